@@ -1,6 +1,7 @@
 //! `lumbre diff`: the difference of two pictures.
 
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lumbre::CancelToken;
@@ -19,10 +20,11 @@ use crate::units;
 #[command(after_help = "Examples:
   lumbre diff out.exr reference.exr
   lumbre diff out.png golden.png --metric flip --fail-above 0.02 -o heat.png
+  lumbre render scene.pbrt -o - | lumbre diff - golden.png
 
 Prints the difference alone, so that scripts can read it. Exit status 1 when it is above --fail-above.")]
 pub(crate) struct Arguments {
-    /// A picture: .exr, .png, .hdr, .pfm, .jpg and others.
+    /// A picture: .exr, .png, .hdr, .pfm, .jpg and others; - is standard input.
     a: PathBuf,
     /// The picture to compare it with; relmse and flip take it as the reference.
     b: PathBuf,
@@ -55,6 +57,10 @@ const FLIP_BYTES: u64 = 160;
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let is_standard_input = |path: &Path| path.as_os_str() == "-";
+    if is_standard_input(&arguments.a) && is_standard_input(&arguments.b) {
+        return Err(Failure::Usage("the two pictures cannot both be standard input".to_owned()));
+    }
     let signals = Signals::listen(&CancelToken::new())?;
     if let Some(output) = &arguments.output {
         Inputs::of([arguments.a.as_path(), &arguments.b]).refuse(output)?;
@@ -63,7 +69,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut limits = Limits::default();
     limits.memory = memory.for_reading() / 2;
     let read = |path: &PathBuf| {
-        lumbre::read_image_within(path, limits).map_err(|error| memory.explain(error.into()))
+        let image = if is_standard_input(path) {
+            lumbre::read_image_from("standard input", io::stdin(), limits)
+        } else {
+            lumbre::read_image_within(path, limits)
+        };
+        image.map_err(|error| memory.explain(error.into()))
     };
     let (a, b) = (read(&arguments.a)?, read(&arguments.b)?);
     let pixels = u64::from(a.width()) * u64::from(a.height());

@@ -16,6 +16,7 @@ pub(crate) fn one_of<T: Clone + Send + Sync + 'static>(
 mod tests {
     use lumbre::description::IntegratorKind;
     use lumbre::image::{Metric, ToneMap};
+    use lumbre::shading::ShadingNormals;
     use lumbre::{Feature, Ground};
 
     use crate::{diff, render};
@@ -23,6 +24,7 @@ mod tests {
     #[test]
     fn every_name_that_is_listed_is_known() {
         assert!(render::INTEGRATORS.iter().all(|name| IntegratorKind::from_name(name).is_some()));
+        assert!(render::SHADING_NORMALS.iter().all(|name| ShadingNormals::from_name(name).is_some()));
         assert!(render::TONE_MAPS.iter().all(|name| ToneMap::from_name(name).is_some()));
         assert!(render::FEATURES.iter().all(|name| Feature::from_name(name).is_some()));
         assert!(diff::METRICS.iter().all(|name| Metric::from_name(name).is_some()));

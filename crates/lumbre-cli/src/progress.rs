@@ -50,7 +50,7 @@ impl Progress for Watched<'_> {
 
 /// Progress on standard error.
 pub(crate) enum Display {
-    /// A bar.
+    /// A bar, or a line of words where it is not known how much there is to do.
     Bar(ProgressBar),
     /// Lines, with the time of the last one.
     Lines {
@@ -81,11 +81,8 @@ impl Display {
     }
 
     fn bar() -> Self {
-        let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
-        if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent:>3}%  {msg}") {
-            bar.set_style(style);
-        }
-        Self::Bar(bar)
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+        Self::Bar(styled(bar, "{msg}"))
     }
 
     /// Clears a bar.
@@ -94,38 +91,104 @@ impl Display {
             bar.finish_and_clear();
         }
     }
-}
 
-impl Display {
-    fn state(&self, state: &State) {
-        let left = state.left.map_or_else(String::new, |left| format!(", {} left", spoken(left)));
+    /// Shows what share is done, in [0, 1], and words; `json` is the line of [`Style::Json`].
+    fn show(&self, share: Option<f64>, words: String, json: impl FnOnce() -> serde_json::Value) {
         match self {
             Self::None => {}
             Self::Bar(bar) => {
-                bar.set_position((state.share * STEPS as f64) as u64);
-                bar.set_message(format!("{}{left}", spoken(state.elapsed)));
+                if let Some(share) = share {
+                    if bar.length().is_none() {
+                        bar.set_length(STEPS);
+                        styled(bar.clone(), "{bar:40} {percent:>3}%  {msg}");
+                    }
+                    bar.set_position((share * STEPS as f64) as u64);
+                }
+                bar.set_message(words);
             }
-            Self::Lines { json, last } => {
+            Self::Lines { json: is_json, last } => {
                 let Ok(mut last) = last.lock() else { return };
-                let due = last.is_none_or(|at| at.elapsed() >= INTERVAL) || state.share >= 1.0;
-                if !due {
+                let is_done = share.is_some_and(|share| share >= 1.0);
+                if !is_done && last.is_some_and(|at| at.elapsed() < INTERVAL) {
                     return;
                 }
                 *last = Some(Instant::now());
-                if *json {
-                    let line = serde_json::json!({
-                        "samples": state.samples,
-                        "total": state.total,
-                        "share": state.share,
-                        "seconds": state.elapsed.as_secs_f64(),
-                        "seconds_left": state.left.map(|left| left.as_secs_f64()),
-                    });
-                    say!("{line}");
-                } else {
-                    let percent = 100.0 * state.share;
-                    say!("{percent:5.1} %  {}{left}", spoken(state.elapsed));
+                match share {
+                    _ if *is_json => say!("{}", json()),
+                    Some(share) => say!("{:5.1} %  {words}", 100.0 * share),
+                    None => say!("{words}"),
                 }
             }
         }
+    }
+
+    fn state(&self, state: &State) {
+        let words = format!("{}{}", spoken(state.elapsed), time_left(state.left));
+        self.show(Some(state.share), words, || {
+            serde_json::json!({
+                "samples": state.samples,
+                "total": state.total,
+                "share": state.share,
+                "seconds": state.elapsed.as_secs_f64(),
+                "seconds_left": state.left.map(|left| left.as_secs_f64()),
+            })
+        });
+    }
+}
+
+fn styled(bar: ProgressBar, template: &str) -> ProgressBar {
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    bar
+}
+
+fn time_left(left: Option<Duration>) -> String {
+    left.map_or_else(String::new, |left| format!(", {} left", spoken(left)))
+}
+
+/// How many rays are done, on a terminal.
+pub(crate) struct RayProgress {
+    display: Display,
+    start: Instant,
+}
+
+impl RayProgress {
+    /// Shows nothing yet, or never anything.
+    pub(crate) fn new(quiet: bool) -> Self {
+        let is_shown = !quiet && std::io::stderr().is_terminal();
+        Self { display: Display::new(if is_shown { Style::Bar } else { Style::None }), start: Instant::now() }
+    }
+
+    /// Shows that so many rays are done, which are this share of all, if that is known.
+    pub(crate) fn show(&self, rays: u64, share: Option<f64>) {
+        let elapsed = self.start.elapsed();
+        self.display.show(share, ray_words(rays, share, elapsed), || serde_json::json!({ "rays": rays }));
+    }
+
+    /// Clears what is shown.
+    pub(crate) fn finish(&self) {
+        self.display.finish();
+    }
+}
+
+fn ray_words(rays: u64, share: Option<f64>, elapsed: Duration) -> String {
+    let seconds = elapsed.as_secs_f64();
+    let rate = rays as f64 / seconds.max(1e-3);
+    let share = share.filter(|share| 0.0 < *share && *share <= 1.0);
+    let left = share.and_then(|share| Duration::try_from_secs_f64(seconds / share - seconds).ok());
+    format!("{:.1} million rays, {:.2} million/s{}", rays as f64 / 1e6, rate / 1e6, time_left(left))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_left_is_said_where_the_share_is_known() {
+        let elapsed = Duration::from_secs(20);
+        let words = |share| ray_words(30_000_000, share, elapsed);
+        assert_eq!(words(Some(0.25)), "30.0 million rays, 1.50 million/s, 60 s left");
+        assert_eq!(words(None), "30.0 million rays, 1.50 million/s");
     }
 }

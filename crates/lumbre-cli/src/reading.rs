@@ -62,7 +62,7 @@ pub(crate) struct ReadingArguments {
     /// Files that may be opened.
     #[arg(long, value_name = "N", hide_short_help = true, help_heading = "Limits")]
     max_files: Option<u64>,
-    /// Bytes that a compressed byte may expand to.
+    /// Bytes that a compressed byte may expand to, and how often on average a file may be included.
     #[arg(long, value_name = "N", hide_short_help = true, help_heading = "Limits")]
     max_expansion: Option<u64>,
 }

@@ -10,7 +10,8 @@ use clap::Args;
 use lumbre::description::{Camera, CameraKind, GroundDesc, IntegratorKind};
 use lumbre::formats::image::{ExrPrecision, ImageFormat};
 use lumbre::formats::{Diagnostics, probe_writable};
-use lumbre::image::ToneMap;
+use lumbre::image::{Image, ToneMap};
+use lumbre::shading::ShadingNormals;
 use lumbre::{
     CancelToken, DVec3, Feature, Ground, Picture, PixelBounds, RenderOptions, SaveOptions, Scene, SceneDesc,
     Stage, StageLight, Staged,
@@ -100,6 +101,10 @@ pub(crate) struct Arguments {
     /// The maximal number of bounces.
     #[arg(long, value_name = "N")]
     max_depth: Option<u32>,
+    /// What is made of normals of vertices and maps that are not those of the surface: lumbre keeps coarse meshes free of black
+    /// edges and leaks, pbrt takes them as pbrt-v4 does. By default what the scene says, else lumbre.
+    #[arg(long, value_name = "HOW", value_parser = one_of(&SHADING_NORMALS, ShadingNormals::from_name))]
+    shading_normals: Option<ShadingNormals>,
     /// Seed of the random numbers.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -153,6 +158,8 @@ fn exposure(text: &str) -> Result<f32, String> {
 /// The names of integrators.
 pub(crate) const INTEGRATORS: [&str; 7] =
     ["path", "whitted", "ambientocclusion", "normals", "depth", "albedo", "uv"];
+/// What can be made of shading normals.
+pub(crate) const SHADING_NORMALS: [&str; 2] = ["lumbre", "pbrt"];
 /// The names of tone mappings.
 pub(crate) const TONE_MAPS: [&str; 4] = ["none", "agx", "aces", "neutral"];
 /// The names of formats that are written.
@@ -441,6 +448,9 @@ fn picture(
     if staged.framed && scene.resolved().accel().primitive_count() == 0 {
         warn(format!("{}: there is nothing to see", name.display()))?;
     }
+    if staged.guessed_up && is_first && !arguments.quiet {
+        say!("{}: z is taken for up, by the plane that it stands on (--up y takes y)", name.display());
+    }
     if scene.is_dark() && is_of_light {
         warn(format!("{}: the scene has no light, its picture is black", name.display()))?;
     }
@@ -503,6 +513,10 @@ fn picture(
     drop(stream);
     let save_time = save_start.elapsed();
     report_stats(arguments, &picture);
+    let is_told = is_first && !arguments.quiet && is_of_light && !scene.is_dark();
+    if is_told && picture.stats().spp > 0 && is_nearly_black(picture.image(), exposure) {
+        say!("{DARK_HINT}");
+    }
     if let Some(path) = &arguments.stats {
         let seconds = json!({
             "load": load_time.as_secs_f64(),
@@ -522,6 +536,29 @@ fn picture(
         summary(arguments.verbose, &scene, &picture, &name, render_time);
     }
     Ok(())
+}
+
+/// What may help where next to nothing is lit.
+const DARK_HINT: &str = "hint: next to nothing in the picture is lit: --fit shows what is closed from outside, where its light does not come in
+  (--eye and --target put a camera inside, where its lights may be), --env FILE lights it from all around, --exposure EV
+  brightens what light there is";
+
+/// Whether almost all of what covers a picture would be shown black.
+fn is_nearly_black(image: &Image, exposure: f32) -> bool {
+    // Two steps of a byte above black, by the curve of sRGB.
+    let seen = 6e-4 * (-exposure).exp2();
+    let (mut covered, mut lit) = (0.0, 0.0);
+    for (i, pixel) in image.pixels().iter().enumerate() {
+        let alpha = image.alpha().map_or(1.0, |alpha| alpha[i]);
+        covered += f64::from(alpha);
+        // Colours are multiplied by coverage.
+        if pixel.max_component() > seen {
+            lit += f64::from(alpha);
+        }
+    }
+    const LEAST_COVERED: f64 = 0.005;
+    const LEAST_LIT: f64 = 0.01;
+    covered > LEAST_COVERED * image.pixels().len() as f64 && lit < LEAST_LIT * covered
 }
 
 /// Refuses a picture that would not fit into memory, while it is rendered or while it is saved.
@@ -608,6 +645,8 @@ fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failur
         options.camera = camera(scene, wanted)?;
     }
     options.integrator.kind = arguments.integrator.unwrap_or(options.integrator.kind);
+    options.integrator.shading_normals =
+        arguments.shading_normals.unwrap_or(options.integrator.shading_normals);
     options.integrator.max_depth = arguments.max_depth.unwrap_or(options.integrator.max_depth);
     options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
     options.stop.time = arguments.time;
@@ -699,13 +738,12 @@ fn peak_memory() -> Option<u64> {
 fn summary(verbose: bool, scene: &Scene, picture: &Picture, output: &str, render_time: Duration) {
     let stats = picture.stats();
     let image = picture.image();
-    say!(
-        "{output}: {}x{}, {} a pixel, {}",
-        image.width(),
-        image.height(),
-        counted(u64::from(stats.spp), "sample"),
-        spoken(render_time)
-    );
+    let samples = if stats.spp > 0 {
+        format!("{} a pixel", counted(u64::from(stats.spp), "sample"))
+    } else {
+        format!("a coarse picture of {}", counted(stats.samples, "sample"))
+    };
+    say!("{output}: {}x{}, {samples}, {}", image.width(), image.height(), spoken(render_time));
     if verbose {
         let rays = stats.rays;
         let total = rays.camera + rays.bounce + rays.shadow;

@@ -33,7 +33,8 @@ pub(crate) struct ViewArguments {
     /// The point in the middle of the picture; by default that of the model.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = point, conflicts_with = "camera")]
     target: Option<DVec3>,
-    /// What is up: x, y, z, -x, -y, -z or a direction X,Y,Z. By default z for .stl and y for all others.
+    /// What is up: x, y, z, -x, -y, -z or a direction X,Y,Z. By default z for .stl, and for an .obj or .ply that plainly
+    /// stands on a plane of z; y for all others.
     #[arg(long, value_name = "AXIS|X,Y,Z", allow_hyphen_values = true, value_parser = up_axis)]
     up: Option<UpAxis>,
 }

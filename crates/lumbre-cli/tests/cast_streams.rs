@@ -165,6 +165,7 @@ fn what_is_wrong_late_is_said_and_leaves_what_was_there() {
     let size = 9001 * 64;
     let cut = npy[..npy.len() - 100].to_vec();
     let long = [&npy[..], b"more"].concat();
+    let (cut_at, long_at) = (cut.len(), npy.len());
     let cases = [
         (bad_number.into_bytes(), "9003:9: expected a number, found \"five\"".to_owned()),
         (short.into_bytes(), "9003:6: 3 values (expected 8)".to_owned()),
@@ -172,8 +173,8 @@ fn what_is_wrong_late_is_said_and_leaves_what_was_there() {
             [csv.as_bytes(), b"1,2,\xFF\n"].concat(),
             "9003: not text (expected CSV in UTF-8, or a .npy array)".to_owned(),
         ),
-        (cut, format!(" {} bytes of data for shape (9001, 8) of <f8", size - 100)),
-        (long, format!(" {} bytes of data for shape (9001, 8) of <f8", size + 4)),
+        (cut, format!("byte {cut_at}: {} bytes of data for shape (9001, 8) of <f8", size - 100)),
+        (long, format!("byte {long_at}: {} bytes of data for shape (9001, 8) of <f8", size + 4)),
     ];
     for (bytes, expected) in cases {
         fs::write(desk.path("rays"), &bytes).unwrap();

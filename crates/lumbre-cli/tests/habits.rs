@@ -463,3 +463,119 @@ fn a_damaged_file_is_told_with_its_byte_and_who_named_it() {
         assert_eq!(text.lines().count(), 1 + places.len(), "{text}");
     }
 }
+
+#[test]
+fn shading_normals_are_those_of_the_option_else_of_the_scene() {
+    let desk = Desk::new();
+    let world = "Film \"rgb\" \"integer xresolution\" 12 \"integer yresolution\" 9 \"bool savefp16\" false\n\
+        Sampler \"independent\" \"integer pixelsamples\" 3\n\
+        LookAt 1 -9 3  0 0 0  0 0 1\nCamera \"perspective\" \"float fov\" 20\nWorldBegin\n\
+        LightSource \"point\" \"point3 from\" [ 6 0.5 -0.2 ] \"rgb I\" [ 50 60 70 ]\n\
+        Shape \"trianglemesh\" \"point3 P\" [ -2 -1 0  2 -1 0  0 2 0.5 ] \"normal N\" [ 1 -0.3 1  1 -0.3 1  1 -0.3 1 ]\n";
+    desk.write("ours.pbrt", &format!("Integrator \"path\"\n{world}"));
+    desk.write("pbrt.pbrt", &format!("Integrator \"path\" \"string shadingnormals\" \"pbrt\"\n{world}"));
+    for (scene, normals, picture) in [
+        ("ours.pbrt", None, "default.pfm"),
+        ("ours.pbrt", Some("lumbre"), "lumbre.pfm"),
+        ("ours.pbrt", Some("pbrt"), "pbrt.pfm"),
+        ("pbrt.pbrt", None, "scene.pfm"),
+        ("pbrt.pbrt", Some("lumbre"), "back.pfm"),
+    ] {
+        let mut arguments = vec!["render", scene, "-o", picture, "--quiet"];
+        arguments.extend(normals.iter().flat_map(|normals| ["--shading-normals", normals]));
+        let out = desk.lumbre(&arguments);
+        assert_eq!(code(&out), 0, "{arguments:?}: {}", stderr(&out));
+    }
+    let bytes = |name: &str| fs::read(desk.path(name)).unwrap();
+    assert!(image(&desk, "pbrt.pfm").pixels().iter().any(|pixel| pixel.g > 0.0));
+    for (a, b, same) in [
+        ("default.pfm", "lumbre.pfm", true),
+        ("default.pfm", "back.pfm", true),
+        ("pbrt.pfm", "scene.pfm", true),
+        ("default.pfm", "pbrt.pfm", false),
+    ] {
+        assert_eq!(bytes(a) == bytes(b), same, "{a} {b}");
+    }
+}
+
+#[test]
+fn a_picture_in_which_next_to_nothing_is_lit_comes_with_a_hint() {
+    let desk = Desk::new();
+    let room = |light: &str, eye: &str| {
+        format!(
+            "Film \"rgb\" \"integer xresolution\" 16 \"integer yresolution\" 12\nSampler \"independent\" \"integer pixelsamples\" 4\n\
+             LookAt {eye}  0 0.5 -3  0 1 0\nCamera \"perspective\"\nWorldBegin\n{light}\n\
+             Shape \"box\" \"point3 p0\" [ -3 -2 -3 ] \"point3 p1\" [ 3 2.5 3 ]\n"
+        )
+    };
+    let sky = "LightSource \"infinite\" \"rgb L\" [ 1 2 3 ]";
+    let lamp = "LightSource \"point\" \"rgb I\" [ 9 8 7 ]";
+    let faint = "LightSource \"point\" \"rgb I\" [ 1e-4 1e-4 1e-4 ]";
+    let (inside, outside) = ("0.5 1 2", "0.5 1 12");
+    for (name, light, eye, more, is_hinted) in [
+        ("the sky stays outside", sky, inside, &[][..], true),
+        ("the lamp stays inside", lamp, outside, &[], true),
+        ("a faint lamp", faint, inside, &[], true),
+        ("a faint lamp, exposed for", faint, inside, &["--exposure", "12"], false),
+        ("a lamp", lamp, inside, &[], false),
+        ("no picture of light", sky, inside, &["--integrator", "depth"], false),
+        ("nobody wants to hear it", sky, inside, &["--quiet"], false),
+    ] {
+        desk.write("room.pbrt", &room(light, eye));
+        let out = desk.lumbre(&[&["render", "room.pbrt", "-o", "a.png"], more].concat());
+        assert_eq!(code(&out), 0, "{name}: {}", stderr(&out));
+        let said = stderr(&out);
+        let words = ["hint: ", "--env", "--exposure", "--fit", "a camera inside"];
+        assert_eq!(words.map(|word| said.contains(word)), [is_hinted; 5], "{name}: {said}");
+    }
+}
+
+#[test]
+fn diff_takes_one_of_its_pictures_from_standard_input() {
+    let desk = Desk::new();
+    let grey = |value: f32| lumbre::image::Image::filled(6, 4, lumbre::image::Rgb::splat(value));
+    for (name, value) in [("a.exr", 0.5), ("b.exr", 0.75)] {
+        lumbre::write_image(&desk.path(name), &grey(value), &lumbre::SaveOptions::default()).unwrap();
+    }
+    let bytes = fs::read(desk.path("a.exr")).unwrap();
+    for (arguments, expected) in [(["diff", "-", "b.exr"], "0.25\n"), (["diff", "a.exr", "-"], "0\n")] {
+        let out = with_input(&desk, &arguments, &bytes);
+        assert_eq!((code(&out), stdout(&out)), (0, expected.to_owned()), "{}", stderr(&out));
+    }
+    let out = with_input(&desk, &["diff", "-", "b.exr"], &bytes[..bytes.len() - 9]);
+    assert_eq!(code(&out), 3);
+    assert!(stderr(&out).starts_with("error: standard input:byte "), "{}", stderr(&out));
+    assert_eq!(code(&with_input(&desk, &["diff", "-", "-"], &bytes)), 2);
+}
+
+#[test]
+fn a_model_that_plainly_stands_on_a_plane_of_z_has_z_up_unless_told() {
+    let desk = Desk::new();
+    // A pole on a wide slab.
+    let box_of = |[x, y, from, to]: [f64; 4], first: usize| {
+        let mut text = String::new();
+        for i in 0..8 {
+            let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            let z = if i >> 2 & 1 == 1 { to } else { from };
+            text += &format!("v {} {} {z}\n", sign(0) * x, sign(1) * y);
+        }
+        for quad in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]] {
+            let corners: Vec<String> = quad.iter().map(|corner| (corner + first).to_string()).collect();
+            text += &format!("f {}\n", corners.join(" "));
+        }
+        text
+    };
+    let pole = box_of([3.0, 2.0, 0.0, 0.5], 1) + &box_of([0.4, 0.3, 0.5, 6.0], 9);
+    desk.write("pole.obj", &pole);
+    let render = |more: &[&str], picture: &str| {
+        let out =
+            desk.lumbre(&[&["pole.obj", "-o", picture, "--size", "24x24", "--spp", "1"], more].concat());
+        assert_eq!(code(&out), 0, "{}", stderr(&out));
+        stderr(&out).contains("z is taken for up")
+    };
+    assert!(render(&[], "guessed.pfm"));
+    assert!(!render(&["--up", "z"], "z.pfm") && !render(&["--up", "y"], "y.pfm"));
+    let bytes = |name: &str| fs::read(desk.path(name)).unwrap();
+    assert!(bytes("guessed.pfm") == bytes("z.pfm") && bytes("guessed.pfm") != bytes("y.pfm"));
+    assert!(!render(&["--eye", "9,8,7", "--up", "y"], "eye.pfm"));
+}

@@ -143,6 +143,10 @@ fn time_that_is_over_in_the_first_pass_leaves_a_coarse_whole_picture_or_the_old_
     let (code, said) = end_of(start(&folder, &arguments));
     if code == 0 {
         assert!(said.contains("the picture has one for"), "{said}");
+        assert!(
+            said.contains("a.png: 3000x2000, a coarse picture of ") && !said.contains("0 samples a pixel"),
+            "{said}"
+        );
         let picture = lumbre::read_image(&folder.path("a.png")).unwrap();
         // No band of it is empty.
         for y in (0..2000).step_by(16) {

@@ -21,7 +21,7 @@ pub struct Limits {
     pub nesting: u32,
     /// Files opened over the whole run, includes and textures counted each time (`--max-files`).
     pub files: u64,
-    /// The expansion ratio of compressed data, beyond the first [`Limits::FREE_EXPANSION`] bytes of a stream
+    /// The expansion ratio of compressed data, and of files that a scene includes again and again, beyond the first [`Limits::FREE_EXPANSION`] bytes of a stream
     /// (`--max-expansion`).
     pub expansion: u64,
 }
@@ -76,7 +76,7 @@ impl LimitKind {
             Self::Elements => "elements",
             Self::Nesting => "levels of nesting",
             Self::Files => "files",
-            Self::Expansion => "bytes from each compressed byte",
+            Self::Expansion => "bytes from each byte stored",
         }
     }
 }

@@ -19,6 +19,7 @@ mod origin;
 pub mod pbrt;
 pub mod ply;
 mod polygon;
+mod standing;
 pub mod stl;
 mod thin;
 

@@ -334,12 +334,12 @@ fn every_broken_file_gets_its_message() {
         (
             "a.png",
             b"RIFF\x10\0\0\0WEBPVP8 ".to_vec(),
-            "a.png: damaged WebP image (found \"failed to fill whole buffer\")",
+            "a.png:byte 12: damaged WebP image (found \"failed to fill whole buffer\")",
         ),
         (
             "a.png",
             png_of_size(0x7FFF_FFFF, 0x7FFF_FFFF),
-            "a.png: PNG image of an impossible size (found 2147483647 by 2147483647 pixels in 130 bytes)",
+            "a.png:byte 16: PNG image of an impossible size (found 2147483647 by 2147483647 pixels in 130 bytes)",
         ),
         // The pixels stand behind the signature, the header and the rendering intent.
         ("a.png", png_of_size(120, 90), "a.png:byte 73: damaged PNG image (found "),

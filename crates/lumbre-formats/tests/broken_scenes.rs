@@ -580,6 +580,29 @@ fn includes_that_fan_out_stop_at_the_limit_of_files() {
 }
 
 #[test]
+fn files_that_are_included_again_and_again_stop_at_the_limit_of_expansion() {
+    let dir = tempfile::tempdir().unwrap();
+    // Eight of them are free.
+    let size = Limits::FREE_EXPANSION / 8;
+    fs::write(dir.path().join("long.pbrt"), " ".repeat(size as usize)).unwrap();
+    fs::write(dir.path().join("other.pbrt"), " ".repeat(size as usize / 2)).unwrap();
+    let read = |lines: usize, expansion: u64| {
+        let text = format!("WorldBegin Include \"other.pbrt\"{}", "\nInclude \"long.pbrt\"".repeat(lines));
+        fs::write(dir.path().join("s.pbrt"), text).unwrap();
+        let limits = changed(Limits::default(), |it| it.expansion = expansion);
+        let options = changed(ReadOptions::default(), |it| it.limits = limits);
+        open_scene(&dir.path().join("s.pbrt"), &options).map_err(|error| error.to_string())
+    };
+    // In line 9 there come to be 17/2 of the size, from 3/2 of it that are stored.
+    assert!(read(7, 1).is_ok());
+    assert!(read(11, 8).is_ok());
+    let error = read(11, 2).unwrap_err();
+    let place =
+        format!("{}:9:9: Include of \"long.pbrt\" once more: needs ", dir.path().join("s.pbrt").display());
+    assert!(error.starts_with(&place) && error.contains("--max-expansion"), "{error}");
+}
+
+#[test]
 fn files_that_are_not_there_are_errors_where_they_are_asked_for() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("s.pbrt");

@@ -9,7 +9,9 @@ use lumbre_geometry::{Ray, Shape};
 use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Transform, Vec2, Vec3};
 use lumbre_scene::*;
-use lumbre_shading::{Convention, Mapping2d, MaterialKind, PrincipledParams, Spectrum, Texture};
+use lumbre_shading::{
+    Convention, Mapping2d, MaterialKind, PrincipledParams, ShadingNormals, Spectrum, Texture,
+};
 
 fn try_read(text: &str) -> (Result<SceneDesc, FormatError>, Diagnostics) {
     let mut diagnostics = Diagnostics::new();
@@ -907,7 +909,7 @@ fn samplers_and_integrators_are_read_and_the_last_wins() {
             "Integrator \"{name}\" \"bool regularize\" true \"integer maxdepth\" 9 Option \"seed\" 42
              Sampler \"independent\" \"integer seed\" 7 \"integer pixelsamples\" 3 WorldBegin"
         ));
-        assert_eq!(scene.integrator, IntegratorDesc { kind, max_depth: 9 });
+        assert_eq!(scene.integrator, IntegratorDesc { kind, max_depth: 9, ..IntegratorDesc::default() });
         assert_eq!(scene.sampler, SamplerDesc { kind: SamplerKind::Independent, spp: Some(3), seed: 42 });
     }
     for (name, kind) in [
@@ -921,6 +923,23 @@ fn samplers_and_integrators_are_read_and_the_last_wins() {
     }
     let scene = read("Integrator \"whitted\" \"integer lightsamples\" 9 \"bool sky\" true WorldBegin");
     assert_eq!(scene.integrator.kind, IntegratorKind::Whitted { light_samples: 9, sky: true });
+}
+
+#[test]
+fn every_integrator_says_what_it_makes_of_shading_normals() {
+    for name in ["path", "whitted", "ambientocclusion"] {
+        for (value, expected) in [
+            ("", ShadingNormals::Lumbre),
+            ("\"string shadingnormals\" \"lumbre\"", ShadingNormals::Lumbre),
+            ("\"string shadingnormals\" \"pbrt\"", ShadingNormals::Pbrt),
+        ] {
+            let scene = read(&format!("Integrator \"{name}\" {value} WorldBegin"));
+            assert_eq!(scene.integrator.shading_normals, expected, "{name} {value}");
+        }
+    }
+    let (refused, _) = try_read("Integrator \"path\" \"string shadingnormals\" \"pbtr\" WorldBegin");
+    let wrong = refused.unwrap_err().to_string();
+    assert!(wrong.contains("one of lumbre, pbrt; did you mean \"pbrt\"?"), "{wrong}");
 }
 
 // Files.
@@ -1079,9 +1098,9 @@ WorldEnd"#,
     let Texture::Scale { texture, scale } = &**reflectance else { panic!() };
     assert_eq!((constant(texture), constant(scale)), (Rgb::new(0.2, 0.4, 0.6), 0.5));
     assert_eq!(mesh(&scene.shapes[0]).uvs.as_ref().unwrap()[1], Vec2::new(1.0, 0.0));
-    let MaterialKind::CoatedDiffuse { reflectance, roughness, .. } = kind(&scene, 1) else { panic!() };
-    assert_eq!(constant(reflectance), Rgb::new(0.1, 0.2, 0.3));
-    assert!(!roughness.remap && constant(&roughness.u) == 0.2);
+    let MaterialKind::Uber(plastic) = kind(&scene, 1) else { panic!() };
+    assert_eq!(constant(&plastic.kd), Rgb::new(0.1, 0.2, 0.3));
+    assert!(!plastic.roughness.remap && constant(&plastic.roughness.u) == 0.2);
     let MaterialKind::ConductorReflectance { reflectance, .. } = kind(&scene, 2) else { panic!() };
     assert_eq!(constant(reflectance), Rgb::splat(0.9));
     assert!(matches!(kind(&scene, 3), MaterialKind::Dielectric { eta, .. } if *eta == 1.6));
@@ -1177,9 +1196,51 @@ fn what_a_film_and_old_materials_ask_for_is_kept() {
     for old in ["uber", "plastic", "substrate"] {
         let text = format!("WorldBegin Material \"{old}\" \"float index\" 2.5 Shape \"sphere\"");
         let (scene, _) = try_read(&text);
-        let MaterialKind::CoatedDiffuse { eta, .. } = *kind(&scene.unwrap(), 0) else { panic!("{old}") };
+        let eta = match kind(&scene.unwrap(), 0) {
+            MaterialKind::CoatedDiffuse { eta, .. } => *eta,
+            MaterialKind::Uber(params) => constant(&params.eta),
+            _ => panic!("{old}"),
+        };
         assert_eq!(eta, 2.5, "{old}");
     }
+}
+
+#[test]
+fn every_parameter_of_uber_and_plastic_is_kept() {
+    let whole = |text: &str| {
+        let (scene, said) = warned(text);
+        assert_eq!(said.len(), 1, "only that it is of pbrt-v3: {said:?}");
+        scene
+    };
+    let scene = whole(
+        r#"Texture "t" "color" "checkerboard" "color tex1" [.2 .4 .6]
+           Material "uber" "rgb Kd" [.1 .2 .3] "rgb Ks" [.4 .5 .6] "rgb Kr" [.7 .8 .9] "texture Kt" "t" "rgb opacity" [.3 .6 .9]
+             "float uroughness" .2 "float vroughness" .4 "float index" 1.7 "bool remaproughness" "false" Shape "sphere"
+           Material "uber" Shape "sphere"
+           Material "plastic" "color Ks" [.3 .2 .1] Shape "sphere""#,
+    );
+    let uber = |shape: usize| {
+        let MaterialKind::Uber(params) = kind(&scene, shape) else { panic!("{:?}", kind(&scene, shape)) };
+        params
+    };
+    let all = uber(0);
+    assert_eq!(constant(&all.kd), Rgb::new(0.1, 0.2, 0.3));
+    assert_eq!(constant(&all.ks), Rgb::new(0.4, 0.5, 0.6));
+    assert_eq!(constant(&all.kr), Rgb::new(0.7, 0.8, 0.9));
+    assert!(!all.kt.is_constant());
+    assert_eq!(constant(&all.opacity), Rgb::new(0.3, 0.6, 0.9));
+    let roughness = [constant(&all.roughness.u), constant(&all.roughness.v)];
+    assert_eq!((constant(&all.eta), roughness, all.roughness.remap), (1.7, [0.2, 0.4], false));
+    for (shape, ks) in [(1, Rgb::splat(0.25)), (2, Rgb::new(0.3, 0.2, 0.1))] {
+        let params = uber(shape);
+        assert_eq!((constant(&params.kd), constant(&params.ks)), (Rgb::splat(0.25), ks));
+        assert_eq!((constant(&params.kr), constant(&params.kt)), (Rgb::BLACK, Rgb::BLACK));
+        assert_eq!((constant(&params.opacity), constant(&params.eta)), (Rgb::WHITE, 1.5));
+        assert!(params.roughness.remap && constant(&params.roughness.u) == 0.1);
+    }
+    // Plastic has no more than that.
+    let (_, said) = warned(r#"Material "plastic" "rgb Kr" [.5 .5 .5] Shape "sphere""#);
+    assert!(said.iter().any(|line| line.contains("\"Kr\"")), "{said:?}");
 }
 
 #[test]
@@ -1218,4 +1279,66 @@ fn the_power_of_an_area_light_keeps_the_factor_of_its_colour() {
     let factor = (200.0 / (std::f64::consts::PI.powi(2) * 2.25 * 2.0)) as f32;
     let expected = Rgb::new(9.0, 8.0, 7.0) * factor;
     assert!((seen - expected).map(f32::abs).max_component() < 1e-4, "{seen:?} {expected:?}");
+}
+
+#[test]
+fn inline_meshes_far_away_keep_their_digits() {
+    // A metre of a map, with millimetres.
+    let (east, north) = (500_000.125, 4_649_781.25);
+    let corners: Vec<DVec3> = [(0.0, 0.0), (1.003, 0.0), (1.003, 1.007), (0.0, 1.007)]
+        .map(|(x, y)| DVec3::new(east + x, north + y, 12.5))
+        .to_vec();
+    let points: Vec<String> = corners.iter().map(|p| format!("{} {} {}", p.x, p.y, p.z)).collect();
+    let near = |scene: &SceneDesc, shape: &ShapeDesc, by: DVec3| {
+        let (GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh)) = &shape.geometry else { panic!() };
+        assert_eq!(mesh.positions.len(), 4);
+        for (found, corner) in mesh.positions.iter().zip(&corners) {
+            let found = shape.world_from_object.point(found.as_dvec3());
+            assert!((found - *corner - by).abs().max_element() < 1e-6, "{found}");
+        }
+        assert!(scene.materials.len() < 3);
+    };
+    for (shape, indices) in [("trianglemesh", "0 1 2 0 2 3"), ("bilinearmesh", "0 1 3 2")] {
+        let shape = format!(
+            "Shape \"{shape}\" \"integer indices\" [ {indices} ] \"point3 P\" [ {} ]",
+            points.join(" ")
+        );
+        let scene = world(&shape);
+        near(&scene, &scene.shapes[0], DVec3::ZERO);
+        let scene = world(&format!("Translate -500000 2 3 {shape}"));
+        near(&scene, &scene.shapes[0], DVec3::new(-500_000.0, 2.0, 3.0));
+        // One that moves stands in an object, to which its motion comes.
+        let scene = world(&format!("ActiveTransform EndTime Translate 0 0 9 ActiveTransform All {shape}"));
+        near(&scene, &scene.objects[0].shapes[0], DVec3::ZERO);
+        let Placement::Moving(motion) = &scene.instances[0].world_from_object else { panic!() };
+        assert_eq!(motion.at(1.0).point(DVec3::ZERO), DVec3::new(0.0, 0.0, 9.0));
+    }
+    // What is near stays what it is, and under the transform that is written.
+    let scene = world("Translate 1 2 3 Shape \"trianglemesh\" \"point3 P\" [ 0.1 0.2 0.3  1 0 0  0 1 0 ]");
+    assert_eq!(origin(&scene.shapes[0]), DVec3::new(1.0, 2.0, 3.0));
+    assert_eq!(mesh(&scene.shapes[0]).positions[0], Vec3::new(0.1, 0.2, 0.3));
+    // A loop subdivision of an octahedron is the same far away as near.
+    let octahedron = |at: f64| {
+        let points = [
+            [1.1, 0.0, 0.0],
+            [-1.1, 0.0, 0.0],
+            [0.0, 1.1, 0.0],
+            [0.0, -1.1, 0.0],
+            [0.0, 0.0, 1.1],
+            [0.0, 0.0, -1.1],
+        ];
+        let points: Vec<String> = points.iter().map(|[x, y, z]| format!("{} {y} {z}", at + x)).collect();
+        let scene = world(&format!(
+            "Shape \"loopsubdiv\" \"integer levels\" 2 \"integer indices\" \
+             [ 0 2 4 2 1 4 1 3 4 3 0 4 2 0 5 1 2 5 3 1 5 0 3 5 ] \"point3 P\" [ {} ]",
+            points.join(" ")
+        ));
+        let shape = &scene.shapes[0];
+        let places = mesh(shape).positions.iter().map(|p| shape.world_from_object.point(p.as_dvec3()));
+        places.map(|p| p - DVec3::new(at, 0.0, 0.0)).collect::<Vec<DVec3>>()
+    };
+    let far = octahedron(16_777_217.0);
+    for (a, b) in octahedron(0.0).iter().zip(&far) {
+        assert!((*a - *b).abs().max_element() < 1e-6, "{a} {b}");
+    }
 }

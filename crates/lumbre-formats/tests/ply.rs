@@ -395,6 +395,53 @@ fn the_texture_of_a_comment_is_found_beside_the_file() {
     assert_eq!(said.len(), 0);
     let MaterialKind::Diffuse { reflectance } = &scene.materials[0].material.kind else { panic!() };
     assert!(matches!(**reflectance, Texture::Image(_)));
+    let (_, said) = with("a b.png\ncomment TextureFile b.png");
+    assert!(said.len() == 1 && said[0].contains("m.ply:4:21: a PLY file names several textures"), "{said:?}");
     let (_, said) = with("gone.png");
     assert!(said.len() == 1 && said[0].contains("cannot use the texture of a PLY file"), "{said:?}");
+}
+
+#[test]
+fn texture_coordinates_of_corners_are_those_of_the_faces() {
+    // A square with a seam along its diagonal, as MeshLab writes it.
+    let file = |body: &str| {
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 4\n{PLACES}property float nx\nproperty float ny\nproperty float nz\n\
+             element face 3\nproperty list uchar int vertex_indices\nproperty list uchar float texcoord\nend_header\n\
+             0 0 1 0 0 1\n2 0 1 0 0 1\n2 3 1 0 0 1\n0 3 1 0.6 0 0.8\n{body}"
+        )
+    };
+    let text = file(
+        "3 0 1 2 6 0 0 0.5 0 0.5 0.75\n3 0 2 3 6 0.25 0.25 0.5 0.75 0 1\n4 0 1 2 3 8 0.25 0.25 0.5 0 0.5 0.75 0 1\n",
+    );
+    let mut said = Diagnostics::new();
+    let file_read = read_ply(text.as_bytes(), &name(), &Budget::default(), &mut said).unwrap();
+    assert_eq!(said.lines(), [""; 0]);
+    assert!(file_read.has_corner_uvs);
+    let mesh = file_read.mesh;
+    let uvs = mesh.uvs.as_ref().unwrap();
+    // One vertex has two places in the texture, and one of them twice.
+    assert_eq!((mesh.positions.len(), uvs.len(), mesh.normals.as_ref().unwrap().len()), (5, 5, 5));
+    let of_corners =
+        |corners: &[u32]| -> Vec<[f32; 2]> { corners.iter().map(|&i| uvs[i as usize].to_array()).collect() };
+    assert_eq!(of_corners(&mesh.triangles[0]), [[0.0, 0.0], [0.5, 0.0], [0.5, 0.75]]);
+    assert_eq!(of_corners(&mesh.triangles[1]), [[0.25, 0.25], [0.5, 0.75], [0.0, 1.0]]);
+    assert_eq!(of_corners(&mesh.quads[0]), [[0.25, 0.25], [0.5, 0.0], [0.5, 0.75], [0.0, 1.0]]);
+    for corners in [&mesh.triangles[0][..], &mesh.triangles[1], &mesh.quads[0]] {
+        assert_eq!(mesh.positions[corners[0] as usize], lumbre_math::Vec3::new(0.0, 0.0, 1.0));
+    }
+    assert_eq!(mesh.quads[0][0], mesh.triangles[1][0]);
+
+    // A face without them, and one with too few; a copy is no vertex of the file.
+    let text = file("3 0 1 2 6 0 0 0.5 0 0.5 0.75\n3 0 2 3 0\n3 0 1 3 4 0.25 0.25 0.5 0\n");
+    let mesh = read_ply(text.as_bytes(), &name(), &Budget::default(), &mut said).unwrap().mesh;
+    assert_eq!((mesh.positions.len(), mesh.triangles.len()), (4, 3));
+    assert!(
+        said.lines().len() == 1 && said.lines()[0].contains("not two numbers a corner"),
+        "{:?}",
+        said.lines()
+    );
+    let text = file("3 0 1 2 6 0 0 0.5 0 0.5 0.75\n3 0 2 3 6 9 9 0.5 0.75 0 1\n3 4 1 2 0\n");
+    let error = read(text.as_bytes()).unwrap_err().to_string();
+    assert!(error.contains("face 2 has a vertex that is not there") && error.contains("0 to 3"), "{error}");
 }

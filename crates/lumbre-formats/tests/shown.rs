@@ -200,6 +200,54 @@ fn nodes_that_are_not_visible_hide_what_hangs_on_them() {
     assert_eq!(with(""), (1, 1));
 }
 
+#[test]
+fn visibility_is_animated_by_a_pointer() {
+    // Visible from the time 0.5 on, hidden from 1 on, and visible again from 2 on: three floats and three bytes.
+    let clip = "data:application/octet-stream;base64,AAAAPwAAgD8AAABAAQABAA==";
+    let at = |frame: Option<f64>, shutter: f64| {
+        let json = triangle(&[
+            (
+                r#""nodes":[{"mesh":0}]"#,
+                r#""extensionsUsed":["KHR_node_visibility","KHR_animation_pointer"],
+                "nodes":[{"children":[1],"extensions":{"KHR_node_visibility":{"visible":false}}},{"mesh":0}],
+                "animations":[{"samplers":[{"input":1,"output":2,"interpolation":"STEP"}],"channels":[{"sampler":0,"target":
+                {"path":"pointer","extensions":{"KHR_animation_pointer":{"pointer":"/nodes/0/extensions/KHR_node_visibility/visible"}}}}]}]"#,
+            ),
+            (
+                r#""max":[3,4,2]}]"#,
+                r#""max":[3,4,2]},{"bufferView":1,"componentType":5126,"count":3,"type":"SCALAR","min":[0.5],"max":[2]},
+                {"bufferView":1,"byteOffset":12,"componentType":5121,"count":3,"type":"SCALAR"}]"#,
+            ),
+            (r#""byteLength":72}],"#, r#""byteLength":72},{"buffer":1,"byteLength":16}],"#),
+            (r#""}]}"#, &format!(r#""}},{{"byteLength":16,"uri":"{clip}"}}]}}"#)),
+        ]);
+        let mut said = Diagnostics::new();
+        let mut options = GltfOptions::default();
+        (options.frame, options.shutter) = (frame, shutter);
+        let (name, folder) = ("m.gltf".into(), Path::new("/nowhere"));
+        let scene =
+            read_gltf(json.as_bytes(), &name, folder, &options, &Budget::default(), &mut said).unwrap();
+        (scene.shapes.len() + scene.instances.len(), said.lines())
+    };
+    // Without a time a file is what it says itself; before the first time of an animation, what that says.
+    for (frame, expected) in [
+        (None, 0),
+        (Some(0.0), 1),
+        (Some(0.75), 1),
+        (Some(1.0), 0),
+        (Some(1.9), 0),
+        (Some(2.0), 1),
+        (Some(7.0), 1),
+    ] {
+        assert_eq!(at(frame, 0.0), (expected, vec![]), "{frame:?}");
+    }
+    // While the shutter is open it stands, and that is said where it really changes.
+    let (count, said) = at(Some(1.25), 0.75);
+    assert_eq!(count, 0);
+    assert!(said.len() == 1 && said[0].contains("KHR_node_visibility/visible"), "{said:?}");
+    assert_eq!(at(Some(1.5), 0.5), (0, vec![]));
+}
+
 fn place() -> TextureContext {
     TextureContext {
         point: lumbre_math::DVec3::ONE,

@@ -13,6 +13,7 @@ use lumbre_math::{DVec3, Vec3};
 use lumbre_render::transport::{Path, Strategy};
 use lumbre_render::{CancelToken, NoProgress, render_with};
 use lumbre_scene::{GeometryDesc, MeshDesc, Scene, SceneDesc};
+use lumbre_shading::uber::UberParams;
 use lumbre_shading::{
     FloatTexture, Material, MaterialKind, PrincipledParams, Roughness, SpectrumTexture, VolumeParams,
 };
@@ -137,6 +138,17 @@ fn what_absorbs_nothing_cannot_be_seen_in_a_white_room() {
     assert_eq!(seen, if is_long() { 53 } else { 19 });
 }
 
+/// White Lambert as far as it is opaque, and what goes straight on for the rest.
+#[test]
+fn a_half_opaque_uber_that_absorbs_nothing_cannot_be_seen_in_a_white_room() {
+    let grey = |c: f32| Arc::new(SpectrumTexture::Constant(Rgb::splat(c)));
+    let [kd, ks, kr, kt, opacity] = [1.0, 0.0, 0.0, 0.0, 0.375].map(grey);
+    let eta = Arc::new(FloatTexture::Constant(1.5));
+    let uber = UberParams { kd, ks, kr, kt, opacity, eta, roughness: Roughness::smooth() };
+    let seen = assert_not_seen(1, "uber", &Material::new(MaterialKind::Uber(Box::new(uber))), false);
+    assert!(seen > 0);
+}
+
 /// In how many shapes it was not seen. Every material is in one of the rooms, and in all of them by `cargo xtask test --all`.
 fn assert_not_seen(number: usize, name: &str, material: &Material, is_layered: bool) -> usize {
     let mut seen = 0;
@@ -161,7 +173,7 @@ fn assert_not_seen(number: usize, name: &str, material: &Material, is_layered: b
             desc.cameras = vec![look(middle - DVec3::new(0.2, 1.2, 0.3), middle, 70.0)];
             let both = if is_layered {
                 LAYERED
-            } else if ["diffuse", "diffuse transmission", "mixture"].contains(&name) {
+            } else if ["diffuse", "diffuse transmission", "mixture", "uber"].contains(&name) {
                 BOTH
             } else {
                 QUIET

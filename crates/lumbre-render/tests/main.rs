@@ -9,4 +9,5 @@ mod integrators;
 mod interiors;
 mod motion;
 mod panes;
+mod shading_normals;
 mod terminator;

@@ -12,6 +12,7 @@ use lumbre_math::{DAffine3, DMat3, DVec3, Transform};
 use lumbre_render::transport::{Integrator, Path, Strategy, Whitted};
 use lumbre_render::{CancelToken, NoProgress, render_with};
 use lumbre_scene::{EnvironmentDesc, IntegratorKind, LightDesc, Scene, SceneDesc};
+use lumbre_shading::uber::UberParams;
 use lumbre_shading::{
     FloatTexture, Material, MaterialKind, PrincipledParams, Roughness, SpectrumTexture, VolumeParams,
 };
@@ -144,6 +145,27 @@ fn of_a_mixed_surface_the_clear_part_lets_light_through() {
     add_pane(&mut desc, 0.5 * LAMP, DVec3::Z, Material::new(mixture));
     let share = 0.375 * through(LAMP.z / LAMP.length());
     assert_direct(&desc, STAIN.to_array().map(|c| open() * share * f64::from(c)), "of two");
+}
+
+#[test]
+fn what_the_opacity_of_uber_leaves_goes_straight_on() {
+    let grey = |c: f32| Arc::new(SpectrumTexture::Constant(Rgb::splat(c)));
+    let opacity = Rgb::new(0.25, 0.5, 0.875);
+    let uber = UberParams {
+        kd: grey(0.3),
+        ks: grey(0.4),
+        kr: grey(0.5),
+        // It bends, so that it throws a shadow.
+        kt: grey(0.6),
+        opacity: Arc::new(SpectrumTexture::Constant(opacity)),
+        eta: number(1.5),
+        roughness: Roughness::isotropic(0.2, true),
+    };
+    for tilt in [DVec3::Z, DVec3::new(0.4, 0.9, -1.3)] {
+        let mut desc = floor(vec![lamp()]);
+        add_pane(&mut desc, 0.5 * LAMP, tilt, Material::new(MaterialKind::Uber(Box::new(uber.clone()))));
+        assert_direct(&desc, opacity.to_array().map(|c| open() * f64::from(1.0 - c)), "uber");
+    }
 }
 
 #[test]

@@ -11,15 +11,13 @@ use lumbre_image::{Image, Rgb};
 use lumbre_math::{DVec3, Vec3};
 use lumbre_render::transport::{Integrator, Path, Whitted};
 use lumbre_render::{CancelToken, NoProgress, render_with};
-use lumbre_scene::{
-    Footprint, GeometryDesc, IntegratorDesc, IntegratorKind, LightDesc, MeshDesc, Scene, SceneDesc,
-};
+use lumbre_scene::{Footprint, GeometryDesc, IntegratorDesc, LightDesc, MeshDesc, Scene, SceneDesc};
 
-const CENTER: DVec3 = DVec3::new(2.0, -1.0, 0.5);
-const RADIUS: f64 = 1.5;
+pub(crate) const CENTER: DVec3 = DVec3::new(2.0, -1.0, 0.5);
+pub(crate) const RADIUS: f64 = 1.5;
 
 /// A sphere of `bands` times twice as many faces about the z axis, with the normals of the sphere or none.
-fn globe(bands: u32, is_smooth: bool) -> GeometryDesc {
+pub(crate) fn globe(bands: u32, is_smooth: bool) -> GeometryDesc {
     let around = 2 * bands;
     let mut unit = vec![];
     for i in 0..=bands {
@@ -45,14 +43,14 @@ fn globe(bands: u32, is_smooth: bool) -> GeometryDesc {
 }
 
 /// White, lit by a point from the right, and seen from the front without its outline.
-fn lit(geometry: GeometryDesc) -> SceneDesc {
+pub(crate) fn lit(geometry: GeometryDesc) -> SceneDesc {
     let mut desc = empty();
     let white = add_material(&mut desc, diffuse(0.8));
     add(&mut desc, geometry, white);
     let from = CENTER + DVec3::new(6.0, -1.5, 1.5);
     desc.lights = vec![LightDesc::Point { from, intensity: Rgb::splat(100.0) }];
     desc.cameras = vec![look(CENTER + DVec3::new(0.3, -9.0, 1.0), CENTER, 12.0)];
-    desc.integrator = IntegratorDesc { kind: IntegratorKind::Path { regularize: false }, max_depth: 1 };
+    desc.integrator = IntegratorDesc { max_depth: 1, ..IntegratorDesc::default() };
     desc
 }
 

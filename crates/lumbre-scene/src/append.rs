@@ -22,13 +22,14 @@ impl SceneDesc {
             lights,
             without_light,
             up,
+            up_is_guessed,
             ground,
             listing,
         } = other;
         self.listing.append(listing);
         if self.cameras.is_empty() && !cameras.is_empty() {
             (self.film, self.filter, self.sampler, self.integrator) = (film, filter, sampler, integrator);
-            self.up = up;
+            (self.up, self.up_is_guessed) = (up, up_is_guessed);
         }
         if self.without_light == WithoutLight::Dark {
             self.without_light = without_light;

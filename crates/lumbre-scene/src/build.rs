@@ -50,6 +50,7 @@ impl Scene {
             without_light: _,
             up,
             ground: _,
+            up_is_guessed: _,
             listing: _,
         } = desc;
         check_cameras(&cameras)?;

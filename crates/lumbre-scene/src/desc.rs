@@ -6,7 +6,7 @@ use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
 use lumbre_kernel::{CustomGeometry, Placement};
 use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec2, Vec3, Vec4};
-use lumbre_shading::{FURTHER_SETS, FloatTexture, Material, MipMap};
+use lumbre_shading::{FURTHER_SETS, FloatTexture, Material, MipMap, ShadingNormals};
 
 use crate::{Camera, Listing, MaterialId, ObjectId};
 
@@ -37,6 +37,8 @@ pub struct SceneDesc {
     pub without_light: WithoutLight,
     /// The up axis of the automatic camera and light.
     pub up: UpAxis,
+    /// Whether that is a guess, by how the model stands.
+    pub up_is_guessed: bool,
     /// The ground plane.
     pub ground: Option<GroundDesc>,
     /// What its files hold by name.
@@ -431,11 +433,14 @@ pub struct IntegratorDesc {
     pub kind: IntegratorKind,
     /// The maximal number of bounces.
     pub max_depth: u32,
+    /// How light is scattered where shading normals are not those of the surface.
+    pub shading_normals: ShadingNormals,
 }
 
 impl Default for IntegratorDesc {
     fn default() -> Self {
-        Self { kind: IntegratorKind::Path { regularize: false }, max_depth: 5 }
+        let kind = IntegratorKind::Path { regularize: false };
+        Self { kind, max_depth: 5, shading_normals: ShadingNormals::default() }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use lumbre_geometry::{Ray, Surface};
 use lumbre_math::{DVec3, Vec2};
-use lumbre_shading::{Bsdf, LocalSurface, Material, ShadingFrame, Spectrum, TextureContext};
+use lumbre_shading::{Bsdf, LocalSurface, Material, ShadingFrame, ShadingNormals, Spectrum, TextureContext};
 
 use crate::light::{LightId, LightSample};
 use crate::{Emission, Footprint, Scene};
@@ -67,9 +67,10 @@ impl<'s> Interaction<'s> {
         self.material.into_iter().flat_map(move |material| material.parts(&self.at, wo, least))
     }
 
-    /// The shading frame and the BSDF; `None` for an interface.
+    /// The shading frame and the BSDF, with [`ShadingNormals::Lumbre`]; `None` for an interface.
     pub fn scattering(&self) -> Option<(ShadingFrame, Bsdf)> {
-        self.resolved()?.shading(&self.at, &self.shading, self.towards_origin.as_vec3())
+        let towards = self.towards_origin.as_vec3();
+        self.resolved()?.shading(&self.at, &self.shading, towards, ShadingNormals::Lumbre)
     }
 
     /// The ray that leaves along a unit direction, offset by the error of the point.

@@ -91,6 +91,8 @@ pub struct Staged {
     pub grounded: bool,
     /// Whether the description has lights in candelas or lux but no exposure, as in glTF.
     pub photometric: bool,
+    /// Whether the automatic camera stands by a guess of what is up: [`SceneDesc::up_is_guessed`].
+    pub guessed_up: bool,
 }
 
 /// The source of light of a staged description.
@@ -188,7 +190,8 @@ impl Stage {
                 (desc.film.width, desc.film.height) = (Some(SIZE.0), Some(SIZE.1));
             }
         }
-        Staged { framed, light, grounded, photometric }
+        let guessed_up = framed && self.up.is_none() && desc.up_is_guessed;
+        Staged { framed, light, grounded, photometric, guessed_up }
     }
 
     /// The camera that stands for those of the description, with the shutter of the first and the same side to the left.
@@ -302,8 +305,13 @@ mod tests {
         for up in [UpAxis::Y, UpAxis::Z] {
             let mut desc = SceneDesc { up, ..ball() };
             let staged = Stage::default().set(&mut desc);
-            let expected =
-                Staged { framed: true, light: StageLight::Studio, grounded: true, photometric: false };
+            let expected = Staged {
+                framed: true,
+                light: StageLight::Studio,
+                grounded: true,
+                photometric: false,
+                guessed_up: false,
+            };
             assert_eq!(staged, expected);
             assert_eq!((desc.cameras.len(), desc.lights.len()), (1, 1));
             assert_eq!((desc.film.width, desc.film.height), (Some(1200), Some(900)));
@@ -327,7 +335,13 @@ mod tests {
                 SceneDesc { cameras: vec![camera()], lights: vec![lamp()], without_light, ..ball() };
             let staged = Stage::default().set(&mut desc);
             let photometric = without_light == WithoutLight::StudioUnlessStaged;
-            let expected = Staged { framed: false, light: StageLight::Own, grounded: false, photometric };
+            let expected = Staged {
+                framed: false,
+                light: StageLight::Own,
+                grounded: false,
+                photometric,
+                guessed_up: false,
+            };
             assert_eq!(staged, expected);
             assert_eq!((desc.cameras, desc.lights.len(), desc.ground), (vec![camera()], 1, None));
             assert_eq!(desc.film.width, None);

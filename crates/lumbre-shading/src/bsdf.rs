@@ -7,6 +7,7 @@ use crate::conductor::Conductor;
 use crate::dielectric::{Dielectric, ThinDielectric};
 use crate::diffuse::{Diffuse, DiffuseTransmission};
 use crate::principled::Principled;
+use crate::uber::Uber;
 use crate::{LocalDir, Spectrum};
 
 /// How a direction was sampled.
@@ -56,6 +57,8 @@ pub enum Bsdf {
     CoatedConductor(CoatedConductor),
     /// All the layers; boxed, since the others are a quarter of its size and are copied often.
     Principled(Box<Principled>),
+    /// pbrt-v3's lobes side by side.
+    Uber(Uber),
 }
 
 impl Bsdf {
@@ -70,6 +73,7 @@ impl Bsdf {
             Self::CoatedDiffuse(bsdf) => bsdf.eval(wo, wi),
             Self::CoatedConductor(bsdf) => bsdf.eval(wo, wi),
             Self::Principled(bsdf) => bsdf.eval(wo, wi),
+            Self::Uber(bsdf) => bsdf.eval(wo, wi),
         }
     }
 
@@ -85,6 +89,7 @@ impl Bsdf {
             Self::CoatedDiffuse(bsdf) => bsdf.pdf(wo, wi),
             Self::CoatedConductor(bsdf) => bsdf.pdf(wo, wi),
             Self::Principled(bsdf) => bsdf.pdf(wo, wi),
+            Self::Uber(bsdf) => bsdf.pdf(wo, wi),
         }
     }
 
@@ -99,6 +104,7 @@ impl Bsdf {
             Self::CoatedDiffuse(bsdf) => bsdf.sample(wo, lobe, u),
             Self::CoatedConductor(bsdf) => bsdf.sample(wo, lobe, u),
             Self::Principled(bsdf) => bsdf.sample(wo, lobe, u),
+            Self::Uber(bsdf) => bsdf.sample(wo, lobe, u),
         }
     }
 
@@ -111,6 +117,7 @@ impl Bsdf {
             Self::ThinDielectric(_) => true,
             Self::CoatedConductor(bsdf) => bsdf.is_delta(),
             Self::Principled(bsdf) => bsdf.is_delta(),
+            Self::Uber(bsdf) => bsdf.is_delta(),
         }
     }
 
@@ -125,6 +132,7 @@ impl Bsdf {
             Self::CoatedDiffuse(bsdf) => bsdf.albedo_estimate(),
             Self::CoatedConductor(bsdf) => bsdf.albedo_estimate(),
             Self::Principled(bsdf) => bsdf.albedo_estimate(),
+            Self::Uber(bsdf) => bsdf.albedo_estimate(),
         }
     }
 
@@ -140,7 +148,7 @@ impl Bsdf {
 
     /// The surface with mirrors and sharp lobes made rougher, for parts of a path that are not seen directly:
     /// less noise, fewer sharp details. Each α below 0.3 is doubled and clamped to [0.1, 0.3]. A thin pane is
-    /// returned unchanged, since light passes straight through it.
+    /// returned unchanged, since light passes straight through it, and the delta parts of [`Uber`] stay what they are.
     #[must_use]
     pub fn regularized(self) -> Self {
         let metal = |bsdf: Conductor| Conductor { facets: bsdf.facets.regularized(), ..bsdf };
@@ -157,6 +165,7 @@ impl Bsdf {
                 Self::CoatedConductor(CoatedConductor { base: metal(bsdf.base), coat: coated(bsdf.coat) })
             }
             Self::Principled(bsdf) => Self::Principled(Box::new(bsdf.regularized())),
+            Self::Uber(bsdf) => Self::Uber(Uber { facets: bsdf.facets.regularized(), ..bsdf }),
         }
     }
 }

@@ -2,6 +2,37 @@
 
 use lumbre_math::{Vec3, frame::orthonormal_basis_f32};
 
+/// What is made of normals that differ from the geometric one: those of vertices, and of normal and bump maps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum ShadingNormals {
+    /// A normal that faces away from the viewer is turned until it does not; directions that a BSDF scatters to on the wrong side of
+    /// the surface are folded back; shadows on coarse meshes end where the smooth surface turns away. Nothing is black that should not be, and no light leaks.
+    #[default]
+    Lumbre,
+    /// As in pbrt-v4: BSDF and cosine by the shading normal as it is, whatever the side of the surface that a direction
+    /// is on; the geometric normal says where rays start and which side they are on.
+    Pbrt,
+}
+
+impl ShadingNormals {
+    /// How far the cosine between a shading normal and the geometric one may be from 1 by rounding.
+    const ROUNDING: f32 = 1e-6;
+
+    /// The one of that name, `lumbre` or `pbrt`.
+    pub fn from_name(name: &str) -> Option<Self> {
+        match name {
+            "lumbre" => Some(Self::Lumbre),
+            "pbrt" => Some(Self::Pbrt),
+            _ => None,
+        }
+    }
+
+    /// Whether a shading normal is another than the geometric one.
+    pub fn differ(shading: Vec3, geometric: Vec3) -> bool {
+        shading.dot(geometric) < 1.0 - Self::ROUNDING
+    }
+}
+
 /// A unit direction in a shading frame, whose z axis is the shading normal. Only [`ShadingFrame`] and the
 /// samplers of this crate construct it.
 #[derive(Clone, Copy, Debug, PartialEq)]

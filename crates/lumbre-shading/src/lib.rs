@@ -23,9 +23,10 @@ mod specular;
 mod stretched;
 mod texture;
 pub mod thin_film;
+pub mod uber;
 
 pub use bsdf::{Bsdf, BsdfSample, Scatter};
-pub use frame::{LocalDir, ShadingFrame};
+pub use frame::{LocalDir, ShadingFrame, ShadingNormals};
 pub use material::{LocalSurface, Material, MaterialKind, Metal, Roughness};
 pub use medium::HomogeneousMedium;
 pub use mipmap::{AxisWrap, ImageFilter, MipMap, MipMapOptions, Wrap};

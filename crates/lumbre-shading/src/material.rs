@@ -11,9 +11,10 @@ use crate::conductor::Conductor;
 use crate::dielectric::{Dielectric, ThinDielectric};
 use crate::diffuse::{Diffuse, DiffuseTransmission};
 use crate::microfacet::Microfacets;
+use crate::uber::UberParams;
 use crate::{
-    Bsdf, FloatTexture, HomogeneousMedium, ImageTexture, PrincipledParams, ShadingFrame, Spectrum,
-    SpectrumTexture, Texture, TextureContext,
+    Bsdf, FloatTexture, HomogeneousMedium, ImageTexture, PrincipledParams, ShadingFrame, ShadingNormals,
+    Spectrum, SpectrumTexture, Texture, TextureContext,
 };
 
 /// The roughness group of parameters.
@@ -151,6 +152,8 @@ pub enum MaterialKind {
     },
     /// Layers of metal, plastic, glass, cloth and lacquer: all that glTF can express.
     Principled(Box<PrincipledParams>),
+    /// pbrt-v3's `uber` and `plastic`: lobes side by side.
+    Uber(Box<UberParams>),
     /// One of two, chosen at random by position and direction.
     Mix {
         /// The materials at amount 0 and 1.
@@ -164,7 +167,7 @@ pub enum MaterialKind {
 
 impl MaterialKind {
     /// The names of the kinds in the scene language, in the order of this enum.
-    pub const NAMES: [&str; 10] = [
+    pub const NAMES: [&str; 11] = [
         "diffuse",
         "conductor",
         "dielectric",
@@ -173,6 +176,7 @@ impl MaterialKind {
         "coatedconductor",
         "diffusetransmission",
         "principled",
+        "uber",
         "mix",
         "interface",
     ];
@@ -188,6 +192,7 @@ impl MaterialKind {
             Self::CoatedConductor { .. } => "coatedconductor",
             Self::DiffuseTransmission { .. } => "diffusetransmission",
             Self::Principled(_) => "principled",
+            Self::Uber(_) => "uber",
             Self::Mix { .. } => "mix",
             Self::Interface => "interface",
         }
@@ -268,6 +273,7 @@ impl Material {
                     base && thickness.is_constant() && g.is_constant() && albedo.is_constant()
                 }
                 MaterialKind::Principled(params) => params.is_uniform(),
+                MaterialKind::Uber(params) => params.is_uniform(),
                 MaterialKind::Mix { materials, amount } => {
                     rest.extend(materials.iter().map(|material| &**material));
                     amount.is_constant()
@@ -288,6 +294,7 @@ impl Material {
             | MaterialKind::ThinDielectric { .. }
             | MaterialKind::DiffuseTransmission { .. } => true,
             MaterialKind::Principled(params) => params.lets_light_through(),
+            MaterialKind::Uber(params) => params.lets_light_through(),
             _ => false,
         })
     }
@@ -298,6 +305,7 @@ impl Material {
             MaterialKind::ThinDielectric { .. } => true,
             MaterialKind::Dielectric { eta, .. } => index(*eta) == 1.0,
             MaterialKind::Principled(params) => params.lets_light_straight_on(),
+            MaterialKind::Uber(params) => params.lets_light_straight_on(),
             _ => false,
         })
     }
@@ -374,17 +382,21 @@ impl Material {
     /// [`Material::bsdf`], with a clear coat oriented by its own normal map or, without one, by the surface
     /// without the base's bump map.
     ///
-    /// A normal that faces away from the visible side of the surface is turned back just far enough: otherwise
-    /// the silhouettes of coarse meshes with smooth normals, and steep bumps, would be black.
+    /// With [`ShadingNormals::Lumbre`] a normal that faces away from the visible side of the surface is turned back just
+    /// far enough: otherwise the silhouettes of coarse meshes with smooth normals, and steep bumps, would be black.
     pub fn shading(
         &self,
         at: &TextureContext,
         surface: &LocalSurface,
         towards: Vec3,
+        normals: ShadingNormals,
     ) -> Option<(ShadingFrame, Bsdf)> {
         let mut bsdf = self.bsdf(at)?;
         let mut frame = self.frame(at, surface);
-        let seen = |normal: Vec3| facing(normal, surface.geometric, towards);
+        let seen = |normal: Vec3| match normals {
+            ShadingNormals::Pbrt if ShadingNormals::differ(normal, surface.geometric) => normal,
+            _ => facing(normal, surface.geometric, towards),
+        };
         let normal = seen(frame.n);
         if normal != frame.n {
             frame = ShadingFrame::new(normal, frame.s);
@@ -514,6 +526,7 @@ impl Material {
                 })
             }
             MaterialKind::Principled(params) => Bsdf::Principled(Box::new(params.bsdf(at))),
+            MaterialKind::Uber(params) => Bsdf::Uber(params.bsdf(at)),
             MaterialKind::Mix { .. } | MaterialKind::Interface => return None,
         };
         Some(bsdf)
@@ -614,7 +627,7 @@ fn asymmetry(g: f32) -> f32 {
 }
 
 /// A valid index of refraction.
-fn index(eta: f32) -> f32 {
+pub(crate) fn index(eta: f32) -> f32 {
     if eta > 0.0 && eta.is_finite() { eta } else { 1.0 }
 }
 

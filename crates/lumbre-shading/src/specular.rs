@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 use crate::dielectric::Ways;
 use crate::{Bsdf, BsdfSample, LocalDir, Spectrum};
 
-/// Delta parts: at most a reflection and a transmission.
+/// Delta parts: a reflection, a transmission, and what goes straight on.
 pub(crate) type Specular = SmallVec<[BsdfSample; 2]>;
 
 impl Bsdf {
@@ -33,6 +33,7 @@ impl Bsdf {
             Self::CoatedDiffuse(bsdf) => bsdf.specular(wo).into_iter().collect(),
             Self::CoatedConductor(bsdf) => bsdf.specular(wo).into_iter().collect(),
             Self::Principled(bsdf) => bsdf.specular(wo),
+            Self::Uber(bsdf) => bsdf.specular(wo),
         }
     }
 
@@ -59,6 +60,7 @@ mod tests {
     use crate::diffuse::Diffuse;
     use crate::microfacet::Microfacets;
     use crate::principled::{Body, Principled};
+    use crate::uber::Uber;
     use crate::{Scatter, Spectrum};
 
     use super::*;
@@ -78,6 +80,15 @@ mod tests {
         };
         let base = Diffuse { reflectance: Spectrum::new(0.7, 0.5, 0.3) };
         let layered = |bsdf| Bsdf::Principled(Box::new(bsdf));
+        let uber = Uber {
+            diffuse: Spectrum::splat(0.2),
+            glossy: Spectrum::splat(0.1),
+            mirror: Spectrum::new(0.4, 0.3, 0.2),
+            refracted: Spectrum::splat(0.3),
+            passed: Spectrum::new(0.1, 0.2, 0.3),
+            eta: 1.5,
+            facets: rough,
+        };
         let bsdfs = [
             (Bsdf::Diffuse(base), 0),
             (Bsdf::Conductor(metal(smooth)), 1),
@@ -93,6 +104,7 @@ mod tests {
             (Bsdf::CoatedConductor(CoatedConductor { base: metal(smooth), coat: coat(rough, 0.0) }), 0),
             (layered(Principled { transmission: 0.6, facets: smooth, ..Principled::DEFAULT }), 2),
             (layered(Principled { metallic: 0.5, facets: rough, ..Principled::DEFAULT }), 0),
+            (Bsdf::Uber(uber), 3),
         ];
         const LOBES: u32 = 4096;
         for (bsdf, parts) in bsdfs {
@@ -100,7 +112,7 @@ mod tests {
                 let wo = LocalDir(Vec3::new(0.6, -0.2, height).normalize());
                 let specular = bsdf.delta_parts(wo);
                 assert_eq!(specular.len(), parts, "{bsdf:?} from {height}");
-                let mut sums = [Spectrum::BLACK; 2];
+                let mut sums = [Spectrum::BLACK; 3];
                 for i in 0..LOBES {
                     let lobe = (i as f32 + 0.5) / LOBES as f32;
                     let Some(sample) = bsdf.sample(wo, lobe, Vec2::new(0.3, 0.8)) else { continue };

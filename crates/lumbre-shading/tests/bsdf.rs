@@ -18,6 +18,7 @@ use lumbre_shading::microfacet::Microfacets;
 use lumbre_shading::principled::{Body, Clearcoat, Principled};
 use lumbre_shading::sheen::Sheen;
 use lumbre_shading::thin_film::ThinFilm;
+use lumbre_shading::uber::Uber;
 use lumbre_shading::{Bsdf, LocalDir, Scatter, ShadingFrame, Spectrum, fresnel};
 
 const GLASS: f32 = 1.5;
@@ -204,6 +205,27 @@ fn all() -> Vec<(String, Bsdf)> {
                 let bsdf = Bsdf::CoatedConductor(coated_metal(alpha, metal, albedo));
                 list.push((format!("coatedconductor {alpha:?} {metal:?} {albedo}"), bsdf));
             }
+        }
+    }
+    for (alpha, eta) in [((0.2, 0.2), GLASS), ((0.6, 0.1), 1.0 / GLASS)] {
+        let uber = Uber {
+            diffuse: Spectrum::new(0.4, 0.2, 0.1),
+            glossy: Spectrum::new(0.2, 0.3, 0.25),
+            mirror: Spectrum::BLACK,
+            refracted: Spectrum::BLACK,
+            passed: Spectrum::BLACK,
+            eta,
+            facets: Microfacets::new(alpha.0, alpha.1),
+        };
+        let clear = Uber {
+            mirror: Spectrum::splat(0.2),
+            refracted: Spectrum::new(0.1, 0.15, 0.05),
+            passed: Spectrum::new(0.1, 0.05, 0.15),
+            ..uber
+        };
+        let glossy = Uber { diffuse: Spectrum::BLACK, glossy: Spectrum::WHITE, eta: 2.4, ..uber };
+        for (name, bsdf) in [("plastic", uber), ("clear", clear), ("glossy", glossy)] {
+            list.push((format!("uber {name} {eta}"), Bsdf::Uber(bsdf)));
         }
     }
     for (name, bsdf) in principled().into_iter().chain([("leaning coat", leaning())]) {

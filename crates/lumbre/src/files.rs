@@ -1,9 +1,10 @@
 //! Image files.
 
+use std::io::Read;
 use std::path::Path;
 
 use lumbre_formats::image::{WriteOptions, open_image};
-use lumbre_formats::{Budget, Diagnostics, Limits};
+use lumbre_formats::{Budget, Diagnostics, Input, Limits};
 use lumbre_image::Image;
 
 use crate::Error;
@@ -26,6 +27,17 @@ pub fn read_image(path: &Path) -> Result<Image, Error> {
 pub fn read_image_within(path: &Path, limits: Limits) -> Result<Image, Error> {
     let budget = Budget::new(limits);
     let file = open_image(path, &budget, &mut Diagnostics::new())?;
+    Ok(file.to_image(&budget)?)
+}
+
+/// [`read_image_within`] of bytes from elsewhere, such as standard input, whose format they tell themselves; `name` is for messages.
+///
+/// # Errors
+/// [`Error::Format`].
+pub fn read_image_from(name: &str, reader: impl Read, limits: Limits) -> Result<Image, Error> {
+    let budget = Budget::new(limits);
+    let input = Input::from_reader(name, reader, &budget)?;
+    let file = lumbre_formats::image::read_image(&input, input.name(), &budget, &mut Diagnostics::new())?;
     Ok(file.to_image(&budget)?)
 }
 

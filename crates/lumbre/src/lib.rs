@@ -46,7 +46,7 @@ pub use background::Background;
 pub use builder::{SceneBuilder, ShapeBuilder};
 pub use cast::{CastHit, CastPoint};
 pub use error::{Error, ErrorKind};
-pub use files::{SaveOptions, read_image, read_image_within, write_image};
+pub use files::{SaveOptions, read_image, read_image_from, read_image_within, write_image};
 pub use info::{SceneInfo, predicted_build_bytes};
 pub use lumbre_formats::ReadOptions;
 pub use lumbre_geometry::Ray;

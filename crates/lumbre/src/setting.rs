@@ -358,6 +358,9 @@ fn material_parameters(kind: &MaterialKind) -> &'static [&'static str] {
         }
         MaterialKind::DiffuseTransmission { .. } => &["reflectance", "transmittance", "scale"],
         MaterialKind::Principled(_) => PRINCIPLED,
+        MaterialKind::Uber(_) => {
+            &["Kd", "Ks", "Kr", "Kt", "opacity", "index", "roughness", "uroughness", "vroughness"]
+        }
         MaterialKind::Mix { .. } => &["amount"],
         MaterialKind::Interface => &[],
     }
@@ -388,6 +391,18 @@ fn material_slot<'m>(kind: &'m mut MaterialKind, name: &str) -> Option<Slot<'m>>
     use MaterialKind as Kind;
     Some(match (kind, name) {
         (Kind::Principled(params), name) => return principled_slot(params, name),
+        (Kind::Uber(params), name) => match name {
+            "Kd" => Slot::Colour(&mut params.kd),
+            "Ks" => Slot::Colour(&mut params.ks),
+            "Kr" => Slot::Colour(&mut params.kr),
+            "Kt" => Slot::Colour(&mut params.kt),
+            "opacity" => Slot::Colour(&mut params.opacity),
+            "index" | "eta" => Slot::Number(&mut params.eta, Range(0.1, 10.0)),
+            "roughness" => Slot::Roughness(&mut params.roughness),
+            "uroughness" => Slot::Number(&mut params.roughness.u, FROM_ZERO),
+            "vroughness" => Slot::Number(&mut params.roughness.v, FROM_ZERO),
+            _ => return None,
+        },
         (
             Kind::Diffuse { reflectance }
             | Kind::ConductorReflectance { reflectance, .. }

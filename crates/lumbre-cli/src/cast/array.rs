@@ -27,7 +27,7 @@ impl ArrayReader {
     pub(super) fn new(mut bytes: Bytes, kind: Rows) -> Result<Self, Failure> {
         let header = Header::read(|count| bytes.read_up_to(count)).map_err(|e| match e {
             HeaderError::Read(failure) => failure,
-            HeaderError::Wrong(at, what) => Failure::input(format!("{}:byte {at}: {what}", bytes.name())),
+            HeaderError::Wrong(at, what) => wrong_at(&bytes, at, &what),
         })?;
         let mut this = Self { bytes, header, kind, columns: None, rows: 0 };
         let (least, most) = (kind.needed(), kind.columns().len());
@@ -116,10 +116,14 @@ impl ArrayReader {
     }
 
     fn check_size(&self, data: u64) -> Result<(), Failure> {
-        self.header.check_size(data).map_err(|what| self.wrong(what))
+        self.header.check_size(data).map_err(|(at, what)| wrong_at(&self.bytes, at, &what))
     }
 
     fn wrong(&self, what: String) -> Failure {
         Failure::input(format!("{}: {what}", self.bytes.name()))
     }
+}
+
+fn wrong_at(bytes: &Bytes, at: u64, what: &str) -> Failure {
+    Failure::input(format!("{}:byte {at}: {what}", bytes.name()))
 }

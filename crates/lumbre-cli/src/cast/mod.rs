@@ -16,18 +16,17 @@ mod csv;
 mod npy;
 mod output;
 mod pipeline;
-mod progress;
 mod rays;
 #[cfg(test)]
 mod tests;
 
 use answers::{Block, Form, Table};
 use output::Output;
-use progress::Progress;
 use rays::{RayReader, Rows};
 
 use crate::failure::Failure;
 use crate::output::{Inputs, Replaced};
+use crate::progress::RayProgress;
 use crate::reading::{ReadingArguments, print_warnings};
 use crate::signals::Signals;
 
@@ -120,7 +119,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let fewer = |&threads: &usize| (threads > 1).then_some(threads / 2);
     let pool = std::iter::successors(Some(wanted), fewer)
         .find_map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok());
-    let progress = Progress::new(arguments.quiet);
+    let progress = RayProgress::new(arguments.quiet);
     let query = arguments.query;
     let cast = Cast {
         scene: &scene,
@@ -180,7 +179,7 @@ struct Cast<'a> {
     query: Query,
     form: Form,
     pool: Option<&'a ThreadPool>,
-    progress: &'a Progress,
+    progress: &'a RayProgress,
     /// How many rays a thread works on at a time, which changes no byte of the answers.
     at_a_time: usize,
 }

@@ -126,12 +126,14 @@ impl Header {
     /// Checks that there are as many bytes of data as the shape asks for.
     ///
     /// # Errors
-    /// What was found.
-    pub(super) fn check_size(&self, data: u64) -> Result<(), String> {
-        match self.rows.checked_mul(self.row_size()) {
-            Some(size) if size == data => Ok(()),
-            _ => Err(format!("{data} bytes of data for shape {}", self.shape)),
+    /// The byte of the file where data are missing, or are too many, and what was found.
+    pub(super) fn check_size(&self, data: u64) -> Result<(), (u64, String)> {
+        let size = self.rows.checked_mul(self.row_size());
+        if size == Some(data) {
+            return Ok(());
         }
+        let at = self.length.saturating_add(size.unwrap_or(u64::MAX).min(data));
+        Err((at, format!("{data} bytes of data for shape {}", self.shape)))
     }
 
     /// The rays, or points, of some rows. Where columns come first, those of all these rows do.
@@ -249,8 +251,9 @@ mod tests {
         }
         for rows in ["9999999999999", "4611686018427387904"] {
             let text = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, 6), }}");
-            let message = read(&file(&text)).unwrap().check_size(0).unwrap_err();
-            assert_eq!(message, format!("0 bytes of data for shape ({rows}, 6) of <f8"));
+            let wrong = read(&file(&text)).unwrap().check_size(0).unwrap_err();
+            let message = format!("0 bytes of data for shape ({rows}, 6) of <f8");
+            assert_eq!(wrong, (10 + text.len() as u64, message));
         }
     }
 }

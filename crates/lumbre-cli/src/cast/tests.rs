@@ -60,7 +60,7 @@ fn reader(query: Query, text: String) -> RayReader {
 
 fn bytes(scene: &Scene, query: Query, form: Form, threads: usize, at_a_time: usize) -> Vec<u8> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    let progress = Progress::new(true);
+    let progress = RayProgress::new(true);
     let cast = Cast { scene, query, form, pool: Some(&pool), progress: &progress, at_a_time };
     let rays = reader(query, if query.rows() == Rows::Rays { rays() } else { points() });
     let mut file = tempfile::tempfile().unwrap();
@@ -140,7 +140,7 @@ fn no_rays_have_no_answers() {
             let folder = tempfile::tempdir().unwrap();
             let scene = scene(folder.path());
             let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
-            let progress = Progress::new(true);
+            let progress = RayProgress::new(true);
             let cast =
                 Cast { scene: &scene, query, form, pool: Some(&pool), progress: &progress, at_a_time: 100 };
             let path = folder.path().join("answers");

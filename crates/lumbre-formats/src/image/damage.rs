@@ -1,21 +1,33 @@
 //! Where an image file is damaged, as its decoder does not say.
 
 use std::cell::Cell;
-use std::io::{Cursor, Read, Result, Seek, SeekFrom};
+use std::io::{BufRead, Cursor, Read, Result, Seek, SeekFrom};
 
 use flate2::Crc;
 
 use super::ImageFormat;
 
-/// The first byte of what is damaged in a file that its decoder refused: of a chunk of PNG or a segment of JPEG that is
-/// cut off or not one, or else of the pixels. `None` for other formats, and where no damage is found.
-pub(super) fn first_damage(format: ImageFormat, bytes: &[u8]) -> Option<u64> {
+/// The first byte of what is damaged in a file that its decoder refused after it had read up to `read`: of a chunk of PNG or
+/// WebP or a segment of JPEG that is cut off or not one, or else of the pixels; of other formats, `read`.
+pub(super) fn first_damage(format: ImageFormat, bytes: &[u8], read: u64) -> u64 {
     match format {
         ImageFormat::Png => png(bytes),
         ImageFormat::Jpeg => jpeg(bytes),
+        ImageFormat::WebP => webp(bytes),
         _ => None,
     }
-    .map(|at| at as u64)
+    .map_or(read.min(bytes.len() as u64), |at| at as u64)
+}
+
+/// Where the size of an image stands in its file, if that is always the same place.
+pub(super) fn place_of_size(format: ImageFormat) -> Option<u64> {
+    match format {
+        ImageFormat::Png => Some(16),
+        ImageFormat::Bmp => Some(18),
+        ImageFormat::Tga => Some(12),
+        ImageFormat::Qoi => Some(4),
+        _ => None,
+    }
 }
 
 fn png(bytes: &[u8]) -> Option<usize> {
@@ -77,6 +89,25 @@ fn jpeg(bytes: &[u8]) -> Option<usize> {
     }
 }
 
+fn webp(bytes: &[u8]) -> Option<usize> {
+    let mut at = 12;
+    let mut first_pixels = None;
+    while at < bytes.len() {
+        let header = bytes.get(at..).and_then(<[u8]>::first_chunk);
+        let Some([k0, k1, k2, k3, a, b, c, d]) = header else { return Some(at) };
+        let length = u32::from_le_bytes([*a, *b, *c, *d]) as usize;
+        if bytes.len() - (at + 8) < length {
+            return Some(at);
+        }
+        if matches!(&[*k0, *k1, *k2, *k3], b"VP8 " | b"VP8L" | b"ANMF") {
+            first_pixels = first_pixels.or(Some(at));
+        }
+        // Chunks are padded to even sizes.
+        at += 8 + length + length % 2;
+    }
+    first_pixels.or(Some(bytes.len()))
+}
+
 /// Bytes that remember how far they were read.
 #[derive(Debug)]
 pub(super) struct Tracked<'a> {
@@ -95,6 +126,17 @@ impl Read for Tracked<'_> {
         let read = self.bytes.read(out);
         self.at.set(self.bytes.position());
         read
+    }
+}
+
+impl BufRead for Tracked<'_> {
+    fn fill_buf(&mut self) -> Result<&[u8]> {
+        self.bytes.fill_buf()
+    }
+
+    fn consume(&mut self, count: usize) {
+        self.bytes.consume(count);
+        self.at.set(self.bytes.position());
     }
 }
 
@@ -131,7 +173,7 @@ mod tests {
     fn a_damaged_chunk_of_png_is_told_by_its_first_byte() {
         let whole = file(ImageFormat::Png);
         let pixels = find(&whole, b"IDAT") - 4;
-        assert_eq!(first_damage(ImageFormat::Png, &whole), Some(pixels as u64));
+        assert_eq!(first_damage(ImageFormat::Png, &whole, 0), pixels as u64);
         let mut wrong = whole.clone();
         wrong[pixels + 12] ^= 0x40;
         assert!(refused(&wrong, "a.png").starts_with(&format!("a.png:byte {pixels}: damaged PNG image")));
@@ -145,14 +187,57 @@ mod tests {
     fn a_damaged_segment_of_jpeg_is_told_by_its_first_byte() {
         let whole = file(ImageFormat::Jpeg);
         let scan = find(&whole, &[0xFF, 0xDA]);
-        assert_eq!(first_damage(ImageFormat::Jpeg, &whole), Some(scan as u64));
+        assert_eq!(first_damage(ImageFormat::Jpeg, &whole, 0), scan as u64);
         let tables = find(&whole, &[0xFF, 0xDB]);
         let mut wrong = whole.clone();
         wrong[tables] = 0;
-        assert_eq!(first_damage(ImageFormat::Jpeg, &wrong), Some(tables as u64));
-        assert_eq!(first_damage(ImageFormat::Jpeg, &whole[..tables + 5]), Some(tables as u64));
+        assert_eq!(first_damage(ImageFormat::Jpeg, &wrong, 0), tables as u64);
+        assert_eq!(first_damage(ImageFormat::Jpeg, &whole[..tables + 5], 0), tables as u64);
         let said = refused(&whole[..tables + 5], "a.jpg");
         assert!(said.starts_with(&format!("a.jpg:byte {tables}: damaged JPEG image")), "{said}");
+    }
+
+    /// A file of a kind that we do not write.
+    fn foreign(format: image::ImageFormat) -> Vec<u8> {
+        let mut bytes = Cursor::new(vec![]);
+        let pixels = (0..24 * 18 * 3).map(|i| (i * i % 251) as u8).collect();
+        image::RgbImage::from_raw(24, 18, pixels).unwrap().write_to(&mut bytes, format).unwrap();
+        bytes.into_inner()
+    }
+
+    #[test]
+    fn tga_bmp_qoi_and_webp_are_told_by_the_byte_where_reading_stopped() {
+        let (tga, bmp, webp) = (
+            foreign(image::ImageFormat::Tga),
+            foreign(image::ImageFormat::Bmp),
+            foreign(image::ImageFormat::WebP),
+        );
+        let qoi = file(ImageFormat::Qoi);
+        let changed = |whole: &[u8], at: usize, bytes: &[u8]| {
+            let mut wrong = whole.to_vec();
+            wrong[at..at + bytes.len()].copy_from_slice(bytes);
+            wrong
+        };
+        let pixels = find(&webp, b"VP8L");
+        let cases = [
+            // Cut off: where the data end; the chunk that is cut off.
+            ("a.tga", tga[..200].to_vec(), 200),
+            ("a.tga", tga[..9].to_vec(), 9),
+            ("a.bmp", bmp[..300].to_vec(), 300),
+            ("a.bmp", bmp[..20].to_vec(), 20),
+            ("a.qoi", qoi[..60].to_vec(), 60),
+            ("a.webp", webp[..webp.len() - 50].to_vec(), pixels),
+            ("a.webp", webp[..15].to_vec(), 12),
+            // Damaged: the pixels of a chunk; the sizes.
+            ("a.webp", changed(&webp, pixels + 8, b"no image"), pixels),
+            ("a.tga", changed(&tga, 12, &[0xff; 4]), 12),
+            ("a.bmp", changed(&bmp, 18, &[0x60, 0xEA, 0, 0]), 18),
+            ("a.qoi", changed(&qoi, 4, &[0, 0, 7, 0xD0, 0, 0, 7, 0xD0]), 4),
+        ];
+        for (name, bytes, at) in cases {
+            let said = refused(&bytes, name);
+            assert!(said.starts_with(&format!("{name}:byte {at}: ")), "{at}: {said}");
+        }
     }
 
     #[test]

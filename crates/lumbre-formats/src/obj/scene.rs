@@ -7,8 +7,7 @@ use std::sync::Arc;
 use lumbre_image::{Encoding, Rgb};
 use lumbre_math::Vec2;
 use lumbre_scene::{
-    AreaLightDesc, GeometryDesc, Listing, MaterialId, NamedMaterial, SceneDesc, ShapeDesc, UpAxis,
-    WithoutLight,
+    AreaLightDesc, GeometryDesc, Listing, MaterialId, NamedMaterial, SceneDesc, ShapeDesc, WithoutLight,
 };
 use lumbre_shading::{
     FloatTexture, ImageFilter, ImageTexture, Mapping2d, Material, MaterialKind, MipMap, MipMapOptions,
@@ -22,8 +21,9 @@ use crate::image::open_image;
 use crate::input::Input;
 use crate::origin::placed;
 use crate::ply::{push_thin, unsaid_material};
+use crate::standing::up_of;
 
-/// Reads the OBJ file `path` with its materials and textures, each mesh a shape; y is up.
+/// Reads the OBJ file `path` with its materials and textures, each mesh a shape; y is up, or z where the meshes plainly stand on a plane of z.
 ///
 /// A material with any of the PBR keys (`Pr`, `Pm`, `Ps`, `Pc`, `aniso` and their maps) becomes the principled
 /// one, clear when `illum` is 6 or 7. Of the others, those with `illum` 6 or 7 become glass, those with
@@ -74,7 +74,7 @@ pub(crate) fn obj_scene(
         }
     }
     let listing = std::mem::take(&mut builder.listing);
-    let mut scene = SceneDesc { up: UpAxis::Y, listing, ..SceneDesc::default() };
+    let mut scene = SceneDesc { listing, ..SceneDesc::default() };
     for finished in &finished {
         let material = finished.material.clone();
         scene.materials.push(NamedMaterial { name: Some(finished.name.clone()), material });
@@ -94,6 +94,7 @@ pub(crate) fn obj_scene(
         found
     };
     let world_from_object = placed(obj.origin);
+    (scene.up, scene.up_is_guessed) = up_of(obj.meshes.iter().map(|mesh| &mesh.mesh), obj.origin);
     for mesh in obj.meshes {
         let named = find(&mesh.material);
         let id = named.unwrap_or_else(|| {

@@ -331,7 +331,8 @@ impl<'b, 'd> Converter<'b, 'd> {
         }
     }
 
-    /// Adds a moving shape to the open object, or else to the world, in an object of its own.
+    /// Adds a moving shape to the open object, or else to the world, in an object of its own. Its transform is what comes before
+    /// the motion.
     pub fn push_moving(
         &mut self,
         shape: ShapeDesc,
@@ -341,7 +342,6 @@ impl<'b, 'd> Converter<'b, 'd> {
         spot: Spot,
     ) {
         let id = ObjectId(self.objects.len() as u32);
-        let shape = ShapeDesc { world_from_object: Transform::IDENTITY, ..shape };
         let object = ObjectDesc { shapes: vec![shape], ..ObjectDesc::default() };
         let name = String::new();
         self.objects.push(ObjectSlot { object: Some(object), name, first_use: spot, leaves, depth });

@@ -6,6 +6,7 @@ use lumbre_image::Encoding;
 use lumbre_math::Vec2;
 use lumbre_scene::MaterialId;
 use lumbre_shading::spectrum::conductor_rgb;
+use lumbre_shading::uber::UberParams;
 use lumbre_shading::{
     ImageFilter, ImageTexture, Mapping2d, Material, MaterialKind, Metal, NamedSpectrum, Roughness, Spectrum,
     SpectrumTexture, SpectrumValue, Texture, Wrap,
@@ -417,6 +418,27 @@ impl Converter<'_, '_> {
         })
     }
 
+    /// pbrt-v3's `uber`, or `plastic`, which has less of it.
+    fn uber(&mut self, ty: &str, params: &Params) -> Result<MaterialKind> {
+        let is_whole = ty == "uber";
+        let colour = |converter: &mut Self, name, default| converter.reflectance(params, name, default);
+        let [kr, kt, opacity] = if is_whole {
+            [colour(self, "Kr", 0.0)?, colour(self, "Kt", 0.0)?, colour(self, "opacity", 1.0)?]
+        } else {
+            [self.colour(Spectrum::BLACK), self.colour(Spectrum::BLACK), self.colour(Spectrum::WHITE)]
+        };
+        let index = if params.has("index") { "index" } else { "eta" };
+        Ok(MaterialKind::Uber(Box::new(UberParams {
+            kd: colour(self, "Kd", 0.25)?,
+            ks: colour(self, "Ks", 0.25)?,
+            kr,
+            kt,
+            opacity,
+            eta: self.float_texture_or(params, index, 1.5)?,
+            roughness: self.roughness(params, ROUGHNESS, 0.1)?,
+        })))
+    }
+
     /// A material of pbrt-v3 as one of pbrt-v4; `None` for an unknown name.
     fn old_material(&mut self, ty: &str, params: &Params) -> Result<Option<MaterialKind>> {
         let spot = params.spot;
@@ -433,12 +455,12 @@ impl Converter<'_, '_> {
                 dropped(self, &["sigma"]);
                 MaterialKind::Diffuse { reflectance: self.reflectance(params, "Kd", 0.5)? }
             }
-            "plastic" | "substrate" | "uber" => {
-                dropped(self, &["Ks", "Kr", "Kt", "opacity"]);
-                let kd = if ty == "substrate" { 0.5 } else { 0.25 };
+            "uber" | "plastic" => self.uber(ty, params)?,
+            "substrate" => {
+                dropped(self, &["Ks"]);
                 let roughness = self.roughness(params, ROUGHNESS, 0.1)?;
                 let index = if params.has("index") { "index" } else { "eta" };
-                self.coated_diffuse(params, ["Kd", index], kd, roughness)?
+                self.coated_diffuse(params, ["Kd", index], 0.5, roughness)?
             }
             "mirror" => {
                 let roughness = Roughness { u: number(0.0), v: number(0.0), remap: false };

@@ -6,6 +6,7 @@ use lumbre_scene::{
     Camera, CameraKind, FilterDesc, IntegratorDesc, IntegratorKind, SamplerDesc, SamplerKind,
     SphericalMapping,
 };
+use lumbre_shading::ShadingNormals;
 
 use super::convert::Converter;
 use super::params::{Params, Type};
@@ -271,7 +272,6 @@ impl Converter<'_, '_> {
                 self.upgraded(params.spot_of(old));
             }
         }
-        self.done(&params);
         self.scene.filter = filter;
         Ok(())
     }
@@ -341,8 +341,11 @@ impl Converter<'_, '_> {
                 self.upgraded(params.spot_of(old));
             }
         }
+        // Ours: pbrt-v4 has no choice.
+        let normals = [("lumbre", ShadingNormals::Lumbre), ("pbrt", ShadingNormals::Pbrt)];
+        let shading_normals = params.choice("shadingnormals", &normals, ShadingNormals::default())?;
         self.done(&params);
-        self.scene.integrator = IntegratorDesc { kind, max_depth };
+        self.scene.integrator = IntegratorDesc { kind, max_depth, shading_normals };
         Ok(())
     }
 

@@ -16,6 +16,7 @@ use super::state::State;
 use super::subdivision;
 use super::textures::vec3;
 use crate::diagnostic::{number, quoted};
+use crate::origin::{Spread, placed, relative};
 use crate::ply::{PlyFile, read_ply};
 use crate::{Diagnostic, Diagnostics, Input, Severity};
 
@@ -46,13 +47,21 @@ const MAX_CSG_LEAVES: u64 = 1 << 16;
 /// A geometry, with the number of leaves and the depth of a CSG.
 struct Form {
     geometry: GeometryDesc,
+    /// What the positions of a mesh are relative to.
+    origin: DVec3,
     leaves: u64,
     depth: usize,
 }
 
 impl From<GeometryDesc> for Form {
     fn from(geometry: GeometryDesc) -> Self {
-        Self { geometry, leaves: 1, depth: 0 }
+        (geometry, DVec3::ZERO).into()
+    }
+}
+
+impl From<(GeometryDesc, DVec3)> for Form {
+    fn from((geometry, origin): (GeometryDesc, DVec3)) -> Self {
+        Self { geometry, origin, leaves: 1, depth: 0 }
     }
 }
 
@@ -80,8 +89,10 @@ impl Converter<'_, '_> {
             self.upgraded(params.spot_of("shadowalpha"));
         }
         self.done(&params);
+        let placed = (form.origin != DVec3::ZERO).then(|| placed(form.origin));
+        let world_from_object = placed.map_or(state.ctm[0], |placed| state.ctm[0] * placed);
         if let GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) = &form.geometry {
-            let moved = Aabb::around(mesh.positions.iter().map(|p| state.ctm[0].point(p.as_dvec3())));
+            let moved = Aabb::around(mesh.positions.iter().map(|p| world_from_object.point(p.as_dvec3())));
             let farthest = moved.min.abs().max(moved.max.abs()).max_element();
             if !moved.is_empty() && (farthest.is_nan() || farthest > f64::from(f32::MAX)) {
                 let wrong = Diagnostic::error("the current transform takes a vertex too far away");
@@ -93,7 +104,7 @@ impl Converter<'_, '_> {
         let shape = ShapeDesc {
             index,
             geometry: form.geometry,
-            world_from_object: state.ctm[0],
+            world_from_object,
             reverse_orientation: state.reverse_orientation,
             material: state.material,
             area_light,
@@ -101,7 +112,11 @@ impl Converter<'_, '_> {
         };
         match self.motion(spot, &state.ctm, "shape") {
             None => self.push_shape(shape, form.leaves, form.depth),
-            Some(motion) => self.push_moving(shape, form.leaves, form.depth, motion, spot),
+            Some(motion) => {
+                let world_from_object = placed.unwrap_or(Transform::IDENTITY);
+                let shape = ShapeDesc { world_from_object, ..shape };
+                self.push_moving(shape, form.leaves, form.depth, motion, spot);
+            }
         }
         Ok(())
     }
@@ -163,7 +178,7 @@ impl Converter<'_, '_> {
             "trianglemesh" => Ok(self.triangle_mesh(params)?.map(Form::from)),
             "bilinearmesh" => Ok(self.bilinear_mesh(params)?.map(Form::from)),
             "plymesh" => self.ply_mesh(params).map(|g| Some(g.into())),
-            "loopsubdiv" => self.loop_subdivision(params).map(|g| Some(g.into())),
+            "loopsubdiv" => self.loop_subdivision(params).map(|mesh| Some(mesh.into())),
             "curve" => {
                 self.note(params.spot, "shape \"curve\" is not rendered yet: it is left out");
                 Ok(None)
@@ -251,23 +266,30 @@ impl Converter<'_, '_> {
             }
             operands.push(object.shapes.clone());
         }
-        Ok(Form { geometry: GeometryDesc::Csg(CsgDesc { operation, operands }), leaves, depth })
+        let geometry = GeometryDesc::Csg(CsgDesc { operation, operands });
+        Ok(Form { geometry, origin: DVec3::ZERO, leaves, depth })
     }
 
     // Meshes.
 
-    /// Vertices in single precision.
-    fn positions(&mut self, params: &Params, shape: &str) -> Result<Vec<Vec3>> {
+    /// Vertices in single precision, and what they are relative to, where they are far away.
+    fn positions(&mut self, params: &Params, shape: &str) -> Result<(Vec<Vec3>, DVec3)> {
         let Some(param) = params.typed("P", &[Type::Point3])? else {
             return Err(params.spot.error(format!("a {shape} has no \"point3 P\"")));
         };
-        let positions = triples(params, "P", Type::Point3)?.unwrap_or_default();
+        let mut positions = triples(params, "P", Type::Point3)?.unwrap_or_default();
         if positions.is_empty() {
             return Err(param.refuse("points"));
         }
         let bytes = positions.len() as u64 * 12;
         self.budget.bytes(bytes, "vertices").at(param.spot)?;
-        Ok(positions)
+        let points =
+            || param.numbers().into_iter().flat_map(|list| list.chunks_exact(3).map(DVec3::from_slice));
+        let origin = points().fold(Spread::NOTHING, Spread::with).origin();
+        if origin != DVec3::ZERO {
+            positions = points().map(|point| relative(point, origin)).collect();
+        }
+        Ok((positions, origin))
     }
 
     /// The indices, `N` per face, checked; unusable faces are dropped where the reader is lenient.
@@ -381,8 +403,8 @@ impl Converter<'_, '_> {
         self.budget.bytes(bytes, "vertices").at(params.spot)
     }
 
-    fn triangle_mesh(&mut self, params: &Params) -> Result<Option<GeometryDesc>> {
-        let positions = self.positions(params, "trianglemesh")?;
+    fn triangle_mesh(&mut self, params: &Params) -> Result<Option<(GeometryDesc, DVec3)>> {
+        let (positions, origin) = self.positions(params, "trianglemesh")?;
         let (triangles, kept) = self.faces::<3>(params, positions.len(), "trianglemesh")?;
         let given = params.integers("indices")?.map_or(1, |indices| indices.len() / 3);
         let mut mesh = MeshDesc { positions, triangles, ..MeshDesc::default() };
@@ -396,11 +418,11 @@ impl Converter<'_, '_> {
             params.ignore_all();
             return Ok(None);
         }
-        Ok(Some(GeometryDesc::Mesh(Arc::new(mesh))))
+        Ok(Some((GeometryDesc::Mesh(Arc::new(mesh)), origin)))
     }
 
-    fn bilinear_mesh(&mut self, params: &Params) -> Result<Option<GeometryDesc>> {
-        let positions = self.positions(params, "bilinearmesh")?;
+    fn bilinear_mesh(&mut self, params: &Params) -> Result<Option<(GeometryDesc, DVec3)>> {
+        let (positions, origin) = self.positions(params, "bilinearmesh")?;
         let (quads, kept) = self.faces::<4>(params, positions.len(), "bilinearmesh")?;
         let given = params.integers("indices")?.map_or(1, |indices| indices.len() / 4);
         let mut mesh = MeshDesc { positions, quads, ..MeshDesc::default() };
@@ -414,11 +436,11 @@ impl Converter<'_, '_> {
             params.ignore_all();
             return Ok(None);
         }
-        Ok(Some(GeometryDesc::BilinearMesh(Arc::new(mesh))))
+        Ok(Some((GeometryDesc::BilinearMesh(Arc::new(mesh)), origin)))
     }
 
-    fn loop_subdivision(&mut self, params: &Params) -> Result<GeometryDesc> {
-        let positions = self.positions(params, "loopsubdiv")?;
+    fn loop_subdivision(&mut self, params: &Params) -> Result<(GeometryDesc, DVec3)> {
+        let (positions, origin) = self.positions(params, "loopsubdiv")?;
         let (faces, _) = self.faces::<3>(params, positions.len(), "loopsubdiv")?;
         if params.has("nlevels") {
             self.upgraded(params.spot_of("nlevels"));
@@ -438,7 +460,7 @@ impl Converter<'_, '_> {
         })?;
         drop(held);
         self.budget.bytes((mesh.positions.len() * 24 + mesh.triangles.len() * 12) as u64, "faces").at(at)?;
-        Ok(GeometryDesc::Mesh(Arc::new(mesh)))
+        Ok((GeometryDesc::Mesh(Arc::new(mesh)), origin))
     }
 
     /// A mesh from a file, which is read at the end with the others.
@@ -498,7 +520,7 @@ impl Converter<'_, '_> {
             // What no worker has read, as there was none or it died, is read here.
             let (mesh, diagnostics) = result.unwrap_or_else(|| read(file));
             self.diagnostics.append(diagnostics);
-            let mesh = match mesh.map_err(|e| file_fault(file.spot, e)) {
+            let mut mesh = match mesh.map_err(|e| file_fault(file.spot, e)) {
                 Ok(mesh) => mesh,
                 Err(Fault::Input(spot, wrong)) if self.diagnostics.is_lenient() => {
                     self.warn(spot, Diagnostic { severity: Severity::Warning, ..*wrong });
@@ -506,6 +528,10 @@ impl Converter<'_, '_> {
                 }
                 Err(fault) => return Err(fault),
             };
+            if mesh.has_corner_uvs {
+                // As in pbrt-v4, which knows none of them.
+                mesh.mesh.uvs = None;
+            }
             if mesh.mesh.triangles.is_empty() && mesh.mesh.quads.is_empty() {
                 self.note(file.spot, "a plymesh without faces shows nothing");
             }

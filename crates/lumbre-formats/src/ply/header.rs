@@ -185,6 +185,12 @@ impl Header {
                     let at = (name.as_ptr() as usize).saturating_sub(line.as_ptr() as usize);
                     texture = line.get(at..).map(|name| name.trim_end().to_owned());
                 }
+                ["comment", "TextureFile", name, ..] => {
+                    diagnostics
+                        .warn("a PLY file names several textures: the first is that of all faces", |said| {
+                            said.at(of(name)).found(quoted(name))
+                        });
+                }
                 [] | ["comment" | "obj_info", ..] => {}
                 ["format", kind, version] => {
                     encoding = Some(match kind {

@@ -3,6 +3,7 @@
 mod header;
 mod values;
 
+use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -20,6 +21,7 @@ use crate::image::open_image;
 use crate::input::{Input, refuse_wide};
 use crate::origin::{diagonal, is_without_area, origin_of, placed, relative};
 use crate::polygon;
+use crate::standing::up_of;
 use crate::thin::{INK, Thin};
 use header::{Element, Encoding, Header, Number, Property};
 use values::{Binary, Fault, Source, Text};
@@ -28,7 +30,8 @@ use values::{Binary, Fault, Source, Text};
 ///
 /// Of vertices: `x y z`, normals `nx ny nz`, texture coordinates (`u v`, `s t`, `texture_u texture_v`,
 /// `texture_s texture_t`) and colours (`red green blue`, integers in sRGB, others linear). Of faces:
-/// `vertex_indices` (or `vertex_index`) and `face_indices`. Of `tristrips`: `vertex_indices`, where -1 begins a
+/// `vertex_indices` (or `vertex_index`), `face_indices`, and `texcoord`, two texture coordinates for each corner, as MeshLab writes
+/// them: a vertex with several is kept several times. Of `tristrips`: `vertex_indices`, where -1 begins a
 /// new strip. Other elements and properties are ignored. Convex quadrilaterals are kept; other polygons are
 /// triangulated.
 ///
@@ -67,6 +70,8 @@ pub struct PlyFile {
     pub edges: Vec<[u32; 2]>,
     /// The image that a comment `TextureFile` names.
     pub texture: Option<String>,
+    /// Whether texture coordinates are those of the corners of faces.
+    pub has_corner_uvs: bool,
 }
 
 /// Reads the PLY file `path` as a scene of one shape with the default material.
@@ -89,7 +94,7 @@ pub(crate) fn ply_scene(
     diagnostics: &mut Diagnostics,
 ) -> Result<SceneDesc, FormatError> {
     let name = input.name().to_owned();
-    let PlyFile { mesh, origin, points, edges, texture } =
+    let PlyFile { mesh, origin, points, edges, texture, .. } =
         read_ply(&input, input.name(), budget, diagnostics)?;
     drop(input);
     let world_from_object = placed(origin);
@@ -108,7 +113,8 @@ pub(crate) fn ply_scene(
         segments,
     });
     let has_uvs = mesh.uvs.is_some();
-    let mut scene = scene_of_meshes([mesh], UpAxis::Y);
+    let (up, up_is_guessed) = up_of(std::iter::once(&mesh), origin);
+    let mut scene = SceneDesc { up_is_guessed, ..scene_of_meshes([mesh], up) };
     if let Some(thin) = thin {
         push_thin(&mut scene, &thin, size, None, Transform::IDENTITY, budget)?;
     }
@@ -248,6 +254,17 @@ impl Slot {
     }
 }
 
+/// Texture coordinates of corners. A vertex has those of the first corner that comes to it; for others it is copied.
+#[derive(Debug)]
+struct CornerUvs {
+    /// Vertices of the file; what comes after them are copies.
+    vertices: usize,
+    /// By vertex; `None` where no corner came to it.
+    of_vertices: Vec<Option<Vec2>>,
+    /// Copies by their vertex and the bits of their coordinates.
+    copies: HashMap<(u32, [u32; 2]), u32>,
+}
+
 struct Mesh<'a> {
     name: &'a Arc<str>,
     bytes: &'a [u8],
@@ -262,6 +279,8 @@ struct Mesh<'a> {
     colours: Option<Vec<Rgb>>,
     /// When lenient, vertices that are not finite.
     unusable: Vec<u32>,
+    /// Texture coordinates of corners, in files that have them.
+    corners: Option<CornerUvs>,
     triangles: BudgetVec<'a, [u32; 3]>,
     quads: BudgetVec<'a, [u32; 4]>,
     triangle_numbers: BudgetVec<'a, u32>,
@@ -290,6 +309,7 @@ impl<'a> Mesh<'a> {
             uvs: None,
             colours: None,
             unusable: vec![],
+            corners: None,
             triangles: BudgetVec::new(budget, "triangles"),
             quads: BudgetVec::new(budget, "quads"),
             triangle_numbers: BudgetVec::new(budget, "face numbers"),
@@ -589,12 +609,22 @@ impl<'a> Mesh<'a> {
             self.triangles.reserve(element.count as usize)?;
             self.triangle_numbers.reserve(if self.has_numbers { element.count as usize } else { 0 })?;
         }
+        let is_uvs = |p: &Property| p.list.is_some() && p.name == "texcoord";
+        let uvs_at = element.properties.iter().position(is_uvs).filter(|_| !is_strips);
+        if uvs_at.is_some() && self.corners.is_none() {
+            let vertices = self.positions.len();
+            self.budget.bytes((vertices * size_of::<Option<Vec2>>()) as u64, "texture coordinates")?;
+            let of_vertices = vec![None; vertices];
+            self.corners = Some(CornerUvs { vertices, of_vertices, copies: HashMap::new() });
+        }
         let mut corners: BudgetVec<'_, i64> = BudgetVec::new(self.budget, "corners of a face");
+        let mut uvs: BudgetVec<'_, f32> = BudgetVec::new(self.budget, "texture coordinates of a face");
         let mut filled;
+        let mut filled_uvs;
         for index in 0..element.count {
             let start = source.at();
             let mut number = 0u32;
-            filled = 0;
+            (filled, filled_uvs) = (0, 0);
             for (i, property) in element.properties.iter().enumerate() {
                 let fault = |f: Box<Fault>| FormatError::from(self.wrong(*f, element, index, &property.name));
                 match property.list {
@@ -609,6 +639,16 @@ impl<'a> Mesh<'a> {
                             *corner = if value.fract() == 0.0 { value as i64 } else { i64::MIN };
                         }
                         filled = length;
+                    }
+                    Some(length) if Some(i) == uvs_at => {
+                        let length = source.length(length, property.number).map_err(fault)?;
+                        while uvs.len() < length {
+                            uvs.push(0.0)?;
+                        }
+                        for uv in &mut uvs[..length] {
+                            *uv = source.number(property.number).map_err(fault)? as f32;
+                        }
+                        filled_uvs = length;
                     }
                     Some(length) => {
                         let length = source.length(length, property.number).map_err(fault)?;
@@ -626,12 +666,80 @@ impl<'a> Mesh<'a> {
             if is_strips {
                 self.strip(&corners[..filled], element, index, start)?;
             } else {
+                let count = self.vertices_of_file() as i64;
+                if let Some(&corner) = corners[..filled].iter().find(|&&c| c < 0 || count <= c) {
+                    self.unusable_face(corner, element, index, start)?;
+                    continue;
+                }
+                if uvs_at.is_some() {
+                    self.set_uvs(&mut corners[..filled], &uvs[..filled_uvs], element, index, start)?;
+                }
                 self.face(&corners[..filled], number, element, index, start)?;
             }
         }
         Ok(())
     }
 
+    /// Gives the corners of a face, which are vertices of the file, their texture coordinates: vertices that have others
+    /// already become copies.
+    fn set_uvs(
+        &mut self,
+        corners: &mut [i64],
+        uvs: &[f32],
+        element: &Element,
+        index: u64,
+        at: usize,
+    ) -> Result<(), FormatError> {
+        let Some(of) = &mut self.corners else { return Ok(()) };
+        let is_usable = |&c: &i64| {
+            (0..of.vertices as i64).contains(&c) && self.unusable.binary_search(&(c as u32)).is_err()
+        };
+        if uvs.is_empty() || !corners.iter().all(is_usable) {
+            return Ok(());
+        }
+        if uvs.len() != 2 * corners.len() || uvs.iter().any(|uv| !uv.is_finite()) {
+            let what = "texture coordinates of a face that are not two numbers a corner, left out";
+            self.drop_face(what, element, index, at);
+            return Ok(());
+        }
+        for (corner, uv) in corners.iter_mut().zip(uvs.chunks_exact(2)) {
+            let (vertex, uv) = (*corner as usize, Vec2::new(uv[0], uv[1]));
+            match of.of_vertices[vertex] {
+                None => of.of_vertices[vertex] = Some(uv),
+                Some(first) if first == uv => {}
+                Some(_) => {
+                    let next = self.positions.len() as u32;
+                    let copy =
+                        *of.copies.entry((vertex as u32, uv.to_array().map(f32::to_bits))).or_insert(next);
+                    if copy == next {
+                        // Lists and the table grow by halves at most.
+                        const COPY: u64 = 2 * 96;
+                        self.budget.bytes(COPY, "texture coordinates")?;
+                        self.positions.push(self.positions[vertex]);
+                        of.of_vertices.push(Some(uv));
+                        for list in self.normals.iter_mut() {
+                            list.push(list[vertex]);
+                        }
+                        for list in self.uvs.iter_mut() {
+                            list.push(list[vertex]);
+                        }
+                        for list in self.colours.iter_mut() {
+                            list.push(list[vertex]);
+                        }
+                    }
+                    *corner = i64::from(copy);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Without copies that [`Mesh::set_uvs`] made.
+    fn vertices_of_file(&self) -> usize {
+        self.corners.as_ref().map_or(self.positions.len(), |of| of.vertices)
+    }
+
+    /// A face whose corners are there.
     #[inline]
     fn face(
         &mut self,
@@ -641,10 +749,6 @@ impl<'a> Mesh<'a> {
         index: u64,
         at: usize,
     ) -> Result<(), FormatError> {
-        let count = self.positions.len() as i64;
-        if let Some(position) = corners.iter().position(|&c| c < 0 || count <= c) {
-            return self.unusable_face(corners[position], element, index, at);
-        }
         if !self.unusable.is_empty()
             && corners.iter().any(|&c| self.unusable.binary_search(&(c as u32)).is_ok())
         {
@@ -698,9 +802,14 @@ impl<'a> Mesh<'a> {
         index: u64,
         at: usize,
     ) -> Result<(), FormatError> {
+        let count = self.vertices_of_file() as i64;
         for strip in corners.split(|&c| c == -1) {
             for (i, corners) in strip.windows(3).enumerate() {
                 let [a, b, c] = [corners[0], corners[1], corners[2]];
+                if let Some(&corner) = corners.iter().find(|&&c| c < 0 || count <= c) {
+                    self.unusable_face(corner, element, index, at)?;
+                    continue;
+                }
                 // Every other triangle of a strip is reversed; degenerate ones have no area.
                 if a != b && b != c && a != c {
                     let corners = if i % 2 == 0 { [a, b, c] } else { [b, a, c] };
@@ -724,7 +833,7 @@ impl<'a> Mesh<'a> {
             return Ok(());
         }
         let place = self.place(self.encoding.start(self.bytes, at), &element.name, index, "vertex_indices");
-        let count = self.positions.len();
+        let count = self.vertices_of_file();
         let expected = if count == 0 {
             "no face, as there are no vertices".to_owned()
         } else {
@@ -746,7 +855,15 @@ impl<'a> Mesh<'a> {
         });
     }
 
-    fn finish(self, texture: Option<String>) -> Result<PlyFile, FormatError> {
+    fn finish(mut self, texture: Option<String>) -> Result<PlyFile, FormatError> {
+        let has_corner_uvs = self.corners.is_some();
+        if let Some(of) = self.corners.take() {
+            let own = self.uvs.take();
+            let of_vertex = |(i, uv): (usize, Option<Vec2>)| {
+                uv.or_else(|| own.as_ref().map(|own| own[i])).unwrap_or(Vec2::ZERO)
+            };
+            self.uvs = Some(of.of_vertices.into_iter().enumerate().map(of_vertex).collect());
+        }
         if self.positions.is_empty() {
             let said = Diagnostic::warning("PLY mesh without vertices").at(Place::whole(self.name.clone()));
             self.diagnostics.push(said);
@@ -786,6 +903,13 @@ impl<'a> Mesh<'a> {
         } else {
             vec![]
         };
-        Ok(PlyFile { mesh, origin: self.origin, points, edges: self.edges.into_vec(), texture })
+        Ok(PlyFile {
+            mesh,
+            origin: self.origin,
+            points,
+            edges: self.edges.into_vec(),
+            texture,
+            has_corner_uvs,
+        })
     }
 }

@@ -2,7 +2,7 @@
 
 use lumbre_math::warp;
 use lumbre_scene::{Scene, View};
-use lumbre_shading::{ShadingFrame, Spectrum};
+use lumbre_shading::{ShadingFrame, ShadingNormals, Spectrum};
 
 use crate::transport::{Draw, Integrator, RayCounts, Sight};
 
@@ -13,6 +13,8 @@ pub struct AmbientOcclusion {
     pub cosine: bool,
     /// How far to look.
     pub max_distance: f64,
+    /// About which normal the sky is: the shading normal, or as in pbrt the geometric one.
+    pub shading_normals: ShadingNormals,
 }
 
 impl Integrator for AmbientOcclusion {
@@ -25,7 +27,13 @@ impl Integrator for AmbientOcclusion {
         rays: &mut RayCounts,
     ) -> Spectrum {
         let Some(met) = &sight.met else { return Spectrum::BLACK };
-        let normal = met.shading.normal;
+        let smooth = met.shading.normal;
+        let normal = match self.shading_normals {
+            ShadingNormals::Pbrt if ShadingNormals::differ(smooth, met.shading.geometric) => {
+                met.shading.geometric
+            }
+            _ => smooth,
+        };
         let facing = if normal.dot(met.towards_origin.as_vec3()) < 0.0 { -normal } else { normal };
         let frame = ShadingFrame::new(facing, met.shading.dpdu);
         let u = draw.direction(0);

@@ -5,7 +5,7 @@ use std::cell::OnceCell;
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Vec2, Vec3};
 use lumbre_scene::{Interaction, LightSample, Scene};
-use lumbre_shading::{Bsdf, LocalDir, Material, Scatter, ShadingFrame, Spectrum};
+use lumbre_shading::{Bsdf, LocalDir, Material, Scatter, ShadingFrame, ShadingNormals, Spectrum};
 
 use crate::transport::RayCounts;
 use crate::transport::interior::Interiors;
@@ -25,14 +25,19 @@ use crate::transport::through::{goes_straight_on, straight_on};
 /// the smooth surface turns away from the light, not at the edge of a face. J. Hanika ("Hacking the Shadow Terminator",
 /// 2021) starts all rays there; here those that leave a face upwards start on it, for they need no help, and nothing that stands
 /// on it comes to hover.
+///
+/// With [`ShadingNormals::Pbrt`] nothing of that is done.
 pub(super) struct Vertex<'a, 's> {
     pub met: &'a Interaction<'s>,
     pub bsdf: Bsdf,
     pub material: &'s Material,
     frame: ShadingFrame,
     wo: LocalDir,
-    /// The geometric normal, on the side of `wo`; `None` where it is the shading normal.
+    /// The geometric normal, on the side of `wo`, in whose plane directions are folded; `None` where it is the shading
+    /// normal, and as in pbrt.
     geometric: Option<Vec3>,
+    /// That normal where it only says which side a direction is on, as in pbrt.
+    side: Option<Vec3>,
     scene: &'s Scene,
     /// [`Interaction::risen`], once it was asked for.
     risen: OnceCell<Option<DVec3>>,
@@ -46,16 +51,23 @@ pub(super) struct Bounce {
     pub weight: Spectrum,
     /// How it was chosen; the density counts every way to the same direction.
     pub scatter: Scatter,
-    /// Whether it crosses the surface.
+    /// Whether the BSDF transmits it.
     pub transmitted: bool,
+    /// Whether it leads to the other side of the surface.
+    pub crosses: bool,
     /// η of the side that it enters over that of the side it leaves.
     pub eta: f32,
 }
 
 impl<'a, 's> Vertex<'a, 's> {
     /// `None` where nothing scatters.
-    pub(super) fn new(scene: &'s Scene, met: &'a Interaction<'s>, interiors: &Interiors<'s>) -> Option<Self> {
-        Self::of(scene, met, met.resolved()?, interiors)
+    pub(super) fn new(
+        scene: &'s Scene,
+        met: &'a Interaction<'s>,
+        interiors: &Interiors<'s>,
+        normals: ShadingNormals,
+    ) -> Option<Self> {
+        Self::of(scene, met, met.resolved()?, interiors, normals)
     }
 
     /// One vertex for each material of a mixture, with its share: see [`Interaction::parts`].
@@ -64,9 +76,12 @@ impl<'a, 's> Vertex<'a, 's> {
         met: &'a Interaction<'s>,
         least: f32,
         interiors: &'a Interiors<'s>,
+        normals: ShadingNormals,
     ) -> impl Iterator<Item = (f32, Self)> {
         let parts = met.parts(least);
-        parts.filter_map(move |(share, material)| Some((share, Self::of(scene, met, material, interiors)?)))
+        parts.filter_map(move |(share, material)| {
+            Some((share, Self::of(scene, met, material, interiors, normals)?))
+        })
     }
 
     fn of(
@@ -74,9 +89,10 @@ impl<'a, 's> Vertex<'a, 's> {
         met: &'a Interaction<'s>,
         material: &'s Material,
         interiors: &Interiors<'s>,
+        normals: ShadingNormals,
     ) -> Option<Self> {
         let towards = met.towards_origin.as_vec3();
-        let (frame, mut bsdf) = material.shading(&met.at, &met.shading, towards)?;
+        let (frame, mut bsdf) = material.shading(&met.at, &met.shading, towards, normals)?;
         if material.is_solid() {
             let outside = interiors.index_outside(material, met.front);
             if outside != 1.0 {
@@ -85,12 +101,17 @@ impl<'a, 's> Vertex<'a, 's> {
         }
         let wo = frame.to_local(towards);
         let geometric = met.shading.geometric;
-        let geometric =
-            (frame.n.dot(geometric) < 1.0 - 1e-6).then(|| if met.front { geometric } else { -geometric });
-        Some(Self { met, bsdf, material, frame, wo, geometric, scene, risen: OnceCell::new() })
+        let side = ShadingNormals::differ(frame.n, geometric)
+            .then(|| if met.front { geometric } else { -geometric });
+        let (geometric, side) = match normals {
+            ShadingNormals::Lumbre => (side, None),
+            ShadingNormals::Pbrt => (None, side),
+        };
+        let risen = OnceCell::new();
+        Some(Self { met, bsdf, material, frame, wo, geometric, side, scene, risen })
     }
 
-    /// Whether a direction leaves on the side of `wo`.
+    /// Whether the BSDF reflects to a direction.
     fn reflects(&self, wi: Vec3) -> bool {
         match self.geometric {
             Some(normal) => normal.dot(wi) > 0.0 || self.stays(wi),
@@ -168,6 +189,7 @@ impl<'a, 's> Vertex<'a, 's> {
             weight: sample.weight,
             scatter: sample.scatter,
             transmitted: sample.transmitted,
+            crosses: self.side.map_or(sample.transmitted, |normal| normal.dot(direction) < 0.0),
             eta: sample.eta,
         }
     }
@@ -253,7 +275,9 @@ impl<'a, 's> Vertex<'a, 's> {
 
     /// Whether a light's sample comes through the solid whose surface this is.
     fn crosses(&self, sample: &LightSample) -> bool {
-        self.material.is_solid() && !self.reflects(sample.towards.as_vec3())
+        let wi = sample.towards.as_vec3();
+        self.material.is_solid()
+            && self.side.map_or_else(|| !self.reflects(wi), |normal| normal.dot(wi) < 0.0)
     }
 
     /// The solids around the place, on one side of its surface or the other.

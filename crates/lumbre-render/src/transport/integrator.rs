@@ -60,12 +60,16 @@ impl AddAssign for RayCounts {
 
 /// The integrator that a description asks for.
 pub fn integrator(desc: &IntegratorDesc) -> Box<dyn Integrator> {
-    let max_depth = desc.max_depth;
+    let IntegratorDesc { max_depth, shading_normals, .. } = *desc;
     match desc.kind {
-        IntegratorKind::Path { regularize } => Box::new(Path { regularize, ..Path::new(max_depth) }),
-        IntegratorKind::Whitted { light_samples, sky } => Box::new(Whitted { max_depth, light_samples, sky }),
+        IntegratorKind::Path { regularize } => {
+            Box::new(Path { regularize, shading_normals, ..Path::new(max_depth) })
+        }
+        IntegratorKind::Whitted { light_samples, sky } => {
+            Box::new(Whitted { max_depth, light_samples, sky, shading_normals })
+        }
         IntegratorKind::AmbientOcclusion { cosine, max_distance } => {
-            Box::new(AmbientOcclusion { cosine, max_distance })
+            Box::new(AmbientOcclusion { cosine, max_distance, shading_normals })
         }
         IntegratorKind::Normals => Box::new(FeatureIntegrator(Feature::Normal)),
         IntegratorKind::Depth => Box::new(FeatureIntegrator(Feature::Depth)),

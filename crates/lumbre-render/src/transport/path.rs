@@ -4,7 +4,7 @@ use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 use lumbre_scene::{Interaction, Scene, View};
 use lumbre_shading::medium::{DistanceSample, sample_henyey_greenstein};
-use lumbre_shading::{HomogeneousMedium, Scatter, Spectrum};
+use lumbre_shading::{HomogeneousMedium, Scatter, ShadingNormals, Spectrum};
 
 use crate::transport::direct::{Vertex, power_heuristic};
 use crate::transport::interior::Interiors;
@@ -23,6 +23,8 @@ pub struct Path {
     pub max_depth: u32,
     /// Whether to roughen surfaces after the first diffuse bounce.
     pub regularize: bool,
+    /// What is made of shading normals that are not those of the surface.
+    pub shading_normals: ShadingNormals,
     /// How light is found.
     pub strategy: Strategy,
     /// Bounces that every path may take before Russian roulette.
@@ -62,7 +64,13 @@ const MOST_COLLISIONS: u32 = 1 << 14;
 impl Path {
     /// A path tracer of so many bounces.
     pub fn new(max_depth: u32) -> Self {
-        Self { max_depth, regularize: false, strategy: Strategy::Both, sure_bounces: SURE_BOUNCES }
+        Self {
+            max_depth,
+            regularize: false,
+            shading_normals: ShadingNormals::default(),
+            strategy: Strategy::Both,
+            sure_bounces: SURE_BOUNCES,
+        }
     }
 
     /// The weight of light that a ray found by itself, against a sample of the light with this density.
@@ -268,7 +276,7 @@ impl<'s, 'w> Walk<'s, 'w> {
         if self.depth == self.path.max_depth {
             return None;
         }
-        let mut vertex = Vertex::new(self.scene, here, &self.interiors)?;
+        let mut vertex = Vertex::new(self.scene, here, &self.interiors, self.path.shading_normals)?;
         if self.path.regularize && self.has_scattered {
             vertex.bsdf = vertex.bsdf.regularized();
         }
@@ -289,6 +297,8 @@ impl<'s, 'w> Walk<'s, 'w> {
         self.has_scattered |= bounce.scatter != Scatter::Delta;
         if bounce.transmitted {
             self.eta_scale *= bounce.eta * bounce.eta;
+        }
+        if bounce.crosses {
             self.interiors.cross(vertex.material, here.front);
         }
         self.depth += 1;

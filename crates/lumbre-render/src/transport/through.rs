@@ -2,7 +2,7 @@
 
 use lumbre_geometry::Ray;
 use lumbre_scene::{Footprint, LightSample, Scene};
-use lumbre_shading::{Scatter, Spectrum};
+use lumbre_shading::{Scatter, ShadingNormals, Spectrum};
 
 use crate::transport::direct::Vertex;
 use crate::transport::interior::Interiors;
@@ -49,7 +49,9 @@ pub(super) fn light_through(
             return Spectrum::BLACK;
         }
         throughput *= interiors.transmittance(ray_length(&ray, &here));
-        let Some(vertex) = Vertex::new(scene, &here, &interiors) else { return Spectrum::BLACK };
+        let Some(vertex) = Vertex::new(scene, &here, &interiors, ShadingNormals::Lumbre) else {
+            return Spectrum::BLACK;
+        };
         let Some(bounce) = vertex.sample(draw.lobe(first + surface), draw.direction(first + surface)) else {
             return Spectrum::BLACK;
         };
@@ -107,7 +109,7 @@ pub(super) fn straight_on<'s>(
         let material = pane.resolved();
         interiors.arrive(&pane, material);
         left *= interiors.transmittance(ray_length(&ray, &pane));
-        left *= Vertex::parts(scene, &pane, LEAST_PART, &interiors)
+        left *= Vertex::parts(scene, &pane, LEAST_PART, &interiors, ShadingNormals::Lumbre)
             .map(|(share, mut vertex)| {
                 if regularize {
                     vertex.bsdf = vertex.bsdf.regularized();

@@ -2,7 +2,7 @@
 
 use lumbre_geometry::Ray;
 use lumbre_scene::{Footprint, Interaction, Light, LightId, LightSample, Scene, View};
-use lumbre_shading::{Scatter, Spectrum};
+use lumbre_shading::{Scatter, ShadingNormals, Spectrum};
 use smallvec::SmallVec;
 
 use crate::transport::direct::Vertex;
@@ -24,6 +24,8 @@ pub struct Whitted {
     pub light_samples: u32,
     /// Whether lights at infinity light surfaces. Without it they are background: mirrors and escaping rays show them.
     pub sky: bool,
+    /// What is made of shading normals that are not those of the surface.
+    pub shading_normals: ShadingNormals,
 }
 
 /// With more lights than these, one is chosen by its power.
@@ -46,7 +48,7 @@ type Scatterers<'a, 's> = SmallVec<[(f32, Vertex<'a, 's>); 2]>;
 impl Whitted {
     /// A Whitted tracer that follows so many reflections, with one point on each light.
     pub fn new(max_depth: u32) -> Self {
-        Self { max_depth, light_samples: 1, sky: false }
+        Self { max_depth, light_samples: 1, sky: false, shading_normals: ShadingNormals::default() }
     }
 
     /// What scatters at a vertex of the tree of rays; its mirrors and its glass go to `pending`.
@@ -61,7 +63,8 @@ impl Whitted {
         let mut scatterers = Scatterers::new();
         let mut branches = 0;
         let least = FAINT / came.throughput.max_component();
-        for (share, vertex) in Vertex::parts(scene, here, least, &came.interiors) {
+        let parts = Vertex::parts(scene, here, least, &came.interiors, self.shading_normals);
+        for (share, vertex) in parts {
             for part in vertex.specular() {
                 let branch = branches;
                 branches += 1;
@@ -74,7 +77,7 @@ impl Whitted {
                     throughput *= FAINT / carries;
                 }
                 let mut interiors = came.interiors.clone();
-                if part.transmitted {
+                if part.crosses {
                     interiors.cross(vertex.material, here.front);
                 }
                 pending.push(Branch {

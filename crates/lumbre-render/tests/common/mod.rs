@@ -10,8 +10,8 @@ use lumbre_image::{Image, Rgb};
 use lumbre_math::{DAffine3, DMat3, DVec3, Transform, Vec2, Vec3};
 use lumbre_render::{CancelToken, NoProgress, RenderOptions, Rendered, render};
 use lumbre_scene::{
-    AreaLightDesc, Camera, CameraKind, FilterDesc, GeometryDesc, IntegratorDesc, IntegratorKind, MaterialId,
-    MeshDesc, NamedMaterial, Scene, SceneDesc, ShapeDesc,
+    AreaLightDesc, Camera, CameraKind, FilterDesc, GeometryDesc, IntegratorDesc, MaterialId, MeshDesc,
+    NamedMaterial, Scene, SceneDesc, ShapeDesc,
 };
 use lumbre_shading::{Material, MaterialKind, SpectrumTexture};
 
@@ -25,7 +25,7 @@ pub(crate) fn diffuse(reflectance: f32) -> Material {
 pub(crate) fn empty() -> SceneDesc {
     SceneDesc {
         filter: FilterDesc::Box { radius: Vec2::splat(0.5) },
-        integrator: IntegratorDesc { kind: IntegratorKind::Path { regularize: false }, max_depth: 5 },
+        integrator: IntegratorDesc::default(),
         ..SceneDesc::default()
     }
 }

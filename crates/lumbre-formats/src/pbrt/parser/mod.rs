@@ -6,7 +6,7 @@ mod scopes;
 mod tokens;
 mod transforms;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use lumbre_math::Transform;
@@ -28,6 +28,29 @@ struct Frame<'b> {
     is_top: bool,
 }
 
+/// What was read by includes. A short scene may have a long file read any number of times, as a short compressed one may
+/// unpack to a long one, and it is held to the same limit.
+#[derive(Debug, Default)]
+struct Included {
+    files: HashSet<PathBuf>,
+    /// Bytes of the different files.
+    stored: u64,
+    /// Bytes read, those of a file counted each time.
+    read: u64,
+}
+
+impl Included {
+    /// Counts a file that is included, and answers the bytes stored and read so far.
+    fn count(&mut self, path: &Path, bytes: u64) -> [u64; 2] {
+        if !self.files.contains(path) {
+            self.files.insert(path.to_owned());
+            self.stored += bytes;
+        }
+        self.read += bytes;
+        [self.stored, self.read]
+    }
+}
+
 /// Parses the scene language and passes each entity to the [`Converter`].
 pub(in crate::pbrt) struct Parser<'b, 'd> {
     frames: Vec<Frame<'b>>,
@@ -36,6 +59,7 @@ pub(in crate::pbrt) struct Parser<'b, 'd> {
     state: State,
     scopes: Vec<Scope>,
     coordinate_systems: HashMap<String, [Transform; 2]>,
+    included: Included,
     pub converter: Converter<'b, 'd>,
 }
 
@@ -49,6 +73,7 @@ impl<'b, 'd> Parser<'b, 'd> {
             state,
             scopes: vec![],
             coordinate_systems: HashMap::new(),
+            included: Included::default(),
             converter,
         }
     }
@@ -118,6 +143,9 @@ impl<'b, 'd> Parser<'b, 'd> {
             Err(FormatError::Limit { source, .. }) => return Err(Fault::Limit(at, source)),
             Err(other) => return Err(other.into()),
         };
+        let [stored, read] = self.included.count(canonical.as_deref().unwrap_or(&path), input.len() as u64);
+        let what = format!("{directive} of {} once more", quoted(&name));
+        self.converter.budget.expansion(stored, read, &what).at(at)?;
         let file = self.converter.files.add(input.name().clone(), Some(spot));
         let lexer = Lexer::new(input, file)?;
         let import = (directive == "Import").then(|| Box::new((self.state.clone(), self.scopes.len())));

@@ -1,0 +1,369 @@
+//! pbrt-v3's `uber`, and with it `plastic`: lobes side by side, each with a weight of its own.
+
+use std::f32::consts::FRAC_1_PI;
+use std::sync::Arc;
+
+use lumbre_math::{Vec2, Vec3};
+
+use crate::conductor::reflect;
+use crate::dielectric::refract;
+use crate::diffuse::cosine_direction;
+use crate::material::{Roughness, albedo, index};
+use crate::microfacet::Microfacets;
+use crate::specular::Specular;
+use crate::{
+    BsdfSample, FloatTexture, LocalDir, Scatter, Spectrum, SpectrumTexture, TextureContext, fresnel,
+};
+
+/// The parameters of `uber`, by their names in pbrt-v3.
+#[derive(Clone, Debug)]
+pub struct UberParams {
+    /// Kd: albedo of the Lambertian lobe.
+    pub kd: Arc<SpectrumTexture>,
+    /// Ks: a factor on the Fresnel reflectance of the facets.
+    pub ks: Arc<SpectrumTexture>,
+    /// Kr: a factor on that of a mirror.
+    pub kr: Arc<SpectrumTexture>,
+    /// Kt: a factor on what smooth refraction transmits.
+    pub kt: Arc<SpectrumTexture>,
+    /// A factor on all of these; the rest of the light goes straight on.
+    pub opacity: Arc<SpectrumTexture>,
+    /// Index of refraction, inside over outside.
+    pub eta: Arc<FloatTexture>,
+    /// Roughness of the facets; its remapping is [`remapped_roughness`].
+    pub roughness: Roughness,
+}
+
+impl UberParams {
+    /// Whether it is known to be uniform.
+    pub(crate) fn is_uniform(&self) -> bool {
+        let colours = [&self.kd, &self.ks, &self.kr, &self.kt, &self.opacity];
+        let numbers = [&self.eta, &self.roughness.u, &self.roughness.v];
+        colours.iter().all(|colour| colour.is_constant()) && numbers.iter().all(|number| number.is_constant())
+    }
+
+    /// Whether light may pass to the other side.
+    pub(crate) fn lets_light_through(&self) -> bool {
+        !is_everywhere(&self.kt, Spectrum::BLACK) || self.lets_light_straight_on()
+    }
+
+    /// Whether light may pass to the other side unbent.
+    pub(crate) fn lets_light_straight_on(&self) -> bool {
+        let may_be_one = match *self.eta {
+            FloatTexture::Constant(eta) => index(eta) == 1.0,
+            _ => true,
+        };
+        !is_everywhere(&self.opacity, Spectrum::WHITE)
+            || (may_be_one && !is_everywhere(&self.kt, Spectrum::BLACK))
+    }
+
+    /// The BSDF at a position.
+    pub(crate) fn bsdf(&self, at: &TextureContext) -> Uber {
+        let opacity = albedo(self.opacity.evaluate(at));
+        let part = |colour: &SpectrumTexture| opacity * albedo(colour.evaluate(at));
+        let alpha = |texture: &FloatTexture| {
+            let roughness = texture.evaluate(at);
+            let alpha = if self.roughness.remap { remapped_roughness(roughness) } else { roughness };
+            // Never a mirror, which is what Kr is for.
+            alpha.max(Microfacets::SMOOTH_BELOW)
+        };
+        Uber {
+            diffuse: part(&self.kd),
+            glossy: part(&self.ks),
+            mirror: part(&self.kr),
+            refracted: part(&self.kt),
+            passed: Spectrum::WHITE - opacity,
+            eta: index(self.eta.evaluate(at)),
+            facets: Microfacets::new(alpha(&self.roughness.u), alpha(&self.roughness.v)),
+        }
+    }
+}
+
+/// Whether a texture is known to be this colour everywhere.
+fn is_everywhere(texture: &SpectrumTexture, colour: Spectrum) -> bool {
+    matches!(texture, SpectrumTexture::Constant(found) if albedo(*found) == colour)
+}
+
+/// α by a roughness of pbrt-v3, in [0, 1], with `remaproughness`. pbrt-v4 has the square root in its place, which is smaller: 0.32
+/// in place of 0.46 for a roughness of 0.1. Source: the polynomial in ln r of pbrt-v3's manual of its file format.
+pub fn remapped_roughness(roughness: f32) -> f32 {
+    let x = roughness.max(1e-3).ln();
+    (((0.000_640_711 * x + 0.017_120_1) * x + 0.173_4) * x + 0.819_955) * x + 1.621_42
+}
+
+/// A sum of lobes that know nothing of each other, the same from both sides but for the index: Lambert, dielectric facets that
+/// only reflect, a mirror and a refraction by the same index, and light that goes straight on.
+///
+/// What the parameters give in sum may be more than what arrives, as in pbrt-v3: white Kd with white Ks makes light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Uber {
+    /// Albedo of the Lambertian lobe, in [0, 1], as all colours here.
+    pub diffuse: Spectrum,
+    /// A factor on the facets.
+    pub glossy: Spectrum,
+    /// A factor on the mirror.
+    pub mirror: Spectrum,
+    /// A factor on what is refracted.
+    pub refracted: Spectrum,
+    /// What goes straight on.
+    pub passed: Spectrum,
+    /// Index of refraction, inside over outside; positive.
+    pub eta: f32,
+    /// The facets; not smooth.
+    pub facets: Microfacets,
+}
+
+/// The lobes, in the order in which they are sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Lobe {
+    Diffuse,
+    Glossy,
+    Mirror,
+    Refracted,
+    Passed,
+}
+
+const LOBES: [Lobe; 5] = [Lobe::Diffuse, Lobe::Glossy, Lobe::Mirror, Lobe::Refracted, Lobe::Passed];
+
+/// The least Fresnel reflectance by which facets are sampled: some of them are met at grazing angles.
+const LEAST_GLOSSY: f32 = 0.1;
+
+impl Uber {
+    /// f · |cos θi|, without the delta parts.
+    pub fn eval(&self, wo: LocalDir, wi: LocalDir) -> Spectrum {
+        if !wo.same_hemisphere(wi) {
+            return Spectrum::BLACK;
+        }
+        let diffuse = self.diffuse * (FRAC_1_PI * wi.abs_cos_theta());
+        let Some(m) = half(wo, wi) else { return diffuse };
+        let reflected = fresnel::dielectric(wo.vec().dot(m), self.eta);
+        let both = self.facets.both_visible_per_cosines(wo.vec(), wi.vec());
+        diffuse + self.glossy * (reflected * 0.25 * self.facets.density(m) * both * wi.abs_cos_theta())
+    }
+
+    /// The density of [`Uber::sample`].
+    pub fn pdf(&self, wo: LocalDir, wi: LocalDir) -> f32 {
+        let [diffuse, glossy, ..] = self.probabilities(wo);
+        self.pdf_of(wo, wi, diffuse, glossy)
+    }
+
+    fn pdf_of(&self, wo: LocalDir, wi: LocalDir, diffuse: f32, glossy: f32) -> f32 {
+        if !wo.same_hemisphere(wi) {
+            return 0.0;
+        }
+        let facets = half(wo, wi)
+            .map_or(0.0, |m| 0.25 * self.facets.density(m) * self.facets.visible_per_cosine(wo.vec()));
+        diffuse * FRAC_1_PI * wi.abs_cos_theta() + glossy * facets
+    }
+
+    /// The probability of each lobe, about in proportion to its power; all 0 where nothing scatters.
+    fn probabilities(&self, wo: LocalDir) -> [f32; 5] {
+        let reflected = fresnel::dielectric(wo.cos_theta(), self.eta);
+        let powers = [
+            self.diffuse.max_component(),
+            self.glossy.max_component() * reflected.max(LEAST_GLOSSY),
+            self.mirror.max_component() * reflected,
+            self.refracted.max_component() * (1.0 - reflected),
+            self.passed.max_component(),
+        ];
+        let sum: f32 = powers.iter().sum();
+        powers.map(|power| if sum > 0.0 { power / sum } else { 0.0 })
+    }
+
+    /// A direction of one of the lobes.
+    pub fn sample(&self, wo: LocalDir, lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        if wo.cos_theta() == 0.0 || wo.cos_theta().is_nan() {
+            return None;
+        }
+        let probabilities = self.probabilities(wo);
+        let mut rest = lobe;
+        let chosen = LOBES.into_iter().zip(probabilities).find(|(_, probability)| {
+            let is_it = rest < *probability;
+            rest -= probability;
+            is_it
+        });
+        // By rounding the probabilities may sum to less than `lobe`.
+        let likely = || LOBES.into_iter().zip(probabilities).rfind(|(_, probability)| *probability > 0.0);
+        let (chosen, probability) = chosen.or_else(likely)?;
+        let wi = match chosen {
+            Lobe::Diffuse => cosine_direction(u, wo.cos_theta())?,
+            Lobe::Glossy => reflect(wo, self.facets.sample_visible(wo.vec(), u)),
+            _ => {
+                let part = self.delta(wo, chosen)?;
+                return Some(BsdfSample { weight: part.weight * (1.0 / probability), ..part });
+            }
+        };
+        let pdf = self.pdf_of(wo, wi, probabilities[0], probabilities[1]);
+        if !(pdf > 0.0 && pdf.is_finite()) {
+            return None;
+        }
+        let weight = self.eval(wo, wi) / pdf;
+        Some(BsdfSample { wi, weight, scatter: Scatter::Density(pdf), transmitted: false, eta: 1.0 })
+    }
+
+    /// One of the delta parts, with its own weight; `None` where it is black.
+    fn delta(&self, wo: LocalDir, lobe: Lobe) -> Option<BsdfSample> {
+        let reflected = fresnel::dielectric(wo.cos_theta(), self.eta);
+        let across = if wo.cos_theta() > 0.0 { self.eta } else { 1.0 / self.eta };
+        let (wi, weight, eta) = match lobe {
+            Lobe::Diffuse | Lobe::Glossy => return None,
+            Lobe::Mirror => (wo.mirrored(), self.mirror * reflected, 1.0),
+            Lobe::Refracted => {
+                // Radiance is scaled by η², as by glass.
+                let weight = self.refracted * ((1.0 - reflected) / (across * across));
+                (refract(wo, Vec3::Z, across)?, weight, across)
+            }
+            Lobe::Passed => (-wo, self.passed, 1.0),
+        };
+        let transmitted = lobe != Lobe::Mirror;
+        (!weight.is_black()).then_some(BsdfSample { wi, weight, scatter: Scatter::Delta, transmitted, eta })
+    }
+
+    /// Its mirror, its refraction, and what goes straight on.
+    pub(crate) fn specular(&self, wo: LocalDir) -> Specular {
+        if wo.cos_theta() == 0.0 || wo.cos_theta().is_nan() {
+            return Specular::new();
+        }
+        LOBES.into_iter().filter_map(|lobe| self.delta(wo, lobe)).collect()
+    }
+
+    /// Whether it is made of delta parts alone.
+    pub fn is_delta(&self) -> bool {
+        self.diffuse.is_black() && self.glossy.is_black()
+    }
+
+    /// An estimate of its albedo: what it gives head on, at most 1.
+    pub(crate) fn albedo_estimate(&self) -> Spectrum {
+        let reflected = fresnel::dielectric(1.0, self.eta);
+        let sum = self.diffuse
+            + (self.glossy + self.mirror) * reflected
+            + self.refracted * (1.0 - reflected)
+            + self.passed;
+        albedo(sum)
+    }
+}
+
+/// The normal of the facets that reflect one direction into the other on the same side, pointing up.
+fn half(wo: LocalDir, wi: LocalDir) -> Option<Vec3> {
+    let half = (wo.vec() + wi.vec()).try_normalize()?;
+    Some(if half.z < 0.0 { -half } else { half })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WHITE_DIFFUSE: Uber = Uber {
+        diffuse: Spectrum::WHITE,
+        glossy: Spectrum::BLACK,
+        mirror: Spectrum::BLACK,
+        refracted: Spectrum::BLACK,
+        passed: Spectrum::BLACK,
+        eta: 1.5,
+        facets: Microfacets::ROUGH,
+    };
+
+    fn from(x: f32, z: f32) -> LocalDir {
+        LocalDir(Vec3::new(x, -0.3, z).normalize())
+    }
+
+    fn parts(params: &UberParams) -> Uber {
+        let at = TextureContext {
+            point: lumbre_math::DVec3::new(2.0, -1.0, 3.0),
+            normal: Vec3::Z,
+            uv: Vec2::new(0.25, 0.75),
+            dpdx: Vec3::ZERO,
+            dpdy: Vec3::ZERO,
+            duv_dx: Vec2::ZERO,
+            duv_dy: Vec2::ZERO,
+            vertex: crate::VertexData::NONE,
+        };
+        params.bsdf(&at)
+    }
+
+    fn params() -> UberParams {
+        let grey = |c: f32| Arc::new(SpectrumTexture::Constant(Spectrum::splat(c)));
+        UberParams {
+            kd: grey(0.25),
+            ks: grey(0.25),
+            kr: grey(0.0),
+            kt: grey(0.0),
+            opacity: grey(1.0),
+            eta: Arc::new(FloatTexture::Constant(1.5)),
+            roughness: Roughness::isotropic(0.1, true),
+        }
+    }
+
+    #[test]
+    fn a_mirror_of_kr_has_the_fresnel_reflectance_of_its_index() {
+        let kr = Spectrum::new(0.9, 0.5, 0.2);
+        let bsdf = Uber { diffuse: Spectrum::BLACK, mirror: kr, eta: 1.7, ..WHITE_DIFFUSE };
+        let head_on = LocalDir(Vec3::Z);
+        // ((η − 1) / (η + 1))².
+        let expected = kr * (0.7_f32 / 2.7).powi(2);
+        let sample = bsdf.sample(head_on, 0.5, Vec2::ZERO).expect("a mirror");
+        assert!(sample.wi == head_on && sample.scatter == Scatter::Delta && !sample.transmitted);
+        let error = (sample.weight - expected).map(f32::abs).max_component();
+        assert!(error < 1e-6, "{:?}", sample.weight);
+        // At Brewster's angle what is reflected is polarised across, by cos²(2 θ) / 2.
+        let brewster = 1.7_f32.atan();
+        let wo = LocalDir(Vec3::new(brewster.sin(), 0.0, brewster.cos()));
+        let expected = kr * (0.5 * (2.0 * brewster).cos().powi(2));
+        let found = bsdf.specular(wo)[0].weight;
+        assert!((found - expected).map(f32::abs).max_component() < 1e-6, "{found:?} {expected:?}");
+        assert!(bsdf.is_delta());
+    }
+
+    #[test]
+    fn what_opacity_leaves_goes_straight_on_in_its_colour() {
+        let opacity = Spectrum::new(0.75, 0.5, 0.0);
+        let opaque = parts(&params());
+        let clear = parts(&UberParams { opacity: Arc::new(SpectrumTexture::Constant(opacity)), ..params() });
+        for (wo, wi) in [(from(0.4, 0.8), from(-0.2, 0.5)), (from(0.4, -0.8), from(-0.6, -0.3))] {
+            let straight = clear.specular(wo);
+            assert_eq!(straight.len(), 1);
+            assert_eq!((straight[0].wi, straight[0].weight), (-wo, Spectrum::WHITE - opacity));
+            assert!(straight[0].transmitted && straight[0].eta == 1.0);
+            let error = (clear.eval(wo, wi) - opacity * opaque.eval(wo, wi)).map(f32::abs).max_component();
+            assert!(error < 1e-6 && !opaque.eval(wo, wi).is_black());
+        }
+        assert!(opaque.specular(from(0.4, 0.8)).is_empty());
+    }
+
+    #[test]
+    fn kr_and_kt_of_one_are_smooth_glass() {
+        let bsdf = Uber {
+            diffuse: Spectrum::BLACK,
+            mirror: Spectrum::WHITE,
+            refracted: Spectrum::WHITE,
+            ..WHITE_DIFFUSE
+        };
+        let glass =
+            crate::Bsdf::Dielectric(crate::dielectric::Dielectric { eta: 1.5, facets: Microfacets::SMOOTH });
+        for wo in [from(0.4, 0.8), from(0.4, -0.8), from(2.0, -0.4)] {
+            let expected: Vec<BsdfSample> = glass.specular(wo).collect();
+            let found = bsdf.specular(wo);
+            assert_eq!(found.len(), expected.len());
+            for (found, expected) in found.iter().zip(&expected) {
+                assert_eq!(
+                    (found.wi, found.transmitted, found.eta),
+                    (expected.wi, expected.transmitted, expected.eta)
+                );
+                assert!((found.weight - expected.weight).map(f32::abs).max_component() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn roughness_is_remapped_as_pbrt_v3_does() {
+        // By hand: ln 0.1 = −2.302585, and so on.
+        for (roughness, alpha) in [(1.0, 1.621_42), (0.1, 0.461_8), (0.001, 0.047_2), (0.0, 0.047_2)] {
+            let found = remapped_roughness(roughness);
+            assert!((found - alpha).abs() < 2e-4, "{roughness}: {found}");
+        }
+        let rough =
+            |value, remap| parts(&UberParams { roughness: Roughness::isotropic(value, remap), ..params() });
+        assert_eq!(rough(0.3, false).facets.alpha(), Vec2::splat(0.3));
+        assert!(!rough(0.0, false).facets.is_smooth());
+    }
+}
