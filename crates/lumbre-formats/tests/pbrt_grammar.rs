@@ -407,7 +407,7 @@ fn solids_combine_and_nest() {
     );
     let GeometryDesc::Csg(csg) = &scene.shapes[0].geometry else { panic!() };
     assert_eq!(csg.operation, CsgOperation::Difference);
-    assert_eq!(csg.operands.iter().map(Vec::len).collect::<Vec<_>>(), [1, 1, 2]);
+    assert_eq!(csg.operands.iter().map(|shapes| shapes.len()).collect::<Vec<_>>(), [1, 1, 2]);
     assert_eq!(origin(&csg.operands[1][0]), DVec3::new(1.0, 0.0, 0.0));
     let GeometryDesc::Csg(inner) = &csg.operands[0][0].geometry else { panic!() };
     assert_eq!(inner.operation, CsgOperation::Union);

@@ -347,7 +347,7 @@ fn an_interface_is_no_surface_and_gives_no_light() {
 fn csg(operation: CsgOperation, operands: Vec<ShapeDesc>) -> GeometryDesc {
     GeometryDesc::Csg(CsgDesc {
         operation,
-        operands: operands.into_iter().map(|shape| vec![shape]).collect(),
+        operands: operands.into_iter().map(|shape| Arc::new(vec![shape])).collect(),
     })
 }
 

@@ -28,6 +28,13 @@ pub(super) struct Token {
     end: usize,
 }
 
+impl Token {
+    /// Its length in bytes.
+    pub fn len(self) -> usize {
+        self.end - self.start
+    }
+}
+
 /// Splits the bytes of one file into tokens.
 ///
 /// White space is space, tab, CR and LF; `#` between tokens starts a comment up to the end of its line. Lines end with LF,

@@ -172,7 +172,8 @@ pub(crate) fn push_thin(
         });
         MaterialId(scene.materials.len() as u32 - 1)
     });
-    for geometry in thin.shapes(size, budget)? {
+    for geometry in thin.shapes(size, budget) {
+        let geometry = geometry?;
         budget.bytes(size_of::<ShapeDesc>() as u64, "points and lines")?;
         scene.shapes.push(ShapeDesc {
             index: scene.shapes.len() as u32,

@@ -16,7 +16,7 @@ use super::lexer::{Lexer, Token, TokenKind};
 use super::source::{AtSpot, Fault, Result, Spot};
 use super::state::{Scope, State};
 use crate::diagnostic::quoted;
-use crate::{Diagnostic, FormatError, Input};
+use crate::{Diagnostic, FormatError, Hold, Input};
 
 /// A file that is being read.
 struct Frame<'b> {
@@ -36,12 +36,15 @@ pub(in crate::pbrt) struct Parser<'b, 'd> {
     state: State,
     scopes: Vec<Scope>,
     coordinate_systems: HashMap<String, [Transform; 2]>,
+    /// What the parameters of the current directive take.
+    room: Hold<'b>,
     pub converter: Converter<'b, 'd>,
 }
 
 impl<'b, 'd> Parser<'b, 'd> {
     pub fn new(mut converter: Converter<'b, 'd>) -> Self {
         let state = State::new(converter.default_material());
+        let room = converter.budget.hold_nothing();
         Self {
             frames: vec![],
             peeked: None,
@@ -49,6 +52,7 @@ impl<'b, 'd> Parser<'b, 'd> {
             state,
             scopes: vec![],
             coordinate_systems: HashMap::new(),
+            room,
             converter,
         }
     }
@@ -69,6 +73,7 @@ impl<'b, 'd> Parser<'b, 'd> {
             if token.kind == TokenKind::Bare {
                 let name = self.bare(token);
                 self.directive(&name, spot)?;
+                self.room.empty();
             } else {
                 let wrong = Diagnostic::error("no directive before this").found(self.shown(token));
                 return Err(spot.wrong(wrong.expected("a directive such as Shape")));

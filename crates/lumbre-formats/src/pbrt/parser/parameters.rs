@@ -22,7 +22,9 @@ impl Parser<'_, '_> {
                 break;
             }
             self.peeked = None;
-            params.push(self.param(token)?);
+            let param = self.param(token)?;
+            self.room.room_in(&mut params, "parameters").at(param.spot)?;
+            params.push(param);
         }
         Ok(params)
     }
@@ -112,6 +114,17 @@ impl Parser<'_, '_> {
     /// Appends the value of `token`; returns whether it is valid.
     fn value(&mut self, token: Token, values: &mut Values) -> Result<bool> {
         let lexer = &mut self.frames.last_mut().expect("a file is being read").lexer;
+        let made = match values {
+            Values::Numbers(v) => self.room.room_in(v, "numbers"),
+            Values::Integers(v) => self.room.room_in(v, "integers"),
+            Values::Strings(v) => {
+                self.room.grow(token.len() as u64, "strings").and_then(|()| self.room.room_in(v, "strings"))
+            }
+            Values::Bools(v) => self.room.room_in(v, "bools"),
+        };
+        if let Err(limit) = made {
+            return Err(limit).at(lexer.spot(token));
+        }
         match (values, token.kind) {
             (Values::Numbers(v), TokenKind::Bare) => {
                 let raw = lexer.raw(token);
