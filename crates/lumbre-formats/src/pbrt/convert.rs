@@ -660,7 +660,7 @@ pub(super) fn file_fault(at: Spot, error: FormatError) -> Fault {
         FormatError::Io { path, action, source } => {
             at.error(format!("{action} {}: {source}", quoted(&path.display().to_string())))
         }
-        FormatError::Limit { place: None, source } => Fault::Limit(at, source),
+        FormatError::Limit { place: None, source } => Fault::Limit(at, Box::new(source)),
         other => Fault::Named(at, Box::new(other)),
     }
 }

@@ -120,7 +120,7 @@ impl<'b, 'd> Parser<'b, 'd> {
                 self.converter.note(at, format!("{message}; the scene goes on without it"));
                 return Ok(());
             }
-            Err(FormatError::Limit { source, .. }) => return Err(Fault::Limit(at, source)),
+            Err(FormatError::Limit { source, .. }) => return Err(Fault::Limit(at, Box::new(source))),
             Err(other) => return Err(other.into()),
         };
         let file = self.converter.files.add(input.name().clone(), Some(spot));
