@@ -416,6 +416,27 @@ fn solids_combine_and_nest() {
 }
 
 #[test]
+fn csg_shapes_of_the_same_objects_share_them() {
+    let mut text = "ObjectBegin \"o0\" Shape \"sphere\" \"texture alpha\" \"later\" ObjectEnd\n".to_owned();
+    for i in 1..=12 {
+        let inner = i - 1;
+        text += &format!(
+            "ObjectBegin \"o{i}\" Shape \"csg\" \"string operands\" [\"o{inner}\" \"o{inner}\"] ObjectEnd\n"
+        );
+    }
+    let scene = world(&(text + "Texture \"later\" \"float\" \"constant\" \"float value\" 0.25"));
+    assert_eq!(scene.objects[12].name, "o12");
+    let mut shape = &scene.objects[12].shapes[0];
+    for depth in 0..12 {
+        let GeometryDesc::Csg(csg) = &shape.geometry else { panic!("{depth}") };
+        assert!(Arc::ptr_eq(&csg.operands[0], &csg.operands[1]), "{depth}");
+        shape = &csg.operands[0][0];
+    }
+    // What is known at the end came to the innermost, too.
+    assert!(matches!(shape.alpha.as_deref(), Some(Texture::Constant(0.25))), "{:?}", shape.alpha);
+}
+
+#[test]
 fn closed_meshes_are_solids_whatever_their_vertices_share() {
     let tetrahedron = r#"Shape "trianglemesh" "integer indices" [0 2 1  0 1 3  1 2 3  2 4 3]
         "point3 P" [0 0 0  4 0 0  0 4 0  0 0 4  0 0 0]"#;

@@ -102,3 +102,52 @@ fn measure(path: &Path) -> Result<()> {
     println!("{seconds} {}{refused}", peak * 1024);
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use peak_alloc::PeakAlloc;
+
+    use super::*;
+
+    #[global_allocator]
+    static ALLOCATED: PeakAlloc = PeakAlloc;
+
+    /// What a scene takes besides what grows with the input.
+    const APART: usize = 256 << 10;
+
+    #[test]
+    fn what_is_read_is_charged_and_what_is_built_was_predicted() {
+        let folder = std::env::temp_dir().join(format!("lumbre-growth-test-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let mut wrong = vec![];
+        for (name, write) in INPUTS {
+            let files = write(3000);
+            for (file, bytes) in &files {
+                std::fs::write(folder.join(file), bytes).unwrap();
+            }
+            let first = folder.join(&files[0].0);
+            drop(files);
+            let before = ALLOCATED.current_usage();
+            let Ok((desc, diagnostics)) = lumbre::describe(&[&first], &lumbre::ReadOptions::default()) else {
+                continue;
+            };
+            let kept = ALLOCATED.current_usage().saturating_sub(before);
+            let charged = diagnostics.memory_held() as usize;
+            let predicted = lumbre::predicted_build_bytes(&desc) as usize;
+            ALLOCATED.reset_peak_usage();
+            let built = lumbre::Scene::from_description(desc);
+            let taken = ALLOCATED.peak_usage().saturating_sub(before);
+            drop(built);
+            if kept > charged + APART {
+                wrong.push(format!("{name}: {kept} bytes kept, {charged} charged"));
+            }
+            if taken > charged + predicted + APART {
+                wrong.push(format!(
+                    "{name}: {taken} bytes when built, {charged} charged and {predicted} predicted"
+                ));
+            }
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
+        assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    }
+}
