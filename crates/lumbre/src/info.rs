@@ -100,12 +100,16 @@ impl SceneInfo {
 pub fn predicted_build_bytes(desc: &SceneDesc) -> u64 {
     const TRIANGLE: u64 = 64;
     // Shapes and instances keep double precision, and their maps.
-    const OTHER: u64 = 512;
-    // Each object that is placed has a tree of its own, however small.
-    const OBJECT: u64 = 4096;
-    let (mut triangles, mut others) = (0_u64, 0_u64);
+    const OTHER: u64 = 640;
+    // Lights keep the shapes that shine, too.
+    const LIGHT: u64 = 768;
+    // Each object that is placed has a tree of its own, however small; of the others, there is only a list.
+    const PLACED: u64 = 4096;
+    const OBJECT: u64 = 160;
+    let (mut triangles, mut others, mut lights) = (0_u64, 0_u64, desc.lights.len() as u64);
     let mut add = |shape: &ShapeDesc| {
         others += 1;
+        lights += u64::from(shape.area_light.is_some());
         if let GeometryDesc::Mesh(mesh) = &shape.geometry {
             triangles += mesh.triangles.len() as u64 + 2 * mesh.quads.len() as u64;
         } else if let GeometryDesc::BilinearMesh(mesh) = &shape.geometry {
@@ -119,7 +123,13 @@ pub fn predicted_build_bytes(desc: &SceneDesc) -> u64 {
     let objects = || (0..).zip(&desc.objects).filter(is_placed).map(|(_, object)| object);
     objects().flat_map(|object| &object.shapes).for_each(&mut add);
     let instances = desc.instances.len() + objects().map(|object| object.instances.len()).sum::<usize>();
-    let parts = [(triangles, TRIANGLE), (others + instances as u64, OTHER), (placed.len() as u64, OBJECT)];
+    let parts = [
+        (triangles, TRIANGLE),
+        (others + instances as u64, OTHER),
+        (lights, LIGHT),
+        (placed.len() as u64, PLACED),
+        (desc.objects.len() as u64, OBJECT),
+    ];
     parts.into_iter().fold(0, |sum, (count, each)| sum.saturating_add(count.saturating_mul(each)))
 }
 

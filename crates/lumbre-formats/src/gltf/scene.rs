@@ -61,7 +61,8 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
             let mut camera = self::camera(camera, value, world)?;
             let forwards = Transform::scale(DVec3::new(1.0, 1.0, -1.0)).unwrap_or_default();
             let place = |world: &DAffine3| Transform::from_affine(rigid(world)).map(|map| map * forwards);
-            file.budget.bytes(size_of::<Camera>() as u64, "cameras")?;
+            // Its name and its place in the node, too.
+            file.budget.bytes(size_of::<Camera>() as u64 + 128, "cameras")?;
             camera.motion = exposure.motion(node, place)?;
             scene.cameras.push(camera);
         }

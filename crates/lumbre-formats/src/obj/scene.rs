@@ -132,6 +132,7 @@ pub(crate) fn obj_scene(
         let id = named.map(|id| MaterialId(id as u32));
         push_thin(&mut scene, thin, obj.size, id, world_from_object, budget)?;
     }
+    scene.shapes.shrink_to_fit();
     scene.without_light = match finished.iter().any(|finished| finished.lights_the_scene()) {
         true => WithoutLight::Studio,
         // The studio stays, beside what shines faintly.

@@ -514,6 +514,9 @@ impl<'b, 'd> Converter<'b, 'd> {
             .collect();
         let objects = std::mem::take(&mut self.objects).into_iter();
         self.object_names = HashMap::new();
+        self.scene.shapes.shrink_to_fit();
+        self.scene.instances.shrink_to_fit();
+        self.scene.lights.shrink_to_fit();
         self.scene.objects = objects
             .map(|slot| ObjectDesc { name: slot.name.to_string(), ..slot.object.expect("names are checked") })
             .collect();

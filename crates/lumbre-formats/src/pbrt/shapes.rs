@@ -44,7 +44,7 @@ const KNOWN: &[&str] = &[
 const MAX_CSG_LEAVES: u64 = 1 << 16;
 
 /// Bytes that a scene takes for a leaf of a CSG.
-const LEAF_BYTES: u64 = 600;
+const LEAF_BYTES: u64 = 1000;
 
 /// Meshes with their origins, by their placeholders.
 pub(super) type ReadMeshes = HashMap<*const MeshDesc, (Arc<MeshDesc>, DVec3)>;

@@ -99,6 +99,7 @@ pub(crate) fn ply_scene(
         let mut scene = SceneDesc { up: UpAxis::Y, ..SceneDesc::default() };
         let thin = Thin { positions: mesh.positions, colours: mesh.colours, points, segments };
         push_thin(&mut scene, &thin, size, None, world_from_object, budget)?;
+        scene.shapes.shrink_to_fit();
         return Ok(scene);
     }
     let thin = (!segments.is_empty()).then(|| Thin {
