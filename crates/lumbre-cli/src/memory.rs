@@ -126,7 +126,7 @@ fn group_memory_left(root: &Path) -> Option<u64> {
         };
         // In a container, the path may be one outside, and the root here is the container's own group.
         let folders = Path::new(path.trim_start_matches('/')).ancestors();
-        folders.flat_map(|inner| mounts.iter().map(|mount| root.join(mount).join(inner)))
+        folders.flat_map(|inner| mounts.iter().map(move |mount| root.join(mount).join(inner)))
     });
     left.filter_map(|folder| left_in(&folder)).min()
 }
