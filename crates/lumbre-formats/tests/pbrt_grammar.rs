@@ -429,7 +429,7 @@ fn csg_shapes_of_the_same_objects_share_them() {
     let mut shape = &scene.objects[12].shapes[0];
     for depth in 0..12 {
         let GeometryDesc::Csg(csg) = &shape.geometry else { panic!("{depth}") };
-        assert!(Arc::ptr_eq(&csg.operands[0], &csg.operands[1]), "{depth}");
+        assert!(std::sync::Arc::ptr_eq(&csg.operands[0], &csg.operands[1]), "{depth}");
         shape = &csg.operands[0][0];
     }
     // What is known at the end came to the innermost, too.
