@@ -17,6 +17,9 @@ pub(crate) enum Bench {
     /// beside the crates obvhs and bvh. All options are passed through: `kernel --help`.
     #[command(disable_help_flag = true)]
     Kernel(PassedOn),
+    /// Time and peak memory of reading n, 2n and 4n of everything that a file can list: `growth --help`.
+    #[command(disable_help_flag = true)]
+    Growth(PassedOn),
     /// The field of exact shapes, against POV-Ray where it is on the PATH.
     Field {
         /// A POV-Ray scene of the same field.
@@ -36,6 +39,7 @@ impl Bench {
     pub(crate) fn run(self) -> Result<()> {
         match self {
             Self::Kernel(passed) => run_ours("lumbre-bench", Profile::Release, &passed.arguments),
+            Self::Growth(passed) => run_ours("lumbre-growth", Profile::Release, &passed.arguments),
             Self::Field { pov, runs, threads } => field(pov.as_deref(), runs, threads),
         }
     }

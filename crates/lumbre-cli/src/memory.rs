@@ -1,6 +1,7 @@
 //! What fits into memory, as far as it can be told before work begins.
 
 use std::fs;
+use std::path::Path;
 
 use lumbre::formats::Limits;
 
@@ -21,6 +22,8 @@ enum Bound {
     Flag,
     /// The memory that is free, from now on.
     Machine,
+    /// That of a control group, such as a container, from now on.
+    Group,
     /// `ulimit -v`, from now on.
     AddressSpace,
 }
@@ -29,12 +32,18 @@ enum Bound {
 const RESERVE: u64 = 64 << 20;
 
 impl Memory {
-    /// As much as `--max-memory` lets it take, or by default what is free; but no more than the system grants (`ulimit -v`).
+    /// As much as `--max-memory` lets it take, or by default what is free, in the machine and in its control groups; but no more than
+    /// the system grants (`ulimit -v`).
     pub(crate) fn new(flag: Option<u64>) -> Self {
-        let memory = match (flag, available_memory()) {
-            (Some(most), _) => Self { most, bound: Bound::Flag },
-            (None, Some(most)) => Self { most, bound: Bound::Machine },
-            (None, None) => Self { most: Limits::default().memory, bound: Bound::Flag },
+        let memory = match flag {
+            Some(most) => Self { most, bound: Bound::Flag },
+            None => {
+                let of_machine = available_memory().map(|most| Self { most, bound: Bound::Machine });
+                let of_groups =
+                    group_memory_left(Path::new("/")).map(|most| Self { most, bound: Bound::Group });
+                let least = of_machine.into_iter().chain(of_groups).min_by_key(|memory| memory.most);
+                least.unwrap_or(Self { most: Limits::default().memory, bound: Bound::Flag })
+            }
         };
         match address_space_left() {
             Some(most) if most < memory.most => Self { most, bound: Bound::AddressSpace },
@@ -46,7 +55,7 @@ impl Memory {
     pub(crate) fn for_reading(self) -> u64 {
         match self.bound {
             Bound::Flag => self.most,
-            Bound::Machine => self.most.min(Limits::default().memory),
+            Bound::Machine | Bound::Group => self.most.min(Limits::default().memory),
             Bound::AddressSpace => self.usable().min(Limits::default().memory),
         }
     }
@@ -67,6 +76,7 @@ impl Memory {
     fn remark(self) -> &'static str {
         match self.bound {
             Bound::AddressSpace => " (but the system grants no more: see ulimit -v)",
+            Bound::Group => " (but the control group has no more: see its memory.max)",
             Bound::Flag | Bound::Machine => "",
         }
     }
@@ -79,7 +89,7 @@ impl Memory {
         let left = match self.bound {
             Bound::Flag => self.most.saturating_sub(held),
             // What is held is not counted any more.
-            Bound::Machine => self.most,
+            Bound::Machine | Bound::Group => self.most,
             Bound::AddressSpace => self.usable(),
         };
         if needed <= left {
@@ -99,6 +109,43 @@ fn available_memory() -> Option<u64> {
     };
     let swap = kibibytes("SwapFree:").unwrap_or(0);
     Some(kibibytes("MemAvailable:")?.saturating_add(swap).saturating_mul(1024))
+}
+
+/// Bytes that are left in the control groups of the process and in those around them; `None` if none has a limit. `root` is the
+/// folder of the system's files.
+fn group_memory_left(root: &Path) -> Option<u64> {
+    let groups = fs::read_to_string(root.join("proc/self/cgroup")).ok()?;
+    let left = groups.lines().flat_map(|line| {
+        let mut parts = line.splitn(3, ':').skip(1);
+        let (controllers, path) = (parts.next().unwrap_or(""), parts.next().unwrap_or(""));
+        let mounts: &[&str] = match controllers {
+            // Version 2, also where version 1 stands beside it.
+            "" => &["sys/fs/cgroup", "sys/fs/cgroup/unified"],
+            _ if controllers.split(',').any(|name| name == "memory") => &["sys/fs/cgroup/memory"],
+            _ => &[],
+        };
+        // In a container, the path may be one outside, and the root here is the container's own group.
+        let folders = Path::new(path.trim_start_matches('/')).ancestors();
+        folders.flat_map(|inner| mounts.iter().map(move |mount| root.join(mount).join(inner)))
+    });
+    left.filter_map(|folder| left_in(&folder)).min()
+}
+
+/// Bytes that are left in the control group of this folder; `None` if it has no limit.
+fn left_in(folder: &Path) -> Option<u64> {
+    let number = |file: &str| fs::read_to_string(folder.join(file)).ok()?.trim().parse::<u64>().ok();
+    let limit = number("memory.max").or_else(|| number("memory.limit_in_bytes"))?;
+    // Version 1 writes about 2^63 for none.
+    if limit > i64::MAX as u64 / 2 {
+        return None;
+    }
+    let used = number("memory.current").or_else(|| number("memory.usage_in_bytes")).unwrap_or(0);
+    // Files in the cache count, and are dropped when memory is asked for.
+    let stat = fs::read_to_string(folder.join("memory.stat")).unwrap_or_default();
+    let cached = ["total_inactive_file ", "inactive_file "]
+        .into_iter()
+        .find_map(|name| stat.lines().find_map(|line| line.strip_prefix(name)?.trim().parse::<u64>().ok()));
+    Some(limit.saturating_sub(used.saturating_sub(cached.unwrap_or(0))))
 }
 
 /// Bytes of address space that the system still grants the process; `None` if it sets no limit, or does not tell.
@@ -128,9 +175,47 @@ mod tests {
         // The system counts what is held itself.
         let memory = Memory { most: 1000, bound: Bound::Machine };
         assert!(memory.check("the tree", 1000, 5000).is_ok() && memory.check("the tree", 1001, 0).is_err());
+        let memory = Memory { most: 1000, bound: Bound::Group };
+        let message = memory.check("the tree", 1001, 0).unwrap_err().to_string();
+        assert!(message.contains("--max-memory (but the control group"), "{message}");
         let memory = Memory { most: RESERVE + 1000, bound: Bound::AddressSpace };
         assert!(memory.check("the tree", 750, 5000).is_ok());
         let message = memory.check("the tree", 751, 0).unwrap_err().to_string();
         assert!(message.contains("ulimit -v"), "{message}");
+    }
+
+    #[test]
+    fn the_tightest_of_the_control_groups_counts() {
+        let root = tempfile::tempdir().unwrap();
+        let write = |file: &str, text: &str| {
+            let path = root.path().join(file);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        };
+        let left = || group_memory_left(root.path());
+        assert_eq!(left(), None);
+        write("proc/self/cgroup", "0::/outer/inner\n");
+        assert_eq!(left(), None);
+        // Version 2: the limit of the one around it, of which files in the cache are free.
+        write("sys/fs/cgroup/outer/inner/memory.max", "max\n");
+        write("sys/fs/cgroup/outer/memory.max", "5000\n");
+        write("sys/fs/cgroup/outer/memory.current", "3000\n");
+        write("sys/fs/cgroup/outer/memory.stat", "anon 7\ninactive_file 400\n");
+        assert_eq!(left(), Some(2400));
+        write("sys/fs/cgroup/outer/inner/memory.max", "900\n");
+        assert_eq!(left(), Some(900));
+        // A container whose path is one outside.
+        write("proc/self/cgroup", "0::/elsewhere\n");
+        assert_eq!(left(), None);
+        write("sys/fs/cgroup/memory.max", "70\n");
+        assert_eq!(left(), Some(70));
+        // Version 1.
+        write("proc/self/cgroup", "7:cpu:/a\n4:cpuset,memory:/pod/x\n");
+        assert_eq!(left(), None);
+        write("sys/fs/cgroup/memory/memory.limit_in_bytes", "9223372036854771712\n");
+        write("sys/fs/cgroup/memory/pod/x/memory.limit_in_bytes", "8000\n");
+        write("sys/fs/cgroup/memory/pod/x/memory.usage_in_bytes", "6000\n");
+        write("sys/fs/cgroup/memory/pod/x/memory.stat", "inactive_file 1\ntotal_inactive_file 500\n");
+        assert_eq!(left(), Some(2500));
     }
 }

@@ -117,6 +117,13 @@ impl ReadingArguments {
         limits
     }
 
+    /// The limits on reading more, beside what was read.
+    pub(crate) fn limits_beside(&self, read: &Diagnostics) -> Limits {
+        let mut limits = self.limits();
+        limits.memory = limits.memory.saturating_sub(read.memory_held());
+        limits
+    }
+
     /// Whether warnings are errors.
     pub(crate) fn is_strict(&self) -> bool {
         self.strict
@@ -137,18 +144,19 @@ impl ReadingArguments {
     /// [`Failure`] by kind of error.
     pub(crate) fn open(&self, paths: &[PathBuf]) -> Result<(Scene, Diagnostics), Failure> {
         let (desc, mut diagnostics) = self.describe(paths)?;
-        self.check_build(&desc)?;
+        self.check_build(&desc, &diagnostics)?;
         let name = paths.first().map_or(Path::new(""), PathBuf::as_path);
         let scene = Scene::of_file(desc, name, &mut diagnostics)?;
         Ok((scene, diagnostics))
     }
 
-    /// Refuses a description whose scene would not fit into memory.
+    /// Refuses a description whose scene would not fit into memory beside it.
     ///
     /// # Errors
     /// [`Failure::Limit`] with the prediction.
-    pub(crate) fn check_build(&self, desc: &SceneDesc) -> Result<(), Failure> {
-        self.memory().check("building the scene", lumbre::predicted_build_bytes(desc), 0)
+    pub(crate) fn check_build(&self, desc: &SceneDesc, diagnostics: &Diagnostics) -> Result<(), Failure> {
+        let needed = lumbre::predicted_build_bytes(desc);
+        self.memory().check("building the scene", needed, diagnostics.memory_held())
     }
 
     /// Reads one or more files as one description.

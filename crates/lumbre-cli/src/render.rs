@@ -409,10 +409,11 @@ fn picture(
     if let Some((_, held)) = frame {
         held.hold(&staged, &mut desc);
     }
-    let behind = arguments.staging.behind(&staged, is_of_light, arguments.reading.limits())?;
+    let behind =
+        arguments.staging.behind(&staged, is_of_light, arguments.reading.limits_beside(diagnostics))?;
     let name = &arguments.scene[0];
     let mut of_frames = Diagnostics::with_strictness(arguments.reading.strictness());
-    arguments.reading.check_build(&desc)?;
+    arguments.reading.check_build(&desc, diagnostics)?;
     let scene = Scene::of_file(desc, name, if is_first { diagnostics } else { &mut of_frames })?;
     let load_time = start.elapsed().saturating_sub(scene.build_time());
     if !arguments.quiet && is_first {
@@ -435,7 +436,8 @@ fn picture(
     }
     let mut options = options(arguments, &scene)?;
     options.transparent = behind.is_transparent();
-    check_film(arguments, &options, scene.info().memory_bytes)?;
+    let held = diagnostics.memory_held().saturating_add(scene.resolved().accel().memory_bytes() as u64);
+    check_film(arguments, &options, held)?;
     arguments.view.check_camera(&scene, options.camera)?;
     let warn = |what: String| match arguments.reading.is_strict() {
         true => Err(Failure::input(what)),

@@ -81,6 +81,24 @@ fn what_cannot_fit_into_memory_is_refused_before_work_begins() {
     let quads: String =
         (0..4000).map(|i| format!("Shape \"sphere\" \"float radius\" {}.5\n", i % 7)).collect();
     folder.write("many.pbrt", &format!("{SPHERE}{quads}"));
+    let world = |name: &str, lines: &dyn Fn(usize) -> String| {
+        let lines: String = (0..10_000).map(lines).collect();
+        folder.write(name, &format!("WorldBegin\n{lines}"));
+    };
+    world("shapes.pbrt", &|_| "Shape \"sphere\"\n".into());
+    world("materials.pbrt", &|_| "Material \"diffuse\"\n".into());
+    world("objects.pbrt", &|i| format!("ObjectBegin \"{i}\"\nObjectEnd\n"));
+    world("instances.pbrt", &|i| match i {
+        0 => "ObjectBegin \"a\"\nShape \"sphere\"\nObjectEnd\n".into(),
+        _ => "ObjectInstance \"a\"\n".into(),
+    });
+    world("numbers.pbrt", &|i| match i {
+        0 => format!("Shape \"sphere\" \"float radius\" [{}]\n", "1 ".repeat(300_000)),
+        _ => "\n".into(),
+    });
+    world("names.pbrt", &|i| format!("CoordinateSystem \"{i}\"\n"));
+    let groups: String = (0..10_000).map(|i| format!("g {i}\nf 1 2 3\n")).collect();
+    folder.write("groups.obj", &format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{groups}"));
     let (code, said) = folder.lumbre(&["render", "scene.pbrt", "-o", "a.png"]);
     assert_eq!(code, 0, "{said}");
     for (option, arguments) in [
@@ -91,6 +109,14 @@ fn what_cannot_fit_into_memory_is_refused_before_work_begins() {
         ("1500k", &["info", "many.pbrt"]),
         ("1500k", &["cast", "many.pbrt", "--rays", "rays.csv"]),
         ("10k", &["diff", "a.png", "a.png"]),
+        // Lists of everything that a file may have.
+        ("2M", &["info", "shapes.pbrt"]),
+        ("2M", &["info", "materials.pbrt"]),
+        ("2M", &["info", "objects.pbrt"]),
+        ("2M", &["info", "instances.pbrt"]),
+        ("2M", &["info", "numbers.pbrt"]),
+        ("2M", &["info", "names.pbrt"]),
+        ("2M", &["info", "groups.obj"]),
     ] {
         let (code, said) = folder.lumbre(&[arguments, &["--max-memory", option]].concat());
         assert_eq!(code, 5, "{arguments:?}: {said}");

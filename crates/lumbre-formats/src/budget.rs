@@ -143,6 +143,11 @@ impl Budget {
         Ok(Hold { budget: self, bytes })
     }
 
+    /// A [`Hold`] of no bytes, to grow.
+    pub fn hold_nothing(&self) -> Hold<'_> {
+        Hold { budget: self, bytes: 0 }
+    }
+
     /// Charges for `count` values of `T` that are kept, and returns `count` as a `usize`.
     ///
     /// # Errors
@@ -274,6 +279,36 @@ impl Hold<'_> {
         Ok(())
     }
 
+    /// Returns all bytes, when their data is gone.
+    pub fn empty(&mut self) {
+        self.budget.release(std::mem::take(&mut self.bytes));
+    }
+
+    /// Room for one more value in `vec`, charged before it is taken. It doubles, as a vector does by itself.
+    ///
+    /// # Errors
+    /// As for [`Budget::bytes`], and when the allocator refuses.
+    #[inline]
+    pub fn room_in<T>(&mut self, vec: &mut Vec<T>, what: &str) -> Result<(), LimitError> {
+        if vec.len() < vec.capacity() {
+            return Ok(());
+        }
+        self.grow_vec(vec, what)
+    }
+
+    #[cold]
+    fn grow_vec<T>(&mut self, vec: &mut Vec<T>, what: &str) -> Result<(), LimitError> {
+        let more = vec.len().max(if vec.capacity() == 0 { 1 } else { 4 });
+        let bytes = (more * size_of::<T>()) as u64;
+        self.grow(bytes, what)?;
+        vec.try_reserve_exact(more).map_err(|_| LimitError {
+            what: what.to_owned(),
+            kind: LimitKind::Memory,
+            needed: bytes,
+            limit: self.budget.limits.memory,
+        })
+    }
+
     /// Leaves the bytes charged, for data that is kept.
     pub fn keep(mut self) {
         self.bytes = 0;
@@ -298,7 +333,7 @@ pub struct BudgetVec<'b, T> {
 impl<'b, T> BudgetVec<'b, T> {
     /// An empty vector; `what` names its values in errors.
     pub fn new(budget: &'b Budget, what: &'static str) -> Self {
-        Self { vec: Vec::new(), hold: Hold { budget, bytes: 0 }, what }
+        Self { vec: Vec::new(), hold: budget.hold_nothing(), what }
     }
 
     /// Reserves capacity for `count` more values, which the caller knows the input can contain.
@@ -319,7 +354,7 @@ impl<'b, T> BudgetVec<'b, T> {
     #[inline]
     pub fn push(&mut self, value: T) -> Result<(), LimitError> {
         if self.vec.len() == self.vec.capacity() {
-            self.grow(self.vec.len().max(16))?;
+            self.grow(self.vec.len().max(4))?;
         }
         self.vec.push(value);
         Ok(())

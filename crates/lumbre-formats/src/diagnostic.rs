@@ -377,6 +377,7 @@ pub struct Diagnostics {
     warnings: u64,
     errors: u64,
     files: Vec<PathBuf>,
+    memory_held: u64,
 }
 
 impl Diagnostics {
@@ -411,8 +412,14 @@ impl Diagnostics {
         &self.files
     }
 
-    pub(crate) fn set_files_read(&mut self, files: Vec<PathBuf>) {
-        self.files = files;
+    /// The bytes that what was read holds, as charged to its [`crate::Budget`].
+    pub fn memory_held(&self) -> u64 {
+        self.memory_held
+    }
+
+    pub(crate) fn set_read(&mut self, budget: &crate::Budget) {
+        self.files = budget.paths();
+        self.memory_held = budget.memory_held();
     }
 
     /// Adds a diagnostic.

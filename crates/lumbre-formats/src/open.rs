@@ -143,7 +143,7 @@ pub fn open_scenes(
     }
     let Some(scene) = scene else { return Err(Diagnostic::error("no scene is given").into()) };
     diagnostics.check()?;
-    diagnostics.set_files_read(budget.paths());
+    diagnostics.set_read(&budget);
     Ok((scene, diagnostics))
 }
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use lumbre_image::{Rgb, srgb_to_linear};
 use lumbre_math::{DVec3, Vec3};
-use lumbre_scene::{MeshDesc, SceneDesc, UpAxis};
+use lumbre_scene::{MeshDesc, SceneDesc, ShapeDesc, UpAxis};
 
 use crate::budget::{Budget, BudgetVec};
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted_bytes};
@@ -332,7 +332,9 @@ impl<'a> Text<'a> {
             self.expect(&["solid"])?;
             let title = self.rest_of_line();
             self.budget.elements(1, "solids")?;
-            self.budget.bytes((title.len() + size_of::<StlSolid>()) as u64, "solids")?;
+            // Its mesh is moved to its shape, while others are where they were.
+            let each = size_of::<StlSolid>() + size_of::<ShapeDesc>() + size_of::<MeshDesc>() + title.len();
+            self.budget.bytes(each as u64, "solids")?;
             let mesh = self.solid()?;
             self.rest_of_line();
             solids.push(StlSolid { name: title, origin: self.origin, mesh });

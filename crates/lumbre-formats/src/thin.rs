@@ -36,16 +36,18 @@ impl Thin {
     }
 
     /// Spheres and cylinders, for a model whose bounding box has a diagonal of `size`; charged to the budget.
-    pub(crate) fn shapes(&self, size: f64, budget: &Budget) -> Result<Vec<GeometryDesc>, LimitError> {
-        let at = |i: u32| self.positions[i as usize].as_dvec3();
+    pub(crate) fn shapes(
+        &self,
+        size: f64,
+        budget: &Budget,
+    ) -> impl Iterator<Item = Result<GeometryDesc, LimitError>> {
+        let at = move |i: u32| self.positions[i as usize].as_dvec3();
         let shapes = points(at, &self.points, size).chain(segments(at, &self.segments, size));
-        let colour = |i: u32| self.colours.as_ref().map_or(Rgb::WHITE, |colours| colours[i as usize]);
-        let each =
-            size_of::<GeometryDesc>() + if self.colours.is_some() { size_of::<ColouredShape>() } else { 0 };
-        let mut made = vec![];
-        for (shape, ends) in shapes {
+        let colour = move |i: u32| self.colours.as_ref().map_or(Rgb::WHITE, |colours| colours[i as usize]);
+        let each = if self.colours.is_some() { size_of::<ColouredShape>() } else { 0 };
+        shapes.map(move |(shape, ends)| {
             budget.bytes(each as u64, "points and lines")?;
-            made.push(match &self.colours {
+            Ok(match &self.colours {
                 None => GeometryDesc::Exact(shape),
                 Some(_) => GeometryDesc::Coloured(Box::new(ColouredShape {
                     shape,
@@ -53,9 +55,8 @@ impl Thin {
                     colours: ends.map(colour),
                     coverages: [1.0; 2],
                 })),
-            });
-        }
-        Ok(made)
+            })
+        })
     }
 }
 

@@ -409,12 +409,33 @@ fn solids_combine_and_nest() {
     );
     let GeometryDesc::Csg(csg) = &scene.shapes[0].geometry else { panic!() };
     assert_eq!(csg.operation, CsgOperation::Difference);
-    assert_eq!(csg.operands.iter().map(Vec::len).collect::<Vec<_>>(), [1, 1, 2]);
+    assert_eq!(csg.operands.iter().map(|shapes| shapes.len()).collect::<Vec<_>>(), [1, 1, 2]);
     assert_eq!(origin(&csg.operands[1][0]), DVec3::new(1.0, 0.0, 0.0));
     let GeometryDesc::Csg(inner) = &csg.operands[0][0].geometry else { panic!() };
     assert_eq!(inner.operation, CsgOperation::Union);
     assert_eq!(scene.shapes[0].index, 4);
     assert!(scene.instances.is_empty());
+}
+
+#[test]
+fn csg_shapes_of_the_same_objects_share_them() {
+    let mut text = "ObjectBegin \"o0\" Shape \"sphere\" \"texture alpha\" \"later\" ObjectEnd\n".to_owned();
+    for i in 1..=12 {
+        let inner = i - 1;
+        text += &format!(
+            "ObjectBegin \"o{i}\" Shape \"csg\" \"string operands\" [\"o{inner}\" \"o{inner}\"] ObjectEnd\n"
+        );
+    }
+    let scene = world(&(text + "Texture \"later\" \"float\" \"constant\" \"float value\" 0.25"));
+    assert_eq!(scene.objects[12].name, "o12");
+    let mut shape = &scene.objects[12].shapes[0];
+    for depth in 0..12 {
+        let GeometryDesc::Csg(csg) = &shape.geometry else { panic!("{depth}") };
+        assert!(std::sync::Arc::ptr_eq(&csg.operands[0], &csg.operands[1]), "{depth}");
+        shape = &csg.operands[0][0];
+    }
+    // What is known at the end came to the innermost, too.
+    assert!(matches!(shape.alpha.as_deref(), Some(Texture::Constant(0.25))), "{:?}", shape.alpha);
 }
 
 #[test]

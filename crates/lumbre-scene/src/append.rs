@@ -1,5 +1,7 @@
 //! Joining descriptions, as of several files.
 
+use std::sync::Arc;
+
 use crate::{GeometryDesc, InstanceDesc, MaterialId, ObjectId, SceneDesc, ShapeDesc, WithoutLight};
 
 impl SceneDesc {
@@ -62,7 +64,7 @@ fn next_index(desc: &SceneDesc) -> u32 {
     while let Some(shape) = open.pop() {
         next = next.max(shape.index.saturating_add(1));
         if let GeometryDesc::Csg(csg) = &shape.geometry {
-            open.extend(csg.operands.iter().flatten());
+            open.extend(csg.operands.iter().flat_map(|operand| &**operand));
         }
     }
     next
@@ -81,7 +83,8 @@ impl After {
         shape.material = shape.material.map(|MaterialId(id)| MaterialId(id + self.material));
         if let GeometryDesc::Csg(csg) = &mut shape.geometry {
             for operand in &mut csg.operands {
-                *operand = std::mem::take(operand).into_iter().map(|shape| self.shape(shape)).collect();
+                let shapes = Arc::unwrap_or_clone(std::mem::take(operand)).into_iter();
+                *operand = Arc::new(shapes.map(|shape| self.shape(shape)).collect());
             }
         }
         shape
@@ -94,8 +97,6 @@ impl After {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use lumbre_geometry::Sphere;
     use lumbre_math::{DVec3, Transform};
     use lumbre_shading::Material;
@@ -125,7 +126,7 @@ mod tests {
         };
         let csg = CsgDesc {
             operation: CsgOperation::Difference,
-            operands: vec![vec![ball(1, 0)], vec![ball(2, 1)]],
+            operands: vec![Arc::new(vec![ball(1, 0)]), Arc::new(vec![ball(2, 1)])],
         };
         let instance =
             InstanceDesc { object: ObjectId(0), world_from_object: Placement::Still(Transform::IDENTITY) };

@@ -152,7 +152,8 @@ pub(crate) struct Builder {
 }
 
 impl Builder {
-    /// The trees of all objects, nested ones first. `in_world` are the instances in the world.
+    /// The trees of all objects, nested ones first. `in_world` are the instances in the world. Objects that are
+    /// not placed have an empty tree.
     fn objects(
         &mut self,
         objects: Vec<ObjectDesc>,
@@ -172,10 +173,26 @@ impl Builder {
                 standing[object] = Standing::Once(instance.world_from_object.clone());
             }
         }
+        let mut is_placed = vec![false; objects.len()];
+        for instance in in_world {
+            if let Some(is_placed) = is_placed.get_mut(instance.object.0 as usize) {
+                *is_placed = true;
+            }
+        }
+        for &outer in order.iter().rev() {
+            if is_placed[outer] {
+                objects[outer].instances.iter().for_each(|inner| is_placed[inner.object.0 as usize] = true);
+            }
+        }
         let mut objects: Vec<Option<ObjectDesc>> = objects.into_iter().map(Some).collect();
         let mut trees: Vec<Option<Arc<Accel>>> = vec![None; objects.len()];
+        let nothing = Arc::new(Accel::build(vec![], &BuildOptions::default())?);
         for position in order {
             let Some(object) = objects[position].take() else { continue };
+            if !is_placed[position] {
+                trees[position] = Some(nothing.clone());
+                continue;
+            }
             let inner = |trees: &[Option<Arc<Accel>>], i: &InstanceDesc| trees[i.object.0 as usize].clone();
             let built: Vec<Arc<Accel>> = object.instances.iter().filter_map(|i| inner(&trees, i)).collect();
             let tree = self.tree_of(object.shapes, &object.instances, &built, &standing[position])?;
@@ -209,8 +226,8 @@ impl Builder {
         standing: &Standing,
     ) -> Result<Accel, BuildError> {
         let origin = origin(&shapes, instances, accels);
-        let mut geometries = Vec::new();
-        for shape in shapes {
+        let mut geometries = Vec::with_capacity(shapes.len() + instances.len());
+        for shape in freeing(shapes) {
             self.shape(shape, origin, standing, &mut geometries)?;
         }
         for ((id, instance), accel) in (0..).zip(instances).zip(accels) {
@@ -516,6 +533,19 @@ impl Builder {
         self.lights.push(light);
         Ok(())
     }
+}
+
+/// The items of a list, whose memory is freed as they are taken: descriptions are as large as what is made of them.
+fn freeing<T>(mut items: Vec<T>) -> impl Iterator<Item = T> {
+    const PIECE: usize = 1 << 14;
+    items.reverse();
+    std::iter::from_fn(move || {
+        let item = items.pop();
+        if items.len().is_multiple_of(PIECE) {
+            items.shrink_to_fit();
+        }
+        item
+    })
 }
 
 /// The emission of an area light, with its power converted to radiance.

@@ -64,7 +64,7 @@ fn combine(
     let mut operands = Vec::with_capacity(desc.operands.len());
     for (position, parts) in desc.operands.into_iter().enumerate() {
         let mut solids = Vec::with_capacity(parts.len());
-        for part in parts {
+        for part in Arc::unwrap_or_clone(parts) {
             solids.push(solid(builder, part, tree_from_csg, reverse, leaves, depth)?);
         }
         let operand = match solids.len() {

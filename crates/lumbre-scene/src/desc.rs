@@ -147,8 +147,9 @@ pub struct ColouredShape {
 pub struct CsgDesc {
     /// The operation.
     pub operation: CsgOperation,
-    /// Two or more operands; each is the union of its shapes, with transforms relative to the CSG's own space.
-    pub operands: Vec<Vec<ShapeDesc>>,
+    /// Two or more operands; each is the union of its shapes, with transforms relative to the CSG's own space. They
+    /// are shared, so that nested CSG of the same objects takes no more memory than its file.
+    pub operands: Vec<Arc<Vec<ShapeDesc>>>,
 }
 
 /// The operations on solids.

@@ -132,7 +132,9 @@ fn each_point_of(shape: &ShapeDesc, used: &Used, visit: &mut dyn FnMut(DVec3)) {
                 bounds.iter().flat_map(corners).for_each(&mut *visit);
             }
             GeometryDesc::Csg(csg) => {
-                open.extend(csg.operands.iter().flatten().map(|operand| (operand, placement)));
+                open.extend(
+                    csg.operands.iter().flat_map(|operand| &**operand).map(|operand| (operand, placement)),
+                );
             }
         }
     }

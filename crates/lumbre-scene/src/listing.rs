@@ -1,5 +1,7 @@
 //! What a description's files hold by name, for those who choose from it.
 
+use std::collections::HashSet;
+
 /// What was read by name. It changes no picture.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
@@ -10,6 +12,8 @@ pub struct Listing {
     pub variants: Vec<String>,
     /// The images that textures and environment maps are made of, in the order in which they were read.
     pub textures: Vec<TextureListing>,
+    /// The names of these.
+    names: HashSet<String>,
 }
 
 /// An animation.
@@ -35,7 +39,7 @@ pub struct TextureListing {
 impl Listing {
     /// Adds an image, unless one of its name is there.
     pub fn add_texture(&mut self, name: &str, width: u32, height: u32) {
-        if self.textures.iter().all(|known| known.name != name) {
+        if self.names.insert(name.to_owned()) {
             self.textures.push(TextureListing { name: name.to_owned(), width, height });
         }
     }
@@ -45,5 +49,6 @@ impl Listing {
         self.animations.extend(other.animations);
         self.variants.extend(other.variants);
         self.textures.extend(other.textures);
+        self.names.extend(other.names);
     }
 }

@@ -1,7 +1,7 @@
 //! Meshes baked for the tree: in single precision relative to a nearby origin, with flat quads split.
 
 use std::mem::take;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use lumbre_kernel::{DeformingMesh, TriangleMesh};
 use lumbre_math::{DVec3, Transform, Vec3};
@@ -24,6 +24,9 @@ pub(crate) enum QuadOrder {
     /// p00, p10, p01, p11.
     Patch,
 }
+
+/// What is left of meshes without attributes: files have many small ones, and their descriptions are larger than they are.
+static BARE: LazyLock<Arc<MeshDesc>> = LazyLock::new(Arc::default);
 
 /// Transforms a mesh into the space of its tree.
 ///
@@ -94,7 +97,9 @@ pub(crate) fn bake(
     }
     let mesh = Arc::new(TriangleMesh { origin, positions, indices: triangles });
     let moving = motion.map(|motion| deforming(shape, motion, tree_from_object, &mesh)).transpose()?;
-    let attributes = Arc::new(MeshAttributes { mesh, swapped, first_half, turned, moving, rest: shared });
+    let is_bare = Arc::get_mut(&mut shared).is_some_and(|own| *own == MeshDesc::default());
+    let rest = if is_bare { BARE.clone() } else { shared };
+    let attributes = Arc::new(MeshAttributes { mesh, swapped, first_half, turned, moving, rest });
     Ok(BakedMesh { attributes, patches })
 }
 

@@ -249,7 +249,7 @@ fn shines(desc: &SceneDesc) -> bool {
             return true;
         }
         if let GeometryDesc::Csg(csg) = &shape.geometry {
-            open.extend(csg.operands.iter().flatten());
+            open.extend(csg.operands.iter().flat_map(|operand| &**operand));
         }
     }
     false

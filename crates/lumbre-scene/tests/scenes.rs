@@ -305,6 +305,34 @@ fn an_instanced_mesh_carries_its_normals_along() {
 }
 
 #[test]
+fn objects_that_are_not_placed_are_not_built() {
+    // A part of an object with several placements warns that its light is not sampled.
+    let shining = |index| ObjectDesc {
+        shapes: vec![ShapeDesc {
+            area_light: Some(glow()),
+            ..shape(index, exact(Sphere::new(DVec3::new(4.0, 4.0, -2.0), 2.5).unwrap()))
+        }],
+        ..ObjectDesc::default()
+    };
+    let at = |object, z| InstanceDesc {
+        object: ObjectId(object),
+        world_from_object: Transform::translate(DVec3::new(0.0, 0.0, z)).into(),
+    };
+    // 0 is nowhere, 1 in 2, 2 in the world, and 3 only in 0.
+    let mut scene = of_shapes(vec![]);
+    scene.objects = (5..9).map(shining).collect();
+    scene.objects[0].instances = vec![at(3, -7.0)];
+    scene.objects[2].instances = vec![at(1, -7.0), at(1, -14.0)];
+    scene.instances = vec![at(2, 1.0)];
+    let scene = Scene::build(scene).unwrap();
+    assert_eq!(scene.warnings(), [BuildWarning::UnsampledLight { shape: 6 }]);
+    assert_eq!(scene.accel().primitive_count(), 1);
+    assert_eq!(meet(&scene, &down(4.0, 4.0)).shape, 7);
+    let below = Ray::new(DVec3::new(4.0, 4.0, -30.0), DVec3::Z);
+    assert_eq!(meet(&scene, &below).shape, 6);
+}
+
+#[test]
 fn cut_outs_let_as_much_through_as_they_say_and_say_the_same_again() {
     let sheet = |alpha: FloatTexture| ShapeDesc {
         alpha: Some(Arc::new(alpha)),
@@ -347,7 +375,7 @@ fn an_interface_is_no_surface_and_gives_no_light() {
 fn csg(operation: CsgOperation, operands: Vec<ShapeDesc>) -> GeometryDesc {
     GeometryDesc::Csg(CsgDesc {
         operation,
-        operands: operands.into_iter().map(|shape| vec![shape]).collect(),
+        operands: operands.into_iter().map(|shape| Arc::new(vec![shape])).collect(),
     })
 }
 

@@ -764,7 +764,7 @@ mod tests {
         // Displacement 0.3 y of the world, on a surface whose ∂p/∂v is 3 y: slope 0.3 along y.
         let ramp = Texture::Bilerp {
             mapping: Mapping2d::Planar {
-                texture_from_world: Transform::IDENTITY,
+                texture_from_world: Transform::IDENTITY.into(),
                 vs: DVec3::Y * 0.01,
                 vt: DVec3::X * 0.01,
                 delta: Vec2::ZERO,

@@ -115,17 +115,17 @@ pub enum Mapping2d {
     /// Angles about the origin of texture space.
     Spherical {
         /// Texture space from world.
-        texture_from_world: Transform,
+        texture_from_world: Arc<Transform>,
     },
     /// Angle and height about the z axis of texture space.
     Cylindrical {
         /// Texture space from world.
-        texture_from_world: Transform,
+        texture_from_world: Arc<Transform>,
     },
     /// Two products with the point.
     Planar {
         /// Texture space from world.
-        texture_from_world: Transform,
+        texture_from_world: Arc<Transform>,
         /// s = p · this.
         vs: DVec3,
         /// t = p · this.
@@ -351,7 +351,7 @@ pub enum Texture<T: TextureValue> {
     /// A checkerboard of two textures in three dimensions.
     Checkerboard3d {
         /// Texture space from world.
-        texture_from_world: Transform,
+        texture_from_world: Arc<Transform>,
         /// The textures; the first at the origin.
         textures: [Arc<Texture<T>>; 2],
     },
@@ -537,7 +537,7 @@ mod tests {
         let uv = Mapping2d::Uv { scale: Vec2::new(4.0, -2.0), delta: Vec2::new(0.5, 3.0) };
         assert!((uv.map(&world(DVec3::ONE)).st - Vec2::new(1.7, 1.8)).length() < 1e-6);
 
-        let spherical = Mapping2d::Spherical { texture_from_world: transform };
+        let spherical = Mapping2d::Spherical { texture_from_world: transform.into() };
         for (p, st) in [
             (DVec3::new(2.0, 0.0, 0.0), (0.5, 0.0)),
             (DVec3::new(0.0, 3.0, 0.0), (0.5, 0.25)),
@@ -549,12 +549,12 @@ mod tests {
             let apart = (ours - Vec2::new(st.0, st.1)).abs();
             assert!(apart.x < 1e-6 && apart.y.min(1.0 - apart.y) < 1e-6, "{p}: {ours}");
         }
-        let cylindrical = Mapping2d::Cylindrical { texture_from_world: transform };
+        let cylindrical = Mapping2d::Cylindrical { texture_from_world: transform.into() };
         for (p, st) in [(DVec3::new(2.0, 0.0, -7.0), (0.5, -7.0)), (DVec3::new(0.0, 3.0, 1.5), (0.75, 1.5))] {
             assert!((cylindrical.map(&world(p)).st - Vec2::new(st.0, st.1)).length() < 1e-5);
         }
         let planar = Mapping2d::Planar {
-            texture_from_world: transform,
+            texture_from_world: transform.into(),
             vs: DVec3::new(2.0, 0.0, 1.0),
             vt: DVec3::new(0.0, -1.0, 0.0),
             delta: Vec2::new(0.25, 0.5),
@@ -567,10 +567,10 @@ mod tests {
     fn derivatives_of_mappings_are_those_of_differences() {
         let transform = moved();
         let mappings = [
-            Mapping2d::Spherical { texture_from_world: transform },
-            Mapping2d::Cylindrical { texture_from_world: transform },
+            Mapping2d::Spherical { texture_from_world: transform.into() },
+            Mapping2d::Cylindrical { texture_from_world: transform.into() },
             Mapping2d::Planar {
-                texture_from_world: transform,
+                texture_from_world: transform.into(),
                 vs: DVec3::new(2.0, 0.0, 1.0),
                 vt: DVec3::new(0.0, -1.0, 0.5),
                 delta: Vec2::ZERO,
@@ -647,7 +647,7 @@ mod tests {
     fn cubes_alternate_along_every_axis() {
         let transform = moved();
         let board = Texture::Checkerboard3d {
-            texture_from_world: transform,
+            texture_from_world: transform.into(),
             textures: [constant(1.0), constant(0.0)],
         };
         for (p, expected) in [

@@ -5,7 +5,8 @@ use std::mem::size_of_val;
 
 use lumbre_geometry::Aabb;
 use lumbre_scene::{
-    AreaLightDesc, CameraKind, GeometryDesc, LightDesc, Listing, MaterialId, MeshDesc, SceneDesc, ShapeDesc,
+    AreaLightDesc, CameraKind, GeometryDesc, LightDesc, Listing, MaterialId, MeshDesc, ObjectDesc, ObjectId,
+    SceneDesc, ShapeDesc,
 };
 
 /// Statistics of a scene. They count what the file describes: a shape inside an object counts once, however
@@ -99,10 +100,37 @@ impl SceneInfo {
 pub fn predicted_build_bytes(desc: &SceneDesc) -> u64 {
     const TRIANGLE: u64 = 64;
     // Shapes and instances keep double precision, and their maps.
-    const OTHER: u64 = 512;
-    let info = SceneInfo::of(desc);
-    let others = info.shapes.values().sum::<u64>().saturating_add(info.instances);
-    info.triangles.saturating_mul(TRIANGLE).saturating_add(others.saturating_mul(OTHER))
+    const OTHER: u64 = 640;
+    // Lights keep the shapes that shine, too.
+    const LIGHT: u64 = 768;
+    // Each object that is placed has a tree of its own, however small; of the others, there is only a list.
+    const PLACED: u64 = 4096;
+    const OBJECT: u64 = 160;
+    let (mut triangles, mut others, mut lights) = (0_u64, 0_u64, desc.lights.len() as u64);
+    let mut add = |shape: &ShapeDesc| {
+        others += 1;
+        lights += u64::from(shape.area_light.is_some());
+        if let GeometryDesc::Mesh(mesh) = &shape.geometry {
+            triangles += mesh.triangles.len() as u64 + 2 * mesh.quads.len() as u64;
+        } else if let GeometryDesc::BilinearMesh(mesh) = &shape.geometry {
+            others += mesh.quads.len() as u64;
+        }
+    };
+    desc.shapes.iter().for_each(&mut add);
+    let of_objects = desc.objects.iter().flat_map(|object| &object.instances);
+    let placed: HashSet<ObjectId> = desc.instances.iter().chain(of_objects).map(|i| i.object).collect();
+    let is_placed = |&(id, _): &(u32, &ObjectDesc)| placed.contains(&ObjectId(id));
+    let objects = || (0..).zip(&desc.objects).filter(is_placed).map(|(_, object)| object);
+    objects().flat_map(|object| &object.shapes).for_each(&mut add);
+    let instances = desc.instances.len() + objects().map(|object| object.instances.len()).sum::<usize>();
+    let parts = [
+        (triangles, TRIANGLE),
+        (others + instances as u64, OTHER),
+        (lights, LIGHT),
+        (placed.len() as u64, PLACED),
+        (desc.objects.len() as u64, OBJECT),
+    ];
+    parts.into_iter().fold(0, |sum, (count, each)| sum.saturating_add(count.saturating_mul(each)))
 }
 
 fn mesh_bytes(mesh: &MeshDesc) -> u64 {

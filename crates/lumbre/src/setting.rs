@@ -511,7 +511,9 @@ fn scale_emission(shape: &mut ShapeDesc, factor: f32) {
         }
     }
     if let GeometryDesc::Csg(csg) = &mut shape.geometry {
-        csg.operands.iter_mut().flatten().for_each(|operand| scale_emission(operand, factor));
+        for operand in &mut csg.operands {
+            Arc::make_mut(operand).iter_mut().for_each(|shape| scale_emission(shape, factor));
+        }
     }
 }
 

@@ -41,7 +41,7 @@ use lumbre_scene::SceneDesc;
 use self::animation::Playing;
 use self::file::File;
 use self::json::{Inside, Json, Read, Value};
-use crate::budget::Budget;
+use crate::budget::{Budget, Limits};
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, nearest_name, quoted};
 use crate::input::{Input, text};
 
@@ -187,7 +187,7 @@ fn animated(
     is_glb: bool,
 ) -> Read<Option<String>> {
     // This load is temporary, and errors are reported when the whole is read.
-    let own = Budget::new(*budget.limits());
+    let own = Budget::new(Limits { memory: budget.memory_left(), ..*budget.limits() });
     let root = json.root().object()?;
     let mut file = File::new(root, name, folder, &own, Diagnostics::default());
     file.load(binary, is_glb)?;

@@ -61,6 +61,8 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
             let mut camera = self::camera(camera, value, world)?;
             let forwards = Transform::scale(DVec3::new(1.0, 1.0, -1.0)).unwrap_or_default();
             let place = |world: &DAffine3| Transform::from_affine(rigid(world)).map(|map| map * forwards);
+            // Its name and its place in the node, too.
+            file.budget.bytes(size_of::<Camera>() as u64 + 128, "cameras")?;
             camera.motion = exposure.motion(node, place)?;
             scene.cameras.push(camera);
         }
@@ -68,12 +70,14 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
             return Ok(());
         }
         if let Some(extension) = value.extension("KHR_lights_punctual")? {
+            file.budget.bytes(size_of::<LightDesc>() as u64, "lights")?;
             let (_, light) = file.at(List::Lights, extension.need("light")?)?;
             let motion = exposure.motion(node, |world| Transform::from_affine(rigid(world)))?;
             let at = if motion.is_some() { DAffine3::IDENTITY } else { *world };
             scene.lights.extend(self::light(file, light, &at)?.map(|light| carried(light, motion)));
         }
         if let Some(extension) = value.extension("EXT_lights_ies")? {
+            file.budget.bytes(size_of::<LightDesc>() as u64, "lights")?;
             let motion = exposure.motion(node, |world| Transform::from_affine(rigid(world)))?;
             let at = if motion.is_some() { DAffine3::IDENTITY } else { rigid(world) };
             scene.lights.push(carried(profiles.light(extension, &at)?, motion));
@@ -105,7 +109,9 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
         }
         *uses.entry(key.clone()).or_default() += worlds.len();
         file.budget.elements(worlds.len() as u64, "nodes with meshes")?;
-        file.budget.bytes((worlds.len() * size_of::<DAffine3>()) as u64, "nodes with meshes")?;
+        // The key stands in a table too.
+        let itself = size_of::<Placed>() + 2 * size_of::<Key>() + 8 * weights.len();
+        file.budget.bytes((itself + size_of_val(&worlds[..])) as u64, "nodes with meshes")?;
         places.push(Placed { key, node, skin, worlds, motions });
         Ok(())
     })?;
@@ -270,6 +276,9 @@ pub(super) fn instances(file: &File<'_>, extension: Value<'_>) -> Read<Vec<DAffi
         }
     }
     let count = count.unwrap_or(0);
+    // Parts that the file has are charged when they are read; those that it lacks, and the result, here.
+    file.budget
+        .bytes((count * (size_of::<DAffine3>() + 10 * size_of::<f32>())) as u64, "copies of meshes")?;
     let vec3 = |part: Option<Accessor<'_>>, default: Vec3| match part {
         Some(accessor) => accessor.vectors(file, Vec3::from_array),
         None => Ok(vec![default; count]),
@@ -327,7 +336,7 @@ impl Builder<'_> {
             return Ok(());
         }
         if !self.objects.contains_key(&place.key) {
-            let (shining, plain): (Vec<_>, Vec<_>) = self
+            let (shining, mut plain): (Vec<_>, Vec<_>) = self
                 .shapes(place)?
                 .into_iter()
                 .partition(|shape| shape.area_light.is_some() && uses <= MOST_COPIES_OF_LIGHTS);
@@ -337,6 +346,8 @@ impl Builder<'_> {
                 let mesh = self.file.list(List::Meshes)[place.key.mesh];
                 let name =
                     mesh.string_at("name")?.map_or_else(|| format!("mesh {}", place.key.mesh), Into::into);
+                plain.shrink_to_fit();
+                self.file.budget.bytes((size_of::<ObjectDesc>() + name.len()) as u64, "meshes")?;
                 scene.objects.push(ObjectDesc { name, shapes: plain, instances: vec![] });
                 Some(ObjectId(scene.objects.len() as u32 - 1))
             };
@@ -356,11 +367,14 @@ impl Builder<'_> {
                         .instances
                         .push(InstanceDesc { object, world_from_object: world_from_object.into() }),
                     Err(_) => {
-                        let shapes = scene.objects[object.0 as usize].shapes.clone();
+                        let shapes = &scene.objects[object.0 as usize].shapes;
+                        self.file.budget.bytes(size_of_val(&shapes[..]) as u64, "meshes")?;
+                        let shapes = shapes.clone();
                         self.stand(scene, shapes, world, place)?;
                     }
                 }
             }
+            self.file.budget.bytes(size_of_val(&shining[..]) as u64, "copies of lights")?;
             let copies = shining.iter().map(|shape| ShapeDesc { index: self.next_index(), ..shape.clone() });
             let copies: Vec<ShapeDesc> = copies.collect();
             match motion {
@@ -471,6 +485,8 @@ impl Builder<'_> {
                         tangents::make(file, &mut vertices, &mut triangles, set)?;
                     }
                     if let Some(mesh) = mesh_of(vertices, triangles, &dressing) {
+                        let each = size_of::<ShapeDesc>() + size_of::<MeshDesc>();
+                        file.budget.bytes(each as u64, "meshes")?;
                         shapes.push(shape(GeometryDesc::Mesh(Arc::new(mesh)), self.next_index()));
                     }
                 }

@@ -77,6 +77,14 @@ impl<'f> Materials<'f> {
             sets,
             tangents: tangent_set(&parameters),
         });
+        // It stays among the parameters of others, and makes most of its textures itself.
+        let each = size_of::<GltfMaterial>()
+            + size_of::<Dressing>()
+            + size_of::<NamedMaterial>()
+            + size_of::<Material>()
+            + size_of::<PrincipledParams>()
+            + 16 * size_of::<SpectrumTexture>();
+        self.file.budget.bytes(each as u64, "materials")?;
         let one_sided = !parameters.double_sided && !seam.is_clear();
         let material = Arc::new(Material { one_sided, ..seam.material()? });
         self.list.borrow_mut().push(NamedMaterial { name: parameters.name.clone(), material });

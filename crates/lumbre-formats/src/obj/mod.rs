@@ -58,7 +58,7 @@ pub struct ObjMesh {
     /// The material (`usemtl`), with the place of its first use for this mesh.
     pub material: Option<(String, Place)>,
     /// Triangles only. Corners with different texture coordinate or normal are separate vertices.
-    pub mesh: MeshDesc,
+    pub mesh: Arc<MeshDesc>,
 }
 
 /// Reads meshes from the bytes of an OBJ file. Material libraries are named, not opened: see [`open_obj`].
@@ -111,7 +111,12 @@ struct Part<'a> {
     /// The place of its material's name.
     material_at: usize,
     triangles: BudgetVec<'a, [Corner; 3]>,
-    /// Points, and segments of lines with whether the line goes on; by position.
+    /// Few have any.
+    thin: Option<Box<ThinPart<'a>>>,
+}
+
+/// Points, and segments of lines with whether the line goes on; by position.
+struct ThinPart<'a> {
     points: BudgetVec<'a, u32>,
     segments: BudgetVec<'a, ([u32; 2], bool)>,
 }
@@ -486,15 +491,19 @@ impl<'a> Reader<'a> {
         // Names of objects and groups do not matter to them.
         let part = self.part(Key { material: self.state.material, ..Key::default() })?;
         self.current = None;
-        let part = &mut self.parts[part];
+        let budget = self.budget;
+        let thin = self.parts[part].thin.get_or_insert_with(|| {
+            let points = BudgetVec::new(budget, "points");
+            Box::new(ThinPart { points, segments: BudgetVec::new(budget, "lines") })
+        });
         if keyword.bytes == b"p" {
             for corner in &self.face {
-                part.points.push(corner[0])?;
+                thin.points.push(corner[0])?;
             }
             return Ok(());
         }
         for (i, ends) in self.face.windows(2).enumerate() {
-            part.segments.push(([ends[0][0], ends[1][0]], i + 2 < self.face.len()))?;
+            thin.segments.push(([ends[0][0], ends[1][0]], i + 2 < self.face.len()))?;
         }
         Ok(())
     }
@@ -504,12 +513,18 @@ impl<'a> Reader<'a> {
             return Ok(part);
         }
         self.budget.elements(1, "meshes")?;
-        self.budget.bytes(size_of::<Part<'_>>() as u64 + size_of::<ObjMesh>() as u64 + 64, "meshes")?;
+        // What is kept of it to the end, and beside the shape that it becomes.
+        let each = size_of::<Part<'_>>()
+            + size_of::<(Key, usize)>()
+            + size_of::<ObjMesh>()
+            + size_of::<MeshDesc>()
+            + self.names[key.material as usize].len()
+            + self.names[key.object.max(key.group) as usize].len()
+            + 64;
+        self.budget.bytes(each as u64, "meshes")?;
         let part = self.parts.len();
         let triangles = BudgetVec::new(self.budget, "triangles");
-        let points = BudgetVec::new(self.budget, "points");
-        let segments = BudgetVec::new(self.budget, "lines");
-        self.parts.push(Part { key, material_at: self.material_at, triangles, points, segments });
+        self.parts.push(Part { key, material_at: self.material_at, triangles, thin: None });
         self.part_of.insert(key, part);
         Ok(part)
     }
@@ -653,11 +668,14 @@ impl<'a> Reader<'a> {
                 meshes.push(ObjMesh {
                     name: self.names[object as usize].clone(),
                     material: material.clone(),
-                    mesh,
+                    mesh: Arc::new(mesh),
                 });
             }
-            if !(part.points.is_empty() && part.segments.is_empty()) {
-                thin.push(ObjThin { material, thin: self.points_and_lines(&part, origin)? });
+            if let Some(part) = part.thin {
+                let made = self.points_and_lines(&part, origin)?;
+                if !made.is_empty() {
+                    thin.push(ObjThin { material, thin: made });
+                }
             }
         }
         if !meshes.is_empty() && meshes.iter().all(|mesh| is_without_area(&mesh.mesh)) {
@@ -671,7 +689,7 @@ impl<'a> Reader<'a> {
         Ok(ObjFile { meshes, thin, origin, size, libraries: self.libraries })
     }
 
-    fn points_and_lines(&self, part: &Part<'_>, origin: DVec3) -> Result<Thin, FormatError> {
+    fn points_and_lines(&self, part: &ThinPart<'_>, origin: DVec3) -> Result<Thin, FormatError> {
         let count = (part.points.len() + 2 * part.segments.len()) as u64;
         let mut positions = self.budget.vec(count, "vertices")?;
         let colour_count = if self.colours.is_empty() { 0 } else { count };

@@ -105,13 +105,15 @@ pub fn read_mtl(
         if keyword.bytes == b"newmtl" {
             let (_, name) = words.rest();
             budget.elements(1, "materials")?;
-            budget.bytes((size_of::<MtlMaterial>() + name.len()) as u64, "materials")?;
+            // Its name stands in a table too, and its folder beside it.
+            let each = size_of::<MtlMaterial>() + 2 * name.len() + 128;
+            budget.bytes(each as u64, "materials")?;
             materials.push(MtlMaterial { name: name.into_owned(), ..MtlMaterial::default() });
             continue;
         }
         match materials.last_mut() {
             Some(material) => {
-                let mut reader = Reader { source, diagnostics };
+                let mut reader = Reader { source, budget, diagnostics };
                 reader.key(material, keyword, words)?;
             }
             None => {
@@ -172,6 +174,7 @@ const OPTIONS: [&[u8]; 14] = [
 
 struct Reader<'a, 'd> {
     source: Source<'a>,
+    budget: &'d Budget,
     diagnostics: &'d mut Diagnostics,
 }
 
@@ -288,6 +291,9 @@ impl<'a> Reader<'a, '_> {
         keyword: Word<'a>,
         mut words: Words<'a>,
     ) -> Result<Option<Box<MtlTexture>>, FormatError> {
+        // Its file stands in a table too.
+        let rest = words.clone().rest().1.len();
+        self.budget.bytes((size_of::<MtlTexture>() + 2 * rest + 128) as u64, "textures")?;
         let mut texture = MtlTexture {
             file: String::new(),
             place: self.source.place(keyword.start),

@@ -69,6 +69,18 @@ pub(crate) fn obj_scene(
                 names.insert(material.name, None);
                 continue;
             }
+            // Itself, its name thrice, and its textures, as if all were its own.
+            let textures = match is_principled(&material) {
+                true => 16 * size_of::<FloatTexture>(),
+                false => 4 * size_of::<SpectrumTexture>(),
+            };
+            let each = size_of::<Finished>()
+                + size_of::<NamedMaterial>()
+                + size_of::<Material>()
+                + size_of::<PrincipledParams>()
+                + textures
+                + 3 * material.name.len();
+            budget.bytes(each as u64, "materials")?;
             names.insert(material.name.clone(), Some(finished.len()));
             finished.push(builder.material(&folder, &material)?);
         }
@@ -81,6 +93,7 @@ pub(crate) fn obj_scene(
     }
     // For meshes without vertex colours, and with them.
     let mut unsaid = [None; 2];
+    scene.shapes = budget.vec(obj.meshes.len() as u64, "meshes")?;
     let mut find = |material: &Option<(String, Place)>| {
         let (name, place) = material.as_ref()?;
         let found = names.get(name).copied().flatten();
@@ -94,7 +107,7 @@ pub(crate) fn obj_scene(
         found
     };
     let world_from_object = placed(obj.origin);
-    (scene.up, scene.up_is_guessed) = up_of(obj.meshes.iter().map(|mesh| &mesh.mesh), obj.origin);
+    (scene.up, scene.up_is_guessed) = up_of(obj.meshes.iter().map(|mesh| &*mesh.mesh), obj.origin);
     for mesh in obj.meshes {
         let named = find(&mesh.material);
         let id = named.unwrap_or_else(|| {
@@ -107,7 +120,7 @@ pub(crate) fn obj_scene(
         let finished = named.map(|i| &finished[i]);
         scene.shapes.push(ShapeDesc {
             index: scene.shapes.len() as u32,
-            geometry: GeometryDesc::Mesh(Arc::new(mesh.mesh)),
+            geometry: GeometryDesc::Mesh(mesh.mesh),
             world_from_object,
             reverse_orientation: false,
             material: Some(MaterialId(id as u32)),
@@ -120,6 +133,7 @@ pub(crate) fn obj_scene(
         let id = named.map(|id| MaterialId(id as u32));
         push_thin(&mut scene, thin, obj.size, id, world_from_object, budget)?;
     }
+    scene.shapes.shrink_to_fit();
     scene.without_light = match finished.iter().any(|finished| finished.lights_the_scene()) {
         true => WithoutLight::Studio,
         // The studio stays, beside what shines faintly.

@@ -11,12 +11,15 @@ use lumbre_scene::{
     FilmDesc, GeometryDesc, InstanceDesc, MaterialId, MeshDesc, NamedMaterial, ObjectDesc, ObjectId,
     Placement, SamplerDesc, SceneDesc, ShapeDesc, WithoutLight,
 };
-use lumbre_shading::{FloatTexture, Material, MipMap, Spectrum, SpectrumTexture, Texture, TextureValue};
+use lumbre_shading::{
+    FloatTexture, Material, MipMap, PrincipledParams, Spectrum, SpectrumTexture, Texture, TextureValue,
+};
 
 use super::images::ImageKey;
 use super::params::{Param, Params};
 use super::parser;
-use super::source::{Fault, Files, Result, Spot};
+use super::shapes::ReadMeshes;
+use super::source::{AtSpot, Fault, Files, Result, Spot};
 use crate::diagnostic::quoted;
 use crate::origin::placed;
 use crate::{Budget, Diagnostic, Diagnostics, FormatError, Severity};
@@ -32,7 +35,7 @@ pub(super) struct Converter<'b, 'd> {
     pub shape_count: u32,
     /// Each with the place of its first use as long as it is undefined.
     pub materials: Vec<MaterialSlot>,
-    pub material_names: HashMap<String, MaterialId>,
+    pub material_names: HashMap<Arc<str>, MaterialId>,
     /// Materials whose textures are defined after them, with their types.
     pub materials_later: Vec<(MaterialId, String, Params)>,
     pub waiting: HashSet<u32>,
@@ -41,7 +44,7 @@ pub(super) struct Converter<'b, 'd> {
     /// Textures by kind and name whose file cannot be read: an error where they are used.
     pub broken_textures: HashMap<(&'static str, String), (Spot, Diagnostic)>,
     pub objects: Vec<ObjectSlot>,
-    pub object_names: HashMap<String, ObjectId>,
+    pub object_names: HashMap<Arc<str>, ObjectId>,
     pub open_object: Option<ObjectId>,
     pub float_textures: HashMap<String, Known<f32>>,
     pub spectrum_textures: HashMap<String, Known<Spectrum>>,
@@ -49,7 +52,8 @@ pub(super) struct Converter<'b, 'd> {
     pub constants: HashMap<u32, FloatArc>,
     pub constant_spectra: HashMap<[u32; 3], SpectrumArc>,
     pub media: HashMap<String, ()>,
-    pub media_used: Vec<(String, Spot)>,
+    /// The places of first uses.
+    pub media_used: HashMap<String, Spot>,
     pub images: HashMap<ImageKey, Arc<MipMap>>,
     /// Images that are missing, when lenient.
     pub missing: HashSet<PathBuf>,
@@ -71,7 +75,7 @@ pub(super) struct Converter<'b, 'd> {
 
 /// A material, by its index in the table.
 pub(super) struct MaterialSlot {
-    pub name: Option<String>,
+    pub name: Option<Arc<str>>,
     pub material: Option<Arc<Material>>,
     pub first_use: Spot,
     /// Its depth of nested mixtures.
@@ -80,8 +84,11 @@ pub(super) struct MaterialSlot {
 
 /// An object, by its index in the table.
 pub(super) struct ObjectSlot {
+    /// Its name is set at the end.
     pub object: Option<ObjectDesc>,
-    pub name: String,
+    pub name: Arc<str>,
+    /// Its shapes as an operand of CSG, once it is one.
+    pub operand: Option<Arc<Vec<ShapeDesc>>>,
     pub first_use: Spot,
     /// The number of its shapes with every CSG expanded, and their nesting depth.
     pub leaves: u64,
@@ -165,7 +172,7 @@ impl<'b, 'd> Converter<'b, 'd> {
             constants: HashMap::new(),
             constant_spectra: HashMap::new(),
             media: HashMap::new(),
-            media_used: vec![],
+            media_used: HashMap::new(),
             images: HashMap::new(),
             missing: HashSet::new(),
             bitmaps: HashMap::new(),
@@ -248,40 +255,75 @@ impl<'b, 'd> Converter<'b, 'd> {
 
     pub fn add_material(
         &mut self,
-        name: Option<String>,
+        name: Option<Arc<str>>,
         material: Option<Material>,
         depth: usize,
         spot: Spot,
-    ) -> MaterialId {
+    ) -> Result<MaterialId> {
+        // What is in a material besides its textures, and textures of its own.
+        const EACH: usize = size_of::<MaterialSlot>()
+            + size_of::<NamedMaterial>()
+            + size_of::<Material>()
+            + size_of::<PrincipledParams>()
+            + 2 * size_of::<SpectrumTexture>();
+        self.keep(EACH, "materials", spot)?;
         let id = MaterialId(self.materials.len() as u32);
         self.materials.push(MaterialSlot { name, material: material.map(Arc::new), first_use: spot, depth });
-        id
+        Ok(id)
     }
 
     /// The material of shapes before the first `Material`.
     pub fn default_material(&mut self) -> MaterialId {
-        let nowhere = Spot { file: 0, line: 1, column: 1 };
-        self.add_material(None, Some(Material::default_diffuse()), 1, nowhere)
+        let first_use = Spot { file: 0, line: 1, column: 1 };
+        let material = Some(Arc::new(Material::default_diffuse()));
+        self.materials.push(MaterialSlot { name: None, material, first_use, depth: 1 });
+        MaterialId(self.materials.len() as u32 - 1)
     }
 
-    pub fn material_named(&mut self, name: &str, at: Spot) -> MaterialId {
+    pub fn material_named(&mut self, name: &str, at: Spot) -> Result<MaterialId> {
         if let Some(id) = self.material_names.get(name) {
-            return *id;
+            return Ok(*id);
         }
-        let id = self.add_material(Some(name.to_owned()), None, 1, at);
-        self.material_names.insert(name.to_owned(), id);
-        id
+        let name = self.kept_name(name, at)?;
+        let id = self.add_material(Some(name.clone()), None, 1, at)?;
+        self.material_names.insert(name, id);
+        Ok(id)
     }
 
-    fn object_named(&mut self, name: &str, at: Spot) -> ObjectId {
+    /// Charges `bytes` that are kept to the end.
+    pub fn keep(&self, bytes: usize, what: &str, spot: Spot) -> Result<()> {
+        self.budget.bytes(bytes as u64, what).at(spot)
+    }
+
+    /// A name that a table keeps, charged with what a table has beside a name, and its copy in the scene.
+    pub fn kept_name(&self, name: &str, spot: Spot) -> Result<Arc<str>> {
+        const BESIDE: usize = 96;
+        self.keep(2 * name.len() + BESIDE, "names", spot)?;
+        Ok(name.into())
+    }
+
+    fn object_named(&mut self, name: &str, at: Spot) -> Result<ObjectId> {
         if let Some(id) = self.object_names.get(name) {
-            return *id;
+            return Ok(*id);
         }
+        let name = self.kept_name(name, at)?;
+        let id = self.add_object(name.clone(), None, 0, 0, at)?;
+        self.object_names.insert(name, id);
+        Ok(id)
+    }
+
+    fn add_object(
+        &mut self,
+        name: Arc<str>,
+        object: Option<ObjectDesc>,
+        leaves: u64,
+        depth: usize,
+        first_use: Spot,
+    ) -> Result<ObjectId> {
+        self.keep(size_of::<ObjectSlot>() + size_of::<ObjectDesc>(), "objects", first_use)?;
         let id = ObjectId(self.objects.len() as u32);
-        let slot = ObjectSlot { object: None, name: name.to_owned(), first_use: at, leaves: 0, depth: 0 };
-        self.objects.push(slot);
-        self.object_names.insert(name.to_owned(), id);
-        id
+        self.objects.push(ObjectSlot { object, name, operand: None, first_use, leaves, depth });
+        Ok(id)
     }
 
     pub fn begin_object(&mut self, name: &str, spot: Spot, at: Spot) -> Result<()> {
@@ -289,18 +331,22 @@ impl<'b, 'd> Converter<'b, 'd> {
             let open = &self.objects[open.0 as usize].name;
             return Err(spot.error(format!("ObjectBegin inside the object {}", quoted(open))));
         }
-        let id = self.object_named(name, at);
+        let id = self.object_named(name, at)?;
         let slot = &mut self.objects[id.0 as usize];
         if slot.object.is_some() {
             return Err(at.error(format!("object {} is defined twice", quoted(name))));
         }
-        slot.object = Some(ObjectDesc { name: name.to_owned(), ..ObjectDesc::default() });
+        slot.object = Some(ObjectDesc::default());
         self.open_object = Some(id);
         Ok(())
     }
 
     pub fn end_object(&mut self) {
-        self.open_object = None;
+        let open = self.open_object.take().and_then(|id| self.objects[id.0 as usize].object.as_mut());
+        if let Some(object) = open {
+            object.shapes.shrink_to_fit();
+            object.instances.shrink_to_fit();
+        }
     }
 
     pub fn instance(&mut self, name: &str, spot: Spot, at: Spot, ctm: &[Transform; 2]) -> Result<()> {
@@ -308,25 +354,33 @@ impl<'b, 'd> Converter<'b, 'd> {
             let open = &self.objects[open.0 as usize].name;
             return Err(spot.error(format!("ObjectInstance inside the object {}", quoted(open))));
         }
-        let object = self.object_named(name, at);
-        let motion = self.motion(spot, ctm, "instance");
+        let object = self.object_named(name, at)?;
+        self.keep(size_of::<InstanceDesc>(), "instances", spot)?;
+        let motion = self.motion(spot, ctm, "instance")?;
         let world_from_object = motion.map_or(ctm[0].into(), Placement::Moving);
         self.scene.instances.push(InstanceDesc { object, world_from_object });
         Ok(())
     }
 
     /// The motion between the two current transforms, if they differ.
-    pub fn motion(&mut self, spot: Spot, ctm: &[Transform; 2], what: &str) -> Option<Arc<AnimatedTransform>> {
+    pub fn motion(
+        &mut self,
+        spot: Spot,
+        ctm: &[Transform; 2],
+        what: &str,
+    ) -> Result<Option<Arc<AnimatedTransform>>> {
         if ctm[0] == ctm[1] {
-            return None;
+            return Ok(None);
         }
+        // The maps, each taken apart as well.
+        self.keep(size_of::<AnimatedTransform>() + 4 * size_of::<Transform>(), "motions", spot)?;
         let [start, end] = self.transform_times;
         match AnimatedTransform::new(vec![(start, ctm[0]), (end, ctm[1])]) {
-            Ok(motion) => Some(Arc::new(motion)),
+            Ok(motion) => Ok(Some(Arc::new(motion))),
             Err(error) => {
                 let message = format!("this {what} stays where it starts: {error}");
                 self.warn(spot, Diagnostic::warning(message));
-                None
+                Ok(None)
             }
         }
     }
@@ -340,11 +394,10 @@ impl<'b, 'd> Converter<'b, 'd> {
         depth: usize,
         motion: Arc<AnimatedTransform>,
         spot: Spot,
-    ) {
-        let id = ObjectId(self.objects.len() as u32);
+    ) -> Result<()> {
         let object = ObjectDesc { shapes: vec![shape], ..ObjectDesc::default() };
-        let name = String::new();
-        self.objects.push(ObjectSlot { object: Some(object), name, first_use: spot, leaves, depth });
+        let id = self.add_object("".into(), Some(object), leaves, depth, spot)?;
+        self.keep(size_of::<InstanceDesc>(), "instances", spot)?;
         let instance = InstanceDesc { object: id, world_from_object: Placement::Moving(motion) };
         match self.open_object {
             None => self.scene.instances.push(instance),
@@ -353,6 +406,7 @@ impl<'b, 'd> Converter<'b, 'd> {
                 slot.object.as_mut().expect("it is open").instances.push(instance);
             }
         }
+        Ok(())
     }
 
     /// Adds a shape to the open object, or else to the world. `leaves` and `depth` are those of a CSG.
@@ -371,6 +425,7 @@ impl<'b, 'd> Converter<'b, 'd> {
     // Media.
 
     pub fn medium(&mut self, name: &str, at: Spot, params: Params) -> Result<()> {
+        self.kept_name(name, at)?;
         if self.media.insert(name.to_owned(), ()).is_some() {
             return Err(at.error(format!("medium {} is defined twice", quoted(name))));
         }
@@ -379,13 +434,20 @@ impl<'b, 'd> Converter<'b, 'd> {
         Ok(())
     }
 
-    pub fn medium_interface(&mut self, spot: Spot, names: Vec<(String, Spot)>) {
-        let used = names.into_iter().filter(|(name, _)| !name.is_empty());
-        let before = self.media_used.len();
-        self.media_used.extend(used);
-        if self.media_used.len() > before {
+    pub fn medium_interface(&mut self, spot: Spot, names: Vec<(String, Spot)>) -> Result<()> {
+        let mut is_used = false;
+        for (name, at) in names.into_iter().filter(|(name, _)| !name.is_empty()) {
+            is_used = true;
+            // The first use of a name is told, where there is no such medium.
+            if !self.media_used.contains_key(&name) {
+                self.kept_name(&name, at)?;
+                self.media_used.insert(name, at);
+            }
+        }
+        if is_used {
             self.note(spot, "media are not rendered yet: this border of one is left out");
         }
+        Ok(())
     }
 
     // The end of the scene.
@@ -419,32 +481,14 @@ impl<'b, 'd> Converter<'b, 'd> {
                 self.note(spot, "an interface gives no light: the area light of this shape is left out");
             }
         }
-        let mut lists: Vec<&mut Vec<ShapeDesc>> = vec![&mut self.scene.shapes];
-        lists.extend(self.objects.iter_mut().filter_map(|slot| slot.object.as_mut()).map(|o| &mut o.shapes));
-        while let Some(shapes) = lists.pop() {
-            for shape in shapes {
-                if let Some(alpha) = alphas.get(&shape.index) {
-                    shape.alpha = Some(alpha.clone());
-                }
-                if shape.material.is_some_and(|id| is_interface[id.0 as usize]) {
-                    shape.material = None;
-                    shape.area_light = None;
-                }
-                match &mut shape.geometry {
-                    GeometryDesc::Mesh(mesh) => {
-                        if let Some((read, origin)) = meshes.get(&Arc::as_ptr(mesh)) {
-                            *mesh = read.clone();
-                            shape.world_from_object = shape.world_from_object * placed(*origin);
-                        }
-                    }
-                    GeometryDesc::Csg(csg) => lists.extend(csg.operands.iter_mut()),
-                    GeometryDesc::Exact(_)
-                    | GeometryDesc::Coloured(_)
-                    | GeometryDesc::BilinearMesh(_)
-                    | GeometryDesc::Custom(_) => {}
-                }
-            }
+        let mut known = Completion { alphas, is_interface, meshes, operands: HashMap::new() };
+        self.scene.shapes.iter_mut().for_each(|shape| known.complete(shape));
+        for slot in &mut self.objects {
+            slot.operand = None;
+            let shapes = slot.object.iter_mut().flat_map(|object| &mut object.shapes);
+            shapes.for_each(|shape| known.complete(shape));
         }
+        let Completion { meshes, .. } = known;
         let shapes = std::mem::take(&mut self.scene.shapes);
         self.scene.shapes = self.shared_out(shapes)?;
         for i in 0..self.objects.len() {
@@ -464,12 +508,18 @@ impl<'b, 'd> Converter<'b, 'd> {
         let materials = std::mem::take(&mut self.materials).into_iter();
         self.scene.materials = materials
             .map(|slot| NamedMaterial {
-                name: slot.name,
+                name: slot.name.map(|name| name.to_string()),
                 material: slot.material.expect("names are checked"),
             })
             .collect();
         let objects = std::mem::take(&mut self.objects).into_iter();
-        self.scene.objects = objects.map(|slot| slot.object.expect("names are checked")).collect();
+        self.object_names = HashMap::new();
+        self.scene.shapes.shrink_to_fit();
+        self.scene.instances.shrink_to_fit();
+        self.scene.lights.shrink_to_fit();
+        self.scene.objects = objects
+            .map(|slot| ObjectDesc { name: slot.name.to_string(), ..slot.object.expect("names are checked") })
+            .collect();
         self.finish_settings()
     }
 
@@ -521,11 +571,14 @@ impl<'b, 'd> Converter<'b, 'd> {
             return Err(slot.first_use.wrong(wrong.suggest(name, known)));
         }
         if let Some(slot) = self.objects.iter().find(|slot| slot.object.is_none()) {
-            let known = self.objects.iter().filter(|slot| slot.object.is_some()).map(|slot| &*slot.name);
+            let defined = self.objects.iter().filter(|slot| slot.object.is_some());
+            let known = defined.map(|slot| &*slot.name).filter(|name| !name.is_empty());
             let wrong = Diagnostic::error(format!("object {} is not defined", quoted(&slot.name)));
             return Err(slot.first_use.wrong(wrong.suggest(&slot.name, known)));
         }
-        for (name, spot) in std::mem::take(&mut self.media_used) {
+        let mut media_used: Vec<_> = std::mem::take(&mut self.media_used).into_iter().collect();
+        media_used.sort_by_key(|(_, spot)| (spot.file, spot.line, spot.column));
+        for (name, spot) in media_used {
             if !self.media.contains_key(&name) {
                 let (files, media) = (&self.files, &self.media);
                 self.diagnostics.warn(&format!("medium {} is not defined", quoted(&name)), |unknown| {
@@ -534,6 +587,56 @@ impl<'b, 'd> Converter<'b, 'd> {
             }
         }
         Ok(())
+    }
+}
+
+/// What is known of shapes only when all is read.
+struct Completion {
+    /// By the index of the shape.
+    alphas: HashMap<u32, FloatArc>,
+    /// By material.
+    is_interface: Vec<bool>,
+    meshes: ReadMeshes,
+    /// Operands by what they were: several CSG shapes share them.
+    operands: HashMap<*const Vec<ShapeDesc>, [Arc<Vec<ShapeDesc>>; 2]>,
+}
+
+impl Completion {
+    fn complete(&mut self, shape: &mut ShapeDesc) {
+        if let Some(alpha) = self.alphas.get(&shape.index) {
+            shape.alpha = Some(alpha.clone());
+        }
+        if shape.material.is_some_and(|id| self.is_interface[id.0 as usize]) {
+            shape.material = None;
+            shape.area_light = None;
+        }
+        match &mut shape.geometry {
+            GeometryDesc::Mesh(mesh) => {
+                if let Some((read, origin)) = self.meshes.get(&Arc::as_ptr(mesh)) {
+                    *mesh = read.clone();
+                    shape.world_from_object = shape.world_from_object * placed(*origin);
+                }
+            }
+            GeometryDesc::Csg(csg) => csg.operands.iter_mut().for_each(|operand| self.operand(operand)),
+            GeometryDesc::Exact(_)
+            | GeometryDesc::Coloured(_)
+            | GeometryDesc::BilinearMesh(_)
+            | GeometryDesc::Custom(_) => {}
+        }
+    }
+
+    /// Nests no deeper than CSG shapes may.
+    fn operand(&mut self, operand: &mut Arc<Vec<ShapeDesc>>) {
+        if let Some([_, complete]) = self.operands.get(&Arc::as_ptr(operand)) {
+            *operand = complete.clone();
+            return;
+        }
+        let mut shapes = Vec::clone(operand);
+        shapes.iter_mut().for_each(|shape| self.complete(shape));
+        let complete = Arc::new(shapes);
+        // The old one stays, so that its address stands for nothing else.
+        let old = std::mem::replace(operand, complete.clone());
+        self.operands.insert(Arc::as_ptr(&old), [old, complete]);
     }
 }
 
@@ -560,7 +663,7 @@ pub(super) fn file_fault(at: Spot, error: FormatError) -> Fault {
         FormatError::Io { path, action, source } => {
             at.error(format!("{action} {}: {source}", quoted(&path.display().to_string())))
         }
-        FormatError::Limit { place: None, source } => Fault::Limit(at, source),
+        FormatError::Limit { place: None, source } => Fault::Limit(at, Box::new(source)),
         other => Fault::Named(at, Box::new(other)),
     }
 }

@@ -7,7 +7,7 @@ use lumbre_image::Encoding;
 use lumbre_shading::{ImageFilter, MipMap, MipMapOptions, Wrap};
 
 use super::convert::{Converter, file_fault};
-use super::source::{AtSpot, Result, Spot};
+use super::source::{Result, Spot};
 use super::textures::unreadable;
 use crate::image::{ImageFile, open_image};
 use crate::{Diagnostic, FormatError};
@@ -48,7 +48,7 @@ impl Converter<'_, '_> {
             }
         };
         // The smaller levels take another third.
-        self.budget.bytes(bitmap.bytes() as u64 / 3, name).at(at)?;
+        self.keep(bitmap.bytes() / 3 + 2 * name.len() + 256, name, at)?;
         self.bitmaps.entry(path).or_insert_with(|| bitmap.clone());
         let image = Arc::new(MipMap::new(bitmap, options));
         self.images.insert(key, image.clone());

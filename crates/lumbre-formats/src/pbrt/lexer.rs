@@ -28,6 +28,13 @@ pub(super) struct Token {
     end: usize,
 }
 
+impl Token {
+    /// Its length in bytes.
+    pub fn len(self) -> usize {
+        self.end - self.start
+    }
+}
+
 /// Splits the bytes of one file into tokens.
 ///
 /// White space is space, tab, CR and LF; `#` between tokens starts a comment up to the end of its line. Lines end with LF,
@@ -123,6 +130,42 @@ impl<B: Deref<Target = [u8]>> Lexer<B> {
         };
         self.at = end;
         Ok(Some(Token { kind, start, end }))
+    }
+
+    /// Reads finite decimal numbers, which stand in long lists, faster than token by token. It stops before the first token that
+    /// is something else, or that `take` does not accept.
+    pub fn numbers<E>(
+        &mut self,
+        mut take: impl FnMut(f64) -> std::result::Result<bool, E>,
+    ) -> std::result::Result<(), E> {
+        let bytes = &*self.bytes;
+        loop {
+            let mut start = self.at;
+            while matches!(bytes.get(start), Some(b' ' | b'\t' | b'\r' | b'\n')) {
+                start += 1;
+            }
+            let (mut end, mut whole) = (start, 0_u64);
+            while let Some(digit @ b'0'..=b'9') = bytes.get(end) {
+                whole = whole.wrapping_mul(10).wrapping_add(u64::from(digit - b'0'));
+                end += 1;
+            }
+            let ends_here = |end| matches!(bytes.get(end), Some(b' ' | b'\t' | b'\r' | b'\n' | b']'));
+            let number = if start < end && end - start <= 15 && ends_here(end) {
+                whole as f64
+            } else {
+                while matches!(bytes.get(end), Some(b'0'..=b'9' | b'+' | b'-' | b'.' | b'e' | b'E')) {
+                    end += 1;
+                }
+                match parse_number(&bytes[start..end]) {
+                    Some(number) if number.is_finite() && ends_here(end) => number,
+                    _ => return Ok(()),
+                }
+            };
+            if !take(number)? {
+                return Ok(());
+            }
+            self.at = end;
+        }
     }
 
     /// The place of a token. Cheap for tokens in order.
@@ -320,6 +363,34 @@ mod tests {
         };
         let fault: Fault = run().unwrap_err();
         fault.into_format_error(&files).to_string()
+    }
+
+    #[test]
+    fn numbers_of_a_list_are_those_of_their_tokens() {
+        let text = b"1 -2.5e3\t007\r\n123456789012345678 .5 3] 4 0x10 5 1e999 6\"a\" 7abc 8";
+        let mut lexer = Lexer::new(&text[..], 0).unwrap();
+        let mut ends = vec![];
+        let mut all = vec![];
+        loop {
+            let taken: std::result::Result<(), ()> = lexer.numbers(|number| {
+                all.push(number);
+                Ok(true)
+            });
+            taken.unwrap();
+            match lexer.next().unwrap() {
+                Some(token) => ends.push(String::from_utf8_lossy(lexer.raw(token)).into_owned()),
+                None => break,
+            }
+        }
+        // What is not certain is left to the token's own reader.
+        assert_eq!(ends, ["]", "0x10", "1e999", "6", "\"a\"", "7abc", "8"]);
+        assert_eq!(all, [1.0, -2500.0, 7.0, 123456789012345678.0, 0.5, 3.0, 4.0, 5.0]);
+
+        let mut lexer = Lexer::new(&b"1 2 3 4"[..], 0).unwrap();
+        let refused: std::result::Result<(), ()> = lexer.numbers(|number| Ok(number < 3.0));
+        refused.unwrap();
+        let token = lexer.next().unwrap().unwrap();
+        assert_eq!(lexer.raw(token), b"3");
     }
 
     #[test]

@@ -95,6 +95,7 @@ impl Converter<'_, '_> {
         };
         self.done(&params);
         self.budget.elements(1, "lights").at(spot)?;
+        self.keep(size_of::<LightDesc>(), "lights", spot)?;
         self.scene.lights.push(light);
         Ok(())
     }

@@ -43,7 +43,8 @@ impl Converter<'_, '_> {
     /// The current material from here on; `None` for an interface.
     pub fn material(&mut self, ty: &str, params: Params) -> Result<Option<MaterialId>> {
         if self.must_wait(ty, &params) {
-            let id = self.add_material(None, None, 1, params.spot);
+            let id = self.add_material(None, None, 1, params.spot)?;
+            self.keep(params.bytes(), "materials", params.spot)?;
             self.waiting.insert(id.0);
             self.materials_later.push((id, ty.to_owned(), params));
             return Ok(Some(id));
@@ -53,11 +54,11 @@ impl Converter<'_, '_> {
         if matches!(material.kind, MaterialKind::Interface) {
             return Ok(None);
         }
-        Ok(Some(self.add_material(None, Some(material), depth, params.spot)))
+        Ok(Some(self.add_material(None, Some(material), depth, params.spot)?))
     }
 
     pub fn named_material(&mut self, name: &str, at: Spot, params: Params) -> Result<()> {
-        let id = self.material_named(name, at);
+        let id = self.material_named(name, at)?;
         if self.materials[id.0 as usize].material.is_some() {
             return Err(at.error(format!("material {} is defined twice", quoted(name))));
         }
@@ -68,6 +69,7 @@ impl Converter<'_, '_> {
             if self.is_waiting(id) {
                 return Err(at.error(format!("material {} is defined twice", quoted(name))));
             }
+            self.keep(params.bytes(), "materials", params.spot)?;
             self.waiting.insert(id.0);
             self.materials_later.push((id, ty, params));
             return Ok(());
@@ -87,7 +89,7 @@ impl Converter<'_, '_> {
             return true;
         }
         let is_waiting = |name: &String| {
-            let id = self.material_names.get(name);
+            let id = self.material_names.get(&**name);
             id.is_some_and(|id| self.is_waiting(*id))
         };
         let of_mix = ["materials", "namedmaterial1", "namedmaterial2"];
@@ -374,7 +376,7 @@ impl Converter<'_, '_> {
             let Some((material, slot)) = slot.and_then(|slot| Some((slot.material.clone()?, slot))) else {
                 let wrong =
                     Diagnostic::error(format!("material {} is not defined before this mix", quoted(name)));
-                return Err(at.wrong(wrong.suggest(name, self.material_names.keys().map(String::as_str))));
+                return Err(at.wrong(wrong.suggest(name, self.material_names.keys().map(|name| &**name))));
             };
             if matches!(material.kind, MaterialKind::Interface) {
                 return Err(at.error(format!("an interface such as {} cannot be mixed", quoted(name))));

@@ -166,6 +166,19 @@ impl Param {
         }
     }
 
+    /// The bytes of its name and its values.
+    pub fn bytes(&self) -> usize {
+        let values = match &self.values {
+            Values::Bools(v) => v.capacity(),
+            Values::Numbers(v) => v.capacity() * size_of::<f64>(),
+            Values::Integers(v) => v.capacity() * size_of::<i32>(),
+            Values::Strings(v) => {
+                v.capacity() * size_of::<String>() + v.iter().map(String::capacity).sum::<usize>()
+            }
+        };
+        self.name.len() + values
+    }
+
     /// The numbers, which must be finite.
     pub fn numbers(&self) -> Result<&[f64]> {
         let numbers = self.numbers_or_infinite()?;
@@ -232,6 +245,12 @@ pub(super) struct Params {
 impl Params {
     pub fn new(owner: String, spot: Spot, own: Vec<Param>, defaults: Defaults) -> Self {
         Self { owner, spot, own, defaults, asked: RefCell::default() }
+    }
+
+    /// The bytes of what it holds itself.
+    pub fn bytes(&self) -> usize {
+        let each = self.own.iter().map(|param| size_of::<Param>() + param.bytes());
+        size_of::<Self>() + self.owner.len() + each.sum::<usize>()
     }
 
     /// The effective parameter of this name: the last one given, else the default of the scope.

@@ -86,7 +86,7 @@ impl Converter<'_, '_> {
             }
         };
         self.done(&params);
-        let motion = self.motion(spot, world_from_camera, "camera");
+        let motion = self.motion(spot, world_from_camera, "camera")?;
         self.scene.cameras = vec![Camera {
             name: None,
             kind,

@@ -3,14 +3,14 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use lumbre_geometry::{Aabb, Csg, ShapeError};
-use lumbre_math::{DVec3, Transform, Vec2, Vec3};
-use lumbre_scene::{CsgDesc, CsgOperation, GeometryDesc, MeshDesc, ShapeDesc};
+use lumbre_geometry::{Aabb, Csg, Quadric, Shape, ShapeError};
+use lumbre_math::{DVec3, Transform, Vec2, Vec3, Vec4};
+use lumbre_scene::{CsgDesc, CsgOperation, GeometryDesc, MaterialId, MeshDesc, ShapeDesc};
 use lumbre_shading::Texture;
 
 use super::convert::{Converter, MeshFile, file_fault};
 use super::exact_shapes::exact_shape;
-use super::params::{Params, Type};
+use super::params::{Param, Params, Type};
 use super::source::{AtSpot, Fault, Result, Spot};
 use super::state::State;
 use super::subdivision;
@@ -44,6 +44,12 @@ const KNOWN: &[&str] = &[
 /// The maximal number of leaves of a CSG.
 const MAX_CSG_LEAVES: u64 = 1 << 16;
 
+/// Bytes that a scene takes for a leaf of a CSG.
+const LEAF_BYTES: u64 = 1000;
+
+/// Meshes with their origins, by their placeholders.
+pub(super) type ReadMeshes = HashMap<*const MeshDesc, (Arc<MeshDesc>, DVec3)>;
+
 /// A geometry, with the number of leaves and the depth of a CSG.
 struct Form {
     geometry: GeometryDesc,
@@ -73,6 +79,7 @@ impl Converter<'_, '_> {
         self.budget.elements(1, "shapes").at(spot)?;
         let alpha = match params.find("alpha") {
             Some(param) if self.is_texture_to_come(param) => {
+                self.keep(2 * size_of::<Param>() + param.bytes(), "textures that are not defined yet", spot)?;
                 self.alphas_later.insert(index, param.clone());
                 None
             }
@@ -101,6 +108,12 @@ impl Converter<'_, '_> {
             }
         }
         let area_light = self.area_light_of(&form.geometry, spot, state)?;
+        let boxed = match &form.geometry {
+            GeometryDesc::Exact(Shape::Quadric(_)) => size_of::<Quadric>(),
+            GeometryDesc::Mesh(_) | GeometryDesc::BilinearMesh(_) => size_of::<MeshDesc>(),
+            _ => 0,
+        };
+        self.keep(size_of::<ShapeDesc>() + boxed, "shapes", spot)?;
         let shape = ShapeDesc {
             index,
             geometry: form.geometry,
@@ -110,12 +123,12 @@ impl Converter<'_, '_> {
             area_light,
             alpha,
         };
-        match self.motion(spot, &state.ctm, "shape") {
+        match self.motion(spot, &state.ctm, "shape")? {
             None => self.push_shape(shape, form.leaves, form.depth),
             Some(motion) => {
                 let world_from_object = placed.unwrap_or(Transform::IDENTITY);
                 let shape = ShapeDesc { world_from_object, ..shape };
-                self.push_moving(shape, form.leaves, form.depth, motion, spot);
+                self.push_moving(shape, form.leaves, form.depth, motion, spot)?;
             }
         }
         Ok(())
@@ -154,6 +167,7 @@ impl Converter<'_, '_> {
                     .as_ref()
                     .is_some_and(|m| matches!(m.kind, lumbre_shading::MaterialKind::Interface));
                 if !is_known || is_interface {
+                    self.keep(size_of::<(MaterialId, Spot)>(), "area lights", spot)?;
                     self.lights_to_check.push((id, spot));
                 }
             }
@@ -216,12 +230,12 @@ impl Converter<'_, '_> {
         let (mut leaves, mut depth) = (0u64, 1);
         let mut operands = vec![];
         for name in names {
-            let id = self.object_names.get(name).copied();
+            let id = self.object_names.get(&**name).copied();
             let slot = id.map(|id| &self.objects[id.0 as usize]);
             let Some((slot, object)) = slot.and_then(|slot| Some((slot, slot.object.as_ref()?))) else {
                 let wrong =
                     Diagnostic::error(format!("object {} is not defined before this csg", quoted(name)));
-                return Err(at.wrong(wrong.suggest(name, self.object_names.keys().map(String::as_str))));
+                return Err(at.wrong(wrong.suggest(name, self.object_names.keys().map(|name| &**name))));
             };
             if id == self.open_object {
                 return Err(at.error(format!("object {} is an operand of a csg inside it", quoted(name))));
@@ -241,6 +255,7 @@ impl Converter<'_, '_> {
                     GeometryDesc::Exact(exact) if !exact.is_solid() => exact.name(),
                     GeometryDesc::BilinearMesh(_) => "bilinearmesh",
                     GeometryDesc::Mesh(mesh) => {
+                        self.keep(size_of::<(Arc<MeshDesc>, Spot)>(), "operands of a csg", at)?;
                         self.meshes_to_close.push((mesh.clone(), at));
                         continue;
                     }
@@ -255,16 +270,24 @@ impl Converter<'_, '_> {
             if leaves > MAX_CSG_LEAVES {
                 return Err(at.error(format!("more than {MAX_CSG_LEAVES} solids are combined into one")));
             }
-            // Operands are expanded: nested objects in a csg may become very many.
+            // The scene expands operands: nested objects in a csg may become very many.
             self.budget.elements(slot.leaves, "operands of a csg").at(at)?;
-            let bytes = slot.leaves.saturating_mul(size_of::<ShapeDesc>() as u64);
-            self.budget.bytes(bytes, "operands of a csg").at(at)?;
+            self.budget.bytes(slot.leaves.saturating_mul(LEAF_BYTES), "operands of a csg").at(at)?;
             self.budget.nesting(depth, "csg shapes in csg shapes").at(at)?;
             // Parts of an operand are a union of their own.
             if 2 * depth > Csg::MAX_DEPTH {
                 return Err(at.error(format!("csg shapes are nested more than {} deep", Csg::MAX_DEPTH / 2)));
             }
-            operands.push(object.shapes.clone());
+            operands.push(match &slot.operand {
+                Some(operand) => operand.clone(),
+                None => {
+                    self.keep(size_of_val(&object.shapes[..]) + 64, "operands of a csg", at)?;
+                    let operand = Arc::new(object.shapes.clone());
+                    let id = id.expect("the object was found");
+                    self.objects[id.0 as usize].operand = Some(operand.clone());
+                    operand
+                }
+            });
         }
         let geometry = GeometryDesc::Csg(CsgDesc { operation, operands });
         Ok(Form { geometry, origin: DVec3::ZERO, leaves, depth })
@@ -277,12 +300,10 @@ impl Converter<'_, '_> {
         let Some(param) = params.typed("P", &[Type::Point3])? else {
             return Err(params.spot.error(format!("a {shape} has no \"point3 P\"")));
         };
-        let mut positions = triples(params, "P", Type::Point3)?.unwrap_or_default();
+        let mut positions = self.triples(params, "P", Type::Point3)?.unwrap_or_default();
         if positions.is_empty() {
             return Err(param.refuse("points"));
         }
-        let bytes = positions.len() as u64 * 12;
-        self.budget.bytes(bytes, "vertices").at(param.spot)?;
         let points =
             || param.numbers().into_iter().flat_map(|list| list.chunks_exact(3).map(DVec3::from_slice));
         let origin = points().fold(Spread::NOTHING, Spread::with).origin();
@@ -318,6 +339,8 @@ impl Converter<'_, '_> {
         };
         self.budget.elements((indices.len() / N) as u64, "faces").at(spot)?;
         self.budget.bytes(indices.len() as u64 * 4, "faces").at(spot)?;
+        // Which were kept, and room for that list to grow.
+        let _while_read = self.budget.hold((indices.len() / N * 24) as u64, "faces").at(spot)?;
         let mut faces = Vec::with_capacity(indices.len() / N);
         let mut kept = vec![];
         let mut dropped = 0u64;
@@ -361,11 +384,13 @@ impl Converter<'_, '_> {
             let expected = format!("{vertices}, as many as points");
             Err(params.spot_of(name).wrong(wrong.found(found).expected(expected)))
         };
-        mesh.normals = triples(params, "N", Type::Normal)?;
+        mesh.normals = self.triples(params, "N", Type::Normal)?;
         if let Some(normals) = &mesh.normals {
             same("N", normals.len())?;
         }
-        let tangents = triples(params, "S", Type::Vector3)?;
+        let tangents = self.triples(params, "S", Type::Vector3)?;
+        let of_fourths = tangents.as_ref().map_or(0, |list| list.len() * size_of::<Vec4>());
+        self.keep(of_fourths, "tangents", params.spot)?;
         mesh.tangents = tangents.map(|list| list.into_iter().map(|t| t.extend(0.0)).collect());
         if let Some(tangents) = &mesh.tangents {
             same("S", tangents.len())?;
@@ -382,6 +407,7 @@ impl Converter<'_, '_> {
                 return Err(param.refuse("pairs of numbers"));
             }
             same(name, numbers.len() / 2)?;
+            self.keep(size_of::<Vec2>() * vertices, "texture coordinates", param.spot)?;
             mesh.uvs = Some(numbers.chunks_exact(2).map(|c| Vec2::new(c[0] as f32, c[1] as f32)).collect());
             if mesh.uvs.iter().flatten().any(|uv| !uv.is_finite()) {
                 return Err(param.refuse("numbers of single precision"));
@@ -394,13 +420,26 @@ impl Converter<'_, '_> {
                 let expected = format!("{faces}, as many as faces");
                 return Err(spot.wrong(wrong.found(indices.len()).expected(expected)));
             }
+            self.keep(size_of::<u32>() * kept.len(), "numbers of faces", spot)?;
             // The bits of the number, whose meaning is the writer's.
             mesh.face_indices = Some(kept.iter().map(|&i| indices[i] as u32).collect());
         }
-        let numbers =
-            [3 * mesh.normals.as_ref().map_or(0, Vec::len), 4 * mesh.tangents.as_ref().map_or(0, Vec::len)];
-        let bytes = 4 * (numbers[0] + numbers[1] + 2 * mesh.uvs.as_ref().map_or(0, Vec::len)) as u64;
-        self.budget.bytes(bytes, "vertices").at(params.spot)
+        Ok(())
+    }
+
+    /// A list of points, vectors or normals in single precision.
+    fn triples(&self, params: &Params, name: &'static str, ty: Type) -> Result<Option<Vec<Vec3>>> {
+        let Some(param) = params.typed(name, &[ty])? else { return Ok(None) };
+        let numbers = param.numbers()?;
+        if !numbers.len().is_multiple_of(3) {
+            return Err(param.refuse("three numbers each"));
+        }
+        self.keep(numbers.len() / 3 * size_of::<Vec3>(), "vertices", param.spot)?;
+        let mut list = Vec::with_capacity(numbers.len() / 3);
+        for triple in numbers.chunks_exact(3) {
+            list.push(vec3(triple).ok_or_else(|| param.refuse("numbers of single precision"))?);
+        }
+        Ok(Some(list))
     }
 
     fn triangle_mesh(&mut self, params: &Params) -> Result<Option<(GeometryDesc, DVec3)>> {
@@ -470,6 +509,14 @@ impl Converter<'_, '_> {
         };
         let at = params.spot_of("filename");
         let path = self.resolve(&filename, at)?;
+        if !self.mesh_paths.contains_key(&path) {
+            // The path is kept twice.
+            self.keep(
+                size_of::<MeshFile>() + size_of::<MeshDesc>() + 2 * filename.len() + 256,
+                "mesh files",
+                at,
+            )?;
+        }
         if params.find("displacement").is_some() {
             let message = "displacement of a plymesh is not rendered yet: the mesh stays as it is";
             self.note(params.spot_of("displacement"), message);
@@ -483,7 +530,7 @@ impl Converter<'_, '_> {
     }
 
     /// Reads the mesh files in parallel; returns each by its placeholder, with its origin.
-    pub fn read_meshes(&mut self) -> Result<HashMap<*const MeshDesc, (Arc<MeshDesc>, DVec3)>> {
+    pub fn read_meshes(&mut self) -> Result<ReadMeshes> {
         let files = std::mem::take(&mut self.mesh_files);
         let strictness = self.diagnostics.strictness();
         let budget = self.budget;
@@ -541,17 +588,6 @@ impl Converter<'_, '_> {
         self.mesh_files = files;
         Ok(meshes)
     }
-}
-
-/// A list of points, vectors or normals in single precision.
-fn triples(params: &Params, name: &'static str, ty: Type) -> Result<Option<Vec<Vec3>>> {
-    let Some(param) = params.typed(name, &[ty])? else { return Ok(None) };
-    let numbers = param.numbers()?;
-    if !numbers.len().is_multiple_of(3) {
-        return Err(param.refuse("three numbers each"));
-    }
-    let list: Option<Vec<Vec3>> = numbers.chunks_exact(3).map(vec3).collect();
-    list.map(Some).ok_or_else(|| param.refuse("numbers of single precision"))
 }
 
 /// Each face of a mesh as a mesh of its own.

@@ -49,7 +49,7 @@ pub(super) enum Fault {
     /// The scene is invalid here.
     Input(Spot, Box<Diagnostic>),
     /// A limit is exceeded here.
-    Limit(Spot, LimitError),
+    Limit(Spot, Box<LimitError>),
     /// Another reader has already reported what and where.
     Other(Box<FormatError>),
     /// As [`Fault::Other`], of a file that is named here.
@@ -62,7 +62,9 @@ impl Fault {
     pub fn into_format_error(self, files: &Files) -> FormatError {
         match self {
             Self::Input(spot, diagnostic) => files.locate(spot, *diagnostic).into(),
-            Self::Limit(spot, source) => FormatError::Limit { place: Some(files.place(spot)), source },
+            Self::Limit(spot, source) => {
+                FormatError::Limit { place: Some(files.place(spot)), source: *source }
+            }
             Self::Other(error) => *error,
             Self::Named(spot, error) => files.chain(spot).fold(*error, FormatError::included_from),
         }
@@ -94,6 +96,6 @@ pub(super) trait AtSpot<T> {
 
 impl<T> AtSpot<T> for std::result::Result<T, LimitError> {
     fn at(self, spot: Spot) -> Result<T> {
-        self.map_err(|limit| Fault::Limit(spot, limit))
+        self.map_err(|limit| Fault::Limit(spot, Box::new(limit)))
     }
 }

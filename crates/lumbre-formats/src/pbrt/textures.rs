@@ -13,7 +13,7 @@ use super::colour;
 use super::convert::{Converter, FloatArc, Known, MAX_TEXTURE_LEAVES, SpectrumArc, file_fault};
 use super::lexer::{Lexer, TokenKind, parse_number};
 use super::params::{Param, Params, Type, Values};
-use super::source::{Fault, Result, Spot};
+use super::source::{AtSpot, Fault, Result, Spot};
 use crate::diagnostic::quoted;
 use crate::{Diagnostic, FormatError, Input};
 
@@ -197,7 +197,13 @@ impl Converter<'_, '_> {
         };
         let input = Input::open(&path, self.budget).map_err(|e| file_fault(at, e))?;
         let file = self.files.add(input.name().clone(), Some(at));
+        let numbers_at_most = input.len() as u64 / 2 + 1;
         let mut lexer = Lexer::new(input, file)?;
+        // A vector that grows may be twice as long.
+        let _while_read = self
+            .budget
+            .hold(numbers_at_most * 2 * size_of::<f64>() as u64, "numbers of a spectrum")
+            .at(at)?;
         let mut numbers = vec![];
         while let Some(token) = lexer.next()? {
             match parse_number(lexer.raw(token)).filter(|v| v.is_finite()) {
@@ -354,7 +360,7 @@ impl Converter<'_, '_> {
         if T::table(self).contains_key(name) || self.broken_textures.contains_key(&key) {
             return Err(spot.error(format!("{} texture {} is defined twice", T::NAME, quoted(name))));
         }
-        let texture_from_world = ctm.inverse();
+        let texture_from_world = Arc::new(ctm.inverse());
         let known = match ty {
             "constant" => self.part::<T>(&params, "value", 1.0)?,
             "scale" => self.scale_texture::<T>(&params)?,
@@ -405,6 +411,8 @@ impl Converter<'_, '_> {
                 Ok(known) => known,
                 Err((spot, wrong)) => {
                     self.done(&params);
+                    self.kept_name(name, spot)?;
+                    self.keep(size_of::<Diagnostic>() + 512, "textures", spot)?;
                     self.broken_textures.insert(key, (spot, *wrong));
                     return Ok(());
                 }
@@ -419,6 +427,12 @@ impl Converter<'_, '_> {
             }
         };
         self.done(&params);
+        self.kept_name(name, spot)?;
+        self.keep(
+            size_of::<Known<T>>() + 2 * size_of::<Texture<T>>() + size_of::<Transform>(),
+            "textures",
+            spot,
+        )?;
         T::table(self).insert(name.to_owned(), known);
         Ok(())
     }
@@ -470,7 +484,7 @@ impl Converter<'_, '_> {
     fn image_texture<T: SceneValue>(
         &mut self,
         params: &Params,
-        texture_from_world: Transform,
+        texture_from_world: Arc<Transform>,
     ) -> Result<std::result::Result<Known<T>, Missing>> {
         let mapping = mapping(params, texture_from_world)?;
         let anisotropy = params.float_above("maxanisotropy", 8.0, 0.0)?;
@@ -542,7 +556,7 @@ pub(super) fn encoding(params: &Params) -> Result<Option<Encoding>> {
 }
 
 /// The mapping from the surface to the plane of a texture.
-fn mapping(params: &Params, texture_from_world: Transform) -> Result<Mapping2d> {
+fn mapping(params: &Params, texture_from_world: Arc<Transform>) -> Result<Mapping2d> {
     #[derive(Clone, Copy)]
     enum Kind {
         Uv,

@@ -104,6 +104,7 @@ pub(crate) fn ply_scene(
         let mut scene = SceneDesc { up: UpAxis::Y, ..SceneDesc::default() };
         let thin = Thin { positions: mesh.positions, colours: mesh.colours, points, segments };
         push_thin(&mut scene, &thin, size, None, world_from_object, budget)?;
+        scene.shapes.shrink_to_fit();
         return Ok(scene);
     }
     let thin = (!segments.is_empty()).then(|| Thin {
@@ -178,7 +179,8 @@ pub(crate) fn push_thin(
         });
         MaterialId(scene.materials.len() as u32 - 1)
     });
-    for geometry in thin.shapes(size, budget)? {
+    for geometry in thin.shapes(size, budget) {
+        let geometry = geometry?;
         budget.bytes(size_of::<ShapeDesc>() as u64, "points and lines")?;
         scene.shapes.push(ShapeDesc {
             index: scene.shapes.len() as u32,

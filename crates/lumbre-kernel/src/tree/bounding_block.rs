@@ -169,7 +169,10 @@ impl BoundingVolumes {
             }
             block
         };
-        Self { blocks: spans.par_iter().with_min_len(64).map(block).collect(), of_entry }
+        let mut blocks: Vec<_> = spans.par_iter().with_min_len(64).map(block).collect();
+        // Room is made for four at least, and many trees are of one shape.
+        blocks.shrink_to_fit();
+        Self { blocks, of_entry }
     }
 
     /// The block of the entry at a place and of up to seven that follow it in its leaf, and whether more follow these; `None`

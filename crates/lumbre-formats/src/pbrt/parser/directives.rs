@@ -229,7 +229,7 @@ impl Parser<'_, '_> {
 
     fn named_material(&mut self, _spot: Spot) -> Result<()> {
         let (name, at) = self.string("NamedMaterial", "a name in quotes")?;
-        self.state.material = Some(self.converter.material_named(&name, at));
+        self.state.material = Some(self.converter.material_named(&name, at)?);
         Ok(())
     }
 
@@ -277,7 +277,6 @@ impl Parser<'_, '_> {
             _ => None,
         };
         let names = [Some((inside, at)), outside].into_iter().flatten();
-        self.converter.medium_interface(spot, names.collect());
-        Ok(())
+        self.converter.medium_interface(spot, names.collect())
     }
 }

@@ -16,7 +16,7 @@ use super::lexer::{Lexer, Token, TokenKind};
 use super::source::{AtSpot, Fault, Result, Spot};
 use super::state::{Scope, State};
 use crate::diagnostic::quoted;
-use crate::{Diagnostic, FormatError, Input};
+use crate::{Diagnostic, FormatError, Hold, Input};
 
 /// A file that is being read.
 struct Frame<'b> {
@@ -60,12 +60,15 @@ pub(in crate::pbrt) struct Parser<'b, 'd> {
     scopes: Vec<Scope>,
     coordinate_systems: HashMap<String, [Transform; 2]>,
     included: Included,
+    /// What the parameters of the current directive take.
+    room: Hold<'b>,
     pub converter: Converter<'b, 'd>,
 }
 
 impl<'b, 'd> Parser<'b, 'd> {
     pub fn new(mut converter: Converter<'b, 'd>) -> Self {
         let state = State::new(converter.default_material());
+        let room = converter.budget.hold_nothing();
         Self {
             frames: vec![],
             peeked: None,
@@ -74,6 +77,7 @@ impl<'b, 'd> Parser<'b, 'd> {
             scopes: vec![],
             coordinate_systems: HashMap::new(),
             included: Included::default(),
+            room,
             converter,
         }
     }
@@ -94,6 +98,7 @@ impl<'b, 'd> Parser<'b, 'd> {
             if token.kind == TokenKind::Bare {
                 let name = self.bare(token);
                 self.directive(&name, spot)?;
+                self.room.empty();
             } else {
                 let wrong = Diagnostic::error("no directive before this").found(self.shown(token));
                 return Err(spot.wrong(wrong.expected("a directive such as Shape")));
@@ -140,7 +145,7 @@ impl<'b, 'd> Parser<'b, 'd> {
                 self.converter.note(at, format!("{message}; the scene goes on without it"));
                 return Ok(());
             }
-            Err(FormatError::Limit { source, .. }) => return Err(Fault::Limit(at, source)),
+            Err(FormatError::Limit { source, .. }) => return Err(Fault::Limit(at, Box::new(source))),
             Err(other) => return Err(other.into()),
         };
         let [stored, read] = self.included.count(canonical.as_deref().unwrap_or(&path), input.len() as u64);

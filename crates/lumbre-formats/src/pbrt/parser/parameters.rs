@@ -10,8 +10,8 @@ use super::super::params::{Param, Params, Type, Values, Wants};
 use super::super::source::{AtSpot, Result, Spot};
 use super::super::state::EntityKind;
 use super::Parser;
-use crate::Diagnostic;
 use crate::diagnostic::quoted;
+use crate::{Diagnostic, LimitError};
 
 impl Parser<'_, '_> {
     /// Reads a parameter list.
@@ -22,7 +22,9 @@ impl Parser<'_, '_> {
                 break;
             }
             self.peeked = None;
-            params.push(self.param(token)?);
+            let param = self.param(token)?;
+            self.room.room_in(&mut params, "parameters").at(param.spot)?;
+            params.push(param);
         }
         Ok(params)
     }
@@ -105,13 +107,49 @@ impl Parser<'_, '_> {
             if !bracketed {
                 return Ok(values);
             }
+            self.more_numbers(&mut values, token)?;
             token = self.expect("]")?;
         }
+    }
+
+    /// Appends the plain numbers that follow `last`.
+    fn more_numbers(&mut self, values: &mut Values, last: Token) -> Result<()> {
+        let lexer = &mut self.frames.last_mut().expect("a file is being read").lexer;
+        let room = &mut self.room;
+        let read = match values {
+            Values::Numbers(v) => lexer.numbers(|number| {
+                room.room_in(v, "numbers")?;
+                v.push(number);
+                Ok(true)
+            }),
+            Values::Integers(v) => lexer.numbers(|number| {
+                let is_whole = number.fract() == 0.0;
+                let is_integer = is_whole && f64::from(i32::MIN) <= number && number <= f64::from(i32::MAX);
+                if is_integer {
+                    room.room_in(v, "integers")?;
+                    v.push(number as i32);
+                }
+                Ok(is_integer)
+            }),
+            Values::Bools(_) | Values::Strings(_) => Ok(()),
+        };
+        read.or_else(|limit: LimitError| Err(limit).at(lexer.spot(last)))
     }
 
     /// Appends the value of `token`; returns whether it is valid.
     fn value(&mut self, token: Token, values: &mut Values) -> Result<bool> {
         let lexer = &mut self.frames.last_mut().expect("a file is being read").lexer;
+        let made = match values {
+            Values::Numbers(v) => self.room.room_in(v, "numbers"),
+            Values::Integers(v) => self.room.room_in(v, "integers"),
+            Values::Strings(v) => {
+                self.room.grow(token.len() as u64, "strings").and_then(|()| self.room.room_in(v, "strings"))
+            }
+            Values::Bools(v) => self.room.room_in(v, "bools"),
+        };
+        if let Err(limit) = made {
+            return Err(limit).at(lexer.spot(token));
+        }
         match (values, token.kind) {
             (Values::Numbers(v), TokenKind::Bare) => {
                 let raw = lexer.raw(token);

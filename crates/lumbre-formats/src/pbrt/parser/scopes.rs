@@ -2,6 +2,7 @@
 
 use std::rc::Rc;
 
+use super::super::params::Param;
 use super::super::source::{AtSpot, Result, Spot};
 use super::super::state::{EntityKind, Scope, ScopeKind};
 use super::Parser;
@@ -53,6 +54,7 @@ impl Parser<'_, '_> {
         };
         let defaults = Rc::make_mut(&mut self.state.defaults[*kind as usize]);
         for param in params {
+            self.converter.keep(size_of::<Param>() + param.bytes(), "defaults of Attribute", param.spot)?;
             let param = Rc::new(param);
             match defaults.binary_search_by(|p| p.name.cmp(&param.name)) {
                 Ok(same) => defaults[same] = param,

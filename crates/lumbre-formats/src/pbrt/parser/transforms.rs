@@ -65,7 +65,11 @@ impl Parser<'_, '_> {
     }
 
     pub(super) fn coordinate_system(&mut self, _spot: Spot) -> Result<()> {
-        let (name, _) = self.string("CoordinateSystem", "a name in quotes")?;
+        let (name, at) = self.string("CoordinateSystem", "a name in quotes")?;
+        if !self.coordinate_systems.contains_key(&name) {
+            self.converter.kept_name(&name, at)?;
+            self.converter.keep(size_of::<[Transform; 2]>(), "coordinate systems", at)?;
+        }
         self.coordinate_systems.insert(name, self.state.ctm);
         Ok(())
     }
