@@ -354,7 +354,12 @@ impl<'b, T> BudgetVec<'b, T> {
     #[inline]
     pub fn push(&mut self, value: T) -> Result<(), LimitError> {
         if self.vec.len() == self.vec.capacity() {
-            self.grow(self.vec.len().max(4))?;
+            // One, four, and twice as many from there: files may have very many lists of one.
+            self.grow(match self.vec.len() {
+                0 => 1,
+                1 => 3,
+                length => length,
+            })?;
         }
         self.vec.push(value);
         Ok(())

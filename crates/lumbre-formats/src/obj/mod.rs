@@ -144,8 +144,8 @@ struct Reader<'a> {
     /// When lenient, positions that are not finite.
     unusable: Vec<u32>,
     /// Every name, 0 for none.
-    names: Vec<String>,
-    numbers: HashMap<String, u32>,
+    names: Vec<Arc<str>>,
+    numbers: HashMap<Arc<str>, u32>,
     /// The state for the next face.
     state: Key,
     material_at: usize,
@@ -183,7 +183,7 @@ impl<'a> Reader<'a> {
             uvs: BudgetVec::new(budget, "texture coordinates"),
             normals: BudgetVec::new(budget, "normals"),
             unusable: vec![],
-            names: vec![String::new()],
+            names: vec!["".into()],
             numbers: HashMap::new(),
             state: Key::default(),
             material_at: 0,
@@ -377,10 +377,11 @@ impl<'a> Reader<'a> {
         if let Some(&number) = self.numbers.get(name) {
             return Ok(number);
         }
-        self.budget.bytes(2 * name.len() as u64 + 64, "names")?;
+        self.budget.bytes(name.len() as u64 + 96, "names")?;
         let number = self.names.len() as u32;
-        self.names.push(name.to_owned());
-        self.numbers.insert(name.to_owned(), number);
+        let name: Arc<str> = name.into();
+        self.names.push(name.clone());
+        self.numbers.insert(name, number);
         Ok(number)
     }
 
@@ -651,6 +652,8 @@ impl<'a> Reader<'a> {
                 .at(Place::whole(self.source.name.clone()));
             self.diagnostics.push(said.found(found));
         }
+        // No more names and parts come: their tables make room for meshes.
+        (self.numbers, self.part_of) = Default::default();
         // The vertex of the current mesh last made from each position.
         let count = self.positions.len() as u64;
         let _scratch = self.budget.hold(count * 4, "vertices")?;
@@ -661,12 +664,13 @@ impl<'a> Reader<'a> {
         for part in parts {
             let key = part.key;
             let object = if self.has_objects { key.object } else { key.group };
-            let material = (key.material != 0)
-                .then(|| (self.names[key.material as usize].clone(), self.source.place(part.material_at)));
+            let material = (key.material != 0).then(|| {
+                (self.names[key.material as usize].to_string(), self.source.place(part.material_at))
+            });
             if !part.triangles.is_empty() {
                 let mesh = self.mesh(&part.triangles, key, origin, &mut newest)?;
                 meshes.push(ObjMesh {
-                    name: self.names[object as usize].clone(),
+                    name: self.names[object as usize].to_string(),
                     material: material.clone(),
                     mesh: Arc::new(mesh),
                 });
