@@ -101,17 +101,20 @@ pub fn predicted_build_bytes(desc: &SceneDesc) -> u64 {
     const TRIANGLE: u64 = 64;
     // Shapes and instances keep double precision, and their maps.
     const OTHER: u64 = 640;
-    // Lights keep the shapes that shine, too.
-    const LIGHT: u64 = 768;
+    // Lights keep the shapes that shine, triangle by triangle, and a tree over them.
+    const LIGHT: u64 = 1152;
     // Each object that is placed has a tree of its own, however small; of the others, there is only a list.
     const PLACED: u64 = 4096;
     const OBJECT: u64 = 160;
     let (mut triangles, mut others, mut lights) = (0_u64, 0_u64, desc.lights.len() as u64);
     let mut add = |shape: &ShapeDesc| {
         others += 1;
-        lights += u64::from(shape.area_light.is_some());
+        let shines = shape.area_light.is_some();
+        lights += u64::from(shines);
         if let GeometryDesc::Mesh(mesh) = &shape.geometry {
-            triangles += mesh.triangles.len() as u64 + 2 * mesh.quads.len() as u64;
+            let count = mesh.triangles.len() as u64 + 2 * mesh.quads.len() as u64;
+            triangles += count;
+            lights += if shines { count } else { 0 };
         } else if let GeometryDesc::BilinearMesh(mesh) = &shape.geometry {
             others += mesh.quads.len() as u64;
         }

@@ -1,7 +1,6 @@
 //! The choice of a light, or of a triangle of one, for a place.
 
-use lumbre_geometry::Ray;
-use lumbre_geometry::Surface;
+use lumbre_geometry::{Ray, Surface};
 use lumbre_math::distribution::AliasTable;
 use lumbre_math::{DVec2, DVec3};
 use lumbre_shading::Scatter;
@@ -54,7 +53,8 @@ impl LightChoice {
         choice.share_elsewhere = match (&choice.tree, &choice.elsewhere) {
             (Some(_), Some(_)) => {
                 let elsewhere: f64 = power_elsewhere.iter().sum();
-                (elsewhere / (elsewhere + power)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE)
+                // Of a NaN, the least.
+                (elsewhere / (elsewhere + power)).max(LEAST_SHARE).min(1.0 - LEAST_SHARE)
             }
             (None, Some(_)) => 1.0,
             (_, None) => 0.0,
