@@ -7,6 +7,8 @@
 
 mod means;
 mod planes;
+#[cfg(test)]
+mod tests;
 
 use lumbre_image::{Image, Rgb};
 

@@ -24,13 +24,15 @@ pub(super) fn layer(
         guides.iter().map(|guide| if is_sampled(guide) { value(guide) } else { 0.0 }).collect()
     };
     let mut halves = [0, 1].map(|h| [0, 1, 2].map(|c| half(h, c)));
-    limit_outliers(&mut halves, size);
+    let kept = limit_outliers(&mut halves, size);
     let by_samples: Vec<f32> = guides
         .iter()
         .map(|guide| {
             let channel = |c| ratio(guide).variance(c, guide.count, least).map_or(0.0, finite);
             channel(0) + channel(1) + channel(2)
         })
+        .zip(kept)
+        .map(|(variance, kept)| variance * kept * kept)
         .collect();
     let by_halves: Vec<f32> = (0..guides.len())
         .map(|i| (0..3).map(|c| 0.25 * (halves[0][c][i] - halves[1][c][i]).powi(2)).sum())
@@ -46,7 +48,7 @@ pub(super) fn layer(
             .map(|i| {
                 let scale = if wide_samples[i] > 0.0 { wide_halves[i] / wide_samples[i] } else { 1.0 };
                 // That of a half is twice that of the whole.
-                2.0 * smooth[i] * scale.clamp(0.05, 2.0)
+                2.0 * smooth[i] * scale.clamp(0.1, 2.0)
             })
             .collect()
     };
@@ -55,20 +57,21 @@ pub(super) fn layer(
 
 /// Pixels around one in which the other half says how bright it may be.
 const OUTLIER_RADIUS: usize = 5;
-/// A pixel of one half that is brighter than so many pixels of that neighbourhood in the other half is an outlier: a third of its
+/// A pixel of one half that is brighter than so many pixels of that neighbourhood in the other half is an outlier: a fifth of its
 /// 121 pixels.
-const OUTLIER: f32 = 40.0;
+const OUTLIER: f32 = 24.0;
 /// Unless the other half has nearly as much beside it.
 const CONFIRMED: f32 = 4.0;
 
 /// Dims pixels of one half by which means would be little else than one sample, of which the other half knows nothing. All other light
-/// is kept.
-fn limit_outliers(halves: &mut [[Vec<f32>; 3]; 2], size: (usize, usize)) {
+/// is kept. Returns the factor of each pixel.
+fn limit_outliers(halves: &mut [[Vec<f32>; 3]; 2], size: (usize, usize)) -> Vec<f32> {
     let brightness = halves
         .each_ref()
         .map(|[r, g, b]| -> Vec<f32> { r.iter().zip(g).zip(b).map(|((r, g), b)| r + g + b).collect() });
     let around = brightness.each_ref().map(|values| mean_around(values, size, OUTLIER_RADIUS));
     let (width, height) = size;
+    let mut kept = vec![1.0; width * height];
     for (i, (x, y)) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).enumerate() {
         for half in [0, 1] {
             let (value, other) = (brightness[half][i], 1 - half);
@@ -84,9 +87,11 @@ fn limit_outliers(halves: &mut [[Vec<f32>; 3]; 2], size: (usize, usize)) {
             // Where all around is black, nothing is known.
             if 0.0 < limit && limit < value {
                 halves[half].iter_mut().for_each(|channel| channel[i] *= limit / value);
+                kept[i] = limit / value;
             }
         }
     }
+    kept
 }
 
 /// The variance of values among neighbours, summed over channels.
