@@ -91,8 +91,7 @@ impl Oidn {
                 Err(_) => {}
             }
         }
-        let found =
-            broken.map_or_else(|| "Open Image Denoise 2 is not installed".to_owned(), |broken| broken);
+        let found = broken.unwrap_or_else(|| "Open Image Denoise 2 is not installed".to_owned());
         Err(format!(
             "{found} (looked in {FOLDER}, the system's libraries, and pyoidn of python3; get it by \"pip install pyoidn\" or from \
              openimagedenoise.org, and set {FOLDER} to its folder; --denoise own needs nothing)"

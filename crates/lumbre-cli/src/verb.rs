@@ -27,14 +27,11 @@ pub(crate) fn with_render(mut arguments: Vec<OsString>, program: &Command) -> Ve
         arguments.insert(1, "render".into());
     }
     if arguments.get(1).is_some_and(|verb| verb == "render") {
-        for i in 2..arguments.len() {
-            let is_denoiser = |next: &OsString| Choice::NAMES.iter().any(|name| next == name);
-            if arguments[i] == "--denoise"
-                && !arguments.get(i + 1).is_some_and(is_denoiser)
-                && arguments.get(i + 1).is_some_and(is_scene)
-            {
+        for i in 3..arguments.len() {
+            let is_name = Choice::NAMES.iter().any(|name| arguments[i] == *name);
+            if arguments[i - 1] == "--denoise" && !is_name && is_scene(&arguments[i]) {
                 // Without a value of its own, it does not take the scene for one.
-                arguments[i] = "--denoise=auto".into();
+                arguments[i - 1] = "--denoise=auto".into();
             }
         }
     }

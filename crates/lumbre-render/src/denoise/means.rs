@@ -33,6 +33,9 @@ const PATCH: usize = 3;
 /// The square of the number of standard deviations with which differences of light are compared.
 const STRENGTH_SQUARED: f32 = 0.36;
 
+/// Added to variances, so that two pixels without noise that differ are different.
+const LEAST_VARIANCE: f32 = 1e-12;
+
 /// Rows that one thread filters at once.
 const BAND: usize = 16;
 
@@ -58,136 +61,129 @@ fn filter_rows(layer: &Layer, groups: &[Group], rows: Range<usize>) -> [Vec<f32>
     let (width, height) = (layer.width, layer.height);
     let count = rows.len() * width;
     let mut sums: [[Vec<f32>; 3]; 2] = array::from_fn(|_| array::from_fn(|_| vec![0.0; count]));
-    let mut weights: [Vec<f32>; 2] = array::from_fn(|_| vec![0.0; count]);
-    let first = rows.start.saturating_sub(PATCH);
-    let last = (rows.end + PATCH).min(height);
-    let mut across = [vec![0.0f32; (last - first) * width], vec![0.0f32; (last - first) * width]];
-    let mut distance = vec![0.0f32; width];
-    let mut feature = vec![0.0f32; width];
-    let mut column = vec![0.0f32; width];
+    let mut totals: [Vec<f32>; 2] = array::from_fn(|_| vec![0.0; count]);
+    // Rows of patches reach beyond those of their pixels.
+    let reached = rows.start.saturating_sub(PATCH)..(rows.end + PATCH).min(height);
+    let mut across: [Vec<f32>; 2] = array::from_fn(|_| vec![0.0; reached.len() * width]);
+    let mut differences = vec![0.0; width];
+    let mut surfaces = vec![0.0; width];
+    let mut weights = vec![0.0; width];
     let share = 1.0 / ((2 * PATCH + 1) * (2 * PATCH + 1)) as f32;
-    for dy in -RADIUS..=RADIUS {
-        for dx in -RADIUS..=RADIUS {
-            // Pixels whose neighbour is in the picture.
-            let x0 = (-dx).max(0) as usize;
-            let x1 = (width as isize - dx.max(0)).max(0) as usize;
-            if x0 >= x1 {
-                continue;
+    for (dx, dy) in (-RADIUS..=RADIUS).flat_map(|dy| (-RADIUS..=RADIUS).map(move |dx| (dx, dy))) {
+        // Less with the distance, and nothing beyond a circle: what stands out is spread softly.
+        let near = 1.0 - (dx * dx + dy * dy) as f32 / ((RADIUS + 1) * (RADIUS + 1)) as f32;
+        // Columns whose neighbour is in the picture.
+        let (left, right) = ((-dx).max(0) as usize, width as isize - dx.max(0));
+        if near <= 0.0 || right <= left as isize {
+            continue;
+        }
+        let span = right as usize - left;
+        let start = |y: usize| y * width + left;
+        let moved = |y: usize| {
+            let row = y.checked_add_signed(dy).filter(|&row| row < height)?;
+            (row * width + left).checked_add_signed(dx)
+        };
+        for y in reached.clone() {
+            for (across, half) in across.iter_mut().zip(&layer.halves) {
+                let across = &mut across[(y - reached.start) * width..][..width];
+                let Some(there) = moved(y) else {
+                    across.fill(0.0);
+                    continue;
+                };
+                differences.fill(0.0);
+                compare_light(half, &layer.variance, start(y), there, &mut differences[left..][..span]);
+                sum_across(&differences, across);
             }
-            // Less with the distance, and nothing beyond a circle: what stands out is spread softly.
-            let near = 1.0 - (dx * dx + dy * dy) as f32 / ((RADIUS + 1) * (RADIUS + 1)) as f32;
-            if near <= 0.0 {
-                continue;
-            }
-            let span = x1 - x0;
-            let moved = |y: usize| (y as isize + dy) as usize * width + (x0 as isize + dx) as usize;
-            let is_in = |y: usize| (0..height as isize).contains(&(y as isize + dy));
-            // Distances, summed along rows of patches.
-            for y in first..last {
-                for half in 0..2 {
-                    let across = &mut across[half][(y - first) * width..][..width];
-                    if !is_in(y) {
-                        across.fill(0.0);
-                        continue;
-                    }
-                    distance.fill(0.0);
-                    let here = y * width + x0;
-                    let there = moved(y);
-                    {
-                        let d = &mut distance[x0..x1];
-                        let vp = &layer.variance[here..][..span];
-                        let vq = &layer.variance[there..][..span];
-                        let p = layer.halves[half].each_ref().map(|plane| &plane[here..][..span]);
-                        let q = layer.halves[half].each_ref().map(|plane| &plane[there..][..span]);
-                        for x in 0..span {
-                            let (r, g, b) = (p[0][x] - q[0][x], p[1][x] - q[1][x], p[2][x] - q[2][x]);
-                            let noise = vp[x] + vp[x].min(vq[x]);
-                            d[x] = (r * r + g * g + b * b - noise)
-                                / (1e-12 + STRENGTH_SQUARED * (vp[x] + vq[x]));
-                        }
-                    }
-                    if width > 2 * PATCH {
-                        for x in 0..PATCH {
-                            across[x] = distance[..=x + PATCH].iter().sum();
-                            across[width - 1 - x] = distance[width - 1 - x - PATCH..].iter().sum();
-                        }
-                        let inner = &mut across[PATCH..width - PATCH];
-                        inner.copy_from_slice(&distance[..width - 2 * PATCH]);
-                        for k in 1..=2 * PATCH {
-                            for (sum, d) in inner.iter_mut().zip(&distance[k..]) {
-                                *sum += d;
-                            }
-                        }
-                    } else {
-                        for x in 0..width {
-                            across[x] =
-                                distance[x.saturating_sub(PATCH)..(x + PATCH + 1).min(width)].iter().sum();
-                        }
-                    }
+        }
+        for y in rows.clone() {
+            let Some(there) = moved(y) else { continue };
+            let surfaces = &mut surfaces[..span];
+            compare_surfaces(groups, start(y), there, surfaces);
+            let out = (y - rows.start) * width + left;
+            // The weights of one half are for the other.
+            for (across, other) in across.iter().zip([1, 0]) {
+                let weights = &mut weights[..span];
+                weights.fill(0.0);
+                for row in y.saturating_sub(PATCH)..(y + PATCH + 1).min(height) {
+                    let patch = &across[(row - reached.start) * width + left..][..span];
+                    weights.iter_mut().zip(patch).for_each(|(sum, difference)| *sum += difference);
                 }
-            }
-            for y in rows.clone().filter(|&y| is_in(y)) {
-                let here = y * width + x0;
-                let there = moved(y);
-                // How different the surfaces are.
-                let f = &mut feature[..span];
-                f.fill(0.0);
-                for group in groups {
-                    let vp = &group.variance[here..][..span];
-                    let vq = &group.variance[there..][..span];
-                    let sharpness = &group.sharpness[here..][..span];
-                    if let [a, b, c] = &group.planes[..] {
-                        let [pa, pb, pc] = [a, b, c].map(|plane| &plane[here..][..span]);
-                        let [qa, qb, qc] = [a, b, c].map(|plane| &plane[there..][..span]);
-                        for x in 0..span {
-                            let (r, g, b) = (pa[x] - qa[x], pb[x] - qb[x], pc[x] - qc[x]);
-                            let d = (r * r + g * g + b * b - (vp[x] + vp[x].min(vq[x]))) * sharpness[x];
-                            f[x] = f[x].max(d);
-                        }
-                    } else {
-                        for plane in &group.planes {
-                            let (p, q) = (&plane[here..][..span], &plane[there..][..span]);
-                            for x in 0..span {
-                                let d = p[x] - q[x];
-                                f[x] = f[x].max((d * d - (vp[x] + vp[x].min(vq[x]))) * sharpness[x]);
-                            }
-                        }
-                    }
+                for (weight, surface) in weights.iter_mut().zip(&*surfaces) {
+                    // What is less different than by noise is not different.
+                    *weight = near * kernel((*weight * share).max(*surface).max(0.0));
                 }
-                let out = (y - rows.start) * width + x0;
-                for half in 0..2 {
-                    let up = y.saturating_sub(PATCH).max(first);
-                    let down = (y + PATCH + 1).min(last);
-                    let c = &mut column[..span];
-                    c.fill(0.0);
-                    for row in up..down {
-                        let from = &across[half][(row - first) * width + x0..][..span];
-                        for x in 0..span {
-                            c[x] += from[x];
-                        }
-                    }
-                    for x in 0..span {
-                        // Both are at least 0, whatever noise was taken off.
-                        c[x] = near * kernel((c[x] * share).max(f[x]).max(0.0));
-                    }
-                    // The weights of one half are for the other.
-                    let other = 1 - half;
-                    let total = &mut weights[other][out..][..span];
-                    for x in 0..span {
-                        total[x] += c[x];
-                    }
-                    for (sum, plane) in sums[other].iter_mut().zip(&layer.halves[other]) {
-                        let (sum, q) = (&mut sum[out..][..span], &plane[there..][..span]);
-                        for x in 0..span {
-                            sum[x] += c[x] * q[x];
-                        }
+                let total = &mut totals[other][out..][..span];
+                total.iter_mut().zip(&*weights).for_each(|(total, weight)| *total += weight);
+                for (sum, values) in sums[other].iter_mut().zip(&layer.halves[other]) {
+                    let (sum, values) = (&mut sum[out..][..span], &values[there..][..span]);
+                    for ((sum, value), weight) in sum.iter_mut().zip(values).zip(&*weights) {
+                        *sum += weight * value;
                     }
                 }
             }
         }
     }
-    // The pixel itself always counts: no weight is 0.
+    // The pixel itself always counts: no total is 0.
     array::from_fn(|c| {
-        (0..count).map(|i| 0.5 * (sums[0][c][i] / weights[0][i] + sums[1][c][i] / weights[1][i])).collect()
+        (0..count).map(|i| 0.5 * (sums[0][c][i] / totals[0][i] + sums[1][c][i] / totals[1][i])).collect()
     })
+}
+
+/// The squared differences of light of the pixels from `p` on and those from `q` on, less what noise makes of them, in units of it.
+fn compare_light(half: &[Vec<f32>; 3], variance: &[f32], p: usize, q: usize, out: &mut [f32]) {
+    let span = out.len();
+    let [pr, pg, pb] = half.each_ref().map(|channel| &channel[p..][..span]);
+    let [qr, qg, qb] = half.each_ref().map(|channel| &channel[q..][..span]);
+    let (vp, vq) = (&variance[p..][..span], &variance[q..][..span]);
+    for x in 0..span {
+        let (r, g, b) = (pr[x] - qr[x], pg[x] - qg[x], pb[x] - qb[x]);
+        let noise = vp[x] + vp[x].min(vq[x]);
+        out[x] = (r * r + g * g + b * b - noise) / (LEAST_VARIANCE + STRENGTH_SQUARED * (vp[x] + vq[x]));
+    }
+}
+
+/// The greatest squared difference of any group of features of the pixels from `p` on and those from `q` on, in units of each group.
+fn compare_surfaces(groups: &[Group], p: usize, q: usize, out: &mut [f32]) {
+    let span = out.len();
+    out.fill(0.0);
+    for Group { planes, variance, sharpness } in groups {
+        let (vp, vq) = (&variance[p..][..span], &variance[q..][..span]);
+        let sharpness = &sharpness[p..][..span];
+        let noise = |x: usize| vp[x] + vp[x].min(vq[x]);
+        if let [a, b, c] = &planes[..] {
+            let [pa, pb, pc] = [a, b, c].map(|plane| &plane[p..][..span]);
+            let [qa, qb, qc] = [a, b, c].map(|plane| &plane[q..][..span]);
+            for x in 0..span {
+                let (a, b, c) = (pa[x] - qa[x], pb[x] - qb[x], pc[x] - qc[x]);
+                out[x] = out[x].max((a * a + b * b + c * c - noise(x)) * sharpness[x]);
+            }
+        } else {
+            for plane in planes {
+                let (p, q) = (&plane[p..][..span], &plane[q..][..span]);
+                for x in 0..span {
+                    let d = p[x] - q[x];
+                    out[x] = out[x].max((d * d - noise(x)) * sharpness[x]);
+                }
+            }
+        }
+    }
+}
+
+/// Sums of each value and its neighbours to the left and the right, as far as patches reach.
+fn sum_across(values: &[f32], out: &mut [f32]) {
+    let width = values.len();
+    let inside = PATCH..width.saturating_sub(PATCH).max(PATCH);
+    for x in (0..width).filter(|x| !inside.contains(x)) {
+        out[x] = values[x.saturating_sub(PATCH)..(x + PATCH + 1).min(width)].iter().sum();
+    }
+    if inside.is_empty() {
+        return;
+    }
+    let inner = &mut out[inside.clone()];
+    inner.copy_from_slice(&values[..inside.len()]);
+    for shift in 1..=2 * PATCH {
+        for (sum, value) in inner.iter_mut().zip(&values[shift..]) {
+            *sum += value;
+        }
+    }
 }
