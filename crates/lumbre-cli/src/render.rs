@@ -75,7 +75,7 @@ pub(crate) struct Arguments {
     /// The format of a picture on standard output: png by default.
     #[arg(long, value_name = "FORMAT", value_parser = one_of(&WRITTEN, written_format))]
     output_format: Option<ImageFormat>,
-    /// Samples per pixel.
+    /// Samples per pixel. By default as many as the scene says, else 64; 16 for a model whose noise is taken out.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
     /// Stop after this time, counted from the start (of each frame), as 90s, 2m or 1h30m.
@@ -86,7 +86,7 @@ pub(crate) struct Arguments {
     noise: Option<f64>,
     /// Take the noise out of the picture: by Lumbre's own filter (own or auto, the same), or by Open Image Denoise where it is installed
     /// (oidn; its folder can be named by the variable OIDN_DIR). An .exr keeps the noisy picture too, in noisy.R, noisy.G and noisy.B.
-    /// By default none.
+    /// By default none; own for a model without camera and light, where none of --spp, --time and --noise is given.
     #[arg(long, value_name = "WITH", num_args = 0..=1, default_missing_value = "auto",
           value_parser = one_of(&Choice::NAMES, Choice::from_name))]
     denoise: Option<Choice>,
@@ -265,6 +265,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 /// How long a picture is rendered even if reading took all of its time.
 const LEAST_TIME: Duration = Duration::from_millis(400);
+
+/// Samples per pixel of a model without camera and light, of which the noise is taken out.
+const MODEL_SPP: u32 = 16;
 
 const READING: Phase = Phase::Preparing("reading the scene");
 
@@ -448,6 +451,14 @@ fn picture(
     }
     let mut options = options(arguments, &scene)?;
     options.transparent = behind.is_transparent();
+    let is_model = staged.framed && staged.light != StageLight::Own && is_of_light;
+    let samples_are_asked = arguments.spp.is_some() || arguments.time.is_some() || arguments.noise.is_some();
+    let is_plain = is_model && !samples_are_asked && scene.resolved().sampler().spp.is_none();
+    // A model by itself is clean soon; who asks for samples has these and nothing else.
+    let denoiser = denoiser.or((is_plain && arguments.denoise.is_none()).then_some(&Denoiser::Own));
+    if is_plain && denoiser.is_some() {
+        options.stop.spp = MODEL_SPP;
+    }
     options.guides = denoiser.is_some();
     check_film(arguments, &options, scene.info().memory_bytes)?;
     arguments.view.check_camera(&scene, options.camera)?;

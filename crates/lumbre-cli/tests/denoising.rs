@@ -89,3 +89,25 @@ fn a_denoiser_that_is_not_there_is_missed_before_anything_is_rendered() {
     assert!(message.contains("OIDN_DIR") && message.contains("pip install pyoidn"), "{message}");
     assert!(!desk.path("out.png").exists());
 }
+
+#[test]
+fn a_model_by_itself_has_few_samples_and_no_noise_unless_others_are_asked_for() {
+    let desk = Desk::new();
+    desk.write("a.obj", "v -3 0 0\nv 4 0 0\nv 4 2 1\nv -3 2 1\nf 1 2 3 4\n");
+    desk.write("sphere.pbrt", SPHERE);
+    for (arguments, samples, is_denoised) in [
+        (&["a.obj"][..], " 16 samples", true),
+        (&["a.obj", "--denoise"], " 16 samples", true),
+        (&["a.obj", "--denoise", "none"], " 64 samples", false),
+        (&["a.obj", "--spp", "3"], " 3 samples", false),
+        (&["a.obj", "--spp", "3", "--denoise"], " 3 samples", true),
+        (&["a.obj", "--integrator", "normals"], " 64 samples", false),
+        (&["sphere.pbrt"], " 4 samples", false),
+    ] {
+        let out = desk.lumbre(&[arguments, &["--size", "24x18", "-o", "out.png"]].concat());
+        assert_eq!(code(&out), 0, "{}", stderr(&out));
+        let said = stderr(&out);
+        let last = said.lines().last().unwrap();
+        assert!(last.contains(samples) && last.contains("denoised") == is_denoised, "{arguments:?}: {last}");
+    }
+}
