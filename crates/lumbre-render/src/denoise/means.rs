@@ -15,6 +15,8 @@ pub(super) struct Layer {
     pub(super) halves: [[Vec<f32>; 3]; 2],
     /// The variance of each channel of a half, summed over channels.
     pub(super) variance: Vec<f32>,
+    /// 1, or 0 where a half says nothing of the pixel.
+    pub(super) known: [Vec<f32>; 2],
 }
 
 /// What tells surfaces apart: a group is compared as one.
@@ -112,6 +114,8 @@ fn filter_rows(layer: &Layer, groups: &[Group], rows: Range<usize>) -> [Vec<f32>
                     // What is less different than by noise is not different.
                     *weight = near * kernel((*weight * share).max(*surface).max(0.0));
                 }
+                let known = &layer.known[other][there..][..span];
+                weights.iter_mut().zip(known).for_each(|(weight, known)| *weight *= known);
                 let total = &mut totals[other][out..][..span];
                 total.iter_mut().zip(&*weights).for_each(|(total, weight)| *total += weight);
                 for (sum, values) in sums[other].iter_mut().zip(&layer.halves[other]) {
@@ -123,9 +127,15 @@ fn filter_rows(layer: &Layer, groups: &[Group], rows: Range<usize>) -> [Vec<f32>
             }
         }
     }
-    // The pixel itself always counts: no total is 0.
+    // A half of which nothing is known leaves it to the other.
     array::from_fn(|c| {
-        (0..count).map(|i| 0.5 * (sums[0][c][i] / totals[0][i] + sums[1][c][i] / totals[1][i])).collect()
+        let mean = |i: usize| match (totals[0][i] > 0.0, totals[1][i] > 0.0) {
+            (true, true) => 0.5 * (sums[0][c][i] / totals[0][i] + sums[1][c][i] / totals[1][i]),
+            (true, false) => sums[0][c][i] / totals[0][i],
+            (false, true) => sums[1][c][i] / totals[1][i],
+            (false, false) => 0.0,
+        };
+        (0..count).map(mean).collect()
     })
 }
 

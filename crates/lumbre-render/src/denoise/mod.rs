@@ -22,7 +22,7 @@ const LEAST_REFLECTANCE: f32 = 0.01;
 const LEAST_GROUND: f32 = 1e-3;
 
 /// Bytes a pixel that the filter needs: two halves of three channels, what comes out of them, and the features with their variance.
-pub(crate) const BYTES_A_PIXEL: usize = 4 * (2 * 6 + 2 * 7 + 12);
+pub(crate) const BYTES_A_PIXEL: usize = 4 * (2 * 6 + 2 * 7 + 14);
 
 /// A picture without noise.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,7 +45,9 @@ pub fn denoise(rendered: &Rendered, threads: usize) -> Option<Denoised> {
     let surfaces = planes::surfaces(guides, size);
     let filtered = |layer: &Layer| means::filter(layer, &surfaces, &workers);
 
-    let light = filtered(&planes::layer(guides, size, |guide| &guide.light, LEAST_REFLECTANCE));
+    // Where a picture is transparent, there is no light of what lets one through.
+    let is_opaque = rendered.image.alpha().is_none();
+    let light = filtered(&planes::layer(guides, size, |guide| &guide.light, LEAST_REFLECTANCE, is_opaque));
     let colours = (0..guides.len()).map(|i| {
         let colour = |c: usize| light[c][i] * share(&guides[i], &guides[i].light, c, LEAST_REFLECTANCE);
         Rgb::new(colour(0), colour(1), colour(2))
@@ -57,7 +59,7 @@ pub fn denoise(rendered: &Rendered, threads: usize) -> Option<Denoised> {
         return Some(Denoised { image, coverage: rendered.coverage.clone() });
     }
 
-    let shadow = filtered(&planes::layer(guides, size, |guide| &guide.shadow, LEAST_GROUND));
+    let shadow = filtered(&planes::layer(guides, size, |guide| &guide.shadow, LEAST_GROUND, false));
     // What is not ground, and covers as it did, and what is.
     let covered = |i: usize, before: Rgb| {
         let (guide, sums) = (&guides[i], &guides[i].shadow);
@@ -79,5 +81,6 @@ pub fn denoise(rendered: &Rendered, threads: usize) -> Option<Denoised> {
 
 /// What the ratio of a pixel is multiplied by again.
 fn share(guide: &GuideSums, sums: &RatioSums, c: usize, least: f32) -> f32 {
-    if guide.count.weight > 0.0 { sums.denominator(c, guide.count).max(least) } else { 0.0 }
+    let has_part = guide.count.weight > 0.0 && !sums.is_absent(c);
+    if has_part { sums.denominator(c, guide.count).max(least) } else { 0.0 }
 }

@@ -10,12 +10,13 @@ const SCALE_RADIUS: usize = 5;
 /// Pixels around one whose spread stands for the variance of a single sample.
 const SPREAD_RADIUS: usize = 2;
 
-/// A ratio of every pixel by two halves of its samples.
+/// A ratio of every pixel by two halves of its samples. Unless it is everywhere, pixels without any part in it say nothing.
 pub(super) fn layer(
     guides: &[GuideSums],
     size: (usize, usize),
     ratio: impl Fn(&GuideSums) -> &RatioSums,
     least: f32,
+    is_everywhere: bool,
 ) -> Layer {
     let finite = |x: f32| if x.is_finite() { x } else { 0.0 };
     let is_sampled = |guide: &GuideSums| guide.count.samples > 0 && guide.count.weight > 0.0;
@@ -52,7 +53,11 @@ pub(super) fn layer(
             })
             .collect()
     };
-    Layer { width: size.0, height: size.1, halves, variance }
+    let known = [0, 1].map(|half| {
+        let is_known = |guide: &GuideSums| is_everywhere || ratio(guide).is_known(half, guide.count);
+        guides.iter().map(|guide| if is_known(guide) { 1.0 } else { 0.0 }).collect()
+    });
+    Layer { width: size.0, height: size.1, halves, variance, known }
 }
 
 /// Pixels around one in which the other half says how bright it may be.

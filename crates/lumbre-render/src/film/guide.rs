@@ -50,6 +50,20 @@ impl RatioSums {
         self.over[c] / self.under[c].max(least * count.weight)
     }
 
+    /// Whether the even samples (0) or the odd ones (1) have a numerator or a denominator; with a single sample, that one for both.
+    pub fn is_known(&self, half: usize, count: Count) -> bool {
+        let is_odd = half == 1 && count.samples > 1;
+        let sum = |all: f32, odd: f32| if is_odd { odd } else { all - odd };
+        (0..3).any(|c| {
+            sum(self.over[c], self.odd_over[c]) != 0.0 || sum(self.under[c], self.odd_under[c]) != 0.0
+        })
+    }
+
+    /// Whether neither numerator nor denominator is there: the pixel has no part in the ratio.
+    pub fn is_absent(&self, c: usize) -> bool {
+        self.over[c] == 0.0 && self.under[c] == 0.0
+    }
+
     /// The ratio by the even samples and that by the odd ones; that of all where there are none of them.
     pub fn halves(&self, c: usize, count: Count, least: f32) -> [f32; 2] {
         let odd = count.samples / 2;
