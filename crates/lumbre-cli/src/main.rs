@@ -12,11 +12,13 @@ macro_rules! say {
 mod cast;
 mod completions;
 mod console;
+mod denoiser;
 mod diff;
 mod failure;
 mod info;
 mod memory;
 mod names;
+mod oidn;
 mod output;
 mod progress;
 mod reading;

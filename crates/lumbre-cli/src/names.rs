@@ -19,6 +19,7 @@ mod tests {
     use lumbre::shading::ShadingNormals;
     use lumbre::{Feature, Ground};
 
+    use crate::denoiser::Choice;
     use crate::{diff, render};
 
     #[test]
@@ -28,6 +29,7 @@ mod tests {
         assert!(render::TONE_MAPS.iter().all(|name| ToneMap::from_name(name).is_some()));
         assert!(render::FEATURES.iter().all(|name| Feature::from_name(name).is_some()));
         assert!(diff::METRICS.iter().all(|name| Metric::from_name(name).is_some()));
+        assert!(Choice::NAMES.iter().all(|name| Choice::from_name(name).is_some()));
         assert!(Ground::NAMES.iter().all(|name| Ground::from_name(name).is_some()));
     }
 }

@@ -18,6 +18,7 @@ use lumbre::{
 };
 use serde_json::json;
 
+use crate::denoiser::{Choice, Denoiser};
 use crate::failure::{Failure, print_bytes};
 use crate::names::one_of;
 use crate::output::{self, Inputs, Pictures, Replaced};
@@ -35,6 +36,7 @@ use crate::view::ViewArguments;
   lumbre render scene.pbrt
   lumbre render scene.pbrt -o out.exr --spp 1024 --time 10m
   lumbre render model.obj --size 1920x1080 --tonemap agx --exposure 0.5
+  lumbre render scene.pbrt -o clean.exr --spp 16 --denoise
   lumbre render scene.pbrt -o part.exr --crop 100,50,300,200
   lumbre render scene.pbrt -o all.exr --aov albedo,normal,depth
   curl https://example.org/fox.glb | lumbre render - -o - | display
@@ -74,7 +76,7 @@ pub(crate) struct Arguments {
     /// The format of a picture on standard output: png by default.
     #[arg(long, value_name = "FORMAT", value_parser = one_of(&WRITTEN, written_format))]
     output_format: Option<ImageFormat>,
-    /// Samples per pixel.
+    /// Samples per pixel. By default as many as the scene says, else 64; 16 for a model whose noise is taken out.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
     /// Stop after this time, counted from the start (of each frame), as 90s, 2m or 1h30m.
@@ -83,6 +85,12 @@ pub(crate) struct Arguments {
     /// Stop when the noise is estimated to be below this share of the luminance.
     #[arg(long, value_name = "R", value_parser = noise)]
     noise: Option<f64>,
+    /// Take the noise out of the picture: by Lumbre's own filter (own or auto, the same), or by Open Image Denoise where it is installed
+    /// (oidn; its folder can be named by the variable OIDN_DIR). An .exr keeps the noisy picture too, in noisy.R, noisy.G and noisy.B.
+    /// By default none; own for a model without camera and light, where none of --spp, --time and --noise is given.
+    #[arg(long, value_name = "WITH", num_args = 0..=1, default_missing_value = "auto",
+          value_parser = one_of(&Choice::NAMES, Choice::from_name))]
+    denoise: Option<Choice>,
     /// Width and height in pixels.
     #[arg(long, value_name = "WxH", value_parser = units::size)]
     size: Option<(u32, u32)>,
@@ -182,6 +190,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         check_format(output, !arguments.aov.is_empty())?;
     }
     arguments.check_standard_output()?;
+    let denoiser = Denoiser::find(arguments.denoise.unwrap_or(Choice::None))?;
+    let denoiser = denoiser.as_ref();
     let inputs = Inputs::of(arguments.inputs());
     output::refuse_inputs(arguments.file(), &arguments.pictures(), arguments.stats.as_deref(), &inputs)?;
     let start = Instant::now();
@@ -189,6 +199,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         // What cannot fit is known before anything is read.
         let mut asked = RenderOptions::default();
         (asked.width, asked.height) = (width, height);
+        asked.guides = denoiser.is_some();
         check_film(arguments, &asked, 0)?;
     }
     let cancel = CancelToken::new();
@@ -212,7 +223,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 say!("frame {number} ({} of {})", number - first + 1, last - first + 1);
             }
             let frame = Some((frame, &mut held));
-            let context = Context { arguments, stage: &stage, start, cancel: &cancel, signals: &signals };
+            let context =
+                Context { arguments, stage: &stage, start, cancel: &cancel, signals: &signals, denoiser };
             picture(context, desc, &mut diagnostics, frame, &mut from_first)?;
             if cancel.is_cancelled() {
                 break;
@@ -222,7 +234,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let (desc, mut diagnostics) = arguments.reading.describe(&arguments.scene)?;
         match arguments.staging.turntable() {
             None => {
-                let context = Context { arguments, stage: &stage, start, cancel: &cancel, signals: &signals };
+                let context =
+                    Context { arguments, stage: &stage, start, cancel: &cancel, signals: &signals, denoiser };
                 picture(context, desc, &mut diagnostics, None, &mut from_first)?;
             }
             Some(frames) => {
@@ -235,8 +248,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                     // Each rotation has its own camera.
                     let frame = Some((frame, &mut Held::default()));
                     let desc = desc.clone();
-                    let context =
-                        Context { arguments, stage: &stage, start, cancel: &cancel, signals: &signals };
+                    let context = Context {
+                        arguments,
+                        stage: &stage,
+                        start,
+                        cancel: &cancel,
+                        signals: &signals,
+                        denoiser,
+                    };
                     picture(context, desc, &mut diagnostics, frame, &mut from_first)?;
                     if cancel.is_cancelled() {
                         break;
@@ -253,6 +272,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 /// How long a picture is rendered even if reading took all of its time.
 const LEAST_TIME: Duration = Duration::from_millis(400);
+
+/// Samples per pixel of a model without camera and light, of which the noise is taken out.
+const MODEL_SPP: u32 = 16;
 
 const READING: Phase = Phase::Preparing("reading the scene");
 
@@ -385,6 +407,7 @@ struct Context<'a> {
     start: Instant,
     cancel: &'a CancelToken,
     signals: &'a Signals,
+    denoiser: Option<&'a Denoiser>,
 }
 
 /// Renders and saves one picture, the only one or one of several frames.
@@ -395,7 +418,7 @@ fn picture(
     frame: Option<(Frame, &mut Held)>,
     first: &mut First,
 ) -> Result<(), Failure> {
-    let Context { arguments, stage, start, cancel, signals } = context;
+    let Context { arguments, stage, start, cancel, signals, denoiser } = context;
     signals.enter(Phase::Preparing("building the scene"));
     let is_first = frame.as_ref().is_none_or(|(frame, _)| frame.is_first);
     let number = frame.as_ref().map(|(frame, _)| frame.number);
@@ -436,6 +459,15 @@ fn picture(
     }
     let mut options = options(arguments, &scene)?;
     options.transparent = behind.is_transparent();
+    let is_model = staged.framed && staged.light != StageLight::Own && is_of_light;
+    let samples_are_asked = arguments.spp.is_some() || arguments.time.is_some() || arguments.noise.is_some();
+    let is_plain = is_model && !samples_are_asked && scene.resolved().sampler().spp.is_none();
+    // A model by itself is clean soon; who asks for samples has these and nothing else.
+    let denoiser = denoiser.or((is_plain && arguments.denoise.is_none()).then_some(&Denoiser::Own));
+    if is_plain && denoiser.is_some() {
+        options.stop.spp = MODEL_SPP;
+    }
+    options.guides = denoiser.is_some();
     let held = diagnostics.memory_held().saturating_add(scene.resolved().accel().memory_bytes() as u64);
     check_film(arguments, &options, held)?;
     arguments.view.check_camera(&scene, options.camera)?;
@@ -486,10 +518,18 @@ fn picture(
         options.stop.time = Some(left.max(LEAST_TIME));
     }
     signals.enter(Phase::Rendering);
-    let picture = scene.render_with(&options, &progress, cancel)?;
+    let mut picture = scene.render_with(&options, &progress, cancel)?;
     let render_time = render_start.elapsed();
     progress.display.finish();
     check_whole(arguments, &picture, &output, signals.received())?;
+    let denoised = match denoiser {
+        // What is coarser than its pixels says nothing of noise.
+        Some(denoiser) if picture.stats().stride == Some(1) => {
+            signals.enter(Phase::Saving);
+            Some((denoiser.name(), denoiser.apply(&mut picture, options.threads)?))
+        }
+        _ => None,
+    };
 
     let replaced: Vec<Replaced<'_>> =
         std::iter::once(&output).chain(&arguments.stats).map(|path| Replaced::by(path)).collect();
@@ -524,6 +564,7 @@ fn picture(
             "load": load_time.as_secs_f64(),
             "build": scene.build_time().as_secs_f64(),
             "render": render_time.as_secs_f64(),
+            "denoise": denoised.map(|(_, time)| time.as_secs_f64()),
             "save": save_time.as_secs_f64(),
         });
         let report = statistics(&scene, &picture, seconds, diagnostics.lines());
@@ -535,7 +576,7 @@ fn picture(
     if !arguments.quiet {
         replaced.iter().for_each(Replaced::say);
         let name = if is_piped { "standard output".into() } else { output.display().to_string() };
-        summary(arguments.verbose, &scene, &picture, &name, render_time);
+        summary(arguments.verbose, &scene, &picture, &name, render_time, denoised);
     }
     Ok(())
 }
@@ -568,7 +609,7 @@ fn check_film(arguments: &Arguments, options: &RenderOptions, held: u64) -> Resu
     // The picture, one over its background, and what encoders make of it; each layer as numbers and as their encoding.
     const SAVED: u64 = 100;
     const LAYERS: u64 = 170;
-    let each = if options.features { SAVED + LAYERS } else { SAVED };
+    let each = if options.features || options.guides { SAVED + LAYERS } else { SAVED };
     let pixels = options.bounds().map_err(lumbre::Error::from)?.area();
     let rendered = options.memory_bytes().map_err(lumbre::Error::from)?;
     let what = format!("a picture of {} by {} pixels", options.width, options.height);
@@ -737,7 +778,16 @@ fn peak_memory() -> Option<u64> {
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kib| kib * 1024)
 }
 
-fn summary(verbose: bool, scene: &Scene, picture: &Picture, output: &str, render_time: Duration) {
+fn summary(
+    verbose: bool,
+    scene: &Scene,
+    picture: &Picture,
+    output: &str,
+    render_time: Duration,
+    denoised: Option<(&str, Duration)>,
+) {
+    let denoised =
+        denoised.map_or_else(String::new, |(name, time)| format!(", denoised in {} ({name})", spoken(time)));
     let stats = picture.stats();
     let image = picture.image();
     let samples = if stats.spp > 0 {
@@ -745,7 +795,7 @@ fn summary(verbose: bool, scene: &Scene, picture: &Picture, output: &str, render
     } else {
         format!("a coarse picture of {}", counted(stats.samples, "sample"))
     };
-    say!("{output}: {}x{}, {samples}, {}", image.width(), image.height(), spoken(render_time));
+    say!("{output}: {}x{}, {samples}, {}{denoised}", image.width(), image.height(), spoken(render_time));
     if verbose {
         let rays = stats.rays;
         let total = rays.camera + rays.bounce + rays.shadow;

@@ -58,6 +58,7 @@ const OPTIONS: &[(&str, &[&str])] = &[
     ("--crop", &["--cropwindow", "--crop-window", "--region", "--pixelbounds", "--border", "--roi"]),
     ("--time", &["--timeout", "--time-limit", "--max-time"]),
     ("--noise", &["--noise-level", "--noise-threshold", "--adaptive", "--adaptive-threshold", "--variance"]),
+    ("--denoise", &["--denoiser", "--denoising", "--denoise-image", "--despeckle", "--smooth"]),
     ("--tonemap", &["--tone-mapping", "--tone-mapper", "--tonemapper", "--view-transform"]),
     ("--exposure", &["--ev", "--exposure-compensation", "--brightness"]),
     ("--env", &["--environment", "--envmap", "--environment-map", "--hdri", "--ibl", "--skybox", "--world"]),
@@ -80,9 +81,10 @@ const OPTIONS: &[(&str, &[&str])] = &[
 
 /// What cannot be asked for by an option, and what helps instead.
 const HINTS: &[(&[&str], &str)] = &[
+    (&["--oidn", "--openimagedenoise"], "the option for it is --denoise oidn"),
     (
-        &["--denoise", "--denoiser", "--oidn", "--optix"],
-        "there is no denoiser; --noise R renders until less noise is left",
+        &["--optix"],
+        "the denoisers are --denoise (Lumbre's own filter) and --denoise oidn (Open Image Denoise)",
     ),
     (&["--gpu", "--device", "--cuda"], "pictures are rendered on the processor's cores (--threads N)"),
     (&["--interactive", "--gui", "--display"], "pictures are written to files (-o OUT)"),
@@ -234,6 +236,7 @@ mod tests {
             ("render", "--resolution", meaning("--size")),
             ("render", "--camera-position", meaning("--eye")),
             ("render", "-j", meaning("--threads")),
+            ("render", "--denoiser", meaning("--denoise")),
             ("cast", "--input", meaning("--rays")),
             ("diff", "--threshold", meaning("--fail-above")),
             ("render", "--sizes", spelling("--size")),
@@ -244,7 +247,7 @@ mod tests {
         ] {
             assert_eq!(tip(command, wrong), expected, "{command} {wrong}");
         }
-        assert!(matches!(tip("render", "--denoise"), Some(Tip::Hint(hint)) if hint.contains("--noise")));
+        assert!(matches!(tip("render", "--oidn"), Some(Tip::Hint(hint)) if hint.contains("--denoise oidn")));
     }
 
     #[test]

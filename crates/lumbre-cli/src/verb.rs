@@ -6,6 +6,8 @@ use std::path::Path;
 use clap::Command;
 use lumbre::formats::SceneFormat;
 
+use crate::denoiser::Choice;
+
 /// The arguments with `render` in front where they name no command but a scene.
 pub(crate) fn with_render(mut arguments: Vec<OsString>, program: &Command) -> Vec<OsString> {
     let names_command = |argument: &OsString| {
@@ -24,6 +26,15 @@ pub(crate) fn with_render(mut arguments: Vec<OsString>, program: &Command) -> Ve
     if renders {
         arguments.insert(1, "render".into());
     }
+    if arguments.get(1).is_some_and(|verb| verb == "render") {
+        for i in 3..arguments.len() {
+            let is_name = Choice::NAMES.iter().any(|name| arguments[i] == *name);
+            if arguments[i - 1] == "--denoise" && !is_name && is_scene(&arguments[i]) {
+                // Without a value of its own, it does not take the scene for one.
+                arguments[i - 1] = "--denoise=auto".into();
+            }
+        }
+    }
     arguments
 }
 
@@ -35,6 +46,23 @@ fn is_scene(argument: &OsString) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn denoise_without_a_value_does_not_take_the_scene_for_one() {
+        let program = Command::new("lumbre").subcommand(Command::new("render"));
+        for (arguments, expected) in [
+            (&["render", "--denoise", "a.obj"][..], &["render", "--denoise=auto", "a.obj"][..]),
+            (&["--denoise", "a.obj"], &["render", "--denoise=auto", "a.obj"]),
+            (&["render", "--denoise", "oidn", "a.obj"], &["render", "--denoise", "oidn", "a.obj"]),
+            (&["render", "--denoise", "odin", "a.obj"], &["render", "--denoise", "odin", "a.obj"]),
+            (&["a.obj", "--denoise"], &["render", "a.obj", "--denoise"]),
+        ] {
+            let all = |words: &[&str]| -> Vec<OsString> {
+                std::iter::once("lumbre").chain(words.iter().copied()).map(Into::into).collect()
+            };
+            assert_eq!(with_render(all(arguments), &program), all(expected));
+        }
+    }
 
     #[test]
     fn a_scene_without_a_verb_is_rendered_and_a_wrong_verb_is_not() {

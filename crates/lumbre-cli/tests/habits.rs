@@ -245,7 +245,7 @@ fn wrong_words_are_answered_with_the_right_ones() {
         (&["render", "a.obj", "--output-file", "x"], "'--output'"),
         (&["render", "a.obj", "--resolution", "4"], "'--size'"),
         (&["render", "a.obj", "--camera-position", "4"], "'--eye'"),
-        (&["a.obj", "--denoise"], "--noise R"),
+        (&["a.obj", "--oidn"], "--denoise oidn"),
         (&["a.obj", "--integrator", "normal"], "'normals'"),
         (&["a.obj", "--tonemap", "natural"], "[possible values: none, agx, aces, neutral]"),
         (&["a.obj", "--background", "wite"], "did you mean white?"),

@@ -3,6 +3,7 @@
 mod broken_inputs;
 mod cast_streams;
 mod cast_vectors;
+mod denoising;
 mod files;
 mod habits;
 mod limits;

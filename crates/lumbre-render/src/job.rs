@@ -7,7 +7,7 @@ use lumbre_scene::{Scene, View};
 
 use crate::clock::Clock;
 use crate::film::{Extras, FeatureSample, Filter, Sample, Tile};
-use crate::rendered::{coverage_picture, feature_picture, noise, picture};
+use crate::rendered::{coverage_picture, feature_picture, guides, noise, picture};
 use crate::transport::{Feature, Features, Integrator, RayCounts, Sampler, Sight, integrator, see};
 use crate::workers::Workers;
 use crate::{CancelToken, DroppedSample, Progress, RenderError, RenderOptions, Rendered, Snapshot, Stats};
@@ -77,7 +77,11 @@ pub fn render_with(
         clock: Clock::new(start, bounds.area(), options.stop, progress),
     };
     let catches_shadows = scene.ground().is_some_and(|ground| ground.catcher);
-    let extras = Extras { features: options.features, tints: options.transparent && catches_shadows };
+    let extras = Extras {
+        features: options.features || options.guides,
+        tints: options.transparent && catches_shadows,
+        guides: options.guides,
+    };
     let mut owners: Vec<Owner> =
         bounds.tiles(TILE).into_iter().map(|tile| Owner::new(Tile::new(tile, extras))).collect();
 
@@ -145,12 +149,13 @@ pub fn render_with(
     first_dropped.sort_unstable_by_key(|d| (d.sample, d.y, d.x));
     first_dropped.truncate(REMEMBERED);
     let wanted: &[Feature] =
-        if options.features { &[Feature::Albedo, Feature::Normal, Feature::Depth, Feature::Uv] } else { &[] };
+        if extras.features { &[Feature::Albedo, Feature::Normal, Feature::Depth, Feature::Uv] } else { &[] };
     Ok(Rendered {
         image: picture(tiles(), bounds, options.transparent),
         coverage: coverage_picture(tiles(), bounds),
         bounds,
         features: wanted.iter().map(|&f| (f, feature_picture(tiles(), bounds, f))).collect(),
+        guides: options.guides.then(|| guides(tiles(), bounds)),
         stats: Stats {
             spp: done,
             stride,
@@ -271,13 +276,21 @@ impl Job<'_> {
         let part = if self.moves { draw.time() } else { 0.0 };
         let ray = self.view.ray(film, draw.lens(), self.view.time(part), self.spacing);
         let sight = Sight::new(self.scene, ray, &mut owner.rays);
-        let features =
-            if self.options.features { Features::of(&self.view, &sight).map(feature_sample) } else { None };
+        let features = if self.options.features || self.options.guides {
+            Features::of(&self.view, &sight).map(feature_sample)
+        } else {
+            None
+        };
         let lights_are_seen = !self.options.transparent;
         let seen =
             see(self.integrator, self.scene, &self.view, sight, &draw, lights_are_seen, &mut owner.rays);
-        let sample =
-            Sample { radiance: seen.radiance, coverage: seen.coverage, weight: place.weight, features };
+        let sample = Sample {
+            radiance: seen.radiance,
+            coverage: seen.coverage,
+            weight: place.weight,
+            features,
+            on_catcher: seen.on_catcher,
+        };
         if !owner.tile.add(x, y, &sample, &self.options.exposure) {
             owner.dropped += 1;
             if owner.first_dropped.len() < REMEMBERED {

@@ -5,6 +5,7 @@
 
 mod cancel;
 mod clock;
+mod denoise;
 mod error;
 pub mod film;
 mod job;
@@ -15,6 +16,7 @@ pub mod transport;
 mod workers;
 
 pub use cancel::CancelToken;
+pub use denoise::{Denoised, denoise};
 pub use error::RenderError;
 pub use job::{render, render_with};
 pub use options::{RenderOptions, Stop};

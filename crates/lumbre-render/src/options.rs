@@ -7,7 +7,8 @@ use lumbre_math::DVec2;
 use lumbre_scene::{FilmDesc, FilterDesc, IntegratorDesc, SamplerDesc, Scene};
 
 use crate::RenderError;
-use crate::film::{Exposure, FeatureSums, Filter, FilterShape, Pixel, PixelBounds, Tint};
+use crate::denoise::BYTES_A_PIXEL;
+use crate::film::{Exposure, FeatureSums, Filter, FilterShape, GuideSums, Pixel, PixelBounds, Tint};
 
 /// Everything about a picture that is not in the scene.
 ///
@@ -39,6 +40,8 @@ pub struct RenderOptions {
     pub stop: Stop,
     /// Whether to gather albedo, normals, depth and uv too.
     pub features: bool,
+    /// Whether to gather what [`crate::denoise`] wants to know, with the features. The picture is the same.
+    pub guides: bool,
     /// Threads; 0 for one a core.
     pub threads: usize,
 }
@@ -87,6 +90,7 @@ impl Default for RenderOptions {
             transparent: false,
             stop: Stop::at(DEFAULT_SPP),
             features: false,
+            guides: false,
             threads: 0,
         }
     }
@@ -165,7 +169,11 @@ impl RenderOptions {
             // Coverage by colour, and the alpha and the coverage of the picture.
             each += size_of::<Tint>() + size_of::<f32>() + size_of::<Rgb>();
         }
-        if self.features {
+        if self.guides {
+            // In the film, in the picture, and taken apart for the filter.
+            each += 2 * size_of::<GuideSums>() + BYTES_A_PIXEL;
+        }
+        if self.features || self.guides {
             each += size_of::<FeatureSums>() + 4 * size_of::<Rgb>();
         }
         Ok(self.bounds()?.area().saturating_mul(each as u64))

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::film::{FeatureSums, Pixel, PixelBounds, Tile};
+use crate::film::{FeatureSums, GuideSums, Pixel, PixelBounds, Tile};
 use crate::transport::{Feature, RayCounts};
 use lumbre_image::{Image, Rgb};
 
@@ -20,6 +20,8 @@ pub struct Rendered {
     pub bounds: PixelBounds,
     /// Feature images, if they were asked for: albedo, normal (with signs), depth, uv (in red and green).
     pub features: Vec<(Feature, Image)>,
+    /// What a denoiser wants to know of every pixel, row by row, if it was asked for.
+    pub guides: Option<Vec<GuideSums>>,
     /// What it took.
     pub stats: Stats,
 }
@@ -113,6 +115,11 @@ pub(crate) fn feature_picture<'t>(
         }
     };
     image_of(bounds, put_together(tiles, bounds, Rgb::BLACK, |tile| tile.features().iter().map(colour)))
+}
+
+/// What a denoiser wants to know of every pixel.
+pub(crate) fn guides<'t>(tiles: impl Iterator<Item = &'t Tile>, bounds: PixelBounds) -> Vec<GuideSums> {
+    put_together(tiles, bounds, GuideSums::default(), |tile| tile.guides().iter().copied())
 }
 
 /// The values of all pixels, row by row, from those of tiles; `none` where there is no tile.

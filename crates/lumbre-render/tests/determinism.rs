@@ -13,7 +13,7 @@ use lumbre_math::{DVec3, Transform, Vec2, Vec3};
 use lumbre_render::transport::{Draw, Path, Sight};
 use lumbre_render::{
     CancelToken, Feature, Integrator, NoProgress, PixelBounds, Progress, RayCounts, RenderError,
-    RenderOptions, Snapshot, State, render, render_with,
+    RenderOptions, Snapshot, State, denoise, render, render_with,
 };
 use lumbre_scene::{
     FilterDesc, GeometryDesc, InstanceDesc, LightDesc, ObjectDesc, ObjectId, SamplerKind, Scene, SceneDesc,
@@ -106,6 +106,10 @@ fn any_number_of_threads_gives_the_same_bytes() {
         assert_eq!(one.stats.rays, many.stats.rays, "{threads} threads");
     }
     assert_eq!(bytes(&one.image), bytes(&with(2, false).image), "features change nothing");
+    let guided = picture(&scene, &changed(options(&scene, 75, 50, 7), |it| it.guides = true));
+    assert_eq!(bytes(&one.image), bytes(&guided.image), "guides change nothing");
+    let denoised = [1, 4].map(|threads| bytes(&denoise(&guided, threads).unwrap().image));
+    assert_eq!(denoised[0], denoised[1]);
 }
 
 #[test]

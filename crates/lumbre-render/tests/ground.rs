@@ -8,6 +8,7 @@ use crate::common::{add, add_material, changed, diffuse, empty, exact, options, 
 use lumbre_geometry::{Disk, Sphere};
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{DAffine3, DMat3, DVec3, Transform};
+use lumbre_render::denoise;
 use lumbre_scene::{
     Camera, CameraKind, EnvironmentDesc, GeometryDesc, GroundDesc, LightDesc, Scene, SceneDesc, WithoutLight,
 };
@@ -72,6 +73,24 @@ fn a_shadow_under_an_even_sky_is_the_view_factor_of_what_hides_it() {
     let (colour, alpha) = look(hovering(vec![sky(Rgb::new(2.0, 3.0, 4.0))], true), true);
     assert_eq!(colour, Rgb::BLACK);
     assert!((f64::from(alpha) / hidden() - 1.0).abs() < 0.01, "{alpha} {}", hidden());
+}
+
+#[test]
+fn a_shadow_without_noise_is_the_same_shadow() {
+    let scene = Scene::build(hovering(vec![sky(Rgb::new(2.0, 3.0, 4.0))], true)).unwrap();
+    let noisy = changed(options(&scene, 24, 20, 8), |it| it.transparent = true);
+    let rendered = picture(&scene, &changed(noisy.clone(), |it| it.guides = true));
+    assert_eq!(rendered.image, picture(&scene, &noisy).image, "guides change nothing");
+    let denoised = denoise(&rendered, 1).unwrap();
+    // The whole picture has one shadow.
+    let spread = |image: &Image| {
+        let alpha = image.alpha().unwrap();
+        let errors = alpha.iter().map(|&a| (f64::from(a) - hidden()).powi(2));
+        errors.sum::<f64>() / alpha.len() as f64
+    };
+    let (before, after) = (spread(&rendered.image), spread(&denoised.image));
+    assert!(after * 10.0 < before, "{before} -> {after}");
+    assert!(denoised.image.pixels().iter().all(|&c| c == Rgb::BLACK));
 }
 
 #[test]

@@ -52,8 +52,8 @@ pub use lumbre_formats::ReadOptions;
 pub use lumbre_geometry::Ray;
 pub use lumbre_math::{DVec2, DVec3, Transform};
 pub use lumbre_render::{
-    CancelToken, Feature, NoProgress, PixelBounds, Progress, RayCounts, RenderError, RenderOptions, Snapshot,
-    State, Stats, Stop,
+    CancelToken, Denoised, Feature, NoProgress, PixelBounds, Progress, RayCounts, RenderError, RenderOptions,
+    Snapshot, State, Stats, Stop,
 };
 pub use lumbre_scene::{
     EnvironmentDesc, Ground, SceneDesc, Stage, StageLight, Staged, Surroundings, UpAxis, Viewpoint,

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use lumbre_formats::image::{ImageFormat, encode_image, encode_layers, write_image, write_layers};
 use lumbre_image::{Image, Layer, Layers, ToneMap};
-use lumbre_render::{Feature, PixelBounds, Rendered, Stats};
+use lumbre_render::{Denoised, Feature, PixelBounds, Rendered, Stats, denoise};
 
 use crate::{Background, Error, SaveOptions};
 
@@ -15,6 +15,16 @@ pub struct Picture {
     pub(crate) rendered: Rendered,
     pub(crate) whole: (u32, u32),
     pub(crate) background: Option<Background>,
+    pub(crate) noisy: Option<Noisy>,
+}
+
+/// What a picture was before it was denoised.
+#[derive(Clone, Debug)]
+pub(crate) struct Noisy {
+    image: Image,
+    coverage: Option<Image>,
+    /// What it was denoised by.
+    denoiser: &'static str,
 }
 
 impl Picture {
@@ -29,6 +39,40 @@ impl Picture {
     #[must_use]
     pub fn over(self, background: Background) -> Self {
         Self { background: Some(background), ..self }
+    }
+
+    /// Takes the noise out of the picture by Lumbre's own filter ([`lumbre_render::denoise`()]) on so many threads, 0 for one a core; the
+    /// same for any number. It keeps the noisy picture, which an .exr shows in channels of its own: `noisy.R` and so on.
+    ///
+    /// # Errors
+    /// [`Error::Options`] where [`crate::RenderOptions::guides`] were not asked for, and where not every pixel has a sample.
+    pub fn denoise(&mut self, threads: usize) -> Result<(), Error> {
+        let denoised = denoise(&self.rendered, threads).ok_or_else(|| {
+            Error::Options("a picture is denoised that has guides, and a sample in every pixel".to_owned())
+        })?;
+        self.set_denoised(denoised, "Lumbre")
+    }
+
+    /// Takes what a denoiser of this name made of [`Picture::image`] and [`Picture::coverage`] for the picture, and keeps the noisy one as
+    /// [`Picture::denoise`] does.
+    ///
+    /// # Errors
+    /// [`Error::Options`] where it is of another size, or has alpha and the picture none, or the other way round.
+    pub fn set_denoised(&mut self, denoised: Denoised, denoiser: &'static str) -> Result<(), Error> {
+        let kind = |image: &Image| (image.width(), image.height(), image.alpha().is_some());
+        let same_coverage = denoised.coverage.is_some() == self.rendered.coverage.is_some();
+        if kind(&denoised.image) != kind(&self.rendered.image) || !same_coverage {
+            return Err(Error::Options("the denoised picture is of another size or kind".to_owned()));
+        }
+        let image = std::mem::replace(&mut self.rendered.image, denoised.image);
+        let coverage = std::mem::replace(&mut self.rendered.coverage, denoised.coverage);
+        self.noisy.get_or_insert(Noisy { image, coverage, denoiser }).denoiser = denoiser;
+        Ok(())
+    }
+
+    /// Coverage by colour, where a transparent picture has coloured shadows on its ground.
+    pub fn coverage(&self) -> Option<&Image> {
+        self.rendered.coverage.as_ref()
     }
 
     /// An AOV, if it was rendered.
@@ -65,7 +109,7 @@ impl Picture {
             return Err(Error::Options(format!("{}: only .exr files hold feature layers", path.display())));
         }
         let (image, options) = self.shown(ImageFormat::from_path(path), options);
-        if layers.is_empty() {
+        if layers.is_empty() && !self.keeps_noisy(ImageFormat::from_path(path)) {
             return Ok(write_image(path, &image, &options)?);
         }
         Ok(write_layers(path, &self.layers(&image, layers)?, &options)?)
@@ -85,7 +129,7 @@ impl Picture {
             return Err(Error::Options(format!("{} does not hold feature layers", format.name())));
         }
         let (image, options) = self.shown(Some(format), options);
-        let encoded = if layers.is_empty() {
+        let encoded = if layers.is_empty() && !self.keeps_noisy(Some(format)) {
             encode_image(&image, format, &options)
         } else {
             encode_layers(&self.layers(&image, layers)?, &options)
@@ -100,6 +144,7 @@ impl Picture {
         let mut options = *options;
         options.exr_window = part.then_some((x0 as i32, y0 as i32, self.whole.0, self.whole.1));
         let is_for_displays = matches!(format, Some(ImageFormat::Png | ImageFormat::Jpeg));
+        options.denoiser = self.noisy.as_ref().map(|noisy| noisy.denoiser);
         let coverage = self.rendered.coverage.as_ref();
         let Some(background) = &self.background else { return (Cow::Borrowed(self.image()), options) };
         let image = if is_for_displays {
@@ -112,8 +157,21 @@ impl Picture {
         (Cow::Owned(image), options)
     }
 
+    /// Whether a file of this format has the noisy picture too.
+    fn keeps_noisy(&self, format: Option<ImageFormat>) -> bool {
+        self.noisy.is_some() && format == Some(ImageFormat::Exr)
+    }
+
     fn layers(&self, image: &Image, features: &[Feature]) -> Result<Layers, Error> {
         let mut all = Layers::from_image(image);
+        if let Some(Noisy { image, coverage, .. }) = &self.noisy {
+            let behind = |background: &Background| {
+                Cow::Owned(background.under_light(image, coverage.as_ref(), self.bounds(), self.whole))
+            };
+            let shown = self.background.as_ref().map_or(Cow::Borrowed(image), behind);
+            all.push_image("noisy", &shown)
+                .map_err(|layer| Error::Options(format!("layer {} stands twice", layer.name)))?;
+        }
         for feature in features {
             let image = self
                 .feature(*feature)

@@ -207,7 +207,7 @@ impl Scene {
         cancel: &CancelToken,
     ) -> Result<Picture, Error> {
         let rendered = render(&self.resolved, options, progress, cancel)?;
-        Ok(Picture { rendered, whole: (options.width, options.height), background: None })
+        Ok(Picture { rendered, whole: (options.width, options.height), background: None, noisy: None })
     }
 
     /// The pixel value of white, well-lit surfaces, as an exposure meter would measure it: the luminance over

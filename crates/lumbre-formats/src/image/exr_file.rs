@@ -5,7 +5,7 @@ use std::io::Cursor;
 use std::sync::Arc;
 
 use exr::meta::MetaData;
-use exr::meta::attribute::{Chromaticities, IntegerBounds, SampleType, Text};
+use exr::meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, SampleType, Text};
 use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding as ExrEncoding, FlatSamples, Image as ExrImage, Layer as ExrLayer,
@@ -278,11 +278,14 @@ pub(super) fn encode(layers: &Layers, options: &WriteOptions) -> std::io::Result
             ExrEncoding { compression: exr::prelude::Compression::PIZ, ..ExrEncoding::SMALL_LOSSLESS }
         }
     };
-    let attributes = LayerAttributes {
+    let mut attributes = LayerAttributes {
         software_name: Text::new_or_none(origin::SOFTWARE),
         layer_position: Vec2(data.x, data.y),
         ..LayerAttributes::default()
     };
+    if let Some(denoiser) = options.denoiser {
+        attributes.other.insert(Text::from("denoiser"), AttributeValue::Text(Text::from(denoiser)));
+    }
     let layer = ExrLayer::new(size, attributes, encoding, AnyChannels::sort(channels));
     let display_size = Vec2(display.width as usize, display.height as usize);
     let mut picture_attributes =

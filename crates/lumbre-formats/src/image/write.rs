@@ -30,10 +30,12 @@ pub struct WriteOptions {
     /// If the image is a crop of a larger one: the position of its top left pixel (x, y) and the larger one's
     /// width and height. Written to EXR as data and display window; other formats have only the crop.
     pub exr_window: Option<(i32, i32, u32, u32)>,
+    /// The denoiser that the image went through, for the metadata of EXR (attribute `denoiser`) and PNG (text `Denoiser`).
+    pub denoiser: Option<&'static str>,
 }
 
 impl Default for WriteOptions {
-    /// No tone mapping, no exposure, 8 bits, quality 95, half precision, ZIP, not a crop.
+    /// No tone mapping, no exposure, 8 bits, quality 95, half precision, ZIP, not a crop, not denoised.
     fn default() -> Self {
         Self {
             tone_map: ToneMap::None,
@@ -43,6 +45,7 @@ impl Default for WriteOptions {
             exr_precision: ExrPrecision::Half,
             exr_compression: ExrCompression::Zip,
             exr_window: None,
+            denoiser: None,
         }
     }
 }
@@ -172,6 +175,9 @@ fn encode_png(image: &Image, options: &WriteOptions) -> io::Result<Vec<u8>> {
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
     let software = origin::SOFTWARE.to_owned();
     encoder.add_text_chunk("Software".to_owned(), software).map_err(io::Error::other)?;
+    if let Some(denoiser) = options.denoiser {
+        encoder.add_text_chunk("Denoiser".to_owned(), denoiser.to_owned()).map_err(io::Error::other)?;
+    }
     let numbers = shown(image, options)
         .flat_map(|([r, g, b], a)| [Some(r), Some(g), Some(b), has_alpha.then_some(a)])
         .flatten();

@@ -6,10 +6,12 @@
 
 mod bounds;
 mod filter;
+mod guide;
 mod pixel;
 mod tile;
 
 pub use bounds::PixelBounds;
 pub use filter::{Filter, FilterSample, FilterShape};
+pub use guide::{Count, FEATURES, GuideSums, RatioSums};
 pub use pixel::{FeatureSample, FeatureSums, Pixel, Tint};
 pub use tile::{Exposure, Extras, Sample, Tile};

@@ -2,7 +2,7 @@
 
 use lumbre_image::Rgb;
 
-use crate::film::{FeatureSample, FeatureSums, Pixel, PixelBounds, Tint};
+use crate::film::{FeatureSample, FeatureSums, GuideSums, Pixel, PixelBounds, Tint};
 
 /// How radiance becomes the colour of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +39,8 @@ pub struct Sample {
     pub weight: f64,
     /// What it met first, if features are wanted and it met anything.
     pub features: Option<FeatureSample>,
+    /// Whether it is of ground that catches shadows.
+    pub on_catcher: bool,
 }
 
 /// The pixels of a rectangle.
@@ -50,6 +52,8 @@ pub struct Tile {
     features: Vec<FeatureSums>,
     // Empty unless coverage is wanted by colour; else as many as pixels.
     tints: Vec<Tint>,
+    // Empty unless guides are wanted; else as many as pixels.
+    guides: Vec<GuideSums>,
 }
 
 /// What is wanted of samples besides the colour of pixels and their coverage.
@@ -59,6 +63,8 @@ pub struct Extras {
     pub features: bool,
     /// By how much the coverage of each colour is another.
     pub tints: bool,
+    /// What a denoiser wants to know.
+    pub guides: bool,
 }
 
 impl Tile {
@@ -70,6 +76,7 @@ impl Tile {
             pixels: vec![Pixel::default(); count],
             features: vec![FeatureSums::default(); if extras.features { count } else { 0 }],
             tints: vec![Tint::default(); if extras.tints { count } else { 0 }],
+            guides: vec![GuideSums::default(); if extras.guides { count } else { 0 }],
         }
     }
 
@@ -86,6 +93,11 @@ impl Tile {
     /// The features of every pixel, row by row; empty where they are not wanted.
     pub fn features(&self) -> &[FeatureSums] {
         &self.features
+    }
+
+    /// What a denoiser wants to know of every pixel, row by row; empty where it is not wanted.
+    pub fn guides(&self) -> &[GuideSums] {
+        &self.guides
     }
 
     /// The coverage of every pixel by colour, row by row; where that is not wanted, of all colours alike.
@@ -118,6 +130,23 @@ impl Tile {
         if let Some(sums) = self.features.get_mut(position) {
             sums.add(sample.features.as_ref(), sample.weight);
         }
+        let catches_shadows = !self.tints.is_empty();
+        if let Some(guide) = self.guides.get_mut(position) {
+            let is_shadow = sample.on_catcher && catches_shadows;
+            let reflectance = match &sample.features {
+                _ if is_shadow => Rgb::BLACK,
+                Some(features) if !sample.on_catcher => features.albedo,
+                // Light from far away stands for itself.
+                _ => sample.coverage,
+            };
+            let weighted = |colour: Rgb| (colour * sample.weight as f32).to_array();
+            let is_odd = guide.count.samples % 2 == 1;
+            guide.light.add(weighted(colour), weighted(reflectance), is_odd);
+            let (shadow, ground) =
+                if is_shadow { (sample.coverage, Rgb::WHITE) } else { (Rgb::BLACK, Rgb::BLACK) };
+            guide.shadow.add(weighted(shadow), weighted(ground), is_odd);
+            guide.add_features(sample.features.as_ref(), sample.weight as f32);
+        }
         true
     }
 
@@ -129,6 +158,7 @@ impl Tile {
             pixels: self.pixels.first().copied().into_iter().collect(),
             features: self.features.first().copied().into_iter().collect(),
             tints: self.tints.first().copied().into_iter().collect(),
+            guides: self.guides.first().copied().into_iter().collect(),
         }
     }
 
@@ -143,6 +173,7 @@ impl Tile {
         copy(&mut self.pixels, &other.pixels);
         copy(&mut self.features, &other.features);
         copy(&mut self.tints, &other.tints);
+        copy(&mut self.guides, &other.guides);
     }
 
     /// Gives every pixel that has no sample the sums of the first pixel of its square of `side` by `side` pixels, counted from
@@ -163,6 +194,9 @@ impl Tile {
             if let Some(&sums) = self.features.get(from) {
                 self.features[at] = sums;
             }
+            if let Some(&guide) = self.guides.get(from) {
+                self.guides[at] = guide;
+            }
         }
     }
 }
@@ -173,10 +207,10 @@ mod tests {
 
     #[test]
     fn a_sample_goes_to_its_own_pixel_and_one_that_is_not_finite_to_none() {
-        let extras = Extras { features: true, tints: true };
+        let extras = Extras { features: true, tints: true, guides: false };
         let mut tile = Tile::new(PixelBounds { x0: 5, y0: 7, x1: 9, y1: 10 }, extras);
         let coverage = Rgb::splat(0.25);
-        let sample = |radiance| Sample { radiance, coverage, weight: 1.0, features: None };
+        let sample = |radiance| Sample { radiance, coverage, weight: 1.0, features: None, on_catcher: false };
         let exposure = Exposure { factor: 2.0, max_component: 6.0 };
         assert!(tile.add(6, 9, &sample(Rgb::new(1.0, 2.0, 3.0)), &exposure));
         assert!(!tile.add(9, 9, &sample(Rgb::WHITE), &exposure));
@@ -195,8 +229,13 @@ mod tests {
     #[test]
     fn a_sample_spreads_over_the_pixels_of_its_square_that_have_none() {
         let mut tile = Tile::new(PixelBounds { x0: 5, y0: 7, x1: 10, y1: 10 }, Extras::default());
-        let sample =
-            |value| Sample { radiance: Rgb::splat(value), coverage: Rgb::WHITE, weight: 1.0, features: None };
+        let sample = |value| Sample {
+            radiance: Rgb::splat(value),
+            coverage: Rgb::WHITE,
+            weight: 1.0,
+            features: None,
+            on_catcher: false,
+        };
         for (x, y, value) in [(5, 7, 1.0), (7, 7, 2.0), (9, 7, 3.0), (5, 9, 4.0), (6, 8, 9.0)] {
             assert!(tile.add(x, y, &sample(value), &Exposure::default()));
         }
@@ -211,10 +250,11 @@ mod tests {
     fn coverage_is_kept_by_colour_where_it_is_wanted() {
         let bounds = PixelBounds { x0: 5, y0: 7, x1: 9, y1: 10 };
         let covered = [Rgb::new(0.75, 0.5, 0.125), Rgb::new(0.25, 1.0, 0.5)];
-        let mut tiles = [true, false].map(|tints| Tile::new(bounds, Extras { features: false, tints }));
+        let mut tiles = [true, false].map(|tints| Tile::new(bounds, Extras { tints, ..Extras::default() }));
         for tile in &mut tiles {
             for (coverage, weight) in covered.into_iter().zip([1.0, 3.0]) {
-                let sample = Sample { radiance: Rgb::BLACK, coverage, weight, features: None };
+                let sample =
+                    Sample { radiance: Rgb::BLACK, coverage, weight, features: None, on_catcher: false };
                 assert!(tile.add(7, 8, &sample, &Exposure::default()));
             }
         }

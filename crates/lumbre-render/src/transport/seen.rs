@@ -26,6 +26,8 @@ pub struct Seen {
     /// How much of what is behind is covered, of each colour: shadows are coloured where lights are, or what they shine through.
     /// Its mean over the samples of a pixel is in [0, 1]; that of one sample need not be.
     pub coverage: Spectrum,
+    /// Whether it is ground that catches shadows.
+    pub on_catcher: bool,
 }
 
 /// Looks along a line of sight.
@@ -53,12 +55,14 @@ pub fn see(
             let blocked = blocked(scene, ground, met, draw, rays);
             let left = Spectrum::WHITE - blocked;
             let coverage = if lights_are_seen { Spectrum::WHITE } else { blocked };
-            Seen { radiance: behind(&sight.ray.ray) * left, coverage }
+            Seen { radiance: behind(&sight.ray.ray) * left, coverage, on_catcher: true }
         }
-        (None, _) if !lights_are_seen => Seen { radiance: Spectrum::BLACK, coverage: covered },
+        (None, _) if !lights_are_seen => {
+            Seen { radiance: Spectrum::BLACK, coverage: covered, on_catcher: false }
+        }
         _ => {
             let radiance = integrator.radiance(scene, view, sight, draw, rays);
-            Seen { radiance, coverage: Spectrum::WHITE }
+            Seen { radiance, coverage: Spectrum::WHITE, on_catcher: false }
         }
     }
 }

@@ -1,0 +1,182 @@
+//! What the film keeps of pixels as planes of numbers, with variances that are less noisy than single ones.
+
+use crate::denoise::means::{Group, Layer};
+use crate::film::{FEATURES, GuideSums, RatioSums};
+
+/// Pixels around one whose variances are averaged.
+const VARIANCE_RADIUS: usize = 2;
+/// Pixels around one in which the samples of a low-discrepancy sampler are found to be better than independent ones.
+const SCALE_RADIUS: usize = 5;
+/// Pixels around one whose spread stands for the variance of a single sample.
+const SPREAD_RADIUS: usize = 2;
+
+/// A ratio of every pixel by two halves of its samples. Unless it is everywhere, pixels without any part in it say nothing.
+pub(super) fn layer(
+    guides: &[GuideSums],
+    size: (usize, usize),
+    ratio: impl Fn(&GuideSums) -> &RatioSums,
+    least: f32,
+    is_everywhere: bool,
+) -> Layer {
+    let finite = |x: f32| if x.is_finite() { x } else { 0.0 };
+    let is_sampled = |guide: &GuideSums| guide.count.samples > 0 && guide.count.weight > 0.0;
+    let half = |half: usize, c: usize| -> Vec<f32> {
+        let value = |guide: &GuideSums| finite(ratio(guide).halves(c, guide.count, least)[half]);
+        guides.iter().map(|guide| if is_sampled(guide) { value(guide) } else { 0.0 }).collect()
+    };
+    let mut halves = [0, 1].map(|h| [0, 1, 2].map(|c| half(h, c)));
+    let kept = limit_outliers(&mut halves, size);
+    let by_samples: Vec<f32> = guides
+        .iter()
+        .map(|guide| {
+            let channel = |c| ratio(guide).variance(c, guide.count, least).map_or(0.0, finite);
+            channel(0) + channel(1) + channel(2)
+        })
+        .zip(kept)
+        .map(|(variance, kept)| variance * kept * kept)
+        .collect();
+    let by_halves: Vec<f32> = (0..guides.len())
+        .map(|i| (0..3).map(|c| 0.25 * (halves[0][c][i] - halves[1][c][i]).powi(2)).sum())
+        .collect();
+    let smooth = mean_around(&by_samples, size, VARIANCE_RADIUS);
+    let (wide_samples, wide_halves) =
+        (mean_around(&by_samples, size, SCALE_RADIUS), mean_around(&by_halves, size, SCALE_RADIUS));
+    let is_single = guides.iter().all(|guide| guide.count.samples < 2);
+    let variance = if is_single {
+        spread(&halves[0], size)
+    } else {
+        (0..guides.len())
+            .map(|i| {
+                let scale = if wide_samples[i] > 0.0 { wide_halves[i] / wide_samples[i] } else { 1.0 };
+                // That of a half is twice that of the whole.
+                2.0 * smooth[i] * scale.clamp(0.1, 2.0)
+            })
+            .collect()
+    };
+    let known = [0, 1].map(|half| {
+        let is_known = |guide: &GuideSums| is_everywhere || ratio(guide).is_known(half, guide.count);
+        guides.iter().map(|guide| if is_known(guide) { 1.0 } else { 0.0 }).collect()
+    });
+    Layer { width: size.0, height: size.1, halves, variance, known }
+}
+
+/// Pixels around one in which the other half says how bright it may be.
+const OUTLIER_RADIUS: usize = 5;
+/// A pixel of one half that is brighter than so many pixels of that neighbourhood in the other half is an outlier: a fifth of its
+/// 121 pixels.
+const OUTLIER: f32 = 24.0;
+/// Unless the other half has nearly as much beside it.
+const CONFIRMED: f32 = 4.0;
+
+/// Dims pixels of one half by which means would be little else than one sample, of which the other half knows nothing. All other light
+/// is kept. Returns the factor of each pixel.
+fn limit_outliers(halves: &mut [[Vec<f32>; 3]; 2], size: (usize, usize)) -> Vec<f32> {
+    let brightness = halves
+        .each_ref()
+        .map(|[r, g, b]| -> Vec<f32> { r.iter().zip(g).zip(b).map(|((r, g), b)| r + g + b).collect() });
+    let around = brightness.each_ref().map(|values| mean_around(values, size, OUTLIER_RADIUS));
+    let (width, height) = size;
+    let mut kept = vec![1.0; width * height];
+    for (i, (x, y)) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).enumerate() {
+        for half in [0, 1] {
+            let (value, other) = (brightness[half][i], 1 - half);
+            let limit = OUTLIER * around[other][i];
+            if value <= limit {
+                continue;
+            }
+            let rows = y.saturating_sub(1)..(y + 2).min(height);
+            let beside = rows.flat_map(|y| {
+                &brightness[other][y * width + x.saturating_sub(1)..y * width + (x + 2).min(width)]
+            });
+            let limit = limit.max(CONFIRMED * beside.copied().fold(0.0, f32::max));
+            // Where all around is black, nothing is known.
+            if 0.0 < limit && limit < value {
+                halves[half].iter_mut().for_each(|channel| channel[i] *= limit / value);
+                kept[i] = limit / value;
+            }
+        }
+    }
+    kept
+}
+
+/// The variance of values among neighbours, summed over channels.
+fn spread(channels: &[Vec<f32>; 3], size: (usize, usize)) -> Vec<f32> {
+    let mut all = vec![0.0; size.0 * size.1];
+    for values in channels {
+        let squares: Vec<f32> = values.iter().map(|v| v * v).collect();
+        let (means, squares) =
+            (mean_around(values, size, SPREAD_RADIUS), mean_around(&squares, size, SPREAD_RADIUS));
+        for (sum, (mean, square)) in all.iter_mut().zip(means.iter().zip(squares)) {
+            *sum += (square - mean * mean).max(0.0);
+        }
+    }
+    all
+}
+
+/// Albedo, normals and depth, and from where on they are different.
+pub(super) fn surfaces(guides: &[GuideSums], size: (usize, usize)) -> Vec<Group> {
+    let value = |f: usize| -> Vec<f32> { guides.iter().map(|guide| guide.feature(f)).collect() };
+    let albedo = 0..3;
+    let normal = 3..6;
+    let depth = 6..FEATURES;
+    let group = |features: std::ops::Range<usize>, least: &dyn Fn(usize) -> f32| {
+        let planes: Vec<Vec<f32>> = features.clone().map(value).collect();
+        let variance: Vec<f32> =
+            guides.iter().map(|guide| features.clone().map(|f| guide.feature_variance(f)).sum()).collect();
+        let sharpness = (0..guides.len())
+            .map(|i| {
+                let slope: f32 = planes.iter().map(|plane| slope_squared(plane, size, i)).sum();
+                let scale = least(i).max(variance[i]).max(slope);
+                1.0 / (STRENGTH * STRENGTH * scale)
+            })
+            .collect();
+        Group { planes, variance, sharpness }
+    };
+    vec![
+        group(albedo, &|_| LEAST_ALBEDO),
+        group(normal, &|_| LEAST_NORMAL),
+        group(depth, &|i| (LEAST_DEPTH * guides[i].feature(6)).powi(2).max(f32::MIN_POSITIVE)),
+    ]
+}
+
+/// Differences of features are compared with this many standard deviations, or slopes.
+const STRENGTH: f32 = 1.0;
+/// The square of a difference of albedo, over three channels, that says little: textures are divided out.
+const LEAST_ALBEDO: f32 = 0.01;
+/// The square of a difference of normals.
+const LEAST_NORMAL: f32 = 0.01;
+/// A difference of depth, as a share of it.
+const LEAST_DEPTH: f32 = 0.01;
+
+/// The square of the slope at a pixel, a pixel far: to the side that is more alike, so that edges are none.
+fn slope_squared(plane: &[f32], (width, height): (usize, usize), i: usize) -> f32 {
+    let (x, y) = (i % width, i / width);
+    let to = |is_there: bool, j: usize| if is_there { (plane[j] - plane[i]).abs() } else { f32::INFINITY };
+    let across = to(x > 0, i.wrapping_sub(1)).min(to(x + 1 < width, i + 1));
+    let down = to(y > 0, i.wrapping_sub(width)).min(to(y + 1 < height, i + width));
+    let square = |d: f32| if d.is_finite() { d * d } else { 0.0 };
+    square(across) + square(down)
+}
+
+/// The mean of each pixel's square of neighbours, as far as they are in the picture.
+fn mean_around(values: &[f32], (width, height): (usize, usize), radius: usize) -> Vec<f32> {
+    let mut rows = Vec::with_capacity(values.len());
+    for row in values.chunks_exact(width.max(1)) {
+        rows.extend((0..width).map(|x| {
+            let near = &row[x.saturating_sub(radius)..(x + radius + 1).min(width)];
+            near.iter().sum::<f32>() / near.len() as f32
+        }));
+    }
+    let mut all = vec![0.0; values.len()];
+    for (y, out) in all.chunks_exact_mut(width.max(1)).enumerate() {
+        let near = y.saturating_sub(radius)..(y + radius + 1).min(height);
+        let count = near.len() as f32;
+        for row in near {
+            for (sum, value) in out.iter_mut().zip(&rows[row * width..]) {
+                *sum += value;
+            }
+        }
+        out.iter_mut().for_each(|sum| *sum /= count);
+    }
+    all
+}

@@ -1,0 +1,187 @@
+//! What a denoiser wants to know of the samples of one pixel besides their mean.
+
+use crate::film::FeatureSample;
+
+/// Sums for a ratio of two means by samples, for each of three channels: its value, its variance, and its value by every other
+/// sample alone.
+///
+/// Single precision is enough: all of it is compared with noise.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RatioSums {
+    /// Σ numerator.
+    over: [f32; 3],
+    /// Σ denominator.
+    under: [f32; 3],
+    /// Σ numerator of the odd samples.
+    odd_over: [f32; 3],
+    /// Σ denominator of the odd samples.
+    odd_under: [f32; 3],
+    /// Σ numerator².
+    over_squares: [f32; 3],
+    /// Σ numerator × denominator.
+    products: [f32; 3],
+    /// Σ denominator².
+    under_squares: [f32; 3],
+}
+
+impl RatioSums {
+    /// Adds a sample.
+    pub fn add(&mut self, over: [f32; 3], under: [f32; 3], is_odd: bool) {
+        for c in 0..3 {
+            self.over[c] += over[c];
+            self.under[c] += under[c];
+            if is_odd {
+                self.odd_over[c] += over[c];
+                self.odd_under[c] += under[c];
+            }
+            self.over_squares[c] += over[c] * over[c];
+            self.products[c] += over[c] * under[c];
+            self.under_squares[c] += under[c] * under[c];
+        }
+    }
+
+    /// The mean denominator.
+    pub fn denominator(&self, c: usize, count: Count) -> f32 {
+        self.under[c] / count.weight
+    }
+
+    /// The ratio of the means, with a mean denominator of at least `least`.
+    pub fn value(&self, c: usize, count: Count, least: f32) -> f32 {
+        self.over[c] / self.under[c].max(least * count.weight)
+    }
+
+    /// Whether the even samples (0) or the odd ones (1) have a numerator or a denominator; with a single sample, that one for both.
+    pub fn is_known(&self, half: usize, count: Count) -> bool {
+        let is_odd = half == 1 && count.samples > 1;
+        let sum = |all: f32, odd: f32| if is_odd { odd } else { all - odd };
+        (0..3).any(|c| {
+            sum(self.over[c], self.odd_over[c]) != 0.0 || sum(self.under[c], self.odd_under[c]) != 0.0
+        })
+    }
+
+    /// Whether neither numerator nor denominator is there: the pixel has no part in the ratio.
+    pub fn is_absent(&self, c: usize) -> bool {
+        self.over[c] == 0.0 && self.under[c] == 0.0
+    }
+
+    /// The ratio by the even samples and that by the odd ones; that of all where there are none of them.
+    pub fn halves(&self, c: usize, count: Count, least: f32) -> [f32; 2] {
+        let odd = count.samples / 2;
+        if odd == 0 {
+            return [self.value(c, count, least); 2];
+        }
+        let least_odd = least * count.weight * odd as f32 / count.samples as f32;
+        let least_even = least * count.weight - least_odd;
+        let even_under = (self.under[c] - self.odd_under[c]).max(least_even);
+        [(self.over[c] - self.odd_over[c]) / even_under, self.odd_over[c] / self.odd_under[c].max(least_odd)]
+    }
+
+    /// The variance of the ratio, as if samples were independent (W. Cochran, "Sampling Techniques", 1977, 6.4). `None` for fewer than
+    /// two samples.
+    pub fn variance(&self, c: usize, count: Count, least: f32) -> Option<f32> {
+        if count.samples < 2 {
+            return None;
+        }
+        let n = count.samples as f32;
+        let under = self.under[c].max(least * count.weight);
+        // Where the denominator is not that of the samples, it has no share in the variance.
+        let squares = if under > self.under[c] {
+            self.over_squares[c] - self.over[c] * self.over[c] / n
+        } else {
+            let ratio = self.over[c] / under;
+            self.over_squares[c] - 2.0 * ratio * self.products[c] + ratio * ratio * self.under_squares[c]
+        };
+        Some(squares.max(0.0) * n / (n - 1.0) / (under * under))
+    }
+}
+
+/// How many samples were added.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Count {
+    /// Their number.
+    pub samples: u32,
+    /// Σ weight.
+    pub weight: f32,
+}
+
+/// What tells one surface from another, as numbers: albedo, normal, depth.
+pub const FEATURES: usize = 7;
+
+/// Sums over the samples of one pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GuideSums {
+    /// Light over reflectance.
+    pub light: RatioSums,
+    /// How much of the ground is in shadow, over how much of the pixel is ground: where shadows are caught in a transparent picture.
+    pub shadow: RatioSums,
+    features: [f32; FEATURES],
+    feature_squares: [f32; FEATURES],
+    /// How many samples.
+    pub count: Count,
+}
+
+impl GuideSums {
+    /// Counts a sample of this weight, and adds what it met; `None` met nothing.
+    pub fn add_features(&mut self, sample: Option<&FeatureSample>, weight: f32) {
+        self.count.samples += 1;
+        self.count.weight += weight;
+        let Some(FeatureSample { albedo, normal, depth, .. }) = sample else { return };
+        let values = [albedo.r, albedo.g, albedo.b, normal[0], normal[1], normal[2], *depth];
+        for (i, value) in values.into_iter().enumerate() {
+            self.features[i] += value;
+            self.feature_squares[i] += value * value;
+        }
+    }
+
+    /// The mean of a feature.
+    pub fn feature(&self, i: usize) -> f32 {
+        self.features[i] / self.count.samples.max(1) as f32
+    }
+
+    /// The variance of that mean, as if samples were independent; 0 for fewer than two samples.
+    pub fn feature_variance(&self, i: usize) -> f32 {
+        if self.count.samples < 2 {
+            return 0.0;
+        }
+        let n = self.count.samples as f32;
+        let mean = self.features[i] / n;
+        (self.feature_squares[i] / n - mean * mean).max(0.0) / (n - 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lumbre_image::Rgb;
+
+    use super::*;
+
+    #[test]
+    fn a_ratio_has_the_variance_of_what_its_parts_do_not_share() {
+        let (count, one) = (Count { samples: 4, weight: 4.0 }, Count { samples: 1, weight: 1.0 });
+        let mut sums = RatioSums::default();
+        // The numerator is 2.5 times the denominator, plus 0.5 or less 0.5.
+        for (i, under) in [0.5_f32, 1.0, 0.25, 0.75].into_iter().enumerate() {
+            let over = 2.5 * under + if i < 2 { 0.5 } else { -0.5 };
+            sums.add([0.0, over, 0.0], [1.0, under, 1.0], i % 2 == 1);
+        }
+        assert!((sums.value(1, count, 0.01) - 2.5).abs() < 1e-6);
+        // 4 × 0.25 × 4 / 3 / 2.5²
+        let variance = sums.variance(1, count, 0.01).unwrap();
+        assert!((variance - 0.213_333).abs() < 1e-5, "{variance}");
+        let [even, odd] = sums.halves(1, count, 0.01);
+        assert!((even - 2.5).abs() < 1e-6 && (odd - 2.5).abs() < 1e-6, "{even} {odd}");
+        assert_eq!((sums.value(0, count, 0.01), sums.variance(0, count, 0.01)), (0.0, Some(0.0)));
+        assert_eq!(RatioSums::default().variance(0, one, 0.01), None);
+    }
+
+    #[test]
+    fn features_have_the_variance_of_their_mean() {
+        let mut sums = GuideSums::default();
+        for depth in [3.0, 5.0] {
+            let sample = FeatureSample { albedo: Rgb::WHITE, normal: [0.0, 1.0, 0.0], depth, uv: [0.0; 2] };
+            sums.add_features(Some(&sample), 1.0);
+        }
+        assert_eq!((sums.feature(6), sums.feature_variance(6)), (4.0, 1.0));
+        assert_eq!((sums.feature(4), sums.feature_variance(4)), (1.0, 0.0));
+    }
+}
