@@ -53,8 +53,9 @@ impl LightChoice {
         choice.share_elsewhere = match (&choice.tree, &choice.elsewhere) {
             (Some(_), Some(_)) => {
                 let elsewhere: f64 = power_elsewhere.iter().sum();
-                // Of a NaN, the least.
-                (elsewhere / (elsewhere + power)).max(LEAST_SHARE).min(1.0 - LEAST_SHARE)
+                let share = elsewhere / (elsewhere + power);
+                // Beyond all numbers, both alike.
+                if share.is_nan() { 0.5 } else { share.clamp(LEAST_SHARE, 1.0 - LEAST_SHARE) }
             }
             (None, Some(_)) => 1.0,
             (_, None) => 0.0,
