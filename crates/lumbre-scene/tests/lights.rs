@@ -1,0 +1,133 @@
+//! The choice among many lights: no light is lost or doubled, and densities are those of the samples.
+
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
+use std::sync::Arc;
+
+use lumbre_geometry::{Disk, Ray, Shape, Sphere};
+use lumbre_image::Rgb;
+use lumbre_math::random::RandomStream;
+use lumbre_math::{DVec2, DVec3, Transform, Vec3};
+use lumbre_scene::{
+    AreaLightDesc, Footprint, GeometryDesc, InstanceDesc, LightDesc, LightId, LightSample, MaterialId,
+    MeshDesc, NamedMaterial, ObjectDesc, ObjectId, Scene, SceneDesc, ShapeDesc,
+};
+use lumbre_shading::{Material, Scatter};
+
+fn shining(index: u32, geometry: GeometryDesc, radiance: f32, two_sided: bool) -> ShapeDesc {
+    let radiance = Rgb::splat(radiance);
+    let light = AreaLightDesc { radiance, image: None, by_vertices: false, two_sided, power: None };
+    ShapeDesc {
+        index,
+        geometry,
+        world_from_object: Transform::IDENTITY,
+        reverse_orientation: index.is_multiple_of(2),
+        material: Some(MaterialId(0)),
+        area_light: Some(light),
+        alpha: None,
+    }
+}
+
+fn patch_of_triangles(random: &mut RandomStream) -> GeometryDesc {
+    let mut x = || 2.0 * random.next_f32() - 1.0;
+    let at = 4.0 * Vec3::new(x(), x(), x());
+    let positions = (0..5).map(|_| at + Vec3::new(x(), x(), x())).collect();
+    let triangles = vec![[0, 1, 2], [0, 2, 3], [0, 3, 4]];
+    GeometryDesc::Mesh(Arc::new(MeshDesc { positions, triangles, ..MeshDesc::default() }))
+}
+
+/// Lights of every kind about the origin, but for the origin itself.
+fn lights_of_all_kinds() -> Scene {
+    let mut random = RandomStream::new(3);
+    let mut shapes: Vec<ShapeDesc> = (0..12)
+        .map(|i| shining(i, patch_of_triangles(&mut random), 0.5 + random.next_f32(), i % 3 == 0))
+        .collect();
+    let exact = |shape: Shape| GeometryDesc::Exact(shape);
+    let v = DVec3::new;
+    shapes.push(shining(
+        12,
+        exact(Disk::new(v(0.0, 0.0, 5.0), -DVec3::Z, 1.0, 0.0).unwrap().into()),
+        2.0,
+        false,
+    ));
+    shapes.push(shining(13, exact(Sphere::new(v(3.0, 4.0, -2.0), 0.7).unwrap().into()), 1.0, false));
+    let placed = shining(14, patch_of_triangles(&mut random), 3.0, true);
+    let object = ObjectDesc { shapes: vec![placed], ..ObjectDesc::default() };
+    let map = Transform::translate(v(0.5, -4.0, 0.3)) * Transform::scale(v(1.0, 2.0, 0.5)).unwrap();
+    let turned =
+        Transform::translate(v(-3.0, 0.5, 2.0)) * Transform::rotate(v(1.0, 2.0, 0.5), 150.0).unwrap();
+    let spot = LightDesc::Spot {
+        world_from_light: turned,
+        intensity: Rgb::splat(5.0),
+        cone_angle: 100.0,
+        cone_delta_angle: 60.0,
+    };
+    let lights = vec![
+        LightDesc::Point { from: v(1.0, -2.0, 2.0), intensity: Rgb::splat(3.0) },
+        spot,
+        LightDesc::Distant { towards: v(0.2, 1.0, 0.4), irradiance: Rgb::splat(0.7) },
+        LightDesc::Infinite { world_from_light: Transform::IDENTITY, radiance: Rgb::splat(0.1), image: None },
+    ];
+    let material = NamedMaterial { name: None, material: Arc::new(Material::default_diffuse()) };
+    let instances = vec![InstanceDesc { object: ObjectId(0), world_from_object: map.into() }];
+    let objects = vec![object];
+    Scene::build(SceneDesc {
+        shapes,
+        objects,
+        instances,
+        lights,
+        materials: vec![material],
+        ..SceneDesc::default()
+    })
+    .unwrap()
+}
+
+fn flux(sample: Option<LightSample>) -> f64 {
+    sample.map_or(0.0, |sample| {
+        let density = if let Scatter::Density(pdf) = sample.scatter { pdf } else { 1.0 };
+        f64::from(sample.radiance.average() / density)
+    })
+}
+
+#[test]
+fn the_light_of_all_is_the_sum_of_each() {
+    const COUNT: usize = 60_000;
+    let scene = lights_of_all_kinds();
+    let mut random = RandomStream::new(8);
+    for from in [DVec3::ZERO, DVec3::new(2.0, -1.0, 0.5), DVec3::new(-30.0, 20.0, 10.0)] {
+        let mut u = || DVec2::new(random.next_f64(), random.next_f64());
+        let each: f64 = (0..scene.lights().len() as u32)
+            .map(|id| {
+                (0..4000).map(|_| flux(scene.sample_one_light(LightId(id), from, 0.0, u()))).sum::<f64>()
+                    / 4e3
+            })
+            .sum();
+        let all: f64 =
+            (0..COUNT).map(|_| flux(scene.sample_light(from, 0.0, u().x, u()))).sum::<f64>() / COUNT as f64;
+        assert!((all / each - 1.0).abs() < 0.03, "{from}: {all} {each}");
+    }
+}
+
+#[test]
+fn the_density_of_what_a_ray_finds_is_that_of_the_sample() {
+    let scene = lights_of_all_kinds();
+    let mut random = RandomStream::new(9);
+    let mut count = 0;
+    for _ in 0..4000 {
+        let mut x = || random.next_f64();
+        let from = 8.0 * DVec3::new(x() - 0.5, x() - 0.5, x() - 0.5);
+        let Some(sample) = scene.sample_light(from, 0.0, x(), DVec2::new(x(), x())) else { continue };
+        let (Scatter::Density(expected), Some(end)) = (sample.scatter, sample.end) else { continue };
+        let ray = Ray::new(from, sample.towards);
+        let Some(hit) = scene.closest(&ray) else { continue };
+        let met = scene.interaction(&ray, &hit, &Footprint::Point);
+        // Another light may stand before it.
+        if (met.surface.point - end.point).length() > 1e-6 {
+            continue;
+        }
+        let density = scene.light_pdf(from, &met);
+        assert!((density / expected - 1.0).abs() < 1e-3, "{density} {expected} {met:?}");
+        count += 1;
+    }
+    assert!(count > 500, "{count}");
+}
