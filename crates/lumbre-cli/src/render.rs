@@ -422,7 +422,12 @@ fn picture(
     signals.enter(Phase::Preparing("building the scene"));
     let is_first = frame.as_ref().is_none_or(|(frame, _)| frame.is_first);
     let number = frame.as_ref().map(|(frame, _)| frame.number);
-    let is_of_light = arguments.integrator.unwrap_or(desc.integrator.kind).needs_light();
+    let kind = arguments.integrator.unwrap_or(desc.integrator.kind);
+    if denoiser.is_some() && kind.is_feature() {
+        let why = "--denoise is for pictures of light: normals, depth, albedo and uv have no such noise";
+        return Err(Failure::Usage(why.to_owned()));
+    }
+    let is_of_light = kind.needs_light();
     let mut stage = stage.clone();
     if !is_of_light && !arguments.staging.wants_ground() {
         // Pictures of normals and the like show the model alone.

@@ -111,3 +111,13 @@ fn a_model_by_itself_has_few_samples_and_no_noise_unless_others_are_asked_for() 
         assert!(last.contains(samples) && last.contains("denoised") == is_denoised, "{arguments:?}: {last}");
     }
 }
+
+#[test]
+fn pictures_of_features_are_not_filtered() {
+    let desk = Desk::new();
+    desk.write("sphere.pbrt", SPHERE);
+    let out = desk.lumbre(&["sphere.pbrt", "--integrator", "normals", "--denoise", "own", "-o", "out.png"]);
+    assert_eq!(code(&out), 2, "{}", stderr(&out));
+    assert!(stderr(&out).contains("--denoise is for pictures of light"), "{}", stderr(&out));
+    assert!(!desk.path("out.png").exists());
+}

@@ -486,6 +486,14 @@ impl IntegratorKind {
         }
     }
 
+    /// Whether its picture is of what is there, and not an estimate of light, with the noise of one.
+    pub fn is_feature(&self) -> bool {
+        match self {
+            Self::Path { .. } | Self::Whitted { .. } | Self::AmbientOcclusion { .. } => false,
+            Self::Normals | Self::Depth | Self::Albedo | Self::Uv => true,
+        }
+    }
+
     /// The integrator of a name in the scene language, with default parameters.
     pub fn from_name(name: &str) -> Option<Self> {
         match name {
