@@ -104,10 +104,13 @@ pub(crate) fn start(w: DVec3, d: DVec3, a: f64, h: f64) -> f64 {
 pub(crate) fn is_exact(start: f64, roots: [f64; 2], slope: f64, [a, h, c]: [f64; 3], tolerance: f64) -> bool {
     roots.into_iter().all(|root| {
         let (s, t) = (root.abs(), (start + root).abs());
-        // A ray that starts at a crossing has no digits of that one to keep.
+        // A ray that starts at a crossing has no digits of that one to keep: there F is what rounding leaves of its terms.
+        if t * slope < 1e-14 * c {
+            return true;
+        }
         let size = if t > 1e-6 * start.abs() { t } else { start.abs() };
         let error = c + s * (2.0 * h + s * a);
-        // False for a NaN, and for a root at infinity.
+        // False for a NaN, and for a root at infinity. Where start and root cancel, their sum has few digits.
         error < tolerance * slope * size && s < 4.0 * size
     })
 }
