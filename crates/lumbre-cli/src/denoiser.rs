@@ -76,8 +76,8 @@ impl Denoiser {
             Self::Oidn(oidn) => {
                 let denoised = oidn
                     .denoise(picture, threads)
-                    .map_err(|why| Failure::Limit(format!("Open Image Denoise: {why}")))?;
-                picture.set_denoised(denoised, "Open Image Denoise")?;
+                    .map_err(|why| Failure::Limit(format!("{}: {why}", self.name())))?;
+                picture.set_denoised(denoised, self.name())?;
             }
         }
         Ok(start.elapsed())

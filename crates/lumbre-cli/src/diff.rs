@@ -1,7 +1,7 @@
 //! `lumbre diff`: the difference of two pictures.
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use lumbre::CancelToken;
@@ -11,7 +11,7 @@ use lumbre::image::{Metric, Rgb, compare};
 use crate::failure::{Failure, print};
 use crate::memory::Memory;
 use crate::names::one_of;
-use crate::output::{Inputs, Replaced};
+use crate::output::{Inputs, Replaced, is_standard_stream};
 use crate::signals::Signals;
 use crate::units;
 
@@ -57,8 +57,7 @@ const FLIP_BYTES: u64 = 160;
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let is_standard_input = |path: &Path| path.as_os_str() == "-";
-    if is_standard_input(&arguments.a) && is_standard_input(&arguments.b) {
+    if is_standard_stream(&arguments.a) && is_standard_stream(&arguments.b) {
         return Err(Failure::Usage("the two pictures cannot both be standard input".to_owned()));
     }
     let signals = Signals::listen(&CancelToken::new())?;
@@ -69,7 +68,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut limits = Limits::default();
     limits.memory = memory.for_reading() / 2;
     let read = |path: &PathBuf| {
-        let image = if is_standard_input(path) {
+        let image = if is_standard_stream(path) {
             lumbre::read_image_from("standard input", io::stdin(), limits)
         } else {
             lumbre::read_image_within(path, limits)

@@ -10,6 +10,11 @@ use lumbre::formats::image::{ImageFormat, is_own_image};
 use crate::failure::Failure;
 use crate::staging::frame_name;
 
+/// Whether a file on the command line is standard input or output.
+pub(crate) fn is_standard_stream(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
 /// What makes two names those of one file.
 #[derive(Debug, PartialEq, Eq, Hash)]
 enum Identity {

@@ -21,7 +21,7 @@ use serde_json::json;
 use crate::denoiser::{Choice, Denoiser};
 use crate::failure::{Failure, print_bytes};
 use crate::names::one_of;
-use crate::output::{self, Inputs, Pictures, Replaced};
+use crate::output::{self, Inputs, Pictures, Replaced, is_standard_stream};
 use crate::progress::{Display, Style, Watched};
 use crate::reading::{Frames, ReadingArguments, print_warnings};
 use crate::signals::{Deadline, Phase, Signals};
@@ -278,11 +278,6 @@ const MODEL_SPP: u32 = 16;
 
 const READING: Phase = Phase::Preparing("reading the scene");
 
-/// Whether an output is standard output.
-fn is_standard_output(path: &Path) -> bool {
-    path.as_os_str() == "-"
-}
-
 impl Arguments {
     /// The files that are named on the command line and read.
     fn inputs(&self) -> impl Iterator<Item = &Path> {
@@ -292,7 +287,7 @@ impl Arguments {
 
     /// The output, unless it is standard output.
     fn file(&self) -> Option<&Path> {
-        self.output.as_deref().filter(|output| !is_standard_output(output))
+        self.output.as_deref().filter(|output| !is_standard_stream(output))
     }
 
     /// What there will be of pictures.
@@ -323,7 +318,7 @@ impl Arguments {
 
     /// An output by a name whose ending is its format, also if it is standard output.
     fn named<'p>(&self, output: &'p Path) -> Cow<'p, Path> {
-        if !is_standard_output(output) {
+        if !is_standard_stream(output) {
             return Cow::Borrowed(output);
         }
         let format = self.output_format.unwrap_or(ImageFormat::Png).name().to_ascii_lowercase();
@@ -332,7 +327,7 @@ impl Arguments {
 
     /// Refuses to fill a terminal with the bytes of a picture, and a format for what has an ending.
     fn check_standard_output(&self) -> Result<(), Failure> {
-        let is_asked = self.output.as_deref().is_some_and(is_standard_output);
+        let is_asked = self.output.as_deref().is_some_and(is_standard_stream);
         if is_asked && std::io::stdout().is_terminal() {
             let message = "standard output is a terminal (expected a pipe or a file, as -o - > picture.png)";
             return Err(Failure::Usage(message.to_owned()));
@@ -456,7 +451,7 @@ fn picture(
     let named = arguments.named(&output);
     check_format(&named, !arguments.aov.is_empty())?;
     arguments.staging.check(Some(&named))?;
-    let is_piped = is_standard_output(&output);
+    let is_piped = is_standard_stream(&output);
     let output = number.map_or(named.to_path_buf(), |number| staging::frame_name(&output, number));
     for path in std::iter::once(&output).filter(|_| !is_piped).chain(&arguments.stats) {
         inputs.refuse(path)?;

@@ -65,6 +65,19 @@ fn nappe(a: f64, pair: Option<(f64, f64)>, growth: f64, radius: f64) -> Option<S
     Some([(low, LATERAL), (high, LATERAL)])
 }
 
+/// F(t) = a t² + 2 h t + c = |B + tA|² − (e + g t)² with A = D×V, B = W×V.
+struct Equation {
+    a: f64,
+    h: f64,
+    c: f64,
+    e: f64,
+    g: f64,
+    /// A.
+    across: DVec3,
+    /// B.
+    offset: DVec3,
+}
+
 /// The axis of a body in twice the precision.
 struct Spine {
     /// The point of it that places are relative to: a pointed end, where there is one.
@@ -106,20 +119,24 @@ impl Axial {
         if part == CAP1 { (self.p1, self.r1) } else { (self.p2, self.r2) }
     }
 
+    /// The equation of the lateral surface along `d` from a place `p` relative to p1.
+    #[inline]
+    fn equation(&self, p: DVec3, d: DVec3) -> Equation {
+        let (across, offset) = (d.cross(self.axis), p.cross(self.axis));
+        let (e, g) = (self.r1 + self.k * p.dot(self.axis), self.k * d.dot(self.axis));
+        let a = across.length_squared() - g * g;
+        let (h, c) = (across.dot(offset) - e * g, offset.length_squared() - e * e);
+        Equation { a, h, c, e, g, across, offset }
+    }
+
     /// The interval of the line within the lateral surface of one nappe, without cuts.
     ///
-    /// F(t) = |B + tA|² − (e + g t)² with A = D×V, B = W×V. The equation is set up about the middle of the crossings, where
-    /// the discriminant keeps its digits for a thin cone far away; where they do not suffice, in twice the precision.
+    /// The [`Equation`] is set up at the ray's origin if that is near, else about the middle of the crossings, where the
+    /// discriminant keeps its digits for a thin cone far away; where they do not suffice, in twice the precision.
     #[inline]
     pub(crate) fn lateral_span(&self, ray: &Ray) -> Option<Span> {
         let (w, d) = (ray.origin - self.p1, ray.direction);
-        let across = d.cross(self.axis);
-        let offset = w.cross(self.axis);
-        let e = self.r1 + self.k * w.dot(self.axis);
-        let g = self.k * d.dot(self.axis);
-
-        let a = across.length_squared() - g * g;
-        let (h, c) = (across.dot(offset) - e * g, offset.length_squared() - e * e);
+        let Equation { a, h, c, .. } = self.equation(w, d);
         let (start, p, slack) = if is_nearby(a, h, c) {
             (0.0, w, w.abs())
         } else {
@@ -133,10 +150,7 @@ impl Axial {
     /// the unit roundoff off.
     #[inline]
     fn decided_span(&self, d: DVec3, start: f64, p: DVec3, slack: f64) -> Option<Option<Span>> {
-        let (across, offset) = (d.cross(self.axis), p.cross(self.axis));
-        let (e, g) = (self.r1 + self.k * p.dot(self.axis), self.k * d.dot(self.axis));
-        let a = across.length_squared() - g * g;
-        let (h, c) = (across.dot(offset) - e * g, offset.length_squared() - e * e);
+        let Equation { a, h, c, e, g, across, offset } = self.equation(p, d);
         let delta = h * h - a * c;
 
         // Bounds on the errors in units of the unit roundoff, by the inequality of Cauchy and Schwarz.
@@ -161,9 +175,8 @@ impl Axial {
             return Some(None);
         }
         let (first, second) = quadratic(a, h, c, delta)?;
-        // A ray that grazes the surface may lose digits in proportion.
-        let slope_of_f = 2.0 * delta.sqrt();
-        let keeps_digits = is_exact(start, [first, second], slope_of_f, [a_error, h_error, c_error], 60.0);
+        let errors = [a_error, h_error, c_error];
+        let keeps_digits = is_exact(start, [first, second], 2.0 * delta.sqrt(), errors, 60.0);
         let pair = Some((start + first, start + second));
         keeps_digits.then(|| nappe(a, pair, g, radius))
     }
@@ -181,10 +194,7 @@ impl Axial {
             let numbers = [solution.a, solution.h, solution.c, radius, growth].map(|x| x.high);
             (numbers, solution.crossings)
         } else {
-            let (across, offset) = (ray.direction.cross(self.axis), p.cross(self.axis));
-            let (e, g) = (self.r1 + self.k * p.dot(self.axis), self.k * ray.direction.dot(self.axis));
-            let a = across.length_squared() - g * g;
-            let (h, c) = (across.dot(offset) - e * g, offset.length_squared() - e * e);
+            let Equation { a, h, c, e, g, .. } = self.equation(p, ray.direction);
             let pair = quadratic(a, h, c, (h * h - a * c).max(0.0));
             ([a, h, c, e, g], pair.map(|(first, second)| (start + first, start + second)))
         };

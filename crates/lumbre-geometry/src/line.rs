@@ -23,8 +23,8 @@ pub(crate) trait SecondDegree {
 /// Both crossings of a ray's line in order, whatever its range: equal where it touches, infinite where there is none;
 /// `None` where it misses.
 ///
-/// The equation is set up about the middle of the two crossings, so that it keeps its digits however far away the ray
-/// begins. Doubles with a bound of their error decide most lines, and twice the precision the others: those that nearly
+/// The equation is set up at the ray's origin if that is near, else about the middle of the two crossings, so that it keeps its
+/// digits however far away the ray begins. Doubles with a bound of their error decide most lines, and twice the precision the others: those that nearly
 /// touch, that are nearly parallel to an asymptote or a generator, or whose digits cancel.
 #[inline]
 pub(crate) fn crossings(surface: &impl SecondDegree, ray: &Ray) -> Option<(f64, f64)> {

@@ -217,7 +217,7 @@ pub(crate) fn point(origin: DVec3, base: DVec3, t: f64, direction: DVec3) -> DVe
 
 /// The same point rounded once, or `rough` where a product over- or underflows.
 #[inline(never)]
-pub(crate) fn exact_point(origin: DVec3, base: DVec3, t: f64, direction: DVec3, rough: DVec3) -> DVec3 {
+fn exact_point(origin: DVec3, base: DVec3, t: f64, direction: DVec3, rough: DVec3) -> DVec3 {
     let exact = DVec3::from_array(place(origin, base, t, direction).map(|x| x.high));
     // Splitting overflows slightly before the product does.
     if exact.is_finite() { exact } else { rough }

@@ -78,6 +78,18 @@ pub struct LightPoint {
     pub normal: DVec3,
 }
 
+impl LightSample {
+    /// The same where directions are so many times as likely: the density grows by that, or the radiance of a delta light, which
+    /// stands for its own division by it, shrinks.
+    fn of_density(mut self, factor: f64) -> Self {
+        match &mut self.scatter {
+            Scatter::Density(pdf) => *pdf *= factor as f32,
+            Scatter::Delta => self.radiance *= (1.0 / factor) as f32,
+        }
+        self
+    }
+}
+
 impl LightPoint {
     fn on(surface: &Surface) -> Self {
         Self { point: surface.point, error: surface.point_error, normal: surface.normal }

@@ -3,7 +3,6 @@
 use lumbre_geometry::{Ray, Surface};
 use lumbre_math::distribution::AliasTable;
 use lumbre_math::{DVec2, DVec3};
-use lumbre_shading::Scatter;
 
 use super::tree::{Emitter, LightTree};
 use super::{Light, LightId, LightSample};
@@ -74,7 +73,7 @@ impl LightChoice {
         choose: f64,
         u: DVec2,
     ) -> Option<LightSample> {
-        let (mut sample, probability) = if choose < self.share_elsewhere {
+        let (sample, probability) = if choose < self.share_elsewhere {
             let choice = self.elsewhere.as_ref()?.sample(choose / self.share_elsewhere);
             let light = &lights[self.elsewhere_ids[choice.index] as usize];
             (light.sample(entries, from, time, u)?, self.share_elsewhere * choice.probability)
@@ -90,11 +89,7 @@ impl LightChoice {
             };
             (sample?, share * chosen.probability)
         };
-        match &mut sample.scatter {
-            Scatter::Density(pdf) => *pdf *= probability as f32,
-            Scatter::Delta => sample.radiance *= (1.0 / probability) as f32,
-        }
-        Some(sample)
+        Some(sample.of_density(probability))
     }
 
     /// The density per unit solid angle with which [`LightChoice::sample`] samples what a ray hit of a light: see [`Light::pdf`].

@@ -52,12 +52,8 @@ impl MeshLight {
 
     pub(super) fn sample(&self, entry: &SurfaceEntry, from: DVec3, u: DVec2) -> Option<LightSample> {
         let choice = self.by_area.sample(u.x);
-        let mut sample = self.sample_triangle(entry, choice.index, from, DVec2::new(choice.rest, u.y))?;
-        match &mut sample.scatter {
-            Scatter::Density(pdf) => *pdf *= choice.probability as f32,
-            Scatter::Delta => sample.radiance *= (1.0 / choice.probability) as f32,
-        }
-        Some(sample)
+        let sample = self.sample_triangle(entry, choice.index, from, DVec2::new(choice.rest, u.y))?;
+        Some(sample.of_density(choice.probability))
     }
 
     /// A sample of one triangle.

@@ -3,7 +3,6 @@
 use lumbre_geometry::{Aabb, Ray, Surface};
 use lumbre_kernel::Placement;
 use lumbre_math::{DVec2, DVec3, Transform};
-use lumbre_shading::Scatter;
 
 use super::tree::{Emitter, Facing};
 use super::{Light, LightPoint, LightSample};
@@ -42,12 +41,7 @@ impl PlacedLight {
             error: map.point_error(end.point, end.error),
             normal: map.normal(end.normal).normalize_or_zero(),
         });
-        let grown = growth(&map, sample.towards);
-        match &mut sample.scatter {
-            Scatter::Density(pdf) => *pdf *= grown as f32,
-            Scatter::Delta => sample.radiance *= (1.0 / grown) as f32,
-        }
-        Some(sample)
+        Some(sample.of_density(growth(&map, sample.towards)))
     }
 
     /// What a tree knows of it; `None` if it moves.
