@@ -105,7 +105,12 @@ impl CoatedDiffuse {
     /// f · |cos θi|, without the mirror reflection of a smooth coat.
     pub fn eval(&self, wo: LocalDir, wi: LocalDir) -> Spectrum {
         let Some((wo, wi)) = from_above(wo, wi) else { return Spectrum::BLACK };
-        self.coat.eval(&self.base, wo, wi)
+        let (coat, base) = (&self.coat, &self.base);
+        if coat.scatters() {
+            coat.eval(wo, wi, |random| coat.walk(base, wo, wi, random))
+        } else {
+            coat.eval(wo, wi, |random| coat.walk_over_diffuse(base, wo, wi, random))
+        }
     }
 
     /// The probability of sampling the coat.
@@ -181,7 +186,7 @@ impl CoatedConductor {
             return Spectrum::BLACK;
         }
         let Some((wo, wi)) = from_above(wo, wi) else { return Spectrum::BLACK };
-        self.coat.eval(&self.base, wo, wi)
+        self.coat.eval(wo, wi, |random| self.coat.walk(&self.base, wo, wi, random))
     }
 
     fn lobes(&self, wo: LocalDir) -> Lobes {
@@ -356,13 +361,13 @@ impl Coat {
         (-height / w.abs_cos_theta()).exp()
     }
 
-    /// f · |cos θi| of the coat over a base, both directions above, without mirror reflections.
-    fn eval<B: Base>(&self, base: &B, wo: LocalDir, wi: LocalDir) -> Spectrum {
+    /// f · |cos θi| of the coat over a base, both directions above, without mirror reflections: its own and the mean of some walks.
+    fn eval(&self, wo: LocalDir, wi: LocalDir, walk: impl Fn(&mut RandomStream) -> Spectrum) -> Spectrum {
         let mut random = RandomStream::new(combine(hash_vec3(wo.vec()), hash_vec3(wi.vec())));
         let samples = self.samples.max(1);
         let mut sum = Spectrum::BLACK;
         for _ in 0..samples {
-            sum += self.walk(base, wo, wi, &mut random);
+            sum += walk(&mut random);
         }
         sum / samples as f32 + Spectrum::splat(self.face.eval(wo, wi))
     }
@@ -449,6 +454,47 @@ impl Coat {
             }
         }
         sum
+    }
+
+    /// [`Coat::walk`] over a diffuse base, where nothing scatters in the medium. The base forgets where light came from, so that one
+    /// way out, sampled from `wi`, serves for all its reflections.
+    fn walk_over_diffuse(
+        &self,
+        base: &Diffuse,
+        wo: LocalDir,
+        wi: LocalDir,
+        random: &mut RandomStream,
+    ) -> Spectrum {
+        let mut pair = || Vec2::new(random.next_f32(), random.next_f32());
+        let entry = self.face.sample_of(wo, 0.0, pair(), Ways::Transmission);
+        let exit = self.face.sample_of(wi, 0.0, pair(), Ways::Transmission);
+        let (Some(entry), Some(exit)) = (entry, exit) else { return Spectrum::BLACK };
+        let mut throughput = entry.weight * Self::transmittance(self.thickness, entry.wi);
+        let mut reflections = Spectrum::BLACK;
+        // Every second bounce is one off the base.
+        for depth in (0..self.max_depth).step_by(2) {
+            throughput *= base.reflectance;
+            reflections += throughput;
+            if depth + 1 == self.max_depth {
+                break;
+            }
+            let brightest = throughput.max_component();
+            if depth > 1 && brightest < 0.25 {
+                if random.next_f32() >= brightest {
+                    break;
+                }
+                throughput = throughput / brightest;
+            }
+            let mut pair = || Vec2::new(random.next_f32(), random.next_f32());
+            let Some(up) = cosine_direction(pair(), 1.0) else { break };
+            let Some(back) = self.face.sample_of(-up, 0.0, pair(), Ways::Reflection) else { break };
+            let both_ways =
+                Self::transmittance(self.thickness, up) * Self::transmittance(self.thickness, back.wi);
+            throughput *= back.weight * both_ways;
+        }
+        // Traced backwards, the exit carries importance, which is not scaled by η².
+        let out = exit.eta * exit.eta * wi.abs_cos_theta() * Self::transmittance(self.thickness, exit.wi);
+        reflections * exit.weight * (FRAC_1_PI * out)
     }
 
     /// The sum of the bounces between a mirror base and a smooth interface before the exit along `exit`.
@@ -548,4 +594,49 @@ fn balance(own: Option<f32>, other: f32) -> f32 {
     let Some(own) = own else { return 1.0 };
     let ratio = other / own;
     1.0 / (1.0 + ratio * ratio)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_walk_over_a_diffuse_base_has_the_mean_of_the_general_one() {
+        let count = if std::env::var_os("LUMBRE_LONG_TESTS").is_some() { 2_000_000 } else { 60_000 };
+        let base = Diffuse { reflectance: Spectrum::new(0.9, 0.4, 0.05) };
+        let local = |x, y, z| LocalDir(Vec3::new(x, y, z).normalize());
+        for (alpha, thickness, max_depth) in
+            [((0.0, 0.0), 0.3, 10), ((0.3, 0.1), 0.1, 3), ((0.8, 0.8), 0.0, 40), ((0.2, 0.6), 1.0, 2)]
+        {
+            let face = Dielectric { eta: 1.5, facets: Microfacets::new(alpha.0, alpha.1) };
+            let coat = Coat { face, thickness, g: 0.0, albedo: Spectrum::BLACK, max_depth, samples: 1 };
+            for (wo, wi) in
+                [(local(0.1, 0.2, 0.9), local(-0.5, 0.3, 0.6)), (local(0.9, 0.1, 0.3), local(0.6, 0.6, 0.2))]
+            {
+                let mut random = RandomStream::new(7);
+                let mut mean = |walk: &dyn Fn(&mut RandomStream) -> Spectrum| {
+                    let (mut sum, mut squares) = ([0.0; 3], [0.0; 3]);
+                    for _ in 0..count {
+                        for (i, value) in walk(&mut random).to_array().into_iter().enumerate() {
+                            sum[i] += f64::from(value);
+                            squares[i] += f64::from(value) * f64::from(value);
+                        }
+                    }
+                    let n = f64::from(count);
+                    std::array::from_fn::<_, 3, _>(|i| {
+                        (sum[i] / n, (squares[i] / n - (sum[i] / n).powi(2)).max(0.0) / n)
+                    })
+                };
+                let general = mean(&|random| coat.walk(&base, wo, wi, random));
+                let short = mean(&|random| coat.walk_over_diffuse(&base, wo, wi, random));
+                for ((a, of_a), (b, of_b)) in general.into_iter().zip(short) {
+                    let spread = (of_a + of_b).sqrt() + 1e-6 * a;
+                    assert!(
+                        a > 0.0 && (a - b).abs() < 4.5 * spread,
+                        "{alpha:?} {max_depth}: {a} {b} {spread}"
+                    );
+                }
+            }
+        }
+    }
 }
