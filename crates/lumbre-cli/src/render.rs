@@ -11,6 +11,7 @@ use lumbre::description::{Camera, CameraKind, GroundDesc, IntegratorKind};
 use lumbre::formats::image::{ExrPrecision, ImageFormat};
 use lumbre::formats::{Diagnostics, probe_writable};
 use lumbre::image::{Image, ToneMap};
+use lumbre::math::Elementary;
 use lumbre::shading::ShadingNormals;
 use lumbre::{
     CancelToken, DVec3, Feature, Ground, Picture, PixelBounds, RenderOptions, SaveOptions, Scene, SceneDesc,
@@ -589,7 +590,7 @@ const DARK_HINT: &str = "hint: next to nothing in the picture is lit: --fit show
 /// Whether almost all of what covers a picture would be shown black.
 fn is_nearly_black(image: &Image, exposure: f32) -> bool {
     // Two steps of a byte above black, by the curve of sRGB.
-    let seen = 6e-4 * (-exposure).exp2();
+    let seen = 6e-4 * (-exposure).exponential_2();
     let (mut covered, mut lit) = (0.0, 0.0);
     for (i, pixel) in image.pixels().iter().enumerate() {
         let alpha = image.alpha().map_or(1.0, |alpha| alpha[i]);
@@ -626,7 +627,7 @@ fn is_for_displays(path: &Path) -> bool {
 fn measured_exposure(white_level: Option<f32>) -> f32 {
     match white_level {
         Some(level) if !(0.125..=2.0).contains(&level) => {
-            (-10.0 * level.log2()).round().clamp(-1000.0, 1000.0) / 10.0
+            (-10.0 * level.logarithm_2()).round().clamp(-1000.0, 1000.0) / 10.0
         }
         _ => 0.0,
     }

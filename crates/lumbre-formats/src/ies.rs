@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use lumbre_image::{Image, Rgb};
-use lumbre_math::{DVec2, DVec3, warp64};
+use lumbre_math::{DVec2, DVec3, Elementary, warp64};
 
 use crate::budget::Budget;
 use crate::diagnostic::{Diagnostic, FormatError, Place, quoted};
@@ -45,13 +45,13 @@ impl Profile {
         let d = direction;
         let (vertical, horizontal) = match self.photometry {
             Photometry::C => {
-                let from_aim = d.truncate().length().atan2(-d.z);
-                let around = d.y.atan2(d.x);
+                let from_aim = d.truncate().length().angle_from(-d.z);
+                let around = d.y.angle_from(d.x);
                 (from_aim, if around < 0.0 { around + TAU } else { around })
             }
             // Seen from the light, these horizontal angles are clockwise.
-            Photometry::B => (d.x.atan2(0.0 - d.z), (-d.y).clamp(-1.0, 1.0).asin()),
-            Photometry::A => (d.x.clamp(-1.0, 1.0).asin(), (0.0 - d.y).atan2(0.0 - d.z)),
+            Photometry::B => (d.x.angle_from(0.0 - d.z), (-d.y).clamp(-1.0, 1.0).arc_sine()),
+            Photometry::A => (d.x.clamp(-1.0, 1.0).arc_sine(), (0.0 - d.y).angle_from(0.0 - d.z)),
         };
         let (vertical, horizontal) = (vertical.to_degrees(), self.folded(horizontal.to_degrees()));
         let Some((row, along)) = place(&self.vertical, vertical) else { return 0.0 };
@@ -107,7 +107,7 @@ impl Profile {
     /// The luminous flux in lumens: the integral over all directions.
     pub fn lumens(&self) -> f64 {
         let image = self.image();
-        let ring = |y: u32| (PI * f64::from(y) / f64::from(HEIGHT)).cos();
+        let ring = |y: u32| (PI * f64::from(y) / f64::from(HEIGHT)).cosine();
         let row = |y: u32| {
             let solid_angle = TAU * (ring(y) - ring(y + 1)) / f64::from(WIDTH);
             (0..WIDTH).map(|x| f64::from(image.pixel(x, y).g)).sum::<f64>() * solid_angle

@@ -1,3 +1,4 @@
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![doc = include_str!("../README.md")]
 //!
 //! Every reader takes a [`Budget`], which it consults before any allocation whose size the input chose, and a

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use lumbre_math::quadratic::quadratic;
 use lumbre_math::rounding::{UNIT_ROUNDOFF, gamma};
-use lumbre_math::{DMat3, DVec2, DVec3, Transform, orthonormal_basis};
+use lumbre_math::{DMat3, DVec2, DVec3, Elementary, Transform, orthonormal_basis};
 
 use crate::line::{Solution, is_blurred, is_exact, is_nearby, plane_crossing, start};
 use crate::nearest::{Meridian, under_similarity};
@@ -253,7 +253,7 @@ impl Axial {
     fn spine(&self) -> Spine {
         // Of about unit length, so that no product over- or underflows.
         let is_ordinary = 1e-20 < self.length && self.length < 1e20;
-        let scale = if is_ordinary { 1.0 } else { (-self.length.log2().floor()).exp2() };
+        let scale = if is_ordinary { 1.0 } else { (-self.length.logarithm_2().floor()).exponential_2() };
         if !self.has_ends {
             let axis = components(self.axis);
             let square = dot(axis, axis);
@@ -397,7 +397,7 @@ impl Axial {
     /// The surface at `uv` of a part.
     pub(crate) fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
         let (e1, e2) = orthonormal_basis(self.axis);
-        let (sin, cos) = (uv.x * self.phi_max).sin_cos();
+        let (sin, cos) = (uv.x * self.phi_max).sine_cosine();
         let outward = cos * e1 + sin * e2;
         if part == LATERAL {
             let z = if self.is_bounded() { uv.y * self.length } else { uv.y };
@@ -410,7 +410,7 @@ impl Axial {
 
     pub(crate) fn on_side(&self, z: f64, outward: DVec3, u: f64) -> Surface {
         let rho = (self.r1 + self.k * z).max(0.0);
-        let slant = self.k.hypot(1.0);
+        let slant = self.k.hypotenuse(1.0);
         let w = z * self.axis + rho * outward;
         let point = self.p1 + w;
         let rise = if self.is_bounded() { self.length } else { 1.0 };
@@ -496,7 +496,7 @@ impl Axial {
             let radius = self.cap(part).1;
             if self.has_cap(part) { 0.5 * self.phi_max * radius * radius } else { 0.0 }
         };
-        let slant = self.length.hypot(self.r2 - self.r1);
+        let slant = self.length.hypotenuse(self.r2 - self.r1);
         [0.5 * self.phi_max * (self.r1 + self.r2) * slant, cap(CAP1), cap(CAP2)]
     }
 
@@ -513,7 +513,7 @@ impl Axial {
         let stretch = measure::area_stretch(world_from_object);
         let (e1, e2) = orthonormal_basis(self.axis);
         let side = measure::integrate(0.0, self.phi_max, |phi| {
-            let (sin, cos) = phi.sin_cos();
+            let (sin, cos) = phi.sine_cosine();
             (stretch * (cos * e1 + sin * e2 - self.k * self.axis)).length()
         });
         let [_, cap1, cap2] = self.part_areas();

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use lumbre_math::rounding::gamma;
-use lumbre_math::{DMat3, DVec2, DVec3, Transform, orthonormal_basis};
+use lumbre_math::{DMat3, DVec2, DVec3, Elementary, Transform, orthonormal_basis, warp64};
 
 use crate::axial::{Axial, CAP1, CAP2, LATERAL, Span};
 use crate::nearest::under_similarity;
@@ -149,13 +149,13 @@ impl Capsule {
     /// if the cylinder were longer or the cap more than a hemisphere.
     pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
         let (e1, e2) = orthonormal_basis(self.tube.axis);
-        let (sin, cos) = (uv.x * TAU).sin_cos();
+        let (sin, cos) = warp64::circle(uv.x);
         let outward = cos * e1 + sin * e2;
         let surface = match part {
             LATERAL => self.on_side(uv.y * self.meridian() - 0.5 * PI * self.radius(), outward, uv.x),
             CAP1 | CAP2 => {
                 let from_pole = if part == CAP1 { uv.y } else { 1.0 - uv.y };
-                let (sin, cos) = (from_pole * self.meridian() / self.radius()).sin_cos();
+                let (sin, cos) = (from_pole * self.meridian() / self.radius()).sine_cosine();
                 let w = sin * outward + cos * self.cap(part).1;
                 self.on_cap(part, w * (self.radius() / w.length()), uv.x)
             }
@@ -182,7 +182,7 @@ impl Capsule {
             let rough = if rho > 0.0 { axis.cross(w) / rho } else { orthonormal_basis(axis).1 };
             (rough - normal.dot(rough) * normal).normalize()
         };
-        let from_pole = rho.atan2(w.dot(to_pole)) * radius / self.meridian();
+        let from_pole = rho.angle_from(w.dot(to_pole)) * radius / self.meridian();
         let dpdu = TAU * rho.max(1e-10 * radius) * around;
         let dpdv = self.meridian() * normal.cross(around);
         let point = center + w;
@@ -226,7 +226,7 @@ impl Capsule {
         let stretch = measure::area_stretch(world_from_object);
         let (e1, e2) = orthonormal_basis(self.tube.axis);
         let around = measure::integrate(0.0, TAU, |phi| {
-            let (sin, cos) = phi.sin_cos();
+            let (sin, cos) = phi.sine_cosine();
             (stretch * (cos * e1 + sin * e2)).length()
         });
         let caps = measure::ellipsoid_area(self.radius(), world_from_object);
@@ -298,7 +298,7 @@ impl Capsule {
     pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
         let (radius, length) = (self.radius(), self.tube.length);
         let (e1, e2) = orthonormal_basis(self.tube.axis);
-        let (sin, cos) = (u.y * TAU).sin_cos();
+        let (sin, cos) = warp64::circle(u.y);
         let outward = cos * e1 + sin * e2;
         let height = length + 2.0 * radius;
         let (below, above) = (u.x * height, (1.0 - u.x) * height);

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use lumbre_math::rounding::gamma;
-use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
+use lumbre_math::{DVec2, DVec3, Elementary, Transform, orthonormal_basis};
 
 use crate::line::plane_crossing;
 use crate::nearest::{Meridian, under_similarity};
@@ -100,7 +100,7 @@ impl Disk {
     /// The surface at `uv`.
     pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
         let (e1, e2) = orthonormal_basis(self.normal());
-        let (sin, cos) = (uv.x * self.phi_max).sin_cos();
+        let (sin, cos) = (uv.x * self.phi_max).sine_cosine();
         let rho = self.radius + uv.y * (self.inner_radius - self.radius);
         (part == 0).then(|| self.surface_on(rho * (cos * e1 + sin * e2), uv))
     }

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use lumbre_math::roots::{bracketed_root, roots_between};
 use lumbre_math::rounding::gamma;
-use lumbre_math::{DMat3, DVec2, DVec3, Transform};
+use lumbre_math::{DMat3, DVec2, DVec3, Elementary, Transform, direction_at};
 
 use crate::line::{Implicit, SecondDegree, accepted, crossings, point_at, sided_gradient};
 use crate::nearest::{Meridian, under_similarity};
@@ -126,10 +126,10 @@ impl Hyperboloid {
         let q = self.segment(v);
         let start = azimuth(q.y, q.x);
         // In the frame rotated to the beginning of the sweep.
-        let flat = DVec2::from_angle(-start).rotate(p.truncate());
+        let flat = direction_at(-start).rotate(p.truncate());
         let meridian = Meridian::new(flat.extend(p.z), self.phi_max);
         let r = q.truncate().length();
-        let outward = DVec2::from_angle(start).rotate(meridian.outward);
+        let outward = direction_at(start).rotate(meridian.outward);
         NearestPoint {
             point: (r * outward).extend(q.z),
             distance: meridian.distance(r, q.z),
@@ -145,7 +145,7 @@ impl Hyperboloid {
 
     fn point_at(&self, uv: DVec2) -> DVec3 {
         let q = self.segment(uv.y);
-        DVec2::from_angle(self.phi_max * uv.x).rotate(q.truncate()).extend(q.z)
+        direction_at(self.phi_max * uv.x).rotate(q.truncate()).extend(q.z)
     }
 
     fn surface_on(&self, p: DVec3) -> Surface {
@@ -224,7 +224,11 @@ impl Hyperboloid {
         // With w = v + offset, the element is √(square w² + rest).
         let rest = (constant - linear * offset).max(0.0);
         let antiderivative = |w: f64| {
-            let curved = if rest > 0.0 { 0.5 * rest / root * (w * root / rest.sqrt()).asinh() } else { 0.0 };
+            let curved = if rest > 0.0 {
+                0.5 * rest / root * (w * root / rest.sqrt()).inverse_hyperbolic_sine()
+            } else {
+                0.0
+            };
             0.5 * w * (square * w * w + rest).sqrt() + curved
         };
         (antiderivative(v + offset) - antiderivative(offset), element(v))
@@ -247,7 +251,7 @@ impl Hyperboloid {
             }
             measure::patch_area(world_from_object, |u, v| {
                 let v = from + v * (to - from);
-                let turn = DVec2::from_angle(self.phi_max * u);
+                let turn = direction_at(self.phi_max * u);
                 let (q, slant) = (turn.rotate(self.segment(v).truncate()), turn.rotate(along.truncate()));
                 let dpdu = DVec3::new(-q.y, q.x, 0.0);
                 self.phi_max * (to - from) * dpdu.cross(slant.extend(along.z))
@@ -310,7 +314,7 @@ impl Hyperboloid {
             if self.phi_max < TAU {
                 // The segment at both ends of the sweep.
                 for phi in [0.0, self.phi_max] {
-                    let turn = DVec2::from_angle(phi);
+                    let turn = direction_at(phi);
                     let start = turn.rotate(self.p1.truncate()).extend(self.p1.z);
                     let along = turn.rotate(self.along.truncate()).extend(self.along.z);
                     let v = ((p - start).dot(along) / along.length_squared()).clamp(0.0, 1.0);

@@ -1,3 +1,4 @@
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![doc = include_str!("../README.md")]
 //!
 //! A ray's direction need not be unit, and `t` is in units of its length. A search returns little ([`Root`]: where, and

@@ -1,6 +1,6 @@
 //! Areas without an elementary closed form: quadrature, and Carlson's symmetric integrals.
 
-use lumbre_math::{DMat3, DVec3, Transform};
+use lumbre_math::{DMat3, DVec3, Elementary, Transform};
 
 /// How a linear map stretches area elements: with the cofactor matrix C = det(L) L⁻ᵀ, an area element with
 /// normal `n` grows by |C n|.
@@ -74,7 +74,7 @@ fn settle(on_panels: impl Fn(u32) -> f64, most: u32) -> f64 {
 pub(crate) fn gauss_legendre() -> [(f64, f64); 16] {
     const N: usize = 16;
     std::array::from_fn(|i| {
-        let mut x = (std::f64::consts::PI * (i as f64 + 0.75) / (N as f64 + 0.5)).cos();
+        let mut x = (std::f64::consts::PI * (i as f64 + 0.75) / (N as f64 + 0.5)).cosine();
         let mut slope = 0.0;
         for _ in 0..8 {
             let (mut before, mut value) = (1.0, x);
@@ -111,8 +111,8 @@ fn symmetric_eigenvalues(m: DMat3) -> [f64; 3] {
                 continue;
             }
             let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let t = 1.0_f64.copysign(theta) / (theta.abs() + theta.hypot(1.0));
-            let c = 1.0 / t.hypot(1.0);
+            let t = 1.0_f64.copysign(theta) / (theta.abs() + theta.hypotenuse(1.0));
+            let c = 1.0 / t.hypotenuse(1.0);
             let s = t * c;
             for row in &mut a {
                 (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);

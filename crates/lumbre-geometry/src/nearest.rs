@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use lumbre_math::{DMat3, DVec2, DVec3, Transform};
+use lumbre_math::{DMat3, DVec2, DVec3, Elementary, Transform, direction_at};
 
 use crate::support::azimuth;
 
@@ -152,7 +152,7 @@ pub(crate) struct Meridian {
 impl Meridian {
     /// For a point in the frame of the axis.
     pub(crate) fn new(p: DVec3, phi_max: f64) -> Self {
-        let rho = p.x.hypot(p.y);
+        let rho = p.x.hypotenuse(p.y);
         let phi = azimuth(p.y, p.x);
         if phi_max >= TAU || phi <= phi_max || rho == 0.0 {
             let is_axis = rho == 0.0;
@@ -160,7 +160,7 @@ impl Meridian {
             return Self { outward, phi: if is_axis { 0.0 } else { phi }, x: rho, z: p.z, aside: 0.0 };
         }
         let phi = if phi - phi_max <= TAU - phi { phi_max } else { 0.0 };
-        let outward = DVec2::from_angle(phi);
+        let outward = direction_at(phi);
         let flat = DVec2::new(p.x, p.y);
         Self { outward, phi, x: flat.dot(outward), z: p.z, aside: flat.perp_dot(outward) }
     }
@@ -191,8 +191,8 @@ pub(crate) fn nearest_on_ellipsoid(map: DMat3, radius: f64, d: DVec3) -> DVec3 {
             }
             is_done = false;
             let zeta = (bb - aa) / (2.0 * ab);
-            let tangent = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
-            let cos = 1.0 / tangent.hypot(1.0);
+            let tangent = zeta.signum() / (zeta.abs() + zeta.hypotenuse(1.0));
+            let cos = 1.0 / tangent.hypotenuse(1.0);
             let sin = cos * tangent;
             (image[i], image[j]) = (cos * a - sin * b, sin * a + cos * b);
             (turn[i], turn[j]) = (cos * turn[i] - sin * turn[j], sin * turn[i] + cos * turn[j]);

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use lumbre_math::roots::roots_between;
 use lumbre_math::rounding::gamma;
-use lumbre_math::{DMat3, DVec2, DVec3, Transform};
+use lumbre_math::{DMat3, DVec2, DVec3, Elementary, Transform, direction_at};
 
 use crate::line::{Implicit, SecondDegree, accepted, crossings, point_at, sided_gradient};
 use crate::nearest::{Meridian, under_similarity};
@@ -105,7 +105,7 @@ impl Paraboloid {
         if part != 0 || z < 0.0 {
             return None;
         }
-        let round = self.radius_at(z) * DVec2::from_angle(self.phi_max * uv.x);
+        let round = self.radius_at(z) * direction_at(self.phi_max * uv.x);
         Some(Surface { uv, ..self.surface_on(round.extend(z)) })
     }
 
@@ -115,8 +115,8 @@ impl Paraboloid {
         let phi = azimuth(p.y, p.x);
         // At the bottom any meridian will do, but none has a finite derivative by height: use a point nearby.
         let floor = 1e-10 * self.radius_at(self.z_max);
-        let rho = p.x.hypot(p.y);
-        let round = if rho > floor { DVec2::new(p.x, p.y) } else { floor * DVec2::from_angle(phi) };
+        let rho = p.x.hypotenuse(p.y);
+        let round = if rho > floor { DVec2::new(p.x, p.y) } else { floor * direction_at(phi) };
         let dpdu = self.phi_max * DVec3::new(-round.y, round.x, 0.0);
         let rise = 0.5 / (self.bend * round.length_squared());
         let dpdv = height * DVec3::new(rise * round.x, rise * round.y, 1.0);
@@ -180,7 +180,7 @@ impl Paraboloid {
         let (inner, outer) = (self.radius_at(self.bottom()), self.radius_at(self.z_max));
         measure::patch_area(world_from_object, |u, v| {
             let rho = inner + v * (outer - inner);
-            let round = 2.0 * self.bend * rho * DVec2::from_angle(self.phi_max * u);
+            let round = 2.0 * self.bend * rho * direction_at(self.phi_max * u);
             self.phi_max * (outer - inner) * rho * round.extend(-1.0)
         })
     }
@@ -222,11 +222,11 @@ impl Paraboloid {
     /// A point uniform by area: the cube of the slant is uniform.
     pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
         let (a, b) = self.slants();
-        let c = (a * a * a + u.y * (b * b * b - a * a * a)).cbrt();
+        let c = (a * a * a + u.y * (b * b * b - a * a * a)).cube_root();
         // z - bottom = (c² - a²)/(4 bend), without cancellation.
         let shares = (a * a + a * b + b * b) * (c + a) / ((a + b) * (c * c + c * a + a * a));
         let z = (self.bottom() + u.y * (self.z_max - self.bottom()) * shares).min(self.z_max);
-        let round = self.radius_at(z) * DVec2::from_angle(self.phi_max * u.x);
+        let round = self.radius_at(z) * direction_at(self.phi_max * u.x);
         Some(SurfaceSample { surface: self.surface_on(round.extend(z)), pdf: 1.0 / self.area() })
     }
 

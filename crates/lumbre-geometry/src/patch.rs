@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use lumbre_math::quadratic::{dop, quadratic};
 use lumbre_math::roots::{RealRoots, roots_between};
 use lumbre_math::rounding::gamma;
-use lumbre_math::{DVec2, DVec3, Transform};
+use lumbre_math::{DVec2, DVec3, Elementary, Transform};
 use smallvec::SmallVec;
 
 use crate::shape::{check, open_surface};
@@ -404,17 +404,17 @@ impl BilinearPatch {
         // The z components of the outward normals of the planes through the viewpoint and the sides y0, x1, y1,
         // x0. The other components of neighbours are orthogonal, so the products of these give the angles
         // between the planes.
-        let [n0, n1, n2, n3] = [-y0, x1, y1, -x0].map(|s| s / s.hypot(z0));
-        let angle = |a: f64, b: f64| (-a * b).acos();
+        let [n0, n1, n2, n3] = [-y0, x1, y1, -x0].map(|s| s / s.hypotenuse(z0));
+        let angle = |a: f64, b: f64| (-a * b).arc_cosine();
         let k = TAU - angle(n2, n3) - angle(n3, n0);
         debug_assert!((angle(n0, n1) + angle(n1, n2) - k - solid_angle).abs() < 1e-6);
 
-        let (sin, cos) = (u.x * solid_angle + k).sin_cos();
+        let (sin, cos) = (u.x * solid_angle + k).sine_cosine();
         let fu = (cos * n0 - n2) / sin;
         let cu = (1.0_f64.copysign(fu) / (fu * fu + n0 * n0).sqrt()).clamp(-1.0, 1.0);
         let xu = (-cu * z0 / (1.0 - cu * cu).sqrt()).max(x0).min(x1);
-        let depth = xu.hypot(z0);
-        let (h0, h1) = (y0 / depth.hypot(y0), y1 / depth.hypot(y1));
+        let depth = xu.hypotenuse(z0);
+        let (h0, h1) = (y0 / depth.hypotenuse(y0), y1 / depth.hypotenuse(y1));
         let hv = h0 + u.y * (h1 - h0);
         let yv = (hv * depth / (1.0 - hv * hv).sqrt()).max(y0).min(y1);
         let uv = DVec2::new((xu - x0) / width, (yv - y0) / height);

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use lumbre_math::quadratic::{dop, quadratic};
 use lumbre_math::rounding::gamma;
-use lumbre_math::{DAffine3, DMat3, DVec2, DVec3, Transform};
+use lumbre_math::{DAffine3, DMat3, DVec2, DVec3, Elementary, Transform};
 
 use smallvec::SmallVec;
 
@@ -72,7 +72,7 @@ impl Quadric {
         }
         // A power of two, so that no digit changes and no product overflows.
         let largest = coefficients.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        let scale = (-largest.log2().floor()).clamp(-1000.0, 1000.0).exp2();
+        let scale = (-largest.logarithm_2().floor()).clamp(-1000.0, 1000.0).exponential_2();
         let [a, b, c, d, e, f, g, h, i, j] = coefficients.map(|x| x * scale);
         let rows = [[a, 0.5 * d, 0.5 * e], [0.5 * d, b, 0.5 * f], [0.5 * e, 0.5 * f, c]];
         let mut quadric = Self {
@@ -309,7 +309,7 @@ impl Quadric {
                 let (middle, half) = (0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0]));
                 for (y, weight) in rule {
                     // At its ends the surface may become vertical like a square root, which the sine smooths.
-                    let (sin, cos) = (PI * (y - 0.5)).sin_cos();
+                    let (sin, cos) = (PI * (y - 0.5)).sine_cosine();
                     p[j] = middle + half * sin;
                     for q in [false, true].into_iter().filter_map(|far| self.above(clip, k, p, far)) {
                         let normal = self.implicit(q).normal();

@@ -1,6 +1,6 @@
 //! A ray with its parameter range.
 
-use lumbre_math::{DVec3, Transform};
+use lumbre_math::{DVec3, Elementary, Transform};
 
 /// The points `origin + t * direction` with `t_min <= t <= t_max`.
 ///
@@ -64,7 +64,7 @@ impl Ray {
         if !self.direction.is_finite() || largest == 0.0 {
             return None;
         }
-        let exponent = largest.log2().floor() as i32;
+        let exponent = largest.logarithm_2().floor() as i32;
         let half = exponent / 2;
         let [one, other] = [half, exponent - half].map(|e| 2f64.powi(e));
         let scaled = Self {

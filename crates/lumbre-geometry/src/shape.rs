@@ -258,7 +258,7 @@ impl std::error::Error for ShapeError {}
 /// The checks that constructors share.
 pub(crate) mod check {
     use super::ShapeError;
-    use lumbre_math::DVec3;
+    use lumbre_math::{DVec3, Elementary};
 
     /// A finite length greater than zero.
     pub(crate) fn positive(parameter: &'static str, found: f64) -> Result<f64, ShapeError> {
@@ -289,10 +289,10 @@ pub(crate) mod check {
     /// A direction of any non-zero length, times the power of two that brings its length near 1.
     pub(crate) fn scaled_direction(parameter: &'static str, found: DVec3) -> Result<DVec3, ShapeError> {
         direction(parameter, found)?;
-        let exponent = found.abs().max_element().log2().floor();
+        let exponent = found.abs().max_element().logarithm_2().floor();
         // In two steps, since 2^1074 overflows and its square root does not.
         let half = (-0.5 * exponent).floor();
-        Ok(found * half.exp2() * (-exponent - half).exp2())
+        Ok(found * half.exponential_2() * (-exponent - half).exponential_2())
     }
 
     /// A sweep about the axis in (0°, 360°], in radians.

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use lumbre_math::quadratic::quadratic;
 use lumbre_math::rounding::gamma;
-use lumbre_math::{DMat3, DVec2, DVec3, Transform, orthonormal_basis};
+use lumbre_math::{DMat3, DVec2, DVec3, Elementary, Transform, orthonormal_basis, warp64};
 
 use crate::line::{Solution, is_blurred};
 use crate::nearest::{Meridian, nearest_on_ellipsoid, similarity_factor, under_similarity};
@@ -62,7 +62,7 @@ impl Sphere {
         if z_min == z_max {
             return Err(ShapeError::Degenerate("nothing of the sphere lies between zmin and zmax"));
         }
-        let theta = |z: f64| ((self.radius - z) * (self.radius + z)).sqrt().atan2(z);
+        let theta = |z: f64| ((self.radius - z) * (self.radius + z)).sqrt().angle_from(z);
         Ok(Self { z_min, z_max, theta_min: theta(z_min), theta_max: theta(z_max), phi_max, ..self })
     }
 
@@ -145,8 +145,8 @@ impl Sphere {
 
     /// The surface at `uv`.
     pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
-        let (phi_sin, phi_cos) = (uv.x * self.phi_max).sin_cos();
-        let (sin, cos) = (self.theta_min + uv.y * (self.theta_max - self.theta_min)).sin_cos();
+        let (phi_sin, phi_cos) = (uv.x * self.phi_max).sine_cosine();
+        let (sin, cos) = (self.theta_min + uv.y * (self.theta_max - self.theta_min)).sine_cosine();
         let w = self.radius * DVec3::new(sin * phi_cos, sin * phi_sin, cos);
         (part == 0).then(|| Surface { uv, ..self.surface_on(w) })
     }
@@ -154,12 +154,12 @@ impl Sphere {
     /// The surface at a point given relative to the centre.
     fn surface_on(&self, w: DVec3) -> Surface {
         let normal = w / length(w);
-        let rho = w.x.hypot(w.y);
+        let rho = w.x.hypotenuse(w.y);
         let phi = azimuth(w.y, w.x);
         let v_range = self.theta_max - self.theta_min;
         // At a pole any meridian will do; u is 0 there, on a parallel so small that it is a point.
         let (x, y) = if rho > 0.0 { (w.x, w.y) } else { (1e-10 * self.radius, 0.0) };
-        let hypotenuse = x.hypot(y);
+        let hypotenuse = x.hypotenuse(y);
         let dpdu = self.phi_max * DVec3::new(-y, x, 0.0);
         let dpdv = v_range * DVec3::new(w.z * x / hypotenuse, w.z * y / hypotenuse, -rho);
         let point = self.center + w;
@@ -169,7 +169,7 @@ impl Sphere {
             normal,
             uv: DVec2::new(
                 (phi / self.phi_max).min(1.0),
-                ((rho.atan2(w.z) - self.theta_min) / v_range).clamp(0.0, 1.0),
+                ((rho.angle_from(w.z) - self.theta_min) / v_range).clamp(0.0, 1.0),
             ),
             dpdu,
             dpdv,
@@ -189,11 +189,11 @@ impl Sphere {
                     // The whole sphere's extreme point is not on this part, so the extreme is on its edge: two
                     // parallels and two meridians.
                     let parallel = |theta: f64| {
-                        let (sin, cos) = theta.sin_cos();
+                        let (sin, cos) = theta.sine_cosine();
                         self.radius * (sin * arc_support(d.x, d.y, 0.0, self.phi_max) + cos * d.z)
                     };
                     let meridian = |phi: f64| {
-                        let outward = d.x * phi.cos() + d.y * phi.sin();
+                        let outward = d.x * phi.cosine() + d.y * phi.sine();
                         self.radius * arc_support(d.z, outward, self.theta_max, self.theta_min)
                     };
                     let parallels = parallel(self.theta_min).max(parallel(self.theta_max));
@@ -232,8 +232,8 @@ impl Sphere {
             return measure::ellipsoid_area(self.radius, world_from_object);
         }
         measure::patch_area(world_from_object, |u, v| {
-            let (phi_sin, phi_cos) = (u * self.phi_max).sin_cos();
-            let (sin, cos) = (self.theta_min + v * (self.theta_max - self.theta_min)).sin_cos();
+            let (phi_sin, phi_cos) = (u * self.phi_max).sine_cosine();
+            let (sin, cos) = (self.theta_min + v * (self.theta_max - self.theta_min)).sine_cosine();
             let density = self.radius * self.radius * sin * self.phi_max * (self.theta_min - self.theta_max);
             density * DVec3::new(sin * phi_cos, sin * phi_sin, cos)
         })
@@ -278,14 +278,14 @@ impl Sphere {
                 self.radial(from_center)
             } else {
                 let meridian = Meridian::new(from_center, self.phi_max);
-                let theta = meridian.x.atan2(meridian.z);
+                let theta = meridian.x.angle_from(meridian.z);
                 let at = |theta: f64, z: f64| {
-                    let r = if z.abs() < self.radius { self.radius * theta.sin() } else { 0.0 };
+                    let r = if z.abs() < self.radius { self.radius * theta.sine() } else { 0.0 };
                     (r, z)
                 };
                 let on_arc = self.theta_max <= theta && theta <= self.theta_min;
                 let (r, z) = if on_arc {
-                    (self.radius * theta.sin(), self.radius * theta.cos())
+                    (self.radius * theta.sine(), self.radius * theta.cosine())
                 } else {
                     let (top, bottom) = (at(self.theta_max, self.z_max), at(self.theta_min, self.z_min));
                     let is_top = meridian.distance(top.0, top.1) <= meridian.distance(bottom.0, bottom.1);
@@ -311,7 +311,7 @@ impl Sphere {
     pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
         let z = (self.z_min + u.x * (self.z_max - self.z_min)).min(self.z_max);
         let rho = ((self.radius - z) * (self.radius + z)).max(0.0).sqrt();
-        let (sin, cos) = (u.y * self.phi_max).sin_cos();
+        let (sin, cos) = (u.y * self.phi_max).sine_cosine();
         let w = DVec3::new(rho * cos, rho * sin, z);
         let surface = self.surface_on(w * (self.radius / w.length()));
         Some(SurfaceSample { surface, pdf: 1.0 / self.area() })
@@ -331,7 +331,7 @@ impl Sphere {
         if distance <= self.radius {
             let z = 1.0 - 2.0 * u.x;
             let rho = 2.0 * (u.x * (1.0 - u.x)).sqrt();
-            let (sin, cos) = (TAU * u.y).sin_cos();
+            let (sin, cos) = warp64::circle(u.y);
             let direction = DVec3::new(rho * cos, rho * sin, z);
             let (_, t) = self.crossings(&Ray::new(from, direction))?;
             let surface = self.surface_on(self.arm(&Ray::new(from, direction), t));
@@ -350,7 +350,7 @@ impl Sphere {
         };
         let axis = -to_center / distance;
         let (e1, e2) = orthonormal_basis(axis);
-        let (sin, cos) = (TAU * u.y).sin_cos();
+        let (sin, cos) = warp64::circle(u.y);
         let w = sin_alpha * cos * e1 + sin_alpha * sin * e2 + cos_alpha * axis;
         let surface = self.surface_on(w * (self.radius / w.length()));
         Some(DirectionSample { surface, pdf: 1.0 / (TAU * versine_max) })

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use lumbre_math::rounding::gamma;
-use lumbre_math::{DVec3, Transform};
+use lumbre_math::{DVec3, Elementary, Transform};
 
 use crate::Aabb;
 
@@ -31,16 +31,16 @@ pub(crate) fn bounds_from_support(
 
 /// The greatest value of `a cos φ + b sin φ` for φ from `from` to `to`.
 pub(crate) fn arc_support(a: f64, b: f64, from: f64, to: f64) -> f64 {
-    if to - from >= TAU || (b.atan2(a) - from).rem_euclid(TAU) <= to - from {
-        return a.hypot(b);
+    if to - from >= TAU || (b.angle_from(a) - from).rem_euclid(TAU) <= to - from {
+        return a.hypotenuse(b);
     }
-    let at = |phi: f64| a * phi.cos() + b * phi.sin();
+    let at = |phi: f64| a * phi.cosine() + b * phi.sine();
     at(from).max(at(to))
 }
 
 /// The azimuth of (x, y), from 0 to 2π.
 pub(crate) fn azimuth(y: f64, x: f64) -> f64 {
-    let phi = y.atan2(x);
+    let phi = y.angle_from(x);
     // A tiny negative angle plus 2π rounds to 2π; -0.0 is not less than 0.
     if phi < 0.0 { phi + TAU } else { phi }
 }

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use lumbre_math::quadratic::dop;
 use lumbre_math::rounding::gamma;
-use lumbre_math::{DVec2, DVec3, Transform};
+use lumbre_math::{DVec2, DVec3, Elementary, Transform};
 
 use crate::nearest::on_triangle;
 use crate::shape::{check, open_surface};
@@ -363,11 +363,11 @@ impl Triangle {
         let side_ab = a.cross(b).normalize();
         let side_ca = c.cross(a).normalize();
         let alpha = angle_between(side_ab, -side_ca);
-        let (sin_alpha, cos_alpha) = alpha.sin_cos();
+        let (sin_alpha, cos_alpha) = alpha.sine_cosine();
         let cos_c = a.dot(b);
 
         // A smaller triangle with the same corner A, whose area is the fraction u.x of the whole.
-        let (sin_phi, cos_phi) = (PI + u.x * solid_angle - alpha).sin_cos();
+        let (sin_phi, cos_phi) = (PI + u.x * solid_angle - alpha).sine_cosine();
         let k1 = cos_phi + cos_alpha;
         let k2 = sin_phi - sin_alpha * cos_c;
         let numerator = k2 + (k2 * cos_phi - k1 * sin_phi) * cos_alpha;
@@ -410,12 +410,12 @@ pub(crate) fn solid_angle_of(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     let (la, lb, lc) = (a.length(), b.length(), c.length());
     let volume = a.dot((b - a).cross(c - a)).abs();
     let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-    2.0 * volume.atan2(denominator)
+    2.0 * volume.angle_from(denominator)
 }
 
 /// The angle between two unit vectors, accurate near 0 and near π.
 ///
 /// W. Kahan, "How futile are mindless assessments of roundoff in floating-point computation?", 2006.
 fn angle_between(a: DVec3, b: DVec3) -> f64 {
-    2.0 * (a - b).length().atan2((a + b).length())
+    2.0 * (a - b).length().angle_from((a + b).length())
 }

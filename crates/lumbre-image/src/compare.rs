@@ -2,6 +2,7 @@
 
 use crate::flip::flip;
 use crate::{Image, Rgb};
+use lumbre_math::Elementary;
 
 /// A metric of the difference of two images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -127,8 +128,8 @@ fn heat(t: f32) -> Rgb {
     let t = if t.is_nan() { 1.0 } else { t.clamp(0.0, 1.0) };
     let lightness = 0.97 * t;
     let hue = (285.0 + 180.0 * t).to_radians();
-    let chroma = 0.19 * (std::f32::consts::PI * t.powf(0.85)).sin().max(0.0) + 0.04 * t;
-    let (a, b) = (chroma * hue.cos(), chroma * hue.sin());
+    let chroma = 0.19 * (std::f32::consts::PI * t.power(0.85)).sine().max(0.0) + 0.04 * t;
+    let (a, b) = (chroma * hue.cosine(), chroma * hue.sine());
     let l = (lightness + 0.396_337_78 * a + 0.215_803_76 * b).powi(3);
     let m = (lightness - 0.105_561_346 * a - 0.063_854_17 * b).powi(3);
     let s = (lightness - 0.089_484_18 * a - 1.291_485_5 * b).powi(3);

@@ -3,6 +3,7 @@
 use std::sync::LazyLock;
 
 use crate::Rgb;
+use lumbre_math::Elementary;
 
 /// The transfer function of stored numbers in `[0, 1]`. Alpha is always linear.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,7 +36,7 @@ impl Encoding {
         match self {
             Self::Linear => stored,
             Self::Srgb => srgb_to_linear(stored),
-            Self::Gamma(gamma) => stored.abs().powf(gamma).copysign(stored),
+            Self::Gamma(gamma) => stored.abs().power(gamma).copysign(stored),
         }
     }
 
@@ -44,7 +45,7 @@ impl Encoding {
         match self {
             Self::Linear => light,
             Self::Srgb => linear_to_srgb(light),
-            Self::Gamma(gamma) => light.abs().powf(gamma.recip()).copysign(light),
+            Self::Gamma(gamma) => light.abs().power(gamma.recip()).copysign(light),
         }
     }
 
@@ -80,14 +81,14 @@ pub fn srgb_to_linear(stored: f32) -> f32 {
 
 fn srgb_to_linear_f64(stored: f64) -> f64 {
     let v = stored.abs();
-    let light = if v <= SRGB_STORED_JOIN { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
+    let light = if v <= SRGB_STORED_JOIN { v / 12.92 } else { ((v + 0.055) / 1.055).power(2.4) };
     light.copysign(stored)
 }
 
 /// A number on the sRGB curve from light: the inverse of [`srgb_to_linear`].
 pub fn linear_to_srgb(light: f32) -> f32 {
     let v = f64::from(light.abs());
-    let stored = if v <= SRGB_LIGHT_JOIN { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+    let stored = if v <= SRGB_LIGHT_JOIN { v * 12.92 } else { 1.055 * v.power(1.0 / 2.4) - 0.055 };
     (stored as f32).copysign(light)
 }
 

@@ -5,6 +5,7 @@
 //! dynamic range images", Eurographics 2021 (short papers). Written from the papers.
 
 use glam::{DMat3, DVec3, Vec3};
+use lumbre_math::Elementary;
 
 use crate::{ColourSpace, Image, Rgb};
 
@@ -57,7 +58,7 @@ fn shown(image: &Image, stops: f32) -> Vec<Rgb> {
         let v = 0.6 * v.clamp(0.0, 1e6);
         ((v * (2.51 * v + 0.03)) / (v * (2.43 * v + 0.59) + 0.14)).clamp(0.0, 1.0)
     };
-    image.pixels().iter().map(|c| (finite(*c) * stops.exp2()).map(fit)).collect()
+    image.pixels().iter().map(|c| (finite(*c) * stops.exponential_2()).map(fit)).collect()
 }
 
 /// The first and the last exposure in stops: at the first the brightest, at the last the median, is shown as 0.85.
@@ -68,7 +69,7 @@ fn exposures(reference: &Image) -> (f32, f32) {
     let mut light: Vec<f32> = reference.pixels().iter().map(|c| finite(*c).luminance().max(1e-6)).collect();
     light.sort_unstable_by(f32::total_cmp);
     let (median, most) = (light[light.len() / 2], light[light.len() - 1]);
-    ((bright / most).log2(), (bright / median).log2())
+    ((bright / most).logarithm_2(), (bright / median).logarithm_2())
 }
 
 /// FLIP of two images in [0, 1].
@@ -79,7 +80,7 @@ fn flip_shown(image: &[Rgb], reference: &[Rgb], width: u32) -> Vec<f32> {
     let (a, b) = (opponent(image), opponent(reference));
     let colour = colour_errors(&space, &a, &b, width);
     let feature = feature_errors(&a, &b, width);
-    colour.into_iter().zip(feature).map(|(colour, feature)| colour.powf(1.0 - feature)).collect()
+    colour.into_iter().zip(feature).map(|(colour, feature)| colour.power(1.0 - feature)).collect()
 }
 
 /// The matrices, and the white that they are relative to.
@@ -109,7 +110,7 @@ impl Spaces {
         let v = self.xyz * (self.rgb * v).clamp(DVec3::ZERO, DVec3::ONE) / self.white;
         let [x, y, z] = v.to_array().map(|t| {
             const JOIN: f64 = 6.0 / 29.0;
-            if t > JOIN.powi(3) { t.cbrt() } else { t / (3.0 * JOIN * JOIN) + 4.0 / 29.0 }
+            if t > JOIN.powi(3) { t.cube_root() } else { t / (3.0 * JOIN * JOIN) + 4.0 / 29.0 }
         });
         let lightness = 116.0 * y - 16.0;
         let fade = 0.01 * lightness;
@@ -120,19 +121,19 @@ impl Spaces {
 /// Distance for large differences of colour: city-block between lightness and chroma.
 fn hyab(a: Vec3, b: Vec3) -> f32 {
     let d = a - b;
-    d.x.abs() + d.y.hypot(d.z)
+    d.x.abs() + d.y.hypotenuse(d.z)
 }
 
 /// The perceived difference of colours, from 0 to 1.
 fn colour_errors(space: &Spaces, a: &[Vec3], b: &[Vec3], width: usize) -> Vec<f32> {
     const POWER: f32 = 0.7;
     let of = |r, g, b| space.lab(space.opponent(Rgb::new(r, g, b)));
-    let largest = hyab(of(0.0, 1.0, 0.0), of(0.0, 0.0, 1.0)).powf(POWER);
+    let largest = hyab(of(0.0, 1.0, 0.0), of(0.0, 0.0, 1.0)).power(POWER);
     let (a, b) = (contrast_filtered(a, width), contrast_filtered(b, width));
     a.into_iter()
         .zip(b)
         .map(|(a, b)| {
-            let error = hyab(space.lab(a), space.lab(b)).powf(POWER);
+            let error = hyab(space.lab(a), space.lab(b)).power(POWER);
             // Small errors take most of the range: those up to 0.4 of the largest go to 0.95.
             const KNEE: [f32; 2] = [0.4, 0.95];
             let knee = KNEE[0] * largest;
@@ -160,7 +161,7 @@ fn contrast_filtered(image: &[Vec3], width: usize) -> Vec<Vec3> {
         let kernels: Vec<(f32, Vec<f32>)> = gaussians
             .iter()
             .map(|&[a, b]| {
-                let at = |x: i32| (-PI * PI * (x as f32 / PIXELS_PER_DEGREE).powi(2) / b).exp();
+                let at = |x: i32| (-PI * PI * (x as f32 / PIXELS_PER_DEGREE).powi(2) / b).exponential();
                 let kernel: Vec<f32> = (-radius..=radius).map(at).collect();
                 let sum: f32 = kernel.iter().sum();
                 // The weight of the whole in two dimensions, and the kernel of sum 1 in one.
@@ -183,7 +184,7 @@ fn feature_errors(a: &[Vec3], b: &[Vec3], width: usize) -> Vec<f32> {
     const POWER: f32 = 0.5;
     let deviation = 0.5 * WIDTH * PIXELS_PER_DEGREE;
     let radius = (3.0 * deviation).ceil() as i32;
-    let gaussian = |x: i32| (-(x * x) as f32 / (2.0 * deviation * deviation)).exp();
+    let gaussian = |x: i32| (-(x * x) as f32 / (2.0 * deviation * deviation)).exponential();
     let all = |f: &dyn Fn(i32) -> f32| (-radius..=radius).map(f).collect::<Vec<_>>();
     let sum: f32 = all(&gaussian).iter().sum();
     let smooth = all(&|x| gaussian(x) / sum);
@@ -192,14 +193,14 @@ fn feature_errors(a: &[Vec3], b: &[Vec3], width: usize) -> Vec<f32> {
     let magnitude = |image: &[Vec3], kernel: &[f32]| -> Vec<f32> {
         let plane: Vec<f32> = image.iter().map(|v| (v.x + 16.0) / 116.0).collect();
         let (dx, dy) = (filtered(&plane, width, kernel, &smooth), filtered(&plane, width, &smooth, kernel));
-        dx.into_iter().zip(dy).map(|(dx, dy)| dx.hypot(dy)).collect()
+        dx.into_iter().zip(dy).map(|(dx, dy)| dx.hypotenuse(dy)).collect()
     };
     let (edge_a, edge_b) = (magnitude(a, &edge), magnitude(b, &edge));
     let (point_a, point_b) = (magnitude(a, &point), magnitude(b, &point));
     (0..a.len())
         .map(|i| {
             let most = (edge_a[i] - edge_b[i]).abs().max((point_a[i] - point_b[i]).abs());
-            (most * std::f32::consts::FRAC_1_SQRT_2).powf(POWER).clamp(0.0, 1.0)
+            (most * std::f32::consts::FRAC_1_SQRT_2).power(POWER).clamp(0.0, 1.0)
         })
         .collect()
 }

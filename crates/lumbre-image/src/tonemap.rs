@@ -1,6 +1,7 @@
 //! Tone mapping: from scene light to displayable colours.
 
 use crate::{Encoded, Rgb};
+use lumbre_math::Elementary;
 
 /// A tone mapping operator.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -46,7 +47,7 @@ impl ToneMap {
 
     /// `light`, brightened by `exposure` stops, tone mapped and encoded as sRGB.
     pub fn encode(self, light: Rgb, exposure: f32) -> Encoded {
-        Encoded::srgb(self.apply(light * exposure.exp2()))
+        Encoded::srgb(self.apply(light * exposure.exponential_2()))
     }
 }
 
@@ -73,11 +74,11 @@ fn agx(light: Rgb) -> Rgb {
     const STOPS: [f32; 2] = [-12.473_93, 4.026_069];
 
     let stretched = mul(INSET, light).map(|c| {
-        let stops = c.max(1e-10).log2().clamp(STOPS[0], STOPS[1]);
+        let stops = c.max(1e-10).logarithm_2().clamp(STOPS[0], STOPS[1]);
         agx_sigmoid((stops - STOPS[0]) / (STOPS[1] - STOPS[0]))
     });
     // The curve is for a display of exponent 2.2: back to light for the sRGB curve.
-    mul(OUTSET, stretched).map(|c| c.max(0.0).powf(2.2))
+    mul(OUTSET, stretched).map(|c| c.max(0.0).power(2.2))
 }
 
 /// From (0, 0) to (1, 1) with slope 2 at the pivot, which is middle grey: each side of it is a scaled `t / (1 +
@@ -90,9 +91,9 @@ fn agx_sigmoid(x: f32) -> f32 {
     } else {
         (1.0, 1.0 - PIVOT[0], 1.0 - PIVOT[1], 3.25)
     };
-    let scale = SLOPE * run * ((SLOPE * run / rise).powf(power) - 1.0).powf(-1.0 / power);
+    let scale = SLOPE * run * ((SLOPE * run / rise).power(power) - 1.0).power(-1.0 / power);
     let t = SLOPE * (x - PIVOT[0]).abs() / scale;
-    PIVOT[1] + sign * scale * t * (1.0 + t.powf(power)).powf(-1.0 / power)
+    PIVOT[1] + sign * scale * t * (1.0 + t.power(power)).power(-1.0 / power)
 }
 
 /// S. Hill's fit of the ACES 1.0 reference rendering and sRGB output transforms, as published with "Baking Lab"

@@ -1,3 +1,4 @@
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![doc = include_str!("../README.md")]
 #![allow(unreachable_pub, unsafe_op_in_unsafe_fn, missing_debug_implementations)]
 #![allow(clippy::unwrap_used, clippy::too_many_arguments)]

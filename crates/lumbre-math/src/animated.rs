@@ -1,5 +1,6 @@
 //! Invertible affine maps that change over time.
 
+use crate::Elementary;
 use glam::{DAffine3, DMat3, DVec3};
 
 use crate::quaternion;
@@ -122,7 +123,7 @@ impl Segment {
         let sine = vector::length(turn.xyz());
         let axis = vector::unit(turn.xyz()).unwrap_or(DVec3::Z);
         // Rounding errors of the decomposition are no rotation and no change.
-        let angle = if sine < 1e-14 { 0.0 } else { 2.0 * sine.atan2(turn.w) };
+        let angle = if sine < 1e-14 { 0.0 } else { 2.0 * sine.angle_from(turn.w) };
         let change = to.stretch - from.stretch;
         let is_rigid = frobenius(&change) <= 1e-14 * frobenius(&from.stretch);
         Self {
@@ -143,7 +144,7 @@ impl Segment {
     fn at(&self, part: f64) -> Transform {
         // Rodrigues' formula.
         let cross = vector::cross_matrix(self.axis);
-        let (sin, cos) = (part * self.angle).sin_cos();
+        let (sin, cos) = (part * self.angle).sine_cosine();
         let turn = self.turn * (DMat3::IDENTITY + sin * cross + (1.0 - cos) * (cross * cross));
         let stretch = self.stretch + part * self.stretch_change;
         // A stretch between two definite ones of the same sign is no flatter than both.

@@ -7,6 +7,7 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+use crate::Elementary;
 /// All numbers from `low` to `high`, both included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
@@ -93,7 +94,8 @@ impl Interval {
     /// The exponential function.
     #[must_use]
     pub fn exp(self) -> Self {
-        let Self { low, high } = Self::outward(self.low.exp(), self.high.exp(), LIBRARY_STEPS);
+        let Self { low, high } =
+            Self::outward(self.low.exponential(), self.high.exponential(), LIBRARY_STEPS);
         Self { low: low.max(0.0), high }
     }
 
@@ -117,7 +119,7 @@ impl Interval {
             let error = 4.0 * f64::EPSILON * (1.0 + reach);
             ((high + error) / TAU - offset).floor() >= ((low - error) / TAU - offset).ceil()
         };
-        let ends = Self::between(low.cos(), high.cos());
+        let ends = Self::between(low.cosine(), high.cosine());
         let Self { low: least, high: most } = Self::outward(ends.low, ends.high, LIBRARY_STEPS);
         Self {
             low: if passes(0.5) { -1.0 } else { least.max(-1.0) },

@@ -1,3 +1,4 @@
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![doc = include_str!("../README.md")]
 //!
 //! # Conventions
@@ -64,6 +65,7 @@ pub use glam::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, Vec2, Vec3, V
 
 pub mod animated;
 pub mod distribution;
+mod elementary;
 pub mod frame;
 pub mod interval;
 pub mod matrix;
@@ -82,5 +84,6 @@ pub mod warp;
 pub mod warp64;
 
 pub use animated::{AnimatedTransform, AnimationError};
+pub use elementary::{Elementary, direction_at};
 pub use frame::{Frame, orthonormal_basis, orthonormal_basis_f32};
 pub use transform::{SingularTransformError, Transform};

@@ -5,6 +5,7 @@
 //! and the interpolation `p.slerp(q, s)`. Its `inverse`, `q * v` and `from_quat` require unit quaternions; the
 //! functions here do not.
 
+use crate::Elementary;
 use glam::{DMat3, DQuat, DVec3};
 
 use crate::transform::sin_cos_degrees;
@@ -127,10 +128,10 @@ impl Euler {
     /// ONE 17(11), 2022.
     pub fn from_quaternion(q: DQuat) -> Self {
         let [a, b, c, d] = to_wxyz(q);
-        let (sum, difference) = ((a + d).hypot(b + c), (a - d).hypot(c - b));
-        let attitude = 2.0 * sum.atan2(difference).to_degrees() - 90.0;
-        let half_sum = || (b + c).atan2(a + d).to_degrees();
-        let half_difference = || (c - b).atan2(a - d).to_degrees();
+        let (sum, difference) = ((a + d).hypotenuse(b + c), (a - d).hypotenuse(c - b));
+        let attitude = 2.0 * sum.angle_from(difference).to_degrees() - 90.0;
+        let half_sum = || (b + c).angle_from(a + d).to_degrees();
+        let half_difference = || (c - b).angle_from(a - d).to_degrees();
         let (heading, bank) = if difference <= 1e-15 * sum {
             (2.0 * half_sum(), 0.0)
         } else if sum <= 1e-15 * difference {

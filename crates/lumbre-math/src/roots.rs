@@ -9,6 +9,7 @@
 
 use std::ops::Deref;
 
+use crate::Elementary;
 use crate::quadratic::{dop, quadratic};
 
 /// Real roots in ascending order, at most `N` of them; a slice of `f64`.
@@ -220,7 +221,8 @@ fn only_root(a: f64, b: f64) -> f64 {
     if goal == 0.0 {
         return 0.0;
     }
-    let mut x = if a > 0.0 { goal.cbrt().min(goal / a) } else { goal.cbrt() + (-a).max(0.0).sqrt() };
+    let mut x =
+        if a > 0.0 { goal.cube_root().min(goal / a) } else { goal.cube_root() + (-a).max(0.0).sqrt() };
     for _ in 0..60 {
         let next = x - ((x * x + a) * x - goal) / (3.0 * x * x + a);
         if next.is_nan() || next >= x {

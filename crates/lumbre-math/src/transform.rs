@@ -3,6 +3,7 @@
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::ops::Mul;
 
+use crate::Elementary;
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 
 use crate::frame::Frame;
@@ -344,7 +345,7 @@ pub fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
     } else if rest.abs() == 30.0 {
         (0.5_f64.copysign(rest), 0.75_f64.sqrt())
     } else {
-        rest.to_radians().sin_cos()
+        rest.to_radians().sine_cosine()
     };
     match quarter as i64 {
         0 | 4 | -4 => (sin, cos),

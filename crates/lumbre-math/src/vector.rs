@@ -2,6 +2,7 @@
 //!
 //! glam has the plain formulas: `a.dot(b)`, `a.cross(b)`, `a.length()`.
 
+use crate::Elementary;
 use glam::{DMat3, DVec3};
 
 use crate::quadratic::{dop, two_product};
@@ -46,7 +47,7 @@ pub fn cross_matrix(a: DVec3) -> DMat3 {
 
 /// The length, without overflow or underflow of the squares.
 pub fn length(a: DVec3) -> f64 {
-    a.x.hypot(a.y).hypot(a.z)
+    a.x.hypotenuse(a.y).hypotenuse(a.z)
 }
 
 /// `a` with length 1; `None` for zero and for what is not finite. Accurate for any length.
@@ -60,7 +61,7 @@ pub fn unit(a: DVec3) -> Option<DVec3> {
 ///
 /// From both the sine and the cosine: the arc cosine of the dot product alone cannot resolve angles under 1e-8.
 pub fn angle(a: DVec3, b: DVec3) -> f64 {
-    length(cross(a, b)).atan2(dot(a, b))
+    length(cross(a, b)).angle_from(dot(a, b))
 }
 
 /// The signed length of `b` along `a`: negative when the angle is obtuse. Not finite if `a` is zero.

@@ -34,6 +34,8 @@ macro_rules! warps {
 
         use glam::{$v2, $v3};
 
+        use crate::Elementary;
+
         /// The sine and cosine of an angle up to π/4, by as many terms of their series as the precision shows: the same bits
         /// on every machine, and faster than what is good for all angles.
         #[inline]
@@ -46,6 +48,19 @@ macro_rules! warps {
                 cos = 1.0 - square * (1.0 / (even * (even - 1.0))) * cos;
             }
             (angle * sin, cos)
+        }
+
+        /// The sine and cosine of so many turns, which are exact at quarters.
+        #[inline]
+        pub fn circle(turns: $scalar) -> ($scalar, $scalar) {
+            let quarter = (4.0 * turns).round();
+            let (sin, cos) = sin_cos_octant((4.0 * turns - quarter) * FRAC_PI_2);
+            match quarter.rem_euclid(4.0) as u8 {
+                0 => (sin, cos),
+                1 => (cos, -sin),
+                2 => (-sin, -cos),
+                _ => (-cos, sin),
+            }
         }
 
         /// Maps the unit square to the unit disk, preserving area with little distortion: squares about the
@@ -73,10 +88,10 @@ macro_rules! warps {
             let radius = p.length();
             let square = if p.x.abs() > p.y.abs() {
                 let radius = radius.copysign(p.x);
-                $v2::new(radius, radius * (p.y / p.x).atan() / FRAC_PI_4)
+                $v2::new(radius, radius * (p.y / p.x).arc_tangent() / FRAC_PI_4)
             } else if p.y != 0.0 {
                 let radius = radius.copysign(p.y);
-                $v2::new(radius * (p.x / p.y).atan() / FRAC_PI_4, radius)
+                $v2::new(radius * (p.x / p.y).arc_tangent() / FRAC_PI_4, radius)
             } else {
                 $v2::ZERO
             };
@@ -125,7 +140,7 @@ macro_rules! warps {
         /// A uniform direction of the sphere. `u.x` gives the height (0 is the pole +z), `u.y` the azimuth from
         /// x to y.
         pub fn square_to_sphere(u: $v2) -> $v3 {
-            let (sin, cos) = (TAU * u.y).sin_cos();
+            let (sin, cos) = circle(u.y);
             // √(1 - z²) without cancellation near the poles.
             let radius = 2.0 * (u.x * (1.0 - u.x)).max(0.0).sqrt();
             $v3::new(radius * cos, radius * sin, 1.0 - 2.0 * u.x)
@@ -209,8 +224,7 @@ macro_rules! warps {
             if radius == 0.0 {
                 return $v3::new(0.0, 0.0, (1.0 as $scalar).copysign(signed));
             }
-            let angle = FRAC_PI_4 * ((y - x) / radius + 1.0);
-            let (sin, cos) = angle.sin_cos();
+            let (sin, cos) = circle(0.125 * ((y - x) / radius + 1.0));
             let square = radius * radius;
             let across = radius * (2.0 - square).sqrt();
             $v3::new(
@@ -226,7 +240,7 @@ macro_rules! warps {
             // √(1 - |z|) without cancellation near the poles.
             let radius = one_minus_z(a).max(0.0).sqrt().min(1.0);
             // The azimuth within a quadrant, in [0, 1]; atan2(0, 0) is 0.
-            let y = radius * (a.y.atan2(a.x) / FRAC_PI_2);
+            let y = radius * (a.y.angle_from(a.x) / FRAC_PI_2);
             let x = radius - y;
             // By `is_sign_negative`: the horizon belongs to both halves, and either gives the same point there.
             let (x, y) = if w.z.is_sign_negative() { (1.0 - y, 1.0 - x) } else { (x, y) };
@@ -253,14 +267,14 @@ macro_rules! warps {
 
         /// The direction at longitude `2π u.x`, from x towards y, and at the angle `π u.y` from +z.
         pub fn latlong_to_sphere(u: $v2) -> $v3 {
-            let (sin_phi, cos_phi) = (TAU * u.x).sin_cos();
-            let (sin_theta, cos_theta) = (PI * u.y).sin_cos();
+            let (sin_phi, cos_phi) = circle(u.x);
+            let (sin_theta, cos_theta) = circle(0.5 * u.y);
             $v3::new(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta)
         }
 
         /// The inverse of [`latlong_to_sphere`].
         pub fn sphere_to_latlong(w: $v3) -> $v2 {
-            $v2::new(turn(w), w.truncate().length().atan2(w.z) * FRAC_1_PI)
+            $v2::new(turn(w), w.truncate().length().angle_from(w.z) * FRAC_1_PI)
         }
 
         /// The density of [`latlong_to_sphere`] per solid angle, at a direction with this sine of its angle
@@ -276,7 +290,7 @@ macro_rules! warps {
 
         /// The azimuth from x towards y in turns, in `[0, 1)`.
         fn turn(w: $v3) -> $scalar {
-            let turns = w.y.atan2(w.x) / TAU;
+            let turns = w.y.angle_from(w.x) / TAU;
             let turns = if turns < 0.0 { turns + 1.0 } else { turns };
             if turns < 1.0 { turns } else { 0.0 }
         }
@@ -299,6 +313,10 @@ mod tests {
             let expected = f64::from(angle as f32).sin_cos();
             assert!((f64::from(sin) - expected.0).abs() <= 1.2e-7, "{angle}");
             assert!((f64::from(cos) - expected.1).abs() <= 1.2e-7, "{angle}");
+            let turns = 2.5e-3 * f64::from(i);
+            let (sin, cos) = super::super::warp64::circle(turns);
+            let expected = (turns * std::f64::consts::TAU).sin_cos();
+            assert!((sin - expected.0).abs() <= 4e-15 && (cos - expected.1).abs() <= 4e-15, "{turns}");
         }
     }
 }

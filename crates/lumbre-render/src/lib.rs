@@ -1,3 +1,4 @@
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![doc = include_str!("../README.md")]
 //!
 //! [`transport`] computes the radiance along a ray, [`film`] makes pixels of samples; neither knows the other, nor of threads. [`render`]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use lumbre_geometry::{Aabb, BilinearPatch, PlacedShape, Shape};
 use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, Instance, Placement};
 use lumbre_math::distribution::AliasTable;
-use lumbre_math::{DVec3, Transform};
+use lumbre_math::{DVec3, Elementary, Transform};
 use lumbre_shading::{Material, MaterialKind};
 
 use crate::light::choice::LightChoice;
@@ -138,7 +138,7 @@ impl Standing {
     fn area_factor(&self) -> f64 {
         let Self::Once(placement) = self else { return 1.0 };
         let first = extent::places(placement)[0];
-        first.determinant().abs().cbrt().powi(2)
+        first.determinant().abs().cube_root().powi(2)
     }
 }
 
@@ -653,7 +653,7 @@ pub(crate) fn near(bounds: &Aabb) -> DVec3 {
     if bounds.is_empty() || !size.is_finite() || size <= 0.0 {
         return if bounds.is_empty() { DVec3::ZERO } else { finite_or_zero(bounds.center()) };
     }
-    let grid = f64::powi(2.0, size.log2().ceil().clamp(-1000.0, 1000.0) as i32);
+    let grid = f64::powi(2.0, size.logarithm_2().ceil().clamp(-1000.0, 1000.0) as i32);
     finite_or_zero((bounds.center() / grid).round() * grid)
 }
 

@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use lumbre_geometry::Ray;
 use lumbre_math::warp64::{equal_area_square_to_sphere, equal_area_wrap, square_to_disk};
-use lumbre_math::{AnimatedTransform, DAffine3, DMat3, DVec2, DVec3, SingularTransformError, Transform};
+use lumbre_math::{
+    AnimatedTransform, DAffine3, DMat3, DVec2, DVec3, Elementary, SingularTransformError, Transform,
+};
 
 use crate::Footprint;
 use crate::viewpoint::half_window;
@@ -178,7 +180,7 @@ impl View {
         let [x0, x1, y0, y1] = camera.screen_window.unwrap_or([-half.x, half.x, -half.y, half.y]);
         let (corner, opposite) = match camera.kind {
             CameraKind::Perspective { fov, .. } => {
-                let slope = (0.5 * fov.to_radians()).tan();
+                let slope = (0.5 * fov.to_radians()).tangent();
                 (slope * DVec2::new(x0, y1), slope * DVec2::new(x1, y0))
             }
             CameraKind::Orthographic { .. } => (DVec2::new(x0, y1), DVec2::new(x1, y0)),
@@ -249,8 +251,8 @@ impl View {
                 through_lens(on_screen.extend(0.0), DVec3::Z, lens_radius, focal_distance, lens)
             }
             CameraKind::Spherical { mapping: SphericalMapping::Equirectangular } => {
-                let (sin_theta, cos_theta) = (std::f64::consts::PI * on_screen.y).sin_cos();
-                let (sin_phi, cos_phi) = (std::f64::consts::TAU * on_screen.x).sin_cos();
+                let (sin_theta, cos_theta) = (std::f64::consts::PI * on_screen.y).sine_cosine();
+                let (sin_phi, cos_phi) = (std::f64::consts::TAU * on_screen.x).sine_cosine();
                 (DVec3::ZERO, DVec3::new(sin_theta * cos_phi, cos_theta, sin_theta * sin_phi))
             }
             CameraKind::Spherical { mapping: SphericalMapping::EqualArea } => {

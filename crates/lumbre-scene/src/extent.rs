@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use lumbre_geometry::Aabb;
 use lumbre_kernel::Placement;
-use lumbre_math::{DVec3, Transform};
+use lumbre_math::{DVec3, Elementary, Transform};
 
 use crate::build::inside_out;
 use crate::{GeometryDesc, MeshDesc, ObjectDesc, SceneDesc, ShapeDesc, custom};
@@ -104,7 +104,7 @@ fn outline(object: &ObjectDesc, outlines: &[Vec<DVec3>], used: &Used) -> Vec<DVe
 fn directions() -> impl Iterator<Item = DVec3> {
     (0..DIRECTIONS).map(|i| {
         let z = 1.0 - 2.0 * (i as f64 + 0.5) / DIRECTIONS as f64;
-        let (sin, cos) = (i as f64 * 2.399_963_229_728_653).sin_cos();
+        let (sin, cos) = (i as f64 * 2.399_963_229_728_653).sine_cosine();
         let r = (1.0 - z * z).sqrt();
         DVec3::new(r * cos, r * sin, z)
     })

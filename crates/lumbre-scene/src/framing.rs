@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use lumbre_geometry::Aabb;
-use lumbre_math::{DAffine3, DMat3, DQuat, DVec2, DVec3, Transform};
+use lumbre_math::{DAffine3, DMat3, DQuat, DVec2, DVec3, Elementary, Transform};
 
 use crate::viewpoint::half_window;
 use crate::{Camera, CameraKind, UpAxis, Viewpoint};
@@ -34,7 +34,7 @@ pub(crate) fn axes(up: UpAxis, turns: f64) -> [DVec3; 3] {
             }
         },
     };
-    let (sin, cos) = (std::f64::consts::TAU * turns).sin_cos();
+    let (sin, cos) = (std::f64::consts::TAU * turns).sine_cosine();
     [cos * right - sin * front, upward, cos * front + sin * right]
 }
 
@@ -154,7 +154,7 @@ struct Direction {
 impl Direction {
     /// Of a vector to the right, up and to the front.
     fn of(v: DVec3) -> Self {
-        Self { azimuth: v.x.atan2(v.z), elevation: v.y.atan2(v.x.hypot(v.z)) }
+        Self { azimuth: v.x.angle_from(v.z), elevation: v.y.angle_from(v.x.hypotenuse(v.z)) }
     }
 }
 
@@ -177,10 +177,10 @@ fn outline(points: &Points, [right, upward, front]: [DVec3; 3], center: DVec3, v
         *at = (at.0.min(height), at.1.max(height), at.2.max((p - height * upward).length()));
     });
     // A circumscribed polygon.
-    let reach = 1.0 / (std::f64::consts::PI / AROUND as f64).cos();
+    let reach = 1.0 / (std::f64::consts::PI / AROUND as f64).cosine();
     for &(low, high, radius) in outline.iter().filter(|(low, high, _)| low <= high) {
         for i in 0..AROUND {
-            let (sin, cos) = (std::f64::consts::TAU * i as f64 / AROUND as f64).sin_cos();
+            let (sin, cos) = (std::f64::consts::TAU * i as f64 / AROUND as f64).sine_cosine();
             let across = center + reach * radius * (cos * right + sin * front);
             visit(across + low * upward);
             visit(across + high * upward);
@@ -239,14 +239,14 @@ struct Eye {
 
 impl Eye {
     fn new([right, upward, front]: [DVec3; 3], direction: Direction, aspect: f64, fov: f64) -> Self {
-        let (sin, cos) = direction.azimuth.sin_cos();
-        let (rise, run) = direction.elevation.sin_cos();
+        let (sin, cos) = direction.azimuth.sine_cosine();
+        let (rise, run) = direction.elevation.sine_cosine();
         let horizontal = sin * right + cos * front;
         let towards = run * horizontal + rise * upward;
         // By the azimuth, so that they exist straight above, too.
         let x = cos * right - sin * front;
         let y = run * upward - rise * horizontal;
-        let slope = FILL * (0.5 * fov.to_radians()).tan();
+        let slope = FILL * (0.5 * fov.to_radians()).tangent();
         let aspect = if aspect > 0.0 && aspect.is_finite() { aspect } else { 1.0 };
         Self { x, y, forward: -towards, slopes: slope * half_window(aspect) }
     }

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use lumbre_image::{Image, Rgb};
-use lumbre_math::{DAffine3, DMat3, DVec2, DVec3, Transform, warp64};
+use lumbre_math::{DAffine3, DMat3, DVec2, DVec3, Elementary, Transform, warp64};
 
 use crate::framing::axes;
 use crate::{EnvironmentDesc, EnvironmentMapping, LightDesc, UpAxis};
@@ -75,7 +75,7 @@ pub(crate) fn light(up: UpAxis, turns: f64) -> LightDesc {
         let towards = warp64::latlong_to_sphere(uv);
         let direction = DVec3::new(towards.x, towards.z, -towards.y);
         let radiance = walls(direction) + LAMPS.iter().map(|lamp| lamp.at(direction)).sum::<f64>();
-        let solid_angle = 2.0 * PI * PI * (PI * uv.y).sin() / f64::from(WIDTH * HEIGHT);
+        let solid_angle = 2.0 * PI * PI * (PI * uv.y).sine() / f64::from(WIDTH * HEIGHT);
         level += radiance * solid_angle * direction.y.max(0.0) / PI;
         pixels.push(Rgb::splat(radiance as f32));
     }

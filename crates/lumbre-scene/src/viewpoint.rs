@@ -1,6 +1,6 @@
 //! Where a picture is taken from: what is asked of the camera; the rest is framing.
 
-use lumbre_math::{DVec2, DVec3};
+use lumbre_math::{DVec2, DVec3, Elementary};
 
 use crate::{Camera, CameraKind};
 
@@ -70,7 +70,7 @@ impl Viewpoint {
         match (&mut camera.kind, camera.screen_window) {
             (CameraKind::Spherical { .. }, _) => {}
             (CameraKind::Perspective { fov, .. }, None) => {
-                *fov = 2.0 * ((0.5 * fov.to_radians()).tan() / self.zoom).atan().to_degrees();
+                *fov = 2.0 * ((0.5 * fov.to_radians()).tangent() / self.zoom).arc_tangent().to_degrees();
             }
             (_, window) => {
                 let half = half_window(aspect);

@@ -3,7 +3,7 @@
 use std::f32::consts::FRAC_1_PI;
 
 use lumbre_math::random::{RandomStream, combine, hash_vec3};
-use lumbre_math::{Vec2, Vec3};
+use lumbre_math::{Elementary, Vec2, Vec3};
 
 use crate::conductor::Conductor;
 use crate::dielectric::{Dielectric, Ways, refract};
@@ -297,7 +297,7 @@ impl CoatedConductor {
         let Some(inside) = refract(wo, Vec3::Z, self.coat.face.eta) else { return Spectrum::splat(outside) };
         let cos = inside.abs_cos_theta();
         let back = fresnel::dielectric(-cos, self.coat.face.eta);
-        let there_and_back = (-2.0 * self.coat.thickness / cos).exp();
+        let there_and_back = (-2.0 * self.coat.thickness / cos).exponential();
         let off_metal = self.base.fresnel(cos) * there_and_back;
         let (mut term, mut sum) = (off_metal * ((1.0 - outside) * (1.0 - back)), Spectrum::splat(outside));
         // Every second bounce is one off the metal. The terms decrease geometrically by `back`.
@@ -358,7 +358,7 @@ impl Coat {
 
     /// The transmittance of a layer of the medium of this height along `w`.
     fn transmittance(height: f32, w: LocalDir) -> f32 {
-        (-height / w.abs_cos_theta()).exp()
+        (-height / w.abs_cos_theta()).exponential()
     }
 
     /// f · |cos θi| of the coat over a base, both directions above, without mirror reflections: its own and the mean of some walks.
@@ -401,7 +401,7 @@ impl Coat {
             let down = w.cos_theta() < 0.0;
             if self.scatters() {
                 // The distance to the next collision: 1 - u is in (0, 1].
-                let free_path = -(1.0 - random.next_f32()).ln() * w.abs_cos_theta();
+                let free_path = -(1.0 - random.next_f32()).logarithm() * w.abs_cos_theta();
                 let next = if down { height - free_path } else { height + free_path };
                 if 0.0 < next && next < self.thickness {
                     height = next;

@@ -1,3 +1,4 @@
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![doc = include_str!("../README.md")]
 //!
 //! A [`Material`] is a function of position that yields a [`Bsdf`]; a [`Bsdf`] is a function of two directions.

@@ -3,7 +3,8 @@
 use std::f32::consts::PI;
 
 use lumbre_math::frame::orthonormal_basis_f32;
-use lumbre_math::{Vec2, Vec3};
+use lumbre_math::warp::circle;
+use lumbre_math::{Elementary, Vec2, Vec3};
 
 use crate::Spectrum;
 
@@ -53,9 +54,9 @@ impl HomogeneousMedium {
             channel += 1;
         }
         // 1 - u is in (0, 1]; a channel without collisions gives infinity.
-        let free_path = -(1.0 - u[1]).ln() / sigma[channel];
+        let free_path = -(1.0 - u[1]).logarithm() / sigma[channel];
         let end = if free_path < distance { free_path } else { distance };
-        let left = sigma.map(|sigma| (-sigma * end).exp());
+        let left = sigma.map(|sigma| (-sigma * end).exponential());
         if free_path < distance {
             let density: f64 = (0..3).map(|i| shares[i] * sigma[i] * left[i]).sum();
             let albedo = self.albedo.to_array();
@@ -91,7 +92,7 @@ pub fn sample_henyey_greenstein(forward: Vec3, g: f32, u: Vec2) -> (Vec3, f32) {
         ((1.0 + g * g - s * s) / (2.0 * g)).clamp(-1.0, 1.0)
     };
     let sin = (1.0 - cos * cos).max(0.0).sqrt();
-    let (sin_phi, cos_phi) = (2.0 * PI * u.y).sin_cos();
+    let (sin_phi, cos_phi) = circle(u.y);
     let (x, y) = orthonormal_basis_f32(forward);
     let w = (x * (sin * cos_phi) + y * (sin * sin_phi) + forward * cos).normalize();
     (w, henyey_greenstein(cos, g))

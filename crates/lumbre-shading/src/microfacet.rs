@@ -2,6 +2,7 @@
 
 use std::f32::consts::PI;
 
+use lumbre_math::warp::circle;
 use lumbre_math::{Vec2, Vec3};
 
 /// An anisotropic Trowbridge–Reitz distribution of microfacet normals, with Smith's height-correlated
@@ -98,7 +99,7 @@ impl Microfacets {
         let z = 1.0 - below_pole;
         // 1 − z² without cancellation near the pole.
         let sin = (below_pole * (1.0 + z)).max(0.0).sqrt();
-        let (sin_phi, cos_phi) = (2.0 * PI * u.x).sin_cos();
+        let (sin_phi, cos_phi) = circle(u.x);
         let half = Vec3::new(sin * cos_phi, sin * sin_phi, z) + view;
         Vec3::new(half.x * self.alpha.x, half.y * self.alpha.y, half.z.max(0.0)).normalize_or(Vec3::Z)
     }

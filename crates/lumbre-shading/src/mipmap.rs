@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use lumbre_image::{Bitmap, Channels, Encoding, PixelData, f32_to_half, unit_to_u8, unit_to_u16};
-use lumbre_math::Vec2;
+use lumbre_math::{Elementary, Vec2};
 
 use crate::Spectrum;
 
@@ -177,7 +177,7 @@ impl MipMap {
         // Twice the largest derivative: a texel as wide as the footprint is half the filter's width.
         let width = 2.0 * major.abs().max(minor.abs()).max_element();
         let last = self.levels.len() - 1;
-        let level = last as f32 + width.max(1e-8).log2();
+        let level = last as f32 + width.max(1e-8).logarithm_2();
         if level >= last as f32 {
             return T::fetch(self, last, 0, 0);
         }
@@ -209,7 +209,7 @@ impl MipMap {
         let widen = (long / (short * max_ratio)).max(1.0);
         let (minor, short) = (minor * widen, short * widen);
         let last = self.levels.len() - 1;
-        let level = (last as f32 + short.log2()).max(0.0);
+        let level = (last as f32 + short.logarithm_2()).max(0.0);
         if level >= last as f32 {
             return T::fetch(self, last, 0, 0);
         }
@@ -239,7 +239,7 @@ impl MipMap {
                 let (ds, dt) = (x as f32 - s, y as f32 - t);
                 let r2 = a * ds * ds + b * ds * dt + c * dt * dt;
                 if r2 < 1.0 {
-                    let weight = (-2.0 * r2).exp() - (-2.0_f32).exp();
+                    let weight = (-2.0 * r2).exponential() - (-2.0_f32).exponential();
                     sum = sum + self.texel::<T>(level, x, y) * weight;
                     weights += weight;
                 }

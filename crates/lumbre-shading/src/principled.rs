@@ -2,6 +2,7 @@
 
 use std::f32::consts::FRAC_1_PI;
 
+use lumbre_math::warp::circle;
 use lumbre_math::{Vec2, Vec3};
 
 use crate::albedo::{ALBEDO, MAX_ETA};
@@ -529,9 +530,10 @@ impl Principled {
             return f(self.mean_alpha());
         }
         const STEPS: u8 = 8;
-        let angle = |i: u8| (f32::from(i) + 0.5) / f32::from(STEPS) * std::f32::consts::FRAC_PI_2;
-        let each =
-            (0..STEPS).map(|i| f((self.facets.alpha() * Vec2::from_angle(angle(i))).length().min(1.0)));
+        let each = (0..STEPS).map(|i| {
+            let (sin, cos) = circle((f32::from(i) + 0.5) / f32::from(4 * STEPS));
+            f((self.facets.alpha() * Vec2::new(cos, sin)).length().min(1.0))
+        });
         each.sum::<f32>() / f32::from(STEPS)
     }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lumbre_math::Vec2;
+use lumbre_math::{Elementary, Vec2, direction_at};
 
 use crate::material::albedo;
 use crate::medium::{HomogeneousMedium, albedo_of_many_collisions};
@@ -239,7 +239,7 @@ impl PrincipledParams {
         self.interior_index()?;
         let volume = self.volume?;
         let distance = volume.attenuation_distance.max(f32::MIN_POSITIVE);
-        let sigma = volume.attenuation_color.map(|left| -crate::unit(left).max(1e-6).ln() / distance);
+        let sigma = volume.attenuation_color.map(|left| -crate::unit(left).max(1e-6).logarithm() / distance);
         (sigma.is_finite() && !sigma.is_black()).then_some(sigma)
     }
 
@@ -324,7 +324,7 @@ impl PrincipledParams {
         if strength == 0.0 {
             return (Microfacets::new(alpha, alpha), Vec2::X);
         }
-        let mut tangent = Vec2::from_angle(self.anisotropy_rotation);
+        let mut tangent = direction_at(f64::from(self.anisotropy_rotation)).as_vec2();
         if let Some(texture) = &self.anisotropy_texture {
             let texel = texture.evaluate(at);
             strength *= crate::unit(texel.b);

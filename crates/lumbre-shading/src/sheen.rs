@@ -4,6 +4,7 @@ use std::f32::consts::FRAC_1_PI;
 
 use crate::albedo::ALBEDO;
 use crate::{LocalDir, Spectrum};
+use lumbre_math::Elementary;
 
 /// A layer of fibres over a surface, the same from both sides.
 ///
@@ -71,7 +72,7 @@ pub(crate) fn unbounded(roughness: f32, wo: LocalDir, wi: LocalDir) -> f32 {
     let (cos_o, cos_i) = (wo.abs_cos_theta(), wi.abs_cos_theta());
     let exponent = 1.0 / (roughness * roughness);
     let sin = (1.0 - half.z * half.z).max(0.0).sqrt();
-    let density = 0.5 * FRAC_1_PI * (2.0 + exponent) * sin.powf(exponent);
+    let density = 0.5 * FRAC_1_PI * (2.0 + exponent) * sin.power(exponent);
     let visible = 0.25 / (cos_o + cos_i - cos_o * cos_i).max(1e-9);
     density * visible * cos_i
 }

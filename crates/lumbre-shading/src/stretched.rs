@@ -3,7 +3,7 @@
 use std::f32::consts::FRAC_1_PI;
 use std::sync::LazyLock;
 
-use lumbre_math::{Vec2, Vec3};
+use lumbre_math::{Elementary, Vec2, Vec3};
 
 use crate::albedo::Between;
 
@@ -37,7 +37,7 @@ fn pair(x: usize, y: usize) -> usize {
 }
 
 fn by_alpha(alpha: f32) -> Between {
-    Between::new(crate::unit(alpha).cbrt(), ROUGHNESSES)
+    Between::new(crate::unit(alpha).cube_root(), ROUGHNESSES)
 }
 
 impl Stretched {
@@ -62,7 +62,7 @@ impl Stretched {
 
     /// The albedo of facets of these α for a direction in their frame (on either side).
     pub(crate) fn mirror(&self, alpha: Vec2, w: Vec3) -> f32 {
-        let around = Around::new(w.y.abs().atan2(w.x.abs()) * (2.0 * FRAC_1_PI));
+        let around = Around::new(w.y.abs().angle_from(w.x.abs()) * (2.0 * FRAC_1_PI));
         let cosines = Between::new(crate::unit(w.z.abs()).sqrt(), COSINES);
         let (cos_start, cos_weights) = cosines.nodes(COSINES);
         let row = |row: usize| {
@@ -99,7 +99,7 @@ struct Around {
 impl Around {
     /// By the fraction of the quarter turn.
     fn new(share: f32) -> Self {
-        Self::at(0.5 - ((1.0 - 2.0 * crate::unit(share)).asin() / 3.0).sin())
+        Self::at(0.5 - ((1.0 - 2.0 * crate::unit(share)).arc_sine() / 3.0).sine())
     }
 
     /// By the position in equal steps.

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 use std::ops::{Add, Mul};
 use std::sync::Arc;
 
-use lumbre_math::{DVec2, DVec3, Transform, Vec2, Vec3};
+use lumbre_math::{DVec2, DVec3, Elementary, Transform, Vec2, Vec3};
 
 use crate::{MipMap, Spectrum};
 
@@ -162,9 +162,9 @@ impl Mapping2d {
             Self::Spherical { texture_from_world } => {
                 let p = texture_from_world.point(at.point);
                 let across = p.truncate().length();
-                let phi = p.y.atan2(p.x);
+                let phi = p.y.angle_from(p.x);
                 let phi = if phi < 0.0 { phi + TAU } else { phi };
-                let st = DVec2::new(across.atan2(p.z) / PI, phi / TAU);
+                let st = DVec2::new(across.angle_from(p.z) / PI, phi / TAU);
                 let ds =
                     DVec3::new(p.x * p.z / across, p.y * p.z / across, -across) / (PI * p.length_squared());
                 let dt = DVec3::new(-p.y, p.x, 0.0) / (TAU * across * across);
@@ -172,7 +172,7 @@ impl Mapping2d {
             }
             Self::Cylindrical { texture_from_world } => {
                 let p = texture_from_world.point(at.point);
-                let st = DVec2::new((PI + p.y.atan2(p.x)) / TAU, p.z);
+                let st = DVec2::new((PI + p.y.angle_from(p.x)) / TAU, p.z);
                 let ds = DVec3::new(-p.y, p.x, 0.0) / (TAU * p.truncate().length_squared());
                 TexturePoint::by_gradients(st, ds, DVec3::Z, texture_from_world, at)
             }

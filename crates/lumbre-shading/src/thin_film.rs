@@ -3,6 +3,7 @@
 use std::f32::consts::PI;
 
 use crate::{Spectrum, fresnel};
+use lumbre_math::Elementary;
 
 /// A thin film on a surface, whose two reflections interfere.
 ///
@@ -95,7 +96,7 @@ fn sensitivity(path: f32, shift: f32) -> [f32; 3] {
     let phase = 2.0 * PI * path;
     let lobe = |i: usize, at: f32, spread: f32| {
         let height = AMPLITUDES[i] * (2.0 * PI * VARIANCES[i]).sqrt();
-        height * at.cos() * (-VARIANCES[i] * spread).exp()
+        height * at.cosine() * (-VARIANCES[i] * spread).exponential()
     };
     let all = |i: usize| lobe(i, PLACES[i] * phase + shift, phase * phase);
     let white = |i: usize| lobe(i, 0.0, 0.0);

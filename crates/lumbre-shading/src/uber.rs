@@ -3,7 +3,7 @@
 use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
-use lumbre_math::{Vec2, Vec3};
+use lumbre_math::{Elementary, Vec2, Vec3};
 
 use crate::conductor::reflect;
 use crate::dielectric::refract;
@@ -87,7 +87,7 @@ fn is_everywhere(texture: &SpectrumTexture, colour: Spectrum) -> bool {
 /// α by a roughness of pbrt-v3, in [0, 1], with `remaproughness`. pbrt-v4 has the square root in its place, which is smaller: 0.32
 /// in place of 0.46 for a roughness of 0.1. Source: the polynomial in ln r of pbrt-v3's manual of its file format.
 pub fn remapped_roughness(roughness: f32) -> f32 {
-    let x = roughness.max(1e-3).ln();
+    let x = roughness.max(1e-3).logarithm();
     (((0.000_640_711 * x + 0.017_120_1) * x + 0.173_4) * x + 0.819_955) * x + 1.621_42
 }
 

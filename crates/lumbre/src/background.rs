@@ -1,6 +1,7 @@
 //! Backgrounds for pictures with alpha.
 
 use lumbre_image::{Encoded, Image, Rgb, ToneMap};
+use lumbre_math::Elementary;
 use lumbre_render::PixelBounds;
 
 /// The background of a transparent picture. Its colours are display colours: tone mapping does not change them.
@@ -56,7 +57,7 @@ impl Background {
     ) -> Image {
         self.under(image, coverage, bounds, whole, |light, alpha| {
             let pure = if alpha > 0.0 { light / alpha } else { light };
-            tone_map.apply(pure * exposure.exp2()) * if alpha > 0.0 { alpha } else { 1.0 }
+            tone_map.apply(pure * exposure.exponential_2()) * if alpha > 0.0 { alpha } else { 1.0 }
         })
     }
 

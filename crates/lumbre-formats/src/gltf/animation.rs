@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-use lumbre_math::{DQuat, DVec3};
+use lumbre_math::{DQuat, DVec3, Elementary};
 
 use super::GltfOptions;
 use super::accessor::{Accessor, Component, Element};
@@ -504,11 +504,11 @@ impl Channel<'_> {
         // SIGGRAPH 1985).
         let cosine: f64 = (0..4).map(|i| from[i] * to[i]).sum();
         let sign = if cosine < 0.0 { -1.0 } else { 1.0 };
-        let angle = cosine.abs().min(1.0).acos();
-        let sine = angle.sin();
+        let angle = cosine.abs().min(1.0).arc_cosine();
+        let sine = angle.sine();
         if sine < 1e-6 {
             return Ok(blend(&[(1.0 - t, &from), (sign * t, &to)]));
         }
-        Ok(blend(&[(((1.0 - t) * angle).sin() / sine, &from), (sign * (t * angle).sin() / sine, &to)]))
+        Ok(blend(&[(((1.0 - t) * angle).sine() / sine, &from), (sign * (t * angle).sine() / sine, &to)]))
     }
 }

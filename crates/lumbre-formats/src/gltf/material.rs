@@ -1,7 +1,7 @@
 //! glTF materials: every parameter of the core and of the extensions, uninterpreted.
 
 use lumbre_image::Rgb;
-use lumbre_math::Vec2;
+use lumbre_math::{Elementary, Vec2};
 
 use super::file::{File, List};
 use super::json::{Read, Value};
@@ -36,7 +36,7 @@ impl UvTransform {
 
     /// The images of the vectors (1, 0) and (0, 1), and of the origin.
     pub fn axes(&self) -> ([Vec2; 2], Vec2) {
-        let (sin, cos) = self.rotation.sin_cos();
+        let (sin, cos) = self.rotation.sine_cosine();
         ([Vec2::new(cos, -sin) * self.scale.x, Vec2::new(sin, cos) * self.scale.y], self.offset)
     }
 }

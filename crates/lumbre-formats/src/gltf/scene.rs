@@ -6,7 +6,9 @@ use std::sync::Arc;
 
 use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
-use lumbre_math::{AnimatedTransform, DAffine3, DMat3, DMat4, DQuat, DVec3, Transform, Vec2, Vec3};
+use lumbre_math::{
+    AnimatedTransform, DAffine3, DMat3, DMat4, DQuat, DVec3, Elementary, Transform, Vec2, Vec3,
+};
 use lumbre_scene::{
     Camera, CameraKind, ColouredShape, GeometryDesc, InstanceDesc, LightDesc, MeshDesc, MeshMoment,
     MeshMotion, ObjectDesc, ObjectId, Placement, SceneDesc, ShapeDesc, WithoutLight,
@@ -492,8 +494,10 @@ impl Builder<'_> {
                 }
                 thin => {
                     // In mesh space, for a constant size in the world.
-                    let scale =
-                        place.worlds.first().map_or(1.0, |world| world.matrix3.determinant().abs().cbrt());
+                    let scale = place
+                        .worlds
+                        .first()
+                        .map_or(1.0, |world| world.matrix3.determinant().abs().cube_root());
                     let each =
                         size_of::<ShapeDesc>() + if has_colours { size_of::<ColouredShape>() } else { 0 };
                     for (exact, ends) in thin_shapes(&vertices.positions, &thin, self.size / scale) {
@@ -661,8 +665,8 @@ pub(super) fn camera(camera: Value<'_>, node: Value<'_>, world: &DAffine3) -> Re
             let aspect =
                 lens.get("aspectRatio")?.map(|_| lens.number_or("aspectRatio", 1.0, above)).transpose()?;
             // Our field of view is that of the shorter side.
-            let slope = (0.5 * fov).tan() * aspect.unwrap_or(1.0).min(1.0);
-            let fov = (2.0 * slope.atan()).to_degrees();
+            let slope = (0.5 * fov).tangent() * aspect.unwrap_or(1.0).min(1.0);
+            let fov = (2.0 * slope.arc_tangent()).to_degrees();
             (CameraKind::Perspective { fov, lens_radius: 0.0, focal_distance: 1.0 }, None)
         }
         "orthographic" => {

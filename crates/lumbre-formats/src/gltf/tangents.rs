@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use lumbre_math::{Vec2, Vec3, Vec4};
+use lumbre_math::{Elementary, Vec2, Vec3, Vec4};
 
 use super::file::File;
 use super::json::Read;
@@ -160,7 +160,7 @@ fn of_corners(positions: &[Vec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[
                 }
                 let flat = |v: Vec3| (v - normal * normal.dot(v)).normalize_or_zero();
                 let [here, after, before] = [0, 1, 2].map(|i| position(triangles[face][(k + i) % 3]));
-                let angle = flat(before - here).dot(flat(after - here)).clamp(-1.0, 1.0).acos();
+                let angle = flat(before - here).dot(flat(after - here)).clamp(-1.0, 1.0).arc_cosine();
                 sum += angle * flat(faces[face].along_u);
             }
             let tangent = sum.normalize_or_zero();

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use lumbre_image::{Bitmap, Channels, Encoding, Image, PixelData, Rgb};
+use lumbre_math::Elementary;
 
 use super::origin::SOFTWARE;
 use super::{ImageFile, ImageFormat, check_expansion};
@@ -45,7 +46,7 @@ fn light([r, g, b, e]: [u8; 4]) -> Rgb {
     if e == 0 {
         return Rgb::BLACK;
     }
-    let step = f64::from(i32::from(e) - 136).exp2() as f32;
+    let step = f64::from(i32::from(e) - 136).exponential_2() as f32;
     Rgb::new(f32::from(r), f32::from(g), f32::from(b)) * step
 }
 
@@ -60,8 +61,9 @@ fn shared_exponent(c: Rgb) -> [u8; 4] {
         return [0; 4];
     }
     // The exponent for which the rounded peak is in [128, 256).
-    let mut exponent = peak.log2().floor() as i32 + 1;
-    let scaled = |exponent: i32| c.map(|c| (f64::from(c) * f64::from(8 - exponent).exp2()).round() as f32);
+    let mut exponent = peak.logarithm_2().floor() as i32 + 1;
+    let scaled =
+        |exponent: i32| c.map(|c| (f64::from(c) * f64::from(8 - exponent).exponential_2()).round() as f32);
     while scaled(exponent).max_component() > 255.0 {
         exponent += 1;
     }

@@ -11,7 +11,7 @@ use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use lumbre_image::Rgb;
-use lumbre_math::{DVec3, Vec2, Vec3};
+use lumbre_math::{DVec3, Elementary, Vec2, Vec3};
 use lumbre_scene::MeshDesc;
 
 use crate::budget::{Budget, BudgetVec};
@@ -794,7 +794,9 @@ fn add_normals(positions: &[DVec3], normals: &mut [DVec3], corners: [Corner; 3])
     let Some(normal) = (b - a).cross(c - a).try_normalize() else { return };
     for (i, corner) in corners.iter().enumerate() {
         let [here, left, right] = [0, 1, 2].map(|k| [a, b, c][(i + k) % 3]);
-        normals[corner[2] as usize] += (left - here).angle_between(right - here) * normal;
+        let (to_left, to_right) = (left - here, right - here);
+        let angle = to_left.cross(to_right).length().angle_from(to_left.dot(to_right));
+        normals[corner[2] as usize] += angle * normal;
     }
 }
 

@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use lumbre_image::Image;
-use lumbre_math::{DAffine3, DMat3, DVec3, Transform};
+use lumbre_math::{DAffine3, DMat3, DVec3, Elementary, Transform};
 use lumbre_scene::{AreaLightDesc, EnvironmentDesc, EnvironmentMapping, LightDesc};
 use lumbre_shading::{ImageFilter, Spectrum, SpectrumValue, Wrap};
 
@@ -50,7 +50,7 @@ impl Converter<'_, '_> {
                 if !(0.0 <= delta && delta <= angle) {
                     return params.out_of_range("conedeltaangle", delta, "0 to coneangle");
                 }
-                let (inner, outer) = ((angle - delta).to_radians().cos(), angle.to_radians().cos());
+                let (inner, outer) = ((angle - delta).to_radians().cosine(), angle.to_radians().cosine());
                 let around = 2.0 * PI * ((1.0 - inner) + 0.5 * (inner - outer));
                 let intensity = self.emission(&params, "I", state)? * scale * power(&params, around)?;
                 let from = params.triple("from", Type::Point3, DVec3::ZERO)?;
@@ -312,7 +312,7 @@ fn environment_mapping(image: &Image, filename: &str, at: Spot) -> Result<Enviro
 /// The integral of an image over all directions.
 fn flux(image: &Image, mapping: EnvironmentMapping) -> f64 {
     let (width, height) = (f64::from(image.width()), f64::from(image.height()));
-    let cosine = |y: u32| (PI * f64::from(y) / height).cos();
+    let cosine = |y: u32| (PI * f64::from(y) / height).cosine();
     let row = |y: u32| {
         let solid_angle = match mapping {
             EnvironmentMapping::EqualArea => 4.0 * PI / (width * height),
@@ -330,7 +330,7 @@ fn upper_illuminance(image: &Image, mapping: EnvironmentMapping) -> f64 {
     for y in 0..image.height() {
         let v = (f64::from(y) + 0.5) / height;
         // The projected part of a row of latitudes above the horizon.
-        let edge = |y: u32| (PI * f64::from(y) / height).min(0.5 * PI).sin().powi(2);
+        let edge = |y: u32| (PI * f64::from(y) / height).min(0.5 * PI).sine().powi(2);
         let row = PI * (edge(y + 1) - edge(y)) / width;
         for x in 0..image.width() {
             let u = (f64::from(x) + 0.5) / width;

@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 
-use lumbre_math::{DVec3, Vec3};
+use lumbre_math::{DVec3, Elementary, Vec3};
 use lumbre_scene::MeshDesc;
 
 /// Subdivides `faces` over `positions` `levels` times and moves the vertices to the limit.
@@ -173,7 +173,7 @@ fn limit_normal(p: DVec3, ring: &Ring, points: &[DVec3]) -> DVec3 {
         return DVec3::ZERO;
     } else if !ring.is_border {
         (0..n).fold((DVec3::ZERO, DVec3::ZERO), |(s, t), i| {
-            let (sin, cos) = (TAU * i as f64 / n as f64).sin_cos();
+            let (sin, cos) = (TAU * i as f64 / n as f64).sine_cosine();
             (s + cos * at(i), t + sin * at(i))
         })
     } else {
@@ -185,9 +185,10 @@ fn limit_normal(p: DVec3, ring: &Ring, points: &[DVec3]) -> DVec3 {
             4 => 2.0 * (at(1) + at(2)) - at(0) - at(3) - 2.0 * p,
             _ => {
                 let theta = PI / (n - 1) as f64;
-                let ends = theta.sin() * (at(0) + at(n - 1));
-                let inner: DVec3 =
-                    (1..n - 1).map(|k| (2.0 * theta.cos() - 2.0) * (k as f64 * theta).sin() * at(k)).sum();
+                let ends = theta.sine() * (at(0) + at(n - 1));
+                let inner: DVec3 = (1..n - 1)
+                    .map(|k| (2.0 * theta.cosine() - 2.0) * (k as f64 * theta).sine() * at(k))
+                    .sum();
                 -(ends + inner)
             }
         };

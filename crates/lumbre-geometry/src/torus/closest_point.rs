@@ -1,6 +1,6 @@
 //! The nearest point of a torus.
 
-use lumbre_math::{DVec2, DVec3, Transform};
+use lumbre_math::{DVec2, DVec3, Elementary, Transform};
 
 use super::Torus;
 use crate::nearest::under_similarity;
@@ -18,7 +18,7 @@ impl Torus {
     ) -> Result<NearestPoint, NoNearestPoint> {
         under_similarity(world_from_object, p, |p| {
             let local = self.framed(p - self.center);
-            let rho = local.x.hypot(local.y);
+            let rho = local.x.hypotenuse(local.y);
             let outward = if rho > 0.0 { DVec2::new(local.x, local.y) / rho } else { DVec2::X };
             // The plane through the axis and the point intersects the torus in two circles.
             let near = DVec2::new(rho - self.major, local.z);

@@ -6,7 +6,7 @@ mod line;
 mod quartic;
 mod surface;
 
-use lumbre_math::{DVec3, orthonormal_basis};
+use lumbre_math::{DVec3, Elementary, orthonormal_basis};
 
 use crate::shape::check;
 use crate::{Ray, Root, Roots, ShapeError};
@@ -126,7 +126,7 @@ impl Torus {
     /// Whether the closed solid contains `p`.
     pub fn contains(&self, p: DVec3) -> bool {
         let p = self.framed(p - self.center);
-        let (outer, inner) = self.factors(p.x.hypot(p.y), p.z);
+        let (outer, inner) = self.factors(p.x.hypotenuse(p.y), p.z);
         outer <= 0.0 && (self.is_ring() || inner >= 0.0)
     }
 

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use lumbre_math::roots::bracketed_root;
 use lumbre_math::rounding::gamma;
-use lumbre_math::{DMat3, DVec2, DVec3, Transform};
+use lumbre_math::{DMat3, DVec2, DVec3, Elementary, Transform, direction_at};
 
 use super::Torus;
 use crate::shape::sampled_by_area;
@@ -16,7 +16,7 @@ impl Torus {
     /// The surface at a crossing.
     pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
         let p = self.framed(point(ray.origin, self.center, root.t, ray.direction));
-        let rho = p.x.hypot(p.y);
+        let rho = p.x.hypotenuse(p.y);
         let outward = if rho > 0.0 { DVec2::new(p.x, p.y) / rho } else { DVec2::X };
         let (outer, inner) = self.factors(rho, p.z);
         if !self.is_ring() && inner.abs() < outer.abs() {
@@ -28,8 +28,8 @@ impl Torus {
 
     /// The surface at `uv`.
     pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
-        let meridian = DVec2::from_angle(TAU * uv.x);
-        let tube = DVec2::from_angle(TAU * uv.y);
+        let meridian = direction_at(TAU * uv.x);
+        let tube = direction_at(TAU * uv.y);
         (part == 0).then(|| Surface { uv, ..self.surface_on(meridian, tube) })
     }
 
@@ -63,7 +63,7 @@ impl Torus {
     /// The tight box under a transform.
     pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
         let support = |d: DVec3| {
-            let across = d.dot(self.e1).hypot(d.dot(self.e2));
+            let across = d.dot(self.e1).hypotenuse(d.dot(self.e2));
             d.dot(self.center) + self.major * across + self.minor * d.length()
         };
         let magnitude = self.center.abs() + DVec3::splat(self.major + self.minor);
@@ -87,14 +87,14 @@ impl Torus {
 
     /// The angle ϑ at which the tube meets the axis: beyond it, up to π, lies the inner sheet; π for a ring.
     fn crossing_angle(&self) -> f64 {
-        (-self.major / self.minor).max(-1.0).acos()
+        (-self.major / self.minor).max(-1.0).arc_cosine()
     }
 
     /// The integral of |major + minor cos ϑ| from 0 to `theta`, for an angle up to π, and its slope.
     fn swept(&self, theta: f64) -> (f64, f64) {
-        let signed = |theta: f64| self.major * theta + self.minor * theta.sin();
+        let signed = |theta: f64| self.major * theta + self.minor * theta.sine();
         let split = self.crossing_angle();
-        let slope = (self.major + self.minor * theta.cos()).abs();
+        let slope = (self.major + self.minor * theta.cosine()).abs();
         if theta <= split { (signed(theta), slope) } else { (2.0 * signed(split) - signed(theta), slope) }
     }
 
@@ -113,8 +113,7 @@ impl Torus {
                 return 0.0;
             }
             measure::patch_area(world_from_object, |u, v| {
-                let (meridian, tube) =
-                    (DVec2::from_angle(TAU * u), DVec2::from_angle(TAU * (from + v * (to - from))));
+                let (meridian, tube) = (direction_at(TAU * u), direction_at(TAU * (from + v * (to - from))));
                 let density = TAU * TAU * self.minor * (self.major + self.minor * tube.x) * (to - from);
                 density * self.unframed(DVec3::new(tube.x * meridian.x, tube.x * meridian.y, tube.y))
             })
@@ -131,9 +130,9 @@ impl Torus {
             let (value, slope) = self.swept(theta);
             (value - goal, slope)
         });
-        let (sin, cos) = theta.sin_cos();
+        let (sin, cos) = theta.sine_cosine();
         let tube = DVec2::new(cos, if upper { sin } else { -sin });
-        let surface = self.surface_on(DVec2::from_angle(TAU * u.x), tube);
+        let surface = self.surface_on(direction_at(TAU * u.x), tube);
         Some(SurfaceSample { surface, pdf: 1.0 / self.area() })
     }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use lumbre_geometry::Aabb;
-use lumbre_math::{DMat3, DVec3, Transform, Vec3};
+use lumbre_math::{DMat3, DVec3, Elementary, Transform, Vec3};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
@@ -548,7 +548,7 @@ pub(crate) fn units_of(geometries: &[Geometry], parts: &Parts) -> TreeSpace {
     let largest = half.max_element();
     // The power of two that brings the largest half edge into (0.5, 1].
     let scale = if largest > 0.0 && largest.is_finite() {
-        let exponent = largest.log2().ceil().clamp(-1000.0, 1000.0);
+        let exponent = largest.logarithm_2().ceil().clamp(-1000.0, 1000.0);
         f64::from_bits((1023.0 - exponent) as u64 * (1 << 52))
     } else {
         1.0

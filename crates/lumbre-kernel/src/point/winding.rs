@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use std::fmt;
 
 use lumbre_geometry::{Shape, similarity_factor};
-use lumbre_math::{DMat3, DVec3};
+use lumbre_math::{DMat3, DVec3, Elementary};
 use rayon::prelude::*;
 
 use crate::geometry::has_area;
@@ -108,7 +108,7 @@ fn solid_angle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     let (la, lb, lc) = (a.length(), b.length(), c.length());
     let volume = a.dot((b - a).cross(c - a));
     let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-    if volume == 0.0 { 0.0 } else { 2.0 * volume.atan2(denominator) }
+    if volume == 0.0 { 0.0 } else { 2.0 * volume.angle_from(denominator) }
 }
 
 /// The corners of a triangle that has an area, relative to a point.

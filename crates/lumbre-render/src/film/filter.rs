@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use lumbre_math::DVec2;
 use lumbre_math::distribution::PiecewiseConstant1D;
+use lumbre_math::{DVec2, Elementary};
 
 /// The closed set of filters: all are products of the same function along x and along y. Radii are in pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,7 +40,7 @@ impl FilterShape {
         }
         match *self {
             Self::Gaussian { sigma } => {
-                let bell = |x: f64| (-x * x / (2.0 * sigma * sigma)).exp();
+                let bell = |x: f64| (-x * x / (2.0 * sigma * sigma)).exponential();
                 (bell(x) - bell(radius)).max(0.0)
             }
             Self::Box => 1.0,
@@ -63,7 +63,7 @@ fn mitchell(x: f64, b: f64, c: f64) -> f64 {
 }
 
 fn sinc(x: f64) -> f64 {
-    if x.abs() < 1e-5 { 1.0 } else { (PI * x).sin() / (PI * x) }
+    if x.abs() < 1e-5 { 1.0 } else { (PI * x).sine() / (PI * x) }
 }
 
 /// A place in the filter, and what a sample there counts.

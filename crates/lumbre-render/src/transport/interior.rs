@@ -1,5 +1,6 @@
 //! The solids that a path is inside of.
 
+use lumbre_math::Elementary;
 use lumbre_scene::Interaction;
 use lumbre_shading::{HomogeneousMedium, Material, Spectrum};
 use smallvec::SmallVec;
@@ -34,7 +35,9 @@ impl<'s> Interiors<'s> {
     /// What is left of light after a distance inside the innermost solid.
     pub(super) fn transmittance(&self, distance: f64) -> Spectrum {
         let sigma = self.around.last().and_then(|solid| solid.interior_attenuation());
-        sigma.map_or(Spectrum::WHITE, |sigma| sigma.map(|sigma| (-f64::from(sigma) * distance).exp() as f32))
+        sigma.map_or(Spectrum::WHITE, |sigma| {
+            sigma.map(|sigma| (-f64::from(sigma) * distance).exponential() as f32)
+        })
     }
 
     /// Whether light loses anything here.

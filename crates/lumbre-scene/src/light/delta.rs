@@ -1,6 +1,6 @@
 //! Delta lights: point, spot and directional lights, which no ray can hit.
 
-use lumbre_math::{DAffine3, DMat3, DVec3, Transform};
+use lumbre_math::{DAffine3, DMat3, DVec3, Elementary, Transform};
 use lumbre_shading::{Scatter, Spectrum};
 
 use super::environment::Panorama;
@@ -51,8 +51,8 @@ impl SpotLight {
             from: world_from_light.point(DVec3::ZERO),
             axis: world_from_light.vector(DVec3::Z).normalize(),
             intensity,
-            cos_start: start.cos(),
-            cos_end: cone.cos(),
+            cos_start: start.cosine(),
+            cos_end: cone.cosine(),
         }
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use lumbre_image::Image;
 use lumbre_math::distribution::PiecewiseConstant2D;
-use lumbre_math::{DVec2, DVec3, Transform, warp64};
+use lumbre_math::{DVec2, DVec3, Elementary, Transform, warp64};
 use lumbre_shading::{Scatter, Spectrum};
 
 use super::LightSample;
@@ -65,7 +65,7 @@ impl Panorama {
         match self.mapping {
             EnvironmentMapping::EqualArea => 1.0,
             EnvironmentMapping::LatitudeLongitude => {
-                let edge = |y: u32| (PI * f64::from(y) / f64::from(self.image.height())).cos();
+                let edge = |y: u32| (PI * f64::from(y) / f64::from(self.image.height())).cosine();
                 edge(row) - edge(row + 1)
             }
         }

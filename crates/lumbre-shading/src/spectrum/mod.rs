@@ -9,6 +9,7 @@ mod observer;
 
 use std::sync::LazyLock;
 
+use lumbre_math::Elementary;
 pub use named::NamedSpectrum;
 use observer::{FIRST_NM, LAST_NM, MATCHING, STEP_NM};
 
@@ -124,7 +125,7 @@ fn blackbody(nm: f64, kelvin: f64) -> f64 {
     // hc/k in nm K, with the constants of the SI of 2019; the maximum is at this value of x = hc/(λkT).
     const SECOND: f64 = 1.438_776_877e7;
     const X_PEAK: f64 = 4.965_114_231_744_276;
-    let shape = |x: f64| x.powi(5) / x.exp_m1();
+    let shape = |x: f64| x.powi(5) / x.exponential_minus_1();
     let x = SECOND / (nm * kelvin);
     if x > 700.0 { 0.0 } else { shape(x) / shape(X_PEAK) }
 }

@@ -11,6 +11,7 @@
 //! - CIE illuminants: CIE 15:2018. D50, D65 and the D60 of ACES follow the daylight formula.
 
 use super::{fluorescent, interpolate};
+use lumbre_math::Elementary;
 
 /// A built-in spectrum. Beyond the wavelengths of its source it is constant; a fluorescent lamp is zero there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,7 +59,7 @@ impl NamedSpectrum {
             Source::Zero => 0.0,
             // The constant of 1931, which defines illuminant A.
             Source::IlluminantA => {
-                let shape = |nm: f64| nm.powi(-5) / (1.435e7 / (2848.0 * nm)).exp_m1();
+                let shape = |nm: f64| nm.powi(-5) / (1.435e7 / (2848.0 * nm)).exponential_minus_1();
                 100.0 * shape(nm) / shape(560.0)
             }
             Source::Daylight((m1, m2)) => daylight(nm, m1, m2),
