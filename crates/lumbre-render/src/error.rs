@@ -23,6 +23,9 @@ pub enum RenderError {
         /// How many there are.
         count: usize,
     },
+    /// The state to go on from is not that of this render.
+    #[error("the state to go on from is of other pixels, samples or sums")]
+    OtherState,
     /// The pixel filter has no width.
     #[error("the pixel filter needs a positive radius, and more than zero inside it")]
     Filter,

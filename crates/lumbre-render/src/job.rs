@@ -1,30 +1,35 @@
 //! The render itself: passes over samples, tiles over threads.
 
-use std::time::Instant;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
-use lumbre_math::DVec2;
+use lumbre_math::{DVec2, DVec3, Elementary};
 use lumbre_scene::{Scene, View};
 
 use crate::clock::Clock;
 use crate::film::{Extras, FeatureSample, Filter, Sample, Tile};
-use crate::rendered::{coverage_picture, feature_picture, guides, noise, picture};
-use crate::transport::{Feature, Features, Integrator, RayCounts, Sampler, Sight, integrator, see};
+use crate::rendered::{noise, picture, rendered_of};
+use crate::state::{Piece, REMEMBERED, RenderState};
+use crate::transport::{Features, Integrator, RayCounts, Sampler, Sight, integrator, see};
 use crate::workers::Workers;
-use crate::{CancelToken, DroppedSample, Progress, RenderError, RenderOptions, Rendered, Snapshot, Stats};
+use crate::{
+    CancelToken, DroppedSample, PixelBounds, Progress, RenderError, RenderOptions, Rendered, Snapshot, Stats,
+};
 
+/// Between the rays that textures are looked up for, in pixels: samples average what is finer. The same for any number of samples, so
+/// that more of them can be added to a render (pbrt takes fewer the wider apart).
+const SPACING: f64 = 0.25;
 /// Pixels along the side of a tile.
 const TILE: u32 = 16;
 /// Samples of the longest pass.
-const MAX_PASS: u32 = 16;
+const MAX_STEP: u32 = 16;
 /// Samples a pixel before its noise is looked at: two or three say little.
 const LEAST_FOR_NOISE: u32 = 8;
-/// Dropped samples that are remembered by place.
-const REMEMBERED: usize = 16;
 /// The first pass goes over the picture in squares of so many pixels a side, one sample in each, and then in smaller ones, so that a
 /// render which is stopped in it is a whole picture, if a coarse one.
 const STRIDES: [u32; 7] = [256, 64, TILE, 8, 4, 2, 1];
 /// Pixels between two looks at the clock.
-const PIXELS_A_LOOK: usize = 4;
+const PIXELS_A_LOOK: u64 = 4;
 
 /// Renders a picture: stops when the options say so, or when `cancel` asks, and returns what there is.
 ///
@@ -53,6 +58,37 @@ pub fn render_with(
     progress: &dyn Progress,
     cancel: &CancelToken,
 ) -> Result<Rendered, RenderError> {
+    Ok(render_from(scene, options, integrator, progress, cancel, None, None)?.0)
+}
+
+/// Who is handed the state of a render now and then.
+pub struct Keeper<'a> {
+    /// The time between two hand-overs.
+    pub every: Duration,
+    /// Told from one thread, while the others wait: it should not take long.
+    pub keep: &'a dyn Fn(RenderState),
+}
+
+impl std::fmt::Debug for Keeper<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Keeper").field("every", &self.every).finish_non_exhaustive()
+    }
+}
+
+/// [`render_with`], going on from the state of the same render, and with the state that it comes to. The picture is that of a render
+/// without a break.
+///
+/// # Errors
+/// As [`render`], and [`RenderError::OtherState`] where the state is of other pixels or samples, or has other sums.
+pub fn render_from(
+    scene: &Scene,
+    options: &RenderOptions,
+    integrator: &dyn Integrator,
+    progress: &dyn Progress,
+    cancel: &CancelToken,
+    state: Option<RenderState>,
+    keeper: Option<&Keeper<'_>>,
+) -> Result<(Rendered, RenderState), RenderError> {
     let start = Instant::now();
     let bounds = options.bounds()?;
     let camera = scene
@@ -62,6 +98,17 @@ pub fn render_with(
     let workers = Workers::start(options.threads);
     let spp = options.stop.spp.max(1);
     let view = View::new(camera, options.width, options.height);
+    let catches_shadows = scene.ground().is_some_and(|ground| ground.catcher);
+    let extras = Extras {
+        features: options.features || options.guides,
+        tints: options.transparent && catches_shadows,
+        guides: options.guides,
+        depth_unit: depth_unit(scene, &view),
+    };
+    let mut owners = match state {
+        Some(state) => owners_of(state, bounds, extras, options.first_sample)?,
+        None => bounds.tiles(TILE).into_iter().map(|tile| Owner::new(Tile::new(tile, extras))).collect(),
+    };
     let job = Job {
         scene,
         options,
@@ -70,49 +117,58 @@ pub fn render_with(
         integrator,
         sampler: Sampler::new(&options.sampler),
         filter: options.pixel_filter()?,
-        // Textures may be looked up more finely the more samples there are to average them (pbrt does likewise).
-        spacing: f64::from(spp).sqrt().recip().max(0.125),
+        spacing: SPACING,
         deadline: options.stop.time.and_then(|time| start.checked_add(time)),
         cancel,
+        pause: keeper.map(|keeper| Pause::new(start, keeper.every)),
         clock: Clock::new(start, bounds.area(), options.stop, progress),
     };
-    let catches_shadows = scene.ground().is_some_and(|ground| ground.catcher);
-    let extras = Extras {
-        features: options.features || options.guides,
-        tints: options.transparent && catches_shadows,
-        guides: options.guides,
+    let hand_over = |owners: &[Owner]| {
+        if let (Some(keeper), Some(pause)) = (keeper, &job.pause) {
+            (keeper.keep)(state_of(owners, bounds, extras, options));
+            pause.start_again();
+        }
     };
-    let mut owners: Vec<Owner> =
-        bounds.tiles(TILE).into_iter().map(|tile| Owner::new(Tile::new(tile, extras))).collect();
+    let has = |owners: &[Owner], samples| owners.iter().all(|owner| owner.tile.has_taken(samples));
 
-    let mut done = 0;
+    job.clock
+        .add(owners.iter().flat_map(|owner| owner.tile.pixels()).map(|pixel| u64::from(pixel.taken)).sum());
     let mut stride = None;
     let mut last = None;
-    for side in STRIDES {
-        workers.for_each(&mut owners, |owner| job.run_coarsely(owner, (bounds.x0, bounds.y0), side, last));
-        last = Some(side);
-        if owners.iter().any(|owner| owner.next_side > side) {
-            break;
+    if has(&owners, 1) {
+        stride = Some(1);
+    } else {
+        for side in STRIDES {
+            loop {
+                workers.for_each(&mut owners, |owner| {
+                    job.run_coarsely(owner, (bounds.x0, bounds.y0), side, last)
+                });
+                if job.must_stop() || !job.is_paused() {
+                    break;
+                }
+                hand_over(&owners);
+            }
+            last = Some(side);
+            if owners.iter().any(|owner| owner.next_side > side) {
+                break;
+            }
+            stride = Some(side);
         }
-        stride = Some(side);
     }
-    if let Some(side) = stride.filter(|side| *side > 1) {
-        spread(&mut owners, bounds.width().div_ceil(TILE) as usize, side);
-    }
-    let mut quiet_at = None;
+    let mut done = owners.iter().map(|owner| owner.tile.least_taken()).min().unwrap_or(0).min(spp);
     while done < spp && stride == Some(1) {
-        // Short passes first, so that there is soon something to see; the length never matters for the picture. None goes far
-        // beyond the noise that is asked for.
-        let most = quiet_at.map_or(MAX_PASS, |quiet: f64| (quiet - f64::from(done)).ceil().max(1.0) as u32);
-        let pass = done.clamp(1, MAX_PASS).min(most).min(spp - done);
-        let samples = done..done + pass;
-        if done > 0 {
-            workers.for_each(&mut owners, |owner| job.run(owner, samples.clone()));
+        let end = next_count(done).min(spp);
+        loop {
+            workers.for_each(&mut owners, |owner| job.run(owner, end));
+            if job.must_stop() || !job.is_paused() {
+                break;
+            }
+            hand_over(&owners);
         }
-        if job.must_stop() && owners.iter().any(|owner| owner.next_sample < samples.end) {
+        if !has(&owners, end) {
             break;
         }
-        done += pass;
+        done = end;
         if job.must_stop() {
             // What follows takes its time for a large picture.
             break;
@@ -129,7 +185,6 @@ pub fn render_with(
         {
             // Noise falls with the square root of the number of samples.
             let expected = (f64::from(done) * (noise / limit).powi(2)).max(f64::from(LEAST_FOR_NOISE));
-            quiet_at = Some(expected);
             job.clock.expect_quiet_at(expected);
         }
         let is_quiet = matches!((options.stop.noise, reached), (Some(limit), Some(noise)) if noise <= limit);
@@ -139,37 +194,88 @@ pub fn render_with(
     }
 
     progress.stopped(stride);
-    let tiles = || owners.iter().map(|owner| &owner.tile);
+    let state = state_of(&owners, bounds, extras, options);
+    if let Some(side) = stride.filter(|side| *side > 1) {
+        spread(&mut owners, bounds.width().div_ceil(TILE) as usize, side);
+    }
+    let rendered = rendered_of(owners.iter().map(|owner| &owner.tile), bounds, options.transparent, extras);
+    let stats = Stats {
+        spp: done,
+        stride,
+        cancelled: cancel.is_cancelled() && done < spp,
+        samples: state.rays.camera,
+        rays: state.rays,
+        dropped: state.dropped,
+        first_dropped: state.first_dropped.clone(),
+        noise: noise(owners.iter().map(|owner| &owner.tile)),
+        threads: workers.count(),
+        refused_threads: workers.refused(),
+        elapsed: start.elapsed(),
+    };
+    Ok((Rendered { stats, ..rendered }, state))
+}
+
+/// The number of samples at which a render next looks at its noise, and shows what there is: always the same, whatever came between.
+fn next_count(done: u32) -> u32 {
+    let step = (done / 4).next_power_of_two().clamp(1, MAX_STEP);
+    done / step * step + step
+}
+
+/// A power of two near the largest depth that there may be.
+fn depth_unit(scene: &Scene, view: &View) -> f64 {
+    let bounds = scene.bounds();
+    let reach = if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() };
+    let camera = view.depth(DVec3::ZERO, view.time(0.5)).abs();
+    let farthest = 4.0 * reach + camera;
+    let unit = farthest.max(f64::MIN_POSITIVE).logarithm_2().ceil().exponential_2();
+    if unit.is_normal() { unit } else { 1.0 }
+}
+
+/// The owners of the tiles of a state.
+fn owners_of(
+    state: RenderState,
+    bounds: PixelBounds,
+    extras: Extras,
+    first_sample: u32,
+) -> Result<Vec<Owner>, RenderError> {
+    let is_same = state.bounds() == bounds
+        && state.film.extras() == extras
+        && state.pieces.iter().all(|piece| piece.bounds == bounds)
+        && state.pieces.len() == 1
+        && state.pieces[0].samples.start == first_sample;
+    if !is_same {
+        return Err(RenderError::OtherState);
+    }
+    let tile = |tile| Owner::new(state.film.placed_in(tile));
+    let mut owners: Vec<Owner> = bounds.tiles(TILE).into_iter().map(tile).collect();
+    if let Some(owner) = owners.first_mut() {
+        (owner.rays, owner.dropped) = (state.rays, state.dropped);
+        owner.first_dropped = state.first_dropped;
+    }
+    Ok(owners)
+}
+
+/// What the owners gathered.
+fn state_of(owners: &[Owner], bounds: PixelBounds, extras: Extras, options: &RenderOptions) -> RenderState {
+    let mut film = Tile::new(bounds, extras);
+    owners.iter().for_each(|owner| film.take(&owner.tile));
     let mut rays = RayCounts::default();
     let mut first_dropped: Vec<DroppedSample> = Vec::new();
-    for owner in &owners {
+    for owner in owners {
         rays += owner.rays;
         first_dropped.extend(&owner.first_dropped);
     }
     first_dropped.sort_unstable_by_key(|d| (d.sample, d.y, d.x));
     first_dropped.truncate(REMEMBERED);
-    let wanted: &[Feature] =
-        if extras.features { &[Feature::Albedo, Feature::Normal, Feature::Depth, Feature::Uv] } else { &[] };
-    Ok(Rendered {
-        image: picture(tiles(), bounds, options.transparent),
-        coverage: coverage_picture(tiles(), bounds),
-        bounds,
-        features: wanted.iter().map(|&f| (f, feature_picture(tiles(), bounds, f))).collect(),
-        guides: options.guides.then(|| guides(tiles(), bounds)),
-        stats: Stats {
-            spp: done,
-            stride,
-            cancelled: cancel.is_cancelled() && done < spp,
-            samples: rays.camera,
-            rays,
-            dropped: owners.iter().map(|owner| owner.dropped).sum(),
-            first_dropped,
-            noise: noise(tiles()),
-            threads: workers.count(),
-            refused_threads: workers.refused(),
-            elapsed: start.elapsed(),
-        },
-    })
+    let first = options.first_sample;
+    let wanted = options.stop.spp.max(1);
+    RenderState {
+        film,
+        pieces: vec![Piece { bounds, samples: first..first.saturating_add(wanted) }],
+        rays,
+        dropped: owners.iter().map(|owner| owner.dropped).sum(),
+        first_dropped,
+    }
 }
 
 /// Gives every pixel that has no sample that of its square of `side` by `side` pixels; the tiles stand in rows of `columns`.
@@ -198,14 +304,38 @@ struct Job<'a> {
     spacing: f64,
     deadline: Option<Instant>,
     cancel: &'a CancelToken,
+    pause: Option<Pause>,
     clock: Clock<'a>,
+}
+
+/// When all threads pause next, to hand over what they have.
+struct Pause {
+    start: Instant,
+    every: Duration,
+    /// Milliseconds after the start.
+    at: AtomicU64,
+}
+
+impl Pause {
+    fn new(start: Instant, every: Duration) -> Self {
+        let pause = Self { start, every, at: AtomicU64::new(0) };
+        pause.start_again();
+        pause
+    }
+
+    fn start_again(&self) {
+        let at = (self.start.elapsed() + self.every).as_millis();
+        self.at.store(u64::try_from(at).unwrap_or(u64::MAX), Ordering::Relaxed);
+    }
+
+    fn is_due(&self) -> bool {
+        self.start.elapsed().as_millis() >= u128::from(self.at.load(Ordering::Relaxed))
+    }
 }
 
 /// A tile and what its one owner counts.
 struct Owner {
     tile: Tile,
-    /// All samples before this one are in every pixel of the tile.
-    next_sample: u32,
     /// The side of the smallest squares that the first pass has done.
     next_side: u32,
     rays: RayCounts,
@@ -215,20 +345,17 @@ struct Owner {
 
 impl Owner {
     fn new(tile: Tile) -> Self {
-        Self {
-            tile,
-            next_sample: 0,
-            next_side: u32::MAX,
-            rays: RayCounts::default(),
-            dropped: 0,
-            first_dropped: Vec::new(),
-        }
+        Self { tile, next_side: u32::MAX, rays: RayCounts::default(), dropped: 0, first_dropped: Vec::new() }
     }
 }
 
 impl Job<'_> {
     fn must_stop(&self) -> bool {
         self.cancel.is_cancelled() || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
+    }
+
+    fn is_paused(&self) -> bool {
+        self.pause.as_ref().is_some_and(Pause::is_due)
     }
 
     /// Takes the first sample of the first pixel of each square of `side` by `side` pixels, counted from the corner of the picture,
@@ -238,31 +365,34 @@ impl Job<'_> {
             (x - corner.0).is_multiple_of(side) && (y - corner.1).is_multiple_of(side)
         };
         let is_new = |x, y| starts(x, y, side) && !last.is_some_and(|last| starts(x, y, last));
-        if self.take(owner, owner.tile.bounds().pixels().filter(|&(x, y)| is_new(x, y)), 0) {
+        if self.take(owner, 0, is_new) {
             owner.next_side = side;
-            owner.next_sample = u32::from(side == 1);
         }
     }
 
-    /// Takes some samples of every pixel of a tile, sample by sample, so that a tile which is stopped has all of one
-    /// sample before it has any of the next.
-    fn run(&self, owner: &mut Owner, samples: std::ops::Range<u32>) {
-        for index in samples {
-            if !self.take(owner, owner.tile.bounds().pixels(), index) {
+    /// Takes the samples of every pixel of a tile up to this number, sample by sample, so that a tile which is stopped has all of
+    /// one sample before it has any of the next.
+    fn run(&self, owner: &mut Owner, end: u32) {
+        for index in owner.tile.least_taken()..end {
+            if !self.take(owner, index, |_, _| true) {
                 return;
             }
-            owner.next_sample = index + 1;
         }
     }
 
-    /// Takes a sample of each of some pixels of a tile; whether it has done so before it had to stop.
-    fn take(&self, owner: &mut Owner, pixels: impl Iterator<Item = (u32, u32)>, index: u32) -> bool {
+    /// Takes a sample of each of those pixels of a tile that have none of this number yet; whether it has done so before it had to stop.
+    fn take(&self, owner: &mut Owner, number: u32, is_wanted: impl Fn(u32, u32) -> bool) -> bool {
         let mut count = 0;
-        for (i, (x, y)) in pixels.enumerate() {
-            if self.cancel.is_cancelled() || (i.is_multiple_of(PIXELS_A_LOOK) && self.must_stop()) {
+        for (x, y) in owner.tile.bounds().pixels() {
+            if owner.tile.taken(x, y) > number || !is_wanted(x, y) {
+                continue;
+            }
+            let looks = count % PIXELS_A_LOOK == 0;
+            if self.cancel.is_cancelled() || (looks && (self.must_stop() || self.is_paused())) {
+                self.clock.add(count);
                 return false;
             }
-            self.sample(owner, x, y, index);
+            self.sample(owner, x, y, self.options.first_sample.saturating_add(number));
             count += 1;
         }
         self.clock.add(count);

@@ -13,16 +13,18 @@ mod job;
 mod options;
 mod progress;
 mod rendered;
+mod state;
 pub mod transport;
 mod workers;
 
 pub use cancel::CancelToken;
 pub use denoise::{Denoised, denoise};
 pub use error::RenderError;
-pub use job::{render, render_with};
+pub use job::{Keeper, render, render_from, render_with};
 pub use options::{RenderOptions, Stop};
 pub use progress::{NoProgress, Progress, Snapshot, State};
 pub use rendered::{DroppedSample, Rendered, Stats};
+pub use state::{MergeError, Piece, RenderState, StateError};
 
 pub use crate::film::PixelBounds;
 pub use crate::transport::{Feature, Integrator, RayCounts};

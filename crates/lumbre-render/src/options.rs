@@ -8,7 +8,9 @@ use lumbre_scene::{FilmDesc, FilterDesc, IntegratorDesc, SamplerDesc, Scene};
 
 use crate::RenderError;
 use crate::denoise::BYTES_A_PIXEL;
-use crate::film::{Exposure, FeatureSums, Filter, FilterShape, GuideSums, Pixel, PixelBounds, Tint};
+use crate::film::{
+    Exposure, FeatureSums, Filter, FilterShape, GuideSums, MAX_PIXELS, Pixel, PixelBounds, Tint,
+};
 
 /// Everything about a picture that is not in the scene.
 ///
@@ -38,6 +40,8 @@ pub struct RenderOptions {
     pub transparent: bool,
     /// When to stop.
     pub stop: Stop,
+    /// The index of the first sample of every pixel: parts of a render begin where others end.
+    pub first_sample: u32,
     /// Whether to gather albedo, normals, depth and uv too.
     pub features: bool,
     /// Whether to gather what [`crate::denoise`] wants to know, with the features. The picture is the same.
@@ -65,7 +69,6 @@ const DEFAULT_SPP: u32 = 64;
 /// Pixels across and down, where nobody says how many.
 const DEFAULT_SIZE: (u32, u32) = (1280, 720);
 const MAX_SIDE: u32 = 65_536;
-const MAX_PIXELS: u64 = 1 << 30;
 
 impl Stop {
     /// At this many samples a pixel.
@@ -89,6 +92,7 @@ impl Default for RenderOptions {
             exposure: Exposure { factor: film.exposure, max_component: film.max_component },
             transparent: false,
             stop: Stop::at(DEFAULT_SPP),
+            first_sample: 0,
             features: false,
             guides: false,
             threads: 0,

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::film::{FeatureSums, GuideSums, Pixel, PixelBounds, Tile};
+use crate::film::{Extras, FeatureSums, GuideSums, Pixel, PixelBounds, Tile};
 use crate::transport::{Feature, RayCounts};
 use lumbre_image::{Image, Rgb};
 
@@ -27,7 +27,7 @@ pub struct Rendered {
 }
 
 /// What a render took.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Stats {
     /// Samples that every pixel has.
@@ -74,6 +74,25 @@ pub struct DroppedSample {
     pub sample: u32,
 }
 
+/// The pictures of some tiles, with statistics that say nothing yet.
+pub(crate) fn rendered_of<'t>(
+    tiles: impl Iterator<Item = &'t Tile> + Clone,
+    bounds: PixelBounds,
+    transparent: bool,
+    extras: Extras,
+) -> Rendered {
+    let wanted: &[Feature] =
+        if extras.features { &[Feature::Albedo, Feature::Normal, Feature::Depth, Feature::Uv] } else { &[] };
+    Rendered {
+        image: picture(tiles.clone(), bounds, transparent),
+        coverage: coverage_picture(tiles.clone(), bounds),
+        bounds,
+        features: wanted.iter().map(|&f| (f, feature_picture(tiles.clone(), bounds, f))).collect(),
+        guides: extras.guides.then(|| guides(tiles, bounds)),
+        stats: Stats::default(),
+    }
+}
+
 /// The picture of some tiles, with coverage if it is to be transparent.
 pub(crate) fn picture<'t>(
     tiles: impl Iterator<Item = &'t Tile> + Clone,
@@ -105,16 +124,17 @@ pub(crate) fn feature_picture<'t>(
     bounds: PixelBounds,
     feature: Feature,
 ) -> Image {
-    let colour = |sums: &FeatureSums| match feature {
+    let colour = |sums: &FeatureSums, depth_unit| match feature {
         Feature::Albedo => sums.albedo(),
         Feature::Normal => sums.normal(),
-        Feature::Depth => Rgb::splat(sums.depth()),
+        Feature::Depth => Rgb::splat(sums.depth(depth_unit)),
         Feature::Uv => {
             let [u, v] = sums.uv();
             Rgb::new(u, v, 0.0)
         }
     };
-    image_of(bounds, put_together(tiles, bounds, Rgb::BLACK, |tile| tile.features().iter().map(colour)))
+    let colours = |tile: &'t Tile| tile.features().iter().map(move |sums| colour(sums, tile.depth_unit()));
+    image_of(bounds, put_together(tiles, bounds, Rgb::BLACK, colours))
 }
 
 /// What a denoiser wants to know of every pixel.

@@ -22,7 +22,7 @@ use lumbre_scene::{
 use lumbre_shading::{Material, MaterialKind, Roughness, Spectrum};
 
 /// A bit of everything, `offset` away from where it usually is.
-fn still_life(offset: DVec3) -> SceneDesc {
+pub(crate) fn still_life(offset: DVec3) -> SceneDesc {
     let mut desc = empty();
     desc.filter = FilterDesc::Gaussian { radius: Vec2::splat(1.5), sigma: 0.5 };
     let grey = add_material(&mut desc, diffuse(0.6));

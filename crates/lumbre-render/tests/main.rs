@@ -9,5 +9,6 @@ mod integrators;
 mod interiors;
 mod motion;
 mod panes;
+mod parts;
 mod shading_normals;
 mod terminator;

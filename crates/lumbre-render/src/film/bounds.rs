@@ -1,5 +1,8 @@
 //! A rectangle of pixels.
 
+/// Pixels at most.
+pub(crate) const MAX_PIXELS: u64 = 1 << 30;
+
 /// The pixels `x0 <= x < x1`, `y0 <= y < y1`, from the upper left of the whole picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PixelBounds {
@@ -50,6 +53,20 @@ impl PixelBounds {
         }
     }
 
+    /// The smallest that holds both.
+    #[must_use]
+    pub fn hull(&self, other: &Self) -> Self {
+        if self.is_empty() || other.is_empty() {
+            return if self.is_empty() { *other } else { *self };
+        }
+        Self {
+            x0: self.x0.min(other.x0),
+            y0: self.y0.min(other.y0),
+            x1: self.x1.max(other.x1),
+            y1: self.y1.max(other.y1),
+        }
+    }
+
     /// Squares of `side` pixels that cover it, row by row; those at the right and below may be smaller.
     pub fn tiles(&self, side: u32) -> Vec<Self> {
         let side = side.max(1) as usize;
@@ -64,6 +81,11 @@ impl PixelBounds {
             })
         })
         .collect()
+    }
+
+    /// The position of a pixel of it among all, row by row.
+    pub fn position(&self, x: u32, y: u32) -> usize {
+        (y - self.y0) as usize * self.width() as usize + (x - self.x0) as usize
     }
 
     /// Every pixel, row by row.

@@ -120,7 +120,40 @@ pub struct GuideSums {
     pub count: Count,
 }
 
+/// Numbers of [`GuideSums`].
+pub(crate) const WORDS: usize = 2 * RATIO_WORDS + 2 * FEATURES + 2;
+const RATIO_WORDS: usize = 21;
+
+impl RatioSums {
+    fn lists(&mut self) -> [&mut [f32; 3]; RATIO_WORDS / 3] {
+        let Self { over, under, odd_over, odd_under, over_squares, products, under_squares } = self;
+        [over, under, odd_over, odd_under, over_squares, products, under_squares]
+    }
+}
+
 impl GuideSums {
+    fn numbers(&mut self) -> impl Iterator<Item = &mut f32> {
+        let ratios = self.light.lists().into_iter().chain(self.shadow.lists()).flatten();
+        let features = self.features.iter_mut().chain(&mut self.feature_squares);
+        ratios.chain(features).chain(std::iter::once(&mut self.count.weight))
+    }
+
+    /// Its numbers, as they are.
+    pub(crate) fn words(&self) -> [u32; WORDS] {
+        let mut words = [self.count.samples; WORDS];
+        let mut own = *self;
+        words.iter_mut().zip(own.numbers()).for_each(|(word, number)| *word = number.to_bits());
+        words
+    }
+
+    /// That of these numbers.
+    pub(crate) fn of_words(words: [u32; WORDS]) -> Self {
+        let mut own = Self::default();
+        own.numbers().zip(words).for_each(|(number, word)| *number = f32::from_bits(word));
+        own.count.samples = words[WORDS - 1];
+        own
+    }
+
     /// Counts a sample of this weight, and adds what it met; `None` met nothing.
     pub fn add_features(&mut self, sample: Option<&FeatureSample>, weight: f32) {
         self.count.samples += 1;

@@ -2,15 +2,18 @@
 //!
 //! A pixel is a function of its own samples alone: the filter is sampled, so that no sample reaches a neighbour
 //! (Ernst, Stamminger, Greiner, "Filter Importance Sampling", IEEE Symposium on Interactive Ray Tracing, 2006). Sums are
-//! in double precision and in the order of the samples.
+//! exact ([`ExactSum`]), so that they do not depend on the order of samples, nor on how these were shared out.
 
 mod bounds;
+mod exact;
 mod filter;
 mod guide;
 mod pixel;
 mod tile;
 
+pub(crate) use bounds::MAX_PIXELS;
 pub use bounds::PixelBounds;
+pub use exact::ExactSum;
 pub use filter::{Filter, FilterSample, FilterShape};
 pub use guide::{Count, FEATURES, GuideSums, RatioSums};
 pub use pixel::{FeatureSample, FeatureSums, Pixel, Tint};

@@ -2,35 +2,60 @@
 
 use lumbre_image::Rgb;
 
-/// Weighted sums of the samples of one pixel.
+use crate::film::ExactSum;
+
+/// Weighted sums of the samples of one pixel, which do not depend on the order that they were added in.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pixel {
     /// Σ weight × colour.
-    pub sum: [f64; 3],
+    pub sum: [ExactSum; 3],
     /// Σ weight × coverage.
-    pub covered: f64,
+    pub covered: ExactSum,
     /// Σ weight.
-    pub weight: f64,
+    pub weight: ExactSum,
     /// Σ luminance, without weights.
-    pub luminance: f64,
+    pub luminance: ExactSum,
     /// Σ luminance², without weights.
-    pub luminance_squares: f64,
-    /// How many samples.
+    pub luminance_squares: ExactSum,
+    /// How many samples were added.
     pub samples: u32,
+    /// How many samples were taken, with those that were dropped.
+    pub taken: u32,
 }
 
+/// Luminance up to which noise is told apart.
+const MOST_LUMINANCE: f64 = 1e6;
+
 impl Pixel {
-    /// Adds a sample, whose colour is multiplied by its coverage.
-    pub fn add(&mut self, colour: Rgb, coverage: f32, weight: f64) {
-        for (sum, channel) in self.sum.iter_mut().zip(colour.to_array()) {
-            *sum += weight * f64::from(channel);
+    /// Adds a sample, whose colour is multiplied by its coverage. False, and nothing is added, where it is not finite, or beyond what
+    /// a sum holds.
+    pub fn add(&mut self, colour: Rgb, coverage: f32, weight: f64) -> bool {
+        let weighted = colour.to_array().map(|channel| weight * f64::from(channel));
+        let covered = weight * f64::from(coverage);
+        if ![weight, covered].into_iter().chain(weighted).all(ExactSum::holds) {
+            return false;
         }
-        self.covered += weight * f64::from(coverage);
-        self.weight += weight;
-        let luminance = f64::from(colour.luminance());
-        self.luminance += luminance;
-        self.luminance_squares += luminance * luminance;
+        for (sum, number) in self.sum.iter_mut().zip(weighted) {
+            sum.add(number);
+        }
+        self.covered.add(covered);
+        self.weight.add(weight);
+        let luminance = f64::from(colour.luminance()).clamp(-MOST_LUMINANCE, MOST_LUMINANCE);
+        self.luminance.add(luminance);
+        self.luminance_squares.add(luminance * luminance);
         self.samples += 1;
+        true
+    }
+
+    /// Adds the samples of another.
+    pub fn merge(&mut self, other: &Self) {
+        self.sum.iter_mut().zip(other.sum).for_each(|(sum, other)| sum.merge(other));
+        self.covered.merge(other.covered);
+        self.weight.merge(other.weight);
+        self.luminance.merge(other.luminance);
+        self.luminance_squares.merge(other.luminance_squares);
+        self.samples += other.samples;
+        self.taken += other.taken;
     }
 
     /// The mean of the samples; black where there is none.
@@ -40,7 +65,8 @@ impl Pixel {
 
     /// The mean coverage, in [0, 1]; 0 where there is no sample.
     pub fn coverage(&self) -> f32 {
-        if self.weight == 0.0 { 0.0 } else { (self.covered / self.weight).clamp(0.0, 1.0) as f32 }
+        let (covered, weight) = (self.covered.value(), self.weight.value());
+        if weight == 0.0 { 0.0 } else { (covered / weight).clamp(0.0, 1.0) as f32 }
     }
 
     /// The mean luminance, and its standard error as if samples were independent (those of a low-discrepancy sampler are
@@ -50,36 +76,44 @@ impl Pixel {
         if self.samples < 2 {
             return None;
         }
-        let mean = self.luminance / n;
-        let variance = (self.luminance_squares / n - mean * mean).max(0.0) * n / (n - 1.0);
+        let mean = self.luminance.value() / n;
+        let variance = (self.luminance_squares.value() / n - mean * mean).max(0.0) * n / (n - 1.0);
         Some((mean, (variance / n).sqrt()))
     }
 }
 
-/// By how much the coverage of red and that of blue are more than that of green: weighted sums of the samples of one pixel.
-///
-/// As a rule they are exactly zero, and else as noisy as shadows are: single precision is enough.
+/// By how much the coverage of red and that of blue are more than that of green: weighted sums of the samples of one pixel. As a
+/// rule they are exactly zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tint {
-    red: f32,
-    blue: f32,
+    /// Σ weight × (red − green).
+    pub red: ExactSum,
+    /// Σ weight × (blue − green).
+    pub blue: ExactSum,
 }
 
 impl Tint {
     /// Adds the coverage of a sample.
     pub fn add(&mut self, coverage: Rgb, weight: f64) {
-        self.red += (weight * f64::from(coverage.r - coverage.g)) as f32;
-        self.blue += (weight * f64::from(coverage.b - coverage.g)) as f32;
+        self.red.add(weight * f64::from(coverage.r - coverage.g));
+        self.blue.add(weight * f64::from(coverage.b - coverage.g));
+    }
+
+    /// Adds the samples of another.
+    pub fn merge(&mut self, other: &Self) {
+        self.red.merge(other.red);
+        self.blue.merge(other.blue);
     }
 
     /// The mean coverage of each colour in the pixel that the same samples were added to, in [0, 1]; 0 where there is none.
     pub fn coverage(&self, of: &Pixel) -> Rgb {
-        if of.weight == 0.0 {
+        let weight = of.weight.value();
+        if weight == 0.0 {
             return Rgb::BLACK;
         }
-        let [red, blue] = [self.red, self.blue].map(f64::from);
-        let green = of.covered - (red + blue) / 3.0;
-        let share = |covered: f64| (covered / of.weight).clamp(0.0, 1.0) as f32;
+        let [red, blue] = [self.red.value(), self.blue.value()];
+        let green = of.covered.value() - (red + blue) / 3.0;
+        let share = |covered: f64| (covered / weight).clamp(0.0, 1.0) as f32;
         Rgb::new(share(green + red), share(green), share(green + blue))
     }
 }
@@ -97,38 +131,51 @@ pub struct FeatureSample {
     pub uv: [f32; 2],
 }
 
-/// Weighted sums of the features of one pixel.
+/// Weighted sums of the features of one pixel, which do not depend on the order that they were added in.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FeatureSums {
     /// Σ weight × albedo.
-    pub albedo: [f64; 3],
+    pub albedo: [ExactSum; 3],
     /// Σ weight × normal.
-    pub normal: [f64; 3],
-    /// Σ weight × depth.
-    pub depth: f64,
+    pub normal: [ExactSum; 3],
+    /// Σ weight × depth, in a unit that the film knows.
+    pub depth: ExactSum,
     /// Σ weight × uv.
-    pub uv: [f64; 2],
+    pub uv: [ExactSum; 2],
     /// Σ weight of samples that met something.
-    pub met: f64,
+    pub met: ExactSum,
     /// Σ weight of all samples.
-    pub weight: f64,
+    pub weight: ExactSum,
 }
 
 impl FeatureSums {
-    /// Adds a sample; `None` met nothing.
-    pub fn add(&mut self, sample: Option<&FeatureSample>, weight: f64) {
-        self.weight += weight;
+    /// Adds a sample, whose depth is measured in `depth_unit`; `None` met nothing.
+    pub fn add(&mut self, sample: Option<&FeatureSample>, weight: f64, depth_unit: f64) {
+        self.weight.add(weight);
         let Some(sample) = sample else { return };
-        let add = |sums: &mut [f64], values: &[f32]| {
+        let add = |sums: &mut [ExactSum], values: &[f32]| {
             for (sum, &value) in sums.iter_mut().zip(values) {
-                *sum += weight * f64::from(value);
+                sum.add(weight * f64::from(value));
             }
         };
         add(&mut self.albedo, &sample.albedo.to_array());
         add(&mut self.normal, &sample.normal);
         add(&mut self.uv, &sample.uv);
-        self.depth += weight * f64::from(sample.depth);
-        self.met += weight;
+        self.depth.add(weight * (f64::from(sample.depth) / depth_unit));
+        self.met.add(weight);
+    }
+
+    /// Adds the samples of another.
+    pub fn merge(&mut self, other: &Self) {
+        let merge = |sums: &mut [ExactSum], others: &[ExactSum]| {
+            sums.iter_mut().zip(others).for_each(|(sum, &other)| sum.merge(other));
+        };
+        merge(&mut self.albedo, &other.albedo);
+        merge(&mut self.normal, &other.normal);
+        merge(&mut self.uv, &other.uv);
+        self.depth.merge(other.depth);
+        self.met.merge(other.met);
+        self.weight.merge(other.weight);
     }
 
     /// The mean albedo, black where nothing was met.
@@ -141,19 +188,40 @@ impl FeatureSums {
         mean(self.normal, self.weight)
     }
 
-    /// The mean depth of what was met; 0 where nothing was.
-    pub fn depth(&self) -> f32 {
-        if self.met > 0.0 { (self.depth / self.met) as f32 } else { 0.0 }
+    /// The mean depth of what was met, in the film's unit times `depth_unit`; 0 where nothing was.
+    pub fn depth(&self, depth_unit: f64) -> f32 {
+        let met = self.met.value();
+        if met > 0.0 { (self.depth.value() / met * depth_unit) as f32 } else { 0.0 }
     }
 
     /// The mean surface parameters of what was met.
     pub fn uv(&self) -> [f32; 2] {
-        if self.met > 0.0 { self.uv.map(|c| (c / self.met) as f32) } else { [0.0; 2] }
+        let met = self.met.value();
+        if met > 0.0 { self.uv.map(|c| (c.value() / met) as f32) } else { [0.0; 2] }
     }
 }
 
-fn mean(sum: [f64; 3], weight: f64) -> Rgb {
-    if weight == 0.0 { Rgb::BLACK } else { sum.map(|c| (c / weight) as f32).into() }
+/// Sums that can be merged.
+pub(super) trait Sums {
+    /// Adds the samples of another.
+    fn merge(&mut self, other: &Self);
+}
+
+macro_rules! sums {
+    ($($sums:ident),*) => {
+        $(impl Sums for $sums {
+            fn merge(&mut self, other: &Self) {
+                self.merge(other);
+            }
+        })*
+    };
+}
+
+sums!(Pixel, Tint, FeatureSums);
+
+fn mean(sum: [ExactSum; 3], weight: ExactSum) -> Rgb {
+    let weight = weight.value();
+    if weight == 0.0 { Rgb::BLACK } else { sum.map(|c| (c.value() / weight) as f32).into() }
 }
 
 #[cfg(test)]
@@ -165,8 +233,13 @@ mod tests {
         let mut pixel = Pixel::default();
         assert_eq!(pixel.colour(), Rgb::BLACK);
         assert_eq!(pixel.coverage(), 0.0);
-        pixel.add(Rgb::new(2.0, 4.0, 8.0), 0.75, 3.0);
-        pixel.add(Rgb::new(6.0, 0.0, 4.0), -0.25, 1.0);
+        assert!(pixel.add(Rgb::new(2.0, 4.0, 8.0), 0.75, 3.0));
+        assert!(pixel.add(Rgb::new(6.0, 0.0, 4.0), -0.25, 1.0));
+        let before = pixel;
+        for colour in [f32::NAN, f32::INFINITY, 2e12] {
+            assert!(!pixel.add(Rgb::new(1.0, colour, 1.0), 1.0, 1.0));
+        }
+        assert_eq!(pixel, before);
         assert_eq!(pixel.coverage(), 0.5);
         assert_eq!(pixel.colour(), Rgb::new(3.0, 3.0, 7.0));
     }
@@ -175,7 +248,7 @@ mod tests {
     fn the_standard_error_is_that_of_the_mean() {
         let mut pixel = Pixel::default();
         for value in [1.0, 2.0, 3.0, 6.0] {
-            pixel.add(Rgb::splat(value), 1.0, 0.5);
+            assert!(pixel.add(Rgb::splat(value), 1.0, 0.5));
         }
         let (mean, error) = pixel.luminance_with_error().unwrap();
         assert!((mean - 3.0).abs() < 1e-6);
@@ -185,11 +258,11 @@ mod tests {
     #[test]
     fn depth_does_not_mix_with_the_background() {
         let mut sums = FeatureSums::default();
-        sums.add(None, 2.0);
+        sums.add(None, 2.0, 8.0);
         let sample =
             FeatureSample { albedo: Rgb::WHITE, normal: [0.0, 0.0, 1.0], depth: 7.0, uv: [0.25, 0.5] };
-        sums.add(Some(&sample), 2.0);
-        assert_eq!((sums.depth(), sums.uv()), (7.0, [0.25, 0.5]));
+        sums.add(Some(&sample), 2.0, 8.0);
+        assert_eq!((sums.depth(8.0), sums.uv()), (7.0, [0.25, 0.5]));
         assert_eq!((sums.albedo(), sums.normal()), (Rgb::splat(0.5), Rgb::new(0.0, 0.0, 0.5)));
     }
 }

@@ -2,6 +2,7 @@
 
 use lumbre_image::Rgb;
 
+use crate::film::pixel::Sums;
 use crate::film::{FeatureSample, FeatureSums, GuideSums, Pixel, PixelBounds, Tint};
 
 /// How radiance becomes the colour of a pixel.
@@ -54,10 +55,11 @@ pub struct Tile {
     tints: Vec<Tint>,
     // Empty unless guides are wanted; else as many as pixels.
     guides: Vec<GuideSums>,
+    depth_unit: f64,
 }
 
 /// What is wanted of samples besides the colour of pixels and their coverage.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extras {
     /// What the samples met first.
     pub features: bool,
@@ -65,6 +67,14 @@ pub struct Extras {
     pub tints: bool,
     /// What a denoiser wants to know.
     pub guides: bool,
+    /// What depths are measured in: a power of two above all of them.
+    pub depth_unit: f64,
+}
+
+impl Default for Extras {
+    fn default() -> Self {
+        Self { features: false, tints: false, guides: false, depth_unit: 1.0 }
+    }
 }
 
 impl Tile {
@@ -77,6 +87,7 @@ impl Tile {
             features: vec![FeatureSums::default(); if extras.features { count } else { 0 }],
             tints: vec![Tint::default(); if extras.tints { count } else { 0 }],
             guides: vec![GuideSums::default(); if extras.guides { count } else { 0 }],
+            depth_unit: extras.depth_unit,
         }
     }
 
@@ -90,6 +101,11 @@ impl Tile {
         &self.pixels
     }
 
+    /// What depths are measured in.
+    pub fn depth_unit(&self) -> f64 {
+        self.depth_unit
+    }
+
     /// The features of every pixel, row by row; empty where they are not wanted.
     pub fn features(&self) -> &[FeatureSums] {
         &self.features
@@ -98,6 +114,11 @@ impl Tile {
     /// What a denoiser wants to know of every pixel, row by row; empty where it is not wanted.
     pub fn guides(&self) -> &[GuideSums] {
         &self.guides
+    }
+
+    /// By how much the coverage of each colour is another, row by row; empty where it is not wanted.
+    pub fn tints(&self) -> &[Tint] {
+        &self.tints
     }
 
     /// The coverage of every pixel by colour, row by row; where that is not wanted, of all colours alike.
@@ -119,16 +140,17 @@ impl Tile {
             return false;
         }
         let colour = exposure.colour(sample.radiance);
-        if !colour.is_finite() || !sample.weight.is_finite() || !sample.coverage.is_finite() {
+        let position = b.position(x, y);
+        let pixel = &mut self.pixels[position];
+        pixel.taken += 1;
+        if !sample.coverage.is_finite() || !pixel.add(colour, sample.coverage.average(), sample.weight) {
             return false;
         }
-        let position = (y - b.y0) as usize * b.width() as usize + (x - b.x0) as usize;
-        self.pixels[position].add(colour, sample.coverage.average(), sample.weight);
         if let Some(tint) = self.tints.get_mut(position) {
             tint.add(sample.coverage, sample.weight);
         }
         if let Some(sums) = self.features.get_mut(position) {
-            sums.add(sample.features.as_ref(), sample.weight);
+            sums.add(sample.features.as_ref(), sample.weight, self.depth_unit);
         }
         let catches_shadows = !self.tints.is_empty();
         if let Some(guide) = self.guides.get_mut(position) {
@@ -150,6 +172,113 @@ impl Tile {
         true
     }
 
+    /// Makes it a tile of more pixels, without samples but for its own.
+    pub(crate) fn grow(&mut self, bounds: PixelBounds) {
+        if bounds != self.bounds {
+            *self = self.placed_in(bounds);
+        }
+    }
+
+    /// The part of it in these bounds, and nothing where it has none.
+    pub(crate) fn placed_in(&self, bounds: PixelBounds) -> Self {
+        let (both, from, to) = (self.bounds.intersection(&bounds), self.bounds, bounds);
+        fn taken<T: Copy + Default>(
+            list: &[T],
+            count: u64,
+            places: impl Iterator<Item = (usize, usize)>,
+        ) -> Vec<T> {
+            if list.is_empty() {
+                return Vec::new();
+            }
+            let mut taken = vec![T::default(); count as usize];
+            places.for_each(|(from, to)| taken[to] = list[from]);
+            taken
+        }
+        let places = || both.pixels().map(move |(x, y)| (from.position(x, y), to.position(x, y)));
+        let count = bounds.area();
+        Self {
+            bounds,
+            pixels: taken(&self.pixels, count, places()),
+            features: taken(&self.features, count, places()),
+            tints: taken(&self.tints, count, places()),
+            guides: taken(&self.guides, count, places()),
+            depth_unit: self.depth_unit,
+        }
+    }
+
+    /// Adds what another tile of the same kind gathered, all of whose pixels this one has.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        fn add<T: Sums>(to: &mut [T], at: usize, other: &[T], from: usize) {
+            if let (Some(to), Some(other)) = (to.get_mut(at), other.get(from)) {
+                to.merge(other);
+            }
+        }
+        for (from, (x, y)) in other.bounds.pixels().enumerate() {
+            let at = self.bounds.position(x, y);
+            add(&mut self.pixels, at, &other.pixels, from);
+            add(&mut self.features, at, &other.features, from);
+            add(&mut self.tints, at, &other.tints, from);
+        }
+    }
+
+    /// Takes the sums of a tile of the same kind, all of whose pixels this one has.
+    pub(crate) fn take(&mut self, other: &Self) {
+        fn copy<T: Copy>(to: &mut [T], at: usize, other: &[T], from: usize) {
+            if let (Some(to), Some(&other)) = (to.get_mut(at), other.get(from)) {
+                *to = other;
+            }
+        }
+        for (from, (x, y)) in other.bounds.pixels().enumerate() {
+            let at = self.bounds.position(x, y);
+            copy(&mut self.pixels, at, &other.pixels, from);
+            copy(&mut self.features, at, &other.features, from);
+            copy(&mut self.tints, at, &other.tints, from);
+            copy(&mut self.guides, at, &other.guides, from);
+        }
+    }
+
+    /// The memory of a tile.
+    pub(crate) fn memory_bytes(bounds: PixelBounds, extras: Extras) -> u64 {
+        let sizes = [
+            (true, size_of::<Pixel>()),
+            (extras.features, size_of::<FeatureSums>()),
+            (extras.tints, size_of::<Tint>()),
+            (extras.guides, size_of::<GuideSums>()),
+        ];
+        let each: usize = sizes.into_iter().filter(|(has, _)| *has).map(|(_, size)| size).sum();
+        bounds.area().saturating_mul(each as u64)
+    }
+
+    /// All sums, to be set.
+    pub(crate) fn sums_mut(&mut self) -> (&mut [Pixel], &mut [Tint], &mut [FeatureSums], &mut [GuideSums]) {
+        (&mut self.pixels, &mut self.tints, &mut self.features, &mut self.guides)
+    }
+
+    /// What is gathered besides colours.
+    pub fn extras(&self) -> Extras {
+        Extras {
+            features: !self.features.is_empty(),
+            tints: !self.tints.is_empty(),
+            guides: !self.guides.is_empty(),
+            depth_unit: self.depth_unit,
+        }
+    }
+
+    /// Whether every pixel has so many samples, with those that were dropped.
+    pub(crate) fn has_taken(&self, samples: u32) -> bool {
+        self.pixels.iter().all(|pixel| pixel.taken >= samples)
+    }
+
+    /// The samples of the pixel with the fewest.
+    pub(crate) fn least_taken(&self) -> u32 {
+        self.pixels.iter().map(|pixel| pixel.taken).min().unwrap_or(0)
+    }
+
+    /// How many samples a pixel of it has, with those that were dropped.
+    pub fn taken(&self, x: u32, y: u32) -> u32 {
+        self.pixels[self.bounds.position(x, y)].taken
+    }
+
     /// The first pixel as a tile of its own.
     pub fn corner(&self) -> Self {
         let bounds = PixelBounds { x1: self.bounds.x0 + 1, y1: self.bounds.y0 + 1, ..self.bounds };
@@ -159,6 +288,7 @@ impl Tile {
             features: self.features.first().copied().into_iter().collect(),
             tints: self.tints.first().copied().into_iter().collect(),
             guides: self.guides.first().copied().into_iter().collect(),
+            depth_unit: self.depth_unit,
         }
     }
 
@@ -207,7 +337,7 @@ mod tests {
 
     #[test]
     fn a_sample_goes_to_its_own_pixel_and_one_that_is_not_finite_to_none() {
-        let extras = Extras { features: true, tints: true, guides: false };
+        let extras = Extras { features: true, tints: true, ..Extras::default() };
         let mut tile = Tile::new(PixelBounds { x0: 5, y0: 7, x1: 9, y1: 10 }, extras);
         let coverage = Rgb::splat(0.25);
         let sample = |radiance| Sample { radiance, coverage, weight: 1.0, features: None, on_catcher: false };

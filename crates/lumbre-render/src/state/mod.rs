@@ -1,0 +1,260 @@
+//! What a render has gathered so far: to go on from, and to join with what others gathered.
+
+mod bytes;
+
+use std::ops::Range;
+
+use crate::film::Tile;
+use crate::rendered::{noise, rendered_of};
+use crate::{DroppedSample, PixelBounds, RayCounts, Rendered, Stats};
+
+pub use bytes::StateError;
+
+/// The sums of every pixel of a render, finished or not, and which samples they are of.
+///
+/// Sums are exact ([`crate::film::ExactSum`]). So the states of parts of a render, by ranges of samples and by crops, come to the
+/// state of the whole, bit for bit, in whatever order and grouping they are merged.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderState {
+    /// The sums of all pixels of the rectangle that holds all pieces.
+    pub(crate) film: Tile,
+    /// What was asked for.
+    pub(crate) pieces: Vec<Piece>,
+    /// What it took.
+    pub(crate) rays: RayCounts,
+    /// Samples that were not finite.
+    pub(crate) dropped: u64,
+    /// The first of them.
+    pub(crate) first_dropped: Vec<DroppedSample>,
+}
+
+/// Some samples of some pixels.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Piece {
+    /// The pixels.
+    pub bounds: PixelBounds,
+    /// The indices of their samples.
+    pub samples: Range<u32>,
+}
+
+/// Why two states cannot be merged.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MergeError {
+    /// A sample is in both.
+    #[error(
+        "both have samples {}..{} of pixels {},{},{},{}",
+        .0.samples.start, .0.samples.end, .0.bounds.x0, .0.bounds.y0, .0.bounds.x1, .0.bounds.y1
+    )]
+    Overlap(Piece),
+    /// Only one of them has features, or coverage by colour.
+    #[error("only one of them has what the other has besides colours")]
+    OtherExtras,
+    /// One has sums of a denoiser, which depend on the order of samples.
+    #[error("what a denoiser gathers cannot be merged")]
+    Guides,
+}
+
+/// Dropped samples that are remembered by place.
+pub(crate) const REMEMBERED: usize = 16;
+
+impl Piece {
+    /// How many samples.
+    pub fn count(&self) -> u64 {
+        self.bounds.area() * u64::from(self.samples.end.saturating_sub(self.samples.start))
+    }
+
+    /// What both have.
+    pub fn intersection(&self, other: &Self) -> Option<Self> {
+        let bounds = self.bounds.intersection(&other.bounds);
+        let samples = self.samples.start.max(other.samples.start)..self.samples.end.min(other.samples.end);
+        (!bounds.is_empty() && !samples.is_empty()).then_some(Self { bounds, samples })
+    }
+}
+
+impl RenderState {
+    /// The rectangle that holds all pixels of it.
+    pub fn bounds(&self) -> PixelBounds {
+        self.film.bounds()
+    }
+
+    /// Which samples of which pixels it is to have, without overlaps, in the order that they were merged in.
+    pub fn pieces(&self) -> &[Piece] {
+        &self.pieces
+    }
+
+    /// How many of these samples were taken.
+    pub fn taken(&self) -> u64 {
+        self.film.pixels().iter().map(|pixel| u64::from(pixel.taken)).sum()
+    }
+
+    /// How many samples it is to have.
+    pub fn wanted(&self) -> u64 {
+        self.pieces.iter().map(Piece::count).sum()
+    }
+
+    /// Whether all samples were taken.
+    pub fn is_finished(&self) -> bool {
+        self.taken() == self.wanted()
+    }
+
+    /// The samples that the pixel with the fewest has.
+    pub fn least_samples(&self) -> u32 {
+        self.film.pixels().iter().map(|pixel| pixel.taken).min().unwrap_or(0)
+    }
+
+    /// The range of samples of all pixels, from the first of any to the last of any.
+    pub fn samples(&self) -> Range<u32> {
+        let first = self.pieces.iter().map(|piece| piece.samples.start).min().unwrap_or(0);
+        let last = self.pieces.iter().map(|piece| piece.samples.end).max().unwrap_or(0);
+        first..last
+    }
+
+    /// What is missing of the samples 0 to the last of any, for the pixels of `bounds`, each piece as large as it can be.
+    pub fn gaps(&self, bounds: PixelBounds) -> Vec<Piece> {
+        // Pieces are few: what is left of one gap after another.
+        let mut gaps = vec![Piece { bounds, samples: 0..self.samples().end }];
+        for piece in &self.pieces {
+            gaps = gaps.iter().flat_map(|gap| without(gap, piece)).collect();
+        }
+        gaps
+    }
+
+    /// The picture that it is, with coverage if it is to be transparent. Its statistics are those of the samples.
+    pub fn to_rendered(&self, transparent: bool) -> Rendered {
+        let film = || std::iter::once(&self.film);
+        let rendered = rendered_of(film(), self.bounds(), transparent, self.film.extras());
+        let stats = Stats {
+            spp: self.least_samples(),
+            stride: (self.least_samples() > 0).then_some(1),
+            samples: self.rays.camera,
+            rays: self.rays,
+            dropped: self.dropped,
+            first_dropped: self.first_dropped.clone(),
+            noise: noise(film()),
+            ..Stats::default()
+        };
+        Rendered { stats, ..rendered }
+    }
+
+    /// Adds what another gathered.
+    ///
+    /// # Errors
+    /// [`MergeError`]; nothing is changed then.
+    pub fn merge(&mut self, other: &Self) -> Result<(), MergeError> {
+        let overlap = |piece: &Piece| other.pieces.iter().find_map(|theirs| piece.intersection(theirs));
+        if let Some(overlap) = self.pieces.iter().find_map(overlap) {
+            return Err(MergeError::Overlap(overlap));
+        }
+        let kind = |state: &Self| (state.film.features().is_empty(), state.film.tints().is_empty());
+        if kind(self) != kind(other) || self.film.depth_unit() != other.film.depth_unit() {
+            return Err(MergeError::OtherExtras);
+        }
+        if !self.film.guides().is_empty() || !other.film.guides().is_empty() {
+            return Err(MergeError::Guides);
+        }
+        self.film.grow(self.bounds().hull(&other.bounds()));
+        self.film.merge(&other.film);
+        self.pieces.extend(other.pieces.iter().cloned());
+        self.rays += other.rays;
+        self.dropped += other.dropped;
+        self.first_dropped.extend(&other.first_dropped);
+        self.first_dropped.sort_unstable_by_key(|d| (d.sample, d.y, d.x));
+        self.first_dropped.truncate(REMEMBERED);
+        Ok(())
+    }
+}
+
+/// What is left of a piece without another: up to six pieces.
+fn without(piece: &Piece, other: &Piece) -> Vec<Piece> {
+    let Some(both) = piece.intersection(other) else { return vec![piece.clone()] };
+    let PixelBounds { x0, y0, x1, y1 } = piece.bounds;
+    let inner = both.bounds;
+    let samples = |samples: Range<u32>, bounds| Piece { bounds, samples };
+    let beside = |x0, y0, x1, y1| samples(piece.samples.clone(), PixelBounds { x0, y0, x1, y1 });
+    [
+        samples(piece.samples.start..both.samples.start, inner),
+        samples(both.samples.end..piece.samples.end, inner),
+        beside(x0, y0, x1, inner.y0),
+        beside(x0, inner.y1, x1, y1),
+        beside(x0, inner.y0, inner.x0, inner.y1),
+        beside(inner.x1, inner.y0, x1, inner.y1),
+    ]
+    .into_iter()
+    .filter(|piece| piece.count() > 0)
+    .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use lumbre_image::Rgb;
+    use lumbre_math::random::RandomStream;
+
+    use super::*;
+    use crate::film::{Exposure, Extras, FeatureSample, Sample};
+
+    fn state(bounds: PixelBounds, samples: Range<u32>) -> RenderState {
+        let extras = Extras { features: true, tints: true, depth_unit: 8.0, ..Extras::default() };
+        let mut film = Tile::new(bounds, extras);
+        for (x, y) in bounds.pixels() {
+            for index in samples.clone() {
+                let mut random =
+                    RandomStream::new(u64::from(x) << 40 | u64::from(y) << 20 | u64::from(index));
+                let mut colour =
+                    || Rgb::new(random.next_f32(), 1e-3 * random.next_f32(), 1e5 * random.next_f32());
+                let features =
+                    FeatureSample { albedo: colour(), normal: [0.1, 0.7, 0.7], depth: 3.3, uv: [0.1, 0.2] };
+                let sample = Sample {
+                    radiance: colour(),
+                    coverage: colour(),
+                    weight: 0.3 + f64::from(index) / 7.0,
+                    features: (index % 3 > 0).then_some(features),
+                    on_catcher: false,
+                };
+                film.add(x, y, &sample, &Exposure::default());
+            }
+        }
+        let pieces = vec![Piece { bounds, samples }];
+        RenderState { film, pieces, rays: RayCounts::default(), dropped: 0, first_dropped: Vec::new() }
+    }
+
+    const WHOLE: PixelBounds = PixelBounds { x0: 3, y0: 5, x1: 12, y1: 11 };
+
+    #[test]
+    fn parts_come_to_the_whole_in_any_order_and_grouping() {
+        let whole = state(WHOLE, 0..23);
+        let left = PixelBounds { x1: 7, ..WHOLE };
+        let right = PixelBounds { x0: 7, ..WHOLE };
+        let mut random = RandomStream::new(3);
+        for _ in 0..50 {
+            let mut parts = vec![state(left, 0..1), state(left, 1..9), state(left, 9..23)];
+            parts.extend([(0, 4), (4, 5), (5, 22), (22, 23)].map(|(from, to)| state(right, from..to)));
+            while parts.len() > 1 {
+                let part = parts.swap_remove(random.next_below(parts.len()));
+                let into = random.next_below(parts.len());
+                parts[into].merge(&part).unwrap();
+            }
+            assert_eq!(parts[0].film, whole.film);
+            assert!(parts[0].is_finished() && parts[0].gaps(WHOLE).is_empty());
+        }
+    }
+
+    #[test]
+    fn what_is_missing_is_named_and_what_is_twice_is_refused() {
+        let mut part = state(WHOLE, 2..5);
+        let before = part.clone();
+        let overlap = part.merge(&state(PixelBounds { x0: 10, ..WHOLE }, 4..6)).unwrap_err();
+        let both = Piece { bounds: PixelBounds { x0: 10, ..WHOLE }, samples: 4..5 };
+        assert_eq!((overlap, &part), (MergeError::Overlap(both), &before));
+        part.merge(&state(PixelBounds { x0: 10, ..WHOLE }, 5..7)).unwrap();
+        let mut gaps = part.gaps(WHOLE);
+        gaps.sort_by_key(|gap| (gap.samples.start, gap.bounds.x0));
+        let left = PixelBounds { x1: 10, ..WHOLE };
+        let missing: u64 = gaps.iter().map(Piece::count).sum();
+        assert_eq!(missing, 2 * WHOLE.area() + 2 * left.area());
+        assert_eq!(part.gaps(WHOLE).len(), gaps.len());
+        assert!(gaps.contains(&Piece { bounds: left, samples: 5..7 }), "{gaps:?}");
+        let other = RenderState { film: Tile::new(WHOLE, Extras::default()), pieces: Vec::new(), ..before };
+        assert_eq!(part.merge(&other), Err(MergeError::OtherExtras));
+    }
+}
