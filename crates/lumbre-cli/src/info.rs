@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
-use lumbre::CancelToken;
+use lumbre::{CancelToken, Part};
 use serde_json::json;
 
 use crate::console::escaped;
@@ -18,6 +18,7 @@ use crate::signals::Signals;
   lumbre info scene.pbrt
   lumbre info dancer.glb                        which cameras, animations, variants and textures it has
   lumbre info model.ply --json | python3 -m json.tool
+  lumbre info picture.exr.checkpoint            which samples a part or a checkpoint has, of which render
 
 Exit status 3 when the scene would not load.")]
 pub(crate) struct Arguments {
@@ -34,6 +35,13 @@ pub(crate) struct Arguments {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let _signals = Signals::listen(&CancelToken::new())?;
+    if let [path] = &arguments.scene[..]
+        && Part::is_in(path)
+    {
+        let part = Part::open(path, arguments.reading.memory().for_reading());
+        let part = part.map_err(|e| Failure::Input(format!("{}: {e}", path.display())))?;
+        return print(&about_part(&part, arguments.json));
+    }
     let (scene, diagnostics) = arguments.reading.open(&arguments.scene)?;
     let info = scene.info();
     if arguments.json {
@@ -97,6 +105,44 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     print(&report.concat())?;
     print_warnings(&diagnostics);
     Ok(())
+}
+
+/// What a part or a checkpoint holds.
+fn about_part(part: &Part, as_json: bool) -> String {
+    let state = &part.state;
+    let (width, height) = part.job.size;
+    if as_json {
+        let pieces = state.pieces().iter().map(|piece| {
+            let b = piece.bounds;
+            json!({ "crop": [b.x0, b.y0, b.x1, b.y1], "samples": [piece.samples.start, piece.samples.end] })
+        });
+        let report = json!({
+            "part": {
+                "width": width,
+                "height": height,
+                "pieces": pieces.collect::<Vec<_>>(),
+                "taken": state.taken(),
+                "wanted": state.wanted(),
+                "least_samples": state.least_samples(),
+                "render": part.job.identity,
+            },
+        });
+        return format!("{report:#}\n");
+    }
+    let done = if state.is_finished() { "finished" } else { "unfinished: --resume goes on from it" };
+    let mut text = format!("part       of a picture of {width}x{height}, {done}\n");
+    for piece in state.pieces() {
+        let (b, samples) = (piece.bounds, &piece.samples);
+        text += &format!(
+            "samples    {}..{} of pixels {},{},{},{}\n",
+            samples.start, samples.end, b.x0, b.y0, b.x1, b.y1
+        );
+    }
+    text += &format!("taken      {} of {}\n", state.taken(), state.wanted());
+    for (name, value) in &part.job.identity {
+        text += &format!("{name}: {}\n", escaped(value));
+    }
+    text
 }
 
 /// How many names of a kind are printed: `--json` has all.

@@ -1,4 +1,4 @@
-//! The `lumbre` program: render, cast, info, diff.
+//! The `lumbre` program: render, cast, info, diff, merge.
 
 use std::process::ExitCode;
 
@@ -10,6 +10,7 @@ macro_rules! say {
 }
 
 mod cast;
+mod checkpoint;
 mod completions;
 mod console;
 mod denoiser;
@@ -17,6 +18,7 @@ mod diff;
 mod failure;
 mod info;
 mod memory;
+mod merge;
 mod names;
 mod oidn;
 mod output;
@@ -31,7 +33,7 @@ mod units;
 mod verb;
 mod view;
 
-/// Renders scenes, casts rays into them, says what is in them, and compares pictures.
+/// Renders scenes, casts rays into them, says what is in them, and compares and joins pictures.
 #[derive(Parser)]
 #[command(name = "lumbre", version, about, max_term_width = 110)]
 #[command(after_help = "Examples:
@@ -41,6 +43,7 @@ mod view;
   lumbre cast scene.pbrt --rays rays.csv        what each ray hits first
   lumbre info scene.pbrt --json                 what is in a scene
   lumbre diff a.exr b.exr --metric relmse       how different two pictures are
+  lumbre merge a.part b.part -o picture.exr     one picture of what two machines rendered
 
 Exit status: 0 done, 1 a comparison failed, 2 usage, 3 input, 4 files, 5 a limit, 130 or 143 a signal.")]
 struct Arguments {
@@ -54,6 +57,7 @@ enum Command {
     Cast(cast::Arguments),
     Info(info::Arguments),
     Diff(diff::Arguments),
+    Merge(merge::Arguments),
     Completions(completions::CompletionsArguments),
     Man(completions::ManArguments),
 }
@@ -70,6 +74,7 @@ fn main() -> ExitCode {
         Command::Cast(arguments) => cast::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Diff(arguments) => diff::run(&arguments),
+        Command::Merge(arguments) => merge::run(&arguments),
         Command::Completions(arguments) => completions::completions::<Arguments>(&arguments),
         Command::Man(arguments) => completions::man::<Arguments>(&arguments),
     };

@@ -193,6 +193,18 @@ impl ReadingArguments {
         Ok((desc, diagnostics))
     }
 
+    /// What the scene depends on besides its files, by name.
+    pub(crate) fn scene_settings(&self) -> Vec<(String, String)> {
+        let Self { lenient, frame, shutter, fps, animation, variant, settings, .. } = self;
+        let text = |name: &str, value: String| (name.to_owned(), value);
+        vec![
+            text("lenient", lenient.to_string()),
+            text("frame", format!("{frame:?} {shutter:?} {fps} {animation:?}")),
+            text("variant", format!("{variant:?}")),
+            text("settings", format!("{settings:?}")),
+        ]
+    }
+
     /// The files of settings, which are read too.
     pub(crate) fn overlays(&self) -> impl Iterator<Item = &Path> {
         self.overlay.iter().map(PathBuf::as_path)

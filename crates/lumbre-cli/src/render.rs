@@ -1,6 +1,7 @@
 //! `lumbre render`: renders a picture of a scene.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -14,11 +15,12 @@ use lumbre::image::{Image, ToneMap};
 use lumbre::math::Elementary;
 use lumbre::shading::ShadingNormals;
 use lumbre::{
-    CancelToken, DVec3, Feature, Ground, Picture, PixelBounds, RenderOptions, SaveOptions, Scene, SceneDesc,
-    Stage, StageLight, Staged,
+    CancelToken, DVec3, Feature, Ground, Job, Keeper, Picture, PixelBounds, RenderOptions, SaveOptions,
+    Scene, SceneDesc, Stage, StageLight, Staged,
 };
 use serde_json::json;
 
+use crate::checkpoint::{Checkpoint, PartArguments, is_bare_part};
 use crate::denoiser::{Choice, Denoiser};
 use crate::failure::{Failure, print_bytes};
 use crate::names::one_of;
@@ -142,6 +144,8 @@ pub(crate) struct Arguments {
     /// Print errors only.
     #[arg(short, long, conflicts_with = "verbose")]
     quiet: bool,
+    #[command(flatten)]
+    parts: PartArguments,
     #[command(flatten)]
     view: ViewArguments,
     #[command(flatten)]
@@ -284,6 +288,39 @@ impl Arguments {
     fn inputs(&self) -> impl Iterator<Item = &Path> {
         let files = self.scene.iter().map(PathBuf::as_path).chain(self.staging.inputs());
         files.chain(self.reading.overlays())
+    }
+
+    /// What else than files and options of rendering the scene depends on, by name.
+    fn settings(&self) -> Vec<(String, String)> {
+        let mut settings = self.reading.scene_settings();
+        settings.push(("view".to_owned(), format!("{:?}", self.view)));
+        settings.push(("stage".to_owned(), format!("{:?} {:?}", self.staging, self.size)));
+        settings
+    }
+
+    /// How a picture is shown, by name, for whoever saves it later: see [`crate::merge`].
+    fn shown(
+        &self,
+        behind: &Behind,
+        tone_map: ToneMap,
+        exposure: f32,
+        precision: ExrPrecision,
+    ) -> BTreeMap<String, String> {
+        let tone_map = TONE_MAPS.iter().find(|name| ToneMap::from_name(name) == Some(tone_map));
+        let layers: Vec<&str> = self.aov.iter().map(|aov| aov.name()).collect();
+        let mut shown = BTreeMap::from([
+            ("exposure".to_owned(), exposure.to_string()),
+            ("tone map".to_owned(), (*tone_map.unwrap_or(&"none")).to_owned()),
+            (
+                "precision".to_owned(),
+                if precision == ExrPrecision::Float { "float" } else { "half" }.to_owned(),
+            ),
+            ("layers".to_owned(), layers.join(",")),
+        ]);
+        if let (Behind::Background(_), Some(background)) = (behind, self.staging.background_name()) {
+            shown.insert("background".to_owned(), background);
+        }
+        shown
     }
 
     /// The output, unless it is standard output.
@@ -452,6 +489,7 @@ fn picture(
     let named = arguments.named(&output);
     check_format(&named, !arguments.aov.is_empty())?;
     arguments.staging.check(Some(&named))?;
+    arguments.parts.check(&named, arguments.spp)?;
     let is_piped = is_standard_stream(&output);
     let output = number.map_or(named.to_path_buf(), |number| staging::frame_name(&output, number));
     for path in std::iter::once(&output).filter(|_| !is_piped).chain(&arguments.stats) {
@@ -461,7 +499,10 @@ fn picture(
     let mut options = options(arguments, &scene)?;
     options.transparent = behind.is_transparent();
     let is_model = staged.framed && staged.light != StageLight::Own && is_of_light;
-    let samples_are_asked = arguments.spp.is_some() || arguments.time.is_some() || arguments.noise.is_some();
+    let samples_are_asked = arguments.spp.is_some()
+        || arguments.time.is_some()
+        || arguments.noise.is_some()
+        || arguments.parts.keeps_sums();
     let is_plain = is_model && !samples_are_asked && scene.resolved().sampler().spp.is_none();
     // A model by itself is clean soon; who asks for samples has these and nothing else.
     let denoiser = denoiser.or((is_plain && arguments.denoise.is_none()).then_some(&Denoiser::Own));
@@ -510,6 +551,13 @@ fn picture(
         None => *first.exposure.insert(0.0),
     };
 
+    let is_shown = is_of_light && staged.light != StageLight::Own;
+    let tone_map = arguments.tonemap.unwrap_or(if is_shown { ToneMap::Neutral } else { ToneMap::None });
+    let precision = match scene.resolved().film().single_precision {
+        true => ExrPrecision::Float,
+        false => ExrPrecision::Half,
+    };
+
     let style = if arguments.quiet { Style::None } else { arguments.progress };
     let progress = Watched { display: Display::new(style), signals };
     let render_start = Instant::now();
@@ -518,10 +566,32 @@ fn picture(
         let left = deadline.at.saturating_duration_since(render_start);
         options.stop.time = Some(left.max(LEAST_TIME));
     }
+    let most_memory = arguments.reading.memory().for_reading();
+    let files: Vec<PathBuf> =
+        diagnostics.files_read().iter().cloned().chain(arguments.inputs().map(Path::to_owned)).collect();
+    let mut settings = arguments.settings();
+    settings.push(("picture".to_owned(), format!("{number:?}")));
+    let (job_options, shown) = (options.clone(), arguments.shown(&behind, tone_map, exposure, precision));
+    let job = move || {
+        let files = files.iter().map(PathBuf::as_path).filter(|path| !is_standard_stream(path));
+        Ok(Job { shown, ..Job::new(files, settings, &job_options)? })
+    };
+    let (checkpoint, state) =
+        Checkpoint::begin(&arguments.parts, &output, most_memory, arguments.quiet, job)?;
+    let keep = |state| checkpoint.keep(state);
+    let keeper = checkpoint.every().map(|every| Keeper { every, keep: &keep });
     signals.enter(Phase::Rendering);
-    let mut picture = scene.render_with(&options, &progress, cancel)?;
+    let (mut picture, state) = scene.render_from(&options, &progress, cancel, state, keeper.as_ref())?;
     let render_time = render_start.elapsed();
     progress.display.finish();
+    signals.enter(Phase::Saving);
+    let is_done = !cancel.is_cancelled();
+    if let Some(path) = checkpoint.end(&state, is_done)?
+        && !is_done
+        && !arguments.quiet
+    {
+        say!("{} keeps what was rendered: --resume goes on from there", path.display());
+    }
     check_whole(arguments, &picture, &output, signals.received())?;
     let denoised = match denoiser {
         // What is coarser than its pixels says nothing of noise.
@@ -536,24 +606,26 @@ fn picture(
         std::iter::once(&output).chain(&arguments.stats).map(|path| Replaced::by(path)).collect();
     let stream = signals.enter_writing(&output)?;
     let save_start = Instant::now();
-    let is_shown = is_of_light && staged.light != StageLight::Own;
-    let tone_map = arguments.tonemap.unwrap_or(if is_shown { ToneMap::Neutral } else { ToneMap::None });
     let mut save = SaveOptions::default();
-    if scene.resolved().film().single_precision {
-        save.exr_precision = ExrPrecision::Float;
-    }
-    (save.tone_map, save.exposure) = (tone_map, exposure);
+    (save.exr_precision, save.tone_map, save.exposure) = (precision, tone_map, exposure);
     let picture = match behind {
         Behind::Background(background) => picture.over(background),
         Behind::Lights | Behind::Nothing => picture,
     };
-    if is_piped {
+    if is_bare_part(&output) {
+        checkpoint.part(state)?.save(&output)?;
+    } else if arguments.parts.keeps_sums() {
+        picture.save_with_part(&output, &save, &arguments.aov, &checkpoint.part(state)?)?;
+    } else if is_piped {
         let format = arguments.output_format.unwrap_or(ImageFormat::Png);
         print_bytes(&picture.encode(format, &save, &arguments.aov)?)?;
     } else {
         picture.save_with(&output, &save, &arguments.aov)?;
     }
     drop(stream);
+    if is_done {
+        checkpoint.remove();
+    }
     let save_time = save_start.elapsed();
     report_stats(arguments, &picture);
     let is_told = is_first && !arguments.quiet && is_of_light && !scene.is_dark();
@@ -637,6 +709,7 @@ fn measured_exposure(white_level: Option<f32>) -> f32 {
 fn check_format(path: &Path, layers: bool) -> Result<(), Failure> {
     let format = ImageFormat::from_path(path).filter(|format| format.is_writable());
     match format {
+        None if is_bare_part(path) => Ok(()),
         None => Err(Failure::Usage(format!(
             "{}: unknown kind of picture (expected a name that ends in .exr, .png, .hdr, .pfm or .jpg)",
             path.display()
@@ -702,6 +775,10 @@ fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failur
         None if open_ended => u32::MAX,
         None => options.stop.spp,
     };
+    if let Some(samples) = arguments.parts.samples() {
+        options.first_sample = samples.start;
+        options.stop.spp = samples.end - samples.start;
+    }
     options.threads = arguments.threads.map_or_else(rayon::current_num_threads, usize::from);
     options.features = !arguments.aov.is_empty();
     Ok(options)

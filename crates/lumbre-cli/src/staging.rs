@@ -14,7 +14,7 @@ use crate::failure::Failure;
 use crate::names::one_of;
 
 /// How a model is shown.
-#[derive(Args)]
+#[derive(Args, Debug)]
 #[command(next_help_heading = "Showing a model")]
 pub(crate) struct StagingArguments {
     /// What the model stands on: none, shadow (ground of which only the shadow is seen) or plane (matte grey). By default a
@@ -191,6 +191,19 @@ impl StagingArguments {
         })
     }
 
+    /// The background that pictures are put over, as its argument; that of the studio where none was given.
+    pub(crate) fn background_name(&self) -> Option<String> {
+        match &self.background {
+            Some(BackgroundArgument::Lights | BackgroundArgument::Transparent) => None,
+            None | Some(BackgroundArgument::Studio) => Some("studio".to_owned()),
+            Some(BackgroundArgument::Colour(colour)) => {
+                let [r, g, b] = colour.to_array().map(f32::to_bits);
+                Some(format!("colour {r:08x} {g:08x} {b:08x}"))
+            }
+            Some(BackgroundArgument::File(path)) => Some(format!("file {}", path.display())),
+        }
+    }
+
     /// The files that the stage is made of.
     pub(crate) fn inputs(&self) -> impl Iterator<Item = &Path> {
         let background = match &self.background {
@@ -220,7 +233,7 @@ fn environment(path: &Path, limits: Limits) -> Result<EnvironmentDesc, Failure> 
 }
 
 /// An image over black, without alpha.
-fn opaque(image: Image) -> Image {
+pub(crate) fn opaque(image: Image) -> Image {
     Image::from_pixels(image.width(), image.height(), image.pixels().to_vec()).unwrap_or(image)
 }
 

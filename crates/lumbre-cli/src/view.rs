@@ -9,7 +9,7 @@ use crate::failure::Failure;
 
 /// Where a picture is taken from. Without a camera in the file, or with any of the options that move it, a camera is made that
 /// has everything in its picture.
-#[derive(Args)]
+#[derive(Args, Debug)]
 #[command(next_help_heading = "View")]
 pub(crate) struct ViewArguments {
     /// Go around the model to the right by so many degrees, from the view that would be chosen or from --eye.

@@ -32,6 +32,7 @@ pub mod description;
 mod error;
 mod files;
 mod info;
+mod part;
 mod picture;
 mod scene;
 mod setting;
@@ -53,12 +54,13 @@ pub use lumbre_formats::ReadOptions;
 pub use lumbre_geometry::Ray;
 pub use lumbre_math::{DVec2, DVec3, Transform};
 pub use lumbre_render::{
-    CancelToken, Denoised, Feature, NoProgress, PixelBounds, Progress, RayCounts, RenderError, RenderOptions,
-    Snapshot, State, Stats, Stop,
+    CancelToken, Denoised, Feature, Keeper, MergeError, NoProgress, Piece, PixelBounds, Progress, RayCounts,
+    RenderError, RenderOptions, RenderState, Snapshot, State, Stats, Stop,
 };
 pub use lumbre_scene::{
     EnvironmentDesc, Ground, SceneDesc, Stage, StageLight, Staged, Surroundings, UpAxis, Viewpoint,
 };
+pub use part::{Job, Part, PartError};
 pub use picture::Picture;
 pub use scene::{Scene, describe, open, open_with};
 pub use setting::Setting;

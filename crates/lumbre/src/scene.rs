@@ -8,7 +8,10 @@ use lumbre_formats::{Diagnostic, Diagnostics, FormatError, Place, ReadOptions, o
 use lumbre_geometry::Ray;
 use lumbre_kernel::Hit;
 use lumbre_math::DVec3;
-use lumbre_render::{CancelToken, Feature, NoProgress, Progress, RenderOptions, Stop, render};
+use lumbre_render::transport::integrator;
+use lumbre_render::{
+    CancelToken, Feature, Keeper, NoProgress, Progress, RenderOptions, RenderState, Stop, render_from,
+};
 use lumbre_scene::{BuildWarning, Footprint, SceneDesc};
 
 use crate::{CastHit, CastPoint, Error, Picture, SceneInfo};
@@ -206,8 +209,27 @@ impl Scene {
         progress: &dyn Progress,
         cancel: &CancelToken,
     ) -> Result<Picture, Error> {
-        let rendered = render(&self.resolved, options, progress, cancel)?;
-        Ok(Picture { rendered, whole: (options.width, options.height), background: None, noisy: None })
+        Ok(self.render_from(options, progress, cancel, None, None)?.0)
+    }
+
+    /// Renders a picture, going on from what the same render gathered before, and hands out what it gathers: now and then to a
+    /// `keeper`, and at the end. The picture is that of a render without a break.
+    ///
+    /// # Errors
+    /// As for [`Scene::render`], and where the state is not that of such a render.
+    pub fn render_from(
+        &self,
+        options: &RenderOptions,
+        progress: &dyn Progress,
+        cancel: &CancelToken,
+        state: Option<RenderState>,
+        keeper: Option<&Keeper<'_>>,
+    ) -> Result<(Picture, RenderState), Error> {
+        let integrator = integrator(&options.integrator);
+        let (rendered, state) =
+            render_from(&self.resolved, options, &*integrator, progress, cancel, state, keeper)?;
+        let whole = (options.width, options.height);
+        Ok((Picture { rendered, whole, background: None, noisy: None }, state))
     }
 
     /// The pixel value of white, well-lit surfaces, as an exposure meter would measure it: the luminance over

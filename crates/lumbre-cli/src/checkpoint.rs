@@ -1,0 +1,357 @@
+//! Parts of renders, and checkpoints: nothing that was rendered is lost.
+
+use std::fs::{self, File};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use lumbre::{Job, Part, PartError, RenderState};
+
+use crate::failure::Failure;
+use crate::output::is_standard_stream;
+use crate::units::{self, counted};
+
+/// How a render is shared out, kept and gone on with.
+#[derive(Args)]
+#[command(next_help_heading = "Parts and checkpoints")]
+pub(crate) struct PartArguments {
+    /// Take these samples of every pixel alone, from A to before B, into a part: an .exr, whose picture other programs show, or a
+    /// .part. lumbre merge makes of parts, in any order, what one run would have made.
+    #[arg(long, value_name = "A..B", value_parser = samples, conflicts_with_all = ["time", "noise", "denoise", "frames", "turntable"])]
+    samples: Option<Range<u32>>,
+    /// Keep the samples in this file while they are taken, to go on from with --resume. Without, a render that takes more than two
+    /// minutes keeps them beside its picture, in OUT.checkpoint, until it is done.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["frames", "turntable"])]
+    checkpoint: Option<PathBuf>,
+    /// The time between two checkpoints.
+    #[arg(long, value_name = "DUR", value_parser = units::duration, default_value = "30s")]
+    checkpoint_every: Duration,
+    /// Go on from the checkpoint, or from the picture if it was saved with --keep-sums, to the very picture of a run without a
+    /// break; with more samples than before, to that of as many. Where there is neither, begin.
+    #[arg(long, conflicts_with_all = ["frames", "turntable"])]
+    resume: bool,
+    /// Keep no checkpoint, however long it takes.
+    #[arg(long, conflicts_with_all = ["checkpoint", "resume"])]
+    no_checkpoint: bool,
+    /// Keep the sums of all samples in the .exr, beside its picture, so that it can be resumed and merged.
+    #[arg(long)]
+    keep_sums: bool,
+}
+
+/// `A..B`, without B.
+fn samples(text: &str) -> Result<Range<u32>, String> {
+    let wrong = || {
+        "expected the first sample and the one after the last, such as 0..16 for the first sixteen".to_owned()
+    };
+    let (first, last) = text.split_once("..").ok_or_else(wrong)?;
+    let range = first.parse().map_err(|_| wrong())?..last.parse().map_err(|_| wrong())?;
+    if range.is_empty() { Err(wrong()) } else { Ok(range) }
+}
+
+/// Renders that are done sooner keep no checkpoint unless asked.
+const LONG: Duration = Duration::from_secs(120);
+
+impl PartArguments {
+    /// The samples that are asked for.
+    pub(crate) fn samples(&self) -> Option<Range<u32>> {
+        self.samples.clone()
+    }
+
+    /// Whether the output holds the sums of its samples.
+    pub(crate) fn keeps_sums(&self) -> bool {
+        self.keep_sums || self.samples.is_some()
+    }
+
+    /// Rejects outputs that cannot hold what is asked for.
+    ///
+    /// # Errors
+    /// [`Failure::Usage`].
+    pub(crate) fn check(&self, output: &Path, spp: Option<u32>) -> Result<(), Failure> {
+        let name = output.display();
+        if let (Some(samples), Some(spp)) = (&self.samples, spp)
+            && samples.end > spp
+        {
+            return Err(Failure::Usage(format!(
+                "--samples: {} is beyond the {spp} of --spp (expected a range within 0..{spp})",
+                samples.end
+            )));
+        }
+        let is = |ending: &str| output.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
+        if self.samples.is_some() && !is("exr") && !is("part") {
+            return Err(Failure::Usage(format!(
+                "{name}: --samples makes a part (expected a name that ends in .exr or .part)"
+            )));
+        }
+        if self.samples.is_none() && is("part") {
+            return Err(Failure::Usage(format!("{name}: a part has some samples (expected --samples, too)")));
+        }
+        if self.keep_sums && !is("exr") {
+            return Err(Failure::Usage(format!("{name}: --keep-sums needs an .exr file")));
+        }
+        Ok(())
+    }
+
+    /// Whether the state of the render is looked at.
+    fn is_asked(&self) -> bool {
+        self.keeps_sums() || self.checkpoint.is_some() || self.resume
+    }
+}
+
+/// Whether a name is that of a part without a picture.
+pub(crate) fn is_bare_part(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("part"))
+}
+
+/// The identity of a render, found out while it runs.
+struct Identified(Mutex<Finding>);
+
+enum Finding {
+    Running(JoinHandle<Result<Job, lumbre::Error>>),
+    Done(Result<Job, String>),
+}
+
+impl Identified {
+    fn get(&self) -> Result<Job, Failure> {
+        let mut finding = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Finding::Running(_) = &*finding
+            && let Finding::Running(thread) =
+                std::mem::replace(&mut *finding, Finding::Done(Err(String::new())))
+        {
+            let found = thread.join().map_err(|_| "cannot hash the files of the scene".to_owned());
+            *finding = Finding::Done(found.and_then(|job| job.map_err(|e| e.to_string())));
+        }
+        match &*finding {
+            Finding::Done(Ok(job)) => Ok(job.clone()),
+            Finding::Done(Err(why)) => Err(Failure::Io(why.clone())),
+            Finding::Running(_) => Err(Failure::Io("cannot hash the files of the scene".to_owned())),
+        }
+    }
+}
+
+/// The checkpoint of one picture, and whence it goes on.
+pub(crate) struct Checkpoint {
+    /// `None` where none is kept.
+    path: Option<PathBuf>,
+    is_asked: bool,
+    every: Duration,
+    start: Instant,
+    identified: Identified,
+    /// Held as long as the render runs, so that no other writes the same checkpoint.
+    lock: Option<Lock>,
+    /// Whether the file is of this very render, to be removed when it is done.
+    is_own: AtomicBool,
+    /// Samples that a checkpoint of an earlier run has, which this one leaves alone as long as it has fewer.
+    others: u64,
+    writing: Mutex<Option<JoinHandle<Result<(), lumbre::Error>>>>,
+}
+
+/// A lock on the name of a checkpoint.
+struct Lock {
+    path: PathBuf,
+    _file: File,
+}
+
+impl Lock {
+    fn take(checkpoint: &Path) -> Result<Self, Failure> {
+        let path = with_ending(checkpoint, "lock");
+        let file = File::options().create(true).truncate(false).write(true).open(&path);
+        let file = file.map_err(|e| Failure::Io(format!("{}: {e}", path.display())))?;
+        match file.try_lock() {
+            Err(fs::TryLockError::WouldBlock) => Err(Failure::Usage(format!(
+                "{}: another run writes this checkpoint (expected another name, or its end)",
+                checkpoint.display()
+            ))),
+            // Where the file system has no locks, there is none to be had.
+            Ok(()) | Err(fs::TryLockError::Error(_)) => Ok(Self { path, _file: file }),
+        }
+    }
+}
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        let _ = fs::remove_file(&self.path);
+    }
+}
+
+fn with_ending(path: &Path, ending: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".");
+    name.push(ending);
+    name.into()
+}
+
+impl Checkpoint {
+    /// Begins a render into `output`, which goes on from the state that is given, if any. `job` is found out on a thread of its own.
+    ///
+    /// # Errors
+    /// [`Failure`] where what there is to go on from is of another render, is damaged, or is in use.
+    pub(crate) fn begin(
+        arguments: &PartArguments,
+        output: &Path,
+        most_memory: u64,
+        is_quiet: bool,
+        job: impl FnOnce() -> Result<Job, lumbre::Error> + Send + 'static,
+    ) -> Result<(Self, Option<RenderState>), Failure> {
+        let is_file = !is_standard_stream(output) && (output.is_file() || !output.exists());
+        let kept = match &arguments.checkpoint {
+            Some(path) => Some(path.clone()),
+            None if arguments.no_checkpoint || !is_file => None,
+            None => Some(with_ending(output, "checkpoint")),
+        };
+        let thread = std::thread::Builder::new().name("identity".to_owned()).spawn(job);
+        let thread = thread.map_err(|e| Failure::Io(format!("cannot start a thread: {e}")))?;
+        let mut checkpoint = Self {
+            lock: None,
+            path: kept,
+            is_asked: arguments.checkpoint.is_some(),
+            every: arguments.checkpoint_every,
+            start: Instant::now(),
+            identified: Identified(Mutex::new(Finding::Running(thread))),
+            is_own: AtomicBool::new(false),
+            others: 0,
+            writing: Mutex::new(None),
+        };
+        if arguments.is_asked() {
+            // Whatever keeps it from being known is told before hours are spent.
+            checkpoint.identified.get()?;
+        }
+        if arguments.checkpoint.is_some() {
+            checkpoint.lock()?;
+        }
+        let state = checkpoint.find(arguments, output, most_memory, is_quiet)?;
+        Ok((checkpoint, state))
+    }
+
+    fn lock(&mut self) -> Result<(), Failure> {
+        if let (None, Some(path)) = (&self.lock, &self.path) {
+            self.lock = Some(Lock::take(path)?);
+        }
+        Ok(())
+    }
+
+    /// What there is to go on from.
+    fn find(
+        &mut self,
+        arguments: &PartArguments,
+        output: &Path,
+        most_memory: u64,
+        is_quiet: bool,
+    ) -> Result<Option<RenderState>, Failure> {
+        let held = self.path.iter().map(PathBuf::as_path).find(|path| path.is_file());
+        let found = match held {
+            Some(path) => Some(path.to_owned()),
+            None if arguments.resume && output.is_file() => Some(output.to_owned()),
+            None => None,
+        };
+        let Some(path) = found else {
+            if arguments.resume && !is_quiet {
+                say!("nothing to resume: the render begins");
+            }
+            return Ok(None);
+        };
+        let is_output = path == output;
+        let name = path.display().to_string();
+        let part = match Part::open(&path, most_memory) {
+            Ok(part) => part,
+            Err(PartError::NoPart) if is_output => {
+                return Err(Failure::Usage(format!(
+                    "{name}: the picture cannot be resumed (expected one that was saved with --keep-sums, or a checkpoint)"
+                )));
+            }
+            Err(_) if !arguments.resume && !self.is_asked => return Ok(None),
+            Err(e) => return Err(Failure::Input(format!("{name}: {e}"))),
+        };
+        let (taken, wanted) = (part.state.taken(), part.state.wanted());
+        if !arguments.resume {
+            if self.is_asked && taken < wanted {
+                return Err(Failure::Usage(format!(
+                    "{name}: it holds {} of an unfinished render (--resume goes on from it; remove it to begin anew)",
+                    counted(taken, "sample")
+                )));
+            }
+            if !self.is_asked {
+                self.others = taken;
+                let is_same = self.identified.get().is_ok_and(|job| job.differences(&part.job).is_empty());
+                self.is_own.store(is_same, Ordering::Relaxed);
+                if is_same && !is_quiet {
+                    let share = 100.0 * taken as f64 / wanted.max(1) as f64;
+                    say!("{name} holds {share:.0} % of this render: --resume goes on from there");
+                }
+            }
+            return Ok(None);
+        }
+        let differences = self.identified.get()?.differences(&part.job);
+        if !differences.is_empty() {
+            let differences = differences.join("; ");
+            return Err(Failure::Usage(format!(
+                "{name}: it is of another render, now and then differ in {differences}"
+            )));
+        }
+        self.is_own.store(!is_output, Ordering::Relaxed);
+        if !is_quiet {
+            say!("resumed from {name}: {} a pixel", counted(u64::from(part.state.least_samples()), "sample"));
+        }
+        Ok(Some(part.state))
+    }
+
+    /// The time between two hand-overs, if there are any.
+    pub(crate) fn every(&self) -> Option<Duration> {
+        self.path.is_some().then_some(self.every)
+    }
+
+    /// Keeps a state while the render goes on: it is written by a thread of its own. A state that comes while another is written is
+    /// left out.
+    pub(crate) fn keep(&self, state: RenderState) {
+        let is_due = self.is_asked || (self.start.elapsed() >= LONG && state.taken() > self.others);
+        let (true, Some(path)) = (is_due, self.path.clone()) else { return };
+        let mut writing = self.writing.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if writing.as_ref().is_some_and(|thread| !thread.is_finished()) {
+            return;
+        }
+        if let Some(Ok(Err(error))) = writing.take().map(JoinHandle::join) {
+            say!("warning: the checkpoint cannot be written: {error}");
+        }
+        let Ok(job) = self.identified.get() else { return };
+        self.is_own.store(true, Ordering::Relaxed);
+        let write = move || Part { job, state }.save(&path);
+        *writing = std::thread::Builder::new().name("checkpoint".to_owned()).spawn(write).ok();
+    }
+
+    /// Ends with the last state: an unfinished render keeps it, a finished one only where a checkpoint was asked for.
+    ///
+    /// # Errors
+    /// [`Failure::Io`] where the checkpoint cannot be written.
+    pub(crate) fn end(&self, state: &RenderState, is_done: bool) -> Result<Option<&Path>, Failure> {
+        let thread = self.writing.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take();
+        if let Some(thread) = thread {
+            // It is older than what is written now.
+            let _ = thread.join();
+        }
+        let Some(path) = &self.path else { return Ok(None) };
+        let is_long = self.start.elapsed() >= LONG;
+        if self.is_asked || (!is_done && is_long && state.taken() > self.others) {
+            Part { job: self.identified.get()?, state: state.clone() }.save(path)?;
+            return Ok(Some(path));
+        }
+        Ok(None)
+    }
+
+    /// Removes the checkpoint of a render that is done and saved, unless it was asked for.
+    pub(crate) fn remove(&self) {
+        if let (false, true, Some(path)) = (self.is_asked, self.is_own.load(Ordering::Relaxed), &self.path) {
+            let _ = fs::remove_file(path);
+        }
+    }
+
+    /// The part that a state is.
+    ///
+    /// # Errors
+    /// [`Failure::Io`] where the files of the scene cannot be read.
+    pub(crate) fn part(&self, state: RenderState) -> Result<Part, Failure> {
+        Ok(Part { job: self.identified.get()?, state })
+    }
+}

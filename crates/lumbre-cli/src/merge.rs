@@ -1,0 +1,192 @@
+//! `lumbre merge`: joins parts of a render.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use lumbre::formats::image::{ExrPrecision, ImageFormat};
+use lumbre::formats::probe_writable;
+use lumbre::image::{Rgb, ToneMap};
+use lumbre::{Background, CancelToken, Feature, MergeError, Part, Piece, SaveOptions};
+
+use crate::checkpoint::is_bare_part;
+use crate::failure::Failure;
+use crate::memory::Memory;
+use crate::output::{Inputs, Replaced};
+use crate::signals::Signals;
+use crate::units::{self, counted};
+
+/// Joins parts of a render (of --samples, with or without --crop) to the picture of one run, byte for byte, in any order.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  lumbre render scene.pbrt --samples 0..32 -o a.part     on one machine
+  lumbre render scene.pbrt --samples 32..64 -o b.part    on another
+  lumbre merge a.part b.part -o picture.exr              what lumbre render scene.pbrt --spp 64 -o picture.exr makes
+  lumbre merge *.part -o more.part --allow-gaps          a part of parts, to be merged again
+
+Exit status 3 when parts overlap, are of different renders, are unfinished, or leave gaps.")]
+pub(crate) struct Arguments {
+    /// The parts: .part files, and .exr files of --samples or --keep-sums.
+    #[arg(required = true, value_name = "PART")]
+    parts: Vec<PathBuf>,
+    /// The picture (.exr, .png, .hdr, .pfm or .jpg), or a .part.
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
+    /// Join what there is even if samples are missing, and say which.
+    #[arg(long)]
+    allow_gaps: bool,
+    /// Keep the sums of all samples in the .exr, so that it can be merged and resumed again.
+    #[arg(long)]
+    keep_sums: bool,
+    /// Bytes of memory that parts may take.
+    #[arg(long, value_name = "SIZE", value_parser = units::bytes)]
+    max_memory: Option<u64>,
+    /// Print errors only.
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// Gaps that are named.
+const MOST_NAMED: usize = 4;
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let output = &arguments.output;
+    let format = ImageFormat::from_path(output).filter(|format| format.is_writable());
+    if format.is_none() && !is_bare_part(output) {
+        return Err(Failure::Usage(format!(
+            "{}: unknown kind of file (expected a name that ends in .exr, .png, .hdr, .pfm, .jpg or .part)",
+            output.display()
+        )));
+    }
+    if arguments.keep_sums && format != Some(ImageFormat::Exr) {
+        return Err(Failure::Usage(format!("{}: --keep-sums needs an .exr file", output.display())));
+    }
+    Inputs::of(arguments.parts.iter().map(PathBuf::as_path)).refuse(output)?;
+    probe_writable(output).map_err(|e| Failure::from(lumbre::Error::from(e)))?;
+    let _signals = Signals::listen(&CancelToken::new())?;
+    let whole = joined(arguments)?;
+    let bounds = whole.state.bounds();
+    let gaps = whole.state.gaps(bounds);
+    if !gaps.is_empty() {
+        let missing: u64 = gaps.iter().map(Piece::count).sum();
+        let named: Vec<String> = gaps.iter().take(MOST_NAMED).map(spoken).collect();
+        let more = if gaps.len() > MOST_NAMED { " and more" } else { "" };
+        let what = format!("{} missing: {}{more}", counted(missing, "sample"), named.join(", "));
+        if !arguments.allow_gaps {
+            return Err(Failure::Input(format!("{what} (--allow-gaps joins what there is)")));
+        }
+        if !arguments.quiet {
+            say!("warning: {what}");
+        }
+    }
+    let replaced = Replaced::by(output);
+    save(arguments, &whole)?;
+    if !arguments.quiet {
+        replaced.say();
+        let (width, height) = (bounds.width(), bounds.height());
+        let spp = counted(u64::from(whole.state.least_samples()), "sample");
+        let parts = counted(arguments.parts.len() as u64, "part");
+        say!("{}: {width}x{height}, {spp} a pixel, of {parts}", output.display());
+    }
+    Ok(())
+}
+
+/// All parts as one.
+fn joined(arguments: &Arguments) -> Result<Part, Failure> {
+    let most_memory = Memory::new(arguments.max_memory).for_reading();
+    let open = |path: &Path| {
+        let part = Part::open(path, most_memory);
+        let part = part.map_err(|e| Failure::Input(format!("{}: {e}", path.display())))?;
+        if part.state.is_finished() {
+            return Ok(part);
+        }
+        Err(Failure::Input(format!(
+            "{}: it is unfinished, with {} of {} samples (expected the part that lumbre render --resume makes of it)",
+            path.display(),
+            part.state.taken(),
+            part.state.wanted()
+        )))
+    };
+    let (first, others) =
+        arguments.parts.split_first().ok_or_else(|| Failure::Usage("no parts".to_owned()))?;
+    let mut whole = open(first)?;
+    let mut origins: Vec<(&Path, Vec<Piece>)> = vec![(first, whole.state.pieces().to_vec())];
+    for path in others {
+        let part = open(path)?;
+        let differences = whole.job.differences(&part.job);
+        if !differences.is_empty() {
+            return Err(Failure::Input(format!(
+                "{}: it is of another render than {}: they differ in {}",
+                path.display(),
+                first.display(),
+                differences.join("; ")
+            )));
+        }
+        let pieces = part.state.pieces().to_vec();
+        whole.merge(&part).map_err(|error| {
+            let MergeError::Overlap(overlap) = &error else {
+                return Failure::Input(format!("{}: {error}", path.display()));
+            };
+            let has_it = |pieces: &[Piece]| pieces.iter().any(|piece| piece.intersection(overlap).is_some());
+            let other =
+                origins.iter().find(|(_, pieces)| has_it(pieces)).map_or(first.as_path(), |(path, _)| *path);
+            Failure::Input(format!(
+                "{}: it has {} as {} has",
+                path.display(),
+                spoken(overlap),
+                other.display()
+            ))
+        })?;
+        origins.push((path, pieces));
+    }
+    Ok(whole)
+}
+
+fn spoken(piece: &Piece) -> String {
+    let Piece { bounds: b, samples } = piece;
+    format!("samples {}..{} of pixels {},{},{},{}", samples.start, samples.end, b.x0, b.y0, b.x1, b.y1)
+}
+
+/// Saves the picture as the render itself would have.
+fn save(arguments: &Arguments, whole: &Part) -> Result<(), Failure> {
+    let output = &arguments.output;
+    if is_bare_part(output) {
+        return Ok(whole.save(output)?);
+    }
+    let shown = |name: &str| whole.job.shown.get(name).map_or("", String::as_str);
+    let mut options = SaveOptions::default();
+    options.exposure = shown("exposure").parse().unwrap_or(0.0);
+    options.tone_map = ToneMap::from_name(shown("tone map")).unwrap_or(ToneMap::None);
+    if shown("precision") == "float" {
+        options.exr_precision = ExrPrecision::Float;
+    }
+    let layers: Vec<Feature> = match ImageFormat::from_path(output) {
+        Some(ImageFormat::Exr) => shown("layers").split(',').filter_map(Feature::from_name).collect(),
+        _ => Vec::new(),
+    };
+    let picture = match background(shown("background"))? {
+        Some(background) => whole.picture().over(background),
+        None => whole.picture(),
+    };
+    if arguments.keep_sums {
+        return Ok(picture.save_with_part(output, &options, &layers, whole)?);
+    }
+    Ok(picture.save_with(output, &options, &layers)?)
+}
+
+/// The background that a part's picture is shown over.
+fn background(name: &str) -> Result<Option<Background>, Failure> {
+    if name == "studio" {
+        return Ok(Some(Background::studio()));
+    }
+    if let Some(path) = name.strip_prefix("file ") {
+        return Ok(Some(Background::Picture(crate::staging::opaque(lumbre::read_image(path.as_ref())?))));
+    }
+    let colour = name.strip_prefix("colour ").map(|digits| {
+        let mut channels =
+            digits.split(' ').map(|digits| u32::from_str_radix(digits, 16).map(f32::from_bits));
+        let mut next = || channels.next().and_then(Result::ok).unwrap_or(0.0);
+        Rgb::new(next(), next(), next())
+    });
+    Ok(colour.map(Background::Colour))
+}

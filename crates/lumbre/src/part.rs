@@ -1,0 +1,258 @@
+//! Parts of renders in files: to go on from, and to join.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
+
+use lumbre_formats::image::ImageFormat;
+use lumbre_formats::{FormatError, atomic_write};
+use lumbre_render::{MergeError, RenderOptions, RenderState};
+use serde::{Deserialize, Serialize};
+
+use crate::{Error, Picture, SaveOptions};
+
+/// What a part file begins with.
+const MAGIC: &[u8] = b"LUMBRE PART 1\n";
+/// What an .exr ends with that holds a part, after the length of the part as eight bytes.
+const TRAILER: &[u8] = b"LUMBREPT";
+/// Bytes of a checksum.
+const CHECKSUM: usize = 32;
+
+/// Some samples of some pixels of a render, finished or not, and of which render they are: a checkpoint, a share of one machine of
+/// many, or what several such were merged to.
+///
+/// Parts of the same render come to the same bytes in whatever order and grouping they are merged.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// Of which render.
+    pub job: Job,
+    /// The sums of its samples.
+    pub state: RenderState,
+}
+
+/// What makes a render the one that it is, but for which of its samples are taken, of which pixels, and when it stops.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Job {
+    /// All that a sample depends on, by name: the version of Lumbre, options, and a hash of every file that was read.
+    pub identity: BTreeMap<String, String>,
+    /// How its picture is shown, by name, as whoever saves it understands it.
+    pub shown: BTreeMap<String, String>,
+    /// Width and height of the whole picture.
+    pub size: (u32, u32),
+    /// Whether the picture has coverage.
+    pub transparent: bool,
+}
+
+impl Job {
+    /// A render with these options of a scene that was read from these files. `settings` are what else the scene depends on, by name.
+    ///
+    /// # Errors
+    /// [`Error::Format`] for a file that cannot be read.
+    pub fn new<'p>(
+        files: impl IntoIterator<Item = &'p Path>,
+        settings: impl IntoIterator<Item = (String, String)>,
+        options: &RenderOptions,
+    ) -> Result<Self, Error> {
+        let mut identity: BTreeMap<String, String> = settings.into_iter().collect();
+        let sampler = &options.sampler;
+        let entries = [
+            ("version", env!("CARGO_PKG_VERSION").to_owned()),
+            ("size", format!("{}x{}", options.width, options.height)),
+            ("camera", options.camera.to_string()),
+            ("integrator", format!("{:?}", options.integrator)),
+            ("sampler", format!("{:?}", sampler.kind)),
+            ("seed", sampler.seed.to_string()),
+            ("filter", format!("{:?}", options.filter)),
+            ("exposure of samples", format!("{:?}", options.exposure)),
+            ("transparent", options.transparent.to_string()),
+            ("features", options.features.to_string()),
+            ("guides", options.guides.to_string()),
+        ];
+        identity.extend(entries.map(|(name, value)| (name.to_owned(), value)));
+        let mut folder = None;
+        for file in files {
+            // By their names from the folder of the first, so that a render is the same wherever its files are.
+            let folder = folder.get_or_insert_with(|| file.parent().unwrap_or(Path::new("")));
+            let name = file.strip_prefix(*folder).unwrap_or(file).display().to_string();
+            identity.insert(format!("file {name}"), hash_of_file(file)?);
+        }
+        let size = (options.width, options.height);
+        Ok(Self { identity, shown: BTreeMap::new(), size, transparent: options.transparent })
+    }
+
+    /// In what another render differs, a line each, as `seed: 3, 5`; nothing for the same render.
+    pub fn differences(&self, other: &Self) -> Vec<String> {
+        let names = self.identity.keys().chain(other.identity.keys());
+        let names: std::collections::BTreeSet<&String> = names.collect();
+        let of = |job: &Self, name: &String| job.identity.get(name).cloned();
+        let difference = |name: &String| match (of(self, name), of(other, name)) {
+            (a, b) if a == b => None,
+            (Some(_), Some(_)) if name.starts_with("file ") => Some(format!("{name}: changed")),
+            (a, b) => Some(format!("{name}: {}, {}", shown(a), shown(b))),
+        };
+        names.into_iter().filter_map(difference).collect()
+    }
+}
+
+fn shown(value: Option<String>) -> String {
+    value.unwrap_or_else(|| "none".to_owned())
+}
+
+/// The hash of a file (BLAKE3) in hexadecimal digits.
+fn hash_of_file(path: &Path) -> Result<String, Error> {
+    let cannot_read = |e| Error::from(FormatError::io(path, "cannot read", e));
+    let mut file = fs::File::open(path).map_err(cannot_read)?;
+    let mut hasher = blake3::Hasher::new();
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        match file.read(&mut buffer) {
+            Ok(0) => return Ok(hasher.finalize().to_hex().to_string()),
+            Ok(count) => hasher.update(&buffer[..count]),
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => continue,
+            Err(e) => return Err(cannot_read(e)),
+        };
+    }
+}
+
+/// Why a file is no part.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PartError {
+    /// It cannot be read.
+    #[error("cannot read: {0}")]
+    Io(#[from] io::Error),
+    /// It is something else.
+    #[error("it is no part of a render (expected a file of --samples, --checkpoint or --keep-sums)")]
+    NoPart,
+    /// It is damaged.
+    #[error("it is damaged: its checksum is not that of its bytes")]
+    Damaged,
+    /// It is of another version of Lumbre.
+    #[error("it is of another version of Lumbre")]
+    Version,
+    /// Its head or its numbers make no sense.
+    #[error("it is damaged: {0}")]
+    Invalid(String),
+}
+
+impl Part {
+    /// The bytes of a file of its own.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let head = serde_json::to_vec(&self.job).unwrap_or_default();
+        let state = self.state.to_bytes();
+        let mut out = Vec::with_capacity(MAGIC.len() + 8 + head.len() + state.len() + CHECKSUM);
+        out.extend(MAGIC);
+        out.extend((head.len() as u64).to_le_bytes());
+        out.extend(head);
+        out.extend(state);
+        let checksum = blake3::hash(&out);
+        out.extend(checksum.as_bytes());
+        out
+    }
+
+    /// The part of bytes, which may take so many bytes of memory.
+    ///
+    /// # Errors
+    /// [`PartError`].
+    pub fn from_bytes(bytes: &[u8], most_memory: u64) -> Result<Self, PartError> {
+        let Some(rest) = bytes.strip_prefix(MAGIC) else {
+            let is_of_another_version = bytes.starts_with(&MAGIC[..MAGIC.len() - 2]);
+            return Err(if is_of_another_version { PartError::Version } else { PartError::NoPart });
+        };
+        let (body, checksum) = bytes.split_last_chunk::<CHECKSUM>().ok_or(PartError::Damaged)?;
+        if blake3::hash(body).as_bytes() != checksum || rest.len() < CHECKSUM + 8 {
+            return Err(PartError::Damaged);
+        }
+        let (length, rest) = rest[..rest.len() - CHECKSUM].split_first_chunk().ok_or(PartError::Damaged)?;
+        let length = usize::try_from(u64::from_le_bytes(*length)).map_err(|_| PartError::Damaged)?;
+        let (head, state) = rest.split_at_checked(length).ok_or(PartError::Damaged)?;
+        let invalid = |e: &dyn std::fmt::Display| PartError::Invalid(e.to_string());
+        let job = serde_json::from_slice(head).map_err(|e| invalid(&e))?;
+        let state = RenderState::from_bytes(state, most_memory).map_err(|e| invalid(&e))?;
+        Ok(Self { job, state })
+    }
+
+    /// Reads a part from a file of its own, or from an .exr that holds one beside its picture.
+    ///
+    /// # Errors
+    /// [`PartError`].
+    pub fn open(path: &Path, most_memory: u64) -> Result<Self, PartError> {
+        let bytes = fs::read(path)?;
+        if let Some((rest, trailer)) = bytes.split_last_chunk::<{ TRAILER.len() }>()
+            && trailer == TRAILER
+            && let Some((rest, length)) = rest.split_last_chunk()
+        {
+            let length = usize::try_from(u64::from_le_bytes(*length)).map_err(|_| PartError::Damaged)?;
+            let start = rest.len().checked_sub(length).ok_or(PartError::Damaged)?;
+            return Self::from_bytes(&rest[start..], most_memory);
+        }
+        Self::from_bytes(&bytes, most_memory)
+    }
+
+    /// Whether a file holds a part, by how it begins and ends.
+    pub fn is_in(path: &Path) -> bool {
+        let look = || -> io::Result<bool> {
+            let mut file = fs::File::open(path)?;
+            if !file.metadata()?.is_file() {
+                return Ok(false);
+            }
+            let mut begin = [0; MAGIC.len()];
+            file.read_exact(&mut begin)?;
+            let mut end = [0; TRAILER.len()];
+            file.seek(SeekFrom::End(-(TRAILER.len() as i64)))?;
+            file.read_exact(&mut end)?;
+            Ok(begin == *MAGIC || end == *TRAILER)
+        };
+        look().unwrap_or(false)
+    }
+
+    /// Writes a file of its own.
+    ///
+    /// # Errors
+    /// [`Error::Format`].
+    pub fn save(&self, path: &Path) -> Result<(), Error> {
+        let bytes = self.to_bytes();
+        Ok(atomic_write(path, |file| file.write_all(&bytes))?)
+    }
+
+    /// The picture of its samples.
+    pub fn picture(&self) -> Picture {
+        Picture {
+            rendered: self.state.to_rendered(self.job.transparent),
+            whole: self.job.size,
+            background: None,
+            noisy: None,
+        }
+    }
+
+    /// Adds the samples of another part of the same render.
+    ///
+    /// # Errors
+    /// [`MergeError`]; nothing is changed then. Whether it is the same render is for [`Job::differences`] to say.
+    pub fn merge(&mut self, other: &Self) -> Result<(), MergeError> {
+        self.state.merge(&other.state)
+    }
+}
+
+impl Picture {
+    /// Writes an .exr of the picture that holds a part beside it: other programs read the picture alone.
+    ///
+    /// # Errors
+    /// As [`Picture::save_with`].
+    pub fn save_with_part(
+        &self,
+        path: &Path,
+        options: &SaveOptions,
+        layers: &[crate::Feature],
+        part: &Part,
+    ) -> Result<(), Error> {
+        let mut bytes = self.encode(ImageFormat::Exr, options, layers)?;
+        let part = part.to_bytes();
+        let length = (part.len() as u64).to_le_bytes();
+        bytes.extend(part);
+        bytes.extend(length);
+        bytes.extend(TRAILER);
+        Ok(atomic_write(path, |file| file.write_all(&bytes))?)
+    }
+}
