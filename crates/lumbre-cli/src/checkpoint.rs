@@ -193,6 +193,7 @@ impl Checkpoint {
         arguments: &PartArguments,
         output: &Path,
         most_memory: u64,
+        spp: u32,
         is_quiet: bool,
         job: impl FnOnce() -> Result<Job, lumbre::Error> + Send + 'static,
     ) -> Result<(Self, Option<RenderState>), Failure> {
@@ -222,7 +223,7 @@ impl Checkpoint {
         if arguments.checkpoint.is_some() {
             checkpoint.lock()?;
         }
-        let state = checkpoint.find(arguments, output, most_memory, is_quiet)?;
+        let state = checkpoint.find(arguments, output, most_memory, spp, is_quiet)?;
         Ok((checkpoint, state))
     }
 
@@ -239,6 +240,7 @@ impl Checkpoint {
         arguments: &PartArguments,
         output: &Path,
         most_memory: u64,
+        spp: u32,
         is_quiet: bool,
     ) -> Result<Option<RenderState>, Failure> {
         let held = self.path.iter().map(PathBuf::as_path).find(|path| path.is_file());
@@ -288,7 +290,14 @@ impl Checkpoint {
         if !differences.is_empty() {
             let differences = differences.join("; ");
             return Err(Failure::Usage(format!(
-                "{name}: it is of another render, now and then differ in {differences}"
+                "{name}: it is of another render: they differ in {differences}"
+            )));
+        }
+        let most = part.state.most_samples();
+        if most > spp {
+            return Err(Failure::Usage(format!(
+                "{name}: it has up to {} a pixel, more than are asked for (expected --spp {most} or more)",
+                counted(u64::from(most), "sample")
             )));
         }
         self.is_own.store(!is_output, Ordering::Relaxed);

@@ -577,7 +577,7 @@ fn picture(
         Ok(Job { shown, ..Job::new(files, settings, &job_options)? })
     };
     let (checkpoint, state) =
-        Checkpoint::begin(&arguments.parts, &output, most_memory, arguments.quiet, job)?;
+        Checkpoint::begin(&arguments.parts, &output, most_memory, options.stop.spp, arguments.quiet, job)?;
     let keep = |state| checkpoint.keep(state);
     let keeper = checkpoint.every().map(|every| Keeper { every, keep: &keep });
     signals.enter(Phase::Rendering);

@@ -7,5 +7,6 @@ mod denoising;
 mod files;
 mod habits;
 mod limits;
+mod parts;
 mod program;
 mod stops;

@@ -15,6 +15,8 @@ pub(crate) struct Clock<'a> {
     pixels: u64,
     stop: Stop,
     done: AtomicU64,
+    /// Samples that an earlier run took.
+    before: u64,
     /// Samples a pixel at which the noise is expected to be low enough, as the bits of an f64; infinite before it is known.
     quiet_at: AtomicU64,
     last: Mutex<Instant>,
@@ -22,14 +24,21 @@ pub(crate) struct Clock<'a> {
 }
 
 impl<'a> Clock<'a> {
-    /// A clock of a render of so many pixels.
-    pub(crate) fn new(start: Instant, pixels: u64, stop: Stop, progress: &'a dyn Progress) -> Self {
+    /// A clock of a render of so many pixels, of which an earlier run took so many samples.
+    pub(crate) fn new(
+        start: Instant,
+        pixels: u64,
+        stop: Stop,
+        before: u64,
+        progress: &'a dyn Progress,
+    ) -> Self {
         let never = AtomicU64::new(f64::INFINITY.to_bits());
         Self {
             start,
             pixels,
             stop,
-            done: AtomicU64::new(0),
+            done: AtomicU64::new(before),
+            before,
             quiet_at: never,
             last: Mutex::new(start),
             progress,
@@ -64,7 +73,9 @@ impl<'a> Clock<'a> {
         let counts = self.stop.spp < u32::MAX || (self.stop.time.is_none() && self.stop.noise.is_none());
         let share = of_noise.max(of_time).max(if counts { of_spp } else { 0.0 }).clamp(0.0, 1.0);
         let is_known = share > 0.0;
-        let left = is_known.then(|| elapsed.as_secs_f64() * (1.0 / share - 1.0));
+        // The share of this run.
+        let own = share * (samples - self.before as f64) / samples;
+        let left = (is_known && own > 0.0).then(|| elapsed.as_secs_f64() * (1.0 - share) / own);
         let total = match counts && of_spp >= share {
             true => Some(self.pixels.saturating_mul(u64::from(self.stop.spp))),
             false => is_known.then(|| ((samples / share) as u64).max(done)),
@@ -85,7 +96,7 @@ mod tests {
     use crate::NoProgress;
 
     fn state(stop: Stop, quiet_at: Option<f64>, done: u64, elapsed: u64) -> State {
-        let clock = Clock::new(Instant::now(), 200, stop, &NoProgress);
+        let clock = Clock::new(Instant::now(), 200, stop, 0, &NoProgress);
         quiet_at.into_iter().for_each(|spp| clock.expect_quiet_at(spp));
         clock.state(done, Duration::from_secs(elapsed))
     }
@@ -113,5 +124,14 @@ mod tests {
         // Over time and beyond the expected noise, it is at its end.
         let late = state(Stop { spp: endless, time, noise }, Some(1.0), 400, 9);
         assert_eq!((late.share, late.total, late.left), (1.0, Some(400), Some(Duration::ZERO)));
+    }
+
+    #[test]
+    fn what_an_earlier_run_took_is_no_work_of_this_one() {
+        let stop = Stop { spp: 8, time: None, noise: None };
+        let clock = Clock::new(Instant::now(), 200, stop, 400, &NoProgress);
+        // 800 of 1600 samples, 400 of them in 2 s: as many again are left twice.
+        let state = clock.state(800, Duration::from_secs(2));
+        assert_eq!((state.share, state.left), (0.5, Some(Duration::from_secs(4))));
     }
 }

@@ -109,6 +109,8 @@ pub fn render_from(
         Some(state) => owners_of(state, bounds, extras, options.first_sample)?,
         None => bounds.tiles(TILE).into_iter().map(|tile| Owner::new(Tile::new(tile, extras))).collect(),
     };
+    let before =
+        owners.iter().flat_map(|owner| owner.tile.pixels()).map(|pixel| u64::from(pixel.taken)).sum();
     let job = Job {
         scene,
         options,
@@ -121,7 +123,7 @@ pub fn render_from(
         deadline: options.stop.time.and_then(|time| start.checked_add(time)),
         cancel,
         pause: keeper.map(|keeper| Pause::new(start, keeper.every)),
-        clock: Clock::new(start, bounds.area(), options.stop, progress),
+        clock: Clock::new(start, bounds.area(), options.stop, before, progress),
     };
     let hand_over = |owners: &[Owner]| {
         if let (Some(keeper), Some(pause)) = (keeper, &job.pause) {
@@ -131,8 +133,6 @@ pub fn render_from(
     };
     let has = |owners: &[Owner], samples| owners.iter().all(|owner| owner.tile.has_taken(samples));
 
-    job.clock
-        .add(owners.iter().flat_map(|owner| owner.tile.pixels()).map(|pixel| u64::from(pixel.taken)).sum());
     let mut stride = None;
     let mut last = None;
     if has(&owners, 1) {
@@ -217,8 +217,11 @@ pub fn render_from(
 
 /// The number of samples at which a render next looks at its noise, and shows what there is: always the same, whatever came between.
 fn next_count(done: u32) -> u32 {
-    let step = (done / 4).next_power_of_two().clamp(1, MAX_STEP);
-    done / step * step + step
+    if done < MAX_STEP {
+        return (done + 1).next_power_of_two();
+    }
+    let step = (done / 8).next_power_of_two().min(MAX_STEP);
+    (done / step + 1) * step
 }
 
 /// A power of two near the largest depth that there may be.
@@ -388,7 +391,9 @@ impl Job<'_> {
                 continue;
             }
             let looks = count % PIXELS_A_LOOK == 0;
-            if self.cancel.is_cancelled() || (looks && (self.must_stop() || self.is_paused())) {
+            // However short the time between two pauses, some work is done.
+            if self.cancel.is_cancelled() || (looks && (self.must_stop() || (count > 0 && self.is_paused())))
+            {
                 self.clock.add(count);
                 return false;
             }

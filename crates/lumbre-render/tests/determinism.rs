@@ -220,7 +220,7 @@ fn a_cancelled_render_returns_what_it_has() {
     assert_eq!(told.iter().map(|t| t.0).collect::<Vec<_>>(), [1, 2, 4, 8]);
     assert!(told[0].1.is_none() && told[3].1 < told[1].1 && told[3].1 > Some(0.0), "{told:?}");
     assert_eq!(told[3].2, mean(&partial.image)[1] as f32);
-    // The same samples as a render that wanted no more; only the textures' footprint knows how many there were to be.
+    // The same samples as a render that wanted no more.
     let whole = picture(&scene, &options(&scene, 40, 30, 8));
     assert_eq!(bytes(&partial.image), bytes(&whole.image));
     assert!(!whole.stats.cancelled);

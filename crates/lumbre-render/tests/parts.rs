@@ -37,11 +37,9 @@ fn run(
 fn assert_same(a: &Rendered, b: &Rendered, what: &str) {
     assert_eq!(a.image, b.image, "{what}");
     assert_eq!((&a.coverage, &a.features, &a.guides), (&b.coverage, &b.features, &b.guides), "{what}");
-    assert_eq!(
-        (a.stats.rays, a.stats.noise, a.stats.spp),
-        (b.stats.rays, b.stats.noise, b.stats.spp),
-        "{what}"
-    );
+    assert_eq!((a.stats.rays, a.stats.spp), (b.stats.rays, b.stats.spp), "{what}");
+    let noise = |rendered: &Rendered| rendered.stats.noise.unwrap();
+    assert!((noise(a) - noise(b)).abs() < 1e-12 * noise(b), "{what}");
 }
 
 #[test]
@@ -51,7 +49,7 @@ fn a_render_goes_on_from_any_state_to_the_same_picture() {
         let whole = run(&scene, &options, None, None).unwrap();
         let states = RefCell::new(Vec::new());
         // Without a pause between two looks: a state of every few pixels, also from the first, coarse pass.
-        let keep = |state: RenderState| states.borrow_mut().push(state);
+        let keep = |state: RenderState| states.borrow_mut().push(state.to_bytes());
         let keeper = Keeper { every: Duration::ZERO, keep: &keep };
         let mut slow = options.clone();
         slow.threads = 1;
@@ -61,9 +59,9 @@ fn a_render_goes_on_from_any_state_to_the_same_picture() {
         assert_same(&kept.0, &small.0, "with hand-overs");
         let states = states.into_inner();
         assert!(states.len() > 20, "{}", states.len());
-        assert!(states.iter().any(|state| state.least_samples() == 0 && state.taken() > 0));
-        for state in states.into_iter().step_by(7) {
-            let state = RenderState::from_bytes(&state.to_bytes(), u64::MAX).unwrap();
+        let state_of = |bytes: &Vec<u8>| RenderState::from_bytes(bytes, u64::MAX).unwrap();
+        assert!(states.iter().map(state_of).any(|state| state.least_samples() == 0 && state.taken() > 0));
+        for state in states.iter().step_by(7).map(state_of) {
             assert!(state.taken() < state.wanted());
             let resumed = run(&scene, &slow, Some(state), None).unwrap();
             assert_same(&resumed.0, &small.0, "resumed");

@@ -103,6 +103,11 @@ impl RenderState {
         self.film.pixels().iter().map(|pixel| pixel.taken).min().unwrap_or(0)
     }
 
+    /// The samples that the pixel with the most has.
+    pub fn most_samples(&self) -> u32 {
+        self.film.pixels().iter().map(|pixel| pixel.taken).max().unwrap_or(0)
+    }
+
     /// The range of samples of all pixels, from the first of any to the last of any.
     pub fn samples(&self) -> Range<u32> {
         let first = self.pieces.iter().map(|piece| piece.samples.start).min().unwrap_or(0);

@@ -1,0 +1,251 @@
+//! Parts and checkpoints: whatever happens to a render, its picture has the same bytes.
+
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
+use std::fs;
+
+use crate::files::{Folder, answer};
+
+const SCENE: &str = r#"
+Film "rgb" "integer xresolution" 33 "integer yresolution" 21 "string filename" "film.exr"
+Sampler "zsobol" "integer pixelsamples" 9
+LookAt 0 -6 2  0 0 0.5  0 0 1
+Camera "perspective" "float fov" 40
+WorldBegin
+LightSource "infinite" "rgb L" [0.4 0.5 0.6]
+Texture "wood" "spectrum" "imagemap" "string filename" "wood.png"
+Material "diffuse" "texture reflectance" "wood"
+Shape "disk" "float radius" 4
+Material "dielectric"
+Translate 0 0 1
+Shape "sphere"
+"#;
+
+fn folder() -> Folder {
+    let folder = Folder::new();
+    folder.write("scene.pbrt", SCENE);
+    wood(&folder, [0.8, 0.5, 0.2]);
+    folder
+}
+
+fn wood(folder: &Folder, colour: [f32; 3]) {
+    let image = lumbre::image::Image::from_pixels(1, 1, vec![colour.into()]).unwrap();
+    lumbre::write_image(&folder.path("wood.png"), &image, &lumbre::SaveOptions::default()).unwrap();
+}
+
+fn run(folder: &Folder, arguments: &str) -> (i32, String) {
+    let arguments: Vec<&str> = arguments.split_whitespace().collect();
+    answer(folder.command(&arguments).output().unwrap())
+}
+
+fn done(folder: &Folder, arguments: &str) {
+    let (status, said) = run(folder, arguments);
+    assert_eq!(status, 0, "{arguments}: {said}");
+}
+
+/// It fails with this status, and says this.
+fn refused(folder: &Folder, arguments: &str, status: i32, why: &str) {
+    let (found, said) = run(folder, arguments);
+    assert!(found == status && said.contains(why), "{arguments}: {found}, {said}");
+}
+
+fn bytes(folder: &Folder, name: &str) -> Vec<u8> {
+    fs::read(folder.path(name)).unwrap()
+}
+
+#[test]
+fn parts_of_any_size_merged_in_any_order_are_the_file_of_one_run() {
+    let folder = folder();
+    for (name, more) in [("whole.exr", ""), ("whole.png", "--tonemap agx --exposure 0.5")] {
+        done(&folder, &format!("render scene.pbrt -o {name} {more}"));
+        for (part, crop, samples) in [
+            ("a.part", "0,0,20,21", "0..4"),
+            ("b.exr", "0,0,20,21", "4..9"),
+            ("c.part", "20,0,33,21", "0..1"),
+            ("d.part", "20,0,33,21", "1..8"),
+            ("e.part", "20,0,33,21", "8..9"),
+        ] {
+            done(
+                &folder,
+                &format!("render scene.pbrt -o {part} --crop {crop} --samples {samples} {more} --threads 1"),
+            );
+        }
+        done(&folder, "merge d.part a.part -o ad.part --allow-gaps");
+        done(&folder, "merge c.part e.part -o ce.part --allow-gaps");
+        done(&folder, &format!("merge ce.part b.exr ad.part -o merged.{name}"));
+        assert_eq!(bytes(&folder, &format!("merged.{name}")), bytes(&folder, name), "{name}");
+    }
+    // An .exr of a part is a picture, too.
+    let part = lumbre::read_image(&folder.path("b.exr")).unwrap();
+    for (i, pixel) in part.pixels().iter().enumerate() {
+        assert_eq!(pixel.max_component() > 0.0, i % 33 < 20, "{i}");
+    }
+}
+
+#[test]
+fn what_is_missing_doubled_foreign_or_damaged_is_refused_by_name() {
+    let folder = folder();
+    done(&folder, "render scene.pbrt -o a.part --samples 0..3");
+    done(&folder, "render scene.pbrt -o b.part --samples 2..5");
+    done(&folder, "render scene.pbrt -o c.part --samples 5..6");
+    done(&folder, "render scene.pbrt -o seed.part --samples 3..5 --seed 4");
+    refused(
+        &folder,
+        "merge a.part b.part -o x.exr",
+        3,
+        "b.part: it has samples 2..3 of pixels 0,0,33,21 as a.part has",
+    );
+    refused(
+        &folder,
+        "merge a.part c.part -o x.exr",
+        3,
+        "missing: samples 3..5 of pixels 0,0,33,21 (--allow-gaps",
+    );
+    refused(&folder, "merge c.part -o x.exr", 3, "missing: samples 0..5");
+    refused(
+        &folder,
+        "merge a.part seed.part -o x.exr",
+        3,
+        "another render than a.part: they differ in seed: 0, 4",
+    );
+    refused(&folder, "merge a.part scene.pbrt -o x.exr", 3, "scene.pbrt: it is no part of a render");
+    refused(&folder, "merge a.part nothing.part -o x.exr", 3, "nothing.part: cannot read");
+    refused(&folder, "merge a.part b.part -o a.part", 2, "a.part: it is an input");
+    refused(
+        &folder,
+        "render scene.pbrt -o a.png --samples 0..3",
+        2,
+        "expected a name that ends in .exr or .part",
+    );
+    refused(&folder, "render scene.pbrt -o a.part", 2, "expected --samples, too");
+    refused(&folder, "render scene.pbrt -o a.part --samples 3..3", 2, "the one after the last");
+    refused(&folder, "render scene.pbrt -o a.part --samples 0..3 --noise 0.1", 2, "cannot be used with");
+    let part = bytes(&folder, "a.part");
+    for place in [0, 20, part.len() / 2, part.len() - 1] {
+        let mut damaged = part.clone();
+        damaged[place] ^= 4;
+        fs::write(folder.path("damaged.part"), damaged).unwrap();
+        let why = if place == 0 { "no part of a render" } else { "checksum" };
+        refused(&folder, "merge damaged.part c.part -o x.exr", 3, why);
+    }
+    fs::write(folder.path("damaged.part"), &part[..part.len() / 2]).unwrap();
+    refused(&folder, "merge damaged.part c.part -o x.exr", 3, "damaged");
+    assert!(!folder.path("x.exr").exists());
+    // An asset that has changed makes it another render.
+    wood(&folder, [0.8, 0.5, 0.3]);
+    done(&folder, "render scene.pbrt -o d.part --samples 3..5");
+    refused(&folder, "merge a.part d.part -o x.exr", 3, "they differ in file wood.png: changed");
+    let (_, about) = answer(folder.command(&["info", "d.part"]).output().unwrap());
+    let about = if about.is_empty() {
+        String::from_utf8(folder.command(&["info", "d.part"]).output().unwrap().stdout).unwrap()
+    } else {
+        about
+    };
+    assert!(about.contains("samples    3..5 of pixels 0,0,33,21"), "{about}");
+}
+
+#[test]
+fn a_finished_picture_takes_more_samples() {
+    let folder = folder();
+    done(&folder, "render scene.pbrt -o whole.exr --spp 9 --keep-sums");
+    done(&folder, "render scene.pbrt -o few.exr --spp 4 --keep-sums");
+    done(&folder, "render scene.pbrt -o few.exr --spp 9 --keep-sums --resume");
+    assert_eq!(bytes(&folder, "few.exr"), bytes(&folder, "whole.exr"));
+    done(&folder, "render scene.pbrt -o plain.exr --spp 4");
+    refused(
+        &folder,
+        "render scene.pbrt -o plain.exr --spp 9 --resume",
+        2,
+        "expected one that was saved with --keep-sums",
+    );
+    refused(
+        &folder,
+        "render scene.pbrt -o few.exr --spp 9 --resume --max-depth 2",
+        2,
+        "they differ in integrator",
+    );
+    done(&folder, "render scene.pbrt -o new.exr --spp 9 --resume --checkpoint new.ck --keep-sums");
+    assert_eq!(bytes(&folder, "new.exr"), bytes(&folder, "whole.exr"));
+    // The checkpoint that was asked for holds the finished render.
+    done(&folder, "render scene.pbrt -o new.exr --spp 11 --resume --checkpoint new.ck");
+    done(&folder, "render scene.pbrt -o eleven.exr --spp 11");
+    assert_eq!(bytes(&folder, "new.exr"), bytes(&folder, "eleven.exr"));
+    assert!(!folder.names().iter().any(|name| name.ends_with(".lock") || name == "eleven.exr.checkpoint"));
+}
+
+#[cfg(unix)]
+mod interrupted {
+    use std::process::Stdio;
+    use std::time::{Duration, Instant};
+
+    use super::*;
+
+    const RENDER: &str =
+        "render scene.pbrt --spp 4000 --size 20x14 --threads 2 --progress none --checkpoint-every 20ms";
+
+    fn signal(id: u32, name: &str) {
+        let sent = std::process::Command::new("kill").args([format!("-{name}"), id.to_string()]).status();
+        assert!(sent.unwrap().success());
+    }
+
+    #[test]
+    fn a_render_that_is_killed_time_and_again_comes_to_the_same_bytes() {
+        let folder = folder();
+        let arguments: Vec<&str> =
+            RENDER.split_whitespace().chain(["-o", "a.exr", "--checkpoint", "ck", "--resume"]).collect();
+        let kills = if std::env::var_os("LUMBRE_LONG_TESTS").is_some() { 100 } else { 6 };
+        let mut held = 0;
+        for i in 0..kills {
+            let mut child = folder.command(&arguments).stderr(Stdio::null()).spawn().unwrap();
+            std::thread::sleep(Duration::from_micros(60_000 + (i * 137_003) % 300_000));
+            signal(child.id(), ["KILL", "INT", "KILL", "TERM"][i as usize % 4]);
+            let _ = child.wait().unwrap();
+            let path = folder.path("ck");
+            if path.exists() {
+                let taken = lumbre::Part::open(&path, u64::MAX).unwrap().state.taken();
+                assert!(taken >= held, "{taken} {held}");
+                held = taken;
+            }
+        }
+        assert!(held > 0, "it never kept anything");
+        // As many samples as the killed runs came to and a few more: the rest is rendered by one run.
+        let most = lumbre::Part::open(&folder.path("ck"), u64::MAX).unwrap().state.most_samples();
+        refused(
+            &folder,
+            &format!("{} -o a.exr --checkpoint ck --resume", RENDER.replace("4000", "1")),
+            2,
+            "more than are asked for",
+        );
+        let enough = RENDER.replace("4000", &(most + 1).to_string());
+        done(&folder, &format!("{enough} -o a.exr --checkpoint ck --resume"));
+        done(&folder, &format!("{enough} -o b.exr --no-checkpoint"));
+        assert_eq!(bytes(&folder, "a.exr"), bytes(&folder, "b.exr"));
+    }
+
+    #[test]
+    fn a_second_run_on_the_same_checkpoint_is_refused() {
+        let folder = folder();
+        let arguments: Vec<&str> =
+            RENDER.split_whitespace().chain(["-o", "a.exr", "--checkpoint", "ck"]).collect();
+        let mut first = folder.command(&arguments).stderr(Stdio::null()).spawn().unwrap();
+        let start = Instant::now();
+        while !folder.path("ck").exists() {
+            assert!(start.elapsed() < Duration::from_secs(60), "no checkpoint");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        refused(
+            &folder,
+            &format!("{RENDER} -o b.exr --checkpoint ck --resume"),
+            2,
+            "another run writes this checkpoint",
+        );
+        signal(first.id(), "TERM");
+        assert_eq!(first.wait().unwrap().code(), Some(143));
+        refused(
+            &folder,
+            &format!("{RENDER} -o b.exr --checkpoint ck"),
+            2,
+            "of an unfinished render (--resume goes on from it",
+        );
+    }
+}
