@@ -6,8 +6,8 @@ use std::process::Command;
 
 /// The layer of each crate. A crate may depend on crates of lower layers only.
 const LAYERS: &[(u32, &[&str])] = &[
-    (0, &["lumbre-math", "lumbre-image"]),
-    (1, &["lumbre-geometry"]),
+    (0, &["lumbre-math"]),
+    (1, &["lumbre-geometry", "lumbre-image"]),
     (2, &["lumbre-kernel", "lumbre-shading"]),
     (3, &["lumbre-scene"]),
     (4, &["lumbre-render"]),

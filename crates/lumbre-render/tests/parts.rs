@@ -38,7 +38,7 @@ fn assert_same(a: &Rendered, b: &Rendered, what: &str) {
     assert_eq!(a.image, b.image, "{what}");
     assert_eq!((&a.coverage, &a.features, &a.guides), (&b.coverage, &b.features, &b.guides), "{what}");
     assert_eq!((a.stats.rays, a.stats.spp), (b.stats.rays, b.stats.spp), "{what}");
-    let noise = |rendered: &Rendered| rendered.stats.noise.unwrap();
+    let noise = |rendered: &Rendered| rendered.stats.noise.expect("two samples");
     assert!((noise(a) - noise(b)).abs() < 1e-12 * noise(b), "{what}");
 }
 
