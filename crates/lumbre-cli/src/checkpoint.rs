@@ -360,7 +360,19 @@ impl Checkpoint {
     ///
     /// # Errors
     /// [`Failure::Io`] where the files of the scene cannot be read.
-    pub(crate) fn part(&self, state: RenderState) -> Result<Part, Failure> {
-        Ok(Part { job: self.identified.get()?, state })
+    pub(crate) fn part(&self, state: &RenderState) -> Result<Part, Failure> {
+        Ok(Part { job: self.identified.get()?, state: state.clone() })
+    }
+
+    /// Keeps what was rendered somewhere else, where its picture cannot be saved; `None` where that fails as well.
+    pub(crate) fn rescue(&self, state: &RenderState, output: &Path) -> Option<PathBuf> {
+        let part = self.part(state).ok()?;
+        let name = output.file_name().map_or("picture".into(), |name| name.to_string_lossy());
+        [PathBuf::from("."), std::env::temp_dir()].into_iter().find_map(|folder| {
+            let free = (0..100)
+                .map(|i| folder.join(format!("{name}.rescued.{i}.part")))
+                .find(|path| !path.exists())?;
+            part.save(&free).ok().map(|()| free)
+        })
     }
 }

@@ -612,16 +612,30 @@ fn picture(
         Behind::Background(background) => picture.over(background),
         Behind::Lights | Behind::Nothing => picture,
     };
-    if is_bare_part(&output) {
-        checkpoint.part(state)?.save(&output)?;
+    let saved = if is_bare_part(&output) {
+        checkpoint.part(&state)?.save(&output).map_err(Failure::from)
     } else if arguments.parts.keeps_sums() {
-        picture.save_with_part(&output, &save, &arguments.aov, &checkpoint.part(state)?)?;
+        picture
+            .save_with_part(&output, &save, &arguments.aov, &checkpoint.part(&state)?)
+            .map_err(Failure::from)
     } else if is_piped {
         let format = arguments.output_format.unwrap_or(ImageFormat::Png);
-        print_bytes(&picture.encode(format, &save, &arguments.aov)?)?;
+        let encoded = picture.encode(format, &save, &arguments.aov).map_err(Failure::from);
+        encoded.and_then(|encoded| print_bytes(&encoded))
     } else {
-        picture.save_with(&output, &save, &arguments.aov)?;
+        picture.save_with(&output, &save, &arguments.aov).map_err(Failure::from)
+    };
+    if let Err(Failure::Io(why)) = saved {
+        return Err(Failure::Io(match checkpoint.rescue(&state, &output) {
+            Some(kept) => format!(
+                "{why}; what was rendered is kept in {} (lumbre merge {} -o PICTURE makes the picture of it)",
+                kept.display(),
+                kept.display()
+            ),
+            None => why,
+        }));
     }
+    saved?;
     drop(stream);
     if is_done {
         checkpoint.remove();

@@ -188,6 +188,15 @@ mod interrupted {
         assert!(sent.unwrap().success());
     }
 
+    /// Waits, far longer than it should take: a test measures no time.
+    fn until_there(folder: &Folder, name: &str) {
+        let start = Instant::now();
+        while !folder.path(name).exists() {
+            assert!(start.elapsed() < Duration::from_secs(60), "{name} does not come");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
     #[test]
     fn a_render_that_is_killed_time_and_again_comes_to_the_same_bytes() {
         let folder = folder();
@@ -223,16 +232,31 @@ mod interrupted {
     }
 
     #[test]
+    fn a_picture_that_cannot_be_saved_is_kept_elsewhere() {
+        let folder = folder();
+        fs::create_dir(folder.path("out")).unwrap();
+        let render = format!("{RENDER} -o out/a.exr --checkpoint ck");
+        let arguments: Vec<&str> = render.split_whitespace().collect();
+        let child = folder.command(&arguments).stderr(Stdio::piped()).spawn().unwrap();
+        until_there(&folder, "ck");
+        fs::remove_dir(folder.path("out")).unwrap();
+        signal(child.id(), "INT");
+        let (status, said) = answer(child.wait_with_output().unwrap());
+        assert!(
+            status == 4 && said.contains("what was rendered is kept in ./a.exr.rescued.0.part"),
+            "{status} {said}"
+        );
+        let part = lumbre::Part::open(&folder.path("a.exr.rescued.0.part"), u64::MAX).unwrap();
+        assert!(part.state.least_samples() > 0);
+    }
+
+    #[test]
     fn a_second_run_on_the_same_checkpoint_is_refused() {
         let folder = folder();
         let arguments: Vec<&str> =
             RENDER.split_whitespace().chain(["-o", "a.exr", "--checkpoint", "ck"]).collect();
         let mut first = folder.command(&arguments).stderr(Stdio::null()).spawn().unwrap();
-        let start = Instant::now();
-        while !folder.path("ck").exists() {
-            assert!(start.elapsed() < Duration::from_secs(60), "no checkpoint");
-            std::thread::sleep(Duration::from_millis(5));
-        }
+        until_there(&folder, "ck");
         refused(
             &folder,
             &format!("{RENDER} -o b.exr --checkpoint ck --resume"),
