@@ -16,6 +16,7 @@ mod console;
 mod denoiser;
 mod diff;
 mod failure;
+mod farm;
 mod info;
 mod memory;
 mod merge;
@@ -58,6 +59,7 @@ enum Command {
     Info(info::Arguments),
     Diff(diff::Arguments),
     Merge(merge::Arguments),
+    Farm(farm::Arguments),
     Completions(completions::CompletionsArguments),
     Man(completions::ManArguments),
 }
@@ -75,6 +77,7 @@ fn main() -> ExitCode {
         Command::Info(arguments) => info::run(&arguments),
         Command::Diff(arguments) => diff::run(&arguments),
         Command::Merge(arguments) => merge::run(&arguments),
+        Command::Farm(arguments) => farm::run(&arguments),
         Command::Completions(arguments) => completions::completions::<Arguments>(&arguments),
         Command::Man(arguments) => completions::man::<Arguments>(&arguments),
     };

@@ -100,6 +100,29 @@ impl FromStr for Frames {
     }
 }
 
+impl Default for ReadingArguments {
+    /// Those of a command line that says nothing of it.
+    fn default() -> Self {
+        Self {
+            input_format: None,
+            strict: false,
+            lenient: false,
+            frame: None,
+            shutter: None,
+            fps: 24.0,
+            animation: None,
+            variant: None,
+            settings: Vec::new(),
+            overlay: Vec::new(),
+            max_memory: None,
+            max_elements: None,
+            max_nesting: None,
+            max_files: None,
+            max_expansion: None,
+        }
+    }
+}
+
 impl ReadingArguments {
     /// The memory that is left.
     pub(crate) fn memory(&self) -> Memory {

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
 use std::fs;
+use std::time::{Duration, Instant};
 
 use crate::files::{Folder, answer};
 
@@ -21,7 +22,7 @@ Translate 0 0 1
 Shape "sphere"
 "#;
 
-fn folder() -> Folder {
+pub(crate) fn folder() -> Folder {
     let folder = Folder::new();
     folder.write("scene.pbrt", SCENE);
     wood(&folder, [0.8, 0.5, 0.2]);
@@ -38,19 +39,34 @@ fn run(folder: &Folder, arguments: &str) -> (i32, String) {
     answer(folder.command(&arguments).output().unwrap())
 }
 
-fn done(folder: &Folder, arguments: &str) {
+pub(crate) fn done(folder: &Folder, arguments: &str) {
     let (status, said) = run(folder, arguments);
     assert_eq!(status, 0, "{arguments}: {said}");
 }
 
 /// It fails with this status, and says this.
-fn refused(folder: &Folder, arguments: &str, status: i32, why: &str) {
+pub(crate) fn refused(folder: &Folder, arguments: &str, status: i32, why: &str) {
     let (found, said) = run(folder, arguments);
     assert!(found == status && said.contains(why), "{arguments}: {found}, {said}");
 }
 
-fn bytes(folder: &Folder, name: &str) -> Vec<u8> {
+pub(crate) fn bytes(folder: &Folder, name: &str) -> Vec<u8> {
     fs::read(folder.path(name)).unwrap()
+}
+
+#[cfg(unix)]
+pub(crate) fn signal(id: u32, name: &str) {
+    let sent = std::process::Command::new("kill").args([format!("-{name}"), id.to_string()]).status();
+    assert!(sent.unwrap().success());
+}
+
+/// Waits, far longer than it should take: a test measures no time.
+pub(crate) fn until_there(folder: &Folder, name: &str) {
+    let start = Instant::now();
+    while !folder.path(name).exists() {
+        assert!(start.elapsed() < Duration::from_secs(60), "{name} does not come");
+        std::thread::sleep(Duration::from_millis(5));
+    }
 }
 
 #[test]
@@ -176,26 +192,11 @@ fn a_finished_picture_takes_more_samples() {
 #[cfg(unix)]
 mod interrupted {
     use std::process::Stdio;
-    use std::time::{Duration, Instant};
 
     use super::*;
 
     const RENDER: &str =
         "render scene.pbrt --spp 4000 --size 20x14 --threads 2 --progress none --checkpoint-every 20ms";
-
-    fn signal(id: u32, name: &str) {
-        let sent = std::process::Command::new("kill").args([format!("-{name}"), id.to_string()]).status();
-        assert!(sent.unwrap().success());
-    }
-
-    /// Waits, far longer than it should take: a test measures no time.
-    fn until_there(folder: &Folder, name: &str) {
-        let start = Instant::now();
-        while !folder.path(name).exists() {
-            assert!(start.elapsed() < Duration::from_secs(60), "{name} does not come");
-            std::thread::sleep(Duration::from_millis(5));
-        }
-    }
 
     #[test]
     fn a_render_that_is_killed_time_and_again_comes_to_the_same_bytes() {
