@@ -401,7 +401,7 @@ fn an_interrupted_render_saves_what_is_there() {
 }
 
 #[test]
-fn every_scene_has_the_same_bytes_from_any_number_of_threads() {
+fn every_scene_has_the_same_bytes_in_eight_ways() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     let mut scenes = Vec::new();
     for folder in fs::read_dir(&root).unwrap() {
@@ -414,30 +414,38 @@ fn every_scene_has_the_same_bytes_from_any_number_of_threads() {
     }
     assert!(scenes.len() >= 6, "{scenes:?}");
     let desk = Desk::new();
+    let all = "--spp 3 --threads";
+    // Each way is a list of commands that come to a.exr; SCENE stands for the scene, in its size.
+    let ways = [
+        format!("render SCENE -o a.exr {all} 1"),
+        format!("render SCENE -o a.exr {all} 2"),
+        format!("render SCENE -o a.exr {all} 16"),
+        "render SCENE -o a.part --samples 0..1; render SCENE -o b.part --samples 1..3 --threads 1; merge b.part a.part -o a.exr".into(),
+        "render SCENE -o a.part --samples 0..3 --crop 0,0,41,50; render SCENE -o b.exr --samples 0..3 --crop 41,0,66,50; merge a.part b.exr -o a.exr".into(),
+        "render SCENE -o a.exr --spp 1 --keep-sums; render SCENE -o a.exr --spp 3 --resume".into(),
+        "render SCENE -o a.exr --spp 2 --checkpoint ck --checkpoint-every 1ms; render SCENE -o a.exr --spp 3 --checkpoint ck --resume".into(),
+        "render SCENE -o a.part --samples 2..3; render SCENE -o b.part --samples 0..1; merge a.part b.part -o c.part --allow-gaps; render SCENE -o d.part --samples 1..2; merge d.part c.part -o a.exr".into(),
+    ];
     for scene in scenes {
-        let bytes: Vec<Vec<u8>> = ["1", "2", "3", "16"]
-            .iter()
-            .map(|threads| {
-                let scene = scene.to_string_lossy();
-                let out = desk.lumbre(&[
-                    "render",
-                    &scene,
-                    "-o",
-                    "a.exr",
-                    "--size",
-                    "66x50",
-                    "--spp",
-                    "3",
-                    "--threads",
-                    threads,
-                    "-q",
-                    "--strict",
-                ]);
-                assert_eq!(code(&out), 0, "{scene}: {}", stderr(&out));
-                fs::read(desk.path("a.exr")).unwrap()
-            })
-            .collect();
-        assert!(bytes.iter().all(|b| *b == bytes[0]), "{}", scene.display());
+        let path = scene.to_string_lossy();
+        let mut pictures = Vec::new();
+        for way in &ways {
+            for name in ["a.exr", "ck"] {
+                let _ = fs::remove_file(desk.path(name));
+            }
+            for command in way.split("; ") {
+                let more: &[&str] =
+                    if command.starts_with("render") { &["--size", "66x50", "--strict"] } else { &[] };
+                let words = command.split(' ').map(|word| if word == "SCENE" { &path } else { word });
+                let words: Vec<&str> = words.chain(["-q"]).chain(more.iter().copied()).collect();
+                let out = desk.lumbre(&words);
+                assert_eq!(code(&out), 0, "{path}: {command}: {}", stderr(&out));
+            }
+            pictures.push(fs::read(desk.path("a.exr")).unwrap());
+        }
+        for (way, picture) in ways.iter().zip(&pictures) {
+            assert!(*picture == pictures[0], "{path}: {way}");
+        }
     }
 }
 
