@@ -356,6 +356,14 @@ impl Checkpoint {
         }
     }
 
+    /// Which render it is.
+    ///
+    /// # Errors
+    /// [`Failure::Io`] where the files of the scene cannot be read.
+    pub(crate) fn job(&self) -> Result<Job, Failure> {
+        self.identified.get()
+    }
+
     /// The part that a state is.
     ///
     /// # Errors

@@ -160,6 +160,8 @@ fn save(arguments: &Arguments, whole: &Part) -> Result<(), Failure> {
     if shown("precision") == "float" {
         options.exr_precision = ExrPrecision::Float;
     }
+    let samples = whole.state.samples();
+    options.metadata = whole.job.metadata(&(samples.start..samples.end));
     let layers: Vec<Feature> = match ImageFormat::from_path(output) {
         Some(ImageFormat::Exr) => shown("layers").split(',').filter_map(Feature::from_name).collect(),
         _ => Vec::new(),

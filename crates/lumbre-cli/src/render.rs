@@ -132,6 +132,10 @@ pub(crate) struct Arguments {
     /// AOVs as layers of an .exr, separated by commas.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = one_of(&FEATURES, Feature::from_name))]
     aov: Vec<Feature>,
+    /// What .exr and .png say of themselves: what their pixels depend on (version, a hash of the scene and the options, seed, samples,
+    /// camera), the same for every run; or, in full, the command and its time as well.
+    #[arg(long, value_enum, value_name = "WHICH", default_value_t = Metadata::Plain)]
+    metadata: Metadata,
     /// Write statistics of the render, as JSON.
     #[arg(long, value_name = "FILE.json")]
     stats: Option<PathBuf>,
@@ -152,6 +156,15 @@ pub(crate) struct Arguments {
     staging: StagingArguments,
     #[command(flatten)]
     reading: ReadingArguments,
+}
+
+/// What pictures say of themselves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Metadata {
+    /// The same for every run.
+    Plain,
+    /// The command and its time, too.
+    Full,
 }
 
 fn noise(text: &str) -> Result<f64, String> {
@@ -608,6 +621,15 @@ fn picture(
     let save_start = Instant::now();
     let mut save = SaveOptions::default();
     (save.exr_precision, save.tone_map, save.exposure) = (precision, tone_map, exposure);
+    if let Ok(job) = checkpoint.job() {
+        let first = options.first_sample;
+        save.metadata = job.metadata(&(first..first + picture.stats().spp));
+    }
+    if arguments.metadata == Metadata::Full {
+        let words: Vec<String> = std::env::args().collect();
+        save.metadata.push(("lumbreCommand".to_owned(), words.join(" ")));
+        save.metadata.push(("lumbreSeconds".to_owned(), format!("{:.2}", render_time.as_secs_f64())));
+    }
     let picture = match behind {
         Behind::Background(background) => picture.over(background),
         Behind::Lights | Behind::Nothing => picture,

@@ -83,11 +83,11 @@ fn picture() -> Image {
 fn images() -> Vec<(&'static str, Vec<u8>)> {
     let image = picture();
     let write = |format, options: WriteOptions| encode_image(&image, format, &options).unwrap();
-    let plain = WriteOptions::default();
+    let plain = WriteOptions::default;
     let exr = |exr_compression, exr_precision| {
         write(
             ImageFormat::Exr,
-            changed(plain, |it| {
+            changed(plain(), |it| {
                 it.exr_compression = exr_compression;
                 it.exr_precision = exr_precision;
             }),
@@ -100,11 +100,11 @@ fn images() -> Vec<(&'static str, Vec<u8>)> {
         out.into_inner()
     };
     vec![
-        ("8.png", write(ImageFormat::Png, plain)),
-        ("16.png", write(ImageFormat::Png, changed(plain, |it| it.png_depth = PngDepth::Sixteen))),
-        ("a.jpg", write(ImageFormat::Jpeg, plain)),
-        ("a.hdr", write(ImageFormat::Hdr, plain)),
-        ("a.pfm", write(ImageFormat::Pfm, plain)),
+        ("8.png", write(ImageFormat::Png, plain())),
+        ("16.png", write(ImageFormat::Png, changed(plain(), |it| it.png_depth = PngDepth::Sixteen))),
+        ("a.jpg", write(ImageFormat::Jpeg, plain())),
+        ("a.hdr", write(ImageFormat::Hdr, plain())),
+        ("a.pfm", write(ImageFormat::Pfm, plain())),
         ("none.exr", exr(ExrCompression::None, ExrPrecision::Float)),
         ("rle.exr", exr(ExrCompression::Rle, ExrPrecision::Half)),
         ("zip.exr", exr(ExrCompression::Zip, ExrPrecision::Half)),

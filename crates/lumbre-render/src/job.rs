@@ -143,7 +143,7 @@ pub fn render_from(
                 workers.for_each(&mut owners, |owner| {
                     job.run_coarsely(owner, (bounds.x0, bounds.y0), side, last)
                 });
-                if job.must_stop() || !job.is_paused() {
+                if job.must_stop() || owners.iter().all(|owner| owner.next_side <= side) {
                     break;
                 }
                 hand_over(&owners);
@@ -160,7 +160,7 @@ pub fn render_from(
         let end = next_count(done).min(spp);
         loop {
             workers.for_each(&mut owners, |owner| job.run(owner, end));
-            if job.must_stop() || !job.is_paused() {
+            if job.must_stop() || has(&owners, end) {
                 break;
             }
             hand_over(&owners);

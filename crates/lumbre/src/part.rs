@@ -81,6 +81,25 @@ impl Job {
         Ok(Self { identity, shown: BTreeMap::new(), size, transparent: options.transparent })
     }
 
+    /// What a picture of some samples of every pixel says of itself: the version of Lumbre, a hash of all that the samples depend on,
+    /// the seed, the samples and the camera. The same for every run.
+    pub fn metadata(&self, samples: &std::ops::Range<u32>) -> Vec<(String, String)> {
+        let mut hasher = blake3::Hasher::new();
+        for (name, value) in &self.identity {
+            hasher.update(format!("{name}\0{value}\0").as_bytes());
+        }
+        let of = |name: &str| self.identity.get(name).cloned().unwrap_or_default();
+        [
+            ("lumbreVersion", of("version")),
+            ("lumbreScene", hasher.finalize().to_hex().to_string()),
+            ("lumbreSeed", of("seed")),
+            ("lumbreSamples", format!("{}..{}", samples.start, samples.end)),
+            ("lumbreCamera", of("camera")),
+        ]
+        .map(|(name, value)| (name.to_owned(), value))
+        .into()
+    }
+
     /// In what another render differs, a line each, as `seed: 3, 5`; nothing for the same render.
     pub fn differences(&self, other: &Self) -> Vec<String> {
         let names = self.identity.keys().chain(other.identity.keys());

@@ -141,7 +141,7 @@ impl Picture {
     fn shown(&self, format: Option<ImageFormat>, options: &SaveOptions) -> (Cow<'_, Image>, SaveOptions) {
         let PixelBounds { x0, y0, .. } = self.bounds();
         let part = (self.image().width(), self.image().height()) != self.whole;
-        let mut options = *options;
+        let mut options = options.clone();
         options.exr_window = part.then_some((x0 as i32, y0 as i32, self.whole.0, self.whole.1));
         let is_for_displays = matches!(format, Some(ImageFormat::Png | ImageFormat::Jpeg));
         options.denoiser = self.noisy.as_ref().map(|noisy| noisy.denoiser);

@@ -286,6 +286,11 @@ pub(super) fn encode(layers: &Layers, options: &WriteOptions) -> std::io::Result
     if let Some(denoiser) = options.denoiser {
         attributes.other.insert(Text::from("denoiser"), AttributeValue::Text(Text::from(denoiser)));
     }
+    for (name, text) in &options.metadata {
+        if let (Some(name), Some(text)) = (Text::new_or_none(name), Text::new_or_none(text)) {
+            attributes.other.insert(name, AttributeValue::Text(text));
+        }
+    }
     let layer = ExrLayer::new(size, attributes, encoding, AnyChannels::sort(channels));
     let display_size = Vec2(display.width as usize, display.height as usize);
     let mut picture_attributes =

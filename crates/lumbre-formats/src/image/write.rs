@@ -12,7 +12,7 @@ use crate::atomic::atomic_write;
 use crate::diagnostic::{Diagnostic, FormatError, Place, quoted};
 
 /// Options of writing an image.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct WriteOptions {
     /// The tone mapping operator, for PNG and JPEG.
@@ -32,6 +32,8 @@ pub struct WriteOptions {
     pub exr_window: Option<(i32, i32, u32, u32)>,
     /// The denoiser that the image went through, for the metadata of EXR (attribute `denoiser`) and PNG (text `Denoiser`).
     pub denoiser: Option<&'static str>,
+    /// Further metadata by name, for EXR (attributes) and PNG (texts). Names are of letters and digits.
+    pub metadata: Vec<(String, String)>,
 }
 
 impl Default for WriteOptions {
@@ -46,6 +48,7 @@ impl Default for WriteOptions {
             exr_compression: ExrCompression::Zip,
             exr_window: None,
             denoiser: None,
+            metadata: Vec::new(),
         }
     }
 }
@@ -177,6 +180,10 @@ fn encode_png(image: &Image, options: &WriteOptions) -> io::Result<Vec<u8>> {
     encoder.add_text_chunk("Software".to_owned(), software).map_err(io::Error::other)?;
     if let Some(denoiser) = options.denoiser {
         encoder.add_text_chunk("Denoiser".to_owned(), denoiser.to_owned()).map_err(io::Error::other)?;
+    }
+    for (name, text) in &options.metadata {
+        let added = encoder.add_itxt_chunk(name.clone(), text.clone());
+        added.map_err(io::Error::other)?;
     }
     let numbers = shown(image, options)
         .flat_map(|([r, g, b], a)| [Some(r), Some(g), Some(b), has_alpha.then_some(a)])
