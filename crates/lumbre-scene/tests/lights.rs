@@ -36,12 +36,29 @@ fn patch_of_triangles(random: &mut RandomStream) -> GeometryDesc {
     GeometryDesc::Mesh(Arc::new(MeshDesc { positions, triangles, ..MeshDesc::default() }))
 }
 
+/// A rectangle that is turned, the point in its middle, its unit normal and half its sides.
+fn rectangle_of_triangles(random: &mut RandomStream) -> (GeometryDesc, DVec3, DVec3, [DVec3; 2]) {
+    let mut x = || 2.0 * random.next_f64() - 1.0;
+    let middle = 5.0 * DVec3::new(x(), x(), x());
+    let normal = DVec3::new(x(), x(), x()).normalize();
+    let across = normal.cross(DVec3::new(x(), x(), x())).normalize();
+    let half = [0.8 * across, 0.5 * normal.cross(across)];
+    let corner = |a: f64, b: f64| (middle + a * half[0] + b * half[1]).as_vec3();
+    let positions = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+    let mesh = MeshDesc { positions, triangles: vec![[0, 1, 2], [2, 3, 0]], ..MeshDesc::default() };
+    (GeometryDesc::Mesh(Arc::new(mesh)), middle, normal, half)
+}
+
 /// Lights of every kind about the origin, but for the origin itself.
 fn lights_of_all_kinds() -> Scene {
     let mut random = RandomStream::new(3);
     let mut shapes: Vec<ShapeDesc> = (0..12)
         .map(|i| shining(i, patch_of_triangles(&mut random), 0.5 + random.next_f32(), i % 3 == 0))
         .collect();
+    shapes.extend(
+        (20..26)
+            .map(|i| shining(i, rectangle_of_triangles(&mut random).0, 0.5 + random.next_f32(), i % 3 == 0)),
+    );
     let exact = |shape: Shape| GeometryDesc::Exact(shape);
     let v = DVec3::new;
     shapes.push(shining(
@@ -130,4 +147,75 @@ fn the_density_of_what_a_ray_finds_is_that_of_the_sample() {
         count += 1;
     }
     assert!(count > 500, "{count}");
+}
+
+/// The irradiance by radiance 1 of a rectangle on a surface that faces `normal`, all of it being before both: Lambert's sum over the
+/// sides of the polygon.
+fn lambert(corners: &[DVec3], normal: DVec3) -> f64 {
+    let sides = corners.iter().zip(corners.iter().cycle().skip(1));
+    let sum: f64 = sides.map(|(a, b)| a.angle_between(*b) * a.cross(*b).normalize().dot(normal)).sum();
+    0.5 * sum.abs()
+}
+
+#[test]
+fn a_rectangle_of_two_triangles_lights_as_lambert_says_from_near_and_far() {
+    let mut random = RandomStream::new(12);
+    for (case, distance) in [0.03, 0.3, 0.9, 2.0, 4.0, 15.0].into_iter().enumerate() {
+        let (geometry, middle, normal, [a, b]) = rectangle_of_triangles(&mut random);
+        let light = shining(1, geometry, 1.0, false);
+        let material = NamedMaterial { name: None, material: Arc::new(Material::default_diffuse()) };
+        let scene = Scene::build(SceneDesc {
+            shapes: vec![light],
+            materials: vec![material],
+            ..SceneDesc::default()
+        })
+        .unwrap();
+        let from = middle + distance * normal + 0.4 * a - 0.7 * b;
+        let corners =
+            [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(s, t)| middle + s * a + t * b - from);
+        let expected = lambert(&corners, normal);
+        let (mut sum, mut of_one, mut sides) = (0.0, 0.0, [0; 2]);
+        const SIDE: usize = 64;
+        for i in 0..SIDE * SIDE {
+            let u = DVec2::new((i % SIDE) as f64 + random.next_f64(), (i / SIDE) as f64 + random.next_f64())
+                / SIDE as f64;
+            let sample = scene.sample_light(from, 0.0, random.next_f64(), u).unwrap();
+            let Scatter::Density(pdf) = sample.scatter else { panic!("{sample:?}") };
+            let cosine = -sample.towards.dot(normal);
+            sum += f64::from(sample.radiance.average()) * cosine / f64::from(pdf);
+            // What a ray finds of either triangle has the density of the samples, and the mean of its inverse is the solid angle.
+            of_one += 1.0 / f64::from(pdf);
+            let ray = Ray::new(from, sample.towards);
+            let Some(hit) = scene.closest(&ray) else { continue };
+            let met = scene.interaction(&ray, &hit, &Footprint::Point);
+            assert!((scene.light_pdf(from, &met) / pdf - 1.0).abs() < 1e-4, "{case}");
+            sides[met.primitive as usize] += 1;
+            assert!(!scene.is_occluded(&met_shadow(from, &sample)), "{case}");
+        }
+        let count = (SIDE * SIDE) as f64;
+        let solid_angle: f64 = [[0, 1, 2], [2, 3, 0]]
+            .map(|triangle| {
+                let [p, q, r] = triangle.map(|i: usize| corners[i]);
+                lumbre_geometry::Triangle::new(p, q, r).unwrap().solid_angle(DVec3::ZERO)
+            })
+            .iter()
+            .sum();
+        assert!((sum / count / expected - 1.0).abs() < 2e-3, "{case}: {} {expected}", sum / count);
+        assert!(
+            (of_one / count / solid_angle - 1.0).abs() < 2e-3,
+            "{case}: {} {solid_angle}",
+            of_one / count
+        );
+        assert!(sides[0] > 20 && sides[1] > 20 && sides[0] + sides[1] > 4090, "{case}: {sides:?}");
+        // Behind it, nothing.
+        assert_eq!(scene.sample_light(middle - distance * normal, 0.0, 0.4, DVec2::splat(0.3)), None);
+    }
+}
+
+/// A shadow ray that ends where the error of the light's point lets it.
+fn met_shadow(from: DVec3, sample: &LightSample) -> Ray {
+    let end = sample.end.unwrap();
+    let way = end.point - from;
+    let short = end.error.dot(end.normal.abs()) / way.dot(end.normal).abs();
+    Ray { t_max: way.length() * (1.0 - 4.0 * short), ..Ray::new(from, sample.towards) }
 }

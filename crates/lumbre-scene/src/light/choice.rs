@@ -1,4 +1,4 @@
-//! The choice of a light, or of a triangle of one, for a place.
+//! The choice of a light, or of a piece of one, for a place.
 
 use lumbre_geometry::{Ray, Surface};
 use lumbre_math::distribution::AliasTable;
@@ -12,7 +12,7 @@ use crate::surface::SurfaceEntry;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LightChoice {
     tree: Option<LightTree>,
-    /// The light of each emitter of the tree, and its triangle, if it is one of many.
+    /// The light of each emitter of the tree, and its piece, if it is one of many.
     emitters: Vec<(u32, Option<u32>)>,
     /// The first emitter of each light; `None` for those that are not in the tree.
     firsts: Vec<Option<u32>>,
@@ -44,7 +44,7 @@ impl LightChoice {
             }
             power += light.power(scene_radius);
             let is_mesh = matches!(light, Light::Mesh(_));
-            choice.emitters.extend((0..).zip(&found).map(|(triangle, _)| (id, is_mesh.then_some(triangle))));
+            choice.emitters.extend((0..).zip(&found).map(|(piece, _)| (id, is_mesh.then_some(piece))));
             all.extend(found);
         }
         choice.tree = LightTree::new(&all);
@@ -80,10 +80,10 @@ impl LightChoice {
         } else {
             let share = 1.0 - self.share_elsewhere;
             let chosen = self.tree.as_ref()?.choose(from, (choose - self.share_elsewhere) / share)?;
-            let (light, triangle) = self.emitters[chosen.emitter];
-            let sample = match (&lights[light as usize], triangle) {
-                (Light::Mesh(light), Some(triangle)) => {
-                    light.sample_triangle(&entries[light.entry as usize], triangle as usize, from, u)
+            let (light, piece) = self.emitters[chosen.emitter];
+            let sample = match (&lights[light as usize], piece) {
+                (Light::Mesh(light), Some(piece)) => {
+                    light.sample_piece(&entries[light.entry as usize], piece, from, u)
                 }
                 (light, _) => light.sample(entries, from, time, u),
             };
@@ -110,9 +110,9 @@ impl LightChoice {
         let probability =
             |emitter: u32| (1.0 - self.share_elsewhere) * tree.probability(ray.origin, emitter as usize);
         match (light, surface) {
-            (Light::Mesh(light), Some((surface, triangle))) if (triangle as usize) < light.facets.len() => {
-                probability(first + triangle) * light.triangle_pdf(ray, surface, triangle)
-            }
+            (Light::Mesh(light), Some((surface, triangle))) => light
+                .piece_of(triangle)
+                .map_or(0.0, |piece| probability(first + piece) * light.piece_pdf(ray, surface, piece)),
             _ => probability(first) * light.pdf(ray, surface),
         }
     }
