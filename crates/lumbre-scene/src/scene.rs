@@ -268,6 +268,9 @@ impl Scene {
 
     /// A light sample for `from` at a time: a light chosen by `choose`, and a direction by `u`. Its density, or
     /// the radiance of a delta light, includes the probability of the light.
+    ///
+    /// It is for those who also find light along rays of their own and weigh both by [`Scene::light_pdf`] and [`Scene::escaped`]: of an
+    /// environment map it rarely samples what is dim. [`Scene::sample_one_light`] is for those who do not.
     pub fn sample_light(&self, from: DVec3, time: f64, choose: f64, u: DVec2) -> Option<LightSample> {
         self.light_choice.sample(&self.lights, &self.entries, from, time, choose, u)
     }

@@ -5,12 +5,13 @@
 use std::sync::Arc;
 
 use lumbre_geometry::{Disk, Ray, Shape, Sphere};
-use lumbre_image::Rgb;
+use lumbre_image::{Image, Rgb};
 use lumbre_math::random::RandomStream;
-use lumbre_math::{DVec2, DVec3, Transform, Vec3};
+use lumbre_math::{DVec2, DVec3, Transform, Vec3, warp64};
 use lumbre_scene::{
-    AreaLightDesc, Footprint, GeometryDesc, InstanceDesc, LightDesc, LightId, LightSample, MaterialId,
-    MeshDesc, NamedMaterial, ObjectDesc, ObjectId, Scene, SceneDesc, ShapeDesc,
+    AreaLightDesc, EnvironmentDesc, EnvironmentMapping, Footprint, GeometryDesc, InstanceDesc, LightDesc,
+    LightId, LightSample, MaterialId, MeshDesc, NamedMaterial, ObjectDesc, ObjectId, Scene, SceneDesc,
+    ShapeDesc,
 };
 use lumbre_shading::{Material, Scatter};
 
@@ -218,4 +219,87 @@ fn met_shadow(from: DVec3, sample: &LightSample) -> Ray {
     let way = end.point - from;
     let short = end.error.dot(end.normal.abs()) / way.dot(end.normal).abs();
     Ray { t_max: way.length() * (1.0 - 4.0 * short), ..Ray::new(from, sample.towards) }
+}
+
+/// A dim sky with two bright pixels and some that are black.
+fn sky(mapping: EnvironmentMapping) -> Scene {
+    let (width, height) = if mapping == EnvironmentMapping::EqualArea { (12, 12) } else { (22, 11) };
+    let mut random = RandomStream::new(4);
+    let pixel = |i: u32| match i {
+        30 | 31 => Rgb::splat(40.0),
+        60..70 => Rgb::BLACK,
+        _ => Rgb::splat(0.2 + random.next_f32()),
+    };
+    let image = Image::from_pixels(width, height, (0..width * height).map(pixel).collect()).unwrap();
+    let map = EnvironmentDesc { image: Arc::new(image), mapping };
+    let world_from_light = Transform::rotate(DVec3::new(1.0, 2.0, 0.5), 40.0).unwrap();
+    let light = LightDesc::Infinite { world_from_light, radiance: Rgb::splat(1.5), image: Some(map) };
+    Scene::build(SceneDesc { lights: vec![light], ..SceneDesc::default() }).unwrap()
+}
+
+#[test]
+fn what_is_sampled_of_a_sky_beside_other_ways_is_all_of_it_with_the_density_of_what_escapes() {
+    const SIDE: u32 = 300;
+    let mut random = RandomStream::new(17);
+    for mapping in [EnvironmentMapping::EqualArea, EnvironmentMapping::LatitudeLongitude] {
+        let scene = sky(mapping);
+        let (mut whole, mut light, mut by_both, mut bright) = (0.0, 0.0, 0.0, 0);
+        for i in 0..SIDE * SIDE {
+            let jitter = DVec2::new(random.next_f64(), random.next_f64());
+            let u = (DVec2::new(f64::from(i % SIDE), f64::from(i / SIDE)) + jitter) / f64::from(SIDE);
+            let cosine = |towards: DVec3| towards.dot(DVec3::new(0.6, 0.0, 0.8)).max(0.0);
+            let share = 1.0 / f64::from(SIDE * SIDE);
+            // All directions alike.
+            let ray = Ray::new(DVec3::ONE, warp64::square_to_sphere(u));
+            let (radiance, pdf) = scene.escaped(&ray).next().unwrap();
+            assert!(radiance.is_black() || pdf > 0.0);
+            let sphere = 4.0 * std::f64::consts::PI;
+            whole += share * sphere * f64::from(pdf);
+            let arriving = f64::from(radiance.average()) * cosine(ray.direction);
+            light += share * sphere * arriving;
+            by_both += share * arriving / (f64::from(pdf) + 1.0 / sphere);
+            // And those that are sampled.
+            let Some(sample) = scene.sample_light(DVec3::ONE, 0.0, 0.5, u) else { continue };
+            let ray = Ray::new(DVec3::ONE, sample.towards);
+            let (radiance, pdf) = scene.escaped(&ray).next().unwrap();
+            let Scatter::Density(expected) = sample.scatter else { panic!("{sample:?}") };
+            assert!((pdf / expected - 1.0).abs() < 1e-3, "{pdf} {expected}");
+            assert!((radiance.average() / sample.radiance.average() - 1.0).abs() < 1e-3);
+            let arriving = f64::from(radiance.average()) * cosine(ray.direction);
+            by_both += share * arriving / (f64::from(pdf) + 1.0 / sphere);
+            bright += u32::from(sample.radiance.average() > 6.0);
+        }
+        assert!((whole - 1.0).abs() < 5e-3, "{mapping:?}: {whole}");
+        assert!((by_both / light - 1.0).abs() < 1e-2, "{mapping:?}: {by_both} {light}");
+        let one = |u| scene.sample_one_light(LightId(0), DVec3::ONE, 0.0, u);
+        let all =
+            (0..SIDE * SIDE).map(|i| DVec2::new(f64::from(i % SIDE), f64::from(i / SIDE)) / f64::from(SIDE));
+        let usual = all.filter_map(one).filter(|sample| sample.radiance.average() > 6.0).count() as u32;
+        assert!(bright * 10 > usual * 13, "{mapping:?}: {bright} {usual}");
+    }
+}
+
+#[test]
+fn a_sky_that_is_the_same_all_around_is_sampled_evenly() {
+    for mapping in [EnvironmentMapping::EqualArea, EnvironmentMapping::LatitudeLongitude] {
+        let image = Image::filled(18, 18, Rgb::splat(0.37));
+        let map = EnvironmentDesc { image: Arc::new(image), mapping };
+        let light = LightDesc::Infinite {
+            world_from_light: Transform::IDENTITY,
+            radiance: Rgb::splat(2.5),
+            image: Some(map),
+        };
+        let scene = Scene::build(SceneDesc { lights: vec![light], ..SceneDesc::default() }).unwrap();
+        let mut random = RandomStream::new(21);
+        for _ in 0..500 {
+            let direction = warp64::square_to_sphere(DVec2::new(random.next_f64(), random.next_f64()));
+            let ray = Ray::new(DVec3::ONE, direction);
+            let (_, pdf) = scene.escaped(&ray).next().unwrap();
+            // A row of the picture between circles of latitude is sampled evenly in the angle, which is not so even near the poles.
+            assert!(
+                direction.z.abs() > 0.8 || (f64::from(pdf) * 4.0 * std::f64::consts::PI - 1.0).abs() < 0.2,
+                "{direction} {pdf}"
+            );
+        }
+    }
 }

@@ -75,8 +75,11 @@ impl LightChoice {
     ) -> Option<LightSample> {
         let (sample, probability) = if choose < self.share_elsewhere {
             let choice = self.elsewhere.as_ref()?.sample(choose / self.share_elsewhere);
-            let light = &lights[self.elsewhere_ids[choice.index] as usize];
-            (light.sample(entries, from, time, u)?, self.share_elsewhere * choice.probability)
+            let sample = match &lights[self.elsewhere_ids[choice.index] as usize] {
+                Light::Environment(light) => light.sample_beside_others(u),
+                light => light.sample(entries, from, time, u),
+            };
+            (sample?, self.share_elsewhere * choice.probability)
         } else {
             let share = 1.0 - self.share_elsewhere;
             let chosen = self.tree.as_ref()?.choose(from, (choose - self.share_elsewhere) / share)?;
@@ -104,7 +107,11 @@ impl LightChoice {
         let Some(first) = self.firsts[id.0 as usize] else {
             let Ok(index) = self.elsewhere_ids.binary_search(&id.0) else { return 0.0 };
             let probability = self.elsewhere.as_ref().map_or(0.0, |choice| choice.probability(index));
-            return self.share_elsewhere * probability * light.pdf(ray, surface);
+            let density = match (light, surface) {
+                (Light::Environment(light), None) => light.pdf_beside_others(ray.direction),
+                _ => light.pdf(ray, surface),
+            };
+            return self.share_elsewhere * probability * density;
         };
         let Some(tree) = &self.tree else { return 0.0 };
         let probability =
