@@ -8,6 +8,15 @@ use super::tree::{Emitter, LightTree};
 use super::{Light, LightId, LightSample};
 use crate::surface::SurfaceEntry;
 
+/// Who asks for a sample of light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Company {
+    /// One who finds light by samples alone.
+    Alone,
+    /// One who finds light along rays of its own as well, and weighs both.
+    BesideOthers,
+}
+
 /// Chooses among all lights: those that stand somewhere by a tree, the others by power.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LightChoice {
@@ -62,7 +71,7 @@ impl LightChoice {
         choice
     }
 
-    /// A sample of a light that `choose` chooses for `from`, in a direction by `u`. Its density, or the radiance of a delta light,
+    /// A sample of a light that `choose` chooses for `from`, in a direction by `x` and `y`. Its density, or the radiance of a delta light,
     /// includes the probability of the choice.
     pub(crate) fn sample(
         &self,
@@ -70,13 +79,16 @@ impl LightChoice {
         entries: &[SurfaceEntry],
         from: DVec3,
         time: f64,
-        choose: f64,
-        u: DVec2,
+        [choose, x, y]: [f64; 3],
+        company: Company,
     ) -> Option<LightSample> {
+        let u = DVec2::new(x, y);
         let (sample, probability) = if choose < self.share_elsewhere {
             let choice = self.elsewhere.as_ref()?.sample(choose / self.share_elsewhere);
             let sample = match &lights[self.elsewhere_ids[choice.index] as usize] {
-                Light::Environment(light) => light.sample_beside_others(u),
+                Light::Environment(light) if company == Company::BesideOthers => {
+                    light.sample_beside_others(u)
+                }
                 light => light.sample(entries, from, time, u),
             };
             (sample?, self.share_elsewhere * choice.probability)
@@ -95,7 +107,8 @@ impl LightChoice {
         Some(sample.of_density(probability))
     }
 
-    /// The density per unit solid angle with which [`LightChoice::sample`] samples what a ray hit of a light: see [`Light::pdf`].
+    /// The density per unit solid angle with which [`LightChoice::sample`], beside others, samples what a ray hit of a light: see
+    /// [`Light::pdf`].
     pub(crate) fn pdf(
         &self,
         lights: &[Light],
