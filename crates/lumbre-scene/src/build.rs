@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use lumbre_geometry::{Aabb, BilinearPatch, PlacedShape, Shape};
-use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, Instance, Placement};
+use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, Instance, Placement, TriangleMesh};
 use lumbre_math::distribution::AliasTable;
 use lumbre_math::{DVec3, Elementary, Transform};
 use lumbre_shading::{Material, MaterialKind};
@@ -370,11 +370,11 @@ impl Builder {
             match &attributes.moving {
                 None => {
                     let id = self.push(entry, geometries, GeometryKind::Mesh(mesh.clone()))?;
-                    self.mesh_light(id, light, standing);
+                    self.mesh_light(id, light, &mesh, standing);
                 }
                 Some(moving) => {
                     let id = self.push(entry, geometries, GeometryKind::Custom(moving.mesh.clone()))?;
-                    self.mesh_light(id, light, &Standing::Anywhere);
+                    self.mesh_light(id, light, &mesh, &Standing::Anywhere);
                 }
             }
         }
@@ -442,14 +442,23 @@ impl Builder {
         self.area_light(id, Light::Shape(ShapeLight { entry: id, shape, power }), standing);
     }
 
-    fn mesh_light(&mut self, id: u32, light: Option<(MeshLight, f64)>, standing: &Standing) {
-        let Some(emission) = &self.entries[id as usize].emission else { return };
+    fn mesh_light(
+        &mut self,
+        id: u32,
+        light: Option<(MeshLight, f64)>,
+        mesh: &TriangleMesh,
+        standing: &Standing,
+    ) {
+        let entry = &self.entries[id as usize];
+        let Some(emission) = &entry.emission else { return };
         let Some((light, area)) = light else {
-            self.warnings.push(BuildWarning::Empty { shape: self.entries[id as usize].shape });
+            self.warnings.push(BuildWarning::Empty { shape: entry.shape });
             return;
         };
         let power = power(emission.mean(), emission.sides(), standing.area_factor() * area);
-        self.area_light(id, Light::Mesh(MeshLight { power, ..light }), standing);
+        let mut light = if entry.plain_emission().is_some() { light.with_rectangles(mesh) } else { light };
+        light.power = power;
+        self.area_light(id, Light::Mesh(light), standing);
     }
 
     fn area_light(&mut self, entry: u32, light: Light, standing: &Standing) {

@@ -6,7 +6,9 @@ mod delta;
 mod environment;
 mod mesh;
 mod moving;
+mod pairs;
 mod placed;
+mod rectangle;
 mod tree;
 
 use lumbre_geometry::{Aabb, Ray, Surface};
@@ -124,7 +126,7 @@ impl Light {
         }
     }
 
-    /// What a tree knows of it, triangle by triangle; nothing for lights that are everywhere, or that move.
+    /// What a tree knows of it, piece by piece; nothing for lights that are everywhere, or that move.
     pub(crate) fn emitters(&self, entries: &[SurfaceEntry]) -> Vec<Emitter> {
         let mean = |colour: Spectrum| f64::from(colour.average());
         let at =

@@ -11,7 +11,7 @@ use lumbre_shading::{FloatTexture, Spectrum};
 
 use crate::footprint::Spot;
 use crate::interaction::offset;
-use crate::light::choice::LightChoice;
+use crate::light::choice::{Company, LightChoice};
 use crate::light::{Light, LightId, LightSample};
 use crate::surface::{Form, ShadingGeometry, SurfaceEntry};
 use crate::{Camera, FilmDesc, FilterDesc, Footprint, GroundPlane, IntegratorDesc, Interaction, SamplerDesc};
@@ -268,8 +268,23 @@ impl Scene {
 
     /// A light sample for `from` at a time: a light chosen by `choose`, and a direction by `u`. Its density, or
     /// the radiance of a delta light, includes the probability of the light.
+    ///
+    /// It is for those who also find light along rays of their own and weigh both by [`Scene::light_pdf`] and [`Scene::escaped`]: of an
+    /// environment map it rarely samples what is dim. [`Scene::sample_light_alone`] is for those who do not.
     pub fn sample_light(&self, from: DVec3, time: f64, choose: f64, u: DVec2) -> Option<LightSample> {
-        self.light_choice.sample(&self.lights, &self.entries, from, time, choose, u)
+        self.light_choice.sample(
+            &self.lights,
+            &self.entries,
+            from,
+            time,
+            [choose, u.x, u.y],
+            Company::BesideOthers,
+        )
+    }
+
+    /// [`Scene::sample_light`] for those who find light in no other way.
+    pub fn sample_light_alone(&self, from: DVec3, time: f64, choose: f64, u: DVec2) -> Option<LightSample> {
+        self.light_choice.sample(&self.lights, &self.entries, from, time, [choose, u.x, u.y], Company::Alone)
     }
 
     /// A light chosen by power, with its probability; `None` without lights.

@@ -209,7 +209,12 @@ impl<'s, 'w> Walk<'s, 'w> {
     /// Adds one sample of the lights.
     fn add_sampled_light(&mut self, vertex: &Vertex<'_, 's>) {
         let (draw, depth) = (self.draw, self.depth);
-        let light = self.scene.sample_light(
+        let sample = match self.path.strategy {
+            Strategy::Lights => Scene::sample_light_alone,
+            Strategy::Both | Strategy::Bsdf => Scene::sample_light,
+        };
+        let light = sample(
+            self.scene,
             self.shadow_origin,
             self.ray.time,
             draw.light_choice(depth),

@@ -1,4 +1,4 @@
-//! The choice of a light, or of a triangle of one, for a place.
+//! The choice of a light, or of a piece of one, for a place.
 
 use lumbre_geometry::{Ray, Surface};
 use lumbre_math::distribution::AliasTable;
@@ -8,11 +8,20 @@ use super::tree::{Emitter, LightTree};
 use super::{Light, LightId, LightSample};
 use crate::surface::SurfaceEntry;
 
+/// Who asks for a sample of light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Company {
+    /// One who finds light by samples alone.
+    Alone,
+    /// One who finds light along rays of its own as well, and weighs both.
+    BesideOthers,
+}
+
 /// Chooses among all lights: those that stand somewhere by a tree, the others by power.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LightChoice {
     tree: Option<LightTree>,
-    /// The light of each emitter of the tree, and its triangle, if it is one of many.
+    /// The light of each emitter of the tree, and its piece, if it is one of many.
     emitters: Vec<(u32, Option<u32>)>,
     /// The first emitter of each light; `None` for those that are not in the tree.
     firsts: Vec<Option<u32>>,
@@ -44,7 +53,7 @@ impl LightChoice {
             }
             power += light.power(scene_radius);
             let is_mesh = matches!(light, Light::Mesh(_));
-            choice.emitters.extend((0..).zip(&found).map(|(triangle, _)| (id, is_mesh.then_some(triangle))));
+            choice.emitters.extend((0..).zip(&found).map(|(piece, _)| (id, is_mesh.then_some(piece))));
             all.extend(found);
         }
         choice.tree = LightTree::new(&all);
@@ -62,7 +71,7 @@ impl LightChoice {
         choice
     }
 
-    /// A sample of a light that `choose` chooses for `from`, in a direction by `u`. Its density, or the radiance of a delta light,
+    /// A sample of a light that `choose` chooses for `from`, in a direction by `x` and `y`. Its density, or the radiance of a delta light,
     /// includes the probability of the choice.
     pub(crate) fn sample(
         &self,
@@ -70,20 +79,26 @@ impl LightChoice {
         entries: &[SurfaceEntry],
         from: DVec3,
         time: f64,
-        choose: f64,
-        u: DVec2,
+        [choose, x, y]: [f64; 3],
+        company: Company,
     ) -> Option<LightSample> {
+        let u = DVec2::new(x, y);
         let (sample, probability) = if choose < self.share_elsewhere {
             let choice = self.elsewhere.as_ref()?.sample(choose / self.share_elsewhere);
-            let light = &lights[self.elsewhere_ids[choice.index] as usize];
-            (light.sample(entries, from, time, u)?, self.share_elsewhere * choice.probability)
+            let sample = match &lights[self.elsewhere_ids[choice.index] as usize] {
+                Light::Environment(light) if company == Company::BesideOthers => {
+                    light.sample_beside_others(u)
+                }
+                light => light.sample(entries, from, time, u),
+            };
+            (sample?, self.share_elsewhere * choice.probability)
         } else {
             let share = 1.0 - self.share_elsewhere;
             let chosen = self.tree.as_ref()?.choose(from, (choose - self.share_elsewhere) / share)?;
-            let (light, triangle) = self.emitters[chosen.emitter];
-            let sample = match (&lights[light as usize], triangle) {
-                (Light::Mesh(light), Some(triangle)) => {
-                    light.sample_triangle(&entries[light.entry as usize], triangle as usize, from, u)
+            let (light, piece) = self.emitters[chosen.emitter];
+            let sample = match (&lights[light as usize], piece) {
+                (Light::Mesh(light), Some(piece)) => {
+                    light.sample_piece(&entries[light.entry as usize], piece, from, u)
                 }
                 (light, _) => light.sample(entries, from, time, u),
             };
@@ -92,7 +107,8 @@ impl LightChoice {
         Some(sample.of_density(probability))
     }
 
-    /// The density per unit solid angle with which [`LightChoice::sample`] samples what a ray hit of a light: see [`Light::pdf`].
+    /// The density per unit solid angle with which [`LightChoice::sample`], beside others, samples what a ray hit of a light: see
+    /// [`Light::pdf`].
     pub(crate) fn pdf(
         &self,
         lights: &[Light],
@@ -104,15 +120,19 @@ impl LightChoice {
         let Some(first) = self.firsts[id.0 as usize] else {
             let Ok(index) = self.elsewhere_ids.binary_search(&id.0) else { return 0.0 };
             let probability = self.elsewhere.as_ref().map_or(0.0, |choice| choice.probability(index));
-            return self.share_elsewhere * probability * light.pdf(ray, surface);
+            let density = match (light, surface) {
+                (Light::Environment(light), None) => light.pdf_beside_others(ray.direction),
+                _ => light.pdf(ray, surface),
+            };
+            return self.share_elsewhere * probability * density;
         };
         let Some(tree) = &self.tree else { return 0.0 };
         let probability =
             |emitter: u32| (1.0 - self.share_elsewhere) * tree.probability(ray.origin, emitter as usize);
         match (light, surface) {
-            (Light::Mesh(light), Some((surface, triangle))) if (triangle as usize) < light.facets.len() => {
-                probability(first + triangle) * light.triangle_pdf(ray, surface, triangle)
-            }
+            (Light::Mesh(light), Some((surface, triangle))) => light
+                .piece_of(triangle)
+                .map_or(0.0, |piece| probability(first + piece) * light.piece_pdf(ray, surface, piece)),
             _ => probability(first) * light.pdf(ray, surface),
         }
     }

@@ -1,12 +1,14 @@
-//! Area lights of triangle meshes: a triangle is sampled by area, then a direction to it.
+//! Area lights of triangle meshes: a triangle, or a rectangle of two, is chosen by area, then a direction to it.
 
-use lumbre_geometry::{Aabb, DirectionSample, Ray, Surface, Triangle};
+use lumbre_geometry::{Aabb, Ray, Surface, Triangle};
 use lumbre_kernel::TriangleMesh;
 use lumbre_math::distribution::AliasTable;
 use lumbre_math::{DVec2, DVec3, Vec2};
 use lumbre_shading::{Scatter, Spectrum};
 
 use super::area::{intensity, side};
+use super::pairs::{Pair, pairs};
+use super::rectangle::Rectangle;
 use super::tree::{Emitter, Facing};
 use super::{LightPoint, LightSample, area};
 use crate::Emission;
@@ -17,15 +19,16 @@ use crate::surface::SurfaceEntry;
 pub struct MeshLight {
     pub(crate) entry: u32,
     pub(crate) power: f64,
-    pub(crate) by_area: AliasTable,
-    pub(crate) facets: Vec<Facet>,
+    by_area: AliasTable,
+    pieces: Vec<Piece>,
+    /// The piece of each triangle; nothing where each is one.
+    piece_of: Vec<u32>,
 }
 
-/// A triangle of the mesh, in the space of its tree, with data shared by its samples; without a shape it has no
-/// area.
+/// What is sampled at once, in the space of the mesh's tree, with data shared by its samples.
 #[derive(Clone, Debug)]
-pub(crate) struct Facet {
-    shape: Option<Triangle>,
+struct Piece {
+    form: Form,
     corner: DVec3,
     sides: [DVec3; 2],
     normal: DVec3,
@@ -37,86 +40,135 @@ pub(crate) struct Facet {
     error: DVec3,
 }
 
+#[derive(Clone, Debug)]
+enum Form {
+    /// Without area.
+    Nothing,
+    /// A triangle of this number.
+    Triangle(Triangle, u32),
+    /// Two triangles of a light that emits the same everywhere.
+    Rectangle(Rectangle),
+}
+
 /// From this many radii away, sampling by area is as good as by solid angle, and faster.
 const FAR: f64 = 2.0;
 
 impl MeshLight {
     /// `None` if no triangle has an area. Also returns the total area.
     pub(crate) fn new(entry: u32, mesh: &TriangleMesh) -> Option<(Self, f64)> {
-        let facets: Vec<Facet> = mesh.indices.iter().map(|&corners| Facet::new(mesh, corners)).collect();
-        let areas: Vec<f64> = facets.iter().map(|facet| facet.area).collect();
-        let total: f64 = areas.iter().sum();
-        let by_area = AliasTable::new(&areas)?;
-        Some((Self { entry, power: 0.0, by_area, facets }, total))
+        let pieces: Vec<Piece> = (0..mesh.indices.len() as u32).map(|i| Piece::triangle(mesh, i)).collect();
+        let total = pieces.iter().map(|piece| piece.area).sum();
+        Some((Self::of(entry, pieces, Vec::new())?, total))
+    }
+
+    fn of(entry: u32, pieces: Vec<Piece>, piece_of: Vec<u32>) -> Option<Self> {
+        let areas: Vec<f64> = pieces.iter().map(|piece| piece.area).collect();
+        Some(Self { entry, power: 0.0, by_area: AliasTable::new(&areas)?, pieces, piece_of })
+    }
+
+    /// The same with rectangles in place of the pairs of triangles that make one, for a light that emits the same everywhere.
+    pub(crate) fn with_rectangles(self, mesh: &TriangleMesh) -> Self {
+        let pairs = pairs(mesh);
+        if pairs.is_empty() {
+            return self;
+        }
+        let mut pieces = Vec::with_capacity(self.pieces.len() - pairs.len());
+        let mut piece_of = vec![None; self.pieces.len()];
+        for pair in pairs {
+            for triangle in pair.triangles {
+                piece_of[triangle as usize] = Some(pieces.len() as u32);
+            }
+            pieces.push(Piece::rectangle(&pair));
+        }
+        let piece_of = piece_of.into_iter().zip(&self.pieces).map(|(piece, triangle)| {
+            piece.unwrap_or_else(|| {
+                pieces.push(triangle.clone());
+                pieces.len() as u32 - 1
+            })
+        });
+        let piece_of = piece_of.collect();
+        Self::of(self.entry, pieces, piece_of).unwrap_or(self)
+    }
+
+    /// The piece of a triangle of the mesh; `None` beyond the last.
+    pub(super) fn piece_of(&self, triangle: u32) -> Option<u32> {
+        if self.piece_of.is_empty() {
+            return ((triangle as usize) < self.pieces.len()).then_some(triangle);
+        }
+        self.piece_of.get(triangle as usize).copied()
     }
 
     pub(super) fn sample(&self, entry: &SurfaceEntry, from: DVec3, u: DVec2) -> Option<LightSample> {
         let choice = self.by_area.sample(u.x);
-        let sample = self.sample_triangle(entry, choice.index, from, DVec2::new(choice.rest, u.y))?;
+        let sample = self.sample_piece(entry, choice.index as u32, from, DVec2::new(choice.rest, u.y))?;
         Some(sample.of_density(choice.probability))
     }
 
-    /// A sample of one triangle.
-    pub(super) fn sample_triangle(
+    /// A sample of one piece.
+    pub(super) fn sample_piece(
         &self,
         entry: &SurfaceEntry,
-        triangle: usize,
+        piece: u32,
         from: DVec3,
         u: DVec2,
     ) -> Option<LightSample> {
-        let facet = &self.facets[triangle];
-        if facet.is_far(from)
-            && let Some((emission, outward)) = entry.plain_emission()
-        {
-            return facet.sample_by_area(emission, outward, from, u);
-        }
-        let sample = match &facet.shape {
-            Some(shape) if !facet.is_far(from) => shape.sample_direction(from, u)?,
-            Some(shape) => {
-                let sample = shape.sample_area(u)?;
-                let pdf = per_solid_angle(facet.area, sample.surface.point - from, facet.normal)?;
-                DirectionSample { surface: sample.surface, pdf }
+        let piece = &self.pieces[piece as usize];
+        let plain = entry.plain_emission();
+        match (&piece.form, plain) {
+            (Form::Nothing, _) => None,
+            (Form::Rectangle(_), None) => None,
+            (_, Some((emission, outward))) => piece.sample(emission, outward, from, u),
+            (Form::Triangle(shape, triangle), None) => {
+                let (surface, pdf) = if piece.is_far(from) {
+                    let surface = shape.sample_area(u)?.surface;
+                    (surface, per_solid_angle(piece.area, surface.point - from, piece.normal)?)
+                } else {
+                    let sample = shape.sample_direction(from, u)?;
+                    (sample.surface, sample.pdf)
+                };
+                area::arriving(entry, &surface, *triangle, surface.uv, from, pdf)
             }
-            None => return None,
-        };
-        area::arriving(entry, &sample.surface, triangle as u32, sample.surface.uv, from, sample.pdf)
-    }
-
-    pub(super) fn pdf(&self, ray: &Ray, surface: &Surface, chosen: u32) -> f64 {
-        self.by_area.probability(chosen as usize) * self.triangle_pdf(ray, surface, chosen)
-    }
-
-    /// The density of [`MeshLight::sample_triangle`].
-    pub(super) fn triangle_pdf(&self, ray: &Ray, surface: &Surface, chosen: u32) -> f64 {
-        let Some(facet) = self.facets.get(chosen as usize) else { return 0.0 };
-        match &facet.shape {
-            Some(shape) if !facet.is_far(ray.origin) => shape.pdf_direction(ray, surface),
-            Some(_) => per_solid_angle(facet.area, surface.point - ray.origin, facet.normal).unwrap_or(0.0),
-            None => 0.0,
         }
     }
 
-    /// What a tree knows of every triangle.
+    pub(super) fn pdf(&self, ray: &Ray, surface: &Surface, triangle: u32) -> f64 {
+        let Some(piece) = self.piece_of(triangle) else { return 0.0 };
+        self.by_area.probability(piece as usize) * self.piece_pdf(ray, surface, piece)
+    }
+
+    /// The density of [`MeshLight::sample_piece`].
+    pub(super) fn piece_pdf(&self, ray: &Ray, surface: &Surface, piece: u32) -> f64 {
+        let piece = &self.pieces[piece as usize];
+        let by_area = || per_solid_angle(piece.area, surface.point - ray.origin, piece.normal).unwrap_or(0.0);
+        match &piece.form {
+            Form::Nothing => 0.0,
+            _ if piece.is_far(ray.origin) => by_area(),
+            Form::Triangle(shape, _) => shape.pdf_direction(ray, surface),
+            Form::Rectangle(shape) => {
+                shape.seen_from(ray.origin).map_or_else(by_area, |view| 1.0 / view.solid_angle)
+            }
+        }
+    }
+
+    /// What a tree knows of every piece.
     pub(super) fn emitters(&self, entry: &SurfaceEntry) -> Vec<Emitter> {
         let Some(emission) = &entry.emission else { return Vec::new() };
-        let total: f64 = self.facets.iter().map(|facet| facet.area).sum();
+        let total: f64 = self.pieces.iter().map(|piece| piece.area).sum();
         let strength = intensity(self.power, emission) / total;
         let side = side(entry);
-        let facets = self.facets.iter();
-        facets
-            .map(|facet| {
-                let [a, b] = facet.sides;
-                let bounds = Aabb::around([facet.corner, facet.corner + a, facet.corner + b]);
-                let facing = side.map_or(Facing::ANY, |side| Facing::side(side * facet.normal));
-                Emitter { bounds, facing, strength: strength * facet.area }
+        let pieces = self.pieces.iter();
+        pieces
+            .map(|piece| {
+                let facing = side.map_or(Facing::ANY, |side| Facing::side(side * piece.normal));
+                Emitter { bounds: Aabb::around(piece.corners()), facing, strength: strength * piece.area }
             })
             .collect()
     }
 }
 
-impl Facet {
-    fn new(mesh: &TriangleMesh, corners: [u32; 3]) -> Self {
-        let [a, b, c] = corners.map(|i| mesh.origin + mesh.positions[i as usize].as_dvec3());
+impl Piece {
+    fn triangle(mesh: &TriangleMesh, triangle: u32) -> Self {
+        let [a, b, c] = mesh.indices[triangle as usize].map(|i| corner(mesh, i));
         let shape = Triangle::new(a, b, c).ok().filter(|shape| shape.area() > 0.0);
         let area = shape.as_ref().map_or(0.0, Triangle::area);
         let center = (a + b + c) / 3.0;
@@ -126,7 +178,25 @@ impl Facet {
         let normal = shape.as_ref().map_or(DVec3::Z, |shape| {
             shape.surface_at(0, DVec2::splat(1.0 / 3.0)).map_or(DVec3::Z, |surface| surface.normal)
         });
-        Self { shape, corner: a, sides: [b - a, c - a], normal, area, center, reach_squared, error }
+        let form = shape.map_or(Form::Nothing, |shape| Form::Triangle(shape, triangle));
+        Self { form, corner: a, sides: [b - a, c - a], normal, area, center, reach_squared, error }
+    }
+
+    fn rectangle(pair: &Pair) -> Self {
+        let Pair { rectangle, corner, sides: [a, b], gap, .. } = *pair;
+        let cross = a.cross(b);
+        let (normal, area) = (cross.normalize(), cross.length());
+        let center = corner + 0.5 * (a + b);
+        let reach_squared = 0.25 * (a + b).length_squared().max((a - b).length_squared());
+        let error = 9.0 * f64::EPSILON * (corner.abs() + a.abs() + b.abs()) + gap;
+        let form = Form::Rectangle(rectangle);
+        Self { form, corner, sides: [a, b], normal, area, center, reach_squared, error }
+    }
+
+    fn corners(&self) -> impl Iterator<Item = DVec3> {
+        let [a, b] = self.sides;
+        let opposite = matches!(self.form, Form::Rectangle(_)).then_some(self.corner + a + b);
+        [self.corner, self.corner + a, self.corner + b].into_iter().chain(opposite)
     }
 
     #[inline]
@@ -134,32 +204,51 @@ impl Facet {
         (from - self.center).length_squared() > FAR * FAR * self.reach_squared
     }
 
-    /// A point uniform by area. The emissive side is determined by the normal, `outward` times the triangle's.
+    /// A sample of a piece that emits the same everywhere, on the side of its normal times `outward`.
     #[inline]
-    fn sample_by_area(
-        &self,
-        emission: &Emission,
-        outward: f64,
-        from: DVec3,
-        u: DVec2,
-    ) -> Option<LightSample> {
-        // The map of E. Heitz, "A low-distortion map between triangle and square", 2019.
-        let (b1, b2) = if u.y > u.x { (0.5 * u.x, u.y - 0.5 * u.x) } else { (u.x - 0.5 * u.y, 0.5 * u.y) };
-        let point = self.corner + b1 * self.sides[0] + b2 * self.sides[1];
-        let arm = point - from;
-        let front = outward * self.normal.dot(arm) < 0.0;
+    fn sample(&self, emission: &Emission, outward: f64, from: DVec3, u: DVec2) -> Option<LightSample> {
+        let front = outward * self.normal.dot(self.corner - from) < 0.0;
         let radiance = emission.at(front, Vec2::ZERO, Spectrum::WHITE);
         if radiance.is_black() {
             return None;
         }
-        let pdf = per_solid_angle(self.area, arm, self.normal)?;
+        let (point, pdf) = self.sample_point(from, u)?;
         Some(LightSample {
-            towards: arm.normalize(),
+            towards: (point - from).try_normalize()?,
             end: Some(LightPoint { point, error: self.error, normal: outward * self.normal }),
             radiance,
             scatter: Scatter::Density(pdf as f32),
         })
     }
+
+    /// A point, and its density per unit solid angle.
+    #[inline]
+    fn sample_point(&self, from: DVec3, u: DVec2) -> Option<(DVec3, f64)> {
+        let [a, b] = self.sides;
+        let at = |part: DVec2| self.corner + part.x * a + part.y * b;
+        let by_area = |part: DVec2| {
+            let point = at(part);
+            Some((point, per_solid_angle(self.area, point - from, self.normal)?))
+        };
+        let is_near = !self.is_far(from);
+        match &self.form {
+            Form::Nothing => None,
+            Form::Triangle(shape, _) if is_near => {
+                shape.sample_direction(from, u).map(|sample| (sample.surface.point, sample.pdf))
+            }
+            // The map of E. Heitz, "A low-distortion map between triangle and square", 2019.
+            Form::Triangle(..) if u.y > u.x => by_area(DVec2::new(0.5 * u.x, u.y - 0.5 * u.x)),
+            Form::Triangle(..) => by_area(DVec2::new(u.x - 0.5 * u.y, 0.5 * u.y)),
+            Form::Rectangle(shape) => match is_near.then(|| shape.seen_from(from)).flatten() {
+                Some(view) => Some((at(shape.sample(&view, u)), 1.0 / view.solid_angle)),
+                None => by_area(u),
+            },
+        }
+    }
+}
+
+fn corner(mesh: &TriangleMesh, vertex: u32) -> DVec3 {
+    mesh.origin + mesh.positions[vertex as usize].as_dvec3()
 }
 
 /// The density per unit solid angle of uniform sampling by area: distance² / (|cos θ| area). `None` when seen

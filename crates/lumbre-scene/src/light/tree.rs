@@ -7,7 +7,7 @@
 use lumbre_geometry::Aabb;
 use lumbre_math::DVec3;
 
-/// What the tree knows of a light, or of a triangle of one.
+/// What the tree knows of a light, or of a piece of one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Emitter {
     /// Where it is.
