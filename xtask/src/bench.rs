@@ -9,6 +9,7 @@ use clap::Subcommand;
 use xtask::command::{Profile, release_program, root, run_ours, succeeds};
 
 use crate::PassedOn;
+use crate::race::Race;
 
 /// What can be measured.
 #[derive(Subcommand)]
@@ -20,6 +21,9 @@ pub(crate) enum Bench {
     /// Time and peak memory of reading n, 2n and 4n of everything that a file can list: `growth --help`.
     #[command(disable_help_flag = true)]
     Growth(PassedOn),
+    /// Error against time on scenes of all kinds, beside Mitsuba 3, Cycles, LuxCore and pbrt-v4 where they are found: in Python
+    /// environments that MITSUBA_PYTHON, BPY_PYTHON and LUXCORE_PYTHON name or that --install made, and on the PATH.
+    Render(Race),
     /// The field of exact shapes, against POV-Ray where it is on the PATH.
     Field {
         /// A POV-Ray scene of the same field.
@@ -40,6 +44,7 @@ impl Bench {
         match self {
             Self::Kernel(passed) => run_ours("lumbre-bench", Profile::Release, &passed.arguments),
             Self::Growth(passed) => run_ours("lumbre-growth", Profile::Release, &passed.arguments),
+            Self::Render(race) => race.run(),
             Self::Field { pov, runs, threads } => field(pov.as_deref(), runs, threads),
         }
     }
