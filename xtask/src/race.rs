@@ -246,9 +246,10 @@ struct References {
 impl References {
     /// The picture that the noise of a program is measured against.
     fn of(&self, kind: Kind) -> &Picture {
+        let own = |of: Kind| self.own.iter().find(|(kind, _)| *kind == of).map(|(_, picture)| picture);
         // Both variants of Mitsuba compute the same.
-        let kind = if kind == Kind::MitsubaScalar { Kind::MitsubaLlvm } else { kind };
-        self.own.iter().find(|(of, _)| *of == kind).map_or(&self.common, |(_, picture)| picture)
+        let compiled = (kind == Kind::MitsubaScalar).then_some(Kind::MitsubaLlvm);
+        own(kind).or_else(|| own(compiled?)).unwrap_or(&self.common)
     }
 
     /// Renders them, or takes those of an earlier race of the same scene.

@@ -266,7 +266,7 @@ impl Program {
                     "none",
                     "-q",
                 ]);
-                run(command.args(["--threads", &self.threads.to_string()]))?;
+                run(command.args(["--strict", "--threads", &self.threads.to_string()]))?;
                 let stats: Value = serde_json::from_slice(&fs::read(stats)?)?;
                 let seconds =
                     stats["seconds"]["render"].as_f64().context("the statistics lack the seconds")?;

@@ -115,14 +115,14 @@ fn interior() -> Scene {
             metal([0.6, 0.6, 0.62], 0.25),
         );
     }
-    parts.add(Mesh::ball([0.0, 1.02, -1.0], 0.26, 5), metal([0.9, 0.65, 0.4], 0.12));
+    parts.add(Mesh::ball([0.0, 1.02, -1.0], 0.26, 5), metal([0.9, 0.65, 0.4], 0.2));
     parts.add(Mesh::ball([0.55, 0.88, -0.75], 0.12, 4), coated([0.1, 0.25, 0.5], 0.1));
     parts.add(Mesh::ball([-0.5, 0.88, -0.7], 0.12, 4), diffuse([0.7, 0.68, 0.6]));
     // A locker of steel, a screen of brass and a chest.
     parts.add(Mesh::block([-1.9, 0.8, -2.2], [0.5, 0.8, 0.45], 12.0), metal([0.55, 0.56, 0.58], 0.3));
-    parts.add(Mesh::block([1.9, 1.0, -2.2], [0.45, 1.0, 0.04], -35.0), metal([0.85, 0.7, 0.35], 0.18));
+    parts.add(Mesh::block([1.9, 1.0, -2.2], [0.45, 1.0, 0.04], -35.0), metal([0.85, 0.7, 0.35], 0.25));
     parts.add(Mesh::block([1.6, 0.3, 0.2], [0.45, 0.3, 0.35], 25.0), coated([0.2, 0.4, 0.25], 0.2));
-    parts.add_light(ceiling([-0.2, 0.2], 2.55, [-0.6, -0.2]), [70.0, 58.0, 42.0]);
+    parts.add_light(ceiling([-0.3, 0.3], 2.55, [-0.7, -0.1]), [31.0, 26.0, 19.0]);
     let camera = Camera { eye: [-0.6, 1.5, 3.2], target: [0.1, 0.95, -1.0], fov: 55.0 };
     let about = "A closed room with a small lamp: lacquer, rough metals and painted walls, so that most light has bounced.";
     parts.scene("interior", about, 12, camera)
