@@ -191,7 +191,7 @@ fn heat(
                     .render(spp, 1 + run, curve.sampler, &out)
                     .and_then(|cost| Ok((cost, Picture::read(&out)?)))
                     .and_then(|(cost, picture)| {
-                        Ok((cost, picture.relative_mse(references.of(curve.kind))?, picture.mean()))
+                        Ok((cost, picture.relative_mse(&references.of(curve.kind).picture)?, picture.mean()))
                     });
                 match rendered {
                     Ok((cost, error, mean)) => {
@@ -226,6 +226,7 @@ fn heat(
         about: scene.about,
         threads,
         curves,
+        noise: references.common.noise,
         agreement: references.agreement,
         own,
         notes,
@@ -237,16 +238,16 @@ fn heat(
 struct References {
     lumbre: Picture,
     /// The mean of Lumbre's and Mitsuba's where they tend to the same, else Lumbre's.
-    common: Picture,
+    common: Reference,
     /// Of programs whose materials are others.
-    own: Vec<(Kind, Picture)>,
+    own: Vec<(Kind, Reference)>,
     agreement: Option<Agreement>,
 }
 
 impl References {
     /// The picture that the noise of a program is measured against.
-    fn of(&self, kind: Kind) -> &Picture {
-        let own = |of: Kind| self.own.iter().find(|(kind, _)| *kind == of).map(|(_, picture)| picture);
+    fn of(&self, kind: Kind) -> &Reference {
+        let own = |of: Kind| self.own.iter().find(|(kind, _)| *kind == of).map(|(_, reference)| reference);
         // Both variants of Mitsuba compute the same.
         let compiled = (kind == Kind::MitsubaScalar).then_some(Kind::MitsubaLlvm);
         own(kind).or_else(|| own(compiled?)).unwrap_or(&self.common)
@@ -263,7 +264,7 @@ impl References {
         let [by_lumbre, by_mitsuba, by_itself] = extent.references;
         let with_mitsuba = programs.iter().any(|p| p.kind == Kind::MitsubaLlvm);
         let shared = with_mitsuba && Kind::MitsubaLlvm.agrees(scene);
-        let mut made: Vec<(Kind, Picture)> = Vec::new();
+        let mut made: Vec<(Kind, Reference)> = Vec::new();
         let mut failed = Vec::new();
         for program in programs.iter_mut() {
             let kind = program.kind;
@@ -277,7 +278,7 @@ impl References {
             };
             if let Some(spp) = spp {
                 match reference(program, scene, spp, folder) {
-                    Ok(picture) => made.push((kind, picture)),
+                    Ok(reference) => made.push((kind, reference)),
                     Err(error) if kind == Kind::Lumbre => return Err(error),
                     Err(error) => {
                         notes.push(format!("{} is left out: {error:#}", kind.name()));
@@ -287,7 +288,7 @@ impl References {
             }
         }
         programs.retain(|p| !failed.contains(&p.kind));
-        let take = |made: &mut Vec<(Kind, Picture)>, kind| {
+        let take = |made: &mut Vec<(Kind, Reference)>, kind| {
             made.iter().position(|(of, _)| *of == kind).map(|at| made.swap_remove(at).1)
         };
         let lumbre = take(&mut made, Kind::Lumbre).context("there is no reference by Lumbre")?;
@@ -295,23 +296,33 @@ impl References {
         let mut agreement = None;
         if let Some((_, mitsuba)) = made.iter().find(|(kind, _)| *kind == Kind::MitsubaLlvm) {
             agreement = Some(Agreement {
-                relative_mse: mitsuba.relative_mse(&lumbre)?,
-                brightness: mitsuba.mean() / lumbre.mean(),
+                relative_mse: mitsuba.picture.relative_mse(&lumbre.picture)?,
+                noise: mitsuba.noise + lumbre.noise,
+                brightness: mitsuba.picture.mean() / lumbre.picture.mean(),
             });
-            if shared {
-                let share = f64::from(by_mitsuba) / f64::from(by_mitsuba + by_lumbre);
-                common = lumbre.mixed(mitsuba, share);
+            if shared && mitsuba.noise + lumbre.noise > 0.0 {
+                // The share by which their mean has the least noise.
+                let share = lumbre.noise / (mitsuba.noise + lumbre.noise);
+                let noise = share * mitsuba.noise;
+                common = Reference { picture: lumbre.picture.mixed(&mitsuba.picture, share), noise };
             }
         }
         if shared {
             take(&mut made, Kind::MitsubaLlvm);
         }
-        Ok(Self { lumbre, common, own: made, agreement })
+        Ok(Self { lumbre: lumbre.picture, common, own: made, agreement })
     }
 }
 
-/// A reference by one program, kept in a file that is named after everything that it depends on.
-fn reference(program: &mut Program, scene: &Scene, spp: u32, folder: &Path) -> Result<Picture> {
+/// A picture with its relative mean squared error, by noise alone.
+#[derive(Clone)]
+struct Reference {
+    picture: Picture,
+    noise: f64,
+}
+
+/// A reference by one program, in two halves that tell its noise. They are kept in files that are named after all that they depend on.
+fn reference(program: &mut Program, scene: &Scene, spp: u32, folder: &Path) -> Result<Reference> {
     let mut hasher = DefaultHasher::new();
     write::pbrt(scene, 0).hash(&mut hasher);
     for object in &scene.objects {
@@ -321,14 +332,21 @@ fn reference(program: &mut Program, scene: &Scene, spp: u32, folder: &Path) -> R
         sky.pixels.iter().flatten().for_each(|x| x.to_bits().hash(&mut hasher));
     }
     let name = program.kind.name().to_lowercase().replace(' ', "-");
-    let file = folder.join(format!("reference-{name}-{spp}-{:016x}.pfm", hasher.finish()));
-    if !file.exists() {
-        println!("  reference by {} with {spp} samples", program.kind.name());
-        let unfinished = file.with_extension("part.pfm");
-        program.render(spp, 4242, program.kind.samplers()[0], &unfinished)?;
-        fs::rename(&unfinished, &file)?;
-    }
-    Picture::read(&file)
+    let mut half = |seed| {
+        let file = folder.join(format!("reference-{name}-{spp}-{seed}-{:016x}.pfm", hasher.finish()));
+        if !file.exists() {
+            println!("  half of a reference by {} with {spp} samples", program.kind.name());
+            let unfinished = file.with_extension("part.pfm");
+            program.render(spp / 2, seed, program.kind.samplers()[0], &unfinished)?;
+            fs::rename(&unfinished, &file)?;
+        }
+        Picture::read(&file)
+    };
+    let (a, b) = (half(4242)?, half(4243)?);
+    let picture = a.mixed(&b, 0.5);
+    // Each half has twice the variance of their mean, and they differ by that of both.
+    let noise = f64::midpoint(a.relative_mse(&picture)?, b.relative_mse(&picture)?);
+    Ok(Reference { picture, noise })
 }
 
 #[cfg(test)]

@@ -69,8 +69,8 @@ impl Kind {
 
     /// Whether it can show a scene at all.
     pub(crate) fn shows(self, scene: &Scene) -> bool {
-        // pbrt-v4 maps skies to a square in another way.
-        self != Self::Pbrt || scene.sky.is_none()
+        // pbrt-v4 maps skies to a square, and LuxCore turns them in a way that the race does not know yet.
+        scene.sky.is_none() || !matches!(self, Self::Pbrt | Self::Luxcore)
     }
 
     fn script(self) -> Option<Script> {

@@ -110,8 +110,8 @@ if SCENE["sky"]:
     tree = world.node_tree
     place = tree.nodes.new("ShaderNodeTexCoord")
     turn = tree.nodes.new("ShaderNodeMapping")
-    # The picture has z up: from y up.
-    turn.inputs["Rotation"].default_value = (math.radians(90), 0, 0)
+    # From y up to z up, and from -z in the middle of the picture to +x.
+    turn.inputs["Rotation"].default_value = (math.radians(90), 0, math.radians(-90))
     sky = tree.nodes.new("ShaderNodeTexEnvironment")
     sky.image = bpy.data.images.load(path(SCENE["sky"]))
     tree.links.new(place.outputs["Generated"], turn.inputs["Vector"])

@@ -65,16 +65,6 @@ for i, item in enumerate(SCENE["objects"]):
     material(f"m{i}", SCENE["materials"][item["material"]], item["emission"])
     give({f"scene.shapes.s{i}.type": "mesh", f"scene.shapes.s{i}.ply": path(item["ply"])})
     give({f"scene.objects.o{i}.shape": f"s{i}", f"scene.objects.o{i}.material": f"m{i}"})
-if SCENE["sky"]:
-    # From y up to z up.
-    give(
-        {
-            "scene.lights.sky.type": "infinite",
-            "scene.lights.sky.file": path(SCENE["sky"]),
-            "scene.lights.sky.gamma": 1.0,
-            "scene.lights.sky.transformation": [1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1],
-        }
-    )
 
 
 def render(spp, seed, _sampler):

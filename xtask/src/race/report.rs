@@ -19,6 +19,8 @@ pub(crate) struct Heat {
     pub(crate) about: &'static str,
     pub(crate) threads: usize,
     pub(crate) curves: Vec<Curve>,
+    /// The relative mean squared error of the reference of Lumbre's, by noise.
+    pub(crate) noise: f64,
     pub(crate) agreement: Option<Agreement>,
     /// The programs that were measured against references of their own.
     pub(crate) own: Vec<Kind>,
@@ -48,6 +50,8 @@ pub(crate) struct Curve {
 pub(crate) struct Agreement {
     /// The relative mean squared error between the two.
     pub(crate) relative_mse: f64,
+    /// As much of it as the noise of both makes.
+    pub(crate) noise: f64,
     /// The ratio of their means.
     pub(crate) brightness: f64,
 }
@@ -182,14 +186,17 @@ pub(crate) fn write(heats: &[Heat], ladder: &[u32], size: u32, folder: &Path) ->
         let title = format!("{}, {}", heat.scene, threads_text(heat.threads));
         fs::write(plots.join(heat.file()), svg(&title, &lines))?;
         let _ = writeln!(text, "### {title}\n\n{}\n", heat.about);
+        let _ = write!(text, "Noise of the reference: {:.1e}.", heat.noise);
         if let Some(agreement) = heat.agreement {
-            let _ = writeln!(
+            let _ = write!(
                 text,
-                "Mitsuba's reference beside Lumbre's: relative MSE {:.1e}, mean {:+.2} %.\n",
+                " Mitsuba's reference beside Lumbre's: relative MSE {:.1e}, of which the noise of both is {:.1e}; mean {:+.2} %.",
                 agreement.relative_mse,
+                agreement.noise,
                 100.0 * (agreement.brightness - 1.0)
             );
         }
+        text.push_str("\n\n");
         let _ =
             writeln!(text, "![{0}](race/{0}.png) ![Error against time](race/{1})\n", heat.scene, heat.file());
         text.push_str(&heat_table(heat, ladder));
