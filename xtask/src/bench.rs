@@ -8,7 +8,8 @@ use anyhow::{Context, Result, bail};
 use clap::Subcommand;
 use xtask::command::{Profile, release_program, root, run_ours, succeeds};
 
-use crate::PassedOn;
+use crate::race::Race;
+use crate::{PassedOn, field};
 
 /// What can be measured.
 #[derive(Subcommand)]
@@ -20,9 +21,12 @@ pub(crate) enum Bench {
     /// Time and peak memory of reading n, 2n and 4n of everything that a file can list: `growth --help`.
     #[command(disable_help_flag = true)]
     Growth(PassedOn),
+    /// Error against time on scenes of all kinds, beside Mitsuba 3, Cycles, LuxCore and pbrt-v4 where they are found: in Python
+    /// environments that MITSUBA_PYTHON, BPY_PYTHON and LUXCORE_PYTHON name or that --install made, and on the PATH.
+    Render(Race),
     /// The field of exact shapes, against POV-Ray where it is on the PATH.
     Field {
-        /// A POV-Ray scene of the same field.
+        /// A POV-Ray scene in place of the one that is written for it.
         #[arg(long)]
         pov: Option<PathBuf>,
         /// How often each program runs.
@@ -40,13 +44,14 @@ impl Bench {
         match self {
             Self::Kernel(passed) => run_ours("lumbre-bench", Profile::Release, &passed.arguments),
             Self::Growth(passed) => run_ours("lumbre-growth", Profile::Release, &passed.arguments),
-            Self::Field { pov, runs, threads } => field(pov.as_deref(), runs, threads),
+            Self::Render(race) => race.run(),
+            Self::Field { pov, runs, threads } => run_field(pov.as_deref(), runs, threads),
         }
     }
 }
 
 /// Times whole commands: reading, building, rendering and writing all count.
-fn field(pov: Option<&Path>, runs: usize, threads: usize) -> Result<()> {
+fn run_field(pov: Option<&Path>, runs: usize, threads: usize) -> Result<()> {
     let program = release_program()?;
     let folder = root().join("target").join("bench");
     std::fs::create_dir_all(&folder)?;
@@ -59,9 +64,11 @@ fn field(pov: Option<&Path>, runs: usize, threads: usize) -> Result<()> {
         command.args(["--spp", "3", "--threads", &threads_text, "--progress", "none", "-q"]);
         seconds(&mut command)
     };
-    let peer = pov.filter(|_| succeeds("povray", &["--version"]));
+    let ours = folder.join("field.pov");
+    std::fs::write(&ours, field::pov_scene())?;
+    let peer = succeeds("povray", &["--version"]).then_some(pov.unwrap_or(&ours));
     if peer.is_none() {
-        println!("POV-Ray is left out: it needs povray on the PATH and a scene by --pov");
+        println!("POV-Ray is left out: povray is not on the PATH");
     }
     let mut ratios = Vec::new();
     for turn in 0..runs {

@@ -11,6 +11,7 @@ mod check;
 mod field;
 mod pictures;
 mod proof;
+mod race;
 mod suite;
 
 #[derive(Parser)]

@@ -1,0 +1,219 @@
+//! A scene as plain data, which is written for every program from here.
+
+/// A colour, linear RGB of the sRGB primaries.
+pub(crate) type Rgb = [f64; 3];
+
+/// A point or a direction; y is up.
+pub(crate) type Point = [f64; 3];
+
+/// What is seen, and how.
+#[derive(Debug)]
+pub(crate) struct Scene {
+    /// A word; files are named after it.
+    pub(crate) name: &'static str,
+    /// What is in it, in a sentence.
+    pub(crate) about: &'static str,
+    /// The most bounces of a path: surfaces between the camera and the light.
+    pub(crate) bounces: u32,
+    pub(crate) camera: Camera,
+    pub(crate) materials: Vec<Material>,
+    pub(crate) objects: Vec<Object>,
+    pub(crate) sky: Option<Sky>,
+}
+
+/// A pinhole camera of a square picture.
+#[derive(Debug)]
+pub(crate) struct Camera {
+    pub(crate) eye: Point,
+    pub(crate) target: Point,
+    /// The field of view in degrees, along either side.
+    pub(crate) fov: f64,
+}
+
+/// Materials that all programs have, some more exactly than others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Material {
+    /// Lambert's.
+    Diffuse { reflectance: Rgb },
+    /// A rough conductor (GGX of width `alpha`) that reflects `reflectance` of the light that falls on it straight.
+    Metal { reflectance: Rgb, alpha: f64 },
+    /// A diffuse base under a rough dielectric boundary.
+    Coated { reflectance: Rgb, eta: f64, alpha: f64 },
+    /// A smooth dielectric.
+    Glass { eta: f64 },
+}
+
+/// A mesh of one material, which may shine.
+#[derive(Debug)]
+pub(crate) struct Object {
+    pub(crate) mesh: Mesh,
+    /// The place of its material in the scene's list.
+    pub(crate) material: usize,
+    /// The radiance that leaves its outer side.
+    pub(crate) emission: Option<Rgb>,
+}
+
+/// Flat triangles, counterclockwise from outside.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Mesh {
+    pub(crate) points: Vec<[f32; 3]>,
+    pub(crate) faces: Vec<[u32; 3]>,
+}
+
+/// Light from all around.
+#[derive(Debug)]
+pub(crate) struct Sky {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    /// Row by row from the zenith down; the middle of a row lies towards -z, and +x is a quarter to its right.
+    pub(crate) pixels: Vec<Rgb>,
+}
+
+impl Mesh {
+    /// A parallelogram or any other flat quadrilateral.
+    pub(crate) fn quad(corners: [Point; 4]) -> Self {
+        Self { points: corners.map(single).to_vec(), faces: vec![[0, 1, 2], [0, 2, 3]] }
+    }
+
+    /// A box turned about the upright axis through its centre.
+    pub(crate) fn block(centre: Point, half: [f64; 3], degrees: f64) -> Self {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let corner = |i: usize| {
+            let side = |axis: usize| if i >> axis & 1 == 1 { half[axis] } else { -half[axis] };
+            let (x, y, z) = (side(0), side(1), side(2));
+            single([centre[0] + cos * x + sin * z, centre[1] + y, centre[2] - sin * x + cos * z])
+        };
+        let sides = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        Self {
+            points: (0..8).map(corner).collect(),
+            faces: sides.iter().flat_map(|s| [[s[0], s[1], s[2]], [s[0], s[2], s[3]]]).collect(),
+        }
+    }
+
+    /// An icosahedron whose faces are cut in four `level` times: 20 * 4^level triangles on a sphere.
+    pub(crate) fn ball(centre: Point, radius: f64, level: u32) -> Self {
+        let golden = f64::midpoint(1.0, 5.0_f64.sqrt());
+        let mut directions: Vec<Point> = Vec::new();
+        for (a, b) in [(-1.0, golden), (1.0, golden), (-1.0, -golden), (1.0, -golden)] {
+            directions.extend([[a, b, 0.0], [0.0, a, b], [b, 0.0, a]]);
+        }
+        // Any three corners at the least distance are a face.
+        let near = |a: Point, b: Point| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>() < 4.1;
+        let mut triangles: Vec<[Point; 3]> = Vec::new();
+        for i in 0..12 {
+            for j in i + 1..12 {
+                for k in j + 1..12 {
+                    let [a, b, c] = [directions[i], directions[j], directions[k]];
+                    if near(a, b) && near(b, c) && near(c, a) {
+                        let outwards = dot(cross(minus(b, a), minus(c, a)), a) > 0.0;
+                        triangles.push(if outwards { [a, b, c] } else { [a, c, b] }.map(normalized));
+                    }
+                }
+            }
+        }
+        for _ in 0..level {
+            let middle = |a: Point, b: Point| normalized([a[0] + b[0], a[1] + b[1], a[2] + b[2]]);
+            triangles = triangles
+                .iter()
+                .flat_map(|&[a, b, c]| {
+                    let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+                    [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]
+                })
+                .collect();
+        }
+        let mut mesh = Self::default();
+        for triangle in triangles {
+            let first = mesh.points.len() as u32;
+            mesh.points.extend(triangle.map(|d| single(along(centre, radius, d))));
+            mesh.faces.push([first, first + 1, first + 2]);
+        }
+        mesh
+    }
+
+    /// A grid over [0,1]² that `place` bends: 2 * columns * rows triangles. Their outer side is that of ∂v × ∂u.
+    pub(crate) fn grid(columns: u32, rows: u32, place: impl Fn(f64, f64) -> Point) -> Self {
+        let mut mesh = Self::default();
+        for j in 0..=rows {
+            for i in 0..=columns {
+                mesh.points
+                    .push(single(place(f64::from(i) / f64::from(columns), f64::from(j) / f64::from(rows))));
+            }
+        }
+        for j in 0..rows {
+            for i in 0..columns {
+                let a = j * (columns + 1) + i;
+                let (b, c, d) = (a + 1, a + columns + 1, a + columns + 2);
+                mesh.faces.extend([[a, c, b], [b, c, d]]);
+            }
+        }
+        mesh
+    }
+
+    /// Adds the triangles of another mesh.
+    pub(crate) fn add(&mut self, other: &Self) {
+        let first = self.points.len() as u32;
+        self.points.extend(&other.points);
+        self.faces.extend(other.faces.iter().map(|face| face.map(|i| i + first)));
+    }
+}
+
+/// Random numbers by Steele, Lea and Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014.
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    /// Uniform in [0, 1).
+    pub(crate) fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut bits = self.0;
+        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((bits ^ (bits >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+pub(crate) fn normalized(v: Point) -> Point {
+    let length = dot(v, v).sqrt();
+    v.map(|x| x / length)
+}
+
+pub(crate) fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: Point, b: Point) -> Point {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn minus(a: Point, b: Point) -> Point {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn along(from: Point, distance: f64, direction: Point) -> Point {
+    [0, 1, 2].map(|k| from[k] + distance * direction[k])
+}
+
+fn single(p: Point) -> [f32; 3] {
+    p.map(|x| x as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Six times the volume that a closed mesh encloses: positive where its faces are counterclockwise from outside.
+    fn six_volumes(mesh: &Mesh) -> f64 {
+        let corner = |i: u32| mesh.points[i as usize].map(f64::from);
+        mesh.faces.iter().map(|&[a, b, c]| dot(corner(a), cross(corner(b), corner(c)))).sum()
+    }
+
+    #[test]
+    fn a_block_and_a_ball_have_their_volume_and_face_outwards() {
+        let block = Mesh::block([3.0, -2.0, 5.0], [0.5, 1.5, 2.5], 30.0);
+        assert!((six_volumes(&block) / 6.0 - 15.0).abs() < 1e-4, "{}", six_volumes(&block) / 6.0);
+        let ball = Mesh::ball([3.0, -2.0, 5.0], 2.5, 4);
+        assert_eq!(ball.faces.len(), 20 << 8);
+        let sphere = 4.0 / 3.0 * std::f64::consts::PI * 2.5_f64.powi(3);
+        let volume = six_volumes(&ball) / 6.0;
+        assert!(0.99 * sphere < volume && volume < sphere, "{volume} of {sphere}");
+    }
+}

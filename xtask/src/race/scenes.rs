@@ -1,0 +1,241 @@
+//! The scenes of the race, each drawn by a few lines.
+
+use super::scene::{Camera, Material, Mesh, Object, Point, Random, Rgb, Scene, Sky, dot, normalized};
+
+/// All of them.
+pub(crate) fn all() -> Vec<Scene> {
+    vec![cornell(), interior(), lights(), terrain(), glass(), coats()]
+}
+
+const WHITE: Material = Material::Diffuse { reflectance: [0.75, 0.75, 0.75] };
+
+/// Scenes are put together from materials and what is made of them.
+#[derive(Default)]
+struct Parts {
+    materials: Vec<Material>,
+    objects: Vec<Object>,
+}
+
+impl Parts {
+    fn add(&mut self, mesh: Mesh, material: Material) {
+        let material = self.material(material);
+        self.objects.push(Object { mesh, material, emission: None });
+    }
+
+    /// What shines is black itself, so that programs need not agree on what a lamp reflects.
+    fn add_light(&mut self, mesh: Mesh, radiance: Rgb) {
+        let material = self.material(Material::Diffuse { reflectance: [0.0; 3] });
+        self.objects.push(Object { mesh, material, emission: Some(radiance) });
+    }
+
+    fn material(&mut self, material: Material) -> usize {
+        self.materials.iter().position(|&m| m == material).unwrap_or_else(|| {
+            self.materials.push(material);
+            self.materials.len() - 1
+        })
+    }
+
+    fn scene(self, name: &'static str, about: &'static str, bounces: u32, camera: Camera) -> Scene {
+        Scene { name, about, bounces, camera, materials: self.materials, objects: self.objects, sky: None }
+    }
+}
+
+fn diffuse(reflectance: Rgb) -> Material {
+    Material::Diffuse { reflectance }
+}
+
+fn metal(reflectance: Rgb, alpha: f64) -> Material {
+    Material::Metal { reflectance, alpha }
+}
+
+fn coated(reflectance: Rgb, alpha: f64) -> Material {
+    Material::Coated { reflectance, eta: 1.5, alpha }
+}
+
+/// A horizontal rectangle that faces up.
+fn floor(x: [f64; 2], y: f64, z: [f64; 2]) -> Mesh {
+    Mesh::quad([[x[0], y, z[1]], [x[1], y, z[1]], [x[1], y, z[0]], [x[0], y, z[0]]])
+}
+
+/// A horizontal rectangle that faces down.
+fn ceiling(x: [f64; 2], y: f64, z: [f64; 2]) -> Mesh {
+    Mesh::quad([[x[0], y, z[0]], [x[1], y, z[0]], [x[1], y, z[1]], [x[0], y, z[1]]])
+}
+
+/// A rectangle that faces +z.
+fn back(x: [f64; 2], y: [f64; 2], z: f64) -> Mesh {
+    Mesh::quad([[x[0], y[0], z], [x[1], y[0], z], [x[1], y[1], z], [x[0], y[1], z]])
+}
+
+/// A rectangle that faces -z.
+fn front(x: [f64; 2], y: [f64; 2], z: f64) -> Mesh {
+    Mesh::quad([[x[1], y[0], z], [x[0], y[0], z], [x[0], y[1], z], [x[1], y[1], z]])
+}
+
+/// A rectangle that faces +x.
+fn left(x: f64, y: [f64; 2], z: [f64; 2]) -> Mesh {
+    Mesh::quad([[x, y[0], z[1]], [x, y[0], z[0]], [x, y[1], z[0]], [x, y[1], z[1]]])
+}
+
+/// A rectangle that faces -x.
+fn right(x: f64, y: [f64; 2], z: [f64; 2]) -> Mesh {
+    Mesh::quad([[x, y[0], z[0]], [x, y[0], z[1]], [x, y[1], z[1]], [x, y[1], z[0]]])
+}
+
+fn cornell() -> Scene {
+    let mut parts = Parts::default();
+    let side = [-1.0, 1.0];
+    parts.add(floor(side, -1.0, side), WHITE);
+    parts.add(ceiling(side, 1.0, side), WHITE);
+    parts.add(back(side, side, -1.0), WHITE);
+    parts.add(left(-1.0, side, side), diffuse([0.6, 0.06, 0.05]));
+    parts.add(right(1.0, side, side), diffuse([0.12, 0.42, 0.1]));
+    parts.add(Mesh::block([-0.35, -0.4, -0.3], [0.29, 0.6, 0.29], 18.0), WHITE);
+    parts.add(Mesh::block([0.35, -0.7, 0.35], [0.29, 0.3, 0.29], -17.0), WHITE);
+    parts.add_light(ceiling([-0.24, 0.24], 0.99, [-0.2, 0.2]), [18.0, 14.0, 8.0]);
+    let camera = Camera { eye: [0.0, 0.0, 3.9], target: [0.0, 0.0, 0.0], fov: 39.3 };
+    parts.scene("cornell", "The Cornell box: diffuse walls, two blocks, a lamp below the ceiling.", 7, camera)
+}
+
+fn interior() -> Scene {
+    let mut parts = Parts::default();
+    let (x, y, z) = ([-2.5, 2.5], [0.0, 2.6], [-3.0, 3.5]);
+    parts.add(floor(x, 0.0, z), coated([0.35, 0.22, 0.12], 0.15));
+    parts.add(ceiling(x, 2.6, z), WHITE);
+    parts.add(back(x, y, -3.0), diffuse([0.55, 0.6, 0.65]));
+    parts.add(front(x, y, 3.5), WHITE);
+    parts.add(left(-2.5, y, z), diffuse([0.6, 0.5, 0.35]));
+    parts.add(right(2.5, y, z), WHITE);
+    // A table of lacquer, with a kettle and two cups on it.
+    let lacquer = coated([0.5, 0.06, 0.05], 0.08);
+    parts.add(Mesh::block([0.1, 0.72, -0.9], [1.0, 0.04, 0.55], 0.0), lacquer);
+    for (dx, dz) in [(-0.9, -0.45), (0.9, -0.45), (-0.9, 0.45), (0.9, 0.45)] {
+        parts.add(
+            Mesh::block([0.1 + dx, 0.34, -0.9 + dz], [0.04, 0.34, 0.04], 0.0),
+            metal([0.6, 0.6, 0.62], 0.25),
+        );
+    }
+    parts.add(Mesh::ball([0.0, 1.02, -1.0], 0.26, 5), metal([0.9, 0.65, 0.4], 0.2));
+    parts.add(Mesh::ball([0.55, 0.88, -0.75], 0.12, 4), coated([0.1, 0.25, 0.5], 0.1));
+    parts.add(Mesh::ball([-0.5, 0.88, -0.7], 0.12, 4), diffuse([0.7, 0.68, 0.6]));
+    // A locker of steel, a screen of brass and a chest.
+    parts.add(Mesh::block([-1.9, 0.8, -2.2], [0.5, 0.8, 0.45], 12.0), metal([0.55, 0.56, 0.58], 0.3));
+    parts.add(Mesh::block([1.9, 1.0, -2.2], [0.45, 1.0, 0.04], -35.0), metal([0.85, 0.7, 0.35], 0.25));
+    parts.add(Mesh::block([1.6, 0.3, 0.2], [0.45, 0.3, 0.35], 25.0), coated([0.2, 0.4, 0.25], 0.2));
+    parts.add_light(ceiling([-0.3, 0.3], 2.55, [-0.7, -0.1]), [31.0, 26.0, 19.0]);
+    let camera = Camera { eye: [-0.6, 1.5, 3.2], target: [0.1, 0.95, -1.0], fov: 55.0 };
+    let about = "A closed room with a small lamp: lacquer, rough metals and painted walls, so that most light has bounced.";
+    parts.scene("interior", about, 12, camera)
+}
+
+fn lights() -> Scene {
+    let mut parts = Parts::default();
+    let mut random = Random(11);
+    parts.add(floor([-55.0, 55.0], 0.0, [-55.0, 55.0]), diffuse([0.5, 0.5, 0.5]));
+    let mut towers = Mesh::default();
+    for _ in 0..300 {
+        let place = [random.next() * 100.0 - 50.0, random.next() * 100.0 - 50.0];
+        let height = 0.5 + 2.5 * random.next();
+        let half = [0.4 + random.next(), height / 2.0, 0.4 + random.next()];
+        towers.add(&Mesh::block([place[0], height / 2.0, place[1]], half, 90.0 * random.next()));
+    }
+    parts.add(towers, diffuse([0.6, 0.55, 0.5]));
+    // A hundred rows of a hundred lamps that hang, in eight colours.
+    let mut lamps = vec![Mesh::default(); 8];
+    for i in 0..100 {
+        for j in 0..100 {
+            let x = f64::from(i) - 49.5 + 0.6 * (random.next() - 0.5);
+            let z = f64::from(j) - 49.5 + 0.6 * (random.next() - 0.5);
+            let y = 3.5 + 2.0 * random.next();
+            let size = 0.03 + 0.05 * random.next();
+            let colour = (random.next() * 8.0) as usize;
+            lamps[colour].add(&ceiling([x - size, x + size], y, [z - size, z + size]));
+        }
+    }
+    for (k, mesh) in lamps.into_iter().enumerate() {
+        let warmth = k as f64 / 7.0;
+        let power = 40.0 * 1.6_f64.powi(k as i32 % 4);
+        parts.add_light(mesh, [power, power * (0.9 - 0.3 * warmth), power * (0.8 - 0.6 * warmth)]);
+    }
+    let camera = Camera { eye: [-8.0, 9.0, 44.0], target: [2.0, 0.0, 14.0], fov: 50.0 };
+    parts.scene("lights", "A town under 10,000 small lamps of eight colours.", 3, camera)
+}
+
+fn terrain() -> Scene {
+    let mut parts = Parts::default();
+    parts.add(
+        Mesh::grid(1000, 500, |u, v| {
+            let (x, z) = (12.0 * u - 6.0, 9.0 * v - 7.5);
+            [x, height(x, z), z]
+        }),
+        diffuse([0.45, 0.38, 0.3]),
+    );
+    let camera = Camera { eye: [0.0, 2.2, 3.0], target: [0.0, 0.1, -2.0], fov: 45.0 };
+    let about = "Mountains of a million triangles under a sky with a low, soft sun.";
+    Scene { sky: Some(evening()), ..parts.scene("terrain", about, 5, camera) }
+}
+
+/// Waves, each half as long as the last, turned so that they do not line up.
+fn height(x: f64, z: f64) -> f64 {
+    let (mut x, mut z) = (x, z);
+    let (mut sum, mut size) = (0.0, 0.45);
+    for _ in 0..8 {
+        sum += size * (1.0 - 2.0 * (x * 0.9).sin().abs()) * (z * 0.8 + 0.5 * x.cos()).cos();
+        (x, z) = (1.56 * x - 1.25 * z + 1.3, 1.25 * x + 1.56 * z - 0.7);
+        size *= 0.48;
+    }
+    sum
+}
+
+fn evening() -> Sky {
+    let (width, height) = (1024, 512);
+    let sun = normalized([0.75, 0.38, -0.35]);
+    let mut pixels = Vec::with_capacity(width * height);
+    for row in 0..height {
+        let down = std::f64::consts::PI * (row as f64 + 0.5) / height as f64;
+        for column in 0..width {
+            let around = std::f64::consts::TAU * ((column as f64 + 0.5) / width as f64 - 0.5);
+            let towards: Point = [down.sin() * around.sin(), down.cos(), -down.sin() * around.cos()];
+            let up = towards[1].max(0.0);
+            let below = if towards[1] < 0.0 { 0.3 } else { 1.0 };
+            let glow = (40.0 * (dot(towards, sun) - 1.0)).exp();
+            let disc = (2500.0 * (dot(towards, sun) - 1.0)).exp();
+            let blue = [0.25 + 0.35 * (1.0 - up), 0.4 + 0.2 * (1.0 - up), 0.75 - 0.15 * (1.0 - up)];
+            let glowing = [1.6, 1.0, 0.5];
+            let shining = [1500.0, 1150.0, 700.0];
+            pixels.push([0, 1, 2].map(|k| below * blue[k] + glow * glowing[k] + disc * shining[k]));
+        }
+    }
+    Sky { width, height, pixels }
+}
+
+fn glass() -> Scene {
+    let mut parts = Parts::default();
+    let clear = Material::Glass { eta: 1.5 };
+    parts.add(floor([-6.0, 6.0], 0.0, [-6.0, 6.0]), diffuse([0.6, 0.6, 0.55]));
+    parts.add(back([-6.0, 6.0], [0.0, 6.0], -3.0), diffuse([0.35, 0.45, 0.6]));
+    parts.add(Mesh::ball([-1.25, 0.752, -0.4], 0.75, 4), clear);
+    parts.add(Mesh::ball([0.35, 0.552, 0.5], 0.55, 1), clear);
+    parts.add(Mesh::block([1.35, 0.702, -0.7], [0.4, 0.7, 0.4], 33.0), clear);
+    parts.add(Mesh::block([0.1, 0.252, -1.2], [0.25, 0.25, 0.25], 10.0), diffuse([0.7, 0.25, 0.15]));
+    parts.add_light(ceiling([-1.4, 1.0], 4.5, [-0.8, 1.6]), [14.0, 13.0, 11.0]);
+    let camera = Camera { eye: [0.0, 2.4, 5.2], target: [0.0, 0.55, 0.0], fov: 38.0 };
+    parts.scene("glass", "A ball, a gem and a block of clear glass, their shadows and caustics.", 12, camera)
+}
+
+fn coats() -> Scene {
+    let mut parts = Parts::default();
+    parts.add(floor([-8.0, 8.0], 0.0, [-8.0, 8.0]), diffuse([0.4, 0.4, 0.42]));
+    parts.add(back([-8.0, 8.0], [0.0, 8.0], -4.0), WHITE);
+    let colours = [[0.6, 0.08, 0.06], [0.1, 0.35, 0.12], [0.08, 0.16, 0.5], [0.65, 0.6, 0.5]];
+    let metals = [[0.95, 0.64, 0.54], [0.9, 0.75, 0.35], [0.92, 0.92, 0.9], [0.56, 0.57, 0.58]];
+    for (k, alpha) in [0.05, 0.12, 0.25, 0.45].into_iter().enumerate() {
+        let x = 1.3 * k as f64 - 1.95;
+        parts.add(Mesh::ball([x, 0.502, 0.8], 0.5, 5), coated(colours[k], alpha));
+        parts.add(Mesh::ball([x + 0.3, 0.602, -0.9], 0.6, 5), metal(metals[k], alpha));
+    }
+    parts.add_light(ceiling([-3.5, -1.5], 4.2, [0.0, 2.0]), [16.0, 15.0, 13.0]);
+    parts.add_light(ceiling([2.0, 2.6], 3.5, [1.2, 1.8]), [40.0, 48.0, 60.0]);
+    let camera = Camera { eye: [0.0, 2.3, 6.0], target: [0.0, 0.55, 0.0], fov: 40.0 };
+    parts.scene("coats", "Plastics and metals of growing roughness under two lamps.", 7, camera)
+}

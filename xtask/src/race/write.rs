@@ -1,0 +1,146 @@
+//! Scenes as files: meshes (.ply), the sky (.hdr), pbrt-v4 text, and JSON for the scripts of the other programs.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use anyhow::Result;
+use serde_json::{Value, json};
+
+use super::scene::{Material, Mesh, Scene, Sky};
+
+/// Writes `scene.pbrt`, `scene.json` and what they name into a folder.
+pub(crate) fn write_scene(scene: &Scene, size: u32, folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder)?;
+    for (i, object) in scene.objects.iter().enumerate() {
+        fs::write(folder.join(mesh_name(i)), ply(&object.mesh))?;
+    }
+    if let Some(sky) = &scene.sky {
+        fs::write(folder.join(SKY_NAME), hdr(sky))?;
+    }
+    fs::write(folder.join("scene.pbrt"), pbrt(scene, size))?;
+    fs::write(folder.join("scene.json"), serde_json::to_string_pretty(&description(scene, size))?)?;
+    Ok(())
+}
+
+const SKY_NAME: &str = "sky.hdr";
+
+fn mesh_name(object: usize) -> String {
+    format!("mesh-{object}.ply")
+}
+
+fn numbers(values: &[f64]) -> String {
+    values.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
+}
+
+/// The scene in the language of pbrt-v4.
+pub(crate) fn pbrt(scene: &Scene, size: u32) -> String {
+    let camera = &scene.camera;
+    // Film and camera of pbrt are left-handed: the mirror makes the picture the one of all other programs.
+    let mut out = format!(
+        "Film \"rgb\" \"integer xresolution\" {size} \"integer yresolution\" {size} \"string filename\" \"out.pfm\"\n\
+         PixelFilter \"box\" \"float xradius\" 0.5 \"float yradius\" 0.5\n\
+         Sampler \"zsobol\" \"integer pixelsamples\" 64\n\
+         Integrator \"path\" \"integer maxdepth\" {}\n\
+         Scale -1 1 1\n\
+         LookAt {}  {}  0 1 0\n\
+         Camera \"perspective\" \"float fov\" {}\n\
+         WorldBegin\n",
+        scene.bounces,
+        numbers(&camera.eye),
+        numbers(&camera.target),
+        camera.fov
+    );
+    if scene.sky.is_some() {
+        // Lumbre reads the picture with z up, -x in its middle and +y to the left of it.
+        let _ = writeln!(
+            out,
+            "AttributeBegin\n  ConcatTransform [0 0 1 0  -1 0 0 0  0 1 0 0  0 0 0 1]\n  \
+             LightSource \"infinite\" \"string filename\" \"{SKY_NAME}\"\nAttributeEnd"
+        );
+    }
+    for (i, material) in scene.materials.iter().enumerate() {
+        let parameters = match material {
+            Material::Diffuse { reflectance } => {
+                format!("\"string type\" \"diffuse\" \"rgb reflectance\" [{}]", numbers(reflectance))
+            }
+            Material::Metal { reflectance, alpha } => format!(
+                "\"string type\" \"conductor\" \"rgb reflectance\" [{}] \"float roughness\" {alpha} \"bool remaproughness\" false",
+                numbers(reflectance)
+            ),
+            Material::Coated { reflectance, eta, alpha } => format!(
+                "\"string type\" \"coateddiffuse\" \"rgb reflectance\" [{}] \"float eta\" {eta} \"float roughness\" {alpha} \
+                 \"bool remaproughness\" false",
+                numbers(reflectance)
+            ),
+            Material::Glass { eta } => format!("\"string type\" \"dielectric\" \"float eta\" {eta}"),
+        };
+        let _ = writeln!(out, "MakeNamedMaterial \"m{i}\" {parameters}");
+    }
+    for (i, object) in scene.objects.iter().enumerate() {
+        let _ = writeln!(out, "AttributeBegin\n  NamedMaterial \"m{}\"", object.material);
+        if let Some(radiance) = &object.emission {
+            let _ = writeln!(out, "  AreaLightSource \"diffuse\" \"rgb L\" [{}]", numbers(radiance));
+        }
+        let _ = writeln!(out, "  Shape \"plymesh\" \"string filename\" \"{}\"\nAttributeEnd", mesh_name(i));
+    }
+    out
+}
+
+/// The scene as the scripts read it.
+fn description(scene: &Scene, size: u32) -> Value {
+    let material = |material: &Material| match material {
+        Material::Diffuse { reflectance } => json!({"kind": "diffuse", "reflectance": reflectance}),
+        Material::Metal { reflectance, alpha } => {
+            json!({"kind": "metal", "reflectance": reflectance, "alpha": alpha})
+        }
+        Material::Coated { reflectance, eta, alpha } => {
+            json!({"kind": "coated", "reflectance": reflectance, "eta": eta, "alpha": alpha})
+        }
+        Material::Glass { eta } => json!({"kind": "glass", "eta": eta}),
+    };
+    let objects = scene.objects.iter().enumerate();
+    json!({
+        "size": size,
+        "bounces": scene.bounces,
+        "camera": {"eye": scene.camera.eye, "target": scene.camera.target, "fov": scene.camera.fov},
+        "materials": scene.materials.iter().map(material).collect::<Vec<_>>(),
+        "objects": objects
+            .map(|(i, o)| json!({"ply": mesh_name(i), "material": o.material, "emission": o.emission}))
+            .collect::<Vec<_>>(),
+        "sky": scene.sky.as_ref().map(|_| SKY_NAME),
+    })
+}
+
+/// The mesh as a binary, little-endian .ply.
+fn ply(mesh: &Mesh) -> Vec<u8> {
+    let mut out = format!(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+         element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        mesh.points.len(),
+        mesh.faces.len()
+    )
+    .into_bytes();
+    for x in mesh.points.as_flattened() {
+        out.extend(x.to_le_bytes());
+    }
+    for face in &mesh.faces {
+        out.push(3);
+        face.iter().for_each(|i| out.extend(i.to_le_bytes()));
+    }
+    out
+}
+
+/// The sky as a Radiance picture without run lengths: eight bits a channel and an exponent for all three.
+fn hdr(sky: &Sky) -> Vec<u8> {
+    let mut out =
+        format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {} +X {}\n", sky.height, sky.width).into_bytes();
+    for pixel in &sky.pixels {
+        let largest = pixel.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        let exponent = largest.log2().floor() as i32 + 1;
+        let scale = 256.0 / f64::from(exponent).exp2();
+        out.extend(pixel.map(|x| (x * scale) as u8));
+        out.push((exponent + 128).clamp(0, 255) as u8);
+    }
+    out
+}
