@@ -21,7 +21,7 @@
 
 use glam::Vec2;
 
-use crate::random::{PixelRandom, combine, mix};
+use crate::random::{combine, mix};
 
 /// The number of dimensions of the plain sequence.
 pub const DIMENSIONS: usize = 10;
@@ -163,27 +163,30 @@ impl OwenSobol {
     /// The 32 binary places of [`OwenSobol::get_1d`].
     #[inline]
     pub const fn bits_1d(&self, pixel: u64, index: u32, dimension: u32) -> u32 {
-        scrambled_1d(self.key(pixel, dimension), index, 0)
+        let key = self.key(pixel, dimension);
+        // The radical inverse of the shuffled index is the shuffled index before its last reversal, which the
+        // scramble would undo.
+        let shuffled = owen_scramble(index, key as u32);
+        reversed_scramble(shuffled, (key >> 32) as u32).reverse_bits()
     }
 
     /// The 32 binary places of [`OwenSobol::get_2d`].
     #[inline]
     pub const fn bits_2d(&self, pixel: u64, index: u32, dimension: u32) -> [u32; 2] {
-        scrambled_2d(self.key(pixel, dimension), index, [0, 0])
-    }
-
-    /// As [`OwenSobol::bits_1d`], where the samples of neighbouring pixels complement each other.
-    #[inline]
-    pub const fn block_bits_1d(&self, pixel: BlockPixel, index: u32, dimension: u32) -> u32 {
-        let key = self.key(pixel.block, dimension);
-        scrambled_1d(key, index, SHIFTS[pixel.place(key)][0])
-    }
-
-    /// As [`OwenSobol::bits_2d`], where the samples of neighbouring pixels complement each other.
-    #[inline]
-    pub const fn block_bits_2d(&self, pixel: BlockPixel, index: u32, dimension: u32) -> [u32; 2] {
-        let key = self.key(pixel.block, dimension);
-        scrambled_2d(key, index, SHIFTS[pixel.place(key)])
+        let key = self.key(pixel, dimension);
+        let scrambles = mix(key ^ 0x2d2d_2d2d);
+        let shuffled = owen_scramble(index, key as u32);
+        // The upper half of the second dimension, see `sobol_2d`.
+        let y = shuffled.reverse_bits();
+        let y = y ^ ((y & 0x5555_5555) << 1);
+        let y = y ^ ((y & 0x3333_3333) << 2);
+        let y = y ^ ((y & 0x0f0f_0f0f) << 4);
+        let y = y ^ ((y & 0x00ff_00ff) << 8);
+        let y = y ^ (y << 16);
+        [
+            reversed_scramble(shuffled, scrambles as u32).reverse_bits(),
+            owen_scramble(y, (scrambles >> 32) as u32),
+        ]
     }
 
     /// A point of the unit cube of `N` ≤ [`DIMENSIONS`] dimensions, well distributed in all of them jointly. It
@@ -203,95 +206,6 @@ impl OwenSobol {
         combine(self.seed ^ pixel, dimension as u64)
     }
 }
-
-/// The shuffled and scrambled radical inverse, shifted by a word.
-#[inline]
-const fn scrambled_1d(key: u64, index: u32, shift: u32) -> u32 {
-    // The radical inverse of the shuffled index is the shuffled index before its last reversal, which the
-    // scramble would undo.
-    let shuffled = owen_scramble(index, key as u32) ^ shift.reverse_bits();
-    reversed_scramble(shuffled, (key >> 32) as u32).reverse_bits()
-}
-
-/// The shuffled and scrambled first two dimensions, shifted by a word each.
-#[inline]
-const fn scrambled_2d(key: u64, index: u32, shifts: [u32; 2]) -> [u32; 2] {
-    let scrambles = mix(key ^ 0x2d2d_2d2d);
-    let shuffled = owen_scramble(index, key as u32);
-    // The upper half of the second dimension, see `sobol_2d`.
-    let y = shuffled.reverse_bits();
-    let y = y ^ ((y & 0x5555_5555) << 1);
-    let y = y ^ ((y & 0x3333_3333) << 2);
-    let y = y ^ ((y & 0x0f0f_0f0f) << 4);
-    let y = y ^ ((y & 0x00ff_00ff) << 8);
-    let y = y ^ (y << 16);
-    [
-        reversed_scramble(shuffled ^ shifts[0].reverse_bits(), scrambles as u32).reverse_bits(),
-        owen_scramble(y ^ shifts[1], (scrambles >> 32) as u32),
-    ]
-}
-
-/// A pixel of a block of 4 × 4, which has one sequence for each dimension.
-///
-/// Each pixel has all of the sequence, shifted by a digital word of its own, so that it is as even as in a pixel alone, and that the
-/// samples of 4 or 16 pixels are even together: the error of the image is of higher frequency. That is so for any number of
-/// samples, which need not be known, unlike in [`ZOrderSobol`]. In each dimension other pixels have other words.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BlockPixel {
-    block: u64,
-    // In the block.
-    x: u32,
-    y: u32,
-}
-
-impl BlockPixel {
-    /// The pixel in column `x` and row `y`.
-    pub const fn new(seed: u64, x: u32, y: u32) -> Self {
-        Self { block: PixelRandom::new(seed, x >> 2, y >> 2).key(), x: x & 3, y: y & 3 }
-    }
-
-    /// Which of the words the pixel has: by quarters of the block, then within them, both permuted.
-    #[inline]
-    const fn place(self, key: u64) -> usize {
-        let bits = mix(key ^ 0x1b1b_1b1b);
-        let upper =
-            PERMUTATIONS[(((bits >> 32) * 24) >> 32) as usize][(self.x >> 1 | self.y & 2) as usize] as usize;
-        let bits = mix(bits ^ (upper as u64 + 1));
-        let lower = PERMUTATIONS[(((bits >> 32) * 24) >> 32) as usize]
-            [(self.x & 1 | (self.y & 1) << 1) as usize] as usize;
-        upper << 2 | lower
-    }
-}
-
-/// The shifts of both dimensions for the pixels of a block.
-///
-/// They are linear in the four bits of the pixel's place. Binary place k of the words is by a mask of these bits, found by a search for
-/// masks with which 2ᵐ samples of 4 and of 16 pixels are (0, n, 2)-nets for as many m up to 7 and boxes as can be; not all can.
-const SHIFTS: [[u32; 2]; 16] = {
-    const MASKS: [[u32; 2]; 12] = [
-        [1, 6],
-        [14, 1],
-        [11, 3],
-        [13, 14],
-        [10, 9],
-        [15, 15],
-        [1, 10],
-        [2, 1],
-        [5, 3],
-        [13, 14],
-        [14, 6],
-        [5, 1],
-    ];
-    let mut shifts = [[0; 2]; 16];
-    let mut at = 0;
-    while at < 16 * 32 * 2 {
-        let (pixel, place, axis) = (at >> 6, at >> 1 & 31, at & 1);
-        let bit = (MASKS[place % 12][axis] & pixel as u32).count_ones() & 1;
-        shifts[pixel][axis] |= bit << (31 - place);
-        at += 1;
-    }
-    shifts
-};
 
 /// One Sobol sequence distributed over all pixels along a shuffled z-order curve, so that the samples of
 /// neighbouring pixels complement each other and the error of the image is mostly of high frequency.
@@ -403,62 +317,6 @@ const fn spread_bits(x: u64) -> u64 {
 mod tests {
     use super::*;
     use crate::random::RandomStream;
-
-    /// The mean squared error of the mean over some pixels of the part of the square under a line.
-    fn error_of_blocks(side: u32, samples: u32, point: impl Fn(u32, u32, u32) -> [u32; 2]) -> f64 {
-        let blocks = 400;
-        let errors = (0..blocks).map(|block| {
-            let (x, y) = (side * (block % 20), side * (block / 20));
-            let mut below = 0.0;
-            for at in 0..side * side * samples {
-                let (pixel, index) = (at / samples, at % samples);
-                let [u, v] = point(x + pixel % side, y + pixel / side, index).map(f64::from);
-                below += f64::from(u8::from(u + 0.6 * v < 3.0e9));
-            }
-            (below / f64::from(side * side * samples) - area_under_line()).powi(2)
-        });
-        errors.sum::<f64>() / f64::from(blocks)
-    }
-
-    /// The part of the unit square where u + 0.6 v is below that line.
-    fn area_under_line() -> f64 {
-        let line = 3.0e9 / 4_294_967_296.0;
-        // A trapezium: from `line` at v = 0 to `line` - 0.6 at v = 1.
-        line - 0.3
-    }
-
-    #[test]
-    fn the_samples_of_neighbouring_pixels_complement_each_other_for_any_number_of_them() {
-        let points = OwenSobol::new(5);
-        for (side, least) in [(2, 0.7), (4, 0.7)] {
-            for samples in [1, 2, 4, 8, 16] {
-                let together = error_of_blocks(side, samples, |x, y, i| {
-                    points.block_bits_2d(BlockPixel::new(9, x, y), i, 3)
-                });
-                let apart = error_of_blocks(side, samples, |x, y, i| {
-                    points.bits_2d(PixelRandom::new(9, x, y).key(), i, 3)
-                });
-                assert!(together < least * apart, "{side} {samples}: {together:e} {apart:e}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_pixel_of_a_block_is_as_even_as_one_alone() {
-        let points = OwenSobol::new(5);
-        for pixel in 0..16 {
-            let pixel = BlockPixel::new(3, 36 + pixel % 4, 8 + pixel / 4);
-            for (dimension, across) in [(0, 1), (3, 2), (11, 3), (20, 4), (21, 5)] {
-                let (mut cells, mut line) = ([0; 64], [0; 64]);
-                for index in 64..128 {
-                    let [x, y] = points.block_bits_2d(pixel, index, dimension);
-                    cells[(x >> (32 - across) << (6 - across) | y >> (26 + across)) as usize] += 1;
-                    line[(points.block_bits_1d(pixel, index, dimension) >> 26) as usize] += 1;
-                }
-                assert_eq!((cells, line), ([1; 64], [1; 64]));
-            }
-        }
-    }
 
     #[test]
     fn the_points_are_those_of_an_independent_implementation() {
@@ -697,7 +555,8 @@ mod tests {
             total
         };
         let blue = low_frequency(&|x, y, i| curve.get_2d(x, y, i, 2));
-        let white = low_frequency(&|x, y, i| own.get_2d(PixelRandom::new(9, x, y).key(), i, 2));
+        let white =
+            low_frequency(&|x, y, i| own.get_2d(crate::random::PixelRandom::new(9, x, y).key(), i, 2));
         assert!(blue > 0.0 && blue < 0.05 * white, "{blue} against {white}");
     }
 

@@ -3,13 +3,13 @@
 use lumbre_math::DVec2;
 use lumbre_math::Vec2;
 use lumbre_math::random::{PixelRandom, SampleRandom, combine, mix, uniform_f64};
-use lumbre_math::sobol::{BlockPixel, OwenSobol};
+use lumbre_math::sobol::OwenSobol;
 use lumbre_scene::{SamplerDesc, SamplerKind};
 
 /// The closed set of samplers.
 #[derive(Clone, Copy, Debug)]
 pub enum Sampler {
-    /// Owen-scrambled Sobol points: even over the samples of a pixel, and as far as the first vertex over those of its neighbours.
+    /// Owen-scrambled Sobol points: even over the samples of a pixel.
     Sobol {
         /// The points.
         points: OwenSobol,
@@ -34,8 +34,6 @@ const LIGHT_POINT: u32 = 1;
 const LOBE: u32 = 2;
 const DIRECTION: u32 = 3;
 const SURVIVAL: u32 = 4;
-/// The numbers below, up to the first vertex, are even over neighbouring pixels as well. Later ones gain next to nothing by it.
-const AMONG_NEIGHBOURS: u32 = FIRST_VERTEX + LABELS;
 /// Labels of integrators that ask every light of a vertex for a point.
 const EVERY_LIGHT: u32 = 1 << 24;
 /// Labels of distance samples in media.
@@ -59,8 +57,7 @@ impl Sampler {
     pub fn draw(&self, x: u32, y: u32, index: u32) -> Draw {
         match *self {
             Self::Sobol { points, seed } => {
-                let (pixel, block) = (PixelRandom::new(seed, x, y).key(), BlockPixel::new(seed, x, y));
-                Draw::Sobol { points, pixel, block, index }
+                Draw::Sobol { points, pixel: PixelRandom::new(seed, x, y).key(), index }
             }
             Self::Independent { seed } => {
                 Draw::Independent(PixelRandom::new(seed, x, y).sample(u64::from(index)))
@@ -78,8 +75,6 @@ pub enum Draw {
         points: OwenSobol,
         /// The hash of the pixel.
         pixel: u64,
-        /// The pixel among its neighbours.
-        block: BlockPixel,
         /// The sample.
         index: u32,
     },
@@ -118,9 +113,9 @@ impl Draw {
         let label = EVERY_LIGHT.wrapping_add(vertex.wrapping_mul(1 << 12)).wrapping_add(light);
         match *self {
             // The points of all samples of the pixel are one even set.
-            Self::Sobol { points: sobol, pixel, block, index } => {
+            Self::Sobol { points: sobol, pixel, index } => {
                 let index = index.wrapping_mul(points).wrapping_add(point);
-                Self::Sobol { points: sobol, pixel, block, index }.two(label)
+                Self::Sobol { points: sobol, pixel, index }.two(label)
             }
             Self::Independent(_) if point == 0 => self.two(label),
             Self::Independent(random) => {
@@ -170,10 +165,7 @@ impl Draw {
     #[inline]
     fn one(&self, label: u32) -> f64 {
         match self {
-            Self::Sobol { points, block, index, .. } if label < AMONG_NEIGHBOURS => {
-                fraction(points.block_bits_1d(*block, *index, label))
-            }
-            Self::Sobol { points, pixel, index, .. } => fraction(points.bits_1d(*pixel, *index, label)),
+            Self::Sobol { points, pixel, index } => fraction(points.bits_1d(*pixel, *index, label)),
             // Two labels each, so that pairs do not share a number.
             Self::Independent(random) => random.f64(label.wrapping_mul(2)),
         }
@@ -182,10 +174,7 @@ impl Draw {
     #[inline]
     fn two(&self, label: u32) -> DVec2 {
         match self {
-            Self::Sobol { points, block, index, .. } if label < AMONG_NEIGHBOURS => {
-                DVec2::from_array(points.block_bits_2d(*block, *index, label).map(fraction))
-            }
-            Self::Sobol { points, pixel, index, .. } => {
+            Self::Sobol { points, pixel, index } => {
                 DVec2::from_array(points.bits_2d(*pixel, *index, label).map(fraction))
             }
             Self::Independent(random) => {
@@ -284,16 +273,11 @@ mod tests {
     #[test]
     fn sobol_samples_of_a_pixel_are_even() {
         let sampler = Sampler::new(&SamplerDesc { kind: SamplerKind::Sobol, spp: None, seed: 9 });
-        // Among its neighbours, and alone.
-        for vertex in [0, 3] {
-            let (mut cells, mut line) = ([0; 64], [0; 64]);
-            for index in 64..128 {
-                let draw = sampler.draw(13, 2, index);
-                let u = draw.light_point(vertex);
-                cells[(u.x * 8.0) as usize * 8 + (u.y * 8.0) as usize] += 1;
-                line[(draw.light_choice(vertex) * 64.0) as usize] += 1;
-            }
-            assert_eq!((cells, line), ([1; 64], [1; 64]));
+        let mut cells = [0; 64];
+        for index in 64..128 {
+            let u = sampler.draw(13, 2, index).light_point(3);
+            cells[(u.x * 8.0) as usize * 8 + (u.y * 8.0) as usize] += 1;
         }
+        assert_eq!(cells, [1; 64]);
     }
 }
