@@ -155,7 +155,8 @@ pub fn render_from(
             stride = Some(side);
         }
     }
-    let mut done = owners.iter().map(|owner| owner.tile.least_taken()).min().unwrap_or(0).min(spp);
+    // What an earlier run took was told by it.
+    let mut done = if before > 0 { least_taken(&owners).min(spp) } else { 0 };
     while done < spp && stride == Some(1) {
         let end = next_count(done).min(spp);
         loop {
@@ -213,6 +214,11 @@ pub fn render_from(
         elapsed: start.elapsed(),
     };
     Ok((Rendered { stats, ..rendered }, state))
+}
+
+/// The samples of the pixel with the fewest.
+fn least_taken(owners: &[Owner]) -> u32 {
+    owners.iter().map(|owner| owner.tile.least_taken()).min().unwrap_or(0)
 }
 
 /// The number of samples at which a render next looks at its noise, and shows what there is: always the same, whatever came between.
