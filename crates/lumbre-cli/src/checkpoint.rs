@@ -45,7 +45,10 @@ pub(crate) struct PartArguments {
 /// `A..B`, without B.
 fn samples(text: &str) -> Result<Range<u32>, String> {
     let wrong = || {
-        "expected the first sample and the one after the last, such as 0..16 for the first sixteen".to_owned()
+        let count = if text.parse::<u32>().is_ok() { "; how many a pixel has is --spp" } else { "" };
+        format!(
+            "expected the first sample and the one after the last, such as 0..16 for the first sixteen{count}"
+        )
     };
     let (first, last) = text.split_once("..").ok_or_else(wrong)?;
     let range = first.parse().map_err(|_| wrong())?..last.parse().map_err(|_| wrong())?;

@@ -12,17 +12,7 @@ use crate::console::{escaped, has_colours};
 
 /// Words of other programs for an option.
 const OPTIONS: &[(&str, &[&str])] = &[
-    (
-        "--spp",
-        &[
-            "--samples",
-            "--samples-per-pixel",
-            "--pixel-samples",
-            "--pixelsamples",
-            "--num-samples",
-            "--quality",
-        ],
-    ),
+    ("--spp", &["--samples-per-pixel", "--pixel-samples", "--pixelsamples", "--num-samples", "--quality"]),
     ("--output", &["--out", "--outfile", "--output-file", "--image", "--save"]),
     ("--output-format", &["--format", "--file-format"]),
     ("--input-format", &["--input-type", "--type", "--from-format"]),
@@ -231,8 +221,8 @@ mod tests {
         let meaning = |option: &str| Some(Tip::Meaning(option.to_owned()));
         let spelling = |option: &str| Some(Tip::Spelling(option.to_owned()));
         for (command, wrong, expected) in [
-            ("render", "--samples", meaning("--spp")),
-            ("render", "--samplse", meaning("--spp")),
+            ("render", "--pixel-samples", meaning("--spp")),
+            ("render", "--samplse", spelling("--samples")),
             ("render", "--resolution", meaning("--size")),
             ("render", "--camera-position", meaning("--eye")),
             ("render", "-j", meaning("--threads")),
