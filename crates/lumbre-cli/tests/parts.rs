@@ -189,6 +189,27 @@ fn a_finished_picture_takes_more_samples() {
     assert!(!folder.names().iter().any(|name| name.ends_with(".lock") || name == "eleven.exr.checkpoint"));
 }
 
+#[test]
+fn a_picture_says_what_it_depends_on() {
+    let folder = folder();
+    let says =
+        |name: &str, what: &str| bytes(&folder, name).windows(what.len()).any(|here| here == what.as_bytes());
+    for name in ["a.exr", "a.png"] {
+        done(&folder, &format!("render scene.pbrt -o {name} --spp 2 --seed 77"));
+        for what in
+            ["lumbreVersion", "lumbreScene", "lumbreSeed", "77", "lumbreSamples", "0..2", "lumbreCamera"]
+        {
+            assert!(says(name, what), "{name}: {what}");
+        }
+        assert!(!says(name, "lumbreCommand"));
+        let first = bytes(&folder, name);
+        done(&folder, &format!("render scene.pbrt -o {name} --spp 2 --seed 77 --threads 1"));
+        assert_eq!(bytes(&folder, name), first, "{name}");
+        done(&folder, &format!("render scene.pbrt -o {name} --spp 2 --seed 77 --metadata full"));
+        assert!(says(name, "lumbreCommand") && says(name, "--metadata full"), "{name}");
+    }
+}
+
 #[cfg(unix)]
 mod interrupted {
     use std::process::Stdio;
