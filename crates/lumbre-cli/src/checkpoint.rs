@@ -73,8 +73,12 @@ impl PartArguments {
     ///
     /// # Errors
     /// [`Failure::Usage`].
-    pub(crate) fn check(&self, output: &Path, spp: Option<u32>) -> Result<(), Failure> {
+    pub(crate) fn check(&self, scene: &[PathBuf], output: &Path, spp: Option<u32>) -> Result<(), Failure> {
         let name = output.display();
+        if self.is_asked() && scene.iter().any(|path| is_standard_stream(path)) {
+            let why = "-: a part or a checkpoint is of a scene that can be read again (expected a file)";
+            return Err(Failure::Usage(why.to_owned()));
+        }
         if let (Some(samples), Some(spp)) = (&self.samples, spp)
             && samples.end > spp
         {

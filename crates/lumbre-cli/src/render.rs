@@ -502,7 +502,7 @@ fn picture(
     let named = arguments.named(&output);
     check_format(&named, !arguments.aov.is_empty())?;
     arguments.staging.check(Some(&named))?;
-    arguments.parts.check(&named, arguments.spp)?;
+    arguments.parts.check(&arguments.scene, &named, arguments.spp)?;
     let is_piped = is_standard_stream(&output);
     let output = number.map_or(named.to_path_buf(), |number| staging::frame_name(&output, number));
     for path in std::iter::once(&output).filter(|_| !is_piped).chain(&arguments.stats) {
@@ -585,8 +585,9 @@ fn picture(
     let mut settings = arguments.settings();
     settings.push(("picture".to_owned(), format!("{number:?}")));
     let (job_options, shown) = (options.clone(), arguments.shown(&behind, tone_map, exposure, precision));
+    // Files that cannot be read again, such as standard input, leave the render without an identity.
     let job = move || {
-        let files = files.iter().map(PathBuf::as_path).filter(|path| !is_standard_stream(path));
+        let files = files.iter().map(PathBuf::as_path);
         Ok(Job { shown, ..Job::new(files, settings, &job_options)? })
     };
     let (checkpoint, state) =

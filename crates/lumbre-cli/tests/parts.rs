@@ -134,6 +134,10 @@ fn what_is_missing_doubled_foreign_or_damaged_is_refused_by_name() {
         "expected a name that ends in .exr or .part",
     );
     refused(&folder, "render scene.pbrt -o a.part", 2, "expected --samples, too");
+    let piped = fs::File::open(folder.path("scene.pbrt")).unwrap();
+    let mut command = folder.command(&["render", "-", "-o", "a.part", "--samples", "0..3"]);
+    let (status, said) = answer(command.stdin(piped).output().unwrap());
+    assert!(status == 2 && said.contains("of a scene that can be read again"), "{said}");
     refused(&folder, "render scene.pbrt -o a.part --samples 3..3", 2, "the one after the last");
     refused(&folder, "render scene.pbrt -o a.part --samples 0..3 --noise 0.1", 2, "cannot be used with");
     let part = bytes(&folder, "a.part");

@@ -286,11 +286,9 @@ pub(super) fn encode(layers: &Layers, options: &WriteOptions) -> std::io::Result
     if let Some(denoiser) = options.denoiser {
         attributes.other.insert(Text::from("denoiser"), AttributeValue::Text(Text::from(denoiser)));
     }
-    for (name, text) in &options.metadata {
-        if let (Some(name), Some(text)) = (Text::new_or_none(name), Text::new_or_none(text)) {
-            attributes.other.insert(name, AttributeValue::Text(text));
-        }
-    }
+    // As one attribute: the crate writes several of one's own in any order, another each time.
+    let lines: Vec<String> = options.metadata.iter().map(|(name, text)| format!("{name}: {text}")).collect();
+    attributes.comments = Text::new_or_none(lines.join("\n")).filter(|_| !lines.is_empty());
     let layer = ExrLayer::new(size, attributes, encoding, AnyChannels::sort(channels));
     let display_size = Vec2(display.width as usize, display.height as usize);
     let mut picture_attributes =

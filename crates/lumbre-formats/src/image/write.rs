@@ -32,7 +32,7 @@ pub struct WriteOptions {
     pub exr_window: Option<(i32, i32, u32, u32)>,
     /// The denoiser that the image went through, for the metadata of EXR (attribute `denoiser`) and PNG (text `Denoiser`).
     pub denoiser: Option<&'static str>,
-    /// Further metadata by name, for EXR (attributes) and PNG (texts). Names are of letters and digits.
+    /// Further metadata by name, for EXR (lines of the attribute `comments`) and PNG (texts). Names are of letters and digits.
     pub metadata: Vec<(String, String)>,
 }
 
