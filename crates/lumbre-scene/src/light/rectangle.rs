@@ -1,6 +1,6 @@
 //! Rectangles, sampled uniformly by solid angle.
 
-use lumbre_math::{DVec2, DVec3};
+use lumbre_math::{DVec2, DVec3, Elementary, direction_at};
 
 /// A rectangle, or what is one up to rounding.
 ///
@@ -58,7 +58,7 @@ impl Rectangle {
         let [low_beyond, high_beyond] =
             [least, greatest].map(|corner| corner_angle(DVec2::new(greatest.x, corner.y), height));
         let angle = product(product(high_beyond, low), conjugate(product(low_beyond, high)));
-        let angle = angle.y.atan2(angle.x);
+        let angle = angle.y.angle_from(angle.x);
         // A sum of angles, from 0 to a full turn.
         let solid_angle = if angle < 0.0 { angle + std::f64::consts::TAU } else { angle };
         let range = LEAST_SOLID_ANGLE..std::f64::consts::TAU - LEAST_SOLID_ANGLE;
@@ -74,7 +74,7 @@ impl Rectangle {
         let (y0, y1) = (least.y, greatest.y);
         let (reach0, reach1) = ((y0 * y0 + squared).sqrt(), (y1 * y1 + squared).sqrt());
         // The part from the least x to this one has u.x of the solid angle.
-        let turned = product(DVec2::from_angle(u.x * solid_angle), product(high, conjugate(low)).normalize());
+        let turned = product(direction_at(u.x * solid_angle), product(high, conjugate(low)).normalize());
         let f = (y1 / reach1 - turned.x * (y0 / reach0)) / turned.y;
         let over = (f * f - squared / (reach0 * reach0)).max(0.0).sqrt();
         // Not `clamp`, which would keep a NaN.
