@@ -127,7 +127,8 @@ pub fn render_from(
     };
     let hand_over = |owners: &[Owner]| {
         if let (Some(keeper), Some(pause)) = (keeper, &job.pause) {
-            (keeper.keep)(state_of(owners, bounds, extras, options));
+            let copies = owners.iter().map(Owner::clone).collect();
+            (keeper.keep)(state_of(copies, bounds, options));
             pause.start_again();
         }
     };
@@ -195,11 +196,10 @@ pub fn render_from(
     }
 
     progress.stopped(stride);
-    let state = state_of(&owners, bounds, extras, options);
-    if let Some(side) = stride.filter(|side| *side > 1) {
-        spread(&mut owners, bounds.width().div_ceil(TILE) as usize, side);
-    }
-    let rendered = rendered_of(owners.iter().map(|owner| &owner.tile), bounds, options.transparent, extras);
+    let spread = stride.filter(|side| *side > 1).map(|side| spread(&owners, bounds, side));
+    let state = state_of(owners, bounds, options);
+    let shown = spread.as_ref().unwrap_or(&state.tiles);
+    let rendered = rendered_of(shown.iter(), bounds, options.transparent, extras);
     let stats = Stats {
         spp: done,
         stride,
@@ -208,7 +208,7 @@ pub fn render_from(
         rays: state.rays,
         dropped: state.dropped,
         first_dropped: state.first_dropped.clone(),
-        noise: noise(owners.iter().map(|owner| &owner.tile)),
+        noise: noise(state.tiles.iter()),
         threads: workers.count(),
         refused_threads: workers.refused(),
         elapsed: start.elapsed(),
@@ -248,29 +248,28 @@ fn owners_of(
     first_sample: u32,
 ) -> Result<Vec<Owner>, RenderError> {
     let is_same = state.bounds() == bounds
-        && state.film.extras() == extras
+        && state.extras() == extras
         && state.pieces.iter().all(|piece| piece.bounds == bounds)
         && state.pieces.len() == 1
         && state.pieces[0].samples.start == first_sample;
     if !is_same {
         return Err(RenderError::OtherState);
     }
-    let tile = |tile| Owner::new(state.film.placed_in(tile));
+    let film = state.film();
+    let tile = |tile| Owner::new(film.placed_in(tile));
     let mut owners: Vec<Owner> = bounds.tiles(TILE).into_iter().map(tile).collect();
     if let Some(owner) = owners.first_mut() {
         (owner.rays, owner.dropped) = (state.rays, state.dropped);
-        owner.first_dropped = state.first_dropped;
+        owner.first_dropped.clone_from(&state.first_dropped);
     }
     Ok(owners)
 }
 
 /// What the owners gathered.
-fn state_of(owners: &[Owner], bounds: PixelBounds, extras: Extras, options: &RenderOptions) -> RenderState {
-    let mut film = Tile::new(bounds, extras);
-    owners.iter().for_each(|owner| film.take(&owner.tile));
+fn state_of(owners: Vec<Owner>, bounds: PixelBounds, options: &RenderOptions) -> RenderState {
     let mut rays = RayCounts::default();
     let mut first_dropped: Vec<DroppedSample> = Vec::new();
-    for owner in owners {
+    for owner in &owners {
         rays += owner.rays;
         first_dropped.extend(&owner.first_dropped);
     }
@@ -279,25 +278,29 @@ fn state_of(owners: &[Owner], bounds: PixelBounds, extras: Extras, options: &Ren
     let first = options.first_sample;
     let wanted = options.stop.spp.max(1);
     RenderState {
-        film,
+        bounds,
         pieces: vec![Piece { bounds, samples: first..first.saturating_add(wanted) }],
         rays,
         dropped: owners.iter().map(|owner| owner.dropped).sum(),
         first_dropped,
+        tiles: owners.into_iter().map(|owner| owner.tile).collect(),
     }
 }
 
-/// Gives every pixel that has no sample that of its square of `side` by `side` pixels; the tiles stand in rows of `columns`.
-fn spread(owners: &mut [Owner], columns: usize, side: u32) {
+/// The tiles, in each of which every pixel that has no sample has that of its square of `side` by `side` pixels.
+fn spread(owners: &[Owner], bounds: PixelBounds, side: u32) -> Vec<Tile> {
+    let columns = bounds.width().div_ceil(TILE) as usize;
+    let mut tiles: Vec<Tile> = owners.iter().map(|owner| owner.tile.clone()).collect();
     if side > TILE {
         let step = (side / TILE) as usize;
-        let corners: Vec<Tile> = owners.iter().map(|owner| owner.tile.corner()).collect();
-        for (i, owner) in owners.iter_mut().enumerate() {
+        let corners: Vec<Tile> = tiles.iter().map(Tile::corner).collect();
+        for (i, tile) in tiles.iter_mut().enumerate() {
             let (column, row) = (i % columns, i / columns);
-            owner.tile.take_corner(&corners[(row - row % step) * columns + (column - column % step)]);
+            tile.take_corner(&corners[(row - row % step) * columns + (column - column % step)]);
         }
     }
-    owners.iter_mut().for_each(|owner| owner.tile.spread(side.min(TILE)));
+    tiles.iter_mut().for_each(|tile| tile.spread(side.min(TILE)));
+    tiles
 }
 
 /// What every tile needs and none changes.
@@ -343,6 +346,7 @@ impl Pause {
 }
 
 /// A tile and what its one owner counts.
+#[derive(Clone)]
 struct Owner {
     tile: Tile,
     /// The side of the smallest squares that the first pass has done.

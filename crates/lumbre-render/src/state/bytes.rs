@@ -37,7 +37,7 @@ impl RenderState {
         let mut out = Vec::new();
         let mut words = |words: &[u32]| words.iter().for_each(|word| out.extend(word.to_le_bytes()));
         words(&corners(self.bounds()));
-        let extras = self.film.extras();
+        let extras = self.extras();
         words(&[u32::from(extras.features), u32::from(extras.tints), u32::from(extras.guides)]);
         let mut pieces: Vec<&Piece> = self.pieces.iter().collect();
         pieces.sort_by_key(|piece| (piece.samples.start, piece.bounds.y0, piece.bounds.x0));
@@ -50,7 +50,7 @@ impl RenderState {
         self.first_dropped.iter().for_each(|d| words(&[d.x, d.y, d.sample]));
         let counts = [self.rays.camera, self.rays.bounce, self.rays.shadow, self.dropped];
         counts.into_iter().chain([extras.depth_unit.to_bits()]).for_each(|n| out.extend(n.to_le_bytes()));
-        let film = &self.film;
+        let film = self.film();
         planes(&mut out, film.pixels(), pixel_numbers);
         planes(&mut out, film.tints(), |tint| [tint.red, tint.blue].map(ExactSum::units));
         planes(&mut out, film.features(), feature_numbers);
@@ -111,7 +111,8 @@ impl RenderState {
         if !input.0.is_empty() {
             return Err(StateError::TooLong);
         }
-        Ok(Self { film, pieces, rays: RayCounts { camera, bounce, shadow }, dropped, first_dropped })
+        let rays = RayCounts { camera, bounce, shadow };
+        Ok(Self { bounds, tiles: vec![film], pieces, rays, dropped, first_dropped })
     }
 }
 
@@ -271,7 +272,8 @@ mod tests {
             film.add(x, y, &sample, &Exposure::default());
         }
         RenderState {
-            film,
+            bounds,
+            tiles: vec![film],
             pieces: vec![
                 Piece { bounds, samples: 4..9 },
                 Piece { bounds: PixelBounds { x1: 8, ..bounds }, samples: 0..4 },
@@ -287,7 +289,7 @@ mod tests {
         let state = state();
         let bytes = state.to_bytes();
         let back = RenderState::from_bytes(&bytes, u64::MAX).unwrap();
-        assert_eq!(back.film, state.film);
+        assert_eq!(back.film(), state.film());
         assert_eq!(back.to_bytes(), bytes);
         assert_eq!((back.rays, back.dropped), (state.rays, state.dropped));
         assert_eq!(back.first_dropped, state.first_dropped);

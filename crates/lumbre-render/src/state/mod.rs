@@ -2,9 +2,10 @@
 
 mod bytes;
 
+use std::borrow::Cow;
 use std::ops::Range;
 
-use crate::film::Tile;
+use crate::film::{Extras, Pixel, Tile};
 use crate::rendered::{noise, rendered_of};
 use crate::{DroppedSample, PixelBounds, RayCounts, Rendered, Stats};
 
@@ -16,8 +17,10 @@ pub use bytes::StateError;
 /// state of the whole, bit for bit, in whatever order and grouping they are merged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderState {
-    /// The sums of all pixels of the rectangle that holds all pieces.
-    pub(crate) film: Tile,
+    /// The rectangle that holds all pieces.
+    pub(crate) bounds: PixelBounds,
+    /// The sums of all its pixels: in one tile, or in many without overlaps.
+    pub(crate) tiles: Vec<Tile>,
     /// What was asked for.
     pub(crate) pieces: Vec<Piece>,
     /// What it took.
@@ -75,7 +78,28 @@ impl Piece {
 impl RenderState {
     /// The rectangle that holds all pixels of it.
     pub fn bounds(&self) -> PixelBounds {
-        self.film.bounds()
+        self.bounds
+    }
+
+    fn pixels(&self) -> impl Iterator<Item = &Pixel> {
+        self.tiles.iter().flat_map(Tile::pixels)
+    }
+
+    /// What is gathered besides colours.
+    pub(crate) fn extras(&self) -> Extras {
+        self.tiles.first().map(Tile::extras).unwrap_or_default()
+    }
+
+    /// All sums in one tile.
+    pub(crate) fn film(&self) -> Cow<'_, Tile> {
+        match &self.tiles[..] {
+            [tile] if tile.bounds() == self.bounds => Cow::Borrowed(tile),
+            tiles => {
+                let mut film = Tile::new(self.bounds, self.extras());
+                tiles.iter().for_each(|tile| film.take(tile));
+                Cow::Owned(film)
+            }
+        }
     }
 
     /// Which samples of which pixels it is to have, without overlaps, in the order that they were merged in.
@@ -85,7 +109,7 @@ impl RenderState {
 
     /// How many of these samples were taken.
     pub fn taken(&self) -> u64 {
-        self.film.pixels().iter().map(|pixel| u64::from(pixel.taken)).sum()
+        self.pixels().map(|pixel| u64::from(pixel.taken)).sum()
     }
 
     /// How many samples it is to have.
@@ -100,12 +124,12 @@ impl RenderState {
 
     /// The samples that the pixel with the fewest has.
     pub fn least_samples(&self) -> u32 {
-        self.film.pixels().iter().map(|pixel| pixel.taken).min().unwrap_or(0)
+        self.pixels().map(|pixel| pixel.taken).min().unwrap_or(0)
     }
 
     /// The samples that the pixel with the most has.
     pub fn most_samples(&self) -> u32 {
-        self.film.pixels().iter().map(|pixel| pixel.taken).max().unwrap_or(0)
+        self.pixels().map(|pixel| pixel.taken).max().unwrap_or(0)
     }
 
     /// The range of samples of all pixels, from the first of any to the last of any.
@@ -127,8 +151,7 @@ impl RenderState {
 
     /// The picture that it is, with coverage if it is to be transparent. Its statistics are those of the samples.
     pub fn to_rendered(&self, transparent: bool) -> Rendered {
-        let film = || std::iter::once(&self.film);
-        let rendered = rendered_of(film(), self.bounds(), transparent, self.film.extras());
+        let rendered = rendered_of(self.tiles.iter(), self.bounds, transparent, self.extras());
         let stats = Stats {
             spp: self.least_samples(),
             stride: (self.least_samples() > 0).then_some(1),
@@ -136,7 +159,7 @@ impl RenderState {
             rays: self.rays,
             dropped: self.dropped,
             first_dropped: self.first_dropped.clone(),
-            noise: noise(film()),
+            noise: noise(self.tiles.iter()),
             ..Stats::default()
         };
         Rendered { stats, ..rendered }
@@ -151,15 +174,18 @@ impl RenderState {
         if let Some(overlap) = self.pieces.iter().find_map(overlap) {
             return Err(MergeError::Overlap(overlap));
         }
-        let kind = |state: &Self| (state.film.features().is_empty(), state.film.tints().is_empty());
-        if kind(self) != kind(other) || self.film.depth_unit() != other.film.depth_unit() {
+        let (own, theirs) = (self.extras(), other.extras());
+        if own != theirs {
             return Err(MergeError::OtherExtras);
         }
-        if !self.film.guides().is_empty() || !other.film.guides().is_empty() {
+        if own.guides {
             return Err(MergeError::Guides);
         }
-        self.film.grow(self.bounds().hull(&other.bounds()));
-        self.film.merge(&other.film);
+        let mut film = self.film().into_owned();
+        self.bounds = self.bounds.hull(&other.bounds);
+        film.grow(self.bounds);
+        other.tiles.iter().for_each(|tile| film.merge(tile));
+        self.tiles = vec![film];
         self.pieces.extend(other.pieces.iter().cloned());
         self.rays += other.rays;
         self.dropped += other.dropped;
@@ -196,7 +222,7 @@ mod tests {
     use lumbre_math::random::RandomStream;
 
     use super::*;
-    use crate::film::{Exposure, Extras, FeatureSample, Sample};
+    use crate::film::{Exposure, FeatureSample, Sample};
 
     fn state(bounds: PixelBounds, samples: Range<u32>) -> RenderState {
         let extras = Extras { features: true, tints: true, depth_unit: 8.0, ..Extras::default() };
@@ -220,7 +246,14 @@ mod tests {
             }
         }
         let pieces = vec![Piece { bounds, samples }];
-        RenderState { film, pieces, rays: RayCounts::default(), dropped: 0, first_dropped: Vec::new() }
+        RenderState {
+            bounds,
+            tiles: vec![film],
+            pieces,
+            rays: RayCounts::default(),
+            dropped: 0,
+            first_dropped: Vec::new(),
+        }
     }
 
     const WHOLE: PixelBounds = PixelBounds { x0: 3, y0: 5, x1: 12, y1: 11 };
@@ -239,7 +272,7 @@ mod tests {
                 let into = random.next_below(parts.len());
                 parts[into].merge(&part).unwrap();
             }
-            assert_eq!(parts[0].film, whole.film);
+            assert_eq!(parts[0].film(), whole.film());
             assert!(parts[0].is_finished() && parts[0].gaps(WHOLE).is_empty());
         }
     }
@@ -259,7 +292,8 @@ mod tests {
         assert_eq!(missing, 2 * WHOLE.area() + 2 * left.area());
         assert_eq!(part.gaps(WHOLE).len(), gaps.len());
         assert!(gaps.contains(&Piece { bounds: left, samples: 5..7 }), "{gaps:?}");
-        let other = RenderState { film: Tile::new(WHOLE, Extras::default()), pieces: Vec::new(), ..before };
+        let other =
+            RenderState { tiles: vec![Tile::new(WHOLE, Extras::default())], pieces: Vec::new(), ..before };
         assert_eq!(part.merge(&other), Err(MergeError::OtherExtras));
     }
 }
