@@ -3,8 +3,8 @@
 use std::fs::{self, File};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -117,18 +117,57 @@ pub(crate) fn is_bare_part(path: &Path) -> bool {
 struct Identified(Mutex<Finding>);
 
 enum Finding {
-    Running(JoinHandle<Result<Job, lumbre::Error>>),
+    Running(Background<Result<Job, lumbre::Error>>),
     Done(Result<Job, String>),
+}
+
+/// Work on a thread of its own, or done at once where the system grants none.
+enum Background<T> {
+    Thread(JoinHandle<Option<T>>),
+    Done(Option<T>),
+}
+
+impl<T: Send + 'static> Background<T> {
+    fn start(name: &str, work: impl FnOnce() -> T + Send + 'static) -> Self {
+        // A thread that cannot be started would take its work along.
+        let work: Box<dyn FnOnce() -> T + Send> = Box::new(work);
+        let work = Arc::new(Mutex::new(Some(work)));
+        let theirs = work.clone();
+        let run = |work: &Mutex<Option<Box<dyn FnOnce() -> T + Send>>>| {
+            let work = work.lock().unwrap_or_else(PoisonError::into_inner).take();
+            work.map(|work| work())
+        };
+        let thread = std::thread::Builder::new().name(name.to_owned()).spawn(move || run(&theirs));
+        match thread {
+            Ok(thread) => Self::Thread(thread),
+            Err(_) => Self::Done(run(&work)),
+        }
+    }
+
+    fn is_finished(&self) -> bool {
+        match self {
+            Self::Thread(thread) => thread.is_finished(),
+            Self::Done(_) => true,
+        }
+    }
+
+    /// What came of it; `None` where it panicked.
+    fn join(self) -> Option<T> {
+        match self {
+            Self::Thread(thread) => thread.join().ok().flatten(),
+            Self::Done(done) => done,
+        }
+    }
 }
 
 impl Identified {
     fn get(&self) -> Result<Job, Failure> {
-        let mut finding = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut finding = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Finding::Running(_) = &*finding
             && let Finding::Running(thread) =
                 std::mem::replace(&mut *finding, Finding::Done(Err(String::new())))
         {
-            let found = thread.join().map_err(|_| "cannot hash the files of the scene".to_owned());
+            let found = thread.join().ok_or_else(|| "cannot hash the files of the scene".to_owned());
             *finding = Finding::Done(found.and_then(|job| job.map_err(|e| e.to_string())));
         }
         match &*finding {
@@ -153,7 +192,7 @@ pub(crate) struct Checkpoint {
     is_own: AtomicBool,
     /// Samples that a checkpoint of an earlier run has, which this one leaves alone as long as it has fewer.
     others: u64,
-    writing: Mutex<Option<JoinHandle<Result<(), lumbre::Error>>>>,
+    writing: Mutex<Option<Background<Result<(), lumbre::Error>>>>,
 }
 
 /// A lock on the name of a checkpoint.
@@ -210,8 +249,7 @@ impl Checkpoint {
             None if arguments.no_checkpoint || !is_file => None,
             None => Some(with_ending(output, "checkpoint")),
         };
-        let thread = std::thread::Builder::new().name("identity".to_owned()).spawn(job);
-        let thread = thread.map_err(|e| Failure::Io(format!("cannot start a thread: {e}")))?;
+        let thread = Background::start("identity", job);
         let mut checkpoint = Self {
             lock: None,
             path: kept,
@@ -324,17 +362,17 @@ impl Checkpoint {
     pub(crate) fn keep(&self, state: RenderState) {
         let is_due = self.is_asked || (self.start.elapsed() >= LONG && state.taken() > self.others);
         let (true, Some(path)) = (is_due, self.path.clone()) else { return };
-        let mut writing = self.writing.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        if writing.as_ref().is_some_and(|thread| !thread.is_finished()) {
+        let mut writing = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
+        if writing.as_ref().is_some_and(|writing| !writing.is_finished()) {
             return;
         }
-        if let Some(Ok(Err(error))) = writing.take().map(JoinHandle::join) {
+        if let Some(Err(error)) = writing.take().and_then(Background::join) {
             say!("warning: the checkpoint cannot be written: {error}");
         }
         let Ok(job) = self.identified.get() else { return };
         self.is_own.store(true, Ordering::Relaxed);
         let write = move || Part { job, state }.save(&path);
-        *writing = std::thread::Builder::new().name("checkpoint".to_owned()).spawn(write).ok();
+        *writing = Some(Background::start("checkpoint", write));
     }
 
     /// Ends with the last state: an unfinished render keeps it, a finished one only where a checkpoint was asked for.
@@ -342,7 +380,7 @@ impl Checkpoint {
     /// # Errors
     /// [`Failure::Io`] where the checkpoint cannot be written.
     pub(crate) fn end(&self, state: &RenderState, is_done: bool) -> Result<Option<&Path>, Failure> {
-        let thread = self.writing.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take();
+        let thread = self.writing.lock().unwrap_or_else(PoisonError::into_inner).take();
         if let Some(thread) = thread {
             // It is older than what is written now.
             let _ = thread.join();
