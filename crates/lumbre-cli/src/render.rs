@@ -600,17 +600,18 @@ fn picture(
     progress.display.finish();
     signals.enter(Phase::Saving);
     let is_done = !cancel.is_cancelled();
-    if let Some(path) = checkpoint.end(&state, is_done)?
-        && !is_done
-        && !arguments.quiet
-    {
-        say!("{} keeps what was rendered: --resume goes on from there", path.display());
+    match checkpoint.end(&state, is_done) {
+        Ok(Some(path)) if !is_done && !arguments.quiet => {
+            say!("{} keeps what was rendered: --resume goes on from there", path.display());
+        }
+        Ok(_) => {}
+        // The picture may be saved all the same.
+        Err(why) => say!("warning: the checkpoint cannot be written: {why}"),
     }
     check_whole(arguments, &picture, &output, signals.received())?;
     let denoised = match denoiser {
         // What is coarser than its pixels says nothing of noise.
         Some(denoiser) if picture.stats().stride == Some(1) => {
-            signals.enter(Phase::Saving);
             Some((denoiser.name(), denoiser.apply(&mut picture, options.threads)?))
         }
         _ => None,

@@ -277,6 +277,27 @@ mod interrupted {
     }
 
     #[test]
+    fn a_picture_is_saved_even_if_its_checkpoint_cannot_be() {
+        let folder = folder();
+        fs::create_dir(folder.path("out")).unwrap();
+        let render = format!("{RENDER} -o a.exr --checkpoint out/ck");
+        let arguments: Vec<&str> = render.split_whitespace().collect();
+        let child = folder.command(&arguments).stderr(Stdio::piped()).spawn().unwrap();
+        until_there(&folder, "out/ck");
+        // A checkpoint may be written while the folder is emptied.
+        while folder.path("out").exists() {
+            let _ = fs::remove_dir_all(folder.path("out"));
+        }
+        signal(child.id(), "INT");
+        let (status, said) = answer(child.wait_with_output().unwrap());
+        assert!(
+            status == 130 && said.contains("warning: the checkpoint cannot be written"),
+            "{status} {said}"
+        );
+        assert!(folder.path("a.exr").exists(), "{said}");
+    }
+
+    #[test]
     fn a_second_run_on_the_same_checkpoint_is_refused() {
         let folder = folder();
         let arguments: Vec<&str> =
