@@ -88,12 +88,12 @@ impl PartArguments {
             )));
         }
         let is = |ending: &str| output.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
-        if self.samples.is_some() && !is("exr") && !is("part") {
+        if self.samples.is_some() && !is("exr") && !is_bare_part(output) {
             return Err(Failure::Usage(format!(
                 "{name}: --samples makes a part (expected a name that ends in .exr or .part)"
             )));
         }
-        if self.samples.is_none() && is("part") {
+        if self.samples.is_none() && is_bare_part(output) {
             return Err(Failure::Usage(format!("{name}: a part has some samples (expected --samples, too)")));
         }
         if self.keep_sums && !is("exr") {
@@ -187,7 +187,7 @@ pub(crate) struct Checkpoint {
     start: Instant,
     identified: Identified,
     /// Held as long as the render runs, so that no other writes the same checkpoint.
-    lock: Option<Lock>,
+    _lock: Option<Lock>,
     /// Whether the file is of this very render, to be removed when it is done.
     is_own: AtomicBool,
     /// Samples that a checkpoint of an earlier run has, which this one leaves alone as long as it has fewer.
@@ -251,7 +251,7 @@ impl Checkpoint {
         };
         let thread = Background::start("identity", job);
         let mut checkpoint = Self {
-            lock: None,
+            _lock: arguments.checkpoint.as_deref().map(Lock::take).transpose()?,
             path: kept,
             is_asked: arguments.checkpoint.is_some(),
             every: arguments.checkpoint_every,
@@ -265,18 +265,8 @@ impl Checkpoint {
             // Whatever keeps it from being known is told before hours are spent.
             checkpoint.identified.get()?;
         }
-        if arguments.checkpoint.is_some() {
-            checkpoint.lock()?;
-        }
         let state = checkpoint.find(arguments, output, most_memory, spp, is_quiet)?;
         Ok((checkpoint, state))
-    }
-
-    fn lock(&mut self) -> Result<(), Failure> {
-        if let (None, Some(path)) = (&self.lock, &self.path) {
-            self.lock = Some(Lock::take(path)?);
-        }
-        Ok(())
     }
 
     /// What there is to go on from.

@@ -69,7 +69,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let gaps = whole.state.gaps(bounds);
     if !gaps.is_empty() {
         let missing: u64 = gaps.iter().map(Piece::count).sum();
-        let named: Vec<String> = gaps.iter().take(MOST_NAMED).map(spoken).collect();
+        let named: Vec<String> = gaps.iter().take(MOST_NAMED).map(Piece::to_string).collect();
         let more = if gaps.len() > MOST_NAMED { " and more" } else { "" };
         let what = format!("{} missing: {}{more}", counted(missing, "sample"), named.join(", "));
         if !arguments.allow_gaps {
@@ -130,21 +130,11 @@ fn joined(arguments: &Arguments) -> Result<Part, Failure> {
             let has_it = |pieces: &[Piece]| pieces.iter().any(|piece| piece.intersection(overlap).is_some());
             let other =
                 origins.iter().find(|(_, pieces)| has_it(pieces)).map_or(first.as_path(), |(path, _)| *path);
-            Failure::Input(format!(
-                "{}: it has {} as {} has",
-                path.display(),
-                spoken(overlap),
-                other.display()
-            ))
+            Failure::Input(format!("{}: it has {overlap} as {} has", path.display(), other.display()))
         })?;
         origins.push((path, pieces));
     }
     Ok(whole)
-}
-
-fn spoken(piece: &Piece) -> String {
-    let Piece { bounds: b, samples } = piece;
-    format!("samples {}..{} of pixels {},{},{},{}", samples.start, samples.end, b.x0, b.y0, b.x1, b.y1)
 }
 
 /// Saves the picture as the render itself would have.
@@ -160,8 +150,7 @@ fn save(arguments: &Arguments, whole: &Part) -> Result<(), Failure> {
     if shown("precision") == "float" {
         options.exr_precision = ExrPrecision::Float;
     }
-    let samples = whole.state.samples();
-    options.metadata = whole.job.metadata(&(samples.start..samples.end));
+    options.metadata = whole.job.metadata(&whole.state.samples());
     let layers: Vec<Feature> = match ImageFormat::from_path(output) {
         Some(ImageFormat::Exr) => shown("layers").split(',').filter_map(Feature::from_name).collect(),
         _ => Vec::new(),

@@ -127,12 +127,11 @@ pub fn render_from(
     };
     let hand_over = |owners: &[Owner]| {
         if let (Some(keeper), Some(pause)) = (keeper, &job.pause) {
-            let copies = owners.iter().map(Owner::clone).collect();
-            (keeper.keep)(state_of(copies, bounds, options));
+            (keeper.keep)(state_of(owners.to_vec(), bounds, options));
             pause.start_again();
         }
     };
-    let has = |owners: &[Owner], samples| owners.iter().all(|owner| owner.tile.has_taken(samples));
+    let has = |owners: &[Owner], samples| least_taken(owners) >= samples;
 
     let mut stride = None;
     let mut last = None;

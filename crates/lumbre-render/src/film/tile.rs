@@ -264,12 +264,7 @@ impl Tile {
         }
     }
 
-    /// Whether every pixel has so many samples, with those that were dropped.
-    pub(crate) fn has_taken(&self, samples: u32) -> bool {
-        self.pixels.iter().all(|pixel| pixel.taken >= samples)
-    }
-
-    /// The samples of the pixel with the fewest.
+    /// The samples of the pixel with the fewest, with those that were dropped.
     pub(crate) fn least_taken(&self) -> u32 {
         self.pixels.iter().map(|pixel| pixel.taken).min().unwrap_or(0)
     }

@@ -3,6 +3,7 @@
 mod bytes;
 
 use std::borrow::Cow;
+use std::fmt;
 use std::ops::Range;
 
 use crate::film::{Extras, Pixel, Tile};
@@ -45,10 +46,7 @@ pub struct Piece {
 #[non_exhaustive]
 pub enum MergeError {
     /// A sample is in both.
-    #[error(
-        "both have samples {}..{} of pixels {},{},{},{}",
-        .0.samples.start, .0.samples.end, .0.bounds.x0, .0.bounds.y0, .0.bounds.x1, .0.bounds.y1
-    )]
+    #[error("both have {0}")]
     Overlap(Piece),
     /// Only one of them has features, or coverage by colour.
     #[error("only one of them has what the other has besides colours")]
@@ -60,6 +58,13 @@ pub enum MergeError {
 
 /// Dropped samples that are remembered by place.
 pub(crate) const REMEMBERED: usize = 16;
+
+impl fmt::Display for Piece {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { bounds: b, samples } = self;
+        write!(f, "samples {}..{} of pixels {},{},{},{}", samples.start, samples.end, b.x0, b.y0, b.x1, b.y1)
+    }
+}
 
 impl Piece {
     /// How many samples.
