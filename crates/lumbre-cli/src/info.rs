@@ -1,16 +1,18 @@
 //! `lumbre info`: the contents of a scene.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::PathBuf;
 
 use clap::Args;
-use lumbre::{CancelToken, Part};
+use lumbre::{CancelToken, Part, Scene, Stage, StageLight};
 use serde_json::json;
 
 use crate::console::escaped;
 use crate::failure::{Failure, print};
 use crate::reading::{ReadingArguments, print_warnings};
 use crate::signals::Signals;
+use crate::units::counted;
 
 /// Prints what is in a scene, and what of it would not be rendered.
 #[derive(Args)]
@@ -42,8 +44,21 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let part = part.map_err(|e| Failure::Input(format!("{}: {e}", path.display())))?;
         return print(&about_part(&part, arguments.json));
     }
-    let (scene, diagnostics) = arguments.reading.open(&arguments.scene)?;
-    let info = scene.info();
+    let (desc, mut diagnostics) = arguments.reading.describe(&arguments.scene)?;
+    arguments.reading.check_build(&desc, &diagnostics)?;
+    let mut shown = desc.clone();
+    let staged = Stage::default().set(&mut shown);
+    let scene = Scene::of_file(desc, &arguments.scene[0], &mut diagnostics)?;
+    let info = scene.info().clone();
+    // A model without a camera is measured as `lumbre render` shows it.
+    let is_staged = staged.framed || staged.grounded || staged.light != StageLight::Own;
+    let scene = if is_staged {
+        drop(scene);
+        Scene::from_description(shown)?
+    } else {
+        scene
+    };
+    let predicted = Predicted::of(&scene);
     if arguments.json {
         let animations = info.listing.animations.iter().map(|a| json!({ "name": a.name, "seconds": a.end }));
         let textures = info.listing.textures.iter();
@@ -61,6 +76,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             "textures": textures.collect::<Vec<_>>(),
             "bounds": bounds,
             "memory_bytes": info.memory_bytes,
+            "picture": predicted.as_ref().ok().map(|predicted| json!({
+                "width": predicted.width,
+                "height": predicted.height,
+                "memory_bytes": predicted.bytes,
+                "seconds_per_sample": predicted.seconds_per_sample,
+                "threads": predicted.threads,
+            })),
             "warnings": diagnostics.lines(),
         });
         return print(&format!("{report:#}\n"));
@@ -100,11 +122,51 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         listed("variants", variants.collect()),
         listed("textures", textures.collect()),
         line("bounds", bounds),
-        line("memory", format!("{:.1} MiB", info.memory_bytes as f64 / f64::from(1 << 20))),
+        line("memory", format!("{:.1} MiB", mebibytes(info.memory_bytes))),
+        line("picture", predicted.map_or_else(|wrong| wrong.to_string(), |predicted| predicted.to_string())),
     ];
     print(&report.concat())?;
     print_warnings(&diagnostics);
     Ok(())
+}
+
+/// What a picture of a scene takes.
+struct Predicted {
+    width: u32,
+    height: u32,
+    bytes: u64,
+    /// Measured.
+    seconds_per_sample: f64,
+    threads: usize,
+}
+
+impl Predicted {
+    fn of(scene: &Scene) -> Result<Self, lumbre::Error> {
+        let options = scene.options();
+        Ok(Self {
+            width: options.width,
+            height: options.height,
+            bytes: options.memory_bytes()?,
+            seconds_per_sample: scene.seconds_per_sample(&options)?,
+            threads: rayon::current_num_threads(),
+        })
+    }
+}
+
+impl fmt::Display for Predicted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { width, height, bytes, seconds_per_sample: seconds, threads } = self;
+        write!(f, "{width}x{height}, {:.1} MiB, ", mebibytes(*bytes))?;
+        match seconds {
+            0.1.. => write!(f, "{seconds:.2} s")?,
+            _ => write!(f, "{:.1} ms", 1e3 * seconds)?,
+        }
+        write!(f, " for a sample of each pixel with {} (measured)", counted(*threads as u64, "thread"))
+    }
+}
+
+fn mebibytes(bytes: u64) -> f64 {
+    bytes as f64 / f64::from(1 << 20)
 }
 
 /// What a part or a checkpoint holds.

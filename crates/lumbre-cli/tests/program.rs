@@ -301,8 +301,22 @@ fn info_counts_what_is_there() {
     assert_eq!(info["cameras"].as_array().map(Vec::len), Some(1));
     assert_eq!(info["bounds"]["max"][0].as_f64().map(f64::round), Some(2.0));
     assert!(info["warnings"].as_array().unwrap().is_empty());
+    let picture = &info["picture"];
+    assert_eq!((picture["width"].as_u64(), picture["height"].as_u64()), (Some(48), Some(32)), "{picture}");
+    let time = picture["seconds_per_sample"].as_f64().unwrap();
+    assert!(time > 0.0 && picture["memory_bytes"].as_u64() > Some(48 * 32 * 16), "{picture}");
     let plain = desk.lumbre(&["info", "scene.pbrt"]);
-    assert!(stdout(&plain).contains("2 sphere"), "{}", stdout(&plain));
+    let plain = stdout(&plain);
+    assert!(plain.contains("2 sphere") && plain.contains("48x32"), "{plain}");
+    // A model is measured as it would be shown; what cannot be a picture is still told about.
+    desk.write("model.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let model: Value = serde_json::from_str(&stdout(&desk.lumbre(&["info", "model.obj", "--json"]))).unwrap();
+    assert_eq!(model["picture"]["width"].as_u64(), Some(1200), "{model}");
+    assert_eq!(model["cameras"].as_array().map(Vec::len), Some(0), "{model}");
+    let huge = SPHERE.replace("\"integer xresolution\" 48", "\"integer xresolution\" 99999999");
+    desk.write("huge.pbrt", &huge);
+    let huge = desk.lumbre(&["info", "huge.pbrt"]);
+    assert!(code(&huge) == 0 && stdout(&huge).contains("99999999"), "{}", stdout(&huge));
 }
 
 #[test]

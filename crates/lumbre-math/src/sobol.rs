@@ -176,16 +176,15 @@ impl OwenSobol {
         let key = self.key(pixel, dimension);
         let scrambles = mix(key ^ 0x2d2d_2d2d);
         let shuffled = owen_scramble(index, key as u32);
-        // The upper half of the second dimension, see `sobol_2d`.
-        let y = shuffled.reverse_bits();
-        let y = y ^ ((y & 0x5555_5555) << 1);
-        let y = y ^ ((y & 0x3333_3333) << 2);
-        let y = y ^ ((y & 0x0f0f_0f0f) << 4);
-        let y = y ^ ((y & 0x00ff_00ff) << 8);
-        let y = y ^ (y << 16);
+        // The upper half of the second dimension, see `sobol_2d`, in reversed order as the scramble takes it.
+        let y = shuffled ^ ((shuffled & 0xaaaa_aaaa) >> 1);
+        let y = y ^ ((y & 0xcccc_cccc) >> 2);
+        let y = y ^ ((y & 0xf0f0_f0f0) >> 4);
+        let y = y ^ ((y & 0xff00_ff00) >> 8);
+        let y = y ^ (y >> 16);
         [
             reversed_scramble(shuffled, scrambles as u32).reverse_bits(),
-            owen_scramble(y, (scrambles >> 32) as u32),
+            reversed_scramble(y, (scrambles >> 32) as u32).reverse_bits(),
         ]
     }
 

@@ -466,21 +466,23 @@ impl MeshAttributes {
 
         // From derivatives by face coordinates to derivatives by uv.
         let [by_a, by_b] = blend.slopes(uvs);
-        let determinant = by_a.x * by_b.y - by_a.y * by_b.x;
+        let scale = 1.0 / (by_a.x * by_b.y - by_a.y * by_b.x);
         let by_uv = |along_a: DVec3, along_b: DVec3| {
-            let along_u = (along_a * by_b.y - along_b * by_a.y) / determinant;
-            let along_v = (along_b * by_a.x - along_a * by_b.x) / determinant;
+            let along_u = (along_a * by_b.y - along_b * by_a.y) * scale;
+            let along_v = (along_b * by_a.x - along_a * by_b.x) * scale;
             (along_u, along_v)
         };
         let (dpdu, dpdv) = by_uv(geometric.dpdu, geometric.dpdv);
-        let has_parameters = determinant != 0.0
-            && dpdu.is_finite()
-            && dpdv.is_finite()
-            && dpdu.cross(dpdv).length_squared() > 0.0;
+        let has_parameters =
+            dpdu.is_finite() && dpdv.is_finite() && dpdu.cross(dpdv).length_squared() > 0.0;
         (surface.dpdu, surface.dpdv) =
             if has_parameters { (dpdu, dpdv) } else { geometric.normal.any_orthonormal_pair() };
-        (surface.dndu, surface.dndv) =
-            if has_parameters { by_uv(geometric.dndu, geometric.dndv) } else { (DVec3::ZERO, DVec3::ZERO) };
+        let is_curved = geometric.dndu != DVec3::ZERO || geometric.dndv != DVec3::ZERO;
+        (surface.dndu, surface.dndv) = if has_parameters && is_curved {
+            by_uv(geometric.dndu, geometric.dndv)
+        } else {
+            (DVec3::ZERO, DVec3::ZERO)
+        };
 
         let Some(normals) = self.corner_normals(corners, time) else {
             let mut shaded = plain(&surface);

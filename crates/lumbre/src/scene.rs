@@ -239,12 +239,9 @@ impl Scene {
     /// # Errors
     /// As for [`Scene::render`].
     pub fn white_level(&self, options: &RenderOptions) -> Result<Option<f32>, Error> {
-        const SIDE: f64 = 64.0;
+        const LONGER_SIDE: f64 = 64.0;
         const SPP: u32 = 16;
-        let longer = f64::from(options.width.max(options.height).max(1));
-        let side = |pixels: u32| (f64::from(pixels) * SIDE / longer).ceil().max(1.0) as u32;
-        let mut small = options.clone();
-        (small.width, small.height, small.crop) = (side(options.width), side(options.height), None);
+        let mut small = smaller(options, LONGER_SIDE);
         (small.transparent, small.features) = (true, true);
         small.stop = Stop::at(SPP);
         let picture = self.render(&small)?;
@@ -266,6 +263,23 @@ impl Scene {
         Ok(levels.get(levels.len() * 4 / 5).copied())
     }
 
+    /// Seconds that a sample of each pixel takes with these options, by rendering a small picture of the same view for a fraction of
+    /// a second. The first samples of all bring what is read for the first time into the processor's caches, so a long render is
+    /// rather sooner done than later.
+    ///
+    /// # Errors
+    /// As for [`Scene::render`].
+    pub fn seconds_per_sample(&self, options: &RenderOptions) -> Result<f64, Error> {
+        const LONGER_SIDE: f64 = 160.0;
+        const TIME: Duration = Duration::from_millis(500);
+        let mut small = smaller(options, LONGER_SIDE);
+        small.stop = Stop::at(u32::MAX);
+        small.stop.time = Some(TIME);
+        let stats = self.render(&small)?.stats().clone();
+        let pixels = options.bounds().map_err(Error::from)?.area();
+        Ok(stats.elapsed.as_secs_f64() * pixels as f64 / stats.samples.max(1) as f64)
+    }
+
     /// Statistics of the scene.
     pub fn info(&self) -> &SceneInfo {
         &self.info
@@ -285,4 +299,13 @@ impl Scene {
     pub fn resolved(&self) -> &lumbre_scene::Scene {
         &self.resolved
     }
+}
+
+/// The options of the whole picture in a size whose longer side has so many pixels.
+fn smaller(options: &RenderOptions, longer_side: f64) -> RenderOptions {
+    let longer = f64::from(options.width.max(options.height).max(1));
+    let side = |pixels: u32| (f64::from(pixels) * longer_side / longer).ceil().max(1.0) as u32;
+    let mut small = options.clone();
+    (small.width, small.height, small.crop) = (side(options.width), side(options.height), None);
+    small
 }

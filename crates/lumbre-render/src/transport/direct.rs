@@ -135,7 +135,7 @@ impl<'a, 's> Vertex<'a, 's> {
     }
 
     /// The directions of the BSDF that come to be this one: itself, and what is folded onto it.
-    fn unfolded(&self, wi: Vec3) -> impl Iterator<Item = LocalDir> {
+    fn unfolded(&self, wi: Vec3) -> [Option<LocalDir>; 2] {
         let is_above = self.geometric.is_none_or(|normal| normal.dot(wi) > 0.0);
         let reflects = self.reflects(wi);
         let own = self.frame.to_local(wi);
@@ -144,17 +144,25 @@ impl<'a, 's> Vertex<'a, 's> {
             let folded = self.frame.to_local(wi);
             (self.wo.same_hemisphere(folded) == is_above && !self.stays(wi)).then_some(folded)
         });
-        own.into_iter().chain(folded)
+        [own, folded]
     }
 
     /// f · |cos θ| towards a unit direction of the world.
     pub(super) fn eval(&self, wi: DVec3) -> Spectrum {
-        self.unfolded(wi.as_vec3()).map(|wi| self.bsdf.eval(self.wo, wi)).sum()
+        self.eval_unfolded(self.unfolded(wi.as_vec3()))
+    }
+
+    fn eval_unfolded(&self, unfolded: [Option<LocalDir>; 2]) -> Spectrum {
+        unfolded.into_iter().flatten().map(|wi| self.bsdf.eval(self.wo, wi)).sum()
     }
 
     /// The density with which [`Vertex::sample`] chooses a unit direction of the world, delta parts left out.
     pub(super) fn pdf(&self, wi: DVec3) -> f32 {
-        self.unfolded(wi.as_vec3()).map(|wi| self.bsdf.pdf(self.wo, wi)).sum()
+        self.pdf_unfolded(self.unfolded(wi.as_vec3()))
+    }
+
+    fn pdf_unfolded(&self, unfolded: [Option<LocalDir>; 2]) -> f32 {
+        unfolded.into_iter().flatten().map(|wi| self.bsdf.pdf(self.wo, wi)).sum()
     }
 
     /// Chooses a direction to go on in.
@@ -204,13 +212,14 @@ impl<'a, 's> Vertex<'a, 's> {
         weigh: impl FnOnce(f32, f32) -> f32,
         rays: &mut RayCounts,
     ) -> Spectrum {
-        let scattered = self.eval(sample.towards) * sample.radiance;
+        let unfolded = self.unfolded(sample.towards.as_vec3());
+        let scattered = self.eval_unfolded(unfolded) * sample.radiance;
         if scattered.is_black() {
             return Spectrum::BLACK;
         }
         let weight = match sample.scatter {
             Scatter::Delta => 1.0,
-            Scatter::Density(pdf) => weigh(pdf, self.pdf(sample.towards)) / pdf,
+            Scatter::Density(pdf) => weigh(pdf, self.pdf_unfolded(unfolded)) / pdf,
         };
         if weight <= 0.0 {
             return Spectrum::BLACK;

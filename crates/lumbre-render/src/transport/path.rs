@@ -290,7 +290,8 @@ impl<'s, 'w> Walk<'s, 'w> {
             self.add_sampled_light(&vertex);
         }
 
-        let bounce = vertex.sample(self.draw.lobe(self.depth), self.draw.direction(self.depth))?;
+        let lobe = if vertex.bsdf.has_lobes() { self.draw.lobe(self.depth) } else { 0.0 };
+        let bounce = vertex.sample(lobe, self.draw.direction(self.depth))?;
         self.throughput *= bounce.weight;
         if self.throughput.is_black() {
             return None;
