@@ -9,6 +9,7 @@ use clap::Subcommand;
 use xtask::command::{Profile, release_program, root, run_ours, succeeds};
 
 use crate::race::Race;
+use crate::race::scaling::Scaling;
 use crate::{PassedOn, field};
 
 /// What can be measured.
@@ -24,6 +25,9 @@ pub(crate) enum Bench {
     /// Error against time on scenes of all kinds, beside Mitsuba 3, Cycles, LuxCore and pbrt-v4 where they are found: in Python
     /// environments that MITSUBA_PYTHON, BPY_PYTHON and LUXCORE_PYTHON name or that --install made, and on the PATH.
     Render(Race),
+    /// The time of a path against the number of lights (to a million), of triangles (to ten million) and of instances (to a
+    /// million), each in a scene of its own.
+    Scaling(Scaling),
     /// The field of exact shapes, against POV-Ray where it is on the PATH.
     Field {
         /// A POV-Ray scene in place of the one that is written for it.
@@ -45,6 +49,7 @@ impl Bench {
             Self::Kernel(passed) => run_ours("lumbre-bench", Profile::Release, &passed.arguments),
             Self::Growth(passed) => run_ours("lumbre-growth", Profile::Release, &passed.arguments),
             Self::Render(race) => race.run(),
+            Self::Scaling(scaling) => scaling.run(),
             Self::Field { pov, runs, threads } => run_field(pov.as_deref(), runs, threads),
         }
     }

@@ -20,6 +20,7 @@ mod picture;
 mod plot;
 mod program;
 mod report;
+pub(crate) mod scaling;
 mod scene;
 mod scenes;
 mod write;

@@ -85,7 +85,8 @@ pub(crate) struct Arguments {
     /// Stop after this time, counted from the start (of each frame), as 90s, 2m or 1h30m.
     #[arg(long, value_name = "DUR", value_parser = units::duration)]
     time: Option<Duration>,
-    /// Stop when the noise is estimated to be below this share of the luminance.
+    /// Stop sampling a pixel when its noise is estimated to be below this share of its luminance, such as 0.02; at 16384 samples at
+    /// the latest, or at --spp.
     #[arg(long, value_name = "R", value_parser = noise)]
     noise: Option<f64>,
     /// Take the noise out of the picture: by Lumbre's own filter (own or auto, the same), or by Open Image Denoise where it is installed
@@ -290,6 +291,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 /// How long a picture is rendered even if reading took all of its time.
 const LEAST_TIME: Duration = Duration::from_millis(400);
+
+/// Samples per pixel at most, where its noise ends its sampling: some never come to little noise.
+const MOST_FOR_NOISE: u32 = 1 << 14;
 
 /// Samples per pixel of a model without camera and light, of which the noise is taken out.
 const MODEL_SPP: u32 = 16;
@@ -687,7 +691,15 @@ fn picture(
     if !arguments.quiet {
         replaced.iter().for_each(Replaced::say);
         let name = if is_piped { "standard output".into() } else { output.display().to_string() };
-        summary(arguments.verbose, &scene, &picture, &name, render_time, denoised);
+        summary(
+            arguments.verbose,
+            options.stop.noise.is_some(),
+            &scene,
+            &picture,
+            &name,
+            render_time,
+            denoised,
+        );
     }
     Ok(())
 }
@@ -806,11 +818,11 @@ fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failur
     options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
     options.stop.time = arguments.time;
     options.stop.noise = arguments.noise;
-    let open_ended = arguments.time.is_some() || arguments.noise.is_some();
     options.stop.spp = match arguments.spp {
         Some(spp) => spp,
-        // With a time or a noise level, samples are not limited.
-        None if open_ended => u32::MAX,
+        None if arguments.noise.is_some() => MOST_FOR_NOISE,
+        // With a time, samples are not limited.
+        None if arguments.time.is_some() => u32::MAX,
         None => options.stop.spp,
     };
     if let Some(samples) = arguments.parts.samples() {
@@ -873,6 +885,7 @@ fn statistics(
         "width": picture.image().width(),
         "height": picture.image().height(),
         "spp": stats.spp,
+        "most_spp": stats.most_spp,
         "rays": { "camera": stats.rays.camera, "bounce": stats.rays.bounce, "shadow": stats.rays.shadow },
         "paths_per_second": stats.paths_per_second(),
         "noise": stats.noise,
@@ -896,6 +909,7 @@ fn peak_memory() -> Option<u64> {
 
 fn summary(
     verbose: bool,
+    has_noise_limit: bool,
     scene: &Scene,
     picture: &Picture,
     output: &str,
@@ -907,7 +921,12 @@ fn summary(
     let stats = picture.stats();
     let image = picture.image();
     let samples = if stats.spp > 0 {
-        format!("{} a pixel", counted(u64::from(stats.spp), "sample"))
+        match stats.noise {
+            Some(noise) if has_noise_limit => {
+                format!("{} to {} samples a pixel, noise {noise:.4}", stats.spp, stats.most_spp)
+            }
+            _ => format!("{} a pixel", counted(u64::from(stats.spp), "sample")),
+        }
     } else {
         format!("a coarse picture of {}", counted(stats.samples, "sample"))
     };

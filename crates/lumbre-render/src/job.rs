@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use lumbre_math::{DVec2, DVec3, Elementary};
 use lumbre_scene::{Scene, View};
 
+use crate::adaptive::{self, Adaptive};
 use crate::clock::Clock;
 use crate::film::{Extras, FeatureSample, Filter, Sample, Tile};
 use crate::rendered::{noise, picture, rendered_of};
@@ -13,7 +14,8 @@ use crate::state::{Piece, REMEMBERED, RenderState};
 use crate::transport::{Features, Integrator, RayCounts, Sampler, Sight, integrator, see};
 use crate::workers::Workers;
 use crate::{
-    CancelToken, DroppedSample, PixelBounds, Progress, RenderError, RenderOptions, Rendered, Snapshot, Stats,
+    CancelToken, DroppedSample, NoProgress, PixelBounds, Progress, RenderError, RenderOptions, Rendered,
+    Snapshot, Stats, Stop,
 };
 
 /// Between the rays that textures are looked up for, in pixels: samples average what is finer. The same for any number of samples, so
@@ -23,8 +25,6 @@ const SPACING: f64 = 0.25;
 const TILE: u32 = 16;
 /// Samples of the longest pass.
 const MAX_STEP: u32 = 16;
-/// Samples a pixel before its noise is looked at: two or three say little.
-const LEAST_FOR_NOISE: u32 = 8;
 /// The first pass goes over the picture in squares of so many pixels a side, one sample in each, and then in smaller ones, so that a
 /// render which is stopped in it is a whole picture, if a coarse one.
 const STRIDES: [u32; 7] = [256, 64, TILE, 8, 4, 2, 1];
@@ -95,7 +95,6 @@ pub fn render_from(
         .cameras()
         .get(options.camera)
         .ok_or(RenderError::NoSuchCamera { index: options.camera, count: scene.cameras().len() })?;
-    let workers = Workers::start(options.threads);
     let spp = options.stop.spp.max(1);
     let view = View::new(camera, options.width, options.height);
     let catches_shadows = scene.ground().is_some_and(|ground| ground.catcher);
@@ -111,9 +110,15 @@ pub fn render_from(
     };
     let before =
         owners.iter().flat_map(|owner| owner.tile.pixels()).map(|pixel| u64::from(pixel.taken)).sum();
+    let adaptive = match options.stop.noise {
+        Some(limit) => Some(Adaptive::new(limit, mean_luminance(scene, options, integrator, cancel)?)),
+        None => None,
+    };
+    let workers = Workers::start(options.threads);
     let job = Job {
         scene,
         options,
+        adaptive,
         moves: scene.moves() || view.moves(),
         view,
         integrator,
@@ -131,11 +136,15 @@ pub fn render_from(
             pause.start_again();
         }
     };
-    let has = |owners: &[Owner], samples| least_taken(owners) >= samples;
+    let least_wanted = |owners: &[Owner]| {
+        owners.iter().filter_map(|owner| adaptive::least_wanted(&owner.tile, job.adaptive.as_ref())).min()
+    };
+    // Of pixels that need more.
+    let has = |owners: &[Owner], samples| least_wanted(owners).is_none_or(|least| least >= samples);
 
     let mut stride = None;
     let mut last = None;
-    if has(&owners, 1) {
+    if least_taken(&owners) >= 1 {
         stride = Some(1);
     } else {
         for side in STRIDES {
@@ -156,7 +165,7 @@ pub fn render_from(
         }
     }
     // What an earlier run took was told by it.
-    let mut done = if before > 0 { least_taken(&owners).min(spp) } else { 0 };
+    let mut done = if before > 0 { least_wanted(&owners).unwrap_or(spp).min(spp) } else { 0 };
     while done < spp && stride == Some(1) {
         let end = next_count(done).min(spp);
         loop {
@@ -181,28 +190,27 @@ pub fn render_from(
             noise: reached,
             picture: &|| picture(tiles(), bounds, options.transparent),
         });
-        if let (Some(limit), Some(noise)) = (options.stop.noise, reached)
-            && done >= LEAST_FOR_NOISE / 2
-        {
-            // Noise falls with the square root of the number of samples.
-            let expected = (f64::from(done) * (noise / limit).powi(2)).max(f64::from(LEAST_FOR_NOISE));
-            job.clock.expect_quiet_at(expected);
+        if let Some(adaptive) = &job.adaptive {
+            let pixels = tiles().flat_map(Tile::pixels);
+            let expected: f64 = pixels.map(|pixel| adaptive.expected(pixel, spp)).sum();
+            job.clock.expect_quiet_at(expected / bounds.area() as f64);
         }
-        let is_quiet = matches!((options.stop.noise, reached), (Some(limit), Some(noise)) if noise <= limit);
-        if job.must_stop() || (is_quiet && done >= LEAST_FOR_NOISE) {
+        if job.must_stop() || least_wanted(&owners).is_none() {
             break;
         }
     }
 
     progress.stopped(stride);
     let spread = stride.filter(|side| *side > 1).map(|side| spread(&owners, bounds, side));
+    let is_done = has(&owners, spp);
     let state = state_of(owners, bounds, options);
     let shown = spread.as_ref().unwrap_or(&state.tiles);
     let rendered = rendered_of(shown.iter(), bounds, options.transparent, extras);
     let stats = Stats {
-        spp: done,
+        spp: state.least_samples(),
+        most_spp: state.most_samples(),
         stride,
-        cancelled: cancel.is_cancelled() && done < spp,
+        cancelled: cancel.is_cancelled() && !is_done,
         samples: state.rays.camera,
         rays: state.rays,
         dropped: state.dropped,
@@ -218,6 +226,27 @@ pub fn render_from(
 /// The samples of the pixel with the fewest.
 fn least_taken(owners: &[Owner]) -> u32 {
     owners.iter().map(|owner| owner.tile.least_taken()).min().unwrap_or(0)
+}
+
+/// The mean luminance of the whole picture, by a small one: the same for every crop of it.
+fn mean_luminance(
+    scene: &Scene,
+    options: &RenderOptions,
+    integrator: &dyn Integrator,
+    cancel: &CancelToken,
+) -> Result<f64, RenderError> {
+    const LONGER_SIDE: f64 = 64.0;
+    const SPP: u32 = 8;
+    let small = RenderOptions {
+        stop: Stop::at(SPP),
+        first_sample: 0,
+        features: false,
+        guides: false,
+        ..options.smaller(LONGER_SIDE)
+    };
+    let image = render_with(scene, &small, integrator, &NoProgress, cancel)?.image;
+    let sum: f64 = image.pixels().iter().map(|pixel| f64::from(pixel.luminance())).sum();
+    Ok(sum / image.pixels().len() as f64)
 }
 
 /// The number of samples at which a render next looks at its noise, and shows what there is: always the same, whatever came between.
@@ -310,6 +339,8 @@ struct Job<'a> {
     /// Whether it matters when a ray looks.
     moves: bool,
     integrator: &'a dyn Integrator,
+    /// When pixels have enough, if not at the number of samples alone.
+    adaptive: Option<Adaptive>,
     sampler: Sampler,
     filter: Filter,
     spacing: f64,
@@ -385,7 +416,8 @@ impl Job<'_> {
     /// Takes the samples of every pixel of a tile up to this number, sample by sample, so that a tile which is stopped has all of
     /// one sample before it has any of the next.
     fn run(&self, owner: &mut Owner, end: u32) {
-        for index in owner.tile.least_taken()..end {
+        let first = adaptive::least_wanted(&owner.tile, self.adaptive.as_ref()).unwrap_or(end);
+        for index in first..end {
             if !self.take(owner, index, |_, _| true) {
                 return;
             }
@@ -396,7 +428,9 @@ impl Job<'_> {
     fn take(&self, owner: &mut Owner, number: u32, is_wanted: impl Fn(u32, u32) -> bool) -> bool {
         let mut count = 0;
         for (x, y) in owner.tile.bounds().pixels() {
-            if owner.tile.taken(x, y) > number || !is_wanted(x, y) {
+            let pixel = owner.tile.pixel(x, y);
+            let has_enough = || self.adaptive.is_some_and(|adaptive| adaptive.is_done(pixel));
+            if pixel.taken > number || !is_wanted(x, y) || has_enough() {
                 continue;
             }
             let looks = count % PIXELS_A_LOOK == 0;

@@ -4,6 +4,7 @@
 //! [`transport`] computes the radiance along a ray, [`film`] makes pixels of samples; neither knows the other, nor of threads. [`render`]
 //! is the verb.
 
+mod adaptive;
 mod cancel;
 mod clock;
 mod denoise;

@@ -58,9 +58,10 @@ pub struct Stop {
     pub spp: u32,
     /// After this much time.
     pub time: Option<Duration>,
-    /// When the noise of the picture is estimated to be below this: the root mean square, over pixels, of the standard
-    /// error of the luminance divided by luminance (plus a tenth of the picture's mean, so that black pixels do not
-    /// count for much).
+    /// For each pixel, when its noise is estimated to be below this: the standard error of its luminance, divided by luminance
+    /// (plus a tenth of the mean of a small picture, so that black pixels do not count for much). A pixel is looked at when it has
+    /// 16, 24, 32, 48, 64 samples and so on, and by its own samples alone. The noise of a picture is the root mean square of that
+    /// of its pixels.
     pub noise: Option<f64>,
 }
 
@@ -134,6 +135,14 @@ impl RenderOptions {
         };
         let windows = film.pixel_bounds.map(of_pixels).into_iter().chain(film.crop_window);
         self.crop = windows.map(|window| self.pixels_of(window)).reduce(|a, b| a.intersection(&b));
+    }
+
+    /// The options of the whole picture in a size whose longer side has so many pixels.
+    #[must_use]
+    pub fn smaller(&self, longer_side: f64) -> Self {
+        let longer = f64::from(self.width.max(self.height).max(1));
+        let side = |pixels: u32| (f64::from(pixels) * longer_side / longer).ceil().max(1.0) as u32;
+        Self { width: side(self.width), height: side(self.height), crop: None, ..self.clone() }
     }
 
     /// The pixels whose upper left corners lie in a window x0, x1, y0, y1 of the picture, as shares in [0, 1].

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::adaptive::FLOOR;
 use crate::film::{Extras, FeatureSums, GuideSums, Pixel, PixelBounds, Tile};
 use crate::transport::{Feature, RayCounts};
 use lumbre_image::{Image, Rgb};
@@ -32,6 +33,8 @@ pub struct Rendered {
 pub struct Stats {
     /// Samples that every pixel has.
     pub spp: u32,
+    /// Samples of the pixel with the most: more than the others have where the noise of each pixel ends its sampling.
+    pub most_spp: u32,
     /// The side of squares of pixels of which each has a sample, which all pixels of the square show that have none of their own: 1
     /// where every pixel has a sample. `None` where there is no whole picture, not even such a coarse one.
     pub stride: Option<u32>,
@@ -174,6 +177,6 @@ pub(crate) fn noise<'t>(tiles: impl Iterator<Item = &'t Tile> + Clone) -> Option
     if mean <= 0.0 {
         return Some(0.0);
     }
-    let square = |(luminance, error): (f64, f64)| (error / (luminance.max(0.0) + 0.1 * mean)).powi(2);
+    let square = |(luminance, error): (f64, f64)| (error / (luminance.max(0.0) + FLOOR * mean)).powi(2);
     Some((errors().map(square).sum::<f64>() / count as f64).sqrt())
 }

@@ -234,10 +234,54 @@ fn time_and_noise_end_a_render() {
     let rendered = picture(&scene, &timed);
     assert!(rendered.stats.elapsed < Duration::from_secs(10), "{:?}", rendered.stats.elapsed);
     assert!(rendered.stats.samples > 0 && !rendered.stats.cancelled);
-    let mut quiet = options(&scene, 40, 30, 1 << 20);
-    quiet.stop.noise = Some(0.25);
-    let rendered = picture(&scene, &quiet);
-    assert!(rendered.stats.spp >= 8 && rendered.stats.noise.unwrap() <= 0.25, "{:?}", rendered.stats);
+}
+
+/// Lit from a side, with sky behind: some pixels are clean at once, others for long not.
+fn uneven() -> Scene {
+    Scene::build(still_life(DVec3::ZERO)).unwrap()
+}
+
+#[test]
+fn noise_ends_the_sampling_of_each_pixel_by_its_own_samples() {
+    let scene = uneven();
+    let quiet = changed(options(&scene, 40, 30, 1 << 12), |it| it.stop.noise = Some(0.1));
+    let whole = picture(&scene, &quiet);
+    let stats = &whole.stats;
+    assert!(stats.spp == 16 && stats.most_spp >= 64 && !stats.cancelled, "{stats:?}");
+    assert!(stats.noise.unwrap() <= 0.1 && stats.samples < 1200 * 128, "{stats:?}");
+    // Neither threads nor crops change a pixel.
+    assert_eq!(
+        bytes(&whole.image),
+        bytes(&picture(&scene, &changed(quiet.clone(), |it| it.threads = 1)).image)
+    );
+    let crop = PixelBounds { x0: 9, y0: 12, x1: 33, y1: 29 };
+    let part = picture(&scene, &changed(quiet, |it| it.crop = Some(crop)));
+    for (x, y) in crop.pixels() {
+        assert_eq!(part.image.pixel(x - crop.x0, y - crop.y0), whole.image.pixel(x, y), "({x}, {y})");
+    }
+}
+
+#[test]
+fn the_true_error_is_within_the_noise_that_was_asked_for() {
+    let scene = uneven();
+    let reference = picture(&scene, &changed(options(&scene, 24, 18, 4096), |it| it.sampler.seed = 77)).image;
+    let mean_of = |image: &Image| {
+        image.pixels().iter().map(|c| f64::from(c.luminance())).sum::<f64>() / image.pixels().len() as f64
+    };
+    let mean_reference = mean_of(&reference);
+    for limit in [0.2, 0.05] {
+        let quiet = changed(options(&scene, 24, 18, 1 << 12), |it| it.stop.noise = Some(limit));
+        let image = picture(&scene, &quiet).image;
+        let pairs = image.pixels().iter().zip(reference.pixels());
+        let squares = pairs.map(|(a, b)| {
+            let (a, b) = (f64::from(a.luminance()), f64::from(b.luminance()));
+            ((a - b) / (b + 0.1 * mean_reference)).powi(2)
+        });
+        let error = (squares.sum::<f64>() / image.pixels().len() as f64).sqrt();
+        let bias = mean_of(&image) / mean_reference - 1.0;
+        println!("limit {limit}: true error {error:.4}, mean off by {bias:+.4}");
+        assert!(error <= limit && bias.abs() < 0.1 * limit, "{limit}: {error} {bias}");
+    }
 }
 
 #[test]

@@ -14,14 +14,16 @@ use lumbre_render::{
 };
 use lumbre_scene::{SamplerKind, Scene};
 
-fn all_options(scene: &Scene) -> [RenderOptions; 3] {
+fn all_options(scene: &Scene) -> [RenderOptions; 4] {
     let base = options(scene, 45, 35, 11);
     let mut with_features = base.clone();
     with_features.features = true;
     with_features.sampler.kind = SamplerKind::Independent;
     let mut with_guides = base.clone();
     with_guides.guides = true;
-    [base, with_features, with_guides]
+    let mut adaptive = base.clone();
+    (adaptive.stop.spp, adaptive.stop.noise) = (40, Some(0.2));
+    [base, with_features, with_guides, adaptive]
 }
 
 fn run(
@@ -69,7 +71,7 @@ fn a_render_goes_on_from_any_state_to_the_same_picture() {
         }
         // More samples for a finished render.
         let mut fewer = options.clone();
-        fewer.stop.spp = 3;
+        fewer.stop.spp /= 2;
         let first = run(&scene, &fewer, None, None).unwrap();
         let both = run(&scene, &options, Some(first.1), None).unwrap();
         assert_same(&both.0, &whole.0, "more samples");
@@ -79,7 +81,7 @@ fn a_render_goes_on_from_any_state_to_the_same_picture() {
 #[test]
 fn parts_are_merged_to_the_picture_of_the_whole() {
     let scene = Scene::build(still_life(DVec3::ZERO)).unwrap();
-    let [base, with_features, _] = all_options(&scene);
+    let [base, with_features, ..] = all_options(&scene);
     for options in [base, with_features] {
         let whole = run(&scene, &options, None, None).unwrap();
         let part = |bounds: PixelBounds, first: u32, last: u32, threads: usize| {

@@ -473,8 +473,7 @@ impl MeshAttributes {
             (along_u, along_v)
         };
         let (dpdu, dpdv) = by_uv(geometric.dpdu, geometric.dpdv);
-        let has_parameters =
-            dpdu.is_finite() && dpdv.is_finite() && dpdu.cross(dpdv).length_squared() > 0.0;
+        let has_parameters = dpdu.is_finite() && dpdv.is_finite() && dpdu.cross(dpdv).length_squared() > 0.0;
         (surface.dpdu, surface.dpdv) =
             if has_parameters { (dpdu, dpdv) } else { geometric.normal.any_orthonormal_pair() };
         let is_curved = geometric.dndu != DVec3::ZERO || geometric.dndv != DVec3::ZERO;

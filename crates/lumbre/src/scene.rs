@@ -241,7 +241,7 @@ impl Scene {
     pub fn white_level(&self, options: &RenderOptions) -> Result<Option<f32>, Error> {
         const LONGER_SIDE: f64 = 64.0;
         const SPP: u32 = 16;
-        let mut small = smaller(options, LONGER_SIDE);
+        let mut small = options.smaller(LONGER_SIDE);
         (small.transparent, small.features) = (true, true);
         small.stop = Stop::at(SPP);
         let picture = self.render(&small)?;
@@ -272,7 +272,7 @@ impl Scene {
     pub fn seconds_per_sample(&self, options: &RenderOptions) -> Result<f64, Error> {
         const LONGER_SIDE: f64 = 160.0;
         const TIME: Duration = Duration::from_millis(500);
-        let mut small = smaller(options, LONGER_SIDE);
+        let mut small = options.smaller(LONGER_SIDE);
         small.stop = Stop::at(u32::MAX);
         small.stop.time = Some(TIME);
         let stats = self.render(&small)?.stats().clone();
@@ -299,13 +299,4 @@ impl Scene {
     pub fn resolved(&self) -> &lumbre_scene::Scene {
         &self.resolved
     }
-}
-
-/// The options of the whole picture in a size whose longer side has so many pixels.
-fn smaller(options: &RenderOptions, longer_side: f64) -> RenderOptions {
-    let longer = f64::from(options.width.max(options.height).max(1));
-    let side = |pixels: u32| (f64::from(pixels) * longer_side / longer).ceil().max(1.0) as u32;
-    let mut small = options.clone();
-    (small.width, small.height, small.crop) = (side(options.width), side(options.height), None);
-    small
 }

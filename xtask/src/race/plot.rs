@@ -1,14 +1,12 @@
-//! Error against time as a picture (.svg) with logarithmic axes.
+//! Lines as a picture (.svg) with logarithmic axes.
 
 use std::fmt::Write;
-
-use super::curve::Point;
 
 /// A line of the plot, with its name.
 #[derive(Debug)]
 pub(crate) struct Line<'a> {
     pub(crate) name: &'a str,
-    pub(crate) points: &'a [Point],
+    pub(crate) points: Vec<[f64; 2]>,
 }
 
 const WIDTH: f64 = 760.0;
@@ -54,20 +52,20 @@ impl Axis {
     }
 }
 
-/// The picture. Lines without points are left out; points that are not above zero too.
-pub(crate) fn svg(title: &str, lines: &[Line<'_>]) -> String {
-    let shown = |line: &Line<'_>| -> Vec<Point> {
-        line.points.iter().copied().filter(|p| p.seconds > 0.0 && p.error > 0.0).collect()
+/// The picture, with the names of its axes. Lines without points are left out; points that are not above zero too.
+pub(crate) fn svg(title: &str, [across, up]: [&str; 2], lines: &[Line<'_>]) -> String {
+    let shown = |line: &Line<'_>| -> Vec<[f64; 2]> {
+        line.points.iter().copied().filter(|p| p.iter().all(|x| *x > 0.0)).collect()
     };
-    let all: Vec<Point> = lines.iter().flat_map(shown).collect();
+    let all: Vec<[f64; 2]> = lines.iter().flat_map(shown).collect();
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{HEIGHT}\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" \
          font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n\
          <text x=\"{LEFT}\" y=\"24\" font-size=\"16\">{title}</text>\n"
     );
     if !all.is_empty() {
-        let x = Axis::around(all.iter().map(|p| p.seconds), [LEFT, RIGHT]);
-        let y = Axis::around(all.iter().map(|p| p.error), [BOTTOM, TOP]);
+        let x = Axis::around(all.iter().map(|p| p[0]), [LEFT, RIGHT]);
+        let y = Axis::around(all.iter().map(|p| p[1]), [BOTTOM, TOP]);
         for (value, whole) in x.ticks() {
             let at = x.place(value);
             let stroke = if whole { "#bbb" } else { "#eee" };
@@ -96,7 +94,7 @@ pub(crate) fn svg(title: &str, lines: &[Line<'_>]) -> String {
                 continue;
             }
             let colour = COLOURS[i % COLOURS.len()];
-            let place = |p: &Point| (x.place(p.seconds), y.place(p.error));
+            let place = |p: &[f64; 2]| (x.place(p[0]), y.place(p[1]));
             let path: Vec<String> = points.iter().map(place).map(|(x, y)| format!("{x:.1} {y:.1}")).collect();
             let (thick, path) = (if i == 0 { 3 } else { 2 }, path.join("L"));
             let _ = writeln!(
@@ -115,13 +113,10 @@ pub(crate) fn svg(title: &str, lines: &[Line<'_>]) -> String {
         }
     }
     let (middle, below) = (f64::midpoint(LEFT, RIGHT), BOTTOM + 38.0);
+    let _ = writeln!(out, "<text x=\"{middle}\" y=\"{below}\" text-anchor=\"middle\">{across}</text>");
     let _ = writeln!(
         out,
-        "<text x=\"{middle}\" y=\"{below}\" text-anchor=\"middle\">seconds of rendering</text>"
-    );
-    let _ = writeln!(
-        out,
-        "<text transform=\"translate(16 {}) rotate(-90)\" text-anchor=\"middle\">relative mean squared error</text>\n</svg>",
+        "<text transform=\"translate(16 {}) rotate(-90)\" text-anchor=\"middle\">{up}</text>\n</svg>",
         f64::midpoint(TOP, BOTTOM)
     );
     out
@@ -145,10 +140,9 @@ mod tests {
 
     #[test]
     fn a_plot_shows_a_mark_for_every_point_above_zero() {
-        let points =
-            [(0.5, 0.2), (2.0, 0.05), (0.0, 0.02)].map(|(seconds, error)| Point { spp: 4, seconds, error });
-        let picture =
-            svg("A scene", &[Line { name: "One", points: &points }, Line { name: "None", points: &[] }]);
+        let points = vec![[0.5, 0.2], [2.0, 0.05], [0.0, 0.02]];
+        let lines = [Line { name: "One", points }, Line { name: "None", points: Vec::new() }];
+        let picture = svg("A scene", ["seconds", "error"], &lines);
         assert_eq!(picture.matches("<circle").count(), 2);
         assert!(picture.contains(">One<") && !picture.contains(">None<"));
     }

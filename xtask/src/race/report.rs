@@ -181,10 +181,12 @@ pub(crate) fn write(heats: &[Heat], ladder: &[u32], size: u32, folder: &Path) ->
     text.push_str("How many times as long as Lumbre each program takes to the same error, by the better of its samplers:\n\n");
     text.push_str(&summary(heats));
     for heat in heats {
+        let points = |curve: &Curve| curve.points.iter().map(|p| [p.seconds, p.error]).collect();
         let lines: Vec<Line<'_>> =
-            heat.curves.iter().map(|c| Line { name: &c.name, points: &c.points }).collect();
+            heat.curves.iter().map(|c| Line { name: &c.name, points: points(c) }).collect();
+        let axes = ["seconds of rendering", "relative mean squared error"];
         let title = format!("{}, {}", heat.scene, threads_text(heat.threads));
-        fs::write(plots.join(heat.file()), svg(&title, &lines))?;
+        fs::write(plots.join(heat.file()), svg(&title, axes, &lines))?;
         let _ = writeln!(text, "### {title}\n\n{}\n", heat.about);
         let _ = write!(text, "Noise of the reference: {:.1e}.", heat.noise);
         if let Some(agreement) = heat.agreement {

@@ -4,26 +4,26 @@ use super::scene::{Camera, Material, Mesh, Object, Point, Random, Rgb, Scene, Sk
 
 /// All of them.
 pub(crate) fn all() -> Vec<Scene> {
-    vec![cornell(), interior(), lights(), terrain(), glass(), coats()]
+    vec![cornell(), interior(), lights(), terrain(1000, 500), glass(), coats()]
 }
 
 const WHITE: Material = Material::Diffuse { reflectance: [0.75, 0.75, 0.75] };
 
 /// Scenes are put together from materials and what is made of them.
 #[derive(Default)]
-struct Parts {
+pub(super) struct Parts {
     materials: Vec<Material>,
     objects: Vec<Object>,
 }
 
 impl Parts {
-    fn add(&mut self, mesh: Mesh, material: Material) {
+    pub(super) fn add(&mut self, mesh: Mesh, material: Material) {
         let material = self.material(material);
         self.objects.push(Object { mesh, material, emission: None });
     }
 
     /// What shines is black itself, so that programs need not agree on what a lamp reflects.
-    fn add_light(&mut self, mesh: Mesh, radiance: Rgb) {
+    pub(super) fn add_light(&mut self, mesh: Mesh, radiance: Rgb) {
         let material = self.material(Material::Diffuse { reflectance: [0.0; 3] });
         self.objects.push(Object { mesh, material, emission: Some(radiance) });
     }
@@ -35,12 +35,18 @@ impl Parts {
         })
     }
 
-    fn scene(self, name: &'static str, about: &'static str, bounces: u32, camera: Camera) -> Scene {
+    pub(super) fn scene(
+        self,
+        name: &'static str,
+        about: &'static str,
+        bounces: u32,
+        camera: Camera,
+    ) -> Scene {
         Scene { name, about, bounces, camera, materials: self.materials, objects: self.objects, sky: None }
     }
 }
 
-fn diffuse(reflectance: Rgb) -> Material {
+pub(super) fn diffuse(reflectance: Rgb) -> Material {
     Material::Diffuse { reflectance }
 }
 
@@ -53,12 +59,12 @@ fn coated(reflectance: Rgb, alpha: f64) -> Material {
 }
 
 /// A horizontal rectangle that faces up.
-fn floor(x: [f64; 2], y: f64, z: [f64; 2]) -> Mesh {
+pub(super) fn floor(x: [f64; 2], y: f64, z: [f64; 2]) -> Mesh {
     Mesh::quad([[x[0], y, z[1]], [x[1], y, z[1]], [x[1], y, z[0]], [x[0], y, z[0]]])
 }
 
 /// A horizontal rectangle that faces down.
-fn ceiling(x: [f64; 2], y: f64, z: [f64; 2]) -> Mesh {
+pub(super) fn ceiling(x: [f64; 2], y: f64, z: [f64; 2]) -> Mesh {
     Mesh::quad([[x[0], y, z[0]], [x[1], y, z[0]], [x[1], y, z[1]], [x[0], y, z[1]]])
 }
 
@@ -161,10 +167,11 @@ fn lights() -> Scene {
     parts.scene("lights", "A town under 10,000 small lamps of eight colours.", 3, camera)
 }
 
-fn terrain() -> Scene {
+/// Of twice as many triangles as there are cells.
+pub(super) fn terrain(columns: u32, rows: u32) -> Scene {
     let mut parts = Parts::default();
     parts.add(
-        Mesh::grid(1000, 500, |u, v| {
+        Mesh::grid(columns, rows, |u, v| {
             let (x, z) = (12.0 * u - 6.0, 9.0 * v - 7.5);
             [x, height(x, z), z]
         }),

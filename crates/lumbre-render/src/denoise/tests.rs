@@ -1,14 +1,12 @@
 //! The filter on pictures whose signal and noise are known.
 
-use std::time::Duration;
-
 use lumbre_image::{Image, Rgb};
 use lumbre_math::random::{combine, mix, uniform_f64};
 
 use super::denoise;
 use crate::film::{Exposure, Extras, FeatureSample, PixelBounds, Sample, Tile};
 use crate::rendered::{guides, picture};
-use crate::{RayCounts, Rendered, Stats};
+use crate::{Rendered, Stats};
 
 const WIDTH: u32 = 40;
 const HEIGHT: u32 = 32;
@@ -40,19 +38,7 @@ fn rendered(samples: u32, scene: &Scene) -> Rendered {
         bounds,
         features: vec![],
         guides: Some(guides(tiles(), bounds)),
-        stats: Stats {
-            spp: samples,
-            stride: Some(1),
-            cancelled: false,
-            samples: 0,
-            rays: RayCounts::default(),
-            dropped: 0,
-            first_dropped: vec![],
-            noise: None,
-            threads: 1,
-            refused_threads: 0,
-            elapsed: Duration::ZERO,
-        },
+        stats: Stats { spp: samples, stride: Some(1), threads: 1, ..Stats::default() },
     }
 }
 

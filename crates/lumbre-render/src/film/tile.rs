@@ -269,9 +269,12 @@ impl Tile {
         self.pixels.iter().map(|pixel| pixel.taken).min().unwrap_or(0)
     }
 
-    /// How many samples a pixel of it has, with those that were dropped.
-    pub fn taken(&self, x: u32, y: u32) -> u32 {
-        self.pixels[self.bounds.position(x, y)].taken
+    /// The sums of the pixel in column `x` and row `y` of the picture.
+    ///
+    /// # Panics
+    /// Where that is not in the tile.
+    pub fn pixel(&self, x: u32, y: u32) -> &Pixel {
+        &self.pixels[self.bounds.position(x, y)]
     }
 
     /// The first pixel as a tile of its own.

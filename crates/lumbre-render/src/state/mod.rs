@@ -159,6 +159,7 @@ impl RenderState {
         let rendered = rendered_of(self.tiles.iter(), self.bounds, transparent, self.extras());
         let stats = Stats {
             spp: self.least_samples(),
+            most_spp: self.most_samples(),
             stride: (self.least_samples() > 0).then_some(1),
             samples: self.rays.camera,
             rays: self.rays,
