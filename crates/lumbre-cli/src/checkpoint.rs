@@ -190,6 +190,8 @@ pub(crate) struct Checkpoint {
     _lock: Option<Lock>,
     /// Whether the file is of this very render, to be removed when it is done.
     is_own: AtomicBool,
+    /// Whether the last write failed, which was said.
+    has_failed: AtomicBool,
     /// Samples that a checkpoint of an earlier run has, which this one leaves alone as long as it has fewer.
     others: u64,
     writing: Mutex<Option<Background<Result<(), lumbre::Error>>>>,
@@ -258,6 +260,7 @@ impl Checkpoint {
             start: Instant::now(),
             identified: Identified(Mutex::new(Finding::Running(thread))),
             is_own: AtomicBool::new(false),
+            has_failed: AtomicBool::new(false),
             others: 0,
             writing: Mutex::new(None),
         };
@@ -284,16 +287,19 @@ impl Checkpoint {
             None if arguments.resume && output.is_file() => Some(output.to_owned()),
             None => None,
         };
-        let Some(path) = found else {
+        let begins = || {
             if arguments.resume && !is_quiet {
                 say!("nothing to resume: the render begins");
             }
-            return Ok(None);
+            Ok(None)
         };
+        let Some(path) = found else { return begins() };
         let is_output = path == output;
         let name = path.display().to_string();
         let part = match Part::open(&path, most_memory) {
             Ok(part) => part,
+            // The checkpoint that is named is yet to come, and the picture is to be replaced.
+            Err(PartError::NoPart) if is_output && self.is_asked => return begins(),
             Err(PartError::NoPart) if is_output => {
                 return Err(Failure::Usage(format!(
                     "{name}: the picture cannot be resumed (expected one that was saved with --keep-sums, or a checkpoint)"
@@ -356,8 +362,12 @@ impl Checkpoint {
         if writing.as_ref().is_some_and(|writing| !writing.is_finished()) {
             return;
         }
-        if let Some(Err(error)) = writing.take().and_then(Background::join) {
-            say!("warning: the checkpoint cannot be written: {error}");
+        if let Some(written) = writing.take().and_then(Background::join) {
+            // Said once for a disk that stays full.
+            let was_said = self.has_failed.swap(written.is_err(), Ordering::Relaxed);
+            if let (Err(error), false) = (written, was_said) {
+                say!("warning: the checkpoint cannot be written, which is tried again: {error}");
+            }
         }
         let Ok(job) = self.identified.get() else { return };
         self.is_own.store(true, Ordering::Relaxed);
