@@ -1,20 +1,6 @@
-//! Any bytes are a scene or an error at a place of it.
 #![no_main]
+#[allow(dead_code, reason = "the others have targets of their own")]
+#[path = "../../crates/lumbre-formats/tests/hostile/mod.rs"]
+mod hostile;
 
-use libfuzzer_sys::fuzz_target;
-use lumbre_formats::{Budget, Diagnostics, Limits, Strictness, pbrt};
-
-fuzz_target!(|bytes: &[u8]| {
-    let mut limits = Limits::default();
-    limits.memory = 64 << 20;
-    limits.elements = 100_000;
-    limits.files = 100;
-    for strictness in [Strictness::Normal, Strictness::Lenient] {
-        let mut diagnostics = Diagnostics::with_strictness(strictness);
-        let scene = pbrt::read_bytes("fuzz.pbrt", bytes, None, &Budget::new(limits), &mut diagnostics);
-        if let Err(error) = scene {
-            assert!(error.to_diagnostic().to_string().starts_with("error: fuzz.pbrt"));
-        }
-        diagnostics.lines();
-    }
-});
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| hostile::pbrt::run(bytes));

@@ -1,20 +1,6 @@
-//! Any bytes are an STL file or an error with a place.
 #![no_main]
+#[allow(dead_code, reason = "the others have targets of their own")]
+#[path = "../../crates/lumbre-formats/tests/hostile/mod.rs"]
+mod hostile;
 
-use libfuzzer_sys::fuzz_target;
-use lumbre_formats::stl::read_stl;
-use lumbre_formats::{Budget, Diagnostics, Limits, Strictness};
-
-fuzz_target!(|bytes: &[u8]| {
-    let mut limits = Limits::default();
-    limits.memory = 64 << 20;
-    limits.elements = 1_000_000;
-    for strictness in [Strictness::Normal, Strictness::Lenient] {
-        let mut diagnostics = Diagnostics::with_strictness(strictness);
-        let read = read_stl(bytes, &"fuzz.stl".into(), &Budget::new(limits), &mut diagnostics);
-        if let Err(error) = read {
-            assert!(error.to_diagnostic().to_string().starts_with("error: "));
-        }
-        diagnostics.lines();
-    }
-});
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| hostile::stl::run(bytes));

@@ -9,6 +9,7 @@ use xtask::command::{self, Profile};
 mod bench;
 mod check;
 mod field;
+mod fuzz;
 mod pictures;
 mod proof;
 mod race;
@@ -71,6 +72,8 @@ enum Task {
     /// Runs the kernel's tests, with every instruction set that the machine has, under the address sanitizer. Needs a nightly
     /// toolchain.
     Asan,
+    /// Damages files of every kind at random, target by target, and keeps what breaks a reader. Needs a nightly toolchain.
+    Fuzz(fuzz::Fuzz),
     /// Measures Lumbre, against peers where they are found.
     #[command(subcommand)]
     Bench(bench::Bench),
@@ -108,6 +111,7 @@ fn main() -> Result<()> {
         Task::Proof { what, rays, seed } => proof::run_proof(what, rays, seed),
         Task::Miri => proof::miri(),
         Task::Asan => proof::asan(),
+        Task::Fuzz(fuzz) => fuzz.run(),
         Task::Bench(bench) => bench.run(),
     }
 }

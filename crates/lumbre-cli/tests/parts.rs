@@ -228,7 +228,7 @@ mod interrupted {
         let folder = folder();
         let arguments: Vec<&str> =
             RENDER.split_whitespace().chain(["-o", "a.exr", "--checkpoint", "ck", "--resume"]).collect();
-        let kills = if std::env::var_os("LUMBRE_LONG_TESTS").is_some() { 100 } else { 6 };
+        let kills = if std::env::var_os("LUMBRE_LONG_TESTS").is_some() { 300 } else { 6 };
         let mut held = 0;
         for i in 0..kills {
             let mut child = folder.command(&arguments).stderr(Stdio::null()).spawn().unwrap();

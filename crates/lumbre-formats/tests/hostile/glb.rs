@@ -7,7 +7,7 @@ use lumbre_formats::{Budget, Diagnostics, FormatError, Limits};
 use lumbre_scene::SceneDesc;
 
 /// A file of these two chunks, each filled up to a multiple of four bytes.
-pub fn of_chunks(json: &str, binary: &[u8]) -> Vec<u8> {
+pub(super) fn of_chunks(json: &str, binary: &[u8]) -> Vec<u8> {
     let filled = |bytes: &[u8], with: u8| {
         let mut filled = bytes.to_vec();
         filled.resize(bytes.len().next_multiple_of(4), with);
@@ -25,8 +25,7 @@ pub fn of_chunks(json: &str, binary: &[u8]) -> Vec<u8> {
 }
 
 /// What such a file holds, in no more memory than malformed files may take.
-#[allow(dead_code, reason = "one target has limits of its own")]
-pub fn read(json: &str, binary: &[u8]) -> Result<SceneDesc, FormatError> {
+pub(super) fn read(json: &str, binary: &[u8]) -> Result<SceneDesc, FormatError> {
     let glb = of_chunks(json, binary);
     let mut limits = Limits::default();
     limits.memory = (64 << 20) + 32 * glb.len() as u64;

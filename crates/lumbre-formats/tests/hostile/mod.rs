@@ -1,0 +1,31 @@
+//! What must hold of any bytes: run on what damages files at random (`fuzz/`), and on the files that it found and kept.
+
+mod glb;
+pub(crate) mod gltf;
+pub(crate) mod gltf_buffer;
+pub(crate) mod gltf_draco;
+pub(crate) mod gltf_ktx;
+pub(crate) mod gltf_meshopt;
+pub(crate) mod ies;
+pub(crate) mod image;
+pub(crate) mod mesh_kinds;
+pub(crate) mod obj;
+pub(crate) mod pbrt;
+pub(crate) mod ply;
+pub(crate) mod stl;
+
+/// What reads bytes as one kind of file, by the name of its fuzz target.
+pub(crate) const CHECKS: [(&str, fn(&[u8])); 12] = [
+    ("gltf", gltf::run),
+    ("gltf_buffer", gltf_buffer::run),
+    ("gltf_draco", gltf_draco::run),
+    ("gltf_ktx", gltf_ktx::run),
+    ("gltf_meshopt", gltf_meshopt::run),
+    ("ies", ies::run),
+    ("image", image::run),
+    ("mesh_kinds", mesh_kinds::run),
+    ("obj", obj::run),
+    ("pbrt", pbrt::run),
+    ("ply", ply::run),
+    ("stl", stl::run),
+];
