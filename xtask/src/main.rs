@@ -11,6 +11,7 @@ mod check;
 mod field;
 mod pictures;
 mod proof;
+mod python;
 mod race;
 mod suite;
 

@@ -5,7 +5,7 @@ use pyo3::exceptions::{PyMemoryError, PyOSError, PyValueError};
 use pyo3::{PyErr, create_exception};
 
 create_exception!(
-    _lumbre,
+    lumbre._lumbre,
     LumbreError,
     PyValueError,
     "A scene, a file or an option is invalid; the message says where, what was found and what is accepted."

@@ -21,8 +21,8 @@ pub(crate) struct Picture {
 }
 
 impl Picture {
-    pub(crate) fn new(picture: lumbre::Picture, part: PartDesc) -> Self {
-        Self { picture, part: Mutex::new(Some(part)) }
+    pub(crate) fn new(picture: lumbre::Picture, part: Option<PartDesc>) -> Self {
+        Self { picture, part: Mutex::new(part) }
     }
 }
 
@@ -134,8 +134,11 @@ impl Picture {
     /// The sums of its samples, which are handed out once.
     fn take_part(&self) -> PyResult<Part> {
         let part = self.part.lock().unwrap_or_else(PoisonError::into_inner).take();
-        part.map(|part| Part(Mutex::new(part)))
-            .ok_or_else(|| invalid("the part of the picture has been taken"))
+        part.map(|part| Part(Mutex::new(part))).ok_or_else(|| {
+            invalid(
+                "the picture has no part, or it has been taken (expected one that was rendered with part)",
+            )
+        })
     }
 }
 
@@ -191,9 +194,7 @@ impl Part {
 
     /// The picture of its samples.
     fn picture(&self, py: Python<'_>) -> Picture {
-        py.detach(|| {
-            self.with(|part| Picture { picture: part.picture(), part: Mutex::new(Some(part.clone())) })
-        })
+        py.detach(|| self.with(|part| Picture::new(part.picture(), None)))
     }
 }
 

@@ -1,7 +1,8 @@
 //! Scenes: opened or built, asked with rays and points, rendered.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 use lumbre::description::IntegratorKind;
@@ -30,6 +31,8 @@ pub(crate) struct Scene {
     files: Vec<PathBuf>,
     /// What else it depends on, by name.
     settings: Vec<(String, String)>,
+    /// Hashes of the files by their names, once someone has asked for a part.
+    hashes: OnceLock<BTreeMap<String, String>>,
 }
 
 /// Does the same in the precision of an array, which goes by the name given.
@@ -90,7 +93,7 @@ impl Scene {
         let open = || lumbre::open_with(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>(), &options);
         let (scene, diagnostics) = interruptible(py, |_| open(), |_| Ok(()))?.map_err(raised)?;
         let files = diagnostics.files_read().to_vec();
-        Ok((Self { scene, files, settings }, diagnostics.lines()))
+        Ok((Self { scene, files, settings, hashes: OnceLock::new() }, diagnostics.lines()))
     }
 
     /// Builds a scene of shapes, of shapes with many places each, of cameras and of lights.
@@ -136,7 +139,7 @@ impl Scene {
             towards => UpAxis::Towards(towards.into()),
         };
         let scene = interruptible(py, |_| lumbre::Scene::from_description(desc), |_| Ok(()))?;
-        Ok(Self { scene: scene.map_err(raised)?, files: Vec::new(), settings })
+        Ok(Self { scene: scene.map_err(raised)?, files: Vec::new(), settings, hashes: OnceLock::new() })
     }
 
     /// The closest hits, into the arrays of `out`.
@@ -242,15 +245,10 @@ impl Scene {
         options: &Bound<'_, PyDict>,
         progress: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Picture> {
-        let (options, denoises) = self.options(options)?;
+        let Asked { options, denoises, keeps_part } = self.asked(options)?;
         let tells = progress.map(Bound::unbind);
         let (watch, cancel) = (Watch::default(), CancelToken::new());
-        let job = Job::new(
-            self.files.iter().map(PathBuf::as_path).filter(|file| Path::is_file(file)),
-            self.settings.iter().cloned(),
-            &options,
-        );
-        let job = job.map_err(raised)?;
+        let job = if keeps_part { Some(self.job(&options)?) } else { None };
         // The render has threads of its own; those that wait for it here look for Ctrl-C.
         let rendered = py.detach(|| {
             std::thread::scope(|scope| {
@@ -277,7 +275,7 @@ impl Scene {
         if denoises {
             py.detach(|| picture.denoise(options.threads)).map_err(raised)?;
         }
-        Ok(Picture::new(picture, PartDesc { job, state }))
+        Ok(Picture::new(picture, job.map(|job| PartDesc { job, state })))
     }
 
     /// What is in it, by name.
@@ -294,6 +292,21 @@ impl Scene {
         all.set_item("memory_bytes", info.memory_bytes)?;
         all.set_item("is_dark", self.scene.is_dark())?;
         Ok(all)
+    }
+
+    /// The files that it was read from, each as it was named.
+    fn files(&self) -> Vec<PathBuf> {
+        self.files.clone()
+    }
+
+    /// Reads its files once more for the hashes by which parts of a render are known; later they may go away.
+    fn hash_files(&self) -> PyResult<()> {
+        self.job(&self.scene.options()).map(drop)
+    }
+
+    /// Samples a pixel, where nobody says how many.
+    fn samples(&self) -> u32 {
+        self.scene.options().stop.spp
     }
 
     /// The size of its picture, where none is asked for.
@@ -325,11 +338,32 @@ impl Watch {
     }
 }
 
+/// What is asked of a render.
+struct Asked {
+    options: RenderOptions,
+    denoises: bool,
+    /// Whether its sums are to be kept, for merging.
+    keeps_part: bool,
+}
+
 impl Scene {
-    /// The options of a render by their names, and whether to denoise it.
-    fn options(&self, given: &Bound<'_, PyDict>) -> PyResult<(RenderOptions, bool)> {
+    /// Which render it is.
+    fn job(&self, options: &RenderOptions) -> PyResult<Job> {
+        if self.hashes.get().is_none() {
+            let files = self.files.iter().map(PathBuf::as_path).filter(|file| Path::is_file(file));
+            let mut identity = Job::new(files, [], options).map_err(raised)?.identity;
+            identity.retain(|name, _| name.starts_with("file "));
+            self.hashes.get_or_init(|| identity);
+        }
+        let mut job = Job::new([], self.settings.iter().cloned(), options).map_err(raised)?;
+        job.identity.extend(self.hashes.get().cloned().unwrap_or_default());
+        Ok(job)
+    }
+
+    /// The options of a render by their names.
+    fn asked(&self, given: &Bound<'_, PyDict>) -> PyResult<Asked> {
         let mut options = self.scene.options();
-        let mut denoises = false;
+        let (mut denoises, mut keeps_part) = (false, false);
         for (name, value) in given {
             let name: String = name.extract()?;
             match &*name {
@@ -363,12 +397,13 @@ impl Scene {
                 "transparent" => options.transparent = value.extract()?,
                 "features" => options.features = value.extract()?,
                 "denoise" => denoises = value.extract()?,
+                "part" => keeps_part = value.extract()?,
                 _ => return Err(invalid(format!("render has no option {name}"))),
             }
         }
         options.guides = denoises;
         options.features |= denoises;
-        Ok((options, denoises))
+        Ok(Asked { options, denoises, keeps_part })
     }
 
     fn camera(&self, wanted: &Bound<'_, PyAny>) -> PyResult<usize> {

@@ -1,0 +1,158 @@
+"""Many machines: on a cluster of processes here, some of which die, freeze or are slow."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import threading
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from conftest import SCENES, ball, random_rays
+
+import lumbre
+from lumbre.distributed import cast, render
+
+distributed = pytest.importorskip("distributed")
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+# Schedules of accidents; before a release 200.
+SCHEDULES = 200 if os.environ.get("LUMBRE_LONG_TESTS") else 4
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[object]:
+    with distributed.LocalCluster(n_workers=4, threads_per_worker=1, dashboard_address=None, memory_limit=0, silence_logs=50) as cluster:
+        with distributed.Client(cluster) as client:
+            yield client
+
+
+@pytest.fixture(scope="module")
+def scene() -> lumbre.Scene:
+    vertices, faces = ball(1)
+    return lumbre.Scene(
+        [lumbre.Mesh(vertices, faces), lumbre.Plane(point=(0, 0, 0.25), material=lumbre.Metal(0.8, 0.2))],
+        camera=lumbre.Perspective((0, -14, 6), target=(0.5, -1, 2.5), fov=35),
+        lights=[lumbre.EnvironmentLight(0.3), lumbre.DistantLight((1, -1, 2), 2)],
+    )
+
+
+def test_many_machines_render_the_bytes_of_one(client, scene) -> None:
+    expected = scene.render(spp=5, size=(40, 30), features=True)
+    told: list[float] = []
+    image = render(scene, client, 5, (40, 30), features=True, tile=17, samples_per_task=2, progress=lambda *state: told.append(state[2]))
+    np.testing.assert_array_equal(image.array, expected.array)
+    np.testing.assert_array_equal(image.feature("normal"), expected.feature("normal"))
+    assert image.png() == expected.png() and image.stats["rays"] == expected.stats["rays"]
+    assert len(told) == 3 * 2 * 3 and told[-1] == 1.0
+    crop = render(scene, client, 5, (40, 30), crop=(3, 4, 21, 29))
+    np.testing.assert_array_equal(crop.array, expected.array[4:29, 3:21])
+
+
+def test_files_are_read_from_shared_storage_or_sent_along(client, tmp_path) -> None:
+    path = SCENES / "csg" / "csg.pbrt"
+    expected = lumbre.load(path).render(spp=1, size=(16, 12)).array
+    np.testing.assert_array_equal(render(path, client, 1, (16, 12)).array, expected)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder" / "ball.pbrt").write_text('Shape "sphere" "float radius" 2\n')
+    sent = tmp_path / "scene.pbrt"
+    sent.write_text('WorldBegin\nInclude "folder/ball.pbrt"\n')
+    image = render(sent, client, 1, (8, 6), ship=True)
+    np.testing.assert_array_equal(image.array, lumbre.load(sent).render(spp=1, size=(8, 6)).array)
+
+
+def test_rays_come_back_with_the_answers_of_one(client, mixed) -> None:
+    origins, directions = random_rays(5003)
+    expected = mixed.cast(origins, directions, tmax=np.linspace(0.1, 2.0, 5003))
+    hits = cast(mixed, origins, directions, client, tmax=np.linspace(0.1, 2.0, 5003), rays_per_task=700)
+    for name in expected.fields:
+        np.testing.assert_array_equal(getattr(hits, name), getattr(expected, name))
+
+
+def test_a_time_limit_gives_what_one_machine_gives_for_as_many_samples(client, scene) -> None:
+    image = render(scene, client, size=(24, 18), time=3.0)
+    spp = image.stats["spp"]
+    assert 1 <= spp < 2**20
+    np.testing.assert_array_equal(image.array, scene.render(spp=spp, size=(24, 18)).array)
+
+
+def test_what_is_wrong_is_said_at_once(client, scene) -> None:
+    start = time.monotonic()
+    with pytest.raises(lumbre.LumbreError, match="no camera 7"):
+        render(scene, client, 1, (8, 6), camera=7)
+    with pytest.raises(lumbre.LumbreError, match="denoise"):
+        render(scene, client, 1, (8, 6), denoise=True)
+    with pytest.raises(lumbre.LumbreError, match="nothing to render"):
+        render(scene, client, 0, (8, 6))
+    with pytest.raises(FileNotFoundError):
+        render("nowhere.pbrt", client, 1, (8, 6))
+    assert time.monotonic() - start < 20
+
+
+HAPPENED: list[str] = []
+
+
+class Accidents(threading.Thread):
+    """Kills, freezes and wakes workers, as a seed says, until it is stopped."""
+
+    def __init__(self, client: object, seed: int) -> None:
+        super().__init__(daemon=True)
+        self.client, self.random, self.over = client, random.Random(seed), threading.Event()
+
+    def run(self) -> None:
+        frozen: list[int] = []
+        kills = 0
+        while not self.over.wait(self.random.uniform(0.02, 0.4)):
+            try:
+                workers = self.client.scheduler_info(n_workers=-1)["workers"].values()
+                pids = [int(str(worker["id"]).split("pid-")[-1]) for worker in workers if "pid-" in str(worker["id"])]
+            except Exception:
+                continue
+            pids = pids or self.pids()
+            if not pids:
+                continue
+            pid, what = self.random.choice(pids), self.random.choice(["kill", "freeze", "freeze", "wake", "none"])
+            try:
+                if what == "kill" and kills < 3:
+                    os.kill(pid, signal.SIGKILL)
+                elif what == "freeze" and len(set(frozen)) < 2:
+                    os.kill(pid, signal.SIGSTOP)
+                    frozen.append(pid)
+                elif what == "wake" and frozen:
+                    os.kill(frozen.pop(), signal.SIGCONT)
+                else:
+                    continue
+                kills += what == "kill"
+                HAPPENED.append(what)
+            except ProcessLookupError:
+                pass
+        for pid in frozen:
+            try:
+                os.kill(pid, signal.SIGCONT)
+            except ProcessLookupError:
+                pass
+
+    def pids(self) -> list[int]:
+        nannies = self.client.cluster.workers.values()
+        return [nanny.pid for nanny in nannies if getattr(nanny, "pid", None)]
+
+
+@pytest.mark.parametrize("seed", range(SCHEDULES))
+def test_workers_may_die_freeze_and_be_slow(client, scene, seed) -> None:
+    expected = scene.render(spp=8, size=(40, 30)).array
+    accidents = Accidents(client, seed)
+    accidents.start()
+    try:
+        image = render(scene, client, 8, (40, 30), tile=10, samples_per_task=4, patience=1.0)
+    finally:
+        accidents.over.set()
+        accidents.join()
+    np.testing.assert_array_equal(image.array, expected)
+    assert image.stats["samples"] == 8 * 40 * 30
+
+
+def test_accidents_did_happen() -> None:
+    assert HAPPENED.count("kill") >= 2 and HAPPENED.count("freeze") >= 2, HAPPENED
