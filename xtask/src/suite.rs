@@ -62,7 +62,16 @@ fn oldest_compiler() -> Result<()> {
 
 /// Every crate that is published makes a package. The packages are not compiled, which would take as long as all the tests.
 fn package() -> Result<()> {
-    let arguments = ["package", "--workspace", "--exclude", "xtask", "--exclude", "lumbre-dev", "--exclude", "lumbre-python"];
+    let arguments = [
+        "package",
+        "--workspace",
+        "--exclude",
+        "xtask",
+        "--exclude",
+        "lumbre-dev",
+        "--exclude",
+        "lumbre-python",
+    ];
     command::run("cargo", &[&arguments[..], &["--no-verify", "--allow-dirty", "--quiet"]].concat())
 }
 
