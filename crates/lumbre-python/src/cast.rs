@@ -7,18 +7,25 @@ use lumbre::kernel::Hit;
 use lumbre::{CastHit, Ray, Scene};
 use numpy::{PyArray1, PyArrayMethods, PyReadwriteArray1, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 use rayon::prelude::*;
 
-use crate::columns::{Columns, NONE, Outputs, Row};
+use crate::columns::{Columns, Fresh, NONE, Outputs, Row};
 use crate::errors::invalid;
 use crate::rays::{Rays, RaysView, Real};
-use crate::work::{Stop, interruptible};
+use crate::work::{Stop, interruptible, pool};
 
 /// Rays that a thread takes at a time: enough for the batches of the kernel, and soon done.
 pub(crate) const PIECE: usize = 4096;
+/// The least that is worth the way to another thread.
+const LEAST: usize = 256;
 /// So few are not worth waking threads for.
-pub(crate) const FEW: usize = 64;
+const FEW: usize = 256;
+
+/// Into how large pieces to cut a list, so that all threads have work to its end.
+pub(crate) fn piece_size(count: usize) -> PyResult<usize> {
+    Ok(if count <= FEW { FEW } else { (count / (4 * pool()?.current_num_threads())).clamp(LEAST, PIECE) })
+}
 
 /// Does `work` for every piece: here where there are few rays, else on all threads without the interpreter's lock.
 pub(crate) fn each_piece<P: Send>(
@@ -51,8 +58,23 @@ pub(crate) fn closest<T: Real>(
     let rays = rays.view();
     let count = rays.len();
     let mut outputs = Outputs::<T>::new(out, count)?;
-    let pieces = outputs.columns(count)?.pieces(PIECE);
+    let pieces = outputs.columns(count)?.pieces(piece_size(count)?);
     each_piece(py, count, pieces, |mut piece| closest_of(scene, &rays, &mut piece))
+}
+
+/// The same into arrays that are made here; `None` where a field is none.
+pub(crate) fn closest_fresh<'py, T: Real>(
+    py: Python<'py>,
+    scene: &Scene,
+    rays: &Rays<'_, T>,
+    fields: &Bound<'_, PyTuple>,
+) -> PyResult<Option<Bound<'py, PyDict>>> {
+    let rays = rays.view();
+    let count = rays.len();
+    let Some(mut fresh) = Fresh::<T>::new(fields, count)? else { return Ok(None) };
+    let pieces = fresh.columns(count).pieces(piece_size(count)?);
+    each_piece(py, count, pieces, |mut piece| closest_of(scene, &rays, &mut piece))?;
+    fresh.into_dict(py).map(Some)
 }
 
 fn closest_of<T: Real>(scene: &Scene, rays: &RaysView<'_, T>, out: &mut Columns<'_, T>) {
@@ -126,8 +148,9 @@ pub(crate) fn each_chunk<O: numpy::Element + Send>(
     if out.len() != count {
         return Err(invalid(format!("out has the wrong length (found {}; expected {count})", out.len())));
     }
-    let pieces = out.as_slice_mut()?.chunks_mut(PIECE).enumerate().collect();
-    each_piece(py, count, pieces, |(number, piece): (usize, &mut [O])| work(number * PIECE, piece))
+    let size = piece_size(count)?;
+    let pieces = out.as_slice_mut()?.chunks_mut(size).enumerate().collect();
+    each_piece(py, count, pieces, |(number, piece): (usize, &mut [O])| work(number * size, piece))
 }
 
 /// Every hit of every ray by ascending t: its columns by name, and `offsets`, by which those of ray i are `offsets[i]..offsets[i + 1]`.
@@ -138,10 +161,11 @@ pub(crate) fn all<'py, T: Real>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let rays = rays.view();
     let count = rays.len();
-    let mut found: Vec<(Vec<CastHit>, Vec<i64>)> = vec![Default::default(); count.div_ceil(PIECE)];
+    let size = piece_size(count)?;
+    let mut found: Vec<(Vec<CastHit>, Vec<i64>)> = vec![Default::default(); count.div_ceil(size)];
     let pieces = found.iter_mut().enumerate().collect();
     each_piece(py, count, pieces, |(number, (hits, ends))| {
-        for ray in number * PIECE..count.min((number + 1) * PIECE) {
+        for ray in number * size..count.min((number + 1) * size) {
             scene.all(&rays.ray(ray), |hit| {
                 hits.push(hit);
                 ControlFlow::Continue(())

@@ -3,9 +3,11 @@
 use std::ops::Range;
 
 use lumbre::DVec3;
-use numpy::{Element, PyReadwriteArray1, PyReadwriteArray2, PyUntypedArrayMethods};
+use numpy::ndarray::Array2;
+use numpy::{Element, PyArray1, PyArray2, PyReadwriteArray1, PyReadwriteArray2, PyUntypedArrayMethods};
+use pyo3::intern;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyString, PyTuple};
 
 use crate::errors::invalid;
 use crate::rays::Real;
@@ -23,6 +25,99 @@ pub(crate) struct Outputs<'py, T: Real> {
     shape: Option<PyReadwriteArray1<'py, i32>>,
     prim: Option<PyReadwriteArray1<'py, i32>>,
     instance: Option<PyReadwriteArray1<'py, i32>>,
+}
+
+/// Arrays that are made here, of the fields that are wanted.
+pub(crate) struct Fresh<T> {
+    t: Option<Vec<T>>,
+    point: Option<Vec<T>>,
+    normal: Option<Vec<T>>,
+    uv: Option<Vec<T>>,
+    front: Option<Vec<bool>>,
+    shape: Option<Vec<i32>>,
+    prim: Option<Vec<i32>>,
+    instance: Option<Vec<i32>>,
+}
+
+impl<T: Real> Fresh<T> {
+    /// Rows for so many rays. Names that are no fields are for Python to refuse: `None`.
+    pub(crate) fn new(fields: &Bound<'_, PyTuple>, count: usize) -> PyResult<Option<Self>> {
+        let mut fresh = Self {
+            t: None,
+            point: None,
+            normal: None,
+            uv: None,
+            front: None,
+            shape: None,
+            prim: None,
+            instance: None,
+        };
+        let zero = T::rounded(0.0);
+        for field in fields {
+            match field.cast::<PyString>()?.to_cow()?.as_ref() {
+                "t" => fresh.t = Some(vec![zero; count]),
+                "point" => fresh.point = Some(vec![zero; 3 * count]),
+                "normal" => fresh.normal = Some(vec![zero; 3 * count]),
+                "uv" => fresh.uv = Some(vec![zero; 2 * count]),
+                "front" => fresh.front = Some(vec![false; count]),
+                "shape" => fresh.shape = Some(vec![0; count]),
+                "prim" => fresh.prim = Some(vec![0; count]),
+                "instance" => fresh.instance = Some(vec![0; count]),
+                _ => return Ok(None),
+            }
+        }
+        Ok(Some(fresh))
+    }
+
+    pub(crate) fn columns(&mut self, count: usize) -> Columns<'_, T> {
+        Columns {
+            first: 0,
+            count,
+            t: self.t.as_deref_mut(),
+            point: self.point.as_deref_mut(),
+            normal: self.normal.as_deref_mut(),
+            uv: self.uv.as_deref_mut(),
+            front: self.front.as_deref_mut(),
+            shape: self.shape.as_deref_mut(),
+            prim: self.prim.as_deref_mut(),
+            instance: self.instance.as_deref_mut(),
+        }
+    }
+
+    /// The arrays by their names.
+    pub(crate) fn into_dict<'py>(self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let columns = PyDict::new(py);
+        put(&columns, intern!(py, "t"), self.t)?;
+        put_table(&columns, intern!(py, "point"), self.point, 3)?;
+        put_table(&columns, intern!(py, "normal"), self.normal, 3)?;
+        put_table(&columns, intern!(py, "uv"), self.uv, 2)?;
+        put(&columns, intern!(py, "front"), self.front)?;
+        put(&columns, intern!(py, "shape"), self.shape)?;
+        put(&columns, intern!(py, "prim"), self.prim)?;
+        put(&columns, intern!(py, "instance"), self.instance)?;
+        Ok(columns)
+    }
+}
+
+fn put<T: Element>(
+    columns: &Bound<'_, PyDict>,
+    name: &Bound<'_, PyString>,
+    column: Option<Vec<T>>,
+) -> PyResult<()> {
+    let Some(column) = column else { return Ok(()) };
+    columns.set_item(name, PyArray1::from_vec(columns.py(), column))
+}
+
+fn put_table<T: Element>(
+    columns: &Bound<'_, PyDict>,
+    name: &Bound<'_, PyString>,
+    column: Option<Vec<T>>,
+    width: usize,
+) -> PyResult<()> {
+    let Some(column) = column else { return Ok(()) };
+    let rows = column.len() / width;
+    let table = Array2::from_shape_vec((rows, width), column).map_err(invalid)?;
+    columns.set_item(name, PyArray2::from_owned_array(columns.py(), table))
 }
 
 /// The rows of a range of rays.

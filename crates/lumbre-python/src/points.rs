@@ -7,7 +7,7 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::cast::{PIECE, each_chunk, each_piece};
+use crate::cast::{each_chunk, each_piece, piece_size};
 use crate::columns::{NONE, Outputs, Row};
 use crate::errors::raised;
 use crate::rays::{Real, Triples, triple};
@@ -41,7 +41,7 @@ pub(crate) fn closest<T: Real>(
 ) -> PyResult<()> {
     let (points, count) = (points.view(), points.len());
     let mut outputs = Outputs::<T>::new(out, count)?;
-    let pieces = outputs.columns(count)?.pieces(PIECE);
+    let pieces = outputs.columns(count)?.pieces(piece_size(count)?);
     let first = First::default();
     each_piece(py, count, pieces, |mut piece| {
         for (row, number) in piece.range().enumerate() {

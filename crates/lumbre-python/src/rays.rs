@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use lumbre::{DVec3, Ray};
 use numpy::ndarray::{ArrayView1, ArrayView2};
-use numpy::{PyArrayDescrMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use crate::errors::invalid;
@@ -41,6 +41,14 @@ impl Real for f32 {
 pub(crate) struct Triples<'py, T: Real>(PyReadonlyArray2<'py, T>);
 
 impl<'py, T: Real> Triples<'py, T> {
+    /// An array that is ready to be read; `None` for what Python has to look at first.
+    pub(crate) fn ready(array: &Bound<'py, PyAny>) -> Option<Self> {
+        let array: PyReadonlyArray2<'py, T> = array.extract().ok()?;
+        let is_whole = |stride: &isize| stride.unsigned_abs() % size_of::<T>() == 0;
+        let is_aligned = array.strides().iter().all(is_whole) && array.data().is_aligned();
+        (is_aligned && array.shape()[1] == 3).then_some(Self(array))
+    }
+
     pub(crate) fn new(name: &str, array: &Bound<'py, PyAny>) -> PyResult<Self> {
         let array: PyReadonlyArray2<'py, T> = array.extract()?;
         let &[count, width] = array.shape() else { return Err(invalid(format!("{name} has no two axes"))) };
@@ -134,6 +142,18 @@ impl<'py, T: Real> Rays<'py, T> {
         }
         let (t_min, t_max) = (Limit::new("tmin", t_min, count)?, Limit::new("tmax", t_max, count)?);
         Ok(Self { origins, directions, t_min, t_max })
+    }
+
+    /// Rays whose arrays are ready to be read, within one range; `None` for what Python has to look at first.
+    pub(crate) fn ready(
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        t_min: f64,
+        t_max: f64,
+    ) -> Option<Self> {
+        let (origins, directions) = (Triples::ready(origins)?, Triples::ready(directions)?);
+        let (t_min, t_max) = (Limit::All(t_min), Limit::All(t_max));
+        (origins.len() == directions.len()).then_some(Self { origins, directions, t_min, t_max })
     }
 
     pub(crate) fn view(&self) -> RaysView<'_, T> {

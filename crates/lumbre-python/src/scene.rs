@@ -14,7 +14,7 @@ use lumbre::{
 };
 use numpy::{PyArray1, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{PyDict, PyList, PyTuple};
 
 use crate::errors::{invalid, raised};
 use crate::picture::Picture;
@@ -154,6 +154,22 @@ impl Scene {
     ) -> PyResult<()> {
         by_precision!(origins, Real => {
                 cast::closest::<Real>(py, &self.scene, &Rays::new(origins, directions, tmin, tmax)?, out)
+        })
+    }
+
+    /// The closest hits as new arrays by name, for arrays that are ready to be read; `None` for what Python has to look at first.
+    fn cast_ready<'py>(
+        &self,
+        py: Python<'py>,
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        tmin: f64,
+        tmax: f64,
+        fields: &Bound<'py, PyTuple>,
+    ) -> PyResult<Option<Bound<'py, PyDict>>> {
+        by_precision!(origins, Real => {
+            let rays = Rays::<Real>::ready(origins, directions, tmin, tmax);
+            rays.map_or(Ok(None), |rays| cast::closest_fresh(py, &self.scene, &rays, fields))
         })
     }
 

@@ -154,6 +154,9 @@ class Scene:
         tmax: float | _Array,
         out: dict[str, _Array],
     ) -> None: ...
+    def cast_ready(
+        self, origins: _Array, directions: _Array, tmin: float, tmax: float, fields: tuple[str, ...]
+    ) -> dict[str, _Array] | None: ...
     def occluded(
         self,
         origins: _Array,

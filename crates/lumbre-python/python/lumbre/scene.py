@@ -55,7 +55,7 @@ class Hits:
     ([2.0, inf], [True, False], [0, -1])
     """
 
-    __slots__ = FIELDS
+    __slots__ = ("_columns",)
 
     t: Array
     point: Array
@@ -67,26 +67,30 @@ class Hits:
     instance: Array
 
     def __init__(self, columns: Mapping[str, Array]) -> None:
-        for name, column in columns.items():
-            setattr(self, name, column)
+        self._columns = columns
+
+    def __getattr__(self, name: str) -> Array:
+        if name != "_columns" and name in self._columns:
+            return self._columns[name]
+        raise AttributeError(f"these hits have no {name} (cast with it among the fields)")
 
     @property
     def hit(self) -> npt.NDArray[np.bool_]:
         """Whether each ray hit anything, (N,)."""
-        if hasattr(self, "t"):
+        if "t" in self._columns:
             return np.isfinite(self.t)
         for name in ("shape", "prim"):
-            if hasattr(self, name):
-                return np.asarray(getattr(self, name) >= 0)
+            if name in self._columns:
+                return np.asarray(self._columns[name] >= 0)
         raise AttributeError("hit needs t, shape or prim among the fields")
 
     @property
     def fields(self) -> tuple[str, ...]:
         """The names of what was asked for."""
-        return tuple(name for name in FIELDS if hasattr(self, name))
+        return tuple(name for name in FIELDS if name in self._columns)
 
     def __len__(self) -> int:
-        return next((len(getattr(self, name)) for name in self.fields), 0)
+        return next((len(column) for column in self._columns.values()), 0)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({len(self)} rays: {', '.join(self.fields)})"
@@ -101,9 +105,15 @@ class AllHits(Hits):
     ([0, 2], [2.0, 4.0], [0, 0])
     """
 
-    __slots__ = ("offsets",)
+    __slots__ = ()
 
     offsets: Array
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        return f"AllHits({len(self)} hits of {len(self.offsets) - 1} rays)"
 
     @property
     def ray(self) -> npt.NDArray[np.int64]:
@@ -241,6 +251,12 @@ class Scene:
         >>> hits.t.tolist(), hits.point.tolist(), hits.front.tolist()
         ([3.0], [[0.0, 0.0, 2.0]], [True])
         """
+        # The usual arrays need no look from here, which takes longer than a ray.
+        if out is None and type(fields) is tuple and type(tmin) is float and type(tmax) is float:
+            if type(origins) is np.ndarray and type(directions) is np.ndarray:
+                ready = self._native.cast_ready(origins, directions, tmin, tmax, fields)
+                if ready is not None:
+                    return Hits(ready)
         o, d, low, high = rays(origins, directions, tmin, tmax)
         columns = _columns(len(o), o.dtype, fields) if out is None else _checked(out)
         self._native.cast(o, d, low, high, columns)
