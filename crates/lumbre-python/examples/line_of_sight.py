@@ -21,11 +21,11 @@ print(f"seen by the first {seen[0].mean():.0%}, by the second {seen[1].mean():.0
 
 colours = np.array([[0.9, 0.2, 0.1], [0.1, 0.3, 0.9]])
 dots = [
-    lumbre.Sphere(center=t, radius=0.5, material=lumbre.Diffuse(0.05 + s @ colours * 0.9)) for t, s in zip(targets, seen.T, strict=True)
+    lumbre.Sphere(center=t, radius=0.8, material=lumbre.Diffuse(0.05 + s @ colours * 0.9)) for t, s in zip(targets, seen.T, strict=True)
 ]
-posts = [lumbre.Sphere(center=o, radius=1.5, material=lumbre.Diffuse(c)) for o, c in zip(observers, colours, strict=True)]
-view = lumbre.Perspective((95, -75, 95), target=(28, 28, 0), fov=42)
+posts = [lumbre.Sphere(center=o, radius=2, material=lumbre.Diffuse(c)) for o, c in zip(observers, colours, strict=True)]
+view = lumbre.Perspective((95, -75, 95), target=(28, 28, 0), fov=32)
 picture = lumbre.Scene(
     [*blocks, *dots, *posts, lumbre.Plane()], camera=view, lights=[lumbre.EnvironmentLight(1.0), lumbre.DistantLight((1, -2, 3), 2)]
 )
-picture.render(spp=64, size=(640, 400), denoise=True).save("line_of_sight.png", tonemap="neutral")
+picture.render(spp=16, size=(480, 300), denoise=True).save("line_of_sight.png", tonemap="neutral")

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use lumbre::description::Footprint;
 use lumbre::kernel::Hit;
 use lumbre::{CastHit, Ray, Scene};
-use numpy::{PyArray1, PyArrayMethods, PyReadwriteArray1, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArrayMethods, PyReadwriteArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use rayon::prelude::*;
@@ -115,8 +115,24 @@ pub(crate) fn any<T: Real>(
     rays: &Rays<'_, T>,
     out: &Bound<'_, PyAny>,
 ) -> PyResult<()> {
+    let mut out: PyReadwriteArray1<'_, bool> = out.extract()?;
+    any_into(py, scene, rays, out.as_slice_mut()?)
+}
+
+/// The same as a new array.
+pub(crate) fn any_fresh<'py, T: Real>(
+    py: Python<'py>,
+    scene: &Scene,
+    rays: &Rays<'_, T>,
+) -> PyResult<Bound<'py, PyArray1<bool>>> {
+    let mut out = vec![false; rays.view().len()];
+    any_into(py, scene, rays, &mut out)?;
+    Ok(PyArray1::from_vec(py, out))
+}
+
+fn any_into<T: Real>(py: Python<'_>, scene: &Scene, rays: &Rays<'_, T>, out: &mut [bool]) -> PyResult<()> {
     let rays = rays.view();
-    each_chunk::<bool>(py, out, rays.len(), |first, out| {
+    fill(py, out, rays.len(), |first, out| {
         let rays = rays.read(first..first + out.len());
         scene.resolved().accel().any_batch(&rays, out);
     })
@@ -145,11 +161,20 @@ pub(crate) fn each_chunk<O: numpy::Element + Send>(
     work: impl Fn(usize, &mut [O]) + Send + Sync,
 ) -> PyResult<()> {
     let mut out: PyReadwriteArray1<'_, O> = out.extract()?;
+    fill(py, out.as_slice_mut()?, count, work)
+}
+
+fn fill<O: Send>(
+    py: Python<'_>,
+    out: &mut [O],
+    count: usize,
+    work: impl Fn(usize, &mut [O]) + Send + Sync,
+) -> PyResult<()> {
     if out.len() != count {
         return Err(invalid(format!("out has the wrong length (found {}; expected {count})", out.len())));
     }
     let size = piece_size(count)?;
-    let pieces = out.as_slice_mut()?.chunks_mut(size).enumerate().collect();
+    let pieces = out.chunks_mut(size).enumerate().collect();
     each_piece(py, count, pieces, |(number, piece): (usize, &mut [O])| work(number * size, piece))
 }
 

@@ -17,7 +17,7 @@ mod _lumbre {
     #[pymodule_export]
     use crate::errors::LumbreError;
     #[pymodule_export]
-    use crate::picture::{Part, Picture, read_image};
+    use crate::picture::{Part, Picture, read_image, write_image};
     #[pymodule_export]
     use crate::program::main;
     #[pymodule_export]

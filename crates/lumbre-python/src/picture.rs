@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 use lumbre::formats::image::{ExrPrecision, ImageFormat, PngDepth};
-use lumbre::image::{Image, ToneMap};
+use lumbre::image::{Image, Rgb, ToneMap};
 use lumbre::{Feature, Part as PartDesc, SaveOptions};
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
@@ -208,4 +208,31 @@ pub(crate) fn read_image(py: Python<'_>, path: PathBuf) -> PyResult<Pixels> {
     let shape = [image.height() as usize, image.width() as usize];
     let alpha = image.alpha().map(|alpha| PyArray1::from_slice(py, alpha).reshape(shape));
     Ok((array(py, &image)?, alpha.transpose()?.map(Bound::unbind)))
+}
+
+/// Writes linear light, (h, w, 3), as an image file.
+///
+/// # Errors
+/// What is wrong with the array, the options or the file.
+#[pyfunction]
+pub(crate) fn write_image(
+    py: Python<'_>,
+    path: PathBuf,
+    pixels: PyReadonlyArray3<'_, f32>,
+    tonemap: &str,
+    exposure: f32,
+) -> PyResult<()> {
+    let options = options(tonemap, exposure, 8, 95, "half")?;
+    let &[height, width, 3] = pixels.shape() else {
+        return Err(invalid(format!(
+            "an image has the wrong shape (found {:?}; expected (h, w, 3))",
+            pixels.shape()
+        )));
+    };
+    let view = pixels.as_array();
+    let pixel = |i: usize| Rgb::from(std::array::from_fn(|channel| view[[i / width, i % width, channel]]));
+    let pixels = (0..width * height).map(pixel).collect();
+    let image = Image::from_pixels(width as u32, height as u32, pixels);
+    let image = image.ok_or_else(|| invalid(format!("there is no image of {width} by {height} pixels")))?;
+    py.detach(|| lumbre::write_image(&path, &image, &options)).map_err(raised)
 }

@@ -44,7 +44,7 @@ impl<'py, T: Real> Triples<'py, T> {
     /// An array that is ready to be read; `None` for what Python has to look at first.
     pub(crate) fn ready(array: &Bound<'py, PyAny>) -> Option<Self> {
         let array: PyReadonlyArray2<'py, T> = array.extract().ok()?;
-        let is_whole = |stride: &isize| stride.unsigned_abs() % size_of::<T>() == 0;
+        let is_whole = |stride: &isize| stride.unsigned_abs().is_multiple_of(size_of::<T>());
         let is_aligned = array.strides().iter().all(is_whole) && array.data().is_aligned();
         (is_aligned && array.shape()[1] == 3).then_some(Self(array))
     }

@@ -188,6 +188,21 @@ impl Scene {
         })
     }
 
+    /// Whether anything is hit, as a new array, for arrays that are ready to be read; `None` for what Python has to look at first.
+    fn occluded_ready<'py>(
+        &self,
+        py: Python<'py>,
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        tmin: f64,
+        tmax: f64,
+    ) -> PyResult<Option<Bound<'py, PyArray1<bool>>>> {
+        by_precision!(origins, Real => {
+            let rays = Rays::<Real>::ready(origins, directions, tmin, tmax);
+            rays.map_or(Ok(None), |rays| cast::any_fresh(py, &self.scene, &rays).map(Some))
+        })
+    }
+
     /// The numbers of hits, into `out`.
     fn count(
         &self,

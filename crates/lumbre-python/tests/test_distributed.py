@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import random
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -23,11 +25,45 @@ pytestmark = pytest.mark.filterwarnings("ignore")
 SCHEDULES = 200 if os.environ.get("LUMBRE_LONG_TESTS") else 4
 
 
+class Farm:
+    """A scheduler here, and four workers, each a process of its own, as a batch system starts them."""
+
+    def __init__(self) -> None:
+        options = {"protocol": "tcp://", "dashboard_address": None, "silence_logs": 50}
+        self.cluster = distributed.LocalCluster(n_workers=0, **options)
+        self.client = distributed.Client(self.cluster)
+        self.workers: list[subprocess.Popen[bytes]] = []
+
+    def start_missing(self) -> None:
+        self.workers = [worker for worker in self.workers if worker.poll() is None]
+        words = [sys.executable, "-m", "distributed.cli.dask_worker", self.cluster.scheduler_address]
+        words += ["--no-nanny", "--nthreads", "1", "--no-dashboard", "--memory-limit", "0", "--death-timeout", "60"]
+        while len(self.workers) < 4:
+            self.workers.append(subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+
+    def ready(self) -> distributed.Client:
+        self.start_missing()
+        self.client.wait_for_workers(4, timeout=120)
+        return self.client
+
+    def close(self) -> None:
+        for worker in self.workers:
+            worker.kill()
+            worker.wait()
+        self.client.close()
+        self.cluster.close()
+
+
 @pytest.fixture(scope="module")
-def client() -> Iterator[object]:
-    with distributed.LocalCluster(n_workers=4, threads_per_worker=1, dashboard_address=None, memory_limit=0, silence_logs=50) as cluster:
-        with distributed.Client(cluster) as client:
-            yield client
+def farm() -> Iterator[Farm]:
+    farm = Farm()
+    yield farm
+    farm.close()
+
+
+@pytest.fixture
+def client(farm) -> distributed.Client:
+    return farm.ready()
 
 
 @pytest.fixture(scope="module")
@@ -96,54 +132,38 @@ HAPPENED: list[str] = []
 
 
 class Accidents(threading.Thread):
-    """Kills, freezes and wakes workers, as a seed says, until it is stopped."""
+    """Kills, freezes and wakes workers, as a seed says, until it is stopped. Others are started for those that are killed."""
 
-    def __init__(self, client: object, seed: int) -> None:
+    def __init__(self, farm: Farm, seed: int) -> None:
         super().__init__(daemon=True)
-        self.client, self.random, self.over = client, random.Random(seed), threading.Event()
+        self.farm, self.random, self.over = farm, random.Random(seed), threading.Event()
 
     def run(self) -> None:
-        frozen: list[int] = []
+        frozen: list[subprocess.Popen[bytes]] = []
         kills = 0
         while not self.over.wait(self.random.uniform(0.02, 0.4)):
-            try:
-                workers = self.client.scheduler_info(n_workers=-1)["workers"].values()
-                pids = [int(str(worker["id"]).split("pid-")[-1]) for worker in workers if "pid-" in str(worker["id"])]
-            except Exception:
+            worker, what = self.random.choice(self.farm.workers), self.random.choice(["kill", "freeze", "wake"])
+            if what == "kill" and kills < 3:
+                kills += 1
+                worker.kill()
+                worker.wait()
+                self.farm.start_missing()
+            elif what == "freeze" and len(frozen) < 3:
+                worker.send_signal(signal.SIGSTOP)
+                frozen.append(worker)
+            elif what == "wake" and frozen:
+                frozen.pop(0).send_signal(signal.SIGCONT)
+            else:
                 continue
-            pids = pids or self.pids()
-            if not pids:
-                continue
-            pid, what = self.random.choice(pids), self.random.choice(["kill", "freeze", "freeze", "wake", "none"])
-            try:
-                if what == "kill" and kills < 3:
-                    os.kill(pid, signal.SIGKILL)
-                elif what == "freeze" and len(set(frozen)) < 2:
-                    os.kill(pid, signal.SIGSTOP)
-                    frozen.append(pid)
-                elif what == "wake" and frozen:
-                    os.kill(frozen.pop(), signal.SIGCONT)
-                else:
-                    continue
-                kills += what == "kill"
-                HAPPENED.append(what)
-            except ProcessLookupError:
-                pass
-        for pid in frozen:
-            try:
-                os.kill(pid, signal.SIGCONT)
-            except ProcessLookupError:
-                pass
-
-    def pids(self) -> list[int]:
-        nannies = self.client.cluster.workers.values()
-        return [nanny.pid for nanny in nannies if getattr(nanny, "pid", None)]
+            HAPPENED.append(what)
+        for worker in frozen:
+            worker.send_signal(signal.SIGCONT)
 
 
 @pytest.mark.parametrize("seed", range(SCHEDULES))
-def test_workers_may_die_freeze_and_be_slow(client, scene, seed) -> None:
+def test_workers_may_die_freeze_and_be_slow(farm, client, scene, seed) -> None:
     expected = scene.render(spp=8, size=(40, 30)).array
-    accidents = Accidents(client, seed)
+    accidents = Accidents(farm, seed)
     accidents.start()
     try:
         image = render(scene, client, 8, (40, 30), tile=10, samples_per_task=4, patience=1.0)

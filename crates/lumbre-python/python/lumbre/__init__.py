@@ -43,7 +43,7 @@ from .geometry import (
     Torus,
     Triangle,
 )
-from .image import Image, read_image
+from .image import Image, read_image, write_image
 from .scene import AllHits, Hits, Nearest, Scene, load
 
 __version__ = "0.1.0"
@@ -87,4 +87,5 @@ __all__ = [
     "load",
     "read_image",
     "thread_count",
+    "write_image",
 ]

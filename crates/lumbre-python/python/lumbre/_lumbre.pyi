@@ -14,6 +14,7 @@ __all__ = [
     "Part",
     "Picture",
     "read_image",
+    "write_image",
     "main",
     "Scene",
     "Camera",
@@ -27,6 +28,7 @@ class LumbreError(ValueError): ...
 
 def main(words: Sequence[str]) -> int: ...
 def read_image(path: str) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32] | None]: ...
+def write_image(path: str, pixels: npt.NDArray[np.float32], tonemap: str, exposure: float) -> None: ...
 def thread_count() -> int: ...
 
 @final
@@ -157,6 +159,7 @@ class Scene:
     def cast_ready(
         self, origins: _Array, directions: _Array, tmin: float, tmax: float, fields: tuple[str, ...]
     ) -> dict[str, _Array] | None: ...
+    def occluded_ready(self, origins: _Array, directions: _Array, tmin: float, tmax: float) -> npt.NDArray[np.bool_] | None: ...
     def occluded(
         self,
         origins: _Array,

@@ -111,3 +111,21 @@ def read_image(path: str | os.PathLike[str]) -> npt.NDArray[np.float32]:
     """
     pixels, alpha = _lumbre.read_image(os.fspath(path))
     return pixels if alpha is None else np.dstack((pixels, alpha))
+
+
+def write_image(path: str | os.PathLike[str], pixels: npt.ArrayLike, *, tonemap: str = "none", exposure: float = 0.0) -> None:
+    """Writes linear light, (h, w, 3) or (h, w) for grey, as an image file: .exr, .png, .hdr, .pfm or .jpg. Options as of `Image.save`.
+
+    >>> import numpy as np, pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "grey.pfm")
+    ...     write_image(path, np.full((2, 3), 0.5))
+    ...     read_image(path).shape
+    (2, 3, 3)
+    """
+    array = np.asarray(pixels, dtype=np.float32)
+    if array.ndim == 2:
+        array = np.repeat(array[..., None], 3, axis=-1)
+    if array.ndim != 3:
+        raise LumbreError(f"an image has the wrong shape (found {array.shape}; expected (h, w, 3) or (h, w))")
+    _lumbre.write_image(os.fspath(path), array, tonemap, exposure)

@@ -277,6 +277,11 @@ class Scene:
         >>> lumbre.Scene([lumbre.Sphere()]).occluded([[0.0, 0.0, 5.0]], [[0.0, 0.0, -1.0]], tmax=3.0).tolist()
         [False]
         """
+        if out is None and type(tmin) is float and type(tmax) is float:
+            if type(origins) is np.ndarray and type(directions) is np.ndarray:
+                ready = self._native.occluded_ready(origins, directions, tmin, tmax)
+                if ready is not None:
+                    return ready
         o, d, low, high = rays(origins, directions, tmin, tmax)
         answer = np.empty(len(o), dtype=np.bool_) if out is None else out
         self._native.occluded(o, d, low, high, answer)
