@@ -12,6 +12,7 @@ mod field;
 mod fuzz;
 mod pictures;
 mod proof;
+mod python;
 mod race;
 mod suite;
 
@@ -38,6 +39,8 @@ enum Task {
         #[arg(long, value_name = "REVISION")]
         since: Option<String>,
     },
+    /// The tests of the Python package alone, where Python is found.
+    Python,
     /// Renders every scene under scenes/ to the picture beside it.
     Scenes {
         /// Only scenes whose path contains this.
@@ -99,6 +102,7 @@ fn main() -> Result<()> {
         Task::Test { all: false } => suite::run(),
         Task::Test { all: true } => suite::run_all(),
         Task::Check { since } => check::run(since.as_deref()),
+        Task::Python => python::test(),
         Task::Scenes { filter } => pictures::render_all(filter.as_deref()),
         Task::Assets(passed) => passed.hand_to_pictures("assets"),
         Task::Contact(passed) => passed.hand_to_pictures("contact"),

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use xtask::command::{self, root, run_with, succeeds};
 
-use crate::proof;
+use crate::{proof, python};
 
 /// The version of cargo-deny that the gate was written for.
 const CARGO_DENY: &str = "0.20.2";
@@ -20,6 +20,7 @@ pub(crate) fn run() -> Result<()> {
     command::run("cargo", &["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"])?;
     command::run("cargo", &["test", "--workspace", "--all-targets"])?;
     command::run("cargo", &["test", "--workspace", "--doc"])?;
+    python::test()?;
     run_with("cargo", &["doc", "--workspace", "--no-deps"], &[("RUSTDOCFLAGS", "--deny warnings")])?;
     oldest_compiler()?;
     package()?;
@@ -61,7 +62,16 @@ fn oldest_compiler() -> Result<()> {
 
 /// Every crate that is published makes a package. The packages are not compiled, which would take as long as all the tests.
 fn package() -> Result<()> {
-    let arguments = ["package", "--workspace", "--exclude", "xtask", "--exclude", "lumbre-dev"];
+    let arguments = [
+        "package",
+        "--workspace",
+        "--exclude",
+        "xtask",
+        "--exclude",
+        "lumbre-dev",
+        "--exclude",
+        "lumbre-python",
+    ];
     command::run("cargo", &[&arguments[..], &["--no-verify", "--allow-dirty", "--quiet"]].concat())
 }
 

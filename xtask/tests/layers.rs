@@ -14,7 +14,7 @@ const LAYERS: &[(u32, &[&str])] = &[
     (5, &["lumbre-formats"]),
     (6, &["lumbre"]),
     (7, &["lumbre-cli", "xtask"]),
-    (8, &["lumbre-dev"]),
+    (8, &["lumbre-dev", "lumbre-python"]),
 ];
 
 /// Layers whose crates do no input or output: no crate there may depend on these.

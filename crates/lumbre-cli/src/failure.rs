@@ -2,7 +2,6 @@
 
 use std::fmt;
 use std::io::{ErrorKind, Write};
-use std::process::ExitCode;
 
 /// Why a command failed.
 #[derive(Debug)]
@@ -28,15 +27,15 @@ impl Failure {
     }
 
     /// The exit status.
-    pub(crate) fn exit_code(&self) -> ExitCode {
-        ExitCode::from(match self {
+    pub(crate) fn status(&self) -> u8 {
+        match self {
             Self::Different => 1,
             Self::Usage(_) => 2,
             Self::Input(_) => 3,
             Self::Io(_) => 4,
             Self::Limit(_) => 5,
             Self::Interrupted(status) => *status,
-        })
+        }
     }
 
     /// Whether the message has already been printed.

@@ -2,7 +2,6 @@
 
 use std::ffi::OsString;
 use std::io::{self, Write};
-use std::process::ExitCode;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Command, CommandFactory, Error, Parser};
@@ -94,7 +93,7 @@ const COMMANDS: &[(&str, &[&str])] = &[
 ///
 /// # Errors
 /// The exit status: 0 for help, 2 for wrong usage.
-pub(crate) fn parse<P: Parser + CommandFactory>(arguments: &[OsString]) -> Result<P, ExitCode> {
+pub(crate) fn parse<P: Parser + CommandFactory>(arguments: &[OsString]) -> Result<P, u8> {
     P::try_parse_from(arguments).map_err(|mut error| {
         // What the user wrote is in the message, where it must not drive the terminal; in a styled message it can no
         // longer be told from the styles.
@@ -115,7 +114,7 @@ pub(crate) fn parse<P: Parser + CommandFactory>(arguments: &[OsString]) -> Resul
     })
 }
 
-fn show(error: &Error) -> ExitCode {
+fn show(error: &Error) -> u8 {
     let text = error.render();
     let write = |out: &mut dyn Write, has_colours: bool| {
         // The reader may close the pipe: `lumbre help | head -1`.
@@ -123,10 +122,10 @@ fn show(error: &Error) -> ExitCode {
     };
     if error.use_stderr() {
         write(&mut io::stderr().lock(), has_colours(&io::stderr()));
-        ExitCode::from(2)
+        2
     } else {
         write(&mut io::stdout().lock(), has_colours(&io::stdout()));
-        ExitCode::SUCCESS
+        0
     }
 }
 

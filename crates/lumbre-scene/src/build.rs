@@ -369,7 +369,11 @@ impl Builder {
             let entry = SurfaceEntry { emission: emission.clone(), form, ..entry.clone() };
             match &attributes.moving {
                 None => {
-                    let id = self.push(entry, geometries, GeometryKind::Mesh(mesh.clone()))?;
+                    let kind = match &attributes.precise {
+                        None => GeometryKind::Mesh(mesh.clone()),
+                        Some(precise) => GeometryKind::PreciseMesh(precise.clone()),
+                    };
+                    let id = self.push(entry, geometries, kind)?;
                     self.mesh_light(id, light, &mesh, standing);
                 }
                 Some(moving) => {

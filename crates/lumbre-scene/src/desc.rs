@@ -168,6 +168,9 @@ pub enum CsgOperation {
 pub struct MeshDesc {
     /// Vertices.
     pub positions: Vec<Vec3>,
+    /// The same vertices in double precision, where rays are to meet the triangles there: see [`lumbre_kernel::PreciseMesh`]. Only
+    /// for meshes of triangles that do not deform.
+    pub precise_positions: Option<Vec<DVec3>>,
     /// Triangles, counter-clockwise from the front.
     pub triangles: Vec<[u32; 3]>,
     /// Quads, counter-clockwise from the front. (For a bilinear mesh, patches in their own order.)

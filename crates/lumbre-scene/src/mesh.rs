@@ -3,7 +3,7 @@
 use std::mem::take;
 use std::sync::{Arc, LazyLock};
 
-use lumbre_kernel::{DeformingMesh, TriangleMesh};
+use lumbre_kernel::{DeformingMesh, PreciseMesh, TriangleMesh};
 use lumbre_math::{DVec3, Transform, Vec3};
 
 use crate::surface::{Deforming, MeshAttributes, Turned};
@@ -51,6 +51,14 @@ pub(crate) fn bake(
         Some(own) => own.motion.take(),
         None => shared.motion.clone(),
     };
+    let precise = match Arc::get_mut(&mut shared) {
+        Some(own) => own.precise_positions.take(),
+        None => shared.precise_positions.clone(),
+    };
+    let precise = precise.map(|list| list.into_iter().map(|p| tree_from_object.point(p)).collect::<Vec<_>>());
+    if let Some(vertex) = precise.iter().flatten().position(|p| !p.is_finite()) {
+        return Err(BuildError::NotFinite { shape, vertex });
+    }
     let stays = tree_from_object.is_identity() && origin == DVec3::ZERO;
     if !stays {
         for p in &mut positions {
@@ -96,10 +104,11 @@ pub(crate) fn bake(
         }
     }
     let mesh = Arc::new(TriangleMesh { origin, positions, indices: triangles });
+    let precise = precise.map(|positions| Arc::new(PreciseMesh { positions, indices: mesh.indices.clone() }));
     let moving = motion.map(|motion| deforming(shape, motion, tree_from_object, &mesh)).transpose()?;
     let is_bare = Arc::get_mut(&mut shared).is_some_and(|own| *own == MeshDesc::default());
     let rest = if is_bare { BARE.clone() } else { shared };
-    let attributes = Arc::new(MeshAttributes { mesh, swapped, first_half, turned, moving, rest });
+    let attributes = Arc::new(MeshAttributes { mesh, swapped, first_half, turned, moving, precise, rest });
     Ok(BakedMesh { attributes, patches })
 }
 
@@ -142,6 +151,7 @@ fn deforming(
 fn check(shape: u32, desc: &MeshDesc) -> Result<(), BuildError> {
     let expected = desc.positions.len();
     let lists = [
+        ("precise positions", desc.precise_positions.as_ref().map(Vec::len)),
         ("normals", desc.normals.as_ref().map(Vec::len)),
         ("texture coordinates", desc.uvs.as_ref().map(Vec::len)),
         ("tangents", desc.tangents.as_ref().map(Vec::len)),

@@ -148,6 +148,12 @@ impl Scene {
         self.leaf(hit).0.shape
     }
 
+    /// The triangle of a mesh that was hit, without all else that [`Scene::interaction`] finds out; 0 for what is no mesh.
+    pub fn primitive_index(&self, hit: &Hit) -> u32 {
+        let (entry, part, _) = self.leaf(hit);
+        entry.primitive(part)
+    }
+
     /// Whether any material transmits light: glass, panes, leaves. Cut-outs do not count.
     pub fn lets_light_through(&self) -> bool {
         self.lets_light_through
@@ -208,11 +214,7 @@ impl Scene {
         let (entry, part, turned) = self.leaf(hit);
         let geometric = self.accel.surface(ray, hit);
         let shaded = self.shading_geometry(entry, &geometric, ray, hit, part, turned);
-        let primitive = match entry.form {
-            Form::Patch { primitive, .. } => primitive,
-            Form::Mesh(_) | Form::Custom => part,
-            Form::Exact | Form::Coloured(_) | Form::Csg(_) => 0,
-        };
+        let primitive = entry.primitive(part);
         let length = ray.direction.length();
         let direction = ray.direction / length;
         let front = shaded.surface.normal.dot(direction) < 0.0;

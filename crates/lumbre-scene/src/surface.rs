@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use lumbre_geometry::Surface;
-use lumbre_kernel::{DeformingMesh, TriangleMesh};
+use lumbre_kernel::{DeformingMesh, PreciseMesh, TriangleMesh};
 use lumbre_math::{DVec2, DVec3, Transform, Vec2, Vec3, Vec4};
 use lumbre_shading::{FloatTexture, FurtherUv, LocalSurface, Material, Spectrum, TextureContext, VertexData};
 
@@ -26,6 +26,17 @@ pub(crate) struct SurfaceEntry {
     /// Whether the material has textures, and needs footprints.
     pub looks_up: bool,
     pub form: Form,
+}
+
+impl SurfaceEntry {
+    /// The number of a part of it as results give it: the triangle of a mesh, else 0.
+    pub(crate) fn primitive(&self, part: u32) -> u32 {
+        match self.form {
+            Form::Patch { primitive, .. } => primitive,
+            Form::Mesh(_) | Form::Custom => part,
+            Form::Exact | Form::Coloured(_) | Form::Csg(_) => 0,
+        }
+    }
 }
 
 /// The vertex attributes of a geometry.
@@ -67,6 +78,8 @@ pub(crate) struct MeshAttributes {
     pub turned: Turned,
     /// Its deformation, if any.
     pub moving: Option<Deforming>,
+    /// What rays meet in place of `mesh`, if vertices are given in double precision.
+    pub precise: Option<Arc<PreciseMesh>>,
     /// The description, which may be shared, without what has been moved into the mesh.
     pub rest: Arc<MeshDesc>,
 }

@@ -583,6 +583,7 @@ fn mesh_of(mut vertices: Vertices, triangles: Vec<[u32; 3]>, dressing: &Dressing
     let tangents = vertices.normals.is_some().then_some(vertices.tangents).flatten();
     Some(MeshDesc {
         positions: vertices.positions,
+        precise_positions: None,
         triangles,
         quads: vec![],
         normals: vertices.normals,

@@ -882,6 +882,7 @@ impl<'a> Mesh<'a> {
         };
         let mesh = MeshDesc {
             positions: self.positions,
+            precise_positions: None,
             triangles: self.triangles.into_vec(),
             quads: self.quads.into_vec(),
             normals: self.normals,

@@ -1,0 +1,95 @@
+//! The `lumbre` program: render, cast, info, diff, merge. It is a library so that other front ends, such as the Python package, bring
+//! the same program.
+
+use std::ffi::OsString;
+
+use clap::{CommandFactory, Parser, Subcommand};
+
+/// Prints a message to standard error, ignoring errors.
+macro_rules! say {
+    ($($what:tt)*) => { $crate::console::tell(&format!($($what)*)) };
+}
+
+mod cast;
+mod checkpoint;
+mod completions;
+mod console;
+mod denoiser;
+mod diff;
+mod failure;
+mod farm;
+mod info;
+mod memory;
+mod merge;
+mod names;
+mod oidn;
+mod output;
+mod progress;
+mod reading;
+mod render;
+mod signals;
+mod staging;
+mod threads;
+mod tips;
+mod units;
+mod verb;
+mod view;
+
+/// Renders scenes, casts rays into them, says what is in them, and compares and joins pictures.
+#[derive(Parser)]
+#[command(name = "lumbre", version, about, max_term_width = 110)]
+#[command(after_help = "Examples:
+  lumbre model.glb                              a picture of a model: without a command, files are rendered
+  lumbre render scene.pbrt                      a picture under the scene's own film name
+  lumbre render model.obj --size 800x600        a model, framed and lit
+  lumbre cast scene.pbrt --rays rays.csv        what each ray hits first
+  lumbre info scene.pbrt --json                 what is in a scene
+  lumbre diff a.exr b.exr --metric relmse       how different two pictures are
+  lumbre merge a.part b.part -o picture.exr     one picture of what two machines rendered
+
+Exit status: 0 done, 1 a comparison failed, 2 usage, 3 input, 4 files, 5 a limit, 130 or 143 a signal.")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Render(Box<render::Arguments>),
+    Cast(cast::Arguments),
+    Info(info::Arguments),
+    Diff(diff::Arguments),
+    Merge(merge::Arguments),
+    Farm(farm::Arguments),
+    Completions(completions::CompletionsArguments),
+    Man(completions::ManArguments),
+}
+
+/// Runs the program with these words, the first of which is its own name, and returns its exit status. Signals end the process.
+pub fn run(words: Vec<OsString>) -> u8 {
+    let words = verb::with_render(words, &Arguments::command());
+    let arguments: Arguments = match tips::parse(&words) {
+        Ok(arguments) => arguments,
+        Err(status) => return status,
+    };
+    threads::start();
+    let outcome = match arguments.command {
+        Command::Render(arguments) => render::run(&arguments),
+        Command::Cast(arguments) => cast::run(&arguments),
+        Command::Info(arguments) => info::run(&arguments),
+        Command::Diff(arguments) => diff::run(&arguments),
+        Command::Merge(arguments) => merge::run(&arguments),
+        Command::Farm(arguments) => farm::run(&arguments),
+        Command::Completions(arguments) => completions::completions::<Arguments>(&arguments),
+        Command::Man(arguments) => completions::man::<Arguments>(&arguments),
+    };
+    match outcome {
+        Ok(()) => 0,
+        Err(failure) => {
+            if !failure.is_silent() {
+                say!("error: {failure}");
+            }
+            failure.status()
+        }
+    }
+}

@@ -1,0 +1,5 @@
+"""`python -m lumbre` is the program `lumbre`."""
+
+from ._program import main
+
+main()

@@ -1,0 +1,412 @@
+"""Shapes: exact ones by their equations, meshes by arrays, and instances of either.
+
+All coordinates are in double precision, and any invertible affine map may place a shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _lumbre
+from ._arrays import Array, Triple, real, triple
+from ._lumbre import LumbreError
+from .appearance import Colour, Material, colour
+
+_ORIGIN: Triple = (0.0, 0.0, 0.0)
+_UP: Triple = (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """What all shapes have.
+
+    Parameters
+    ----------
+    transform : (4, 4) array, optional
+        The place: world from object, with the translation in the last column.
+    material : Material, optional
+        The appearance in pictures; by default matt and grey.
+    emission : colour, optional
+        Radiance that its front emits, as a number or (r, g, b).
+    """
+
+    transform: npt.ArrayLike | None = field(default=None, kw_only=True)
+    material: Material | None = field(default=None, kw_only=True)
+    emission: float | Colour | None = field(default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        # Frozen, so that a scene and its pickle stay the same.
+        object.__setattr__(self, "_made", (self._geometry(), self._place(), self._light()))
+
+    def _geometry(self) -> _lumbre.Geometry:
+        raise LumbreError("a shape is one of Sphere, Mesh and so on")
+
+    def _place(self) -> list[list[float]] | None:
+        if self.transform is None:
+            return None
+        matrix = np.asarray(self.transform, dtype=np.float64)
+        if matrix.shape != (4, 4):
+            raise LumbreError(f"transform has the wrong shape (found {matrix.shape}; expected (4, 4))")
+        rows: list[list[float]] = matrix.tolist()
+        return rows
+
+    def _light(self) -> Colour | None:
+        return None if self.emission is None else colour("emission", self.emission)
+
+    def _native(self) -> _lumbre._Placed:
+        geometry, place, light = self.__dict__["_made"]
+        return geometry, place, None if self.material is None else self.material._native(), light
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "_made"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.__post_init__()
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere(Shape):
+    """A sphere.
+
+    Raises `LumbreError` unless the radius is above 0.
+
+    >>> Sphere(center=(0, 0, 3), radius=2).radius
+    2
+    """
+
+    center: Iterable[float] = _ORIGIN
+    radius: float = 1.0
+
+    def _geometry(self) -> _lumbre.Geometry:
+        return _lumbre.Geometry.sphere(triple("center", self.center), self.radius)
+
+
+@dataclass(frozen=True, eq=False)
+class Plane(Shape):
+    """An infinite plane through `point`; `normal` points to its front.
+
+    >>> Plane(point=(0, 0, 0), normal=(0, 0, 1)).normal
+    (0, 0, 1)
+    """
+
+    point: Iterable[float] = _ORIGIN
+    normal: Iterable[float] = _UP
+
+    def _geometry(self) -> _lumbre.Geometry:
+        return _lumbre.Geometry.plane(triple("point", self.point), triple("normal", self.normal))
+
+
+@dataclass(frozen=True, eq=False)
+class Disk(Shape):
+    """A disk, or with `inner_radius` an annulus.
+
+    >>> Disk(radius=2, inner_radius=0.5).radius
+    2
+    """
+
+    center: Iterable[float] = _ORIGIN
+    normal: Iterable[float] = _UP
+    radius: float = 1.0
+    inner_radius: float = 0.0
+
+    def _geometry(self) -> _lumbre.Geometry:
+        center, normal = triple("center", self.center), triple("normal", self.normal)
+        return _lumbre.Geometry.disk(center, normal, self.radius, self.inner_radius)
+
+
+@dataclass(frozen=True, eq=False)
+class Box(Shape):
+    """A box along the axes, between two opposite corners.
+
+    >>> Box(p0=(0, 0, 0), p1=(1, 2, 3)).p1
+    (1, 2, 3)
+    """
+
+    p0: Iterable[float] = (-0.5, -0.5, -0.5)
+    p1: Iterable[float] = (0.5, 0.5, 0.5)
+
+    def _geometry(self) -> _lumbre.Geometry:
+        return _lumbre.Geometry.cuboid(triple("p0", self.p0), triple("p1", self.p1))
+
+
+@dataclass(frozen=True, eq=False)
+class Cylinder(Shape):
+    """A cylinder around the segment from `p0` to `p1`, closed by `caps` or open.
+
+    >>> Cylinder(p0=(0, 0, 0), p1=(0, 0, 2), radius=0.5).caps
+    True
+    """
+
+    p0: Iterable[float] = _ORIGIN
+    p1: Iterable[float] = _UP
+    radius: float = 1.0
+    caps: bool = True
+
+    def _geometry(self) -> _lumbre.Geometry:
+        return _lumbre.Geometry.cylinder(triple("p0", self.p0), triple("p1", self.p1), self.radius, self.caps)
+
+
+@dataclass(frozen=True, eq=False)
+class Cone(Shape):
+    """A cone of radius `r0` at `p0` and `r1` at `p1`, closed by `caps` or open.
+
+    >>> Cone(p0=(0, 0, 0), p1=(0, 0, 2), r0=1, r1=0).r1
+    0
+    """
+
+    p0: Iterable[float] = _ORIGIN
+    p1: Iterable[float] = _UP
+    r0: float = 1.0
+    r1: float = 0.0
+    caps: bool = True
+
+    def _geometry(self) -> _lumbre.Geometry:
+        p0, p1 = triple("p0", self.p0), triple("p1", self.p1)
+        return _lumbre.Geometry.cone(p0, p1, self.r0, self.r1, self.caps)
+
+
+@dataclass(frozen=True, eq=False)
+class Capsule(Shape):
+    """A cylinder with round ends: all that is within `radius` of a segment.
+
+    >>> Capsule(p0=(0, 0, 0), p1=(0, 0, 2), radius=0.5).radius
+    0.5
+    """
+
+    p0: Iterable[float] = _ORIGIN
+    p1: Iterable[float] = _UP
+    radius: float = 1.0
+
+    def _geometry(self) -> _lumbre.Geometry:
+        return _lumbre.Geometry.capsule(triple("p0", self.p0), triple("p1", self.p1), self.radius)
+
+
+@dataclass(frozen=True, eq=False)
+class Torus(Shape):
+    """A torus: a tube of radius `minor` around a circle of radius `major`.
+
+    Raises `LumbreError` unless both are above 0.
+
+    >>> Torus(major=1, minor=0.25).minor
+    0.25
+    """
+
+    major: float = 1.0
+    minor: float = 0.25
+    center: Iterable[float] = _ORIGIN
+    axis: Iterable[float] = _UP
+
+    def _geometry(self) -> _lumbre.Geometry:
+        center, axis = triple("center", self.center), triple("axis", self.axis)
+        return _lumbre.Geometry.torus(center, axis, self.major, self.minor)
+
+
+@dataclass(frozen=True, eq=False)
+class Paraboloid(Shape):
+    """A paraboloid about the z axis, of this radius at `zmax`; `phimax` in degrees.
+
+    >>> Paraboloid(radius=1, zmin=0, zmax=2).zmax
+    2
+    """
+
+    radius: float = 1.0
+    zmin: float = 0.0
+    zmax: float = 1.0
+    phimax: float = 360.0
+
+    def _geometry(self) -> _lumbre.Geometry:
+        return _lumbre.Geometry.paraboloid(self.radius, self.zmin, self.zmax, self.phimax)
+
+
+@dataclass(frozen=True, eq=False)
+class Hyperboloid(Shape):
+    """What the segment from `p1` to `p2` sweeps about the z axis; `phimax` in degrees.
+
+    >>> Hyperboloid(p1=(1, 0, -1), p2=(0, 1, 1)).phimax
+    360.0
+    """
+
+    p1: Iterable[float] = (1.0, 0.0, -1.0)
+    p2: Iterable[float] = (0.0, 1.0, 1.0)
+    phimax: float = 360.0
+
+    def _geometry(self) -> _lumbre.Geometry:
+        return _lumbre.Geometry.hyperboloid(triple("p1", self.p1), triple("p2", self.p2), self.phimax)
+
+
+@dataclass(frozen=True, eq=False)
+class Quadric(Shape):
+    """A general quadric by its ten coefficients, in the order of `docs/scene-language.md`; an open one needs a `clip` box.
+
+    >>> Quadric(coefficients=(1, 1, 1, 0, 0, 0, 0, 0, 0, -1)).clip is None
+    True
+    """
+
+    coefficients: Iterable[float]
+    clip: tuple[Iterable[float], Iterable[float]] | None = None
+
+    def _geometry(self) -> _lumbre.Geometry:
+        clip = None if self.clip is None else (triple("clip", self.clip[0]), triple("clip", self.clip[1]))
+        numbers = [float(number) for number in self.coefficients]
+        if len(numbers) != 10:
+            raise LumbreError(f"a quadric has ten coefficients (found {len(numbers)})")
+        return _lumbre.Geometry.quadric(numbers, clip)
+
+
+@dataclass(frozen=True, eq=False)
+class Triangle(Shape):
+    """A triangle in double precision; its front is where the corners run counter-clockwise.
+
+    >>> Triangle(p0=(0, 0, 0), p1=(1, 0, 0), p2=(0, 1, 0)).p1
+    (1, 0, 0)
+    """
+
+    p0: Iterable[float]
+    p1: Iterable[float]
+    p2: Iterable[float]
+
+    def _geometry(self) -> _lumbre.Geometry:
+        return _lumbre.Geometry.triangle(triple("p0", self.p0), triple("p1", self.p1), triple("p2", self.p2))
+
+
+@dataclass(frozen=True, eq=False)
+class Patch(Shape):
+    """A bilinear patch between four corners.
+
+    >>> Patch(p00=(0, 0, 0), p10=(1, 0, 0), p01=(0, 1, 0), p11=(1, 1, 1)).p11
+    (1, 1, 1)
+    """
+
+    p00: Iterable[float]
+    p10: Iterable[float]
+    p01: Iterable[float]
+    p11: Iterable[float]
+
+    def _geometry(self) -> _lumbre.Geometry:
+        corners = [triple(name, getattr(self, name)) for name in ("p00", "p10", "p01", "p11")]
+        return _lumbre.Geometry.patch(*corners)
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh(Shape):
+    """Triangles or quads by index.
+
+    Parameters
+    ----------
+    vertices : (V, 3) array of float32 or float64
+        float64 vertices keep their precision: rays meet the triangles between these very points. Where single precision holds every
+        one of them exactly, it is used, for speed.
+    faces : (F, 3) or (F, 4) array of integers
+        Vertices of each face, counter-clockwise from its front.
+    normals : (V, 3) array, optional
+        Shading normals, for pictures.
+    uvs : (V, 2) array, optional
+        Texture coordinates, for pictures and `Hits.uv`.
+    precision : "auto", "single" or "double"
+        "single" rounds float64 vertices, which halves the memory and is faster; "auto" goes by what `vertices` are.
+
+    Raises `LumbreError` for faces that name missing vertices, for vertices that are not finite, and for quads that single precision
+    does not hold.
+
+    >>> mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> mesh.vertices.shape, mesh.faces.shape
+    ((3, 3), (1, 3))
+    """
+
+    vertices: Array
+    faces: Array
+    normals: Array | None = None
+    uvs: Array | None = None
+    precision: str = "auto"
+
+    def __init__(
+        self,
+        vertices: npt.ArrayLike,
+        faces: npt.ArrayLike,
+        normals: npt.ArrayLike | None = None,
+        uvs: npt.ArrayLike | None = None,
+        precision: str = "auto",
+        *,
+        transform: npt.ArrayLike | None = None,
+        material: Material | None = None,
+        emission: float | Colour | None = None,
+    ) -> None:
+        if precision not in ("auto", "single", "double"):
+            raise LumbreError(f'precision is unknown (found "{precision}"; expected auto, single, double)')
+        tables = {"vertices": vertices, "normals": normals, "uvs": uvs}
+        given: dict[str, Any] = {name: None if table is None else _table(name, table) for name, table in tables.items()}
+        corners = np.asarray(faces)
+        if corners.size == 0 and corners.ndim != 2:
+            corners = np.zeros((0, 3), dtype=np.int64)
+        if corners.dtype.kind not in "iu" and corners.size > 0:
+            raise LumbreError(f"faces are of the wrong kind (found {corners.dtype}; expected integers)")
+        if corners.ndim != 2:
+            raise LumbreError(f"faces have the wrong shape (found {corners.shape}; expected (F, 3) or (F, 4))")
+        given |= {"faces": corners, "precision": precision}
+        given |= {"transform": transform, "material": material, "emission": emission}
+        for name, value in given.items():
+            object.__setattr__(self, name, value)
+        self.__post_init__()
+
+    def _geometry(self) -> _lumbre.Geometry:
+        def double(array: Array | None) -> Array | None:
+            return None if array is None else array.astype(np.float64, copy=False)
+
+        vertices = self.vertices.astype(np.float64, copy=False)
+        is_precise = self.precision == "double"
+        if self.precision == "auto" and self.vertices.dtype == np.float64:
+            with np.errstate(over="ignore"):
+                is_precise = not np.array_equal(vertices.astype(np.float32), vertices, equal_nan=True)
+        faces = self.faces.astype(np.int64, copy=False)
+        return _lumbre.Geometry.mesh(vertices, faces, double(self.normals), double(self.uvs), is_precise)
+
+    def __repr__(self) -> str:
+        return f"Mesh({len(self.vertices)} vertices, {len(self.faces)} faces)"
+
+
+def _table(name: str, value: npt.ArrayLike) -> Array:
+    array = real(np.asarray(value))
+    if array.size == 0 and array.ndim != 2:
+        array = array.reshape(0, 3)
+    if array.ndim != 2:
+        raise LumbreError(f"{name} has the wrong shape (found {array.shape}; expected two axes)")
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class Instances:
+    """The same shapes in many places, at the memory of one.
+
+    Parameters
+    ----------
+    shapes : a shape, or a list of them
+    transforms : (N, 4, 4) array
+        One place each: world from object. `Hits.instance` counts them over all `Instances` of a scene.
+
+    >>> places = np.tile(np.eye(4), (3, 1, 1))
+    >>> places[:, 2, 3] = [0, 2, 4]
+    >>> len(Instances(Sphere(radius=0.5), places))
+    3
+    """
+
+    shapes: Shape | Sequence[Shape]
+    transforms: npt.ArrayLike
+
+    def __len__(self) -> int:
+        return len(self._places())
+
+    def _places(self) -> Array:
+        places = np.asarray(self.transforms, dtype=np.float64)
+        if places.ndim != 3 or places.shape[1:] != (4, 4):
+            raise LumbreError(f"transforms have the wrong shape (found {places.shape}; expected (N, 4, 4))")
+        return places
+
+    def _native(self) -> tuple[list[_lumbre._Placed], Array]:
+        shapes = [self.shapes] if isinstance(self.shapes, Shape) else self.shapes
+        return [shape._native() for shape in shapes], self._places()

@@ -1,0 +1,131 @@
+"""Pictures."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _lumbre
+from ._lumbre import LumbreError
+
+
+class Image:
+    """A rendered picture: an array of linear light, which shows itself in a notebook.
+
+    `numpy.asarray(image)` is `image.array`.
+
+    >>> import lumbre, numpy as np
+    >>> image = lumbre.Scene([lumbre.Sphere()]).render(spp=1, size=(8, 6), features=True)
+    >>> np.asarray(image).shape, image.feature("depth").shape
+    ((6, 8, 3), (6, 8))
+    """
+
+    def __init__(self, native: _lumbre.Picture) -> None:
+        self._native = native
+
+    @cached_property
+    def array(self) -> npt.NDArray[np.float32]:
+        """Linear light, (h, w, 3), float32, the first row at the top."""
+        return self._native.pixels()
+
+    @cached_property
+    def alpha(self) -> npt.NDArray[np.float32] | None:
+        """Coverage in [0, 1], (h, w), of a transparent picture, else None."""
+        return self._native.alpha()
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """That of `array`."""
+        return self.array.shape
+
+    def feature(self, name: str) -> npt.NDArray[np.float32]:
+        """An AOV: albedo (h, w, 3), normal (h, w, 3), depth (h, w) along the camera's axis, or uv (h, w, 2).
+
+        Raises `LumbreError` where the picture was rendered without `features`.
+        """
+        found = self._native.feature(name)
+        if found is None:
+            raise LumbreError(f"the {name} layer was not rendered (expected features=True)")
+        array, channels = found
+        return array[..., 0] if channels == 1 else array[..., :channels]
+
+    @property
+    def stats(self) -> dict[str, Any]:
+        """spp, samples, rays, dropped, noise, threads, seconds."""
+        return self._native.stats()
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        layers: Sequence[str] = (),
+        tonemap: str = "none",
+        exposure: float = 0.0,
+        depth: int = 8,
+        quality: int = 95,
+        precision: str = "half",
+    ) -> None:
+        """Writes a file by its extension: .exr, .png, .hdr, .pfm or .jpg. The path holds the old file or the whole new one.
+
+        Parameters
+        ----------
+        layers : features to write beside the picture, in an .exr
+        tonemap : none, agx, aces or neutral, for .png and .jpg; exposure is in stops before it
+        depth : 8 or 16 bits, of a .png
+        quality : 1 to 100, of a .jpg
+        precision : half or float, of an .exr
+
+        Raises `LumbreError` for options out of range, and `OSError` for a file that cannot be written.
+        """
+        self._native.save(os.fspath(path), list(layers), tonemap, exposure, depth, quality, precision)
+
+    def png(self, *, tonemap: str = "none", exposure: float = 0.0) -> bytes:
+        """The bytes of a .png."""
+        return self._native.png(tonemap, exposure)
+
+    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> npt.NDArray[Any]:
+        wants_copy = copy or (dtype is not None and np.dtype(dtype) != self.array.dtype)
+        if not wants_copy:
+            return self.array
+        if copy is False:
+            raise ValueError("another dtype needs a copy")
+        return np.array(self.array, dtype=dtype)
+
+    def __repr__(self) -> str:
+        height, width = self.array.shape[:2]
+        return f"<lumbre.Image {width} x {height}, {self.stats['spp']} samples a pixel>"
+
+    def _repr_png_(self) -> bytes:
+        return self.png(tonemap="neutral")
+
+
+def read_image(path: str | os.PathLike[str]) -> npt.NDArray[np.float32]:
+    """An image file as linear light, (h, w, 3), or (h, w, 4) with its alpha: EXR, PNG, HDR, PFM, JPEG, TGA, BMP or QOI.
+
+    Raises `LumbreError` for what is wrong with it, and `OSError` where it cannot be read.
+    """
+    pixels, alpha = _lumbre.read_image(os.fspath(path))
+    return pixels if alpha is None else np.dstack((pixels, alpha))
+
+
+def write_image(path: str | os.PathLike[str], pixels: npt.ArrayLike, *, tonemap: str = "none", exposure: float = 0.0) -> None:
+    """Writes linear light, (h, w, 3) or (h, w) for grey, as an image file: .exr, .png, .hdr, .pfm or .jpg. Options as of `Image.save`.
+
+    >>> import numpy as np, pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "grey.pfm")
+    ...     write_image(path, np.full((2, 3), 0.5))
+    ...     read_image(path).shape
+    (2, 3, 3)
+    """
+    array = np.asarray(pixels, dtype=np.float32)
+    if array.ndim == 2:
+        array = np.repeat(array[..., None], 3, axis=-1)
+    if array.ndim != 3:
+        raise LumbreError(f"an image has the wrong shape (found {array.shape}; expected (h, w, 3) or (h, w))")
+    _lumbre.write_image(os.fspath(path), array, tonemap, exposure)

@@ -1,0 +1,29 @@
+//! The native half of the Python package `lumbre`. What users see is in `python/lumbre`: it checks and names, this computes.
+
+mod cast;
+mod columns;
+mod errors;
+mod picture;
+mod points;
+mod program;
+mod rays;
+mod scene;
+mod shape;
+mod work;
+
+/// The module as Python imports it.
+#[pyo3::pymodule(gil_used = false)]
+mod _lumbre {
+    #[pymodule_export]
+    use crate::errors::LumbreError;
+    #[pymodule_export]
+    use crate::picture::{Part, Picture, read_image, write_image};
+    #[pymodule_export]
+    use crate::program::main;
+    #[pymodule_export]
+    use crate::scene::Scene;
+    #[pymodule_export]
+    use crate::shape::{Camera, Geometry, Light, Material};
+    #[pymodule_export]
+    use crate::work::thread_count;
+}

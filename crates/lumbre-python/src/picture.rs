@@ -1,0 +1,238 @@
+//! Pictures and parts of renders.
+
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+
+use lumbre::formats::image::{ExrPrecision, ImageFormat, PngDepth};
+use lumbre::image::{Image, Rgb, ToneMap};
+use lumbre::{Feature, Part as PartDesc, SaveOptions};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+
+use crate::errors::{invalid, raised};
+use crate::scene::unknown;
+
+/// A rendered picture, with the sums of its samples.
+#[pyclass(frozen, module = "lumbre._lumbre")]
+pub(crate) struct Picture {
+    picture: lumbre::Picture,
+    part: Mutex<Option<PartDesc>>,
+}
+
+impl Picture {
+    pub(crate) fn new(picture: lumbre::Picture, part: Option<PartDesc>) -> Self {
+        Self { picture, part: Mutex::new(part) }
+    }
+}
+
+/// Pixels and their alpha, where there is one.
+type Pixels = (Py<PyArray3<f32>>, Option<Py<PyArray2<f32>>>);
+/// The first and the end of samples, and pixels as x0, y0, x1, y1.
+type PiecePlace = (u32, u32, (u32, u32, u32, u32));
+
+fn array(py: Python<'_>, image: &Image) -> PyResult<Py<PyArray3<f32>>> {
+    let numbers = image.pixels().iter().flat_map(|pixel| pixel.to_array()).collect();
+    let shape = [image.height() as usize, image.width() as usize, 3];
+    Ok(PyArray1::from_vec(py, numbers).reshape(shape)?.unbind())
+}
+
+fn options(tonemap: &str, exposure: f32, depth: u8, quality: u8, precision: &str) -> PyResult<SaveOptions> {
+    let tone_map = ToneMap::from_name(tonemap);
+    let tone_map = tone_map.ok_or_else(|| unknown("tonemap", tonemap, &ToneMap::NAMES))?;
+    let png_depth = match depth {
+        8 => PngDepth::Eight,
+        16 => PngDepth::Sixteen,
+        _ => return Err(invalid(format!("depth is no depth of PNG (found {depth}; expected 8 or 16)"))),
+    };
+    if !(1..=100).contains(&quality) {
+        return Err(invalid(format!("quality is out of range (found {quality}; expected 1 to 100)")));
+    }
+    let exr_precision = match precision {
+        "half" => ExrPrecision::Half,
+        "float" => ExrPrecision::Float,
+        _ => return Err(unknown("precision", precision, &["half", "float"])),
+    };
+    let mut options = SaveOptions::default();
+    (options.tone_map, options.exposure) = (tone_map, exposure);
+    (options.png_depth, options.jpeg_quality, options.exr_precision) = (png_depth, quality, exr_precision);
+    Ok(options)
+}
+
+fn features(names: &[String]) -> PyResult<Vec<Feature>> {
+    let of = |name: &String| {
+        Feature::from_name(name).ok_or_else(|| unknown("layer", name, &Feature::ALL.map(Feature::name)))
+    };
+    names.iter().map(of).collect()
+}
+
+#[pymethods]
+impl Picture {
+    /// Linear light, (h, w, 3).
+    fn pixels(&self, py: Python<'_>) -> PyResult<Py<PyArray3<f32>>> {
+        array(py, self.picture.image())
+    }
+
+    /// Coverage, (h, w), of a transparent picture.
+    fn alpha(&self, py: Python<'_>) -> PyResult<Option<Py<PyArray2<f32>>>> {
+        let image = self.picture.image();
+        let shape = [image.height() as usize, image.width() as usize];
+        let Some(alpha) = image.alpha() else { return Ok(None) };
+        Ok(Some(PyArray1::from_slice(py, alpha).reshape(shape)?.unbind()))
+    }
+
+    /// An AOV, (h, w, 3), of which the first channels count; `None` where it was not rendered.
+    fn feature(&self, py: Python<'_>, name: &str) -> PyResult<Option<(Py<PyArray3<f32>>, usize)>> {
+        let feature = features(&[name.to_owned()])?[0];
+        let Some(image) = self.picture.feature(feature) else { return Ok(None) };
+        Ok(Some((array(py, image)?, feature.channels().len())))
+    }
+
+    /// Writes a file.
+    #[expect(clippy::too_many_arguments, reason = "one call of the package's own")]
+    fn save(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        layers: Vec<String>,
+        tonemap: &str,
+        exposure: f32,
+        depth: u8,
+        quality: u8,
+        precision: &str,
+    ) -> PyResult<()> {
+        let options = options(tonemap, exposure, depth, quality, precision)?;
+        let layers = features(&layers)?;
+        py.detach(|| self.picture.save_with(&path, &options, &layers)).map_err(raised)
+    }
+
+    /// The bytes of a .png.
+    fn png<'py>(&self, py: Python<'py>, tonemap: &str, exposure: f32) -> PyResult<Bound<'py, PyBytes>> {
+        let options = options(tonemap, exposure, 8, 95, "half")?;
+        let bytes = py.detach(|| self.picture.encode(ImageFormat::Png, &options, &[])).map_err(raised)?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// Statistics by name.
+    fn stats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let stats = self.picture.stats();
+        let rays = PyDict::new(py);
+        rays.set_item("camera", stats.rays.camera)?;
+        rays.set_item("bounce", stats.rays.bounce)?;
+        rays.set_item("shadow", stats.rays.shadow)?;
+        let all = PyDict::new(py);
+        all.set_item("spp", stats.spp)?;
+        all.set_item("samples", stats.samples)?;
+        all.set_item("rays", rays)?;
+        all.set_item("dropped", stats.dropped)?;
+        all.set_item("noise", stats.noise)?;
+        all.set_item("threads", stats.threads)?;
+        all.set_item("seconds", stats.elapsed.as_secs_f64())?;
+        Ok(all)
+    }
+
+    /// The sums of its samples, which are handed out once.
+    fn take_part(&self) -> PyResult<Part> {
+        let part = self.part.lock().unwrap_or_else(PoisonError::into_inner).take();
+        part.map(|part| Part(Mutex::new(part))).ok_or_else(|| {
+            invalid(
+                "the picture has no part, or it has been taken (expected one that was rendered with part)",
+            )
+        })
+    }
+}
+
+/// Some samples of some pixels of a render: what parts of it are merged to.
+#[pyclass(frozen, module = "lumbre._lumbre")]
+pub(crate) struct Part(Mutex<PartDesc>);
+
+impl Part {
+    fn with<R>(&self, work: impl FnOnce(&mut PartDesc) -> R) -> R {
+        work(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+#[pymethods]
+impl Part {
+    /// The part of bytes.
+    #[staticmethod]
+    fn from_bytes(bytes: &[u8]) -> PyResult<Self> {
+        Ok(Self(Mutex::new(PartDesc::from_bytes(bytes, u64::MAX).map_err(invalid)?)))
+    }
+
+    /// The bytes of a file of its own.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        let bytes = py.detach(|| self.with(|part| part.to_bytes()));
+        PyBytes::new(py, &bytes)
+    }
+
+    /// Adds the samples of the bytes of another part.
+    fn merge(&self, py: Python<'_>, bytes: &[u8]) -> PyResult<()> {
+        let merged = py.detach(|| {
+            let other = PartDesc::from_bytes(bytes, u64::MAX).map_err(|e| e.to_string())?;
+            self.with(|part| {
+                let differences = part.job.differences(&other.job);
+                if !differences.is_empty() {
+                    return Err(format!("these are parts of different renders: {}", differences.join("; ")));
+                }
+                part.merge(&other).map_err(|e| e.to_string())
+            })
+        });
+        merged.map_err(invalid)
+    }
+
+    /// Its samples: a list of (first, end, (x0, y0, x1, y1)).
+    fn pieces(&self) -> Vec<PiecePlace> {
+        self.with(|part| {
+            let of = |piece: &lumbre::Piece| {
+                let b = piece.bounds;
+                (piece.samples.start, piece.samples.end, (b.x0, b.y0, b.x1, b.y1))
+            };
+            part.state.pieces().iter().map(of).collect()
+        })
+    }
+
+    /// The picture of its samples.
+    fn picture(&self, py: Python<'_>) -> Picture {
+        py.detach(|| self.with(|part| Picture::new(part.picture(), None)))
+    }
+}
+
+/// An image file as (h, w, 3), linear light, and its alpha as (h, w) where it has one.
+///
+/// # Errors
+/// What is wrong with the file.
+#[pyfunction]
+pub(crate) fn read_image(py: Python<'_>, path: PathBuf) -> PyResult<Pixels> {
+    let image = py.detach(|| lumbre::read_image(&path)).map_err(raised)?;
+    let shape = [image.height() as usize, image.width() as usize];
+    let alpha = image.alpha().map(|alpha| PyArray1::from_slice(py, alpha).reshape(shape));
+    Ok((array(py, &image)?, alpha.transpose()?.map(Bound::unbind)))
+}
+
+/// Writes linear light, (h, w, 3), as an image file.
+///
+/// # Errors
+/// What is wrong with the array, the options or the file.
+#[pyfunction]
+pub(crate) fn write_image(
+    py: Python<'_>,
+    path: PathBuf,
+    pixels: PyReadonlyArray3<'_, f32>,
+    tonemap: &str,
+    exposure: f32,
+) -> PyResult<()> {
+    let options = options(tonemap, exposure, 8, 95, "half")?;
+    let &[height, width, 3] = pixels.shape() else {
+        return Err(invalid(format!(
+            "an image has the wrong shape (found {:?}; expected (h, w, 3))",
+            pixels.shape()
+        )));
+    };
+    let view = pixels.as_array();
+    let pixel = |i: usize| Rgb::from(std::array::from_fn(|channel| view[[i / width, i % width, channel]]));
+    let pixels = (0..width * height).map(pixel).collect();
+    let image = Image::from_pixels(width as u32, height as u32, pixels);
+    let image = image.ok_or_else(|| invalid(format!("there is no image of {width} by {height} pixels")))?;
+    py.detach(|| lumbre::write_image(&path, &image, &options)).map_err(raised)
+}

@@ -1,0 +1,463 @@
+//! Scenes: opened or built, asked with rays and points, rendered.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::Duration;
+
+use lumbre::description::IntegratorKind;
+use lumbre::formats::Strictness;
+use lumbre::formats::diagnostic::nearest_name;
+use lumbre::{
+    CancelToken, Job, Part as PartDesc, PixelBounds, Progress, ReadOptions, RenderOptions, SceneBuilder,
+    ShapeBuilder, State, UpAxis,
+};
+use numpy::{PyArray1, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList, PyTuple};
+
+use crate::errors::{invalid, raised};
+use crate::picture::Picture;
+use crate::rays::{Rays, Triples, is_single};
+use crate::shape::{Camera, Geometry, Light, Material, transform};
+use crate::work::interruptible;
+use crate::{cast, points};
+
+/// A scene, ready for queries and renders.
+#[pyclass(frozen, module = "lumbre._lumbre")]
+pub(crate) struct Scene {
+    scene: lumbre::Scene,
+    /// The files that it was read from.
+    files: Vec<PathBuf>,
+    /// What else it depends on, by name.
+    settings: Vec<(String, String)>,
+    /// Hashes of the files by their names, once someone has asked for a part.
+    hashes: OnceLock<BTreeMap<String, String>>,
+}
+
+/// Does the same in the precision of an array, which goes by the name given.
+macro_rules! by_precision {
+    ($array:expr, $Real:ident => $query:expr) => {
+        if is_single($array)? {
+            type $Real = f32;
+            $query
+        } else {
+            type $Real = f64;
+            $query
+        }
+    };
+}
+
+/// A shape with its place, material and emitted radiance.
+type Placed<'py> =
+    (Bound<'py, Geometry>, Option<[[f64; 4]; 4]>, Option<Bound<'py, Material>>, Option<[f32; 3]>);
+
+fn placed((geometry, place, material, emission): &Placed<'_>) -> PyResult<ShapeBuilder> {
+    let mut shape = ShapeBuilder::new(geometry.get().0.clone());
+    if let Some(place) = place {
+        shape = shape.at(transform(*place)?);
+    }
+    if let Some(material) = material {
+        shape = shape.material(material.get().0.clone());
+    }
+    if let Some([r, g, b]) = *emission {
+        shape = shape.shining(lumbre::image::Rgb::new(r, g, b));
+    }
+    Ok(shape)
+}
+
+#[pymethods]
+impl Scene {
+    /// Reads files as one scene; also returns the warnings.
+    #[staticmethod]
+    #[pyo3(signature = (paths, strictness, frame, shutter, animation, variant, settings))]
+    #[expect(clippy::too_many_arguments, reason = "one call of the package's own")]
+    fn open(
+        py: Python<'_>,
+        paths: Vec<PathBuf>,
+        strictness: &str,
+        frame: Option<f64>,
+        shutter: f64,
+        animation: Option<String>,
+        variant: Option<String>,
+        settings: Vec<(String, String)>,
+    ) -> PyResult<(Self, Vec<String>)> {
+        let mut options = ReadOptions::default();
+        options.strictness = match strictness {
+            "lenient" => Strictness::Lenient,
+            "strict" => Strictness::Strict,
+            _ => Strictness::Normal,
+        };
+        (options.frame, options.shutter) = (frame, shutter);
+        (options.animation, options.variant) = (animation, variant);
+        let open = || lumbre::open_with(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>(), &options);
+        let (scene, diagnostics) = interruptible(py, |_| open(), |_| Ok(()))?.map_err(raised)?;
+        let files = diagnostics.files_read().to_vec();
+        Ok((Self { scene, files, settings, hashes: OnceLock::new() }, diagnostics.lines()))
+    }
+
+    /// Builds a scene of shapes, of shapes with many places each, of cameras and of lights.
+    #[staticmethod]
+    fn build(
+        py: Python<'_>,
+        shapes: Vec<Placed<'_>>,
+        instances: Vec<(Vec<Placed<'_>>, PyReadonlyArray3<'_, f64>)>,
+        cameras: Vec<Bound<'_, Camera>>,
+        lights: Vec<Bound<'_, Light>>,
+        up: [f64; 3],
+        settings: Vec<(String, String)>,
+    ) -> PyResult<Self> {
+        let mut builder = SceneBuilder::new();
+        for shape in &shapes {
+            builder = builder.shape(placed(shape)?);
+        }
+        for (shapes, places) in &instances {
+            let shapes = shapes.iter().map(placed).collect::<PyResult<Vec<_>>>()?;
+            if places.shape()[1..] != [4, 4] {
+                return Err(invalid(format!(
+                    "the places of an instance have the wrong shape (found {:?}; expected (N, 4, 4))",
+                    places.shape()
+                )));
+            }
+            let matrix = |place: numpy::ndarray::ArrayView2<'_, f64>| {
+                transform(std::array::from_fn(|row| std::array::from_fn(|column| place[[row, column]])))
+            };
+            let places = places.as_array().outer_iter().map(matrix).collect::<PyResult<Vec<_>>>()?;
+            builder = builder.instances(shapes, places);
+        }
+        for camera in &cameras {
+            builder = builder.camera(camera.get().0.clone());
+        }
+        for light in &lights {
+            builder = builder.light(light.get().0.clone());
+        }
+        let mut desc = builder.description().clone();
+        drop(builder);
+        desc.up = match up {
+            [x, y, z] if x == 0.0 && z == 0.0 && y > 0.0 => UpAxis::Y,
+            [x, y, z] if x == 0.0 && y == 0.0 && z > 0.0 => UpAxis::Z,
+            towards => UpAxis::Towards(towards.into()),
+        };
+        let scene = interruptible(py, |_| lumbre::Scene::from_description(desc), |_| Ok(()))?;
+        Ok(Self { scene: scene.map_err(raised)?, files: Vec::new(), settings, hashes: OnceLock::new() })
+    }
+
+    /// The closest hits, into the arrays of `out`.
+    fn cast(
+        &self,
+        py: Python<'_>,
+        origins: &Bound<'_, PyAny>,
+        directions: &Bound<'_, PyAny>,
+        tmin: &Bound<'_, PyAny>,
+        tmax: &Bound<'_, PyAny>,
+        out: &Bound<'_, PyDict>,
+    ) -> PyResult<()> {
+        by_precision!(origins, Real => {
+                cast::closest::<Real>(py, &self.scene, &Rays::new(origins, directions, tmin, tmax)?, out)
+        })
+    }
+
+    /// The closest hits as new arrays by name, for arrays that are ready to be read; `None` for what Python has to look at first.
+    fn cast_ready<'py>(
+        &self,
+        py: Python<'py>,
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        tmin: f64,
+        tmax: f64,
+        fields: &Bound<'py, PyTuple>,
+    ) -> PyResult<Option<Bound<'py, PyDict>>> {
+        by_precision!(origins, Real => {
+            let rays = Rays::<Real>::ready(origins, directions, tmin, tmax);
+            rays.map_or(Ok(None), |rays| cast::closest_fresh(py, &self.scene, &rays, fields))
+        })
+    }
+
+    /// Whether anything is hit, into `out`.
+    fn occluded(
+        &self,
+        py: Python<'_>,
+        origins: &Bound<'_, PyAny>,
+        directions: &Bound<'_, PyAny>,
+        tmin: &Bound<'_, PyAny>,
+        tmax: &Bound<'_, PyAny>,
+        out: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        by_precision!(origins, Real => {
+                cast::any::<Real>(py, &self.scene, &Rays::new(origins, directions, tmin, tmax)?, out)
+        })
+    }
+
+    /// Whether anything is hit, as a new array, for arrays that are ready to be read; `None` for what Python has to look at first.
+    fn occluded_ready<'py>(
+        &self,
+        py: Python<'py>,
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        tmin: f64,
+        tmax: f64,
+    ) -> PyResult<Option<Bound<'py, PyArray1<bool>>>> {
+        by_precision!(origins, Real => {
+            let rays = Rays::<Real>::ready(origins, directions, tmin, tmax);
+            rays.map_or(Ok(None), |rays| cast::any_fresh(py, &self.scene, &rays).map(Some))
+        })
+    }
+
+    /// The numbers of hits, into `out`.
+    fn count(
+        &self,
+        py: Python<'_>,
+        origins: &Bound<'_, PyAny>,
+        directions: &Bound<'_, PyAny>,
+        tmin: &Bound<'_, PyAny>,
+        tmax: &Bound<'_, PyAny>,
+        out: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        by_precision!(origins, Real => {
+                cast::count::<Real>(py, &self.scene, &Rays::new(origins, directions, tmin, tmax)?, out)
+        })
+    }
+
+    /// Every hit, as columns by name.
+    fn cast_all<'py>(
+        &self,
+        py: Python<'py>,
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        tmin: &Bound<'py, PyAny>,
+        tmax: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        by_precision!(origins, Real => {
+                cast::all::<Real>(py, &self.scene, &Rays::new(origins, directions, tmin, tmax)?)
+        })
+    }
+
+    /// The nearest points of all surfaces, into the arrays of `out`.
+    fn closest_point(
+        &self,
+        py: Python<'_>,
+        points: &Bound<'_, PyAny>,
+        max_distance: f64,
+        out: &Bound<'_, PyDict>,
+    ) -> PyResult<()> {
+        by_precision!(points, Real => {
+                points::closest::<Real>(py, &self.scene, &Triples::new("points", points)?, max_distance, out)
+        })
+    }
+
+    /// Whether points are inside, into `out`.
+    fn inside(&self, py: Python<'_>, points: &Bound<'_, PyAny>, out: &Bound<'_, PyAny>) -> PyResult<()> {
+        by_precision!(points, Real => {
+                points::inside::<Real>(py, &self.scene, &Triples::new("points", points)?, out)
+        })
+    }
+
+    /// Winding numbers, into `out`.
+    fn winding_number(
+        &self,
+        py: Python<'_>,
+        points: &Bound<'_, PyAny>,
+        out: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        by_precision!(points, Real => {
+                points::winding_number::<Real>(
+                    py,
+                    &self.scene,
+                    &Triples::new("points", points)?,
+                    out.cast::<PyArray1<Real>>()?,
+                )
+        })
+    }
+
+    /// Renders with options by name; see the Python side for what they are.
+    fn render(
+        &self,
+        py: Python<'_>,
+        options: &Bound<'_, PyDict>,
+        progress: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<Picture> {
+        let Asked { options, denoises, keeps_part } = self.asked(options)?;
+        let tells = progress.map(Bound::unbind);
+        let (watch, cancel) = (Watch::default(), CancelToken::new());
+        let job = if keeps_part { Some(self.job(&options)?) } else { None };
+        // The render has threads of its own; those that wait for it here look for Ctrl-C.
+        let rendered = py.detach(|| {
+            std::thread::scope(|scope| {
+                let render = || self.scene.render_from(&options, &watch, &cancel, None, None);
+                let running = scope.spawn(render);
+                let mut raised = None;
+                while !running.is_finished() {
+                    std::thread::park_timeout(LOOK);
+                    if raised.is_none() && !running.is_finished() {
+                        let look =
+                            |py: Python<'_>| py.check_signals().and_then(|()| watch.tell(py, tells.as_ref()));
+                        raised = Python::attach(look).err();
+                        if raised.is_some() {
+                            cancel.cancel();
+                        }
+                    }
+                }
+                let rendered = running.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+                raised.map_or(Ok(rendered), Err)
+            })
+        })?;
+        let (mut picture, state) = rendered.map_err(raised)?;
+        watch.tell(py, tells.as_ref())?;
+        if denoises {
+            py.detach(|| picture.denoise(options.threads)).map_err(raised)?;
+        }
+        Ok(Picture::new(picture, job.map(|job| PartDesc { job, state })))
+    }
+
+    /// What is in it, by name.
+    fn info<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let info = self.scene.info();
+        let all = PyDict::new(py);
+        all.set_item("shapes", &info.shapes)?;
+        all.set_item("materials", &info.materials)?;
+        all.set_item("lights", &info.lights)?;
+        all.set_item("triangles", info.triangles)?;
+        all.set_item("instances", info.instances)?;
+        all.set_item("cameras", PyList::new(py, &info.cameras)?)?;
+        all.set_item("bounds", info.bounds.map(|b| (b.min.to_array(), b.max.to_array())))?;
+        all.set_item("memory_bytes", info.memory_bytes)?;
+        all.set_item("is_dark", self.scene.is_dark())?;
+        Ok(all)
+    }
+
+    /// The files that it was read from, each as it was named.
+    fn files(&self) -> Vec<PathBuf> {
+        self.files.clone()
+    }
+
+    /// Reads its files once more for the hashes by which parts of a render are known; later they may go away.
+    fn hash_files(&self) -> PyResult<()> {
+        self.job(&self.scene.options()).map(drop)
+    }
+
+    /// Samples a pixel, where nobody says how many.
+    fn samples(&self) -> u32 {
+        self.scene.options().stop.spp
+    }
+
+    /// The size of its picture, where none is asked for.
+    fn size(&self) -> (u32, u32) {
+        let options = self.scene.options();
+        (options.width, options.height)
+    }
+}
+
+/// Between two looks at a render.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// How far a render is, for whoever looks.
+#[derive(Default)]
+struct Watch(Mutex<Option<State>>);
+
+impl Progress for Watch {
+    fn state(&self, state: &State) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(*state);
+    }
+}
+
+impl Watch {
+    /// Calls `tells(samples, total, share)`, where something has changed.
+    fn tell(&self, py: Python<'_>, tells: Option<&Py<PyAny>>) -> PyResult<()> {
+        let Some(tells) = tells else { return Ok(()) };
+        let Some(state) = self.0.lock().unwrap_or_else(PoisonError::into_inner).take() else { return Ok(()) };
+        tells.call1(py, (state.samples, state.total, state.share)).map(drop)
+    }
+}
+
+/// What is asked of a render.
+struct Asked {
+    options: RenderOptions,
+    denoises: bool,
+    /// Whether its sums are to be kept, for merging.
+    keeps_part: bool,
+}
+
+impl Scene {
+    /// Which render it is.
+    fn job(&self, options: &RenderOptions) -> PyResult<Job> {
+        if self.hashes.get().is_none() {
+            let files = self.files.iter().map(PathBuf::as_path).filter(|file| Path::is_file(file));
+            let mut identity = Job::new(files, [], options).map_err(raised)?.identity;
+            identity.retain(|name, _| name.starts_with("file "));
+            self.hashes.get_or_init(|| identity);
+        }
+        let mut job = Job::new([], self.settings.iter().cloned(), options).map_err(raised)?;
+        job.identity.extend(self.hashes.get().cloned().unwrap_or_default());
+        Ok(job)
+    }
+
+    /// The options of a render by their names.
+    fn asked(&self, given: &Bound<'_, PyDict>) -> PyResult<Asked> {
+        let mut options = self.scene.options();
+        let (mut denoises, mut keeps_part) = (false, false);
+        for (name, value) in given {
+            let name: String = name.extract()?;
+            match &*name {
+                "spp" => options.stop.spp = value.extract()?,
+                "size" => (options.width, options.height) = value.extract()?,
+                "crop" => {
+                    let (x0, y0, x1, y1) = value.extract()?;
+                    options.crop = Some(PixelBounds { x0, y0, x1, y1 });
+                }
+                "camera" => options.camera = self.camera(&value)?,
+                "integrator" => {
+                    let name: String = value.extract()?;
+                    options.integrator.kind = IntegratorKind::from_name(&name).ok_or_else(|| {
+                        let names =
+                            ["path", "whitted", "ambientocclusion", "normals", "depth", "albedo", "uv"];
+                        unknown("integrator", &name, &names)
+                    })?;
+                }
+                "max_depth" => options.integrator.max_depth = value.extract()?,
+                "seed" => options.sampler.seed = value.extract()?,
+                "threads" => options.threads = value.extract()?,
+                "noise" => options.stop.noise = Some(value.extract()?),
+                "time" => {
+                    let seconds: f64 = value.extract()?;
+                    let time = Duration::try_from_secs_f64(seconds).map_err(|_| {
+                        invalid(format!("time is out of range (found {seconds}; expected seconds)"))
+                    })?;
+                    options.stop.time = Some(time);
+                }
+                "first_sample" => options.first_sample = value.extract()?,
+                "transparent" => options.transparent = value.extract()?,
+                "features" => options.features = value.extract()?,
+                "denoise" => denoises = value.extract()?,
+                "part" => keeps_part = value.extract()?,
+                _ => return Err(invalid(format!("render has no option {name}"))),
+            }
+        }
+        options.guides = denoises;
+        options.features |= denoises;
+        Ok(Asked { options, denoises, keeps_part })
+    }
+
+    fn camera(&self, wanted: &Bound<'_, PyAny>) -> PyResult<usize> {
+        let cameras = self.scene.resolved().cameras();
+        if let Ok(name) = wanted.extract::<String>() {
+            let names: Vec<&str> = cameras.iter().filter_map(|camera| camera.name.as_deref()).collect();
+            let found = cameras.iter().position(|camera| camera.name.as_deref() == Some(&name));
+            return found.ok_or_else(|| unknown("camera", &name, &names));
+        }
+        let index: usize = wanted.extract()?;
+        if index < cameras.len() {
+            return Ok(index);
+        }
+        Err(invalid(format!(
+            "there is no camera {index} (expected 0 to {})",
+            cameras.len().saturating_sub(1)
+        )))
+    }
+}
+
+/// The error for a name that is not there.
+pub(crate) fn unknown(noun: &str, name: &str, known: &[&str]) -> PyErr {
+    let tip = nearest_name(name, known.iter().copied());
+    let tip = tip.map_or_else(String::new, |near| format!("; did you mean {near}?"));
+    invalid(format!("there is no {noun} \"{name}\" (expected {}{tip})", known.join(", ")))
+}

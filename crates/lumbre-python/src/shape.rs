@@ -1,0 +1,354 @@
+//! What scenes are made of. Each is checked when it is made, so that a wrong number is refused where it stands.
+
+use std::sync::Arc;
+
+use lumbre::description::{Camera as CameraDesc, CameraView, GeometryDesc, LightDesc, MeshDesc};
+use lumbre::geometry::{
+    BilinearPatch, Capsule, Cone, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, Plane, Quadric, Shape,
+    ShapeError, Sphere, Torus, Triangle,
+};
+use lumbre::image::{Image, Rgb};
+use lumbre::math::{DMat4, Vec2, Vec3};
+use lumbre::shading::{Material as MaterialDesc, PrincipledParams, SpectrumTexture, Texture};
+use lumbre::{DVec2, DVec3, EnvironmentDesc, Transform};
+use numpy::ndarray::ArrayView2;
+use numpy::{PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+
+use crate::errors::invalid;
+
+type Triple = [f64; 3];
+
+/// A geometry without a place, material and light.
+#[pyclass(frozen, module = "lumbre._lumbre")]
+pub(crate) struct Geometry(pub(crate) GeometryDesc);
+
+fn exact<S: Into<Shape>>(shape: Result<S, ShapeError>) -> PyResult<Geometry> {
+    Ok(Geometry(GeometryDesc::Exact(shape.map_err(invalid)?.into())))
+}
+
+fn rows<const N: usize, T: Copy, U>(view: &ArrayView2<'_, T>, of: impl Fn([T; N]) -> U) -> Vec<U> {
+    (0..view.nrows()).map(|row| of(std::array::from_fn(|column| view[[row, column]]))).collect()
+}
+
+fn check_width<T: numpy::Element>(name: &str, array: &PyReadonlyArray2<'_, T>, width: usize) -> PyResult<()> {
+    if array.shape()[1] == width {
+        return Ok(());
+    }
+    Err(invalid(format!("{name} has the wrong shape (found {:?}; expected (N, {width}))", array.shape())))
+}
+
+#[pymethods]
+impl Geometry {
+    #[staticmethod]
+    fn sphere(center: Triple, radius: f64) -> PyResult<Self> {
+        exact(Sphere::new(center.into(), radius))
+    }
+
+    #[staticmethod]
+    fn plane(point: Triple, normal: Triple) -> PyResult<Self> {
+        exact(Plane::new(point.into(), normal.into()))
+    }
+
+    #[staticmethod]
+    fn disk(center: Triple, normal: Triple, radius: f64, inner_radius: f64) -> PyResult<Self> {
+        exact(Disk::new(center.into(), normal.into(), radius, inner_radius))
+    }
+
+    #[staticmethod]
+    fn cuboid(p0: Triple, p1: Triple) -> PyResult<Self> {
+        exact(Cuboid::new(p0.into(), p1.into()))
+    }
+
+    #[staticmethod]
+    fn cylinder(p0: Triple, p1: Triple, radius: f64, caps: bool) -> PyResult<Self> {
+        exact(Cylinder::new(p0.into(), p1.into(), radius, caps))
+    }
+
+    #[staticmethod]
+    fn cone(p0: Triple, p1: Triple, r0: f64, r1: f64, caps: bool) -> PyResult<Self> {
+        exact(Cone::new(p0.into(), p1.into(), r0, r1, caps))
+    }
+
+    #[staticmethod]
+    fn capsule(p0: Triple, p1: Triple, radius: f64) -> PyResult<Self> {
+        exact(Capsule::new(p0.into(), p1.into(), radius))
+    }
+
+    #[staticmethod]
+    fn torus(center: Triple, axis: Triple, major: f64, minor: f64) -> PyResult<Self> {
+        exact(Torus::new(center.into(), axis.into(), major, minor))
+    }
+
+    #[staticmethod]
+    fn paraboloid(radius: f64, zmin: f64, zmax: f64, phimax: f64) -> PyResult<Self> {
+        exact(Paraboloid::new(radius, zmin, zmax, phimax))
+    }
+
+    #[staticmethod]
+    fn hyperboloid(p1: Triple, p2: Triple, phimax: f64) -> PyResult<Self> {
+        exact(Hyperboloid::new(p1.into(), p2.into(), phimax))
+    }
+
+    #[staticmethod]
+    fn quadric(coefficients: [f64; 10], clip: Option<(Triple, Triple)>) -> PyResult<Self> {
+        let clip = clip.map(|(p0, p1)| {
+            let (p0, p1) = (DVec3::from(p0), DVec3::from(p1));
+            lumbre::geometry::Aabb { min: p0.min(p1), max: p0.max(p1) }
+        });
+        exact(Quadric::new(coefficients, clip))
+    }
+
+    #[staticmethod]
+    fn triangle(p0: Triple, p1: Triple, p2: Triple) -> PyResult<Self> {
+        exact(Triangle::new(p0.into(), p1.into(), p2.into()))
+    }
+
+    #[staticmethod]
+    fn patch(p00: Triple, p10: Triple, p01: Triple, p11: Triple) -> PyResult<Self> {
+        exact(BilinearPatch::new(p00.into(), p10.into(), p01.into(), p11.into()))
+    }
+
+    /// Triangles or quads of (V, 3) vertices in double precision and (F, 3) or (F, 4) faces. `is_precise` says whether rays meet
+    /// triangles at these vertices, or at what they are in single precision.
+    #[staticmethod]
+    fn mesh(
+        vertices: PyReadonlyArray2<'_, f64>,
+        faces: PyReadonlyArray2<'_, i64>,
+        normals: Option<PyReadonlyArray2<'_, f64>>,
+        uvs: Option<PyReadonlyArray2<'_, f64>>,
+        is_precise: bool,
+    ) -> PyResult<Self> {
+        check_width("vertices", &vertices, 3)?;
+        let places: Vec<DVec3> = rows(&vertices.as_array(), |place: Triple| place.into());
+        if let Some(vertex) = places.iter().position(|place| !place.is_finite()) {
+            return Err(invalid(format!("vertex {vertex} is not finite")));
+        }
+        let faces = faces.as_array();
+        let wrong = faces
+            .indexed_iter()
+            .find(|(_, vertex)| usize::try_from(**vertex).map_or(true, |v| v >= places.len()));
+        if let Some(((face, _), vertex)) = wrong {
+            return Err(invalid(format!(
+                "face {face} names a vertex that is not there (found {vertex}; expected 0 to {})",
+                places.len().saturating_sub(1)
+            )));
+        }
+        let (mut triangles, mut quads) = (Vec::new(), Vec::new());
+        match faces.ncols() {
+            3 => triangles = rows(&faces, |face: [i64; 3]| face.map(|vertex| vertex as u32)),
+            4 => quads = rows(&faces, |face: [i64; 4]| face.map(|vertex| vertex as u32)),
+            found => return Err(invalid(format!("faces have {found} corners (expected 3 or 4)"))),
+        }
+        if is_precise && !quads.is_empty() {
+            return Err(invalid("quads are of single precision (expected triangles, or float32 vertices)"));
+        }
+        if let Some(normals) = &normals {
+            check_width("normals", normals, 3)?;
+        }
+        if let Some(uvs) = &uvs {
+            check_width("uvs", uvs, 2)?;
+        }
+        let narrow = |numbers: Triple| Vec3::from(numbers.map(|x| x as f32));
+        let mesh = MeshDesc {
+            positions: places.iter().map(|place| place.as_vec3()).collect(),
+            precise_positions: is_precise.then_some(places),
+            triangles,
+            quads,
+            normals: normals.map(|normals| rows(&normals.as_array(), narrow)),
+            uvs: uvs.map(|uvs| rows(&uvs.as_array(), |uv: [f64; 2]| Vec2::from(uv.map(|x| x as f32)))),
+            ..MeshDesc::default()
+        };
+        Ok(Self(GeometryDesc::Mesh(Arc::new(mesh))))
+    }
+}
+
+/// The appearance of a surface.
+#[pyclass(frozen, module = "lumbre._lumbre")]
+pub(crate) struct Material(pub(crate) MaterialDesc);
+
+fn colour(name: &str, [r, g, b]: [f32; 3]) -> PyResult<Rgb> {
+    let is_light = |x: f32| x >= 0.0 && x.is_finite();
+    if is_light(r) && is_light(g) && is_light(b) {
+        return Ok(Rgb::new(r, g, b));
+    }
+    Err(invalid(format!("{name} is no colour (found {r}, {g}, {b}; expected finite numbers, 0 or greater)")))
+}
+
+fn share(name: &str, found: f32) -> PyResult<f32> {
+    if (0.0..=1.0).contains(&found) {
+        return Ok(found);
+    }
+    Err(invalid(format!("{name} is out of range (found {found}; expected 0 to 1)")))
+}
+
+#[pymethods]
+impl Material {
+    #[staticmethod]
+    fn diffuse(reflectance: [f32; 3]) -> PyResult<Self> {
+        Ok(Self(MaterialDesc::diffuse(colour("reflectance", reflectance)?)))
+    }
+
+    #[staticmethod]
+    fn metal(reflectance: [f32; 3], roughness: f32) -> PyResult<Self> {
+        let roughness = share("roughness", roughness)?;
+        Ok(Self(MaterialDesc::metal(colour("reflectance", reflectance)?, roughness)))
+    }
+
+    #[staticmethod]
+    fn glass(eta: f32) -> PyResult<Self> {
+        if eta > 0.0 && eta.is_finite() {
+            return Ok(Self(MaterialDesc::glass(eta)));
+        }
+        Err(invalid(format!("ior is out of range (found {eta}; expected a number above 0)")))
+    }
+
+    #[staticmethod]
+    fn principled(
+        base_color: [f32; 3],
+        metallic: f32,
+        roughness: f32,
+        transmission: f32,
+        clearcoat: f32,
+        ior: f32,
+    ) -> PyResult<Self> {
+        let number = |name, found| Ok::<_, PyErr>(Arc::new(Texture::Constant(share(name, found)?)));
+        if !(ior >= 1.0 && ior.is_finite()) {
+            return Err(invalid(format!("ior is out of range (found {ior}; expected 1 or more)")));
+        }
+        let params = PrincipledParams {
+            base_color: Arc::new(SpectrumTexture::Constant(colour("base_color", base_color)?)),
+            metallic: number("metallic", metallic)?,
+            roughness: number("roughness", roughness)?,
+            transmission: number("transmission", transmission)?,
+            clearcoat: number("clearcoat", clearcoat)?,
+            ior,
+            ..PrincipledParams::default()
+        };
+        Ok(Self(MaterialDesc::new(lumbre::shading::MaterialKind::Principled(Box::new(params)))))
+    }
+}
+
+/// A light other than a shape.
+#[pyclass(frozen, module = "lumbre._lumbre")]
+pub(crate) struct Light(pub(crate) LightDesc);
+
+#[pymethods]
+impl Light {
+    #[staticmethod]
+    fn point(position: Triple, intensity: [f32; 3]) -> PyResult<Self> {
+        let from = DVec3::from(position);
+        if !from.is_finite() {
+            return Err(invalid(format!("position is not finite (found {from})")));
+        }
+        Ok(Self(LightDesc::Point { from, intensity: colour("intensity", intensity)? }))
+    }
+
+    #[staticmethod]
+    fn distant(towards: Triple, irradiance: [f32; 3]) -> PyResult<Self> {
+        let towards = DVec3::from(towards).try_normalize();
+        let towards =
+            towards.ok_or_else(|| invalid("towards is no direction (expected a vector of some length)"))?;
+        Ok(Self(LightDesc::Distant { towards, irradiance: colour("irradiance", irradiance)? }))
+    }
+
+    /// Light from all around: `image` is (h, 2h, 3), by longitude and latitude, with this axis up.
+    #[staticmethod]
+    fn environment(
+        radiance: [f32; 3],
+        image: Option<PyReadonlyArray3<'_, f32>>,
+        up: Triple,
+    ) -> PyResult<Self> {
+        let radiance = colour("radiance", radiance)?;
+        let up = DVec3::from(up).try_normalize().ok_or_else(|| invalid("up is no direction"))?;
+        let turn = lumbre::math::DQuat::from_rotation_arc(DVec3::Z, up);
+        let world_from_light =
+            Transform::from_scale_rotation_translation(DVec3::ONE, turn, DVec3::ZERO).map_err(invalid)?;
+        let Some(image) = image else {
+            return Ok(Self(LightDesc::Infinite { world_from_light, radiance, image: None }));
+        };
+        let &[height, width, 3] = image.shape() else {
+            return Err(invalid(format!(
+                "image has the wrong shape (found {:?}; expected (h, 2h, 3))",
+                image.shape()
+            )));
+        };
+        let view = image.as_array();
+        let pixel = |i: usize| {
+            Rgb::new(
+                view[[i / width, i % width, 0]],
+                view[[i / width, i % width, 1]],
+                view[[i / width, i % width, 2]],
+            )
+        };
+        let pixels = (0..width * height).map(pixel).collect();
+        let described = Image::from_pixels(width as u32, height as u32, pixels)
+            .and_then(|image| EnvironmentDesc::of_image(Arc::new(image)));
+        let described = described.ok_or_else(|| {
+            invalid(format!("image is no environment map (found {width} by {height} pixels; expected twice as wide as high)"))
+        })?;
+        Ok(Self(LightDesc::Infinite { world_from_light, radiance, image: Some(described) }))
+    }
+}
+
+/// A camera.
+#[pyclass(frozen, module = "lumbre._lumbre")]
+pub(crate) struct Camera(pub(crate) CameraDesc);
+
+#[pymethods]
+impl Camera {
+    #[staticmethod]
+    fn perspective(eye: Triple, target: Triple, up: Triple, fov: f64, lens_radius: f64) -> PyResult<Self> {
+        if !(0.0 < fov && fov < 180.0) {
+            return Err(invalid(format!(
+                "fov is out of range (found {fov}; expected degrees between 0 and 180)"
+            )));
+        }
+        let camera = CameraDesc::perspective(eye.into(), target.into(), up.into(), fov);
+        Ok(Self(camera.map_err(|_| no_view(eye, target, up))?.with_lens(lens_radius)))
+    }
+
+    #[staticmethod]
+    fn orthographic(eye: Triple, target: Triple, up: Triple, height: f64) -> PyResult<Self> {
+        let camera = CameraDesc::orthographic(eye.into(), target.into(), up.into(), height);
+        Ok(Self(camera.map_err(|_| no_view(eye, target, up))?))
+    }
+
+    #[staticmethod]
+    fn panorama(eye: Triple, target: Triple, up: Triple) -> PyResult<Self> {
+        let camera = CameraDesc::panorama(eye.into(), target.into(), up.into());
+        Ok(Self(camera.map_err(|_| no_view(eye, target, up))?))
+    }
+
+    /// The rays through the centres of the pixels of a picture: origins and directions.
+    fn rays<'py>(
+        &self,
+        py: Python<'py>,
+        width: u32,
+        height: u32,
+    ) -> PyResult<[Bound<'py, PyArray3<f64>>; 2]> {
+        let view = CameraView::new(&self.0, width, height);
+        let (mut origins, mut directions) = (Vec::new(), Vec::new());
+        for y in 0..height {
+            for x in 0..width {
+                let film = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+                let ray = view.ray(film, DVec2::splat(0.5), view.time(0.0), 1.0).ray;
+                origins.extend(ray.origin.to_array());
+                directions.extend(ray.direction.to_array());
+            }
+        }
+        let array = |numbers| PyArray1::from_vec(py, numbers).reshape([height as usize, width as usize, 3]);
+        Ok([array(origins)?, array(directions)?])
+    }
+}
+
+fn no_view(eye: Triple, target: Triple, up: Triple) -> PyErr {
+    invalid(format!(
+        "a camera at {eye:?} does not see {target:?} with {up:?} upwards (expected two places, and another direction up)"
+    ))
+}
+
+/// A map of a (4, 4) matrix.
+pub(crate) fn transform(matrix: [[f64; 4]; 4]) -> PyResult<Transform> {
+    Transform::from_matrix(DMat4::from_cols_array_2d(&matrix).transpose()).map_err(invalid)
+}
