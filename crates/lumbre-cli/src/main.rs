@@ -1,4 +1,4 @@
-//! The `lumbre` program: render, cast, info, diff, merge.
+//! The `lumbre` program: render, view, cast, info, diff, merge.
 
 use std::process::ExitCode;
 
@@ -33,6 +33,7 @@ mod tips;
 mod units;
 mod verb;
 mod view;
+mod viewing;
 
 /// Renders scenes, casts rays into them, says what is in them, and compares and joins pictures.
 #[derive(Parser)]
@@ -41,6 +42,7 @@ mod view;
   lumbre model.glb                              a picture of a model: without a command, files are rendered
   lumbre render scene.pbrt                      a picture under the scene's own film name
   lumbre render model.obj --size 800x600        a model, framed and lit
+  lumbre view scene.pbrt                        the picture in the browser while it is made
   lumbre cast scene.pbrt --rays rays.csv        what each ray hits first
   lumbre info scene.pbrt --json                 what is in a scene
   lumbre diff a.exr b.exr --metric relmse       how different two pictures are
@@ -55,6 +57,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::Arguments>),
+    View(Box<viewing::Arguments>),
     Cast(cast::Arguments),
     Info(info::Arguments),
     Diff(diff::Arguments),
@@ -73,6 +76,7 @@ fn main() -> ExitCode {
     threads::start();
     let outcome = match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
+        Command::View(arguments) => viewing::run(*arguments),
         Command::Cast(arguments) => cast::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Diff(arguments) => diff::run(&arguments),

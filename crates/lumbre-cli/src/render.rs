@@ -292,7 +292,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 const LEAST_TIME: Duration = Duration::from_millis(400);
 
 /// Samples per pixel of a model without camera and light, of which the noise is taken out.
-const MODEL_SPP: u32 = 16;
+pub(crate) const MODEL_SPP: u32 = 16;
 
 const READING: Phase = Phase::Preparing("reading the scene");
 
@@ -734,7 +734,7 @@ fn is_for_displays(path: &Path) -> bool {
 
 /// The stops that bring white to 1, in tenths, if it is more than one stop too bright or three too dark; else
 /// 0.
-fn measured_exposure(white_level: Option<f32>) -> f32 {
+pub(crate) fn measured_exposure(white_level: Option<f32>) -> f32 {
     match white_level {
         Some(level) if !(0.125..=2.0).contains(&level) => {
             (-10.0 * level.logarithm_2()).round().clamp(-1000.0, 1000.0) / 10.0
@@ -822,7 +822,7 @@ fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failur
     Ok(options)
 }
 
-fn camera(scene: &Scene, wanted: &str) -> Result<usize, Failure> {
+pub(crate) fn camera(scene: &Scene, wanted: &str) -> Result<usize, Failure> {
     let cameras = scene.resolved().cameras();
     let by_name = cameras.iter().position(|camera| camera.name.as_deref() == Some(wanted));
     let by_index = wanted.parse().ok().filter(|index| *index < cameras.len());

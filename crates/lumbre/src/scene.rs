@@ -266,6 +266,18 @@ impl Scene {
         Ok(levels.get(levels.len() * 4 / 5).copied())
     }
 
+    /// Puts a camera in the place of the one at a position, for pictures from elsewhere; nothing is built anew.
+    ///
+    /// # Errors
+    /// [`Error::Build`] for a camera that makes no picture, and where there is none at the position.
+    pub fn replace_camera(
+        &mut self,
+        position: usize,
+        camera: crate::description::Camera,
+    ) -> Result<(), Error> {
+        Ok(self.resolved.replace_camera(position, camera)?)
+    }
+
     /// Statistics of the scene.
     pub fn info(&self) -> &SceneInfo {
         &self.info
