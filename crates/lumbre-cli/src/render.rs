@@ -137,7 +137,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_enum, value_name = "WHICH", default_value_t = Metadata::Plain)]
     metadata: Metadata,
     /// Write statistics of the render, as JSON.
-    #[arg(long, value_name = "FILE.json")]
+    #[arg(long, value_name = "FILE.json", conflicts_with = "turntable")]
     stats: Option<PathBuf>,
     /// How to show progress.
     #[arg(long, value_enum, value_name = "STYLE", default_value_t = Style::Auto)]
