@@ -188,6 +188,9 @@ impl Worker {
         self.options = options;
         self.options.stop.spp = self.target(wanted, &stage);
         (self.state, self.spent) = (None, Duration::ZERO);
+        let target = self.options.stop.spp;
+        self.session
+            .tell_progress(&json!({ "type": "progress", "doing": "rendering", "spp": 0, "target": target }));
         self.sequence = wanted.sequence;
         self.step =
             if wanted.channel == Channel::Ids { Step::Full(1) } else { Step::First(self.coarseness()) };

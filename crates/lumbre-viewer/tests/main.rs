@@ -1,1 +1,6 @@
-//! x
+//! What the viewer answers, and what it refuses.
+
+mod client;
+mod files;
+mod hostile;
+mod picture;
