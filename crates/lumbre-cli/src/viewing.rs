@@ -82,6 +82,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
     let mut options = Options::default();
     options.address = (arguments.host, arguments.port).into();
     options.hosts.clone_from(&arguments.allow_host);
+    options.session_file = session_file(arguments.port);
     let opens = !arguments.no_open;
     let source = Arc::new(Files { arguments: Arc::new(arguments), dropped: None });
     let viewer = Viewer::new(source, &options).map_err(Failure::Io)?;
@@ -110,6 +111,13 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(status) => Err(Failure::Interrupted(status)),
         None => Ok(()),
     }
+}
+
+/// Where the session of a port that was asked for is kept until the user logs out; nowhere on systems without such a folder.
+fn session_file(port: u16) -> Option<PathBuf> {
+    let folder = std::env::var_os("XDG_RUNTIME_DIR").filter(|folder| !folder.is_empty() && port != 0)?;
+    let folder = Path::new(&folder);
+    folder.is_dir().then(|| folder.join(format!("lumbre-view-{port}")))
 }
 
 /// Opens an address in the browser of who sits at this machine; whether there seems to be one.

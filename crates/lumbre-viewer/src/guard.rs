@@ -1,6 +1,8 @@
 //! Who may talk to the viewer: exact lists of hosts and origins, a token that works once, and the cookie that it becomes.
 
+use std::io::Write;
 use std::net::SocketAddr;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use hyper::HeaderMap;
@@ -30,11 +32,16 @@ pub(crate) struct Guard {
 const FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 
 impl Guard {
-    /// That of a viewer at an address, with other names under which it may be reached, as `name:port`.
+    /// That of a viewer at an address, with other names under which it may be reached, as `name:port`, and the file in which the secret
+    /// of the session outlives it.
     ///
     /// # Errors
     /// Where the system gives no random bytes.
-    pub(crate) fn new(address: SocketAddr, more_hosts: &[String]) -> Result<Self, String> {
+    pub(crate) fn new(
+        address: SocketAddr,
+        more_hosts: &[String],
+        session_file: Option<&Path>,
+    ) -> Result<Self, String> {
         let port = address.port();
         let mut hosts = vec![address.to_string()];
         if address.ip().is_loopback() {
@@ -43,7 +50,11 @@ impl Guard {
         hosts.extend(more_hosts.iter().map(|host| host.to_ascii_lowercase()));
         // Browsers do not tell the cookies of two ports of one host apart.
         let cookie_name = format!("lumbre-{port}");
-        let (session, token) = (secret()?, secret()?);
+        let session = match session_file {
+            Some(path) => kept_secret(path)?,
+            None => secret()?,
+        };
+        let token = secret()?;
         Ok(Self { hosts, cookie_name, session, token, token_is_used: AtomicBool::new(false) })
     }
 
@@ -106,6 +117,40 @@ fn is_same(guess: &str, secret: &str) -> bool {
     guess.len() == secret.len() && differences == 0
 }
 
+/// The secret that a file keeps, or a new one that it keeps from now on. A file that others could have written, or that holds
+/// something else, is replaced.
+fn kept_secret(path: &Path) -> Result<String, String> {
+    let kept = std::fs::symlink_metadata(path)
+        .ok()
+        .filter(is_private)
+        .and_then(|_| std::fs::read_to_string(path).ok());
+    if let Some(kept) =
+        kept.filter(|text| text.len() == SECRET_DIGITS && text.bytes().all(|b| b.is_ascii_hexdigit()))
+    {
+        return Ok(kept);
+    }
+    let new = secret()?;
+    // Where it cannot be kept, the page is opened anew after a restart.
+    let _ = std::fs::remove_file(path);
+    let mut options = std::fs::OpenOptions::new();
+    options.write(true).create_new(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    let _ = options.open(path).and_then(|mut file| file.write_all(new.as_bytes()));
+    Ok(new)
+}
+
+/// Whether it is a file that no one else may read or write.
+fn is_private(meta: &std::fs::Metadata) -> bool {
+    #[cfg(unix)]
+    let is_own = std::os::unix::fs::PermissionsExt::mode(&meta.permissions()) & 0o077 == 0;
+    #[cfg(not(unix))]
+    let is_own = true;
+    meta.is_file() && is_own
+}
+
+const SECRET_DIGITS: usize = 32;
+
 /// 128 random bits as hexadecimal digits.
 fn secret() -> Result<String, String> {
     let mut bytes = [0; 16];
@@ -119,11 +164,31 @@ mod tests {
 
     #[test]
     fn a_token_works_once_and_a_wrong_one_never() {
-        let guard = Guard::new("127.0.0.1:7777".parse().unwrap(), &[]).unwrap();
+        let guard = Guard::new("127.0.0.1:7777".parse().unwrap(), &[], None).unwrap();
         let token = guard.path().strip_prefix("/open/").unwrap().to_owned();
         assert_eq!(token.len(), 32);
         assert!(!guard.take("") && !guard.take(&token[1..]) && !guard.take(&token.replace(|_| true, "0")));
         assert!(guard.take(&token));
         assert!(!guard.take(&token));
+    }
+
+    #[test]
+    fn a_session_outlives_the_viewer_in_a_file_of_ones_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("session");
+        let first = kept_secret(&path).unwrap();
+        assert_eq!(kept_secret(&path).unwrap(), first);
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o644)).unwrap();
+            let second = kept_secret(&path).unwrap();
+            assert_ne!(second, first, "others could have read it");
+            std::fs::rename(&path, folder.path().join("elsewhere")).unwrap();
+            std::os::unix::fs::symlink(folder.path().join("elsewhere"), &path).unwrap();
+            assert_ne!(kept_secret(&path).unwrap(), second, "it is not in this place");
+        }
+        std::fs::write(&path, "short").unwrap();
+        assert_eq!(kept_secret(&path).unwrap().len(), SECRET_DIGITS);
     }
 }

@@ -1,6 +1,7 @@
 //! A viewer: a scene, those who work on it, and the server that shows it.
 
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use tokio::sync::Notify;
@@ -20,12 +21,15 @@ pub struct Options {
     pub address: SocketAddr,
     /// Other names under which browsers reach it, as `name:port`: those of a tunnel whose ends have different ports.
     pub hosts: Vec<String>,
+    /// A file, in a folder of the user's own, in which the session is kept: pages that are open go on when a viewer ends and another one
+    /// begins at the same address. Without it, the new one's address is to be opened.
+    pub session_file: Option<PathBuf>,
 }
 
 impl Default for Options {
     /// This machine only, at any port.
     fn default() -> Self {
-        Self { address: (Ipv4Addr::LOCALHOST, 0).into(), hosts: Vec::new() }
+        Self { address: (Ipv4Addr::LOCALHOST, 0).into(), hosts: Vec::new(), session_file: None }
     }
 }
 
@@ -70,7 +74,7 @@ impl Viewer {
     pub fn new(source: Arc<dyn Source>, options: &Options) -> Result<Self, String> {
         let listener = listen(options.address)?;
         let address = listener.local_addr().map_err(|e| e.to_string())?;
-        let guard = Guard::new(address, &options.hosts)?;
+        let guard = Guard::new(address, &options.hosts, options.session_file.as_deref())?;
         let dropped = tempfile::tempdir().map_err(|e| format!("cannot make a temporary folder: {e}"))?;
         let session = Arc::new(Session::new(source));
         let server = Arc::new(Server { session, guard, dropped, closed: Arc::new(Notify::new()) });

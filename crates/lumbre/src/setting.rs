@@ -46,7 +46,8 @@ impl FromStr for Setting {
                 quoted(text)
             )
         };
-        let (path, value) = text.split_once('=').ok_or_else(wrong)?;
+        // Names may hold it, values do not.
+        let (path, value) = text.rsplit_once('=').ok_or_else(wrong)?;
         let (owner, rest) = path.trim().split_once('.').ok_or_else(wrong)?;
         let (of, is_one) = match owner {
             "material" => (Owner::Material, false),
