@@ -9,6 +9,7 @@ use xtask::command::{self, Profile};
 mod bench;
 mod check;
 mod field;
+mod page;
 mod pictures;
 mod proof;
 mod race;

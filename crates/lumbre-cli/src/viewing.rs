@@ -9,7 +9,7 @@ use std::time::Duration;
 use clap::Args;
 use lumbre::image::ToneMap;
 use lumbre::{CancelToken, SaveOptions, Scene, SceneDesc, StageLight};
-use lumbre_viewer::{Built, Moment, Options, Read, Source, Viewer};
+use lumbre_viewer::{Built, Moment, Options, Read, Source, Viewer, export};
 
 use crate::failure::{Failure, print};
 use crate::names::one_of;
@@ -27,6 +27,7 @@ use crate::view::ViewArguments;
   lumbre view scene.pbrt                        opens a page that shows the picture
   lumbre view chair.glb --size 1280x720
   lumbre view scene.pbrt --overlay evening.txt  with edits that the page has saved
+  lumbre view scene.pbrt --export page          a page of the finished picture, in a folder
   lumbre view                                   an empty page, on which a .glb can be dropped
 
 On another machine: with the same port at both ends, then open the address that is printed.
@@ -48,6 +49,10 @@ pub(crate) struct Arguments {
     /// Only print the address.
     #[arg(long)]
     no_open: bool,
+    /// Write a page of the finished picture into this folder instead: with its channels, the values of its pixels and the facts of the
+    /// scene. It opens from a file, and can be sent or put on a web server.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["port", "host", "allow_host", "no_open"])]
+    export: Option<PathBuf>,
     /// Samples per pixel. By default as many as the scene says, else 64; 16 for a model whose noise is taken out.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
@@ -79,6 +84,16 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
     }
     let cancel = CancelToken::new();
     let signals = Signals::listen(&cancel)?;
+    if let Some(folder) = arguments.export.clone() {
+        if arguments.scene.is_empty() {
+            return Err(Failure::Usage("--export needs a scene".to_owned()));
+        }
+        signals.enter(Phase::Rendering);
+        let files = Files { arguments: Arc::new(arguments), dropped: None };
+        export(&files, &folder, &cancel).map_err(Failure::Input)?;
+        say!("{}: open it in a browser", folder.join("index.html").display());
+        return signals.received().map_or(Ok(()), |status| Err(Failure::Interrupted(status)));
+    }
     let mut options = Options::default();
     options.address = (arguments.host, arguments.port).into();
     options.hosts.clone_from(&arguments.allow_host);

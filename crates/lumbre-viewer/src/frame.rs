@@ -81,7 +81,7 @@ impl Shot {
 pub(crate) struct Frame(pub Bytes);
 
 /// Bytes before the pixels: eight numbers of four bytes, the least significant first.
-const HEADER: usize = 32;
+pub(crate) const HEADER: usize = 32;
 const MAGIC: u32 = u32::from_le_bytes(*b"LUM1");
 
 impl Frame {

@@ -2,6 +2,7 @@
 #![doc = include_str!("../README.md")]
 
 mod camera;
+mod export;
 mod frame;
 mod guard;
 mod message;
@@ -16,5 +17,6 @@ mod viewer;
 mod watching;
 mod worker;
 
+pub use export::export;
 pub use source::{Built, Moment, Read, Source};
 pub use viewer::{Closer, Options, Viewer};

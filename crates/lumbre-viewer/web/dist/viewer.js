@@ -119,6 +119,153 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     }
   };
 
+  // src/elements.ts
+  function byId(id) {
+    const found = document.getElementById(id);
+    if (!found) throw new Error(`the page has no ${id}`);
+    return found;
+  }
+  function element(name, text = "", properties = {}) {
+    const made = Object.assign(document.createElement(name), properties);
+    if (text) made.textContent = text;
+    return made;
+  }
+  function short(value) {
+    return Number.isFinite(value) ? String(+value.toPrecision(6)) : String(value);
+  }
+  function large(value) {
+    const units = [[1e9, " G"], [1e6, " M"], [1e3, " k"]];
+    for (const [unit2, name] of units) if (value >= unit2) return `${(value / unit2).toFixed(2)}${name}`;
+    return `${Math.round(value)}`;
+  }
+  function spoken(seconds) {
+    if (seconds < 1) return `${Math.round(seconds * 1e3)} ms`;
+    if (seconds < 90) return `${seconds.toFixed(seconds < 10 ? 1 : 0)} s`;
+    return `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
+  }
+  function options(select, entries, chosen) {
+    const same = select.options.length === entries.length && entries.every(([value, text], i) => select.options[i]?.value === value && select.options[i]?.textContent === text);
+    if (!same) select.replaceChildren(...entries.map(([value, text]) => element("option", text, { value })));
+    select.value = chosen;
+  }
+  function save(name, text) {
+    const url = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
+    element("a", "", { href: url, download: name }).click();
+    setTimeout(() => URL.revokeObjectURL(url), 1e4);
+  }
+
+  // src/at-rest.ts
+  function bytes(base64) {
+    return Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+  }
+  function half(bits) {
+    const sign = bits & 32768 ? -1 : 1;
+    const [exponent, fraction] = [bits >> 10 & 31, bits & 1023];
+    if (exponent === 31) return fraction ? NaN : sign * Infinity;
+    return exponent === 0 ? sign * fraction * 2 ** -24 : sign * (1 + fraction / 1024) * 2 ** (exponent - 15);
+  }
+  var AtRest = class {
+    constructor(listener2, data2) {
+      this.listener = listener2;
+      this.data = data2;
+      setTimeout(() => void this.start());
+    }
+    listener;
+    data;
+    shown;
+    values;
+    async start() {
+      this.listener.stood("open");
+      this.listener.told({ type: "scene", scene: this.data.scene });
+      this.listener.told({ type: "progress", doing: "done", ...this.data.progress });
+      await this.show("beauty");
+    }
+    state(channel) {
+      return {
+        name: this.data.name,
+        has_scene: true,
+        error: null,
+        edit_error: null,
+        camera: this.data.camera,
+        sequence: 0,
+        moved: false,
+        placement: this.data.placement,
+        fov: null,
+        zoom: 1,
+        size: null,
+        channel,
+        scale: 1,
+        spp: this.data.progress.spp ?? null,
+        denoise: null,
+        paused: false,
+        exposure: 0,
+        tone_map: null,
+        false_colour: false,
+        time: null,
+        variant: null,
+        settings: []
+      };
+    }
+    async show(name) {
+      const channel = this.data.channels.find((known) => known.name === name);
+      if (!channel) return;
+      this.listener.told({ type: "state", ...this.state(name) });
+      const bitmap = await createImageBitmap(new Blob([bytes(channel.png)], { type: "image/png" }));
+      const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
+      const drawing = canvas.getContext("2d");
+      if (!drawing) return;
+      drawing.drawImage(bitmap, 0, 0);
+      const { width, height } = bitmap;
+      const pixels = drawing.getImageData(0, 0, width, height);
+      [this.shown, this.values] = [pixels, void 0];
+      if (channel.values) {
+        const stream = new Blob([bytes(channel.values)]).stream().pipeThrough(new DecompressionStream("deflate"));
+        this.values = new DataView(await new Response(stream).arrayBuffer());
+      }
+      const spp = this.data.progress.spp ?? 0;
+      this.listener.framed({ width, height, fullWidth: width, fullHeight: height, spp, sequence: 0, isFull: true, isDone: true, pixels });
+    }
+    send(message) {
+      const { type, channel, x, y, width, height, request: request2 } = message;
+      if (type === "set" && channel) void this.show(String(channel));
+      if (type !== "values" || !this.shown) return;
+      const whole = this.shown.width;
+      const [x0, y0] = [x ?? 0, y ?? 0];
+      const [columns, rows] = [Math.min(width ?? 0, whole - x0), Math.min(height ?? 0, this.shown.height - y0)];
+      const found = [];
+      for (let row = y0; row < y0 + rows; row++) {
+        for (let column = x0; column < x0 + columns; column++) {
+          const pixel = row * whole + column;
+          const value = (c) => this.values ? half(this.values.getUint16(2 * (3 * pixel + c), true)) : +((this.shown?.data[4 * pixel + c] ?? 0) / 255).toFixed(3);
+          found.push([value(0), value(1), value(2)]);
+        }
+      }
+      this.listener.told({ type: "values", request: request2 ?? 0, x: x0, y: y0, width: columns, height: rows, values: found });
+    }
+  };
+  function hideWhatNeedsAViewer() {
+    const live = [
+      "pause",
+      "reset",
+      "exposure",
+      "tone-map",
+      "false-colour",
+      "denoise",
+      "spp",
+      "scale",
+      "edit-details",
+      "camera-details",
+      "picked-details",
+      "save-details",
+      "help-open"
+    ];
+    for (const id of live) {
+      byId(id).hidden = true;
+      for (const label of document.querySelectorAll(`label[for="${id}"]`)) label.hidden = true;
+    }
+    document.querySelector("option[value=ids]")?.remove();
+  }
+
   // src/protocol.ts
   var HEADER = 32;
   var MAGIC = 827151692;
@@ -132,8 +279,8 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
 
   // src/connection.ts
   var Connection = class {
-    constructor(listener) {
-      this.listener = listener;
+    constructor(listener2) {
+      this.listener = listener2;
       this.connect();
     }
     listener;
@@ -172,41 +319,6 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       this.wait = Math.min(this.wait * 1.5, 5e3);
     }
   };
-
-  // src/elements.ts
-  function byId(id) {
-    const found = document.getElementById(id);
-    if (!found) throw new Error(`the page has no ${id}`);
-    return found;
-  }
-  function element(name, text = "", properties = {}) {
-    const made = Object.assign(document.createElement(name), properties);
-    if (text) made.textContent = text;
-    return made;
-  }
-  function short(value) {
-    return Number.isFinite(value) ? String(+value.toPrecision(6)) : String(value);
-  }
-  function large(value) {
-    const units = [[1e9, " G"], [1e6, " M"], [1e3, " k"]];
-    for (const [unit2, name] of units) if (value >= unit2) return `${(value / unit2).toFixed(2)}${name}`;
-    return `${Math.round(value)}`;
-  }
-  function spoken(seconds) {
-    if (seconds < 1) return `${Math.round(seconds * 1e3)} ms`;
-    if (seconds < 90) return `${seconds.toFixed(seconds < 10 ? 1 : 0)} s`;
-    return `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
-  }
-  function options(select, entries, chosen) {
-    const same = select.options.length === entries.length && entries.every(([value, text], i) => select.options[i]?.value === value && select.options[i]?.textContent === text);
-    if (!same) select.replaceChildren(...entries.map(([value, text]) => element("option", text, { value })));
-    select.value = chosen;
-  }
-  function save(name, text) {
-    const url = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
-    element("a", "", { href: url, download: name }).click();
-    setTimeout(() => URL.revokeObjectURL(url), 1e4);
-  }
 
   // src/edit.ts
   var MOST = 60;
@@ -650,11 +762,9 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
   var mine = -1;
   var measured = { latencies: [], frames: [], changes: /* @__PURE__ */ new Map(), spp: 0, done: false, sequence: 0 };
   Object.assign(globalThis, { lumbreMeasured: measured });
-  var connection = new Connection({
-    told: (message) => told(message),
-    framed: (frame) => framed(frame),
-    stood: (how) => stood(how)
-  });
+  var listener = { told: (message) => told(message), framed: (frame) => framed(frame), stood: (how) => stood(how) };
+  var data = globalThis.lumbreAtRest;
+  var connection = data ? new AtRest(listener, data) : new Connection(listener);
   var isMoving = false;
   function moved() {
     if (isMoving) return;
@@ -905,6 +1015,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       alertOf("This is no picture that a browser can show.", file.name);
     }
   });
+  if (data) hideWhatNeedsAViewer();
   async function drop(file) {
     if (!file) return;
     try {
@@ -923,6 +1034,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
   stage.addEventListener("dragleave", () => stage.classList.remove("over"));
   stage.addEventListener("drop", (event) => {
     event.preventDefault();
+    if (data) return;
     stage.classList.remove("over");
     void drop(event.dataTransfer?.files[0]);
   });

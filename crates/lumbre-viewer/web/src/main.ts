@@ -1,6 +1,7 @@
 // The page: what comes from the viewer is shown, what is wished goes to it.
 import { Camera } from "./camera";
-import { Connection } from "./connection";
+import { AtRest, hideWhatNeedsAViewer, type Data } from "./at-rest";
+import { Connection, type Listener } from "./connection";
 import { Editor } from "./edit";
 import { byId, large, options, save, short, spoken } from "./elements";
 import { showFacts, showHits } from "./facts";
@@ -28,11 +29,9 @@ let mine = -1;
 const measured = { latencies: [] as number[], frames: [] as number[], changes: new Map<number, number>(), spp: 0, done: false, sequence: 0 };
 Object.assign(globalThis, { lumbreMeasured: measured });
 
-const connection = new Connection({
-  told: (message) => told(message),
-  framed: (frame) => framed(frame),
-  stood: (how) => stood(how),
-});
+const listener: Listener = { told: (message) => told(message), framed: (frame) => framed(frame), stood: (how) => stood(how) };
+const data = (globalThis as { lumbreAtRest?: Data }).lumbreAtRest;
+const connection = data ? new AtRest(listener, data) : new Connection(listener);
 
 // ---- the camera goes out once a picture of the screen
 let isMoving = false;
@@ -304,6 +303,8 @@ on("reference-file", "change", async ({ files }) => {
   }
 });
 
+if (data) hideWhatNeedsAViewer();
+
 // ---- a model that is dropped
 async function drop(file: File | undefined): Promise<void> {
   if (!file) return;
@@ -323,6 +324,7 @@ stage.addEventListener("dragover", (event) => {
 stage.addEventListener("dragleave", () => stage.classList.remove("over"));
 stage.addEventListener("drop", (event) => {
   event.preventDefault();
+  if (data) return;
   stage.classList.remove("over");
   void drop(event.dataTransfer?.files[0]);
 });

@@ -28,6 +28,8 @@ NamedMaterial "<img src=x onerror=evil()>"
 Shape "sphere" "float radius" 1.25
 `;
 
+writeFileSync(join(folder, "scene.pbrt"), SCENE);
+
 const freePort = () => new Promise((done) => {
   const server = createServer().listen(0, "127.0.0.1", () => {
     const { port } = server.address();
@@ -77,7 +79,6 @@ async function finds(page, what) {
 const tests = {
   async "it opens once and converges to the pixels that are rendered"() {
     const path = join(folder, "scene.pbrt");
-    writeFileSync(path, SCENE);
     const viewer = await view(path);
     const page = await open(viewer.url);
     await done(page);
@@ -249,6 +250,26 @@ const tests = {
     await other.waitForFunction(() => !document.getElementById("alert").hidden);
     assert.match(await other.textContent("#alert"), /missing\.pbrt/);
     await missing.stop();
+  },
+
+  async "a page at rest opens from a file and shows the same pixels and their values"() {
+    const [path, out] = [join(folder, "scene.pbrt"), join(folder, "page")];
+    execFileSync(program, ["view", path, "--export", out], { stdio: "ignore" });
+    const rendered = join(folder, "at-rest.png");
+    execFileSync(program, ["render", path, "-o", rendered, "-q"]);
+    const page = await open(`file://${out}/index.html`);
+    await done(page);
+    const png = PNG.sync.read(readFileSync(rendered));
+    assert.deepEqual(await pixels(page), [png.width, png.height, ...png.data]);
+    const box = await page.locator("#picture").boundingBox();
+    await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+    await page.waitForFunction(() => /^48, 32: 0\.\d+  0\.\d+  0\.\d+$/.test(document.getElementById("pixel").textContent));
+    await page.selectOption("#channel", "normal");
+    await page.waitForFunction(() => document.getElementById("channel").value === "normal");
+    await page.waitForTimeout(300);
+    assert.notDeepEqual(await pixels(page), [png.width, png.height, ...png.data]);
+    assert.equal(await page.isVisible("#pause"), false);
+    await finds(page, "the page at rest");
   },
 
   async "axe finds nothing, light and dark, desktop and phone"() {
