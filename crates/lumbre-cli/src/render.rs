@@ -25,10 +25,12 @@ use crate::denoiser::{Choice, Denoiser};
 use crate::failure::{Failure, print_bytes};
 use crate::names::one_of;
 use crate::output::{self, Inputs, Pictures, Replaced, is_standard_stream};
-use crate::progress::{Display, Style, Watched};
+use crate::preview::{Preview, Protocol};
+use crate::progress::{Display, PictureViewer, Style, Watched};
 use crate::reading::{Frames, ReadingArguments, print_warnings};
 use crate::signals::{Deadline, Phase, Signals};
 use crate::staging::{self, Behind, StagingArguments};
+use crate::tev::Tev;
 use crate::threads;
 use crate::units::{self, Crop, counted, spoken};
 use crate::view::ViewArguments;
@@ -142,6 +144,12 @@ pub(crate) struct Arguments {
     /// How to show progress.
     #[arg(long, value_enum, value_name = "STYLE", default_value_t = Style::Auto)]
     progress: Style,
+    /// Show the picture in the terminal while it is rendered, in place of the progress.
+    #[arg(long, value_enum, value_name = "HOW", num_args = 0..=1, require_equals = true, default_missing_value = "auto")]
+    preview: Option<Protocol>,
+    /// Show the picture in a tev that is open, by default at its port 14158.
+    #[arg(long, value_name = "HOST:PORT")]
+    tev: Option<String>,
     /// Print more.
     #[arg(short, long)]
     verbose: bool,
@@ -334,6 +342,23 @@ impl Arguments {
             shown.insert("background".to_owned(), background);
         }
         shown
+    }
+
+    /// Who else is shown the picture while it is rendered.
+    fn viewers(
+        &self,
+        output: &Path,
+        tone_map: ToneMap,
+        exposure: f32,
+    ) -> Result<Vec<Box<dyn PictureViewer>>, Failure> {
+        let mut viewers: Vec<Box<dyn PictureViewer>> = Vec::new();
+        if let Some(protocol) = self.preview {
+            viewers.push(Box::new(Preview::new(protocol, tone_map, exposure)?));
+        }
+        if let Some(address) = &self.tev {
+            viewers.push(Box::new(Tev::connect(address, &output.display().to_string())?));
+        }
+        Ok(viewers)
     }
 
     /// The output, unless it is standard output.
@@ -571,8 +596,10 @@ fn picture(
         false => ExrPrecision::Half,
     };
 
-    let style = if arguments.quiet { Style::None } else { arguments.progress };
-    let progress = Watched { display: Display::new(style), signals };
+    let is_silent = arguments.quiet || arguments.preview.is_some();
+    let style = if is_silent { Style::None } else { arguments.progress };
+    let viewers = arguments.viewers(&output, tone_map, exposure)?;
+    let progress = Watched { display: Display::new(style), signals, viewers };
     let render_start = Instant::now();
     if let Some(deadline) = arguments.deadline(start) {
         // What reading and building left of it.
@@ -597,7 +624,7 @@ fn picture(
     signals.enter(Phase::Rendering);
     let (mut picture, state) = scene.render_from(&options, &progress, cancel, state, keeper.as_ref())?;
     let render_time = render_start.elapsed();
-    progress.display.finish();
+    progress.finish(picture.image());
     signals.enter(Phase::Saving);
     let is_done = !cancel.is_cancelled();
     match checkpoint.end(&state, is_done) {

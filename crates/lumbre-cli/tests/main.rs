@@ -11,3 +11,4 @@ mod limits;
 mod parts;
 mod program;
 mod stops;
+mod viewers;

@@ -1,6 +1,7 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![doc = include_str!("../README.md")]
 
+mod base64;
 mod camera;
 mod export;
 mod frame;
@@ -17,6 +18,7 @@ mod viewer;
 mod watching;
 mod worker;
 
+pub use base64::base64;
 pub use export::export;
 pub use source::{Built, Moment, Read, Source};
 pub use viewer::{Closer, Options, Viewer};
