@@ -179,6 +179,12 @@ impl Session {
         inner.cancel.clone()
     }
 
+    /// Whether a picture that was begun for this is still wanted, however it is shown.
+    pub(crate) fn is_wanted(&self, known: Changes) -> bool {
+        let now = self.lock().wanted.changes;
+        (now.read, now.build, now.render) == (known.read, known.build, known.render)
+    }
+
     pub(crate) fn close(&self) {
         self.change(|inner| inner.closing = true);
     }

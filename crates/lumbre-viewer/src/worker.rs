@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use lumbre::description::IntegratorKind;
 use lumbre::image::{Image, Rgb};
-use lumbre::{CancelToken, NoProgress, RenderOptions, RenderState, SceneDesc, Setting};
+use lumbre::{CancelToken, NoProgress, Progress, RenderOptions, RenderState, SceneDesc, Setting};
 use rayon::prelude::*;
 use serde_json::json;
 
@@ -164,8 +164,9 @@ impl Worker {
                 }
             }
         };
-        if stage.scene_mut().replace_camera(options.camera, camera).is_err() {
-            return;
+        let replaced = stage.scene_mut().replace_camera(options.camera, camera);
+        if let Err(error) = replaced {
+            return self.fail(error);
         }
         if wanted.scale != 1.0 {
             let side = |pixels: u32| ((f64::from(pixels) * wanted.scale).round() as u32).max(1);
@@ -258,9 +259,9 @@ impl Worker {
         options.resize(scene.resolved().film(), width, height);
         let rendered = scene.render_from(&options, &NoProgress, &cancel, None, None);
         drop(scene);
-        let Ok((picture, _)) = rendered else {
-            self.step = Step::Done;
-            return;
+        let picture = match rendered {
+            Ok((picture, _)) => picture,
+            Err(error) => return self.fail(error),
         };
         if cancel.is_cancelled() {
             return;
@@ -283,11 +284,14 @@ impl Worker {
         let scene = stage.scene();
         let state = self.state.take();
         let before = state.as_ref().map_or(0, RenderState::taken);
-        let rendered = scene.render_from(&options, &NoProgress, &cancel, state, None);
+        let asked = Asked { session: &self.session, known: self.known };
+        let rendered = scene.render_from(&options, &asked, &cancel, state, None);
         drop(scene);
-        let Ok((mut picture, state)) = rendered else {
-            self.step = Step::Done;
-            return;
+        let (mut picture, state) = match rendered {
+            Ok(rendered) => rendered,
+            // What is wanted instead comes next.
+            Err(lumbre::Error::Render(lumbre::RenderError::Unwanted)) => return,
+            Err(error) => return self.fail(error),
         };
         self.state = Some(state);
         let took = start.elapsed();
@@ -351,6 +355,12 @@ impl Worker {
         self.session.tell_progress(&json!({ "type": "progress", "doing": "done" }));
     }
 
+    /// There can be no picture: the page says why.
+    fn fail(&mut self, error: lumbre::Error) {
+        self.step = Step::Done;
+        self.session.staged(Err(error.to_string()));
+    }
+
     fn measure(&mut self, speed: f64) {
         if speed.is_finite() && speed > 1.0 {
             self.speed = 0.5 * (self.speed + speed);
@@ -361,6 +371,18 @@ impl Worker {
         let full = (self.options.width, self.options.height);
         let shot = Shot { pixels, channel: wanted.channel, full, sequence: self.sequence, is_full, is_done };
         self.session.show(shot, &self.look(wanted));
+    }
+}
+
+/// Knows whether the picture is still wanted: a large one takes longer to put together than one may wait for the next.
+struct Asked<'s> {
+    session: &'s Session,
+    known: Changes,
+}
+
+impl Progress for Asked<'_> {
+    fn is_wanted(&self) -> bool {
+        self.session.is_wanted(self.known)
     }
 }
 
