@@ -21,6 +21,8 @@ pub(crate) enum Channel {
     Depth,
     /// Texture coordinates.
     Uv,
+    /// The variance of the picture's luminance; its square root, the standard error, is shown by colours.
+    Variance,
     /// A colour for each shape.
     Ids,
 }
@@ -128,6 +130,7 @@ fn pixels(shot: &Shot, look: &Look, out: &mut [u8]) {
     rows(image, width, out, |_, value| {
         let [r, g, b] = match shot.channel {
             Channel::Beauty => return opaque(stops_colour((value * factor).luminance())),
+            Channel::Variance => return opaque(stops_colour(value.r.max(0.0).sqrt() * factor)),
             Channel::Depth if value.r > 0.0 => {
                 Encoded::srgb(Rgb::splat(1.0 - 0.9 * value.r / farthest)).to_u8()
             }

@@ -179,9 +179,9 @@ impl Worker {
             Channel::Normal => IntegratorKind::Normals,
             Channel::Depth => IntegratorKind::Depth,
             Channel::Uv => IntegratorKind::Uv,
-            Channel::Ids => options.integrator.kind,
+            Channel::Variance | Channel::Ids => options.integrator.kind,
         };
-        if wanted.channel != Channel::Beauty {
+        if !matches!(wanted.channel, Channel::Beauty | Channel::Variance) {
             options.transparent = false;
             options.exposure = RenderOptions::default().exposure;
         }
@@ -200,6 +200,7 @@ impl Worker {
     fn target(&self, wanted: &Wanted, stage: &Stage) -> u32 {
         match wanted.channel {
             Channel::Beauty => wanted.spp.unwrap_or(stage.options.stop.spp).max(1),
+            Channel::Variance => wanted.spp.unwrap_or(stage.options.stop.spp).max(2),
             Channel::Ids => 1,
             _ => FEATURE_SPP,
         }
@@ -310,7 +311,11 @@ impl Worker {
         if let Some(background) = stage.background.as_ref().filter(|_| wanted.channel == Channel::Beauty) {
             picture = picture.over(background.clone());
         }
-        self.show(wanted, Pixels::Rendered(Box::new(picture)), true, is_done);
+        let pixels = match (wanted.channel, &self.state) {
+            (Channel::Variance, Some(state)) => Pixels::Plain(state.variance()),
+            _ => Pixels::Rendered(Box::new(picture)),
+        };
+        self.show(wanted, pixels, true, is_done);
         self.step = if is_done { Step::Done } else { Step::Full(self.next(stats.spp, target)) };
         let rays = stats.rays.camera + stats.rays.bounce + stats.rays.shadow;
         let spent = self.spent.as_secs_f64().max(1e-6);

@@ -263,7 +263,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       byId(id).hidden = true;
       for (const label of document.querySelectorAll(`label[for="${id}"]`)) label.hidden = true;
     }
-    document.querySelector("option[value=ids]")?.remove();
+    for (const option of document.querySelectorAll("option[value=ids], option[value=variance]")) option.remove();
   }
 
   // src/protocol.ts
@@ -929,7 +929,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
   }
   sheet.changed = askNumbers;
   function key(pressed) {
-    const channels = ["beauty", "albedo", "normal", "depth", "uv", "ids"];
+    const channels = ["beauty", "albedo", "normal", "depth", "uv", "variance", "ids"];
     const channel = channels[Number(pressed) - 1];
     if (channel) set({ channel });
     else if (pressed === "r") reset(state?.camera ?? 0);

@@ -97,5 +97,5 @@ export function hideWhatNeedsAViewer(): void {
     byId(id).hidden = true;
     for (const label of document.querySelectorAll<HTMLElement>(`label[for="${id}"]`)) label.hidden = true;
   }
-  document.querySelector<HTMLElement>("option[value=ids]")?.remove();
+  for (const option of document.querySelectorAll("option[value=ids], option[value=variance]")) option.remove();
 }

@@ -209,7 +209,7 @@ sheet.changed = askNumbers;
 
 // ---- what the hand does
 function key(pressed: string): boolean {
-  const channels = ["beauty", "albedo", "normal", "depth", "uv", "ids"];
+  const channels = ["beauty", "albedo", "normal", "depth", "uv", "variance", "ids"];
   const channel = channels[Number(pressed) - 1];
   if (channel) set({ channel });
   else if (pressed === "r") reset(state?.camera ?? 0);

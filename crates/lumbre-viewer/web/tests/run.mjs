@@ -153,14 +153,14 @@ const tests = {
     await page.mouse.move(x + 5, y + 5);
     await page.waitForFunction(() => /^\d+, \d+: /.test(document.getElementById("pixel").textContent));
     const seen = new Set([JSON.stringify(await pixels(page))]);
-    for (const channel of ["albedo", "normal", "depth", "uv", "ids"]) {
+    for (const channel of ["albedo", "normal", "depth", "uv", "variance", "ids"]) {
       const frames = await page.evaluate(() => lumbreMeasured.frames.length);
       await page.selectOption("#channel", channel);
       await page.waitForFunction((known) => lumbreMeasured.done && lumbreMeasured.frames.length > known + 1, frames - 1);
       await page.waitForTimeout(300);
       seen.add(JSON.stringify(await pixels(page)));
     }
-    assert.equal(seen.size, 6, "every channel is another picture");
+    assert.equal(seen.size, 7, "every channel is another picture");
     await page.selectOption("#channel", "beauty");
     await page.waitForTimeout(500);
     await page.focus("#picture");
