@@ -181,8 +181,9 @@ impl Session {
 
     /// Whether a picture that was begun for this is still wanted, however it is shown.
     pub(crate) fn is_wanted(&self, known: Changes) -> bool {
-        let now = self.lock().wanted.changes;
-        (now.read, now.build, now.render) == (known.read, known.build, known.render)
+        let inner = self.lock();
+        let now = inner.wanted.changes;
+        !inner.closing && (now.read, now.build, now.render) == (known.read, known.build, known.render)
     }
 
     pub(crate) fn close(&self) {

@@ -227,8 +227,9 @@ impl Worker {
     /// The number of samples after the next pass.
     fn next(&self, done: u32, target: u32) -> u32 {
         let all = f64::from(self.options.width) * f64::from(self.options.height);
-        let in_a_pass = (self.speed * PASS / all.max(1.0)) as u32;
-        (done + done.min(in_a_pass.max(1)).max(1)).min(target)
+        let in_a_pass = ((self.speed * PASS / all.max(1.0)) as u32).max(1);
+        // What little a pass changes of many samples is not worth sending a picture to everyone.
+        (done + done.min(in_a_pass.max(done / 8)).max(1)).min(target)
     }
 
     fn look(&self, wanted: &Wanted) -> Look {
