@@ -37,6 +37,9 @@ const freePort = () => new Promise((done) => {
   });
 });
 
+/** Viewers that run: those of a test that fails are ended, too. */
+const running = new Set();
+
 /** A viewer that runs, and the address that opens it. */
 async function view(...words) {
   const child = spawn(program, ["view", "--no-open", ...words], {
@@ -46,6 +49,7 @@ async function view(...words) {
     child.stdout.once("data", (bytes) => done(String(bytes).trim()));
     child.once("exit", (code) => failed(new Error(`the viewer ended with ${code}`)));
   });
+  running.add(child);
   const ended = new Promise((done) => child.once("exit", done));
   return { url, stop: () => (child.kill("SIGINT"), ended) };
 }
@@ -68,6 +72,12 @@ const pixels = (page) => page.evaluate(() => {
   const canvas = document.getElementById("picture");
   return [canvas.width, canvas.height, ...canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data];
 });
+/** Waits until the finished picture is this one, or another one. */
+const becomes = (page, picture, same) => page.waitForFunction(([wanted, same]) => {
+  const canvas = document.getElementById("picture");
+  const now = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+  return lumbreMeasured.done && wanted.slice(2).every((value, i) => now[i] === value) === same;
+}, [picture, same]);
 const moved = (page) => page.evaluate(() => lumbreMeasured.latencies.length);
 async function finds(page, what) {
   await page.evaluate(axe);
@@ -129,12 +139,7 @@ const tests = {
     await page.click("#copy-pbrt");
     assert.match(await page.inputValue("#copied"), /^LookAt /);
     await page.click("#reset");
-    await page.waitForFunction(() => lumbreMeasured.done && document.activeElement);
-    await page.waitForFunction((wanted) => {
-      const canvas = document.getElementById("picture");
-      const now = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
-      return wanted.slice(2).every((value, i) => now[i] === value);
-    }, before);
+    await becomes(page, before, true);
     await viewer.stop();
   },
 
@@ -152,23 +157,22 @@ const tests = {
     assert.match(told, /All 2 hits/);
     await page.mouse.move(x + 5, y + 5);
     await page.waitForFunction(() => /^\d+, \d+: /.test(document.getElementById("pixel").textContent));
-    const seen = new Set([JSON.stringify(await pixels(page))]);
+    let shown = await pixels(page);
+    const beauty = shown;
+    const seen = new Set([JSON.stringify(shown)]);
     for (const channel of ["albedo", "normal", "depth", "uv", "variance", "ids"]) {
-      const frames = await page.evaluate(() => lumbreMeasured.frames.length);
       await page.selectOption("#channel", channel);
-      await page.waitForFunction((known) => lumbreMeasured.done && lumbreMeasured.frames.length > known + 1, frames - 1);
-      await page.waitForTimeout(300);
-      seen.add(JSON.stringify(await pixels(page)));
+      await becomes(page, shown, false);
+      shown = await pixels(page);
+      seen.add(JSON.stringify(shown));
     }
     assert.equal(seen.size, 7, "every channel is another picture");
     await page.selectOption("#channel", "beauty");
-    await page.waitForTimeout(500);
+    await becomes(page, beauty, true);
     await page.focus("#picture");
-    const before = await pixels(page);
     await page.keyboard.press("]");
     await page.waitForFunction(() => document.getElementById("exposure-value").textContent === "0.5");
-    await page.waitForTimeout(300);
-    assert.notDeepEqual(await pixels(page), before);
+    await becomes(page, beauty, false);
     for (let i = 0; i < 8; i++) await page.keyboard.press("+");
     await page.waitForFunction(() => document.getElementById("numbers").width > 1);
     await viewer.stop();
@@ -188,10 +192,8 @@ const tests = {
       input.dispatchEvent(new Event("input"));
     });
     await page.waitForFunction(() => !document.getElementById("save-overlay").disabled);
-    await page.waitForTimeout(300);
-    await done(page);
+    await becomes(page, before, false);
     const edited = await pixels(page);
-    assert.notDeepEqual(edited, before);
     const [download] = await Promise.all([page.waitForEvent("download"), page.click("#save-overlay")]);
     const overlay = join(folder, "edits.txt");
     await download.saveAs(overlay);
@@ -217,20 +219,13 @@ const tests = {
     assert.deepEqual(await pixels(page), before, "the last good picture stays");
     writeFileSync(path, SCENE.replace("1.25", "0.5"));
     await page.waitForFunction(() => document.getElementById("alert").hidden);
-    await page.waitForTimeout(500);
-    await done(page);
-    const smaller = await pixels(page);
-    assert.notDeepEqual(smaller, before);
+    await becomes(page, before, false);
     await viewer.stop();
     await page.waitForFunction(() => /does not answer/.test(document.getElementById("alert").textContent));
     writeFileSync(path, SCENE);
     viewer = await view("--port", port, path);
     await page.waitForFunction(() => document.getElementById("alert").hidden);
-    await page.waitForFunction((wanted) => {
-      const canvas = document.getElementById("picture");
-      const now = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
-      return lumbreMeasured.done && wanted.slice(2).every((value, i) => now[i] === value);
-    }, before);
+    await becomes(page, before, true);
     await viewer.stop();
   },
 
@@ -266,8 +261,7 @@ const tests = {
     await page.waitForFunction(() => /^48, 32: 0\.\d+  0\.\d+  0\.\d+$/.test(document.getElementById("pixel").textContent));
     await page.selectOption("#channel", "normal");
     await page.waitForFunction(() => document.getElementById("channel").value === "normal");
-    await page.waitForTimeout(300);
-    assert.notDeepEqual(await pixels(page), [png.width, png.height, ...png.data]);
+    await becomes(page, [png.width, png.height, ...png.data], false);
     assert.equal(await page.isVisible("#pause"), false);
     await finds(page, "the page at rest");
   },
@@ -275,8 +269,8 @@ const tests = {
   async "axe finds nothing, light and dark, desktop and phone"() {
     for (const colorScheme of ["light", "dark"]) {
       for (const [width, height, form] of [[1280, 800, "desktop"], [390, 844, "phone"]]) {
-        const scene = process.argv.includes("--pictures") ? join(root, "scenes/still-life/still-life.pbrt") : join(folder, "scene.pbrt");
-        const viewer = await view(scene);
+        const pictures = ["--size", "500x350", "--spp", "6", join(root, "scenes/still-life/still-life.pbrt")];
+        const viewer = await view(...(process.argv.includes("--pictures") ? pictures : [join(folder, "scene.pbrt")]));
         const page = await open(viewer.url, { colorScheme, viewport: { width, height } });
         await done(page);
         const box = await page.locator("#picture").boundingBox();
@@ -288,9 +282,9 @@ const tests = {
         assert.ok(wide <= width, `${form}: nothing is wider than the screen`);
         if (process.argv.includes("--pictures")) {
           for (const details of (await page.$$("aside > details")).slice(3)) await details.evaluate((node) => (node.open = false));
-          const pictures = join(root, "docs/viewer");
-          if (!existsSync(pictures)) mkdirSync(pictures);
-          await page.screenshot({ path: join(pictures, `${form}-${colorScheme}.png`) });
+          const folder = join(root, "docs/viewer");
+          if (!existsSync(folder)) mkdirSync(folder);
+          await page.screenshot({ path: join(folder, `${form}-${colorScheme}.png`) });
         }
         await page.focus("#picture");
         await page.keyboard.press("?");
@@ -314,6 +308,8 @@ for (const [name, test] of Object.entries(tests)) {
     failed += 1;
     console.error(`FAILED: ${name}\n${error.stack}`);
   }
+  for (const child of running) child.kill("SIGINT");
+  running.clear();
 }
 await browser.close();
 rmSync(folder, { recursive: true, force: true });
