@@ -47,7 +47,7 @@ pub enum Profile {
 /// Builds a program of the package `lumbre-dev` and runs it in the user's folder, so that relative paths mean what they say. Where it
 /// fails it has said why, and this program ends as it did.
 pub fn run_ours(name: &str, profile: Profile, arguments: &[String]) -> Result<()> {
-    let program = build("lumbre-dev", name, profile)?;
+    let program = program("lumbre-dev", name, profile)?;
     let status = Command::new(&program)
         .args(arguments)
         .status()
@@ -57,11 +57,11 @@ pub fn run_ours(name: &str, profile: Profile, arguments: &[String]) -> Result<()
 
 /// Builds Lumbre's program and says where it lies.
 pub fn release_program() -> Result<PathBuf> {
-    build("lumbre-cli", "lumbre", Profile::Release)
+    program("lumbre-cli", "lumbre", Profile::Release)
 }
 
 /// Builds the program of this name in one of our packages and says where it lies.
-fn build(package: &str, name: &str, profile: Profile) -> Result<PathBuf> {
+pub fn program(package: &str, name: &str, profile: Profile) -> Result<PathBuf> {
     let target = root().join(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()));
     let build = ["build", "--package", package, "--bin", name];
     let folder = match profile {

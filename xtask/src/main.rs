@@ -10,6 +10,7 @@ mod bench;
 mod check;
 mod field;
 mod fuzz;
+mod page;
 mod pictures;
 mod proof;
 mod python;

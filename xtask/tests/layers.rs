@@ -13,8 +13,9 @@ const LAYERS: &[(u32, &[&str])] = &[
     (4, &["lumbre-render"]),
     (5, &["lumbre-formats"]),
     (6, &["lumbre"]),
-    (7, &["lumbre-cli", "xtask"]),
-    (8, &["lumbre-dev", "lumbre-python"]),
+    (7, &["lumbre-viewer", "xtask"]),
+    (8, &["lumbre-cli"]),
+    (9, &["lumbre-dev", "lumbre-python"]),
 ];
 
 /// Layers whose crates do no input or output: no crate there may depend on these.

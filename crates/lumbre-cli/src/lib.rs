@@ -1,4 +1,4 @@
-//! The `lumbre` program: render, cast, info, diff, merge. It is a library so that other front ends, such as the Python package, bring
+//! The `lumbre` program: render, view, cast, info, diff, merge. It is a library so that other front ends, such as the Python package, bring
 //! the same program.
 
 use std::ffi::OsString;
@@ -24,16 +24,19 @@ mod merge;
 mod names;
 mod oidn;
 mod output;
+mod preview;
 mod progress;
 mod reading;
 mod render;
 mod signals;
 mod staging;
+mod tev;
 mod threads;
 mod tips;
 mod units;
 mod verb;
 mod view;
+mod viewing;
 
 /// Renders scenes, casts rays into them, says what is in them, and compares and joins pictures.
 #[derive(Parser)]
@@ -42,6 +45,7 @@ mod view;
   lumbre model.glb                              a picture of a model: without a command, files are rendered
   lumbre render scene.pbrt                      a picture under the scene's own film name
   lumbre render model.obj --size 800x600        a model, framed and lit
+  lumbre view scene.pbrt                        the picture in the browser while it is made
   lumbre cast scene.pbrt --rays rays.csv        what each ray hits first
   lumbre info scene.pbrt --json                 what is in a scene
   lumbre diff a.exr b.exr --metric relmse       how different two pictures are
@@ -56,6 +60,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::Arguments>),
+    View(Box<viewing::Arguments>),
     Cast(cast::Arguments),
     Info(info::Arguments),
     Diff(diff::Arguments),
@@ -75,6 +80,7 @@ pub fn run(words: Vec<OsString>) -> u8 {
     threads::start();
     let outcome = match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
+        Command::View(arguments) => viewing::run(*arguments),
         Command::Cast(arguments) => cast::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Diff(arguments) => diff::run(&arguments),

@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use lumbre::{Progress, State};
+use lumbre::image::Image;
+use lumbre::{Progress, Snapshot, State};
 
 use crate::signals::{Phase, Signals};
 use crate::units::spoken;
@@ -26,17 +27,37 @@ pub(crate) enum Style {
     None,
 }
 
+/// Who is shown the picture while it is rendered.
+pub(crate) trait PictureViewer: Sync {
+    /// Shows the picture, unless one was shown a moment ago; the last one always. It is put together when asked for.
+    fn show(&self, picture: &dyn Fn() -> Image, is_last: bool);
+}
+
 /// Progress on standard error, and to those who watch for signals.
 pub(crate) struct Watched<'a> {
     /// What is shown.
     pub display: Display,
     /// Who watches.
     pub signals: &'a Signals,
+    /// Who else wants to see the picture.
+    pub viewers: Vec<Box<dyn PictureViewer>>,
+}
+
+impl Watched<'_> {
+    /// The render has ended with this picture.
+    pub(crate) fn finish(&self, picture: &Image) {
+        self.display.finish();
+        self.viewers.iter().for_each(|viewer| viewer.show(&|| picture.clone(), true));
+    }
 }
 
 impl Progress for Watched<'_> {
     fn state(&self, state: &State) {
         self.display.state(state);
+    }
+
+    fn pass(&self, snapshot: &Snapshot<'_>) {
+        self.viewers.iter().for_each(|viewer| viewer.show(&|| snapshot.image(), false));
     }
 
     fn stopped(&self, stride: Option<u32>) {

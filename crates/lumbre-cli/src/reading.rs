@@ -202,10 +202,34 @@ impl ReadingArguments {
         self.describe_at(paths, Some(f64::from(number) / self.fps))
     }
 
+    /// [`Self::describe`] at another moment, and with another variant, where they are given.
+    ///
+    /// # Errors
+    /// As for [`ReadingArguments::open`].
+    pub(crate) fn describe_moment(
+        &self,
+        paths: &[PathBuf],
+        time: Option<f64>,
+        variant: Option<&str>,
+    ) -> Result<(SceneDesc, Diagnostics), Failure> {
+        self.describe_as(paths, time.or(self.frame), variant.or(self.variant.as_deref()))
+    }
+
     fn describe_at(&self, paths: &[PathBuf], time: Option<f64>) -> Result<(SceneDesc, Diagnostics), Failure> {
+        self.describe_as(paths, time, self.variant.as_deref())
+    }
+
+    fn describe_as(
+        &self,
+        paths: &[PathBuf],
+        time: Option<f64>,
+        variant: Option<&str>,
+    ) -> Result<(SceneDesc, Diagnostics), Failure> {
         let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
         let memory = self.memory();
-        let read = lumbre::describe(&paths, &self.options(time)?);
+        let mut options = self.options(time)?;
+        options.variant = variant.map(str::to_owned);
+        let read = lumbre::describe(&paths, &options);
         let (mut desc, diagnostics) = read.map_err(|error| memory.explain(error.into()))?;
         for path in &self.overlay {
             self.overlay(path, &mut desc)?;

@@ -25,10 +25,12 @@ use crate::denoiser::{Choice, Denoiser};
 use crate::failure::{Failure, print_bytes};
 use crate::names::one_of;
 use crate::output::{self, Inputs, Pictures, Replaced, is_standard_stream};
-use crate::progress::{Display, Style, Watched};
+use crate::preview::{Preview, Protocol};
+use crate::progress::{Display, PictureViewer, Style, Watched};
 use crate::reading::{Frames, ReadingArguments, print_warnings};
 use crate::signals::{Deadline, Phase, Signals};
 use crate::staging::{self, Behind, StagingArguments};
+use crate::tev::Tev;
 use crate::threads;
 use crate::units::{self, Crop, counted, spoken};
 use crate::view::ViewArguments;
@@ -138,11 +140,17 @@ pub(crate) struct Arguments {
     #[arg(long, value_enum, value_name = "WHICH", default_value_t = Metadata::Plain)]
     metadata: Metadata,
     /// Write statistics of the render, as JSON.
-    #[arg(long, value_name = "FILE.json")]
+    #[arg(long, value_name = "FILE.json", conflicts_with = "turntable")]
     stats: Option<PathBuf>,
     /// How to show progress.
     #[arg(long, value_enum, value_name = "STYLE", default_value_t = Style::Auto)]
     progress: Style,
+    /// Show the picture in the terminal while it is rendered, in place of the progress.
+    #[arg(long, value_enum, value_name = "HOW", num_args = 0..=1, require_equals = true, default_missing_value = "auto")]
+    preview: Option<Protocol>,
+    /// Show the picture in a tev that is open, by default at its port 14158.
+    #[arg(long, value_name = "HOST:PORT")]
+    tev: Option<String>,
     /// Print more.
     #[arg(short, long)]
     verbose: bool,
@@ -296,7 +304,7 @@ const LEAST_TIME: Duration = Duration::from_millis(400);
 const MOST_FOR_NOISE: u32 = 1 << 14;
 
 /// Samples per pixel of a model without camera and light, of which the noise is taken out.
-const MODEL_SPP: u32 = 16;
+pub(crate) const MODEL_SPP: u32 = 16;
 
 const READING: Phase = Phase::Preparing("reading the scene");
 
@@ -338,6 +346,23 @@ impl Arguments {
             shown.insert("background".to_owned(), background);
         }
         shown
+    }
+
+    /// Who else is shown the picture while it is rendered.
+    fn viewers(
+        &self,
+        output: &Path,
+        tone_map: ToneMap,
+        exposure: f32,
+    ) -> Result<Vec<Box<dyn PictureViewer>>, Failure> {
+        let mut viewers: Vec<Box<dyn PictureViewer>> = Vec::new();
+        if let Some(protocol) = self.preview {
+            viewers.push(Box::new(Preview::new(protocol, tone_map, exposure)?));
+        }
+        if let Some(address) = &self.tev {
+            viewers.push(Box::new(Tev::connect(address, &output.display().to_string())?));
+        }
+        Ok(viewers)
     }
 
     /// The output, unless it is standard output.
@@ -575,8 +600,10 @@ fn picture(
         false => ExrPrecision::Half,
     };
 
-    let style = if arguments.quiet { Style::None } else { arguments.progress };
-    let progress = Watched { display: Display::new(style), signals };
+    let is_silent = arguments.quiet || arguments.preview.is_some();
+    let style = if is_silent { Style::None } else { arguments.progress };
+    let viewers = arguments.viewers(&output, tone_map, exposure)?;
+    let progress = Watched { display: Display::new(style), signals, viewers };
     let render_start = Instant::now();
     if let Some(deadline) = arguments.deadline(start) {
         // What reading and building left of it.
@@ -601,7 +628,7 @@ fn picture(
     signals.enter(Phase::Rendering);
     let (mut picture, state) = scene.render_from(&options, &progress, cancel, state, keeper.as_ref())?;
     let render_time = render_start.elapsed();
-    progress.display.finish();
+    progress.finish(picture.image());
     signals.enter(Phase::Saving);
     let is_done = !cancel.is_cancelled();
     match checkpoint.end(&state, is_done) {
@@ -746,7 +773,7 @@ fn is_for_displays(path: &Path) -> bool {
 
 /// The stops that bring white to 1, in tenths, if it is more than one stop too bright or three too dark; else
 /// 0.
-fn measured_exposure(white_level: Option<f32>) -> f32 {
+pub(crate) fn measured_exposure(white_level: Option<f32>) -> f32 {
     match white_level {
         Some(level) if !(0.125..=2.0).contains(&level) => {
             (-10.0 * level.logarithm_2()).round().clamp(-1000.0, 1000.0) / 10.0
@@ -834,7 +861,7 @@ fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failur
     Ok(options)
 }
 
-fn camera(scene: &Scene, wanted: &str) -> Result<usize, Failure> {
+pub(crate) fn camera(scene: &Scene, wanted: &str) -> Result<usize, Failure> {
     let cameras = scene.resolved().cameras();
     let by_name = cameras.iter().position(|camera| camera.name.as_deref() == Some(wanted));
     let by_index = wanted.parse().ok().filter(|index| *index < cameras.len());

@@ -34,7 +34,7 @@ pub(crate) struct StagingArguments {
     fit: bool,
     /// Render N pictures from all around the model, as -o frame.####.png.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000),
-          conflicts_with_all = ["camera", "stats"], help_heading = "View")]
+          conflicts_with = "camera", help_heading = "View")]
     turntable: Option<u32>,
 }
 

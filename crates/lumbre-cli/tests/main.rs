@@ -13,3 +13,4 @@ mod parts;
 mod program;
 mod slurm;
 mod stops;
+mod viewers;

@@ -29,4 +29,7 @@ pub enum RenderError {
     /// The pixel filter has no width.
     #[error("the pixel filter needs a positive radius, and more than zero inside it")]
     Filter,
+    /// Nobody wants the picture any longer: [`crate::Progress::is_wanted`].
+    #[error("the picture is not wanted any longer")]
+    Unwanted,
 }

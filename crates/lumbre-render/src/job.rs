@@ -37,7 +37,7 @@ const PIXELS_A_LOOK: u64 = 4;
 /// a render depends on the machine.
 ///
 /// # Errors
-/// [`RenderError`] for options that make no picture.
+/// [`RenderError`] for options that make no picture, and where `progress` does not want it.
 pub fn render(
     scene: &Scene,
     options: &RenderOptions,
@@ -200,6 +200,9 @@ pub fn render_from(
         }
     }
 
+    if !progress.is_wanted() {
+        return Err(RenderError::Unwanted);
+    }
     progress.stopped(stride);
     let spread = stride.filter(|side| *side > 1).map(|side| spread(&owners, bounds, side));
     let is_done = has(&owners, spp);

@@ -12,6 +12,12 @@ pub trait Progress: Sync {
     /// Told after each pass over the picture, from one thread; the next pass waits for it.
     fn pass(&self, _snapshot: &Snapshot<'_>) {}
 
+    /// Asked once, from one thread, when no more samples will be taken: whether anyone still wants the picture. Where no one does, it is
+    /// not put together, and the render ends at once with [`crate::RenderError::Unwanted`].
+    fn is_wanted(&self) -> bool {
+        true
+    }
+
     /// Told once, from one thread, when no more samples will be taken and the picture is put together: what
     /// [`crate::Stats::stride`] will be.
     fn stopped(&self, _stride: Option<u32>) {}

@@ -140,6 +140,14 @@ pub(crate) fn feature_picture<'t>(
     image_of(bounds, put_together(tiles, bounds, Rgb::BLACK, colours))
 }
 
+/// The variance of the luminance of every pixel, as it is estimated from its samples: that of their mean. 0 for fewer than two.
+pub(crate) fn variance_picture<'t>(tiles: impl Iterator<Item = &'t Tile>, bounds: PixelBounds) -> Image {
+    let variance = |pixel: &Pixel| pixel.luminance_with_error().map_or(0.0, |(_, error)| error * error);
+    let variances =
+        |tile: &'t Tile| tile.pixels().iter().map(move |pixel| Rgb::splat(variance(pixel) as f32));
+    image_of(bounds, put_together(tiles, bounds, Rgb::BLACK, variances))
+}
+
 /// What a denoiser wants to know of every pixel.
 pub(crate) fn guides<'t>(tiles: impl Iterator<Item = &'t Tile>, bounds: PixelBounds) -> Vec<GuideSums> {
     put_together(tiles, bounds, GuideSums::default(), |tile| tile.guides().iter().copied())

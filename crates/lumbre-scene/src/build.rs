@@ -686,7 +686,7 @@ pub(crate) fn moved(bounds: &Aabb, placement: &Transform) -> Aabb {
     Aabb::around(corners)
 }
 
-fn check_cameras(cameras: &[Camera]) -> Result<(), BuildError> {
+pub(crate) fn check_cameras(cameras: &[Camera]) -> Result<(), BuildError> {
     for (position, camera) in cameras.iter().enumerate() {
         let wrong =
             |parameter, found, expected| BuildError::Camera { camera: position, parameter, found, expected };

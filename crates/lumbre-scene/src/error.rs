@@ -112,6 +112,14 @@ pub enum BuildError {
         /// The accepted range.
         expected: &'static str,
     },
+    /// There is no camera at this position.
+    #[error("there is no camera {position}, but {count} of them")]
+    NoSuchCamera {
+        /// The position.
+        position: usize,
+        /// The number of cameras.
+        count: usize,
+    },
     /// A light has a parameter out of range.
     #[error("light {light}: {reason}")]
     Light {

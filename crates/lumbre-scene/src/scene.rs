@@ -9,12 +9,16 @@ use lumbre_math::random::{combine, hash_dvec3, uniform_f32};
 use lumbre_math::{DVec2, DVec3, Transform};
 use lumbre_shading::{FloatTexture, Spectrum};
 
+use crate::build::check_cameras;
 use crate::footprint::Spot;
 use crate::interaction::offset;
 use crate::light::choice::{Company, LightChoice};
 use crate::light::{Light, LightId, LightSample};
 use crate::surface::{Form, ShadingGeometry, SurfaceEntry};
-use crate::{Camera, FilmDesc, FilterDesc, Footprint, GroundPlane, IntegratorDesc, Interaction, SamplerDesc};
+use crate::{
+    BuildError, Camera, FilmDesc, FilterDesc, Footprint, GroundPlane, IntegratorDesc, Interaction,
+    SamplerDesc,
+};
 
 /// An immutable scene, which any number of threads can render.
 #[derive(Debug)]
@@ -96,6 +100,19 @@ impl Scene {
     /// The cameras, the default first; at least one.
     pub fn cameras(&self) -> &[Camera] {
         &self.cameras
+    }
+
+    /// Puts a camera in the place of another one: a viewer that moves builds nothing anew.
+    ///
+    /// # Errors
+    /// [`BuildError`] for a camera that [`Scene::build`] would refuse, and for a position at which there is none.
+    pub fn replace_camera(&mut self, position: usize, camera: Camera) -> Result<(), BuildError> {
+        let mut cameras = self.cameras.clone();
+        let count = cameras.len();
+        *cameras.get_mut(position).ok_or(BuildError::NoSuchCamera { position, count })? = camera;
+        check_cameras(&cameras)?;
+        self.cameras = cameras;
+        Ok(())
     }
 
     /// The film settings of the description.

@@ -32,6 +32,7 @@ pub mod description;
 mod error;
 mod files;
 mod info;
+mod parameter;
 mod part;
 mod picture;
 mod scene;
@@ -60,6 +61,7 @@ pub use lumbre_render::{
 pub use lumbre_scene::{
     EnvironmentDesc, Ground, SceneDesc, Stage, StageLight, Staged, Surroundings, UpAxis, Viewpoint,
 };
+pub use parameter::{Parameter, ParameterKind, parameters};
 pub use part::{Job, Part, PartError};
 pub use picture::Picture;
 pub use scene::{Scene, describe, open, open_with};

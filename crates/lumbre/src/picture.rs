@@ -137,6 +137,12 @@ impl Picture {
         encoded.map_err(|e| Error::Options(format!("{}: {e}", format.name())))
     }
 
+    /// The picture over its background, as it is for displays, and what is left to be done to it: how [`Picture::encode`] begins
+    /// with a PNG. `shown.tone_map.encode(light, shown.exposure)` of a pixel, divided by its alpha, is what the PNG has there.
+    pub fn displayed(&self, options: &SaveOptions) -> (Cow<'_, Image>, SaveOptions) {
+        self.shown(Some(ImageFormat::Png), options)
+    }
+
     /// The image over its background, and the options for writing what is left to do to it.
     fn shown(&self, format: Option<ImageFormat>, options: &SaveOptions) -> (Cow<'_, Image>, SaveOptions) {
         let PixelBounds { x0, y0, .. } = self.bounds();

@@ -280,6 +280,18 @@ impl Scene {
         Ok(stats.elapsed.as_secs_f64() * pixels as f64 / stats.samples.max(1) as f64)
     }
 
+    /// Puts a camera in the place of the one at a position, for pictures from elsewhere; nothing is built anew.
+    ///
+    /// # Errors
+    /// [`Error::Build`] for a camera that makes no picture, and where there is none at the position.
+    pub fn replace_camera(
+        &mut self,
+        position: usize,
+        camera: crate::description::Camera,
+    ) -> Result<(), Error> {
+        Ok(self.resolved.replace_camera(position, camera)?)
+    }
+
     /// Statistics of the scene.
     pub fn info(&self) -> &SceneInfo {
         &self.info

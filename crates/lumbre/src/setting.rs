@@ -46,7 +46,8 @@ impl FromStr for Setting {
                 quoted(text)
             )
         };
-        let (path, value) = text.split_once('=').ok_or_else(wrong)?;
+        // Names may hold it, values do not.
+        let (path, value) = text.rsplit_once('=').ok_or_else(wrong)?;
         let (owner, rest) = path.trim().split_once('.').ok_or_else(wrong)?;
         let (of, is_one) = match owner {
             "material" => (Owner::Material, false),
@@ -305,7 +306,7 @@ impl Setting {
 
 /// From the first to the second, both included.
 #[derive(Clone, Copy)]
-struct Range(f64, f64);
+pub(crate) struct Range(pub(crate) f64, pub(crate) f64);
 
 /// What single precision can hold of numbers above 0.
 const ABOVE_ZERO: Range = Range(1e-30, 1e30);
@@ -324,7 +325,7 @@ impl Range {
 }
 
 /// Where a value goes.
-enum Slot<'a> {
+pub(crate) enum Slot<'a> {
     /// In [0, 1].
     Colour(&'a mut Arc<SpectrumTexture>),
     /// From 0 up.
@@ -338,7 +339,7 @@ enum Slot<'a> {
 }
 
 /// The names of the parameters that [`material_slot`] finds: those of the scene language, and of [`PrincipledParams`].
-fn material_parameters(kind: &MaterialKind) -> &'static [&'static str] {
+pub(crate) fn material_parameters(kind: &MaterialKind) -> &'static [&'static str] {
     match kind {
         MaterialKind::Diffuse { .. } => &["reflectance"],
         MaterialKind::Conductor { .. } => &["roughness", "uroughness", "vroughness"],
@@ -387,7 +388,7 @@ const PRINCIPLED: &[&str] = &[
 ];
 
 /// The parameter of a material by its name.
-fn material_slot<'m>(kind: &'m mut MaterialKind, name: &str) -> Option<Slot<'m>> {
+pub(crate) fn material_slot<'m>(kind: &'m mut MaterialKind, name: &str) -> Option<Slot<'m>> {
     use MaterialKind as Kind;
     Some(match (kind, name) {
         (Kind::Principled(params), name) => return principled_slot(params, name),

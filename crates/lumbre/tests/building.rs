@@ -153,3 +153,36 @@ fn a_light_of_custom_geometry_shines_and_cannot_shine_by_power() {
     let mean = scene.render(&scene.options()).unwrap().image().mean();
     assert!((mean.r - 2.0).abs() < 1e-5, "{mean:?}");
 }
+
+#[test]
+fn a_camera_is_replaced_and_the_picture_is_that_of_a_scene_made_with_it() {
+    let ball = || {
+        SceneBuilder::new().shape(ShapeBuilder::exact(Sphere::new(CENTER, 0.75).unwrap())).film(film(9, 7))
+    };
+    let [here, there] = [4.0 * DVec3::X, DVec3::new(-3.0, 4.0, 1.0)]
+        .map(|eye| Camera::perspective(CENTER + eye, CENTER, DVec3::Z, 40.0).unwrap());
+    let mut scene = ball().light(sky()).camera(here).build().unwrap();
+    let expected = ball().light(sky()).camera(there.clone()).build().unwrap();
+    let picture = |scene: &Scene| scene.render(&scene.options()).unwrap().image().clone();
+    assert_ne!(picture(&scene), picture(&expected));
+    scene.replace_camera(0, there.clone()).unwrap();
+    assert_eq!(picture(&scene), picture(&expected));
+    let wrong = scene.replace_camera(1, there.clone()).unwrap_err();
+    assert!(wrong.to_string().contains("there is no camera 1, but 1 of them"), "{wrong}");
+    assert!(scene.replace_camera(0, there.with_lens(-1.0)).is_err());
+    assert_eq!(picture(&scene), picture(&expected), "what is refused changes nothing");
+}
+
+#[test]
+fn a_picture_that_no_one_wants_is_not_put_together() {
+    struct Gone;
+    impl lumbre::Progress for Gone {
+        fn is_wanted(&self) -> bool {
+            false
+        }
+    }
+    let ball = ShapeBuilder::exact(Sphere::new(CENTER, 0.75).unwrap());
+    let scene = SceneBuilder::new().shape(ball).light(sky()).film(film(9, 7)).build().unwrap();
+    let rendered = scene.render_with(&scene.options(), &Gone, &lumbre::CancelToken::new());
+    assert!(matches!(rendered, Err(Error::Render(lumbre::RenderError::Unwanted))));
+}

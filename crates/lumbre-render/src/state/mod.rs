@@ -6,8 +6,10 @@ use std::borrow::Cow;
 use std::fmt;
 use std::ops::Range;
 
+use lumbre_image::Image;
+
 use crate::film::{Extras, Pixel, Tile};
-use crate::rendered::{noise, rendered_of};
+use crate::rendered::{noise, rendered_of, variance_picture};
 use crate::{DroppedSample, PixelBounds, RayCounts, Rendered, Stats};
 
 pub use bytes::StateError;
@@ -169,6 +171,12 @@ impl RenderState {
             ..Stats::default()
         };
         Rendered { stats, ..rendered }
+    }
+
+    /// The variance of the luminance of every pixel, in all three channels, as it is estimated from its samples: that of their mean, so
+    /// that it falls with their number. 0 for fewer than two samples.
+    pub fn variance(&self) -> Image {
+        variance_picture(self.tiles.iter(), self.bounds)
     }
 
     /// Adds what another gathered.

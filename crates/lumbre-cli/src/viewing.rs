@@ -1,0 +1,259 @@
+//! `lumbre view`: the picture in the browser while it is rendered.
+
+use std::net::{IpAddr, Ipv4Addr};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::time::Duration;
+
+use clap::Args;
+use lumbre::image::ToneMap;
+use lumbre::{CancelToken, SaveOptions, Scene, SceneDesc, StageLight};
+use lumbre_viewer::{Built, Moment, Options, Read, Source, Viewer, export};
+
+use crate::failure::{Failure, print};
+use crate::names::one_of;
+use crate::reading::ReadingArguments;
+use crate::render::{MODEL_SPP, TONE_MAPS, camera, measured_exposure};
+use crate::signals::{Phase, Signals};
+use crate::staging::{Behind, StagingArguments};
+use crate::units;
+use crate::view::ViewArguments;
+
+/// Shows a scene in the browser while it is rendered: one moves the camera, looks into the pixels, and sees every edit of the
+/// file when it is saved.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  lumbre view scene.pbrt                        opens a page that shows the picture
+  lumbre view chair.glb --size 1280x720
+  lumbre view scene.pbrt --overlay evening.txt  with edits that the page has saved
+  lumbre view scene.pbrt --export page          a page of the finished picture, in a folder
+  lumbre view                                   an empty page, on which a .glb can be dropped
+
+On another machine: with the same port at both ends, then open the address that is printed.
+  ssh -L 8765:127.0.0.1:8765 HOST lumbre view --no-open --port 8765 scene.pbrt")]
+pub(crate) struct Arguments {
+    /// The scene: .pbrt, .gltf, .glb, .obj, .ply or .stl, also packed by gzip. Several are put into the same world.
+    #[arg(value_name = "SCENE")]
+    scene: Vec<PathBuf>,
+    /// The port; by default one that is free.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    port: u16,
+    /// The address to listen at. Others than this machine's own let whoever reaches them ask for the page, and what is sent is not
+    /// encrypted: a tunnel by ssh is better.
+    #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
+    host: IpAddr,
+    /// Another name under which browsers reach it, as localhost:9000 for a tunnel that begins at another port.
+    #[arg(long, value_name = "NAME:PORT")]
+    allow_host: Vec<String>,
+    /// Only print the address.
+    #[arg(long)]
+    no_open: bool,
+    /// Write a page of the finished picture into this folder instead: with its channels, the values of its pixels and the facts of the
+    /// scene. It opens from a file, and can be sent or put on a web server.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["port", "host", "allow_host", "no_open"])]
+    export: Option<PathBuf>,
+    /// Samples per pixel. By default as many as the scene says, else 64; 16 for a model whose noise is taken out.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    spp: Option<u32>,
+    /// Width and height in pixels.
+    #[arg(long, value_name = "WxH", value_parser = units::size)]
+    size: Option<(u32, u32)>,
+    /// A camera by name or 0-based position.
+    #[arg(long, value_name = "NAME|INDEX", help_heading = "View")]
+    camera: Option<String>,
+    /// Exposure in stops. The page can change it.
+    #[arg(long, value_name = "EV", allow_negative_numbers = true)]
+    exposure: Option<f32>,
+    /// Tone mapping. The page can change it.
+    #[arg(long, value_name = "NAME", value_parser = one_of(&TONE_MAPS, ToneMap::from_name))]
+    tonemap: Option<ToneMap>,
+    #[command(flatten)]
+    view: ViewArguments,
+    #[command(flatten)]
+    staging: StagingArguments,
+    #[command(flatten)]
+    reading: ReadingArguments,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
+    if arguments.staging.turntable().is_some() {
+        let why = "--turntable makes many pictures (expected lumbre render, or no --turntable)";
+        return Err(Failure::Usage(why.to_owned()));
+    }
+    let cancel = CancelToken::new();
+    let signals = Signals::listen(&cancel)?;
+    if let Some(folder) = arguments.export.clone() {
+        if arguments.scene.is_empty() {
+            return Err(Failure::Usage("--export needs a scene".to_owned()));
+        }
+        signals.enter(Phase::Rendering);
+        let files = Files { arguments: Arc::new(arguments), dropped: None };
+        export(&files, &folder, &cancel).map_err(Failure::Input)?;
+        say!("{}: open it in a browser", folder.join("index.html").display());
+        return signals.received().map_or(Ok(()), |status| Err(Failure::Interrupted(status)));
+    }
+    let mut options = Options::default();
+    options.address = (arguments.host, arguments.port).into();
+    options.hosts.clone_from(&arguments.allow_host);
+    options.session_file = session_file(arguments.port);
+    let opens = !arguments.no_open;
+    let source = Arc::new(Files { arguments: Arc::new(arguments), dropped: None });
+    let viewer = Viewer::new(source, &options).map_err(Failure::Io)?;
+    if !options.address.ip().is_loopback() {
+        say!(
+            "warning: {} can be reached from other machines, and what is sent is not encrypted",
+            viewer.address()
+        );
+    }
+    let url = viewer.url();
+    print(&format!("{url}\n"))?;
+    if opens && !open(&url) {
+        say!("open this address in a browser; Ctrl-C ends the viewer");
+    }
+    let closer = viewer.closer();
+    let stopped = cancel.clone();
+    std::thread::spawn(move || {
+        while !stopped.is_cancelled() {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        closer.close();
+    });
+    signals.enter(Phase::Rendering);
+    viewer.run().map_err(Failure::Io)?;
+    match signals.received() {
+        Some(status) => Err(Failure::Interrupted(status)),
+        None => Ok(()),
+    }
+}
+
+/// Where the session of a port that was asked for is kept until the user logs out; nowhere on systems without such a folder.
+fn session_file(port: u16) -> Option<PathBuf> {
+    let folder = std::env::var_os("XDG_RUNTIME_DIR").filter(|folder| !folder.is_empty() && port != 0)?;
+    let folder = Path::new(&folder);
+    folder.is_dir().then(|| folder.join(format!("lumbre-view-{port}")))
+}
+
+/// Opens an address in the browser of who sits at this machine; whether there seems to be one.
+fn open(url: &str) -> bool {
+    let is_far = std::env::var_os("SSH_CONNECTION").is_some();
+    let has_screen = ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|name| std::env::var_os(name).is_some());
+    let (program, first): (&str, &[&str]) = match std::env::consts::OS {
+        "macos" => ("open", &[]),
+        "windows" => ("rundll32", &["url.dll,FileProtocolHandler"]),
+        _ if has_screen => ("xdg-open", &[]),
+        _ => return false,
+    };
+    if is_far {
+        return false;
+    }
+    let mut command = Command::new(program);
+    command.args(first).arg(url).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    command.spawn().is_ok()
+}
+
+/// The files of the command line, or one that came later.
+struct Files {
+    arguments: Arc<Arguments>,
+    dropped: Option<PathBuf>,
+}
+
+impl Files {
+    fn paths(&self) -> Vec<PathBuf> {
+        self.dropped.as_ref().map_or_else(|| self.arguments.scene.clone(), |path| vec![path.clone()])
+    }
+}
+
+impl Source for Files {
+    fn name(&self) -> String {
+        let path = self.paths().into_iter().next().unwrap_or_default();
+        path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+    }
+
+    fn files(&self) -> Vec<PathBuf> {
+        let overlays = self.arguments.reading.overlays().map(Path::to_owned);
+        self.paths().into_iter().chain(overlays).collect()
+    }
+
+    fn read(&self, moment: &Moment) -> Result<Read, String> {
+        let (desc, diagnostics) = self
+            .arguments
+            .reading
+            .describe_moment(&self.paths(), moment.time, moment.variant.as_deref())
+            .map_err(|failure| failure.to_string())?;
+        let files = diagnostics.files_read().to_vec();
+        let warnings = diagnostics.lines();
+        Ok(Read { desc, files, warnings })
+    }
+
+    fn build(&self, desc: SceneDesc) -> Result<Built, String> {
+        self.built(desc).map_err(|failure| failure.to_string())
+    }
+
+    fn of_file(&self, file: &Path) -> Arc<dyn Source> {
+        Arc::new(Self { arguments: self.arguments.clone(), dropped: Some(file.to_owned()) })
+    }
+
+    fn is_empty(&self) -> bool {
+        self.paths().is_empty()
+    }
+}
+
+impl Files {
+    /// As `lumbre render` would make its picture.
+    fn built(&self, mut desc: SceneDesc) -> Result<Built, Failure> {
+        let Arguments { view, staging, reading, size, .. } = &*self.arguments;
+        let mut stage = staging.stage(*size, reading.limits())?;
+        view.set(&mut stage)?;
+        let is_of_light = desc.integrator.kind.needs_light();
+        if !is_of_light && !staging.wants_ground() {
+            stage.ground = lumbre::Ground::None;
+        }
+        let staged = stage.set(&mut desc);
+        let behind = staging.behind(&staged, is_of_light, reading.limits())?;
+        let name = self.paths().into_iter().next().unwrap_or_default();
+        let mut diagnostics = lumbre::formats::Diagnostics::with_strictness(reading.strictness());
+        reading.check_build(&desc, &diagnostics)?;
+        let scene = Scene::of_file(desc, &name, &mut diagnostics)?;
+        let mut warnings = diagnostics.lines();
+        let mut options = scene.options();
+        if let Some((width, height)) = *size {
+            options.resize(scene.resolved().film(), width, height);
+        }
+        if let (Some(wanted), None) = (&self.arguments.camera, &self.dropped) {
+            options.camera = camera(&scene, wanted)?;
+        }
+        view.check_camera(&scene, options.camera)?;
+        options.threads = rayon::current_num_threads();
+        options.transparent = behind.is_transparent();
+        let is_model = staged.framed && staged.light != StageLight::Own && is_of_light;
+        let is_plain = is_model && self.arguments.spp.is_none() && scene.resolved().sampler().spp.is_none();
+        if is_plain {
+            options.stop.spp = MODEL_SPP;
+        }
+        options.stop.spp = self.arguments.spp.unwrap_or(options.stop.spp);
+        options.bounds().map_err(lumbre::Error::from)?;
+        if scene.is_dark() && is_of_light {
+            warnings
+                .push(format!("warning: {}: the scene has no light, its picture is black", name.display()));
+        }
+        let mut save = SaveOptions::default();
+        save.exposure = match self.arguments.exposure {
+            Some(exposure) => exposure,
+            None if staged.photometric && is_of_light => measured_exposure(scene.white_level(&options)?),
+            None => 0.0,
+        };
+        let is_shown = is_of_light && staged.light != StageLight::Own;
+        let tone_map = if is_shown { ToneMap::Neutral } else { ToneMap::None };
+        save.tone_map = self.arguments.tonemap.unwrap_or(tone_map);
+        if scene.resolved().film().single_precision {
+            save.exr_precision = lumbre::formats::image::ExrPrecision::Float;
+        }
+        let background = match behind {
+            Behind::Background(background) => Some(background),
+            Behind::Lights | Behind::Nothing => None,
+        };
+        Ok(Built { scene, options, save, background, denoise: is_plain, warnings })
+    }
+}

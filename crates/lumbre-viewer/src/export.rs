@@ -1,0 +1,126 @@
+//! The page at rest: the picture with its channels, the values of its pixels and the facts of the scene, as files that need no viewer.
+
+use std::io::Write;
+use std::path::Path;
+
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+use lumbre::description::IntegratorKind;
+use lumbre::formats::atomic_write;
+use lumbre::formats::image::{ImageFormat, encode_image};
+use lumbre::image::{Encoded, Image, f32_to_half};
+use lumbre::{CancelToken, NoProgress, Stop};
+use serde_json::{Value, json};
+
+use crate::base64::base64;
+use crate::frame::{Channel, Frame, HEADER, Look, Pixels, Shot};
+use crate::page::FILES;
+use crate::source::{Moment, Source};
+use crate::stage::Stage;
+
+/// Samples a pixel of channels other than the picture.
+const FEATURE_SPP: u32 = 16;
+
+/// Renders a scene and writes a page of it into a folder, which is made where it is not there: `index.html` opens from a file, and the
+/// folder can be sent or put on a web server. `cancel` ends the render early, and the page has what was rendered.
+///
+/// # Errors
+/// What is wrong with the scene, and what cannot be written.
+pub fn export(source: &dyn Source, folder: &Path, cancel: &CancelToken) -> Result<(), String> {
+    let read = source.read(&Moment::default())?;
+    let stage = Stage::new(source.build(read.desc.clone())?, &read.desc, read.warnings);
+    let scene = stage.scene();
+    let look = Look { save: stage.save.clone(), false_colour: false };
+    let mut options = stage.options.clone();
+    options.guides = stage.denoise;
+    let full = (options.width, options.height);
+    let (mut picture, _) =
+        scene.render_from(&options, &NoProgress, cancel, None, None).map_err(|e| e.to_string())?;
+    let stats = picture.stats().clone();
+    if stats.spp == 0 {
+        return Err("not every pixel had a sample: nothing was written".to_owned());
+    }
+    if stage.denoise {
+        picture.denoise(options.threads).map_err(|e| e.to_string())?;
+    }
+    let values = packed(picture.image())?;
+    let picture = match &stage.background {
+        Some(background) => picture.over(background.clone()),
+        None => picture,
+    };
+    let png = picture.encode(ImageFormat::Png, &look.save, &[]).map_err(|e| e.to_string())?;
+    let mut channels =
+        vec![json!({ "name": Channel::Beauty, "png": base64(&png), "values": base64(&values) })];
+    for (channel, kind) in [
+        (Channel::Albedo, IntegratorKind::Albedo),
+        (Channel::Normal, IntegratorKind::Normals),
+        (Channel::Depth, IntegratorKind::Depth),
+        (Channel::Uv, IntegratorKind::Uv),
+    ] {
+        let mut options = options.clone();
+        (options.integrator.kind, options.transparent, options.guides) = (kind, false, false);
+        options.exposure = lumbre::RenderOptions::default().exposure;
+        options.stop = Stop::at(FEATURE_SPP);
+        let picture = scene.render(&options).map_err(|e| e.to_string())?;
+        let values =
+            if channel == Channel::Depth { base64(&packed(picture.image())?) } else { String::new() };
+        let pixels = Pixels::Rendered(Box::new(picture));
+        let shot = Shot { pixels, channel, full, sequence: 0, is_full: true, is_done: true };
+        channels.push(json!({ "name": channel, "png": base64(&shown(&shot, &look)?), "values": values }));
+    }
+    let rays = stats.rays.camera + stats.rays.bounce + stats.rays.shadow;
+    let seconds = stats.elapsed.as_secs_f64();
+    let data = json!({
+        "name": source.name(),
+        "scene": stage.facts,
+        "placement": stage.placements.get(options.camera),
+        "camera": options.camera,
+        "progress": { "spp": stats.spp, "target": options.stop.spp, "noise": stats.noise, "seconds": seconds,
+                      "rays_per_second": rays as f64 / seconds.max(1e-6) },
+        "channels": channels,
+    });
+    write(folder, &data)
+}
+
+fn write(folder: &Path, data: &Value) -> Result<(), String> {
+    std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let save = |name: &str, bytes: &[u8]| {
+        atomic_write(&folder.join(name), |file: &mut dyn Write| file.write_all(bytes))
+            .map_err(|e| e.to_string())
+    };
+    save("data.js", format!("globalThis.lumbreAtRest = {data};\n").as_bytes())?;
+    for file in FILES {
+        match file.path {
+            "/" => {
+                let page = String::from_utf8_lossy(file.bytes);
+                let script = "<script src=\"viewer.js\"></script>";
+                let page = page.replace(script, &format!("<script src=\"data.js\"></script>\n{script}"));
+                save("index.html", page.as_bytes())?;
+            }
+            path => save(path.trim_start_matches('/'), file.bytes)?,
+        }
+    }
+    Ok(())
+}
+
+/// A shot as a PNG that shows what its frame shows.
+fn shown(shot: &Shot, look: &Look) -> Result<Vec<u8>, String> {
+    let Frame(bytes) = Frame::new(shot, look);
+    let unit = |byte: u8| f32::from(byte) / 255.0;
+    let light = |rgba: &[u8]| Encoded::new(unit(rgba[0]), unit(rgba[1]), unit(rgba[2])).to_linear();
+    let pixels = bytes[HEADER..].chunks_exact(4).map(light).collect();
+    let (width, height) = (shot.image().width(), shot.image().height());
+    let image = Image::from_pixels(width, height, pixels).ok_or("a frame has a pixel too few")?;
+    encode_image(&image, ImageFormat::Png, &lumbre::SaveOptions::default()).map_err(|e| e.to_string())
+}
+
+/// The numbers of an image in half precision, the least significant byte first, compressed.
+fn packed(image: &Image) -> Result<Vec<u8>, String> {
+    let mut packed = ZlibEncoder::new(Vec::new(), Compression::default());
+    for pixel in image.pixels() {
+        for value in pixel.to_array() {
+            packed.write_all(&f32_to_half(value).to_le_bytes()).map_err(|e| e.to_string())?;
+        }
+    }
+    packed.finish().map_err(|e| e.to_string())
+}

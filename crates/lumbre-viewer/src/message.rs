@@ -1,0 +1,66 @@
+//! What a page says.
+
+use serde::Deserialize;
+
+use crate::camera::Placement;
+use crate::frame::Channel;
+
+/// A message of a page. Whatever else one holds is an error: a page is of the same program.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(tag = "type", rename_all = "lowercase", deny_unknown_fields)]
+pub(crate) enum Message {
+    /// It has shown the last frame, and can take another.
+    Shown {},
+    /// The camera is there now.
+    Camera { sequence: u32, placement: Placement, fov: Option<f64>, zoom: f64 },
+    /// One of the file's cameras, as it is.
+    Reset { sequence: u32, camera: usize },
+    /// What is rendered, and how it is shown.
+    Set(Box<Wishes>),
+    /// A parameter of the scene; without a value that of the file.
+    Edit { path: String, value: Option<String> },
+    /// A moment of an animation, a variant.
+    Moment { time: Option<f64>, variant: Option<String> },
+    /// What is there at a pixel of the full picture.
+    Pick { x: f64, y: f64, request: u32 },
+    /// The values of a rectangle of pixels.
+    Values { x: u32, y: u32, width: u32, height: u32, request: u32 },
+}
+
+/// What a page asks for; what is not in it stays.
+#[derive(Clone, Debug, Default, Deserialize, PartialEq)]
+#[serde(default, deny_unknown_fields)]
+pub(crate) struct Wishes {
+    pub exposure: Option<f32>,
+    pub tone_map: Option<String>,
+    pub false_colour: Option<bool>,
+    pub channel: Option<Channel>,
+    pub denoise: Option<bool>,
+    pub paused: Option<bool>,
+    pub scale: Option<f64>,
+    pub spp: Option<u32>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_are_what_they_are_and_nothing_else() {
+        let set: Message = serde_json::from_str(r#"{"type":"set","paused":true,"channel":"ids"}"#).unwrap();
+        let Message::Set(wishes) = set else { panic!() };
+        assert_eq!((wishes.paused, wishes.channel, wishes.exposure), (Some(true), Some(Channel::Ids), None));
+        for text in [
+            "",
+            "[]",
+            "7",
+            r#"{"type":"open","path":"/etc/passwd"}"#,
+            r#"{"type":"shown","more":1}"#,
+            r#"{"type":"pick","x":"a","y":2,"request":3}"#,
+            r#"{"type":"set","spp":-3}"#,
+            r#"{"type":"set","channel":"../beauty"}"#,
+        ] {
+            assert!(serde_json::from_str::<Message>(text).is_err(), "{text}");
+        }
+    }
+}

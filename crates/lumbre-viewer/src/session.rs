@@ -1,0 +1,450 @@
+//! What is wanted of a viewer, what it has, and how both reach those who work on it.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use lumbre::CancelToken;
+use lumbre::image::ToneMap;
+use serde_json::{Value, json};
+use tokio::sync::watch;
+
+use crate::camera::Placement;
+use crate::frame::{Channel, Frame, Look, Pixels, Shot};
+use crate::message::{Message, Wishes};
+use crate::source::{Moment, Source};
+use crate::stage::Stage;
+use crate::watching::Watched;
+
+/// How often something was changed, by what has to be done again.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Changes {
+    /// The files are read.
+    pub read: u64,
+    /// The scene is built.
+    pub build: u64,
+    /// The picture is begun.
+    pub render: u64,
+    /// The picture is shown.
+    pub look: u64,
+    /// It begins or ends to wait.
+    pub pause: u64,
+}
+
+/// What is wanted.
+#[derive(Clone, Debug)]
+pub(crate) struct Wanted {
+    pub changes: Changes,
+    /// The last change of the camera, by the page's own count.
+    pub sequence: u32,
+    pub camera: usize,
+    /// Where it was moved; `None` for the file's own camera.
+    pub moved: Option<Moved>,
+    pub channel: Channel,
+    pub scale: f64,
+    pub spp: Option<u32>,
+    pub denoise: Option<bool>,
+    pub paused: bool,
+    pub exposure: Option<f32>,
+    pub tone_map: Option<ToneMap>,
+    pub false_colour: bool,
+    pub moment: Moment,
+    /// Parameters with their values, in the order in which they were first set.
+    pub settings: Vec<(String, String)>,
+}
+
+/// Where a camera was moved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Moved {
+    pub placement: Placement,
+    pub fov: Option<f64>,
+    pub zoom: f64,
+}
+
+/// Parameters that may be set.
+const MOST_SETTINGS: usize = 500;
+/// Characters of a parameter's name and of its value.
+const LONGEST_SETTING: usize = 1000;
+/// Between two looks at the files.
+const LOOK_EVERY: Duration = Duration::from_millis(200);
+/// The side of a rectangle of pixels whose values are asked for.
+const MOST_VALUES: u32 = 64;
+
+struct Inner {
+    wanted: Wanted,
+    cancel: CancelToken,
+    source: Arc<dyn Source>,
+    closing: bool,
+    shot: Option<Arc<Shot>>,
+    stage: Option<Arc<Stage>>,
+    look: Option<Look>,
+    error: Option<String>,
+    edit_error: Option<String>,
+    name: String,
+}
+
+/// What all parts of a viewer share.
+pub(crate) struct Session {
+    inner: Mutex<Inner>,
+    changed: Condvar,
+    watched: Mutex<Watched>,
+    /// The last frame.
+    pub frames: watch::Sender<Option<Frame>>,
+    /// What there is, as JSON.
+    pub scene: watch::Sender<Arc<str>>,
+    /// What is wanted, as JSON.
+    pub state: watch::Sender<Arc<str>>,
+    /// How far the picture is, as JSON.
+    pub progress: watch::Sender<Arc<str>>,
+}
+
+impl Session {
+    pub(crate) fn new(source: Arc<dyn Source>) -> Self {
+        let name = source.name();
+        let wanted = Wanted {
+            changes: Changes { read: 1, ..Changes::default() },
+            sequence: 0,
+            camera: 0,
+            moved: None,
+            channel: Channel::Beauty,
+            scale: 1.0,
+            spp: None,
+            denoise: None,
+            paused: false,
+            exposure: None,
+            tone_map: None,
+            false_colour: false,
+            moment: Moment::default(),
+            settings: Vec::new(),
+        };
+        let inner = Inner {
+            wanted,
+            cancel: CancelToken::new(),
+            source,
+            closing: false,
+            shot: None,
+            stage: None,
+            look: None,
+            error: None,
+            edit_error: None,
+            name,
+        };
+        let session = Self {
+            inner: Mutex::new(inner),
+            changed: Condvar::new(),
+            watched: Mutex::new(Watched::default()),
+            frames: watch::channel(None).0,
+            scene: watch::channel("".into()).0,
+            state: watch::channel("".into()).0,
+            progress: watch::channel("".into()).0,
+        };
+        session.tell(&session.lock());
+        session
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Changes what is wanted, stops what is not any longer, and tells everyone.
+    fn change(&self, change: impl FnOnce(&mut Inner)) {
+        let mut inner = self.lock();
+        change(&mut inner);
+        inner.cancel.cancel();
+        self.changed.notify_all();
+        self.tell(&inner);
+    }
+
+    /// Waits until something else is wanted than this, or until there is work to go on with; `None` when the viewer closes.
+    pub(crate) fn wait(&self, known: Changes, has_work: bool) -> Option<Wanted> {
+        let mut inner = self.lock();
+        loop {
+            if inner.closing {
+                return None;
+            }
+            if inner.wanted.changes != known || (has_work && !inner.wanted.paused) {
+                return Some(inner.wanted.clone());
+            }
+            inner = self.changed.wait(inner).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// A token that is pulled when something else is wanted than this, at once if it is already.
+    pub(crate) fn token(&self, known: Changes) -> CancelToken {
+        let mut inner = self.lock();
+        inner.cancel = CancelToken::new();
+        if inner.closing || inner.wanted.changes != known {
+            inner.cancel.cancel();
+        }
+        inner.cancel.clone()
+    }
+
+    /// Whether a picture that was begun for this is still wanted, however it is shown.
+    pub(crate) fn is_wanted(&self, known: Changes) -> bool {
+        let inner = self.lock();
+        let now = inner.wanted.changes;
+        !inner.closing && (now.read, now.build, now.render) == (known.read, known.build, known.render)
+    }
+
+    pub(crate) fn close(&self) {
+        self.change(|inner| inner.closing = true);
+    }
+
+    /// Reads the files again.
+    pub(crate) fn reload(&self) {
+        self.change(|inner| inner.wanted.changes.read += 1);
+    }
+
+    /// Shows another scene.
+    pub(crate) fn open(&self, source: Arc<dyn Source>) {
+        self.change(|inner| {
+            inner.name = source.name();
+            inner.source = source;
+            let wanted = &mut inner.wanted;
+            (wanted.camera, wanted.moved, wanted.moment) = (0, None, Moment::default());
+            wanted.settings.clear();
+            wanted.changes.read += 1;
+        });
+    }
+
+    pub(crate) fn source(&self) -> Arc<dyn Source> {
+        self.lock().source.clone()
+    }
+
+    /// A stage is there, or none that can be shown: then the last one stays.
+    pub(crate) fn staged(&self, staged: Result<Arc<Stage>, String>) {
+        let mut inner = self.lock();
+        match staged {
+            Ok(stage) => {
+                let scene = json!({ "type": "scene", "scene": stage.facts });
+                (inner.stage, inner.error) = (Some(stage), None);
+                self.scene.send_replace(scene.to_string().into());
+            }
+            Err(error) => inner.error = Some(error),
+        }
+        self.tell(&inner);
+    }
+
+    /// Watches these files from now on: those that were read, or else those that were watched before, and those of the source.
+    pub(crate) fn watch_files(&self, read: Option<Vec<PathBuf>>, named: Vec<PathBuf>) {
+        let mut watched = self.watched.lock().unwrap_or_else(PoisonError::into_inner);
+        let before = read.unwrap_or_else(|| watched.files().collect());
+        *watched = Watched::new(before.into_iter().chain(named));
+    }
+
+    /// Looks at the files until the viewer closes, and has them read again when one has changed.
+    pub(crate) fn watch(&self) {
+        while !self.lock().closing {
+            std::thread::sleep(LOOK_EVERY);
+            if self.watched.lock().unwrap_or_else(PoisonError::into_inner).changed() {
+                self.reload();
+            }
+        }
+    }
+
+    /// Whether the last parameter that was set could be.
+    pub(crate) fn edited(&self, wrong: Option<String>) {
+        let mut inner = self.lock();
+        inner.edit_error = wrong;
+        self.tell(&inner);
+    }
+
+    /// Takes back a parameter that cannot be set.
+    pub(crate) fn drop_setting(&self, path: &str) {
+        self.lock().wanted.settings.retain(|(known, _)| known != path);
+    }
+
+    /// There is a picture: it is encoded once, for all.
+    pub(crate) fn show(&self, shot: Shot, look: &Look) {
+        let frame = Frame::new(&shot, look);
+        let mut inner = self.lock();
+        (inner.shot, inner.look) = (Some(Arc::new(shot)), Some(look.clone()));
+        drop(inner);
+        self.frames.send_replace(Some(frame));
+    }
+
+    /// The last picture, and how it is shown.
+    pub(crate) fn shot(&self) -> Option<(Arc<Shot>, Look)> {
+        let inner = self.lock();
+        Some((inner.shot.clone()?, inner.look.clone()?))
+    }
+
+    pub(crate) fn tell_progress(&self, progress: &Value) {
+        self.progress.send_replace(progress.to_string().into());
+    }
+
+    /// Says what is wanted and what there is.
+    fn tell(&self, inner: &Inner) {
+        let Inner { wanted, stage, error, edit_error, name, .. } = inner;
+        let index =
+            stage.as_ref().map_or(0, |stage| wanted.camera.min(stage.cameras.len().saturating_sub(1)));
+        let own = stage.as_ref().and_then(|stage| stage.placements.get(index));
+        let size = stage.as_ref().map(|stage| [stage.options.width, stage.options.height]);
+        let state = json!({
+            "type": "state",
+            "name": name,
+            "has_scene": stage.is_some(),
+            "error": error,
+            "edit_error": edit_error,
+            "camera": index,
+            "sequence": wanted.sequence,
+            "moved": wanted.moved.is_some(),
+            "placement": wanted.moved.as_ref().map(|moved| &moved.placement).or(own),
+            "fov": wanted.moved.and_then(|moved| moved.fov),
+            "zoom": wanted.moved.map_or(1.0, |moved| moved.zoom),
+            "size": size,
+            "channel": wanted.channel,
+            "scale": wanted.scale,
+            "spp": wanted.spp.or(stage.as_ref().map(|stage| stage.options.stop.spp)),
+            "denoise": wanted.denoise.or(stage.as_ref().map(|stage| stage.denoise)),
+            "paused": wanted.paused,
+            "exposure": wanted.exposure.or(stage.as_ref().map(|stage| stage.save.exposure)),
+            "tone_map": wanted.tone_map.or(stage.as_ref().map(|stage| stage.save.tone_map)).map(tone_map_name),
+            "false_colour": wanted.false_colour,
+            "time": wanted.moment.time,
+            "variant": wanted.moment.variant,
+            "settings": wanted.settings,
+        });
+        self.state.send_replace(state.to_string().into());
+    }
+
+    /// Does what a page says; what it is answered, if anything.
+    pub(crate) fn obey(&self, message: Message) -> Option<Value> {
+        match message {
+            Message::Shown {} => None,
+            Message::Camera { sequence, placement, fov, zoom } => {
+                self.change(|inner| {
+                    let wanted = &mut inner.wanted;
+                    wanted.sequence = sequence;
+                    wanted.moved = Some(Moved { placement, fov, zoom });
+                    wanted.changes.render += 1;
+                });
+                None
+            }
+            Message::Reset { sequence, camera } => {
+                self.change(|inner| {
+                    let wanted = &mut inner.wanted;
+                    (wanted.sequence, wanted.camera, wanted.moved) = (sequence, camera, None);
+                    wanted.changes.render += 1;
+                });
+                None
+            }
+            Message::Set(wishes) => self.wish(&wishes),
+            Message::Edit { path, value } => self.edit(path, value),
+            Message::Moment { time, variant } => {
+                let is_fine = time.is_none_or(|time| time.is_finite() && time.abs() < 1e9);
+                if is_fine && variant.as_ref().is_none_or(|name| name.len() <= LONGEST_SETTING) {
+                    self.change(|inner| {
+                        inner.wanted.moment = Moment { time, variant };
+                        inner.wanted.changes.read += 1;
+                    });
+                }
+                None
+            }
+            Message::Pick { x, y, request } => self.pick(x, y, request),
+            Message::Values { x, y, width, height, request } => self.values([x, y, width, height], request),
+        }
+    }
+
+    fn wish(&self, wishes: &Wishes) -> Option<Value> {
+        let tone_map = match wishes.tone_map.as_deref().map(|name| ToneMap::from_name(name).ok_or(name)) {
+            Some(Err(_)) => return Some(json!({ "type": "wrong", "what": "there is no such tone mapping" })),
+            Some(Ok(map)) => Some(map),
+            None => None,
+        };
+        self.change(|inner| {
+            let wanted = &mut inner.wanted;
+            let before = wanted.clone();
+            wanted.exposure = wishes.exposure.map(|stops| stops.clamp(-100.0, 100.0)).or(wanted.exposure);
+            wanted.tone_map = tone_map.or(wanted.tone_map);
+            wanted.false_colour = wishes.false_colour.unwrap_or(wanted.false_colour);
+            wanted.channel = wishes.channel.unwrap_or(wanted.channel);
+            wanted.denoise = wishes.denoise.or(wanted.denoise);
+            wanted.paused = wishes.paused.unwrap_or(wanted.paused);
+            wanted.scale = wishes.scale.filter(|s| s.is_finite()).map_or(wanted.scale, |s| s.clamp(0.1, 2.0));
+            wanted.spp = wishes.spp.map(|spp| spp.clamp(1, 1 << 20)).or(wanted.spp);
+            let is_same_look = (before.exposure, before.tone_map, before.false_colour)
+                == (wanted.exposure, wanted.tone_map, wanted.false_colour);
+            let is_same_picture = (before.channel, before.denoise, before.scale)
+                == (wanted.channel, wanted.denoise, wanted.scale);
+            wanted.changes.look += u64::from(!is_same_look);
+            wanted.changes.render += u64::from(!is_same_picture);
+            // More samples go on from those that there are.
+            wanted.changes.pause += u64::from(before.paused != wanted.paused || before.spp != wanted.spp);
+        });
+        None
+    }
+
+    fn edit(&self, path: String, value: Option<String>) -> Option<Value> {
+        let is_long =
+            path.len() > LONGEST_SETTING || value.as_ref().is_some_and(|v| v.len() > LONGEST_SETTING);
+        let mut is_full = false;
+        self.change(|inner| {
+            let settings = &mut inner.wanted.settings;
+            is_full = settings.len() >= MOST_SETTINGS && !settings.iter().any(|(known, _)| *known == path);
+            if is_long || is_full {
+                return;
+            }
+            match (settings.iter_mut().find(|(known, _)| *known == path), value) {
+                (Some(setting), Some(value)) => setting.1 = value,
+                (None, Some(value)) => settings.push((path, value)),
+                (_, None) => settings.retain(|(known, _)| *known != path),
+            }
+            inner.wanted.changes.build += 1;
+        });
+        (is_long || is_full)
+            .then(|| json!({ "type": "wrong", "what": "too many parameters are set, or one is too long" }))
+    }
+
+    fn pick(&self, x: f64, y: f64, request: u32) -> Option<Value> {
+        let (stage, camera, full) = {
+            let inner = self.lock();
+            (inner.stage.clone()?, inner.wanted.camera, inner.shot.as_ref()?.full)
+        };
+        if !(0.0 <= x && x <= f64::from(full.0) && 0.0 <= y && y <= f64::from(full.1)) {
+            return None;
+        }
+        let camera = camera.min(stage.cameras.len().saturating_sub(1));
+        let met = stage.pick(camera, full, x, y);
+        Some(json!({ "type": "picked", "request": request, "x": x, "y": y, "ray": met }))
+    }
+
+    /// The numbers of pixels of the last whole picture, row by row.
+    fn values(&self, [x0, y0, width, height]: [u32; 4], request: u32) -> Option<Value> {
+        let (shot, _) = self.shot()?;
+        let image = shot.image();
+        let is_whole = (image.width(), image.height()) == shot.full;
+        if !is_whole || width > MOST_VALUES || height > MOST_VALUES {
+            return None;
+        }
+        let (x1, y1) =
+            (x0.saturating_add(width).min(image.width()), y0.saturating_add(height).min(image.height()));
+        let pixels = (y0..y1).flat_map(|y| (x0..x1).map(move |x| image.pixel(x, y).to_array()));
+        // JSON has no infinity: what is not finite is said in words.
+        let said = |value: f32| if value.is_finite() { json!(value) } else { json!(value.to_string()) };
+        let values: Vec<Value> = pixels.map(|rgb| json!(rgb.map(said))).collect();
+        let (width, height) = (x1.saturating_sub(x0), y1.saturating_sub(y0));
+        Some(
+            json!({ "type": "values", "request": request, "x": x0, "y": y0, "width": width, "height": height, "values": values }),
+        )
+    }
+
+    /// The picture as a file.
+    ///
+    /// # Errors
+    /// Where there is none, and where it cannot be encoded.
+    pub(crate) fn file(&self, format: lumbre::formats::image::ImageFormat) -> Result<Vec<u8>, String> {
+        let (shot, look) = self.shot().ok_or("there is no picture yet")?;
+        match &shot.pixels {
+            Pixels::Rendered(picture) => picture.encode(format, &look.save, &[]).map_err(|e| e.to_string()),
+            Pixels::Plain(image) => {
+                let save = lumbre::SaveOptions::default();
+                lumbre::formats::image::encode_image(image, format, &save).map_err(|e| e.to_string())
+            }
+        }
+    }
+}
+
+fn tone_map_name(map: ToneMap) -> &'static str {
+    ToneMap::NAMES.into_iter().find(|name| ToneMap::from_name(name) == Some(map)).unwrap_or("none")
+}

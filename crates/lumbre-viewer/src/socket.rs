@@ -1,0 +1,124 @@
+//! One page's socket: frames and facts go out, wishes come in. Who reads slowly misses frames; who reads nothing is dropped.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use futures_util::{SinkExt, StreamExt};
+use hyper::upgrade::Upgraded;
+use hyper_util::rt::TokioIo;
+use tokio::sync::{OwnedSemaphorePermit, watch};
+use tokio_tungstenite::WebSocketStream;
+use tokio_tungstenite::tungstenite::Message as Packet;
+use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
+use tokio_tungstenite::tungstenite::protocol::{CloseFrame, Role, WebSocketConfig};
+
+use crate::message::Message;
+use crate::rate::Allowance;
+use crate::session::Session;
+
+/// A place among the connections.
+pub(crate) type Place = Arc<OwnedSemaphorePermit>;
+
+/// Bytes of a message of a page, whose longest names a parameter and its value.
+const MOST_MESSAGE_BYTES: usize = 16 << 10;
+/// Until a page has taken what was sent to it.
+const TAKEN_WITHIN: Duration = Duration::from_secs(10);
+/// Between two questions whether it is still there.
+const ASK_EVERY: Duration = Duration::from_secs(20);
+/// How long it may be silent.
+const SILENT_AT_MOST: Duration = Duration::from_secs(65);
+
+type Stream = WebSocketStream<TokioIo<Upgraded>>;
+
+/// Talks with a page until one of both ends it.
+pub(crate) async fn talk(stream: TokioIo<Upgraded>, session: Arc<Session>, _place: Place) {
+    let config = WebSocketConfig::default()
+        .max_message_size(Some(MOST_MESSAGE_BYTES))
+        .max_frame_size(Some(MOST_MESSAGE_BYTES))
+        .read_buffer_size(8 << 10);
+    let mut stream = WebSocketStream::from_raw_socket(stream, Role::Server, Some(config)).await;
+    if let Err(Some(reason)) = converse(&mut stream, &session).await {
+        let frame = CloseFrame { code: reason.0, reason: reason.1.into() };
+        let _ = tokio::time::timeout(TAKEN_WITHIN, stream.close(Some(frame))).await;
+    }
+}
+
+/// Why we end it; `None` where the other side did, or is gone.
+type Ended = Option<(CloseCode, &'static str)>;
+
+async fn converse(stream: &mut Stream, session: &Session) -> Result<(), Ended> {
+    let mut scene = subscribe(&session.scene);
+    let mut state = subscribe(&session.state);
+    let mut progress = subscribe(&session.progress);
+    let mut frames = subscribe(&session.frames);
+    let mut ask = tokio::time::interval(ASK_EVERY);
+    let mut allowance = Allowance::new(Instant::now());
+    let mut last_heard = Instant::now();
+    let mut may_send = true;
+    loop {
+        tokio::select! {
+            biased;
+            packet = stream.next() => {
+                let packet = packet.ok_or(None)?.map_err(|_| None)?;
+                last_heard = Instant::now();
+                if !allowance.take(last_heard) {
+                    return Err(Some((CloseCode::Policy, "too many messages")));
+                }
+                match packet {
+                    Packet::Text(text) => {
+                        let message: Message = serde_json::from_str(&text)
+                            .map_err(|_| Some((CloseCode::Policy, "the message is not understood")))?;
+                        may_send |= message == Message::Shown {};
+                        if let Some(answer) = session.obey(message) {
+                            send(stream, Packet::text(answer.to_string())).await?;
+                        }
+                    }
+                    Packet::Binary(_) => return Err(Some((CloseCode::Unsupported, "text is expected"))),
+                    Packet::Close(_) => return Ok(()),
+                    Packet::Ping(_) | Packet::Pong(_) | Packet::Frame(_) => {}
+                }
+            }
+            changed = scene.changed() => say(stream, changed, &mut scene).await?,
+            changed = state.changed() => say(stream, changed, &mut state).await?,
+            changed = frames.changed(), if may_send => {
+                changed.map_err(|_| None)?;
+                let frame = frames.borrow_and_update().clone();
+                if let Some(frame) = frame {
+                    may_send = false;
+                    send(stream, Packet::Binary(frame.0)).await?;
+                }
+            }
+            changed = progress.changed() => say(stream, changed, &mut progress).await?,
+            _ = ask.tick() => {
+                if last_heard.elapsed() > SILENT_AT_MOST {
+                    return Err(Some((CloseCode::Away, "nothing was heard")));
+                }
+                send(stream, Packet::Ping(Vec::new().into())).await?;
+            }
+        }
+    }
+}
+
+fn subscribe<T>(of: &watch::Sender<T>) -> watch::Receiver<T> {
+    let mut receiver = of.subscribe();
+    // What there is already is news to a page that has just come.
+    receiver.mark_changed();
+    receiver
+}
+
+async fn say(
+    stream: &mut Stream,
+    changed: Result<(), watch::error::RecvError>,
+    what: &mut watch::Receiver<Arc<str>>,
+) -> Result<(), Ended> {
+    changed.map_err(|_| None)?;
+    let text = what.borrow_and_update().clone();
+    if text.is_empty() { Ok(()) } else { send(stream, Packet::text(&*text)).await }
+}
+
+async fn send(stream: &mut Stream, packet: Packet) -> Result<(), Ended> {
+    match tokio::time::timeout(TAKEN_WITHIN, stream.send(packet)).await {
+        Ok(Ok(())) => Ok(()),
+        Ok(Err(_)) | Err(_) => Err(None),
+    }
+}

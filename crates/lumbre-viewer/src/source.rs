@@ -1,0 +1,72 @@
+//! Where a viewer gets its scene from: whoever starts it says how files are read and pictures are set up.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use lumbre::{Background, RenderOptions, SaveOptions, Scene, SceneDesc};
+
+/// Which moment and which variant of a scene to read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Moment {
+    /// The time in seconds at which animations stand; `None` for the scene at rest.
+    pub time: Option<f64>,
+    /// The material variant.
+    pub variant: Option<String>,
+}
+
+/// What was read.
+#[derive(Debug)]
+pub struct Read {
+    /// The scene, before it is set on a stage.
+    pub desc: SceneDesc,
+    /// Every file that was read.
+    pub files: Vec<PathBuf>,
+    /// Warnings, with their places.
+    pub warnings: Vec<String>,
+}
+
+/// A scene that is ready, and how `lumbre render` would make and save its picture.
+#[derive(Debug)]
+pub struct Built {
+    /// The scene.
+    pub scene: Scene,
+    /// The options of its picture.
+    pub options: RenderOptions,
+    /// How the picture is shown: exposure and tone mapping.
+    pub save: SaveOptions,
+    /// What is laid behind the picture.
+    pub background: Option<Background>,
+    /// Whether the noise is taken out of the picture.
+    pub denoise: bool,
+    /// Warnings.
+    pub warnings: Vec<String>,
+}
+
+/// How a scene is read and built. Errors are messages for people, with the place in the file where there is one.
+pub trait Source: Send + Sync {
+    /// What to call the scene.
+    fn name(&self) -> String;
+
+    /// The files to watch even if none can be read.
+    fn files(&self) -> Vec<PathBuf>;
+
+    /// Reads the files.
+    ///
+    /// # Errors
+    /// What is wrong, and where.
+    fn read(&self, moment: &Moment) -> Result<Read, String>;
+
+    /// Sets a description on its stage and builds it.
+    ///
+    /// # Errors
+    /// What is wrong.
+    fn build(&self, desc: SceneDesc) -> Result<Built, String>;
+
+    /// The same for another file, which came from elsewhere than the command line.
+    fn of_file(&self, file: &Path) -> Arc<dyn Source>;
+
+    /// Whether there is a scene at all.
+    fn is_empty(&self) -> bool {
+        false
+    }
+}

@@ -1,0 +1,189 @@
+//! The scene that is shown, and what can be asked of it while it is rendered.
+
+use std::ops::ControlFlow;
+use std::sync::{RwLock, RwLockReadGuard, RwLockWriteGuard};
+
+use lumbre::description::{Camera, CameraKind, CameraView, GeometryDesc, UpAxis};
+use lumbre::{
+    Background, DVec2, DVec3, Parameter, ParameterKind, Ray, RenderOptions, SaveOptions, Scene, SceneDesc,
+};
+use serde_json::{Value, json};
+
+use crate::camera::{Placement, field_of_view};
+use crate::source::Built;
+
+/// A scene with its descriptions by name.
+pub(crate) struct Stage {
+    /// The options of its picture.
+    pub options: RenderOptions,
+    /// How that is shown.
+    pub save: SaveOptions,
+    /// What is behind it.
+    pub background: Option<Background>,
+    /// Whether its noise is taken out.
+    pub denoise: bool,
+    scene: RwLock<Scene>,
+    /// The cameras of the file.
+    pub cameras: Vec<Camera>,
+    /// Where they stand.
+    pub placements: Vec<Placement>,
+    /// By the index of the shape in its file.
+    things: Vec<Thing>,
+    /// What is said of it to every page.
+    pub facts: Value,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Thing {
+    kind: &'static str,
+    material: Option<String>,
+}
+
+/// Hits that are listed of one ray.
+const MOST_HITS: usize = 64;
+/// Parameters that a page can list.
+const MOST_PARAMETERS: usize = 2000;
+
+impl Stage {
+    /// What was built of a description.
+    pub(crate) fn new(built: Built, desc: &SceneDesc, mut warnings: Vec<String>) -> Self {
+        let Built { scene, options, save, background, denoise, warnings: more } = built;
+        warnings.extend(more);
+        let cameras = scene.resolved().cameras().to_vec();
+        let placements: Vec<Placement> =
+            cameras.iter().map(|camera| Placement::of(camera, distance(&scene, camera))).collect();
+        let facts = facts(&scene, desc, &cameras, &warnings);
+        let things = things(desc);
+        let scene = RwLock::new(scene);
+        Self { options, save, background, denoise, scene, cameras, placements, things, facts }
+    }
+
+    /// The scene, to render or to ask.
+    pub(crate) fn scene(&self) -> RwLockReadGuard<'_, Scene> {
+        self.scene.read().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+
+    /// The scene, to move its camera.
+    pub(crate) fn scene_mut(&self) -> RwLockWriteGuard<'_, Scene> {
+        self.scene.write().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+
+    /// What the ray through a place of the picture meets, all of it by distance.
+    pub(crate) fn pick(&self, camera: usize, size: (u32, u32), x: f64, y: f64) -> Value {
+        let scene = self.scene();
+        let Some(ray) = ray(&scene, camera, size, x, y) else { return json!({ "hits": [] }) };
+        let mut hits = Vec::new();
+        scene.all(&ray, |hit| {
+            let thing = self.things.get(hit.shape as usize).cloned().unwrap_or_default();
+            hits.push(json!({
+                "distance": hit.t,
+                "point": hit.point.to_array(),
+                "normal": hit.normal.to_array(),
+                "uv": hit.uv.to_array(),
+                "front": hit.front,
+                "shape": hit.shape,
+                "kind": thing.kind,
+                "material": thing.material,
+                "primitive": hit.primitive,
+                "instance": hit.instance,
+            }));
+            if hits.len() < MOST_HITS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        });
+        json!({ "origin": ray.origin.to_array(), "direction": ray.direction.to_array(), "hits": hits })
+    }
+}
+
+/// The ray through a place of the picture, through the middle of the lens in the middle of the exposure.
+pub(crate) fn ray(scene: &Scene, camera: usize, (width, height): (u32, u32), x: f64, y: f64) -> Option<Ray> {
+    let camera = scene.resolved().cameras().get(camera)?;
+    let view = CameraView::new(camera, width, height);
+    Some(view.ray(DVec2::new(x, y), DVec2::splat(0.5), view.time(0.5), 0.25).ray)
+}
+
+/// How far what a camera looks at is away: what it hits in its middle, else the middle of the scene.
+fn distance(scene: &Scene, camera: &Camera) -> f64 {
+    let place = camera.world_from_camera;
+    let (eye, forward) = (place.point(DVec3::ZERO), place.vector(DVec3::Z).normalize_or(DVec3::Z));
+    let hit = scene.closest(&Ray::new(eye, forward)).map(|hit| hit.t);
+    let middle = scene.info().bounds.map(|bounds| (0.5 * (bounds.min + bounds.max) - eye).dot(forward));
+    let near = |distance: &f64| *distance > 1e-9 && *distance < 1e9;
+    hit.filter(near).or(middle.filter(near)).unwrap_or(1.0)
+}
+
+fn things(desc: &SceneDesc) -> Vec<Thing> {
+    let mut things = Vec::new();
+    let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);
+    for shape in desc.shapes.iter().chain(in_objects) {
+        let index = shape.index as usize;
+        // Indices count the shapes of a file: a number that does not would be some other program's.
+        if index >= things.len() && index < 50_000_000 {
+            things.resize_with(index + 1, Thing::default);
+        }
+        let Some(thing) = things.get_mut(index) else { continue };
+        thing.kind = match &shape.geometry {
+            GeometryDesc::Exact(exact) => exact.name(),
+            GeometryDesc::Coloured(coloured) => coloured.shape.name(),
+            GeometryDesc::Mesh(_) => "mesh",
+            GeometryDesc::BilinearMesh(_) => "bilinear mesh",
+            GeometryDesc::Csg(_) => "CSG",
+            GeometryDesc::Custom(_) => "custom geometry",
+        };
+        let material = shape.material.and_then(|id| desc.materials.get(id.0 as usize));
+        thing.material = material.map(|material| {
+            let kind = material.material.kind.name();
+            material.name.as_ref().map_or_else(|| kind.to_owned(), |name| format!("{name} ({kind})"))
+        });
+    }
+    things
+}
+
+fn facts(scene: &Scene, desc: &SceneDesc, cameras: &[Camera], warnings: &[String]) -> Value {
+    let info = scene.info();
+    let up = match desc.up {
+        UpAxis::Y => DVec3::Y,
+        UpAxis::Z => DVec3::Z,
+        UpAxis::Towards(up) => up.normalize_or(DVec3::Y),
+    };
+    let camera = |(i, camera): (usize, &Camera)| {
+        let kind = match camera.kind {
+            CameraKind::Perspective { .. } => "perspective",
+            CameraKind::Orthographic { .. } => "orthographic",
+            CameraKind::Spherical { .. } => "spherical",
+        };
+        let mirrored = camera.world_from_camera.is_mirror();
+        let name = camera.name.clone().unwrap_or_else(|| format!("{i} ({kind})"));
+        json!({ "name": name, "kind": kind, "mirrored": mirrored, "fov": field_of_view(camera) })
+    };
+    let parameter = |parameter: &Parameter| {
+        let (kind, low, high) = match parameter.kind {
+            ParameterKind::Number { low, high } => ("number", low, high),
+            ParameterKind::Colour => ("colour", 0.0, 1.0),
+            ParameterKind::Light => ("light", 0.0, f64::INFINITY),
+            ParameterKind::Point => ("point", f64::NEG_INFINITY, f64::INFINITY),
+            ParameterKind::Factor | _ => ("factor", 0.0, f64::INFINITY),
+        };
+        let (path, owner, name, value) =
+            (&parameter.path, &parameter.owner, &parameter.name, &parameter.value);
+        // JSON has no infinity: there is no end then.
+        json!({ "path": path, "owner": owner, "name": name, "kind": kind, "value": value,
+                "low": low.is_finite().then_some(low), "high": high.is_finite().then_some(high) })
+    };
+    let parameters = lumbre::parameters(desc);
+    let animations = info.listing.animations.iter();
+    json!({
+        "cameras": cameras.iter().enumerate().map(camera).collect::<Vec<_>>(),
+        "up": up.to_array(),
+        "bounds": info.bounds.map(|bounds| [bounds.min.to_array(), bounds.max.to_array()]),
+        "shapes": info.shapes,
+        "materials": info.materials,
+        "lights": info.lights,
+        "triangles": info.triangles,
+        "instances": info.instances,
+        "memory": info.memory_bytes,
+        "build_seconds": scene.build_time().as_secs_f64(),
+        "animations": animations.map(|a| json!({ "name": a.name, "end": a.end })).collect::<Vec<_>>(),
+        "variants": info.listing.variants,
+        "parameters": parameters.iter().take(MOST_PARAMETERS).map(parameter).collect::<Vec<_>>(),
+        "warnings": warnings,
+    })
+}

@@ -1,0 +1,246 @@
+//! A viewer of a small scene, and a client that says whatever it likes.
+
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpStream};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use lumbre::{SaveOptions, Scene, SceneDesc};
+use lumbre_viewer::{Built, Closer, Moment, Options, Read as WasRead, Source, Viewer};
+
+/// A scene file in a folder of its own.
+pub(crate) struct OneFile(pub PathBuf);
+
+impl Source for OneFile {
+    fn name(&self) -> String {
+        "<img src=x onerror=alert(1)>.pbrt".to_owned()
+    }
+
+    fn files(&self) -> Vec<PathBuf> {
+        vec![self.0.clone()]
+    }
+
+    fn read(&self, _: &Moment) -> Result<WasRead, String> {
+        let read = lumbre::describe(&[&self.0], &lumbre::ReadOptions::default());
+        let (desc, diagnostics) = read.map_err(|e| e.to_string())?;
+        Ok(WasRead { desc, files: diagnostics.files_read().to_vec(), warnings: diagnostics.lines() })
+    }
+
+    fn build(&self, desc: SceneDesc) -> Result<Built, String> {
+        let scene = Scene::from_description(desc).map_err(|e| e.to_string())?;
+        let options = scene.options();
+        let save = SaveOptions::default();
+        Ok(Built { scene, options, save, background: None, denoise: false, warnings: Vec::new() })
+    }
+
+    fn of_file(&self, file: &Path) -> Arc<dyn Source> {
+        Arc::new(Self(file.to_owned()))
+    }
+}
+
+pub(crate) const SCENE: &str = r#"LookAt 1 -7 3  0 0 0.5  0 0 1 Camera "perspective" "float fov" 35
+Film "rgb" "integer xresolution" 48 "integer yresolution" 32 Sampler "independent" "integer pixelsamples" 4
+WorldBegin LightSource "infinite" "rgb L" [0.5 0.6 0.7]
+MakeNamedMaterial "<b>wood</b>" "string type" "diffuse" "rgb reflectance" [0.7 0.2 0.1]
+NamedMaterial "<b>wood</b>" Shape "sphere" "float radius" 1.25
+"#;
+
+/// A viewer that runs until it is dropped.
+pub(crate) struct Running {
+    pub address: SocketAddr,
+    pub path: PathBuf,
+    token: String,
+    closer: Closer,
+    thread: Option<JoinHandle<Result<(), String>>>,
+    _folder: tempfile::TempDir,
+}
+
+impl Running {
+    pub(crate) fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.pbrt");
+        std::fs::write(&path, SCENE).unwrap();
+        let viewer = Viewer::new(Arc::new(OneFile(path.clone())), &Options::default()).unwrap();
+        let address = viewer.address();
+        let url = viewer.url();
+        let token = url.rsplit('/').next().unwrap().to_owned();
+        let closer = viewer.closer();
+        let thread = Some(std::thread::spawn(move || viewer.run()));
+        Self { address, path, token, closer, thread, _folder: folder }
+    }
+
+    pub(crate) fn host(&self) -> String {
+        self.address.to_string()
+    }
+
+    /// The path that opens it once.
+    pub(crate) fn opening(&self) -> String {
+        format!("/open/{}", self.token)
+    }
+
+    /// Sends bytes and reads until the other side closes or says nothing for a while.
+    pub(crate) fn raw(&self, request: &[u8]) -> String {
+        let mut stream = TcpStream::connect(self.address).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+        // It may be refused before it is all there.
+        let _ = stream.write_all(request);
+        let mut answer = Vec::new();
+        let _ = stream.read_to_end(&mut answer);
+        String::from_utf8_lossy(&answer).into_owned()
+    }
+
+    /// The status of the answer to a request with these header lines; 0 without an answer.
+    pub(crate) fn status(&self, method: &str, path: &str, headers: &[String]) -> u16 {
+        let lines: String = headers.iter().map(|line| format!("{line}\r\n")).collect();
+        let answer =
+            self.raw(format!("{method} {path} HTTP/1.1\r\n{lines}Connection: close\r\n\r\n").as_bytes());
+        answer.split(' ').nth(1).and_then(|status| status.parse().ok()).unwrap_or(0)
+    }
+
+    /// Takes the token for a cookie.
+    pub(crate) fn cookie(&self) -> String {
+        let request =
+            format!("GET {} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n", self.opening(), self.host());
+        let answer = self.raw(request.as_bytes());
+        assert!(answer.starts_with("HTTP/1.1 303"), "{answer}");
+        let line = answer.lines().find(|line| line.starts_with("set-cookie: ")).expect("a cookie");
+        assert!(line.contains("HttpOnly") && line.contains("SameSite=Strict"), "{line}");
+        line["set-cookie: ".len()..].split(';').next().unwrap().to_owned()
+    }
+
+    /// A socket of a page that has this cookie.
+    pub(crate) fn socket(&self, cookie: &str) -> Socket {
+        let mut stream = TcpStream::connect(self.address).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        let host = self.host();
+        let request = format!(
+            "GET /socket HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nCookie: {cookie}\r\nConnection: Upgrade\r\n\
+             Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+        );
+        stream.write_all(request.as_bytes()).unwrap();
+        let mut head = Vec::new();
+        let mut byte = [0];
+        while !head.ends_with(b"\r\n\r\n") {
+            stream.read_exact(&mut byte).unwrap();
+            head.push(byte[0]);
+        }
+        let head = String::from_utf8(head).unwrap();
+        assert!(head.starts_with("HTTP/1.1 101"), "{head}");
+        // The example of RFC 6455.
+        assert!(head.contains("s3pPLMBiTxaQ9kYGzzhZRbK+xOo="), "{head}");
+        Socket(stream)
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.closer.close();
+        let ended = self.thread.take().unwrap().join().unwrap();
+        if !std::thread::panicking() {
+            ended.unwrap();
+        }
+    }
+}
+
+/// What came through a socket.
+#[derive(Debug)]
+pub(crate) enum Packet {
+    Text(String),
+    Binary(Vec<u8>),
+    /// With its code.
+    Close(u16),
+    /// The connection is gone.
+    Gone,
+}
+
+/// The page's side of a socket.
+pub(crate) struct Socket(pub TcpStream);
+
+impl Socket {
+    /// Sends a frame with a first byte and a length as they are said, masked by zeros.
+    pub(crate) fn send_frame(&mut self, first: u8, payload: &[u8]) {
+        let mut frame = vec![first];
+        match payload.len() {
+            short @ 0..126 => frame.push(0x80 | short as u8),
+            middle @ 126..65536 => {
+                frame.push(0x80 | 126);
+                frame.extend((middle as u16).to_be_bytes());
+            }
+            long => {
+                frame.push(0x80 | 127);
+                frame.extend((long as u64).to_be_bytes());
+            }
+        }
+        frame.extend([0; 4]);
+        frame.extend(payload);
+        let _ = self.0.write_all(&frame);
+    }
+
+    pub(crate) fn say(&mut self, text: &str) {
+        self.send_frame(0x81, text.as_bytes());
+    }
+
+    /// The next packet that is no ping.
+    pub(crate) fn next(&mut self) -> Packet {
+        loop {
+            let mut head = [0; 2];
+            if self.0.read_exact(&mut head).is_err() {
+                return Packet::Gone;
+            }
+            let mut length = u64::from(head[1] & 0x7f);
+            if length >= 126 {
+                let mut bytes = vec![0; if length == 126 { 2 } else { 8 }];
+                self.0.read_exact(&mut bytes).unwrap();
+                length = bytes.iter().fold(0, |all, byte| all << 8 | u64::from(*byte));
+            }
+            let mut payload = vec![0; length as usize];
+            if self.0.read_exact(&mut payload).is_err() {
+                return Packet::Gone;
+            }
+            match head[0] & 0x0f {
+                1 => return Packet::Text(String::from_utf8(payload).unwrap()),
+                2 => return Packet::Binary(payload),
+                8 => {
+                    let code = payload.get(..2).map_or(1005, |code| u16::from_be_bytes([code[0], code[1]]));
+                    return Packet::Close(code);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Waits for a message of this kind of which something holds.
+    pub(crate) fn wait_for(
+        &mut self,
+        kind: &str,
+        holds: impl Fn(&serde_json::Value) -> bool,
+    ) -> serde_json::Value {
+        let end = Instant::now() + Duration::from_secs(60);
+        while Instant::now() < end {
+            match self.next() {
+                Packet::Text(text) => {
+                    let message: serde_json::Value = serde_json::from_str(&text).unwrap();
+                    if message["type"] == kind && holds(&message) {
+                        return message;
+                    }
+                }
+                Packet::Binary(_) => self.say(r#"{"type":"shown"}"#),
+                other => panic!("while waiting for {kind}: {other:?}"),
+            }
+        }
+        panic!("no {kind} came");
+    }
+
+    /// How the socket ends: its code, or nothing where the connection is gone.
+    pub(crate) fn end(&mut self) -> Option<u16> {
+        loop {
+            match self.next() {
+                Packet::Close(code) => return Some(code),
+                Packet::Gone => return None,
+                Packet::Text(_) | Packet::Binary(_) => {}
+            }
+        }
+    }
+}

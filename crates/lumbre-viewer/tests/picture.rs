@@ -1,0 +1,97 @@
+//! What a page sees.
+
+use crate::client::{Packet, Running, SCENE};
+
+fn numbers(frame: &[u8]) -> Vec<u32> {
+    frame[..32].chunks(4).map(|bytes| u32::from_le_bytes(bytes.try_into().unwrap())).collect()
+}
+
+/// Reads frames until one is the whole picture with all samples, of the change of this number.
+fn finished(socket: &mut crate::client::Socket, sequence: u32) -> Vec<u8> {
+    loop {
+        match socket.next() {
+            Packet::Binary(frame) => {
+                socket.say(r#"{"type":"shown"}"#);
+                let head = numbers(&frame);
+                if head[6] == sequence && head[7] == 3 {
+                    return frame;
+                }
+            }
+            Packet::Text(_) => {}
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn the_last_frame_has_the_pixels_of_the_picture_that_is_rendered() {
+    let viewer = Running::new();
+    let mut socket = viewer.socket(&viewer.cookie());
+    let frame = finished(&mut socket, 0);
+    let scene = lumbre::open(&viewer.path).unwrap();
+    let picture = scene.render(&scene.options()).unwrap();
+    let expected: Vec<u8> = picture
+        .image()
+        .pixels()
+        .iter()
+        .flat_map(|&light| {
+            let [r, g, b] = lumbre::image::ToneMap::None.encode(light, 0.0).to_u8();
+            [r, g, b, 255]
+        })
+        .collect();
+    assert_eq!(numbers(&frame)[1..6], [48, 32, 48, 32, 4]);
+    assert!(frame[32..] == expected[..]);
+    // Another camera makes another picture, and the file's own the same again.
+    let placement = r#"{"eye":[5,-5,4],"target":[0,0,0],"up":[0,0,1]}"#;
+    socket.say(&format!(r#"{{"type":"camera","sequence":7,"placement":{placement},"fov":null,"zoom":1}}"#));
+    assert!(finished(&mut socket, 7)[32..] != expected[..]);
+    socket.say(r#"{"type":"reset","sequence":8,"camera":0}"#);
+    assert!(finished(&mut socket, 8)[32..] == expected[..]);
+    // What makes no camera leaves the picture.
+    let nowhere = r#"{"eye":[0,0,0],"target":[0,0,0],"up":[0,0,1]}"#;
+    socket.say(&format!(r#"{{"type":"camera","sequence":9,"placement":{nowhere},"fov":null,"zoom":1}}"#));
+    socket.say(r#"{"type":"reset","sequence":10,"camera":0}"#);
+    assert!(finished(&mut socket, 10)[32..] == expected[..]);
+}
+
+#[test]
+fn a_page_asks_for_pixels_and_for_what_a_ray_meets() {
+    let viewer = Running::new();
+    let mut socket = viewer.socket(&viewer.cookie());
+    finished(&mut socket, 0);
+    socket.say(r#"{"type":"pick","x":24,"y":16,"request":5}"#);
+    let picked = socket.wait_for("picked", |_| true);
+    let hits = picked["ray"]["hits"].as_array().unwrap();
+    assert_eq!((picked["request"].as_u64(), hits.len()), (Some(5), 2));
+    assert_eq!((hits[0]["kind"].as_str(), hits[0]["front"].as_bool()), (Some("sphere"), Some(true)));
+    assert_eq!(hits[0]["material"], "<b>wood</b> (diffuse)");
+    let point: Vec<f64> = hits[0]["point"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
+    assert!((point.iter().map(|x| x * x).sum::<f64>().sqrt() - 1.25).abs() < 1e-9, "{point:?}");
+    socket.say(r#"{"type":"values","x":46,"y":30,"width":9,"height":9,"request":6}"#);
+    let values = socket.wait_for("values", |_| true);
+    assert_eq!((values["width"].as_u64(), values["height"].as_u64()), (Some(2), Some(2)));
+    let image = lumbre::open(&viewer.path).unwrap();
+    let image = image.render(&image.options()).unwrap();
+    let expected = image.image().pixel(47, 30).to_array();
+    let found: Vec<f32> =
+        values["values"][1].as_array().unwrap().iter().map(|x| x.as_f64().unwrap() as f32).collect();
+    assert_eq!(found, expected);
+}
+
+#[test]
+fn parameters_are_edited_and_wrong_ones_named() {
+    let viewer = Running::new();
+    let mut socket = viewer.socket(&viewer.cookie());
+    let before = finished(&mut socket, 0);
+    let path = "material.<b>wood</b>.reflectance";
+    socket.say(&format!(r##"{{"type":"edit","path":"{path}","value":"#00ff00"}}"##));
+    let state = socket.wait_for("state", |state| !state["settings"].as_array().unwrap().is_empty());
+    assert_eq!(state["settings"][0][0], path);
+    assert!(finished(&mut socket, 0)[32..] != before[32..]);
+    socket.say(&format!(r##"{{"type":"edit","path":"{path}","value":"nonsense"}}"##));
+    let state = socket.wait_for("state", |state| !state["edit_error"].is_null());
+    assert!(state["edit_error"].as_str().unwrap().contains("expected"), "{state}");
+    socket.say(&format!(r#"{{"type":"edit","path":"{path}","value":null}}"#));
+    assert!(finished(&mut socket, 0)[32..] == before[32..]);
+    assert_eq!(std::fs::read_to_string(&viewer.path).unwrap(), SCENE, "the file is never written");
+}

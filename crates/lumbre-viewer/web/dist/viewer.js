@@ -1,0 +1,1041 @@
+"use strict";
+(() => {
+  // src/vectors.ts
+  var add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+  var sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+  var scale = (a, s) => [a[0] * s, a[1] * s, a[2] * s];
+  var dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  var cross = (a, b) => [
+    a[1] * b[2] - a[2] * b[1],
+    a[2] * b[0] - a[0] * b[2],
+    a[0] * b[1] - a[1] * b[0]
+  ];
+  var length = (a) => Math.hypot(...a);
+  var unit = (a) => scale(a, 1 / (length(a) || 1));
+  function turned(v, axis, angle) {
+    const [c, s] = [Math.cos(angle), Math.sin(angle)];
+    return add(add(scale(v, c), scale(cross(axis, v), s)), scale(axis, dot(axis, v) * (1 - c)));
+  }
+
+  // src/camera.ts
+  var POLE = 0.02;
+  var Camera = class {
+    placement = { eye: [0, 0, 1], target: [0, 0, 0], up: [0, 1, 0] };
+    fov = null;
+    zoom = 1;
+    mirrored = false;
+    /** What stays upwards while the camera turns. */
+    axis = [0, 1, 0];
+    /** That of a state; what stays upwards is found anew. */
+    take(state2, scene2) {
+      if (!state2.placement) return;
+      const own = scene2.cameras[state2.camera];
+      this.placement = state2.placement;
+      this.mirrored = own?.mirrored ?? false;
+      this.fov = state2.fov ?? own?.fov ?? null;
+      this.zoom = state2.zoom;
+      this.axis = this.upright(scene2, state2.name.endsWith(".pbrt"));
+    }
+    forward() {
+      return unit(sub(this.placement.target, this.placement.eye));
+    }
+    right() {
+      const right = unit(cross(this.placement.up, this.forward()));
+      return this.mirrored ? scale(right, -1) : right;
+    }
+    upward() {
+      const forward = this.forward();
+      return unit(sub(this.placement.up, scale(forward, dot(this.placement.up, forward))));
+    }
+    distance() {
+      return length(sub(this.placement.target, this.placement.eye));
+    }
+    /** An axis that the picture does not lean to the side of; pbrt files do not say which is up. */
+    upright(scene2, unsaid) {
+      const [right, up] = [this.right(), this.upward()];
+      const axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+      const candidates = [...axes, ...axes.map((axis) => scale(axis, -1)), scene2.up];
+      let [best, most] = [up, 0];
+      for (const axis of candidates) {
+        const bonus = axis === scene2.up && !unsaid ? 0.5 : 0;
+        const standing = dot(axis, up) + bonus;
+        if (Math.abs(dot(axis, right)) < 1e-3 && dot(axis, up) > 1e-3 && standing > most) [best, most] = [axis, standing];
+      }
+      return best;
+    }
+    /** Turns around the target by angles in radians: to the right, and up. */
+    orbit(right, up) {
+      let { eye, target } = this.placement;
+      let offset = sub(eye, target);
+      const sideways = Math.sign(dot(cross(this.axis, offset), this.right())) || 1;
+      offset = turned(offset, this.axis, right * sideways);
+      const polar = Math.acos(Math.max(-1, Math.min(1, dot(unit(offset), this.axis))));
+      const wanted = Math.max(POLE, Math.min(Math.PI - POLE, polar - up));
+      const across = cross(this.axis, offset);
+      if (length(across) > 0) offset = turned(offset, unit(across), wanted - polar);
+      eye = add(target, offset);
+      this.placement = { eye, target, up: this.axis };
+    }
+    /** Moves eye and target: to the right, up and forward, in shares of the distance between them. */
+    move(right, up, forward) {
+      const by = this.distance();
+      const step = add(add(scale(this.right(), right * by), scale(this.upward(), up * by)), scale(this.forward(), forward * by));
+      const { eye, target } = this.placement;
+      this.placement = { eye: add(eye, step), target: add(target, step), up: this.axis };
+    }
+    /** Comes nearer to the target by a factor, or shows more of it. */
+    dolly(factor) {
+      const { eye, target } = this.placement;
+      this.placement = { eye: add(target, scale(sub(eye, target), factor)), target, up: this.axis };
+      this.zoom = Math.max(1e-4, Math.min(1e4, this.zoom / factor));
+    }
+    /** Turns around this point from now on. */
+    lookAt(point2) {
+      const { eye } = this.placement;
+      this.placement = { eye, target: point2, up: this.axis };
+    }
+    /** As pbrt writes it. */
+    toPbrt() {
+      const { eye, target } = this.placement;
+      const numbers = (v) => v.map((x) => +x.toPrecision(9)).join(" ");
+      const mirror = this.mirrored ? "Scale -1 1 1\n" : "";
+      const lens = this.fov === null ? "" : `
+Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
+      return `${mirror}LookAt ${numbers(eye)}  ${numbers(target)}  ${numbers(this.upward())}${lens}`;
+    }
+    /** As glTF writes it: a node, whose camera looks along -z. */
+    toGltf(aspect) {
+      const columns = [
+        [this.right(), 0],
+        [this.upward(), 0],
+        [scale(this.forward(), -1), 0],
+        [this.placement.eye, 1]
+      ];
+      const matrix = columns.flatMap(([v, w]) => [...v.map((x) => +x.toPrecision(9)), w]);
+      const shorter = (this.fov ?? 45) * Math.PI / 180;
+      const yfov = aspect >= 1 ? shorter : 2 * Math.atan(Math.tan(shorter / 2) / aspect);
+      const perspective = { aspectRatio: +aspect.toPrecision(9), yfov: +yfov.toPrecision(9), znear: 0.01 };
+      return JSON.stringify({ cameras: [{ type: "perspective", perspective }], nodes: [{ camera: 0, matrix }] });
+    }
+  };
+
+  // src/elements.ts
+  function byId(id) {
+    const found = document.getElementById(id);
+    if (!found) throw new Error(`the page has no ${id}`);
+    return found;
+  }
+  function element(name, text = "", properties = {}) {
+    const made = Object.assign(document.createElement(name), properties);
+    if (text) made.textContent = text;
+    return made;
+  }
+  function short(value) {
+    return Number.isFinite(value) ? String(+value.toPrecision(6)) : String(value);
+  }
+  function large(value) {
+    const units = [[1e9, " G"], [1e6, " M"], [1e3, " k"]];
+    for (const [unit2, name] of units) if (value >= unit2) return `${(value / unit2).toFixed(2)}${name}`;
+    return `${Math.round(value)}`;
+  }
+  function spoken(seconds) {
+    if (seconds < 1) return `${Math.round(seconds * 1e3)} ms`;
+    if (seconds < 90) return `${seconds.toFixed(seconds < 10 ? 1 : 0)} s`;
+    return `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
+  }
+  function options(select, entries, chosen) {
+    const same = select.options.length === entries.length && entries.every(([value, text], i) => select.options[i]?.value === value && select.options[i]?.textContent === text);
+    if (!same) select.replaceChildren(...entries.map(([value, text]) => element("option", text, { value })));
+    select.value = chosen;
+  }
+  function save(name, text) {
+    const url = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
+    element("a", "", { href: url, download: name }).click();
+    setTimeout(() => URL.revokeObjectURL(url), 1e4);
+  }
+
+  // src/at-rest.ts
+  function bytes(base64) {
+    return Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+  }
+  function half(bits) {
+    const sign = bits & 32768 ? -1 : 1;
+    const [exponent, fraction] = [bits >> 10 & 31, bits & 1023];
+    if (exponent === 31) return fraction ? NaN : sign * Infinity;
+    return exponent === 0 ? sign * fraction * 2 ** -24 : sign * (1 + fraction / 1024) * 2 ** (exponent - 15);
+  }
+  var AtRest = class {
+    constructor(listener2, data2) {
+      this.listener = listener2;
+      this.data = data2;
+      setTimeout(() => void this.start());
+    }
+    listener;
+    data;
+    shown;
+    values;
+    async start() {
+      this.listener.stood("open");
+      this.listener.told({ type: "scene", scene: this.data.scene });
+      this.listener.told({ type: "progress", doing: "done", ...this.data.progress });
+      await this.show("beauty");
+    }
+    state(channel) {
+      return {
+        name: this.data.name,
+        has_scene: true,
+        error: null,
+        edit_error: null,
+        camera: this.data.camera,
+        sequence: 0,
+        moved: false,
+        placement: this.data.placement,
+        fov: null,
+        zoom: 1,
+        size: null,
+        channel,
+        scale: 1,
+        spp: this.data.progress.spp ?? null,
+        denoise: null,
+        paused: false,
+        exposure: 0,
+        tone_map: null,
+        false_colour: false,
+        time: null,
+        variant: null,
+        settings: []
+      };
+    }
+    async show(name) {
+      const channel = this.data.channels.find((known) => known.name === name);
+      if (!channel) return;
+      this.listener.told({ type: "state", ...this.state(name) });
+      const bitmap = await createImageBitmap(new Blob([bytes(channel.png)], { type: "image/png" }));
+      const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
+      const drawing = canvas.getContext("2d");
+      if (!drawing) return;
+      drawing.drawImage(bitmap, 0, 0);
+      const { width, height } = bitmap;
+      const pixels = drawing.getImageData(0, 0, width, height);
+      [this.shown, this.values] = [pixels, void 0];
+      if (channel.values) {
+        const stream = new Blob([bytes(channel.values)]).stream().pipeThrough(new DecompressionStream("deflate"));
+        this.values = new DataView(await new Response(stream).arrayBuffer());
+      }
+      const spp = this.data.progress.spp ?? 0;
+      this.listener.framed({ width, height, fullWidth: width, fullHeight: height, spp, sequence: 0, isFull: true, isDone: true, pixels });
+    }
+    send(message) {
+      const { type, channel, x, y, width, height, request: request2 } = message;
+      if (type === "set" && channel) void this.show(String(channel));
+      if (type !== "values" || !this.shown) return;
+      const whole = this.shown.width;
+      const [x0, y0] = [x ?? 0, y ?? 0];
+      const [columns, rows] = [Math.min(width ?? 0, whole - x0), Math.min(height ?? 0, this.shown.height - y0)];
+      const found = [];
+      for (let row = y0; row < y0 + rows; row++) {
+        for (let column = x0; column < x0 + columns; column++) {
+          const pixel = row * whole + column;
+          const value = (c) => this.values ? half(this.values.getUint16(2 * (3 * pixel + c), true)) : +((this.shown?.data[4 * pixel + c] ?? 0) / 255).toFixed(3);
+          found.push([value(0), value(1), value(2)]);
+        }
+      }
+      this.listener.told({ type: "values", request: request2 ?? 0, x: x0, y: y0, width: columns, height: rows, values: found });
+    }
+  };
+  function hideWhatNeedsAViewer() {
+    const live = [
+      "pause",
+      "reset",
+      "exposure",
+      "tone-map",
+      "false-colour",
+      "denoise",
+      "spp",
+      "scale",
+      "edit-details",
+      "camera-details",
+      "picked-details",
+      "save-details",
+      "help-open"
+    ];
+    for (const id of live) {
+      byId(id).hidden = true;
+      for (const label of document.querySelectorAll(`label[for="${id}"]`)) label.hidden = true;
+    }
+    for (const option of document.querySelectorAll("option[value=ids], option[value=variance]")) option.remove();
+  }
+
+  // src/protocol.ts
+  var HEADER = 32;
+  var MAGIC = 827151692;
+  function decoded(packet) {
+    const numbers = new Uint32Array(packet, 0, HEADER / 4);
+    const [magic = 0, width = 0, height = 0, fullWidth = 0, fullHeight = 0, spp = 0, sequence2 = 0, flags = 0] = numbers;
+    if (magic !== MAGIC || packet.byteLength !== HEADER + 4 * width * height) throw new Error("no frame");
+    const pixels = new ImageData(new Uint8ClampedArray(packet, HEADER), width, height);
+    return { width, height, fullWidth, fullHeight, spp, sequence: sequence2, isFull: (flags & 1) !== 0, isDone: (flags & 2) !== 0, pixels };
+  }
+
+  // src/connection.ts
+  var Connection = class {
+    constructor(listener2) {
+      this.listener = listener2;
+      this.connect();
+    }
+    listener;
+    socket;
+    wait = 500;
+    send(message) {
+      if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
+    }
+    connect() {
+      const socket = new WebSocket(`ws://${location.host}/socket`);
+      socket.binaryType = "arraybuffer";
+      this.socket = socket;
+      socket.onopen = () => {
+        this.wait = 500;
+        this.listener.stood("open");
+      };
+      socket.onmessage = (event) => {
+        if (typeof event.data === "string") {
+          this.listener.told(JSON.parse(event.data));
+          return;
+        }
+        this.listener.framed(decoded(event.data));
+        this.send({ type: "shown" });
+      };
+      socket.onclose = () => void this.lost();
+    }
+    async lost() {
+      let how = "gone";
+      try {
+        const answer = await fetch("/", { cache: "no-store" });
+        if (answer.status === 403) how = "refused";
+      } catch {
+      }
+      this.listener.stood(how);
+      setTimeout(() => this.connect(), this.wait);
+      this.wait = Math.min(this.wait * 1.5, 5e3);
+    }
+  };
+
+  // src/edit.ts
+  var MOST = 60;
+  var toSrgb = (c) => c <= 31308e-7 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055;
+  var hex = (value) => "#" + value.map((c) => Math.round(255 * Math.max(0, Math.min(1, toSrgb(c)))).toString(16).padStart(2, "0")).join("");
+  var Editor = class {
+    constructor(panel, filter, edit) {
+      this.panel = panel;
+      this.filter = filter;
+      this.edit = edit;
+      filter.addEventListener("input", () => this.draw());
+    }
+    panel;
+    filter;
+    edit;
+    parameters = [];
+    settings = /* @__PURE__ */ new Map();
+    list(parameters) {
+      if (JSON.stringify(parameters) === JSON.stringify(this.parameters)) return;
+      this.parameters = parameters;
+      this.draw();
+    }
+    take(settings) {
+      this.settings = new Map(settings);
+      for (const row of this.panel.querySelectorAll(".parameter")) {
+        row.classList.toggle("changed", this.settings.has(row.dataset["path"] ?? ""));
+      }
+    }
+    draw() {
+      const wanted = this.filter.value.toLowerCase();
+      const found = this.parameters.filter((p) => `${p.owner} ${p.name}`.toLowerCase().includes(wanted));
+      const groups = /* @__PURE__ */ new Map();
+      for (const parameter of found.slice(0, MOST)) {
+        let group = groups.get(parameter.owner);
+        if (!group) {
+          group = element("fieldset");
+          group.append(element("legend", parameter.owner));
+          groups.set(parameter.owner, group);
+        }
+        group.append(this.row(parameter));
+      }
+      const rest = found.length - MOST;
+      const more = rest > 0 ? [element("p", `${rest} more: find them by name.`, { className: "quiet" })] : [];
+      const none = found.length === 0 ? [element("p", "No parameter has this name.", { className: "quiet" })] : [];
+      this.panel.replaceChildren(...groups.values(), ...more, ...none);
+    }
+    row(parameter) {
+      const id = `parameter-${parameter.path}`;
+      const row = element("div", "", { className: "parameter" });
+      row.dataset["path"] = parameter.path;
+      row.classList.toggle("changed", this.settings.has(parameter.path));
+      const input = element("input", "", { id });
+      const label = element("label", parameter.name, { htmlFor: id });
+      const start = () => {
+        const set2 = this.settings.get(parameter.path);
+        if (parameter.kind === "colour") {
+          input.type = "color";
+          input.value = set2?.startsWith("#") ? set2 : hex(parameter.value ?? [0.5, 0.5, 0.5]);
+        } else if (parameter.kind === "number" || parameter.kind === "factor") {
+          input.type = "number";
+          input.step = "any";
+          if (parameter.low !== null) input.min = String(parameter.low);
+          if (parameter.high !== null) input.max = String(parameter.high);
+          input.value = set2 ?? (parameter.value ? short(parameter.value[0] ?? 0) : "");
+        } else {
+          input.type = "text";
+          input.value = set2 ?? (parameter.value ?? []).map(short).join(",");
+        }
+        if (!parameter.value && !set2) input.placeholder = "texture";
+      };
+      start();
+      const event = parameter.kind === "colour" ? "input" : "change";
+      input.addEventListener(event, () => input.value !== "" && this.edit(parameter.path, input.value));
+      const back = element("button", "\u21BA", { title: `Undo ${parameter.name}` });
+      back.setAttribute("aria-label", `Undo ${parameter.name} of ${parameter.owner}`);
+      back.addEventListener("click", () => {
+        this.settings.delete(parameter.path);
+        this.edit(parameter.path, null);
+        start();
+      });
+      row.append(label, input, back);
+      return row;
+    }
+    /** As an overlay file. */
+    overlay() {
+      return [...this.settings].map(([path, value]) => `${path} = ${value}
+`).join("");
+    }
+    dropAll() {
+      for (const path of this.settings.keys()) this.edit(path, null);
+      this.settings.clear();
+      this.draw();
+    }
+  };
+
+  // src/facts.ts
+  var point = (v) => v.map(short).join(", ");
+  function showFacts(list, warnings, scene2) {
+    const counted = (kinds) => Object.entries(kinds).map(([name, count]) => `${count} ${name}`).join(", ") || "none";
+    const rows = [
+      ["Shapes", counted(scene2.shapes)],
+      ["Triangles", large(scene2.triangles)],
+      ["Instances", large(scene2.instances)],
+      ["Materials", counted(scene2.materials)],
+      ["Lights", counted(scene2.lights)],
+      ["Bounds", scene2.bounds ? `${point(scene2.bounds[0])} to ${point(scene2.bounds[1])}` : "none"],
+      ["Memory", `${large(scene2.memory)}B`],
+      ["Built in", spoken(scene2.build_seconds)]
+    ];
+    list.replaceChildren(...rows.flatMap(([name, text]) => [element("dt", name), element("dd", text)]));
+    warnings.replaceChildren();
+    if (scene2.warnings.length > 0) {
+      warnings.append(element("p", `${scene2.warnings.length} warnings`, { className: "quiet" }));
+      warnings.append(element("pre", scene2.warnings.join("\n"), { tabIndex: 0 }));
+    }
+  }
+  function showHits(panel, hits) {
+    const first = hits[0];
+    if (!first) {
+      panel.replaceChildren(element("p", "Nothing is there.", { className: "quiet" }));
+      return;
+    }
+    const rows = [
+      ["Shape", `${first.shape} (${first.kind})`],
+      ["Material", first.material ?? "none"],
+      ["Position", point(first.point)],
+      ["Normal", point(first.normal)],
+      ["Distance", short(first.distance)],
+      ["uv", point(first.uv)],
+      ["Triangle", String(first.primitive)],
+      ["Instance", first.instance === null ? "none" : String(first.instance)],
+      ["Side", first.front ? "outside" : "inside"]
+    ];
+    const table = element("table");
+    for (const [name, text] of rows) {
+      const row = element("tr");
+      row.append(element("th", name, { scope: "row" }), element("td", text));
+      table.append(row);
+    }
+    const all = element("details");
+    all.append(element("summary", `All ${hits.length} hits of this ray`));
+    const list = element("ol");
+    for (const hit of hits) {
+      list.append(element("li", `${short(hit.distance)}: shape ${hit.shape} (${hit.kind}), ${hit.material ?? "no material"}, ${hit.front ? "in" : "out"}`));
+    }
+    all.append(list);
+    panel.replaceChildren(table, all);
+  }
+
+  // src/hands.ts
+  var STILL = 4;
+  function attach(canvas, sheet2, camera2, wishes) {
+    const pointers = /* @__PURE__ */ new Map();
+    let travelled = 0;
+    const spread = () => {
+      const [a, b] = [...pointers.values()];
+      return a && b ? Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY) : 0;
+    };
+    canvas.addEventListener("pointerdown", (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      canvas.focus();
+      pointers.set(event.pointerId, event);
+      if (pointers.size === 1) travelled = 0;
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      const before = pointers.get(event.pointerId);
+      if (!before) {
+        wishes.hover(sheet2.at(event.clientX, event.clientY));
+        return;
+      }
+      const wide = spread();
+      const [dx, dy] = [event.clientX - before.clientX, event.clientY - before.clientY];
+      pointers.set(event.pointerId, event);
+      travelled += Math.hypot(dx, dy);
+      if (travelled < STILL) return;
+      const height = Math.max(1, sheet2.height * sheet2.scale());
+      const pan = () => {
+        const span = camera2.fov === null ? 1 : 2 * Math.tan(camera2.fov * Math.PI / 360);
+        camera2.move(-dx / height * span, dy / height * span, 0);
+      };
+      if (pointers.size >= 2) {
+        if (wide > 0) camera2.dolly(wide / Math.max(1, spread()));
+        pan();
+      } else if (sheet2.isZoomed() && event.ctrlKey) {
+        sheet2.slide(dx, dy);
+        return;
+      } else if (before.button === 2 || before.button === 1 || (event.buttons & 6) !== 0 || event.shiftKey) {
+        pan();
+      } else {
+        camera2.orbit(-dx / height * Math.PI, dy / height * Math.PI);
+      }
+      wishes.moved();
+    });
+    const up = (event) => {
+      const was = pointers.delete(event.pointerId);
+      if (was && pointers.size === 0 && travelled < STILL && event.type === "pointerup" && event.button === 0) {
+        const at = sheet2.at(event.clientX, event.clientY);
+        if (at) wishes.pick(at[0], at[1], false);
+      }
+    };
+    canvas.addEventListener("pointerup", up);
+    canvas.addEventListener("pointercancel", up);
+    canvas.addEventListener("pointerleave", () => wishes.hover(null));
+    canvas.addEventListener("contextmenu", (event) => event.preventDefault());
+    canvas.addEventListener("dblclick", (event) => {
+      const at = sheet2.at(event.clientX, event.clientY);
+      if (at) wishes.pick(at[0], at[1], true);
+    });
+    canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      const factor = Math.exp(Math.max(-1, Math.min(1, event.deltaY / 300)));
+      if (event.ctrlKey || event.metaKey) {
+        const box = (canvas.parentElement?.parentElement ?? canvas).getBoundingClientRect();
+        sheet2.zoomBy(1 / factor, event.clientX - box.left, event.clientY - box.top);
+        return;
+      }
+      camera2.dolly(factor);
+      wishes.moved();
+    }, { passive: false });
+    const held = /* @__PURE__ */ new Set();
+    let last = 0;
+    const FLY = {
+      w: [0, 0, 1],
+      s: [0, 0, -1],
+      a: [-1, 0, 0],
+      d: [1, 0, 0],
+      q: [0, -1, 0],
+      e: [0, 1, 0]
+    };
+    const TURN = {
+      arrowleft: [-1, 0],
+      arrowright: [1, 0],
+      arrowup: [0, 1],
+      arrowdown: [0, -1]
+    };
+    const fly = (now) => {
+      if (held.size === 0) return;
+      const seconds = Math.min(0.1, (now - last) / 1e3);
+      last = now;
+      const fast = held.has("shift") ? 4 : 1;
+      let any = false;
+      for (const key2 of held) {
+        const [step, turn] = [FLY[key2], TURN[key2]];
+        const by = seconds * 0.8 * fast;
+        if (step) camera2.move(step[0] * by, step[1] * by, step[2] * by);
+        if (turn) camera2.orbit(turn[0] * by, turn[1] * by);
+        if (key2 === "pageup" || key2 === "pagedown") camera2.dolly(Math.exp(key2 === "pageup" ? -by : by));
+        any ||= key2 !== "shift";
+      }
+      if (any) wishes.moved();
+      requestAnimationFrame(fly);
+    };
+    canvas.addEventListener("keydown", (event) => {
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      const key2 = event.key.toLowerCase();
+      if (key2 in FLY || key2 in TURN || key2 === "pageup" || key2 === "pagedown" || key2 === "shift") {
+        event.preventDefault();
+        if (held.size === 0) {
+          last = performance.now() - 16;
+          requestAnimationFrame(fly);
+        }
+        held.add(key2);
+      } else if (key2 === "enter") {
+        wishes.pick(sheet2.width / 2, sheet2.height / 2, false);
+      } else if (wishes.key(key2)) {
+        event.preventDefault();
+      }
+    });
+    canvas.addEventListener("keyup", (event) => held.delete(event.key.toLowerCase()));
+    canvas.addEventListener("blur", () => held.clear());
+  }
+
+  // src/sheet.ts
+  var MOST_ZOOM = 256;
+  var NUMBERS_FROM = 32;
+  function context(canvas) {
+    const found = canvas.getContext("2d", { willReadFrequently: false });
+    if (!found) throw new Error("this browser has no canvas");
+    return found;
+  }
+  var Sheet = class {
+    constructor(stage2, sheet2, picture, reference, numbers) {
+      this.stage = stage2;
+      this.sheet = sheet2;
+      this.picture = picture;
+      this.reference = reference;
+      this.numbers = numbers;
+      new ResizeObserver(() => this.place()).observe(stage2);
+    }
+    stage;
+    sheet;
+    picture;
+    reference;
+    numbers;
+    width = 16;
+    height = 9;
+    /** Screen pixels a pixel; 0 fits the picture. */
+    zoom = 0;
+    left = 0;
+    top = 0;
+    small = document.createElement("canvas");
+    changed = () => {
+    };
+    show(frame) {
+      const { fullWidth, fullHeight } = frame;
+      if (frame.isFull && (this.width !== frame.width || this.height !== frame.height)) this.size(frame.width, frame.height);
+      if (!frame.isFull && Math.abs(this.width / this.height - frame.width / frame.height) > 0.05) this.size(fullWidth, fullHeight);
+      const drawing = context(this.picture);
+      if (frame.width === this.width && frame.height === this.height) {
+        drawing.putImageData(frame.pixels, 0, 0);
+      } else {
+        if (this.small.width !== frame.width || this.small.height !== frame.height) {
+          [this.small.width, this.small.height] = [frame.width, frame.height];
+        }
+        context(this.small).putImageData(frame.pixels, 0, 0);
+        drawing.imageSmoothingQuality = "low";
+        drawing.clearRect(0, 0, this.width, this.height);
+        drawing.drawImage(this.small, 0, 0, this.width, this.height);
+      }
+    }
+    size(width, height) {
+      [this.width, this.height] = [width, height];
+      [this.picture.width, this.picture.height] = [width, height];
+      this.place();
+    }
+    fit() {
+      return Math.min(this.stage.clientWidth / this.width, this.stage.clientHeight / this.height);
+    }
+    /** Screen pixels a pixel. */
+    scale() {
+      return this.zoom || this.fit();
+    }
+    place() {
+      const scale2 = this.scale();
+      const [width, height] = [this.width * scale2, this.height * scale2];
+      const within = (at, size, room) => size <= room ? (room - size) / 2 : Math.min(0, Math.max(room - size, at));
+      this.left = within(this.left, width, this.stage.clientWidth);
+      this.top = within(this.top, height, this.stage.clientHeight);
+      const style = this.sheet.style;
+      [style.left, style.top, style.width, style.height] = [`${this.left}px`, `${this.top}px`, `${width}px`, `${height}px`];
+      this.sheet.classList.toggle("pixels", scale2 > 2);
+      this.clearNumbers();
+      this.changed();
+    }
+    /** Zooms about a place of the screen. */
+    zoomBy(factor, x = this.stage.clientWidth / 2, y = this.stage.clientHeight / 2) {
+      const before = this.scale();
+      const after = Math.min(MOST_ZOOM, before * factor);
+      this.zoom = after <= this.fit() ? 0 : after;
+      const ratio = this.scale() / before;
+      this.left = x - (x - this.left) * ratio;
+      this.top = y - (y - this.top) * ratio;
+      this.place();
+    }
+    zoomOut() {
+      this.zoom = 0;
+      this.place();
+    }
+    slide(x, y) {
+      this.left += x;
+      this.top += y;
+      this.place();
+    }
+    isZoomed() {
+      return this.zoom > 0;
+    }
+    /** The place in the picture, in pixels, of one on the screen; null outside. */
+    at(clientX, clientY) {
+      const box = this.stage.getBoundingClientRect();
+      const [x, y] = [(clientX - box.left - this.left) / this.scale(), (clientY - box.top - this.top) / this.scale()];
+      return x >= 0 && y >= 0 && x < this.width && y < this.height ? [x, y] : null;
+    }
+    /** The pixels whose numbers can be read: x, y, width, height. */
+    readable() {
+      const scale2 = this.scale();
+      if (scale2 < NUMBERS_FROM) return null;
+      const x = Math.max(0, Math.floor(-this.left / scale2));
+      const y = Math.max(0, Math.floor(-this.top / scale2));
+      const width = Math.min(64, this.width - x, Math.ceil(this.stage.clientWidth / scale2) + 1);
+      const height = Math.min(64, this.height - y, Math.ceil(this.stage.clientHeight / scale2) + 1);
+      return [x, y, width, height];
+    }
+    clearNumbers() {
+      if (this.numbers.width > 1) [this.numbers.width, this.numbers.height] = [1, 1];
+    }
+    writeNumbers(x0, y0, width, values) {
+      const scale2 = this.scale();
+      if (scale2 < NUMBERS_FROM) return;
+      const canvas = this.numbers;
+      const rows = Math.ceil(values.length / Math.max(1, width));
+      [canvas.width, canvas.height] = [Math.round(width * scale2), Math.round(rows * scale2)];
+      const style = canvas.style;
+      [style.left, style.top] = [`${x0 * scale2}px`, `${y0 * scale2}px`];
+      [style.width, style.height] = [`${canvas.width}px`, `${canvas.height}px`];
+      const drawing = context(canvas);
+      drawing.font = `${Math.max(8, Math.min(13, scale2 / 5))}px ui-monospace, monospace`;
+      drawing.textAlign = "center";
+      drawing.textBaseline = "middle";
+      const colours = ["#ff9a9a", "#9dffa6", "#a9c8ff"];
+      values.forEach((value, i) => {
+        const [x, y] = [(i % width + 0.5) * scale2, (Math.floor(i / width) + 0.5) * scale2];
+        value.forEach((number, channel) => {
+          const text = typeof number === "number" ? +number.toPrecision(3) + "" : number;
+          const at = y + (channel - 1) * scale2 * 0.25;
+          drawing.lineWidth = 3;
+          drawing.strokeStyle = "#000";
+          drawing.strokeText(text, x, at, scale2 - 2);
+          drawing.fillStyle = colours[channel] ?? "#fff";
+          drawing.fillText(text, x, at, scale2 - 2);
+        });
+      });
+    }
+    /** Keeps a picture to compare with; without one, what is shown. */
+    keep(source = this.picture) {
+      [this.reference.width, this.reference.height] = [this.width, this.height];
+      context(this.reference).drawImage(source, 0, 0, this.width, this.height);
+      this.reference.hidden = false;
+    }
+    split(percent) {
+      this.reference.style.clipPath = `inset(0 0 0 ${percent}%)`;
+    }
+  };
+
+  // src/main.ts
+  var stage = byId("stage");
+  var sheet = new Sheet(
+    stage,
+    byId("sheet"),
+    byId("picture"),
+    byId("reference"),
+    byId("numbers")
+  );
+  var camera = new Camera();
+  var scene;
+  var state;
+  var request = 0;
+  var turnAround = 0;
+  var hovered = null;
+  var asked = 0;
+  var sequence = Math.floor(Math.random() * 2147418112);
+  var mine = -1;
+  var measured = { latencies: [], frames: [], changes: /* @__PURE__ */ new Map(), spp: 0, done: false, sequence: 0 };
+  Object.assign(globalThis, { lumbreMeasured: measured });
+  var listener = { told: (message) => told(message), framed: (frame) => framed(frame), stood: (how) => stood(how) };
+  var data = globalThis.lumbreAtRest;
+  var connection = data ? new AtRest(listener, data) : new Connection(listener);
+  var isMoving = false;
+  function moved() {
+    if (isMoving) return;
+    isMoving = true;
+    requestAnimationFrame(() => {
+      isMoving = false;
+      sequence = sequence + 1 >>> 0;
+      mine = sequence;
+      measured.changes.set(sequence, performance.now());
+      connection.send({ type: "camera", sequence, placement: camera.placement, fov: camera.fov, zoom: camera.zoom });
+    });
+  }
+  function reset(index) {
+    sequence = sequence + 1 >>> 0;
+    mine = -1;
+    connection.send({ type: "reset", sequence, camera: index });
+  }
+  var set = (wishes) => connection.send({ type: "set", ...wishes });
+  function framed(frame) {
+    sheet.show(frame);
+    const now = performance.now();
+    measured.frames.push(now);
+    if (measured.frames.length > 2e3) measured.frames.splice(0, 1e3);
+    [measured.spp, measured.done, measured.sequence] = [frame.isFull ? frame.spp : 0, frame.isDone, frame.sequence];
+    for (const [change, since] of measured.changes) {
+      if (change > frame.sequence) continue;
+      if (change === frame.sequence) measured.latencies.push(now - since);
+      measured.changes.delete(change);
+    }
+    if (frame.isFull) askNumbers();
+    if (hovered && frame.isFull) askPixel();
+  }
+  function told(message) {
+    switch (message.type) {
+      case "scene":
+        scene = message.scene;
+        showFacts(byId("facts"), byId("warnings"), scene);
+        editor.list(scene.parameters);
+        if (state) showState(state);
+        break;
+      case "state":
+        state = message;
+        showState(message);
+        break;
+      case "progress":
+        showProgress(message);
+        break;
+      case "picked":
+        showHits(byId("picked"), message.ray.hits);
+        if (message.request === turnAround && message.ray.hits[0]) {
+          camera.lookAt(message.ray.hits[0].point);
+          moved();
+        }
+        break;
+      case "values":
+        if (message.width === 1 && message.height === 1) {
+          const [value] = message.values;
+          if (value) byId("pixel").textContent = `${message.x}, ${message.y}: ${value.map((v) => typeof v === "number" ? short(v) : v).join("  ")}`;
+        } else {
+          sheet.writeNumbers(message.x, message.y, message.width, message.values);
+        }
+        break;
+      case "wrong":
+        byId("edit-error").textContent = message.what;
+        byId("edit-error").hidden = false;
+        break;
+    }
+  }
+  function alertOf(title, text) {
+    byId("alert-title").textContent = title;
+    byId("alert-text").textContent = text;
+    byId("alert").hidden = title === "";
+  }
+  var connected = false;
+  function stood(how) {
+    connected = how === "open";
+    if (how === "open") alertOf("", "");
+    if (how === "gone") alertOf("The viewer does not answer.", "It has ended, or the tunnel to it has. This page goes on when it is back.");
+    if (how === "refused") alertOf("The viewer was started anew.", "Open the address that it printed.");
+    if (!connected) byId("progress").textContent = "Not connected";
+  }
+  function showProgress(progress) {
+    const { doing, spp = 0, target = 0 } = progress;
+    const words = {
+      reading: "Reading the scene",
+      building: "Building the scene",
+      rendering: "",
+      done: "",
+      waiting: "Waiting for the file to be mended",
+      nothing: "No scene"
+    };
+    let text = words[doing];
+    if (doing === "rendering" || doing === "done") {
+      const parts = [target > 0 ? `${spp} of ${target} samples` : "done"];
+      if (progress.noise != null && spp > 1) parts.push(`noise ${progress.noise.toFixed(4)}`);
+      if (progress.rays_per_second) parts.push(`${large(progress.rays_per_second)} rays/s`);
+      if (doing === "rendering" && progress.left) parts.push(`${spoken(progress.left)} left`);
+      if (doing === "done" && progress.seconds) parts.push(`done in ${spoken(progress.seconds)}`);
+      if (progress.dropped) parts.push(`${progress.dropped} samples dropped`);
+      text = parts.join(" \xB7 ");
+    }
+    byId("progress").textContent = text;
+    byId("bar").value = target > 0 ? spp / target : doing === "done" ? 1 : 0;
+  }
+  function showState(now) {
+    document.title = now.name ? `${now.name} \u2013 Lumbre` : "Lumbre";
+    byId("name").textContent = now.name || "Lumbre";
+    if (connected) alertOf(now.error ? now.has_scene ? "The file has an error; this is the last good picture." : "The file has an error." : "", now.error ?? "");
+    byId("empty").hidden = now.name !== "";
+    byId("sheet").hidden = now.name === "";
+    const error = byId("edit-error");
+    error.textContent = now.edit_error ?? "";
+    error.hidden = !now.edit_error;
+    const pause = byId("pause");
+    pause.setAttribute("aria-pressed", String(now.paused));
+    byId("channel").value = now.channel;
+    byId("tone-map").value = now.tone_map ?? "none";
+    byId("scale").value = String(now.scale);
+    const active = document.activeElement;
+    const value = (id, text) => {
+      const input = byId(id);
+      if (active !== input) input.value = text;
+    };
+    value("exposure", String(now.exposure ?? 0));
+    byId("exposure-value").textContent = (now.exposure ?? 0).toFixed(1);
+    value("spp", String(now.spp ?? 64));
+    byId("false-colour").checked = now.false_colour;
+    byId("denoise").checked = now.denoise ?? false;
+    editor.take(now.settings);
+    byId("save-overlay").disabled = now.settings.length === 0;
+    byId("drop-edits").disabled = now.settings.length === 0;
+    if (!scene) return;
+    options(byId("camera"), scene.cameras.map(({ name }, i) => [String(i), name]), String(now.camera));
+    const isOld = now.moved && now.sequence === mine;
+    if (!isOld && !isMoving) camera.take(now, scene);
+    const fov = byId("fov");
+    fov.disabled = camera.fov === null;
+    value("fov", camera.fov === null ? "" : short(camera.fov));
+    const end = Math.max(0, ...scene.animations.map((animation) => animation.end ?? 0));
+    for (const part of document.querySelectorAll(".animated")) part.hidden = end === 0;
+    byId("animation-time").max = String(end);
+    value("animation-time", String(now.time ?? 0));
+    byId("time-value").textContent = `${(now.time ?? 0).toFixed(2)} s`;
+    for (const part of document.querySelectorAll(".varied")) part.hidden = scene.variants.length === 0;
+    const variants = [["", "as in the file"], ...scene.variants.map((name) => [name, name])];
+    options(byId("variant"), variants, now.variant ?? "");
+  }
+  function askPixel() {
+    const now = performance.now();
+    if (!hovered || now - asked < 40) return;
+    asked = now;
+    const [x, y] = hovered;
+    connection.send({ type: "values", x: Math.floor(x), y: Math.floor(y), width: 1, height: 1, request: ++request });
+  }
+  var numbersWait = 0;
+  function askNumbers() {
+    const rectangle = sheet.readable();
+    if (!rectangle) return;
+    clearTimeout(numbersWait);
+    const [x, y, width, height] = rectangle;
+    numbersWait = setTimeout(() => connection.send({ type: "values", x, y, width, height, request: ++request }), 60);
+  }
+  sheet.changed = askNumbers;
+  function key(pressed) {
+    const channels = ["beauty", "albedo", "normal", "depth", "uv", "variance", "ids"];
+    const channel = channels[Number(pressed) - 1];
+    if (channel) set({ channel });
+    else if (pressed === "r") reset(state?.camera ?? 0);
+    else if (pressed === "p") set({ paused: !state?.paused });
+    else if (pressed === "0") sheet.zoomOut();
+    else if (pressed === "+" || pressed === "=") sheet.zoomBy(1.5);
+    else if (pressed === "-") sheet.zoomBy(1 / 1.5);
+    else if (pressed === "[") set({ exposure: (state?.exposure ?? 0) - 0.5 });
+    else if (pressed === "]") set({ exposure: (state?.exposure ?? 0) + 0.5 });
+    else if (pressed === "?") byId("help").showModal();
+    else return false;
+    return true;
+  }
+  attach(sheet.picture, sheet, camera, {
+    moved,
+    key,
+    pick(x, y, turns) {
+      request += 1;
+      if (turns) turnAround = request;
+      connection.send({ type: "pick", x, y, request });
+    },
+    hover(at) {
+      hovered = at;
+      if (at) askPixel();
+      else byId("pixel").textContent = "";
+    }
+  });
+  var editor = new Editor(byId("parameters"), byId("filter"), (path, value) => connection.send({ type: "edit", path, value }));
+  function on(id, event, act) {
+    const input = byId(id);
+    input.addEventListener(event, () => act(input));
+  }
+  on("pause", "click", () => set({ paused: !state?.paused }));
+  on("reset", "click", () => reset(state?.camera ?? 0));
+  on("help-open", "click", () => byId("help").showModal());
+  on("help-close", "click", () => byId("help").close());
+  on("channel", "change", ({ value }) => set({ channel: value }));
+  on("exposure", "input", ({ value }) => set({ exposure: Number(value) }));
+  on("tone-map", "change", ({ value }) => set({ tone_map: value }));
+  on("false-colour", "change", ({ checked }) => set({ false_colour: checked }));
+  on("denoise", "change", ({ checked }) => set({ denoise: checked }));
+  on("scale", "change", ({ value }) => set({ scale: Number(value) }));
+  on("spp", "change", (input) => input.checkValidity() && set({ spp: Number(input.value) }));
+  on("camera", "change", ({ value }) => reset(Number(value)));
+  on("fov", "change", (input) => {
+    if (!input.checkValidity()) return;
+    camera.fov = Number(input.value);
+    moved();
+  });
+  var moment = (wishes) => connection.send({ type: "moment", time: state?.time ?? null, variant: state?.variant ?? null, ...wishes });
+  on("animation-time", "input", ({ value }) => moment({ time: Number(value) }));
+  on("variant", "change", ({ value }) => moment({ variant: value || null }));
+  on("save-overlay", "click", () => save(`${state?.name ?? "scene"}.overlay.txt`, editor.overlay()));
+  on("drop-edits", "click", () => editor.dropAll());
+  function copy(text) {
+    const shown = byId("copied");
+    [shown.hidden, shown.value] = [false, text];
+    shown.select();
+    navigator.clipboard?.writeText(text).catch(() => {
+    });
+  }
+  on("copy-pbrt", "click", () => copy(camera.toPbrt()));
+  on("copy-gltf", "click", () => copy(camera.toGltf(sheet.width / sheet.height)));
+  function compare(is) {
+    byId("split").disabled = !is;
+    byId("forget").disabled = !is;
+    sheet.reference.hidden = !is;
+    if (is) sheet.split(Number(byId("split").value));
+  }
+  on("keep", "click", () => {
+    sheet.keep();
+    compare(true);
+  });
+  on("forget", "click", () => compare(false));
+  on("split", "input", ({ value }) => sheet.split(Number(value)));
+  on("reference-file", "change", async ({ files }) => {
+    const file = files?.[0];
+    if (!file) return;
+    try {
+      sheet.keep(await createImageBitmap(file));
+      compare(true);
+    } catch {
+      alertOf("This is no picture that a browser can show.", file.name);
+    }
+  });
+  if (data) hideWhatNeedsAViewer();
+  async function drop(file) {
+    if (!file) return;
+    try {
+      const headers = { "Content-Type": "application/octet-stream" };
+      const answer = await fetch("/scene", { method: "POST", headers, body: file });
+      if (!answer.ok) alertOf("The file was not opened.", await answer.text());
+    } catch {
+      alertOf("The file was not opened.", "The viewer does not answer.");
+    }
+  }
+  on("open", "change", ({ files }) => void drop(files?.[0]));
+  stage.addEventListener("dragover", (event) => {
+    event.preventDefault();
+    stage.classList.add("over");
+  });
+  stage.addEventListener("dragleave", () => stage.classList.remove("over"));
+  stage.addEventListener("drop", (event) => {
+    event.preventDefault();
+    if (data) return;
+    stage.classList.remove("over");
+    void drop(event.dataTransfer?.files[0]);
+  });
+})();

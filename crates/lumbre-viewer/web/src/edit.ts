@@ -1,0 +1,104 @@
+// Parameters of materials and lights.
+import { element, short } from "./elements";
+import type { Parameter } from "./protocol";
+
+/** Parameters that are shown at a time. */
+const MOST = 60;
+
+const toSrgb = (c: number) => (c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055);
+const hex = (value: number[]) =>
+  "#" + value.map((c) => Math.round(255 * Math.max(0, Math.min(1, toSrgb(c)))).toString(16).padStart(2, "0")).join("");
+
+export class Editor {
+  private parameters: Parameter[] = [];
+  private settings = new Map<string, string>();
+
+  constructor(
+    private readonly panel: HTMLElement, private readonly filter: HTMLInputElement,
+    private readonly edit: (path: string, value: string | null) => void,
+  ) {
+    filter.addEventListener("input", () => this.draw());
+  }
+
+  list(parameters: Parameter[]): void {
+    // An edit has the scene built anew, with the same parameters: what is under the hand stays.
+    if (JSON.stringify(parameters) === JSON.stringify(this.parameters)) return;
+    this.parameters = parameters;
+    this.draw();
+  }
+
+  take(settings: [string, string][]): void {
+    this.settings = new Map(settings);
+    for (const row of this.panel.querySelectorAll<HTMLElement>(".parameter")) {
+      row.classList.toggle("changed", this.settings.has(row.dataset["path"] ?? ""));
+    }
+  }
+
+  private draw(): void {
+    const wanted = this.filter.value.toLowerCase();
+    const found = this.parameters.filter((p) => `${p.owner} ${p.name}`.toLowerCase().includes(wanted));
+    const groups = new Map<string, HTMLElement>();
+    for (const parameter of found.slice(0, MOST)) {
+      let group = groups.get(parameter.owner);
+      if (!group) {
+        group = element("fieldset");
+        group.append(element("legend", parameter.owner));
+        groups.set(parameter.owner, group);
+      }
+      group.append(this.row(parameter));
+    }
+    const rest = found.length - MOST;
+    const more = rest > 0 ? [element("p", `${rest} more: find them by name.`, { className: "quiet" })] : [];
+    const none = found.length === 0 ? [element("p", "No parameter has this name.", { className: "quiet" })] : [];
+    this.panel.replaceChildren(...groups.values(), ...more, ...none);
+  }
+
+  private row(parameter: Parameter): HTMLElement {
+    const id = `parameter-${parameter.path}`;
+    const row = element("div", "", { className: "parameter" });
+    row.dataset["path"] = parameter.path;
+    row.classList.toggle("changed", this.settings.has(parameter.path));
+    const input = element("input", "", { id });
+    const label = element("label", parameter.name, { htmlFor: id });
+    const start = () => {
+      const set = this.settings.get(parameter.path);
+      if (parameter.kind === "colour") {
+        input.type = "color";
+        input.value = set?.startsWith("#") ? set : hex(parameter.value ?? [0.5, 0.5, 0.5]);
+      } else if (parameter.kind === "number" || parameter.kind === "factor") {
+        input.type = "number";
+        input.step = "any";
+        if (parameter.low !== null) input.min = String(parameter.low);
+        if (parameter.high !== null) input.max = String(parameter.high);
+        input.value = set ?? (parameter.value ? short(parameter.value[0] ?? 0) : "");
+      } else {
+        input.type = "text";
+        input.value = set ?? (parameter.value ?? []).map(short).join(",");
+      }
+      if (!parameter.value && !set) input.placeholder = "texture";
+    };
+    start();
+    const event = parameter.kind === "colour" ? "input" : "change";
+    input.addEventListener(event, () => input.value !== "" && this.edit(parameter.path, input.value));
+    const back = element("button", "↺", { title: `Undo ${parameter.name}` });
+    back.setAttribute("aria-label", `Undo ${parameter.name} of ${parameter.owner}`);
+    back.addEventListener("click", () => {
+      this.settings.delete(parameter.path);
+      this.edit(parameter.path, null);
+      start();
+    });
+    row.append(label, input, back);
+    return row;
+  }
+
+  /** As an overlay file. */
+  overlay(): string {
+    return [...this.settings].map(([path, value]) => `${path} = ${value}\n`).join("");
+  }
+
+  dropAll(): void {
+    for (const path of this.settings.keys()) this.edit(path, null);
+    this.settings.clear();
+    this.draw();
+  }
+}

@@ -1,0 +1,48 @@
+// Elements of the page. Names of scenes are set as text, never as markup.
+
+export function byId<T extends HTMLElement>(id: string): T {
+  const found = document.getElementById(id);
+  if (!found) throw new Error(`the page has no ${id}`);
+  return found as T;
+}
+
+export function element<K extends keyof HTMLElementTagNameMap>(
+  name: K, text = "", properties: Partial<HTMLElementTagNameMap[K]> = {},
+): HTMLElementTagNameMap[K] {
+  const made = Object.assign(document.createElement(name), properties);
+  if (text) made.textContent = text;
+  return made;
+}
+
+/** A number with so many digits that one can tell it apart. */
+export function short(value: number): string {
+  return Number.isFinite(value) ? String(+value.toPrecision(6)) : String(value);
+}
+
+/** A large number, with its prefix. */
+export function large(value: number): string {
+  const units: [number, string][] = [[1e9, " G"], [1e6, " M"], [1e3, " k"]];
+  for (const [unit, name] of units) if (value >= unit) return `${(value / unit).toFixed(2)}${name}`;
+  return `${Math.round(value)}`;
+}
+
+/** Seconds as people say them. */
+export function spoken(seconds: number): string {
+  if (seconds < 1) return `${Math.round(seconds * 1000)} ms`;
+  if (seconds < 90) return `${seconds.toFixed(seconds < 10 ? 1 : 0)} s`;
+  return `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
+}
+
+export function options(select: HTMLSelectElement, entries: [string, string][], chosen: string): void {
+  const same = select.options.length === entries.length
+    && entries.every(([value, text], i) => select.options[i]?.value === value && select.options[i]?.textContent === text);
+  if (!same) select.replaceChildren(...entries.map(([value, text]) => element("option", text, { value })));
+  select.value = chosen;
+}
+
+/** Hands a text to the user as a file. */
+export function save(name: string, text: string): void {
+  const url = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
+  element("a", "", { href: url, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(url), 10_000);
+}

@@ -1,0 +1,59 @@
+// What is in the scene, and what a ray meets.
+import { element, large, short, spoken } from "./elements";
+import type { Hit, Scene } from "./protocol";
+
+const point = (v: readonly number[]) => v.map(short).join(", ");
+
+export function showFacts(list: HTMLElement, warnings: HTMLElement, scene: Scene): void {
+  const counted = (kinds: Record<string, number>) =>
+    Object.entries(kinds).map(([name, count]) => `${count} ${name}`).join(", ") || "none";
+  const rows: [string, string][] = [
+    ["Shapes", counted(scene.shapes)],
+    ["Triangles", large(scene.triangles)],
+    ["Instances", large(scene.instances)],
+    ["Materials", counted(scene.materials)],
+    ["Lights", counted(scene.lights)],
+    ["Bounds", scene.bounds ? `${point(scene.bounds[0])} to ${point(scene.bounds[1])}` : "none"],
+    ["Memory", `${large(scene.memory)}B`],
+    ["Built in", spoken(scene.build_seconds)],
+  ];
+  list.replaceChildren(...rows.flatMap(([name, text]) => [element("dt", name), element("dd", text)]));
+  warnings.replaceChildren();
+  if (scene.warnings.length > 0) {
+    warnings.append(element("p", `${scene.warnings.length} warnings`, { className: "quiet" }));
+    warnings.append(element("pre", scene.warnings.join("\n"), { tabIndex: 0 }));
+  }
+}
+
+export function showHits(panel: HTMLElement, hits: Hit[]): void {
+  const first = hits[0];
+  if (!first) {
+    panel.replaceChildren(element("p", "Nothing is there.", { className: "quiet" }));
+    return;
+  }
+  const rows: [string, string][] = [
+    ["Shape", `${first.shape} (${first.kind})`],
+    ["Material", first.material ?? "none"],
+    ["Position", point(first.point)],
+    ["Normal", point(first.normal)],
+    ["Distance", short(first.distance)],
+    ["uv", point(first.uv)],
+    ["Triangle", String(first.primitive)],
+    ["Instance", first.instance === null ? "none" : String(first.instance)],
+    ["Side", first.front ? "outside" : "inside"],
+  ];
+  const table = element("table");
+  for (const [name, text] of rows) {
+    const row = element("tr");
+    row.append(element("th", name, { scope: "row" }), element("td", text));
+    table.append(row);
+  }
+  const all = element("details");
+  all.append(element("summary", `All ${hits.length} hits of this ray`));
+  const list = element("ol");
+  for (const hit of hits) {
+    list.append(element("li", `${short(hit.distance)}: shape ${hit.shape} (${hit.kind}), ${hit.material ?? "no material"}, ${hit.front ? "in" : "out"}`));
+  }
+  all.append(list);
+  panel.replaceChildren(table, all);
+}

@@ -1,0 +1,70 @@
+// What the viewer and the page say to each other.
+import type { Vector } from "./vectors";
+
+export interface Placement { eye: Vector; target: Vector; up: Vector }
+
+export interface Parameter {
+  path: string; owner: string; name: string; kind: "number" | "colour" | "light" | "point" | "factor";
+  value: number[] | null; low: number | null; high: number | null;
+}
+
+export interface Scene {
+  cameras: { name: string; kind: string; mirrored: boolean; fov: number | null }[];
+  up: Vector;
+  bounds: [Vector, Vector] | null;
+  shapes: Record<string, number>;
+  materials: Record<string, number>;
+  lights: Record<string, number>;
+  triangles: number; instances: number; memory: number; build_seconds: number;
+  animations: { name: string | null; end: number | null }[];
+  variants: string[];
+  parameters: Parameter[];
+  warnings: string[];
+}
+
+export interface State {
+  name: string; has_scene: boolean; error: string | null; edit_error: string | null;
+  camera: number; sequence: number; moved: boolean; placement: Placement | null; fov: number | null; zoom: number;
+  size: [number, number] | null;
+  channel: string; scale: number; spp: number | null; denoise: boolean | null; paused: boolean;
+  exposure: number | null; tone_map: string | null; false_colour: boolean;
+  time: number | null; variant: string | null; settings: [string, string][];
+}
+
+export interface Progress {
+  doing: "reading" | "building" | "rendering" | "done" | "waiting" | "nothing";
+  spp?: number; target?: number; noise?: number | null; rays_per_second?: number; seconds?: number; left?: number; dropped?: number;
+}
+
+export interface Hit {
+  distance: number; point: Vector; normal: Vector; uv: [number, number]; front: boolean;
+  shape: number; kind: string; material: string | null; primitive: number; instance: number | null;
+}
+
+export type Value = number | string;
+
+export type Told =
+  | ({ type: "state" } & State)
+  | { type: "scene"; scene: Scene }
+  | ({ type: "progress" } & Progress)
+  | { type: "picked"; request: number; x: number; y: number; ray: { origin?: Vector; direction?: Vector; hits: Hit[] } }
+  | { type: "values"; request: number; x: number; y: number; width: number; height: number; values: [Value, Value, Value][] }
+  | { type: "wrong"; what: string };
+
+/** A picture with its size, that of the whole one, and what it shows. */
+export interface Frame {
+  width: number; height: number; fullWidth: number; fullHeight: number;
+  spp: number; sequence: number; isFull: boolean; isDone: boolean; pixels: ImageData;
+}
+
+const HEADER = 32;
+const MAGIC = 0x314d554c;
+
+/** The frame of a packet. */
+export function decoded(packet: ArrayBuffer): Frame {
+  const numbers = new Uint32Array(packet, 0, HEADER / 4);
+  const [magic = 0, width = 0, height = 0, fullWidth = 0, fullHeight = 0, spp = 0, sequence = 0, flags = 0] = numbers;
+  if (magic !== MAGIC || packet.byteLength !== HEADER + 4 * width * height) throw new Error("no frame");
+  const pixels = new ImageData(new Uint8ClampedArray(packet, HEADER), width, height);
+  return { width, height, fullWidth, fullHeight, spp, sequence, isFull: (flags & 1) !== 0, isDone: (flags & 2) !== 0, pixels };
+}
