@@ -1,5 +1,6 @@
 //! Progress display.
 
+use std::fmt;
 use std::io::IsTerminal;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
@@ -10,7 +11,7 @@ use lumbre::image::Image;
 use lumbre::{Progress, Snapshot, State};
 
 use crate::signals::{Phase, Signals};
-use crate::units::spoken;
+use crate::units::{counted, spoken};
 
 /// How to show progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -41,6 +42,51 @@ pub(crate) struct Watched<'a> {
     pub signals: &'a Signals,
     /// Who else wants to see the picture.
     pub viewers: Vec<Box<dyn PictureViewer>>,
+    /// Which of several pictures it is.
+    pub series: Option<Series>,
+    /// The last whole pass over the picture.
+    pub pass: Mutex<Pass>,
+}
+
+/// What is known after a pass over the picture.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Pass {
+    /// Samples of each pixel.
+    spp: u32,
+    noise: Option<f64>,
+}
+
+/// The place of a picture among several that are rendered one after another.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Series {
+    /// The number of the frame.
+    pub number: u32,
+    /// How many are done.
+    pub done: u32,
+    /// How many there are.
+    pub count: u32,
+    /// When the first began.
+    pub start: Instant,
+}
+
+impl fmt::Display for Series {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let left = time_left(self.left(self.share(0.0)));
+        write!(f, "frame {} ({} of {}{left})", self.number, self.done + 1, self.count)
+    }
+}
+
+impl Series {
+    /// The share of all that is done, when this is done of the picture.
+    fn share(&self, of_picture: f64) -> f64 {
+        (f64::from(self.done) + of_picture) / f64::from(self.count)
+    }
+
+    /// The time until all are done, if they take as long in the mean.
+    fn left(&self, share: f64) -> Option<Duration> {
+        let elapsed = self.start.elapsed().as_secs_f64();
+        Duration::try_from_secs_f64(elapsed / share - elapsed).ok().filter(|_| share > 0.0)
+    }
 }
 
 impl Watched<'_> {
@@ -53,10 +99,14 @@ impl Watched<'_> {
 
 impl Progress for Watched<'_> {
     fn state(&self, state: &State) {
-        self.display.state(state);
+        let pass = self.pass.lock().map(|pass| *pass).unwrap_or_default();
+        self.display.state(state, &pass, self.series.as_ref());
     }
 
     fn pass(&self, snapshot: &Snapshot<'_>) {
+        if let Ok(mut pass) = self.pass.lock() {
+            *pass = Pass { spp: snapshot.spp, noise: snapshot.noise };
+        }
         self.viewers.iter().for_each(|viewer| viewer.show(&|| snapshot.image(), false));
     }
 
@@ -143,10 +193,30 @@ impl Display {
         }
     }
 
-    fn state(&self, state: &State) {
-        let words = format!("{}{}", spoken(state.elapsed), time_left(state.left));
+    fn state(&self, state: &State, pass: &Pass, series: Option<&Series>) {
+        let all = series.map(|series| (series, series.share(state.share)));
+        let seconds = state.elapsed.as_secs_f64();
+        let rays_per_second = if seconds > 0.0 { state.rays as f64 / seconds } else { 0.0 };
+        let mut words = all.map_or_else(String::new, |(series, share)| {
+            let Series { number, done, count, .. } = series;
+            format!("frame {number}, {} of {count}{}; ", done + 1, time_left(series.left(share)))
+        });
+        if pass.spp > 0 {
+            words += &format!("{} a pixel, ", counted(u64::from(pass.spp), "sample"));
+        }
+        if let Some(noise) = pass.noise {
+            words += &format!("noise {noise:.3}, ");
+        }
+        words += &format!("{:.1} M rays/s, ", rays_per_second / 1e6);
+        words += &format!("{}{}", spoken(state.elapsed), time_left(state.left));
         self.show(Some(state.share), words, || {
             serde_json::json!({
+                "frame": all.map(|(series, _)| series.number),
+                "share_of_all": all.map(|(_, share)| share),
+                "seconds_left_of_all": all.and_then(|(series, share)| series.left(share)).map(|left| left.as_secs_f64()),
+                "samples_per_pixel": pass.spp,
+                "noise": pass.noise,
+                "rays_per_second": rays_per_second,
                 "samples": state.samples,
                 "total": state.total,
                 "share": state.share,
@@ -204,6 +274,18 @@ fn ray_words(rays: u64, share: Option<f64>, elapsed: Duration) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn frames_are_told_with_their_place_in_the_whole() {
+        let start = Instant::now() - Duration::from_secs(30);
+        let series = Series { number: 12, done: 2, count: 5, start };
+        // Half of the third of five pictures: half of all.
+        assert_eq!(series.share(0.5), 0.5);
+        assert!((series.left(0.5).unwrap().as_secs_f64() - 30.0).abs() < 1.0);
+        assert_eq!(series.to_string(), "frame 12 (3 of 5, 45 s left)");
+        let first = Series { done: 0, ..series };
+        assert_eq!(first.to_string(), "frame 12 (1 of 5)");
+    }
 
     #[test]
     fn the_time_left_is_said_where_the_share_is_known() {

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -26,7 +27,7 @@ use crate::failure::{Failure, print_bytes};
 use crate::names::one_of;
 use crate::output::{self, Inputs, Pictures, Replaced, is_standard_stream};
 use crate::preview::{Preview, Protocol};
-use crate::progress::{Display, PictureViewer, Style, Watched};
+use crate::progress::{Display, PictureViewer, Series, Style, Watched};
 use crate::reading::{Frames, ReadingArguments, print_warnings};
 use crate::signals::{Deadline, Phase, Signals};
 use crate::staging::{self, Behind, StagingArguments};
@@ -235,6 +236,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     signals.enter(READING);
     let mut stage = arguments.staging.stage(arguments.size, arguments.reading.limits())?;
     arguments.view.set(&mut stage)?;
+    let began = start;
     // The first picture's name and exposure are used for all.
     let mut from_first = First { pattern: None, exposure: arguments.exposure };
     if let Some(Frames(frames)) = &arguments.frames {
@@ -245,9 +247,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             signals.end_at(arguments.deadline(start));
             signals.enter(READING);
             let (desc, mut diagnostics) = arguments.reading.describe_frame(&arguments.scene, number)?;
-            let frame = Frame { number, is_first: number == first };
+            let series = Series { number, done: number - first, count: last - first + 1, start: began };
+            let frame = Frame { number, is_first: number == first, series };
             if !arguments.quiet {
-                say!("frame {number} ({} of {})", number - first + 1, last - first + 1);
+                say!("{series}");
             }
             let frame = Some((frame, &mut held));
             let context =
@@ -271,7 +274,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                     // The first one's time is also that of reading.
                     let start = if turn == 0 { start } else { Instant::now() };
                     signals.end_at(arguments.deadline(start));
-                    let frame = Frame { number: turn + 1, is_first: turn == 0 };
+                    let series = Series { number: turn + 1, done: turn, count: frames, start: began };
+                    let frame = Frame { number: turn + 1, is_first: turn == 0, series };
                     // Each rotation has its own camera.
                     let frame = Some((frame, &mut Held::default()));
                     let desc = desc.clone();
@@ -464,6 +468,7 @@ impl Held {
 struct Frame {
     number: u32,
     is_first: bool,
+    series: Series,
 }
 
 /// What all pictures of a run have from the first.
@@ -497,6 +502,7 @@ fn picture(
     signals.enter(Phase::Preparing("building the scene"));
     let is_first = frame.as_ref().is_none_or(|(frame, _)| frame.is_first);
     let number = frame.as_ref().map(|(frame, _)| frame.number);
+    let series = frame.as_ref().map(|(frame, _)| frame.series);
     let kind = arguments.integrator.unwrap_or(desc.integrator.kind);
     if denoiser.is_some() && kind.is_feature() {
         let why = "--denoise is for pictures of light: normals, depth, albedo and uv have no such noise";
@@ -603,7 +609,7 @@ fn picture(
     let is_silent = arguments.quiet || arguments.preview.is_some();
     let style = if is_silent { Style::None } else { arguments.progress };
     let viewers = arguments.viewers(&output, tone_map, exposure)?;
-    let progress = Watched { display: Display::new(style), signals, viewers };
+    let progress = Watched { display: Display::new(style), signals, viewers, series, pass: Mutex::default() };
     let render_start = Instant::now();
     if let Some(deadline) = arguments.deadline(start) {
         // What reading and building left of it.

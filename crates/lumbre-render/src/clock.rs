@@ -15,6 +15,8 @@ pub(crate) struct Clock<'a> {
     pixels: u64,
     stop: Stop,
     done: AtomicU64,
+    /// Rays of this run.
+    rays: AtomicU64,
     /// Samples that an earlier run took.
     before: u64,
     /// Samples a pixel at which the noise is expected to be low enough, as the bits of an f64; infinite before it is known.
@@ -38,6 +40,7 @@ impl<'a> Clock<'a> {
             pixels,
             stop,
             done: AtomicU64::new(before),
+            rays: AtomicU64::new(0),
             before,
             quiet_at: never,
             last: Mutex::new(start),
@@ -50,8 +53,9 @@ impl<'a> Clock<'a> {
         self.quiet_at.store(spp.to_bits(), Ordering::Relaxed);
     }
 
-    /// Counts samples.
-    pub(crate) fn add(&self, samples: u64) {
+    /// Counts samples, and the rays that they took.
+    pub(crate) fn add(&self, samples: u64, rays: u64) {
+        self.rays.fetch_add(rays, Ordering::Relaxed);
         let done = self.done.fetch_add(samples, Ordering::Relaxed) + samples;
         // Whoever finds someone else telling goes on with its work.
         let Ok(mut last) = self.last.try_lock() else { return };
@@ -82,6 +86,7 @@ impl<'a> Clock<'a> {
         };
         State {
             samples: done,
+            rays: self.rays.load(Ordering::Relaxed),
             total,
             share,
             elapsed,

@@ -240,12 +240,14 @@ fn mean_luminance(
 ) -> Result<f64, RenderError> {
     const LONGER_SIDE: f64 = 64.0;
     const SPP: u32 = 8;
+    let longer_side = LONGER_SIDE.min(f64::from(options.width.max(options.height)));
     let small = RenderOptions {
-        stop: Stop::at(SPP),
+        // A time that is over here leaves none for the picture.
+        stop: Stop { spp: SPP, noise: None, ..options.stop },
         first_sample: 0,
         features: false,
         guides: false,
-        ..options.smaller(LONGER_SIDE)
+        ..options.smaller(longer_side)
     };
     let image = render_with(scene, &small, integrator, &NoProgress, cancel)?.image;
     let sum: f64 = image.pixels().iter().map(|pixel| f64::from(pixel.luminance())).sum();
@@ -430,6 +432,7 @@ impl Job<'_> {
     /// Takes a sample of each of those pixels of a tile that have none of this number yet; whether it has done so before it had to stop.
     fn take(&self, owner: &mut Owner, number: u32, is_wanted: impl Fn(u32, u32) -> bool) -> bool {
         let mut count = 0;
+        let rays = owner.rays.total();
         for (x, y) in owner.tile.bounds().pixels() {
             let pixel = owner.tile.pixel(x, y);
             let has_enough = || self.adaptive.is_some_and(|adaptive| adaptive.is_done(pixel));
@@ -440,13 +443,13 @@ impl Job<'_> {
             // However short the time between two pauses, some work is done.
             if self.cancel.is_cancelled() || (looks && (self.must_stop() || (count > 0 && self.is_paused())))
             {
-                self.clock.add(count);
+                self.clock.add(count, owner.rays.total() - rays);
                 return false;
             }
             self.sample(owner, x, y, self.options.first_sample.saturating_add(number));
             count += 1;
         }
-        self.clock.add(count);
+        self.clock.add(count, owner.rays.total() - rays);
         true
     }
 

@@ -35,6 +35,8 @@ impl Progress for NoProgress {}
 pub struct State {
     /// Samples taken, over all pixels.
     pub samples: u64,
+    /// Rays traced by this run.
+    pub rays: u64,
     /// Samples over all pixels at the end: exact where their number ends the render, else estimated from the time or the noise that
     /// does; `None` as long as nothing is known.
     pub total: Option<u64>,

@@ -50,6 +50,13 @@ pub struct RayCounts {
     pub shadow: u64,
 }
 
+impl RayCounts {
+    /// All of them.
+    pub fn total(&self) -> u64 {
+        self.camera + self.bounce + self.shadow
+    }
+}
+
 impl AddAssign for RayCounts {
     fn add_assign(&mut self, other: Self) {
         self.camera += other.camera;
