@@ -1,5 +1,6 @@
 //! `lumbre merge`: joins parts of a render.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -13,6 +14,7 @@ use crate::failure::Failure;
 use crate::memory::Memory;
 use crate::output::{Inputs, Replaced};
 use crate::signals::Signals;
+use crate::staging::frame_name;
 use crate::units::{self, counted};
 
 /// Joins parts of a render (of --samples, with or without --crop) to the picture of one run, byte for byte, in any order.
@@ -22,13 +24,14 @@ use crate::units::{self, counted};
   lumbre render scene.pbrt --samples 32..64 -o b.part    on another
   lumbre merge a.part b.part -o picture.exr              what lumbre render scene.pbrt --spp 64 -o picture.exr makes
   lumbre merge *.part -o more.part --allow-gaps          a part of parts, to be merged again
+  lumbre merge *.part -o frame.####.png                  parts of several frames: a picture of each frame
 
 Exit status 3 when parts overlap, are of different renders, are unfinished, or leave gaps.")]
 pub(crate) struct Arguments {
     /// The parts: .part files, and .exr files of --samples or --keep-sums.
     #[arg(required = true, value_name = "PART")]
     parts: Vec<PathBuf>,
-    /// The picture (.exr, .png, .hdr, .pfm or .jpg), or a .part.
+    /// The picture (.exr, .png, .hdr, .pfm or .jpg), or a .part. With # for its number, one for each frame that there are parts of.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Join what there is even if samples are missing, and say which.
@@ -61,17 +64,50 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.keep_sums && format != Some(ImageFormat::Exr) {
         return Err(Failure::Usage(format!("{}: --keep-sums needs an .exr file", output.display())));
     }
+    let _signals = Signals::listen(&CancelToken::new())?;
+    let has_number = output.file_name().is_some_and(|name| name.to_string_lossy().contains('#'));
+    if !has_number {
+        return merge(arguments, &arguments.parts, output, 0);
+    }
+    let mut frames: BTreeMap<u32, Vec<PathBuf>> = BTreeMap::new();
+    // All frames have as many samples as any.
+    let mut spp = 0;
+    for path in &arguments.parts {
+        let part = open(path, arguments)?;
+        spp = spp.max(part.state.samples().end);
+        let frame = frame_of(&part).ok_or_else(|| {
+            let why = "it is not of a frame (expected a name without #, or parts that --frames made)";
+            Failure::Input(format!("{}: {why}", path.display()))
+        })?;
+        frames.entry(frame).or_default().push(path.clone());
+    }
+    frames.iter().try_for_each(|(&frame, parts)| merge(arguments, parts, &frame_name(output, frame), spp))
+}
+
+/// The number of the frame that a part is of, if it is of one of several.
+fn frame_of(part: &Part) -> Option<u32> {
+    part.job.identity.get("picture")?.strip_prefix("Some(")?.strip_suffix(')')?.parse().ok()
+}
+
+/// Joins parts of one picture, of at least so many samples.
+fn merge(arguments: &Arguments, parts: &[PathBuf], output: &Path, spp: u32) -> Result<(), Failure> {
     Inputs::of(arguments.parts.iter().map(PathBuf::as_path)).refuse(output)?;
     probe_writable(output).map_err(|e| Failure::from(lumbre::Error::from(e)))?;
-    let _signals = Signals::listen(&CancelToken::new())?;
-    let whole = joined(arguments)?;
+    let whole = joined(arguments, parts)?;
     let bounds = whole.state.bounds();
-    let gaps = whole.state.gaps(bounds);
+    let mut gaps = whole.state.gaps(bounds);
+    let last = whole.state.samples().end;
+    if last < spp {
+        gaps.push(Piece { bounds, samples: last..spp });
+    }
     if !gaps.is_empty() {
         let missing: u64 = gaps.iter().map(Piece::count).sum();
         let named: Vec<String> = gaps.iter().take(MOST_NAMED).map(Piece::to_string).collect();
         let more = if gaps.len() > MOST_NAMED { " and more" } else { "" };
         let what = format!("{} missing: {}{more}", counted(missing, "sample"), named.join(", "));
+        // Which of several pictures.
+        let what =
+            if parts.len() < arguments.parts.len() { format!("{}: {what}", output.display()) } else { what };
         if !arguments.allow_gaps {
             return Err(Failure::Input(format!("{what} (--allow-gaps joins what there is)")));
         }
@@ -80,39 +116,39 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
     }
     let replaced = Replaced::by(output);
-    save(arguments, &whole)?;
+    save(arguments, &whole, output)?;
     if !arguments.quiet {
         replaced.say();
         let (width, height) = (bounds.width(), bounds.height());
         let spp = counted(u64::from(whole.state.least_samples()), "sample");
-        let parts = counted(arguments.parts.len() as u64, "part");
+        let parts = counted(parts.len() as u64, "part");
         say!("{}: {width}x{height}, {spp} a pixel, of {parts}", output.display());
     }
     Ok(())
 }
 
+/// A finished part.
+fn open(path: &Path, arguments: &Arguments) -> Result<Part, Failure> {
+    let part = Part::open(path, Memory::new(arguments.max_memory).for_reading());
+    let part = part.map_err(|e| Failure::Input(format!("{}: {e}", path.display())))?;
+    if part.state.is_finished() {
+        return Ok(part);
+    }
+    Err(Failure::Input(format!(
+        "{}: it is unfinished, with {} of {} samples (expected the part that lumbre render --resume makes of it)",
+        path.display(),
+        part.state.taken(),
+        part.state.wanted()
+    )))
+}
+
 /// All parts as one.
-fn joined(arguments: &Arguments) -> Result<Part, Failure> {
-    let most_memory = Memory::new(arguments.max_memory).for_reading();
-    let open = |path: &Path| {
-        let part = Part::open(path, most_memory);
-        let part = part.map_err(|e| Failure::Input(format!("{}: {e}", path.display())))?;
-        if part.state.is_finished() {
-            return Ok(part);
-        }
-        Err(Failure::Input(format!(
-            "{}: it is unfinished, with {} of {} samples (expected the part that lumbre render --resume makes of it)",
-            path.display(),
-            part.state.taken(),
-            part.state.wanted()
-        )))
-    };
-    let (first, others) =
-        arguments.parts.split_first().ok_or_else(|| Failure::Usage("no parts".to_owned()))?;
-    let mut whole = open(first)?;
+fn joined(arguments: &Arguments, parts: &[PathBuf]) -> Result<Part, Failure> {
+    let (first, others) = parts.split_first().ok_or_else(|| Failure::Usage("no parts".to_owned()))?;
+    let mut whole = open(first, arguments)?;
     let mut origins: Vec<(&Path, Vec<Piece>)> = vec![(first, whole.state.pieces().to_vec())];
     for path in others {
-        let part = open(path)?;
+        let part = open(path, arguments)?;
         let differences = whole.job.differences(&part.job);
         if !differences.is_empty() {
             return Err(Failure::Input(format!(
@@ -138,8 +174,7 @@ fn joined(arguments: &Arguments) -> Result<Part, Failure> {
 }
 
 /// Saves the picture as the render itself would have.
-fn save(arguments: &Arguments, whole: &Part) -> Result<(), Failure> {
-    let output = &arguments.output;
+fn save(arguments: &Arguments, whole: &Part, output: &Path) -> Result<(), Failure> {
     if is_bare_part(output) {
         return Ok(whole.save(output)?);
     }

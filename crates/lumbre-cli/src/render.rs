@@ -621,6 +621,11 @@ fn picture(
         diagnostics.files_read().iter().cloned().chain(arguments.inputs().map(Path::to_owned)).collect();
     let mut settings = arguments.settings();
     settings.push(("picture".to_owned(), format!("{number:?}")));
+    // Camera and ground are those of the first.
+    settings.push((
+        "first picture".to_owned(),
+        format!("{:?}", series.map(|series| series.number - series.done)),
+    ));
     let (job_options, shown) = (options.clone(), arguments.shown(&behind, tone_map, exposure, precision));
     // Files that cannot be read again, such as standard input, leave the render without an identity.
     let job = move || {

@@ -98,6 +98,40 @@ fn parts_of_any_size_merged_in_any_order_are_the_file_of_one_run() {
     }
 }
 
+/// A triangle that slides to a side within a second.
+const SLIDING: &str = r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"scene":0,
+"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+"buffers":[{"byteLength":68,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAABAAAAAAAAAAAA="}],
+"bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":8},{"buffer":0,"byteOffset":44,"byteLength":24}],
+"accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":3,"min":[0,0,0],"max":[1,1,0]},
+{"bufferView":1,"componentType":5126,"type":"SCALAR","count":2,"min":[0],"max":[1]},
+{"bufferView":2,"componentType":5126,"type":"VEC3","count":2}],
+"animations":[{"samplers":[{"input":1,"output":2}],"channels":[{"sampler":0,"target":{"node":0,"path":"translation"}}]}]}"#;
+
+#[test]
+fn parts_of_several_frames_are_merged_at_once() {
+    let folder = Folder::new();
+    folder.write("slide.gltf", SLIDING);
+    let render = "render slide.gltf --frames 0..1 --fps 4 --size 20x15 -q";
+    done(&folder, &format!("{render} --spp 3 -o whole.#.exr"));
+    done(&folder, &format!("{render} --samples 0..1 -o a.#.part"));
+    done(&folder, &format!("{render} --samples 1..3 -o b.#.part"));
+    done(&folder, "merge b.1.part a.0.part a.1.part b.0.part -o f.#.exr");
+    for frame in 0..2 {
+        assert_eq!(bytes(&folder, &format!("f.{frame}.exr")), bytes(&folder, &format!("whole.{frame}.exr")));
+    }
+    assert_ne!(bytes(&folder, "f.0.exr"), bytes(&folder, "f.1.exr"));
+    refused(
+        &folder,
+        "merge a.0.part a.1.part b.0.part -o g.#.exr",
+        3,
+        "g.1.exr: 600 samples missing: samples 1..3",
+    );
+    refused(&folder, "merge a.0.part b.1.part -o g.exr", 3, "they differ in");
+    done(&folder, "render slide.gltf --size 20x15 --samples 0..1 -q -o one.part");
+    refused(&folder, "merge one.part -o g.#.exr", 3, "one.part: it is not of a frame");
+}
+
 #[test]
 fn what_is_missing_doubled_foreign_or_damaged_is_refused_by_name() {
     let folder = folder();
