@@ -82,6 +82,10 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         let why = "--turntable makes many pictures (expected lumbre render, or no --turntable)";
         return Err(Failure::Usage(why.to_owned()));
     }
+    if arguments.host.is_unspecified() && arguments.allow_host.is_empty() {
+        let why = "is no address that a browser can open (expected one of this machine's, or --allow-host NAME:PORT too)";
+        return Err(Failure::Usage(format!("--host {} {why}", arguments.host)));
+    }
     let cancel = CancelToken::new();
     let signals = Signals::listen(&cancel)?;
     if let Some(folder) = arguments.export.clone() {
@@ -107,7 +111,10 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
             viewer.address()
         );
     }
-    let url = viewer.url();
+    let url = match options.hosts.first().filter(|_| options.address.ip().is_unspecified()) {
+        Some(name) => viewer.url().replacen(&viewer.address().to_string(), name, 1),
+        None => viewer.url(),
+    };
     print(&format!("{url}\n"))?;
     if opens && !open(&url) {
         say!("open this address in a browser; Ctrl-C ends the viewer");

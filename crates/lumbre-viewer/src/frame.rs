@@ -135,8 +135,8 @@ fn pixels(shot: &Shot, look: &Look, out: &mut [u8]) {
                 Encoded::srgb(Rgb::splat(1.0 - 0.9 * value.r / farthest)).to_u8()
             }
             // The numbers themselves, as they are known from other programs.
-            Channel::Normal | Channel::Uv | Channel::Ids => Encoded::new(value.r, value.g, value.b).to_u8(),
-            Channel::Albedo | Channel::Depth => ToneMap::None.encode(value, 0.0).to_u8(),
+            Channel::Normal | Channel::Uv => Encoded::new(value.r, value.g, value.b).to_u8(),
+            Channel::Albedo | Channel::Depth | Channel::Ids => ToneMap::None.encode(value, 0.0).to_u8(),
         };
         [r, g, b, 255]
     });

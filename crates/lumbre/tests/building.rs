@@ -186,3 +186,21 @@ fn a_picture_that_no_one_wants_is_not_put_together() {
     let rendered = scene.render_with(&scene.options(), &Gone, &lumbre::CancelToken::new());
     assert!(matches!(rendered, Err(Error::Render(lumbre::RenderError::Unwanted))));
 }
+
+#[test]
+fn the_variance_of_a_picture_falls_with_the_number_of_samples() {
+    let ball = ShapeBuilder::exact(Sphere::new(CENTER, 0.75).unwrap());
+    let scene = SceneBuilder::new().shape(ball).light(sky()).film(film(9, 7)).build().unwrap();
+    let variance = |spp: u32| {
+        let mut options = scene.options();
+        options.stop = lumbre::Stop::at(spp);
+        let cancel = lumbre::CancelToken::new();
+        let (_, state) = scene.render_from(&options, &lumbre::NoProgress, &cancel, None, None).unwrap();
+        let variance = state.variance();
+        assert_eq!((variance.width(), variance.height()), (9, 7));
+        variance.mean().r
+    };
+    assert_eq!(variance(1), 0.0);
+    let (few, many) = (variance(8), variance(128));
+    assert!(0.0 < many && many < 0.25 * few, "{few} {many}");
+}

@@ -284,7 +284,7 @@ const tests = {
           for (const details of (await page.$$("aside > details")).slice(3)) await details.evaluate((node) => (node.open = false));
           const folder = join(root, "docs/viewer");
           if (!existsSync(folder)) mkdirSync(folder);
-          await page.screenshot({ path: join(folder, `${form}-${colorScheme}.png`) });
+          await page.screenshot({ path: join(folder, `${form}-${colorScheme}.jpg`), type: "jpeg", quality: 78 });
         }
         await page.focus("#picture");
         await page.keyboard.press("?");
