@@ -154,9 +154,8 @@ def count_wrong(count: int) -> None:
                 wrong[name][0] += first is not None
             else:
                 wrong[name][1] += first is None or prim not in met or met[prim][0] != first
-    print(
-        f"wrong of {count} rays at edges and vertices of {len(faces)} triangles, {touching} of which only touch (lost, and of a triangle that is not the first):"
-    )
+    print(f"wrong of {count} rays at edges and vertices of {len(faces)} triangles, {touching} of which only touch")
+    print("(lost, and of a triangle that is not the first):")
     print(", ".join(f"{name} {lost} and {other}" for name, (lost, other) in wrong.items()))
 
 
