@@ -20,7 +20,7 @@ starts = corners.mean(axis=1) + 1e-4 * normals
 sky = np.random.default_rng(1).normal(size=(128, 3))
 sky /= np.linalg.norm(sky, axis=1, keepdims=True)
 sky[:, 2] = abs(sky[:, 2])
-hours = np.linspace(-5.875, 5.75, 24)[:, None] * np.pi / 12
+hours = np.linspace(-5.75, 5.75, 24)[:, None] * np.pi / 12
 sun = np.hstack([-np.sin(hours), -0.6 * np.cos(hours), 0.8 * np.cos(hours)])
 
 

@@ -550,6 +550,8 @@ def _checked(out: Mapping[str, Array]) -> dict[str, Array]:
     for name, array in out.items():
         if name not in FIELDS:
             raise LumbreError(f'a hit has no field "{name}" (expected some of {", ".join(FIELDS)})')
+        if not isinstance(array, np.ndarray):
+            raise LumbreError(f"out: {name} is no array (found {type(array).__name__})")
         if not array.flags.writeable:
             raise LumbreError(f"out: {name} is read-only")
     return dict(out)
