@@ -5,11 +5,11 @@ import numpy as np
 import lumbre
 
 # A landscape of hills, as a mesh.
-x, y = np.meshgrid(np.linspace(-5, 5, 90), np.linspace(-5, 5, 90))
+x, y = np.meshgrid(np.linspace(-5, 5, 70), np.linspace(-5, 5, 70))
 z = 1.3 * np.exp(-((x - 1) ** 2) - y**2) + 0.9 * np.exp(-((x + 2) ** 2) - (y + 1.5) ** 2) + 0.12 * np.sin(3 * x) * np.cos(2 * y)
 vertices = np.stack([x, y, z], axis=-1).reshape(-1, 3).astype(np.float32)
-a = (np.arange(89)[:, None] * 90 + np.arange(89)).reshape(-1)
-faces = np.concatenate([np.stack([a, a + 1, a + 91], axis=1), np.stack([a, a + 91, a + 90], axis=1)])
+a = (np.arange(69)[:, None] * 70 + np.arange(69)).reshape(-1)
+faces = np.concatenate([np.stack([a, a + 1, a + 71], axis=1), np.stack([a, a + 71, a + 70], axis=1)])
 land = lumbre.Scene(lumbre.Mesh(vertices, faces))
 
 corners = vertices[faces].astype(np.float64)
@@ -17,10 +17,10 @@ normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 normals /= np.linalg.norm(normals, axis=1, keepdims=True)
 starts = corners.mean(axis=1) + 1e-4 * normals
 
-sky = np.random.default_rng(1).normal(size=(256, 3))
+sky = np.random.default_rng(1).normal(size=(128, 3))
 sky /= np.linalg.norm(sky, axis=1, keepdims=True)
 sky[:, 2] = abs(sky[:, 2])
-hours = np.linspace(-5.875, 5.875, 48)[:, None] * np.pi / 12
+hours = np.linspace(-5.75, 5.75, 24)[:, None] * np.pi / 12
 sun = np.hstack([-np.sin(hours), -0.6 * np.cos(hours), 0.8 * np.cos(hours)])
 
 

@@ -13,6 +13,7 @@ use lumbre::{
     ShapeBuilder, State, UpAxis,
 };
 use numpy::{PyArray1, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
 
@@ -393,48 +394,60 @@ impl Scene {
 
     /// The options of a render by their names.
     fn asked(&self, given: &Bound<'_, PyDict>) -> PyResult<Asked> {
-        let mut options = self.scene.options();
-        let (mut denoises, mut keeps_part) = (false, false);
+        let mut asked = Asked { options: self.scene.options(), denoises: false, keeps_part: false };
         for (name, value) in given {
             let name: String = name.extract()?;
-            match &*name {
-                "spp" => options.stop.spp = value.extract()?,
-                "size" => (options.width, options.height) = value.extract()?,
-                "crop" => {
-                    let (x0, y0, x1, y1) = value.extract()?;
-                    options.crop = Some(PixelBounds { x0, y0, x1, y1 });
+            self.ask(&mut asked, &name, &value).map_err(|error| {
+                let is_of_value = error.is_instance_of::<PyTypeError>(given.py())
+                    || error.is_instance_of::<PyOverflowError>(given.py());
+                if is_of_value {
+                    invalid(format!("render: {name} is {value}: {}", error.value(given.py())))
+                } else {
+                    error
                 }
-                "camera" => options.camera = self.camera(&value)?,
-                "integrator" => {
-                    let name: String = value.extract()?;
-                    options.integrator.kind = IntegratorKind::from_name(&name).ok_or_else(|| {
-                        let names =
-                            ["path", "whitted", "ambientocclusion", "normals", "depth", "albedo", "uv"];
-                        unknown("integrator", &name, &names)
-                    })?;
-                }
-                "max_depth" => options.integrator.max_depth = value.extract()?,
-                "seed" => options.sampler.seed = value.extract()?,
-                "threads" => options.threads = value.extract()?,
-                "noise" => options.stop.noise = Some(value.extract()?),
-                "time" => {
-                    let seconds: f64 = value.extract()?;
-                    let time = Duration::try_from_secs_f64(seconds).map_err(|_| {
-                        invalid(format!("time is out of range (found {seconds}; expected seconds)"))
-                    })?;
-                    options.stop.time = Some(time);
-                }
-                "first_sample" => options.first_sample = value.extract()?,
-                "transparent" => options.transparent = value.extract()?,
-                "features" => options.features = value.extract()?,
-                "denoise" => denoises = value.extract()?,
-                "part" => keeps_part = value.extract()?,
-                _ => return Err(invalid(format!("render has no option {name}"))),
-            }
+            })?;
         }
-        options.guides = denoises;
-        options.features |= denoises;
-        Ok(Asked { options, denoises, keeps_part })
+        asked.options.guides = asked.denoises;
+        asked.options.features |= asked.denoises;
+        Ok(asked)
+    }
+
+    fn ask(&self, asked: &mut Asked, name: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
+        let options = &mut asked.options;
+        match name {
+            "spp" => options.stop.spp = value.extract()?,
+            "size" => (options.width, options.height) = value.extract()?,
+            "crop" => {
+                let (x0, y0, x1, y1) = value.extract()?;
+                options.crop = Some(PixelBounds { x0, y0, x1, y1 });
+            }
+            "camera" => options.camera = self.camera(value)?,
+            "integrator" => {
+                let name: String = value.extract()?;
+                options.integrator.kind = IntegratorKind::from_name(&name).ok_or_else(|| {
+                    let names = ["path", "whitted", "ambientocclusion", "normals", "depth", "albedo", "uv"];
+                    unknown("integrator", &name, &names)
+                })?;
+            }
+            "max_depth" => options.integrator.max_depth = value.extract()?,
+            "seed" => options.sampler.seed = value.extract()?,
+            "threads" => options.threads = value.extract()?,
+            "noise" => options.stop.noise = Some(value.extract()?),
+            "time" => {
+                let seconds: f64 = value.extract()?;
+                let time = Duration::try_from_secs_f64(seconds).map_err(|_| {
+                    invalid(format!("time is out of range (found {seconds}; expected seconds)"))
+                })?;
+                options.stop.time = Some(time);
+            }
+            "first_sample" => options.first_sample = value.extract()?,
+            "transparent" => options.transparent = value.extract()?,
+            "features" => options.features = value.extract()?,
+            "denoise" => asked.denoises = value.extract()?,
+            "part" => asked.keeps_part = value.extract()?,
+            _ => return Err(invalid(format!("render has no option {name}"))),
+        }
+        Ok(())
     }
 
     fn camera(&self, wanted: &Bound<'_, PyAny>) -> PyResult<usize> {

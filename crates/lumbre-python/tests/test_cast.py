@@ -231,6 +231,7 @@ def test_what_has_no_answer_says_so() -> None:
         (np.zeros((4, 3)), np.zeros((4, 3)), {"out": {"t": np.zeros(3)}}, "out: t has the wrong length"),
         (np.zeros((4, 3)), np.zeros((4, 3)), {"out": {"t": np.zeros(4, dtype=np.float32)}}, "out: t"),
         (np.zeros((4, 3)), np.zeros((4, 3)), {"out": {"t": np.zeros(8)[::2]}}, "contiguous"),
+        (np.zeros((4, 3)), np.zeros((4, 3)), {"out": {"t": [0.0] * 4}}, "out: t is no array"),
     ],
 )
 def test_wrong_arrays_are_refused(mixed, origins, directions, limits, message) -> None:

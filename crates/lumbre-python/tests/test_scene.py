@@ -184,6 +184,8 @@ def test_render_options_out_of_range_are_refused() -> None:
         ({"camera": "left"}, 'no camera "left"'),
         ({"integrator": "pth"}, "did you mean path"),
         ({"time": -1.0}, "time"),
+        ({"seed": -1}, "render: seed is -1"),
+        ({"max_depth": "deep"}, "render: max_depth is deep"),
     ]:
         with pytest.raises(lumbre.LumbreError, match=message):
             scene.render(spp=1, **{"size": (4, 4), **options})

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -16,7 +17,15 @@ from conftest import random_rays
 import lumbre
 
 
-def test_ctrl_c_ends_a_cast_and_a_render_soon(mixed: lumbre.Scene) -> None:
+@pytest.fixture
+def listens() -> Iterator[None]:
+    """Who starts the tests in the background may have had Ctrl-C ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_ctrl_c_ends_a_cast_and_a_render_soon(mixed: lumbre.Scene, listens: None) -> None:
     origins, directions = random_rays(2000)
     # As many rays as take a minute or more, at no memory.
     many = np.broadcast_to(origins[:1], (100_000_000, 3)), np.broadcast_to(directions[:1], (100_000_000, 3))

@@ -25,6 +25,7 @@ FIELDS = ("t", "point", "normal", "uv", "front", "shape", "prim", "instance")
 
 _WIDTHS = {"point": 3, "normal": 3, "uv": 2}
 _KINDS: dict[str, type[Any]] = {"front": np.bool_, "shape": np.int32, "prim": np.int32, "instance": np.int32}
+_ndarray = np.ndarray
 _NEAREST = ("distance", "point", "shape", "prim", "instance")
 
 Progress = Callable[[int, "int | None", float], object]
@@ -55,8 +56,6 @@ class Hits:
     ([2.0, inf], [True, False], [0, -1])
     """
 
-    __slots__ = ("_columns",)
-
     t: Array
     point: Array
     normal: Array
@@ -66,31 +65,30 @@ class Hits:
     prim: Array
     instance: Array
 
-    def __init__(self, columns: Mapping[str, Array]) -> None:
-        self._columns = columns
+    def __init__(self, columns: dict[str, Array]) -> None:
+        # The columns are the attributes: nothing is sooner made, or found.
+        self.__dict__ = columns
 
     def __getattr__(self, name: str) -> Array:
-        if name != "_columns" and name in self._columns:
-            return self._columns[name]
         raise AttributeError(f"these hits have no {name} (cast with it among the fields)")
 
     @property
     def hit(self) -> npt.NDArray[np.bool_]:
         """Whether each ray hit anything, (N,)."""
-        if "t" in self._columns:
+        if "t" in self.__dict__:
             return np.isfinite(self.t)
         for name in ("shape", "prim"):
-            if name in self._columns:
-                return np.asarray(self._columns[name] >= 0)
+            if name in self.__dict__:
+                return np.asarray(self.__dict__[name] >= 0)
         raise AttributeError("hit needs t, shape or prim among the fields")
 
     @property
     def fields(self) -> tuple[str, ...]:
         """The names of what was asked for."""
-        return tuple(name for name in FIELDS if name in self._columns)
+        return tuple(name for name in FIELDS if name in self.__dict__)
 
     def __len__(self) -> int:
-        return next((len(column) for column in self._columns.values()), 0)
+        return next((len(column) for column in self.__dict__.values()), 0)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({len(self)} rays: {', '.join(self.fields)})"
@@ -104,8 +102,6 @@ class AllHits(Hits):
     >>> every.offsets.tolist(), every.t.tolist(), every.ray.tolist()
     ([0, 2], [2.0, 4.0], [0, 0])
     """
-
-    __slots__ = ()
 
     offsets: Array
 
@@ -253,7 +249,7 @@ class Scene:
         """
         # The usual arrays need no look from here, which takes longer than a ray.
         if out is None and type(fields) is tuple and type(tmin) is float and type(tmax) is float:
-            if type(origins) is np.ndarray and type(directions) is np.ndarray:
+            if type(origins) is _ndarray and type(directions) is _ndarray:
                 ready = self._native.cast_ready(origins, directions, tmin, tmax, fields)
                 if ready is not None:
                     return Hits(ready)
@@ -278,7 +274,7 @@ class Scene:
         [False]
         """
         if out is None and type(tmin) is float and type(tmax) is float:
-            if type(origins) is np.ndarray and type(directions) is np.ndarray:
+            if type(origins) is _ndarray and type(directions) is _ndarray:
                 ready = self._native.occluded_ready(origins, directions, tmin, tmax)
                 if ready is not None:
                     return ready
@@ -554,6 +550,8 @@ def _checked(out: Mapping[str, Array]) -> dict[str, Array]:
     for name, array in out.items():
         if name not in FIELDS:
             raise LumbreError(f'a hit has no field "{name}" (expected some of {", ".join(FIELDS)})')
+        if not isinstance(array, np.ndarray):
+            raise LumbreError(f"out: {name} is no array (found {type(array).__name__})")
         if not array.flags.writeable:
             raise LumbreError(f"out: {name} is read-only")
     return dict(out)
