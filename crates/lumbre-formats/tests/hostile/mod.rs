@@ -14,8 +14,11 @@ pub(crate) mod pbrt;
 pub(crate) mod ply;
 pub(crate) mod stl;
 
-/// What reads bytes as one kind of file, by the name of its fuzz target.
-pub(crate) const CHECKS: [(&str, fn(&[u8])); 12] = [
+/// Reads bytes as one kind of file.
+type Check = fn(&[u8]);
+
+/// What reads each kind of file, by the name of its fuzz target.
+pub(crate) const CHECKS: [(&str, Check); 12] = [
     ("gltf", gltf::run),
     ("gltf_buffer", gltf_buffer::run),
     ("gltf_draco", gltf_draco::run),
