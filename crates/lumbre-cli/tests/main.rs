@@ -9,6 +9,7 @@ mod faults;
 mod files;
 mod habits;
 mod limits;
+mod malformed;
 mod parts;
 mod program;
 mod slurm;

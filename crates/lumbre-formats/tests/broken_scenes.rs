@@ -312,7 +312,7 @@ const CASES: &[(&str, &str)] = &[
     // Spectra, materials and lights.
     (
         "WorldBegin Material \"diffuse\" \"rgb reflectance\" [1 -1 0]",
-        "1:31: wrong value for parameter \"reflectance\" (found 3 numbers; expected 3 numbers that are not negative)",
+        "1:31: wrong value for parameter \"reflectance\" (found 1 -1 0; expected 3 numbers that are not negative)",
     ),
     (
         "WorldBegin Material \"diffuse\" \"rgb reflectance\" [1 1]",

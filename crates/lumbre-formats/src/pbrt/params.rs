@@ -146,6 +146,17 @@ impl Param {
         self.wrong(self.values.shown(), expected)
     }
 
+    /// The same, with a few numbers themselves in place of how many there are.
+    pub fn refuse_numbers(&self, expected: &str) -> super::source::Fault {
+        match &self.values {
+            Values::Numbers(v) if v.len() <= 4 => {
+                let numbers: Vec<String> = v.iter().map(|v| number(*v)).collect();
+                self.wrong(numbers.join(" "), expected)
+            }
+            _ => self.refuse(expected),
+        }
+    }
+
     fn of_type(&self, types: &[Type]) -> Result<&Self> {
         if types.contains(&self.ty) {
             return Ok(self);

@@ -140,7 +140,7 @@ impl Converter<'_, '_> {
                 let rgb = param.exactly::<3>()?;
                 let representable = |v: &f64| (0.0..=f64::from(f32::MAX)).contains(v);
                 if !rgb.iter().all(representable) {
-                    return Err(param.refuse("3 numbers that are not negative"));
+                    return Err(param.refuse_numbers("3 numbers that are not negative"));
                 }
                 let colour = match usage {
                     SpectrumUse::Light => colour::light(&param.space, rgb),

@@ -249,6 +249,12 @@ impl Header {
                     element.properties.push(Property { name: property.to_owned(), list, number: kind });
                 }
                 ["end_header"] => break,
+                ["element", ..] => return Err(whole("wrong element").expected("element NAME COUNT").into()),
+                ["format", ..] => {
+                    let expected =
+                        "format ascii 1.0, or binary_little_endian or binary_big_endian in place of ascii";
+                    return Err(whole("wrong format").expected(expected).into());
+                }
                 [keyword, ..] => {
                     let known = ["format", "element", "property", "comment", "obj_info", "end_header"];
                     let wrong = wrong(keyword, "unknown line in PLY header").suggest(keyword, known);
