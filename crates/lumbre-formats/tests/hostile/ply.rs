@@ -1,17 +1,11 @@
 //! Any bytes are a PLY mesh or an error with a place.
+
 use lumbre_formats::ply::read_ply;
-use lumbre_formats::{Budget, Diagnostics, Limits, Strictness};
+
+use super::read_both_ways;
 
 pub(crate) fn run(bytes: &[u8]) {
-    let mut limits = Limits::default();
-    limits.memory = 64 << 20;
-    limits.elements = 1_000_000;
-    for strictness in [Strictness::Normal, Strictness::Lenient] {
-        let mut diagnostics = Diagnostics::with_strictness(strictness);
-        let read = read_ply(bytes, &"fuzz.ply".into(), &Budget::new(limits), &mut diagnostics);
-        if let Err(error) = read {
-            assert!(error.to_diagnostic().to_string().starts_with("error: "));
-        }
-        diagnostics.lines();
-    }
+    read_both_ways(1_000_000, "error: ", |budget, diagnostics| {
+        read_ply(bytes, &"fuzz.ply".into(), budget, diagnostics)
+    });
 }
