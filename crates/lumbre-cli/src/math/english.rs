@@ -38,7 +38,7 @@ pub(super) static ENGLISH: Texts = Texts {
     numbers_or_rows: "numbers, or rows such as [1, 2]",
     nothing: "nothing",
     entries: "{0} entries",
-    vector_size: "2 to 4 numbers",
+    vector_size: "1 to 4 numbers",
     matrix_size: "1 to 4 rows",
     like_the_first: "the same as the first entry",
     wrong_count: "wrong number of arguments of {0}",
@@ -102,7 +102,7 @@ pub(super) static ENGLISH: Texts = Texts {
     welcome: "help lists what there is; quit or the end of the input leaves.",
     language: "\
 numbers        1  -0.5  1e-3  pi; angles are in degrees
-vectors        [1, 2, 3] of 2 to 4 numbers; x, y, z are the axes
+vectors        [1, 2, 3] of 1 to 4 numbers; x, y, z are the axes
 matrices       [[1, 2], [3, 4]], row by row
 quaternions    quat(w, x, y, z), or 1 + 2*i + 3*j + 4*k
 operators      + - * / ^; M * p, A * B (first B), v * M (a row), M^-1

@@ -8,12 +8,12 @@ use super::texts::Texts;
 #[derive(Debug)]
 pub(super) struct Wrong {
     pub(super) offset: usize,
-    pub(super) what: Diagnostic,
+    pub(super) what: Box<Diagnostic>,
 }
 
 impl Wrong {
-    pub(super) fn new(offset: usize, what: Diagnostic) -> Self {
-        Self { offset, what }
+    pub(super) fn new(offset: usize, what: impl Into<Box<Diagnostic>>) -> Self {
+        Self { offset, what: what.into() }
     }
 }
 

@@ -138,7 +138,7 @@ fn shown(outcome: &Outcome, form: Form) -> String {
 /// A mistake with its place, and below it the line with a mark under the place.
 fn message(name: &str, text: &str, wrong: &Wrong) -> String {
     let offset = wrong.offset.min(text.len());
-    let message = wrong.what.clone().at(Place::of_offset(name, text.as_bytes(), offset)).body();
+    let message = (*wrong.what).clone().at(Place::of_offset(name, text.as_bytes(), offset)).body();
     let start = text[..offset].rfind('\n').map_or(0, |end| end + 1);
     let line = text[start..].lines().next().unwrap_or("");
     let before = text[start..offset].chars().count();

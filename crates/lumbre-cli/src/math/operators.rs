@@ -9,11 +9,12 @@ use super::steps::{Work, sum_of_products};
 use super::value::{Matrix, Value, list, number};
 
 /// That these two do not go together.
-fn mismatch(sign: &str, a: &Value, b: &Value, expected: &str, work: &Work) -> Diagnostic {
+fn mismatch(sign: &str, a: &Value, b: &Value, expected: &str, work: &Work) -> Box<Diagnostic> {
     let (a, b) = (a.described(work.texts), b.described(work.texts));
     Diagnostic::error(work.texts.no_operation.replace("{0}", sign))
         .found(format!("{a} {sign} {b}"))
         .expected(expected)
+        .into()
 }
 
 pub(super) fn negated(value: &Value) -> Value {
@@ -35,7 +36,7 @@ fn each(m: &Matrix, f: impl Fn(f64) -> f64) -> Matrix {
 }
 
 /// The sum, or the difference.
-pub(super) fn add(a: &Value, b: &Value, is_sum: bool, work: &mut Work) -> Result<Value, Diagnostic> {
+pub(super) fn add(a: &Value, b: &Value, is_sum: bool, work: &mut Work) -> Result<Value, Box<Diagnostic>> {
     let sign = if is_sum { "+" } else { "-" };
     let f = |x: f64, y: f64| if is_sum { x + y } else { x - y };
     let real = |x: f64| quaternion::from_wxyz([x, 0.0, 0.0, 0.0]);
@@ -69,7 +70,7 @@ pub(super) fn add(a: &Value, b: &Value, is_sum: bool, work: &mut Work) -> Result
 }
 
 /// The product: of vectors there are two, which have names.
-pub(super) fn multiply(a: &Value, b: &Value, work: &mut Work) -> Result<Value, Diagnostic> {
+pub(super) fn multiply(a: &Value, b: &Value, work: &mut Work) -> Result<Value, Box<Diagnostic>> {
     match (a, b) {
         (Value::Number(x), Value::Number(y)) => Ok(Value::Number(x * y)),
         (Value::Number(factor), value) | (value, Value::Number(factor)) => {
@@ -135,14 +136,15 @@ fn column_product(a: &Value, v: &[f64]) -> Option<Vec<f64>> {
     Some(product.entries().collect())
 }
 
-fn column_image(a: &Value, v: &[f64], image: &[f64], work: &mut Work) -> Result<Value, Diagnostic> {
+fn column_image(a: &Value, v: &[f64], image: &[f64], work: &mut Work) -> Result<Value, Box<Diagnostic>> {
     let Some(m) = a.as_matrix() else { return Ok(Value::Vector(image.to_vec())) };
     if image.len() == 4 && v.len() == 3 {
         let homogeneous = [image[0], image[1], image[2], image[3]];
         let Some(point) = matrix::point_of_homogeneous(homogeneous.into()) else {
             return Err(Diagnostic::error(work.texts.no_image)
                 .found(list(image))
-                .expected(work.texts.w_not_zero));
+                .expected(work.texts.w_not_zero)
+                .into());
         };
         show_image(&m, v, image, Some(image[3]), work);
         return Ok(point.into());
@@ -192,7 +194,7 @@ fn row_product(v: &[f64], b: &Value, work: &mut Work) -> Option<Value> {
 }
 
 /// The quotient by a number, or of quaternions.
-pub(super) fn divide(a: &Value, b: &Value, work: &mut Work) -> Result<Value, Diagnostic> {
+pub(super) fn divide(a: &Value, b: &Value, work: &mut Work) -> Result<Value, Box<Diagnostic>> {
     let p = match (a, b) {
         (Value::Number(x), Value::Number(y)) => return Ok(Value::Number(x / y)),
         (_, Value::Number(divisor)) => {
@@ -215,7 +217,10 @@ pub(super) fn divide(a: &Value, b: &Value, work: &mut Work) -> Result<Value, Dia
     let Value::Quaternion(q) = b else { return Err(mismatch("/", a, b, work.texts.divisors, work)) };
     let quotient = quaternion::divide(p, *q);
     let Some((inverse, quotient)) = quaternion::inverse(*q).zip(quotient) else {
-        return Err(Diagnostic::error(work.texts.no_inverse).found(b.line()).expected(work.texts.invertible));
+        return Err(Diagnostic::error(work.texts.no_inverse)
+            .found(b.line())
+            .expected(work.texts.invertible)
+            .into());
     };
     work.begin("p / q");
     let line = |q| Value::Quaternion(q).line();
@@ -225,7 +230,7 @@ pub(super) fn divide(a: &Value, b: &Value, work: &mut Work) -> Result<Value, Dia
 }
 
 /// A power of a number; the inverse of a matrix, transform or quaternion by the exponent -1.
-pub(super) fn power(base: &Value, exponent: &Value, work: &mut Work) -> Result<Value, Diagnostic> {
+pub(super) fn power(base: &Value, exponent: &Value, work: &mut Work) -> Result<Value, Box<Diagnostic>> {
     match (base, exponent) {
         (Value::Number(x), Value::Number(y)) => Ok(Value::Number(x.power(*y))),
         (Value::Matrix(_) | Value::Transform(_) | Value::Quaternion(_), Value::Number(-1.0)) => {
@@ -236,19 +241,19 @@ pub(super) fn power(base: &Value, exponent: &Value, work: &mut Work) -> Result<V
 }
 
 /// The inverse of a matrix, transform or quaternion.
-pub(super) fn inverse(value: &Value, work: &mut Work) -> Result<Value, Diagnostic> {
+pub(super) fn inverse(value: &Value, work: &mut Work) -> Result<Value, Box<Diagnostic>> {
     let result = match value {
         Value::Quaternion(q) => quaternion::inverse(*q).map(Value::Quaternion),
         Value::Transform(map) => Some(map.inverse().into()),
         Value::Matrix(m) => inverse_matrix(m),
         _ => {
             let what = Diagnostic::error(work.texts.no_inverse).found(value.described(work.texts));
-            return Err(what.expected(work.texts.inverted_kinds));
+            return Err(what.expected(work.texts.inverted_kinds).into());
         }
     };
     let Some(result) = result.filter(Value::is_finite) else {
         let what = Diagnostic::error(work.texts.no_inverse).found(value.line());
-        return Err(what.expected(work.texts.invertible));
+        return Err(what.expected(work.texts.invertible).into());
     };
     match (value, value.as_matrix(), result.as_matrix()) {
         (Value::Quaternion(q), ..) => {

@@ -1,6 +1,9 @@
-//! A prompt: lines from standard input, one after the other.
+//! A prompt: lines from a terminal, with a history, or from a pipe.
 
 use std::io::{BufRead, IsTerminal, Read};
+
+use rustyline::error::ReadlineError;
+use rustyline::{Config, DefaultEditor};
 
 use crate::failure::{Failure, print};
 
@@ -9,56 +12,71 @@ use super::lexer::is_unfinished;
 use super::session::Session;
 use super::{Form, evaluate, message};
 
-/// The most bytes that open brackets may collect.
+/// The most bytes that the lines of one bracket may have. Each line is looked at again with those before it.
 const LONGEST: usize = 1 << 16;
 
-/// Evaluates lines until their end or `quit`. At a terminal a mistake is said and the next line may do better; otherwise
-/// it ends the program, as in a file.
+/// Evaluates lines of standard input until their end or `quit`.
 pub(super) fn run(session: &mut Session, form: Form) -> Result<(), Failure> {
-    let stdin = std::io::stdin().lock();
-    let is_terminal = stdin.is_terminal();
-    if is_terminal {
-        print(&format!("{}\n", ENGLISH.welcome))?;
+    if std::io::stdin().is_terminal() && std::io::stdout().is_terminal() {
+        from_terminal(session, form)
+    } else {
+        from_pipe(std::io::stdin().lock(), session, form)
     }
-    converse(stdin, is_terminal, session, form)
 }
 
-fn converse(
-    mut input: impl BufRead,
-    is_terminal: bool,
-    session: &mut Session,
-    form: Form,
-) -> Result<(), Failure> {
+fn is_farewell(text: &str) -> bool {
+    matches!(text.trim(), "quit" | "exit")
+}
+
+/// A mistake is said, and the next line may do better. The history is that of this run: arrow up and down.
+fn from_terminal(session: &mut Session, form: Form) -> Result<(), Failure> {
+    let failed = |e: ReadlineError| Failure::Io(format!("the terminal: {e}"));
+    let config = Config::builder().auto_add_history(true).build();
+    let mut editor = DefaultEditor::with_config(config).map_err(failed)?;
+    print(&format!("{}\n", ENGLISH.welcome))?;
+    let mut text = String::new();
+    loop {
+        match editor.readline(if text.is_empty() { "> " } else { "| " }) {
+            Ok(line) => text += &format!("{line}\n"),
+            // Ctrl-C gives up what was typed.
+            Err(ReadlineError::Interrupted) => text.clear(),
+            Err(ReadlineError::Eof) => return Ok(()),
+            Err(e) => return Err(failed(e)),
+        }
+        if is_farewell(&text) {
+            return Ok(());
+        }
+        if is_unfinished(&text, &ENGLISH) {
+            continue;
+        }
+        if let Err(wrong) = evaluate(session, &text, form)? {
+            say!("error: {}", message("expression", &text, &wrong));
+        }
+        text.clear();
+    }
+}
+
+/// A mistake ends the program, as in a file; its line is counted from the start of the input.
+fn from_pipe(mut input: impl BufRead, session: &mut Session, form: Form) -> Result<(), Failure> {
     let mut lines_before = 0;
     loop {
-        if is_terminal {
-            print("> ")?;
-        }
         let mut text = String::new();
         let is_end = loop {
             let is_end = !read_line(&mut input, &mut text)?;
             if is_end || !is_unfinished(&text, &ENGLISH) {
                 break is_end;
             }
-            if is_terminal {
-                print("| ")?;
-            }
         };
-        if matches!(text.trim(), "quit" | "exit") {
+        if is_farewell(&text) {
             return Ok(());
         }
         if let Err(mut wrong) = evaluate(session, &text, form)? {
-            // At a terminal, what was typed last is what is meant; elsewhere lines are counted from the start.
-            if is_terminal {
-                say!("error: {}", message("expression", &text, &wrong));
-            } else {
-                let before = "\n".repeat(lines_before);
-                wrong.offset += before.len();
-                return Err(Failure::Input(message("standard input", &(before + &text), &wrong)));
-            }
+            let before = "\n".repeat(lines_before);
+            wrong.offset += before.len();
+            return Err(Failure::Input(message("standard input", &(before + &text), &wrong)));
         }
         if is_end {
-            return if is_terminal { print("\n") } else { Ok(()) };
+            return Ok(());
         }
         lines_before += text.matches('\n').count();
     }
@@ -72,7 +90,9 @@ fn read_line(input: &mut impl BufRead, text: &mut String) -> Result<bool, Failur
         _ => Failure::Io(format!("standard input: {e}")),
     })?;
     if text.len() >= LONGEST {
-        return Err(Failure::Input(format!("standard input: an expression of more than {LONGEST} bytes")));
+        return Err(Failure::Input(format!(
+            "standard input: an expression of more than {LONGEST} bytes (--file reads any length)"
+        )));
     }
     Ok(count > 0)
 }

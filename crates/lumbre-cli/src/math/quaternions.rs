@@ -12,7 +12,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function::new("quat", &["w, x, y, z", "w, v", "R"], quat),
     Function::new("quat_about", &["axis, degrees"], quat_about),
     Function::new("conjugate", &["q"], conjugate),
-    Function::new("euler", &["heading, attitude, bank"], euler),
+    Function::new("euler", &["heading, attitude, bank", "angles"], euler),
     Function::new("angles", &["q"], angles),
 ];
 
@@ -94,7 +94,8 @@ fn conjugate(call: &mut Call) -> Result<Value, Wrong> {
 }
 
 fn euler(call: &mut Call) -> Result<Value, Wrong> {
-    let [heading, attitude, bank] = call.numbers(0)?;
+    let [heading, attitude, bank] =
+        if call.count() == 1 { call.vec3(0)?.to_array() } else { call.numbers(0)? };
     let q = Euler { heading, attitude, bank }.to_quaternion();
     call.work.line("R = Ry(heading) Rz(attitude) Rx(bank)");
     call.work.line("a = c1c2c3 - s1s2s3,  b = s1s2c3 + c1c2s3,  c = s1c2c3 + c1s2s3,  d = c1s2c3 - s1c2s3");

@@ -285,14 +285,13 @@ impl<'a> Reader<'a> {
         let wrong = |at: usize, found: String, expected: &str| {
             Err(Wrong::new(at, Diagnostic::error(texts.wrong_list).found(found).expected(expected)))
         };
-        let sizes = match items.first().map(|item| &item.value) {
-            Some(Value::Number(_)) => 2..=4,
-            Some(Value::Vector(_)) => 1..=4,
+        let expected = match items.first().map(|item| &item.value) {
+            Some(Value::Number(_)) => texts.vector_size,
+            Some(Value::Vector(_)) => texts.matrix_size,
             Some(other) => return wrong(items[0].offset, other.described(texts), texts.numbers_or_rows),
             None => return wrong(offset, texts.nothing.to_owned(), texts.numbers_or_rows),
         };
-        if !sizes.contains(&items.len()) {
-            let expected = if *sizes.start() == 2 { texts.vector_size } else { texts.matrix_size };
+        if items.len() > 4 {
             return wrong(offset, texts.entries.replace("{0}", &items.len().to_string()), expected);
         }
         let mut numbers = vec![];
@@ -355,7 +354,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The result of an operation at this byte.
-    fn finite(&self, result: Result<Value, Diagnostic>, offset: usize) -> Result<Value, Wrong> {
+    fn finite(&self, result: Result<Value, Box<Diagnostic>>, offset: usize) -> Result<Value, Wrong> {
         let value = result.map_err(|what| Wrong::new(offset, what))?;
         if value.is_finite() {
             return Ok(value);

@@ -184,7 +184,7 @@ fn every_function_is_described_in_every_language_and_in_the_manual() {
     assert_eq!(unknown, None);
 }
 
-/// Rows of the manual's tables are: call, meaning, example, result.
+/// Rows of the manual's tables of functions are: call, meaning, example, result.
 #[test]
 fn the_examples_of_the_manual_give_what_it_says() {
     let manual = include_str!("../../../../docs/math.md");
@@ -192,9 +192,10 @@ fn the_examples_of_the_manual_give_what_it_says() {
     for row in manual.lines().filter(|row| row.starts_with("| `")) {
         let cells: Vec<&str> =
             row.trim_matches('|').split(" | ").map(|cell| cell.trim().trim_matches('`')).collect();
-        let [_, _, example, result] = cells[..] else { panic!("{row}") };
-        assert_eq!(line(example), result, "{example}");
-        count += 1;
+        if let [_, _, example, result] = cells[..] {
+            assert_eq!(line(example), result, "{example}");
+            count += 1;
+        }
     }
     assert!(count >= functions::all().count(), "{count} rows");
 }

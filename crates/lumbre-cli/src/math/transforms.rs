@@ -14,7 +14,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function::new("translate", &["v"], translate),
     Function::new("scale", &["v"], scale),
     Function::new("shear", &["xy, yx", "xy, xz, yx, yz, zx, zy"], shear),
-    Function::new("rotate", &["degrees", "axis, degrees", "axis, degrees, v"], rotate),
+    Function::new("rotate", &["degrees", "axis, degrees", "q, v", "axis, degrees, v"], rotate),
     Function::new("rotate_x", &["degrees"], |call| about(call, DVec3::X)),
     Function::new("rotate_y", &["degrees"], |call| about(call, DVec3::Y)),
     Function::new("rotate_z", &["degrees"], |call| about(call, DVec3::Z)),
@@ -101,6 +101,8 @@ fn rotate(call: &mut Call) -> Result<Value, Wrong> {
         }
         (2, Value::Quaternion(_)) => {
             let (q, v) = (call.rotation(0)?, call.vec3(1)?);
+            call.work.steps.pop();
+            call.work.begin("rotate(q, v)");
             rotate_by(q, v, call.work)
         }
         (2, _) => {

@@ -88,7 +88,7 @@ impl From<&Transform> for Matrix {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Value {
     Number(f64),
-    /// Two to four components.
+    /// One to four components.
     Vector(Vec<f64>),
     Matrix(Matrix),
     /// An invertible affine map, which brings its inverse.
