@@ -76,6 +76,7 @@ enum Command {
 /// Runs the program with these words, the first of which is its own name, and returns its exit status. Signals end the process.
 pub fn run(words: Vec<OsString>) -> u8 {
     let words = verb::with_render(words, &Arguments::command());
+    let words = math::with_negative_expressions(words);
     let arguments: Arguments = match tips::parse(&words) {
         Ok(arguments) => arguments,
         Err(status) => return status,

@@ -215,8 +215,15 @@ fn an_expression_prints_its_steps_and_then_its_value() {
         "{text}"
     );
     assert!(text.ends_with("\n= [-3, 2, 5]\n"), "{text}");
-    let unquoted = Desk::new().lumbre(&["math", "-1", "+", "2", "*", "3"]);
-    assert_eq!(stdout(&unquoted), "= 5\n", "{}", stderr(&unquoted));
+    for (words, result) in [
+        (&["-1", "+", "2", "*", "3"][..], "= 5\n"),
+        (&["-2^2 + 1"], "= -3\n"),
+        (&["-x"], "= [-1, 0, 0]\n"),
+        (&["7", "-", "3"], "= 4\n"),
+    ] {
+        let out = Desk::new().lumbre(&[&["math"], words].concat());
+        assert_eq!(stdout(&out), result, "{}", stderr(&out));
+    }
 }
 
 #[test]

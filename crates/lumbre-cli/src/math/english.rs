@@ -100,6 +100,9 @@ pub(super) static ENGLISH: Texts = Texts {
     north: "north pole, M = 0: bank = 0, heading = 2 atan2(b+c, a+d)",
     south: "south pole, S = 0: bank = 0, heading = 2 atan2(c-b, a-d)",
     welcome: "help lists what there is; quit or the end of the input leaves.",
+    not_utf8: "not text in UTF-8",
+    not_regular: "not a regular file",
+    too_long: "an expression of {0} bytes or more (--file reads any length)",
     language: "\
 numbers        1  -0.5  1e-3  pi; angles are in degrees
 vectors        [1, 2, 3] of 1 to 4 numbers; x, y, z are the axes

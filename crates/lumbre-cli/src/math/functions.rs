@@ -8,7 +8,7 @@ use super::lexer::Wrong;
 use super::steps::Work;
 use super::texts::Texts;
 use super::value::{Matrix, Value};
-use super::{cameras, numbers, quaternions, transforms, vectors};
+use super::{cameras, matrices, numbers, quaternions, transforms, vectors};
 
 /// A function of the language.
 pub(super) struct Function {
@@ -33,6 +33,7 @@ pub(super) fn all() -> impl Iterator<Item = &'static Function> {
     let topics = [
         vectors::FUNCTIONS,
         transforms::FUNCTIONS,
+        matrices::FUNCTIONS,
         cameras::FUNCTIONS,
         quaternions::FUNCTIONS,
         numbers::FUNCTIONS,

@@ -1,5 +1,6 @@
 //! `lumbre math`: vectors, matrices, transforms, cameras and quaternions, step by step.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -12,6 +13,7 @@ mod cameras;
 mod english;
 mod functions;
 mod lexer;
+mod matrices;
 mod numbers;
 mod operators;
 mod prompt;
@@ -44,9 +46,7 @@ use session::{Outcome, Session};
 
 Exit status 2 for a wrong expression, 3 for one in a file or on standard input.")]
 pub(crate) struct Arguments {
-    /// What to evaluate, with ; between expressions; in quotes, as the shell knows brackets too, and after -- where
-    /// it begins with a minus. A prompt without.
-    #[arg(allow_negative_numbers = true)]
+    /// What to evaluate, with ; between expressions; in quotes, as the shell knows brackets too. A prompt without.
     expression: Vec<String>,
     /// Evaluate the statements of this file; - is standard input.
     #[arg(long, value_name = "FILE", conflicts_with = "expression")]
@@ -54,6 +54,21 @@ pub(crate) struct Arguments {
     /// Print each result with its steps as one line of JSON.
     #[arg(long)]
     json: bool,
+}
+
+/// Puts a space before what begins with a single minus: it is part of an expression and no option.
+pub(crate) fn with_negative_expressions(mut words: Vec<OsString>) -> Vec<OsString> {
+    if words.get(1).is_some_and(|verb| verb == "math") {
+        for word in &mut words[2..] {
+            let is_option = word == "-" || word == "-h" || word.as_encoded_bytes().starts_with(b"--");
+            if word.as_encoded_bytes().starts_with(b"-") && !is_option {
+                let mut spaced = OsString::from(" ");
+                spaced.push(&*word);
+                *word = spaced;
+            }
+        }
+    }
+    words
 }
 
 /// Runs the command.
@@ -70,7 +85,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         return prompt::run(&mut session, form);
     }
     let text = arguments.expression.join(" ");
-    evaluate(&mut session, &text, form)?.map_err(|wrong| Failure::Usage(message("expression", &text, &wrong)))
+    let text = text.trim_start();
+    evaluate(&mut session, text, form)?.map_err(|wrong| Failure::Usage(message("expression", text, &wrong)))
 }
 
 /// How results are printed.
@@ -82,7 +98,9 @@ enum Form {
 
 fn read(path: &Path) -> Result<String, Failure> {
     let failed = |e: std::io::Error| match e.kind() {
-        std::io::ErrorKind::InvalidData => Failure::Input(format!("{}: not text in UTF-8", path.display())),
+        std::io::ErrorKind::InvalidData => {
+            Failure::Input(format!("{}: {}", path.display(), ENGLISH.not_utf8))
+        }
         _ => Failure::Io(format!("{}: {e}", path.display())),
     };
     if path == Path::new("-") {
@@ -90,7 +108,7 @@ fn read(path: &Path) -> Result<String, Failure> {
     }
     // A device has no end.
     if !std::fs::metadata(path).map_err(failed)?.is_file() {
-        return Err(Failure::Io(format!("{}: not a regular file", path.display())));
+        return Err(Failure::Io(format!("{}: {}", path.display(), ENGLISH.not_regular)));
     }
     std::fs::read_to_string(path).map_err(failed)
 }

@@ -86,13 +86,12 @@ fn from_pipe(mut input: impl BufRead, session: &mut Session, form: Form) -> Resu
 fn read_line(input: &mut impl BufRead, text: &mut String) -> Result<bool, Failure> {
     let room = (LONGEST - text.len()) as u64;
     let count = input.take(room).read_line(text).map_err(|e| match e.kind() {
-        std::io::ErrorKind::InvalidData => Failure::Input("standard input: not text in UTF-8".into()),
+        std::io::ErrorKind::InvalidData => Failure::Input(format!("standard input: {}", ENGLISH.not_utf8)),
         _ => Failure::Io(format!("standard input: {e}")),
     })?;
     if text.len() >= LONGEST {
-        return Err(Failure::Input(format!(
-            "standard input: an expression of more than {LONGEST} bytes (--file reads any length)"
-        )));
+        let what = ENGLISH.too_long.replace("{0}", &LONGEST.to_string());
+        return Err(Failure::Input(format!("standard input: {what}")));
     }
     Ok(count > 0)
 }

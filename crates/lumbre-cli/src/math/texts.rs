@@ -105,6 +105,9 @@ pub(super) struct Texts {
     pub(super) south: &'static str,
     // The prompt and the command.
     pub(super) welcome: &'static str,
+    pub(super) not_utf8: &'static str,
+    pub(super) not_regular: &'static str,
+    pub(super) too_long: &'static str,
     pub(super) language: &'static str,
     /// What each function does, by its name.
     pub(super) functions: &'static [(&'static str, &'static str)],
