@@ -261,7 +261,7 @@ fn mistakes_have_their_place_and_the_exit_status_of_their_source() {
     );
     assert!(stderr(&out).contains("did you mean \"dot\"?)\n  dott(x, y)\n  ^\n"), "{}", stderr(&out));
 
-    desk.write("script.txt", "a = 2 # fine\n\na * x * y\n");
+    desk.write("script.txt", "\u{feff}a = 2 # fine\r\n\r\na * x * y\r\n");
     let out = desk.lumbre(&["math", "--file", "script.txt"]);
     assert_eq!(code(&out), 3);
     assert!(stderr(&out).starts_with("error: script.txt:3:7: these have no *"), "{}", stderr(&out));
@@ -301,4 +301,42 @@ fn help_lists_the_functions() {
     }
     let one = desk.lumbre(&["math", "help angles"]);
     assert_eq!(stdout(&one), "angles(q)\n    heading, attitude and bank of a quaternion, in degrees\n");
+}
+
+/// Rows of its tables of functions are: call, meaning, example, result.
+#[test]
+fn the_manual_has_every_form_of_every_function_with_an_example_that_is_right() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/math.md");
+    let manual = std::fs::read_to_string(path).unwrap();
+    let desk = Desk::new();
+    let help = stdout(&desk.lumbre(&["math", "help"]));
+    let calls =
+        help.lines().filter(|line| line.contains('(') && line.ends_with(')') && !line.starts_with(' '));
+    let forms: Vec<&str> = calls.flat_map(|line| line.split(" | ")).collect();
+    assert!(forms.len() > 60, "{forms:?}");
+    let (mut script, mut shown) = (String::new(), vec![]);
+    for form in forms {
+        let start = format!("| `{form}` |");
+        let row = manual.lines().find(|row| row.starts_with(&start));
+        assert!(row.is_some(), "{form} is missing");
+    }
+    for row in manual.lines().filter(|row| row.starts_with("| `")) {
+        let cells: Vec<&str> =
+            row.trim_matches('|').split(" | ").map(|cell| cell.trim().trim_matches('`')).collect();
+        if let [_, _, example, result] = cells[..] {
+            script += &format!("{example}\n{result}\n");
+            shown.push(row);
+        }
+    }
+    desk.write("examples.txt", &script);
+    let out = desk.lumbre(&["math", "--json", "--file", "examples.txt"]);
+    assert_eq!(code(&out), 0, "{}", stderr(&out));
+    let text = stdout(&out);
+    let values: Vec<Value> =
+        text.lines().map(|line| serde_json::from_str::<Value>(line).unwrap()["value"].take()).collect();
+    assert_eq!(values.len(), 2 * shown.len());
+    for (pair, row) in values.chunks(2).zip(shown) {
+        // The sign of zero is not printed.
+        assert_eq!(numbers(&pair[0]), numbers(&pair[1]), "{row}");
+    }
 }

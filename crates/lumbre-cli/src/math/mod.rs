@@ -77,9 +77,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let form = if arguments.json { Form::Json } else { Form::Text };
     if let Some(path) = &arguments.file {
         let text = read(path)?;
+        // Some editors put a byte order mark in front.
+        let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
         let name = path.display().to_string();
-        return evaluate(&mut session, &text, form)?
-            .map_err(|wrong| Failure::Input(message(&name, &text, &wrong)));
+        return evaluate(&mut session, text, form)?
+            .map_err(|wrong| Failure::Input(message(&name, text, &wrong)));
     }
     if arguments.expression.is_empty() {
         return prompt::run(&mut session, form);

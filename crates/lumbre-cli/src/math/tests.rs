@@ -171,31 +171,10 @@ fn mistakes_say_where_what_and_what_would_do() {
 }
 
 #[test]
-fn every_function_is_described_in_every_language_and_in_the_manual() {
-    let manual = include_str!("../../../../docs/math.md");
+fn every_function_is_described_and_nothing_else() {
     for function in functions::all() {
         assert!(!ENGLISH.about(function.name).is_empty(), "{}", function.name);
-        for form in function.forms {
-            let call = format!("`{}({form})`", function.name);
-            assert!(manual.contains(&call), "{call} is missing");
-        }
     }
     let unknown = ENGLISH.functions.iter().find(|(name, _)| functions::find(name).is_none());
     assert_eq!(unknown, None);
-}
-
-/// Rows of the manual's tables of functions are: call, meaning, example, result.
-#[test]
-fn the_examples_of_the_manual_give_what_it_says() {
-    let manual = include_str!("../../../../docs/math.md");
-    let mut count = 0;
-    for row in manual.lines().filter(|row| row.starts_with("| `")) {
-        let cells: Vec<&str> =
-            row.trim_matches('|').split(" | ").map(|cell| cell.trim().trim_matches('`')).collect();
-        if let [_, _, example, result] = cells[..] {
-            assert_eq!(line(example), result, "{example}");
-            count += 1;
-        }
-    }
-    assert!(count >= functions::all().count(), "{count} rows");
 }
