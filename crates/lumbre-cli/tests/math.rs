@@ -200,7 +200,8 @@ fn piped(arguments: &[&str], input: &str) -> Output {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    child.stdin.take().unwrap().write_all(input.as_bytes()).unwrap();
+    // It may end before it has read everything.
+    let _ = child.stdin.take().unwrap().write_all(input.as_bytes());
     child.wait_with_output().unwrap()
 }
 
@@ -271,6 +272,17 @@ fn mistakes_have_their_place_and_the_exit_status_of_their_source() {
     assert_eq!(code(&out), 3);
     assert!(
         stderr(&out).starts_with("error: standard input:2:4: this does not belong here"),
+        "{}",
+        stderr(&out)
+    );
+
+    // Minutes, if each line were read again with those before it.
+    let out = piped(&["math"], &format!("[{}", "1,\n".repeat(400_000)));
+    assert_eq!(code(&out), 3);
+    assert!(stderr(&out).contains("an expression of 1048576 bytes or more"), "{}", stderr(&out));
+    let out = desk.lumbre(&["math", &format!("[{}", "1, ".repeat(1000))]);
+    assert!(
+        stderr(&out).contains("too many values between brackets (expected at most 16)"),
         "{}",
         stderr(&out)
     );

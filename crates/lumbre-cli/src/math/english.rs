@@ -27,6 +27,7 @@ pub(super) static ENGLISH: Texts = Texts {
     comma_or_bracket: ", or ]",
     comma_or_parenthesis: ", or )",
     too_deep: "too many brackets within each other",
+    too_many: "too many values between brackets",
     at_most: "at most {0}",
     name_is_taken: "this name means something already",
     another_name: "another name",

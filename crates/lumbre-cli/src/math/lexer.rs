@@ -130,14 +130,15 @@ fn begins_name(c: char) -> bool {
     c.is_ascii_alphabetic() || c == '_'
 }
 
-/// Whether a bracket of the text is still open, so that more lines belong to it.
-pub(super) fn is_unfinished(text: &str, texts: &'static Texts) -> bool {
-    let mut lexer = Lexer::new(text, texts);
+/// How many brackets are open after a line that begins with `open` of them: more lines belong to it. 0 after a mistake.
+pub(super) fn open_brackets(line: &str, open: usize, texts: &'static Texts) -> usize {
+    let mut lexer = Lexer::new(line, texts);
+    lexer.open = open;
     loop {
         match lexer.next() {
-            Ok(Token { kind: TokenKind::End, .. }) => return lexer.open > 0,
+            Ok(Token { kind: TokenKind::End, .. }) => return lexer.open,
             Ok(_) => {}
-            Err(_) => return false,
+            Err(_) => return 0,
         }
     }
 }

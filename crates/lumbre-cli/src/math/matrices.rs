@@ -39,7 +39,7 @@ fn det(call: &mut Call) -> Result<Value, Wrong> {
         (2, 2) => {
             let products = difference_of_products(c[0][0], c[1][1], c[0][1], c[1][0]);
             call.work.line(format!("m11 m22 - m12 m21 = {products}"));
-            m_det2(&m)
+            quadratic::dop(c[0][0], c[1][1], c[0][1], c[1][0])
         }
         (3, 3) => {
             let linear = m.mat3();
@@ -61,10 +61,6 @@ fn det(call: &mut Call) -> Result<Value, Wrong> {
         texts.keeps_hand
     });
     Ok(Value::Number(result))
-}
-
-fn m_det2(m: &Matrix) -> f64 {
-    quadratic::dop(m.cells[0][0], m.cells[1][1], m.cells[0][1], m.cells[1][0])
 }
 
 fn solve(call: &mut Call) -> Result<Value, Wrong> {

@@ -163,7 +163,7 @@ fn message(name: &str, text: &str, wrong: &Wrong) -> String {
     let line = text[start..].lines().next().unwrap_or("");
     let before = text[start..offset].chars().count();
     // A longer line would not show its mark.
-    if line.chars().count() > 100 || line.contains('\t') {
+    if line.trim().is_empty() || line.chars().count() > 100 || line.contains('\t') {
         return message;
     }
     format!("{message}\n  {line}\n  {}^", " ".repeat(before))

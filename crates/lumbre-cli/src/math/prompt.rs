@@ -8,12 +8,12 @@ use rustyline::{Config, DefaultEditor};
 use crate::failure::{Failure, print};
 
 use super::english::ENGLISH;
-use super::lexer::is_unfinished;
+use super::lexer::open_brackets;
 use super::session::Session;
 use super::{Form, evaluate, message};
 
-/// The most bytes that the lines of one bracket may have. Each line is looked at again with those before it.
-const LONGEST: usize = 1 << 16;
+/// The most bytes that a line, or the lines of one bracket, may have.
+const LONGEST: usize = 1 << 20;
 
 /// Evaluates lines of standard input until their end or `quit`.
 pub(super) fn run(session: &mut Session, form: Form) -> Result<(), Failure> {
@@ -34,19 +34,22 @@ fn from_terminal(session: &mut Session, form: Form) -> Result<(), Failure> {
     let config = Config::builder().auto_add_history(true).build();
     let mut editor = DefaultEditor::with_config(config).map_err(failed)?;
     print(&format!("{}\n", ENGLISH.welcome))?;
-    let mut text = String::new();
+    let (mut text, mut open) = (String::new(), 0);
     loop {
         match editor.readline(if text.is_empty() { "> " } else { "| " }) {
-            Ok(line) => text += &format!("{line}\n"),
+            Ok(line) => {
+                open = open_brackets(&line, open, &ENGLISH);
+                text += &format!("{line}\n");
+            }
             // Ctrl-C gives up what was typed.
-            Err(ReadlineError::Interrupted) => text.clear(),
+            Err(ReadlineError::Interrupted) => (text, open) = (String::new(), 0),
             Err(ReadlineError::Eof) => return Ok(()),
             Err(e) => return Err(failed(e)),
         }
         if is_farewell(&text) {
             return Ok(());
         }
-        if is_unfinished(&text, &ENGLISH) {
+        if open > 0 {
             continue;
         }
         if let Err(wrong) = evaluate(session, &text, form)? {
@@ -60,10 +63,12 @@ fn from_terminal(session: &mut Session, form: Form) -> Result<(), Failure> {
 fn from_pipe(mut input: impl BufRead, session: &mut Session, form: Form) -> Result<(), Failure> {
     let mut lines_before = 0;
     loop {
-        let mut text = String::new();
+        let (mut text, mut open) = (String::new(), 0);
         let is_end = loop {
+            let line_start = text.len();
             let is_end = !read_line(&mut input, &mut text)?;
-            if is_end || !is_unfinished(&text, &ENGLISH) {
+            open = open_brackets(&text[line_start..], open, &ENGLISH);
+            if is_end || open == 0 {
                 break is_end;
             }
         };

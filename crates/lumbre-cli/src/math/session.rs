@@ -25,6 +25,9 @@ use super::value::{Matrix, Value};
 /// How deep brackets and powers may be nested: no text may exhaust the stack.
 const DEEPEST: usize = 100;
 
+/// The most values between two brackets; more than any has a use for.
+const MOST: usize = 16;
+
 /// The names that always have a value.
 const CONSTANTS: [&str; 7] = ["pi", "x", "y", "z", "i", "j", "k"];
 
@@ -269,6 +272,11 @@ impl<'a> Reader<'a> {
         }
         loop {
             let offset = self.token.offset;
+            if items.len() == MOST {
+                let what = Diagnostic::error(self.session.texts.too_many);
+                let expected = self.session.texts.at_most.replace("{0}", &MOST.to_string());
+                return Err(Wrong::new(offset, what.expected(expected)));
+            }
             let value = self.sum()?;
             items.push(Argument { value, offset });
             if !self.is_at(',') {

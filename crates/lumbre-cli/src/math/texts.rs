@@ -29,6 +29,7 @@ pub(super) struct Texts {
     pub(super) comma_or_bracket: &'static str,
     pub(super) comma_or_parenthesis: &'static str,
     pub(super) too_deep: &'static str,
+    pub(super) too_many: &'static str,
     pub(super) at_most: &'static str,
     pub(super) name_is_taken: &'static str,
     pub(super) another_name: &'static str,
