@@ -19,6 +19,7 @@ mod diff;
 mod failure;
 mod farm;
 mod info;
+mod math;
 mod memory;
 mod merge;
 mod names;
@@ -50,6 +51,7 @@ mod viewing;
   lumbre info scene.pbrt --json                 what is in a scene
   lumbre diff a.exr b.exr --metric relmse       how different two pictures are
   lumbre merge a.part b.part -o picture.exr     one picture of what two machines rendered
+  lumbre math 'rotate(z, 90) * [1, 0, 0]'       vectors, transforms and quaternions, step by step
 
 Exit status: 0 done, 1 a comparison failed, 2 usage, 3 input, 4 files, 5 a limit, 130 or 143 a signal.")]
 struct Arguments {
@@ -65,6 +67,7 @@ enum Command {
     Info(info::Arguments),
     Diff(diff::Arguments),
     Merge(merge::Arguments),
+    Math(math::Arguments),
     Farm(farm::Arguments),
     Completions(completions::CompletionsArguments),
     Man(completions::ManArguments),
@@ -73,6 +76,7 @@ enum Command {
 /// Runs the program with these words, the first of which is its own name, and returns its exit status. Signals end the process.
 pub fn run(words: Vec<OsString>) -> u8 {
     let words = verb::with_render(words, &Arguments::command());
+    let words = math::with_negative_expressions(words);
     let arguments: Arguments = match tips::parse(&words) {
         Ok(arguments) => arguments,
         Err(status) => return status,
@@ -85,6 +89,7 @@ pub fn run(words: Vec<OsString>) -> u8 {
         Command::Info(arguments) => info::run(&arguments),
         Command::Diff(arguments) => diff::run(&arguments),
         Command::Merge(arguments) => merge::run(&arguments),
+        Command::Math(arguments) => math::run(&arguments),
         Command::Farm(arguments) => farm::run(&arguments),
         Command::Completions(arguments) => completions::completions::<Arguments>(&arguments),
         Command::Man(arguments) => completions::man::<Arguments>(&arguments),

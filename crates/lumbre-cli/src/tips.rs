@@ -87,6 +87,7 @@ const COMMANDS: &[(&str, &[&str])] = &[
     ("diff", &["compare", "cmp", "difference", "flip"]),
     ("completions", &["completion", "complete", "autocomplete"]),
     ("man", &["manual", "manpage"]),
+    ("math", &["calc", "calculate", "eval", "evaluate"]),
 ];
 
 /// Reads the command line, or says what is wrong with it.

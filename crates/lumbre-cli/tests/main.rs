@@ -10,6 +10,7 @@ mod files;
 mod habits;
 mod limits;
 mod malformed;
+mod math;
 mod parts;
 mod program;
 mod slurm;

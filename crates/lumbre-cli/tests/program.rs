@@ -64,7 +64,7 @@ pub(crate) fn stdout(output: &Output) -> String {
 #[test]
 fn every_command_has_help_with_an_example() {
     let desk = Desk::new();
-    for command in ["render", "cast", "info", "diff", "completions", "man"] {
+    for command in ["render", "cast", "info", "diff", "math", "completions", "man"] {
         let help = desk.lumbre(&[command, "--help"]);
         assert_eq!(code(&help), 0);
         assert!(stdout(&help).contains(&format!("  lumbre {command} ")), "{command}: {}", stdout(&help));

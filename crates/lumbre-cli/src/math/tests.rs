@@ -1,0 +1,180 @@
+//! The language from within: no text makes it panic, and what it prints reads back.
+
+use lumbre::math::random::RandomStream;
+
+use super::english::ENGLISH;
+use super::functions;
+use super::session::{Outcome, Session};
+use super::value::Value;
+use super::{Form, message, shown};
+
+/// The value of the last statement.
+fn value(text: &str) -> Result<Value, String> {
+    let mut last = None;
+    let run = Session::new(&ENGLISH).run(text, |outcome| {
+        last = Some(outcome);
+        Ok::<(), ()>(())
+    });
+    run.map_err(|wrong| message("expression", text, &wrong))?.expect("nothing stops it");
+    match last {
+        Some(Outcome::Value { value, .. }) => Ok(value),
+        other => Err(format!("{text}: {other:?}")),
+    }
+}
+
+fn line(text: &str) -> String {
+    value(text).unwrap_or_else(|message| panic!("{message}")).line()
+}
+
+#[test]
+fn random_tokens_are_evaluated_or_refused_and_never_panic() {
+    let mut words: Vec<String> = functions::all().map(|function| format!("{}(", function.name)).collect();
+    let others = "0 1 -1 2 1e308 -1e-308 5e-324 90 0.5 pi x y z i j k a ans = ( ) [ ] , ; + - * / ^ ^-1 \
+        [1,2] [1,2,3] [0,0,0] [1,2,3,4] [[1,2],[3,4]] [[1,0,0],[0,1,0],[0,0,1]] [[0,0,0],[0,0,0],[0,0,0]] [1e200,0,-1e200] \
+        rotate_x(30) translate([1,2,3]) perspective(60,1,1,9) quat(1,2,3,4) quat(0,0,0,0) help € \u{0} \" . .. 1e 2x # ";
+    words.extend(others.split(' ').map(str::to_owned));
+    words.push("\n".into());
+    let simple: Vec<&String> = words.iter().filter(|word| value(word).is_ok()).collect();
+    let mut random = RandomStream::new(5);
+    let (mut values, mut mistakes) = (0, 0);
+    for _ in 0..6000 {
+        let count = 1 + random.next_below(9);
+        let mut text = String::new();
+        for _ in 0..count {
+            text += &words[random.next_below(words.len())];
+            text += if random.next_below(4) == 0 { "" } else { " " };
+        }
+        // Half of them are calls that are well formed, so that the functions see odd values.
+        if random.next_below(2) == 0 {
+            let function =
+                functions::all().nth(random.next_below(functions::all().count())).expect("it is below");
+            let form = function.forms[random.next_below(function.forms.len())];
+            let arguments = form.split(',').map(|_| simple[random.next_below(simple.len())].as_str());
+            text = format!("{}({})", function.name, arguments.collect::<Vec<_>>().join(", "));
+        }
+        let mut session = Session::new(&ENGLISH);
+        let run = session.run(&text, |outcome| {
+            assert!(!shown(&outcome, Form::Text).is_empty());
+            let json = shown(&outcome, Form::Json);
+            assert!(
+                serde_json::from_str::<serde_json::Value>(&json).is_ok_and(|json| json.is_object()),
+                "{json}"
+            );
+            if let Outcome::Value { value, .. } = outcome {
+                assert!(value.is_finite(), "{text}: {value:?}");
+                values += 1;
+            }
+            Ok::<(), ()>(())
+        });
+        if let Err(wrong) = run {
+            assert!(wrong.offset <= text.len(), "{text}");
+            assert!(message("expression", &text, &wrong).starts_with("expression:"), "{text}");
+            mistakes += 1;
+        }
+    }
+    assert!(values > 500 && mistakes > 2000, "{values} values, {mistakes} mistakes");
+}
+
+#[test]
+fn deep_brackets_signs_and_long_sums_do_not_exhaust_the_stack() {
+    for open in ["(", "[", "-(", "2^", "sqrt("] {
+        let message = value(&open.repeat(100_000)).expect_err("it has no end");
+        assert!(message.contains("at most 100"), "{open}: {message}");
+    }
+    assert_eq!(line(&format!("{}1", "-".repeat(100_001))), "-1");
+    assert_eq!(line(&vec!["1"; 100_000].join("+")), "100000");
+}
+
+#[test]
+fn what_is_printed_reads_back() {
+    for text in [
+        "1/3",
+        "[1/3, -1e-7, 1e300]",
+        "rotate([1, 2, 3], 40) * translate([0.1, 0.2, 0.3])",
+        "quat_about([1, 2, 3], 77)",
+        "[[1/3, 2], [1e17, -4]]",
+        "perspective(50, 1.5, 0.1, 90)",
+    ] {
+        let first = value(text).expect("it is right");
+        assert_eq!(line(text), line(&line(text)));
+        assert_eq!(value(&first.lines().join("\n")).expect("it reads back").line(), first.line());
+    }
+}
+
+#[test]
+fn operators_bind_as_in_mathematics() {
+    for (text, expected) in [
+        ("1 + 2 * 3", "7"),
+        ("(1 + 2) * 3", "9"),
+        ("7 - 2 - 1", "4"),
+        ("-2^2", "-4"),
+        ("2^3^2", "512"),
+        ("2^-1", "0.5"),
+        ("a = 2; b = a * 3; a + b", "8"),
+        ("2; ans * 5", "10"),
+        ("i*j", "quat(0, 0, 0, 1)"),
+        ("1 + 2*i - j/2", "quat(1, 2, -0.5, 0)"),
+        ("[1, 2,\n 3] # a comment", "[1, 2, 3]"),
+        (
+            "[[1, 7], [2, 3], [5, 4]] * [[2, 5, 8, 10], [2.2, 3, -2.5, 5]]",
+            "[[17.400000000000002, 26, -9.5, 45], [10.600000000000001, 19, 8.5, 35], [18.8, 37, 30, 70]]",
+        ),
+        ("[1, 0, 0] * transpose(translate([5, 6, 7]))", "[6, 6, 7]"),
+        ("[1, 0, 0, 1] * transpose(translate([5, 6, 7]))", "[6, 6, 7, 1]"),
+    ] {
+        assert_eq!(line(text), expected, "{text}");
+    }
+}
+
+#[test]
+fn mistakes_say_where_what_and_what_would_do() {
+    for (text, expected) in [
+        (
+            "1 + crosss(x, y)",
+            "expression:1:5: unknown function (found \"crosss\"; expected a name of the list that `help` prints; did you mean \"cross\"?)\n  1 + crosss(x, y)\n      ^",
+        ),
+        (
+            "dot(x, 3)",
+            "expression:1:8: wrong argument 2 of dot (found 3; expected a vector of 2 or 3)\n  dot(x, 3)\n         ^",
+        ),
+        (
+            "a = x\ndot(a)",
+            "expression:2:1: wrong number of arguments of dot (found 1; expected dot(a, b))\n  dot(a)\n  ^",
+        ),
+        (
+            "x * y",
+            "expression:1:3: these have no * (found a vector of 3 * a vector of 3; expected dot(a, b) or cross(a, b))\n  x * y\n    ^",
+        ),
+        (
+            "1 / 0",
+            "expression:1:3: the result is not finite (found inf; expected numbers that stay finite)\n  1 / 0\n    ^",
+        ),
+        (
+            "[1, 2",
+            "expression:1:6: this does not belong here (found the end; expected , or ])\n  [1, 2\n       ^",
+        ),
+        (
+            "look_at(x, x, y)",
+            "expression:1:12: wrong argument 2 of look_at (found [1, 0, 0]; expected a target away from the eye)\n  look_at(x, x, y)\n             ^",
+        ),
+        (
+            "dot = 3",
+            "expression:1:1: this name means something already (found \"dot\"; expected another name)\n  dot = 3\n  ^",
+        ),
+        (
+            "2x",
+            "expression:1:1: this is not a number (found \"2x\"; expected a number such as 2, 0.5 or 1e-3, and * between factors)\n  2x\n  ^",
+        ),
+    ] {
+        assert_eq!(value(text).expect_err(text), expected);
+    }
+}
+
+#[test]
+fn every_function_is_described_and_nothing_else() {
+    for function in functions::all() {
+        assert!(!ENGLISH.about(function.name).is_empty(), "{}", function.name);
+    }
+    let unknown = ENGLISH.functions.iter().find(|(name, _)| functions::find(name).is_none());
+    assert_eq!(unknown, None);
+}

@@ -1,0 +1,354 @@
+//! `lumbre math` against reference data computed with 120 digits, and as a person or a script meets it.
+
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
+use std::io::Write;
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+
+use crate::program::{Desk, code, stderr, stdout};
+
+/// Expressions with what each should give, as numbers row by row.
+#[derive(Default)]
+struct Checks {
+    script: String,
+    expected: Vec<(String, Vec<f64>)>,
+}
+
+impl Checks {
+    fn add(&mut self, expression: String, expected: &Value) {
+        let numbers = numbers(expected);
+        assert!(!numbers.is_empty(), "{expression} = {expected}");
+        self.script += &format!("{expression}\n");
+        self.expected.push((expression, numbers));
+    }
+
+    /// All of them in one script, whose answers are JSON.
+    fn check(&self) {
+        let desk = Desk::new();
+        desk.write("script.txt", &self.script);
+        let out = desk.lumbre(&["math", "--json", "--file", "script.txt"]);
+        assert_eq!(code(&out), 0, "{}", stderr(&out));
+        let text = stdout(&out);
+        let answers: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        assert_eq!(answers.len(), self.expected.len());
+        for (answer, (expression, expected)) in answers.iter().zip(&self.expected) {
+            let found = numbers(&answer["value"]);
+            assert_eq!(found.len(), expected.len(), "{expression}: {answer}");
+            let scale = expected.iter().fold(0.0_f64, |most, e| most.max(e.abs()));
+            let slack = 1e-13 * if scale > 0.0 { scale } else { 1.0 };
+            for (f, e) in found.iter().zip(expected) {
+                assert!((f - e).abs() <= slack, "{expression}: {found:?}, not {expected:?}");
+            }
+        }
+    }
+}
+
+/// The numbers of nested lists in their order.
+fn numbers(value: &Value) -> Vec<f64> {
+    match value {
+        Value::Array(items) => items.iter().flat_map(numbers).collect(),
+        other => vec![other.as_f64().unwrap_or_else(|| panic!("{other} is no number"))],
+    }
+}
+
+/// A list as a matrix with rows of this length.
+fn rows(value: &Value, length: usize) -> String {
+    let rows: Vec<String> = numbers(value).chunks(length).map(|row| format!("{row:?}")).collect();
+    format!("[{}]", rows.join(", "))
+}
+
+fn quat(value: &Value) -> String {
+    format!("quat({})", format!("{:?}", numbers(value)).trim_matches(['[', ']']))
+}
+
+#[test]
+fn every_reference_vector_of_vectors_transforms_cameras_and_quaternions_holds() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/vectors.json");
+    let all: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let mut seen = 0;
+    let mut family = |name: &str, count: usize| {
+        let records = all[name].as_array().unwrap().clone();
+        assert_eq!(records.len(), count, "{name}");
+        seen += count;
+        records
+    };
+    let mut checks = Checks::default();
+    let in_degrees = |radians: &Value| Value::from(radians.as_f64().unwrap().to_degrees());
+    for r in family("vector", 6) {
+        let (a, b) = (&r["a"], &r["b"]);
+        checks.add(format!("dot({a}, {b})"), &r["dot"]);
+        checks.add(format!("cross({a}, {b})"), &r["cross"]);
+        checks.add(format!("cross_matrix({a}) * {b}"), &r["cross"]);
+        checks.add(format!("angle({a}, {b})"), &in_degrees(&r["angle_rad"]));
+        checks.add(format!("projected_length({a}, {b})"), &r["proj_len_b_on_a"]);
+        checks.add(format!("project({a}, {b})"), &r["proj_b_on_a"]);
+        checks.add(format!("project({a}, {b}) + reject({a}, {b})"), b);
+    }
+    for r in family("matrix_product", 3) {
+        let is_number = r["product"]
+            .as_array()
+            .is_some_and(|rows| rows.len() == 1 && rows[0].as_array().unwrap().len() == 1);
+        let product = if is_number { &r["product"][0] } else { &r["product"] };
+        checks.add(format!("{} * {}", r["a"], r["b"]), product);
+    }
+    for r in family("axis_angle", 12) {
+        let (axis, angle, v) = (&r["axis"], &r["angle_deg"], &r["v"]);
+        checks.add(format!("linear(rotate({axis}, {angle}))"), &r["matrix3"]);
+        checks.add(format!("rotate({axis}, {angle}, {v})"), &r["rotated"]);
+        checks.add(format!("rotate({axis}, {angle}) * {v}"), &r["rotated"]);
+        checks.add(format!("quat_about({axis}, {angle})"), &r["quaternion"]);
+        checks.add(format!("rotate(quat_about({axis}, {angle}), {v})"), &r["rotated"]);
+    }
+    let mut recovered = 0;
+    for r in family("euler", 18) {
+        let euler = format!("euler({}, {}, {})", r["heading_deg"], r["attitude_deg"], r["bank_deg"]);
+        checks.add(euler.clone(), &r["quaternion"]);
+        checks.add(format!("matrix({euler})"), &r["matrix3"]);
+        checks.add(format!("matrix(euler(angles({euler})))"), &r["matrix3"]);
+        // Beside a pole, not at it, single angles are uncertain by about 1e-16 / cos(attitude).
+        let attitude = r["attitude_deg"].as_f64().unwrap().abs();
+        if attitude < 89.0 || !r["pole"].is_null() {
+            checks.add(format!("angles({euler})"), &r["recovered_deg"]);
+            recovered += 1;
+        }
+    }
+    for r in family("quaternion", 10) {
+        let (p, q) = (quat(&r["p"]), quat(&r["q"]));
+        checks.add(format!("{p} + {q}"), &r["sum"]);
+        checks.add(format!("{p} * {q}"), &r["product"]);
+        checks.add(format!("conjugate({p})"), &r["conjugate_p"]);
+        checks.add(format!("length({p})"), &r["norm_p"]);
+        checks.add(format!("inverse({p})"), &r["inverse_p"]);
+    }
+    for r in family("quaternion_rotate", 6) {
+        let q = quat(&r["quaternion"]);
+        checks.add(format!("rotate({q}, {})", r["v"]), &r["rotated"]);
+        checks.add(format!("matrix({q})"), &r["matrix3"]);
+    }
+    let mut parallel = 0;
+    for r in family("frame", 7) {
+        let expression = format!("frame({}, {})", r["a"], r["b"]);
+        if r["u"].is_null() {
+            let out = Desk::new().lumbre(&["math", &expression]);
+            assert_eq!(code(&out), 2);
+            assert!(stderr(&out).contains("not parallel to the first"), "{}", stderr(&out));
+            parallel += 1;
+        } else {
+            checks.add(expression, &Value::from(vec![r["u"].clone(), r["v"].clone(), r["w"].clone()]));
+        }
+    }
+    assert!(parallel > 0);
+    for r in family("onb", 10) {
+        let axes = vec![r["b1"].clone(), r["b2"].clone(), r["unit_n"].clone()];
+        checks.add(format!("frame({})", r["n"]), &Value::from(axes));
+    }
+    for r in family("look_at", 12) {
+        let name = if r["handedness"] == "right" { "look_at" } else { "look_at_left" };
+        let expression = format!("{name}({}, {}, {})", r["eye"], r["center"], r["up"]);
+        checks.add(expression.clone(), &r["matrix"]);
+        checks.add(format!("{expression} * {}", r["center"]), &r["center_image"]);
+    }
+    for r in family("ortho", 5) {
+        let sides =
+            ["left", "right", "bottom", "top", "near", "far"].map(|side| r[side].to_string()).join(", ");
+        checks.add(format!("ortho({sides})"), &r["matrix"]);
+        checks.add(format!("ortho({sides}) * {}", r["point"]), &r["image"]);
+    }
+    for r in family("perspective", 5) {
+        let m = format!("perspective({}, {}, {}, {})", r["fovy_deg"], r["aspect"], r["near"], r["far"]);
+        checks.add(m.clone(), &r["matrix"]);
+        for point in r["points"].as_array().unwrap() {
+            checks.add(format!("clip({m}, {})", point["point"]), &point["clip"]);
+            checks.add(format!("{m} * {}", point["point"]), &point["ndc"]);
+        }
+    }
+    for r in family("simple_projection", 3) {
+        checks.add(format!("simple_perspective({})", r["d"]), &r["matrix"]);
+        checks.add(format!("simple_perspective({}) * {}", r["d"], r["point"]), &r["image"]);
+    }
+    for r in family("normal_transform", 8) {
+        checks.add(format!("normal({}, {})", rows(&r["matrix3"], 3), r["normal"]), &r["transformed"]);
+    }
+    for r in family("composition", 6) {
+        let arguments = format!("{}, {}, {}", r["scale"], r["angles_deg"], r["translate"]);
+        let p = &r["point"];
+        checks.add(format!("row_chain({arguments})"), &r["row_matrix"]);
+        checks.add(format!("{p} * row_chain({arguments})"), &r["row_image"]);
+        checks.add(format!("transpose(row_chain({arguments}))"), &r["column_matrix_equivalent"]);
+        checks.add(format!("chain({arguments})"), &r["column_matrix_same_angles"]);
+        checks.add(format!("chain({arguments}) * {p}"), &r["column_image_same_angles"]);
+        checks.add(format!("{p} * row_form(chain({arguments}))"), &r["column_image_same_angles"]);
+        checks.add(format!("inverse(chain({arguments})) * (chain({arguments}) * {p})"), p);
+    }
+    for r in family("camera_ray", 8) {
+        let size = format!("[{}, {}]", r["width"], r["height"]);
+        let view = format!("{}, {}, {}, {}", r["eye"], r["center"], r["up"], r["fovy_deg"]);
+        checks.add(format!("camera_ray({view}, {size}, {})", r["pixel"]), &r["direction_unit"]);
+    }
+    assert_eq!(seen, 119);
+    assert!(recovered >= 14, "{recovered}");
+    checks.check();
+}
+
+fn piped(arguments: &[&str], input: &str) -> Output {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_lumbre"))
+        .args(arguments)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // It may end before it has read everything.
+    let _ = child.stdin.take().unwrap().write_all(input.as_bytes());
+    child.wait_with_output().unwrap()
+}
+
+#[test]
+fn an_expression_prints_its_steps_and_then_its_value() {
+    let out = Desk::new().lumbre(&["math", "rotate_z(90) * [2, 3, 5]"]);
+    assert_eq!(code(&out), 0, "{}", stderr(&out));
+    let text = stdout(&out);
+    assert!(text.starts_with("rotate_z(degrees)\n  R = cos θ I"), "{text}");
+    assert!(
+        text.contains("\n  | 0  -1  0  0 | | 2 |   | -3 |\n  | 1   0  0  0 | | 3 | = |  2 |\n"),
+        "{text}"
+    );
+    assert!(text.ends_with("\n= [-3, 2, 5]\n"), "{text}");
+    for (words, result) in [
+        (&["-1", "+", "2", "*", "3"][..], "= 5\n"),
+        (&["-2^2 + 1"], "= -3\n"),
+        (&["-x"], "= [-1, 0, 0]\n"),
+        (&["7", "-", "3"], "= 4\n"),
+    ] {
+        let out = Desk::new().lumbre(&[&["math"], words].concat());
+        assert_eq!(stdout(&out), result, "{}", stderr(&out));
+    }
+}
+
+#[test]
+fn json_has_the_value_its_kind_and_the_steps() {
+    let out = Desk::new().lumbre(&["math", "T = translate([1, 2, 3]); [1, 2] / 2", "--json"]);
+    assert_eq!(code(&out), 0, "{}", stderr(&out));
+    let results: Vec<Value> = stdout(&out).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(results.len(), 2);
+    assert_eq!((&results[0]["name"], &results[0]["type"]), (&"T".into(), &"transform".into()));
+    assert_eq!(results[0]["value"][1], serde_json::json!([0.0, 1.0, 0.0, 2.0]));
+    assert_eq!(results[0]["steps"][0]["operation"], "translate(v)");
+    assert!(results[0]["steps"][0]["lines"].as_array().unwrap().len() > 3);
+    assert_eq!((&results[1]["name"], &results[1]["value"]), (&Value::Null, &serde_json::json!([0.5, 1.0])));
+}
+
+#[test]
+fn lines_of_standard_input_share_names_and_go_on_where_a_bracket_is_open() {
+    let out = piped(&["math"], "v = [3,\n 4]\nlength(v)\nans * 2\n\nquit\n1 / 0\n");
+    assert_eq!(code(&out), 0, "{}", stderr(&out));
+    let text = stdout(&out);
+    let results: Vec<&str> =
+        text.lines().filter(|line| !line.starts_with(' ') && line.contains("= ")).collect();
+    assert_eq!(results, ["v = [3, 4]", "= 5", "= 10"]);
+}
+
+#[test]
+fn mistakes_have_their_place_and_the_exit_status_of_their_source() {
+    let desk = Desk::new();
+    let out = desk.lumbre(&["math", "dott(x, y)"]);
+    assert_eq!((code(&out), stdout(&out).as_str()), (2, ""));
+    assert!(
+        stderr(&out).starts_with("error: expression:1:1: unknown function (found \"dott\""),
+        "{}",
+        stderr(&out)
+    );
+    assert!(stderr(&out).contains("did you mean \"dot\"?)\n  dott(x, y)\n  ^\n"), "{}", stderr(&out));
+
+    desk.write("script.txt", "\u{feff}a = 2 # fine\r\n\r\na * x * y\r\n");
+    let out = desk.lumbre(&["math", "--file", "script.txt"]);
+    assert_eq!(code(&out), 3);
+    assert!(stderr(&out).starts_with("error: script.txt:3:7: these have no *"), "{}", stderr(&out));
+    assert!(stdout(&out).starts_with("a = 2\n"), "what comes before is done: {}", stdout(&out));
+
+    let out = piped(&["math"], "1\n2 +\n");
+    assert_eq!(code(&out), 3);
+    assert!(
+        stderr(&out).starts_with("error: standard input:2:4: this does not belong here"),
+        "{}",
+        stderr(&out)
+    );
+
+    // Minutes, if each line were read again with those before it.
+    let out = piped(&["math"], &format!("[{}", "1,\n".repeat(400_000)));
+    assert_eq!(code(&out), 3);
+    assert!(stderr(&out).contains("an expression of 1048576 bytes or more"), "{}", stderr(&out));
+    let out = desk.lumbre(&["math", &format!("[{}", "1, ".repeat(1000))]);
+    assert!(
+        stderr(&out).contains("too many values between brackets (expected at most 16)"),
+        "{}",
+        stderr(&out)
+    );
+
+    desk.write("deep.txt", &"-(sqrt([2^".repeat(50_000));
+    let out = desk.lumbre(&["math", "--file", "deep.txt"]);
+    assert_eq!(code(&out), 3);
+    assert!(
+        stderr(&out).contains("too many brackets within each other (expected at most 100)"),
+        "{}",
+        stderr(&out)
+    );
+
+    let out = desk.lumbre(&["math", "--file", "missing.txt"]);
+    assert_eq!(code(&out), 4);
+    std::fs::write(desk.path("bytes"), [0xff, 0xfe, 0]).unwrap();
+    let out = desk.lumbre(&["math", "--file", "bytes"]);
+    assert_eq!((code(&out), stderr(&out).trim_end()), (3, "error: bytes: not text in UTF-8"));
+    assert_eq!(code(&desk.lumbre(&["math", "--jsn", "1"])), 2);
+}
+
+#[test]
+fn help_lists_the_functions() {
+    let desk = Desk::new();
+    let all = stdout(&desk.lumbre(&["math", "help"]));
+    for name in ["dot(a, b)", "look_at(eye, target, up)", "euler(heading, attitude, bank)"] {
+        assert!(all.contains(name), "{all}");
+    }
+    let one = desk.lumbre(&["math", "help angles"]);
+    assert_eq!(stdout(&one), "angles(q)\n    heading, attitude and bank of a quaternion, in degrees\n");
+}
+
+/// Rows of its tables of functions are: call, meaning, example, result.
+#[test]
+fn the_manual_has_every_form_of_every_function_with_an_example_that_is_right() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/math.md");
+    let manual = std::fs::read_to_string(path).unwrap();
+    let desk = Desk::new();
+    let help = stdout(&desk.lumbre(&["math", "help"]));
+    let calls =
+        help.lines().filter(|line| line.contains('(') && line.ends_with(')') && !line.starts_with(' '));
+    let forms: Vec<&str> = calls.flat_map(|line| line.split(" | ")).collect();
+    assert!(forms.len() > 60, "{forms:?}");
+    let (mut script, mut shown) = (String::new(), vec![]);
+    for form in forms {
+        let start = format!("| `{form}` |");
+        let row = manual.lines().find(|row| row.starts_with(&start));
+        assert!(row.is_some(), "{form} is missing");
+    }
+    for row in manual.lines().filter(|row| row.starts_with("| `")) {
+        let cells: Vec<&str> =
+            row.trim_matches('|').split(" | ").map(|cell| cell.trim().trim_matches('`')).collect();
+        if let [_, _, example, result] = cells[..] {
+            script += &format!("{example}\n{result}\n");
+            shown.push(row);
+        }
+    }
+    desk.write("examples.txt", &script);
+    let out = desk.lumbre(&["math", "--json", "--file", "examples.txt"]);
+    assert_eq!(code(&out), 0, "{}", stderr(&out));
+    let text = stdout(&out);
+    let values: Vec<Value> =
+        text.lines().map(|line| serde_json::from_str::<Value>(line).unwrap()["value"].take()).collect();
+    assert_eq!(values.len(), 2 * shown.len());
+    for (pair, row) in values.chunks(2).zip(shown) {
+        // The sign of zero is not printed.
+        assert_eq!(numbers(&pair[0]), numbers(&pair[1]), "{row}");
+    }
+}
