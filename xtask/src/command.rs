@@ -60,9 +60,20 @@ pub fn release_program() -> Result<PathBuf> {
     program("lumbre-cli", "lumbre", Profile::Release)
 }
 
+/// Where cargo puts what it builds.
+pub fn target() -> PathBuf {
+    root().join(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
+}
+
+/// Builds all that the tests build, by the same features, so that nothing is compiled a second time, and says where it lies.
+pub fn built_as_for_tests() -> Result<PathBuf> {
+    run("cargo", &["build", "--workspace"])?;
+    Ok(target().join("debug"))
+}
+
 /// Builds the program of this name in one of our packages and says where it lies.
-pub fn program(package: &str, name: &str, profile: Profile) -> Result<PathBuf> {
-    let target = root().join(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()));
+fn program(package: &str, name: &str, profile: Profile) -> Result<PathBuf> {
+    let target = target();
     let build = ["build", "--package", package, "--bin", name];
     let folder = match profile {
         Profile::Dev => {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
-use xtask::command::{self, Profile, run_with, succeeds};
+use xtask::command::{self, run_with, succeeds};
 
 /// Where its sources are.
 const FOLDER: &str = "crates/lumbre-viewer/web";
@@ -26,8 +26,7 @@ pub(crate) fn run() -> Result<()> {
         eprintln!("\nThe viewer's page is not tried: it needs Chromium (Debian: apt-get install chromium)");
         return Ok(());
     };
-    // That of the tests before, which is built already.
-    let program = command::program("lumbre-cli", "lumbre", Profile::Dev)?;
+    let program = command::built_as_for_tests()?.join(format!("lumbre{}", std::env::consts::EXE_SUFFIX));
     let (program, browser) = (program.to_string_lossy(), browser.to_string_lossy());
     let test = format!("{FOLDER}/tests/run.mjs");
     run_with("node", &[&test], &[("LUMBRE", &program), ("CHROMIUM", &browser)])

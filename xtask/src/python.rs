@@ -1,10 +1,10 @@
 //! The tests of the Python package, in a virtual environment under `target`.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::{env, fs};
 
 use anyhow::{Context, Result};
-use xtask::command::{root, run, run_with, succeeds};
+use xtask::command::{built_as_for_tests, root, run, run_with, succeeds, target};
 
 /// What the environment needs besides Python.
 const REQUIREMENTS: &str = "crates/lumbre-python/tests/requirements.txt";
@@ -82,19 +82,15 @@ fn trimesh_tests(python: &str) -> Option<String> {
 
 /// Builds the native module and puts it beside the sources, where Python finds it.
 fn build_module(package: &Path) -> Result<()> {
-    run("cargo", &["build", "--package", "lumbre-python"])?;
+    let built = built_as_for_tests()?;
     let name = format!("{}_lumbre{}", env::consts::DLL_PREFIX, env::consts::DLL_SUFFIX);
-    let built = target().join("debug").join(name);
+    let built = built.join(name);
     let module =
         package.join("python/lumbre").join(if cfg!(windows) { "_lumbre.pyd" } else { "_lumbre.abi3.so" });
     // What is loaded somewhere keeps the old file.
     drop(fs::remove_file(&module));
     fs::copy(&built, &module).with_context(|| format!("cannot copy {}", built.display()))?;
     Ok(())
-}
-
-fn target() -> PathBuf {
-    root().join(env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
 }
 
 fn text(path: &Path) -> String {
