@@ -144,8 +144,11 @@ class Accidents(threading.Thread):
     def run(self) -> None:
         frozen: list[subprocess.Popen[bytes]] = []
         kills = 0
-        while not self.over.wait(self.random.uniform(0.02, 0.4)):
-            worker, what = self.random.choice(self.farm.workers), self.random.choice(["kill", "freeze", "wake"])
+        # A quick machine has a picture before chance would do anything.
+        first = ["kill", "freeze"]
+        while first or not self.over.wait(self.random.uniform(0.02, 0.4)):
+            worker = self.random.choice(self.farm.workers)
+            what = first.pop() if first else self.random.choice(["kill", "freeze", "wake"])
             if what == "kill" and kills < 3:
                 kills += 1
                 worker.kill()

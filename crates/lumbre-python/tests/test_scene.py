@@ -6,6 +6,7 @@ import copy
 import pickle
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -193,8 +194,19 @@ def test_render_options_out_of_range_are_refused() -> None:
 
 def test_progress_is_told_and_may_stop_a_render() -> None:
     told: list[tuple[int, int | None, float]] = []
-    small_scene().render(spp=4, size=(32, 24), progress=lambda *state: told.append(state))
-    assert told and told[-1][0] <= 4 * 32 * 24 and told[-1][1] == 4 * 32 * 24
+    # So many samples that the time between two reports is over, on whatever machine, before it is done.
+    limit = RuntimeError("told thrice")
+
+    def listen(*state: Any) -> None:
+        told.append(state)
+        if len(told) == 3:
+            raise limit
+
+    with pytest.raises(RuntimeError, match="told thrice"):
+        small_scene().render(spp=100_000, size=(32, 24), progress=listen)
+    wanted = 100_000 * 32 * 24
+    assert all(samples <= wanted and total == wanted and 0 <= share <= 1 for samples, total, share in told), told
+    assert told[0][0] < told[1][0] < told[2][0], told
 
     def stop(samples: int, total: int | None, share: float) -> None:
         raise RuntimeError("enough")
