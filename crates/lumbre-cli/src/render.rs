@@ -88,7 +88,7 @@ pub(crate) struct Arguments {
     /// Stop after this time, counted from the start (of each frame), as 90s, 2m or 1h30m.
     #[arg(long, value_name = "DUR", value_parser = units::duration)]
     time: Option<Duration>,
-    /// Stop sampling a pixel when its noise is estimated to be below this share of its luminance, such as 0.02; at 16384 samples at
+    /// Stop sampling a pixel when its noise is estimated to be below this share of its luminance, such as 0.02; at 1024 samples at
     /// the latest, or at --spp.
     #[arg(long, value_name = "R", value_parser = noise)]
     noise: Option<f64>,
@@ -305,7 +305,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 const LEAST_TIME: Duration = Duration::from_millis(400);
 
 /// Samples per pixel at most, where its noise ends its sampling: some never come to little noise.
-const MOST_FOR_NOISE: u32 = 1 << 14;
+const MOST_FOR_NOISE: u32 = 1024;
 
 /// Samples per pixel of a model without camera and light, of which the noise is taken out.
 pub(crate) const MODEL_SPP: u32 = 16;

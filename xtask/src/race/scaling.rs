@@ -94,7 +94,13 @@ impl Scaling {
         fs::create_dir_all(&out)?;
         let plot = svg("Growth", ["number", "microseconds a path"], &lines);
         fs::write(out.join("scaling.svg"), plot)?;
-        fs::write(out.join("scaling.md"), table)?;
+        let threads = self.threads;
+        let head = format!(
+            "# Growth\n\nThe time of a path of {SIZE} x {SIZE} pixels and {SPP} samples, least of {} runs, with {threads} threads: \
+             `cargo xtask bench scaling --threads {threads}`.\n\n![The plot](scaling.svg)\n\n",
+            self.runs
+        );
+        fs::write(out.join("scaling.md"), head + &table)?;
         println!("\n{} and scaling.svg beside it", out.join("scaling.md").display());
         Ok(())
     }

@@ -405,7 +405,7 @@ class Scene:
         seed : whole number, 0 or more
         threads : 0 for one a core
         time, noise : seconds, and relative noise
-            The render stops at whichever of spp, time and noise comes first.
+            The render stops at whichever of spp, time and noise comes first; a pixel whose noise stays high at 1024 samples.
         transparent : leave out what is behind everything, and keep the coverage as `Image.alpha`
         features : gather albedo, normal, depth and uv as well, for `Image.feature`
         denoise : take the noise out
@@ -439,7 +439,10 @@ class Scene:
             "first_sample": first_sample,
         }
         options = {name: value for name, value in given.items() if value is not None}
-        if spp is None and (time is not None or noise is not None):
+        if spp is None and noise is not None:
+            # As in the program: some pixels never come to little noise.
+            options["spp"] = 1024
+        elif spp is None and time is not None:
             options["spp"] = 2**32 - 1
         if progress is True:
             with _Bar() as bar:
