@@ -50,7 +50,7 @@ pub struct State {
 
 /// The picture after a pass.
 pub struct Snapshot<'a> {
-    /// Samples of every pixel.
+    /// Samples of every pixel; where noise ends their sampling, of those that it has not ended.
     pub spp: u32,
     /// The noise, as [`crate::Stop::noise`] defines it; `None` before there are two samples.
     pub noise: Option<f64>,
