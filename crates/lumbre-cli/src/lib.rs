@@ -29,6 +29,7 @@ mod preview;
 mod progress;
 mod reading;
 mod render;
+mod report;
 mod signals;
 mod staging;
 mod tev;
