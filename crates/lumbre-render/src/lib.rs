@@ -23,7 +23,7 @@ pub use cancel::CancelToken;
 pub use denoise::{Denoised, denoise};
 pub use error::RenderError;
 pub use job::{Keeper, render, render_from, render_with};
-pub use one_sample::{ExplainedSample, explain_sample};
+pub use one_sample::{ExplainedSample, explain_ray, explain_sample};
 pub use options::{RenderOptions, Stop};
 pub use progress::{NoProgress, Progress, Snapshot, State};
 pub use rendered::{DroppedSample, Rendered, Stats};

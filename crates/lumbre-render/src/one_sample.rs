@@ -2,7 +2,7 @@
 
 use lumbre_geometry::Ray;
 use lumbre_math::DVec2;
-use lumbre_scene::{Scene, View};
+use lumbre_scene::{CameraRay, Footprint, Scene, View};
 use lumbre_shading::Spectrum;
 
 use crate::film::{FeatureSample, Filter, Sample};
@@ -60,6 +60,13 @@ impl<'a> Taker<'a> {
     /// The sample of a pixel with this number.
     pub(crate) fn take(&self, x: u32, y: u32, index: u32, record: &mut Record) -> Sample {
         self.taken(x, y, index, record).sample
+    }
+
+    /// The light along a ray of no pixel, with the random numbers of one.
+    fn along(&self, ray: &Ray, index: u32, record: &mut Record) -> Spectrum {
+        let draw = self.sampler.draw(0, 0, index);
+        let sight = Sight::new(self.scene, CameraRay { ray: *ray, footprint: Footprint::Point }, record);
+        see(self.integrator, self.scene, &self.view, sight, &draw, self.lights_are_seen, record).radiance
     }
 
     #[inline]
@@ -128,4 +135,22 @@ pub fn explain_sample(
     let Taken { film, lens, ray, sample } = taker.taken(x, y, index, &mut record);
     let events = record.journal.unwrap_or_default();
     Ok(ExplainedSample { film, lens, ray, radiance: sample.radiance, weight: sample.weight, events })
+}
+
+/// An estimate of the light that arrives along a ray, as the render would make it, with all that happens along its path. The number
+/// chooses among such estimates. The direction must be unit.
+///
+/// # Errors
+/// [`RenderError`] for options that make no picture.
+pub fn explain_ray(
+    scene: &Scene,
+    options: &RenderOptions,
+    ray: &Ray,
+    index: u32,
+) -> Result<(Spectrum, Vec<Event>), RenderError> {
+    let integrator = integrator(&options.integrator);
+    let taker = Taker::new(scene, options, &*integrator)?;
+    let mut record = Record::with_journal();
+    let radiance = taker.along(ray, index, &mut record);
+    Ok((radiance, record.journal.unwrap_or_default()))
 }

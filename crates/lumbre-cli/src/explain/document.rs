@@ -25,7 +25,11 @@ pub(super) enum Item {
     /// A sentence that one should not miss.
     Remark(String),
     /// Rows of one kind, with a key for programs.
-    Table { key: &'static str, columns: Vec<Column>, rows: Vec<Vec<Value>> },
+    Table {
+        key: &'static str,
+        columns: Vec<Column>,
+        rows: Vec<Vec<Value>>,
+    },
     /// A drawing.
     Sketch(String),
 }
@@ -87,8 +91,8 @@ impl From<DVec3> for Value {
     }
 }
 
-impl From<lumbre::Spectrum> for Value {
-    fn from(light: lumbre::Spectrum) -> Self {
+impl From<lumbre::shading::Spectrum> for Value {
+    fn from(light: lumbre::shading::Spectrum) -> Self {
         Self::Colour(light.to_array())
     }
 }
@@ -153,7 +157,10 @@ impl Value {
             }
             Self::Matrix(m) => {
                 let rows = m.transpose().to_cols_array_2d();
-                format!("[{}]", rows.iter().map(|row| format!("[{}]", list(row))).collect::<Vec<_>>().join(", "))
+                format!(
+                    "[{}]",
+                    rows.iter().map(|row| format!("[{}]", list(row))).collect::<Vec<_>>().join(", ")
+                )
             }
             Self::Text(text) => text.clone(),
         }

@@ -8,8 +8,8 @@ use std::fmt::Write;
 enum Token {
     /// A letter or word with its primes and its subscript: `O′`, `t₁`, `det`.
     Symbol { base: String, primes: usize, subscript: String },
-    /// A numeral.
-    Number(String),
+    /// A numeral, with a power of ten where it has one.
+    Number { digits: String, exponent: String },
     /// Raised digits and signs, as `²` or `⁻¹`.
     Power(String),
     /// √, whose argument stands in the parentheses that follow.
@@ -23,24 +23,82 @@ const FUNCTIONS: [&str; 8] = ["min", "max", "sin", "cos", "tan", "atan2", "det",
 
 /// Subscripts with the characters that they stand for.
 const SUBSCRIPTS: [(char, char); 23] = [
-    ('₀', '0'), ('₁', '1'), ('₂', '2'), ('₃', '3'), ('₄', '4'), ('₅', '5'), ('₆', '6'), ('₇', '7'), ('₈', '8'), ('₉', '9'),
-    ('ₐ', 'a'), ('ₑ', 'e'), ('ₕ', 'h'), ('ᵢ', 'i'), ('ⱼ', 'j'), ('ₖ', 'k'), ('ₗ', 'l'), ('ₘ', 'm'), ('ₙ', 'n'), ('ₒ', 'o'),
-    ('ₚ', 'p'), ('ₓ', 'x'), ('ₜ', 't'),
+    ('₀', '0'),
+    ('₁', '1'),
+    ('₂', '2'),
+    ('₃', '3'),
+    ('₄', '4'),
+    ('₅', '5'),
+    ('₆', '6'),
+    ('₇', '7'),
+    ('₈', '8'),
+    ('₉', '9'),
+    ('ₐ', 'a'),
+    ('ₑ', 'e'),
+    ('ₕ', 'h'),
+    ('ᵢ', 'i'),
+    ('ⱼ', 'j'),
+    ('ₖ', 'k'),
+    ('ₗ', 'l'),
+    ('ₘ', 'm'),
+    ('ₙ', 'n'),
+    ('ₒ', 'o'),
+    ('ₚ', 'p'),
+    ('ₓ', 'x'),
+    ('ₜ', 't'),
 ];
 /// Raised characters with those that they stand for.
 const POWERS: [(char, char); 14] = [
-    ('⁰', '0'), ('¹', '1'), ('²', '2'), ('³', '3'), ('⁴', '4'), ('⁵', '5'), ('⁶', '6'), ('⁷', '7'), ('⁸', '8'), ('⁹', '9'),
-    ('⁻', '−'), ('ᵀ', 'T'), ('⁺', '+'), ('ⁿ', 'n'),
+    ('⁰', '0'),
+    ('¹', '1'),
+    ('²', '2'),
+    ('³', '3'),
+    ('⁴', '4'),
+    ('⁵', '5'),
+    ('⁶', '6'),
+    ('⁷', '7'),
+    ('⁸', '8'),
+    ('⁹', '9'),
+    ('⁻', '−'),
+    ('ᵀ', 'T'),
+    ('⁺', '+'),
+    ('ⁿ', 'n'),
 ];
 /// Greek letters with their names in LaTeX.
 const GREEK: [(&str, &str); 22] = [
-    ("α", "alpha"), ("β", "beta"), ("γ", "gamma"), ("δ", "delta"), ("ε", "varepsilon"), ("η", "eta"), ("θ", "theta"),
-    ("κ", "kappa"), ("λ", "lambda"), ("μ", "mu"), ("ν", "nu"), ("ξ", "xi"), ("π", "pi"), ("ρ", "rho"), ("σ", "sigma"),
-    ("τ", "tau"), ("φ", "varphi"), ("ψ", "psi"), ("ω", "omega"), ("Δ", "Delta"), ("Σ", "Sigma"), ("Φ", "Phi"),
+    ("α", "alpha"),
+    ("β", "beta"),
+    ("γ", "gamma"),
+    ("δ", "delta"),
+    ("ε", "varepsilon"),
+    ("η", "eta"),
+    ("θ", "theta"),
+    ("κ", "kappa"),
+    ("λ", "lambda"),
+    ("μ", "mu"),
+    ("ν", "nu"),
+    ("ξ", "xi"),
+    ("π", "pi"),
+    ("ρ", "rho"),
+    ("σ", "sigma"),
+    ("τ", "tau"),
+    ("φ", "varphi"),
+    ("ψ", "psi"),
+    ("ω", "omega"),
+    ("Δ", "Delta"),
+    ("Σ", "Sigma"),
+    ("Φ", "Phi"),
 ];
 
 fn stands_for(table: &[(char, char)], c: char) -> Option<char> {
     table.iter().find(|(from, _)| *from == c).map(|(_, to)| *to)
+}
+
+/// Whether a numeral begins here.
+fn is_numeral(rest: &std::iter::Peekable<std::str::Chars<'_>>) -> bool {
+    let mut ahead = rest.clone();
+    ahead.next_if_eq(&'-');
+    ahead.next().is_some_and(|c| c.is_ascii_digit())
 }
 
 fn tokens(formula: &str) -> Vec<Token> {
@@ -67,8 +125,21 @@ fn tokens(formula: &str) -> Vec<Token> {
             let low = take_while(&mut rest, &|c| stands_for(&SUBSCRIPTS, c).is_some());
             let subscript = low.chars().filter_map(|c| stands_for(&SUBSCRIPTS, c)).collect();
             tokens.push(Token::Symbol { base, primes, subscript });
-        } else if c.is_ascii_digit() {
-            tokens.push(Token::Number(take_while(&mut rest, &|c| c.is_ascii_digit() || c == '.')));
+        } else if is_numeral(&rest) {
+            // A hyphen is the sign of a number: what subtracts is the sign for minus.
+            let sign = rest.next_if_eq(&'-').map_or_else(String::new, String::from);
+            let digits = sign + &take_while(&mut rest, &|c| c.is_ascii_digit() || c == '.');
+            let mut after = rest.clone();
+            let has_e = after.next() == Some('e');
+            after.next_if_eq(&'-');
+            let has_exponent = has_e && after.next().is_some_and(|c| c.is_ascii_digit());
+            let exponent = if has_exponent {
+                rest.next();
+                take_while(&mut rest, &|c| c.is_ascii_digit() || c == '-')
+            } else {
+                String::new()
+            };
+            tokens.push(Token::Number { digits, exponent });
         } else {
             rest.next();
             tokens.push(if c == '√' { Token::Root } else { Token::Sign(c) });
@@ -122,6 +193,22 @@ impl Scope {
     }
 }
 
+/// The formula with a prime at each of these symbols that has none.
+pub(super) fn with_primes(formula: &str, symbols: &[&str]) -> String {
+    let mut written = String::new();
+    for mut token in tokens(formula) {
+        if let Token::Symbol { base, primes, subscript } = &mut token
+            && *primes == 0
+            && subscript.is_empty()
+            && symbols.contains(&base.as_str())
+        {
+            *primes = 1;
+        }
+        plain(&token, &mut written);
+    }
+    written
+}
+
 fn plain(token: &Token, out: &mut String) {
     let raise = |table: &[(char, char)], text: &str, out: &mut String| {
         out.extend(text.chars().filter_map(|c| table.iter().find(|(_, to)| *to == c).map(|(from, _)| *from)));
@@ -132,7 +219,12 @@ fn plain(token: &Token, out: &mut String) {
             out.extend(std::iter::repeat_n('′', *primes));
             raise(&SUBSCRIPTS, subscript, out);
         }
-        Token::Number(digits) => out.push_str(digits),
+        Token::Number { digits, exponent } => {
+            out.push_str(digits);
+            if !exponent.is_empty() {
+                let _ = write!(out, "e{exponent}");
+            }
+        }
         Token::Power(digits) => raise(&POWERS, digits, out),
         Token::Root => out.push('√'),
         Token::Sign(c) => out.push(*c),
@@ -165,7 +257,12 @@ pub(super) fn latex(formula: &str) -> String {
                     let _ = write!(out, "_{{{subscript}}}");
                 }
             }
-            Token::Number(digits) => out.push_str(digits),
+            Token::Number { digits, exponent } => {
+                out.push_str(digits);
+                if !exponent.is_empty() {
+                    let _ = write!(out, "\\cdot 10^{{{exponent}}}");
+                }
+            }
             Token::Power(digits) => {
                 let _ = write!(out, "^{{{}}}", digits.replace('−', "-"));
             }
@@ -256,9 +353,14 @@ pub(super) fn mathml(formula: &str) -> String {
                     (true, false) => format!("<msubsup>{name}{low}{primes}</msubsup>"),
                 });
             }
-            Token::Number(digits) => {
+            Token::Number { digits, exponent } => {
                 flush(&mut last, &mut out);
-                last = Some(format!("<mn>{digits}</mn>"));
+                let number = format!("<mn>{digits}</mn>");
+                last = Some(if exponent.is_empty() {
+                    number
+                } else {
+                    format!("<mrow>{number}<mo>·</mo><msup><mn>10</mn><mn>{exponent}</mn></msup></mrow>")
+                });
             }
             Token::Power(digits) => {
                 let base = last.take().unwrap_or_else(|| "<mrow></mrow>".to_owned());
@@ -292,7 +394,8 @@ mod tests {
 
     #[test]
     fn formulas_are_read_back_as_they_are_written() {
-        for formula in ["Δ = h² − a·c", "t₁ = c/q", "O′ = M⁻¹ O", "√(x² + y²) ≤ r", "min(tₓ, t₂)", "|D′|"] {
+        for formula in ["Δ = h² − a·c", "t₁ = c/q", "O′ = M⁻¹ O", "√(x² + y²) ≤ r", "min(tₓ, t₂)", "|D′|"]
+        {
             let mut written = String::new();
             tokens(formula).iter().for_each(|token| plain(token, &mut written));
             assert_eq!(written, formula);
@@ -314,6 +417,15 @@ mod tests {
         // What is only partly known says nothing.
         assert_eq!(scope.put_in("a + x"), None);
         assert_eq!(scope.put_in("2·3"), None);
+    }
+
+    #[test]
+    fn powers_of_ten_are_part_of_their_number() {
+        assert_eq!(latex("1.5e-7 + 2e10"), "1.5\\cdot 10^{-7} + 2\\cdot 10^{10}");
+        assert_eq!(mathml("2e-3").matches("<msup>").count(), 1);
+        let mut written = String::new();
+        tokens("-1.25e-8·2").iter().for_each(|token| plain(token, &mut written));
+        assert_eq!(written, "-1.25e-8·2");
     }
 
     #[test]
