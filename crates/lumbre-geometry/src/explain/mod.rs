@@ -1,8 +1,20 @@
 //! What a search computes for a ray, as data: the steps with their formulas and numbers, and what became of each crossing.
 
+mod axial;
+mod capsule;
+mod csg;
+mod cuboid;
 mod fate;
+mod notes;
+mod patch;
+mod planar;
+mod quadratic;
 mod remark;
+mod second_degree;
+mod sphere;
 mod topic;
+mod torus;
+mod triangle;
 
 use std::borrow::Cow;
 
@@ -11,6 +23,7 @@ use lumbre_math::{DVec3, Transform};
 use crate::Root;
 
 pub use fate::Fate;
+pub(crate) use notes::Notes;
 pub use remark::Remark;
 pub use topic::Topic;
 

@@ -3,7 +3,8 @@
 /// What a [`Step`](super::Step) computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Topic {
-    /// The numbers that the shape is made of.
+    /// The numbers that the shape is made of, as the search uses them: the normals of planes and disks and all coefficients of a
+    /// quadric times a power of two, which changes no digit. A quadric is `p·⟨M₁·p, M₂·p, M₃·p⟩ + 2·(G·p) + j = 0`.
     Parameters,
     /// A ray whose direction is so long or so short that its square is no number: `D` with about unit length, which all steps after
     /// it use. `D` is the given direction over `f`, and the given ray's `t` are those of the steps over `f`. The candidates are of
@@ -37,14 +38,16 @@ pub enum Topic {
     Slabs,
     /// The interval of the line within a convex solid: from the last of what it enters to the first of what it leaves.
     Span,
-    /// The line in a torus' own frame, from the point that is nearest to the centre: `p + s·u`, with a unit `u`.
+    /// The line in a torus' own frame, from the point that is nearest to the centre: `p + s·u`, with a unit `u`. `v` is the length of
+    /// the direction, and `s₀` what rounding leaves between `t₀` and that point. `z₀` and `z₁` are the components of `p` and `u`
+    /// along the axis.
     TorusFrame,
     /// The part of the line, in `s`, that is within the flat cylinder about a torus.
     TorusBounds,
-    /// The equation of a torus along the line, a quartic without a cubic term: `s²·s² + p·s² + q·s + w = 0`. The textbook's is
+    /// The equation of a torus along the line, a quartic without a cubic term: `s²·s² + a₂·s² + a₁·s + a₀ = 0`. The textbook's is
     /// `c₄·t²·t² + c₃·t²·t + c₂·t² + c₁·t + c₀ = 0`, from the ray's origin.
     Quartic,
-    /// The roots of the quartic's derivative, between which it rises or falls throughout, and its values there.
+    /// The roots `s` of the quartic's derivative, between which it rises or falls throughout, and its values `f` there.
     QuarticExtrema,
     /// The roots of the quartic, and the crossings that they are.
     QuarticRoots,
