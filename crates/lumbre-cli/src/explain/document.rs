@@ -1,7 +1,7 @@
 //! What is told, whatever it is written as: sections of quantities, tables and sentences.
 
-use lumbre::DVec3;
 use lumbre::math::glam::DMat4;
+use lumbre::{DVec3, Ray};
 
 use super::formula::Scope;
 
@@ -195,6 +195,14 @@ fn single(x: f32) -> String {
         format!("{x}")
     } else {
         exact(f64::from(x))
+    }
+}
+
+impl Scope {
+    /// Gives the symbols of a ray's origin and direction their values.
+    pub(super) fn set_ray(&mut self, [origin, direction]: [&str; 2], ray: &Ray) {
+        self.set(origin, Value::from(ray.origin).in_short());
+        self.set(direction, Value::from(ray.direction).in_short());
     }
 }
 

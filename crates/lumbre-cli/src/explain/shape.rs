@@ -1,11 +1,12 @@
 //! How a shape's crossings are found, told in a language.
 
+use lumbre::Ray;
 use lumbre::geometry::{Candidate, Explanation, Operand, Step, Value as Found};
 use lumbre::math::glam::DMat4;
 
 use super::document::{Column, Item, Quantity, Section, Value, numbers};
 use super::formula::Scope;
-use super::texts::Texts;
+use super::texts::{Texts, filled};
 
 impl From<&Found> for Value {
     fn from(found: &Found) -> Self {
@@ -23,21 +24,22 @@ impl From<&Found> for Value {
 pub(super) fn tell(
     section: &mut Section,
     explanation: &Explanation,
+    ray: &Ray,
     scope: &mut Scope,
     rename: &dyn Fn(&str) -> String,
     texts: &Texts,
 ) {
     let operands = explanation.operands.iter().enumerate();
-    let mut operands: Vec<Section> =
-        operands.map(|(i, operand)| tell_operand(i, operand, scope, texts)).collect();
-    section.sections.append(&mut operands);
+    section.sections.extend(operands.map(|(i, operand)| tell_operand(i, operand, ray, texts)));
     // The textbook's symbols are its own.
     let mut schoolbook = scope.clone();
     for step in &explanation.steps {
         section.sections.push(tell_step(step, scope, &mut schoolbook, rename, texts));
     }
     if !explanation.candidates.is_empty() {
-        section.items.push(candidates(&explanation.candidates, texts));
+        let mut crossings = Section::new("crossings", texts.fates);
+        crossings.items.push(candidates(&explanation.candidates, texts));
+        section.sections.push(crossings);
     }
 }
 
@@ -97,18 +99,20 @@ fn candidates(candidates: &[Candidate], texts: &Texts) -> Item {
     Item::Table { key: "crossings", columns, rows: rows.collect() }
 }
 
-fn tell_operand(index: usize, operand: &Operand, scope: &Scope, texts: &Texts) -> Section {
-    let title = texts.operand.replace("{0}", &index.to_string()).replace("{1}", operand.name);
+fn tell_operand(index: usize, operand: &Operand, ray: &Ray, texts: &Texts) -> Section {
+    let title = filled(texts.operand, &[&index.to_string(), operand.name]);
     let mut section = Section::new(format!("operand {index}"), title);
     let m = &operand.world_from_object;
+    let own = if m.is_identity() { *ray } else { ray.into_object(m) };
+    let mut scope = Scope::default();
     if !m.is_identity() {
         section.fact("M", DMat4::from(*m.affine()));
+        section.quantity(&mut scope, "O", texts.operand_origin, "", own.origin);
+        section.quantity(&mut scope, "D", texts.operand_direction, "", own.direction);
     }
+    scope.set_ray(["O", "D"], &own);
     match &operand.explanation {
-        Some(explanation) => {
-            // In the operand's own space the ray is another one.
-            tell(&mut section, explanation, &mut scope.clone(), &str::to_owned, texts);
-        }
+        Some(explanation) => tell(&mut section, explanation, &own, &mut scope, &str::to_owned, texts),
         None => section.text(texts.not_looked_at),
     }
     section

@@ -123,7 +123,7 @@ fn thing(
     if is_placed {
         section.sections.push(transforms(&chain, ray, &object_ray, &mut scope, texts));
     } else {
-        set_ray(&mut scope, ["O", "D"], &object_ray);
+        scope.set_ray(["O", "D"], &object_ray);
     }
     let rename = |formula: &str| {
         if is_placed { super::formula::with_primes(formula, &["O", "D"]) } else { formula.to_owned() }
@@ -136,7 +136,7 @@ fn thing(
     match &exact {
         Some(exact) => {
             let mut equation = Section::new("equation", texts.equation);
-            shape::tell(&mut equation, &exact.explain(&object_ray), &mut scope, &rename, texts);
+            shape::tell(&mut equation, &exact.explain(&object_ray), &object_ray, &mut scope, &rename, texts);
             section.sections.push(equation);
         }
         None => section.text(texts.custom),
@@ -146,12 +146,6 @@ fn thing(
         section.sections.push(at_hit(scene, ray, hit, is_first, placed.as_ref(), &inner, &chain, texts));
     }
     section
-}
-
-fn set_ray(scope: &mut Scope, [origin, direction]: [&str; 2], ray: &Ray) {
-    use super::document::Value;
-    scope.set(origin, Value::from(ray.origin).in_short());
-    scope.set(direction, Value::from(ray.direction).in_short());
 }
 
 /// The chain of maps from the object to the world, and the ray in the object's space.
@@ -186,7 +180,7 @@ fn transforms(chain: &[Transform], ray: &Ray, object_ray: &Ray, scope: &mut Scop
         section.fact("M", DMat4::from(*whole.affine()));
     }
     section.fact("M⁻¹", DMat4::from(*whole.inverse_affine()));
-    set_ray(scope, ["O", "D"], ray);
+    scope.set_ray(["O", "D"], ray);
     section.quantity(scope, "O′", texts.as_point, "M⁻¹ O", object_ray.origin);
     section.quantity(scope, "D′", texts.as_direction, "M⁻¹ D", object_ray.direction);
     section.quantity(scope, "|D′|", "", "√(D′·D′)", object_ray.direction.length());
@@ -239,7 +233,7 @@ fn at_hit(
 ) -> Section {
     let surface = scene.resolved().accel().surface(ray, hit);
     let mut scope = Scope::default();
-    set_ray(&mut scope, ["O", "D"], ray);
+    scope.set_ray(["O", "D"], ray);
     let title = filled(texts.hit, &[&super::document::exact(hit.root.t)]);
     let mut section = Section::new("hit", title);
     section.quantity(&mut scope, "t", texts.t_of_search, "", hit.root.t);
