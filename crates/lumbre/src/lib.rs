@@ -75,4 +75,5 @@ pub use setting::Setting;
 /// Compiles the examples of the project's README.
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
+#[doc = include_str!("../../../docs/explain.md")]
 struct ProjectReadme;

@@ -97,13 +97,20 @@ fn thing(
     let resolved = scene.resolved();
     let hit = hits[0];
     let index = resolved.shape_index(hit);
-    let title = filled(texts.shape, &[&index.to_string(), things.kind(index)]);
+    let Target { placements, shape } = resolved.accel().target(ray, hit);
+    // The leaf of a tree is what has a number and a material.
+    let kind = match &shape {
+        TargetShape::Exact(placed) if matches!(placed.shape(), Shape::Csg(_)) => {
+            format!("{} ({})", things.kind(index), placed.shape().name())
+        }
+        _ => things.kind(index).to_owned(),
+    };
+    let title = filled(texts.shape, &[&index.to_string(), &kind]);
     let mut section = Section::new(format!("shape {index}"), title);
     section.fact(texts.material, things.material(index).map_or(texts.no_material, |material| &material.name));
     if let Some(&instance) = hit.instances.first() {
         section.fact(texts.instance, f64::from(instance));
     }
-    let Target { placements, shape } = resolved.accel().target(ray, hit);
     if matches!(shape, TargetShape::Triangle(_)) {
         section.fact(texts.triangle, f64::from(hit.primitive));
     }
