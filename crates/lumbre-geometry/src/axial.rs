@@ -95,7 +95,7 @@ pub(crate) struct Doubles {
 
 impl Doubles {
     /// The equation set up at the place `p` relative to p1, which is `slack` units of the unit roundoff off.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn new(body: &Axial, d: DVec3, p: DVec3, slack: f64) -> Self {
         let equation = body.equation(p, d);
         let Equation { a, h, c, e, g, across, offset } = equation;
@@ -120,7 +120,7 @@ impl Doubles {
     }
 
     /// What the line has of the double cone, as far as doubles decide it.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn double_cone(&self, start: f64) -> Option<DoubleCone> {
         let Equation { a, h, c, g, .. } = self.equation;
         if !self.is_certain {
@@ -260,7 +260,7 @@ impl Axial {
 
     /// Where the equation is set up: the parameter, the place there relative to p1, and how far that may be off, in units of the
     /// unit roundoff.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn set_up(&self, ray: &Ray) -> (f64, DVec3, DVec3) {
         let (w, d) = (ray.origin - self.p1, ray.direction);
         let Equation { a, h, c, .. } = self.equation(w, d);

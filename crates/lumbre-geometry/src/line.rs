@@ -35,7 +35,7 @@ pub(crate) fn crossings(surface: &impl SecondDegree, ray: &Ray) -> Option<(f64, 
 
 /// Where the equation is set up: the parameter, the place there relative to the base, and how far that may be off, in units of
 /// the unit roundoff.
-#[inline]
+#[inline(always)]
 pub(crate) fn set_up(surface: &impl SecondDegree, ray: &Ray) -> (f64, DVec3, DVec3) {
     let (w, d) = (ray.origin - surface.base(), ray.direction);
     let [a, h, c] = surface.along(w.to_array(), d.to_array());
@@ -61,7 +61,7 @@ pub(crate) struct Doubles {
 
 impl Doubles {
     /// The equation set up at the place `p`, which is `slack` units of the unit roundoff off.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn new(surface: &impl SecondDegree, d: DVec3, p: DVec3, slack: DVec3) -> Self {
         let [a, h, c] = surface.along(p.to_array(), d.to_array());
         let delta = h * h - a * c;
@@ -74,7 +74,7 @@ impl Doubles {
     }
 
     /// The crossings as far as doubles decide them.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn crossings(&self, start: f64) -> Option<Option<(f64, f64)>> {
         let &Self { a, h, c, delta, errors, delta_error } = self;
         // False for a NaN.
@@ -297,7 +297,7 @@ pub(crate) fn plane_crossing(ray: &Ray, point: DVec3, normal: DVec3) -> (f64, f6
 }
 
 /// The way to the plane and the ray's way, both along the normal; and whether doubles keep their digits.
-#[inline]
+#[inline(always)]
 pub(crate) fn plane_products(ray: &Ray, point: DVec3, normal: DVec3) -> (f64, f64, bool) {
     let d = ray.direction;
     let to_point = point - ray.origin;

@@ -54,6 +54,19 @@ macro_rules! shapes {
             /// [`Shape::roots`], to the bit.
             ///
             /// A ray whose direction is too long or too short to be squared is explained with another length, as the search takes it.
+            ///
+            /// ```
+            /// use lumbre_geometry::{Fate, Ray, Shape, Sphere, Topic, Value};
+            /// use lumbre_math::DVec3;
+            ///
+            /// let ball = Shape::from(Sphere::new(DVec3::ZERO, 1.0)?);
+            /// let explanation = ball.explain(&Ray::new(DVec3::new(0.0, 0.0, 0.5), DVec3::Z));
+            /// let equation = explanation.steps.iter().find(|step| step.topic == Topic::Quadratic).expect("told");
+            /// assert_eq!((equation.quantities[2].symbol.as_ref(), &equation.quantities[2].value), ("c", &Value::Number(-0.75)));
+            /// let fates: Vec<(f64, Fate)> = explanation.candidates.iter().map(|one| (one.t, one.fate)).collect();
+            /// assert_eq!(fates, [(-1.5, Fate::Behind), (0.5, Fate::Hit)]);
+            /// # Ok::<(), lumbre_geometry::ShapeError>(())
+            /// ```
             pub fn explain(&self, ray: &Ray) -> crate::Explanation {
                 let mut notes = crate::explain::Notes::new(ray);
                 if let Some(line) = notes.line() {

@@ -6,8 +6,8 @@
 use std::collections::BTreeMap;
 
 use lumbre_geometry::{
-    Candidate, Csg, Explanation, Fate, Leaf, Ray, Remark, Root, Roots, Shape, Sphere, Step, Topic, Torus,
-    Triangle, Value,
+    Candidate, Csg, Cuboid, Explanation, Fate, Leaf, PlacedShape, Plane, Ray, Remark, Root, Roots, Shape,
+    ShapeError, Sphere, Step, Topic, Torus, Triangle, Value,
 };
 use lumbre_math::random::RandomStream;
 use lumbre_math::{DVec2, DVec3, Transform};
@@ -217,7 +217,7 @@ fn an_explanation_has_the_hits_of_the_search_and_tells_the_truth_of_every_other_
             };
             let shape = subject.placed.shape();
             let to = map * subject.placed.world_from_object();
-            let placed = lumbre_geometry::PlacedShape::new(shape.clone(), to);
+            let placed = PlacedShape::new(shape.clone(), to);
             let t_of = |distance: f64| distance * subject.reach() / near.direction.length();
             let range = match i % 3 {
                 0 => (f64::NEG_INFINITY, f64::INFINITY),
@@ -451,4 +451,67 @@ fn a_direction_of_any_length_is_explained_and_one_that_is_none_is_said_to_be() {
             assert_eq!(explanation.steps[0].remarks, [Remark::NoRay], "{ray:?}");
         }
     }
+}
+
+/// The fates of the crossings of a CSG tree with the x axis, with the interval of the result.
+fn fates_of(csg: Result<Csg, ShapeError>, ray: &Ray) -> (Vec<(f64, Fate)>, Vec<[f64; 2]>) {
+    let explanation = Shape::from(csg.unwrap()).explain(ray);
+    let fates = explanation.candidates.iter().map(|candidate| (candidate.t, candidate.fate)).collect();
+    let result = explanation.steps[0].quantities.iter().find(|quantity| quantity.symbol == "I").unwrap();
+    let Value::Intervals(intervals) = &result.value else { panic!("{result:?}") };
+    (fates, intervals.clone())
+}
+
+#[test]
+fn a_crossing_of_an_operand_that_is_none_of_the_result_names_the_operand_that_is_why() {
+    let leaf = |shape: Result<Shape, ShapeError>| {
+        Csg::leaf(PlacedShape::new(shape.unwrap(), Transform::IDENTITY)).unwrap()
+    };
+    let ball =
+        |x: f64, y: f64, radius: f64| leaf(Sphere::new(DVec3::new(x, y, 0.0), radius).map(Shape::from));
+    let slab = |from: f64, to: f64| {
+        leaf(Cuboid::new(DVec3::new(from, -1.0, -1.0), DVec3::new(to, 3.0, 3.0)).map(Shape::from))
+    };
+    let ray = Ray::new(DVec3::ZERO, DVec3::X);
+    // From 2 to 6 and from 4 to 9.
+    let pair = || vec![ball(4.0, 0.0, 2.0), ball(6.5, 0.0, 2.5)];
+    let (inside, outside) =
+        (|operand| Fate::InsideOperand { operand }, |operand| Fate::OutsideOperand { operand });
+    assert_eq!(
+        fates_of(Csg::union(pair()), &ray),
+        (vec![(2.0, Fate::Hit), (4.0, inside(0)), (6.0, inside(1)), (9.0, Fate::Hit)], vec![[2.0, 9.0]])
+    );
+    assert_eq!(
+        fates_of(Csg::difference(pair()), &ray),
+        (vec![(2.0, Fate::Hit), (4.0, Fate::Hit), (6.0, inside(1)), (9.0, outside(0))], vec![[2.0, 4.0]])
+    );
+    assert_eq!(
+        fates_of(Csg::intersection(pair()), &ray.with_range(5.0, f64::INFINITY)),
+        (
+            vec![
+                (2.0, Fate::BeforeRange { t_min: 5.0 }),
+                (4.0, Fate::BeforeRange { t_min: 5.0 }),
+                (6.0, Fate::Hit),
+                (9.0, outside(0))
+            ],
+            vec![[4.0, 6.0]]
+        )
+    );
+    // Two boxes side by side are one.
+    let (fates, interval) = fates_of(Csg::union(vec![slab(1.0, 2.0), slab(2.0, 5.0)]), &ray);
+    assert_eq!(interval, [[1.0, 5.0]]);
+    let coincides = |operand| Fate::Coincides { operand };
+    assert_eq!(fates, [(1.0, Fate::Hit), (2.0, coincides(1)), (2.0, coincides(0)), (5.0, Fate::Hit)]);
+    // A ball that is only touched, and one that is not met.
+    let (fates, interval) = fates_of(Csg::union(vec![slab(1.0, 2.0), ball(7.0, 2.0, 2.0)]), &ray);
+    assert_eq!(interval, [[1.0, 2.0]]);
+    assert_eq!(fates, [(1.0, Fate::Hit), (2.0, Fate::Hit), (7.0, Fate::Touch)]);
+    let far = Shape::from(Csg::union(vec![slab(1.0, 2.0), ball(7.0, 9.0, 2.0)]).unwrap()).explain(&ray);
+    assert_eq!(far.steps[0].remarks, [Remark::NotLookedAt { operand: 1 }]);
+    assert!(far.operands[0].explanation.is_some() && far.operands[1].explanation.is_none());
+    // Half a space holds the ray's beginning.
+    let below = leaf(Plane::new(DVec3::new(3.0, 0.0, 0.0), DVec3::X).map(Shape::from));
+    let (fates, interval) = fates_of(Csg::difference(vec![below, slab(1.0, 2.0)]), &ray);
+    assert_eq!(interval, [[f64::NEG_INFINITY, 1.0], [2.0, 3.0]]);
+    assert!(fates.iter().all(|(_, fate)| *fate == Fate::Hit) && fates.len() == 3);
 }

@@ -252,15 +252,11 @@ fn check(explanation: &Explanation, ray: &Ray, name: &str) -> usize {
         for quantity in &step.quantities {
             let Some((formula, value)) = &quantity.schoolbook else { continue };
             let (symbol, formula) = formula.split_once(" = ").unwrap_or(("", formula));
-            let at_origin =
-                explanation.steps.iter().all(|step| step.topic != Topic::SetUp || step.remarks.is_empty());
-            if at_origin || !formula.contains('c') {
-                let term = evaluate(formula, &textbook);
-                assert!(agrees(value, term), "{name}: {quantity:?} {term:?} {ray:?} {explanation:#?}");
-                count += 1;
-            }
-            put(&mut textbook, symbol, value);
-            if symbol == "b" {
+            let term = evaluate(formula, &textbook);
+            assert!(agrees(value, term), "{name}: {quantity:?} {term:?} {ray:?} {explanation:#?}");
+            count += 1;
+            if !symbol.is_empty() {
+                put(&mut textbook, symbol, value);
                 put(&mut symbols, symbol, value);
             }
         }

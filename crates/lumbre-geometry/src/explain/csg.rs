@@ -38,16 +38,6 @@ impl Csg {
                 step.remark(Remark::StartsInside { operand: leaf });
             }
         }
-        if gathered.is_none() {
-            // Nothing is left of an intersection or a difference.
-            step.intervals("I", vec![]).remark(Remark::Misses);
-            for event in &events {
-                let fate = out_of_range(ray, event.root.t).unwrap_or(Fate::NoChange { inside: false });
-                notes.candidate(event.root.t, event.root.part, fate);
-            }
-            return;
-        }
-
         let result_starts_inside = membership.contains(0);
         let mut ends = vec![];
         let mut candidates = vec![];
@@ -56,7 +46,8 @@ impl Csg {
             rest = later;
             let reasons: Vec<Option<Fate>> =
                 group.iter().map(|event| obstacle(&mut membership, event, is_looked_at.len())).collect();
-            let root = membership.cross_group(group);
+            // Where the search has seen that nothing is left, it does not go on to the crossings.
+            let root = gathered.and_then(|()| membership.cross_group(group));
             if let Some(root) = root {
                 ends.push((root.t, membership.contains(0)));
             }
@@ -87,19 +78,27 @@ impl Csg {
         if let Some(fate) = out_of_range(ray, event.root.t) {
             return fate;
         }
-        let another = || group.iter().find(|other| other.leaf != event.leaf).map(|other| other.leaf as usize);
-        match root {
-            Some(root) if root == event.root => Fate::Hit,
-            Some(root) => match self.leaf_of(&root) {
+        let is_here = |operand: usize| {
+            operand != event.leaf as usize && group.iter().any(|other| other.leaf as usize == operand)
+        };
+        let no_change = Fate::NoChange { inside: membership.contains(0) };
+        match (root, reason) {
+            (Some(root), _) if root == event.root => Fate::Hit,
+            (Some(root), _) => match self.leaf_of(&root) {
                 Some(owner) => Fate::Coincides { operand: owner.leaf },
                 None => Fate::NotReturned,
             },
+            (None, Some(Fate::InsideOperand { operand } | Fate::OutsideOperand { operand }))
+                if is_here(operand) =>
+            {
+                Fate::Coincides { operand }
+            }
+            (None, Some(reason)) => reason,
             // By itself it would be a crossing of the result.
-            None if reason.is_none() => match another() {
-                Some(operand) => Fate::Coincides { operand },
-                None => Fate::NoChange { inside: membership.contains(0) },
-            },
-            None => reason.unwrap_or(Fate::NoChange { inside: membership.contains(0) }),
+            (None, None) => {
+                let another = group.iter().map(|other| other.leaf as usize).find(|&leaf| is_here(leaf));
+                another.map_or(no_change, |operand| Fate::Coincides { operand })
+            }
         }
     }
 }

@@ -54,7 +54,31 @@ impl BilinearPatch {
         if crossings.is_edge_on {
             step.remark(Remark::EdgeOn);
         }
+        let rulings = quadratic(c, h, a, delta);
+        match rulings {
+            Some((first, second)) if first == second => {
+                step.number("u₁", "−h/c", first).remark(Remark::Touches);
+            }
+            Some((first, second)) => {
+                let q = -(h + delta.sqrt().copysign(h));
+                step.number("q", if q < 0.0 { "−(h + √(Δ))" } else { "√(Δ) − h" }, q);
+                let is_ascending = if c == 0.0 { !first.is_finite() } else { (q < 0.0) == (c > 0.0) };
+                let formulas = if is_ascending { ["q/c", "a/q"] } else { ["a/q", "q/c"] };
+                for ((symbol, formula), u) in ["u₁", "u₂"].into_iter().zip(formulas).zip([first, second])
+                {
+                    if u.is_finite() {
+                        step.number(symbol, formula, u);
+                    } else {
+                        step.remark(Remark::AtInfinity);
+                    }
+                }
+            }
+            None => {
+                step.remark(Remark::Misses);
+            }
+        }
         let hits = &crossings.of_line;
+        let step = notes.step(Topic::Roots);
         for (root, [u, v, t]) in hits.iter().map(|crossing| crossing.root).zip(ROOTS) {
             step.number(u, "", root.local.x).number(v, "", root.local.y).number(t, "", root.t);
             if root.multiplicity > 1 {
@@ -68,7 +92,7 @@ impl BilinearPatch {
             let t = crossing.root.t;
             notes.candidate(t, 0, out_of_range(ray, t).unwrap_or(Fate::Hit));
         }
-        for uv in roots_outside(&patch, quadratic(c, h, a, delta)) {
+        for uv in roots_outside(&patch, rulings) {
             let t = sheared.t(patch.at(uv).z);
             notes.candidate(t, 0, Fate::OutsidePatch { u: uv.x, v: uv.y });
         }

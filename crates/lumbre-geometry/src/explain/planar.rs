@@ -39,7 +39,7 @@ pub(super) fn tell_plane(
     step.number("t", "δ/μ", t);
     if is_exact {
         let schoolbook = rough_away / rough_along;
-        step.beside("δ/μ", schoolbook);
+        step.beside(format!("(({point_name} − O)·{normal_name})/(D·{normal_name})"), schoolbook);
         let off = ((schoolbook - t) / t).abs();
         if off > 1e-12 && off.is_finite() {
             step.remark(Remark::Cancellation { digits: super::quadratic::digits_lost(off) });

@@ -91,20 +91,37 @@ impl Solved {
             step.remark(Remark::TwicePrecision);
         }
         let [a, h, c] = self.coefficients;
-        let [_, h_origin, c_origin] = self.at_origin;
+        let [a_origin, h_origin, c_origin] = self.at_origin;
         let [a_formula, h_formula, c_formula] = self.formulas;
         step.number("a", a_formula, a);
+        if self.textbook_a() == "a₀" {
+            step.beside(format!("a₀ = {a_formula}"), a_origin);
+        }
         step.number("h", at_place(h_formula, self.start), h);
         step.beside(format!("b = 2·({h_formula})"), 2.0 * h_origin);
         step.number("c", at_place(c_formula, self.start), c);
-        if self.start != 0.0 {
-            step.beside(c_formula, c_origin);
+        if self.textbook_c() == "c₀" {
+            step.beside(format!("c₀ = {c_formula}"), c_origin);
         }
         if let Some([a_error, h_error, c_error]) = self.errors {
             step.number("ε₂", "", a_error).number("ε₁", "", h_error).number("ε₀", "", c_error);
         }
         self.tell_discriminant(notes);
         self.tell_roots(notes);
+    }
+
+    /// What the textbook's first coefficient is called, which is that of the ray's origin.
+    fn textbook_a(&self) -> &'static str {
+        if self.coefficients[0] == self.at_origin[0] { "a" } else { "a₀" }
+    }
+
+    /// What its last coefficient is called.
+    fn textbook_c(&self) -> &'static str {
+        if self.start == 0.0 && !self.is_twofold { "c" } else { "c₀" }
+    }
+
+    fn textbook_discriminant(&self) -> String {
+        format!("b² − 4·{}·{}", self.textbook_a(), self.textbook_c())
     }
 
     fn schoolbook_discriminant(&self) -> f64 {
@@ -119,7 +136,8 @@ impl Solved {
         if let Some((symbol, formula, nearest)) = self.nearest {
             step.vector(symbol, formula, nearest);
         }
-        step.number("Δ", self.delta_formula, self.delta).beside("b² − 4·a·c", schoolbook);
+        step.number("Δ", self.delta_formula, self.delta);
+        step.beside(self.textbook_discriminant(), schoolbook);
         if let Some(error) = self.delta_error {
             step.number("ε", "", error);
         }
@@ -142,7 +160,8 @@ impl Solved {
             if self.start == 0.0 { formula.to_owned() } else { format!("t₀ + {formula}") }
         };
         if first == second {
-            step.number("t₁", from_start("(−h/a)"), first).remark(Remark::Touches);
+            step.number("t₁", if self.start == 0.0 { "−h/a" } else { "t₀ − h/a" }, first)
+                .remark(Remark::Touches);
             return;
         }
         // With the sign of h, or of zero, as the search takes it.
@@ -160,9 +179,10 @@ impl Solved {
             }
             let (symbol, sign) = if i == 0 { ("t₁", '−') } else { ("t₂", '+') };
             // With a negative `a` the greater root comes with the minus.
-            let sign = if (a < 0.0) == (sign == '−') { '+' } else { '−' };
+            let sign = if (self.at_origin[0] < 0.0) == (sign == '−') { '+' } else { '−' };
             step.number(symbol, formula, t);
-            step.beside(format!("(−b {sign} √(b² − 4·a·c))/(2·a)"), textbook[i]);
+            let (discriminant, a) = (self.textbook_discriminant(), self.textbook_a());
+            step.beside(format!("(−b {sign} √({discriminant}))/(2·{a})"), textbook[i]);
             if textbook[i].is_finite() {
                 let off = ((textbook[i] - t) / t).abs();
                 lost = lost.max(if off.is_finite() { off } else { 0.0 });

@@ -12,12 +12,15 @@ pub enum Topic {
     ScaledRay,
     /// Where the equation along the line is set up: `w`, the ray's origin as seen from the shape; or, at `t₀` along the ray, `w₀`.
     SetUp,
-    /// The equation `a·s² + 2·h·s + c = 0` of the surface along the line, where `s = t`, or `t − t₀`.
+    /// The equation `a·s² + 2·h·s + c = 0` of the surface along the line, where `s = t`, or `t − t₀`; with the bounds `ε₂`, `ε₁` and
+    /// `ε₀` of the errors of `a`, `h` and `c`, in units of the unit roundoff 2⁻⁵³, where the search computes them. The textbook's is
+    /// `a₀·t² + b·t + c₀ = 0`, from the ray's origin; where they are the same numbers, `a₀` is called `a` and `c₀` `c`.
     Quadratic,
     /// The quarter `Δ` of the discriminant, whose sign says how many roots there are; with the bound `ε` of its error, where the
     /// search asks whether doubles decide the sign.
     Discriminant,
-    /// The roots of the equation, and the crossings `t₁ ≤ t₂` of the whole line.
+    /// The roots of the equation, and the crossings `t₁ ≤ t₂` of the whole line. Of a bilinear patch, the places `u` and `v` of each
+    /// crossing with the patch too, after a step of Newton's method.
     Roots,
     /// A cone's radius `ρ`, with a sign, in the middle of both roots, which says which of them are on the nappe of the body. (Along
     /// the line, the radius grows by `g` for each unit of `t`.)
@@ -63,7 +66,8 @@ pub enum Topic {
     /// How often a bilinear patch's outline winds about the ray, from the side of each edge that it passes on (1 where the edge function
     /// is positive, and −1 where it is negative).
     Winding,
-    /// The rulings of a bilinear patch that meet the ray: the roots `u` of `a + 2·h·u + c·u² = 0`.
+    /// The rulings of a bilinear patch, or of the surface that continues it, that meet the ray's line: the roots `u₁ ≤ u₂` of
+    /// `a + 2·h·u + c·u² = 0`.
     Rulings,
     /// The intervals of the line within each operand of a CSG tree (`I₁` the first leaf's) and within the result, `I`.
     Intervals,

@@ -58,12 +58,12 @@ impl Torus {
     }
 
     /// The radius of the sphere about it, with a margin.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn reach(&self) -> f64 {
         (self.major + self.minor) * (1.0 + MARGIN)
     }
 
-    #[inline]
+    #[inline(always)]
     pub(crate) fn nearest(&self, ray: &Ray) -> Nearest {
         let (w, d) = (ray.origin - self.center, ray.direction);
         let dd = d.length_squared();
@@ -80,7 +80,7 @@ impl Torus {
     }
 
     /// The line's nearest point and its unit direction, in the torus's frame.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn turned(&self, nearest: &Nearest) -> (DVec3, DVec3) {
         (self.framed(nearest.near + nearest.shift * nearest.unit), self.framed(nearest.unit))
     }
