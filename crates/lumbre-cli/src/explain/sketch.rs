@@ -147,15 +147,13 @@ pub(super) fn svg(
         let dot = place(*point);
         let _ = write!(out, "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"3.5\" fill=\"#c0392b\"/>", dot.x, dot.y);
     }
-    for (point, text, colour) in [(start, "O + tD", "#d9822b")] {
-        let at = place(point);
-        let _ = write!(
-            out,
-            "<text x=\"{:.1}\" y=\"{:.1}\" font-size=\"12\" font-family=\"sans-serif\" fill=\"{colour}\">{text}</text>",
-            at.x + 4.0,
-            at.y - 6.0
-        );
-    }
+    let at = place(start);
+    let _ = write!(
+        out,
+        "<text x=\"{:.1}\" y=\"{:.1}\" font-size=\"12\" font-family=\"sans-serif\" fill=\"#d9822b\">O + tD</text>",
+        at.x + 4.0,
+        at.y - 6.0
+    );
     out.push_str("</svg>");
     out
 }

@@ -19,19 +19,22 @@ struct Thing {
     material: Option<usize>,
 }
 
+/// A parameter's name and its numbers; without these where a texture stands.
+type Parameter = (String, Option<Vec<f64>>);
+
 /// A material of a file.
 #[derive(Clone, Debug)]
 pub(super) struct Substance {
     /// Its name and kind.
     pub(super) name: String,
-    /// Its parameters with their numbers; without where a texture stands.
-    pub(super) parameters: Vec<(String, Option<Vec<f64>>)>,
+    /// Its parameters.
+    pub(super) parameters: Vec<Parameter>,
 }
 
 impl Things {
     /// Of a description.
     pub(super) fn of(desc: &SceneDesc) -> Self {
-        let mut by_owner: HashMap<String, Vec<(String, Option<Vec<f64>>)>> = HashMap::new();
+        let mut by_owner: HashMap<String, Vec<Parameter>> = HashMap::new();
         for parameter in lumbre::parameters(desc) {
             let owner = parameter.path.strip_suffix(&parameter.name).unwrap_or_default().to_owned();
             by_owner.entry(owner).or_default().push((parameter.name, parameter.value));
