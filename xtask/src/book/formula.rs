@@ -25,7 +25,7 @@ pub(crate) fn html(latex: &str, is_displayed: bool) -> Result<String> {
 /// The same elements, with text that Markdown takes for nothing else.
 fn protected(mathml: &str) -> String {
     let mut protected = String::new();
-    let (mut in_tag, mut in_entity) = (false, false);
+    let (mut in_tag, mut is_quoted, mut in_entity) = (false, false, false);
     let mut characters = mathml.chars().peekable();
     while let Some(character) = characters.next() {
         // Characters of the formula itself may stand as they are.
@@ -39,6 +39,12 @@ fn protected(mathml: &str) -> String {
         } else {
             protected.push(character);
         }
+        // Some attributes stand without a space between them.
+        if in_tag && character == '"' && characters.peek().is_some_and(char::is_ascii_alphabetic) && is_quoted
+        {
+            protected.push(' ');
+        }
+        is_quoted ^= in_tag && character == '"';
         in_tag &= character != '>';
         in_entity &= character != ';';
     }
@@ -57,6 +63,12 @@ mod tests {
             shown.split('<').filter_map(|part| part.split_once('>')).map(|(_, text)| text).collect();
         assert!(text.contains("&#91;") && text.contains("&#60;"), "{text}");
         assert!(!text.contains(['*', '_', '[']), "{text}");
+    }
+
+    #[test]
+    fn attributes_stand_apart() {
+        let shown = html(r"\bigl( x \bigr)", false).expect("a formula");
+        assert!(shown.contains("stretchy=\"true\" minsize=\"1.2em\" maxsize="), "{shown}");
     }
 
     #[test]
