@@ -125,6 +125,15 @@ impl<'a> Preparer<'a> {
                 Err(error) => say(place.start, &error),
             }
         }
+        // mdbook would say which file, and not where.
+        for (at, _) in text.match_indices("{{#include ") {
+            let named =
+                text[at..].trim_start_matches("{{#include ").split(['}', ':']).next().unwrap_or_default();
+            let file = self.copy.join(name).with_file_name(named.trim());
+            if !file.is_file() {
+                say(at, &anyhow::anyhow!("there is no {named} to be included"));
+            }
+        }
         Ok(changed(text, &changes))
     }
 
@@ -273,13 +282,14 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_said_with_its_line() {
-        let (_, faults) =
-            prepared("one\n\n$\\nosuch$\n\n[a](../../none.md)\n\n```console\n$ true\n$ false\n```\n");
+        let (_, faults) = prepared(
+            "one\n\n$\\nosuch$\n\n[a](../../none.md)\n\n```console\n$ true\n$ false\n```\n{{#include none}}",
+        );
         let places: Vec<&str> =
             faults.iter().map(|fault| fault.split(": ").next().unwrap_or_default()).collect();
         assert_eq!(
             places,
-            ["docs/more/page.md:3", "docs/more/page.md:5", "docs/more/page.md:9"],
+            ["docs/more/page.md:3", "docs/more/page.md:5", "docs/more/page.md:9", "docs/more/page.md:11"],
             "{faults:?}"
         );
     }
