@@ -6,7 +6,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use xtask::command::{self, built_as_for_tests, release_program, root, succeeds, target};
+use xtask::command::{self, built_as_for_tests, release_program, root, target};
 
 use page::Preparer;
 
@@ -50,17 +50,22 @@ pub(crate) fn test() -> Result<()> {
     match find_mdbook() {
         Some(mdbook) => build(&mdbook, true),
         None => {
-            eprintln!("\nThe book is left out: it needs mdbook (cargo xtask book --install-only)");
+            eprintln!("\nThe book is left out: it needs mdbook 0.5 (cargo xtask book --install-only)");
             Ok(())
         }
     }
 }
 
-/// mdbook, on the path or where this program puts its tools.
+/// mdbook, on the path or where this program puts its tools, of the same minor version: others make other pages.
 fn find_mdbook() -> Option<PathBuf> {
-    ["mdbook".into(), installed_mdbook()]
-        .into_iter()
-        .find(|mdbook| succeeds(&mdbook.to_string_lossy(), &["--version"]))
+    let wanted = MDBOOK.rsplit_once('.').map_or(MDBOOK, |(minor, _)| minor);
+    let is_fit = |mdbook: &PathBuf| {
+        let output = Command::new(mdbook).arg("--version").output();
+        output.is_ok_and(|said| {
+            String::from_utf8_lossy(&said.stdout).starts_with(&format!("mdbook v{wanted}."))
+        })
+    };
+    ["mdbook".into(), installed_mdbook()].into_iter().find(is_fit)
 }
 
 fn tools() -> PathBuf {
