@@ -1,4 +1,4 @@
-//! The `lumbre` program: render, view, cast, info, diff, merge. It is a library so that other front ends, such as the Python package, bring
+//! The `lumbre` program: render, view, cast, info, diff, merge, explain, math. It is a library so that other front ends, such as the Python package, bring
 //! the same program.
 
 use std::ffi::OsString;
@@ -16,6 +16,7 @@ mod completions;
 mod console;
 mod denoiser;
 mod diff;
+mod explain;
 mod failure;
 mod farm;
 mod info;
@@ -30,6 +31,7 @@ mod progress;
 mod reading;
 mod render;
 mod report;
+mod shown;
 mod signals;
 mod staging;
 mod tev;
@@ -52,6 +54,7 @@ mod viewing;
   lumbre info scene.pbrt --json                 what is in a scene
   lumbre diff a.exr b.exr --metric relmse       how different two pictures are
   lumbre merge a.part b.part -o picture.exr     one picture of what two machines rendered
+  lumbre explain scene.pbrt --pixel 320,240     every number between a pixel and its colour
   lumbre math 'rotate(z, 90) * [1, 0, 0]'       vectors, transforms and quaternions, step by step
 
 Exit status: 0 done, 1 a comparison failed, 2 usage, 3 input, 4 files, 5 a limit, 130 or 143 a signal.")]
@@ -68,6 +71,7 @@ enum Command {
     Info(info::Arguments),
     Diff(diff::Arguments),
     Merge(merge::Arguments),
+    Explain(Box<explain::Arguments>),
     Math(math::Arguments),
     Farm(farm::Arguments),
     Completions(completions::CompletionsArguments),
@@ -90,6 +94,7 @@ pub fn run(words: Vec<OsString>) -> u8 {
         Command::Info(arguments) => info::run(&arguments),
         Command::Diff(arguments) => diff::run(&arguments),
         Command::Merge(arguments) => merge::run(&arguments),
+        Command::Explain(arguments) => explain::run(&arguments),
         Command::Math(arguments) => math::run(&arguments),
         Command::Farm(arguments) => farm::run(&arguments),
         Command::Completions(arguments) => completions::completions::<Arguments>(&arguments),

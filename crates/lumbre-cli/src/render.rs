@@ -183,7 +183,8 @@ fn noise(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected a number above 0, such as 0.02".to_owned())
 }
 
-fn exposure(text: &str) -> Result<f32, String> {
+/// Stops of exposure.
+pub(crate) fn exposure(text: &str) -> Result<f32, String> {
     text.parse()
         .ok()
         .filter(|x: &f32| x.abs() <= 100.0)

@@ -8,13 +8,14 @@ use std::time::Duration;
 
 use clap::Args;
 use lumbre::image::ToneMap;
-use lumbre::{CancelToken, SaveOptions, Scene, SceneDesc, StageLight};
+use lumbre::{CancelToken, SaveOptions, SceneDesc, StageLight};
 use lumbre_viewer::{Built, Moment, Options, Read, Source, Viewer, export};
 
 use crate::failure::{Failure, print};
 use crate::names::one_of;
 use crate::reading::ReadingArguments;
-use crate::render::{MODEL_SPP, TONE_MAPS, camera, measured_exposure};
+use crate::render::{MODEL_SPP, TONE_MAPS, exposure, measured_exposure};
+use crate::shown::{Shown, Wish, shown};
 use crate::signals::{Phase, Signals};
 use crate::staging::{Behind, StagingArguments};
 use crate::units;
@@ -63,7 +64,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "NAME|INDEX", help_heading = "View")]
     camera: Option<String>,
     /// Exposure in stops. The page can change it.
-    #[arg(long, value_name = "EV", allow_negative_numbers = true)]
+    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure)]
     exposure: Option<f32>,
     /// Tone mapping. The page can change it.
     #[arg(long, value_name = "NAME", value_parser = one_of(&TONE_MAPS, ToneMap::from_name))]
@@ -209,31 +210,15 @@ impl Source for Files {
 
 impl Files {
     /// As `lumbre render` would make its picture.
-    fn built(&self, mut desc: SceneDesc) -> Result<Built, Failure> {
+    fn built(&self, desc: SceneDesc) -> Result<Built, Failure> {
         let Arguments { view, staging, reading, size, .. } = &*self.arguments;
-        let mut stage = staging.stage(*size, reading.limits())?;
-        view.set(&mut stage)?;
-        let is_of_light = desc.integrator.kind.needs_light();
-        if !is_of_light && !staging.wants_ground() {
-            stage.ground = lumbre::Ground::None;
-        }
-        let staged = stage.set(&mut desc);
-        let behind = staging.behind(&staged, is_of_light, reading.limits())?;
         let name = self.paths().into_iter().next().unwrap_or_default();
-        let mut diagnostics = lumbre::formats::Diagnostics::with_strictness(reading.strictness());
-        reading.check_build(&desc, &diagnostics)?;
-        let scene = Scene::of_file(desc, &name, &mut diagnostics)?;
+        // The camera that was asked for is of the command line's file.
+        let camera = self.arguments.camera.as_deref().filter(|_| self.dropped.is_none());
+        let wish = Wish { name: &name, size: *size, camera, integrator: None, view, staging, reading };
+        let Shown { scene, staged, behind, mut options, is_of_light, diagnostics } = shown(desc, &wish)?;
         let mut warnings = diagnostics.lines();
-        let mut options = scene.options();
-        if let Some((width, height)) = *size {
-            options.resize(scene.resolved().film(), width, height);
-        }
-        if let (Some(wanted), None) = (&self.arguments.camera, &self.dropped) {
-            options.camera = camera(&scene, wanted)?;
-        }
-        view.check_camera(&scene, options.camera)?;
         options.threads = rayon::current_num_threads();
-        options.transparent = behind.is_transparent();
         let is_model = staged.framed && staged.light != StageLight::Own && is_of_light;
         let is_plain = is_model && self.arguments.spp.is_none() && scene.resolved().sampler().spp.is_none();
         if is_plain {

@@ -138,8 +138,53 @@ fn cast(folder: &Path, record: &Value, query: &str) -> Vec<Vec<String>> {
     stdout.lines().skip(1).map(|line| line.split(',').map(str::to_owned).collect()).collect()
 }
 
+/// The crossings that `lumbre explain` tells of a record's ray: t and normal.
+fn explained(folder: &Path, record: &Value) -> Vec<(f64, Vec<f64>)> {
+    let scene_path = folder.join("scene.pbrt");
+    std::fs::write(&scene_path, scene(record)).unwrap();
+    let out = Command::new(env!("CARGO_BIN_EXE_lumbre"))
+        .args(["explain", "--strict", "--quiet", "--format", "json", "--env", "none", "--ground", "none"])
+        .arg(format!("--ray={}", ray(record)))
+        .arg(&scene_path)
+        .output()
+        .unwrap();
+    assert!(out.status.success(), "{}: {}", record["id"], String::from_utf8_lossy(&out.stderr));
+    let told: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let sections = |of: &Value| of["sections"].as_array().cloned().unwrap_or_default();
+    let met = sections(&told).into_iter().find(|section| section["key"] == "surfaces").unwrap();
+    let hits = sections(&met)
+        .iter()
+        .flat_map(sections)
+        .filter(|section| section["key"] == "hit")
+        .collect::<Vec<_>>();
+    let of = |hit: &Value, symbol: &str| {
+        let mut quantities = hit["quantities"].as_array().unwrap().iter();
+        quantities.find(|quantity| quantity["symbol"] == symbol).unwrap()["value"].clone()
+    };
+    hits.iter().map(|hit| (number(&of(hit, "t")), numbers(&of(hit, "N")))).collect()
+}
+
 #[test]
-fn every_reference_ray_is_answered_to_double_precision() {
+fn every_reference_ray_is_explained_as_it_is_answered() {
+    let vectors: Value = serde_json::from_str(include_str!("../../../tests/data/vectors.json")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let mut count = 0;
+    for record in vectors["intersection"].as_array().unwrap() {
+        let rows = cast(folder.path(), record, "all");
+        let told = explained(folder.path(), record);
+        assert_eq!(told.len(), rows.len(), "{}", record["id"]);
+        for (row, (t, normal)) in rows.iter().zip(told) {
+            let value = |i: usize| row[i].parse::<f64>().unwrap();
+            assert_eq!(t.to_bits(), value(2).to_bits(), "{}: t", record["id"]);
+            assert_eq!(normal, [value(6), value(7), value(8)], "{}: normal", record["id"]);
+            count += 1;
+        }
+    }
+    assert!(count >= 300, "{count}");
+}
+
+#[test]
+fn every_reference_ray_is_answered_is_answered_to_double_precision() {
     let vectors: Value = serde_json::from_str(include_str!("../../../tests/data/vectors.json")).unwrap();
     let records = vectors["intersection"].as_array().unwrap();
     let folder = tempfile::tempdir().unwrap();

@@ -4,6 +4,7 @@ mod broken_inputs;
 mod cast_streams;
 mod cast_vectors;
 mod denoising;
+mod explain;
 mod farm;
 mod faults;
 mod files;

@@ -66,145 +66,113 @@ fn nappe(a: f64, pair: Option<(f64, f64)>, growth: f64, radius: f64) -> Option<S
 }
 
 /// F(t) = a t² + 2 h t + c = |B + tA|² − (e + g t)² with A = D×V, B = W×V.
-struct Equation {
-    a: f64,
-    h: f64,
-    c: f64,
-    e: f64,
-    g: f64,
+pub(crate) struct Equation {
+    pub(crate) a: f64,
+    pub(crate) h: f64,
+    pub(crate) c: f64,
+    pub(crate) e: f64,
+    pub(crate) g: f64,
     /// A.
-    across: DVec3,
+    pub(crate) across: DVec3,
     /// B.
-    offset: DVec3,
+    pub(crate) offset: DVec3,
 }
 
-/// The axis of a body in twice the precision.
-struct Spine {
-    /// The point of it that places are relative to: a pointed end, where there is one.
-    base: DVec3,
-    axis: [Twofold; 3],
-    /// The square of its length.
-    square: Twofold,
-    /// What the radius grows by along it, and the radius at the base times the square.
-    rise: Twofold,
-    radius: Twofold,
+/// The equation in doubles, with bounds of its errors.
+pub(crate) struct Doubles {
+    pub(crate) equation: Equation,
+    /// h² − ac.
+    pub(crate) delta: f64,
+    /// The signed radius at the middle of the crossings.
+    pub(crate) radius: f64,
+    /// Of a, h and c, in units of the unit roundoff.
+    pub(crate) errors: [f64; 3],
+    /// Of the discriminant.
+    pub(crate) delta_error: f64,
+    /// Whether the signs of a, the discriminant and the radius are beyond doubt.
+    pub(crate) is_certain: bool,
 }
 
-impl Spine {
-    /// The signed radius at a place relative to the base, times the square.
-    fn radius_at(&self, p: [Twofold; 3]) -> Twofold {
-        self.radius + self.growth(p)
-    }
-
-    /// What that grows by along `d`.
-    fn growth(&self, d: [Twofold; 3]) -> Twofold {
-        self.rise * dot(d, self.axis)
-    }
-}
-
-impl Axial {
-    fn is_whole(&self) -> bool {
-        self.phi_max >= TAU
-    }
-
-    fn is_bounded(&self) -> bool {
-        self.length.is_finite()
-    }
-
-    fn has_cap(&self, part: u32) -> bool {
-        self.caps && if part == CAP1 { self.cut1 } else { part == CAP2 && self.cut2 }
-    }
-
-    fn cap(&self, part: u32) -> (DVec3, f64) {
-        if part == CAP1 { (self.p1, self.r1) } else { (self.p2, self.r2) }
-    }
-
-    /// The equation of the lateral surface along `d` from a place `p` relative to p1.
-    #[inline]
-    fn equation(&self, p: DVec3, d: DVec3) -> Equation {
-        let (across, offset) = (d.cross(self.axis), p.cross(self.axis));
-        let (e, g) = (self.r1 + self.k * p.dot(self.axis), self.k * d.dot(self.axis));
-        let a = across.length_squared() - g * g;
-        let (h, c) = (across.dot(offset) - e * g, offset.length_squared() - e * e);
-        Equation { a, h, c, e, g, across, offset }
-    }
-
-    /// The interval of the line within the lateral surface of one nappe, without cuts.
-    ///
-    /// The [`Equation`] is set up at the ray's origin if that is near, else about the middle of the crossings, where the
-    /// discriminant keeps its digits for a thin cone far away; where they do not suffice, in twice the precision.
-    #[inline]
-    pub(crate) fn lateral_span(&self, ray: &Ray) -> Option<Span> {
-        let (w, d) = (ray.origin - self.p1, ray.direction);
-        let Equation { a, h, c, .. } = self.equation(w, d);
-        let (start, p, slack) = if is_nearby(a, h, c) {
-            (0.0, w, w.abs())
-        } else {
-            place_near(ray.origin, self.p1, start(w, d, a, h), d)
-        };
-        let decided = self.decided_span(d, start, p, length(slack));
-        self.cut_at_apex(ray, decided.unwrap_or_else(|| self.exact_lateral_span(ray, start, p))?)
-    }
-
-    /// The span as far as doubles decide it, with the equation set up at the place `p` relative to p1, which is `slack` units of
-    /// the unit roundoff off.
-    #[inline]
-    fn decided_span(&self, d: DVec3, start: f64, p: DVec3, slack: f64) -> Option<Option<Span>> {
-        let Equation { a, h, c, e, g, across, offset } = self.equation(p, d);
+impl Doubles {
+    /// The equation set up at the place `p` relative to p1, which is `slack` units of the unit roundoff off.
+    #[inline(always)]
+    pub(crate) fn new(body: &Axial, d: DVec3, p: DVec3, slack: f64) -> Self {
+        let equation = body.equation(p, d);
+        let Equation { a, h, c, e, g, across, offset } = equation;
         let delta = h * h - a * c;
 
         // Bounds on the errors in units of the unit roundoff, by the inequality of Cauchy and Schwarz.
         let (way, across, offset) = (length(p), length(across), length(offset));
         let (speed, reach) = (4.0 * length(d), 4.0 * way + slack);
-        let slope = self.k.abs();
-        let e_error = slope * reach + 2.0 * self.r1;
+        let slope = body.k.abs();
+        let e_error = slope * reach + 2.0 * body.r1;
         let a_error = 2.0 * speed * (across + slope * g.abs());
         let h_error = across * reach + offset * speed + g.abs() * e_error + e.abs() * slope * speed;
         let c_error = 2.0 * (offset * reach + e.abs() * e_error)
             // Near the apex nothing is left but errors.
             + UNIT_ROUNDOFF * (reach * reach + e_error * e_error);
-        let delta_error = 2.0 * h.abs() * h_error + a.abs() * c_error + c.abs() * a_error;
+        let delta_error = f64::EPSILON * (2.0 * h.abs() * h_error + a.abs() * c_error + c.abs() * a_error);
         let radius = e - g * (h / a);
         let is_certain = a.abs() > f64::EPSILON * a_error
-            && delta.abs() > f64::EPSILON * delta_error
+            && delta.abs() > delta_error
             && (g == 0.0 || radius.abs() > 8.0 * f64::EPSILON * (e_error + (h / a).abs() * slope * speed));
-        if !is_certain {
-            return None;
-        }
-        if delta < 0.0 && a > 0.0 {
-            return Some(None);
-        }
-        let (first, second) = quadratic(a, h, c, delta)?;
-        let errors = [a_error, h_error, c_error];
-        let keeps_digits = is_exact(start, [first, second], 2.0 * delta.sqrt(), errors, 60.0);
-        let pair = Some((start + first, start + second));
-        keeps_digits.then(|| nappe(a, pair, g, radius))
+        Self { equation, delta, radius, errors: [a_error, h_error, c_error], delta_error, is_certain }
     }
 
-    /// As [`Axial::lateral_span`], in twice the precision, and at the place `p` by `start` for want of that.
-    #[cold]
-    #[inline(never)]
-    fn exact_lateral_span(&self, ray: &Ray, start: f64, p: DVec3) -> Option<Span> {
-        // Near a pointed end, where everything cancels, from the point nearest to that.
-        let near_tip = self.r1 == 0.0 || self.r2 == 0.0;
-        let from_tip = if near_tip { self.way_to_tip(ray) } else { start };
-        let (spine, solution) = self.solution(ray, from_tip);
-        let (radius, growth) = (spine.radius_at(solution.place), spine.growth(components(ray.direction)));
-        let ([a, h, c, e, g], pair) = if solution.is_finite {
-            let numbers = [solution.a, solution.h, solution.c, radius, growth].map(|x| x.high);
-            (numbers, solution.crossings)
-        } else {
-            let Equation { a, h, c, e, g, .. } = self.equation(p, ray.direction);
-            let pair = quadratic(a, h, c, (h * h - a * c).max(0.0));
-            ([a, h, c, e, g], pair.map(|(first, second)| (start + first, start + second)))
-        };
+    /// What the line has of the double cone, as far as doubles decide it.
+    #[inline(always)]
+    pub(crate) fn double_cone(&self, start: f64) -> Option<DoubleCone> {
+        let Equation { a, h, c, g, .. } = self.equation;
+        if !self.is_certain {
+            return None;
+        }
+        let cone = DoubleCone { a, growth: g, radius: self.radius, pair: None };
+        if self.delta < 0.0 && a > 0.0 {
+            return Some(cone);
+        }
+        let (first, second) = quadratic(a, h, c, self.delta)?;
+        let keeps_digits = is_exact(start, [first, second], 2.0 * self.delta.sqrt(), self.errors, 60.0);
+        keeps_digits.then_some(DoubleCone { pair: Some((start + first, start + second)), ..cone })
+    }
+}
+
+/// What a line that crosses a double cone at two places, or misses it, has of it.
+pub(crate) struct DoubleCone {
+    pub(crate) a: f64,
+    /// What the signed radius grows by along the line, and what it is at the middle of the crossings.
+    pub(crate) growth: f64,
+    pub(crate) radius: f64,
+    pub(crate) pair: Option<(f64, f64)>,
+}
+
+impl DoubleCone {
+    /// The part in one nappe.
+    #[inline]
+    pub(crate) fn nappe(&self) -> Option<Span> {
+        nappe(self.a, self.pair, self.growth, self.radius)
+    }
+}
+
+/// The equation in twice the precision, rounded.
+pub(crate) struct ExactSide {
+    pub(crate) a: f64,
+    pub(crate) h: f64,
+    pub(crate) c: f64,
+    pub(crate) e: f64,
+    pub(crate) g: f64,
+    pub(crate) pair: Option<(f64, f64)>,
+    /// The signed radius at the middle of the crossings; no number where `a` is zero.
+    pub(crate) middle: f64,
+    pub(crate) spine: Spine,
+    pub(crate) solution: Solution,
+}
+
+impl ExactSide {
+    /// The interval of the line within one nappe.
+    pub(crate) fn span(&self, caps: bool) -> Option<Span> {
+        let &Self { a, h, c, e, g, pair, .. } = self;
         if a != 0.0 {
-            let middle = if solution.is_finite {
-                (radius - growth * (solution.h / solution.a)).high
-            } else {
-                e - g * (h / a)
-            };
-            return nappe(a, pair, g, middle);
+            return nappe(a, pair, g, self.middle);
         }
         let whole = (f64::NEG_INFINITY, f64::INFINITY);
         let (low, high) = if h != 0.0 {
@@ -220,10 +188,109 @@ impl Axial {
             (c <= 0.0).then_some(whole)?
         } else {
             // Along a generator: the line is inside from the apex on, and misses an open surface.
-            let apex = (self.caps && c <= 0.0).then_some(solution.start - e / g)?;
+            let apex = (caps && c <= 0.0).then_some(self.solution.start - e / g)?;
             if g > 0.0 { (apex, whole.1) } else { (whole.0, apex) }
         };
         Some([(low, LATERAL), (high, LATERAL)])
+    }
+}
+
+/// The axis of a body in twice the precision.
+pub(crate) struct Spine {
+    /// The point of it that places are relative to: a pointed end, where there is one.
+    pub(crate) base: DVec3,
+    pub(crate) axis: [Twofold; 3],
+    /// The square of its length.
+    pub(crate) square: Twofold,
+    /// What the radius grows by along it, and the radius at the base times the square.
+    pub(crate) rise: Twofold,
+    pub(crate) radius: Twofold,
+}
+
+impl Spine {
+    /// The signed radius at a place relative to the base, times the square.
+    fn radius_at(&self, p: [Twofold; 3]) -> Twofold {
+        self.radius + self.growth(p)
+    }
+
+    /// What that grows by along `d`.
+    fn growth(&self, d: [Twofold; 3]) -> Twofold {
+        self.rise * dot(d, self.axis)
+    }
+}
+
+impl Axial {
+    pub(crate) fn is_whole(&self) -> bool {
+        self.phi_max >= TAU
+    }
+
+    pub(crate) fn is_bounded(&self) -> bool {
+        self.length.is_finite()
+    }
+
+    fn has_cap(&self, part: u32) -> bool {
+        self.caps && if part == CAP1 { self.cut1 } else { part == CAP2 && self.cut2 }
+    }
+
+    fn cap(&self, part: u32) -> (DVec3, f64) {
+        if part == CAP1 { (self.p1, self.r1) } else { (self.p2, self.r2) }
+    }
+
+    /// The equation of the lateral surface along `d` from a place `p` relative to p1.
+    #[inline]
+    pub(crate) fn equation(&self, p: DVec3, d: DVec3) -> Equation {
+        let (across, offset) = (d.cross(self.axis), p.cross(self.axis));
+        let (e, g) = (self.r1 + self.k * p.dot(self.axis), self.k * d.dot(self.axis));
+        let a = across.length_squared() - g * g;
+        let (h, c) = (across.dot(offset) - e * g, offset.length_squared() - e * e);
+        Equation { a, h, c, e, g, across, offset }
+    }
+
+    /// The interval of the line within the lateral surface of one nappe, without cuts.
+    ///
+    /// The [`Equation`] is set up at the ray's origin if that is near, else about the middle of the crossings, where the
+    /// discriminant keeps its digits for a thin cone far away; where they do not suffice, in twice the precision.
+    #[inline]
+    pub(crate) fn lateral_span(&self, ray: &Ray) -> Option<Span> {
+        let (start, p, slack) = self.set_up(ray);
+        let doubles = Doubles::new(self, ray.direction, p, length(slack));
+        let decided = doubles.double_cone(start).map(|cone| cone.nappe());
+        self.cut_at_apex(ray, decided.unwrap_or_else(|| self.exact_side(ray, start, p).span(self.caps))?)
+    }
+
+    /// Where the equation is set up: the parameter, the place there relative to p1, and how far that may be off, in units of the
+    /// unit roundoff.
+    #[inline(always)]
+    pub(crate) fn set_up(&self, ray: &Ray) -> (f64, DVec3, DVec3) {
+        let (w, d) = (ray.origin - self.p1, ray.direction);
+        let Equation { a, h, c, .. } = self.equation(w, d);
+        if is_nearby(a, h, c) {
+            (0.0, w, w.abs())
+        } else {
+            place_near(ray.origin, self.p1, start(w, d, a, h), d)
+        }
+    }
+
+    /// The equation of the lateral surface in twice the precision, or in doubles at the place `p` by `start` for want of that.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn exact_side(&self, ray: &Ray, start: f64, p: DVec3) -> ExactSide {
+        // Near a pointed end, where everything cancels, from the point nearest to that.
+        let near_tip = self.r1 == 0.0 || self.r2 == 0.0;
+        let from_tip = if near_tip { self.way_to_tip(ray) } else { start };
+        let (spine, solution) = self.solution(ray, from_tip);
+        let (radius, growth) = (spine.radius_at(solution.place), spine.growth(components(ray.direction)));
+        if solution.is_finite {
+            let [a, h, c, e, g] = [solution.a, solution.h, solution.c, radius, growth].map(|x| x.high);
+            let middle = (radius - growth * (solution.h / solution.a)).high;
+            let pair = solution.crossings;
+            ExactSide { a, h, c, e, g, pair, middle, spine, solution }
+        } else {
+            let Equation { a, h, c, e, g, .. } = self.equation(p, ray.direction);
+            let pair = quadratic(a, h, c, (h * h - a * c).max(0.0));
+            let pair = pair.map(|(first, second)| (start + first, start + second));
+            ExactSide { a, h, c, e, g, pair, middle: e - g * (h / a), spine, solution }
+        }
     }
 
     /// The parameter of the point nearest to the pointed end.
@@ -234,7 +301,7 @@ impl Axial {
 
     /// The part of the interval on the body's side of a pointed end.
     #[inline]
-    fn cut_at_apex(&self, ray: &Ray, [near, far]: Span) -> Option<Span> {
+    pub(crate) fn cut_at_apex(&self, ray: &Ray, [near, far]: Span) -> Option<Span> {
         let (apex, is_above) = match (self.r1 == 0.0, self.r2 == 0.0) {
             (true, _) => (self.p1, true),
             (_, true) => (self.p2, false),
@@ -343,7 +410,7 @@ impl Axial {
     }
 
     /// Whether the point at `t` is within the sweep.
-    fn keeps(&self, ray: &Ray, t: f64, part: u32) -> bool {
+    pub(crate) fn keeps(&self, ray: &Ray, t: f64, part: u32) -> bool {
         let (_, arm) = self.arm(ray, t, part);
         self.phi(arm) <= self.phi_max
     }
@@ -621,6 +688,10 @@ macro_rules! axial_shape {
             /// Every crossing in the ray's range, appended in ascending order.
             pub fn roots(&self, ray: &Ray, out: &mut Roots) {
                 self.body.roots(ray, out);
+            }
+
+            pub(crate) fn explained(&self, ray: &Ray, notes: &mut crate::explain::Notes) {
+                self.body.explained(ray, notes);
             }
 
             /// The surface at a crossing.

@@ -25,7 +25,7 @@ use crate::{measure, sphere};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capsule {
     // The capped cylinder inside the capsule (k = 0); its length may be 0.
-    tube: Axial,
+    pub(crate) tube: Axial,
 }
 
 impl Capsule {
@@ -73,7 +73,7 @@ impl Capsule {
     }
 
     /// The centre of a cap, and the unit vector from there to its pole.
-    fn cap(&self, part: u32) -> (DVec3, DVec3) {
+    pub(crate) fn cap(&self, part: u32) -> (DVec3, DVec3) {
         if part == CAP1 { (self.tube.p1, -self.tube.axis) } else { (self.tube.p2, self.tube.axis) }
     }
 
@@ -85,16 +85,14 @@ impl Capsule {
     /// a seam, so there is no crack along it. If rounding makes a line miss a ball although it passes through
     /// the disk at its end, the disk is used.
     #[inline]
-    fn span(&self, ray: &Ray) -> Option<Span> {
+    pub(crate) fn span(&self, ray: &Ray) -> Option<Span> {
         let [side_near, side_far] = self.tube.lateral_span(ray)?;
         let ball = |part| {
             let (near, far) = sphere::crossings(self.cap(part).0, self.radius(), ray)?;
             Some([(near, part), (far, part)])
         };
         let Some([slab_near, slab_far]) = self.tube.slab_span(ray) else {
-            // Perpendicular to the axis, beyond one of the ends.
-            let is_before = (ray.origin - self.tube.p1).dot(self.tube.axis) < 0.0;
-            return ball(if is_before { CAP1 } else { CAP2 });
+            return ball(self.ball_beyond(ray));
         };
         let enters = if side_near.0 < slab_near.0 { slab_near } else { side_near };
         let leaves = if side_far.0 > slab_far.0 { slab_far } else { side_far };
@@ -115,6 +113,12 @@ impl Capsule {
             join(slab_far.1);
         }
         span
+    }
+
+    /// The end beyond which a line is that passes perpendicular to the axis.
+    pub(crate) fn ball_beyond(&self, ray: &Ray) -> u32 {
+        let is_before = (ray.origin - self.tube.p1).dot(self.tube.axis) < 0.0;
+        if is_before { CAP1 } else { CAP2 }
     }
 
     #[inline]

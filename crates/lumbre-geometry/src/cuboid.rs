@@ -47,7 +47,7 @@ impl Cuboid {
     /// T. L. Kay, J. T. Kajiya, "Ray tracing complex scenes", SIGGRAPH 1986. The code divides instead of
     /// multiplying by a reciprocal, so a ray in the plane of a face does not multiply zero by infinity.
     #[inline]
-    fn span(&self, ray: &Ray) -> Option<[(f64, u32); 2]> {
+    pub(crate) fn span(&self, ray: &Ray) -> Option<[(f64, u32); 2]> {
         let (to_low, to_high) = (self.low - ray.origin, self.high - ray.origin);
         let d = ray.direction;
         let (at_low, at_high) = (to_low / d, to_high / d);

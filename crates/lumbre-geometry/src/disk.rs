@@ -21,13 +21,13 @@ use crate::{
 /// in the plane misses it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disk {
-    center: DVec3,
+    pub(crate) center: DVec3,
     // The given normal times a power of two, so that small integers stay exact; of the order of 1 in length.
-    normal: DVec3,
+    pub(crate) normal: DVec3,
     // 0 <= inner_radius < radius.
-    radius: f64,
-    inner_radius: f64,
-    phi_max: f64,
+    pub(crate) radius: f64,
+    pub(crate) inner_radius: f64,
+    pub(crate) phi_max: f64,
 }
 
 impl Disk {
@@ -60,7 +60,7 @@ impl Disk {
     }
 
     /// The point at `t` in the disk's plane, relative to the centre.
-    fn arm(&self, ray: &Ray, t: f64) -> DVec3 {
+    pub(crate) fn arm(&self, ray: &Ray, t: f64) -> DVec3 {
         let w = point(ray.origin, self.center, t, ray.direction);
         w - (w.dot(self.normal) / self.normal.length_squared()) * self.normal
     }

@@ -23,11 +23,11 @@ use crate::{
 /// Cylinders and cones are special cases. Ends at the same height are refused: that is a disk.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hyperboloid {
-    p1: DVec3,
-    p2: DVec3,
+    pub(crate) p1: DVec3,
+    pub(crate) p2: DVec3,
     // From p1 to p2, rounded; its z is not 0.
     along: DVec3,
-    phi_max: f64,
+    pub(crate) phi_max: f64,
     // The squared radius at v is start + 2 middle v + end v².
     start: f64,
     middle: f64,
@@ -69,19 +69,19 @@ impl Hyperboloid {
         self.p1 + v * self.along
     }
 
-    fn v_of(&self, z: f64) -> f64 {
+    pub(crate) fn v_of(&self, z: f64) -> f64 {
         (z - self.p1.z) / self.along.z
     }
 
     /// The cosine and sine of the rotation that takes the segment through `p`.
-    fn turn(&self, p: DVec3) -> DVec2 {
+    pub(crate) fn turn(&self, p: DVec3) -> DVec2 {
         let q = self.segment(self.v_of(p.z));
         let turn = DVec2::new(p.x * q.x + p.y * q.y, p.y * q.x - p.x * q.y);
         // Where the segment meets the axis, any angle will do.
         turn.try_normalize().unwrap_or(DVec2::X)
     }
 
-    fn keeps(&self, p: DVec3) -> bool {
+    pub(crate) fn keeps(&self, p: DVec3) -> bool {
         let v = self.v_of(p.z);
         let turn = self.turn(p);
         (0.0..=1.0).contains(&v) && (self.phi_max >= TAU || azimuth(turn.y, turn.x) <= self.phi_max)

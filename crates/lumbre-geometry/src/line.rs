@@ -28,50 +28,78 @@ pub(crate) trait SecondDegree {
 /// touch, that are nearly parallel to an asymptote or a generator, or whose digits cancel.
 #[inline]
 pub(crate) fn crossings(surface: &impl SecondDegree, ray: &Ray) -> Option<(f64, f64)> {
+    let (start, p, slack) = set_up(surface, ray);
+    let doubles = Doubles::new(surface, ray.direction, p, slack);
+    doubles.crossings(start).unwrap_or_else(|| exact_crossings(surface, ray, start, p))
+}
+
+/// Where the equation is set up: the parameter, the place there relative to the base, and how far that may be off, in units of
+/// the unit roundoff.
+#[inline(always)]
+pub(crate) fn set_up(surface: &impl SecondDegree, ray: &Ray) -> (f64, DVec3, DVec3) {
     let (w, d) = (ray.origin - surface.base(), ray.direction);
     let [a, h, c] = surface.along(w.to_array(), d.to_array());
-    let (start, p, slack) = if is_nearby(a, h, c) {
+    if is_nearby(a, h, c) {
         (0.0, w, w.abs())
     } else {
         place_near(ray.origin, surface.base(), start(ray.origin - surface.center(), d, a, h), d)
-    };
-    decided(surface, d, start, p, slack).unwrap_or_else(|| exact_crossings(surface, ray, start, p))
+    }
 }
 
-/// The crossings as far as doubles decide them, with the equation set up at the place `p`, which is `slack` units of the unit
-/// roundoff off.
-#[inline]
-fn decided(
-    surface: &impl SecondDegree,
-    d: DVec3,
-    start: f64,
-    p: DVec3,
-    slack: DVec3,
-) -> Option<Option<(f64, f64)>> {
-    let [a, h, c] = surface.along(p.to_array(), d.to_array());
-    let delta = h * h - a * c;
-    // No coefficient is off by more than this many units of the unit roundoff of its terms.
-    const ROUNDINGS: f64 = 20.0;
-    let sizes = surface.along(components::<Magnitude>(p.abs().max(slack)), components(d));
-    let errors @ [a_error, h_error, c_error] = sizes.map(|size| ROUNDINGS * size.0);
-    let delta_error = 2.0 * h.abs() * h_error + a.abs() * c_error + c.abs() * a_error;
-    // False for a NaN.
-    let is_certain = delta.abs() > f64::EPSILON * delta_error;
-    if !is_certain {
-        return None;
+/// The equation in doubles, with bounds of its errors.
+pub(crate) struct Doubles {
+    pub(crate) a: f64,
+    pub(crate) h: f64,
+    pub(crate) c: f64,
+    /// h² − ac.
+    pub(crate) delta: f64,
+    /// Of a, h and c, in units of the unit roundoff.
+    pub(crate) errors: [f64; 3],
+    /// Of the discriminant.
+    pub(crate) delta_error: f64,
+}
+
+impl Doubles {
+    /// The equation set up at the place `p`, which is `slack` units of the unit roundoff off.
+    #[inline(always)]
+    pub(crate) fn new(surface: &impl SecondDegree, d: DVec3, p: DVec3, slack: DVec3) -> Self {
+        let [a, h, c] = surface.along(p.to_array(), d.to_array());
+        let delta = h * h - a * c;
+        // No coefficient is off by more than this many units of the unit roundoff of its terms.
+        const ROUNDINGS: f64 = 20.0;
+        let sizes = surface.along(components::<Magnitude>(p.abs().max(slack)), components(d));
+        let errors @ [a_error, h_error, c_error] = sizes.map(|size| ROUNDINGS * size.0);
+        let delta_error = 2.0 * h.abs() * h_error + a.abs() * c_error + c.abs() * a_error;
+        Self { a, h, c, delta, errors, delta_error: f64::EPSILON * delta_error }
     }
-    if delta < 0.0 {
-        return Some(None);
+
+    /// The crossings as far as doubles decide them.
+    #[inline(always)]
+    pub(crate) fn crossings(&self, start: f64) -> Option<Option<(f64, f64)>> {
+        let &Self { a, h, c, delta, errors, delta_error } = self;
+        // False for a NaN.
+        let is_certain = delta.abs() > delta_error;
+        if !is_certain {
+            return None;
+        }
+        if delta < 0.0 {
+            return Some(None);
+        }
+        let (first, second) = quadratic(a, h, c, delta)?;
+        let keeps_digits = is_exact(start, [first, second], 2.0 * delta.sqrt(), errors, 200.0);
+        keeps_digits.then_some(Some((start + first, start + second)))
     }
-    let (first, second) = quadratic(a, h, c, delta)?;
-    let keeps_digits = is_exact(start, [first, second], 2.0 * delta.sqrt(), errors, 200.0);
-    keeps_digits.then_some(Some((start + first, start + second)))
 }
 
 /// As [`crossings`], in twice the precision, and at the place `p` by `start` for want of that.
 #[cold]
 #[inline(never)]
-fn exact_crossings(surface: &impl SecondDegree, ray: &Ray, start: f64, p: DVec3) -> Option<(f64, f64)> {
+pub(crate) fn exact_crossings(
+    surface: &impl SecondDegree,
+    ray: &Ray,
+    start: f64,
+    p: DVec3,
+) -> Option<(f64, f64)> {
     let exact = Solution::new(ray.origin, surface.base(), ray.direction, start, |p, d| surface.along(p, d));
     if exact.is_finite {
         return exact.crossings;
@@ -153,8 +181,7 @@ impl Solution {
             let double = at((h / a).negated());
             double.is_finite().then_some((double, double))
         } else {
-            let root = delta.sqrt();
-            let q = if h.high < 0.0 { root - h } else { (h + root).negated() };
+            let q = stable(h, delta);
             let near = at(c / q);
             // As `a` vanishes, one crossing goes to infinity.
             let far = q.high / a.high;
@@ -164,19 +191,39 @@ impl Solution {
         Self { crossings, start, place, a, h, c, is_finite }
     }
 
+    /// h² − ac.
+    pub(crate) fn delta(&self) -> Twofold {
+        self.h * self.h - self.a * self.c
+    }
+
+    /// The number of which one root is q/a and the other c/q.
+    pub(crate) fn q(&self) -> Twofold {
+        stable(self.h, self.delta())
+    }
+
     /// The point, relative to the base, of the crossing that `t` is: not rounded on the way, which from far away would put it
     /// anywhere on the surface.
     pub(crate) fn point(&self, t: f64, direction: DVec3) -> Option<DVec3> {
         let (first, second) = self.crossings?;
-        let root = (self.h * self.h - self.a * self.c).sqrt();
-        let q = if self.h.high < 0.0 { root - self.h } else { (self.h + root).negated() };
-        let pair = if root.high == 0.0 { [(self.h / self.a).negated(); 2] } else { [self.c / q, q / self.a] };
+        let delta = self.delta();
+        let q = stable(self.h, delta);
+        let pair = if delta.sqrt().high == 0.0 {
+            [(self.h / self.a).negated(); 2]
+        } else {
+            [self.c / q, q / self.a]
+        };
         let [near, far] = if pair[1].high < pair[0].high { [pair[1], pair[0]] } else { pair };
         let s = if (t - first).abs() <= (second - t).abs() { near } else { far };
         let at = |i: usize| (self.place[i] + s * Twofold::from(direction[i])).high;
         let point = DVec3::new(at(0), at(1), at(2));
         point.is_finite().then_some(point)
     }
+}
+
+/// −(h ± √Δ), with the sign that lets nothing cancel.
+fn stable(h: Twofold, delta: Twofold) -> Twofold {
+    let root = delta.sqrt();
+    if h.high < 0.0 { root - h } else { (h + root).negated() }
 }
 
 /// The point at a crossing, relative to the base, and on a scale of `size`.
@@ -241,13 +288,7 @@ pub(crate) fn accepted(
 /// the normal, of the right sign: 0 where it is parallel, and the parameter says nothing.
 #[inline]
 pub(crate) fn plane_crossing(ray: &Ray, point: DVec3, normal: DVec3) -> (f64, f64) {
-    let d = ray.direction;
-    let to_point = point - ray.origin;
-    let (along, away) = (d.dot(normal), to_point.dot(normal));
-    let size = normal.abs();
-    // Where much cancels, digits are lost.
-    let keeps_digits =
-        64.0 * along.abs() >= d.abs().dot(size) && 64.0 * away.abs() >= to_point.abs().dot(size);
+    let (away, along, keeps_digits) = plane_products(ray, point, normal);
     if keeps_digits && along != 0.0 {
         (away / along, along)
     } else {
@@ -255,11 +296,30 @@ pub(crate) fn plane_crossing(ray: &Ray, point: DVec3, normal: DVec3) -> (f64, f6
     }
 }
 
-#[inline(never)]
-fn exact_plane_crossing(ray: &Ray, point: DVec3, normal: DVec3) -> (f64, f64) {
+/// The way to the plane and the ray's way, both along the normal; and whether doubles keep their digits.
+#[inline(always)]
+pub(crate) fn plane_products(ray: &Ray, point: DVec3, normal: DVec3) -> (f64, f64, bool) {
+    let d = ray.direction;
+    let to_point = point - ray.origin;
+    let (along, away) = (d.dot(normal), to_point.dot(normal));
+    let size = normal.abs();
+    // Where much cancels, digits are lost.
+    let keeps_digits =
+        64.0 * along.abs() >= d.abs().dot(size) && 64.0 * away.abs() >= to_point.abs().dot(size);
+    (away, along, keeps_digits)
+}
+
+/// Both ways as if computed in twice the precision and then rounded.
+pub(crate) fn exact_plane_products(ray: &Ray, point: DVec3, normal: DVec3) -> (f64, f64) {
     let n = normal.to_array();
     let along = exact_dot(ray.direction.to_array().map(Twofold::from), n);
     let away = exact_dot(std::array::from_fn(|i| Twofold::difference(point[i], ray.origin[i])), n);
+    (away, along)
+}
+
+#[inline(never)]
+fn exact_plane_crossing(ray: &Ray, point: DVec3, normal: DVec3) -> (f64, f64) {
+    let (away, along) = exact_plane_products(ray, point, normal);
     let t = away / along;
     if t.is_finite() || along == 0.0 {
         return (t, along);

@@ -25,10 +25,10 @@ use crate::{
 pub struct Paraboloid {
     // z = bend (x² + y²), bend > 0: z_max / radius², rounded.
     bend: f64,
-    radius: f64,
-    z_min: f64,
-    z_max: f64,
-    phi_max: f64,
+    pub(crate) radius: f64,
+    pub(crate) z_min: f64,
+    pub(crate) z_max: f64,
+    pub(crate) phi_max: f64,
 }
 
 impl Paraboloid {
@@ -65,7 +65,7 @@ impl Paraboloid {
         (z / self.bend).sqrt()
     }
 
-    fn keeps(&self, p: DVec3) -> bool {
+    pub(crate) fn keeps(&self, p: DVec3) -> bool {
         let is_bottom = self.z_min <= 0.0;
         (is_bottom || self.z_min <= p.z)
             && p.z <= self.z_max

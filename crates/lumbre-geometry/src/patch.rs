@@ -123,17 +123,9 @@ impl BilinearPatch {
             return crossings;
         }
         let sheared = WatertightRay::new(ray.origin, ray.direction);
-        let patch = Sheared { corners: self.corners().map(|p| sheared.sheared(p)) };
-        let outline = patch.outline();
-        let sides: [Side; 4] = std::array::from_fn(|i| Side::of(outline[i], outline[(i + 1) % 4]));
-        let mut winding = 0;
-        for (i, side) in sides.into_iter().enumerate() {
-            let [is_above, goes_above] = [i, (i + 1) % 4].map(|corner| outline[corner].y > 0.0);
-            if is_above != goes_above && side.is_positive == goes_above {
-                winding += if goes_above { 1 } else { -1 };
-            }
-        }
-        for (uv, multiplicity) in patch.inside(winding != 0).into_iter().flatten() {
+        let patch = self.sheared(&sheared);
+        let sides = patch.sides();
+        for (uv, multiplicity) in patch.inside(patch.winding(sides) != 0).into_iter().flatten() {
             let t = sheared.t(patch.at(uv).z);
             if t.is_finite() {
                 let root = Root { t, part: 0, multiplicity, local: uv };
@@ -155,6 +147,12 @@ impl BilinearPatch {
             crossings.of_line.sort_by(|a, b| a.root.t.total_cmp(&b.root.t));
         }
         crossings
+    }
+
+    /// The patch in the sheared space of a ray.
+    #[inline]
+    pub(crate) fn sheared(&self, sheared: &WatertightRay) -> Sheared {
+        Sheared { corners: self.corners().map(|p| sheared.sheared(p)) }
     }
 
     /// Finds the crossings exactly at edges and corners: those that the patch owns among what is found, and the others.
@@ -431,9 +429,9 @@ impl BilinearPatch {
 }
 
 /// A patch in the sheared space of a ray, which is its last axis.
-struct Sheared {
+pub(crate) struct Sheared {
     /// p00, p10, p01, p11.
-    corners: [DVec3; 4],
+    pub(crate) corners: [DVec3; 4],
 }
 
 /// The z component of a cross product.
@@ -442,12 +440,42 @@ fn turn(a: DVec3, b: DVec3) -> f64 {
 }
 
 impl Sheared {
-    fn outline(&self) -> [DVec3; 4] {
+    pub(crate) fn outline(&self) -> [DVec3; 4] {
         let [p00, p10, p01, p11] = self.corners;
         [p00, p10, p11, p01]
     }
 
-    fn at(&self, uv: DVec2) -> DVec3 {
+    /// On which side of each edge of the outline the ray passes.
+    #[inline]
+    pub(crate) fn sides(&self) -> [Side; 4] {
+        let outline = self.outline();
+        std::array::from_fn(|i| Side::of(outline[i], outline[(i + 1) % 4]))
+    }
+
+    /// How often the outline winds around the ray.
+    #[inline]
+    pub(crate) fn winding(&self, sides: [Side; 4]) -> i32 {
+        let outline = self.outline();
+        let mut winding = 0;
+        for (i, side) in sides.into_iter().enumerate() {
+            let [is_above, goes_above] = [i, (i + 1) % 4].map(|corner| outline[corner].y > 0.0);
+            if is_above != goes_above && side.is_positive == goes_above {
+                winding += if goes_above { 1 } else { -1 };
+            }
+        }
+        winding
+    }
+
+    /// a, h, c and the discriminant of a + 2 h u + c u² = 0, whose roots are the rulings of constant u that meet the ray.
+    #[inline]
+    pub(crate) fn rulings(&self) -> [f64; 4] {
+        let [p00, p10, p01, p11] = self.corners;
+        let (a, c) = (turn(p00, p01), turn(p10 - p00, p11 - p01));
+        let h = 0.5 * (turn(p10, p11) - a - c);
+        [a, h, c, dop(h, h, a, c)]
+    }
+
+    pub(crate) fn at(&self, uv: DVec2) -> DVec3 {
         let [p00, p10, p01, p11] = self.corners;
         let (low, high) = ((1.0 - uv.x) * p00 + uv.x * p10, (1.0 - uv.x) * p01 + uv.x * p11);
         (1.0 - uv.y) * low + uv.y * high
@@ -470,11 +498,8 @@ impl Sheared {
     /// 2019: the rulings of constant u that the ray intersects are roots of a quadratic; the rest is linear. Theirs tests u and
     /// v against 0 and 1, which leaks; here a root that is off by its rounding is moved into the patch.
     fn inside(&self, is_odd: bool) -> [Option<(DVec2, u8)>; 2] {
-        let [p00, p10, p01, p11] = self.corners;
-        let (a, c) = (turn(p00, p01), turn(p10 - p00, p11 - p01));
-        let h = 0.5 * (turn(p10, p11) - a - c);
-        // a + 2 h u + c u² = 0.
-        let roots = quadratic(c, h, a, dop(h, h, a, c));
+        let [a, h, c, delta] = self.rulings();
+        let roots = quadratic(c, h, a, delta);
         if let Some((double, second)) = roots
             && double == second
             && !is_odd
@@ -499,7 +524,7 @@ impl Sheared {
     }
 
     /// The point of a ruling that is nearest to the ray.
-    fn on_ruling(&self, u: f64) -> DVec2 {
+    pub(crate) fn on_ruling(&self, u: f64) -> DVec2 {
         let [p00, p10, p01, p11] = self.corners;
         let (start, end) = ((1.0 - u) * p00 + u * p10, (1.0 - u) * p01 + u * p11);
         let side = end - start;
@@ -509,7 +534,7 @@ impl Sheared {
 
     /// A Newton step. A ruling of constant u almost parallel to the ray determines the crossing poorly; afterwards the error
     /// is limited by the angle with the surface alone.
-    fn refined(&self, uv: DVec2) -> DVec2 {
+    pub(crate) fn refined(&self, uv: DVec2) -> DVec2 {
         let (p, [along_u, along_v]) = (self.at(uv), self.derivatives(uv));
         let area = turn(along_u, along_v);
         let step = DVec2::new(-turn(p, along_v) / area, -turn(along_u, p) / area);

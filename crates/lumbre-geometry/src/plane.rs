@@ -14,9 +14,9 @@ use crate::{Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Roots
 /// `uv` are lengths along the two axes that complete the normal to a frame. A ray in the plane misses it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
-    point: DVec3,
+    pub(crate) point: DVec3,
     // The given normal times a power of two, so that small integers stay exact; of the order of 1 in length.
-    normal: DVec3,
+    pub(crate) normal: DVec3,
 }
 
 impl Plane {

@@ -34,9 +34,9 @@ use crate::{
 #[derive(Clone, Debug)]
 pub struct Quadric {
     // p·matrix p + linear·p + constant; the largest coefficient is between 1 and 2.
-    matrix: DMat3,
-    linear: DVec3,
-    constant: f64,
+    pub(crate) matrix: DMat3,
+    pub(crate) linear: DVec3,
+    pub(crate) constant: f64,
     clip: Option<Aabb>,
     // A point about which the surface is: see `SecondDegree`.
     place: DVec3,
@@ -153,7 +153,7 @@ impl Quadric {
         self.clip
     }
 
-    fn keeps(&self, p: DVec3) -> bool {
+    pub(crate) fn keeps(&self, p: DVec3) -> bool {
         self.clip.is_none_or(|clip| clip.contains(p))
     }
 

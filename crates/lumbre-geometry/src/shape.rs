@@ -50,6 +50,33 @@ macro_rules! shapes {
                 match self { $(Self::$shape(shape) => shape.surface(ray, root),)+ }
             }
 
+            /// How the crossings with `ray` are found, step by step, and what became of each: the hits are those of
+            /// [`Shape::roots`], to the bit.
+            ///
+            /// A ray whose direction is too long or too short to be squared is explained with another length, as the search takes it.
+            ///
+            /// ```
+            /// use lumbre_geometry::{Fate, Ray, Shape, Sphere, Topic, Value};
+            /// use lumbre_math::DVec3;
+            ///
+            /// let ball = Shape::from(Sphere::new(DVec3::ZERO, 1.0)?);
+            /// let explanation = ball.explain(&Ray::new(DVec3::new(0.0, 0.0, 0.5), DVec3::Z));
+            /// let equation = explanation.steps.iter().find(|step| step.topic == Topic::Quadratic).expect("told");
+            /// assert_eq!((equation.quantities[2].symbol.as_ref(), &equation.quantities[2].value), ("c", &Value::Number(-0.75)));
+            /// let fates: Vec<(f64, Fate)> = explanation.candidates.iter().map(|one| (one.t, one.fate)).collect();
+            /// assert_eq!(fates, [(-1.5, Fate::Behind), (0.5, Fate::Hit)]);
+            /// # Ok::<(), lumbre_geometry::ShapeError>(())
+            /// ```
+            pub fn explain(&self, ray: &Ray) -> crate::Explanation {
+                let mut notes = crate::explain::Notes::new(ray);
+                if let Some(line) = notes.line() {
+                    match self { $(Self::$shape(shape) => shape.explained(&line, &mut notes),)+ }
+                }
+                let mut roots = Roots::new();
+                self.roots(ray, &mut roots);
+                notes.finished(ray, &roots, |root| self.surface(ray, root))
+            }
+
             /// The surface at `uv` of a part (see [`Root::part`]); `None` for a part that the shape does not
             /// have, and for shapes whose `uv` does not determine a point.
             pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {

@@ -26,12 +26,12 @@ pub struct Sphere {
     center: DVec3,
     radius: f64,
     // Relative to the centre, -radius <= z_min < z_max <= radius.
-    z_min: f64,
-    z_max: f64,
+    pub(crate) z_min: f64,
+    pub(crate) z_max: f64,
     // Angles from +z of z_min and z_max: theta_min > theta_max.
     theta_min: f64,
     theta_max: f64,
-    phi_max: f64,
+    pub(crate) phi_max: f64,
 }
 
 impl Sphere {
@@ -76,12 +76,12 @@ impl Sphere {
         self.radius
     }
 
-    fn is_whole(&self) -> bool {
+    pub(crate) fn is_whole(&self) -> bool {
         self.z_min <= -self.radius && self.z_max >= self.radius && self.phi_max >= TAU
     }
 
     /// Whether a point of the whole sphere, relative to the centre, belongs to this part.
-    fn keeps(&self, w: DVec3) -> bool {
+    pub(crate) fn keeps(&self, w: DVec3) -> bool {
         // A pole's computed height may lie slightly inside the pole.
         (self.z_min <= -self.radius || self.z_min <= w.z)
             && (self.z_max >= self.radius || w.z <= self.z_max)
@@ -93,7 +93,7 @@ impl Sphere {
         crossings(self.center, self.radius, ray)
     }
 
-    fn arm(&self, ray: &Ray, t: f64) -> DVec3 {
+    pub(crate) fn arm(&self, ray: &Ray, t: f64) -> DVec3 {
         arm(self.center, self.radius, ray, t)
     }
 
@@ -402,22 +402,48 @@ pub fn sphere_crossings(center: DVec3, radius: f64, ray: &Ray) -> Option<(f64, f
 /// nearly touches is decided in twice the precision.
 #[inline(always)]
 pub(crate) fn crossings(center: DVec3, radius: f64, ray: &Ray) -> Option<(f64, f64)> {
-    let w = ray.origin - center;
-    let a = ray.direction.length_squared();
-    let h = w.dot(ray.direction);
-    let nearest = w - (h / a) * ray.direction;
-    let (square, far) = (radius * radius, w.length_squared());
-    let (depth, power) = (square - nearest.length_squared(), far - square);
-    // All false for a NaN.
-    let is_steep = depth > 0.1 * square || (far < 2.0 * square && depth * depth > 1e-28 * square * square);
-    // Next to the surface the nearer crossing would lose digits, of which one that starts there has none.
-    let keeps_digits = power.abs() > 0.2 * square || power.abs() < 1e-6 * square;
-    if is_steep && keeps_digits {
-        quadratic(a, h, power, a * depth)
-    } else if depth < -0.1 * square && depth < -1e-27 * far {
+    let equation = Equation::new(center, radius, ray);
+    let Equation { a, h, c, depth, keeps_digits, .. } = equation;
+    if equation.is_steep && keeps_digits {
+        quadratic(a, h, c, a * depth)
+    } else if equation.surely_misses {
         None
     } else {
-        careful_crossings(center, radius, ray, [a, h, power, a * depth], keeps_digits)
+        careful_crossings(center, radius, ray, [a, h, c, a * depth], keeps_digits)
+    }
+}
+
+/// The equation a t² + 2 h t + c = 0 of a sphere along a ray.
+pub(crate) struct Equation {
+    pub(crate) a: f64,
+    pub(crate) h: f64,
+    pub(crate) c: f64,
+    /// The point nearest to the centre, relative to it.
+    pub(crate) nearest: DVec3,
+    /// The square of the radius less that of the distance there.
+    pub(crate) depth: f64,
+    /// Whether these numbers decide that the line crosses the sphere, leave the roots their digits, and decide that it misses.
+    pub(crate) is_steep: bool,
+    pub(crate) keeps_digits: bool,
+    pub(crate) surely_misses: bool,
+}
+
+impl Equation {
+    #[inline(always)]
+    pub(crate) fn new(center: DVec3, radius: f64, ray: &Ray) -> Self {
+        let w = ray.origin - center;
+        let a = ray.direction.length_squared();
+        let h = w.dot(ray.direction);
+        let nearest = w - (h / a) * ray.direction;
+        let (square, far) = (radius * radius, w.length_squared());
+        let (depth, power) = (square - nearest.length_squared(), far - square);
+        // All false for a NaN.
+        let is_steep =
+            depth > 0.1 * square || (far < 2.0 * square && depth * depth > 1e-28 * square * square);
+        // Next to the surface the nearer crossing would lose digits, of which one that starts there has none.
+        let keeps_digits = power.abs() > 0.2 * square || power.abs() < 1e-6 * square;
+        let surely_misses = depth < -0.1 * square && depth < -1e-27 * far;
+        Self { a, h, c: power, nearest, depth, is_steep, keeps_digits, surely_misses }
     }
 }
 
@@ -430,21 +456,47 @@ fn careful_crossings(
     [a, h, c, delta]: [f64; 4],
     is_apart: bool,
 ) -> Option<(f64, f64)> {
-    let (start, p, slack) = place_near(ray.origin, center, -h / a, ray.direction);
-    let (h_there, c_there) = (p.dot(ray.direction), p.length_squared() - radius * radius);
-    let delta_there = h_there * h_there - a * c_there;
-    let error = a * radius * (1e-14 * radius + f64::EPSILON * slack.element_sum());
-    // False for a NaN.
-    let is_certain = is_apart && delta_there.abs() > error;
-    if is_certain {
-        let (first, second) = quadratic(a, h_there, c_there, delta_there)?;
-        return Some((start + first, start + second));
+    let nearby = Nearby::new(center, radius, ray, [a, h]);
+    if nearby.is_certain && is_apart {
+        return nearby.crossings(a);
     }
-    let solution = solution(center, radius, ray, start);
+    let solution = solution(center, radius, ray, nearby.start);
     if solution.is_finite { solution.crossings } else { quadratic(a, h, c, delta) }
 }
 
-fn solution(center: DVec3, radius: f64, ray: &Ray, start: f64) -> Solution {
+/// The equation next to the point nearest to the centre.
+pub(crate) struct Nearby {
+    pub(crate) start: f64,
+    /// Relative to the centre.
+    pub(crate) place: DVec3,
+    pub(crate) h: f64,
+    pub(crate) c: f64,
+    pub(crate) delta: f64,
+    /// A bound on the discriminant's error.
+    pub(crate) error: f64,
+    pub(crate) is_certain: bool,
+}
+
+impl Nearby {
+    #[inline]
+    pub(crate) fn new(center: DVec3, radius: f64, ray: &Ray, [a, h]: [f64; 2]) -> Self {
+        let (start, p, slack) = place_near(ray.origin, center, -h / a, ray.direction);
+        let (h, c) = (p.dot(ray.direction), p.length_squared() - radius * radius);
+        let delta = h * h - a * c;
+        let error = a * radius * (1e-14 * radius + f64::EPSILON * slack.element_sum());
+        // False for a NaN.
+        let is_certain = delta.abs() > error;
+        Self { start, place: p, h, c, delta, error, is_certain }
+    }
+
+    #[inline]
+    pub(crate) fn crossings(&self, a: f64) -> Option<(f64, f64)> {
+        let (first, second) = quadratic(a, self.h, self.c, self.delta)?;
+        Some((self.start + first, self.start + second))
+    }
+}
+
+pub(crate) fn solution(center: DVec3, radius: f64, ray: &Ray, start: f64) -> Solution {
     Solution::new(ray.origin, center, ray.direction, start, |p, d| {
         [dot(d, d), dot(p, d), dot(p, p) - Twofold::product(radius, radius)]
     })

@@ -143,26 +143,78 @@ impl WatertightRay {
 
     #[inline(always)]
     fn hit_in(&self, order: Order, p0: DVec3, p1: DVec3, p2: DVec3) -> Option<TriangleHit> {
+        let edges = self.edges_in(order, p0, p1, p2);
+        if !edges.are_passed_inside() {
+            return None;
+        }
+        edges.crossing(self.shear.z)
+    }
+
+    #[inline(always)]
+    fn edges_in(&self, order: Order, p0: DVec3, p1: DVec3, p2: DVec3) -> Edges {
         let [a, b, c] = [p0, p1, p2].map(|p| order.apply(p - self.origin));
         let flat = |p: DVec3| (p.x - self.shear.x * p.z, p.y - self.shear.y * p.z);
         let ((ax, ay), (bx, by), (cx, cy)) = (flat(a), flat(b), flat(c));
         let mut u = cx * by - cy * bx;
         let mut v = ax * cy - ay * cx;
         let mut w = bx * ay - by * ax;
-        if (u == 0.0) | (v == 0.0) | (w == 0.0) {
+        let by_errors = (u == 0.0) | (v == 0.0) | (w == 0.0);
+        if by_errors {
             (u, v, w) = (dop(cx, by, cy, bx), dop(ax, cy, ay, cx), dop(bx, ay, by, ax));
         }
+        let corners = [DVec3::new(ax, ay, a.z), DVec3::new(bx, by, b.z), DVec3::new(cx, cy, c.z)];
+        Edges { corners, u, v, w, by_errors }
+    }
+
+    /// The edge functions of a triangle.
+    pub(crate) fn edges(&self, [p0, p1, p2]: [DVec3; 3]) -> Edges {
+        self.edges_in(self.order, p0, p1, p2)
+    }
+
+    /// The axes in the order of the sheared space.
+    pub(crate) fn axes(&self) -> [DVec3; 3] {
+        let numbers = self.order.apply(DVec3::new(0.0, 1.0, 2.0));
+        numbers.to_array().map(|axis| DVec3::AXES[axis as usize])
+    }
+
+    /// What a height along the last axis moves a point by, along the first two, and what it is of the ray's `t`.
+    pub(crate) fn shear(&self) -> DVec3 {
+        self.shear
+    }
+}
+
+/// The edge functions of a triangle in the sheared space of a ray.
+pub(crate) struct Edges {
+    /// In sheared space.
+    pub(crate) corners: [DVec3; 3],
+    /// Of the edges opposite to p0, p1 and p2.
+    pub(crate) u: f64,
+    pub(crate) v: f64,
+    pub(crate) w: f64,
+    /// Whether rounding errors were taken into account.
+    pub(crate) by_errors: bool,
+}
+
+impl Edges {
+    /// Whether the ray passes inside all edges, or on them.
+    #[inline(always)]
+    pub(crate) fn are_passed_inside(&self) -> bool {
+        let &Self { u, v, w, .. } = self;
         // No short-circuit: the branches are unpredictable, and a misprediction costs more than the
         // comparisons.
-        if ((u < 0.0) | (v < 0.0) | (w < 0.0)) & ((u > 0.0) | (v > 0.0) | (w > 0.0)) {
-            return None;
-        }
+        !(((u < 0.0) | (v < 0.0) | (w < 0.0)) & ((u > 0.0) | (v > 0.0) | (w > 0.0)))
+    }
+
+    /// Where the line crosses the triangle's plane; `None` where it sees the triangle edge-on.
+    #[inline(always)]
+    pub(crate) fn crossing(&self, from_height: f64) -> Option<TriangleHit> {
+        let &Self { corners: [a, b, c], u, v, w, .. } = self;
         let determinant = u + v + w;
         if determinant == 0.0 || determinant.is_nan() {
             return None;
         }
         let inverse = determinant.recip();
-        let t = self.shear.z * (u * a.z + v * b.z + w * c.z) * inverse;
+        let t = from_height * (u * a.z + v * b.z + w * c.z) * inverse;
         Some(TriangleHit { t, b1: v * inverse, b2: w * inverse, determinant })
     }
 }
@@ -205,7 +257,7 @@ pub struct Triangle {
     p1: DVec3,
     p2: DVec3,
     // Whether it has no area.
-    is_flat: bool,
+    pub(crate) is_flat: bool,
 }
 
 /// Solid angles outside this range are sampled by area: small ones lose the digits of the spherical excess, and

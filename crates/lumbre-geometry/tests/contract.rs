@@ -12,9 +12,9 @@ use lumbre_math::random::{RandomStream, hash_words};
 use lumbre_math::{DVec2, DVec3, Transform};
 
 /// A shape under test, somewhere.
-struct Subject {
-    name: String,
-    placed: PlacedShape,
+pub(crate) struct Subject {
+    pub(crate) name: String,
+    pub(crate) placed: PlacedShape,
     /// A box that rays are aimed at: the shape's own, or for an infinite shape some part of it.
     aim: Aabb,
 }
@@ -39,12 +39,12 @@ impl Subject {
     }
 
     /// A radius that holds the box.
-    fn reach(&self) -> f64 {
+    pub(crate) fn reach(&self) -> f64 {
         0.5 * self.aim.size().length()
     }
 
     /// A stream of random numbers of its own for each law.
-    fn random(&self, law: u64) -> Random {
+    pub(crate) fn random(&self, law: u64) -> Random {
         let name = self.name.bytes().fold(law, |key, byte| hash_words(&[key, u64::from(byte)]));
         Random(RandomStream::new(name))
     }
@@ -89,7 +89,7 @@ fn placements() -> Vec<(&'static str, Transform)> {
     ]
 }
 
-fn subjects() -> Vec<Subject> {
+pub(crate) fn subjects() -> Vec<Subject> {
     let v = DVec3::new;
     let (p, q, r, s) = (v(0.4, -0.3, 1.2), v(-1.3, 2.1, 0.6), v(2.2, 0.9, -0.8), v(1.1, 1.7, 2.3));
     let ball = || Sphere::new(p, 2.5);
@@ -162,14 +162,14 @@ fn bored_box() -> Result<Csg, ShapeError> {
     ])
 }
 
-struct Random(RandomStream);
+pub(crate) struct Random(RandomStream);
 
 impl Random {
     fn unit(&mut self) -> f64 {
         self.0.next_f64()
     }
 
-    fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + self.unit() * (high - low)
     }
 
@@ -177,7 +177,7 @@ impl Random {
         DVec2::new(self.unit(), self.unit())
     }
 
-    fn direction(&mut self) -> DVec3 {
+    pub(crate) fn direction(&mut self) -> DVec3 {
         let z = self.between(-1.0, 1.0);
         let (sin, cos) = self.between(0.0, TAU).sin_cos();
         let rho = (1.0 - z * z).sqrt();
@@ -194,7 +194,7 @@ impl Random {
     }
 
     /// A ray through the subject's surroundings from within or without, of any length of direction.
-    fn ray(&mut self, subject: &Subject) -> Ray {
+    pub(crate) fn ray(&mut self, subject: &Subject) -> Ray {
         let line = self.line(subject.center(), subject.reach());
         let start = self.between(0.0, 2.0) * subject.reach();
         let length = 10f64.powf(self.between(-3.0, 3.0));

@@ -17,7 +17,7 @@ use lumbre_math::{DVec2, DVec3};
 /// J. R. Shewchuk, "Adaptive precision floating-point arithmetic and fast robust geometric predicates", Discrete &
 /// Computational Geometry, 1997.
 #[derive(Clone, Debug, Default)]
-struct Exact(Vec<f64>);
+pub(crate) struct Exact(Vec<f64>);
 
 impl Exact {
     fn grown(mut self, x: f64) -> Self {
@@ -36,7 +36,7 @@ impl Exact {
     }
 
     /// The number rounded, to a unit in the last place.
-    fn value(&self) -> f64 {
+    pub(crate) fn value(&self) -> f64 {
         self.0.iter().sum()
     }
 }
@@ -101,14 +101,14 @@ fn cross(a: &Vector, b: &Vector) -> Vector {
 type Coefficients = [Exact; 3];
 
 /// A shape and its equation.
-struct Subject {
-    name: &'static str,
-    shape: Shape,
+pub(crate) struct Subject {
+    pub(crate) name: &'static str,
+    pub(crate) shape: Shape,
     equation: Box<dyn Fn(&Ray) -> Coefficients>,
     /// The planes that cut it: a point and a direction to the side that is kept.
     cuts: Vec<(DVec3, DVec3)>,
     /// A size of its finest part, to aim near it.
-    size: f64,
+    pub(crate) size: f64,
 }
 
 fn round_to(x: f64) -> f64 {
@@ -233,14 +233,14 @@ fn quadric(name: &'static str, coefficients: [f64; 10], size: f64) -> Subject {
     }
 }
 
-struct Random(RandomStream);
+pub(crate) struct Random(pub(crate) RandomStream);
 
 impl Random {
-    fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + self.0.next_f64() * (high - low)
     }
 
-    fn vector(&mut self) -> DVec3 {
+    pub(crate) fn vector(&mut self) -> DVec3 {
         DVec3::new(self.between(-1.0, 1.0), self.between(-1.0, 1.0), self.between(-1.0, 1.0))
     }
 }
@@ -345,7 +345,7 @@ fn shoot(subject: &Subject, random: &mut Random, count: usize, [from, to]: [f64;
 }
 
 /// Random sizes of few digits, so that exact arithmetic stays short.
-fn subjects(random: &mut Random, slenderness: f64) -> Vec<Subject> {
+pub(crate) fn subjects(random: &mut Random, slenderness: f64) -> Vec<Subject> {
     let mut v = |scale: f64| (scale * random.vector()).map(round_to);
     let (p, q) = (v(2.0), v(2.0));
     let thin = round_to(0.7 / slenderness);

@@ -4,6 +4,8 @@ mod contract;
 mod conventions;
 mod csg;
 mod exactness;
+mod explain;
+mod explain_formulas;
 mod extremes;
 mod nearest;
 mod precision;

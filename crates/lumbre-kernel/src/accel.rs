@@ -27,7 +27,7 @@ use crate::tree::summary::Sizes;
 use crate::tree::summary::Summary;
 use crate::{
     ClosestPoint, Geometry, GeometryKind, Hit, Hit32, LoadError, MapError, NoClosestPoint, NoWindingNumber,
-    Query, Ray32, RefitError, SphereCloud, batch, surface,
+    Query, Ray32, RefitError, SphereCloud, Target, batch, surface,
 };
 
 /// A bounding volume hierarchy over geometries, ready for queries from any number of threads.
@@ -564,6 +564,14 @@ impl Accel {
     /// When `hit` comes from another tree and names what is not in this one.
     pub fn world_from_object(&self, ray: &Ray, hit: &Hit) -> Transform {
         surface::world_from_object(self, ray, hit)
+    }
+
+    /// What was hit, and where it stands at the time of the ray.
+    ///
+    /// # Panics
+    /// When `hit` comes from another tree and names what is not in this one.
+    pub fn target(&self, ray: &Ray, hit: &Hit) -> Target<'_> {
+        surface::target(self, ray, hit)
     }
 
     /// A box around everything finite in it.

@@ -1,10 +1,33 @@
 //! What a query returns.
 
-use lumbre_geometry::Root;
+use std::borrow::Cow;
+
+use lumbre_geometry::{PlacedShape, Root};
+use lumbre_math::{DVec3, Transform};
 use smallvec::SmallVec;
 
 /// The ids of the instances that a ray went through, outermost first; empty for what stands in the tree itself.
 pub type InstancePath = SmallVec<[u32; 4]>;
+
+/// What a hit is on, and where it stands.
+#[derive(Clone, Debug)]
+pub struct Target<'a> {
+    /// The maps of the instances around it, outermost first: their product leads from the space of the shape to the world.
+    pub placements: Vec<Transform>,
+    /// What it is, in the space of the innermost instance.
+    pub shape: TargetShape<'a>,
+}
+
+/// What a hit is on.
+#[derive(Clone, Debug)]
+pub enum TargetShape<'a> {
+    /// An exact shape.
+    Exact(Cow<'a, PlacedShape>),
+    /// A triangle of a mesh, by its corners.
+    Triangle([DVec3; 3]),
+    /// Geometry that the kernel does not know.
+    Custom,
+}
 
 /// A crossing, and what was crossed.
 #[derive(Clone, Debug, PartialEq)]

@@ -25,7 +25,7 @@ pub use accel::{Accel, BuildError, BuildOptions, Preset};
 pub use build::refit::RefitError;
 pub use deforming_mesh::DeformingMesh;
 pub use geometry::{CustomGeometry, Geometry, GeometryKind, Instance, Placement, SphereCloud, TriangleMesh};
-pub use hit::{Hit, InstancePath};
+pub use hit::{Hit, InstancePath, Target, TargetShape};
 pub use io::bytes::LoadError;
 pub use io::mapped::MapError;
 pub use point::closest_point::{ClosestPoint, NoClosestPoint};

@@ -1,13 +1,15 @@
 //! What is computed once, for the hit that was chosen.
 
-use lumbre_geometry::{Ray, Surface};
+use std::borrow::Cow;
+
+use lumbre_geometry::{PlacedShape, Ray, Surface};
 use lumbre_math::quadratic::dop;
 use lumbre_math::rounding::{UNIT_ROUNDOFF, gamma};
 use lumbre_math::{DMat3, DVec2, DVec3, Transform, Vec3};
 use smallvec::SmallVec;
 
 use crate::tree::sphere_block::ExactSphere;
-use crate::{Accel, GeometryKind, Hit, Instance};
+use crate::{Accel, GeometryKind, Hit, Instance, Target, TargetShape};
 
 /// The instances along a hit's route, outermost first, and the tree within the last.
 fn along<'a>(accel: &'a Accel, hit: &Hit) -> (SmallVec<[&'a Instance; 4]>, &'a Accel) {
@@ -42,6 +44,27 @@ pub(crate) fn surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
     let surface = bare_surface(inner, &ray, hit);
     let placed = |surface, instance: &&Instance| place(&surface, &instance.world_from_object.at(ray.time));
     instances.iter().rev().fold(surface, placed)
+}
+
+/// What was hit, and where it stands.
+pub(crate) fn target<'a>(accel: &'a Accel, ray: &Ray, hit: &Hit) -> Target<'a> {
+    let (instances, inner) = along(accel, hit);
+    let shape = match &inner.geometries[hit.geometry as usize].kind {
+        GeometryKind::Shape(shape) => TargetShape::Exact(Cow::Borrowed(shape)),
+        GeometryKind::Mesh(mesh) => {
+            let corner = |vertex: u32| mesh.origin + mesh.positions[vertex as usize].as_dvec3();
+            TargetShape::Triangle(mesh.indices[hit.primitive as usize].map(corner))
+        }
+        GeometryKind::PreciseMesh(mesh) => TargetShape::Triangle(mesh.corners(hit.primitive)),
+        GeometryKind::Spheres(cloud) => {
+            let sphere = ExactSphere::of(cloud, hit.primitive).to_shape();
+            TargetShape::Exact(Cow::Owned(PlacedShape::new(sphere.into(), Transform::IDENTITY)))
+        }
+        GeometryKind::Custom(_) => TargetShape::Custom,
+        GeometryKind::Instance(_) => panic!("a hit of another tree"),
+    };
+    let placements = instances.iter().map(|instance| instance.world_from_object.at(ray.time)).collect();
+    Target { placements, shape }
 }
 
 /// The surface at a hit, in the space of its innermost instance.

@@ -3,24 +3,22 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use lumbre_math::{DVec2, DVec3, Elementary};
+use lumbre_math::{DVec3, Elementary};
 use lumbre_scene::{Scene, View};
 
 use crate::adaptive::{self, Adaptive};
 use crate::clock::Clock;
-use crate::film::{Extras, FeatureSample, Filter, Sample, Tile};
+use crate::film::{Extras, Tile};
+use crate::one_sample::Taker;
 use crate::rendered::{noise, picture, rendered_of};
 use crate::state::{Piece, REMEMBERED, RenderState};
-use crate::transport::{Features, Integrator, RayCounts, Sampler, Sight, integrator, see};
+use crate::transport::{Integrator, RayCounts, Record, integrator};
 use crate::workers::Workers;
 use crate::{
     CancelToken, DroppedSample, NoProgress, PixelBounds, Progress, RenderError, RenderOptions, Rendered,
     Snapshot, Stats, Stop,
 };
 
-/// Between the rays that textures are looked up for, in pixels: samples average what is finer. The same for any number of samples, so
-/// that more of them can be added to a render (pbrt takes fewer the wider apart).
-const SPACING: f64 = 0.25;
 /// Pixels along the side of a tile.
 const TILE: u32 = 16;
 /// Samples of the longest pass.
@@ -91,18 +89,14 @@ pub fn render_from(
 ) -> Result<(Rendered, RenderState), RenderError> {
     let start = Instant::now();
     let bounds = options.bounds()?;
-    let camera = scene
-        .cameras()
-        .get(options.camera)
-        .ok_or(RenderError::NoSuchCamera { index: options.camera, count: scene.cameras().len() })?;
+    let taker = Taker::new(scene, options, integrator)?;
     let spp = options.stop.spp.max(1);
-    let view = View::new(camera, options.width, options.height);
     let catches_shadows = scene.ground().is_some_and(|ground| ground.catcher);
     let extras = Extras {
         features: options.features || options.guides,
         tints: options.transparent && catches_shadows,
         guides: options.guides,
-        depth_unit: depth_unit(scene, &view),
+        depth_unit: depth_unit(scene, &taker.view),
     };
     let mut owners = match state {
         Some(state) => owners_of(state, bounds, extras, options.first_sample)?,
@@ -116,15 +110,9 @@ pub fn render_from(
     };
     let workers = Workers::start(options.threads);
     let job = Job {
-        scene,
         options,
+        taker,
         adaptive,
-        moves: scene.moves() || view.moves(),
-        view,
-        integrator,
-        sampler: Sampler::new(&options.sampler),
-        filter: options.pixel_filter()?,
-        spacing: SPACING,
         deadline: options.stop.time.and_then(|time| start.checked_add(time)),
         cancel,
         pause: keeper.map(|keeper| Pause::new(start, keeper.every)),
@@ -292,7 +280,7 @@ fn owners_of(
     let tile = |tile| Owner::new(film.placed_in(tile));
     let mut owners: Vec<Owner> = bounds.tiles(TILE).into_iter().map(tile).collect();
     if let Some(owner) = owners.first_mut() {
-        (owner.rays, owner.dropped) = (state.rays, state.dropped);
+        (owner.record.counts, owner.dropped) = (state.rays, state.dropped);
         owner.first_dropped.clone_from(&state.first_dropped);
     }
     Ok(owners)
@@ -303,7 +291,7 @@ fn state_of(owners: Vec<Owner>, bounds: PixelBounds, options: &RenderOptions) ->
     let mut rays = RayCounts::default();
     let mut first_dropped: Vec<DroppedSample> = Vec::new();
     for owner in &owners {
-        rays += owner.rays;
+        rays += owner.record.counts;
         first_dropped.extend(&owner.first_dropped);
     }
     first_dropped.sort_unstable_by_key(|d| (d.sample, d.y, d.x));
@@ -338,17 +326,10 @@ fn spread(owners: &[Owner], bounds: PixelBounds, side: u32) -> Vec<Tile> {
 
 /// What every tile needs and none changes.
 struct Job<'a> {
-    scene: &'a Scene,
     options: &'a RenderOptions,
-    view: View,
-    /// Whether it matters when a ray looks.
-    moves: bool,
-    integrator: &'a dyn Integrator,
+    taker: Taker<'a>,
     /// When pixels have enough, if not at the number of samples alone.
     adaptive: Option<Adaptive>,
-    sampler: Sampler,
-    filter: Filter,
-    spacing: f64,
     deadline: Option<Instant>,
     cancel: &'a CancelToken,
     pause: Option<Pause>,
@@ -386,14 +367,14 @@ struct Owner {
     tile: Tile,
     /// The side of the smallest squares that the first pass has done.
     next_side: u32,
-    rays: RayCounts,
+    record: Record,
     dropped: u64,
     first_dropped: Vec<DroppedSample>,
 }
 
 impl Owner {
     fn new(tile: Tile) -> Self {
-        Self { tile, next_side: u32::MAX, rays: RayCounts::default(), dropped: 0, first_dropped: Vec::new() }
+        Self { tile, next_side: u32::MAX, record: Record::default(), dropped: 0, first_dropped: Vec::new() }
     }
 }
 
@@ -432,7 +413,7 @@ impl Job<'_> {
     /// Takes a sample of each of those pixels of a tile that have none of this number yet; whether it has done so before it had to stop.
     fn take(&self, owner: &mut Owner, number: u32, is_wanted: impl Fn(u32, u32) -> bool) -> bool {
         let mut count = 0;
-        let rays = owner.rays.total();
+        let rays = owner.record.counts.total();
         for (x, y) in owner.tile.bounds().pixels() {
             let pixel = owner.tile.pixel(x, y);
             let has_enough = || self.adaptive.is_some_and(|adaptive| adaptive.is_done(pixel));
@@ -443,52 +424,23 @@ impl Job<'_> {
             // However short the time between two pauses, some work is done.
             if self.cancel.is_cancelled() || (looks && (self.must_stop() || (count > 0 && self.is_paused())))
             {
-                self.clock.add(count, owner.rays.total() - rays);
+                self.clock.add(count, owner.record.counts.total() - rays);
                 return false;
             }
             self.sample(owner, x, y, self.options.first_sample.saturating_add(number));
             count += 1;
         }
-        self.clock.add(count, owner.rays.total() - rays);
+        self.clock.add(count, owner.record.counts.total() - rays);
         true
     }
 
     fn sample(&self, owner: &mut Owner, x: u32, y: u32, index: u32) {
-        let draw = self.sampler.draw(x, y, index);
-        let place = self.filter.sample(draw.filter());
-        let film = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) + place.offset;
-        let part = if self.moves { draw.time() } else { 0.0 };
-        let ray = self.view.ray(film, draw.lens(), self.view.time(part), self.spacing);
-        let sight = Sight::new(self.scene, ray, &mut owner.rays);
-        let features = if self.options.features || self.options.guides {
-            Features::of(&self.view, &sight).map(feature_sample)
-        } else {
-            None
-        };
-        let lights_are_seen = !self.options.transparent;
-        let seen =
-            see(self.integrator, self.scene, &self.view, sight, &draw, lights_are_seen, &mut owner.rays);
-        let sample = Sample {
-            radiance: seen.radiance,
-            coverage: seen.coverage,
-            weight: place.weight,
-            features,
-            on_catcher: seen.on_catcher,
-        };
+        let sample = self.taker.take(x, y, index, &mut owner.record);
         if !owner.tile.add(x, y, &sample, &self.options.exposure) {
             owner.dropped += 1;
             if owner.first_dropped.len() < REMEMBERED {
                 owner.first_dropped.push(DroppedSample { x, y, sample: index });
             }
         }
-    }
-}
-
-fn feature_sample(features: Features) -> FeatureSample {
-    FeatureSample {
-        albedo: features.albedo,
-        normal: features.normal.to_array(),
-        depth: features.depth,
-        uv: features.uv.to_array(),
     }
 }

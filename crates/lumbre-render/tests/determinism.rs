@@ -12,8 +12,8 @@ use lumbre_image::{Image, Rgb};
 use lumbre_math::{DVec3, Transform, Vec2, Vec3};
 use lumbre_render::transport::{Draw, Path, Sight};
 use lumbre_render::{
-    CancelToken, Feature, Integrator, NoProgress, PixelBounds, Progress, RayCounts, RenderError,
-    RenderOptions, Snapshot, State, denoise, render, render_with,
+    CancelToken, Feature, Integrator, NoProgress, PixelBounds, Progress, Record, RenderError, RenderOptions,
+    Snapshot, State, denoise, render, render_with,
 };
 use lumbre_scene::{
     FilterDesc, GeometryDesc, InstanceDesc, LightDesc, ObjectDesc, ObjectId, SamplerKind, Scene, SceneDesc,
@@ -161,7 +161,7 @@ fn a_scene_far_from_the_origin_looks_the_same() {
 struct Broken(AtomicU32);
 
 impl Integrator for Broken {
-    fn radiance(&self, _: &Scene, _: &View, _: Sight<'_>, draw: &Draw, _: &mut RayCounts) -> Spectrum {
+    fn radiance(&self, _: &Scene, _: &View, _: Sight<'_>, draw: &Draw, _: &mut Record) -> Spectrum {
         if draw.lobe(7) < 1.0 / 97.0 {
             let count = self.0.fetch_add(1, Ordering::Relaxed);
             Spectrum::new(1.0, if count.is_multiple_of(2) { f32::NAN } else { f32::INFINITY }, 1.0)
@@ -374,7 +374,7 @@ struct Interrupting {
 }
 
 impl Integrator for Interrupting {
-    fn radiance(&self, _: &Scene, _: &View, _: Sight<'_>, _: &Draw, _: &mut RayCounts) -> Spectrum {
+    fn radiance(&self, _: &Scene, _: &View, _: Sight<'_>, _: &Draw, _: &mut Record) -> Spectrum {
         if self.left.fetch_sub(1, Ordering::Relaxed) == 1 {
             self.cancel.cancel();
         }

@@ -7,6 +7,7 @@ mod furnace;
 mod ground;
 mod integrators;
 mod interiors;
+mod journal;
 mod motion;
 mod panes;
 mod parts;

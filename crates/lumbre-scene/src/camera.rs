@@ -232,16 +232,33 @@ impl View {
         }
     }
 
-    fn placement(&self, time: f64) -> Cow<'_, Transform> {
+    /// The placement at a time: from camera space to the world.
+    pub fn placement(&self, time: f64) -> Cow<'_, Transform> {
         match &self.motion {
             None => Cow::Borrowed(&self.world_from_camera),
             Some(motion) => Cow::Owned(motion.at(time)),
         }
     }
 
+    /// Where a point of the film is on the screen: that of a perspective camera is at z = 1 of camera space, with x to the right and y
+    /// up; that of an orthographic one at z = 0; that of a spherical one is the unit square.
+    pub fn on_screen(&self, film: DVec2) -> DVec2 {
+        self.corner + self.step * film
+    }
+
+    /// Whether rays begin at points of a lens.
+    pub fn has_lens(&self) -> bool {
+        match self.kind {
+            CameraKind::Perspective { lens_radius, .. } | CameraKind::Orthographic { lens_radius, .. } => {
+                lens_radius > 0.0
+            }
+            CameraKind::Spherical { .. } => false,
+        }
+    }
+
     /// The world-space origin and unit direction.
     fn line(&self, placement: &Transform, film: DVec2, lens: DVec2) -> (DVec3, DVec3) {
-        let on_screen = self.corner + self.step * film;
+        let on_screen = self.on_screen(film);
         let (origin, direction) = match self.kind {
             CameraKind::Perspective { lens_radius, focal_distance, .. } => {
                 let towards = on_screen.extend(1.0);

@@ -55,12 +55,17 @@ pub use lumbre_formats::ReadOptions;
 pub use lumbre_geometry::Ray;
 pub use lumbre_math::{DVec2, DVec3, Transform};
 pub use lumbre_render::{
-    CancelToken, Denoised, Feature, Keeper, MergeError, NoProgress, Piece, PixelBounds, Progress, RayCounts,
-    RenderError, RenderOptions, RenderState, Snapshot, State, Stats, Stop,
+    CancelToken, Denoised, ExplainedSample, Feature, Keeper, MergeError, NoProgress, Piece, PixelBounds,
+    Progress, RayCounts, RenderError, RenderOptions, RenderState, Snapshot, State, Stats, Stop,
 };
 pub use lumbre_scene::{
     EnvironmentDesc, Ground, SceneDesc, Stage, StageLight, Staged, Surroundings, UpAxis, Viewpoint,
 };
+/// What happens along the path of one sample: see [`Scene::explain_sample`].
+pub mod journal {
+    pub use lumbre_render::transport::{End, Event, Met, SampledLight, Scattered, Source};
+}
+
 pub use parameter::{Parameter, ParameterKind, parameters};
 pub use part::{Job, Part, PartError};
 pub use picture::Picture;
@@ -70,4 +75,5 @@ pub use setting::Setting;
 /// Compiles the examples of the project's README.
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
+#[doc = include_str!("../../../docs/explain.md")]
 struct ProjectReadme;

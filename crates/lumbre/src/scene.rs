@@ -8,11 +8,13 @@ use lumbre_formats::{Diagnostic, Diagnostics, FormatError, Place, ReadOptions, o
 use lumbre_geometry::Ray;
 use lumbre_kernel::Hit;
 use lumbre_math::DVec3;
-use lumbre_render::transport::integrator;
+use lumbre_render::transport::{Event, integrator};
 use lumbre_render::{
-    CancelToken, Feature, Keeper, NoProgress, Progress, RenderOptions, RenderState, Stop, render_from,
+    CancelToken, ExplainedSample, Feature, Keeper, NoProgress, Progress, RenderOptions, RenderState, Stop,
+    render_from,
 };
 use lumbre_scene::{BuildWarning, Footprint, SceneDesc};
+use lumbre_shading::Spectrum;
 
 use crate::{CastHit, CastPoint, Error, Picture, SceneInfo};
 
@@ -230,6 +232,34 @@ impl Scene {
             render_from(&self.resolved, options, &*integrator, progress, cancel, state, keeper)?;
         let whole = (options.width, options.height);
         Ok((Picture { rendered, whole, background: None, noisy: None }, state))
+    }
+
+    /// The sample of a pixel with this number, as a render takes it, with all that happens along its path: the radiance is that which
+    /// the render adds to the pixel, to the bit.
+    ///
+    /// # Errors
+    /// As for [`Scene::render`].
+    pub fn explain_sample(
+        &self,
+        options: &RenderOptions,
+        pixel: (u32, u32),
+        index: u32,
+    ) -> Result<ExplainedSample, Error> {
+        Ok(lumbre_render::explain_sample(&self.resolved, options, pixel, index)?)
+    }
+
+    /// An estimate of the light that arrives along a ray with a unit direction, and what happens along its path; the number chooses
+    /// among such estimates.
+    ///
+    /// # Errors
+    /// As for [`Scene::render`].
+    pub fn explain_ray(
+        &self,
+        options: &RenderOptions,
+        ray: &Ray,
+        index: u32,
+    ) -> Result<(Spectrum, Vec<Event>), Error> {
+        Ok(lumbre_render::explain_ray(&self.resolved, options, ray, index)?)
     }
 
     /// The pixel value of white, well-lit surfaces, as an exposure meter would measure it: the luminance over

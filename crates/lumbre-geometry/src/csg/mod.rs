@@ -11,7 +11,7 @@ use crate::shape::unsampled;
 use crate::{Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Roots, Surface};
 
 pub use leaf::{Crossing, Crossings, Leaf, LeafPart, Solid};
-use spans::Membership;
+pub(crate) use spans::{Event, Events, Membership, coincident};
 use tree::Node;
 
 /// A solid composed of others. Every surface point belongs to one leaf: see [`Csg::leaf_of`].

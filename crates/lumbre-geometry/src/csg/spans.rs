@@ -11,13 +11,13 @@ use crate::{Aabb, Ray, Root, Roots};
 
 /// A crossing of one leaf.
 #[derive(Clone, Copy)]
-struct Event {
-    root: Root,
-    leaf: u32,
-    enters: bool,
+pub(crate) struct Event {
+    pub(crate) root: Root,
+    pub(crate) leaf: u32,
+    pub(crate) enters: bool,
 }
 
-type Events = SmallVec<[Event; 16]>;
+pub(crate) type Events = SmallVec<[Event; 16]>;
 
 /// Crossings closer than this, relative to the coordinates involved, count as one.
 const COINCIDENT: f64 = 256.0 * f64::EPSILON;
@@ -27,19 +27,14 @@ impl Csg {
     pub(super) fn sweep(&self, ray: &Ray, mut emit: impl FnMut(Root) -> bool) {
         let mut membership = Membership::new(self);
         let mut events = Events::new();
-        if self.gather(ray, &mut membership, &mut events).is_none() {
+        if self.gather(ray, &mut membership, &mut events, |_| {}).is_none() {
             return;
         }
-        let (origin, direction) = (ray.origin.abs().max_element(), ray.direction.abs().max_element());
         let mut rest = &events[..];
-        while let Some(first) = rest.first() {
-            let t = first.root.t;
-            if t > ray.t_max {
+        while let Some((group, later)) = coincident(ray, rest) {
+            if group[0].root.t > ray.t_max {
                 return;
             }
-            let reach = t + COINCIDENT * (origin / direction + t.abs());
-            let together = 1 + rest[1..].iter().take_while(|event| event.root.t <= reach).count();
-            let (group, later) = rest.split_at(together);
             rest = later;
             if let Some(root) = membership.cross_group(group)
                 && ray.contains(root.t)
@@ -54,14 +49,24 @@ impl Csg {
     /// ray's range.
     ///
     /// A leaf whose box the ray misses is empty along the whole range, and so is every intersection that
-    /// contains it.
-    fn gather(&self, ray: &Ray, membership: &mut Membership, events: &mut Events) -> Option<()> {
+    /// contains it. Calls `look` with every leaf that is looked at.
+    #[inline]
+    pub(crate) fn gather(
+        &self,
+        ray: &Ray,
+        membership: &mut Membership,
+        events: &mut Events,
+        mut look: impl FnMut(u32),
+    ) -> Option<()> {
         let inverse = ray.direction.recip();
         let mut i = 0;
         while let Some(node) = self.nodes.get(i) {
             let is_empty = match (node.bounds, node.kind) {
                 (Some(bounds), _) if !overlaps(&bounds, ray, inverse) => true,
-                (_, NodeKind::Leaf(leaf)) => !self.leaf_crossings(leaf, ray, membership, events),
+                (_, NodeKind::Leaf(leaf)) => {
+                    look(leaf);
+                    !self.leaf_crossings(leaf, ray, membership, events)
+                }
                 _ => false,
             };
             i = if is_empty {
@@ -93,15 +98,17 @@ impl Csg {
         }
     }
 
+    /// A root of a leaf as a simple one of this shape.
+    #[inline]
+    pub(crate) fn encoded(&self, leaf: usize, root: &Root) -> Root {
+        let (first_part, flipped) = (self.first_part[leaf], self.leaf_nodes[leaf].1);
+        let part = first_part.saturating_add(root.part) << 1 | u32::from(flipped);
+        Root { part, multiplicity: 1, ..*root }
+    }
+
     /// Appends the crossings of a leaf; false when the whole line is outside of it.
     fn leaf_crossings(&self, leaf: u32, ray: &Ray, membership: &mut Membership, events: &mut Events) -> bool {
-        let first_part = self.first_part[leaf as usize];
-        let flipped = self.leaf_nodes[leaf as usize].1;
-        let encode = |root: &Root| Root {
-            part: first_part.saturating_add(root.part) << 1 | u32::from(flipped),
-            multiplicity: 1,
-            ..*root
-        };
+        let encode = |root: &Root| self.encoded(leaf as usize, root);
         let line = ray.with_range(f64::NEG_INFINITY, f64::INFINITY);
         let before = events.len();
         match &self.leaves[leaf as usize] {
@@ -142,6 +149,16 @@ impl Csg {
     }
 }
 
+/// The first crossing and those that coincide with it, and the later ones; `None` after the last.
+#[inline]
+pub(crate) fn coincident<'a>(ray: &Ray, events: &'a [Event]) -> Option<(&'a [Event], &'a [Event])> {
+    let t = events.first()?.root.t;
+    let (origin, direction) = (ray.origin.abs().max_element(), ray.direction.abs().max_element());
+    let reach = t + COINCIDENT * (origin / direction + t.abs());
+    let together = 1 + events[1..].iter().take_while(|event| event.root.t <= reach).count();
+    Some(events.split_at(together))
+}
+
 /// Whether the ray's range overlaps a box; true when in doubt.
 #[inline]
 fn overlaps(bounds: &Aabb, ray: &Ray, inverse: DVec3) -> bool {
@@ -163,7 +180,7 @@ fn overlaps(bounds: &Aabb, ray: &Ray, inverse: DVec3) -> bool {
 }
 
 /// The leaves and nodes that contain the current point of the line.
-pub(super) struct Membership<'a> {
+pub(crate) struct Membership<'a> {
     csg: &'a Csg,
     // For each leaf, how many more times it has been entered than left.
     nesting: Numbers<i32>,
@@ -207,17 +224,22 @@ impl<T: Copy + Default> Numbers<T> {
 }
 
 impl<'a> Membership<'a> {
-    pub(super) fn new(csg: &'a Csg) -> Self {
+    pub(crate) fn new(csg: &'a Csg) -> Self {
         Self { csg, nesting: Numbers::new(csg.leaves.len()), counts: Numbers::new(csg.nodes.len()) }
     }
 
-    pub(super) fn contains(&self, node: u32) -> bool {
+    pub(crate) fn contains(&self, node: u32) -> bool {
         let Node { initial, needed, .. } = self.csg.nodes[node as usize];
         i64::from(initial) + i64::from(self.counts.get(node)) >= i64::from(needed)
     }
 
+    /// Whether the current point is inside a leaf.
+    pub(crate) fn is_inside(&self, leaf: u32) -> bool {
+        self.nesting.get(leaf) > 0
+    }
+
     /// Enters or leaves a leaf, and updates its ancestors as far as they change.
-    pub(super) fn cross(&mut self, leaf: u32, enters: bool) {
+    pub(crate) fn cross(&mut self, leaf: u32, enters: bool) {
         let before = self.nesting.get(leaf);
         let now = before + if enters { 1 } else { -1 };
         self.nesting.set(leaf, now);
@@ -240,7 +262,7 @@ impl<'a> Membership<'a> {
     }
 
     /// Passes a group of coincident crossings; returns a root when the result begins or ends there.
-    fn cross_group(&mut self, group: &[Event]) -> Option<Root> {
+    pub(crate) fn cross_group(&mut self, group: &[Event]) -> Option<Root> {
         let was_inside = self.contains(0);
         // The surface belongs to a crossing that is sufficient by itself, or else to one that is necessary.
         let mut decisive = None;

@@ -85,7 +85,7 @@ impl<F: FnMut(f64, u8) -> bool> Pieces<'_, F> {
         } else {
             return Some(());
         };
-        (self.emit)(self.line.t(root), multiplicity).then_some(())
+        (self.emit)(root, multiplicity).then_some(())
     }
 
     /// The root in a monotone piece: Newton's method on the quartic, then on the torus's own equation.
@@ -176,15 +176,15 @@ impl Torus {
         s
     }
 
-    /// Calls `emit(t, multiplicity)` with every crossing of the whole line in order, until it returns false.
+    /// Calls `emit(s, multiplicity)` with every crossing of the whole line in order, until it returns false.
     /// Crossings before `t_min` may be left out.
     #[inline]
-    pub(super) fn crossings(&self, line: &Line, t_min: f64, mut emit: impl FnMut(f64, u8) -> bool) {
+    pub(crate) fn crossings(&self, line: &Line, t_min: f64, mut emit: impl FnMut(f64, u8) -> bool) {
         let quartic = Quartic::new(self, line);
         let mut first = FirstCrossing::NotSearched;
         if line.t(line.low) >= t_min {
             first = match self.descend(line, &quartic) {
-                Some(s) if !emit(line.t(s), 1) => return,
+                Some(s) if !emit(s, 1) => return,
                 Some(_) => FirstCrossing::Emitted,
                 None => FirstCrossing::NotFound,
             };
@@ -198,7 +198,7 @@ impl Torus {
     /// On an interval where the quartic falls and has no inflection, the result is its only zero; where it
     /// falls from a positive value and is convex, the first.
     #[inline]
-    fn descend(&self, line: &Line, quartic: &Quartic) -> Option<f64> {
+    pub(crate) fn descend(&self, line: &Line, quartic: &Quartic) -> Option<f64> {
         if !self.is_ring() || self.is_thin() {
             return None;
         }
@@ -357,15 +357,15 @@ mod tests {
                     quartic,
                     f64::NEG_INFINITY,
                     FirstCrossing::NotFound,
-                    |t, n| {
-                        by_pieces.push((t, n));
+                    |s, n| {
+                        by_pieces.push((line.t(s), n));
                         true
                     },
                 );
                 all += 1;
                 let mut by_both = Vec::new();
-                ring.crossings(&line, f64::NEG_INFINITY, |t, n| {
-                    by_both.push((t, n));
+                ring.crossings(&line, f64::NEG_INFINITY, |s, n| {
+                    by_both.push((line.t(s), n));
                     true
                 });
                 assert_eq!(by_both.len(), by_pieces.len(), "{ray:?}");

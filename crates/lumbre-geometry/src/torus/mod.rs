@@ -26,8 +26,8 @@ use crate::{Ray, Root, Roots, ShapeError};
 pub struct Torus {
     center: DVec3,
     // Orthonormal and right-handed.
-    e1: DVec3,
-    e2: DVec3,
+    pub(crate) e1: DVec3,
+    pub(crate) e2: DVec3,
     axis: DVec3,
     // The frame is that of the coordinate axes, so no rotation is needed.
     upright: bool,
@@ -79,11 +79,11 @@ impl Torus {
     }
 
     /// Whether the tube is so thin that the quartic's digits do not tell whether a line meets it.
-    fn is_thin(&self) -> bool {
+    pub(crate) fn is_thin(&self) -> bool {
         self.minor < 1e-4 * self.major
     }
 
-    fn framed(&self, v: DVec3) -> DVec3 {
+    pub(crate) fn framed(&self, v: DVec3) -> DVec3 {
         if self.upright { v } else { DVec3::new(v.dot(self.e1), v.dot(self.e2), v.dot(self.axis)) }
     }
 
@@ -96,7 +96,8 @@ impl Torus {
     pub fn closest(&self, ray: &Ray) -> Option<Root> {
         let line = self.line(ray)?;
         let mut found = None;
-        self.crossings(&line, ray.t_min, |t, multiplicity| {
+        self.crossings(&line, ray.t_min, |s, multiplicity| {
+            let t = line.t(s);
             if ray.contains(t) && t.is_finite() {
                 found = Some(Root { multiplicity, ..Root::at(t) });
             }
@@ -110,7 +111,8 @@ impl Torus {
         let Some(line) = self.line(ray) else {
             return;
         };
-        self.crossings(&line, ray.t_min, |t, multiplicity| {
+        self.crossings(&line, ray.t_min, |s, multiplicity| {
+            let t = line.t(s);
             if ray.contains(t) && t.is_finite() {
                 out.push(Root { multiplicity, ..Root::at(t) });
             }

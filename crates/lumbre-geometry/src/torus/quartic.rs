@@ -6,15 +6,15 @@ use super::line::Line;
 /// The quartic whose roots are the crossings: s⁴ + p s² + q s + w. Away from the roots it is as accurate as the
 /// torus's own equation, and faster.
 #[derive(Clone, Copy)]
-pub(super) struct Quartic {
-    pub(super) p: f64,
-    pub(super) q: f64,
-    w: f64,
+pub(crate) struct Quartic {
+    pub(crate) p: f64,
+    pub(crate) q: f64,
+    pub(crate) w: f64,
 }
 
 impl Quartic {
     #[inline]
-    pub(super) fn new(torus: &Torus, line: &Line) -> Self {
+    pub(crate) fn new(torus: &Torus, line: &Line) -> Self {
         let (big, small) = (torus.major * torus.major, torus.minor * torus.minor);
         let (p, u) = (line.p, line.u);
         let reach = p.length_squared() - small;
@@ -27,24 +27,29 @@ impl Quartic {
     }
 
     #[inline]
-    pub(super) fn at(&self, s: f64) -> (f64, f64) {
+    pub(crate) fn at(&self, s: f64) -> (f64, f64) {
         let square = s * s;
         let value = (square + self.p) * square + (self.q * s + self.w);
         (value, (4.0 * square + 2.0 * self.p) * s + self.q)
     }
 
-    pub(super) fn curvature(&self, s: f64) -> f64 {
+    pub(crate) fn curvature(&self, s: f64) -> f64 {
         12.0 * s * s + 2.0 * self.p
     }
 }
 
 impl Torus {
+    /// The quartic along a line.
+    pub(crate) fn quartic(&self, line: &Line) -> Quartic {
+        Quartic::new(self, line)
+    }
+
     /// The implicit function of the torus and its slope along the line; negative inside, positive outside.
     ///
     /// For a ring it is (ρ - R)² + z² - r²: the quartic's other factor (ρ + R)² + z² - r² is positive and would
     /// only add rounding. For the others it is the product.
     #[inline]
-    pub(super) fn value_and_slope(&self, line: &Line, s: f64) -> (f64, f64) {
+    pub(crate) fn value_and_slope(&self, line: &Line, s: f64) -> (f64, f64) {
         let p = line.p + s * line.u;
         let rho = (p.x * p.x + p.y * p.y).sqrt();
         let outward = p.x * line.u.x + p.y * line.u.y;
@@ -61,7 +66,7 @@ impl Torus {
 
     /// (ρ - R)² + z² - r² and (ρ + R)² + z² - r².
     #[inline]
-    pub(super) fn factors(&self, rho: f64, z: f64) -> (f64, f64) {
+    pub(crate) fn factors(&self, rho: f64, z: f64) -> (f64, f64) {
         let (near, far) = (rho - self.major, rho + self.major);
         let outer = (near - self.minor) * (near + self.minor) + z * z;
         let inner = (far - self.minor) * (far + self.minor) + z * z;
@@ -71,7 +76,7 @@ impl Torus {
     /// The sign of the quartic at `s`, 0 where rounding leaves it uncertain; and the quartic itself. A ring's
     /// sign is that of its first factor.
     #[inline]
-    pub(super) fn sign_and_quartic(&self, line: &Line, s: f64) -> (f64, f64) {
+    pub(crate) fn sign_and_quartic(&self, line: &Line, s: f64) -> (f64, f64) {
         let p = line.p + s * line.u;
         let (outer, inner) = self.factors((p.x * p.x + p.y * p.y).sqrt(), p.z);
         let size = self.major + self.minor;

@@ -4,7 +4,8 @@ use lumbre_math::warp;
 use lumbre_scene::{Scene, View};
 use lumbre_shading::{ShadingFrame, ShadingNormals, Spectrum};
 
-use crate::transport::{Draw, Integrator, RayCounts, Sight};
+use crate::transport::journal::{Event, Met, Source};
+use crate::transport::{Draw, Integrator, Record, Sight};
 
 /// The share of the sky over a surface that is open, weighed by the cosine: white where nothing is near.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,9 +25,13 @@ impl Integrator for AmbientOcclusion {
         _: &View,
         sight: Sight<'_>,
         draw: &Draw,
-        rays: &mut RayCounts,
+        record: &mut Record,
     ) -> Spectrum {
-        let Some(met) = &sight.met else { return Spectrum::BLACK };
+        let Some(met) = &sight.met else {
+            record.note(|| Event::Left { ray: sight.ray.ray });
+            return Spectrum::BLACK;
+        };
+        record.note(|| Event::Met(Met::of(&sight.ray.ray, met, 0, Spectrum::WHITE)));
         let smooth = met.shading.normal;
         let normal = match self.shading_normals {
             ShadingNormals::Pbrt if ShadingNormals::differ(smooth, met.shading.geometric) => {
@@ -45,7 +50,10 @@ impl Integrator for AmbientOcclusion {
         };
         let direction = (frame.s * local.x + frame.t * local.y + frame.n * local.z).as_dvec3().normalize();
         let ray = met.leave(direction).with_range(0.0, self.max_distance);
-        rays.shadow += 1;
-        if scene.is_occluded(&ray) { Spectrum::BLACK } else { Spectrum::splat(weight) }
+        record.counts.shadow += 1;
+        let is_occluded = scene.is_occluded(&ray);
+        record.note(|| Event::Looked { ray, is_occluded });
+        let open = if is_occluded { Spectrum::BLACK } else { Spectrum::splat(weight) };
+        record.added(Source::Sampled, Spectrum::WHITE, open, 1.0)
     }
 }

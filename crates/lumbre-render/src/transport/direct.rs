@@ -7,8 +7,9 @@ use lumbre_math::{DVec3, Vec2, Vec3};
 use lumbre_scene::{Interaction, LightSample, Scene};
 use lumbre_shading::{Bsdf, LocalDir, Material, Scatter, ShadingFrame, ShadingNormals, Spectrum};
 
-use crate::transport::RayCounts;
+use crate::transport::Record;
 use crate::transport::interior::Interiors;
+use crate::transport::journal::{Event, SampledLight};
 use crate::transport::through::{goes_straight_on, straight_on};
 
 /// A surface as seen along a path, ready to scatter.
@@ -210,28 +211,54 @@ impl<'a, 's> Vertex<'a, 's> {
         interiors: &Interiors<'s>,
         regularize: bool,
         weigh: impl FnOnce(f32, f32) -> f32,
-        rays: &mut RayCounts,
+        record: &mut Record,
     ) -> Spectrum {
         let unfolded = self.unfolded(sample.towards.as_vec3());
-        let scattered = self.eval_unfolded(unfolded) * sample.radiance;
-        if scattered.is_black() {
-            return Spectrum::BLACK;
-        }
-        let weight = match sample.scatter {
-            Scatter::Delta => 1.0,
-            Scatter::Density(pdf) => weigh(pdf, self.pdf_unfolded(unfolded)) / pdf,
+        let value = self.eval_unfolded(unfolded);
+        let scattered = value * sample.radiance;
+        let (weight, pdf, bsdf_pdf) = match sample.scatter {
+            _ if scattered.is_black() => (0.0, 1.0, 0.0),
+            Scatter::Delta => (1.0, 1.0, 0.0),
+            Scatter::Density(pdf) => {
+                let bsdf_pdf = self.pdf_unfolded(unfolded);
+                (weigh(pdf, bsdf_pdf), pdf, bsdf_pdf)
+            }
         };
-        if weight <= 0.0 {
-            return Spectrum::BLACK;
-        }
+        // False for a NaN.
+        let counts = weight / pdf > 0.0;
+        let passes =
+            if counts { self.visible(sample, interiors, regularize, record) } else { Spectrum::BLACK };
+        record.note(|| {
+            let shadow_ray = counts.then(|| self.shadow_ray(sample));
+            let sample = *sample;
+            Event::Sampled(Box::new(SampledLight {
+                sample,
+                scattered: value,
+                bsdf_pdf,
+                weight,
+                shadow_ray,
+                passes,
+            }))
+        });
+        if passes.is_black() { Spectrum::BLACK } else { scattered * (weight / pdf) * passes }
+    }
+
+    /// What comes through of a light's sample between the light and here; black where something is in its way.
+    fn visible(
+        &self,
+        sample: &LightSample,
+        interiors: &Interiors<'s>,
+        regularize: bool,
+        record: &mut Record,
+    ) -> Spectrum {
         if goes_straight_on(self.scene, sample) {
-            return scattered * weight * self.passes_straight_on(sample, interiors, regularize, rays);
+            return self.passes_straight_on(sample, interiors, regularize, record);
         }
-        rays.shadow += 1;
+        record.counts.shadow += 1;
         if self.scene.is_occluded(&self.shadow_ray(sample)) {
             return Spectrum::BLACK;
         }
-        scattered * weight * self.passes(sample, interiors)
+        self.passes(sample, interiors)
     }
 
     /// What of the light that comes from straight behind goes straight on: see [`Bsdf::straight_on`].
@@ -276,10 +303,10 @@ impl<'a, 's> Vertex<'a, 's> {
         sample: &LightSample,
         interiors: &Interiors<'s>,
         regularize: bool,
-        rays: &mut RayCounts,
+        record: &mut Record,
     ) -> Spectrum {
         let around = self.around(self.crosses(sample), interiors);
-        straight_on(self.scene, self.shadow_ray(sample), sample, around, regularize, rays)
+        straight_on(self.scene, self.shadow_ray(sample), sample, around, regularize, record)
     }
 
     /// Whether a light's sample comes through the solid whose surface this is.

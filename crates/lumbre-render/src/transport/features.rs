@@ -4,7 +4,8 @@ use lumbre_math::{Vec2, Vec3};
 use lumbre_scene::{Scene, View};
 use lumbre_shading::Spectrum;
 
-use crate::transport::{Draw, Integrator, RayCounts, Sight};
+use crate::transport::journal::{Event, Met, Source};
+use crate::transport::{Draw, Integrator, Record, Sight};
 
 /// One of the features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -97,9 +98,15 @@ impl Features {
 pub struct FeatureIntegrator(pub Feature);
 
 impl Integrator for FeatureIntegrator {
-    fn radiance(&self, _: &Scene, view: &View, sight: Sight<'_>, _: &Draw, _: &mut RayCounts) -> Spectrum {
+    fn radiance(&self, _: &Scene, view: &View, sight: Sight<'_>, _: &Draw, record: &mut Record) -> Spectrum {
+        let ray = sight.ray.ray;
+        match &sight.met {
+            Some(met) => record.note(|| Event::Met(Met::of(&ray, met, 0, Spectrum::WHITE))),
+            None => record.note(|| Event::Left { ray }),
+        }
         let Some(features) = Features::of(view, &sight) else { return Spectrum::BLACK };
         let value = features.get(self.0);
-        if self.0 == Feature::Normal { (value + Spectrum::WHITE) * 0.5 } else { value }
+        let shown = if self.0 == Feature::Normal { (value + Spectrum::WHITE) * 0.5 } else { value };
+        record.added(Source::Surface, Spectrum::WHITE, shown, 1.0)
     }
 }

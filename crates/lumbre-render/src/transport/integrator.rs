@@ -6,7 +6,7 @@ use std::ops::AddAssign;
 use lumbre_scene::{CameraRay, IntegratorDesc, IntegratorKind, Interaction, Scene, View};
 use lumbre_shading::Spectrum;
 
-use crate::transport::{AmbientOcclusion, Draw, Feature, FeatureIntegrator, Path, Whitted};
+use crate::transport::{AmbientOcclusion, Draw, Feature, FeatureIntegrator, Path, Record, Whitted};
 
 /// An estimator of the radiance that arrives along a ray. It is called once a path.
 pub trait Integrator: Debug + Send + Sync {
@@ -17,7 +17,7 @@ pub trait Integrator: Debug + Send + Sync {
         view: &View,
         sight: Sight<'_>,
         draw: &Draw,
-        rays: &mut RayCounts,
+        record: &mut Record,
     ) -> Spectrum;
 }
 
@@ -32,8 +32,8 @@ pub struct Sight<'s> {
 
 impl<'s> Sight<'s> {
     /// Follows a ray to the first thing that a camera sees.
-    pub fn new(scene: &'s Scene, ray: CameraRay, rays: &mut RayCounts) -> Self {
-        rays.camera += 1;
+    pub fn new(scene: &'s Scene, ray: CameraRay, record: &mut Record) -> Self {
+        record.counts.camera += 1;
         let met = scene.closest_seen(&ray.ray).map(|hit| scene.interaction(&ray.ray, &hit, &ray.footprint));
         Self { ray, met }
     }

@@ -8,7 +8,8 @@ use lumbre_shading::{HomogeneousMedium, Scatter, ShadingNormals, Spectrum};
 
 use crate::transport::direct::{Vertex, power_heuristic};
 use crate::transport::interior::Interiors;
-use crate::transport::{Draw, Integrator, RayCounts, Sight};
+use crate::transport::journal::{End, Event, Met, Scattered, Source};
+use crate::transport::{Draw, Integrator, Record, Sight};
 
 /// Kajiya's path tracing: at each surface one sample of a light and one of the BSDF, combined by the power heuristic,
 /// and Russian roulette by throughput from the sixth bounce on.
@@ -105,12 +106,14 @@ impl Integrator for Path {
         _: &View,
         sight: Sight<'_>,
         draw: &Draw,
-        rays: &mut RayCounts,
+        record: &mut Record,
     ) -> Spectrum {
-        let mut walk = Walk::new(self, scene, sight.ray.ray, draw, rays);
+        let mut walk = Walk::new(self, scene, sight.ray.ray, draw, record);
         let mut met = sight.met;
         while let Some(here) = &met {
             walk.interiors.arrive(here, here.resolved());
+            let (ray, depth, throughput) = (walk.ray, walk.depth, walk.throughput);
+            walk.record.note(|| Event::Met(Met::of(&ray, here, depth, throughput)));
             let next = match walk.cross_medium(here) {
                 Crossing::Through => walk.scatter_at_surface(here),
                 Crossing::Scattered(ray) => Some(ray),
@@ -129,7 +132,7 @@ struct Walk<'s, 'w> {
     path: &'w Path,
     scene: &'s Scene,
     draw: &'w Draw,
-    rays: &'w mut RayCounts,
+    record: &'w mut Record,
     radiance: Spectrum,
     throughput: Spectrum,
     /// What refraction did to the throughput alone: it comes back when the path leaves again.
@@ -158,12 +161,12 @@ enum Crossing {
 }
 
 impl<'s, 'w> Walk<'s, 'w> {
-    fn new(path: &'w Path, scene: &'s Scene, ray: Ray, draw: &'w Draw, rays: &'w mut RayCounts) -> Self {
+    fn new(path: &'w Path, scene: &'s Scene, ray: Ray, draw: &'w Draw, record: &'w mut Record) -> Self {
         Self {
             path,
             scene,
             draw,
-            rays,
+            record,
             radiance: Spectrum::BLACK,
             throughput: Spectrum::WHITE,
             eta_scale: 1.0,
@@ -181,16 +184,29 @@ impl<'s, 'w> Walk<'s, 'w> {
     /// Goes on along a ray, to what it meets.
     fn follow(&mut self, ray: Ray, from: &Interaction<'s>) -> Option<Interaction<'s>> {
         self.ray = ray;
-        self.rays.bounce += 1;
+        self.record.counts.bounce += 1;
         let footprint = from.footprint();
         self.scene.closest(&ray).map(|hit| self.scene.interaction(&ray, &hit, &footprint))
     }
 
     /// Adds the light at infinity that a ray found which left the scene.
     fn add_escaped(&mut self) {
-        for (arriving, pdf) in self.scene.escaped(&self.ray) {
-            self.radiance += self.throughput * arriving * self.path.weight_of_found(self.chosen, pdf);
+        let ray = self.ray;
+        self.record.note(|| Event::Left { ray });
+        for (arriving, pdf) in self.scene.escaped(&ray) {
+            self.add(Source::Infinity, arriving, self.path.weight_of_found(self.chosen, pdf));
         }
+    }
+
+    /// Adds light that arrives, with a weight.
+    fn add(&mut self, source: Source, arriving: Spectrum, weight: f32) {
+        self.radiance += self.record.added(source, self.throughput, arriving, weight);
+    }
+
+    /// Ends the path.
+    fn end<T>(&mut self, why: End) -> Option<T> {
+        self.record.note(|| Event::Ended(why));
+        None
     }
 
     /// Adds the light of the surface that was found.
@@ -202,7 +218,7 @@ impl<'s, 'w> Walk<'s, 'w> {
             } else {
                 self.scene.light_pdf(self.shadow_origin, here)
             };
-            self.radiance += self.throughput * emitted * self.path.weight_of_found(self.chosen, pdf);
+            self.add(Source::Surface, emitted, self.path.weight_of_found(self.chosen, pdf));
         }
     }
 
@@ -223,8 +239,8 @@ impl<'s, 'w> Walk<'s, 'w> {
         if let Some(light) = light {
             let path = self.path;
             let weigh = |light_pdf, bsdf_pdf| path.weight_of_sampled(light_pdf, bsdf_pdf);
-            self.radiance += self.throughput
-                * vertex.scattered(&light, &self.interiors, path.regularize, weigh, self.rays);
+            let scattered = vertex.scattered(&light, &self.interiors, path.regularize, weigh, self.record);
+            self.add(Source::Sampled, scattered, 1.0);
         }
     }
 
@@ -239,10 +255,14 @@ impl<'s, 'w> Walk<'s, 'w> {
             DistanceSample::Through(weight) => {
                 self.throughput *= weight;
                 self.distance_samples += 1;
+                let throughput = self.throughput;
+                self.record.note(|| Event::Medium { distance: way, scattered: false, throughput });
                 Crossing::Through
             }
             DistanceSample::Collision { distance, weight } => {
                 self.throughput *= weight;
+                let throughput = self.throughput;
+                self.record.note(|| Event::Medium { distance, scattered: true, throughput });
                 match self.collide(&medium, distance) {
                     Some(ray) => Crossing::Scattered(ray),
                     None => Crossing::Ended,
@@ -255,11 +275,13 @@ impl<'s, 'w> Walk<'s, 'w> {
     fn collide(&mut self, medium: &HomogeneousMedium, distance: f64) -> Option<Ray> {
         let likely = (self.throughput * self.eta_scale).max_component();
         if self.collisions >= MOST_COLLISIONS || likely <= 0.0 {
-            return None;
+            return self.end(End::Medium);
         }
         if likely < 1.0 && self.collisions >= SURE_COLLISIONS {
-            if self.draw.survives_collision(self.distance_samples) >= likely {
-                return None;
+            let survives = self.draw.survives_collision(self.distance_samples) < likely;
+            self.record.note(|| Event::Roulette { probability: likely, survives });
+            if !survives {
+                return self.end(End::Roulette);
             }
             self.throughput *= 1.0 / likely;
         }
@@ -279,9 +301,10 @@ impl<'s, 'w> Walk<'s, 'w> {
     fn scatter_at_surface(&mut self, here: &Interaction<'s>) -> Option<Ray> {
         self.add_emitted(here);
         if self.depth == self.path.max_depth {
-            return None;
+            return self.end(End::Depth);
         }
-        let mut vertex = Vertex::new(self.scene, here, &self.interiors, self.path.shading_normals)?;
+        let vertex = Vertex::new(self.scene, here, &self.interiors, self.path.shading_normals);
+        let Some(mut vertex) = vertex else { return self.end(End::Nothing) };
         if self.path.regularize && self.has_scattered {
             vertex.bsdf = vertex.bsdf.regularized();
         }
@@ -291,10 +314,11 @@ impl<'s, 'w> Walk<'s, 'w> {
         }
 
         let lobe = if vertex.bsdf.has_lobes() { self.draw.lobe(self.depth) } else { 0.0 };
-        let bounce = vertex.sample(lobe, self.draw.direction(self.depth))?;
+        let bounce = vertex.sample(lobe, self.draw.direction(self.depth));
+        let Some(bounce) = bounce else { return self.end(End::Absorbed) };
         self.throughput *= bounce.weight;
         if self.throughput.is_black() {
-            return None;
+            return self.end(End::Absorbed);
         }
         self.chosen = match bounce.scatter {
             Scatter::Delta => Chosen::Only,
@@ -309,17 +333,21 @@ impl<'s, 'w> Walk<'s, 'w> {
         }
         self.depth += 1;
         if !self.survives() {
-            return None;
+            return self.end(End::Roulette);
         }
         self.shadow_origin = vertex.risen_towards(bounce.direction).unwrap_or(self.shadow_origin);
-        Some(vertex.leave(&bounce))
+        let (ray, throughput) = (vertex.leave(&bounce), self.throughput);
+        self.record.note(|| Event::Scattered(Scattered::of(&ray, &bounce, throughput)));
+        Some(ray)
     }
 
     /// Russian roulette after a bounce.
     fn survives(&mut self) -> bool {
         let likely = (self.throughput * self.eta_scale).max_component();
         if self.depth > self.path.sure_bounces && likely < 1.0 {
-            if self.draw.survival(self.depth) >= likely {
+            let survives = self.draw.survival(self.depth) < likely;
+            self.record.note(|| Event::Roulette { probability: likely, survives });
+            if !survives {
                 return false;
             }
             self.throughput *= 1.0 / likely;

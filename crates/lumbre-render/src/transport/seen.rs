@@ -7,8 +7,9 @@ use lumbre_scene::{GroundPlane, Interaction, LightSample, Scene, View};
 use lumbre_shading::{Scatter, Spectrum};
 
 use crate::transport::interior::Interiors;
+use crate::transport::journal::{Event, Source};
 use crate::transport::through::{goes_straight_on, light_through, straight_on};
-use crate::transport::{Draw, Integrator, RayCounts, Sight};
+use crate::transport::{Draw, Integrator, Record, Sight};
 
 /// Samples of each light that each sample of a shadow takes: few rays, where a whole path would be many.
 const SAMPLES: u32 = 2;
@@ -45,23 +46,25 @@ pub fn see(
     sight: Sight<'_>,
     draw: &Draw,
     lights_are_seen: bool,
-    rays: &mut RayCounts,
+    record: &mut Record,
 ) -> Seen {
     let behind = |ray| if lights_are_seen { scene.background(ray).sum() } else { Spectrum::BLACK };
     let covered = if lights_are_seen { Spectrum::WHITE } else { Spectrum::BLACK };
     let catcher = scene.ground().filter(|ground| ground.catcher);
     match (&sight.met, catcher) {
         (Some(met), Some(ground)) if ground.holds(met) => {
-            let blocked = blocked(scene, ground, met, draw, rays);
+            let blocked = blocked(scene, ground, met, draw, record);
+            record.note(|| Event::Caught { blocked });
             let left = Spectrum::WHITE - blocked;
             let coverage = if lights_are_seen { Spectrum::WHITE } else { blocked };
-            Seen { radiance: behind(&sight.ray.ray) * left, coverage, on_catcher: true }
+            let radiance = record.added(Source::Infinity, left, behind(&sight.ray.ray), 1.0);
+            Seen { radiance, coverage, on_catcher: true }
         }
         (None, _) if !lights_are_seen => {
             Seen { radiance: Spectrum::BLACK, coverage: covered, on_catcher: false }
         }
         _ => {
-            let radiance = integrator.radiance(scene, view, sight, draw, rays);
+            let radiance = integrator.radiance(scene, view, sight, draw, record);
             Seen { radiance, coverage: Spectrum::WHITE, on_catcher: false }
         }
     }
@@ -73,7 +76,7 @@ fn blocked(
     ground: &GroundPlane,
     at: &Interaction<'_>,
     draw: &Draw,
-    rays: &mut RayCounts,
+    record: &mut Record,
 ) -> Spectrum {
     let from = at.shadow_origin();
     let mut lost = Spectrum::BLACK;
@@ -100,9 +103,9 @@ fn blocked(
         }
         let shadow_ray = at.shadow_ray(&sample);
         let left = if goes_straight_on(scene, &sample) {
-            straight_on(scene, shadow_ray, &sample, Interiors::default(), false, rays)
+            straight_on(scene, shadow_ray, &sample, Interiors::default(), false, record)
         } else {
-            rays.shadow += 1;
+            record.counts.shadow += 1;
             if scene.is_occluded(&shadow_ray) { Spectrum::BLACK } else { Spectrum::WHITE }
         };
         if left == Spectrum::WHITE {
@@ -111,7 +114,7 @@ fn blocked(
         lost += sample.radiance * (Spectrum::WHITE - left) * (cosine * share / (density * SAMPLES as f32));
     }
     if scene.lets_light_through() {
-        lost = lost - passed(scene, ground, at, draw, rays);
+        lost = lost - passed(scene, ground, at, draw, record);
     }
     let open = ground.open_irradiance(at.surface.point, at.time);
     let part = |lost: f32, open: f32| if open > 0.0 { lost / open } else { 0.0 };
@@ -127,18 +130,18 @@ fn passed(
     ground: &GroundPlane,
     at: &Interaction<'_>,
     draw: &Draw,
-    rays: &mut RayCounts,
+    record: &mut Record,
 ) -> Spectrum {
     let frame = Frame::from_z(ground.normal);
     let mut irradiance = Spectrum::BLACK;
     // The vertices whose numbers choose the way of the light begin at a place of their own for each direction.
-    let along = |direction: DVec3, way: u32, rays: &mut RayCounts| {
+    let along = |direction: DVec3, way: u32, record: &mut Record| {
         let cosine = ground.normal.dot(direction);
         if cosine <= 0.0 {
             return Spectrum::BLACK;
         }
         let ray = at.leave(direction);
-        let light = light_through(scene, ray, draw, way << WAY_BITS, rays);
+        let light = light_through(scene, ray, draw, way << WAY_BITS, record);
         if light.is_black() {
             return Spectrum::BLACK;
         }
@@ -150,10 +153,10 @@ fn passed(
         let sample =
             scene.sample_light(at.shadow_origin(), at.time, draw.light_choice(i), draw.light_point(i));
         if let Some(LightSample { scatter: Scatter::Density(_), end: None, towards, .. }) = sample {
-            irradiance += along(towards, 1 + 2 * i, rays);
+            irradiance += along(towards, 1 + 2 * i, record);
         }
         let local = warp64::square_to_cosine_hemisphere(draw.direction(i).as_dvec2());
-        irradiance += along(frame.to_world(local), 2 + 2 * i, rays);
+        irradiance += along(frame.to_world(local), 2 + 2 * i, record);
     }
     irradiance / SAMPLES as f32
 }

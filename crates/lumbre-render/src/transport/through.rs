@@ -7,7 +7,7 @@ use lumbre_shading::{Scatter, ShadingNormals, Spectrum};
 use crate::transport::direct::Vertex;
 use crate::transport::interior::Interiors;
 use crate::transport::path::ray_length;
-use crate::transport::{Draw, RayCounts};
+use crate::transport::{Draw, Record};
 
 /// Surfaces at most that light goes through or is reflected by inside a solid.
 const MOST_SURFACES: u32 = 16;
@@ -27,14 +27,14 @@ pub(super) fn light_through(
     mut ray: Ray,
     draw: &Draw,
     first: u32,
-    rays: &mut RayCounts,
+    record: &mut Record,
 ) -> Spectrum {
     let mut throughput = Spectrum::WHITE;
     let mut interiors = Interiors::default();
     // Index of refraction where the path is, over that where it began.
     let mut index = 1.0_f32;
     for surface in 0..MOST_SURFACES {
-        rays.bounce += 1;
+        record.counts.bounce += 1;
         let Some(hit) = scene.closest(&ray) else {
             let is_open = surface == 0;
             return if is_open {
@@ -91,12 +91,12 @@ pub(super) fn straight_on<'s>(
     sample: &LightSample,
     mut interiors: Interiors<'s>,
     regularize: bool,
-    rays: &mut RayCounts,
+    record: &mut Record,
 ) -> Spectrum {
     let mut left = Spectrum::WHITE;
     let mut ray = shadow_ray;
     for _ in 0..MOST_PANES {
-        rays.shadow += 1;
+        record.counts.shadow += 1;
         let Some(hit) = scene.closest(&ray) else {
             // Light from infinitely far away was not inside anything.
             let last = sample.end.map(|end| interiors.transmittance((end.point - ray.origin).length()));

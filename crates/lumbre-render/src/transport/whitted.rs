@@ -7,8 +7,9 @@ use smallvec::SmallVec;
 
 use crate::transport::direct::Vertex;
 use crate::transport::interior::Interiors;
+use crate::transport::journal::{Event, Met, SampledLight, Scattered, Source};
 use crate::transport::path::ray_length;
-use crate::transport::{Draw, Integrator, RayCounts, Sight};
+use crate::transport::{Draw, Integrator, Record, Sight};
 
 /// Follows every mirror image and every refraction, and gives each surface on the way direct light from every light.
 ///
@@ -59,6 +60,7 @@ impl Whitted {
         came: &'a Arrival<'s>,
         draw: &Draw,
         pending: &mut SmallVec<[Branch<'s>; 4]>,
+        record: &mut Record,
     ) -> Scatterers<'a, 's> {
         let mut scatterers = Scatterers::new();
         let mut branches = 0;
@@ -80,8 +82,10 @@ impl Whitted {
                 if part.crosses {
                     interiors.cross(vertex.material, here.front);
                 }
+                let ray = vertex.leave(&part);
+                record.note(|| Event::Scattered(Scattered::of(&ray, &part, throughput)));
                 pending.push(Branch {
-                    ray: vertex.leave(&part),
+                    ray,
                     interiors,
                     footprint: here.footprint(),
                     throughput,
@@ -103,11 +107,11 @@ impl Whitted {
         scatterers: &Scatterers<'_, 's>,
         came: &Arrival<'s>,
         draw: &Draw,
-        rays: &mut RayCounts,
+        record: &mut Record,
     ) -> Spectrum {
         let from = here.shadow_origin();
         let lights = scene.lights();
-        let by_light = |rays: &mut RayCounts, id: LightId, light: &Light, label: u32| {
+        let by_light = |record: &mut Record, id: LightId, light: &Light, label: u32| {
             if light.is_infinite() && !self.sky {
                 return Spectrum::BLACK;
             }
@@ -116,7 +120,7 @@ impl Whitted {
             for point in 0..points {
                 let u = draw.point_on_each_light(came.vertex, label, point, points);
                 if let Some(sample) = scene.sample_one_light(id, from, here.time, u) {
-                    sum += scattered(scene, scatterers, &came.interiors, &sample, rays);
+                    sum += scattered(scene, scatterers, &came.interiors, &sample, record);
                 }
             }
             sum * (1.0 / points as f32)
@@ -124,12 +128,12 @@ impl Whitted {
         if lights.len() > EVERY_LIGHT_UP_TO {
             let choice = scene.choose_light(draw.light_choice(came.vertex));
             return choice.map_or(Spectrum::BLACK, |(id, probability)| {
-                by_light(rays, id, &lights[id.0 as usize], 0) * (1.0 / probability) as f32
+                by_light(record, id, &lights[id.0 as usize], 0) * (1.0 / probability) as f32
             });
         }
         let mut sum = Spectrum::BLACK;
         for (i, light) in (0..).zip(lights) {
-            sum += by_light(rays, LightId(i), light, i);
+            sum += by_light(record, LightId(i), light, i);
         }
         sum
     }
@@ -150,7 +154,7 @@ impl Integrator for Whitted {
         _: &View,
         sight: Sight<'_>,
         draw: &Draw,
-        rays: &mut RayCounts,
+        record: &mut Record,
     ) -> Spectrum {
         let mut radiance = Spectrum::BLACK;
         let mut pending: SmallVec<[Branch; 4]> = SmallVec::new();
@@ -162,17 +166,19 @@ impl Integrator for Whitted {
                 // Of a mixture the one material that stands for it says what the way was inside of.
                 came.interiors.arrive(here, here.resolved());
                 came.throughput *= came.interiors.transmittance(ray_length(&ray, here));
-                radiance += came.throughput * here.emitted();
+                record.note(|| Event::Met(Met::of(&ray, here, came.depth, came.throughput)));
+                radiance += record.added(Source::Surface, came.throughput, here.emitted(), 1.0);
                 if came.depth < self.max_depth {
-                    let scatterers = self.split(scene, here, &came, draw, &mut pending);
+                    let scatterers = self.split(scene, here, &came, draw, &mut pending, record);
                     if !scatterers.is_empty() {
-                        let direct = self.direct(scene, here, &scatterers, &came, draw, rays);
-                        radiance += came.throughput * direct;
+                        let direct = self.direct(scene, here, &scatterers, &came, draw, record);
+                        radiance += record.added(Source::Direct, came.throughput, direct, 1.0);
                     }
                 }
             } else {
                 let arriving: Spectrum = scene.background(&ray).sum();
-                radiance += came.throughput * arriving;
+                record.note(|| Event::Left { ray });
+                radiance += record.added(Source::Infinity, came.throughput, arriving, 1.0);
             }
             let Some(next) = pending.pop() else { return radiance };
             ray = next.ray;
@@ -182,7 +188,7 @@ impl Integrator for Whitted {
                 depth: next.depth,
                 vertex: came.vertex + 1,
             };
-            rays.bounce += 1;
+            record.counts.bounce += 1;
             met = scene.closest(&ray).map(|hit| scene.interaction(&ray, &hit, &next.footprint));
         }
     }
@@ -194,7 +200,7 @@ fn scattered<'s>(
     scatterers: &Scatterers<'_, 's>,
     interiors: &Interiors<'s>,
     sample: &LightSample,
-    rays: &mut RayCounts,
+    record: &mut Record,
 ) -> Spectrum {
     let mut sum = Spectrum::BLACK;
     let mut shadow_ray = None;
@@ -206,21 +212,31 @@ fn scattered<'s>(
             continue;
         }
         if goes_straight_on {
-            sum += scattered * vertex.passes_straight_on(sample, interiors, false, rays);
+            sum += scattered * vertex.passes_straight_on(sample, interiors, false, record);
         } else {
             sum += scattered * vertex.passes(sample, interiors);
             shadow_ray.get_or_insert_with(|| vertex.shadow_ray(sample));
         }
     }
     let scattered = sum * sample.radiance;
-    if scattered.is_black() {
+    let is_occluded = shadow_ray.filter(|_| !scattered.is_black()).is_some_and(|shadow_ray| {
+        record.counts.shadow += 1;
+        scene.is_occluded(&shadow_ray)
+    });
+    record.note(|| {
+        let passes = if is_occluded || scattered.is_black() { Spectrum::BLACK } else { Spectrum::WHITE };
+        let sample = *sample;
+        Event::Sampled(Box::new(SampledLight {
+            sample,
+            scattered: sum,
+            bsdf_pdf: 0.0,
+            weight: 1.0,
+            shadow_ray,
+            passes,
+        }))
+    });
+    if scattered.is_black() || is_occluded {
         return Spectrum::BLACK;
-    }
-    if let Some(shadow_ray) = shadow_ray {
-        rays.shadow += 1;
-        if scene.is_occluded(&shadow_ray) {
-            return Spectrum::BLACK;
-        }
     }
     match sample.scatter {
         Scatter::Delta => scattered,

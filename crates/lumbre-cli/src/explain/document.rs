@@ -1,0 +1,259 @@
+//! What is told, whatever it is written as: sections of quantities, tables and sentences.
+
+use lumbre::math::glam::DMat4;
+use lumbre::{DVec3, Ray};
+
+use super::formula::Scope;
+
+/// A part of what is told.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Section {
+    /// What it is, for programs.
+    pub(super) key: String,
+    /// Its heading.
+    pub(super) title: String,
+    pub(super) items: Vec<Item>,
+    pub(super) sections: Vec<Section>,
+}
+
+/// One thing that is told.
+#[derive(Clone, Debug)]
+pub(super) enum Item {
+    Quantity(Quantity),
+    /// A sentence.
+    Text(String),
+    /// A sentence that one should not miss.
+    Remark(String),
+    /// Rows of one kind, with a key for programs.
+    Table {
+        key: &'static str,
+        columns: Vec<Column>,
+        rows: Vec<Vec<Value>>,
+    },
+    /// A drawing.
+    Sketch(String),
+}
+
+/// A column of a table.
+#[derive(Clone, Debug)]
+pub(super) struct Column {
+    pub(super) key: &'static str,
+    pub(super) title: String,
+}
+
+/// A number with its name and where it comes from.
+#[derive(Clone, Debug)]
+pub(super) struct Quantity {
+    /// The name in formulas; empty where `label` says what it is.
+    pub(super) symbol: String,
+    /// What it is, in words; may be empty.
+    pub(super) label: String,
+    /// The formula; may be empty.
+    pub(super) formula: String,
+    /// The formula with its numbers, where it has one.
+    pub(super) numbers: Option<String>,
+    pub(super) value: Value,
+    /// The textbook's formula and what it gives.
+    pub(super) schoolbook: Option<(String, Value)>,
+}
+
+/// What a quantity is.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Value {
+    Number(f64),
+    /// In single precision, as light is computed.
+    Single(f32),
+    Vector(DVec3),
+    /// Red, green and blue.
+    Colour([f32; 3]),
+    Numbers(Vec<f64>),
+    /// From a first to a last number, each.
+    Intervals(Vec<[f64; 2]>),
+    Matrix(Box<DMat4>),
+    Text(String),
+}
+
+impl From<f64> for Value {
+    fn from(x: f64) -> Self {
+        Self::Number(x)
+    }
+}
+
+impl From<f32> for Value {
+    fn from(x: f32) -> Self {
+        Self::Single(x)
+    }
+}
+
+impl From<DVec3> for Value {
+    fn from(v: DVec3) -> Self {
+        Self::Vector(v)
+    }
+}
+
+impl From<lumbre::shading::Spectrum> for Value {
+    fn from(light: lumbre::shading::Spectrum) -> Self {
+        Self::Colour(light.to_array())
+    }
+}
+
+impl From<String> for Value {
+    fn from(text: String) -> Self {
+        Self::Text(text)
+    }
+}
+
+impl From<&str> for Value {
+    fn from(text: &str) -> Self {
+        Self::Text(text.to_owned())
+    }
+}
+
+impl From<DMat4> for Value {
+    fn from(m: DMat4) -> Self {
+        Self::Matrix(Box::new(m))
+    }
+}
+
+/// The shortest text that is read back as the same number.
+pub(super) fn exact(x: f64) -> String {
+    let size = x.abs();
+    if x == 0.0 {
+        "0".to_owned()
+    } else if size.is_finite() && !(1e-5..1e17).contains(&size) {
+        format!("{x:e}")
+    } else if x.is_finite() {
+        format!("{x}")
+    } else if x.is_nan() {
+        "NaN".to_owned()
+    } else {
+        if x > 0.0 { "∞".to_owned() } else { "-∞".to_owned() }
+    }
+}
+
+/// With six digits, for what stands in formulas.
+fn short(x: f64) -> String {
+    if x == 0.0 || !x.is_finite() {
+        return exact(x);
+    }
+    let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
+    exact(rounded)
+}
+
+impl Value {
+    fn written(&self, number: impl Fn(f64) -> String + Copy) -> String {
+        let list = |numbers: &[f64]| numbers.iter().map(|x| number(*x)).collect::<Vec<_>>().join(", ");
+        match self {
+            Self::Number(x) => number(*x),
+            Self::Single(x) => single(*x),
+            Self::Vector(v) => format!("({})", list(&v.to_array())),
+            Self::Colour([r, g, b]) if r == g && g == b => single(*r),
+            Self::Colour(rgb) => format!("({})", rgb.map(single).join(", ")),
+            Self::Numbers(numbers) => list(numbers),
+            Self::Intervals(intervals) if intervals.is_empty() => "∅".to_owned(),
+            Self::Intervals(intervals) => {
+                let one = |[from, to]: &[f64; 2]| format!("[{}, {}]", number(*from), number(*to));
+                intervals.iter().map(one).collect::<Vec<_>>().join(" ∪ ")
+            }
+            Self::Matrix(m) => {
+                let rows = m.transpose().to_cols_array_2d();
+                format!(
+                    "[{}]",
+                    rows.iter().map(|row| format!("[{}]", list(row))).collect::<Vec<_>>().join(", ")
+                )
+            }
+            Self::Text(text) => text.clone(),
+        }
+    }
+
+    /// In full.
+    pub(super) fn in_full(&self) -> String {
+        self.written(exact)
+    }
+
+    /// With six digits, to stand in a formula.
+    pub(super) fn in_short(&self) -> String {
+        self.written(short)
+    }
+
+    /// The rows of a matrix, in full.
+    pub(super) fn rows(&self) -> Option<[[String; 4]; 4]> {
+        match self {
+            Self::Matrix(m) => Some(m.transpose().to_cols_array_2d().map(|row| row.map(exact))),
+            _ => None,
+        }
+    }
+}
+
+fn single(x: f32) -> String {
+    let size = x.abs();
+    if x == 0.0 {
+        "0".to_owned()
+    } else if size.is_finite() && !(1e-5..1e9).contains(&size) {
+        format!("{x:e}")
+    } else if x.is_finite() {
+        format!("{x}")
+    } else {
+        exact(f64::from(x))
+    }
+}
+
+impl Scope {
+    /// Gives the symbols of a ray's origin and direction their values.
+    pub(super) fn set_ray(&mut self, [origin, direction]: [&str; 2], ray: &Ray) {
+        self.set(origin, Value::from(ray.origin).in_short());
+        self.set(direction, Value::from(ray.direction).in_short());
+    }
+}
+
+impl Section {
+    pub(super) fn new(key: impl Into<String>, title: impl Into<String>) -> Self {
+        Self { key: key.into(), title: title.into(), items: Vec::new(), sections: Vec::new() }
+    }
+
+    /// Tells what something is.
+    pub(super) fn fact(&mut self, label: impl Into<String>, value: impl Into<Value>) {
+        self.items.push(Item::Quantity(Quantity {
+            symbol: String::new(),
+            label: label.into(),
+            formula: String::new(),
+            numbers: None,
+            value: value.into(),
+            schoolbook: None,
+        }));
+    }
+
+    /// Tells a quantity, with its formula and the numbers in it, and keeps it for the formulas that follow.
+    pub(super) fn quantity(
+        &mut self,
+        scope: &mut Scope,
+        symbol: &str,
+        label: &str,
+        formula: &str,
+        value: impl Into<Value>,
+    ) {
+        let value = value.into();
+        self.items.push(Item::Quantity(Quantity {
+            symbol: symbol.to_owned(),
+            label: label.to_owned(),
+            formula: formula.to_owned(),
+            numbers: numbers(scope, formula, &value),
+            value: value.clone(),
+            schoolbook: None,
+        }));
+        scope.set(symbol, value.in_short());
+    }
+
+    pub(super) fn text(&mut self, text: impl Into<String>) {
+        self.items.push(Item::Text(text.into()));
+    }
+
+    pub(super) fn remark(&mut self, text: impl Into<String>) {
+        self.items.push(Item::Remark(text.into()));
+    }
+}
+
+/// The numbers in a formula, where they say more than its result.
+pub(super) fn numbers(scope: &Scope, formula: &str, value: &Value) -> Option<String> {
+    scope.put_in(formula).filter(|numbers| *numbers != value.in_full())
+}

@@ -1,0 +1,307 @@
+//! The sentences of explanations in English.
+
+use lumbre::geometry::{Fate, Remark, Topic};
+
+use super::document::exact;
+use super::texts::Texts;
+
+pub(super) static ENGLISH: Texts = Texts {
+    code: "en",
+    topic,
+    remark,
+    fate_of,
+    camera: "The camera",
+    kind: "kind",
+    name: "name",
+    size: "size of the picture",
+    eye: "where it stands",
+    right: "to the right of the picture",
+    up: "upwards",
+    forward: "into the picture",
+    frame: "Camera space has x along u, y along v and z along w: a left-handed frame in a right-handed world.",
+    look_at: "look-at matrix, from the world to the camera",
+    projection: "projection matrix, for a camera that looks along -z, from {0} to {1} (rays need neither end)",
+    perspective: "perspective, {0}° along the shorter side",
+    lens: "with a lens of radius {0} in focus at {1}",
+    orthographic: "orthographic",
+    spherical: "spherical, all directions at once",
+    pixel: "pixel",
+    film_point: "point of the film, in pixels from the upper left corner",
+    screen_point: "point of the screen (at a distance of 1 for a perspective)",
+    lens_point: "point of the lens, as two numbers in [0, 1)",
+    direction_in_camera: "direction in camera space",
+    direction_turned: "turned into the world",
+    origin: "the ray's origin",
+    direction: "the ray's direction",
+    range: "range of t",
+    time: "time",
+    ray_is: "The ray is the points O + t·D with t in this range.",
+    given_ray: "The ray",
+    surfaces: "What the ray meets",
+    nothing_met: "Nothing: the ray leaves the scene.",
+    more_hits: "There is more: {0} crossings are told.",
+    shape: "shape {0}, {1}",
+    material: "material",
+    no_material: "none",
+    instance: "instance",
+    triangle: "triangle of the mesh",
+    transform: "Into the object's space",
+    chain: "The maps from the object to the world, the outermost first; M is their product.",
+    decomposes: "M = T·Rz·Ry·Rx·S, with:",
+    scale: "scale S along x, y, z",
+    rotations: "rotations about x, y, z in degrees",
+    translation: "translation T",
+    sheared: "M shears: it is no scale, rotations and a translation.",
+    as_point: "the origin as a point, w = 1",
+    as_direction: "the direction as a direction, w = 0",
+    t_is_kept: "D′ is not made a unit vector, so t means the same point in both spaces. By unit directions it would be |D′| times as large.",
+    equation: "The crossings",
+    custom: "Geometry of a program's own: how it finds its crossings is not known here.",
+    hit: "The crossing at t = {0}",
+    t_of_search: "as the search found it",
+    is_seen: "This is the one that is seen.",
+    point: "the point, on the surface",
+    reprojected: "P is put back onto the surface; O + t·D is {0} away from it by rounding.",
+    normal_in_object: "outward normal in the object's space",
+    by_inverse_transpose: "by the inverse transpose",
+    normal: "outward unit normal",
+    front: "N·D < 0: the ray meets the outside; the normal that faces it is N.",
+    back: "N·D > 0: the ray meets the inside; the normal that faces it is −N.",
+    grazing: "N·D = 0: the ray touches the surface.",
+    part: "part",
+    multiplicity: "multiplicity",
+    fate: "what became of it",
+    fates: "What became of the crossings of the whole line",
+    operand_origin: "the ray's origin in the operand's own space",
+    operand_direction: "the ray's direction there",
+    operand: "Operand {0}, {1}",
+    not_looked_at: "The ray misses its box: the search does not look at it.",
+    light: "The light",
+    start: "The beginning",
+    left: "The ray leaves the scene",
+    throughput: "what the path carries",
+    radiance: "light that arrives",
+    mis_weight: "weight against the other way to find this light",
+    added: "what is added",
+    survives: "By chance the path goes on, with a probability of {0}, and carries the inverse of it more.",
+    does_not_survive: "By chance the path ends here; it would have gone on with a probability of {0}.",
+    medium: "A medium",
+    medium_scattered: "The path scatters there.",
+    medium_passed: "The path comes through.",
+    distance: "distance",
+    blocked: "share of the light on the ground that something blocks",
+    occluded: "Something is in the way of it.",
+    open: "Nothing is in the way of it.",
+    sum: "All light of this path",
+    source: "from",
+    no_light: "No light was found.",
+    radiance_of_sample: "radiance of this sample, as the render adds it to the pixel",
+    vertex: "Vertex {0} of the path: {1}",
+    shading_normal: "shading normal",
+    texture: "(by a texture)",
+    mirror: "A mirror, and a smooth boundary",
+    facing: "the normal that faces the ray",
+    reflected: "the mirrored direction",
+    index: "index of refraction",
+    eta: "index on this side over that beyond",
+    cos_incident: "cosine of the angle of incidence",
+    cos_squared: "square of the cosine of the angle of refraction",
+    refracted: "the refracted direction",
+    total_reflection: "k < 0: all is reflected, nothing is refracted.",
+    each_light: "Each light, from here",
+    each_light_is: "One point of each light, in its middle; the path below takes points by chance.",
+    light_number: "light",
+    towards_light: "towards it",
+    arriving: "radiance that arrives",
+    pdf: "density by solid angle",
+    visible: "seen",
+    contribution: "what is scattered of it",
+    yes: "yes",
+    no: "no",
+    more_lights: "There are {0} lights; the first are told.",
+    sampled_light: "A light is sampled",
+    scattered: "f·|cos θ| towards it",
+    no_shadow_ray: "Nothing would be scattered of it: no ray looks whether it is seen.",
+    bsdf_pdf: "density with which the material would choose this direction",
+    shadow_origin: "the shadow ray's origin, moved off the surface by its error",
+    shadow_direction: "the shadow ray's direction",
+    visibility: "what comes through",
+    blocked_by: "In its way: {0}, at t = {1}.",
+    goes_on: "The path goes on",
+    transmitted: "It is transmitted.",
+    is_reflected: "It is reflected.",
+    only_direction: "This is the only direction of its kind (a mirror, or glass): it has no density.",
+    bsdf_weight: "f·|cos θ| over the density",
+    throughput_after: "what the path carries then",
+    from_surface: "light of the surface",
+    from_infinity: "light from infinity",
+    from_sampled: "a light that was sampled",
+    from_direct: "all lights that shine on it",
+    end_depth: "The path has as many bounces as it may have.",
+    end_nothing: "Nothing scatters here.",
+    end_absorbed: "All is absorbed.",
+    end_roulette: "It ends by chance.",
+    end_medium: "It ends in the medium.",
+    schoolbook: "by the textbook",
+    title: "How Lumbre computes it",
+    sketch: "The ray, what it meets, and the normals there",
+    sample: "sample",
+    weight: "weight in the pixel",
+};
+
+fn topic(topic: Topic) -> &'static str {
+    match topic {
+        Topic::Parameters => "The shape",
+        Topic::ScaledRay => "The direction, scaled",
+        Topic::SetUp => "Where the equation is set up",
+        Topic::Quadratic => "The equation a·s² + 2·h·s + c = 0",
+        Topic::Discriminant => "The discriminant (a quarter of the textbook's)",
+        Topic::Roots => "The roots",
+        Topic::Nappe => "Which nappe of the cone",
+        Topic::Tip => "The plane through the tip",
+        Topic::FirstCut => "The plane through the first end",
+        Topic::SecondCut => "The plane through the second end",
+        Topic::FirstBall => "The ball about the first end",
+        Topic::SecondBall => "The ball about the second end",
+        Topic::Plane => "The plane",
+        Topic::Slabs => "The slabs, axis by axis",
+        Topic::Span => "The interval within the solid",
+        Topic::TorusFrame => "The line in the torus' own frame",
+        Topic::TorusBounds => "Where the line is near the torus",
+        Topic::Quartic => "The quartic",
+        Topic::QuarticExtrema => "Where the quartic turns",
+        Topic::QuarticRoots => "The roots of the quartic",
+        Topic::Shear => "The shear that puts the ray on an axis",
+        Topic::EdgeFunctions => "The edge functions (watertight)",
+        Topic::MollerTrumbore => "For comparison: Möller and Trumbore",
+        Topic::PlaneAndSides => "For comparison: the plane and the sides of the edges",
+        Topic::Winding => "How the outline winds about the ray",
+        Topic::Rulings => "The rulings that meet the ray",
+        Topic::Intervals => "The intervals on the line",
+        Topic::Surface => "The surface at the nearest crossing",
+    }
+}
+
+fn remark(remark: &Remark) -> String {
+    let text = match remark {
+        Remark::NoRay => {
+            "Something in the ray is not a number, or its direction is zero or infinite: it meets nothing."
+        }
+        Remark::Misses => "The line misses it.",
+        Remark::Touches => "The line touches it: both roots are one.",
+        Remark::Parallel => "The line is parallel to it.",
+        Remark::Between => "The line lies in it, or between both planes all the way.",
+        Remark::AtInfinity => "a = 0: the equation is linear, and one root has gone to infinity.",
+        Remark::InsideThroughout => "The line is inside from end to end, and crosses nothing.",
+        Remark::AlongGenerator => "The line is along a generator of the cone, and inside from the tip on.",
+        Remark::SetUpNearby { start } => {
+            return format!(
+                "The ray begins far away: the equation is set up at t₀ = {}, where it keeps its digits.",
+                exact(*start)
+            );
+        }
+        Remark::TwicePrecision => {
+            "Doubles could not decide, or would lose digits: it is computed in twice the precision, and told rounded."
+        }
+        Remark::Cancellation { digits } => {
+            return format!("The textbook's formula loses {digits:.0} of about 16 digits here.");
+        }
+        Remark::SchoolbookMisses => {
+            "By rounding, the textbook's discriminant is negative: it would miss what is hit."
+        }
+        Remark::SchoolbookHits => {
+            "By rounding, the textbook's discriminant is not negative: it would hit what is missed."
+        }
+        Remark::EdgeByRoundingErrors => {
+            "Two products rounded to the same number: their rounding errors decide about an edge."
+        }
+        Remark::Disagrees => "This test says otherwise than the search.",
+        Remark::Flat => "The triangle has no area, and is never hit.",
+        Remark::EdgeOn => "The line lies in the plane of the patch, or along one of its edges.",
+        Remark::Thin => {
+            "The tube is so thin that the quartic has no digits for it: the crossings come from the torus' own equation."
+        }
+        Remark::Descent => "The first crossing was found by a descent along the quartic.",
+        Remark::Pieces => {
+            "The crossings were found between the places where the quartic turns, piece by piece."
+        }
+        Remark::StartsInside { operand } => {
+            return format!("The line begins inside operand {operand}.");
+        }
+        Remark::NotLookedAt { operand } => {
+            return format!(
+                "The search does not look at operand {operand}: the ray misses its box, or it could change nothing."
+            );
+        }
+    };
+    text.to_owned()
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+fn fate_of(fate: &Fate) -> String {
+    let text = match *fate {
+        Fate::Hit => "a hit",
+        Fate::Behind => "behind the ray's origin",
+        Fate::BeforeRange { t_min } => return format!("before the range, which begins at {}", exact(t_min)),
+        Fate::BeyondRange { t_max } => return format!("beyond the range, which ends at {}", exact(t_max)),
+        Fate::OtherNappe { radius } => return format!("on the other nappe (radius {})", exact(radius)),
+        Fate::OutsideHeights { z, min, max } => {
+            return format!("at height {}, outside of {} to {}", exact(z), exact(min), exact(max));
+        }
+        Fate::OutsideSegment { v } => {
+            return format!("beyond the ends of the segment (at {} of it)", exact(v));
+        }
+        Fate::OutsideSweep { phi, max } => {
+            return format!(
+                "at an azimuth of {}°, beyond {}°",
+                exact(phi.to_degrees()),
+                exact(max.to_degrees())
+            );
+        }
+        Fate::OutsideRim { distance, radius } => {
+            return format!("{} from the centre, beyond the rim at {}", exact(distance), exact(radius));
+        }
+        Fate::InsideHole { distance, radius } => {
+            return format!("{} from the centre, in the hole of radius {}", exact(distance), exact(radius));
+        }
+        Fate::OutsideEdges { weights: [a, b, c] } => {
+            return format!("outside the edges (weights {}, {}, {})", exact(a), exact(b), exact(c));
+        }
+        Fate::OutsidePatch { u, v } => {
+            return format!("outside the patch (u = {}, v = {})", exact(u), exact(v));
+        }
+        Fate::OutsideSlab { axis, enter, leave } => {
+            return format!(
+                "outside the slab of {}, which is from t = {} to {}",
+                AXES[axis],
+                exact(enter),
+                exact(leave)
+            );
+        }
+        Fate::OutsideBox { axis, value, min, max } => {
+            return format!(
+                "{} = {}, outside the clipping box ({} to {})",
+                AXES[axis],
+                exact(value),
+                exact(min),
+                exact(max)
+            );
+        }
+        Fate::InsideSolid => "within the solid, on a surface that continues one of its parts",
+        Fate::Shared { part } => return format!("at the seam of two parts; it counts for part {part}"),
+        Fate::Flat => "the triangle has no area",
+        Fate::Touch => "the line only touches the operand",
+        Fate::InsideOperand { operand } => {
+            return format!("inside operand {operand}: nothing begins or ends there");
+        }
+        Fate::OutsideOperand { operand } => {
+            return format!("outside operand {operand}: nothing begins or ends there");
+        }
+        Fate::Coincides { operand } => return format!("on the surface of operand {operand} as well"),
+        Fate::NoChange { inside: true } => "inside the result on both sides",
+        Fate::NoChange { inside: false } => "outside the result on both sides",
+        Fate::NotReturned => "not returned by the search",
+    };
+    text.to_owned()
+}

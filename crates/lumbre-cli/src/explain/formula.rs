@@ -1,0 +1,443 @@
+//! Formulas: written as plain text in Unicode, and from there with numbers for their symbols, as LaTeX and as MathML.
+
+use std::collections::HashMap;
+use std::fmt::Write;
+
+/// A piece of a formula.
+#[derive(Clone, Debug, PartialEq)]
+enum Token {
+    /// A letter or word with its primes and its subscript: `O′`, `t₁`, `det`.
+    Symbol { base: String, primes: usize, subscript: String },
+    /// A numeral, with a power of ten where it has one.
+    Number { digits: String, exponent: String },
+    /// Raised digits and signs, as `²` or `⁻¹`.
+    Power(String),
+    /// √, whose argument stands in the parentheses that follow.
+    Root,
+    /// Anything else, a character each.
+    Sign(char),
+}
+
+/// Words that are functions, and so never symbols.
+const FUNCTIONS: [&str; 8] = ["min", "max", "sin", "cos", "tan", "atan2", "det", "sign"];
+
+/// Subscripts with the characters that they stand for.
+const SUBSCRIPTS: [(char, char); 23] = [
+    ('₀', '0'),
+    ('₁', '1'),
+    ('₂', '2'),
+    ('₃', '3'),
+    ('₄', '4'),
+    ('₅', '5'),
+    ('₆', '6'),
+    ('₇', '7'),
+    ('₈', '8'),
+    ('₉', '9'),
+    ('ₐ', 'a'),
+    ('ₑ', 'e'),
+    ('ₕ', 'h'),
+    ('ᵢ', 'i'),
+    ('ⱼ', 'j'),
+    ('ₖ', 'k'),
+    ('ₗ', 'l'),
+    ('ₘ', 'm'),
+    ('ₙ', 'n'),
+    ('ₒ', 'o'),
+    ('ₚ', 'p'),
+    ('ₓ', 'x'),
+    ('ₜ', 't'),
+];
+/// Raised characters with those that they stand for.
+const POWERS: [(char, char); 14] = [
+    ('⁰', '0'),
+    ('¹', '1'),
+    ('²', '2'),
+    ('³', '3'),
+    ('⁴', '4'),
+    ('⁵', '5'),
+    ('⁶', '6'),
+    ('⁷', '7'),
+    ('⁸', '8'),
+    ('⁹', '9'),
+    ('⁻', '−'),
+    ('ᵀ', 'T'),
+    ('⁺', '+'),
+    ('ⁿ', 'n'),
+];
+/// Greek letters with their names in LaTeX.
+const GREEK: [(&str, &str); 22] = [
+    ("α", "alpha"),
+    ("β", "beta"),
+    ("γ", "gamma"),
+    ("δ", "delta"),
+    ("ε", "varepsilon"),
+    ("η", "eta"),
+    ("θ", "theta"),
+    ("κ", "kappa"),
+    ("λ", "lambda"),
+    ("μ", "mu"),
+    ("ν", "nu"),
+    ("ξ", "xi"),
+    ("π", "pi"),
+    ("ρ", "rho"),
+    ("σ", "sigma"),
+    ("τ", "tau"),
+    ("φ", "varphi"),
+    ("ψ", "psi"),
+    ("ω", "omega"),
+    ("Δ", "Delta"),
+    ("Σ", "Sigma"),
+    ("Φ", "Phi"),
+];
+
+fn stands_for(table: &[(char, char)], c: char) -> Option<char> {
+    table.iter().find(|(from, _)| *from == c).map(|(_, to)| *to)
+}
+
+/// Whether a numeral begins here.
+fn is_numeral(rest: &std::iter::Peekable<std::str::Chars<'_>>) -> bool {
+    let mut ahead = rest.clone();
+    ahead.next_if_eq(&'-');
+    ahead.next().is_some_and(|c| c.is_ascii_digit())
+}
+
+fn tokens(formula: &str) -> Vec<Token> {
+    let mut tokens = Vec::new();
+    let mut rest = formula.chars().peekable();
+    let take_while = |rest: &mut std::iter::Peekable<std::str::Chars<'_>>, keep: &dyn Fn(char) -> bool| {
+        let mut taken = String::new();
+        while let Some(c) = rest.next_if(|c| keep(*c)) {
+            taken.push(c);
+        }
+        taken
+    };
+    while let Some(&c) = rest.peek() {
+        if stands_for(&POWERS, c).is_some() {
+            let raised = take_while(&mut rest, &|c| stands_for(&POWERS, c).is_some());
+            tokens.push(Token::Power(raised.chars().filter_map(|c| stands_for(&POWERS, c)).collect()));
+        } else if c.is_alphabetic() && stands_for(&SUBSCRIPTS, c).is_none() {
+            let base = take_while(&mut rest, &|c| {
+                (c.is_alphanumeric())
+                    && stands_for(&SUBSCRIPTS, c).is_none()
+                    && stands_for(&POWERS, c).is_none()
+            });
+            let primes = take_while(&mut rest, &|c| c == '′').chars().count();
+            let low = take_while(&mut rest, &|c| stands_for(&SUBSCRIPTS, c).is_some());
+            let subscript = low.chars().filter_map(|c| stands_for(&SUBSCRIPTS, c)).collect();
+            tokens.push(Token::Symbol { base, primes, subscript });
+        } else if is_numeral(&rest) {
+            // A hyphen is the sign of a number: what subtracts is the sign for minus.
+            let sign = rest.next_if_eq(&'-').map_or_else(String::new, String::from);
+            let digits = sign + &take_while(&mut rest, &|c| c.is_ascii_digit() || c == '.');
+            let mut after = rest.clone();
+            let has_e = after.next() == Some('e');
+            after.next_if_eq(&'-');
+            let has_exponent = has_e && after.next().is_some_and(|c| c.is_ascii_digit());
+            let exponent = if has_exponent {
+                rest.next();
+                take_while(&mut rest, &|c| c.is_ascii_digit() || c == '-')
+            } else {
+                String::new()
+            };
+            tokens.push(Token::Number { digits, exponent });
+        } else {
+            rest.next();
+            tokens.push(if c == '√' { Token::Root } else { Token::Sign(c) });
+        }
+    }
+    tokens
+}
+
+/// What the symbols of a formula stand for, each written as it is put in its place.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Scope(HashMap<String, String>);
+
+impl Scope {
+    /// Gives a symbol a value from here on.
+    pub(super) fn set(&mut self, symbol: &str, written: String) {
+        self.0.insert(symbol.to_owned(), written);
+    }
+
+    /// The formula with the numbers in it; `None` where that says nothing new.
+    pub(super) fn put_in(&self, formula: &str) -> Option<String> {
+        let tokens = tokens(formula);
+        let mut written = String::new();
+        let mut is_changed = false;
+        let mut is_whole = true;
+        for (i, token) in tokens.iter().enumerate() {
+            let Token::Symbol { base, .. } = token else {
+                plain(token, &mut written);
+                continue;
+            };
+            let mut symbol = String::new();
+            plain(token, &mut symbol);
+            match self.0.get(&symbol) {
+                Some(number) => {
+                    is_changed = true;
+                    let is_first = written.trim_end().is_empty() || written.ends_with(['(', '|', '√']);
+                    let is_raised = matches!(tokens.get(i + 1), Some(Token::Power(_)));
+                    let is_negative = number.starts_with('-');
+                    if is_negative && (is_raised || !is_first) {
+                        let _ = write!(written, "({number})");
+                    } else {
+                        written.push_str(number);
+                    }
+                }
+                None => {
+                    is_whole &= FUNCTIONS.contains(&base.as_str());
+                    written.push_str(&symbol);
+                }
+            }
+        }
+        (is_changed && is_whole).then_some(written)
+    }
+}
+
+/// The formula with a prime at each of these symbols that has none.
+pub(super) fn with_primes(formula: &str, symbols: &[&str]) -> String {
+    let mut written = String::new();
+    for mut token in tokens(formula) {
+        if let Token::Symbol { base, primes, subscript } = &mut token
+            && *primes == 0
+            && subscript.is_empty()
+            && symbols.contains(&base.as_str())
+        {
+            *primes = 1;
+        }
+        plain(&token, &mut written);
+    }
+    written
+}
+
+fn plain(token: &Token, out: &mut String) {
+    let raise = |table: &[(char, char)], text: &str, out: &mut String| {
+        out.extend(text.chars().filter_map(|c| table.iter().find(|(_, to)| *to == c).map(|(from, _)| *from)));
+    };
+    match token {
+        Token::Symbol { base, primes, subscript } => {
+            out.push_str(base);
+            out.extend(std::iter::repeat_n('′', *primes));
+            raise(&SUBSCRIPTS, subscript, out);
+        }
+        Token::Number { digits, exponent } => {
+            out.push_str(digits);
+            if !exponent.is_empty() {
+                let _ = write!(out, "e{exponent}");
+            }
+        }
+        Token::Power(digits) => raise(&POWERS, digits, out),
+        Token::Root => out.push('√'),
+        Token::Sign(c) => out.push(*c),
+    }
+}
+
+/// The formula as LaTeX, without its dollars.
+pub(super) fn latex(formula: &str) -> String {
+    let tokens = tokens(formula);
+    let mut out = String::new();
+    let closings = closings(&tokens);
+    for (i, token) in tokens.iter().enumerate() {
+        match token {
+            Token::Symbol { base, primes, subscript } => {
+                let greek = GREEK.iter().find(|(letter, _)| letter == base);
+                match greek {
+                    Some((_, name)) => {
+                        let _ = write!(out, "\\{name}");
+                        if subscript.is_empty() && *primes == 0 {
+                            out.push(' ');
+                        }
+                    }
+                    None if base.chars().count() > 1 => {
+                        let _ = write!(out, "\\operatorname{{{base}}}");
+                    }
+                    None => out.push_str(base),
+                }
+                out.extend(std::iter::repeat_n('\'', *primes));
+                if !subscript.is_empty() {
+                    let _ = write!(out, "_{{{subscript}}}");
+                }
+            }
+            Token::Number { digits, exponent } => {
+                out.push_str(digits);
+                if !exponent.is_empty() {
+                    let _ = write!(out, "\\cdot 10^{{{exponent}}}");
+                }
+            }
+            Token::Power(digits) => {
+                let _ = write!(out, "^{{{}}}", digits.replace('−', "-"));
+            }
+            Token::Root => out.push_str("\\sqrt"),
+            Token::Sign('(') if closings.roots.contains(&i) => out.push('{'),
+            Token::Sign(')') if closings.ends.contains(&i) => out.push('}'),
+            Token::Sign(c) => out.push_str(match c {
+                '·' => "\\cdot ",
+                '×' => "\\times ",
+                '−' => "-",
+                '±' => "\\pm ",
+                '≤' => "\\le ",
+                '≥' => "\\ge ",
+                '≠' => "\\ne ",
+                '≈' => "\\approx ",
+                '⟨' => "\\langle ",
+                '⟩' => "\\rangle ",
+                '→' => "\\to ",
+                '∞' => "\\infty ",
+                '{' => "\\{",
+                '}' => "\\}",
+                '∪' => "\\cup ",
+                '∩' => "\\cap ",
+                '∖' | '\\' => "\\setminus ",
+                '%' => "\\%",
+                _ => {
+                    out.push(*c);
+                    continue;
+                }
+            }),
+        }
+    }
+    out
+}
+
+/// The parentheses of roots: of their beginnings and of their ends.
+struct Closings {
+    roots: Vec<usize>,
+    ends: Vec<usize>,
+}
+
+fn closings(tokens: &[Token]) -> Closings {
+    let mut found = Closings { roots: Vec::new(), ends: Vec::new() };
+    let mut open = Vec::new();
+    for (i, token) in tokens.iter().enumerate() {
+        match token {
+            Token::Sign('(') => {
+                let is_root = i > 0 && tokens[i - 1] == Token::Root;
+                if is_root {
+                    found.roots.push(i);
+                }
+                open.push(is_root);
+            }
+            Token::Sign(')') if open.pop() == Some(true) => found.ends.push(i),
+            _ => {}
+        }
+    }
+    found
+}
+
+/// Text with the characters replaced that mean something in HTML.
+pub(super) fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// The formula as MathML, which browsers set without help.
+pub(super) fn mathml(formula: &str) -> String {
+    let tokens = tokens(formula);
+    let closings = closings(&tokens);
+    let mut out = String::from("<math>");
+    let mut last: Option<String> = None;
+    let flush = |last: &mut Option<String>, out: &mut String| {
+        if let Some(element) = last.take() {
+            out.push_str(&element);
+        }
+    };
+    for (i, token) in tokens.iter().enumerate() {
+        match token {
+            Token::Symbol { base, primes, subscript } => {
+                flush(&mut last, &mut out);
+                let name = format!("<mi>{}</mi>", escaped(base));
+                let primes = format!("<mo>{}</mo>", "′".repeat(*primes));
+                let low = format!("<mi>{subscript}</mi>");
+                last = Some(match (primes.len() > "<mo></mo>".len(), subscript.is_empty()) {
+                    (false, true) => name,
+                    (true, true) => format!("<msup>{name}{primes}</msup>"),
+                    (false, false) => format!("<msub>{name}{low}</msub>"),
+                    (true, false) => format!("<msubsup>{name}{low}{primes}</msubsup>"),
+                });
+            }
+            Token::Number { digits, exponent } => {
+                flush(&mut last, &mut out);
+                let number = format!("<mn>{digits}</mn>");
+                last = Some(if exponent.is_empty() {
+                    number
+                } else {
+                    format!("<mrow>{number}<mo>·</mo><msup><mn>10</mn><mn>{exponent}</mn></msup></mrow>")
+                });
+            }
+            Token::Power(digits) => {
+                let base = last.take().unwrap_or_else(|| "<mrow></mrow>".to_owned());
+                last = Some(format!("<msup>{base}<mn>{digits}</mn></msup>"));
+            }
+            Token::Root => flush(&mut last, &mut out),
+            Token::Sign('(') if closings.roots.contains(&i) => {
+                flush(&mut last, &mut out);
+                out.push_str("<msqrt>");
+            }
+            Token::Sign(')') if closings.ends.contains(&i) => {
+                flush(&mut last, &mut out);
+                out.push_str("</msqrt>");
+            }
+            Token::Sign(c) if c.is_whitespace() => {}
+            Token::Sign(c) => {
+                flush(&mut last, &mut out);
+                let stretches = if matches!(c, '(' | ')' | '|') { " stretchy=\"false\"" } else { "" };
+                last = Some(format!("<mo{stretches}>{}</mo>", escaped(&c.to_string())));
+            }
+        }
+    }
+    flush(&mut last, &mut out);
+    out.push_str("</math>");
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formulas_are_read_back_as_they_are_written() {
+        for formula in ["Δ = h² − a·c", "t₁ = c/q", "O′ = M⁻¹ O", "√(x² + y²) ≤ r", "min(tₓ, t₂)", "|D′|"]
+        {
+            let mut written = String::new();
+            tokens(formula).iter().for_each(|token| plain(token, &mut written));
+            assert_eq!(written, formula);
+        }
+    }
+
+    #[test]
+    fn numbers_take_the_place_of_symbols() {
+        let mut scope = Scope::default();
+        scope.set("h", "-5".to_owned());
+        scope.set("a", "1".to_owned());
+        scope.set("c", "24".to_owned());
+        scope.set("t₁", "4".to_owned());
+        scope.set("O", "(0, 0, -5)".to_owned());
+        assert_eq!(scope.put_in("h² − a·c").as_deref(), Some("(-5)² − 1·24"));
+        assert_eq!(scope.put_in("a − h").as_deref(), Some("1 − (-5)"));
+        assert_eq!(scope.put_in("h − √(h)").as_deref(), Some("-5 − √(-5)"));
+        assert_eq!(scope.put_in("max(a, t₁)").as_deref(), Some("max(1, 4)"));
+        // What is only partly known says nothing.
+        assert_eq!(scope.put_in("a + x"), None);
+        assert_eq!(scope.put_in("2·3"), None);
+    }
+
+    #[test]
+    fn powers_of_ten_are_part_of_their_number() {
+        assert_eq!(latex("1.5e-7 + 2e10"), "1.5\\cdot 10^{-7} + 2\\cdot 10^{10}");
+        assert_eq!(mathml("2e-3").matches("<msup>").count(), 1);
+        let mut written = String::new();
+        tokens("-1.25e-8·2").iter().for_each(|token| plain(token, &mut written));
+        assert_eq!(written, "-1.25e-8·2");
+    }
+
+    #[test]
+    fn latex_and_mathml_are_balanced() {
+        assert_eq!(latex("Δ = h² − a·c"), "\\Delta  = h^{2} - a\\cdot c");
+        assert_eq!(latex("√(h² − (a + b)·c)"), "\\sqrt{h^{2} - (a + b)\\cdot c}");
+        assert_eq!(latex("O′ = M⁻¹ O, t₁₂"), "O' = M^{-1} O, t_{12}");
+        assert_eq!(latex("min(tₓ, ρ₁)"), "\\operatorname{min}(t_{x}, \\rho_{1})");
+        let ml = mathml("√(h² − (a + b)·c) < t₁");
+        assert_eq!(ml.matches("<msqrt>").count(), 1);
+        assert_eq!(ml.matches("</msqrt>").count(), 1);
+        assert!(ml.contains("<msup><mi>h</mi><mn>2</mn></msup>") && ml.contains("&lt;"), "{ml}");
+        assert!(ml.contains("<msub><mi>t</mi><mi>1</mi></msub>"), "{ml}");
+    }
+}

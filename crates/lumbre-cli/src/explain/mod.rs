@@ -1,0 +1,255 @@
+//! `lumbre explain`: every number between a pixel or a ray and its colour.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use lumbre::description::IntegratorKind;
+use lumbre::formats::atomic_write;
+use lumbre::{DVec3, Ray};
+use serde_json::json;
+
+use crate::failure::{Failure, print};
+use crate::names::one_of;
+use crate::output::Inputs;
+use crate::reading::{ReadingArguments, print_warnings};
+use crate::render::INTEGRATORS;
+use crate::shown::{Shown, Wish, shown};
+use crate::staging::StagingArguments;
+use crate::units;
+use crate::view::ViewArguments;
+
+mod camera;
+mod document;
+mod english;
+mod formula;
+mod html;
+mod light;
+mod shape;
+mod sketch;
+mod spanish;
+mod surfaces;
+mod texts;
+mod things;
+mod writing;
+
+use document::{Item, Section};
+use english::ENGLISH;
+use spanish::SPANISH;
+use texts::Texts;
+use things::Things;
+
+/// Tells how the colour of a pixel, or the light along a ray, comes about: the camera and its ray, every surface on the way with the
+/// equation of its crossings, normals, lights and shadows, and the path of one sample, with all numbers as the render computes them.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  lumbre explain scene.pbrt --pixel 320,240
+  lumbre explain scene.pbrt --ray 0,0,-5,0,0,1 --nearest
+  lumbre explain scene.pbrt --pixel 320,240 --format html -o pixel.html
+  lumbre explain scene.pbrt --pixel 320,240 --sample 7 --depth 2
+  lumbre explain scene.pbrt --pixel 320,240 --format markdown --lang es
+  lumbre explain model.glb --pixel 100,80 --size 200x160 --format json | jq .")]
+pub(crate) struct Arguments {
+    /// The scene: .pbrt, .gltf, .glb, .obj, .ply or .stl, also packed by gzip. Several are put into the same world.
+    #[arg(required = true, value_name = "SCENE")]
+    scene: Vec<PathBuf>,
+    /// The pixel, from 0,0 in the upper left corner.
+    #[arg(long, value_name = "X,Y", value_parser = pixel, required_unless_present = "ray")]
+    pixel: Option<(u32, u32)>,
+    /// A ray instead: its origin and its direction, of any length but 0; then, where it is not 0 to infinity, its range of t.
+    #[arg(long, value_name = "OX,OY,OZ,DX,DY,DZ[,TMIN,TMAX]", allow_hyphen_values = true, value_parser = ray, conflicts_with = "pixel")]
+    ray: Option<Ray>,
+    /// What it is written as.
+    #[arg(long, value_enum, value_name = "FORMAT", default_value_t = Format::Text)]
+    format: Format,
+    /// The language: English or Spanish.
+    #[arg(long, value_enum, value_name = "LANGUAGE", default_value_t = Language::En)]
+    lang: Language,
+    /// Tell the crossings of so many of the rays that follow, too.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    depth: u32,
+    /// The number of the sample: the radiance is that which a render adds to the pixel for it.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    sample: u32,
+    /// Tell only the surface that is seen, not those behind it.
+    #[arg(long)]
+    nearest: bool,
+    /// Write to this file.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Width and height of the picture in pixels.
+    #[arg(long, value_name = "WxH", value_parser = units::size)]
+    size: Option<(u32, u32)>,
+    /// A camera by name or 0-based position.
+    #[arg(long, value_name = "NAME|INDEX", help_heading = "View")]
+    camera: Option<String>,
+    /// What is computed for each pixel.
+    #[arg(long, value_name = "NAME", value_parser = one_of(&INTEGRATORS, IntegratorKind::from_name))]
+    integrator: Option<IntegratorKind>,
+    /// The maximal number of bounces.
+    #[arg(long, value_name = "N")]
+    max_depth: Option<u32>,
+    /// Seed of the random numbers.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Print errors only.
+    #[arg(short, long)]
+    quiet: bool,
+    #[command(flatten)]
+    view: ViewArguments,
+    #[command(flatten)]
+    staging: StagingArguments,
+    #[command(flatten)]
+    reading: ReadingArguments,
+}
+
+/// What an explanation is written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Format {
+    /// Plain text.
+    Text,
+    /// Markdown, with formulas in LaTeX.
+    Markdown,
+    /// One page, with formulas and a sketch.
+    Html,
+    /// For programs.
+    Json,
+}
+
+/// The languages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Language {
+    /// English.
+    En,
+    /// Spanish.
+    Es,
+}
+
+impl Language {
+    fn texts(self) -> &'static Texts {
+        match self {
+            Self::En => &ENGLISH,
+            Self::Es => &SPANISH,
+        }
+    }
+}
+
+fn pixel(text: &str) -> Result<(u32, u32), String> {
+    let numbers =
+        text.split_once(',').and_then(|(x, y)| Some((x.trim().parse().ok()?, y.trim().parse().ok()?)));
+    numbers.ok_or_else(|| "expected two whole numbers, such as 320,240".to_owned())
+}
+
+fn ray(text: &str) -> Result<Ray, String> {
+    let wrong = || "expected six numbers, the origin and the direction, such as 0,0,-5,0,0,1".to_owned();
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let numbers = numbers.ok_or_else(wrong)?;
+    let (&[ox, oy, oz, dx, dy, dz], range) = numbers.split_first_chunk().ok_or_else(wrong)?;
+    let (origin, direction) = (DVec3::new(ox, oy, oz), DVec3::new(dx, dy, dz));
+    if !origin.is_finite() || !direction.is_finite() || direction == DVec3::ZERO {
+        return Err("expected finite numbers and a direction other than 0,0,0".to_owned());
+    }
+    match *range {
+        [] => Ok(Ray::new(origin, direction)),
+        [from, to] if from <= to => Ok(Ray::new(origin, direction).with_range(from, to)),
+        _ => Err("expected the least and the greatest t after the direction, such as 0,0,-5,0,0,1,0,100"
+            .to_owned()),
+    }
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.staging.turntable().is_some() {
+        return Err(Failure::Usage("--turntable makes many pictures (expected no --turntable)".to_owned()));
+    }
+    let named = arguments.scene.iter().map(PathBuf::as_path).chain(arguments.staging.inputs());
+    if let Some(output) = &arguments.output {
+        Inputs::of(named.chain(arguments.reading.overlays())).refuse(output)?;
+    }
+    let (desc, diagnostics) = arguments.reading.describe(&arguments.scene)?;
+    if let Some(output) = &arguments.output {
+        Inputs::of(diagnostics.files_read().iter().map(PathBuf::as_path)).refuse(output)?;
+    }
+    let things = Things::of(&desc);
+    let Arguments { size, camera, integrator, view, staging, reading, .. } = arguments;
+    let name = arguments.scene.first().map_or(Path::new(""), PathBuf::as_path);
+    let wish = Wish {
+        name,
+        size: *size,
+        camera: camera.as_deref(),
+        integrator: *integrator,
+        view,
+        staging,
+        reading,
+    };
+    let shown = shown(desc, &wish)?;
+    if !arguments.quiet {
+        print_warnings(&diagnostics);
+        print_warnings(&shown.diagnostics);
+    }
+    let sections = told(arguments, shown, &things)?;
+    let written = written(arguments, name, &sections);
+    match &arguments.output {
+        None => print(&written),
+        Some(path) => {
+            Ok(atomic_write(path, |out| out.write_all(written.as_bytes())).map_err(lumbre::Error::from)?)
+        }
+    }
+}
+
+fn told(arguments: &Arguments, shown: Shown, things: &Things) -> Result<Vec<Section>, Failure> {
+    let texts = arguments.lang.texts();
+    let Shown { scene, mut options, .. } = shown;
+    options.integrator.max_depth = arguments.max_depth.unwrap_or(options.integrator.max_depth);
+    options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
+    let whole = (options.width, options.height);
+    let (mut sections, ray, radiance, events) = if let Some((x, y)) = arguments.pixel {
+        if x >= whole.0 || y >= whole.1 {
+            return Err(Failure::Usage(format!(
+                "--pixel {x},{y}: outside of the picture (expected less than {},{}; --size gives another)",
+                whole.0, whole.1
+            )));
+        }
+        let sample = scene.explain_sample(&options, (x, y), arguments.sample)?;
+        let camera = &scene.resolved().cameras()[options.camera];
+        let mut section = camera::camera(camera, whole, (x, y), &sample, texts);
+        section.fact(texts.sample, f64::from(arguments.sample));
+        section.fact(texts.weight, sample.weight);
+        (vec![section], sample.ray, sample.radiance, sample.events)
+    } else {
+        let ray = arguments.ray.unwrap_or(Ray::new(DVec3::ZERO, DVec3::Z));
+        // Light travels along unit directions.
+        let scaled = ray.direction / ray.direction.abs().max_element();
+        let unit = Ray { direction: scaled.normalize(), ..ray };
+        let (radiance, events) = scene.explain_ray(&options, &unit, arguments.sample)?;
+        (vec![camera::given(&ray, texts)], ray, radiance, events)
+    };
+    let mut met = surfaces::surfaces(&scene, &ray, things, arguments.nearest, true, texts);
+    let path = light::corners(&events);
+    if !met.hits.is_empty() {
+        let drawing = sketch::svg(&met.scenery, &ray, &met.hits, &path, texts.sketch);
+        met.section.items.insert(0, Item::Sketch(drawing));
+    }
+    sections.push(met.section);
+    let path = light::Path { scene: &scene, things, texts, depth: arguments.depth };
+    sections.push(path.tell(radiance, &events));
+    Ok(sections)
+}
+
+fn written(arguments: &Arguments, name: &Path, sections: &[Section]) -> String {
+    let texts = arguments.lang.texts();
+    let name = name.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let title = match (arguments.pixel, &arguments.ray) {
+        (Some((x, y)), _) => format!("{}: {name}, {} ({x}, {y})", texts.title, texts.pixel),
+        _ => format!("{}: {name}", texts.title),
+    };
+    match arguments.format {
+        Format::Text => writing::text(sections, texts.schoolbook),
+        Format::Markdown => format!("# {title}\n\n{}", writing::markdown(sections, texts.schoolbook)),
+        Format::Html => html::html(&title, texts.code, sections, texts.schoolbook),
+        Format::Json => {
+            let sections: Vec<_> = sections.iter().map(writing::json).collect();
+            let report = json!({ "title": title, "sections": sections });
+            format!("{report:#}\n")
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! How a shape's crossings are found, told in a language.
+
+use lumbre::Ray;
+use lumbre::geometry::{Candidate, Explanation, Operand, Step, Value as Found};
+use lumbre::math::glam::DMat4;
+
+use super::document::{Column, Item, Quantity, Section, Value, numbers};
+use super::formula::Scope;
+use super::texts::{Texts, filled};
+
+impl From<&Found> for Value {
+    fn from(found: &Found) -> Self {
+        match found {
+            Found::Number(x) => Self::Number(*x),
+            Found::Vector(v) => Self::Vector(*v),
+            Found::Numbers(numbers) => Self::Numbers(numbers.clone()),
+            Found::Intervals(intervals) => Self::Intervals(intervals.clone()),
+        }
+    }
+}
+
+/// Adds the steps of a search, and what became of the crossings. The scope holds the ray; `rename` gives the symbols of the ray
+/// their names here.
+pub(super) fn tell(
+    section: &mut Section,
+    explanation: &Explanation,
+    ray: &Ray,
+    scope: &mut Scope,
+    rename: &dyn Fn(&str) -> String,
+    texts: &Texts,
+) {
+    let operands = explanation.operands.iter().enumerate();
+    section.sections.extend(operands.map(|(i, operand)| tell_operand(i, operand, ray, texts)));
+    // The textbook's symbols are its own.
+    let mut schoolbook = scope.clone();
+    for step in &explanation.steps {
+        section.sections.push(tell_step(step, scope, &mut schoolbook, rename, texts));
+    }
+    if !explanation.candidates.is_empty() {
+        let mut crossings = Section::new("crossings", texts.fates);
+        crossings.items.push(candidates(&explanation.candidates, texts));
+        section.sections.push(crossings);
+    }
+}
+
+fn tell_step(
+    step: &Step,
+    scope: &mut Scope,
+    schoolbook: &mut Scope,
+    rename: &dyn Fn(&str) -> String,
+    texts: &Texts,
+) -> Section {
+    let mut section = Section::new(format!("{:?}", step.topic), (texts.topic)(step.topic));
+    for told in &step.quantities {
+        let value = Value::from(&told.value);
+        let (symbol, formula) = (rename(&told.symbol), rename(&told.formula));
+        let theirs = told.schoolbook.as_ref().map(|(formula, value)| {
+            let (formula, value) = (rename(formula), Value::from(value));
+            if let Some((name, _)) = formula.split_once(" = ") {
+                schoolbook.set(name.trim(), value.in_short());
+            }
+            let put_in = schoolbook.put_in(formula.split_once(" = ").map_or(&*formula, |(_, right)| right));
+            (put_in.map_or_else(|| formula.clone(), |numbers| format!("{formula} = {numbers}")), value)
+        });
+        section.items.push(Item::Quantity(Quantity {
+            symbol: symbol.clone(),
+            label: String::new(),
+            numbers: numbers(scope, &formula, &value),
+            formula,
+            value: value.clone(),
+            schoolbook: theirs,
+        }));
+        scope.set(&symbol, value.in_short());
+        schoolbook.set(&symbol, value.in_short());
+    }
+    for remark in &step.remarks {
+        section.remark((texts.remark)(remark));
+    }
+    section
+}
+
+fn candidates(candidates: &[Candidate], texts: &Texts) -> Item {
+    let column = |key, title: &str| Column { key, title: title.to_owned() };
+    let columns = vec![
+        column("t", "t"),
+        column("part", texts.part),
+        column("multiplicity", texts.multiplicity),
+        column("fate", texts.fate),
+    ];
+    let rows = candidates.iter().map(|candidate| {
+        let multiplicity = candidate.root.map(|root| root.multiplicity.to_string()).unwrap_or_default();
+        vec![
+            Value::from(candidate.t),
+            Value::Text(candidate.part.to_string()),
+            Value::Text(multiplicity),
+            Value::Text((texts.fate_of)(&candidate.fate)),
+        ]
+    });
+    Item::Table { key: "crossings", columns, rows: rows.collect() }
+}
+
+fn tell_operand(index: usize, operand: &Operand, ray: &Ray, texts: &Texts) -> Section {
+    let title = filled(texts.operand, &[&index.to_string(), operand.name]);
+    let mut section = Section::new(format!("operand {index}"), title);
+    let m = &operand.world_from_object;
+    let own = if m.is_identity() { *ray } else { ray.into_object(m) };
+    let mut scope = Scope::default();
+    if !m.is_identity() {
+        section.fact("M", DMat4::from(*m.affine()));
+        section.quantity(&mut scope, "O", texts.operand_origin, "", own.origin);
+        section.quantity(&mut scope, "D", texts.operand_direction, "", own.direction);
+    }
+    scope.set_ray(["O", "D"], &own);
+    match &operand.explanation {
+        Some(explanation) => tell(&mut section, explanation, &own, &mut scope, &str::to_owned, texts),
+        None => section.text(texts.not_looked_at),
+    }
+    section
+}

@@ -1,0 +1,161 @@
+//! A drawing of a ray, of what it meets, and of the normals there.
+
+use std::fmt::Write;
+
+use lumbre::geometry::{PlacedShape, Shape, Surface};
+use lumbre::math::Frame;
+use lumbre::{DVec2, DVec3, Ray, Transform};
+
+/// The size of the drawing.
+const WIDTH: f64 = 480.0;
+const HEIGHT: f64 = 320.0;
+const MARGIN: f64 = 24.0;
+/// Lines across each surface, in either direction, and points of each line.
+const LINES: u32 = 8;
+const POINTS: u32 = 48;
+/// Parts that a shape has at most: the faces of a box.
+const PARTS: u32 = 6;
+
+/// What is drawn.
+#[derive(Debug, Default)]
+pub(super) struct Scenery {
+    /// Lines on the surfaces, in the world.
+    lines: Vec<Vec<DVec3>>,
+}
+
+impl Scenery {
+    /// Adds the lines of constant u and v of a shape, where it stands.
+    pub(super) fn add(&mut self, shape: &PlacedShape, outer: &Transform, at: DVec3) {
+        let map = *outer * shape.world_from_object();
+        let before = self.lines.len();
+        if shape.shape().bounds(&Transform::IDENTITY).is_some() {
+            for part in 0..PARTS {
+                self.lines.extend(lines_of(shape.shape(), part, &map));
+            }
+        }
+        if self.lines.len() == before {
+            self.lines.extend(boxed(shape, outer, at));
+        }
+    }
+}
+
+fn lines_of(shape: &Shape, part: u32, map: &Transform) -> Vec<Vec<DVec3>> {
+    if let Shape::Triangle(_) = shape {
+        // Its parameters are weights: its outline says more.
+        let corners = [DVec2::ZERO, DVec2::X, DVec2::Y, DVec2::ZERO];
+        let points: Option<Vec<DVec3>> =
+            corners.iter().map(|uv| Some(map.point(shape.surface_at(part, *uv)?.point))).collect();
+        return points.into_iter().filter(|_| part == 0).collect();
+    }
+    let line = |fixed: f64, along_u: bool| -> Option<Vec<DVec3>> {
+        let place = |i: u32| {
+            let moving = f64::from(i) / f64::from(POINTS);
+            let uv = if along_u { DVec2::new(moving, fixed) } else { DVec2::new(fixed, moving) };
+            let Surface { point, .. } = shape.surface_at(part, uv)?;
+            Some(map.point(point)).filter(|point| point.is_finite())
+        };
+        (0..=POINTS).map(place).collect()
+    };
+    let lines = (0..=LINES).flat_map(|i| {
+        let fixed = f64::from(i) / f64::from(LINES);
+        [line(fixed, true), line(fixed, false)]
+    });
+    lines.flatten().collect()
+}
+
+/// The edges of a shape's box; of an infinite shape, a square about where it was met.
+fn boxed(shape: &PlacedShape, outer: &Transform, at: DVec3) -> Vec<Vec<DVec3>> {
+    if let Some(bounds) = shape.shape().bounds(&(*outer * shape.world_from_object())) {
+        let corner = |i: usize| {
+            let pick = |axis: usize| if i >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
+            DVec3::new(pick(0), pick(1), pick(2))
+        };
+        let edges = (0..8)
+            .flat_map(|i| (0..3).filter(move |axis| i >> axis & 1 == 0).map(move |axis| (i, i | 1 << axis)));
+        return edges.map(|(from, to)| vec![corner(from), corner(to)]).collect();
+    }
+    let place = at;
+    let size = place.length().max(1.0) * 0.5;
+    let ray = Ray::new(place, DVec3::Z);
+    let normal = shape.closest(&ray).map_or(DVec3::Z, |root| shape.surface(&ray, &root).normal);
+    let frame = Frame::from_z(normal);
+    let corner = |x: f64, y: f64| place + size * (x * frame.x + y * frame.y);
+    vec![vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0), corner(-1.0, -1.0)]]
+}
+
+/// The drawing as SVG: the surfaces, the ray, and the points where it meets them, with their normals. `path` goes on from there.
+pub(super) fn svg(
+    scenery: &Scenery,
+    ray: &Ray,
+    hits: &[(DVec3, DVec3)],
+    path: &[DVec3],
+    title: &str,
+) -> String {
+    let along = ray.direction.normalize_or(DVec3::Z);
+    // From the side, and a little from above and behind.
+    let up = if along.y.abs() < 0.8 { DVec3::Y } else { DVec3::X };
+    let side = along.cross(up).normalize_or(DVec3::X);
+    let frame = Frame::from_two_or_any(0.8 * side + 0.35 * up - 0.3 * along, up)
+        .unwrap_or_else(|| Frame::from_z(DVec3::Z));
+    let flat = |p: DVec3| DVec2::new(p.dot(frame.x), -p.dot(frame.y));
+
+    let things = scenery.lines.iter().flatten().copied().chain(hits.iter().map(|(point, _)| *point));
+    let mut low = DVec2::INFINITY;
+    let mut high = DVec2::NEG_INFINITY;
+    for p in things.map(flat) {
+        (low, high) = (low.min(p), high.max(p));
+    }
+    if !(low.is_finite() && high.is_finite()) {
+        (low, high) = (flat(ray.origin), flat(ray.at(1.0)));
+        (low, high) = (low.min(high), low.max(high));
+    }
+    // The ray begins in the picture, if need be nearer than it does.
+    let extent = (high - low).length().max(1e-9);
+    let first = hits.first().map_or(ray.at(1.0), |(point, _)| *point);
+    let last = hits.last().map_or(first, |(point, _)| *point);
+    let from = (first - ray.origin).length().min(0.7 * extent);
+    let (start, end) = (first - from * along, last + 0.25 * extent * along);
+    for p in [start, end].map(flat) {
+        (low, high) = (low.min(p), high.max(p));
+    }
+    let room = DVec2::new(WIDTH - 2.0 * MARGIN, HEIGHT - 2.0 * MARGIN);
+    let scale = (room / (high - low).max(DVec2::splat(1e-9))).min_element();
+    let middle = 0.5 * (low + high);
+    let place = |p: DVec3| scale * (flat(p) - middle) + 0.5 * DVec2::new(WIDTH, HEIGHT);
+
+    let mut out = format!(
+        "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" role=\"img\" \
+         xmlns=\"http://www.w3.org/2000/svg\"><title>{}</title>",
+        super::formula::escaped(title)
+    );
+    let line = |points: &[DVec3], style: &str, out: &mut String| {
+        let points: Vec<String> =
+            points.iter().map(|p| place(*p)).map(|p| format!("{:.1},{:.1}", p.x, p.y)).collect();
+        let _ = write!(out, "<polyline points=\"{}\" fill=\"none\" {style}/>", points.join(" "));
+    };
+    for points in &scenery.lines {
+        line(points, "stroke=\"#7a8ca5\" stroke-width=\"0.8\" stroke-opacity=\"0.7\"", &mut out);
+    }
+    line(&[start, end], "stroke=\"#d9822b\" stroke-width=\"2\"", &mut out);
+    let way: Vec<DVec3> = path.iter().copied().take(4).collect();
+    if way.len() > 1 {
+        line(&way, "stroke=\"#d9822b\" stroke-width=\"1.2\" stroke-dasharray=\"4 3\"", &mut out);
+    }
+    for (point, normal) in hits {
+        let tip = *point + (0.14 * extent) * *normal;
+        line(&[*point, tip], "stroke=\"#2f9e62\" stroke-width=\"2\"", &mut out);
+        let dot = place(*point);
+        let _ = write!(out, "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"3.5\" fill=\"#c0392b\"/>", dot.x, dot.y);
+    }
+    for (point, text, colour) in [(start, "O + tD", "#d9822b")] {
+        let at = place(point);
+        let _ = write!(
+            out,
+            "<text x=\"{:.1}\" y=\"{:.1}\" font-size=\"12\" font-family=\"sans-serif\" fill=\"{colour}\">{text}</text>",
+            at.x + 4.0,
+            at.y - 6.0
+        );
+    }
+    out.push_str("</svg>");
+    out
+}

@@ -1,0 +1,277 @@
+//! What a ray meets, and how that is found.
+
+use std::ops::ControlFlow;
+
+use lumbre::geometry::{PlacedShape, Shape, Surface, Triangle};
+use lumbre::kernel::{Hit, Target, TargetShape};
+use lumbre::math::glam::{DMat4, DQuat, EulerRot};
+use lumbre::math::matrix::affine4;
+use lumbre::{DVec3, Ray, Scene, Transform};
+
+use super::document::Section;
+use super::formula::Scope;
+use super::shape;
+use super::sketch::Scenery;
+use super::texts::{Texts, filled};
+use super::things::Things;
+
+/// Hits that are told at most.
+const MOST_HITS: usize = 64;
+/// Columns of a matrix are at right angles where their cosines are less than this.
+const RIGHT_ANGLE: f64 = 1e-12;
+
+/// What is told of the things that a ray meets.
+pub(super) struct Told {
+    pub(super) section: Section,
+    /// Where the ray meets them, with the normals: for the sketch.
+    pub(super) hits: Vec<(DVec3, DVec3)>,
+    pub(super) scenery: Scenery,
+}
+
+/// Everything on the way of a ray; with `nearest`, what the camera sees.
+pub(super) fn surfaces(
+    scene: &Scene,
+    ray: &Ray,
+    things: &Things,
+    nearest: bool,
+    is_from_camera: bool,
+    texts: &Texts,
+) -> Told {
+    let resolved = scene.resolved();
+    let mut section = Section::new("surfaces", texts.surfaces);
+    let first = if is_from_camera { resolved.closest_seen(ray) } else { resolved.closest(ray) };
+    let mut hits: Vec<Hit> = Vec::new();
+    let mut are_more = false;
+    if nearest {
+        hits.extend(first.clone());
+    } else {
+        resolved.accel().all(ray, |hit| {
+            are_more = hits.len() == MOST_HITS;
+            if are_more {
+                return ControlFlow::Break(());
+            }
+            hits.push(hit.clone());
+            ControlFlow::Continue(())
+        });
+    }
+    if hits.is_empty() {
+        section.text(texts.nothing_met);
+        return Told { section, hits: Vec::new(), scenery: Scenery::default() };
+    }
+    // All crossings of one thing are found at once.
+    let mut groups: Vec<Vec<&Hit>> = Vec::new();
+    for hit in &hits {
+        let is_same = |group: &&mut Vec<&Hit>| {
+            (group[0].geometry, group[0].primitive, &group[0].instances)
+                == (hit.geometry, hit.primitive, &hit.instances)
+        };
+        match groups.iter_mut().find(is_same) {
+            Some(group) => group.push(hit),
+            None => groups.push(vec![hit]),
+        }
+    }
+    let met = |hit: &Hit| {
+        let surface = resolved.accel().surface(ray, hit);
+        (surface.point, surface.normal)
+    };
+    let places = hits.iter().map(met).collect();
+    let mut scenery = Scenery::default();
+    for group in groups {
+        section.sections.push(thing(scene, ray, &group, first.as_ref(), things, &mut scenery, texts));
+    }
+    if are_more {
+        section.remark(filled(texts.more_hits, &[&MOST_HITS.to_string()]));
+    }
+    Told { section, hits: places, scenery }
+}
+
+fn thing(
+    scene: &Scene,
+    ray: &Ray,
+    hits: &[&Hit],
+    first: Option<&Hit>,
+    things: &Things,
+    scenery: &mut Scenery,
+    texts: &Texts,
+) -> Section {
+    let resolved = scene.resolved();
+    let hit = hits[0];
+    let index = resolved.shape_index(hit);
+    let Target { placements, shape } = resolved.accel().target(ray, hit);
+    // The leaf of a tree is what has a number and a material.
+    let kind = match &shape {
+        TargetShape::Exact(placed) if matches!(placed.shape(), Shape::Csg(_)) => {
+            format!("{} ({})", things.kind(index), placed.shape().name())
+        }
+        _ => things.kind(index).to_owned(),
+    };
+    let title = filled(texts.shape, &[&index.to_string(), &kind]);
+    let mut section = Section::new(format!("shape {index}"), title);
+    section.fact(texts.material, things.material(index).map_or(texts.no_material, |material| &material.name));
+    if let Some(&instance) = hit.instances.first() {
+        section.fact(texts.instance, f64::from(instance));
+    }
+    if matches!(shape, TargetShape::Triangle(_)) {
+        section.fact(texts.triangle, f64::from(hit.primitive));
+    }
+    // The same steps as the search takes, for the same bits.
+    let inner = placements.iter().fold(*ray, |ray, map| ray.into_object(map));
+    let (exact, own, object_ray) = match &shape {
+        TargetShape::Exact(placed) => {
+            let own = Some(placed.world_from_object()).filter(|map| !map.is_identity());
+            (Some(placed.shape().clone()), own, placed.object_ray(&inner))
+        }
+        TargetShape::Triangle([a, b, c]) => (Triangle::new(*a, *b, *c).ok().map(Shape::from), None, inner),
+        TargetShape::Custom => (None, None, inner),
+    };
+    let mut scope = Scope::default();
+    let chain: Vec<Transform> = placements.iter().copied().chain(own).collect();
+    let is_placed = !chain.is_empty();
+    if is_placed {
+        section.sections.push(transforms(&chain, ray, &object_ray, &mut scope, texts));
+    } else {
+        scope.set_ray(["O", "D"], &object_ray);
+    }
+    let rename = |formula: &str| {
+        if is_placed { super::formula::with_primes(formula, &["O", "D"]) } else { formula.to_owned() }
+    };
+    let placed = exact.as_ref().map(|shape| PlacedShape::new(shape.clone(), own.unwrap_or_default()));
+    if let Some(placed) = &placed {
+        let outer = placements.iter().copied().fold(Transform::IDENTITY, |outer, inner| outer * inner);
+        scenery.add(placed, &outer, resolved.accel().surface(ray, hit).point);
+    }
+    match &exact {
+        Some(exact) => {
+            let mut equation = Section::new("equation", texts.equation);
+            shape::tell(&mut equation, &exact.explain(&object_ray), &object_ray, &mut scope, &rename, texts);
+            section.sections.push(equation);
+        }
+        None => section.text(texts.custom),
+    }
+    for &hit in hits {
+        let is_first = first.is_some_and(|first| first == hit);
+        section.sections.push(at_hit(scene, ray, hit, is_first, placed.as_ref(), &inner, &chain, texts));
+    }
+    section
+}
+
+/// The chain of maps from the object to the world, and the ray in the object's space.
+fn transforms(chain: &[Transform], ray: &Ray, object_ray: &Ray, scope: &mut Scope, texts: &Texts) -> Section {
+    let mut section = Section::new("transform", texts.transform);
+    if chain.len() > 1 {
+        section.text(texts.chain);
+    }
+    for (i, map) in chain.iter().enumerate() {
+        let mut one = Section::new(
+            format!("transform {i}"),
+            if chain.len() > 1 {
+                format!("M{}", "₁₂₃₄₅₆₇₈₉".chars().nth(i).unwrap_or('ₙ'))
+            } else {
+                "M".to_owned()
+            },
+        );
+        one.fact("M", DMat4::from(*map.affine()));
+        match decomposed(map) {
+            Some(Parts { scale, angles, offset }) => {
+                one.text(texts.decomposes);
+                one.fact(texts.scale, scale);
+                one.fact(texts.rotations, angles);
+                one.fact(texts.translation, offset);
+            }
+            None => one.text(texts.sheared),
+        }
+        section.sections.push(one);
+    }
+    let whole = chain.iter().copied().fold(Transform::IDENTITY, |outer, inner| outer * inner);
+    if chain.len() > 1 {
+        section.fact("M", DMat4::from(*whole.affine()));
+    }
+    section.fact("M⁻¹", DMat4::from(*whole.inverse_affine()));
+    scope.set_ray(["O", "D"], ray);
+    section.quantity(scope, "O′", texts.as_point, "M⁻¹ O", object_ray.origin);
+    section.quantity(scope, "D′", texts.as_direction, "M⁻¹ D", object_ray.direction);
+    section.quantity(scope, "|D′|", "", "√(D′·D′)", object_ray.direction.length());
+    section.text(texts.t_is_kept);
+    section
+}
+
+/// A map as a scale, rotations about x, y and z in this order, and a translation.
+struct Parts {
+    scale: DVec3,
+    /// Degrees about x, y and z.
+    angles: DVec3,
+    offset: DVec3,
+}
+
+/// The parts of a map `T · Rz · Ry · Rx · S`; `None` where it shears.
+fn decomposed(map: &Transform) -> Option<Parts> {
+    let linear = map.linear();
+    let axes = [linear.x_axis, linear.y_axis, linear.z_axis];
+    let lengths = axes.map(DVec3::length);
+    let is_right = |i: usize, j: usize| axes[i].dot(axes[j]).abs() <= RIGHT_ANGLE * lengths[i] * lengths[j];
+    if !(is_right(0, 1) && is_right(1, 2) && is_right(2, 0)) {
+        return None;
+    }
+    // A mirror is told as a negative scale along z.
+    let sign = if map.is_mirror() { -1.0 } else { 1.0 };
+    let scale = DVec3::new(lengths[0], lengths[1], sign * lengths[2]);
+    let rotation =
+        lumbre::math::glam::DMat3::from_cols(axes[0] / scale.x, axes[1] / scale.y, axes[2] / scale.z);
+    let (z, y, x) = DQuat::from_mat3(&rotation).to_euler(EulerRot::ZYX);
+    let tidy = |radians: f64| {
+        let degrees = radians.to_degrees();
+        // Rounding of a whole number of degrees says nothing.
+        if (degrees - degrees.round()).abs() < 1e-9 { degrees.round() } else { degrees }
+    };
+    Some(Parts { scale, angles: DVec3::new(tidy(x), tidy(y), tidy(z)), offset: map.affine().translation })
+}
+
+/// The surface at one crossing.
+#[expect(clippy::too_many_arguments, reason = "all that is known of a hit")]
+fn at_hit(
+    scene: &Scene,
+    ray: &Ray,
+    hit: &Hit,
+    is_first: bool,
+    shape: Option<&PlacedShape>,
+    inner: &Ray,
+    chain: &[Transform],
+    texts: &Texts,
+) -> Section {
+    let surface = scene.resolved().accel().surface(ray, hit);
+    let mut scope = Scope::default();
+    scope.set_ray(["O", "D"], ray);
+    let title = filled(texts.hit, &[&super::document::exact(hit.root.t)]);
+    let mut section = Section::new("hit", title);
+    section.quantity(&mut scope, "t", texts.t_of_search, "", hit.root.t);
+    if is_first {
+        section.text(texts.is_seen);
+    }
+    section.quantity(&mut scope, "P", texts.point, "O + t·D", surface.point);
+    let deviation = (surface.point - ray.at(hit.root.t)).length();
+    if deviation > 0.0 {
+        section.remark(filled(texts.reprojected, &[&format!("{deviation:.1e}")]));
+    }
+    if let (Some(shape), false) = (shape, chain.is_empty()) {
+        let object_ray = shape.object_ray(inner);
+        let local: Surface = shape.shape().surface(&object_ray, &hit.root);
+        let whole = chain.iter().copied().fold(Transform::IDENTITY, |outer, inner| outer * inner);
+        section.quantity(&mut scope, "N′", texts.normal_in_object, "", local.normal);
+        section.fact("M⁻ᵀ", affine4(whole.inverse_affine().matrix3.transpose(), DVec3::ZERO));
+        section.quantity(&mut scope, "G", texts.by_inverse_transpose, "M⁻ᵀ N′", whole.normal(local.normal));
+        section.quantity(&mut scope, "N", texts.normal, "G/|G|", surface.normal);
+    } else {
+        section.quantity(&mut scope, "N", texts.normal, "", surface.normal);
+    }
+    let along = surface.normal.dot(ray.direction);
+    section.quantity(&mut scope, "N·D", "", "N·D", along);
+    section.text(if along < 0.0 {
+        texts.front
+    } else if along > 0.0 {
+        texts.back
+    } else {
+        texts.grazing
+    });
+    section.fact("u, v", super::document::Value::Numbers(vec![surface.uv.x, surface.uv.y]));
+    section
+}

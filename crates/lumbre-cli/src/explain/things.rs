@@ -1,0 +1,71 @@
+//! What the shapes of a file are called, and what they are made of.
+
+use std::collections::HashMap;
+
+use lumbre::SceneDesc;
+use lumbre::description::GeometryDesc;
+
+/// The shapes of a file by their number, and the materials.
+#[derive(Debug, Default)]
+pub(super) struct Things {
+    shapes: HashMap<u32, Thing>,
+    materials: Vec<Substance>,
+}
+
+/// A shape of a file.
+#[derive(Clone, Copy, Debug)]
+struct Thing {
+    kind: &'static str,
+    material: Option<usize>,
+}
+
+/// A material of a file.
+#[derive(Clone, Debug)]
+pub(super) struct Substance {
+    /// Its name and kind.
+    pub(super) name: String,
+    /// Its parameters with their numbers; without where a texture stands.
+    pub(super) parameters: Vec<(String, Option<Vec<f64>>)>,
+}
+
+impl Things {
+    /// Of a description.
+    pub(super) fn of(desc: &SceneDesc) -> Self {
+        let mut by_owner: HashMap<String, Vec<(String, Option<Vec<f64>>)>> = HashMap::new();
+        for parameter in lumbre::parameters(desc) {
+            let owner = parameter.path.strip_suffix(&parameter.name).unwrap_or_default().to_owned();
+            by_owner.entry(owner).or_default().push((parameter.name, parameter.value));
+        }
+        let materials = desc.materials.iter().enumerate().map(|(index, named)| {
+            let kind = named.material.kind.name();
+            let called = named.name.clone().unwrap_or_else(|| index.to_string());
+            let name = named.name.as_ref().map_or_else(|| kind.to_owned(), |name| format!("{name} ({kind})"));
+            let parameters = by_owner.remove(&format!("material.{called}.")).unwrap_or_default();
+            Substance { name, parameters }
+        });
+        let materials = materials.collect();
+        let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);
+        let shapes = desc.shapes.iter().chain(in_objects).map(|shape| {
+            let kind = match &shape.geometry {
+                GeometryDesc::Exact(exact) => exact.name(),
+                GeometryDesc::Coloured(coloured) => coloured.shape.name(),
+                GeometryDesc::Mesh(_) => "mesh",
+                GeometryDesc::BilinearMesh(_) => "bilinearmesh",
+                GeometryDesc::Csg(_) => "csg",
+                GeometryDesc::Custom(_) => "custom",
+            };
+            (shape.index, Thing { kind, material: shape.material.map(|id| id.0 as usize) })
+        });
+        Self { shapes: shapes.collect(), materials }
+    }
+
+    /// What kind of shape has this number, in the words of the scene language; the ground is of no file.
+    pub(super) fn kind(&self, shape: u32) -> &'static str {
+        self.shapes.get(&shape).map_or("ground", |thing| thing.kind)
+    }
+
+    /// What a shape is made of.
+    pub(super) fn material(&self, shape: u32) -> Option<&Substance> {
+        self.materials.get(self.shapes.get(&shape)?.material?)
+    }
+}

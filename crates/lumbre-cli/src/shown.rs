@@ -1,0 +1,70 @@
+//! A scene as `lumbre render` would show it: on its stage, with its camera and its options.
+
+use std::path::Path;
+
+use lumbre::description::IntegratorKind;
+use lumbre::formats::Diagnostics;
+use lumbre::{RenderOptions, Scene, SceneDesc, Staged};
+
+use crate::failure::Failure;
+use crate::reading::ReadingArguments;
+use crate::render::camera;
+use crate::staging::{Behind, StagingArguments};
+use crate::view::ViewArguments;
+
+/// How a scene is to be shown.
+pub(crate) struct Wish<'a> {
+    /// The name of the file, for messages.
+    pub(crate) name: &'a Path,
+    pub(crate) size: Option<(u32, u32)>,
+    /// A camera by name or position.
+    pub(crate) camera: Option<&'a str>,
+    /// In place of the scene's own.
+    pub(crate) integrator: Option<IntegratorKind>,
+    pub(crate) view: &'a ViewArguments,
+    pub(crate) staging: &'a StagingArguments,
+    pub(crate) reading: &'a ReadingArguments,
+}
+
+/// A scene on its stage.
+pub(crate) struct Shown {
+    pub(crate) scene: Scene,
+    pub(crate) staged: Staged,
+    pub(crate) behind: Behind,
+    pub(crate) options: RenderOptions,
+    /// Whether its pictures are of light, and not of normals or the like.
+    pub(crate) is_of_light: bool,
+    pub(crate) diagnostics: Diagnostics,
+}
+
+/// Puts a description on its stage and builds it.
+///
+/// # Errors
+/// [`Failure`] by kind of error.
+pub(crate) fn shown(mut desc: SceneDesc, wish: &Wish<'_>) -> Result<Shown, Failure> {
+    let Wish { name, size, camera: wanted, integrator, view, staging, reading } = *wish;
+    let mut stage = staging.stage(size, reading.limits())?;
+    view.set(&mut stage)?;
+    let kind = integrator.unwrap_or(desc.integrator.kind);
+    let is_of_light = kind.needs_light();
+    if !is_of_light && !staging.wants_ground() {
+        // Pictures of normals and the like show the model alone.
+        stage.ground = lumbre::Ground::None;
+    }
+    let staged = stage.set(&mut desc);
+    let behind = staging.behind(&staged, is_of_light, reading.limits())?;
+    let mut diagnostics = Diagnostics::with_strictness(reading.strictness());
+    reading.check_build(&desc, &diagnostics)?;
+    let scene = Scene::of_file(desc, name, &mut diagnostics)?;
+    let mut options = scene.options();
+    options.integrator.kind = kind;
+    if let Some((width, height)) = size {
+        options.resize(scene.resolved().film(), width, height);
+    }
+    if let Some(wanted) = wanted {
+        options.camera = camera(&scene, wanted)?;
+    }
+    view.check_camera(&scene, options.camera)?;
+    options.transparent = behind.is_transparent();
+    Ok(Shown { scene, staged, behind, options, is_of_light, diagnostics })
+}

@@ -1,0 +1,251 @@
+//! `lumbre explain`: what it tells is what the render does, in every form and language.
+
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
+use serde_json::Value;
+
+use crate::program::{Desk, code, stderr, stdout};
+
+/// A ball that is twice as wide as high, a mirror behind it, and a lamp; of one sample a pixel each.
+const SCENE: &str = r#"
+LookAt 0 0 -6  0 0 0  0 1 0
+Camera "perspective" "float fov" 40
+Film "rgb" "integer xresolution" 24 "integer yresolution" 16 "string filename" "a.pfm"
+PixelFilter "box" "float xradius" 0.5 "float yradius" 0.5
+Sampler "independent" "integer pixelsamples" 1
+Integrator "path" "integer maxdepth" 6
+WorldBegin
+LightSource "infinite" "rgb L" [0.1 0.1 0.2]
+LightSource "point" "point3 from" [2 4 -5] "rgb I" [30 28 25]
+AttributeBegin
+  AreaLightSource "diffuse" "rgb L" [4 4 4]
+  Translate -2 3 0
+  Shape "sphere" "float radius" 0.5
+AttributeEnd
+MakeNamedMaterial "clay" "string type" "diffuse" "rgb reflectance" [0.6 0.4 0.3]
+NamedMaterial "clay"
+AttributeBegin
+  Scale 2 1 1
+  Shape "sphere" "float radius" 1
+AttributeEnd
+Material "conductor"
+Shape "disk" "float radius" 5 "float height" 4
+Material "dielectric" "float eta" 1.5
+Translate 0 -1.6 0
+Shape "sphere" "float radius" 0.5
+"#;
+
+fn explained(desk: &Desk, arguments: &[&str]) -> Value {
+    let out = desk.lumbre(&[&["explain", "a.pbrt", "--format", "json"], arguments].concat());
+    assert_eq!(code(&out), 0, "{}", stderr(&out));
+    serde_json::from_str(&stdout(&out)).unwrap()
+}
+
+fn list(value: &Value) -> &[Value] {
+    value.as_array().map_or(&[], Vec::as_slice)
+}
+
+/// The first section with this key, at any depth.
+fn section<'v>(within: &'v Value, key: &str) -> Option<&'v Value> {
+    let sections = list(&within["sections"]);
+    sections
+        .iter()
+        .find(|section| section["key"] == key)
+        .or_else(|| sections.iter().find_map(|it| section(it, key)))
+}
+
+/// The value of the first quantity with this symbol or label.
+fn quantity<'v>(section: &'v Value, name: &str) -> &'v Value {
+    let mut quantities = list(&section["quantities"]).iter();
+    let found = quantities.find(|quantity| quantity["symbol"] == name || quantity["label"] == name);
+    &found.unwrap_or_else(|| panic!("no {name} in {section}"))["value"]
+}
+
+/// The pixels of a picture in PFM, from the lower left corner.
+fn pfm(bytes: &[u8]) -> Vec<[f32; 3]> {
+    let start = bytes.iter().enumerate().filter(|(_, byte)| **byte == b'\n').nth(2).unwrap().0 + 1;
+    let numbers: Vec<f32> =
+        bytes[start..].chunks(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
+    numbers.chunks(3).map(|rgb| [rgb[0], rgb[1], rgb[2]]).collect()
+}
+
+#[test]
+fn the_radiance_that_is_told_is_that_of_the_picture_to_the_bit() {
+    let desk = Desk::new();
+    desk.write("a.pbrt", SCENE);
+    assert_eq!(code(&desk.lumbre(&["render", "a.pbrt", "-q", "-o", "a.pfm"])), 0);
+    let pixels = pfm(&std::fs::read(desk.path("a.pfm")).unwrap());
+    let mut lit = 0;
+    for (x, y) in [(0, 0), (12, 8), (12, 7), (3, 3), (20, 12), (12, 13), (11, 14), (8, 8), (15, 9), (5, 1)] {
+        let told = explained(&desk, &["--pixel", &format!("{x},{y}")]);
+        let radiance = section(&told, "radiance").unwrap();
+        let label = "radiance of this sample, as the render adds it to the pixel";
+        let rgb: Vec<f32> =
+            list(quantity(radiance, label)).iter().map(|x| x.as_f64().unwrap() as f32).collect();
+        assert_eq!(rgb, pixels[(15 - y) * 24 + x], "({x}, {y})");
+        lit += u32::from(rgb[1] > 0.0);
+        // What is added sums to it, in the order that it is told in.
+        let added = list(&radiance["tables"]["added"]);
+        let sum = added.iter().fold([0.0_f32; 3], |sum, row| {
+            std::array::from_fn(|i| sum[i] + row["added"][i].as_f64().unwrap() as f32)
+        });
+        assert_eq!(rgb, sum, "({x}, {y})");
+    }
+    assert!(lit >= 5, "{lit}");
+}
+
+#[test]
+fn the_numbers_of_a_scaled_sphere_are_those_of_pencil_and_paper() {
+    let desk = Desk::new();
+    desk.write("a.pbrt", SCENE);
+    // Along x through the ellipsoid of half-axes 2, 1, 1: in its own space the ray begins at -4 and is half as long.
+    let told = explained(&desk, &["--ray", "-8,0,0,1,0,0", "--nearest"]);
+    let transform = section(&told, "transform").unwrap();
+    assert_eq!(quantity(transform, "O′"), &serde_json::json!([-4.0, 0.0, 0.0]));
+    assert_eq!(quantity(transform, "D′"), &serde_json::json!([0.5, 0.0, 0.0]));
+    assert_eq!(quantity(transform, "|D′|"), 0.5);
+    assert_eq!(
+        quantity(section(transform, "transform 0").unwrap(), "scale S along x, y, z"),
+        &serde_json::json!([2.0, 1.0, 1.0])
+    );
+    let quadratic = section(&told, "Quadratic").unwrap();
+    let [a, h, c] = ["a", "h", "c"].map(|symbol| quantity(quadratic, symbol).as_f64().unwrap());
+    assert_eq!([a, h, c], [0.25, -2.0, 15.0]);
+    assert_eq!(quantity(section(&told, "Discriminant").unwrap(), "Δ"), 0.25);
+    let crossings = list(&section(&told, "crossings").unwrap()["tables"]["crossings"]);
+    let t: Vec<f64> = crossings.iter().map(|row| row["t"].as_f64().unwrap()).collect();
+    assert_eq!(t, [6.0, 10.0]);
+    let hit = section(&told, "hit").unwrap();
+    assert_eq!(quantity(hit, "P"), &serde_json::json!([-2.0, 0.0, 0.0]));
+    assert_eq!(quantity(hit, "N"), &serde_json::json!([-1.0, 0.0, 0.0]));
+    // The normal of an ellipsoid is not its direction from the middle: at (√2, 1/√2, 0) it is (1, 2, 0)/√5.
+    let told = explained(&desk, &["--ray", "1.4142135623730951,8,0,0,-1,0", "--nearest"]);
+    let normal: Vec<f64> =
+        list(quantity(section(&told, "hit").unwrap(), "N")).iter().map(|x| x.as_f64().unwrap()).collect();
+    let expected = [1.0 / 5.0_f64.sqrt(), 2.0 / 5.0_f64.sqrt(), 0.0];
+    assert!(
+        normal.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-15),
+        "{normal:?}"
+    );
+}
+
+#[test]
+fn glass_tells_its_refraction_and_shadows_what_is_in_their_way() {
+    let desk = Desk::new();
+    desk.write("a.pbrt", SCENE);
+    let told = explained(&desk, &["--ray", "0.25,-1.6,-3,0,0,1", "--nearest", "--depth", "2"]);
+    let mirror = section(&told, "mirror").unwrap();
+    let eta = quantity(mirror, "η").as_f64().unwrap();
+    assert!((eta - 1.0 / 1.5).abs() < 1e-7, "{eta}");
+    let vector = |name: &str| -> Vec<f64> {
+        list(quantity(mirror, name)).iter().map(|x| x.as_f64().unwrap()).collect()
+    };
+    let (normal, refracted) = (vector("n"), vector("T"));
+    // Snell: the sines of both angles are as 1.5 to 1. The ball's normal is a quarter over a half off the axis: a sine of 1/2.
+    let cosine: f64 = -normal.iter().zip(&refracted).map(|(n, t)| n * t).sum::<f64>();
+    assert!(((1.0 - cosine * cosine).sqrt() - 0.5 / 1.5).abs() < 1e-6, "{cosine}");
+    // The rays that follow are told too.
+    assert!(section(section(&told, "vertex 1").unwrap(), "surfaces").is_some());
+    // From the front the lamps are seen, from below the clay is in the way of both.
+    let seen = |ray: &str| -> Vec<bool> {
+        let told = explained(&desk, &["--ray", ray]);
+        let lights = list(&section(&told, "lights").unwrap()["tables"]["lights"]).to_vec();
+        let lamps = lights.iter().filter(|light| light["distance"].is_number());
+        lamps.map(|light| light["visible"] == "yes").collect()
+    };
+    assert_eq!(seen("0,0.5,-6,0,0,1"), [true, true]);
+    assert_eq!(seen("1,-3,0.2,0,1,0"), [false, false]);
+}
+
+/// Everything but the words.
+fn numbers(section: &Value, out: &mut Vec<String>) {
+    out.push(section["key"].to_string());
+    for quantity in list(&section["quantities"]) {
+        let value = &quantity["value"];
+        let value = if value.is_string() { String::new() } else { value.to_string() };
+        out.push(format!("{} {} {value}", quantity["symbol"], quantity["formula"]));
+    }
+    list(&section["sections"]).iter().for_each(|inner| numbers(inner, out));
+}
+
+#[test]
+fn both_languages_tell_the_same_numbers() {
+    let desk = Desk::new();
+    desk.write("a.pbrt", SCENE);
+    let tell = |lang: &str| {
+        let told = explained(&desk, &["--pixel", "12,8", "--depth", "3", "--lang", lang]);
+        let mut all = Vec::new();
+        numbers(&told, &mut all);
+        (told["title"].as_str().unwrap().to_owned(), all)
+    };
+    let (english, spanish) = (tell("en"), tell("es"));
+    assert_eq!(english.1, spanish.1);
+    assert!(english.1.len() > 50, "{}", english.1.len());
+    assert_ne!(english.0, spanish.0);
+}
+
+#[test]
+fn every_form_is_whole() {
+    let desk = Desk::new();
+    desk.write("a <b> & c.pbrt", SCENE);
+    let tell = |format: &str| {
+        let out = desk.lumbre(&[
+            "explain",
+            "a <b> & c.pbrt",
+            "--pixel",
+            "12,8",
+            "--depth",
+            "1",
+            "--format",
+            format,
+        ]);
+        assert_eq!(code(&out), 0, "{}", stderr(&out));
+        stdout(&out)
+    };
+    let text = tell("text");
+    assert!(text.contains("THE CAMERA") && text.contains("w·w − r²"), "{text}");
+    let markdown = tell("markdown");
+    for line in markdown.lines() {
+        assert!(line.matches('$').count() % 2 == 0, "{line}");
+        assert_eq!(line.matches('{').count(), line.matches('}').count(), "{line}");
+    }
+    assert!(markdown.contains("w\\cdot w - r^{2}"), "{markdown}");
+    let html = tell("html");
+    for tag in ["math", "section", "svg", "table", "msqrt", "msup", "p", "td", "polyline"] {
+        let opened = html.matches(&format!("<{tag}>")).count() + html.matches(&format!("<{tag} ")).count();
+        let closed = html.matches(&format!("</{tag}>")).count() + if tag == "polyline" { opened } else { 0 };
+        assert!(opened > 0 && opened == closed, "{tag}: {opened} and {closed}");
+    }
+    assert!(!html.contains("<b>") && html.contains("a &lt;b&gt; &amp; c.pbrt"));
+    assert!(
+        !html.contains("http://")
+            || html.matches("http://").count() == html.matches("http://www.w3.org").count()
+    );
+}
+
+#[test]
+fn what_cannot_be_explained_is_said() {
+    let desk = Desk::new();
+    desk.write("a.pbrt", SCENE);
+    for (arguments, status, expected) in [
+        (&["a.pbrt"][..], 2, "--pixel"),
+        (&["a.pbrt", "--pixel", "24,0"], 2, "outside of the picture (expected less than 24,16"),
+        (&["a.pbrt", "--pixel", "1"], 2, "two whole numbers"),
+        (&["a.pbrt", "--ray", "1,2,3,0,0,0"], 2, "a direction other than 0,0,0"),
+        (&["a.pbrt", "--ray", "1,2,3"], 2, "six numbers"),
+        (&["a.pbrt", "--ray", "0,0,0,0,0,1,5,1"], 2, "the least and the greatest t"),
+        (&["a.pbrt", "--pixel", "1,1", "--ray", "0,0,0,0,0,1"], 2, "cannot be used with"),
+        (&["a.pbrt", "--pixel", "1,1", "-o", "a.pbrt"], 2, "a.pbrt"),
+        (&["b.pbrt", "--pixel", "1,1"], 4, "b.pbrt"),
+    ] {
+        let out = desk.lumbre(&[&["explain"], arguments].concat());
+        assert_eq!(code(&out), status, "{arguments:?}: {}", stderr(&out));
+        assert!(stderr(&out).contains(expected), "{arguments:?}: {}", stderr(&out));
+    }
+    assert_eq!(std::fs::read_to_string(desk.path("a.pbrt")).unwrap(), SCENE);
+    let out = desk.lumbre(&["explain", "a.pbrt", "--ray", "0,100,0,0,1,0", "-o", "a.txt"]);
+    assert_eq!(code(&out), 0, "{}", stderr(&out));
+    assert!(
+        std::fs::read_to_string(desk.path("a.txt")).unwrap().contains("Nothing: the ray leaves the scene.")
+    );
+}
