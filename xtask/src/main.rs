@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand};
 use xtask::command::{self, Profile};
 
 mod bench;
+mod book;
 mod check;
 mod field;
 mod fuzz;
@@ -42,6 +43,8 @@ enum Task {
     },
     /// The tests of the Python package alone, where Python is found.
     Python,
+    /// Builds the book of docs/ into target/book/html: renders its pictures, runs its examples, and tries its links.
+    Book(book::Book),
     /// Renders every scene under scenes/ to the picture beside it.
     Scenes {
         /// Only scenes whose path contains this.
@@ -104,6 +107,7 @@ fn main() -> Result<()> {
         Task::Test { all: true } => suite::run_all(),
         Task::Check { since } => check::run(since.as_deref()),
         Task::Python => python::test(),
+        Task::Book(book) => book.run(),
         Task::Scenes { filter } => pictures::render_all(filter.as_deref()),
         Task::Assets(passed) => passed.hand_to_pictures("assets"),
         Task::Contact(passed) => passed.hand_to_pictures("contact"),

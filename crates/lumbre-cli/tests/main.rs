@@ -16,4 +16,5 @@ mod parts;
 mod program;
 mod slurm;
 mod stops;
+mod topics;
 mod viewers;

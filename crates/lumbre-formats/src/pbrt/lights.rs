@@ -17,7 +17,7 @@ use super::textures::{SpectrumUse, single};
 use crate::Diagnostic;
 use crate::diagnostic::quoted;
 
-const KNOWN: [&str; 6] = ["point", "spot", "distant", "infinite", "goniometric", "projection"];
+pub(super) const KNOWN: [&str; 6] = ["point", "spot", "distant", "infinite", "goniometric", "projection"];
 
 impl Converter<'_, '_> {
     pub fn light(&mut self, ty: &str, params: Params, state: &State) -> Result<()> {

@@ -20,7 +20,7 @@ use crate::Diagnostic;
 use crate::diagnostic::quoted;
 
 /// The material types of pbrt-v4.
-const KNOWN: [&str; 13] = [
+pub(super) const KNOWN: [&str; 13] = [
     "diffuse",
     "coateddiffuse",
     "coatedconductor",

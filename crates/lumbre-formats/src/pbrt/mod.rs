@@ -17,6 +17,8 @@ mod images;
 mod lexer;
 mod lights;
 mod materials;
+#[cfg(test)]
+mod pages;
 mod params;
 mod parser;
 mod principled;

@@ -14,6 +14,28 @@ use super::source::{Result, Spot};
 use crate::Diagnostic;
 use crate::diagnostic::{number, quoted};
 
+/// The types of cameras.
+pub(super) const CAMERAS: [&str; 4] = ["perspective", "orthographic", "spherical", "realistic"];
+
+/// The types of integrators.
+pub(super) const INTEGRATORS: [&str; 15] = [
+    "path",
+    "volpath",
+    "simplepath",
+    "simplevolpath",
+    "whitted",
+    "ambientocclusion",
+    "normals",
+    "depth",
+    "albedo",
+    "uv",
+    "bdpt",
+    "mlt",
+    "sppm",
+    "lightpath",
+    "randomwalk",
+];
+
 impl Converter<'_, '_> {
     pub fn camera(&mut self, ty: &str, params: Params, world_from_camera: &[Transform; 2]) -> Result<()> {
         let spot = params.spot;
@@ -80,8 +102,7 @@ impl Converter<'_, '_> {
             }
             _ => {
                 params.ignore_all();
-                let known = ["perspective", "orthographic", "spherical", "realistic"];
-                self.unknown(spot, "camera", ty, &known, "a perspective one takes its place");
+                self.unknown(spot, "camera", ty, &CAMERAS, "a perspective one takes its place");
                 perspective(90.0)
             }
         };
@@ -311,24 +332,7 @@ impl Converter<'_, '_> {
             }
             _ => {
                 let kind = path(&params)?;
-                let known = [
-                    "path",
-                    "volpath",
-                    "simplepath",
-                    "simplevolpath",
-                    "whitted",
-                    "ambientocclusion",
-                    "normals",
-                    "depth",
-                    "albedo",
-                    "uv",
-                    "bdpt",
-                    "mlt",
-                    "sppm",
-                    "lightpath",
-                    "randomwalk",
-                ];
-                self.unknown(spot, "integrator", ty, &known, "path takes its place");
+                self.unknown(spot, "integrator", ty, &INTEGRATORS, "path takes its place");
                 kind
             }
         };

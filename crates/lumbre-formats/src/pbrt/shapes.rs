@@ -20,7 +20,7 @@ use crate::origin::{Spread, placed, relative};
 use crate::ply::{PlyFile, read_ply};
 use crate::{Diagnostic, Diagnostics, Input, Severity};
 
-const KNOWN: &[&str] = &[
+pub(super) const KNOWN: &[&str] = &[
     "sphere",
     "plane",
     "disk",

@@ -114,7 +114,7 @@ pub(super) fn single(params: &Params, name: &'static str, default: f32) -> Resul
 type Missing = (Spot, Box<Diagnostic>);
 
 /// The kinds of texture.
-const KNOWN_KINDS: [&str; 13] = [
+pub(super) const KNOWN_KINDS: [&str; 13] = [
     "constant",
     "scale",
     "mix",

@@ -1,0 +1,100 @@
+//! Pictures of the book: each is rendered of the scene beside it, and again only where that or the program has changed.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, bail};
+
+/// Renders pictures, or finds them among those that it has rendered.
+#[derive(Debug)]
+pub(crate) struct Pictures<'a> {
+    pub(crate) program: &'a Path,
+    /// Where rendered pictures are kept by what they are made of.
+    pub(crate) kept: &'a Path,
+    pub(crate) quick: bool,
+}
+
+impl Pictures<'_> {
+    /// The picture of a scene, which may be rendered without a warning: but that it is of pbrt-v3, as what shows pbrt-v3's materials is.
+    pub(crate) fn picture_of(&self, scene: &Path) -> Result<PathBuf> {
+        let mut files = BTreeMap::new();
+        read_with_named(scene, &mut files)?;
+        let program = fs::metadata(self.program).context("cannot read the program")?;
+        let mut hasher = DefaultHasher::new();
+        files.hash(&mut hasher);
+        (program.len(), program.modified()?, self.quick).hash(&mut hasher);
+        let picture = self.kept.join(format!("{:016x}.png", hasher.finish()));
+        if picture.exists() {
+            return Ok(picture);
+        }
+        fs::create_dir_all(self.kept).with_context(|| format!("cannot make {}", self.kept.display()))?;
+        let mut render = Command::new(self.program);
+        render.arg("render").arg(scene).args(["--progress", "none", "--no-checkpoint", "-o"]).arg(&picture);
+        if self.quick {
+            let side = |name| files.values().find_map(|text| number_after(text, name)).unwrap_or(320);
+            let (width, height) = (side("xresolution").div_ceil(4), side("yresolution").div_ceil(4));
+            render.args(["--spp", "1", "--size", &format!("{width}x{height}")]);
+        }
+        let output = render.output().context("cannot start the program")?;
+        let said = String::from_utf8_lossy(&output.stderr);
+        let is_warning = |line: &str| line.starts_with("warning:") && !line.contains("this is of pbrt-v3");
+        if !output.status.success() || said.lines().any(is_warning) {
+            // What has a warning is not to be found the next time.
+            drop(fs::remove_file(&picture));
+            bail!("{}: {}\n{}", scene.display(), output.status, said.trim_end());
+        }
+        Ok(picture)
+    }
+}
+
+/// The bytes of a file, and of those that it names in quotes, relative to itself.
+fn read_with_named(file: &Path, files: &mut BTreeMap<PathBuf, Vec<u8>>) -> Result<()> {
+    if files.contains_key(file) {
+        return Ok(());
+    }
+    let bytes = fs::read(file).with_context(|| format!("cannot read {}", file.display()))?;
+    files.insert(file.to_owned(), bytes.clone());
+    let (Some(folder), Ok(text)) = (file.parent(), std::str::from_utf8(&bytes)) else { return Ok(()) };
+    for named in text.split('"').skip(1).step_by(2).filter(|name| name.contains('.')) {
+        let path = folder.join(named);
+        if path.is_file() {
+            read_with_named(&path, files)?;
+        }
+    }
+    Ok(())
+}
+
+/// The first integer after a word.
+fn number_after(text: &[u8], word: &str) -> Option<u32> {
+    let text = std::str::from_utf8(text).ok()?;
+    let (_, rest) = text.split_once(word)?;
+    let digits = rest.trim_start_matches(['"', ' ', '[']);
+    digits.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_depends_on_all_that_its_scene_names() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = |name: &str, text: &str| {
+            fs::write(folder.path().join(name), text).expect("a file");
+            folder.path().join(name)
+        };
+        let scene =
+            file("scene.pbrt", "Include \"studio.pbrt\" Texture \"t\" \"string filename\" \"missing.png\"");
+        file("studio.pbrt", "Include \"scene.pbrt\" Film \"rgb\" \"integer xresolution\" [ 320 ] ");
+        file("other.pbrt", "");
+        let mut files = BTreeMap::new();
+        read_with_named(&scene, &mut files).expect("both can be read");
+        let names: Vec<_> = files.keys().filter_map(|path| path.file_name()?.to_str()).collect();
+        assert_eq!(names, ["scene.pbrt", "studio.pbrt"]);
+        let widths: Vec<_> = files.values().filter_map(|text| number_after(text, "xresolution")).collect();
+        assert_eq!(widths, [320]);
+    }
+}
