@@ -184,7 +184,7 @@ fn every_reference_ray_is_explained_as_it_is_answered() {
 }
 
 #[test]
-fn every_reference_ray_is_answered_is_answered_to_double_precision() {
+fn every_reference_ray_is_answered_to_double_precision() {
     let vectors: Value = serde_json::from_str(include_str!("../../../tests/data/vectors.json")).unwrap();
     let records = vectors["intersection"].as_array().unwrap();
     let folder = tempfile::tempdir().unwrap();
