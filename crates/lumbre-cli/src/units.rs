@@ -113,6 +113,18 @@ pub(crate) fn spoken(duration: Duration) -> String {
     }
 }
 
+/// The shortest decimal number that reads back as `x`. The sign of zero is left out: it equals zero.
+pub(crate) fn number(x: f64) -> String {
+    let size = x.abs();
+    if size == 0.0 {
+        "0".to_owned()
+    } else if (1e-5..1e16).contains(&size) {
+        x.to_string()
+    } else {
+        format!("{x:e}")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

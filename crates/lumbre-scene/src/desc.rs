@@ -92,6 +92,14 @@ pub struct NamedMaterial {
     pub material: Arc<Material>,
 }
 
+impl NamedMaterial {
+    /// What people call it: its name and its kind, or the kind alone.
+    pub fn label(&self) -> String {
+        let kind = self.material.kind.name();
+        self.name.as_ref().map_or_else(|| kind.to_owned(), |name| format!("{name} ({kind})"))
+    }
+}
+
 /// A shape with its material.
 #[derive(Clone, Debug)]
 pub struct ShapeDesc {

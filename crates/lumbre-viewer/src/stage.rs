@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::sync::{RwLock, RwLockReadGuard, RwLockWriteGuard};
 
-use lumbre::description::{Camera, CameraKind, CameraView, GeometryDesc, UpAxis};
+use lumbre::description::{Camera, CameraKind, CameraView, GeometryDesc, NamedMaterial, UpAxis};
 use lumbre::{
     Background, DVec2, DVec3, Parameter, ParameterKind, Ray, RenderOptions, SaveOptions, Scene, SceneDesc,
 };
@@ -129,10 +129,7 @@ fn things(desc: &SceneDesc) -> Vec<Thing> {
             GeometryDesc::Custom(_) => "custom geometry",
         };
         let material = shape.material.and_then(|id| desc.materials.get(id.0 as usize));
-        thing.material = material.map(|material| {
-            let kind = material.material.kind.name();
-            material.name.as_ref().map_or_else(|| kind.to_owned(), |name| format!("{name} ({kind})"))
-        });
+        thing.material = material.map(NamedMaterial::label);
     }
     things
 }

@@ -4,6 +4,7 @@ use lumbre::math::glam::DMat4;
 use lumbre::{DVec3, Ray};
 
 use super::formula::Scope;
+use crate::units::number;
 
 /// A part of what is told.
 #[derive(Clone, Debug, Default)]
@@ -115,20 +116,12 @@ impl From<DMat4> for Value {
     }
 }
 
-/// The shortest text that is read back as the same number.
+/// The shortest text that is read back as the same number; infinity has its sign.
 pub(super) fn exact(x: f64) -> String {
-    let size = x.abs();
-    if x == 0.0 {
-        "0".to_owned()
-    } else if size.is_finite() && !(1e-5..1e17).contains(&size) {
-        format!("{x:e}")
-    } else if x.is_finite() {
-        format!("{x}")
-    } else if x.is_nan() {
-        "NaN".to_owned()
-    } else {
-        if x > 0.0 { "∞".to_owned() } else { "-∞".to_owned() }
+    if x.is_finite() || x.is_nan() {
+        return number(x);
     }
+    if x > 0.0 { "∞".to_owned() } else { "-∞".to_owned() }
 }
 
 /// With six digits, for what stands in formulas.
@@ -141,10 +134,10 @@ fn short(x: f64) -> String {
 }
 
 impl Value {
-    fn written(&self, number: impl Fn(f64) -> String + Copy) -> String {
-        let list = |numbers: &[f64]| numbers.iter().map(|x| number(*x)).collect::<Vec<_>>().join(", ");
+    fn written(&self, write: impl Fn(f64) -> String + Copy) -> String {
+        let list = |numbers: &[f64]| numbers.iter().map(|x| write(*x)).collect::<Vec<_>>().join(", ");
         match self {
-            Self::Number(x) => number(*x),
+            Self::Number(x) => write(*x),
             Self::Single(x) => single(*x),
             Self::Vector(v) => format!("({})", list(&v.to_array())),
             Self::Colour([r, g, b]) if r == g && g == b => single(*r),
@@ -152,7 +145,7 @@ impl Value {
             Self::Numbers(numbers) => list(numbers),
             Self::Intervals(intervals) if intervals.is_empty() => "∅".to_owned(),
             Self::Intervals(intervals) => {
-                let one = |[from, to]: &[f64; 2]| format!("[{}, {}]", number(*from), number(*to));
+                let one = |[from, to]: &[f64; 2]| format!("[{}, {}]", write(*from), write(*to));
                 intervals.iter().map(one).collect::<Vec<_>>().join(" ∪ ")
             }
             Self::Matrix(m) => {

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use lumbre::geometry::{PlacedShape, Shape, Surface};
+use lumbre::geometry::{Shape, Surface};
 use lumbre::math::Frame;
 use lumbre::{DVec2, DVec3, Ray, Transform};
 
@@ -24,17 +24,16 @@ pub(super) struct Scenery {
 }
 
 impl Scenery {
-    /// Adds the lines of constant u and v of a shape, where it stands.
-    pub(super) fn add(&mut self, shape: &PlacedShape, outer: &Transform, at: DVec3) {
-        let map = *outer * shape.world_from_object();
+    /// Adds the lines of constant u and v of a shape under a map to the world, which is met at a surface there.
+    pub(super) fn add(&mut self, shape: &Shape, map: &Transform, met: &Surface) {
         let before = self.lines.len();
-        if shape.shape().bounds(&Transform::IDENTITY).is_some() {
+        if shape.bounds(&Transform::IDENTITY).is_some() {
             for part in 0..PARTS {
-                self.lines.extend(lines_of(shape.shape(), part, &map));
+                self.lines.extend(lines_of(shape, part, map));
             }
         }
         if self.lines.len() == before {
-            self.lines.extend(boxed(shape, outer, at));
+            self.lines.extend(boxed(shape, map, met));
         }
     }
 }
@@ -64,8 +63,8 @@ fn lines_of(shape: &Shape, part: u32, map: &Transform) -> Vec<Vec<DVec3>> {
 }
 
 /// The edges of a shape's box; of an infinite shape, a square about where it was met.
-fn boxed(shape: &PlacedShape, outer: &Transform, at: DVec3) -> Vec<Vec<DVec3>> {
-    if let Some(bounds) = shape.shape().bounds(&(*outer * shape.world_from_object())) {
+fn boxed(shape: &Shape, map: &Transform, met: &Surface) -> Vec<Vec<DVec3>> {
+    if let Some(bounds) = shape.bounds(map) {
         let corner = |i: usize| {
             let pick = |axis: usize| if i >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
             DVec3::new(pick(0), pick(1), pick(2))
@@ -74,11 +73,9 @@ fn boxed(shape: &PlacedShape, outer: &Transform, at: DVec3) -> Vec<Vec<DVec3>> {
             .flat_map(|i| (0..3).filter(move |axis| i >> axis & 1 == 0).map(move |axis| (i, i | 1 << axis)));
         return edges.map(|(from, to)| vec![corner(from), corner(to)]).collect();
     }
-    let place = at;
+    let place = met.point;
     let size = place.length().max(1.0) * 0.5;
-    let ray = Ray::new(place, DVec3::Z);
-    let normal = shape.closest(&ray).map_or(DVec3::Z, |root| shape.surface(&ray, &root).normal);
-    let frame = Frame::from_z(normal);
+    let frame = Frame::from_z(met.normal);
     let corner = |x: f64, y: f64| place + size * (x * frame.x + y * frame.y);
     vec![vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0), corner(-1.0, -1.0)]]
 }

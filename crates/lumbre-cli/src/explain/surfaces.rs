@@ -2,14 +2,14 @@
 
 use std::ops::ControlFlow;
 
-use lumbre::geometry::{PlacedShape, Shape, Surface, Triangle};
+use lumbre::geometry::{Shape, Triangle};
 use lumbre::kernel::{Hit, Target, TargetShape};
-use lumbre::math::glam::{DMat4, DQuat, EulerRot};
+use lumbre::math::glam::{DMat3, DMat4, DQuat, EulerRot};
 use lumbre::math::matrix::affine4;
 use lumbre::{DVec3, Ray, Scene, Transform};
 
-use super::document::Section;
-use super::formula::Scope;
+use super::document::{Section, Value, exact};
+use super::formula::{Scope, with_primes};
 use super::shape;
 use super::sketch::Scenery;
 use super::texts::{Texts, filled};
@@ -116,7 +116,7 @@ fn thing(
     }
     // The same steps as the search takes, for the same bits.
     let inner = placements.iter().fold(*ray, |ray, map| ray.into_object(map));
-    let (exact, own, object_ray) = match &shape {
+    let (shape, own, object_ray) = match &shape {
         TargetShape::Exact(placed) => {
             let own = Some(placed.world_from_object()).filter(|map| !map.is_identity());
             (Some(placed.shape().clone()), own, placed.object_ray(&inner))
@@ -125,51 +125,66 @@ fn thing(
         TargetShape::Custom => (None, None, inner),
     };
     let mut scope = Scope::default();
-    let chain: Vec<Transform> = placements.iter().copied().chain(own).collect();
-    let is_placed = !chain.is_empty();
-    if is_placed {
-        section.sections.push(transforms(&chain, ray, &object_ray, &mut scope, texts));
+    let chain: Vec<Transform> = placements.into_iter().chain(own).collect();
+    let whole = chain.iter().copied().fold(Transform::IDENTITY, |outer, inner| outer * inner);
+    let object = Object { ray: object_ray, shape, chain, whole };
+    if object.is_placed() {
+        section.sections.push(transforms(&object, ray, &mut scope, texts));
     } else {
-        scope.set_ray(["O", "D"], &object_ray);
+        scope.set_ray(["O", "D"], &object.ray);
     }
     let rename = |formula: &str| {
-        if is_placed { super::formula::with_primes(formula, &["O", "D"]) } else { formula.to_owned() }
+        if object.is_placed() { with_primes(formula, &["O", "D"]) } else { formula.to_owned() }
     };
-    let placed = exact.as_ref().map(|shape| PlacedShape::new(shape.clone(), own.unwrap_or_default()));
-    if let Some(placed) = &placed {
-        let outer = placements.iter().copied().fold(Transform::IDENTITY, |outer, inner| outer * inner);
-        scenery.add(placed, &outer, resolved.accel().surface(ray, hit).point);
-    }
-    match &exact {
+    match &object.shape {
         Some(exact) => {
+            scenery.add(exact, &object.whole, &resolved.accel().surface(ray, hit));
             let mut equation = Section::new("equation", texts.equation);
-            shape::tell(&mut equation, &exact.explain(&object_ray), &object_ray, &mut scope, &rename, texts);
+            let explanation = exact.explain(&object.ray);
+            shape::tell(&mut equation, &explanation, &object.ray, &mut scope, &rename, texts);
             section.sections.push(equation);
         }
         None => section.text(texts.custom),
     }
     for &hit in hits {
         let is_first = first.is_some_and(|first| first == hit);
-        section.sections.push(at_hit(scene, ray, hit, is_first, placed.as_ref(), &inner, &chain, texts));
+        section.sections.push(at_hit(scene, ray, hit, is_first, &object, texts));
     }
     section
 }
 
+/// A thing in its own space.
+struct Object {
+    /// The ray there.
+    ray: Ray,
+    /// What it is; `None` for geometry of a program's own.
+    shape: Option<Shape>,
+    /// The maps from there to the world, the outermost first.
+    chain: Vec<Transform>,
+    /// Their product.
+    whole: Transform,
+}
+
+impl Object {
+    /// Whether its own space is another than the world.
+    fn is_placed(&self) -> bool {
+        !self.chain.is_empty()
+    }
+}
+
 /// The chain of maps from the object to the world, and the ray in the object's space.
-fn transforms(chain: &[Transform], ray: &Ray, object_ray: &Ray, scope: &mut Scope, texts: &Texts) -> Section {
+fn transforms(object: &Object, ray: &Ray, scope: &mut Scope, texts: &Texts) -> Section {
+    let Object { ray: object_ray, chain, whole, .. } = object;
     let mut section = Section::new("transform", texts.transform);
     if chain.len() > 1 {
         section.text(texts.chain);
     }
     for (i, map) in chain.iter().enumerate() {
-        let mut one = Section::new(
-            format!("transform {i}"),
-            if chain.len() > 1 {
-                format!("M{}", "₁₂₃₄₅₆₇₈₉".chars().nth(i).unwrap_or('ₙ'))
-            } else {
-                "M".to_owned()
-            },
-        );
+        let name = match chain.len() {
+            1 => "M".to_owned(),
+            _ => format!("M{}", "₁₂₃₄₅₆₇₈₉".chars().nth(i).unwrap_or('ₙ')),
+        };
+        let mut one = Section::new(format!("transform {i}"), name);
         one.fact("M", DMat4::from(*map.affine()));
         match decomposed(map) {
             Some(Parts { scale, angles, offset }) => {
@@ -182,7 +197,6 @@ fn transforms(chain: &[Transform], ray: &Ray, object_ray: &Ray, scope: &mut Scop
         }
         section.sections.push(one);
     }
-    let whole = chain.iter().copied().fold(Transform::IDENTITY, |outer, inner| outer * inner);
     if chain.len() > 1 {
         section.fact("M", DMat4::from(*whole.affine()));
     }
@@ -215,8 +229,7 @@ fn decomposed(map: &Transform) -> Option<Parts> {
     // A mirror is told as a negative scale along z.
     let sign = if map.is_mirror() { -1.0 } else { 1.0 };
     let scale = DVec3::new(lengths[0], lengths[1], sign * lengths[2]);
-    let rotation =
-        lumbre::math::glam::DMat3::from_cols(axes[0] / scale.x, axes[1] / scale.y, axes[2] / scale.z);
+    let rotation = DMat3::from_cols(axes[0] / scale.x, axes[1] / scale.y, axes[2] / scale.z);
     let (z, y, x) = DQuat::from_mat3(&rotation).to_euler(EulerRot::ZYX);
     let tidy = |radians: f64| {
         let degrees = radians.to_degrees();
@@ -227,21 +240,11 @@ fn decomposed(map: &Transform) -> Option<Parts> {
 }
 
 /// The surface at one crossing.
-#[expect(clippy::too_many_arguments, reason = "all that is known of a hit")]
-fn at_hit(
-    scene: &Scene,
-    ray: &Ray,
-    hit: &Hit,
-    is_first: bool,
-    shape: Option<&PlacedShape>,
-    inner: &Ray,
-    chain: &[Transform],
-    texts: &Texts,
-) -> Section {
+fn at_hit(scene: &Scene, ray: &Ray, hit: &Hit, is_first: bool, object: &Object, texts: &Texts) -> Section {
     let surface = scene.resolved().accel().surface(ray, hit);
     let mut scope = Scope::default();
     scope.set_ray(["O", "D"], ray);
-    let title = filled(texts.hit, &[&super::document::exact(hit.root.t)]);
+    let title = filled(texts.hit, &[&exact(hit.root.t)]);
     let mut section = Section::new("hit", title);
     section.quantity(&mut scope, "t", texts.t_of_search, "", hit.root.t);
     if is_first {
@@ -252,10 +255,9 @@ fn at_hit(
     if deviation > 0.0 {
         section.remark(filled(texts.reprojected, &[&format!("{deviation:.1e}")]));
     }
-    if let (Some(shape), false) = (shape, chain.is_empty()) {
-        let object_ray = shape.object_ray(inner);
-        let local: Surface = shape.shape().surface(&object_ray, &hit.root);
-        let whole = chain.iter().copied().fold(Transform::IDENTITY, |outer, inner| outer * inner);
+    if let (Some(shape), true) = (&object.shape, object.is_placed()) {
+        let local = shape.surface(&object.ray, &hit.root);
+        let whole = &object.whole;
         section.quantity(&mut scope, "N′", texts.normal_in_object, "", local.normal);
         section.fact("M⁻ᵀ", affine4(whole.inverse_affine().matrix3.transpose(), DVec3::ZERO));
         section.quantity(&mut scope, "G", texts.by_inverse_transpose, "M⁻ᵀ N′", whole.normal(local.normal));
@@ -272,6 +274,6 @@ fn at_hit(
     } else {
         texts.grazing
     });
-    section.fact("u, v", super::document::Value::Numbers(vec![surface.uv.x, surface.uv.y]));
+    section.fact("u, v", Value::Numbers(vec![surface.uv.x, surface.uv.y]));
     section
 }

@@ -40,11 +40,9 @@ impl Things {
             by_owner.entry(owner).or_default().push((parameter.name, parameter.value));
         }
         let materials = desc.materials.iter().enumerate().map(|(index, named)| {
-            let kind = named.material.kind.name();
             let called = named.name.clone().unwrap_or_else(|| index.to_string());
-            let name = named.name.as_ref().map_or_else(|| kind.to_owned(), |name| format!("{name} ({kind})"));
             let parameters = by_owner.remove(&format!("material.{called}.")).unwrap_or_default();
-            Substance { name, parameters }
+            Substance { name: named.label(), parameters }
         });
         let materials = materials.collect();
         let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);

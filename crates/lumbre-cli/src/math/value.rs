@@ -5,6 +5,7 @@ use lumbre::math::{Transform, matrix, quaternion};
 use serde_json::{Value as Json, json};
 
 use super::texts::Texts;
+pub(super) use crate::units::number;
 
 /// A matrix of up to 4×4 entries; what is outside of its size is 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -178,18 +179,6 @@ impl Value {
             Self::Transform(map) => ("transform", rows(&(&**map).into())),
             Self::Quaternion(q) => ("quaternion", json!(quaternion::to_wxyz(*q))),
         }
-    }
-}
-
-/// The shortest decimal number that reads back as `x`. The sign of zero is left out: it equals zero.
-pub(super) fn number(x: f64) -> String {
-    let size = x.abs();
-    if size == 0.0 {
-        "0".to_owned()
-    } else if (1e-5..1e16).contains(&size) {
-        x.to_string()
-    } else {
-        format!("{x:e}")
     }
 }
 
