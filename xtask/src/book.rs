@@ -6,7 +6,9 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use xtask::command::{self, built_as_for_tests, release_program, root, target};
+use xtask::command::{self, release_program, root, target, tested_program};
+
+use crate::files;
 
 use page::Preparer;
 
@@ -94,7 +96,7 @@ fn build(mdbook: &Path, quick: bool) -> Result<()> {
         }
     }
     for part in BESIDE.into_iter().chain([PAGES]) {
-        copy_folder(&root().join(part), &copy.join(part))?;
+        files::copy(&root().join(part), &copy.join(part))?;
     }
     let pages = copy.join(PAGES);
     let (root, kept) = (root(), book.join("pictures"));
@@ -121,7 +123,7 @@ fn program(quick: bool) -> Result<PathBuf> {
         return named.canonicalize().with_context(|| format!("cannot find {}", named.display()));
     }
     if quick {
-        return Ok(built_as_for_tests()?.join(format!("lumbre{}", std::env::consts::EXE_SUFFIX)));
+        return tested_program();
     }
     release_program()
 }
@@ -140,22 +142,6 @@ fn run_mdbook(mdbook: &Path, pages: &Path, html: &Path) -> Result<()> {
     let is_fault = |line: &&str| line.contains("ERROR") || line.contains("WARN");
     if !output.status.success() || said.lines().any(|line| is_fault(&line)) {
         bail!("mdbook refuses the book:\n{said}");
-    }
-    Ok(())
-}
-
-/// Copies all files below a folder.
-fn copy_folder(from: &Path, to: &Path) -> Result<()> {
-    fs::create_dir_all(to).with_context(|| format!("cannot make {}", to.display()))?;
-    for entry in fs::read_dir(from).with_context(|| format!("cannot read {}", from.display()))? {
-        let path = entry?.path();
-        let Some(name) = path.file_name() else { continue };
-        let copy = to.join(name);
-        if path.is_dir() {
-            copy_folder(&path, &copy)?;
-        } else {
-            fs::copy(&path, &copy).with_context(|| format!("cannot copy {}", path.display()))?;
-        }
     }
     Ok(())
 }

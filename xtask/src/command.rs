@@ -71,6 +71,11 @@ pub fn built_as_for_tests() -> Result<PathBuf> {
     Ok(target().join("debug"))
 }
 
+/// Builds all that the tests build and says where Lumbre's program lies.
+pub fn tested_program() -> Result<PathBuf> {
+    Ok(built_as_for_tests()?.join(format!("lumbre{}", std::env::consts::EXE_SUFFIX)))
+}
+
 /// Builds the program of this name in one of our packages and says where it lies.
 fn program(package: &str, name: &str, profile: Profile) -> Result<PathBuf> {
     let target = target();

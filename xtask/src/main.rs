@@ -10,6 +10,7 @@ mod bench;
 mod book;
 mod check;
 mod field;
+mod files;
 mod fuzz;
 mod page;
 mod pictures;

@@ -26,7 +26,7 @@ pub(crate) fn run() -> Result<()> {
         eprintln!("\nThe viewer's page is not tried: it needs Chromium (Debian: apt-get install chromium)");
         return Ok(());
     };
-    let program = command::built_as_for_tests()?.join(format!("lumbre{}", std::env::consts::EXE_SUFFIX));
+    let program = command::tested_program()?;
     let (program, browser) = (program.to_string_lossy(), browser.to_string_lossy());
     let test = format!("{FOLDER}/tests/run.mjs");
     run_with("node", &[&test], &[("LUMBRE", &program), ("CHROMIUM", &browser)])

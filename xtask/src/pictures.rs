@@ -1,18 +1,22 @@
 //! The pictures that stand beside the scenes.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use xtask::command::{release_program, root, run};
+
+use crate::files;
 
 /// Renders every scene under `scenes/` whose path contains `filter` to a PNG beside it.
 pub(crate) fn render_all(filter: Option<&str>) -> Result<()> {
     let program = release_program()?;
     let program = program.to_string_lossy();
-    let mut scenes = Vec::new();
-    collect(&root().join("scenes"), &mut scenes)?;
-    scenes.sort();
+    let folder = root().join("scenes");
+    let mut scenes = files::with_ending(&folder, "pbrt")?;
+    // Files that other scenes include are not scenes.
+    let is_part =
+        |scene: &Path| scene.strip_prefix(&folder).is_ok_and(|name| name.iter().any(|it| it == "parts"));
+    scenes.retain(|scene| !is_part(scene));
     scenes.retain(|scene| filter.is_none_or(|wanted| scene.to_string_lossy().contains(wanted)));
     if scenes.is_empty() {
         bail!("no scene matches");
@@ -20,19 +24,6 @@ pub(crate) fn render_all(filter: Option<&str>) -> Result<()> {
     for scene in scenes {
         let picture = scene.with_extension("png");
         run(&program, &["render", &scene.to_string_lossy(), "-o", &picture.to_string_lossy()])?;
-    }
-    Ok(())
-}
-
-/// Scenes below a folder; files that other scenes include are not scenes.
-fn collect(folder: &Path, scenes: &mut Vec<PathBuf>) -> Result<()> {
-    for entry in fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))? {
-        let path = entry?.path();
-        if path.is_dir() && !path.ends_with("parts") {
-            collect(&path, scenes)?;
-        } else if path.extension().is_some_and(|extension| extension == "pbrt") {
-            scenes.push(path);
-        }
     }
     Ok(())
 }

@@ -7,6 +7,8 @@ use std::path::{Component, Path, PathBuf};
 
 use anyhow::{Context, Result};
 
+use crate::files;
+
 /// What a built page has of links.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Links {
@@ -20,7 +22,14 @@ struct Links {
 /// only.
 pub(crate) fn check(html: &Path, pages: &Path) -> Result<Vec<String>> {
     let mut found = BTreeMap::new();
-    collect(html, &mut found)?;
+    for page in files::with_ending(html, "html")? {
+        // The page of what is not found is shown at any address, so that its links are to the root.
+        if page.file_name() != Some(OsStr::new("404.html")) {
+            let text =
+                fs::read_to_string(&page).with_context(|| format!("cannot read {}", page.display()))?;
+            found.insert(page, links(&text));
+        }
+    }
     let mut faults = Vec::new();
     for (page, links) in &found {
         for target in &links.targets {
@@ -31,23 +40,6 @@ pub(crate) fn check(html: &Path, pages: &Path) -> Result<Vec<String>> {
         }
     }
     Ok(faults)
-}
-
-fn collect(folder: &Path, found: &mut BTreeMap<PathBuf, Links>) -> Result<()> {
-    for entry in fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))? {
-        let path = entry?.path();
-        if path.is_dir() {
-            collect(&path, found)?;
-        // The page of what is not found is shown at any address, so that its links are to the root.
-        } else if path.extension() == Some(OsStr::new("html"))
-            && path.file_name() != Some(OsStr::new("404.html"))
-        {
-            let text =
-                fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
-            found.insert(path, links(&text));
-        }
-    }
-    Ok(())
 }
 
 /// What is wrong with a link from this page.

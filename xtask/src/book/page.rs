@@ -10,6 +10,8 @@ use std::path::{Component, Path, PathBuf};
 use anyhow::{Context, Result};
 use pulldown_cmark::{CodeBlockKind, CowStr, Event, Options, Parser, Tag};
 
+use crate::files;
+
 use super::console::Example;
 use super::picture::Pictures;
 use super::{PAGES, formula};
@@ -51,12 +53,10 @@ impl<'a> Preparer<'a> {
     /// Prepares every page, and says all that is wrong in them.
     pub(crate) fn prepare_all(&self) -> Result<Vec<Fault>> {
         let folder = self.copy.join(PAGES);
-        let mut pages = BTreeSet::new();
-        collect_pages(&folder, &mut pages)?;
         let mut faults = Vec::new();
         let summary = fs::read_to_string(folder.join("SUMMARY.md")).context("cannot read SUMMARY.md")?;
         let listed: BTreeSet<PathBuf> = links_of(&summary).map(|link| folder.join(&*link)).collect();
-        for page in pages {
+        for page in files::with_ending(&folder, "md")? {
             let name = page.strip_prefix(self.copy).unwrap_or(&page).to_owned();
             if page.file_name() == Some(OsStr::new("SUMMARY.md")) {
                 continue;
@@ -170,18 +170,6 @@ impl<'a> Preparer<'a> {
         let fragment = link.split_once('#').map(|(_, fragment)| format!("#{fragment}")).unwrap_or_default();
         Ok(Some(format!("{REPOSITORY}/{kind}/main/{}{fragment}", file.display())))
     }
-}
-
-fn collect_pages(folder: &Path, pages: &mut BTreeSet<PathBuf>) -> Result<()> {
-    for entry in fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))? {
-        let path = entry?.path();
-        if path.is_dir() {
-            collect_pages(&path, pages)?;
-        } else if path.extension() == Some(OsStr::new("md")) {
-            pages.insert(path);
-        }
-    }
-    Ok(())
 }
 
 fn links_of(text: &str) -> impl Iterator<Item = CowStr<'_>> {

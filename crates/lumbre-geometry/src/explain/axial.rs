@@ -4,7 +4,7 @@ use lumbre_math::DVec3;
 
 use super::notes::{Notes, out_of_range};
 use super::planar::tell_plane;
-use super::quadratic::{Solved, at_place, tell_place};
+use super::quadratic::{Solved, at_place, stable_q, tell_place};
 use super::{Fate, Remark, Topic};
 use crate::Ray;
 use crate::axial::{Axial, CAP1, Doubles, Equation, ExactSide, LATERAL, Span};
@@ -94,7 +94,7 @@ impl Axial {
             delta_formula: "h² − a·c",
             delta_error: Some(doubles.delta_error),
             errors: Some(doubles.errors),
-            q: -(h + doubles.delta.sqrt().copysign(h)),
+            q: stable_q(h, doubles.delta),
             crossings,
             is_twofold: false,
         };

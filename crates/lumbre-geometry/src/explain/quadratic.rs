@@ -33,6 +33,11 @@ pub(super) struct Solved {
     pub(super) is_twofold: bool,
 }
 
+/// −(h ± √Δ), with the sign that lets nothing cancel.
+pub(super) fn stable_q(h: f64, delta: f64) -> f64 {
+    -(h + delta.sqrt().copysign(h))
+}
+
 /// A formula in the place where an equation is set up.
 pub(super) fn at_place(formula: &'static str, start: f64) -> String {
     if start == 0.0 { formula.to_owned() } else { formula.replace('w', "w₀") }

@@ -3,7 +3,7 @@
 use lumbre_math::DVec3;
 
 use super::notes::Notes;
-use super::quadratic::{Solved, tell_pair, tell_place};
+use super::quadratic::{Solved, stable_q, tell_pair, tell_place};
 use super::{Fate, Topic};
 use crate::line::{Doubles, SecondDegree, Solution, crossings, set_up};
 use crate::support::azimuth;
@@ -34,7 +34,7 @@ fn tell(
         delta_formula: "h² − a·c",
         delta_error: Some(delta_error),
         errors: Some(errors),
-        q: -(h + delta.sqrt().copysign(h)),
+        q: stable_q(h, delta),
         crossings: found,
         is_twofold: false,
     };

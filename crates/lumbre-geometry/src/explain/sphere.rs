@@ -3,7 +3,7 @@
 use lumbre_math::DVec3;
 
 use super::notes::Notes;
-use super::quadratic::{Solved, tell_pair, tell_place};
+use super::quadratic::{Solved, stable_q, tell_pair, tell_place};
 use super::{Fate, Topic};
 use crate::sphere::{Equation, Nearby, crossings, solution};
 use crate::support::azimuth;
@@ -28,7 +28,7 @@ pub(super) fn tell_sphere(notes: &mut Notes, center: DVec3, radius: f64, ray: &R
         delta_formula: "a·(r² − l·l)",
         delta_error: None,
         errors: None,
-        q: -(h + delta.sqrt().copysign(h)),
+        q: stable_q(h, delta),
         crossings: found,
         is_twofold: false,
     };
@@ -41,7 +41,7 @@ pub(super) fn tell_sphere(notes: &mut Notes, center: DVec3, radius: f64, ray: &R
         let exact = solution(center, radius, ray, nearby.start);
         if nearby.is_certain && keeps_digits {
             let Nearby { start, place, h, c, delta, error, .. } = nearby;
-            let q = -(h + delta.sqrt().copysign(h));
+            let q = stable_q(h, delta);
             let coefficients = [a, h, c];
             (Solved { start, coefficients, delta, delta_error: Some(error), q, ..elsewhere }, place)
         } else if exact.is_finite {

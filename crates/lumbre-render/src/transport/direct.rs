@@ -224,12 +224,13 @@ impl<'a, 's> Vertex<'a, 's> {
                 (weigh(pdf, bsdf_pdf), pdf, bsdf_pdf)
             }
         };
-        // False for a NaN.
-        let counts = weight / pdf > 0.0;
+        let share = weight / pdf;
+        // False for a NaN, which is for the film to find.
+        let is_nothing = share <= 0.0;
         let passes =
-            if counts { self.visible(sample, interiors, regularize, record) } else { Spectrum::BLACK };
+            if is_nothing { Spectrum::BLACK } else { self.visible(sample, interiors, regularize, record) };
         record.note(|| {
-            let shadow_ray = counts.then(|| self.shadow_ray(sample));
+            let shadow_ray = (!is_nothing).then(|| self.shadow_ray(sample));
             let sample = *sample;
             Event::Sampled(Box::new(SampledLight {
                 sample,
@@ -240,7 +241,7 @@ impl<'a, 's> Vertex<'a, 's> {
                 passes,
             }))
         });
-        if passes.is_black() { Spectrum::BLACK } else { scattered * (weight / pdf) * passes }
+        if passes.is_black() { Spectrum::BLACK } else { scattered * share * passes }
     }
 
     /// What comes through of a light's sample between the light and here; black where something is in its way.
