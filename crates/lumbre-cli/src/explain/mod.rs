@@ -85,9 +85,6 @@ pub(crate) struct Arguments {
     /// What is computed for each pixel.
     #[arg(long, value_name = "NAME", value_parser = one_of(&INTEGRATORS, IntegratorKind::from_name))]
     integrator: Option<IntegratorKind>,
-    /// The maximal number of bounces.
-    #[arg(long, value_name = "N")]
-    max_depth: Option<u32>,
     /// Seed of the random numbers.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -199,7 +196,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn told(arguments: &Arguments, shown: Shown, things: &Things) -> Result<Vec<Section>, Failure> {
     let texts = arguments.lang.texts();
     let Shown { scene, mut options, .. } = shown;
-    options.integrator.max_depth = arguments.max_depth.unwrap_or(options.integrator.max_depth);
     options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
     let whole = (options.width, options.height);
     let (mut sections, ray, radiance, events) = if let Some((x, y)) = arguments.pixel {
