@@ -286,6 +286,12 @@ pub(super) fn parse_number(word: &[u8]) -> Option<f64> {
     Some(if negative { -magnitude } else { magnitude })
 }
 
+/// The integer that a number is, if it is one.
+pub(super) fn whole(number: f64) -> Option<i32> {
+    let is_integer = number.fract() == 0.0 && f64::from(i32::MIN) <= number && number <= f64::from(i32::MAX);
+    is_integer.then_some(number as i32)
+}
+
 /// Whether a word is `inf` itself, rather than a number that is too large.
 pub(super) fn says_infinity(word: &[u8]) -> bool {
     word.iter().any(|b| b.eq_ignore_ascii_case(&b'i'))

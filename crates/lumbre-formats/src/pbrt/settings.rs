@@ -9,6 +9,7 @@ use lumbre_scene::{
 use lumbre_shading::ShadingNormals;
 
 use super::convert::Converter;
+use super::lexer::{parse_number, whole};
 use super::params::{Params, Type};
 use super::source::{Result, Spot};
 use crate::Diagnostic;
@@ -366,11 +367,9 @@ impl Converter<'_, '_> {
     pub fn option(&mut self, name: &str, at: Spot, value: &str) -> Result<()> {
         let plain: String = name.chars().filter(|c| !matches!(c, '-' | '_')).collect();
         match plain.to_ascii_lowercase().as_str() {
-            "seed" => match value.parse::<i64>() {
-                Ok(seed) if i32::try_from(seed).is_ok() => {
-                    self.sampler_seed = Some(u64::from(seed as i32 as u32))
-                }
-                _ => {
+            "seed" => match parse_number(value.as_bytes()).and_then(whole) {
+                Some(seed) => self.sampler_seed = Some(u64::from(seed as u32)),
+                None => {
                     let wrong = Diagnostic::error("wrong value of the option \"seed\"").found(quoted(value));
                     return Err(at.wrong(wrong.expected("an integer")));
                 }

@@ -5,7 +5,7 @@ use std::cell::Cell;
 use lumbre_image::ColourSpace;
 
 use super::super::colour::rgb_from_xyz;
-use super::super::lexer::{Token, TokenKind, parse_number, says_infinity};
+use super::super::lexer::{Token, TokenKind, parse_number, says_infinity, whole};
 use super::super::params::{Param, Params, Type, Values, Wants};
 use super::super::source::{AtSpot, Result, Spot};
 use super::super::state::EntityKind;
@@ -123,13 +123,10 @@ impl Parser<'_, '_> {
                 Ok(true)
             }),
             Values::Integers(v) => lexer.numbers(|number| {
-                let is_whole = number.fract() == 0.0;
-                let is_integer = is_whole && f64::from(i32::MIN) <= number && number <= f64::from(i32::MAX);
-                if is_integer {
-                    room.room_in(v, "integers")?;
-                    v.push(number as i32);
-                }
-                Ok(is_integer)
+                let Some(number) = whole(number) else { return Ok(false) };
+                room.room_in(v, "integers")?;
+                v.push(number);
+                Ok(true)
             }),
             Values::Bools(_) | Values::Strings(_) => Ok(()),
         };
@@ -158,11 +155,9 @@ impl Parser<'_, '_> {
                     _ => return Ok(false),
                 }
             }
-            (Values::Integers(v), TokenKind::Bare) => match parse_number(lexer.raw(token)) {
-                Some(n) if n.fract() == 0.0 && f64::from(i32::MIN) <= n && n <= f64::from(i32::MAX) => {
-                    v.push(n as i32);
-                }
-                _ => return Ok(false),
+            (Values::Integers(v), TokenKind::Bare) => match parse_number(lexer.raw(token)).and_then(whole) {
+                Some(number) => v.push(number),
+                None => return Ok(false),
             },
             (Values::Strings(v), TokenKind::String) => v.push(lexer.string(token)?.into_owned()),
             (Values::Bools(v), TokenKind::Bare) => match lexer.raw(token) {
