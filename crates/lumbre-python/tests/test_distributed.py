@@ -107,6 +107,23 @@ def test_rays_come_back_with_the_answers_of_one(client, mixed) -> None:
         np.testing.assert_array_equal(getattr(hits, name), getattr(expected, name))
 
 
+def test_rays_and_answers_may_be_files(client, mixed, tmp_path) -> None:
+    origins, directions = random_rays(5003)
+    expected = mixed.cast(origins, directions, fields=("t", "prim"))
+    np.save(tmp_path / "rays.npy", np.hstack([origins, directions]))
+    rays = np.load(tmp_path / "rays.npy", mmap_mode="r")
+    kinds = {"t": np.float64, "prim": np.int32}
+    out = {name: np.lib.format.open_memmap(tmp_path / name, mode="w+", dtype=kind, shape=(5003,)) for name, kind in kinds.items()}
+    hits = cast(mixed, rays[:, :3], rays[:, 3:], client, out=out, rays_per_task=700)
+    assert hits.fields == ("t", "prim")
+    out["t"].flush()
+    np.testing.assert_array_equal(np.load(tmp_path / "t"), expected.t)
+    np.testing.assert_array_equal(out["prim"], expected.prim)
+    for wrong in (np.zeros(5002), np.zeros(5003, dtype=np.float32), np.zeros((5003, 3))):
+        with pytest.raises(lumbre.LumbreError, match="of the wrong kind"):
+            cast(mixed, origins, directions, client, out={"t": wrong})
+
+
 def test_a_time_limit_gives_what_one_machine_gives_for_as_many_samples(client, scene) -> None:
     for limit in (2.0, 8.0, 32.0, 128.0):
         try:
