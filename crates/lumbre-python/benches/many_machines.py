@@ -60,6 +60,12 @@ class Costs:
         return Costs(**{part.name: known["costs"][part.name] for part in fields(Costs)})
 
 
+def spread() -> list[float]:
+    """How uneven tasks are, by many_machines.json."""
+    times: list[float] = json.loads((HERE / "many_machines.json").read_text())["spread"]
+    return times
+
+
 @dataclass(frozen=True)
 class Job:
     """A render, and how it is cut: each tile is rendered in passes, which are ranges of samples."""
@@ -211,6 +217,8 @@ class Outcome:
     merged: list[int] = field(default_factory=list)
     """How often each task is in the picture."""
     deaths: int = 0
+    samples: float = 0.0
+    """Seconds of samples that all tasks have together."""
     busy: dict[str, float] = field(default_factory=dict)
     """Seconds that client, scheduler and all workers were at work."""
 
@@ -288,6 +296,7 @@ class Simulation:
     def give(self, task: int) -> None:
         """The client has given out a task."""
         samples = self.job.task * self.random.choice(self.job.spread)
+        self.outcome.samples += samples * self.job.threads
         sent = self.costs.send * self.size if self.job.fan_in == 1 else 0.0
         self.hand_over(_Work([task], samples + self.costs.start + self.costs.encode * self.job.part_pixels + sent))
 
@@ -385,39 +394,43 @@ def scene_arrivals(workers: int, seconds: float) -> list[float]:
 WORKERS = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000]
 
 
-def jobs(spread: Sequence[float]) -> dict[str, Callable[[int], Job]]:
-    """The renders of the plot, by their names, for so many threads: a picture of 1920 x 1080 pixels that takes one thread ten hours."""
-    job = Job(pixels=1920 * 1080, work=36000.0, tiles=2040, spread=spread, build=0.5)
+SIZE = (7680, 4320)
+SPP = 1024
+
+
+def jobs() -> dict[str, Callable[[int], Job]]:
+    """The renders of the plot, by their names, for so many threads: a large picture that takes one thread ten hours."""
+    job = Job(pixels=SIZE[0] * SIZE[1], work=36000.0, tiles=2040, spread=spread(), build=0.5)
     long, short = replace(job, passes=2), replace(job, passes=16)
-    machines = replace(short, threads=32.0)
     return {
         "tasks of 9 s": lambda threads: long,
         "tasks of 1 s": lambda threads: short,
-        "tasks of 1 s, merged 16 to 1": lambda threads: replace(short, fan_in=16),
-        "32 threads a worker": lambda threads: machines,
-        "16 tasks a thread": lambda threads: default(job, threads),
+        "tasks of 1 s, merged by 16": lambda threads: replace(short, fan_in=16),
+        "by default": lambda threads: default(job, threads),
+        "workers of 32 threads": lambda threads: replace(default(job, threads // 32), threads=32.0),
     }
 
 
-def default(job: Job, threads: int) -> Job:
+def default(job: Job, slots: int) -> Job:
     """As `lumbre.distributed` cuts a render where it is not told how."""
-    wanted = 16 * threads
+    wanted = max(4 * slots, min(64 * slots, 1 << 14))
     side = max(16, math.ceil(math.sqrt(job.pixels / wanted)))
-    tiles = math.ceil(1920 / side) * math.ceil(1080 / side)
-    return replace(job, tiles=tiles, passes=max(1, round(wanted / tiles)))
+    tiles = math.ceil(SIZE[0] / side) * math.ceil(SIZE[1] / side)
+    step = max(1, min(SPP, math.ceil(SPP * tiles / wanted), (1 << 23) // side**2))
+    return replace(job, tiles=tiles, passes=math.ceil(SPP / step))
 
 
-def table(costs: Costs, spread: Sequence[float]) -> dict[str, list[tuple[int, Prediction, float]]]:
+def table(costs: Costs) -> dict[str, list[tuple[int, Prediction, float]]]:
     """Threads, what the formula says, and the efficiency of a simulation, for each of the renders."""
     rows: dict[str, list[tuple[int, Prediction, float]]] = {}
-    for name, job_of in jobs(spread).items():
+    for name, job_of in jobs().items():
         for threads in WORKERS:
-            job = job_of(threads)
-            if threads < job.threads:
+            if name.startswith("workers of") and threads < 32:
                 continue
+            job = job_of(threads)
             workers = round(threads / job.threads)
-            seconds = Simulation(job, costs, workers).run().seconds
-            efficiency = job.work / (workers * job.threads * seconds)
+            outcome = Simulation(job, costs, workers).run()
+            efficiency = outcome.samples / (workers * job.threads * outcome.seconds)
             rows.setdefault(name, []).append((threads, predict(job, costs, workers), efficiency))
     return rows
 
@@ -465,8 +478,7 @@ def plot(rows: dict[str, list[tuple[int, Prediction, float]]]) -> str:
 
 
 def main(folder: Path) -> None:
-    costs, spread = Costs.measured(), json.loads((HERE / "many_machines.json").read_text())["spread"]
-    rows = table(costs, spread)
+    rows = table(Costs.measured())
     print("| | threads | seconds | efficiency | simulated | limited by |\n|---|---|---|---|---|---|")
     for name, points in rows.items():
         for threads, predicted, simulated in points:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from dataclasses import replace
 
@@ -12,12 +11,26 @@ from conftest import ROOT
 BENCHES = ROOT / "crates/lumbre-python/benches"
 sys.path.insert(0, str(BENCHES))
 
-from many_machines import Accidents, Costs, Job, Rest, Simulation, Stages, predict, scene_arrivals  # noqa: E402
+from many_machines import (  # noqa: E402
+    SIZE,
+    SPP,
+    Accidents,
+    Costs,
+    Job,
+    Rest,
+    Simulation,
+    Stages,
+    default,
+    predict,
+    scene_arrivals,
+    spread,
+)
+
+from lumbre.distributed import _Plan, _wanted  # noqa: E402
 
 COSTS = Costs.measured()
-SPREAD = json.loads((BENCHES / "many_machines.json").read_text())["spread"]
 FREE = Costs(**dict.fromkeys(vars(COSTS), 0.0))
-JOB = Job(pixels=640 * 360, work=900.0, tiles=60, passes=8, spread=SPREAD, build=0.5)
+JOB = Job(pixels=640 * 360, work=900.0, tiles=60, passes=8, spread=spread(), build=0.5)
 
 
 def test_one_worker_takes_the_sum_of_the_work() -> None:
@@ -95,3 +108,10 @@ def test_what_is_not_simulated_is_refused() -> None:
         Simulation(replace(JOB, fan_in=3), COSTS, 2)
     with pytest.raises(ValueError, match="deaths"):
         Simulation(replace(JOB, fan_in=2), COSTS, 2, Accidents(deaths=1.0))
+
+
+def test_renders_are_cut_as_the_package_cuts_them() -> None:
+    for slots in (1, 2, 30, 256, 1000, 10000):
+        job = default(replace(JOB, pixels=SIZE[0] * SIZE[1]), slots)
+        plan = _Plan(1, (0, 0, *SIZE), SPP, _wanted(slots), None, None, False)
+        assert (job.tiles, job.tasks) == (len(plan.tiles), sum(1 for _ in plan.tasks()))

@@ -33,7 +33,9 @@ from ._lumbre import LumbreError
 from .image import Image
 from .scene import FIELDS, Hits, Progress, Scene, _checked, _columns, load
 
-_TASKS_PER_THREAD = 16
+# A render ends unevenly by about a task, and Dask takes some milliseconds for each: many for few threads, fewer for many.
+_TASKS_PER_THREAD = (4, 64)
+_MOST_TASKS = 1 << 14
 _LEAST_SIDE = 16
 _MOST_SAMPLES = 1 << 23
 
@@ -68,7 +70,8 @@ def render(
     time : seconds, optional
         Stops then, with as many samples as every pixel has: the picture is that of one machine for that spp.
     samples_per_task, tile : optional
-        How a render is cut: samples a pixel, and the side of square tiles. By default some sixteen tasks for each thread.
+        How a render is cut: samples a pixel, and the side of square tiles. By default up to 64 tasks for each thread, 4 for those of
+        thousands.
     threads : threads of each task
         1 where workers have a slot for each core, as is usual.
     ship : bool
@@ -92,7 +95,7 @@ def render(
     slots = max(1, sum(client.nthreads().values()))
     if spp is None:
         spp = 2**20 if time is not None else _known(sources[0])._native.samples()
-    plan = _Plan(len(sources), crop, spp, slots * _TASKS_PER_THREAD, tile, samples_per_task, time is not None)
+    plan = _Plan(len(sources), crop, spp, _wanted(slots), tile, samples_per_task, time is not None)
     wholes: list[_lumbre.Part | None] = [None] * len(sources)
     runner = _Runner(client, retries, patience, 2 * slots + 2)
     scenes = [runner.share(source) for source in sources]
@@ -284,6 +287,12 @@ class _Task:
     def samples(self) -> int:
         x0, y0, x1, y1 = self.crop
         return (x1 - x0) * (y1 - y0) * (self.end - self.first)
+
+
+def _wanted(slots: int) -> int:
+    """Into about how many tasks a render is cut for so many threads."""
+    least, most = _TASKS_PER_THREAD
+    return max(least * slots, min(most * slots, _MOST_TASKS))
 
 
 class _Plan:
