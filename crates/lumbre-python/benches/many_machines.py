@@ -413,7 +413,7 @@ def jobs() -> dict[str, Callable[[int], Job]]:
 
 def default(job: Job, slots: int) -> Job:
     """As `lumbre.distributed` cuts a render where it is not told how."""
-    wanted = max(4 * slots, min(64 * slots, 1 << 14))
+    wanted = max(4 * slots, min(32 * slots, 1 << 14))
     side = max(16, math.ceil(math.sqrt(job.pixels / wanted)))
     tiles = math.ceil(SIZE[0] / side) * math.ceil(SIZE[1] / side)
     step = max(1, min(SPP, math.ceil(SPP * tiles / wanted), (1 << 23) // side**2))

@@ -34,7 +34,7 @@ from .image import Image
 from .scene import FIELDS, Hits, Progress, Scene, _checked, _columns, load
 
 # A render ends unevenly by about a task, and Dask takes some milliseconds for each: many for few threads, fewer for many.
-_TASKS_PER_THREAD = (4, 64)
+_TASKS_PER_THREAD = (4, 32)
 _MOST_TASKS = 1 << 14
 _LEAST_SIDE = 16
 _MOST_SAMPLES = 1 << 23
@@ -70,7 +70,7 @@ def render(
     time : seconds, optional
         Stops then, with as many samples as every pixel has: the picture is that of one machine for that spp.
     samples_per_task, tile : optional
-        How a render is cut: samples a pixel, and the side of square tiles. By default up to 64 tasks for each thread, 4 for those of
+        How a render is cut: samples a pixel, and the side of square tiles. By default up to 32 tasks for each thread, 4 for those of
         thousands.
     threads : threads of each task
         1 where workers have a slot for each core, as is usual.
