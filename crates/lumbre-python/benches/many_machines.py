@@ -143,12 +143,13 @@ def predict(job: Job, costs: Costs, workers: int) -> Prediction:
     stages, tasks = Stages.of(job, costs), job.tasks
     window = 2 * workers + 2
     cycle = stages.worker + stages.client + stages.scheduler + 4 * costs.latency
-    # A worker has its first task after those before it have been given out.
+    # A worker has its first task after those before it have been given out; of many workers the one with the shortest is done first.
     wait = costs.client / 2 * min(workers, tasks) / 2
+    shortest = stages.worker * min(job.spread)
     times = {
         "workers": max(wait + tasks * stages.worker / workers + tail(job, stages, workers), tasks * cycle / window),
-        "client": stages.worker + tasks * stages.client,
-        "scheduler": stages.worker + tasks * stages.scheduler,
+        "client": shortest + tasks * stages.client,
+        "scheduler": shortest + tasks * stages.scheduler,
     }
     limit = max(times, key=lambda place: times[place])
     seconds = start(job, costs, workers) + times[limit] + stages.client + stages.scheduler + 4 * costs.latency
@@ -162,16 +163,21 @@ def start(job: Job, costs: Costs, workers: int) -> float:
 
 
 def tail(job: Job, stages: Stages, workers: int) -> float:
-    """Seconds from when half of the workers' last tasks would be over until all are.
+    """Seconds from when workers have, on average, done their last tasks until the last of them has.
 
-    When no task is left to begin, what is left of each that runs is distributed as the rest of a renewal process: density
-    P(task > r) / mean. The last of W of them is about its quantile 1 - 1 / (W + 1).
+    When no task is left to give out, each worker has one that runs and one that waits. What is left of the first is distributed as the rest
+    of a renewal process: density P(task > r) / mean. The longest of W sums of both is about the quantile 1 - 1 / (W + 1).
     """
+    if workers == 1:
+        return 0.0
     if job.tasks <= workers:
-        highest = sorted(job.spread)[min(len(job.spread) - 1, int(len(job.spread) * (1 - 1 / (job.tasks + 1))))]
-        return stages.worker * (highest - job.tasks / workers)
-    rest, wanted = Rest(job.spread), 1 - 1 / (workers + 1)
-    return stages.worker * (rest.quantile(wanted) - rest.mean) if workers > 1 else 0.0
+        longest = sorted(job.spread)[int(len(job.spread) * (1 - 1 / (job.tasks + 1)))]
+        return stages.worker * (longest - job.tasks / workers)
+    rest, steps = Rest(job.spread), 100
+    rests = [rest.quantile((step + 0.5) / steps) for step in range(steps)]
+    sums = sorted(left + time for left in rests for time in job.spread)
+    mean = rest.mean + sum(job.spread) / len(job.spread)
+    return stages.worker * (sums[int(len(sums) * (1 - 1 / (workers + 1)))] - mean)
 
 
 class Rest:
@@ -391,7 +397,7 @@ def scene_arrivals(workers: int, seconds: float) -> list[float]:
     return arrivals
 
 
-WORKERS = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000]
+THREADS = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000]
 
 
 SIZE = (7680, 4320)
@@ -401,19 +407,19 @@ SPP = 1024
 def jobs() -> dict[str, Callable[[int], Job]]:
     """The renders of the plot, by their names, for so many threads: a large picture that takes one thread ten hours."""
     job = Job(pixels=SIZE[0] * SIZE[1], work=36000.0, tiles=2040, spread=spread(), build=0.5)
-    long, short = replace(job, passes=2), replace(job, passes=16)
+    few, many = replace(job, passes=2), replace(job, passes=16)
     return {
-        "tasks of 9 s": lambda threads: long,
-        "tasks of 1 s": lambda threads: short,
-        "tasks of 1 s, merged by 16": lambda threads: replace(short, fan_in=16),
+        "4080 tasks": lambda threads: few,
+        "32640 tasks": lambda threads: many,
+        "32640, merged by 16": lambda threads: replace(many, fan_in=16),
         "by default": lambda threads: default(job, threads),
-        "workers of 32 threads": lambda threads: replace(default(job, threads // 32), threads=32.0),
+        "2040, 32 threads a worker": lambda threads: replace(job, threads=32.0),
     }
 
 
 def default(job: Job, slots: int) -> Job:
     """As `lumbre.distributed` cuts a render where it is not told how."""
-    wanted = max(4 * slots, min(32 * slots, 1 << 14))
+    wanted = max(4 * slots, min(32 * slots, 1 << 14), math.ceil(job.pixels * SPP / (1 << 23)))
     side = max(16, math.ceil(math.sqrt(job.pixels / wanted)))
     tiles = math.ceil(SIZE[0] / side) * math.ceil(SIZE[1] / side)
     step = max(1, min(SPP, math.ceil(SPP * tiles / wanted), (1 << 23) // side**2))
@@ -424,14 +430,14 @@ def table(costs: Costs) -> dict[str, list[tuple[int, Prediction, float]]]:
     """Threads, what the formula says, and the efficiency of a simulation, for each of the renders."""
     rows: dict[str, list[tuple[int, Prediction, float]]] = {}
     for name, job_of in jobs().items():
-        for threads in WORKERS:
-            if name.startswith("workers of") and threads < 32:
-                continue
+        for threads in THREADS:
             job = job_of(threads)
-            workers = round(threads / job.threads)
+            workers = threads // round(job.threads)
+            if workers == 0:
+                continue
             outcome = Simulation(job, costs, workers).run()
             efficiency = outcome.samples / (workers * job.threads * outcome.seconds)
-            rows.setdefault(name, []).append((threads, predict(job, costs, workers), efficiency))
+            rows.setdefault(name, []).append((round(workers * job.threads), predict(job, costs, workers), efficiency))
     return rows
 
 

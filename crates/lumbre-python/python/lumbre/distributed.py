@@ -37,6 +37,7 @@ from .scene import FIELDS, Hits, Progress, Scene, _checked, _columns, load
 _TASKS_PER_THREAD = (4, 32)
 _MOST_TASKS = 1 << 14
 _LEAST_SIDE = 16
+# A task that is lost is no more than these, some ten seconds.
 _MOST_SAMPLES = 1 << 23
 
 
@@ -313,6 +314,8 @@ class _Plan:
             raise LumbreError(f"there is nothing to render (found crop {crop} and spp {spp})")
         pixels = (x1 - x0) * (y1 - y0)
         # A tile is sent once for every range of samples, so that the picture is rather cut into tiles.
+        if not is_timed:
+            wanted = max(wanted, math.ceil(pixels * spp * frames / _MOST_SAMPLES))
         side = tile or max(_LEAST_SIDE, math.ceil(math.sqrt(pixels * frames / wanted)))
         self.tiles = [(x, y, min(x + side, x1), min(y + side, y1)) for y in range(y0, y1, side) for x in range(x0, x1, side)]
         by_tasks = math.ceil(spp * len(self.tiles) * frames / wanted)
