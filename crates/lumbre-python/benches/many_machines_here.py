@@ -61,8 +61,8 @@ def main(spp: int, rounds: int, slots: int) -> None:
     # Threads of one machine that are no gain to each other are no fault of workers.
     job, costs = job_of(threads * slots, spp, slots), Costs.measured()
     said, outcome = predict(job, costs, slots).seconds, Simulation(job, costs, slots).run()
-    print(f"least of threads {threads:.2f} s, of workers {machines:.2f} s: efficiency {threads / machines:.1%}; {job.tasks} tasks; ", end="")
-    print(f"by the formula {said:.2f} s, by simulation {outcome.seconds * job.work / outcome.samples:.2f} s")
+    print(f"least of threads {threads:.2f} s, of workers {machines:.2f} s: efficiency {threads / machines:.1%}")
+    print(f"{job.tasks} tasks; by the formula {said:.2f} s, by simulation {outcome.seconds * job.work / outcome.samples:.2f} s")
 
 
 if __name__ == "__main__":

@@ -69,7 +69,8 @@ def main(count: int, folder: Path) -> None:
     own, of_files = (most - least for most, least in zip(watch.most, before, strict=True))
     hit = sum(int(np.isfinite(out["t"][first : first + PIECE]).sum()) for first in range(0, count, PIECE))
     print(f"{count} rays, {rays.nbytes / 1e9:.1f} GB: {took:.1f} s, {count / took / 1e6:.2f} M rays/s, {hit / count:.1%} hit")
-    print(f"memory of its own: {before[0] / 1e6:.1f} MB before, {own / 1e6:.1f} MB more at most; pages of files: {of_files / 1e6:.0f} MB at most")
+    print(f"memory of its own: {before[0] / 1e6:.1f} MB before, {own / 1e6:.1f} MB more at most")
+    print(f"pages of files: {of_files / 1e6:.0f} MB more at most")
 
 
 if __name__ == "__main__":
