@@ -87,6 +87,26 @@ def test_many_machines_render_the_bytes_of_one(client, scene) -> None:
     np.testing.assert_array_equal(crop.array, expected.array[4:29, 3:21])
 
 
+def test_the_scheduler_is_asked_who_is_there_once_and_not_for_each_task(client, scene, monkeypatch) -> None:
+    asked = {"nthreads": 0, "processing": 0}
+
+    def counted(name):
+        ask = getattr(client, name)
+
+        def asks(*arguments, **named):
+            asked[name] += 1
+            return ask(*arguments, **named)
+
+        return asks
+
+    for name in asked:
+        monkeypatch.setattr(client, name, counted(name))
+    image = render(scene, client, 8, (40, 30), tile=5, samples_per_task=1, patience=60.0)
+    np.testing.assert_array_equal(image.array, scene.render(spp=8, size=(40, 30)).array)
+    # Not for each of the 384 tasks.
+    assert asked == {"nthreads": 1, "processing": 0}
+
+
 def test_files_are_read_from_shared_storage_or_sent_along(client, tmp_path) -> None:
     path = SCENES / "csg" / "csg.pbrt"
     expected = lumbre.load(path).render(spp=1, size=(16, 12)).array
