@@ -200,6 +200,10 @@ impl RenderState {
         if own.guides {
             return Err(MergeError::Guides);
         }
+        if self.tiles.len() > 1 && other.tiles.len() > 1 {
+            // Each of many would be looked for among many.
+            self.tiles = vec![self.film().into_owned()];
+        }
         self.bounds = self.bounds.hull(&other.bounds);
         other.tiles.iter().for_each(|tile| self.add(tile));
         self.pieces.extend(other.pieces.iter().cloned());
@@ -332,6 +336,14 @@ mod tests {
             merged.to_rendered(true),
             RenderState { tiles: whole.tiles.clone(), ..merged.clone() }.to_rendered(true)
         );
+        let many = |samples: Range<u32>| {
+            let mut many = state(tiles[0], samples.clone());
+            tiles[1..].iter().for_each(|tile| many.merge(&state(*tile, samples.clone())).unwrap());
+            many
+        };
+        let mut both = many(0..3);
+        both.merge(&many(3..7)).unwrap();
+        assert_eq!((both.tiles.len(), both.film()), (1, whole.film()));
     }
 
     #[test]
