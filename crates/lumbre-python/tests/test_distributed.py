@@ -83,7 +83,7 @@ def test_many_machines_render_the_bytes_of_one(client, scene) -> None:
     np.testing.assert_array_equal(image.feature("normal"), expected.feature("normal"))
     assert image.png() == expected.png() and image.stats["rays"] == expected.stats["rays"]
     assert len(told) == 3 * 2 * 3 and told[-1] == 1.0
-    crop = render(scene, client, 5, (40, 30), crop=(3, 4, 21, 29))
+    crop = render(scene, client, 5, (40, 30), crop=(3, 4, 21, 29), threads=2)
     np.testing.assert_array_equal(crop.array, expected.array[4:29, 3:21])
 
 
