@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
@@ -284,22 +285,33 @@ impl Scene {
         // The render has threads of its own; those that wait for it here look for Ctrl-C.
         let rendered = py.detach(|| {
             std::thread::scope(|scope| {
+                let (done, waits) = mpsc::channel();
                 let render = || self.scene.render_from(&options, &watch, &cancel, None, None);
-                let running = scope.spawn(render);
+                let running = scope.spawn(move || {
+                    // The receiver is there until the scope ends.
+                    drop(done.send(render()));
+                });
                 let mut raised = None;
-                while !running.is_finished() {
-                    std::thread::park_timeout(LOOK);
-                    if raised.is_none() && !running.is_finished() {
-                        let look =
-                            |py: Python<'_>| py.check_signals().and_then(|()| watch.tell(py, tells.as_ref()));
-                        raised = Python::attach(look).err();
-                        if raised.is_some() {
-                            cancel.cancel();
+                loop {
+                    match waits.recv_timeout(LOOK) {
+                        Ok(rendered) => return raised.map_or(Ok(rendered), Err),
+                        Err(RecvTimeoutError::Timeout) if raised.is_none() => {
+                            let look = |py: Python<'_>| {
+                                py.check_signals().and_then(|()| watch.tell(py, tells.as_ref()))
+                            };
+                            raised = Python::attach(look).err();
+                            if raised.is_some() {
+                                cancel.cancel();
+                            }
+                        }
+                        Err(RecvTimeoutError::Timeout) => {}
+                        Err(RecvTimeoutError::Disconnected) => {
+                            let panic =
+                                running.join().expect_err("it ends without an answer by a panic alone");
+                            std::panic::resume_unwind(panic);
                         }
                     }
                 }
-                let rendered = running.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-                raised.map_or(Ok(rendered), Err)
             })
         })?;
         let (mut picture, state) = rendered.map_err(raised)?;

@@ -83,8 +83,28 @@ def test_many_machines_render_the_bytes_of_one(client, scene) -> None:
     np.testing.assert_array_equal(image.feature("normal"), expected.feature("normal"))
     assert image.png() == expected.png() and image.stats["rays"] == expected.stats["rays"]
     assert len(told) == 3 * 2 * 3 and told[-1] == 1.0
-    crop = render(scene, client, 5, (40, 30), crop=(3, 4, 21, 29))
+    crop = render(scene, client, 5, (40, 30), crop=(3, 4, 21, 29), threads=2)
     np.testing.assert_array_equal(crop.array, expected.array[4:29, 3:21])
+
+
+def test_the_scheduler_is_asked_who_is_there_once_and_not_for_each_task(client, scene, monkeypatch) -> None:
+    asked = {"nthreads": 0, "processing": 0}
+
+    def counted(name):
+        ask = getattr(client, name)
+
+        def asks(*arguments, **named):
+            asked[name] += 1
+            return ask(*arguments, **named)
+
+        return asks
+
+    for name in asked:
+        monkeypatch.setattr(client, name, counted(name))
+    image = render(scene, client, 8, (40, 30), tile=5, samples_per_task=1, patience=60.0)
+    np.testing.assert_array_equal(image.array, scene.render(spp=8, size=(40, 30)).array)
+    # Not for each of the 384 tasks.
+    assert asked == {"nthreads": 1, "processing": 0}
 
 
 def test_files_are_read_from_shared_storage_or_sent_along(client, tmp_path) -> None:
@@ -105,6 +125,23 @@ def test_rays_come_back_with_the_answers_of_one(client, mixed) -> None:
     hits = cast(mixed, origins, directions, client, tmax=np.linspace(0.1, 2.0, 5003), rays_per_task=700)
     for name in expected.fields:
         np.testing.assert_array_equal(getattr(hits, name), getattr(expected, name))
+
+
+def test_rays_and_answers_may_be_files(client, mixed, tmp_path) -> None:
+    origins, directions = random_rays(5003)
+    expected = mixed.cast(origins, directions, fields=("t", "prim"))
+    np.save(tmp_path / "rays.npy", np.hstack([origins, directions]))
+    rays = np.load(tmp_path / "rays.npy", mmap_mode="r")
+    kinds = {"t": np.float64, "prim": np.int32}
+    out = {name: np.lib.format.open_memmap(tmp_path / name, mode="w+", dtype=kind, shape=(5003,)) for name, kind in kinds.items()}
+    hits = cast(mixed, rays[:, :3], rays[:, 3:], client, out=out, rays_per_task=700)
+    assert hits.fields == ("t", "prim")
+    out["t"].flush()
+    np.testing.assert_array_equal(np.load(tmp_path / "t"), expected.t)
+    np.testing.assert_array_equal(out["prim"], expected.prim)
+    for wrong in (np.zeros(5002), np.zeros(5003, dtype=np.float32), np.zeros((5003, 3))):
+        with pytest.raises(lumbre.LumbreError, match="of the wrong kind"):
+            cast(mixed, origins, directions, client, out={"t": wrong})
 
 
 def test_a_time_limit_gives_what_one_machine_gives_for_as_many_samples(client, scene) -> None:

@@ -98,3 +98,13 @@ def test_the_program_is_there_with_its_statuses(tmp_path) -> None:
     wrong = run("rendr", str(path))
     assert wrong.returncode == 2 and "rendr" in wrong.stderr
     assert run("--version").stdout.startswith("lumbre ")
+
+
+def test_a_small_render_ends_when_it_is_done() -> None:
+    # Not when someone looks for Ctrl-C the next time, after 20 ms.
+    scene, least = lumbre.Scene([lumbre.Sphere()]), 1.0
+    for _ in range(200):
+        began = time.perf_counter()
+        scene.render(spp=1, size=(2, 3), threads=1)
+        least = min(least, time.perf_counter() - began)
+    assert least < 0.015

@@ -13,11 +13,13 @@ import io
 import math
 import os
 import pickle
+import queue
 import tempfile
 import threading
 import time as clock
 import zipfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -29,10 +31,13 @@ from . import _lumbre
 from ._arrays import rays
 from ._lumbre import LumbreError
 from .image import Image
-from .scene import FIELDS, Hits, Progress, Scene, _columns, load
+from .scene import FIELDS, Hits, Progress, Scene, _checked, _columns, load
 
-_TASKS_PER_THREAD = 16
+# A render ends unevenly by about a task, and Dask takes some milliseconds for each: many for few threads, fewer for many.
+_TASKS_PER_THREAD = (4, 32)
+_MOST_TASKS = 1 << 14
 _LEAST_SIDE = 16
+# A task that is lost is no more than these, some ten seconds.
 _MOST_SAMPLES = 1 << 23
 
 
@@ -66,7 +71,8 @@ def render(
     time : seconds, optional
         Stops then, with as many samples as every pixel has: the picture is that of one machine for that spp.
     samples_per_task, tile : optional
-        How a render is cut: samples a pixel, and the side of square tiles. By default some sixteen tasks for each thread.
+        How a render is cut: samples a pixel, and the side of square tiles. By default up to 32 tasks for each thread, 4 for those of
+        thousands.
     threads : threads of each task
         1 where workers have a slot for each core, as is usual.
     ship : bool
@@ -90,7 +96,7 @@ def render(
     slots = max(1, sum(client.nthreads().values()))
     if spp is None:
         spp = 2**20 if time is not None else _known(sources[0])._native.samples()
-    plan = _Plan(len(sources), crop, spp, slots * _TASKS_PER_THREAD, tile, samples_per_task, time is not None)
+    plan = _Plan(len(sources), crop, spp, _wanted(slots), tile, samples_per_task, time is not None)
     wholes: list[_lumbre.Part | None] = [None] * len(sources)
     runner = _Runner(client, retries, patience, 2 * slots + 2)
     scenes = [runner.share(source) for source in sources]
@@ -141,24 +147,34 @@ def cast(
     tmax: npt.ArrayLike = np.inf,
     *,
     fields: Sequence[str] = FIELDS,
-    rays_per_task: int = 1 << 18,
+    out: Mapping[str, npt.NDArray[Any]] | None = None,
+    rays_per_task: int = 1 << 17,
     ship: bool = False,
     retries: int = 10,
     patience: float | None = None,
 ) -> Hits:
-    """`Scene.cast` on a Dask client, with the same answers to the bit; arguments as there, and as of `render`."""
+    """`Scene.cast` on a Dask client, with the same answers to the bit; arguments as there, and as of `render`.
+
+    Memory-mapped rays are read, and a memory-mapped `out` is written, a few tasks at a time.
+    """
     o, d, low, high = rays(origins, directions, tmin, tmax)
     source = _Source.of(scene, ship, None)
     slots = max(1, sum(client.nthreads().values()))
     runner = _Runner(client, retries, patience, 2 * slots + 2)
     shared = runner.share(source)
-    columns = _columns(len(o), o.dtype, fields)
+    columns = _columns(len(o), o.dtype, fields) if out is None else _checked(out)
+    expected = _columns(0, o.dtype, tuple(columns))
+    for name, column in columns.items():
+        shape = (len(o), *expected[name].shape[1:])
+        if column.shape != shape or column.dtype != expected[name].dtype:
+            found = f"{column.dtype} of shape {column.shape}"
+            raise LumbreError(f"out: {name} is of the wrong kind (found {found}; expected {expected[name].dtype} of shape {shape})")
 
     def some(limit: Any, part: slice) -> Any:
-        return limit[part] if isinstance(limit, np.ndarray) else limit
+        return np.array(limit[part]) if isinstance(limit, np.ndarray) else limit
 
     def call(part: slice) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        return _cast_part, (shared, source.key, o[part], d[part], some(low, part), some(high, part), tuple(fields))
+        return _cast_part, (shared, source.key, some(o, part), some(d, part), some(low, part), some(high, part), tuple(columns))
 
     parts = (slice(first, min(first + rays_per_task, len(o))) for first in range(0, len(o), rays_per_task))
     for part, answers in runner.run(parts, call, None):
@@ -274,6 +290,12 @@ class _Task:
         return (x1 - x0) * (y1 - y0) * (self.end - self.first)
 
 
+def _wanted(slots: int) -> int:
+    """Into about how many tasks a render is cut for so many threads."""
+    least, most = _TASKS_PER_THREAD
+    return max(least * slots, min(most * slots, _MOST_TASKS))
+
+
 class _Plan:
     """How a render is cut: passes of some samples each, over tiles of all frames."""
 
@@ -292,6 +314,8 @@ class _Plan:
             raise LumbreError(f"there is nothing to render (found crop {crop} and spp {spp})")
         pixels = (x1 - x0) * (y1 - y0)
         # A tile is sent once for every range of samples, so that the picture is rather cut into tiles.
+        if not is_timed:
+            wanted = max(wanted, math.ceil(pixels * spp * frames / _MOST_SAMPLES))
         side = tile or max(_LEAST_SIDE, math.ceil(math.sqrt(pixels * frames / wanted)))
         self.tiles = [(x, y, min(x + side, x1), min(y + side, y1)) for y in range(y0, y1, side) for x in range(x0, x1, side)]
         by_tasks = math.ceil(spp * len(self.tiles) * frames / wanted)
@@ -314,27 +338,39 @@ class _Plan:
                     yield _Task(frame, number, crop, first, min(first + self.step, self.spp))
 
 
-@dataclass
+@dataclass(eq=False)
 class _Given:
     """A task that is given out, maybe several times."""
 
     task: Any
-    started: float
+    started: float = 0.0
     futures: list[Any] = field(default_factory=list)
     failures: int = 0
 
 
 class _Runner:
-    """Gives tasks to workers, a window of them at a time, until each has been done once."""
+    """Gives tasks to workers, a window of them at a time, until each has been done once.
+
+    What is done for a task takes the same time however many there are, and however many workers: all that is asked of the scheduler is
+    asked for many tasks at once, and only tasks that are done are looked at.
+    """
 
     POLL = 0.25
     LEAST_PATIENCE = 2.0
+    # So many answers are fetched at once: few trips, and little memory.
+    BATCH = 64
+    # Times of as many tasks as say what is usual.
+    REMEMBERED = 255
 
     def __init__(self, client: Any, retries: int, patience: float | None, window: int) -> None:
         self.client, self.retries, self.patience, self.window = client, retries, patience, window
         self.name = f"lumbre-{os.getpid()}-{clock.monotonic_ns()}"
         self.count = 0
-        self.took: list[float] = []
+        self.running: set[_Given] = set()
+        self.givens: dict[str, _Given] = {}
+        self.ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self.late: list[Any] = []
+        self.took: deque[float] = deque(maxlen=self.REMEMBERED)
 
     def share(self, source: _Source) -> Any:
         """The contents as the answer of a task, which Dask computes again where all workers that have it die."""
@@ -348,78 +384,112 @@ class _Runner:
     ) -> Iterator[tuple[Any, Any]]:
         """Each task with its answer, as they come; those that are not done at the deadline are called off."""
         rest = iter(tasks)
-        running: list[_Given] = []
-        has_more = True
+        looked = clock.monotonic()
         try:
             while True:
-                while has_more and len(running) < self.window:
-                    task = next(rest, None)
-                    has_more = task is not None
-                    if task is not None:
-                        running.append(self._given(_Given(task, clock.monotonic()), call))
-                if not running or (deadline is not None and clock.monotonic() > deadline):
+                while len(self.running) < self.window and (task := next(rest, None)) is not None:
+                    given = _Given(task)
+                    self.running.add(given)
+                    self._give(given, call)
+                if not self.running or (deadline is not None and clock.monotonic() > deadline):
                     return
-                self._wait(running, deadline)
-                for given in list(running):
-                    answer = self._answer(given, call)
-                    if answer is not None:
-                        running.remove(given)
-                        self._call_off(given)
-                        yield given.task, answer[0]
+                for future, answer in self._answers(self._ended(deadline), call):
+                    # Another worker may have been sooner.
+                    given_out = self.givens.get(future.key)
+                    if given_out is not None:
+                        self.took.append(clock.monotonic() - given_out.started)
+                        self._call_off(given_out)
+                        yield given_out.task, answer
+                if clock.monotonic() - looked > self.POLL:
+                    looked = clock.monotonic()
+                    self._give_again(call)
+                    late, self.late = self.late, []
+                    for future in late:
+                        self.ended.put(future)
         finally:
-            for given in running:
+            for given in list(self.running):
                 self._call_off(given)
 
-    def _given(self, given: _Given, call: Callable[[Any], Any], shunned: Iterable[str] = ()) -> _Given:
+    def _give(self, given: _Given, call: Callable[[Any], Any], others: list[str] | None = None) -> None:
         work, arguments = call(given.task)
         self.count += 1
-        others = [name for name in self.client.nthreads() if name not in set(shunned)]
-        where = {"workers": others, "allow_other_workers": True} if shunned and others else {}
+        where = {"workers": others, "allow_other_workers": True} if others else {}
         key = f"{self.name}-{self.count}"
-        given.futures.append(self.client.submit(work, *arguments, key=key, pure=False, priority=-self.count, **where))
         given.started = clock.monotonic()
-        return given
+        self.givens[key] = given
+        future = self.client.submit(work, *arguments, key=key, pure=False, priority=-self.count, **where)
+        given.futures.append(future)
+        future.add_done_callback(self.ended.put)
 
-    def _wait(self, running: list[_Given], deadline: float | None) -> None:
-        import distributed
+    def _give_again(self, call: Callable[[Any], Any]) -> None:
+        """Gives tasks that take too long to workers as well that do not have them."""
+        now, patience = clock.monotonic(), self._patience()
+        slow = [given for given in self.running if now - given.started > patience and len(given.futures) < 4]
+        if not slow:
+            return
+        try:
+            names, processing = set(self.client.nthreads()), self.client.processing()
+        except Exception:
+            names, processing = set(), {}
+        holder = {key: name for name, keys in processing.items() for key in keys}
+        for given in slow:
+            holders = {holder.get(future.key) for future in given.futures}
+            self._give(given, call, sorted(names - holders) if holders & names else None)
 
-        wait: Any = distributed.wait
-
+    def _ended(self, deadline: float | None) -> list[Any]:
+        """Futures that are done, after a while at most."""
         left = self.POLL if deadline is None else min(self.POLL, max(0.01, deadline - clock.monotonic()))
-        futures = [future for given in running for future in given.futures]
-        if not any(future.done() for future in futures):
-            try:
-                wait(futures, timeout=left, return_when="FIRST_COMPLETED")
-            except TimeoutError:
-                pass
-            except Exception:
-                # What was lost is looked at one by one.
-                clock.sleep(0.05)
+        ended: list[Any] = []
+        try:
+            ended.append(self.ended.get(timeout=left))
+            while len(ended) < self.BATCH:
+                ended.append(self.ended.get_nowait())
+        except queue.Empty:
+            pass
+        ended = [future for future in ended if future.key in self.givens]
+        # One whose answer was lost on the way is computed again by Dask.
+        self.late += [future for future in ended if not future.done()]
+        return [future for future in ended if future.done()]
 
-    def _answer(self, given: _Given, call: Callable[[Any], Any]) -> tuple[Any] | None:
-        """The answer to a task, if there is one; else it is given out again where that is due."""
-        for future in list(given.futures):
-            if not future.done():
-                continue
+    def _answers(self, futures: list[Any], call: Callable[[Any], Any]) -> Iterator[tuple[Any, Any]]:
+        """The answers of those that have one; the others are given out again where that is due."""
+        if not futures:
+            return
+        try:
+            answers = self._gathered(futures) if all(future.status == "finished" for future in futures) else None
+        except Exception:
+            # What was lost is looked at one by one.
+            answers = None
+        if answers is not None:
+            yield from zip(futures, answers)
+            return
+        for future in futures:
             try:
-                answer = future.result(timeout=self._patience())
+                yield future, future.result(timeout=self._patience())
             except TimeoutError:
-                continue
+                self.late.append(future)
             except Exception as error:
                 if not _is_of_workers(error):
                     raise
-                given.futures.remove(future)
-                given.failures += 1
-                if given.failures > self.retries:
-                    raise LumbreError(f"a task was given out {given.failures} times, and lost each time: {error}") from error
-                if not given.futures:
-                    self._given(given, call)
-                continue
-            self.took.append(clock.monotonic() - given.started)
-            return (answer,)
-        if clock.monotonic() - given.started > self._patience() and len(given.futures) < 4:
-            self._given(given, call, self._holders(given))
-        return None
+                self._lost(future, error, call)
+
+    def _gathered(self, futures: list[Any]) -> list[Any]:
+        async def gathered() -> Any:
+            return await self.client.gather(futures, asynchronous=True)
+
+        answers: list[Any] = self.client.sync(gathered, callback_timeout=self._patience())
+        return answers
+
+    def _lost(self, future: Any, error: Exception, call: Callable[[Any], Any]) -> None:
+        given = self.givens.pop(future.key, None)
+        if given is None:
+            return
+        given.futures.remove(future)
+        given.failures += 1
+        if given.failures > self.retries:
+            raise LumbreError(f"a task was given out {given.failures} times, and lost each time: {error}") from error
+        if not given.futures:
+            self._give(given, call)
 
     def _patience(self) -> float:
         if self.patience is not None:
@@ -429,16 +499,10 @@ class _Runner:
             return 60.0
         return max(self.LEAST_PATIENCE, 6 * sorted(self.took)[len(self.took) // 2])
 
-    def _holders(self, given: _Given) -> set[str]:
-        """The workers that have the task now."""
-        keys = {future.key for future in given.futures}
-        try:
-            processing = self.client.processing()
-        except Exception:
-            return set()
-        return {name for name, held in processing.items() if keys & set(held)}
-
     def _call_off(self, given: _Given) -> None:
+        self.running.discard(given)
+        for future in given.futures:
+            self.givens.pop(future.key, None)
         unfinished = [future for future in given.futures if not future.done()]
         if unfinished:
             self.client.cancel(unfinished)

@@ -172,13 +172,6 @@ impl Tile {
         true
     }
 
-    /// Makes it a tile of more pixels, without samples but for its own.
-    pub(crate) fn grow(&mut self, bounds: PixelBounds) {
-        if bounds != self.bounds {
-            *self = self.placed_in(bounds);
-        }
-    }
-
     /// The part of it in these bounds, and nothing where it has none.
     pub(crate) fn placed_in(&self, bounds: PixelBounds) -> Self {
         let (both, from, to) = (self.bounds.intersection(&bounds), self.bounds, bounds);

@@ -4,6 +4,7 @@ mod bytes;
 
 use std::borrow::Cow;
 use std::fmt;
+use std::iter;
 use std::ops::Range;
 
 use lumbre_image::Image;
@@ -131,7 +132,9 @@ impl RenderState {
 
     /// The samples that the pixel with the fewest has.
     pub fn least_samples(&self) -> u32 {
-        self.pixels().map(|pixel| pixel.taken).min().unwrap_or(0)
+        let covered: u64 = self.tiles.iter().map(|tile| tile.bounds().area()).sum();
+        let is_whole = covered == self.bounds.area();
+        self.pixels().map(|pixel| pixel.taken).min().filter(|_| is_whole).unwrap_or(0)
     }
 
     /// The samples that the pixel with the most has.
@@ -158,7 +161,9 @@ impl RenderState {
 
     /// The picture that it is, with coverage if it is to be transparent. Its statistics are those of the samples.
     pub fn to_rendered(&self, transparent: bool) -> Rendered {
-        let rendered = rendered_of(self.tiles.iter(), self.bounds, transparent, self.extras());
+        // All in one, so that sums of rounded numbers, such as the noise, do not depend on the order of merges.
+        let film = self.film();
+        let rendered = rendered_of(iter::once(&*film), self.bounds, transparent, self.extras());
         let stats = Stats {
             spp: self.least_samples(),
             most_spp: self.most_samples(),
@@ -167,7 +172,7 @@ impl RenderState {
             rays: self.rays,
             dropped: self.dropped,
             first_dropped: self.first_dropped.clone(),
-            noise: noise(self.tiles.iter()),
+            noise: noise(iter::once(&*film)),
             ..Stats::default()
         };
         Rendered { stats, ..rendered }
@@ -195,11 +200,12 @@ impl RenderState {
         if own.guides {
             return Err(MergeError::Guides);
         }
-        let mut film = self.film().into_owned();
+        if self.tiles.len() > 1 && other.tiles.len() > 1 {
+            // Each of many would be looked for among many.
+            self.tiles = vec![self.film().into_owned()];
+        }
         self.bounds = self.bounds.hull(&other.bounds);
-        film.grow(self.bounds);
-        other.tiles.iter().for_each(|tile| film.merge(tile));
-        self.tiles = vec![film];
+        other.tiles.iter().for_each(|tile| self.add(tile));
         self.pieces.extend(other.pieces.iter().cloned());
         self.rays += other.rays;
         self.dropped += other.dropped;
@@ -207,6 +213,22 @@ impl RenderState {
         self.first_dropped.sort_unstable_by_key(|d| (d.sample, d.y, d.x));
         self.first_dropped.truncate(REMEMBERED);
         Ok(())
+    }
+
+    /// Adds the sums of a tile within the bounds, in a time that does not depend on how large the picture is, but for tiles that lie
+    /// across others.
+    fn add(&mut self, tile: &Tile) {
+        let bounds = tile.bounds();
+        if let Some(own) = self.tiles.iter_mut().find(|own| own.bounds().intersection(&bounds) == bounds) {
+            own.merge(tile);
+        } else if self.tiles.iter().all(|own| own.bounds().intersection(&bounds).is_empty()) {
+            self.tiles.push(tile.clone());
+        } else {
+            let mut film = Tile::new(self.bounds, self.extras());
+            self.tiles.iter().for_each(|own| film.take(own));
+            film.merge(tile);
+            self.tiles = vec![film];
+        }
     }
 }
 
@@ -289,6 +311,39 @@ mod tests {
             assert_eq!(parts[0].film(), whole.film());
             assert!(parts[0].is_finished() && parts[0].gaps(WHOLE).is_empty());
         }
+    }
+
+    #[test]
+    fn tiles_stay_tiles_when_they_are_merged_and_a_gap_has_no_samples() {
+        let whole = state(WHOLE, 0..7);
+        let tiles = WHOLE.tiles(4);
+        let mut merged = state(tiles[0], 0..3);
+        let mut least = Vec::new();
+        for tile in &tiles[1..] {
+            merged.merge(&state(*tile, 0..3)).unwrap();
+            least.push(merged.least_samples());
+        }
+        // Three in the first row, three in the second.
+        assert_eq!(least, [3, 3, 0, 0, 3]);
+        // The rest of them comes to the tiles that are there.
+        tiles.iter().for_each(|tile| merged.merge(&state(*tile, 3..6)).unwrap());
+        assert_eq!((merged.tiles.len(), tiles.len()), (6, 6));
+        assert_eq!(merged.least_samples(), 6);
+        // What lies across them does not.
+        merged.merge(&state(WHOLE, 6..7)).unwrap();
+        assert_eq!((merged.tiles.len(), merged.film()), (1, whole.film()));
+        assert_eq!(
+            merged.to_rendered(true),
+            RenderState { tiles: whole.tiles.clone(), ..merged.clone() }.to_rendered(true)
+        );
+        let many = |samples: Range<u32>| {
+            let mut many = state(tiles[0], samples.clone());
+            tiles[1..].iter().for_each(|tile| many.merge(&state(*tile, samples.clone())).unwrap());
+            many
+        };
+        let mut both = many(0..3);
+        both.merge(&many(3..7)).unwrap();
+        assert_eq!((both.tiles.len(), both.film()), (1, whole.film()));
     }
 
     #[test]
