@@ -196,7 +196,7 @@ fn only_the_sections_that_are_asked_for_are_told() {
     assert_eq!(Some(&sections[1]), section(&whole, "radiance"));
     let out = desk.lumbre(&["explain", "a.pbrt", "--pixel", "12,8", "--nearest", "--only", "Discriminant"]);
     let text = stdout(&out);
-    assert!(text.starts_with("THE DISCRIMINANT (A QUARTER OF THE TEXTBOOK'S)\n  l = w − "), "{text}");
+    assert!(text.starts_with("The discriminant (a quarter of the textbook's)\n  l = w − "), "{text}");
     assert_eq!(text.lines().count(), 4, "{text}");
 }
 

@@ -241,7 +241,7 @@ fn written(arguments: &Arguments, name: &Path, sections: &[Section]) -> String {
         _ => format!("{}: {name}", texts.title),
     };
     match arguments.format {
-        Format::Text => writing::text(sections, texts.schoolbook),
+        Format::Text => writing::text(sections, arguments.only.is_empty(), texts.schoolbook),
         Format::Markdown => format!("# {title}\n\n{}", writing::markdown(sections, texts.schoolbook)),
         Format::Html => html::html(&title, texts.code, sections, texts.schoolbook),
         Format::Json => {
