@@ -20,6 +20,7 @@ mod explain;
 mod failure;
 mod farm;
 mod info;
+mod language;
 mod math;
 mod memory;
 mod merge;

@@ -65,6 +65,7 @@ const OPTIONS: &[(&str, &[&str])] = &[
     ("--fail-above", &["--threshold", "--tolerance", "--max-error", "--fail"]),
     ("--metric", &["--error", "--method"]),
     ("--json", &["--format"]),
+    ("--lang", &["--language", "--locale"]),
     ("--define", &["--set", "--param", "--parameter", "--override"]),
 ];
 

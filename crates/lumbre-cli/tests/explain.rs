@@ -185,6 +185,22 @@ fn both_languages_tell_the_same_numbers() {
 }
 
 #[test]
+fn only_the_sections_that_are_asked_for_are_told() {
+    let desk = Desk::new();
+    desk.write("a.pbrt", SCENE);
+    let whole = explained(&desk, &["--pixel", "12,8", "--nearest"]);
+    let told = explained(&desk, &["--pixel", "12,8", "--nearest", "--only", "radiance,equation,Roots"]);
+    let sections = list(&told["sections"]);
+    assert_eq!(sections.len(), 2, "the roots are told with the equation: {told}");
+    assert_eq!(Some(&sections[0]), section(&whole, "equation"));
+    assert_eq!(Some(&sections[1]), section(&whole, "radiance"));
+    let out = desk.lumbre(&["explain", "a.pbrt", "--pixel", "12,8", "--nearest", "--only", "Discriminant"]);
+    let text = stdout(&out);
+    assert!(text.starts_with("The discriminant (a quarter of the textbook's)\n  l = w − "), "{text}");
+    assert_eq!(text.lines().count(), 4, "{text}");
+}
+
+#[test]
 fn every_form_is_whole() {
     let desk = Desk::new();
     desk.write("a <b> & c.pbrt", SCENE);
@@ -237,6 +253,12 @@ fn what_cannot_be_explained_is_said() {
         (&["a.pbrt", "--pixel", "1,1", "--ray", "0,0,0,0,0,1"], 2, "cannot be used with"),
         (&["a.pbrt", "--pixel", "1,1", "-o", "a.pbrt"], 2, "a.pbrt"),
         (&["b.pbrt", "--pixel", "1,1"], 4, "b.pbrt"),
+        (&["a.pbrt", "--pixel", "12,8", "--only", "hit,colour"], 2, "--only colour: no section has this key"),
+        (
+            &["a.pbrt", "--pixel", "12,8", "--only", "colour"],
+            2,
+            "camera, crossings, equation, hit, left, light, lights",
+        ),
     ] {
         let out = desk.lumbre(&[&["explain"], arguments].concat());
         assert_eq!(code(&out), status, "{arguments:?}: {}", stderr(&out));

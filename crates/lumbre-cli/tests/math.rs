@@ -228,6 +228,78 @@ fn an_expression_prints_its_steps_and_then_its_value() {
 }
 
 #[test]
+fn steps_help_and_mistakes_are_told_in_spanish_too() {
+    let desk = Desk::new();
+    for (expression, expected) in [
+        (
+            "dot([1, 2], [3, 4])",
+            "dot(a, b)\n  a·b = ax bx + ay by\n  = 1·3 + 2·4 = 11\n  > 0: el ángulo es menor que 90°\n= 11\n",
+        ),
+        (
+            "perspective(90, 2, 1, 3) * [1, 2, -4]",
+            "perspective(fovy, aspect, near, far)
+  k = cot(fovy/2) = 1
+  | k/aspect  0   0            0          |
+  | 0         k   0            0          |
+  | 0         0   (f+n)/(n-f)  2fn/(n-f)  |
+  | 0         0  -1            0          |
+  tras dividir entre w = -z: z = -near va a -1, z = -far va a 1
+M p
+  un punto: w = 1
+  | 0.5  0   0   0 | |  1 |   | 0.5 |
+  |   0  1   0   0 | |  2 | = |   2 |
+  |   0  0  -2  -3 | | -4 |   |   5 |
+  |   0  0  -1   0 | |  1 |   |   4 |
+  dividido entre w = 4
+= [0.125, 0.5, 1.25]
+",
+        ),
+        ("det([[0, 2], [3, 0]])", "det(M)\n  m11 m22 - m12 m21 = 0·0 - 2·3\n  < 0: refleja\n= -6\n"),
+        ("help angles", "angles(q)\n    heading, attitude y bank de un cuaternión, en grados\n"),
+    ] {
+        let out = desk.lumbre(&["math", "--lang", "es", expression]);
+        assert_eq!(code(&out), 0, "{}", stderr(&out));
+        assert_eq!(stdout(&out), expected);
+    }
+    for (expression, expected) in [
+        (
+            "x + dott(x, y)",
+            "error: expresión:1:5: función desconocida (hay \"dott\"; se esperaba: un nombre de la lista que da `help`; ¿quería decir \"dot\"?)
+  x + dott(x, y)
+      ^
+",
+        ),
+        (
+            "cross([1, 2, 3], [4, 5])",
+            "error: expresión:1:18: el argumento 2 de cross no vale (hay [4, 5]; se esperaba: un vector de 3)
+  cross([1, 2, 3], [4, 5])
+                   ^
+",
+        ),
+    ] {
+        let out = desk.lumbre(&["math", expression, "--lang", "es"]);
+        assert_eq!((code(&out), stdout(&out).as_str()), (2, ""));
+        assert_eq!(stderr(&out), expected);
+    }
+    let out = piped(&["math", "--lang", "es"], "1 +\n");
+    assert_eq!(code(&out), 3);
+    assert!(
+        stderr(&out).starts_with("error: entrada estándar:1:4: esto no va aquí (hay el final"),
+        "{}",
+        stderr(&out)
+    );
+    desk.write("nota.txt", "translate([1, 2, 3])");
+    let steps = |lang: &str| {
+        let out = desk.lumbre(&["math", "--json", "--lang", lang, "--file", "nota.txt"]);
+        serde_json::from_str::<Value>(&stdout(&out)).unwrap()
+    };
+    let (english, spanish) = (steps("en"), steps("es"));
+    assert_eq!(english["value"], spanish["value"]);
+    assert_eq!(spanish["steps"][0]["lines"][0], "mueve puntos (w = 1), no direcciones (w = 0)");
+    assert_eq!(english["steps"][0]["lines"][1], spanish["steps"][0]["lines"][1]);
+}
+
+#[test]
 fn json_has_the_value_its_kind_and_the_steps() {
     let out = Desk::new().lumbre(&["math", "T = translate([1, 2, 3]); [1, 2] / 2", "--json"]);
     assert_eq!(code(&out), 0, "{}", stderr(&out));

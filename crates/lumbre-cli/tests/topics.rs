@@ -185,7 +185,7 @@ fn every_topic_has_its_chapter_function_command_and_test() -> Result<(), String>
     assert!(complaints.is_empty(), "{}", complaints.join("\n"));
     let topics: Vec<Topic> = lines(&text).map(topic).collect::<Result<_, _>>()?;
     assert!(topics.len() > 140, "{} topics", topics.len());
-    assert!(topics.iter().filter(|topic| topic.command.is_none()).count() < 6);
+    assert!(topics.iter().filter(|topic| topic.command.is_none()).count() <= 3);
     let told: BTreeSet<&str> = topics.iter().map(|topic| topic.chapter.as_str()).collect();
     for entry in fs::read_dir(&folder).map_err(|e| e.to_string())? {
         let name = entry.map_err(|e| e.to_string())?.file_name().to_string_lossy().into_owned();

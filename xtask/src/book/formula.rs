@@ -18,8 +18,23 @@ pub(crate) fn html(latex: &str, is_displayed: bool) -> Result<String> {
     let config = RenderConfig { display_mode, ..RenderConfig::default() };
     let mut mathml = String::new();
     push_mathml(&mut mathml, Parser::new(latex, &storage), config).context("cannot write MathML")?;
-    let mathml = protected(&mathml);
+    let mathml = protected(&with_sided_bars(&mathml, latex)?);
     Ok(if is_displayed { format!("<span class=\"formula\">{mathml}</span>") } else { mathml })
+}
+
+/// With bars that open before what they hold and close after it. Without a form, a bar within a row counts as one between two, and
+/// stands apart from both.
+fn with_sided_bars(mathml: &str, latex: &str) -> Result<String> {
+    const BAR: &str = ">|</mo>";
+    let forms = latex.match_indices("vert").map(|(at, _)| match latex[..at].strip_suffix('r') {
+        Some(_) => " form=\"postfix\"",
+        None => " form=\"prefix\"",
+    });
+    let forms: Vec<&str> = forms.collect();
+    let parts: Vec<&str> = mathml.split(BAR).collect();
+    anyhow::ensure!(parts.len() == forms.len() + 1, "a bar is \\lvert or \\rvert in {latex}");
+    let sided = parts.iter().zip(&forms).map(|(part, form)| format!("{part}{form}{BAR}"));
+    Ok(sided.chain([parts[forms.len()].to_owned()]).collect())
 }
 
 /// The same elements, with text that Markdown takes for nothing else.
@@ -69,6 +84,14 @@ mod tests {
     fn attributes_stand_apart() {
         let shown = html(r"\bigl( x \bigr)", false).expect("a formula");
         assert!(shown.contains("stretchy=\"true\" minsize=\"1.2em\" maxsize="), "{shown}");
+    }
+
+    #[test]
+    fn bars_stand_at_what_they_hold() {
+        let shown = html(r"a - \lvert b \rvert^2", false).expect("a formula");
+        let (before, after) = shown.split_once("<mi>b</mi>").expect("what is between the bars");
+        assert!(before.contains("form=\"prefix\"") && !before.contains("postfix"), "{shown}");
+        assert!(after.contains("form=\"postfix\"") && !after.contains("prefix"), "{shown}");
     }
 
     #[test]

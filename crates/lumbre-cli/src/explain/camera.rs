@@ -7,7 +7,8 @@ use lumbre::{DVec3, ExplainedSample, Transform};
 
 use super::document::{Section, Value};
 use super::formula::Scope;
-use super::texts::{Texts, filled};
+use super::texts::Texts;
+use crate::language::filled;
 
 /// Where the projection matrix that is told begins and ends; rays need neither.
 const NEAR: f64 = 0.01;

@@ -1,5 +1,7 @@
 //! What is told, whatever it is written as: sections of quantities, tables and sentences.
 
+use std::collections::BTreeSet;
+
 use lumbre::math::glam::DMat4;
 use lumbre::{DVec3, Ray};
 
@@ -202,6 +204,20 @@ impl Scope {
 impl Section {
     pub(super) fn new(key: impl Into<String>, title: impl Into<String>) -> Self {
         Self { key: key.into(), title: title.into(), items: Vec::new(), sections: Vec::new() }
+    }
+
+    /// Adds the keys of this section and of those below it.
+    pub(super) fn collect_keys<'a>(&'a self, keys: &mut BTreeSet<&'a str>) {
+        keys.insert(&self.key);
+        self.sections.iter().for_each(|section| section.collect_keys(keys));
+    }
+
+    /// This section if it has one of these keys, else those below it that do.
+    pub(super) fn with_keys(self, keys: &[String]) -> Vec<Self> {
+        if keys.contains(&self.key) {
+            return vec![self];
+        }
+        self.sections.into_iter().flat_map(|section| section.with_keys(keys)).collect()
     }
 
     /// Tells what something is.

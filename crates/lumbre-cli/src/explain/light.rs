@@ -9,8 +9,9 @@ use lumbre::{DVec2, DVec3, Ray, Scene};
 use super::document::{Column, Item, Section, Value};
 use super::formula::Scope;
 use super::surfaces::surfaces;
-use super::texts::{Texts, filled};
+use super::texts::Texts;
 use super::things::Things;
+use crate::language::filled;
 
 /// Lights that are told of one by one at most.
 const MOST_LIGHTS: usize = 16;

@@ -1,5 +1,6 @@
 //! `lumbre explain`: every number between a pixel or a ray and its colour.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -9,6 +10,7 @@ use lumbre::{DVec3, Ray};
 use serde_json::json;
 
 use crate::failure::{Failure, print};
+use crate::language::LanguageArguments;
 use crate::names::one_of;
 use crate::output::Inputs;
 use crate::reading::{ReadingArguments, print_warnings};
@@ -35,7 +37,6 @@ mod writing;
 use document::{Item, Section};
 use english::ENGLISH;
 use spanish::SPANISH;
-use texts::Texts;
 use things::Things;
 
 /// Tells how the colour of a pixel, or the light along a ray, comes about: the camera and its ray, every surface on the way with the
@@ -44,6 +45,7 @@ use things::Things;
 #[command(after_help = "Examples:
   lumbre explain scene.pbrt --pixel 320,240
   lumbre explain scene.pbrt --ray 0,0,-5,0,0,1 --nearest
+  lumbre explain scene.pbrt --pixel 320,240 --only equation,radiance
   lumbre explain scene.pbrt --pixel 320,240 --format html -o pixel.html
   lumbre explain scene.pbrt --pixel 320,240 --sample 7 --depth 2
   lumbre explain scene.pbrt --pixel 320,240 --format markdown --lang es
@@ -61,9 +63,8 @@ pub(crate) struct Arguments {
     /// What it is written as.
     #[arg(long, value_enum, value_name = "FORMAT", default_value_t = Format::Text)]
     format: Format,
-    /// The language: English or Spanish.
-    #[arg(long, value_enum, value_name = "LANGUAGE", default_value_t = Language::En)]
-    lang: Language,
+    #[command(flatten)]
+    language: LanguageArguments,
     /// Tell the crossings of so many of the rays that follow, too.
     #[arg(long, value_name = "N", default_value_t = 0)]
     depth: u32,
@@ -73,6 +74,9 @@ pub(crate) struct Arguments {
     /// Tell only the surface that is seen, not those behind it.
     #[arg(long)]
     nearest: bool,
+    /// Tell only the sections with these keys, as JSON names them: camera, equation, Quadratic, hit, transform, light, radiance, …
+    #[arg(long, value_name = "KEY,…", value_delimiter = ',')]
+    only: Vec<String>,
     /// Write to this file.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -110,24 +114,6 @@ enum Format {
     Html,
     /// For programs.
     Json,
-}
-
-/// The languages.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Language {
-    /// English.
-    En,
-    /// Spanish.
-    Es,
-}
-
-impl Language {
-    fn texts(self) -> &'static Texts {
-        match self {
-            Self::En => &ENGLISH,
-            Self::Es => &SPANISH,
-        }
-    }
 }
 
 fn pixel(text: &str) -> Result<(u32, u32), String> {
@@ -183,7 +169,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         print_warnings(&diagnostics);
         print_warnings(&shown.diagnostics);
     }
-    let sections = told(arguments, shown, &things)?;
+    let mut sections = told(arguments, shown, &things)?;
+    if !arguments.only.is_empty() {
+        sections = only(sections, &arguments.only)?;
+    }
     let written = written(arguments, name, &sections);
     match &arguments.output {
         None => print(&written),
@@ -194,7 +183,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn told(arguments: &Arguments, shown: Shown, things: &Things) -> Result<Vec<Section>, Failure> {
-    let texts = arguments.lang.texts();
+    let texts = arguments.language.choose(&ENGLISH, &SPANISH);
     let Shown { scene, mut options, .. } = shown;
     options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
     let whole = (options.width, options.height);
@@ -231,15 +220,28 @@ fn told(arguments: &Arguments, shown: Shown, things: &Things) -> Result<Vec<Sect
     Ok(sections)
 }
 
+/// The sections with these keys, each with all below it.
+fn only(sections: Vec<Section>, keys: &[String]) -> Result<Vec<Section>, Failure> {
+    let mut known = BTreeSet::new();
+    sections.iter().for_each(|section| section.collect_keys(&mut known));
+    match keys.iter().find(|key| !known.contains(key.as_str())) {
+        None => Ok(sections.into_iter().flat_map(|section| section.with_keys(keys)).collect()),
+        Some(key) => Err(Failure::Usage(format!(
+            "--only {key}: no section has this key (expected some of {})",
+            Vec::from_iter(known).join(", ")
+        ))),
+    }
+}
+
 fn written(arguments: &Arguments, name: &Path, sections: &[Section]) -> String {
-    let texts = arguments.lang.texts();
+    let texts = arguments.language.choose(&ENGLISH, &SPANISH);
     let name = name.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let title = match (arguments.pixel, &arguments.ray) {
         (Some((x, y)), _) => format!("{}: {name}, {} ({x}, {y})", texts.title, texts.pixel),
         _ => format!("{}: {name}", texts.title),
     };
     match arguments.format {
-        Format::Text => writing::text(sections, texts.schoolbook),
+        Format::Text => writing::text(sections, arguments.only.is_empty(), texts.schoolbook),
         Format::Markdown => format!("# {title}\n\n{}", writing::markdown(sections, texts.schoolbook)),
         Format::Html => html::html(&title, texts.code, sections, texts.schoolbook),
         Format::Json => {

@@ -6,7 +6,8 @@ use lumbre::math::glam::DMat4;
 
 use super::document::{Column, Item, Quantity, Section, Value, numbers};
 use super::formula::Scope;
-use super::texts::{Texts, filled};
+use super::texts::Texts;
+use crate::language::filled;
 
 impl From<&Found> for Value {
     fn from(found: &Found) -> Self {

@@ -12,8 +12,9 @@ use super::document::{Section, Value, exact};
 use super::formula::{Scope, with_primes};
 use super::shape;
 use super::sketch::Scenery;
-use super::texts::{Texts, filled};
+use super::texts::Texts;
 use super::things::Things;
+use crate::language::filled;
 
 /// Hits that are told at most.
 const MOST_HITS: usize = 64;

@@ -152,11 +152,8 @@ pub(super) struct Texts {
     pub(super) weight: &'static str,
 }
 
-/// A sentence with what it is about.
-pub(super) fn filled(text: &str, parts: &[&str]) -> String {
-    let mut filled = text.to_owned();
-    for (i, part) in parts.iter().enumerate() {
-        filled = filled.replace(&format!("{{{i}}}"), part);
-    }
-    filled
+#[test]
+fn every_sentence_is_translated() {
+    use super::{ENGLISH, SPANISH};
+    crate::language::tests::assert_translated(&ENGLISH, &SPANISH, &["material", "no"]);
 }

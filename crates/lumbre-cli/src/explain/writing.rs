@@ -7,21 +7,22 @@ use serde_json::{Map, Value as Json, json};
 use super::document::{Item, Quantity, Section, Value};
 use super::formula::latex;
 
-/// As text, indented by two spaces a level.
-pub(super) fn text(sections: &[Section], schoolbook: &str) -> String {
+/// As text, indented by two spaces a level. The titles of a whole explanation's chapters are in capitals; those of single sections
+/// may have formulas.
+pub(super) fn text(sections: &[Section], has_chapters: bool, schoolbook: &str) -> String {
     let mut out = String::new();
     for section in sections {
         if !out.is_empty() {
             out.push('\n');
         }
-        write_text(section, 0, schoolbook, &mut out);
+        let title = if has_chapters { section.title.to_uppercase() } else { section.title.clone() };
+        write_text(section, &title, 0, schoolbook, &mut out);
     }
     out
 }
 
-fn write_text(section: &Section, level: usize, schoolbook: &str, out: &mut String) {
+fn write_text(section: &Section, title: &str, level: usize, schoolbook: &str, out: &mut String) {
     let indent = "  ".repeat(level);
-    let title = if level == 0 { section.title.to_uppercase() } else { section.title.clone() };
     let _ = writeln!(out, "{indent}{title}");
     let indent = "  ".repeat(level + 1);
     for item in &section.items {
@@ -50,7 +51,7 @@ fn write_text(section: &Section, level: usize, schoolbook: &str, out: &mut Strin
         }
     }
     for section in &section.sections {
-        write_text(section, level + 1, schoolbook, out);
+        write_text(section, &section.title, level + 1, schoolbook, out);
     }
 }
 

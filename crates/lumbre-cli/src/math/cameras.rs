@@ -3,6 +3,8 @@
 use lumbre::math::view::{Handedness, View};
 use lumbre::math::{DVec3, projection, vector};
 
+use crate::language::filled;
+
 use super::functions::{Call, Function};
 use super::lexer::Wrong;
 use super::value::{Matrix, Value, list, number};
@@ -98,7 +100,7 @@ fn simple_perspective(call: &mut Call) -> Result<Value, Wrong> {
 fn clip(call: &mut Call) -> Result<Value, Wrong> {
     let (m, p) = (call.matrix(0)?, call.vec3(1)?);
     if !m.is_square(4) {
-        return Err(call.wrong(0, &call.work.texts.matrix_of.replace("{0}", "4").replace("{1}", "4")));
+        return Err(call.wrong(0, &filled(call.work.texts.matrix_of, &["4", "4"])));
     }
     let image = projection::clip_coordinates(&m.mat4(), p).to_array();
     let column = Matrix::column(&[p.x, p.y, p.z, 1.0]);

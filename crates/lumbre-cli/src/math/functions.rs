@@ -4,6 +4,8 @@ use lumbre::formats::diagnostic::Diagnostic;
 use lumbre::math::glam::{DMat4, DQuat, DVec2};
 use lumbre::math::{DVec3, Transform};
 
+use crate::language::filled;
+
 use super::lexer::Wrong;
 use super::steps::Work;
 use super::texts::Texts;
@@ -94,9 +96,11 @@ impl<'a> Call<'a> {
     pub(super) fn run(mut self) -> Result<Value, Wrong> {
         let fits = |form: &&str| form.split(',').count() == self.arguments.len();
         let Some(form) = self.function.forms.iter().find(|form| fits(form)) else {
-            let what = Diagnostic::error(self.work.texts.wrong_count.replace("{0}", self.function.name));
-            let found = self.work.texts.arguments.replace("{0}", &self.arguments.len().to_string());
-            return Err(Wrong::new(self.offset, what.found(found).expected(forms(self.function.name))));
+            let what = Diagnostic::error(filled(self.work.texts.wrong_count, &[self.function.name]));
+            return Err(Wrong::new(
+                self.offset,
+                what.found(self.arguments.len()).expected(forms(self.function.name)),
+            ));
         };
         self.work.begin(format!("{}({form})", self.function.name));
         (self.function.run)(&mut self)
@@ -120,8 +124,7 @@ impl<'a> Call<'a> {
     pub(super) fn wrong(&self, i: usize, expected: &str) -> Wrong {
         let Argument { value, offset } = &self.arguments[i];
         let texts = self.work.texts;
-        let message =
-            texts.wrong_argument.replace("{0}", &(i + 1).to_string()).replace("{1}", self.function.name);
+        let message = filled(texts.wrong_argument, &[&(i + 1).to_string(), self.function.name]);
         let found = match value {
             Value::Number(_) | Value::Vector(_) | Value::Quaternion(_) => value.line(),
             _ => value.described(texts),
@@ -156,14 +159,14 @@ impl<'a> Call<'a> {
     pub(super) fn vec2(&self, i: usize) -> Result<DVec2, Wrong> {
         match self.value(i) {
             Value::Vector(v) if v.len() == 2 => Ok(DVec2::from_slice(v)),
-            _ => Err(self.wrong(i, &self.work.texts.vector_of.replace("{0}", "2"))),
+            _ => Err(self.wrong(i, &filled(self.work.texts.vector_of, &["2"]))),
         }
     }
 
     pub(super) fn vec3(&self, i: usize) -> Result<DVec3, Wrong> {
         match self.value(i) {
             Value::Vector(v) if v.len() == 3 => Ok(DVec3::from_slice(v)),
-            _ => Err(self.wrong(i, &self.work.texts.vector_of.replace("{0}", "3"))),
+            _ => Err(self.wrong(i, &filled(self.work.texts.vector_of, &["3"]))),
         }
     }
 

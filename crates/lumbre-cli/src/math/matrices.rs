@@ -2,6 +2,8 @@
 
 use lumbre::math::{matrix, quadratic, quaternion, vector};
 
+use crate::language::filled;
+
 use super::functions::{Call, Function};
 use super::lexer::Wrong;
 use super::operators;
@@ -66,7 +68,7 @@ fn det(call: &mut Call) -> Result<Value, Wrong> {
 fn solve(call: &mut Call) -> Result<Value, Wrong> {
     let (m, b) = (call.matrix(0)?, call.vec3(1)?);
     if !m.is_square(3) {
-        return Err(call.wrong(0, &call.work.texts.matrix_of.replace("{0}", "3").replace("{1}", "3")));
+        return Err(call.wrong(0, &filled(call.work.texts.matrix_of, &["3", "3"])));
     }
     let linear = m.mat3();
     let Some(x) = matrix::solve(&linear, b) else { return Err(call.wrong(0, call.work.texts.invertible)) };

@@ -4,10 +4,11 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use lumbre::formats::diagnostic::Place;
+use lumbre::formats::diagnostic::{Diagnostic, Place, quoted};
 use serde_json::json;
 
 use crate::failure::{Failure, print};
+use crate::language::{LanguageArguments, filled};
 
 mod cameras;
 mod english;
@@ -19,6 +20,7 @@ mod operators;
 mod prompt;
 mod quaternions;
 mod session;
+mod spanish;
 mod steps;
 #[cfg(test)]
 mod tests;
@@ -30,6 +32,8 @@ mod vectors;
 use english::ENGLISH;
 use lexer::Wrong;
 use session::{Outcome, Session};
+use spanish::SPANISH;
+use texts::Texts;
 
 /// Evaluates vectors, matrices, transforms, cameras and quaternions, step by step.
 #[derive(Args)]
@@ -42,6 +46,7 @@ use session::{Outcome, Session};
   lumbre math 'angles(euler(30, 90, 10))'              Euler angles at a pole
   lumbre math --file notes.txt                         a script: statements on lines, # comments
   lumbre math                                          a prompt; earlier results are ans and names
+  lumbre math 'angle(x, y)' --lang es                  the steps in Spanish
   lumbre math help                                     every function
 
 Exit status 2 for a wrong expression, 3 for one in a file or on standard input.")]
@@ -54,6 +59,8 @@ pub(crate) struct Arguments {
     /// Print each result with its steps as one line of JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    language: LanguageArguments,
 }
 
 /// Puts a space before what begins with a single minus: it is part of an expression and no option.
@@ -73,22 +80,24 @@ pub(crate) fn with_negative_expressions(mut words: Vec<OsString>) -> Vec<OsStrin
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let mut session = Session::new(&ENGLISH);
+    let texts = arguments.language.choose(&ENGLISH, &SPANISH);
+    let mut session = Session::new(texts);
     let form = if arguments.json { Form::Json } else { Form::Text };
     if let Some(path) = &arguments.file {
-        let text = read(path)?;
+        let text = read(path, texts)?;
         // Some editors put a byte order mark in front.
         let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
         let name = path.display().to_string();
         return evaluate(&mut session, text, form)?
-            .map_err(|wrong| Failure::Input(message(&name, text, &wrong)));
+            .map_err(|wrong| Failure::Input(message(&name, text, &wrong, texts)));
     }
     if arguments.expression.is_empty() {
         return prompt::run(&mut session, form);
     }
     let text = arguments.expression.join(" ");
     let text = text.trim_start();
-    evaluate(&mut session, text, form)?.map_err(|wrong| Failure::Usage(message("expression", text, &wrong)))
+    evaluate(&mut session, text, form)?
+        .map_err(|wrong| Failure::Usage(message(texts.expression, text, &wrong, texts)))
 }
 
 /// How results are printed.
@@ -98,11 +107,9 @@ enum Form {
     Json,
 }
 
-fn read(path: &Path) -> Result<String, Failure> {
+fn read(path: &Path, texts: &Texts) -> Result<String, Failure> {
     let failed = |e: std::io::Error| match e.kind() {
-        std::io::ErrorKind::InvalidData => {
-            Failure::Input(format!("{}: {}", path.display(), ENGLISH.not_utf8))
-        }
+        std::io::ErrorKind::InvalidData => Failure::Input(format!("{}: {}", path.display(), texts.not_utf8)),
         _ => Failure::Io(format!("{}: {e}", path.display())),
     };
     if path == Path::new("-") {
@@ -110,7 +117,7 @@ fn read(path: &Path) -> Result<String, Failure> {
     }
     // A device has no end.
     if !std::fs::metadata(path).map_err(failed)?.is_file() {
-        return Err(Failure::Io(format!("{}: {}", path.display(), ENGLISH.not_regular)));
+        return Err(Failure::Io(format!("{}: {}", path.display(), texts.not_regular)));
     }
     std::fs::read_to_string(path).map_err(failed)
 }
@@ -156,9 +163,10 @@ fn shown(outcome: &Outcome, form: Form) -> String {
 }
 
 /// A mistake with its place, and below it the line with a mark under the place.
-fn message(name: &str, text: &str, wrong: &Wrong) -> String {
+fn message(name: &str, text: &str, wrong: &Wrong, texts: &Texts) -> String {
     let offset = wrong.offset.min(text.len());
-    let message = (*wrong.what).clone().at(Place::of_offset(name, text.as_bytes(), offset)).body();
+    let place = Place::of_offset(name, text.as_bytes(), offset);
+    let message = format!("{place}: {}", said(&wrong.what, texts));
     let start = text[..offset].rfind('\n').map_or(0, |end| end + 1);
     let line = text[start..].lines().next().unwrap_or("");
     let before = text[start..offset].chars().count();
@@ -167,4 +175,16 @@ fn message(name: &str, text: &str, wrong: &Wrong) -> String {
         return message;
     }
     format!("{message}\n  {line}\n  {}^", " ".repeat(before))
+}
+
+/// What is wrong, in the words of a language.
+fn said(what: &Diagnostic, texts: &Texts) -> String {
+    let Diagnostic { message, found, expected, suggestion, .. } = what;
+    let details = [
+        found.as_ref().map(|found| filled(texts.found, &[found])),
+        expected.as_ref().map(|expected| filled(texts.expected, &[expected])),
+        suggestion.as_ref().map(|name| filled(texts.did_you_mean, &[&quoted(name)])),
+    ];
+    let details: Vec<String> = details.into_iter().flatten().collect();
+    if details.is_empty() { message.clone() } else { format!("{message} ({})", details.join("; ")) }
 }

@@ -4,6 +4,8 @@ use lumbre::formats::diagnostic::Diagnostic;
 use lumbre::math::glam::{DMat3, DMat4};
 use lumbre::math::{DVec3, Elementary, Transform, matrix, quaternion};
 
+use crate::language::filled;
+
 use super::quaternions;
 use super::steps::{Work, sum_of_products};
 use super::value::{Matrix, Value, list, number};
@@ -11,7 +13,7 @@ use super::value::{Matrix, Value, list, number};
 /// That these two do not go together.
 fn mismatch(sign: &str, a: &Value, b: &Value, expected: &str, work: &Work) -> Box<Diagnostic> {
     let (a, b) = (a.described(work.texts), b.described(work.texts));
-    Diagnostic::error(work.texts.no_operation.replace("{0}", sign))
+    Diagnostic::error(filled(work.texts.no_operation, &[sign]))
         .found(format!("{a} {sign} {b}"))
         .expected(expected)
         .into()

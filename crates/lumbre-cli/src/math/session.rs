@@ -15,6 +15,8 @@ use lumbre::formats::diagnostic::{Diagnostic, quoted};
 use lumbre::math::DVec3;
 use lumbre::math::quaternion;
 
+use crate::language::filled;
+
 use super::functions::{self, Argument, Call};
 use super::lexer::{Lexer, Token, TokenKind, Wrong};
 use super::operators;
@@ -42,7 +44,7 @@ pub(super) enum Outcome {
 
 /// The values that have names.
 pub(super) struct Session {
-    texts: &'static Texts,
+    pub(super) texts: &'static Texts,
     names: BTreeMap<String, Value>,
 }
 
@@ -220,7 +222,7 @@ impl<'a> Reader<'a> {
         self.depth += 1;
         if self.depth > DEEPEST {
             let what = Diagnostic::error(self.session.texts.too_deep);
-            let expected = self.session.texts.at_most.replace("{0}", &DEEPEST.to_string());
+            let expected = filled(self.session.texts.at_most, &[&DEEPEST.to_string()]);
             return Err(Wrong::new(self.token.offset, what.expected(expected)));
         }
         let mut base = self.primary()?;
@@ -274,7 +276,7 @@ impl<'a> Reader<'a> {
             let offset = self.token.offset;
             if items.len() == MOST {
                 let what = Diagnostic::error(self.session.texts.too_many);
-                let expected = self.session.texts.at_most.replace("{0}", &MOST.to_string());
+                let expected = filled(self.session.texts.at_most, &[&MOST.to_string()]);
                 return Err(Wrong::new(offset, what.expected(expected)));
             }
             let value = self.sum()?;
@@ -300,7 +302,7 @@ impl<'a> Reader<'a> {
             None => return wrong(offset, texts.nothing.to_owned(), texts.numbers_or_rows),
         };
         if items.len() > 4 {
-            return wrong(offset, texts.entries.replace("{0}", &items.len().to_string()), expected);
+            return wrong(offset, filled(texts.entries, &[&items.len().to_string()]), expected);
         }
         let mut numbers = vec![];
         let mut rows: Vec<Vec<f64>> = vec![];

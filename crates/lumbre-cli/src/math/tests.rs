@@ -5,6 +5,7 @@ use lumbre::math::random::RandomStream;
 use super::english::ENGLISH;
 use super::functions;
 use super::session::{Outcome, Session};
+use super::spanish::SPANISH;
 use super::value::Value;
 use super::{Form, message, shown};
 
@@ -15,7 +16,7 @@ fn value(text: &str) -> Result<Value, String> {
         last = Some(outcome);
         Ok::<(), ()>(())
     });
-    run.map_err(|wrong| message("expression", text, &wrong))?.expect("nothing stops it");
+    run.map_err(|wrong| message("expression", text, &wrong, &ENGLISH))?.expect("nothing stops it");
     match last {
         Some(Outcome::Value { value, .. }) => Ok(value),
         other => Err(format!("{text}: {other:?}")),
@@ -52,7 +53,8 @@ fn random_tokens_are_evaluated_or_refused_and_never_panic() {
             let arguments = form.split(',').map(|_| simple[random.next_below(simple.len())].as_str());
             text = format!("{}({})", function.name, arguments.collect::<Vec<_>>().join(", "));
         }
-        let mut session = Session::new(&ENGLISH);
+        let texts = if random.next_below(2) == 0 { &ENGLISH } else { &SPANISH };
+        let mut session = Session::new(texts);
         let run = session.run(&text, |outcome| {
             assert!(!shown(&outcome, Form::Text).is_empty());
             let json = shown(&outcome, Form::Json);
@@ -68,7 +70,7 @@ fn random_tokens_are_evaluated_or_refused_and_never_panic() {
         });
         if let Err(wrong) = run {
             assert!(wrong.offset <= text.len(), "{text}");
-            assert!(message("expression", &text, &wrong).starts_with("expression:"), "{text}");
+            assert!(message("expression", &text, &wrong, texts).starts_with("expression:"), "{text}");
             mistakes += 1;
         }
     }
@@ -172,9 +174,11 @@ fn mistakes_say_where_what_and_what_would_do() {
 
 #[test]
 fn every_function_is_described_and_nothing_else() {
-    for function in functions::all() {
-        assert!(!ENGLISH.about(function.name).is_empty(), "{}", function.name);
+    for texts in [&ENGLISH, &SPANISH] {
+        for function in functions::all() {
+            assert!(!texts.about(function.name).is_empty(), "{}", function.name);
+        }
+        let unknown = texts.functions.iter().find(|(name, _)| functions::find(name).is_none());
+        assert_eq!(unknown, None);
     }
-    let unknown = ENGLISH.functions.iter().find(|(name, _)| functions::find(name).is_none());
-    assert_eq!(unknown, None);
 }

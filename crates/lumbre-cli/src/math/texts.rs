@@ -15,7 +15,7 @@ pub(super) struct Texts {
     pub(super) transform: &'static str,
     pub(super) transform_or_quaternion: &'static str,
     pub(super) quaternion: &'static str,
-    // What is wrong with the writing.
+    // What is wrong in the text.
     pub(super) unknown_character: &'static str,
     pub(super) characters: &'static str,
     pub(super) not_a_number: &'static str,
@@ -45,7 +45,6 @@ pub(super) struct Texts {
     pub(super) matrix_size: &'static str,
     pub(super) like_the_first: &'static str,
     pub(super) wrong_count: &'static str,
-    pub(super) arguments: &'static str,
     // What is wrong with the values.
     pub(super) wrong_argument: &'static str,
     pub(super) no_operation: &'static str,
@@ -104,7 +103,12 @@ pub(super) struct Texts {
     pub(super) largest_part: &'static str,
     pub(super) north: &'static str,
     pub(super) south: &'static str,
-    // The prompt and the command.
+    // A mistake, the prompt and the command.
+    pub(super) found: &'static str,
+    pub(super) expected: &'static str,
+    pub(super) did_you_mean: &'static str,
+    pub(super) expression: &'static str,
+    pub(super) standard_input: &'static str,
     pub(super) welcome: &'static str,
     pub(super) not_utf8: &'static str,
     pub(super) not_regular: &'static str,
@@ -119,4 +123,11 @@ impl Texts {
     pub(super) fn about(&self, function: &str) -> &'static str {
         self.functions.iter().find(|(name, _)| *name == function).map_or("", |(_, about)| about)
     }
+}
+
+#[test]
+fn every_sentence_is_translated() {
+    use super::{ENGLISH, SPANISH};
+    let names: Vec<&str> = ENGLISH.functions.iter().map(|(name, _)| *name).collect();
+    crate::language::tests::assert_translated(&ENGLISH, &SPANISH, &names);
 }

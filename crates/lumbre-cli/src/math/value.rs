@@ -4,6 +4,8 @@ use lumbre::math::glam::{DMat2, DMat3, DMat4, DQuat, DVec3};
 use lumbre::math::{Transform, matrix, quaternion};
 use serde_json::{Value as Json, json};
 
+use crate::language::filled;
+
 use super::texts::Texts;
 pub(super) use crate::units::number;
 
@@ -114,10 +116,8 @@ impl Value {
     pub(super) fn described(&self, texts: &Texts) -> String {
         match self {
             Self::Number(_) => texts.number.to_owned(),
-            Self::Vector(v) => texts.vector_of.replace("{0}", &v.len().to_string()),
-            Self::Matrix(m) => {
-                texts.matrix_of.replace("{0}", &m.rows.to_string()).replace("{1}", &m.columns.to_string())
-            }
+            Self::Vector(v) => filled(texts.vector_of, &[&v.len().to_string()]),
+            Self::Matrix(m) => filled(texts.matrix_of, &[&m.rows.to_string(), &m.columns.to_string()]),
             Self::Transform(_) => texts.transform.to_owned(),
             Self::Quaternion(_) => texts.quaternion.to_owned(),
         }

@@ -2,6 +2,8 @@
 
 use lumbre::math::{DVec3, Frame, orthonormal_basis, quaternion, vector};
 
+use crate::language::filled;
+
 use super::functions::{Call, Function};
 use super::lexer::Wrong;
 use super::steps::{difference_of_products, factor, sum_of_products};
@@ -27,7 +29,7 @@ fn pair(call: &Call) -> Result<(DVec3, DVec3, usize), Wrong> {
     let (a, size) = call.flat_or_space(0)?;
     let (b, other) = call.flat_or_space(1)?;
     if size != other {
-        return Err(call.wrong(1, &call.work.texts.vector_of.replace("{0}", &size.to_string())));
+        return Err(call.wrong(1, &filled(call.work.texts.vector_of, &[&size.to_string()])));
     }
     Ok((a, b, size))
 }
