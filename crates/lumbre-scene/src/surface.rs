@@ -5,7 +5,7 @@ use std::sync::Arc;
 use lumbre_geometry::Surface;
 use lumbre_kernel::{DeformingMesh, PreciseMesh, TriangleMesh};
 use lumbre_math::{DVec2, DVec3, Transform, Vec2, Vec3, Vec4};
-use lumbre_shading::{FloatTexture, FurtherUv, LocalSurface, Material, Spectrum, TextureContext, VertexData};
+use lumbre_shading::{FloatTexture, LocalSurface, Material, Spectrum, TextureContext, VertexData};
 
 use crate::csg::CsgForm;
 use crate::light::LightId;
@@ -311,11 +311,12 @@ impl ShadingGeometry {
     /// The context of texture lookups, with derivatives of u and v over a pixel.
     pub(crate) fn context(&self, dpdx: Vec3, dpdy: Vec3, duv_dx: Vec2, duv_dy: Vec2) -> TextureContext {
         // From derivatives by u and v to derivatives over a pixel.
-        let further = self.vertex.further.map(|place| FurtherUv {
-            duv_dx: place.duv_dx * duv_dx.x + place.duv_dy * duv_dx.y,
-            duv_dy: place.duv_dx * duv_dy.x + place.duv_dy * duv_dy.y,
-            ..place
-        });
+        let mut vertex = self.vertex;
+        for place in &mut vertex.further {
+            let (by_u, by_v) = (place.duv_dx, place.duv_dy);
+            place.duv_dx = by_u * duv_dx.x + by_v * duv_dx.y;
+            place.duv_dy = by_u * duv_dy.x + by_v * duv_dy.y;
+        }
         TextureContext {
             point: self.surface.point,
             normal: self.shading.normal,
@@ -324,7 +325,7 @@ impl ShadingGeometry {
             dpdy,
             duv_dx,
             duv_dy,
-            vertex: VertexData { further, ..self.vertex },
+            vertex,
         }
     }
 

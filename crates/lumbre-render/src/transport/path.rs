@@ -109,21 +109,22 @@ impl Integrator for Path {
         record: &mut Record,
     ) -> Spectrum {
         let mut walk = Walk::new(self, scene, sight.ray.ray, draw, record);
-        let mut met = sight.met;
-        while let Some(here) = &met {
-            walk.interiors.arrive(here, here.resolved());
+        let Some(mut here) = sight.met else { return walk.escaped() };
+        loop {
+            walk.interiors.arrive(&here, here.resolved());
             let (ray, depth, throughput) = (walk.ray, walk.depth, walk.throughput);
-            walk.record.note(|| Event::Met(Met::of(&ray, here, depth, throughput)));
-            let next = match walk.cross_medium(here) {
-                Crossing::Through => walk.scatter_at_surface(here),
+            walk.record.note(|| Event::Met(Met::of(&ray, &here, depth, throughput)));
+            let next = match walk.cross_medium(&here) {
+                Crossing::Through => walk.scatter_at_surface(&here),
                 Crossing::Scattered(ray) => Some(ray),
                 Crossing::Ended => None,
             };
             let Some(ray) = next else { return walk.radiance };
-            met = walk.follow(ray, here);
+            walk.ray = ray;
+            walk.record.counts.bounce += 1;
+            let Some(hit) = scene.closest(&ray) else { return walk.escaped() };
+            here = scene.interaction(&ray, &hit, &here.footprint());
         }
-        walk.add_escaped();
-        walk.radiance
     }
 }
 
@@ -181,21 +182,14 @@ impl<'s, 'w> Walk<'s, 'w> {
         }
     }
 
-    /// Goes on along a ray, to what it meets.
-    fn follow(&mut self, ray: Ray, from: &Interaction<'s>) -> Option<Interaction<'s>> {
-        self.ray = ray;
-        self.record.counts.bounce += 1;
-        let footprint = from.footprint();
-        self.scene.closest(&ray).map(|hit| self.scene.interaction(&ray, &hit, &footprint))
-    }
-
-    /// Adds the light at infinity that a ray found which left the scene.
-    fn add_escaped(&mut self) {
+    /// The light of the whole path, with that at infinity that its last ray found, which left the scene.
+    fn escaped(mut self) -> Spectrum {
         let ray = self.ray;
         self.record.note(|| Event::Left { ray });
         for (arriving, pdf) in self.scene.escaped(&ray) {
             self.add(Source::Infinity, arriving, self.path.weight_of_found(self.chosen, pdf));
         }
+        self.radiance
     }
 
     /// Adds light that arrives, with a weight.
