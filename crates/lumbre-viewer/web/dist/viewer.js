@@ -507,7 +507,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       ["Normal", first.normal && point(first.normal)],
       ["Distance", short(first.distance)],
       ["uv", first.uv && point(first.uv)],
-      ["Triangle", first.primitive?.toString()],
+      ["Triangle", first.kind === "mesh" ? first.primitive?.toString() : void 0],
       ["Instance", first.instance === null ? "none" : first.instance?.toString()],
       ["Side", first.front === void 0 ? void 0 : first.front ? "outside" : "inside"]
     ];

@@ -41,7 +41,7 @@ export function showHits(panel: HTMLElement, hits: Hit[]): void {
     ["Normal", first.normal && point(first.normal)],
     ["Distance", short(first.distance)],
     ["uv", first.uv && point(first.uv)],
-    ["Triangle", first.primitive?.toString()],
+    ["Triangle", first.kind === "mesh" ? first.primitive?.toString() : undefined],
     ["Instance", first.instance === null ? "none" : first.instance?.toString()],
     ["Side", first.front === undefined ? undefined : first.front ? "outside" : "inside"],
   ];

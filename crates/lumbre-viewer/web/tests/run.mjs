@@ -140,9 +140,12 @@ const becomes = (page, picture, same) => page.waitForFunction(([wanted, same]) =
   return lumbreMeasured.done && wanted.slice(2).every((value, i) => now[i] === value) === same;
 }, [picture, same]);
 const moved = (page) => page.evaluate(() => lumbreMeasured.latencies.length);
-async function finds(page, what) {
+async function finds(page, what, rules = {}) {
   await page.evaluate(axe);
-  const { violations } = await page.evaluate(() => axe.run(document, { runOnly: ["wcag2a", "wcag2aa", "wcag21aa", "best-practice"] }));
+  // Frames that run nothing are looked at by themselves.
+  const { violations } = await page.evaluate(
+    (rules) => axe.run(document, { iframes: false, rules, runOnly: ["wcag2a", "wcag2aa", "wcag21aa", "best-practice"] }), rules,
+  );
   const told = violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html).join(" ")}`);
   assert.deepEqual(told, [], `axe finds something in ${what}`);
 }
@@ -488,6 +491,15 @@ const tests = {
         await page.focus("#picture");
         await page.keyboard.press("?");
         await finds(page, `help, ${colorScheme} ${form}`);
+        await page.keyboard.press("Escape");
+        await page.focus("#picture");
+        await page.keyboard.press("x");
+        await page.frameLocator("#explanation iframe").locator("main").waitFor();
+        await finds(page, `explanation, ${colorScheme} ${form}`);
+        await page.goto(await page.locator("#explanation iframe").evaluate((frame) => frame.src));
+        // Browsers let the keyboard into what scrolls.
+        await finds(page, `explanation alone, ${colorScheme} ${form}`, { "scrollable-region-focusable": { enabled: false } });
+        assert.ok(await page.evaluate(() => document.documentElement.scrollWidth) <= width, `${form}: the explanation is no wider than the screen`);
         await page.context().close();
         await viewer.stop();
       }
