@@ -79,6 +79,28 @@ fn a_page_asks_for_pixels_and_for_what_a_ray_meets() {
 }
 
 #[test]
+fn kinds_of_shapes_are_called_what_the_scene_language_calls_them() {
+    let viewer = Running::new();
+    let mut socket = viewer.socket(&viewer.cookie());
+    finished(&mut socket, 0);
+    let ball = r#"Shape "sphere" "float radius" 1.25"#;
+    let shapes = [
+        ("bilinearmesh", r#"Shape "bilinearmesh" "point3 P" [-2 0 -2  2 0 -2  -2 0 2  2 0.5 2]"#),
+        ("mesh", r#"Shape "trianglemesh" "point3 P" [-5 0 -5  5 0 -5  0 0 9]"#),
+        ("box", r#"Shape "box" "point3 pmin" [-1 -1 -1] "point3 pmax" [1 1 1]"#),
+    ];
+    for (name, shape) in shapes {
+        assert!(SCENE.contains(ball));
+        std::fs::write(&viewer.path, SCENE.replace(ball, shape)).unwrap();
+        let expected = serde_json::json!({ name: 1 });
+        socket.wait_for("scene", |told| told["scene"]["shapes"] == expected);
+        socket.say(r#"{"type":"pick","x":24,"y":16,"request":5}"#);
+        let picked = socket.wait_for("picked", |_| true);
+        assert_eq!(picked["ray"]["hits"][0]["kind"], name, "{picked}");
+    }
+}
+
+#[test]
 fn a_pixel_of_the_picture_that_is_shown_is_explained_in_a_frame_that_runs_nothing() {
     let viewer = Running::new();
     let cookie = viewer.cookie();

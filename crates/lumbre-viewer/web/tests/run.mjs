@@ -139,6 +139,11 @@ const becomes = (page, picture, same) => page.waitForFunction(([wanted, same]) =
   const now = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
   return lumbreMeasured.done && wanted.slice(2).every((value, i) => now[i] === value) === same;
 }, [picture, same]);
+/** Clicks into the middle of a pixel of a picture of 96 by 64. */
+async function click(page, x, y) {
+  const box = await page.locator("#picture").boundingBox();
+  await page.mouse.click(box.x + ((x + 0.5) * box.width) / 96, box.y + ((y + 0.5) * box.height) / 64);
+}
 const moved = (page) => page.evaluate(() => lumbreMeasured.latencies.length);
 async function finds(page, what, rules = {}) {
   await page.evaluate(axe);
@@ -249,8 +254,7 @@ const tests = {
     await done(page);
     assert.equal(await page.isVisible("#explain"), false, "nothing was asked yet");
     const [x, y] = [40, 33];
-    const box = await page.locator("#picture").boundingBox();
-    await page.mouse.click(box.x + (x + 0.5) * box.width / 96, box.y + (y + 0.5) * box.height / 64);
+    await click(page, x, y);
     await page.waitForSelector("#explain:visible");
     assert.equal(await page.textContent("#explain"), `Explain pixel ${x}, ${y}`);
     const explain = (...words) => execFileSync(program, ["explain", path, "--pixel", `${x},${y}`, "-q", ...words], { encoding: "utf8" });
@@ -380,7 +384,7 @@ const tests = {
   async "the time of an animation and the variants of a model make the pictures that are rendered"() {
     const path = join(folder, "model.glb");
     writeFileSync(path, model());
-    const words = ["--size", "96x64", "--spp", "4", path];
+    const words = ["--size", "96x64", "--spp", "4", "--ground", "plane", path];
     const rendered = (...more) => {
       const out = join(folder, "moment.png");
       execFileSync(program, ["render", ...words, "-o", out, "-q", ...more]);
@@ -393,6 +397,10 @@ const tests = {
     const pictures = [rendered(), rendered("--frame", "1"), rendered("--frame", "1", "--variant", "night")];
     assert.equal(new Set(pictures.map(String)).size, 3, "they are different pictures");
     await becomes(page, pictures[0], true);
+    for (const [x, y, shape] of [[48, 32, "0 (mesh)"], [48, 60, "ground"]]) {
+      await click(page, x, y);
+      await page.waitForFunction((wanted) => document.querySelector("#picked td")?.textContent === wanted, shape);
+    }
     assert.equal(await page.getAttribute("#animation-time", "max"), "2");
     await page.evaluate(() => {
       const input = document.getElementById("animation-time");
@@ -449,16 +457,15 @@ const tests = {
     await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
     await page.waitForFunction(() => /^48, 32: 0\.\d+  0\.\d+  0\.\d+$/.test(document.getElementById("pixel").textContent));
     // What is there: the ball, as far away as a ray through the middle of the pixel finds it, and nothing beside it.
-    const click = (x, y) => page.mouse.click(box.x + (x + 0.5) * box.width / 96, box.y + (y + 0.5) * box.height / 64);
     for (const [x, y] of [[40, 33], [50, 28]]) {
-      await click(x, y);
+      await click(page, x, y);
       await page.waitForFunction((distance) => {
         const rows = new Map([...document.querySelectorAll("#picked tr")].map((row) => [...row.children].map((cell) => cell.textContent)));
         return rows.size === 3 && rows.get("Shape") === "0 (sphere)" && rows.get("Material") === "<img src=x onerror=evil()> (diffuse)"
           && Math.abs(Number(rows.get("Distance")) / distance - 1) < 1e-5;
       }, toTheBall(x + 0.5, y + 0.5));
     }
-    await click(2, 3);
+    await click(page, 2, 3);
     await page.waitForFunction(() => document.getElementById("picked").textContent === "Nothing is there.");
     assert.equal(await page.isVisible("#explain"), false);
     await page.selectOption("#channel", "normal");
