@@ -48,6 +48,9 @@ pub fn denoise_unless(rendered: &Rendered, threads: usize, cancel: &CancelToken)
     let size = (rendered.image.width() as usize, rendered.image.height() as usize);
     let workers = Workers::start(threads);
     let surfaces = planes::surfaces(guides, size);
+    if cancel.is_cancelled() {
+        return None;
+    }
     let filtered = |layer: &Layer| means::filter(layer, &surfaces, &workers, cancel);
 
     // Where a picture is transparent, there is no light of what lets one through.
