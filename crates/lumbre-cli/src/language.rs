@@ -7,23 +7,24 @@ use clap::{Args, ValueEnum};
 pub(crate) struct LanguageArguments {
     /// The language: English or Spanish.
     #[arg(long, value_enum, value_name = "LANGUAGE", default_value_t = Language::En)]
-    lang: Language,
+    pub(crate) lang: Language,
 }
 
+/// The languages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Language {
+pub(crate) enum Language {
     /// English.
     En,
     /// Spanish.
     Es,
 }
 
-impl LanguageArguments {
-    /// The one that is in the wanted language.
-    pub(crate) fn choose<T>(&self, english: T, spanish: T) -> T {
-        match self.lang {
-            Language::En => english,
-            Language::Es => spanish,
+impl Language {
+    /// The one of both that is in this language.
+    pub(crate) fn choose<T>(self, english: T, spanish: T) -> T {
+        match self {
+            Self::En => english,
+            Self::Es => spanish,
         }
     }
 }

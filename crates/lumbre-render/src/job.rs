@@ -276,12 +276,19 @@ fn owners_of(
     if !is_same {
         return Err(RenderError::OtherState);
     }
-    let film = state.film();
-    let tile = |tile| Owner::new(film.placed_in(tile));
-    let mut owners: Vec<Owner> = bounds.tiles(TILE).into_iter().map(tile).collect();
+    let places = bounds.tiles(TILE);
+    // Those of a render that goes on in the same program are not copied: there may be gigabytes.
+    let are_in_place = state.tiles.iter().map(Tile::bounds).eq(places.iter().copied());
+    let tiles = if are_in_place {
+        state.tiles
+    } else {
+        let film = state.film();
+        places.into_iter().map(|place| film.placed_in(place)).collect()
+    };
+    let mut owners: Vec<Owner> = tiles.into_iter().map(Owner::new).collect();
     if let Some(owner) = owners.first_mut() {
         (owner.record.counts, owner.dropped) = (state.rays, state.dropped);
-        owner.first_dropped.clone_from(&state.first_dropped);
+        owner.first_dropped = state.first_dropped;
     }
     Ok(owners)
 }

@@ -79,6 +79,73 @@ fn a_page_asks_for_pixels_and_for_what_a_ray_meets() {
 }
 
 #[test]
+fn kinds_of_shapes_are_called_what_the_scene_language_calls_them() {
+    let viewer = Running::new();
+    let mut socket = viewer.socket(&viewer.cookie());
+    finished(&mut socket, 0);
+    let ball = r#"Shape "sphere" "float radius" 1.25"#;
+    let shapes = [
+        ("bilinearmesh", r#"Shape "bilinearmesh" "point3 P" [-2 0 -2  2 0 -2  -2 0 2  2 0.5 2]"#),
+        ("mesh", r#"Shape "trianglemesh" "point3 P" [-5 0 -5  5 0 -5  0 0 9]"#),
+        ("box", r#"Shape "box" "point3 pmin" [-1 -1 -1] "point3 pmax" [1 1 1]"#),
+    ];
+    for (name, shape) in shapes {
+        assert!(SCENE.contains(ball));
+        std::fs::write(&viewer.path, SCENE.replace(ball, shape)).unwrap();
+        let expected = serde_json::json!({ name: 1 });
+        socket.wait_for("scene", |told| told["scene"]["shapes"] == expected);
+        socket.say(r#"{"type":"pick","x":24,"y":16,"request":5}"#);
+        let picked = socket.wait_for("picked", |_| true);
+        assert_eq!(picked["ray"]["hits"][0]["kind"], name, "{picked}");
+    }
+}
+
+#[test]
+fn a_pixel_of_the_picture_that_is_shown_is_explained_in_a_frame_that_runs_nothing() {
+    let viewer = Running::new();
+    let cookie = viewer.cookie();
+    let mut socket = viewer.socket(&cookie);
+    let scene = socket.wait_for("scene", |_| true);
+    assert_eq!(scene["scene"]["languages"], serde_json::json!([["la", "Latina"]]));
+    finished(&mut socket, 0);
+    let asked = |path: &str, lines: &str| {
+        let host = viewer.host();
+        let request = format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n{lines}Connection: close\r\n\r\n");
+        let answer = viewer.raw(request.as_bytes());
+        let (head, body) = answer.split_once("\r\n\r\n").unwrap();
+        (head.to_ascii_lowercase(), body.to_owned())
+    };
+    let cookie = format!("Cookie: {cookie}\r\n");
+    let (head, body) = asked("/explanation/la/47/31", &cookie);
+    assert_eq!(body, "47 31 of 48 32 from 1");
+    for line in [
+        "http/1.1 200",
+        "content-type: text/html; charset=utf-8",
+        "x-frame-options: sameorigin",
+        "content-security-policy: default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'",
+    ] {
+        assert!(head.contains(line), "{line}: {head}");
+    }
+    assert_eq!((head.matches("x-frame").count(), head.matches("content-security").count()), (1, 1), "{head}");
+
+    // It is the picture that is there now: its camera and its size.
+    let placement = r#"{"eye":[5,-5,4],"target":[0,0,0],"up":[0,0,1]}"#;
+    socket.say(&format!(r#"{{"type":"camera","sequence":7,"placement":{placement},"fov":null,"zoom":1}}"#));
+    socket.say(r#"{"type":"set","scale":0.5}"#);
+    socket.wait_for("progress", |told| told["doing"] == "done");
+    while asked("/explanation/la/23/15", &cookie).1 != "23 15 of 24 16 from 5" {
+        socket.wait_for("progress", |told| told["doing"] == "done");
+    }
+    let (head, body) = asked("/explanation/la/24/15", &cookie);
+    assert!(head.starts_with("http/1.1 422") && head.contains("text/plain"), "{head}");
+    assert_eq!(body, "The picture of 24 by 16 pixels has no pixel 24, 15.");
+    let (head, body) = asked("/explanation/xx/3/2", &cookie);
+    assert!(head.starts_with("http/1.1 422") && head.contains("text/plain"), "{head}");
+    assert_eq!(body, "<b>xx</b> is not spoken here", "as text");
+    assert!(asked("/explanation/la/3/2", "").0.starts_with("http/1.1 403"));
+}
+
+#[test]
 fn parameters_are_edited_and_wrong_ones_named() {
     let viewer = Running::new();
     let mut socket = viewer.socket(&viewer.cookie());

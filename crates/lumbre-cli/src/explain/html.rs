@@ -6,8 +6,8 @@ use super::document::{Item, Quantity, Section, Value};
 use super::formula::{escaped, mathml};
 
 const STYLE: &str = "
-:root { color-scheme: light dark; --line: #8884; --weak: #777; --mark: #b50; }
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 1rem auto; padding: 0 1rem; }
+:root { color-scheme: light dark; --line: #8884; --weak: light-dark(#5c6370, #a9b0bb); --mark: #b50; }
+body { background: Canvas; color: CanvasText; font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 1rem auto; padding: 0 1rem; }
 h1 { font-size: 1.5rem; } h2 { font-size: 1.25rem; margin-top: 2rem; border-bottom: 1px solid var(--line); }
 h3 { font-size: 1.1rem; } h4, h5, h6 { font-size: 1rem; margin-bottom: .2rem; }
 section section { margin-left: .8rem; padding-left: .8rem; border-left: 2px solid var(--line); }

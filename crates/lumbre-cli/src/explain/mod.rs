@@ -23,9 +23,11 @@ use crate::view::ViewArguments;
 mod camera;
 mod document;
 mod english;
+mod explainer;
 mod formula;
 mod html;
 mod light;
+mod question;
 mod shape;
 mod sketch;
 mod spanish;
@@ -34,8 +36,10 @@ mod texts;
 mod things;
 mod writing;
 
-use document::{Item, Section};
+use document::Section;
 use english::ENGLISH;
+pub(crate) use explainer::Explainer;
+use question::Question;
 use spanish::SPANISH;
 use things::Things;
 
@@ -186,38 +190,19 @@ fn told(arguments: &Arguments, shown: Shown, things: &Things) -> Result<Vec<Sect
     let texts = arguments.language.choose(&ENGLISH, &SPANISH);
     let Shown { scene, mut options, .. } = shown;
     options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
-    let whole = (options.width, options.height);
-    let (mut sections, ray, radiance, events) = if let Some((x, y)) = arguments.pixel {
-        if x >= whole.0 || y >= whole.1 {
-            return Err(Failure::Usage(format!(
-                "--pixel {x},{y}: outside of the picture (expected less than {},{}; --size gives another)",
-                whole.0, whole.1
-            )));
-        }
-        let sample = scene.explain_sample(&options, (x, y), arguments.sample)?;
-        let camera = &scene.resolved().cameras()[options.camera];
-        let mut section = camera::camera(camera, whole, (x, y), &sample, texts);
-        section.fact(texts.sample, f64::from(arguments.sample));
-        section.fact(texts.weight, sample.weight);
-        (vec![section], sample.ray, sample.radiance, sample.events)
-    } else {
+    let &Arguments { sample, depth, nearest, .. } = arguments;
+    let question = Question { things, texts, sample, depth, nearest };
+    let Some((x, y)) = arguments.pixel else {
         let ray = arguments.ray.unwrap_or(Ray::new(DVec3::ZERO, DVec3::Z));
-        // Light travels along unit directions.
-        let scaled = ray.direction / ray.direction.abs().max_element();
-        let unit = Ray { direction: scaled.normalize(), ..ray };
-        let (radiance, events) = scene.explain_ray(&options, &unit, arguments.sample)?;
-        (vec![camera::given(&ray, texts)], ray, radiance, events)
+        return question.of_ray(&scene, &options, &ray);
     };
-    let mut met = surfaces::surfaces(&scene, &ray, things, arguments.nearest, true, texts);
-    let path = light::corners(&events);
-    if !met.hits.is_empty() {
-        let drawing = sketch::svg(&met.scenery, &ray, &met.hits, &path, texts.sketch);
-        met.section.items.insert(0, Item::Sketch(drawing));
+    let (width, height) = (options.width, options.height);
+    if x >= width || y >= height {
+        return Err(Failure::Usage(format!(
+            "--pixel {x},{y}: outside of the picture (expected less than {width},{height}; --size gives another)"
+        )));
     }
-    sections.push(met.section);
-    let path = light::Path { scene: &scene, things, texts, depth: arguments.depth };
-    sections.push(path.tell(radiance, &events));
-    Ok(sections)
+    question.of_pixel(&scene, &options, (x, y))
 }
 
 /// The sections with these keys, each with all below it.
@@ -236,10 +221,7 @@ fn only(sections: Vec<Section>, keys: &[String]) -> Result<Vec<Section>, Failure
 fn written(arguments: &Arguments, name: &Path, sections: &[Section]) -> String {
     let texts = arguments.language.choose(&ENGLISH, &SPANISH);
     let name = name.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let title = match (arguments.pixel, &arguments.ray) {
-        (Some((x, y)), _) => format!("{}: {name}, {} ({x}, {y})", texts.title, texts.pixel),
-        _ => format!("{}: {name}", texts.title),
-    };
+    let title = title(&name, arguments.pixel, texts);
     match arguments.format {
         Format::Text => writing::text(sections, arguments.only.is_empty(), texts.schoolbook),
         Format::Markdown => format!("# {title}\n\n{}", writing::markdown(sections, texts.schoolbook)),
@@ -249,5 +231,12 @@ fn written(arguments: &Arguments, name: &Path, sections: &[Section]) -> String {
             let report = json!({ "title": title, "sections": sections });
             format!("{report:#}\n")
         }
+    }
+}
+
+fn title(name: &str, pixel: Option<(u32, u32)>, texts: &Texts) -> String {
+    match pixel {
+        Some((x, y)) => format!("{}: {name}, {} ({x}, {y})", texts.title, texts.pixel),
+        None => format!("{}: {name}", texts.title),
     }
 }

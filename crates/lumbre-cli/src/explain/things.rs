@@ -3,7 +3,6 @@
 use std::collections::HashMap;
 
 use lumbre::SceneDesc;
-use lumbre::description::GeometryDesc;
 
 /// The shapes of a file by their number, and the materials.
 #[derive(Debug, Default)]
@@ -47,15 +46,10 @@ impl Things {
         let materials = materials.collect();
         let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);
         let shapes = desc.shapes.iter().chain(in_objects).map(|shape| {
-            let kind = match &shape.geometry {
-                GeometryDesc::Exact(exact) => exact.name(),
-                GeometryDesc::Coloured(coloured) => coloured.shape.name(),
-                GeometryDesc::Mesh(_) => "mesh",
-                GeometryDesc::BilinearMesh(_) => "bilinearmesh",
-                GeometryDesc::Csg(_) => "csg",
-                GeometryDesc::Custom(_) => "custom",
-            };
-            (shape.index, Thing { kind, material: shape.material.map(|id| id.0 as usize) })
+            (
+                shape.index,
+                Thing { kind: shape.geometry.name(), material: shape.material.map(|id| id.0 as usize) },
+            )
         });
         Self { shapes: shapes.collect(), materials }
     }
