@@ -14,6 +14,7 @@ mod cast;
 mod checkpoint;
 mod completions;
 mod console;
+mod defaults;
 mod denoiser;
 mod diff;
 mod explain;
@@ -41,6 +42,10 @@ mod units;
 mod verb;
 mod view;
 mod viewing;
+
+pub use defaults::{Defaults, MODEL_SPP};
+pub use explain::{Format, Language, Question, Things, explain};
+pub use failure::Failure;
 
 /// Renders scenes, casts rays into them, says what is in them, and compares and joins pictures.
 #[derive(Parser)]

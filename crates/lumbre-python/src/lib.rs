@@ -3,6 +3,7 @@
 mod cast;
 mod columns;
 mod errors;
+mod material;
 mod picture;
 mod points;
 mod program;
@@ -17,13 +18,15 @@ mod _lumbre {
     #[pymodule_export]
     use crate::errors::LumbreError;
     #[pymodule_export]
+    use crate::material::{Material, Texture};
+    #[pymodule_export]
     use crate::picture::{Part, Picture, read_image, write_image};
     #[pymodule_export]
     use crate::program::main;
     #[pymodule_export]
     use crate::scene::Scene;
     #[pymodule_export]
-    use crate::shape::{Camera, Geometry, Light, Material};
+    use crate::shape::{Camera, Geometry, Light};
     #[pymodule_export]
     use crate::work::thread_count;
 }

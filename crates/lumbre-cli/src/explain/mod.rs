@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use lumbre::description::IntegratorKind;
 use lumbre::formats::atomic_write;
-use lumbre::{DVec3, Ray};
+use lumbre::{DVec3, Ray, RenderOptions, Scene};
 use serde_json::json;
 
 use crate::failure::{Failure, print};
@@ -36,7 +36,7 @@ use document::{Item, Section};
 use english::ENGLISH;
 use spanish::SPANISH;
 use texts::Texts;
-use things::Things;
+pub use things::Things;
 
 /// Tells how the colour of a pixel, or the light along a ray, comes about: the camera and its ray, every surface on the way with the
 /// equation of its crossings, normals, lights and shadows, and the path of one sample, with all numbers as the render computes them.
@@ -52,27 +52,8 @@ pub(crate) struct Arguments {
     /// The scene: .pbrt, .gltf, .glb, .obj, .ply or .stl, also packed by gzip. Several are put into the same world.
     #[arg(required = true, value_name = "SCENE")]
     scene: Vec<PathBuf>,
-    /// The pixel, from 0,0 in the upper left corner.
-    #[arg(long, value_name = "X,Y", value_parser = pixel, required_unless_present = "ray")]
-    pixel: Option<(u32, u32)>,
-    /// A ray instead: its origin and its direction, of any length but 0; then, where it is not 0 to infinity, its range of t.
-    #[arg(long, value_name = "OX,OY,OZ,DX,DY,DZ[,TMIN,TMAX]", allow_hyphen_values = true, value_parser = ray, conflicts_with = "pixel")]
-    ray: Option<Ray>,
-    /// What it is written as.
-    #[arg(long, value_enum, value_name = "FORMAT", default_value_t = Format::Text)]
-    format: Format,
-    /// The language: English or Spanish.
-    #[arg(long, value_enum, value_name = "LANGUAGE", default_value_t = Language::En)]
-    lang: Language,
-    /// Tell the crossings of so many of the rays that follow, too.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    depth: u32,
-    /// The number of the sample: the radiance is that which a render adds to the pixel for it.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    sample: u32,
-    /// Tell only the surface that is seen, not those behind it.
-    #[arg(long)]
-    nearest: bool,
+    #[command(flatten)]
+    question: Question,
     /// Write to this file.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -99,9 +80,35 @@ pub(crate) struct Arguments {
     reading: ReadingArguments,
 }
 
+/// What is to be explained, and how that is told.
+#[derive(Args, Clone, Debug)]
+pub struct Question {
+    /// The pixel, from 0,0 in the upper left corner.
+    #[arg(long, value_name = "X,Y", value_parser = pixel, required_unless_present = "ray")]
+    pub pixel: Option<(u32, u32)>,
+    /// A ray instead: its origin and its direction, of any length but 0; then, where it is not 0 to infinity, its range of t.
+    #[arg(long, value_name = "OX,OY,OZ,DX,DY,DZ[,TMIN,TMAX]", allow_hyphen_values = true, value_parser = ray, conflicts_with = "pixel")]
+    pub ray: Option<Ray>,
+    /// What it is written as.
+    #[arg(long, value_enum, value_name = "FORMAT", default_value_t = Format::Text)]
+    pub format: Format,
+    /// The language: English or Spanish.
+    #[arg(long, value_enum, value_name = "LANGUAGE", default_value_t = Language::En)]
+    pub lang: Language,
+    /// Tell the crossings of so many of the rays that follow, too.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub depth: u32,
+    /// The number of the sample: the radiance is that which a render adds to the pixel for it.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub sample: u32,
+    /// Tell only the surface that is seen, not those behind it.
+    #[arg(long)]
+    pub nearest: bool,
+}
+
 /// What an explanation is written as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Format {
+pub enum Format {
     /// Plain text.
     Text,
     /// Markdown, with formulas in LaTeX.
@@ -114,14 +121,32 @@ enum Format {
 
 /// The languages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Language {
+pub enum Language {
     /// English.
     En,
     /// Spanish.
     Es,
 }
 
+impl Format {
+    /// The names.
+    pub const NAMES: [&'static str; 4] = ["text", "markdown", "html", "json"];
+
+    /// The format of a name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        clap::ValueEnum::from_str(name, false).ok()
+    }
+}
+
 impl Language {
+    /// The names.
+    pub const NAMES: [&'static str; 2] = ["en", "es"];
+
+    /// The language of a name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        clap::ValueEnum::from_str(name, false).ok()
+    }
+
     fn texts(self) -> &'static Texts {
         match self {
             Self::En => &ENGLISH,
@@ -183,8 +208,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         print_warnings(&diagnostics);
         print_warnings(&shown.diagnostics);
     }
-    let sections = told(arguments, shown, &things)?;
-    let written = written(arguments, name, &sections);
+    let Shown { scene, mut options, .. } = shown;
+    options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
+    let written = explain(&scene, &options, &things, name, &arguments.question)?;
     match &arguments.output {
         None => print(&written),
         Some(path) => {
@@ -193,52 +219,69 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-fn told(arguments: &Arguments, shown: Shown, things: &Things) -> Result<Vec<Section>, Failure> {
-    let texts = arguments.lang.texts();
-    let Shown { scene, mut options, .. } = shown;
-    options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
+/// Explains a pixel of a scene's picture, or the light along a ray in it.
+///
+/// # Errors
+/// [`Failure::Usage`] for a pixel outside of the picture, and for options that make no picture.
+pub fn explain(
+    scene: &Scene,
+    options: &RenderOptions,
+    things: &Things,
+    name: &Path,
+    question: &Question,
+) -> Result<String, Failure> {
+    Ok(written(question, name, &told(question, scene, options, things)?))
+}
+
+fn told(
+    question: &Question,
+    scene: &Scene,
+    options: &RenderOptions,
+    things: &Things,
+) -> Result<Vec<Section>, Failure> {
+    let texts = question.lang.texts();
     let whole = (options.width, options.height);
-    let (mut sections, ray, radiance, events) = if let Some((x, y)) = arguments.pixel {
+    let (mut sections, ray, radiance, events) = if let Some((x, y)) = question.pixel {
         if x >= whole.0 || y >= whole.1 {
             return Err(Failure::Usage(format!(
                 "--pixel {x},{y}: outside of the picture (expected less than {},{}; --size gives another)",
                 whole.0, whole.1
             )));
         }
-        let sample = scene.explain_sample(&options, (x, y), arguments.sample)?;
+        let sample = scene.explain_sample(options, (x, y), question.sample)?;
         let camera = &scene.resolved().cameras()[options.camera];
         let mut section = camera::camera(camera, whole, (x, y), &sample, texts);
-        section.fact(texts.sample, f64::from(arguments.sample));
+        section.fact(texts.sample, f64::from(question.sample));
         section.fact(texts.weight, sample.weight);
         (vec![section], sample.ray, sample.radiance, sample.events)
     } else {
-        let ray = arguments.ray.unwrap_or(Ray::new(DVec3::ZERO, DVec3::Z));
+        let ray = question.ray.unwrap_or(Ray::new(DVec3::ZERO, DVec3::Z));
         // Light travels along unit directions.
         let scaled = ray.direction / ray.direction.abs().max_element();
         let unit = Ray { direction: scaled.normalize(), ..ray };
-        let (radiance, events) = scene.explain_ray(&options, &unit, arguments.sample)?;
+        let (radiance, events) = scene.explain_ray(options, &unit, question.sample)?;
         (vec![camera::given(&ray, texts)], ray, radiance, events)
     };
-    let mut met = surfaces::surfaces(&scene, &ray, things, arguments.nearest, true, texts);
+    let mut met = surfaces::surfaces(scene, &ray, things, question.nearest, true, texts);
     let path = light::corners(&events);
     if !met.hits.is_empty() {
         let drawing = sketch::svg(&met.scenery, &ray, &met.hits, &path, texts.sketch);
         met.section.items.insert(0, Item::Sketch(drawing));
     }
     sections.push(met.section);
-    let path = light::Path { scene: &scene, things, texts, depth: arguments.depth };
+    let path = light::Path { scene, things, texts, depth: question.depth };
     sections.push(path.tell(radiance, &events));
     Ok(sections)
 }
 
-fn written(arguments: &Arguments, name: &Path, sections: &[Section]) -> String {
-    let texts = arguments.lang.texts();
+fn written(question: &Question, name: &Path, sections: &[Section]) -> String {
+    let texts = question.lang.texts();
     let name = name.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let title = match (arguments.pixel, &arguments.ray) {
+    let title = match (question.pixel, &question.ray) {
         (Some((x, y)), _) => format!("{}: {name}, {} ({x}, {y})", texts.title, texts.pixel),
         _ => format!("{}: {name}", texts.title),
     };
-    match arguments.format {
+    match question.format {
         Format::Text => writing::text(sections, texts.schoolbook),
         Format::Markdown => format!("# {title}\n\n{}", writing::markdown(sections, texts.schoolbook)),
         Format::Html => html::html(&title, texts.code, sections, texts.schoolbook),

@@ -3,11 +3,11 @@
 use std::collections::HashMap;
 
 use lumbre::SceneDesc;
-use lumbre::description::GeometryDesc;
+use lumbre::description::{GeometryDesc, ShapeDesc};
 
 /// The shapes of a file by their number, and the materials.
 #[derive(Debug, Default)]
-pub(super) struct Things {
+pub struct Things {
     shapes: HashMap<u32, Thing>,
     materials: Vec<Substance>,
 }
@@ -33,7 +33,7 @@ pub(super) struct Substance {
 
 impl Things {
     /// Of a description.
-    pub(super) fn of(desc: &SceneDesc) -> Self {
+    pub fn of(desc: &SceneDesc) -> Self {
         let mut by_owner: HashMap<String, Vec<Parameter>> = HashMap::new();
         for parameter in lumbre::parameters(desc) {
             let owner = parameter.path.strip_suffix(&parameter.name).unwrap_or_default().to_owned();
@@ -46,18 +46,24 @@ impl Things {
         });
         let materials = materials.collect();
         let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);
-        let shapes = desc.shapes.iter().chain(in_objects).map(|shape| {
+        let mut open: Vec<&ShapeDesc> = desc.shapes.iter().chain(in_objects).collect();
+        let mut shapes = HashMap::new();
+        while let Some(shape) = open.pop() {
             let kind = match &shape.geometry {
                 GeometryDesc::Exact(exact) => exact.name(),
                 GeometryDesc::Coloured(coloured) => coloured.shape.name(),
                 GeometryDesc::Mesh(_) => "mesh",
                 GeometryDesc::BilinearMesh(_) => "bilinearmesh",
-                GeometryDesc::Csg(_) => "csg",
+                GeometryDesc::Csg(csg) => {
+                    // A hit is on a shape of an operand, which comes later: the number may be that of the first of them.
+                    open.extend(csg.operands.iter().flat_map(|operand| &**operand));
+                    "csg"
+                }
                 GeometryDesc::Custom(_) => "custom",
             };
-            (shape.index, Thing { kind, material: shape.material.map(|id| id.0 as usize) })
-        });
-        Self { shapes: shapes.collect(), materials }
+            shapes.insert(shape.index, Thing { kind, material: shape.material.map(|id| id.0 as usize) });
+        }
+        Self { shapes, materials }
     }
 
     /// What kind of shape has this number, in the words of the scene language; the ground is of no file.

@@ -21,6 +21,7 @@ __all__ = [
     "Geometry",
     "Light",
     "Material",
+    "Texture",
     "thread_count",
 ]
 
@@ -60,30 +61,60 @@ class Geometry:
     @staticmethod
     def patch(p00: _Triple, p10: _Triple, p01: _Triple, p11: _Triple) -> Geometry: ...
     @staticmethod
-    def mesh(vertices: _Array, faces: _Array, normals: _Array | None, uvs: _Array | None, is_precise: bool) -> Geometry: ...
+    def csg(operation: str, operands: Sequence[Sequence[_Placed]]) -> Geometry: ...
+    @staticmethod
+    def mesh(
+        vertices: _Array, faces: _Array, normals: _Array | None, uvs: _Array | None, colors: _Array | None, is_precise: bool
+    ) -> Geometry: ...
+
+@final
+class Texture:
+    def __new__(
+        cls, texels: _Array, is_srgb: bool, wrap: str, filter: str, scale: tuple[float, float], offset: tuple[float, float]
+    ) -> Texture: ...
+
+_Colour = Texture | _Triple
+_Number = Texture | float
 
 @final
 class Material:
     @staticmethod
-    def diffuse(reflectance: _Triple) -> Material: ...
+    def diffuse(reflectance: _Colour) -> Material: ...
     @staticmethod
-    def metal(reflectance: _Triple, roughness: float) -> Material: ...
+    def metal(reflectance: _Colour, roughness: _Number) -> Material: ...
     @staticmethod
-    def glass(eta: float) -> Material: ...
+    def glass(eta: float, roughness: _Number) -> Material: ...
+    @staticmethod
+    def pane(eta: float) -> Material: ...
+    @staticmethod
+    def coated(reflectance: _Colour, roughness: _Number, eta: float) -> Material: ...
+    @staticmethod
+    def translucent(reflectance: _Colour, transmittance: _Colour) -> Material: ...
+    @staticmethod
+    def mix(first: Material, second: Material, amount: _Number) -> Material: ...
     @staticmethod
     def principled(
-        base_color: _Triple,
-        metallic: float,
-        roughness: float,
-        transmission: float,
-        clearcoat: float,
+        base_color: _Colour,
+        metallic: _Number,
+        roughness: _Number,
+        transmission: _Number,
+        clearcoat: _Number,
+        clearcoat_roughness: _Number,
+        sheen_color: _Colour,
+        sheen_roughness: _Number,
+        specular: _Number,
+        specular_color: _Colour,
         ior: float,
+        attenuation: tuple[_Triple, float] | None,
     ) -> Material: ...
+    def tilted(self, normal_map: Texture | None, bump_map: Texture | None) -> Material: ...
 
 @final
 class Light:
     @staticmethod
     def point(position: _Triple, intensity: _Triple) -> Light: ...
+    @staticmethod
+    def spot(position: _Triple, target: _Triple, intensity: _Triple, angle: float, falloff: float) -> Light: ...
     @staticmethod
     def distant(towards: _Triple, irradiance: _Triple) -> Light: ...
     @staticmethod
@@ -108,13 +139,13 @@ class Picture:
         self,
         path: str,
         layers: Sequence[str],
-        tonemap: str,
-        exposure: float,
+        tonemap: str | None,
+        exposure: float | None,
         depth: int,
         quality: int,
-        precision: str,
+        precision: str | None,
     ) -> None: ...
-    def png(self, tonemap: str, exposure: float) -> bytes: ...
+    def png(self, tonemap: str | None, exposure: float | None) -> bytes: ...
     def stats(self) -> dict[str, Any]: ...
     def take_part(self) -> Part: ...
 
@@ -181,6 +212,17 @@ class Scene:
     def inside(self, points: _Array, out: _Array) -> None: ...
     def winding_number(self, points: _Array, out: _Array) -> None: ...
     def render(self, options: dict[str, Any], progress: Callable[[int, int | None, float], object] | None) -> Picture: ...
+    def explain(
+        self,
+        options: dict[str, Any],
+        pixel: tuple[int, int] | None,
+        ray: tuple[_Triple, _Triple, float, float] | None,
+        sample: int,
+        depth: int,
+        nearest: bool,
+        lang: str,
+        format: str,
+    ) -> str: ...
     def info(self) -> dict[str, Any]: ...
     def files(self) -> list[Path]: ...
     def hash_files(self) -> None: ...
