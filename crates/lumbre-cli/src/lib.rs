@@ -44,7 +44,7 @@ mod view;
 mod viewing;
 
 pub use defaults::{Defaults, MODEL_SPP};
-pub use explain::{Format, Language, Question, Things, explain};
+pub use explain::{Explainer, Format, Language, Request, Things, explain};
 pub use failure::Failure;
 
 /// Renders scenes, casts rays into them, says what is in them, and compares and joins pictures.

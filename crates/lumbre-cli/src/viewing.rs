@@ -9,9 +9,10 @@ use std::time::Duration;
 use clap::Args;
 use lumbre::image::ToneMap;
 use lumbre::{CancelToken, SaveOptions, SceneDesc};
-use lumbre_viewer::{Built, Moment, Options, Read, Source, Viewer, export};
+use lumbre_viewer::{Built, Explain, Moment, Options, Read, Source, Viewer, export};
 
 use crate::defaults::MODEL_SPP;
+use crate::explain::Explainer;
 use crate::failure::{Failure, print};
 use crate::names::one_of;
 use crate::reading::ReadingArguments;
@@ -217,6 +218,7 @@ impl Files {
         // The camera that was asked for is of the command line's file.
         let camera = self.arguments.camera.as_deref().filter(|_| self.dropped.is_none());
         let wish = Wish { name: &name, size: *size, camera, integrator: None, view, staging, reading };
+        let explain = Some(Box::new(Explainer::new(&desc, self.name())) as Box<dyn Explain>);
         let Shown { scene, defaults, behind, mut options, is_of_light, diagnostics } = shown(desc, &wish)?;
         let mut warnings = diagnostics.lines();
         options.threads = rayon::current_num_threads();
@@ -243,6 +245,6 @@ impl Files {
             Behind::Background(background) => Some(background),
             Behind::Lights | Behind::Nothing => None,
         };
-        Ok(Built { scene, options, save, background, denoise: is_plain, warnings })
+        Ok(Built { scene, options, save, background, denoise: is_plain, warnings, explain })
     }
 }

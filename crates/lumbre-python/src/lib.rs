@@ -10,6 +10,7 @@ mod program;
 mod rays;
 mod scene;
 mod shape;
+mod viewer;
 mod work;
 
 /// The module as Python imports it.
@@ -28,5 +29,7 @@ mod _lumbre {
     #[pymodule_export]
     use crate::shape::{Camera, Geometry, Light};
     #[pymodule_export]
-    use crate::work::thread_count;
+    use crate::viewer::Viewer;
+    #[pymodule_export]
+    use crate::work::{panic_on_purpose, thread_count};
 }

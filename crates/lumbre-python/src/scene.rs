@@ -12,7 +12,7 @@ use lumbre::{
     CancelToken, Job, Part as PartDesc, PixelBounds, Progress, Ray, ReadOptions, RenderOptions, SceneBuilder,
     SceneDesc, State, UpAxis,
 };
-use lumbre_cli::{Defaults, Format, Language, MODEL_SPP, Question, Things};
+use lumbre_cli::{Defaults, Format, Language, MODEL_SPP, Request, Things};
 use numpy::{PyArray1, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
@@ -22,6 +22,7 @@ use crate::errors::{failed, invalid, raised};
 use crate::picture::{Look, Picture};
 use crate::rays::{Rays, Triples, is_single};
 use crate::shape::{Camera, Light, Placed, placed, transform};
+use crate::viewer::{Origin, Viewer};
 use crate::work::interruptible;
 use crate::{cast, points};
 
@@ -31,7 +32,8 @@ pub(crate) struct Scene {
     /// Of what is there alone, for queries.
     scene: Arc<lumbre::Scene>,
     /// Before it is set on a stage.
-    desc: SceneDesc,
+    desc: Arc<SceneDesc>,
+    origin: Origin,
     /// What it is called.
     name: PathBuf,
     /// The files that it was read from.
@@ -99,9 +101,12 @@ impl Scene {
             let scene = lumbre::Scene::of_file(desc.clone(), &name, &mut diagnostics)?;
             Ok((scene, desc, diagnostics))
         };
+        // They may be read again when this process is elsewhere.
+        let named = paths.iter().map(std::path::absolute).collect::<Result<_, _>>()?;
+        let origin = Origin::Files(named, Box::new(options.clone()));
         let (scene, desc, diagnostics) = interruptible(py, |_| open(), |_| Ok(()))?.map_err(raised)?;
         let files = diagnostics.files_read().to_vec();
-        Ok((Self::new(scene, desc, name, files, settings), diagnostics.lines()))
+        Ok((Self::new(scene, desc.into(), origin, name, files, settings), diagnostics.lines()))
     }
 
     /// Builds a scene of shapes, of shapes with many places each, of cameras and of lights.
@@ -148,7 +153,9 @@ impl Scene {
         };
         let build = || lumbre::Scene::from_description(desc.clone());
         let scene = interruptible(py, |_| build(), |_| Ok(()))?.map_err(raised)?;
-        Ok(Self::new(scene, desc, "scene".into(), Vec::new(), settings))
+        let desc = Arc::new(desc);
+        let origin = Origin::Shapes(Arc::clone(&desc));
+        Ok(Self::new(scene, desc, origin, "scene".into(), Vec::new(), settings))
     }
 
     /// The closest hits, into the arrays of `out`.
@@ -293,7 +300,15 @@ impl Scene {
         // The render has threads of its own; those that wait for it here look for Ctrl-C.
         let rendered = py.detach(|| {
             std::thread::scope(|scope| {
-                let render = || shown.scene.render_from(&options, &watch, &cancel, None, None);
+                let render = || {
+                    let (mut picture, state) =
+                        shown.scene.render_from(&options, &watch, &cancel, None, None)?;
+                    // What is coarser than its pixels says nothing of noise.
+                    if denoises && picture.stats().stride == Some(1) {
+                        picture.denoise_unless(options.threads, &cancel)?;
+                    }
+                    Ok((picture, state))
+                };
                 let running = scope.spawn(render);
                 let mut raised = None;
                 while !running.is_finished() {
@@ -311,13 +326,15 @@ impl Scene {
                 raised.map_or(Ok(rendered), Err)
             })
         })?;
-        let (mut picture, state) = rendered.map_err(raised)?;
+        let (picture, state) = rendered.map_err(raised)?;
         watch.tell(py, tells.as_ref())?;
-        // What is coarser than its pixels says nothing of noise.
-        if denoises && picture.stats().stride == Some(1) {
-            py.detach(|| picture.denoise(options.threads)).map_err(raised)?;
-        }
         Ok(Picture::new(picture, look, job.map(|job| PartDesc { job, state })))
+    }
+
+    /// Shows it in a viewer, at an address of this machine.
+    fn view(&self, py: Python<'_>, size: Option<(u32, u32)>, spp: Option<u32>) -> PyResult<Viewer> {
+        let origin = self.origin.clone();
+        py.detach(|| Viewer::start(origin, size, spp))
     }
 
     /// What is in it, by name.
@@ -371,10 +388,10 @@ impl Scene {
             Ray::new(origin.into(), direction.into()).with_range(from, to)
         });
         let Asked { shown, options, .. } = self.asked(py, options)?;
-        let question = Question { pixel, ray, format, lang, depth, sample, nearest };
+        let request = Request { pixel, ray, format, lang, depth, sample, nearest };
         let explain = || {
             let things = self.things.get_or_init(|| Things::of(&self.desc));
-            lumbre_cli::explain(&shown.scene, &options, things, &self.name, &question)
+            lumbre_cli::explain(&shown.scene, &options, things, &self.name, &request)
         };
         py.detach(explain).map_err(failed)
     }
@@ -422,7 +439,8 @@ struct Asked {
 impl Scene {
     fn new(
         scene: lumbre::Scene,
-        desc: SceneDesc,
+        desc: Arc<SceneDesc>,
+        origin: Origin,
         name: PathBuf,
         files: Vec<PathBuf>,
         settings: Vec<(String, String)>,
@@ -430,6 +448,7 @@ impl Scene {
         Self {
             scene: Arc::new(scene),
             desc,
+            origin,
             name,
             files,
             settings,
@@ -454,7 +473,7 @@ impl Scene {
             return Ok(Arc::clone(shown));
         }
         let build = || -> Result<Shown, lumbre::Error> {
-            let mut desc = self.desc.clone();
+            let mut desc = SceneDesc::clone(&self.desc);
             let defaults = Defaults::stage(&mut desc, size, integrator);
             let scene = match defaults.is_bare() {
                 true => Arc::clone(&self.scene),

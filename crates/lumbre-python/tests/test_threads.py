@@ -98,3 +98,13 @@ def test_the_program_is_there_with_its_statuses(tmp_path) -> None:
     wrong = run("rendr", str(path))
     assert wrong.returncode == 2 and "rendr" in wrong.stderr
     assert run("--version").stdout.startswith("lumbre ")
+
+
+def test_a_panic_is_an_exception_and_the_threads_work_on(mixed: lumbre.Scene) -> None:
+    origins, directions = random_rays(5003)
+    expected = mixed.cast(origins, directions).t
+    for _ in range(3):
+        with pytest.raises(BaseException, match="on purpose") as raised:
+            lumbre._lumbre.panic_on_purpose()
+        assert raised.typename == "PanicException" and not isinstance(raised.value, Exception)
+        np.testing.assert_array_equal(mixed.cast(origins, directions).t, expected)

@@ -20,7 +20,7 @@ pub mod transport;
 mod workers;
 
 pub use cancel::CancelToken;
-pub use denoise::{Denoised, denoise};
+pub use denoise::{Denoised, denoise, denoise_unless};
 pub use error::RenderError;
 pub use job::{Keeper, render, render_from, render_with};
 pub use one_sample::{ExplainedSample, explain_ray, explain_sample};

@@ -48,6 +48,17 @@ pub enum CameraKind {
     },
 }
 
+impl CameraKind {
+    /// Its name in the scene language.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Perspective { .. } => "perspective",
+            Self::Orthographic { .. } => "orthographic",
+            Self::Spherical { .. } => "spherical",
+        }
+    }
+}
+
 /// A camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {

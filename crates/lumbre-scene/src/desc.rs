@@ -136,6 +136,20 @@ pub enum GeometryDesc {
     Custom(Arc<dyn CustomGeometry>),
 }
 
+impl GeometryDesc {
+    /// The name of its kind, in the words of the scene language where that has one; for several ways to write a mesh, `mesh`.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Exact(exact) => exact.name(),
+            Self::Coloured(coloured) => coloured.shape.name(),
+            Self::Mesh(_) => "mesh",
+            Self::BilinearMesh(_) => "bilinearmesh",
+            Self::Csg(_) => "csg",
+            Self::Custom(_) => "custom",
+        }
+    }
+}
+
 /// An exact shape with vertex colours interpolated between two points, such as a thick line between two
 /// vertices.
 #[derive(Clone, Debug)]

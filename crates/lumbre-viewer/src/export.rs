@@ -1,5 +1,6 @@
-//! The page at rest: the picture with its channels, the values of its pixels and the facts of the scene, as files that need no viewer.
+//! The page at rest: the picture with its channels, what is at its pixels, and the facts of the scene, as files that need no viewer.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::Path;
 
@@ -10,13 +11,14 @@ use lumbre::formats::atomic_write;
 use lumbre::formats::image::{ImageFormat, encode_image};
 use lumbre::image::{Encoded, Image, f32_to_half};
 use lumbre::{CancelToken, NoProgress, Stop};
+use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use crate::base64::base64;
 use crate::frame::{Channel, Frame, HEADER, Look, Pixels, Shot};
 use crate::page::FILES;
-use crate::source::{Moment, Source};
-use crate::stage::Stage;
+use crate::source::{Built, Moment, Source};
+use crate::stage::{Stage, ray};
 
 /// Samples a pixel of channels other than the picture.
 const FEATURE_SPP: u32 = 16;
@@ -28,7 +30,9 @@ const FEATURE_SPP: u32 = 16;
 /// What is wrong with the scene, and what cannot be written.
 pub fn export(source: &dyn Source, folder: &Path, cancel: &CancelToken) -> Result<(), String> {
     let read = source.read(&Moment::default())?;
-    let stage = Stage::new(source.build(read.desc.clone())?, &read.desc, read.warnings);
+    // Nobody is there to tell more than what is in the page.
+    let built = Built { explain: None, ..source.build(read.desc.clone())? };
+    let stage = Stage::new(built, &read.desc, read.warnings);
     let scene = stage.scene();
     let look = Look { save: stage.save.clone(), false_colour: false };
     let mut options = stage.options.clone();
@@ -78,6 +82,7 @@ pub fn export(source: &dyn Source, folder: &Path, cancel: &CancelToken) -> Resul
         "progress": { "spp": stats.spp, "target": options.stop.spp, "noise": stats.noise, "seconds": seconds,
                       "rays_per_second": rays as f64 / seconds.max(1e-6) },
         "channels": channels,
+        "picks": picks(&stage, options.camera, full)?,
     });
     write(folder, &data)
 }
@@ -114,13 +119,41 @@ fn shown(shot: &Shot, look: &Look) -> Result<Vec<u8>, String> {
     encode_image(&image, ImageFormat::Png, &lumbre::SaveOptions::default()).map_err(|e| e.to_string())
 }
 
-/// The numbers of an image in half precision, the least significant byte first, compressed.
+/// The numbers of an image in half precision.
 fn packed(image: &Image) -> Result<Vec<u8>, String> {
+    let numbers = image.pixels().iter().flat_map(|pixel| pixel.to_array());
+    compressed(numbers.map(|value| f32_to_half(value).to_le_bytes()))
+}
+
+/// What the rays through the middles of the pixels meet: for each pixel the place of the shape in a list, from 1, or 0 for nothing,
+/// and its distance.
+fn picks(stage: &Stage, camera: usize, (width, height): (u32, u32)) -> Result<Value, String> {
+    let scene = stage.scene();
+    let pixels = (0..height).into_par_iter().flat_map_iter(|y| (0..width).map(move |x| (x, y)));
+    let met = pixels.map(|(x, y)| {
+        let (x, y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
+        let hit = scene.closest(&ray(&scene, camera, (width, height), x, y)?)?;
+        Some((hit.shape, hit.t as f32))
+    });
+    let met: Vec<Option<(u32, f32)>> = met.collect();
+    let shapes: BTreeSet<u32> = met.iter().flatten().map(|(shape, _)| *shape).collect();
+    let places: BTreeMap<u32, u32> = shapes.iter().copied().zip(1..).collect();
+    let numbers = met.iter().flat_map(|met| match met {
+        Some((shape, distance)) => [places[shape].to_le_bytes(), distance.to_le_bytes()],
+        None => [[0; 4]; 2],
+    });
+    let shapes = shapes.iter().map(|shape| {
+        let thing = stage.thing(*shape);
+        json!({ "shape": shape, "kind": thing.kind, "material": thing.material })
+    });
+    Ok(json!({ "shapes": shapes.collect::<Vec<_>>(), "values": base64(&compressed(numbers)?) }))
+}
+
+/// Numbers whose bytes begin with the least significant one, compressed.
+fn compressed<const N: usize>(numbers: impl Iterator<Item = [u8; N]>) -> Result<Vec<u8>, String> {
     let mut packed = ZlibEncoder::new(Vec::new(), Compression::default());
-    for pixel in image.pixels() {
-        for value in pixel.to_array() {
-            packed.write_all(&f32_to_half(value).to_le_bytes()).map_err(|e| e.to_string())?;
-        }
+    for bytes in numbers {
+        packed.write_all(&bytes).map_err(|e| e.to_string())?;
     }
     packed.finish().map_err(|e| e.to_string())
 }

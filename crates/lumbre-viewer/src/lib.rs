@@ -20,5 +20,5 @@ mod worker;
 
 pub use base64::base64;
 pub use export::export;
-pub use source::{Built, Moment, Read, Source};
+pub use source::{Built, Explain, Moment, Read, Source};
 pub use viewer::{Closer, Options, Viewer};

@@ -29,4 +29,7 @@ pub(crate) const FILES: [File; 4] = [
 
 /// What may be loaded by the page: what this server has, and pictures that it makes itself.
 pub(crate) const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; \
-     base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+     frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+/// What an explanation may: be in a frame of ours, have styles, and nothing else.
+pub(crate) const EXPLANATION_POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'";

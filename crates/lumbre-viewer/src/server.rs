@@ -21,7 +21,7 @@ use tokio::sync::{Notify, Semaphore};
 use tokio_tungstenite::tungstenite::handshake::derive_accept_key;
 
 use crate::guard::{Guard, Refusal};
-use crate::page::{FILES, POLICY};
+use crate::page::{EXPLANATION_POLICY, FILES, POLICY};
 use crate::session::Session;
 use crate::socket;
 
@@ -99,7 +99,7 @@ impl Server {
             (REFERRER_POLICY, "no-referrer"),
             (CACHE_CONTROL, "no-store"),
         ] {
-            headers.insert(name, HeaderValue::from_static(value));
+            headers.entry(name).or_insert(HeaderValue::from_static(value));
         }
         headers.insert("cross-origin-resource-policy", HeaderValue::from_static("same-origin"));
         headers.insert("cross-origin-opener-policy", HeaderValue::from_static("same-origin"));
@@ -128,6 +128,7 @@ impl Server {
             (&Method::GET, "/picture.exr") => {
                 self.picture(ImageFormat::Exr, "image/x-exr", "picture.exr").await
             }
+            (&Method::GET, path) if path.starts_with("/explanation/") => self.explanation(path).await,
             (&Method::POST, "/scene") => self.dropped(request).await,
             (method, path) => {
                 let file = FILES.iter().find(|file| file.path == path).ok_or(StatusCode::NOT_FOUND)?;
@@ -170,6 +171,35 @@ impl Server {
         answer
             .headers_mut()
             .insert(CONTENT_DISPOSITION, name.map_err(|_| StatusCode::INTERNAL_SERVER_ERROR)?);
+        Ok(answer)
+    }
+
+    /// How the colour of a pixel comes about: a page for a frame of ours or a tab of its own.
+    async fn explanation(&self, path: &str) -> Result<Answer, StatusCode> {
+        let mut parts = path.split('/').skip(2);
+        let (Some(language), Some(x), Some(y), None) =
+            (parts.next(), parts.next(), parts.next(), parts.next())
+        else {
+            return Err(StatusCode::NOT_FOUND);
+        };
+        let number = |text: &str| text.parse().map_err(|_| StatusCode::NOT_FOUND);
+        let (session, language, pixel) =
+            (self.session.clone(), language.to_owned(), (number(x)?, number(y)?));
+        let told = tokio::task::spawn_blocking(move || session.explain(pixel, &language)).await;
+        let told = told.map_err(|_| StatusCode::INTERNAL_SERVER_ERROR)?.ok_or(StatusCode::NOT_FOUND)?;
+        let (status, kind, text) = match told {
+            Ok(page) => (StatusCode::OK, "text/html; charset=utf-8", page),
+            Err(why) => (StatusCode::UNPROCESSABLE_ENTITY, "text/plain; charset=utf-8", why),
+        };
+        let mut answer = Response::new(Full::new(text.into()));
+        *answer.status_mut() = status;
+        for (name, value) in [
+            (CONTENT_TYPE, kind),
+            (CONTENT_SECURITY_POLICY, EXPLANATION_POLICY),
+            (X_FRAME_OPTIONS, "SAMEORIGIN"),
+        ] {
+            answer.headers_mut().insert(name, HeaderValue::from_static(value));
+        }
         Ok(answer)
     }
 

@@ -396,17 +396,27 @@ impl Session {
             .then(|| json!({ "type": "wrong", "what": "too many parameters are set, or one is too long" }))
     }
 
+    /// The stage, the camera that looks at it, and the size of the picture.
+    fn shown(&self) -> Option<(Arc<Stage>, usize, (u32, u32))> {
+        let inner = self.lock();
+        let stage = inner.stage.clone()?;
+        let camera = inner.wanted.camera.min(stage.cameras.len().saturating_sub(1));
+        Some((stage, camera, inner.shot.as_ref()?.full))
+    }
+
     fn pick(&self, x: f64, y: f64, request: u32) -> Option<Value> {
-        let (stage, camera, full) = {
-            let inner = self.lock();
-            (inner.stage.clone()?, inner.wanted.camera, inner.shot.as_ref()?.full)
-        };
+        let (stage, camera, full) = self.shown()?;
         if !(0.0 <= x && x <= f64::from(full.0) && 0.0 <= y && y <= f64::from(full.1)) {
             return None;
         }
-        let camera = camera.min(stage.cameras.len().saturating_sub(1));
         let met = stage.pick(camera, full, x, y);
         Some(json!({ "type": "picked", "request": request, "x": x, "y": y, "ray": met }))
+    }
+
+    /// How the colour of a pixel of the picture comes about, as a page in a language; `None` where nobody tells that.
+    pub(crate) fn explain(&self, pixel: (u32, u32), language: &str) -> Option<Result<String, String>> {
+        let (stage, camera, full) = self.shown()?;
+        stage.explain(camera, full, pixel, language)
     }
 
     /// The numbers of pixels of the last whole picture, row by row.

@@ -1,5 +1,6 @@
 //! Where a viewer gets its scene from: whoever starts it says how files are read and pictures are set up.
 
+use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -40,6 +41,26 @@ pub struct Built {
     pub denoise: bool,
     /// Warnings.
     pub warnings: Vec<String>,
+    /// What tells how the colours of its pixels come about.
+    pub explain: Option<Box<dyn Explain>>,
+}
+
+/// Tells how the colour of a pixel comes about.
+pub trait Explain: Debug + Send + Sync {
+    /// The languages in which it does, as their codes and their own names.
+    fn languages(&self) -> Vec<(&'static str, &'static str)>;
+
+    /// A page of HTML, which may have styles, and neither runs nor loads anything.
+    ///
+    /// # Errors
+    /// Why there is none, for people.
+    fn page(
+        &self,
+        scene: &Scene,
+        options: &RenderOptions,
+        pixel: (u32, u32),
+        language: &str,
+    ) -> Result<String, String>;
 }
 
 /// How a scene is read and built. Errors are messages for people, with the place in the file where there is one.

@@ -3,14 +3,14 @@
 use std::ops::ControlFlow;
 use std::sync::{RwLock, RwLockReadGuard, RwLockWriteGuard};
 
-use lumbre::description::{Camera, CameraKind, CameraView, GeometryDesc, NamedMaterial, UpAxis};
+use lumbre::description::{Camera, CameraView, NamedMaterial, UpAxis};
 use lumbre::{
     Background, DVec2, DVec3, Parameter, ParameterKind, Ray, RenderOptions, SaveOptions, Scene, SceneDesc,
 };
 use serde_json::{Value, json};
 
 use crate::camera::{Placement, field_of_view};
-use crate::source::Built;
+use crate::source::{Built, Explain};
 
 /// A scene with its descriptions by name.
 pub(crate) struct Stage {
@@ -29,14 +29,25 @@ pub(crate) struct Stage {
     pub placements: Vec<Placement>,
     /// By the index of the shape in its file.
     things: Vec<Thing>,
+    explain: Option<Box<dyn Explain>>,
     /// What is said of it to every page.
     pub facts: Value,
 }
 
-#[derive(Clone, Debug, Default)]
-struct Thing {
-    kind: &'static str,
-    material: Option<String>,
+/// A shape of the file.
+#[derive(Clone, Debug)]
+pub(crate) struct Thing {
+    /// The name of its kind.
+    pub kind: &'static str,
+    /// That of its material.
+    pub material: Option<String>,
+}
+
+impl Default for Thing {
+    /// What is of no file.
+    fn default() -> Self {
+        Self { kind: "ground", material: None }
+    }
 }
 
 /// Hits that are listed of one ray.
@@ -47,15 +58,16 @@ const MOST_PARAMETERS: usize = 2000;
 impl Stage {
     /// What was built of a description.
     pub(crate) fn new(built: Built, desc: &SceneDesc, mut warnings: Vec<String>) -> Self {
-        let Built { scene, options, save, background, denoise, warnings: more } = built;
+        let Built { scene, options, save, background, denoise, warnings: more, explain } = built;
         warnings.extend(more);
         let cameras = scene.resolved().cameras().to_vec();
         let placements: Vec<Placement> =
             cameras.iter().map(|camera| Placement::of(camera, distance(&scene, camera))).collect();
-        let facts = facts(&scene, desc, &cameras, &warnings);
+        let languages = explain.as_ref().map_or_else(Vec::new, |explain| explain.languages());
+        let facts = facts(&scene, desc, &cameras, &languages, &warnings);
         let things = things(desc);
         let scene = RwLock::new(scene);
-        Self { options, save, background, denoise, scene, cameras, placements, things, facts }
+        Self { options, save, background, denoise, scene, cameras, placements, things, explain, facts }
     }
 
     /// The scene, to render or to ask.
@@ -74,7 +86,7 @@ impl Stage {
         let Some(ray) = ray(&scene, camera, size, x, y) else { return json!({ "hits": [] }) };
         let mut hits = Vec::new();
         scene.all(&ray, |hit| {
-            let thing = self.things.get(hit.shape as usize).cloned().unwrap_or_default();
+            let thing = self.thing(hit.shape);
             hits.push(json!({
                 "distance": hit.t,
                 "point": hit.point.to_array(),
@@ -90,6 +102,33 @@ impl Stage {
             if hits.len() < MOST_HITS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
         json!({ "origin": ray.origin.to_array(), "direction": ray.direction.to_array(), "hits": hits })
+    }
+
+    /// The shape with this number.
+    pub(crate) fn thing(&self, shape: u32) -> Thing {
+        self.things.get(shape as usize).cloned().unwrap_or_default()
+    }
+
+    /// How the colour of a pixel of the picture comes about, as a page; `None` where nobody tells that.
+    pub(crate) fn explain(
+        &self,
+        camera: usize,
+        (width, height): (u32, u32),
+        pixel: (u32, u32),
+        language: &str,
+    ) -> Option<Result<String, String>> {
+        let explain = self.explain.as_ref()?;
+        if pixel.0 >= width || pixel.1 >= height {
+            let (x, y) = pixel;
+            return Some(Err(format!("The picture of {width} by {height} pixels has no pixel {x}, {y}.")));
+        }
+        let scene = self.scene();
+        let mut options = self.options.clone();
+        options.camera = camera;
+        if (width, height) != (options.width, options.height) {
+            options.resize(scene.resolved().film(), width, height);
+        }
+        Some(explain.page(&scene, &options, pixel, language))
     }
 }
 
@@ -120,21 +159,20 @@ fn things(desc: &SceneDesc) -> Vec<Thing> {
             things.resize_with(index + 1, Thing::default);
         }
         let Some(thing) = things.get_mut(index) else { continue };
-        thing.kind = match &shape.geometry {
-            GeometryDesc::Exact(exact) => exact.name(),
-            GeometryDesc::Coloured(coloured) => coloured.shape.name(),
-            GeometryDesc::Mesh(_) => "mesh",
-            GeometryDesc::BilinearMesh(_) => "bilinear mesh",
-            GeometryDesc::Csg(_) => "CSG",
-            GeometryDesc::Custom(_) => "custom geometry",
-        };
+        thing.kind = shape.geometry.name();
         let material = shape.material.and_then(|id| desc.materials.get(id.0 as usize));
         thing.material = material.map(NamedMaterial::label);
     }
     things
 }
 
-fn facts(scene: &Scene, desc: &SceneDesc, cameras: &[Camera], warnings: &[String]) -> Value {
+fn facts(
+    scene: &Scene,
+    desc: &SceneDesc,
+    cameras: &[Camera],
+    languages: &[(&str, &str)],
+    warnings: &[String],
+) -> Value {
     let info = scene.info();
     let up = match desc.up {
         UpAxis::Y => DVec3::Y,
@@ -142,11 +180,7 @@ fn facts(scene: &Scene, desc: &SceneDesc, cameras: &[Camera], warnings: &[String
         UpAxis::Towards(up) => up.normalize_or(DVec3::Y),
     };
     let camera = |(i, camera): (usize, &Camera)| {
-        let kind = match camera.kind {
-            CameraKind::Perspective { .. } => "perspective",
-            CameraKind::Orthographic { .. } => "orthographic",
-            CameraKind::Spherical { .. } => "spherical",
-        };
+        let kind = camera.kind.name();
         let mirrored = camera.world_from_camera.is_mirror();
         let name = camera.name.clone().unwrap_or_else(|| format!("{i} ({kind})"));
         json!({ "name": name, "kind": kind, "mirrored": mirrored, "fov": field_of_view(camera) })
@@ -181,6 +215,7 @@ fn facts(scene: &Scene, desc: &SceneDesc, cameras: &[Camera], warnings: &[String
         "animations": animations.map(|a| json!({ "name": a.name, "end": a.end })).collect::<Vec<_>>(),
         "variants": info.listing.variants,
         "parameters": parameters.iter().take(MOST_PARAMETERS).map(parameter).collect::<Vec<_>>(),
+        "languages": languages,
         "warnings": warnings,
     })
 }

@@ -307,7 +307,10 @@ impl Worker {
         let is_done = stats.spp >= target;
         if options.guides && (is_done || stats.spp.is_power_of_two()) && stats.spp >= 4.min(target) {
             // It fails where there is no sample in some pixel, and there is one in each.
-            let _ = picture.denoise(options.threads);
+            let _ = picture.denoise_unless(options.threads, &cancel);
+            if cancel.is_cancelled() {
+                return;
+            }
         }
         if let Some(background) = stage.background.as_ref().filter(|_| wanted.channel == Channel::Beauty) {
             picture = picture.over(background.clone());

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use lumbre::{SaveOptions, Scene, SceneDesc};
-use lumbre_viewer::{Built, Closer, Moment, Options, Read as WasRead, Source, Viewer};
+use lumbre::{DVec3, RenderOptions, SaveOptions, Scene, SceneDesc};
+use lumbre_viewer::{Built, Closer, Explain, Moment, Options, Read as WasRead, Source, Viewer};
 
 /// A scene file in a folder of its own.
 pub(crate) struct OneFile(pub PathBuf);
@@ -32,11 +32,43 @@ impl Source for OneFile {
         let scene = Scene::from_description(desc).map_err(|e| e.to_string())?;
         let options = scene.options();
         let save = SaveOptions::default();
-        Ok(Built { scene, options, save, background: None, denoise: false, warnings: Vec::new() })
+        Ok(Built {
+            scene,
+            options,
+            save,
+            background: None,
+            denoise: false,
+            warnings: Vec::new(),
+            explain: Some(Box::new(Words)),
+        })
     }
 
     fn of_file(&self, file: &Path) -> Arc<dyn Source> {
         Arc::new(Self(file.to_owned()))
+    }
+}
+
+/// Tells which pixel it was asked of, in one language.
+#[derive(Debug)]
+struct Words;
+
+impl Explain for Words {
+    fn languages(&self) -> Vec<(&'static str, &'static str)> {
+        vec![("la", "Latina")]
+    }
+
+    fn page(
+        &self,
+        scene: &Scene,
+        options: &RenderOptions,
+        (x, y): (u32, u32),
+        language: &str,
+    ) -> Result<String, String> {
+        if language != "la" {
+            return Err(format!("<b>{language}</b> is not spoken here"));
+        }
+        let eye = scene.resolved().cameras()[options.camera].world_from_camera.point(DVec3::ZERO);
+        Ok(format!("{x} {y} of {} {} from {}", options.width, options.height, eye.x.round()))
     }
 }
 

@@ -79,6 +79,51 @@ fn a_page_asks_for_pixels_and_for_what_a_ray_meets() {
 }
 
 #[test]
+fn a_pixel_of_the_picture_that_is_shown_is_explained_in_a_frame_that_runs_nothing() {
+    let viewer = Running::new();
+    let cookie = viewer.cookie();
+    let mut socket = viewer.socket(&cookie);
+    let scene = socket.wait_for("scene", |_| true);
+    assert_eq!(scene["scene"]["languages"], serde_json::json!([["la", "Latina"]]));
+    finished(&mut socket, 0);
+    let asked = |path: &str, lines: &str| {
+        let host = viewer.host();
+        let request = format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n{lines}Connection: close\r\n\r\n");
+        let answer = viewer.raw(request.as_bytes());
+        let (head, body) = answer.split_once("\r\n\r\n").unwrap();
+        (head.to_ascii_lowercase(), body.to_owned())
+    };
+    let cookie = format!("Cookie: {cookie}\r\n");
+    let (head, body) = asked("/explanation/la/47/31", &cookie);
+    assert_eq!(body, "47 31 of 48 32 from 1");
+    for line in [
+        "http/1.1 200",
+        "content-type: text/html; charset=utf-8",
+        "x-frame-options: sameorigin",
+        "content-security-policy: default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'",
+    ] {
+        assert!(head.contains(line), "{line}: {head}");
+    }
+    assert_eq!((head.matches("x-frame").count(), head.matches("content-security").count()), (1, 1), "{head}");
+
+    // It is the picture that is there now: its camera and its size.
+    let placement = r#"{"eye":[5,-5,4],"target":[0,0,0],"up":[0,0,1]}"#;
+    socket.say(&format!(r#"{{"type":"camera","sequence":7,"placement":{placement},"fov":null,"zoom":1}}"#));
+    socket.say(r#"{"type":"set","scale":0.5}"#);
+    socket.wait_for("progress", |told| told["doing"] == "done");
+    while asked("/explanation/la/23/15", &cookie).1 != "23 15 of 24 16 from 5" {
+        socket.wait_for("progress", |told| told["doing"] == "done");
+    }
+    let (head, body) = asked("/explanation/la/24/15", &cookie);
+    assert!(head.starts_with("http/1.1 422") && head.contains("text/plain"), "{head}");
+    assert_eq!(body, "The picture of 24 by 16 pixels has no pixel 24, 15.");
+    let (head, body) = asked("/explanation/xx/3/2", &cookie);
+    assert!(head.starts_with("http/1.1 422") && head.contains("text/plain"), "{head}");
+    assert_eq!(body, "<b>xx</b> is not spoken here", "as text");
+    assert!(asked("/explanation/la/3/2", "").0.starts_with("http/1.1 403"));
+}
+
+#[test]
 fn parameters_are_edited_and_wrong_ones_named() {
     let viewer = Running::new();
     let mut socket = viewer.socket(&viewer.cookie());

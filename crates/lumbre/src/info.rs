@@ -5,8 +5,8 @@ use std::mem::size_of_val;
 
 use lumbre_geometry::Aabb;
 use lumbre_scene::{
-    AreaLightDesc, CameraKind, GeometryDesc, LightDesc, Listing, MaterialId, MeshDesc, ObjectDesc, ObjectId,
-    SceneDesc, ShapeDesc,
+    AreaLightDesc, GeometryDesc, LightDesc, Listing, MaterialId, MeshDesc, ObjectDesc, ObjectId, SceneDesc,
+    ShapeDesc,
 };
 
 /// Statistics of a scene. They count what the file describes: a shape inside an object counts once, however
@@ -60,35 +60,24 @@ impl SceneInfo {
         info.cameras = desc
             .cameras
             .iter()
-            .map(|camera| {
-                let kind = match camera.kind {
-                    CameraKind::Perspective { .. } => "perspective",
-                    CameraKind::Orthographic { .. } => "orthographic",
-                    CameraKind::Spherical { .. } => "spherical",
-                };
-                camera.name.clone().unwrap_or_else(|| kind.to_owned())
-            })
+            .map(|camera| camera.name.clone().unwrap_or_else(|| camera.kind.name().to_owned()))
             .collect();
         info
     }
 
     fn add_shape(&mut self, shape: &ShapeDesc) {
-        let name = match &shape.geometry {
-            GeometryDesc::Exact(exact) => exact.name(),
-            GeometryDesc::Coloured(coloured) => coloured.shape.name(),
+        match &shape.geometry {
             GeometryDesc::Mesh(mesh) => {
                 self.triangles += mesh.triangles.len() as u64 + 2 * mesh.quads.len() as u64;
                 self.memory_bytes += mesh_bytes(mesh);
-                "mesh"
             }
-            GeometryDesc::BilinearMesh(mesh) => {
-                self.memory_bytes += mesh_bytes(mesh);
-                "bilinearmesh"
-            }
-            GeometryDesc::Csg(_) => "csg",
-            GeometryDesc::Custom(_) => "custom",
-        };
-        *self.shapes.entry(name.to_owned()).or_default() += 1;
+            GeometryDesc::BilinearMesh(mesh) => self.memory_bytes += mesh_bytes(mesh),
+            GeometryDesc::Exact(_)
+            | GeometryDesc::Coloured(_)
+            | GeometryDesc::Csg(_)
+            | GeometryDesc::Custom(_) => {}
+        }
+        *self.shapes.entry(shape.geometry.name().to_owned()).or_default() += 1;
         if let Some(AreaLightDesc { .. }) = shape.area_light {
             *self.lights.entry("area".to_owned()).or_default() += 1;
         }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use lumbre_formats::image::{ImageFormat, encode_image, encode_layers, write_image, write_layers};
 use lumbre_image::{Image, Layer, Layers, ToneMap};
-use lumbre_render::{Denoised, Feature, PixelBounds, Rendered, Stats, denoise};
+use lumbre_render::{CancelToken, Denoised, Feature, PixelBounds, Rendered, Stats, denoise_unless};
 
 use crate::{Background, Error, SaveOptions};
 
@@ -52,10 +52,22 @@ impl Picture {
     /// # Errors
     /// [`Error::Options`] where [`crate::RenderOptions::guides`] were not asked for, and where not every pixel has a sample.
     pub fn denoise(&mut self, threads: usize) -> Result<(), Error> {
-        let denoised = denoise(&self.rendered, threads).ok_or_else(|| {
-            Error::Options("a picture is denoised that has guides, and a sample in every pixel".to_owned())
-        })?;
-        self.set_denoised(denoised, "Lumbre")
+        self.denoise_unless(threads, &CancelToken::new())
+    }
+
+    /// The same, unless it is cancelled: then the picture stays as it is, soon after that.
+    ///
+    /// # Errors
+    /// As for [`Picture::denoise`].
+    pub fn denoise_unless(&mut self, threads: usize, cancel: &CancelToken) -> Result<(), Error> {
+        match denoise_unless(&self.rendered, threads, cancel) {
+            Some(denoised) => self.set_denoised(denoised, "Lumbre"),
+            None if cancel.is_cancelled() => Ok(()),
+            None => {
+                let why = "a picture is denoised that has guides, and a sample in every pixel";
+                Err(Error::Options(why.to_owned()))
+            }
+        }
     }
 
     /// Takes what a denoiser of this name made of [`Picture::image`] and [`Picture::coverage`] for the picture, and keeps the noisy one as

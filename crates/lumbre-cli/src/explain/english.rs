@@ -7,6 +7,7 @@ use super::texts::Texts;
 
 pub(super) static ENGLISH: Texts = Texts {
     code: "en",
+    language: "English",
     topic,
     remark,
     fate_of,

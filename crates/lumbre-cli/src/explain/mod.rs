@@ -21,9 +21,11 @@ use crate::view::ViewArguments;
 mod camera;
 mod document;
 mod english;
+mod explainer;
 mod formula;
 mod html;
 mod light;
+mod question;
 mod shape;
 mod sketch;
 mod spanish;
@@ -32,8 +34,10 @@ mod texts;
 mod things;
 mod writing;
 
-use document::{Item, Section};
+use document::Section;
 use english::ENGLISH;
+pub use explainer::Explainer;
+use question::Question;
 use spanish::SPANISH;
 use texts::Texts;
 pub use things::Things;
@@ -53,7 +57,7 @@ pub(crate) struct Arguments {
     #[arg(required = true, value_name = "SCENE")]
     scene: Vec<PathBuf>,
     #[command(flatten)]
-    question: Question,
+    request: Request,
     /// Write to this file.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -82,7 +86,7 @@ pub(crate) struct Arguments {
 
 /// What is to be explained, and how that is told.
 #[derive(Args, Clone, Debug)]
-pub struct Question {
+pub struct Request {
     /// The pixel, from 0,0 in the upper left corner.
     #[arg(long, value_name = "X,Y", value_parser = pixel, required_unless_present = "ray")]
     pub pixel: Option<(u32, u32)>,
@@ -210,7 +214,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let Shown { scene, mut options, .. } = shown;
     options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
-    let written = explain(&scene, &options, &things, name, &arguments.question)?;
+    let written = explain(&scene, &options, &things, name, &arguments.request)?;
     match &arguments.output {
         None => print(&written),
         Some(path) => {
@@ -228,60 +232,37 @@ pub fn explain(
     options: &RenderOptions,
     things: &Things,
     name: &Path,
-    question: &Question,
+    request: &Request,
 ) -> Result<String, Failure> {
-    Ok(written(question, name, &told(question, scene, options, things)?))
+    Ok(written(request, name, &told(request, scene, options, things)?))
 }
 
 fn told(
-    question: &Question,
+    request: &Request,
     scene: &Scene,
     options: &RenderOptions,
     things: &Things,
 ) -> Result<Vec<Section>, Failure> {
-    let texts = question.lang.texts();
-    let whole = (options.width, options.height);
-    let (mut sections, ray, radiance, events) = if let Some((x, y)) = question.pixel {
-        if x >= whole.0 || y >= whole.1 {
-            return Err(Failure::Usage(format!(
-                "--pixel {x},{y}: outside of the picture (expected less than {},{}; --size gives another)",
-                whole.0, whole.1
-            )));
-        }
-        let sample = scene.explain_sample(options, (x, y), question.sample)?;
-        let camera = &scene.resolved().cameras()[options.camera];
-        let mut section = camera::camera(camera, whole, (x, y), &sample, texts);
-        section.fact(texts.sample, f64::from(question.sample));
-        section.fact(texts.weight, sample.weight);
-        (vec![section], sample.ray, sample.radiance, sample.events)
-    } else {
-        let ray = question.ray.unwrap_or(Ray::new(DVec3::ZERO, DVec3::Z));
-        // Light travels along unit directions.
-        let scaled = ray.direction / ray.direction.abs().max_element();
-        let unit = Ray { direction: scaled.normalize(), ..ray };
-        let (radiance, events) = scene.explain_ray(options, &unit, question.sample)?;
-        (vec![camera::given(&ray, texts)], ray, radiance, events)
+    let &Request { sample, depth, nearest, .. } = request;
+    let question = Question { things, texts: request.lang.texts(), sample, depth, nearest };
+    let Some((x, y)) = request.pixel else {
+        let ray = request.ray.unwrap_or(Ray::new(DVec3::ZERO, DVec3::Z));
+        return question.of_ray(scene, options, &ray);
     };
-    let mut met = surfaces::surfaces(scene, &ray, things, question.nearest, true, texts);
-    let path = light::corners(&events);
-    if !met.hits.is_empty() {
-        let drawing = sketch::svg(&met.scenery, &ray, &met.hits, &path, texts.sketch);
-        met.section.items.insert(0, Item::Sketch(drawing));
+    let (width, height) = (options.width, options.height);
+    if x >= width || y >= height {
+        return Err(Failure::Usage(format!(
+            "--pixel {x},{y}: outside of the picture (expected less than {width},{height}; --size gives another)"
+        )));
     }
-    sections.push(met.section);
-    let path = light::Path { scene, things, texts, depth: question.depth };
-    sections.push(path.tell(radiance, &events));
-    Ok(sections)
+    question.of_pixel(scene, options, (x, y))
 }
 
-fn written(question: &Question, name: &Path, sections: &[Section]) -> String {
-    let texts = question.lang.texts();
+fn written(request: &Request, name: &Path, sections: &[Section]) -> String {
+    let texts = request.lang.texts();
     let name = name.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let title = match (question.pixel, &question.ray) {
-        (Some((x, y)), _) => format!("{}: {name}, {} ({x}, {y})", texts.title, texts.pixel),
-        _ => format!("{}: {name}", texts.title),
-    };
-    match question.format {
+    let title = title(&name, request.pixel, texts);
+    match request.format {
         Format::Text => writing::text(sections, texts.schoolbook),
         Format::Markdown => format!("# {title}\n\n{}", writing::markdown(sections, texts.schoolbook)),
         Format::Html => html::html(&title, texts.code, sections, texts.schoolbook),
@@ -290,5 +271,12 @@ fn written(question: &Question, name: &Path, sections: &[Section]) -> String {
             let report = json!({ "title": title, "sections": sections });
             format!("{report:#}\n")
         }
+    }
+}
+
+fn title(name: &str, pixel: Option<(u32, u32)>, texts: &Texts) -> String {
+    match pixel {
+        Some((x, y)) => format!("{}: {name}, {} ({x}, {y})", texts.title, texts.pixel),
+        None => format!("{}: {name}", texts.title),
     }
 }

@@ -7,6 +7,7 @@ use super::texts::Texts;
 
 pub(super) static SPANISH: Texts = Texts {
     code: "es",
+    language: "Español",
     topic,
     remark,
     fate_of,

@@ -7,6 +7,8 @@ use lumbre::geometry::{Fate, Remark, Topic};
 pub(super) struct Texts {
     /// The language's code, as in HTML.
     pub(super) code: &'static str,
+    /// What the language calls itself.
+    pub(super) language: &'static str,
     /// What a step of a search computes.
     pub(super) topic: fn(Topic) -> &'static str,
     /// What is worth saying of a step.

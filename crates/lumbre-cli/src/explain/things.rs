@@ -49,19 +49,12 @@ impl Things {
         let mut open: Vec<&ShapeDesc> = desc.shapes.iter().chain(in_objects).collect();
         let mut shapes = HashMap::new();
         while let Some(shape) = open.pop() {
-            let kind = match &shape.geometry {
-                GeometryDesc::Exact(exact) => exact.name(),
-                GeometryDesc::Coloured(coloured) => coloured.shape.name(),
-                GeometryDesc::Mesh(_) => "mesh",
-                GeometryDesc::BilinearMesh(_) => "bilinearmesh",
-                GeometryDesc::Csg(csg) => {
-                    // A hit is on a shape of an operand, which comes later: the number may be that of the first of them.
-                    open.extend(csg.operands.iter().flat_map(|operand| &**operand));
-                    "csg"
-                }
-                GeometryDesc::Custom(_) => "custom",
-            };
-            shapes.insert(shape.index, Thing { kind, material: shape.material.map(|id| id.0 as usize) });
+            if let GeometryDesc::Csg(csg) = &shape.geometry {
+                // A hit is on a shape of an operand, which comes later: the number may be that of the first of them.
+                open.extend(csg.operands.iter().flat_map(|operand| &**operand));
+            }
+            let material = shape.material.map(|id| id.0 as usize);
+            shapes.insert(shape.index, Thing { kind: shape.geometry.name(), material });
         }
         Self { shapes, materials }
     }

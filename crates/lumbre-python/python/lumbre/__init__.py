@@ -55,6 +55,7 @@ from .geometry import (
 )
 from .image import Image, read_image, write_image
 from .scene import AllHits, Hits, Nearest, Scene, load
+from .viewing import Viewer
 
 __version__ = "0.1.0"
 
@@ -104,6 +105,7 @@ __all__ = [
     "Translucent",
     "Triangle",
     "Union",
+    "Viewer",
     "load",
     "read_image",
     "thread_count",

@@ -20,6 +20,7 @@ from .appearance import Camera, Light
 from .explanation import Explanation
 from .geometry import Instances, Shape
 from .image import Image
+from .viewing import Viewer
 
 FIELDS = ("t", "point", "normal", "uv", "front", "shape", "prim", "instance")
 """The fields of a hit, in the order of the program's own columns."""
@@ -504,6 +505,29 @@ class Scene:
         options = {name: value for name, value in given.items() if value is not None}
         native = self._native
         return Explanation(lambda format: native.explain(options, pixel, asked, sample, depth, nearest, lang, format))
+
+    def view(self, *, size: tuple[int, int] | None = None, spp: int | None = None, open: bool = True) -> Viewer:
+        """Shows the scene in a page of the browser while it is rendered: `lumbre view`, from Python.
+
+        One moves the camera there, looks into pixels, and sees every edit of its files when it is saved. It runs beside what Python does;
+        the other queries of the scene stay as they are.
+
+        Parameters
+        ----------
+        size : (width, height) in pixels
+        spp : samples per pixel, as of `render`
+        open : open it in the browser of this machine, where it has one
+
+        Raises `OSError` where the system has no address for it.
+
+        >>> import lumbre
+        >>> viewer = lumbre.Scene([lumbre.Sphere()]).view(size=(320, 200), open=False)
+        >>> viewer.close()
+        """
+        viewer = Viewer(self._native.view(size, spp), self._repr_png_)
+        if open:
+            viewer.open()
+        return viewer
 
     @property
     def size(self) -> tuple[int, int]:

@@ -5,6 +5,7 @@
 use std::array;
 use std::ops::Range;
 
+use crate::CancelToken;
 use crate::workers::Workers;
 
 /// A picture in two independent halves.
@@ -49,17 +50,25 @@ fn kernel(x: f32) -> f32 {
     t * t
 }
 
-/// Three channels of the filtered layer.
-pub(super) fn filter(layer: &Layer, groups: &[Group], workers: &Workers) -> [Vec<f32>; 3] {
+/// Three channels of the filtered layer; `None` where it is cancelled.
+pub(super) fn filter(
+    layer: &Layer,
+    groups: &[Group],
+    workers: &Workers,
+    cancel: &CancelToken,
+) -> Option<[Vec<f32>; 3]> {
     let starts = (0..layer.height).step_by(BAND);
     let mut bands: Vec<(Range<usize>, [Vec<f32>; 3])> =
         starts.map(|y| (y..(y + BAND).min(layer.height), Default::default())).collect();
-    workers.for_each(&mut bands, |(rows, band)| *band = filter_rows(layer, groups, rows.clone()));
-    array::from_fn(|c| bands.iter().flat_map(|(_, band)| &band[c]).copied().collect())
+    workers.for_each(&mut bands, |(rows, band)| *band = filter_rows(layer, groups, rows.clone(), cancel));
+    if cancel.is_cancelled() {
+        return None;
+    }
+    Some(array::from_fn(|c| bands.iter().flat_map(|(_, band)| &band[c]).copied().collect()))
 }
 
-/// The rows of the filtered layer: each half by weights from the other.
-fn filter_rows(layer: &Layer, groups: &[Group], rows: Range<usize>) -> [Vec<f32>; 3] {
+/// The rows of the filtered layer: each half by weights from the other. Where it is cancelled, they are of no use.
+fn filter_rows(layer: &Layer, groups: &[Group], rows: Range<usize>, cancel: &CancelToken) -> [Vec<f32>; 3] {
     let (width, height) = (layer.width, layer.height);
     let count = rows.len() * width;
     let mut sums: [[Vec<f32>; 3]; 2] = array::from_fn(|_| array::from_fn(|_| vec![0.0; count]));
@@ -78,6 +87,9 @@ fn filter_rows(layer: &Layer, groups: &[Group], rows: Range<usize>) -> [Vec<f32>
         let (left, right) = ((-dx).max(0) as usize, width as isize - dx.max(0));
         if near <= 0.0 || right <= left as isize {
             continue;
+        }
+        if cancel.is_cancelled() {
+            break;
         }
         let span = right as usize - left;
         let start = |y: usize| y * width + left;

@@ -14,7 +14,7 @@ use lumbre_image::{Image, Rgb};
 
 use crate::film::{GuideSums, RatioSums};
 use crate::workers::Workers;
-use crate::{Rendered, denoise::means::Layer};
+use crate::{CancelToken, Rendered, denoise::means::Layer};
 
 /// Reflectance below which light is not divided by it.
 const LEAST_REFLECTANCE: f32 = 0.01;
@@ -39,15 +39,20 @@ pub struct Denoised {
 /// Pixels whose samples all agree, and that look like no other, stay as they are. Coverage is filtered only where the ground catches
 /// shadows, so that outlines stay sharp.
 pub fn denoise(rendered: &Rendered, threads: usize) -> Option<Denoised> {
+    denoise_unless(rendered, threads, &CancelToken::new())
+}
+
+/// The same, unless it is cancelled: `None` soon after that.
+pub fn denoise_unless(rendered: &Rendered, threads: usize, cancel: &CancelToken) -> Option<Denoised> {
     let guides = rendered.guides.as_deref().filter(|_| rendered.stats.stride == Some(1))?;
     let size = (rendered.image.width() as usize, rendered.image.height() as usize);
     let workers = Workers::start(threads);
     let surfaces = planes::surfaces(guides, size);
-    let filtered = |layer: &Layer| means::filter(layer, &surfaces, &workers);
+    let filtered = |layer: &Layer| means::filter(layer, &surfaces, &workers, cancel);
 
     // Where a picture is transparent, there is no light of what lets one through.
     let is_opaque = rendered.image.alpha().is_none();
-    let light = filtered(&planes::layer(guides, size, |guide| &guide.light, LEAST_REFLECTANCE, is_opaque));
+    let light = filtered(&planes::layer(guides, size, |guide| &guide.light, LEAST_REFLECTANCE, is_opaque))?;
     let colours = (0..guides.len()).map(|i| {
         let colour = |c: usize| light[c][i] * share(&guides[i], &guides[i].light, c, LEAST_REFLECTANCE);
         Rgb::new(colour(0), colour(1), colour(2))
@@ -59,7 +64,7 @@ pub fn denoise(rendered: &Rendered, threads: usize) -> Option<Denoised> {
         return Some(Denoised { image, coverage: rendered.coverage.clone() });
     }
 
-    let shadow = filtered(&planes::layer(guides, size, |guide| &guide.shadow, LEAST_GROUND, false));
+    let shadow = filtered(&planes::layer(guides, size, |guide| &guide.shadow, LEAST_GROUND, false))?;
     // What is not ground, and covers as it did, and what is.
     let covered = |i: usize, before: Rgb| {
         let (guide, sums) = (&guides[i], &guides[i].shadow);

@@ -3,7 +3,7 @@
 use lumbre_image::{Image, Rgb};
 use lumbre_math::random::{combine, mix, uniform_f64};
 
-use super::denoise;
+use super::{denoise, denoise_unless};
 use crate::film::{Exposure, Extras, FeatureSample, PixelBounds, Sample, Tile};
 use crate::rendered::{guides, picture};
 use crate::{Rendered, Stats};
@@ -168,4 +168,15 @@ fn any_number_of_threads_denoises_to_the_same_bytes() {
         image.pixels().iter().flat_map(|c| c.to_array().map(f32::to_bits)).collect()
     };
     assert_eq!(bytes(1), bytes(4));
+}
+
+#[test]
+fn what_is_cancelled_gives_no_picture_and_the_token_of_nobody_changes_nothing() {
+    let rendered = rendered(8, &truth);
+    let cancel = crate::CancelToken::new();
+    let whole = denoise(&rendered, 2);
+    assert!(whole.is_some());
+    assert_eq!(denoise_unless(&rendered, 2, &cancel), whole);
+    cancel.cancel();
+    assert_eq!(denoise_unless(&rendered, 2, &cancel), None);
 }

@@ -158,6 +158,10 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
   function bytes(base64) {
     return Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
   }
+  async function unpacked(base64) {
+    const stream = new Blob([bytes(base64)]).stream().pipeThrough(new DecompressionStream("deflate"));
+    return new DataView(await new Response(stream).arrayBuffer());
+  }
   function half(bits) {
     const sign = bits & 32768 ? -1 : 1;
     const [exponent, fraction] = [bits >> 10 & 31, bits & 1023];
@@ -174,11 +178,13 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     data;
     shown;
     values;
+    picks;
     async start() {
       this.listener.stood("open");
       this.listener.told({ type: "scene", scene: this.data.scene });
       this.listener.told({ type: "progress", doing: "done", ...this.data.progress });
       await this.show("beauty");
+      this.picks = await unpacked(this.data.picks.values);
     }
     state(channel) {
       return {
@@ -218,16 +224,21 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       const { width, height } = bitmap;
       const pixels = drawing.getImageData(0, 0, width, height);
       [this.shown, this.values] = [pixels, void 0];
-      if (channel.values) {
-        const stream = new Blob([bytes(channel.values)]).stream().pipeThrough(new DecompressionStream("deflate"));
-        this.values = new DataView(await new Response(stream).arrayBuffer());
-      }
+      if (channel.values) this.values = await unpacked(channel.values);
       const spp = this.data.progress.spp ?? 0;
       this.listener.framed({ width, height, fullWidth: width, fullHeight: height, spp, sequence: 0, isFull: true, isDone: true, pixels });
+    }
+    pick(x, y, request2) {
+      if (!this.picks || !this.shown) return;
+      const at = 8 * (y * this.shown.width + x);
+      const thing = this.data.picks.shapes[this.picks.getUint32(at, true) - 1];
+      const hits = thing ? [{ ...thing, distance: this.picks.getFloat32(at + 4, true) }] : [];
+      this.listener.told({ type: "picked", request: request2, x, y, ray: { hits } });
     }
     send(message) {
       const { type, channel, x, y, width, height, request: request2 } = message;
       if (type === "set" && channel) void this.show(String(channel));
+      if (type === "pick") this.pick(Math.floor(x ?? 0), Math.floor(y ?? 0), request2 ?? 0);
       if (type !== "values" || !this.shown) return;
       const whole = this.shown.width;
       const [x0, y0] = [x ?? 0, y ?? 0];
@@ -255,7 +266,6 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       "scale",
       "edit-details",
       "camera-details",
-      "picked-details",
       "save-details",
       "help-open"
     ];
@@ -414,6 +424,54 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     }
   };
 
+  // src/explanation.ts
+  var Explanation = class {
+    dialog = byId("explanation");
+    button = byId("explain");
+    language = byId("language");
+    languages = [];
+    pixel;
+    constructor() {
+      this.button.addEventListener("click", () => this.show());
+      this.language.addEventListener("change", () => this.load());
+      byId("explanation-close").addEventListener("click", () => this.dialog.close());
+      this.dialog.addEventListener("close", () => byId("explanation-text").replaceChildren());
+    }
+    /** The languages in which there are explanations. */
+    offer(languages) {
+      this.languages = languages;
+      const codes = languages.map(([code]) => code);
+      const spoken2 = navigator.languages.map((name) => name.slice(0, 2)).find((code) => codes.includes(code));
+      const chosen = codes.includes(this.language.value) ? this.language.value : spoken2 ?? codes[0] ?? "";
+      options(this.language, languages, chosen);
+      this.draw();
+    }
+    /** It is this pixel that is asked about. */
+    of(x, y) {
+      this.pixel = [x, y];
+      this.draw();
+    }
+    /** Explains the pixel that was asked about. */
+    show() {
+      if (this.button.hidden) return;
+      this.load();
+      this.dialog.showModal();
+    }
+    draw() {
+      this.button.hidden = !this.pixel || this.languages.length === 0;
+      this.button.textContent = `Explain pixel ${this.pixel?.join(", ") ?? ""}`;
+    }
+    load() {
+      if (!this.pixel) return;
+      const address = `explanation/${this.language.value}/${this.pixel.join("/")}`;
+      byId("explanation-alone").href = address;
+      const frame = element("iframe", "", { title: this.button.textContent ?? "" });
+      frame.setAttribute("sandbox", "");
+      frame.src = address;
+      byId("explanation-text").replaceChildren(frame);
+    }
+  };
+
   // src/facts.ts
   var point = (v) => v.map(short).join(", ");
   function showFacts(list, warnings, scene2) {
@@ -435,6 +493,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       warnings.append(element("pre", scene2.warnings.join("\n"), { tabIndex: 0 }));
     }
   }
+  var named = ({ shape, kind }) => kind === "ground" ? kind : `${shape} (${kind})`;
   function showHits(panel, hits) {
     const first = hits[0];
     if (!first) {
@@ -442,30 +501,33 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       return;
     }
     const rows = [
-      ["Shape", `${first.shape} (${first.kind})`],
+      ["Shape", named(first)],
       ["Material", first.material ?? "none"],
-      ["Position", point(first.point)],
-      ["Normal", point(first.normal)],
+      ["Position", first.point && point(first.point)],
+      ["Normal", first.normal && point(first.normal)],
       ["Distance", short(first.distance)],
-      ["uv", point(first.uv)],
-      ["Triangle", String(first.primitive)],
-      ["Instance", first.instance === null ? "none" : String(first.instance)],
-      ["Side", first.front ? "outside" : "inside"]
+      ["uv", first.uv && point(first.uv)],
+      ["Triangle", first.primitive?.toString()],
+      ["Instance", first.instance === null ? "none" : first.instance?.toString()],
+      ["Side", first.front === void 0 ? void 0 : first.front ? "outside" : "inside"]
     ];
     const table = element("table");
     for (const [name, text] of rows) {
+      if (text === void 0) continue;
       const row = element("tr");
       row.append(element("th", name, { scope: "row" }), element("td", text));
       table.append(row);
     }
+    panel.replaceChildren(table);
+    if (first.front === void 0) return;
     const all = element("details");
     all.append(element("summary", `All ${hits.length} hits of this ray`));
     const list = element("ol");
     for (const hit of hits) {
-      list.append(element("li", `${short(hit.distance)}: shape ${hit.shape} (${hit.kind}), ${hit.material ?? "no material"}, ${hit.front ? "in" : "out"}`));
+      list.append(element("li", `${short(hit.distance)}: shape ${named(hit)}, ${hit.material ?? "no material"}, ${hit.front ? "in" : "out"}`));
     }
     all.append(list);
-    panel.replaceChildren(table, all);
+    panel.append(all);
   }
 
   // src/hands.ts
@@ -803,6 +865,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
         scene = message.scene;
         showFacts(byId("facts"), byId("warnings"), scene);
         editor.list(scene.parameters);
+        explanation.offer(scene.languages);
         if (state) showState(state);
         break;
       case "state":
@@ -814,7 +877,8 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
         break;
       case "picked":
         showHits(byId("picked"), message.ray.hits);
-        if (message.request === turnAround && message.ray.hits[0]) {
+        explanation.of(Math.floor(message.x), Math.floor(message.y));
+        if (message.request === turnAround && message.ray.hits[0]?.point) {
           camera.lookAt(message.ray.hits[0].point);
           moved();
         }
@@ -933,6 +997,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     const channel = channels[Number(pressed) - 1];
     if (channel) set({ channel });
     else if (pressed === "r") reset(state?.camera ?? 0);
+    else if (pressed === "x") explanation.show();
     else if (pressed === "p") set({ paused: !state?.paused });
     else if (pressed === "0") sheet.zoomOut();
     else if (pressed === "+" || pressed === "=") sheet.zoomBy(1.5);
@@ -957,6 +1022,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       else byId("pixel").textContent = "";
     }
   });
+  var explanation = new Explanation();
   var editor = new Editor(byId("parameters"), byId("filter"), (path, value) => connection.send({ type: "edit", path, value }));
   function on(id, event, act) {
     const input = byId(id);

@@ -1,7 +1,7 @@
 // A page that was exported: what a viewer would say is in it.
 import type { Listener } from "./connection";
 import { byId } from "./elements";
-import type { Placement, Progress, Scene, State, Value } from "./protocol";
+import type { Placement, Progress, Scene, State, Thing, Value } from "./protocol";
 
 interface Channel { name: string; png: string; values: string }
 
@@ -9,10 +9,17 @@ interface Channel { name: string; png: string; values: string }
 export interface Data {
   name: string; scene: Scene; placement: Placement | null; camera: number;
   progress: Omit<Progress, "doing">; channels: Channel[];
+  /** What is met in the middle of each pixel: the place of the shape in the list, from 1, or 0 for nothing, and its distance. */
+  picks: { shapes: Thing[]; values: string };
 }
 
 function bytes(base64: string): Uint8Array<ArrayBuffer> {
   return Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+}
+
+async function unpacked(base64: string): Promise<DataView> {
+  const stream = new Blob([bytes(base64)]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new DataView(await new Response(stream).arrayBuffer());
 }
 
 /** The number of 16 bits. */
@@ -26,6 +33,7 @@ export function half(bits: number): number {
 export class AtRest {
   private shown: ImageData | undefined;
   private values: DataView | undefined;
+  private picks: DataView | undefined;
 
   constructor(private readonly listener: Listener, private readonly data: Data) {
     // The page has to be there before it is told anything.
@@ -37,6 +45,7 @@ export class AtRest {
     this.listener.told({ type: "scene", scene: this.data.scene });
     this.listener.told({ type: "progress", doing: "done", ...this.data.progress });
     await this.show("beauty");
+    this.picks = await unpacked(this.data.picks.values);
   }
 
   private state(channel: string): State {
@@ -59,17 +68,23 @@ export class AtRest {
     const { width, height } = bitmap;
     const pixels = drawing.getImageData(0, 0, width, height);
     [this.shown, this.values] = [pixels, undefined];
-    if (channel.values) {
-      const stream = new Blob([bytes(channel.values)]).stream().pipeThrough(new DecompressionStream("deflate"));
-      this.values = new DataView(await new Response(stream).arrayBuffer());
-    }
+    if (channel.values) this.values = await unpacked(channel.values);
     const spp = this.data.progress.spp ?? 0;
     this.listener.framed({ width, height, fullWidth: width, fullHeight: height, spp, sequence: 0, isFull: true, isDone: true, pixels });
+  }
+
+  private pick(x: number, y: number, request: number): void {
+    if (!this.picks || !this.shown) return;
+    const at = 8 * (y * this.shown.width + x);
+    const thing = this.data.picks.shapes[this.picks.getUint32(at, true) - 1];
+    const hits = thing ? [{ ...thing, distance: this.picks.getFloat32(at + 4, true) }] : [];
+    this.listener.told({ type: "picked", request, x, y, ray: { hits } });
   }
 
   send(message: object): void {
     const { type, channel, x, y, width, height, request } = message as Record<string, number> & { type: string; channel?: string };
     if (type === "set" && channel) void this.show(String(channel));
+    if (type === "pick") this.pick(Math.floor(x ?? 0), Math.floor(y ?? 0), request ?? 0);
     if (type !== "values" || !this.shown) return;
     const whole = this.shown.width;
     const [x0, y0] = [x ?? 0, y ?? 0];
@@ -90,7 +105,7 @@ export class AtRest {
 /** What only a viewer can do is not offered. */
 export function hideWhatNeedsAViewer(): void {
   const live = [
-    "pause", "reset", "exposure", "tone-map", "false-colour", "denoise", "spp", "scale", "edit-details", "camera-details", "picked-details",
+    "pause", "reset", "exposure", "tone-map", "false-colour", "denoise", "spp", "scale", "edit-details", "camera-details",
     "save-details", "help-open",
   ];
   for (const id of live) {

@@ -25,35 +25,41 @@ export function showFacts(list: HTMLElement, warnings: HTMLElement, scene: Scene
   }
 }
 
+/** The ground has a number that says nothing. */
+const named = ({ shape, kind }: Hit) => (kind === "ground" ? kind : `${shape} (${kind})`);
+
 export function showHits(panel: HTMLElement, hits: Hit[]): void {
   const first = hits[0];
   if (!first) {
     panel.replaceChildren(element("p", "Nothing is there.", { className: "quiet" }));
     return;
   }
-  const rows: [string, string][] = [
-    ["Shape", `${first.shape} (${first.kind})`],
+  const rows: [string, string | undefined][] = [
+    ["Shape", named(first)],
     ["Material", first.material ?? "none"],
-    ["Position", point(first.point)],
-    ["Normal", point(first.normal)],
+    ["Position", first.point && point(first.point)],
+    ["Normal", first.normal && point(first.normal)],
     ["Distance", short(first.distance)],
-    ["uv", point(first.uv)],
-    ["Triangle", String(first.primitive)],
-    ["Instance", first.instance === null ? "none" : String(first.instance)],
-    ["Side", first.front ? "outside" : "inside"],
+    ["uv", first.uv && point(first.uv)],
+    ["Triangle", first.primitive?.toString()],
+    ["Instance", first.instance === null ? "none" : first.instance?.toString()],
+    ["Side", first.front === undefined ? undefined : first.front ? "outside" : "inside"],
   ];
   const table = element("table");
   for (const [name, text] of rows) {
+    if (text === undefined) continue;
     const row = element("tr");
     row.append(element("th", name, { scope: "row" }), element("td", text));
     table.append(row);
   }
+  panel.replaceChildren(table);
+  if (first.front === undefined) return;
   const all = element("details");
   all.append(element("summary", `All ${hits.length} hits of this ray`));
   const list = element("ol");
   for (const hit of hits) {
-    list.append(element("li", `${short(hit.distance)}: shape ${hit.shape} (${hit.kind}), ${hit.material ?? "no material"}, ${hit.front ? "in" : "out"}`));
+    list.append(element("li", `${short(hit.distance)}: shape ${named(hit)}, ${hit.material ?? "no material"}, ${hit.front ? "in" : "out"}`));
   }
   all.append(list);
-  panel.replaceChildren(table, all);
+  panel.append(all);
 }

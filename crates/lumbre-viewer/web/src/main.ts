@@ -4,6 +4,7 @@ import { AtRest, hideWhatNeedsAViewer, type Data } from "./at-rest";
 import { Connection, type Listener } from "./connection";
 import { Editor } from "./edit";
 import { byId, large, options, save, short, spoken } from "./elements";
+import { Explanation } from "./explanation";
 import { showFacts, showHits } from "./facts";
 import { attach } from "./hands";
 import type { Frame, Progress, Scene, State, Told } from "./protocol";
@@ -78,6 +79,7 @@ function told(message: Told): void {
       scene = message.scene;
       showFacts(byId("facts"), byId("warnings"), scene);
       editor.list(scene.parameters);
+      explanation.offer(scene.languages);
       if (state) showState(state);
       break;
     case "state":
@@ -89,7 +91,8 @@ function told(message: Told): void {
       break;
     case "picked":
       showHits(byId("picked"), message.ray.hits);
-      if (message.request === turnAround && message.ray.hits[0]) {
+      explanation.of(Math.floor(message.x), Math.floor(message.y));
+      if (message.request === turnAround && message.ray.hits[0]?.point) {
         camera.lookAt(message.ray.hits[0].point);
         moved();
       }
@@ -213,6 +216,7 @@ function key(pressed: string): boolean {
   const channel = channels[Number(pressed) - 1];
   if (channel) set({ channel });
   else if (pressed === "r") reset(state?.camera ?? 0);
+  else if (pressed === "x") explanation.show();
   else if (pressed === "p") set({ paused: !state?.paused });
   else if (pressed === "0") sheet.zoomOut();
   else if (pressed === "+" || pressed === "=") sheet.zoomBy(1.5);
@@ -239,6 +243,7 @@ attach(sheet.picture, sheet, camera, {
   },
 });
 
+const explanation = new Explanation();
 const editor = new Editor(byId("parameters"), byId("filter"), (path, value) => connection.send({ type: "edit", path, value }));
 
 function on(id: string, event: string, act: (input: HTMLInputElement) => void): void {

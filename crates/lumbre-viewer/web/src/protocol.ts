@@ -19,6 +19,8 @@ export interface Scene {
   animations: { name: string | null; end: number | null }[];
   variants: string[];
   parameters: Parameter[];
+  /** Those in which pixels are explained: their codes and their own names. */
+  languages: [string, string][];
   warnings: string[];
 }
 
@@ -36,9 +38,13 @@ export interface Progress {
   spp?: number; target?: number; noise?: number | null; rays_per_second?: number; seconds?: number; left?: number; dropped?: number;
 }
 
-export interface Hit {
-  distance: number; point: Vector; normal: Vector; uv: [number, number]; front: boolean;
-  shape: number; kind: string; material: string | null; primitive: number; instance: number | null;
+/** A shape of the file, or the ground. */
+export interface Thing { shape: number; kind: string; material: string | null }
+
+/** Where a ray meets it; a page at rest knows no more than how far away. */
+export interface Hit extends Thing {
+  distance: number;
+  point?: Vector; normal?: Vector; uv?: [number, number]; front?: boolean; primitive?: number; instance?: number | null;
 }
 
 export type Value = number | string;

@@ -1,5 +1,8 @@
 // How soon a page shows a change, and how many frames a second while the camera turns: node tests/measure.mjs SCENE…
+// The word "million" stands for a ball with waves, of a million triangles.
 import { spawn } from "node:child_process";
+import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { loadavg, tmpdir } from "node:os";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { chromium } from "playwright-core";
@@ -12,7 +15,35 @@ const browser = await chromium.launch({ executablePath, args: ["--no-sandbox"] }
 const sorted = (numbers) => [...numbers].sort((a, b) => a - b);
 const share = (numbers, part) => sorted(numbers)[Math.min(numbers.length - 1, Math.floor(part * numbers.length))] ?? NaN;
 
-for (const scene of process.argv.slice(2)) {
+/** Writes the ball: rings of squares, each of two triangles. */
+function million(path) {
+  const [rings, round] = [500, 1000];
+  const head = `ply\nformat binary_little_endian 1.0\nelement vertex ${(rings + 1) * round}\nproperty float x\nproperty float y\nproperty float z\n`
+    + `element face ${2 * rings * round}\nproperty list uchar uint vertex_indices\nend_header\n`;
+  const vertices = new Float32Array(3 * (rings + 1) * round);
+  const faces = Buffer.alloc(13 * 2 * rings * round);
+  let face = 0;
+  for (let i = 0; i <= rings; i++) {
+    for (let j = 0; j < round; j++) {
+      const [theta, phi] = [(Math.PI * i) / rings, (2 * Math.PI * j) / round];
+      const radius = 1 + 0.05 * Math.sin(theta) * Math.sin(20 * theta) * Math.sin(24 * phi);
+      vertices.set([radius * Math.sin(theta) * Math.cos(phi), radius * Math.cos(theta), radius * Math.sin(theta) * Math.sin(phi)], 3 * (i * round + j));
+      if (i === rings) continue;
+      const [a, b] = [i * round + j, i * round + ((j + 1) % round)];
+      for (const corners of [[a, b, a + round], [b, b + round, a + round]]) {
+        faces[face] = 3;
+        corners.forEach((corner, k) => faces.writeUInt32LE(corner, face + 1 + 4 * k));
+        face += 13;
+      }
+    }
+  }
+  writeFileSync(path, Buffer.concat([Buffer.from(head), Buffer.from(vertices.buffer), faces]));
+}
+
+const folder = mkdtempSync(join(tmpdir(), "lumbre-measure-"));
+const scenes = process.argv.slice(2).map((word) => (word === "million" ? join(folder, "million.ply") : word));
+if (process.argv.includes("million")) million(join(folder, "million.ply"));
+for (const scene of scenes) {
   const child = spawn(program, ["view", "--no-open", "--size", "1280x720", scene], { stdio: ["ignore", "pipe", "inherit"] });
   const url = await new Promise((done) => child.stdout.once("data", (bytes) => done(String(bytes).trim())));
   const page = await browser.newPage({ viewport: { width: 1600, height: 900 } });
@@ -43,9 +74,10 @@ for (const scene of process.argv.slice(2)) {
   ], from);
   await page.mouse.up();
   const ms = (numbers) => `${share(numbers, 0.5).toFixed(0)} ms (95 %: ${share(numbers, 0.95).toFixed(0)} ms, of ${numbers.length})`;
-  console.log(`${scene}: first pixels after ${ms(single)}; while turning ${((1000 * frames) / (to - from)).toFixed(1)} frames/s, ${ms(dragged)}`);
+  console.log(`${scene}, with a load of ${loadavg()[0].toFixed(1)}: first pixels after ${ms(single)}; while turning ${((1000 * frames) / (to - from)).toFixed(1)} frames/s, ${ms(dragged)}`);
   await page.close();
   child.kill("SIGINT");
   await new Promise((done) => child.once("exit", done));
 }
 await browser.close();
+rmSync(folder, { recursive: true });

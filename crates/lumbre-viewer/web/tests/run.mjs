@@ -30,6 +30,67 @@ Shape "sphere" "float radius" 1.25
 
 writeFileSync(join(folder, "scene.pbrt"), SCENE);
 
+/** A binary glTF: a square that goes to the right within two seconds, of another colour at night, and a camera. */
+function model() {
+  const bytes = Buffer.concat([
+    Buffer.from(new Float32Array([-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0]).buffer),
+    Buffer.from(new Uint16Array([0, 1, 2, 0, 2, 3]).buffer),
+    Buffer.from(new Float32Array([0, 2]).buffer),
+    Buffer.from(new Float32Array([0, 0, 0, 1.5, 0, 0]).buffer),
+  ]);
+  const views = [[0, 48], [48, 12], [60, 8], [68, 24]];
+  const mappings = [0, 1].map((index) => ({ material: index, variants: [index] }));
+  const colour = (...rgb) => ({ pbrMetallicRoughness: { baseColorFactor: [...rgb, 1], metallicFactor: 0 } });
+  const text = Buffer.from(JSON.stringify({
+    asset: { version: "2.0" },
+    extensionsUsed: ["KHR_materials_variants"],
+    extensions: { KHR_materials_variants: { variants: [{ name: "day" }, { name: "night" }] } },
+    scene: 0,
+    scenes: [{ nodes: [0, 1] }],
+    nodes: [{ mesh: 0 }, { camera: 0, translation: [0, 0, 7] }],
+    cameras: [{ type: "perspective", perspective: { yfov: 0.8, znear: 0.1 } }],
+    meshes: [{ primitives: [{ attributes: { POSITION: 0 }, indices: 1, material: 0, extensions: { KHR_materials_variants: { mappings } } }] }],
+    materials: [colour(0.8, 0.3, 0.1), colour(0.1, 0.2, 0.7)],
+    animations: [{ channels: [{ sampler: 0, target: { node: 0, path: "translation" } }], samplers: [{ input: 2, output: 3 }] }],
+    buffers: [{ byteLength: bytes.length }],
+    bufferViews: views.map(([byteOffset, byteLength]) => ({ buffer: 0, byteOffset, byteLength })),
+    accessors: [
+      { bufferView: 0, componentType: 5126, count: 4, type: "VEC3", min: [-1, -1, 0], max: [1, 1, 0] },
+      { bufferView: 1, componentType: 5123, count: 6, type: "SCALAR" },
+      { bufferView: 2, componentType: 5126, count: 2, type: "SCALAR", min: [0], max: [2] },
+      { bufferView: 3, componentType: 5126, count: 2, type: "VEC3" },
+    ],
+  }));
+  const chunk = (type, content, fill) => {
+    const padded = Buffer.concat([content, Buffer.alloc(-content.length & 3, fill)]);
+    const head = Buffer.alloc(8);
+    head.writeUInt32LE(padded.length, 0);
+    head.write(type, 4, "latin1");
+    return Buffer.concat([head, padded]);
+  };
+  const chunks = [chunk("JSON", text, " "), chunk("BIN\0", bytes, 0)];
+  const head = Buffer.alloc(12);
+  head.write("glTF", 0);
+  head.writeUInt32LE(2, 4);
+  head.writeUInt32LE(12 + chunks[0].length + chunks[1].length, 8);
+  return Buffer.concat([head, ...chunks]);
+}
+
+/** How far the ray through a point of the scene's film goes to the ball. */
+function toTheBall(x, y) {
+  const [eye, target, up, radius] = [[1, -7, 3], [0, 0, 0.5], [0, 0, 1], 1.25];
+  const cross = (a, b) => [0, 1, 2].map((i) => a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3]);
+  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  const unit = (a) => a.map((c) => c / Math.hypot(...a));
+  const forward = unit(target.map((c, i) => c - eye[i]));
+  const right = unit(cross(up, forward));
+  const upward = cross(forward, right);
+  const [across, above] = [x - 48, 32 - y].map((pixels) => (pixels / 32) * Math.tan((17.5 * Math.PI) / 180));
+  const direction = unit(forward.map((c, i) => c + across * right[i] + above * upward[i]));
+  const middle = -dot(eye, direction);
+  return middle - Math.sqrt(middle ** 2 - dot(eye, eye) + radius ** 2);
+}
+
 const freePort = () => new Promise((done) => {
   const server = createServer().listen(0, "127.0.0.1", () => {
     const { port } = server.address();
@@ -178,6 +239,72 @@ const tests = {
     await viewer.stop();
   },
 
+  async "it explains a pixel in the words of the program, of the picture as it is"() {
+    const path = join(folder, "scene.pbrt");
+    const viewer = await view(path);
+    const page = await open(viewer.url);
+    await done(page);
+    assert.equal(await page.isVisible("#explain"), false, "nothing was asked yet");
+    const [x, y] = [40, 33];
+    const box = await page.locator("#picture").boundingBox();
+    await page.mouse.click(box.x + (x + 0.5) * box.width / 96, box.y + (y + 0.5) * box.height / 64);
+    await page.waitForSelector("#explain:visible");
+    assert.equal(await page.textContent("#explain"), `Explain pixel ${x}, ${y}`);
+    const explain = (...words) => execFileSync(program, ["explain", path, "--pixel", `${x},${y}`, "-q", ...words], { encoding: "utf8" });
+    const served = async () => (await page.request.get(await page.locator("#explanation iframe").evaluate((frame) => frame.src))).text();
+    await page.focus("#picture");
+    await page.keyboard.press("x");
+    const told = page.frameLocator("#explanation iframe").locator("main");
+    await told.waitFor();
+    assert.equal(await served(), explain("--format", "html"));
+    // The numbers that are seen are those that the program gives to other programs, and names are text.
+    const report = JSON.parse(explain("--format", "json"));
+    const sections = new Map(report.sections.map((section) => [section.key, section]));
+    const shape = sections.get("surfaces").sections[0];
+    assert.equal(shape.title, "shape 0, sphere");
+    const seen = await told.innerText();
+    assert.ok(seen.includes(shape.title), seen.slice(0, 3000));
+    const radiance = sections.get("light").sections.find(({ key }) => key === "radiance").quantities[0];
+    assert.ok(radiance.value.length === 3 && radiance.value.every((number) => number > 0), JSON.stringify(radiance));
+    const flat = seen.replaceAll(/[\s\u2061-\u2064]/g, "");
+    assert.ok(flat.includes(`(${radiance.value.join(",")})`), `${radiance.value} in ${flat.slice(-2000)}`);
+    assert.ok(seen.includes("<img src=x onerror=evil()> (diffuse)"));
+    assert.equal(await told.locator("img").count(), 0);
+
+    await page.selectOption("#language", "es");
+    await page.frameLocator("#explanation iframe").locator("html[lang=es]").waitFor();
+    assert.equal(await served(), explain("--format", "html", "--lang", "es"));
+    const [alone] = await Promise.all([page.context().waitForEvent("page"), page.click("#explanation-alone")]);
+    await alone.waitForLoadState();
+    assert.equal(await alone.getAttribute("html", "lang"), "es");
+    await alone.close();
+    await page.click("#explanation-close");
+    assert.equal(await page.locator("#explanation iframe").count(), 0);
+
+    // Of an edited scene, what the edited one's render does; of another camera, something else.
+    await page.click("#edit-details > summary");
+    await page.fill("#filter", "reflectance");
+    const before = await pixels(page);
+    await page.evaluate(() => {
+      const input = document.querySelector("#parameters input");
+      input.value = "#20c040";
+      input.dispatchEvent(new Event("input"));
+    });
+    await becomes(page, before, false);
+    const overlay = join(folder, "explained.txt");
+    writeFileSync(overlay, "material.<img src=x onerror=evil()>.reflectance = #20c040\n");
+    await page.click("#explain");
+    assert.equal(await served(), explain("--format", "html", "--lang", "es", "--overlay", overlay));
+    await page.click("#explanation-close");
+    await page.focus("#picture");
+    await page.keyboard.press("ArrowLeft", { delay: 80 });
+    await page.waitForFunction(() => lumbreMeasured.latencies.length > 0);
+    await page.focus("#picture");
+    await page.keyboard.press("x");
+    assert.notEqual(await served(), explain("--format", "html", "--lang", "es", "--overlay", overlay));
+    await viewer.stop();
+  },
+
   async "it edits, and the edits render the same from their file"() {
     const path = join(folder, "scene.pbrt");
     const viewer = await view(path);
@@ -247,7 +374,66 @@ const tests = {
     await missing.stop();
   },
 
-  async "a page at rest opens from a file and shows the same pixels and their values"() {
+  async "the time of an animation and the variants of a model make the pictures that are rendered"() {
+    const path = join(folder, "model.glb");
+    writeFileSync(path, model());
+    const words = ["--size", "96x64", "--spp", "4", path];
+    const rendered = (...more) => {
+      const out = join(folder, "moment.png");
+      execFileSync(program, ["render", ...words, "-o", out, "-q", ...more]);
+      const png = PNG.sync.read(readFileSync(out));
+      return [png.width, png.height, ...png.data];
+    };
+    const viewer = await view(...words);
+    const page = await open(viewer.url);
+    await done(page);
+    const pictures = [rendered(), rendered("--frame", "1"), rendered("--frame", "1", "--variant", "night")];
+    assert.equal(new Set(pictures.map(String)).size, 3, "they are different pictures");
+    await becomes(page, pictures[0], true);
+    assert.equal(await page.getAttribute("#animation-time", "max"), "2");
+    await page.evaluate(() => {
+      const input = document.getElementById("animation-time");
+      input.value = "1";
+      input.dispatchEvent(new Event("input"));
+    });
+    await becomes(page, pictures[1], true);
+    assert.equal(await page.textContent("#time-value"), "1.00 s");
+    assert.deepEqual(await page.locator("#variant option").allTextContents(), ["as in the file", "day", "night"]);
+    await page.selectOption("#variant", "night");
+    await becomes(page, pictures[2], true);
+    await page.selectOption("#variant", "");
+    await becomes(page, pictures[1], true);
+    await viewer.stop();
+  },
+
+  async "a model that is dropped on the page is opened, on an empty page and in place of another"() {
+    const path = join(folder, "dropped-later.glb");
+    writeFileSync(path, model());
+    const out = join(folder, "dropped.png");
+    const words = ["--size", "96x64", "--spp", "4"];
+    execFileSync(program, ["render", path, ...words, "-o", out, "-q"]);
+    const png = PNG.sync.read(readFileSync(out));
+    for (const before of [[], [join(folder, "scene.pbrt")]]) {
+      const viewer = await view(...words, ...before);
+      const page = await open(viewer.url);
+      if (before.length > 0) await done(page);
+      else await page.waitForSelector("#empty:not([hidden])");
+      await page.evaluate((bytes) => {
+        const dropped = new DataTransfer();
+        dropped.items.add(new File([new Uint8Array(bytes)], "chair.glb", { type: "model/gltf-binary" }));
+        const stage = document.getElementById("stage");
+        for (const type of ["dragover", "drop"]) {
+          stage.dispatchEvent(new DragEvent(type, { dataTransfer: dropped, bubbles: true, cancelable: true }));
+        }
+      }, [...model()]);
+      await page.waitForFunction(() => document.getElementById("empty").hidden && document.getElementById("name").textContent === "dropped.glb");
+      await becomes(page, [png.width, png.height, ...png.data], true);
+      assert.equal(await page.isHidden("#alert"), true);
+      await viewer.stop();
+    }
+  },
+
+  async "a page at rest opens from a file and shows the same pixels, their values and what is there"() {
     const [path, out] = [join(folder, "scene.pbrt"), join(folder, "page")];
     execFileSync(program, ["view", path, "--export", out], { stdio: "ignore" });
     const rendered = join(folder, "at-rest.png");
@@ -259,6 +445,19 @@ const tests = {
     const box = await page.locator("#picture").boundingBox();
     await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
     await page.waitForFunction(() => /^48, 32: 0\.\d+  0\.\d+  0\.\d+$/.test(document.getElementById("pixel").textContent));
+    // What is there: the ball, as far away as a ray through the middle of the pixel finds it, and nothing beside it.
+    const click = (x, y) => page.mouse.click(box.x + (x + 0.5) * box.width / 96, box.y + (y + 0.5) * box.height / 64);
+    for (const [x, y] of [[40, 33], [50, 28]]) {
+      await click(x, y);
+      await page.waitForFunction((distance) => {
+        const rows = new Map([...document.querySelectorAll("#picked tr")].map((row) => [...row.children].map((cell) => cell.textContent)));
+        return rows.size === 3 && rows.get("Shape") === "0 (sphere)" && rows.get("Material") === "<img src=x onerror=evil()> (diffuse)"
+          && Math.abs(Number(rows.get("Distance")) / distance - 1) < 1e-5;
+      }, toTheBall(x + 0.5, y + 0.5));
+    }
+    await click(2, 3);
+    await page.waitForFunction(() => document.getElementById("picked").textContent === "Nothing is there.");
+    assert.equal(await page.isVisible("#explain"), false);
     await page.selectOption("#channel", "normal");
     await page.waitForFunction(() => document.getElementById("channel").value === "normal");
     await becomes(page, [png.width, png.height, ...png.data], false);

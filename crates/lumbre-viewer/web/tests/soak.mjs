@@ -31,8 +31,19 @@ page.on("pageerror", (error) => console.log(`the page threw: ${error.message}`))
 await page.goto(url);
 await page.waitForFunction(() => lumbreMeasured.done);
 await page.focus("#picture");
+// The facts are written anew for each scene that is built, and the alert for each file that is broken.
+await page.evaluate(() => {
+  globalThis.soak = { reloads: 0, refusals: 0 };
+  new MutationObserver(() => (soak.reloads += 1)).observe(document.getElementById("facts"), { childList: true });
+  const alert = document.getElementById("alert");
+  new MutationObserver(() => (soak.refusals += alert.hidden ? 0 : 1)).observe(alert, { attributeFilter: ["hidden"] });
+});
 const start = performance.now();
 let edits = 0;
+async function told() {
+  const { reloads, refusals } = await page.evaluate(() => soak);
+  return `${edits} edits, ${reloads} reloads, ${refusals} refusals, ${memory().toFixed(1)} MiB`;
+}
 while (performance.now() - start < minutes * 60_000) {
   edits += 1;
   // Every tenth one is broken.
@@ -40,11 +51,10 @@ while (performance.now() - start < minutes * 60_000) {
   await page.keyboard.press("ArrowRight", { delay: 60 });
   await page.waitForTimeout(900);
   if (edits % 60 === 1) {
-    const frames = await page.evaluate(() => lumbreMeasured.frames.length);
-    console.log(`${((performance.now() - start) / 60_000).toFixed(1)} min: ${edits} edits, ${memory().toFixed(1)} MiB, ${frames} frames kept in mind`);
+    console.log(`${((performance.now() - start) / 60_000).toFixed(1)} min: ${await told()}`);
   }
 }
-console.log(`end: ${edits} edits, ${memory().toFixed(1)} MiB, alert hidden: ${await page.isHidden("#alert")}`);
+console.log(`end: ${await told()}, alert hidden: ${await page.isHidden("#alert")}`);
 await browser.close();
 child.kill("SIGINT");
 child.once("exit", () => rmSync(folder, { recursive: true, force: true }));

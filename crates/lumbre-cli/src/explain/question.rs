@@ -1,0 +1,80 @@
+//! What is told of a pixel or of a ray.
+
+use lumbre::journal::Event;
+use lumbre::shading::Spectrum;
+use lumbre::{Ray, RenderOptions, Scene};
+
+use super::document::{Item, Section};
+use super::texts::Texts;
+use super::things::Things;
+use super::{camera, light, sketch, surfaces};
+use crate::failure::Failure;
+
+/// Of which sample is told, how much of it, and in which language.
+pub(super) struct Question<'a> {
+    pub(super) things: &'a Things,
+    pub(super) texts: &'static Texts,
+    /// The number of the sample.
+    pub(super) sample: u32,
+    /// Rays after the first whose crossings are told as well.
+    pub(super) depth: u32,
+    /// Whether only the surface that is seen is told.
+    pub(super) nearest: bool,
+}
+
+impl Question<'_> {
+    /// Of a pixel of the picture.
+    ///
+    /// # Errors
+    /// As for a render.
+    pub(super) fn of_pixel(
+        &self,
+        scene: &Scene,
+        options: &RenderOptions,
+        pixel: (u32, u32),
+    ) -> Result<Vec<Section>, Failure> {
+        let sample = scene.explain_sample(options, pixel, self.sample)?;
+        let camera = &scene.resolved().cameras()[options.camera];
+        let whole = (options.width, options.height);
+        let mut section = camera::camera(camera, whole, pixel, &sample, self.texts);
+        section.fact(self.texts.sample, f64::from(self.sample));
+        section.fact(self.texts.weight, sample.weight);
+        Ok(self.along(section, scene, &sample.ray, sample.radiance, &sample.events))
+    }
+
+    /// Of a ray, whose direction is of any length but 0.
+    ///
+    /// # Errors
+    /// As for a render.
+    pub(super) fn of_ray(
+        &self,
+        scene: &Scene,
+        options: &RenderOptions,
+        ray: &Ray,
+    ) -> Result<Vec<Section>, Failure> {
+        // Light travels along unit directions.
+        let scaled = ray.direction / ray.direction.abs().max_element();
+        let unit = Ray { direction: scaled.normalize(), ..*ray };
+        let (radiance, events) = scene.explain_ray(options, &unit, self.sample)?;
+        Ok(self.along(camera::given(ray, self.texts), scene, ray, radiance, &events))
+    }
+
+    /// Where the ray comes from, what it meets, and the light along it.
+    fn along(
+        &self,
+        from: Section,
+        scene: &Scene,
+        ray: &Ray,
+        radiance: Spectrum,
+        events: &[Event],
+    ) -> Vec<Section> {
+        let &Self { things, texts, depth, nearest, .. } = self;
+        let mut met = surfaces::surfaces(scene, ray, things, nearest, true, texts);
+        if !met.hits.is_empty() {
+            let drawing = sketch::svg(&met.scenery, ray, &met.hits, &light::corners(events), texts.sketch);
+            met.section.items.insert(0, Item::Sketch(drawing));
+        }
+        let path = light::Path { scene, things, texts, depth };
+        vec![from, met.section, path.tell(radiance, events)]
+    }
+}

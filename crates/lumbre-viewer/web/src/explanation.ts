@@ -1,0 +1,56 @@
+// How the colour of a pixel comes about, as the viewer tells it: a page in a frame that can run nothing.
+import { byId, element, options } from "./elements";
+
+export class Explanation {
+  private readonly dialog = byId<HTMLDialogElement>("explanation");
+  private readonly button = byId<HTMLButtonElement>("explain");
+  private readonly language = byId<HTMLSelectElement>("language");
+  private languages: [string, string][] = [];
+  private pixel: [number, number] | undefined;
+
+  constructor() {
+    this.button.addEventListener("click", () => this.show());
+    this.language.addEventListener("change", () => this.load());
+    byId("explanation-close").addEventListener("click", () => this.dialog.close());
+    this.dialog.addEventListener("close", () => byId("explanation-text").replaceChildren());
+  }
+
+  /** The languages in which there are explanations. */
+  offer(languages: [string, string][]): void {
+    this.languages = languages;
+    const codes = languages.map(([code]) => code);
+    const spoken = navigator.languages.map((name) => name.slice(0, 2)).find((code) => codes.includes(code));
+    const chosen = codes.includes(this.language.value) ? this.language.value : spoken ?? codes[0] ?? "";
+    options(this.language, languages, chosen);
+    this.draw();
+  }
+
+  /** It is this pixel that is asked about. */
+  of(x: number, y: number): void {
+    this.pixel = [x, y];
+    this.draw();
+  }
+
+  /** Explains the pixel that was asked about. */
+  show(): void {
+    if (this.button.hidden) return;
+    this.load();
+    this.dialog.showModal();
+  }
+
+  private draw(): void {
+    this.button.hidden = !this.pixel || this.languages.length === 0;
+    this.button.textContent = `Explain pixel ${this.pixel?.join(", ") ?? ""}`;
+  }
+
+  private load(): void {
+    if (!this.pixel) return;
+    const address = `explanation/${this.language.value}/${this.pixel.join("/")}`;
+    byId<HTMLAnchorElement>("explanation-alone").href = address;
+    // A new frame: one that goes to another address would be a step in the history of the page.
+    const frame = element("iframe", "", { title: this.button.textContent ?? "" });
+    frame.setAttribute("sandbox", "");
+    frame.src = address;
+    byId("explanation-text").replaceChildren(frame);
+  }
+}
