@@ -24,7 +24,7 @@ use crate::rays::{Rays, Triples, is_single};
 use crate::shape::{Camera, Light, Placed, placed, transform};
 use crate::viewer::{Origin, Viewer};
 use crate::work::interruptible;
-use crate::{cast, points};
+use crate::{cast, points, rays};
 
 /// A scene, ready for queries and renders.
 #[pyclass(frozen, module = "lumbre._lumbre")]
@@ -184,6 +184,9 @@ impl Scene {
         fields: &Bound<'py, PyTuple>,
     ) -> PyResult<Option<Bound<'py, PyDict>>> {
         by_precision!(origins, Real => {
+            if let Some(ray) = rays::single::<Real>(origins, directions, tmin, tmax) {
+                return cast::closest_single::<Real>(py, &self.scene, ray, fields);
+            }
             let rays = Rays::<Real>::ready(origins, directions, tmin, tmax);
             rays.map_or(Ok(None), |rays| cast::closest_fresh(py, &self.scene, &rays, fields))
         })
@@ -214,6 +217,9 @@ impl Scene {
         tmax: f64,
     ) -> PyResult<Option<Bound<'py, PyArray1<bool>>>> {
         by_precision!(origins, Real => {
+            if let Some(ray) = rays::single::<Real>(origins, directions, tmin, tmax) {
+                return Ok(Some(PyArray1::from_slice(py, &[self.scene.any(&ray)])));
+            }
             let rays = Rays::<Real>::ready(origins, directions, tmin, tmax);
             rays.map_or(Ok(None), |rays| cast::any_fresh(py, &self.scene, &rays).map(Some))
         })

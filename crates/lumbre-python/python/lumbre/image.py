@@ -116,7 +116,9 @@ def read_image(path: str | os.PathLike[str]) -> npt.NDArray[np.float32]:
 
 
 def write_image(path: str | os.PathLike[str], pixels: npt.ArrayLike, *, tonemap: str = "none", exposure: float = 0.0) -> None:
-    """Writes linear light, (h, w, 3) or (h, w) for grey, as an image file: .exr, .png, .hdr, .pfm or .jpg. `tonemap` and `exposure` as of `Image.save`.
+    """Writes linear light, (h, w, 3) or (h, w) for grey, as an image file: .exr, .png, .hdr, .pfm or .jpg.
+
+    `tonemap` and `exposure` are as of `Image.save`.
 
     >>> import numpy as np, pathlib, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:

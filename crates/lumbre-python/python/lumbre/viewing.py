@@ -6,8 +6,8 @@ import base64
 import html
 import os
 import sys
-import webbrowser
 import weakref
+import webbrowser
 from collections.abc import Callable
 
 from . import _lumbre
