@@ -218,7 +218,7 @@ impl Material {
         }
         let volume = match attenuation {
             None => None,
-            Some((_, distance)) if !(distance > 0.0) => {
+            Some((_, distance)) if distance.is_nan() || distance <= 0.0 => {
                 return Err(invalid(format!(
                     "attenuation_distance is out of range (found {distance}; expected a number above 0)"
                 )));
