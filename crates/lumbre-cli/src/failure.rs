@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Write};
 
 /// Why a command failed.
 #[derive(Debug)]
-pub(crate) enum Failure {
+pub enum Failure {
     /// A comparison exceeded its limit (1).
     Different,
     /// The command line is invalid (2).

@@ -1,18 +1,10 @@
 //! The languages in which numbers and their steps are told.
 
-use clap::{Args, ValueEnum};
-
-/// The option for the language.
-#[derive(Args)]
-pub(crate) struct LanguageArguments {
-    /// The language: English or Spanish.
-    #[arg(long, value_enum, value_name = "LANGUAGE", default_value_t = Language::En)]
-    pub(crate) lang: Language,
-}
+use clap::ValueEnum;
 
 /// The languages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Language {
+pub enum Language {
     /// English.
     En,
     /// Spanish.
@@ -20,6 +12,14 @@ pub(crate) enum Language {
 }
 
 impl Language {
+    /// The names.
+    pub const NAMES: [&'static str; 2] = ["en", "es"];
+
+    /// The language of a name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::from_str(name, false).ok()
+    }
+
     /// The one of both that is in this language.
     pub(crate) fn choose<T>(self, english: T, spanish: T) -> T {
         match self {

@@ -14,6 +14,7 @@ mod cast;
 mod checkpoint;
 mod completions;
 mod console;
+mod defaults;
 mod denoiser;
 mod diff;
 mod explain;
@@ -42,6 +43,11 @@ mod units;
 mod verb;
 mod view;
 mod viewing;
+
+pub use defaults::{Defaults, MODEL_SPP};
+pub use explain::{Explainer, Format, Request, Things, explain};
+pub use failure::Failure;
+pub use language::Language;
 
 /// Renders scenes, casts rays into them, says what is in them, and compares and joins pictures.
 #[derive(Parser)]

@@ -15,12 +15,13 @@ use lumbre::image::{Image, ToneMap};
 use lumbre::math::Elementary;
 use lumbre::shading::ShadingNormals;
 use lumbre::{
-    CancelToken, DVec3, Feature, Ground, Job, Keeper, Picture, PixelBounds, RenderOptions, SaveOptions,
-    Scene, SceneDesc, Stage, StageLight, Staged,
+    CancelToken, DVec3, Feature, Job, Keeper, Picture, PixelBounds, RenderOptions, SaveOptions, Scene,
+    SceneDesc, Stage, Staged,
 };
 use serde_json::json;
 
 use crate::checkpoint::{Checkpoint, PartArguments, is_bare_part};
+use crate::defaults::{Defaults, MODEL_SPP};
 use crate::denoiser::{Choice, Denoiser};
 use crate::failure::{Failure, print_bytes};
 use crate::names::one_of;
@@ -307,9 +308,6 @@ const LEAST_TIME: Duration = Duration::from_millis(400);
 /// Samples per pixel at most, where its noise ends its sampling: some never come to little noise.
 const MOST_FOR_NOISE: u32 = 1024;
 
-/// Samples per pixel of a model without camera and light, of which the noise is taken out.
-pub(crate) const MODEL_SPP: u32 = 16;
-
 const READING: Phase = Phase::Preparing("reading the scene");
 
 impl Arguments {
@@ -510,16 +508,13 @@ fn picture(
     }
     let is_of_light = kind.needs_light();
     let mut stage = stage.clone();
-    if !is_of_light && !arguments.staging.wants_ground() {
-        // Pictures of normals and the like show the model alone.
-        stage.ground = Ground::None;
-    }
+    stage.ground = Defaults::ground(stage.ground, is_of_light);
     let staged = stage.set(&mut desc);
+    let defaults = Defaults::new(staged, is_of_light);
     if let Some((_, held)) = frame {
         held.hold(&staged, &mut desc);
     }
-    let behind =
-        arguments.staging.behind(&staged, is_of_light, arguments.reading.limits_beside(diagnostics))?;
+    let behind = arguments.staging.behind(&defaults, arguments.reading.limits_beside(diagnostics))?;
     let name = &arguments.scene[0];
     let mut of_frames = Diagnostics::with_strictness(arguments.reading.strictness());
     arguments.reading.check_build(&desc, diagnostics)?;
@@ -546,12 +541,11 @@ fn picture(
     }
     let mut options = options(arguments, &scene)?;
     options.transparent = behind.is_transparent();
-    let is_model = staged.framed && staged.light != StageLight::Own && is_of_light;
     let samples_are_asked = arguments.spp.is_some()
         || arguments.time.is_some()
         || arguments.noise.is_some()
         || arguments.parts.keeps_sums();
-    let is_plain = is_model && !samples_are_asked && scene.resolved().sampler().spp.is_none();
+    let is_plain = !samples_are_asked && defaults.is_plain(&scene);
     // A model by itself is clean soon; who asks for samples has these and nothing else.
     let denoiser = denoiser.or((is_plain && arguments.denoise.is_none()).then_some(&Denoiser::Own));
     if is_plain && denoiser.is_some() {
@@ -587,8 +581,8 @@ fn picture(
 
     let exposure = match first.exposure {
         Some(exposure) => exposure,
-        None if staged.photometric && is_of_light && is_for_displays(&output) => {
-            let stops = measured_exposure(scene.white_level(&options)?);
+        None if is_for_displays(&output) => {
+            let stops = defaults.exposure(&scene, &options)?;
             if stops != 0.0 && !arguments.quiet {
                 say!(
                     "exposed by {stops:.1} stops for the file's own lights (--exposure 0 takes them as they are)"
@@ -599,8 +593,7 @@ fn picture(
         None => *first.exposure.insert(0.0),
     };
 
-    let is_shown = is_of_light && staged.light != StageLight::Own;
-    let tone_map = arguments.tonemap.unwrap_or(if is_shown { ToneMap::Neutral } else { ToneMap::None });
+    let tone_map = arguments.tonemap.unwrap_or(defaults.tone_map());
     let precision = match scene.resolved().film().single_precision {
         true => ExrPrecision::Float,
         false => ExrPrecision::Half,
@@ -780,17 +773,6 @@ fn check_film(arguments: &Arguments, options: &RenderOptions, held: u64) -> Resu
 /// Whether exposure applies to the format of this name.
 fn is_for_displays(path: &Path) -> bool {
     matches!(ImageFormat::from_path(path), Some(ImageFormat::Png | ImageFormat::Jpeg))
-}
-
-/// The stops that bring white to 1, in tenths, if it is more than one stop too bright or three too dark; else
-/// 0.
-pub(crate) fn measured_exposure(white_level: Option<f32>) -> f32 {
-    match white_level {
-        Some(level) if !(0.125..=2.0).contains(&level) => {
-            (-10.0 * level.logarithm_2()).round().clamp(-1000.0, 1000.0) / 10.0
-        }
-        _ => 0.0,
-    }
 }
 
 /// Checks that the program can write the format of the path's extension.

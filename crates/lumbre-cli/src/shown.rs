@@ -4,8 +4,9 @@ use std::path::Path;
 
 use lumbre::description::IntegratorKind;
 use lumbre::formats::Diagnostics;
-use lumbre::{RenderOptions, Scene, SceneDesc, Staged};
+use lumbre::{RenderOptions, Scene, SceneDesc};
 
+use crate::defaults::Defaults;
 use crate::failure::Failure;
 use crate::reading::ReadingArguments;
 use crate::render::camera;
@@ -29,7 +30,7 @@ pub(crate) struct Wish<'a> {
 /// A scene on its stage.
 pub(crate) struct Shown {
     pub(crate) scene: Scene,
-    pub(crate) staged: Staged,
+    pub(crate) defaults: Defaults,
     pub(crate) behind: Behind,
     pub(crate) options: RenderOptions,
     /// Whether its pictures are of light, and not of normals or the like.
@@ -47,12 +48,9 @@ pub(crate) fn shown(mut desc: SceneDesc, wish: &Wish<'_>) -> Result<Shown, Failu
     view.set(&mut stage)?;
     let kind = integrator.unwrap_or(desc.integrator.kind);
     let is_of_light = kind.needs_light();
-    if !is_of_light && !staging.wants_ground() {
-        // Pictures of normals and the like show the model alone.
-        stage.ground = lumbre::Ground::None;
-    }
-    let staged = stage.set(&mut desc);
-    let behind = staging.behind(&staged, is_of_light, reading.limits())?;
+    stage.ground = Defaults::ground(stage.ground, is_of_light);
+    let defaults = Defaults::new(stage.set(&mut desc), is_of_light);
+    let behind = staging.behind(&defaults, reading.limits())?;
     let mut diagnostics = Diagnostics::with_strictness(reading.strictness());
     reading.check_build(&desc, &diagnostics)?;
     let scene = Scene::of_file(desc, name, &mut diagnostics)?;
@@ -66,5 +64,5 @@ pub(crate) fn shown(mut desc: SceneDesc, wish: &Wish<'_>) -> Result<Shown, Failu
     }
     view.check_camera(&scene, options.camera)?;
     options.transparent = behind.is_transparent();
-    Ok(Shown { scene, staged, behind, options, is_of_light, diagnostics })
+    Ok(Shown { scene, defaults, behind, options, is_of_light, diagnostics })
 }

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
-use lumbre::description::{GroundPlane, StageLight};
+use lumbre::description::GroundPlane;
 use lumbre::formats::Limits;
 use lumbre::formats::diagnostic::nearest_name;
 use lumbre::image::{Image, Rgb, srgb_to_linear};
-use lumbre::{Background, EnvironmentDesc, Ground, Stage, Staged, Surroundings};
+use lumbre::{Background, EnvironmentDesc, Ground, Stage, Surroundings};
 
+use crate::defaults::Defaults;
 use crate::failure::Failure;
 use crate::names::one_of;
 
@@ -166,22 +167,14 @@ impl StagingArguments {
         Ok(stage)
     }
 
-    /// The background of a picture of a staged description. Pictures other than of light (normals and the like)
-    /// have none by default.
+    /// The background of a picture of a staged description.
     ///
     /// # Errors
     /// Unreadable files.
-    pub(crate) fn behind(
-        &self,
-        staged: &Staged,
-        is_of_light: bool,
-        limits: Limits,
-    ) -> Result<Behind, Failure> {
+    pub(crate) fn behind(&self, defaults: &Defaults, limits: Limits) -> Result<Behind, Failure> {
         Ok(match &self.background {
-            None if is_of_light && staged.light == StageLight::Studio => {
-                Behind::Background(Background::studio())
-            }
-            None | Some(BackgroundArgument::Lights) => Behind::Lights,
+            None => defaults.background().map_or(Behind::Lights, Behind::Background),
+            Some(BackgroundArgument::Lights) => Behind::Lights,
             Some(BackgroundArgument::Transparent) => Behind::Nothing,
             Some(BackgroundArgument::Studio) => Behind::Background(Background::studio()),
             Some(BackgroundArgument::Colour(colour)) => Behind::Background(Background::Colour(*colour)),
@@ -211,11 +204,6 @@ impl StagingArguments {
             _ => None,
         };
         self.env.as_deref().into_iter().chain(background)
-    }
-
-    /// Whether ground is requested.
-    pub(crate) fn wants_ground(&self) -> bool {
-        matches!(self.ground, Some(Ground::Shadow | Ground::Plane))
     }
 }
 

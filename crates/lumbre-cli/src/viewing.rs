@@ -8,14 +8,15 @@ use std::time::Duration;
 
 use clap::Args;
 use lumbre::image::ToneMap;
-use lumbre::{CancelToken, SaveOptions, SceneDesc, StageLight};
+use lumbre::{CancelToken, SaveOptions, SceneDesc};
 use lumbre_viewer::{Built, Explain, Moment, Options, Read, Source, Viewer, export};
 
+use crate::defaults::MODEL_SPP;
 use crate::explain::Explainer;
 use crate::failure::{Failure, print};
 use crate::names::one_of;
 use crate::reading::ReadingArguments;
-use crate::render::{MODEL_SPP, TONE_MAPS, exposure, measured_exposure};
+use crate::render::{TONE_MAPS, exposure};
 use crate::shown::{Shown, Wish, shown};
 use crate::signals::{Phase, Signals};
 use crate::staging::{Behind, StagingArguments};
@@ -218,11 +219,10 @@ impl Files {
         let camera = self.arguments.camera.as_deref().filter(|_| self.dropped.is_none());
         let wish = Wish { name: &name, size: *size, camera, integrator: None, view, staging, reading };
         let explain = Some(Box::new(Explainer::new(&desc, self.name())) as Box<dyn Explain>);
-        let Shown { scene, staged, behind, mut options, is_of_light, diagnostics } = shown(desc, &wish)?;
+        let Shown { scene, defaults, behind, mut options, is_of_light, diagnostics } = shown(desc, &wish)?;
         let mut warnings = diagnostics.lines();
         options.threads = rayon::current_num_threads();
-        let is_model = staged.framed && staged.light != StageLight::Own && is_of_light;
-        let is_plain = is_model && self.arguments.spp.is_none() && scene.resolved().sampler().spp.is_none();
+        let is_plain = self.arguments.spp.is_none() && defaults.is_plain(&scene);
         if is_plain {
             options.stop.spp = MODEL_SPP;
         }
@@ -235,12 +235,9 @@ impl Files {
         let mut save = SaveOptions::default();
         save.exposure = match self.arguments.exposure {
             Some(exposure) => exposure,
-            None if staged.photometric && is_of_light => measured_exposure(scene.white_level(&options)?),
-            None => 0.0,
+            None => defaults.exposure(&scene, &options)?,
         };
-        let is_shown = is_of_light && staged.light != StageLight::Own;
-        let tone_map = if is_shown { ToneMap::Neutral } else { ToneMap::None };
-        save.tone_map = self.arguments.tonemap.unwrap_or(tone_map);
+        save.tone_map = self.arguments.tonemap.unwrap_or(defaults.tone_map());
         if scene.resolved().film().single_precision {
             save.exr_precision = lumbre::formats::image::ExrPrecision::Float;
         }

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use crate::columns::{Columns, Fresh, NONE, Outputs, Row};
 use crate::errors::invalid;
-use crate::rays::{Rays, RaysView, Real};
+use crate::rays::{Rays, Real};
 use crate::work::{Stop, interruptible, pool};
 
 /// Rays that a thread takes at a time: enough for the batches of the kernel, and soon done.
@@ -59,7 +59,7 @@ pub(crate) fn closest<T: Real>(
     let count = rays.len();
     let mut outputs = Outputs::<T>::new(out, count)?;
     let pieces = outputs.columns(count)?.pieces(piece_size(count)?);
-    each_piece(py, count, pieces, |mut piece| closest_of(scene, &rays, &mut piece))
+    each_piece(py, count, pieces, |mut piece| closest_of(scene, &rays.read(piece.range()), &mut piece))
 }
 
 /// The same into arrays that are made here; `None` where a field is none.
@@ -73,16 +73,27 @@ pub(crate) fn closest_fresh<'py, T: Real>(
     let count = rays.len();
     let Some(mut fresh) = Fresh::<T>::new(fields, count)? else { return Ok(None) };
     let pieces = fresh.columns(count).pieces(piece_size(count)?);
-    each_piece(py, count, pieces, |mut piece| closest_of(scene, &rays, &mut piece))?;
+    each_piece(py, count, pieces, |mut piece| closest_of(scene, &rays.read(piece.range()), &mut piece))?;
     fresh.into_dict(py).map(Some)
 }
 
-fn closest_of<T: Real>(scene: &Scene, rays: &RaysView<'_, T>, out: &mut Columns<'_, T>) {
-    let rays = rays.read(out.range());
+/// The same of one ray.
+pub(crate) fn closest_single<'py, T: Real>(
+    py: Python<'py>,
+    scene: &Scene,
+    ray: Ray,
+    fields: &Bound<'_, PyTuple>,
+) -> PyResult<Option<Bound<'py, PyDict>>> {
+    let Some(mut fresh) = Fresh::<T>::new(fields, 1)? else { return Ok(None) };
+    closest_of(scene, &[ray], &mut fresh.columns(1));
+    fresh.into_dict(py).map(Some)
+}
+
+fn closest_of<T: Real>(scene: &Scene, rays: &[Ray], out: &mut Columns<'_, T>) {
     let mut hits = vec![None; rays.len()];
-    match (&rays[..], &mut hits[..]) {
+    match (rays, &mut hits[..]) {
         ([ray], [hit]) => *hit = scene.resolved().accel().closest(ray),
-        _ => scene.resolved().accel().closest_batch(&rays, &mut hits),
+        _ => scene.resolved().accel().closest_batch(rays, &mut hits),
     }
     let wants_surface = out.wants_surface();
     for (row, (ray, hit)) in rays.iter().zip(&hits).enumerate() {

@@ -12,6 +12,9 @@ use pyo3::types::{PyDict, PyString, PyTuple};
 use crate::errors::invalid;
 use crate::rays::Real;
 
+/// So many numbers are sooner copied than handed over.
+const FEW: usize = 256;
+
 /// What stands for no shape, primitive or instance.
 pub(crate) const NONE: i32 = -1;
 
@@ -105,7 +108,11 @@ fn put<T: Element>(
     column: Option<Vec<T>>,
 ) -> PyResult<()> {
     let Some(column) = column else { return Ok(()) };
-    columns.set_item(name, PyArray1::from_vec(columns.py(), column))
+    let py = columns.py();
+    // To hand over few numbers takes longer than to copy them.
+    let array =
+        if column.len() <= FEW { PyArray1::from_slice(py, &column) } else { PyArray1::from_vec(py, column) };
+    columns.set_item(name, array)
 }
 
 fn put_table<T: Element>(
@@ -116,8 +123,12 @@ fn put_table<T: Element>(
 ) -> PyResult<()> {
     let Some(column) = column else { return Ok(()) };
     let rows = column.len() / width;
+    let py = columns.py();
+    let is_small = column.len() <= FEW;
     let table = Array2::from_shape_vec((rows, width), column).map_err(invalid)?;
-    columns.set_item(name, PyArray2::from_owned_array(columns.py(), table))
+    let array =
+        if is_small { PyArray2::from_array(py, &table) } else { PyArray2::from_owned_array(py, table) };
+    columns.set_item(name, array)
 }
 
 /// The rows of a range of rays.

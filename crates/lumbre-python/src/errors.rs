@@ -1,6 +1,7 @@
 //! Errors as exceptions.
 
 use lumbre::{Error, ErrorKind};
+use lumbre_cli::Failure;
 use pyo3::exceptions::{PyMemoryError, PyOSError, PyValueError};
 use pyo3::{PyErr, create_exception};
 
@@ -22,6 +23,15 @@ pub(crate) fn raised(error: Error) -> PyErr {
         },
         ErrorKind::Limit => PyMemoryError::new_err(message),
         ErrorKind::Input | ErrorKind::Options => LumbreError::new_err(message),
+    }
+}
+
+/// The exception for why the program would fail: as of [`raised`].
+pub(crate) fn failed(failure: Failure) -> PyErr {
+    match failure {
+        Failure::Io(message) => PyOSError::new_err(message),
+        Failure::Limit(message) => PyMemoryError::new_err(message),
+        failure => LumbreError::new_err(failure.to_string()),
     }
 }
 

@@ -3,12 +3,14 @@
 mod cast;
 mod columns;
 mod errors;
+mod material;
 mod picture;
 mod points;
 mod program;
 mod rays;
 mod scene;
 mod shape;
+mod viewer;
 mod work;
 
 /// The module as Python imports it.
@@ -17,13 +19,17 @@ mod _lumbre {
     #[pymodule_export]
     use crate::errors::LumbreError;
     #[pymodule_export]
+    use crate::material::{Material, Texture};
+    #[pymodule_export]
     use crate::picture::{Part, Picture, read_image, write_image};
     #[pymodule_export]
     use crate::program::main;
     #[pymodule_export]
     use crate::scene::Scene;
     #[pymodule_export]
-    use crate::shape::{Camera, Geometry, Light, Material};
+    use crate::shape::{Camera, Geometry, Light};
     #[pymodule_export]
-    use crate::work::thread_count;
+    use crate::viewer::Viewer;
+    #[pymodule_export]
+    use crate::work::{panic_on_purpose, thread_count};
 }

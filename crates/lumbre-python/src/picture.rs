@@ -1,28 +1,116 @@
 //! Pictures and parts of renders.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 use lumbre::formats::image::{ExrPrecision, ImageFormat, PngDepth};
 use lumbre::image::{Image, Rgb, ToneMap};
-use lumbre::{Feature, Part as PartDesc, SaveOptions};
+use lumbre::{Background, Feature, Part as PartDesc, RenderOptions, SaveOptions};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
 use crate::errors::{invalid, raised};
-use crate::scene::unknown;
+use crate::scene::{Shown, unknown};
 
 /// A rendered picture, with the sums of its samples.
 #[pyclass(frozen, module = "lumbre._lumbre")]
 pub(crate) struct Picture {
     picture: lumbre::Picture,
+    look: Look,
     part: Mutex<Option<PartDesc>>,
 }
 
 impl Picture {
-    pub(crate) fn new(picture: lumbre::Picture, part: Option<PartDesc>) -> Self {
-        Self { picture, part: Mutex::new(part) }
+    pub(crate) fn new(picture: lumbre::Picture, look: Look, part: Option<PartDesc>) -> Self {
+        let picture = if look.has_paper { picture.over(Background::studio()) } else { picture };
+        Self { picture, look, part: Mutex::new(part) }
+    }
+}
+
+/// How a picture is saved where nobody says otherwise.
+pub(crate) struct Look {
+    tone_map: ToneMap,
+    exposure: f32,
+    precision: ExrPrecision,
+    /// Whether it stands before the paper of the studio.
+    has_paper: bool,
+}
+
+impl Look {
+    /// As the program saves it.
+    pub(crate) fn of(
+        shown: &Shown,
+        options: &RenderOptions,
+        is_transparent: bool,
+    ) -> Result<Self, lumbre::Error> {
+        let Shown { scene, defaults, .. } = shown;
+        Ok(Self {
+            tone_map: defaults.tone_map(),
+            exposure: defaults.exposure(scene, options)?,
+            precision: match scene.resolved().film().single_precision {
+                true => ExrPrecision::Float,
+                false => ExrPrecision::Half,
+            },
+            has_paper: !is_transparent && defaults.background().is_some(),
+        })
+    }
+
+    /// By name, in the words of the program's own parts.
+    pub(crate) fn named(&self) -> BTreeMap<String, String> {
+        let precision = if self.precision == ExrPrecision::Float { "float" } else { "half" };
+        let tone_map =
+            ToneMap::NAMES.into_iter().find(|name| ToneMap::from_name(name) == Some(self.tone_map));
+        let entry = |name: &str, value: &str| (name.to_owned(), value.to_owned());
+        let mut names = BTreeMap::from([
+            entry("exposure", &self.exposure.to_string()),
+            entry("tone map", tone_map.unwrap_or("none")),
+            entry("precision", precision),
+            entry("layers", ""),
+        ]);
+        names.extend(self.has_paper.then(|| entry("background", "studio")));
+        names
+    }
+
+    /// The options of a file, where what is not given is as it is here.
+    fn options(
+        &self,
+        tonemap: Option<&str>,
+        exposure: Option<f32>,
+        depth: u8,
+        quality: u8,
+        precision: Option<&str>,
+    ) -> PyResult<SaveOptions> {
+        let png_depth = match depth {
+            8 => PngDepth::Eight,
+            16 => PngDepth::Sixteen,
+            _ => return Err(invalid(format!("depth is no depth of PNG (found {depth}; expected 8 or 16)"))),
+        };
+        if !(1..=100).contains(&quality) {
+            return Err(invalid(format!("quality is out of range (found {quality}; expected 1 to 100)")));
+        }
+        let mut options = SaveOptions::default();
+        options.tone_map = tonemap.map_or(Ok(self.tone_map), tone_map)?;
+        options.exposure = exposure.unwrap_or(self.exposure);
+        options.exr_precision = match precision {
+            None => self.precision,
+            Some("half") => ExrPrecision::Half,
+            Some("float") => ExrPrecision::Float,
+            Some(other) => return Err(unknown("precision", other, &["half", "float"])),
+        };
+        (options.png_depth, options.jpeg_quality) = (png_depth, quality);
+        Ok(options)
+    }
+
+    fn from_names(names: &BTreeMap<String, String>) -> Self {
+        let text = |name: &str| names.get(name).map_or("", String::as_str);
+        Self {
+            tone_map: ToneMap::from_name(text("tone map")).unwrap_or_default(),
+            exposure: text("exposure").parse().unwrap_or(0.0),
+            precision: if text("precision") == "float" { ExrPrecision::Float } else { ExrPrecision::Half },
+            has_paper: text("background") == "studio",
+        }
     }
 }
 
@@ -37,26 +125,8 @@ fn array(py: Python<'_>, image: &Image) -> PyResult<Py<PyArray3<f32>>> {
     Ok(PyArray1::from_vec(py, numbers).reshape(shape)?.unbind())
 }
 
-fn options(tonemap: &str, exposure: f32, depth: u8, quality: u8, precision: &str) -> PyResult<SaveOptions> {
-    let tone_map = ToneMap::from_name(tonemap);
-    let tone_map = tone_map.ok_or_else(|| unknown("tonemap", tonemap, &ToneMap::NAMES))?;
-    let png_depth = match depth {
-        8 => PngDepth::Eight,
-        16 => PngDepth::Sixteen,
-        _ => return Err(invalid(format!("depth is no depth of PNG (found {depth}; expected 8 or 16)"))),
-    };
-    if !(1..=100).contains(&quality) {
-        return Err(invalid(format!("quality is out of range (found {quality}; expected 1 to 100)")));
-    }
-    let exr_precision = match precision {
-        "half" => ExrPrecision::Half,
-        "float" => ExrPrecision::Float,
-        _ => return Err(unknown("precision", precision, &["half", "float"])),
-    };
-    let mut options = SaveOptions::default();
-    (options.tone_map, options.exposure) = (tone_map, exposure);
-    (options.png_depth, options.jpeg_quality, options.exr_precision) = (png_depth, quality, exr_precision);
-    Ok(options)
+fn tone_map(name: &str) -> PyResult<ToneMap> {
+    ToneMap::from_name(name).ok_or_else(|| unknown("tonemap", name, &ToneMap::NAMES))
 }
 
 fn features(names: &[String]) -> PyResult<Vec<Feature>> {
@@ -70,12 +140,12 @@ fn features(names: &[String]) -> PyResult<Vec<Feature>> {
 impl Picture {
     /// Linear light, (h, w, 3).
     fn pixels(&self, py: Python<'_>) -> PyResult<Py<PyArray3<f32>>> {
-        array(py, self.picture.image())
+        array(py, &self.picture.lit())
     }
 
     /// Coverage, (h, w), of a transparent picture.
     fn alpha(&self, py: Python<'_>) -> PyResult<Option<Py<PyArray2<f32>>>> {
-        let image = self.picture.image();
+        let image = self.picture.lit();
         let shape = [image.height() as usize, image.width() as usize];
         let Some(alpha) = image.alpha() else { return Ok(None) };
         Ok(Some(PyArray1::from_slice(py, alpha).reshape(shape)?.unbind()))
@@ -95,20 +165,25 @@ impl Picture {
         py: Python<'_>,
         path: PathBuf,
         layers: Vec<String>,
-        tonemap: &str,
-        exposure: f32,
+        tonemap: Option<&str>,
+        exposure: Option<f32>,
         depth: u8,
         quality: u8,
-        precision: &str,
+        precision: Option<&str>,
     ) -> PyResult<()> {
-        let options = options(tonemap, exposure, depth, quality, precision)?;
+        let options = self.look.options(tonemap, exposure, depth, quality, precision)?;
         let layers = features(&layers)?;
         py.detach(|| self.picture.save_with(&path, &options, &layers)).map_err(raised)
     }
 
     /// The bytes of a .png.
-    fn png<'py>(&self, py: Python<'py>, tonemap: &str, exposure: f32) -> PyResult<Bound<'py, PyBytes>> {
-        let options = options(tonemap, exposure, 8, 95, "half")?;
+    fn png<'py>(
+        &self,
+        py: Python<'py>,
+        tonemap: Option<&str>,
+        exposure: Option<f32>,
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        let options = self.look.options(tonemap, exposure, 8, 95, None)?;
         let bytes = py.detach(|| self.picture.encode(ImageFormat::Png, &options, &[])).map_err(raised)?;
         Ok(PyBytes::new(py, &bytes))
     }
@@ -194,7 +269,7 @@ impl Part {
 
     /// The picture of its samples.
     fn picture(&self, py: Python<'_>) -> Picture {
-        py.detach(|| self.with(|part| Picture::new(part.picture(), None)))
+        py.detach(|| self.with(|part| Picture::new(part.picture(), Look::from_names(&part.job.shown), None)))
     }
 }
 
@@ -222,7 +297,8 @@ pub(crate) fn write_image(
     tonemap: &str,
     exposure: f32,
 ) -> PyResult<()> {
-    let options = options(tonemap, exposure, 8, 95, "half")?;
+    let mut options = SaveOptions::default();
+    (options.tone_map, options.exposure) = (tone_map(tonemap)?, exposure);
     let &[height, width, 3] = pixels.shape() else {
         return Err(invalid(format!(
             "an image has the wrong shape (found {:?}; expected (h, w, 3))",

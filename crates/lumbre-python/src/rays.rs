@@ -4,7 +4,9 @@ use std::ops::Range;
 
 use lumbre::{DVec3, Ray};
 use numpy::ndarray::{ArrayView1, ArrayView2};
-use numpy::{PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{
+    PyArray2, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 use crate::errors::invalid;
@@ -44,9 +46,7 @@ impl<'py, T: Real> Triples<'py, T> {
     /// An array that is ready to be read; `None` for what Python has to look at first.
     pub(crate) fn ready(array: &Bound<'py, PyAny>) -> Option<Self> {
         let array: PyReadonlyArray2<'py, T> = array.extract().ok()?;
-        let is_whole = |stride: &isize| stride.unsigned_abs().is_multiple_of(size_of::<T>());
-        let is_aligned = array.strides().iter().all(is_whole) && array.data().is_aligned();
-        (is_aligned && array.shape()[1] == 3).then_some(Self(array))
+        (is_aligned(&array) && array.shape()[1] == 3).then_some(Self(array))
     }
 
     pub(crate) fn new(name: &str, array: &Bound<'py, PyAny>) -> PyResult<Self> {
@@ -67,6 +67,30 @@ impl<'py, T: Real> Triples<'py, T> {
     pub(crate) fn len(&self) -> usize {
         self.0.shape()[0]
     }
+}
+
+fn is_aligned<T: Real>(array: &Bound<'_, PyArray2<T>>) -> bool {
+    let is_whole = |stride: &isize| stride.unsigned_abs().is_multiple_of(size_of::<T>());
+    array.strides().iter().all(is_whole) && array.data().is_aligned()
+}
+
+/// The ray of arrays that are ready to be read and have one; `None` for others. Its numbers are copied, for to borrow the arrays takes
+/// longer than the ray.
+pub(crate) fn single<T: Real>(
+    origins: &Bound<'_, PyAny>,
+    directions: &Bound<'_, PyAny>,
+    t_min: f64,
+    t_max: f64,
+) -> Option<Ray> {
+    let only = |array: &Bound<'_, PyAny>| {
+        let array = array.cast::<PyArray2<T>>().ok()?;
+        if array.shape() != [1, 3] || !is_aligned(array) {
+            return None;
+        }
+        let at = |column| array.get_owned([0, column]).map(T::widened);
+        Some(DVec3::new(at(0)?, at(1)?, at(2)?))
+    };
+    Some(Ray::new(only(origins)?, only(directions)?).with_range(t_min, t_max))
 }
 
 /// The triple in this row.

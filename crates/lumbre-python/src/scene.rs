@@ -3,38 +3,59 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, RecvTimeoutError};
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 use lumbre::description::IntegratorKind;
-use lumbre::formats::Strictness;
 use lumbre::formats::diagnostic::nearest_name;
+use lumbre::formats::{Diagnostics, Strictness};
 use lumbre::{
-    CancelToken, Job, Part as PartDesc, PixelBounds, Progress, ReadOptions, RenderOptions, SceneBuilder,
-    ShapeBuilder, State, UpAxis,
+    CancelToken, Job, Part as PartDesc, PixelBounds, Progress, Ray, ReadOptions, RenderOptions, SceneBuilder,
+    SceneDesc, State, UpAxis,
 };
+use lumbre_cli::{Defaults, Format, Language, MODEL_SPP, Request, Things};
 use numpy::{PyArray1, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
 
-use crate::errors::{invalid, raised};
-use crate::picture::Picture;
+use crate::errors::{failed, invalid, raised};
+use crate::picture::{Look, Picture};
 use crate::rays::{Rays, Triples, is_single};
-use crate::shape::{Camera, Geometry, Light, Material, transform};
+use crate::shape::{Camera, Light, Placed, placed, transform};
+use crate::viewer::{Origin, Viewer};
 use crate::work::interruptible;
-use crate::{cast, points};
+use crate::{cast, points, rays};
 
 /// A scene, ready for queries and renders.
 #[pyclass(frozen, module = "lumbre._lumbre")]
 pub(crate) struct Scene {
-    scene: lumbre::Scene,
+    /// Of what is there alone, for queries.
+    scene: Arc<lumbre::Scene>,
+    /// Before it is set on a stage.
+    desc: Arc<SceneDesc>,
+    origin: Origin,
+    /// What it is called.
+    name: PathBuf,
     /// The files that it was read from.
     files: Vec<PathBuf>,
     /// What else it depends on, by name.
     settings: Vec<(String, String)>,
     /// Hashes of the files by their names, once someone has asked for a part.
     hashes: OnceLock<BTreeMap<String, String>>,
+    /// As the last picture showed it.
+    shown: Mutex<Option<Arc<Shown>>>,
+    /// What is called how, once someone has asked for an explanation.
+    things: OnceLock<Things>,
+}
+
+/// A scene on its stage, as the program shows it.
+pub(crate) struct Shown {
+    pub(crate) scene: Arc<lumbre::Scene>,
+    pub(crate) defaults: Defaults,
+    /// For which pictures.
+    size: Option<(u32, u32)>,
+    is_of_light: bool,
 }
 
 /// Does the same in the precision of an array, which goes by the name given.
@@ -48,24 +69,6 @@ macro_rules! by_precision {
             $query
         }
     };
-}
-
-/// A shape with its place, material and emitted radiance.
-type Placed<'py> =
-    (Bound<'py, Geometry>, Option<[[f64; 4]; 4]>, Option<Bound<'py, Material>>, Option<[f32; 3]>);
-
-fn placed((geometry, place, material, emission): &Placed<'_>) -> PyResult<ShapeBuilder> {
-    let mut shape = ShapeBuilder::new(geometry.get().0.clone());
-    if let Some(place) = place {
-        shape = shape.at(transform(*place)?);
-    }
-    if let Some(material) = material {
-        shape = shape.material(material.get().0.clone());
-    }
-    if let Some([r, g, b]) = *emission {
-        shape = shape.shining(lumbre::image::Rgb::new(r, g, b));
-    }
-    Ok(shape)
 }
 
 #[pymethods]
@@ -92,10 +95,19 @@ impl Scene {
         };
         (options.frame, options.shutter) = (frame, shutter);
         (options.animation, options.variant) = (animation, variant);
-        let open = || lumbre::open_with(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>(), &options);
-        let (scene, diagnostics) = interruptible(py, |_| open(), |_| Ok(()))?.map_err(raised)?;
+        let name = paths.first().cloned().unwrap_or_default();
+        let open = || -> Result<(lumbre::Scene, SceneDesc, Diagnostics), lumbre::Error> {
+            let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
+            let (desc, mut diagnostics) = lumbre::describe(&paths, &options)?;
+            let scene = lumbre::Scene::of_file(desc.clone(), &name, &mut diagnostics)?;
+            Ok((scene, desc, diagnostics))
+        };
+        // They may be read again when this process is elsewhere.
+        let named = paths.iter().map(std::path::absolute).collect::<Result<_, _>>()?;
+        let origin = Origin::Files(named, Box::new(options.clone()));
+        let (scene, desc, diagnostics) = interruptible(py, |_| open(), |_| Ok(()))?.map_err(raised)?;
         let files = diagnostics.files_read().to_vec();
-        Ok((Self { scene, files, settings, hashes: OnceLock::new() }, diagnostics.lines()))
+        Ok((Self::new(scene, desc.into(), origin, name, files, settings), diagnostics.lines()))
     }
 
     /// Builds a scene of shapes, of shapes with many places each, of cameras and of lights.
@@ -140,8 +152,11 @@ impl Scene {
             [x, y, z] if x == 0.0 && y == 0.0 && z > 0.0 => UpAxis::Z,
             towards => UpAxis::Towards(towards.into()),
         };
-        let scene = interruptible(py, |_| lumbre::Scene::from_description(desc), |_| Ok(()))?;
-        Ok(Self { scene: scene.map_err(raised)?, files: Vec::new(), settings, hashes: OnceLock::new() })
+        let build = || lumbre::Scene::from_description(desc.clone());
+        let scene = interruptible(py, |_| build(), |_| Ok(()))?.map_err(raised)?;
+        let desc = Arc::new(desc);
+        let origin = Origin::Shapes(Arc::clone(&desc));
+        Ok(Self::new(scene, desc, origin, "scene".into(), Vec::new(), settings))
     }
 
     /// The closest hits, into the arrays of `out`.
@@ -170,6 +185,9 @@ impl Scene {
         fields: &Bound<'py, PyTuple>,
     ) -> PyResult<Option<Bound<'py, PyDict>>> {
         by_precision!(origins, Real => {
+            if let Some(ray) = rays::single::<Real>(origins, directions, tmin, tmax) {
+                return cast::closest_single::<Real>(py, &self.scene, ray, fields);
+            }
             let rays = Rays::<Real>::ready(origins, directions, tmin, tmax);
             rays.map_or(Ok(None), |rays| cast::closest_fresh(py, &self.scene, &rays, fields))
         })
@@ -200,6 +218,9 @@ impl Scene {
         tmax: f64,
     ) -> PyResult<Option<Bound<'py, PyArray1<bool>>>> {
         by_precision!(origins, Real => {
+            if let Some(ray) = rays::single::<Real>(origins, directions, tmin, tmax) {
+                return Ok(Some(PyArray1::from_slice(py, &[self.scene.any(&ray)])));
+            }
             let rays = Rays::<Real>::ready(origins, directions, tmin, tmax);
             rays.map_or(Ok(None), |rays| cast::any_fresh(py, &self.scene, &rays).map(Some))
         })
@@ -278,15 +299,24 @@ impl Scene {
         options: &Bound<'_, PyDict>,
         progress: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Picture> {
-        let Asked { options, denoises, keeps_part } = self.asked(options)?;
+        let Asked { shown, options, is_transparent, denoises, keeps_part } = self.asked(py, options)?;
+        let look = py.detach(|| Look::of(&shown, &options, is_transparent)).map_err(raised)?;
         let tells = progress.map(Bound::unbind);
         let (watch, cancel) = (Watch::default(), CancelToken::new());
-        let job = if keeps_part { Some(self.job(&options)?) } else { None };
+        let job = if keeps_part { Some(Job { shown: look.named(), ..self.job(&options)? }) } else { None };
         // The render has threads of its own; those that wait for it here look for Ctrl-C.
         let rendered = py.detach(|| {
             std::thread::scope(|scope| {
                 let (done, waits) = mpsc::channel();
-                let render = || self.scene.render_from(&options, &watch, &cancel, None, None);
+                let render = || {
+                    let (mut picture, state) =
+                        shown.scene.render_from(&options, &watch, &cancel, None, None)?;
+                    // What is coarser than its pixels says nothing of noise.
+                    if denoises && picture.stats().stride == Some(1) {
+                        picture.denoise_unless(options.threads, &cancel)?;
+                    }
+                    Ok((picture, state))
+                };
                 let running = scope.spawn(move || {
                     // The receiver is there until the scope ends.
                     drop(done.send(render()));
@@ -314,12 +344,15 @@ impl Scene {
                 }
             })
         })?;
-        let (mut picture, state) = rendered.map_err(raised)?;
+        let (picture, state) = rendered.map_err(raised)?;
         watch.tell(py, tells.as_ref())?;
-        if denoises {
-            py.detach(|| picture.denoise(options.threads)).map_err(raised)?;
-        }
-        Ok(Picture::new(picture, job.map(|job| PartDesc { job, state })))
+        Ok(Picture::new(picture, look, job.map(|job| PartDesc { job, state })))
+    }
+
+    /// Shows it in a viewer, at an address of this machine.
+    fn view(&self, py: Python<'_>, size: Option<(u32, u32)>, spp: Option<u32>) -> PyResult<Viewer> {
+        let origin = self.origin.clone();
+        py.detach(|| Viewer::start(origin, size, spp))
     }
 
     /// What is in it, by name.
@@ -353,10 +386,38 @@ impl Scene {
         self.scene.options().stop.spp
     }
 
+    /// An explanation of a pixel, or of a ray (its origin, its direction and its range), written in a format; options as of a render.
+    #[expect(clippy::too_many_arguments, reason = "one call of the package's own")]
+    fn explain(
+        &self,
+        py: Python<'_>,
+        options: &Bound<'_, PyDict>,
+        pixel: Option<(u32, u32)>,
+        ray: Option<([f64; 3], [f64; 3], f64, f64)>,
+        sample: u32,
+        depth: u32,
+        nearest: bool,
+        lang: &str,
+        format: &str,
+    ) -> PyResult<String> {
+        let lang = Language::from_name(lang).ok_or_else(|| unknown("language", lang, &Language::NAMES))?;
+        let format = Format::from_name(format).ok_or_else(|| unknown("format", format, &Format::NAMES))?;
+        let ray = ray.map(|(origin, direction, from, to)| {
+            Ray::new(origin.into(), direction.into()).with_range(from, to)
+        });
+        let Asked { shown, options, .. } = self.asked(py, options)?;
+        let request = Request { pixel, ray, format, lang, depth, sample, nearest, only: Vec::new() };
+        let explain = || {
+            let things = self.things.get_or_init(|| Things::of(&self.desc));
+            lumbre_cli::explain(&shown.scene, &options, things, &self.name, &request)
+        };
+        py.detach(explain).map_err(failed)
+    }
+
     /// The size of its picture, where none is asked for.
-    fn size(&self) -> (u32, u32) {
-        let options = self.scene.options();
-        (options.width, options.height)
+    fn size(&self, py: Python<'_>) -> PyResult<(u32, u32)> {
+        let options = self.shown(py, None, None)?.scene.options();
+        Ok((options.width, options.height))
     }
 }
 
@@ -384,13 +445,65 @@ impl Watch {
 
 /// What is asked of a render.
 struct Asked {
+    shown: Arc<Shown>,
     options: RenderOptions,
+    /// Whether nothing is to be behind the picture.
+    is_transparent: bool,
     denoises: bool,
     /// Whether its sums are to be kept, for merging.
     keeps_part: bool,
 }
 
 impl Scene {
+    fn new(
+        scene: lumbre::Scene,
+        desc: Arc<SceneDesc>,
+        origin: Origin,
+        name: PathBuf,
+        files: Vec<PathBuf>,
+        settings: Vec<(String, String)>,
+    ) -> Self {
+        Self {
+            scene: Arc::new(scene),
+            desc,
+            origin,
+            name,
+            files,
+            settings,
+            hashes: OnceLock::new(),
+            shown: Mutex::default(),
+            things: OnceLock::new(),
+        }
+    }
+
+    /// On the stage of a picture of this size. That of the last one is kept, for the next is most likely of the same size.
+    fn shown(
+        &self,
+        py: Python<'_>,
+        size: Option<(u32, u32)>,
+        integrator: Option<IntegratorKind>,
+    ) -> PyResult<Arc<Shown>> {
+        let is_of_light = integrator.unwrap_or(self.desc.integrator.kind).needs_light();
+        let last = || self.shown.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(shown) = &*last()
+            && (shown.size, shown.is_of_light) == (size, is_of_light)
+        {
+            return Ok(Arc::clone(shown));
+        }
+        let build = || -> Result<Shown, lumbre::Error> {
+            let mut desc = SceneDesc::clone(&self.desc);
+            let defaults = Defaults::stage(&mut desc, size, integrator);
+            let scene = match defaults.is_bare() {
+                true => Arc::clone(&self.scene),
+                false => Arc::new(lumbre::Scene::from_description(desc)?),
+            };
+            Ok(Shown { scene, defaults, size, is_of_light })
+        };
+        let shown = Arc::new(interruptible(py, |_| build(), |_| Ok(()))?.map_err(raised)?);
+        *last() = Some(Arc::clone(&shown));
+        Ok(shown)
+    }
+
     /// Which render it is.
     fn job(&self, options: &RenderOptions) -> PyResult<Job> {
         if self.hashes.get().is_none() {
@@ -405,79 +518,101 @@ impl Scene {
     }
 
     /// The options of a render by their names.
-    fn asked(&self, given: &Bound<'_, PyDict>) -> PyResult<Asked> {
-        let mut asked = Asked { options: self.scene.options(), denoises: false, keeps_part: false };
+    fn asked(&self, py: Python<'_>, given: &Bound<'_, PyDict>) -> PyResult<Asked> {
+        let size: Option<(u32, u32)> = named(given, "size")?;
+        let integrator = match named::<String>(given, "integrator")? {
+            None => None,
+            Some(name) => Some(IntegratorKind::from_name(&name).ok_or_else(|| {
+                let names = ["path", "whitted", "ambientocclusion", "normals", "depth", "albedo", "uv"];
+                unknown("integrator", &name, &names)
+            })?),
+        };
+        let shown = self.shown(py, size, integrator)?;
+        let mut options = shown.scene.options();
+        options.integrator.kind = integrator.unwrap_or(options.integrator.kind);
+        if let Some((width, height)) = size {
+            options.resize(shown.scene.resolved().film(), width, height);
+        }
+        // As the program does.
+        let samples_are_asked = ["spp", "time", "noise", "part"]
+            .iter()
+            .any(|name| given.get_item(name).is_ok_and(|found| found.is_some()));
+        let is_plain = !samples_are_asked && shown.defaults.is_plain(&shown.scene);
+        let denoises = named(given, "denoise")?.unwrap_or(is_plain);
+        if is_plain && denoises {
+            options.stop.spp = MODEL_SPP;
+        }
+        let mut asked = Asked { shown, options, is_transparent: false, denoises, keeps_part: false };
         for (name, value) in given {
             let name: String = name.extract()?;
-            self.ask(&mut asked, &name, &value).map_err(|error| {
-                let is_of_value = error.is_instance_of::<PyTypeError>(given.py())
-                    || error.is_instance_of::<PyOverflowError>(given.py());
-                if is_of_value {
-                    invalid(format!("render: {name} is {value}: {}", error.value(given.py())))
-                } else {
-                    error
-                }
-            })?;
+            ask(&mut asked, &name, &value).map_err(|error| of_value(&name, &value, error))?;
         }
         asked.options.guides = asked.denoises;
         asked.options.features |= asked.denoises;
+        asked.options.transparent = asked.is_transparent || asked.shown.defaults.background().is_some();
         Ok(asked)
     }
+}
 
-    fn ask(&self, asked: &mut Asked, name: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
-        let options = &mut asked.options;
-        match name {
-            "spp" => options.stop.spp = value.extract()?,
-            "size" => (options.width, options.height) = value.extract()?,
-            "crop" => {
-                let (x0, y0, x1, y1) = value.extract()?;
-                options.crop = Some(PixelBounds { x0, y0, x1, y1 });
-            }
-            "camera" => options.camera = self.camera(value)?,
-            "integrator" => {
-                let name: String = value.extract()?;
-                options.integrator.kind = IntegratorKind::from_name(&name).ok_or_else(|| {
-                    let names = ["path", "whitted", "ambientocclusion", "normals", "depth", "albedo", "uv"];
-                    unknown("integrator", &name, &names)
-                })?;
-            }
-            "max_depth" => options.integrator.max_depth = value.extract()?,
-            "seed" => options.sampler.seed = value.extract()?,
-            "threads" => options.threads = value.extract()?,
-            "noise" => options.stop.noise = Some(value.extract()?),
-            "time" => {
-                let seconds: f64 = value.extract()?;
-                let time = Duration::try_from_secs_f64(seconds).map_err(|_| {
-                    invalid(format!("time is out of range (found {seconds}; expected seconds)"))
-                })?;
-                options.stop.time = Some(time);
-            }
-            "first_sample" => options.first_sample = value.extract()?,
-            "transparent" => options.transparent = value.extract()?,
-            "features" => options.features = value.extract()?,
-            "denoise" => asked.denoises = value.extract()?,
-            "part" => asked.keeps_part = value.extract()?,
-            _ => return Err(invalid(format!("render has no option {name}"))),
-        }
-        Ok(())
-    }
+/// The value of an option, if it is given.
+fn named<'py, T: for<'a> FromPyObject<'a, 'py, Error = PyErr>>(
+    given: &Bound<'py, PyDict>,
+    name: &str,
+) -> PyResult<Option<T>> {
+    let Some(value) = given.get_item(name)? else { return Ok(None) };
+    value.extract().map(Some).map_err(|error| of_value(name, &value, error))
+}
 
-    fn camera(&self, wanted: &Bound<'_, PyAny>) -> PyResult<usize> {
-        let cameras = self.scene.resolved().cameras();
-        if let Ok(name) = wanted.extract::<String>() {
-            let names: Vec<&str> = cameras.iter().filter_map(|camera| camera.name.as_deref()).collect();
-            let found = cameras.iter().position(|camera| camera.name.as_deref() == Some(&name));
-            return found.ok_or_else(|| unknown("camera", &name, &names));
-        }
-        let index: usize = wanted.extract()?;
-        if index < cameras.len() {
-            return Ok(index);
-        }
-        Err(invalid(format!(
-            "there is no camera {index} (expected 0 to {})",
-            cameras.len().saturating_sub(1)
-        )))
+/// The error of an option whose value is of a wrong kind.
+fn of_value(name: &str, value: &Bound<'_, PyAny>, error: PyErr) -> PyErr {
+    let py = value.py();
+    if error.is_instance_of::<PyTypeError>(py) || error.is_instance_of::<PyOverflowError>(py) {
+        return invalid(format!("render: {name} is {value}: {}", error.value(py)));
     }
+    error
+}
+
+fn ask(asked: &mut Asked, name: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
+    let options = &mut asked.options;
+    match name {
+        "size" | "integrator" | "denoise" => {}
+        "spp" => options.stop.spp = value.extract()?,
+        "crop" => {
+            let (x0, y0, x1, y1) = value.extract()?;
+            options.crop = Some(PixelBounds { x0, y0, x1, y1 });
+        }
+        "camera" => options.camera = camera(&asked.shown.scene, value)?,
+        "max_depth" => options.integrator.max_depth = value.extract()?,
+        "seed" => options.sampler.seed = value.extract()?,
+        "threads" => options.threads = value.extract()?,
+        "noise" => options.stop.noise = Some(value.extract()?),
+        "time" => {
+            let seconds: f64 = value.extract()?;
+            let time = Duration::try_from_secs_f64(seconds)
+                .map_err(|_| invalid(format!("time is out of range (found {seconds}; expected seconds)")))?;
+            options.stop.time = Some(time);
+        }
+        "first_sample" => options.first_sample = value.extract()?,
+        "transparent" => asked.is_transparent = value.extract()?,
+        "features" => options.features = value.extract()?,
+        "part" => asked.keeps_part = value.extract()?,
+        _ => return Err(invalid(format!("render has no option {name}"))),
+    }
+    Ok(())
+}
+
+fn camera(scene: &lumbre::Scene, wanted: &Bound<'_, PyAny>) -> PyResult<usize> {
+    let cameras = scene.resolved().cameras();
+    if let Ok(name) = wanted.extract::<String>() {
+        let names: Vec<&str> = cameras.iter().filter_map(|camera| camera.name.as_deref()).collect();
+        let found = cameras.iter().position(|camera| camera.name.as_deref() == Some(&name));
+        return found.ok_or_else(|| unknown("camera", &name, &names));
+    }
+    let index: usize = wanted.extract()?;
+    if index < cameras.len() {
+        return Ok(index);
+    }
+    Err(invalid(format!("there is no camera {index} (expected 0 to {})", cameras.len().saturating_sub(1))))
 }
 
 /// The error for a name that is not there.

@@ -2,29 +2,50 @@
 
 use std::sync::Arc;
 
-use lumbre::description::{Camera as CameraDesc, CameraView, GeometryDesc, LightDesc, MeshDesc};
+use lumbre::description::{Camera as CameraDesc, CameraView, CsgOperation, LightDesc, MeshDesc};
 use lumbre::geometry::{
     BilinearPatch, Capsule, Cone, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, Plane, Quadric, Shape,
     ShapeError, Sphere, Torus, Triangle,
 };
 use lumbre::image::{Image, Rgb};
 use lumbre::math::{DMat4, Vec2, Vec3};
-use lumbre::shading::{Material as MaterialDesc, PrincipledParams, SpectrumTexture, Texture};
-use lumbre::{DVec2, DVec3, EnvironmentDesc, Transform};
+use lumbre::shading::{Material as MaterialDesc, MaterialKind, SpectrumTexture};
+use lumbre::{DVec2, DVec3, EnvironmentDesc, ShapeBuilder, Transform};
 use numpy::ndarray::ArrayView2;
 use numpy::{PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use crate::errors::invalid;
+use crate::material::{Material, colour};
+use crate::scene::unknown;
 
 type Triple = [f64; 3];
 
 /// A geometry without a place, material and light.
 #[pyclass(frozen, module = "lumbre._lumbre")]
-pub(crate) struct Geometry(pub(crate) GeometryDesc);
+pub(crate) struct Geometry(ShapeBuilder);
+
+/// A geometry with its place, material and emitted radiance.
+pub(crate) type Placed<'py> =
+    (Bound<'py, Geometry>, Option<[[f64; 4]; 4]>, Option<Bound<'py, Material>>, Option<[f32; 3]>);
+
+/// The shape of these.
+pub(crate) fn placed((geometry, place, material, emission): &Placed<'_>) -> PyResult<ShapeBuilder> {
+    let mut shape = geometry.get().0.clone();
+    if let Some(place) = place {
+        shape = shape.at(transform(*place)?);
+    }
+    if let Some(material) = material {
+        shape = shape.material(material.get().0.clone());
+    }
+    if let Some(emission) = emission {
+        shape = shape.shining(colour("emission", *emission)?);
+    }
+    Ok(shape)
+}
 
 fn exact<S: Into<Shape>>(shape: Result<S, ShapeError>) -> PyResult<Geometry> {
-    Ok(Geometry(GeometryDesc::Exact(shape.map_err(invalid)?.into())))
+    Ok(Geometry(ShapeBuilder::exact(shape.map_err(invalid)?)))
 }
 
 fn rows<const N: usize, T: Copy, U>(view: &ArrayView2<'_, T>, of: impl Fn([T; N]) -> U) -> Vec<U> {
@@ -109,6 +130,20 @@ impl Geometry {
         exact(BilinearPatch::new(p00.into(), p10.into(), p01.into(), p11.into()))
     }
 
+    /// CSG of operands, each the union of its shapes.
+    #[staticmethod]
+    fn csg(operation: &str, operands: Vec<Vec<Placed<'_>>>) -> PyResult<Self> {
+        let operation = match operation {
+            "union" => CsgOperation::Union,
+            "intersection" => CsgOperation::Intersection,
+            "difference" => CsgOperation::Difference,
+            _ => return Err(unknown("operation", operation, &["union", "intersection", "difference"])),
+        };
+        let operand = |shapes: &Vec<Placed<'_>>| shapes.iter().map(placed).collect::<PyResult<Vec<_>>>();
+        let operands = operands.iter().map(operand).collect::<PyResult<_>>()?;
+        Ok(Self(ShapeBuilder::csg(operation, operands)))
+    }
+
     /// Triangles or quads of (V, 3) vertices in double precision and (F, 3) or (F, 4) faces. `is_precise` says whether rays meet
     /// triangles at these vertices, or at what they are in single precision.
     #[staticmethod]
@@ -117,6 +152,7 @@ impl Geometry {
         faces: PyReadonlyArray2<'_, i64>,
         normals: Option<PyReadonlyArray2<'_, f64>>,
         uvs: Option<PyReadonlyArray2<'_, f64>>,
+        colors: Option<PyReadonlyArray2<'_, f64>>,
         is_precise: bool,
     ) -> PyResult<Self> {
         check_width("vertices", &vertices, 3)?;
@@ -149,6 +185,15 @@ impl Geometry {
         if let Some(uvs) = &uvs {
             check_width("uvs", uvs, 2)?;
         }
+        if let Some(colors) = &colors {
+            check_width("colors", colors, 3)?;
+            if let Some(((vertex, _), found)) =
+                colors.as_array().indexed_iter().find(|(_, x)| !(**x >= 0.0 && x.is_finite()))
+            {
+                return Err(invalid(format!("colors of vertex {vertex} are no light (found {found})")));
+            }
+        }
+        let is_coloured = colors.is_some();
         let narrow = |numbers: Triple| Vec3::from(numbers.map(|x| x as f32));
         let mesh = MeshDesc {
             positions: places.iter().map(|place| place.as_vec3()).collect(),
@@ -156,76 +201,18 @@ impl Geometry {
             triangles,
             quads,
             normals: normals.map(|normals| rows(&normals.as_array(), narrow)),
+            colours: colors
+                .map(|colors| rows(&colors.as_array(), |colour: Triple| Rgb::from(colour.map(|x| x as f32)))),
             uvs: uvs.map(|uvs| rows(&uvs.as_array(), |uv: [f64; 2]| Vec2::from(uv.map(|x| x as f32)))),
             ..MeshDesc::default()
         };
-        Ok(Self(GeometryDesc::Mesh(Arc::new(mesh))))
-    }
-}
-
-/// The appearance of a surface.
-#[pyclass(frozen, module = "lumbre._lumbre")]
-pub(crate) struct Material(pub(crate) MaterialDesc);
-
-fn colour(name: &str, [r, g, b]: [f32; 3]) -> PyResult<Rgb> {
-    let is_light = |x: f32| x >= 0.0 && x.is_finite();
-    if is_light(r) && is_light(g) && is_light(b) {
-        return Ok(Rgb::new(r, g, b));
-    }
-    Err(invalid(format!("{name} is no colour (found {r}, {g}, {b}; expected finite numbers, 0 or greater)")))
-}
-
-fn share(name: &str, found: f32) -> PyResult<f32> {
-    if (0.0..=1.0).contains(&found) {
-        return Ok(found);
-    }
-    Err(invalid(format!("{name} is out of range (found {found}; expected 0 to 1)")))
-}
-
-#[pymethods]
-impl Material {
-    #[staticmethod]
-    fn diffuse(reflectance: [f32; 3]) -> PyResult<Self> {
-        Ok(Self(MaterialDesc::diffuse(colour("reflectance", reflectance)?)))
-    }
-
-    #[staticmethod]
-    fn metal(reflectance: [f32; 3], roughness: f32) -> PyResult<Self> {
-        let roughness = share("roughness", roughness)?;
-        Ok(Self(MaterialDesc::metal(colour("reflectance", reflectance)?, roughness)))
-    }
-
-    #[staticmethod]
-    fn glass(eta: f32) -> PyResult<Self> {
-        if eta > 0.0 && eta.is_finite() {
-            return Ok(Self(MaterialDesc::glass(eta)));
+        let shape = ShapeBuilder::mesh(mesh);
+        if !is_coloured {
+            return Ok(Self(shape));
         }
-        Err(invalid(format!("ior is out of range (found {eta}; expected a number above 0)")))
-    }
-
-    #[staticmethod]
-    fn principled(
-        base_color: [f32; 3],
-        metallic: f32,
-        roughness: f32,
-        transmission: f32,
-        clearcoat: f32,
-        ior: f32,
-    ) -> PyResult<Self> {
-        let number = |name, found| Ok::<_, PyErr>(Arc::new(Texture::Constant(share(name, found)?)));
-        if !(ior >= 1.0 && ior.is_finite()) {
-            return Err(invalid(format!("ior is out of range (found {ior}; expected 1 or more)")));
-        }
-        let params = PrincipledParams {
-            base_color: Arc::new(SpectrumTexture::Constant(colour("base_color", base_color)?)),
-            metallic: number("metallic", metallic)?,
-            roughness: number("roughness", roughness)?,
-            transmission: number("transmission", transmission)?,
-            clearcoat: number("clearcoat", clearcoat)?,
-            ior,
-            ..PrincipledParams::default()
-        };
-        Ok(Self(MaterialDesc::new(lumbre::shading::MaterialKind::Principled(Box::new(params)))))
+        // As a file of coloured vertices has it.
+        let reflectance = Arc::new(SpectrumTexture::Vertices);
+        Ok(Self(shape.material(MaterialDesc::new(MaterialKind::Diffuse { reflectance }))))
     }
 }
 
@@ -242,6 +229,34 @@ impl Light {
             return Err(invalid(format!("position is not finite (found {from})")));
         }
         Ok(Self(LightDesc::Point { from, intensity: colour("intensity", intensity)? }))
+    }
+
+    /// A cone of this half-angle in degrees, of which the outer part fades out.
+    #[staticmethod]
+    fn spot(
+        position: Triple,
+        target: Triple,
+        intensity: [f32; 3],
+        angle: f32,
+        falloff: f32,
+    ) -> PyResult<Self> {
+        let (from, target) = (DVec3::from(position), DVec3::from(target));
+        let along = (target - from).try_normalize();
+        let along = along.ok_or_else(|| invalid(format!("a light at {from} shines at no {target}")))?;
+        if !(0.0 < angle && angle <= 90.0 && 0.0 <= falloff && falloff <= angle) {
+            return Err(invalid(format!(
+                "angle and falloff are out of range (found {angle} and {falloff}; expected degrees to 90, and no more than angle)"
+            )));
+        }
+        let turn = lumbre::math::DQuat::from_rotation_arc(DVec3::Z, along);
+        let world_from_light =
+            Transform::from_scale_rotation_translation(DVec3::ONE, turn, from).map_err(invalid)?;
+        Ok(Self(LightDesc::Spot {
+            world_from_light,
+            intensity: colour("intensity", intensity)?,
+            cone_angle: angle,
+            cone_delta_angle: falloff,
+        }))
     }
 
     #[staticmethod]

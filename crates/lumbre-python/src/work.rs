@@ -101,3 +101,9 @@ pub(crate) fn interruptible<R: Send>(
 pub(crate) fn thread_count() -> PyResult<usize> {
     Ok(pool()?.current_num_threads())
 }
+
+/// Panics on a thread of the pool, which tests what becomes of that.
+#[pyfunction]
+pub(crate) fn panic_on_purpose(py: Python<'_>) -> PyResult<()> {
+    interruptible(py, |_| panic!("on purpose"), |_| Ok(()))
+}

@@ -100,11 +100,11 @@ def test_the_program_is_there_with_its_statuses(tmp_path) -> None:
     assert run("--version").stdout.startswith("lumbre ")
 
 
-def test_a_small_render_ends_when_it_is_done() -> None:
-    # Not when someone looks for Ctrl-C the next time, after 20 ms.
-    scene, least = lumbre.Scene([lumbre.Sphere()]), 1.0
-    for _ in range(200):
-        began = time.perf_counter()
-        scene.render(spp=1, size=(2, 3), threads=1)
-        least = min(least, time.perf_counter() - began)
-    assert least < 0.015
+def test_a_panic_is_an_exception_and_the_threads_work_on(mixed: lumbre.Scene) -> None:
+    origins, directions = random_rays(5003)
+    expected = mixed.cast(origins, directions).t
+    for _ in range(3):
+        with pytest.raises(BaseException, match="on purpose") as raised:
+            lumbre._lumbre.panic_on_purpose()
+        assert raised.typename == "PanicException" and not isinstance(raised.value, Exception)
+        np.testing.assert_array_equal(mixed.cast(origins, directions).t, expected)

@@ -7,8 +7,8 @@ use lumbre_image::Rgb;
 use lumbre_kernel::CustomGeometry;
 use lumbre_math::Transform;
 use lumbre_scene::{
-    AreaLightDesc, Camera, FilmDesc, GeometryDesc, InstanceDesc, IntegratorDesc, LightDesc, MaterialId,
-    MeshDesc, NamedMaterial, ObjectDesc, ObjectId, SamplerDesc, SceneDesc, ShapeDesc,
+    AreaLightDesc, Camera, CsgDesc, CsgOperation, FilmDesc, GeometryDesc, InstanceDesc, IntegratorDesc,
+    LightDesc, MaterialId, MeshDesc, NamedMaterial, ObjectDesc, ObjectId, SamplerDesc, SceneDesc, ShapeDesc,
 };
 use lumbre_shading::Material;
 
@@ -24,10 +24,16 @@ pub struct SceneBuilder {
 /// A shape with its material, before it is added to a scene.
 #[derive(Clone, Debug)]
 pub struct ShapeBuilder {
-    geometry: GeometryDesc,
+    form: Form,
     world_from_object: Transform,
     material: Option<Material>,
     light: Option<AreaLightDesc>,
+}
+
+#[derive(Clone, Debug)]
+enum Form {
+    Geometry(GeometryDesc),
+    Csg { operation: CsgOperation, operands: Vec<Vec<ShapeBuilder>> },
 }
 
 impl ShapeBuilder {
@@ -48,7 +54,31 @@ impl ShapeBuilder {
 
     /// A shape of any geometry, in its own space, grey.
     pub fn new(geometry: GeometryDesc) -> Self {
-        Self { geometry, world_from_object: Transform::IDENTITY, material: None, light: None }
+        Self::of(Form::Geometry(geometry))
+    }
+
+    /// Constructive solid geometry of two or more operands, each the union of its shapes. Shapes without a material or light take those of
+    /// the whole. In results, each shape counts in its place, and the whole has no number of its own.
+    ///
+    /// ```
+    /// use lumbre::description::CsgOperation;
+    /// use lumbre::geometry::{Cuboid, Sphere};
+    /// use lumbre::{DVec3, Ray, SceneBuilder, ShapeBuilder};
+    ///
+    /// let block = ShapeBuilder::exact(Cuboid::new(-2.0 * DVec3::ONE, 2.0 * DVec3::ONE)?);
+    /// let hole = ShapeBuilder::exact(Sphere::new(2.0 * DVec3::Z, 1.5)?);
+    /// let dented = ShapeBuilder::csg(CsgOperation::Difference, vec![vec![block], vec![hole]]);
+    /// let scene = SceneBuilder::new().shape(dented).build()?;
+    /// let hit = scene.closest(&Ray::new(5.0 * DVec3::Z, -DVec3::Z)).expect("the bottom of the dent is there");
+    /// assert_eq!((hit.t, hit.shape, hit.front), (4.5, 1, true));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn csg(operation: CsgOperation, operands: Vec<Vec<Self>>) -> Self {
+        Self::of(Form::Csg { operation, operands })
+    }
+
+    fn of(form: Form) -> Self {
+        Self { form, world_from_object: Transform::IDENTITY, material: None, light: None }
     }
 
     /// Sets the transform.
@@ -115,12 +145,30 @@ impl SceneBuilder {
 
     /// The description of a shape, with an index and a material of its own.
     fn described(&mut self, shape: ShapeBuilder) -> ShapeDesc {
-        let ShapeBuilder { geometry, world_from_object, material, light } = shape;
+        let ShapeBuilder { form, world_from_object, material, light } = shape;
+        // Every shape has a material, so that their numbers are the same; a CSG has those of its first shape.
         let id = MaterialId(self.desc.materials.len() as u32);
-        let material = Arc::new(material.unwrap_or_else(Material::default_diffuse));
-        self.desc.materials.push(NamedMaterial { name: None, material });
-        // Every shape has a material.
         let index = id.0;
+        let geometry = match form {
+            Form::Geometry(geometry) => {
+                let material = Arc::new(material.unwrap_or_else(Material::default_diffuse));
+                self.desc.materials.push(NamedMaterial { name: None, material });
+                geometry
+            }
+            Form::Csg { operation, operands } => {
+                let mut part = |shape: ShapeBuilder| {
+                    self.described(ShapeBuilder {
+                        material: shape.material.or_else(|| material.clone()),
+                        light: shape.light.or_else(|| light.clone()),
+                        ..shape
+                    })
+                };
+                let operands = operands.into_iter();
+                let operands = operands.map(|shapes| Arc::new(shapes.into_iter().map(&mut part).collect()));
+                GeometryDesc::Csg(CsgDesc { operation, operands: operands.collect() })
+            }
+        };
+        let light = if matches!(geometry, GeometryDesc::Csg(_)) { None } else { light };
         ShapeDesc {
             index,
             geometry,

@@ -41,6 +41,11 @@ impl Picture {
         Self { background: Some(background), ..self }
     }
 
+    /// The picture over its background, as light: what formats of light have of it.
+    pub fn lit(&self) -> Cow<'_, Image> {
+        self.shown(None, &SaveOptions::default()).0
+    }
+
     /// Takes the noise out of the picture by Lumbre's own filter ([`lumbre_render::denoise`()]) on so many threads, 0 for one a core; the
     /// same for any number. It keeps the noisy picture, which an .exr shows in channels of its own: `noisy.R` and so on.
     ///

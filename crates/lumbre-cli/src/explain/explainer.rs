@@ -6,25 +6,26 @@ use lumbre_viewer::Explain;
 
 use super::question::Question;
 use super::things::Things;
-use super::{Language, html, title};
+use super::{html, texts, title};
+use crate::language::Language;
 
 /// Tells of the pixels of one scene.
 #[derive(Debug)]
-pub(crate) struct Explainer {
+pub struct Explainer {
     name: String,
     things: Things,
 }
 
 impl Explainer {
     /// Of a scene with its name, as it is described before it is set on its stage.
-    pub(crate) fn new(desc: &SceneDesc, name: String) -> Self {
+    pub fn new(desc: &SceneDesc, name: String) -> Self {
         Self { name, things: Things::of(desc) }
     }
 }
 
 impl Explain for Explainer {
     fn languages(&self) -> Vec<(&'static str, &'static str)> {
-        let languages = Language::value_variants().iter().map(|language| language.texts());
+        let languages = Language::value_variants().iter().map(|language| texts(*language));
         languages.map(|texts| (texts.code, texts.language)).collect()
     }
 
@@ -35,7 +36,7 @@ impl Explain for Explainer {
         pixel: (u32, u32),
         language: &str,
     ) -> Result<String, String> {
-        let texts = Language::from_str(language, false)?.texts();
+        let texts = texts(Language::from_str(language, false)?);
         let question = Question { things: &self.things, texts, sample: 0, depth: 0, nearest: false };
         let sections = question.of_pixel(scene, options, pixel).map_err(|failure| failure.to_string())?;
         Ok(html::html(&title(&self.name, Some(pixel), texts), texts.code, &sections, texts.schoolbook))

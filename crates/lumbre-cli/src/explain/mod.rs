@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use lumbre::description::IntegratorKind;
 use lumbre::formats::atomic_write;
-use lumbre::{DVec3, Ray};
+use lumbre::{DVec3, Ray, RenderOptions, Scene};
 use serde_json::json;
 
 use crate::failure::{Failure, print};
-use crate::language::LanguageArguments;
+use crate::language::Language;
 use crate::names::one_of;
 use crate::output::Inputs;
 use crate::reading::{ReadingArguments, print_warnings};
@@ -38,10 +38,11 @@ mod writing;
 
 use document::Section;
 use english::ENGLISH;
-pub(crate) use explainer::Explainer;
+pub use explainer::Explainer;
 use question::Question;
 use spanish::SPANISH;
-use things::Things;
+use texts::Texts;
+pub use things::Things;
 
 /// Tells how the colour of a pixel, or the light along a ray, comes about: the camera and its ray, every surface on the way with the
 /// equation of its crossings, normals, lights and shadows, and the path of one sample, with all numbers as the render computes them.
@@ -58,29 +59,8 @@ pub(crate) struct Arguments {
     /// The scene: .pbrt, .gltf, .glb, .obj, .ply or .stl, also packed by gzip. Several are put into the same world.
     #[arg(required = true, value_name = "SCENE")]
     scene: Vec<PathBuf>,
-    /// The pixel, from 0,0 in the upper left corner.
-    #[arg(long, value_name = "X,Y", value_parser = pixel, required_unless_present = "ray")]
-    pixel: Option<(u32, u32)>,
-    /// A ray instead: its origin and its direction, of any length but 0; then, where it is not 0 to infinity, its range of t.
-    #[arg(long, value_name = "OX,OY,OZ,DX,DY,DZ[,TMIN,TMAX]", allow_hyphen_values = true, value_parser = ray, conflicts_with = "pixel")]
-    ray: Option<Ray>,
-    /// What it is written as.
-    #[arg(long, value_enum, value_name = "FORMAT", default_value_t = Format::Text)]
-    format: Format,
     #[command(flatten)]
-    language: LanguageArguments,
-    /// Tell the crossings of so many of the rays that follow, too.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    depth: u32,
-    /// The number of the sample: the radiance is that which a render adds to the pixel for it.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    sample: u32,
-    /// Tell only the surface that is seen, not those behind it.
-    #[arg(long)]
-    nearest: bool,
-    /// Tell only the sections with these keys, as JSON names them: camera, equation, Quadratic, hit, transform, light, radiance, …
-    #[arg(long, value_name = "KEY,…", value_delimiter = ',')]
-    only: Vec<String>,
+    request: Request,
     /// Write to this file.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -107,9 +87,38 @@ pub(crate) struct Arguments {
     reading: ReadingArguments,
 }
 
+/// What is to be explained, and how that is told.
+#[derive(Args, Clone, Debug)]
+pub struct Request {
+    /// The pixel, from 0,0 in the upper left corner.
+    #[arg(long, value_name = "X,Y", value_parser = pixel, required_unless_present = "ray")]
+    pub pixel: Option<(u32, u32)>,
+    /// A ray instead: its origin and its direction, of any length but 0; then, where it is not 0 to infinity, its range of t.
+    #[arg(long, value_name = "OX,OY,OZ,DX,DY,DZ[,TMIN,TMAX]", allow_hyphen_values = true, value_parser = ray, conflicts_with = "pixel")]
+    pub ray: Option<Ray>,
+    /// What it is written as.
+    #[arg(long, value_enum, value_name = "FORMAT", default_value_t = Format::Text)]
+    pub format: Format,
+    /// The language: English or Spanish.
+    #[arg(long, value_enum, value_name = "LANGUAGE", default_value_t = Language::En)]
+    pub lang: Language,
+    /// Tell the crossings of so many of the rays that follow, too.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub depth: u32,
+    /// The number of the sample: the radiance is that which a render adds to the pixel for it.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub sample: u32,
+    /// Tell only the surface that is seen, not those behind it.
+    #[arg(long)]
+    pub nearest: bool,
+    /// Tell only the sections with these keys, as JSON names them: camera, equation, Quadratic, hit, transform, light, radiance, …
+    #[arg(long, value_name = "KEY,…", value_delimiter = ',')]
+    pub only: Vec<String>,
+}
+
 /// What an explanation is written as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Format {
+pub enum Format {
     /// Plain text.
     Text,
     /// Markdown, with formulas in LaTeX.
@@ -118,6 +127,21 @@ enum Format {
     Html,
     /// For programs.
     Json,
+}
+
+impl Format {
+    /// The names.
+    pub const NAMES: [&'static str; 4] = ["text", "markdown", "html", "json"];
+
+    /// The format of a name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        clap::ValueEnum::from_str(name, false).ok()
+    }
+}
+
+/// The sentences of a language.
+fn texts(language: Language) -> &'static Texts {
+    language.choose(&ENGLISH, &SPANISH)
 }
 
 fn pixel(text: &str) -> Result<(u32, u32), String> {
@@ -173,11 +197,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         print_warnings(&diagnostics);
         print_warnings(&shown.diagnostics);
     }
-    let mut sections = told(arguments, shown, &things)?;
-    if !arguments.only.is_empty() {
-        sections = only(sections, &arguments.only)?;
-    }
-    let written = written(arguments, name, &sections);
+    let Shown { scene, mut options, .. } = shown;
+    options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
+    let written = explain(&scene, &options, &things, name, &arguments.request)?;
     match &arguments.output {
         None => print(&written),
         Some(path) => {
@@ -186,15 +208,35 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-fn told(arguments: &Arguments, shown: Shown, things: &Things) -> Result<Vec<Section>, Failure> {
-    let texts = arguments.language.choose(&ENGLISH, &SPANISH);
-    let Shown { scene, mut options, .. } = shown;
-    options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
-    let &Arguments { sample, depth, nearest, .. } = arguments;
-    let question = Question { things, texts, sample, depth, nearest };
-    let Some((x, y)) = arguments.pixel else {
-        let ray = arguments.ray.unwrap_or(Ray::new(DVec3::ZERO, DVec3::Z));
-        return question.of_ray(&scene, &options, &ray);
+/// Explains a pixel of a scene's picture, or the light along a ray in it.
+///
+/// # Errors
+/// [`Failure::Usage`] for a pixel outside of the picture, and for options that make no picture.
+pub fn explain(
+    scene: &Scene,
+    options: &RenderOptions,
+    things: &Things,
+    name: &Path,
+    request: &Request,
+) -> Result<String, Failure> {
+    let mut sections = told(request, scene, options, things)?;
+    if !request.only.is_empty() {
+        sections = only(sections, &request.only)?;
+    }
+    Ok(written(request, name, &sections))
+}
+
+fn told(
+    request: &Request,
+    scene: &Scene,
+    options: &RenderOptions,
+    things: &Things,
+) -> Result<Vec<Section>, Failure> {
+    let &Request { sample, depth, nearest, .. } = request;
+    let question = Question { things, texts: texts(request.lang), sample, depth, nearest };
+    let Some((x, y)) = request.pixel else {
+        let ray = request.ray.unwrap_or(Ray::new(DVec3::ZERO, DVec3::Z));
+        return question.of_ray(scene, options, &ray);
     };
     let (width, height) = (options.width, options.height);
     if x >= width || y >= height {
@@ -202,7 +244,7 @@ fn told(arguments: &Arguments, shown: Shown, things: &Things) -> Result<Vec<Sect
             "--pixel {x},{y}: outside of the picture (expected less than {width},{height}; --size gives another)"
         )));
     }
-    question.of_pixel(&scene, &options, (x, y))
+    question.of_pixel(scene, options, (x, y))
 }
 
 /// The sections with these keys, each with all below it.
@@ -218,12 +260,12 @@ fn only(sections: Vec<Section>, keys: &[String]) -> Result<Vec<Section>, Failure
     }
 }
 
-fn written(arguments: &Arguments, name: &Path, sections: &[Section]) -> String {
-    let texts = arguments.language.choose(&ENGLISH, &SPANISH);
+fn written(request: &Request, name: &Path, sections: &[Section]) -> String {
+    let texts = texts(request.lang);
     let name = name.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let title = title(&name, arguments.pixel, texts);
-    match arguments.format {
-        Format::Text => writing::text(sections, arguments.only.is_empty(), texts.schoolbook),
+    let title = title(&name, request.pixel, texts);
+    match request.format {
+        Format::Text => writing::text(sections, request.only.is_empty(), texts.schoolbook),
         Format::Markdown => format!("# {title}\n\n{}", writing::markdown(sections, texts.schoolbook)),
         Format::Html => html::html(&title, texts.code, sections, texts.schoolbook),
         Format::Json => {

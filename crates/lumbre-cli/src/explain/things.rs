@@ -3,10 +3,11 @@
 use std::collections::HashMap;
 
 use lumbre::SceneDesc;
+use lumbre::description::{GeometryDesc, ShapeDesc};
 
 /// The shapes of a file by their number, and the materials.
 #[derive(Debug, Default)]
-pub(super) struct Things {
+pub struct Things {
     shapes: HashMap<u32, Thing>,
     materials: Vec<Substance>,
 }
@@ -32,7 +33,7 @@ pub(super) struct Substance {
 
 impl Things {
     /// Of a description.
-    pub(super) fn of(desc: &SceneDesc) -> Self {
+    pub fn of(desc: &SceneDesc) -> Self {
         let mut by_owner: HashMap<String, Vec<Parameter>> = HashMap::new();
         for parameter in lumbre::parameters(desc) {
             let owner = parameter.path.strip_suffix(&parameter.name).unwrap_or_default().to_owned();
@@ -45,13 +46,17 @@ impl Things {
         });
         let materials = materials.collect();
         let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);
-        let shapes = desc.shapes.iter().chain(in_objects).map(|shape| {
-            (
-                shape.index,
-                Thing { kind: shape.geometry.name(), material: shape.material.map(|id| id.0 as usize) },
-            )
-        });
-        Self { shapes: shapes.collect(), materials }
+        let mut open: Vec<&ShapeDesc> = desc.shapes.iter().chain(in_objects).collect();
+        let mut shapes = HashMap::new();
+        while let Some(shape) = open.pop() {
+            if let GeometryDesc::Csg(csg) = &shape.geometry {
+                // A hit is on a shape of an operand, which comes later: the number may be that of the first of them.
+                open.extend(csg.operands.iter().flat_map(|operand| &**operand));
+            }
+            let material = shape.material.map(|id| id.0 as usize);
+            shapes.insert(shape.index, Thing { kind: shape.geometry.name(), material });
+        }
+        Self { shapes, materials }
     }
 
     /// What kind of shape has this number, in the words of the scene language; the ground is of no file.

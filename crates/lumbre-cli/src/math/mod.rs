@@ -8,7 +8,7 @@ use lumbre::formats::diagnostic::{Diagnostic, Place, quoted};
 use serde_json::json;
 
 use crate::failure::{Failure, print};
-use crate::language::{LanguageArguments, filled};
+use crate::language::{Language, filled};
 
 mod cameras;
 mod english;
@@ -59,8 +59,9 @@ pub(crate) struct Arguments {
     /// Print each result with its steps as one line of JSON.
     #[arg(long)]
     json: bool,
-    #[command(flatten)]
-    language: LanguageArguments,
+    /// The language: English or Spanish.
+    #[arg(long, value_enum, value_name = "LANGUAGE", default_value_t = Language::En)]
+    lang: Language,
 }
 
 /// Puts a space before what begins with a single minus: it is part of an expression and no option.
@@ -80,7 +81,7 @@ pub(crate) fn with_negative_expressions(mut words: Vec<OsString>) -> Vec<OsStrin
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let texts = arguments.language.choose(&ENGLISH, &SPANISH);
+    let texts = arguments.lang.choose(&ENGLISH, &SPANISH);
     let mut session = Session::new(texts);
     let form = if arguments.json { Form::Json } else { Form::Text };
     if let Some(path) = &arguments.file {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -23,15 +23,107 @@ def colour(name: str, value: float | Iterable[float]) -> Colour:
     return triple(name, value)
 
 
-@dataclass(frozen=True)
-class Material:
-    """The appearance of a surface: one of Diffuse, Metal, Glass and Principled. Wrong numbers raise `LumbreError` at once."""
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """An image on a surface, by its texture coordinates.
+
+    Parameters
+    ----------
+    image : (h, w), or (h, w, 1 to 4) array
+        The first row is at the top, where v is 1. Of any kind of numbers; uint8 and uint16 stand for 0 to 1.
+    encoding : "auto", "srgb" or "linear"
+        How uint8 and uint16 are meant; "auto" takes them for sRGB where they are a colour, and for linear where they are a number or a
+        normal. Floats are linear.
+    wrap : "repeat", "clamp", "black" or "mirror"
+        What is beyond the edges.
+    filter : "nearest", "bilinear", "trilinear" or "ewa"
+    scale, offset : pairs
+        (u, v) times scale, plus offset, is where the image is looked up.
+
+    Where a number is looked for in colours, it is their mean, or their alpha where that is not 1 everywhere.
+
+    >>> checks = Texture(np.indices((4, 4)).sum(axis=0) % 2, scale=(3, 3), filter="nearest")
+    >>> Diffuse(checks).reflectance.image.shape
+    (4, 4)
+    """
+
+    image: npt.ArrayLike
+    encoding: str = "auto"
+    wrap: str = "repeat"
+    filter: str = "bilinear"
+    scale: tuple[float, float] = (1.0, 1.0)
+    offset: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "image", np.asarray(self.image))
+        self._native(True)
+
+    def _native(self, is_colour: bool) -> _lumbre.Texture:
+        texels = np.asarray(self.image)
+        if self.encoding not in ("auto", "srgb", "linear"):
+            raise LumbreError(f'encoding is unknown (found "{self.encoding}"; expected auto, srgb, linear)')
+        is_whole = texels.dtype in (np.uint8, np.uint16)
+        if texels.dtype.kind not in "fiub":
+            raise LumbreError(f"a texture is of the wrong kind (found {texels.dtype}; expected real numbers)")
+        if texels.ndim not in (2, 3):
+            raise LumbreError(f"a texture has the wrong shape (found {texels.shape}; expected (h, w) or (h, w, 1 to 4))")
+        if not is_whole:
+            texels = texels.astype(np.float32, copy=False)
+            if not np.isfinite(texels).all():
+                raise LumbreError("a texture has numbers that are not finite")
+        is_srgb = self.encoding == "srgb" or (self.encoding == "auto" and is_whole and is_colour)
+        table = texels if texels.ndim == 3 else texels[..., None]
+        return _lumbre.Texture(table, is_srgb, self.wrap, self.filter, self.scale, self.offset)
+
+
+def _textured(value: Any) -> Any:
+    """Arrays of two and three axes as textures, all else as it is."""
+    return Texture(value) if isinstance(value, np.ndarray) and value.ndim > 1 else value
+
+
+def _colour_map(name: str, value: Any) -> _lumbre.Texture | Colour:
+    return value._native(True) if isinstance(value, Texture) else colour(name, value)
+
+
+def _number_map(name: str, value: Any) -> _lumbre.Texture | float:
+    if isinstance(value, Texture):
+        return value._native(False)
+    try:
+        return float(value)
+    except (TypeError, ValueError) as error:
+        raise LumbreError(f"{name} is no number (found {value!r}; expected a number, a Texture or an (h, w) array)") from error
+
+
+ColourMap = float | Iterable[float] | Texture | npt.NDArray[Any]
+NumberMap = float | Texture | npt.NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Material:
+    """The appearance of a surface: one of Diffuse, Metal, Glass, ThinGlass, Coated, Translucent, Principled and Mix.
+
+    Parameters are numbers; colours are numbers or (r, g, b), linear. Each that is a colour, and each that may differ from place to place
+    (said by its type), may be a `Texture` or an array of one, (h, w) or (h, w, 3). `normal_map` is an image of normals in tangent space,
+    as in glTF, and `bump_map` one of heights. Wrong numbers raise `LumbreError` at once.
+    """
+
+    normal_map: Texture | npt.NDArray[Any] | None = field(default=None, kw_only=True)
+    bump_map: Texture | npt.NDArray[Any] | None = field(default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            object.__setattr__(self, name, _textured(value))
         self._native()
 
     def _native(self) -> _lumbre.Material:
-        raise LumbreError("a material is one of Diffuse, Metal, Glass and Principled")
+        maps = [None if map is None else _number_map("a map", map) for map in (self.normal_map, self.bump_map)]
+        if any(isinstance(map, float) for map in maps):
+            raise LumbreError("a map is no image (expected a Texture or an array)")
+        normals, heights = (map for map in maps if not isinstance(map, float))
+        return self._kind().tilted(normals, heights)
+
+    def _kind(self) -> _lumbre.Material:
+        raise LumbreError("a material is one of Diffuse, Metal, Glass, ThinGlass, Coated, Translucent, Principled and Mix")
 
 
 @dataclass(frozen=True)
@@ -42,10 +134,10 @@ class Diffuse(Material):
     (0.8, 0.3, 0.1)
     """
 
-    reflectance: float | Iterable[float] = 0.5
+    reflectance: ColourMap = 0.5
 
-    def _native(self) -> _lumbre.Material:
-        return _lumbre.Material.diffuse(colour("reflectance", self.reflectance))
+    def _kind(self) -> _lumbre.Material:
+        return _lumbre.Material.diffuse(_colour_map("reflectance", self.reflectance))
 
 
 @dataclass(frozen=True)
@@ -56,62 +148,144 @@ class Metal(Material):
     0.1
     """
 
-    reflectance: float | Iterable[float] = 0.9
-    roughness: float = 0.0
+    reflectance: ColourMap = 0.9
+    roughness: NumberMap = 0.0
 
-    def _native(self) -> _lumbre.Material:
-        return _lumbre.Material.metal(colour("reflectance", self.reflectance), self.roughness)
+    def _kind(self) -> _lumbre.Material:
+        return _lumbre.Material.metal(_colour_map("reflectance", self.reflectance), _number_map("roughness", self.roughness))
 
 
 @dataclass(frozen=True)
 class Glass(Material):
-    """Smooth, clear glass of an index of refraction.
+    """Clear glass of an index of refraction, smooth or rough: what a closed body is made of.
 
     >>> Glass(1.33).ior
     1.33
     """
 
     ior: float = 1.5
+    roughness: NumberMap = 0.0
 
-    def _native(self) -> _lumbre.Material:
-        return _lumbre.Material.glass(self.ior)
+    def _kind(self) -> _lumbre.Material:
+        return _lumbre.Material.glass(self.ior, _number_map("roughness", self.roughness))
+
+
+@dataclass(frozen=True)
+class ThinGlass(Material):
+    """A clear pane without thickness: what a single surface is made of.
+
+    >>> ThinGlass().ior
+    1.5
+    """
+
+    ior: float = 1.5
+
+    def _kind(self) -> _lumbre.Material:
+        return _lumbre.Material.pane(self.ior)
+
+
+@dataclass(frozen=True)
+class Coated(Material):
+    """Matt under a clear coat, as plastic and varnished wood; roughness is that of the coat.
+
+    >>> Coated((0.1, 0.3, 0.6), roughness=0.1).ior
+    1.5
+    """
+
+    reflectance: ColourMap = 0.5
+    roughness: NumberMap = 0.0
+    ior: float = 1.5
+
+    def _kind(self) -> _lumbre.Material:
+        reflectance, roughness = _colour_map("reflectance", self.reflectance), _number_map("roughness", self.roughness)
+        return _lumbre.Material.coated(reflectance, roughness, self.ior)
+
+
+@dataclass(frozen=True)
+class Translucent(Material):
+    """Matt on both sides, with light that comes through, as paper and leaves.
+
+    >>> Translucent(0.4, transmittance=(0.2, 0.4, 0.1)).reflectance
+    0.4
+    """
+
+    reflectance: ColourMap = 0.25
+    transmittance: ColourMap = 0.25
+
+    def _kind(self) -> _lumbre.Material:
+        reflectance = _colour_map("reflectance", self.reflectance)
+        return _lumbre.Material.translucent(reflectance, _colour_map("transmittance", self.transmittance))
 
 
 @dataclass(frozen=True)
 class Principled(Material):
-    """What most things are made of, by the parameters of glTF: all in [0, 1] but for `ior`, 1 or more.
+    """What most things are made of, by the parameters of glTF: all in [0, 1] but for `ior`, 1 or more, and `attenuation_distance`.
+
+    Where it transmits, it is a thin pane, unless it has an `attenuation_distance`: then it is a body, in which light has
+    `attenuation_color` left after that distance; `math.inf` is a clear one.
 
     >>> Principled((0.1, 0.2, 0.8), roughness=0.3).metallic
     0.0
     """
 
-    base_color: float | Iterable[float] = 0.8
-    metallic: float = 0.0
-    roughness: float = 0.5
-    transmission: float = 0.0
-    clearcoat: float = 0.0
+    base_color: ColourMap = 0.8
+    metallic: NumberMap = 0.0
+    roughness: NumberMap = 0.5
+    transmission: NumberMap = 0.0
+    clearcoat: NumberMap = 0.0
     ior: float = 1.5
+    clearcoat_roughness: NumberMap = 0.0
+    sheen_color: ColourMap = 0.0
+    sheen_roughness: NumberMap = 0.0
+    specular: NumberMap = 1.0
+    specular_color: ColourMap = 1.0
+    attenuation_color: float | Iterable[float] = 1.0
+    attenuation_distance: float | None = None
 
-    def _native(self) -> _lumbre.Material:
+    def _kind(self) -> _lumbre.Material:
+        distance = self.attenuation_distance
+        attenuation = None if distance is None else (colour("attenuation_color", self.attenuation_color), distance)
         return _lumbre.Material.principled(
-            colour("base_color", self.base_color),
-            self.metallic,
-            self.roughness,
-            self.transmission,
-            self.clearcoat,
+            _colour_map("base_color", self.base_color),
+            _number_map("metallic", self.metallic),
+            _number_map("roughness", self.roughness),
+            _number_map("transmission", self.transmission),
+            _number_map("clearcoat", self.clearcoat),
+            _number_map("clearcoat_roughness", self.clearcoat_roughness),
+            _colour_map("sheen_color", self.sheen_color),
+            _number_map("sheen_roughness", self.sheen_roughness),
+            _number_map("specular", self.specular),
+            _colour_map("specular_color", self.specular_color),
             self.ior,
+            attenuation,
         )
 
 
 @dataclass(frozen=True)
+class Mix(Material):
+    """One material or another from place to place: `amount` is the share of the second.
+
+    >>> Mix(Diffuse(0.8), Metal(0.9), np.eye(2)).amount.image.shape
+    (2, 2)
+    """
+
+    first: Material = Diffuse()
+    second: Material = Metal()
+    amount: NumberMap = 0.5
+
+    def _kind(self) -> _lumbre.Material:
+        return _lumbre.Material.mix(self.first._native(), self.second._native(), _number_map("amount", self.amount))
+
+
+@dataclass(frozen=True)
 class Light:
-    """A light other than a shape: one of PointLight, DistantLight and EnvironmentLight."""
+    """A light other than a shape: one of PointLight, SpotLight, DistantLight and EnvironmentLight."""
 
     def __post_init__(self) -> None:
         self._native()
 
     def _native(self) -> _lumbre.Light:
-        raise LumbreError("a light is one of PointLight, DistantLight and EnvironmentLight")
+        raise LumbreError("a light is one of PointLight, SpotLight, DistantLight and EnvironmentLight")
 
 
 @dataclass(frozen=True)
@@ -128,6 +302,26 @@ class PointLight(Light):
     def _native(self) -> _lumbre.Light:
         position = triple("position", self.position)
         return _lumbre.Light.point(position, colour("intensity", self.intensity))
+
+
+@dataclass(frozen=True)
+class SpotLight(Light):
+    """A cone of light from `position` towards `target`: of this radiant intensity along its axis, `angle` degrees wide to each side, of
+    which the outer `falloff` degrees fade out.
+
+    >>> SpotLight((0, 0, 5), intensity=100, angle=20).falloff
+    5.0
+    """
+
+    position: Iterable[float]
+    target: Iterable[float] = (0.0, 0.0, 0.0)
+    intensity: float | Iterable[float] = 1.0
+    angle: float = 30.0
+    falloff: float = 5.0
+
+    def _native(self) -> _lumbre.Light:
+        position, target = triple("position", self.position), triple("target", self.target)
+        return _lumbre.Light.spot(position, target, colour("intensity", self.intensity), self.angle, self.falloff)
 
 
 @dataclass(frozen=True)

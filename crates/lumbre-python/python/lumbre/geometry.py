@@ -30,9 +30,11 @@ class Shape:
     transform : (4, 4) array, optional
         The place: world from object, with the translation in the last column.
     material : Material, optional
-        The appearance in pictures; by default matt and grey.
+        The appearance in pictures; by default matt and grey, or that of the CSG that it is a part of.
     emission : colour, optional
         Radiance that its front emits, as a number or (r, g, b).
+
+    Solids are combined by `a | b`, `a & b` and `a - b`: see `Union`, `Intersection` and `Difference`.
     """
 
     transform: npt.ArrayLike | None = field(default=None, kw_only=True)
@@ -61,6 +63,15 @@ class Shape:
     def _native(self) -> _lumbre._Placed:
         geometry, place, light = self.__dict__["_made"]
         return geometry, place, None if self.material is None else self.material._native(), light
+
+    def __or__(self, other: Shape) -> Union:
+        return Union(self, other)
+
+    def __and__(self, other: Shape) -> Intersection:
+        return Intersection(self, other)
+
+    def __sub__(self, other: Shape) -> Difference:
+        return Difference(self, other)
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name != "_made"}
@@ -307,7 +318,9 @@ class Mesh(Shape):
     normals : (V, 3) array, optional
         Shading normals, for pictures.
     uvs : (V, 2) array, optional
-        Texture coordinates, for pictures and `Hits.uv`.
+        Texture coordinates, for pictures and `Hits.uv`; v goes up from the bottom row of an image.
+    colors : (V, 3) array, optional
+        Linear colours, which it has where it has no material.
     precision : "auto", "single" or "double"
         "single" rounds float64 vertices, which halves the memory and is faster; "auto" goes by what `vertices` are.
 
@@ -323,6 +336,7 @@ class Mesh(Shape):
     faces: Array
     normals: Array | None = None
     uvs: Array | None = None
+    colors: Array | None = None
     precision: str = "auto"
 
     def __init__(
@@ -333,13 +347,14 @@ class Mesh(Shape):
         uvs: npt.ArrayLike | None = None,
         precision: str = "auto",
         *,
+        colors: npt.ArrayLike | None = None,
         transform: npt.ArrayLike | None = None,
         material: Material | None = None,
         emission: float | Colour | None = None,
     ) -> None:
         if precision not in ("auto", "single", "double"):
             raise LumbreError(f'precision is unknown (found "{precision}"; expected auto, single, double)')
-        tables = {"vertices": vertices, "normals": normals, "uvs": uvs}
+        tables = {"vertices": vertices, "normals": normals, "uvs": uvs, "colors": colors}
         given: dict[str, Any] = {name: None if table is None else _table(name, table) for name, table in tables.items()}
         corners = np.asarray(faces)
         if corners.size == 0 and corners.ndim != 2:
@@ -364,7 +379,8 @@ class Mesh(Shape):
             with np.errstate(over="ignore"):
                 is_precise = not np.array_equal(vertices.astype(np.float32), vertices, equal_nan=True)
         faces = self.faces.astype(np.int64, copy=False)
-        return _lumbre.Geometry.mesh(vertices, faces, double(self.normals), double(self.uvs), is_precise)
+        tables = double(self.normals), double(self.uvs), double(self.colors)
+        return _lumbre.Geometry.mesh(vertices, faces, *tables, is_precise)
 
     def __repr__(self) -> str:
         return f"Mesh({len(self.vertices)} vertices, {len(self.faces)} faces)"
@@ -377,6 +393,86 @@ def _table(name: str, value: npt.ArrayLike) -> Array:
     if array.ndim != 2:
         raise LumbreError(f"{name} has the wrong shape (found {array.shape}; expected two axes)")
     return array
+
+
+class _Csg(Shape):
+    """Operands, each a solid, or several whose union it is."""
+
+    operands: tuple[Shape | Sequence[Shape], ...]
+    _operation = ""
+
+    def __init__(
+        self,
+        *operands: Shape | Sequence[Shape],
+        transform: npt.ArrayLike | None = None,
+        material: Material | None = None,
+        emission: float | Colour | None = None,
+    ) -> None:
+        name = type(self).__name__
+        if len(operands) < 2:
+            raise LumbreError(f"{name} has too few operands (found {len(operands)}; expected two or more)")
+        for operand in operands:
+            for shape in operand if isinstance(operand, (list, tuple)) else [operand]:
+                if not isinstance(shape, Shape):
+                    raise LumbreError(f"an operand of {name} is no shape: {shape!r}")
+        kept = tuple(operand if isinstance(operand, Shape) else tuple(operand) for operand in operands)
+        given = {"operands": kept, "transform": transform, "material": material, "emission": emission}
+        for field_name, value in given.items():
+            object.__setattr__(self, field_name, value)
+        self.__post_init__()
+
+    def _geometry(self) -> _lumbre.Geometry:
+        operands = [[shape._native() for shape in _listed(operand)] for operand in self.operands]
+        return _lumbre.Geometry.csg(self._operation, operands)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(map(repr, self.operands))})"
+
+
+def _listed(operand: Shape | Sequence[Shape]) -> Sequence[Shape]:
+    return [operand] if isinstance(operand, Shape) else operand
+
+
+class Union(_Csg):
+    """What is in any of two or more solids, without the surfaces inside: `a | b`.
+
+    Solids are closed shapes, closed meshes, half-spaces below a `Plane`, quadrics, and unions, intersections and differences of these;
+    an operand may also be a list, and is the union of its shapes then. Each surface keeps its material and its own number in
+    `Hits.shape`, which counts shapes in the order in which they are written; the whole has none. `transform`, `material` and
+    `emission` are as of every shape; the last two are for operands that have none of their own. What is no solid is refused by `Scene`.
+
+    >>> import lumbre
+    >>> both = Sphere(radius=2) | Sphere(center=(3, 0, 0), radius=2)
+    >>> int(lumbre.Scene(both).count([[-5.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]])[0])
+    2
+    """
+
+    _operation = "union"
+
+
+class Intersection(_Csg):
+    """What is in all of two or more solids: `a & b`. Arguments as for `Union`.
+
+    >>> import lumbre
+    >>> lens = Sphere(center=(0, 0, -2), radius=3) & Sphere(center=(0, 0, 2), radius=3)
+    >>> lumbre.Scene(lens).bounds[:, 2].round(6).tolist()
+    [-1.0, 1.0]
+    """
+
+    _operation = "intersection"
+
+
+class Difference(_Csg):
+    """What is in the first of two or more solids and in no other: `a - b`. Arguments as for `Union`.
+
+    >>> import lumbre
+    >>> pipe = Cylinder(p1=(0, 0, 4), radius=2) - Cylinder(p0=(0, 0, -1), p1=(0, 0, 5), radius=1.5)
+    >>> hits = lumbre.Scene(pipe).cast_all([[-5.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    >>> hits.t.tolist(), hits.shape.tolist()
+    ([3.0, 3.5, 6.5, 7.0], [0, 1, 1, 0])
+    """
+
+    _operation = "difference"
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,7 +35,7 @@ class Image:
 
     @cached_property
     def alpha(self) -> npt.NDArray[np.float32] | None:
-        """Coverage in [0, 1], (h, w), of a transparent picture, else None."""
+        """Coverage in [0, 1], (h, w), of a picture that was rendered with `transparent`, else None."""
         return self._native.alpha()
 
     @property
@@ -64,11 +64,11 @@ class Image:
         path: str | os.PathLike[str],
         *,
         layers: Sequence[str] = (),
-        tonemap: str = "none",
-        exposure: float = 0.0,
+        tonemap: str | None = None,
+        exposure: float | None = None,
         depth: int = 8,
         quality: int = 95,
-        precision: str = "half",
+        precision: str | None = None,
     ) -> None:
         """Writes a file by its extension: .exr, .png, .hdr, .pfm or .jpg. The path holds the old file or the whole new one.
 
@@ -76,16 +76,18 @@ class Image:
         ----------
         layers : features to write beside the picture, in an .exr
         tonemap : none, agx, aces or neutral, for .png and .jpg; exposure is in stops before it
+            By default as the program has them: neutral in the light of its studio, else none; and no stops, unless the lights of a glTF
+            would make its picture white or black.
         depth : 8 or 16 bits, of a .png
         quality : 1 to 100, of a .jpg
-        precision : half or float, of an .exr
+        precision : half or float, of an .exr; by default what the scene says, else half
 
         Raises `LumbreError` for options out of range, and `OSError` for a file that cannot be written.
         """
         self._native.save(os.fspath(path), list(layers), tonemap, exposure, depth, quality, precision)
 
-    def png(self, *, tonemap: str = "none", exposure: float = 0.0) -> bytes:
-        """The bytes of a .png."""
+    def png(self, *, tonemap: str | None = None, exposure: float | None = None) -> bytes:
+        """The bytes of a .png; options as of `save`."""
         return self._native.png(tonemap, exposure)
 
     def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> npt.NDArray[Any]:
@@ -101,7 +103,7 @@ class Image:
         return f"<lumbre.Image {width} x {height}, {self.stats['spp']} samples a pixel>"
 
     def _repr_png_(self) -> bytes:
-        return self.png(tonemap="neutral")
+        return self.png()
 
 
 def read_image(path: str | os.PathLike[str]) -> npt.NDArray[np.float32]:
@@ -114,7 +116,9 @@ def read_image(path: str | os.PathLike[str]) -> npt.NDArray[np.float32]:
 
 
 def write_image(path: str | os.PathLike[str], pixels: npt.ArrayLike, *, tonemap: str = "none", exposure: float = 0.0) -> None:
-    """Writes linear light, (h, w, 3) or (h, w) for grey, as an image file: .exr, .png, .hdr, .pfm or .jpg. Options as of `Image.save`.
+    """Writes linear light, (h, w, 3) or (h, w) for grey, as an image file: .exr, .png, .hdr, .pfm or .jpg.
+
+    `tonemap` and `exposure` are as of `Image.save`.
 
     >>> import numpy as np, pathlib, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:

@@ -17,8 +17,10 @@ from . import _lumbre
 from ._arrays import Array, rays, rows, triple
 from ._lumbre import LumbreError
 from .appearance import Camera, Light
+from .explanation import Explanation
 from .geometry import Instances, Shape
 from .image import Image
+from .viewing import Viewer
 
 FIELDS = ("t", "point", "normal", "uv", "front", "shape", "prim", "instance")
 """The fields of a hit, in the order of the program's own columns."""
@@ -159,7 +161,7 @@ class Scene:
     camera : Camera or list of them, optional
         The first is the default; by default one that sees everything.
     lights : list of lights, optional
-        By default studio light, unless a shape emits.
+        By default studio light, unless a shape emits. With neither camera nor light, everything also stands on its shadow in pictures.
     up : triple
         What is up for the default camera and light; z unless you say otherwise.
 
@@ -387,15 +389,16 @@ class Scene:
         noise: float | None = None,
         transparent: bool = False,
         features: bool = False,
-        denoise: bool = False,
+        denoise: bool | None = None,
         first_sample: int = 0,
         progress: Progress | bool | None = None,
     ) -> Image:
-        """Renders a picture.
+        """Renders a picture, as the program does: a model by itself is framed, lit as in a studio, and stands on its shadow before paper.
 
         Parameters
         ----------
         spp : samples per pixel
+            By default what the scene says, else 64; 16 for a model without camera and light, whose noise is taken out.
         size : (width, height) in pixels
         crop : (x0, y0, x1, y1), upper ends excluded
             Only these pixels.
@@ -408,7 +411,7 @@ class Scene:
             The render stops at whichever of spp, time and noise comes first; a pixel whose noise stays high at 1024 samples.
         transparent : leave out what is behind everything, and keep the coverage as `Image.alpha`
         features : gather albedo, normal, depth and uv as well, for `Image.feature`
-        denoise : take the noise out
+        denoise : take the noise out; by default only of a model without camera and light, where none of spp, time and noise is given
         first_sample : index of the first sample of each pixel, for parts of a render
         progress : callable, or True
             Called as progress(samples, total, share) now and then on this thread; total is None while unknown. True shows a bar where
@@ -449,6 +452,83 @@ class Scene:
                 return Image(self._native.render(options, bar))
         return Image(self._native.render(options, progress or None))
 
+    def explain(
+        self,
+        pixel: tuple[int, int] | None = None,
+        *,
+        ray: tuple[Iterable[float], Iterable[float]] | None = None,
+        tmin: float = 0.0,
+        tmax: float = math.inf,
+        sample: int = 0,
+        depth: int = 0,
+        nearest: bool = False,
+        lang: str = "en",
+        size: tuple[int, int] | None = None,
+        camera: int | str | None = None,
+        integrator: str | None = None,
+        seed: int | None = None,
+    ) -> Explanation:
+        """Tells how the colour of a pixel, or the light along a ray, comes about, with all numbers as the render computes them.
+
+        Parameters
+        ----------
+        pixel : (x, y), from (0, 0) in the upper left corner
+        ray : (origin, direction), two triples, in place of a pixel; tmin and tmax are its range
+        sample : the number of the sample
+            The radiance is that which `render` adds to the pixel for it.
+        depth : of how many of the rays that follow the crossings are told, too
+        nearest : tell only the surface that is seen, not those behind it
+        lang : en or es
+        size, camera, integrator, seed : as of `render`
+
+        Raises `LumbreError` for a pixel outside of the picture, and for a ray without a direction.
+
+        >>> import lumbre
+        >>> scene = lumbre.Scene([lumbre.Sphere(radius=2)])
+        >>> told = scene.explain((60, 40), size=(120, 80))
+        >>> surfaces = next(section for section in told["sections"] if section["key"] == "surfaces")
+        >>> surfaces["sections"][0]["key"]
+        'shape 0'
+        """
+        if (pixel is None) == (ray is None):
+            raise LumbreError("either a pixel or a ray is explained")
+        width, height = size if size is not None else self.size
+        if pixel is not None and not (0 <= pixel[0] < width and 0 <= pixel[1] < height):
+            raise LumbreError(f"pixel {pixel} is outside of the picture (expected less than ({width}, {height}))")
+        asked = None
+        if ray is not None:
+            origin, direction = triple("origin", ray[0]), triple("direction", ray[1])
+            if not np.isfinite((origin, direction)).all() or not any(direction) or not tmin <= tmax:
+                raise LumbreError(f"this is no ray (found {ray} from {tmin} to {tmax}; expected finite numbers, and a direction)")
+            asked = (origin, direction, float(tmin), float(tmax))
+        given = {"size": size, "camera": camera, "integrator": integrator, "seed": seed}
+        options = {name: value for name, value in given.items() if value is not None}
+        native = self._native
+        return Explanation(lambda format: native.explain(options, pixel, asked, sample, depth, nearest, lang, format))
+
+    def view(self, *, size: tuple[int, int] | None = None, spp: int | None = None, open: bool = True) -> Viewer:
+        """Shows the scene in a page of the browser while it is rendered: `lumbre view`, from Python.
+
+        One moves the camera there, looks into pixels, and sees every edit of its files when it is saved. It runs beside what Python does;
+        the other queries of the scene stay as they are.
+
+        Parameters
+        ----------
+        size : (width, height) in pixels
+        spp : samples per pixel, as of `render`
+        open : open it in the browser of this machine, where it has one
+
+        Raises `OSError` where the system has no address for it.
+
+        >>> import lumbre
+        >>> viewer = lumbre.Scene([lumbre.Sphere()]).view(size=(320, 200), open=False)
+        >>> viewer.close()
+        """
+        viewer = Viewer(self._native.view(size, spp), self._repr_png_)
+        if open:
+            viewer.open()
+        return viewer
+
     @property
     def size(self) -> tuple[int, int]:
         """Width and height of its pictures, where none is asked for."""
@@ -462,7 +542,7 @@ class Scene:
         width, height = self.size
         factor = 320 / max(width, height)
         small = (max(1, round(width * factor)), max(1, round(height * factor)))
-        return self.render(spp=16, size=small, denoise=True).png(tonemap="neutral")
+        return self.render(spp=16, size=small, denoise=True).png()
 
     def __reduce__(self) -> tuple[Callable[..., Scene], tuple[Any, ...]]:
         return _again, (self._source,)

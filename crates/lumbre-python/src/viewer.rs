@@ -1,0 +1,136 @@
+//! The viewer of the program, for a scene that is here.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+
+use lumbre::{ReadOptions, SaveOptions, SceneDesc};
+use lumbre_cli::{Defaults, Explainer, MODEL_SPP};
+use lumbre_viewer::{Built, Closer, Moment, Options, Read, Source};
+use pyo3::exceptions::{PyOSError, PyRuntimeError};
+use pyo3::prelude::*;
+
+/// Where a scene comes from.
+#[derive(Clone)]
+pub(crate) enum Origin {
+    /// These files, read like this.
+    Files(Vec<PathBuf>, Box<ReadOptions>),
+    /// What was built.
+    Shapes(Arc<SceneDesc>),
+}
+
+/// A scene for the viewer.
+struct Live {
+    origin: Origin,
+    size: Option<(u32, u32)>,
+    spp: Option<u32>,
+}
+
+impl Source for Live {
+    fn name(&self) -> String {
+        let name = self.files().into_iter().next().unwrap_or_else(|| "scene".into());
+        name.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+    }
+
+    fn files(&self) -> Vec<PathBuf> {
+        match &self.origin {
+            Origin::Files(paths, _) => paths.clone(),
+            Origin::Shapes(_) => Vec::new(),
+        }
+    }
+
+    fn read(&self, moment: &Moment) -> Result<Read, String> {
+        match &self.origin {
+            Origin::Shapes(desc) => {
+                Ok(Read { desc: SceneDesc::clone(desc), files: Vec::new(), warnings: Vec::new() })
+            }
+            Origin::Files(paths, options) => {
+                let mut options = options.clone();
+                options.frame = moment.time.or(options.frame);
+                options.variant = moment.variant.clone().or(options.variant);
+                let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
+                let (desc, diagnostics) = lumbre::describe(&paths, &options).map_err(|e| e.to_string())?;
+                Ok(Read { desc, files: diagnostics.files_read().to_vec(), warnings: diagnostics.lines() })
+            }
+        }
+    }
+
+    fn build(&self, mut desc: SceneDesc) -> Result<Built, String> {
+        let explain = Explainer::new(&desc, self.name());
+        let defaults = Defaults::stage(&mut desc, self.size, None);
+        let scene = lumbre::Scene::from_description(desc).map_err(|e| e.to_string())?;
+        let mut options = scene.options();
+        if let Some((width, height)) = self.size {
+            options.resize(scene.resolved().film(), width, height);
+        }
+        options.transparent = defaults.background().is_some();
+        options.threads = rayon::current_num_threads();
+        let is_plain = self.spp.is_none() && defaults.is_plain(&scene);
+        let own = if is_plain { MODEL_SPP } else { options.stop.spp };
+        options.stop.spp = self.spp.unwrap_or(own);
+        options.bounds().map_err(|e| e.to_string())?;
+        let mut save = SaveOptions::default();
+        save.tone_map = defaults.tone_map();
+        save.exposure = defaults.exposure(&scene, &options).map_err(|e| e.to_string())?;
+        Ok(Built {
+            scene,
+            options,
+            save,
+            background: defaults.background(),
+            denoise: is_plain,
+            warnings: Vec::new(),
+            explain: Some(Box::new(explain)),
+        })
+    }
+
+    fn of_file(&self, file: &Path) -> Arc<dyn Source> {
+        let origin = Origin::Files(vec![file.to_owned()], Box::default());
+        Arc::new(Self { origin, size: self.size, spp: self.spp })
+    }
+}
+
+/// A viewer that listens on this machine alone, until it is closed.
+#[pyclass(frozen, module = "lumbre._lumbre")]
+pub(crate) struct Viewer {
+    url: String,
+    closer: Closer,
+    runs: Mutex<Option<JoinHandle<Result<(), String>>>>,
+}
+
+impl Viewer {
+    pub(crate) fn start(origin: Origin, size: Option<(u32, u32)>, spp: Option<u32>) -> PyResult<Self> {
+        let source = Arc::new(Live { origin, size, spp });
+        let viewer = lumbre_viewer::Viewer::new(source, &Options::default()).map_err(PyOSError::new_err)?;
+        let (url, closer) = (viewer.url(), viewer.closer());
+        let thread = std::thread::Builder::new().name("viewer".to_owned());
+        let runs = thread.spawn(move || viewer.run()).map_err(|e| PyRuntimeError::new_err(e.to_string()))?;
+        Ok(Self { url, closer, runs: Mutex::new(Some(runs)) })
+    }
+
+    fn runs(&self) -> std::sync::MutexGuard<'_, Option<JoinHandle<Result<(), String>>>> {
+        self.runs.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[pymethods]
+impl Viewer {
+    /// The address to open, once.
+    fn url(&self) -> &str {
+        &self.url
+    }
+
+    /// Whether it still runs.
+    fn is_open(&self) -> bool {
+        self.runs().as_ref().is_some_and(|runs| !runs.is_finished())
+    }
+
+    /// Ends it, and waits until it has ended.
+    fn close(&self, py: Python<'_>) -> PyResult<()> {
+        self.closer.close();
+        let Some(runs) = self.runs().take() else { return Ok(()) };
+        match py.detach(|| runs.join()) {
+            Ok(ended) => ended.map_err(PyRuntimeError::new_err),
+            Err(panic) => std::panic::resume_unwind(panic),
+        }
+    }
+}
