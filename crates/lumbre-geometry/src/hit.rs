@@ -1,5 +1,6 @@
 //! Crossings, and the surface at a hit.
 
+use lumbre_math::rounding::offset_point;
 use lumbre_math::{DVec2, DVec3};
 use smallvec::SmallVec;
 
@@ -52,21 +53,9 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// The origin for a ray that leaves along `direction`: moved to that side of the surface by the error of
-    /// `point`, so that the ray does not hit the surface where it starts.
-    ///
-    /// M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering", 3rd edition, 2016, section 3.9.
+    /// The origin of a ray that leaves along `direction`, by [`offset_point`].
     pub fn offset_origin(&self, direction: DVec3) -> DVec3 {
-        let distance = self.normal.abs().dot(self.point_error);
-        let side = if self.normal.dot(direction) < 0.0 { -self.normal } else { self.normal };
-        let moved = self.point + distance * side;
-        // Round away from the surface.
-        let outward = |axis: usize| match side[axis] {
-            s if s > 0.0 => moved[axis].next_up(),
-            s if s < 0.0 => moved[axis].next_down(),
-            _ => moved[axis],
-        };
-        DVec3::new(outward(0), outward(1), outward(2))
+        offset_point(self.point, self.point_error, self.normal, direction)
     }
 }
 

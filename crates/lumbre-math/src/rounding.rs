@@ -32,29 +32,33 @@ pub fn next_down_by(x: f64, steps: u32) -> f64 {
     (0..steps).fold(x, |x, _| x.next_down())
 }
 
-/// The origin of a ray that leaves a surface at `point` towards `direction`: offset along the unit normal to
-/// the side of `direction`, beyond any place where the true surface can be, so that the ray does not hit the
-/// surface it leaves.
+/// The origin of a ray that leaves a surface at `point` towards `direction`: offset along the unit normal to the side of `direction`,
+/// beyond any place where the true surface can be, so that the ray does not meet the surface that it leaves.
 ///
-/// `error` bounds, axis by axis, the distance of `point` from the surface. A `direction` perpendicular to the
-/// normal counts as on the side of the normal. Source: Pharr, Jakob, Humphreys, "Physically Based Rendering",
-/// 4th edition, 2023, section 6.8.6.
+/// `error` bounds, axis by axis, the distance of `point` from the surface. A `direction` perpendicular to the normal counts as on the
+/// side of the normal.
+///
+/// Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th edition, 2023, 6.8.6. There, intersection tests reject a `t` within its
+/// own error; here the offset is larger instead, by the error of the coordinate with the largest error, which rounds into `t`.
+/// Otherwise a face in the plane z = 0, whose error along z is 0, would be met again. At the origin, where all errors may be 0, the
+/// offset is so large that no map makes it 0.
+#[inline]
 pub fn offset_point(point: DVec3, error: DVec3, normal: DVec3, direction: DVec3) -> DVec3 {
-    // The extent of the error box along the normal.
-    let reach = normal.abs().dot(error.abs());
-    let offset = if direction.dot(normal) < 0.0 { -reach * normal } else { reach * normal };
-    let away = |moved: f64, by: f64| {
-        // The sum was rounded to nearest, perhaps towards the surface.
-        if by > 0.0 {
+    const LEAST: f64 = 1e-250;
+    let distance = (normal.abs().dot(error) + 4.0 * error.max_element()).max(LEAST);
+    let along = if normal.dot(direction) < 0.0 { -normal } else { normal };
+    let moved = point + distance * along;
+    // The sum was rounded to nearest, perhaps towards the surface.
+    let away = |moved: f64, along: f64| {
+        if along > 0.0 {
             moved.next_up()
-        } else if by < 0.0 {
+        } else if along < 0.0 {
             moved.next_down()
         } else {
             moved
         }
     };
-    let moved = point + offset;
-    DVec3::new(away(moved.x, offset.x), away(moved.y, offset.y), away(moved.z, offset.z))
+    DVec3::new(away(moved.x, along.x), away(moved.y, along.y), away(moved.z, along.z))
 }
 
 #[cfg(test)]
@@ -103,14 +107,16 @@ mod tests {
                 // The corners that matter differ from `start` by few units in the last place: the difference is exact.
                 assert!((start - surface).dot(normal) * side > -1e-17 * size, "{k} {corner}");
             }
-            assert!((start - point).length() < 4e-15 * size);
+            assert!((start - point).length() < 7e-15 * size);
         }
     }
 
     #[test]
-    fn without_error_there_is_no_step() {
+    fn without_error_the_step_is_the_least() {
         let p = DVec3::new(3.0, -4.0, 5.0);
-        assert_eq!(offset_point(p, DVec3::ZERO, DVec3::Y, DVec3::X), p);
+        let least = DVec3::new(p.x, p.y.next_up(), p.z);
+        assert_eq!(offset_point(p, DVec3::ZERO, DVec3::Y, DVec3::X), least);
+        assert_eq!(offset_point(DVec3::ZERO, DVec3::ZERO, DVec3::Y, DVec3::X).y, 1e-250_f64.next_up());
         assert!(offset_point(p, DVec3::splat(1e-12), DVec3::Y, DVec3::NEG_Y).y < -4.0);
     }
 }

@@ -1,6 +1,7 @@
 //! The interaction of a ray with a surface.
 
 use lumbre_geometry::{Ray, Surface};
+use lumbre_math::rounding::offset_point;
 use lumbre_math::{DVec3, Vec2};
 use lumbre_shading::{Bsdf, LocalSurface, Material, ShadingFrame, ShadingNormals, Spectrum, TextureContext};
 
@@ -91,7 +92,7 @@ impl<'s> Interaction<'s> {
     /// [`Self::shadow_ray`] from another origin.
     pub fn shadow_ray_from(&self, start: DVec3, sample: &LightSample) -> Ray {
         let Some(end) = sample.end else { return self.leave_from(start, sample.towards) };
-        let stop = offset(end.point, end.error, end.normal, -sample.towards);
+        let stop = offset_point(end.point, end.error, end.normal, -sample.towards);
         // The range allows for rounding of the direction and of t.
         Ray::new(start, stop - start).with_range(0.0, 1.0 - f64::powi(2.0, -40)).at_time(self.time)
     }
@@ -135,30 +136,6 @@ impl<'s> Interaction<'s> {
         if (normal.dot(direction) < 0.0) == (normal.dot(self.towards_origin) < 0.0) {
             return self.incident_origin;
         }
-        offset(self.surface.point, self.surface.point_error, self.surface.normal, direction)
+        self.surface.offset_origin(direction)
     }
-}
-
-/// The point offset along the normal to the side of `direction`, out of its error box, and rounded away from
-/// the surface.
-///
-/// Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th edition, 2023, 6.8.6. There, intersection tests
-/// reject a `t` within its own error; here the offset is larger instead, by the error of the coordinate with
-/// the largest error, which rounds into `t`. Otherwise a face in the plane z = 0, whose error along z is 0,
-/// would be hit again.
-#[inline]
-pub fn offset(point: DVec3, error: DVec3, normal: DVec3, direction: DVec3) -> DVec3 {
-    let distance = normal.abs().dot(error) + 4.0 * error.max_element();
-    let along = if normal.dot(direction) < 0.0 { -normal } else { normal };
-    let moved = point + distance * along;
-    let away = |p: f64, n: f64| {
-        if n > 0.0 {
-            p.next_up()
-        } else if n < 0.0 {
-            p.next_down()
-        } else {
-            p
-        }
-    };
-    DVec3::new(away(moved.x, along.x), away(moved.y, along.y), away(moved.z, along.z))
 }

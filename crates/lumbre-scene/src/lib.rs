@@ -32,7 +32,7 @@ pub use error::BuildError;
 pub use footprint::Footprint;
 pub use ground::GroundPlane;
 pub use id::{MaterialId, ObjectId};
-pub use interaction::{Interaction, offset};
+pub use interaction::Interaction;
 pub use light::{Light, LightId, LightSample};
 pub use listing::{AnimationListing, Listing, TextureListing};
 pub use lumbre_kernel::Placement;

@@ -11,7 +11,6 @@ use lumbre_shading::{FloatTexture, Spectrum};
 
 use crate::build::check_cameras;
 use crate::footprint::Spot;
-use crate::interaction::offset;
 use crate::light::choice::{Company, LightChoice};
 use crate::light::{Light, LightId, LightSample};
 use crate::surface::{Form, ShadingGeometry, SurfaceEntry};
@@ -244,7 +243,7 @@ impl Scene {
         } else {
             Spot::default()
         };
-        let incident_origin = offset(surface.point, surface.point_error, surface.normal, -direction);
+        let incident_origin = surface.offset_origin(-direction);
         let is_smooth = shaded.shading.normal.dot(shaded.shading.geometric) < SMOOTH;
         let terminator_offset = is_smooth.then(|| {
             let placement = self.placement(ray, hit);

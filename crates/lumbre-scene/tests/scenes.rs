@@ -145,6 +145,46 @@ fn check_leaving(geometry: &GeometryDesc, outside_alone: bool) {
 }
 
 #[test]
+fn rays_that_leave_the_origin_do_not_meet_it_again() {
+    // Where every coordinate is 0, so is the error of the point.
+    let shapes: Vec<Shape> = vec![
+        Disk::new(DVec3::ZERO, DVec3::Z, 40.0, 0.0).unwrap().into(),
+        Disk::new(DVec3::ZERO, DVec3::new(0.1, -0.2, 1.0), 0.9, 0.0).unwrap().into(),
+        Plane::new(DVec3::ZERO, DVec3::new(0.3, 0.2, 1.0)).unwrap().into(),
+        Triangle::new(DVec3::ZERO, DVec3::X, DVec3::Y).unwrap().into(),
+        BilinearPatch::new(DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::X + DVec3::Y).unwrap().into(),
+        Cuboid::new(DVec3::ZERO, DVec3::ONE).unwrap().into(),
+    ];
+    for (geometry, scale) in
+        shapes.into_iter().flat_map(|shape| [1e-3, 0.7, 1.0, 1e3].map(|scale| (shape.clone(), scale)))
+    {
+        let placement = Transform::scale(DVec3::new(scale, 2.0 * scale, scale)).unwrap();
+        let scene =
+            build(vec![ShapeDesc { world_from_object: placement, ..shape(0, exact(geometry.clone())) }]);
+        let mut left = 0;
+        for towards in directions(300) {
+            let ray = Ray::new(-3.0 * towards, towards);
+            let Some(hit) = scene.closest(&ray) else { continue };
+            let met = scene.interaction(&ray, &hit, &Footprint::Point);
+            // From inside, a corner of the box leads to its other faces.
+            let is_inside = matches!(geometry, Shape::Cuboid(_)) && !met.front;
+            if met.surface.point != DVec3::ZERO || is_inside {
+                continue;
+            }
+            let side = if met.surface.normal.dot(met.towards_origin) > 0.0 { 1.0 } else { -1.0 };
+            for leaving in directions(30) {
+                let leaving = if leaving.dot(side * met.surface.normal) < 0.0 { -leaving } else { leaving };
+                assert!(!scene.is_occluded(&met.leave(leaving)), "{geometry:?} {scale} {towards} {leaving}");
+                let from_light = Ray { origin: met.shadow_origin(), ..met.leave(leaving) };
+                assert!(!scene.is_occluded(&from_light), "{geometry:?} {scale} {towards} {leaving}, light");
+                left += 1;
+            }
+        }
+        assert!(left >= 60, "{geometry:?} {scale}: {left}");
+    }
+}
+
+#[test]
 fn the_colour_of_a_line_runs_from_end_to_end() {
     let (from, to) = (DVec3::new(2.0, 3.0, 4.0), DVec3::new(5.0, 1.0, 4.5));
     let colours = [Rgb::new(1.0, 0.25, 0.0), Rgb::new(0.0, 0.75, 0.5)];

@@ -11,5 +11,5 @@ pub use lumbre_scene::{
     IntegratorKind, Interaction, Light, LightDesc, LightId, LightSample, MaterialId, MeshDesc, MeshMoment,
     MeshMotion, NamedMaterial, ObjectDesc, ObjectId, Placement, SamplerDesc, SamplerKind,
     Scene as ResolvedScene, SceneDesc, ShapeDesc, SphericalMapping, Stage, StageLight, Staged, Surroundings,
-    UpAxis, View as CameraView, WithoutLight, offset,
+    UpAxis, View as CameraView, WithoutLight,
 };
