@@ -189,7 +189,7 @@ const CASES: &[(&str, &str)] = &[
         "Sampler \"sobol\" \"integer pixelsamples\" -4",
         "1:17: parameter \"pixelsamples\" of sampler \"sobol\" is out of range (found -4; expected 1 or more)",
     ),
-    ("Option \"seed\" 1e9", "1:8: wrong value of the option \"seed\" (found \"1e9\"; expected an integer)"),
+    ("Option \"seed\" 1.5", "1:8: wrong value of the option \"seed\" (found \"1.5\"; expected an integer)"),
     (
         "Attribute \"shap\" \"float radius\" 2",
         "1:11: unknown kind of Attribute (found \"shap\"; expected shape, light, material, medium, texture; did you mean \"shape\"?)",

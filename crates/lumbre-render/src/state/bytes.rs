@@ -157,18 +157,28 @@ fn planes<T, const N: usize>(out: &mut Vec<u8>, sums: &[T], numbers: impl Fn(&T)
     if sums.is_empty() {
         return;
     }
-    for i in 0..N {
-        let plane = || sums.iter().map(|sums| numbers(sums)[i]);
-        let width = plane().map(bytes_of).max().unwrap_or(0);
-        out.push(width as u8);
-        plane().for_each(|number| out.extend(&number.to_le_bytes()[..width]));
+    // Of each plane, the bits that differ from the sign in any number, and whether any is other than 0.
+    let mut bits = [0_i128; N];
+    let mut is_used = [false; N];
+    for sums in sums {
+        for (i, number) in numbers(sums).into_iter().enumerate() {
+            bits[i] |= number ^ (number >> 127);
+            is_used[i] |= number != 0;
+        }
     }
-}
-
-/// How many bytes hold a number with its sign.
-fn bytes_of(number: i128) -> usize {
-    let magnitude = if number < 0 { !number } else { number };
-    if number == 0 { 0 } else { (128 - magnitude.leading_zeros() as usize) / 8 + 1 }
+    for i in 0..N {
+        let width = if is_used[i] { (128 - bits[i].leading_zeros() as usize) / 8 + 1 } else { 0 };
+        out.push(width as u8);
+        let start = out.len();
+        let end = start + width * sums.len();
+        // Each is written whole, as that is faster, and the next one takes the place of what is too much of it.
+        out.resize(end + 16, 0);
+        for (k, sums) in sums.iter().enumerate() {
+            let at = start + width * k;
+            out[at..at + 16].copy_from_slice(&numbers(sums)[i].to_le_bytes());
+        }
+        out.truncate(end);
+    }
 }
 
 /// What is left to read.
@@ -330,8 +340,15 @@ mod tests {
             (i128::MAX, 16),
             (i128::MIN, 16),
         ] {
-            assert_eq!(bytes_of(number), bytes, "{number}");
-            assert_eq!(super::number(&number.to_le_bytes()[..bytes]), number);
+            // Among smaller ones of either sign.
+            let numbers = [0, number, number >> 3, number];
+            let mut out = Vec::new();
+            planes(&mut out, &numbers, |number| [*number]);
+            assert_eq!((usize::from(out[0]), out.len()), (bytes, 1 + 4 * bytes), "{number}");
+            if bytes > 0 {
+                let back = out[1..].chunks(bytes).map(super::number);
+                assert!(back.eq(numbers), "{number}");
+            }
         }
     }
 }
