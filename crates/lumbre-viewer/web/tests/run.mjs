@@ -286,7 +286,7 @@ const tests = {
     assert.equal(await alone.getAttribute("html", "lang"), "es");
     await alone.close();
     await page.click("#explanation-close");
-    assert.equal(await page.locator("#explanation iframe").count(), 0);
+    await page.waitForSelector("#explanation iframe", { state: "detached" });
 
     // Of an edited scene, what the edited one's render does; of another camera, something else.
     await page.click("#edit-details > summary");
