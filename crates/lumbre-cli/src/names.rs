@@ -24,9 +24,9 @@ mod tests {
 
     #[test]
     fn every_name_that_is_listed_is_known() {
-        assert!(render::INTEGRATORS.iter().all(|name| IntegratorKind::from_name(name).is_some()));
+        assert!(IntegratorKind::NAMES.iter().all(|name| IntegratorKind::from_name(name).is_some()));
         assert!(render::SHADING_NORMALS.iter().all(|name| ShadingNormals::from_name(name).is_some()));
-        assert!(render::TONE_MAPS.iter().all(|name| ToneMap::from_name(name).is_some()));
+        assert!(ToneMap::NAMES.iter().all(|name| ToneMap::from_name(name).is_some()));
         assert!(render::FEATURES.iter().all(|name| Feature::from_name(name).is_some()));
         assert!(diff::METRICS.iter().all(|name| Metric::from_name(name).is_some()));
         assert!(Choice::NAMES.iter().all(|name| Choice::from_name(name).is_some()));

@@ -111,7 +111,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "NAME|INDEX", help_heading = "View")]
     camera: Option<String>,
     /// What is computed for each pixel: light along paths, or a quantity of what is seen.
-    #[arg(long, value_name = "NAME", value_parser = one_of(&INTEGRATORS, IntegratorKind::from_name))]
+    #[arg(long, value_name = "NAME", value_parser = one_of(&IntegratorKind::NAMES, IntegratorKind::from_name))]
     integrator: Option<IntegratorKind>,
     /// The maximal number of bounces.
     #[arg(long, value_name = "N")]
@@ -131,7 +131,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure)]
     exposure: Option<f32>,
     /// Tone mapping, for .png and .jpg. By default neutral with the light of the studio or --env, else none.
-    #[arg(long, value_name = "NAME", value_parser = one_of(&TONE_MAPS, ToneMap::from_name))]
+    #[arg(long, value_name = "NAME", value_parser = one_of(&ToneMap::NAMES, ToneMap::from_name))]
     tonemap: Option<ToneMap>,
     /// AOVs as layers of an .exr, separated by commas.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = one_of(&FEATURES, Feature::from_name))]
@@ -192,13 +192,8 @@ pub(crate) fn exposure(text: &str) -> Result<f32, String> {
         .ok_or_else(|| "expected a number from -100 to 100, such as 1.5".to_owned())
 }
 
-/// The names of integrators.
-pub(crate) const INTEGRATORS: [&str; 7] =
-    ["path", "whitted", "ambientocclusion", "normals", "depth", "albedo", "uv"];
 /// What can be made of shading normals.
 pub(crate) const SHADING_NORMALS: [&str; 2] = ["lumbre", "pbrt"];
-/// The names of tone mappings.
-pub(crate) const TONE_MAPS: [&str; 4] = ["none", "agx", "aces", "neutral"];
 /// The names of formats that are written.
 const WRITTEN: [&str; 5] = ["png", "exr", "hdr", "pfm", "jpg"];
 
@@ -333,11 +328,11 @@ impl Arguments {
         exposure: f32,
         precision: ExrPrecision,
     ) -> BTreeMap<String, String> {
-        let tone_map = TONE_MAPS.iter().find(|name| ToneMap::from_name(name) == Some(tone_map));
+        let tone_map = ToneMap::NAMES.into_iter().find(|name| ToneMap::from_name(name) == Some(tone_map));
         let layers: Vec<&str> = self.aov.iter().map(|aov| aov.name()).collect();
         let mut shown = BTreeMap::from([
             ("exposure".to_owned(), exposure.to_string()),
-            ("tone map".to_owned(), (*tone_map.unwrap_or(&"none")).to_owned()),
+            ("tone map".to_owned(), tone_map.unwrap_or("none").to_owned()),
             (
                 "precision".to_owned(),
                 if precision == ExrPrecision::Float { "float" } else { "half" }.to_owned(),

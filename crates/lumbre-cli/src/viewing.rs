@@ -16,7 +16,7 @@ use crate::explain::Explainer;
 use crate::failure::{Failure, print};
 use crate::names::one_of;
 use crate::reading::ReadingArguments;
-use crate::render::{TONE_MAPS, exposure};
+use crate::render::exposure;
 use crate::shown::{Shown, Wish, shown};
 use crate::signals::{Phase, Signals};
 use crate::staging::{Behind, StagingArguments};
@@ -69,7 +69,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure)]
     exposure: Option<f32>,
     /// Tone mapping. The page can change it.
-    #[arg(long, value_name = "NAME", value_parser = one_of(&TONE_MAPS, ToneMap::from_name))]
+    #[arg(long, value_name = "NAME", value_parser = one_of(&ToneMap::NAMES, ToneMap::from_name))]
     tonemap: Option<ToneMap>,
     #[command(flatten)]
     view: ViewArguments,

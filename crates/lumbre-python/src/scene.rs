@@ -522,10 +522,10 @@ impl Scene {
         let size: Option<(u32, u32)> = named(given, "size")?;
         let integrator = match named::<String>(given, "integrator")? {
             None => None,
-            Some(name) => Some(IntegratorKind::from_name(&name).ok_or_else(|| {
-                let names = ["path", "whitted", "ambientocclusion", "normals", "depth", "albedo", "uv"];
-                unknown("integrator", &name, &names)
-            })?),
+            Some(name) => Some(
+                IntegratorKind::from_name(&name)
+                    .ok_or_else(|| unknown("integrator", &name, &IntegratorKind::NAMES))?,
+            ),
         };
         let shown = self.shown(py, size, integrator)?;
         let mut options = shown.scene.options();

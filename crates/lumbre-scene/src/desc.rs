@@ -519,6 +519,10 @@ impl IntegratorKind {
         }
     }
 
+    /// The names of all.
+    pub const NAMES: [&'static str; 7] =
+        ["path", "whitted", "ambientocclusion", "normals", "depth", "albedo", "uv"];
+
     /// The integrator of a name in the scene language, with default parameters.
     pub fn from_name(name: &str) -> Option<Self> {
         match name {

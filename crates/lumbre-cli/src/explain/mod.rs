@@ -14,7 +14,6 @@ use crate::language::Language;
 use crate::names::one_of;
 use crate::output::Inputs;
 use crate::reading::{ReadingArguments, print_warnings};
-use crate::render::INTEGRATORS;
 use crate::shown::{Shown, Wish, shown};
 use crate::staging::StagingArguments;
 use crate::units;
@@ -71,7 +70,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "NAME|INDEX", help_heading = "View")]
     camera: Option<String>,
     /// What is computed for each pixel.
-    #[arg(long, value_name = "NAME", value_parser = one_of(&INTEGRATORS, IntegratorKind::from_name))]
+    #[arg(long, value_name = "NAME", value_parser = one_of(&IntegratorKind::NAMES, IntegratorKind::from_name))]
     integrator: Option<IntegratorKind>,
     /// Seed of the random numbers.
     #[arg(long, value_name = "N")]
