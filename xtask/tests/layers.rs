@@ -6,7 +6,7 @@ use std::process::Command;
 
 /// The layer of each crate. A crate may depend on crates of lower layers only.
 const LAYERS: &[(u32, &[&str])] = &[
-    (0, &["lumbre-math"]),
+    (0, &["lumbre-math", "lumbre-simd"]),
     (1, &["lumbre-geometry", "lumbre-image"]),
     (2, &["lumbre-kernel", "lumbre-shading"]),
     (3, &["lumbre-scene"]),
