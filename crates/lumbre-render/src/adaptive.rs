@@ -60,6 +60,11 @@ fn is_looked_at(taken: u32) -> bool {
     taken >= LEAST && is_step
 }
 
+/// The number of samples at which pixels are looked at next that have so many.
+pub(crate) fn next_look(taken: u32) -> u32 {
+    (taken.saturating_add(1)..=u32::MAX).find(|&count| is_looked_at(count)).unwrap_or(u32::MAX)
+}
+
 /// The fewest samples of the pixels of a tile that need more; `None` where none does.
 pub(crate) fn least_wanted(tile: &Tile, adaptive: Option<&Adaptive>) -> Option<u32> {
     let wants = |pixel: &&Pixel| adaptive.is_none_or(|adaptive| !adaptive.is_done(pixel));

@@ -1,6 +1,8 @@
 //! The render itself: passes over samples, tiles over threads.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use lumbre_math::{DVec3, Elementary};
@@ -13,6 +15,7 @@ use crate::one_sample::Taker;
 use crate::rendered::{noise, picture, rendered_of};
 use crate::state::{Piece, REMEMBERED, RenderState};
 use crate::transport::{Integrator, RayCounts, Record, integrator};
+use crate::wave::{SampleId, WAVE, Wave};
 use crate::workers::Workers;
 use crate::{
     CancelToken, DroppedSample, NoProgress, PixelBounds, Progress, RenderError, RenderOptions, Rendered,
@@ -26,8 +29,8 @@ const MAX_STEP: u32 = 16;
 /// The first pass goes over the picture in squares of so many pixels a side, one sample in each, and then in smaller ones, so that a
 /// render which is stopped in it is a whole picture, if a coarse one.
 const STRIDES: [u32; 7] = [256, 64, TILE, 8, 4, 2, 1];
-/// Pixels between two looks at the clock.
-const PIXELS_A_LOOK: u64 = 4;
+/// Samples of a wave, at most, where a clock or a pause may stop the render: so many take a few milliseconds.
+const WAVE_BY_THE_CLOCK: usize = 1024;
 
 /// Renders a picture: stops when the options say so, or when `cancel` asks, and returns what there is.
 ///
@@ -117,6 +120,7 @@ pub fn render_from(
         cancel,
         pause: keeper.map(|keeper| Pause::new(start, keeper.every)),
         clock: Clock::new(start, bounds.area(), options.stop, before, progress),
+        waves: Mutex::default(),
     };
     let hand_over = |owners: &[Owner]| {
         if let (Some(keeper), Some(pause)) = (keeper, &job.pause) {
@@ -341,6 +345,8 @@ struct Job<'a> {
     cancel: &'a CancelToken,
     pause: Option<Pause>,
     clock: Clock<'a>,
+    /// Columns for those who take samples, one for each thread.
+    waves: Mutex<Vec<Wave<'a>>>,
 }
 
 /// When all threads pause next, to hand over what they have.
@@ -374,6 +380,8 @@ struct Owner {
     tile: Tile,
     /// The side of the smallest squares that the first pass has done.
     next_side: u32,
+    /// Whether it has taken a sample since it last stopped.
+    has_worked: bool,
     record: Record,
     dropped: u64,
     first_dropped: Vec<DroppedSample>,
@@ -381,7 +389,14 @@ struct Owner {
 
 impl Owner {
     fn new(tile: Tile) -> Self {
-        Self { tile, next_side: u32::MAX, record: Record::default(), dropped: 0, first_dropped: Vec::new() }
+        Self {
+            tile,
+            next_side: u32::MAX,
+            has_worked: false,
+            record: Record::default(),
+            dropped: 0,
+            first_dropped: Vec::new(),
+        }
     }
 }
 
@@ -401,53 +416,64 @@ impl Job<'_> {
             (x - corner.0).is_multiple_of(side) && (y - corner.1).is_multiple_of(side)
         };
         let is_new = |x, y| starts(x, y, side) && !last.is_some_and(|last| starts(x, y, last));
-        if self.take(owner, 0, is_new) {
+        if self.take(owner, 0..1, is_new) {
             owner.next_side = side;
         }
     }
 
-    /// Takes the samples of every pixel of a tile up to this number, sample by sample, so that a tile which is stopped has all of
-    /// one sample before it has any of the next.
+    /// Takes the samples of every pixel of a tile up to this number, in waves of some samples of all pixels, so that a tile which is stopped
+    /// has all of one sample before it has any of the next.
     fn run(&self, owner: &mut Owner, end: u32) {
-        let first = adaptive::least_wanted(&owner.tile, self.adaptive.as_ref()).unwrap_or(end);
-        for index in first..end {
-            if !self.take(owner, index, |_, _| true) {
+        let mut first = adaptive::least_wanted(&owner.tile, self.adaptive.as_ref()).unwrap_or(end);
+        let may_stop = self.deadline.is_some() || self.pause.is_some();
+        let most = if may_stop { WAVE_BY_THE_CLOCK } else { WAVE };
+        let step = (most / owner.tile.pixels().len()).max(1) as u32;
+        while first < end {
+            let mut next = first.saturating_add(step).min(end);
+            if self.adaptive.is_some() {
+                next = next.min(adaptive::next_look(first));
+            }
+            if !self.take(owner, first..next, |_, _| true) {
                 return;
             }
+            first = next;
         }
     }
 
-    /// Takes a sample of each of those pixels of a tile that have none of this number yet; whether it has done so before it had to stop.
-    fn take(&self, owner: &mut Owner, number: u32, is_wanted: impl Fn(u32, u32) -> bool) -> bool {
-        let mut count = 0;
+    /// Takes samples of those pixels of a tile that have none of these numbers yet and need them; false where it had to stop before.
+    fn take(&self, owner: &mut Owner, numbers: Range<u32>, is_wanted: impl Fn(u32, u32) -> bool) -> bool {
+        let mut ids = Vec::new();
+        for number in numbers {
+            for (x, y) in owner.tile.bounds().pixels() {
+                let pixel = owner.tile.pixel(x, y);
+                let has_enough = || self.adaptive.is_some_and(|adaptive| adaptive.is_done(pixel));
+                if pixel.taken <= number && is_wanted(x, y) && !has_enough() {
+                    ids.push(SampleId { x, y, index: self.options.first_sample.saturating_add(number) });
+                }
+            }
+        }
+        if ids.is_empty() {
+            return true;
+        }
+        // However short the time between two pauses, some work is done.
+        if self.must_stop() || (owner.has_worked && self.is_paused()) {
+            owner.has_worked = false;
+            return false;
+        }
+        owner.has_worked = true;
         let rays = owner.record.counts.total();
-        for (x, y) in owner.tile.bounds().pixels() {
-            let pixel = owner.tile.pixel(x, y);
-            let has_enough = || self.adaptive.is_some_and(|adaptive| adaptive.is_done(pixel));
-            if pixel.taken > number || !is_wanted(x, y) || has_enough() {
-                continue;
+        let mut wave = self.waves.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default();
+        let Owner { tile, record, dropped, first_dropped, .. } = owner;
+        self.taker.take(&mut wave, &ids, record, |SampleId { x, y, index }, sample| {
+            if !tile.add(x, y, &sample, &self.options.exposure) {
+                *dropped += 1;
+                if first_dropped.len() < REMEMBERED {
+                    first_dropped.push(DroppedSample { x, y, sample: index });
+                }
             }
-            let looks = count % PIXELS_A_LOOK == 0;
-            // However short the time between two pauses, some work is done.
-            if self.cancel.is_cancelled() || (looks && (self.must_stop() || (count > 0 && self.is_paused())))
-            {
-                self.clock.add(count, owner.record.counts.total() - rays);
-                return false;
-            }
-            self.sample(owner, x, y, self.options.first_sample.saturating_add(number));
-            count += 1;
-        }
-        self.clock.add(count, owner.record.counts.total() - rays);
+        });
+        self.waves.lock().unwrap_or_else(PoisonError::into_inner).push(wave);
+        self.clock.add(ids.len() as u64, owner.record.counts.total() - rays);
         true
-    }
-
-    fn sample(&self, owner: &mut Owner, x: u32, y: u32, index: u32) {
-        let sample = self.taker.take(x, y, index, &mut owner.record);
-        if !owner.tile.add(x, y, &sample, &self.options.exposure) {
-            owner.dropped += 1;
-            if owner.first_dropped.len() < REMEMBERED {
-                owner.first_dropped.push(DroppedSample { x, y, sample: index });
-            }
-        }
     }
 }

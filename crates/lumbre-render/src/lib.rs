@@ -17,6 +17,7 @@ mod progress;
 mod rendered;
 mod state;
 pub mod transport;
+mod wave;
 mod workers;
 
 pub use cancel::CancelToken;
@@ -30,4 +31,5 @@ pub use rendered::{DroppedSample, Rendered, Stats};
 pub use state::{MergeError, Piece, RenderState, StateError};
 
 pub use crate::film::PixelBounds;
-pub use crate::transport::{Event, Feature, Integrator, RayCounts, Record};
+pub use crate::transport::{Event, Feature, Integrator, RayCounts, RayIntegrator, Record};
+pub use crate::wave::Sights;

@@ -1,4 +1,4 @@
-//! One sample of one pixel.
+//! Samples of pixels.
 
 use lumbre_geometry::Ray;
 use lumbre_math::DVec2;
@@ -6,7 +6,8 @@ use lumbre_scene::{CameraRay, Footprint, Scene, View};
 use lumbre_shading::Spectrum;
 
 use crate::film::{FeatureSample, Filter, Sample};
-use crate::transport::{Event, Features, Integrator, Record, Sampler, Sight, integrator, see};
+use crate::transport::{Draw, Event, Features, Integrator, Record, Sampler, Seen, caught, integrator};
+use crate::wave::{SampleId, Sights, Wave};
 use crate::{RenderError, RenderOptions};
 
 /// Between the rays that textures are looked up for, in pixels: samples average what is finer. The same for any number of samples, so
@@ -26,13 +27,13 @@ pub(crate) struct Taker<'a> {
     lights_are_seen: bool,
 }
 
-/// A sample, and the ray that it was taken along.
-struct Taken {
+/// Where on the film a sample is taken, and through which point of the lens.
+#[derive(Clone, Copy)]
+struct Aim {
     /// The point of the film, in pixels.
     film: DVec2,
     lens: DVec2,
-    ray: Ray,
-    sample: Sample,
+    weight: f64,
 }
 
 impl<'a> Taker<'a> {
@@ -57,38 +58,77 @@ impl<'a> Taker<'a> {
         })
     }
 
-    /// The sample of a pixel with this number.
-    pub(crate) fn take(&self, x: u32, y: u32, index: u32, record: &mut Record) -> Sample {
-        self.taken(x, y, index, record).sample
+    /// Takes samples, and hands them on in their order.
+    pub(crate) fn take(
+        &self,
+        wave: &mut Wave<'a>,
+        ids: &[SampleId],
+        record: &mut Record,
+        mut put: impl FnMut(SampleId, Sample),
+    ) {
+        let aimed = ids.iter().map(|&id| {
+            let draw = self.sampler.draw(id.x, id.y, id.index);
+            (draw, self.camera_ray(&draw, &self.aim(id, &draw)))
+        });
+        let mut sights = Sights::new(self.scene, &self.view, wave, aimed, record);
+        let seen = self.see(&mut sights, record);
+        for ((&id, (seen, features)), &radiance) in ids.iter().zip(seen).zip(sights.radiance()) {
+            let weight = self.filter.sample(self.sampler.draw(id.x, id.y, id.index).filter()).weight;
+            let Seen { radiance, coverage, on_catcher } =
+                seen.unwrap_or(Seen { radiance, coverage: Spectrum::WHITE, on_catcher: false });
+            put(id, Sample { radiance, coverage, weight, features, on_catcher });
+        }
     }
 
-    /// The light along a ray of no pixel, with the random numbers of one.
-    fn along(&self, ray: &Ray, index: u32, record: &mut Record) -> Spectrum {
-        let draw = self.sampler.draw(0, 0, index);
-        let sight = Sight::new(self.scene, CameraRay { ray: *ray, footprint: Footprint::Point }, record);
-        see(self.integrator, self.scene, &self.view, sight, &draw, self.lights_are_seen, record).radiance
+    /// Has the integrator find the light of all sights but those that see something else, and gives what these see and all features.
+    fn see(
+        &self,
+        sights: &mut Sights<'_, 'a>,
+        record: &mut Record,
+    ) -> Vec<(Option<Seen>, Option<FeatureSample>)> {
+        let has_catcher = self.scene.ground().is_some_and(|ground| ground.catcher);
+        let mut seen = vec![(None, None); sights.len()];
+        if self.wants_features || has_catcher || !self.lights_are_seen {
+            sights.retain(|sights, slot| {
+                let sight = sights.sight(slot);
+                let features = if self.wants_features { Features::of(&self.view, &sight) } else { None };
+                let caught = caught(self.scene, &sight, sights.draw(slot), self.lights_are_seen, record);
+                seen[slot] = (caught, features.map(feature_sample));
+                caught.is_none()
+            });
+        }
+        self.integrator.estimate(sights, &self.sampler, record);
+        seen
     }
 
-    #[inline]
-    fn taken(&self, x: u32, y: u32, index: u32, record: &mut Record) -> Taken {
-        let draw = self.sampler.draw(x, y, index);
+    fn aim(&self, id: SampleId, draw: &Draw) -> Aim {
         let place = self.filter.sample(draw.filter());
-        let film = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) + place.offset;
+        let pixel = DVec2::new(f64::from(id.x) + 0.5, f64::from(id.y) + 0.5);
+        Aim { film: pixel + place.offset, lens: draw.lens(), weight: place.weight }
+    }
+
+    fn camera_ray(&self, draw: &Draw, aim: &Aim) -> CameraRay {
         let part = if self.moves { draw.time() } else { 0.0 };
-        let lens = draw.lens();
-        let ray = self.view.ray(film, lens, self.view.time(part), SPACING);
-        let sight = Sight::new(self.scene, ray, record);
-        let features =
-            if self.wants_features { Features::of(&self.view, &sight).map(feature_sample) } else { None };
-        let seen = see(self.integrator, self.scene, &self.view, sight, &draw, self.lights_are_seen, record);
-        let sample = Sample {
-            radiance: seen.radiance,
-            coverage: seen.coverage,
-            weight: place.weight,
-            features,
-            on_catcher: seen.on_catcher,
-        };
-        Taken { film, lens, ray: ray.ray, sample }
+        self.view.ray(aim.film, aim.lens, self.view.time(part), SPACING)
+    }
+
+    /// A sample with all that leads to it.
+    fn explain(&self, id: SampleId) -> ExplainedSample {
+        let draw = self.sampler.draw(id.x, id.y, id.index);
+        let Aim { film, lens, weight } = self.aim(id, &draw);
+        let camera = self.camera_ray(&draw, &Aim { film, lens, weight });
+        let (ray, radiance, events) = self.explain_sight(draw, camera);
+        ExplainedSample { film, lens, ray, radiance, weight, events }
+    }
+
+    /// The light along a ray, and what happens along its path.
+    fn explain_sight(&self, draw: Draw, camera: CameraRay) -> (Ray, Spectrum, Vec<Event>) {
+        let (mut wave, mut record) = (Wave::default(), Record::with_journal());
+        let one = std::iter::once((draw, camera));
+        let mut sights = Sights::new(self.scene, &self.view, &mut wave, one, &mut record);
+        let seen = self.see(&mut sights, &mut record)[0].0;
+        let radiance = seen.map_or(sights.radiance()[0], |seen| seen.radiance);
+        (sights.ray(0), radiance, record.journal.unwrap_or_default())
     }
 }
 
@@ -131,10 +171,7 @@ pub fn explain_sample(
 ) -> Result<ExplainedSample, RenderError> {
     let integrator = integrator(&options.integrator);
     let taker = Taker::new(scene, options, &*integrator)?;
-    let mut record = Record::with_journal();
-    let Taken { film, lens, ray, sample } = taker.taken(x, y, index, &mut record);
-    let events = record.journal.unwrap_or_default();
-    Ok(ExplainedSample { film, lens, ray, radiance: sample.radiance, weight: sample.weight, events })
+    Ok(taker.explain(SampleId { x, y, index }))
 }
 
 /// An estimate of the light that arrives along a ray, as the render would make it, with all that happens along its path. The number
@@ -150,7 +187,9 @@ pub fn explain_ray(
 ) -> Result<(Spectrum, Vec<Event>), RenderError> {
     let integrator = integrator(&options.integrator);
     let taker = Taker::new(scene, options, &*integrator)?;
-    let mut record = Record::with_journal();
-    let radiance = taker.along(ray, index, &mut record);
-    Ok((radiance, record.journal.unwrap_or_default()))
+    // With the random numbers of a pixel.
+    let draw = taker.sampler.draw(0, 0, index);
+    let camera = CameraRay { ray: *ray, footprint: Footprint::Point };
+    let (_, radiance, events) = taker.explain_sight(draw, camera);
+    Ok((radiance, events))
 }

@@ -10,10 +10,10 @@ use crate::common::*;
 use lumbre_geometry::{Cuboid, Sphere, Torus};
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{DVec3, Transform, Vec2, Vec3};
-use lumbre_render::transport::{Draw, Path, Sight};
+use lumbre_render::transport::{Draw, Path, RayIntegrator, Sight};
 use lumbre_render::{
-    CancelToken, Feature, Integrator, NoProgress, PixelBounds, Progress, Record, RenderError, RenderOptions,
-    Snapshot, State, denoise, render, render_with,
+    CancelToken, Feature, NoProgress, PixelBounds, Progress, Record, RenderError, RenderOptions, Snapshot,
+    State, denoise, render, render_with,
 };
 use lumbre_scene::{
     FilterDesc, GeometryDesc, InstanceDesc, LightDesc, ObjectDesc, ObjectId, SamplerKind, Scene, SceneDesc,
@@ -160,7 +160,7 @@ fn a_scene_far_from_the_origin_looks_the_same() {
 #[derive(Debug)]
 struct Broken(AtomicU32);
 
-impl Integrator for Broken {
+impl RayIntegrator for Broken {
     fn radiance(&self, _: &Scene, _: &View, _: Sight<'_>, draw: &Draw, _: &mut Record) -> Spectrum {
         if draw.lobe(7) < 1.0 / 97.0 {
             let count = self.0.fetch_add(1, Ordering::Relaxed);
@@ -373,7 +373,7 @@ struct Interrupting {
     left: AtomicU32,
 }
 
-impl Integrator for Interrupting {
+impl RayIntegrator for Interrupting {
     fn radiance(&self, _: &Scene, _: &View, _: Sight<'_>, _: &Draw, _: &mut Record) -> Spectrum {
         if self.left.fetch_sub(1, Ordering::Relaxed) == 1 {
             self.cancel.cancel();
@@ -397,14 +397,15 @@ fn a_render_that_is_stopped_in_its_first_pass_is_a_whole_coarse_picture() {
         (squares(64) + 1, Some(64)),
         (squares(16), Some(16)),
         (squares(4) + 50, Some(4)),
-        (squares(1) - 1, Some(2)),
+        (squares(1) - 300, Some(2)),
         (squares(1), Some(1)),
     ] {
         let cancel = CancelToken::new();
         let interrupting = Interrupting { cancel: cancel.clone(), left: AtomicU32::new(after) };
         let part = render_with(&scene, &options, &interrupting, &NoProgress, &cancel).unwrap();
         assert_eq!((part.stats.stride, part.stats.spp), (stride, u32::from(stride == Some(1))), "{after}");
-        assert_eq!(part.stats.samples, u64::from(after));
+        // What was begun is finished: a sample of each new pixel of a tile at most.
+        assert!((u64::from(after)..u64::from(after) + 256).contains(&part.stats.samples), "{after}");
         let dark = part.image.pixels().iter().filter(|pixel| pixel.g < 0.99).count();
         assert_eq!(dark == 0, stride.is_some(), "{after}: {dark} pixels are dark");
     }

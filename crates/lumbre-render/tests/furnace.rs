@@ -57,7 +57,7 @@ struct Way {
 fn assert_white(desc: SceneDesc, what: &str, ways: &[Way]) {
     let scene = Scene::build(desc).unwrap();
     for &Way { strategy, spp, bounces, share } in ways {
-        let path = Path { strategy, sure_bounces: 1000, ..Path::new(bounces) };
+        let path = Path { strategy, roulette_start: 1000, ..Path::new(bounces) };
         let options = options(&scene, 12, 12, spp);
         let rendered = render_with(&scene, &options, &path, &NoProgress, &CancelToken::new()).unwrap();
         assert_eq!(rendered.stats.dropped, 0);

@@ -58,7 +58,8 @@ fn sky(radiance: Rgb) -> LightDesc {
 
 fn look(desc: SceneDesc, transparent: bool) -> (Rgb, f32) {
     let scene = Scene::build(desc).unwrap();
-    let rendered = picture(&scene, &changed(options(&scene, 12, 10, 256), |it| it.transparent = transparent));
+    let rendered =
+        picture(&scene, &changed(options(&scene, 12, 10, 2048), |it| it.transparent = transparent));
     let alpha = rendered.image.alpha().map_or(1.0, |a| a.iter().sum::<f32>() / a.len() as f32);
     (rendered.image.mean(), alpha)
 }
@@ -189,7 +190,7 @@ fn glass_that_bends_light_takes_as_much_as_geometric_optics_says() {
 /// The coverage of each colour, and that of the picture.
 fn coverage_by_colour(desc: SceneDesc) -> (Option<Rgb>, f32) {
     let scene = Scene::build(desc).unwrap();
-    let rendered = picture(&scene, &changed(options(&scene, 12, 10, 256), |it| it.transparent = true));
+    let rendered = picture(&scene, &changed(options(&scene, 12, 10, 2048), |it| it.transparent = true));
     let alpha = rendered.image.alpha().unwrap();
     (rendered.coverage.map(|coverage| coverage.mean()), alpha.iter().sum::<f32>() / alpha.len() as f32)
 }

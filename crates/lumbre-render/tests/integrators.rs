@@ -168,8 +168,8 @@ fn roulette_changes_the_noise_and_not_the_mean() {
     desc.cameras = vec![look(PLACE + DVec3::new(-2.5, -2.0, 0.5), PLACE, 55.0)];
     let scene = Scene::build(desc).unwrap();
     let options = options(&scene, 20, 20, 256);
-    let by = |sure_bounces| {
-        let path = Path { sure_bounces, ..Path::new(20) };
+    let by = |roulette_start| {
+        let path = Path { roulette_start, ..Path::new(20) };
         let rendered = render_with(&scene, &options, &path, &NoProgress, &CancelToken::new()).unwrap();
         (mean(&rendered.image)[1], rendered.stats.rays.bounce)
     };

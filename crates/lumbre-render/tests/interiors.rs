@@ -52,7 +52,7 @@ fn in_the_open() -> SceneDesc {
 /// The mean of the picture by paths without roulette, and by Whitted's tree of rays.
 fn both(desc: &SceneDesc, camera: Camera, side: u32, spp: u32) -> [[f64; 3]; 2] {
     let scene = Scene::build(SceneDesc { cameras: vec![camera], ..desc.clone() }).unwrap();
-    let path = Path { sure_bounces: 1000, ..Path::new(64) };
+    let path = Path { roulette_start: 1000, ..Path::new(64) };
     let whitted = Whitted { sky: true, ..Whitted::new(64) };
     let integrators: [&dyn Integrator; 2] = [&path, &whitted];
     integrators.map(|integrator| {
@@ -160,7 +160,7 @@ fn glass_in_glass_of_the_same_index_cannot_be_seen() {
             let same = add_material(&mut desc, solid(ior, COLOR, DISTANCE));
             add(&mut desc, exact(Sphere::new(CENTER, 0.6).unwrap()), same);
         }
-        both(&desc, over(0.4), 24, 64)
+        both(&desc, over(0.4), 24, 512)
     };
     let plain = picture_of(None);
     let mut differs = 0;
@@ -219,7 +219,7 @@ fn a_deep_body_shows_the_colour_that_many_collisions_leave() {
     add(&mut desc, exact(Sphere::new(CENTER, radius).unwrap()), wax);
     let disk = std::f64::consts::PI * radius * radius;
     let area = side * side;
-    let found = by_paths(desc, over(0.5 * side), 48, 64);
+    let found = by_paths(desc, over(0.5 * side), 48, 256);
     for (found, expected) in found.into_iter().zip(color.to_array()) {
         // A sphere shows every angle as often as it counts; beside it is the sky. The formula is a fit.
         let found = (found * area - (area - disk)) / disk;

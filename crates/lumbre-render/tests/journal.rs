@@ -33,7 +33,7 @@ fn the_journal_of_every_sample_sums_to_the_pixel_of_the_render() {
     ];
     let mut events = Vec::new();
     for kind in kinds {
-        for index in [0, 5] {
+        for index in [0, 5, 6, 9, 11] {
             let mut options = options(&scene, 24, 16, 1);
             options.first_sample = index;
             options.integrator.kind = kind;

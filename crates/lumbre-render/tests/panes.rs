@@ -299,7 +299,7 @@ fn area_light() -> SceneDesc {
 fn light_of_a_surface_is_counted_once() {
     let expected = STAIN.to_array().map(|c| f64::from(c) * 5.0 * PI * 6.25 / (6.25 + 9.0));
     for strategy in [Strategy::Both, Strategy::Lights, Strategy::Bsdf] {
-        let found = shown(&area_light(), &Path { strategy, sure_bounces: 9, ..Path::new(3) }, 4096);
+        let found = shown(&area_light(), &Path { strategy, roulette_start: 9, ..Path::new(3) }, 4096);
         for (found, expected) in found.into_iter().zip(expected) {
             assert_close(found, expected, 0.01, &format!("{strategy:?}"));
         }
@@ -320,7 +320,7 @@ fn light_of_the_sky_is_counted_once_beside_that_of_a_lamp() {
     let bell = add_material(&mut desc, principled(clear(1.0, STAIN)));
     add(&mut desc, exact(Sphere::new(PLACE, 2.0).unwrap()), bell);
     let whitted = Whitted { sky: true, ..Whitted::new(3) };
-    let path = Path { sure_bounces: 9, ..Path::new(3) };
+    let path = Path { roulette_start: 9, ..Path::new(3) };
     let integrators: [&dyn Integrator; 2] = [&path, &whitted];
     for integrator in integrators {
         for (found, stain) in shown(&desc, integrator, 2048).into_iter().zip(STAIN.to_array()) {
@@ -334,7 +334,7 @@ fn a_pane_that_is_made_rough_for_the_sake_of_noise_is_gone_through_once() {
     let mut desc = floor(vec![lamp()]);
     // The floor lies in the shadow of a small pane, whose surroundings are open.
     add_pane(&mut desc, 0.5 * LAMP, DVec3::Z, principled(clear(1.0, Rgb::WHITE)));
-    let path = Path { sure_bounces: 9, ..Path::new(3) };
+    let path = Path { roulette_start: 9, ..Path::new(3) };
     let sharp = shown(&desc, &path, 64)[1];
     assert_close(sharp, open(), 1e-4, "sharp");
     let rough = shown(&desc, &Path { regularize: true, ..path }, 16384)[1];

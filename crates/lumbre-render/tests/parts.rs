@@ -50,12 +50,12 @@ fn a_render_goes_on_from_any_state_to_the_same_picture() {
     for options in all_options(&scene) {
         let whole = run(&scene, &options, None, None).unwrap();
         let states = RefCell::new(Vec::new());
-        // Without a pause between two looks: a state of every few pixels, also from the first, coarse pass.
+        // Without a pause between two looks: a state of every wave, also from the first, coarse pass.
         let keep = |state: RenderState| states.borrow_mut().push(state.to_bytes());
         let keeper = Keeper { every: Duration::ZERO, keep: &keep };
         let mut slow = options.clone();
         slow.threads = 1;
-        (slow.width, slow.height, slow.stop.spp) = (12, 9, 5);
+        (slow.width, slow.height, slow.stop.spp) = (12, 9, 200);
         let small = run(&scene, &slow, None, None).unwrap();
         let kept = run(&scene, &slow, None, Some(&keeper)).unwrap();
         assert_same(&kept.0, &small.0, "with hand-overs");

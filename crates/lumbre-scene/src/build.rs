@@ -93,6 +93,7 @@ impl Scene {
         let has_holes = builder.entries.iter().any(SurfaceEntry::has_holes);
         let lets_light_through = builder.entries.iter().any(SurfaceEntry::lets_light_through);
         let lets_light_straight_on = builder.entries.iter().any(SurfaceEntry::lets_light_straight_on);
+        let has_solids = builder.entries.iter().any(SurfaceEntry::may_be_solid);
         let has_one_sided = builder.entries.iter().any(SurfaceEntry::is_one_sided_anywhere);
         let looks_up = builder.entries.iter().any(SurfaceEntry::looks_up_anywhere);
         Ok(Self {
@@ -109,6 +110,7 @@ impl Scene {
             has_holes,
             lets_light_through,
             lets_light_straight_on,
+            has_solids,
             has_one_sided,
             has_instances: !objects.is_empty(),
             moves,

@@ -109,6 +109,16 @@ impl<'s> Interaction<'s> {
         (!scene.is_occluded(&way)).then(|| self.incident_origin + terminator_offset)
     }
 
+    /// [`Interaction::risen`] without a look at what lies between.
+    pub fn terminator_origin(&self) -> Option<DVec3> {
+        Some(self.incident_origin + self.terminator_offset?)
+    }
+
+    /// The width of the footprint across the ray, and its growth with distance: of the rays that leave, too.
+    pub fn cone(&self) -> (f64, f64) {
+        (self.width, self.spread)
+    }
+
     /// Whether there may be a terminator offset.
     pub fn may_rise(&self) -> bool {
         self.terminator_offset.is_some()

@@ -43,6 +43,8 @@ pub struct Scene {
     pub(crate) lets_light_through: bool,
     /// Whether any material transmits light straight on.
     pub(crate) lets_light_straight_on: bool,
+    /// Whether any material encloses a solid that light passes through.
+    pub(crate) has_solids: bool,
     // Whether any material is one-sided.
     pub(crate) has_one_sided: bool,
     pub(crate) has_instances: bool,
@@ -175,6 +177,11 @@ impl Scene {
         self.lets_light_through
     }
 
+    /// Whether any material encloses a solid that light passes through.
+    pub fn has_solids(&self) -> bool {
+        self.has_solids
+    }
+
     /// Whether any material transmits light straight on ([`lumbre_shading::Bsdf::straight_on`]), such as a thin
     /// smooth pane.
     pub fn lets_light_straight_on(&self) -> bool {
@@ -204,6 +211,45 @@ impl Scene {
             self.accel.closest_with(ray, &Query::new().filter(&is_seen))
         } else {
             self.closest(ray)
+        }
+    }
+
+    /// [`Scene::closest`] for every ray.
+    ///
+    /// # Panics
+    /// When there are not as many places for hits as rays.
+    pub fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        if self.has_holes {
+            assert_eq!(rays.len(), hits.len(), "a place for each hit");
+            hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = self.closest(ray));
+        } else {
+            self.accel.closest_batch(rays, hits);
+        }
+    }
+
+    /// [`Scene::closest_seen`] for every ray.
+    ///
+    /// # Panics
+    /// When there are not as many places for hits as rays.
+    pub fn closest_seen_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        if self.has_one_sided {
+            assert_eq!(rays.len(), hits.len(), "a place for each hit");
+            hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = self.closest_seen(ray));
+        } else {
+            self.closest_batch(rays, hits);
+        }
+    }
+
+    /// [`Scene::is_occluded`] for every ray.
+    ///
+    /// # Panics
+    /// When there are not as many answers as rays.
+    pub fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
+        if self.has_holes {
+            assert_eq!(rays.len(), occluded.len(), "an answer for each ray");
+            occluded.iter_mut().zip(rays).for_each(|(occluded, ray)| *occluded = self.is_occluded(ray));
+        } else {
+            self.accel.any_batch(rays, occluded);
         }
     }
 

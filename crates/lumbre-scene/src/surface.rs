@@ -220,6 +220,14 @@ impl SurfaceEntry {
         }
     }
 
+    /// Whether any part of it may enclose a solid that light passes through.
+    pub(crate) fn may_be_solid(&self) -> bool {
+        match &self.form {
+            Form::Csg(csg) => csg.leaves.iter().any(Self::may_be_solid),
+            _ => self.material.as_ref().is_some_and(|material| material.may_be_solid()),
+        }
+    }
+
     /// Whether any part of it may be passed by light.
     pub(crate) fn has_holes(&self) -> bool {
         match &self.form {

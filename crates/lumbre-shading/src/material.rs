@@ -445,6 +445,13 @@ impl Material {
         self.interior_index().is_some()
     }
 
+    /// Whether it, or a part of the mixture, may be solid: see [`Material::is_solid`].
+    pub fn may_be_solid(&self) -> bool {
+        self.has_part(
+            |kind| matches!(kind, MaterialKind::Principled(params) if params.interior_index().is_some()),
+        )
+    }
+
     /// The index of refraction inside a solid of this material, against vacuum; `None` where light cannot get
     /// inside, and for the kinds whose index is relative to the outside.
     pub fn interior_index(&self) -> Option<f32> {

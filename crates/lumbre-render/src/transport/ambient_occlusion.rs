@@ -5,7 +5,7 @@ use lumbre_scene::{Scene, View};
 use lumbre_shading::{ShadingFrame, ShadingNormals, Spectrum};
 
 use crate::transport::journal::{Event, Met, Source};
-use crate::transport::{Draw, Integrator, Record, Sight};
+use crate::transport::{Draw, RayIntegrator, Record, Sight};
 
 /// The share of the sky over a surface that is open, weighed by the cosine: white where nothing is near.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,7 +18,7 @@ pub struct AmbientOcclusion {
     pub shading_normals: ShadingNormals,
 }
 
-impl Integrator for AmbientOcclusion {
+impl RayIntegrator for AmbientOcclusion {
     fn radiance(
         &self,
         scene: &Scene,

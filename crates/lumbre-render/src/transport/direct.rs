@@ -9,8 +9,7 @@ use lumbre_shading::{Bsdf, LocalDir, Material, Scatter, ShadingFrame, ShadingNor
 
 use crate::transport::Record;
 use crate::transport::interior::Interiors;
-use crate::transport::journal::{Event, SampledLight};
-use crate::transport::through::{goes_straight_on, straight_on};
+use crate::transport::through::straight_on;
 
 /// A surface as seen along a path, ready to scatter.
 ///
@@ -203,65 +202,6 @@ impl<'a, 's> Vertex<'a, 's> {
         }
     }
 
-    /// What the vertex scatters of a light's sample towards the path, weighed against the other way to find the same
-    /// light: the density with which the BSDF would have chosen it.
-    pub(super) fn scattered(
-        &self,
-        sample: &LightSample,
-        interiors: &Interiors<'s>,
-        regularize: bool,
-        weigh: impl FnOnce(f32, f32) -> f32,
-        record: &mut Record,
-    ) -> Spectrum {
-        let unfolded = self.unfolded(sample.towards.as_vec3());
-        let value = self.eval_unfolded(unfolded);
-        let scattered = value * sample.radiance;
-        let (weight, pdf, bsdf_pdf) = match sample.scatter {
-            _ if scattered.is_black() => (0.0, 1.0, 0.0),
-            Scatter::Delta => (1.0, 1.0, 0.0),
-            Scatter::Density(pdf) => {
-                let bsdf_pdf = self.pdf_unfolded(unfolded);
-                (weigh(pdf, bsdf_pdf), pdf, bsdf_pdf)
-            }
-        };
-        let share = weight / pdf;
-        // False for a NaN, which is for the film to find.
-        let is_nothing = share <= 0.0;
-        let passes =
-            if is_nothing { Spectrum::BLACK } else { self.visible(sample, interiors, regularize, record) };
-        record.note(|| {
-            let shadow_ray = (!is_nothing).then(|| self.shadow_ray(sample));
-            let sample = *sample;
-            Event::Sampled(Box::new(SampledLight {
-                sample,
-                scattered: value,
-                bsdf_pdf,
-                weight,
-                shadow_ray,
-                passes,
-            }))
-        });
-        if passes.is_black() { Spectrum::BLACK } else { scattered * share * passes }
-    }
-
-    /// What comes through of a light's sample between the light and here; black where something is in its way.
-    fn visible(
-        &self,
-        sample: &LightSample,
-        interiors: &Interiors<'s>,
-        regularize: bool,
-        record: &mut Record,
-    ) -> Spectrum {
-        if goes_straight_on(self.scene, sample) {
-            return self.passes_straight_on(sample, interiors, regularize, record);
-        }
-        record.counts.shadow += 1;
-        if self.scene.is_occluded(&self.shadow_ray(sample)) {
-            return Spectrum::BLACK;
-        }
-        self.passes(sample, interiors)
-    }
-
     /// What of the light that comes from straight behind goes straight on: see [`Bsdf::straight_on`].
     pub(super) fn straight_on(&self) -> Spectrum {
         self.bsdf.straight_on(self.wo)
@@ -329,28 +269,4 @@ impl<'a, 's> Vertex<'a, 's> {
 
 fn mirrored(w: Vec3, normal: Vec3) -> Vec3 {
     w - normal * (2.0 * normal.dot(w))
-}
-
-/// The power heuristic (Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997) for two ways.
-pub(super) fn power_heuristic(this: f32, other: f32) -> f32 {
-    if this.is_infinite() {
-        return 1.0;
-    }
-    // By the ratio, for a square may overflow.
-    let ratio = other / this;
-    1.0 / (1.0 + ratio * ratio)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::power_heuristic;
-
-    #[test]
-    fn the_weights_of_both_ways_sum_to_one_at_any_size() {
-        for (a, b) in [(2.0, 3.0), (1e30, 2e30), (1e-30, 5e-30), (7.0, 0.0), (0.5, 1e25)] {
-            let sum = power_heuristic(a, b) + if b > 0.0 { power_heuristic(b, a) } else { 0.0 };
-            assert!((sum - 1.0).abs() < 1e-6, "{a} {b} {sum}");
-        }
-        assert_eq!(power_heuristic(f32::INFINITY, 2.0), 1.0);
-    }
 }

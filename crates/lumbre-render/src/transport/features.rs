@@ -5,7 +5,7 @@ use lumbre_scene::{Scene, View};
 use lumbre_shading::Spectrum;
 
 use crate::transport::journal::{Event, Met, Source};
-use crate::transport::{Draw, Integrator, Record, Sight};
+use crate::transport::{Draw, RayIntegrator, Record, Sight};
 
 /// One of the features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -97,7 +97,7 @@ impl Features {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FeatureIntegrator(pub Feature);
 
-impl Integrator for FeatureIntegrator {
+impl RayIntegrator for FeatureIntegrator {
     fn radiance(&self, _: &Scene, view: &View, sight: Sight<'_>, _: &Draw, record: &mut Record) -> Spectrum {
         let ray = sight.ray.ray;
         match &sight.met {

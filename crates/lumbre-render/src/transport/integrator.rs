@@ -6,10 +6,17 @@ use std::ops::AddAssign;
 use lumbre_scene::{CameraRay, IntegratorDesc, IntegratorKind, Interaction, Scene, View};
 use lumbre_shading::Spectrum;
 
-use crate::transport::{AmbientOcclusion, Draw, Feature, FeatureIntegrator, Path, Record, Whitted};
+use crate::transport::{AmbientOcclusion, Draw, Feature, FeatureIntegrator, Path, Record, Sampler, Whitted};
+use crate::wave::Sights;
 
-/// An estimator of the radiance that arrives along a ray. It is called once a path.
+/// An estimator of the radiance that arrives at the camera, of many samples at a time.
 pub trait Integrator: Debug + Send + Sync {
+    /// Gives each of the samples an estimate of the radiance along its ray from the camera.
+    fn estimate(&self, sights: &mut Sights<'_, '_>, sampler: &Sampler, record: &mut Record);
+}
+
+/// An estimator that takes one ray from the camera after the other.
+pub trait RayIntegrator: Debug + Send + Sync {
     /// An estimate of the radiance that arrives at the camera along a line of sight.
     fn radiance(
         &self,
@@ -21,6 +28,13 @@ pub trait Integrator: Debug + Send + Sync {
     ) -> Spectrum;
 }
 
+impl<T: RayIntegrator> Integrator for T {
+    fn estimate(&self, sights: &mut Sights<'_, '_>, _: &Sampler, record: &mut Record) {
+        let (scene, view) = (sights.scene(), sights.view());
+        sights.each(|sight, draw| self.radiance(scene, view, sight, draw, record));
+    }
+}
+
 /// A ray from the camera, and what it meets first.
 #[derive(Clone, Debug)]
 pub struct Sight<'s> {
@@ -28,15 +42,6 @@ pub struct Sight<'s> {
     pub ray: CameraRay,
     /// What it meets; `None` when it leaves the scene.
     pub met: Option<Interaction<'s>>,
-}
-
-impl<'s> Sight<'s> {
-    /// Follows a ray to the first thing that a camera sees.
-    pub fn new(scene: &'s Scene, ray: CameraRay, record: &mut Record) -> Self {
-        record.counts.camera += 1;
-        let met = scene.closest_seen(&ray.ray).map(|hit| scene.interaction(&ray.ray, &hit, &ray.footprint));
-        Self { ray, met }
-    }
 }
 
 /// How many rays were traced, by what for.

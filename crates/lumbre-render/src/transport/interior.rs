@@ -12,14 +12,14 @@ use smallvec::SmallVec;
 /// index of refraction counts against that of the solid around it. Where solids overlap without one holding the other,
 /// the one that was entered last counts.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Interiors<'s> {
+pub(crate) struct Interiors<'s> {
     around: SmallVec<[&'s Material; 2]>,
 }
 
 impl<'s> Interiors<'s> {
     /// Comes to a surface, whose material there is `material`. A solid that is met from inside without having been entered is
     /// one that the path began in; until then nothing is known of it.
-    pub(super) fn arrive(&mut self, here: &Interaction<'s>, material: Option<&'s Material>) {
+    pub(crate) fn arrive(&mut self, here: &Interaction<'s>, material: Option<&'s Material>) {
         if let Some(material) = material.filter(|material| !here.front && material.is_solid())
             && !self.around.iter().any(|&solid| std::ptr::eq(solid, material))
         {
@@ -28,12 +28,12 @@ impl<'s> Interiors<'s> {
     }
 
     /// What scatters light in the innermost solid.
-    pub(super) fn medium(&self) -> Option<HomogeneousMedium> {
+    pub(crate) fn medium(&self) -> Option<HomogeneousMedium> {
         self.around.last().and_then(|solid| solid.interior_medium())
     }
 
     /// What is left of light after a distance inside the innermost solid.
-    pub(super) fn transmittance(&self, distance: f64) -> Spectrum {
+    pub(crate) fn transmittance(&self, distance: f64) -> Spectrum {
         let sigma = self.around.last().and_then(|solid| solid.interior_attenuation());
         sigma.map_or(Spectrum::WHITE, |sigma| {
             sigma.map(|sigma| (-f64::from(sigma) * distance).exponential() as f32)
@@ -41,12 +41,12 @@ impl<'s> Interiors<'s> {
     }
 
     /// Whether light loses anything here.
-    pub(super) fn attenuates(&self) -> bool {
+    pub(crate) fn attenuates(&self) -> bool {
         self.around.last().is_some_and(|solid| solid.interior_attenuation().is_some())
     }
 
     /// Goes through a surface, into the solid behind it or out of it.
-    pub(super) fn cross(&mut self, material: &'s Material, inwards: bool) {
+    pub(crate) fn cross(&mut self, material: &'s Material, inwards: bool) {
         if !material.is_solid() {
             return;
         }
@@ -61,7 +61,7 @@ impl<'s> Interiors<'s> {
     }
 
     /// The index of refraction outside a solid whose surface the path is at.
-    pub(super) fn index_outside(&self, material: &Material, from_outside: bool) -> f32 {
+    pub(crate) fn index_outside(&self, material: &Material, from_outside: bool) -> f32 {
         let mut outer = self.around.iter().rev();
         let solid = if from_outside {
             outer.next()

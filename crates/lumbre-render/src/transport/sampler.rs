@@ -1,88 +1,187 @@
-//! Random numbers as a pure function of (seed, pixel, sample index, what they are for).
+//! Random numbers as a pure function of (seed, pixel, sample index, what they are for), for one sample or for lanes of them.
 
-use lumbre_math::DVec2;
-use lumbre_math::Vec2;
-use lumbre_math::random::{PixelRandom, SampleRandom, combine, mix, uniform_f64};
-use lumbre_math::sobol::OwenSobol;
+use lumbre_math::random::PixelRandom;
+use lumbre_math::{DVec2, Vec2};
 use lumbre_scene::{SamplerDesc, SamplerKind};
+use lumbre_simd::{Real, UInt};
 
-/// The closed set of samplers.
+/// How the numbers of a pixel's samples are made.
 #[derive(Clone, Copy, Debug)]
-pub enum Sampler {
-    /// Owen-scrambled Sobol points: even over the samples of a pixel.
-    Sobol {
-        /// The points.
-        points: OwenSobol,
-        /// The seed, for the hash of a pixel.
-        seed: u64,
-    },
-    /// Independent uniform numbers.
-    Independent {
-        /// The seed.
-        seed: u64,
-    },
+pub struct Sampler {
+    kind: SamplerKind,
+    seed: u64,
 }
 
-/// What belongs to a whole path, each a label of its own.
+/// Where in the pixel, and when a ray looks.
 const FILTER: u32 = 0;
+/// Where on the lens.
 const LENS: u32 = 1;
-/// The labels of path vertex k start at `FIRST_VERTEX + k * LABELS`.
+/// Path vertex k has the labels `FIRST_VERTEX + 2 * k`, for its light, and the next one, for its BSDF.
 const FIRST_VERTEX: u32 = 2;
-const LABELS: u32 = 5;
-const LIGHT_CHOICE: u32 = 0;
-const LIGHT_POINT: u32 = 1;
-const LOBE: u32 = 2;
-const DIRECTION: u32 = 3;
-const SURVIVAL: u32 = 4;
 /// Labels of integrators that ask every light of a vertex for a point.
 const EVERY_LIGHT: u32 = 1 << 24;
-/// Labels of distance samples in media.
+/// Labels of distance samples in media: two each.
 const EVERY_DISTANCE_SAMPLE: u32 = 1 << 27;
-/// When a ray looks. Away from the others, so that these are what they are without it.
-const TIME: u32 = 1 << 30;
 /// Labels of integrators that follow several rays from a vertex.
 const EVERY_BRANCH: u32 = 1 << 28;
 
 impl Sampler {
     /// The sampler that a description asks for.
     pub fn new(desc: &SamplerDesc) -> Self {
-        match desc.kind {
-            SamplerKind::Sobol => Self::Sobol { points: OwenSobol::new(desc.seed), seed: desc.seed },
-            SamplerKind::Independent => Self::Independent { seed: desc.seed },
-        }
+        Self { kind: desc.kind, seed: desc.seed }
     }
 
     /// The numbers of one sample of the pixel in column `x` and row `y`.
     #[inline]
     pub fn draw(&self, x: u32, y: u32, index: u32) -> Draw {
-        match *self {
-            Self::Sobol { points, seed } => {
-                Draw::Sobol { points, pixel: PixelRandom::new(seed, x, y).key(), index }
-            }
-            Self::Independent { seed } => {
-                Draw::Independent(PixelRandom::new(seed, x, y).sample(u64::from(index)))
-            }
-        }
+        let key = PixelRandom::new(self.seed, x, y).key();
+        Draw { kind: self.kind, pixel: [key as u32, (key >> 32) as u32], index }
+    }
+
+    /// The kind of all numbers.
+    pub(crate) fn kind(&self) -> SamplerKind {
+        self.kind
     }
 }
 
 /// The random numbers of one sample. Asking one of them changes none of the others.
 #[derive(Clone, Copy, Debug)]
-pub enum Draw {
-    /// Of [`Sampler::Sobol`].
-    Sobol {
-        /// The points.
-        points: OwenSobol,
-        /// The hash of the pixel.
-        pixel: u64,
-        /// The sample.
-        index: u32,
-    },
-    /// Of [`Sampler::Independent`].
-    Independent(SampleRandom),
+pub struct Draw {
+    kind: SamplerKind,
+    /// A hash of the seed and the pixel.
+    pixel: [u32; 2],
+    index: u32,
+}
+
+/// The random numbers of a sample in each lane: those of [`Draw`], to the bit.
+#[derive(Clone, Copy)]
+pub(crate) struct LaneDraw<R: Real> {
+    /// Of all lanes.
+    pub(crate) kind: SamplerKind,
+    /// A hash of the seed and the pixel.
+    pub(crate) pixel: [R::UInt; 2],
+    /// The sample.
+    pub(crate) index: R::UInt,
+}
+
+impl<R: Real> LaneDraw<R> {
+    /// Where on a light, which light, and further digits of that.
+    #[inline(always)]
+    pub(crate) fn light(&self, vertex: R::UInt) -> [R; 4] {
+        self.four(vertex.shl::<1>() + R::UInt::splat(FIRST_VERTEX))
+    }
+
+    /// Which direction, which part of a BSDF, and whether the path goes on.
+    #[inline(always)]
+    pub(crate) fn scatter(&self, vertex: R::UInt) -> [R; 4] {
+        self.four(vertex.shl::<1>() + R::UInt::splat(FIRST_VERTEX + 1))
+    }
+
+    /// Four numbers of a label in [0, 1), multiples of 2⁻²⁴. Over the samples of a pixel, Sobol numbers are even: the first two
+    /// together, the others each by itself.
+    #[inline(always)]
+    pub(crate) fn four(&self, label: R::UInt) -> [R; 4] {
+        let [p, q] = self.pixel;
+        let bits = match self.kind {
+            SamplerKind::Independent => pcg4d([p, q, self.index, label]),
+            SamplerKind::Sobol => {
+                let k = pcg4d([p, q, label, R::UInt::splat(1)]);
+                let l = pcg4d([p, q, label, R::UInt::splat(2)]);
+                let index = reversed(self.index);
+                let [x, y] = sobol_pair(index, [k[0], k[1], k[2]]);
+                [x, y, sobol_one(index, [k[3], l[0]]), sobol_one(index, [l[1], l[2]])]
+            }
+        };
+        [uniform(bits[0]), uniform(bits[1]), uniform(bits[2]), uniform(bits[3])]
+    }
+}
+
+/// The multiple of 2⁻²⁴ in [0, 1) from the top bits of a word.
+#[inline(always)]
+fn uniform<R: Real>(bits: R::UInt) -> R {
+    R::from_int(bits.shr::<8>()) * R::splat(1.0 / 16_777_216.0)
+}
+
+/// Hashes four words to four: M. Jarzynski, M. Olano, "Hash Functions for GPU Rendering", JCGT 9(3), 2020.
+#[inline(always)]
+fn pcg4d<U: UInt>(v: [U; 4]) -> [U; 4] {
+    let (a, c) = (U::splat(1_664_525), U::splat(1_013_904_223));
+    let (mut x, mut y, mut z, mut w) = (v[0] * a + c, v[1] * a + c, v[2] * a + c, v[3] * a + c);
+    x = x + y * w;
+    y = y + z * x;
+    z = z + x * y;
+    w = w + y * z;
+    x = x ^ x.shr::<16>();
+    y = y ^ y.shr::<16>();
+    z = z ^ z.shr::<16>();
+    w = w ^ w.shr::<16>();
+    x = x + y * w;
+    y = y + z * x;
+    z = z + x * y;
+    w = w + y * z;
+    [x, y, z, w]
+}
+
+/// The word with its bits in reversed order.
+#[inline(always)]
+fn reversed<U: UInt>(x: U) -> U {
+    let s = U::splat;
+    let x = (x.shr::<1>() & s(0x5555_5555)) | (x & s(0x5555_5555)).shl::<1>();
+    let x = (x.shr::<2>() & s(0x3333_3333)) | (x & s(0x3333_3333)).shl::<2>();
+    let x = (x.shr::<4>() & s(0x0f0f_0f0f)) | (x & s(0x0f0f_0f0f)).shl::<4>();
+    let x = (x.shr::<8>() & s(0x00ff_00ff)) | (x & s(0x00ff_00ff)).shl::<8>();
+    x.shr::<16>() | x.shl::<16>()
+}
+
+/// [`lumbre_math::sobol::owen_scramble`] of binary places in reversed order, to reversed order.
+#[inline(always)]
+fn reversed_scramble<U: UInt>(x: U, seed: U) -> U {
+    let s = U::splat;
+    let x = x ^ x * s(0x3d20_adea);
+    let x = x + seed;
+    let x = x * (seed.shr::<16>() | s(1));
+    let x = x ^ x * s(0x0552_6c56);
+    x ^ x * s(0x53a2_2864)
+}
+
+/// A point of Owen-scrambled Sobol points, by the reversed index and keys of the shuffle and of both coordinates: see
+/// [`lumbre_math::sobol`].
+#[inline(always)]
+fn sobol_pair<U: UInt>(reversed_index: U, keys: [U; 3]) -> [U; 2] {
+    let s = U::splat;
+    // In reversed order the radical inverse is the index itself.
+    let x = reversed(reversed_scramble(reversed_index, keys[0]));
+    let y = x ^ (x & s(0xaaaa_aaaa)).shr::<1>();
+    let y = y ^ (y & s(0xcccc_cccc)).shr::<2>();
+    let y = y ^ (y & s(0xf0f0_f0f0)).shr::<4>();
+    let y = y ^ (y & s(0xff00_ff00)).shr::<8>();
+    let y = y ^ y.shr::<16>();
+    [reversed(reversed_scramble(x, keys[1])), reversed(reversed_scramble(y, keys[2]))]
+}
+
+/// A number that is even over aligned ranges of indices, by keys of the shuffle and of the scramble.
+#[inline(always)]
+fn sobol_one<U: UInt>(reversed_index: U, keys: [U; 2]) -> U {
+    let shuffled = reversed(reversed_scramble(reversed_index, keys[0]));
+    reversed(reversed_scramble(shuffled, keys[1]))
 }
 
 impl Draw {
+    /// The words that all numbers are made of: of the pixel, and the index of the sample.
+    pub(crate) fn words(&self) -> ([u32; 2], u32) {
+        (self.pixel, self.index)
+    }
+
+    fn four(&self, label: u32) -> [f32; 4] {
+        let pixel = self.pixel.map(UInt::splat);
+        LaneDraw::<f32> { kind: self.kind, pixel, index: UInt::splat(self.index) }.four(UInt::splat(label))
+    }
+
+    fn two(&self, label: u32) -> DVec2 {
+        let [x, y, ..] = self.four(label);
+        DVec2::new(x.into(), y.into())
+    }
+
     /// Where in the pixel filter.
     pub fn filter(&self) -> DVec2 {
         self.two(FILTER)
@@ -95,113 +194,77 @@ impl Draw {
 
     /// Which part of the exposure is over when the ray looks: even over the samples of a pixel.
     pub fn time(&self) -> f64 {
-        self.one(TIME)
+        self.four(FILTER)[2].into()
     }
 
-    /// Which light, at a vertex.
+    /// Which light, at a vertex: a multiple of 2⁻⁴⁸.
     pub fn light_choice(&self, vertex: u32) -> f64 {
-        self.one(label(vertex, LIGHT_CHOICE))
+        let [.., choice, more] = self.four(of_light(vertex));
+        f64::from(choice) + f64::from(more) * (1.0 / 16_777_216.0)
     }
 
     /// Where on the light.
     pub fn light_point(&self, vertex: u32) -> DVec2 {
-        self.two(label(vertex, LIGHT_POINT))
+        self.two(of_light(vertex))
     }
 
-    /// Where on the light of this number, for integrators that ask all of them for some `points` each.
+    /// Where on the light of this number, for integrators that ask all of them for some `points` each: the points of all samples of
+    /// the pixel are even together.
     pub fn point_on_each_light(&self, vertex: u32, light: u32, point: u32, points: u32) -> DVec2 {
         let label = EVERY_LIGHT.wrapping_add(vertex.wrapping_mul(1 << 12)).wrapping_add(light);
-        match *self {
-            // The points of all samples of the pixel are one even set.
-            Self::Sobol { points: sobol, pixel, index } => {
-                let index = index.wrapping_mul(points).wrapping_add(point);
-                Self::Sobol { points: sobol, pixel, index }.two(label)
-            }
-            Self::Independent(_) if point == 0 => self.two(label),
-            Self::Independent(random) => {
-                let key = combine(random.bits(label), u64::from(point));
-                DVec2::new(uniform_f64(key), uniform_f64(mix(key)))
-            }
-        }
+        let index = self.index.wrapping_mul(points).wrapping_add(point);
+        Self { index, ..*self }.two(label)
     }
 
     /// Whether a branch of a tree of rays goes on.
     pub fn branch(&self, vertex: u32, branch: u32) -> f32 {
-        single(self.one(EVERY_BRANCH.wrapping_add(vertex.wrapping_mul(1 << 12)).wrapping_add(branch)))
+        self.four(EVERY_BRANCH.wrapping_add(vertex.wrapping_mul(1 << 12)).wrapping_add(branch))[2]
     }
 
     /// Which part of a BSDF.
     pub fn lobe(&self, vertex: u32) -> f32 {
-        single(self.one(label(vertex, LOBE)))
+        self.four(of_bsdf(vertex))[2]
     }
 
     /// Which direction of that part.
     pub fn direction(&self, vertex: u32) -> Vec2 {
-        let u = self.two(label(vertex, DIRECTION));
-        Vec2::new(single(u.x), single(u.y))
+        let [x, y, ..] = self.four(of_bsdf(vertex));
+        Vec2::new(x, y)
     }
 
     /// Whether the path goes on.
     pub fn survival(&self, vertex: u32) -> f32 {
-        single(self.one(label(vertex, SURVIVAL)))
+        self.four(of_bsdf(vertex))[3]
     }
 
     /// A distance sample in a medium: which channel of the spectrum, and how far.
     pub fn distance(&self, sample: u32) -> [f64; 2] {
-        [self.one(inside(sample, 0)), self.one(inside(sample, 1))]
+        let [.., channel, distance] = self.four(in_medium(sample, 0));
+        [channel.into(), distance.into()]
     }
 
     /// The direction after the collision of a distance sample.
     pub fn scattered(&self, sample: u32) -> Vec2 {
-        let u = self.two(inside(sample, 2));
-        Vec2::new(single(u.x), single(u.y))
+        let [x, y, ..] = self.four(in_medium(sample, 0));
+        Vec2::new(x, y)
     }
 
     /// Whether the path goes on after that collision.
     pub fn survives_collision(&self, sample: u32) -> f32 {
-        single(self.one(inside(sample, 3)))
-    }
-
-    #[inline]
-    fn one(&self, label: u32) -> f64 {
-        match self {
-            Self::Sobol { points, pixel, index } => fraction(points.bits_1d(*pixel, *index, label)),
-            // Two labels each, so that pairs do not share a number.
-            Self::Independent(random) => random.f64(label.wrapping_mul(2)),
-        }
-    }
-
-    #[inline]
-    fn two(&self, label: u32) -> DVec2 {
-        match self {
-            Self::Sobol { points, pixel, index } => {
-                DVec2::from_array(points.bits_2d(*pixel, *index, label).map(fraction))
-            }
-            Self::Independent(random) => {
-                let first = label.wrapping_mul(2);
-                DVec2::new(random.f64(first), random.f64(first.wrapping_add(1)))
-            }
-        }
+        self.four(in_medium(sample, 1))[2]
     }
 }
 
-fn inside(sample: u32, what: u32) -> u32 {
-    EVERY_DISTANCE_SAMPLE.wrapping_add(sample.wrapping_mul(4)).wrapping_add(what)
+fn of_light(vertex: u32) -> u32 {
+    vertex.wrapping_mul(2).wrapping_add(FIRST_VERTEX)
 }
 
-fn label(vertex: u32, what: u32) -> u32 {
-    FIRST_VERTEX.wrapping_add(vertex.wrapping_mul(LABELS)).wrapping_add(what)
+fn of_bsdf(vertex: u32) -> u32 {
+    of_light(vertex).wrapping_add(1)
 }
 
-#[inline]
-fn fraction(bits: u32) -> f64 {
-    f64::from(bits) * (1.0 / 4_294_967_296.0)
-}
-
-/// Cut to 24 places, so that it stays below 1.
-#[inline]
-fn single(u: f64) -> f32 {
-    (u * 16_777_216.0) as u32 as f32 * (1.0 / 16_777_216.0)
+fn in_medium(sample: u32, what: u32) -> u32 {
+    EVERY_DISTANCE_SAMPLE.wrapping_add(sample.wrapping_mul(2)).wrapping_add(what)
 }
 
 #[cfg(test)]

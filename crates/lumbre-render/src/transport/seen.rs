@@ -3,13 +3,13 @@
 use std::f64::consts::FRAC_1_PI;
 
 use lumbre_math::{DVec3, Frame, warp64};
-use lumbre_scene::{GroundPlane, Interaction, LightSample, Scene, View};
+use lumbre_scene::{GroundPlane, Interaction, LightSample, Scene};
 use lumbre_shading::{Scatter, Spectrum};
 
 use crate::transport::interior::Interiors;
 use crate::transport::journal::{Event, Source};
 use crate::transport::through::{goes_straight_on, light_through, straight_on};
-use crate::transport::{Draw, Integrator, Record, Sight};
+use crate::transport::{Draw, Record, Sight};
 
 /// Samples of each light that each sample of a shadow takes: few rays, where a whole path would be many.
 const SAMPLES: u32 = 2;
@@ -21,7 +21,7 @@ const WAY_BITS: u32 = 6;
 
 /// What is seen along a line of sight.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seen {
+pub(crate) struct Seen {
     /// Radiance, multiplied by the coverage.
     pub radiance: Spectrum,
     /// How much of what is behind is covered, of each colour: shadows are coloured where lights are, or what they shine through.
@@ -31,7 +31,7 @@ pub struct Seen {
     pub on_catcher: bool,
 }
 
-/// Looks along a line of sight.
+/// What a sample sees where that is not for an integrator to find: nothing, or ground that catches shadows.
 ///
 /// Where the camera meets nothing it sees the lights at infinity, or, if these are not to be seen, nothing at all. On ground
 /// that catches shadows ([`GroundPlane::catcher`]) it sees what it would see without the ground, darkened by the share of
@@ -39,15 +39,13 @@ pub struct Seen {
 /// things is not kept from it: light at infinity through whatever bends or spreads it, the other light through smooth panes
 /// without thickness. (P. Debevec, "Rendering Synthetic Objects into Real Scenes", SIGGRAPH 1998, takes the difference of
 /// two renderings; here only what is blocked is estimated, so that ground in the open has no noise.)
-pub fn see(
-    integrator: &dyn Integrator,
+pub(crate) fn caught(
     scene: &Scene,
-    view: &View,
-    sight: Sight<'_>,
+    sight: &Sight<'_>,
     draw: &Draw,
     lights_are_seen: bool,
     record: &mut Record,
-) -> Seen {
+) -> Option<Seen> {
     let behind = |ray| if lights_are_seen { scene.background(ray).sum() } else { Spectrum::BLACK };
     let covered = if lights_are_seen { Spectrum::WHITE } else { Spectrum::BLACK };
     let catcher = scene.ground().filter(|ground| ground.catcher);
@@ -58,15 +56,12 @@ pub fn see(
             let left = Spectrum::WHITE - blocked;
             let coverage = if lights_are_seen { Spectrum::WHITE } else { blocked };
             let radiance = record.added(Source::Infinity, left, behind(&sight.ray.ray), 1.0);
-            Seen { radiance, coverage, on_catcher: true }
+            Some(Seen { radiance, coverage, on_catcher: true })
         }
         (None, _) if !lights_are_seen => {
-            Seen { radiance: Spectrum::BLACK, coverage: covered, on_catcher: false }
+            Some(Seen { radiance: Spectrum::BLACK, coverage: covered, on_catcher: false })
         }
-        _ => {
-            let radiance = integrator.radiance(scene, view, sight, draw, record);
-            Seen { radiance, coverage: Spectrum::WHITE, on_catcher: false }
-        }
+        _ => None,
     }
 }
 

@@ -1,12 +1,11 @@
 //! Light that reaches a place through what is clear.
 
 use lumbre_geometry::Ray;
-use lumbre_scene::{Footprint, LightSample, Scene};
+use lumbre_scene::{Footprint, Interaction, LightSample, Scene};
 use lumbre_shading::{Scatter, ShadingNormals, Spectrum};
 
 use crate::transport::direct::Vertex;
 use crate::transport::interior::Interiors;
-use crate::transport::path::ray_length;
 use crate::transport::{Draw, Record};
 
 /// Surfaces at most that light goes through or is reflected by inside a solid.
@@ -17,6 +16,11 @@ const MOST_PANES: u32 = 256;
 const LEAST_PART: f32 = 1.0 / 256.0;
 /// How far the product of the indices along a path may be from 1 by rounding.
 const INDEX_ERROR: f32 = 1e-4;
+
+/// The way from a ray's origin to what it met; its direction is unit.
+pub(super) fn ray_length(ray: &Ray, here: &Interaction) -> f64 {
+    (here.surface.point - ray.origin).length()
+}
 
 /// An estimate of the light at infinity that comes back along a ray which meets something first: refracted, spread by what is
 /// rough, and reflected inside solids, but not by their outer sides. Black where the ray meets nothing, or what is not clear.
@@ -85,7 +89,7 @@ pub(super) fn goes_straight_on(scene: &Scene, sample: &LightSample) -> bool {
 /// Only for light that is not also found by rays which go through the pane themselves, or it would count twice: of paths, see
 /// [`goes_straight_on`]. What bends or spreads light stands in its way here: what is rough is lit itself, and paths find it; what
 /// is smooth and bends light would have to send a path to such a light by chance, and never does.
-pub(super) fn straight_on<'s>(
+pub(crate) fn straight_on<'s>(
     scene: &'s Scene,
     shadow_ray: Ray,
     sample: &LightSample,

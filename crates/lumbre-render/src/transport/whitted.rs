@@ -8,8 +8,8 @@ use smallvec::SmallVec;
 use crate::transport::direct::Vertex;
 use crate::transport::interior::Interiors;
 use crate::transport::journal::{Event, Met, SampledLight, Scattered, Source};
-use crate::transport::path::ray_length;
-use crate::transport::{Draw, Integrator, Record, Sight};
+use crate::transport::through::ray_length;
+use crate::transport::{Draw, RayIntegrator, Record, Sight};
 
 /// Follows every mirror image and every refraction, and gives each surface on the way direct light from every light.
 ///
@@ -147,7 +147,7 @@ struct Arrival<'s> {
     vertex: u32,
 }
 
-impl Integrator for Whitted {
+impl RayIntegrator for Whitted {
     fn radiance(
         &self,
         scene: &Scene,

@@ -1,0 +1,244 @@
+//! The state of paths, in columns.
+
+use lumbre_geometry::Ray;
+use lumbre_math::{DVec3, Vec3};
+use lumbre_scene::CameraRay;
+use lumbre_shading::Spectrum;
+use lumbre_simd::{Double, Mask, Real, UInt, V3};
+
+use crate::transport::Draw;
+use crate::transport::interior::Interiors;
+
+/// Lanes beyond the last that a column has room for: a store writes whole vectors.
+pub(crate) const PAD: usize = 16;
+
+/// Makes a column hold so many, and a vector more.
+pub(crate) fn grow<T: Default + Clone>(column: &mut Vec<T>, len: usize) {
+    if column.len() < len + PAD {
+        column.resize(len + PAD, T::default());
+    }
+}
+
+/// A sample of a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct SampleId {
+    /// Column of the pixel.
+    pub(crate) x: u32,
+    /// Row of the pixel.
+    pub(crate) y: u32,
+    /// The number of the sample.
+    pub(crate) index: u32,
+}
+
+/// What belongs to a sample for as long as its path goes on.
+#[derive(Debug, Default)]
+pub(crate) struct Slots<'s> {
+    /// Its random numbers, for code that takes one path at a time.
+    pub(crate) draws: Vec<Draw>,
+    /// The words of [`Draw`], for lanes: those of the pixel, and the number of the sample.
+    pub(crate) pixel: [Vec<u32>; 2],
+    pub(crate) index: Vec<u32>,
+    /// The ray from the camera.
+    pub(crate) camera: Vec<CameraRay>,
+    /// The light that the path has found.
+    pub(crate) radiance: Vec<Spectrum>,
+    /// The solids that it is inside of; empty in a scene without solids.
+    pub(crate) interiors: Vec<Interiors<'s>>,
+    /// Distances sampled in media, and collisions in them.
+    pub(crate) distance_samples: Vec<u32>,
+    pub(crate) collisions: Vec<u32>,
+}
+
+impl Slots<'_> {
+    /// Forgets all samples.
+    pub(crate) fn clear(&mut self) {
+        self.draws.clear();
+        self.pixel.iter_mut().for_each(Vec::clear);
+        self.index.clear();
+        self.camera.clear();
+        self.radiance.clear();
+        self.interiors.clear();
+        self.distance_samples.clear();
+        self.collisions.clear();
+    }
+
+    /// Adds a sample.
+    pub(crate) fn push(&mut self, draw: Draw, camera: CameraRay, has_solids: bool) {
+        let (pixel, index) = draw.words();
+        self.draws.push(draw);
+        self.pixel[0].push(pixel[0]);
+        self.pixel[1].push(pixel[1]);
+        self.index.push(index);
+        self.camera.push(camera);
+        self.radiance.push(Spectrum::BLACK);
+        if has_solids {
+            self.interiors.push(Interiors::default());
+            self.distance_samples.push(0);
+            self.collisions.push(0);
+        }
+    }
+}
+
+/// Paths on their way, each with the ray that it follows next.
+#[derive(Debug, Default)]
+pub(crate) struct Paths {
+    pub(crate) len: usize,
+    /// Whose path it is: a position in [`Slots`].
+    pub(crate) slot: Vec<u32>,
+    /// Where the ray starts; lights were sampled from there, too.
+    pub(crate) origin: [Vec<f64>; 3],
+    /// Unit.
+    pub(crate) direction: [Vec<f32>; 3],
+    pub(crate) throughput: [Vec<f32>; 3],
+    /// What refraction did to the throughput alone: it comes back when the path leaves again.
+    pub(crate) eta_scale: Vec<f32>,
+    /// The density with which the direction was chosen; infinite where it was the only one.
+    pub(crate) pdf: Vec<f32>,
+    /// Bounces off surfaces, and [`SCATTERED`].
+    pub(crate) depth: Vec<u32>,
+    /// The width of the footprint where the ray starts, and its growth with distance: see [`lumbre_scene::Footprint::Cone`].
+    pub(crate) width: Vec<f32>,
+    pub(crate) spread: Vec<f32>,
+}
+
+/// The bit of [`Paths::depth`] that says that the path has scattered otherwise than by mirrors and smooth glass.
+pub(crate) const SCATTERED: u32 = 1 << 31;
+
+/// What a path takes along from a vertex.
+#[derive(Clone, Copy)]
+pub(crate) struct Departure<R: Real> {
+    pub(crate) slot: R::UInt,
+    pub(crate) origin: V3<R::Double>,
+    pub(crate) direction: V3<R>,
+    pub(crate) throughput: V3<R>,
+    pub(crate) eta_scale: R,
+    pub(crate) pdf: R,
+    pub(crate) depth: R::UInt,
+    pub(crate) width: R,
+    pub(crate) spread: R,
+}
+
+/// One path: see [`Paths`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OnePath {
+    pub(crate) slot: u32,
+    pub(crate) origin: DVec3,
+    pub(crate) direction: Vec3,
+    pub(crate) throughput: Spectrum,
+    pub(crate) eta_scale: f32,
+    pub(crate) pdf: f32,
+    pub(crate) depth: u32,
+    pub(crate) width: f32,
+    pub(crate) spread: f32,
+}
+
+impl Paths {
+    /// Appends a path.
+    pub(crate) fn push_one(&mut self, path: &OnePath) {
+        self.reserve(self.len + 1);
+        self.put(self.len, path);
+        self.len += 1;
+    }
+
+    /// Drops the paths at some positions, which ascend.
+    pub(crate) fn remove(&mut self, positions: &[u32]) {
+        let mut positions = positions.iter().peekable();
+        let mut kept = 0;
+        for at in 0..self.len {
+            if positions.next_if(|&&position| position as usize == at).is_none() {
+                let path = self.get(at);
+                self.put(kept, &path);
+                kept += 1;
+            }
+        }
+        self.len = kept;
+    }
+
+    /// The path at a position.
+    pub(crate) fn get(&self, at: usize) -> OnePath {
+        OnePath {
+            slot: self.slot[at],
+            origin: self.origin(at),
+            direction: self.direction(at),
+            throughput: self.throughput(at),
+            eta_scale: self.eta_scale[at],
+            pdf: self.pdf[at],
+            depth: self.depth[at],
+            width: self.width[at],
+            spread: self.spread[at],
+        }
+    }
+
+    fn put(&mut self, at: usize, path: &OnePath) {
+        self.slot[at] = path.slot;
+        for (column, x) in self.origin.iter_mut().zip(path.origin.to_array()) {
+            column[at] = x;
+        }
+        for (column, x) in self.direction.iter_mut().zip(path.direction.to_array()) {
+            column[at] = x;
+        }
+        self.set_throughput(at, path.throughput);
+        self.eta_scale[at] = path.eta_scale;
+        self.pdf[at] = path.pdf;
+        self.depth[at] = path.depth;
+        self.width[at] = path.width;
+        self.spread[at] = path.spread;
+    }
+
+    /// Room for so many.
+    pub(crate) fn reserve(&mut self, len: usize) {
+        grow(&mut self.slot, len);
+        self.origin.iter_mut().for_each(|column| grow(column, len));
+        self.direction.iter_mut().for_each(|column| grow(column, len));
+        self.throughput.iter_mut().for_each(|column| grow(column, len));
+        for column in [&mut self.eta_scale, &mut self.pdf, &mut self.width, &mut self.spread] {
+            grow(column, len);
+        }
+        grow(&mut self.depth, len);
+    }
+
+    /// Appends the lanes of a mask.
+    #[inline(always)]
+    pub(crate) fn push<R: Real>(&mut self, mask: R::Mask, path: &Departure<R>) {
+        let to = self.len;
+        path.slot.compress_store(mask, &mut self.slot[to..]);
+        path.origin.x.compress_store(mask, &mut self.origin[0][to..]);
+        path.origin.y.compress_store(mask, &mut self.origin[1][to..]);
+        path.origin.z.compress_store(mask, &mut self.origin[2][to..]);
+        path.direction.x.compress_store(mask, &mut self.direction[0][to..]);
+        path.direction.y.compress_store(mask, &mut self.direction[1][to..]);
+        path.direction.z.compress_store(mask, &mut self.direction[2][to..]);
+        path.throughput.x.compress_store(mask, &mut self.throughput[0][to..]);
+        path.throughput.y.compress_store(mask, &mut self.throughput[1][to..]);
+        path.throughput.z.compress_store(mask, &mut self.throughput[2][to..]);
+        path.eta_scale.compress_store(mask, &mut self.eta_scale[to..]);
+        path.pdf.compress_store(mask, &mut self.pdf[to..]);
+        path.depth.compress_store(mask, &mut self.depth[to..]);
+        path.width.compress_store(mask, &mut self.width[to..]);
+        path.spread.compress_store(mask, &mut self.spread[to..]);
+        self.len += mask.count();
+    }
+
+    /// The ray that a path follows next.
+    pub(crate) fn ray(&self, path: usize, time: f64) -> Ray {
+        Ray::new(self.origin(path), self.direction(path).as_dvec3()).at_time(time)
+    }
+
+    pub(crate) fn origin(&self, path: usize) -> DVec3 {
+        DVec3::new(self.origin[0][path], self.origin[1][path], self.origin[2][path])
+    }
+
+    pub(crate) fn direction(&self, path: usize) -> Vec3 {
+        Vec3::new(self.direction[0][path], self.direction[1][path], self.direction[2][path])
+    }
+
+    pub(crate) fn throughput(&self, path: usize) -> Spectrum {
+        Spectrum::new(self.throughput[0][path], self.throughput[1][path], self.throughput[2][path])
+    }
+
+    pub(crate) fn set_throughput(&mut self, path: usize, throughput: Spectrum) {
+        for (column, channel) in self.throughput.iter_mut().zip(throughput.to_array()) {
+            column[path] = channel;
+        }
+    }
+}

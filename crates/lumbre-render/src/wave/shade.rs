@@ -1,0 +1,457 @@
+//! Shading: a light and a direction to go on in, sampled at each vertex. Nothing is traced here.
+
+use std::marker::PhantomData;
+
+use lumbre_math::DVec3;
+use lumbre_shading::Bsdf;
+use lumbre_shading::lanes::{LaneBsdf, LaneSample, OneBsdf, RowBsdf};
+use lumbre_simd::{Double, Job, Mask, Real, UInt, V3};
+
+use crate::transport::Strategy;
+use crate::transport::sampler::LaneDraw;
+use crate::wave::lights::{LightLanes, pass_solids, push_panes, sample_lights};
+use crate::wave::paths::{Departure, Paths, SCATTERED, Slots};
+use crate::wave::shadows::{NEARLY_WHOLE, Segment, Shadows};
+use crate::wave::traced::Traced;
+use crate::wave::vertices::{FOLDS, Place, RISES, SIDED, Vertices, gather3, gather64};
+use crate::wave::{Leg, Setting};
+
+/// BSDFs of one kind, whatever the lanes.
+pub(crate) trait Kind {
+    type Bsdf<R: Real>: RowBsdf<R>;
+}
+
+/// Where the BSDFs of a queue are.
+pub(crate) trait Bsdfs<R: Real> {
+    type Bsdf: LaneBsdf<R>;
+    /// The BSDF at a position in each lane.
+    fn load(&self, at: R::UInt) -> Self::Bsdf;
+}
+
+/// BSDFs as rows of numbers.
+pub(crate) struct Rows<'a, K>(pub(crate) &'a [f32], pub(crate) PhantomData<K>);
+
+impl<R: Real, K: Kind> Bsdfs<R> for Rows<'_, K> {
+    type Bsdf = K::Bsdf<R>;
+
+    #[inline(always)]
+    fn load(&self, at: R::UInt) -> Self::Bsdf {
+        K::Bsdf::<R>::load(self.0, at)
+    }
+}
+
+/// Shades the vertices of a queue. Paths that go on are appended to `next`, segments to lights to `shadows`.
+pub(crate) struct Shade<'a, 's> {
+    pub(crate) setting: &'a Setting<'s>,
+    pub(crate) slots: &'a Slots<'s>,
+    pub(crate) paths: &'a Paths,
+    pub(crate) vertices: &'a Vertices<'s>,
+    /// Positions of paths, and after the last ones enough others to fill a vector.
+    pub(crate) queue: &'a [u32],
+    pub(crate) count: usize,
+    pub(crate) next: &'a mut Paths,
+    /// First parts of rays of `next`.
+    pub(crate) legs: &'a mut Vec<Leg>,
+    pub(crate) shadows: &'a mut Shadows<'s>,
+    /// Paths that go through a surface, in scenes with solids.
+    pub(crate) crossings: &'a mut Vec<u32>,
+    /// What happens, where somebody asks: of a wave of one path.
+    pub(crate) traced: Option<&'a mut Traced>,
+}
+
+impl<'a> Bsdfs<f32> for &'a [Bsdf] {
+    type Bsdf = OneBsdf<'a>;
+
+    #[inline(always)]
+    fn load(&self, at: <f32 as Real>::UInt) -> OneBsdf<'a> {
+        OneBsdf(&self[at.to_lanes()[0] as usize])
+    }
+}
+
+/// [`Shade`] with BSDFs of one kind, at any instruction set.
+pub(crate) struct ShadeRows<'a, 'b, 's, K> {
+    pub(crate) shade: &'b mut Shade<'a, 's>,
+    pub(crate) rows: Rows<'b, K>,
+}
+
+impl<K: Kind> Job for ShadeRows<'_, '_, '_, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<R: Real>(self) {
+        self.shade.run::<R, _>(&self.rows);
+    }
+}
+
+/// A surface as seen along a path, ready to scatter.
+///
+/// A shading normal is not the normal of the surface, and some directions that a BSDF scatters to on its side of it lie on the other
+/// side of the surface as it is. They are folded back: mirrored in the plane of the surface. What goes through likewise stays on the
+/// far side. So nothing is lost that the BSDF gives (a white surface stays white whatever its normals), and no light leaks. At grazing
+/// angles, where a reflection would point into the surface, it comes to point out of it as far. Others let it be (and have dark specks
+/// at silhouettes of coarse meshes), or turn the normal: A. Keller and others, "The Iray Light Transport Simulation and Rendering
+/// System", 2017, A.3.
+///
+/// Where the faces of a mesh stand for a smooth surface that bulges out over them, directions that go under a face but not under that
+/// surface stay as they are, and their rays start on it. So shadows end where the smooth surface turns away from the light, not at the
+/// edge of a face. J. Hanika ("Hacking the Shadow Terminator", 2021) starts all rays there; here those that leave a face upwards start
+/// on it. What lies between the face and the smooth surface stands in the way of such rays: it is their first leg.
+#[derive(Clone, Copy)]
+struct Vertex<R: Real> {
+    place: Place<R>,
+    /// The shading frame.
+    s: V3<R>,
+    t: V3<R>,
+    n: V3<R>,
+    /// To the viewer, in the frame.
+    wo: V3<R>,
+    folds: R::Mask,
+    sided: R::Mask,
+    rises: R::Mask,
+    smooth: V3<R>,
+    risen: V3<R::Double>,
+}
+
+/// f · |cos θ| towards a direction, and the density of the BSDF's choice of it.
+#[derive(Clone, Copy)]
+struct Scattered<R: Real> {
+    f: V3<R>,
+    pdf: R,
+}
+
+#[inline(always)]
+fn none<R: Real>() -> R::Mask {
+    R::Mask::splat(false)
+}
+
+#[inline(always)]
+fn alike<R: Real>(a: R::Mask, b: R::Mask) -> R::Mask {
+    (a & b) | !(a | b)
+}
+
+#[inline(always)]
+fn mirrored<R: Real>(w: V3<R>, normal: V3<R>) -> V3<R> {
+    w - normal * (R::splat(2.0) * normal.dot(w))
+}
+
+/// The power heuristic (Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997) for two ways, by their ratio, for a
+/// square may overflow.
+#[inline(always)]
+pub(crate) fn power_heuristic<R: Real>(this: R, other: R) -> R {
+    let ratio = other / this;
+    let weight = (R::one() + ratio * ratio).recip();
+    R::select(this.simd_eq(R::splat(f32::INFINITY)), R::one(), weight)
+}
+
+impl<R: Real> Vertex<R> {
+    #[inline(always)]
+    fn new(vertices: &Vertices<'_>, at: R::UInt, towards: V3<R>) -> Self {
+        let flags = R::UInt::gather(&vertices.flags, at);
+        let folds = has::<R>(flags, FOLDS);
+        let rises = has::<R>(flags, RISES);
+        let (s, n) = (gather3::<R>(&vertices.frame_s, at), gather3::<R>(&vertices.frame_n, at));
+        let t = n.cross(s);
+        let place = vertices.place(at);
+        let (mut smooth, mut risen) = (n, place.point);
+        if rises.any() {
+            smooth = gather3(&vertices.smooth, at);
+            risen = gather64::<R>(&vertices.risen, at);
+        }
+        let wo = V3 { x: s.dot(towards), y: t.dot(towards), z: n.dot(towards) };
+        Self { place, s, t, n, wo, folds, sided: has::<R>(flags, SIDED), rises, smooth, risen }
+    }
+
+    #[inline(always)]
+    fn to_local(self, w: V3<R>) -> V3<R> {
+        V3 { x: self.s.dot(w), y: self.t.dot(w), z: self.n.dot(w) }
+    }
+
+    #[inline(always)]
+    fn to_world(self, w: V3<R>) -> V3<R> {
+        self.s * w.x + self.t * w.y + self.n * w.z
+    }
+
+    /// Whether a direction of the frame is on the viewer's side of the shading normal.
+    #[inline(always)]
+    fn on_side(&self, local: V3<R>) -> R::Mask {
+        R::zero().simd_lt(self.wo.z * local.z)
+    }
+
+    /// Whether a direction below the face is one that the smooth surface over it reflects to.
+    #[inline(always)]
+    fn stays(&self, wi: V3<R>, local: V3<R>) -> R::Mask {
+        let below = self.place.normal.dot(wi).simd_le(R::zero());
+        self.rises & below & R::zero().simd_lt(self.smooth.dot(wi)) & self.on_side(local)
+    }
+
+    /// What the BSDF scatters to a direction of the world, by itself and by directions that are folded onto it.
+    #[inline(always)]
+    fn eval<B: LaneBsdf<R>>(&self, bsdf: &B, wi: V3<R>) -> Scattered<R> {
+        let local = self.to_local(wi);
+        let (f, pdf) = bsdf.eval(self.wo, local);
+        if self.folds.none() {
+            return Scattered { f, pdf };
+        }
+        let above = R::zero().simd_lt(self.place.normal.dot(wi));
+        let stays = self.stays(wi, local);
+        let own = !self.folds | alike::<R>(self.on_side(local), above | stays);
+        let mirrored = mirrored(wi, self.place.normal);
+        let image = self.to_local(mirrored);
+        let folded = self.folds & alike::<R>(self.on_side(image), above) & !self.stays(mirrored, image);
+        let (image_f, image_pdf) = bsdf.eval(self.wo, image);
+        Scattered {
+            f: f.or_zero(own) + image_f.or_zero(folded),
+            pdf: pdf.or_zero(own) + image_pdf.or_zero(folded),
+        }
+    }
+
+    /// The direction of the world that a sample leads to.
+    #[inline(always)]
+    fn leave(&self, sample: &LaneSample<R>) -> V3<R> {
+        let direction = self.to_world(sample.wi);
+        if self.folds.none() {
+            return direction.normalize();
+        }
+        let above = R::zero().simd_lt(self.place.normal.dot(direction));
+        let stays = self.stays(direction, sample.wi);
+        let folds = self.folds & alike::<R>(above, sample.transmitted) & (sample.transmitted | !stays);
+        V3::select(folds, mirrored(direction, self.place.normal), direction).normalize()
+    }
+
+    /// Where a ray along a direction starts, and whether that is on the smooth surface over the face.
+    #[inline(always)]
+    fn start(&self, wi: V3<R>) -> (V3<R::Double>, R::Mask) {
+        let start = self.place.start(wi);
+        if self.rises.none() {
+            return (start, none::<R>());
+        }
+        let stays = self.folds & self.stays(wi, self.to_local(wi));
+        (select64::<R>(stays, self.risen, start), stays)
+    }
+
+    /// Whether a direction leads to the other side of the surface, where the BSDF says so of it, or of none.
+    #[inline(always)]
+    fn crosses(&self, wi: V3<R>, transmitted: R::Mask) -> R::Mask {
+        let below = self.place.normal.dot(wi).simd_lt(R::zero());
+        (self.sided & below) | (!self.sided & transmitted)
+    }
+}
+
+#[inline(always)]
+fn has<R: Real>(flags: R::UInt, flag: u32) -> R::Mask {
+    (flags & R::UInt::splat(flag)).simd_eq(R::UInt::splat(flag))
+}
+
+#[inline(always)]
+fn select64<R: Real>(mask: R::Mask, a: V3<R::Double>, b: V3<R::Double>) -> V3<R::Double> {
+    V3 {
+        x: R::Double::select(mask, a.x, b.x),
+        y: R::Double::select(mask, a.y, b.y),
+        z: R::Double::select(mask, a.z, b.z),
+    }
+}
+
+/// Whether a colour is other than black; true for a NaN, which is for the film to find.
+#[inline(always)]
+fn is_light<R: Real>(colour: V3<R>) -> R::Mask {
+    !(colour.x + colour.y + colour.z).simd_le(R::zero())
+}
+
+/// The lanes of a chunk of the queue.
+#[derive(Clone, Copy)]
+struct Arrived<R: Real> {
+    at: R::UInt,
+    slot: R::UInt,
+    depth: R::UInt,
+    throughput: V3<R>,
+    vertex: Vertex<R>,
+}
+
+impl<'s> Shade<'_, 's> {
+    /// Shades the whole queue.
+    #[inline(always)]
+    pub(crate) fn run<R: Real, B: Bsdfs<R>>(&mut self, bsdfs: &B) {
+        let mut done = 0;
+        while done < self.count {
+            let lanes = R::Mask::first(self.count - done);
+            let at = R::UInt::from_slice(&self.queue[done..]);
+            done += R::LANES;
+            let paths = self.paths;
+            let slot = R::UInt::gather(&paths.slot, at);
+            let towards = -gather3::<R>(&paths.direction, at);
+            let arrived = Arrived {
+                at,
+                slot,
+                depth: R::UInt::gather(&paths.depth, at) & R::UInt::splat(!SCATTERED),
+                throughput: gather3(&paths.throughput, at),
+                vertex: Vertex::new(self.vertices, at, towards),
+            };
+            let draw = LaneDraw::<R> {
+                kind: self.setting.sampler,
+                pixel: [
+                    R::UInt::gather(&self.slots.pixel[0], slot),
+                    R::UInt::gather(&self.slots.pixel[1], slot),
+                ],
+                index: R::UInt::gather(&self.slots.index, slot),
+            };
+            let bsdf = bsdfs.load(R::UInt::gather(&self.vertices.bsdf, at));
+            let useful = lanes & !bsdf.is_delta();
+            if useful.any() {
+                self.light(useful, &arrived, &bsdf, draw.light(arrived.depth));
+            }
+            self.scatter(lanes, &arrived, &bsdf, draw.scatter(arrived.depth));
+        }
+    }
+
+    /// One sample of the lights.
+    #[inline(always)]
+    fn light<R: Real, B: LaneBsdf<R>>(&mut self, useful: R::Mask, arrived: &Arrived<R>, bsdf: &B, u: [R; 4]) {
+        let vertex = &arrived.vertex;
+        let from = vertex.place.start(vertex.place.normal);
+        let light: LightLanes<R> = sample_lights(self.setting, self.slots, useful, arrived.slot, from, u);
+        let Scattered { f, pdf: bsdf_pdf } = vertex.eval(bsdf, light.towards);
+        let weight = match self.setting.strategy {
+            Strategy::Both => power_heuristic(light.pdf, bsdf_pdf),
+            Strategy::Lights => R::one(),
+            Strategy::Bsdf => R::zero(),
+        };
+        let weight = R::select(light.delta, R::one(), weight);
+        let share = R::select(light.delta, R::one(), weight / light.pdf);
+        let value = f * light.radiance;
+        let mut arriving = arrived.throughput * (value * share);
+        let found = useful & light.valid & is_light(value) & !share.simd_le(R::zero());
+        let (start, stays) = vertex.start(light.towards);
+        let crosses = vertex.crosses(light.towards, !vertex.on_side(vertex.to_local(light.towards)));
+        let through_panes = found & light.delta & R::Mask::splat(self.setting.has_panes);
+        if self.setting.has_solids && found.any() {
+            // What comes through panes is told with them.
+            let through_air = found & !through_panes;
+            arriving = pass_solids(self, through_air, arrived.at, arrived.slot, crosses, &light, arriving);
+        }
+        let end = Place::<R>::new(light.point, light.error, light.normal).start(-light.towards);
+        let infinite = light.infinite;
+        let segment = Segment {
+            slot: arrived.slot,
+            origin: start,
+            way: select64::<R>(infinite, light.towards.to_double(), end - start),
+            end: R::Double::select(infinite, R::Double::splat(f64::INFINITY), R::Double::splat(NEARLY_WHOLE)),
+            light: arriving,
+        };
+        if let Some(traced) = &mut self.traced {
+            traced.light(found, &light, f, bsdf_pdf, weight, &segment);
+        }
+        if !found.any() {
+            return;
+        }
+        let first = self.shadows.len;
+        self.shadows.push(found, &segment);
+        if (found & stays).any() {
+            let from = vertex.place.start(vertex.place.normal);
+            push_legs::<R>(&mut self.shadows.legs, first, found, found & stays, from);
+        }
+        if through_panes.any() {
+            push_panes(self, first, found, through_panes, arrived.at, arrived.slot, crosses, &light);
+        }
+    }
+
+    /// The direction to go on in.
+    #[inline(always)]
+    fn scatter<R: Real, B: LaneBsdf<R>>(
+        &mut self,
+        lanes: R::Mask,
+        arrived: &Arrived<R>,
+        bsdf: &B,
+        u: [R; 4],
+    ) {
+        let (vertex, at) = (&arrived.vertex, arrived.at);
+        let sample = bsdf.sample(vertex.wo, u[2], [u[0], u[1]]);
+        let direction = vertex.leave(&sample);
+        let mut pdf = sample.pdf;
+        if vertex.folds.any() {
+            let folded = vertex.eval(bsdf, direction).pdf;
+            // On the very border between the sides rounding may find no way at all.
+            pdf = R::select(vertex.folds & R::zero().simd_lt(folded), folded, pdf);
+        }
+        let pdf = R::select(sample.delta, R::splat(f32::INFINITY), pdf);
+        let mut throughput = arrived.throughput * sample.weight;
+        let eta_scale = R::gather(&self.paths.eta_scale, at);
+        let eta_scale = R::select(sample.transmitted, eta_scale * sample.eta * sample.eta, eta_scale);
+        let goes_on = lanes & sample.valid & is_light(throughput);
+
+        let depth = arrived.depth + R::UInt::splat(1);
+        let likely = throughput.max_component() * eta_scale;
+        let risky = R::UInt::splat(self.setting.roulette_start).simd_lt(depth) & likely.simd_lt(R::one());
+        let survives = goes_on & (!risky | u[3].simd_lt(likely));
+        throughput = V3::select(risky, throughput * likely.recip(), throughput);
+
+        let scattered = R::UInt::gather(&self.paths.depth, at) & R::UInt::splat(SCATTERED);
+        let scattered = R::UInt::select(sample.delta, scattered, R::UInt::splat(SCATTERED));
+        let (origin, stays) = vertex.start(direction);
+        let path = Departure {
+            slot: arrived.slot,
+            origin,
+            direction,
+            throughput,
+            eta_scale,
+            pdf,
+            depth: depth | scattered,
+            width: R::gather(&self.vertices.width, at),
+            spread: R::gather(&self.vertices.spread, at),
+        };
+        if let Some(traced) = &mut self.traced {
+            traced.scattered(goes_on, risky, survives, likely, &sample, &path);
+        }
+        if !survives.any() {
+            return;
+        }
+        let first = self.next.len;
+        self.next.push(survives, &path);
+        if (survives & stays).any() {
+            let from = vertex.place.start(vertex.place.normal);
+            push_legs::<R>(self.legs, first, survives, survives & stays, from);
+        }
+        if self.setting.has_solids {
+            let crosses = survives & vertex.crosses(direction, sample.transmitted);
+            push_crossings::<R>(self.crossings, crosses, at);
+        }
+    }
+}
+
+/// Notes for lanes of `some` where their rays come from first; those of `all` were appended from `first` on.
+#[inline(always)]
+fn push_legs<R: Real>(legs: &mut Vec<Leg>, first: usize, all: R::Mask, some: R::Mask, from: V3<R::Double>) {
+    let (all, mut some) = (all.to_bitmask(), some.to_bitmask());
+    let from = [from.x.to_lanes(), from.y.to_lanes(), from.z.to_lanes()];
+    while some != 0 {
+        let lane = some.trailing_zeros() as usize;
+        some &= some - 1;
+        let before = (all & ((1 << lane) - 1)).count_ones();
+        let from = DVec3::new(from[0][lane], from[1][lane], from[2][lane]);
+        legs.push(Leg { ray: first as u32 + before, from });
+    }
+}
+
+/// Notes which paths go through a surface.
+#[inline(always)]
+fn push_crossings<R: Real>(crossings: &mut Vec<u32>, mask: R::Mask, at: R::UInt) {
+    let at = at.to_lanes();
+    let mut bits = mask.to_bitmask();
+    while bits != 0 {
+        crossings.push(at[bits.trailing_zeros() as usize]);
+        bits &= bits - 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::power_heuristic;
+
+    #[test]
+    fn the_weights_of_both_ways_sum_to_one_at_any_size() {
+        for (a, b) in [(2.0_f32, 3.0), (1e30, 2e30), (1e-30, 5e-30), (7.0, 0.0), (0.5, 1e25)] {
+            let sum = power_heuristic(a, b) + if b > 0.0 { power_heuristic(b, a) } else { 0.0 };
+            assert!((sum - 1.0).abs() < 1e-6, "{a} {b} {sum}");
+        }
+        assert_eq!(power_heuristic(f32::INFINITY, 2.0), 1.0);
+    }
+}

@@ -1,0 +1,147 @@
+//! Segments between vertices and lights: what light would come, unless something is in its way.
+
+use lumbre_geometry::Ray;
+use lumbre_math::DVec3;
+use lumbre_scene::{LightSample, Scene};
+use lumbre_shading::Spectrum;
+use lumbre_simd::{Double, Mask, Real, UInt, V3};
+
+use crate::transport::Record;
+use crate::transport::interior::Interiors;
+use crate::transport::through::straight_on;
+use crate::wave::Leg;
+use crate::wave::paths::{Slots, grow};
+
+/// Shadow segments, in columns.
+#[derive(Debug, Default)]
+pub(crate) struct Shadows<'s> {
+    pub(crate) len: usize,
+    pub(crate) slot: Vec<u32>,
+    pub(crate) origin: [Vec<f64>; 3],
+    /// To the light, or, where [`Shadows::end`] is infinite, the unit direction of one that is infinitely far away.
+    pub(crate) way: [Vec<f64>; 3],
+    /// Where along the way a segment ends.
+    pub(crate) end: Vec<f64>,
+    /// What the path receives where nothing is in the way.
+    pub(crate) light: [Vec<f32>; 3],
+    /// First parts of segments.
+    pub(crate) legs: Vec<Leg>,
+    /// Segments that panes let through.
+    pub(crate) panes: Vec<Pane<'s>>,
+    rays: Vec<Ray>,
+    blocked: Vec<bool>,
+}
+
+/// A segment that goes straight on through panes.
+#[derive(Clone, Debug)]
+pub(crate) struct Pane<'s> {
+    pub(crate) segment: u32,
+    pub(crate) sample: LightSample,
+    /// The solids around its start.
+    pub(crate) around: Interiors<'s>,
+}
+
+/// A segment in each lane.
+#[derive(Clone, Copy)]
+pub(crate) struct Segment<R: Real> {
+    pub(crate) slot: R::UInt,
+    pub(crate) origin: V3<R::Double>,
+    pub(crate) way: V3<R::Double>,
+    pub(crate) end: R::Double,
+    pub(crate) light: V3<R>,
+}
+
+/// The part of a way to a point that a segment goes: allows for the rounding of its direction and of `t`.
+pub(crate) const NEARLY_WHOLE: f64 = 1.0 - 1.0 / (1_u64 << 40) as f64;
+
+impl<'s> Shadows<'s> {
+    /// Forgets all, with room for so many.
+    pub(crate) fn reset(&mut self, len: usize) {
+        self.len = 0;
+        self.legs.clear();
+        self.panes.clear();
+        grow(&mut self.slot, len);
+        let f64s = self.origin.iter_mut().chain(&mut self.way).chain([&mut self.end]);
+        f64s.for_each(|column| grow(column, len));
+        self.light.iter_mut().for_each(|column| grow(column, len));
+    }
+
+    /// Appends the lanes of a mask.
+    #[inline(always)]
+    pub(crate) fn push<R: Real>(&mut self, mask: R::Mask, segment: &Segment<R>) {
+        let to = self.len;
+        segment.slot.compress_store(mask, &mut self.slot[to..]);
+        segment.origin.x.compress_store(mask, &mut self.origin[0][to..]);
+        segment.origin.y.compress_store(mask, &mut self.origin[1][to..]);
+        segment.origin.z.compress_store(mask, &mut self.origin[2][to..]);
+        segment.way.x.compress_store(mask, &mut self.way[0][to..]);
+        segment.way.y.compress_store(mask, &mut self.way[1][to..]);
+        segment.way.z.compress_store(mask, &mut self.way[2][to..]);
+        segment.end.compress_store(mask, &mut self.end[to..]);
+        segment.light.x.compress_store(mask, &mut self.light[0][to..]);
+        segment.light.y.compress_store(mask, &mut self.light[1][to..]);
+        segment.light.z.compress_store(mask, &mut self.light[2][to..]);
+        self.len += mask.count();
+    }
+
+    /// What a segment brings where nothing is in its way.
+    pub(crate) fn light(&self, segment: usize) -> Spectrum {
+        Spectrum::new(self.light[0][segment], self.light[1][segment], self.light[2][segment])
+    }
+
+    /// The ray along a segment.
+    pub(crate) fn ray(&self, segment: usize, time: f64) -> Ray {
+        let at = |columns: &[Vec<f64>; 3]| {
+            DVec3::new(columns[0][segment], columns[1][segment], columns[2][segment])
+        };
+        Ray::new(at(&self.origin), at(&self.way)).with_range(0.0, self.end[segment]).at_time(time)
+    }
+
+    /// Gives each path the light that comes through, and tells of each segment what share that is.
+    pub(crate) fn resolve(
+        &mut self,
+        scene: &'s Scene,
+        slots: &mut Slots<'_>,
+        regularize: bool,
+        record: &mut Record,
+        mut resolved: impl FnMut(usize, Spectrum),
+    ) {
+        let len = self.len;
+        record.counts.shadow += (len - self.panes.len()) as u64;
+        let mut rays = std::mem::take(&mut self.rays);
+        rays.clear();
+        rays.extend((0..len).map(|i| self.ray(i, slots.camera[self.slot[i] as usize].ray.time)));
+        self.blocked.clear();
+        self.blocked.resize(len, false);
+        occluded(scene, &rays, &mut self.blocked);
+        for &Leg { ray: segment, from } in &self.legs {
+            let segment = segment as usize;
+            if !self.blocked[segment] {
+                let to = rays[segment].origin;
+                let leg = Ray::new(from, to - from).with_range(0.0, 1.0).at_time(rays[segment].time);
+                record.counts.shadow += 1;
+                self.blocked[segment] = scene.is_occluded(&leg);
+            }
+        }
+        let mut panes = self.panes.drain(..).peekable();
+        for (i, ray) in rays.iter().enumerate() {
+            let mut passes = if self.blocked[i] { Spectrum::BLACK } else { Spectrum::WHITE };
+            if let Some(pane) = panes.next_if(|pane| pane.segment as usize == i) {
+                // Something is in its way, perhaps a pane.
+                passes = straight_on(scene, *ray, &pane.sample, pane.around, regularize, record);
+            }
+            if !passes.is_black() {
+                let light = Spectrum::new(self.light[0][i], self.light[1][i], self.light[2][i]);
+                slots.radiance[self.slot[i] as usize] += light * passes;
+            }
+            resolved(i, passes);
+        }
+        drop(panes);
+        self.rays = rays;
+    }
+}
+
+/// Whether something is in the way of each ray.
+fn occluded(scene: &Scene, rays: &[Ray], blocked: &mut [bool]) {
+    scene.occluded_batch(rays, blocked);
+}

@@ -1,0 +1,125 @@
+//! A wave as integrators see it: samples of pixels, and what their rays from the camera meet.
+
+use lumbre_geometry::Ray;
+use lumbre_scene::{CameraRay, Scene, View};
+use lumbre_shading::Spectrum;
+
+use crate::transport::{Draw, Record, Sight};
+use crate::wave::paths::{OnePath, Paths};
+use crate::wave::{Setting, Wave};
+
+/// Samples whose rays from the camera have met what they meet first. An integrator gives each its radiance.
+#[derive(Debug)]
+pub struct Sights<'a, 's> {
+    scene: &'s Scene,
+    view: &'a View,
+    wave: &'a mut Wave<'s>,
+    /// What the integrator is asked for, as slots.
+    wanted: Vec<u32>,
+}
+
+impl<'a, 's> Sights<'a, 's> {
+    /// Looks along the rays of some samples.
+    pub(crate) fn new(
+        scene: &'s Scene,
+        view: &'a View,
+        wave: &'a mut Wave<'s>,
+        samples: impl Iterator<Item = (Draw, CameraRay)>,
+        record: &mut Record,
+    ) -> Self {
+        let has_solids = scene.has_solids();
+        wave.slots.clear();
+        wave.paths.len = 0;
+        wave.is_first = true;
+        for (slot, (draw, mut camera)) in samples.enumerate() {
+            let ray = &mut camera.ray;
+            // Paths keep directions in single precision: all that is told of the ray is told of that one.
+            let direction = ray.direction.as_vec3();
+            ray.direction = direction.as_dvec3();
+            wave.paths.push_one(&OnePath {
+                slot: slot as u32,
+                origin: ray.origin,
+                direction,
+                throughput: Spectrum::WHITE,
+                eta_scale: 1.0,
+                pdf: f32::INFINITY,
+                depth: 0,
+                width: 0.0,
+                spread: 0.0,
+            });
+            wave.slots.push(draw, camera, has_solids);
+        }
+        record.counts.camera += wave.paths.len as u64;
+        wave.search_seen(scene);
+        let wanted = (0..wave.paths.len as u32).collect();
+        Self { scene, view, wave, wanted }
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &'s Scene {
+        self.scene
+    }
+
+    /// The camera.
+    pub fn view(&self) -> &'a View {
+        self.view
+    }
+
+    /// How many samples there are.
+    pub(crate) fn len(&self) -> usize {
+        self.wave.slots.draws.len()
+    }
+
+    /// The ray from the camera of a sample.
+    pub(crate) fn ray(&self, slot: usize) -> Ray {
+        self.wave.slots.camera[slot].ray
+    }
+
+    /// The ray from the camera of a sample, and what it meets.
+    pub(crate) fn sight(&self, slot: usize) -> Sight<'s> {
+        let ray = self.wave.slots.camera[slot];
+        let met = self.wave.hits[slot].as_ref();
+        Sight { ray, met: met.map(|hit| self.scene.interaction(&ray.ray, hit, &ray.footprint)) }
+    }
+
+    /// The random numbers of a sample.
+    pub(crate) fn draw(&self, slot: usize) -> &Draw {
+        &self.wave.slots.draws[slot]
+    }
+
+    /// Leaves out the samples that a predicate does not want of the integrator.
+    pub(crate) fn retain(&mut self, mut is_wanted: impl FnMut(&Self, usize) -> bool) {
+        let mut wanted = std::mem::take(&mut self.wanted);
+        wanted.retain(|&slot| is_wanted(self, slot as usize));
+        self.wanted = wanted;
+    }
+
+    /// The radiance of every sample; black where an integrator gave none.
+    pub(crate) fn radiance(&self) -> &[Spectrum] {
+        &self.wave.slots.radiance
+    }
+
+    /// Gives each sample the radiance that a function finds along its ray, one after the other.
+    pub fn each(&mut self, mut radiance: impl FnMut(Sight<'s>, &Draw) -> Spectrum) {
+        for at in 0..self.wanted.len() {
+            let slot = self.wanted[at] as usize;
+            let found = radiance(self.sight(slot), self.draw(slot));
+            self.wave.slots.radiance[slot] = found;
+        }
+    }
+
+    /// Follows a path from each ray.
+    pub(crate) fn follow(&mut self, setting: &Setting<'s>, record: &mut Record) {
+        if self.wanted.len() < self.wave.paths.len {
+            let mut kept = Paths::default();
+            let mut hits = Vec::with_capacity(self.wanted.len());
+            for &slot in &self.wanted {
+                kept.push_one(&self.wave.paths.get(slot as usize));
+                hits.push(self.wave.hits[slot as usize].take());
+            }
+            self.wave.paths = kept;
+            self.wave.hits = hits;
+        }
+        self.wave.follow(setting, record);
+    }
+}

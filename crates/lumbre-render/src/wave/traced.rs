@@ -1,0 +1,159 @@
+//! What happens at a vertex, for those who want to see it: read off the numbers that lanes compute with.
+
+use lumbre_geometry::Ray;
+use lumbre_math::{DVec3, Vec3};
+use lumbre_scene::LightSample;
+use lumbre_shading::lanes::LaneSample;
+use lumbre_shading::{Scatter, Spectrum};
+use lumbre_simd::{Double, Mask, Real, V3};
+
+use crate::transport::Record;
+use crate::transport::journal::{End, Event, SampledLight, Scattered, Source};
+use crate::wave::lights::{LightLanes, first_sample};
+use crate::wave::paths::Departure;
+use crate::wave::shadows::Segment;
+
+/// What happens at the vertex of a wave of one path.
+#[derive(Debug, Default)]
+pub(crate) struct Traced {
+    light: Option<TracedLight>,
+    scattered: Option<TracedScatter>,
+}
+
+#[derive(Debug)]
+struct TracedLight {
+    sample: LightSample,
+    /// f · |cos θ|.
+    f: Spectrum,
+    bsdf_pdf: f32,
+    weight: f32,
+    /// Towards the light, where light would come along it.
+    shadow_ray: Option<Ray>,
+}
+
+#[derive(Debug)]
+struct TracedScatter {
+    /// Whether the BSDF scatters it.
+    goes_on: bool,
+    /// The probability to go on and whether the path does, where that is by chance.
+    roulette: Option<(f32, bool)>,
+    event: Scattered,
+}
+
+impl Traced {
+    /// A sample of a light.
+    #[inline(always)]
+    pub(crate) fn light<R: Real>(
+        &mut self,
+        found: R::Mask,
+        light: &LightLanes<R>,
+        f: V3<R>,
+        bsdf_pdf: R,
+        weight: R,
+        segment: &Segment<R>,
+    ) {
+        if light.valid.to_bitmask() & 1 == 0 {
+            return;
+        }
+        let shadow_ray = Ray::new(first64::<R>(segment.origin), first64::<R>(segment.way))
+            .with_range(0.0, segment.end.to_lanes()[0]);
+        self.light = Some(TracedLight {
+            sample: first_sample(light),
+            f: colour(f),
+            bsdf_pdf: bsdf_pdf.to_lanes()[0],
+            weight: weight.to_lanes()[0],
+            shadow_ray: (found.to_bitmask() & 1 == 1).then_some(shadow_ray),
+        });
+    }
+
+    /// A direction to go on in.
+    #[inline(always)]
+    pub(crate) fn scattered<R: Real>(
+        &mut self,
+        goes_on: R::Mask,
+        risky: R::Mask,
+        survives: R::Mask,
+        likely: R,
+        sample: &LaneSample<R>,
+        path: &Departure<R>,
+    ) {
+        let is = |mask: R::Mask| mask.to_bitmask() & 1 == 1;
+        let pdf = path.pdf.to_lanes()[0];
+        self.scattered = Some(TracedScatter {
+            goes_on: is(goes_on),
+            roulette: is(risky).then(|| (likely.to_lanes()[0], is(survives))),
+            event: Scattered {
+                ray: Ray::new(first64::<R>(path.origin), first(path.direction).as_dvec3()),
+                weight: colour(sample.weight),
+                scatter: if pdf == f32::INFINITY { Scatter::Delta } else { Scatter::Density(pdf) },
+                transmitted: is(sample.transmitted),
+                eta: sample.eta.to_lanes()[0],
+                throughput: colour(path.throughput),
+            },
+        });
+    }
+
+    /// Writes the events of a vertex, once it is known what share comes through of the light that was sampled there.
+    pub(crate) fn write(
+        &mut self,
+        throughput: Spectrum,
+        time: f64,
+        light: Spectrum,
+        passes: Spectrum,
+        record: &mut Record,
+    ) {
+        if let Some(traced) = self.light.take() {
+            let TracedLight { sample, f, bsdf_pdf, weight, shadow_ray } = traced;
+            let shadow_ray = shadow_ray.map(|ray| ray.at_time(time));
+            let passes = if shadow_ray.is_some() { passes } else { Spectrum::BLACK };
+            record.note(|| {
+                Event::Sampled(Box::new(SampledLight {
+                    sample,
+                    scattered: f,
+                    bsdf_pdf,
+                    weight,
+                    shadow_ray,
+                    passes,
+                }))
+            });
+            let share = match sample.scatter {
+                Scatter::Delta => weight,
+                Scatter::Density(pdf) => weight / pdf,
+            };
+            let radiance =
+                if passes.is_black() { Spectrum::BLACK } else { f * sample.radiance * share * passes };
+            let added = if passes.is_black() { Spectrum::BLACK } else { light * passes };
+            record.note(|| Event::Added {
+                source: Source::Sampled,
+                radiance,
+                weight: 1.0,
+                throughput,
+                added,
+            });
+        }
+        let Some(scattered) = self.scattered.take() else { return };
+        if !scattered.goes_on {
+            return record.note(|| Event::Ended(End::Absorbed));
+        }
+        if let Some((probability, survives)) = scattered.roulette {
+            record.note(|| Event::Roulette { probability, survives });
+            if !survives {
+                return record.note(|| Event::Ended(End::Roulette));
+            }
+        }
+        let ray = scattered.event.ray.at_time(time);
+        record.note(|| Event::Scattered(Box::new(Scattered { ray, ..scattered.event })));
+    }
+}
+
+fn first<R: Real>(v: V3<R>) -> Vec3 {
+    Vec3::new(v.x.to_lanes()[0], v.y.to_lanes()[0], v.z.to_lanes()[0])
+}
+
+fn colour<R: Real>(v: V3<R>) -> Spectrum {
+    first(v).to_array().into()
+}
+
+fn first64<R: Real>(v: V3<R::Double>) -> DVec3 {
+    DVec3::new(v.x.to_lanes()[0], v.y.to_lanes()[0], v.z.to_lanes()[0])
+}
