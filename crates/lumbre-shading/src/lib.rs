@@ -12,6 +12,7 @@ pub mod dielectric;
 pub mod diffuse;
 mod frame;
 pub mod fresnel;
+pub mod lanes;
 mod material;
 pub mod medium;
 pub mod microfacet;
