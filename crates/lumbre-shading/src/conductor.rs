@@ -45,7 +45,7 @@ impl Conductor {
         self.lane().sample(wo.lane(), 0.0, square(u)).scalar()
     }
 
-    fn lane(&self) -> ConductorLanes<f32> {
+    pub(crate) fn lane(&self) -> ConductorLanes<f32> {
         ConductorLanes { eta: colour_lane(self.eta), k: colour_lane(self.k), facets: self.facets.lane() }
     }
 
@@ -73,6 +73,23 @@ impl<R: Real> ConductorLanes<R> {
     pub fn fresnel(&self, cos: R) -> V3<R> {
         fresnel::conductor_lanes(cos.abs(), self.eta, self.k)
     }
+
+    /// [`Conductor::pdf`].
+    #[inline(always)]
+    pub(crate) fn pdf(&self, wo: V3<R>, wi: V3<R>) -> R {
+        let (density, fits) = self.facet_density(wo, wi);
+        (density * self.facets.visible_per_cosine(wo)).or_zero(fits)
+    }
+
+    /// A quarter of the density of the facets that reflect one direction into the other, and where there are any.
+    #[inline(always)]
+    fn facet_density(&self, wo: V3<R>, wi: V3<R>) -> (R, R::Mask) {
+        let half = wo + wi;
+        let fits = !self.facets.is_smooth()
+            & (wo.z * wi.z).simd_gt(R::zero())
+            & half.length_squared().simd_gt(R::zero());
+        (R::splat(0.25) * self.facets.density(half.normalize()), fits)
+    }
 }
 
 impl<R: Real> LaneBsdf<R> for ConductorLanes<R> {
@@ -86,12 +103,8 @@ impl<R: Real> LaneBsdf<R> for ConductorLanes<R> {
 
     #[inline(always)]
     fn eval(&self, wo: V3<R>, wi: V3<R>) -> (V3<R>, R) {
-        let half = wo + wi;
-        let fits = !self.facets.is_smooth()
-            & (wo.z * wi.z).simd_gt(R::zero())
-            & half.length_squared().simd_gt(R::zero());
-        let m = half.normalize();
-        let density = R::splat(0.25) * self.facets.density(m);
+        let (density, fits) = self.facet_density(wo, wi);
+        let m = (wo + wi).normalize();
         let both = self.facets.both_visible_per_cosines(wo, wi);
         let value = self.fresnel(wo.dot(m)) * (density * both * wi.z.abs());
         (value.or_zero(fits), (density * self.facets.visible_per_cosine(wo)).or_zero(fits))

@@ -32,7 +32,7 @@ impl Diffuse {
         self.lane().sample(wo.lane(), 0.0, square(u)).scalar()
     }
 
-    fn lane(&self) -> DiffuseLanes<f32> {
+    pub(crate) fn lane(&self) -> DiffuseLanes<f32> {
         DiffuseLanes { reflectance: colour_lane(self.reflectance) }
     }
 

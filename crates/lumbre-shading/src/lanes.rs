@@ -8,6 +8,7 @@ use lumbre_math::{Vec2, Vec3};
 use lumbre_simd::{Real, UInt, V3};
 use smallvec::SmallVec;
 
+pub use crate::coated_lanes::{CoatLanes, CoatedConductorLanes, CoatedDiffuseLanes};
 pub use crate::conductor::ConductorLanes;
 pub use crate::dielectric::{DielectricLanes, ThinDielectricLanes};
 pub use crate::diffuse::{DiffuseLanes, DiffuseTransmissionLanes};
@@ -73,6 +74,10 @@ pub enum BsdfKind {
     Dielectric,
     /// [`ThinDielectricLanes`].
     ThinDielectric,
+    /// [`CoatedDiffuseLanes`].
+    CoatedDiffuse,
+    /// [`CoatedConductorLanes`].
+    CoatedConductor,
     /// A kind without lanes: only the scalar [`Bsdf`] has it.
     Other,
 }
@@ -89,6 +94,8 @@ impl Bsdf {
             Self::Conductor(_) => BsdfKind::Conductor,
             Self::Dielectric(_) => BsdfKind::Dielectric,
             Self::ThinDielectric(_) => BsdfKind::ThinDielectric,
+            Self::CoatedDiffuse(_) => BsdfKind::CoatedDiffuse,
+            Self::CoatedConductor(_) => BsdfKind::CoatedConductor,
             _ => BsdfKind::Other,
         }
     }
@@ -101,6 +108,8 @@ impl Bsdf {
             Self::Conductor(bsdf) => Row::from_slice(&bsdf.row()),
             Self::Dielectric(bsdf) => Row::from_slice(&bsdf.row()),
             Self::ThinDielectric(bsdf) => Row::from_slice(&[bsdf.eta]),
+            Self::CoatedDiffuse(bsdf) => bsdf.row().collect(),
+            Self::CoatedConductor(bsdf) => bsdf.row().collect(),
             _ => return None,
         };
         Some((self.kind(), row))

@@ -7,6 +7,7 @@
 mod albedo;
 mod bsdf;
 pub mod coated;
+mod coated_lanes;
 pub mod conductor;
 pub mod dielectric;
 pub mod diffuse;

@@ -1135,7 +1135,7 @@ impl Columns {
         let mut table = vec![f32::NAN; 5];
         let mut starts = Vec::new();
         for bsdf in bsdfs {
-            let (_, row) = bsdf.row().unwrap();
+            let (_, row) = bsdf.row().expect("a kind with lanes");
             starts.push(table.len() as u32);
             table.extend_from_slice(&row);
         }
@@ -1218,7 +1218,7 @@ impl<K: Kind> Job for Scattering<'_, K> {
 
 /// The same by the scalar interface.
 fn scalar_outcomes(bsdfs: &[Bsdf], columns: &Columns) -> Vec<Outcome> {
-    let row = bsdfs[0].row().unwrap().1.len() as u32;
+    let row = bsdfs[0].row().expect("a kind with lanes").1.len() as u32;
     let outcome = |i: usize| {
         let bsdf = bsdfs[((columns.at[i] - 5) / row) as usize].clone();
         let bsdf = if columns.regularized[i] { bsdf.regularized() } else { bsdf };
@@ -1255,7 +1255,7 @@ fn assert_lanes_agree<K: Kind>(kind: BsdfKind, random_bsdf: impl Fn(&mut RandomS
     let mut random = RandomStream::new(61 + kind as u64);
     let bsdfs: Vec<Bsdf> = (0..97).map(|_| random_bsdf(&mut random)).collect();
     assert!(bsdfs.iter().all(|bsdf| bsdf.kind() == kind && bsdf.row().is_some_and(|row| row.0 == kind)));
-    assert_eq!(bsdfs[0].row().unwrap().1.len(), <K::Lanes<f32> as LaneBsdf<f32>>::ROW);
+    assert_eq!(bsdfs[0].row().map(|row| row.1.len()), Some(<K::Lanes<f32> as LaneBsdf<f32>>::ROW));
     let columns = Columns::new(&bsdfs, 16 * 1500, 3 + kind as u64);
     let expected = scalar_outcomes(&bsdfs, &columns);
     for set in InstructionSet::available() {
@@ -1288,6 +1288,22 @@ fn random_facets(random: &mut RandomStream) -> Microfacets {
     }
 }
 
+/// A third of them scatter.
+fn random_coat(random: &mut RandomStream) -> Coat {
+    let scatters = random.next_f32() < 0.3;
+    Coat {
+        face: Dielectric {
+            eta: if random.next_f32() < 0.1 { 1.0 } else { 1.0 + random.next_f32() },
+            facets: random_facets(random),
+        },
+        thickness: random.next_f32(),
+        g: 1.8 * random.next_f32() - 0.9,
+        albedo: if scatters { random_colour(random) } else { Spectrum::BLACK },
+        max_depth: (12.0 * random.next_f32()) as u32,
+        samples: (4.0 * random.next_f32()) as u32,
+    }
+}
+
 macro_rules! kinds {
     ($($name:ident = $lanes:ident),*) => {
         $(
@@ -1301,7 +1317,8 @@ macro_rules! kinds {
 
 kinds! {
     DiffuseKind = DiffuseLanes, DiffuseTransmissionKind = DiffuseTransmissionLanes, ConductorKind = ConductorLanes,
-    DielectricKind = DielectricLanes, ThinDielectricKind = ThinDielectricLanes
+    DielectricKind = DielectricLanes, ThinDielectricKind = ThinDielectricLanes,
+    CoatedDiffuseKind = CoatedDiffuseLanes, CoatedConductorKind = CoatedConductorLanes
 }
 
 #[test]
@@ -1324,6 +1341,15 @@ fn lanes_scatter_as_scalar_code_does_to_the_bit() {
     });
     assert_lanes_agree::<ThinDielectricKind>(BsdfKind::ThinDielectric, |random| {
         Bsdf::ThinDielectric(ThinDielectric { eta: 1.0 + 2.0 * random.next_f32() })
+    });
+    assert_lanes_agree::<CoatedDiffuseKind>(BsdfKind::CoatedDiffuse, |random| {
+        let base = Diffuse { reflectance: random_colour(random) };
+        Bsdf::CoatedDiffuse(CoatedDiffuse { base, coat: random_coat(random) })
+    });
+    assert_lanes_agree::<CoatedConductorKind>(BsdfKind::CoatedConductor, |random| {
+        let (eta, k) = (random_colour(random) * 3.0, random_colour(random) * 5.0);
+        let base = Conductor { eta, k, facets: random_facets(random) };
+        Bsdf::CoatedConductor(CoatedConductor { base, coat: random_coat(random) })
     });
 }
 
