@@ -1,9 +1,11 @@
 //! Metals, smooth or rough.
 
 use lumbre_math::{Vec2, Vec3};
+use lumbre_simd::{Mask, Real, V3};
 
-use crate::microfacet::Microfacets;
-use crate::{BsdfSample, LocalDir, Scatter, Spectrum, fresnel};
+use crate::lanes::{LaneBsdf, LaneSample, colour, colour_lane, field, lane, spectrum, square, vector};
+use crate::microfacet::{FacetLanes, Microfacets};
+use crate::{BsdfSample, LocalDir, Spectrum, fresnel};
 
 /// A metal by its complex index of refraction. Smooth, it is a delta; rough, it has single scattering only, so
 /// it loses energy as α grows.
@@ -25,63 +27,132 @@ impl Conductor {
 
     /// The reflectance at this cosine of incidence.
     pub fn fresnel(&self, cos: f32) -> Spectrum {
-        fresnel::conductor(cos.abs(), self.eta, self.k)
-    }
-
-    /// The normal of the facets that reflect one direction into the other, pointing up.
-    fn half(&self, wo: LocalDir, wi: LocalDir) -> Option<Vec3> {
-        if self.facets.is_smooth() || !wo.same_hemisphere(wi) {
-            return None;
-        }
-        let half = (wo.vec() + wi.vec()).try_normalize()?;
-        Some(if half.z < 0.0 { -half } else { half })
+        spectrum(self.lane().fresnel(cos))
     }
 
     /// f · |cos θi|.
     pub fn eval(&self, wo: LocalDir, wi: LocalDir) -> Spectrum {
-        let Some(m) = self.half(wo, wi) else { return Spectrum::BLACK };
-        let both = self.facets.both_visible_per_cosines(wo.vec(), wi.vec());
-        self.fresnel(wo.vec().dot(m)) * (0.25 * self.facets.density(m) * both * wi.abs_cos_theta())
+        spectrum(self.lane().eval(wo.lane(), wi.lane()).0)
     }
 
     /// The density of [`Conductor::sample`].
     pub fn pdf(&self, wo: LocalDir, wi: LocalDir) -> f32 {
-        let Some(m) = self.half(wo, wi) else { return 0.0 };
-        0.25 * self.facets.density(m) * self.facets.visible_per_cosine(wo.vec())
+        self.lane().eval(wo.lane(), wi.lane()).1
     }
 
     /// A reflection in a visible facet.
     pub fn sample(&self, wo: LocalDir, u: Vec2) -> Option<BsdfSample> {
-        if wo.cos_theta() == 0.0 || wo.cos_theta().is_nan() {
-            return None;
-        }
-        if self.facets.is_smooth() {
-            return Some(BsdfSample {
-                wi: wo.mirrored(),
-                weight: self.fresnel(wo.cos_theta()),
-                scatter: Scatter::Delta,
-                transmitted: false,
-                eta: 1.0,
-            });
-        }
-        let m = self.facets.sample_visible(wo.vec(), u);
-        let wi = reflect(wo, m);
-        if !wo.same_hemisphere(wi) {
-            return None;
-        }
-        Some(BsdfSample {
-            wi,
-            weight: self.fresnel(wo.vec().dot(m)) * self.facets.also_visible(wo.vec(), wi.vec()),
-            scatter: Scatter::Density(
-                0.25 * self.facets.density(m) * self.facets.visible_per_cosine(wo.vec()),
-            ),
-            transmitted: false,
-            eta: 1.0,
-        })
+        self.lane().sample(wo.lane(), 0.0, square(u)).scalar()
     }
+
+    pub(crate) fn lane(&self) -> ConductorLanes<f32> {
+        ConductorLanes { eta: colour_lane(self.eta), k: colour_lane(self.k), facets: self.facets.lane() }
+    }
+
+    pub(crate) fn row(&self) -> [f32; 8] {
+        let ([a, b, c], [d, e, f]) = (self.eta.to_array(), self.k.to_array());
+        let alpha = self.facets.alpha();
+        [a, b, c, d, e, f, alpha.x, alpha.y]
+    }
+}
+
+/// [`Conductor`] over lanes.
+#[derive(Clone, Copy, Debug)]
+pub struct ConductorLanes<R: Real> {
+    /// Real part of the index.
+    pub eta: V3<R>,
+    /// Imaginary part of the index.
+    pub k: V3<R>,
+    /// Its roughness.
+    pub facets: FacetLanes<R>,
+}
+
+impl<R: Real> ConductorLanes<R> {
+    /// [`Conductor::fresnel`].
+    #[inline(always)]
+    pub fn fresnel(&self, cos: R) -> V3<R> {
+        fresnel::conductor_lanes(cos.abs(), self.eta, self.k)
+    }
+
+    /// [`Conductor::pdf`].
+    #[inline(always)]
+    pub(crate) fn pdf(&self, wo: V3<R>, wi: V3<R>) -> R {
+        let (density, fits) = self.facet_density(wo, wi);
+        (density * self.facets.visible_per_cosine(wo)).or_zero(fits)
+    }
+
+    /// A quarter of the density of the facets that reflect one direction into the other, and where there are any.
+    #[inline(always)]
+    fn facet_density(&self, wo: V3<R>, wi: V3<R>) -> (R, R::Mask) {
+        let half = wo + wi;
+        let fits = !self.facets.is_smooth()
+            & (wo.z * wi.z).simd_gt(R::zero())
+            & half.length_squared().simd_gt(R::zero());
+        (R::splat(0.25) * self.facets.density(half.normalize()), fits)
+    }
+}
+
+impl<R: Real> LaneBsdf<R> for ConductorLanes<R> {
+    const ROW: usize = 8;
+
+    #[inline(always)]
+    fn load(table: &[f32], at: R::UInt) -> Self {
+        let facets = FacetLanes { alpha_x: field(table, at, 6), alpha_y: field(table, at, 7) };
+        Self { eta: colour(table, at, 0), k: colour(table, at, 3), facets }
+    }
+
+    #[inline(always)]
+    fn eval(&self, wo: V3<R>, wi: V3<R>) -> (V3<R>, R) {
+        let (density, fits) = self.facet_density(wo, wi);
+        let m = (wo + wi).normalize();
+        let both = self.facets.both_visible_per_cosines(wo, wi);
+        let value = self.fresnel(wo.dot(m)) * (density * both * wi.z.abs());
+        (value.or_zero(fits), (density * self.facets.visible_per_cosine(wo)).or_zero(fits))
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: V3<R>, _: R, u: [R; 2]) -> LaneSample<R> {
+        let smooth = self.facets.is_smooth();
+        let up = V3::constant([0.0, 0.0, 1.0]);
+        let m = V3::select(smooth, up, self.facets.sample_visible(wo, u));
+        let wi = V3::select(smooth, mirrored(wo), reflect_lanes(wo, m));
+        let also_visible = R::select(smooth, R::one(), self.facets.also_visible(wo, wi));
+        let pdf = R::splat(0.25) * self.facets.density(m) * self.facets.visible_per_cosine(wo);
+        LaneSample {
+            wi,
+            weight: self.fresnel(wo.dot(m)) * also_visible,
+            pdf: R::select(smooth, R::one(), pdf),
+            valid: (wo.z * wi.z).simd_gt(R::zero()),
+            delta: smooth,
+            transmitted: R::Mask::splat(false),
+            eta: R::one(),
+        }
+    }
+
+    #[inline(always)]
+    fn is_delta(&self) -> R::Mask {
+        self.facets.is_smooth()
+    }
+
+    #[inline(always)]
+    fn regularized(self, mask: R::Mask) -> Self {
+        Self { facets: self.facets.regularized(mask), ..self }
+    }
+}
+
+/// The mirror reflection in the surface.
+#[inline(always)]
+pub(crate) fn mirrored<R: Real>(w: V3<R>) -> V3<R> {
+    V3::new(-w.x, -w.y, w.z)
+}
+
+/// `w` mirrored about the unit normal `m`.
+#[inline(always)]
+pub(crate) fn reflect_lanes<R: Real>(w: V3<R>, m: V3<R>) -> V3<R> {
+    (m * (R::splat(2.0) * w.dot(m)) - w).normalize()
 }
 
 /// `w` mirrored about the unit normal `m`.
 pub(crate) fn reflect(w: LocalDir, m: Vec3) -> LocalDir {
-    LocalDir((2.0 * w.vec().dot(m) * m - w.vec()).normalize())
+    LocalDir(vector(reflect_lanes(w.lane(), lane(m))))
 }

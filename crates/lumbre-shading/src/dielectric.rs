@@ -1,9 +1,12 @@
 //! Glass: reflection and refraction.
 
 use lumbre_math::{Vec2, Vec3};
+use lumbre_simd::{Mask, Real, V3};
 
-use crate::conductor::reflect;
-use crate::microfacet::Microfacets;
+use crate::conductor::{mirrored, reflect_lanes};
+use crate::diffuse::has_side;
+use crate::lanes::{LaneBsdf, LaneSample, field, lane, square, vector};
+use crate::microfacet::{FacetLanes, Microfacets};
 use crate::specular::Specular;
 use crate::{BsdfSample, LocalDir, Scatter, Spectrum, fresnel};
 
@@ -22,20 +25,6 @@ pub struct Dielectric {
     pub facets: Microfacets,
 }
 
-/// A facet that scatters `wo` to `wi`.
-pub(crate) struct Facet {
-    /// Its normal, pointing up.
-    pub normal: Vec3,
-    /// Index of the side of `wi` over that of the side of `wo`.
-    pub eta: f32,
-    /// Its Fresnel reflectance.
-    pub fresnel: f32,
-    /// |dm/dwi|.
-    pub jacobian: f32,
-    /// Whether it refracts.
-    pub transmits: bool,
-}
-
 /// The modes of scattering to consider.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Ways {
@@ -47,52 +36,23 @@ pub(crate) enum Ways {
 impl Dielectric {
     /// Whether it is a delta: smooth, or with equal indices.
     pub fn is_delta(&self) -> bool {
-        self.facets.is_smooth() || self.eta == 1.0
-    }
-
-    /// Index of the other side over that of the side of `w`.
-    pub(crate) fn eta_across(&self, w: LocalDir) -> f32 {
-        if w.cos_theta() > 0.0 { self.eta } else { 1.0 / self.eta }
+        self.lane().is_delta()
     }
 
     /// The facet between two directions; `None` where there is none, as for a delta.
-    pub(crate) fn facet(&self, wo: LocalDir, wi: LocalDir) -> Option<Facet> {
-        let (cos_o, cos_i) = (wo.cos_theta(), wi.cos_theta());
-        let sides = cos_o * cos_i;
-        if self.is_delta() || sides == 0.0 || sides.is_nan() {
-            return None;
-        }
-        let transmits = sides < 0.0;
-        let eta = if transmits { self.eta_across(wo) } else { 1.0 };
-        let normal = (wo.vec() + eta * wi.vec()).try_normalize()?;
-        let normal = if normal.z < 0.0 { -normal } else { normal };
-        let (dot_o, dot_i) = (wo.vec().dot(normal), wi.vec().dot(normal));
-        // A facet is visible only from the side of the surface that it faces.
-        if dot_o * cos_o <= 0.0 || dot_i * cos_i <= 0.0 {
-            return None;
-        }
-        let jacobian = if transmits {
-            let denominator = dot_i + dot_o / eta;
-            dot_i.abs() / (denominator * denominator)
-        } else {
-            0.25 / dot_o.abs()
-        };
-        Some(Facet { normal, eta, fresnel: fresnel::dielectric(dot_o, self.eta), jacobian, transmits })
+    pub(crate) fn facet(&self, wo: LocalDir, wi: LocalDir) -> Option<Facet<f32>> {
+        let (facet, fits) = self.lane().facet(wo.lane(), wi.lane());
+        fits.then_some(facet)
     }
 
     /// f · |cos θi|.
     pub fn eval(&self, wo: LocalDir, wi: LocalDir) -> f32 {
-        let Some(facet) = self.facet(wo, wi) else { return 0.0 };
-        let share = if facet.transmits { 1.0 - facet.fresnel } else { facet.fresnel };
-        share * self.eval_facet(&facet, wo, wi)
+        self.lane().eval(wo.lane(), wi.lane()).0.x
     }
 
     /// f · |cos θi| of a facet that only reflects or only refracts.
-    pub(crate) fn eval_facet(&self, facet: &Facet, wo: LocalDir, wi: LocalDir) -> f32 {
-        let facets = self.facets.density(facet.normal)
-            * self.facets.both_visible_per_cosines(wo.vec(), wi.vec())
-            * wo.vec().dot(facet.normal).abs();
-        facets * facet.jacobian * wi.abs_cos_theta() / (facet.eta * facet.eta)
+    pub(crate) fn eval_facet(&self, facet: &Facet<f32>, wo: LocalDir, wi: LocalDir) -> f32 {
+        self.lane().eval_facet(facet, wo.lane(), wi.lane())
     }
 
     /// The density of [`Dielectric::sample`].
@@ -102,14 +62,7 @@ impl Dielectric {
 
     /// The density of [`Dielectric::sample_of`].
     pub(crate) fn pdf_of(&self, wo: LocalDir, wi: LocalDir, ways: Ways) -> f32 {
-        let Some(facet) = self.facet(wo, wi) else { return 0.0 };
-        let probability = match (ways, facet.transmits) {
-            (Ways::Both, true) => 1.0 - facet.fresnel,
-            (Ways::Both, false) => facet.fresnel,
-            (Ways::Transmission, transmits) => f32::from(transmits && facet.fresnel < 1.0),
-            (Ways::Reflection, transmits) => f32::from(!transmits),
-        };
-        probability * self.facets.visible_density(wo.vec(), facet.normal) * facet.jacobian
+        self.lane().pdf_of(wo.lane(), wi.lane(), ways)
     }
 
     /// A reflection or a refraction, in proportion to their power.
@@ -119,74 +72,196 @@ impl Dielectric {
 
     /// [`Dielectric::sample`] restricted to some modes; the weight is for those.
     pub(crate) fn sample_of(&self, wo: LocalDir, lobe: f32, u: Vec2, ways: Ways) -> Option<BsdfSample> {
-        if wo.cos_theta() == 0.0 || wo.cos_theta().is_nan() {
-            return None;
-        }
+        self.lane().sample_of(wo.lane(), lobe, square(u), ways).scalar()
+    }
+
+    pub(crate) fn lane(&self) -> DielectricLanes<f32> {
+        DielectricLanes { eta: self.eta, facets: self.facets.lane() }
+    }
+
+    pub(crate) fn row(&self) -> [f32; 3] {
+        let alpha = self.facets.alpha();
+        [self.eta, alpha.x, alpha.y]
+    }
+}
+
+/// [`Dielectric`] over lanes.
+#[derive(Clone, Copy, Debug)]
+pub struct DielectricLanes<R: Real> {
+    /// Index of refraction, inside over outside.
+    pub eta: R,
+    /// Its roughness.
+    pub facets: FacetLanes<R>,
+}
+
+/// A facet that scatters `wo` to `wi`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Facet<R: Real> {
+    /// Its normal, pointing up.
+    pub(crate) normal: V3<R>,
+    /// Index of the side of `wi` over that of the side of `wo`.
+    pub(crate) eta: R,
+    /// Its Fresnel reflectance.
+    pub(crate) fresnel: R,
+    /// |dm/dwi|.
+    pub(crate) jacobian: R,
+    /// Whether it refracts.
+    pub(crate) transmits: R::Mask,
+}
+
+impl<R: Real> DielectricLanes<R> {
+    /// Index of the other side over that of the side of `w`.
+    #[inline(always)]
+    fn eta_across(&self, w: V3<R>) -> R {
+        R::select(w.z.simd_gt(R::zero()), self.eta, self.eta.recip())
+    }
+
+    /// |dm/dwi| for a facet of normal `m`, where `eta` is the index of the side of `wi` over that of the side of `wo`.
+    #[inline(always)]
+    fn jacobian(wo: V3<R>, wi: V3<R>, m: V3<R>, eta: R, transmits: R::Mask) -> R {
+        let (dot_o, dot_i) = (wo.dot(m), wi.dot(m));
+        let denominator = dot_i + dot_o / eta;
+        let refraction = dot_i.abs() / (denominator * denominator);
+        R::select(transmits, refraction, R::splat(0.25) / dot_o.abs())
+    }
+
+    /// The facet between two directions, and where there is one: not for a delta.
+    #[inline(always)]
+    pub(crate) fn facet(&self, wo: V3<R>, wi: V3<R>) -> (Facet<R>, R::Mask) {
+        let sides = wo.z * wi.z;
+        let transmits = sides.simd_lt(R::zero());
+        let eta = R::select(transmits, self.eta_across(wo), R::one());
+        let sum = wo + wi * eta;
+        let normal = sum.normalize();
+        let normal = V3::select(normal.z.simd_lt(R::zero()), -normal, normal);
+        let (dot_o, dot_i) = (wo.dot(normal), wi.dot(normal));
+        // A facet is visible only from the side of the surface that it faces.
+        let fits = !self.is_delta()
+            & sides.abs().simd_gt(R::zero())
+            & sum.length_squared().simd_gt(R::zero())
+            & (dot_o * wo.z).simd_gt(R::zero())
+            & (dot_i * wi.z).simd_gt(R::zero());
+        let jacobian = Self::jacobian(wo, wi, normal, eta, transmits);
+        let fresnel = fresnel::dielectric(dot_o, self.eta);
+        (Facet { normal, eta, fresnel, jacobian, transmits }, fits)
+    }
+
+    /// f · |cos θi| of a facet that only reflects or only refracts.
+    #[inline(always)]
+    pub(crate) fn eval_facet(&self, facet: &Facet<R>, wo: V3<R>, wi: V3<R>) -> R {
+        let facets = self.facets.density(facet.normal)
+            * self.facets.both_visible_per_cosines(wo, wi)
+            * wo.dot(facet.normal).abs();
+        facets * facet.jacobian * wi.z.abs() / (facet.eta * facet.eta)
+    }
+
+    /// The density of [`DielectricLanes::sample_of`].
+    #[inline(always)]
+    pub(crate) fn pdf_of(&self, wo: V3<R>, wi: V3<R>, ways: Ways) -> R {
+        let (facet, fits) = self.facet(wo, wi);
+        self.pdf_of_facet(&facet, wo, ways).or_zero(fits)
+    }
+
+    #[inline(always)]
+    fn pdf_of_facet(&self, facet: &Facet<R>, wo: V3<R>, ways: Ways) -> R {
+        let probability = match ways {
+            Ways::Both => R::select(facet.transmits, R::one() - facet.fresnel, facet.fresnel),
+            Ways::Transmission => R::one().or_zero(facet.transmits & facet.fresnel.simd_lt(R::one())),
+            Ways::Reflection => R::one().or_zero(!facet.transmits),
+        };
+        probability * self.facets.visible_density(wo, facet.normal) * facet.jacobian
+    }
+
+    /// [`LaneBsdf::sample`] restricted to some modes; the weight is for those.
+    #[inline(always)]
+    pub(crate) fn sample_of(&self, wo: V3<R>, lobe: R, u: [R; 2], ways: Ways) -> LaneSample<R> {
         let delta = self.is_delta();
-        let m = if delta { Vec3::Z } else { self.facets.sample_visible(wo.vec(), u) };
-        let reflected = fresnel::dielectric(wo.vec().dot(m), self.eta);
+        let up = V3::constant([0.0, 0.0, 1.0]);
+        let m = V3::select(delta, up, self.facets.sample_visible(wo, u));
+        let reflected = fresnel::dielectric(wo.dot(m), self.eta);
         let (transmits, probability) = match ways {
-            Ways::Both if lobe < reflected => (false, reflected),
-            Ways::Both => (true, 1.0 - reflected),
-            Ways::Transmission => (true, 1.0),
-            Ways::Reflection => (false, 1.0),
+            Ways::Both => {
+                let reflects = lobe.simd_lt(reflected);
+                (!reflects, R::select(reflects, reflected, R::one() - reflected))
+            }
+            Ways::Transmission => (R::Mask::splat(true), R::one()),
+            Ways::Reflection => (R::Mask::splat(false), R::one()),
         };
-        let share = if transmits { 1.0 - reflected } else { reflected };
-        let eta = if transmits { self.eta_across(wo) } else { 1.0 };
-        let wi = if transmits {
-            refract(wo, m, eta)?
-        } else if delta {
-            wo.mirrored()
-        } else {
-            reflect(wo, m)
-        };
-        let sides = wo.cos_theta() * wi.cos_theta();
-        let on_its_side = if transmits { sides < 0.0 } else { sides > 0.0 };
-        if !on_its_side || share == 0.0 {
-            return None;
-        }
-        let weight = share / probability / (eta * eta);
-        if delta {
-            return Some(BsdfSample {
-                wi,
-                weight: Spectrum::splat(weight),
-                scatter: Scatter::Delta,
-                transmitted: transmits,
-                eta,
-            });
-        }
-        let jacobian = if transmits {
-            let (dot_o, dot_i) = (wo.vec().dot(m), wi.vec().dot(m));
-            let denominator = dot_i + dot_o / eta;
-            dot_i.abs() / (denominator * denominator)
-        } else {
-            0.25 / wo.vec().dot(m).abs()
-        };
-        let pdf = probability * self.facets.visible_density(wo.vec(), m) * jacobian;
-        if !(pdf > 0.0 && pdf.is_finite()) {
-            return None;
-        }
-        Some(BsdfSample {
+        let share = R::select(transmits, R::one() - reflected, reflected);
+        let eta = R::select(transmits, self.eta_across(wo), R::one());
+        let (refracted, refracts) = refract_lanes(wo, m, eta);
+        let reflection = V3::select(delta, mirrored(wo), reflect_lanes(wo, m));
+        let wi = V3::select(transmits, refracted, reflection);
+        let sides = wo.z * wi.z;
+        let on_its_side =
+            (transmits & refracts & sides.simd_lt(R::zero())) | (!transmits & sides.simd_gt(R::zero()));
+        let pdf =
+            probability * self.facets.visible_density(wo, m) * Self::jacobian(wo, wi, m, eta, transmits);
+        let pdf = R::select(delta, R::one(), pdf);
+        let also_visible = R::select(delta, R::one(), self.facets.also_visible(wo, wi));
+        LaneSample {
             wi,
-            weight: Spectrum::splat(weight * self.facets.also_visible(wo.vec(), wi.vec())),
-            scatter: Scatter::Density(pdf),
+            weight: V3::splat(share / probability / (eta * eta) * also_visible),
+            pdf,
+            valid: on_its_side & share.simd_ne(R::zero()) & pdf.simd_gt(R::zero()) & pdf.is_finite(),
+            delta,
             transmitted: transmits,
             eta,
-        })
+        }
     }
+}
+
+impl<R: Real> LaneBsdf<R> for DielectricLanes<R> {
+    const ROW: usize = 3;
+
+    #[inline(always)]
+    fn load(table: &[f32], at: R::UInt) -> Self {
+        let facets = FacetLanes { alpha_x: field(table, at, 1), alpha_y: field(table, at, 2) };
+        Self { eta: field(table, at, 0), facets }
+    }
+
+    #[inline(always)]
+    fn eval(&self, wo: V3<R>, wi: V3<R>) -> (V3<R>, R) {
+        let (facet, fits) = self.facet(wo, wi);
+        let share = R::select(facet.transmits, R::one() - facet.fresnel, facet.fresnel);
+        let value = share * self.eval_facet(&facet, wo, wi);
+        let pdf = self.pdf_of_facet(&facet, wo, Ways::Both);
+        (V3::splat(value.or_zero(fits)), pdf.or_zero(fits))
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: V3<R>, lobe: R, u: [R; 2]) -> LaneSample<R> {
+        self.sample_of(wo, lobe, u, Ways::Both)
+    }
+
+    #[inline(always)]
+    fn is_delta(&self) -> R::Mask {
+        self.facets.is_smooth() | self.eta.simd_eq(R::one())
+    }
+
+    #[inline(always)]
+    fn regularized(self, mask: R::Mask) -> Self {
+        Self { facets: self.facets.regularized(mask), ..self }
+    }
+}
+
+/// `w` refracted through a facet of normal `m`, where `eta` is the index of the other side over that of the
+/// side of `w`; and where there is a refraction: not beyond the critical angle.
+#[inline(always)]
+pub(crate) fn refract_lanes<R: Real>(w: V3<R>, m: V3<R>, eta: R) -> (V3<R>, R::Mask) {
+    let m = V3::select(w.dot(m).simd_lt(R::zero()), -m, m);
+    let cos_i = w.dot(m);
+    let sin2_t = (R::one() - cos_i * cos_i).simd_max(R::zero()) / (eta * eta);
+    let cos_t = (R::one() - sin2_t).simd_max(R::zero()).sqrt();
+    let refracted = (m * (cos_i / eta - cos_t) - w / eta).normalize();
+    (refracted, sin2_t.simd_lt(R::one()))
 }
 
 /// `w` refracted through a facet of normal `m`, where `eta` is the index of the other side over that of the
 /// side of `w`. `None` beyond the critical angle.
 pub(crate) fn refract(w: LocalDir, m: Vec3, eta: f32) -> Option<LocalDir> {
-    let m = if w.vec().dot(m) < 0.0 { -m } else { m };
-    let cos_i = w.vec().dot(m);
-    let sin2_t = (1.0 - cos_i * cos_i).max(0.0) / (eta * eta);
-    if sin2_t >= 1.0 {
-        return None;
-    }
-    let cos_t = (1.0 - sin2_t).sqrt();
-    Some(LocalDir(((cos_i / eta - cos_t) * m - w.vec() / eta).normalize()))
+    let (refracted, refracts) = refract_lanes(w.lane(), lane(m), eta);
+    refracts.then(|| LocalDir(vector(refracted)))
 }
 
 /// A pane of glass so thin that transmission is not displaced: a delta, with all reflections between its faces
@@ -200,8 +275,7 @@ pub struct ThinDielectric {
 impl ThinDielectric {
     /// The reflectance R + T² R + T² R³ + … = 2R / (1 + R) with T = 1 − R.
     pub fn reflected(&self, cos: f32) -> f32 {
-        let once = fresnel::dielectric(cos.abs(), self.eta);
-        2.0 * once / (1.0 + once)
+        ThinDielectricLanes { eta: self.eta }.reflected(cos)
     }
 
     /// The reflection and the transmission, each with its power.
@@ -225,16 +299,60 @@ impl ThinDielectric {
 
     /// A reflection, or transmission straight on.
     pub fn sample(&self, wo: LocalDir, lobe: f32) -> Option<BsdfSample> {
-        if wo.cos_theta() == 0.0 || wo.cos_theta().is_nan() {
-            return None;
-        }
-        let transmitted = lobe >= self.reflected(wo.cos_theta());
-        Some(BsdfSample {
-            wi: if transmitted { -wo } else { wo.mirrored() },
-            weight: Spectrum::WHITE,
-            scatter: Scatter::Delta,
+        ThinDielectricLanes { eta: self.eta }.sample(wo.lane(), lobe, [0.0; 2]).scalar()
+    }
+}
+
+/// [`ThinDielectric`] over lanes.
+#[derive(Clone, Copy, Debug)]
+pub struct ThinDielectricLanes<R: Real> {
+    /// Index of the pane over that of its surroundings.
+    pub eta: R,
+}
+
+impl<R: Real> ThinDielectricLanes<R> {
+    /// [`ThinDielectric::reflected`].
+    #[inline(always)]
+    pub fn reflected(&self, cos: R) -> R {
+        let once = fresnel::dielectric(cos.abs(), self.eta);
+        R::splat(2.0) * once / (R::one() + once)
+    }
+}
+
+impl<R: Real> LaneBsdf<R> for ThinDielectricLanes<R> {
+    const ROW: usize = 1;
+
+    #[inline(always)]
+    fn load(table: &[f32], at: R::UInt) -> Self {
+        Self { eta: field(table, at, 0) }
+    }
+
+    #[inline(always)]
+    fn eval(&self, _: V3<R>, _: V3<R>) -> (V3<R>, R) {
+        (V3::splat(R::zero()), R::zero())
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: V3<R>, lobe: R, _: [R; 2]) -> LaneSample<R> {
+        let transmitted = lobe.simd_ge(self.reflected(wo.z));
+        LaneSample {
+            wi: V3::select(transmitted, -wo, mirrored(wo)),
+            weight: V3::splat(R::one()),
+            pdf: R::one(),
+            valid: has_side(wo),
+            delta: R::Mask::splat(true),
             transmitted,
-            eta: 1.0,
-        })
+            eta: R::one(),
+        }
+    }
+
+    #[inline(always)]
+    fn is_delta(&self) -> R::Mask {
+        R::Mask::splat(true)
+    }
+
+    #[inline(always)]
+    fn regularized(self, _: R::Mask) -> Self {
+        self
     }
 }

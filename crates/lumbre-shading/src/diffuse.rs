@@ -2,10 +2,12 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use lumbre_math::warp::square_to_cosine_hemisphere;
-use lumbre_math::{Vec2, Vec3};
+use lumbre_math::Vec2;
+use lumbre_simd::math::cosine_hemisphere;
+use lumbre_simd::{Mask, Real, V3};
 
-use crate::{BsdfSample, LocalDir, Scatter, Spectrum};
+use crate::lanes::{LaneBsdf, LaneSample, colour, colour_lane, spectrum, square, vector};
+use crate::{BsdfSample, LocalDir, Spectrum};
 
 /// Lambertian reflection. Conserves energy at a reflectance of 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,28 +19,72 @@ pub struct Diffuse {
 impl Diffuse {
     /// f · |cos θi|.
     pub fn eval(&self, wo: LocalDir, wi: LocalDir) -> Spectrum {
-        if wo.same_hemisphere(wi) {
-            self.reflectance * (FRAC_1_PI * wi.abs_cos_theta())
-        } else {
-            Spectrum::BLACK
-        }
+        spectrum(self.lane().eval(wo.lane(), wi.lane()).0)
     }
 
     /// The density of [`Diffuse::sample`].
     pub fn pdf(&self, wo: LocalDir, wi: LocalDir) -> f32 {
-        if wo.same_hemisphere(wi) { FRAC_1_PI * wi.abs_cos_theta() } else { 0.0 }
+        self.lane().eval(wo.lane(), wi.lane()).1
     }
 
     /// A cosine-weighted direction.
     pub fn sample(&self, wo: LocalDir, u: Vec2) -> Option<BsdfSample> {
-        let wi = cosine_direction(u, wo.cos_theta())?;
-        Some(BsdfSample {
+        self.lane().sample(wo.lane(), 0.0, square(u)).scalar()
+    }
+
+    pub(crate) fn lane(&self) -> DiffuseLanes<f32> {
+        DiffuseLanes { reflectance: colour_lane(self.reflectance) }
+    }
+
+    pub(crate) fn row(&self) -> [f32; 3] {
+        self.reflectance.to_array()
+    }
+}
+
+/// [`Diffuse`] over lanes.
+#[derive(Clone, Copy, Debug)]
+pub struct DiffuseLanes<R: Real> {
+    /// In [0, 1].
+    pub reflectance: V3<R>,
+}
+
+impl<R: Real> LaneBsdf<R> for DiffuseLanes<R> {
+    const ROW: usize = 3;
+
+    #[inline(always)]
+    fn load(table: &[f32], at: R::UInt) -> Self {
+        Self { reflectance: colour(table, at, 0) }
+    }
+
+    #[inline(always)]
+    fn eval(&self, wo: V3<R>, wi: V3<R>) -> (V3<R>, R) {
+        let is_reflection = (wo.z * wi.z).simd_gt(R::zero());
+        let pdf = (R::splat(FRAC_1_PI) * wi.z.abs()).or_zero(is_reflection);
+        (self.reflectance * pdf, pdf)
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: V3<R>, _: R, u: [R; 2]) -> LaneSample<R> {
+        let wi = cosine_lanes(u, wo.z);
+        LaneSample {
             wi,
             weight: self.reflectance,
-            scatter: Scatter::Density(FRAC_1_PI * wi.abs_cos_theta()),
-            transmitted: false,
-            eta: 1.0,
-        })
+            pdf: R::splat(FRAC_1_PI) * wi.z.abs(),
+            valid: has_side(wo),
+            delta: R::Mask::splat(false),
+            transmitted: R::Mask::splat(false),
+            eta: R::one(),
+        }
+    }
+
+    #[inline(always)]
+    fn is_delta(&self) -> R::Mask {
+        R::Mask::splat(false)
+    }
+
+    #[inline(always)]
+    fn regularized(self, _: R::Mask) -> Self {
+        self
     }
 }
 
@@ -55,60 +101,113 @@ pub struct DiffuseTransmission {
 impl DiffuseTransmission {
     /// f · |cos θi|.
     pub fn eval(&self, wo: LocalDir, wi: LocalDir) -> Spectrum {
-        let side = wo.cos_theta() * wi.cos_theta();
-        let share = if side > 0.0 {
-            self.reflectance
-        } else if side < 0.0 {
-            self.transmittance
-        } else {
-            return Spectrum::BLACK;
-        };
-        share * (FRAC_1_PI * wi.abs_cos_theta())
-    }
-
-    /// The probability of a reflection.
-    fn reflection_probability(&self) -> f32 {
-        let (r, t) = (self.reflectance.max_component(), self.transmittance.max_component());
-        if r + t > 0.0 { r / (r + t) } else { 0.5 }
+        spectrum(self.lane().eval(wo.lane(), wi.lane()).0)
     }
 
     /// The density of [`DiffuseTransmission::sample`].
     pub fn pdf(&self, wo: LocalDir, wi: LocalDir) -> f32 {
-        let side = wo.cos_theta() * wi.cos_theta();
-        let reflection = self.reflection_probability();
-        let probability = if side > 0.0 {
-            reflection
-        } else if side < 0.0 {
-            1.0 - reflection
-        } else {
-            return 0.0;
-        };
-        probability * FRAC_1_PI * wi.abs_cos_theta()
+        self.lane().eval(wo.lane(), wi.lane()).1
     }
 
     /// A cosine-weighted direction on either side.
     pub fn sample(&self, wo: LocalDir, lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        self.lane().sample(wo.lane(), lobe, square(u)).scalar()
+    }
+
+    fn lane(&self) -> DiffuseTransmissionLanes<f32> {
+        DiffuseTransmissionLanes {
+            reflectance: colour_lane(self.reflectance),
+            transmittance: colour_lane(self.transmittance),
+        }
+    }
+
+    pub(crate) fn row(&self) -> [f32; 6] {
+        let ([a, b, c], [d, e, f]) = (self.reflectance.to_array(), self.transmittance.to_array());
+        [a, b, c, d, e, f]
+    }
+}
+
+/// [`DiffuseTransmission`] over lanes.
+#[derive(Clone, Copy, Debug)]
+pub struct DiffuseTransmissionLanes<R: Real> {
+    /// In [0, 1].
+    pub reflectance: V3<R>,
+    /// In [0, 1].
+    pub transmittance: V3<R>,
+}
+
+impl<R: Real> DiffuseTransmissionLanes<R> {
+    /// The probability of a reflection.
+    #[inline(always)]
+    fn reflection_probability(&self) -> R {
+        let (r, t) = (self.reflectance.max_component(), self.transmittance.max_component());
+        let sum = r + t;
+        R::select(sum.simd_gt(R::zero()), r / sum, R::splat(0.5))
+    }
+}
+
+impl<R: Real> LaneBsdf<R> for DiffuseTransmissionLanes<R> {
+    const ROW: usize = 6;
+
+    #[inline(always)]
+    fn load(table: &[f32], at: R::UInt) -> Self {
+        Self { reflectance: colour(table, at, 0), transmittance: colour(table, at, 3) }
+    }
+
+    #[inline(always)]
+    fn eval(&self, wo: V3<R>, wi: V3<R>) -> (V3<R>, R) {
+        let side = wo.z * wi.z;
+        let (reflects, transmits) = (side.simd_gt(R::zero()), side.simd_lt(R::zero()));
         let reflection = self.reflection_probability();
-        let transmitted = lobe >= reflection;
-        let (share, probability) =
-            if transmitted { (self.transmittance, 1.0 - reflection) } else { (self.reflectance, reflection) };
-        let wi = cosine_direction(u, if transmitted { -wo.cos_theta() } else { wo.cos_theta() })?;
-        Some(BsdfSample {
+        let cosine = (R::splat(FRAC_1_PI) * wi.z.abs()).or_zero(reflects | transmits);
+        let share = V3::select(reflects, self.reflectance, self.transmittance);
+        (share * cosine, R::select(reflects, reflection, R::one() - reflection) * cosine)
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: V3<R>, lobe: R, u: [R; 2]) -> LaneSample<R> {
+        let reflection = self.reflection_probability();
+        let transmitted = lobe.simd_ge(reflection);
+        let share = V3::select(transmitted, self.transmittance, self.reflectance);
+        let probability = R::select(transmitted, R::one() - reflection, reflection);
+        let wi = cosine_lanes(u, R::select(transmitted, -wo.z, wo.z));
+        LaneSample {
             wi,
             weight: share / probability,
-            scatter: Scatter::Density(probability * FRAC_1_PI * wi.abs_cos_theta()),
+            pdf: probability * (R::splat(FRAC_1_PI) * wi.z.abs()),
+            valid: has_side(wo),
+            delta: R::Mask::splat(false),
             transmitted,
-            eta: 1.0,
-        })
+            eta: R::one(),
+        }
     }
+
+    #[inline(always)]
+    fn is_delta(&self) -> R::Mask {
+        R::Mask::splat(false)
+    }
+
+    #[inline(always)]
+    fn regularized(self, _: R::Mask) -> Self {
+        self
+    }
+}
+
+/// Where a direction has a side of the surface: not in it, and not NaN.
+#[inline(always)]
+pub(crate) fn has_side<R: Real>(w: V3<R>) -> R::Mask {
+    w.z.abs().simd_gt(R::zero())
+}
+
+/// A direction with density cos θ / π on the side of the sign of `side`, which is not zero.
+#[inline(always)]
+pub(crate) fn cosine_lanes<R: Real>(u: [R; 2], side: R) -> V3<R> {
+    let up = cosine_hemisphere(u);
+    // At least 2⁻¹³, since a direction in the surface has no side.
+    V3::new(up.x, up.y, up.z.simd_max(R::splat(1.2e-4)).copysign(side))
 }
 
 /// A direction with density cos θ / π on the side of the sign of `side`; `None` when that is zero.
 pub(crate) fn cosine_direction(u: Vec2, side: f32) -> Option<LocalDir> {
-    if side == 0.0 || side.is_nan() {
-        return None;
-    }
-    let up = square_to_cosine_hemisphere(u);
-    // At least 2⁻¹³, since a direction in the surface has no side.
-    Some(LocalDir(Vec3::new(up.x, up.y, up.z.max(1.2e-4).copysign(side))))
+    (side.abs() > 0.0).then(|| LocalDir(vector(cosine_lanes(square(u), side))))
 }

@@ -33,12 +33,16 @@ impl ShadingNormals {
     }
 }
 
-/// A unit direction in a shading frame, whose z axis is the shading normal. Only [`ShadingFrame`] and the
-/// samplers of this crate construct it.
+/// A unit direction in a shading frame, whose z axis is the shading normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalDir(pub(crate) Vec3);
 
 impl LocalDir {
+    /// A unit vector of a frame.
+    pub fn new(unit: Vec3) -> Self {
+        Self(unit)
+    }
+
     /// Its coordinates.
     pub fn vec(self) -> Vec3 {
         self.0

@@ -1,22 +1,23 @@
 //! Fresnel reflectance.
 
+use lumbre_simd::{Real, V3};
+
 use crate::Spectrum;
 
 /// The reflectance of a smooth dielectric interface for unpolarised light.
 ///
 /// `cos_i` is the cosine of incidence, negative from the inside; `eta` is the index of the inside over that of
 /// the outside, positive. 1 beyond the critical angle and at grazing incidence.
-pub fn dielectric(cos_i: f32, eta: f32) -> f32 {
-    let (cos_i, eta) = if cos_i < 0.0 { (-cos_i, 1.0 / eta) } else { (cos_i, eta) };
-    let cos_i = cos_i.min(1.0);
-    let sin2_t = (1.0 - cos_i * cos_i) / (eta * eta);
-    if sin2_t >= 1.0 {
-        return 1.0;
-    }
-    let cos_t = (1.0 - sin2_t).sqrt();
+#[inline(always)]
+pub fn dielectric<R: Real>(cos_i: R, eta: R) -> R {
+    let eta = R::select(cos_i.simd_lt(R::zero()), eta.recip(), eta);
+    let cos_i = cos_i.abs().simd_min(R::one());
+    let sin2_t = (R::one() - cos_i * cos_i) / (eta * eta);
+    let cos_t = (R::one() - sin2_t).simd_max(R::zero()).sqrt();
     let parallel = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
     let perpendicular = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-    0.5 * (parallel * parallel + perpendicular * perpendicular)
+    let partial = R::splat(0.5) * (parallel * parallel + perpendicular * perpendicular);
+    R::select(sin2_t.simd_ge(R::one()), R::one(), partial)
 }
 
 /// The reflectance of a metal of index `eta + i k` (over that of its surroundings) at one wavelength, `cos_i` ≥
@@ -24,28 +25,38 @@ pub fn dielectric(cos_i: f32, eta: f32) -> f32 {
 ///
 /// An infinite `k` reflects everything. Source: the Fresnel equations with a complex index, in the real form of
 /// Born and Wolf, "Principles of Optics", 7th ed., 1999, section 14.2.
-pub fn conductor_channel(cos_i: f32, eta: f32, k: f32) -> f32 {
-    // Beyond this the reflectance is within 4·10⁻⁴ of 1 except at grazing angles, and k⁴ approaches the end of
-    // the range.
-    if k > 1e4 {
-        return 1.0;
-    }
-    let cos_i = cos_i.clamp(0.0, 1.0);
+#[inline(always)]
+pub fn conductor_channel<R: Real>(cos_i: R, eta: R, k: R) -> R {
+    let cos_i = cos_i.simd_max(R::zero()).simd_min(R::one());
     let cos2 = cos_i * cos_i;
-    let sin2 = 1.0 - cos2;
+    let sin2 = R::one() - cos2;
     let (eta2, k2) = (eta * eta, k * k);
     let t0 = eta2 - k2 - sin2;
-    let a2_plus_b2 = (t0 * t0 + 4.0 * eta2 * k2).sqrt();
-    let a = (0.5 * (a2_plus_b2 + t0)).max(0.0).sqrt();
-    let (t1, t2) = (a2_plus_b2 + cos2, 2.0 * a * cos_i);
+    let a2_plus_b2 = (t0 * t0 + R::splat(4.0) * eta2 * k2).sqrt();
+    let a = (R::splat(0.5) * (a2_plus_b2 + t0)).simd_max(R::zero()).sqrt();
+    let (t1, t2) = (a2_plus_b2 + cos2, R::splat(2.0) * a * cos_i);
     let (t3, t4) = (cos2 * a2_plus_b2 + sin2 * sin2, t2 * sin2);
-    // Both are 0/0 where metal and surroundings are equal, at a grazing angle.
-    if t1 + t2 <= 0.0 || t3 + t4 <= 0.0 {
-        return if k > 0.0 || eta != 1.0 { 1.0 } else { 0.0 };
-    }
     let perpendicular = (t1 - t2) / (t1 + t2);
     let parallel = perpendicular * (t3 - t4) / (t3 + t4);
-    (0.5 * (perpendicular + parallel)).clamp(0.0, 1.0)
+    let partial = R::splat(0.5) * (perpendicular + parallel);
+    let partial = partial.simd_max(R::zero()).simd_min(R::one());
+    // Both are 0/0 where metal and surroundings are equal, at a grazing angle.
+    let is_undefined = (t1 + t2).simd_le(R::zero()) | (t3 + t4).simd_le(R::zero());
+    let is_border = k.simd_gt(R::zero()) | eta.simd_ne(R::one());
+    let reflectance = R::select(is_undefined, R::one().or_zero(is_border), partial);
+    // Beyond this the reflectance is within 4·10⁻⁴ of 1 except at grazing angles, and k⁴ approaches the end of
+    // the range.
+    R::select(k.simd_gt(R::splat(1e4)), R::one(), reflectance)
+}
+
+/// [`conductor_channel`] for each channel, in lanes.
+#[inline(always)]
+pub(crate) fn conductor_lanes<R: Real>(cos_i: R, eta: V3<R>, k: V3<R>) -> V3<R> {
+    V3::new(
+        conductor_channel(cos_i, eta.x, k.x),
+        conductor_channel(cos_i, eta.y, k.y),
+        conductor_channel(cos_i, eta.z, k.z),
+    )
 }
 
 /// [`conductor_channel`] for each channel.

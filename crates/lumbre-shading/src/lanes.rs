@@ -1,50 +1,170 @@
-//! BSDFs over lanes of numbers.
+//! BSDFs over lanes: each kind is written once over [`Real`], and the scalar [`Bsdf`] is its `f32` instance.
+//!
+//! A kind is loaded from rows of a table of numbers, which [`Bsdf::row`] writes; the lanes of one value may have rows of different surfaces,
+//! but of one kind. All results have the same bits at every instruction set. Directions are unit vectors in the local frame, whose z axis
+//! is the shading normal.
 
-use lumbre_simd::{Real, V3};
+use lumbre_math::{Vec2, Vec3};
+use lumbre_simd::{Real, UInt, V3};
+use smallvec::SmallVec;
 
-#[cfg(doc)]
-use crate::Bsdf;
-pub use crate::one_bsdf::OneBsdf;
+pub use crate::coated_lanes::{CoatLanes, CoatedConductorLanes, CoatedDiffuseLanes};
+pub use crate::conductor::ConductorLanes;
+pub use crate::dielectric::{DielectricLanes, ThinDielectricLanes};
+pub use crate::diffuse::{DiffuseLanes, DiffuseTransmissionLanes};
+pub use crate::microfacet::FacetLanes;
 
-/// A direction sampled from a BSDF in each lane: see [`crate::BsdfSample`].
+use crate::{Bsdf, BsdfSample, LocalDir, Scatter, Spectrum};
+
+/// A direction sampled from a BSDF in each lane: see [`BsdfSample`].
 #[derive(Clone, Copy, Debug)]
 pub struct LaneSample<R: Real> {
-    /// The direction of incidence, unit, in the shading frame.
+    /// The direction of incidence.
     pub wi: V3<R>,
     /// f · |cos θi| / pdf.
     pub weight: V3<R>,
-    /// The density per unit solid angle, where it is no delta.
+    /// The density per unit solid angle; 1 for a delta.
     pub pdf: R,
-    /// False where all is absorbed.
+    /// Where there is a sample. Elsewhere the light is absorbed, and the other members mean nothing.
     pub valid: R::Mask,
-    /// Whether the direction is the only possible one.
+    /// Where the direction is the only possible one.
     pub delta: R::Mask,
-    /// Whether it is on the other side of the surface.
+    /// Where the direction is on the other side of the surface.
     pub transmitted: R::Mask,
-    /// η of the side of `wi` over that of the side of `wo`.
+    /// η of the side of `wi` over that of the side of `wo`; 1 for a reflection or an unbent transmission.
     pub eta: R,
 }
 
-/// A BSDF in each lane: see [`Bsdf`].
-pub trait LaneBsdf<R: Real> {
-    /// f(wo, wi) · |cos θi| and the density of [`LaneBsdf::sample`], without delta parts.
-    fn eval(&self, wo: V3<R>, wi: V3<R>) -> (V3<R>, R);
-
-    /// Samples `wi` from three uniform numbers: `lobe` selects a part, `u` the direction.
-    fn sample(&self, wo: V3<R>, lobe: R, u: [R; 2]) -> LaneSample<R>;
-
-    /// Whether all parts are deltas.
-    fn is_delta(&self) -> R::Mask;
-}
-
-/// A BSDF that is a row of numbers.
-pub trait RowBsdf<R: Real>: LaneBsdf<R> {
-    /// Numbers of a row of parameters.
+/// A kind of BSDF over lanes.
+pub trait LaneBsdf<R: Real>: Sized {
+    /// The numbers in a row of parameters.
     const ROW: usize;
 
-    /// Reads the row that begins at `at` in each lane.
+    /// Reads the row that begins at `table[at]` in each lane.
     ///
     /// # Panics
-    /// Where a row is not all in the table.
+    /// If a row reaches beyond the table.
     fn load(table: &[f32], at: R::UInt) -> Self;
+
+    /// f · |cos θi|, and the density of [`LaneBsdf::sample`]: both without delta parts.
+    fn eval(&self, wo: V3<R>, wi: V3<R>) -> (V3<R>, R);
+
+    /// Samples a direction from three uniform numbers in [0, 1): `lobe` selects a part, `u` the direction.
+    fn sample(&self, wo: V3<R>, lobe: R, u: [R; 2]) -> LaneSample<R>;
+
+    /// Where all parts are deltas, so that light sampling is useless.
+    fn is_delta(&self) -> R::Mask;
+
+    /// [`Bsdf::regularized`] in the lanes of the mask.
+    #[must_use]
+    fn regularized(self, mask: R::Mask) -> Self;
+}
+
+/// The kinds of [`Bsdf`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u8)]
+pub enum BsdfKind {
+    /// [`DiffuseLanes`].
+    Diffuse,
+    /// [`DiffuseTransmissionLanes`].
+    DiffuseTransmission,
+    /// [`ConductorLanes`].
+    Conductor,
+    /// [`DielectricLanes`].
+    Dielectric,
+    /// [`ThinDielectricLanes`].
+    ThinDielectric,
+    /// [`CoatedDiffuseLanes`].
+    CoatedDiffuse,
+    /// [`CoatedConductorLanes`].
+    CoatedConductor,
+    /// A kind without lanes: only the scalar [`Bsdf`] has it.
+    Other,
+}
+
+/// The parameters of a BSDF as plain numbers: [`LaneBsdf::ROW`] of them.
+pub type Row = SmallVec<[f32; 8]>;
+
+impl Bsdf {
+    /// Its kind.
+    pub fn kind(&self) -> BsdfKind {
+        match self {
+            Self::Diffuse(_) => BsdfKind::Diffuse,
+            Self::DiffuseTransmission(_) => BsdfKind::DiffuseTransmission,
+            Self::Conductor(_) => BsdfKind::Conductor,
+            Self::Dielectric(_) => BsdfKind::Dielectric,
+            Self::ThinDielectric(_) => BsdfKind::ThinDielectric,
+            Self::CoatedDiffuse(_) => BsdfKind::CoatedDiffuse,
+            Self::CoatedConductor(_) => BsdfKind::CoatedConductor,
+            _ => BsdfKind::Other,
+        }
+    }
+
+    /// Its kind, and the row from which [`LaneBsdf::load`] of that kind makes the same BSDF; `None` for a kind without lanes.
+    pub fn row(&self) -> Option<(BsdfKind, Row)> {
+        let row = match self {
+            Self::Diffuse(bsdf) => Row::from_slice(&bsdf.row()),
+            Self::DiffuseTransmission(bsdf) => Row::from_slice(&bsdf.row()),
+            Self::Conductor(bsdf) => Row::from_slice(&bsdf.row()),
+            Self::Dielectric(bsdf) => Row::from_slice(&bsdf.row()),
+            Self::ThinDielectric(bsdf) => Row::from_slice(&[bsdf.eta]),
+            Self::CoatedDiffuse(bsdf) => bsdf.row().collect(),
+            Self::CoatedConductor(bsdf) => bsdf.row().collect(),
+            _ => return None,
+        };
+        Some((self.kind(), row))
+    }
+}
+
+/// The number at this place of each row.
+#[inline(always)]
+pub(crate) fn field<R: Real>(table: &[f32], at: R::UInt, place: u32) -> R {
+    R::gather(table, at + R::UInt::splat(place))
+}
+
+/// The colour from this place on of each row.
+#[inline(always)]
+pub(crate) fn colour<R: Real>(table: &[f32], at: R::UInt, place: u32) -> V3<R> {
+    V3::new(field(table, at, place), field(table, at, place + 1), field(table, at, place + 2))
+}
+
+// Between the types of scalar code and one lane.
+
+impl LaneSample<f32> {
+    /// The sample, if there is one.
+    pub(crate) fn scalar(self) -> Option<BsdfSample> {
+        self.valid.then(|| BsdfSample {
+            wi: LocalDir(vector(self.wi)),
+            weight: spectrum(self.weight),
+            scatter: if self.delta { Scatter::Delta } else { Scatter::Density(self.pdf) },
+            transmitted: self.transmitted,
+            eta: self.eta,
+        })
+    }
+}
+
+impl LocalDir {
+    pub(crate) fn lane(self) -> V3<f32> {
+        lane(self.0)
+    }
+}
+
+pub(crate) fn lane(v: Vec3) -> V3<f32> {
+    V3::new(v.x, v.y, v.z)
+}
+
+pub(crate) fn vector(v: V3<f32>) -> Vec3 {
+    Vec3::new(v.x, v.y, v.z)
+}
+
+pub(crate) fn colour_lane(c: Spectrum) -> V3<f32> {
+    V3::new(c.r, c.g, c.b)
+}
+
+pub(crate) fn spectrum(c: V3<f32>) -> Spectrum {
+    Spectrum::new(c.x, c.y, c.z)
+}
+
+pub(crate) fn square(u: Vec2) -> [f32; 2] {
+    [u.x, u.y]
 }

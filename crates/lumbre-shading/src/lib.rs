@@ -7,6 +7,7 @@
 mod albedo;
 mod bsdf;
 pub mod coated;
+mod coated_lanes;
 pub mod conductor;
 pub mod dielectric;
 pub mod diffuse;
@@ -17,7 +18,6 @@ mod material;
 pub mod medium;
 pub mod microfacet;
 mod mipmap;
-mod one_bsdf;
 pub mod principled;
 mod principled_params;
 pub mod sheen;

@@ -2,11 +2,12 @@
 
 use std::f32::consts::PI;
 
-use lumbre_math::frame::orthonormal_basis_f32;
-use lumbre_math::warp::circle;
 use lumbre_math::{Elementary, Vec2, Vec3};
+use lumbre_simd::math::{orthonormal_basis, sin_cos_turns};
+use lumbre_simd::{Real, V3};
 
 use crate::Spectrum;
+use crate::lanes::{lane, square, vector};
 
 /// A homogeneous medium.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,22 +79,28 @@ impl HomogeneousMedium {
 /// The phase function per solid angle at the cosine of the scattering angle: 1 is straight on.
 ///
 /// L. Henyey, J. Greenstein, "Diffuse Radiation in the Galaxy", Astrophysical Journal 93, 1941.
-pub fn henyey_greenstein(cos: f32, g: f32) -> f32 {
-    let d = (1.0 + g * g - 2.0 * g * cos).max(1e-12);
-    (1.0 - g * g) / (4.0 * PI * d * d.sqrt())
+#[inline(always)]
+pub fn henyey_greenstein<R: Real>(cos: R, g: R) -> R {
+    let d = (R::one() + g * g - R::splat(2.0) * g * cos).simd_max(R::splat(1e-12));
+    (R::one() - g * g) / (R::splat(4.0 * PI) * d * d.sqrt())
 }
 
 /// A unit direction sampled about the unit vector `forward` by [`henyey_greenstein`], with its density.
 pub fn sample_henyey_greenstein(forward: Vec3, g: f32, u: Vec2) -> (Vec3, f32) {
-    let cos = if g.abs() < 1e-3 {
-        1.0 - 2.0 * u.x
-    } else {
-        let s = (1.0 - g * g) / (1.0 + g - 2.0 * g * u.x);
-        ((1.0 + g * g - s * s) / (2.0 * g)).clamp(-1.0, 1.0)
-    };
-    let sin = (1.0 - cos * cos).max(0.0).sqrt();
-    let (sin_phi, cos_phi) = circle(u.y);
-    let (x, y) = orthonormal_basis_f32(forward);
+    let (w, density) = sample_henyey_greenstein_lanes(lane(forward), g, square(u));
+    (vector(w), density)
+}
+
+/// [`sample_henyey_greenstein`] over lanes.
+#[inline(always)]
+pub fn sample_henyey_greenstein_lanes<R: Real>(forward: V3<R>, g: R, u: [R; 2]) -> (V3<R>, R) {
+    let (one, two) = (R::one(), R::splat(2.0));
+    let s = (one - g * g) / (one + g - two * g * u[0]);
+    let cos = ((one + g * g - s * s) / (two * g)).simd_max(-one).simd_min(one);
+    let cos = R::select(g.abs().simd_lt(R::splat(1e-3)), one - two * u[0], cos);
+    let sin = (one - cos * cos).simd_max(R::zero()).sqrt();
+    let (sin_phi, cos_phi) = sin_cos_turns(u[1]);
+    let (x, y) = orthonormal_basis(forward);
     let w = (x * (sin * cos_phi) + y * (sin * sin_phi) + forward * cos).normalize();
     (w, henyey_greenstein(cos, g))
 }

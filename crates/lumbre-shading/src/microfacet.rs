@@ -2,8 +2,11 @@
 
 use std::f32::consts::PI;
 
-use lumbre_math::warp::circle;
 use lumbre_math::{Vec2, Vec3};
+use lumbre_simd::math::sin_cos_turns;
+use lumbre_simd::{Real, V3};
+
+use crate::lanes::{lane, square, vector};
 
 /// An anisotropic Trowbridge–Reitz distribution of microfacet normals, with Smith's height-correlated
 /// shadowing.
@@ -51,58 +54,134 @@ impl Microfacets {
     /// A rougher distribution: each α below 0.3 is doubled and clamped to [0.1, 0.3].
     #[must_use]
     pub fn regularized(&self) -> Self {
-        let rougher = |alpha: f32| if alpha < 0.3 { (2.0 * alpha).clamp(0.1, 0.3) } else { alpha };
-        Self { alpha: Vec2::new(rougher(self.alpha.x), rougher(self.alpha.y)) }
+        let FacetLanes { alpha_x, alpha_y } = self.lane().regularized(true);
+        Self { alpha: Vec2::new(alpha_x, alpha_y) }
     }
 
     /// The density D of facets with the unit normal `m` (of either sign), per unit of solid angle and surface
     /// area: ∫ D(m) cos θ dm = 1 over the hemisphere.
     pub fn density(&self, m: Vec3) -> f32 {
-        let h = Vec3::new(m.x / self.alpha.x, m.y / self.alpha.y, m.z);
-        let h2 = h.length_squared();
-        1.0 / (PI * self.alpha.x * self.alpha.y * h2 * h2)
-    }
-
-    /// |(α ∘ w.xy, w.z)|: Smith's auxiliary function is Λ(w) = (stretch(w) / |w.z| − 1) / 2. In terms of it nothing divides by a cosine, and grazing directions need no special case.
-    fn stretch(&self, w: Vec3) -> f32 {
-        Vec3::new(self.alpha.x * w.x, self.alpha.y * w.y, w.z).length()
+        self.lane().density(lane(m))
     }
 
     /// G₁(w) / |cos θ|: the fraction of facets visible from `w`, per projected surface area.
     pub fn visible_per_cosine(&self, w: Vec3) -> f32 {
-        2.0 / (w.z.abs() + self.stretch(w))
+        self.lane().visible_per_cosine(lane(w))
     }
 
     /// G₂(wo, wi) / (|cos θo| |cos θi|): the fraction of facets visible from both; the directions may be on
     /// different sides.
     pub fn both_visible_per_cosines(&self, wo: Vec3, wi: Vec3) -> f32 {
-        2.0 / (self.stretch(wo) * wi.z.abs() + self.stretch(wi) * wo.z.abs())
+        self.lane().both_visible_per_cosines(lane(wo), lane(wi))
     }
 
     /// G₂ / G₁(wo): the fraction of the facets visible from `wo` that are visible from `wi`, too.
     pub fn also_visible(&self, wo: Vec3, wi: Vec3) -> f32 {
-        self.both_visible_per_cosines(wo, wi) * wi.z.abs() / self.visible_per_cosine(wo)
+        self.lane().also_visible(lane(wo), lane(wi))
     }
 
     /// The density per solid angle of visible normals from `w`: that of [`Microfacets::sample_visible`].
     pub fn visible_density(&self, w: Vec3, m: Vec3) -> f32 {
-        self.visible_per_cosine(w) * self.density(m) * w.dot(m).abs()
+        self.lane().visible_density(lane(w), lane(m))
     }
 
     /// A facet normal sampled among those visible from `w`, pointing up (z ≥ 0) on its side of the surface.
     pub fn sample_visible(&self, w: Vec3, u: Vec2) -> Vec3 {
-        let up = if w.z < 0.0 { -w } else { w };
+        vector(self.lane().sample_visible(lane(w), square(u)))
+    }
+
+    /// The same in one lane.
+    pub(crate) fn lane(&self) -> FacetLanes<f32> {
+        FacetLanes { alpha_x: self.alpha.x, alpha_y: self.alpha.y }
+    }
+}
+
+/// [`Microfacets`] over lanes. Where they are smooth, only [`FacetLanes::is_smooth`] and [`FacetLanes::regularized`] mean anything.
+#[derive(Clone, Copy, Debug)]
+pub struct FacetLanes<R: Real> {
+    /// α along x; with `alpha_y` as [`Microfacets::new`] makes them: both zero or both positive.
+    pub alpha_x: R,
+    /// α along y.
+    pub alpha_y: R,
+}
+
+impl<R: Real> FacetLanes<R> {
+    /// [`Microfacets::is_smooth`].
+    #[inline(always)]
+    pub fn is_smooth(&self) -> R::Mask {
+        self.alpha_x.simd_eq(R::zero())
+    }
+
+    /// [`Microfacets::regularized`] where the mask is true.
+    #[inline(always)]
+    #[must_use]
+    pub fn regularized(self, mask: R::Mask) -> Self {
+        Self {
+            alpha_x: R::select(mask, rougher(self.alpha_x), self.alpha_x),
+            alpha_y: R::select(mask, rougher(self.alpha_y), self.alpha_y),
+        }
+    }
+
+    /// [`Microfacets::density`].
+    #[inline(always)]
+    pub fn density(&self, m: V3<R>) -> R {
+        let h2 = V3::new(m.x / self.alpha_x, m.y / self.alpha_y, m.z).length_squared();
+        (R::splat(PI) * self.alpha_x * self.alpha_y * h2 * h2).recip()
+    }
+
+    /// |(α ∘ w.xy, w.z)|: Smith's auxiliary function is Λ(w) = (stretch(w) / |w.z| − 1) / 2. In terms of it nothing divides by a cosine, and grazing directions need no special case.
+    #[inline(always)]
+    fn stretch(&self, w: V3<R>) -> R {
+        V3::new(self.alpha_x * w.x, self.alpha_y * w.y, w.z).length()
+    }
+
+    /// [`Microfacets::visible_per_cosine`].
+    #[inline(always)]
+    pub fn visible_per_cosine(&self, w: V3<R>) -> R {
+        R::splat(2.0) / (w.z.abs() + self.stretch(w))
+    }
+
+    /// [`Microfacets::both_visible_per_cosines`].
+    #[inline(always)]
+    pub fn both_visible_per_cosines(&self, wo: V3<R>, wi: V3<R>) -> R {
+        R::splat(2.0) / (self.stretch(wo) * wi.z.abs() + self.stretch(wi) * wo.z.abs())
+    }
+
+    /// [`Microfacets::also_visible`].
+    #[inline(always)]
+    pub fn also_visible(&self, wo: V3<R>, wi: V3<R>) -> R {
+        self.both_visible_per_cosines(wo, wi) * wi.z.abs() / self.visible_per_cosine(wo)
+    }
+
+    /// [`Microfacets::visible_density`].
+    #[inline(always)]
+    pub fn visible_density(&self, w: V3<R>, m: V3<R>) -> R {
+        self.visible_per_cosine(w) * self.density(m) * w.dot(m).abs()
+    }
+
+    /// [`Microfacets::sample_visible`].
+    #[inline(always)]
+    pub fn sample_visible(&self, w: V3<R>, u: [R; 2]) -> V3<R> {
+        let up = V3::select(w.z.simd_lt(R::zero()), -w, w);
         // With facets stretched to those of a unit hemisphere, reflections of `view` are uniform on a spherical
         // cap.
-        let view = Vec3::new(up.x * self.alpha.x, up.y * self.alpha.y, up.z).normalize();
-        let below_pole = u.y * (1.0 + view.z);
-        let z = 1.0 - below_pole;
+        let view = V3::new(up.x * self.alpha_x, up.y * self.alpha_y, up.z).normalize();
+        let below_pole = u[1] * (R::one() + view.z);
+        let z = R::one() - below_pole;
         // 1 − z² without cancellation near the pole.
-        let sin = (below_pole * (1.0 + z)).max(0.0).sqrt();
-        let (sin_phi, cos_phi) = circle(u.x);
-        let half = Vec3::new(sin * cos_phi, sin * sin_phi, z) + view;
-        Vec3::new(half.x * self.alpha.x, half.y * self.alpha.y, half.z.max(0.0)).normalize_or(Vec3::Z)
+        let sin = (below_pole * (R::one() + z)).simd_max(R::zero()).sqrt();
+        let (sin_phi, cos_phi) = sin_cos_turns(u[0]);
+        let half = V3::new(sin * cos_phi, sin * sin_phi, z) + view;
+        let m = V3::new(half.x * self.alpha_x, half.y * self.alpha_y, half.z.simd_max(R::zero()));
+        let has_direction = m.length_squared().simd_gt(R::zero());
+        V3::select(has_direction, m.normalize(), V3::constant([0.0, 0.0, 1.0]))
     }
+}
+
+#[inline(always)]
+fn rougher<R: Real>(alpha: R) -> R {
+    let doubled = (R::splat(2.0) * alpha).simd_max(R::splat(0.1)).simd_min(R::splat(0.3));
+    R::select(alpha.simd_lt(R::splat(0.3)), doubled, alpha)
 }
 
 #[cfg(test)]

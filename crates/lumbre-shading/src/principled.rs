@@ -9,6 +9,7 @@ use crate::albedo::{ALBEDO, MAX_ETA};
 use crate::conductor::reflect;
 use crate::dielectric::{Dielectric, Ways, refract};
 use crate::diffuse::cosine_direction;
+use crate::lanes::vector;
 use crate::microfacet::Microfacets;
 use crate::sheen::Sheen;
 use crate::specular::Specular;
@@ -689,7 +690,7 @@ impl Principled {
         let mut sum = Spectrum::BLACK;
         for (lane, border, wi) in self.ways(wo, wi) {
             let Some(facet) = border.facet(wo, wi) else { continue };
-            let shares = self.shares(wo.vec().dot(facet.normal));
+            let shares = self.shares(wo.lane().dot(facet.normal));
             let share = if reflects { shares.reflects } else { shares.transmits };
             sum += only(share, lane) * border.eval_facet(&facet, wo, wi);
         }
@@ -705,10 +706,10 @@ impl Principled {
         let mut sum = 0.0;
         for (lane, border, wi) in self.ways(wo, wi) {
             let Some(facet) = border.facet(wo, wi) else { continue };
-            let reflection = self.shares(wo.vec().dot(facet.normal)).reflection_probability();
+            let reflection = self.shares(wo.lane().dot(facet.normal)).reflection_probability();
             let way = if reflects { reflection } else { 1.0 - reflection };
             let lane = if lane.is_some() { 1.0 / 3.0 } else { 1.0 };
-            sum += lane * way * self.facets.visible_density(wo.vec(), facet.normal) * facet.jacobian;
+            sum += lane * way * self.facets.visible_density(wo.vec(), vector(facet.normal)) * facet.jacobian;
         }
         sum
     }

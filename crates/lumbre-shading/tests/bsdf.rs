@@ -6,6 +6,7 @@
 //! a transmission those of weights and reciprocity.
 
 use std::f64::consts::{PI, TAU};
+use std::marker::PhantomData;
 use std::thread;
 
 use lumbre_math::random::RandomStream;
@@ -14,12 +15,14 @@ use lumbre_shading::coated::{Coat, CoatedConductor, CoatedDiffuse};
 use lumbre_shading::conductor::Conductor;
 use lumbre_shading::dielectric::{Dielectric, ThinDielectric};
 use lumbre_shading::diffuse::{Diffuse, DiffuseTransmission};
+use lumbre_shading::lanes::{self, BsdfKind, LaneBsdf};
 use lumbre_shading::microfacet::Microfacets;
 use lumbre_shading::principled::{Body, Clearcoat, Principled};
 use lumbre_shading::sheen::Sheen;
 use lumbre_shading::thin_film::ThinFilm;
 use lumbre_shading::uber::Uber;
 use lumbre_shading::{Bsdf, LocalDir, Scatter, ShadingFrame, Spectrum, fresnel};
+use lumbre_simd::{InstructionSet, Job, Mask, Real, UInt, V3};
 
 const GLASS: f32 = 1.5;
 
@@ -1114,4 +1117,257 @@ fn a_coat_looks_the_same_from_both_sides() {
         }
     }
     assert!(count > 60, "{count}");
+}
+
+/// Directions, random numbers and rows of one kind, to run at any number of lanes.
+struct Columns {
+    table: Vec<f32>,
+    at: Vec<u32>,
+    wo: [Vec<f32>; 3],
+    wi: [Vec<f32>; 3],
+    u: [Vec<f32>; 3],
+    regularized: Vec<bool>,
+}
+
+impl Columns {
+    /// The row of each lane is one of the BSDFs'; directions are of all kinds, samples of theirs and such that have no side among them.
+    fn new(bsdfs: &[Bsdf], count: usize, seed: u64) -> Self {
+        let mut table = vec![f32::NAN; 5];
+        let mut starts = Vec::new();
+        for bsdf in bsdfs {
+            let (_, row) = bsdf.row().expect("a kind with lanes");
+            starts.push(table.len() as u32);
+            table.extend_from_slice(&row);
+        }
+        let mut random = RandomStream::new(seed);
+        let mut columns = Self {
+            table,
+            at: Vec::new(),
+            wo: Default::default(),
+            wi: Default::default(),
+            u: Default::default(),
+            regularized: Vec::new(),
+        };
+        for i in 0..count {
+            let which = (random.next_f32() * bsdfs.len() as f32) as usize;
+            let wo = if i % 61 == 0 { local(Vec3::X) } else { random_direction(&mut random) };
+            let (lobe, u) = numbers(&mut random);
+            let regularized = i % 7 == 3;
+            let bsdf = if regularized { bsdfs[which].clone().regularized() } else { bsdfs[which].clone() };
+            let sampled = bsdf.sample(wo, random.next_f32(), u).filter(|_| i % 2 == 0);
+            let wi = sampled.map_or_else(|| random_direction(&mut random), |sample| sample.wi);
+            columns.at.push(starts[which]);
+            columns.regularized.push(regularized);
+            for axis in 0..3 {
+                columns.wo[axis].push(wo.vec()[axis]);
+                columns.wi[axis].push(wi.vec()[axis]);
+                columns.u[axis].push([lobe, u.x, u.y][axis]);
+            }
+        }
+        columns
+    }
+}
+
+/// Value, density and sample of each row of the columns, as bits.
+struct Scattering<'a, K>(&'a Columns, PhantomData<K>);
+
+type Outcome = ([f32; 4], bool, Option<([f32; 8], [bool; 2])>);
+
+/// A kind of BSDF at any number of lanes.
+trait Kind {
+    type Lanes<R: Real>: LaneBsdf<R>;
+}
+
+impl<K: Kind> Job for Scattering<'_, K> {
+    type Output = Vec<Outcome>;
+    #[inline(always)]
+    fn run<R: Real>(self) -> Vec<Outcome> {
+        let Self(columns, _) = self;
+        let count = columns.at.len();
+        assert_eq!(count % R::LANES, 0);
+        let mut outcomes = Vec::with_capacity(count);
+        for start in (0..count).step_by(R::LANES) {
+            let load = |columns: &[Vec<f32>; 3]| {
+                let [x, y, z] = [0, 1, 2].map(|axis| R::from_slice(&columns[axis][start..]));
+                V3::new(x, y, z)
+            };
+            let mut bits = 0;
+            for lane in 0..R::LANES {
+                bits |= u32::from(columns.regularized[start + lane]) << lane;
+            }
+            let at = R::UInt::from_slice(&columns.at[start..]);
+            let bsdf = K::Lanes::<R>::load(&columns.table, at).regularized(R::Mask::from_bitmask(bits));
+            let (wo, wi) = (load(&columns.wo), load(&columns.wi));
+            let V3 { x: lobe, y: u, z: v } = load(&columns.u);
+            let (value, pdf) = bsdf.eval(wo, wi);
+            let sample = bsdf.sample(wo, lobe, [u, v]);
+            let evaluated = [value.x, value.y, value.z, pdf].map(R::to_lanes);
+            let s = sample;
+            let sampled = [s.wi.x, s.wi.y, s.wi.z, s.weight.x, s.weight.y, s.weight.z, s.pdf, s.eta];
+            let sampled = sampled.map(R::to_lanes);
+            let masks = [bsdf.is_delta(), s.valid, s.delta, s.transmitted].map(R::Mask::to_bitmask);
+            for lane in 0..R::LANES {
+                let [is_delta, valid, delta, transmitted] = masks.map(|mask| mask >> lane & 1 == 1);
+                let sample = valid.then(|| (sampled.map(|lanes| lanes[lane]), [delta, transmitted]));
+                outcomes.push((evaluated.map(|lanes| lanes[lane]), is_delta, sample));
+            }
+        }
+        outcomes
+    }
+}
+
+/// The same by the scalar interface.
+fn scalar_outcomes(bsdfs: &[Bsdf], columns: &Columns) -> Vec<Outcome> {
+    let row = bsdfs[0].row().expect("a kind with lanes").1.len() as u32;
+    let outcome = |i: usize| {
+        let bsdf = bsdfs[((columns.at[i] - 5) / row) as usize].clone();
+        let bsdf = if columns.regularized[i] { bsdf.regularized() } else { bsdf };
+        // Made up by its coordinates, which the frame's products and sums leave as they are.
+        let direction = |w: &[Vec<f32>; 3]| {
+            ShadingFrame { s: Vec3::X, t: Vec3::Y, n: Vec3::Z }.to_local(Vec3::new(w[0][i], w[1][i], w[2][i]))
+        };
+        let (wo, wi) = (direction(&columns.wo), direction(&columns.wi));
+        let value = bsdf.eval(wo, wi);
+        let sample = bsdf.sample(wo, columns.u[0][i], Vec2::new(columns.u[1][i], columns.u[2][i]));
+        let sample = sample.map(|s| {
+            let (w, c) = (s.wi.vec(), s.weight);
+            let (pdf, delta) = match s.scatter {
+                Scatter::Density(pdf) => (pdf, false),
+                Scatter::Delta => (1.0, true),
+            };
+            ([w.x, w.y, w.z, c.r, c.g, c.b, pdf, s.eta], [delta, s.transmitted])
+        });
+        ([value.r, value.g, value.b, bsdf.pdf(wo, wi)], bsdf.is_delta(), sample)
+    };
+    (0..columns.at.len()).map(outcome).collect()
+}
+
+fn bits_of((evaluated, is_delta, sample): &Outcome) -> impl PartialEq + std::fmt::Debug {
+    (
+        evaluated.map(f32::to_bits),
+        *is_delta,
+        sample.map(|(numbers, masks)| (numbers.map(f32::to_bits), masks)),
+    )
+}
+
+/// Compares all instruction sets with the scalar interface on random BSDFs of a kind.
+fn assert_lanes_agree<K: Kind>(kind: BsdfKind, random_bsdf: impl Fn(&mut RandomStream) -> Bsdf) {
+    let mut random = RandomStream::new(61 + kind as u64);
+    let bsdfs: Vec<Bsdf> = (0..97).map(|_| random_bsdf(&mut random)).collect();
+    assert!(bsdfs.iter().all(|bsdf| bsdf.kind() == kind && bsdf.row().is_some_and(|row| row.0 == kind)));
+    assert_eq!(bsdfs[0].row().map(|row| row.1.len()), Some(<K::Lanes<f32> as LaneBsdf<f32>>::ROW));
+    let columns = Columns::new(&bsdfs, 16 * 1500, 3 + kind as u64);
+    let expected = scalar_outcomes(&bsdfs, &columns);
+    for set in InstructionSet::available() {
+        let outcomes = set.run(Scattering::<K>(&columns, PhantomData));
+        for (i, (outcome, expected)) in outcomes.iter().zip(&expected).enumerate() {
+            assert!(
+                bits_of(outcome) == bits_of(expected),
+                "{kind:?} at {}, row {i}: {outcome:?} and {expected:?}",
+                set.name()
+            );
+        }
+    }
+    let met = expected.iter().filter(|(evaluated, ..)| evaluated[3] > 0.0).count();
+    let sampled = expected.iter().filter(|(.., sample)| sample.is_some()).count();
+    assert!(kind == BsdfKind::ThinDielectric || met > 2000, "{kind:?}: {met}");
+    assert!(sampled > 10_000 && sampled < expected.len(), "{kind:?}: {sampled}");
+}
+
+fn random_colour(random: &mut RandomStream) -> Spectrum {
+    Spectrum::new(random.next_f32(), random.next_f32(), random.next_f32())
+}
+
+/// A quarter smooth, a quarter isotropic.
+fn random_facets(random: &mut RandomStream) -> Microfacets {
+    let (x, y) = (random.next_f32(), random.next_f32());
+    match (4.0 * random.next_f32()) as u32 {
+        0 => Microfacets::SMOOTH,
+        1 => Microfacets::new(x * x, x * x),
+        _ => Microfacets::new(x * x, y),
+    }
+}
+
+/// A third of them scatter.
+fn random_coat(random: &mut RandomStream) -> Coat {
+    let scatters = random.next_f32() < 0.3;
+    Coat {
+        face: Dielectric {
+            eta: if random.next_f32() < 0.1 { 1.0 } else { 1.0 + random.next_f32() },
+            facets: random_facets(random),
+        },
+        thickness: random.next_f32(),
+        g: 1.8 * random.next_f32() - 0.9,
+        albedo: if scatters { random_colour(random) } else { Spectrum::BLACK },
+        max_depth: (12.0 * random.next_f32()) as u32,
+        samples: (4.0 * random.next_f32()) as u32,
+    }
+}
+
+macro_rules! kinds {
+    ($($name:ident = $lanes:ident),*) => {
+        $(
+            struct $name;
+            impl Kind for $name {
+                type Lanes<R: Real> = lanes::$lanes<R>;
+            }
+        )*
+    };
+}
+
+kinds! {
+    DiffuseKind = DiffuseLanes, DiffuseTransmissionKind = DiffuseTransmissionLanes, ConductorKind = ConductorLanes,
+    DielectricKind = DielectricLanes, ThinDielectricKind = ThinDielectricLanes,
+    CoatedDiffuseKind = CoatedDiffuseLanes, CoatedConductorKind = CoatedConductorLanes
+}
+
+#[test]
+fn lanes_scatter_as_scalar_code_does_to_the_bit() {
+    assert_lanes_agree::<DiffuseKind>(BsdfKind::Diffuse, |random| {
+        Bsdf::Diffuse(Diffuse { reflectance: random_colour(random) })
+    });
+    assert_lanes_agree::<DiffuseTransmissionKind>(BsdfKind::DiffuseTransmission, |random| {
+        let (reflectance, transmittance) = (random_colour(random) * 0.5, random_colour(random) * 0.5);
+        Bsdf::DiffuseTransmission(DiffuseTransmission { reflectance, transmittance })
+    });
+    assert_lanes_agree::<ConductorKind>(BsdfKind::Conductor, |random| {
+        let (eta, k) = (random_colour(random) * 3.0, random_colour(random) * 5.0);
+        let k = if random.next_f32() < 0.1 { Spectrum::new(f32::INFINITY, 0.0, 3e4) } else { k };
+        Bsdf::Conductor(Conductor { eta, k, facets: random_facets(random) })
+    });
+    assert_lanes_agree::<DielectricKind>(BsdfKind::Dielectric, |random| {
+        let eta = if random.next_f32() < 0.1 { 1.0 } else { 0.4 + 2.0 * random.next_f32() };
+        Bsdf::Dielectric(Dielectric { eta, facets: random_facets(random) })
+    });
+    assert_lanes_agree::<ThinDielectricKind>(BsdfKind::ThinDielectric, |random| {
+        Bsdf::ThinDielectric(ThinDielectric { eta: 1.0 + 2.0 * random.next_f32() })
+    });
+    assert_lanes_agree::<CoatedDiffuseKind>(BsdfKind::CoatedDiffuse, |random| {
+        let base = Diffuse { reflectance: random_colour(random) };
+        Bsdf::CoatedDiffuse(CoatedDiffuse { base, coat: random_coat(random) })
+    });
+    assert_lanes_agree::<CoatedConductorKind>(BsdfKind::CoatedConductor, |random| {
+        let (eta, k) = (random_colour(random) * 3.0, random_colour(random) * 5.0);
+        let base = Conductor { eta, k, facets: random_facets(random) };
+        Bsdf::CoatedConductor(CoatedConductor { base, coat: random_coat(random) })
+    });
+}
+
+#[test]
+fn a_row_that_reaches_beyond_the_table_panics() {
+    struct Load(u32);
+    impl Job for Load {
+        type Output = ();
+        #[inline(always)]
+        fn run<R: Real>(self) {
+            let mut at = [0; 16];
+            at[R::LANES - 1] = self.0;
+            let bsdf = lanes::ConductorLanes::<R>::load(&[0.5; 8], R::UInt::from_lanes(&at));
+            assert!(bsdf.is_delta().none());
+        }
+    }
+    for set in InstructionSet::available() {
+        set.run(Load(0));
+        assert!(std::panic::catch_unwind(|| set.run(Load(1))).is_err(), "{}", set.name());
+    }
 }

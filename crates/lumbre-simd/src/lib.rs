@@ -16,6 +16,7 @@
 mod instruction_set;
 mod lanes;
 pub mod math;
+pub mod random;
 mod scalar;
 mod v3;
 #[cfg(target_arch = "x86_64")]

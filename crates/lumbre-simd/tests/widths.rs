@@ -2,7 +2,7 @@
 
 use std::num::Wrapping;
 
-use lumbre_simd::{Double, InstructionSet, Job, Mask, Real, UInt, V3, math};
+use lumbre_simd::{Double, InstructionSet, Job, Mask, Real, UInt, V3, math, random};
 
 /// What an operation gives for one row of inputs.
 #[derive(Clone, Copy, Debug)]
@@ -36,7 +36,7 @@ struct Inputs {
 
 /// A small generator of its own, since this crate depends on nothing: Steele, Lea, Flood, "Fast Splittable Pseudorandom Number
 /// Generators", OOPSLA 2014.
-fn random(state: &mut u64) -> u64 {
+fn next_random(state: &mut u64) -> u64 {
     *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let z = (*state ^ *state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -77,15 +77,15 @@ fn single(bits: u64) -> f32 {
 
 fn inputs() -> Inputs {
     let mut state = 5;
-    let singles = std::array::from_fn(|_| (0..COUNT).map(|_| single(random(&mut state))).collect());
+    let singles = std::array::from_fn(|_| (0..COUNT).map(|_| single(next_random(&mut state))).collect());
     let double = |bits: u64| match bits % 4 {
         0 => f64::from_bits(bits.rotate_left(17)),
         1 => f64::from(single(bits.rotate_left(23))) * 1e-290,
         _ => f64::from(single(bits.rotate_left(29))),
     };
-    let doubles = std::array::from_fn(|_| (0..COUNT).map(|_| double(random(&mut state))).collect());
+    let doubles = std::array::from_fn(|_| (0..COUNT).map(|_| double(next_random(&mut state))).collect());
     let ints = std::array::from_fn(|_| {
-        (0..COUNT).map(|_| random(&mut state)).map(|x| (x >> (32 + x % 32)) as u32).collect()
+        (0..COUNT).map(|_| next_random(&mut state)).map(|x| (x >> (32 + x % 32)) as u32).collect()
     });
     Inputs { singles, doubles, ints }
 }
@@ -143,6 +143,7 @@ impl Job for Operations<'_> {
                 "acos": math::acos(a); "exp": math::exp(a); "ln": math::ln(a); "pow": math::pow(a, b);
                 "basis": math::orthonormal_basis(p).0.x; "basis 2": math::orthonormal_basis(p).1.y;
                 "disk": math::square_to_disk([a, b])[0]; "disk 2": math::square_to_disk([a, b])[1];
+                "uniform": random::uniform(i);
                 "hemisphere": math::cosine_hemisphere([a, b]).z;
             }
             doubles! {
@@ -165,6 +166,7 @@ impl Job for Operations<'_> {
                 "shl": i.shl::<7>(); "shl 0": i.shl::<0>(); "shl 31": i.shl::<31>(); "shr": i.shr::<9>();
                 "shr 31": i.shr::<31>(); "int select": R::UInt::select(i.simd_lt(j), i, j);
                 "to_bits": a.to_bits(); "to_int": a.to_int(); "int gather": R::UInt::gather(&self.0.ints[1], small);
+                "pcg4d": random::pcg4d([i, j, i + j, small])[0]; "pcg4d 2": random::pcg4d([i, j, i + j, small])[3];
                 "indices": R::UInt::splat(start as u32) + R::UInt::lane_indices();
             }
             masks! {

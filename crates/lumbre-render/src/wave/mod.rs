@@ -6,6 +6,7 @@
 //! nothing but its sample: neither the size of the wave nor the other paths in it show in the picture.
 
 mod lights;
+mod one_bsdf;
 mod paths;
 mod search;
 mod shade;

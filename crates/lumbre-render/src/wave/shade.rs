@@ -3,8 +3,7 @@
 use std::marker::PhantomData;
 
 use lumbre_math::DVec3;
-use lumbre_shading::Bsdf;
-use lumbre_shading::lanes::{LaneBsdf, LaneSample, OneBsdf, RowBsdf};
+use lumbre_shading::lanes::{LaneBsdf, LaneSample};
 use lumbre_simd::{Double, Job, Mask, Real, UInt, V3};
 
 use crate::transport::Strategy;
@@ -18,12 +17,36 @@ use crate::wave::{Leg, Setting};
 
 /// BSDFs of one kind, whatever the lanes.
 pub(crate) trait Kind {
-    type Bsdf<R: Real>: RowBsdf<R>;
+    type Bsdf<R: Real>: LaneBsdf<R>;
+}
+
+/// What shading asks of a BSDF in each lane: see [`LaneBsdf`].
+pub(crate) trait Scatters<R: Real> {
+    fn eval(&self, wo: V3<R>, wi: V3<R>) -> (V3<R>, R);
+    fn sample(&self, wo: V3<R>, lobe: R, u: [R; 2]) -> LaneSample<R>;
+    fn is_delta(&self) -> R::Mask;
+}
+
+impl<R: Real, B: LaneBsdf<R>> Scatters<R> for B {
+    #[inline(always)]
+    fn eval(&self, wo: V3<R>, wi: V3<R>) -> (V3<R>, R) {
+        B::eval(self, wo, wi)
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: V3<R>, lobe: R, u: [R; 2]) -> LaneSample<R> {
+        B::sample(self, wo, lobe, u)
+    }
+
+    #[inline(always)]
+    fn is_delta(&self) -> R::Mask {
+        B::is_delta(self)
+    }
 }
 
 /// Where the BSDFs of a queue are.
 pub(crate) trait Bsdfs<R: Real> {
-    type Bsdf: LaneBsdf<R>;
+    type Bsdf: Scatters<R>;
     /// The BSDF at a position in each lane.
     fn load(&self, at: R::UInt) -> Self::Bsdf;
 }
@@ -57,15 +80,6 @@ pub(crate) struct Shade<'a, 's> {
     pub(crate) crossings: &'a mut Vec<u32>,
     /// What happens, where somebody asks: of a wave of one path.
     pub(crate) traced: Option<&'a mut Traced>,
-}
-
-impl<'a> Bsdfs<f32> for &'a [Bsdf] {
-    type Bsdf = OneBsdf<'a>;
-
-    #[inline(always)]
-    fn load(&self, at: <f32 as Real>::UInt) -> OneBsdf<'a> {
-        OneBsdf(&self[at.to_lanes()[0] as usize])
-    }
 }
 
 /// [`Shade`] with BSDFs of one kind, at any instruction set.
@@ -186,7 +200,7 @@ impl<R: Real> Vertex<R> {
 
     /// What the BSDF scatters to a direction of the world, by itself and by directions that are folded onto it.
     #[inline(always)]
-    fn eval<B: LaneBsdf<R>>(&self, bsdf: &B, wi: V3<R>) -> Scattered<R> {
+    fn eval<B: Scatters<R>>(&self, bsdf: &B, wi: V3<R>) -> Scattered<R> {
         let local = self.to_local(wi);
         let (f, pdf) = bsdf.eval(self.wo, local);
         if self.folds.none() {
@@ -305,7 +319,7 @@ impl<'s> Shade<'_, 's> {
 
     /// One sample of the lights.
     #[inline(always)]
-    fn light<R: Real, B: LaneBsdf<R>>(&mut self, useful: R::Mask, arrived: &Arrived<R>, bsdf: &B, u: [R; 4]) {
+    fn light<R: Real, B: Scatters<R>>(&mut self, useful: R::Mask, arrived: &Arrived<R>, bsdf: &B, u: [R; 4]) {
         let vertex = &arrived.vertex;
         let from = vertex.place.start(vertex.place.normal);
         let light: LightLanes<R> = sample_lights(self.setting, self.slots, useful, arrived.slot, from, u);
@@ -356,7 +370,7 @@ impl<'s> Shade<'_, 's> {
 
     /// The direction to go on in.
     #[inline(always)]
-    fn scatter<R: Real, B: LaneBsdf<R>>(
+    fn scatter<R: Real, B: Scatters<R>>(
         &mut self,
         lanes: R::Mask,
         arrived: &Arrived<R>,

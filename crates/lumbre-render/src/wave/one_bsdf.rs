@@ -1,20 +1,28 @@
-//! Any BSDF in one lane.
+//! Any BSDF in one lane: for kinds that have no lanes.
 
 use lumbre_math::{Vec2, Vec3};
-use lumbre_simd::V3;
+use lumbre_shading::lanes::LaneSample;
+use lumbre_shading::{Bsdf, LocalDir, Scatter};
+use lumbre_simd::{Real, UInt, V3};
 
-use crate::lanes::{LaneBsdf, LaneSample};
-use crate::{Bsdf, LocalDir, Scatter};
+use crate::wave::shade::{Bsdfs, Scatters};
 
 /// A [`Bsdf`] of any kind, in one lane.
-#[derive(Clone, Copy, Debug)]
-pub struct OneBsdf<'a>(pub &'a Bsdf);
+pub(crate) struct OneBsdf<'a>(&'a Bsdf);
 
-fn local(w: V3<f32>) -> LocalDir {
-    LocalDir(Vec3::new(w.x, w.y, w.z))
+impl<'a> Bsdfs<f32> for &'a [Bsdf] {
+    type Bsdf = OneBsdf<'a>;
+
+    fn load(&self, at: <f32 as Real>::UInt) -> OneBsdf<'a> {
+        OneBsdf(&self[at.to_lanes()[0] as usize])
+    }
 }
 
-impl LaneBsdf<f32> for OneBsdf<'_> {
+fn local(w: V3<f32>) -> LocalDir {
+    LocalDir::new(Vec3::new(w.x, w.y, w.z))
+}
+
+impl Scatters<f32> for OneBsdf<'_> {
     fn eval(&self, wo: V3<f32>, wi: V3<f32>) -> (V3<f32>, f32) {
         let (wo, wi) = (local(wo), local(wi));
         let [x, y, z] = self.0.eval(wo, wi).to_array();
@@ -23,11 +31,9 @@ impl LaneBsdf<f32> for OneBsdf<'_> {
 
     fn sample(&self, wo: V3<f32>, lobe: f32, u: [f32; 2]) -> LaneSample<f32> {
         let Some(sample) = self.0.sample(local(wo), lobe, Vec2::new(u[0], u[1])) else {
-            let nothing = V3::splat(0.0);
-            let up = V3::new(0.0, 0.0, 1.0);
             return LaneSample {
-                wi: up,
-                weight: nothing,
+                wi: V3::new(0.0, 0.0, 1.0),
+                weight: V3::splat(0.0),
                 pdf: 0.0,
                 valid: false,
                 delta: false,
@@ -41,7 +47,7 @@ impl LaneBsdf<f32> for OneBsdf<'_> {
             weight: V3::new(x, y, z),
             pdf: match sample.scatter {
                 Scatter::Density(pdf) => pdf,
-                Scatter::Delta => 0.0,
+                Scatter::Delta => 1.0,
             },
             valid: true,
             delta: sample.scatter == Scatter::Delta,
