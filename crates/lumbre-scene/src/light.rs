@@ -17,11 +17,13 @@ use lumbre_shading::{Scatter, Spectrum};
 
 pub use area::ShapeLight;
 pub(crate) use area::power;
+pub use choice::Sampling;
 pub use delta::{DistantLight, GoniometricLight, PointLight, SpotLight};
 pub use environment::{Environment, UniformLight};
 pub use mesh::MeshLight;
 pub use moving::MovingLight;
 pub use placed::PlacedLight;
+pub(crate) use tree::Place;
 use tree::{Emitter, Facing};
 
 use crate::surface::SurfaceEntry;
@@ -126,7 +128,7 @@ impl Light {
         }
     }
 
-    /// What a tree knows of it, piece by piece; nothing for lights that are everywhere, or that move.
+    /// What a tree knows of it, piece by piece; nothing for lights that are everywhere.
     pub(crate) fn emitters(&self, entries: &[SurfaceEntry]) -> Vec<Emitter> {
         let mean = |colour: Spectrum| f64::from(colour.average());
         let at =
@@ -142,7 +144,22 @@ impl Light {
             Self::Shape(light) => light.emitter(&entries[light.entry as usize]).into_iter().collect(),
             Self::Mesh(light) => light.emitters(&entries[light.entry as usize]),
             Self::Placed(light) => light.emitter(entries).into_iter().collect(),
-            Self::Distant(_) | Self::Uniform(_) | Self::Environment(_) | Self::Moving(_) => Vec::new(),
+            Self::Moving(light) => light.emitter(entries).into_iter().collect(),
+            Self::Distant(_) | Self::Uniform(_) | Self::Environment(_) => Vec::new(),
+        }
+    }
+
+    /// The direction of parallel light at a time; `None` for all other.
+    fn towards(&self, time: f64) -> Option<DVec3> {
+        match self {
+            Self::Distant(light) => Some(light.towards),
+            Self::Moving(light) => light.towards(time),
+            Self::Point(_)
+            | Self::Spot(_)
+            | Self::Goniometric(_)
+            | Self::Uniform(_)
+            | Self::Environment(_) => None,
+            Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => None,
         }
     }
 

@@ -262,6 +262,16 @@ impl<'a, 's> Vertex<'a, 's> {
         self.passes(sample, interiors)
     }
 
+    /// The unit normal on the side that the path came from where light from below its horizon gives nothing; zero where it may.
+    pub(super) fn lit_side(&self) -> DVec3 {
+        let from_below = self.material.lets_light_through() || self.met.may_rise() || self.side.is_some();
+        match (from_below, self.met.front) {
+            (true, _) => DVec3::ZERO,
+            (false, true) => self.met.surface.normal,
+            (false, false) => -self.met.surface.normal,
+        }
+    }
+
     /// What of the light that comes from straight behind goes straight on: see [`Bsdf::straight_on`].
     pub(super) fn straight_on(&self) -> Spectrum {
         self.bsdf.straight_on(self.wo)

@@ -143,6 +143,8 @@ struct Walk<'s, 'w> {
     ray: Ray,
     /// Where the last vertex sampled lights from.
     shadow_origin: DVec3,
+    /// See [`Vertex::lit_side`].
+    lit_side: DVec3,
     /// Bounces off surfaces.
     depth: u32,
     interiors: Interiors<'s>,
@@ -175,6 +177,7 @@ impl<'s, 'w> Walk<'s, 'w> {
             has_scattered: false,
             ray,
             shadow_origin: ray.origin,
+            lit_side: DVec3::ZERO,
             depth: 0,
             interiors: Interiors::default(),
             distance_samples: 0,
@@ -186,7 +189,7 @@ impl<'s, 'w> Walk<'s, 'w> {
     fn escaped(mut self) -> Spectrum {
         let ray = self.ray;
         self.record.note(|| Event::Left { ray });
-        for (arriving, pdf) in self.scene.escaped(&ray) {
+        for (arriving, pdf) in self.scene.escaped(&ray, self.lit_side) {
             self.add(Source::Infinity, arriving, self.path.weight_of_found(self.chosen, pdf));
         }
         self.radiance
@@ -210,7 +213,7 @@ impl<'s, 'w> Walk<'s, 'w> {
             let pdf = if self.chosen == Chosen::Only {
                 0.0
             } else {
-                self.scene.light_pdf(self.shadow_origin, here)
+                self.scene.light_pdf(self.shadow_origin, self.lit_side, here)
             };
             self.add(Source::Surface, emitted, self.path.weight_of_found(self.chosen, pdf));
         }
@@ -226,6 +229,7 @@ impl<'s, 'w> Walk<'s, 'w> {
         let light = sample(
             self.scene,
             self.shadow_origin,
+            self.lit_side,
             self.ray.time,
             draw.light_choice(depth),
             draw.light_point(depth),
@@ -303,6 +307,7 @@ impl<'s, 'w> Walk<'s, 'w> {
             vertex.bsdf = vertex.bsdf.regularized();
         }
         self.shadow_origin = here.shadow_origin();
+        self.lit_side = vertex.lit_side();
         if !vertex.bsdf.is_delta() {
             self.add_sampled_light(&vertex);
         }
