@@ -4,6 +4,7 @@ mod area;
 pub(crate) mod choice;
 mod delta;
 mod environment;
+pub mod lanes;
 mod mesh;
 mod moving;
 mod pairs;
@@ -177,6 +178,20 @@ impl Light {
             | (Self::Shape(_) | Self::Mesh(_) | Self::Placed(_), None)
             | (Self::Point(_) | Self::Spot(_) | Self::Goniometric(_), _)
             | (Self::Distant(_) | Self::Moving(_), _) => 0.0,
+        }
+    }
+
+    /// The surface, in the space of its tree, of which a ray from `from` met this point, both in the world; of a mesh, as far as densities
+    /// depend on it. `None` for what is no surface, and for a point that is not on it.
+    fn surface_at(&self, from: DVec3, point: DVec3, time: f64) -> Option<Surface> {
+        match self {
+            Self::Shape(light) => light.surface_at(from, point),
+            Self::Mesh(light) => Some(light.surface_at(point)),
+            Self::Placed(light) => light.surface_at(from, point, time),
+            Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Distant(_) | Self::Moving(_) => {
+                None
+            }
+            Self::Uniform(_) | Self::Environment(_) => None,
         }
     }
 

@@ -12,6 +12,7 @@ use lumbre_shading::{FloatTexture, Spectrum};
 use crate::build::check_cameras;
 use crate::footprint::Spot;
 use crate::light::choice::LightChoice;
+use crate::light::lanes::LaneLights;
 use crate::light::{Light, LightId, LightSample, Place, Sampling};
 use crate::surface::{Form, ShadingGeometry, SurfaceEntry};
 use crate::{
@@ -26,6 +27,7 @@ pub struct Scene {
     pub(crate) entries: Vec<SurfaceEntry>,
     pub(crate) lights: Vec<Light>,
     pub(crate) light_choice: LightChoice,
+    pub(crate) lane_lights: LaneLights,
     // By power; `None` without lights.
     pub(crate) light_by_power: Option<AliasTable>,
     pub(crate) infinite: Vec<LightId>,
@@ -326,6 +328,11 @@ impl Scene {
     ) -> Option<LightSample> {
         let place = Place { from, normal };
         self.light_choice.sample(&self.lights, &self.entries, &place, time, [choose, u.x, u.y], sampling)
+    }
+
+    /// The lights over lanes: as [`Scene::sample_light`], [`Scene::light_pdf`] and [`Scene::escaped`].
+    pub fn lane_lights(&self) -> &LaneLights {
+        &self.lane_lights
     }
 
     /// A light chosen by power, with its probability; `None` without lights.

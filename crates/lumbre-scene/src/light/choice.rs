@@ -191,9 +191,11 @@ impl LightChoice {
         let Some(tree) = &self.tree else { return 0.0 };
         let probability = |emitter: u32| (1.0 - share_elsewhere) * tree.probability(&place, emitter as usize);
         match (light, surface) {
-            (Light::Mesh(light), Some((surface, triangle))) => light
-                .piece_of(triangle)
-                .map_or(0.0, |piece| probability(first + piece) * light.piece_pdf(ray, surface, piece)),
+            (Light::Mesh(light), Some((surface, triangle))) => {
+                light.piece_of(triangle).map_or(0.0, |piece| {
+                    probability(first + piece) * light.piece_pdf(ray.origin, surface.point, piece)
+                })
+            }
             _ => probability(first) * light.pdf(ray, surface),
         }
     }

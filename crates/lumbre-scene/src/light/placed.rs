@@ -59,6 +59,12 @@ impl PlacedLight {
         (!inner.is_empty()).then_some(Emitter { bounds, facing: Facing::ANY, strength })
     }
 
+    /// The surface, in the space of the object, of which a ray from `from` met this point.
+    pub(super) fn surface_at(&self, from: DVec3, point: DVec3, time: f64) -> Option<Surface> {
+        let map = self.placement.at(time);
+        self.light.surface_at(map.inverse_point(from), map.inverse_point(point), time)
+    }
+
     /// `surface` is in the space of the object.
     pub(super) fn pdf(&self, ray: &Ray, surface: (&Surface, u32)) -> f64 {
         let map = self.placement.at(ray.time);
