@@ -282,7 +282,9 @@ fn the_irradiance_of_an_environment_agrees_with_its_samples() {
         const N: u32 = 300;
         for i in 0..N * N {
             let u = lumbre_math::DVec2::new(f64::from(i % N) + 0.5, f64::from(i / N) + 0.5) / f64::from(N);
-            let Some(sample) = scene.sample_light_alone(DVec3::ZERO, 0.0, 0.5, u) else { continue };
+            let Some(sample) = scene.sample_light_alone(DVec3::ZERO, DVec3::ZERO, 0.0, 0.5, u) else {
+                continue;
+            };
             let lumbre_shading::Scatter::Density(pdf) = sample.scatter else { panic!("no delta light") };
             let weight = normal.dot(sample.towards).max(0.0) / f64::from(pdf) / f64::from(N * N);
             sum.iter_mut().zip(sample.radiance.to_array()).for_each(|(sum, c)| *sum += weight * f64::from(c));

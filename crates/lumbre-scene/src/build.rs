@@ -9,6 +9,7 @@ use lumbre_math::{DVec3, Elementary, Transform};
 use lumbre_shading::{Material, MaterialKind};
 
 use crate::light::choice::LightChoice;
+use crate::light::lanes::LaneLights;
 use crate::light::{
     DistantLight, Environment, GoniometricLight, Light, LightId, MeshLight, MovingLight, PlacedLight,
     PointLight, ShapeLight, SpotLight, UniformLight, power,
@@ -89,7 +90,8 @@ impl Scene {
         let radius = if bounds.is_empty() { 1.0 } else { 0.5 * bounds.size().length() };
         let powers: Vec<f64> = builder.lights.iter().map(|light| light.power(radius)).collect();
         let infinite = (0..builder.lights.len() as u32).map(LightId);
-        let infinite = infinite.filter(|id| builder.lights[id.0 as usize].is_infinite()).collect();
+        let infinite: Vec<LightId> =
+            infinite.filter(|id| builder.lights[id.0 as usize].is_infinite()).collect();
         let has_holes = builder.entries.iter().any(SurfaceEntry::has_holes);
         let lets_light_through = builder.entries.iter().any(SurfaceEntry::lets_light_through);
         let lets_light_straight_on = builder.entries.iter().any(SurfaceEntry::lets_light_straight_on);
@@ -99,6 +101,7 @@ impl Scene {
         Ok(Self {
             accel,
             light_choice: LightChoice::new(&builder.lights, &builder.entries, radius),
+            lane_lights: LaneLights::new(infinite.len()),
             light_by_power: AliasTable::new(&powers),
             infinite,
             cameras,

@@ -4,6 +4,7 @@ mod area;
 pub(crate) mod choice;
 mod delta;
 mod environment;
+pub mod lanes;
 mod mesh;
 mod moving;
 mod pairs;
@@ -17,11 +18,13 @@ use lumbre_shading::{Scatter, Spectrum};
 
 pub use area::ShapeLight;
 pub(crate) use area::power;
+pub use choice::Sampling;
 pub use delta::{DistantLight, GoniometricLight, PointLight, SpotLight};
 pub use environment::{Environment, UniformLight};
 pub use mesh::MeshLight;
 pub use moving::MovingLight;
 pub use placed::PlacedLight;
+pub(crate) use tree::Place;
 use tree::{Emitter, Facing};
 
 use crate::surface::SurfaceEntry;
@@ -126,7 +129,7 @@ impl Light {
         }
     }
 
-    /// What a tree knows of it, piece by piece; nothing for lights that are everywhere, or that move.
+    /// What a tree knows of it, piece by piece; nothing for lights that are everywhere.
     pub(crate) fn emitters(&self, entries: &[SurfaceEntry]) -> Vec<Emitter> {
         let mean = |colour: Spectrum| f64::from(colour.average());
         let at =
@@ -142,7 +145,22 @@ impl Light {
             Self::Shape(light) => light.emitter(&entries[light.entry as usize]).into_iter().collect(),
             Self::Mesh(light) => light.emitters(&entries[light.entry as usize]),
             Self::Placed(light) => light.emitter(entries).into_iter().collect(),
-            Self::Distant(_) | Self::Uniform(_) | Self::Environment(_) | Self::Moving(_) => Vec::new(),
+            Self::Moving(light) => light.emitter(entries).into_iter().collect(),
+            Self::Distant(_) | Self::Uniform(_) | Self::Environment(_) => Vec::new(),
+        }
+    }
+
+    /// The direction of parallel light at a time; `None` for all other.
+    fn towards(&self, time: f64) -> Option<DVec3> {
+        match self {
+            Self::Distant(light) => Some(light.towards),
+            Self::Moving(light) => light.towards(time),
+            Self::Point(_)
+            | Self::Spot(_)
+            | Self::Goniometric(_)
+            | Self::Uniform(_)
+            | Self::Environment(_) => None,
+            Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => None,
         }
     }
 
@@ -160,6 +178,20 @@ impl Light {
             | (Self::Shape(_) | Self::Mesh(_) | Self::Placed(_), None)
             | (Self::Point(_) | Self::Spot(_) | Self::Goniometric(_), _)
             | (Self::Distant(_) | Self::Moving(_), _) => 0.0,
+        }
+    }
+
+    /// The surface, in the space of its tree, of which a ray from `from` met this point, both in the world; of a mesh, as far as densities
+    /// depend on it. `None` for what is no surface, and for a point that is not on it.
+    fn surface_at(&self, from: DVec3, point: DVec3, time: f64) -> Option<Surface> {
+        match self {
+            Self::Shape(light) => light.surface_at(from, point),
+            Self::Mesh(light) => Some(light.surface_at(point)),
+            Self::Placed(light) => light.surface_at(from, point, time),
+            Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Distant(_) | Self::Moving(_) => {
+                None
+            }
+            Self::Uniform(_) | Self::Environment(_) => None,
         }
     }
 

@@ -11,8 +11,9 @@ use lumbre_shading::{FloatTexture, Spectrum};
 
 use crate::build::check_cameras;
 use crate::footprint::Spot;
-use crate::light::choice::{Company, LightChoice};
-use crate::light::{Light, LightId, LightSample};
+use crate::light::choice::LightChoice;
+use crate::light::lanes::LaneLights;
+use crate::light::{Light, LightId, LightSample, Place, Sampling};
 use crate::surface::{Form, ShadingGeometry, SurfaceEntry};
 use crate::{
     BuildError, Camera, FilmDesc, FilterDesc, Footprint, GroundPlane, IntegratorDesc, Interaction,
@@ -26,6 +27,7 @@ pub struct Scene {
     pub(crate) entries: Vec<SurfaceEntry>,
     pub(crate) lights: Vec<Light>,
     pub(crate) light_choice: LightChoice,
+    pub(crate) lane_lights: LaneLights,
     // By power; `None` without lights.
     pub(crate) light_by_power: Option<AliasTable>,
     pub(crate) infinite: Vec<LightId>,
@@ -333,22 +335,50 @@ impl Scene {
     /// A light sample for `from` at a time: a light chosen by `choose`, and a direction by `u`. Its density, or
     /// the radiance of a delta light, includes the probability of the light.
     ///
+    /// `normal` is the unit geometric normal of an opaque surface, on the side that is seen: lights below its horizon are not chosen, and
+    /// others by the cosine. It is zero where light from every side counts: where the surface transmits, and in a medium.
+    ///
     /// It is for those who also find light along rays of their own and weigh both by [`Scene::light_pdf`] and [`Scene::escaped`]: of an
     /// environment map it rarely samples what is dim. [`Scene::sample_light_alone`] is for those who do not.
-    pub fn sample_light(&self, from: DVec3, time: f64, choose: f64, u: DVec2) -> Option<LightSample> {
-        self.light_choice.sample(
-            &self.lights,
-            &self.entries,
-            from,
-            time,
-            [choose, u.x, u.y],
-            Company::BesideOthers,
-        )
+    pub fn sample_light(
+        &self,
+        from: DVec3,
+        normal: DVec3,
+        time: f64,
+        choose: f64,
+        u: DVec2,
+    ) -> Option<LightSample> {
+        self.sample_light_for(Sampling::Mis, from, normal, time, choose, u)
     }
 
     /// [`Scene::sample_light`] for those who find light in no other way.
-    pub fn sample_light_alone(&self, from: DVec3, time: f64, choose: f64, u: DVec2) -> Option<LightSample> {
-        self.light_choice.sample(&self.lights, &self.entries, from, time, [choose, u.x, u.y], Company::Alone)
+    pub fn sample_light_alone(
+        &self,
+        from: DVec3,
+        normal: DVec3,
+        time: f64,
+        choose: f64,
+        u: DVec2,
+    ) -> Option<LightSample> {
+        self.sample_light_for(Sampling::LightsOnly, from, normal, time, choose, u)
+    }
+
+    fn sample_light_for(
+        &self,
+        sampling: Sampling,
+        from: DVec3,
+        normal: DVec3,
+        time: f64,
+        choose: f64,
+        u: DVec2,
+    ) -> Option<LightSample> {
+        let place = Place { from, normal };
+        self.light_choice.sample(&self.lights, &self.entries, &place, time, [choose, u.x, u.y], sampling)
+    }
+
+    /// The lights over lanes: as [`Scene::sample_light`], [`Scene::light_pdf`] and [`Scene::escaped`].
+    pub fn lane_lights(&self) -> &LaneLights {
+        &self.lane_lights
     }
 
     /// A light chosen by power, with its probability; `None` without lights.
@@ -362,21 +392,21 @@ impl Scene {
         self.lights[light.0 as usize].sample(&self.entries, from, time, u)
     }
 
-    /// The density per unit solid angle with which [`Scene::sample_light`] samples `hit` from `from`; 0 if it
+    /// The density per unit solid angle with which [`Scene::sample_light`] samples `hit` from `from` with a normal; 0 if it
     /// never does.
-    pub fn light_pdf(&self, from: DVec3, hit: &Interaction) -> f32 {
+    pub fn light_pdf(&self, from: DVec3, normal: DVec3, hit: &Interaction) -> f32 {
         let (Some(light), Some(geometric)) = (hit.light, &hit.geometric) else { return 0.0 };
         let surface = Some((&**geometric, hit.primitive));
         let ray = Ray::new(from, -hit.towards_origin).at_time(hit.time);
-        self.light_choice.pdf(&self.lights, light, &ray, surface) as f32
+        self.light_choice.pdf(&self.lights, light, &ray, normal, surface) as f32
     }
 
     /// The radiance of each infinite light along a ray that leaves the scene, with the density with which
-    /// [`Scene::sample_light`] samples that direction.
-    pub fn escaped<'s>(&'s self, ray: &'s Ray) -> impl Iterator<Item = (Spectrum, f32)> + 's {
+    /// [`Scene::sample_light`] samples that direction from the ray's origin with a normal.
+    pub fn escaped<'s>(&'s self, ray: &'s Ray, normal: DVec3) -> impl Iterator<Item = (Spectrum, f32)> + 's {
         self.infinite.iter().map(move |&id| {
             let light = &self.lights[id.0 as usize];
-            let pdf = self.light_choice.pdf(&self.lights, id, ray, None);
+            let pdf = self.light_choice.pdf(&self.lights, id, ray, normal, None);
             (light.escaped(ray.direction), pdf as f32)
         })
     }

@@ -121,7 +121,8 @@ fn the_light_of_all_is_the_sum_of_each() {
             })
             .sum();
         let all: f64 =
-            (0..COUNT).map(|_| flux(scene.sample_light(from, 0.0, u().x, u()))).sum::<f64>() / COUNT as f64;
+            (0..COUNT).map(|_| flux(scene.sample_light(from, DVec3::ZERO, 0.0, u().x, u()))).sum::<f64>()
+                / COUNT as f64;
         assert!((all / each - 1.0).abs() < 0.03, "{from}: {all} {each}");
     }
 }
@@ -134,7 +135,9 @@ fn the_density_of_what_a_ray_finds_is_that_of_the_sample() {
     for _ in 0..4000 {
         let mut x = || random.next_f64();
         let from = 8.0 * DVec3::new(x() - 0.5, x() - 0.5, x() - 0.5);
-        let Some(sample) = scene.sample_light(from, 0.0, x(), DVec2::new(x(), x())) else { continue };
+        let Some(sample) = scene.sample_light(from, DVec3::ZERO, 0.0, x(), DVec2::new(x(), x())) else {
+            continue;
+        };
         let (Scatter::Density(expected), Some(end)) = (sample.scatter, sample.end) else { continue };
         let ray = Ray::new(from, sample.towards);
         let Some(hit) = scene.closest(&ray) else { continue };
@@ -143,7 +146,7 @@ fn the_density_of_what_a_ray_finds_is_that_of_the_sample() {
         if (met.surface.point - end.point).length() > 1e-6 {
             continue;
         }
-        let density = scene.light_pdf(from, &met);
+        let density = scene.light_pdf(from, DVec3::ZERO, &met);
         assert!((density / expected - 1.0).abs() < 1e-3, "{density} {expected} {met:?}");
         count += 1;
     }
@@ -180,7 +183,7 @@ fn a_rectangle_of_two_triangles_lights_as_lambert_says_from_near_and_far() {
         for i in 0..SIDE * SIDE {
             let u = DVec2::new((i % SIDE) as f64 + random.next_f64(), (i / SIDE) as f64 + random.next_f64())
                 / SIDE as f64;
-            let sample = scene.sample_light(from, 0.0, random.next_f64(), u).unwrap();
+            let sample = scene.sample_light(from, DVec3::ZERO, 0.0, random.next_f64(), u).unwrap();
             let Scatter::Density(pdf) = sample.scatter else { panic!("{sample:?}") };
             let cosine = -sample.towards.dot(normal);
             sum += f64::from(sample.radiance.average()) * cosine / f64::from(pdf);
@@ -189,7 +192,7 @@ fn a_rectangle_of_two_triangles_lights_as_lambert_says_from_near_and_far() {
             let ray = Ray::new(from, sample.towards);
             let Some(hit) = scene.closest(&ray) else { continue };
             let met = scene.interaction(&ray, &hit, &Footprint::Point);
-            assert!((scene.light_pdf(from, &met) / pdf - 1.0).abs() < 1e-4, "{case}");
+            assert!((scene.light_pdf(from, DVec3::ZERO, &met) / pdf - 1.0).abs() < 1e-4, "{case}");
             sides[met.primitive as usize] += 1;
             assert!(!scene.is_occluded(&met_shadow(from, &sample)), "{case}");
         }
@@ -209,7 +212,10 @@ fn a_rectangle_of_two_triangles_lights_as_lambert_says_from_near_and_far() {
         );
         assert!(sides[0] > 20 && sides[1] > 20 && sides[0] + sides[1] > 4090, "{case}: {sides:?}");
         // Behind it, nothing.
-        assert_eq!(scene.sample_light(middle - distance * normal, 0.0, 0.4, DVec2::splat(0.3)), None);
+        assert_eq!(
+            scene.sample_light(middle - distance * normal, DVec3::ZERO, 0.0, 0.4, DVec2::splat(0.3)),
+            None
+        );
     }
 }
 
@@ -251,7 +257,7 @@ fn what_is_sampled_of_a_sky_beside_other_ways_is_all_of_it_with_the_density_of_w
             let share = 1.0 / f64::from(SIDE * SIDE);
             // All directions alike.
             let ray = Ray::new(DVec3::ONE, warp64::square_to_sphere(u));
-            let (radiance, pdf) = scene.escaped(&ray).next().unwrap();
+            let (radiance, pdf) = scene.escaped(&ray, DVec3::ZERO).next().unwrap();
             assert!(radiance.is_black() || pdf > 0.0);
             let sphere = 4.0 * std::f64::consts::PI;
             whole += share * sphere * f64::from(pdf);
@@ -259,9 +265,9 @@ fn what_is_sampled_of_a_sky_beside_other_ways_is_all_of_it_with_the_density_of_w
             light += share * sphere * arriving;
             by_both += share * arriving / (f64::from(pdf) + 1.0 / sphere);
             // And those that are sampled.
-            let Some(sample) = scene.sample_light(DVec3::ONE, 0.0, 0.5, u) else { continue };
+            let Some(sample) = scene.sample_light(DVec3::ONE, DVec3::ZERO, 0.0, 0.5, u) else { continue };
             let ray = Ray::new(DVec3::ONE, sample.towards);
-            let (radiance, pdf) = scene.escaped(&ray).next().unwrap();
+            let (radiance, pdf) = scene.escaped(&ray, DVec3::ZERO).next().unwrap();
             let Scatter::Density(expected) = sample.scatter else { panic!("{sample:?}") };
             assert!((pdf / expected - 1.0).abs() < 1e-3, "{pdf} {expected}");
             assert!((radiance.average() / sample.radiance.average() - 1.0).abs() < 1e-3);
@@ -294,7 +300,7 @@ fn a_sky_that_is_the_same_all_around_is_sampled_evenly() {
         for _ in 0..500 {
             let direction = warp64::square_to_sphere(DVec2::new(random.next_f64(), random.next_f64()));
             let ray = Ray::new(DVec3::ONE, direction);
-            let (_, pdf) = scene.escaped(&ray).next().unwrap();
+            let (_, pdf) = scene.escaped(&ray, DVec3::ZERO).next().unwrap();
             // A row of the picture between circles of latitude is sampled evenly in the angle, which is not so even near the poles.
             assert!(
                 direction.z.abs() > 0.8 || (f64::from(pdf) * 4.0 * std::f64::consts::PI - 1.0).abs() < 0.2,

@@ -569,7 +569,8 @@ fn a_scene_of_nothing_builds_and_answers() {
     let scene = Scene::build(SceneDesc::default()).unwrap();
     assert!(scene.closest(&down(1.0, 2.0)).is_none());
     assert_eq!((scene.cameras().len(), scene.lights().len()), (1, 1));
-    let sample = scene.sample_light(DVec3::new(1.0, 2.0, 3.0), 0.0, 0.3, DVec2::new(0.7, 0.6)).unwrap();
+    let sample =
+        scene.sample_light(DVec3::new(1.0, 2.0, 3.0), DVec3::ZERO, 0.0, 0.3, DVec2::new(0.7, 0.6)).unwrap();
     assert!(sample.towards.is_normalized() && sample.radiance.is_finite());
 }
 

@@ -140,13 +140,18 @@ fn passed(
         if light.is_black() {
             return Spectrum::BLACK;
         }
-        let by_lights: f64 = scene.escaped(&ray).map(|(_, pdf)| f64::from(pdf)).sum();
+        let by_lights: f64 = scene.escaped(&ray, ground.normal).map(|(_, pdf)| f64::from(pdf)).sum();
         let by_cosine = cosine * FRAC_1_PI;
         light * (cosine / (by_lights + by_cosine)) as f32
     };
     for i in 0..SAMPLES {
-        let sample =
-            scene.sample_light(at.shadow_origin(), at.time, draw.light_choice(i), draw.light_point(i));
+        let sample = scene.sample_light(
+            at.shadow_origin(),
+            ground.normal,
+            at.time,
+            draw.light_choice(i),
+            draw.light_point(i),
+        );
         if let Some(LightSample { scatter: Scatter::Density(_), end: None, towards, .. }) = sample {
             irradiance += along(towards, 1 + 2 * i, record);
         }

@@ -1,6 +1,6 @@
 //! Area lights of one exact shape.
 
-use lumbre_geometry::{PlacedShape, Ray, Shape, Surface};
+use lumbre_geometry::{PlacedShape, Ray, Roots, Shape, Surface};
 use lumbre_math::{DVec2, DVec3};
 use lumbre_shading::{FloatTexture, Scatter, Spectrum};
 
@@ -27,6 +27,15 @@ impl ShapeLight {
 
     pub(super) fn pdf(&self, ray: &Ray, surface: &Surface) -> f64 {
         self.shape.pdf_direction(ray, surface)
+    }
+
+    /// The surface of which a ray from `from` met this point.
+    pub(super) fn surface_at(&self, from: DVec3, point: DVec3) -> Option<Surface> {
+        let ray = Ray::new(from, point - from);
+        let mut roots = Roots::new();
+        self.shape.roots(&ray, &mut roots);
+        let root = roots.iter().min_by(|a, b| (a.t - 1.0).abs().total_cmp(&(b.t - 1.0).abs()))?;
+        Some(self.shape.surface(&ray, root))
     }
 
     /// What a tree knows of it; `None` if it has no bounds.

@@ -1,35 +1,40 @@
 //! The choice of a light, or of a piece of one, for a place.
 
 use lumbre_geometry::{Ray, Surface};
-use lumbre_math::distribution::AliasTable;
 use lumbre_math::{DVec2, DVec3};
 
-use super::tree::{Emitter, LightTree};
+use super::tree::{Emitter, HORIZON_SLACK, LightTree, Place};
 use super::{Light, LightId, LightSample};
 use crate::surface::SurfaceEntry;
 
-/// Who asks for a sample of light.
+/// What the samples of light are for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Company {
-    /// One who finds light by samples alone.
-    Alone,
-    /// One who finds light along rays of its own as well, and weighs both.
-    BesideOthers,
+pub enum Sampling {
+    /// Light is found by them alone.
+    LightsOnly,
+    /// Light is found along other rays as well, and both are weighed: multiple importance sampling.
+    Mis,
 }
 
-/// Chooses among all lights: those that stand somewhere by a tree, the others by power.
+/// Chooses among all lights: those that stand somewhere by a tree, the others by what they give to a place.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LightChoice {
-    tree: Option<LightTree>,
+    pub(super) tree: Option<LightTree>,
     /// The light of each emitter of the tree, and its piece, if it is one of many.
-    emitters: Vec<(u32, Option<u32>)>,
+    pub(super) emitters: Vec<(u32, Option<u32>)>,
     /// The first emitter of each light; `None` for those that are not in the tree.
-    firsts: Vec<Option<u32>>,
-    /// Lights that are everywhere, or that move, by power.
-    elsewhere: Option<AliasTable>,
-    elsewhere_ids: Vec<u32>,
-    /// The probability of one of those.
-    share_elsewhere: f64,
+    pub(super) firsts: Vec<Option<u32>>,
+    pub(super) elsewhere: Vec<Elsewhere>,
+    /// The probability of one of those, where there are others that may shine.
+    pub(super) share_elsewhere: f64,
+}
+
+/// A light that is everywhere.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Elsewhere {
+    pub light: u32,
+    /// Relative to the greatest.
+    pub power: f64,
 }
 
 /// The least probability of lights that stand somewhere, and of others, where there are both: their powers are no good measure of what
@@ -41,14 +46,13 @@ impl LightChoice {
     pub(crate) fn new(lights: &[Light], entries: &[SurfaceEntry], scene_radius: f64) -> Self {
         let mut choice = Self::default();
         let mut all: Vec<Emitter> = Vec::new();
-        let (mut power, mut power_elsewhere) = (0.0, Vec::new());
+        let mut power = 0.0;
         for (id, light) in (0..).zip(lights) {
             let found = light.emitters(entries);
             let first = choice.emitters.len() as u32;
             choice.firsts.push((!found.is_empty()).then_some(first));
             if found.is_empty() {
-                choice.elsewhere_ids.push(id);
-                power_elsewhere.push(light.power(scene_radius));
+                choice.elsewhere.push(Elsewhere { light: id, power: light.power(scene_radius) });
                 continue;
             }
             power += light.power(scene_radius);
@@ -57,83 +61,154 @@ impl LightChoice {
             all.extend(found);
         }
         choice.tree = LightTree::new(&all);
-        choice.elsewhere = AliasTable::new(&power_elsewhere);
-        choice.share_elsewhere = match (&choice.tree, &choice.elsewhere) {
-            (Some(_), Some(_)) => {
-                let elsewhere: f64 = power_elsewhere.iter().sum();
-                let share = elsewhere / (elsewhere + power);
-                // Beyond all numbers, both alike.
-                if share.is_nan() { 0.5 } else { share.clamp(LEAST_SHARE, 1.0 - LEAST_SHARE) }
-            }
-            (None, Some(_)) => 1.0,
-            (_, None) => 0.0,
+        let elsewhere: f64 = choice.elsewhere.iter().map(|light| light.power).sum();
+        let share = elsewhere / (elsewhere + power);
+        // Beyond all numbers, both alike.
+        let share = if share.is_nan() { 0.5 } else { share.clamp(LEAST_SHARE, 1.0 - LEAST_SHARE) };
+        let has_elsewhere = choice.elsewhere.iter().any(|light| light.power > 0.0);
+        choice.share_elsewhere = match (&choice.tree, has_elsewhere) {
+            (Some(_), true) => share,
+            (None, true) => 1.0,
+            (_, false) => 0.0,
         };
+        let greatest = choice.elsewhere.iter().map(|light| light.power).fold(0.0, f64::max);
+        for light in &mut choice.elsewhere {
+            let relative = light.power / greatest;
+            light.power = if relative.is_finite() { relative.max(0.0) } else { 1.0 };
+        }
         choice
     }
 
-    /// A sample of a light that `choose` chooses for `from`, in a direction by `x` and `y`. Its density, or the radiance of a delta light,
+    /// A sample of a light that `choose` chooses for a place, in a direction by `x` and `y`. Its density, or the radiance of a delta light,
     /// includes the probability of the choice.
     pub(crate) fn sample(
         &self,
         lights: &[Light],
         entries: &[SurfaceEntry],
-        from: DVec3,
+        place: &Place,
         time: f64,
         [choose, x, y]: [f64; 3],
-        company: Company,
+        sampling: Sampling,
     ) -> Option<LightSample> {
         let u = DVec2::new(x, y);
-        let (sample, probability) = if choose < self.share_elsewhere {
-            let choice = self.elsewhere.as_ref()?.sample(choose / self.share_elsewhere);
-            let sample = match &lights[self.elsewhere_ids[choice.index] as usize] {
-                Light::Environment(light) if company == Company::BesideOthers => {
-                    light.sample_beside_others(u)
-                }
-                light => light.sample(entries, from, time, u),
+        let sum = self.sum_elsewhere(lights, place.normal, time);
+        let share_elsewhere = self.share_elsewhere_at(place, sum);
+        let (sample, probability) = if choose < share_elsewhere {
+            let (id, probability) =
+                self.choose_elsewhere(lights, place.normal, time, choose / share_elsewhere * sum)?;
+            let sample = match &lights[id as usize] {
+                Light::Environment(light) if sampling == Sampling::Mis => light.sample_beside_others(u),
+                light => light.sample(entries, place.from, time, u),
             };
-            (sample?, self.share_elsewhere * choice.probability)
+            (sample?, share_elsewhere * (probability / sum))
         } else {
-            let share = 1.0 - self.share_elsewhere;
-            let chosen = self.tree.as_ref()?.choose(from, (choose - self.share_elsewhere) / share)?;
-            let (light, piece) = self.emitters[chosen.emitter];
-            let sample = match (&lights[light as usize], piece) {
-                (Light::Mesh(light), Some(piece)) => {
-                    light.sample_piece(&entries[light.entry as usize], piece, from, u)
-                }
-                (light, _) => light.sample(entries, from, time, u),
-            };
-            (sample?, share * chosen.probability)
+            let share = 1.0 - share_elsewhere;
+            let chosen = self.tree.as_ref()?.choose(place, (choose - share_elsewhere) / share)?;
+            (
+                self.sample_emitter(lights, entries, chosen.emitter, place.from, time, u)?,
+                share * chosen.probability,
+            )
         };
         Some(sample.of_density(probability))
     }
 
-    /// The density per unit solid angle with which [`LightChoice::sample`], beside others, samples what a ray hit of a light: see
-    /// [`Light::pdf`].
+    /// A sample of an emitter of the tree.
+    pub(super) fn sample_emitter(
+        &self,
+        lights: &[Light],
+        entries: &[SurfaceEntry],
+        emitter: usize,
+        from: DVec3,
+        time: f64,
+        u: DVec2,
+    ) -> Option<LightSample> {
+        let (light, piece) = self.emitters[emitter];
+        match (&lights[light as usize], piece) {
+            (Light::Mesh(light), Some(piece)) => {
+                light.sample_piece(&entries[light.entry as usize], piece, from, u)
+            }
+            (light, _) => light.sample(entries, from, time, u),
+        }
+    }
+
+    /// The probability of the lights that are everywhere at a place to which they give `sum`.
+    fn share_elsewhere_at(&self, place: &Place, sum: f64) -> f64 {
+        // False for a NaN.
+        let shines = sum > 0.0;
+        if !shines {
+            return 0.0;
+        }
+        let is_alone =
+            self.share_elsewhere < 1.0 && !self.tree.as_ref().is_some_and(|tree| tree.shines_on(place));
+        if is_alone { 1.0 } else { self.share_elsewhere }
+    }
+
+    /// What all lights that are everywhere give to a place with this normal, in arbitrary units.
+    fn sum_elsewhere(&self, lights: &[Light], normal: DVec3, time: f64) -> f64 {
+        self.elsewhere.iter().map(|light| light.given(lights, normal, time)).sum()
+    }
+
+    /// The light up to which they give this, and what it gives itself.
+    fn choose_elsewhere(&self, lights: &[Light], normal: DVec3, time: f64, up_to: f64) -> Option<(u32, f64)> {
+        let (mut sum, mut last) = (0.0, None);
+        for light in &self.elsewhere {
+            let given = light.given(lights, normal, time);
+            if given > 0.0 {
+                sum += given;
+                last = Some((light.light, given));
+                if up_to < sum {
+                    break;
+                }
+            }
+        }
+        last
+    }
+
+    /// The density per unit solid angle with which [`LightChoice::sample`] with [`Sampling::Mis`] samples what a ray from a place with this
+    /// normal hit of a light: see [`Light::pdf`].
     pub(crate) fn pdf(
         &self,
         lights: &[Light],
         id: LightId,
         ray: &Ray,
+        normal: DVec3,
         surface: Option<(&Surface, u32)>,
     ) -> f64 {
         let light = &lights[id.0 as usize];
+        let place = Place { from: ray.origin, normal };
+        let sum = self.sum_elsewhere(lights, normal, ray.time);
+        let share_elsewhere = self.share_elsewhere_at(&place, sum);
         let Some(first) = self.firsts[id.0 as usize] else {
-            let Ok(index) = self.elsewhere_ids.binary_search(&id.0) else { return 0.0 };
-            let probability = self.elsewhere.as_ref().map_or(0.0, |choice| choice.probability(index));
+            let position = self.elsewhere.binary_search_by_key(&id.0, |light| light.light);
+            let Ok(index) = position else { return 0.0 };
+            let given = self.elsewhere[index].given(lights, normal, ray.time);
             let density = match (light, surface) {
                 (Light::Environment(light), None) => light.pdf_beside_others(ray.direction),
                 _ => light.pdf(ray, surface),
             };
-            return self.share_elsewhere * probability * density;
+            return if given > 0.0 { share_elsewhere * (given / sum) * density } else { 0.0 };
         };
         let Some(tree) = &self.tree else { return 0.0 };
-        let probability =
-            |emitter: u32| (1.0 - self.share_elsewhere) * tree.probability(ray.origin, emitter as usize);
+        let probability = |emitter: u32| (1.0 - share_elsewhere) * tree.probability(&place, emitter as usize);
         match (light, surface) {
-            (Light::Mesh(light), Some((surface, triangle))) => light
-                .piece_of(triangle)
-                .map_or(0.0, |piece| probability(first + piece) * light.piece_pdf(ray, surface, piece)),
+            (Light::Mesh(light), Some((surface, triangle))) => {
+                light.piece_of(triangle).map_or(0.0, |piece| {
+                    probability(first + piece) * light.piece_pdf(ray.origin, surface.point, piece)
+                })
+            }
             _ => probability(first) * light.pdf(ray, surface),
         }
+    }
+}
+
+impl Elsewhere {
+    /// What it gives to a place with this normal, or to one that faces it if that is zero; in arbitrary units.
+    fn given(&self, lights: &[Light], normal: DVec3, time: f64) -> f64 {
+        if normal == DVec3::ZERO {
+            return self.power;
+        }
+        let cosine = lights[self.light as usize].towards(time).map_or(1.0, |towards| normal.dot(towards));
+        // As for lights in the tree: what is in the plane itself may shine by rounding.
+        if cosine < -HORIZON_SLACK { 0.0 } else { self.power * cosine.max(HORIZON_SLACK) }
     }
 }

@@ -133,21 +133,28 @@ impl MeshLight {
 
     pub(super) fn pdf(&self, ray: &Ray, surface: &Surface, triangle: u32) -> f64 {
         let Some(piece) = self.piece_of(triangle) else { return 0.0 };
-        self.by_area.probability(piece as usize) * self.piece_pdf(ray, surface, piece)
+        self.by_area.probability(piece as usize) * self.piece_pdf(ray.origin, surface.point, piece)
     }
 
-    /// The density of [`MeshLight::sample_piece`].
-    pub(super) fn piece_pdf(&self, ray: &Ray, surface: &Surface, piece: u32) -> f64 {
+    /// The density of [`MeshLight::sample_piece`] from a place at a point of the piece.
+    pub(super) fn piece_pdf(&self, from: DVec3, point: DVec3, piece: u32) -> f64 {
         let piece = &self.pieces[piece as usize];
-        let by_area = || per_solid_angle(piece.area, surface.point - ray.origin, piece.normal).unwrap_or(0.0);
+        let by_area = || per_solid_angle(piece.area, point - from, piece.normal).unwrap_or(0.0);
         match &piece.form {
             Form::Nothing => 0.0,
-            _ if piece.is_far(ray.origin) => by_area(),
-            Form::Triangle(shape, _) => shape.pdf_direction(ray, surface),
+            _ if piece.is_far(from) => by_area(),
+            Form::Triangle(shape, _) => {
+                shape.pdf_direction(&Ray::new(from, point - from), &piece.surface_at(point))
+            }
             Form::Rectangle(shape) => {
-                shape.seen_from(ray.origin).map_or_else(by_area, |view| 1.0 / view.solid_angle)
+                shape.seen_from(from).map_or_else(by_area, |view| 1.0 / view.solid_angle)
             }
         }
+    }
+
+    /// The surface at a point, as far as densities depend on it: on the point alone.
+    pub(super) fn surface_at(&self, point: DVec3) -> Surface {
+        self.pieces[0].surface_at(point)
     }
 
     /// What a tree knows of every piece.
@@ -191,6 +198,23 @@ impl Piece {
         let error = 9.0 * f64::EPSILON * (corner.abs() + a.abs() + b.abs()) + gap;
         let form = Form::Rectangle(rectangle);
         Self { form, corner, sides: [a, b], normal, area, center, reach_squared, error }
+    }
+
+    /// The surface at a point of it.
+    fn surface_at(&self, point: DVec3) -> Surface {
+        let [dpdu, dpdv] = self.sides;
+        let none = DVec3::ZERO;
+        let normal = self.normal;
+        Surface {
+            point,
+            point_error: self.error,
+            normal,
+            uv: DVec2::ZERO,
+            dpdu,
+            dpdv,
+            dndu: none,
+            dndv: none,
+        }
     }
 
     fn corners(&self) -> impl Iterator<Item = DVec3> {

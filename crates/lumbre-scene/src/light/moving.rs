@@ -2,10 +2,13 @@
 
 use std::sync::Arc;
 
+use lumbre_geometry::Aabb;
 use lumbre_math::{AnimatedTransform, DMat3, DVec2, DVec3};
 use lumbre_shading::Spectrum;
 
+use super::tree::{Emitter, Facing};
 use super::{Light, LightSample};
+use crate::build::moved;
 use crate::surface::SurfaceEntry;
 
 /// A light in its own space, and the rigid motion of that space.
@@ -46,9 +49,39 @@ impl MovingLight {
         Some(sample)
     }
 
+    /// The direction of parallel light at a time; `None` for a light that is somewhere.
+    pub(super) fn towards(&self, time: f64) -> Option<DVec3> {
+        self.motion.at(time).vector(self.light.towards(time)?).try_normalize()
+    }
+
+    /// What a tree knows of it at all times; `None` for parallel light.
+    pub(super) fn emitter(&self, entries: &[SurfaceEntry]) -> Option<Emitter> {
+        let inner = self.light.emitters(entries);
+        let [Emitter { bounds, strength, .. }] = inner[..] else { return None };
+        Some(Emitter { bounds: swept(&bounds, &self.motion), facing: Facing::ANY, strength })
+    }
+
     pub(super) fn irradiance(&self, at: DVec3, time: f64, normal: DVec3) -> Option<Spectrum> {
         let map = self.motion.at(time);
         let normal = map.inverse_vector(normal).try_normalize()?;
         self.light.irradiance(map.inverse_point(at), time, normal)
     }
+}
+
+/// A box that holds another one at all times of its motion.
+pub(super) fn swept(bounds: &Aabb, motion: &AnimatedTransform) -> Aabb {
+    if motion.is_still() {
+        return moved(bounds, &motion.keys()[0].1).outward(8);
+    }
+    let (center, half) = (bounds.center(), 0.5 * bounds.size());
+    let places = motion.keys().iter().fold(Aabb::EMPTY, |all, (_, map)| all.union(moved(bounds, map)));
+    let reach = |bounds: &Aabb| bounds.min.abs().max(bounds.max.abs()).max_element();
+    let rounding = 64.0 * f64::EPSILON * motion.condition() * reach(&places);
+    // As fine as is worth while: a hundredth of how far it goes.
+    let tolerance = (0.01 * places.size().max_element()).max(rounding).max(f64::MIN_POSITIVE);
+    motion.steps(center, half, tolerance).fold(places, |all, (maps, beyond)| {
+        let step = maps.iter().fold(Aabb::EMPTY, |step, map| step.union(moved(bounds, map)));
+        let margin = DVec3::splat(beyond + rounding);
+        all.union(Aabb { min: step.min - margin, max: step.max + margin })
+    })
 }

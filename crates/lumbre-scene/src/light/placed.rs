@@ -4,8 +4,10 @@ use lumbre_geometry::{Aabb, Ray, Surface};
 use lumbre_kernel::Placement;
 use lumbre_math::{DVec2, DVec3, Transform};
 
+use super::moving::swept;
 use super::tree::{Emitter, Facing};
 use super::{Light, LightPoint, LightSample};
+use crate::build::moved;
 use crate::surface::SurfaceEntry;
 
 /// A light in the space of an object, and the object's placement.
@@ -44,17 +46,23 @@ impl PlacedLight {
         Some(sample.of_density(growth(&map, sample.towards)))
     }
 
-    /// What a tree knows of it; `None` if it moves.
+    /// What a tree knows of it, at all times if it moves.
     pub(super) fn emitter(&self, entries: &[SurfaceEntry]) -> Option<Emitter> {
-        let Placement::Still(map) = &self.placement else { return None };
         let inner = self.light.emitters(entries);
         let bounds = inner.iter().fold(Aabb::EMPTY, |bounds, emitter| bounds.union(emitter.bounds));
-        let corner =
-            |i: usize| DVec3::from_array(std::array::from_fn(|k| [bounds.min, bounds.max][i >> k & 1][k]));
         // By its power, which is that in the world.
         let strength = self.light.power(0.0) / std::f64::consts::TAU;
-        let bounds = Aabb::around((0..8).map(|i| map.point(corner(i)))).outward(8);
+        let bounds = match &self.placement {
+            Placement::Still(map) => moved(&bounds, map).outward(8),
+            Placement::Moving(motion) => swept(&bounds, motion),
+        };
         (!inner.is_empty()).then_some(Emitter { bounds, facing: Facing::ANY, strength })
+    }
+
+    /// The surface, in the space of the object, of which a ray from `from` met this point.
+    pub(super) fn surface_at(&self, from: DVec3, point: DVec3, time: f64) -> Option<Surface> {
+        let map = self.placement.at(time);
+        self.light.surface_at(map.inverse_point(from), map.inverse_point(point), time)
     }
 
     /// `surface` is in the space of the object.

@@ -2,7 +2,9 @@
 //!
 //! After A. Conty Estevez, C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", Proceedings of the
 //! ACM on Computer Graphics and Interactive Techniques 1(2), 2018, without the splitting; cosines of bounding cones are
-//! found without angles, as in M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering", 4th edition, 2023, 12.6.
+//! found without angles, as in M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering", 4th edition, 2023, 12.6. The cosine at
+//! the place is bounded by the height of the node's box over the horizon, which for lights in the plane of the place is tighter than
+//! a cone.
 
 use lumbre_geometry::Aabb;
 use lumbre_math::DVec3;
@@ -88,12 +90,25 @@ pub(crate) struct LightTree {
 #[derive(Clone, Copy, Debug)]
 struct Node {
     center: DVec3,
+    /// Half the size of the bounding box.
+    half: DVec3,
     radius_squared: f64,
     facing: Facing,
     strength: f64,
     /// The second child; of a leaf, [`LEAF`] and its emitter.
     next: u32,
 }
+
+/// A place that is lit.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    pub from: DVec3,
+    /// The unit normal of an opaque surface, on the side that is lit; zero where light from every side counts.
+    pub normal: DVec3,
+}
+
+/// Sines of elevation down to minus this count as above the horizon: normals may have been rounded to single precision.
+pub(super) const HORIZON_SLACK: f64 = 1e-6;
 
 const LEAF: u32 = 1 << 31;
 const BELOW_ONE: f64 = 1.0 - 0.5 * f64::EPSILON;
@@ -105,7 +120,31 @@ impl Node {
 
     /// What the lights of the node may send to a place, roughly: zero only where they send nothing.
     #[inline]
-    fn importance(&self, from: DVec3) -> f64 {
+    fn importance(&self, place: &Place) -> f64 {
+        self.cosine_at(place) * self.intensity(place.from)
+    }
+
+    /// A bound on the cosine at the place between its normal and the way to any light of the node; 1 without a normal, 0 where all lights
+    /// are below the horizon.
+    #[inline]
+    fn cosine_at(&self, &Place { from, normal }: &Place) -> f64 {
+        if normal == DVec3::ZERO {
+            return 1.0;
+        }
+        let way = self.center - from;
+        // No point of the box is higher above the plane of the place, and none is nearer.
+        let height = normal.dot(way) + normal.abs().dot(self.half);
+        let distance = (way.abs() - self.half).max(DVec3::ZERO).length();
+        if distance <= 0.0 {
+            return 1.0;
+        }
+        let sine = height / distance;
+        if sine < -HORIZON_SLACK { 0.0 } else { sine.clamp(HORIZON_SLACK, 1.0) }
+    }
+
+    /// What the lights of the node may send to a place that faces them.
+    #[inline]
+    fn intensity(&self, from: DVec3) -> f64 {
         let way = from - self.center;
         let squared = way.length_squared();
         if squared <= self.radius_squared {
@@ -149,45 +188,50 @@ impl LightTree {
         let mut nodes = Vec::with_capacity(2 * emitters.len() - 1);
         build(&mut order, &mut nodes, 0);
         let mut leaves = vec![0; emitters.len()];
-        for (place, node) in (0..).zip(&nodes) {
+        for (at, node) in (0..).zip(&nodes) {
             if let Some(emitter) = node.emitter() {
-                leaves[emitter as usize] = place;
+                leaves[emitter as usize] = at;
             }
         }
         Some(Self { nodes, leaves })
     }
 
+    /// Whether anything may shine on a place.
+    pub(crate) fn shines_on(&self, place: &Place) -> bool {
+        self.nodes[0].importance(place) > 0.0
+    }
+
     /// The emitter for a place and a uniform `u` of [0, 1); `None` where nothing shines.
-    pub(crate) fn choose(&self, from: DVec3, mut u: f64) -> Option<Chosen> {
-        let (mut place, mut probability) = (0, 1.0);
+    pub(crate) fn choose(&self, place: &Place, mut u: f64) -> Option<Chosen> {
+        let (mut at, mut probability) = (0, 1.0);
         loop {
-            let node = &self.nodes[place];
+            let node = &self.nodes[at];
             if let Some(emitter) = node.emitter() {
                 return Some(Chosen { emitter: emitter as usize, probability });
             }
-            let share = self.share_of_first(place, from)?;
+            let share = self.share_of_first(at, place)?;
             if u < share {
-                (place, u) = (place + 1, (u / share).min(BELOW_ONE));
+                (at, u) = (at + 1, (u / share).min(BELOW_ONE));
                 probability *= share;
             } else {
-                (place, u) = (node.next as usize, ((u - share) / (1.0 - share)).min(BELOW_ONE));
+                (at, u) = (node.next as usize, ((u - share) / (1.0 - share)).min(BELOW_ONE));
                 probability *= 1.0 - share;
             }
         }
     }
 
     /// The probability with which [`LightTree::choose`] chooses an emitter.
-    pub(crate) fn probability(&self, from: DVec3, emitter: usize) -> f64 {
+    pub(crate) fn probability(&self, place: &Place, emitter: usize) -> f64 {
         let leaf = self.leaves[emitter] as usize;
-        let (mut place, mut probability) = (0, 1.0);
-        while place != leaf {
-            let Some(share) = self.share_of_first(place, from) else { return 0.0 };
-            let second = self.nodes[place].next as usize;
+        let (mut at, mut probability) = (0, 1.0);
+        while at != leaf {
+            let Some(share) = self.share_of_first(at, place) else { return 0.0 };
+            let second = self.nodes[at].next as usize;
             if leaf < second {
-                place += 1;
+                at += 1;
                 probability *= share;
             } else {
-                place = second;
+                at = second;
                 probability *= 1.0 - share;
             }
         }
@@ -196,9 +240,9 @@ impl LightTree {
 
     /// The probability of the first child of a node.
     #[inline]
-    fn share_of_first(&self, place: usize, from: DVec3) -> Option<f64> {
-        let first = self.nodes[place + 1].importance(from);
-        let second = self.nodes[self.nodes[place].next as usize].importance(from);
+    fn share_of_first(&self, at: usize, place: &Place) -> Option<f64> {
+        let first = self.nodes[at + 1].importance(place);
+        let second = self.nodes[self.nodes[at].next as usize].importance(place);
         let share = first / (first + second);
         if share.is_nan() {
             // Neither shines there; or both are infinitely strong, for the place is on a light without an extent.
@@ -217,9 +261,10 @@ const BINS: usize = 12;
 fn build(emitters: &mut [(Emitter, u32)], nodes: &mut Vec<Node>, depth: u32) {
     let bounds = emitters.iter().fold(Aabb::EMPTY, |bounds, (emitter, _)| bounds.union(emitter.bounds));
     let radius_squared = 0.25 * bounds.size().length_squared() * (1.0 + SLACK);
-    let place = nodes.len();
+    let at = nodes.len();
     nodes.push(Node {
         center: bounds.center(),
+        half: 0.5 * (1.0 + SLACK) * bounds.size(),
         radius_squared,
         facing: Facing::around(emitters),
         strength: emitters.iter().map(|(emitter, _)| emitter.strength).sum(),
@@ -232,7 +277,7 @@ fn build(emitters: &mut [(Emitter, u32)], nodes: &mut Vec<Node>, depth: u32) {
     let middle = middle.unwrap_or(emitters.len() / 2);
     let (first, second) = emitters.split_at_mut(middle);
     build(first, nodes, depth + 1);
-    nodes[place].next = nodes.len() as u32;
+    nodes[at].next = nodes.len() as u32;
     build(second, nodes, depth + 1);
 }
 
@@ -346,22 +391,27 @@ mod tests {
             .collect()
     }
 
+    fn anywhere(from: DVec3) -> Place {
+        Place { from, normal: DVec3::ZERO }
+    }
+
     #[test]
     fn probabilities_sum_to_one_and_are_those_of_the_choice() {
         let mut random = RandomStream::new(5);
         for count in [1, 2, 3, 50, 300] {
             let tree = LightTree::new(&emitters(count, count as u64)).unwrap();
             assert_eq!(tree.nodes.len(), 2 * count - 1);
-            for _ in 0..20 {
-                let from = 14.0 * vector(&mut random);
-                let sum: f64 = (0..count).map(|emitter| tree.probability(from, emitter)).sum();
+            for i in 0..20 {
+                let normal = if i % 3 == 0 { DVec3::ZERO } else { vector(&mut random).normalize() };
+                let place = Place { from: 14.0 * vector(&mut random), normal };
+                let sum: f64 = (0..count).map(|emitter| tree.probability(&place, emitter)).sum();
                 // A place that no light reaches has no choice.
-                let Some(chosen) = tree.choose(from, random.next_f64()) else {
+                let Some(chosen) = tree.choose(&place, random.next_f64()) else {
                     assert!(sum < 1.0);
                     continue;
                 };
                 assert!(sum <= 1.0 + 1e-12, "{sum}");
-                assert_eq!(tree.probability(from, chosen.emitter), chosen.probability);
+                assert_eq!(tree.probability(&place, chosen.emitter), chosen.probability);
             }
         }
     }
@@ -371,8 +421,11 @@ mod tests {
         let mut random = RandomStream::new(6);
         let all = emitters(200, 9);
         let tree = LightTree::new(&all).unwrap();
-        for _ in 0..200 {
+        let (mut left_out, mut shining) = (0, 0);
+        for round in 0..400 {
             let from = 14.0 * vector(&mut random);
+            let normal = if round % 2 == 0 { DVec3::ZERO } else { vector(&mut random).normalize() };
+            let place = Place { from, normal };
             for (i, emitter) in all.iter().enumerate().filter(|(_, emitter)| emitter.strength > 0.0) {
                 let within = vector(&mut random) * 0.5 * emitter.bounds.size();
                 let way = (from - (emitter.bounds.center() + within)).normalize();
@@ -381,17 +434,49 @@ mod tests {
                     1 => emitter.facing.axis.dot(way) > 0.0,
                     _ => emitter.facing.axis.dot(way) > 0.7,
                 };
-                assert!(!shines || tree.probability(from, i) > 0.0, "{i} {from}");
+                let shines = shines && (normal == DVec3::ZERO || normal.dot(-way) > 0.0);
+                let probability = tree.probability(&place, i);
+                assert!(!shines || probability > 0.0, "{i} {from}");
+                shining += u32::from(shines);
+                left_out += u32::from(probability == 0.0);
             }
         }
+        // It is no use where it leaves out nothing.
+        assert!(shining > 15_000 && left_out > 15_000, "{shining} {left_out}");
+    }
+
+    #[test]
+    fn lights_below_the_horizon_of_an_opaque_place_are_never_chosen() {
+        let at = |x, y, z, half: f64| {
+            let (at, half) = (DVec3::new(x, y, z), DVec3::new(half, half, 0.0));
+            let bounds = Aabb { min: at - half, max: at + half };
+            Emitter { bounds, facing: Facing::ANY, strength: if z < 0.7 { 1e6 } else { 0.3 } }
+        };
+        // A wide panel and a point below, and a point above.
+        let lights = [at(0.2, 0.0, -0.4, 30.0), at(1.0, 2.0, -3.0, 0.0), at(2.0, 1.0, 1.5, 0.0)];
+        let tree = LightTree::new(&lights).unwrap();
+        let place = Place { from: DVec3::new(0.5, 0.3, 0.1), normal: DVec3::Z };
+        assert_eq!([0, 1, 2].map(|i| tree.probability(&place, i)), [0.0, 0.0, 1.0]);
+        assert_eq!(tree.choose(&place, 0.2).unwrap().emitter, 2);
+        let below = Place { normal: -DVec3::Z, ..place };
+        assert_eq!(tree.probability(&below, 2), 0.0);
+        assert!(
+            tree.shines_on(&below)
+                && [0, 1, 2].iter().all(|&i| tree.probability(&anywhere(place.from), i) > 0.0)
+        );
+        assert!(!LightTree::new(&lights[..2]).unwrap().shines_on(&place));
+        // The one above gives a place that faces it at an angle as much more as the cosine is greater.
+        let two = LightTree::new(&[at(0.0, 0.0, 4.0, 0.0), at(0.0, 4.0, 4.0, 0.0)]).unwrap();
+        let share = two.probability(&Place { from: DVec3::ZERO, normal: DVec3::Z }, 0);
+        assert!((share - 1.0 / (1.0 + 0.5 * 0.5_f64.sqrt())).abs() < 1e-9, "{share}");
     }
 
     #[test]
     fn near_bright_lights_that_face_a_place_are_chosen_more_often() {
         let at = |x: f64| Aabb { min: DVec3::new(x, 0.0, 0.0), max: DVec3::new(x, 0.0, 0.0) };
         let light = |x, facing, strength| Emitter { bounds: at(x), facing, strength };
-        let here = DVec3::ZERO;
-        let first = |lights: &[Emitter]| LightTree::new(lights).unwrap().probability(here, 0);
+        let here = anywhere(DVec3::ZERO);
+        let first = |lights: &[Emitter]| LightTree::new(lights).unwrap().probability(&here, 0);
         let any = Facing::ANY;
         assert!((first(&[light(1.0, any, 1.0), light(3.0, any, 1.0)]) - 0.9).abs() < 1e-9);
         assert!((first(&[light(1.0, any, 1.0), light(-1.0, any, 3.0)]) - 0.25).abs() < 1e-9);
@@ -405,7 +490,7 @@ mod tests {
     fn a_million_lights_in_one_place_make_a_tree_that_is_not_deep() {
         let one = Emitter { bounds: Aabb::around([DVec3::ONE]), facing: Facing::ANY, strength: 1.0 };
         let tree = LightTree::new(&vec![one; 1 << 12]).unwrap();
-        let chosen = tree.choose(DVec3::ZERO, 0.3).unwrap();
+        let chosen = tree.choose(&anywhere(DVec3::ZERO), 0.3).unwrap();
         assert!((chosen.probability * 4096.0 - 1.0).abs() < 1e-9, "{chosen:?}");
     }
 }
