@@ -95,4 +95,9 @@ impl FilterStart {
             tiny: (TINY_NEAR / tree_space.scale) as f32,
         })
     }
+
+    /// The same for rays in single precision that start relative to the mesh already.
+    pub(crate) fn relative_to_mesh(&self) -> Self {
+        Self { mesh_origin: [0.0; 4], single_mesh_origin: Some([0.0; 4]), ..self.clone() }
+    }
 }
