@@ -7,8 +7,9 @@ use lumbre_math::{DVec3, Vec3};
 
 use crate::intersect::filter_start::FilterStart;
 use crate::trace::Winner;
-use crate::tree::node::ROUNDOFF;
-use crate::{Accel, GeometryKind, Hit, InstancePath, Ray32};
+use crate::trace::picture::Crossing;
+use crate::tree::node::{ROUNDOFF, round_up};
+use crate::{Accel, Geometry, GeometryKind, Hit, InstancePath, Placement, Ray32};
 
 /// Rays of a picture, in columns of equal length: `t` starts at 0.
 #[derive(Clone, Copy, Debug)]
@@ -158,6 +159,19 @@ impl HitColumns {
         self.t[i] = t;
     }
 
+    /// A hit of a triangle in single precision, or of anything.
+    #[inline(always)]
+    pub(crate) fn put_crossing(&mut self, i: usize, accel: &Accel, crossing: Crossing) {
+        if crossing.is_plain(accel) {
+            let Winner { root, geometry, primitive } = crossing.winner;
+            let id = accel.geometries[geometry as usize].id;
+            let local = [root.local.x as f32, root.local.y as f32];
+            self.put_plain(i, (id, primitive, geometry), root.t as f32, local);
+        } else {
+            self.put_whole(i, accel, crossing.into_hit(accel));
+        }
+    }
+
     /// A hit in double precision, outside of instances.
     #[inline(always)]
     pub(crate) fn put_winner(&mut self, i: usize, accel: &Accel, winner: Winner) {
@@ -201,35 +215,67 @@ pub(crate) struct PictureStart {
     /// For rays that start relative to the mesh.
     pub(crate) start: FilterStart,
     pub(crate) rounding: PictureRounding,
+    /// How far a hit in the tree may be from its triangle, on each axis, as seen from a ray that comes to it as to an instance, and that
+    /// was not rounded: see `trace::picture`.
+    deviation: f64,
 }
 
 impl PictureStart {
-    /// Of a tree that has this start; `None` where pictures take double precision.
-    pub(crate) fn new(start: Option<&FilterStart>) -> Option<Self> {
-        let start = start.filter(|start| start.only_triangles)?;
+    /// Of a tree that has this start; `None` where pictures take double precision: also where instances move.
+    pub(crate) fn new(geometries: &[Geometry], start: Option<&FilterStart>) -> Option<Self> {
+        let start = start?;
+        let mut within: f64 = 0.0;
+        for geometry in geometries {
+            let GeometryKind::Instance(instance) = &geometry.kind else { continue };
+            let Placement::Still(map) = &instance.world_from_object else { return None };
+            if let Some(picture) = &instance.accel.picture {
+                let linear = map.affine().matrix3;
+                let size = linear.x_axis.abs() + linear.y_axis.abs() + linear.z_axis.abs();
+                within = within.max(size.max_element() * picture.deviation);
+            }
+        }
+        let shift = start.shift.iter().fold(0.0f32, |most, shift| most.max(shift.abs()));
+        let own = ROUNDOFF * (128.0 + 2.0 * f64::from(shift)) / start.scale;
         let rounding = PictureRounding {
             origin: DVec3::from_slice(&start.mesh_origin),
             relative: RELATIVE * ROUNDOFF,
             absolute: ABSOLUTE * ROUNDOFF / start.scale,
         };
-        Some(Self { start: start.relative_to_mesh(), rounding })
+        let room = within * start.scale;
+        // Also where that is no number.
+        (room <= MOST_ROOM).then(|| Self {
+            start: start.relative_to_mesh(round_up(room)),
+            rounding,
+            deviation: own.max(within),
+        })
+    }
+
+    /// Where a ray starts, as single precision knows it.
+    #[inline(always)]
+    pub(crate) fn local(&self, columns: &RayColumns, i: usize) -> Ray32 {
+        let origin = DVec3::from_array(columns.origin.map(|column| column[i])) - self.rounding.origin;
+        Ray32 {
+            origin: origin.as_vec3(),
+            t_min: 0.0,
+            direction: Vec3::from_array(columns.direction.map(|column| column[i])),
+            t_max: columns.t_max.map_or(f32::INFINITY, |column| column[i]),
+        }
     }
 
     /// Adds rays, rounded, relative to the mesh.
     pub(crate) fn push_rays(&self, columns: &RayColumns, range: Range<usize>, rays: &mut Vec<Ray32>) {
-        let [x, y, z] = columns.origin.map(|column| &column[range.clone()]);
-        let [dx, dy, dz] = columns.direction.map(|column| &column[range.clone()]);
-        let t_max = columns.t_max.map(|column| &column[range.clone()]);
-        let origin = self.rounding.origin;
-        rays.extend((0..x.len()).map(|i| Ray32 {
-            origin: (DVec3::new(x[i], y[i], z[i]) - origin).as_vec3(),
-            t_min: 0.0,
-            direction: Vec3::new(dx[i], dy[i], dz[i]),
-            t_max: t_max.map_or(f32::INFINITY, |column| column[i]),
-        }));
+        let some = RayColumns {
+            origin: columns.origin.map(|column| &column[range.clone()]),
+            direction: columns.direction.map(|column| &column[range.clone()]),
+            t_max: columns.t_max.map(|column| &column[range.clone()]),
+            time: None,
+        };
+        rays.extend((0..range.len()).map(|i| self.local(&some, i)));
     }
 }
 
 /// See [`Accel::picture_rounding`].
 const RELATIVE: f64 = 2.0;
 const ABSOLUTE: f64 = 20.0;
+/// By no more than this, in tree units, boxes may be moved for what is in instances.
+const MOST_ROOM: f64 = 1.0 / 1024.0;

@@ -4,6 +4,8 @@
 //! [`Ray32`]: coherent ones in packets, the others one by one in small trees and interleaved in large ones. All others
 //! take those of double precision. What is answered depends on the ray alone.
 
+use std::marker::PhantomData;
+
 use lumbre_geometry::Ray;
 
 use super::{AnyHit, Batch, ClosestHit, F32, Plan, Sink, batch_f64};
@@ -12,8 +14,10 @@ use crate::intersect::{Dispatch, Isa, Simd};
 use crate::simd;
 use crate::trace::decide::Decider;
 use crate::trace::filtered::Found;
+use crate::trace::picture::{Crossing, LocalRay, Search};
 use crate::trace::stack::Goal;
 use crate::trace::{ContextRef, Outcome, exact, f32_ray};
+use crate::tree::packed::Start;
 use crate::{Accel, Hit32, HitColumns, Ray32, RayColumns};
 
 /// How many rays are put side by side at a time.
@@ -81,6 +85,10 @@ fn traverse_f32<G: Goal, A: Answer>(
         rays.clear();
         picture.push_rays(columns, first..columns.len().min(first + PIECE), &mut rays);
         let (start, rays) = (&picture.start, &rays[..]);
+        if !start.only_triangles {
+            isa.run(InAnything::<G, A> { accel, picture, columns, rays, first, answer, goal: PhantomData });
+            continue;
+        }
         let sink = &mut F32Sink { accel, isa, start: picture, rays, first, answer };
         if super::batched(isa, accel).is_some() {
             isa.run_with_vectors(Batch::<F32<G>, _> {
@@ -91,7 +99,7 @@ fn traverse_f32<G: Goal, A: Answer>(
                 plan: Plan::of_picture(accel),
             });
         } else {
-            isa.run(OneByOne::<G, _> { accel, picture, rays, sink, goal: std::marker::PhantomData });
+            isa.run(OneByOne::<G, _> { accel, picture, rays, sink, goal: PhantomData });
         }
     }
 }
@@ -102,7 +110,7 @@ struct OneByOne<'a, G, S> {
     picture: &'a PictureStart,
     rays: &'a [Ray32],
     sink: &'a mut S,
-    goal: std::marker::PhantomData<G>,
+    goal: PhantomData<G>,
 }
 
 impl<G: Goal, S: Sink<Option<Hit32>>> Dispatch for OneByOne<'_, G, S> {
@@ -117,12 +125,42 @@ impl<G: Goal, S: Sink<Option<Hit32>>> Dispatch for OneByOne<'_, G, S> {
     }
 }
 
+/// Rays one after the other, in a tree of anything.
+struct InAnything<'a, G, A> {
+    accel: &'a Accel,
+    picture: &'a PictureStart,
+    columns: &'a RayColumns<'a>,
+    rays: &'a [Ray32],
+    first: usize,
+    answer: &'a mut A,
+    goal: PhantomData<G>,
+}
+
+impl<G: Goal, A: Answer> Dispatch for InAnything<'_, G, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Simd>(self) {
+        let Self { accel, picture, columns, rays, first, answer, .. } = self;
+        for (i, ray) in rays.iter().enumerate() {
+            let position = first + i;
+            let (local, ray) = (LocalRay::new(*simd::opaque(ray)), &columns.ray(position));
+            let search = Search { accel, picture, from: Start::WHOLE, ray, local, limit: ray.t_max };
+            match search.run::<G, L, true>() {
+                Outcome::Certain(None) => {}
+                Outcome::Certain(Some(crossing)) => answer.put_crossing(position, crossing),
+                Outcome::Uncertain => answer.put_exactly(position),
+            }
+        }
+    }
+}
+
 /// One ray, where a batch has given it up.
 struct Alone<'a, G> {
     accel: &'a Accel,
     picture: &'a PictureStart,
     ray: &'a Ray32,
-    goal: std::marker::PhantomData<G>,
+    goal: PhantomData<G>,
 }
 
 impl<G: Goal> Dispatch for Alone<'_, G> {
@@ -139,6 +177,8 @@ trait Answer {
     type Goal: Goal;
     /// The answer to a ray, by its position among all.
     fn put(&mut self, position: usize, hit: Option<Hit32>);
+    /// The same in a tree of anything.
+    fn put_crossing(&mut self, position: usize, crossing: Crossing);
     /// The same by double precision.
     fn put_exactly(&mut self, position: usize);
 }
@@ -158,7 +198,7 @@ impl<A: Answer> F32Sink<'_, A> {
     #[inline(never)]
     fn put_alone(&mut self, position: usize) {
         let (accel, picture, ray) = (self.accel, self.start, &self.rays[position]);
-        let alone = Alone::<A::Goal> { accel, picture, ray, goal: std::marker::PhantomData };
+        let alone = Alone::<A::Goal> { accel, picture, ray, goal: PhantomData };
         match self.isa.run(alone) {
             Outcome::Certain(hit) => self.answer.put(self.first + position, hit),
             Outcome::Uncertain => self.answer.put_exactly(self.first + position),
@@ -194,6 +234,11 @@ impl Answer for Closest<'_> {
         }
     }
 
+    #[inline(always)]
+    fn put_crossing(&mut self, position: usize, crossing: Crossing) {
+        self.hits.put_crossing(position, self.accel, crossing);
+    }
+
     fn put_exactly(&mut self, position: usize) {
         let closest = self.accel.queries_at(self.isa).closest;
         if let Some(hit) = closest.ask(self.accel, &self.rays.ray(position)) {
@@ -216,6 +261,11 @@ impl Answer for Any<'_> {
     #[inline(always)]
     fn put(&mut self, position: usize, hit: Option<Hit32>) {
         self.occluded[position] = hit.is_some();
+    }
+
+    #[inline(always)]
+    fn put_crossing(&mut self, position: usize, _: Crossing) {
+        self.occluded[position] = true;
     }
 
     fn put_exactly(&mut self, position: usize) {

@@ -96,8 +96,9 @@ impl FilterStart {
         })
     }
 
-    /// The same for rays in single precision that start relative to the mesh already.
-    pub(crate) fn relative_to_mesh(&self) -> Self {
-        Self { mesh_origin: [0.0; 4], single_mesh_origin: Some([0.0; 4]), ..self.clone() }
+    /// The same for rays in single precision that start relative to the mesh already, with more room around boxes.
+    pub(crate) fn relative_to_mesh(&self, room: f32) -> Self {
+        let f32_margin = self.f32_margin + room;
+        Self { mesh_origin: [0.0; 4], single_mesh_origin: Some([0.0; 4]), f32_margin, ..self.clone() }
     }
 }

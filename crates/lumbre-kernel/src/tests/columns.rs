@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use lumbre_geometry::Ray;
-use lumbre_math::{DVec3, Vec3};
+use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::{
-    Random, build, bumpy, cube, icosphere, mixture, repeats, soup, torus, with_every_preset,
+    self, Random, build, bumpy, cube, icosphere, mixture, precise, repeats, soup, torus, with_every_preset,
 };
 use crate::batch::columns;
 use crate::intersect::Isa;
-use crate::{Accel, GeometryKind, Hit, HitColumns, RayColumns, TriangleMesh};
+use crate::{Accel, GeometryKind, Hit, HitColumns, Instance, RayColumns, TargetShape, TriangleMesh};
 
 /// Rays, column by column.
 #[derive(Default)]
@@ -75,8 +75,50 @@ const PLACES: [(f64, DVec3); 4] = [
     (1e6, DVec3::new(-2.0, 30.0, 5.0)),
 ];
 
-fn tree(meshes: &[TriangleMesh], (size, origin): (f64, DVec3)) -> Accel {
-    build(meshes.iter().map(|mesh| GeometryKind::Mesh(Arc::new(placed(mesh, size, origin)))).collect())
+fn kinds(meshes: &[TriangleMesh], (size, origin): (f64, DVec3)) -> Vec<GeometryKind> {
+    meshes.iter().map(|mesh| GeometryKind::Mesh(Arc::new(placed(mesh, size, origin)))).collect()
+}
+
+fn tree(meshes: &[TriangleMesh], place: (f64, DVec3)) -> Accel {
+    build(kinds(meshes, place))
+}
+
+fn instance(accel: &Arc<Accel>, map: Transform) -> GeometryKind {
+    GeometryKind::Instance(Instance { accel: Arc::clone(accel), world_from_object: map.into() })
+}
+
+/// Meshes, and shapes, clouds, custom geometry and instances of meshes and of mixtures beside them, all of one size.
+fn anything(random: &mut Random, (size, origin): (f64, DVec3)) -> Accel {
+    let mut kinds = kinds(
+        &[bumpy(2, DVec3::new(-0.5, 0.1, 0.0), 0.4), soup(random, 200, DVec3::ZERO, 0.8)],
+        (size, origin),
+    );
+    for _ in 0..25 {
+        kinds.push(GeometryKind::Shape(scenes::shape(random, origin, size)));
+    }
+    kinds.push(GeometryKind::Spheres(Arc::new(scenes::cloud(random, 20, origin, origin, size))));
+    kinds.push(GeometryKind::Custom(Arc::new(scenes::balls(random, 6, origin, 0.7 * size, None))));
+    kinds.push(GeometryKind::PreciseMesh(Arc::new(precise(&placed(
+        &soup(random, 40, DVec3::ZERO, 0.8),
+        size,
+        origin,
+    )))));
+    let ball = Arc::new(tree(&[icosphere(2, DVec3::new(0.1, -0.2, 0.05), 0.9)], PLACES[1]));
+    let near = DVec3::new(2.0, -1.0, 0.5);
+    let mixed = Arc::new(mixture(random, near, 1.5, 1, false));
+    for _ in 0..5 {
+        let to = random.placement(origin, size, 0.2 * size);
+        kinds.push(instance(&ball, to * Transform::translate(-PLACES[1].1)));
+        let to = random.placement(origin, size, 0.1 * size);
+        kinds.push(instance(&mixed, to * Transform::translate(-near)));
+    }
+    // Much smaller, and much larger, than they are at home.
+    for place in [PLACES[2], PLACES[3]] {
+        let own = Arc::new(tree(&[cube(), soup(random, 60, DVec3::ZERO, 2.0)], place));
+        let to = Transform::translate(origin) * Transform::scale(DVec3::splat(0.2 * size / place.0)).unwrap();
+        kinds.push(instance(&own, to * Transform::translate(-place.1)));
+    }
+    build(kinds)
 }
 
 /// A place on a triangle: a corner, on an edge, or within.
@@ -140,10 +182,10 @@ fn check_cuts(accel: &Accel, rays: &Rays, exact: bool) -> usize {
                 columns::closest(isa, accel, &some, exact, &mut hits);
                 columns::any(isa, accel, &some, exact, &mut occluded);
                 assert_eq!((hits.len(), occluded.len()), (some.len(), some.len()));
-                for i in 0..some.len() {
+                for (i, &is_occluded) in occluded.iter().enumerate() {
                     let (found, expected) = (bits(&hits, i), bits(&expected, first + i));
                     assert_eq!(found, expected, "{isa:?} {size} {exact} {:?}", some.ray(i));
-                    assert_eq!(occluded[i], found.is_some(), "{isa:?} {size} {exact} {:?}", some.ray(i));
+                    assert_eq!(is_occluded, found.is_some(), "{isa:?} {size} {exact} {:?}", some.ray(i));
                 }
             }
         }
@@ -203,9 +245,9 @@ fn check_leaving(random: &mut Random, accel: &Accel, rays: &Rays) -> usize {
     let (mut leaving, mut from) = (Rays::default(), Vec::new());
     for i in 0..rays.len() {
         let Some(hit) = hits.to_hit(i) else { continue };
-        let mut surface = accel.surface(&rays.ray(i), &hit);
-        if let Some(rounding) = accel.picture_rounding() {
-            surface.point_error += rounding.error(surface.point);
+        let surface = accel.picture_surface(&rays.ray(i), &hit);
+        if !matches!(accel.target(&rays.ray(i), &hit).shape, TargetShape::Triangle(_)) {
+            continue;
         }
         for k in 0..6 {
             // Steep ones, and some that graze it.
@@ -242,10 +284,13 @@ fn columns_have_the_same_bits_for_any_cut_and_at_every_instruction_set() {
                 hits += check_cuts(&accel, &rays, true);
             }
         }
-        let accel = mixture(&mut random, DVec3::new(3.0, -2.0, 1.0), 2.5, 2, true);
-        let rays = rays_at(&mut random, &accel, repeats(1200));
-        hits += check_cuts(&accel, &rays, false);
-        hits += check_cuts(&accel, &rays, true);
+        let mut accels = vec![mixture(&mut random, DVec3::new(3.0, -2.0, 1.0), 2.5, 2, true)];
+        accels.extend(PLACES.map(|place| anything(&mut random, place)));
+        for accel in accels {
+            let rays = rays_at(&mut random, &accel, repeats(1200));
+            hits += check_cuts(&accel, &rays, false);
+            hits += check_cuts(&accel, &rays, true);
+        }
     });
     assert!(hits > repeats(12_000), "{hits}");
 }
@@ -260,6 +305,12 @@ fn columns_answer_as_double_precision_but_for_rounding() {
             let rays = rays_at(&mut random, &accel, repeats(2000));
             hits += check_beside_double(&mut random, &accel, &rays);
         }
+    }
+    for place in PLACES {
+        let accel = anything(&mut random, place);
+        assert!(accel.picture_rounding().is_some());
+        let rays = rays_at(&mut random, &accel, repeats(6000));
+        hits += check_beside_double(&mut random, &accel, &rays);
     }
     assert!(hits > repeats(10_000), "{hits}");
 }
@@ -299,6 +350,11 @@ fn rays_do_not_hit_the_triangle_that_they_leave() {
             leaving += check_leaving(&mut random, &accel, &rays);
         }
     }
+    for place in PLACES {
+        let accel = anything(&mut random, place);
+        let rays = rays_at(&mut random, &accel, repeats(8000));
+        leaving += check_leaving(&mut random, &accel, &rays);
+    }
     assert!(leaving > repeats(100_000), "{leaving}");
 }
 
@@ -322,11 +378,62 @@ fn rays_at_edges_and_corners_of_closed_meshes_hit() {
                 let from: Vec3 = (size * center).as_vec3();
                 rays.push(origin + from.as_dvec3(), p.as_dvec3() - from.as_dvec3(), f32::INFINITY);
             }
-            let hits = closest(&accel, &rays, false);
-            let lost = (0..rays.len()).find(|&i| hits.id[i] == HitColumns::MISS);
-            assert_eq!(lost.map(|i| rays.ray(i)), None);
+            assert_all_hit(&accel, &rays);
         }
     }
+}
+
+#[track_caller]
+fn assert_all_hit(accel: &Accel, rays: &Rays) {
+    let hits = closest(accel, rays, false);
+    let mut occluded = Vec::new();
+    accel.any_columns(&rays.all(), false, &mut occluded);
+    let lost = (0..rays.len()).find(|&i| hits.id[i] == HitColumns::MISS || !occluded[i]);
+    assert_eq!(lost.map(|i| rays.ray(i)), None);
+}
+
+#[test]
+fn rays_at_edges_and_corners_hit_in_instances_and_beside_shapes() {
+    let mut random = Random(76);
+    let center = DVec3::new(0.3, -0.4, 0.2);
+    with_every_preset(|| {
+        for mesh in [icosphere(4, center, 0.9), bumpy(3, center, 0.7)] {
+            for (size, origin) in PLACES {
+                let inner = Arc::new(tree(std::slice::from_ref(&mesh), (size, origin)));
+                let GeometryKind::Mesh(own) = inner.geometries[0].kind.clone() else {
+                    unreachable!("it is one")
+                };
+                for (distance, scale) in [(0.0, 1.0), (0.0, 1e-4 / size), (3e3, 0.2)] {
+                    let map = random.placement(DVec3::new(-0.2, 0.7, 0.4), 1.0, scale)
+                        * Transform::translate(-origin);
+                    let mut kinds = vec![instance(&inner, map)];
+                    // Farther away than the mesh, or within and all around.
+                    let at = map.point(origin + size * center);
+                    for _ in 0..3 {
+                        kinds.push(GeometryKind::Shape(scenes::shape(
+                            &mut random,
+                            at + 1e3 * scale * size,
+                            scale * size,
+                        )));
+                    }
+                    let accel = build(kinds);
+                    let accel = match random.below(2) {
+                        0 => accel,
+                        _ => build(vec![instance(&Arc::new(accel), Transform::IDENTITY)]),
+                    };
+                    assert!(accel.picture_rounding().is_some());
+                    let mut rays = Rays::default();
+                    for _ in 0..repeats(2000) {
+                        // From within, or from afar towards what is behind a face.
+                        let to = map.point(place(&mut random, &own));
+                        let from = at + (at - to) * distance;
+                        rays.push(from, to - from, f32::INFINITY);
+                    }
+                    assert_all_hit(&accel, &rays);
+                }
+            }
+        }
+    });
 }
 
 #[test]
