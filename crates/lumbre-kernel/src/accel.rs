@@ -10,6 +10,7 @@ use lumbre_geometry::{Aabb, Ray, Surface};
 use lumbre_math::{DVec3, Transform};
 
 use crate::build::{input, rebuild, refit};
+use crate::columns::PictureStart;
 use crate::intersect::Isa;
 use crate::intersect::filter_start::FilterStart;
 use crate::io::{bytes, mapped};
@@ -26,8 +27,9 @@ use crate::tree::packed::{Entry, Packed};
 use crate::tree::summary::Sizes;
 use crate::tree::summary::Summary;
 use crate::{
-    ClosestPoint, Geometry, GeometryKind, Hit, Hit32, LoadError, MapError, NoClosestPoint, NoWindingNumber,
-    Query, Ray32, RefitError, SphereCloud, Target, batch, surface,
+    ClosestPoint, Geometry, GeometryKind, Hit, Hit32, HitColumns, LoadError, MapError, NoClosestPoint,
+    NoWindingNumber, PictureRounding, Query, Ray32, RayColumns, RefitError, SphereCloud, Target, batch,
+    surface,
 };
 
 /// A bounding volume hierarchy over geometries, ready for queries from any number of threads.
@@ -47,6 +49,8 @@ pub struct Accel {
     pub(crate) summary: Summary,
     /// Where single precision can traverse the tree.
     pub(crate) single: Option<FilterStart>,
+    /// Where rays of pictures traverse it in single precision.
+    pub(crate) picture: Option<PictureStart>,
     pub(crate) queries: Queries,
     /// Those of rays in single precision, where these are not asked in double.
     pub(crate) f32_queries: Option<F32Queries>,
@@ -199,10 +203,12 @@ impl Accel {
         let AccelParts { tree_space, tree, sizes, bounds, infinite, primitives } = parts;
         let summary = Summary::new(&geometries, sizes);
         let single = FilterStart::new(&summary, &tree_space, tree.root);
+        let picture = PictureStart::new(&geometries, single.as_ref());
         Self {
             bounding_volumes: BoundingVolumes::new(&geometries, &tree.entries, &tree_space),
             queries: Queries::new(isa, single.as_ref()),
             f32_queries: F32Queries::new(isa, single.as_ref()),
+            picture,
             single,
             tree_space,
             summary,
@@ -228,6 +234,7 @@ impl Accel {
         self.single = FilterStart::new(&self.summary, &self.tree_space, self.tree.root);
         self.queries = Queries::new(self.isa, self.single.as_ref());
         self.f32_queries = F32Queries::new(self.isa, self.single.as_ref());
+        self.picture = PictureStart::new(&self.geometries, self.single.as_ref());
         self.bounding_volumes = BoundingVolumes::new(&self.geometries, &self.tree.entries, &self.tree_space);
         self.moments = OnceLock::new();
     }
@@ -440,6 +447,64 @@ impl Accel {
     pub fn any_batch_f32(&self, rays: &[Ray32], hits: &mut [bool]) {
         assert_eq!(rays.len(), hits.len(), "a slot for the answer of every ray");
         batch::any_f32(self.isa, self, rays, hits);
+    }
+
+    /// By how much the rays of a picture are rounded where they start, and triangles of meshes in the tree itself with them;
+    /// `None` where rays are traversed in double precision.
+    ///
+    /// A point of such a triangle that rays leave has to be farther off it by that: [`PictureRounding::error`] is to be added to
+    /// [`Surface::point_error`]. [`Accel::picture_surface`] does so, in instances, too; what is met in double precision needs nothing.
+    ///
+    /// # Error bound
+    ///
+    /// Let u = 2⁻²⁴, n the unit normal of a triangle, |n|₁ the sum of the sizes of its components, and lengths be in tree units. A ray
+    /// that leaves the triangle starts at a distance D from its plane and does not come nearer to it. Its start is rounded by
+    /// u |o - origin| on each axis; in an instance, its direction too, by u on each axis, which takes it nearer by less than 3.5u |n|₁ on
+    /// its way through the tree. Where single precision finds a hit, the point of the rounded ray lies within
+    /// u(47 + 14·1.01) < 61.2u of the triangle on each axis (see `trace::f32_ray`), and so within 61.2u |n|₁ of the plane.
+    /// There is none where D > u Σ |nᵢ| |oᵢ - originᵢ| + 64.7u |n|₁.
+    ///
+    /// With the error e on each axis, [`Surface::offset_origin`] moves the point by Σ |nᵢ| eᵢ + 4 max e, and 4 max e is at least
+    /// 4/√3 Σ |nᵢ| eᵢ as |n|₁ ≤ √3: altogether 3.3 Σ |nᵢ| eᵢ. So e = 2u |p - origin| + 20u has room for it, and for how far o is from p.
+    /// What moves points by less than that needs a larger error.
+    ///
+    /// Under the map L of an instance, the error is |L| e, and the unit normal m = L⁻ᵀn / |L⁻ᵀn|. A move by d along m is one by
+    /// d |L⁻ᵀn| across the plane of the triangle in its own space, and Σ |mᵢ| (|L| e)ᵢ ≥ Σ |nᵢ| eᵢ / |L⁻ᵀn|: there, too, it is moved by
+    /// 3.3 Σ |nᵢ| eᵢ or more.
+    pub fn picture_rounding(&self) -> Option<PictureRounding> {
+        self.picture.as_ref().map(|picture| picture.rounding)
+    }
+
+    /// [`Accel::surface`] at a hit of [`Accel::closest_columns`], with an error by which rays of pictures that leave it by
+    /// [`Surface::offset_origin`] do not hit its triangle: see [`Accel::picture_rounding`].
+    ///
+    /// # Panics
+    /// When `hit` comes from another tree and names what is not in this one.
+    pub fn picture_surface(&self, ray: &Ray, hit: &Hit) -> Surface {
+        surface::picture_surface(self, ray, hit)
+    }
+
+    /// The closest hits of the rays of a picture.
+    ///
+    /// For triangles of meshes, rays are rounded to single precision once, relative to what the meshes are relative to (in an instance,
+    /// after they are taken into its space), and tested as [`Accel::closest_f32`] tests them: a ray through a closed mesh hits
+    /// it. All else is met by the ray as it is, in double precision. Trees that have no [`Accel::picture_rounding`], rays from afar
+    /// (sixteen sizes of the tree) and all rays where `exact` is asked for are answered as [`Accel::closest`] answers. Answers are the
+    /// same on any machine, and do not depend on what else is asked. Rays in a row that are coherent are traversed as in
+    /// [`Accel::closest_batch`].
+    ///
+    /// # Panics
+    /// When columns differ in length.
+    pub fn closest_columns(&self, rays: &RayColumns, exact: bool, hits: &mut HitColumns) {
+        batch::columns::closest(self.isa, self, rays, exact, hits);
+    }
+
+    /// Whether anything is hit by the rays of a picture: whether [`Accel::closest_columns`] finds something.
+    ///
+    /// # Panics
+    /// When columns differ in length.
+    pub fn any_columns(&self, rays: &RayColumns, exact: bool, occluded: &mut Vec<bool>) {
+        batch::columns::any(self.isa, self, rays, exact, occluded);
     }
 
     /// The tree with a mask for each of its geometries, by position, for [`Query::mask`]; without, all bits are set.

@@ -6,6 +6,7 @@
 mod accel;
 mod batch;
 mod build;
+mod columns;
 mod deforming_mesh;
 mod geometry;
 mod hit;
@@ -23,6 +24,7 @@ mod tree;
 
 pub use accel::{Accel, BuildError, BuildOptions, Preset};
 pub use build::refit::RefitError;
+pub use columns::{HitColumns, PictureRounding, RayColumns};
 pub use deforming_mesh::DeformingMesh;
 pub use geometry::{CustomGeometry, Geometry, GeometryKind, Instance, Placement, SphereCloud, TriangleMesh};
 pub use hit::{Hit, InstancePath, Target, TargetShape};

@@ -35,13 +35,30 @@ pub(crate) fn world_from_object(accel: &Accel, ray: &Ray, hit: &Hit) -> Transfor
 /// The surface at a hit, in the space of `accel`.
 #[inline]
 pub(crate) fn surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
+    placed_surface::<false>(accel, ray, hit)
+}
+
+/// The same for rays of pictures that leave it.
+#[inline]
+pub(crate) fn picture_surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
+    // Without one, all rays are in double precision, in instances, too.
+    if accel.picture.is_some() {
+        placed_surface::<true>(accel, ray, hit)
+    } else {
+        placed_surface::<false>(accel, ray, hit)
+    }
+}
+
+/// The surface at a hit; `ROUNDED`: with the error of rays that are rounded where its triangle stands. Maps take that with them.
+#[inline]
+fn placed_surface<const ROUNDED: bool>(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
     if hit.route.is_empty() {
-        return bare_surface(accel, ray, hit);
+        return rounded::<ROUNDED>(accel, hit, bare_surface(accel, ray, hit));
     }
     let (instances, inner) = along(accel, hit);
     // The same steps as the search took, for the same bits.
     let ray = instances.iter().fold(*ray, |ray, instance| instance.world_from_object.object_ray(&ray));
-    let surface = bare_surface(inner, &ray, hit);
+    let surface = rounded::<ROUNDED>(inner, hit, bare_surface(inner, &ray, hit));
     let placed = |surface, instance: &&Instance| place(&surface, &instance.world_from_object.at(ray.time));
     instances.iter().rev().fold(surface, placed)
 }
@@ -72,6 +89,18 @@ pub(crate) fn surface_in_object(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface 
     let (instances, inner) = along(accel, hit);
     let ray = instances.iter().fold(*ray, |ray, instance| instance.world_from_object.object_ray(&ray));
     bare_surface(inner, &ray, hit)
+}
+
+/// A surface of a tree, with the error of rays that are rounded there.
+#[inline]
+fn rounded<const ROUNDED: bool>(accel: &Accel, hit: &Hit, mut surface: Surface) -> Surface {
+    if ROUNDED
+        && let Some(picture) = &accel.picture
+        && matches!(accel.geometries[hit.geometry as usize].kind, GeometryKind::Mesh(_))
+    {
+        surface.point_error += picture.rounding.error(surface.point);
+    }
+    surface
 }
 
 /// The surface at a hit in the tree that its geometry stands in.

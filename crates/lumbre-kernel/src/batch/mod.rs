@@ -3,6 +3,7 @@
 //! Rays that are coherent are traversed as packets of sixteen (see [`packet`]), the others interleaved (see [`interleaved`]). Triangles
 //! are tested so in either precision; leaves of anything else ray by ray, by the code of single rays.
 
+pub(crate) mod columns;
 mod f32_packet;
 mod f32_slot;
 mod f64_packet;
@@ -59,8 +60,13 @@ pub(crate) fn closest(isa: Isa, accel: &Accel, rays: &[Ray], hits: &mut [Option<
 
 /// [`Accel::any`] for every ray.
 pub(crate) fn any(isa: Isa, accel: &Accel, rays: &[Ray], hits: &mut [bool]) {
+    any_by(isa, accel, rays, hits, Plan::of(accel));
+}
+
+/// The same by a plan.
+fn any_by(isa: Isa, accel: &Accel, rays: &[Ray], hits: &mut [bool], plan: Plan) {
     let sink = &mut AnySink { accel, isa, rays, hits };
-    if !batch_f64::<AnyHit, _>(isa, accel, rays, sink, Plan::of(accel)) {
+    if !batch_f64::<AnyHit, _>(isa, accel, rays, sink, plan) {
         let any = accel.queries_at(isa).any;
         hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = any.ask(accel, ray));
     }
@@ -273,11 +279,23 @@ impl Plan {
     pub(crate) const NEAR: Self = Self { least: 128, prefetches: false, has_packets: true };
     pub(crate) const MIDDLE: Self = Self { least: 32, prefetches: false, has_packets: true };
     pub(crate) const FAR: Self = Self { least: 32, prefetches: true, has_packets: true };
+    /// What goes in no packet goes alone.
+    const SINGLES: Self = Self { least: usize::MAX, prefetches: false, has_packets: true };
+
+    /// The fastest for rays of a picture: of those of single precision, the incoherent ones are faster alone where the tree stays in the
+    /// caches.
+    fn of_picture(accel: &Accel) -> Self {
+        if Self::bytes(accel) >= FAR { Self::FAR } else { Self::SINGLES }
+    }
+
+    /// Those of a tree that rays read.
+    fn bytes(accel: &Accel) -> usize {
+        size_of_val::<[Line]>(&accel.tree.blocks) + size_of_val::<[Node]>(&accel.tree.nodes)
+    }
 
     /// The fastest for a tree.
     fn of(accel: &Accel) -> Self {
-        let tree = &accel.tree;
-        let bytes = size_of_val::<[Line]>(&tree.blocks) + size_of_val::<[Node]>(&tree.nodes);
+        let bytes = Self::bytes(accel);
         if bytes >= FAR {
             Self::FAR
         } else if bytes >= NEAR {

@@ -95,4 +95,10 @@ impl FilterStart {
             tiny: (TINY_NEAR / tree_space.scale) as f32,
         })
     }
+
+    /// The same for rays in single precision that start relative to the mesh already, with more room around boxes.
+    pub(crate) fn relative_to_mesh(&self, room: f32) -> Self {
+        let f32_margin = self.f32_margin + room;
+        Self { mesh_origin: [0.0; 4], single_mesh_origin: Some([0.0; 4]), f32_margin, ..self.clone() }
+    }
 }

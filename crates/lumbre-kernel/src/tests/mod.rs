@@ -6,6 +6,7 @@ mod borders;
 mod bounding_volumes;
 mod boxes;
 mod build;
+mod columns;
 mod deforming;
 mod f32_ray;
 mod file;

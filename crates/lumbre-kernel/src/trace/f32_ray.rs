@@ -36,12 +36,14 @@
 //! the tree.
 
 use bytemuck::Zeroable;
+use lumbre_math::DVec2;
 
 use super::cursor::NodeCursor;
 use super::decide::Decider;
 use super::leaves::nearest_of;
 use super::stack::{AnyHit, ClosestHit, Goal, Stack};
 use super::{LaneHits, Outcome, precedes};
+use crate::intersect::box_ray::Slabs;
 use crate::intersect::f32_ray::{F32Ray, Precise, within};
 use crate::intersect::filter_start::FilterStart;
 use crate::intersect::watertight;
@@ -246,6 +248,15 @@ impl Nearest {
         }
     }
 
+    /// Geometry and primitive, the barycentrics, and whether the ray enters there, if there is one.
+    #[inline(always)]
+    pub(super) fn crossing(&self, decider: &Decider) -> Option<(u32, u32, DVec2, bool)> {
+        let (block, lane) = self.triangle()?;
+        let (geometry, primitive) = decider.ids(block, lane);
+        let [v, w, det] = self.weights;
+        Some((geometry, primitive, DVec2::new((v / det).into(), (w / det).into()), det > 0.0))
+    }
+
     /// As a hit at this `t`, if there is one.
     #[inline(always)]
     pub(crate) fn hit(&self, decider: &Decider, t: f32) -> Option<Hit32> {
@@ -348,6 +359,43 @@ impl F32Ray {
         })
     }
 
+    /// Leaves out what is beyond this.
+    #[inline(always)]
+    pub(super) fn shorten(&mut self, t_max: f32) {
+        if t_max < self.t_max() {
+            self.end_at(t_max);
+        }
+    }
+
+    /// Tests a leaf: takes the nearest, and ends the ray there; true where any hit will do, and there is one.
+    #[inline(always)]
+    pub(super) fn test_leaf<G: Goal, L: Simd>(
+        &mut self,
+        decider: &Decider,
+        leaf: u32,
+        nearest: &mut Nearest,
+        slabs: &mut Slabs,
+    ) -> bool {
+        let precise = &decider.start.precise;
+        let mut place = leaf & tag::PLACE;
+        loop {
+            let block = decider.block(place);
+            if G::IS_ANY {
+                if self.meets_any::<L>(precise, block) {
+                    return true;
+                }
+            } else if let Some((hits, pass)) = self.pass::<L>(precise, block)
+                && nearest.take(decider, self, place, &hits, &pass)
+            {
+                slabs.end_at(watertight::beyond(self.t_max()));
+            }
+            match block.next(place) {
+                Some(next) => place = next,
+                None => return false,
+            }
+        }
+    }
+
     /// Whether the ray meets any triangle of a block.
     #[inline(always)]
     fn meets_any<L: Simd>(&self, precise: &Precise, block: &TriangleBlock) -> bool {
@@ -385,22 +433,8 @@ pub(crate) fn traverse<G: Goal, L: Simd>(decider: &Decider, ray: &Ray32) -> Outc
     let mut ray = L::start_f32_blocks(start, simd::opaque(ray), &cursor.slabs);
     let mut nearest = Nearest::NONE;
     loop {
-        let mut place = leaf & tag::PLACE;
-        loop {
-            let block = decider.block(place);
-            if G::IS_ANY {
-                if ray.meets_any::<L>(&start.precise, block) {
-                    return Outcome::Certain(Some(SOME_HIT));
-                }
-            } else if let Some((hits, pass)) = ray.pass::<L>(&start.precise, block)
-                && nearest.take(decider, &mut ray, place, &hits, &pass)
-            {
-                cursor.slabs.end_at(watertight::beyond(ray.t_max()));
-            }
-            match block.next(place) {
-                Some(next) => place = next,
-                None => break,
-            }
+        if ray.test_leaf::<G, L>(decider, leaf, &mut nearest, &mut cursor.slabs) {
+            return Outcome::Certain(Some(SOME_HIT));
         }
         match cursor.next_leaf::<G>(&mut stack) {
             Some(next) => leaf = next,

@@ -19,19 +19,19 @@ use crate::tree::packed::Start;
 use crate::{Accel, GeometryKind, Hit, Instance};
 
 /// An instance, or a part of one.
-struct Placed<'a> {
-    instance: &'a Instance,
+pub(super) struct Placed<'a> {
+    pub(super) instance: &'a Instance,
     /// The subtree that is entered.
-    from: Start,
+    pub(super) from: Start,
     /// Its position and its id.
-    geometry: u32,
+    pub(super) geometry: u32,
     id: u32,
 }
 
 impl<'a> Placed<'a> {
     /// `None` where an entry stands for nothing.
     #[inline(always)]
-    fn of(accel: &'a Accel, entry: &Entry) -> Option<Self> {
+    pub(super) fn of(accel: &'a Accel, entry: &Entry) -> Option<Self> {
         let (geometry, from) = (entry.geometry, Start::of(entry.primitive()));
         let placed = &accel.geometries[geometry as usize];
         let GeometryKind::Instance(instance) = &placed.kind else { unreachable!("the tag says so") };

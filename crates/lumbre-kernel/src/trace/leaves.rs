@@ -551,6 +551,11 @@ impl CloudRay {
         slot.as_mut().expect("it was turned")
     }
 
+    /// The origin of the cloud.
+    pub(super) fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
     /// The ray in this range of `t`; `None` where single precision tells nothing.
     #[inline(always)]
     pub(crate) fn within(&mut self, [t_min, t_max]: [f64; 2]) -> Option<&SphereRay> {

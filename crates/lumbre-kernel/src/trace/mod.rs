@@ -3,7 +3,8 @@
 //! [`filtered`] is the traversal that every query takes first: single precision decides what it is certain of, and double precision
 //! the rest (see [`decide`]), so that an answer has the bits that double precision alone gives. Where neither can tell, because the ray
 //! meets an edge exactly or starts far away, [`exact`] answers: the traversal in double precision, which finds every hit, and is the
-//! oracle of the other. Rays in single precision have a traversal of their own, [`f32_ray`], in trees of nothing but triangles.
+//! oracle of the other. Rays in single precision have a traversal of their own, [`f32_ray`], in trees of nothing but triangles, and
+//! [`picture`] takes it to trees of anything.
 
 pub(crate) mod cursor;
 pub(crate) mod decide;
@@ -13,6 +14,7 @@ pub(crate) mod f32_ray;
 pub(crate) mod filtered;
 mod instances;
 mod leaves;
+pub(crate) mod picture;
 pub(crate) mod stack;
 pub(crate) mod visitors;
 

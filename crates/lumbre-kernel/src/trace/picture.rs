@@ -1,0 +1,571 @@
+//! Rays of pictures in trees of anything: triangles in single precision, all else in double.
+//!
+//! A ray is there twice. Rounded, relative to the mesh, it goes among boxes and triangles, as [`f32_ray`](super::f32_ray) says;
+//! as it is, it meets shapes, spheres, custom geometry and triangles in double precision, and is taken into the space of an
+//! instance, where the same begins once more. What is met is compared by `t` in double precision, and by the order of
+//! [`precedes`] where that is equal. So the answer is that of a loop over everything: it depends neither on the order of the visit nor
+//! on what is visited in vain.
+//!
+//! A crossing at an edge of a bilinear patch or of a triangle in double precision counts: they are closed, as triangles in single
+//! precision are.
+//!
+//! # Error bound: a ray in an instance
+//!
+//! Let u = 2⁻²⁴, and lengths be in the units of the instance's tree. The ray is taken into its space in double precision; one that starts
+//! farther than [`NEARBY`] = 4 from the tree's origin on some axis is moved along its line, to a little before the tree. Then it is
+//! rounded: its start by u (4 + shift) on each axis, where shift is the distance between the origins of the tree and of its mesh, and
+//! its direction by u of each component, which makes 5.1u on the way through the tree. As `f32_ray` says, a hit lies within
+//! u (47 + 14·4) of its triangle. So it lies within u (113 + shift) of the triangle as seen from the ray that was not rounded:
+//! [`PictureStart::deviation`] is more, and what that is under the map of the instance, the boxes around it are met with more room
+//! for. No box is passed by with a hit in it.
+//!
+//! Among boxes around exact shapes, the margin of triangles has room for the rounding of the start, u (|o| + shift), and for the
+//! `slop` of double precision.
+
+use lumbre_geometry::{Ray, Root};
+use lumbre_math::DVec3;
+
+use super::cursor::NodeCursor;
+use super::decide::{Decider, enters, largest_component};
+use super::edges::{self, Patch};
+use super::exact;
+use super::f32_ray::Nearest;
+use super::instances::Placed;
+use super::leaves::{CloudRay, nearest_of};
+use super::stack::{Goal, Stack};
+use super::{Context, ContextRef, Outcome, Winner, first_crossing, is_crossed};
+use crate::columns::PictureStart;
+use crate::intersect::box_ray::Slabs;
+use crate::intersect::f32_ray::F32Ray;
+use crate::intersect::watertight::{self, Feature, HeightRange, Meeting, beyond};
+use crate::intersect::{self, BoundingHits, Dispatch, Isa, Simd};
+use crate::simd;
+use crate::tree::BLOCK;
+use crate::tree::bounding_block::BoundingVolumeRay;
+use crate::tree::node::tag;
+use crate::tree::packed::{Entry, Start};
+use crate::{Accel, GeometryKind, Hit, InstancePath, Ray32};
+
+/// How far from a tree's origin a ray may start on each axis, in tree units, to enter an instance where it is.
+const NEARBY: f64 = 4.0;
+/// A ray that starts farther away cannot be moved nearer.
+const MOVABLE: f64 = (1u64 << 30) as f64;
+/// No point of a tree is farther from its origin: its planes are within 1.01.
+const RADIUS: f64 = 1.8;
+
+/// A crossing in a tree.
+#[derive(Clone)]
+pub(crate) struct Crossing {
+    pub(crate) winner: Winner,
+    /// Whether the ray enters there, where that is known.
+    enters: Option<bool>,
+    /// The position of the instance that it is in.
+    instance: Option<u32>,
+    /// The hit in the tree of that instance, where it is in an instance there.
+    nested: Option<Box<Hit>>,
+}
+
+impl Crossing {
+    /// Stands for any hit.
+    fn some() -> Self {
+        Self::of(Winner { root: Root::at(0.0), geometry: 0, primitive: 0 }, None)
+    }
+
+    /// In no instance.
+    #[inline(always)]
+    fn of(winner: Winner, enters: Option<bool>) -> Self {
+        Self { winner, enters, instance: None, nested: None }
+    }
+
+    /// Whether it is on a triangle of a mesh in the tree itself.
+    #[inline(always)]
+    pub(crate) fn is_plain(&self, accel: &Accel) -> bool {
+        self.instance.is_none()
+            && matches!(accel.geometries[self.winner.geometry as usize].kind, GeometryKind::Mesh(_))
+    }
+
+    /// As a hit of the tree.
+    pub(crate) fn into_hit(self, accel: &Accel) -> Hit {
+        let Some(position) = self.instance else { return self.winner.to_hit(accel) };
+        let placed = &accel.geometries[position as usize];
+        let GeometryKind::Instance(instance) = &placed.kind else { unreachable!("it was an instance") };
+        match self.nested {
+            None => {
+                let context = ContextRef::OUTSIDE.within(position, placed.id);
+                self.winner.to_hit_in(&instance.accel, context)
+            }
+            Some(mut hit) => {
+                hit.route.insert(0, position);
+                hit.instances.insert(0, placed.id);
+                *hit
+            }
+        }
+    }
+
+    /// Of two at the same `t`, whether it comes before the other.
+    #[cold]
+    #[inline(never)]
+    fn precedes(&self, other: &Self, accel: &Accel, ray: &Ray) -> bool {
+        let key = |crossing: &Self| {
+            let Hit { root, geometry, primitive, route, .. } = crossing.clone().into_hit(accel);
+            let winner = Winner { root, geometry, primitive };
+            let enters = crossing.enters.or_else(|| enters(accel, ray, &route, &winner)).unwrap_or(false);
+            (!enters, !route.is_empty(), route, geometry, primitive)
+        };
+        key(self) < key(other)
+    }
+}
+
+/// A ray in single precision for a tree, and what its `t` are in double: `zero + factor * t`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LocalRay {
+    pub(crate) ray: Ray32,
+    zero: f64,
+    /// A power of two.
+    factor: f64,
+}
+
+impl LocalRay {
+    /// Whose `t` are the same.
+    #[inline(always)]
+    pub(crate) fn new(ray: Ray32) -> Self {
+        Self { ray, zero: 0.0, factor: 1.0 }
+    }
+
+    #[inline(always)]
+    fn t(&self, t: f32) -> f64 {
+        self.zero + self.factor * f64::from(t)
+    }
+
+    /// More than every `t` of it that is not beyond this one.
+    #[inline(always)]
+    fn end(&self, t: f64) -> f32 {
+        // What the difference may lose.
+        const LOST: f64 = 8.0 * f64::EPSILON;
+        let t = (t - self.zero + LOST * self.zero) / self.factor;
+        beyond(if t > 0.0 { t as f32 } else { 0.0 })
+    }
+}
+
+/// How a ray comes to the tree of an instance.
+enum Approach {
+    Ray(LocalRay),
+    PassesBy,
+    /// Only double precision can tell.
+    Unknown,
+}
+
+/// The ray as single precision takes it in a tree; nothing beyond `limit` is wanted.
+#[inline(always)]
+fn approach(accel: &Accel, picture: &PictureStart, ray: &Ray, limit: f64) -> Approach {
+    let start = &picture.start;
+    let size = largest_component(ray) * start.scale;
+    if !(f64::MIN_POSITIVE <= size && size <= f64::MAX) {
+        return Approach::Unknown;
+    }
+    // So that its largest component is about 1, in tree units.
+    let factor = if (1.0 / 1024.0..=1024.0).contains(&size) { 1.0 } else { power_of_two_over(size) };
+    let direction = ray.direction * factor;
+    let from = (ray.origin - DVec3::from_slice(&start.tree_origin)) * start.scale;
+    let mut zero = 0.0;
+    let distance = from.abs().max_element();
+    if !(distance <= NEARBY) {
+        if !(distance <= MOVABLE && accel.infinite.is_empty()) {
+            return Approach::Unknown;
+        }
+        let along = direction * start.scale;
+        let (length, middle) = (along.length(), -from.dot(along) / along.length_squared());
+        if (from + middle * along).length_squared() > RADIUS * RADIUS {
+            return Approach::PassesBy;
+        }
+        zero = (middle - 2.0 * RADIUS / length) * factor;
+        if zero > limit || middle + RADIUS / length < 0.0 {
+            return Approach::PassesBy;
+        }
+    }
+    let origin = ray.origin + zero * ray.direction - picture.rounding.origin;
+    let end = (ray.t_max - zero) / factor;
+    // The same for all that ask, and no earlier than the ray's own.
+    let t_max = if zero == 0.0 && factor == 1.0 { end as f32 } else { (end as f32).next_up() };
+    let ray = Ray32 { origin: origin.as_vec3(), t_min: 0.0, direction: direction.as_vec3(), t_max };
+    Approach::Ray(LocalRay { ray, zero, factor })
+}
+
+/// The power of two that takes a number to between 1 and 2; no more than `f64` holds.
+#[cold]
+fn power_of_two_over(size: f64) -> f64 {
+    let exponent = (size.to_bits() >> 52) as i64 - 1023;
+    2f64.powi((-exponent).clamp(-1000, 1000) as i32)
+}
+
+/// What a ray meets of anything but the tree's own triangles in single precision.
+struct Others<'a, 'r> {
+    accel: &'a Accel,
+    ray: &'r Ray,
+    nearest: Option<Crossing>,
+    /// What is beyond this is not wanted.
+    limit: f64,
+    /// For shapes, once the ray has come to some.
+    bounding_volumes: Option<BoundingVolumeRay>,
+    /// For the cloud of spheres that the ray came to last.
+    cloud: Option<CloudRay>,
+}
+
+impl<'a> Others<'a, '_> {
+    /// Takes a crossing that is in range, if it is the nearest.
+    #[inline(always)]
+    fn offer(&mut self, crossing: Crossing) {
+        let t = crossing.winner.root.t;
+        if !(t <= self.limit) {
+            return;
+        }
+        let is_first = match &self.nearest {
+            Some(nearest) if nearest.winner.root.t == t => crossing.precedes(nearest, self.accel, self.ray),
+            nearest => nearest.as_ref().is_none_or(|nearest| t < nearest.winner.root.t),
+        };
+        if is_first {
+            self.nearest = Some(crossing);
+            self.limit = t;
+        }
+    }
+
+    /// Tests a leaf; whether any hit will do, and there is one.
+    #[inline(always)]
+    fn test_leaf<G: Goal, L: Simd>(&mut self, leaf: u32) -> bool {
+        match tag::of(leaf) {
+            tag::SHAPES => self.test_shapes::<G, L>(leaf),
+            tag::SPHERES => self.test_spheres::<G, L>(leaf),
+            tag::PRECISE => self.test_precise::<G>(leaf),
+            tag::INSTANCE => {
+                let entry = &self.accel.tree.entries[tag::place(leaf)];
+                self.test_instance::<G, L>(entry)
+            }
+            _ => self.test_entries::<G>(leaf),
+        }
+    }
+
+    /// The same of what has no bounds.
+    #[inline(always)]
+    fn test_infinite<G: Goal, L: Simd>(&mut self) -> bool {
+        let accel = self.accel;
+        accel.infinite.iter().any(
+            #[inline(always)]
+            |entry| match accel.geometries[entry.geometry as usize].kind {
+                GeometryKind::Instance(_) => self.test_instance::<G, L>(entry),
+                _ => self.test_entry::<G>(entry),
+            },
+        )
+    }
+
+    /// The heights along the ray at which anything is wanted.
+    #[inline(always)]
+    fn heights(&self) -> HeightRange {
+        let length = largest_component(self.ray);
+        HeightRange::ahead((self.ray.t_min * length) as f32, (self.limit * length) as f32)
+    }
+
+    /// A leaf of shapes: those whose bounding volumes are hit, the nearest first.
+    #[inline(always)]
+    fn test_shapes<G: Goal, L: Simd>(&mut self, leaf: u32) -> bool {
+        let (accel, ray) = (self.accel, self.ray);
+        let make = || BoundingVolumeRay::new(&accel.tree_space, ray, largest_component(ray));
+        let volumes = *self.bounding_volumes.get_or_insert_with(make);
+        let mut first = tag::place(leaf);
+        loop {
+            let Some((block, goes_on)) = accel.bounding_volumes.block(first) else {
+                return self.test_entries::<G>(leaf);
+            };
+            let entries = &accel.tree.entries[first..];
+            let mut range = self.heights();
+            let BoundingHits { mut mask, sure, near } = if G::IS_ANY {
+                intersect::intersect_bounding_volumes::<L, true>(block, simd::opaque(&volumes), &range)
+            } else {
+                intersect::intersect_bounding_volumes::<L, false>(block, simd::opaque(&volumes), &range)
+            };
+            if G::IS_ANY && sure != 0 {
+                return true;
+            }
+            while mask != 0 {
+                let lane =
+                    if G::IS_ANY { mask.trailing_zeros() as usize % BLOCK } else { nearest_of(mask, &near) };
+                mask &= !(1 << lane);
+                if !G::IS_ANY && near[lane] > range.last {
+                    continue;
+                }
+                if self.test_entry::<G>(&entries[lane]) {
+                    return true;
+                }
+                range = self.heights();
+            }
+            if !goes_on {
+                return false;
+            }
+            first += BLOCK;
+        }
+    }
+
+    /// A leaf of custom geometry, or of shapes one by one.
+    #[inline(never)]
+    fn test_entries<G: Goal>(&mut self, leaf: u32) -> bool {
+        for entry in &self.accel.tree.entries[tag::place(leaf)..] {
+            if self.test_entry::<G>(entry) {
+                return true;
+            }
+            if entry.is_last() {
+                break;
+            }
+        }
+        false
+    }
+
+    /// A shape, or a primitive of custom geometry.
+    #[inline(always)]
+    fn test_entry<G: Goal>(&mut self, entry: &Entry) -> bool {
+        let (geometry, primitive) = (entry.geometry, entry.primitive());
+        let (kind, ray) = (&self.accel.geometries[geometry as usize].kind, self.ray);
+        let root = if let Some(patch) = Patch::of(kind) {
+            patch
+                .line_crossings(ray)
+                .of_line
+                .iter()
+                .map(|crossing| crossing.root)
+                .find(|root| ray.contains(root.t))
+        } else if G::IS_ANY {
+            return is_crossed(kind, primitive, ray);
+        } else {
+            first_crossing(kind, primitive, ray).filter(|root| ray.contains(root.t))
+        };
+        if let Some(root) = root {
+            if G::IS_ANY {
+                return true;
+            }
+            self.offer(Crossing::of(Winner { root, geometry, primitive }, None));
+        }
+        false
+    }
+
+    /// A leaf of spheres of clouds, eight at a time.
+    #[inline(always)]
+    fn test_spheres<G: Goal, L: Simd>(&mut self, leaf: u32) -> bool {
+        let (accel, ray, places) = (self.accel, self.ray, tag::blocks(leaf));
+        let range = [ray.t_min, self.limit];
+        for (ids, block) in
+            accel.tree.sphere_names[places.clone()].iter().zip(&accel.tree.sphere_blocks[places])
+        {
+            let cloud = CloudRay::turn(&mut self.cloud, accel, ray, ids.geometry);
+            let origin = cloud.origin();
+            let (mut mask, certain) = match cloud.within(range) {
+                Some(spheres) => intersect::intersect_spheres::<L>(block, spheres),
+                None => (ids.lanes(), 0),
+            };
+            if G::IS_ANY && certain != 0 {
+                return true;
+            }
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize % BLOCK;
+                mask &= mask - 1;
+                let Some(root) = block.sphere(lane, &origin).closest(ray) else { continue };
+                if G::IS_ANY {
+                    return true;
+                }
+                let winner = Winner { root, geometry: ids.geometry, primitive: ids.primitives[lane] };
+                self.offer(Crossing::of(winner, None));
+            }
+        }
+        false
+    }
+
+    /// A leaf of triangles in double precision.
+    #[inline(never)]
+    fn test_precise<G: Goal>(&mut self, leaf: u32) -> bool {
+        for entry in &self.accel.tree.entries[tag::place(leaf)..] {
+            let (geometry, primitive) = (entry.geometry, entry.primitive());
+            let met =
+                match edges::intersect_precise(self.accel, self.ray, geometry, primitive) {
+                    Meeting::Hit { root, is_front } => Some((root, is_front)),
+                    Meeting::Touch {
+                        root, feature: Feature::Edge(_) | Feature::Vertex(_), is_front, ..
+                    } if self.ray.contains(root.t) => Some((root, is_front)),
+                    Meeting::Miss | Meeting::Touch { .. } => None,
+                };
+            if let Some((root, is_front)) = met {
+                if G::IS_ANY {
+                    return true;
+                }
+                self.offer(Crossing::of(Winner { root, geometry, primitive }, Some(is_front)));
+            }
+            if entry.is_last() {
+                break;
+            }
+        }
+        false
+    }
+
+    /// An instance: one of triangles is entered at once, any other by a call.
+    #[inline(always)]
+    fn test_instance<G: Goal, L: Simd>(&mut self, entry: &Entry) -> bool {
+        let Some(placed) = Placed::of(self.accel, entry) else { return false };
+        let inner = &*placed.instance.accel;
+        let ray = &placed.instance.world_from_object.object_ray(self.ray);
+        let mut found = Outcome::Uncertain;
+        if let Some(picture) = &inner.picture {
+            match approach(inner, picture, ray, self.limit) {
+                Approach::PassesBy => return false,
+                Approach::Unknown => {}
+                Approach::Ray(local) => {
+                    let search =
+                        Search { accel: inner, picture, from: placed.from, ray, local, limit: self.limit };
+                    found = if picture.start.only_triangles {
+                        search.run::<G, L, false>()
+                    } else {
+                        L::isa().run(General::<G>(search, std::marker::PhantomData))
+                    };
+                }
+            }
+        }
+        let found = match found {
+            Outcome::Certain(found) => found,
+            Outcome::Uncertain => exactly::<G>(L::isa(), inner, placed.from, ray, self.limit),
+        };
+        let Some(found) = found else { return false };
+        if G::IS_ANY {
+            return true;
+        }
+        let Crossing { winner, enters, instance, nested } = found;
+        let nested = match instance {
+            Some(_) => Some(Box::new(Crossing { winner, enters, instance, nested }.into_hit(inner))),
+            None => None,
+        };
+        self.offer(Crossing { winner, enters, instance: Some(placed.geometry), nested });
+        false
+    }
+}
+
+/// A part of a tree in double precision alone.
+#[cold]
+#[inline(never)]
+fn exactly<G: Goal>(isa: Isa, accel: &Accel, from: Start, ray: &Ray, limit: f64) -> Option<Crossing> {
+    let context = &Context::default();
+    if G::IS_ANY {
+        return exact::any_from(isa, accel, from, context, ray, None).then(Crossing::some);
+    }
+    let ray = &ray.with_range(ray.t_min, limit);
+    let hit = exact::closest_from(isa, accel, from, context, ray, None)?;
+    let winner = Winner { root: hit.root, geometry: hit.geometry, primitive: hit.primitive };
+    if hit.route.is_empty() {
+        return Some(Crossing::of(winner, None));
+    }
+    let mut nested = Box::new(hit);
+    let behind_first = |path: &InstancePath| InstancePath::from_slice(&path[1..]);
+    let instance = Some(nested.route[0]);
+    let is_nested = nested.route.len() > 1;
+    (nested.route, nested.instances) = (behind_first(&nested.route), behind_first(&nested.instances));
+    Some(Crossing { winner, enters: None, instance, nested: is_nested.then_some(nested) })
+}
+
+/// A ray on its way through a part of a tree.
+pub(crate) struct Search<'a, 'r> {
+    pub(crate) accel: &'a Accel,
+    pub(crate) picture: &'a PictureStart,
+    pub(crate) from: Start,
+    pub(crate) ray: &'r Ray,
+    pub(crate) local: LocalRay,
+    /// What is beyond this is not wanted.
+    pub(crate) limit: f64,
+}
+
+impl Search<'_, '_> {
+    /// The nearest crossing, or any. `GENERAL`: in a tree of anything, not of triangles alone.
+    #[inline(always)]
+    pub(crate) fn run<G: Goal, L: Simd, const GENERAL: bool>(self) -> Outcome<Option<Crossing>> {
+        let Self { accel, picture, from, ray, local, limit } = self;
+        let start = &picture.start;
+        let Some(slabs) = L::start_f32(start, simd::opaque(&local.ray)) else { return Outcome::Uncertain };
+        let decider = &Decider::new(accel, start);
+        let mut cursor = NodeCursor::<L>::new(decider.nodes(), slabs);
+        let mut stack = Stack::new();
+        if !G::IS_ANY && limit < ray.t_max {
+            shorten(&mut cursor.slabs, local.end(limit));
+        }
+        let mut next = cursor.descend::<G>(from.below(start.root), &mut stack);
+        if next.is_none() && (!GENERAL || accel.infinite.is_empty()) {
+            return Outcome::Certain(None);
+        }
+        let mut triangles = L::start_f32_blocks(start, simd::opaque(&local.ray), &cursor.slabs);
+        if !G::IS_ANY && limit < ray.t_max {
+            triangles.shorten(local.end(limit));
+        }
+        let mut nearest = Nearest::NONE;
+        let mut others = Others { accel, ray, nearest: None, limit, bounding_volumes: None, cloud: None };
+        if GENERAL && !accel.infinite.is_empty() {
+            if others.test_infinite::<G, L>() {
+                return Outcome::Certain(Some(Crossing::some()));
+            }
+            end_at::<G>(&mut triangles, &mut cursor.slabs, &local, others.limit);
+        }
+        while let Some(leaf) = next {
+            if !GENERAL || tag::of(leaf) == tag::TRIANGLES {
+                if triangles.test_leaf::<G, L>(decider, leaf, &mut nearest, &mut cursor.slabs) {
+                    return Outcome::Certain(Some(Crossing::some()));
+                }
+                if GENERAL && !G::IS_ANY {
+                    let t = local.t(triangles.t_max());
+                    others.limit = if t < others.limit { t } else { others.limit };
+                }
+            } else {
+                if others.test_leaf::<G, L>(leaf) {
+                    return Outcome::Certain(Some(Crossing::some()));
+                }
+                end_at::<G>(&mut triangles, &mut cursor.slabs, &local, others.limit);
+            }
+            next = cursor.next_leaf::<G>(&mut stack);
+        }
+        let triangle = nearest.crossing(decider).map(|(geometry, primitive, local_uv, enters)| {
+            let t = local.t(triangles.t_max());
+            // What was rounded beyond the end is in range.
+            let root = watertight::root(if t < ray.t_max { t } else { ray.t_max }, local_uv);
+            Crossing::of(Winner { root, geometry, primitive }, Some(enters))
+        });
+        Outcome::Certain(match (triangle, others.nearest) {
+            (Some(triangle), Some(other)) => {
+                let (t, other_t) = (triangle.winner.root.t, other.winner.root.t);
+                let is_first = t < other_t || t == other_t && triangle.precedes(&other, accel, ray);
+                Some(if is_first { triangle } else { other })
+            }
+            (triangle, other) => triangle.or(other),
+        })
+    }
+}
+
+/// Ends the ray where something in double precision is met.
+#[inline(always)]
+fn end_at<G: Goal>(triangles: &mut F32Ray, slabs: &mut Slabs, local: &LocalRay, limit: f64) {
+    if G::IS_ANY {
+        return;
+    }
+    let end = local.end(limit);
+    if end < triangles.t_max() {
+        triangles.shorten(end);
+        shorten(slabs, end);
+    }
+}
+
+#[inline(always)]
+fn shorten(slabs: &mut Slabs, end: f32) {
+    let end = beyond(end);
+    if end < slabs.s_max() {
+        slabs.end_at(end);
+    }
+}
+
+/// [`Search::run`] in a tree of anything, out of line.
+pub(crate) struct General<'a, 'r, G>(pub(crate) Search<'a, 'r>, pub(crate) std::marker::PhantomData<G>);
+
+impl<G: Goal> Dispatch for General<'_, '_, G> {
+    type Output = Outcome<Option<Crossing>>;
+
+    #[inline(always)]
+    fn run<L: Simd>(self) -> Self::Output {
+        self.0.run::<G, L, true>()
+    }
+}
