@@ -7,7 +7,7 @@ use lumbre_shading::Spectrum;
 
 use crate::film::{FeatureSample, Filter, Sample};
 use crate::transport::{Draw, Event, Features, Integrator, Record, Sampler, Seen, caught, integrator};
-use crate::wave::{SampleId, Sights, Wave};
+use crate::wave::{Precision, SampleId, Sights, Wave, cone};
 use crate::{RenderError, RenderOptions};
 
 /// Between the rays that textures are looked up for, in pixels: samples average what is finer. The same for any number of samples, so
@@ -25,6 +25,7 @@ pub(crate) struct Taker<'a> {
     moves: bool,
     wants_features: bool,
     lights_are_seen: bool,
+    precision: Precision,
 }
 
 /// Where on the film a sample is taken, and through which point of the lens.
@@ -49,6 +50,7 @@ impl<'a> Taker<'a> {
         Ok(Self {
             scene,
             moves: scene.moves() || view.moves(),
+            precision: precision(scene, &view, options),
             view,
             integrator,
             sampler: Sampler::new(&options.sampler),
@@ -70,7 +72,7 @@ impl<'a> Taker<'a> {
             let draw = self.sampler.draw(id.x, id.y, id.index);
             (draw, self.camera_ray(&draw, &self.aim(id, &draw)))
         });
-        let mut sights = Sights::new(self.scene, &self.view, wave, aimed, record);
+        let mut sights = Sights::new(self.scene, &self.view, wave, self.precision, aimed, record);
         let seen = self.see(&mut sights, record);
         for ((&id, (seen, features)), &radiance) in ids.iter().zip(seen).zip(sights.radiance()) {
             let weight = self.filter.sample(self.sampler.draw(id.x, id.y, id.index).filter()).weight;
@@ -125,11 +127,30 @@ impl<'a> Taker<'a> {
     fn explain_sight(&self, draw: Draw, camera: CameraRay) -> (Ray, Spectrum, Vec<Event>) {
         let (mut wave, mut record) = (Wave::default(), Record::with_journal());
         let one = std::iter::once((draw, camera));
-        let mut sights = Sights::new(self.scene, &self.view, &mut wave, one, &mut record);
+        let mut sights = Sights::new(self.scene, &self.view, &mut wave, self.precision, one, &mut record);
         let seen = self.see(&mut sights, &mut record)[0].0;
         let radiance = seen.map_or(sights.radiance()[0], |seen| seen.radiance);
         (sights.ray(0), radiance, record.journal.unwrap_or_default())
     }
+}
+
+/// Rays that are rounded leave surfaces from farther off. Where that would show, because a small part of a large scene is looked at,
+/// they are not: where it is more than a pixel of a picture of a thousand, of anything that some rays over the picture meet.
+fn precision(scene: &Scene, view: &View, options: &RenderOptions) -> Precision {
+    const RAYS: u32 = 8;
+    const PIXELS: f64 = 1000.0;
+    let Some(rounding) = scene.accel().picture_rounding() else { return Precision::Double };
+    let size = DVec2::new(f64::from(options.width), f64::from(options.height));
+    let spacing = size.max_element() / PIXELS;
+    let is_coarse = |i: u32| {
+        let place = DVec2::new(f64::from(i % RAYS) + 0.5, f64::from(i / RAYS) + 0.5) / f64::from(RAYS);
+        let camera = view.ray(place * size, DVec2::splat(0.5), view.time(0.5), spacing);
+        let Some(hit) = scene.closest(&camera.ray) else { return false };
+        let (width, spread) = cone(&camera);
+        let distance = hit.root.t;
+        rounding.error(camera.ray.at(distance)).length() > f64::from(width) + f64::from(spread) * distance
+    };
+    Precision::of(scene, (0..RAYS * RAYS).any(is_coarse))
 }
 
 fn feature_sample(features: Features) -> FeatureSample {

@@ -18,8 +18,8 @@ use crate::mesh::{self, QuadOrder};
 use crate::surface::{ColourRamp, Form, SurfaceEntry};
 use crate::{
     AreaLightDesc, BuildError, BuildWarning, Camera, CameraKind, Emission, GeometryDesc, GroundPlane,
-    InstanceDesc, LightDesc, MeshDesc, ObjectDesc, Scene, SceneDesc, ShapeDesc, csg, custom, extent, framing,
-    ground, stage, studio,
+    InstanceDesc, LightDesc, MeshDesc, ObjectDesc, Scene, SceneDesc, ShapeDesc, SurfaceTable, csg, custom,
+    extent, framing, ground, stage, studio,
 };
 
 /// The maximal depth of nested objects.
@@ -119,6 +119,7 @@ impl Scene {
             moves,
             looks_up,
             ground: ground.map(|desc| GroundPlane::new(desc, &builder.lights)),
+            tables: SurfaceTable::new(&builder.entries),
             entries: builder.entries,
             lights: builder.lights,
             warnings: builder.warnings,

@@ -23,6 +23,7 @@ mod solid;
 mod stage;
 mod studio;
 mod surface;
+mod tables;
 mod viewpoint;
 
 pub use camera::{Camera, CameraKind, CameraRay, SphericalMapping, View};
@@ -38,4 +39,5 @@ pub use listing::{AnimationListing, Listing, TextureListing};
 pub use lumbre_kernel::Placement;
 pub use scene::{BuildWarning, Scene};
 pub use stage::{Ground, Stage, StageLight, Staged, Surroundings};
+pub use tables::{FlatSurface, SurfaceTable};
 pub use viewpoint::Viewpoint;

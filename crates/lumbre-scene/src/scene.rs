@@ -17,7 +17,7 @@ use crate::light::{Light, LightId, LightSample, Place, Sampling};
 use crate::surface::{Form, ShadingGeometry, SurfaceEntry};
 use crate::{
     BuildError, Camera, FilmDesc, FilterDesc, Footprint, GroundPlane, IntegratorDesc, Interaction,
-    SamplerDesc,
+    SamplerDesc, SurfaceTable,
 };
 
 /// An immutable scene, which any number of threads can render.
@@ -25,6 +25,7 @@ use crate::{
 pub struct Scene {
     pub(crate) accel: Arc<Accel>,
     pub(crate) entries: Vec<SurfaceEntry>,
+    pub(crate) tables: SurfaceTable,
     pub(crate) lights: Vec<Light>,
     pub(crate) light_choice: LightChoice,
     pub(crate) lane_lights: LaneLights,
@@ -273,10 +274,44 @@ impl Scene {
         self.entries[id as usize].shape
     }
 
+    /// Surfaces as plain rows.
+    pub fn tables(&self) -> &SurfaceTable {
+        &self.tables
+    }
+
+    /// Whether shadow rays and paths go through some surfaces: cut-outs and interfaces.
+    pub fn has_holes(&self) -> bool {
+        self.has_holes
+    }
+
+    /// Whether cameras look through the backs of some surfaces.
+    pub fn has_one_sided(&self) -> bool {
+        self.has_one_sided
+    }
+
+    /// Whether any material has textures, so that rays need footprints.
+    pub fn is_textured(&self) -> bool {
+        self.looks_up
+    }
+
     /// The interaction at a hit.
     pub fn interaction(&self, ray: &Ray, hit: &Hit, footprint: &Footprint) -> Interaction<'_> {
+        self.interaction_at(ray, hit, footprint, self.accel.surface(ray, hit))
+    }
+
+    /// [`Scene::interaction`] at a hit of [`Accel::closest_columns`]: rays of pictures that leave it do not hit it again.
+    pub fn picture_interaction(&self, ray: &Ray, hit: &Hit, footprint: &Footprint) -> Interaction<'_> {
+        self.interaction_at(ray, hit, footprint, self.accel.picture_surface(ray, hit))
+    }
+
+    fn interaction_at(
+        &self,
+        ray: &Ray,
+        hit: &Hit,
+        footprint: &Footprint,
+        geometric: Surface,
+    ) -> Interaction<'_> {
         let (entry, part, turned) = self.leaf(hit);
-        let geometric = self.accel.surface(ray, hit);
         let shaded = self.shading_geometry(entry, &geometric, ray, hit, part, turned);
         let primitive = entry.primitive(part);
         let length = ray.direction.length();

@@ -82,6 +82,11 @@ pub enum BsdfKind {
     Other,
 }
 
+impl BsdfKind {
+    /// How many there are.
+    pub const COUNT: usize = Self::Other as usize + 1;
+}
+
 /// The parameters of a BSDF as plain numbers: [`LaneBsdf::ROW`] of them.
 pub type Row = SmallVec<[f32; 8]>;
 

@@ -40,6 +40,11 @@ impl<'s> Interiors<'s> {
         })
     }
 
+    /// Whether there is none.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.around.is_empty()
+    }
+
     /// Whether light loses anything here.
     pub(crate) fn attenuates(&self) -> bool {
         self.around.last().is_some_and(|solid| solid.interior_attenuation().is_some())

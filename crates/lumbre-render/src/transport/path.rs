@@ -1,6 +1,7 @@
 //! Path tracing with next-event estimation and multiple importance sampling.
 
 use lumbre_shading::ShadingNormals;
+use lumbre_simd::InstructionSet;
 
 use crate::transport::{Integrator, Record, Sampler};
 use crate::wave::{Setting, Sights};
@@ -69,6 +70,8 @@ impl Integrator for Path {
             shading_normals: self.shading_normals,
             has_solids: scene.has_solids(),
             has_panes: scene.lets_light_straight_on(),
+            moves: scene.moves(),
+            instruction_set: InstructionSet::detect(),
         };
         sights.follow(&setting, record);
     }

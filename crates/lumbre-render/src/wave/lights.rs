@@ -1,150 +1,24 @@
-//! Light samples in lanes, and what solids and panes do to them.
+//! What solids and panes do to light samples.
 
-use lumbre_math::{DVec2, DVec3};
+use lumbre_math::DVec3;
+use lumbre_scene::LightSample;
 use lumbre_scene::light::LightPoint;
-use lumbre_scene::{LightSample, Scene};
+use lumbre_scene::light::lanes::LaneLightSample;
 use lumbre_shading::{Scatter, Spectrum};
 use lumbre_simd::{Double, Mask, Real, UInt, V3};
 
-use crate::transport::Strategy;
 use crate::transport::interior::Interiors;
-use crate::wave::Setting;
-use crate::wave::paths::Slots;
 use crate::wave::shade::Shade;
 use crate::wave::shadows::Pane;
-
-/// A light sample in each lane: see [`LightSample`].
-#[derive(Clone, Copy)]
-pub(crate) struct LightLanes<R: Real> {
-    /// Unit, towards the light.
-    pub(crate) towards: V3<R>,
-    /// Where it comes from, a bound on the error of that, and the normal there; zero where there is no surface.
-    pub(crate) point: V3<R::Double>,
-    pub(crate) error: V3<R::Double>,
-    pub(crate) normal: V3<R>,
-    /// Whether it is infinitely far away.
-    pub(crate) infinite: R::Mask,
-    pub(crate) radiance: V3<R>,
-    pub(crate) pdf: R,
-    pub(crate) delta: R::Mask,
-    pub(crate) valid: R::Mask,
-}
-
-/// Samples a light for each lane.
-#[inline(always)]
-pub(crate) fn sample_lights<R: Real>(
-    setting: &Setting<'_>,
-    slots: &Slots<'_>,
-    useful: R::Mask,
-    slot: R::UInt,
-    from: V3<R::Double>,
-    u: [R; 4],
-) -> LightLanes<R> {
-    let from = [from.x.to_lanes(), from.y.to_lanes(), from.z.to_lanes()];
-    let u = [u[0].to_lanes(), u[1].to_lanes(), u[2].to_lanes(), u[3].to_lanes()];
-    let mut samples = OneByOne::default();
-    samples.take(setting, slots, useful.to_bitmask(), &slot.to_lanes(), &from, &u);
-    samples.lanes::<R>()
-}
-
-/// Light samples one after the other.
-#[derive(Default)]
-struct OneByOne {
-    towards: [[f32; 16]; 3],
-    point: [[f64; 16]; 3],
-    error: [[f64; 16]; 3],
-    normal: [[f32; 16]; 3],
-    radiance: [[f32; 16]; 3],
-    pdf: [f32; 16],
-    infinite: u32,
-    delta: u32,
-    valid: u32,
-}
-
-impl OneByOne {
-    #[inline(never)]
-    fn take(
-        &mut self,
-        setting: &Setting<'_>,
-        slots: &Slots<'_>,
-        mut lanes: u32,
-        slot: &[u32; 16],
-        from: &[[f64; 16]; 3],
-        u: &[[f32; 16]; 4],
-    ) {
-        let sample_light = match setting.strategy {
-            Strategy::Lights => Scene::sample_light_alone,
-            Strategy::Both | Strategy::Bsdf => Scene::sample_light,
-        };
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize;
-            lanes &= lanes - 1;
-            let from = DVec3::new(from[0][lane], from[1][lane], from[2][lane]);
-            let choice = f64::from(u[2][lane]) + f64::from(u[3][lane]) * (1.0 / 16_777_216.0);
-            let point = DVec2::new(u[0][lane].into(), u[1][lane].into());
-            let time = slots.camera[slot[lane] as usize].ray.time;
-            if let Some(sample) = sample_light(setting.scene, from, time, choice, point) {
-                self.put(lane, &sample);
-            }
-        }
-    }
-
-    fn put(&mut self, lane: usize, sample: &LightSample) {
-        let bit = 1 << lane;
-        self.valid |= bit;
-        for k in 0..3 {
-            self.towards[k][lane] = sample.towards[k] as f32;
-            self.radiance[k][lane] = sample.radiance.to_array()[k];
-        }
-        match sample.end {
-            None => self.infinite |= bit,
-            Some(end) => {
-                for k in 0..3 {
-                    self.point[k][lane] = end.point[k];
-                    self.error[k][lane] = end.error[k];
-                    self.normal[k][lane] = end.normal[k] as f32;
-                }
-            }
-        }
-        match sample.scatter {
-            Scatter::Density(pdf) => self.pdf[lane] = pdf,
-            Scatter::Delta => self.delta |= bit,
-        }
-    }
-
-    #[inline(always)]
-    fn lanes<R: Real>(&self) -> LightLanes<R> {
-        LightLanes {
-            towards: from_lanes(&self.towards),
-            point: from_lanes64::<R>(&self.point),
-            error: from_lanes64::<R>(&self.error),
-            normal: from_lanes(&self.normal),
-            infinite: R::Mask::from_bitmask(self.infinite),
-            radiance: from_lanes(&self.radiance),
-            pdf: R::from_lanes(&self.pdf),
-            delta: R::Mask::from_bitmask(self.delta),
-            valid: R::Mask::from_bitmask(self.valid),
-        }
-    }
-}
 
 #[inline(always)]
 fn from_lanes<R: Real>(lanes: &[[f32; 16]; 3]) -> V3<R> {
     V3 { x: R::from_lanes(&lanes[0]), y: R::from_lanes(&lanes[1]), z: R::from_lanes(&lanes[2]) }
 }
 
-#[inline(always)]
-fn from_lanes64<R: Real>(lanes: &[[f64; 16]; 3]) -> V3<R::Double> {
-    V3 {
-        x: R::Double::from_lanes(&lanes[0]),
-        y: R::Double::from_lanes(&lanes[1]),
-        z: R::Double::from_lanes(&lanes[2]),
-    }
-}
-
 /// Light samples as one lane after the other sees them.
 #[inline(always)]
-fn to_samples<R: Real>(light: &LightLanes<R>) -> Samples {
+fn to_samples<R: Real>(light: &LaneLightSample<R>) -> Samples {
     Samples {
         towards: [light.towards.x.to_lanes(), light.towards.y.to_lanes(), light.towards.z.to_lanes()],
         point: [light.point.x.to_lanes(), light.point.y.to_lanes(), light.point.z.to_lanes()],
@@ -188,14 +62,14 @@ impl Samples {
 }
 
 /// A light sample of the first lane.
-pub(crate) fn first_sample<R: Real>(light: &LightLanes<R>) -> LightSample {
+pub(crate) fn first_sample<R: Real>(light: &LaneLightSample<R>) -> LightSample {
     to_samples(light).get(0)
 }
 
 /// The solids around a path on one side of the surface that it is at, or the other.
-fn around<'s>(shade: &Shade<'_, 's>, path: usize, slot: u32, crosses: bool) -> Interiors<'s> {
+fn around<'s>(shade: &Shade<'_, 's>, vertex: usize, slot: u32, crosses: bool) -> Interiors<'s> {
     let mut around = shade.slots.interiors.get(slot as usize).cloned().unwrap_or_default();
-    if let (true, Some(&Some((solid, front)))) = (crosses, shade.vertices.solids.get(path)) {
+    if let (true, Some((solid, front))) = (crosses, shade.vertices.solid(vertex)) {
         around.cross(solid, front);
     }
     around
@@ -209,7 +83,7 @@ pub(crate) fn pass_solids<R: Real>(
     at: R::UInt,
     slot: R::UInt,
     crosses: R::Mask,
-    light: &LightLanes<R>,
+    light: &LaneLightSample<R>,
     arriving: V3<R>,
 ) -> V3<R> {
     let samples = to_samples(light);
@@ -254,7 +128,7 @@ pub(crate) fn push_panes<R: Real>(
     at: R::UInt,
     slot: R::UInt,
     crosses: R::Mask,
-    light: &LightLanes<R>,
+    light: &LaneLightSample<R>,
 ) {
     let samples = to_samples(light);
     let masks = [all.to_bitmask(), some.to_bitmask(), crosses.to_bitmask()];

@@ -5,6 +5,8 @@
 //! and a direction to go on in, for all of them ([`shade`]); what comes through of the lights ([`shadows`]). What a path does depends on
 //! nothing but its sample: neither the size of the wave nor the other paths in it show in the picture.
 
+mod escape;
+mod flat;
 mod lights;
 mod one_bsdf;
 mod paths;
@@ -16,19 +18,31 @@ mod surfaces;
 mod traced;
 mod vertices;
 
+use std::marker::PhantomData;
+
 use lumbre_geometry::Ray;
-use lumbre_kernel::Hit;
+use lumbre_kernel::PictureRounding;
 use lumbre_math::DVec3;
 use lumbre_scene::{SamplerKind, Scene};
+use lumbre_shading::lanes::{
+    BsdfKind, CoatedConductorLanes, CoatedDiffuseLanes, ConductorLanes, DielectricLanes, DiffuseLanes,
+    DiffuseTransmissionLanes, ThinDielectricLanes,
+};
 use lumbre_shading::{Bsdf, ShadingNormals, Spectrum};
+use lumbre_simd::{Double, InstructionSet, Real, V3};
 
 pub(crate) use paths::SampleId;
+pub(crate) use search::Precision;
 pub use sights::Sights;
+pub(crate) use sights::cone;
 
 use crate::transport::journal::{End, Event, Source};
 use crate::transport::{Record, Strategy};
+use crate::wave::escape::Escape;
+use crate::wave::flat::FlatHits;
 use crate::wave::paths::{OnePath, Paths, Slots};
-use crate::wave::shade::Shade;
+use crate::wave::search::Hits;
+use crate::wave::shade::{Kind, Rows, Shade, ShadeRows};
 use crate::wave::shadows::Shadows;
 use crate::wave::traced::Traced;
 use crate::wave::vertices::Vertices;
@@ -50,6 +64,8 @@ pub(crate) struct Setting<'s> {
     pub(crate) has_solids: bool,
     /// Whether light from points is followed straight on through panes.
     pub(crate) has_panes: bool,
+    pub(crate) moves: bool,
+    pub(crate) instruction_set: InstructionSet,
 }
 
 /// The first part of a ray: from a face to the smooth surface over it, where the ray itself starts.
@@ -61,6 +77,24 @@ pub(crate) struct Leg {
     pub(crate) from: DVec3,
 }
 
+/// Light that a path found by itself.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Found {
+    /// The position of the path.
+    pub(crate) path: u32,
+    pub(crate) radiance: Spectrum,
+    /// The density with which the last vertex would have sampled it; 0 where that does not matter.
+    pub(crate) light_pdf: f32,
+}
+
+/// By how much rays of pictures are rounded: see [`PictureRounding`]; by nothing in double precision.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rounding {
+    origin: DVec3,
+    relative: f64,
+    absolute: f64,
+}
+
 /// A wave's columns, kept from one wave to the next.
 #[derive(Debug, Default)]
 pub(crate) struct Wave<'s> {
@@ -68,11 +102,12 @@ pub(crate) struct Wave<'s> {
     paths: Paths,
     /// The same paths after the bounce.
     next: Paths,
-    rays: Vec<Ray>,
-    hits: Vec<Option<Hit>>,
+    hits: Hits,
+    flat: FlatHits,
+    /// Paths that left the scene, or that met what is not flat.
+    others: Vec<u32>,
     vertices: Vertices<'s>,
-    /// Vertices to be shaded, as positions of paths.
-    queue: Vec<u32>,
+    found: Vec<Found>,
     shadows: Shadows<'s>,
     legs: Vec<Leg>,
     crossings: Vec<u32>,
@@ -84,14 +119,14 @@ pub(crate) struct Wave<'s> {
 
 impl<'s> Wave<'s> {
     /// Follows all paths, whose rays have met what is in `hits`, to their ends.
-    fn follow(&mut self, setting: &Setting<'s>, record: &mut Record) {
+    fn follow(&mut self, setting: &Setting<'s>, precision: Precision, record: &mut Record) {
         let mut traced = record.journal.is_some().then(Traced::default);
         loop {
             self.escape(setting, record);
             self.surfaces(setting, record);
-            self.shade(setting, traced.as_mut());
+            self.shade(setting, precision, traced.as_mut());
             self.cross_surfaces();
-            self.light(setting, traced.as_mut(), record);
+            self.light(setting, precision, traced.as_mut(), record);
             self.walk_legs(setting.scene, record);
             std::mem::swap(&mut self.paths, &mut self.next);
             if self.paths.len == 0 {
@@ -99,53 +134,76 @@ impl<'s> Wave<'s> {
             }
             record.counts.bounce += self.paths.len as u64;
             self.is_first = false;
-            self.search(setting.scene);
+            self.hits.search(setting.scene, &self.paths, &self.slots, precision, false);
         }
     }
 
     /// Adds the light at infinity that rays found which left the scene.
     fn escape(&mut self, setting: &Setting<'s>, record: &mut Record) {
-        for path in 0..self.paths.len {
-            if self.hits[path].is_some() {
-                continue;
-            }
-            let slot = self.paths.slot[path] as usize;
-            let ray = self.paths.ray(path, self.slots.camera[slot].ray.time);
-            record.note(|| Event::Left { ray });
-            let (throughput, chosen) = (self.paths.throughput(path), self.paths.pdf[path]);
-            for (arriving, pdf) in setting.scene.escaped(&ray) {
-                let weight = setting.weight_of_found(chosen, pdf);
-                self.slots.radiance[slot] += record.added(Source::Infinity, throughput, arriving, weight);
-            }
+        self.others.clear();
+        self.others
+            .extend((0..self.paths.len).filter(|&path| self.hits.is_miss(path)).map(|path| path as u32));
+        let count = self.others.len();
+        let Some(&last) = self.others.last() else { return };
+        record.note(|| Event::Left { ray: self.paths.ray(0, self.slots.time[0]) });
+        // A vector reads beyond the last.
+        self.others.resize(count + paths::PAD, last);
+        for light in 0..setting.scene.lane_lights().infinite_count() {
+            self.found.clear();
+            setting.instruction_set.run(Escape {
+                setting,
+                slots: &self.slots,
+                paths: &self.paths,
+                queue: &self.others,
+                count,
+                light,
+                found: &mut self.found,
+            });
+            self.add_found(setting, Source::Infinity, record);
+        }
+    }
+
+    /// Adds the light that paths found by themselves.
+    fn add_found(&mut self, setting: &Setting<'s>, source: Source, record: &mut Record) {
+        for &Found { path, radiance, light_pdf } in &self.found {
+            let path = path as usize;
+            let weight = setting.weight_of_found(self.paths.pdf[path], light_pdf);
+            let added = record.added(source, self.paths.throughput(path), radiance, weight);
+            self.slots.radiance[self.paths.slot[path] as usize] += added;
         }
     }
 
     /// Samples lights and directions at all vertices.
-    fn shade(&mut self, setting: &Setting<'s>, traced: Option<&mut Traced>) {
-        let count = self.queue.len();
+    fn shade(&mut self, setting: &Setting<'s>, precision: Precision, mut traced: Option<&mut Traced>) {
+        let count: usize = self.vertices.queues.iter().map(Vec::len).sum();
         self.next.len = 0;
         self.legs.clear();
         self.crossings.clear();
         self.next.reserve(count);
         self.shadows.reset(count);
-        // A vector reads beyond the last.
-        let last = self.queue.last().copied().unwrap_or(0);
-        self.queue.resize(count + paths::PAD, last);
-        let mut shade = Shade {
-            setting,
-            slots: &self.slots,
-            paths: &self.paths,
-            vertices: &self.vertices,
-            queue: &self.queue,
-            count,
-            next: &mut self.next,
-            legs: &mut self.legs,
-            shadows: &mut self.shadows,
-            crossings: &mut self.crossings,
-            traced,
-        };
-        let bsdfs: &[Bsdf] = &self.vertices.bsdfs;
-        shade.run::<f32, _>(&bsdfs);
+        let mut queues = std::mem::take(&mut self.vertices.queues);
+        for (kind, queue) in KINDS.into_iter().zip(&mut queues) {
+            let count = queue.len();
+            let Some(&last) = queue.last() else { continue };
+            // A vector reads beyond the last.
+            queue.resize(count + paths::PAD, last);
+            let mut shade = Shade {
+                setting,
+                slots: &self.slots,
+                paths: &self.paths,
+                vertices: &self.vertices,
+                queue,
+                count,
+                next: &mut self.next,
+                legs: &mut self.legs,
+                shadows: &mut self.shadows,
+                crossings: &mut self.crossings,
+                is_single: precision == Precision::Single,
+                traced: traced.as_deref_mut(),
+            };
+            shade.of_kind(kind);
+        }
+        self.vertices.queues = queues;
         for path in &self.collided {
             self.next.push_one(path);
         }
@@ -153,22 +211,28 @@ impl<'s> Wave<'s> {
 
     /// Takes paths into the solids behind the surfaces that they go through, or out of them.
     fn cross_surfaces(&mut self) {
-        for &path in &self.crossings {
-            if let Some((solid, front)) = self.vertices.solids[path as usize] {
-                self.slots.interiors[self.paths.slot[path as usize] as usize].cross(solid, front);
+        for &vertex in &self.crossings {
+            if let Some((solid, front)) = self.vertices.solid(vertex as usize) {
+                let path = self.vertices.path[vertex as usize] as usize;
+                self.slots.interiors[self.paths.slot[path] as usize].cross(solid, front);
             }
         }
     }
 
     /// Adds the light of samples that nothing stands in the way of.
-    fn light(&mut self, setting: &Setting<'s>, traced: Option<&mut Traced>, record: &mut Record) {
+    fn light(
+        &mut self,
+        setting: &Setting<'s>,
+        precision: Precision,
+        traced: Option<&mut Traced>,
+        record: &mut Record,
+    ) {
         let mut share = Spectrum::BLACK;
         let Self { shadows, slots, .. } = self;
-        shadows.resolve(setting.scene, slots, setting.regularize, record, |_, passes| share = passes);
+        shadows.resolve(setting, precision == Precision::Single, slots, record, |_, passes| share = passes);
         if let Some(traced) = traced {
             let light = if self.shadows.len > 0 { self.shadows.light(0) } else { Spectrum::BLACK };
-            let time = self.slots.camera[0].ray.time;
-            traced.write(self.paths.throughput(0), time, light, share, record);
+            traced.write(self.paths.throughput(0), self.slots.time[0], light, share, record);
         }
     }
 
@@ -177,7 +241,7 @@ impl<'s> Wave<'s> {
         let mut ended = Vec::new();
         for &Leg { ray, from } in &self.legs {
             let start = self.next.origin(ray as usize);
-            let time = self.slots.camera[self.next.slot[ray as usize] as usize].ray.time;
+            let time = self.slots.time[self.next.slot[ray as usize] as usize];
             record.counts.shadow += 1;
             if scene.is_occluded(&Ray::new(from, start - from).with_range(0.0, 1.0).at_time(time)) {
                 ended.push(ray);
@@ -185,10 +249,61 @@ impl<'s> Wave<'s> {
         }
         if !ended.is_empty() {
             record.note(|| Event::Ended(End::Absorbed));
+            ended.sort_unstable();
             self.next.remove(&ended);
         }
     }
 }
+
+/// All kinds of BSDFs, in their order.
+const KINDS: [BsdfKind; BsdfKind::COUNT] = [
+    BsdfKind::Diffuse,
+    BsdfKind::DiffuseTransmission,
+    BsdfKind::Conductor,
+    BsdfKind::Dielectric,
+    BsdfKind::ThinDielectric,
+    BsdfKind::CoatedDiffuse,
+    BsdfKind::CoatedConductor,
+    BsdfKind::Other,
+];
+
+macro_rules! kinds {
+    ($($kind:ident: $lanes:ident),* $(,)?) => {
+        $(#[derive(Debug)]
+        enum $kind {}
+
+        impl Kind for $kind {
+            type Bsdf<R: Real> = $lanes<R>;
+        })*
+
+        impl<'s> Shade<'_, 's> {
+            /// Shades vertices whose BSDFs are of a kind.
+            fn of_kind(&mut self, kind: BsdfKind) {
+                let instruction_set = self.setting.instruction_set;
+                match kind {
+                    $(BsdfKind::$kind => {
+                        let rows: Rows<'_, $kind> = Rows(&self.vertices.rows, PhantomData);
+                        instruction_set.run(ShadeRows { shade: self, rows });
+                    })*
+                    BsdfKind::Other => {
+                        let bsdfs: &[Bsdf] = &self.vertices.bsdfs;
+                        self.run::<f32, _>(&bsdfs);
+                    }
+                }
+            }
+        }
+    };
+}
+
+kinds!(
+    Diffuse: DiffuseLanes,
+    DiffuseTransmission: DiffuseTransmissionLanes,
+    Conductor: ConductorLanes,
+    Dielectric: DielectricLanes,
+    ThinDielectric: ThinDielectricLanes,
+    CoatedDiffuse: CoatedDiffuseLanes,
+    CoatedConductor: CoatedConductorLanes,
+);
 
 impl Setting<'_> {
     /// The weight of light that a ray found by itself, against a sample of the light with this density.
@@ -199,5 +314,35 @@ impl Setting<'_> {
             Strategy::Lights => f32::from(u8::from(light_pdf <= 0.0)),
             Strategy::Both => shade::power_heuristic(chosen, light_pdf),
         }
+    }
+
+    /// By how much rays are rounded.
+    #[inline(always)]
+    fn rounding(&self, is_single: bool) -> Rounding {
+        match self.scene.accel().picture_rounding() {
+            Some(PictureRounding { origin, relative, absolute }) if is_single => {
+                Rounding { origin, relative, absolute }
+            }
+            _ => Rounding { origin: DVec3::ZERO, relative: 0.0, absolute: 0.0 },
+        }
+    }
+}
+
+impl Rounding {
+    /// The error of points, grown so that rays which leave them do not meet their surfaces again.
+    #[inline(always)]
+    fn grow<R: Real>(&self, point: V3<R::Double>, error: V3<R::Double>) -> V3<R::Double> {
+        let [x, y, z] = self.origin.to_array();
+        V3 {
+            x: self.grown::<R>(point.x, error.x, x),
+            y: self.grown::<R>(point.y, error.y, y),
+            z: self.grown::<R>(point.z, error.z, z),
+        }
+    }
+
+    #[inline(always)]
+    fn grown<R: Real>(&self, x: R::Double, error: R::Double, origin: f64) -> R::Double {
+        let s = R::Double::splat;
+        error + ((x - s(origin)).abs() * s(self.relative) + s(self.absolute))
     }
 }

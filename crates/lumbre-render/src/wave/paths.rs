@@ -38,6 +38,8 @@ pub(crate) struct Slots<'s> {
     /// The words of [`Draw`], for lanes: those of the pixel, and the number of the sample.
     pub(crate) pixel: [Vec<u32>; 2],
     pub(crate) index: Vec<u32>,
+    /// When its rays look.
+    pub(crate) time: Vec<f64>,
     /// The ray from the camera.
     pub(crate) camera: Vec<CameraRay>,
     /// The light that the path has found.
@@ -55,6 +57,7 @@ impl Slots<'_> {
         self.draws.clear();
         self.pixel.iter_mut().for_each(Vec::clear);
         self.index.clear();
+        self.time.clear();
         self.camera.clear();
         self.radiance.clear();
         self.interiors.clear();
@@ -69,6 +72,7 @@ impl Slots<'_> {
         self.pixel[0].push(pixel[0]);
         self.pixel[1].push(pixel[1]);
         self.index.push(index);
+        self.time.push(camera.ray.time);
         self.camera.push(camera);
         self.radiance.push(Spectrum::BLACK);
         if has_solids {
@@ -87,6 +91,8 @@ pub(crate) struct Paths {
     pub(crate) slot: Vec<u32>,
     /// Where the ray starts; lights were sampled from there, too.
     pub(crate) origin: [Vec<f64>; 3],
+    /// The normal there that lights were sampled for: see [`lumbre_scene::light::lanes::Receiver`].
+    pub(crate) receiver: [Vec<f32>; 3],
     /// Unit.
     pub(crate) direction: [Vec<f32>; 3],
     pub(crate) throughput: [Vec<f32>; 3],
@@ -109,6 +115,7 @@ pub(crate) const SCATTERED: u32 = 1 << 31;
 pub(crate) struct Departure<R: Real> {
     pub(crate) slot: R::UInt,
     pub(crate) origin: V3<R::Double>,
+    pub(crate) receiver: V3<R>,
     pub(crate) direction: V3<R>,
     pub(crate) throughput: V3<R>,
     pub(crate) eta_scale: R,
@@ -123,6 +130,7 @@ pub(crate) struct Departure<R: Real> {
 pub(crate) struct OnePath {
     pub(crate) slot: u32,
     pub(crate) origin: DVec3,
+    pub(crate) receiver: Vec3,
     pub(crate) direction: Vec3,
     pub(crate) throughput: Spectrum,
     pub(crate) eta_scale: f32,
@@ -159,6 +167,7 @@ impl Paths {
         OnePath {
             slot: self.slot[at],
             origin: self.origin(at),
+            receiver: self.receiver(at),
             direction: self.direction(at),
             throughput: self.throughput(at),
             eta_scale: self.eta_scale[at],
@@ -172,6 +181,9 @@ impl Paths {
     fn put(&mut self, at: usize, path: &OnePath) {
         self.slot[at] = path.slot;
         for (column, x) in self.origin.iter_mut().zip(path.origin.to_array()) {
+            column[at] = x;
+        }
+        for (column, x) in self.receiver.iter_mut().zip(path.receiver.to_array()) {
             column[at] = x;
         }
         for (column, x) in self.direction.iter_mut().zip(path.direction.to_array()) {
@@ -189,6 +201,7 @@ impl Paths {
     pub(crate) fn reserve(&mut self, len: usize) {
         grow(&mut self.slot, len);
         self.origin.iter_mut().for_each(|column| grow(column, len));
+        self.receiver.iter_mut().for_each(|column| grow(column, len));
         self.direction.iter_mut().for_each(|column| grow(column, len));
         self.throughput.iter_mut().for_each(|column| grow(column, len));
         for column in [&mut self.eta_scale, &mut self.pdf, &mut self.width, &mut self.spread] {
@@ -205,6 +218,9 @@ impl Paths {
         path.origin.x.compress_store(mask, &mut self.origin[0][to..]);
         path.origin.y.compress_store(mask, &mut self.origin[1][to..]);
         path.origin.z.compress_store(mask, &mut self.origin[2][to..]);
+        path.receiver.x.compress_store(mask, &mut self.receiver[0][to..]);
+        path.receiver.y.compress_store(mask, &mut self.receiver[1][to..]);
+        path.receiver.z.compress_store(mask, &mut self.receiver[2][to..]);
         path.direction.x.compress_store(mask, &mut self.direction[0][to..]);
         path.direction.y.compress_store(mask, &mut self.direction[1][to..]);
         path.direction.z.compress_store(mask, &mut self.direction[2][to..]);
@@ -226,6 +242,10 @@ impl Paths {
 
     pub(crate) fn origin(&self, path: usize) -> DVec3 {
         DVec3::new(self.origin[0][path], self.origin[1][path], self.origin[2][path])
+    }
+
+    pub(crate) fn receiver(&self, path: usize) -> Vec3 {
+        Vec3::new(self.receiver[0][path], self.receiver[1][path], self.receiver[2][path])
     }
 
     pub(crate) fn direction(&self, path: usize) -> Vec3 {

@@ -1,28 +1,136 @@
 //! The closest hits of all rays of a wave.
 
-use lumbre_scene::Scene;
+use lumbre_geometry::Ray;
+use lumbre_kernel::{Hit, HitColumns, RayColumns};
+use lumbre_scene::{Footprint, Interaction, Scene};
 
-use crate::wave::Wave;
+use crate::wave::paths::{Paths, Slots};
 
-impl Wave<'_> {
-    /// Finds what every ray meets.
-    pub(super) fn search(&mut self, scene: &Scene) {
-        self.collect_rays();
-        scene.closest_batch(&self.rays, &mut self.hits);
+/// What the rays of a wave met.
+#[derive(Debug, Default)]
+pub(crate) struct Hits {
+    columns: HitColumns,
+    /// In double precision; used where `is_single` does not say otherwise.
+    double: Vec<Option<Hit>>,
+    is_single: bool,
+    rays: Vec<Ray>,
+    times: Vec<f64>,
+}
+
+/// A triangle of a mesh in the world itself that a ray met.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MetTriangle {
+    /// The id of its geometry.
+    pub(crate) id: u32,
+    pub(crate) triangle: u32,
+    /// The barycentrics of its second and third corner.
+    pub(crate) local: [f32; 2],
+}
+
+/// Which rays a wave sends through the scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Precision {
+    /// Rounded once, relative to the origin of the meshes; exact shapes are met in double precision all the same.
+    Single,
+    /// In double precision throughout.
+    Double,
+}
+
+impl Precision {
+    /// What a scene allows: rays in single precision unless double is asked for, or the scene has no tree for them.
+    pub(crate) fn of(scene: &Scene, asks_for_double: bool) -> Self {
+        // Cut-outs are decided by hits in double precision.
+        let is_single = !asks_for_double && !scene.has_holes() && scene.accel().picture_rounding().is_some();
+        if is_single { Self::Single } else { Self::Double }
+    }
+}
+
+impl Hits {
+    /// Finds what every ray meets; of rays from the camera, what it sees.
+    pub(crate) fn search(
+        &mut self,
+        scene: &Scene,
+        paths: &Paths,
+        slots: &Slots<'_>,
+        precision: Precision,
+        is_seen: bool,
+    ) {
+        let len = paths.len;
+        self.is_single = precision == Precision::Single && !(is_seen && scene.has_one_sided());
+        let time = |path: usize| slots.camera[paths.slot[path] as usize].ray.time;
+        if !self.is_single {
+            self.rays.clear();
+            self.rays.extend((0..len).map(|path| paths.ray(path, time(path))));
+            self.double.resize(len, None);
+            if is_seen {
+                scene.closest_seen_batch(&self.rays, &mut self.double[..len]);
+            } else {
+                scene.closest_batch(&self.rays, &mut self.double[..len]);
+            }
+            return;
+        }
+        self.times.clear();
+        if scene.moves() {
+            self.times.extend((0..len).map(time));
+        }
+        let rays = RayColumns {
+            origin: paths.origin.each_ref().map(|column| &column[..len]),
+            direction: paths.direction.each_ref().map(|column| &column[..len]),
+            t_max: None,
+            time: scene.moves().then_some(&self.times),
+        };
+        scene.accel().closest_columns(&rays, false, &mut self.columns);
     }
 
-    /// Finds what rays from the camera meet.
-    pub(super) fn search_seen(&mut self, scene: &Scene) {
-        self.collect_rays();
-        scene.closest_seen_batch(&self.rays, &mut self.hits);
+    /// Whether a ray met nothing.
+    pub(crate) fn is_miss(&self, path: usize) -> bool {
+        if self.is_single { self.columns.id[path] == HitColumns::MISS } else { self.double[path].is_none() }
     }
 
-    fn collect_rays(&mut self) {
-        let Self { rays, paths, slots, hits, .. } = self;
-        rays.clear();
-        rays.extend(
-            (0..paths.len).map(|path| paths.ray(path, slots.camera[paths.slot[path] as usize].ray.time)),
-        );
-        hits.resize(paths.len, None);
+    /// The triangle in the world itself that a ray met.
+    #[inline]
+    pub(crate) fn triangle(&self, path: usize) -> Option<MetTriangle> {
+        if self.is_single {
+            let columns = &self.columns;
+            return columns.is_plain(path).then(|| MetTriangle {
+                id: columns.id[path],
+                triangle: columns.primitive[path],
+                local: [columns.local[0][path], columns.local[1][path]],
+            });
+        }
+        let hit = self.double[path].as_ref().filter(|hit| hit.instances.is_empty())?;
+        let local = hit.root.local.as_vec2().to_array();
+        Some(MetTriangle { id: hit.id, triangle: hit.primitive, local })
+    }
+
+    /// How far a ray went.
+    #[inline]
+    pub(crate) fn distance(&self, path: usize) -> f32 {
+        if self.is_single {
+            self.columns.t[path]
+        } else {
+            self.double[path].as_ref().map_or(0.0, |hit| hit.root.t as f32)
+        }
+    }
+
+    /// What a ray met, with all that one may want to know of it.
+    pub(crate) fn interaction<'s>(
+        &self,
+        scene: &'s Scene,
+        path: usize,
+        ray: &Ray,
+        footprint: &Footprint,
+    ) -> Option<Interaction<'s>> {
+        if self.is_single {
+            let hit = self.columns.to_hit(path)?;
+            Some(scene.picture_interaction(ray, &hit, footprint))
+        } else {
+            Some(scene.interaction(ray, self.double[path].as_ref()?, footprint))
+        }
+    }
+
+    /// Whether rays were rounded to single precision.
+    pub(crate) fn is_single(&self) -> bool {
+        self.is_single
     }
 }

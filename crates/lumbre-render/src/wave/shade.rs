@@ -3,16 +3,18 @@
 use std::marker::PhantomData;
 
 use lumbre_math::DVec3;
+use lumbre_scene::light::Sampling;
+use lumbre_scene::light::lanes::{LaneLightSample, Receiver};
 use lumbre_shading::lanes::{LaneBsdf, LaneSample};
 use lumbre_simd::{Double, Job, Mask, Real, UInt, V3};
 
 use crate::transport::Strategy;
 use crate::transport::sampler::LaneDraw;
-use crate::wave::lights::{LightLanes, pass_solids, push_panes, sample_lights};
+use crate::wave::lights::{pass_solids, push_panes};
 use crate::wave::paths::{Departure, Paths, SCATTERED, Slots};
 use crate::wave::shadows::{NEARLY_WHOLE, Segment, Shadows};
 use crate::wave::traced::Traced;
-use crate::wave::vertices::{FOLDS, Place, RISES, SIDED, Vertices, gather3, gather64};
+use crate::wave::vertices::{FOLDS, LIT_FROM_BELOW, Place, RISES, SIDED, Vertices, gather3, gather64};
 use crate::wave::{Leg, Setting};
 
 /// BSDFs of one kind, whatever the lanes.
@@ -69,15 +71,17 @@ pub(crate) struct Shade<'a, 's> {
     pub(crate) slots: &'a Slots<'s>,
     pub(crate) paths: &'a Paths,
     pub(crate) vertices: &'a Vertices<'s>,
-    /// Positions of paths, and after the last ones enough others to fill a vector.
+    /// Positions of vertices, and after the last ones enough others to fill a vector.
     pub(crate) queue: &'a [u32],
     pub(crate) count: usize,
     pub(crate) next: &'a mut Paths,
     /// First parts of rays of `next`.
     pub(crate) legs: &'a mut Vec<Leg>,
     pub(crate) shadows: &'a mut Shadows<'s>,
-    /// Paths that go through a surface, in scenes with solids.
+    /// Vertices whose paths go through the surface, in scenes with solids.
     pub(crate) crossings: &'a mut Vec<u32>,
+    /// Whether rays are rounded to single precision.
+    pub(crate) is_single: bool,
     /// What happens, where somebody asks: of a wave of one path.
     pub(crate) traced: Option<&'a mut Traced>,
 }
@@ -113,6 +117,8 @@ impl<K: Kind> Job for ShadeRows<'_, '_, '_, K> {
 #[derive(Clone, Copy)]
 struct Vertex<R: Real> {
     place: Place<R>,
+    /// The normal for which lights are sampled.
+    receiver: V3<R>,
     /// The shading frame.
     s: V3<R>,
     t: V3<R>,
@@ -172,7 +178,8 @@ impl<R: Real> Vertex<R> {
             risen = gather64::<R>(&vertices.risen, at);
         }
         let wo = V3 { x: s.dot(towards), y: t.dot(towards), z: n.dot(towards) };
-        Self { place, s, t, n, wo, folds, sided: has::<R>(flags, SIDED), rises, smooth, risen }
+        let receiver = place.normal.or_zero(!has::<R>(flags, LIT_FROM_BELOW));
+        Self { place, receiver, s, t, n, wo, folds, sided: has::<R>(flags, SIDED), rises, smooth, risen }
     }
 
     #[inline(always)]
@@ -274,6 +281,8 @@ fn is_light<R: Real>(colour: V3<R>) -> R::Mask {
 /// The lanes of a chunk of the queue.
 #[derive(Clone, Copy)]
 struct Arrived<R: Real> {
+    /// The position of the vertex, and that of its path.
+    vertex_at: R::UInt,
     at: R::UInt,
     slot: R::UInt,
     depth: R::UInt,
@@ -288,17 +297,19 @@ impl<'s> Shade<'_, 's> {
         let mut done = 0;
         while done < self.count {
             let lanes = R::Mask::first(self.count - done);
-            let at = R::UInt::from_slice(&self.queue[done..]);
+            let vertex_at = R::UInt::from_slice(&self.queue[done..]);
+            let at = R::UInt::gather(&self.vertices.path, vertex_at);
             done += R::LANES;
             let paths = self.paths;
             let slot = R::UInt::gather(&paths.slot, at);
             let towards = -gather3::<R>(&paths.direction, at);
             let arrived = Arrived {
+                vertex_at,
                 at,
                 slot,
                 depth: R::UInt::gather(&paths.depth, at) & R::UInt::splat(!SCATTERED),
                 throughput: gather3(&paths.throughput, at),
-                vertex: Vertex::new(self.vertices, at, towards),
+                vertex: Vertex::new(self.vertices, vertex_at, towards),
             };
             let draw = LaneDraw::<R> {
                 kind: self.setting.sampler,
@@ -308,7 +319,7 @@ impl<'s> Shade<'_, 's> {
                 ],
                 index: R::UInt::gather(&self.slots.index, slot),
             };
-            let bsdf = bsdfs.load(R::UInt::gather(&self.vertices.bsdf, at));
+            let bsdf = bsdfs.load(R::UInt::gather(&self.vertices.bsdf, vertex_at));
             let useful = lanes & !bsdf.is_delta();
             if useful.any() {
                 self.light(useful, &arrived, &bsdf, draw.light(arrived.depth));
@@ -321,8 +332,18 @@ impl<'s> Shade<'_, 's> {
     #[inline(always)]
     fn light<R: Real, B: Scatters<R>>(&mut self, useful: R::Mask, arrived: &Arrived<R>, bsdf: &B, u: [R; 4]) {
         let vertex = &arrived.vertex;
-        let from = vertex.place.start(vertex.place.normal);
-        let light: LightLanes<R> = sample_lights(self.setting, self.slots, useful, arrived.slot, from, u);
+        let scene = self.setting.scene;
+        let receiver = Receiver {
+            from: vertex.place.start(vertex.place.normal),
+            normal: vertex.receiver,
+            time: self.setting.moves.then_some(R::Double::gather(&self.slots.time, arrived.slot)),
+        };
+        let sampling = match self.setting.strategy {
+            Strategy::Lights => Sampling::LightsOnly,
+            Strategy::Both | Strategy::Bsdf => Sampling::Mis,
+        };
+        let light: LaneLightSample<R> =
+            scene.lane_lights().sample(scene, useful, &receiver, [u[2], u[0], u[1], u[3]], sampling);
         let Scattered { f, pdf: bsdf_pdf } = vertex.eval(bsdf, light.towards);
         let weight = match self.setting.strategy {
             Strategy::Both => power_heuristic(light.pdf, bsdf_pdf),
@@ -340,9 +361,11 @@ impl<'s> Shade<'_, 's> {
         if self.setting.has_solids && found.any() {
             // What comes through panes is told with them.
             let through_air = found & !through_panes;
-            arriving = pass_solids(self, through_air, arrived.at, arrived.slot, crosses, &light, arriving);
+            let at = arrived.vertex_at;
+            arriving = pass_solids(self, through_air, at, arrived.slot, crosses, &light, arriving);
         }
-        let end = Place::<R>::new(light.point, light.error, light.normal).start(-light.towards);
+        let error = self.setting.rounding(self.is_single).grow::<R>(light.point, light.error);
+        let end = Place::<R>::new(light.point, error, light.normal).start(-light.towards);
         let infinite = light.infinite;
         let segment = Segment {
             slot: arrived.slot,
@@ -360,11 +383,10 @@ impl<'s> Shade<'_, 's> {
         let first = self.shadows.len;
         self.shadows.push(found, &segment);
         if (found & stays).any() {
-            let from = vertex.place.start(vertex.place.normal);
-            push_legs::<R>(&mut self.shadows.legs, first, found, found & stays, from);
+            push_legs::<R>(&mut self.shadows.legs, first, found, found & stays, receiver.from);
         }
         if through_panes.any() {
-            push_panes(self, first, found, through_panes, arrived.at, arrived.slot, crosses, &light);
+            push_panes(self, first, found, through_panes, arrived.vertex_at, arrived.slot, crosses, &light);
         }
     }
 
@@ -404,13 +426,14 @@ impl<'s> Shade<'_, 's> {
         let path = Departure {
             slot: arrived.slot,
             origin,
+            receiver: vertex.receiver,
             direction,
             throughput,
             eta_scale,
             pdf,
             depth: depth | scattered,
-            width: R::gather(&self.vertices.width, at),
-            spread: R::gather(&self.vertices.spread, at),
+            width: R::gather(&self.vertices.width, arrived.vertex_at),
+            spread: R::gather(&self.vertices.spread, arrived.vertex_at),
         };
         if let Some(traced) = &mut self.traced {
             traced.scattered(goes_on, risky, survives, likely, &sample, &path);
@@ -426,7 +449,7 @@ impl<'s> Shade<'_, 's> {
         }
         if self.setting.has_solids {
             let crosses = survives & vertex.crosses(direction, sample.transmitted);
-            push_crossings::<R>(self.crossings, crosses, at);
+            push_crossings::<R>(self.crossings, crosses, arrived.vertex_at);
         }
     }
 }
@@ -445,7 +468,7 @@ fn push_legs<R: Real>(legs: &mut Vec<Leg>, first: usize, all: R::Mask, some: R::
     }
 }
 
-/// Notes which paths go through a surface.
+/// Notes whose paths go through a surface.
 #[inline(always)]
 fn push_crossings<R: Real>(crossings: &mut Vec<u32>, mask: R::Mask, at: R::UInt) {
     let at = at.to_lanes();

@@ -1,6 +1,7 @@
 //! Segments between vertices and lights: what light would come, unless something is in its way.
 
 use lumbre_geometry::Ray;
+use lumbre_kernel::RayColumns;
 use lumbre_math::DVec3;
 use lumbre_scene::{LightSample, Scene};
 use lumbre_shading::Spectrum;
@@ -9,8 +10,8 @@ use lumbre_simd::{Double, Mask, Real, UInt, V3};
 use crate::transport::Record;
 use crate::transport::interior::Interiors;
 use crate::transport::through::straight_on;
-use crate::wave::Leg;
 use crate::wave::paths::{Slots, grow};
+use crate::wave::{Leg, Setting};
 
 /// Shadow segments, in columns.
 #[derive(Debug, Default)]
@@ -29,6 +30,10 @@ pub(crate) struct Shadows<'s> {
     /// Segments that panes let through.
     pub(crate) panes: Vec<Pane<'s>>,
     rays: Vec<Ray>,
+    /// For rays in single precision: their directions and ends.
+    direction: [Vec<f32>; 3],
+    t_max: Vec<f32>,
+    times: Vec<f64>,
     blocked: Vec<bool>,
 }
 
@@ -100,48 +105,71 @@ impl<'s> Shadows<'s> {
     /// Gives each path the light that comes through, and tells of each segment what share that is.
     pub(crate) fn resolve(
         &mut self,
-        scene: &'s Scene,
+        setting: &Setting<'s>,
+        is_single: bool,
         slots: &mut Slots<'_>,
-        regularize: bool,
         record: &mut Record,
         mut resolved: impl FnMut(usize, Spectrum),
     ) {
-        let len = self.len;
-        record.counts.shadow += (len - self.panes.len()) as u64;
-        let mut rays = std::mem::take(&mut self.rays);
-        rays.clear();
-        rays.extend((0..len).map(|i| self.ray(i, slots.camera[self.slot[i] as usize].ray.time)));
-        self.blocked.clear();
-        self.blocked.resize(len, false);
-        occluded(scene, &rays, &mut self.blocked);
+        let scene = setting.scene;
+        record.counts.shadow += (self.len - self.panes.len()) as u64;
+        self.search(scene, is_single, slots);
         for &Leg { ray: segment, from } in &self.legs {
             let segment = segment as usize;
             if !self.blocked[segment] {
-                let to = rays[segment].origin;
-                let leg = Ray::new(from, to - from).with_range(0.0, 1.0).at_time(rays[segment].time);
+                let ray = self.ray(segment, slots.time[self.slot[segment] as usize]);
+                let leg = Ray::new(from, ray.origin - from).with_range(0.0, 1.0).at_time(ray.time);
                 record.counts.shadow += 1;
                 self.blocked[segment] = scene.is_occluded(&leg);
             }
         }
-        let mut panes = self.panes.drain(..).peekable();
-        for (i, ray) in rays.iter().enumerate() {
+        let mut panes = std::mem::take(&mut self.panes);
+        let mut next_pane = panes.drain(..).peekable();
+        for i in 0..self.len {
             let mut passes = if self.blocked[i] { Spectrum::BLACK } else { Spectrum::WHITE };
-            if let Some(pane) = panes.next_if(|pane| pane.segment as usize == i) {
-                // Something is in its way, perhaps a pane.
-                passes = straight_on(scene, *ray, &pane.sample, pane.around, regularize, record);
+            if let Some(pane) = next_pane.next_if(|pane| pane.segment as usize == i) {
+                let ray = self.ray(i, slots.time[self.slot[i] as usize]);
+                passes = straight_on(scene, ray, &pane.sample, pane.around, setting.regularize, record);
             }
             if !passes.is_black() {
-                let light = Spectrum::new(self.light[0][i], self.light[1][i], self.light[2][i]);
-                slots.radiance[self.slot[i] as usize] += light * passes;
+                slots.radiance[self.slot[i] as usize] += self.light(i) * passes;
             }
             resolved(i, passes);
         }
-        drop(panes);
-        self.rays = rays;
+        drop(next_pane);
+        self.panes = panes;
     }
-}
 
-/// Whether something is in the way of each ray.
-fn occluded(scene: &Scene, rays: &[Ray], blocked: &mut [bool]) {
-    scene.occluded_batch(rays, blocked);
+    /// Finds whether something is in the way of each segment.
+    fn search(&mut self, scene: &Scene, is_single: bool, slots: &Slots<'_>) {
+        let len = self.len;
+        let time = |slot: &u32| slots.time[*slot as usize];
+        if !is_single {
+            let mut rays = std::mem::take(&mut self.rays);
+            rays.clear();
+            rays.extend((0..len).map(|i| self.ray(i, time(&self.slot[i]))));
+            self.blocked.clear();
+            self.blocked.resize(len, false);
+            scene.occluded_batch(&rays, &mut self.blocked);
+            self.rays = rays;
+            return;
+        }
+        for (single, double) in self.direction.iter_mut().zip(&self.way) {
+            single.clear();
+            single.extend(double[..len].iter().map(|&x| x as f32));
+        }
+        self.t_max.clear();
+        self.t_max.extend(self.end[..len].iter().map(|&end| end as f32));
+        self.times.clear();
+        if scene.moves() {
+            self.times.extend(self.slot[..len].iter().map(time));
+        }
+        let rays = RayColumns {
+            origin: self.origin.each_ref().map(|column| &column[..len]),
+            direction: self.direction.each_ref().map(|column| &column[..]),
+            t_max: Some(&self.t_max),
+            time: scene.moves().then_some(&self.times),
+        };
+        scene.accel().any_columns(&rays, false, &mut self.blocked);
+    }
 }

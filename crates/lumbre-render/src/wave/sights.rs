@@ -1,12 +1,13 @@
 //! A wave as integrators see it: samples of pixels, and what their rays from the camera meet.
 
 use lumbre_geometry::Ray;
-use lumbre_scene::{CameraRay, Scene, View};
+use lumbre_math::{DVec3, Vec3};
+use lumbre_scene::{CameraRay, Footprint, Scene, View};
 use lumbre_shading::Spectrum;
 
 use crate::transport::{Draw, Record, Sight};
 use crate::wave::paths::{OnePath, Paths};
-use crate::wave::{Setting, Wave};
+use crate::wave::{Precision, Setting, Wave};
 
 /// Samples whose rays from the camera have met what they meet first. An integrator gives each its radiance.
 #[derive(Debug)]
@@ -14,6 +15,7 @@ pub struct Sights<'a, 's> {
     scene: &'s Scene,
     view: &'a View,
     wave: &'a mut Wave<'s>,
+    precision: Precision,
     /// What the integrator is asked for, as slots.
     wanted: Vec<u32>,
 }
@@ -24,6 +26,7 @@ impl<'a, 's> Sights<'a, 's> {
         scene: &'s Scene,
         view: &'a View,
         wave: &'a mut Wave<'s>,
+        precision: Precision,
         samples: impl Iterator<Item = (Draw, CameraRay)>,
         record: &mut Record,
     ) -> Self {
@@ -36,23 +39,26 @@ impl<'a, 's> Sights<'a, 's> {
             // Paths keep directions in single precision: all that is told of the ray is told of that one.
             let direction = ray.direction.as_vec3();
             ray.direction = direction.as_dvec3();
+            let (width, spread) = cone(&camera);
+            let ray = &camera.ray;
             wave.paths.push_one(&OnePath {
                 slot: slot as u32,
                 origin: ray.origin,
+                receiver: Vec3::ZERO,
                 direction,
                 throughput: Spectrum::WHITE,
                 eta_scale: 1.0,
                 pdf: f32::INFINITY,
                 depth: 0,
-                width: 0.0,
-                spread: 0.0,
+                width,
+                spread,
             });
             wave.slots.push(draw, camera, has_solids);
         }
         record.counts.camera += wave.paths.len as u64;
-        wave.search_seen(scene);
+        wave.hits.search(scene, &wave.paths, &wave.slots, precision, true);
         let wanted = (0..wave.paths.len as u32).collect();
-        Self { scene, view, wave, wanted }
+        Self { scene, view, wave, precision, wanted }
     }
 
     /// The scene.
@@ -78,8 +84,7 @@ impl<'a, 's> Sights<'a, 's> {
     /// The ray from the camera of a sample, and what it meets.
     pub(crate) fn sight(&self, slot: usize) -> Sight<'s> {
         let ray = self.wave.slots.camera[slot];
-        let met = self.wave.hits[slot].as_ref();
-        Sight { ray, met: met.map(|hit| self.scene.interaction(&ray.ray, hit, &ray.footprint)) }
+        Sight { ray, met: self.wave.hits.interaction(self.scene, slot, &ray.ray, &ray.footprint) }
     }
 
     /// The random numbers of a sample.
@@ -111,15 +116,27 @@ impl<'a, 's> Sights<'a, 's> {
     /// Follows a path from each ray.
     pub(crate) fn follow(&mut self, setting: &Setting<'s>, record: &mut Record) {
         if self.wanted.len() < self.wave.paths.len {
+            // What others see is known: only these rays are asked again, to the same answer.
             let mut kept = Paths::default();
-            let mut hits = Vec::with_capacity(self.wanted.len());
             for &slot in &self.wanted {
                 kept.push_one(&self.wave.paths.get(slot as usize));
-                hits.push(self.wave.hits[slot as usize].take());
             }
             self.wave.paths = kept;
-            self.wave.hits = hits;
+            let Wave { hits, paths, slots, .. } = &mut *self.wave;
+            hits.search(self.scene, paths, slots, self.precision, true);
         }
-        self.wave.follow(setting, record);
+        self.wave.follow(setting, self.precision, record);
     }
+}
+
+/// The cone of a ray from the camera: the width of its footprint at its origin, and its growth.
+pub(crate) fn cone(camera: &CameraRay) -> (f32, f32) {
+    let Footprint::Neighbours { x_origin, x_direction, y_origin, y_direction } = camera.footprint else {
+        return (0.0, 0.0);
+    };
+    let ray = &camera.ray;
+    let mean = |x: DVec3, y: DVec3| 0.5 * (x.length() + y.length());
+    let width = mean(x_origin - ray.origin, y_origin - ray.origin);
+    let spread = mean(x_direction - ray.direction, y_direction - ray.direction);
+    (width as f32, spread as f32)
 }

@@ -1,14 +1,17 @@
 //! From hits to vertices: where paths are, what is in the way there, what shines, and how the surface scatters.
 
 use lumbre_geometry::Ray;
+use lumbre_math::Vec3;
 use lumbre_scene::{Footprint, Interaction};
 use lumbre_shading::medium::{DistanceSample, sample_henyey_greenstein};
 use lumbre_shading::{HomogeneousMedium, ShadingNormals, Spectrum};
 
 use crate::transport::Record;
+use crate::transport::interior::Interiors;
 use crate::transport::journal::{End, Event, Met, Source};
+use crate::wave::flat::FlatVertices;
 use crate::wave::paths::{OnePath, SCATTERED};
-use crate::wave::vertices::{FOLDS, RISES, SIDED};
+use crate::wave::vertices::{FOLDS, LIT_FROM_BELOW, SIDED};
 use crate::wave::{Setting, Wave};
 
 /// Collisions inside media that every path may have before Russian roulette.
@@ -17,25 +20,79 @@ const ROULETTE_START_IN_MEDIA: u32 = 4;
 const MAX_COLLISIONS: u32 = 1 << 14;
 
 impl<'s> Wave<'s> {
-    /// Writes down the vertices of all paths that met something, and queues those that scatter.
+    /// Writes down the vertices of all paths that met something, queues those that scatter, and adds the light of those that shine.
     pub(super) fn surfaces(&mut self, setting: &Setting<'s>, record: &mut Record) {
-        self.vertices.reset(self.paths.len, setting.has_solids);
-        self.queue.clear();
+        let scene = setting.scene;
+        self.vertices.reset(self.paths.len, scene.tables().rows());
+        self.flat.reset(self.paths.len);
+        self.found.clear();
         self.collided.clear();
+        let takes_flat = !setting.regularize;
+        let mut others = std::mem::take(&mut self.others);
+        others.clear();
         for path in 0..self.paths.len {
-            let Some(hit) = &self.hits[path] else { continue };
-            let slot = self.paths.slot[path] as usize;
-            let camera = &self.slots.camera[slot];
-            let ray = self.paths.ray(path, camera.ray.time);
-            let footprint = match self.paths.width[path] {
-                _ if self.is_first => camera.footprint,
-                width if width > 0.0 => {
-                    Footprint::Cone { width: width.into(), spread: self.paths.spread[path].into() }
-                }
-                _ => Footprint::Point,
+            if self.hits.is_miss(path) {
+                continue;
+            }
+            let in_the_open =
+                self.slots.interiors.get(self.paths.slot[path] as usize).is_none_or(Interiors::is_empty);
+            let met = if takes_flat && in_the_open { self.hits.triangle(path) } else { None };
+            let kind = met.and_then(|met| self.flat.push(setting, path, met, self.hits.distance(path)));
+            let Some(kind) = kind else {
+                others.push(path as u32);
+                continue;
             };
-            let here = setting.scene.interaction(&ray, hit, &footprint);
-            self.surface(setting, path, slot, &ray, &here, record);
+            let ends = self.paths.depth[path] & !SCATTERED == setting.max_depth;
+            if !ends {
+                self.vertices.queue(self.flat.len() - 1, kind);
+            }
+            if record.journal.is_some() {
+                self.tell_flat(setting, path, record);
+            }
+        }
+        setting.instruction_set.run(FlatVertices {
+            setting,
+            hits: &self.flat,
+            paths: &self.paths,
+            vertices: &mut self.vertices,
+            found: &mut self.found,
+            is_single: self.hits.is_single(),
+        });
+        self.add_found(setting, Source::Surface, record);
+        if record.journal.is_some() && self.flat.len() > 0 && self.vertices.is_unqueued() {
+            record.note(|| Event::Ended(End::Depth));
+        }
+        for &path in &others {
+            let path = path as usize;
+            let slot = self.paths.slot[path] as usize;
+            let ray = self.paths.ray(path, self.slots.time[slot]);
+            let footprint = self.footprint(path);
+            if let Some(here) = self.hits.interaction(scene, path, &ray, &footprint) {
+                self.surface(setting, path, slot, &ray, &here, record);
+            }
+        }
+        self.others = others;
+    }
+
+    /// The footprint of a path's ray.
+    fn footprint(&self, path: usize) -> Footprint {
+        if self.is_first {
+            return self.slots.camera[self.paths.slot[path] as usize].footprint;
+        }
+        match self.paths.width[path] {
+            width if width > 0.0 => {
+                Footprint::Cone { width: width.into(), spread: self.paths.spread[path].into() }
+            }
+            _ => Footprint::Point,
+        }
+    }
+
+    /// Tells of a flat surface that a path met.
+    fn tell_flat(&self, setting: &Setting<'s>, path: usize, record: &mut Record) {
+        let ray = self.paths.ray(path, self.slots.time[self.paths.slot[path] as usize]);
+        if let Some(here) = self.hits.interaction(setting.scene, path, &ray, &self.footprint(path)) {
+            let (depth, throughput) = (self.paths.depth[path] & !SCATTERED, self.paths.throughput(path));
+            record.note(|| Event::Met(Met::of(&ray, &here, depth, throughput)));
         }
     }
 
@@ -75,7 +132,6 @@ impl<'s> Wave<'s> {
             if outside != 1.0 {
                 bsdf = bsdf.immersed(outside);
             }
-            self.vertices.solids[path] = Some((material, here.front));
         }
         if setting.regularize && self.paths.depth[path] & SCATTERED != 0 {
             bsdf = bsdf.regularized();
@@ -84,24 +140,26 @@ impl<'s> Wave<'s> {
         if ShadingNormals::differ(frame.n, here.shading.geometric) {
             flags |= match setting.shading_normals {
                 ShadingNormals::Lumbre => FOLDS,
-                ShadingNormals::Pbrt => SIDED,
+                ShadingNormals::Pbrt => SIDED | LIT_FROM_BELOW,
             };
         }
+        if material.lets_light_through() {
+            flags |= LIT_FROM_BELOW;
+        }
+        self.vertices.push_place(path, &here.surface, here.surface.point_error, here.towards_origin);
         if flags & FOLDS != 0
             && let Some(risen) = here.terminator_origin()
         {
-            flags |= RISES;
             let (smooth, geometric) = (here.shading.normal, here.shading.geometric);
             let on_its_side = if here.front { geometric } else { -geometric };
             let smooth = if smooth.dot(on_its_side) < 0.0 { -smooth } else { smooth };
-            self.vertices.put_risen(path, smooth, risen);
+            self.vertices.put_risen(smooth, risen);
+            flags |= LIT_FROM_BELOW;
         }
-        self.vertices.put_place(path, &here.surface, here.surface.point_error, here.towards_origin);
-        self.vertices.put_bsdf(path, &frame, bsdf, flags);
-        let (width, spread) = here.cone();
-        self.vertices.width[path] = width as f32;
-        self.vertices.spread[path] = spread as f32;
-        self.queue.push(path as u32);
+        if material.is_solid() {
+            self.vertices.put_solid(material, here.front);
+        }
+        self.vertices.put_bsdf(&frame, bsdf, flags, here.cone());
     }
 
     /// Adds the light of the surface that was found.
@@ -119,7 +177,11 @@ impl<'s> Wave<'s> {
             return;
         }
         let chosen = self.paths.pdf[path];
-        let pdf = if chosen == f32::INFINITY { 0.0 } else { setting.scene.light_pdf(ray.origin, here) };
+        let receiver = self.paths.receiver(path).as_dvec3();
+        let pdf = match chosen {
+            f32::INFINITY => 0.0,
+            _ => setting.scene.light_pdf(ray.origin, receiver, here),
+        };
         let weight = setting.weight_of_found(chosen, pdf);
         let throughput = self.paths.throughput(path);
         self.slots.radiance[slot] += record.added(Source::Surface, throughput, emitted, weight);
@@ -196,6 +258,7 @@ impl<'s> Wave<'s> {
         self.collided.push(OnePath {
             slot: slot as u32,
             origin: ray.origin + distance * ray.direction,
+            receiver: Vec3::ZERO,
             direction: along.normalize(),
             throughput,
             eta_scale,

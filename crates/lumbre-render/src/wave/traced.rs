@@ -3,13 +3,14 @@
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Vec3};
 use lumbre_scene::LightSample;
+use lumbre_scene::light::lanes::LaneLightSample;
 use lumbre_shading::lanes::LaneSample;
 use lumbre_shading::{Scatter, Spectrum};
 use lumbre_simd::{Double, Mask, Real, V3};
 
 use crate::transport::Record;
 use crate::transport::journal::{End, Event, SampledLight, Scattered, Source};
-use crate::wave::lights::{LightLanes, first_sample};
+use crate::wave::lights::first_sample;
 use crate::wave::paths::Departure;
 use crate::wave::shadows::Segment;
 
@@ -46,7 +47,7 @@ impl Traced {
     pub(crate) fn light<R: Real>(
         &mut self,
         found: R::Mask,
-        light: &LightLanes<R>,
+        light: &LaneLightSample<R>,
         f: V3<R>,
         bsdf_pdf: R,
         weight: R,

@@ -2,14 +2,18 @@
 
 use lumbre_geometry::Surface;
 use lumbre_math::{DVec3, Vec3};
+use lumbre_shading::lanes::BsdfKind;
 use lumbre_shading::{Bsdf, Material, ShadingFrame};
 use lumbre_simd::{Double, Real, V3};
 
 use crate::wave::paths::grow;
 
-/// Vertices of paths, each at the position of its path.
+/// Vertices of paths.
 #[derive(Debug, Default)]
 pub(crate) struct Vertices<'s> {
+    pub(crate) len: usize,
+    /// The position of the path.
+    pub(crate) path: Vec<u32>,
     pub(crate) point: [Vec<f64>; 3],
     /// How far off the surface rays start: beyond any place where the true surface can be.
     pub(crate) offset: Vec<f64>,
@@ -18,16 +22,20 @@ pub(crate) struct Vertices<'s> {
     /// The shading frame: its x and its z axis.
     pub(crate) frame_s: [Vec<f32>; 3],
     pub(crate) frame_n: [Vec<f32>; 3],
-    /// Of [`FOLDS`], [`SIDED`] and [`RISES`].
+    /// Of [`FOLDS`], [`SIDED`], [`RISES`] and [`LIT_FROM_BELOW`].
     pub(crate) flags: Vec<u32>,
     /// Only where [`RISES`] says so: the shading normal before bump maps, on the side of the viewer, and where rays start that leave
     /// below the face but not below the smooth surface.
     pub(crate) smooth: [Vec<f32>; 3],
     pub(crate) risen: [Vec<f64>; 3],
-    /// The position of the BSDF in [`Vertices::bsdfs`].
+    /// Where the BSDF is: its row in [`Vertices::rows`] begins there, or, where its kind has no rows, its position in
+    /// [`Vertices::bsdfs`].
     pub(crate) bsdf: Vec<u32>,
+    pub(crate) rows: Vec<f32>,
     pub(crate) bsdfs: Vec<Bsdf>,
-    /// The solids that surfaces belong to, and whether they were met from outside; empty in scenes without solids.
+    /// The vertices to be shaded by the kind of their BSDF.
+    pub(crate) queues: [Vec<u32>; BsdfKind::COUNT],
+    /// The solids that surfaces belong to, and whether they were met from outside; none beyond the end.
     pub(crate) solids: Vec<Option<(&'s Material, bool)>>,
     /// The footprint of rays that leave: see [`lumbre_scene::Footprint::Cone`].
     pub(crate) width: Vec<f32>,
@@ -40,6 +48,9 @@ pub(crate) const FOLDS: u32 = 1;
 pub(crate) const SIDED: u32 = 2;
 /// The mesh stands for a smooth surface above the face.
 pub(crate) const RISES: u32 = 4;
+
+/// Light from below the horizon counts: the surface transmits, or stands for one that is not where it is.
+pub(crate) const LIT_FROM_BELOW: u32 = 8;
 
 /// A place off which rays start.
 #[derive(Clone, Copy)]
@@ -86,51 +97,95 @@ impl<R: Real> Place<R> {
 }
 
 impl<'s> Vertices<'s> {
-    /// Room for the vertices of so many paths.
-    pub(crate) fn reset(&mut self, len: usize, has_solids: bool) {
+    /// Forgets all, with room for so many; `rows` are those of uniform materials.
+    pub(crate) fn reset(&mut self, len: usize, rows: &[f32]) {
+        self.len = 0;
         let f64s = self.point.iter_mut().chain(&mut self.risen).chain([&mut self.offset]);
         f64s.for_each(|column| grow(column, len));
         let vectors = [&mut self.normal, &mut self.frame_s, &mut self.frame_n, &mut self.smooth];
         vectors.into_iter().flatten().for_each(|column| grow(column, len));
-        grow(&mut self.flags, len);
-        grow(&mut self.bsdf, len);
+        for column in [&mut self.path, &mut self.flags, &mut self.bsdf] {
+            grow(column, len);
+        }
         grow(&mut self.width, len);
         grow(&mut self.spread, len);
+        if self.rows.len() < rows.len() {
+            self.rows = rows.to_vec();
+        }
+        self.rows.truncate(rows.len());
         self.bsdfs.clear();
         self.solids.clear();
-        self.solids.resize(if has_solids { len } else { 0 }, None);
+        self.queues.iter_mut().for_each(Vec::clear);
     }
 
-    /// Writes down where a path is. The normal of the surface may face either side.
-    pub(crate) fn put_place(&mut self, path: usize, surface: &Surface, error: DVec3, towards: DVec3) {
-        let normal = surface.normal;
+    /// Appends where a path is. The normal of the surface may face either side.
+    pub(crate) fn push_place(&mut self, path: usize, surface: &Surface, error: DVec3, towards: DVec3) {
+        let (at, normal) = (self.len, surface.normal);
         let facing = if normal.dot(towards) < 0.0 { -normal } else { normal };
-        put64(&mut self.point, path, surface.point);
-        put(&mut self.normal, path, facing.as_vec3());
-        self.offset[path] = offset_of(normal, error);
+        self.len += 1;
+        self.path[at] = path as u32;
+        put64(&mut self.point, at, surface.point);
+        put(&mut self.normal, at, facing.as_vec3());
+        self.offset[at] = offset_of(normal, error);
+        self.flags[at] = 0;
     }
 
-    /// Writes down how the surface scatters.
-    pub(crate) fn put_bsdf(&mut self, path: usize, frame: &ShadingFrame, bsdf: Bsdf, flags: u32) {
-        put(&mut self.frame_s, path, frame.s);
-        put(&mut self.frame_n, path, frame.n);
-        self.flags[path] = flags;
-        self.bsdf[path] = self.bsdfs.len() as u32;
-        self.bsdfs.push(bsdf);
+    /// Writes down how the surface of the last vertex scatters, and queues it.
+    pub(crate) fn put_bsdf(&mut self, frame: &ShadingFrame, bsdf: Bsdf, flags: u32, cone: (f64, f64)) {
+        let at = self.len - 1;
+        put(&mut self.frame_s, at, frame.s);
+        put(&mut self.frame_n, at, frame.n);
+        self.flags[at] |= flags;
+        (self.width[at], self.spread[at]) = (cone.0 as f32, cone.1 as f32);
+        match bsdf.row() {
+            Some((kind, row)) => {
+                self.bsdf[at] = self.rows.len() as u32;
+                self.rows.extend(row);
+                self.queue(at, kind);
+            }
+            None => {
+                self.bsdf[at] = self.bsdfs.len() as u32;
+                self.bsdfs.push(bsdf);
+                self.queue(at, BsdfKind::Other);
+            }
+        }
     }
 
-    /// Writes down where rays start that leave below the face.
-    pub(crate) fn put_risen(&mut self, path: usize, smooth: Vec3, risen: DVec3) {
-        put(&mut self.smooth, path, smooth);
-        put64(&mut self.risen, path, risen);
+    /// Has a vertex shaded.
+    pub(crate) fn queue(&mut self, vertex: usize, kind: BsdfKind) {
+        self.queues[kind as usize].push(vertex as u32);
     }
 
-    /// Where a path is.
-    pub(crate) fn point(&self, path: usize) -> DVec3 {
-        DVec3::new(self.point[0][path], self.point[1][path], self.point[2][path])
+    /// Whether no vertex is to be shaded.
+    pub(crate) fn is_unqueued(&self) -> bool {
+        self.queues.iter().all(Vec::is_empty)
     }
 
-    /// Where paths are.
+    /// Writes down where rays start that leave the last vertex below the face.
+    pub(crate) fn put_risen(&mut self, smooth: Vec3, risen: DVec3) {
+        let at = self.len - 1;
+        self.flags[at] |= RISES;
+        put(&mut self.smooth, at, smooth);
+        put64(&mut self.risen, at, risen);
+    }
+
+    /// The solid that a vertex belongs to, and whether it was met from outside.
+    pub(crate) fn solid(&self, vertex: usize) -> Option<(&'s Material, bool)> {
+        self.solids.get(vertex).copied().flatten()
+    }
+
+    /// Writes down the solid of the last vertex.
+    pub(crate) fn put_solid(&mut self, solid: &'s Material, front: bool) {
+        self.solids.resize(self.len, None);
+        self.solids[self.len - 1] = Some((solid, front));
+    }
+
+    /// Where a vertex is.
+    pub(crate) fn point(&self, vertex: usize) -> DVec3 {
+        DVec3::new(self.point[0][vertex], self.point[1][vertex], self.point[2][vertex])
+    }
+
+    /// Where vertices are.
     #[inline(always)]
     pub(crate) fn place<R: Real>(&self, at: R::UInt) -> Place<R> {
         Place {
