@@ -11,10 +11,11 @@ use lumbre_scene::{Scene, View};
 use crate::adaptive::{self, Adaptive};
 use crate::clock::Clock;
 use crate::film::{Extras, Tile};
+use crate::integrators::{Integrator, integrator};
 use crate::one_sample::Taker;
 use crate::rendered::{noise, picture, rendered_of};
 use crate::state::{Piece, REMEMBERED, RenderState};
-use crate::transport::{Integrator, RayCounts, Record, integrator};
+use crate::transport::{RayCounts, Record};
 use crate::wave::{SampleId, WAVE, Wave};
 use crate::workers::Workers;
 use crate::{

@@ -1,8 +1,8 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![doc = include_str!("../README.md")]
 //!
-//! [`transport`] computes the radiance along a ray, [`film`] makes pixels of samples; neither knows the other, nor of threads. [`render`]
-//! is the verb.
+//! A render takes samples of pixels in waves of some thousand paths, of which an [`integrators::Integrator`] finds the light; [`film`] makes
+//! pixels of samples and knows nothing of that. [`render`] is the verb.
 
 mod adaptive;
 mod cancel;
@@ -10,6 +10,7 @@ mod clock;
 mod denoise;
 mod error;
 pub mod film;
+pub mod integrators;
 mod job;
 mod one_sample;
 mod options;
@@ -31,5 +32,6 @@ pub use rendered::{DroppedSample, Rendered, Stats};
 pub use state::{MergeError, Piece, RenderState, StateError};
 
 pub use crate::film::PixelBounds;
-pub use crate::transport::{Event, Feature, Integrator, RayCounts, RayIntegrator, Record};
+pub use crate::integrators::{Integrator, RayIntegrator};
+pub use crate::transport::{Event, Feature, RayCounts, Record};
 pub use crate::wave::Sights;

@@ -6,7 +6,8 @@ use lumbre_scene::{CameraRay, Footprint, Scene, View};
 use lumbre_shading::Spectrum;
 
 use crate::film::{FeatureSample, Filter, Sample};
-use crate::transport::{Draw, Event, Features, Integrator, Record, Sampler, Seen, caught, integrator};
+use crate::integrators::{Integrator, integrator};
+use crate::transport::{Draw, Event, Features, Record, Sampler, Seen, caught};
 use crate::wave::{Precision, SampleId, Sights, Wave, cone};
 use crate::{RenderError, RenderOptions};
 

@@ -10,7 +10,8 @@ use crate::common::*;
 use lumbre_geometry::{Cuboid, Sphere, Torus};
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{DVec3, Transform, Vec2, Vec3};
-use lumbre_render::transport::{Draw, Path, RayIntegrator, Sight};
+use lumbre_render::integrators::{Path, RayIntegrator};
+use lumbre_render::transport::{Draw, Sight};
 use lumbre_render::{
     CancelToken, Feature, NoProgress, PixelBounds, Progress, Record, RenderError, RenderOptions, Snapshot,
     State, denoise, render, render_with,
@@ -148,10 +149,11 @@ fn a_scene_far_from_the_origin_looks_the_same() {
         let offset = distance * DVec3::new(1.0, -1.0, 0.75);
         let far = Scene::build(still_life(offset)).unwrap();
         let image = picture(&far, &options(&far, 60, 40, 16)).image;
-        // What rounding of the input to 1e-10 may change is which side of an edge a sample falls on.
+        // What rounding of the input to 1e-10 may change is which side of an edge a sample falls on, and the last bit of a direction in
+        // single precision, by which walks through coats and mixtures are keyed.
         let differs = |a: &Rgb, b: &Rgb| (a.g - b.g).abs() > 1e-3 * (a.g + b.g);
         let changed = reference.pixels().iter().zip(image.pixels()).filter(|(a, b)| differs(a, b)).count();
-        assert!(changed <= 24, "{distance}: {changed} of 2400 pixels");
+        assert!(changed <= 240, "{distance}: {changed} of 2400 pixels");
         assert_close(mean(&image)[1], mean(&reference)[1], 1e-3, "far away");
     }
 }

@@ -12,7 +12,8 @@ use lumbre_geometry::{
 };
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{DAffine3, DMat3, DVec2, DVec3, Transform, Vec3, warp64};
-use lumbre_render::transport::{Path, Strategy};
+use lumbre_render::integrators::Path;
+use lumbre_render::transport::Strategy;
 use lumbre_render::{CancelToken, NoProgress, render_with};
 use lumbre_scene::{EnvironmentDesc, EnvironmentMapping, GeometryDesc, LightDesc, Scene, SceneDesc};
 

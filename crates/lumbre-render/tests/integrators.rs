@@ -9,7 +9,7 @@ use crate::common::*;
 use lumbre_geometry::{Cuboid, Disk, Sphere};
 use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Transform};
-use lumbre_render::transport::{Path, Whitted};
+use lumbre_render::integrators::{Path, Whitted};
 use lumbre_render::{CancelToken, NoProgress, render_with};
 use lumbre_scene::{IntegratorKind, LightDesc, Scene, SceneDesc};
 use lumbre_shading::dielectric::ThinDielectric;

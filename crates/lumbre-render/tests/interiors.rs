@@ -8,7 +8,7 @@ use crate::common::*;
 use lumbre_geometry::{Cuboid, Sphere};
 use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Transform};
-use lumbre_render::transport::{Integrator, Path, Whitted};
+use lumbre_render::integrators::{Integrator, Path, Whitted};
 use lumbre_render::{CancelToken, NoProgress, render_with};
 use lumbre_scene::{Camera, CameraKind, LightDesc, Scene, SceneDesc};
 use lumbre_shading::{FloatTexture, Material, MaterialKind, PrincipledParams, VolumeParams};

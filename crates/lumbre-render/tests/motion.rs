@@ -8,7 +8,8 @@ use crate::common::*;
 use lumbre_geometry::{Disk, Sphere};
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{AnimatedTransform, DAffine3, DMat3, DVec3, Transform, Vec2, Vec3};
-use lumbre_render::transport::{Path, Strategy};
+use lumbre_render::integrators::Path;
+use lumbre_render::transport::Strategy;
 use lumbre_render::{CancelToken, NoProgress, render_with};
 use lumbre_scene::{
     Camera, CameraKind, GeometryDesc, InstanceDesc, LightDesc, MeshMoment, MeshMotion, ObjectDesc, ObjectId,

@@ -7,7 +7,7 @@ use crate::common::*;
 use crate::determinism::still_life;
 use lumbre_math::DVec3;
 use lumbre_math::random::RandomStream;
-use lumbre_render::transport::integrator;
+use lumbre_render::integrators::integrator;
 use lumbre_render::{
     CancelToken, Keeper, NoProgress, PixelBounds, RenderError, RenderOptions, RenderState, Rendered,
     render_from,

@@ -9,7 +9,7 @@ use crate::common::*;
 use lumbre_geometry::{Ray, Sphere};
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{DVec3, Vec3};
-use lumbre_render::transport::{Integrator, Path, Whitted};
+use lumbre_render::integrators::{Integrator, Path, Whitted};
 use lumbre_render::{CancelToken, NoProgress, render_with};
 use lumbre_scene::{Footprint, GeometryDesc, IntegratorDesc, LightDesc, MeshDesc, Scene, SceneDesc};
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use lumbre_kernel::TriangleMesh;
 use lumbre_math::{DVec3, Vec2, Vec3};
 use lumbre_shading::lanes::BsdfKind;
-use lumbre_shading::{Bsdf, TextureContext, VertexData};
+use lumbre_shading::{TextureContext, VertexData};
 
 use crate::surface::{Form, SurfaceEntry};
 
@@ -82,7 +82,7 @@ impl SurfaceTable {
             return None;
         }
         let bsdf = material.bsdf(&ANYWHERE)?;
-        if !is_isotropic(&bsdf) {
+        if !bsdf.is_isotropic() {
             return None;
         }
         let (kind, numbers) = bsdf.row()?;
@@ -97,17 +97,4 @@ impl SurfaceTable {
             emission: entry.emission.as_ref().map(|e| (e.radiance.to_array(), e.two_sided)),
         })
     }
-}
-
-/// Whether a BSDF is the same however its frame is turned about the normal.
-fn is_isotropic(bsdf: &Bsdf) -> bool {
-    let facets: &[_] = match bsdf {
-        Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::ThinDielectric(_) => &[],
-        Bsdf::Conductor(bsdf) => &[bsdf.facets],
-        Bsdf::Dielectric(bsdf) => &[bsdf.facets],
-        Bsdf::CoatedDiffuse(bsdf) => &[bsdf.coat.face.facets],
-        Bsdf::CoatedConductor(bsdf) => &[bsdf.coat.face.facets, bsdf.base.facets],
-        Bsdf::Principled(_) | Bsdf::Uber(_) => return false,
-    };
-    facets.iter().all(|facets| facets.alpha().x == facets.alpha().y)
 }

@@ -126,6 +126,19 @@ impl Bsdf {
         }
     }
 
+    /// Whether it is certainly the same however its frame is turned about the normal.
+    pub fn is_isotropic(&self) -> bool {
+        let facets: &[_] = match self {
+            Self::Diffuse(_) | Self::DiffuseTransmission(_) | Self::ThinDielectric(_) => &[],
+            Self::Conductor(bsdf) => &[bsdf.facets],
+            Self::Dielectric(bsdf) => &[bsdf.facets],
+            Self::CoatedDiffuse(bsdf) => &[bsdf.coat.face.facets],
+            Self::CoatedConductor(bsdf) => &[bsdf.coat.face.facets, bsdf.base.facets],
+            Self::Principled(_) | Self::Uber(_) => return false,
+        };
+        facets.iter().all(|facets| facets.alpha().x == facets.alpha().y)
+    }
+
     /// An estimate of the hemispherical albedo for the AOV of that name: exact for diffuse surfaces, the
     /// reflectance at normal incidence for metals, 1 for glass.
     pub fn albedo(&self) -> Spectrum {

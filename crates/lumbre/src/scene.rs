@@ -8,7 +8,8 @@ use lumbre_formats::{Diagnostic, Diagnostics, FormatError, Place, ReadOptions, o
 use lumbre_geometry::Ray;
 use lumbre_kernel::Hit;
 use lumbre_math::DVec3;
-use lumbre_render::transport::{Event, integrator};
+use lumbre_render::integrators::integrator;
+use lumbre_render::transport::Event;
 use lumbre_render::{
     CancelToken, ExplainedSample, Feature, Keeper, NoProgress, Progress, RenderOptions, RenderState, Stop,
     render_from,

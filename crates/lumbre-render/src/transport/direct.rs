@@ -27,7 +27,7 @@ use crate::transport::through::straight_on;
 /// on it comes to hover.
 ///
 /// With [`ShadingNormals::Pbrt`] nothing of that is done.
-pub(super) struct Vertex<'a, 's> {
+pub(crate) struct Vertex<'a, 's> {
     pub met: &'a Interaction<'s>,
     pub bsdf: Bsdf,
     pub material: &'s Material,
@@ -44,7 +44,7 @@ pub(super) struct Vertex<'a, 's> {
 }
 
 /// A direction in which a path goes on.
-pub(super) struct Bounce {
+pub(crate) struct Bounce {
     /// Unit.
     pub direction: DVec3,
     /// f · |cos θ| / pdf.
@@ -61,7 +61,7 @@ pub(super) struct Bounce {
 
 impl<'a, 's> Vertex<'a, 's> {
     /// `None` where nothing scatters.
-    pub(super) fn new(
+    pub(crate) fn new(
         scene: &'s Scene,
         met: &'a Interaction<'s>,
         interiors: &Interiors<'s>,
@@ -71,7 +71,7 @@ impl<'a, 's> Vertex<'a, 's> {
     }
 
     /// One vertex for each material of a mixture, with its share: see [`Interaction::parts`].
-    pub(super) fn parts(
+    pub(crate) fn parts(
         scene: &'s Scene,
         met: &'a Interaction<'s>,
         least: f32,
@@ -148,7 +148,7 @@ impl<'a, 's> Vertex<'a, 's> {
     }
 
     /// f · |cos θ| towards a unit direction of the world.
-    pub(super) fn eval(&self, wi: DVec3) -> Spectrum {
+    pub(crate) fn eval(&self, wi: DVec3) -> Spectrum {
         self.eval_unfolded(self.unfolded(wi.as_vec3()))
     }
 
@@ -157,7 +157,7 @@ impl<'a, 's> Vertex<'a, 's> {
     }
 
     /// The density with which [`Vertex::sample`] chooses a unit direction of the world, delta parts left out.
-    pub(super) fn pdf(&self, wi: DVec3) -> f32 {
+    pub(crate) fn pdf(&self, wi: DVec3) -> f32 {
         self.pdf_unfolded(self.unfolded(wi.as_vec3()))
     }
 
@@ -166,7 +166,7 @@ impl<'a, 's> Vertex<'a, 's> {
     }
 
     /// Chooses a direction to go on in.
-    pub(super) fn sample(&self, lobe: f32, u: Vec2) -> Option<Bounce> {
+    pub(crate) fn sample(&self, lobe: f32, u: Vec2) -> Option<Bounce> {
         let sample = self.bsdf.sample(self.wo, lobe, u)?;
         let mut bounce = self.bounce(&sample);
         if let (Scatter::Density(_), Some(_)) = (sample.scatter, self.geometric) {
@@ -180,7 +180,7 @@ impl<'a, 's> Vertex<'a, 's> {
     }
 
     /// Its mirrors and its glass: every delta part.
-    pub(super) fn specular(&self) -> impl Iterator<Item = Bounce> {
+    pub(crate) fn specular(&self) -> impl Iterator<Item = Bounce> {
         self.bsdf.specular(self.wo).map(|sample| self.bounce(&sample))
     }
 
@@ -203,12 +203,12 @@ impl<'a, 's> Vertex<'a, 's> {
     }
 
     /// What of the light that comes from straight behind goes straight on: see [`Bsdf::straight_on`].
-    pub(super) fn straight_on(&self) -> Spectrum {
+    pub(crate) fn straight_on(&self) -> Spectrum {
         self.bsdf.straight_on(self.wo)
     }
 
     /// Where rays along a unit direction start, if that is off the face.
-    pub(super) fn risen_towards(&self, direction: DVec3) -> Option<DVec3> {
+    pub(crate) fn risen_towards(&self, direction: DVec3) -> Option<DVec3> {
         if self.stays(direction.as_vec3()) { self.risen() } else { None }
     }
 
@@ -217,17 +217,17 @@ impl<'a, 's> Vertex<'a, 's> {
     }
 
     /// The ray that goes on.
-    pub(super) fn leave(&self, bounce: &Bounce) -> Ray {
+    pub(crate) fn leave(&self, bounce: &Bounce) -> Ray {
         self.met.leave_from(self.start(bounce.direction), bounce.direction)
     }
 
     /// See [`Interaction::shadow_ray`].
-    pub(super) fn shadow_ray(&self, sample: &LightSample) -> Ray {
+    pub(crate) fn shadow_ray(&self, sample: &LightSample) -> Ray {
         self.met.shadow_ray_from(self.start(sample.towards), sample)
     }
 
     /// What the solids around leave of a light's sample that nothing stands in the way of.
-    pub(super) fn passes(&self, sample: &LightSample, interiors: &Interiors<'s>) -> Spectrum {
+    pub(crate) fn passes(&self, sample: &LightSample, interiors: &Interiors<'s>) -> Spectrum {
         // Light from infinitely far away was not inside anything.
         let Some(end) = sample.end else { return Spectrum::WHITE };
         let crosses = self.crosses(sample);
@@ -239,7 +239,7 @@ impl<'a, 's> Vertex<'a, 's> {
     }
 
     /// What all that stands in the way of a light's sample leaves of it: see [`straight_on`].
-    pub(super) fn passes_straight_on(
+    pub(crate) fn passes_straight_on(
         &self,
         sample: &LightSample,
         interiors: &Interiors<'s>,

@@ -1,11 +1,10 @@
 //! What a picture can show besides light: reflectance, normals, depth and surface parameters.
 
 use lumbre_math::{Vec2, Vec3};
-use lumbre_scene::{Scene, View};
+use lumbre_scene::View;
 use lumbre_shading::Spectrum;
 
-use crate::transport::journal::{Event, Met, Source};
-use crate::transport::{Draw, RayIntegrator, Record, Sight};
+use crate::transport::Sight;
 
 /// One of the features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -90,23 +89,5 @@ impl Features {
             Feature::Depth => Spectrum::splat(self.depth),
             Feature::Uv => Spectrum::new(self.uv.x, self.uv.y, 0.0),
         }
-    }
-}
-
-/// A picture of one feature; no light is needed. The normal is shown as (n + 1) / 2.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FeatureIntegrator(pub Feature);
-
-impl RayIntegrator for FeatureIntegrator {
-    fn radiance(&self, _: &Scene, view: &View, sight: Sight<'_>, _: &Draw, record: &mut Record) -> Spectrum {
-        let ray = sight.ray.ray;
-        match &sight.met {
-            Some(met) => record.note(|| Event::Met(Met::of(&ray, met, 0, Spectrum::WHITE))),
-            None => record.note(|| Event::Left { ray }),
-        }
-        let Some(features) = Features::of(view, &sight) else { return Spectrum::BLACK };
-        let value = features.get(self.0);
-        let shown = if self.0 == Feature::Normal { (value + Spectrum::WHITE) * 0.5 } else { value };
-        record.added(Source::Surface, Spectrum::WHITE, shown, 1.0)
     }
 }

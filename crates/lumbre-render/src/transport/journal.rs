@@ -210,7 +210,7 @@ impl Met {
 }
 
 impl Scattered {
-    pub(super) fn of(ray: &Ray, bounce: &Bounce, throughput: Spectrum) -> Box<Self> {
+    pub(crate) fn of(ray: &Ray, bounce: &Bounce, throughput: Spectrum) -> Box<Self> {
         Box::new(Self {
             ray: *ray,
             weight: bounce.weight,

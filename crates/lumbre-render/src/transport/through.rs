@@ -18,7 +18,7 @@ const LEAST_PART: f32 = 1.0 / 256.0;
 const INDEX_ERROR: f32 = 1e-4;
 
 /// The way from a ray's origin to what it met; its direction is unit.
-pub(super) fn ray_length(ray: &Ray, here: &Interaction) -> f64 {
+pub(crate) fn ray_length(ray: &Ray, here: &Interaction) -> f64 {
     (here.surface.point - ray.origin).length()
 }
 
@@ -26,7 +26,7 @@ pub(super) fn ray_length(ray: &Ray, here: &Interaction) -> f64 {
 /// rough, and reflected inside solids, but not by their outer sides. Black where the ray meets nothing, or what is not clear.
 ///
 /// What solids scatter inside is not followed. The draw's vertices from `first` on choose the way.
-pub(super) fn light_through(
+pub(crate) fn light_through(
     scene: &Scene,
     mut ray: Ray,
     draw: &Draw,
@@ -78,7 +78,7 @@ pub(super) fn light_through(
 
 /// Whether a light's sample is to be followed through panes by [`straight_on`], where paths find all other light behind them: that of
 /// points and in one direction, which no path finds by chance, so that nothing counts twice.
-pub(super) fn goes_straight_on(scene: &Scene, sample: &LightSample) -> bool {
+pub(crate) fn goes_straight_on(scene: &Scene, sample: &LightSample) -> bool {
     sample.scatter == Scatter::Delta && scene.lets_light_straight_on()
 }
 

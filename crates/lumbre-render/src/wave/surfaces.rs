@@ -4,7 +4,9 @@ use lumbre_geometry::Ray;
 use lumbre_math::Vec3;
 use lumbre_scene::{Footprint, Interaction};
 use lumbre_shading::medium::{DistanceSample, sample_henyey_greenstein};
-use lumbre_shading::{HomogeneousMedium, ShadingNormals, Spectrum};
+use lumbre_shading::{HomogeneousMedium, ShadingFrame, ShadingNormals, Spectrum};
+use lumbre_simd::V3;
+use lumbre_simd::math::orthonormal_basis;
 
 use crate::transport::Record;
 use crate::transport::interior::Interiors;
@@ -123,7 +125,7 @@ impl<'s> Wave<'s> {
         let towards = here.towards_origin.as_vec3();
         let scattering = material
             .and_then(|material| material.shading(&here.at, &here.shading, towards, setting.shading_normals));
-        let (Some((frame, mut bsdf)), Some(material)) = (scattering, material) else {
+        let (Some((mut frame, mut bsdf)), Some(material)) = (scattering, material) else {
             record.note(|| Event::Ended(End::Nothing));
             return;
         };
@@ -135,6 +137,11 @@ impl<'s> Wave<'s> {
         }
         if setting.regularize && self.paths.depth[path] & SCATTERED != 0 {
             bsdf = bsdf.regularized();
+        }
+        if bsdf.is_isotropic() {
+            // As on flat surfaces, so that their random numbers mean the same directions.
+            let (s, t) = orthonormal_basis(V3::new(frame.n.x, frame.n.y, frame.n.z));
+            frame = ShadingFrame { s: Vec3::new(s.x, s.y, s.z), t: Vec3::new(t.x, t.y, t.z), n: frame.n };
         }
         let mut flags = 0;
         if ShadingNormals::differ(frame.n, here.shading.geometric) {

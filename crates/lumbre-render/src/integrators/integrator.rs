@@ -1,12 +1,12 @@
 //! What every integrator does: the radiance along a ray from the camera.
 
 use std::fmt::Debug;
-use std::ops::AddAssign;
 
-use lumbre_scene::{CameraRay, IntegratorDesc, IntegratorKind, Interaction, Scene, View};
+use lumbre_scene::{IntegratorDesc, IntegratorKind, Scene, View};
 use lumbre_shading::Spectrum;
 
-use crate::transport::{AmbientOcclusion, Draw, Feature, FeatureIntegrator, Path, Record, Sampler, Whitted};
+use crate::integrators::{AmbientOcclusion, FeatureIntegrator, Path, Whitted};
+use crate::transport::{Draw, Feature, Record, Sampler, Sight};
 use crate::wave::Sights;
 
 /// An estimator of the radiance that arrives at the camera, of many samples at a time.
@@ -32,41 +32,6 @@ impl<T: RayIntegrator> Integrator for T {
     fn estimate(&self, sights: &mut Sights<'_, '_>, _: &Sampler, record: &mut Record) {
         let (scene, view) = (sights.scene(), sights.view());
         sights.each(|sight, draw| self.radiance(scene, view, sight, draw, record));
-    }
-}
-
-/// A ray from the camera, and what it meets first.
-#[derive(Clone, Debug)]
-pub struct Sight<'s> {
-    /// The ray.
-    pub ray: CameraRay,
-    /// What it meets; `None` when it leaves the scene.
-    pub met: Option<Interaction<'s>>,
-}
-
-/// How many rays were traced, by what for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct RayCounts {
-    /// From the camera.
-    pub camera: u64,
-    /// On from a surface.
-    pub bounce: u64,
-    /// Towards a light, or to see how open a place is.
-    pub shadow: u64,
-}
-
-impl RayCounts {
-    /// All of them.
-    pub fn total(&self) -> u64 {
-        self.camera + self.bounce + self.shadow
-    }
-}
-
-impl AddAssign for RayCounts {
-    fn add_assign(&mut self, other: Self) {
-        self.camera += other.camera;
-        self.bounce += other.bounce;
-        self.shadow += other.shadow;
     }
 }
 

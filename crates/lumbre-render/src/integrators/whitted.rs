@@ -5,11 +5,12 @@ use lumbre_scene::{Footprint, Interaction, Light, LightId, LightSample, Scene, V
 use lumbre_shading::{Scatter, ShadingNormals, Spectrum};
 use smallvec::SmallVec;
 
+use crate::integrators::RayIntegrator;
 use crate::transport::direct::Vertex;
 use crate::transport::interior::Interiors;
 use crate::transport::journal::{Event, Met, SampledLight, Scattered, Source};
 use crate::transport::through::ray_length;
-use crate::transport::{Draw, RayIntegrator, Record, Sight};
+use crate::transport::{Draw, Record, Sight};
 
 /// Follows every mirror image and every refraction, and gives each surface on the way direct light from every light.
 ///

@@ -3,7 +3,8 @@
 use lumbre_shading::ShadingNormals;
 use lumbre_simd::InstructionSet;
 
-use crate::transport::{Integrator, Record, Sampler};
+use crate::integrators::Integrator;
+use crate::transport::{Record, Sampler, Strategy};
 use crate::wave::{Setting, Sights};
 
 /// Kajiya's path tracing: at each surface one sample of a light and one of the BSDF, combined by the power heuristic,
@@ -25,19 +26,6 @@ pub struct Path {
     pub strategy: Strategy,
     /// Bounces that every path may take before Russian roulette.
     pub roulette_start: u32,
-}
-
-/// How a path finds light. All give the same picture in the mean, but [`Strategy::Bsdf`] does not find lights that no ray
-/// can hit by chance, for which it samples the lights all the same.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Strategy {
-    /// Both ways, weighed.
-    #[default]
-    Both,
-    /// By sampling lights, where they can be sampled.
-    Lights,
-    /// By sampling the BSDF.
-    Bsdf,
 }
 
 /// Bounces that every path may take before Russian roulette: fewer cost more error than they save time, in every scene that was

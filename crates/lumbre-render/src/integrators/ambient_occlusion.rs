@@ -4,8 +4,9 @@ use lumbre_math::warp;
 use lumbre_scene::{Scene, View};
 use lumbre_shading::{ShadingFrame, ShadingNormals, Spectrum};
 
+use crate::integrators::RayIntegrator;
 use crate::transport::journal::{Event, Met, Source};
-use crate::transport::{Draw, RayIntegrator, Record, Sight};
+use crate::transport::{Draw, Record, Sight};
 
 /// The share of the sky over a surface that is open, weighed by the cosine: white where nothing is near.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,0 +1,26 @@
+//! Pictures of what there is besides light.
+
+use lumbre_scene::{Scene, View};
+use lumbre_shading::Spectrum;
+
+use crate::integrators::RayIntegrator;
+use crate::transport::journal::{Event, Met, Source};
+use crate::transport::{Draw, Feature, Features, Record, Sight};
+
+/// A picture of one feature; no light is needed. The normal is shown as (n + 1) / 2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FeatureIntegrator(pub Feature);
+
+impl RayIntegrator for FeatureIntegrator {
+    fn radiance(&self, _: &Scene, view: &View, sight: Sight<'_>, _: &Draw, record: &mut Record) -> Spectrum {
+        let ray = sight.ray.ray;
+        match &sight.met {
+            Some(met) => record.note(|| Event::Met(Met::of(&ray, met, 0, Spectrum::WHITE))),
+            None => record.note(|| Event::Left { ray }),
+        }
+        let Some(features) = Features::of(view, &sight) else { return Spectrum::BLACK };
+        let value = features.get(self.0);
+        let shown = if self.0 == Feature::Normal { (value + Spectrum::WHITE) * 0.5 } else { value };
+        record.added(Source::Surface, Spectrum::WHITE, shown, 1.0)
+    }
+}
