@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use lumbre_simd::{Real, UInt};
+use lumbre_simd::{Real, Task, UInt};
 
 /// Nodes of the cosine, at the squares of equal steps from 0 to 1: dense at grazing angles.
 const COSINES: usize = 32;
@@ -139,16 +139,7 @@ impl Albedo {
 
     #[inline(always)]
     fn at<R: Real>(&self, page: R::UInt, alpha: R, cos: R) -> R {
-        let (row, by_row) = by_alpha(alpha).nodes(ROUGHNESSES);
-        let (column, by_column) = by_cosine(cos).nodes(COSINES);
-        let start =
-            (page * R::UInt::splat(ROUGHNESSES as u32) + row) * R::UInt::splat(COSINES as u32) + column;
-        let mut sum = R::zero();
-        for (i, weight) in by_row.into_iter().enumerate() {
-            let start = start + R::UInt::splat((i * COSINES) as u32);
-            sum = sum + weight * weighed(&self.values, start, by_column);
-        }
-        sum
+        R::call(At { albedo: self, page, alpha, cos })
     }
 
     #[inline(always)]
@@ -160,22 +151,12 @@ impl Albedo {
     /// [`Albedo::at`] between the pages of indices of refraction that begin with one.
     #[inline(always)]
     fn by_index_at<R: Real>(&self, page: R::UInt, eta: R, alpha: R, cos: R) -> R {
-        let (first, weights) = by_index(eta).nodes(INDICES);
-        let mut sum = R::zero();
-        for (i, weight) in weights.into_iter().enumerate() {
-            sum = sum + weight * self.at(page + first + R::UInt::splat(i as u32), alpha, cos);
-        }
-        sum.simd_max(R::zero()).simd_min(R::one())
+        R::call(ByIndex { eta, at: At { albedo: self, page, alpha, cos } })
     }
 
     #[inline(always)]
     fn mean_by_index_at<R: Real>(&self, page: R::UInt, eta: R, alpha: R) -> R {
-        let (first, weights) = by_index(eta).nodes(INDICES);
-        let mut sum = R::zero();
-        for (i, weight) in weights.into_iter().enumerate() {
-            sum = sum + weight * self.mean_at(page + first + R::UInt::splat(i as u32), alpha);
-        }
-        sum
+        R::call(MeanByIndex { albedo: self, page, eta, alpha })
     }
 
     /// The single-scattering albedo of perfectly reflecting facets.
@@ -230,6 +211,73 @@ impl Albedo {
     #[inline(always)]
     pub(crate) fn sheen<R: Real>(&self, cos: R, roughness: R) -> R {
         self.at(R::UInt::splat(SHEEN as u32), roughness * roughness, cos).simd_max(R::zero())
+    }
+}
+
+/// A value of a page.
+struct At<'a, R: Real> {
+    albedo: &'a Albedo,
+    page: R::UInt,
+    alpha: R,
+    cos: R,
+}
+
+impl<R: Real> Task<R> for At<'_, R> {
+    type Output = R;
+    #[inline(always)]
+    fn run(self) -> R {
+        let (row, by_row) = by_alpha(self.alpha).nodes(ROUGHNESSES);
+        let (column, by_column) = by_cosine(self.cos).nodes(COSINES);
+        let row = self.page * R::UInt::splat(ROUGHNESSES as u32) + row;
+        let start = row * R::UInt::splat(COSINES as u32) + column;
+        let mut sum = R::zero();
+        for (i, weight) in by_row.into_iter().enumerate() {
+            let start = start + R::UInt::splat((i * COSINES) as u32);
+            sum = sum + weight * weighed(&self.albedo.values, start, by_column);
+        }
+        sum
+    }
+}
+
+/// A value between pages, of which that of the lowest index is named.
+struct ByIndex<'a, R: Real> {
+    eta: R,
+    at: At<'a, R>,
+}
+
+impl<R: Real> Task<R> for ByIndex<'_, R> {
+    type Output = R;
+    #[inline(always)]
+    fn run(self) -> R {
+        let (first, weights) = by_index(self.eta).nodes(INDICES);
+        let At { albedo, page, alpha, cos } = self.at;
+        let mut sum = R::zero();
+        for (i, weight) in weights.into_iter().enumerate() {
+            sum = sum + weight * albedo.at(page + first + R::UInt::splat(i as u32), alpha, cos);
+        }
+        sum.simd_max(R::zero()).simd_min(R::one())
+    }
+}
+
+/// A mean between pages.
+struct MeanByIndex<'a, R: Real> {
+    albedo: &'a Albedo,
+    page: R::UInt,
+    eta: R,
+    alpha: R,
+}
+
+impl<R: Real> Task<R> for MeanByIndex<'_, R> {
+    type Output = R;
+    #[inline(always)]
+    fn run(self) -> R {
+        let (first, weights) = by_index(self.eta).nodes(INDICES);
+        let mut sum = R::zero();
+        for (i, weight) in weights.into_iter().enumerate() {
+            let page = self.page + first + R::UInt::splat(i as u32);
+            sum = sum + weight * self.albedo.mean_at(page, self.alpha);
+        }
+        sum
     }
 }
 

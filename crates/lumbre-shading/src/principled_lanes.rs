@@ -3,7 +3,7 @@
 use std::f32::consts::FRAC_1_PI;
 
 use lumbre_simd::math::sin_cos_turns;
-use lumbre_simd::{Mask, Real, V3};
+use lumbre_simd::{Mask, Real, Task, V3};
 
 use crate::albedo::{ALBEDO, MAX_ETA, unit};
 use crate::conductor::{mirrored, reflect_lanes};
@@ -347,6 +347,11 @@ impl<R: Real> PrincipledLanes<R> {
     /// Reflection and transmission of a facet at a cosine, negative from below.
     #[inline(always)]
     pub(crate) fn shares(&self, cos: R) -> Shares<R> {
+        R::call(SharesAt { bsdf: self, cos })
+    }
+
+    #[inline(always)]
+    fn shares_inlined(&self, cos: R) -> Shares<R> {
         let zero = R::zero();
         let clear = self.clear();
         let opaque = (R::one() - self.metallic) - clear;
@@ -663,6 +668,11 @@ impl<R: Real> PrincipledLanes<R> {
 
     #[inline(always)]
     pub(crate) fn lobes(&self, wo: V3<R>) -> Lobes<R> {
+        R::call(LobesFrom { bsdf: self, wo })
+    }
+
+    #[inline(always)]
+    fn lobes_inlined(&self, wo: V3<R>) -> Lobes<R> {
         let (zero, one, half) = (R::zero(), R::one(), R::splat(0.5));
         let (opaque, clear) = (self.opaque(), self.clear());
         let shares = self.shares(wo.z);
@@ -701,6 +711,11 @@ impl<R: Real> PrincipledLanes<R> {
     /// [`LaneBsdf::eval`] with the probabilities of the lobes from `wo`.
     #[inline(always)]
     fn eval_with(&self, lobes: &Lobes<R>, wo: V3<R>, wi: V3<R>) -> (V3<R>, R) {
+        R::call(Eval { bsdf: self, lobes, wo, wi })
+    }
+
+    #[inline(always)]
+    fn eval_inlined(&self, lobes: &Lobes<R>, wo: V3<R>, wi: V3<R>) -> (V3<R>, R) {
         let fits = has_side(wo) & has_side(wi);
         let reflects = (wo.z * wi.z).simd_gt(R::zero());
         let (facets, facets_pdf) = self.eval_facets(wo, wi);
@@ -720,6 +735,50 @@ impl<R: Real> PrincipledLanes<R> {
             pdf = pdf + (lobes.coat * face_pdf).or_zero(lobes.coat.simd_gt(R::zero()));
         }
         (sum.or_zero(fits), pdf.or_zero(fits))
+    }
+}
+
+/// [`PrincipledLanes::shares`].
+struct SharesAt<'a, R: Real> {
+    bsdf: &'a PrincipledLanes<R>,
+    cos: R,
+}
+
+impl<R: Real> Task<R> for SharesAt<'_, R> {
+    type Output = Shares<R>;
+    #[inline(always)]
+    fn run(self) -> Shares<R> {
+        self.bsdf.shares_inlined(self.cos)
+    }
+}
+
+/// [`PrincipledLanes::lobes`].
+struct LobesFrom<'a, R: Real> {
+    bsdf: &'a PrincipledLanes<R>,
+    wo: V3<R>,
+}
+
+impl<R: Real> Task<R> for LobesFrom<'_, R> {
+    type Output = Lobes<R>;
+    #[inline(always)]
+    fn run(self) -> Lobes<R> {
+        self.bsdf.lobes_inlined(self.wo)
+    }
+}
+
+/// [`PrincipledLanes::eval_with`].
+struct Eval<'a, R: Real> {
+    bsdf: &'a PrincipledLanes<R>,
+    lobes: &'a Lobes<R>,
+    wo: V3<R>,
+    wi: V3<R>,
+}
+
+impl<R: Real> Task<R> for Eval<'_, R> {
+    type Output = (V3<R>, R);
+    #[inline(always)]
+    fn run(self) -> (V3<R>, R) {
+        self.bsdf.eval_inlined(self.lobes, self.wo, self.wi)
     }
 }
 

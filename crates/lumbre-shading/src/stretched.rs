@@ -4,7 +4,7 @@ use std::f32::consts::FRAC_1_PI;
 use std::sync::LazyLock;
 
 use lumbre_simd::math::{atan2, pow, sin_cos_turns};
-use lumbre_simd::{Real, UInt, V3};
+use lumbre_simd::{Real, Task, UInt, V3};
 
 use crate::albedo::{Between, unit, weighed};
 
@@ -68,9 +68,13 @@ impl Stretched {
     /// The albedo of facets of these α for a direction in their frame (on either side).
     #[inline(always)]
     pub(crate) fn mirror<R: Real>(&self, alpha: [R; 2], w: V3<R>) -> R {
+        R::call(Mirror { table: self, alpha, w })
+    }
+
+    #[inline(always)]
+    fn mirror_inlined<R: Real>(&self, alpha: [R; 2], w: V3<R>) -> R {
         let around = Around::new(atan2(w.y.abs(), w.x.abs()) * R::splat(2.0 * FRAC_1_PI));
         let (column, by_column) = Between::new(unit(w.z.abs()).sqrt(), COSINES).nodes(COSINES);
-        let last = R::UInt::splat(AZIMUTHS as u32 - 1);
         let [(x, by_x), (y, by_y)] =
             [by_alpha(alpha[0]).nodes(ROUGHNESSES), by_alpha(alpha[1]).nodes(ROUGHNESSES)];
         let mut sum = R::zero();
@@ -78,13 +82,9 @@ impl Stretched {
             let mut row = R::zero();
             for (j, by_y) in by_y.into_iter().enumerate() {
                 let (page, swapped) = pair::<R>(x + R::UInt::splat(i as u32), y + R::UInt::splat(j as u32));
-                let mut value = R::zero();
-                for (node, weight) in around.nodes.into_iter().zip(around.weights) {
-                    let node = R::UInt::select(swapped, last - node, node);
-                    let start = (page * R::UInt::splat(AZIMUTHS as u32) + node) * R::UInt::splat(ROW as u32);
-                    value = value + weight * weighed(&self.values, start + column, by_column);
-                }
-                row = row + by_y * value;
+                let page = page * R::UInt::splat(AZIMUTHS as u32);
+                let page = PageAt { values: &self.values, page, swapped, around: &around, column, by_column };
+                row = row + by_y * R::call(page);
             }
             sum = sum + by_x * row;
         }
@@ -94,6 +94,11 @@ impl Stretched {
     /// The cosine-weighted mean of [`Stretched::mirror`].
     #[inline(always)]
     pub(crate) fn mean<R: Real>(&self, alpha: [R; 2]) -> R {
+        R::call(Mean { table: self, alpha })
+    }
+
+    #[inline(always)]
+    fn mean_inlined<R: Real>(&self, alpha: [R; 2]) -> R {
         let [(x, by_x), (y, by_y)] =
             [by_alpha(alpha[0]).nodes(ROUGHNESSES), by_alpha(alpha[1]).nodes(ROUGHNESSES)];
         let mut sum = R::zero();
@@ -106,6 +111,60 @@ impl Stretched {
             sum = sum + by_x * row;
         }
         sum
+    }
+}
+
+/// [`Stretched::mirror`].
+struct Mirror<'a, R: Real> {
+    table: &'a Stretched,
+    alpha: [R; 2],
+    w: V3<R>,
+}
+
+impl<R: Real> Task<R> for Mirror<'_, R> {
+    type Output = R;
+    #[inline(always)]
+    fn run(self) -> R {
+        self.table.mirror_inlined(self.alpha, self.w)
+    }
+}
+
+/// The value of one pair of roughnesses.
+struct PageAt<'a, R: Real> {
+    values: &'a [f32],
+    page: R::UInt,
+    swapped: R::Mask,
+    around: &'a Around<R>,
+    column: R::UInt,
+    by_column: [R; 4],
+}
+
+impl<R: Real> Task<R> for PageAt<'_, R> {
+    type Output = R;
+    #[inline(always)]
+    fn run(self) -> R {
+        let last = R::UInt::splat(AZIMUTHS as u32 - 1);
+        let mut value = R::zero();
+        for (node, weight) in self.around.nodes.into_iter().zip(self.around.weights) {
+            let node = R::UInt::select(self.swapped, last - node, node);
+            let start = (self.page + node) * R::UInt::splat(ROW as u32) + self.column;
+            value = value + weight * weighed(self.values, start, self.by_column);
+        }
+        value
+    }
+}
+
+/// [`Stretched::mean`].
+struct Mean<'a, R: Real> {
+    table: &'a Stretched,
+    alpha: [R; 2],
+}
+
+impl<R: Real> Task<R> for Mean<'_, R> {
+    type Output = R;
+    #[inline(always)]
+    fn run(self) -> R {
+        self.table.mean_inlined(self.alpha)
     }
 }
 

@@ -3,7 +3,7 @@
 use std::f32::consts::PI;
 
 use lumbre_simd::math::{exp, sin_cos_turns};
-use lumbre_simd::{Real, V3};
+use lumbre_simd::{Real, Task, V3};
 
 use crate::albedo::unit;
 use crate::lanes::{colour_lane, spectrum};
@@ -69,9 +69,14 @@ impl<R: Real> ThinFilmLanes<R> {
     #[inline(always)]
     pub(crate) fn reflectance(&self, cos: V3<R>, f0: V3<R>) -> V3<R> {
         let [x, y, z] = REC709_FROM_XYZ;
-        V3::new(self.channel(cos.x, f0.x, x), self.channel(cos.y, f0.y, y), self.channel(cos.z, f0.z, z))
+        V3::new(
+            R::call(Channel { film: self, cos: cos.x, f0: f0.x, row: x }),
+            R::call(Channel { film: self, cos: cos.y, f0: f0.y, row: y }),
+            R::call(Channel { film: self, cos: cos.z, f0: f0.z, row: z }),
+        )
     }
 
+    /// The reflectance in a channel, by its row of [`REC709_FROM_XYZ`].
     #[inline(always)]
     fn channel(&self, cos: R, f0: R, row: [f32; 3]) -> R {
         let (one, two) = (R::one(), R::splat(2.0));
@@ -101,6 +106,22 @@ impl<R: Real> ThinFilmLanes<R> {
         let eta = self.eta_of_thickness();
         let outer = fresnel::dielectric(R::one(), eta).sqrt();
         V3::new(most_of(outer, eta, f0.x), most_of(outer, eta, f0.y), most_of(outer, eta, f0.z))
+    }
+}
+
+/// [`ThinFilmLanes::channel`].
+struct Channel<'a, R: Real> {
+    film: &'a ThinFilmLanes<R>,
+    cos: R,
+    f0: R,
+    row: [f32; 3],
+}
+
+impl<R: Real> Task<R> for Channel<'_, R> {
+    type Output = R;
+    #[inline(always)]
+    fn run(self) -> R {
+        self.film.channel(self.cos, self.f0, self.row)
     }
 }
 
