@@ -2,6 +2,8 @@
 
 use std::sync::LazyLock;
 
+use lumbre_simd::{Real, Task, UInt};
+
 /// Nodes of the cosine, at the squares of equal steps from 0 to 1: dense at grazing angles.
 const COSINES: usize = 32;
 /// Nodes of the square root of α, in equal steps from 0 to 1.
@@ -37,63 +39,89 @@ pub(crate) struct Albedo {
 
 /// A position between two nodes.
 #[derive(Clone, Copy)]
-pub(crate) struct Between(usize, f32);
+pub(crate) struct Between<R: Real> {
+    first: R::UInt,
+    share: R,
+}
 
-impl Between {
+impl<R: Real> Between<R> {
     /// The position of `x` in [0, 1] between `nodes` in equal steps.
-    pub(crate) fn new(x: f32, nodes: usize) -> Self {
-        let place = crate::unit(x) * (nodes - 1) as f32;
-        let first = (place as usize).min(nodes - 2);
-        Self(first, place - first as f32)
+    #[inline(always)]
+    pub(crate) fn new(x: R, nodes: usize) -> Self {
+        let place = unit(x) * R::splat((nodes - 1) as f32);
+        let first = place.floor().simd_min(R::splat((nodes - 2) as f32));
+        Self::at(first.to_int(), place - first)
     }
 
     /// The position at a fraction between a node and the next.
-    pub(crate) fn at(first: usize, share: f32) -> Self {
-        Self(first, share)
+    #[inline(always)]
+    pub(crate) fn at(first: R::UInt, share: R) -> Self {
+        Self { first, share }
     }
 
     /// Catmull–Rom weights; beyond the ends the table is extended linearly. Linear interpolation would not
     /// conserve energy.
-    pub(crate) fn weights(self) -> [f32; 4] {
-        let t = self.1;
+    #[inline(always)]
+    pub(crate) fn weights(self) -> [R; 4] {
+        let (t, one, half) = (self.share, R::one(), R::splat(0.5));
         [
-            -0.5 * t * (1.0 - t) * (1.0 - t),
-            1.0 + t * t * (1.5 * t - 2.5),
-            0.5 * t + t * t * (2.0 - 1.5 * t),
-            0.5 * t * t * (t - 1.0),
+            R::splat(-0.5) * t * (one - t) * (one - t),
+            one + t * t * (R::splat(1.5) * t - R::splat(2.5)),
+            half * t + t * t * (R::splat(2.0) - R::splat(1.5) * t),
+            half * t * t * (t - one),
         ]
     }
 
-    /// The first of the nodes around the position, and their weights.
-    pub(crate) fn nodes(self, nodes: usize) -> (usize, [f32; 4]) {
-        let Self(first, _) = self;
+    /// The first of the four nodes around the position, and their weights.
+    #[inline(always)]
+    pub(crate) fn nodes(self, nodes: usize) -> (R::UInt, [R; 4]) {
+        let (zero, two) = (R::zero(), R::splat(2.0));
         let [a, b, c, d] = self.weights();
-        if first == 0 {
-            // The node before the first is extrapolated to 2 p0 − p1.
-            return (0, [b + 2.0 * a, c - a, d, 0.0]);
-        }
-        if first + 2 == nodes {
-            return (first - 2, [0.0, a, b - d, c + 2.0 * d]);
-        }
-        (first - 1, [a, b, c, d])
-    }
-
-    pub(crate) fn interpolate(self, nodes: usize, mut f: impl FnMut(usize) -> f32) -> f32 {
-        let (first, weights) = self.nodes(nodes);
-        weights.into_iter().enumerate().map(|(i, w)| w * f(first + i)).sum()
+        let is_first = self.first.simd_eq(R::UInt::splat(0));
+        let is_last = self.first.simd_eq(R::UInt::splat(nodes as u32 - 2));
+        // The node before the first is extrapolated to 2 p0 − p1, and so is that after the last.
+        let weights = [
+            R::select(is_first, b + two * a, R::select(is_last, zero, a)),
+            R::select(is_first, c - a, R::select(is_last, a, b)),
+            R::select(is_first, d, R::select(is_last, b - d, c)),
+            R::select(is_first, zero, R::select(is_last, c + two * d, d)),
+        ];
+        let back = R::UInt::select(is_last, R::UInt::splat(2), R::UInt::splat(1));
+        (self.first - R::UInt::select(is_first, R::UInt::splat(0), back), weights)
     }
 }
 
-fn by_cosine(cos: f32) -> Between {
-    Between::new(crate::unit(cos).sqrt(), COSINES)
+/// The number clamped to [0, 1]; 0 for NaN.
+#[inline(always)]
+pub(crate) fn unit<R: Real>(x: R) -> R {
+    x.simd_min(R::one()).or_zero(x.simd_gt(R::zero()))
 }
 
-fn by_alpha(alpha: f32) -> Between {
-    Between::new(crate::unit(alpha).sqrt(), ROUGHNESSES)
+/// The sum of the numbers from an index on, each by its weight.
+#[inline(always)]
+pub(crate) fn weighed<R: Real>(table: &[f32], start: R::UInt, weights: [R; 4]) -> R {
+    let [a, b, c, d] = weights;
+    let [one, two, three] = [R::UInt::splat(1), R::UInt::splat(2), R::UInt::splat(3)];
+    a * R::gather(table, start)
+        + b * R::gather(table, start + one)
+        + c * R::gather(table, start + two)
+        + d * R::gather(table, start + three)
 }
 
-fn by_index(eta: f32) -> Between {
-    Between::new(crate::unit((eta - 1.0) / (eta + 1.0) / MAX_ROOT).sqrt(), INDICES)
+#[inline(always)]
+fn by_cosine<R: Real>(cos: R) -> Between<R> {
+    Between::new(unit(cos).sqrt(), COSINES)
+}
+
+#[inline(always)]
+fn by_alpha<R: Real>(alpha: R) -> Between<R> {
+    Between::new(unit(alpha).sqrt(), ROUGHNESSES)
+}
+
+#[inline(always)]
+fn by_index<R: Real>(eta: R) -> Between<R> {
+    let root = (eta - R::one()) / (eta + R::one()) / R::splat(MAX_ROOT);
+    Between::new(unit(root).sqrt(), INDICES)
 }
 
 impl Albedo {
@@ -109,62 +137,147 @@ impl Albedo {
         Self { values, means }
     }
 
-    fn at(&self, page: usize, alpha: Between, cos: Between) -> f32 {
-        alpha.interpolate(ROUGHNESSES, |a| {
-            let row = (page * ROUGHNESSES + a) * COSINES;
-            cos.interpolate(COSINES, |c| self.values[row + c])
-        })
+    #[inline(always)]
+    fn at<R: Real>(&self, page: R::UInt, alpha: R, cos: R) -> R {
+        R::call(At { albedo: self, page, alpha, cos })
     }
 
-    fn mean_at(&self, page: usize, alpha: Between) -> f32 {
-        alpha.interpolate(ROUGHNESSES, |a| self.means[page * ROUGHNESSES + a])
+    #[inline(always)]
+    fn mean_at<R: Real>(&self, page: R::UInt, alpha: R) -> R {
+        let (row, weights) = by_alpha(alpha).nodes(ROUGHNESSES);
+        weighed(&self.means, page * R::UInt::splat(ROUGHNESSES as u32) + row, weights)
+    }
+
+    /// [`Albedo::at`] between the pages of indices of refraction that begin with one.
+    #[inline(always)]
+    fn by_index_at<R: Real>(&self, page: R::UInt, eta: R, alpha: R, cos: R) -> R {
+        R::call(ByIndex { eta, at: At { albedo: self, page, alpha, cos } })
+    }
+
+    #[inline(always)]
+    fn mean_by_index_at<R: Real>(&self, page: R::UInt, eta: R, alpha: R) -> R {
+        R::call(MeanByIndex { albedo: self, page, eta, alpha })
     }
 
     /// The single-scattering albedo of perfectly reflecting facets.
-    pub(crate) fn mirror(&self, cos: f32, alpha: f32) -> f32 {
-        self.at(MIRROR, by_alpha(alpha), by_cosine(cos)).clamp(0.0, 1.0)
+    #[inline(always)]
+    pub(crate) fn mirror<R: Real>(&self, cos: R, alpha: R) -> R {
+        let albedo = self.at(R::UInt::splat(MIRROR as u32), alpha, cos);
+        albedo.simd_max(R::zero()).simd_min(R::one())
     }
 
     /// The mean of [`Albedo::mirror`].
-    pub(crate) fn mirror_mean(&self, alpha: f32) -> f32 {
-        self.mean_at(MIRROR, by_alpha(alpha))
+    #[inline(always)]
+    pub(crate) fn mirror_mean<R: Real>(&self, alpha: R) -> R {
+        self.mean_at(R::UInt::splat(MIRROR as u32), alpha)
     }
 
     /// The albedo of the outside of a dielectric of index 1 to [`MAX_ETA`].
-    pub(crate) fn face(&self, cos: f32, alpha: f32, eta: f32) -> f32 {
-        let (alpha, cos) = (by_alpha(alpha), by_cosine(cos));
-        by_index(eta).interpolate(INDICES, |e| self.at(FACES + e, alpha, cos)).clamp(0.0, 1.0)
+    #[inline(always)]
+    pub(crate) fn face<R: Real>(&self, cos: R, alpha: R, eta: R) -> R {
+        self.by_index_at(R::UInt::splat(FACES as u32), eta, alpha, cos)
     }
 
     /// The mean of [`Albedo::face`].
-    pub(crate) fn face_mean(&self, alpha: f32, eta: f32) -> f32 {
-        let alpha = by_alpha(alpha);
-        by_index(eta).interpolate(INDICES, |e| self.mean_at(FACES + e, alpha))
+    #[inline(always)]
+    pub(crate) fn face_mean<R: Real>(&self, alpha: R, eta: R) -> R {
+        self.mean_by_index_at(R::UInt::splat(FACES as u32), eta, alpha)
     }
 
     /// The page of a rough dielectric interface, seen from one side: from the denser side it is the inside.
-    fn glass_pages(eta: f32, inside: bool) -> (usize, f32) {
-        let denser = eta >= 1.0;
-        (if denser == inside { INSIDE } else { OUTSIDE }, if denser { eta } else { 1.0 / eta })
+    #[inline(always)]
+    fn glass_pages<R: Real>(eta: R, inside: R::Mask) -> (R::UInt, R) {
+        let denser = eta.simd_ge(R::one());
+        let is_inside = (denser & inside) | (!denser & !inside);
+        let page = R::UInt::select(is_inside, R::UInt::splat(INSIDE as u32), R::UInt::splat(OUTSIDE as u32));
+        (page, R::select(denser, eta, eta.recip()))
     }
 
     /// The reflected and transmitted power of a dielectric interface of index `eta` (inside over outside).
-    pub(crate) fn glass(&self, cos: f32, alpha: f32, eta: f32, inside: bool) -> f32 {
-        let (alpha, cos) = (by_alpha(alpha), by_cosine(cos));
+    #[inline(always)]
+    pub(crate) fn glass<R: Real>(&self, cos: R, alpha: R, eta: R, inside: R::Mask) -> R {
         let (page, eta) = Self::glass_pages(eta, inside);
-        by_index(eta).interpolate(INDICES, |e| self.at(page + e, alpha, cos)).clamp(0.0, 1.0)
+        self.by_index_at(page, eta, alpha, cos)
     }
 
     /// The mean of [`Albedo::glass`].
-    pub(crate) fn glass_mean(&self, alpha: f32, eta: f32, inside: bool) -> f32 {
-        let alpha = by_alpha(alpha);
+    #[inline(always)]
+    pub(crate) fn glass_mean<R: Real>(&self, alpha: R, eta: R, inside: R::Mask) -> R {
         let (page, eta) = Self::glass_pages(eta, inside);
-        by_index(eta).interpolate(INDICES, |e| self.mean_at(page + e, alpha))
+        self.mean_by_index_at(page, eta, alpha)
     }
 
     /// The albedo of white sheen, by roughness (α is its square); may be more than 1.
-    pub(crate) fn sheen(&self, cos: f32, roughness: f32) -> f32 {
-        self.at(SHEEN, by_alpha(roughness * roughness), by_cosine(cos)).max(0.0)
+    #[inline(always)]
+    pub(crate) fn sheen<R: Real>(&self, cos: R, roughness: R) -> R {
+        self.at(R::UInt::splat(SHEEN as u32), roughness * roughness, cos).simd_max(R::zero())
+    }
+}
+
+/// A value of a page.
+struct At<'a, R: Real> {
+    albedo: &'a Albedo,
+    page: R::UInt,
+    alpha: R,
+    cos: R,
+}
+
+impl<R: Real> Task<R> for At<'_, R> {
+    type Output = R;
+    #[inline(always)]
+    fn run(self) -> R {
+        let (row, by_row) = by_alpha(self.alpha).nodes(ROUGHNESSES);
+        let (column, by_column) = by_cosine(self.cos).nodes(COSINES);
+        let row = self.page * R::UInt::splat(ROUGHNESSES as u32) + row;
+        let start = row * R::UInt::splat(COSINES as u32) + column;
+        let mut sum = R::zero();
+        for (i, weight) in by_row.into_iter().enumerate() {
+            let start = start + R::UInt::splat((i * COSINES) as u32);
+            sum = sum + weight * weighed(&self.albedo.values, start, by_column);
+        }
+        sum
+    }
+}
+
+/// A value between pages, of which that of the lowest index is named.
+struct ByIndex<'a, R: Real> {
+    eta: R,
+    at: At<'a, R>,
+}
+
+impl<R: Real> Task<R> for ByIndex<'_, R> {
+    type Output = R;
+    #[inline(always)]
+    fn run(self) -> R {
+        let (first, weights) = by_index(self.eta).nodes(INDICES);
+        let At { albedo, page, alpha, cos } = self.at;
+        let mut sum = R::zero();
+        for (i, weight) in weights.into_iter().enumerate() {
+            sum = sum + weight * albedo.at(page + first + R::UInt::splat(i as u32), alpha, cos);
+        }
+        sum.simd_max(R::zero()).simd_min(R::one())
+    }
+}
+
+/// A mean between pages.
+struct MeanByIndex<'a, R: Real> {
+    albedo: &'a Albedo,
+    page: R::UInt,
+    eta: R,
+    alpha: R,
+}
+
+impl<R: Real> Task<R> for MeanByIndex<'_, R> {
+    type Output = R;
+    #[inline(always)]
+    fn run(self) -> R {
+        let (first, weights) = by_index(self.eta).nodes(INDICES);
+        let mut sum = R::zero();
+        for (i, weight) in weights.into_iter().enumerate() {
+            let page = self.page + first + R::UInt::splat(i as u32);
+            sum = sum + weight * self.albedo.mean_at(page, self.alpha);
+        }
+        sum
     }
 }
 
@@ -175,7 +288,7 @@ pub(crate) fn mean_weights<const N: usize>() -> [f32; N] {
     for i in 0..steps {
         let t = (f64::from(i) + 0.5) / f64::from(steps);
         let (first, weights) = Between::new(t as f32, N).nodes(N);
-        for (sum, weight) in sum[first..].iter_mut().zip(weights) {
+        for (sum, weight) in sum[first.0 as usize..].iter_mut().zip(weights) {
             // μ = t², dμ = 2 t dt
             *sum += 4.0 * t.powi(3) / f64::from(steps) * f64::from(weight);
         }
@@ -229,7 +342,7 @@ mod tests {
                 let (sin, cos) = (std::f32::consts::TAU * u.x).sin_cos();
                 let r = (1.0 - z * z).max(0.0).sqrt();
                 let wi = LocalDir(Vec3::new(r * cos, r * sin, z));
-                sheen::unbounded(roughness, wo, wi) * std::f32::consts::TAU * 3.0 * u.y * u.y
+                sheen::unbounded(roughness, wo.lane(), wi.lane()) * std::f32::consts::TAU * 3.0 * u.y * u.y
             });
             return value / MOST_SHEEN;
         }

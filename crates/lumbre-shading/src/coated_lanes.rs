@@ -4,7 +4,7 @@ use std::f32::consts::FRAC_1_PI;
 
 use lumbre_simd::math::{exp, ln};
 use lumbre_simd::random::{pcg4d, uniform};
-use lumbre_simd::{Mask, Real, UInt, V3};
+use lumbre_simd::{Mask, Real, Task, UInt, V3};
 
 use crate::conductor::{ConductorLanes, mirrored};
 use crate::dielectric::{DielectricLanes, Ways, refract_lanes};
@@ -424,6 +424,11 @@ impl<R: Real> CoatLanes<R> {
     /// inactive lanes.
     #[inline(always)]
     fn value<B: Base<R>>(&self, base: &B, wo: V3<R>, wi: V3<R>, active: R::Mask) -> V3<R> {
+        R::call(Value { coat: self, base, wo, wi, active })
+    }
+
+    #[inline(always)]
+    fn value_inlined<B: Base<R>>(&self, base: &B, wo: V3<R>, wi: V3<R>, active: R::Mask) -> V3<R> {
         let way = Way { wo, wi, random: WalkRandom::new(wo, wi) };
         let mut sum = V3::splat(R::zero());
         let (mut walk, mut goes_on) = (0, active);
@@ -579,6 +584,23 @@ impl<R: Real> CoatLanes<R> {
         let found = self.face.pdf_of(wi, -w, Ways::Transmission).or_zero(has_density);
         let (value, _) = self.face.eval(-w, wi);
         value.x * balance(chosen, has_density, found)
+    }
+}
+
+/// [`CoatLanes::value`].
+struct Value<'a, R: Real, B> {
+    coat: &'a CoatLanes<R>,
+    base: &'a B,
+    wo: V3<R>,
+    wi: V3<R>,
+    active: R::Mask,
+}
+
+impl<R: Real, B: Base<R>> Task<R> for Value<'_, R, B> {
+    type Output = V3<R>;
+    #[inline(always)]
+    fn run(self) -> V3<R> {
+        self.coat.value_inlined(self.base, self.wo, self.wi, self.active)
     }
 }
 

@@ -39,20 +39,9 @@ impl Dielectric {
         self.lane().is_delta()
     }
 
-    /// The facet between two directions; `None` where there is none, as for a delta.
-    pub(crate) fn facet(&self, wo: LocalDir, wi: LocalDir) -> Option<Facet<f32>> {
-        let (facet, fits) = self.lane().facet(wo.lane(), wi.lane());
-        fits.then_some(facet)
-    }
-
     /// f · |cos θi|.
     pub fn eval(&self, wo: LocalDir, wi: LocalDir) -> f32 {
         self.lane().eval(wo.lane(), wi.lane()).0.x
-    }
-
-    /// f · |cos θi| of a facet that only reflects or only refracts.
-    pub(crate) fn eval_facet(&self, facet: &Facet<f32>, wo: LocalDir, wi: LocalDir) -> f32 {
-        self.lane().eval_facet(facet, wo.lane(), wi.lane())
     }
 
     /// The density of [`Dielectric::sample`].

@@ -13,6 +13,9 @@ pub use crate::conductor::ConductorLanes;
 pub use crate::dielectric::{DielectricLanes, ThinDielectricLanes};
 pub use crate::diffuse::{DiffuseLanes, DiffuseTransmissionLanes};
 pub use crate::microfacet::FacetLanes;
+pub use crate::principled_lanes::{ClearcoatLanes, PrincipledLanes};
+pub use crate::sheen::SheenLanes;
+pub use crate::thin_film::ThinFilmLanes;
 
 use crate::{Bsdf, BsdfSample, LocalDir, Scatter, Spectrum};
 
@@ -78,6 +81,8 @@ pub enum BsdfKind {
     CoatedDiffuse,
     /// [`CoatedConductorLanes`].
     CoatedConductor,
+    /// [`PrincipledLanes`].
+    Principled,
     /// A kind without lanes: only the scalar [`Bsdf`] has it.
     Other,
 }
@@ -101,6 +106,7 @@ impl Bsdf {
             Self::ThinDielectric(_) => BsdfKind::ThinDielectric,
             Self::CoatedDiffuse(_) => BsdfKind::CoatedDiffuse,
             Self::CoatedConductor(_) => BsdfKind::CoatedConductor,
+            Self::Principled(_) => BsdfKind::Principled,
             _ => BsdfKind::Other,
         }
     }
@@ -115,6 +121,7 @@ impl Bsdf {
             Self::ThinDielectric(bsdf) => Row::from_slice(&[bsdf.eta]),
             Self::CoatedDiffuse(bsdf) => bsdf.row().collect(),
             Self::CoatedConductor(bsdf) => bsdf.row().collect(),
+            Self::Principled(bsdf) => bsdf.row(),
             _ => return None,
         };
         Some((self.kind(), row))

@@ -19,6 +19,7 @@ pub mod medium;
 pub mod microfacet;
 mod mipmap;
 pub mod principled;
+mod principled_lanes;
 mod principled_params;
 pub mod sheen;
 pub mod spectrum;

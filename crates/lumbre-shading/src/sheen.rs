@@ -2,9 +2,12 @@
 
 use std::f32::consts::FRAC_1_PI;
 
+use lumbre_simd::math::pow;
+use lumbre_simd::{Real, V3};
+
 use crate::albedo::ALBEDO;
+use crate::lanes::{colour_lane, spectrum};
 use crate::{LocalDir, Spectrum};
-use lumbre_math::Elementary;
 
 /// A layer of fibres over a surface, the same from both sides.
 ///
@@ -47,32 +50,72 @@ impl Sheen {
 
     /// f · |cos θi|.
     pub fn eval(&self, wo: LocalDir, wi: LocalDir) -> Spectrum {
-        if self.is_none() || !wo.same_hemisphere(wi) {
-            return Spectrum::BLACK;
-        }
-        let at = |w: LocalDir| ALBEDO.sheen(w.abs_cos_theta(), self.roughness);
-        let most = at(wo).max(at(wi)).max(1.0);
-        self.color * (unbounded(self.roughness, wo, wi) / most)
+        spectrum(self.lane().eval(wo.lane(), wi.lane()))
     }
 
     /// The albedo of a white layer along one direction, by which the layers below are attenuated.
     pub fn share(&self, w: LocalDir) -> f32 {
-        ALBEDO.sheen(w.abs_cos_theta(), self.roughness).min(1.0)
+        self.lane().share(w.lane())
     }
 
     /// The transmittance to the layers below along one direction.
     pub fn passes(&self, w: LocalDir) -> f32 {
-        if self.is_none() { 1.0 } else { 1.0 - self.color.max_component() * self.share(w) }
+        self.lane().passes(w.lane())
+    }
+
+    pub(crate) fn lane(&self) -> SheenLanes<f32> {
+        SheenLanes { color: colour_lane(self.color), roughness: self.roughness }
+    }
+}
+
+/// [`Sheen`] over lanes.
+#[derive(Clone, Copy, Debug)]
+pub struct SheenLanes<R: Real> {
+    /// The strength in each channel; black is no sheen.
+    pub color: V3<R>,
+    /// Within [[`Sheen::MIN_ROUGHNESS`], 1].
+    pub roughness: R,
+}
+
+impl<R: Real> SheenLanes<R> {
+    /// [`Sheen::is_none`].
+    #[inline(always)]
+    pub fn is_none(&self) -> R::Mask {
+        self.color.max_component().simd_eq(R::zero())
+    }
+
+    /// [`Sheen::eval`].
+    #[inline(always)]
+    pub fn eval(&self, wo: V3<R>, wi: V3<R>) -> V3<R> {
+        let (at_o, at_i) =
+            (ALBEDO.sheen(wo.z.abs(), self.roughness), ALBEDO.sheen(wi.z.abs(), self.roughness));
+        let most = at_o.simd_max(at_i).simd_max(R::one());
+        let value = self.color * (unbounded(self.roughness, wo, wi) / most);
+        value.or_zero(!self.is_none() & (wo.z * wi.z).simd_gt(R::zero()))
+    }
+
+    /// [`Sheen::share`].
+    #[inline(always)]
+    pub fn share(&self, w: V3<R>) -> R {
+        ALBEDO.sheen(w.z.abs(), self.roughness).simd_min(R::one())
+    }
+
+    /// [`Sheen::passes`].
+    #[inline(always)]
+    pub fn passes(&self, w: V3<R>) -> R {
+        R::select(self.is_none(), R::one(), R::one() - self.color.max_component() * self.share(w))
     }
 }
 
 /// D · V · |cos θi| of white fibres, both directions on one side.
-pub(crate) fn unbounded(roughness: f32, wo: LocalDir, wi: LocalDir) -> f32 {
-    let Some(half) = (wo.vec() + wi.vec()).try_normalize() else { return 0.0 };
-    let (cos_o, cos_i) = (wo.abs_cos_theta(), wi.abs_cos_theta());
-    let exponent = 1.0 / (roughness * roughness);
-    let sin = (1.0 - half.z * half.z).max(0.0).sqrt();
-    let density = 0.5 * FRAC_1_PI * (2.0 + exponent) * sin.power(exponent);
-    let visible = 0.25 / (cos_o + cos_i - cos_o * cos_i).max(1e-9);
-    density * visible * cos_i
+#[inline(always)]
+pub(crate) fn unbounded<R: Real>(roughness: R, wo: V3<R>, wi: V3<R>) -> R {
+    let half = wo + wi;
+    let height = half.normalize().z;
+    let (cos_o, cos_i) = (wo.z.abs(), wi.z.abs());
+    let exponent = (roughness * roughness).recip();
+    let sin = (R::one() - height * height).simd_max(R::zero()).sqrt();
+    let density = R::splat(0.5 * FRAC_1_PI) * (R::splat(2.0) + exponent) * pow(sin, exponent);
+    let visible = R::splat(0.25) / (cos_o + cos_i - cos_o * cos_i).simd_max(R::splat(1e-9));
+    (density * visible * cos_i).or_zero(half.length_squared().simd_gt(R::zero()))
 }

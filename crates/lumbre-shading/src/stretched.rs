@@ -3,9 +3,10 @@
 use std::f32::consts::FRAC_1_PI;
 use std::sync::LazyLock;
 
-use lumbre_math::{Elementary, Vec2, Vec3};
+use lumbre_simd::math::{atan2, pow, sin_cos_turns};
+use lumbre_simd::{Real, Task, UInt, V3};
 
-use crate::albedo::Between;
+use crate::albedo::{Between, unit, weighed};
 
 /// Nodes of the cosine, at the squares of equal steps from 0 to 1.
 const COSINES: usize = 24;
@@ -31,13 +32,17 @@ pub(crate) struct Stretched {
     means: Vec<f32>,
 }
 
-/// The index of a pair, its larger one first.
-fn pair(x: usize, y: usize) -> usize {
-    x * (x + 1) / 2 + y
+/// The index of the pair of two roughnesses, and where the second is the larger one.
+#[inline(always)]
+fn pair<R: Real>(x: R::UInt, y: R::UInt) -> (R::UInt, R::Mask) {
+    let swapped = x.simd_lt(y);
+    let (larger, smaller) = (R::UInt::select(swapped, y, x), R::UInt::select(swapped, x, y));
+    ((larger * (larger + R::UInt::splat(1))).shr::<1>() + smaller, swapped)
 }
 
-fn by_alpha(alpha: f32) -> Between {
-    Between::new(crate::unit(alpha).cube_root(), ROUGHNESSES)
+#[inline(always)]
+fn by_alpha<R: Real>(alpha: R) -> Between<R> {
+    Between::new(pow(unit(alpha), R::splat(1.0 / 3.0)), ROUGHNESSES)
 }
 
 impl Stretched {
@@ -61,58 +66,139 @@ impl Stretched {
     }
 
     /// The albedo of facets of these α for a direction in their frame (on either side).
-    pub(crate) fn mirror(&self, alpha: Vec2, w: Vec3) -> f32 {
-        let around = Around::new(w.y.abs().angle_from(w.x.abs()) * (2.0 * FRAC_1_PI));
-        let cosines = Between::new(crate::unit(w.z.abs()).sqrt(), COSINES);
-        let (cos_start, cos_weights) = cosines.nodes(COSINES);
-        let row = |row: usize| {
-            let start = row * ROW + cos_start;
-            let values = &self.values[start..(start + 4).min(self.values.len())];
-            values.iter().zip(cos_weights).map(|(v, w)| v * w).sum::<f32>()
-        };
-        let page = |x: usize, y: usize| {
-            let swapped = x < y;
-            let page = if swapped { pair(y, x) } else { pair(x, y) };
-            let node = |node: usize| if swapped { AZIMUTHS - 1 - node } else { node };
-            around
-                .nodes
-                .into_iter()
-                .zip(around.weights)
-                .map(|(i, w)| w * row(page * AZIMUTHS + node(i)))
-                .sum()
-        };
-        interpolated(alpha, page).clamp(0.0, 1.0)
+    #[inline(always)]
+    pub(crate) fn mirror<R: Real>(&self, alpha: [R; 2], w: V3<R>) -> R {
+        R::call(Mirror { table: self, alpha, w })
+    }
+
+    #[inline(always)]
+    fn mirror_inlined<R: Real>(&self, alpha: [R; 2], w: V3<R>) -> R {
+        let around = Around::new(atan2(w.y.abs(), w.x.abs()) * R::splat(2.0 * FRAC_1_PI));
+        let (column, by_column) = Between::new(unit(w.z.abs()).sqrt(), COSINES).nodes(COSINES);
+        let [(x, by_x), (y, by_y)] =
+            [by_alpha(alpha[0]).nodes(ROUGHNESSES), by_alpha(alpha[1]).nodes(ROUGHNESSES)];
+        let mut sum = R::zero();
+        for (i, by_x) in by_x.into_iter().enumerate() {
+            let mut row = R::zero();
+            for (j, by_y) in by_y.into_iter().enumerate() {
+                let (page, swapped) = pair::<R>(x + R::UInt::splat(i as u32), y + R::UInt::splat(j as u32));
+                let page = page * R::UInt::splat(AZIMUTHS as u32);
+                let page = PageAt { values: &self.values, page, swapped, around: &around, column, by_column };
+                row = row + by_y * R::call(page);
+            }
+            sum = sum + by_x * row;
+        }
+        sum.simd_max(R::zero()).simd_min(R::one())
     }
 
     /// The cosine-weighted mean of [`Stretched::mirror`].
-    pub(crate) fn mean(&self, alpha: Vec2) -> f32 {
-        interpolated(alpha, |x, y| self.means[if x < y { pair(y, x) } else { pair(x, y) }])
+    #[inline(always)]
+    pub(crate) fn mean<R: Real>(&self, alpha: [R; 2]) -> R {
+        R::call(Mean { table: self, alpha })
+    }
+
+    #[inline(always)]
+    fn mean_inlined<R: Real>(&self, alpha: [R; 2]) -> R {
+        let [(x, by_x), (y, by_y)] =
+            [by_alpha(alpha[0]).nodes(ROUGHNESSES), by_alpha(alpha[1]).nodes(ROUGHNESSES)];
+        let mut sum = R::zero();
+        for (i, by_x) in by_x.into_iter().enumerate() {
+            let mut row = R::zero();
+            for (j, by_y) in by_y.into_iter().enumerate() {
+                let (page, _) = pair::<R>(x + R::UInt::splat(i as u32), y + R::UInt::splat(j as u32));
+                row = row + by_y * R::gather(&self.means, page);
+            }
+            sum = sum + by_x * row;
+        }
+        sum
+    }
+}
+
+/// [`Stretched::mirror`].
+struct Mirror<'a, R: Real> {
+    table: &'a Stretched,
+    alpha: [R; 2],
+    w: V3<R>,
+}
+
+impl<R: Real> Task<R> for Mirror<'_, R> {
+    type Output = R;
+    #[inline(always)]
+    fn run(self) -> R {
+        self.table.mirror_inlined(self.alpha, self.w)
+    }
+}
+
+/// The value of one pair of roughnesses.
+struct PageAt<'a, R: Real> {
+    values: &'a [f32],
+    page: R::UInt,
+    swapped: R::Mask,
+    around: &'a Around<R>,
+    column: R::UInt,
+    by_column: [R; 4],
+}
+
+impl<R: Real> Task<R> for PageAt<'_, R> {
+    type Output = R;
+    #[inline(always)]
+    fn run(self) -> R {
+        let last = R::UInt::splat(AZIMUTHS as u32 - 1);
+        let mut value = R::zero();
+        for (node, weight) in self.around.nodes.into_iter().zip(self.around.weights) {
+            let node = R::UInt::select(self.swapped, last - node, node);
+            let start = (self.page + node) * R::UInt::splat(ROW as u32) + self.column;
+            value = value + weight * weighed(self.values, start, self.by_column);
+        }
+        value
+    }
+}
+
+/// [`Stretched::mean`].
+struct Mean<'a, R: Real> {
+    table: &'a Stretched,
+    alpha: [R; 2],
+}
+
+impl<R: Real> Task<R> for Mean<'_, R> {
+    type Output = R;
+    #[inline(always)]
+    fn run(self) -> R {
+        self.table.mean_inlined(self.alpha)
     }
 }
 
 /// A position between nodes of the azimuth.
-struct Around {
-    nodes: [usize; 4],
-    weights: [f32; 4],
+struct Around<R: Real> {
+    nodes: [R::UInt; 4],
+    weights: [R; 4],
 }
 
-impl Around {
+impl<R: Real> Around<R> {
     /// By the fraction of the quarter turn.
-    fn new(share: f32) -> Self {
-        Self::at(0.5 - ((1.0 - 2.0 * crate::unit(share)).arc_sine() / 3.0).sine())
+    #[inline(always)]
+    fn new(share: R) -> Self {
+        // The root of 3 s² − 2 s³ = share: ½ − sin(⅓ arcsin(1 − 2 share)).
+        let sine = R::one() - R::splat(2.0) * unit(share);
+        let cosine = ((R::one() - sine) * (R::one() + sine)).simd_max(R::zero()).sqrt();
+        let third = atan2(sine, cosine) * R::splat(0.5 * FRAC_1_PI / 3.0);
+        Self::at(R::splat(0.5) - sin_cos_turns(third).0)
     }
 
     /// By the position in equal steps.
-    fn at(s: f32) -> Self {
-        let place = crate::unit(s) * (AZIMUTHS - 1) as f32;
-        let first = (place as usize).min(AZIMUTHS - 2);
-        // The quarter is extended by its mirror image.
-        let last = 2 * (AZIMUTHS - 1);
-        let nodes = [0, 1, 2, 3].map(|i| {
-            let node = (first + i + last - 1) % last;
-            node.min(last - node)
-        });
-        Self { nodes, weights: Between::at(first, place - first as f32).weights() }
+    #[inline(always)]
+    fn at(s: R) -> Self {
+        let place = unit(s) * R::splat((AZIMUTHS - 1) as f32);
+        let first = place.floor().simd_min(R::splat((AZIMUTHS - 2) as f32));
+        let node = first.to_int();
+        let (one, two) = (R::UInt::splat(1), R::UInt::splat(2));
+        // The quarter is extended by its mirror image: node −1 is node 1, and that after the last the one before it.
+        let is_first = node.simd_eq(R::UInt::splat(0));
+        let before = R::UInt::select(is_first, one, node - one);
+        let is_last = node.simd_eq(R::UInt::splat(AZIMUTHS as u32 - 2));
+        let after = R::UInt::select(is_last, node, node + two);
+        let nodes = [before, node, node + one, after];
+        Self { nodes, weights: Between::at(node, place - first).weights() }
     }
 }
 
@@ -122,27 +208,23 @@ fn azimuth_weights() -> [f32; AZIMUTHS] {
     let mut sum = [0.0; AZIMUTHS];
     for i in 0..steps {
         let s = (i as f32 + 0.5) / steps as f32;
-        let around = Around::at(s);
+        let around = Around::<f32>::at(s);
         for (node, weight) in around.nodes.into_iter().zip(around.weights) {
-            sum[node] += f64::from(6.0 * s * (1.0 - s) * weight) / f64::from(steps);
+            sum[node.0 as usize] += f64::from(6.0 * s * (1.0 - s) * weight) / f64::from(steps);
         }
     }
     sum.map(|weight| weight as f32)
-}
-
-/// Interpolates between nodes of both roughnesses.
-fn interpolated(alpha: Vec2, value: impl Fn(usize, usize) -> f32) -> f32 {
-    by_alpha(alpha.x)
-        .interpolate(ROUGHNESSES, |x| by_alpha(alpha.y).interpolate(ROUGHNESSES, |y| value(x, y)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::conductor::Conductor;
+    use crate::lanes::lane;
     use crate::microfacet::Microfacets;
     use crate::{LocalDir, Spectrum};
     use lumbre_math::random::RandomStream;
+    use lumbre_math::{Vec2, Vec3};
     use std::f32::consts::FRAC_PI_2;
 
     /// The direction of a node.
@@ -200,7 +282,8 @@ mod tests {
             let (cos, phi) = (number().powi(2).max(1e-3), number() * std::f32::consts::TAU);
             let sin = (1.0 - cos * cos).sqrt();
             let w = Vec3::new(sin * phi.cos(), sin * phi.sin(), cos);
-            let (ours, expected) = (STRETCHED.mirror(alpha, w), reflected(alpha, w, [28657, 17711]));
+            let (ours, expected) =
+                (STRETCHED.mirror(alpha.into(), lane(w)), reflected(alpha, w, [28657, 17711]));
             worst = worst.max((ours - expected).abs());
             // Along the surface, and along the narrow axis most, the steps are too wide.
             let tolerance = if cos < 0.1 { 3e-2 } else { 3e-3 };
@@ -216,11 +299,10 @@ mod tests {
             for cos in [0.02, 0.3, 0.77, 1.0_f32] {
                 let w = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
                 let (ours, other) =
-                    (STRETCHED.mirror(Vec2::splat(alpha), w), crate::albedo::ALBEDO.mirror(cos, alpha));
+                    (STRETCHED.mirror([alpha; 2], lane(w)), crate::albedo::ALBEDO.mirror(cos, alpha));
                 assert!((ours - other).abs() < 4e-3, "{alpha} {cos}: {ours} {other}");
             }
-            let (ours, other) =
-                (STRETCHED.mean(Vec2::splat(alpha)), crate::albedo::ALBEDO.mirror_mean(alpha));
+            let (ours, other) = (STRETCHED.mean([alpha; 2]), crate::albedo::ALBEDO.mirror_mean(alpha));
             assert!((ours - other).abs() < 2e-3, "{alpha}: {ours} {other}");
         }
     }
@@ -235,11 +317,15 @@ mod tests {
                     let cos = ((i as f32 + 0.5) / steps as f32).sqrt();
                     let phi = (j as f32 + 0.5) / steps as f32 * std::f32::consts::TAU;
                     let sin = (1.0 - cos * cos).sqrt();
-                    sum += STRETCHED.mirror(alpha, Vec3::new(sin * phi.cos(), sin * phi.sin(), cos));
+                    sum += STRETCHED.mirror(alpha.into(), V3::new(sin * phi.cos(), sin * phi.sin(), cos));
                 }
             }
             let mean = sum / (steps * steps) as f32;
-            assert!((mean - STRETCHED.mean(alpha)).abs() < 5e-4, "{alpha}: {mean} {}", STRETCHED.mean(alpha));
+            assert!(
+                (mean - STRETCHED.mean(alpha.into())).abs() < 5e-4,
+                "{alpha}: {mean} {}",
+                STRETCHED.mean(alpha.into())
+            );
         }
     }
 }

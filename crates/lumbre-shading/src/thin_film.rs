@@ -2,8 +2,12 @@
 
 use std::f32::consts::PI;
 
+use lumbre_simd::math::{exp, sin_cos_turns};
+use lumbre_simd::{Real, Task, V3};
+
+use crate::albedo::unit;
+use crate::lanes::{colour_lane, spectrum};
 use crate::{Spectrum, fresnel};
-use lumbre_math::Elementary;
 
 /// A thin film on a surface, whose two reflections interfere.
 ///
@@ -25,82 +29,152 @@ impl ThinFilm {
     /// No film.
     pub const NONE: Self = Self { weight: 0.0, eta: 1.3, thickness: 0.0 };
 
-    /// The film fades out below a thickness of 30 nm, where the method does not apply.
-    fn eta_of_thickness(&self) -> f32 {
-        let t = (self.thickness / 30.0).clamp(0.0, 1.0);
-        1.0 + (self.eta.max(1.0) - 1.0) * t * t * (3.0 - 2.0 * t)
-    }
-
     /// The reflectance at a cosine (outside) where the bare surface has the reflectance `f0` at normal
     /// incidence; each channel in [0, 1].
     pub fn reflectance(&self, cos: f32, f0: Spectrum) -> Spectrum {
-        let eta = self.eta_of_thickness();
-        let cos = cos.clamp(0.0, 1.0);
-        let cos_inside = (1.0 - (1.0 - cos * cos) / (eta * eta)).max(0.0).sqrt();
-        let outer = fresnel::dielectric(cos, eta);
-        let passes = 1.0 - outer;
-        let detour = 2.0 * eta * self.thickness * 1e-9 * cos_inside;
-        let lane = |f0: f32, row: [f32; 3]| {
-            let base = index_of(f0);
-            let inner = fresnel::dielectric(cos_inside, base / eta);
-            // Reflection inside the denser medium shifts the phase by half a wave: at the outer face always,
-            // at the base where the film is the denser.
-            let shift = if base < eta { 2.0 * PI } else { PI };
-            let both = outer * inner;
-            let series = passes * passes * inner / (1.0 - both).max(1e-6);
-            let root = both.sqrt();
-            let (mut order, mut sum) = (series - passes, outer + series);
-            for m in 1..=2 {
-                order *= root;
-                let m = m as f32;
-                let [x, y, z] = sensitivity(m * detour, m * shift);
-                sum += 2.0 * order * (row[0] * x + row[1] * y + row[2] * z);
-            }
-            crate::unit(sum)
-        };
-        Spectrum::new(
-            lane(f0.r, REC709_FROM_XYZ[0]),
-            lane(f0.g, REC709_FROM_XYZ[1]),
-            lane(f0.b, REC709_FROM_XYZ[2]),
-        )
+        spectrum(self.lane().reflectance(V3::splat(cos), colour_lane(f0)))
     }
 
     /// The maximal reflectance at normal incidence over all wavelengths: both faces in phase.
     pub fn most(&self, f0: Spectrum) -> Spectrum {
-        let eta = self.eta_of_thickness();
-        let outer = fresnel::dielectric(1.0, eta).sqrt();
-        f0.map(|f0| {
-            let inner = fresnel::dielectric(1.0, index_of(f0) / eta).sqrt();
-            ((outer + inner) / (1.0 + outer * inner)).powi(2).max(f0)
-        })
+        spectrum(self.lane().most(colour_lane(f0)))
+    }
+
+    pub(crate) fn lane(&self) -> ThinFilmLanes<f32> {
+        ThinFilmLanes { weight: self.weight, eta: self.eta, thickness: self.thickness }
     }
 }
 
+/// [`ThinFilm`] over lanes.
+#[derive(Clone, Copy, Debug)]
+pub struct ThinFilmLanes<R: Real> {
+    /// The share of the surface covered, in [0, 1].
+    pub weight: R,
+    /// Index of refraction, at least 1.
+    pub eta: R,
+    /// In nanometres, ≥ 0.
+    pub thickness: R,
+}
+
+impl<R: Real> ThinFilmLanes<R> {
+    /// The film fades out below a thickness of 30 nm, where the method does not apply.
+    #[inline(always)]
+    fn eta_of_thickness(&self) -> R {
+        let t = (self.thickness / R::splat(30.0)).simd_max(R::zero()).simd_min(R::one());
+        let excess = self.eta.simd_max(R::one()) - R::one();
+        R::one() + excess * t * t * (R::splat(3.0) - R::splat(2.0) * t)
+    }
+
+    /// [`ThinFilm::reflectance`], at a cosine for each channel.
+    #[inline(always)]
+    pub(crate) fn reflectance(&self, cos: V3<R>, f0: V3<R>) -> V3<R> {
+        let [x, y, z] = REC709_FROM_XYZ;
+        V3::new(
+            R::call(Channel { film: self, cos: cos.x, f0: f0.x, row: x }),
+            R::call(Channel { film: self, cos: cos.y, f0: f0.y, row: y }),
+            R::call(Channel { film: self, cos: cos.z, f0: f0.z, row: z }),
+        )
+    }
+
+    /// The reflectance in a channel, by its row of [`REC709_FROM_XYZ`].
+    #[inline(always)]
+    fn channel(&self, cos: R, f0: R, row: [f32; 3]) -> R {
+        let (one, two) = (R::one(), R::splat(2.0));
+        let eta = self.eta_of_thickness();
+        let cos = cos.simd_max(R::zero()).simd_min(one);
+        let cos_inside = (one - (one - cos * cos) / (eta * eta)).simd_max(R::zero()).sqrt();
+        let outer = fresnel::dielectric(cos, eta);
+        let passes = one - outer;
+        let detour = two * eta * self.thickness * R::splat(1e-9) * cos_inside;
+        let base = index_of(f0);
+        let inner = fresnel::dielectric(cos_inside, base / eta);
+        // Reflection inside the denser medium shifts the phase by half a wave: at the outer face always,
+        // at the base where the film is the denser. In turns.
+        let shift = R::select(base.simd_lt(eta), one, R::splat(0.5));
+        let both = outer * inner;
+        let series = passes * passes * inner / (one - both).simd_max(R::splat(1e-6));
+        let root = both.sqrt();
+        let first = (series - passes) * root;
+        let orders = first * row_of(sensitivity(detour, shift), row)
+            + first * root * row_of(sensitivity(two * detour, two * shift), row);
+        unit(outer + series + two * orders)
+    }
+
+    /// [`ThinFilm::most`].
+    #[inline(always)]
+    pub(crate) fn most(&self, f0: V3<R>) -> V3<R> {
+        let eta = self.eta_of_thickness();
+        let outer = fresnel::dielectric(R::one(), eta).sqrt();
+        V3::new(most_of(outer, eta, f0.x), most_of(outer, eta, f0.y), most_of(outer, eta, f0.z))
+    }
+}
+
+/// [`ThinFilmLanes::channel`].
+struct Channel<'a, R: Real> {
+    film: &'a ThinFilmLanes<R>,
+    cos: R,
+    f0: R,
+    row: [f32; 3],
+}
+
+impl<R: Real> Task<R> for Channel<'_, R> {
+    type Output = R;
+    #[inline(always)]
+    fn run(self) -> R {
+        self.film.channel(self.cos, self.f0, self.row)
+    }
+}
+
+#[inline(always)]
+fn most_of<R: Real>(outer: R, eta: R, f0: R) -> R {
+    let inner = fresnel::dielectric(R::one(), index_of(f0) / eta).sqrt();
+    let sum = (outer + inner) / (R::one() + outer * inner);
+    (sum * sum).simd_max(f0)
+}
+
+#[inline(always)]
+fn row_of<R: Real>(xyz: V3<R>, row: [f32; 3]) -> R {
+    xyz.dot(V3::constant(row))
+}
+
 /// The index of the dielectric with the reflectance `f0` at normal incidence.
-pub(crate) fn index_of(f0: f32) -> f32 {
-    let root = f0.clamp(0.0, 0.9999).sqrt();
-    (1.0 + root) / (1.0 - root)
+#[inline(always)]
+pub(crate) fn index_of<R: Real>(f0: R) -> R {
+    let root = f0.simd_max(R::zero()).simd_min(R::splat(0.9999)).sqrt();
+    (R::one() + root) / (R::one() - root)
 }
 
 /// Linear Rec. 709 from CIE XYZ, for a white of (1, 1, 1): each row is divided by its sum.
 const REC709_FROM_XYZ: [[f32; 3]; 3] =
     [[2.688_95, -1.275_71, -0.413_24], [-1.022_15, 1.978_32, 0.043_83], [0.061_21, -0.224_49, 1.163_28]];
 
-/// The Fourier transform of the eye's sensitivity (X, Y, Z) at an optical path difference in metres, with a
-/// phase shift: sums of Gaussians in the wave number, with the constants fitted by Belcour and Barla,
+/// The lobes of the eye's sensitivity (X, Y, Z, and X again): Gaussians in the wave number, with the constants fitted by Belcour and
+/// Barla.
+const PLACES: [f32; 4] = [1.6810e6, 1.7953e6, 2.2084e6, 2.2399e6];
+const VARIANCES: [f32; 4] = [4.3278e9, 9.3046e9, 6.6121e9, 4.5282e9];
+/// The share of each of the two lobes of X: amplitudes 5.4856e-13 and 9.7470e-14, each times the root of its variance.
+const OF_X: [f32; 2] = {
+    // √(4.3278e9) and √(4.5282e9)
+    let (first, second) = (5.4856e-13 * 65_786.0, 9.7470e-14 * 67_292.0);
+    [first / (first + second), second / (first + second)]
+};
+
+/// The Fourier transform of the eye's sensitivity at an optical path difference in metres, with a phase shift in turns,
 /// normalised to 1 for no difference.
-fn sensitivity(path: f32, shift: f32) -> [f32; 3] {
-    const AMPLITUDES: [f32; 4] = [5.4856e-13, 4.4201e-13, 5.2481e-13, 9.7470e-14];
-    const PLACES: [f32; 4] = [1.6810e6, 1.7953e6, 2.2084e6, 2.2399e6];
-    const VARIANCES: [f32; 4] = [4.3278e9, 9.3046e9, 6.6121e9, 4.5282e9];
-    let phase = 2.0 * PI * path;
-    let lobe = |i: usize, at: f32, spread: f32| {
-        let height = AMPLITUDES[i] * (2.0 * PI * VARIANCES[i]).sqrt();
-        height * at.cosine() * (-VARIANCES[i] * spread).exponential()
-    };
-    let all = |i: usize| lobe(i, PLACES[i] * phase + shift, phase * phase);
-    let white = |i: usize| lobe(i, 0.0, 0.0);
-    [(all(0) + all(3)) / (white(0) + white(3)), all(1) / white(1), all(2) / white(2)]
+#[inline(always)]
+fn sensitivity<R: Real>(path: R, shift: R) -> V3<R> {
+    V3::new(
+        R::splat(OF_X[0]) * lobe(path, shift, 0) + R::splat(OF_X[1]) * lobe(path, shift, 3),
+        lobe(path, shift, 1),
+        lobe(path, shift, 2),
+    )
+}
+
+#[inline(always)]
+fn lobe<R: Real>(path: R, shift: R, which: usize) -> R {
+    let phase = R::splat(2.0 * PI) * path;
+    let (_, cos) = sin_cos_turns(R::splat(PLACES[which]) * path + shift);
+    cos * exp(R::splat(-VARIANCES[which]) * (phase * phase))
 }
 
 #[cfg(test)]

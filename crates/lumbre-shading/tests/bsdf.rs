@@ -1304,6 +1304,44 @@ fn random_coat(random: &mut RandomStream) -> Coat {
     }
 }
 
+/// Every part is missing in some.
+fn random_principled(random: &mut RandomStream) -> Principled {
+    let (sin, cos) = (std::f32::consts::TAU * random.next_f32()).sin_cos();
+    let mut share = || {
+        let number = 3.0 * random.next_f32() - 1.0;
+        number.clamp(0.0, 1.0)
+    };
+    let (metallic, transmission, diffuse_transmission) = (share(), share(), share());
+    let (film, coat, sheen, leans, thin, disperses) = (share(), share(), share(), share(), share(), share());
+    let eta = if random.next_f32() < 0.1 { 1.0 } else { 0.6 + 1.5 * random.next_f32() };
+    let normal = Vec3::new(random.next_f32() - 0.5, random.next_f32() - 0.5, 1.0).normalize();
+    Principled {
+        base: random_colour(random),
+        metallic,
+        facets: random_facets(random),
+        tangent: Vec2::new(cos, sin),
+        eta,
+        f0: random_colour(random) * 0.2,
+        f90: random.next_f32(),
+        transmission,
+        transmission_color: random_colour(random),
+        body: match (thin > 0.5, disperses > 0.5) {
+            (true, _) => Body::Thin,
+            (_, true) => Body::Solid { spread: 0.05 },
+            _ => Body::Solid { spread: 0.0 },
+        },
+        diffuse_transmission,
+        diffuse_transmission_color: random_colour(random),
+        film: ThinFilm { weight: film, eta: 1.0 + random.next_f32(), thickness: 800.0 * random.next_f32() },
+        sheen: if sheen > 0.5 { Sheen::new(random_colour(random), random.next_f32()) } else { Sheen::NONE },
+        coat: Clearcoat {
+            weight: coat,
+            alpha: (2.0 * random.next_f32() - 1.0).max(0.0),
+            normal: if leans > 0.5 { normal } else { Vec3::Z },
+        },
+    }
+}
+
 macro_rules! kinds {
     ($($name:ident = $lanes:ident),*) => {
         $(
@@ -1318,7 +1356,8 @@ macro_rules! kinds {
 kinds! {
     DiffuseKind = DiffuseLanes, DiffuseTransmissionKind = DiffuseTransmissionLanes, ConductorKind = ConductorLanes,
     DielectricKind = DielectricLanes, ThinDielectricKind = ThinDielectricLanes,
-    CoatedDiffuseKind = CoatedDiffuseLanes, CoatedConductorKind = CoatedConductorLanes
+    CoatedDiffuseKind = CoatedDiffuseLanes, CoatedConductorKind = CoatedConductorLanes,
+    PrincipledKind = PrincipledLanes
 }
 
 #[test]
@@ -1350,6 +1389,9 @@ fn lanes_scatter_as_scalar_code_does_to_the_bit() {
         let (eta, k) = (random_colour(random) * 3.0, random_colour(random) * 5.0);
         let base = Conductor { eta, k, facets: random_facets(random) };
         Bsdf::CoatedConductor(CoatedConductor { base, coat: random_coat(random) })
+    });
+    assert_lanes_agree::<PrincipledKind>(BsdfKind::Principled, |random| {
+        Bsdf::Principled(Box::new(random_principled(random)))
     });
 }
 

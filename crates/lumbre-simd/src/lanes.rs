@@ -240,6 +240,15 @@ pub trait Double:
     }
 }
 
+/// A piece of lane code that [`Real::call`] runs.
+pub trait Task<R: Real>: Sized {
+    /// What it returns.
+    type Output;
+
+    /// Does the work. To be `#[inline(always)]`, as all lane code.
+    fn run(self) -> Self::Output;
+}
+
 /// An `f32` in each lane.
 pub trait Real:
     Copy
@@ -349,6 +358,10 @@ pub trait Real:
     /// # Panics
     /// If the slice has no room for all lanes.
     fn compress_store(self, mask: Self::Mask, slice: &mut [f32]);
+
+    /// Runs a task by a call instead of inlining it; the called function has the instruction set, too. For code that is long and used in
+    /// several places: inlined in each it would compile for minutes.
+    fn call<T: Task<Self>>(task: T) -> T::Output;
 
     /// 0 in all lanes.
     #[inline(always)]

@@ -5,6 +5,7 @@
 //!
 //! - Everything is generic over [`Real`] and `#[inline(always)]`, from [`Job::run`] down: only inlined code takes on the instruction set of
 //!   the root that [`InstructionSet::run`] calls. A function that is not inlined, and a closure, loses it and runs many times slower.
+//!   What is too long to be inlined everywhere is a [`Task`], run by [`Real::call`].
 //! - An early return becomes a mask, an `if` a [`Real::select`]. Lanes that a mask excludes are computed all the same, so they may hold
 //!   infinities and NaN, but never an index out of range.
 //!
@@ -23,5 +24,5 @@ mod v3;
 mod x86;
 
 pub use instruction_set::{InstructionSet, Job, UnknownInstructionSet};
-pub use lanes::{Double, MAX_LANES, Mask, Real, UInt};
+pub use lanes::{Double, MAX_LANES, Mask, Real, Task, UInt};
 pub use v3::V3;

@@ -2,7 +2,7 @@
 
 use std::num::Wrapping;
 
-use crate::{Double, Mask, Real, UInt};
+use crate::{Double, Mask, Real, Task, UInt};
 
 impl Mask for bool {
     #[inline(always)]
@@ -174,6 +174,11 @@ impl Real for f32 {
     memory!(f32, f32::from, f32::from);
 
     #[inline(always)]
+    fn call<T: Task<Self>>(task: T) -> T::Output {
+        task.run_called()
+    }
+
+    #[inline(always)]
     fn sqrt(self) -> Self {
         f32::sqrt(self)
     }
@@ -255,3 +260,13 @@ impl Real for f32 {
         int.0.cast_signed() as f32
     }
 }
+
+/// A trait, so that each task is compiled beside its own type.
+trait Called: Task<f32> {
+    #[inline(never)]
+    fn run_called(self) -> Self::Output {
+        self.run()
+    }
+}
+
+impl<T: Task<f32>> Called for T {}

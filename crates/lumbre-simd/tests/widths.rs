@@ -2,7 +2,7 @@
 
 use std::num::Wrapping;
 
-use lumbre_simd::{Double, InstructionSet, Job, Mask, Real, UInt, V3, math, random};
+use lumbre_simd::{Double, InstructionSet, Job, Mask, Real, Task, UInt, V3, math, random};
 
 /// What an operation gives for one row of inputs.
 #[derive(Clone, Copy, Debug)]
@@ -90,6 +90,17 @@ fn inputs() -> Inputs {
     Inputs { singles, doubles, ints }
 }
 
+/// A task.
+struct Norm<R>(V3<R>);
+
+impl<R: Real> Task<R> for Norm<R> {
+    type Output = R;
+    #[inline(always)]
+    fn run(self) -> R {
+        self.0.length()
+    }
+}
+
 /// All operations on all inputs: their names, and the answers row by row.
 struct Operations<'a>(&'a Inputs);
 
@@ -144,7 +155,7 @@ impl Job for Operations<'_> {
                 "basis": math::orthonormal_basis(p).0.x; "basis 2": math::orthonormal_basis(p).1.y;
                 "disk": math::square_to_disk([a, b])[0]; "disk 2": math::square_to_disk([a, b])[1];
                 "uniform": random::uniform(i);
-                "hemisphere": math::cosine_hemisphere([a, b]).z;
+                "call": R::call(Norm(p)); "hemisphere": math::cosine_hemisphere([a, b]).z;
             }
             doubles! {
                 "x": x; "x + y": x + y; "x - y": x - y; "x * y": x * y; "x / y": x / y; "-x": -x;

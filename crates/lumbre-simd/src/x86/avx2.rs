@@ -3,8 +3,8 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Neg, Not, Sub};
 
-use super::{check_indices, operators, operators_by_two, registers};
-use crate::{Double, Mask, Real, UInt};
+use super::{Called, check_indices, operators, operators_by_two, registers};
+use crate::{Double, Mask, Real, Task, UInt};
 
 /// All bits of a lane are set, or none.
 #[derive(Clone, Copy, Debug)]
@@ -375,6 +375,12 @@ impl Real for F32x8 {
     type Mask = Mask8;
     type UInt = U32x8;
     type Double = F64x8;
+
+    #[inline(always)]
+    fn call<T: Task<Self>>(task: T) -> T::Output {
+        // SAFETY: where this type is used, the machine has the features: see the module.
+        unsafe { task.call_avx2() }
+    }
 
     #[inline(always)]
     fn splat(x: f32) -> Self {

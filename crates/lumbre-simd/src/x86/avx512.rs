@@ -3,8 +3,8 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Neg, Not, Sub};
 
-use super::{check_indices, operators, operators_by_two, registers};
-use crate::{Double, Mask, Real, UInt};
+use super::{Called, check_indices, operators, operators_by_two, registers};
+use crate::{Double, Mask, Real, Task, UInt};
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Mask16(__mmask16);
@@ -337,6 +337,12 @@ impl Real for F32x16 {
     type Mask = Mask16;
     type UInt = U32x16;
     type Double = F64x16;
+
+    #[inline(always)]
+    fn call<T: Task<Self>>(task: T) -> T::Output {
+        // SAFETY: where this type is used, the machine has the features: see the module.
+        unsafe { task.call_avx512() }
+    }
 
     #[inline(always)]
     fn splat(x: f32) -> Self {

@@ -8,7 +8,7 @@
 mod avx2;
 mod avx512;
 
-use crate::Job;
+use crate::{Job, Real, Task};
 
 /// Jobs on x86; a trait, so that each is compiled beside its own type.
 pub(crate) trait OnX86: Job + Sized {
@@ -30,6 +30,27 @@ pub(crate) trait OnX86: Job + Sized {
 }
 
 impl<J: Job> OnX86 for J {}
+
+/// Tasks of AVX2 and AVX-512.
+trait Called<R: Real>: Task<R> {
+    /// # Safety
+    /// The machine has these features.
+    #[inline(never)]
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+    unsafe fn call_avx2(self) -> Self::Output {
+        self.run()
+    }
+
+    /// # Safety
+    /// The machine has these features.
+    #[inline(never)]
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512cd,avx512dq,avx512vl")]
+    unsafe fn call_avx512(self) -> Self::Output {
+        self.run()
+    }
+}
+
+impl<R: Real, T: Task<R>> Called<R> for T {}
 
 /// Instructions on registers.
 macro_rules! registers {
@@ -74,5 +95,13 @@ use {operators, operators_by_two, registers};
 /// Checks the largest index of a gather. Instructions take indices as signed numbers, hence the second bound.
 #[inline(always)]
 fn check_indices(largest: u32, len: usize) {
-    assert!((largest as usize) < len.min(1 << 31), "index {largest} of a table of {len}");
+    if largest as usize >= len.min(1 << 31) {
+        refuse_index(largest, len);
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn refuse_index(index: u32, len: usize) -> ! {
+    panic!("index {index} of a table of {len}");
 }
