@@ -92,6 +92,7 @@ impl Scene {
         let infinite = (0..builder.lights.len() as u32).map(LightId);
         let infinite: Vec<LightId> =
             infinite.filter(|id| builder.lights[id.0 as usize].is_infinite()).collect();
+        let light_choice = LightChoice::new(&builder.lights, &builder.entries, radius);
         let has_holes = builder.entries.iter().any(SurfaceEntry::has_holes);
         let lets_light_through = builder.entries.iter().any(SurfaceEntry::lets_light_through);
         let lets_light_straight_on = builder.entries.iter().any(SurfaceEntry::lets_light_straight_on);
@@ -99,8 +100,8 @@ impl Scene {
         let looks_up = builder.entries.iter().any(SurfaceEntry::looks_up_anywhere);
         Ok(Self {
             accel,
-            light_choice: LightChoice::new(&builder.lights, &builder.entries, radius),
-            lane_lights: LaneLights::new(infinite.len()),
+            lane_lights: LaneLights::new(&builder.lights, &builder.entries, &light_choice, &infinite),
+            light_choice,
             light_by_power: AliasTable::new(&powers),
             infinite,
             cameras,

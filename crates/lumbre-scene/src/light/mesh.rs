@@ -20,28 +20,28 @@ pub struct MeshLight {
     pub(crate) entry: u32,
     pub(crate) power: f64,
     by_area: AliasTable,
-    pieces: Vec<Piece>,
+    pub(super) pieces: Vec<Piece>,
     /// The piece of each triangle; nothing where each is one.
     piece_of: Vec<u32>,
 }
 
 /// What is sampled at once, in the space of the mesh's tree, with data shared by its samples.
 #[derive(Clone, Debug)]
-struct Piece {
-    form: Form,
-    corner: DVec3,
-    sides: [DVec3; 2],
-    normal: DVec3,
-    area: f64,
-    center: DVec3,
+pub(super) struct Piece {
+    pub form: Form,
+    pub corner: DVec3,
+    pub sides: [DVec3; 2],
+    pub normal: DVec3,
+    pub area: f64,
+    pub center: DVec3,
     // The squared distance from the centre to the farthest corner.
-    reach_squared: f64,
+    pub reach_squared: f64,
     // A bound on the error of each coordinate of its points.
-    error: DVec3,
+    pub error: DVec3,
 }
 
 #[derive(Clone, Debug)]
-enum Form {
+pub(super) enum Form {
     /// Without area.
     Nothing,
     /// A triangle of this number.
