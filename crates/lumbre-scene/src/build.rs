@@ -463,8 +463,24 @@ impl Builder {
             self.warnings.push(BuildWarning::Empty { shape: entry.shape });
             return;
         };
-        let power = power(emission.mean(), emission.sides(), standing.area_factor() * area);
-        let mut light = if entry.plain_emission().is_some() { light.with_rectangles(mesh) } else { light };
+        let power_of = |mean| power(mean, emission.sides(), standing.area_factor() * area);
+        let is_varied = emission.image.is_some() || emission.by_vertices;
+        let light = light.with_sides(entry);
+        let (mut light, power) = match &entry.form {
+            Form::Mesh(attributes) if is_varied => {
+                match light.clone().with_brightness(emission, attributes) {
+                    Some((light, whole)) => {
+                        let mean = lumbre_image::Rgb::splat((whole / area) as f32);
+                        (light, power_of(mean))
+                    }
+                    None => (light, 0.0),
+                }
+            }
+            _ if entry.uniform_emission().is_some() => {
+                (light.with_rectangles(mesh), power_of(emission.mean()))
+            }
+            _ => (light, power_of(emission.mean())),
+        };
         light.power = power;
         self.area_light(id, Light::Mesh(light), standing);
     }

@@ -8,14 +8,14 @@ use std::sync::Arc;
 
 use lit::{lights_of_all_kinds, rectangle_of_triangles, shining, sky_under};
 use lumbre_geometry::Ray;
-use lumbre_image::{Image, Rgb};
+use lumbre_image::{Bitmap, Channels, Encoding, Image, PixelData, Rgb};
 use lumbre_math::random::RandomStream;
-use lumbre_math::{DVec2, DVec3, Transform, warp64};
+use lumbre_math::{DVec2, DVec3, Transform, Vec2, warp64};
 use lumbre_scene::{
-    EnvironmentDesc, EnvironmentMapping, Footprint, LightDesc, LightId, LightSample, NamedMaterial, Scene,
-    SceneDesc,
+    EnvironmentDesc, EnvironmentMapping, Footprint, GeometryDesc, LightDesc, LightId, LightSample, MeshDesc,
+    NamedMaterial, Scene, SceneDesc,
 };
-use lumbre_shading::{Material, Scatter};
+use lumbre_shading::{Material, MipMap, MipMapOptions, Scatter};
 
 fn flux(sample: Option<LightSample>) -> f64 {
     sample.map_or(0.0, |sample| {
@@ -245,6 +245,80 @@ fn a_sky_that_is_the_same_all_around_is_sampled_evenly() {
                 direction.z.abs() > 0.8 || (f64::from(pdf) * 4.0 * std::f64::consts::PI - 1.0).abs() < 0.2,
                 "{direction} {pdf}"
             );
+        }
+    }
+}
+
+/// A rectangle of two triangles with a picture that is dim but for one texel in 4,096: its radiance over uv, and the scene.
+fn screen(corner: DVec3, sides: [DVec3; 2], has_normals: bool) -> (Arc<MipMap>, Scene) {
+    const SIDE: usize = 64;
+    let mut texels = vec![0.02; 3 * SIDE * SIDE];
+    texels[3 * (SIDE * 21 + 37)..][..3].fill(400.0);
+    let bitmap = Bitmap::new(64, 64, Channels::Rgb, PixelData::F32(texels), Encoding::Linear).unwrap();
+    let image = Arc::new(MipMap::new(Arc::new(bitmap), MipMapOptions::default()));
+    let [a, b] = sides;
+    let positions = [corner, corner + a, corner + a + b, corner + b].map(|p| p.as_vec3()).to_vec();
+    let mesh = MeshDesc {
+        positions,
+        uvs: Some(vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y]),
+        normals: has_normals.then(|| vec![a.cross(b).normalize().as_vec3(); 4]),
+        triangles: vec![[0, 1, 2], [2, 3, 0]],
+        ..MeshDesc::default()
+    };
+    let mut shape = shining(1, GeometryDesc::Mesh(Arc::new(mesh)), 1.5, false);
+    shape.area_light.as_mut().unwrap().image = Some(image.clone());
+    let material = NamedMaterial { name: None, material: Arc::new(Material::default_diffuse()) };
+    let scene =
+        Scene::build(SceneDesc { shapes: vec![shape], materials: vec![material], ..SceneDesc::default() });
+    (image, scene.unwrap())
+}
+
+#[test]
+fn one_bright_texel_of_thousands_is_found_from_near_and_far() {
+    let (corner, [a, b]) =
+        (DVec3::new(-1.2, 0.5, 4.0), [DVec3::new(3.0, 0.0, 0.4), DVec3::new(0.0, -2.0, 0.3)]);
+    let normal = a.cross(b).normalize();
+    let mut random = RandomStream::new(29);
+    for has_normals in [false, true] {
+        let (image, scene) = screen(corner, [a, b], has_normals);
+        for distance in [0.3, 1.5, 9.0] {
+            let from = corner + 0.4 * a + 0.8 * b + distance * normal;
+            // By a fine grid.
+            const GRID: u32 = 512;
+            let mut expected = 0.0;
+            for i in 0..GRID * GRID {
+                let uv = (DVec2::new(f64::from(i % GRID), f64::from(i / GRID)) + 0.5) / f64::from(GRID);
+                let way = corner + uv.x * a + uv.y * b - from;
+                let radiance = 1.5 * image.lookup(uv.as_vec2(), Vec2::ZERO, Vec2::ZERO).average();
+                let cosines = way.dot(normal).powi(2) / way.length_squared().powi(2);
+                expected += f64::from(radiance) * cosines * a.cross(b).length() / f64::from(GRID * GRID);
+            }
+            let (mut mean, mut square, mut solid_angle, mut same) = (0.0, 0.0, 0.0, 0);
+            const COUNT: u32 = 4096;
+            for i in 0..COUNT {
+                let jitter = DVec2::new(random.next_f64(), random.next_f64());
+                let u = (DVec2::new(f64::from(i % 64), f64::from(i / 64)) + jitter) / 64.0;
+                let sample = scene.sample_light(from, -normal, 0.0, random.next_f64(), u).unwrap();
+                let Scatter::Density(pdf) = sample.scatter else { panic!("{sample:?}") };
+                let light = flux(Some(sample)) * -sample.towards.dot(normal);
+                mean += light / f64::from(COUNT);
+                square += light * light / f64::from(COUNT);
+                solid_angle += 1.0 / f64::from(pdf) / f64::from(COUNT);
+                let ray = Ray::new(from, sample.towards);
+                let Some(hit) = scene.closest(&ray) else { continue };
+                let met = scene.interaction(&ray, &hit, &Footprint::Point);
+                same += u32::from((scene.light_pdf(from, -normal, &met) / pdf - 1.0).abs() < 1e-3);
+            }
+            assert!((mean / expected - 1.0).abs() < 0.03, "{distance}: {mean} {expected}");
+            // The variance of one sample is less than twice the square of the mean; by area it is some hundred times that.
+            assert!(square < 3.0 * expected * expected, "{distance}: {square} {expected}");
+            let seen = [[a, a + b], [a + b, b]].map(|[p, q]| {
+                let at = corner - from;
+                lumbre_geometry::Triangle::new(at, at + p, at + q).unwrap().solid_angle(DVec3::ZERO)
+            });
+            let seen: f64 = seen.iter().sum();
+            assert!((solid_angle / seen - 1.0).abs() < 0.15, "{distance}: {solid_angle} {seen}");
+            assert!(same > COUNT - COUNT / 100, "{distance}: {same}");
         }
     }
 }

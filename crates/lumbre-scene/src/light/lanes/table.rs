@@ -249,7 +249,7 @@ fn point_row(light: &PointLight, axis: DVec3, cosines: [f64; 2]) -> Option<Emitt
 
 /// `None` for what does not emit the same everywhere.
 fn piece_row(piece: &Piece, entry: &SurfaceEntry) -> Option<EmitterRow> {
-    let (emission, outward) = entry.plain_emission()?;
+    let (emission, outward) = (entry.uniform_emission()?, piece.outward?);
     let is_rectangle = match piece.form {
         Form::Nothing => return None,
         Form::Triangle(..) => 0.0,
