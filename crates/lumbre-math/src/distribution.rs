@@ -96,6 +96,15 @@ impl PiecewiseConstant1D {
         (largest > 0.0).then(|| Self { mean: sum / weights.len() as f64 * largest, starts })
     }
 
+    /// For each cell the probability of all before it, out of [`PiecewiseConstant1D::TOTAL`]: ascending, from 0. A cell of weight zero
+    /// begins where the next one does.
+    pub fn starts(&self) -> &[u32] {
+        &self.starts
+    }
+
+    /// What probabilities are out of in [`PiecewiseConstant1D::starts`].
+    pub const TOTAL: u32 = TOTAL;
+
     /// The number of cells.
     pub fn cells(&self) -> usize {
         self.starts.len()
@@ -182,6 +191,16 @@ impl PiecewiseConstant2D {
             .collect();
         let marginal = PiecewiseConstant1D::new(&sums)?;
         Some(Self { columns, rows: starts, marginal })
+    }
+
+    /// The choice of a row.
+    pub fn marginal(&self) -> &PiecewiseConstant1D {
+        &self.marginal
+    }
+
+    /// The [`PiecewiseConstant1D::starts`] of the columns of each row, one row after the other; all zero for a row of weight zero.
+    pub fn row_starts(&self) -> &[u32] {
+        &self.rows
     }
 
     /// The number of columns and of rows.

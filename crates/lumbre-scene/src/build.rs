@@ -92,6 +92,7 @@ impl Scene {
         let infinite = (0..builder.lights.len() as u32).map(LightId);
         let infinite: Vec<LightId> =
             infinite.filter(|id| builder.lights[id.0 as usize].is_infinite()).collect();
+        let light_choice = LightChoice::new(&builder.lights, &builder.entries, radius);
         let has_holes = builder.entries.iter().any(SurfaceEntry::has_holes);
         let lets_light_through = builder.entries.iter().any(SurfaceEntry::lets_light_through);
         let lets_light_straight_on = builder.entries.iter().any(SurfaceEntry::lets_light_straight_on);
@@ -100,8 +101,8 @@ impl Scene {
         let looks_up = builder.entries.iter().any(SurfaceEntry::looks_up_anywhere);
         Ok(Self {
             accel,
-            light_choice: LightChoice::new(&builder.lights, &builder.entries, radius),
-            lane_lights: LaneLights::new(infinite.len()),
+            lane_lights: LaneLights::new(&builder.lights, &builder.entries, &light_choice, &infinite),
+            light_choice,
             light_by_power: AliasTable::new(&powers),
             infinite,
             cameras,
@@ -465,8 +466,24 @@ impl Builder {
             self.warnings.push(BuildWarning::Empty { shape: entry.shape });
             return;
         };
-        let power = power(emission.mean(), emission.sides(), standing.area_factor() * area);
-        let mut light = if entry.plain_emission().is_some() { light.with_rectangles(mesh) } else { light };
+        let power_of = |mean| power(mean, emission.sides(), standing.area_factor() * area);
+        let is_varied = emission.image.is_some() || emission.by_vertices;
+        let light = light.with_sides(entry);
+        let (mut light, power) = match &entry.form {
+            Form::Mesh(attributes) if is_varied => {
+                match light.clone().with_brightness(emission, attributes) {
+                    Some((light, whole)) => {
+                        let mean = lumbre_image::Rgb::splat((whole / area) as f32);
+                        (light, power_of(mean))
+                    }
+                    None => (light, 0.0),
+                }
+            }
+            _ if entry.uniform_emission().is_some() => {
+                (light.with_rectangles(mesh), power_of(emission.mean()))
+            }
+            _ => (light, power_of(emission.mean())),
+        };
         light.power = power;
         self.area_light(id, Light::Mesh(light), standing);
     }

@@ -1,6 +1,7 @@
 //! The closed set of lights: sampled from a point, and asked for the density of what a ray found.
 
 mod area;
+mod brightness;
 pub(crate) mod choice;
 mod delta;
 mod environment;

@@ -170,17 +170,20 @@ impl SurfaceEntry {
         }
     }
 
-    /// Its emission, with 1 if it faces as its geometry does or -1 if flipped, provided that this is uniform:
-    /// without textures, cut-outs, and vertex normals that might flip a face.
-    pub(crate) fn plain_emission(&self) -> Option<(&Emission, f64)> {
-        let is_plain = match &self.form {
-            Form::Exact | Form::Coloured(_) | Form::Custom => true,
-            Form::Mesh(mesh) => mesh.normals().is_none(),
-            Form::Patch { .. } | Form::Csg(_) => false,
-        };
+    /// Its emission, if that is the same everywhere: without textures and cut-outs.
+    pub(crate) fn uniform_emission(&self) -> Option<&Emission> {
         let emission = self.emission.as_ref()?;
-        (is_plain && self.alpha.is_none() && emission.image.is_none() && !emission.by_vertices)
-            .then_some((emission, if self.reverse { -1.0 } else { 1.0 }))
+        (self.alpha.is_none() && emission.image.is_none() && !emission.by_vertices).then_some(emission)
+    }
+
+    /// 1 if it faces as its geometry does, or −1 if flipped; `None` where vertex normals flip a part of a triangle.
+    pub(crate) fn outward(&self, triangle: u32) -> Option<f64> {
+        let outward = match &self.form {
+            Form::Exact | Form::Coloured(_) | Form::Custom => 1.0,
+            Form::Mesh(mesh) => mesh.outward(triangle)?,
+            Form::Patch { .. } | Form::Csg(_) => return None,
+        };
+        Some(if self.reverse { -outward } else { outward })
     }
 
     /// Whether any part of it has textures.
@@ -253,10 +256,7 @@ impl SurfaceEntry {
             }
             Form::Mesh(mesh) => {
                 let corners = mesh.mesh.indices[primitive as usize];
-                let uvs = match &mesh.rest.uvs {
-                    Some(uvs) => at(uvs, corners),
-                    None => mesh.default_uvs(primitive),
-                };
+                let uvs = mesh.corner_uvs(primitive);
                 mesh.shading_geometry(surface, corners, uvs, &triangle_blend(local), placement, time)
             }
             Form::Patch { attributes, corners, .. } => {
@@ -417,6 +417,30 @@ impl MeshAttributes {
         let (from, part) = moving.mesh.part(time);
         let [here, next] = [from, (from + 1).min(lists.len() - 1)].map(|moment| at(&lists[moment], corners));
         Some(std::array::from_fn(|i| here[i].as_dvec3().lerp(next[i].as_dvec3(), part)))
+    }
+
+    /// 1 if vertex normals face as the triangle does, or −1 if all face the other way; `None` if they do not agree.
+    fn outward(&self, triangle: u32) -> Option<f64> {
+        let Some(normals) = self.normals() else { return Some(1.0) };
+        let corners = self.mesh.indices[triangle as usize];
+        let [a, b, c] = at(&self.mesh.positions, corners).map(|p| p.as_dvec3());
+        let face = (b - a).cross(c - a);
+        let sides = at(normals, corners).map(|normal| normal.as_dvec3().dot(face));
+        let all = |sign: f64| sides.iter().all(|side| sign * side > 0.0);
+        [1.0, -1.0].into_iter().find(|&sign| all(sign))
+    }
+
+    /// The uv of a triangle's corners.
+    pub(crate) fn corner_uvs(&self, triangle: u32) -> [Vec2; 3] {
+        match &self.rest.uvs {
+            Some(uvs) => at(uvs, self.mesh.indices[triangle as usize]),
+            None => self.default_uvs(triangle),
+        }
+    }
+
+    /// The vertex colours of a triangle, if it has any.
+    pub(crate) fn corner_colours(&self, triangle: u32) -> Option<[Spectrum; 3]> {
+        self.rest.colours.as_ref().map(|colours| at(colours, self.mesh.indices[triangle as usize]))
     }
 
     /// Vertex tangents, with the sides of the bitangents.

@@ -2,103 +2,20 @@
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
+mod lit;
+
 use std::sync::Arc;
 
-use lumbre_geometry::{Disk, Ray, Shape, Sphere};
-use lumbre_image::{Image, Rgb};
+use lit::{lights_of_all_kinds, rectangle_of_triangles, shining, sky_under};
+use lumbre_geometry::Ray;
+use lumbre_image::{Bitmap, Channels, Encoding, Image, PixelData, Rgb};
 use lumbre_math::random::RandomStream;
-use lumbre_math::{DVec2, DVec3, Transform, Vec3, warp64};
+use lumbre_math::{DVec2, DVec3, Transform, Vec2, warp64};
 use lumbre_scene::{
-    AreaLightDesc, EnvironmentDesc, EnvironmentMapping, Footprint, GeometryDesc, InstanceDesc, LightDesc,
-    LightId, LightSample, MaterialId, MeshDesc, NamedMaterial, ObjectDesc, ObjectId, Scene, SceneDesc,
-    ShapeDesc,
+    EnvironmentDesc, EnvironmentMapping, Footprint, GeometryDesc, LightDesc, LightId, LightSample, MeshDesc,
+    NamedMaterial, Scene, SceneDesc,
 };
-use lumbre_shading::{Material, Scatter};
-
-fn shining(index: u32, geometry: GeometryDesc, radiance: f32, two_sided: bool) -> ShapeDesc {
-    let radiance = Rgb::splat(radiance);
-    let light = AreaLightDesc { radiance, image: None, by_vertices: false, two_sided, power: None };
-    ShapeDesc {
-        index,
-        geometry,
-        world_from_object: Transform::IDENTITY,
-        reverse_orientation: index.is_multiple_of(2),
-        material: Some(MaterialId(0)),
-        area_light: Some(light),
-        alpha: None,
-    }
-}
-
-fn patch_of_triangles(random: &mut RandomStream) -> GeometryDesc {
-    let mut x = || 2.0 * random.next_f32() - 1.0;
-    let at = 4.0 * Vec3::new(x(), x(), x());
-    let positions = (0..5).map(|_| at + Vec3::new(x(), x(), x())).collect();
-    let triangles = vec![[0, 1, 2], [0, 2, 3], [0, 3, 4]];
-    GeometryDesc::Mesh(Arc::new(MeshDesc { positions, triangles, ..MeshDesc::default() }))
-}
-
-/// A rectangle that is turned, the point in its middle, its unit normal and half its sides.
-fn rectangle_of_triangles(random: &mut RandomStream) -> (GeometryDesc, DVec3, DVec3, [DVec3; 2]) {
-    let mut x = || 2.0 * random.next_f64() - 1.0;
-    let middle = 5.0 * DVec3::new(x(), x(), x());
-    let normal = DVec3::new(x(), x(), x()).normalize();
-    let across = normal.cross(DVec3::new(x(), x(), x())).normalize();
-    let half = [0.8 * across, 0.5 * normal.cross(across)];
-    let corner = |a: f64, b: f64| (middle + a * half[0] + b * half[1]).as_vec3();
-    let positions = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
-    let mesh = MeshDesc { positions, triangles: vec![[0, 1, 2], [2, 3, 0]], ..MeshDesc::default() };
-    (GeometryDesc::Mesh(Arc::new(mesh)), middle, normal, half)
-}
-
-/// Lights of every kind about the origin, but for the origin itself.
-fn lights_of_all_kinds() -> Scene {
-    let mut random = RandomStream::new(3);
-    let mut shapes: Vec<ShapeDesc> = (0..12)
-        .map(|i| shining(i, patch_of_triangles(&mut random), 0.5 + random.next_f32(), i % 3 == 0))
-        .collect();
-    shapes.extend(
-        (20..26)
-            .map(|i| shining(i, rectangle_of_triangles(&mut random).0, 0.5 + random.next_f32(), i % 3 == 0)),
-    );
-    let exact = |shape: Shape| GeometryDesc::Exact(shape);
-    let v = DVec3::new;
-    shapes.push(shining(
-        12,
-        exact(Disk::new(v(0.0, 0.0, 5.0), -DVec3::Z, 1.0, 0.0).unwrap().into()),
-        2.0,
-        false,
-    ));
-    shapes.push(shining(13, exact(Sphere::new(v(3.0, 4.0, -2.0), 0.7).unwrap().into()), 1.0, false));
-    let placed = shining(14, patch_of_triangles(&mut random), 3.0, true);
-    let object = ObjectDesc { shapes: vec![placed], ..ObjectDesc::default() };
-    let map = Transform::translate(v(0.5, -4.0, 0.3)) * Transform::scale(v(1.0, 2.0, 0.5)).unwrap();
-    let turned =
-        Transform::translate(v(-3.0, 0.5, 2.0)) * Transform::rotate(v(1.0, 2.0, 0.5), 150.0).unwrap();
-    let spot = LightDesc::Spot {
-        world_from_light: turned,
-        intensity: Rgb::splat(5.0),
-        cone_angle: 100.0,
-        cone_delta_angle: 60.0,
-    };
-    let lights = vec![
-        LightDesc::Point { from: v(1.0, -2.0, 2.0), intensity: Rgb::splat(3.0) },
-        spot,
-        LightDesc::Distant { towards: v(0.2, 1.0, 0.4), irradiance: Rgb::splat(0.7) },
-        LightDesc::Infinite { world_from_light: Transform::IDENTITY, radiance: Rgb::splat(0.1), image: None },
-    ];
-    let material = NamedMaterial { name: None, material: Arc::new(Material::default_diffuse()) };
-    let instances = vec![InstanceDesc { object: ObjectId(0), world_from_object: map.into() }];
-    let objects = vec![object];
-    Scene::build(SceneDesc {
-        shapes,
-        objects,
-        instances,
-        lights,
-        materials: vec![material],
-        ..SceneDesc::default()
-    })
-    .unwrap()
-}
+use lumbre_shading::{Material, MipMap, MipMapOptions, Scatter};
 
 fn flux(sample: Option<LightSample>) -> f64 {
     sample.map_or(0.0, |sample| {
@@ -110,7 +27,7 @@ fn flux(sample: Option<LightSample>) -> f64 {
 #[test]
 fn the_light_of_all_is_the_sum_of_each() {
     const COUNT: usize = 60_000;
-    let scene = lights_of_all_kinds();
+    let scene = lights_of_all_kinds(None);
     let mut random = RandomStream::new(8);
     for from in [DVec3::ZERO, DVec3::new(2.0, -1.0, 0.5), DVec3::new(-30.0, 20.0, 10.0)] {
         let mut u = || DVec2::new(random.next_f64(), random.next_f64());
@@ -128,8 +45,45 @@ fn the_light_of_all_is_the_sum_of_each() {
 }
 
 #[test]
+fn light_below_the_horizon_of_an_opaque_place_takes_no_samples() {
+    let mut lights = vec![
+        LightDesc::Point { from: DVec3::new(0.3, 0.0, 2.0), intensity: Rgb::splat(4.0) },
+        LightDesc::Point { from: DVec3::new(0.0, 0.2, -2.0), intensity: Rgb::splat(4e4) },
+        LightDesc::Distant { towards: DVec3::new(0.2, 0.1, -0.9), irradiance: Rgb::splat(4e4) },
+        LightDesc::Distant { towards: DVec3::new(0.6, 0.0, 0.8), irradiance: Rgb::splat(2.0) },
+    ];
+    let build = |lights: &[LightDesc]| {
+        Scene::build(SceneDesc { lights: lights.to_vec(), ..SceneDesc::default() }).unwrap()
+    };
+    let scene = build(&lights);
+    let mut random = RandomStream::new(23);
+    let mut mean = 0.0;
+    for _ in 0..4000 {
+        let u = DVec2::new(random.next_f64(), random.next_f64());
+        let sample = scene.sample_light(DVec3::ZERO, DVec3::Z, 0.0, random.next_f64(), u).unwrap();
+        assert!(sample.towards.z > 0.0);
+        mean += flux(Some(sample)) * sample.towards.z / 4000.0;
+        // A place that transmits, and one that faces down, are lit from below.
+        let down = scene.sample_light(DVec3::ZERO, -DVec3::Z, 0.0, random.next_f64(), u).unwrap();
+        assert!(down.towards.z < 0.0);
+    }
+    let expected = 4.0 * 2.0 / (0.09_f64 + 4.0).powf(1.5) + 2.0 * 0.8;
+    assert!((mean / expected - 1.0).abs() < 0.03, "{mean} {expected}");
+    let below = |_| scene.sample_light(DVec3::ZERO, DVec3::ZERO, 0.0, random.next_f64(), DVec2::splat(0.5));
+    assert!((0..100).filter_map(below).filter(|sample| sample.towards.z < 0.0).count() > 50);
+    // All that is left is sampled by every sample.
+    lights.truncate(3);
+    let scene = build(&lights);
+    for i in 0..100 {
+        let choose = f64::from(i) / 100.0;
+        let sample = scene.sample_light(DVec3::ZERO, DVec3::Z, 0.0, choose, DVec2::splat(0.5)).unwrap();
+        assert!((flux(Some(sample)) - 4.0 / 4.09).abs() < 1e-6, "{sample:?}");
+    }
+}
+
+#[test]
 fn the_density_of_what_a_ray_finds_is_that_of_the_sample() {
-    let scene = lights_of_all_kinds();
+    let scene = lights_of_all_kinds(None);
     let mut random = RandomStream::new(9);
     let mut count = 0;
     for _ in 0..4000 {
@@ -227,28 +181,13 @@ fn met_shadow(from: DVec3, sample: &LightSample) -> Ray {
     Ray { t_max: way.length() * (1.0 - 4.0 * short), ..Ray::new(from, sample.towards) }
 }
 
-/// A dim sky with two bright pixels and some that are black.
-fn sky(mapping: EnvironmentMapping) -> Scene {
-    let (width, height) = if mapping == EnvironmentMapping::EqualArea { (12, 12) } else { (22, 11) };
-    let mut random = RandomStream::new(4);
-    let pixel = |i: u32| match i {
-        30 | 31 => Rgb::splat(40.0),
-        60..70 => Rgb::BLACK,
-        _ => Rgb::splat(0.2 + random.next_f32()),
-    };
-    let image = Image::from_pixels(width, height, (0..width * height).map(pixel).collect()).unwrap();
-    let map = EnvironmentDesc { image: Arc::new(image), mapping };
-    let world_from_light = Transform::rotate(DVec3::new(1.0, 2.0, 0.5), 40.0).unwrap();
-    let light = LightDesc::Infinite { world_from_light, radiance: Rgb::splat(1.5), image: Some(map) };
-    Scene::build(SceneDesc { lights: vec![light], ..SceneDesc::default() }).unwrap()
-}
-
 #[test]
 fn what_is_sampled_of_a_sky_beside_other_ways_is_all_of_it_with_the_density_of_what_escapes() {
     const SIDE: u32 = 300;
     let mut random = RandomStream::new(17);
     for mapping in [EnvironmentMapping::EqualArea, EnvironmentMapping::LatitudeLongitude] {
-        let scene = sky(mapping);
+        let turned = Transform::rotate(DVec3::new(1.0, 2.0, 0.5), 40.0).unwrap();
+        let scene = sky_under(mapping, turned);
         let (mut whole, mut light, mut by_both, mut bright) = (0.0, 0.0, 0.0, 0);
         for i in 0..SIDE * SIDE {
             let jitter = DVec2::new(random.next_f64(), random.next_f64());
@@ -306,6 +245,80 @@ fn a_sky_that_is_the_same_all_around_is_sampled_evenly() {
                 direction.z.abs() > 0.8 || (f64::from(pdf) * 4.0 * std::f64::consts::PI - 1.0).abs() < 0.2,
                 "{direction} {pdf}"
             );
+        }
+    }
+}
+
+/// A rectangle of two triangles with a picture that is dim but for one texel in 4,096: its radiance over uv, and the scene.
+fn screen(corner: DVec3, sides: [DVec3; 2], has_normals: bool) -> (Arc<MipMap>, Scene) {
+    const SIDE: usize = 64;
+    let mut texels = vec![0.02; 3 * SIDE * SIDE];
+    texels[3 * (SIDE * 21 + 37)..][..3].fill(400.0);
+    let bitmap = Bitmap::new(64, 64, Channels::Rgb, PixelData::F32(texels), Encoding::Linear).unwrap();
+    let image = Arc::new(MipMap::new(Arc::new(bitmap), MipMapOptions::default()));
+    let [a, b] = sides;
+    let positions = [corner, corner + a, corner + a + b, corner + b].map(|p| p.as_vec3()).to_vec();
+    let mesh = MeshDesc {
+        positions,
+        uvs: Some(vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y]),
+        normals: has_normals.then(|| vec![a.cross(b).normalize().as_vec3(); 4]),
+        triangles: vec![[0, 1, 2], [2, 3, 0]],
+        ..MeshDesc::default()
+    };
+    let mut shape = shining(1, GeometryDesc::Mesh(Arc::new(mesh)), 1.5, false);
+    shape.area_light.as_mut().unwrap().image = Some(image.clone());
+    let material = NamedMaterial { name: None, material: Arc::new(Material::default_diffuse()) };
+    let scene =
+        Scene::build(SceneDesc { shapes: vec![shape], materials: vec![material], ..SceneDesc::default() });
+    (image, scene.unwrap())
+}
+
+#[test]
+fn one_bright_texel_of_thousands_is_found_from_near_and_far() {
+    let (corner, [a, b]) =
+        (DVec3::new(-1.2, 0.5, 4.0), [DVec3::new(3.0, 0.0, 0.4), DVec3::new(0.0, -2.0, 0.3)]);
+    let normal = a.cross(b).normalize();
+    let mut random = RandomStream::new(29);
+    for has_normals in [false, true] {
+        let (image, scene) = screen(corner, [a, b], has_normals);
+        for distance in [0.3, 1.5, 9.0] {
+            let from = corner + 0.4 * a + 0.8 * b + distance * normal;
+            // By a fine grid.
+            const GRID: u32 = 512;
+            let mut expected = 0.0;
+            for i in 0..GRID * GRID {
+                let uv = (DVec2::new(f64::from(i % GRID), f64::from(i / GRID)) + 0.5) / f64::from(GRID);
+                let way = corner + uv.x * a + uv.y * b - from;
+                let radiance = 1.5 * image.lookup(uv.as_vec2(), Vec2::ZERO, Vec2::ZERO).average();
+                let cosines = way.dot(normal).powi(2) / way.length_squared().powi(2);
+                expected += f64::from(radiance) * cosines * a.cross(b).length() / f64::from(GRID * GRID);
+            }
+            let (mut mean, mut square, mut solid_angle, mut same) = (0.0, 0.0, 0.0, 0);
+            const COUNT: u32 = 4096;
+            for i in 0..COUNT {
+                let jitter = DVec2::new(random.next_f64(), random.next_f64());
+                let u = (DVec2::new(f64::from(i % 64), f64::from(i / 64)) + jitter) / 64.0;
+                let sample = scene.sample_light(from, -normal, 0.0, random.next_f64(), u).unwrap();
+                let Scatter::Density(pdf) = sample.scatter else { panic!("{sample:?}") };
+                let light = flux(Some(sample)) * -sample.towards.dot(normal);
+                mean += light / f64::from(COUNT);
+                square += light * light / f64::from(COUNT);
+                solid_angle += 1.0 / f64::from(pdf) / f64::from(COUNT);
+                let ray = Ray::new(from, sample.towards);
+                let Some(hit) = scene.closest(&ray) else { continue };
+                let met = scene.interaction(&ray, &hit, &Footprint::Point);
+                same += u32::from((scene.light_pdf(from, -normal, &met) / pdf - 1.0).abs() < 1e-3);
+            }
+            assert!((mean / expected - 1.0).abs() < 0.03, "{distance}: {mean} {expected}");
+            // The variance of one sample is less than twice the square of the mean; by area it is some hundred times that.
+            assert!(square < 3.0 * expected * expected, "{distance}: {square} {expected}");
+            let seen = [[a, a + b], [a + b, b]].map(|[p, q]| {
+                let at = corner - from;
+                lumbre_geometry::Triangle::new(at, at + p, at + q).unwrap().solid_angle(DVec3::ZERO)
+            });
+            let seen: f64 = seen.iter().sum();
+            assert!((solid_angle / seen - 1.0).abs() < 0.15, "{distance}: {solid_angle} {seen}");
+            assert!(same > COUNT - COUNT / 100, "{distance}: {same}");
         }
     }
 }

@@ -86,9 +86,9 @@ pub(super) fn arriving(
 }
 
 /// The factor that turns the normal of a geometry to the side that emits, if that is one alone and known.
-pub(super) fn side(entry: &SurfaceEntry) -> Option<f64> {
-    let (emission, outward) = entry.plain_emission()?;
-    (!emission.two_sided).then_some(outward)
+fn side(entry: &SurfaceEntry) -> Option<f64> {
+    let emission = entry.emission.as_ref()?;
+    entry.outward(0).filter(|_| !emission.two_sided)
 }
 
 /// The greatest radiant intensity of a flat surface of this power.

@@ -9,6 +9,7 @@ use lumbre_math::{DVec2, DVec3, Elementary, Transform, warp64};
 use lumbre_shading::{Scatter, Spectrum};
 
 use super::LightSample;
+use super::lanes::LaneMaps;
 use crate::EnvironmentMapping;
 
 /// Uniform radiance from all directions.
@@ -36,10 +37,13 @@ impl UniformLight {
 /// An image over the sphere, interpolated bilinearly.
 #[derive(Clone, Debug)]
 pub(super) struct Panorama {
-    image: Arc<Image>,
-    mapping: EnvironmentMapping,
-    world_from_light: Transform,
-    scale: Spectrum,
+    /// Three numbers a texel, in rows of `width + 2`: with one texel more on each side, what is beyond the edge. None is negative.
+    pub(super) texels: Arc<Vec<f32>>,
+    pub(super) width: u32,
+    pub(super) height: u32,
+    pub(super) mapping: EnvironmentMapping,
+    pub(super) world_from_light: Transform,
+    pub(super) scale: Spectrum,
 }
 
 impl Panorama {
@@ -52,7 +56,23 @@ impl Panorama {
     ) -> Option<Self> {
         let is_usable =
             image.width() > 0 && image.height() > 0 && image.pixels().iter().all(|c| c.is_finite());
-        is_usable.then_some(Self { image, mapping, world_from_light, scale })
+        if !is_usable {
+            return None;
+        }
+        let (width, height) = (image.width(), image.height());
+        let (columns, rows) = (-1..=i64::from(width), -1..=i64::from(height));
+        let mut texels = Vec::with_capacity(3 * (width as usize + 2) * (height as usize + 2));
+        for y in rows {
+            texels.extend(columns.clone().flat_map(|x| texel(&image, mapping, x, y).to_array()));
+        }
+        Some(Self { texels: Arc::new(texels), width, height, mapping, world_from_light, scale })
+    }
+
+    /// A texel, or one beyond the edge.
+    #[inline]
+    fn texel(&self, x: i64, y: i64) -> Spectrum {
+        let at = 3 * ((y + 1) as usize * (self.width as usize + 2) + (x + 1) as usize);
+        Spectrum::new(self.texels[at], self.texels[at + 1], self.texels[at + 2])
     }
 
     /// The value in the unit world-space `direction`.
@@ -65,7 +85,7 @@ impl Panorama {
         match self.mapping {
             EnvironmentMapping::EqualArea => 1.0,
             EnvironmentMapping::LatitudeLongitude => {
-                let edge = |y: u32| (PI * f64::from(y) / f64::from(self.image.height())).cosine();
+                let edge = |y: u32| (PI * f64::from(y) / f64::from(self.height)).cosine();
                 edge(row) - edge(row + 1)
             }
         }
@@ -74,10 +94,11 @@ impl Panorama {
     /// The mean over the sphere and over the channels; `None` if it is 0.
     pub(super) fn mean(&self) -> Option<f64> {
         let (mut sum, mut whole) = (0.0, 0.0);
-        for (row, pixels) in (0..).zip(self.image.pixels().chunks(self.image.width() as usize)) {
-            let weight = self.solid_angle(row);
-            sum += weight * pixels.iter().map(|p| f64::from(p.map(|c| c.max(0.0)).average())).sum::<f64>();
-            whole += weight * pixels.len() as f64;
+        for y in 0..self.height {
+            let weight = self.solid_angle(y);
+            let row = (0..i64::from(self.width)).map(|x| f64::from(self.texel(x, i64::from(y)).average()));
+            sum += weight * row.sum::<f64>();
+            whole += weight * f64::from(self.width);
         }
         let mean = sum / whole * f64::from(self.scale.average());
         (mean > 0.0 && mean.is_finite()).then_some(mean)
@@ -89,7 +110,7 @@ impl Panorama {
 
     /// The irradiance on a surface with the unit `normal`: a sum over all pixels.
     fn irradiance(&self, normal: DVec3) -> Spectrum {
-        let (width, height) = (self.image.width(), self.image.height());
+        let (width, height) = (self.width, self.height);
         let cell = 1.0 / (f64::from(width) * f64::from(height));
         let mut sum = [0.0_f64; 3];
         for y in 0..height {
@@ -102,7 +123,7 @@ impl Panorama {
                 let cosine = self.world_from_light.vector(local).normalize().dot(normal);
                 if cosine > 0.0 {
                     let weight = cosine * cell / self.density_of_map(local);
-                    let texel = texel(&self.image, self.mapping, i64::from(x), i64::from(y));
+                    let texel = self.texel(i64::from(x), i64::from(y));
                     sum.iter_mut().zip(texel.to_array()).for_each(|(sum, c)| *sum += weight * f64::from(c));
                 }
             }
@@ -142,14 +163,13 @@ impl Panorama {
 
     /// Bilinear interpolation at a point of the unit square.
     fn lookup(&self, uv: DVec2) -> Spectrum {
-        let size = DVec2::new(f64::from(self.image.width()), f64::from(self.image.height()));
-        let at = uv * size - 0.5;
+        let size = DVec2::new(f64::from(self.width), f64::from(self.height));
+        let at = (uv * size - 0.5).clamp(DVec2::splat(-0.5), size - 0.5);
         let cell = at.floor();
         let (x, y) = (cell.x as i64, cell.y as i64);
         let part = (at - cell).as_vec2();
-        let texel = |x, y| texel(&self.image, self.mapping, x, y);
-        let above = texel(x, y).lerp(texel(x + 1, y), part.x);
-        let below = texel(x, y + 1).lerp(texel(x + 1, y + 1), part.x);
+        let above = self.texel(x, y).lerp(self.texel(x + 1, y), part.x);
+        let below = self.texel(x, y + 1).lerp(self.texel(x + 1, y + 1), part.x);
         above.lerp(below, part.y)
     }
 }
@@ -160,17 +180,19 @@ const LEFT: f32 = 0.01;
 /// An environment map, interpolated bilinearly and sampled by brightness.
 #[derive(Clone, Debug)]
 pub struct Environment {
-    picture: Panorama,
+    pub(super) picture: Panorama,
     // One cell per pixel: the mean of the interpolated image over the pixel, times its solid angle. It is
     // positive wherever the interpolated image is.
-    by_brightness: PiecewiseConstant2D,
+    pub(super) by_brightness: PiecewiseConstant2D,
     // The same less the mean, for those who find light along their own rays as well.
     //
     // O. Karlik, M. Sik, P. Vevoda, T. Skrivan, J. Krivanek, "MIS Compensation: Optimizing Sampling Techniques in Multiple Importance
     // Sampling", SIGGRAPH Asia 2019. Where the image is darker than its mean some is left, so that samples alone still find all light.
-    beside_others: PiecewiseConstant2D,
+    pub(super) beside_others: PiecewiseConstant2D,
     // The mean over the sphere and over the channels.
     mean: f64,
+    /// What lanes need of the map.
+    pub(super) maps: LaneMaps,
 }
 
 impl Environment {
@@ -182,11 +204,10 @@ impl Environment {
         scale: Spectrum,
     ) -> Option<Self> {
         let picture = Panorama::new(image, mapping, world_from_light, scale)?;
-        let image = &picture.image;
-        let (width, height) = (image.width() as usize, image.height() as usize);
+        let (width, height) = (picture.width as usize, picture.height as usize);
         // The mean of the linear interpolation over a pixel: 1/8, 6/8, 1/8 of it and its neighbours, along both
         // axes.
-        let brightness = |x: i64, y: i64| f64::from(texel(image, mapping, x, y).average());
+        let brightness = |x: i64, y: i64| f64::from(picture.texel(x, y).average());
         let smooth = |x: i64, y: i64| {
             let row = |y| 0.125 * (brightness(x - 1, y) + brightness(x + 1, y)) + 0.75 * brightness(x, y);
             0.125 * (row(y - 1) + row(y + 1)) + 0.75 * row(y)
@@ -212,7 +233,8 @@ impl Environment {
         }
         let beside_others = PiecewiseConstant2D::new(&weights, width)?;
         let mean = mean * f64::from(scale.average());
-        Some(Self { picture, by_brightness, beside_others, mean })
+        let maps = LaneMaps::new(&picture);
+        Some(Self { picture, by_brightness, beside_others, mean, maps })
     }
 
     pub(super) fn mean(&self) -> f64 {

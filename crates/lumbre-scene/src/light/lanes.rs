@@ -1,14 +1,26 @@
 //! The lights of a scene over lanes: samples, densities, and the light that rays find which leave the scene.
 
+mod elsewhere;
+mod environment;
+mod piece;
+mod point;
 mod scalar;
+mod table;
+mod tree;
 
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
-use lumbre_simd::{MAX_LANES, Mask, Real, UInt, V3};
+use lumbre_simd::{Double, MAX_LANES, Mask, Real, UInt, V3};
 
-use self::scalar::{Receivers, Samples, doubles, lanes_of, point_of, singles, vector};
-use super::Sampling;
+use self::elsewhere::LaneElsewhere;
+pub(crate) use self::environment::LaneMaps;
+use self::scalar::{Receivers, Samples, doubles, lanes_of, point_of, vector};
+use self::table::{NONE, Table, kind};
+use self::tree::LanePlace;
+use super::choice::LightChoice;
+use super::{Light, LightId, Sampling};
 use crate::Scene;
+use crate::surface::SurfaceEntry;
 
 /// Light that arrives at a place in each lane, from a direction that a light chose. Where it is not `valid`, the rest is unspecified.
 #[derive(Clone, Copy, Debug)]
@@ -47,14 +59,76 @@ pub struct Receiver<R: Real> {
 }
 
 /// The lights of a scene, laid out for lanes.
+///
+/// Triangles and rectangles that emit the same everywhere, point, spot and directional lights, uniform light and environment maps are
+/// sampled in lanes, and so is the choice among all lights. Others are sampled by the code of [`Scene::sample_light`], lane by lane.
 #[derive(Clone, Debug, Default)]
 pub struct LaneLights {
-    infinite_count: usize,
+    table: Table,
+    elsewhere: Vec<LaneElsewhere>,
+    /// The probability of those, where there are others that may shine.
+    share_elsewhere: f32,
+    /// The infinite lights, as positions in `elsewhere`.
+    infinite: Vec<u32>,
+}
+
+/// The largest number below 1.
+#[inline(always)]
+fn below_one<R: Real>() -> R {
+    R::splat(1.0 - 0.5 * f32::EPSILON)
+}
+
+/// The steps of uniform numbers.
+const STEP: f32 = 1.0 / 16_777_216.0;
+
+impl<R: Real> LaneLightSample<R> {
+    #[inline(always)]
+    fn none() -> Self {
+        let (zero, nowhere) = (V3::splat(R::zero()), V3::splat(R::Double::splat(0.0)));
+        let none = R::Mask::splat(false);
+        Self {
+            towards: zero,
+            point: nowhere,
+            error: nowhere,
+            normal: zero,
+            infinite: none,
+            radiance: zero,
+            pdf: R::zero(),
+            delta: none,
+            valid: none,
+        }
+    }
+
+    /// `other` in some lanes, where directions are this many times as likely.
+    #[inline(always)]
+    fn with(self, mask: R::Mask, other: Self, probability: R) -> Self {
+        let radiance = V3::select(other.delta, other.radiance * probability.recip(), other.radiance);
+        Self {
+            towards: V3::select(mask, other.towards, self.towards),
+            point: V3::select_f64(mask, other.point, self.point),
+            error: V3::select_f64(mask, other.error, self.error),
+            normal: V3::select(mask, other.normal, self.normal),
+            infinite: (mask & other.infinite) | (!mask & self.infinite),
+            radiance: V3::select(mask, radiance, self.radiance),
+            pdf: R::select(mask, other.pdf * probability, self.pdf),
+            delta: (mask & other.delta) | (!mask & self.delta),
+            valid: (mask & other.valid) | (!mask & self.valid),
+        }
+    }
 }
 
 impl LaneLights {
-    pub(crate) fn new(infinite_count: usize) -> Self {
-        Self { infinite_count }
+    pub(crate) fn new(
+        lights: &[Light],
+        entries: &[SurfaceEntry],
+        choice: &LightChoice,
+        infinite: &[LightId],
+    ) -> Self {
+        let elsewhere = LaneElsewhere::all(lights, choice);
+        let position = |id: &LightId| elsewhere.iter().position(|light| light.light == id.0);
+        let infinite = infinite.iter().filter_map(position).map(|position| position as u32).collect();
+        let table = Table::new(lights, entries, choice);
+        Self { table, share_elsewhere: choice.share_elsewhere as f32, infinite, elsewhere }
     }
 
     /// A sample of light for each lane of `active`. `u` are four uniform numbers: the choice of a light, a point of it, and further digits
@@ -68,10 +142,55 @@ impl LaneLights {
         u: [R; 4],
         sampling: Sampling,
     ) -> LaneLightSample<R> {
-        let u = [u[0].to_lanes(), u[1].to_lanes(), u[2].to_lanes(), u[3].to_lanes()];
-        let mut samples = Samples::none();
-        sample(scene, active.to_bitmask(), &Receivers::new(receiver), &u, sampling, &mut samples);
-        samples.to_lanes()
+        let place = LanePlace::new(&self.table, receiver);
+        let sum = self.sum_elsewhere(scene, active, &place, receiver);
+        let share = self.share_elsewhere_at(active, &place, sum);
+        let is_elsewhere = active & u[0].simd_lt(share);
+        let mut sample = LaneLightSample::none();
+        if is_elsewhere.any() {
+            let chosen = self.choose_elsewhere(scene, is_elsewhere, &place, receiver, u[0] / share * sum);
+            let probability = share * (chosen.1 / sum);
+            let mut position = 0;
+            while position < self.elsewhere.len() {
+                let here = is_elsewhere & chosen.0.simd_eq(R::UInt::splat(position as u32));
+                if here.any() {
+                    let light = &self.elsewhere[position];
+                    let of_light = light.sample(scene, here, receiver, [u[1], u[2], u[3]], sampling);
+                    sample = sample.with(here, of_light, probability);
+                }
+                position += 1;
+            }
+        }
+        let in_tree = active & !is_elsewhere;
+        if in_tree.any() && !self.table.next.is_empty() {
+            let rest = (R::one() - share).recip();
+            let choose = ((u[0] - share) * rest).simd_max(R::zero()).simd_min(below_one());
+            let step = R::splat(STEP) * rest;
+            let chosen = tree::choose(&self.table, in_tree, &place, choose, step, u[3]);
+            let probability = (R::one() - share) * chosen.probability;
+            let kinds = R::UInt::gather(&self.table.kinds, chosen.emitter);
+            let pieces = chosen.valid & kinds.simd_eq(R::UInt::splat(kind::PIECE));
+            if pieces.any() {
+                let of_piece =
+                    piece::sample(&self.table, pieces, chosen.emitter, receiver.from, [u[1], u[2]]);
+                sample = sample.with(pieces, of_piece, probability);
+            }
+            let points = chosen.valid & kinds.simd_eq(R::UInt::splat(kind::POINT));
+            if points.any() {
+                let of_point = point::sample(&self.table, points, chosen.emitter, receiver.from);
+                sample = sample.with(points, of_point, probability);
+            }
+            let others = chosen.valid & kinds.simd_eq(R::UInt::splat(kind::SCALAR));
+            if others.any() {
+                let u = [u[0].to_lanes(), u[1].to_lanes(), u[2].to_lanes(), u[3].to_lanes()];
+                let mut samples = Samples::none();
+                let receivers = Receivers::new(receiver);
+                let emitters = chosen.emitter.to_lanes();
+                sample_emitters(scene, others.to_bitmask(), &emitters, &receivers, &u, &mut samples);
+                sample = sample.with(others, samples.to_lanes(), probability);
+            }
+        }
+        sample
     }
 
     /// The density per unit solid angle with which [`LaneLights::sample`] with [`Sampling::Mis`] would have chosen what a ray met: the point
@@ -86,15 +205,35 @@ impl LaneLights {
         primitive: R::UInt,
         point: V3<R::Double>,
     ) -> R {
-        let mut pdf = [0.0; MAX_LANES];
-        let met = (entry.to_lanes(), primitive.to_lanes(), doubles::<R>(point));
-        pdf_of(scene, active.to_bitmask(), &Receivers::new(receiver), &met, &mut pdf);
-        R::from_lanes(&pdf)
+        let emitter = self.table.emitter::<R>(active, entry, primitive);
+        let listed = active & !emitter.simd_eq(R::UInt::splat(NONE));
+        if listed.none() {
+            return R::zero();
+        }
+        let emitter = R::UInt::select(listed, emitter, R::UInt::splat(0));
+        let place = LanePlace::new(&self.table, receiver);
+        let sum = self.sum_elsewhere(scene, listed, &place, receiver);
+        let share = self.share_elsewhere_at(listed, &place, sum);
+        let probability = (R::one() - share) * tree::probability(&self.table, listed, &place, emitter);
+        let kinds = R::UInt::gather(&self.table.kinds, emitter);
+        let mut pdf = R::zero();
+        let pieces = listed & kinds.simd_eq(R::UInt::splat(kind::PIECE));
+        if pieces.any() {
+            pdf = piece::pdf(&self.table, pieces, emitter, receiver.from, point);
+        }
+        let others = listed & kinds.simd_eq(R::UInt::splat(kind::SCALAR));
+        if others.any() {
+            let mut of_others = [0.0; MAX_LANES];
+            let met = (emitter.to_lanes(), primitive.to_lanes(), doubles::<R>(point));
+            pdf_of_emitters(scene, others.to_bitmask(), &Receivers::new(receiver), &met, &mut of_others);
+            pdf = R::select(others, R::from_lanes(&of_others), pdf);
+        }
+        (probability * pdf).or_zero(listed)
     }
 
     /// The number of lights that rays meet which leave the scene.
     pub fn infinite_count(&self) -> usize {
-        self.infinite_count
+        self.infinite.len()
     }
 
     /// The radiance of one of the [`LaneLights::infinite_count`] infinite lights along a unit direction, and the density with which
@@ -108,35 +247,93 @@ impl LaneLights {
         receiver: &Receiver<R>,
         direction: V3<R>,
     ) -> (V3<R>, R) {
-        let (mut radiance, mut pdf) = ([[0.0; MAX_LANES]; 3], [0.0; MAX_LANES]);
-        let receivers = Receivers::new(receiver);
-        escaped(
-            scene,
-            position,
-            active.to_bitmask(),
-            &receivers,
-            &singles(direction),
-            &mut radiance,
-            &mut pdf,
-        );
-        (scalar::from_singles(&radiance), R::from_lanes(&pdf))
+        let light = &self.elsewhere[self.infinite[position] as usize];
+        let (radiance, pdf) = light.escaped(scene, active, direction);
+        let place = LanePlace::new(&self.table, receiver);
+        let sum = self.sum_elsewhere(scene, active, &place, receiver);
+        let share = self.share_elsewhere_at(active, &place, sum);
+        let given = light.given(scene, active, &place, receiver);
+        let probability = (share * (given / sum)).or_zero(given.simd_gt(R::zero()));
+        (radiance, probability * pdf)
+    }
+
+    /// The radiance of one of the [`LaneLights::infinite_count`] infinite lights along a unit direction.
+    #[inline(always)]
+    pub fn background<R: Real>(
+        &self,
+        scene: &Scene,
+        position: usize,
+        active: R::Mask,
+        direction: V3<R>,
+    ) -> V3<R> {
+        self.elsewhere[self.infinite[position] as usize].escaped(scene, active, direction).0
+    }
+
+    /// What all lights that are everywhere give to a place, in arbitrary units.
+    #[inline(always)]
+    fn sum_elsewhere<R: Real>(
+        &self,
+        scene: &Scene,
+        active: R::Mask,
+        place: &LanePlace<R>,
+        receiver: &Receiver<R>,
+    ) -> R {
+        let mut sum = R::zero();
+        for light in &self.elsewhere {
+            sum = sum + light.given(scene, active, place, receiver);
+        }
+        sum
+    }
+
+    /// The probability of the lights that are everywhere at a place to which they give `sum`.
+    #[inline(always)]
+    fn share_elsewhere_at<R: Real>(&self, active: R::Mask, place: &LanePlace<R>, sum: R) -> R {
+        let share = R::splat(self.share_elsewhere).or_zero(sum.simd_gt(R::zero()));
+        if self.share_elsewhere <= 0.0 || self.share_elsewhere >= 1.0 {
+            return share;
+        }
+        let others_shine = tree::shines_on(&self.table, active, place);
+        R::select(others_shine | share.simd_eq(R::zero()), share, R::one())
+    }
+
+    /// The position of the light up to which they give this, and what it gives itself.
+    #[inline(always)]
+    fn choose_elsewhere<R: Real>(
+        &self,
+        scene: &Scene,
+        active: R::Mask,
+        place: &LanePlace<R>,
+        receiver: &Receiver<R>,
+        up_to: R,
+    ) -> (R::UInt, R) {
+        let (mut before, mut chosen, mut of_chosen) = (R::zero(), R::UInt::splat(0), R::zero());
+        for (position, light) in self.elsewhere.iter().enumerate() {
+            let given = light.given(scene, active, place, receiver);
+            // The last one that begins before it.
+            let is_later = given.simd_gt(R::zero()) & before.simd_le(up_to);
+            chosen = R::UInt::select(is_later, R::UInt::splat(position as u32), chosen);
+            of_chosen = R::select(is_later, given, of_chosen);
+            before = before + given;
+        }
+        (chosen, of_chosen)
     }
 }
 
 #[inline(never)]
-fn sample(
+fn sample_emitters(
     scene: &Scene,
     active: u32,
+    emitters: &[u32; MAX_LANES],
     receivers: &Receivers,
     u: &[[f32; MAX_LANES]; 4],
-    sampling: Sampling,
     samples: &mut Samples,
 ) {
     for lane in lanes_of(active) {
-        let (place, point) = (receivers.place(lane), point_of(u, lane));
-        let choose = [f64::from(u[0][lane]), point.x, point.y];
-        let (choice, time) = (&scene.light_choice, receivers.time(lane));
-        let sample = choice.sample(&scene.lights, &scene.entries, &place, time, choose, sampling);
+        let (place, time) = (receivers.place(lane), receivers.time(lane));
+        let emitter = emitters[lane] as usize;
+        let u = point_of(u, lane);
+        let choice = &scene.light_choice;
+        let sample = choice.sample_emitter(&scene.lights, &scene.entries, emitter, place.from, time, u);
         if let Some(sample) = sample {
             samples.set(lane, &sample);
         }
@@ -144,44 +341,24 @@ fn sample(
 }
 
 #[inline(never)]
-fn pdf_of(
+fn pdf_of_emitters(
     scene: &Scene,
     active: u32,
     receivers: &Receivers,
-    (entry, primitive, point): &([u32; MAX_LANES], [u32; MAX_LANES], [[f64; MAX_LANES]; 3]),
+    (emitter, primitive, point): &([u32; MAX_LANES], [u32; MAX_LANES], [[f64; MAX_LANES]; 3]),
     pdf: &mut [f32; MAX_LANES],
 ) {
     for lane in lanes_of(active) {
         let (place, time) = (receivers.place(lane), receivers.time(lane));
-        let Some(id) = scene.entries[entry[lane] as usize].light else { continue };
+        let (light, piece) = scene.light_choice.emitters[emitter[lane] as usize];
+        let light = &scene.lights[light as usize];
         let point = DVec3::from(vector(point, lane));
-        let light = &scene.lights[id.0 as usize];
+        if let (Light::Mesh(light), Some(piece)) = (light, piece) {
+            pdf[lane] = light.piece_pdf(place.from, point, piece) as f32;
+            continue;
+        }
         let Some(surface) = light.surface_at(place.from, point, time) else { continue };
         let ray = Ray::new(place.from, (point - place.from).normalize_or_zero()).at_time(time);
-        let met = Some((&surface, primitive[lane]));
-        pdf[lane] = scene.light_choice.pdf(&scene.lights, id, &ray, place.normal, met) as f32;
-    }
-}
-
-#[inline(never)]
-fn escaped(
-    scene: &Scene,
-    position: usize,
-    active: u32,
-    receivers: &Receivers,
-    direction: &[[f32; MAX_LANES]; 3],
-    radiance: &mut [[f32; MAX_LANES]; 3],
-    pdf: &mut [f32; MAX_LANES],
-) {
-    let id = scene.infinite[position];
-    for lane in lanes_of(active) {
-        let (place, time) = (receivers.place(lane), receivers.time(lane));
-        let direction = DVec3::from(vector(direction, lane).map(f64::from)).normalize();
-        let ray = Ray::new(place.from, direction).at_time(time);
-        pdf[lane] = scene.light_choice.pdf(&scene.lights, id, &ray, place.normal, None) as f32;
-        let found = scene.lights[id.0 as usize].escaped(direction).to_array();
-        for k in 0..3 {
-            radiance[k][lane] = found[k];
-        }
+        pdf[lane] = light.pdf(&ray, Some((&surface, primitive[lane]))) as f32;
     }
 }

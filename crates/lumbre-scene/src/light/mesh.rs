@@ -1,4 +1,4 @@
-//! Area lights of triangle meshes: a triangle, or a rectangle of two, is chosen by area, then a direction to it.
+//! Area lights of triangle meshes: a triangle, or a rectangle of two, is chosen by power, then a direction to it.
 
 use lumbre_geometry::{Aabb, Ray, Surface, Triangle};
 use lumbre_kernel::TriangleMesh;
@@ -6,42 +6,50 @@ use lumbre_math::distribution::AliasTable;
 use lumbre_math::{DVec2, DVec3, Vec2};
 use lumbre_shading::{Scatter, Spectrum};
 
-use super::area::{intensity, side};
+use super::area::intensity;
+use super::brightness::{Brightness, Cells};
 use super::pairs::{Pair, pairs};
 use super::rectangle::Rectangle;
 use super::tree::{Emitter, Facing};
 use super::{LightPoint, LightSample, area};
 use crate::Emission;
-use crate::surface::SurfaceEntry;
+use crate::surface::{MeshAttributes, SurfaceEntry};
 
 /// Emissive triangles.
 #[derive(Clone, Debug)]
 pub struct MeshLight {
     pub(crate) entry: u32,
     pub(crate) power: f64,
-    by_area: AliasTable,
-    pieces: Vec<Piece>,
+    /// By weight.
+    by_power: AliasTable,
+    pub(super) pieces: Vec<Piece>,
     /// The piece of each triangle; nothing where each is one.
     piece_of: Vec<u32>,
 }
 
 /// What is sampled at once, in the space of the mesh's tree, with data shared by its samples.
 #[derive(Clone, Debug)]
-struct Piece {
-    form: Form,
-    corner: DVec3,
-    sides: [DVec3; 2],
-    normal: DVec3,
-    area: f64,
-    center: DVec3,
+pub(super) struct Piece {
+    pub form: Form,
+    pub corner: DVec3,
+    pub sides: [DVec3; 2],
+    pub normal: DVec3,
+    pub area: f64,
+    /// 1 if it faces as its normal does, or −1 if it is flipped; `None` if only a part is.
+    pub outward: Option<f64>,
+    /// The area times the brightness, relative to other pieces.
+    weight: f64,
+    /// Where it is bright, if that is not about the same everywhere.
+    cells: Option<Cells>,
+    pub center: DVec3,
     // The squared distance from the centre to the farthest corner.
-    reach_squared: f64,
+    pub reach_squared: f64,
     // A bound on the error of each coordinate of its points.
-    error: DVec3,
+    pub error: DVec3,
 }
 
 #[derive(Clone, Debug)]
-enum Form {
+pub(super) enum Form {
     /// Without area.
     Nothing,
     /// A triangle of this number.
@@ -50,6 +58,10 @@ enum Form {
     Rectangle(Rectangle),
 }
 
+/// What every triangle gets of the mean brightness of all: look-ups may have missed what is bright.
+const OF_MEAN: f64 = 1e-3;
+/// The share of samples by solid angle of a near triangle that is not about the same everywhere.
+const BY_ANGLE: f64 = 0.5;
 /// From this many radii away, sampling by area is as good as by solid angle, and faster.
 const FAR: f64 = 2.0;
 
@@ -62,13 +74,43 @@ impl MeshLight {
     }
 
     fn of(entry: u32, pieces: Vec<Piece>, piece_of: Vec<u32>) -> Option<Self> {
-        let areas: Vec<f64> = pieces.iter().map(|piece| piece.area).collect();
-        Some(Self { entry, power: 0.0, by_area: AliasTable::new(&areas)?, pieces, piece_of })
+        let weights: Vec<f64> = pieces.iter().map(|piece| piece.weight).collect();
+        Some(Self { entry, power: 0.0, by_power: AliasTable::new(&weights)?, pieces, piece_of })
+    }
+
+    /// The same for a light with a picture or vertex colours: brighter triangles are chosen more often, and of those that are not about the
+    /// same everywhere what is brighter. Also returns the sum of the areas, each times its mean radiance; `None` for a light that is black.
+    pub(crate) fn with_brightness(
+        mut self,
+        emission: &Emission,
+        attributes: &MeshAttributes,
+    ) -> Option<(Self, f64)> {
+        let brightness = Brightness::all(emission, attributes);
+        let total: f64 = self.pieces.iter().map(|piece| piece.area).sum();
+        let whole: f64 = self.pieces.iter().zip(&brightness).map(|(piece, b)| piece.area * b.mean).sum();
+        for (piece, Brightness { mean, cells }) in self.pieces.iter_mut().zip(brightness) {
+            piece.weight = piece.area * (mean + OF_MEAN * (whole / total));
+            piece.cells = cells;
+        }
+        Some((Self::of(self.entry, self.pieces, self.piece_of)?, whole))
+    }
+
+    /// The same with what is known of the sides that the triangles face.
+    pub(crate) fn with_sides(mut self, entry: &SurfaceEntry) -> Self {
+        for (triangle, piece) in (0..).zip(&mut self.pieces) {
+            piece.outward = entry.outward(triangle);
+        }
+        self
     }
 
     /// The same with rectangles in place of the pairs of triangles that make one, for a light that emits the same everywhere.
     pub(crate) fn with_rectangles(self, mesh: &TriangleMesh) -> Self {
-        let pairs = pairs(mesh);
+        let mut pairs = pairs(mesh);
+        let outward = |triangle: u32| self.pieces[triangle as usize].outward;
+        pairs.retain(|pair| {
+            let [first, second] = pair.triangles.map(outward);
+            first.is_some() && first == second
+        });
         if pairs.is_empty() {
             return self;
         }
@@ -78,7 +120,8 @@ impl MeshLight {
             for triangle in pair.triangles {
                 piece_of[triangle as usize] = Some(pieces.len() as u32);
             }
-            pieces.push(Piece::rectangle(&pair));
+            let outward = self.pieces[pair.triangles[0] as usize].outward;
+            pieces.push(Piece { outward, ..Piece::rectangle(&pair) });
         }
         let piece_of = piece_of.into_iter().zip(&self.pieces).map(|(piece, triangle)| {
             piece.unwrap_or_else(|| {
@@ -99,7 +142,7 @@ impl MeshLight {
     }
 
     pub(super) fn sample(&self, entry: &SurfaceEntry, from: DVec3, u: DVec2) -> Option<LightSample> {
-        let choice = self.by_area.sample(u.x);
+        let choice = self.by_power.sample(u.x);
         let sample = self.sample_piece(entry, choice.index as u32, from, DVec2::new(choice.rest, u.y))?;
         Some(sample.of_density(choice.probability))
     }
@@ -113,19 +156,13 @@ impl MeshLight {
         u: DVec2,
     ) -> Option<LightSample> {
         let piece = &self.pieces[piece as usize];
-        let plain = entry.plain_emission();
+        let plain = entry.uniform_emission().zip(piece.outward);
         match (&piece.form, plain) {
             (Form::Nothing, _) => None,
             (Form::Rectangle(_), None) => None,
             (_, Some((emission, outward))) => piece.sample(emission, outward, from, u),
             (Form::Triangle(shape, triangle), None) => {
-                let (surface, pdf) = if piece.is_far(from) {
-                    let surface = shape.sample_area(u)?.surface;
-                    (surface, per_solid_angle(piece.area, surface.point - from, piece.normal)?)
-                } else {
-                    let sample = shape.sample_direction(from, u)?;
-                    (sample.surface, sample.pdf)
-                };
+                let (surface, pdf) = piece.sample_varied(shape, from, u)?;
                 area::arriving(entry, &surface, *triangle, surface.uv, from, pdf)
             }
         }
@@ -133,7 +170,7 @@ impl MeshLight {
 
     pub(super) fn pdf(&self, ray: &Ray, surface: &Surface, triangle: u32) -> f64 {
         let Some(piece) = self.piece_of(triangle) else { return 0.0 };
-        self.by_area.probability(piece as usize) * self.piece_pdf(ray.origin, surface.point, piece)
+        self.by_power.probability(piece as usize) * self.piece_pdf(ray.origin, surface.point, piece)
     }
 
     /// The density of [`MeshLight::sample_piece`] from a place at a point of the piece.
@@ -142,6 +179,7 @@ impl MeshLight {
         let by_area = || per_solid_angle(piece.area, point - from, piece.normal).unwrap_or(0.0);
         match &piece.form {
             Form::Nothing => 0.0,
+            Form::Triangle(shape, _) if piece.cells.is_some() => piece.pdf_varied(shape, from, point),
             _ if piece.is_far(from) => by_area(),
             Form::Triangle(shape, _) => {
                 shape.pdf_direction(&Ray::new(from, point - from), &piece.surface_at(point))
@@ -160,14 +198,14 @@ impl MeshLight {
     /// What a tree knows of every piece.
     pub(super) fn emitters(&self, entry: &SurfaceEntry) -> Vec<Emitter> {
         let Some(emission) = &entry.emission else { return Vec::new() };
-        let total: f64 = self.pieces.iter().map(|piece| piece.area).sum();
+        let total: f64 = self.pieces.iter().map(|piece| piece.weight).sum();
         let strength = intensity(self.power, emission) / total;
-        let side = side(entry);
         let pieces = self.pieces.iter();
         pieces
             .map(|piece| {
+                let side = piece.outward.filter(|_| !emission.two_sided);
                 let facing = side.map_or(Facing::ANY, |side| Facing::side(side * piece.normal));
-                Emitter { bounds: Aabb::around(piece.corners()), facing, strength: strength * piece.area }
+                Emitter { bounds: Aabb::around(piece.corners()), facing, strength: strength * piece.weight }
             })
             .collect()
     }
@@ -186,7 +224,9 @@ impl Piece {
             shape.surface_at(0, DVec2::splat(1.0 / 3.0)).map_or(DVec3::Z, |surface| surface.normal)
         });
         let form = shape.map_or(Form::Nothing, |shape| Form::Triangle(shape, triangle));
-        Self { form, corner: a, sides: [b - a, c - a], normal, area, center, reach_squared, error }
+        let (sides, weight) = ([b - a, c - a], area);
+        let (outward, cells) = (None, None);
+        Self { form, corner: a, sides, normal, area, outward, weight, cells, center, reach_squared, error }
     }
 
     fn rectangle(pair: &Pair) -> Self {
@@ -196,8 +236,9 @@ impl Piece {
         let center = corner + 0.5 * (a + b);
         let reach_squared = 0.25 * (a + b).length_squared().max((a - b).length_squared());
         let error = 9.0 * f64::EPSILON * (corner.abs() + a.abs() + b.abs()) + gap;
-        let form = Form::Rectangle(rectangle);
-        Self { form, corner, sides: [a, b], normal, area, center, reach_squared, error }
+        let (form, sides, weight) = (Form::Rectangle(rectangle), [a, b], area);
+        let (outward, cells) = (None, None);
+        Self { form, corner, sides, normal, area, outward, weight, cells, center, reach_squared, error }
     }
 
     /// The surface at a point of it.
@@ -226,6 +267,44 @@ impl Piece {
     #[inline]
     fn is_far(&self, from: DVec3) -> bool {
         (from - self.center).length_squared() > FAR * FAR * self.reach_squared
+    }
+
+    /// A point of a triangle that does not emit the same everywhere, and its density per unit solid angle.
+    fn sample_varied(&self, shape: &Triangle, from: DVec3, u: DVec2) -> Option<(Surface, f64)> {
+        let is_far = self.is_far(from);
+        let by_angle = |u: DVec2| shape.sample_direction(from, u).map(|sample| (sample.surface, sample.pdf));
+        let Some(cells) = &self.cells else {
+            if !is_far {
+                return by_angle(u);
+            }
+            let surface = shape.sample_area(u)?.surface;
+            return Some((surface, per_solid_angle(self.area, surface.point - from, self.normal)?));
+        };
+        let by_cells = |u: DVec2| shape.surface_at(0, cells.sample(u).0);
+        let surface = if is_far {
+            by_cells(u)?
+        } else if u.x < BY_ANGLE {
+            by_angle(DVec2::new(u.x / BY_ANGLE, u.y))?.0
+        } else {
+            by_cells(DVec2::new((u.x - BY_ANGLE) / (1.0 - BY_ANGLE), u.y))?
+        };
+        let pdf = self.pdf_varied(shape, from, surface.point);
+        (pdf > 0.0 && pdf.is_finite()).then_some((surface, pdf))
+    }
+
+    /// The density of [`Piece::sample_varied`] where there are cells.
+    fn pdf_varied(&self, shape: &Triangle, from: DVec3, point: DVec3) -> f64 {
+        let Some(cells) = &self.cells else { return 0.0 };
+        let [a, b] = self.sides;
+        let (cross, arm) = (a.cross(b), point - self.corner);
+        let weights = DVec2::new(arm.cross(b).dot(cross), a.cross(arm).dot(cross)) / cross.length_squared();
+        let by_area = per_solid_angle(self.area, point - from, self.normal).unwrap_or(0.0);
+        let by_cells = by_area * cells.pdf(weights);
+        if self.is_far(from) {
+            return by_cells;
+        }
+        let by_angle = shape.pdf_direction(&Ray::new(from, point - from), &self.surface_at(point));
+        BY_ANGLE * by_angle + (1.0 - BY_ANGLE) * by_cells
     }
 
     /// A sample of a piece that emits the same everywhere, on the side of its normal times `outward`.

@@ -24,11 +24,11 @@ pub(crate) struct Emitter {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Facing {
     /// Unit; zero where all directions are possible.
-    axis: DVec3,
+    pub(super) axis: DVec3,
     /// The cosine of the angle between the axis and the farthest normal; −1 for all directions.
-    cos_normals: f64,
+    pub(super) cos_normals: f64,
     /// The cosine of the angle between a normal and the farthest direction of light.
-    cos_light: f64,
+    pub(super) cos_light: f64,
 }
 
 /// What is lost by rounding in cosines of bounding cones.
@@ -82,21 +82,21 @@ fn sine(cosine: f64) -> f64 {
 #[derive(Clone, Debug)]
 pub(crate) struct LightTree {
     // In depth-first order: a node of n leaves has 2n - 1 nodes, its first child follows it.
-    nodes: Vec<Node>,
+    pub(super) nodes: Vec<Node>,
     // The node of each emitter.
-    leaves: Vec<u32>,
+    pub(super) leaves: Vec<u32>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Node {
-    center: DVec3,
+pub(super) struct Node {
+    pub center: DVec3,
     /// Half the size of the bounding box.
-    half: DVec3,
-    radius_squared: f64,
-    facing: Facing,
-    strength: f64,
+    pub half: DVec3,
+    pub radius_squared: f64,
+    pub facing: Facing,
+    pub strength: f64,
     /// The second child; of a leaf, [`LEAF`] and its emitter.
-    next: u32,
+    pub next: u32,
 }
 
 /// A place that is lit.
@@ -110,7 +110,7 @@ pub(crate) struct Place {
 /// Sines of elevation down to minus this count as above the horizon: normals may have been rounded to single precision.
 pub(super) const HORIZON_SLACK: f64 = 1e-6;
 
-const LEAF: u32 = 1 << 31;
+pub(super) const LEAF: u32 = 1 << 31;
 const BELOW_ONE: f64 = 1.0 - 0.5 * f64::EPSILON;
 
 impl Node {

@@ -2,7 +2,7 @@
 
 use lumbre_math::{DVec2, DVec3};
 use lumbre_shading::Scatter;
-use lumbre_simd::{MAX_LANES, Mask, Real, V3};
+use lumbre_simd::{Double, MAX_LANES, Mask, Real, V3};
 
 use super::{LaneLightSample, Receiver};
 use crate::light::{LightSample, Place};
@@ -17,14 +17,12 @@ pub(super) struct Receivers {
 impl Receivers {
     #[inline(always)]
     pub(super) fn new<R: Real>(receiver: &Receiver<R>) -> Self {
-        Self {
-            from: doubles::<R>(receiver.from),
-            normal: singles(receiver.normal),
-            time: match receiver.time {
-                Some(time) => Some(lumbre_simd::Double::to_lanes(time)),
-                None => None,
-            },
+        let mut time = None;
+        // No `map`: closures do not take on the instruction set.
+        if let Some(at) = receiver.time {
+            time = Some(at.to_lanes());
         }
+        Self { from: doubles::<R>(receiver.from), normal: singles(receiver.normal), time }
     }
 
     pub(super) fn place(&self, lane: usize) -> Place {
@@ -127,7 +125,6 @@ pub(super) fn singles<R: Real>(v: V3<R>) -> [[f32; MAX_LANES]; 3] {
 
 #[inline(always)]
 pub(super) fn doubles<R: Real>(v: V3<R::Double>) -> [[f64; MAX_LANES]; 3] {
-    use lumbre_simd::Double;
     [v.x.to_lanes(), v.y.to_lanes(), v.z.to_lanes()]
 }
 
@@ -138,6 +135,5 @@ pub(super) fn from_singles<R: Real>(v: &[[f32; MAX_LANES]; 3]) -> V3<R> {
 
 #[inline(always)]
 pub(super) fn from_doubles<R: Real>(v: &[[f64; MAX_LANES]; 3]) -> V3<R::Double> {
-    use lumbre_simd::Double;
     V3::new(R::Double::from_lanes(&v[0]), R::Double::from_lanes(&v[1]), R::Double::from_lanes(&v[2]))
 }
