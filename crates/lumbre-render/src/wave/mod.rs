@@ -26,7 +26,7 @@ use lumbre_math::DVec3;
 use lumbre_scene::{SamplerKind, Scene};
 use lumbre_shading::lanes::{
     BsdfKind, CoatedConductorLanes, CoatedDiffuseLanes, ConductorLanes, DielectricLanes, DiffuseLanes,
-    DiffuseTransmissionLanes, ThinDielectricLanes,
+    DiffuseTransmissionLanes, PrincipledLanes, ThinDielectricLanes,
 };
 use lumbre_shading::{Bsdf, ShadingNormals, Spectrum};
 use lumbre_simd::{Double, InstructionSet, Real, V3};
@@ -264,6 +264,7 @@ const KINDS: [BsdfKind; BsdfKind::COUNT] = [
     BsdfKind::ThinDielectric,
     BsdfKind::CoatedDiffuse,
     BsdfKind::CoatedConductor,
+    BsdfKind::Principled,
     BsdfKind::Other,
 ];
 
@@ -303,6 +304,7 @@ kinds!(
     ThinDielectric: ThinDielectricLanes,
     CoatedDiffuse: CoatedDiffuseLanes,
     CoatedConductor: CoatedConductorLanes,
+    Principled: PrincipledLanes,
 );
 
 impl Setting<'_> {
