@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 use lumbre_math::{DVec3, Elementary};
 use lumbre_scene::{Scene, View};
 
-use crate::adaptive::{self, Adaptive};
+use crate::adaptive::{self, Adaptive, Spread, TRIAL_SIDE, TRIAL_SPP, Trial};
 use crate::clock::Clock;
-use crate::film::{Extras, Tile};
+use crate::film::{Extras, MAX_LUMINANCE, Tile};
 use crate::integrators::{Integrator, integrator};
 use crate::one_sample::Taker;
 use crate::rendered::{noise, picture, rendered_of};
@@ -19,8 +19,7 @@ use crate::transport::{RayCounts, Record};
 use crate::wave::{SampleId, WAVE, Wave};
 use crate::workers::Workers;
 use crate::{
-    CancelToken, DroppedSample, NoProgress, PixelBounds, Progress, RenderError, RenderOptions, Rendered,
-    Snapshot, Stats, Stop,
+    CancelToken, DroppedSample, PixelBounds, Progress, RenderError, RenderOptions, Rendered, Snapshot, Stats,
 };
 
 /// Pixels along the side of a tile.
@@ -108,11 +107,11 @@ pub fn render_from(
     };
     let before =
         owners.iter().flat_map(|owner| owner.tile.pixels()).map(|pixel| u64::from(pixel.taken)).sum();
+    let workers = Workers::start(options.threads);
     let adaptive = match options.stop.noise {
-        Some(limit) => Some(Adaptive::new(limit, mean_luminance(scene, options, integrator, cancel)?)),
+        Some(limit) => Some(Adaptive::new(limit, trial(scene, options, integrator, cancel, &workers)?)),
         None => None,
     };
-    let workers = Workers::start(options.threads);
     let job = Job {
         options,
         taker,
@@ -184,8 +183,8 @@ pub fn render_from(
             picture: &|| picture(tiles(), bounds, options.transparent),
         });
         if let Some(adaptive) = &job.adaptive {
-            let pixels = tiles().flat_map(Tile::pixels);
-            let expected: f64 = pixels.map(|pixel| adaptive.expected(pixel, spp)).sum();
+            let pixels = tiles().flat_map(|tile| tile.bounds().pixels().zip(tile.pixels()));
+            let expected: f64 = pixels.map(|((x, y), pixel)| adaptive.expected(x, y, pixel, spp)).sum();
             job.clock.expect_quiet_at(expected / bounds.area() as f64);
         }
         if job.must_stop() || least_wanted(&owners).is_none() {
@@ -224,27 +223,38 @@ fn least_taken(owners: &[Owner]) -> u32 {
     owners.iter().map(|owner| owner.tile.least_taken()).min().unwrap_or(0)
 }
 
-/// The mean luminance of the whole picture, by a small one: the same for every crop of it.
-fn mean_luminance(
+/// A small picture of the whole film, for what it says of the noise of the large one: the same for every crop.
+fn trial(
     scene: &Scene,
     options: &RenderOptions,
     integrator: &dyn Integrator,
     cancel: &CancelToken,
-) -> Result<f64, RenderError> {
-    const LONGER_SIDE: f64 = 64.0;
-    const SPP: u32 = 8;
-    let longer_side = LONGER_SIDE.min(f64::from(options.width.max(options.height)));
-    let small = RenderOptions {
-        // A time that is over here leaves none for the picture.
-        stop: Stop { spp: SPP, noise: None, ..options.stop },
-        first_sample: 0,
-        features: false,
-        guides: false,
-        ..options.smaller(longer_side)
-    };
-    let image = render_with(scene, &small, integrator, &NoProgress, cancel)?.image;
-    let sum: f64 = image.pixels().iter().map(|pixel| f64::from(pixel.luminance())).sum();
-    Ok(sum / image.pixels().len() as f64)
+    workers: &Workers,
+) -> Result<Trial, RenderError> {
+    let longer_side = TRIAL_SIDE.min(f64::from(options.width.max(options.height)));
+    let small = RenderOptions { features: false, guides: false, ..options.smaller(longer_side) };
+    let taker = Taker::new(scene, &small, integrator)?;
+    let mut rows: Vec<(u32, f64, Vec<Spread>)> = (0..small.height).map(|y| (y, 0.0, Vec::new())).collect();
+    workers.for_each(&mut rows, |(y, sum, spreads)| {
+        let y = *y;
+        let ids: Vec<SampleId> = (0..small.width)
+            .flat_map(|x| (0..TRIAL_SPP).map(move |index| SampleId { x, y, index }))
+            .filter(|_| !cancel.is_cancelled())
+            .collect();
+        let mut luminances = vec![Vec::with_capacity(TRIAL_SPP as usize); small.width as usize];
+        taker.take(&mut Wave::default(), &ids, &mut Record::default(), |id, sample| {
+            let luminance = f64::from(small.exposure.colour(sample.radiance).luminance());
+            if luminance.is_finite() {
+                luminances[id.x as usize].push(luminance.clamp(0.0, MAX_LUMINANCE));
+            }
+        });
+        *sum = luminances.iter().flatten().sum();
+        *spreads = luminances.iter().map(|pixel| Spread::of(pixel)).collect();
+    });
+    let samples = f64::from(small.width) * f64::from(small.height) * f64::from(TRIAL_SPP);
+    let mean = rows.iter().map(|(_, sum, _)| sum).sum::<f64>() / samples;
+    let spreads: Vec<Spread> = rows.into_iter().flat_map(|(.., spreads)| spreads).collect();
+    Ok(Trial::new(mean, [options.width, options.height], small.width as usize, &spreads))
 }
 
 /// The number of samples at which a render next looks at its noise, and shows what there is: always the same, whatever came between.
@@ -447,7 +457,8 @@ impl Job<'_> {
         for number in numbers {
             for (x, y) in owner.tile.bounds().pixels() {
                 let pixel = owner.tile.pixel(x, y);
-                let has_enough = || self.adaptive.is_some_and(|adaptive| adaptive.is_done(pixel));
+                let has_enough =
+                    || self.adaptive.as_ref().is_some_and(|adaptive| adaptive.is_done(x, y, pixel));
                 if pixel.taken <= number && is_wanted(x, y) && !has_enough() {
                     ids.push(SampleId { x, y, index: self.options.first_sample.saturating_add(number) });
                 }

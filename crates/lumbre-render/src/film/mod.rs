@@ -18,3 +18,5 @@ pub use filter::{Filter, FilterSample, FilterShape};
 pub use guide::{Count, FEATURES, GuideSums, RatioSums};
 pub use pixel::{FeatureSample, FeatureSums, Pixel, Tint};
 pub use tile::{Exposure, Extras, Sample, Tile};
+
+pub(crate) use pixel::MAX_LUMINANCE;

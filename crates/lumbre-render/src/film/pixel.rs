@@ -24,7 +24,7 @@ pub struct Pixel {
 }
 
 /// Luminance up to which noise is told apart.
-const MOST_LUMINANCE: f64 = 1e6;
+pub(crate) const MAX_LUMINANCE: f64 = 1e6;
 
 impl Pixel {
     /// Adds a sample, whose colour is multiplied by its coverage. False, and nothing is added, where it is not finite, or beyond what
@@ -40,7 +40,7 @@ impl Pixel {
         }
         self.covered.add(covered);
         self.weight.add(weight);
-        let luminance = f64::from(colour.luminance()).clamp(-MOST_LUMINANCE, MOST_LUMINANCE);
+        let luminance = f64::from(colour.luminance()).clamp(-MAX_LUMINANCE, MAX_LUMINANCE);
         self.luminance.add(luminance);
         self.luminance_squares.add(luminance * luminance);
         self.samples += 1;
