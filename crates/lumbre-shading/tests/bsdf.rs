@@ -1357,7 +1357,7 @@ kinds! {
     DiffuseKind = DiffuseLanes, DiffuseTransmissionKind = DiffuseTransmissionLanes, ConductorKind = ConductorLanes,
     DielectricKind = DielectricLanes, ThinDielectricKind = ThinDielectricLanes,
     CoatedDiffuseKind = CoatedDiffuseLanes, CoatedConductorKind = CoatedConductorLanes,
-    PrincipledKind = PrincipledLanes
+    PrincipledKind = PrincipledLanes, UberKind = UberLanes
 }
 
 #[test]
@@ -1392,6 +1392,17 @@ fn lanes_scatter_as_scalar_code_does_to_the_bit() {
     });
     assert_lanes_agree::<PrincipledKind>(BsdfKind::Principled, |random| {
         Bsdf::Principled(Box::new(random_principled(random)))
+    });
+    assert_lanes_agree::<UberKind>(BsdfKind::Uber, |random| {
+        let mut part = || {
+            let is_there = random.next_f32() < 0.7;
+            random_colour(random) * if is_there { 0.3 } else { 0.0 }
+        };
+        let [diffuse, glossy, mirror, refracted, passed] = std::array::from_fn(|_| part());
+        let (x, y) = (random.next_f32(), random.next_f32());
+        let facets = Microfacets::new(x * x + 1e-3, y + 1e-3);
+        let eta = 0.6 + 1.5 * random.next_f32();
+        Bsdf::Uber(Uber { diffuse, glossy, mirror, refracted, passed, eta, facets })
     });
 }
 
