@@ -7,8 +7,8 @@ use lumbre_simd::random::{pcg4d, uniform};
 use lumbre_simd::{Mask, Real, Task, UInt, V3};
 
 use crate::conductor::{ConductorLanes, mirrored};
-use crate::dielectric::{DielectricLanes, Ways, refract_lanes};
-use crate::diffuse::{DiffuseLanes, cosine_lanes, has_side};
+use crate::dielectric::{DielectricLanes, Ways, refract};
+use crate::diffuse::{DiffuseLanes, cosine_direction, has_side};
 use crate::fresnel;
 use crate::lanes::{LaneBsdf, LaneSample, colour, field};
 use crate::medium::{henyey_greenstein, sample_henyey_greenstein_lanes};
@@ -165,7 +165,7 @@ impl<R: Real> LaneBsdf<R> for CoatedDiffuseLanes<R> {
         let probability = self.coat_probability(wo);
         let from_coat = lobe.simd_lt(probability);
         let reflection = self.coat.face.sample_of(wo, R::zero(), u, Ways::Reflection);
-        let wi = V3::select(from_coat, reflection.wi, cosine_lanes(u, R::one()));
+        let wi = V3::select(from_coat, reflection.wi, cosine_direction(u, R::one()));
         let exists = has_side(wo) & (!from_coat | reflection.valid);
         let delta = from_coat & reflection.delta;
         let delta_weight = reflection.weight / probability;
@@ -249,7 +249,7 @@ impl<R: Real> CoatedConductorLanes<R> {
     fn metal_pdf(&self, wo: V3<R>, wi: V3<R>) -> R {
         let through_rough = self.seen_through().pdf(wo, wi);
         let (up, eta) = (V3::constant([0.0, 0.0, 1.0]), self.coat.face.eta);
-        let ((o, enters), (i, leaves)) = (refract_lanes(wo, up, eta), refract_lanes(wi, up, eta));
+        let ((o, enters), (i, leaves)) = (refract(wo, up, eta), refract(wi, up, eta));
         // |dω below / dω above| = cos above / (η² cos below)
         let through_smooth = self.base.pdf(-o, -i) * wi.z.abs() / (eta * eta * i.z.abs());
         R::select(self.coat.face.is_delta(), through_smooth.or_zero(enters & leaves), through_rough)
@@ -260,9 +260,9 @@ impl<R: Real> CoatedConductorLanes<R> {
     fn sample_metal(&self, wo: V3<R>, u: [R; 2]) -> (V3<R>, R::Mask) {
         let through_rough = self.seen_through().sample(wo, R::zero(), u);
         let (up, eta) = (V3::constant([0.0, 0.0, 1.0]), self.coat.face.eta);
-        let (o, enters) = refract_lanes(wo, up, eta);
+        let (o, enters) = refract(wo, up, eta);
         let reflected = self.base.sample(-o, R::zero(), u);
-        let (out, leaves) = refract_lanes(-reflected.wi, up, eta.recip());
+        let (out, leaves) = refract(-reflected.wi, up, eta.recip());
         let smooth = self.coat.face.is_delta();
         let exists = (smooth & enters & reflected.valid & leaves) | (!smooth & through_rough.valid);
         (V3::select(smooth, out, through_rough.wi), exists)
@@ -282,7 +282,7 @@ impl<R: Real> CoatedConductorLanes<R> {
     pub(crate) fn mirror(&self, wo: V3<R>) -> V3<R> {
         let eta = self.coat.face.eta;
         let outside = fresnel::dielectric(wo.z.abs(), eta);
-        let (inside, enters) = refract_lanes(wo, V3::constant([0.0, 0.0, 1.0]), eta);
+        let (inside, enters) = refract(wo, V3::constant([0.0, 0.0, 1.0]), eta);
         let cos = inside.z.abs();
         let back = fresnel::dielectric(-cos, eta);
         let there_and_back = exp(R::splat(-2.0) * self.coat.thickness / cos);
@@ -328,7 +328,7 @@ impl<R: Real> LaneBsdf<R> for CoatedConductorLanes<R> {
         let from_metal = !from_coat & lobe.simd_lt(coat + metal);
         let reflection = self.coat.face.sample_of(wo, R::zero(), u, Ways::Reflection);
         let (off_metal, metal_exists) = self.sample_metal(wo, u);
-        let wi = V3::select(from_metal, off_metal, cosine_lanes(u, R::one()));
+        let wi = V3::select(from_metal, off_metal, cosine_direction(u, R::one()));
         let wi = V3::select(from_coat, reflection.wi, wi);
         let both_smooth = self.both_smooth();
         let wi = V3::select(from_coat & both_smooth, mirrored(wo), wi);
@@ -556,7 +556,7 @@ impl<R: Real> CoatLanes<R> {
                 break;
             }
             let [a, b, c, d] = random.numbers(walk, depth + 2);
-            let up = cosine_lanes([a, b], R::one());
+            let up = cosine_direction([a, b], R::one());
             let back = self.face.sample_of(-up, R::zero(), [c, d], Ways::Reflection);
             let both_ways = self.across(up) * self.across(back.wi);
             throughput = throughput * (back.weight * both_ways);

@@ -1,9 +1,9 @@
 //! Metals, smooth or rough.
 
-use lumbre_math::{Vec2, Vec3};
+use lumbre_math::Vec2;
 use lumbre_simd::{Mask, Real, V3};
 
-use crate::lanes::{LaneBsdf, LaneSample, colour, colour_lane, field, lane, spectrum, square, vector};
+use crate::lanes::{LaneBsdf, LaneSample, colour, colour_lane, field, spectrum, square};
 use crate::microfacet::{FacetLanes, Microfacets};
 use crate::{BsdfSample, LocalDir, Spectrum, fresnel};
 
@@ -115,7 +115,7 @@ impl<R: Real> LaneBsdf<R> for ConductorLanes<R> {
         let smooth = self.facets.is_smooth();
         let up = V3::constant([0.0, 0.0, 1.0]);
         let m = V3::select(smooth, up, self.facets.sample_visible(wo, u));
-        let wi = V3::select(smooth, mirrored(wo), reflect_lanes(wo, m));
+        let wi = V3::select(smooth, mirrored(wo), reflect(wo, m));
         let also_visible = R::select(smooth, R::one(), self.facets.also_visible(wo, wi));
         let pdf = R::splat(0.25) * self.facets.density(m) * self.facets.visible_per_cosine(wo);
         LaneSample {
@@ -148,11 +148,6 @@ pub(crate) fn mirrored<R: Real>(w: V3<R>) -> V3<R> {
 
 /// `w` mirrored about the unit normal `m`.
 #[inline(always)]
-pub(crate) fn reflect_lanes<R: Real>(w: V3<R>, m: V3<R>) -> V3<R> {
+pub(crate) fn reflect<R: Real>(w: V3<R>, m: V3<R>) -> V3<R> {
     (m * (R::splat(2.0) * w.dot(m)) - w).normalize()
-}
-
-/// `w` mirrored about the unit normal `m`.
-pub(crate) fn reflect(w: LocalDir, m: Vec3) -> LocalDir {
-    LocalDir(vector(reflect_lanes(w.lane(), lane(m))))
 }

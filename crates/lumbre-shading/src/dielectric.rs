@@ -1,11 +1,11 @@
 //! Glass: reflection and refraction.
 
-use lumbre_math::{Vec2, Vec3};
+use lumbre_math::Vec2;
 use lumbre_simd::{Mask, Real, V3};
 
-use crate::conductor::{mirrored, reflect_lanes};
+use crate::conductor::{mirrored, reflect};
 use crate::diffuse::has_side;
-use crate::lanes::{LaneBsdf, LaneSample, field, lane, square, vector};
+use crate::lanes::{LaneBsdf, LaneSample, field, square};
 use crate::microfacet::{FacetLanes, Microfacets};
 use crate::specular::Specular;
 use crate::{BsdfSample, LocalDir, Scatter, Spectrum, fresnel};
@@ -178,8 +178,8 @@ impl<R: Real> DielectricLanes<R> {
         };
         let share = R::select(transmits, R::one() - reflected, reflected);
         let eta = R::select(transmits, self.eta_across(wo), R::one());
-        let (refracted, refracts) = refract_lanes(wo, m, eta);
-        let reflection = V3::select(delta, mirrored(wo), reflect_lanes(wo, m));
+        let (refracted, refracts) = refract(wo, m, eta);
+        let reflection = V3::select(delta, mirrored(wo), reflect(wo, m));
         let wi = V3::select(transmits, refracted, reflection);
         let sides = wo.z * wi.z;
         let on_its_side =
@@ -237,20 +237,13 @@ impl<R: Real> LaneBsdf<R> for DielectricLanes<R> {
 /// `w` refracted through a facet of normal `m`, where `eta` is the index of the other side over that of the
 /// side of `w`; and where there is a refraction: not beyond the critical angle.
 #[inline(always)]
-pub(crate) fn refract_lanes<R: Real>(w: V3<R>, m: V3<R>, eta: R) -> (V3<R>, R::Mask) {
+pub(crate) fn refract<R: Real>(w: V3<R>, m: V3<R>, eta: R) -> (V3<R>, R::Mask) {
     let m = V3::select(w.dot(m).simd_lt(R::zero()), -m, m);
     let cos_i = w.dot(m);
     let sin2_t = (R::one() - cos_i * cos_i).simd_max(R::zero()) / (eta * eta);
     let cos_t = (R::one() - sin2_t).simd_max(R::zero()).sqrt();
     let refracted = (m * (cos_i / eta - cos_t) - w / eta).normalize();
     (refracted, sin2_t.simd_lt(R::one()))
-}
-
-/// `w` refracted through a facet of normal `m`, where `eta` is the index of the other side over that of the
-/// side of `w`. `None` beyond the critical angle.
-pub(crate) fn refract(w: LocalDir, m: Vec3, eta: f32) -> Option<LocalDir> {
-    let (refracted, refracts) = refract_lanes(w.lane(), lane(m), eta);
-    refracts.then(|| LocalDir(vector(refracted)))
 }
 
 /// A pane of glass so thin that transmission is not displaced: a delta, with all reflections between its faces

@@ -6,7 +6,7 @@ use lumbre_math::Vec2;
 use lumbre_simd::math::cosine_hemisphere;
 use lumbre_simd::{Mask, Real, V3};
 
-use crate::lanes::{LaneBsdf, LaneSample, colour, colour_lane, spectrum, square, vector};
+use crate::lanes::{LaneBsdf, LaneSample, colour, colour_lane, spectrum, square};
 use crate::{BsdfSample, LocalDir, Spectrum};
 
 /// Lambertian reflection. Conserves energy at a reflectance of 1.
@@ -65,7 +65,7 @@ impl<R: Real> LaneBsdf<R> for DiffuseLanes<R> {
 
     #[inline(always)]
     fn sample(&self, wo: V3<R>, _: R, u: [R; 2]) -> LaneSample<R> {
-        let wi = cosine_lanes(u, wo.z);
+        let wi = cosine_direction(u, wo.z);
         LaneSample {
             wi,
             weight: self.reflectance,
@@ -170,7 +170,7 @@ impl<R: Real> LaneBsdf<R> for DiffuseTransmissionLanes<R> {
         let transmitted = lobe.simd_ge(reflection);
         let share = V3::select(transmitted, self.transmittance, self.reflectance);
         let probability = R::select(transmitted, R::one() - reflection, reflection);
-        let wi = cosine_lanes(u, R::select(transmitted, -wo.z, wo.z));
+        let wi = cosine_direction(u, R::select(transmitted, -wo.z, wo.z));
         LaneSample {
             wi,
             weight: share / probability,
@@ -201,13 +201,8 @@ pub(crate) fn has_side<R: Real>(w: V3<R>) -> R::Mask {
 
 /// A direction with density cos θ / π on the side of the sign of `side`, which is not zero.
 #[inline(always)]
-pub(crate) fn cosine_lanes<R: Real>(u: [R; 2], side: R) -> V3<R> {
+pub(crate) fn cosine_direction<R: Real>(u: [R; 2], side: R) -> V3<R> {
     let up = cosine_hemisphere(u);
     // At least 2⁻¹³, since a direction in the surface has no side.
     V3::new(up.x, up.y, up.z.simd_max(R::splat(1.2e-4)).copysign(side))
-}
-
-/// A direction with density cos θ / π on the side of the sign of `side`; `None` when that is zero.
-pub(crate) fn cosine_direction(u: Vec2, side: f32) -> Option<LocalDir> {
-    (side.abs() > 0.0).then(|| LocalDir(vector(cosine_lanes(square(u), side))))
 }

@@ -16,6 +16,7 @@ pub use crate::microfacet::FacetLanes;
 pub use crate::principled_lanes::{ClearcoatLanes, PrincipledLanes};
 pub use crate::sheen::SheenLanes;
 pub use crate::thin_film::ThinFilmLanes;
+pub use crate::uber_lanes::UberLanes;
 
 use crate::{Bsdf, BsdfSample, LocalDir, Scatter, Spectrum};
 
@@ -83,7 +84,9 @@ pub enum BsdfKind {
     CoatedConductor,
     /// [`PrincipledLanes`].
     Principled,
-    /// A kind without lanes: only the scalar [`Bsdf`] has it.
+    /// [`UberLanes`].
+    Uber,
+    /// A kind without lanes, which only the scalar [`Bsdf`] has: none at present.
     Other,
 }
 
@@ -107,7 +110,7 @@ impl Bsdf {
             Self::CoatedDiffuse(_) => BsdfKind::CoatedDiffuse,
             Self::CoatedConductor(_) => BsdfKind::CoatedConductor,
             Self::Principled(_) => BsdfKind::Principled,
-            _ => BsdfKind::Other,
+            Self::Uber(_) => BsdfKind::Uber,
         }
     }
 
@@ -122,7 +125,7 @@ impl Bsdf {
             Self::CoatedDiffuse(bsdf) => bsdf.row().collect(),
             Self::CoatedConductor(bsdf) => bsdf.row().collect(),
             Self::Principled(bsdf) => bsdf.row(),
-            _ => return None,
+            Self::Uber(bsdf) => bsdf.row(),
         };
         Some((self.kind(), row))
     }

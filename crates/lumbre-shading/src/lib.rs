@@ -28,6 +28,7 @@ mod stretched;
 mod texture;
 pub mod thin_film;
 pub mod uber;
+mod uber_lanes;
 
 pub use bsdf::{Bsdf, BsdfSample, Scatter};
 pub use frame::{LocalDir, ShadingFrame, ShadingNormals};

@@ -6,9 +6,9 @@ use lumbre_simd::math::sin_cos_turns;
 use lumbre_simd::{Mask, Real, Task, V3};
 
 use crate::albedo::{ALBEDO, MAX_ETA, unit};
-use crate::conductor::{mirrored, reflect_lanes};
-use crate::dielectric::{DielectricLanes, Ways, refract_lanes};
-use crate::diffuse::{cosine_lanes, has_side};
+use crate::conductor::{mirrored, reflect};
+use crate::dielectric::{DielectricLanes, Ways, refract};
+use crate::diffuse::{cosine_direction, has_side};
 use crate::fresnel;
 use crate::lanes::{LaneBsdf, LaneSample, colour, field};
 use crate::microfacet::{FacetLanes, Microfacets};
@@ -625,7 +625,7 @@ impl<R: Real> PrincipledLanes<R> {
         let m = V3::select(smooth, up, self.facets.sample_visible(wo, u));
         let shares = self.shares(wo.dot(m));
         let reflection = shares.reflection_probability();
-        let reflected = V3::select(smooth, mirrored(wo), reflect_lanes(wo, m));
+        let reflected = V3::select(smooth, mirrored(wo), reflect(wo, m));
         let transmits = lobe.simd_ge(reflection);
         let through = one - reflection;
         // The channel that is refracted.
@@ -647,7 +647,7 @@ impl<R: Real> PrincipledLanes<R> {
         let passes = transmits & !self.thin & !has_border;
         let across = R::select(wo.z.simd_gt(zero), eta, eta.recip());
         let across = R::select(bends, across, one);
-        let (refracted, refracts) = refract_lanes(wo, m, across);
+        let (refracted, refracts) = refract(wo, m, across);
         let wi = V3::select(transmits & self.thin, flipped(reflected), reflected);
         let wi = V3::select(bends, refracted, wi);
         let wi = V3::select(passes, -wo, wi);
@@ -830,7 +830,7 @@ impl<R: Real> LaneBsdf<R> for PrincipledLanes<R> {
 
         // A remainder by rounding beyond the last lobe must not select a lobe of probability zero.
         let is_far = lobes.far.simd_gt(zero) & (lobes.near.simd_eq(zero) | lobe.simd_ge(one - lobes.far));
-        let mut wi = cosine_lanes(u, R::select(is_far, -wo.z, wo.z));
+        let mut wi = cosine_direction(u, R::select(is_far, -wo.z, wo.z));
         let mut exists = has_side(wo) & (!from_cosine | (lobes.near + lobes.far).simd_ne(zero));
         let mut delta = R::Mask::splat(false);
         let mut delta_weight = V3::splat(one);

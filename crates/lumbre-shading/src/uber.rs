@@ -1,16 +1,14 @@
 //! pbrt-v3's `uber`, and with it `plastic`: lobes side by side, each with a weight of its own.
 
-use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
-use lumbre_math::{Elementary, Vec2, Vec3};
+use lumbre_math::{Elementary, Vec2};
 
-use crate::conductor::reflect;
-use crate::dielectric::refract;
-use crate::diffuse::cosine_direction;
+use crate::lanes::{LaneBsdf, Row, colour_lane, spectrum, square, vector};
 use crate::material::{Roughness, albedo, index};
 use crate::microfacet::Microfacets;
 use crate::specular::Specular;
+use crate::uber_lanes::{MIRROR, PASSED, REFRACTED, UberLanes};
 use crate::{
     BsdfSample, FloatTexture, LocalDir, Scatter, Spectrum, SpectrumTexture, TextureContext, fresnel,
 };
@@ -113,110 +111,20 @@ pub struct Uber {
     pub facets: Microfacets,
 }
 
-/// The lobes, in the order in which they are sampled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Lobe {
-    Diffuse,
-    Glossy,
-    Mirror,
-    Refracted,
-    Passed,
-}
-
-const LOBES: [Lobe; 5] = [Lobe::Diffuse, Lobe::Glossy, Lobe::Mirror, Lobe::Refracted, Lobe::Passed];
-
-/// The least Fresnel reflectance by which facets are sampled: some of them are met at grazing angles.
-const LEAST_GLOSSY: f32 = 0.1;
-
 impl Uber {
     /// f · |cos θi|, without the delta parts.
     pub fn eval(&self, wo: LocalDir, wi: LocalDir) -> Spectrum {
-        if !wo.same_hemisphere(wi) {
-            return Spectrum::BLACK;
-        }
-        let diffuse = self.diffuse * (FRAC_1_PI * wi.abs_cos_theta());
-        let Some(m) = half(wo, wi) else { return diffuse };
-        let reflected = fresnel::dielectric(wo.vec().dot(m), self.eta);
-        let both = self.facets.both_visible_per_cosines(wo.vec(), wi.vec());
-        diffuse + self.glossy * (reflected * 0.25 * self.facets.density(m) * both * wi.abs_cos_theta())
+        spectrum(self.lane().eval(wo.lane(), wi.lane()).0)
     }
 
     /// The density of [`Uber::sample`].
     pub fn pdf(&self, wo: LocalDir, wi: LocalDir) -> f32 {
-        let [diffuse, glossy, ..] = self.probabilities(wo);
-        self.pdf_of(wo, wi, diffuse, glossy)
-    }
-
-    fn pdf_of(&self, wo: LocalDir, wi: LocalDir, diffuse: f32, glossy: f32) -> f32 {
-        if !wo.same_hemisphere(wi) {
-            return 0.0;
-        }
-        let facets = half(wo, wi)
-            .map_or(0.0, |m| 0.25 * self.facets.density(m) * self.facets.visible_per_cosine(wo.vec()));
-        diffuse * FRAC_1_PI * wi.abs_cos_theta() + glossy * facets
-    }
-
-    /// The probability of each lobe, about in proportion to its power; all 0 where nothing scatters.
-    fn probabilities(&self, wo: LocalDir) -> [f32; 5] {
-        let reflected = fresnel::dielectric(wo.cos_theta(), self.eta);
-        let powers = [
-            self.diffuse.max_component(),
-            self.glossy.max_component() * reflected.max(LEAST_GLOSSY),
-            self.mirror.max_component() * reflected,
-            self.refracted.max_component() * (1.0 - reflected),
-            self.passed.max_component(),
-        ];
-        let sum: f32 = powers.iter().sum();
-        powers.map(|power| if sum > 0.0 { power / sum } else { 0.0 })
+        self.lane().eval(wo.lane(), wi.lane()).1
     }
 
     /// A direction of one of the lobes.
     pub fn sample(&self, wo: LocalDir, lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        if wo.cos_theta() == 0.0 || wo.cos_theta().is_nan() {
-            return None;
-        }
-        let probabilities = self.probabilities(wo);
-        let mut rest = lobe;
-        let chosen = LOBES.into_iter().zip(probabilities).find(|(_, probability)| {
-            let is_it = rest < *probability;
-            rest -= probability;
-            is_it
-        });
-        // By rounding the probabilities may sum to less than `lobe`.
-        let likely = || LOBES.into_iter().zip(probabilities).rfind(|(_, probability)| *probability > 0.0);
-        let (chosen, probability) = chosen.or_else(likely)?;
-        let wi = match chosen {
-            Lobe::Diffuse => cosine_direction(u, wo.cos_theta())?,
-            Lobe::Glossy => reflect(wo, self.facets.sample_visible(wo.vec(), u)),
-            _ => {
-                let part = self.delta(wo, chosen)?;
-                return Some(BsdfSample { weight: part.weight * (1.0 / probability), ..part });
-            }
-        };
-        let pdf = self.pdf_of(wo, wi, probabilities[0], probabilities[1]);
-        if !(pdf > 0.0 && pdf.is_finite()) {
-            return None;
-        }
-        let weight = self.eval(wo, wi) / pdf;
-        Some(BsdfSample { wi, weight, scatter: Scatter::Density(pdf), transmitted: false, eta: 1.0 })
-    }
-
-    /// One of the delta parts, with its own weight; `None` where it is black.
-    fn delta(&self, wo: LocalDir, lobe: Lobe) -> Option<BsdfSample> {
-        let reflected = fresnel::dielectric(wo.cos_theta(), self.eta);
-        let across = if wo.cos_theta() > 0.0 { self.eta } else { 1.0 / self.eta };
-        let (wi, weight, eta) = match lobe {
-            Lobe::Diffuse | Lobe::Glossy => return None,
-            Lobe::Mirror => (wo.mirrored(), self.mirror * reflected, 1.0),
-            Lobe::Refracted => {
-                // Radiance is scaled by η², as by glass.
-                let weight = self.refracted * ((1.0 - reflected) / (across * across));
-                (refract(wo, Vec3::Z, across)?, weight, across)
-            }
-            Lobe::Passed => (-wo, self.passed, 1.0),
-        };
-        let transmitted = lobe != Lobe::Mirror;
-        (!weight.is_black()).then_some(BsdfSample { wi, weight, scatter: Scatter::Delta, transmitted, eta })
+        self.lane().sample(wo.lane(), lobe, square(u)).scalar()
     }
 
     /// Its mirror, its refraction, and what goes straight on.
@@ -224,12 +132,41 @@ impl Uber {
         if wo.cos_theta() == 0.0 || wo.cos_theta().is_nan() {
             return Specular::new();
         }
-        LOBES.into_iter().filter_map(|lobe| self.delta(wo, lobe)).collect()
+        let part = |lobe| {
+            let (wi, weight, eta, is_there) = self.lane().delta(wo.lane(), lobe);
+            is_there.then(|| BsdfSample {
+                wi: LocalDir(vector(wi)),
+                weight: spectrum(weight),
+                scatter: Scatter::Delta,
+                transmitted: lobe != MIRROR,
+                eta,
+            })
+        };
+        [MIRROR, REFRACTED, PASSED].into_iter().filter_map(part).collect()
     }
 
     /// Whether it is made of delta parts alone.
     pub fn is_delta(&self) -> bool {
-        self.diffuse.is_black() && self.glossy.is_black()
+        self.lane().is_delta()
+    }
+
+    fn lane(&self) -> UberLanes<f32> {
+        UberLanes {
+            diffuse: colour_lane(self.diffuse),
+            glossy: colour_lane(self.glossy),
+            mirror: colour_lane(self.mirror),
+            refracted: colour_lane(self.refracted),
+            passed: colour_lane(self.passed),
+            eta: self.eta,
+            facets: self.facets.lane(),
+        }
+    }
+
+    /// The row that [`UberLanes`] loads.
+    pub(crate) fn row(&self) -> Row {
+        let colours = [self.diffuse, self.glossy, self.mirror, self.refracted, self.passed];
+        let alpha = self.facets.alpha();
+        colours.into_iter().flat_map(Spectrum::to_array).chain([self.eta, alpha.x, alpha.y]).collect()
     }
 
     /// An estimate of its albedo: what it gives head on, at most 1.
@@ -243,14 +180,10 @@ impl Uber {
     }
 }
 
-/// The normal of the facets that reflect one direction into the other on the same side, pointing up.
-fn half(wo: LocalDir, wi: LocalDir) -> Option<Vec3> {
-    let half = (wo.vec() + wi.vec()).try_normalize()?;
-    Some(if half.z < 0.0 { -half } else { half })
-}
-
 #[cfg(test)]
 mod tests {
+    use lumbre_math::Vec3;
+
     use super::*;
 
     const WHITE_DIFFUSE: Uber = Uber {

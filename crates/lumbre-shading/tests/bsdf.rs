@@ -1187,25 +1187,27 @@ impl<K: Kind> Job for Scattering<'_, K> {
         assert_eq!(count % R::LANES, 0);
         let mut outcomes = Vec::with_capacity(count);
         for start in (0..count).step_by(R::LANES) {
-            let load = |columns: &[Vec<f32>; 3]| {
-                let [x, y, z] = [0, 1, 2].map(|axis| R::from_slice(&columns[axis][start..]));
-                V3::new(x, y, z)
-            };
             let mut bits = 0;
             for lane in 0..R::LANES {
                 bits |= u32::from(columns.regularized[start + lane]) << lane;
             }
             let at = R::UInt::from_slice(&columns.at[start..]);
             let bsdf = K::Lanes::<R>::load(&columns.table, at).regularized(R::Mask::from_bitmask(bits));
-            let (wo, wi) = (load(&columns.wo), load(&columns.wi));
-            let V3 { x: lobe, y: u, z: v } = load(&columns.u);
+            let (wo, wi) = (load::<R>(&columns.wo, start), load(&columns.wi, start));
+            let V3 { x: lobe, y: u, z: v } = load(&columns.u, start);
             let (value, pdf) = bsdf.eval(wo, wi);
             let sample = bsdf.sample(wo, lobe, [u, v]);
-            let evaluated = [value.x, value.y, value.z, pdf].map(R::to_lanes);
+            let evaluated = [value.x.to_lanes(), value.y.to_lanes(), value.z.to_lanes(), pdf.to_lanes()];
             let s = sample;
-            let sampled = [s.wi.x, s.wi.y, s.wi.z, s.weight.x, s.weight.y, s.weight.z, s.pdf, s.eta];
-            let sampled = sampled.map(R::to_lanes);
-            let masks = [bsdf.is_delta(), s.valid, s.delta, s.transmitted].map(R::Mask::to_bitmask);
+            let (w, c) = ([s.wi.x.to_lanes(), s.wi.y.to_lanes(), s.wi.z.to_lanes()], s.weight);
+            let c = [c.x.to_lanes(), c.y.to_lanes(), c.z.to_lanes(), s.pdf.to_lanes(), s.eta.to_lanes()];
+            let sampled = [w[0], w[1], w[2], c[0], c[1], c[2], c[3], c[4]];
+            let masks = [
+                bsdf.is_delta().to_bitmask(),
+                s.valid.to_bitmask(),
+                s.delta.to_bitmask(),
+                s.transmitted.to_bitmask(),
+            ];
             for lane in 0..R::LANES {
                 let [is_delta, valid, delta, transmitted] = masks.map(|mask| mask >> lane & 1 == 1);
                 let sample = valid.then(|| (sampled.map(|lanes| lanes[lane]), [delta, transmitted]));
@@ -1214,6 +1216,12 @@ impl<K: Kind> Job for Scattering<'_, K> {
         }
         outcomes
     }
+}
+
+#[inline(always)]
+fn load<R: Real>(columns: &[Vec<f32>; 3], start: usize) -> V3<R> {
+    let [x, y, z] = columns;
+    V3::new(R::from_slice(&x[start..]), R::from_slice(&y[start..]), R::from_slice(&z[start..]))
 }
 
 /// The same by the scalar interface.
@@ -1357,7 +1365,7 @@ kinds! {
     DiffuseKind = DiffuseLanes, DiffuseTransmissionKind = DiffuseTransmissionLanes, ConductorKind = ConductorLanes,
     DielectricKind = DielectricLanes, ThinDielectricKind = ThinDielectricLanes,
     CoatedDiffuseKind = CoatedDiffuseLanes, CoatedConductorKind = CoatedConductorLanes,
-    PrincipledKind = PrincipledLanes
+    PrincipledKind = PrincipledLanes, UberKind = UberLanes
 }
 
 #[test]
@@ -1392,6 +1400,17 @@ fn lanes_scatter_as_scalar_code_does_to_the_bit() {
     });
     assert_lanes_agree::<PrincipledKind>(BsdfKind::Principled, |random| {
         Bsdf::Principled(Box::new(random_principled(random)))
+    });
+    assert_lanes_agree::<UberKind>(BsdfKind::Uber, |random| {
+        let mut part = || {
+            let is_there = random.next_f32() < 0.7;
+            random_colour(random) * if is_there { 0.3 } else { 0.0 }
+        };
+        let [diffuse, glossy, mirror, refracted, passed] = std::array::from_fn(|_| part());
+        let (x, y) = (random.next_f32(), random.next_f32());
+        let facets = Microfacets::new(x * x + 1e-3, y + 1e-3);
+        let eta = 0.6 + 1.5 * random.next_f32();
+        Bsdf::Uber(Uber { diffuse, glossy, mirror, refracted, passed, eta, facets })
     });
 }
 
