@@ -1,16 +1,20 @@
 //! How many rays a second: `cargo run --release -p lumbre-kernel --example kernel_speed [-- [--quick] [NAME]]`, where NAME is a
 //! part of a scene's name.
 //!
-//! Scenes: bumpy spheres of triangles, a field of spheres, the field of mixed shapes on a plane, and an instanced field.
-//! Rays: primary (scanlines of a pinhole camera), bounce (from the primary hits, at random), shadow (from the primary hits
-//! to a light). Each figure is the best of several passes, in millions of rays a second.
+//! Scenes: a room, alone and with a sphere and an instance in it, bumpy spheres of triangles, a field of spheres, the field of mixed
+//! shapes on a plane, and an instanced field. Rays: primary (of a pinhole camera, in squares of four by four pixels), bounce (from the
+//! primary hits, at random), shadow (from the primary hits to a light). Each figure is the best of several passes, in millions of
+//! rays a second: of single rays by one thread and by two; in batches; as rays of a picture, 4096 at a time; and these by
+//! double precision.
 
 use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
 
 use lumbre_geometry::{Cone, Cuboid, Cylinder, PlacedShape, Plane, Ray, Shape, Sphere, Torus, Triangle};
-use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, Instance, TriangleMesh};
+use lumbre_kernel::{
+    Accel, BuildOptions, Geometry, GeometryKind, HitColumns, Instance, RayColumns, TriangleMesh,
+};
 use lumbre_math::{DVec3, Transform};
 
 struct Random(u64);
@@ -36,10 +40,27 @@ impl Random {
 fn main() {
     let is_quick = std::env::args().any(|argument| argument == "--quick");
     println!(
-        "{:<22} {:>9} {:>7} {:>8} {:>6}  {:<8} {:>9} {:>9} {:>9} {:>9}",
-        "scene", "prims", "build", "Mprim/s", "B/prim", "rays", "closest×1", "any×1", "closest×2", "any×2"
+        "{:<22} {:>9} {:>7} {:>8} {:>6}  {:<8} {:>9} {:>7} {:>9} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7}",
+        "scene",
+        "prims",
+        "build",
+        "Mprim/s",
+        "B/prim",
+        "rays",
+        "closest×1",
+        "any×1",
+        "closest×2",
+        "any×2",
+        "batch",
+        "any",
+        "picture",
+        "any",
+        "exact",
+        "any"
     );
     let mut scenes: Vec<(&str, Vec<GeometryKind>)> = vec![
+        ("room", vec![room()]),
+        ("room with things", room_with_things()),
         ("mesh 100k", vec![mesh(224)]),
         ("mixed field 625", field(25, mixed)),
         ("sphere field 625", field(25, sphere)),
@@ -95,6 +116,7 @@ fn measure(name: &str, kinds: Vec<GeometryKind>, passes: usize) {
         };
         let figures =
             [1, 2].map(|threads| (speed(rays, threads, passes, closest), speed(rays, threads, passes, any)));
+        let many = speeds_of_many(&accel, rays, passes);
         let head = if i == 0 {
             let bytes = accel.memory_bytes() as f64 / count as f64;
             format!(
@@ -105,8 +127,12 @@ fn measure(name: &str, kinds: Vec<GeometryKind>, passes: usize) {
             format!("{:<56}", "")
         };
         println!(
-            "{head}  {work:<8} {:>9.2} {:>9.2} {:>9.2} {:>9.2}",
-            figures[0].0, figures[0].1, figures[1].0, figures[1].1
+            "{head}  {work:<8} {:>9.2} {:>7.2} {:>9.2} {:>7.2}{}",
+            figures[0].0,
+            figures[0].1,
+            figures[1].0,
+            figures[1].1,
+            many.map(|figure| format!(" {figure:>7.2}")).concat()
         );
     }
 }
@@ -128,15 +154,54 @@ fn speed(rays: &[Ray], threads: usize, passes: usize, query: impl Fn(&Ray) + Syn
     rays.len() as f64 / best / 1e6
 }
 
+/// Millions of rays a second in batches, as rays of a picture, and as those in double precision; closest hits, then any.
+fn speeds_of_many(accel: &Accel, rays: &[Ray], passes: usize) -> [f64; 6] {
+    const WAVE: usize = 4096;
+    let origin = [0, 1, 2].map(|axis| rays.iter().map(|ray| ray.origin[axis]).collect::<Vec<_>>());
+    let direction =
+        [0, 1, 2].map(|axis| rays.iter().map(|ray| ray.direction[axis] as f32).collect::<Vec<_>>());
+    let t_max: Vec<f32> = rays.iter().map(|ray| ray.t_max as f32).collect();
+    let (mut hits, mut are_hit) = (vec![None; WAVE], vec![false; WAVE]);
+    let (mut columns, mut occluded) = (HitColumns::default(), Vec::new());
+    let mut wave = |figure: usize, first: usize| {
+        let range = first..rays.len().min(first + WAVE);
+        let len = range.len();
+        let wave = RayColumns {
+            origin: [0, 1, 2].map(|axis| &origin[axis][range.clone()]),
+            direction: [0, 1, 2].map(|axis| &direction[axis][range.clone()]),
+            t_max: Some(&t_max[range.clone()]),
+            time: None,
+        };
+        match figure {
+            0 => accel.closest_batch(&rays[range], &mut hits[..len]),
+            1 => accel.any_batch(&rays[range], &mut are_hit[..len]),
+            2 | 4 => accel.closest_columns(&wave, figure == 4, &mut columns),
+            _ => accel.any_columns(&wave, figure == 5, &mut occluded),
+        }
+    };
+    [0, 1, 2, 3, 4, 5].map(|figure| {
+        let mut best = f64::INFINITY;
+        for _ in 0..passes {
+            let start = Instant::now();
+            (0..rays.len()).step_by(WAVE).for_each(|first| wave(figure, first));
+            best = best.min(start.elapsed().as_secs_f64());
+        }
+        rays.len() as f64 / best / 1e6
+    })
+}
+
 fn primary_rays(size: usize) -> Vec<Ray> {
     let eye = DVec3::new(9.0, 7.0, 14.0);
     let forward = (DVec3::new(0.0, 0.5, 0.0) - eye).normalize();
     let right = forward.cross(DVec3::Y).normalize();
     let up = right.cross(forward);
     let pixel = |i: usize| (i as f64 + 0.5) / size as f64 * 2.0 - 1.0;
-    (0..size * size)
-        .map(|i| Ray::new(eye, forward + 0.5 * (pixel(i % size) * right - pixel(i / size) * up)))
-        .collect()
+    let ray = |i: usize| {
+        let (square, inside) = (i / 16, i % 16);
+        let (x, y) = (square % (size / 4) * 4 + inside % 4, square / (size / 4) * 4 + inside / 4);
+        Ray::new(eye, forward + 0.5 * (pixel(x) * right - pixel(y) * up))
+    };
+    (0..size * size).map(ray).collect()
 }
 
 /// A bumpy sphere of 2 n² triangles, radius about 6.
@@ -163,6 +228,44 @@ fn mesh(n: u32) -> GeometryKind {
         }
     }
     GeometryKind::Mesh(Arc::new(TriangleMesh { origin: DVec3::ZERO, positions, indices }))
+}
+
+/// A closed room with two boxes in it, around the camera.
+fn room() -> GeometryKind {
+    let mut mesh = TriangleMesh::default();
+    let boxes = [
+        (DVec3::new(-8.0, -0.5, -8.0), DVec3::new(16.0, 12.0, 16.0)),
+        (DVec3::new(-4.0, -0.5, -3.0), DVec3::new(-0.5, 6.0, 1.0)),
+        (DVec3::new(1.0, -0.5, -1.0), DVec3::new(4.0, 2.5, 3.0)),
+    ];
+    for (low, high) in boxes {
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend((0..8).map(|i| {
+            let at = |axis: usize| if i >> axis & 1 == 0 { low[axis] } else { high[axis] };
+            DVec3::new(at(0), at(1), at(2)).as_vec3()
+        }));
+        let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        for [a, b, c, d] in quads.map(|quad| quad.map(|corner| first + corner)) {
+            mesh.indices.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    GeometryKind::Mesh(Arc::new(mesh))
+}
+
+/// The room, with a sphere, a torus and an instance of a mesh in it.
+fn room_with_things() -> Vec<GeometryKind> {
+    let sphere = Sphere::new(DVec3::new(2.5, 4.0, 1.0), 1.5).expect("a radius");
+    let torus = Torus::new(DVec3::new(5.0, 1.0, 5.0), DVec3::Y, 1.2, 0.4).expect("two radii");
+    let ball = vec![Geometry { id: 3, kind: mesh(60) }];
+    let accel = Arc::new(Accel::build(ball, &BuildOptions::default()).expect("a sound mesh"));
+    let place = Transform::translate(DVec3::new(-2.0, 8.0, 0.0))
+        * Transform::scale(DVec3::splat(0.3)).expect("a size");
+    vec![
+        room(),
+        GeometryKind::Shape(PlacedShape::new(sphere.into(), Transform::IDENTITY)),
+        GeometryKind::Shape(PlacedShape::new(torus.into(), Transform::IDENTITY)),
+        GeometryKind::Instance(Instance { accel, world_from_object: place.into() }),
+    ]
 }
 
 /// Things on a square of 18, in rows, and the ground under them.

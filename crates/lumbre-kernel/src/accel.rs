@@ -472,7 +472,7 @@ impl Accel {
     /// d |L⁻ᵀn| across the plane of the triangle in its own space, and Σ |mᵢ| (|L| e)ᵢ ≥ Σ |nᵢ| eᵢ / |L⁻ᵀn|: there, too, it is moved by
     /// 3.3 Σ |nᵢ| eᵢ or more.
     pub fn picture_rounding(&self) -> Option<PictureRounding> {
-        self.picture.as_ref().map(|picture| picture.rounding)
+        PictureStart::of(self).map(|picture| picture.rounding)
     }
 
     /// [`Accel::surface`] at a hit of [`Accel::closest_columns`], with an error by which rays of pictures that leave it by

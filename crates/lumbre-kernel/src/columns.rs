@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
-use lumbre_geometry::Ray;
+use lumbre_geometry::{Ray, Root};
 use lumbre_math::{DVec3, Vec3};
 
 use crate::intersect::filter_start::FilterStart;
+use crate::intersect::watertight::root;
 use crate::trace::Winner;
 use crate::trace::picture::Crossing;
 use crate::tree::node::{ROUNDOFF, round_up};
@@ -79,7 +80,19 @@ pub struct HitColumns {
     /// The position of the geometry in the list of the tree; with the bit [`WHOLE`], that of the hit among `whole`.
     geometry: Vec<u32>,
     /// Hits that the columns do not hold whole.
-    whole: Vec<Hit>,
+    whole: Vec<WholeHit>,
+}
+
+/// A hit in an instance of an instance, or any other.
+#[derive(Clone, Debug)]
+enum WholeHit {
+    /// With the position and the id of the instance.
+    Near {
+        winner: Winner,
+        id: u32,
+        instance: Option<(u32, u32)>,
+    },
+    Nested(Box<Hit>),
 }
 
 /// Marks a place among whole hits; with the other, one of a triangle of a mesh in the tree itself.
@@ -116,17 +129,14 @@ impl HitColumns {
             return None;
         }
         if geometry & WHOLE != 0 {
-            return Some(self.whole[(geometry & !(WHOLE | PLAIN)) as usize].clone());
+            return Some(match &self.whole[(geometry & !(WHOLE | PLAIN)) as usize] {
+                WholeHit::Nested(hit) => (**hit).clone(),
+                &WholeHit::Near { winner, id, instance } => hit(winner, id, instance),
+            });
         }
         let local = [self.local[0][i], self.local[1][i]].map(f64::from);
-        Some(Hit {
-            root: crate::intersect::watertight::root(self.t[i].into(), local.into()),
-            id,
-            primitive: self.primitive[i],
-            geometry,
-            instances: InstancePath::new(),
-            route: InstancePath::new(),
-        })
+        let root = root(self.t[i].into(), local.into());
+        Some(hit(Winner { root, geometry, primitive: self.primitive[i] }, id, None))
     }
 
     /// Makes room for the hits of so many rays, which are all misses until they are put.
@@ -162,31 +172,59 @@ impl HitColumns {
     /// A hit of a triangle in single precision, or of anything.
     #[inline(always)]
     pub(crate) fn put_crossing(&mut self, i: usize, accel: &Accel, crossing: Crossing) {
+        let Winner { root, geometry, primitive } = crossing.winner;
         if crossing.is_plain(accel) {
-            let Winner { root, geometry, primitive } = crossing.winner;
             let id = accel.geometries[geometry as usize].id;
             let local = [root.local.x as f32, root.local.y as f32];
             self.put_plain(i, (id, primitive, geometry), root.t as f32, local);
-        } else {
-            self.put_whole(i, accel, crossing.into_hit(accel));
+            return;
+        }
+        match crossing.placed(accel) {
+            Some((id, instance)) => self.put_near(i, crossing.winner, id, instance, false),
+            None => self.put_hit(i, accel, crossing.into_hit(accel)),
         }
     }
 
     /// A hit in double precision, outside of instances.
     #[inline(always)]
     pub(crate) fn put_winner(&mut self, i: usize, accel: &Accel, winner: Winner) {
-        self.put_whole(i, accel, winner.to_hit(accel));
+        let geometry = &accel.geometries[winner.geometry as usize];
+        self.put_near(i, winner, geometry.id, None, matches!(geometry.kind, GeometryKind::Mesh(_)));
     }
 
     /// A hit in double precision.
-    pub(crate) fn put_whole(&mut self, i: usize, accel: &Accel, hit: Hit) {
-        let is_plain = hit.route.is_empty()
-            && matches!(accel.geometries[hit.geometry as usize].kind, GeometryKind::Mesh(_));
-        let place = self.whole.len() as u32 | WHOLE | if is_plain { PLAIN } else { 0 };
-        let local = hit.root.local.as_vec2().to_array();
-        self.put_plain(i, (hit.id, hit.primitive, place), hit.root.t as f32, local);
-        self.whole.push(hit);
+    pub(crate) fn put_hit(&mut self, i: usize, accel: &Accel, hit: Hit) {
+        let Hit { root, id, primitive, geometry, .. } = hit;
+        if hit.route.is_empty() {
+            return self.put_winner(i, accel, Winner { root, geometry, primitive });
+        }
+        self.put_rounded(i, (id, primitive), &root, 0);
+        self.whole.push(WholeHit::Nested(Box::new(hit)));
     }
+
+    #[inline(always)]
+    fn put_near(&mut self, i: usize, winner: Winner, id: u32, instance: Option<(u32, u32)>, is_plain: bool) {
+        self.put_rounded(i, (id, winner.primitive), &winner.root, if is_plain { PLAIN } else { 0 });
+        self.whole.push(WholeHit::Near { winner, id, instance });
+    }
+
+    /// What the columns hold of the whole hit that is pushed next.
+    #[inline(always)]
+    fn put_rounded(&mut self, i: usize, (id, primitive): (u32, u32), root: &Root, mark: u32) {
+        let place = self.whole.len() as u32 | WHOLE | mark;
+        let local = [root.local.x as f32, root.local.y as f32];
+        self.put_plain(i, (id, primitive, place), root.t as f32, local);
+    }
+}
+
+/// A hit in no instance, or in one: by position and id.
+fn hit(Winner { root, geometry, primitive }: Winner, id: u32, instance: Option<(u32, u32)>) -> Hit {
+    let (mut instances, mut route) = (InstancePath::new(), InstancePath::new());
+    if let Some((position, id)) = instance {
+        route.push(position);
+        instances.push(id);
+    }
+    Hit { root, id, primitive, geometry, instances, route }
 }
 
 /// By how much rays of a picture are rounded, and triangles with them: see [`Accel::picture_rounding`].
@@ -218,20 +256,30 @@ pub(crate) struct PictureStart {
     /// How far a hit in the tree may be from its triangle, on each axis, as seen from a ray that comes to it as to an instance, and that
     /// was not rounded: see `trace::picture`.
     deviation: f64,
+    /// Whether there are triangles in single precision in the tree, or in its instances.
+    has_triangles: bool,
 }
 
 impl PictureStart {
+    /// That of a tree in which single precision is of use.
+    #[inline]
+    pub(crate) fn of(accel: &Accel) -> Option<&Self> {
+        accel.picture.as_ref().filter(|picture| picture.has_triangles)
+    }
+
     /// Of a tree that has this start; `None` where pictures take double precision: also where instances move.
     pub(crate) fn new(geometries: &[Geometry], start: Option<&FilterStart>) -> Option<Self> {
         let start = start?;
-        let mut within: f64 = 0.0;
+        let (mut within, mut has_triangles) = (0.0f64, false);
         for geometry in geometries {
+            has_triangles |= matches!(geometry.kind, GeometryKind::Mesh(_));
             let GeometryKind::Instance(instance) = &geometry.kind else { continue };
             let Placement::Still(map) = &instance.world_from_object else { return None };
             if let Some(picture) = &instance.accel.picture {
                 let linear = map.affine().matrix3;
                 let size = linear.x_axis.abs() + linear.y_axis.abs() + linear.z_axis.abs();
                 within = within.max(size.max_element() * picture.deviation);
+                has_triangles |= picture.has_triangles;
             }
         }
         let shift = start.shift.iter().fold(0.0f32, |most, shift| most.max(shift.abs()));
@@ -247,6 +295,7 @@ impl PictureStart {
             start: start.relative_to_mesh(round_up(room)),
             rounding,
             deviation: own.max(within),
+            has_triangles,
         })
     }
 

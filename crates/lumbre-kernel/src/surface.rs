@@ -8,6 +8,7 @@ use lumbre_math::rounding::{UNIT_ROUNDOFF, gamma};
 use lumbre_math::{DMat3, DVec2, DVec3, Transform, Vec3};
 use smallvec::SmallVec;
 
+use crate::columns::PictureStart;
 use crate::tree::sphere_block::ExactSphere;
 use crate::{Accel, GeometryKind, Hit, Instance, Target, TargetShape};
 
@@ -42,7 +43,7 @@ pub(crate) fn surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
 #[inline]
 pub(crate) fn picture_surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
     // Without one, all rays are in double precision, in instances, too.
-    if accel.picture.is_some() {
+    if PictureStart::of(accel).is_some() {
         placed_surface::<true>(accel, ray, hit)
     } else {
         placed_surface::<false>(accel, ray, hit)

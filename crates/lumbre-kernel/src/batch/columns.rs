@@ -8,8 +8,10 @@ use std::marker::PhantomData;
 
 use lumbre_geometry::Ray;
 
-use super::{AnyHit, Batch, ClosestHit, F32, Plan, Sink, batch_f64};
+use super::f32_packet::{F32Bundle, PictureRay};
+use super::{AnyHit, Batch, ClosestHit, F32, Plan, Precision, Sink, batch_f64};
 use crate::columns::PictureStart;
+use crate::intersect::filter_start::FilterStart;
 use crate::intersect::{Dispatch, Isa, Simd};
 use crate::simd;
 use crate::trace::decide::Decider;
@@ -27,7 +29,7 @@ const PIECE: usize = 4096;
 pub(crate) fn closest(isa: Isa, accel: &Accel, rays: &RayColumns, exact: bool, hits: &mut HitColumns) {
     rays.check();
     hits.clear(rays.len());
-    match &accel.picture {
+    match PictureStart::of(accel) {
         Some(picture) if !exact => {
             let answer = &mut Closest { accel, isa, rays, hits };
             traverse_f32::<ClosestHit, _>(isa, accel, picture, rays, answer);
@@ -38,7 +40,7 @@ pub(crate) fn closest(isa: Isa, accel: &Accel, rays: &RayColumns, exact: bool, h
                 let closest = accel.queries_at(isa).closest;
                 for (i, ray) in rays.iter().enumerate() {
                     if let Some(hit) = closest.ask(accel, ray) {
-                        hits.put_whole(first + i, accel, hit);
+                        hits.put_hit(first + i, accel, hit);
                     }
                 }
             }
@@ -51,7 +53,7 @@ pub(crate) fn any(isa: Isa, accel: &Accel, rays: &RayColumns, exact: bool, occlu
     rays.check();
     occluded.clear();
     occluded.resize(rays.len(), false);
-    match &accel.picture {
+    match PictureStart::of(accel) {
         Some(picture) if !exact => {
             let answer = &mut Any { accel, isa, rays, occluded };
             traverse_f32::<AnyHit, _>(isa, accel, picture, rays, answer);
@@ -80,77 +82,112 @@ fn traverse_f32<G: Goal, A: Answer>(
     columns: &RayColumns,
     answer: &mut A,
 ) {
-    let mut rays = Vec::with_capacity(columns.len().min(PIECE));
-    for first in (0..columns.len()).step_by(PIECE) {
-        rays.clear();
-        picture.push_rays(columns, first..columns.len().min(first + PIECE), &mut rays);
-        let (start, rays) = (&picture.start, &rays[..]);
-        if !start.only_triangles {
-            isa.run(InAnything::<G, A> { accel, picture, columns, rays, first, answer, goal: PhantomData });
-            continue;
-        }
-        let sink = &mut F32Sink { accel, isa, start: picture, rays, first, answer };
-        if super::batched(isa, accel).is_some() {
-            isa.run_with_vectors(Batch::<F32<G>, _> {
-                accel,
-                start,
-                rays,
-                sink,
-                plan: Plan::of_picture(accel),
-            });
+    let start = &picture.start;
+    let piece = if start.only_triangles { PIECE } else { PIECE / 4 };
+    let (mut alone, mut both) = (Vec::new(), Vec::new());
+    for first in (0..columns.len()).step_by(piece) {
+        let range = first..columns.len().min(first + piece);
+        if start.only_triangles {
+            alone.clear();
+            picture.push_rays(columns, range, &mut alone);
+            let rays = &alone[..];
+            let sink = &mut F32Sink { accel, isa, start: picture, rays, first, answer };
+            batch::<F32<G>, _>(isa, accel, start, rays, sink, Plan::of_picture(accel));
         } else {
-            isa.run(OneByOne::<G, _> { accel, picture, rays, sink, goal: PhantomData });
+            both.clear();
+            both.extend(range.map(|i| PictureRay { local: picture.local(columns, i), ray: columns.ray(i) }));
+            let sink = &mut PictureSink { first, answer };
+            batch::<Picture<G>, _>(isa, accel, start, &both, sink, Plan::SINGLES);
         }
+    }
+}
+
+/// Rays in packets, or one after the other where there are none.
+fn batch<P: Precision, S: Sink<P::Answer>>(
+    isa: Isa,
+    accel: &Accel,
+    start: &FilterStart,
+    rays: &[P::Ray],
+    sink: &mut S,
+    plan: Plan,
+) {
+    if super::batched(isa, accel).is_some() {
+        isa.run_with_vectors(Batch::<P, S> { accel, start, rays, sink, plan });
+    } else {
+        isa.run(OneByOne::<P, S> { accel, start, rays, sink });
     }
 }
 
 /// Rays one after the other, where there are no packets.
-struct OneByOne<'a, G, S> {
+struct OneByOne<'a, P: Precision, S> {
     accel: &'a Accel,
-    picture: &'a PictureStart,
-    rays: &'a [Ray32],
+    start: &'a FilterStart,
+    rays: &'a [P::Ray],
     sink: &'a mut S,
-    goal: PhantomData<G>,
 }
 
-impl<G: Goal, S: Sink<Option<Hit32>>> Dispatch for OneByOne<'_, G, S> {
+impl<P: Precision, S: Sink<P::Answer>> Dispatch for OneByOne<'_, P, S> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Simd>(self) {
-        let decider = &Decider::new(self.accel, &self.picture.start);
+        let decider = &Decider::new(self.accel, self.start);
         for (i, ray) in self.rays.iter().enumerate() {
-            self.sink.put(i, f32_ray::traverse::<G, L>(decider, simd::opaque(ray)));
+            self.sink.put(i, P::traverse_alone::<L>(decider, simd::opaque(ray)));
         }
     }
 }
 
-/// Rays one after the other, in a tree of anything.
-struct InAnything<'a, G, A> {
-    accel: &'a Accel,
-    picture: &'a PictureStart,
-    columns: &'a RayColumns<'a>,
-    rays: &'a [Ray32],
-    first: usize,
-    answer: &'a mut A,
-    goal: PhantomData<G>,
-}
+/// Single precision in trees of anything.
+struct Picture<G>(PhantomData<G>);
 
-impl<G: Goal, A: Answer> Dispatch for InAnything<'_, G, A> {
-    type Output = ();
+impl<G: Goal> Precision for Picture<G> {
+    type Goal = G;
+    type Ray = PictureRay;
+    type Answer = Option<Crossing>;
+    type Bundle<'a, 'd>
+        = F32Bundle<'a, 'd, G, PictureRay>
+    where
+        'a: 'd;
+    const PREFETCHES_RAYS: bool = false;
 
     #[inline(always)]
-    fn run<L: Simd>(self) {
-        let Self { accel, picture, columns, rays, first, answer, .. } = self;
-        for (i, ray) in rays.iter().enumerate() {
-            let position = first + i;
-            let (local, ray) = (LocalRay::new(*simd::opaque(ray)), &columns.ray(position));
-            let search = Search { accel, picture, from: Start::WHOLE, ray, local, limit: ray.t_max };
-            match search.run::<G, L, true>() {
-                Outcome::Certain(None) => {}
-                Outcome::Certain(Some(crossing)) => answer.put_crossing(position, crossing),
-                Outcome::Uncertain => answer.put_exactly(position),
-            }
+    fn traverse_alone<L: Simd>(decider: &Decider, ray: &PictureRay) -> Outcome<Option<Crossing>> {
+        let accel = decider.accel();
+        let Some(picture) = &accel.picture else { return Outcome::Uncertain };
+        let PictureRay { local, ray } = ray;
+        let (local, limit) = (LocalRay::new(*simd::opaque(local)), ray.t_max);
+        Search { accel, picture, from: Start::WHOLE, ray, local, limit }.run::<G, L, true>()
+    }
+
+    // Leaves of anything but triangles keep single rays busy.
+    #[inline(always)]
+    fn interleave<L: Simd>(
+        decider: &Decider,
+        _: bool,
+        rays: &[PictureRay],
+        positions: &[usize],
+        sink: &mut impl Sink<Option<Crossing>>,
+    ) {
+        for &i in positions {
+            sink.put(i, Self::traverse_alone::<L>(decider, simd::opaque(&rays[i])));
+        }
+    }
+}
+
+/// The answers of a piece in a tree of anything.
+struct PictureSink<'a, A> {
+    first: usize,
+    answer: &'a mut A,
+}
+
+impl<A: Answer> Sink<Option<Crossing>> for PictureSink<'_, A> {
+    #[inline(always)]
+    fn put(&mut self, position: usize, outcome: Outcome<Option<Crossing>>) {
+        match outcome {
+            Outcome::Certain(None) => {}
+            Outcome::Certain(Some(crossing)) => self.answer.put_crossing(self.first + position, crossing),
+            Outcome::Uncertain => self.answer.put_exactly(self.first + position),
         }
     }
 }
@@ -242,7 +279,7 @@ impl Answer for Closest<'_> {
     fn put_exactly(&mut self, position: usize) {
         let closest = self.accel.queries_at(self.isa).closest;
         if let Some(hit) = closest.ask(self.accel, &self.rays.ray(position)) {
-            self.hits.put_whole(position, self.accel, hit);
+            self.hits.put_hit(position, self.accel, hit);
         }
     }
 }
@@ -297,7 +334,7 @@ impl Sink<Found> for F64Closest<'_> {
             Outcome::Uncertain => exact::closest(self.isa, self.accel, &self.rays[position], None),
         };
         if let Some(hit) = hit {
-            self.hits.put_whole(self.first + position, self.accel, hit);
+            self.hits.put_hit(self.first + position, self.accel, hit);
         }
     }
 }

@@ -7,15 +7,18 @@
 
 use std::marker::PhantomData;
 
+use lumbre_geometry::Ray;
+
 use super::Sink;
 use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, Start, State};
 use crate::intersect::box_ray::SlabRows;
 use crate::intersect::f32_ray::{F32Ray, within};
 use crate::intersect::watertight::{BEYOND, beyond};
-use crate::intersect::{Axes, Simd};
+use crate::intersect::{Axes, Dispatch, Simd};
 use crate::simd::{self, F32x16, Row, Vector};
 use crate::trace::decide::Decider;
 use crate::trace::f32_ray::SOME_HIT;
+use crate::trace::picture::{Crossing, LocalRay, Others};
 use crate::trace::stack::Goal;
 use crate::trace::{Outcome, precedes};
 use crate::tree::Corners;
@@ -23,8 +26,39 @@ use crate::tree::node::TreeSpace;
 use crate::tree::triangle_block::TriangleBlock;
 use crate::{Hit32, Ray32};
 
+/// A ray of a packet: alone, in trees of triangles, or with the same ray in double precision, in trees of anything.
+pub(super) trait PacketRay: Sized + 'static {
+    type Answer;
+    /// Whether the tree has leaves of anything but triangles.
+    const GENERAL: bool;
+
+    /// In single precision.
+    fn local(&self) -> &Ray32;
+
+    /// In double precision, for leaves of anything but triangles.
+    fn in_f64(&self) -> Option<&Ray>;
+
+    /// Hands out the answers of a packet's rays: see [`Bundle::put`].
+    fn put<G: Goal, L: Simd>(
+        bundle: &mut F32Bundle<'_, '_, G, Self>,
+        state: &State,
+        rays: &[Self; PACKET],
+        first: usize,
+        sink: &mut impl Sink<Self::Answer>,
+    );
+}
+
+/// A ray of a picture in a tree of anything.
+#[derive(Clone, Copy)]
+pub(super) struct PictureRay {
+    /// Relative to the mesh, and rounded.
+    pub(super) local: Ray32,
+    /// As it is.
+    pub(super) ray: Ray,
+}
+
 /// The rays of a packet.
-pub(super) struct F32Bundle<'a, 'd, G> {
+pub(super) struct F32Bundle<'a, 'd, G, R> {
     decider: &'d Decider<'a>,
     /// The rays, number by number: origin (relative to the mesh once they have started), first `t`, direction, last `t`.
     rows: [Row<f32>; 8],
@@ -41,13 +75,16 @@ pub(super) struct F32Bundle<'a, 'd, G> {
     /// Its weights: of the second and the third corner, and of all.
     weights: [Row<f32>; 3],
     has_one_origin: bool,
-    goal: PhantomData<G>,
+    /// What each meets of anything but triangles, once they have come to something else.
+    others: Vec<Others<'a>>,
+    others_started: bool,
+    goal: PhantomData<(G, R)>,
 }
 
 /// No triangle.
 const NONE: u32 = u32::MAX;
 
-impl<G: Goal> F32Bundle<'_, '_, G> {
+impl<G: Goal, R: PacketRay> F32Bundle<'_, '_, G, R> {
     /// Those of some rays for which a triangle that they hit at the same `t` as the best comes before it. `enters` has a bit for each
     /// ray that enters through it.
     #[cold]
@@ -65,6 +102,40 @@ impl<G: Goal> F32Bundle<'_, '_, G> {
             first |= u32::from(is_first) << i;
         }
         first
+    }
+
+    /// Tests a leaf of anything but triangles, or what has no bounds, ray by ray.
+    #[inline(always)]
+    fn test_others<L: Simd>(&mut self, state: &mut State, leaf: Option<u32>, rays: &[R; PACKET]) {
+        if !self.others_started {
+            self.others_started = true;
+            self.others.clear();
+            for ray in rays {
+                let limit = ray.in_f64().map_or(f64::NEG_INFINITY, |ray| ray.t_max);
+                self.others.push(Others::new(self.decider.accel(), limit));
+            }
+        }
+        let mut alive = state.alive;
+        while alive != 0 {
+            let i = alive.trailing_zeros() as usize % PACKET;
+            alive &= alive - 1;
+            let (Some(ray), Some(others)) = (rays[i].in_f64(), self.others.get_mut(i)) else { continue };
+            let local = LocalRay::new(*rays[i].local());
+            if !G::IS_ANY {
+                others.shorten(local.t(self.t_max.0[i]));
+            }
+            let (is_met, nearer) = others.test::<G, L>(leaf, ray);
+            if is_met {
+                state.stop_at_hits(1 << i);
+            } else if let Some(t) = nearer {
+                let end = local.end(t);
+                if end < self.t_max.0[i] {
+                    self.t_max.0[i] = end;
+                    state.slabs.s_max.0[i] = beyond(end);
+                }
+            }
+        }
+        state.end_frustum();
     }
 
     /// One of the rays among triangles.
@@ -105,11 +176,28 @@ impl<G: Goal> F32Bundle<'_, '_, G> {
     }
 }
 
-impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
+/// [`F32Bundle::test_others`] out of line: it is long, and its calls are few.
+struct TestOthers<'s, 'a, 'd, G, R> {
+    bundle: &'s mut F32Bundle<'a, 'd, G, R>,
+    state: &'s mut State,
+    leaf: Option<u32>,
+    rays: &'s [R; PACKET],
+}
+
+impl<G: Goal, R: PacketRay> Dispatch for TestOthers<'_, '_, '_, G, R> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Simd>(self) {
+        self.bundle.test_others::<L>(self.state, self.leaf, self.rays);
+    }
+}
+
+impl<'a, 'd, G: Goal, R: PacketRay> Bundle<'a, 'd> for F32Bundle<'a, 'd, G, R> {
     type Goal = G;
-    type Ray = Ray32;
-    type Answer = Option<Hit32>;
-    const GENERAL: bool = false;
+    type Ray = R;
+    type Answer = R::Answer;
+    const GENERAL: bool = R::GENERAL;
     const NEEDS_BOUNDS: bool = false;
     const MOST_SPREAD: f32 = 0.3;
 
@@ -128,23 +216,32 @@ impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
             triangle: row,
             weights: [row; 3],
             has_one_origin: false,
+            others: Vec::new(),
+            others_started: false,
             goal: PhantomData,
         }
     }
 
-    // Less than in double precision, since interleaved rays are faster.
+    // Less than in double precision, since single rays are faster; as much where there is anything but triangles.
     #[inline(always)]
     fn effort(has_one_origin: bool) -> Effort {
-        match (has_one_origin, G::IS_ANY) {
-            (true, true) => Effort { most: 112, paying: 70 },
-            (true, false) => Effort { most: 210, paying: 84 },
-            (false, _) => Effort { most: 50, paying: 40 },
+        match (R::GENERAL, has_one_origin, G::IS_ANY) {
+            (false, true, true) => Effort { most: 112, paying: 70 },
+            (false, true, false) => Effort { most: 210, paying: 84 },
+            (false, false, _) => Effort { most: 50, paying: 40 },
+            (true, _, true) => Effort { most: 600, paying: 400 },
+            (true, _, false) => Effort { most: 800, paying: 400 },
         }
     }
 
     #[inline(always)]
-    fn load<L: Simd>(&mut self, rays: &[Ray32; PACKET]) {
-        L::f32_rows(rays, &mut self.rows);
+    fn load<L: Simd>(&mut self, rays: &[R; PACKET]) {
+        // No closures: they do not inherit target features.
+        let mut local = [*rays[0].local(); PACKET];
+        for (local, ray) in local.iter_mut().zip(rays) {
+            *local = *ray.local();
+        }
+        L::f32_rows(&local, &mut self.rows);
     }
 
     #[inline(always)]
@@ -254,6 +351,7 @@ impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
         }
         cull.apart[2] = if self.has_one_origin { 0.0 } else { off[2].abs().most() };
         (self.t_min, self.t_max, self.axes) = (self.rows[3], self.rows[7], axes);
+        self.others_started = false;
         splat(f32::from_bits(NONE)).store(&mut self.triangle);
     }
 
@@ -265,7 +363,7 @@ impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
         (place, block, corners): (u32, &TriangleBlock, &Corners),
         lane: usize,
         _: &CullBounds,
-        _: &[Ray32; PACKET],
+        _: &[R; PACKET],
     ) {
         let own = simd::opaque(self);
         let (load, splat) = (L::F32x16::load, L::F32x16::splat);
@@ -325,32 +423,69 @@ impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
     }
 
     #[inline(always)]
+    fn test_infinite<L: Simd>(&mut self, state: &mut State, rays: &[R; PACKET]) {
+        L::isa().run(TestOthers { bundle: self, state, leaf: None, rays });
+    }
+
+    #[inline(always)]
+    fn test_leaf<L: Simd>(&mut self, state: &mut State, leaf: u32, rays: &[R; PACKET]) {
+        L::isa().run(TestOthers { bundle: self, state, leaf: Some(leaf), rays });
+    }
+
+    #[inline(always)]
     fn put<L: Simd>(
         &mut self,
-        decider: &Decider,
+        _: &Decider,
         state: &State,
-        _: &[Ray32; PACKET],
+        rays: &[R; PACKET],
+        first: usize,
+        sink: &mut impl Sink<R::Answer>,
+    ) {
+        R::put::<G, L>(self, state, rays, first, sink);
+    }
+}
+
+impl PacketRay for Ray32 {
+    type Answer = Option<Hit32>;
+    const GENERAL: bool = false;
+
+    #[inline(always)]
+    fn local(&self) -> &Ray32 {
+        self
+    }
+
+    #[inline(always)]
+    fn in_f64(&self) -> Option<&Ray> {
+        None
+    }
+
+    #[inline(always)]
+    fn put<G: Goal, L: Simd>(
+        bundle: &mut F32Bundle<'_, '_, G, Self>,
+        state: &State,
+        _: &[Self; PACKET],
         first: usize,
         sink: &mut impl Sink<Option<Hit32>>,
     ) {
+        let decider = bundle.decider;
         if G::IS_ANY {
             return put_chosen(state.chosen, first, |i| (state.met >> i & 1 != 0).then_some(SOME_HIT), sink);
         }
         let load = L::F32x16::load;
-        let triangle = load(&self.triangle.0);
+        let triangle = load(&bundle.triangle.0);
         let hits = if state.is_among_triangles { state.chosen & !triangle.with_bits(NONE) } else { 0 };
         let row = Row::of(0.0);
         let (mut local, mut id, mut primitive, mut geometry) = ([row; 2], row, row, row);
         if hits != 0 {
-            let det = load(&self.weights[2].0);
-            for (local, weight) in local.iter_mut().zip(&self.weights) {
+            let det = load(&bundle.weights[2].0);
+            for (local, weight) in local.iter_mut().zip(&bundle.weights) {
                 load(&weight.0).over(det).store(local);
             }
             let mut ids = [L::F32x16::splat(0.0); 3];
             let mut rest = hits;
             while rest != 0 {
                 // Many may have hit the same.
-                let own = self.triangle.0[rest.trailing_zeros() as usize % PACKET].to_bits();
+                let own = bundle.triangle.0[rest.trailing_zeros() as usize % PACKET].to_bits();
                 let with_this = triangle.with_bits(own);
                 rest &= !with_this;
                 let (geometry, primitive) = decider.ids(own >> 3, own & 7);
@@ -364,7 +499,7 @@ impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
             ids[2].store(&mut geometry);
         }
         let hit = |i: usize| Hit32 {
-            t: self.t_max.0[i],
+            t: bundle.t_max.0[i],
             local: [local[0].0[i], local[1].0[i]],
             id: id.0[i].to_bits(),
             primitive: primitive.0[i].to_bits(),
@@ -375,6 +510,55 @@ impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
             sink.put_row(first, |i| Some(hit(i)));
         } else {
             put_chosen(state.chosen, first, |i| (hits >> i & 1 != 0).then(|| hit(i)), sink);
+        }
+    }
+}
+
+impl PacketRay for PictureRay {
+    type Answer = Option<Crossing>;
+    const GENERAL: bool = true;
+
+    #[inline(always)]
+    fn local(&self) -> &Ray32 {
+        &self.local
+    }
+
+    #[inline(always)]
+    fn in_f64(&self) -> Option<&Ray> {
+        Some(&self.ray)
+    }
+
+    #[inline(always)]
+    fn put<G: Goal, L: Simd>(
+        bundle: &mut F32Bundle<'_, '_, G, Self>,
+        state: &State,
+        rays: &[Self; PACKET],
+        first: usize,
+        sink: &mut impl Sink<Option<Crossing>>,
+    ) {
+        let decider = bundle.decider;
+        let mut rest = state.chosen;
+        while rest != 0 {
+            let i = rest.trailing_zeros() as usize % PACKET;
+            rest &= rest - 1;
+            if G::IS_ANY {
+                let answer = if state.met >> i & 1 != 0 { Some(Crossing::some()) } else { None };
+                sink.put(first + i, Outcome::Certain(answer));
+                continue;
+            }
+            let (ray, triangle) = (&rays[i].ray, bundle.triangle.0[i].to_bits());
+            let mut answer = None;
+            if state.is_among_triangles && triangle != NONE {
+                let [v, w, det] = [0, 1, 2].map(|corner| bundle.weights[corner].0[i]);
+                let t = LocalRay::new(rays[i].local).t(bundle.t_max.0[i]);
+                let ids = decider.ids(triangle >> 3, triangle & 7);
+                answer = Some(Crossing::on_triangle(ids, t, [v / det, w / det], det > 0.0, ray));
+            }
+            if state.is_among_triangles && bundle.others_started {
+                let other = bundle.others[i].nearest.take();
+                answer = Crossing::nearer(answer, other, decider.accel(), ray);
+            }
+            sink.put(first + i, Outcome::Certain(answer));
         }
     }
 }

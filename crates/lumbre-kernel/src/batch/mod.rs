@@ -22,7 +22,6 @@ use self::f32_packet::F32Bundle;
 use self::f32_slot::F32Slot;
 use self::f64_packet::F64Bundle;
 use self::f64_slot::F64Slot;
-use self::interleaved::RaySlot;
 use self::packet::{Bundle, PACKET, Packet};
 use crate::intersect::filter_start::FilterStart;
 use crate::intersect::{Dispatch, Isa, Simd};
@@ -282,10 +281,16 @@ impl Plan {
     /// What goes in no packet goes alone.
     const SINGLES: Self = Self { least: usize::MAX, prefetches: false, has_packets: true };
 
-    /// The fastest for rays of a picture: of those of single precision, the incoherent ones are faster alone where the tree stays in the
-    /// caches.
+    /// The fastest for rays of a picture, incoherent ones of which are faster alone where the tree stays in the caches.
     fn of_picture(accel: &Accel) -> Self {
-        if Self::bytes(accel) >= FAR { Self::FAR } else { Self::SINGLES }
+        let bytes = Self::bytes(accel);
+        if bytes >= FAR {
+            Self::FAR
+        } else if bytes >= 4 * NEAR {
+            Self::MIDDLE
+        } else {
+            Self::SINGLES
+        }
     }
 
     /// Those of a tree that rays read.
@@ -314,14 +319,20 @@ trait Precision {
     type Bundle<'a, 'd>: Bundle<'a, 'd, Ray = Self::Ray, Answer = Self::Answer>
     where
         'a: 'd;
-    type Slot<'a, 'd, L: Simd>: RaySlot<'a, 'd, L, Ray = Self::Ray, Answer = Self::Answer>
-    where
-        'a: 'd;
     /// Whether the rays of packets are prefetched.
     const PREFETCHES_RAYS: bool;
 
     /// Traverses the tree with one ray.
     fn traverse_alone<L: Simd>(decider: &Decider, ray: &Self::Ray) -> Outcome<Self::Answer>;
+
+    /// Traverses the tree with those of the rays that have these positions, interleaved.
+    fn interleave<L: Simd>(
+        decider: &Decider,
+        prefetches: bool,
+        rays: &[Self::Ray],
+        positions: &[usize],
+        sink: &mut impl Sink<Self::Answer>,
+    );
 }
 
 /// Double precision; `GENERAL` in trees of anything among triangles.
@@ -335,16 +346,23 @@ impl<G: FilteredGoal, const GENERAL: bool> Precision for F64<G, GENERAL> {
         = F64Bundle<'a, 'd, G, GENERAL>
     where
         'a: 'd;
-    type Slot<'a, 'd, L: Simd>
-        = F64Slot<'a, 'd, G, GENERAL>
-    where
-        'a: 'd;
     // Where any hit will do, nothing else keeps the memory busy, and the caches foresee it.
     const PREFETCHES_RAYS: bool = !G::IS_ANY;
 
     #[inline(always)]
     fn traverse_alone<L: Simd>(decider: &Decider, ray: &Ray) -> Outcome<G::Found> {
         Traversal::<G, GENERAL, false>::whole(decider.accel(), decider.start, ray).run::<L>()
+    }
+
+    #[inline(always)]
+    fn interleave<L: Simd>(
+        decider: &Decider,
+        prefetches: bool,
+        rays: &[Ray],
+        positions: &[usize],
+        sink: &mut impl Sink<G::Found>,
+    ) {
+        interleaved::traverse::<F64Slot<'_, '_, G, GENERAL>, L>(decider, prefetches, rays, positions, sink);
     }
 }
 
@@ -356,11 +374,7 @@ impl<G: Goal> Precision for F32<G> {
     type Ray = Ray32;
     type Answer = Option<Hit32>;
     type Bundle<'a, 'd>
-        = F32Bundle<'a, 'd, G>
-    where
-        'a: 'd;
-    type Slot<'a, 'd, L: Simd>
-        = F32Slot<'a, 'd, G>
+        = F32Bundle<'a, 'd, G, Ray32>
     where
         'a: 'd;
     const PREFETCHES_RAYS: bool = true;
@@ -368,6 +382,17 @@ impl<G: Goal> Precision for F32<G> {
     #[inline(always)]
     fn traverse_alone<L: Simd>(decider: &Decider, ray: &Ray32) -> Outcome<Option<Hit32>> {
         f32_ray::traverse::<G, L>(decider, ray)
+    }
+
+    #[inline(always)]
+    fn interleave<L: Simd>(
+        decider: &Decider,
+        prefetches: bool,
+        rays: &[Ray32],
+        positions: &[usize],
+        sink: &mut impl Sink<Option<Hit32>>,
+    ) {
+        interleaved::traverse::<F32Slot<'_, '_, G>, L>(decider, prefetches, rays, positions, sink);
     }
 }
 
@@ -464,7 +489,7 @@ impl<P: Precision, S: Sink<P::Answer>> Dispatch for Batch<'_, '_, P, S> {
                     sink.put(i, P::traverse_alone::<L>(decider, simd::opaque(&rays[i])));
                 }
             } else {
-                interleaved::traverse::<P::Slot<'_, '_, L>, L>(decider, plan.prefetches, rays, &others, sink);
+                P::interleave::<L>(decider, plan.prefetches, rays, &others, sink);
             }
             others.clear();
         }

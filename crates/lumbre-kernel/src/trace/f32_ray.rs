@@ -36,7 +36,6 @@
 //! the tree.
 
 use bytemuck::Zeroable;
-use lumbre_math::DVec2;
 
 use super::cursor::NodeCursor;
 use super::decide::Decider;
@@ -250,11 +249,10 @@ impl Nearest {
 
     /// Geometry and primitive, the barycentrics, and whether the ray enters there, if there is one.
     #[inline(always)]
-    pub(super) fn crossing(&self, decider: &Decider) -> Option<(u32, u32, DVec2, bool)> {
+    pub(super) fn crossing(&self, decider: &Decider) -> Option<((u32, u32), [f32; 2], bool)> {
         let (block, lane) = self.triangle()?;
-        let (geometry, primitive) = decider.ids(block, lane);
         let [v, w, det] = self.weights;
-        Some((geometry, primitive, DVec2::new((v / det).into(), (w / det).into()), det > 0.0))
+        Some((decider.ids(block, lane), [v / det, w / det], det > 0.0))
     }
 
     /// As a hit at this `t`, if there is one.

@@ -23,7 +23,7 @@
 //! `slop` of double precision.
 
 use lumbre_geometry::{Ray, Root};
-use lumbre_math::DVec3;
+use lumbre_math::{DVec2, DVec3};
 
 use super::cursor::NodeCursor;
 use super::decide::{Decider, enters, largest_component};
@@ -66,8 +66,37 @@ pub(crate) struct Crossing {
 }
 
 impl Crossing {
+    /// On a triangle of the tree, by geometry and primitive.
+    #[inline(always)]
+    pub(crate) fn on_triangle(
+        (geometry, primitive): (u32, u32),
+        t: f64,
+        [u, v]: [f32; 2],
+        enters: bool,
+        ray: &Ray,
+    ) -> Self {
+        // What was rounded beyond the end is in range.
+        let t = if t < ray.t_max { t } else { ray.t_max };
+        let root = watertight::root(t, DVec2::new(u.into(), v.into()));
+        Self::of(Winner { root, geometry, primitive }, Some(enters))
+    }
+
+    /// Which of two comes first.
+    #[inline(always)]
+    pub(crate) fn nearer(one: Option<Self>, other: Option<Self>, accel: &Accel, ray: &Ray) -> Option<Self> {
+        match (one, other) {
+            (Some(one), Some(other)) => {
+                let (t, other_t) = (one.winner.root.t, other.winner.root.t);
+                let is_first = t < other_t || t == other_t && one.precedes(&other, accel, ray);
+                Some(if is_first { one } else { other })
+            }
+            (one, None) => one,
+            (None, other) => other,
+        }
+    }
+
     /// Stands for any hit.
-    fn some() -> Self {
+    pub(crate) fn some() -> Self {
         Self::of(Winner { root: Root::at(0.0), geometry: 0, primitive: 0 }, None)
     }
 
@@ -82,6 +111,20 @@ impl Crossing {
     pub(crate) fn is_plain(&self, accel: &Accel) -> bool {
         self.instance.is_none()
             && matches!(accel.geometries[self.winner.geometry as usize].kind, GeometryKind::Mesh(_))
+    }
+
+    /// The id of the geometry, and position and id of the instance that it is in; `None` where it is in more than one.
+    #[inline(always)]
+    pub(crate) fn placed(&self, accel: &Accel) -> Option<(u32, Option<(u32, u32)>)> {
+        let geometry = self.winner.geometry as usize;
+        let Some(position) = self.instance else { return Some((accel.geometries[geometry].id, None)) };
+        let placed = &accel.geometries[position as usize];
+        match &placed.kind {
+            GeometryKind::Instance(instance) if self.nested.is_none() => {
+                Some((instance.accel.geometries[geometry].id, Some((position, placed.id))))
+            }
+            _ => None,
+        }
     }
 
     /// As a hit of the tree.
@@ -133,13 +176,13 @@ impl LocalRay {
     }
 
     #[inline(always)]
-    fn t(&self, t: f32) -> f64 {
+    pub(crate) fn t(&self, t: f32) -> f64 {
         self.zero + self.factor * f64::from(t)
     }
 
     /// More than every `t` of it that is not beyond this one.
     #[inline(always)]
-    fn end(&self, t: f64) -> f32 {
+    pub(crate) fn end(&self, t: f64) -> f32 {
         // What the difference may lose.
         const LOST: f64 = 8.0 * f64::EPSILON;
         let t = (t - self.zero + LOST * self.zero) / self.factor;
@@ -199,10 +242,9 @@ fn power_of_two_over(size: f64) -> f64 {
 }
 
 /// What a ray meets of anything but the tree's own triangles in single precision.
-struct Others<'a, 'r> {
+pub(crate) struct Others<'a> {
     accel: &'a Accel,
-    ray: &'r Ray,
-    nearest: Option<Crossing>,
+    pub(crate) nearest: Option<Crossing>,
     /// What is beyond this is not wanted.
     limit: f64,
     /// For shapes, once the ray has come to some.
@@ -211,16 +253,39 @@ struct Others<'a, 'r> {
     cloud: Option<CloudRay>,
 }
 
-impl<'a> Others<'a, '_> {
+impl<'a> Others<'a> {
+    #[inline(always)]
+    pub(crate) fn new(accel: &'a Accel, limit: f64) -> Self {
+        Self { accel, nearest: None, limit, bounding_volumes: None, cloud: None }
+    }
+
+    /// Leaves out what is beyond this.
+    #[inline(always)]
+    pub(crate) fn shorten(&mut self, limit: f64) {
+        self.limit = if limit < self.limit { limit } else { self.limit };
+    }
+
+    /// Tests a leaf, or what has no bounds; whether any hit will do, and there is one. Else, where something nearer was met, the ray
+    /// ends there.
+    #[inline(always)]
+    pub(crate) fn test<G: Goal, L: Simd>(&mut self, leaf: Option<u32>, ray: &Ray) -> (bool, Option<f64>) {
+        let limit = self.limit;
+        let is_met = match leaf {
+            Some(leaf) => self.test_leaf::<G, L>(leaf, ray),
+            None => self.test_infinite::<G, L>(ray),
+        };
+        (is_met, (!G::IS_ANY && self.limit < limit).then_some(self.limit))
+    }
+
     /// Takes a crossing that is in range, if it is the nearest.
     #[inline(always)]
-    fn offer(&mut self, crossing: Crossing) {
+    fn offer(&mut self, crossing: Crossing, ray: &Ray) {
         let t = crossing.winner.root.t;
         if !(t <= self.limit) {
             return;
         }
         let is_first = match &self.nearest {
-            Some(nearest) if nearest.winner.root.t == t => crossing.precedes(nearest, self.accel, self.ray),
+            Some(nearest) if nearest.winner.root.t == t => crossing.precedes(nearest, self.accel, ray),
             nearest => nearest.as_ref().is_none_or(|nearest| t < nearest.winner.root.t),
         };
         if is_first {
@@ -231,52 +296,56 @@ impl<'a> Others<'a, '_> {
 
     /// Tests a leaf; whether any hit will do, and there is one.
     #[inline(always)]
-    fn test_leaf<G: Goal, L: Simd>(&mut self, leaf: u32) -> bool {
+    fn test_leaf<G: Goal, L: Simd>(&mut self, leaf: u32, ray: &Ray) -> bool {
         match tag::of(leaf) {
-            tag::SHAPES => self.test_shapes::<G, L>(leaf),
-            tag::SPHERES => self.test_spheres::<G, L>(leaf),
-            tag::PRECISE => self.test_precise::<G>(leaf),
+            tag::SHAPES => self.test_shapes::<G, L>(leaf, ray),
+            tag::SPHERES => self.test_spheres::<G, L>(leaf, ray),
+            tag::PRECISE => self.test_precise::<G>(leaf, ray),
             tag::INSTANCE => {
                 let entry = &self.accel.tree.entries[tag::place(leaf)];
-                self.test_instance::<G, L>(entry)
+                self.test_instance::<G, L>(entry, ray)
             }
-            _ => self.test_entries::<G>(leaf),
+            _ => self.test_entries::<G>(leaf, ray),
         }
     }
 
     /// The same of what has no bounds.
     #[inline(always)]
-    fn test_infinite<G: Goal, L: Simd>(&mut self) -> bool {
+    fn test_infinite<G: Goal, L: Simd>(&mut self, ray: &Ray) -> bool {
         let accel = self.accel;
-        accel.infinite.iter().any(
-            #[inline(always)]
-            |entry| match accel.geometries[entry.geometry as usize].kind {
-                GeometryKind::Instance(_) => self.test_instance::<G, L>(entry),
-                _ => self.test_entry::<G>(entry),
-            },
-        )
+        // No closures: they do not inherit target features.
+        for entry in &*accel.infinite {
+            let is_met = match accel.geometries[entry.geometry as usize].kind {
+                GeometryKind::Instance(_) => self.test_instance::<G, L>(entry, ray),
+                _ => self.test_entry::<G>(entry, ray),
+            };
+            if is_met {
+                return true;
+            }
+        }
+        false
     }
 
     /// The heights along the ray at which anything is wanted.
     #[inline(always)]
-    fn heights(&self) -> HeightRange {
-        let length = largest_component(self.ray);
-        HeightRange::ahead((self.ray.t_min * length) as f32, (self.limit * length) as f32)
+    fn heights(&self, ray: &Ray) -> HeightRange {
+        let length = largest_component(ray);
+        HeightRange::ahead((ray.t_min * length) as f32, (self.limit * length) as f32)
     }
 
     /// A leaf of shapes: those whose bounding volumes are hit, the nearest first.
     #[inline(always)]
-    fn test_shapes<G: Goal, L: Simd>(&mut self, leaf: u32) -> bool {
-        let (accel, ray) = (self.accel, self.ray);
+    fn test_shapes<G: Goal, L: Simd>(&mut self, leaf: u32, ray: &Ray) -> bool {
+        let accel = self.accel;
         let make = || BoundingVolumeRay::new(&accel.tree_space, ray, largest_component(ray));
         let volumes = *self.bounding_volumes.get_or_insert_with(make);
         let mut first = tag::place(leaf);
         loop {
             let Some((block, goes_on)) = accel.bounding_volumes.block(first) else {
-                return self.test_entries::<G>(leaf);
+                return self.test_entries::<G>(leaf, ray);
             };
             let entries = &accel.tree.entries[first..];
-            let mut range = self.heights();
+            let mut range = self.heights(ray);
             let BoundingHits { mut mask, sure, near } = if G::IS_ANY {
                 intersect::intersect_bounding_volumes::<L, true>(block, simd::opaque(&volumes), &range)
             } else {
@@ -292,10 +361,10 @@ impl<'a> Others<'a, '_> {
                 if !G::IS_ANY && near[lane] > range.last {
                     continue;
                 }
-                if self.test_entry::<G>(&entries[lane]) {
+                if self.test_entry::<G>(&entries[lane], ray) {
                     return true;
                 }
-                range = self.heights();
+                range = self.heights(ray);
             }
             if !goes_on {
                 return false;
@@ -306,9 +375,9 @@ impl<'a> Others<'a, '_> {
 
     /// A leaf of custom geometry, or of shapes one by one.
     #[inline(never)]
-    fn test_entries<G: Goal>(&mut self, leaf: u32) -> bool {
+    fn test_entries<G: Goal>(&mut self, leaf: u32, ray: &Ray) -> bool {
         for entry in &self.accel.tree.entries[tag::place(leaf)..] {
-            if self.test_entry::<G>(entry) {
+            if self.test_entry::<G>(entry, ray) {
                 return true;
             }
             if entry.is_last() {
@@ -320,9 +389,9 @@ impl<'a> Others<'a, '_> {
 
     /// A shape, or a primitive of custom geometry.
     #[inline(always)]
-    fn test_entry<G: Goal>(&mut self, entry: &Entry) -> bool {
+    fn test_entry<G: Goal>(&mut self, entry: &Entry, ray: &Ray) -> bool {
         let (geometry, primitive) = (entry.geometry, entry.primitive());
-        let (kind, ray) = (&self.accel.geometries[geometry as usize].kind, self.ray);
+        let kind = &self.accel.geometries[geometry as usize].kind;
         let root = if let Some(patch) = Patch::of(kind) {
             patch
                 .line_crossings(ray)
@@ -339,15 +408,15 @@ impl<'a> Others<'a, '_> {
             if G::IS_ANY {
                 return true;
             }
-            self.offer(Crossing::of(Winner { root, geometry, primitive }, None));
+            self.offer(Crossing::of(Winner { root, geometry, primitive }, None), ray);
         }
         false
     }
 
     /// A leaf of spheres of clouds, eight at a time.
     #[inline(always)]
-    fn test_spheres<G: Goal, L: Simd>(&mut self, leaf: u32) -> bool {
-        let (accel, ray, places) = (self.accel, self.ray, tag::blocks(leaf));
+    fn test_spheres<G: Goal, L: Simd>(&mut self, leaf: u32, ray: &Ray) -> bool {
+        let (accel, places) = (self.accel, tag::blocks(leaf));
         let range = [ray.t_min, self.limit];
         for (ids, block) in
             accel.tree.sphere_names[places.clone()].iter().zip(&accel.tree.sphere_blocks[places])
@@ -369,7 +438,7 @@ impl<'a> Others<'a, '_> {
                     return true;
                 }
                 let winner = Winner { root, geometry: ids.geometry, primitive: ids.primitives[lane] };
-                self.offer(Crossing::of(winner, None));
+                self.offer(Crossing::of(winner, None), ray);
             }
         }
         false
@@ -377,22 +446,22 @@ impl<'a> Others<'a, '_> {
 
     /// A leaf of triangles in double precision.
     #[inline(never)]
-    fn test_precise<G: Goal>(&mut self, leaf: u32) -> bool {
+    fn test_precise<G: Goal>(&mut self, leaf: u32, ray: &Ray) -> bool {
         for entry in &self.accel.tree.entries[tag::place(leaf)..] {
             let (geometry, primitive) = (entry.geometry, entry.primitive());
             let met =
-                match edges::intersect_precise(self.accel, self.ray, geometry, primitive) {
+                match edges::intersect_precise(self.accel, ray, geometry, primitive) {
                     Meeting::Hit { root, is_front } => Some((root, is_front)),
                     Meeting::Touch {
                         root, feature: Feature::Edge(_) | Feature::Vertex(_), is_front, ..
-                    } if self.ray.contains(root.t) => Some((root, is_front)),
+                    } if ray.contains(root.t) => Some((root, is_front)),
                     Meeting::Miss | Meeting::Touch { .. } => None,
                 };
             if let Some((root, is_front)) = met {
                 if G::IS_ANY {
                     return true;
                 }
-                self.offer(Crossing::of(Winner { root, geometry, primitive }, Some(is_front)));
+                self.offer(Crossing::of(Winner { root, geometry, primitive }, Some(is_front)), ray);
             }
             if entry.is_last() {
                 break;
@@ -403,18 +472,24 @@ impl<'a> Others<'a, '_> {
 
     /// An instance: one of triangles is entered at once, any other by a call.
     #[inline(always)]
-    fn test_instance<G: Goal, L: Simd>(&mut self, entry: &Entry) -> bool {
+    fn test_instance<G: Goal, L: Simd>(&mut self, entry: &Entry, ray: &Ray) -> bool {
         let Some(placed) = Placed::of(self.accel, entry) else { return false };
         let inner = &*placed.instance.accel;
-        let ray = &placed.instance.world_from_object.object_ray(self.ray);
+        let object_ray = &placed.instance.world_from_object.object_ray(ray);
         let mut found = Outcome::Uncertain;
         if let Some(picture) = &inner.picture {
-            match approach(inner, picture, ray, self.limit) {
+            match approach(inner, picture, object_ray, self.limit) {
                 Approach::PassesBy => return false,
                 Approach::Unknown => {}
                 Approach::Ray(local) => {
-                    let search =
-                        Search { accel: inner, picture, from: placed.from, ray, local, limit: self.limit };
+                    let search = Search {
+                        accel: inner,
+                        picture,
+                        from: placed.from,
+                        ray: object_ray,
+                        local,
+                        limit: self.limit,
+                    };
                     found = if picture.start.only_triangles {
                         search.run::<G, L, false>()
                     } else {
@@ -425,7 +500,7 @@ impl<'a> Others<'a, '_> {
         }
         let found = match found {
             Outcome::Certain(found) => found,
-            Outcome::Uncertain => exactly::<G>(L::isa(), inner, placed.from, ray, self.limit),
+            Outcome::Uncertain => exactly::<G>(L::isa(), inner, placed.from, object_ray, self.limit),
         };
         let Some(found) = found else { return false };
         if G::IS_ANY {
@@ -436,7 +511,7 @@ impl<'a> Others<'a, '_> {
             Some(_) => Some(Box::new(Crossing { winner, enters, instance, nested }.into_hit(inner))),
             None => None,
         };
-        self.offer(Crossing { winner, enters, instance: Some(placed.geometry), nested });
+        self.offer(Crossing { winner, enters, instance: Some(placed.geometry), nested }, ray);
         false
     }
 }
@@ -496,12 +571,15 @@ impl Search<'_, '_> {
             triangles.shorten(local.end(limit));
         }
         let mut nearest = Nearest::NONE;
-        let mut others = Others { accel, ray, nearest: None, limit, bounding_volumes: None, cloud: None };
+        let mut others = Others::new(accel, limit);
         if GENERAL && !accel.infinite.is_empty() {
-            if others.test_infinite::<G, L>() {
+            let (is_met, nearer) = others.test::<G, L>(None, ray);
+            if is_met {
                 return Outcome::Certain(Some(Crossing::some()));
             }
-            end_at::<G>(&mut triangles, &mut cursor.slabs, &local, others.limit);
+            if let Some(t) = nearer {
+                end_at(&mut triangles, &mut cursor.slabs, local.end(t));
+            }
         }
         while let Some(leaf) = next {
             if !GENERAL || tag::of(leaf) == tag::TRIANGLES {
@@ -509,45 +587,38 @@ impl Search<'_, '_> {
                     return Outcome::Certain(Some(Crossing::some()));
                 }
                 if GENERAL && !G::IS_ANY {
-                    let t = local.t(triangles.t_max());
-                    others.limit = if t < others.limit { t } else { others.limit };
+                    others.shorten(local.t(triangles.t_max()));
                 }
             } else {
-                if others.test_leaf::<G, L>(leaf) {
+                let (is_met, nearer) = others.test::<G, L>(Some(leaf), ray);
+                if is_met {
                     return Outcome::Certain(Some(Crossing::some()));
                 }
-                end_at::<G>(&mut triangles, &mut cursor.slabs, &local, others.limit);
+                if let Some(t) = nearer {
+                    end_at(&mut triangles, &mut cursor.slabs, local.end(t));
+                }
             }
             next = cursor.next_leaf::<G>(&mut stack);
         }
-        let triangle = nearest.crossing(decider).map(|(geometry, primitive, local_uv, enters)| {
-            let t = local.t(triangles.t_max());
-            // What was rounded beyond the end is in range.
-            let root = watertight::root(if t < ray.t_max { t } else { ray.t_max }, local_uv);
-            Crossing::of(Winner { root, geometry, primitive }, Some(enters))
-        });
-        Outcome::Certain(match (triangle, others.nearest) {
-            (Some(triangle), Some(other)) => {
-                let (t, other_t) = (triangle.winner.root.t, other.winner.root.t);
-                let is_first = t < other_t || t == other_t && triangle.precedes(&other, accel, ray);
-                Some(if is_first { triangle } else { other })
+        let triangle = match nearest.crossing(decider) {
+            Some((ids, uv, enters)) => {
+                Some(Crossing::on_triangle(ids, local.t(triangles.t_max()), uv, enters, ray))
             }
-            (triangle, other) => triangle.or(other),
+            None => None,
+        };
+        Outcome::Certain(if GENERAL {
+            Crossing::nearer(triangle, others.nearest, accel, ray)
+        } else {
+            triangle
         })
     }
 }
 
-/// Ends the ray where something in double precision is met.
+/// Ends the ray where something is met.
 #[inline(always)]
-fn end_at<G: Goal>(triangles: &mut F32Ray, slabs: &mut Slabs, local: &LocalRay, limit: f64) {
-    if G::IS_ANY {
-        return;
-    }
-    let end = local.end(limit);
-    if end < triangles.t_max() {
-        triangles.shorten(end);
-        shorten(slabs, end);
-    }
+fn end_at(triangles: &mut F32Ray, slabs: &mut Slabs, end: f32) {
+    triangles.shorten(end);
+    shorten(slabs, end);
 }
 
 #[inline(always)]
