@@ -1047,8 +1047,8 @@ fn lights_that_animations_move_are_seen_moving() {
         assert_eq!((lamp.name(), sun.name()), ("point", "distant"));
         assert!(lamp.is_delta() && sun.is_delta());
         // Chosen and asked at the time, a sample comes from where the lamp is then.
-        let samples =
-            [0.1, 0.4, 0.7, 0.95].map(|choose| scene.sample_light(floor, DVec3::ZERO, part, choose, DVec2::splat(0.5)));
+        let samples = [0.1, 0.4, 0.7, 0.95]
+            .map(|choose| scene.sample_light(floor, DVec3::ZERO, part, choose, DVec2::splat(0.5)));
         let ends: Vec<DVec3> =
             samples.into_iter().flatten().filter_map(|sample| Some(sample.end?.point)).collect();
         assert!(!ends.is_empty());

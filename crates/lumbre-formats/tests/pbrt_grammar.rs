@@ -189,7 +189,8 @@ fn lamps_that_move_are_sampled_where_they_are() {
     assert_eq!(scene.warnings(), []);
     let from = DVec3::new(0.0, 0.0, -20.0);
     for time in [0.0, 0.5, 1.0] {
-        let sample = scene.sample_light(from, DVec3::ZERO, time, 0.5, lumbre_math::DVec2::new(0.3, 0.6)).unwrap();
+        let sample =
+            scene.sample_light(from, DVec3::ZERO, time, 0.5, lumbre_math::DVec2::new(0.3, 0.6)).unwrap();
         let end = sample.end.unwrap().point;
         assert!((end - DVec3::new(5.0 * time, 0.0, 0.0)).length() < 1.0 + 1e-9, "{end}");
     }

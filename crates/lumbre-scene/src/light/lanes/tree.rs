@@ -186,3 +186,103 @@ pub(super) fn probability<R: Real>(
         at = R::UInt::select(open, child, at);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use lumbre_geometry::Aabb;
+    use lumbre_math::DVec3;
+    use lumbre_math::random::RandomStream;
+
+    use super::*;
+    use crate::light::tree::{Emitter, Facing, LightTree};
+
+    fn vector(random: &mut RandomStream) -> DVec3 {
+        let mut x = || 2.0 * random.next_f64() - 1.0;
+        DVec3::new(x(), x(), x())
+    }
+
+    fn lane_place(table: &Table, from: DVec3, normal: DVec3) -> LanePlace<f32> {
+        let [x, y, z] = from.to_array();
+        let n = normal.as_vec3();
+        LanePlace::new(
+            table,
+            &Receiver { from: V3::new(x, y, z), normal: V3::new(n.x, n.y, n.z), time: None },
+        )
+    }
+
+    #[test]
+    fn what_shines_on_a_place_is_never_left_out_and_densities_are_those_of_the_choice() {
+        let mut random = RandomStream::new(16);
+        // Far from where numbers are fine, too.
+        for (size, middle) in [(10.0, DVec3::ZERO), (10.0, DVec3::splat(3e4)), (2e5, DVec3::ONE)] {
+            let lights: Vec<(Emitter, DVec3)> = (0..150)
+                .map(|i| {
+                    let half = 0.3 * vector(&mut random).abs() * f64::from(i % 4);
+                    let at = middle + if i % 2 == 0 { size } else { 3.0 } * vector(&mut random);
+                    let axis = vector(&mut random).normalize();
+                    let facing = match i % 3 {
+                        0 => Facing::ANY,
+                        1 => Facing::side(axis),
+                        _ => Facing::cone(axis, 0.9, 0.7),
+                    };
+                    let bounds = Aabb { min: at - half, max: at + half };
+                    (Emitter { bounds, facing, strength: random.next_f64() }, axis)
+                })
+                .collect();
+            let emitters: Vec<Emitter> = lights.iter().map(|light| light.0).collect();
+            let table = Table::of_tree(&LightTree::new(&emitters).unwrap(), 0);
+            let (mut shining, mut left_out) = (0, 0);
+            for round in 0..300 {
+                let from = middle + if round % 3 == 0 { 1.4 * size } else { 4.0 } * vector(&mut random);
+                let normal = if round % 2 == 0 { DVec3::ZERO } else { vector(&mut random).normalize() };
+                let place = lane_place(&table, from, normal);
+                let mut sum = 0.0;
+                for (i, (emitter, axis)) in (0..).zip(&lights) {
+                    let within = vector(&mut random) * 0.5 * emitter.bounds.size();
+                    let way = (from - (emitter.bounds.center() + within)).normalize();
+                    let shines = match i % 3 {
+                        0 => true,
+                        1 => axis.dot(way) > 0.0,
+                        _ => axis.dot(way) > 0.7,
+                    };
+                    let shines = shines && (normal == DVec3::ZERO || normal.dot(-way) > 0.0);
+                    let probability = probability::<f32>(&table, true, &place, UInt::splat(i));
+                    assert!(!shines || probability > 0.0, "{i} {from} {normal}");
+                    shining += u32::from(shines);
+                    left_out += u32::from(probability == 0.0);
+                    sum += probability;
+                }
+                assert!(sum < 1.0 + 1e-4, "{sum}");
+                let (u, more) = (random.next_f32(), random.next_f32());
+                let chosen = choose::<f32>(&table, true, &place, u, 1.0 / 16_777_216.0, more);
+                if chosen.valid {
+                    let probability = probability::<f32>(&table, true, &place, chosen.emitter);
+                    assert_eq!(probability, chosen.probability);
+                }
+            }
+            assert!(shining > 8_000 && left_out > 5_000, "{shining} {left_out}");
+        }
+    }
+
+    #[test]
+    fn of_thousands_of_lights_each_has_its_turn() {
+        let light = |i: u32| {
+            let at = DVec3::new(f64::from(i % 256), f64::from(i / 256), 1e6);
+            Emitter { bounds: Aabb::around([at]), facing: Facing::ANY, strength: 1.0 }
+        };
+        const COUNT: u32 = 1 << 15;
+        let emitters: Vec<Emitter> = (0..COUNT).map(light).collect();
+        let table = Table::of_tree(&LightTree::new(&emitters).unwrap(), 0);
+        let place = lane_place(&table, DVec3::ZERO, DVec3::ZERO);
+        let mut random = RandomStream::new(17);
+        // Further digits are needed: one number of 24 bits has 512 for each.
+        let mut found = std::collections::HashSet::new();
+        for i in 0..8 * COUNT {
+            let u = (i as f32 + 0.5) / (8 * COUNT) as f32;
+            let chosen = choose::<f32>(&table, true, &place, u, 1.0 / 16_777_216.0, random.next_f32());
+            found.insert(chosen.emitter.to_lanes()[0]);
+            assert!((chosen.probability * COUNT as f32 - 1.0).abs() < 0.1, "{}", chosen.probability);
+        }
+        assert_eq!(found.len(), COUNT as usize);
+    }
+}
