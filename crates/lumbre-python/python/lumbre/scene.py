@@ -362,7 +362,8 @@ class Scene:
         return answer
 
     def signed_distance(self, points: npt.ArrayLike) -> Array:
-        """The distance of (N, 3) points to the nearest surface, negative inside: where the winding number is above 0.5.
+        """The distance of (N, 3) points to the nearest surface, negative inside: where surfaces wind around a point
+        more than 0.5 times, in either direction. So a closed mesh that is inside out has the same signs, as `inside` does.
 
         Raises `LumbreError` as `closest_point` and `winding_number` do.
 
@@ -372,7 +373,7 @@ class Scene:
         """
         places = _points(points)
         distance = self.closest_point(places).distance
-        return np.where(self.winding_number(places) > 0.5, -distance, distance)
+        return np.where(np.abs(self.winding_number(places)) > 0.5, -distance, distance)
 
     def render(
         self,
