@@ -3,7 +3,7 @@
 mod area;
 pub(crate) mod choice;
 mod delta;
-mod environment;
+pub(crate) mod environment;
 mod mesh;
 mod moving;
 mod pairs;
