@@ -147,9 +147,7 @@ impl Accel {
 fn placed(bounds: &Aabb, placement: &Placement) -> Aabb {
     match placement {
         Placement::Still(map) if bounds.min.is_finite() && bounds.max.is_finite() => moved(bounds, map),
-        Placement::Still(_) | Placement::Moving(_) => {
-            Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY }
-        }
+        Placement::Still(_) | Placement::Moving(_) => Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY },
     }
 }
 

@@ -109,7 +109,8 @@ fn what_has_no_area_is_as_near_as_it_is_and_no_ray_hits_it() {
         precise_mesh.indices.truncate(39);
         let mut dust = cloud(&mut random, 30, center, center, 3.0);
         dust.spheres.iter_mut().step_by(2).for_each(|sphere| sphere[3] = 0.0);
-        let inner = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(flat_soup(&mut random, 60, center, 0.5)))]));
+        let inner =
+            Arc::new(build(vec![GeometryKind::Mesh(Arc::new(flat_soup(&mut random, 60, center, 0.5)))]));
         // Nothing in it has an area, so no tree of its own holds the instance.
         let mut points = flat_soup(&mut random, 20, center, 0.5);
         points.indices.iter_mut().for_each(|triangle| *triangle = [triangle[0]; 3]);
@@ -152,7 +153,8 @@ fn what_has_no_area_is_as_near_as_it_is_and_no_ray_hits_it() {
 #[test]
 fn a_needle_and_a_point_have_the_distances_that_they_have() {
     // A triangle on a line of the x axis, one in a point, and one on a line far away, beside two that have an area.
-    let vertices = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [5, 5, 5], [10, 10, 10], [10, 10, 12], [10, 10, 11]];
+    let vertices =
+        [[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [5, 5, 5], [10, 10, 10], [10, 10, 12], [10, 10, 11]];
     let positions = vertices.map(|p: [i32; 3]| lumbre_math::Vec3::from_array(p.map(|c| c as f32))).to_vec();
     let indices = vec![[0, 1, 2], [4, 4, 4], [5, 6, 7], [0, 2, 3], [5, 5, 6]];
     let mesh = TriangleMesh { origin: DVec3::ZERO, positions, indices };
