@@ -509,3 +509,40 @@ fn colours_of_faces_are_those_of_their_corners() {
     assert_eq!(edges, [[0, 2]]);
     assert!(said.lines()[0].contains("colours of \"edge\" elements are not used"), "{:?}", said.lines());
 }
+
+#[test]
+fn what_is_not_finite_where_nothing_is_seen_is_a_note() {
+    // The third vertex has a normal that is not finite, the fourth such texture coordinates.
+    let file = |faces: &str, count: usize| {
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 4\n{PLACES}property float nx\nproperty float ny\nproperty float nz\n\
+             property float u\nproperty float v\nelement face {count}\nproperty list uchar int vertex_indices\nend_header\n\
+             0 0 1 0 0 1 0 0\n2 0 1 0 0 1 0 0\n2 3 1 nan 0 1 0 0\n4 0 1 0 0 1 inf 0\n{faces}"
+        )
+    };
+    let read = |text: &str| {
+        let mut said = Diagnostics::with_strictness(Strictness::Strict);
+        read_ply(text.as_bytes(), &name(), &Budget::default(), &mut said).unwrap();
+        (said.lines(), said.warnings(), said.check().is_ok())
+    };
+    // A face along a line, and one in a point: nothing of them is seen.
+    let unseen = "3 0 1 3\n3 2 2 2\n4 0 2 2 0\n";
+    let (lines, warnings, passes) = read(&file(unseen, 3));
+    assert_eq!((lines.len() - 1, warnings, passes), (2, 1, false), "{lines:?}");
+    assert!(
+        lines
+            .iter()
+            .filter(|line| line.starts_with("note: m.ply:") && line.contains("no face with an area"))
+            .count()
+            == 2
+    );
+    let seen = |face: &str| {
+        let (lines, warnings, passes) = read(&file(&format!("3 0 1 3\n4 0 2 2 0\n{face}"), 3));
+        let notes = lines.iter().filter(|line| line.starts_with("note: ")).count() as u64;
+        assert_eq!(passes, warnings == 0, "{lines:?}");
+        (warnings, notes)
+    };
+    assert_eq!(seen("3 0 1 2\n"), (1, 1));
+    assert_eq!(seen("3 0 2 3\n"), (2, 0));
+    assert_eq!(seen("4 0 0 1 3\n").1, 2);
+}

@@ -256,6 +256,14 @@ impl Slot {
     }
 }
 
+/// A value of a vertex that is not finite, and where the vertex begins.
+#[derive(Clone, Copy, Debug)]
+struct Flaw {
+    vertex: u32,
+    at: usize,
+    what: &'static str,
+}
+
 /// A channel of a colour as linear light: integers are in sRGB.
 fn colour_of(value: f64, number: Number) -> f32 {
     if number.is_float() { value as f32 } else { srgb_to_linear((value / number.one()) as f32) }
@@ -304,6 +312,8 @@ struct Mesh<'a> {
     colours: Option<Vec<Rgb>>,
     /// When lenient, vertices that are not finite.
     unusable: Vec<u32>,
+    /// What else is not finite.
+    flaws: BudgetVec<'a, Flaw>,
     /// Texture coordinates of corners and colours of faces, in files that have them.
     corners: Option<Corners>,
     triangles: BudgetVec<'a, [u32; 3]>,
@@ -334,6 +344,7 @@ impl<'a> Mesh<'a> {
             uvs: None,
             colours: None,
             unusable: vec![],
+            flaws: BudgetVec::new(budget, "flaws"),
             corners: None,
             triangles: BudgetVec::new(budget, "triangles"),
             quads: BudgetVec::new(budget, "quads"),
@@ -536,28 +547,25 @@ impl<'a> Mesh<'a> {
                 places.push(position);
             }
             if has_normals {
-                normals.push(self.finite_or_zero(
-                    Vec3::from(n),
-                    Vec3::is_finite,
-                    "a normal is not finite, and taken for 0",
-                    element,
-                    index,
-                    start,
-                ));
+                let n = Vec3::from(n);
+                normals.push(if n.is_finite() { n } else { Vec3::ZERO });
+                if !n.is_finite() {
+                    self.flaw(index, start, "a normal is not finite, and taken for 0")?;
+                }
             }
             if has_uvs {
-                let what = "a texture coordinate is not finite, and taken for 0";
-                uvs.push(self.finite_or_zero(Vec2::from(uv), Vec2::is_finite, what, element, index, start));
+                let uv = Vec2::from(uv);
+                uvs.push(if uv.is_finite() { uv } else { Vec2::ZERO });
+                if !uv.is_finite() {
+                    self.flaw(index, start, "a texture coordinate is not finite, and taken for 0")?;
+                }
             }
             if has_colours {
-                colours.push(self.finite_or_zero(
-                    Rgb::from(colour),
-                    Rgb::is_finite,
-                    "a colour is not finite, and taken for 0",
-                    element,
-                    index,
-                    start,
-                ));
+                let colour = Rgb::from(colour);
+                colours.push(if colour.is_finite() { colour } else { Rgb::BLACK });
+                if !colour.is_finite() {
+                    self.flaw(index, start, "a colour is not finite, and taken for 0")?;
+                }
             }
         }
         if !is_single {
@@ -569,6 +577,44 @@ impl<'a> Mesh<'a> {
         self.normals = has_normals.then_some(normals);
         self.uvs = has_uvs.then_some(uvs);
         self.colours = has_colours.then_some(colours);
+        Ok(())
+    }
+
+    #[cold]
+    fn flaw(&mut self, vertex: u64, at: usize, what: &'static str) -> Result<(), FormatError> {
+        Ok(self.flaws.push(Flaw { vertex: vertex as u32, at, what })?)
+    }
+
+    /// Says what is not finite: a warning where a face that has an area uses it, or where vertices are points; else a note.
+    fn say_flaws(&mut self) -> Result<(), FormatError> {
+        if self.flaws.is_empty() {
+            return Ok(());
+        }
+        let _while_said = self.budget.hold(self.positions.len() as u64, "vertices")?;
+        let mut is_seen = vec![self.triangles.is_empty() && self.quads.is_empty(); self.positions.len()];
+        let place = |vertex: u32| self.positions[vertex as usize].as_dvec3();
+        let quads = self.quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
+        for triangle in self.triangles.iter().copied().chain(quads) {
+            let [a, b, c] = triangle.map(place);
+            if (b - a).cross(c - a) != DVec3::ZERO {
+                triangle.iter().for_each(|&vertex| is_seen[vertex as usize] = true);
+            }
+        }
+        for (&(vertex, _), &copy) in self.corners.iter().flat_map(|of| &of.copies) {
+            is_seen[vertex as usize] |= is_seen[copy as usize];
+        }
+        let (encoding, name, bytes) = (self.encoding, self.name, self.bytes);
+        for &Flaw { vertex, at, what } in self.flaws.iter() {
+            let placed = |said: Diagnostic| {
+                let start = encoding.start(bytes, at);
+                said.at(encoding.place(name, bytes, start, "vertex", u64::from(vertex), ""))
+            };
+            if is_seen[vertex as usize] {
+                self.diagnostics.warn(what, placed);
+            } else {
+                self.diagnostics.note(&format!("{what}: no face with an area has it"), placed);
+            }
+        }
         Ok(())
     }
 
@@ -928,6 +974,7 @@ impl<'a> Mesh<'a> {
     }
 
     fn finish(mut self, texture: Option<String>) -> Result<PlyFile, FormatError> {
+        self.say_flaws()?;
         let has_corner_uvs = self.corners.as_ref().is_some_and(|of| of.has_uvs);
         if let Some(of) = self.corners.take() {
             if of.has_colours {
