@@ -100,6 +100,13 @@ impl Memory {
     }
 }
 
+/// Bytes that are left for what is asked for next: in the machine, in its control groups, and by what the system grants
+/// (`ulimit -v`).
+pub fn memory_left() -> u64 {
+    let memory = Memory::new(None);
+    if memory.bound == Bound::AddressSpace { memory.usable() } else { memory.most }
+}
+
 /// Bytes of memory that are free, or can be made so; `None` if the system does not tell.
 fn available_memory() -> Option<u64> {
     let memory = fs::read_to_string("/proc/meminfo").ok()?;

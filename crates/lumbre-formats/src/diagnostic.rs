@@ -147,6 +147,8 @@ pub enum Severity {
     Warning,
     /// The input cannot be used.
     Error,
+    /// A flaw that changes no picture and no answer: [`Strictness::Strict`] passes it.
+    Note,
 }
 
 impl Display for Severity {
@@ -154,6 +156,7 @@ impl Display for Severity {
         f.write_str(match self {
             Self::Warning => "warning",
             Self::Error => "error",
+            Self::Note => "note",
         })
     }
 }
@@ -189,6 +192,11 @@ impl Diagnostic {
     /// A part of the input that was not used.
     pub fn warning(message: impl Into<String>) -> Self {
         Self::new(Severity::Warning, message.into())
+    }
+
+    /// A flaw of the input that changes nothing.
+    pub fn note(message: impl Into<String>) -> Self {
+        Self::new(Severity::Note, message.into())
     }
 
     fn new(severity: Severity, message: String) -> Self {
@@ -234,7 +242,7 @@ impl Diagnostic {
         self
     }
 
-    /// The text without `error: ` or `warning: `.
+    /// The text without `error: `, `warning: ` or `note: `.
     pub fn body(&self) -> String {
         let mut text = String::new();
         if let Some(place) = &self.place {
@@ -372,10 +380,11 @@ pub enum Strictness {
 pub struct Diagnostics {
     strictness: Strictness,
     kept: Vec<Diagnostic>,
-    /// The counts of each kind, by message: warnings, then errors.
-    kinds: [HashMap<String, u64>; 2],
+    /// The counts of each kind, by message: warnings, errors, then notes.
+    kinds: [HashMap<String, u64>; 3],
     warnings: u64,
     errors: u64,
+    notes: u64,
     files: Vec<PathBuf>,
     memory_held: u64,
 }
@@ -434,10 +443,16 @@ impl Diagnostics {
         self.push_with(Severity::Warning, message, || make(Diagnostic::warning(message)));
     }
 
+    /// Adds a note of this kind, as [`Diagnostics::warn`] does.
+    pub fn note(&mut self, message: &str, make: impl FnOnce(Diagnostic) -> Diagnostic) {
+        self.push_with(Severity::Note, message, || make(Diagnostic::note(message)));
+    }
+
     fn push_with(&mut self, severity: Severity, message: &str, make: impl FnOnce() -> Diagnostic) {
         match severity {
             Severity::Warning => self.warnings += 1,
             Severity::Error => self.errors += 1,
+            Severity::Note => self.notes += 1,
         }
         let room = self.kinds.iter().map(HashMap::len).sum::<usize>() < Self::KEPT_IN_ALL;
         let kinds = &mut self.kinds[severity as usize];
@@ -461,7 +476,8 @@ impl Diagnostics {
     /// fixed order.
     pub fn append(&mut self, other: Self) {
         let (warnings, errors) = (self.warnings + other.warnings, self.errors + other.errors);
-        let mut pushed: [HashMap<String, u64>; 2] = Default::default();
+        let notes = self.notes + other.notes;
+        let mut pushed: [HashMap<String, u64>; 3] = Default::default();
         for diagnostic in other.kept {
             *pushed[diagnostic.severity as usize].entry(diagnostic.message.clone()).or_default() += 1;
             self.push(diagnostic);
@@ -477,7 +493,7 @@ impl Diagnostics {
                 }
             }
         }
-        (self.warnings, self.errors) = (warnings, errors);
+        (self.warnings, self.errors, self.notes) = (warnings, errors, notes);
     }
 
     /// The diagnostics kept, in order.
@@ -503,7 +519,8 @@ impl Diagnostics {
     /// The lines to print: those kept, and for each kind with more the number omitted.
     pub fn lines(&self) -> Vec<String> {
         let mut lines: Vec<String> = self.kept.iter().map(Diagnostic::to_string).collect();
-        for (severity, kinds) in [Severity::Warning, Severity::Error].into_iter().zip(&self.kinds) {
+        let severities = [Severity::Warning, Severity::Error, Severity::Note];
+        for (severity, kinds) in severities.into_iter().zip(&self.kinds) {
             let mut more: Vec<_> = kinds.iter().filter(|&(_, &count)| count > Self::KEPT_OF_A_KIND).collect();
             more.sort();
             lines.extend(more.into_iter().map(|(message, count)| {
@@ -511,20 +528,25 @@ impl Diagnostics {
             }));
         }
         let said: u64 = self.kinds.iter().flat_map(HashMap::values).sum();
-        let unsaid = self.warnings + self.errors - said;
+        let unsaid = self.warnings + self.errors + self.notes - said;
         if unsaid > 0 {
             lines.push(format!("warning: {unsaid} more of other kinds"));
         }
         lines
     }
 
-    /// The first error, or under [`Strictness::Strict`] the first diagnostic.
+    /// The first error, or under [`Strictness::Strict`] the first warning or error.
     ///
     /// # Errors
     /// That diagnostic.
     pub fn check(&self) -> Result<(), FormatError> {
         let strict = self.strictness == Strictness::Strict;
-        let first = self.kept.iter().find(|d| strict || d.severity == Severity::Error);
+        let is_refused = |severity| match severity {
+            Severity::Error => true,
+            Severity::Warning => strict,
+            Severity::Note => false,
+        };
+        let first = self.kept.iter().find(|d| is_refused(d.severity));
         first.map_or(Ok(()), |diagnostic| Err(diagnostic.clone().into()))
     }
 }

@@ -56,6 +56,31 @@ impl<'b> Input<'b> {
         if input.bytes.starts_with(&[0x1F, 0x8B]) { input.unpacked(path, budget) } else { Ok(input) }
     }
 
+    /// [`Input::from_reader`] of a stream, which may never end: `is_text` says of its first bytes, as far as there are so many,
+    /// whether they begin a text. The first byte of a text that no text has, a zero, ends the reading.
+    ///
+    /// # Errors
+    /// As for [`Input::open`], that of `is_text`, and with the place of that byte.
+    pub(crate) fn from_stream(
+        name: &str,
+        mut reader: impl Read,
+        budget: &'b Budget,
+        is_text: impl FnOnce(&[u8]) -> Result<bool, FormatError>,
+    ) -> Result<Self, FormatError> {
+        const FIRST: u64 = 64 << 10;
+        let mut first = Vec::new();
+        let read = (&mut reader).take(FIRST).read_to_end(&mut first);
+        read.map_err(|e| FormatError::io(Path::new(name), "cannot read", e))?;
+        if first.starts_with(&[0x1F, 0x8B]) || !is_text(&first)? {
+            return Self::from_reader(name, first.chain(reader), budget);
+        }
+        let mut text = TextStream { inner: first.chain(reader), read: 0, zero: None };
+        let input = Self::from_reader(name, &mut text, budget);
+        let Some(offset) = text.zero else { return input };
+        let wrong = Diagnostic::error("text with a byte that no text has");
+        Err(wrong.at(Place::binary(name, offset, "")).found("byte 0x00").into())
+    }
+
     fn unpacked(self, path: &Path, budget: &'b Budget) -> Result<Self, FormatError> {
         let packed = self.bytes.len() as u64;
         let mut bytes = Vec::new();
@@ -236,6 +261,25 @@ impl From<crate::budget::LimitError> for ReadError {
     }
 }
 
+/// A text, which ends with an error where there is a zero.
+struct TextStream<R> {
+    inner: R,
+    read: u64,
+    zero: Option<u64>,
+}
+
+impl<R: Read> Read for TextStream<R> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        let read = self.inner.read(out)?;
+        if let Some(at) = out[..read].iter().position(|&b| b == 0) {
+            self.zero = Some(self.read + at as u64);
+            return Err(io::ErrorKind::InvalidData.into());
+        }
+        self.read += read as u64;
+        Ok(read)
+    }
+}
+
 /// The number of bytes to the end, each piece checked.
 fn counted(
     mut reader: impl Read,
@@ -381,6 +425,48 @@ pub(crate) mod tests {
                 said.strip_prefix("m.ply.gz:byte ").unwrap().split_once(": damaged gzip data").unwrap().0;
             assert!(at.parse::<usize>().unwrap() <= cut, "{error}");
         }
+    }
+
+    /// A stream that never ends, and remembers how much was taken of it.
+    struct Endless<'a>(&'a [u8], u64);
+
+    impl Read for Endless<'_> {
+        fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+            let text = self.0.len().min(out.len());
+            out[..text].copy_from_slice(&self.0[..text]);
+            out[text..].fill(0);
+            self.0 = &self.0[text..];
+            self.1 += out.len() as u64;
+            Ok(out.len())
+        }
+    }
+
+    #[test]
+    fn an_endless_stream_is_refused_at_its_first_wrong_byte() {
+        let text = "Shape \"sphere\"\n".repeat(9000);
+        let budget = Budget::default();
+        let mut stream = Endless(text.as_bytes(), 0);
+        let error = Input::from_stream("s", &mut stream, &budget, |_| Ok(true)).unwrap_err().to_string();
+        assert!(error.contains(&format!("s:byte {}: text with a byte", text.len())), "{error}");
+        assert!(stream.1 < 1 << 20, "{}", stream.1);
+        // What is refused at its beginning is not read on.
+        let mut stream = Endless(b"", 0);
+        let refuse = |first: &[u8]| -> Result<bool, FormatError> {
+            assert_eq!(first.len(), 64 << 10);
+            Err(Diagnostic::error("unknown").into())
+        };
+        Input::from_stream("s", &mut stream, &budget, refuse).unwrap_err();
+        assert_eq!(stream.1, 64 << 10);
+        // What ends is all there, packed or not, text or not.
+        for is_text in [true, false] {
+            let read =
+                |bytes: &[u8]| Input::from_stream("s", bytes, &budget, |_| Ok(is_text)).unwrap().to_vec();
+            assert_eq!(read(text.as_bytes()), text.as_bytes());
+            assert_eq!(read(&gzip(text.as_bytes())), text.as_bytes());
+            assert_eq!(read(b""), b"");
+        }
+        let binary = Input::from_stream("s", &b"ply\0"[..], &budget, |_| Ok(false)).unwrap();
+        assert_eq!(&*binary, b"ply\0");
     }
 
     #[test]

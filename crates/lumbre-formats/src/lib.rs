@@ -23,6 +23,7 @@ mod polygon;
 mod standing;
 pub mod stl;
 mod thin;
+mod unseen;
 
 pub use atomic::{abandon_writes, atomic_write, atomic_write_seek, probe_writable};
 pub use budget::{Budget, BudgetVec, Hold, LimitError, LimitKind, Limits};

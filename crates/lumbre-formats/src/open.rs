@@ -102,6 +102,18 @@ impl SceneFormat {
     }
 }
 
+/// Whether these bytes, which are of no known format yet, are comments and spaces before the first word of a text.
+fn may_begin_a_text(bytes: &[u8]) -> bool {
+    let mut lines = bytes.split(|&b| matches!(b, b'\n' | b'\r')).map(<[u8]>::trim_ascii_start);
+    !bytes.contains(&0) && lines.all(|line| line.is_empty() || line.starts_with(b"#"))
+}
+
+/// Whether a binary STL of at most so many bytes may begin with these.
+fn may_begin_an_stl(bytes: &[u8], most: u64) -> bool {
+    let count = bytes.get(80..84).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+    count.is_none_or(|n| (bytes.len() as u64..=most).contains(&(84 + 50 * u64::from(n))))
+}
+
 /// Reads the scene or the mesh in the file `path`: `.pbrt`, `.ply` and `.stl`, each also with `.gz`, `.gltf`,
 /// `.glb` and `.obj`. A file with another extension is told by its bytes, and so is `-`, standard input.
 ///
@@ -166,7 +178,17 @@ impl<'p, 'b> Source<'p, 'b> {
             return Err(unknown(path, path.display().to_string().into()));
         }
         let input = if is_standard_input {
-            Input::from_reader("standard input", std::io::stdin().lock(), budget)?
+            Input::from_stream("standard input", std::io::stdin().lock(), budget, |first| {
+                match options.format.or_else(|| SceneFormat::from_bytes(first)) {
+                    Some(SceneFormat::Pbrt | SceneFormat::Obj) => Ok(true),
+                    // Both have a binary form.
+                    Some(SceneFormat::Ply | SceneFormat::Stl) => Ok(false),
+                    Some(SceneFormat::Gltf) => Ok(!first.starts_with(b"glTF")),
+                    None if may_begin_a_text(first) => Ok(true),
+                    None if may_begin_an_stl(first, options.limits.memory) => Ok(false),
+                    None => Err(unknown(path, "standard input".into())),
+                }
+            })?
         } else {
             Input::open(path, budget)?
         };
@@ -261,6 +283,21 @@ mod tests {
             (b"", None),
         ] {
             assert_eq!(SceneFormat::from_bytes(bytes), expected, "{}", String::from_utf8_lossy(bytes));
+        }
+        // Of a stream, as far as it is there.
+        let comments = "# nothing yet\n".repeat(5000);
+        let title = [&[b'x'; 80][..], &2000_u32.to_le_bytes(), &[0; 900]].concat();
+        let (zeros, letters) = ([0; 64 << 10], [b'x'; 64 << 10]);
+        for (first, is_text, is_stl) in [
+            (comments.as_bytes(), true, false),
+            (b" \r\n", true, true),
+            (&title, false, true),
+            (b"hello", false, true),
+            (&zeros, false, false),
+            (&letters, false, false),
+        ] {
+            assert_eq!(SceneFormat::from_bytes(first), None);
+            assert_eq!((may_begin_a_text(first), may_begin_an_stl(first, 1 << 30)), (is_text, is_stl));
         }
         for name in SceneFormat::NAMES {
             assert_eq!(SceneFormat::from_name(name), SceneFormat::from_path(Path::new(&format!("a.{name}"))));

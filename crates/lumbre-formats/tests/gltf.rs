@@ -1438,6 +1438,29 @@ fn coverage_is_by_mode_and_light_by_strength() {
 }
 
 #[test]
+fn what_is_invisible_everywhere_does_not_shine() {
+    let shines = |alpha: f32, rest: &str| {
+        let colour = format!(r#""pbrMetallicRoughness":{{"baseColorFactor":[1,1,1,{alpha}]}}"#);
+        let (scene, _) = dressed(&format!(r#"{{{colour},"emissiveFactor":[1,1,1]{rest}}}"#));
+        scene.shapes[0].area_light.is_some()
+    };
+    let unlit = r#","extensions":{"KHR_materials_unlit":{}}"#;
+    for more in ["", unlit] {
+        // Without a mode, alpha is not used.
+        assert!(shines(0.0, more) && shines(0.75, &format!(r#","alphaMode":"BLEND"{more}"#)));
+        assert!(!shines(0.0, &format!(r#","alphaMode":"BLEND"{more}"#)));
+        assert!(!shines(0.0, &format!(r#","alphaMode":"MASK"{more}"#)));
+        assert!(!shines(0.75, &format!(r#","alphaMode":"MASK","alphaCutoff":0.8{more}"#)));
+        assert!(shines(0.75, &format!(r#","alphaMode":"MASK","alphaCutoff":0.7{more}"#)));
+    }
+    let textured = r#""pbrMetallicRoughness":{"baseColorFactor":[1,1,1,0],"baseColorTexture":{"index":0}}"#;
+    for mode in ["MASK", "BLEND"] {
+        let (scene, _) = dressed(&format!(r#"{{{textured},"emissiveFactor":[1,1,1],"alphaMode":"{mode}"}}"#));
+        assert!(scene.shapes[0].area_light.is_none(), "{mode}");
+    }
+}
+
+#[test]
 fn variants_are_worn_by_name() {
     let mut parts = Parts::default();
     let p = parts.positions(&SQUARE);

@@ -290,3 +290,121 @@ fn nothing_finite_becomes_infinite_in_an_exr_and_a_qoi_keeps_its_bytes() {
     let bytes = encode_image(&shown, ImageFormat::Qoi, &WriteOptions::default()).unwrap();
     assert!((read(&bytes, "a.qoi").pixel(4, 2) - shown.pixel(4, 2)).map(f32::abs).max_component() < 1e-6);
 }
+
+/// A scene whose texture, area light, environment and goniometric light are the image file `name`, written beside it.
+fn scene_of_image(file: &str, bytes: &[u8]) -> (lumbre_scene::SceneDesc, Vec<String>) {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join(file), bytes).unwrap();
+    let path = dir.path().join("a.pbrt");
+    let text = format!(
+        "WorldBegin\nLightSource \"infinite\" \"string filename\" \"{file}\"\n\
+         LightSource \"goniometric\" \"string filename\" \"{file}\"\n\
+         Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"{file}\"\n\
+         Material \"diffuse\" \"texture reflectance\" \"t\"\nShape \"sphere\"\n\
+         AreaLightSource \"diffuse\" \"string filename\" \"{file}\"\nShape \"sphere\"\n"
+    );
+    std::fs::write(&path, text).unwrap();
+    let (scene, said) = lumbre_formats::open_scene(&path, &lumbre_formats::ReadOptions::default()).unwrap();
+    (scene, said.lines())
+}
+
+#[test]
+fn texels_that_are_not_finite_are_named_and_the_rest_shines() {
+    let good = picture(10, 10).map(|c| c + Rgb::splat(0.5));
+    for wrong in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let mut pixels = good.pixels().to_vec();
+        pixels[37].g = wrong;
+        let image = Image::from_pixels(10, 10, pixels).unwrap();
+        let exr = changed(WriteOptions::default(), |it| it.exr_precision = ExrPrecision::Float);
+        for (file, format) in [("bad.pfm", ImageFormat::Pfm), ("bad.exr", ImageFormat::Exr)] {
+            let (scene, said) = scene_of_image(file, &encode_image(&image, format, &exr).unwrap());
+            assert!(said.iter().all(|line| line.contains(file)), "{said:?}");
+            assert!(
+                said[0].contains("not finite, and taken for black (found texel (7, 3) of 10 by 10)"),
+                "{said:?}"
+            );
+            for light in &scene.lights {
+                let image = match light {
+                    lumbre_scene::LightDesc::Infinite { image: Some(picture), .. } => &picture.image,
+                    lumbre_scene::LightDesc::Goniometric { image, .. } => &image.image,
+                    other => panic!("another light: {other:?}"),
+                };
+                assert!(image.pixels().iter().enumerate().all(|(i, c)| c.is_black() == (i == 37)));
+            }
+            assert_eq!(scene.lights.len(), 2);
+            let light = scene.shapes[1].area_light.as_ref().unwrap().image.as_ref().unwrap();
+            let at = |x: u32, y: u32| {
+                let uv = lumbre_math::Vec2::new((x as f32 + 0.5) / 10.0, 1.0 - (y as f32 + 0.5) / 10.0);
+                light.lookup(uv, lumbre_math::Vec2::ZERO, lumbre_math::Vec2::ZERO)
+            };
+            assert!(at(7, 3).max_component() < 1e-6 && at(2, 3).min_component() > 0.4, "{:?}", at(7, 3));
+            assert!(lumbre_scene::Scene::build(scene).unwrap().warnings().is_empty());
+        }
+    }
+}
+
+#[test]
+fn an_exr_texture_is_in_its_place_in_its_display_window() {
+    // 6 by 5 pixels of 16 by 16, and beyond that window on one side.
+    for (x, y) in [(3, 9), (13, -2)] {
+        let part = Image::filled(6, 5, Rgb::new(0.75, 0.5, 0.25));
+        let options = changed(WriteOptions::default(), |it| it.exr_window = Some((x, y, 16, 16)));
+        let (scene, said) =
+            scene_of_image("crop.exr", &encode_image(&part, ImageFormat::Exr, &options).unwrap());
+        assert_eq!(said, [""; 0]);
+        let image = scene.shapes[1].area_light.as_ref().unwrap().image.as_ref().unwrap();
+        let mut lit = 0;
+        for (row, column) in (0..16).flat_map(|row| (0..16).map(move |column| (row, column))) {
+            let uv = lumbre_math::Vec2::new((column as f32 + 0.5) / 16.0, 1.0 - (row as f32 + 0.5) / 16.0);
+            let found = image.lookup(uv, lumbre_math::Vec2::ZERO, lumbre_math::Vec2::ZERO);
+            let is_in = (x..x + 6).contains(&column) && (y..y + 5).contains(&row);
+            let expected = if is_in { Rgb::new(0.75, 0.5, 0.25) } else { Rgb::BLACK };
+            assert!((found - expected).map(f32::abs).max_component() < 1e-3, "{row} {column}: {found:?}");
+            lit += u32::from(is_in);
+        }
+        assert!(lit == 30 || lit == 9, "{lit}");
+    }
+}
+
+#[test]
+fn exposures_and_colour_corrections_of_hdr_are_taken_back() {
+    let image = picture(9, 4);
+    let plain = encode_image(&image, ImageFormat::Hdr, &WriteOptions::default()).unwrap();
+    let plain_light = back(&plain, "a.hdr");
+    let with = |lines: &str| {
+        let end = plain.windows(2).position(|pair| pair == b"\n\n").unwrap() + 1;
+        [&plain[..end], lines.as_bytes(), &plain[end..]].concat()
+    };
+    let check = |lines: &str, factor: [f32; 3]| {
+        let found = back(&with(lines), "a.hdr");
+        for (found, plain) in found.pixels().iter().zip(plain_light.pixels()) {
+            let expected = *plain * Rgb::from(factor);
+            assert!(
+                (*found - expected).map(f32::abs).max_component() <= 1e-6 * expected.max_component(),
+                "{lines}"
+            );
+        }
+    };
+    check("EXPOSURE=1.0\n", [1.0; 3]);
+    check("EXPOSURE=4\n", [0.25; 3]);
+    // Those of several steps are multiplied; a line that is indented belongs to a picture that this one was made of.
+    check("EXPOSURE= 4.0\n\tEXPOSURE=100\nEXPOSURE=0.5\r\n", [0.5; 3]);
+    check("COLORCORR= 2 0.5 1\nEXPOSURE=2\n", [0.25, 1.0, 0.5]);
+    for wrong in [
+        "EXPOSURE=0\n",
+        "EXPOSURE=-1\n",
+        "EXPOSURE=nan\n",
+        "EXPOSURE=\n",
+        "COLORCORR=1 2\n",
+        "EXPOSURE=1e999\n",
+    ] {
+        let mut said = Diagnostics::new();
+        let file = read_image(&with(wrong), &name("a.hdr"), &Budget::default(), &mut said).unwrap();
+        assert_eq!(file.to_image(&Budget::default()).unwrap(), plain_light);
+        assert!(
+            said.lines().len() == 1 && said.lines()[0].contains("is not applied"),
+            "{wrong}: {:?}",
+            said.lines()
+        );
+    }
+}

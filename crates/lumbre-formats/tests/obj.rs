@@ -410,3 +410,38 @@ fn a_library_is_read_once_and_what_shines_faintly_leaves_the_studio() {
     assert_eq!(light("0 0 0.1"), (true, StageLight::Studio));
     assert_eq!(light("9 8 7"), (true, StageLight::Own));
 }
+
+#[test]
+fn a_material_that_is_invisible_does_not_shine() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("m.obj");
+    let shines = |keys: &str| {
+        std::fs::write(dir.path().join("m.mtl"), format!("newmtl m\nKe 9 9 9\n{keys}\n")).unwrap();
+        std::fs::write(&path, format!("mtllib m.mtl\n{SQUARE}usemtl m\nf 1 2 3\n")).unwrap();
+        let scene = open_obj(&path, &Budget::default(), &mut Diagnostics::new()).unwrap();
+        let staged = Stage::default().set(&mut scene.clone()).light;
+        (scene.shapes[0].area_light.is_some(), staged)
+    };
+    assert_eq!(shines("d 1"), (true, StageLight::Own));
+    assert_eq!(shines("d 0.25"), (true, StageLight::Own));
+    assert_eq!(shines("d 0"), (false, StageLight::Studio));
+    assert_eq!(shines("d -1"), (false, StageLight::Studio));
+}
+
+#[test]
+fn what_is_not_finite_where_nothing_is_seen_is_a_note() {
+    let start = "v 0 0 0\nv 1 0 0\nv 2 0 0\nv 0 3 0\nvn nan 0 1\nvn 0 0 1\nvt 0 inf\nvt 0 0\n";
+    let check = |faces: &str| {
+        let mut said = Diagnostics::with_strictness(Strictness::Strict);
+        read_obj(format!("{start}{faces}").as_bytes(), &name(), &Budget::default(), &mut said).unwrap();
+        let notes = said.lines().iter().filter(|line| line.starts_with("note: m.obj:")).count() as u64;
+        assert_eq!(said.check().is_ok(), said.warnings() == 0);
+        (said.warnings(), notes)
+    };
+    // Beside a face that is seen, with other normals, or none.
+    assert_eq!(check("f 1/2/2 2/2/2 4/2/2\nf 1/1/1 2/1/1 3/1/1\n"), (0, 2));
+    assert_eq!(check("f 1 2 4\nf 1//1 2//1 3//1\n"), (0, 2));
+    assert_eq!(check("f 1//2 2//1 4//2\n"), (1, 1));
+    assert_eq!(check("f 1/1/2 2/2/1 4/2/2\n"), (2, 0));
+    assert_eq!(check("s 1\nf 1/2 2/2 4/1\n"), (1, 1));
+}

@@ -8,6 +8,7 @@ use crate::common::{changed, shared};
 use lumbre_formats::ply::read_ply;
 use lumbre_formats::{Budget, Diagnostics, FormatError, Input, Limits, ReadOptions, Strictness, open_scene};
 use lumbre_geometry::Shape;
+use lumbre_image::Rgb;
 use lumbre_math::DVec3;
 use lumbre_scene::{GeometryDesc, MeshDesc, Scene, ShapeDesc};
 use lumbre_shading::{MaterialKind, Texture};
@@ -444,4 +445,104 @@ fn texture_coordinates_of_corners_are_those_of_the_faces() {
     let text = file("3 0 1 2 6 0 0 0.5 0 0.5 0.75\n3 0 2 3 6 9 9 0.5 0.75 0 1\n3 4 1 2 0\n");
     let error = read(text.as_bytes()).unwrap_err().to_string();
     assert!(error.contains("face 2 has a vertex that is not there") && error.contains("0 to 3"), "{error}");
+}
+
+#[test]
+fn colours_of_faces_are_those_of_their_corners() {
+    let file = |of_vertices: &str, of_faces: &str, body: &str| {
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 4\n{PLACES}{of_vertices}element face 3\n\
+             property list uchar int vertex_indices\n{of_faces}end_header\n{body}"
+        )
+    };
+    let colours = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+    let places = "0 0 1\n2 0 1\n2 3 1\n0 3 1\n";
+    let text = file("", colours, &format!("{places}3 0 1 2 255 0 0\n3 0 2 3 0 0 255\n4 0 1 2 3 255 0 0\n"));
+    let mut said = Diagnostics::new();
+    let mesh = read_ply(text.as_bytes(), &name(), &Budget::default(), &mut said).unwrap().mesh;
+    assert_eq!(said.lines(), [""; 0]);
+    let (red, blue) = (Rgb::new(1.0, 0.0, 0.0), Rgb::new(0.0, 0.0, 1.0));
+    // Three vertices have two colours.
+    assert_eq!((mesh.positions.len(), mesh.uvs.is_none()), (7, true));
+    let list = mesh.colours.as_ref().unwrap();
+    let all = |corners: &[u32], colour: Rgb| corners.iter().all(|&i| list[i as usize] == colour);
+    assert!(all(&mesh.triangles[0], red) && all(&mesh.triangles[1], blue));
+    assert!(all(&mesh.quads[0], red), "{list:?}");
+
+    // Texture coordinates of corners beside them; floats are linear.
+    let floats =
+        "property float red\nproperty float green\nproperty float blue\nproperty list uchar float texcoord\n";
+    let faces =
+        "3 0 1 2 0.5 0 0 6 0 0 0.5 0 0.5 0.75\n3 0 2 3 0 0 7.5 6 0 0 0.5 0.75 0 1\n3 0 1 3 0 nan 0 0\n";
+    let text = file("", floats, &format!("{places}{faces}"));
+    let read = read_ply(text.as_bytes(), &name(), &Budget::default(), &mut said).unwrap();
+    let (mesh, colours_of, uvs) =
+        (&read.mesh, read.mesh.colours.as_ref().unwrap(), read.mesh.uvs.as_ref().unwrap());
+    assert!(read.has_corner_uvs);
+    for (triangle, colour) in mesh.triangles.iter().zip([[0.5, 0.0, 0.0], [0.0, 0.0, 7.5], [0.0; 3]]) {
+        assert!(triangle.iter().all(|&i| colours_of[i as usize] == Rgb::from(colour)), "{colours_of:?}");
+    }
+    assert_eq!(mesh.triangles[1].map(|i| uvs[i as usize].to_array()), [[0.0, 0.0], [0.5, 0.75], [0.0, 1.0]]);
+    assert!(
+        said.lines().len() == 1 && said.lines()[0].contains("a colour is not finite"),
+        "{:?}",
+        said.lines()
+    );
+
+    // Vertices come first, and that is said.
+    let with = places.replace(" 1\n", " 1 0 255 0\n");
+    let text = file(colours, colours, &format!("{with}3 0 1 2 255 0 0\n3 0 2 3 0 0 255\n3 0 1 3 9 9 9\n"));
+    let mut said = Diagnostics::new();
+    let mesh = read_ply(text.as_bytes(), &name(), &Budget::default(), &mut said).unwrap().mesh;
+    assert!(mesh.colours.unwrap().iter().all(|&c| c == Rgb::new(0.0, 1.0, 0.0)) && mesh.positions.len() == 4);
+    let (lines, expected) =
+        (said.lines(), "colours of \"face\" elements are not used (found colours of vertices");
+    assert!(lines.len() == 1 && lines[0].contains(expected), "{lines:?}");
+
+    // Edges have no colours.
+    let text = format!(
+        "ply\nformat ascii 1.0\nelement vertex 4\n{PLACES}element edge 1\nproperty int vertex1\nproperty int vertex2\n\
+         {colours}end_header\n{places}0 2 255 0 0\n"
+    );
+    let mut said = Diagnostics::new();
+    let edges = read_ply(text.as_bytes(), &name(), &Budget::default(), &mut said).unwrap().edges;
+    assert_eq!(edges, [[0, 2]]);
+    assert!(said.lines()[0].contains("colours of \"edge\" elements are not used"), "{:?}", said.lines());
+}
+
+#[test]
+fn what_is_not_finite_where_nothing_is_seen_is_a_note() {
+    // The third vertex has a normal that is not finite, the fourth such texture coordinates.
+    let file = |faces: &str, count: usize| {
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 4\n{PLACES}property float nx\nproperty float ny\nproperty float nz\n\
+             property float u\nproperty float v\nelement face {count}\nproperty list uchar int vertex_indices\nend_header\n\
+             0 0 1 0 0 1 0 0\n2 0 1 0 0 1 0 0\n2 3 1 nan 0 1 0 0\n4 0 1 0 0 1 inf 0\n{faces}"
+        )
+    };
+    let read = |text: &str| {
+        let mut said = Diagnostics::with_strictness(Strictness::Strict);
+        read_ply(text.as_bytes(), &name(), &Budget::default(), &mut said).unwrap();
+        (said.lines(), said.warnings(), said.check().is_ok())
+    };
+    // A face along a line, and one in a point: nothing of them is seen.
+    let unseen = "3 0 1 3\n3 2 2 2\n4 0 2 2 0\n";
+    let (lines, warnings, passes) = read(&file(unseen, 3));
+    assert_eq!((lines.len() - 1, warnings, passes), (2, 1, false), "{lines:?}");
+    assert!(
+        lines
+            .iter()
+            .filter(|line| line.starts_with("note: m.ply:") && line.contains("no face with an area"))
+            .count()
+            == 2
+    );
+    let seen = |face: &str| {
+        let (lines, warnings, passes) = read(&file(&format!("3 0 1 3\n4 0 2 2 0\n{face}"), 3));
+        let notes = lines.iter().filter(|line| line.starts_with("note: ")).count() as u64;
+        assert_eq!(passes, warnings == 0, "{lines:?}");
+        (warnings, notes)
+    };
+    assert_eq!(seen("3 0 1 2\n"), (1, 1));
+    assert_eq!(seen("3 0 2 3\n"), (2, 0));
+    assert_eq!(seen("4 0 0 1 3\n").1, 2);
 }

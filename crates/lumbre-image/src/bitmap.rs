@@ -1,7 +1,7 @@
 //! A picture as stored in a file: one to four channels in the file's own number format.
 
 use crate::half::half_to_f32;
-use crate::{Encoding, Image, Rgb};
+use crate::{Encoding, Image, Rgb, Window};
 
 /// The values of a [`Bitmap`], channels innermost, row by row from the top left.
 #[derive(Clone, Debug, PartialEq)]
@@ -221,6 +221,79 @@ impl Bitmap {
         }
     }
 
+    /// The picture on a larger or smaller canvas, its upper left corner at (x, y) there. Elsewhere the canvas is black, and
+    /// transparent if the picture has alpha.
+    ///
+    /// # Panics
+    /// When the canvas has no pixels.
+    #[must_use]
+    pub fn placed(&self, x: i32, y: i32, width: u32, height: u32) -> Self {
+        assert!(width > 0 && height > 0, "a canvas with pixels");
+        let here = Window { x, y, width: self.width, height: self.height };
+        let seen = here.intersection(Window { x: 0, y: 0, width, height });
+        let data = match &self.data {
+            PixelData::U8(v) => PixelData::U8(self.on_canvas(v, here, seen, width, height)),
+            PixelData::U16(v) => PixelData::U16(self.on_canvas(v, here, seen, width, height)),
+            PixelData::F16(v) => PixelData::F16(self.on_canvas(v, here, seen, width, height)),
+            PixelData::F32(v) => PixelData::F32(self.on_canvas(v, here, seen, width, height)),
+        };
+        Self { width, height, data, ..*self }
+    }
+
+    fn on_canvas<T: Copy + Default>(
+        &self,
+        values: &[T],
+        here: Window,
+        seen: Option<Window>,
+        width: u32,
+        height: u32,
+    ) -> Vec<T> {
+        let channels = self.channels.count();
+        let mut canvas = vec![T::default(); width as usize * height as usize * channels];
+        let Some(seen) = seen else { return canvas };
+        let (left, top) = (i64::from(seen.x) - i64::from(here.x), i64::from(seen.y) - i64::from(here.y));
+        let span = seen.width as usize * channels;
+        for row in 0..seen.height as usize {
+            let to = ((seen.y as usize + row) * width as usize + seen.x as usize) * channels;
+            let from = ((top as usize + row) * self.width as usize + left as usize) * channels;
+            canvas[to..to + span].copy_from_slice(&values[from..from + span]);
+        }
+        canvas
+    }
+
+    /// Makes texels black that have a channel that is infinite or no number. How many there were, and the place of the first,
+    /// from the top left.
+    pub fn blacken_not_finite(&mut self) -> (usize, (u32, u32)) {
+        let (channels, width) = (self.channels.count(), self.width as usize);
+        let (mut count, mut first) = (0, (0, 0));
+        let mut note = |texel: usize| {
+            if count == 0 {
+                first = ((texel % width) as u32, (texel / width) as u32);
+            }
+            count += 1;
+        };
+        match &mut self.data {
+            PixelData::U8(_) | PixelData::U16(_) => {}
+            PixelData::F16(v) => {
+                for (i, texel) in v.chunks_exact_mut(channels).enumerate() {
+                    if texel.iter().any(|&bits| !half_to_f32(bits).is_finite()) {
+                        texel.fill(0);
+                        note(i);
+                    }
+                }
+            }
+            PixelData::F32(v) => {
+                for (i, texel) in v.chunks_exact_mut(channels).enumerate() {
+                    if texel.iter().any(|v| !v.is_finite()) {
+                        texel.fill(0.0);
+                        note(i);
+                    }
+                }
+            }
+        }
+        (count, first)
+    }
+
     fn index(&self, x: u32, y: u32, c: usize) -> usize {
         assert!(
             x < self.width && y < self.height && c < self.channels.count(),
@@ -237,6 +310,45 @@ impl Bitmap {
 mod tests {
     use super::*;
     use crate::half::f32_to_half;
+
+    #[test]
+    fn a_picture_on_a_canvas_stands_in_its_place() {
+        // 3 by 2 pixels of grey and alpha, each of another value.
+        let data: Vec<u16> = (1..=12).collect();
+        let picture = Bitmap::new(3, 2, Channels::Ya, PixelData::U16(data), Encoding::Linear).unwrap();
+        let canvas = picture.placed(2, 3, 7, 9);
+        assert_eq!((canvas.width(), canvas.height(), canvas.channels()), (7, 9, Channels::Ya));
+        let PixelData::U16(values) = canvas.data() else { panic!("another kind") };
+        let mut inside = 0;
+        for (i, pair) in values.chunks(2).enumerate() {
+            let (x, y) = (i as i32 % 7 - 2, i as i32 / 7 - 3);
+            let is_in = (0..3).contains(&x) && (0..2).contains(&y);
+            let first = if is_in { 2 * (3 * y + x) + 1 } else { -1 };
+            inside += i32::from(is_in);
+            assert_eq!(pair, if is_in { [first as u16, first as u16 + 1] } else { [0, 0] }, "{x} {y}");
+        }
+        assert_eq!(inside, 6);
+        // What is beyond the canvas is cut off, on every side.
+        let cut = picture.placed(-1, -1, 1, 1);
+        assert_eq!(cut.data(), &PixelData::U16(vec![9, 10]));
+        assert_eq!(picture.placed(3, 0, 3, 2).data(), &PixelData::U16(vec![0; 12]));
+        assert_eq!(picture.placed(i32::MIN, i32::MAX, 3, 2).data(), &PixelData::U16(vec![0; 12]));
+    }
+
+    #[test]
+    fn texels_that_are_not_finite_become_black_and_others_stay() {
+        let values =
+            vec![0.5, 1.0, f32::NAN, 3.0, f32::MAX, 5.0, f32::NEG_INFINITY, 0.0, -7.0, 0.0, 1.0, 2.0];
+        let mut picture = Bitmap::new(2, 2, Channels::Rgb, PixelData::F32(values), Encoding::Linear).unwrap();
+        assert_eq!(picture.blacken_not_finite(), (2, (0, 0)));
+        let expected = [0.0, 0.0, 0.0, 3.0, f32::MAX, 5.0, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0];
+        assert_eq!(picture.data(), &PixelData::F32(expected.to_vec()));
+        assert_eq!(picture.blacken_not_finite().0, 0);
+        let halves = [1.0, 2.0, 3.0, 4.0, 5.0, f32::INFINITY].map(f32_to_half).to_vec();
+        let mut picture = Bitmap::new(2, 3, Channels::Y, PixelData::F16(halves), Encoding::Linear).unwrap();
+        assert_eq!(picture.blacken_not_finite(), (1, (1, 2)));
+        assert_eq!((picture.texel(1, 2, 0), picture.texel(0, 2, 0)), (0.0, 5.0));
+    }
 
     #[test]
     fn texels_are_light_in_every_number_format() {

@@ -14,6 +14,7 @@ use crate::columns::PictureStart;
 use crate::intersect::Isa;
 use crate::intersect::filter_start::FilterStart;
 use crate::io::{bytes, mapped};
+use crate::point::flats::Flats;
 use crate::point::winding::{self, Moments};
 use crate::point::{closest_point, inside};
 use crate::trace::f32_ray::{self, F32Queries};
@@ -62,6 +63,8 @@ pub struct Accel {
     pub(crate) masks: Vec<u32>,
     /// For winding numbers, once one was asked for.
     pub(crate) moments: OnceLock<Moments>,
+    /// For closest points, once one was asked for.
+    pub(crate) flats: OnceLock<Flats>,
 }
 
 /// What a build, or a file, makes.
@@ -220,6 +223,7 @@ impl Accel {
             built_cost: None,
             masks: Vec::new(),
             moments: OnceLock::new(),
+            flats: OnceLock::new(),
             geometries,
         }
     }
@@ -237,6 +241,7 @@ impl Accel {
         self.picture = PictureStart::new(&self.geometries, self.single.as_ref());
         self.bounding_volumes = BoundingVolumes::new(&self.geometries, &self.tree.entries, &self.tree_space);
         self.moments = OnceLock::new();
+        self.flats = OnceLock::new();
     }
 
     /// How the tree is put together, as bytes for a file: some six a triangle, whatever the machine. The geometries are not
@@ -529,8 +534,9 @@ impl Accel {
     }
 
     /// The nearest point of all surfaces within `max_distance` (itself included; infinite for anywhere), or `None` where there
-    /// is none so near. Of points as near, the one whose (path, geometry, primitive) comes first. Triangles without area do
-    /// not count. Nothing is near a point that is not finite.
+    /// is none so near. Of points as near, the one whose (path, geometry, primitive) comes first. Triangles without area and spheres
+    /// without a radius count as the lines and points that they are, although no ray hits them: the first call looks for them. Nothing
+    /// is near a point that is not finite.
     ///
     /// Distances to triangles are exact up to rounding under any map; those to shapes wherever
     /// [`Shape::closest_point`](lumbre_geometry::Shape::closest_point) has a method.
@@ -667,6 +673,7 @@ impl Accel {
             + bytes(&self.infinite)
             + bytes(&self.masks)
             + self.moments.get().map_or(0, Moments::memory_bytes)
+            + self.flats.get().map_or(0, Flats::memory_bytes)
     }
 
     /// What the corners of a mesh are relative to.

@@ -1,17 +1,21 @@
 //! Ray queries of arrays.
 
 use std::ops::ControlFlow;
+use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::{AtomicBool, AtomicU64};
 
 use lumbre::description::Footprint;
 use lumbre::kernel::Hit;
 use lumbre::{CastHit, Ray, Scene};
+use lumbre_cli::memory_left;
 use numpy::{PyArray1, PyArrayMethods, PyReadwriteArray1};
+use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use rayon::prelude::*;
 
 use crate::columns::{Columns, Fresh, NONE, Outputs, Row};
-use crate::errors::invalid;
+use crate::errors::{filled, invalid, list};
 use crate::rays::{Rays, Real};
 use crate::work::{Stop, interruptible, pool};
 
@@ -21,6 +25,8 @@ pub(crate) const PIECE: usize = 4096;
 const LEAST: usize = 256;
 /// So few are not worth waking threads for.
 const FEW: usize = 256;
+/// The answers of more rays are arrays that Python makes, which knows how much memory there is.
+const MOST_FRESH: usize = 1 << 16;
 
 /// Into how large pieces to cut a list, so that all threads have work to its end.
 pub(crate) fn piece_size(count: usize) -> PyResult<usize> {
@@ -58,7 +64,7 @@ pub(crate) fn closest<T: Real>(
     let rays = rays.view();
     let count = rays.len();
     let mut outputs = Outputs::<T>::new(out, count)?;
-    let pieces = outputs.columns(count)?.pieces(piece_size(count)?);
+    let pieces = outputs.columns(count)?.pieces(piece_size(count)?)?;
     each_piece(py, count, pieces, |mut piece| closest_of(scene, &rays.read(piece.range()), &mut piece))
 }
 
@@ -71,8 +77,11 @@ pub(crate) fn closest_fresh<'py, T: Real>(
 ) -> PyResult<Option<Bound<'py, PyDict>>> {
     let rays = rays.view();
     let count = rays.len();
+    if count > MOST_FRESH {
+        return Ok(None);
+    }
     let Some(mut fresh) = Fresh::<T>::new(fields, count)? else { return Ok(None) };
-    let pieces = fresh.columns(count).pieces(piece_size(count)?);
+    let pieces = fresh.columns(count).pieces(piece_size(count)?)?;
     each_piece(py, count, pieces, |mut piece| closest_of(scene, &rays.read(piece.range()), &mut piece))?;
     fresh.into_dict(py).map(Some)
 }
@@ -130,15 +139,19 @@ pub(crate) fn any<T: Real>(
     any_into(py, scene, rays, out.as_slice_mut()?)
 }
 
-/// The same as a new array.
+/// The same as a new array; `None` where it is for Python to make.
 pub(crate) fn any_fresh<'py, T: Real>(
     py: Python<'py>,
     scene: &Scene,
     rays: &Rays<'_, T>,
-) -> PyResult<Bound<'py, PyArray1<bool>>> {
-    let mut out = vec![false; rays.view().len()];
+) -> PyResult<Option<Bound<'py, PyArray1<bool>>>> {
+    let count = rays.view().len();
+    if count > MOST_FRESH {
+        return Ok(None);
+    }
+    let mut out = filled(false, count)?;
     any_into(py, scene, rays, &mut out)?;
-    Ok(PyArray1::from_vec(py, out))
+    Ok(Some(PyArray1::from_vec(py, out)))
 }
 
 fn any_into<T: Real>(py: Python<'_>, scene: &Scene, rays: &Rays<'_, T>, out: &mut [bool]) -> PyResult<()> {
@@ -185,7 +198,8 @@ fn fill<O: Send>(
         return Err(invalid(format!("out has the wrong length (found {}; expected {count})", out.len())));
     }
     let size = piece_size(count)?;
-    let pieces = out.chunks_mut(size).enumerate().collect();
+    let mut pieces = list(count.div_ceil(size))?;
+    pieces.extend(out.chunks_mut(size).enumerate());
     each_piece(py, count, pieces, |(number, piece): (usize, &mut [O])| work(number * size, piece))
 }
 
@@ -198,39 +212,78 @@ pub(crate) fn all<'py, T: Real>(
     let rays = rays.view();
     let count = rays.len();
     let size = piece_size(count)?;
-    let mut found: Vec<(Vec<CastHit>, Vec<i64>)> = vec![Default::default(); count.div_ceil(size)];
-    let pieces = found.iter_mut().enumerate().collect();
+    let mut found: Vec<(Vec<CastHit>, Vec<i64>)> = filled(Default::default(), count.div_ceil(size))?;
+    let mut pieces = list(found.len())?;
+    pieces.extend(found.iter_mut().enumerate());
+    // The hits themselves, and the columns that are made of them.
+    let left = memory_left();
+    let most = left / (size_of::<CastHit>() + 8 * size_of::<T>() + 3 * size_of::<i32>() + 1) as u64;
+    let (held, is_full) = (AtomicU64::new(0), AtomicBool::new(false));
     each_piece(py, count, pieces, |(number, (hits, ends))| {
-        for ray in number * size..count.min((number + 1) * size) {
+        let rays_of_piece = number * size..count.min((number + 1) * size);
+        if ends.try_reserve_exact(rays_of_piece.len()).is_err() {
+            is_full.store(true, Relaxed);
+        }
+        for ray in rays_of_piece {
+            if is_full.load(Relaxed) {
+                return;
+            }
+            let before = hits.len();
             scene.all(&rays.ray(ray), |hit| {
+                let is_beyond = (hits.len() - before) as u64 >= most;
+                if is_beyond || hits.try_reserve(1).is_err() {
+                    is_full.store(true, Relaxed);
+                    return ControlFlow::Break(());
+                }
                 hits.push(hit);
                 ControlFlow::Continue(())
             });
+            let more = (hits.len() - before) as u64;
+            if held.fetch_add(more, Relaxed).saturating_add(more) > most {
+                is_full.store(true, Relaxed);
+            }
             ends.push(hits.len() as i64);
         }
     })?;
-    let mut offsets = Vec::with_capacity(count + 1);
+    if is_full.into_inner() {
+        return Err(PyMemoryError::new_err(format!(
+            "the hits of {count} rays do not fit into {left} bytes of memory (cast fewer rays at a time)"
+        )));
+    }
+    let mut offsets = list(count.saturating_add(1))?;
     offsets.push(0);
     let mut before = 0;
     for (hits, ends) in &found {
         offsets.extend(ends.iter().map(|end| before + end));
         before += hits.len() as i64;
     }
+    let all = before as usize;
     let hits = || found.iter().flat_map(|(hits, _)| hits);
     let columns = PyDict::new(py);
     columns.set_item("offsets", PyArray1::from_vec(py, offsets))?;
-    let number = |of: fn(&CastHit) -> i64| PyArray1::from_iter(py, hits().map(|hit| of(hit) as i32));
+    let number = |of: fn(&CastHit) -> i64| column(py, all, hits().map(|hit| of(hit) as i32));
     let table = |width: usize, of: fn(&CastHit) -> [f64; 3]| {
         let rows = hits().flat_map(|hit| of(hit).into_iter().take(width).map(T::rounded));
-        PyArray1::from_vec(py, rows.collect()).reshape([before as usize, width])
+        column(py, all * width, rows)?.reshape([all, width])
     };
-    columns.set_item("t", PyArray1::from_iter(py, hits().map(|hit| T::rounded(hit.t))))?;
+    columns.set_item("t", column(py, all, hits().map(|hit| T::rounded(hit.t)))?)?;
     columns.set_item("point", table(3, |hit| hit.point.to_array())?)?;
     columns.set_item("normal", table(3, |hit| hit.normal.to_array())?)?;
     columns.set_item("uv", table(2, |hit| [hit.uv.x, hit.uv.y, 0.0])?)?;
-    columns.set_item("front", PyArray1::from_iter(py, hits().map(|hit| hit.front)))?;
-    columns.set_item("shape", number(|hit| hit.shape.into()))?;
-    columns.set_item("prim", number(|hit| hit.primitive.into()))?;
-    columns.set_item("instance", number(|hit| hit.instance.map_or(NONE.into(), i64::from)))?;
+    columns.set_item("front", column(py, all, hits().map(|hit| hit.front))?)?;
+    columns.set_item("shape", number(|hit| hit.shape.into())?)?;
+    columns.set_item("prim", number(|hit| hit.primitive.into())?)?;
+    columns.set_item("instance", number(|hit| hit.instance.map_or(NONE.into(), i64::from))?)?;
     Ok(columns)
+}
+
+/// An array of `count` numbers.
+fn column<'py, N: numpy::Element>(
+    py: Python<'py>,
+    count: usize,
+    numbers: impl Iterator<Item = N>,
+) -> PyResult<Bound<'py, PyArray1<N>>> {
+    let mut column = list(count)?;
+    column.extend(numbers);
+    Ok(PyArray1::from_vec(py, column))
 }

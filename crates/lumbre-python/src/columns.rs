@@ -9,7 +9,7 @@ use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
 
-use crate::errors::invalid;
+use crate::errors::{filled, invalid, list};
 use crate::rays::Real;
 
 /// So many numbers are sooner copied than handed over.
@@ -58,14 +58,14 @@ impl<T: Real> Fresh<T> {
         let zero = T::rounded(0.0);
         for field in fields {
             match field.cast::<PyString>()?.to_cow()?.as_ref() {
-                "t" => fresh.t = Some(vec![zero; count]),
-                "point" => fresh.point = Some(vec![zero; 3 * count]),
-                "normal" => fresh.normal = Some(vec![zero; 3 * count]),
-                "uv" => fresh.uv = Some(vec![zero; 2 * count]),
-                "front" => fresh.front = Some(vec![false; count]),
-                "shape" => fresh.shape = Some(vec![0; count]),
-                "prim" => fresh.prim = Some(vec![0; count]),
-                "instance" => fresh.instance = Some(vec![0; count]),
+                "t" => fresh.t = Some(filled(zero, count)?),
+                "point" => fresh.point = Some(filled(zero, 3 * count)?),
+                "normal" => fresh.normal = Some(filled(zero, 3 * count)?),
+                "uv" => fresh.uv = Some(filled(zero, 2 * count)?),
+                "front" => fresh.front = Some(filled(false, count)?),
+                "shape" => fresh.shape = Some(filled(0, count)?),
+                "prim" => fresh.prim = Some(filled(0, count)?),
+                "instance" => fresh.instance = Some(filled(0, count)?),
                 _ => return Ok(None),
             }
         }
@@ -250,14 +250,14 @@ fn slice<'a, T: Element, D: numpy::ndarray::Dimension>(
 
 impl<'a, T: Real> Columns<'a, T> {
     /// The same rows in pieces of so many rays.
-    pub(crate) fn pieces(mut self, size: usize) -> Vec<Self> {
-        let mut pieces = Vec::with_capacity(self.count.div_ceil(size));
+    pub(crate) fn pieces(mut self, size: usize) -> PyResult<Vec<Self>> {
+        let mut pieces = list(self.count.div_ceil(size).max(1))?;
         while self.count > size {
             let rest = self.split_off(size);
             pieces.push(std::mem::replace(&mut self, rest));
         }
         pieces.push(self);
-        pieces
+        Ok(pieces)
     }
 
     /// Keeps the first rays, and returns the others.

@@ -3,7 +3,7 @@
 use lumbre::{Error, ErrorKind};
 use lumbre_cli::Failure;
 use pyo3::exceptions::{PyMemoryError, PyOSError, PyValueError};
-use pyo3::{PyErr, create_exception};
+use pyo3::{PyErr, PyResult, create_exception};
 
 create_exception!(
     lumbre._lumbre,
@@ -45,6 +45,31 @@ fn system_error(error: &Error) -> Option<i32> {
         source = error.source();
     }
     None
+}
+
+/// The exception for what does not fit into memory.
+pub(crate) fn too_large(what: &str, bytes: u64, left: u64) -> PyErr {
+    PyMemoryError::new_err(format!("{what}: needs {bytes} bytes of memory, {left} are left"))
+}
+
+/// The exception for memory that the system does not give.
+pub(crate) fn no_memory<T>(count: usize) -> PyErr {
+    let bytes = count as u128 * size_of::<T>() as u128;
+    PyMemoryError::new_err(format!("the system has no {bytes} bytes of memory for this"))
+}
+
+/// An empty list with room for `count` items.
+pub(crate) fn list<T>(count: usize) -> PyResult<Vec<T>> {
+    let mut list = Vec::new();
+    list.try_reserve_exact(count).map_err(|_| no_memory::<T>(count))?;
+    Ok(list)
+}
+
+/// A list of `count` times the same.
+pub(crate) fn filled<T: Clone>(value: T, count: usize) -> PyResult<Vec<T>> {
+    let mut list = list(count)?;
+    list.resize(count, value);
+    Ok(list)
 }
 
 /// The exception for what is wrong with a value.

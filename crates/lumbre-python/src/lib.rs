@@ -31,5 +31,5 @@ mod _lumbre {
     #[pymodule_export]
     use crate::viewer::Viewer;
     #[pymodule_export]
-    use crate::work::{panic_on_purpose, thread_count};
+    use crate::work::{memory_left, panic_on_purpose, thread_count};
 }

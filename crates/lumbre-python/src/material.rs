@@ -12,7 +12,7 @@ use lumbre::shading::{
 use numpy::{PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::errors::invalid;
+use crate::errors::{invalid, list};
 use crate::scene::unknown;
 
 /// An image on a surface.
@@ -32,11 +32,11 @@ impl Texture {
         offset: [f32; 2],
     ) -> PyResult<Self> {
         let ([height, width, channels], data) = if let Ok(bytes) = texels.extract() {
-            read(&bytes, PixelData::U8)
+            read(&bytes, PixelData::U8)?
         } else if let Ok(numbers) = texels.extract() {
-            read(&numbers, PixelData::U16)
+            read(&numbers, PixelData::U16)?
         } else {
-            read(&texels.extract()?, PixelData::F32)
+            read(&texels.extract()?, PixelData::F32)?
         };
         let encoding = if is_srgb { Encoding::Srgb } else { Encoding::Linear };
         let bitmap = Channels::from_count(channels)
@@ -69,9 +69,11 @@ impl Texture {
 fn read<T: numpy::Element + Copy>(
     texels: &PyReadonlyArray3<'_, T>,
     of: fn(Vec<T>) -> PixelData,
-) -> ([usize; 3], PixelData) {
-    let &[height, width, channels] = texels.shape() else { return ([0; 3], of(Vec::new())) };
-    ([height, width, channels], of(texels.as_array().iter().copied().collect()))
+) -> PyResult<([usize; 3], PixelData)> {
+    let &[height, width, channels] = texels.shape() else { return Ok(([0; 3], of(Vec::new()))) };
+    let mut numbers = list(height * width * channels)?;
+    numbers.extend(texels.as_array().iter().copied());
+    Ok(([height, width, channels], of(numbers)))
 }
 
 /// A colour, or one for each place.
@@ -132,12 +134,19 @@ fn index(ior: f32) -> PyResult<f32> {
     Err(invalid(format!("ior is out of range (found {ior}; expected a number above 0)")))
 }
 
-/// The appearance of a surface.
+/// The appearance of a surface. What is made of it shares it.
 #[pyclass(frozen, module = "lumbre._lumbre")]
-pub(crate) struct Material(pub(crate) MaterialDesc);
+pub(crate) struct Material {
+    pub(crate) desc: Arc<MaterialDesc>,
+    /// Mixtures in mixtures.
+    depth: usize,
+}
+
+/// As deep as in a scene file: dropping and drawing them takes steps of each.
+const MOST_MIXTURES: usize = 64;
 
 fn made(kind: MaterialKind) -> PyResult<Material> {
-    Ok(Material(MaterialDesc::new(kind)))
+    Ok(Material { desc: MaterialDesc::new(kind).into(), depth: 0 })
 }
 
 #[pymethods]
@@ -193,8 +202,13 @@ impl Material {
 
     #[staticmethod]
     fn mix(first: &Bound<'_, Self>, second: &Bound<'_, Self>, amount: Number<'_>) -> PyResult<Self> {
-        let materials = [first, second].map(|material| Arc::new(material.get().0.clone()));
-        made(MaterialKind::Mix { materials, amount: amount.share("amount")? })
+        let depth = 1 + first.get().depth.max(second.get().depth);
+        if depth > MOST_MIXTURES {
+            return Err(invalid(format!("mixtures stand in each other more than {MOST_MIXTURES} deep")));
+        }
+        let materials = [first, second].map(|material| Arc::clone(&material.get().desc));
+        let mixture = made(MaterialKind::Mix { materials, amount: amount.share("amount")? })?;
+        Ok(Self { depth, ..mixture })
     }
 
     #[staticmethod]
@@ -253,12 +267,12 @@ impl Material {
         normal_map: Option<&Bound<'_, Texture>>,
         bump_map: Option<&Bound<'_, Texture>>,
     ) -> PyResult<Self> {
-        let mut material = self.0.clone();
+        let mut material = MaterialDesc::clone(&self.desc);
         if matches!(material.kind, MaterialKind::Mix { .. }) && (normal_map.is_some() || bump_map.is_some()) {
             return Err(invalid("a mixture has no maps of its own (expected them on its materials)"));
         }
         material.normal_map = normal_map.map(|map| map.get().0.clone());
         material.displacement = bump_map.map(|map| Arc::new(FloatTexture::Image(map.get().0.clone())));
-        Ok(Self(material))
+        Ok(Self { desc: material.into(), depth: self.depth })
     }
 }

@@ -11,7 +11,7 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray3, PyUn
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::errors::{invalid, raised};
+use crate::errors::{invalid, list, raised};
 use crate::scene::{Shown, unknown};
 
 /// A rendered picture, with the sums of its samples.
@@ -120,7 +120,8 @@ type Pixels = (Py<PyArray3<f32>>, Option<Py<PyArray2<f32>>>);
 type PiecePlace = (u32, u32, (u32, u32, u32, u32));
 
 fn array(py: Python<'_>, image: &Image) -> PyResult<Py<PyArray3<f32>>> {
-    let numbers = image.pixels().iter().flat_map(|pixel| pixel.to_array()).collect();
+    let mut numbers = list(3 * image.pixels().len())?;
+    numbers.extend(image.pixels().iter().flat_map(|pixel| pixel.to_array()));
     let shape = [image.height() as usize, image.width() as usize, 3];
     Ok(PyArray1::from_vec(py, numbers).reshape(shape)?.unbind())
 }
@@ -307,8 +308,9 @@ pub(crate) fn write_image(
     };
     let view = pixels.as_array();
     let pixel = |i: usize| Rgb::from(std::array::from_fn(|channel| view[[i / width, i % width, channel]]));
-    let pixels = (0..width * height).map(pixel).collect();
-    let image = Image::from_pixels(width as u32, height as u32, pixels);
+    let mut colours = list(width * height)?;
+    colours.extend((0..width * height).map(pixel));
+    let image = Image::from_pixels(width as u32, height as u32, colours);
     let image = image.ok_or_else(|| invalid(format!("there is no image of {width} by {height} pixels")))?;
     py.detach(|| lumbre::write_image(&path, &image, &options)).map_err(raised)
 }

@@ -41,7 +41,7 @@ pub(crate) fn closest<T: Real>(
 ) -> PyResult<()> {
     let (points, count) = (points.view(), points.len());
     let mut outputs = Outputs::<T>::new(out, count)?;
-    let pieces = outputs.columns(count)?.pieces(piece_size(count)?);
+    let pieces = outputs.columns(count)?.pieces(piece_size(count)?)?;
     let first = First::default();
     each_piece(py, count, pieces, |mut piece| {
         for (row, number) in piece.range().enumerate() {

@@ -13,13 +13,13 @@ use lumbre::{
     CancelToken, Job, Part as PartDesc, PixelBounds, Progress, Ray, ReadOptions, RenderOptions, SceneBuilder,
     SceneDesc, State, UpAxis,
 };
-use lumbre_cli::{Defaults, Format, Language, MODEL_SPP, Request, Things};
+use lumbre_cli::{Defaults, Format, Language, MODEL_SPP, Request, Things, memory_left};
 use numpy::{PyArray1, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
 
-use crate::errors::{failed, invalid, raised};
+use crate::errors::{failed, invalid, raised, too_large};
 use crate::picture::{Look, Picture};
 use crate::rays::{Rays, Triples, is_single};
 use crate::shape::{Camera, Light, Placed, placed, transform};
@@ -222,7 +222,7 @@ impl Scene {
                 return Ok(Some(PyArray1::from_slice(py, &[self.scene.any(&ray)])));
             }
             let rays = Rays::<Real>::ready(origins, directions, tmin, tmax);
-            rays.map_or(Ok(None), |rays| cast::any_fresh(py, &self.scene, &rays).map(Some))
+            rays.map_or(Ok(None), |rays| cast::any_fresh(py, &self.scene, &rays))
         })
     }
 
@@ -300,6 +300,7 @@ impl Scene {
         progress: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Picture> {
         let Asked { shown, options, is_transparent, denoises, keeps_part } = self.asked(py, options)?;
+        check_memory(&options)?;
         let look = py.detach(|| Look::of(&shown, &options, is_transparent)).map_err(raised)?;
         let tells = progress.map(Bound::unbind);
         let (watch, cancel) = (Watch::default(), CancelToken::new());
@@ -552,6 +553,21 @@ impl Scene {
         asked.options.transparent = asked.is_transparent || asked.shown.defaults.background().is_some();
         Ok(asked)
     }
+}
+
+/// Refuses a picture that would not fit into memory.
+fn check_memory(options: &RenderOptions) -> PyResult<()> {
+    // The arrays of numpy, each of which is made of another list: the picture, its alpha, and a feature.
+    const ARRAYS: u64 = 64;
+    let pixels = options.bounds().map_err(lumbre::Error::from).map_err(raised)?.area();
+    let rendered = options.memory_bytes().map_err(lumbre::Error::from).map_err(raised)?;
+    let needed = rendered.saturating_add(pixels.saturating_mul(ARRAYS));
+    let left = memory_left();
+    if needed <= left {
+        return Ok(());
+    }
+    let what = format!("a picture of {} by {} pixels", options.width, options.height);
+    Err(too_large(&what, needed, left))
 }
 
 /// The value of an option, if it is given.

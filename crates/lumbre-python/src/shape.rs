@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use lumbre::description::{Camera as CameraDesc, CameraView, CsgOperation, LightDesc, MeshDesc};
 use lumbre::geometry::{
-    BilinearPatch, Capsule, Cone, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, Plane, Quadric, Shape,
-    ShapeError, Sphere, Torus, Triangle,
+    BilinearPatch, Capsule, Cone, Csg, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, Plane, Quadric,
+    Shape, ShapeError, Sphere, Torus, Triangle,
 };
 use lumbre::image::{Image, Rgb};
 use lumbre::math::{DMat4, Vec2, Vec3};
@@ -15,7 +15,7 @@ use numpy::ndarray::ArrayView2;
 use numpy::{PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::errors::invalid;
+use crate::errors::{invalid, list};
 use crate::material::{Material, colour};
 use crate::scene::unknown;
 
@@ -23,7 +23,24 @@ type Triple = [f64; 3];
 
 /// A geometry without a place, material and light.
 #[pyclass(frozen, module = "lumbre._lumbre")]
-pub(crate) struct Geometry(ShapeBuilder);
+pub(crate) struct Geometry {
+    shape: ShapeBuilder,
+    /// Shapes in it, each as often as it stands there.
+    leaves: u64,
+    /// CSG in CSG.
+    depth: usize,
+}
+
+/// As deep as scenes have CSG.
+const MOST_NESTED: usize = Csg::MAX_DEPTH / 2;
+/// A scene has a description of each, of some 500 bytes.
+const MOST_LEAVES: u64 = 1 << 22;
+
+impl From<ShapeBuilder> for Geometry {
+    fn from(shape: ShapeBuilder) -> Self {
+        Self { shape, leaves: 1, depth: 0 }
+    }
+}
 
 /// A geometry with its place, material and emitted radiance.
 pub(crate) type Placed<'py> =
@@ -31,12 +48,12 @@ pub(crate) type Placed<'py> =
 
 /// The shape of these.
 pub(crate) fn placed((geometry, place, material, emission): &Placed<'_>) -> PyResult<ShapeBuilder> {
-    let mut shape = geometry.get().0.clone();
+    let mut shape = geometry.get().shape.clone();
     if let Some(place) = place {
         shape = shape.at(transform(*place)?);
     }
     if let Some(material) = material {
-        shape = shape.material(material.get().0.clone());
+        shape = shape.material(Arc::clone(&material.get().desc));
     }
     if let Some(emission) = emission {
         shape = shape.shining(colour("emission", *emission)?);
@@ -45,11 +62,13 @@ pub(crate) fn placed((geometry, place, material, emission): &Placed<'_>) -> PyRe
 }
 
 fn exact<S: Into<Shape>>(shape: Result<S, ShapeError>) -> PyResult<Geometry> {
-    Ok(Geometry(ShapeBuilder::exact(shape.map_err(invalid)?)))
+    Ok(ShapeBuilder::exact(shape.map_err(invalid)?).into())
 }
 
-fn rows<const N: usize, T: Copy, U>(view: &ArrayView2<'_, T>, of: impl Fn([T; N]) -> U) -> Vec<U> {
-    (0..view.nrows()).map(|row| of(std::array::from_fn(|column| view[[row, column]]))).collect()
+fn rows<const N: usize, T: Copy, U>(view: &ArrayView2<'_, T>, of: impl Fn([T; N]) -> U) -> PyResult<Vec<U>> {
+    let mut rows = list(view.nrows())?;
+    rows.extend((0..view.nrows()).map(|row| of(std::array::from_fn(|column| view[[row, column]]))));
+    Ok(rows)
 }
 
 fn check_width<T: numpy::Element>(name: &str, array: &PyReadonlyArray2<'_, T>, width: usize) -> PyResult<()> {
@@ -140,8 +159,21 @@ impl Geometry {
             _ => return Err(unknown("operation", operation, &["union", "intersection", "difference"])),
         };
         let operand = |shapes: &Vec<Placed<'_>>| shapes.iter().map(placed).collect::<PyResult<Vec<_>>>();
+        let parts = || operands.iter().flatten().map(|(geometry, ..)| geometry.get());
+        let leaves = parts().fold(0, |leaves: u64, part| leaves.saturating_add(part.leaves));
+        let depth = 1 + parts().map(|part| part.depth).max().unwrap_or(0);
+        if leaves > MOST_LEAVES {
+            return Err(invalid(format!(
+                "CSG of too many shapes (found {leaves}; expected at most {MOST_LEAVES})"
+            )));
+        }
+        if depth > MOST_NESTED {
+            return Err(invalid(format!(
+                "CSG stands in CSG more than {MOST_NESTED} deep (Union(*shapes) makes one of many)"
+            )));
+        }
         let operands = operands.iter().map(operand).collect::<PyResult<_>>()?;
-        Ok(Self(ShapeBuilder::csg(operation, operands)))
+        Ok(Self { shape: ShapeBuilder::csg(operation, operands), leaves, depth })
     }
 
     /// Triangles or quads of (V, 3) vertices in double precision and (F, 3) or (F, 4) faces. `is_precise` says whether rays meet
@@ -156,7 +188,7 @@ impl Geometry {
         is_precise: bool,
     ) -> PyResult<Self> {
         check_width("vertices", &vertices, 3)?;
-        let places: Vec<DVec3> = rows(&vertices.as_array(), |place: Triple| place.into());
+        let places: Vec<DVec3> = rows(&vertices.as_array(), |place: Triple| place.into())?;
         if let Some(vertex) = places.iter().position(|place| !place.is_finite()) {
             return Err(invalid(format!("vertex {vertex} is not finite")));
         }
@@ -172,8 +204,8 @@ impl Geometry {
         }
         let (mut triangles, mut quads) = (Vec::new(), Vec::new());
         match faces.ncols() {
-            3 => triangles = rows(&faces, |face: [i64; 3]| face.map(|vertex| vertex as u32)),
-            4 => quads = rows(&faces, |face: [i64; 4]| face.map(|vertex| vertex as u32)),
+            3 => triangles = rows(&faces, |face: [i64; 3]| face.map(|vertex| vertex as u32))?,
+            4 => quads = rows(&faces, |face: [i64; 4]| face.map(|vertex| vertex as u32))?,
             found => return Err(invalid(format!("faces have {found} corners (expected 3 or 4)"))),
         }
         if is_precise && !quads.is_empty() {
@@ -195,24 +227,29 @@ impl Geometry {
         }
         let is_coloured = colors.is_some();
         let narrow = |numbers: Triple| Vec3::from(numbers.map(|x| x as f32));
+        let mut positions = list(places.len())?;
+        positions.extend(places.iter().map(|place| place.as_vec3()));
         let mesh = MeshDesc {
-            positions: places.iter().map(|place| place.as_vec3()).collect(),
+            positions,
             precise_positions: is_precise.then_some(places),
             triangles,
             quads,
-            normals: normals.map(|normals| rows(&normals.as_array(), narrow)),
+            normals: normals.map(|normals| rows(&normals.as_array(), narrow)).transpose()?,
             colours: colors
-                .map(|colors| rows(&colors.as_array(), |colour: Triple| Rgb::from(colour.map(|x| x as f32)))),
-            uvs: uvs.map(|uvs| rows(&uvs.as_array(), |uv: [f64; 2]| Vec2::from(uv.map(|x| x as f32)))),
+                .map(|colors| rows(&colors.as_array(), |colour: Triple| Rgb::from(colour.map(|x| x as f32))))
+                .transpose()?,
+            uvs: uvs
+                .map(|uvs| rows(&uvs.as_array(), |uv: [f64; 2]| Vec2::from(uv.map(|x| x as f32))))
+                .transpose()?,
             ..MeshDesc::default()
         };
         let shape = ShapeBuilder::mesh(mesh);
         if !is_coloured {
-            return Ok(Self(shape));
+            return Ok(shape.into());
         }
         // As a file of coloured vertices has it.
         let reflectance = Arc::new(SpectrumTexture::Vertices);
-        Ok(Self(shape.material(MaterialDesc::new(MaterialKind::Diffuse { reflectance }))))
+        Ok(shape.material(MaterialDesc::new(MaterialKind::Diffuse { reflectance })).into())
     }
 }
 
@@ -296,7 +333,8 @@ impl Light {
                 view[[i / width, i % width, 2]],
             )
         };
-        let pixels = (0..width * height).map(pixel).collect();
+        let mut pixels = list(width * height)?;
+        pixels.extend((0..width * height).map(pixel));
         let described = Image::from_pixels(width as u32, height as u32, pixels)
             .and_then(|image| EnvironmentDesc::of_image(Arc::new(image)));
         let described = described.ok_or_else(|| {

@@ -107,3 +107,9 @@ pub(crate) fn thread_count() -> PyResult<usize> {
 pub(crate) fn panic_on_purpose(py: Python<'_>) -> PyResult<()> {
     interruptible(py, |_| panic!("on purpose"), |_| Ok(()))
 }
+
+/// Bytes of memory that are left for what is asked for next.
+#[pyfunction]
+pub(crate) fn memory_left() -> u64 {
+    lumbre_cli::memory_left()
+}

@@ -213,6 +213,18 @@ def test_points_are_near_inside_and_wound_around() -> None:
     assert scene.closest_point(points, max_distance=0.1).distance[abs(distance) > 0.2].min() == np.inf
 
 
+def test_a_mesh_that_is_inside_out_has_the_same_signed_distances() -> None:
+    vertices, faces = ball(3)
+    points = np.array([0.5, -1.0, 3.0]) + np.random.default_rng(5).normal(size=(500, 3)) * 2
+    here = lumbre.Scene([lumbre.Mesh(vertices, faces)])
+    flipped = lumbre.Scene([lumbre.Mesh(vertices, np.ascontiguousarray(np.asarray(faces)[:, ::-1]))])
+    signed = flipped.signed_distance(points)
+    assert 100 < (signed < 0).sum() < 400
+    np.testing.assert_allclose(signed, here.signed_distance(points), rtol=1e-12)
+    np.testing.assert_array_equal(signed < 0, flipped.inside(points))
+    np.testing.assert_allclose(flipped.winding_number(points), -here.winding_number(points), atol=1e-12)
+
+
 def test_what_has_no_answer_says_so() -> None:
     squeezed = lumbre.Torus(transform=np.diag([1.0, 2.0, 3.0, 1.0]))
     with pytest.raises(lumbre.LumbreError, match="no nearest point"):

@@ -221,3 +221,75 @@ def test_notebooks_show_pictures_and_scenes() -> None:
     assert image._repr_png_()[:8] == b"\x89PNG\r\n\x1a\n"
     assert repr(image) == "<lumbre.Image 8 x 6, 1 samples a pixel>"
     assert "mesh" in repr(scene) and "sphere" in repr(scene)
+
+
+@pytest.mark.parametrize(
+    "options, expected",
+    [
+        ({"spp": 0}, r"spp is out of range \(found 0; expected a whole number from 1 to 4294967295\)"),
+        ({"spp": 1.5}, "expected a whole number"),
+        ({"spp": "4"}, "found '4'; expected a whole number"),
+        ({"spp": True}, "found True; expected a whole number"),
+        ({"noise": math.nan}, "noise is out of range .* expected a relative noise above 0"),
+        ({"noise": 0}, "noise is out of range"),
+        ({"noise": "0.1"}, "noise is out of range"),
+        ({"time": -1}, r"time is out of range \(found -1; expected seconds, above 0\)"),
+        ({"time": math.inf}, "time is out of range"),
+        ({"size": "320x200"}, r"size is out of range \(found '320x200'; expected \(width, height\), 2 whole numbers\)"),
+        ({"size": ("320", "200")}, "size is out of range .* expected a whole number from 1"),
+        ({"size": (320,)}, "expected \\(width, height\\)"),
+        ({"size": (0, 9)}, "size is out of range"),
+        ({"size": 320}, "expected \\(width, height\\)"),
+        ({"crop": (0, 0, 4)}, "expected \\(x0, y0, x1, y1\\)"),
+        ({"seed": -1}, "seed is out of range"),
+        ({"camera": 0.5}, "camera is out of range"),
+        ({"integrator": 3}, "integrator is no name"),
+        ({"transparent": "no"}, "transparent is neither True nor False"),
+        ({"denoise": 1}, "denoise is neither True nor False"),
+        ({"progress": 3}, "progress is no callable"),
+    ],
+)
+def test_loose_options_are_answered_with_what_is_accepted(options: dict[str, Any], expected: str) -> None:
+    with pytest.raises(lumbre.LumbreError, match=expected):
+        lumbre.Scene([lumbre.Sphere()]).render(**options)
+
+
+def test_numbers_of_numpy_are_options() -> None:
+    scene = lumbre.Scene([lumbre.Sphere()])
+    image = scene.render(np.int64(1), np.array([8, 6]), seed=np.uint64(3), noise=np.float32(0.5), transparent=np.bool_(True))
+    assert image.shape == (6, 8, 3)
+
+
+def test_loose_arrays_are_answered_with_what_is_accepted() -> None:
+    scene = lumbre.Scene([lumbre.Sphere()])
+    o, d = np.array([[0.0, 0.0, -3.0], [0.0, 0.0, 3.0]]), np.array([0.0, 0.0, 1.0])
+    masked = np.ma.masked_array(o, mask=[[False] * 3, [False, True, False]])
+    for query in (scene.cast, scene.occluded, scene.count, scene.cast_all):
+        with pytest.raises(lumbre.LumbreError, match="origins has masked values"):
+            query(masked, d)
+        with pytest.raises(lumbre.LumbreError, match="tmax has masked values"):
+            query(o, d, tmax=masked[:, 1])
+    for ask in (scene.closest_point, scene.inside, scene.winding_number, scene.signed_distance):
+        with pytest.raises(lumbre.LumbreError, match="points has masked values"):
+            ask(masked)
+    assert scene.cast(np.ma.masked_array(o), d).t.tolist() == [2.0, np.inf]
+    for out in (3, "t", [o]):
+        with pytest.raises(lumbre.LumbreError, match="out has no arrays by name .* expected a dict of some of t, point"):
+            scene.cast(o, d, out=out)
+        with pytest.raises(lumbre.LumbreError, match="out is no array to write .* expected a numpy.ndarray"):
+            scene.occluded(o, d, out=out)
+    with pytest.raises(lumbre.LumbreError, match="fields are no names"):
+        scene.cast(o, d, fields=3)
+    with pytest.raises(lumbre.LumbreError, match="a hit has no field 3"):
+        scene.cast(o, d, fields=(3,))
+    for distance in ("3", math.nan, -1.0, None):
+        with pytest.raises(lumbre.LumbreError, match="max_distance is out of range"):
+            scene.closest_point(o, distance)
+    with pytest.raises(lumbre.LumbreError, match="vertices has masked values"):
+        lumbre.Mesh(np.ma.masked_array(np.eye(3), mask=np.eye(3)), [[0, 1, 2]])
+    with pytest.raises(lumbre.LumbreError, match="a texture has masked values"):
+        lumbre.Texture(masked)
+    with pytest.raises(lumbre.LumbreError, match="pixel is out of range .* expected \\(x, y\\)"):
+        scene.explain(("3", 4, 5))
+    with pytest.raises(lumbre.LumbreError, match="size is out of range"):
+        scene.view(size="9x9", open=False)

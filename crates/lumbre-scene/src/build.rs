@@ -9,6 +9,7 @@ use lumbre_math::{DVec3, Elementary, Transform};
 use lumbre_shading::{Material, MaterialKind};
 
 use crate::light::choice::LightChoice;
+use crate::light::environment::first_not_finite;
 use crate::light::lanes::LaneLights;
 use crate::light::{
     DistantLight, Environment, GoniometricLight, Light, LightId, MeshLight, MovingLight, PlacedLight,
@@ -507,6 +508,14 @@ impl Builder {
 
     fn light(&mut self, position: usize, desc: LightDesc) -> Result<(), BuildError> {
         let wrong = |reason| BuildError::Light { light: position, reason };
+        let picture = match &desc {
+            LightDesc::Infinite { image, .. } => image.as_ref(),
+            LightDesc::Goniometric { image, .. } => Some(image),
+            _ => None,
+        };
+        if let Some((x, y)) = picture.and_then(|picture| first_not_finite(&picture.image)) {
+            self.warnings.push(BuildWarning::NotFiniteTexel { light: position, x, y });
+        }
         let light = match desc {
             LightDesc::Moving { light, world_from_light } => {
                 let before = self.lights.len();

@@ -360,6 +360,8 @@ pub struct FilmDesc {
     pub crop_window: Option<[f64; 4]>,
     /// Factor from radiance to pixel values: shutter time × ISO / 100.
     pub exposure: f32,
+    /// The ISO speed that `exposure` contains.
+    pub iso: f32,
     /// The largest component of one sample; infinite by default.
     pub max_component: f32,
     /// Whether files of light keep single precision; half precision by default.
@@ -375,6 +377,7 @@ impl Default for FilmDesc {
             pixel_bounds: None,
             crop_window: None,
             exposure: 1.0,
+            iso: 100.0,
             max_component: f32::INFINITY,
             single_precision: false,
         }

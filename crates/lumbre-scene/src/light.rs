@@ -4,7 +4,7 @@ mod area;
 mod brightness;
 pub(crate) mod choice;
 mod delta;
-mod environment;
+pub(crate) mod environment;
 pub mod lanes;
 mod mesh;
 mod moving;

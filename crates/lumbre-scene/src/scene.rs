@@ -87,11 +87,21 @@ pub enum BuildWarning {
     /// There is no light: pictures of light are black.
     #[error("the scene has no light: its picture is black")]
     NoLight,
-    /// An environment map that is black or not finite is dropped.
-    #[error("light {light}: its picture is black or not finite, it gives no light")]
+    /// An environment map that is black is dropped.
+    #[error("light {light}: its picture is black, it gives no light")]
     DarkEnvironment {
         /// The index of the light.
         light: usize,
+    },
+    /// Texels of an environment map that are not finite count as black.
+    #[error("light {light}: texel ({x}, {y}) of its picture is not finite, and taken for black")]
+    NotFiniteTexel {
+        /// The index of the light.
+        light: usize,
+        /// The column of the first such texel, from the left.
+        x: u32,
+        /// Its row, from the top.
+        y: u32,
     },
 }
 

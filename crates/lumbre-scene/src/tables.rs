@@ -85,13 +85,12 @@ impl SurfaceTable {
         if !bsdf.is_isotropic() {
             return None;
         }
-        let (kind, numbers) = bsdf.row()?;
         let row = self.rows.len() as u32;
-        self.rows.extend(numbers);
+        self.rows.extend(bsdf.row());
         Some(FlatSurface {
             mesh: attributes.mesh.clone(),
             outward: if entry.reverse { -1.0 } else { 1.0 },
-            kind,
+            kind: bsdf.kind(),
             row,
             transmits: material.lets_light_through(),
             emission: entry.emission.as_ref().map(|e| (e.radiance.to_array(), e.two_sided)),

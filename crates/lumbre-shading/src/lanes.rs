@@ -86,13 +86,11 @@ pub enum BsdfKind {
     Principled,
     /// [`UberLanes`].
     Uber,
-    /// A kind without lanes, which only the scalar [`Bsdf`] has: none at present.
-    Other,
 }
 
 impl BsdfKind {
     /// How many there are.
-    pub const COUNT: usize = Self::Other as usize + 1;
+    pub const COUNT: usize = Self::Uber as usize + 1;
 }
 
 /// The parameters of a BSDF as plain numbers: [`LaneBsdf::ROW`] of them.
@@ -114,9 +112,9 @@ impl Bsdf {
         }
     }
 
-    /// Its kind, and the row from which [`LaneBsdf::load`] of that kind makes the same BSDF; `None` for a kind without lanes.
-    pub fn row(&self) -> Option<(BsdfKind, Row)> {
-        let row = match self {
+    /// The row from which [`LaneBsdf::load`] of its kind makes the same BSDF.
+    pub fn row(&self) -> Row {
+        match self {
             Self::Diffuse(bsdf) => Row::from_slice(&bsdf.row()),
             Self::DiffuseTransmission(bsdf) => Row::from_slice(&bsdf.row()),
             Self::Conductor(bsdf) => Row::from_slice(&bsdf.row()),
@@ -126,8 +124,7 @@ impl Bsdf {
             Self::CoatedConductor(bsdf) => bsdf.row().collect(),
             Self::Principled(bsdf) => bsdf.row(),
             Self::Uber(bsdf) => bsdf.row(),
-        };
-        Some((self.kind(), row))
+        }
     }
 }
 

@@ -1226,7 +1226,7 @@ fn load<R: Real>(columns: &[Vec<f32>; 3], start: usize) -> V3<R> {
 
 /// The same by the scalar interface.
 fn scalar_outcomes(bsdfs: &[Bsdf], columns: &Columns) -> Vec<Outcome> {
-    let row = bsdfs[0].row().expect("a kind with lanes").1.len() as u32;
+    let row = bsdfs[0].row().len() as u32;
     let outcome = |i: usize| {
         let bsdf = bsdfs[((columns.at[i] - 5) / row) as usize].clone();
         let bsdf = if columns.regularized[i] { bsdf.regularized() } else { bsdf };
@@ -1263,7 +1263,7 @@ fn assert_lanes_agree<K: Kind>(kind: BsdfKind, random_bsdf: impl Fn(&mut RandomS
     let mut random = RandomStream::new(61 + kind as u64);
     let bsdfs: Vec<Bsdf> = (0..97).map(|_| random_bsdf(&mut random)).collect();
     assert!(bsdfs.iter().all(|bsdf| bsdf.kind() == kind && bsdf.row().is_some_and(|row| row.0 == kind)));
-    assert_eq!(bsdfs[0].row().map(|row| row.1.len()), Some(<K::Lanes<f32> as LaneBsdf<f32>>::ROW));
+    assert_eq!(bsdfs[0].row().len(), <K::Lanes<f32> as LaneBsdf<f32>>::ROW);
     let columns = Columns::new(&bsdfs, 16 * 1500, 3 + kind as u64);
     let expected = scalar_outcomes(&bsdfs, &columns);
     for set in InstructionSet::available() {

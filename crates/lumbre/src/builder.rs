@@ -26,14 +26,15 @@ pub struct SceneBuilder {
 pub struct ShapeBuilder {
     form: Form,
     world_from_object: Transform,
-    material: Option<Material>,
+    material: Option<Arc<Material>>,
     light: Option<AreaLightDesc>,
 }
 
 #[derive(Clone, Debug)]
 enum Form {
     Geometry(GeometryDesc),
-    Csg { operation: CsgOperation, operands: Vec<Vec<ShapeBuilder>> },
+    // Shared, so that bodies which are made of one another take no more memory than they are many.
+    Csg { operation: CsgOperation, operands: Arc<Vec<Vec<ShapeBuilder>>> },
 }
 
 impl ShapeBuilder {
@@ -74,7 +75,7 @@ impl ShapeBuilder {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn csg(operation: CsgOperation, operands: Vec<Vec<Self>>) -> Self {
-        Self::of(Form::Csg { operation, operands })
+        Self::of(Form::Csg { operation, operands: Arc::new(operands) })
     }
 
     fn of(form: Form) -> Self {
@@ -87,10 +88,10 @@ impl ShapeBuilder {
         Self { world_from_object, ..self }
     }
 
-    /// Sets the material.
+    /// Sets the material, which many shapes may share.
     #[must_use]
-    pub fn material(self, material: Material) -> Self {
-        Self { material: Some(material), ..self }
+    pub fn material(self, material: impl Into<Arc<Material>>) -> Self {
+        Self { material: Some(material.into()), ..self }
     }
 
     /// Makes its front emit a radiance.
@@ -151,7 +152,7 @@ impl SceneBuilder {
         let index = id.0;
         let geometry = match form {
             Form::Geometry(geometry) => {
-                let material = Arc::new(material.unwrap_or_else(Material::default_diffuse));
+                let material = material.unwrap_or_else(|| Material::default_diffuse().into());
                 self.desc.materials.push(NamedMaterial { name: None, material });
                 geometry
             }
@@ -163,7 +164,7 @@ impl SceneBuilder {
                         ..shape
                     })
                 };
-                let operands = operands.into_iter();
+                let operands = Arc::unwrap_or_clone(operands).into_iter();
                 let operands = operands.map(|shapes| Arc::new(shapes.into_iter().map(&mut part).collect()));
                 GeometryDesc::Csg(CsgDesc { operation, operands: operands.collect() })
             }

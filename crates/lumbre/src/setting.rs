@@ -6,7 +6,7 @@ use std::sync::Arc;
 use lumbre_formats::diagnostic::{nearest_name, number, quoted};
 use lumbre_image::{Rgb, srgb_to_linear};
 use lumbre_math::DVec3;
-use lumbre_scene::{Camera, CameraKind, GeometryDesc, LightDesc, SceneDesc, ShapeDesc};
+use lumbre_scene::{Camera, CameraKind, FilmDesc, GeometryDesc, LightDesc, SceneDesc, ShapeDesc};
 use lumbre_shading::{
     FloatTexture, Material, MaterialKind, Metal, PrincipledParams, Roughness, SpectrumTexture, Texture,
 };
@@ -16,7 +16,7 @@ use lumbre_shading::{
 /// - `material.NAME.PARAM=VALUE`, where NAME is that of the file or the 0-based index, and a value takes the place of a texture;
 /// - `light.INDEX.PARAM=VALUE` of lights other than shapes, and `light.area.scale=VALUE` of all shapes that emit;
 /// - `camera.NAME.PARAM=VALUE`, or `camera.PARAM=VALUE` of all cameras;
-/// - `film.PARAM=VALUE`.
+/// - `film.PARAM=VALUE`, of the parameters of the scene language, and `film.exposure` of all that the exposure is multiplied from.
 ///
 /// Values are numbers, colours (one number, three with commas between, or `#rrggbb` in sRGB) or points. A parameter that is not
 /// there is answered with those that are.
@@ -80,16 +80,51 @@ impl Setting {
             Owner::Material => self.set_material(desc),
             Owner::Light => self.set_light(desc),
             Owner::Camera => self.set_camera(desc),
-            Owner::Film => {
-                let film = &mut desc.film;
-                let slot = match &*self.parameter {
-                    "exposure" => Slot::Plain(&mut film.exposure, ABOVE_ZERO),
-                    "maxcomponent" => Slot::Plain(&mut film.max_component, ABOVE_ZERO),
-                    _ => return Err(self.unknown("the film", &["exposure", "maxcomponent"])),
-                };
-                self.set(slot)
-            }
+            Owner::Film => self.set_film(&mut desc.film),
         }
+    }
+
+    fn set_film(&self, film: &mut FilmDesc) -> Result<(), String> {
+        match &*self.parameter {
+            "exposure" => self.set(Slot::Plain(&mut film.exposure, ABOVE_ZERO))?,
+            "maxcomponent" | "maxcomponentvalue" => {
+                self.set(Slot::Plain(&mut film.max_component, ABOVE_ZERO))?;
+            }
+            "iso" => {
+                let before = film.iso;
+                self.set(Slot::Plain(&mut film.iso, ABOVE_ZERO))?;
+                film.exposure *= film.iso / before;
+            }
+            "xresolution" => film.width = Some(self.pixels()?),
+            "yresolution" => film.height = Some(self.pixels()?),
+            "pixelbounds" => {
+                let bounds = self.numbers(Range(0.0, f64::from(u32::MAX)));
+                let bounds = bounds.filter(|all| all.iter().all(|v| v.fract() == 0.0)).map(|all| {
+                    let [x0, x1, y0, y1] = all.map(|v| v as u32);
+                    let clip = |v: u32, size: Option<u32>| size.map_or(v, |size| v.min(size));
+                    [clip(x0, film.width), clip(x1, film.width), clip(y0, film.height), clip(y1, film.height)]
+                });
+                let bounds = bounds.filter(|[x0, x1, y0, y1]| x0 < x1 && y0 < y1);
+                let said = "x0,x1,y0,y1 in pixels of the film, such as 0,320,120,240";
+                film.pixel_bounds = Some(bounds.ok_or_else(|| self.refused(said))?);
+            }
+            "cropwindow" => {
+                let window = self.numbers(UNIT).filter(|[x0, x1, y0, y1]| x0 < x1 && y0 < y1);
+                let said = "x0,x1,y0,y1 from 0 to 1, such as 0,0.5,0.25,1";
+                film.crop_window = Some(window.ok_or_else(|| self.refused(said))?);
+            }
+            "savefp16" => {
+                let value = self.value.parse::<bool>();
+                film.single_precision = !value.map_err(|_| self.refused("true or false"))?;
+            }
+            "filename" => film.filename = Some(self.value.clone()),
+            _ => return Err(self.unknown("the film", &FILM_PARAMETERS)),
+        }
+        Ok(())
+    }
+
+    fn pixels(&self) -> Result<u32, String> {
+        self.value.parse().ok().filter(|&n| n > 0).ok_or_else(|| self.refused("a whole number from 1"))
     }
 
     fn set_material(&self, desc: &mut SceneDesc) -> Result<(), String> {
@@ -303,6 +338,19 @@ impl Setting {
         )
     }
 }
+
+/// Those of the scene language, and the whole factor of the exposure.
+const FILM_PARAMETERS: [&str; 9] = [
+    "exposure",
+    "iso",
+    "maxcomponentvalue",
+    "xresolution",
+    "yresolution",
+    "pixelbounds",
+    "cropwindow",
+    "savefp16",
+    "filename",
+];
 
 /// From the first to the second, both included.
 #[derive(Clone, Copy)]
@@ -587,7 +635,13 @@ mod tests {
             ("light.0.radiance=1", "expected from, intensity, scale"),
             ("camera.fov=-3", "a number from 0.001 to 179"),
             ("camera.left.fov=30", "there is no camera \"left\" (expected \"0\")"),
-            ("film.iso=3", "expected exposure, maxcomponent"),
+            ("film.izo=3", "expected exposure, iso, maxcomponentvalue"),
+            ("film.iso=0", "expected a number above 0"),
+            ("film.xresolution=0", "a whole number from 1"),
+            ("film.cropwindow=0.5,0.5,0,1", "x0,x1,y0,y1 from 0 to 1"),
+            ("film.pixelbounds=0,5.5,0,1", "x0,x1,y0,y1 in pixels"),
+            ("film.pixelbounds=5000,6000,0,1", "x0,x1,y0,y1 in pixels"),
+            ("film.savefp16=1", "true or false"),
             ("wood.reflectance=1", "expected material.NAME.PARAM=VALUE"),
             ("material.reflectance=1", "expected material.NAME.PARAM=VALUE"),
             ("material.wood.reflectance", "expected material.NAME.PARAM=VALUE"),
@@ -625,6 +679,38 @@ mod tests {
         );
         let CameraKind::Perspective { fov, lens_radius, .. } = desc.cameras[0].kind else { panic!() };
         assert_eq!((fov, lens_radius, desc.film.exposure), (35.0, 0.25, 2.0));
+    }
+
+    #[test]
+    fn every_parameter_of_a_film_is_set() {
+        let film_of = |settings: &[&str]| {
+            let mut desc = scene("Shape \"sphere\"");
+            (desc.film.iso, desc.film.exposure) = (50.0, 3.0);
+            settings.iter().for_each(|text| set(&mut desc, text).unwrap());
+            desc.film
+        };
+        // The shutter's share of the exposure stays.
+        let film = film_of(&["film.iso=200"]);
+        assert_eq!((film.iso, film.exposure), (200.0, 12.0));
+        assert_eq!(film_of(&["film.iso=200", "film.iso=50"]).exposure, 3.0);
+        let film = film_of(&["film.xresolution=300", "film.yresolution=200", "film.maxcomponentvalue=7"]);
+        assert_eq!((film.width, film.height, film.max_component), (Some(300), Some(200), 7.0));
+        let film = film_of(&[
+            "film.xresolution=300",
+            "film.pixelbounds=10,999,20,40",
+            "film.cropwindow=0,0.5,0.25,1",
+        ]);
+        assert_eq!(film.pixel_bounds, Some([10, 300, 20, 40]));
+        assert_eq!(film.crop_window, Some([0.0, 0.5, 0.25, 1.0]));
+        let film = film_of(&["film.savefp16=false", "film.filename=a b.exr"]);
+        assert_eq!((film.single_precision, film.filename.as_deref()), (true, Some("a b.exr")));
+        assert!(!film_of(&["film.savefp16=true"]).single_precision);
+        for name in FILM_PARAMETERS {
+            let said = set(&mut scene("Shape \"sphere\""), &format!("film.{name}=")).unwrap_err();
+            assert!(said.contains("expected material.NAME.PARAM=VALUE"), "{said}");
+            let said = set(&mut scene("Shape \"sphere\""), &format!("film.{name}=?"));
+            assert!(name == "filename" || said.unwrap_err().contains("wrong value"), "{name}");
+        }
     }
 
     #[test]

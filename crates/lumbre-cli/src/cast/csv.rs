@@ -176,9 +176,8 @@ impl Header {
                 return Err((column(), format!("more than the {} values of the header", self.width)));
             }
             let field = unquoted(field.trim());
-            values[count] = field
-                .parse::<f64>()
-                .map_err(|_| (column(), format!("expected a number, found {}", quoted(field))))?;
+            values[count] = number(field)
+                .map_err(|expected| (column(), format!("expected {expected}, found {}", quoted(field))))?;
             count += 1;
         }
         if count < self.width {
@@ -189,6 +188,19 @@ impl Header {
         let value = |column: usize| self.place[column].map_or(default(column), |i| values[i]);
         Ok(self.rows.ray(value, true))
     }
+}
+
+/// A number in double precision, or what is expected instead: one that is too large or too small would become another number.
+fn number(field: &str) -> Result<f64, &'static str> {
+    let value: f64 = field.parse().map_err(|_| "a number")?;
+    let mantissa = field.split(['e', 'E']).next().unwrap_or(field);
+    if value.is_infinite() && field.bytes().any(|b| b.is_ascii_digit()) {
+        return Err("a number of double precision, at most 1.7976931348623157e308 in size");
+    }
+    if value == 0.0 && mantissa.bytes().any(|b| (b'1'..=b'9').contains(&b)) {
+        return Err("a number of double precision, which does not become 0: 5e-324 is the smallest");
+    }
+    Ok(value)
 }
 
 /// The fields of a line with the column, from 1, where each begins.

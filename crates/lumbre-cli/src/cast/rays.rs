@@ -225,6 +225,14 @@ mod tests {
     }
 
     #[test]
+    fn the_ends_of_double_precision_are_numbers() {
+        let text = b"ox,oy,oz,dx,dy,dz,tmax\n0,-0e-999,5e-324,1.7976931348623157e308,-1e-320,0.000e5,inf\n";
+        let rays = read("rays.csv", text, 7).unwrap();
+        let (o, d) = (DVec3::new(0.0, -0.0, 5e-324), DVec3::new(f64::MAX, -1e-320, 0.0));
+        assert_eq!(rays, [Ray::new(o, d).with_range(0.0, f64::INFINITY)]);
+    }
+
+    #[test]
     fn what_is_wrong_is_said_with_its_place() {
         let long = format!("ox,oy,oz,dx,dy,dz\n1,2{}", " ".repeat(1 << 17));
         for (text, expected) in [
@@ -236,6 +244,15 @@ mod tests {
                 "ox,oy,oz,dx,dy,dz\n1,2,3,4,5,6\n\n1,2,3, four,5,6\n",
                 "rays.csv:4:8: expected a number, found \"four\"",
             ),
+            (
+                "ox,oy,oz,dx,dy,dz\n1,2,3,4,5,-1e999\n",
+                "rays.csv:2:11: expected a number of double precision, at most",
+            ),
+            (
+                "ox,oy,oz,dx,dy,dz\n1, 2e-400,3,4,5,6\n",
+                "rays.csv:2:4: expected a number of double precision, which",
+            ),
+            ("ox,oy,oz,dx,dy,dz\n0.0000001e-320,2,3,4,5,6\n", "rays.csv:2:1: expected a number of double"),
             ("ox,oy,oz,dx,dy,dz\n1,2,3\n", "rays.csv:2:6: 3 values (expected 6)"),
             ("ox,oy,oz,dx,dy,dz\n1,2,3,4,5,6,7\n", "rays.csv:2:13: more than the 6 values"),
             (&long, "rays.csv:2:65537: a line of more than 65536 bytes"),

@@ -17,6 +17,7 @@ use super::json::Read;
 use super::material::{AlphaMode, GltfMaterial, TextureRef};
 use super::texture::{Textures, UvSets, ours};
 use crate::thin::INK;
+use crate::unseen::is_unseen;
 
 /// Everything that a material contributes to a shape.
 #[derive(Clone, Debug)]
@@ -70,10 +71,11 @@ impl<'f> Materials<'f> {
         let sets = self.sets(&parameters, index);
         let seam =
             Seam { materials: self, parameters: &parameters, has_colours, sets: sets.unwrap_or_default() };
+        let alpha = seam.coverage()?;
         let dressing = Arc::new(Dressing {
             material: MaterialId(self.list.borrow().len() as u32),
-            alpha: seam.coverage()?,
-            area_light: seam.light()?,
+            area_light: if is_unseen(alpha.as_deref()) { None } else { seam.light()? },
+            alpha,
             sets,
             tangents: tangent_set(&parameters),
         });

@@ -17,6 +17,7 @@ use super::file::{File, List};
 use super::json::{Read, Value};
 use super::material::TextureRef;
 use super::uri::{Target, target};
+use crate::diagnostic::Place;
 use crate::diagnostic::{Diagnostic, quoted};
 use crate::image::read_image;
 
@@ -247,7 +248,10 @@ fn decoded(file: &File<'_>, value: Value<'_>) -> Read<Bitmap> {
         if bytes.starts_with(super::ktx::MAGIC) {
             return super::ktx::read(file, bytes, name);
         }
-        let image = file.with_diagnostics(|diagnostics| read_image(bytes, name, file.budget, diagnostics))?;
+        let image = file.with_diagnostics(|diagnostics| {
+            let image = read_image(bytes, name, file.budget, diagnostics)?;
+            image.for_scene(|| Place::whole(name.clone()), file.budget, diagnostics)
+        })?;
         Ok(image.bitmap)
     };
     if let Some(uri) = value.get("uri")? {

@@ -17,7 +17,7 @@ pub(super) fn read(
     diagnostics: &mut Diagnostics,
 ) -> Result<ImageFile, FormatError> {
     let mut reader = Reader { bytes, at: 0, name };
-    let (width, height, flip_x, flip_y) = reader.header(diagnostics)?;
+    let Header { width, height, flip_x, flip_y, multipliers } = reader.header(diagnostics)?;
     let pixels = u64::from(width) * u64::from(height);
     // A run of 127 takes two bytes, and old runs can be longer: an upper bound for the former, generous to the
     // latter.
@@ -34,7 +34,11 @@ pub(super) fn read(
         let into = if flip_y { height - 1 - y } else { y } as usize * width as usize * 3;
         for (x, rgbe) in row.iter().enumerate() {
             let x = if flip_x { width as usize - 1 - x } else { x };
-            data[into + 3 * x..][..3].copy_from_slice(&light(*rgbe).to_array());
+            let light = light(*rgbe).to_array();
+            for ((into, c), multiplier) in data[into + 3 * x..].iter_mut().zip(light).zip(multipliers) {
+                // Nothing finite becomes infinite.
+                *into = (f64::from(c) / multiplier).min(f64::from(f32::MAX)) as f32;
+            }
         }
     }
     let bitmap = Bitmap::new(width, height, Channels::Rgb, PixelData::F32(data), Encoding::Linear);
@@ -119,6 +123,18 @@ fn encode_runs(plane: &[u8], out: &mut Vec<u8>) {
     }
 }
 
+/// What a header says.
+struct Header {
+    width: u32,
+    height: u32,
+    /// Whether columns are reversed.
+    flip_x: bool,
+    /// Whether rows are reversed.
+    flip_y: bool,
+    /// What the pixels have been multiplied by: the product of all exposures and colour corrections.
+    multipliers: [f64; 3],
+}
+
 struct Reader<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -143,9 +159,9 @@ impl<'a> Reader<'a> {
         Ok(line.strip_suffix(b"\r").unwrap_or(line))
     }
 
-    /// The width and the height, and whether columns and rows are reversed.
-    fn header(&mut self, diagnostics: &mut Diagnostics) -> Result<(u32, u32, bool, bool), FormatError> {
+    fn header(&mut self, diagnostics: &mut Diagnostics) -> Result<Header, FormatError> {
         self.line()?;
+        let mut multipliers = [1.0; 3];
         loop {
             let start = self.at;
             let line = self.line()?;
@@ -160,14 +176,23 @@ impl<'a> Reader<'a> {
                     let wrong = Diagnostic::error("unsupported HDR format").at(here());
                     return Err(wrong.found(quoted(&format)).expected("32-bit_rle_rgbe").into());
                 }
-            } else if let Some(exposure) = value(b"EXPOSURE=")
-                && exposure.parse::<f64>() != Ok(1.0)
-            {
-                diagnostics.push(
-                    Diagnostic::warning("EXPOSURE of an HDR image is not applied")
-                        .at(here())
-                        .found(quoted(&exposure)),
-                );
+                continue;
+            }
+            let exposure = value(b"EXPOSURE=").map(|text| (text, 1));
+            let Some((text, count)) = exposure.or_else(|| value(b"COLORCORR=").map(|text| (text, 3))) else {
+                continue;
+            };
+            let numbers: Option<Vec<f64>> =
+                text.split_ascii_whitespace().map(|word| word.parse().ok()).collect();
+            let numbers = numbers.filter(|numbers| numbers.len() == count);
+            let after = numbers.map(|numbers| [0, 1, 2].map(|c| multipliers[c] * numbers[c % count]));
+            // Beyond these no light of single precision is left.
+            match after.filter(|after| after.iter().all(|m| (1e-60..=1e60).contains(m))) {
+                Some(after) => multipliers = after,
+                None => {
+                    let what = "EXPOSURE or COLORCORR of an HDR image that is not positive is not applied";
+                    diagnostics.push(Diagnostic::warning(what).at(here()).found(quoted(&text)));
+                }
             }
         }
         let start = self.at;
@@ -178,7 +203,7 @@ impl<'a> Reader<'a> {
         if let [y @ ("-Y" | "+Y"), height, x @ ("+X" | "-X"), width] = words[..]
             && let (Some(width), Some(height)) = (size(width), size(height))
         {
-            return Ok((width, height, x == "-X", y == "+Y"));
+            return Ok(Header { width, height, flip_x: x == "-X", flip_y: y == "+Y", multipliers });
         }
         let wrong = Diagnostic::error("unsupported HDR resolution");
         let wrong = wrong.at(Place::binary(self.name.clone(), start as u64, ""));

@@ -6,6 +6,7 @@ mod exr_file;
 mod hdr;
 mod origin;
 mod pfm;
+mod scene;
 mod write;
 
 use std::path::Path;
@@ -18,6 +19,7 @@ use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted};
 use crate::input::Input;
 
 pub use origin::is_own_image;
+pub(crate) use scene::open_scene_image;
 pub use write::{
     ExrCompression, ExrPrecision, PngDepth, WriteOptions, encode_image, encode_layers, write_image,
     write_layers,

@@ -143,6 +143,8 @@ struct Reader<'a> {
     normals: BudgetVec<'a, Vec3>,
     /// When lenient, positions that are not finite.
     unusable: Vec<u32>,
+    /// Texture coordinates and normals that are not finite, by index, with where they stand.
+    flaws: [BudgetVec<'a, (u32, usize)>; 2],
     /// Every name, 0 for none.
     names: Vec<Arc<str>>,
     numbers: HashMap<Arc<str>, u32>,
@@ -183,6 +185,7 @@ impl<'a> Reader<'a> {
             uvs: BudgetVec::new(budget, "texture coordinates"),
             normals: BudgetVec::new(budget, "normals"),
             unusable: vec![],
+            flaws: [BudgetVec::new(budget, "flaws"), BudgetVec::new(budget, "flaws")],
             names: vec!["".into()],
             numbers: HashMap::new(),
             state: Key::default(),
@@ -213,16 +216,22 @@ impl<'a> Reader<'a> {
                 if count == 0 || count > 3 {
                     return Err(self.wrong_count(keyword, count, "1 to 3").into());
                 }
-                let uv = self.finite_or_zero(Vec2::new(u as f32, v as f32), Vec2::is_finite, word, WRONG_UV);
-                Ok(self.uvs.push(uv)?)
+                let uv = Vec2::new(u as f32, v as f32);
+                if !uv.is_finite() {
+                    self.flaws[0].push((self.uvs.len() as u32, word.start))?;
+                }
+                Ok(self.uvs.push(if uv.is_finite() { uv } else { Vec2::ZERO })?)
             }
             b"vn" => {
                 let (n, count, word) = self.numbers(keyword, words)?;
                 if count != 3 {
                     return Err(self.wrong_count(keyword, count, "3").into());
                 }
-                let n = self.finite_or_zero(DVec3::from(n).as_vec3(), Vec3::is_finite, word, WRONG_NORMAL);
-                Ok(self.normals.push(n)?)
+                let n = DVec3::from(n).as_vec3();
+                if !n.is_finite() {
+                    self.flaws[1].push((self.normals.len() as u32, word.start))?;
+                }
+                Ok(self.normals.push(if n.is_finite() { n } else { Vec3::ZERO })?)
             }
             b"f" | b"fo" => self.face(keyword, words),
             b"usemtl" => {
@@ -622,6 +631,37 @@ impl<'a> Reader<'a> {
         .into())
     }
 
+    /// Says what is not finite: a warning where a face that has an area uses it, else a note.
+    fn say_flaws(&mut self) -> Result<(), FormatError> {
+        let counts = [self.uvs.len(), self.normals.len()];
+        for (of, what) in [WRONG_UV, WRONG_NORMAL].into_iter().enumerate() {
+            if self.flaws[of].is_empty() {
+                continue;
+            }
+            let _while_said = self.budget.hold(counts[of] as u64, "flaws")?;
+            let mut is_seen = vec![false; counts[of]];
+            let made = self.parts.iter().filter(|part| !(of == 1 && part.key.is_smoothed));
+            for corners in made.flat_map(|part| part.triangles.iter()) {
+                let [a, b, c] = corners.map(|corner| self.positions[corner[0] as usize]);
+                if (b - a).cross(c - a) == DVec3::ZERO {
+                    continue;
+                }
+                for corner in corners.iter().filter(|corner| corner[1 + of] != NONE) {
+                    is_seen[corner[1 + of] as usize] = true;
+                }
+            }
+            for &(index, at) in self.flaws[of].iter() {
+                let placed = |said: Diagnostic| said.at(self.source.place(at));
+                if is_seen[index as usize] {
+                    self.diagnostics.warn(what, placed);
+                } else {
+                    self.diagnostics.note(&format!("{what}: no face with an area has it"), placed);
+                }
+            }
+        }
+        Ok(())
+    }
+
     fn finish(mut self) -> Result<ObjFile, FormatError> {
         let later = std::mem::replace(&mut self.later, BudgetVec::new(self.budget, "faces"));
         for face in later.iter() {
@@ -633,6 +673,7 @@ impl<'a> Reader<'a> {
             read(&mut self, face.keyword, face.words.clone())
                 .map_err(|e| e.or_at(|| self.source.place(face.keyword.start)))?;
         }
+        self.say_flaws()?;
         for (missing, what) in self.missing.iter().zip(["texture coordinates", "normals"]) {
             if missing.get() {
                 let said = Diagnostic::warning(format!("faces name {what}, and the file has none"));

@@ -17,11 +17,12 @@ use lumbre_shading::{
 use super::{MtlMaterial, MtlTexture, ObjThin, read_mtl, read_obj};
 use crate::budget::Budget;
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, nearest_name, quoted};
-use crate::image::open_image;
+use crate::image::open_scene_image;
 use crate::input::Input;
 use crate::origin::placed;
 use crate::ply::{push_thin, unsaid_material};
 use crate::standing::up_of;
+use crate::unseen::is_unseen;
 
 /// Reads the OBJ file `path` with its materials and textures, each mesh a shape; y is up, or z where the meshes plainly stand on a plane of z.
 ///
@@ -262,7 +263,7 @@ impl Builder<'_> {
         };
         let radiance = m.emission.unwrap_or(if m.emission_map.is_some() { Rgb::WHITE } else { Rgb::BLACK });
         let radiance = radiance.map(|c| c.max(0.0));
-        let light = if radiance.is_black() {
+        let light = if radiance.is_black() || is_unseen(alpha.as_deref()) {
             None
         } else {
             let image = match &m.emission_map {
@@ -374,7 +375,7 @@ impl Builder<'_> {
         holds_numbers: bool,
         map: &MtlTexture,
     ) -> Result<Option<Arc<MipMap>>, FormatError> {
-        let file = match open_image(path, self.budget, self.diagnostics) {
+        let file = match open_scene_image(path, self.budget, self.diagnostics) {
             Ok(file) => file,
             Err(e @ FormatError::Limit { .. }) => return Err(e.included_from(map.place.clone())),
             Err(e) => {

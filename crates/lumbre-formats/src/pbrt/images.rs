@@ -9,7 +9,7 @@ use lumbre_shading::{ImageFilter, MipMap, MipMapOptions, Wrap};
 use super::convert::{Converter, file_fault};
 use super::source::{Result, Spot};
 use super::textures::unreadable;
-use crate::image::{ImageFile, open_image};
+use crate::image::{ImageFile, open_scene_image};
 use crate::{Diagnostic, FormatError};
 
 /// The key of an image with its lookup: its path, and how it is decoded and filtered.
@@ -58,7 +58,7 @@ impl Converter<'_, '_> {
     /// The image of this name as stored in its file.
     pub fn image_file(&mut self, name: &str, at: Spot) -> Result<ImageFile> {
         let path = self.resolve(name, at)?;
-        match open_image(&path, self.budget, self.diagnostics) {
+        match open_scene_image(&path, self.budget, self.diagnostics) {
             Ok(image) => {
                 self.scene.listing.add_texture(name, image.bitmap.width(), image.bitmap.height());
                 Ok(image)

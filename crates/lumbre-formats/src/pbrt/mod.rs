@@ -66,7 +66,7 @@ pub(crate) fn read_sources<'b, 'p>(
             let input = match input {
                 Some(input) => input,
                 None if is_standard_input => {
-                    Input::from_reader("standard input", std::io::stdin().lock(), budget)?
+                    Input::from_stream("standard input", std::io::stdin().lock(), budget, |_| Ok(true))?
                 }
                 None => Input::open(path, budget)?,
             };

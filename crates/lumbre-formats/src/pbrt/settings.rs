@@ -414,6 +414,7 @@ impl Converter<'_, '_> {
     pub fn finish_settings(&mut self) -> Result<()> {
         let exposure = self.exposure.shutter * self.exposure.iso / 100.0 * self.exposure.scale;
         self.scene.film.exposure = exposure as f32;
+        self.scene.film.iso = self.exposure.iso as f32;
         if let Some(seed) = self.sampler_seed {
             self.scene.sampler.seed = seed;
         }

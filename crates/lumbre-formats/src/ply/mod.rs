@@ -17,7 +17,7 @@ use lumbre_shading::{
 
 use crate::budget::{Budget, BudgetVec};
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, nearest_name, quoted};
-use crate::image::open_image;
+use crate::image::open_scene_image;
 use crate::input::{Input, refuse_wide};
 use crate::origin::{diagonal, is_without_area, origin_of, placed, relative};
 use crate::polygon;
@@ -30,8 +30,8 @@ use values::{Binary, Fault, Source, Text};
 ///
 /// Of vertices: `x y z`, normals `nx ny nz`, texture coordinates (`u v`, `s t`, `texture_u texture_v`,
 /// `texture_s texture_t`) and colours (`red green blue`, integers in sRGB, others linear). Of faces:
-/// `vertex_indices` (or `vertex_index`), `face_indices`, and `texcoord`, two texture coordinates for each corner, as MeshLab writes
-/// them: a vertex with several is kept several times. Of `tristrips`: `vertex_indices`, where -1 begins a
+/// `vertex_indices` (or `vertex_index`), `face_indices`, `texcoord`, two texture coordinates for each corner, as MeshLab writes
+/// them, and colours, unless vertices have them: a vertex with several of these is kept several times. Of `tristrips`: `vertex_indices`, where -1 begins a
 /// new strip. Other elements and properties are ignored. Convex quadrilaterals are kept; other polygons are
 /// triangulated.
 ///
@@ -135,7 +135,7 @@ fn textured(
     budget: &Budget,
     diagnostics: &mut Diagnostics,
 ) -> Result<Option<Material>, FormatError> {
-    let image = match open_image(path, budget, diagnostics) {
+    let image = match open_scene_image(path, budget, diagnostics) {
         Ok(image) => image,
         Err(e @ FormatError::Limit { .. }) => return Err(e),
         Err(e) => {
@@ -256,15 +256,46 @@ impl Slot {
     }
 }
 
-/// Texture coordinates of corners. A vertex has those of the first corner that comes to it; for others it is copied.
+/// A value of a vertex that is not finite, and where the vertex begins.
+#[derive(Clone, Copy, Debug)]
+struct Flaw {
+    vertex: u32,
+    at: usize,
+    what: &'static str,
+}
+
+/// A channel of a colour as linear light: integers are in sRGB.
+fn colour_of(value: f64, number: Number) -> f32 {
+    if number.is_float() { value as f32 } else { srgb_to_linear((value / number.one()) as f32) }
+}
+
+/// What faces say of their corners. A vertex has the values of the first corner that comes to it; for others it is copied.
 #[derive(Debug)]
-struct CornerUvs {
+struct Corners {
     /// Vertices of the file; what comes after them are copies.
     vertices: usize,
     /// By vertex; `None` where no corner came to it.
-    of_vertices: Vec<Option<Vec2>>,
-    /// Copies by their vertex and the bits of their coordinates.
-    copies: HashMap<(u32, [u32; 2]), u32>,
+    of_vertices: Vec<Option<Corner>>,
+    /// Copies by their vertex and the bits of their values.
+    copies: HashMap<(u32, [u32; 5]), u32>,
+    /// Whether faces have texture coordinates.
+    has_uvs: bool,
+    /// Whether faces have colours.
+    has_colours: bool,
+}
+
+/// The texture coordinates of a corner, and the colour of its face.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Corner {
+    uv: Vec2,
+    colour: Rgb,
+}
+
+impl Corner {
+    fn bits(self) -> [u32; 5] {
+        let Self { uv, colour } = self;
+        [uv.x, uv.y, colour.r, colour.g, colour.b].map(f32::to_bits)
+    }
 }
 
 struct Mesh<'a> {
@@ -281,8 +312,10 @@ struct Mesh<'a> {
     colours: Option<Vec<Rgb>>,
     /// When lenient, vertices that are not finite.
     unusable: Vec<u32>,
-    /// Texture coordinates of corners, in files that have them.
-    corners: Option<CornerUvs>,
+    /// What else is not finite.
+    flaws: BudgetVec<'a, Flaw>,
+    /// Texture coordinates of corners and colours of faces, in files that have them.
+    corners: Option<Corners>,
     triangles: BudgetVec<'a, [u32; 3]>,
     quads: BudgetVec<'a, [u32; 4]>,
     triangle_numbers: BudgetVec<'a, u32>,
@@ -311,6 +344,7 @@ impl<'a> Mesh<'a> {
             uvs: None,
             colours: None,
             unusable: vec![],
+            flaws: BudgetVec::new(budget, "flaws"),
             corners: None,
             triangles: BudgetVec::new(budget, "triangles"),
             quads: BudgetVec::new(budget, "quads"),
@@ -421,6 +455,8 @@ impl<'a> Mesh<'a> {
 
     fn read_edges<S: Source>(&mut self, element: &Element, source: &mut S) -> Result<(), FormatError> {
         let Some(ends) = Self::ends_of(element) else { return self.skip(element, source) };
+        // Edges have those of their vertices, if any.
+        self.colours_of(element);
         for index in 0..element.count {
             let start = source.at();
             let mut found = [0i64; 2];
@@ -496,8 +532,7 @@ impl<'a> Mesh<'a> {
                     Slot::Position(c) => p[c] = value,
                     Slot::Normal(c) => n[c] = value as f32,
                     Slot::Uv(c) => uv[c] = value as f32,
-                    Slot::Colour(c) if property.number.is_float() => colour[c] = value as f32,
-                    Slot::Colour(c) => colour[c] = srgb_to_linear((value / property.number.one()) as f32),
+                    Slot::Colour(c) => colour[c] = colour_of(value, property.number),
                     Slot::Unused => {}
                 }
             }
@@ -512,28 +547,25 @@ impl<'a> Mesh<'a> {
                 places.push(position);
             }
             if has_normals {
-                normals.push(self.finite_or_zero(
-                    Vec3::from(n),
-                    Vec3::is_finite,
-                    "a normal is not finite, and taken for 0",
-                    element,
-                    index,
-                    start,
-                ));
+                let n = Vec3::from(n);
+                normals.push(if n.is_finite() { n } else { Vec3::ZERO });
+                if !n.is_finite() {
+                    self.flaw(index, start, "a normal is not finite, and taken for 0")?;
+                }
             }
             if has_uvs {
-                let what = "a texture coordinate is not finite, and taken for 0";
-                uvs.push(self.finite_or_zero(Vec2::from(uv), Vec2::is_finite, what, element, index, start));
+                let uv = Vec2::from(uv);
+                uvs.push(if uv.is_finite() { uv } else { Vec2::ZERO });
+                if !uv.is_finite() {
+                    self.flaw(index, start, "a texture coordinate is not finite, and taken for 0")?;
+                }
             }
             if has_colours {
-                colours.push(self.finite_or_zero(
-                    Rgb::from(colour),
-                    Rgb::is_finite,
-                    "a colour is not finite, and taken for 0",
-                    element,
-                    index,
-                    start,
-                ));
+                let colour = Rgb::from(colour);
+                colours.push(if colour.is_finite() { colour } else { Rgb::BLACK });
+                if !colour.is_finite() {
+                    self.flaw(index, start, "a colour is not finite, and taken for 0")?;
+                }
             }
         }
         if !is_single {
@@ -545,6 +577,44 @@ impl<'a> Mesh<'a> {
         self.normals = has_normals.then_some(normals);
         self.uvs = has_uvs.then_some(uvs);
         self.colours = has_colours.then_some(colours);
+        Ok(())
+    }
+
+    #[cold]
+    fn flaw(&mut self, vertex: u64, at: usize, what: &'static str) -> Result<(), FormatError> {
+        Ok(self.flaws.push(Flaw { vertex: vertex as u32, at, what })?)
+    }
+
+    /// Says what is not finite: a warning where a face that has an area uses it, or where vertices are points; else a note.
+    fn say_flaws(&mut self) -> Result<(), FormatError> {
+        if self.flaws.is_empty() {
+            return Ok(());
+        }
+        let _while_said = self.budget.hold(self.positions.len() as u64, "vertices")?;
+        let mut is_seen = vec![self.triangles.is_empty() && self.quads.is_empty(); self.positions.len()];
+        let place = |vertex: u32| self.positions[vertex as usize].as_dvec3();
+        let quads = self.quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
+        for triangle in self.triangles.iter().copied().chain(quads) {
+            let [a, b, c] = triangle.map(place);
+            if (b - a).cross(c - a) != DVec3::ZERO {
+                triangle.iter().for_each(|&vertex| is_seen[vertex as usize] = true);
+            }
+        }
+        for (&(vertex, _), &copy) in self.corners.iter().flat_map(|of| &of.copies) {
+            is_seen[vertex as usize] |= is_seen[copy as usize];
+        }
+        let (encoding, name, bytes) = (self.encoding, self.name, self.bytes);
+        for &Flaw { vertex, at, what } in self.flaws.iter() {
+            let placed = |said: Diagnostic| {
+                let start = encoding.start(bytes, at);
+                said.at(encoding.place(name, bytes, start, "vertex", u64::from(vertex), ""))
+            };
+            if is_seen[vertex as usize] {
+                self.diagnostics.warn(what, placed);
+            } else {
+                self.diagnostics.note(&format!("{what}: no face with an area has it"), placed);
+            }
+        }
         Ok(())
     }
 
@@ -613,11 +683,18 @@ impl<'a> Mesh<'a> {
         }
         let is_uvs = |p: &Property| p.list.is_some() && p.name == "texcoord";
         let uvs_at = element.properties.iter().position(is_uvs).filter(|_| !is_strips);
-        if uvs_at.is_some() && self.corners.is_none() {
+        let colour_at = self.colours_of(element);
+        if (uvs_at.is_some() || colour_at.is_some()) && self.corners.is_none() {
             let vertices = self.positions.len();
-            self.budget.bytes((vertices * size_of::<Option<Vec2>>()) as u64, "texture coordinates")?;
+            self.budget.bytes((vertices * size_of::<Option<Corner>>()) as u64, "corners")?;
             let of_vertices = vec![None; vertices];
-            self.corners = Some(CornerUvs { vertices, of_vertices, copies: HashMap::new() });
+            let (has_uvs, has_colours) = (false, false);
+            let copies = HashMap::new();
+            self.corners = Some(Corners { vertices, of_vertices, copies, has_uvs, has_colours });
+        }
+        if let Some(of) = &mut self.corners {
+            of.has_uvs |= uvs_at.is_some();
+            of.has_colours |= colour_at.is_some();
         }
         let mut corners: BudgetVec<'_, i64> = BudgetVec::new(self.budget, "corners of a face");
         let mut uvs: BudgetVec<'_, f32> = BudgetVec::new(self.budget, "texture coordinates of a face");
@@ -626,6 +703,7 @@ impl<'a> Mesh<'a> {
         for index in 0..element.count {
             let start = source.at();
             let mut number = 0u32;
+            let mut colour = [0f32; 3];
             (filled, filled_uvs) = (0, 0);
             for (i, property) in element.properties.iter().enumerate() {
                 let fault = |f: Box<Fault>| FormatError::from(self.wrong(*f, element, index, &property.name));
@@ -662,9 +740,16 @@ impl<'a> Mesh<'a> {
                             // Signed numbers keep their bits.
                             number = value as i64 as u32;
                         }
+                        if let Some(c) = colour_at.and_then(|at| at.iter().position(|&at| at == i)) {
+                            colour[c] = colour_of(value, property.number);
+                        }
                     }
                 }
             }
+            let colour = colour_at.map(|_| {
+                let said = "a colour is not finite, and taken for 0";
+                self.finite_or_zero(Rgb::from(colour), Rgb::is_finite, said, element, index, start)
+            });
             if is_strips {
                 self.strip(&corners[..filled], element, index, start)?;
             } else {
@@ -673,8 +758,9 @@ impl<'a> Mesh<'a> {
                     self.unusable_face(corner, element, index, start)?;
                     continue;
                 }
-                if uvs_at.is_some() {
-                    self.set_uvs(&mut corners[..filled], &uvs[..filled_uvs], element, index, start)?;
+                if uvs_at.is_some() || colour.is_some() {
+                    let uvs = &uvs[..filled_uvs];
+                    self.set_corners(&mut corners[..filled], uvs, colour, element, index, start)?;
                 }
                 self.face(&corners[..filled], number, element, index, start)?;
             }
@@ -682,43 +768,73 @@ impl<'a> Mesh<'a> {
         Ok(())
     }
 
-    /// Gives the corners of a face, which are vertices of the file, their texture coordinates: vertices that have others
-    /// already become copies.
-    fn set_uvs(
+    /// The properties that are the colour of a face, or a warning where they are not used: vertices come first, and edges
+    /// have no colours of their own.
+    fn colours_of(&mut self, element: &Element) -> Option<[usize; 3]> {
+        let find = |c: usize| {
+            let is_channel = |p: &Property| p.list.is_none() && Slot::of(&p.name) == Slot::Colour(c);
+            element.properties.iter().position(is_channel)
+        };
+        let at = [find(0)?, find(1)?, find(2)?];
+        if self.colours.is_none() && element.name == "face" {
+            return Some(at);
+        }
+        let what = format!("colours of {} elements are not used", quoted(&element.name));
+        let said = Diagnostic::warning(what).at(element.place.clone());
+        self.diagnostics.push(match self.colours.is_some() {
+            true => said.found("colours of vertices as well"),
+            false => said,
+        });
+        None
+    }
+
+    /// Gives the corners of a face, which are vertices of the file, their texture coordinates and the colour of the face:
+    /// vertices that have others already become copies.
+    fn set_corners(
         &mut self,
         corners: &mut [i64],
         uvs: &[f32],
+        colour: Option<Rgb>,
         element: &Element,
         index: u64,
         at: usize,
     ) -> Result<(), FormatError> {
-        let Some(of) = &mut self.corners else { return Ok(()) };
+        let Some(of) = &self.corners else { return Ok(()) };
         let is_usable = |&c: &i64| {
             (0..of.vertices as i64).contains(&c) && self.unusable.binary_search(&(c as u32)).is_err()
         };
-        if uvs.is_empty() || !corners.iter().all(is_usable) {
+        if !corners.iter().all(is_usable) {
             return Ok(());
         }
-        if uvs.len() != 2 * corners.len() || uvs.iter().any(|uv| !uv.is_finite()) {
+        let has_uvs = uvs.len() == 2 * corners.len() && uvs.iter().all(|uv| uv.is_finite());
+        if !uvs.is_empty() && !has_uvs {
             let what = "texture coordinates of a face that are not two numbers a corner, left out";
             self.drop_face(what, element, index, at);
+        }
+        if !has_uvs && colour.is_none() {
             return Ok(());
         }
-        for (corner, uv) in corners.iter_mut().zip(uvs.chunks_exact(2)) {
-            let (vertex, uv) = (*corner as usize, Vec2::new(uv[0], uv[1]));
+        let Some(of) = &mut self.corners else { return Ok(()) };
+        for (i, corner) in corners.iter_mut().enumerate() {
+            let vertex = *corner as usize;
+            let uv = match &self.uvs {
+                _ if has_uvs => Vec2::new(uvs[2 * i], uvs[2 * i + 1]),
+                Some(own) => own[vertex],
+                None => Vec2::ZERO,
+            };
+            let said = Corner { uv, colour: colour.unwrap_or(Rgb::WHITE) };
             match of.of_vertices[vertex] {
-                None => of.of_vertices[vertex] = Some(uv),
-                Some(first) if first == uv => {}
+                None => of.of_vertices[vertex] = Some(said),
+                Some(first) if first == said => {}
                 Some(_) => {
                     let next = self.positions.len() as u32;
-                    let copy =
-                        *of.copies.entry((vertex as u32, uv.to_array().map(f32::to_bits))).or_insert(next);
+                    let copy = *of.copies.entry((vertex as u32, said.bits())).or_insert(next);
                     if copy == next {
                         // Lists and the table grow by halves at most.
-                        const COPY: u64 = 2 * 96;
-                        self.budget.bytes(COPY, "texture coordinates")?;
+                        const COPY: u64 = 2 * 128;
+                        self.budget.bytes(COPY, "corners")?;
                         self.positions.push(self.positions[vertex]);
-                        of.of_vertices.push(Some(uv));
+                        of.of_vertices.push(Some(said));
                         for list in self.normals.iter_mut() {
                             list.push(list[vertex]);
                         }
@@ -736,7 +852,7 @@ impl<'a> Mesh<'a> {
         Ok(())
     }
 
-    /// Without copies that [`Mesh::set_uvs`] made.
+    /// Without copies that [`Mesh::set_corners`] made.
     fn vertices_of_file(&self) -> usize {
         self.corners.as_ref().map_or(self.positions.len(), |of| of.vertices)
     }
@@ -858,13 +974,21 @@ impl<'a> Mesh<'a> {
     }
 
     fn finish(mut self, texture: Option<String>) -> Result<PlyFile, FormatError> {
-        let has_corner_uvs = self.corners.is_some();
+        self.say_flaws()?;
+        let has_corner_uvs = self.corners.as_ref().is_some_and(|of| of.has_uvs);
         if let Some(of) = self.corners.take() {
-            let own = self.uvs.take();
-            let of_vertex = |(i, uv): (usize, Option<Vec2>)| {
-                uv.or_else(|| own.as_ref().map(|own| own[i])).unwrap_or(Vec2::ZERO)
-            };
-            self.uvs = Some(of.of_vertices.into_iter().enumerate().map(of_vertex).collect());
+            if of.has_colours {
+                let of_vertex = |corner: &Option<Corner>| corner.map_or(Rgb::WHITE, |corner| corner.colour);
+                self.colours = Some(of.of_vertices.iter().map(of_vertex).collect());
+            }
+            if of.has_uvs {
+                let own = self.uvs.take();
+                let of_vertex = |(i, corner): (usize, Option<Corner>)| {
+                    let uv = corner.map(|corner| corner.uv);
+                    uv.or_else(|| own.as_ref().map(|own| own[i])).unwrap_or(Vec2::ZERO)
+                };
+                self.uvs = Some(of.of_vertices.into_iter().enumerate().map(of_vertex).collect());
+            }
         }
         if self.positions.is_empty() {
             let said = Diagnostic::warning("PLY mesh without vertices").at(Place::whole(self.name.clone()));

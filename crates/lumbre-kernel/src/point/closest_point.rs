@@ -2,7 +2,7 @@
 //!
 //! Branch and bound, the nearest box first, in all trees at once: an instance that is entered adds a frame, with its map to
 //! the outermost space, in which all distances are. A tree's boxes are in single precision and hold their primitives up to a
-//! `slop` (see `node`), which is taken off every distance.
+//! `slop` (see `node`), which is taken off every distance. What has no area is in no tree; it has its own (see `flats`).
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -11,12 +11,12 @@ use std::fmt;
 use lumbre_geometry::{Aabb, NearestPoint, NoNearestPoint, nearest_on_triangle, similarity_factor};
 use lumbre_math::{DVec2, DVec3, Transform};
 
-use crate::geometry::has_area;
+use super::flats::{Below, FlatItem};
 use crate::trace::Context;
 use crate::tree::node::{Node, tag};
 use crate::tree::packed::Start;
 use crate::tree::sphere_block::{ExactSphere, has_radius};
-use crate::{Accel, GeometryKind, Instance, InstancePath, TriangleMesh, precise_mesh};
+use crate::{Accel, GeometryKind, Instance, InstancePath, TriangleMesh};
 
 /// The point of all surfaces that is nearest to a given one.
 #[derive(Clone, Debug, PartialEq)]
@@ -84,6 +84,7 @@ pub(crate) fn closest_point(
     let mut frames = vec![Frame::outermost(accel, point, time)];
     let mut pending = BinaryHeap::new();
     enter(&frames, Start::WHOLE, 0.0, &mut pending);
+    enter_flats(&frames, 0.0, &mut pending);
     while let Some(next) = pending.pop() {
         if next.distance > search.limit {
             break;
@@ -127,6 +128,39 @@ pub(crate) fn closest_point(
                     }
                 }
             }
+            Waiting::Flat(node) => {
+                let flats = frame.accel.flats();
+                match flats.node(node).below {
+                    Below::Nodes(second) => {
+                        for child in [node + 1, second] {
+                            let distance =
+                                frame.distance_to_flats(&flats.node(child).bounds).max(next.distance);
+                            if distance <= search.limit {
+                                let what = Waiting::Flat(child);
+                                pending.push(Pending { distance, frame: next.frame, what });
+                            }
+                        }
+                    }
+                    Below::Items(first, end) => {
+                        let mut inner = Vec::new();
+                        for &FlatItem { geometry, primitive } in flats.items(first, end) {
+                            match &frame.accel.geometries[geometry as usize].kind {
+                                GeometryKind::Mesh(mesh) => {
+                                    search.intersect_triangle(frame, mesh, geometry, primitive);
+                                }
+                                GeometryKind::Instance(instance) => {
+                                    inner.push(frame.within(geometry, instance));
+                                }
+                                _ => search.meet(frame, geometry, primitive, next.distance),
+                            }
+                        }
+                        for frame in inner {
+                            frames.push(frame);
+                            enter_flats(&frames, next.distance, &mut pending);
+                        }
+                    }
+                }
+            }
             Waiting::Primitive(geometry, primitive) => {
                 if let GeometryKind::Instance(instance) = &frame.accel.geometries[geometry as usize].kind {
                     let start = Start::of(primitive);
@@ -155,6 +189,15 @@ fn enter(frames: &[Frame], start: Start, distance: f64, pending: &mut BinaryHeap
     pending.extend(root.into_iter().chain(infinite).map(|what| Pending { distance, frame, what }));
 }
 
+/// The same of what has no area below the last frame.
+fn enter_flats(frames: &[Frame], distance: f64, pending: &mut BinaryHeap<Pending>) {
+    let position = frames.len() - 1;
+    if let Some(root) = frames[position].accel.flats().root() {
+        let distance = frames[position].distance_to_flats(&root.bounds).max(distance);
+        pending.push(Pending { distance, frame: position as u32, what: Waiting::Flat(0) });
+    }
+}
+
 /// Something to be looked at, and how far away it is at least.
 struct Pending {
     distance: f64,
@@ -168,6 +211,8 @@ enum Waiting {
     Reference(u32),
     /// Geometry and primitive of what is no triangle of a mesh; of an instance, where it is entered.
     Primitive(u32, u32),
+    /// A node of what has no area.
+    Flat(u32),
 }
 
 // The nearest is the greatest.
@@ -249,6 +294,17 @@ impl<'a> Frame<'a> {
         // Also where it is no number.
         if distance > 0.0 { distance } else { 0.0 }
     }
+
+    /// How far a box of what has no area is away at least, in the outermost space.
+    fn distance_to_flats(&self, bounds: &Aabb) -> f64 {
+        let tree_space = &self.accel.tree_space;
+        let reach = self.local.abs() + self.accel.flats().reach;
+        let slop = 4.0 * tree_space.slop_of(reach) / tree_space.scale;
+        let gap = (bounds.min - self.local).max(self.local - bounds.max).max(DVec3::ZERO);
+        let distance = (gap.length() * (1.0 - 1e-12) - slop) * self.shrink;
+        // Also where it is no number.
+        if distance > 0.0 { distance } else { 0.0 }
+    }
 }
 
 /// What was found so far.
@@ -312,7 +368,7 @@ impl Search {
         });
     }
 
-    /// A triangle of a mesh, moved to the outermost space; those without area do not count.
+    /// A triangle of a mesh, moved to the outermost space; one without area is a line or a point.
     pub(crate) fn intersect_triangle(
         &mut self,
         frame: &Frame,
@@ -321,9 +377,6 @@ impl Search {
         primitive: u32,
     ) {
         let corners = mesh.indices[primitive as usize].map(|vertex| mesh.positions[vertex as usize]);
-        if !has_area(&corners) {
-            return;
-        }
         let from_point = mesh.origin - frame.local;
         self.intersect_corners(frame, corners.map(|p| from_point + p.as_dvec3()), geometry, primitive);
     }
@@ -348,6 +401,10 @@ impl Search {
             GeometryKind::Spheres(cloud) => {
                 let sphere = ExactSphere::of(cloud, primitive);
                 if !has_radius(&cloud.spheres[primitive as usize]) {
+                    let center = frame.map.point(sphere.center);
+                    let distance = (center - self.point).length();
+                    let found = NearestPoint { point: center, distance, part: 0, uv: DVec2::ZERO };
+                    self.offer(frame, geometry, primitive, &found);
                     return;
                 }
                 sphere.to_shape().closest_point(&frame.map, self.point)
@@ -361,10 +418,8 @@ impl Search {
                 None => Err(NoNearestPoint::Map),
             },
             GeometryKind::PreciseMesh(mesh) => {
-                let corners = mesh.corners(primitive);
-                if precise_mesh::has_area(&corners) {
-                    self.intersect_corners(frame, corners.map(|p| p - frame.local), geometry, primitive);
-                }
+                let corners = mesh.corners(primitive).map(|p| p - frame.local);
+                self.intersect_corners(frame, corners, geometry, primitive);
                 return;
             }
             GeometryKind::Mesh(_) | GeometryKind::Instance(_) => return,

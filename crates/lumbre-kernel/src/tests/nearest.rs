@@ -76,6 +76,104 @@ fn check(accel: &Accel, point: DVec3, max_distance: f64) -> (bool, bool) {
     }
 }
 
+/// Triangles of which most have no area: lines, and points.
+fn flat_soup(random: &mut Random, count: usize, center: DVec3, extent: f64) -> TriangleMesh {
+    let mut mesh = soup(random, count, center, extent);
+    for (i, triangle) in mesh.indices.iter_mut().enumerate() {
+        let [a, b, _] = *triangle;
+        match i % 4 {
+            0 => *triangle = [a; 3],
+            1 => *triangle = [a, b, a],
+            // A corner half way between two others, where single precision has such a place.
+            2 => {
+                let ends = [a, b].map(|vertex| mesh.positions[vertex as usize]);
+                let [start, end] = ends.map(|p| (16.0 * p).round() / 16.0);
+                let first = mesh.positions.len() as u32;
+                mesh.positions.extend([start, end, 0.5 * (start + end)]);
+                *triangle = [first, first + 1, first + 2];
+            }
+            _ => {}
+        }
+    }
+    mesh
+}
+
+#[test]
+fn what_has_no_area_is_as_near_as_it_is_and_no_ray_hits_it() {
+    let mut random = Random(31);
+    let mut found = [0; 2];
+    for center in [CENTER, 1000.0 * CENTER] {
+        let mesh = flat_soup(&mut random, 240, center, 3.0);
+        let flats: Vec<u32> = (0..240).filter(|i| i % 4 != 3).collect();
+        let mut precise_mesh = precise(&flat_soup(&mut random, 40, center, 3.0));
+        precise_mesh.indices.truncate(39);
+        let mut dust = cloud(&mut random, 30, center, center, 3.0);
+        dust.spheres.iter_mut().step_by(2).for_each(|sphere| sphere[3] = 0.0);
+        let inner =
+            Arc::new(build(vec![GeometryKind::Mesh(Arc::new(flat_soup(&mut random, 60, center, 0.5)))]));
+        // Nothing in it has an area, so no tree of its own holds the instance.
+        let mut points = flat_soup(&mut random, 20, center, 0.5);
+        points.indices.iter_mut().for_each(|triangle| *triangle = [triangle[0]; 3]);
+        let points = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(points))]));
+        let nested = Arc::new(build(vec![GeometryKind::Instance(Instance {
+            accel: points.clone(),
+            world_from_object: Transform::translate(DVec3::new(0.5, 0.25, -1.0)).into(),
+        })]));
+        let mut kinds = vec![
+            GeometryKind::Mesh(Arc::new(mesh)),
+            GeometryKind::PreciseMesh(Arc::new(precise_mesh)),
+            GeometryKind::Spheres(Arc::new(dust)),
+        ];
+        for accel in [&inner, &points, &nested] {
+            for _ in 0..4 {
+                let map = random.placement(center, 4.0, 0.5) * Transform::translate(-center);
+                let accel = Arc::clone(accel);
+                kinds.push(GeometryKind::Instance(Instance { accel, world_from_object: map.into() }));
+            }
+        }
+        let accel = build(kinds);
+        for _ in 0..600 {
+            let point = somewhere(&mut random, center, 4.0);
+            let reach = [1.0, f64::INFINITY][random.below(2)];
+            let (answered, is_there) = check(&accel, point, reach);
+            assert!(answered);
+            found[usize::from(is_there)] += 1;
+            let Ok(Some(nearest)) = accel.closest_point(point, f64::INFINITY) else { panic!("nothing near") };
+            if nearest.geometry == 0 && flats.contains(&nearest.primitive) {
+                let way = nearest.point - point;
+                let ray = lumbre_geometry::Ray::new(point, way);
+                let hit = accel.closest(&ray);
+                assert!(hit.is_none_or(|hit| hit.geometry != 0 || hit.primitive != nearest.primitive));
+            }
+        }
+    }
+    assert!(found[0] > 100 && found[1] > 600, "{found:?}");
+}
+
+#[test]
+fn a_needle_and_a_point_have_the_distances_that_they_have() {
+    // A triangle on a line of the x axis, one in a point, and one on a line far away, beside two that have an area.
+    let vertices =
+        [[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [5, 5, 5], [10, 10, 10], [10, 10, 12], [10, 10, 11]];
+    let positions = vertices.map(|p: [i32; 3]| lumbre_math::Vec3::from_array(p.map(|c| c as f32))).to_vec();
+    let indices = vec![[0, 1, 2], [4, 4, 4], [5, 6, 7], [0, 2, 3], [5, 5, 6]];
+    let mesh = TriangleMesh { origin: DVec3::ZERO, positions, indices };
+    let accel = build(vec![GeometryKind::Mesh(Arc::new(mesh))]);
+    let expected = [
+        ([1.3, -1.0, 0.0], 1.0),
+        ([5.0, 5.0, 6.0], 1.0),
+        ([10.0, 11.0, 11.5], 1.0),
+        ([10.0, 10.0, 13.0], 1.0),
+        ([0.2, 0.2, 3.0], 3.0),
+        ([5.1, 5.0, 5.0], 0.1),
+        ([1.5, 0.0, 0.0], 0.0),
+    ];
+    for (point, distance) in expected {
+        let found = accel.closest_point(DVec3::from_array(point), f64::INFINITY).unwrap().unwrap();
+        assert!((found.distance - distance).abs() < 1e-12, "{point:?}: {}", found.distance);
+    }
+}
+
 fn similar(random: &mut Random, center: DVec3, spread: f64) -> Transform {
     let size = random.between(0.2, 1.5);
     let mirror = if random.unit() < 0.3 { -1.0 } else { 1.0 };

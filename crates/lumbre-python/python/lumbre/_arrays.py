@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import math
+import operator
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ._lumbre import LumbreError
+from ._lumbre import LumbreError, memory_left
 
 Array = npt.NDArray[Any]
 Triple = tuple[float, float, float]
 
 _SINGLE = np.dtype(np.float32)
 _DOUBLE = np.dtype(np.float64)
+# Half of what a small machine has.
+_LITTLE = 1 << 28
 
 
 def triple(name: str, value: Iterable[float]) -> Triple:
@@ -24,6 +28,56 @@ def triple(name: str, value: Iterable[float]) -> Triple:
     except (TypeError, ValueError) as error:
         raise LumbreError(f"{name} is no triple (found {value!r}; expected three numbers)") from error
     return x, y, z
+
+
+def array_of(name: str, value: npt.ArrayLike) -> Array:
+    """An array of numbers. One whose values are masked is refused, for what is behind a mask would count."""
+    if isinstance(value, np.ma.MaskedArray):
+        if np.ma.getmaskarray(value).any():
+            raise LumbreError(f"{name} has masked values (expected an array without, such as value.filled(0) or value.compressed())")
+        value = value.data
+    return np.asarray(value)
+
+
+def whole(name: str, value: Any, low: int = 0, high: int = 2**32 - 1) -> int:
+    """A whole number from low to high."""
+    try:
+        number = None if isinstance(value, (bool, np.bool_)) else operator.index(value)
+    except TypeError:
+        number = None
+    if number is None or not low <= number <= high:
+        raise LumbreError(f"{name} is out of range (found {value!r}; expected a whole number from {low} to {high})")
+    return number
+
+
+def wholes(name: str, value: Any, names: str, low: int = 0) -> tuple[int, ...]:
+    """Whole numbers, one for each of these names."""
+    count = len(names.split(", "))
+    is_list = isinstance(value, (tuple, list, np.ndarray)) and np.ndim(value) == 1
+    if not is_list or len(value) != count:
+        raise LumbreError(f"{name} is out of range (found {value!r}; expected ({names}), {count} whole numbers)")
+    return tuple(whole(name, number, low) for number in value)
+
+
+def positive(name: str, value: Any, unit: str = "a number above 0") -> float:
+    """A finite number above 0."""
+    is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    if not is_number or not 0 < value < math.inf:
+        raise LumbreError(f"{name} is out of range (found {value!r}; expected {unit})")
+    return float(value)
+
+
+def flag(name: str, value: Any) -> bool:
+    """True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise LumbreError(f"{name} is neither True nor False (found {value!r})")
+    return bool(value)
+
+
+def fits(what: str, nbytes: int) -> None:
+    """Raises `MemoryError` for what does not fit into the memory that is left. Little is not asked about."""
+    if nbytes > _LITTLE and nbytes > (left := memory_left()):
+        raise MemoryError(f"{what}: needs {nbytes} bytes of memory, {left} are left")
 
 
 def real(array: Array) -> Array:
@@ -38,7 +92,7 @@ def real(array: Array) -> Array:
 
 def rows(name: str, value: npt.ArrayLike) -> Array:
     """An (N, 3) array, or a single triple."""
-    array = real(np.asarray(value))
+    array = real(array_of(name, value))
     if array.ndim in (1, 2) and array.shape[-1] == 3:
         return array
     if array.size == 0 and array.ndim <= 2:
@@ -69,7 +123,7 @@ def limit(name: str, value: npt.ArrayLike) -> float | Array:
     """One number for all rays, or one for each."""
     if isinstance(value, (int, float)):
         return float(value)
-    array = real(np.asarray(value))
+    array = real(array_of(name, value))
     if array.ndim == 0:
         return float(array)
     if array.ndim == 1:

@@ -23,6 +23,7 @@ __all__ = [
     "Material",
     "Texture",
     "Viewer",
+    "memory_left",
     "panic_on_purpose",
     "thread_count",
 ]
@@ -34,6 +35,7 @@ def read_image(path: str) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float
 def write_image(path: str, pixels: npt.NDArray[np.float32], tonemap: str, exposure: float) -> None: ...
 def thread_count() -> int: ...
 def panic_on_purpose() -> None: ...
+def memory_left() -> int: ...
 
 @final
 class Geometry:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _lumbre
-from ._arrays import Triple, triple
+from ._arrays import Triple, array_of, triple
 from ._lumbre import LumbreError
 
 Colour = tuple[float, float, float]
@@ -55,10 +55,25 @@ class Texture:
     offset: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "image", np.asarray(self.image))
+        object.__setattr__(self, "image", array_of("a texture", self.image))
+        object.__setattr__(self, "_made", {})
         self._native(True)
 
     def _native(self, is_colour: bool) -> _lumbre.Texture:
+        # Made once for each meaning, and shared by all that it is on.
+        made: dict[bool, _lumbre.Texture] = self.__dict__["_made"]
+        if is_colour not in made:
+            made[is_colour] = self._new(is_colour)
+        return made[is_colour]
+
+    def __getstate__(self) -> dict[str, Any]:
+        return _given(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.__post_init__()
+
+    def _new(self, is_colour: bool) -> _lumbre.Texture:
         texels = np.asarray(self.image)
         if self.encoding not in ("auto", "srgb", "linear"):
             raise LumbreError(f'encoding is unknown (found "{self.encoding}"; expected auto, srgb, linear)')
@@ -74,6 +89,11 @@ class Texture:
         is_srgb = self.encoding == "srgb" or (self.encoding == "auto" and is_whole and is_colour)
         table = texels if texels.ndim == 3 else texels[..., None]
         return _lumbre.Texture(table, is_srgb, self.wrap, self.filter, self.scale, self.offset)
+
+
+def _given(part: Any) -> dict[str, Any]:
+    """What a part was made of, without what was made of it."""
+    return {name: value for name, value in part.__dict__.items() if name != "_made"}
 
 
 def _textured(value: Any) -> Any:
@@ -111,11 +131,23 @@ class Material:
     bump_map: Texture | npt.NDArray[Any] | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
+        for name, value in _given(self).items():
             object.__setattr__(self, name, _textured(value))
-        self._native()
+        # Made once, and shared by all that it is on, and by mixtures.
+        object.__setattr__(self, "_made", self._new())
 
     def _native(self) -> _lumbre.Material:
+        made: _lumbre.Material = self.__dict__["_made"]
+        return made
+
+    def __getstate__(self) -> dict[str, Any]:
+        return _given(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.__post_init__()
+
+    def _new(self) -> _lumbre.Material:
         maps = [None if map is None else _number_map("a map", map) for map in (self.normal_map, self.bump_map)]
         if any(isinstance(map, float) for map in maps):
             raise LumbreError("a map is no image (expected a Texture or an array)")
@@ -353,7 +385,7 @@ class EnvironmentLight(Light):
     up: Iterable[float] = (0.0, 0.0, 1.0)
 
     def _native(self) -> _lumbre.Light:
-        image = None if self.image is None else np.asarray(self.image, dtype=np.float32)
+        image = None if self.image is None else array_of("image", self.image).astype(np.float32, copy=False)
         if image is not None and image.ndim != 3:
             raise LumbreError(f"image has the wrong shape (found {image.shape}; expected (h, 2h, 3))")
         return _lumbre.Light.environment(colour("radiance", self.radiance), image, triple("up", self.up))

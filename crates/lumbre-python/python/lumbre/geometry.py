@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _lumbre
-from ._arrays import Array, Triple, real, triple
+from ._arrays import Array, Triple, array_of, real, triple
 from ._lumbre import LumbreError
 from .appearance import Colour, Material, colour
 
@@ -51,7 +51,7 @@ class Shape:
     def _place(self) -> list[list[float]] | None:
         if self.transform is None:
             return None
-        matrix = np.asarray(self.transform, dtype=np.float64)
+        matrix = array_of("transform", self.transform).astype(np.float64, copy=False)
         if matrix.shape != (4, 4):
             raise LumbreError(f"transform has the wrong shape (found {matrix.shape}; expected (4, 4))")
         rows: list[list[float]] = matrix.tolist()
@@ -356,7 +356,7 @@ class Mesh(Shape):
             raise LumbreError(f'precision is unknown (found "{precision}"; expected auto, single, double)')
         tables = {"vertices": vertices, "normals": normals, "uvs": uvs, "colors": colors}
         given: dict[str, Any] = {name: None if table is None else _table(name, table) for name, table in tables.items()}
-        corners = np.asarray(faces)
+        corners = array_of("faces", faces)
         if corners.size == 0 and corners.ndim != 2:
             corners = np.zeros((0, 3), dtype=np.int64)
         if corners.dtype.kind not in "iu" and corners.size > 0:
@@ -387,7 +387,7 @@ class Mesh(Shape):
 
 
 def _table(name: str, value: npt.ArrayLike) -> Array:
-    array = real(np.asarray(value))
+    array = real(array_of(name, value))
     if array.size == 0 and array.ndim != 2:
         array = array.reshape(0, 3)
     if array.ndim != 2:
@@ -498,7 +498,7 @@ class Instances:
         return len(self._places())
 
     def _places(self) -> Array:
-        places = np.asarray(self.transforms, dtype=np.float64)
+        places = array_of("transforms", self.transforms).astype(np.float64, copy=False)
         if places.ndim != 3 or places.shape[1:] != (4, 4):
             raise LumbreError(f"transforms have the wrong shape (found {places.shape}; expected (N, 4, 4))")
         return places

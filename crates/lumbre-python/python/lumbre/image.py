@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _lumbre
+from ._arrays import array_of
 from ._lumbre import LumbreError
 
 
@@ -127,7 +128,7 @@ def write_image(path: str | os.PathLike[str], pixels: npt.ArrayLike, *, tonemap:
     ...     read_image(path).shape
     (2, 3, 3)
     """
-    array = np.asarray(pixels, dtype=np.float32)
+    array = array_of("an image", pixels).astype(np.float32, copy=False)
     if array.ndim == 2:
         array = np.repeat(array[..., None], 3, axis=-1)
     if array.ndim != 3:

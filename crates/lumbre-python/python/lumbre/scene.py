@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _lumbre
-from ._arrays import Array, rays, rows, triple
+from ._arrays import Array, fits, flag, positive, rays, rows, triple, whole, wholes
 from ._lumbre import LumbreError
 from .appearance import Camera, Light
 from .explanation import Explanation
@@ -281,7 +281,11 @@ class Scene:
                 if ready is not None:
                     return ready
         o, d, low, high = rays(origins, directions, tmin, tmax)
-        answer = np.empty(len(o), dtype=np.bool_) if out is None else out
+        if out is None:
+            fits(f"the answers of {len(o)} rays", len(o))
+            answer = np.empty(len(o), dtype=np.bool_)
+        else:
+            answer = _array("out", out)
         self._native.occluded(o, d, low, high, answer)
         return answer
 
@@ -299,6 +303,7 @@ class Scene:
         [2]
         """
         o, d, low, high = rays(origins, directions, tmin, tmax)
+        fits(f"the answers of {len(o)} rays", 8 * len(o))
         answer = np.empty(len(o), dtype=np.int64)
         self._native.count(o, d, low, high, answer)
         return answer
@@ -330,6 +335,8 @@ class Scene:
         >>> nearest.distance.tolist(), nearest.point.tolist()
         ([3.0], [[0.0, 0.0, 2.0]])
         """
+        if not isinstance(max_distance, (int, float, np.integer, np.floating)) or not max_distance >= 0:
+            raise LumbreError(f"max_distance is out of range (found {max_distance!r}; expected a number, 0 or more)")
         places = _points(points)
         columns = _columns(len(places), places.dtype, ("t", "point", "shape", "prim", "instance"))
         self._native.closest_point(places, max_distance, columns)
@@ -362,7 +369,8 @@ class Scene:
         return answer
 
     def signed_distance(self, points: npt.ArrayLike) -> Array:
-        """The distance of (N, 3) points to the nearest surface, negative inside: where the winding number is above 0.5.
+        """The distance of (N, 3) points to the nearest surface, negative inside: where surfaces wind around a point
+        more than 0.5 times, in either direction. So a closed mesh that is inside out has the same signs, as `inside` does.
 
         Raises `LumbreError` as `closest_point` and `winding_number` do.
 
@@ -372,7 +380,7 @@ class Scene:
         """
         places = _points(points)
         distance = self.closest_point(places).distance
-        return np.where(self.winding_number(places) > 0.5, -distance, distance)
+        return np.where(np.abs(self.winding_number(places)) > 0.5, -distance, distance)
 
     def render(
         self,
@@ -441,7 +449,9 @@ class Scene:
             "denoise": denoise,
             "first_sample": first_sample,
         }
-        options = {name: value for name, value in given.items() if value is not None}
+        options = _options(given)
+        if not (progress is None or isinstance(progress, bool) or callable(progress)):
+            raise LumbreError(f"progress is no callable (found {progress!r}; expected True, or a function of samples, total and share)")
         if spp is None and noise is not None:
             # As in the program: some pixels never come to little noise.
             options["spp"] = 1024
@@ -492,7 +502,12 @@ class Scene:
         """
         if (pixel is None) == (ray is None):
             raise LumbreError("either a pixel or a ray is explained")
-        width, height = size if size is not None else self.size
+        options = _options({"size": size, "camera": camera, "integrator": integrator, "seed": seed})
+        sample, depth = whole("sample", sample), whole("depth", depth)
+        if pixel is not None:
+            x, y = wholes("pixel", pixel, "x, y")
+            pixel = (x, y)
+        width, height = options["size"] if "size" in options else self.size
         if pixel is not None and not (0 <= pixel[0] < width and 0 <= pixel[1] < height):
             raise LumbreError(f"pixel {pixel} is outside of the picture (expected less than ({width}, {height}))")
         asked = None
@@ -501,8 +516,6 @@ class Scene:
             if not np.isfinite((origin, direction)).all() or not any(direction) or not tmin <= tmax:
                 raise LumbreError(f"this is no ray (found {ray} from {tmin} to {tmax}; expected finite numbers, and a direction)")
             asked = (origin, direction, float(tmin), float(tmax))
-        given = {"size": size, "camera": camera, "integrator": integrator, "seed": seed}
-        options = {name: value for name, value in given.items() if value is not None}
         native = self._native
         return Explanation(lambda format: native.explain(options, pixel, asked, sample, depth, nearest, lang, format))
 
@@ -524,7 +537,8 @@ class Scene:
         >>> viewer = lumbre.Scene([lumbre.Sphere()]).view(size=(320, 200), open=False)
         >>> viewer.close()
         """
-        viewer = Viewer(self._native.view(size, spp), self._repr_png_)
+        options = _options({"size": size, "spp": spp})
+        viewer = Viewer(self._native.view(options.get("size"), options.get("spp")), self._repr_png_)
         if open:
             viewer.open()
         return viewer
@@ -619,25 +633,64 @@ def _columns(count: int, dtype: np.dtype[Any], fields: Sequence[str]) -> dict[st
     """Arrays for these fields, not filled."""
     if isinstance(fields, str):
         fields = (fields,)
-    columns: dict[str, Array] = {}
+    if not isinstance(fields, Iterable):
+        raise LumbreError(f"fields are no names (found {fields!r}; expected some of {', '.join(FIELDS)})")
+    layouts: dict[str, tuple[tuple[int, ...], np.dtype[Any]]] = {}
     for name in fields:
         if name not in FIELDS:
-            raise LumbreError(f'a hit has no field "{name}" (expected some of {", ".join(FIELDS)})')
+            raise LumbreError(f"a hit has no field {name!r} (expected some of {', '.join(FIELDS)})")
         width = _WIDTHS.get(name)
-        shape = (count,) if width is None else (count, width)
-        columns[name] = np.empty(shape, dtype=_KINDS.get(name, dtype))
-    return columns
+        layouts[name] = ((count,) if width is None else (count, width), np.dtype(_KINDS.get(name, dtype)))
+    nbytes = sum(math.prod(shape) * kind.itemsize for shape, kind in layouts.values())
+    fits(f"the answers of {count} rays", nbytes)
+    return {name: np.empty(shape, dtype=kind) for name, (shape, kind) in layouts.items()}
+
+
+def _options(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Options of a render that are given, each of its kind and in its range."""
+    options = {name: value for name, value in given.items() if value is not None}
+    for name, value in options.items():
+        if name == "size":
+            options[name] = wholes(name, value, "width, height", 1)
+        elif name == "crop":
+            options[name] = wholes(name, value, "x0, y0, x1, y1")
+        elif name == "spp":
+            options[name] = whole(name, value, 1)
+        elif name in ("max_depth", "threads", "first_sample"):
+            options[name] = whole(name, value)
+        elif name == "seed":
+            options[name] = whole(name, value, 0, 2**64 - 1)
+        elif name == "camera":
+            options[name] = value if isinstance(value, str) else whole("camera", value)
+        elif name == "integrator":
+            if not isinstance(value, str):
+                raise LumbreError(f"integrator is no name (found {value!r})")
+        elif name == "time":
+            options[name] = positive(name, value, "seconds, above 0")
+        elif name == "noise":
+            options[name] = positive(name, value, "a relative noise above 0, such as 0.02")
+        else:
+            options[name] = flag(name, value)
+    return options
 
 
 def _checked(out: Mapping[str, Array]) -> dict[str, Array]:
+    if not isinstance(out, Mapping):
+        raise LumbreError(f"out has no arrays by name (found {out!r}; expected a dict of some of {', '.join(FIELDS)})")
     for name, array in out.items():
         if name not in FIELDS:
-            raise LumbreError(f'a hit has no field "{name}" (expected some of {", ".join(FIELDS)})')
-        if not isinstance(array, np.ndarray):
-            raise LumbreError(f"out: {name} is no array (found {type(array).__name__})")
-        if not array.flags.writeable:
-            raise LumbreError(f"out: {name} is read-only")
+            raise LumbreError(f"a hit has no field {name!r} (expected some of {', '.join(FIELDS)})")
+        _array(f"out: {name}", array)
     return dict(out)
+
+
+def _array(name: str, array: Any) -> Any:
+    """An array that can be written."""
+    if not isinstance(array, np.ndarray) or isinstance(array, np.ma.MaskedArray):
+        raise LumbreError(f"{name} is no array to write (found {type(array).__name__}; expected a numpy.ndarray)")
+    if not array.flags.writeable:
+        raise LumbreError(f"{name} is read-only")
+    return array
 
 
 def _points(points: npt.ArrayLike) -> Array:

@@ -109,7 +109,7 @@ class RayMeshIntersector:
         places = rows("points", points).astype(np.float64, copy=False).reshape(-1, 3)
         if self.mesh.is_watertight:
             return self.scene.inside(places)
-        return np.asarray(self.scene.winding_number(places) > 0.5)
+        return np.asarray(np.abs(self.scene.winding_number(places)) > 0.5)
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_built": None}

@@ -8,7 +8,6 @@
 mod escape;
 mod flat;
 mod lights;
-mod one_bsdf;
 mod paths;
 mod search;
 mod shade;
@@ -26,9 +25,9 @@ use lumbre_math::DVec3;
 use lumbre_scene::{SamplerKind, Scene};
 use lumbre_shading::lanes::{
     BsdfKind, CoatedConductorLanes, CoatedDiffuseLanes, ConductorLanes, DielectricLanes, DiffuseLanes,
-    DiffuseTransmissionLanes, PrincipledLanes, ThinDielectricLanes,
+    DiffuseTransmissionLanes, PrincipledLanes, ThinDielectricLanes, UberLanes,
 };
-use lumbre_shading::{Bsdf, ShadingNormals, Spectrum};
+use lumbre_shading::{ShadingNormals, Spectrum};
 use lumbre_simd::{Double, InstructionSet, Real, V3};
 
 pub(crate) use paths::SampleId;
@@ -42,7 +41,7 @@ use crate::wave::escape::Escape;
 use crate::wave::flat::FlatHits;
 use crate::wave::paths::{OnePath, Paths, Slots};
 use crate::wave::search::Hits;
-use crate::wave::shade::{Kind, Rows, Shade, ShadeRows};
+use crate::wave::shade::{Kind, Shade, ShadeKind};
 use crate::wave::shadows::Shadows;
 use crate::wave::traced::Traced;
 use crate::wave::vertices::Vertices;
@@ -265,7 +264,7 @@ const KINDS: [BsdfKind; BsdfKind::COUNT] = [
     BsdfKind::CoatedDiffuse,
     BsdfKind::CoatedConductor,
     BsdfKind::Principled,
-    BsdfKind::Other,
+    BsdfKind::Uber,
 ];
 
 macro_rules! kinds {
@@ -283,13 +282,8 @@ macro_rules! kinds {
                 let instruction_set = self.setting.instruction_set;
                 match kind {
                     $(BsdfKind::$kind => {
-                        let rows: Rows<'_, $kind> = Rows(&self.vertices.rows, PhantomData);
-                        instruction_set.run(ShadeRows { shade: self, rows });
+                        instruction_set.run(ShadeKind { shade: self, kind: PhantomData::<$kind> });
                     })*
-                    BsdfKind::Other => {
-                        let bsdfs: &[Bsdf] = &self.vertices.bsdfs;
-                        self.run::<f32, _>(&bsdfs);
-                    }
                 }
             }
         }
@@ -305,6 +299,7 @@ kinds!(
     CoatedDiffuse: CoatedDiffuseLanes,
     CoatedConductor: CoatedConductorLanes,
     Principled: PrincipledLanes,
+    Uber: UberLanes,
 );
 
 impl Setting<'_> {

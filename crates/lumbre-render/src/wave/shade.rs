@@ -22,49 +22,6 @@ pub(crate) trait Kind {
     type Bsdf<R: Real>: LaneBsdf<R>;
 }
 
-/// What shading asks of a BSDF in each lane: see [`LaneBsdf`].
-pub(crate) trait Scatters<R: Real> {
-    fn eval(&self, wo: V3<R>, wi: V3<R>) -> (V3<R>, R);
-    fn sample(&self, wo: V3<R>, lobe: R, u: [R; 2]) -> LaneSample<R>;
-    fn is_delta(&self) -> R::Mask;
-}
-
-impl<R: Real, B: LaneBsdf<R>> Scatters<R> for B {
-    #[inline(always)]
-    fn eval(&self, wo: V3<R>, wi: V3<R>) -> (V3<R>, R) {
-        B::eval(self, wo, wi)
-    }
-
-    #[inline(always)]
-    fn sample(&self, wo: V3<R>, lobe: R, u: [R; 2]) -> LaneSample<R> {
-        B::sample(self, wo, lobe, u)
-    }
-
-    #[inline(always)]
-    fn is_delta(&self) -> R::Mask {
-        B::is_delta(self)
-    }
-}
-
-/// Where the BSDFs of a queue are.
-pub(crate) trait Bsdfs<R: Real> {
-    type Bsdf: Scatters<R>;
-    /// The BSDF at a position in each lane.
-    fn load(&self, at: R::UInt) -> Self::Bsdf;
-}
-
-/// BSDFs as rows of numbers.
-pub(crate) struct Rows<'a, K>(pub(crate) &'a [f32], pub(crate) PhantomData<K>);
-
-impl<R: Real, K: Kind> Bsdfs<R> for Rows<'_, K> {
-    type Bsdf = K::Bsdf<R>;
-
-    #[inline(always)]
-    fn load(&self, at: R::UInt) -> Self::Bsdf {
-        K::Bsdf::<R>::load(self.0, at)
-    }
-}
-
 /// Shades the vertices of a queue. Paths that go on are appended to `next`, segments to lights to `shadows`.
 pub(crate) struct Shade<'a, 's> {
     pub(crate) setting: &'a Setting<'s>,
@@ -87,17 +44,17 @@ pub(crate) struct Shade<'a, 's> {
 }
 
 /// [`Shade`] with BSDFs of one kind, at any instruction set.
-pub(crate) struct ShadeRows<'a, 'b, 's, K> {
+pub(crate) struct ShadeKind<'a, 'b, 's, K> {
     pub(crate) shade: &'b mut Shade<'a, 's>,
-    pub(crate) rows: Rows<'b, K>,
+    pub(crate) kind: PhantomData<K>,
 }
 
-impl<K: Kind> Job for ShadeRows<'_, '_, '_, K> {
+impl<K: Kind> Job for ShadeKind<'_, '_, '_, K> {
     type Output = ();
 
     #[inline(always)]
     fn run<R: Real>(self) {
-        self.shade.run::<R, _>(&self.rows);
+        self.shade.run::<R, K::Bsdf<R>>();
     }
 }
 
@@ -207,7 +164,7 @@ impl<R: Real> Vertex<R> {
 
     /// What the BSDF scatters to a direction of the world, by itself and by directions that are folded onto it.
     #[inline(always)]
-    fn eval<B: Scatters<R>>(&self, bsdf: &B, wi: V3<R>) -> Scattered<R> {
+    fn eval<B: LaneBsdf<R>>(&self, bsdf: &B, wi: V3<R>) -> Scattered<R> {
         let local = self.to_local(wi);
         let (f, pdf) = bsdf.eval(self.wo, local);
         if self.folds.none() {
@@ -293,7 +250,7 @@ struct Arrived<R: Real> {
 impl<'s> Shade<'_, 's> {
     /// Shades the whole queue.
     #[inline(always)]
-    pub(crate) fn run<R: Real, B: Bsdfs<R>>(&mut self, bsdfs: &B) {
+    fn run<R: Real, B: LaneBsdf<R>>(&mut self) {
         let mut done = 0;
         while done < self.count {
             let lanes = R::Mask::first(self.count - done);
@@ -319,7 +276,7 @@ impl<'s> Shade<'_, 's> {
                 ],
                 index: R::UInt::gather(&self.slots.index, slot),
             };
-            let bsdf = bsdfs.load(R::UInt::gather(&self.vertices.bsdf, vertex_at));
+            let bsdf = B::load(&self.vertices.rows, R::UInt::gather(&self.vertices.bsdf, vertex_at));
             let useful = lanes & !bsdf.is_delta();
             if useful.any() {
                 self.light(useful, &arrived, &bsdf, draw.light(arrived.depth));
@@ -330,7 +287,7 @@ impl<'s> Shade<'_, 's> {
 
     /// One sample of the lights.
     #[inline(always)]
-    fn light<R: Real, B: Scatters<R>>(&mut self, useful: R::Mask, arrived: &Arrived<R>, bsdf: &B, u: [R; 4]) {
+    fn light<R: Real, B: LaneBsdf<R>>(&mut self, useful: R::Mask, arrived: &Arrived<R>, bsdf: &B, u: [R; 4]) {
         let vertex = &arrived.vertex;
         let scene = self.setting.scene;
         let receiver = Receiver {
@@ -392,7 +349,7 @@ impl<'s> Shade<'_, 's> {
 
     /// The direction to go on in.
     #[inline(always)]
-    fn scatter<R: Real, B: Scatters<R>>(
+    fn scatter<R: Real, B: LaneBsdf<R>>(
         &mut self,
         lanes: R::Mask,
         arrived: &Arrived<R>,

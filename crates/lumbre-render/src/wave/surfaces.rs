@@ -166,7 +166,7 @@ impl<'s> Wave<'s> {
         if material.is_solid() {
             self.vertices.put_solid(material, here.front);
         }
-        self.vertices.put_bsdf(&frame, bsdf, flags, here.cone());
+        self.vertices.put_bsdf(&frame, &bsdf, flags, here.cone());
     }
 
     /// Adds the light of the surface that was found.

@@ -28,11 +28,9 @@ pub(crate) struct Vertices<'s> {
     /// below the face but not below the smooth surface.
     pub(crate) smooth: [Vec<f32>; 3],
     pub(crate) risen: [Vec<f64>; 3],
-    /// Where the BSDF is: its row in [`Vertices::rows`] begins there, or, where its kind has no rows, its position in
-    /// [`Vertices::bsdfs`].
+    /// Where the row of the BSDF begins in [`Vertices::rows`].
     pub(crate) bsdf: Vec<u32>,
     pub(crate) rows: Vec<f32>,
-    pub(crate) bsdfs: Vec<Bsdf>,
     /// The vertices to be shaded by the kind of their BSDF.
     pub(crate) queues: [Vec<u32>; BsdfKind::COUNT],
     /// The solids that surfaces belong to, and whether they were met from outside; none beyond the end.
@@ -113,7 +111,6 @@ impl<'s> Vertices<'s> {
             self.rows = rows.to_vec();
         }
         self.rows.truncate(rows.len());
-        self.bsdfs.clear();
         self.solids.clear();
         self.queues.iter_mut().for_each(Vec::clear);
     }
@@ -131,24 +128,15 @@ impl<'s> Vertices<'s> {
     }
 
     /// Writes down how the surface of the last vertex scatters, and queues it.
-    pub(crate) fn put_bsdf(&mut self, frame: &ShadingFrame, bsdf: Bsdf, flags: u32, cone: (f64, f64)) {
+    pub(crate) fn put_bsdf(&mut self, frame: &ShadingFrame, bsdf: &Bsdf, flags: u32, cone: (f64, f64)) {
         let at = self.len - 1;
         put(&mut self.frame_s, at, frame.s);
         put(&mut self.frame_n, at, frame.n);
         self.flags[at] |= flags;
         (self.width[at], self.spread[at]) = (cone.0 as f32, cone.1 as f32);
-        match bsdf.row() {
-            Some((kind, row)) => {
-                self.bsdf[at] = self.rows.len() as u32;
-                self.rows.extend(row);
-                self.queue(at, kind);
-            }
-            None => {
-                self.bsdf[at] = self.bsdfs.len() as u32;
-                self.bsdfs.push(bsdf);
-                self.queue(at, BsdfKind::Other);
-            }
-        }
+        self.bsdf[at] = self.rows.len() as u32;
+        self.rows.extend(bsdf.row());
+        self.queue(at, bsdf.kind());
     }
 
     /// Has a vertex shaded.

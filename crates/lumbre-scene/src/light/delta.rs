@@ -90,7 +90,7 @@ pub struct GoniometricLight {
 }
 
 impl GoniometricLight {
-    /// `None` for an image that is black, empty or not finite.
+    /// `None` for an image that is black or empty.
     pub(crate) fn new(
         world_from_light: &Transform,
         intensity: Spectrum,

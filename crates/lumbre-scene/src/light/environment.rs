@@ -34,7 +34,7 @@ impl UniformLight {
     }
 }
 
-/// An image over the sphere, interpolated bilinearly.
+/// An image over the sphere, interpolated bilinearly. Texels that are not finite count as black.
 #[derive(Clone, Debug)]
 pub(super) struct Panorama {
     /// Three numbers a texel, in rows of `width + 2`: with one texel more on each side, what is beyond the edge. None is negative.
@@ -47,15 +47,14 @@ pub(super) struct Panorama {
 }
 
 impl Panorama {
-    /// `None` for an image that is empty or not finite.
+    /// `None` for an image that is empty.
     pub(super) fn new(
         image: Arc<Image>,
         mapping: EnvironmentMapping,
         world_from_light: Transform,
         scale: Spectrum,
     ) -> Option<Self> {
-        let is_usable =
-            image.width() > 0 && image.height() > 0 && image.pixels().iter().all(|c| c.is_finite());
+        let is_usable = image.width() > 0 && image.height() > 0;
         if !is_usable {
             return None;
         }
@@ -96,7 +95,7 @@ impl Panorama {
         let (mut sum, mut whole) = (0.0, 0.0);
         for y in 0..self.height {
             let weight = self.solid_angle(y);
-            let row = (0..i64::from(self.width)).map(|x| f64::from(self.texel(x, i64::from(y)).average()));
+            let row = (0..i64::from(self.width)).map(|x| mean_of(self.texel(x, i64::from(y))));
             sum += weight * row.sum::<f64>();
             whole += weight * f64::from(self.width);
         }
@@ -196,7 +195,7 @@ pub struct Environment {
 }
 
 impl Environment {
-    /// `None` for an image that is black, empty or not finite.
+    /// `None` for an image that is black or empty.
     pub(crate) fn new(
         image: Arc<Image>,
         mapping: EnvironmentMapping,
@@ -207,7 +206,7 @@ impl Environment {
         let (width, height) = (picture.width as usize, picture.height as usize);
         // The mean of the linear interpolation over a pixel: 1/8, 6/8, 1/8 of it and its neighbours, along both
         // axes.
-        let brightness = |x: i64, y: i64| f64::from(picture.texel(x, y).average());
+        let brightness = |x: i64, y: i64| mean_of(picture.texel(x, y));
         let smooth = |x: i64, y: i64| {
             let row = |y| 0.125 * (brightness(x - 1, y) + brightness(x + 1, y)) + 0.75 * brightness(x, y);
             0.125 * (row(y - 1) + row(y + 1)) + 0.75 * row(y)
@@ -288,7 +287,23 @@ impl Environment {
     }
 }
 
-/// The pixel, wrapped if it is beyond an edge. Negative light counts as 0.
+/// The first texel of an image that is not finite, from the top left, as (x, y).
+pub(crate) fn first_not_finite(image: &Image) -> Option<(u32, u32)> {
+    let place = image.pixels().iter().position(|c| !c.is_finite())?;
+    Some(((place % image.width() as usize) as u32, (place / image.width() as usize) as u32))
+}
+
+/// The light of a texel: negative channels count as 0, and texels that are not finite as black.
+fn light_of(texel: Spectrum) -> Spectrum {
+    if texel.is_finite() { texel.map(|c| c.max(0.0)) } else { Spectrum::BLACK }
+}
+
+/// The mean of the channels, which does not overflow.
+fn mean_of(colour: Spectrum) -> f64 {
+    colour.to_array().iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0
+}
+
+/// The pixel, wrapped if it is beyond an edge; see [`light_of`].
 fn texel(image: &Image, mapping: EnvironmentMapping, x: i64, y: i64) -> Spectrum {
     let (width, height) = (i64::from(image.width()), i64::from(image.height()));
     let (x, y) = match mapping {
@@ -316,5 +331,5 @@ fn texel(image: &Image, mapping: EnvironmentMapping, x: i64, y: i64) -> Spectrum
             ((if beyond { x + width / 2 } else { x }).rem_euclid(width), y.clamp(0, height - 1))
         }
     };
-    image.pixels()[(y * width + x) as usize].map(|c| c.max(0.0))
+    light_of(image.pixels()[(y * width + x) as usize])
 }

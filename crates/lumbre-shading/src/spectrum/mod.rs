@@ -244,11 +244,36 @@ mod tests {
             ("glass-F10", 1.72825),
             ("glass-F11", 1.78472),
             ("metal-MgO-eta", 1.7375),
-            ("metal-TiO2-eta", 2.614),
+            ("metal-TiO2-eta", 2.91237),
         ];
         for (name, n) in published {
             let ours = named(name).index_of_refraction();
             assert!((ours - n).abs() < 1e-3, "{name}: {ours}");
+        }
+    }
+
+    #[test]
+    fn metals_have_the_values_that_pbrt_gives_them() {
+        // (η, k) at entries of its tables, half way between two, and beyond the ends.
+        let published = [
+            ("Ag", 551.041, 0.124375, 3.34813),
+            ("Ag", 200.0, 1.519, 1.08),
+            ("Ag", 300.5785, 1.5075, 0.981),
+            ("Ag", 2000.0, 0.163, 5.95),
+            ("Cu", 298.757, 1.40031, 1.66213),
+            ("Cu", 885.601, 0.3, 5.717),
+            ("Au", 298.757, 1.795, 1.92037),
+            ("Au", 885.601, 0.21, 5.88),
+            ("Al", 298.757, 0.273375, 3.59375),
+            ("Al", 885.601, 2.24, 8.21),
+            ("CuZn", 440.0, 1.191, 1.797),
+            ("MgO", 767.678, 1.72872, 0.0),
+            ("TiO2", 412.031, 3.24, 0.022),
+            ("TiO2", 359.988, 3.87, 0.251),
+        ];
+        for (metal, nm, eta, k) in published {
+            let ours = ["eta", "k"].map(|what| named(&format!("metal-{metal}-{what}")).at(nm).unwrap());
+            assert!((ours[0] - eta).abs() < 1e-9 && (ours[1] - k).abs() < 1e-9, "{metal} at {nm}: {ours:?}");
         }
     }
 
