@@ -96,7 +96,7 @@ impl Job for Lanes<'_> {
                 Work::Density { last } => {
                     // Some triangle or other: what it costs does not depend on the place of the point.
                     let index = R::UInt::lane_indices() + R::UInt::splat(at as u32);
-                    let primitive = index * R::UInt::splat(97) & R::UInt::splat(last);
+                    let primitive = (index * R::UInt::splat(97)) & R::UInt::splat(last);
                     let zero = R::UInt::splat(0);
                     let up = V3::new(R::Double::splat(0.3), R::Double::splat(0.2), R::Double::splat(4.0));
                     sum = sum + lights.pdf(scene, active, &receiver, zero, primitive, from + up);

@@ -137,11 +137,11 @@ fn reversed<U: UInt>(x: U) -> U {
 #[inline(always)]
 fn reversed_scramble<U: UInt>(x: U, seed: U) -> U {
     let s = U::splat;
-    let x = x ^ x * s(0x3d20_adea);
+    let x = x ^ (x * s(0x3d20_adea));
     let x = x + seed;
     let x = x * (seed.shr::<16>() | s(1));
-    let x = x ^ x * s(0x0552_6c56);
-    x ^ x * s(0x53a2_2864)
+    let x = x ^ (x * s(0x0552_6c56));
+    x ^ (x * s(0x53a2_2864))
 }
 
 /// A point of Owen-scrambled Sobol points, by the reversed index and keys of the shuffle and of both coordinates: see
