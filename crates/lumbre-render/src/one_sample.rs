@@ -69,29 +69,35 @@ impl<'a> Taker<'a> {
         record: &mut Record,
         mut put: impl FnMut(SampleId, Sample),
     ) {
+        let mut weights = Vec::with_capacity(ids.len());
         let aimed = ids.iter().map(|&id| {
             let draw = self.sampler.draw(id.x, id.y, id.index);
-            (draw, self.camera_ray(&draw, &self.aim(id, &draw)))
+            let aim = self.aim(id, &draw);
+            weights.push(aim.weight);
+            (draw, self.camera_ray(&draw, &aim))
         });
         let mut sights = Sights::new(self.scene, &self.view, wave, self.precision, aimed, record);
         let seen = self.see(&mut sights, record);
-        for ((&id, (seen, features)), &radiance) in ids.iter().zip(seen).zip(sights.radiance()) {
-            let weight = self.filter.sample(self.sampler.draw(id.x, id.y, id.index).filter()).weight;
+        for (slot, ((&id, &weight), &radiance)) in ids.iter().zip(&weights).zip(sights.radiance()).enumerate()
+        {
+            let (seen, features) = seen.get(slot).copied().unwrap_or_default();
             let Seen { radiance, coverage, on_catcher } =
                 seen.unwrap_or(Seen { radiance, coverage: Spectrum::WHITE, on_catcher: false });
             put(id, Sample { radiance, coverage, weight, features, on_catcher });
         }
     }
 
-    /// Has the integrator find the light of all sights but those that see something else, and gives what these see and all features.
+    /// Has the integrator find the light of all sights but those that see something else, and gives what these see and all features;
+    /// nothing where no sample has any of both.
     fn see(
         &self,
         sights: &mut Sights<'_, 'a>,
         record: &mut Record,
     ) -> Vec<(Option<Seen>, Option<FeatureSample>)> {
         let has_catcher = self.scene.ground().is_some_and(|ground| ground.catcher);
-        let mut seen = vec![(None, None); sights.len()];
+        let mut seen = Vec::new();
         if self.wants_features || has_catcher || !self.lights_are_seen {
+            seen.resize(sights.len(), (None, None));
             sights.retain(|sights, slot| {
                 let sight = sights.sight(slot);
                 let features = if self.wants_features { Features::of(&self.view, &sight) } else { None };
@@ -107,12 +113,19 @@ impl<'a> Taker<'a> {
     fn aim(&self, id: SampleId, draw: &Draw) -> Aim {
         let place = self.filter.sample(draw.filter());
         let pixel = DVec2::new(f64::from(id.x) + 0.5, f64::from(id.y) + 0.5);
-        Aim { film: pixel + place.offset, lens: draw.lens(), weight: place.weight }
+        // A lens without width has no place but its middle.
+        let lens = if self.view.has_lens() { draw.lens() } else { DVec2::splat(0.5) };
+        Aim { film: pixel + place.offset, lens, weight: place.weight }
     }
 
     fn camera_ray(&self, draw: &Draw, aim: &Aim) -> CameraRay {
         let part = if self.moves { draw.time() } else { 0.0 };
-        self.view.ray(aim.film, aim.lens, self.view.time(part), SPACING)
+        let time = self.view.time(part);
+        if self.scene.is_textured() {
+            self.view.ray(aim.film, aim.lens, time, SPACING)
+        } else {
+            self.view.bare_ray(aim.film, aim.lens, time)
+        }
     }
 
     /// A sample with all that leads to it.
@@ -129,7 +142,7 @@ impl<'a> Taker<'a> {
         let (mut wave, mut record) = (Wave::default(), Record::with_journal());
         let one = std::iter::once((draw, camera));
         let mut sights = Sights::new(self.scene, &self.view, &mut wave, self.precision, one, &mut record);
-        let seen = self.see(&mut sights, &mut record)[0].0;
+        let seen = self.see(&mut sights, &mut record).first().and_then(|seen| seen.0);
         let radiance = seen.map_or(sights.radiance()[0], |seen| seen.radiance);
         (sights.ray(0), radiance, record.journal.unwrap_or_default())
     }

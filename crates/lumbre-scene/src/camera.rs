@@ -232,6 +232,12 @@ impl View {
         }
     }
 
+    /// [`View::ray`] without a footprint.
+    pub fn bare_ray(&self, film: DVec2, lens: DVec2, time: f64) -> CameraRay {
+        let (origin, direction) = self.line(&self.placement(time), film, lens);
+        CameraRay { ray: Ray::new(origin, direction).at_time(time), footprint: Footprint::Point }
+    }
+
     /// The depth of a world-space point along the camera's axis at a time; for a spherical camera, the
     /// distance.
     pub fn depth(&self, point: DVec3, time: f64) -> f64 {
