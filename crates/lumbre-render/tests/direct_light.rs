@@ -74,6 +74,18 @@ fn over_floor() -> Transform {
 }
 
 #[test]
+fn a_lamp_below_the_floor_takes_no_samples_however_bright_it_is() {
+    let from = |height| over_floor().point(DVec3::new(1.5, -2.0, height));
+    let above = LightDesc::Point { from: from(4.0), intensity: Rgb::splat(30.0) };
+    let below = LightDesc::Point { from: from(-4.0), intensity: Rgb::splat(3e5) };
+    let (expected, _) = irradiance(with_light(above.clone()), Strategy::Both, 1);
+    // Were the one below chosen at all, some pixel of one sample would be black.
+    let (found, rays) = irradiance(SceneDesc { lights: vec![above, below], ..floor() }, Strategy::Both, 1);
+    assert!((found / expected - 1.0).abs() < 1e-6, "{found} {expected}");
+    assert_eq!(rays.shadow, 64);
+}
+
+#[test]
 fn a_point_light_falls_off_with_the_square_of_the_distance() {
     let from = over_floor().point(DVec3::new(1.5, -2.0, 4.0));
     let light = LightDesc::Point { from, intensity: Rgb::splat(30.0) };

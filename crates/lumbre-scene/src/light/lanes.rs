@@ -10,7 +10,7 @@ mod tree;
 
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
-use lumbre_simd::{Double, MAX_LANES, Mask, Real, UInt, V3};
+use lumbre_simd::{Double, MAX_LANES, Mask, Real, Task, UInt, V3};
 
 use self::elsewhere::LaneElsewhere;
 pub(crate) use self::environment::LaneMaps;
@@ -142,6 +142,18 @@ impl LaneLights {
         u: [R; 4],
         sampling: Sampling,
     ) -> LaneLightSample<R> {
+        R::call(SampleTask { lights: self, scene, active, receiver, u, sampling })
+    }
+
+    #[inline(always)]
+    fn sample_inlined<R: Real>(
+        &self,
+        scene: &Scene,
+        active: R::Mask,
+        receiver: &Receiver<R>,
+        u: [R; 4],
+        sampling: Sampling,
+    ) -> LaneLightSample<R> {
         let place = LanePlace::new(&self.table, receiver);
         let sum = self.sum_elsewhere(scene, active, &place, receiver);
         let share = self.share_elsewhere_at(active, &place, sum);
@@ -211,6 +223,20 @@ impl LaneLights {
             return R::zero();
         }
         let emitter = R::UInt::select(listed, emitter, R::UInt::splat(0));
+        R::call(PdfTask { lights: self, scene, listed, receiver, emitter, primitive, point })
+    }
+
+    /// The density of a point of an emitter in each listed lane.
+    #[inline(always)]
+    fn pdf_inlined<R: Real>(
+        &self,
+        scene: &Scene,
+        listed: R::Mask,
+        receiver: &Receiver<R>,
+        emitter: R::UInt,
+        primitive: R::UInt,
+        point: V3<R::Double>,
+    ) -> R {
         let place = LanePlace::new(&self.table, receiver);
         let sum = self.sum_elsewhere(scene, listed, &place, receiver);
         let share = self.share_elsewhere_at(listed, &place, sum);
@@ -240,6 +266,18 @@ impl LaneLights {
     /// [`LaneLights::sample`] with [`Sampling::Mis`] samples that direction for a receiver.
     #[inline(always)]
     pub fn escaped<R: Real>(
+        &self,
+        scene: &Scene,
+        position: usize,
+        active: R::Mask,
+        receiver: &Receiver<R>,
+        direction: V3<R>,
+    ) -> (V3<R>, R) {
+        R::call(EscapeTask { lights: self, scene, position, active, receiver, direction })
+    }
+
+    #[inline(always)]
+    fn escaped_inlined<R: Real>(
         &self,
         scene: &Scene,
         position: usize,
@@ -316,6 +354,64 @@ impl LaneLights {
             before = before + given;
         }
         (chosen, of_chosen)
+    }
+}
+
+struct SampleTask<'t, R: Real> {
+    lights: &'t LaneLights,
+    scene: &'t Scene,
+    active: R::Mask,
+    receiver: &'t Receiver<R>,
+    u: [R; 4],
+    sampling: Sampling,
+}
+
+impl<R: Real> Task<R> for SampleTask<'_, R> {
+    type Output = LaneLightSample<R>;
+
+    #[inline(always)]
+    fn run(self) -> LaneLightSample<R> {
+        let Self { lights, scene, active, receiver, u, sampling } = self;
+        lights.sample_inlined(scene, active, receiver, u, sampling)
+    }
+}
+
+struct PdfTask<'t, R: Real> {
+    lights: &'t LaneLights,
+    scene: &'t Scene,
+    listed: R::Mask,
+    receiver: &'t Receiver<R>,
+    emitter: R::UInt,
+    primitive: R::UInt,
+    point: V3<R::Double>,
+}
+
+impl<R: Real> Task<R> for PdfTask<'_, R> {
+    type Output = R;
+
+    #[inline(always)]
+    fn run(self) -> R {
+        let Self { lights, scene, listed, receiver, emitter, primitive, point } = self;
+        lights.pdf_inlined(scene, listed, receiver, emitter, primitive, point)
+    }
+}
+
+struct EscapeTask<'t, R: Real> {
+    lights: &'t LaneLights,
+    scene: &'t Scene,
+    position: usize,
+    active: R::Mask,
+    receiver: &'t Receiver<R>,
+    direction: V3<R>,
+}
+
+impl<R: Real> Task<R> for EscapeTask<'_, R> {
+    type Output = (V3<R>, R);
+
+    #[inline(always)]
+    fn run(self) -> (V3<R>, R) {
+        let Self { lights, scene, position, active, receiver, direction } = self;
+        lights.escaped_inlined(scene, position, active, receiver, direction)
     }
 }
 
