@@ -54,6 +54,17 @@ impl RayColumns<'_> {
         }
     }
 
+    /// Some of them.
+    pub(crate) fn slice(&self, range: Range<usize>) -> Self {
+        let RayColumns { origin, direction, t_max, time } = *self;
+        Self {
+            origin: origin.map(|column| &column[range.clone()]),
+            direction: direction.map(|column| &column[range.clone()]),
+            t_max: t_max.map(|column| &column[range.clone()]),
+            time: time.map(|column| &column[range]),
+        }
+    }
+
     /// # Panics
     /// When the columns differ in length.
     pub(crate) fn check(&self) {
@@ -313,13 +324,8 @@ impl PictureStart {
 
     /// Adds rays, rounded, relative to the mesh.
     pub(crate) fn push_rays(&self, columns: &RayColumns, range: Range<usize>, rays: &mut Vec<Ray32>) {
-        let some = RayColumns {
-            origin: columns.origin.map(|column| &column[range.clone()]),
-            direction: columns.direction.map(|column| &column[range.clone()]),
-            t_max: columns.t_max.map(|column| &column[range.clone()]),
-            time: None,
-        };
-        rays.extend((0..range.len()).map(|i| self.local(&some, i)));
+        let columns = columns.slice(range);
+        rays.extend((0..columns.len()).map(|i| self.local(&columns, i)));
     }
 }
 

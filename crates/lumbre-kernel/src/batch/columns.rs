@@ -95,7 +95,10 @@ fn traverse_f32<G: Goal, A: Answer>(
             batch::<F32<G>, _>(isa, accel, start, rays, sink, Plan::of_picture(accel));
         } else {
             both.clear();
-            both.extend(range.map(|i| PictureRay { local: picture.local(columns, i), ray: columns.ray(i) }));
+            let some = columns.slice(range);
+            both.extend(
+                (0..some.len()).map(|i| PictureRay { local: picture.local(&some, i), ray: some.ray(i) }),
+            );
             let sink = &mut PictureSink { first, answer };
             batch::<Picture<G>, _>(isa, accel, start, &both, sink, Plan::SINGLES);
         }

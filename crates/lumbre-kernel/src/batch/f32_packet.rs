@@ -9,8 +9,8 @@ use std::marker::PhantomData;
 
 use lumbre_geometry::Ray;
 
-use super::Sink;
 use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, Start, State};
+use super::sink::Sink;
 use crate::intersect::box_ray::SlabRows;
 use crate::intersect::f32_ray::{F32Ray, within};
 use crate::intersect::watertight::{BEYOND, beyond};

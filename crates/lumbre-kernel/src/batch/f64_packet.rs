@@ -5,8 +5,8 @@ use std::marker::PhantomData;
 use lumbre_geometry::Ray;
 use lumbre_math::DVec2;
 
-use super::Sink;
 use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, Start, State, record};
+use super::sink::Sink;
 use crate::intersect::box_ray::SlabRows;
 use crate::intersect::box_ray::Slabs;
 use crate::intersect::filter_start::FilterStart;

@@ -6,7 +6,7 @@
 
 use bytemuck::Zeroable;
 
-use super::Sink;
+use super::sink::Sink;
 use crate::intersect::STACK;
 use crate::intersect::box_ray::Slabs;
 use crate::intersect::{self, Simd, Slots};

@@ -12,6 +12,7 @@ mod interleaved;
 pub(crate) mod packet;
 #[cfg(test)]
 pub(crate) mod shims;
+mod sink;
 
 use std::marker::PhantomData;
 use std::slice::Chunks;
@@ -23,6 +24,7 @@ use self::f32_slot::F32Slot;
 use self::f64_packet::F64Bundle;
 use self::f64_slot::F64Slot;
 use self::packet::{Bundle, PACKET, Packet};
+pub(crate) use self::sink::Sink;
 use crate::intersect::filter_start::FilterStart;
 use crate::intersect::{Dispatch, Isa, Simd};
 use crate::simd;
@@ -39,6 +41,8 @@ use crate::{Accel, Hit, Hit32, Ray32};
 const FAR: usize = 1 << 24;
 /// Trees of fewer bytes are in the nearest caches; interleaving pays for many rays only.
 const NEAR: usize = 1 << 20;
+/// Trees of fewer bytes, some two thousand triangles, are so shallow that single rays in single precision are faster than interleaved ones.
+const SMALL: usize = 1 << 17;
 /// Packets in a row that may be skipped without a try.
 const MOST_SKIPPED: usize = 16;
 /// Rays among which packets are sought before the others are interleaved.
@@ -152,24 +156,6 @@ fn batch_f32<G: Goal, S: Sink<Option<Hit32>>>(
     true
 }
 
-/// Takes the answers, in any order. Methods are to be `#[inline(always)]`: an answer that goes through memory is waited for.
-pub(crate) trait Sink<A> {
-    /// The answer to the ray at a position.
-    fn put(&mut self, position: usize, outcome: Outcome<A>);
-
-    /// The answers to a packet, the first ray of which has this position.
-    #[inline(always)]
-    fn put_row(&mut self, first: usize, answer: impl Fn(usize) -> A) {
-        for i in 0..PACKET {
-            self.put(first + i, Outcome::Certain(answer(i)));
-        }
-    }
-
-    /// Prefetches where an answer will be written.
-    #[inline(always)]
-    fn prefetch(&self, _position: usize) {}
-}
-
 /// See [`closest`].
 struct ClosestSink<'a> {
     accel: &'a Accel,
@@ -281,12 +267,12 @@ impl Plan {
     /// What goes in no packet goes alone.
     const SINGLES: Self = Self { least: usize::MAX, prefetches: false, has_packets: true };
 
-    /// The fastest for rays of a picture, incoherent ones of which are faster alone where the tree stays in the caches.
+    /// The fastest for rays of a picture, incoherent ones of which are faster alone where the tree is small.
     fn of_picture(accel: &Accel) -> Self {
         let bytes = Self::bytes(accel);
         if bytes >= FAR {
             Self::FAR
-        } else if bytes >= 4 * NEAR {
+        } else if bytes >= SMALL {
             Self::MIDDLE
         } else {
             Self::SINGLES

@@ -24,12 +24,13 @@
 //! these larger bounds. A triangle all of whose corners are beyond that on one side is hit by no ray; and with the larger m, h
 //! and s the errors are no smaller than those of every ray.
 
-use super::Sink;
+pub(crate) use super::sink::PACKET;
+use super::sink::Sink;
 use crate::intersect::box_ray::{END_FACTOR, LITTLE, START_FACTOR};
 use crate::intersect::box_ray::{Frustum, SlabRows};
 use crate::intersect::watertight::TINY;
 use crate::intersect::{self, Axes, CornersRoom, Sides, Simd};
-use crate::simd::{self, F32x8, F32x16, Vector, WIDE};
+use crate::simd::{self, F32x8, F32x16, Vector};
 use crate::trace::Stop;
 use crate::trace::decide::Decider;
 use crate::trace::stack::{Goal, Stack};
@@ -37,8 +38,6 @@ use crate::tree::Corners;
 use crate::tree::node::{Node, tag};
 use crate::tree::triangle_block::TriangleBlock;
 
-/// Rays in a packet.
-pub(crate) const PACKET: usize = WIDE;
 /// A mask of all of them.
 pub(crate) const ALL: u32 = (1 << PACKET) - 1;
 /// How far from their middle rays may start on an axis, in tree units: see above.

@@ -164,15 +164,16 @@ impl Crossing {
 pub(crate) struct LocalRay {
     pub(crate) ray: Ray32,
     zero: f64,
-    /// A power of two.
+    /// A power of two, and its inverse.
     factor: f64,
+    inverse: f64,
 }
 
 impl LocalRay {
     /// Whose `t` are the same.
     #[inline(always)]
     pub(crate) fn new(ray: Ray32) -> Self {
-        Self { ray, zero: 0.0, factor: 1.0 }
+        Self { ray, zero: 0.0, factor: 1.0, inverse: 1.0 }
     }
 
     #[inline(always)]
@@ -185,7 +186,7 @@ impl LocalRay {
     pub(crate) fn end(&self, t: f64) -> f32 {
         // What the difference may lose.
         const LOST: f64 = 8.0 * f64::EPSILON;
-        let t = (t - self.zero + LOST * self.zero) / self.factor;
+        let t = (t - self.zero + LOST * self.zero) * self.inverse;
         beyond(if t > 0.0 { t as f32 } else { 0.0 })
     }
 }
@@ -226,12 +227,17 @@ fn approach(accel: &Accel, picture: &PictureStart, ray: &Ray, limit: f64) -> App
             return Approach::PassesBy;
         }
     }
-    let origin = ray.origin + zero * ray.direction - picture.rounding.origin;
-    let end = (ray.t_max - zero) / factor;
+    if zero == 0.0 && factor == 1.0 {
+        let origin = (ray.origin - picture.rounding.origin).as_vec3();
+        let direction = ray.direction.as_vec3();
+        let ray = Ray32 { origin, t_min: 0.0, direction, t_max: ray.t_max as f32 };
+        return Approach::Ray(LocalRay::new(ray));
+    }
+    let (inverse, origin) = (1.0 / factor, ray.origin + zero * ray.direction - picture.rounding.origin);
     // The same for all that ask, and no earlier than the ray's own.
-    let t_max = if zero == 0.0 && factor == 1.0 { end as f32 } else { (end as f32).next_up() };
+    let t_max = (((ray.t_max - zero) * inverse) as f32).next_up();
     let ray = Ray32 { origin: origin.as_vec3(), t_min: 0.0, direction: direction.as_vec3(), t_max };
-    Approach::Ray(LocalRay { ray, zero, factor })
+    Approach::Ray(LocalRay { ray, zero, factor, inverse })
 }
 
 /// The power of two that takes a number to between 1 and 2; no more than `f64` holds.
