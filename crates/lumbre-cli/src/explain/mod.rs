@@ -265,7 +265,7 @@ fn written(request: &Request, name: &Path, sections: &[Section]) -> String {
     let title = title(&name, request.pixel, texts);
     match request.format {
         Format::Text => writing::text(sections, request.only.is_empty(), texts.schoolbook),
-        Format::Markdown => format!("# {title}\n\n{}", writing::markdown(sections, texts.schoolbook)),
+        Format::Markdown => format!("# {}\n\n{}", writing::literal(&title), writing::markdown(sections, texts.schoolbook)),
         Format::Html => html::html(&title, texts.code, sections, texts.schoolbook),
         Format::Json => {
             let sections: Vec<_> = sections.iter().map(writing::json).collect();
