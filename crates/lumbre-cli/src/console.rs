@@ -77,6 +77,11 @@ pub(crate) fn escaped_line(text: &str) -> Cow<'_, str> {
     Cow::Owned(each.collect())
 }
 
+/// [`escaped_line`] for each line of a text.
+pub(crate) fn escaped_lines(text: &str) -> String {
+    text.split('\n').map(escaped_line).collect::<Vec<_>>().join("\n")
+}
+
 /// JSON as text that cannot drive a terminal either: its strings have escapes for what is not to be printed.
 pub(crate) fn escaped_json(json: &serde_json::Value) -> String {
     let text = format!("{json:#}\n");

@@ -8,14 +8,17 @@ pub fn in_words(options: &impl Debug) -> String {
     let text = format!("{options:?}");
     let mut out = String::with_capacity(text.len());
     let mut rest = &*text;
+    let is_name = |c: char| c.is_alphanumeric() || c == '_';
     while let Some(c) = rest.chars().next() {
-        let is_name = |c: char| c.is_alphanumeric() || c == '_';
         let end = match c {
             '"' => end_of_quotes(rest),
             _ if is_name(c) || c == '-' => {
-                // A number with its sign, point and exponent, or a name.
-                let is_part =
-                    |(at, c): (usize, char)| is_name(c) || c == '.' || at == 0 || rest[..at].ends_with('e');
+                // A name, or a number with its sign, point and exponent.
+                let is_number = !c.is_alphabetic();
+                let is_part = |(at, c): (usize, char)| {
+                    let is_sign = matches!(c, '-' | '+') && (at == 0 || rest[..at].ends_with('e'));
+                    is_name(c) || (is_number && (c == '.' || is_sign))
+                };
                 rest.char_indices().find(|&place| !is_part(place)).map_or(rest.len(), |(at, _)| at)
             }
             _ => c.len_utf8(),
@@ -23,10 +26,11 @@ pub fn in_words(options: &impl Debug) -> String {
         let (token, after) = rest.split_at(end);
         let is_type = out.is_empty() && after.starts_with(" {");
         match token {
+            "(" if out.ends_with(is_name) => out.push(' '),
             "{" | "}" | "(" | ")" | ":" | "Some" => {}
             " " if out.is_empty() || out.ends_with([' ', '[']) => {}
             _ if is_type => {}
-            _ if c.is_alphabetic() => push_words(token, &mut out),
+            _ if is_name(c) && !c.is_numeric() => push_words(token.trim_start_matches('_'), &mut out),
             _ => out.push_str(token),
         }
         rest = after;
@@ -89,5 +93,11 @@ mod tests {
         let options = Options { _max_depth: None, _kind: Kind::Plain, _names: Vec::new() };
         assert_eq!(in_words(&options), "max depth none, kind plain, names []");
         assert_eq!((in_words(&Some(3)), in_words(&None::<u32>)), ("3".to_owned(), "none".to_owned()));
+        #[derive(Debug)]
+        struct Pair(#[expect(dead_code)] f32, #[expect(dead_code)] Option<(u32, i32)>);
+        assert_eq!(
+            in_words(&(true, Pair(1.5, Some((20, -14))), None::<f64>)),
+            "true, pair 1.5, 20, -14, none"
+        );
     }
 }

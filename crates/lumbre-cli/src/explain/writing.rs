@@ -125,7 +125,11 @@ fn write_markdown(section: &Section, level: usize, schoolbook: &str, out: &mut S
                 let row = |cells: Vec<String>| {
                     format!(
                         "| {} |\n",
-                        cells.iter().map(|cell| literal(cell).replace('|', "\\|")).collect::<Vec<_>>().join(" | ")
+                        cells
+                            .iter()
+                            .map(|cell| literal(cell).replace('|', "\\|"))
+                            .collect::<Vec<_>>()
+                            .join(" | ")
                     )
                 };
                 out.push_str(&row(columns.iter().map(|column| column.title.clone()).collect()));
@@ -175,7 +179,8 @@ fn markdown_of(quantity: &Quantity, schoolbook: &str) -> String {
     let Quantity { symbol, label, value, .. } = quantity;
     let label_after =
         if label.is_empty() || symbol.is_empty() { String::new() } else { format!(" ({})", literal(label)) };
-    let latex = |formula: &str| latex(formula).replace('<', "\\lt ").replace('>', "\\gt ").replace('$', "\\$");
+    let latex =
+        |formula: &str| latex(formula).replace('<', "\\lt ").replace('>', "\\gt ").replace('$', "\\$");
     let mut line = match (value.rows(), symbol.is_empty()) {
         (Some(rows), _) => {
             let rows = rows.map(|row| row.map(|cell| latex(&cell)).join(" & ")).join(" \\\\ ");

@@ -356,8 +356,9 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       addEventListener("hashchange", () => {
         if (!secret()) return;
         clearTimeout(this.again);
-        this.socket?.close();
+        const before = this.socket;
         this.connect();
+        before?.close();
       });
     }
     listener;
@@ -380,6 +381,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       });
     }
     connect() {
+      this.isIn = false;
       const known = secret();
       if (!known) {
         this.listener.stood("refused");
@@ -402,15 +404,26 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
         this.listener.stood("open");
         return true;
       };
-      let isForeign = false;
+      const lost = (how) => {
+        if (this.socket !== socket) return;
+        [this.socket, this.isIn] = [void 0, false];
+        this.waiting.clear();
+        this.listener.stood(how);
+        this.again = setTimeout(() => this.connect(), this.wait);
+        this.wait = Math.min(this.wait * 1.5, 5e3);
+      };
+      socket.onclose = ({ code }) => lost(code === UNKNOWN ? "refused" : "gone");
       socket.onmessage = (event) => {
+        if (this.socket !== socket) return;
         if (!this.isIn) {
-          isForeign = true;
+          let isViewer = false;
           try {
-            isForeign = typeof event.data !== "string" || !greet(JSON.parse(event.data));
+            isViewer = typeof event.data === "string" && greet(JSON.parse(event.data));
           } catch {
           }
-          if (isForeign) socket.close();
+          if (isViewer) return;
+          lost("foreign");
+          socket.close();
           return;
         }
         if (typeof event.data === "string") {
@@ -425,14 +438,6 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
         }
         this.listener.framed(decoded(event.data));
         this.send({ type: "shown" });
-      };
-      socket.onclose = ({ code }) => {
-        if (this.socket !== socket) return;
-        this.isIn = false;
-        this.waiting.clear();
-        this.listener.stood(isForeign ? "foreign" : code === UNKNOWN ? "refused" : "gone");
-        this.again = setTimeout(() => this.connect(), this.wait);
-        this.wait = Math.min(this.wait * 1.5, 5e3);
       };
     }
   };

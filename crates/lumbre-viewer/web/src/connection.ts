@@ -51,8 +51,9 @@ export class Connection {
     addEventListener("hashchange", () => {
       if (!secret()) return;
       clearTimeout(this.again);
-      this.socket?.close();
+      const before = this.socket;
       this.connect();
+      before?.close();
     });
   }
 
@@ -71,6 +72,7 @@ export class Connection {
   }
 
   private connect(): void {
+    this.isIn = false;
     const known = secret();
     if (!known) {
       this.listener.stood("refused");
@@ -93,16 +95,28 @@ export class Connection {
       this.listener.stood("open");
       return true;
     };
-    let isForeign = false;
+    const lost = (how: "gone" | "refused" | "foreign"): void => {
+      if (this.socket !== socket) return;
+      [this.socket, this.isIn] = [undefined, false];
+      this.waiting.clear();
+      this.listener.stood(how);
+      this.again = setTimeout(() => this.connect(), this.wait);
+      this.wait = Math.min(this.wait * 1.5, 5000);
+    };
+    socket.onclose = ({ code }) => lost(code === UNKNOWN ? "refused" : "gone");
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => {
+      if (this.socket !== socket) return;
       if (!this.isIn) {
-        isForeign = true;
+        let isViewer = false;
         try {
-          isForeign = typeof event.data !== "string" || !greet(JSON.parse(event.data) as Greeting);
+          isViewer = typeof event.data === "string" && greet(JSON.parse(event.data) as Greeting);
         } catch {
           // What makes no sense comes from another program.
         }
-        if (isForeign) socket.close();
+        // Which need not answer that it is closed.
+        if (isViewer) return;
+        lost("foreign");
+        socket.close();
         return;
       }
       if (typeof event.data === "string") {
@@ -118,14 +132,6 @@ export class Connection {
       this.listener.framed(decoded(event.data));
       // The next one comes when this one is shown: what comes between is never sent.
       this.send({ type: "shown" });
-    };
-    socket.onclose = ({ code }) => {
-      if (this.socket !== socket) return;
-      this.isIn = false;
-      this.waiting.clear();
-      this.listener.stood(isForeign ? "foreign" : code === UNKNOWN ? "refused" : "gone");
-      this.again = setTimeout(() => this.connect(), this.wait);
-      this.wait = Math.min(this.wait * 1.5, 5000);
     };
   }
 }

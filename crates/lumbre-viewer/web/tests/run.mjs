@@ -8,6 +8,7 @@ import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { chromium } from "playwright-core";
 import { PNG } from "pngjs";
+import { attacks } from "./attacks.mjs";
 
 const here = dirname(fileURLToPath(import.meta.url));
 const root = join(here, "../../../..");
@@ -156,6 +157,8 @@ async function finds(page, what, rules = {}) {
 }
 
 const tests = {
+  ...attacks({ view, open, done, pixels, freePort, folder }),
+
   async "it opens once and converges to the pixels that are rendered"() {
     const path = join(folder, "scene.pbrt");
     const viewer = await view(path);
