@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
+use crate::files::Folder;
 use serde_json::Value;
 
 use crate::program::{Desk, code, stderr, stdout};

@@ -173,7 +173,7 @@ fn names_reach_a_script_as_names_and_what_no_script_can_hold_is_refused() {
     for name in ["-x.pbrt", "it's $(touch x) \"a\" `b`.pbrt"] {
         fs::write(folder.path(name), &scene).unwrap();
         let (stem, path) = (name.strip_suffix(".pbrt").unwrap(), format!("./{name}"));
-        let (status, said) = farm(&path, &["-o", &format!("{stem}.png"), &format!("--folder={stem}.farm")]);
+        let (status, said) = farm(&path, &[&format!("-o={stem}.png"), &format!("--folder={stem}.farm")]);
         assert_eq!(status, 0, "{said}");
         for task in ["0", "1"] {
             let mut command = Command::new(folder.path(&format!("{stem}.farm/render.sh")));

@@ -44,6 +44,19 @@ pub(crate) fn done(folder: &Folder, arguments: &str) {
     assert_eq!(status, 0, "{arguments}: {said}");
 }
 
+/// Waits until a checkpoint is there that has a sample of every pixel.
+pub(crate) fn until_sampled(folder: &Folder, name: &str) {
+    let start = Instant::now();
+    let is_sampled = || {
+        let part = lumbre::Part::open(&folder.path(name), |_| u64::MAX);
+        part.is_ok_and(|part| part.state.least_samples() > 0)
+    };
+    while !is_sampled() {
+        assert!(start.elapsed() < Duration::from_secs(60), "{name} does not come");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
 /// It fails with this status, and says this.
 pub(crate) fn refused(folder: &Folder, arguments: &str, status: i32, why: &str) {
     let (found, said) = run(folder, arguments);
@@ -399,7 +412,7 @@ mod interrupted {
         let render = format!("{RENDER} -o out/a.exr --checkpoint ck");
         let arguments: Vec<&str> = render.split_whitespace().collect();
         let child = folder.command(&arguments).stderr(Stdio::piped()).spawn().unwrap();
-        until_there(&folder, "ck");
+        until_sampled(&folder, "ck");
         fs::remove_dir(folder.path("out")).unwrap();
         signal(child.id(), "INT");
         let (status, said) = answer(child.wait_with_output().unwrap());
@@ -418,7 +431,7 @@ mod interrupted {
         let render = format!("{RENDER} -o a.exr --checkpoint out/ck");
         let arguments: Vec<&str> = render.split_whitespace().collect();
         let child = folder.command(&arguments).stderr(Stdio::piped()).spawn().unwrap();
-        until_there(&folder, "out/ck");
+        until_sampled(&folder, "out/ck");
         // A checkpoint may be written while the folder is emptied.
         while folder.path("out").exists() {
             let _ = fs::remove_dir_all(folder.path("out"));
@@ -441,7 +454,10 @@ mod interrupted {
         folder.write("names.pbrt", "WorldBegin Shape \"plymesh\" \"string filename\" \"pipe.ply\"");
         for (arguments, why) in [
             ("render pipe.pbrt -o a.png", "it is not a regular file"),
-            ("render names.pbrt -o a.png", "it is not a regular file"),
+            (
+                "render names.pbrt -o a.png",
+                "names.pbrt:1:28: cannot read \"pipe.ply\": it is not a regular file",
+            ),
             ("info pipe.pbrt", "it is not a regular file"),
             ("merge pipe.part -o a.png", "it is not a regular file"),
             ("merge /dev/zero -o a.png", "it is not a regular file"),
@@ -460,7 +476,9 @@ mod interrupted {
             ("render scene.pbrt -o a.png --checkpoint .", "it is not a regular file, as a checkpoint is"),
             ("render scene.pbrt -o a.png --stats pipe.ply", "nobody reads from this pipe"),
         ] {
-            refused(&folder, arguments, 4, why);
+            // What a scene names is an error of the scene.
+            let status = if arguments.contains("names") { 3 } else { 4 };
+            refused(&folder, arguments, status, why);
         }
         // Its name for a checkpoint is taken: it keeps none, and renders.
         done(&folder, "render scene.pbrt -q -o out.exr --spp 2");

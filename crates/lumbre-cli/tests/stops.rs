@@ -212,7 +212,7 @@ fn every_signal_that_asks_for_an_end_keeps_the_picture_and_the_checkpoint() {
             let _ = fs::remove_file(folder.path(file));
         }
         let child = start(&folder, &arguments);
-        crate::parts::until_there(&folder, "ck");
+        crate::parts::until_sampled(&folder, "ck");
         for _ in 0..times {
             let _ = Command::new("kill")
                 .args([format!("-{name}"), child.id().to_string()])
@@ -235,7 +235,7 @@ fn every_signal_that_asks_for_an_end_keeps_the_picture_and_the_checkpoint() {
         .args(arguments)
         .current_dir(folder.path(""));
     let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-    crate::parts::until_there(&folder, "ck");
+    crate::parts::until_sampled(&folder, "ck");
     signal(&child, "HUP");
     let before = fs::metadata(folder.path("ck")).unwrap().modified().unwrap();
     let start = Instant::now();

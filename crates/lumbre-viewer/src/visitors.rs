@@ -123,10 +123,14 @@ mod tests {
         assert!(!has_to_go(&many[0]) && !has_to_go(&late) && !has_to_go(&guest));
         assert!(late.let_in());
         drop((first, many));
-        assert_eq!((visitors.lock().strangers.len(), visitors.lock().guests), (0, 2));
+        let counted = || {
+            let inner = visitors.lock();
+            (inner.strangers.len(), inner.guests)
+        };
+        assert_eq!(counted(), (0, 2));
         let guests: Vec<Visit> = (2..MOST_GUESTS).map(|_| visitors.come()).collect();
         assert!(guests.iter().all(Visit::let_in) && !visitors.come().let_in(), "there are so many places");
         drop((guest, late, guests));
-        assert_eq!((visitors.lock().strangers.len(), visitors.lock().guests), (0, 0));
+        assert_eq!(counted(), (0, 0));
     }
 }

@@ -41,14 +41,15 @@ pub fn in_words(options: &impl Debug) -> String {
 
 /// `max_depth` and `MaxDepth` as `max depth`.
 fn push_words(name: &str, out: &mut String) {
-    let start = out.len();
+    let mut before = '_';
     for c in name.chars() {
-        if c == '_' || (c.is_uppercase() && out.len() > start && !out.ends_with(' ')) {
+        if c == '_' || (c.is_uppercase() && before.is_lowercase()) {
             out.push(' ');
         }
         if c != '_' {
             out.extend(c.to_lowercase());
         }
+        before = c;
     }
 }
 
