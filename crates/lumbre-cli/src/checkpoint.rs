@@ -12,6 +12,7 @@ use clap::Args;
 use lumbre::{Job, Part, PartError, RenderState};
 
 use crate::failure::Failure;
+use crate::memory::Memory;
 use crate::output::is_standard_stream;
 use crate::units::{self, counted};
 
@@ -197,31 +198,100 @@ pub(crate) struct Checkpoint {
     writing: Mutex<Option<Background<Result<(), lumbre::Error>>>>,
 }
 
-/// A lock on the name of a checkpoint.
+/// A lock on a checkpoint, by the file that it is and not by its name: links to it lead to the same lock.
 struct Lock {
     path: PathBuf,
-    _file: File,
+    file: File,
 }
 
 impl Lock {
     fn take(checkpoint: &Path) -> Result<Self, Failure> {
-        let path = with_ending(checkpoint, "lock");
-        let file = File::options().create(true).truncate(false).write(true).open(&path);
-        let file = file.map_err(|e| Failure::Io(format!("{}: {e}", path.display())))?;
-        match file.try_lock() {
-            Err(fs::TryLockError::WouldBlock) => Err(Failure::Usage(format!(
-                "{}: another run writes this checkpoint (expected another name, or its end)",
-                checkpoint.display()
-            ))),
-            // Where the file system has no locks, there is none to be had.
-            Ok(()) | Err(fs::TryLockError::Error(_)) => Ok(Self { path, _file: file }),
+        let path = with_ending(&real_path(checkpoint), "lock");
+        let wrong = |e| Failure::Io(format!("{}: {e}", path.display()));
+        loop {
+            refuse_special(&path, "the lock of a checkpoint")?;
+            let file = File::options().create(true).truncate(false).write(true).open(&path).map_err(wrong)?;
+            match file.try_lock() {
+                Err(fs::TryLockError::WouldBlock) => {
+                    return Err(Failure::Usage(format!(
+                        "{}: another run writes this checkpoint (expected another name, or its end)",
+                        checkpoint.display()
+                    )));
+                }
+                // A run that ended meanwhile has removed it: who comes next would lock another one.
+                Ok(()) if !is_same_file(&file, &path) => {}
+                // Where the file system has no locks, there is none to be had.
+                Ok(()) | Err(fs::TryLockError::Error(_)) => return Ok(Self { path, file }),
+            }
         }
     }
 }
 
 impl Drop for Lock {
     fn drop(&mut self) {
-        let _ = fs::remove_file(&self.path);
+        if is_same_file(&self.file, &self.path) {
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Whether an open file is the one of this name.
+fn is_same_file(file: &File, path: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        let identity = |meta: fs::Metadata| (meta.dev(), meta.ino());
+        let (open, named) = (file.metadata().map(identity), fs::metadata(path).map(identity));
+        matches!((open, named), (Ok(open), Ok(named)) if open == named)
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = file;
+        path.is_file()
+    }
+}
+
+/// The name without links, of a file that need not be there.
+fn real_path(path: &Path) -> PathBuf {
+    if let Ok(real) = path.canonicalize() {
+        return real;
+    }
+    let folder = |path: &Path| match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
+        _ => PathBuf::from("."),
+    };
+    // A link to what is not there yet is written through.
+    let to = fs::read_link(path).map_or_else(|_| path.to_owned(), |to| folder(path).join(to));
+    match (folder(&to).canonicalize(), to.file_name()) {
+        (Ok(folder), Some(name)) => folder.join(name),
+        _ => to,
+    }
+}
+
+/// Refuses what is there and is no regular file: a folder, a pipe, a device.
+fn refuse_special(path: &Path, what: &str) -> Result<(), Failure> {
+    match fs::metadata(path) {
+        Ok(meta) if !meta.is_file() => {
+            Err(Failure::Io(format!("{}: it is not a regular file, as {what} is", path.display())))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Reads a part, within this memory.
+///
+/// # Errors
+/// [`Failure`] with its name, by kind of error.
+pub(crate) fn open_part(path: &Path, memory: Memory) -> Result<Part, Failure> {
+    Part::open(path, |bytes| memory.for_part(bytes)).map_err(|e| part_failure(path, &e))
+}
+
+fn part_failure(path: &Path, error: &PartError) -> Failure {
+    let message = format!("{}: {error}", path.display());
+    match error {
+        PartError::Io(_) => Failure::Io(message),
+        PartError::TooLarge { .. } => Failure::Limit(message),
+        _ => Failure::Input(message),
     }
 }
 
@@ -240,7 +310,7 @@ impl Checkpoint {
     pub(crate) fn begin(
         arguments: &PartArguments,
         output: &Path,
-        most_memory: u64,
+        memory: Memory,
         spp: u32,
         is_quiet: bool,
         job: impl FnOnce() -> Result<Job, lumbre::Error> + Send + 'static,
@@ -249,8 +319,13 @@ impl Checkpoint {
         let kept = match &arguments.checkpoint {
             Some(path) => Some(path.clone()),
             None if arguments.no_checkpoint || !is_file => None,
-            None => Some(with_ending(output, "checkpoint")),
+            // Where the name is that of a pipe or a device, none is kept.
+            None => Some(with_ending(output, "checkpoint"))
+                .filter(|path| refuse_special(path, "a checkpoint").is_ok()),
         };
+        if let Some(path) = &arguments.checkpoint {
+            refuse_special(path, "a checkpoint")?;
+        }
         let thread = Background::start("identity", job);
         let mut checkpoint = Self {
             _lock: arguments.checkpoint.as_deref().map(Lock::take).transpose()?,
@@ -268,7 +343,7 @@ impl Checkpoint {
             // Whatever keeps it from being known is told before hours are spent.
             checkpoint.identified.get()?;
         }
-        let state = checkpoint.find(arguments, output, most_memory, spp, is_quiet)?;
+        let state = checkpoint.find(arguments, output, memory, spp, is_quiet)?;
         Ok((checkpoint, state))
     }
 
@@ -277,7 +352,7 @@ impl Checkpoint {
         &mut self,
         arguments: &PartArguments,
         output: &Path,
-        most_memory: u64,
+        memory: Memory,
         spp: u32,
         is_quiet: bool,
     ) -> Result<Option<RenderState>, Failure> {
@@ -296,7 +371,7 @@ impl Checkpoint {
         let Some(path) = found else { return begins() };
         let is_output = path == output;
         let name = path.display().to_string();
-        let part = match Part::open(&path, most_memory) {
+        let part = match Part::open(&path, |bytes| memory.for_part(bytes)) {
             Ok(part) => part,
             // The checkpoint that is named is yet to come, and the picture is to be replaced.
             Err(PartError::NoPart) if is_output && self.is_asked => return begins(),
@@ -306,7 +381,7 @@ impl Checkpoint {
                 )));
             }
             Err(_) if !arguments.resume && !self.is_asked => return Ok(None),
-            Err(e) => return Err(Failure::Input(format!("{name}: {e}"))),
+            Err(e) => return Err(part_failure(&path, &e)),
         };
         let (taken, wanted) = (part.state.taken(), part.state.wanted());
         if !arguments.resume {

@@ -67,6 +67,35 @@ pub(crate) fn escaped(message: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
+/// [`escaped`] for what has to stay on its line.
+pub(crate) fn escaped_line(text: &str) -> Cow<'_, str> {
+    if text.chars().all(is_printable) {
+        return Cow::Borrowed(text);
+    }
+    let each =
+        text.chars().map(|c| if is_printable(c) { c.to_string() } else { c.escape_default().to_string() });
+    Cow::Owned(each.collect())
+}
+
+/// [`escaped_line`] for each line of a text.
+pub(crate) fn escaped_lines(text: &str) -> String {
+    text.split('\n').map(escaped_line).collect::<Vec<_>>().join("\n")
+}
+
+/// JSON as text that cannot drive a terminal either: its strings have escapes for what is not to be printed.
+pub(crate) fn escaped_json(json: &serde_json::Value) -> String {
+    let text = format!("{json:#}\n");
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        if c == '\n' || is_printable(c) {
+            out.push(c);
+        } else {
+            c.encode_utf16(&mut [0; 2]).iter().for_each(|unit| out.push_str(&format!("\\u{unit:04x}")));
+        }
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -103,6 +132,10 @@ mod tests {
         );
         assert_eq!(escaped("\x1b]0;x\x07\0.csv"), "\\u{1b}]0;x\\u{7}\\u{0}.csv");
         assert_eq!(escaped("x\nerror: y"), "x\\nerror: y");
+        let json = serde_json::json!({ "name": "\u{9b}31m\x1b \u{202e}é" });
+        assert_eq!(escaped_json(&json), "{\n  \"name\": \"\\u009b31m\\u001b \\u202eé\"\n}\n");
+        assert_eq!(serde_json::from_str::<serde_json::Value>(&escaped_json(&json)).unwrap(), json);
+        assert_eq!(escaped_line("x\n  taken 5\x1b[2J"), "x\\n  taken 5\\u{1b}[2J");
         assert_eq!(escaped("x\u{202e}gpj.exe \u{9b}31m"), "x\\u{202e}gpj.exe \\u{9b}31m");
         assert_eq!(message_text("warning: a\x1b", true), "\x1b[1m\x1b[33mwarning:\x1b[0m a\\u{1b}");
         assert_eq!(message_text("error: a", false), "error: a");

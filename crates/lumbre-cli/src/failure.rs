@@ -16,11 +16,21 @@ pub enum Failure {
     Io(String),
     /// A limit was exceeded (5).
     Limit(String),
-    /// A signal interrupted the work (130 or 143, as given).
+    /// A signal interrupted the work (128 and its number, as given).
     Interrupted(u8),
 }
 
 impl Failure {
+    /// A failure of this kind.
+    pub(crate) fn of_kind(kind: lumbre::ErrorKind, message: String) -> Self {
+        match kind {
+            lumbre::ErrorKind::Input => Self::Input(message),
+            lumbre::ErrorKind::Io => Self::Io(message),
+            lumbre::ErrorKind::Limit => Self::Limit(message),
+            lumbre::ErrorKind::Options => Self::Usage(message),
+        }
+    }
+
     /// A file is invalid.
     pub(crate) fn input(message: impl Into<String>) -> Self {
         Self::Input(message.into())

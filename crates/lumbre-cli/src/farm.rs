@@ -1,17 +1,18 @@
 //! `lumbre farm`: a render on many machines, by the scheduler that is there.
 
 use std::fs;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use clap::{Args, Subcommand};
-use lumbre::formats::atomic_write;
-use lumbre::formats::image::ImageFormat;
+use clap::{Args, Parser, Subcommand};
+use lumbre::formats::image::{ImageFormat, is_own_image};
+use lumbre::formats::{atomic_write, open_regular};
 use lumbre::{CancelToken, Error};
 
 use crate::failure::Failure;
-use crate::output::Inputs;
-use crate::reading::{Frames, ReadingArguments};
+use crate::output::{Inputs, Pictures};
+use crate::reading::Frames;
 use crate::signals::Signals;
 use crate::units::counted;
 
@@ -45,7 +46,7 @@ struct SlurmArguments {
     /// The picture; with --frames, the pattern of the names of pictures. By default SCENE's stem with .exr.
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
-    /// Samples per pixel; by default as many as the scene says.
+    /// Samples per pixel, here or after --; by default as many as the scene says.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
     /// Frames of an animation, which are shared out instead of samples.
@@ -63,7 +64,8 @@ struct SlurmArguments {
     /// The folder of scripts and parts; by default SCENE's stem with .farm.
     #[arg(long, value_name = "DIR")]
     folder: Option<PathBuf>,
-    /// Options of lumbre render, after --.
+    /// Options of lumbre render, after --. Those that a task has itself, as --samples and -o, are refused, and those that parts cannot
+    /// have, as --time, --noise and --denoise.
     #[arg(last = true, value_name = "RENDER OPTIONS")]
     render: Vec<String>,
 }
@@ -75,13 +77,31 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
+/// The options of lumbre render that a task has, read as its command will read them.
+#[derive(Parser)]
+#[command(no_binary_name = true)]
+struct Task {
+    #[command(flatten)]
+    arguments: crate::render::Arguments,
+}
+
+/// The names that a job has, as words of a shell.
+struct Names {
+    scene: String,
+    output: String,
+    folder: String,
+    here: String,
+    program: String,
+}
+
 fn slurm(arguments: &SlurmArguments) -> Result<(), Failure> {
     let _signals = Signals::listen(&CancelToken::new())?;
     let stem = arguments.scene.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy().into_owned());
-    let output = arguments.output.clone().unwrap_or_else(|| match arguments.frames {
+    let default_output = || match arguments.frames {
         Some(_) => format!("{stem}.####.exr").into(),
         None => format!("{stem}.exr").into(),
-    });
+    };
+    let output: PathBuf = arguments.output.clone().unwrap_or_else(default_output);
     let is_writable = ImageFormat::from_path(&output).is_some_and(|format| format.is_writable());
     if !is_writable || (arguments.frames.is_some() && !output.to_string_lossy().contains('#')) {
         return Err(Failure::Usage(format!(
@@ -91,43 +111,58 @@ fn slurm(arguments: &SlurmArguments) -> Result<(), Failure> {
         )));
     }
     Inputs::of([arguments.scene.as_path()]).refuse(&output)?;
-    let folder = arguments.folder.clone().unwrap_or_else(|| format!("{stem}.farm").into());
+    if arguments.output.is_none() {
+        refuse_others(&output, arguments.frames.as_ref())?;
+    }
+    let folder: PathBuf = arguments.folder.clone().unwrap_or_else(|| format!("{stem}.farm").into());
+    let here = std::env::current_dir().map_err(|e| Failure::Io(format!("the current folder: {e}")))?;
+    let program = std::env::current_exe().map_err(|e| Failure::Io(format!("the program's own name: {e}")))?;
+    let names = Names {
+        scene: in_script(&arguments.scene, "%")?,
+        output: in_script(&output, "%")?,
+        folder: in_script(&folder, "%")?,
+        here: in_script(&here, "")?,
+        program: in_script(&program, "")?,
+    };
+    for option in arguments.sbatch.iter().chain(&arguments.render) {
+        in_script(Path::new(option), "")?;
+    }
+    let task = task(arguments, &names)?;
     let (render, merge) = match &arguments.frames {
-        Some(Frames(frames)) => frame_scripts(arguments, &output, *frames.start(), *frames.end())?,
-        None => sample_scripts(arguments, &output, &folder)?,
+        Some(Frames(frames)) => frame_scripts(arguments, &names, *frames.start(), *frames.end())?,
+        None => sample_scripts(arguments, &names, &task)?,
     };
     let head = |name: &str| {
         let options: String = arguments.sbatch.iter().map(|option| format!("#SBATCH {option}\n")).collect();
-        format!("#!/bin/sh\n#SBATCH --job-name={name}-{}\n{options}", plain(&stem))
+        format!("{MARK}#SBATCH --job-name={name}-{}\n{options}", plain(&stem))
     };
-    let logs = quoted(&folder.join("%a.log").display().to_string());
-    let here = std::env::current_dir().map_err(|e| Failure::Io(format!("the current folder: {e}")))?;
-    let program = std::env::current_exe().map_err(|e| Failure::Io(format!("the program's own name: {e}")))?;
-    let start = format!(
-        "set -eu\ncd {}\nlumbre=${{LUMBRE:-{}}}\n",
-        quoted(&here.display().to_string()),
-        quoted(&program.display().to_string())
-    );
+    let start =
+        format!("set -eu\ncd {}\nlumbre=${{LUMBRE:-{}}}\n", quoted(&names.here), quoted(&names.program));
     let last = arguments.tasks - 1;
     let render = format!(
-        "{}#SBATCH --array=0-{last}\n#SBATCH --requeue\n#SBATCH --output={logs}\n{start}{TASK}{render}",
-        head("lumbre")
+        "{}#SBATCH --array=0-{last}\n#SBATCH --requeue\n#SBATCH --output={}\n{start}{TASK}{render}",
+        head("lumbre"),
+        quoted(&format!("{}/%a.log", names.folder))
     );
     let merge = format!(
         "{}#SBATCH --output={}\n{start}{merge}",
         head("merge"),
-        quoted(&folder.join("merge.log").display().to_string())
+        quoted(&format!("{}/merge.log", names.folder))
     );
-    let (render_path, merge_path) = (folder.join("render.sh"), folder.join("merge.sh"));
     let submit = format!(
-        "#!/bin/sh\nset -eu\ncd {}\njob=$(sbatch --parsable {})\nsbatch --parsable --dependency=afterok:\"${{job%%;*}}\" {}\n",
-        quoted(&here.display().to_string()),
-        quoted(&render_path.display().to_string()),
-        quoted(&merge_path.display().to_string())
+        "{MARK}set -eu\ncd {}\njob=$(sbatch --parsable {})\nsbatch --parsable --dependency=afterok:\"${{job%%;*}}\" {}\n",
+        quoted(&names.here),
+        quoted(&format!("{}/render.sh", names.folder)),
+        quoted(&format!("{}/merge.sh", names.folder))
     );
-    fs::create_dir_all(&folder).map_err(|e| Failure::Io(format!("{}: {e}", folder.display())))?;
     let submit_path = folder.join("submit.sh");
-    for (path, text) in [(&render_path, &render), (&merge_path, &merge), (&submit_path, &submit)] {
+    let scripts =
+        [(folder.join("render.sh"), render), (folder.join("merge.sh"), merge), (submit_path.clone(), submit)];
+    for (path, _) in &scripts {
+        refuse_foreign(path)?;
+    }
+    fs::create_dir_all(&folder).map_err(|e| Failure::Io(format!("{}: {e}", folder.display())))?;
+    for (path, text) in &scripts {
         atomic_write(path, |file| file.write_all(text.as_bytes()))
             .map_err(|e| Failure::from(Error::from(e)))?;
         make_executable(path)?;
@@ -137,7 +172,8 @@ fn slurm(arguments: &SlurmArguments) -> Result<(), Failure> {
         say!("{}: {tasks}; run it, or give --submit", submit_path.display());
         return Ok(());
     }
-    let submitted = Command::new("sh").arg(&submit_path).status();
+    // A name that begins with a dash is none of an option.
+    let submitted = Command::new("sh").arg(format!("{}/submit.sh", names.folder)).status();
     match submitted {
         Ok(status) if status.success() => {
             say!("{tasks} submitted; {} comes when all are done", output.display());
@@ -148,6 +184,100 @@ fn slurm(arguments: &SlurmArguments) -> Result<(), Failure> {
     }
 }
 
+/// How every script begins, by which it is known again.
+const MARK: &str = "#!/bin/sh\n# Written by lumbre farm slurm, which replaces it.\n";
+
+/// Refuses to replace a script that is none of ours.
+fn refuse_foreign(path: &Path) -> Result<(), Failure> {
+    if fs::symlink_metadata(path).is_err() {
+        return Ok(());
+    }
+    let mut start = Vec::new();
+    let read = open_regular(path).map(|(file, _)| file.take(MARK.len() as u64).read_to_end(&mut start));
+    if read.is_ok() && start == MARK.as_bytes() {
+        return Ok(());
+    }
+    Err(Failure::Usage(format!(
+        "{}: lumbre farm did not write what is there (expected another --folder, or that it is removed)",
+        path.display()
+    )))
+}
+
+/// Refuses a default name that is the one of a file which is not known to be Lumbre's.
+fn refuse_others(output: &Path, frames: Option<&Frames>) -> Result<(), Failure> {
+    let pictures = frames.map_or(Pictures::One, |Frames(numbers)| Pictures::Frames(numbers.clone()));
+    match pictures.names(output).find(|name| name.exists() && !is_own_image(name)) {
+        Some(name) => Err(Failure::Usage(format!(
+            "{} is there, and not known to be Lumbre's (expected -o with another name)",
+            name.display()
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// A name as a script has it: no option, and all on one line. `forbidden` are characters that mean something there.
+///
+/// # Errors
+/// [`Failure::Usage`] for a name that no script can hold.
+fn in_script(path: &Path, forbidden: &str) -> Result<String, Failure> {
+    let name = path.to_str().filter(|name| !name.chars().any(|c| c.is_control() || forbidden.contains(c)));
+    match name {
+        None => {
+            let which = if forbidden.is_empty() { "" } else { " and %" };
+            Err(Failure::Usage(format!(
+                "{}: a job script cannot hold this name (expected one of UTF-8 without line feeds, other control characters{which})",
+                path.display()
+            )))
+        }
+        Some("-") => Err(Failure::Usage("-: every task reads the scene (expected a file)".to_owned())),
+        Some(name) if name.starts_with('-') => Ok(format!("./{name}")),
+        Some(name) => Ok(name.to_owned()),
+    }
+}
+
+/// The options of a task, as lumbre render will take them; what it would refuse is refused now, and not on the cluster.
+fn task(arguments: &SlurmArguments, names: &Names) -> Result<crate::render::Arguments, Failure> {
+    let own: &[&str] = match arguments.frames {
+        Some(_) => &["--frames", "0..1", "-o", &names.output, "--progress", "plain"],
+        None => &[
+            "--samples",
+            "0..1",
+            "-o",
+            "task.part",
+            "--checkpoint",
+            "task.checkpoint",
+            "--resume",
+            "--progress",
+            "plain",
+        ],
+    };
+    let spp =
+        arguments.spp.filter(|_| arguments.frames.is_some()).map(|spp| ["--spp".to_owned(), spp.to_string()]);
+    let words = std::iter::once(names.scene.clone()).chain(own.iter().map(|&word| word.to_owned()));
+    let words = words.chain(spp.into_iter().flatten()).chain(arguments.render.iter().cloned());
+    let wrong = |why: &str| {
+        let own = if arguments.frames.is_some() {
+            "--frames, -o and --progress"
+        } else {
+            "--samples, -o, --checkpoint, --resume and --progress"
+        };
+        Failure::Usage(format!(
+            "after --: {why} (expected options of lumbre render beside {own}, which a task has already)"
+        ))
+    };
+    let task = Task::try_parse_from(words).map_err(|error| {
+        let said = error.to_string();
+        let first = said.lines().next().unwrap_or_default();
+        wrong(first.strip_prefix("error: ").unwrap_or("that is no option of a picture"))
+    })?;
+    let task = task.arguments;
+    task.check_task().map_err(|why| wrong(&why.to_string()))?;
+    match (arguments.spp, task.spp()) {
+        (Some(a), Some(b)) if a != b => Err(wrong(&format!("--spp {b} and --spp {a} before it"))),
+        _ => Ok(task),
+    }
+}
+
 /// The number of a task.
 const TASK: &str =
     "task=${SLURM_ARRAY_TASK_ID:-${JOB_COMPLETION_INDEX:?\"this script is a task of a job array\"}}\n";
@@ -155,15 +285,12 @@ const TASK: &str =
 /// Tasks that take some samples each.
 fn sample_scripts(
     arguments: &SlurmArguments,
-    output: &Path,
-    folder: &Path,
+    names: &Names,
+    task: &crate::render::Arguments,
 ) -> Result<(String, String), Failure> {
-    let spp = match arguments.spp {
+    let spp = match arguments.spp.or(task.spp()) {
         Some(spp) => spp,
-        None => {
-            let (scene, _) = ReadingArguments::default().open(std::slice::from_ref(&arguments.scene))?;
-            scene.options().stop.spp
-        }
+        None => task.open_scene()?.options().stop.spp,
     };
     let tasks = arguments.tasks;
     if tasks > spp {
@@ -172,26 +299,25 @@ fn sample_scripts(
             counted(u64::from(spp), "sample")
         )));
     }
-    let base = quoted(&folder.join("task.").display().to_string());
+    let base = quoted(&format!("{}/task.", names.folder));
     let render = format!(
         "first=$((task * {spp} / {tasks}))\nlast=$(((task + 1) * {spp} / {tasks}))\n\
          exec \"$lumbre\" render {} --samples \"$first..$last\" -o {base}\"$task.part\" \
          --checkpoint {base}\"$task.checkpoint\" --resume --progress plain{}\n",
-        quoted(&arguments.scene.display().to_string()),
+        quoted(&names.scene),
         options(arguments)
     );
     let parts = format!(
         "set --\ntask=0\nwhile [ \"$task\" -lt {tasks} ]; do\n  set -- \"$@\" {base}\"$task.part\"\n  task=$((task + 1))\ndone\n"
     );
-    let merge =
-        format!("{parts}exec \"$lumbre\" merge \"$@\" -o {}\n", quoted(&output.display().to_string()));
+    let merge = format!("{parts}exec \"$lumbre\" merge \"$@\" -o {}\n", quoted(&names.output));
     Ok((render, merge))
 }
 
 /// Tasks that render some frames each.
 fn frame_scripts(
     arguments: &SlurmArguments,
-    output: &Path,
+    names: &Names,
     first: u32,
     last: u32,
 ) -> Result<(String, String), Failure> {
@@ -203,15 +329,14 @@ fn frame_scripts(
         )));
     }
     let spp = arguments.spp.map_or_else(String::new, |spp| format!(" --spp {spp}"));
-    let out = quoted(&output.display().to_string());
+    let out = quoted(&names.output);
     let render = format!(
         "first=$(({first} + task * {count} / {tasks}))\nlast=$(({first} + (task + 1) * {count} / {tasks} - 1))\n\
          exec \"$lumbre\" render {} --frames \"$first..$last\" -o {out}{spp} --progress plain{}\n",
-        quoted(&arguments.scene.display().to_string()),
+        quoted(&names.scene),
         options(arguments)
     );
-    let merge =
-        format!("echo {}\n", quoted(&format!("frames {first} to {last} are done: {}", output.display())));
+    let merge = format!("echo {}\n", quoted(&format!("frames {first} to {last} are done: {}", names.output)));
     Ok((render, merge))
 }
 

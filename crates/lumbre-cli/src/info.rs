@@ -8,7 +8,8 @@ use clap::Args;
 use lumbre::{CancelToken, Part, Scene, Stage, StageLight};
 use serde_json::json;
 
-use crate::console::escaped;
+use crate::checkpoint::open_part;
+use crate::console::{escaped_json, escaped_line};
 use crate::failure::{Failure, print};
 use crate::reading::{ReadingArguments, print_warnings};
 use crate::signals::Signals;
@@ -40,8 +41,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let [path] = &arguments.scene[..]
         && Part::is_in(path)
     {
-        let part = Part::open(path, arguments.reading.memory().for_reading());
-        let part = part.map_err(|e| Failure::Input(format!("{}: {e}", path.display())))?;
+        let part = open_part(path, arguments.reading.memory())?;
         return print(&about_part(&part, arguments.json));
     }
     let (desc, mut diagnostics) = arguments.reading.describe(&arguments.scene)?;
@@ -85,7 +85,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             })),
             "warnings": diagnostics.lines(),
         });
-        return print(&format!("{report:#}\n"));
+        return print(&escaped_json(&report));
     }
     let line = |title: &str, what: String| format!("{title:<11}{what}\n");
     let count = |title: &str, counts: &BTreeMap<String, u64>| {
@@ -96,15 +96,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let cameras = match info.cameras.len() {
         0 => "none: one is made".to_owned(),
-        _ => shortened(info.cameras.iter().map(|name| escaped(name).into_owned())),
+        _ => shortened(info.cameras.iter().map(|name| escaped_line(name).into_owned())),
     };
     let animations = info.listing.animations.iter().enumerate().map(|(i, animation)| {
-        let name = animation.name.as_ref().map_or_else(|| i.to_string(), |name| escaped(name).into_owned());
+        let name =
+            animation.name.as_ref().map_or_else(|| i.to_string(), |name| escaped_line(name).into_owned());
         animation.end.map_or_else(|| name.clone(), |end| format!("{name} ({end:.2} s)"))
     });
-    let variants = info.listing.variants.iter().map(|name| escaped(name).into_owned());
+    let variants = info.listing.variants.iter().map(|name| escaped_line(name).into_owned());
     let textures = info.listing.textures.iter();
-    let textures = textures.map(|t| format!("{} {}x{}", escaped(&t.name), t.width, t.height));
+    let textures = textures.map(|t| format!("{} {}x{}", escaped_line(&t.name), t.width, t.height));
     // What most files lack is told only where it is.
     let listed = |title: &str, names: Vec<String>| match names.len() {
         0 => String::new(),
@@ -189,7 +190,7 @@ fn about_part(part: &Part, as_json: bool) -> String {
                 "render": part.job.identity,
             },
         });
-        return format!("{report:#}\n");
+        return escaped_json(&report);
     }
     let done = if state.is_finished() { "finished" } else { "unfinished: --resume goes on from it" };
     let mut text = format!("part       of a picture of {width}x{height}, {done}\n");
@@ -202,7 +203,7 @@ fn about_part(part: &Part, as_json: bool) -> String {
     }
     text += &format!("taken      {} of {}\n", state.taken(), state.wanted());
     for (name, value) in &part.job.identity {
-        text += &format!("{name}: {}\n", escaped(value));
+        text += &format!("{}: {}\n", escaped_line(name), escaped_line(value));
     }
     text
 }

@@ -65,7 +65,8 @@ pub use memory::memory_left;
   lumbre explain scene.pbrt --pixel 320,240     every number between a pixel and its colour
   lumbre math 'rotate(z, 90) * [1, 0, 0]'       vectors, transforms and quaternions, step by step
 
-Exit status: 0 done, 1 a comparison failed, 2 usage, 3 input, 4 files, 5 a limit, 130 or 143 a signal.")]
+Exit status: 0 done, 1 a comparison failed, 2 usage, 3 input, 4 files, 5 a limit, 128 + N signal N
+(130 for Ctrl-C, 143 for SIGTERM).")]
 struct Arguments {
     #[command(subcommand)]
     command: Command,

@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use lumbre::formats::Limits;
+use lumbre::RenderOptions;
+use lumbre::formats::{FormatError, LimitKind, Limits};
 
 use crate::failure::Failure;
 
@@ -55,20 +56,39 @@ impl Memory {
     pub(crate) fn for_reading(self) -> u64 {
         match self.bound {
             Bound::Flag => self.most,
-            Bound::Machine | Bound::Group => self.most.min(Limits::default().memory),
-            Bound::AddressSpace => self.usable().min(Limits::default().memory),
+            Bound::Machine | Bound::Group | Bound::AddressSpace => {
+                self.usable().min(Limits::default().memory)
+            }
+        }
+    }
+
+    /// The bytes that a part in a file of this size may take: by default no more than an honest one of that size does.
+    pub(crate) fn for_part(self, file_bytes: u64) -> u64 {
+        match self.bound {
+            Bound::Flag => self.most,
+            _ => self.for_reading().min(lumbre::Part::fair_memory(file_bytes)),
         }
     }
 
     /// Allocators take more of the address space than they are asked for.
     fn usable(self) -> u64 {
-        self.most.saturating_sub(RESERVE) / 4 * 3
+        match self.bound {
+            Bound::AddressSpace => self.most.saturating_sub(RESERVE) / 4 * 3,
+            Bound::Flag | Bound::Machine | Bound::Group => self.most,
+        }
     }
 
-    /// The failure of a reader, with what else there is to know of the limit that it met.
-    pub(crate) fn explain(self, failure: Failure) -> Failure {
-        match failure {
-            Failure::Limit(message) => Failure::Limit(message + self.remark()),
+    /// The failure of a reader, with what else there is to know of the limit on memory where it met that, and what the system grants is
+    /// what set it.
+    pub(crate) fn explain(self, error: lumbre::Error) -> Failure {
+        let is_of_memory = match &error {
+            lumbre::Error::Format(FormatError::Limit { source, .. }) => source.kind == LimitKind::Memory,
+            _ => false,
+        };
+        match Failure::from(error) {
+            Failure::Limit(message) if is_of_memory && self.usable() == self.for_reading() => {
+                Failure::Limit(message + self.remark())
+            }
             failure => failure,
         }
     }
@@ -89,14 +109,28 @@ impl Memory {
         let left = match self.bound {
             Bound::Flag => self.most.saturating_sub(held),
             // What is held is not counted any more.
-            Bound::Machine | Bound::Group => self.most,
-            Bound::AddressSpace => self.usable(),
+            Bound::Machine | Bound::Group | Bound::AddressSpace => self.usable(),
         };
         if needed <= left {
             return Ok(());
         }
         let raise = format!("raise it with --max-memory{}", self.remark());
         Err(Failure::Limit(format!("{what}: needs {needed} bytes of memory, {left} are left; {raise}")))
+    }
+
+    /// Refuses a picture that would not fit beside `held` bytes, while it is rendered, saved or shown.
+    ///
+    /// # Errors
+    /// [`Failure::Limit`] with the prediction, and [`Failure::Usage`] for options that make no picture.
+    pub(crate) fn check_picture(self, options: &RenderOptions, held: u64) -> Result<(), Failure> {
+        // The picture, one over its background, and what encoders make of it; each layer as numbers and as their encoding.
+        const SAVED: u64 = 100;
+        const LAYERS: u64 = 170;
+        let each = if options.features || options.guides { SAVED + LAYERS } else { SAVED };
+        let pixels = options.bounds().map_err(lumbre::Error::from)?.area();
+        let rendered = options.memory_bytes().map_err(lumbre::Error::from)?;
+        let what = format!("a picture of {} by {} pixels", options.width, options.height);
+        self.check(&what, rendered.max(pixels.saturating_mul(each)), held)
     }
 }
 
@@ -189,6 +223,26 @@ mod tests {
         assert!(memory.check("the tree", 750, 5000).is_ok());
         let message = memory.check("the tree", 751, 0).unwrap_err().to_string();
         assert!(message.contains("ulimit -v"), "{message}");
+    }
+
+    #[test]
+    fn the_limit_of_the_system_is_named_where_it_is_the_cause_and_nowhere_else() {
+        let explained = |memory: Memory, kind: LimitKind| {
+            let limit = lumbre::formats::LimitError { what: "a.ply".to_owned(), kind, needed: 9, limit: 5 };
+            memory.explain(lumbre::Error::Format(limit.into())).to_string()
+        };
+        let tight = Memory { most: RESERVE + 1000, bound: Bound::AddressSpace };
+        assert!(
+            explained(tight, LimitKind::Memory)
+                .ends_with("--max-memory (but the system grants no more: see ulimit -v)")
+        );
+        assert!(explained(tight, LimitKind::Elements).ends_with("--max-elements"));
+        // So much that what reading takes by default is less.
+        let wide = Memory { most: 64 << 30, bound: Bound::AddressSpace };
+        assert!(explained(wide, LimitKind::Memory).ends_with("--max-memory"));
+        let group = Memory { most: 1000, bound: Bound::Group };
+        assert!(explained(group, LimitKind::Memory).contains("memory.max"));
+        assert!(explained(group, LimitKind::Nesting).ends_with("--max-nesting"));
     }
 
     #[test]

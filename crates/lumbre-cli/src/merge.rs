@@ -1,6 +1,6 @@
 //! `lumbre merge`: joins parts of a render.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -9,10 +9,12 @@ use lumbre::formats::probe_writable;
 use lumbre::image::{Rgb, ToneMap};
 use lumbre::{Background, CancelToken, Feature, MergeError, Part, Piece, SaveOptions};
 
-use crate::checkpoint::is_bare_part;
+use crate::checkpoint::{is_bare_part, open_part};
 use crate::failure::Failure;
 use crate::memory::Memory;
+use crate::names::one_of;
 use crate::output::{Inputs, Replaced};
+use crate::render::{exposure, tone_map_name};
 use crate::signals::Signals;
 use crate::staging::frame_name;
 use crate::units::{self, counted};
@@ -40,7 +42,13 @@ pub(crate) struct Arguments {
     /// Keep the sums of all samples in the .exr, so that it can be merged and resumed again.
     #[arg(long)]
     keep_sums: bool,
-    /// Bytes of memory that parts may take.
+    /// Exposure in stops, for .png and .jpg, in place of the parts' own, which have to be the same without it.
+    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure)]
+    exposure: Option<f32>,
+    /// Tone mapping, for .png and .jpg, in place of the parts' own, which has to be the same without it.
+    #[arg(long, value_name = "NAME", value_parser = one_of(&ToneMap::NAMES, ToneMap::from_name))]
+    tonemap: Option<ToneMap>,
+    /// Bytes of memory that a part may take. By default 64 MiB and 32 for each byte of its file.
     #[arg(long, value_name = "SIZE", value_parser = units::bytes)]
     max_memory: Option<u64>,
     /// Print errors only.
@@ -86,7 +94,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 /// The number of the frame that a part is of, if it is of one of several.
 fn frame_of(part: &Part) -> Option<u32> {
-    part.job.identity.get("picture")?.strip_prefix("Some(")?.strip_suffix(')')?.parse().ok()
+    part.job.identity.get("picture")?.parse().ok()
 }
 
 /// Joins parts of one picture, of at least so many samples.
@@ -129,8 +137,13 @@ fn merge(arguments: &Arguments, parts: &[PathBuf], output: &Path, spp: u32) -> R
 
 /// A finished part.
 fn open(path: &Path, arguments: &Arguments) -> Result<Part, Failure> {
-    let part = Part::open(path, Memory::new(arguments.max_memory).for_reading());
-    let part = part.map_err(|e| Failure::Input(format!("{}: {e}", path.display())))?;
+    let mut part = open_part(path, Memory::new(arguments.max_memory))?;
+    if let Some(exposure) = arguments.exposure {
+        part.job.shown.insert("exposure".to_owned(), exposure.to_string());
+    }
+    if let Some(tone_map) = arguments.tonemap {
+        part.job.shown.insert("tone map".to_owned(), tone_map_name(tone_map).to_owned());
+    }
     if part.state.is_finished() {
         return Ok(part);
     }
@@ -158,6 +171,14 @@ fn joined(arguments: &Arguments, parts: &[PathBuf]) -> Result<Part, Failure> {
                 differences.join("; ")
             )));
         }
+        // Which of them is first would say how the picture is shown.
+        if let Some(differences) = shown_differences(&whole.job.shown, &part.job.shown) {
+            return Err(Failure::Usage(format!(
+                "{}: its picture is shown in another way than that of {}: {differences}",
+                path.display(),
+                first.display()
+            )));
+        }
         let pieces = part.state.pieces().to_vec();
         whole.merge(&part).map_err(|error| {
             let MergeError::Overlap(overlap) = &error else {
@@ -171,6 +192,24 @@ fn joined(arguments: &Arguments, parts: &[PathBuf]) -> Result<Part, Failure> {
         origins.push((path, pieces));
     }
     Ok(whole)
+}
+
+/// In what two ways of showing a picture differ, with the options that say which is meant.
+fn shown_differences(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>) -> Option<String> {
+    let names: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+    let of = |shown: &BTreeMap<String, String>, name: &String| {
+        shown.get(name).map_or("none", String::as_str).to_owned()
+    };
+    let differences = names.into_iter().filter(|name| a.get(*name) != b.get(*name)).map(|name| {
+        let option = match name.as_str() {
+            "exposure" => " (expected --exposure EV, or parts of the same)",
+            "tone map" => " (expected --tonemap NAME, or parts of the same)",
+            _ => " (expected parts of the same)",
+        };
+        format!("{name} {} and {}{option}", of(a, name), of(b, name))
+    });
+    let differences: Vec<String> = differences.collect();
+    (!differences.is_empty()).then(|| differences.join("; "))
 }
 
 /// Saves the picture as the render itself would have.

@@ -99,7 +99,7 @@ pub(crate) enum Pictures {
 
 impl Pictures {
     /// The names of all of them; a single one has that of the pattern.
-    fn names<'a>(&self, pattern: &'a Path) -> Box<dyn Iterator<Item = PathBuf> + 'a> {
+    pub(crate) fn names<'a>(&self, pattern: &'a Path) -> Box<dyn Iterator<Item = PathBuf> + 'a> {
         let numbers = match self {
             Self::One => return Box::new(std::iter::once(pattern.to_owned())),
             Self::Frames(numbers) => numbers.clone(),

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use clap::Args;
 use lumbre::formats::{Budget, Diagnostics, Input, Limits, SceneFormat, Strictness};
-use lumbre::{Error, Scene, SceneDesc, Setting};
+use lumbre::{Error, Scene, SceneDesc, Setting, in_words};
 
 use crate::failure::Failure;
 use crate::memory::Memory;
@@ -202,7 +202,8 @@ impl ReadingArguments {
         self.describe_at(paths, Some(f64::from(number) / self.fps))
     }
 
-    /// [`Self::describe`] at another moment, and with another variant, where they are given.
+    /// [`Self::describe`] at another moment, and with another variant, where they are given. A scene that is alone may use no files but
+    /// those that are named: see [`lumbre::ReadOptions::is_alone`].
     ///
     /// # Errors
     /// As for [`ReadingArguments::open`].
@@ -211,12 +212,13 @@ impl ReadingArguments {
         paths: &[PathBuf],
         time: Option<f64>,
         variant: Option<&str>,
+        is_alone: bool,
     ) -> Result<(SceneDesc, Diagnostics), Failure> {
-        self.describe_as(paths, time.or(self.frame), variant.or(self.variant.as_deref()))
+        self.describe_as(paths, time.or(self.frame), variant.or(self.variant.as_deref()), is_alone)
     }
 
     fn describe_at(&self, paths: &[PathBuf], time: Option<f64>) -> Result<(SceneDesc, Diagnostics), Failure> {
-        self.describe_as(paths, time, self.variant.as_deref())
+        self.describe_as(paths, time, self.variant.as_deref(), false)
     }
 
     fn describe_as(
@@ -224,13 +226,15 @@ impl ReadingArguments {
         paths: &[PathBuf],
         time: Option<f64>,
         variant: Option<&str>,
+        is_alone: bool,
     ) -> Result<(SceneDesc, Diagnostics), Failure> {
         let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
         let memory = self.memory();
         let mut options = self.options(time)?;
         options.variant = variant.map(str::to_owned);
+        options.is_alone = is_alone;
         let read = lumbre::describe(&paths, &options);
-        let (mut desc, diagnostics) = read.map_err(|error| memory.explain(error.into()))?;
+        let (mut desc, diagnostics) = read.map_err(|error| memory.explain(error))?;
         for path in &self.overlay {
             self.overlay(path, &mut desc)?;
         }
@@ -246,9 +250,9 @@ impl ReadingArguments {
         let text = |name: &str, value: String| (name.to_owned(), value);
         vec![
             text("lenient", lenient.to_string()),
-            text("frame", format!("{frame:?} {shutter:?} {fps} {animation:?}")),
-            text("variant", format!("{variant:?}")),
-            text("settings", format!("{settings:?}")),
+            text("frame", in_words(&(frame, shutter, fps, animation))),
+            text("variant", in_words(variant)),
+            text("settings", in_words(settings)),
         ]
     }
 
@@ -309,13 +313,7 @@ pub(crate) fn print_warnings(diagnostics: &Diagnostics) {
 
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
-        let message = error.to_string();
-        match error.kind() {
-            lumbre::ErrorKind::Input => Self::Input(message),
-            lumbre::ErrorKind::Io => Self::Io(message),
-            lumbre::ErrorKind::Limit => Self::Limit(message),
-            lumbre::ErrorKind::Options => Self::Usage(message),
-        }
+        Self::of_kind(error.kind(), error.to_string())
     }
 }
 

@@ -16,7 +16,7 @@ use lumbre::math::Elementary;
 use lumbre::shading::ShadingNormals;
 use lumbre::{
     CancelToken, DVec3, Feature, Job, Keeper, Picture, PixelBounds, RenderOptions, SaveOptions, Scene,
-    SceneDesc, Stage, Staged,
+    SceneDesc, Stage, Staged, in_words,
 };
 use serde_json::json;
 
@@ -192,6 +192,11 @@ pub(crate) fn exposure(text: &str) -> Result<f32, String> {
         .ok_or_else(|| "expected a number from -100 to 100, such as 1.5".to_owned())
 }
 
+/// The name of a tone mapping.
+pub(crate) fn tone_map_name(map: ToneMap) -> &'static str {
+    ToneMap::NAMES.into_iter().find(|name| ToneMap::from_name(name) == Some(map)).unwrap_or("none")
+}
+
 /// What can be made of shading normals.
 pub(crate) const SHADING_NORMALS: [&str; 2] = ["lumbre", "pbrt"];
 /// The names of formats that are written.
@@ -224,7 +229,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let mut asked = RenderOptions::default();
         (asked.width, asked.height) = (width, height);
         asked.guides = denoiser.is_some();
-        check_film(arguments, &asked, 0)?;
+        arguments.reading.memory().check_picture(&asked, 0)?;
     }
     let cancel = CancelToken::new();
     let signals = Signals::listen(&cancel)?;
@@ -306,6 +311,41 @@ const MOST_FOR_NOISE: u32 = 1024;
 const READING: Phase = Phase::Preparing("reading the scene");
 
 impl Arguments {
+    /// The samples per pixel that are asked for.
+    pub(crate) fn spp(&self) -> Option<u32> {
+        self.spp
+    }
+
+    /// The scene.
+    ///
+    /// # Errors
+    /// [`Failure`] by kind of error.
+    pub(crate) fn open_scene(&self) -> Result<Scene, Failure> {
+        self.reading.open(&self.scene).map(|(scene, _)| scene)
+    }
+
+    /// Refuses what a task of a farm cannot do, before it is sent off.
+    ///
+    /// # Errors
+    /// [`Failure::Usage`].
+    pub(crate) fn check_task(&self) -> Result<(), Failure> {
+        let Some(output) = &self.output else { return Ok(()) };
+        self.staging.check(Some(output))?;
+        self.check_frames(Some(output))?;
+        check_format(output, !self.aov.is_empty())?;
+        self.check_standard_output()?;
+        self.parts.check(&self.scene, output, self.spp)?;
+        let alone = [
+            (self.stats.is_some(), "--stats is one file for all tasks"),
+            (self.preview.is_some(), "--preview needs a terminal"),
+            (self.tev.is_some(), "--tev needs a screen"),
+        ];
+        alone
+            .iter()
+            .find(|(is_asked, _)| *is_asked)
+            .map_or(Ok(()), |(_, why)| Err(Failure::Usage((*why).to_owned())))
+    }
+
     /// The files that are named on the command line and read.
     fn inputs(&self) -> impl Iterator<Item = &Path> {
         let files = self.scene.iter().map(PathBuf::as_path).chain(self.staging.inputs());
@@ -315,8 +355,8 @@ impl Arguments {
     /// What else than files and options of rendering the scene depends on, by name.
     fn settings(&self) -> Vec<(String, String)> {
         let mut settings = self.reading.scene_settings();
-        settings.push(("view".to_owned(), format!("{:?}", self.view)));
-        settings.push(("stage".to_owned(), format!("{:?} {:?}", self.staging, self.size)));
+        settings.push(("view".to_owned(), in_words(&self.view)));
+        settings.push(("stage".to_owned(), in_words(&(&self.staging, self.size))));
         settings
     }
 
@@ -328,11 +368,10 @@ impl Arguments {
         exposure: f32,
         precision: ExrPrecision,
     ) -> BTreeMap<String, String> {
-        let tone_map = ToneMap::NAMES.into_iter().find(|name| ToneMap::from_name(name) == Some(tone_map));
         let layers: Vec<&str> = self.aov.iter().map(|aov| aov.name()).collect();
         let mut shown = BTreeMap::from([
             ("exposure".to_owned(), exposure.to_string()),
-            ("tone map".to_owned(), tone_map.unwrap_or("none").to_owned()),
+            ("tone map".to_owned(), tone_map_name(tone_map).to_owned()),
             (
                 "precision".to_owned(),
                 if precision == ExrPrecision::Float { "float" } else { "half" }.to_owned(),
@@ -548,7 +587,7 @@ fn picture(
     }
     options.guides = denoiser.is_some();
     let held = diagnostics.memory_held().saturating_add(scene.resolved().accel().memory_bytes() as u64);
-    check_film(arguments, &options, held)?;
+    arguments.reading.memory().check_picture(&options, held)?;
     arguments.view.check_camera(&scene, options.camera)?;
     let warn = |what: String| match arguments.reading.is_strict() {
         true => Err(Failure::input(what)),
@@ -604,16 +643,13 @@ fn picture(
         let left = deadline.at.saturating_duration_since(render_start);
         options.stop.time = Some(left.max(LEAST_TIME));
     }
-    let most_memory = arguments.reading.memory().for_reading();
+    let memory = arguments.reading.memory();
     let files: Vec<PathBuf> =
         diagnostics.files_read().iter().cloned().chain(arguments.inputs().map(Path::to_owned)).collect();
     let mut settings = arguments.settings();
-    settings.push(("picture".to_owned(), format!("{number:?}")));
+    settings.push(("picture".to_owned(), in_words(&number)));
     // Camera and ground are those of the first.
-    settings.push((
-        "first picture".to_owned(),
-        format!("{:?}", series.map(|series| series.number - series.done)),
-    ));
+    settings.push(("first picture".to_owned(), in_words(&series.map(|series| series.number - series.done))));
     let (job_options, shown) = (options.clone(), arguments.shown(&behind, tone_map, exposure, precision));
     // Files that cannot be read again, such as standard input, leave the render without an identity.
     let job = move || {
@@ -621,7 +657,7 @@ fn picture(
         Ok(Job { shown, ..Job::new(files, settings, &job_options)? })
     };
     let (checkpoint, state) =
-        Checkpoint::begin(&arguments.parts, &output, most_memory, options.stop.spp, arguments.quiet, job)?;
+        Checkpoint::begin(&arguments.parts, &output, memory, options.stop.spp, arguments.quiet, job)?;
     let keep = |state| checkpoint.keep(state);
     let keeper = checkpoint.every().map(|every| Keeper { every, keep: &keep });
     signals.enter(Phase::Rendering);
@@ -709,7 +745,9 @@ fn picture(
             "save": save_time.as_secs_f64(),
         });
         let report = statistics(&scene, &picture, seconds, diagnostics.lines());
+        let pipe = Signals::open_pipe(path)?;
         let stream = signals.enter_writing(path)?;
+        drop(pipe);
         lumbre::formats::atomic_write(path, |file| writeln!(file, "{report:#}"))
             .map_err(|e| Failure::from(lumbre::Error::from(e)))?;
         drop(stream);
@@ -751,18 +789,6 @@ fn is_nearly_black(image: &Image, exposure: f32) -> bool {
     const LEAST_COVERED: f64 = 0.005;
     const LEAST_LIT: f64 = 0.01;
     covered > LEAST_COVERED * image.pixels().len() as f64 && lit < LEAST_LIT * covered
-}
-
-/// Refuses a picture that would not fit into memory, while it is rendered or while it is saved.
-fn check_film(arguments: &Arguments, options: &RenderOptions, held: u64) -> Result<(), Failure> {
-    // The picture, one over its background, and what encoders make of it; each layer as numbers and as their encoding.
-    const SAVED: u64 = 100;
-    const LAYERS: u64 = 170;
-    let each = if options.features || options.guides { SAVED + LAYERS } else { SAVED };
-    let pixels = options.bounds().map_err(lumbre::Error::from)?.area();
-    let rendered = options.memory_bytes().map_err(lumbre::Error::from)?;
-    let what = format!("a picture of {} by {} pixels", options.width, options.height);
-    arguments.reading.memory().check(&what, rendered.max(pixels.saturating_mul(each)), held)
 }
 
 /// Whether exposure applies to the format of this name.

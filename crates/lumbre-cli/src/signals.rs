@@ -8,6 +8,8 @@ use std::time::{Duration, Instant};
 
 use lumbre::CancelToken;
 use lumbre::formats::abandon_writes;
+#[cfg(unix)]
+use signal_hook::consts::{SIGHUP, SIGQUIT, SIGUSR1, SIGXCPU};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::failure::Failure;
@@ -38,7 +40,34 @@ const INTERVAL: Duration = Duration::from_millis(10);
 /// The exit status of a limit.
 const LIMIT: i32 = 5;
 
-/// SIGINT, SIGTERM and a deadline. The first signal asks the work to end, and ends the program where that leaves nothing to save
+/// What asks the program to end, with its exit status, and whether a second one means that it cannot wait: shells send SIGHUP twice when
+/// a terminal is closed, schedulers SIGUSR1 as often as they like, and the system SIGXCPU every second once the time of the processor
+/// (`ulimit -t`) is over.
+#[cfg(unix)]
+const SIGNALS: [(i32, u8, bool); 6] = [
+    (SIGINT, 130, true),
+    (SIGTERM, 143, true),
+    (SIGQUIT, 131, true),
+    (SIGHUP, 129, false),
+    (SIGUSR1, 138, false),
+    (SIGXCPU, 152, false),
+];
+#[cfg(not(unix))]
+const SIGNALS: [(i32, u8, bool); 2] = [(SIGINT, 130, true), (SIGTERM, 143, true)];
+
+/// The signals of [`SIGNALS`] that are listened for: all but those that whoever started the program had it ignore, as nohup does with
+/// SIGHUP. SIGINT and SIGTERM are always, as they were ever: shells ignore SIGINT for what runs in the background.
+fn wanted() -> impl Iterator<Item = (i32, u8, bool)> {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored =
+        status.lines().find_map(|line| u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok());
+    SIGNALS.into_iter().filter(move |&(signal, ..)| {
+        let is_ignored = ignored.is_some_and(|mask| mask >> (signal - 1) & 1 == 1);
+        matches!(signal, SIGINT | SIGTERM) || !is_ignored
+    })
+}
+
+/// SIGINT, SIGTERM and their like ([`SIGNALS`]), and a deadline. The first signal asks the work to end, and ends the program where that leaves nothing to save
 /// or takes too long; a second one ends it at once. The temporary files of writes are removed, and no path holds a part of a file.
 pub(crate) struct Signals {
     last: Arc<AtomicUsize>,
@@ -73,11 +102,17 @@ impl Signals {
         let last = Arc::new(AtomicUsize::new(0));
         let state = State { phase: Phase::Preparing("starting"), cancel: cancel.clone(), deadline: None };
         let signals = Self { last: last.clone(), state: Arc::new(Mutex::new(state)) };
-        let came = Arc::new(AtomicBool::new(false));
+        let (came, hurries) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
         // A signal handler may do almost nothing, so a thread does it.
-        let watcher = Watcher { came: came.clone(), last: last.clone(), state: signals.state.clone() };
+        let watcher = Watcher {
+            came: came.clone(),
+            hurries: hurries.clone(),
+            last: last.clone(),
+            state: signals.state.clone(),
+        };
         let watches = std::thread::Builder::new().spawn(move || watcher.watch()).is_ok();
-        for (signal, status) in [(SIGINT, 130), (SIGTERM, 143)] {
+        for (signal, status, may_hurry) in wanted() {
+            let status = i32::from(status);
             if !watches {
                 // Without a thread nothing can be removed or saved: the next run removes what is left.
                 let at_once = Arc::new(AtomicBool::new(true));
@@ -85,6 +120,9 @@ impl Signals {
             }
             signal_hook::flag::register_usize(signal, last.clone(), status as usize)?;
             signal_hook::flag::register(signal, came.clone())?;
+            if may_hurry {
+                signal_hook::flag::register(signal, hurries.clone())?;
+            }
         }
         Ok(signals)
     }
@@ -99,6 +137,32 @@ impl Signals {
         lock(&self.state).phase = phase;
     }
 
+    /// Opens a pipe to be written, if this is the name of one: nobody is waited for.
+    ///
+    /// # Errors
+    /// [`Failure::Io`] where nobody reads from it.
+    #[cfg(unix)]
+    pub(crate) fn open_pipe(path: &Path) -> Result<Option<File>, Failure> {
+        use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+        if !std::fs::metadata(path).is_ok_and(|meta| meta.file_type().is_fifo()) {
+            return Ok(None);
+        }
+        const O_NONBLOCK: i32 = if cfg!(target_os = "linux") { 0o4000 } else { 4 };
+        match File::options().write(true).custom_flags(O_NONBLOCK).open(path) {
+            Ok(pipe) => Ok(Some(pipe)),
+            Err(_) => Err(Failure::Io(format!("{}: nobody reads from this pipe", path.display()))),
+        }
+    }
+
+    /// Pipes have no names elsewhere.
+    ///
+    /// # Errors
+    /// None.
+    #[cfg(not(unix))]
+    pub(crate) fn open_pipe(_: &Path) -> Result<Option<File>, Failure> {
+        Ok(None)
+    }
+
     /// Ends the work at this time, in place of an earlier deadline.
     pub(crate) fn end_at(&self, deadline: Option<Deadline>) {
         lock(&self.state).deadline = deadline;
@@ -110,7 +174,10 @@ fn lock(state: &Mutex<State>) -> MutexGuard<'_, State> {
 }
 
 struct Watcher {
+    /// A signal came.
     came: Arc<AtomicBool>,
+    /// One came that ends the program at once where it is the second.
+    hurries: Arc<AtomicBool>,
     last: Arc<AtomicUsize>,
     state: Arc<Mutex<State>>,
 }
@@ -122,6 +189,7 @@ impl Watcher {
         loop {
             std::thread::sleep(INTERVAL);
             let came = self.came.swap(false, Ordering::Relaxed);
+            let hurries = self.hurries.swap(false, Ordering::Relaxed);
             // Held until the end, so that nothing begins meanwhile that is worth saving.
             let state = lock(&self.state);
             let status = i32::try_from(self.last.load(Ordering::Relaxed)).unwrap_or(130);
@@ -130,7 +198,7 @@ impl Watcher {
                     first = Some(Instant::now());
                     state.cancel.cancel();
                 }
-                (Some(_), true) => end(status),
+                (Some(_), true) if hurries => end(status),
                 _ => {}
             }
             let elapsed = first.map(|at| at.elapsed());

@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use clap::Args;
 use lumbre::image::ToneMap;
-use lumbre::{CancelToken, SaveOptions, SceneDesc};
-use lumbre_viewer::{Built, Explain, Moment, Options, Read, Source, Viewer, export};
+use lumbre::{CancelToken, ErrorKind, RenderOptions, SaveOptions, SceneDesc};
+use lumbre_viewer::{Built, Explain, Moment, Options, Read, Source, SourceError, Viewer, export};
 
 use crate::defaults::MODEL_SPP;
 use crate::explain::Explainer;
@@ -97,7 +97,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         }
         signals.enter(Phase::Rendering);
         let files = Files { arguments: Arc::new(arguments), dropped: None };
-        export(&files, &folder, &cancel).map_err(Failure::Input)?;
+        export(&files, &folder, &cancel).map_err(Failure::from)?;
         say!("{}: open it in a browser", folder.join("index.html").display());
         return signals.received().map_or(Ok(()), |status| Err(Failure::Interrupted(status)));
     }
@@ -163,6 +163,24 @@ fn open(url: &str) -> bool {
     command.spawn().is_ok()
 }
 
+impl From<Failure> for SourceError {
+    fn from(failure: Failure) -> Self {
+        let kind = match failure {
+            Failure::Io(_) => ErrorKind::Io,
+            Failure::Limit(_) => ErrorKind::Limit,
+            Failure::Usage(_) => ErrorKind::Options,
+            Failure::Input(_) | Failure::Different | Failure::Interrupted(_) => ErrorKind::Input,
+        };
+        Self { kind, message: failure.to_string() }
+    }
+}
+
+impl From<SourceError> for Failure {
+    fn from(error: SourceError) -> Self {
+        Self::of_kind(error.kind, error.message)
+    }
+}
+
 /// The files of the command line, or one that came later.
 struct Files {
     arguments: Arc<Arguments>,
@@ -186,19 +204,26 @@ impl Source for Files {
         self.paths().into_iter().chain(overlays).collect()
     }
 
-    fn read(&self, moment: &Moment) -> Result<Read, String> {
-        let (desc, diagnostics) = self
-            .arguments
-            .reading
-            .describe_moment(&self.paths(), moment.time, moment.variant.as_deref())
-            .map_err(|failure| failure.to_string())?;
+    fn read(&self, moment: &Moment) -> Result<Read, SourceError> {
+        // What came through the page may be a stranger's, and has no files beside it.
+        let is_alone = self.dropped.is_some();
+        let (desc, diagnostics) = self.arguments.reading.describe_moment(
+            &self.paths(),
+            moment.time,
+            moment.variant.as_deref(),
+            is_alone,
+        )?;
         let files = diagnostics.files_read().to_vec();
         let warnings = diagnostics.lines();
         Ok(Read { desc, files, warnings })
     }
 
-    fn build(&self, desc: SceneDesc) -> Result<Built, String> {
-        self.built(desc).map_err(|failure| failure.to_string())
+    fn build(&self, desc: SceneDesc) -> Result<Built, SourceError> {
+        Ok(self.built(desc)?)
+    }
+
+    fn check(&self, options: &RenderOptions) -> Result<(), SourceError> {
+        Ok(self.arguments.reading.memory().check_picture(options, 0)?)
     }
 
     fn of_file(&self, file: &Path) -> Arc<dyn Source> {
@@ -227,7 +252,8 @@ impl Files {
             options.stop.spp = MODEL_SPP;
         }
         options.stop.spp = self.arguments.spp.unwrap_or(options.stop.spp);
-        options.bounds().map_err(lumbre::Error::from)?;
+        let held = diagnostics.memory_held().saturating_add(scene.resolved().accel().memory_bytes() as u64);
+        reading.memory().check_picture(&options, held)?;
         if scene.is_dark() && is_of_light {
             warnings
                 .push(format!("warning: {}: the scene has no light, its picture is black", name.display()));

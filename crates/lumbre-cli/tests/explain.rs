@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
+use crate::files::Folder;
 use serde_json::Value;
 
 use crate::program::{Desk, code, stderr, stdout};
@@ -270,4 +271,40 @@ fn what_cannot_be_explained_is_said() {
     assert!(
         std::fs::read_to_string(desk.path("a.txt")).unwrap().contains("Nothing: the ray leaves the scene.")
     );
+}
+
+#[test]
+fn names_are_text_in_markdown_and_drive_no_terminal() {
+    let folder = Folder::new();
+    let name = "<img src=x onerror=alert(1)><b>[x](http://a)![y](z)|$\\frac{1}{0}$ \u{1b}[31m&amp;";
+    folder.write(
+        "scene.pbrt",
+        &format!(
+            "LookAt 0 -6 2  0 0 0.5  0 0 1 Camera \"perspective\" Film \"rgb\" \"integer xresolution\" 40 \"integer yresolution\" 30 WorldBegin\n\
+             LightSource \"infinite\" MakeNamedMaterial \"{name}\" \"string type\" \"diffuse\" NamedMaterial \"{name}\"\n\
+             Shape \"sphere\" \"float radius\" 1.75"
+        ),
+    );
+    let tell = |format: &str| {
+        let out = folder
+            .command(&["explain", "scene.pbrt", "--pixel", "20,15", "-q", "--format", format])
+            .output()
+            .unwrap();
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        String::from_utf8(out.stdout).unwrap()
+    };
+    let markdown = tell("markdown");
+    assert!(markdown.contains("&lt;img src=x onerror=alert(1)&gt;&lt;b&gt;[x]&#40;http://a)"), "{markdown}");
+    for active in ["<img", "<b>", "](", " $\\frac{1}"] {
+        let lines = markdown.lines().filter(|line| line.contains("onerror"));
+        assert!(
+            lines.clone().count() > 0 && !lines.clone().any(|line| line.contains(active)),
+            "{active}: {markdown}"
+        );
+    }
+    for format in ["text", "markdown", "html", "json"] {
+        let told = tell(format);
+        assert!(format == "html" || told.chars().all(|c| c == '\n' || !c.is_control()), "{format}: {told:?}");
+        assert!(told.contains("onerror"), "{format}");
+    }
 }

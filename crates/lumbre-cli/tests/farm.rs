@@ -84,9 +84,138 @@ fn a_task_that_is_killed_and_runs_again_changes_nothing() {
 fn what_cannot_be_shared_out_is_refused() {
     let folder = folder();
     refused(&folder, "farm slurm scene.pbrt --tasks 10", 2, "found 10 for 9 samples; expected 9 or fewer");
-    refused(&folder, "farm slurm scene.pbrt --tasks 3 --frames 0..1 -o f.#.png", 2, "found 3 for 2 frames");
-    refused(&folder, "farm slurm scene.pbrt --tasks 2 --frames 0..1 -o f.png", 2, "with # for the number");
+    refused(&folder, "farm slurm a.glb --tasks 3 --frames 0..1 -o f.#.png", 2, "found 3 for 2 frames");
+    refused(
+        &folder,
+        "farm slurm scene.pbrt --tasks 2 --frames 0..1 -o f.#.png",
+        2,
+        "--frames needs an animation",
+    );
+    refused(&folder, "farm slurm a.glb --tasks 2 --frames 0..1 -o f.png", 2, "with # for the number");
     refused(&folder, "farm slurm scene.pbrt --tasks 2 -o scene.pbrt", 2, "expected the name of a picture");
     refused(&folder, "farm slurm none.pbrt --tasks 2", 4, "none.pbrt");
     assert!(!folder.path("scene.farm").exists());
+}
+
+#[test]
+fn options_after_the_dashes_are_read_and_those_that_a_task_cannot_have_are_refused() {
+    let folder = folder();
+    // Scripts are run by hand, as where there is no scheduler.
+    done(&folder, "farm slurm scene.pbrt --tasks 3 -- --spp 6 --max-depth 2");
+    for task in ["0", "1", "2"] {
+        let mut command = Command::new(folder.path("scene.farm/render.sh"));
+        assert!(command.env("SLURM_ARRAY_TASK_ID", task).output().unwrap().status.success());
+    }
+    assert!(Command::new(folder.path("scene.farm/merge.sh")).output().unwrap().status.success());
+    done(&folder, "render scene.pbrt --spp 6 --max-depth 2 -o whole.exr");
+    assert_eq!(bytes(&folder, "scene.exr"), bytes(&folder, "whole.exr"));
+    for option in [
+        "-o x.exr",
+        "--output x.exr",
+        "--time 3s",
+        "--noise 0.1",
+        "--samples 0..2",
+        "--resume",
+        "--checkpoint x",
+        "--frames 0..3",
+        "--denoise",
+        "--stats x.json",
+        "--keep-sums",
+        "--turntable 3",
+        "--tev host",
+        "--preview",
+        "--spp 5",
+        "--spp 0",
+        "--progress json",
+        "--no-checkpoint",
+        "--nonsense",
+        "--help",
+        "--output-format png",
+    ] {
+        let (status, said) = folder.lumbre(
+            &["farm", "slurm", "scene.pbrt", "--tasks", "3", "--spp", "6", "--"]
+                .into_iter()
+                .chain(option.split(' '))
+                .collect::<Vec<_>>(),
+        );
+        assert!(status == 2 && said.contains("after --: "), "{option}: {status} {said}");
+    }
+}
+
+#[test]
+fn names_reach_a_script_as_names_and_what_no_script_can_hold_is_refused() {
+    let folder = folder();
+    let scene = fs::read(folder.path("scene.pbrt")).unwrap();
+    let farm = |scene: &str, more: &[&str]| {
+        folder.lumbre(&[&["farm", "slurm", scene, "--tasks", "2", "--spp", "2"][..], more].concat())
+    };
+    for name in ["a\n#SBATCH --uid=0\n.pbrt", "a\r.pbrt", "50%j.pbrt", "a\u{85}.pbrt"] {
+        fs::write(folder.path(name), &scene).unwrap();
+        let (status, said) = farm(name, &[]);
+        assert!(
+            status == 2 && said.contains("a job script cannot hold this name"),
+            "{name:?}: {status} {said}"
+        );
+        for (option, value) in [("--folder", name.to_owned()), ("-o", format!("{name}.png"))] {
+            let (status, said) = farm("scene.pbrt", &[option, &value]);
+            assert!(
+                status == 2 && said.contains("a job script cannot hold this name"),
+                "{option} {name:?}: {said}"
+            );
+        }
+    }
+    for more in [&["--sbatch=--x\nrm -rf y"][..], &["--", "--camera", "a\nrm -rf y"]] {
+        let (status, said) = farm("scene.pbrt", more);
+        assert!(status == 2 && said.contains("a job script cannot hold this name"), "{more:?}: {said}");
+    }
+    assert_eq!(farm("-", &[]).0, 2);
+    // A dash before a name makes it no option of lumbre, sh or sbatch; quotes and dollars are letters like others.
+    for name in ["-x.pbrt", "it's $(touch x) \"a\" `b`.pbrt"] {
+        fs::write(folder.path(name), &scene).unwrap();
+        let (stem, path) = (name.strip_suffix(".pbrt").unwrap(), format!("./{name}"));
+        let (status, said) = farm(&path, &[&format!("-o={stem}.png"), &format!("--folder={stem}.farm")]);
+        assert_eq!(status, 0, "{said}");
+        for task in ["0", "1"] {
+            let mut command = Command::new(folder.path(&format!("{stem}.farm/render.sh")));
+            let out = command.env("SLURM_ARRAY_TASK_ID", task).output().unwrap();
+            assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        }
+        let out = Command::new(folder.path(&format!("{stem}.farm/merge.sh"))).output().unwrap();
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        assert!(folder.path(&format!("{stem}.png")).exists() && !folder.path("x").exists());
+        let submit = fs::read_to_string(folder.path(&format!("{stem}.farm/submit.sh"))).unwrap();
+        assert!(!submit.contains(" '-") && !submit.contains(" -x"), "{submit}");
+    }
+}
+
+#[test]
+fn only_scripts_and_pictures_of_lumbre_are_replaced() {
+    let folder = folder();
+    fs::create_dir(folder.path("scene.farm")).unwrap();
+    for name in ["render.sh", "merge.sh", "submit.sh"] {
+        folder.write(&format!("scene.farm/{name}"), "#!/bin/sh\necho mine\n");
+        refused(
+            &folder,
+            "farm slurm scene.pbrt --tasks 2",
+            2,
+            &format!("scene.farm/{name}: lumbre farm did not write"),
+        );
+        assert_eq!(bytes(&folder, &format!("scene.farm/{name}")), b"#!/bin/sh\necho mine\n");
+        assert_eq!(fs::read_dir(folder.path("scene.farm")).unwrap().count(), 1);
+        fs::remove_file(folder.path(&format!("scene.farm/{name}"))).unwrap();
+    }
+    // A link is not followed to what is not there.
+    std::os::unix::fs::symlink(folder.path("elsewhere"), folder.path("scene.farm/merge.sh")).unwrap();
+    refused(&folder, "farm slurm scene.pbrt --tasks 2", 2, "lumbre farm did not write");
+    fs::remove_file(folder.path("scene.farm/merge.sh")).unwrap();
+    done(&folder, "farm slurm scene.pbrt --tasks 2");
+    done(&folder, "farm slurm scene.pbrt --tasks 3");
+    folder.write("scene.exr", "mine");
+    refused(
+        &folder,
+        "farm slurm scene.pbrt --tasks 2",
+        2,
+        "scene.exr is there, and not known to be Lumbre's",
+    );
+    done(&folder, "farm slurm scene.pbrt --tasks 2 -o other.exr");
 }

@@ -156,6 +156,35 @@ fn a_full_disk_leaves_the_old_picture_and_keeps_the_pixels_elsewhere() {
 }
 
 #[test]
+fn a_full_disk_is_a_failure_of_files_for_whatever_is_written() {
+    let folder = folder();
+    done(&folder, "render scene.pbrt --size 64x48 --samples 0..2 -q -o a.part");
+    done(&folder, "render scene.pbrt --size 64x48 --spp 2 -q -o b.exr");
+    let rays: String = (0..2000).map(|i| format!("0,-6,{},0,1,0\n", f64::from(i) / 1000.0)).collect();
+    folder.write("rays.csv", &format!("ox,oy,oz,dx,dy,dz\n{rays}"));
+    let Some(_mount) = Mount::new(&folder.path("full"), "size=8k") else {
+        println!("skipped: no file system may be mounted");
+        return;
+    };
+    for command in [
+        "merge a.part -o full/a.pfm",
+        "merge a.part -o full/a.part",
+        "view scene.pbrt --size 64x48 --spp 2 --export full/page",
+        "cast scene.pbrt --rays rays.csv -o full/hits.csv",
+        "diff b.exr b.exr -o full/d.pfm",
+        "render scene.pbrt --size 64x48 --spp 2 -o full/a.pfm --no-checkpoint",
+        "render scene.pbrt --size 64x48 --spp 2 -o c.pfm --stats /dev/full",
+        "info scene.pbrt",
+    ] {
+        let arguments: Vec<&str> = command.split_whitespace().collect();
+        let mut command_line = folder.command(&arguments);
+        let full = fs::File::options().write(true).open("/dev/full").unwrap();
+        let (status, said) = answer(command_line.stdout(full).output().unwrap());
+        assert!(status == 4 && said.contains("No space left"), "{command}: {status} {said}");
+    }
+}
+
+#[test]
 fn a_disk_that_takes_nothing_is_found_out_before_rendering() {
     let folder = folder();
     let Some(mount) = Mount::new(&folder.path("fixed"), "size=1m") else {

@@ -12,6 +12,8 @@ mod habits;
 mod limits;
 mod malformed;
 mod math;
+mod messages;
+mod pages;
 mod parts;
 mod program;
 mod slurm;

@@ -44,6 +44,19 @@ pub(crate) fn done(folder: &Folder, arguments: &str) {
     assert_eq!(status, 0, "{arguments}: {said}");
 }
 
+/// Waits until a checkpoint is there that has a sample of every pixel.
+pub(crate) fn until_sampled(folder: &Folder, name: &str) {
+    let start = Instant::now();
+    let is_sampled = || {
+        let part = lumbre::Part::open(&folder.path(name), |_| u64::MAX);
+        part.is_ok_and(|part| part.state.least_samples() > 0)
+    };
+    while !is_sampled() {
+        assert!(start.elapsed() < Duration::from_secs(60), "{name} does not come");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
 /// It fails with this status, and says this.
 pub(crate) fn refused(folder: &Folder, arguments: &str, status: i32, why: &str) {
     let (found, said) = run(folder, arguments);
@@ -159,7 +172,9 @@ fn what_is_missing_doubled_foreign_or_damaged_is_refused_by_name() {
         "another render than a.part: they differ in seed: 0, 4",
     );
     refused(&folder, "merge a.part scene.pbrt -o x.exr", 3, "scene.pbrt: it is no part of a render");
-    refused(&folder, "merge a.part nothing.part -o x.exr", 3, "nothing.part: cannot read");
+    refused(&folder, "merge a.part nothing.part -o x.exr", 4, "nothing.part: cannot read");
+    fs::create_dir(folder.path("parts")).unwrap();
+    refused(&folder, "merge parts -o x.exr", 4, "parts: cannot read: it is a folder");
     refused(&folder, "merge a.part b.part -o a.part", 2, "a.part: it is an input");
     refused(
         &folder,
@@ -196,6 +211,105 @@ fn what_is_missing_doubled_foreign_or_damaged_is_refused_by_name() {
         about
     };
     assert!(about.contains("samples    3..5 of pixels 0,0,33,21"), "{about}");
+}
+
+#[test]
+fn parts_that_are_shown_in_two_ways_are_merged_in_the_one_that_is_asked_for() {
+    let folder = folder();
+    done(&folder, "render scene.pbrt -q -o a.part --samples 0..2 --exposure 1.5 --tonemap agx");
+    done(&folder, "render scene.pbrt -q -o b.part --samples 2..4");
+    let asked = "--exposure 1.5 --tonemap agx";
+    done(&folder, &format!("render scene.pbrt -q -o whole.png --spp 4 {asked}"));
+    for parts in ["a.part b.part", "b.part a.part"] {
+        refused(&folder, &format!("merge {parts} -o x.png"), 2, "expected --exposure EV");
+        refused(&folder, &format!("merge {parts} -o x.part"), 2, "expected --tonemap NAME");
+        refused(&folder, &format!("merge {parts} -o x.png --exposure 1.5"), 2, "tone map");
+        done(&folder, &format!("merge {parts} -o x.png {asked}"));
+        assert_eq!(bytes(&folder, "x.png"), bytes(&folder, "whole.png"), "{parts}");
+        fs::remove_file(folder.path("x.png")).unwrap();
+    }
+    // Those of one way are shown in another one when that is asked for.
+    done(&folder, "render scene.pbrt -q -o c.part --samples 0..2");
+    done(&folder, &format!("merge c.part b.part -o x.png {asked}"));
+    assert_eq!(bytes(&folder, "x.png"), bytes(&folder, "whole.png"));
+}
+
+/// A part whose head is true to the form, and whose planes are all zeros, which take no bytes: of a picture of this size.
+fn forged(folder: &Folder, (width, height): (u32, u32)) -> Vec<u8> {
+    done(folder, "render scene.pbrt -q -o small.part --samples 0..1 --size 20x14");
+    let mut part = lumbre::Part::open(&folder.path("small.part"), |_| u64::MAX).unwrap();
+    part.job.size = (width, height);
+    let whole = part.to_bytes();
+    let start = 14 + 8 + u64::from_le_bytes(whole[14..22].try_into().unwrap()) as usize;
+    // Corners, flags, one piece, no dropped samples, counts of rays and the rest: then the planes.
+    let head = &whole[start..start + 16 + 12 + 4 + 24 + 4 + 40];
+    assert_eq!(head[..16], [0u32, 0, 20, 14].map(u32::to_le_bytes).concat());
+    let sealed = |head: &[u8], planes: usize| {
+        let mut bytes = [&whole[..start], head, &vec![0; planes]].concat();
+        let checksum = blake3::hash(&bytes);
+        bytes.extend(checksum.as_bytes());
+        bytes
+    };
+    let planes = (0..99).find(|&planes| lumbre::Part::from_bytes(&sealed(head, planes), u64::MAX).is_ok());
+    let mut head = head.to_vec();
+    head[8..12].copy_from_slice(&width.to_le_bytes());
+    head[12..16].copy_from_slice(&height.to_le_bytes());
+    sealed(&head, planes.expect("as many planes as there are sums"))
+}
+
+#[test]
+fn a_part_that_claims_much_memory_is_refused_by_its_size_before_it_is_read() {
+    let folder = folder();
+    for size in [(1000, 1000), (7000, 7000), (20_000, 20_000)] {
+        let bytes = forged(&folder, size);
+        assert!(bytes.len() < 4096, "{}", bytes.len());
+        fs::write(folder.path("forged.part"), bytes).unwrap();
+        for command in [
+            "merge forged.part -o x.exr",
+            "info forged.part",
+            "render scene.pbrt -o x.exr --checkpoint forged.part --resume",
+        ] {
+            let (status, said) = run(&folder, command);
+            assert!(
+                status == 5 && said.contains("--max-memory") && !said.contains("damaged"),
+                "{command}: {status} {said}"
+            );
+        }
+    }
+    // Who lets it take as much has it read: it has no samples.
+    let small = forged(&folder, (1000, 1000));
+    fs::write(folder.path("forged.part"), small).unwrap();
+    refused(&folder, "merge forged.part -o x.exr --max-memory 1G", 3, "unfinished");
+    // And what claims pixels outside of its picture is damaged.
+    let mut part = lumbre::Part::open(&folder.path("small.part"), |_| u64::MAX).unwrap();
+    part.job.size = (19, 14);
+    part.save(&folder.path("narrow.part")).unwrap();
+    refused(&folder, "merge narrow.part -o x.exr", 3, "its pixels are not those of its picture");
+}
+
+#[test]
+fn what_a_part_says_of_itself_is_told_in_words_and_drives_no_terminal() {
+    let folder = folder();
+    done(&folder, "render scene.pbrt -q -o a.part --samples 0..1 --lenient --eye 1,-6,2.5 --background #fa0");
+    let mut part = lumbre::Part::open(&folder.path("a.part"), |_| u64::MAX).unwrap();
+    let told =
+        |arguments: &[&str]| String::from_utf8(folder.command(arguments).output().unwrap().stdout).unwrap();
+    let about = told(&["info", "a.part"]);
+    for debug in ["Some(", "None", " {", "Path", "DVec3", "_"] {
+        assert!(!about.contains(debug), "{debug}: {about}");
+    }
+    assert!(about.contains("integrator: kind path regularize false, max depth 5"), "{about}");
+    assert!(about.contains("eye dvec3 1.0, -6.0, 2.5"), "{about}");
+    part.job
+        .identity
+        .insert("a\x1b[2J\n  taken 7 of 7".to_owned(), "\x1b]0;x\x07\u{9b}31m\u{202e}\n  b".to_owned());
+    part.save(&folder.path("a.part")).unwrap();
+    for arguments in [&["info", "a.part"][..], &["info", "a.part", "--json"]] {
+        let about = told(arguments);
+        let is_plain = |c: char| c == '\n' || !(c.is_control() || c == '\u{202e}');
+        assert!(about.chars().all(is_plain) && about.contains("taken 7 of 7"), "{about:?}");
+        assert!(!about.lines().any(|line| line.trim_start().starts_with("taken 7")), "{about}");
+    }
 }
 
 #[test]
@@ -271,14 +385,14 @@ mod interrupted {
             let _ = child.wait().unwrap();
             let path = folder.path("ck");
             if path.exists() {
-                let taken = lumbre::Part::open(&path, u64::MAX).unwrap().state.taken();
+                let taken = lumbre::Part::open(&path, |_| u64::MAX).unwrap().state.taken();
                 assert!(taken >= held, "{taken} {held}");
                 held = taken;
             }
         }
         assert!(held > 0, "it never kept anything");
         // As many samples as the killed runs came to and a few more: the rest is rendered by one run.
-        let most = lumbre::Part::open(&folder.path("ck"), u64::MAX).unwrap().state.most_samples();
+        let most = lumbre::Part::open(&folder.path("ck"), |_| u64::MAX).unwrap().state.most_samples();
         refused(
             &folder,
             &format!("{} -o a.exr --checkpoint ck --resume", RENDER.replace("4000", "1")),
@@ -298,7 +412,7 @@ mod interrupted {
         let render = format!("{RENDER} -o out/a.exr --checkpoint ck");
         let arguments: Vec<&str> = render.split_whitespace().collect();
         let child = folder.command(&arguments).stderr(Stdio::piped()).spawn().unwrap();
-        until_there(&folder, "ck");
+        until_sampled(&folder, "ck");
         fs::remove_dir(folder.path("out")).unwrap();
         signal(child.id(), "INT");
         let (status, said) = answer(child.wait_with_output().unwrap());
@@ -306,7 +420,7 @@ mod interrupted {
             status == 4 && said.contains("what was rendered is kept in ./a.exr.rescued.0.part"),
             "{status} {said}"
         );
-        let part = lumbre::Part::open(&folder.path("a.exr.rescued.0.part"), u64::MAX).unwrap();
+        let part = lumbre::Part::open(&folder.path("a.exr.rescued.0.part"), |_| u64::MAX).unwrap();
         assert!(part.state.least_samples() > 0);
     }
 
@@ -317,7 +431,7 @@ mod interrupted {
         let render = format!("{RENDER} -o a.exr --checkpoint out/ck");
         let arguments: Vec<&str> = render.split_whitespace().collect();
         let child = folder.command(&arguments).stderr(Stdio::piped()).spawn().unwrap();
-        until_there(&folder, "out/ck");
+        until_sampled(&folder, "out/ck");
         // A checkpoint may be written while the folder is emptied.
         while folder.path("out").exists() {
             let _ = fs::remove_dir_all(folder.path("out"));
@@ -332,7 +446,55 @@ mod interrupted {
     }
 
     #[test]
-    fn a_second_run_on_the_same_checkpoint_is_refused() {
+    fn pipes_devices_and_files_of_the_system_are_not_waited_for() {
+        let folder = folder();
+        for name in ["pipe.pbrt", "pipe.part", "pipe.ply", "out.exr.checkpoint"] {
+            assert!(std::process::Command::new("mkfifo").arg(folder.path(name)).status().unwrap().success());
+        }
+        folder.write("names.pbrt", "WorldBegin Shape \"plymesh\" \"string filename\" \"pipe.ply\"");
+        for (arguments, why) in [
+            ("render pipe.pbrt -o a.png", "it is not a regular file"),
+            (
+                "render names.pbrt -o a.png",
+                "names.pbrt:1:28: cannot read \"pipe.ply\": it is not a regular file",
+            ),
+            ("info pipe.pbrt", "it is not a regular file"),
+            ("merge pipe.part -o a.png", "it is not a regular file"),
+            ("merge /dev/zero -o a.png", "it is not a regular file"),
+            #[cfg(target_os = "linux")]
+            ("merge /proc/self/pagemap -o a.png", "of the system's own"),
+            #[cfg(target_os = "linux")]
+            ("render /proc/self/environ --input-format pbrt -o a.png", "of the system's own"),
+            (
+                "render scene.pbrt -o a.png --checkpoint pipe.part",
+                "it is not a regular file, as a checkpoint is",
+            ),
+            (
+                "render scene.pbrt -o a.png --checkpoint /dev/null --resume",
+                "it is not a regular file, as a checkpoint is",
+            ),
+            ("render scene.pbrt -o a.png --checkpoint .", "it is not a regular file, as a checkpoint is"),
+            ("render scene.pbrt -o a.png --stats pipe.ply", "nobody reads from this pipe"),
+        ] {
+            // What a scene names is an error of the scene.
+            let status = if arguments.contains("names") { 3 } else { 4 };
+            refused(&folder, arguments, status, why);
+        }
+        // Its name for a checkpoint is taken: it keeps none, and renders.
+        done(&folder, "render scene.pbrt -q -o out.exr --spp 2");
+        // One who reads gets the statistics.
+        let reader = std::process::Command::new("cat")
+            .arg(folder.path("pipe.ply"))
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        while run(&folder, "render scene.pbrt -q -o b.png --spp 2 --stats pipe.ply").0 != 0 {}
+        let read = reader.wait_with_output().unwrap().stdout;
+        assert!(serde_json::from_slice::<serde_json::Value>(&read).unwrap()["seconds"].is_object());
+    }
+
+    #[test]
+    fn a_second_run_on_the_same_checkpoint_is_refused_by_whatever_name() {
         let folder = folder();
         let arguments: Vec<&str> =
             RENDER.split_whitespace().chain(["-o", "a.exr", "--checkpoint", "ck"]).collect();
@@ -344,6 +506,13 @@ mod interrupted {
             2,
             "another run writes this checkpoint",
         );
+        fs::create_dir(folder.path("sub")).unwrap();
+        std::os::unix::fs::symlink(folder.path("."), folder.path("sub/here")).unwrap();
+        std::os::unix::fs::symlink("ck", folder.path("link")).unwrap();
+        for name in ["./ck", "sub/../ck", "sub/here/ck", "link", "sub/here/link"] {
+            let again = format!("{RENDER} -o b.exr --checkpoint {name} --resume");
+            refused(&folder, &again, 2, "another run writes this checkpoint");
+        }
         signal(first.id(), "TERM");
         assert_eq!(first.wait().unwrap().code(), Some(143));
         refused(

@@ -187,3 +187,62 @@ fn progress_goes_by_whichever_limit_comes_first() {
         assert!(count > 0 || arguments[0] == "--spp", "{arguments:?}: {said}");
     }
 }
+
+#[test]
+fn every_signal_that_asks_for_an_end_keeps_the_picture_and_the_checkpoint() {
+    let folder = Folder::new();
+    room(&folder, (8, 6), 5);
+    let arguments = [
+        "render",
+        "room.pbrt",
+        "-o",
+        "a.png",
+        "--progress",
+        "none",
+        "--checkpoint",
+        "ck",
+        "--checkpoint-every",
+        "20ms",
+    ];
+    // Those that come more than once end it no earlier.
+    for (name, status, times) in
+        [("HUP", 129, 3), ("QUIT", 131, 1), ("USR1", 138, 3), ("XCPU", 152, 3), ("TERM", 143, 1)]
+    {
+        for file in ["a.png", "ck"] {
+            let _ = fs::remove_file(folder.path(file));
+        }
+        let child = start(&folder, &arguments);
+        crate::parts::until_sampled(&folder, "ck");
+        for _ in 0..times {
+            let _ = Command::new("kill")
+                .args([format!("-{name}"), child.id().to_string()])
+                .stderr(Stdio::null())
+                .status();
+        }
+        let (code, said) = end_of(child);
+        assert_eq!(code, status, "{name}: {said}");
+        assert_eq!(folder.names(), ["a.png", "ck", "room.pbrt"], "{name}: {said}");
+        assert!(lumbre::read_image(&folder.path("a.png")).is_ok());
+        let part = lumbre::Part::open(&folder.path("ck"), |_| u64::MAX).unwrap();
+        assert!(part.state.least_samples() > 0, "{name}");
+    }
+    fs::remove_file(folder.path("ck")).unwrap();
+    // nohup has it ignore SIGHUP, which it does.
+    let program = env!("CARGO_BIN_EXE_lumbre");
+    let mut command = Command::new("sh");
+    command
+        .args(["-c", "trap '' HUP; exec \"$@\"", "sh", program])
+        .args(arguments)
+        .current_dir(folder.path(""));
+    let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    crate::parts::until_sampled(&folder, "ck");
+    signal(&child, "HUP");
+    let before = fs::metadata(folder.path("ck")).unwrap().modified().unwrap();
+    let start = Instant::now();
+    while fs::metadata(folder.path("ck")).unwrap().modified().unwrap() == before {
+        assert!(start.elapsed() < Duration::from_secs(60), "it does not go on");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    signal(&child, "TERM");
+    assert_eq!(end_of(child).0, 143);
+}

@@ -104,12 +104,26 @@ pub struct Budget {
     elements: AtomicU64,
     files: AtomicU64,
     paths: Mutex<Vec<PathBuf>>,
+    /// The files that may be opened; `None` for any.
+    only: Option<Vec<PathBuf>>,
 }
 
 impl Budget {
     /// A budget with nothing spent.
     pub fn new(limits: Limits) -> Self {
         Self { limits, ..Self::default() }
+    }
+
+    /// Lets no file be opened but these, each by the name that is given here: for a scene from a stranger, who could name any file of
+    /// its reader as a texture or a buffer.
+    #[must_use]
+    pub fn only(self, files: impl IntoIterator<Item = PathBuf>) -> Self {
+        Self { only: Some(files.into_iter().collect()), ..self }
+    }
+
+    /// Whether the file of this name may be opened.
+    pub fn allows(&self, path: &Path) -> bool {
+        self.only.as_ref().is_none_or(|only| only.iter().any(|known| known == path))
     }
 
     /// Its limits.

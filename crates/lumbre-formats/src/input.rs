@@ -25,11 +25,16 @@ impl<'b> Input<'b> {
     /// decompressed.
     ///
     /// # Errors
-    /// [`FormatError::Io`] when the system refuses or `path` is not a regular file (a folder, a pipe, a
-    /// device), [`FormatError::Limit`] when the budget is exceeded, and [`FormatError::Input`] when gzip data
+    /// [`FormatError::Io`] when the system refuses, `path` is not a regular file (a folder, a pipe, a
+    /// device) or the budget does not let it be opened ([`Budget::only`]), [`FormatError::Limit`] when the budget is exceeded, and [`FormatError::Input`] when gzip data
     /// is damaged.
     pub fn open(path: &Path, budget: &'b Budget) -> Result<Self, FormatError> {
         let name: Arc<str> = path.display().to_string().into();
+        if !budget.allows(path) {
+            let alone =
+                io::Error::new(io::ErrorKind::PermissionDenied, "the scene may use no files but its own");
+            return Err(FormatError::io(path, "cannot read", alone));
+        }
         budget.path(path)?;
         let (file, size) = open_regular(path)?;
         let mut bytes = Vec::new();
@@ -133,8 +138,11 @@ impl Deref for Input<'_> {
     }
 }
 
-/// Opens a regular file, and answers its size too.
-pub(crate) fn open_regular(path: &Path) -> Result<(File, u64), FormatError> {
+/// Opens a regular file for reading, and returns its size too. It asks what the file is before it opens it, and never waits.
+///
+/// # Errors
+/// [`FormatError::Io`] when the system refuses, and for folders, pipes, devices and the files of `/proc` and `/sys`, which need not end.
+pub fn open_regular(path: &Path) -> Result<(File, u64), FormatError> {
     let refuse = |action, source| FormatError::io(path, action, source);
     let not_regular = |kind: std::fs::FileType| {
         let what = if kind.is_dir() { "it is a folder" } else { "it is not a regular file" };
@@ -145,6 +153,12 @@ pub(crate) fn open_regular(path: &Path) -> Result<(File, u64), FormatError> {
     let before = std::fs::metadata(path).map_err(|e| refuse("cannot open", e))?;
     if !before.is_file() {
         return Err(not_regular(before.file_type()));
+    }
+    // By its real name: a link in /proc may lead to an ordinary file.
+    let real = std::fs::canonicalize(path).map_err(|e| refuse("cannot open", e))?;
+    if cfg!(target_os = "linux") && (real.starts_with("/proc") || real.starts_with("/sys")) {
+        let what = "it is a file of the system's own (/proc, /sys)";
+        return Err(refuse("cannot read", io::Error::new(io::ErrorKind::InvalidInput, what)));
     }
     let mut how = OpenOptions::new();
     how.read(true);
@@ -376,6 +390,10 @@ pub(crate) mod tests {
         let cases = [
             (dir.path().to_owned(), "it is a folder"),
             ("/dev/zero".into(), "it is not a regular file"),
+            #[cfg(target_os = "linux")]
+            ("/proc/self/pagemap".into(), "it is a file of the system's own"),
+            #[cfg(target_os = "linux")]
+            ("/proc/self/status".into(), "it is a file of the system's own"),
             (dir.path().join("absent.ply"), "cannot open"),
             ("$HOME/.profile".into(), "cannot open"),
         ];
@@ -384,6 +402,26 @@ pub(crate) mod tests {
             assert!(matches!(error, FormatError::Io { .. }));
             assert!(error.to_string().contains(expected), "{error}");
         }
+    }
+
+    #[test]
+    fn a_budget_of_some_files_lets_no_other_be_opened() {
+        let dir = tempfile::tempdir().unwrap();
+        let (own, other) = (dir.path().join("own.bin"), dir.path().join("other.bin"));
+        for path in [&own, &other] {
+            std::fs::write(path, b"bytes").unwrap();
+        }
+        let budget = Budget::default().only([own.clone()]);
+        assert_eq!(&*Input::open(&own, &budget).unwrap(), b"bytes");
+        for path in [&other, &dir.path().join("absent.bin")] {
+            let error = Input::open(path, &budget).unwrap_err();
+            assert!(
+                error.to_string().contains("no files but its own"),
+                "whether it is there does not show: {error}"
+            );
+        }
+        // No one looks at them later, either.
+        assert_eq!(budget.paths(), [own]);
     }
 
     #[cfg(unix)]

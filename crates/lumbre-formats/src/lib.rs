@@ -28,7 +28,7 @@ mod unseen;
 pub use atomic::{abandon_writes, atomic_write, atomic_write_seek, probe_writable};
 pub use budget::{Budget, BudgetVec, Hold, LimitError, LimitKind, Limits};
 pub use diagnostic::{Diagnostic, Diagnostics, FormatError, Place, Position, Severity, Strictness};
-pub use input::Input;
+pub use input::{Input, open_regular};
 pub use input_stream::InputStream;
 pub use open::{ReadOptions, SceneFormat, open_scene, open_scenes};
 pub use thin::Thin;

@@ -30,6 +30,8 @@ pub struct ReadOptions {
     pub animation: Option<String>,
     /// The material variant of a glTF.
     pub variant: Option<String>,
+    /// Whether the scene may use no other files than those that are named: for a scene from a stranger.
+    pub is_alone: bool,
 }
 
 /// The supported scene formats.
@@ -134,7 +136,10 @@ pub fn open_scenes(
     paths: &[impl AsRef<Path>],
     options: &ReadOptions,
 ) -> Result<(SceneDesc, Diagnostics), FormatError> {
-    let budget = Budget::new(options.limits);
+    let mut budget = Budget::new(options.limits);
+    if options.is_alone {
+        budget = budget.only(paths.iter().map(|path| path.as_ref().to_owned()));
+    }
     let mut diagnostics = Diagnostics::with_strictness(options.strictness);
     let mut groups: Vec<Vec<Source>> = Vec::with_capacity(paths.len());
     for path in paths {

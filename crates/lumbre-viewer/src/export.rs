@@ -1,34 +1,36 @@
 //! The page at rest: the picture with its channels, what is at its pixels, and the facts of the scene, as files that need no viewer.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::Path;
 
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use lumbre::description::IntegratorKind;
-use lumbre::formats::atomic_write;
 use lumbre::formats::image::{ImageFormat, encode_image};
+use lumbre::formats::{atomic_write, open_regular};
 use lumbre::image::{Encoded, Image, f32_to_half};
-use lumbre::{CancelToken, NoProgress, Stop};
+use lumbre::{CancelToken, ErrorKind, NoProgress, Stop};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use crate::base64::base64;
 use crate::frame::{Channel, Frame, HEADER, Look, Pixels, Shot};
 use crate::page::FILES;
-use crate::source::{Built, Moment, Source};
+use crate::source::{Built, Moment, Source, SourceError};
 use crate::stage::{Stage, ray};
 
 /// Samples a pixel of channels other than the picture.
 const FEATURE_SPP: u32 = 16;
 
 /// Renders a scene and writes a page of it into a folder, which is made where it is not there: `index.html` opens from a file, and the
-/// folder can be sent or put on a web server. `cancel` ends the render early, and the page has what was rendered.
+/// folder can be sent or put on a web server. `cancel` ends the render early, and the page has what was rendered. Files of an earlier page
+/// are replaced, and no others.
 ///
 /// # Errors
-/// What is wrong with the scene, and what cannot be written.
-pub fn export(source: &dyn Source, folder: &Path, cancel: &CancelToken) -> Result<(), String> {
+/// What is wrong with the scene, what cannot be written, and which file stands in the way: before anything is read.
+pub fn export(source: &dyn Source, folder: &Path, cancel: &CancelToken) -> Result<(), SourceError> {
+    refuse_foreign(folder)?;
     let read = source.read(&Moment::default())?;
     // Nobody is there to tell more than what is in the page.
     let built = Built { explain: None, ..source.build(read.desc.clone())? };
@@ -38,21 +40,21 @@ pub fn export(source: &dyn Source, folder: &Path, cancel: &CancelToken) -> Resul
     let mut options = stage.options.clone();
     options.guides = stage.denoise;
     let full = (options.width, options.height);
-    let (mut picture, _) =
-        scene.render_from(&options, &NoProgress, cancel, None, None).map_err(|e| e.to_string())?;
+    source.check(&options)?;
+    let (mut picture, _) = scene.render_from(&options, &NoProgress, cancel, None, None)?;
     let stats = picture.stats().clone();
     if stats.spp == 0 {
-        return Err("not every pixel had a sample: nothing was written".to_owned());
+        return Err(wrong(ErrorKind::Limit, "not every pixel had a sample: nothing was written"));
     }
     if stage.denoise {
-        picture.denoise(options.threads).map_err(|e| e.to_string())?;
+        picture.denoise(options.threads)?;
     }
     let values = packed(picture.image())?;
     let picture = match &stage.background {
         Some(background) => picture.over(background.clone()),
         None => picture,
     };
-    let png = picture.encode(ImageFormat::Png, &look.save, &[]).map_err(|e| e.to_string())?;
+    let png = picture.encode(ImageFormat::Png, &look.save, &[])?;
     let mut channels =
         vec![json!({ "name": Channel::Beauty, "png": base64(&png), "values": base64(&values) })];
     for (channel, kind) in [
@@ -65,7 +67,7 @@ pub fn export(source: &dyn Source, folder: &Path, cancel: &CancelToken) -> Resul
         (options.integrator.kind, options.transparent, options.guides) = (kind, false, false);
         options.exposure = lumbre::RenderOptions::default().exposure;
         options.stop = Stop::at(FEATURE_SPP);
-        let picture = scene.render(&options).map_err(|e| e.to_string())?;
+        let picture = scene.render(&options)?;
         let values =
             if channel == Channel::Depth { base64(&packed(picture.image())?) } else { String::new() };
         let pixels = Pixels::Rendered(Box::new(picture));
@@ -87,47 +89,88 @@ pub fn export(source: &dyn Source, folder: &Path, cancel: &CancelToken) -> Resul
     write(folder, &data)
 }
 
-fn write(folder: &Path, data: &Value) -> Result<(), String> {
-    std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    let save = |name: &str, bytes: &[u8]| {
-        atomic_write(&folder.join(name), |file: &mut dyn Write| file.write_all(bytes))
-            .map_err(|e| e.to_string())
+fn wrong(kind: ErrorKind, message: impl Into<String>) -> SourceError {
+    SourceError { kind, message: message.into() }
+}
+
+/// What every file of the page has near its beginning, by which it is known again.
+const MARK: &str = "Written by lumbre view --export, which replaces it.";
+const DATA: &str = "data.js";
+const INDEX: &str = "index.html";
+
+/// The names of all files of the page.
+fn names() -> impl Iterator<Item = &'static str> {
+    let pages =
+        FILES.iter().map(|file| if file.path == "/" { INDEX } else { file.path.trim_start_matches('/') });
+    std::iter::once(DATA).chain(pages)
+}
+
+/// Refuses a folder in which something else stands in the place of a file of the page.
+fn refuse_foreign(folder: &Path) -> Result<(), SourceError> {
+    for path in names().map(|name| folder.join(name)) {
+        if std::fs::symlink_metadata(&path).is_err() {
+            continue;
+        }
+        let mut start = Vec::new();
+        let read = open_regular(&path).map(|(file, _)| file.take(1000).read_to_end(&mut start));
+        let has_mark = start.windows(MARK.len()).any(|here| here == MARK.as_bytes());
+        if !(read.is_ok() && has_mark) {
+            let why = "is no file of an earlier page (expected another folder, or that it is removed)";
+            return Err(wrong(ErrorKind::Options, format!("{}: it {why}", path.display())));
+        }
+    }
+    Ok(())
+}
+
+fn write(folder: &Path, data: &Value) -> Result<(), SourceError> {
+    std::fs::create_dir_all(folder)
+        .map_err(|e| wrong(ErrorKind::Io, format!("{}: {e}", folder.display())))?;
+    // Something may have come meanwhile.
+    refuse_foreign(folder)?;
+    let save = |name: &str, text: &str| {
+        let text = match name.rsplit_once('.') {
+            Some((_, "html")) => text.replacen("<html", &format!("<!-- {MARK} -->\n<html"), 1),
+            Some((_, "svg")) => text.replacen("<svg", &format!("<!-- {MARK} -->\n<svg"), 1),
+            _ => format!("/* {MARK} */\n{text}"),
+        };
+        atomic_write(&folder.join(name), |file: &mut dyn Write| file.write_all(text.as_bytes()))
+            .map_err(|e| SourceError::from(lumbre::Error::from(e)))
     };
-    save("data.js", format!("globalThis.lumbreAtRest = {data};\n").as_bytes())?;
-    for file in FILES {
-        match file.path {
-            "/" => {
-                let page = String::from_utf8_lossy(file.bytes);
-                let script = "<script src=\"viewer.js\"></script>";
-                let page = page.replace(script, &format!("<script src=\"data.js\"></script>\n{script}"));
-                save("index.html", page.as_bytes())?;
-            }
-            path => save(path.trim_start_matches('/'), file.bytes)?,
+    save(DATA, &format!("globalThis.lumbreAtRest = {data};\n"))?;
+    for (file, name) in FILES.iter().zip(names().skip(1)) {
+        let text = String::from_utf8_lossy(file.bytes);
+        if name == INDEX {
+            let script = "<script src=\"viewer.js\"></script>";
+            save(name, &text.replace(script, &format!("<script src=\"{DATA}\"></script>\n{script}")))?;
+        } else {
+            save(name, &text)?;
         }
     }
     Ok(())
 }
 
 /// A shot as a PNG that shows what its frame shows.
-fn shown(shot: &Shot, look: &Look) -> Result<Vec<u8>, String> {
+fn shown(shot: &Shot, look: &Look) -> Result<Vec<u8>, SourceError> {
     let Frame(bytes) = Frame::new(shot, look);
     let unit = |byte: u8| f32::from(byte) / 255.0;
     let light = |rgba: &[u8]| Encoded::new(unit(rgba[0]), unit(rgba[1]), unit(rgba[2])).to_linear();
     let pixels = bytes[HEADER..].chunks_exact(4).map(light).collect();
     let (width, height) = (shot.image().width(), shot.image().height());
-    let image = Image::from_pixels(width, height, pixels).ok_or("a frame has a pixel too few")?;
-    encode_image(&image, ImageFormat::Png, &lumbre::SaveOptions::default()).map_err(|e| e.to_string())
+    let image = Image::from_pixels(width, height, pixels)
+        .ok_or_else(|| wrong(ErrorKind::Options, "a frame has a pixel too few"))?;
+    encode_image(&image, ImageFormat::Png, &lumbre::SaveOptions::default())
+        .map_err(|e| wrong(ErrorKind::Options, e.to_string()))
 }
 
 /// The numbers of an image in half precision.
-fn packed(image: &Image) -> Result<Vec<u8>, String> {
+fn packed(image: &Image) -> Result<Vec<u8>, SourceError> {
     let numbers = image.pixels().iter().flat_map(|pixel| pixel.to_array());
     compressed(numbers.map(|value| f32_to_half(value).to_le_bytes()))
 }
 
 /// What the rays through the middles of the pixels meet: for each pixel the place of the shape in a list, from 1, or 0 for nothing,
 /// and its distance.
-fn picks(stage: &Stage, camera: usize, (width, height): (u32, u32)) -> Result<Value, String> {
+fn picks(stage: &Stage, camera: usize, (width, height): (u32, u32)) -> Result<Value, SourceError> {
     let scene = stage.scene();
     let pixels = (0..height).into_par_iter().flat_map_iter(|y| (0..width).map(move |x| (x, y)));
     let met = pixels.map(|(x, y)| {
@@ -150,10 +193,10 @@ fn picks(stage: &Stage, camera: usize, (width, height): (u32, u32)) -> Result<Va
 }
 
 /// Numbers whose bytes begin with the least significant one, compressed.
-fn compressed<const N: usize>(numbers: impl Iterator<Item = [u8; N]>) -> Result<Vec<u8>, String> {
+fn compressed<const N: usize>(numbers: impl Iterator<Item = [u8; N]>) -> Result<Vec<u8>, SourceError> {
     let mut packed = ZlibEncoder::new(Vec::new(), Compression::default());
     for bytes in numbers {
-        packed.write_all(&bytes).map_err(|e| e.to_string())?;
+        packed.write_all(&bytes).map_err(|e| wrong(ErrorKind::Io, e.to_string()))?;
     }
-    packed.finish().map_err(|e| e.to_string())
+    packed.finish().map_err(|e| wrong(ErrorKind::Io, e.to_string()))
 }

@@ -1,12 +1,21 @@
-//! Who may talk to the viewer: exact lists of hosts and origins, a token that works once, and the cookie that it becomes.
+//! Who may talk to the viewer: exact lists of hosts and origins, and secrets that only the page and the viewer know.
+//!
+//! A browser sends cookies to every port of a host, so that there are none. The address that opens the viewer has a token behind its `#`,
+//! which browsers do not send; the page keeps what it becomes in the storage of its own origin, a port included. Over the socket neither
+//! is sent: each side proves to know it, by a keyed hash (BLAKE3) of random numbers of both. Whoever takes the port when the
+//! viewer has ended learns nothing of use from a page that comes back.
 
-use std::io::Write;
+use std::collections::VecDeque;
+use std::fs;
+use std::io::{Read, Write};
 use std::net::SocketAddr;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use hyper::HeaderMap;
-use hyper::header::{COOKIE, HOST, HeaderName, ORIGIN};
+use hyper::header::{HOST, HeaderName, ORIGIN};
+
+use crate::message::Errand;
 
 /// Why a request is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,20 +24,29 @@ pub(crate) enum Refusal {
     Host,
     /// The `Origin`, or what the browser says of where the request comes from.
     Origin,
-    /// There is no cookie of this viewer.
-    Session,
+}
+
+/// What a page that was let in hears.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Welcome {
+    /// The keyed hash of "viewer" and the numbers of both sides, by the secret that the page has proved to know.
+    pub proof: String,
+    /// The secret of the session, for who came with the token.
+    pub session: Option<String>,
 }
 
 /// The secrets and the names of a viewer.
-#[derive(Debug)]
 pub(crate) struct Guard {
     hosts: Vec<String>,
-    cookie_name: String,
-    session: String,
-    token: String,
-    token_is_used: AtomicBool,
+    session: Secret,
+    /// The token, until it was used.
+    token: Mutex<Option<Secret>>,
+    /// The oldest first.
+    tickets: Mutex<VecDeque<(Secret, Errand)>>,
 }
 
+/// Tickets that are not used yet; more push out the oldest.
+const MOST_TICKETS: usize = 64;
 const FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 
 impl Guard {
@@ -48,29 +66,18 @@ impl Guard {
             hosts.push(format!("localhost:{port}"));
         }
         hosts.extend(more_hosts.iter().map(|host| host.to_ascii_lowercase()));
-        // Browsers do not tell the cookies of two ports of one host apart.
-        let cookie_name = format!("lumbre-{port}");
         let session = match session_file {
             Some(path) => kept_secret(path)?,
-            None => secret()?,
+            None => Secret::new()?,
         };
-        let token = secret()?;
-        Ok(Self { hosts, cookie_name, session, token, token_is_used: AtomicBool::new(false) })
+        let token = Mutex::new(Some(Secret::new()?));
+        Ok(Self { hosts, session, token, tickets: Mutex::default() })
     }
 
     /// The path that opens the viewer, once.
     pub(crate) fn path(&self) -> String {
-        format!("/open/{}", self.token)
-    }
-
-    /// Takes the token; whether it is the right one, and was not taken before.
-    pub(crate) fn take(&self, token: &str) -> bool {
-        is_same(token, &self.token) && !self.token_is_used.swap(true, Ordering::SeqCst)
-    }
-
-    /// The header that makes the browser one of ours.
-    pub(crate) fn set_cookie(&self) -> String {
-        format!("{}={}; Path=/; HttpOnly; SameSite=Strict", self.cookie_name, self.session)
+        let token = self.token.lock().unwrap_or_else(PoisonError::into_inner);
+        token.as_ref().map_or_else(|| "/".to_owned(), |token| format!("/#{}", token.digits()))
     }
 
     /// Whether a request is for this host: against names that are made to point here.
@@ -95,12 +102,79 @@ impl Guard {
         }
     }
 
-    /// Whether a request has our cookie.
-    pub(crate) fn check_session(&self, headers: &HeaderMap) -> Result<(), Refusal> {
-        let cookies = headers.get_all(COOKIE).iter().filter_map(|value| value.to_str().ok());
-        let pairs = cookies.flat_map(|text| text.split(';')).filter_map(|pair| pair.trim().split_once('='));
-        let mut ours = pairs.filter(|(name, _)| *name == self.cookie_name);
-        if ours.any(|(_, value)| is_same(value, &self.session)) { Ok(()) } else { Err(Refusal::Session) }
+    /// Lets in who proves to know the token, which works once, or the secret of the session: by the keyed hash of "page", of our challenge
+    /// and of 32 random bytes of the page's, both as hexadecimal digits.
+    pub(crate) fn admit(&self, challenge: &Secret, nonce: &str, proof: &str) -> Option<Welcome> {
+        let page: Secret = nonce.parse().ok()?;
+        let asked = |key: &Secret| key.proof(b"page", challenge, &page);
+        let answered = |key: &Secret| key.proof(b"viewer", challenge, &page).digits();
+        if is_same(proof, &asked(&self.session).digits()) {
+            return Some(Welcome { proof: answered(&self.session), session: None });
+        }
+        let mut token = self.token.lock().unwrap_or_else(PoisonError::into_inner);
+        if !token.as_ref().is_some_and(|token| is_same(proof, &asked(token).digits())) {
+            return None;
+        }
+        let token = token.take()?;
+        Some(Welcome { proof: answered(&token), session: Some(self.session.digits()) })
+    }
+
+    /// An address for an errand, which works once.
+    pub(crate) fn ticket(&self, errand: Errand) -> Option<String> {
+        let ticket = Secret::new().ok()?;
+        let address = format!("/ticket/{}", ticket.digits());
+        let mut tickets = self.tickets.lock().unwrap_or_else(PoisonError::into_inner);
+        if tickets.len() >= MOST_TICKETS {
+            tickets.pop_front();
+        }
+        tickets.push_back((ticket, errand));
+        Some(address)
+    }
+
+    /// What a ticket is for, which is used by that.
+    pub(crate) fn redeem(&self, ticket: &str) -> Option<Errand> {
+        let mut tickets = self.tickets.lock().unwrap_or_else(PoisonError::into_inner);
+        let place = tickets.iter().position(|(known, _)| is_same(ticket, &known.digits()))?;
+        tickets.remove(place).map(|(_, errand)| errand)
+    }
+}
+
+/// 256 random bits.
+#[derive(Clone, PartialEq)]
+pub(crate) struct Secret([u8; 32]);
+
+impl Secret {
+    /// # Errors
+    /// Where the system gives no random bytes.
+    pub(crate) fn new() -> Result<Self, String> {
+        let mut bytes = [0; 32];
+        getrandom::fill(&mut bytes).map_err(|e| format!("the system gives no random numbers: {e}"))?;
+        Ok(Self(bytes))
+    }
+
+    pub(crate) fn digits(&self) -> String {
+        self.0.iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+
+    /// That `whose` side knows this secret. Of each random number its first 24 bytes are taken, so that all is one block of BLAKE3.
+    fn proof(&self, whose: &[u8], challenge: &Self, page: &Self) -> Self {
+        let text = [whose, &challenge.0[..24], &page.0[..24]].concat();
+        Self(*blake3::keyed_hash(&self.0, &text).as_bytes())
+    }
+}
+
+impl std::str::FromStr for Secret {
+    type Err = ();
+
+    fn from_str(digits: &str) -> Result<Self, ()> {
+        let mut bytes = [0; 32];
+        if digits.len() != 64 || !digits.bytes().all(|b| b.is_ascii_hexdigit()) {
+            return Err(());
+        }
+        for (byte, at) in bytes.iter_mut().zip((0..64).step_by(2)) {
+            *byte = u8::from_str_radix(&digits[at..at + 2], 16).map_err(|_| ())?;
+        }
+        Ok(Self(bytes))
     }
 }
 
@@ -117,78 +191,144 @@ fn is_same(guess: &str, secret: &str) -> bool {
     guess.len() == secret.len() && differences == 0
 }
 
-/// The secret that a file keeps, or a new one that it keeps from now on. A file that others could have written, or that holds
-/// something else, is replaced.
-fn kept_secret(path: &Path) -> Result<String, String> {
-    let kept = std::fs::symlink_metadata(path)
-        .ok()
-        .filter(is_private)
-        .and_then(|_| std::fs::read_to_string(path).ok());
-    if let Some(kept) =
-        kept.filter(|text| text.len() == SECRET_DIGITS && text.bytes().all(|b| b.is_ascii_hexdigit()))
-    {
-        return Ok(kept);
+/// The secret that a file keeps, or a new one that it keeps from now on, where its folder is the user's own and nobody else's. A file that
+/// another could have written or read, a link, or one that holds something else is replaced.
+fn kept_secret(path: &Path) -> Result<Secret, String> {
+    let new = Secret::new()?;
+    let Some(folder) = path.parent() else { return Ok(new) };
+    // A file of our own, mode 0600: it says which user we are, and takes the place of what is there without following it.
+    let Ok(mut file) = tempfile::Builder::new().prefix(".lumbre-view").tempfile_in(folder) else {
+        return Ok(new);
+    };
+    let Ok(own) = file.as_file().metadata() else { return Ok(new) };
+    if !fs::symlink_metadata(folder).is_ok_and(|meta| meta.is_dir() && is_private(&meta, &own)) {
+        return Ok(new);
     }
-    let new = secret()?;
+    // Nobody else can change what is in the folder, so that it is still the same when it is opened.
+    let is_ours = |meta: fs::Metadata| meta.is_file() && is_private(&meta, &own);
+    if fs::symlink_metadata(path).is_ok_and(is_ours) {
+        let mut text = String::new();
+        let read = fs::File::open(path).and_then(|file| file.take(65).read_to_string(&mut text));
+        if let (Ok(_), Ok(kept)) = (read, text.parse()) {
+            return Ok(kept);
+        }
+    }
     // Where it cannot be kept, the page is opened anew after a restart.
-    let _ = std::fs::remove_file(path);
-    let mut options = std::fs::OpenOptions::new();
-    options.write(true).create_new(true);
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-    let _ = options.open(path).and_then(|mut file| file.write_all(new.as_bytes()));
+    if file.write_all(new.digits().as_bytes()).is_ok() {
+        let _ = file.persist(path);
+    }
     Ok(new)
 }
 
-/// Whether it is a file that no one else may read or write.
-fn is_private(meta: &std::fs::Metadata) -> bool {
-    #[cfg(unix)]
-    let is_own = std::os::unix::fs::PermissionsExt::mode(&meta.permissions()) & 0o077 == 0;
-    #[cfg(not(unix))]
-    let is_own = true;
-    meta.is_file() && is_own
+/// Whether this belongs to the user that `own` belongs to, and no one else may read or write it.
+#[cfg(unix)]
+fn is_private(meta: &fs::Metadata, own: &fs::Metadata) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    meta.uid() == own.uid() && meta.mode() & 0o077 == 0
 }
 
-const SECRET_DIGITS: usize = 32;
-
-/// 128 random bits as hexadecimal digits.
-fn secret() -> Result<String, String> {
-    let mut bytes = [0; 16];
-    getrandom::fill(&mut bytes).map_err(|e| format!("the system gives no random numbers: {e}"))?;
-    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+/// Other systems say it in other ways, which are not asked.
+#[cfg(not(unix))]
+fn is_private(_: &fs::Metadata, _: &fs::Metadata) -> bool {
+    false
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_token_works_once_and_a_wrong_one_never() {
-        let guard = Guard::new("127.0.0.1:7777".parse().unwrap(), &[], None).unwrap();
-        let token = guard.path().strip_prefix("/open/").unwrap().to_owned();
-        assert_eq!(token.len(), 32);
-        assert!(!guard.take("") && !guard.take(&token[1..]) && !guard.take(&token.replace(|_| true, "0")));
-        assert!(guard.take(&token));
-        assert!(!guard.take(&token));
+    fn guard() -> Guard {
+        Guard::new("127.0.0.1:7777".parse().unwrap(), &[], None).unwrap()
+    }
+
+    /// What a page that knows this secret says to a challenge: its random number, and its proof.
+    fn hello(key: &Secret, challenge: &Secret) -> (Secret, String) {
+        let page = Secret::new().unwrap();
+        let proof = key.proof(b"page", challenge, &page).digits();
+        (page, proof)
     }
 
     #[test]
-    fn a_session_outlives_the_viewer_in_a_file_of_ones_own() {
+    fn a_token_works_once_the_session_always_and_anything_else_never() {
+        let guard = guard();
+        let token: Secret = guard.path().strip_prefix("/#").unwrap().parse().unwrap();
+        let challenge = Secret::new().unwrap();
+        for wrong in [Secret([0; 32]), challenge.clone(), Secret::new().unwrap()] {
+            let (page, proof) = hello(&wrong, &challenge);
+            assert!(guard.admit(&challenge, &page.digits(), &proof).is_none());
+        }
+        let (nonces, proofs) = (challenge.digits(), token.digits());
+        for (nonce, proof) in [("", ""), ("00", ""), (&*nonces, &*proofs)] {
+            assert!(guard.admit(&challenge, nonce, proof).is_none());
+        }
+        let (page, proof) = hello(&token, &challenge);
+        let welcome = guard.admit(&challenge, &page.digits(), &proof).expect("it is the token");
+        assert_eq!(welcome.proof, token.proof(b"viewer", &challenge, &page).digits());
+        assert!(guard.admit(&challenge, &page.digits(), &proof).is_none(), "a second time");
+        assert_eq!(guard.path(), "/");
+        let session: Secret = welcome.session.expect("the session").parse().unwrap();
+        for _ in 0..3 {
+            let challenge = Secret::new().unwrap();
+            let (page, proof) = hello(&session, &challenge);
+            let welcome = guard.admit(&challenge, &page.digits(), &proof).expect("it is the session");
+            assert_eq!(welcome.proof, session.proof(b"viewer", &challenge, &page).digits());
+            assert!(welcome.session.is_none(), "it is said once");
+            // What was overheard answers no other challenge.
+            assert!(guard.admit(&Secret::new().unwrap(), &page.digits(), &proof).is_none());
+        }
+    }
+
+    #[test]
+    fn a_ticket_is_for_one_errand_once() {
+        let guard = guard();
+        let errand = Errand::Picture { format: crate::message::FileFormat::Exr };
+        let address = guard.ticket(errand.clone()).unwrap();
+        let ticket = address.strip_prefix("/ticket/").unwrap();
+        assert!(guard.redeem("").is_none() && guard.redeem(&ticket[1..]).is_none());
+        assert_eq!(guard.redeem(ticket), Some(errand));
+        assert_eq!(guard.redeem(ticket), None);
+        let first = guard.ticket(Errand::Scene {}).unwrap();
+        for _ in 0..MOST_TICKETS {
+            guard.ticket(Errand::Scene {}).unwrap();
+        }
+        assert_eq!(guard.redeem(first.strip_prefix("/ticket/").unwrap()), None, "they are not kept for ever");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_session_outlives_the_viewer_in_a_file_of_the_users_own() {
+        use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
         let folder = tempfile::tempdir().unwrap();
+        let set = |path: &Path, mode| fs::set_permissions(path, fs::Permissions::from_mode(mode)).unwrap();
+        set(folder.path(), 0o700);
         let path = folder.path().join("session");
         let first = kept_secret(&path).unwrap();
-        assert_eq!(kept_secret(&path).unwrap(), first);
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o644)).unwrap();
-            let second = kept_secret(&path).unwrap();
-            assert_ne!(second, first, "others could have read it");
-            std::fs::rename(&path, folder.path().join("elsewhere")).unwrap();
-            std::os::unix::fs::symlink(folder.path().join("elsewhere"), &path).unwrap();
-            assert_ne!(kept_secret(&path).unwrap(), second, "it is not in this place");
+        assert!(kept_secret(&path).unwrap() == first);
+        let meta = fs::symlink_metadata(&path).unwrap();
+        assert_eq!((meta.mode() & 0o777, meta.is_file()), (0o600, true));
+        set(&path, 0o644);
+        let second = kept_secret(&path).unwrap();
+        assert!(second != first, "others could have read it");
+        // A link is not followed: neither read, nor written through.
+        let elsewhere = folder.path().join("elsewhere");
+        fs::rename(&path, &elsewhere).unwrap();
+        symlink(&elsewhere, &path).unwrap();
+        assert!(kept_secret(&path).unwrap() != second, "it is not in this place");
+        assert_eq!(fs::read_to_string(&elsewhere).unwrap(), second.digits());
+        assert!(fs::symlink_metadata(&path).unwrap().is_file());
+        for broken in ["short", &"x".repeat(64), &"0".repeat(65)] {
+            fs::write(&path, broken).unwrap();
+            assert!(kept_secret(&path).unwrap() == fs::read_to_string(&path).unwrap().parse().unwrap());
         }
-        std::fs::write(&path, "short").unwrap();
-        assert_eq!(kept_secret(&path).unwrap().len(), SECRET_DIGITS);
+        // Where others can come into the folder, or it is a link, nothing is kept.
+        let kept = kept_secret(&path).unwrap();
+        let link = folder.path().join("link");
+        symlink(folder.path(), &link).unwrap();
+        assert!(kept_secret(&link.join("session")).unwrap() != kept);
+        set(folder.path(), 0o755);
+        assert!(kept_secret(&path).unwrap() != kept);
+        set(folder.path(), 0o700);
+        assert!(kept_secret(&path).unwrap() == kept);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3, "no temporary file is left");
     }
 }

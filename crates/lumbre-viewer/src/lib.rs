@@ -15,10 +15,11 @@ mod socket;
 mod source;
 mod stage;
 mod viewer;
+mod visitors;
 mod watching;
 mod worker;
 
 pub use base64::base64;
 pub use export::export;
-pub use source::{Built, Explain, Moment, Read, Source};
+pub use source::{Built, Explain, Moment, Read, Source, SourceError};
 pub use viewer::{Closer, Options, Viewer};

@@ -23,8 +23,38 @@ pub(crate) enum Message {
     Moment { time: Option<f64>, variant: Option<String> },
     /// What is there at a pixel of the full picture.
     Pick { x: f64, y: f64, request: u32 },
+    /// An address for what goes beside the socket.
+    Ticket { request: u32, errand: Errand },
     /// The values of a rectangle of pixels.
     Values { x: u32, y: u32, width: u32, height: u32, request: u32 },
+}
+
+/// The first message of a page.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(tag = "type", rename_all = "lowercase", deny_unknown_fields)]
+pub(crate) enum Greeting {
+    /// It proves to be one that may come in: see [`crate::guard::Guard::admit`].
+    Hello { nonce: String, proof: String },
+}
+
+/// What a page does by a request of its own, for which it has a ticket that works once.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(tag = "for", rename_all = "lowercase", deny_unknown_fields)]
+pub(crate) enum Errand {
+    /// It takes the picture as a file.
+    Picture { format: FileFormat },
+    /// It takes a page on how the colour of a pixel comes about.
+    Explanation { language: String, pixel: (u32, u32) },
+    /// It sends a scene.
+    Scene {},
+}
+
+/// The formats of pictures that a page can take.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum FileFormat {
+    Png,
+    Exr,
 }
 
 /// What a page asks for; what is not in it stays.
@@ -47,6 +77,10 @@ mod tests {
 
     #[test]
     fn messages_are_what_they_are_and_nothing_else() {
+        let ticket =
+            r#"{"type":"ticket","request":3,"errand":{"for":"explanation","language":"en","pixel":[7,5]}}"#;
+        let errand = Errand::Explanation { language: "en".to_owned(), pixel: (7, 5) };
+        assert_eq!(serde_json::from_str::<Message>(ticket).unwrap(), Message::Ticket { request: 3, errand });
         let set: Message = serde_json::from_str(r#"{"type":"set","paused":true,"channel":"ids"}"#).unwrap();
         let Message::Set(wishes) = set else { panic!() };
         assert_eq!((wishes.paused, wishes.channel, wishes.exposure), (Some(true), Some(Channel::Ids), None));
@@ -59,6 +93,9 @@ mod tests {
             r#"{"type":"pick","x":"a","y":2,"request":3}"#,
             r#"{"type":"set","spp":-3}"#,
             r#"{"type":"set","channel":"../beauty"}"#,
+            r#"{"type":"ticket","request":3,"errand":{"for":"file","path":"/etc/passwd"}}"#,
+            r#"{"type":"ticket","request":3,"errand":{"for":"picture","format":"../png"}}"#,
+            r#"{"type":"ticket","request":3,"errand":{"for":"explanation","language":"en","pixel":[3,-1]}}"#,
         ] {
             assert!(serde_json::from_str::<Message>(text).is_err(), "{text}");
         }

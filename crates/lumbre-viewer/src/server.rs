@@ -10,25 +10,28 @@ use http_body_util::{BodyExt, Full, Limited};
 use hyper::body::{Bytes, Incoming};
 use hyper::header::{
     CACHE_CONTROL, CONNECTION, CONTENT_DISPOSITION, CONTENT_LENGTH, CONTENT_SECURITY_POLICY, CONTENT_TYPE,
-    HeaderValue, LOCATION, REFERRER_POLICY, SEC_WEBSOCKET_ACCEPT, SEC_WEBSOCKET_KEY, SEC_WEBSOCKET_VERSION,
-    SET_COOKIE, UPGRADE, X_CONTENT_TYPE_OPTIONS, X_FRAME_OPTIONS,
+    HeaderValue, REFERRER_POLICY, SEC_WEBSOCKET_ACCEPT, SEC_WEBSOCKET_KEY, SEC_WEBSOCKET_VERSION, UPGRADE,
+    X_CONTENT_TYPE_OPTIONS, X_FRAME_OPTIONS,
 };
 use hyper::service::service_fn;
-use hyper::{HeaderMap, Method, Request, Response, StatusCode};
+use hyper::{Method, Request, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
+use lumbre::formats::atomic_write;
 use lumbre::formats::image::ImageFormat;
-use tokio::sync::{Notify, Semaphore};
+use tokio::sync::Notify;
 use tokio_tungstenite::tungstenite::handshake::derive_accept_key;
 
 use crate::guard::{Guard, Refusal};
+use crate::message::{Errand, FileFormat};
 use crate::page::{EXPLANATION_POLICY, FILES, POLICY};
 use crate::session::Session;
 use crate::socket;
+use crate::visitors::{Visit, Visitors};
 
-/// Connections at a time; more are closed at once.
-const MOST_CONNECTIONS: usize = 256;
-/// Until a request is there with all of its headers.
-const HEADERS_WITHIN: Duration = Duration::from_secs(10);
+/// Until a request is there with all of its headers, and until the next one comes.
+const HEADERS_WITHIN: Duration = Duration::from_secs(5);
+/// How long a connection lasts that was never let in.
+const STRANGER_AT_MOST: Duration = Duration::from_secs(20);
 /// Bytes of a request's headers.
 const MOST_HEADER_BYTES: usize = 16 << 10;
 /// Bytes of a scene that is dropped on the page.
@@ -44,6 +47,8 @@ pub(crate) struct Server {
     pub guard: Guard,
     /// Where scenes go that are dropped on the page, under names of our own.
     pub dropped: tempfile::TempDir,
+    /// Who is connected.
+    pub visitors: Arc<Visitors>,
     /// Tells that the viewer closes.
     pub closed: Arc<Notify>,
 }
@@ -57,37 +62,54 @@ type Answer = Response<Full<Bytes>>;
 pub(crate) async fn serve(server: Arc<Server>, listener: TcpListener) -> std::io::Result<()> {
     listener.set_nonblocking(true)?;
     let listener = tokio::net::TcpListener::from_std(listener)?;
-    let connections = Arc::new(Semaphore::new(MOST_CONNECTIONS));
     loop {
         let accepted = tokio::select! {
             accepted = listener.accept() => accepted,
             () = server.closed.notified() => return Ok(()),
         };
-        let (Ok((stream, _)), Ok(place)) = (accepted, connections.clone().try_acquire_owned()) else {
-            // No more files, or no more places: whoever is there goes on.
+        let Ok((stream, _)) = accepted else {
+            // No more files.
             tokio::time::sleep(Duration::from_millis(5)).await;
             continue;
         };
         // A frame is many packets, and an answer few: none should wait for another.
         let _ = stream.set_nodelay(true);
         let server = server.clone();
+        let visit = Arc::new(server.visitors.come());
         tokio::spawn(async move {
-            let place = Arc::new(place);
             let service = service_fn(|request| {
-                let (server, place) = (server.clone(), place.clone());
-                async move { Ok::<_, Infallible>(server.answer(request, place).await) }
+                let (server, visit) = (server.clone(), visit.clone());
+                async move { Ok::<_, Infallible>(server.answer(request, visit).await) }
             });
             let mut http = hyper::server::conn::http1::Builder::new();
             http.timer(TokioTimer::new()).header_read_timeout(HEADERS_WITHIN).max_buf_size(MOST_HEADER_BYTES);
+            let served = http.serve_connection(TokioIo::new(stream), service).with_upgrades();
             // What goes wrong with one connection is told to no one else.
-            let _ = http.serve_connection(TokioIo::new(stream), service).with_upgrades().await;
+            tokio::select! {
+                _ = served => {}
+                () = has_to_go(&visit) => {}
+            }
         });
     }
 }
 
+/// Waits until a connection has to go: to make room for another, or as it was not let in for too long.
+pub(crate) async fn has_to_go(visit: &Visit) {
+    let is_late = async {
+        tokio::time::sleep(STRANGER_AT_MOST).await;
+        if visit.is_guest() {
+            std::future::pending::<()>().await;
+        }
+    };
+    tokio::select! {
+        () = visit.gives_way() => {}
+        () = is_late => {}
+    }
+}
+
 impl Server {
-    async fn answer(&self, request: Request<Incoming>, place: socket::Place) -> Answer {
-        let mut answer = match self.answered(request, place).await {
+    async fn answer(self: Arc<Self>, request: Request<Incoming>, visit: Arc<Visit>) -> Answer {
+        let mut answer = match self.answered(request, visit).await {
             Ok(answer) => answer,
             Err(status) => text(status, explained(status)),
         };
@@ -106,7 +128,11 @@ impl Server {
         answer
     }
 
-    async fn answered(&self, request: Request<Incoming>, place: socket::Place) -> Result<Answer, StatusCode> {
+    async fn answered(
+        self: &Arc<Self>,
+        request: Request<Incoming>,
+        visit: Arc<Visit>,
+    ) -> Result<Answer, StatusCode> {
         let headers = request.headers();
         self.guard.check_host(headers).map_err(status)?;
         if request.uri().authority().is_some() || request.uri().query().is_some() {
@@ -116,42 +142,32 @@ impl Server {
         let is_get = request.method() == Method::GET;
         let changes = !is_get || path == "/socket";
         self.guard.check_origin(headers, changes).map_err(status)?;
-        if let (Some(token), true) = (path.strip_prefix("/open/"), is_get) {
-            return self.opened(headers, token);
-        }
-        self.guard.check_session(headers).map_err(status)?;
-        match (request.method(), path) {
-            (&Method::GET, "/socket") => self.upgraded(request, place),
-            (&Method::GET, "/picture.png") => {
-                self.picture(ImageFormat::Png, "image/png", "picture.png").await
-            }
-            (&Method::GET, "/picture.exr") => {
-                self.picture(ImageFormat::Exr, "image/x-exr", "picture.exr").await
-            }
-            (&Method::GET, path) if path.starts_with("/explanation/") => self.explanation(path).await,
-            (&Method::POST, "/scene") => self.dropped(request).await,
-            (method, path) => {
-                let file = FILES.iter().find(|file| file.path == path).ok_or(StatusCode::NOT_FOUND)?;
-                if method != Method::GET {
-                    return Err(StatusCode::METHOD_NOT_ALLOWED);
+        if let Some(ticket) = path.strip_prefix("/ticket/") {
+            let errand = self.guard.redeem(ticket).filter(|_| visit.let_in()).ok_or(StatusCode::FORBIDDEN)?;
+            return match (request.method(), errand) {
+                (&Method::GET, Errand::Picture { format: FileFormat::Png }) => {
+                    self.picture(ImageFormat::Png, "image/png", "picture.png").await
                 }
-                let mut answer = Response::new(Full::new(Bytes::from_static(file.bytes)));
-                answer.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static(file.kind));
-                Ok(answer)
-            }
+                (&Method::GET, Errand::Picture { format: FileFormat::Exr }) => {
+                    self.picture(ImageFormat::Exr, "image/x-exr", "picture.exr").await
+                }
+                (&Method::GET, Errand::Explanation { language, pixel }) => {
+                    self.explanation(language, pixel).await
+                }
+                (&Method::POST, Errand::Scene {}) => self.dropped(request).await,
+                _ => Err(StatusCode::METHOD_NOT_ALLOWED),
+            };
         }
-    }
-
-    /// The token becomes a cookie, and the address one without it.
-    fn opened(&self, headers: &HeaderMap, token: &str) -> Result<Answer, StatusCode> {
-        let is_known = self.guard.check_session(headers).is_ok();
-        if !is_known && !self.guard.take(token) {
-            return Err(StatusCode::FORBIDDEN);
+        if (is_get, path) == (true, "/socket") {
+            return self.upgraded(request, visit);
         }
-        let mut answer = text(StatusCode::SEE_OTHER, "");
-        answer.headers_mut().insert(LOCATION, HeaderValue::from_static("/"));
-        let cookie = HeaderValue::from_str(&self.guard.set_cookie());
-        answer.headers_mut().insert(SET_COOKIE, cookie.map_err(|_| StatusCode::INTERNAL_SERVER_ERROR)?);
+        // The page itself is no secret: it is part of the program.
+        let file = FILES.iter().find(|file| file.path == path).ok_or(StatusCode::NOT_FOUND)?;
+        if !is_get {
+            return Err(StatusCode::METHOD_NOT_ALLOWED);
+        }
+        let mut answer = Response::new(Full::new(Bytes::from_static(file.bytes)));
+        answer.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static(file.kind));
         Ok(answer)
     }
 
@@ -175,16 +191,8 @@ impl Server {
     }
 
     /// How the colour of a pixel comes about: a page for a frame of ours or a tab of its own.
-    async fn explanation(&self, path: &str) -> Result<Answer, StatusCode> {
-        let mut parts = path.split('/').skip(2);
-        let (Some(language), Some(x), Some(y), None) =
-            (parts.next(), parts.next(), parts.next(), parts.next())
-        else {
-            return Err(StatusCode::NOT_FOUND);
-        };
-        let number = |text: &str| text.parse().map_err(|_| StatusCode::NOT_FOUND);
-        let (session, language, pixel) =
-            (self.session.clone(), language.to_owned(), (number(x)?, number(y)?));
+    async fn explanation(&self, language: String, pixel: (u32, u32)) -> Result<Answer, StatusCode> {
+        let session = self.session.clone();
         let told = tokio::task::spawn_blocking(move || session.explain(pixel, &language)).await;
         let told = told.map_err(|_| StatusCode::INTERNAL_SERVER_ERROR)?.ok_or(StatusCode::NOT_FOUND)?;
         let (status, kind, text) = match told {
@@ -225,7 +233,7 @@ impl Server {
             return Err(StatusCode::UNSUPPORTED_MEDIA_TYPE);
         }
         let path = self.dropped.path().join("dropped.glb");
-        let written = std::fs::File::create(&path).and_then(|mut file| file.write_all(&bytes));
+        let written = atomic_write(&path, |file: &mut dyn Write| file.write_all(&bytes));
         written.map_err(|_| StatusCode::INSUFFICIENT_STORAGE)?;
         let source = self.session.source().of_file(&path);
         self.session.open(source);
@@ -233,7 +241,11 @@ impl Server {
     }
 
     /// From HTTP to the socket.
-    fn upgraded(&self, request: Request<Incoming>, place: socket::Place) -> Result<Answer, StatusCode> {
+    fn upgraded(
+        self: &Arc<Self>,
+        request: Request<Incoming>,
+        visit: Arc<Visit>,
+    ) -> Result<Answer, StatusCode> {
         let headers = request.headers();
         let names = |name, word: &str| {
             let value: Option<&HeaderValue> = headers.get(name);
@@ -252,10 +264,10 @@ impl Server {
             headers.get(SEC_WEBSOCKET_KEY).filter(|key| key.len() == 24).ok_or(StatusCode::BAD_REQUEST)?;
         let accept = HeaderValue::from_str(&derive_accept_key(key.as_bytes()));
         let accept = accept.map_err(|_| StatusCode::INTERNAL_SERVER_ERROR)?;
-        let session = self.session.clone();
+        let server = self.clone();
         tokio::spawn(async move {
             if let Ok(upgraded) = hyper::upgrade::on(request).await {
-                socket::talk(TokioIo::new(upgraded), session, place).await;
+                socket::talk(TokioIo::new(upgraded), server, visit).await;
             }
         });
         let mut answer = Response::new(Full::default());
@@ -271,14 +283,14 @@ impl Server {
 fn status(refusal: Refusal) -> StatusCode {
     match refusal {
         Refusal::Host => StatusCode::MISDIRECTED_REQUEST,
-        Refusal::Origin | Refusal::Session => StatusCode::FORBIDDEN,
+        Refusal::Origin => StatusCode::FORBIDDEN,
     }
 }
 
 fn explained(status: StatusCode) -> &'static str {
     match status {
         StatusCode::FORBIDDEN => {
-            "This viewer is open to one browser. Open the address that `lumbre view` printed; it works once, so start it again for another browser."
+            "This viewer answers its own page alone. Open the address that `lumbre view` printed."
         }
         StatusCode::MISDIRECTED_REQUEST => {
             "This viewer has another address. Through a tunnel, use the same port at both ends: ssh -L PORT:127.0.0.1:PORT HOST"

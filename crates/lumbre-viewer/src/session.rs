@@ -79,6 +79,7 @@ struct Inner {
     stage: Option<Arc<Stage>>,
     look: Option<Look>,
     error: Option<String>,
+    picture_error: Option<String>,
     edit_error: Option<String>,
     name: String,
 }
@@ -126,6 +127,7 @@ impl Session {
             stage: None,
             look: None,
             error: None,
+            picture_error: None,
             edit_error: None,
             name,
         };
@@ -225,6 +227,16 @@ impl Session {
         self.tell(&inner);
     }
 
+    /// Whether there can be a picture of the stage as it is wanted.
+    pub(crate) fn pictured(&self, pictured: Result<(), String>) {
+        let mut inner = self.lock();
+        let error = pictured.err();
+        if inner.picture_error != error {
+            inner.picture_error = error;
+            self.tell(&inner);
+        }
+    }
+
     /// Watches these files from now on: those that were read, or else those that were watched before, and those of the source.
     pub(crate) fn watch_files(&self, read: Option<Vec<PathBuf>>, named: Vec<PathBuf>) {
         let mut watched = self.watched.lock().unwrap_or_else(PoisonError::into_inner);
@@ -275,7 +287,7 @@ impl Session {
 
     /// Says what is wanted and what there is.
     fn tell(&self, inner: &Inner) {
-        let Inner { wanted, stage, error, edit_error, name, .. } = inner;
+        let Inner { wanted, stage, error, picture_error, edit_error, name, .. } = inner;
         let index =
             stage.as_ref().map_or(0, |stage| wanted.camera.min(stage.cameras.len().saturating_sub(1)));
         let own = stage.as_ref().and_then(|stage| stage.placements.get(index));
@@ -284,7 +296,7 @@ impl Session {
             "type": "state",
             "name": name,
             "has_scene": stage.is_some(),
-            "error": error,
+            "error": error.as_ref().or(picture_error.as_ref()),
             "edit_error": edit_error,
             "camera": index,
             "sequence": wanted.sequence,
@@ -311,7 +323,8 @@ impl Session {
     /// Does what a page says; what it is answered, if anything.
     pub(crate) fn obey(&self, message: Message) -> Option<Value> {
         match message {
-            Message::Shown {} => None,
+            // The socket's own affairs.
+            Message::Shown {} | Message::Ticket { .. } => None,
             Message::Camera { sequence, placement, fov, zoom } => {
                 self.change(|inner| {
                     let wanted = &mut inner.wanted;

@@ -1,4 +1,4 @@
-//! One page's socket: frames and facts go out, wishes come in. Who reads slowly misses frames; who reads nothing is dropped.
+//! One page's socket: it is let in, then frames and facts go out and wishes come in. Who reads slowly misses frames; who reads nothing is dropped.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -6,18 +6,18 @@ use std::time::{Duration, Instant};
 use futures_util::{SinkExt, StreamExt};
 use hyper::upgrade::Upgraded;
 use hyper_util::rt::TokioIo;
-use tokio::sync::{OwnedSemaphorePermit, watch};
+use serde_json::json;
+use tokio::sync::watch;
 use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::Message as Packet;
 use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 use tokio_tungstenite::tungstenite::protocol::{CloseFrame, Role, WebSocketConfig};
 
-use crate::message::Message;
+use crate::guard::{Guard, Secret};
+use crate::message::{Greeting, Message};
 use crate::rate::Allowance;
-use crate::session::Session;
-
-/// A place among the connections.
-pub(crate) type Place = Arc<OwnedSemaphorePermit>;
+use crate::server::{Server, has_to_go};
+use crate::visitors::Visit;
 
 /// Bytes of a message of a page, whose longest names a parameter and its value.
 const MOST_MESSAGE_BYTES: usize = 16 << 10;
@@ -28,25 +28,52 @@ const ASK_EVERY: Duration = Duration::from_secs(20);
 /// How long it may be silent.
 const SILENT_AT_MOST: Duration = Duration::from_secs(65);
 
+/// Until a page has said who it is.
+const HELLO_WITHIN: Duration = Duration::from_secs(5);
+/// The code of a page that is not known: it knows no secret of this viewer, or there is no place for it.
+const UNKNOWN: CloseCode = CloseCode::Library(4403);
+
 type Stream = WebSocketStream<TokioIo<Upgraded>>;
 
 /// Talks with a page until one of both ends it.
-pub(crate) async fn talk(stream: TokioIo<Upgraded>, session: Arc<Session>, _place: Place) {
+pub(crate) async fn talk(stream: TokioIo<Upgraded>, server: Arc<Server>, visit: Arc<Visit>) {
     let config = WebSocketConfig::default()
         .max_message_size(Some(MOST_MESSAGE_BYTES))
         .max_frame_size(Some(MOST_MESSAGE_BYTES))
         .read_buffer_size(8 << 10);
     let mut stream = WebSocketStream::from_raw_socket(stream, Role::Server, Some(config)).await;
-    if let Err(Some(reason)) = converse(&mut stream, &session).await {
+    let ended = tokio::select! {
+        ended = async {
+            greet(&mut stream, &server.guard, &visit).await?;
+            converse(&mut stream, &server).await
+        } => ended,
+        () = has_to_go(&visit) => return,
+    };
+    if let Err(Some(reason)) = ended {
         let frame = CloseFrame { code: reason.0, reason: reason.1.into() };
         let _ = tokio::time::timeout(TAKEN_WITHIN, stream.close(Some(frame))).await;
     }
 }
 
+/// Lets in a page that knows our secret, and proves to it that we know it, too. Nothing is said before.
+async fn greet(stream: &mut Stream, guard: &Guard, visit: &Visit) -> Result<(), Ended> {
+    let challenge = Secret::new().map_err(|_| None)?;
+    let asked = json!({ "type": "challenge", "nonce": challenge.digits() });
+    send(stream, Packet::text(asked.to_string())).await?;
+    let answer = tokio::time::timeout(HELLO_WITHIN, stream.next()).await;
+    let unknown = || Some((UNKNOWN, "this page is not known"));
+    let Ok(Some(Ok(Packet::Text(text)))) = answer else { return Err(unknown()) };
+    let Greeting::Hello { nonce, proof } = serde_json::from_str(&text).map_err(|_| unknown())?;
+    let welcome = guard.admit(&challenge, &nonce, &proof).filter(|_| visit.let_in()).ok_or_else(unknown)?;
+    let welcome = json!({ "type": "welcome", "proof": welcome.proof, "session": welcome.session });
+    send(stream, Packet::text(welcome.to_string())).await
+}
+
 /// Why we end it; `None` where the other side did, or is gone.
 type Ended = Option<(CloseCode, &'static str)>;
 
-async fn converse(stream: &mut Stream, session: &Session) -> Result<(), Ended> {
+async fn converse(stream: &mut Stream, server: &Server) -> Result<(), Ended> {
+    let session = &*server.session;
     let mut scene = subscribe(&session.scene);
     let mut state = subscribe(&session.state);
     let mut progress = subscribe(&session.progress);
@@ -69,7 +96,14 @@ async fn converse(stream: &mut Stream, session: &Session) -> Result<(), Ended> {
                         let message: Message = serde_json::from_str(&text)
                             .map_err(|_| Some((CloseCode::Policy, "the message is not understood")))?;
                         may_send |= message == Message::Shown {};
-                        if let Some(answer) = session.obey(message) {
+                        let answer = match message {
+                            Message::Ticket { request, errand } => {
+                                let address = server.guard.ticket(errand);
+                                Some(json!({ "type": "ticket", "request": request, "address": address }))
+                            }
+                            message => session.obey(message),
+                        };
+                        if let Some(answer) = answer {
                             send(stream, Packet::text(answer.to_string())).await?;
                         }
                     }

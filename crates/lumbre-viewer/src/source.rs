@@ -4,7 +4,7 @@ use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use lumbre::{Background, RenderOptions, SaveOptions, Scene, SceneDesc};
+use lumbre::{Background, ErrorKind, RenderOptions, SaveOptions, Scene, SceneDesc};
 
 /// Which moment and which variant of a scene to read.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -45,6 +45,29 @@ pub struct Built {
     pub explain: Option<Box<dyn Explain>>,
 }
 
+/// Why there is no scene, or no picture of it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SourceError {
+    /// What kind of error it is.
+    pub kind: ErrorKind,
+    /// What is wrong, for people, with the place in the file where there is one.
+    pub message: String,
+}
+
+impl std::fmt::Display for SourceError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for SourceError {}
+
+impl From<lumbre::Error> for SourceError {
+    fn from(error: lumbre::Error) -> Self {
+        Self { kind: error.kind(), message: error.to_string() }
+    }
+}
+
 /// Tells how the colour of a pixel comes about.
 pub trait Explain: Debug + Send + Sync {
     /// The languages in which it does, as their codes and their own names.
@@ -63,7 +86,7 @@ pub trait Explain: Debug + Send + Sync {
     ) -> Result<String, String>;
 }
 
-/// How a scene is read and built. Errors are messages for people, with the place in the file where there is one.
+/// How a scene is read and built.
 pub trait Source: Send + Sync {
     /// What to call the scene.
     fn name(&self) -> String;
@@ -75,15 +98,21 @@ pub trait Source: Send + Sync {
     ///
     /// # Errors
     /// What is wrong, and where.
-    fn read(&self, moment: &Moment) -> Result<Read, String>;
+    fn read(&self, moment: &Moment) -> Result<Read, SourceError>;
 
     /// Sets a description on its stage and builds it.
     ///
     /// # Errors
     /// What is wrong.
-    fn build(&self, desc: SceneDesc) -> Result<Built, String>;
+    fn build(&self, desc: SceneDesc) -> Result<Built, SourceError>;
 
-    /// The same for another file, which came from elsewhere than the command line.
+    /// Whether there is memory for a picture with these options.
+    ///
+    /// # Errors
+    /// How much it takes and how much there is.
+    fn check(&self, options: &RenderOptions) -> Result<(), SourceError>;
+
+    /// The same for a file that came through the page. It may be a stranger's, so that it may use no other file of this machine.
     fn of_file(&self, file: &Path) -> Arc<dyn Source>;
 
     /// Whether there is a scene at all.

@@ -77,7 +77,13 @@ impl Viewer {
         let guard = Guard::new(address, &options.hosts, options.session_file.as_deref())?;
         let dropped = tempfile::tempdir().map_err(|e| format!("cannot make a temporary folder: {e}"))?;
         let session = Arc::new(Session::new(source));
-        let server = Arc::new(Server { session, guard, dropped, closed: Arc::new(Notify::new()) });
+        let server = Arc::new(Server {
+            session,
+            guard,
+            dropped,
+            visitors: Arc::default(),
+            closed: Arc::new(Notify::new()),
+        });
         Ok(Self { server, listener, address })
     }
 

@@ -7,14 +7,14 @@ use std::time::{Duration, Instant};
 
 use lumbre::description::IntegratorKind;
 use lumbre::image::{Image, Rgb};
-use lumbre::{CancelToken, NoProgress, Progress, RenderOptions, RenderState, SceneDesc, Setting};
+use lumbre::{CancelToken, ErrorKind, NoProgress, Progress, RenderOptions, RenderState, SceneDesc, Setting};
 use rayon::prelude::*;
 use serde_json::json;
 
 use crate::camera::moved;
 use crate::frame::{Channel, Look, Pixels, Shot, id_colour};
 use crate::session::{Changes, Session, Wanted};
-use crate::source::Read;
+use crate::source::{Read, SourceError};
 use crate::stage::{Stage, ray};
 
 /// What the first picture after a change may take.
@@ -118,7 +118,7 @@ impl Worker {
         } else {
             self.session.tell_progress(&json!({ "type": "progress", "doing": "waiting" }));
         }
-        self.session.staged(loaded);
+        self.session.staged(loaded.map_err(|error| error.to_string()));
         is_fine
     }
 
@@ -127,14 +127,16 @@ impl Worker {
         source: &dyn crate::Source,
         wanted: &Wanted,
         again: bool,
-    ) -> Result<Arc<Stage>, String> {
+    ) -> Result<Arc<Stage>, SourceError> {
         if again || self.read.is_none() {
             let read = source.read(&wanted.moment);
             let files = read.as_ref().map(|read| read.files.clone()).ok();
             self.session.watch_files(files, source.files());
             self.read = Some(read?);
         }
-        let Some(read) = &self.read else { return Err("nothing was read".to_owned()) };
+        let Some(read) = &self.read else {
+            return Err(SourceError { kind: ErrorKind::Input, message: "nothing was read".to_owned() });
+        };
         let mut desc = read.desc.clone();
         let mut wrong = None;
         for (path, value) in &wanted.settings {
@@ -166,7 +168,7 @@ impl Worker {
         };
         let replaced = stage.scene_mut().replace_camera(options.camera, camera);
         if let Err(error) = replaced {
-            return self.fail(error);
+            return self.fail(&error);
         }
         if wanted.scale != 1.0 {
             let side = |pixels: u32| ((f64::from(pixels) * wanted.scale).round() as u32).max(1);
@@ -186,6 +188,10 @@ impl Worker {
             options.exposure = RenderOptions::default().exposure;
         }
         options.guides = wanted.channel == Channel::Beauty && wanted.denoise.unwrap_or(stage.denoise);
+        if let Err(error) = self.session.source().check(&options) {
+            return self.fail(&error);
+        }
+        self.session.pictured(Ok(()));
         self.options = options;
         self.options.stop.spp = self.target(wanted, &stage);
         (self.state, self.spent) = (None, Duration::ZERO);
@@ -263,7 +269,7 @@ impl Worker {
         drop(scene);
         let picture = match rendered {
             Ok((picture, _)) => picture,
-            Err(error) => return self.fail(error),
+            Err(error) => return self.fail(&error),
         };
         if cancel.is_cancelled() {
             return;
@@ -293,7 +299,7 @@ impl Worker {
             Ok(rendered) => rendered,
             // What is wanted instead comes next.
             Err(lumbre::Error::Render(lumbre::RenderError::Unwanted)) => return,
-            Err(error) => return self.fail(error),
+            Err(error) => return self.fail(&error),
         };
         self.state = Some(state);
         let took = start.elapsed();
@@ -365,9 +371,10 @@ impl Worker {
     }
 
     /// There can be no picture: the page says why.
-    fn fail(&mut self, error: lumbre::Error) {
+    fn fail(&mut self, error: &dyn std::fmt::Display) {
         self.step = Step::Done;
-        self.session.staged(Err(error.to_string()));
+        self.session.pictured(Err(error.to_string()));
+        self.session.tell_progress(&json!({ "type": "progress", "doing": "nothing" }));
     }
 
     fn measure(&mut self, speed: f64) {

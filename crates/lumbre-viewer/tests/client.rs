@@ -8,7 +8,10 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use lumbre::{DVec3, RenderOptions, SaveOptions, Scene, SceneDesc};
-use lumbre_viewer::{Built, Closer, Explain, Moment, Options, Read as WasRead, Source, Viewer};
+use lumbre_viewer::{Built, Closer, Explain, Moment, Options, Read as WasRead, Source, SourceError, Viewer};
+
+/// The widest picture that there is memory for.
+pub(crate) const MOST_PIXELS: u32 = 90;
 
 /// A scene file in a folder of its own.
 pub(crate) struct OneFile(pub PathBuf);
@@ -22,14 +25,13 @@ impl Source for OneFile {
         vec![self.0.clone()]
     }
 
-    fn read(&self, _: &Moment) -> Result<WasRead, String> {
-        let read = lumbre::describe(&[&self.0], &lumbre::ReadOptions::default());
-        let (desc, diagnostics) = read.map_err(|e| e.to_string())?;
+    fn read(&self, _: &Moment) -> Result<WasRead, SourceError> {
+        let (desc, diagnostics) = lumbre::describe(&[&self.0], &lumbre::ReadOptions::default())?;
         Ok(WasRead { desc, files: diagnostics.files_read().to_vec(), warnings: diagnostics.lines() })
     }
 
-    fn build(&self, desc: SceneDesc) -> Result<Built, String> {
-        let scene = Scene::from_description(desc).map_err(|e| e.to_string())?;
+    fn build(&self, desc: SceneDesc) -> Result<Built, SourceError> {
+        let scene = Scene::from_description(desc)?;
         let options = scene.options();
         let save = SaveOptions::default();
         Ok(Built {
@@ -41,6 +43,14 @@ impl Source for OneFile {
             warnings: Vec::new(),
             explain: Some(Box::new(Words)),
         })
+    }
+
+    fn check(&self, options: &RenderOptions) -> Result<(), SourceError> {
+        if options.width <= MOST_PIXELS {
+            return Ok(());
+        }
+        let message = format!("a picture of {} pixels does not fit", options.width);
+        Err(SourceError { kind: lumbre::ErrorKind::Limit, message })
     }
 
     fn of_file(&self, file: &Path) -> Arc<dyn Source> {
@@ -97,7 +107,7 @@ impl Running {
         let viewer = Viewer::new(Arc::new(OneFile(path.clone())), &Options::default()).unwrap();
         let address = viewer.address();
         let url = viewer.url();
-        let token = url.rsplit('/').next().unwrap().to_owned();
+        let token = url.rsplit('#').next().unwrap().to_owned();
         let closer = viewer.closer();
         let thread = Some(std::thread::spawn(move || viewer.run()));
         Self { address, path, token, closer, thread, _folder: folder }
@@ -107,9 +117,9 @@ impl Running {
         self.address.to_string()
     }
 
-    /// The path that opens it once.
-    pub(crate) fn opening(&self) -> String {
-        format!("/open/{}", self.token)
+    /// What the address has that opens it once.
+    pub(crate) fn token(&self) -> &str {
+        &self.token
     }
 
     /// Sends bytes and reads until the other side closes or says nothing for a while.
@@ -131,24 +141,28 @@ impl Running {
         answer.split(' ').nth(1).and_then(|status| status.parse().ok()).unwrap_or(0)
     }
 
-    /// Takes the token for a cookie.
-    pub(crate) fn cookie(&self) -> String {
-        let request =
-            format!("GET {} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n", self.opening(), self.host());
-        let answer = self.raw(request.as_bytes());
-        assert!(answer.starts_with("HTTP/1.1 303"), "{answer}");
-        let line = answer.lines().find(|line| line.starts_with("set-cookie: ")).expect("a cookie");
-        assert!(line.contains("HttpOnly") && line.contains("SameSite=Strict"), "{line}");
-        line["set-cookie: ".len()..].split(';').next().unwrap().to_owned()
+    /// Takes the token for the secret of the session.
+    pub(crate) fn session(&self) -> String {
+        let mut socket = self.connect();
+        let welcome = socket.greet(&self.token).expect("it is let in");
+        welcome["session"].as_str().unwrap().to_owned()
     }
 
-    /// A socket of a page that has this cookie.
-    pub(crate) fn socket(&self, cookie: &str) -> Socket {
+    /// A socket of a page that has this secret.
+    pub(crate) fn socket(&self, session: &str) -> Socket {
+        let mut socket = self.connect();
+        let welcome = socket.greet(session).expect("it is let in");
+        assert!(welcome["session"].is_null());
+        socket
+    }
+
+    /// A socket of a page that has said nothing yet.
+    pub(crate) fn connect(&self) -> Socket {
         let mut stream = TcpStream::connect(self.address).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
         let host = self.host();
         let request = format!(
-            "GET /socket HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nCookie: {cookie}\r\nConnection: Upgrade\r\n\
+            "GET /socket HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nConnection: Upgrade\r\n\
              Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
         );
         stream.write_all(request.as_bytes()).unwrap();
@@ -176,6 +190,15 @@ impl Drop for Running {
     }
 }
 
+/// That a side knows a secret.
+pub(crate) fn proof(secret: &str, side: &str, challenge: &str, nonce: &str) -> String {
+    let bytes = |digits: &str| -> Vec<u8> {
+        (0..digits.len() / 2).map(|i| u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).unwrap()).collect()
+    };
+    let text = [side.as_bytes(), &bytes(challenge)[..24], &bytes(nonce)[..24]].concat();
+    blake3::keyed_hash(&bytes(secret).try_into().unwrap(), &text).to_hex().to_string()
+}
+
 /// What came through a socket.
 #[derive(Debug)]
 pub(crate) enum Packet {
@@ -191,6 +214,31 @@ pub(crate) enum Packet {
 pub(crate) struct Socket(pub TcpStream);
 
 impl Socket {
+    /// Proves to know a secret, and hears that the other side does; `None` where it is sent away.
+    pub(crate) fn greet(&mut self, secret: &str) -> Option<serde_json::Value> {
+        let Packet::Text(text) = self.next() else { return None };
+        let challenge: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(challenge["type"], "challenge");
+        let challenge = challenge["nonce"].as_str().unwrap().to_owned();
+        let nonce = "5a".repeat(32);
+        let (proof, expected) =
+            (proof(secret, "page", &challenge, &nonce), proof(secret, "viewer", &challenge, &nonce));
+        self.say(&format!(r#"{{"type":"hello","nonce":"{nonce}","proof":"{proof}"}}"#));
+        let Packet::Text(text) = self.next() else { return None };
+        let welcome: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(
+            (welcome["type"].as_str(), welcome["proof"].as_str()),
+            (Some("welcome"), Some(&*expected))
+        );
+        Some(welcome)
+    }
+
+    /// An address for an errand.
+    pub(crate) fn ticket(&mut self, errand: &str) -> String {
+        self.say(&format!(r#"{{"type":"ticket","request":5,"errand":{errand}}}"#));
+        self.wait_for("ticket", |_| true)["address"].as_str().unwrap().to_owned()
+    }
+
     /// Sends a frame with a first byte and a length as they are said, masked by zeros.
     pub(crate) fn send_frame(&mut self, first: u8, payload: &[u8]) {
         let mut frame = vec![first];

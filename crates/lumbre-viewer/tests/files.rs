@@ -5,7 +5,7 @@ use crate::client::{Running, SCENE};
 #[test]
 fn a_saved_edit_is_read_and_a_broken_one_leaves_the_picture_with_its_place() {
     let viewer = Running::new();
-    let mut socket = viewer.socket(&viewer.cookie());
+    let mut socket = viewer.socket(&viewer.session());
     let done = |message: &serde_json::Value| message["doing"] == "done";
     socket.wait_for("progress", done);
     let placement = r#"{"eye":[5,-5,4],"target":[0,0,0],"up":[0,0,1]}"#;
@@ -24,4 +24,25 @@ fn a_saved_edit_is_read_and_a_broken_one_leaves_the_picture_with_its_place() {
     std::fs::write(&viewer.path, SCENE.replace("1.25", "0.5")).unwrap();
     let state = socket.wait_for("state", |state| state["error"].is_null());
     assert_eq!(state["placement"]["eye"], serde_json::json!([5.0, -5.0, 4.0]), "the camera is kept");
+}
+
+#[test]
+fn a_picture_for_which_there_is_no_memory_is_refused_and_a_smaller_one_goes_on() {
+    let viewer = Running::new();
+    let mut socket = viewer.socket(&viewer.session());
+    socket.wait_for("progress", |message| message["doing"] == "done");
+    socket.say(r#"{"type":"set","scale":2}"#);
+    let state = socket.wait_for("state", |state| !state["error"].is_null());
+    assert_eq!(state["error"], "a picture of 96 pixels does not fit");
+    socket.say(r#"{"type":"set","scale":1.5}"#);
+    socket.wait_for("state", |state| state["error"].is_null());
+    socket.wait_for("progress", |message| message["doing"] == "done");
+    // As the file itself asks for it.
+    let wide = SCENE.replace("xresolution\" 48", "xresolution\" 480");
+    assert_ne!(wide, SCENE);
+    std::fs::write(&viewer.path, wide).unwrap();
+    let state = socket.wait_for("state", |state| !state["error"].is_null());
+    assert_eq!(state["error"], "a picture of 720 pixels does not fit");
+    std::fs::write(&viewer.path, SCENE).unwrap();
+    socket.wait_for("state", |state| state["error"].is_null());
 }

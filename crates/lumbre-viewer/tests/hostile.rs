@@ -7,10 +7,9 @@ use std::time::{Duration, Instant};
 use crate::client::{Packet, Running};
 
 /// Asserts that the viewer still answers its own page, and still renders.
-fn goes_on(viewer: &Running, cookie: &str) {
-    let host = viewer.host();
-    assert_eq!(viewer.status("GET", "/", &[format!("Host: {host}"), format!("Cookie: {cookie}")]), 200);
-    let mut socket = viewer.socket(cookie);
+fn goes_on(viewer: &Running, session: &str) {
+    assert_eq!(viewer.status("GET", "/", &[format!("Host: {}", viewer.host())]), 200);
+    let mut socket = viewer.socket(session);
     socket.say(r#"{"type":"reset","sequence":3,"camera":0}"#);
     socket.wait_for("progress", |progress| progress["doing"] == "done");
 }
@@ -18,9 +17,9 @@ fn goes_on(viewer: &Running, cookie: &str) {
 #[test]
 fn hosts_and_origins_that_are_not_ours_are_refused() {
     let viewer = Running::new();
-    let cookie = viewer.cookie();
+    let session = viewer.session();
     let (host, port) = (viewer.host(), viewer.address.port());
-    let cookie_line = format!("Cookie: {cookie}");
+    let ticket = viewer.socket(&session).ticket(r#"{"for":"picture","format":"png"}"#);
     let mut count = 0;
     let hosts = [
         "example.org".to_owned(),
@@ -46,7 +45,7 @@ fn hosts_and_origins_that_are_not_ours_are_refused() {
         "localhost".to_owned(),
     ];
     for wrong in hosts {
-        let status = viewer.status("GET", "/", &[format!("Host: {wrong}"), cookie_line.clone()]);
+        let status = viewer.status("GET", "/", &[format!("Host: {wrong}")]);
         assert!(matches!(status, 400 | 421), "host {wrong:?}: {status}");
         count += 1;
     }
@@ -55,7 +54,7 @@ fn hosts_and_origins_that_are_not_ours_are_refused() {
         vec![format!("Host: {host}"), format!("Host: {host}")],
         vec![format!("Host: {host}"), "Host: example.org".to_owned()],
     ] {
-        let status = viewer.status("GET", "/", &[lines, vec![cookie_line.clone()]].concat());
+        let status = viewer.status("GET", "/", &lines);
         assert!(matches!(status, 400 | 421), "{status}");
         count += 1;
     }
@@ -80,11 +79,10 @@ fn hosts_and_origins_that_are_not_ours_are_refused() {
         String::new(),
     ];
     for wrong in origins {
-        for (method, path) in [("GET", "/"), ("GET", "/socket"), ("POST", "/scene")] {
+        for (method, path) in [("GET", "/"), ("GET", "/socket"), ("POST", "/scene"), ("GET", &ticket)] {
             let lines = [
                 format!("Host: {host}"),
                 format!("Origin: {wrong}"),
-                cookie_line.clone(),
                 "Upgrade: websocket".to_owned(),
                 "Sec-WebSocket-Version: 13".to_owned(),
                 "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==".to_owned(),
@@ -96,52 +94,77 @@ fn hosts_and_origins_that_are_not_ours_are_refused() {
     // A socket, or a scene, without an origin; and pages of which the browser says that they are others.
     for path in ["/socket", "/scene"] {
         let method = if path == "/scene" { "POST" } else { "GET" };
-        assert_eq!(viewer.status(method, path, &[format!("Host: {host}"), cookie_line.clone()]), 403);
+        assert_eq!(viewer.status(method, path, &[format!("Host: {host}")]), 403);
         count += 1;
     }
     for site in ["cross-site", "same-site", "", "none-such"] {
-        for path in ["/", "/picture.png", "/viewer.js", &viewer.opening()] {
-            let lines = [format!("Host: {host}"), cookie_line.clone(), format!("Sec-Fetch-Site: {site}")];
+        for path in ["/", "/viewer.js", "/icon.svg", &ticket] {
+            let lines = [format!("Host: {host}"), format!("Sec-Fetch-Site: {site}")];
             assert_eq!(viewer.status("GET", path, &lines), 403, "{site} {path}");
             count += 1;
         }
     }
     assert!(count > 90, "{count}");
-    goes_on(&viewer, &cookie);
+    assert_eq!(viewer.status("GET", &ticket, &[format!("Host: {host}")]), 200, "nobody has used it");
+    goes_on(&viewer, &session);
 }
 
 #[test]
-fn without_the_cookie_there_is_nothing_and_the_token_works_once() {
+fn without_the_secret_there_is_nothing_and_the_token_works_once() {
     let viewer = Running::new();
     let host = format!("Host: {}", viewer.host());
-    for cookie in ["", "lumbre=1", "a=b; c=d", &format!("lumbre-{}=", viewer.address.port())] {
-        for path in ["/", "/socket", "/picture.png", "/picture.exr", "/viewer.js", "/nothing"] {
-            let lines =
-                [host.clone(), format!("Cookie: {cookie}"), format!("Origin: http://{}", viewer.host())];
-            assert_eq!(viewer.status("GET", path, &lines), 403, "{cookie:?} {path}");
-        }
+    let zeros = "0".repeat(64);
+    for path in ["/picture.png", "/scene", "/explanation/la/1/2", "/nothing", "/open/1"] {
+        assert_eq!(viewer.status("GET", path, std::slice::from_ref(&host)), 404, "{path}");
     }
-    let opening = viewer.opening();
-    for wrong in
-        ["/open/", "/open/x", &opening[..opening.len() - 1], &format!("{opening}0"), &opening.to_uppercase()]
+    for path in ["/ticket/", "/ticket/x", &format!("/ticket/{zeros}"), &format!("/ticket/{}", viewer.token())]
     {
-        assert_eq!(viewer.status("GET", wrong, std::slice::from_ref(&host)), 403, "{wrong}");
+        assert_eq!(viewer.status("GET", path, std::slice::from_ref(&host)), 403, "{path}");
     }
-    let cookie = viewer.cookie();
-    assert_eq!(viewer.status("GET", &opening, std::slice::from_ref(&host)), 403, "a second time");
-    assert_eq!(
-        viewer.status("GET", &opening, &[host, format!("Cookie: {cookie}")]),
-        303,
-        "who is known may come again"
-    );
-    goes_on(&viewer, &cookie);
+    let sent_away = |said: &str| {
+        let mut socket = viewer.connect();
+        let Packet::Text(challenge) = socket.next() else { panic!("no challenge") };
+        assert!(challenge.len() < 120, "nothing is said of the scene: {challenge}");
+        socket.say(said);
+        assert_eq!(socket.end(), Some(4403), "{said}");
+    };
+    for said in [
+        "",
+        "{}",
+        r#"{"type":"hello"}"#,
+        r#"{"type":"hello","nonce":"","proof":""}"#,
+        &format!(r#"{{"type":"hello","nonce":"{zeros}","proof":"{zeros}"}}"#),
+        &format!(r#"{{"type":"hello","nonce":"{zeros}","proof":"{}"}}"#, viewer.token()),
+        &format!(r#"{{"type":"hello","nonce":"{}","proof":"{zeros}"}}"#, "é".repeat(32)),
+        r#"{"type":"pick","x":24,"y":16,"request":5}"#,
+        r#"{"type":"ticket","request":5,"errand":{"for":"scene"}}"#,
+    ] {
+        sent_away(said);
+    }
+    for wrong in [zeros, viewer.token().chars().rev().collect()] {
+        assert!(viewer.connect().greet(&wrong).is_none());
+    }
+    let session = viewer.session();
+    assert_ne!(session, viewer.token());
+    assert!(viewer.connect().greet(viewer.token()).is_none(), "a second time");
+    // What was heard of one socket opens no other.
+    let mut socket = viewer.connect();
+    let Packet::Text(challenge) = socket.next() else { panic!() };
+    let challenge: serde_json::Value = serde_json::from_str(&challenge).unwrap();
+    let nonce = "77".repeat(32);
+    let proof = crate::client::proof(&session, "page", challenge["nonce"].as_str().unwrap(), &nonce);
+    let hello = format!(r#"{{"type":"hello","nonce":"{nonce}","proof":"{proof}"}}"#);
+    sent_away(&hello);
+    socket.say(&hello);
+    assert!(matches!(socket.next(), Packet::Text(welcome) if welcome.contains("welcome")));
+    goes_on(&viewer, &session);
 }
 
 #[test]
 fn no_path_reaches_a_file_and_no_method_but_those_of_the_page() {
     let viewer = Running::new();
-    let cookie = viewer.cookie();
-    let lines = [format!("Host: {}", viewer.host()), format!("Cookie: {cookie}")];
+    let session = viewer.session();
+    let lines = [format!("Host: {}", viewer.host())];
     for path in [
         "/../../etc/passwd",
         "/..%2f..%2fetc/passwd",
@@ -181,16 +204,17 @@ fn no_path_reaches_a_file_and_no_method_but_those_of_the_page() {
         let status = viewer.status(method, "/", &own);
         assert!(matches!(status, 400 | 403 | 404 | 405), "{method}: {status}");
     }
-    goes_on(&viewer, &cookie);
+    goes_on(&viewer, &session);
 }
 
 #[test]
 fn answers_say_what_a_browser_may_do_with_them() {
     let viewer = Running::new();
-    let cookie = viewer.cookie();
+    let session = viewer.session();
     let host = viewer.host();
-    for (path, line) in [("/", format!("Cookie: {cookie}\r\n")), ("/nothing", String::new())] {
-        let request = format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n{line}Connection: close\r\n\r\n");
+    let ticket = viewer.socket(&session).ticket(r#"{"for":"picture","format":"exr"}"#);
+    for path in ["/", "/nothing", &ticket] {
+        let request = format!("GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n");
         let answer = viewer.raw(request.as_bytes());
         let head = answer.split("\r\n\r\n").next().unwrap();
         for expected in [
@@ -203,14 +227,14 @@ fn answers_say_what_a_browser_may_do_with_them() {
         ] {
             assert!(head.contains(expected), "{path}: {expected}: {head}");
         }
-        assert!(!head.contains("access-control-allow"), "{head}");
+        assert!(!head.contains("access-control-allow") && !head.contains("set-cookie"), "{head}");
     }
 }
 
 #[test]
 fn broken_requests_are_refused_and_slow_ones_given_up() {
     let viewer = Running::new();
-    let cookie = viewer.cookie();
+    let session = viewer.session();
     let host = viewer.host();
     let long = "x".repeat(20_000);
     for request in [
@@ -234,7 +258,7 @@ fn broken_requests_are_refused_and_slow_ones_given_up() {
     let mut slow = TcpStream::connect(viewer.address).unwrap();
     slow.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
     slow.write_all(b"GET / HTTP/1.1\r\nHost: ").unwrap();
-    goes_on(&viewer, &cookie);
+    goes_on(&viewer, &session);
     let mut rest = Vec::new();
     let _ = slow.read_to_end(&mut rest);
     assert!(start.elapsed() < Duration::from_secs(18), "headers that never end are waited for");
@@ -243,18 +267,15 @@ fn broken_requests_are_refused_and_slow_ones_given_up() {
 #[test]
 fn scenes_that_are_dropped_are_models_of_a_bounded_size() {
     let viewer = Running::new();
-    let cookie = viewer.cookie();
-    let own = [
-        format!("Host: {}", viewer.host()),
-        format!("Origin: http://{}", viewer.host()),
-        format!("Cookie: {cookie}"),
-    ];
-    let post = |lines: &[&str]| {
-        viewer.status(
-            "POST",
-            "/scene",
-            &[&own[..], &lines.iter().map(|l| (*l).to_owned()).collect::<Vec<_>>()].concat(),
-        )
+    let session = viewer.session();
+    let own = [format!("Host: {}", viewer.host()), format!("Origin: http://{}", viewer.host())];
+    let mut socket = viewer.socket(&session);
+    let mut post = |lines: &[&str]| {
+        let address = socket.ticket(r#"{"for":"scene"}"#);
+        let lines = [&own[..], &lines.iter().map(|l| (*l).to_owned()).collect::<Vec<_>>()].concat();
+        let status = viewer.status("POST", &address, &lines);
+        assert_eq!(viewer.status("POST", &address, &lines), 403, "it works once");
+        status
     };
     let kind = "Content-Type: application/octet-stream";
     assert_eq!(post(&["Content-Type: text/plain", "Content-Length: 0"]), 415);
@@ -262,13 +283,18 @@ fn scenes_that_are_dropped_are_models_of_a_bounded_size() {
     assert_eq!(post(&[kind, "Content-Length: 0"]), 415);
     assert_eq!(post(&[kind, "Content-Length: 999999999999"]), 413);
     assert_eq!(post(&[kind, "Transfer-Encoding: chunked"]), 411);
-    goes_on(&viewer, &cookie);
+    // A ticket is for one thing.
+    let address = socket.ticket(r#"{"for":"scene"}"#);
+    assert_eq!(viewer.status("GET", &address, &own), 405);
+    let address = socket.ticket(r#"{"for":"picture","format":"png"}"#);
+    assert_eq!(viewer.status("POST", &address, &own), 405);
+    goes_on(&viewer, &session);
 }
 
 #[test]
 fn messages_that_are_none_end_the_socket() {
     let viewer = Running::new();
-    let cookie = viewer.cookie();
+    let session = viewer.session();
     for text in [
         "",
         "null",
@@ -280,7 +306,7 @@ fn messages_that_are_none_end_the_socket() {
         r#"{"type":"shown","__proto__":{}}"#,
         &"[".repeat(10_000),
     ] {
-        let mut socket = viewer.socket(&cookie);
+        let mut socket = viewer.socket(&session);
         socket.say(text);
         assert_eq!(socket.end(), Some(1008), "{}", &text[..text.len().min(40)]);
     }
@@ -295,31 +321,31 @@ fn messages_that_are_none_end_the_socket() {
         ("a length of 2^63", &[0x81, 0xff, 0x80, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]),
     ];
     for (what, bytes) in frames {
-        let mut socket = viewer.socket(&cookie);
+        let mut socket = viewer.socket(&session);
         socket.0.write_all(bytes).unwrap();
         assert!(socket.end().is_none_or(|code| code >= 1002), "{what}");
     }
-    let mut socket = viewer.socket(&cookie);
+    let mut socket = viewer.socket(&session);
     socket.send_frame(0x81, &[0xff, 0xfe, 0xfd]);
     assert!(socket.end().is_none_or(|code| code == 1007), "text that is none");
-    let mut socket = viewer.socket(&cookie);
+    let mut socket = viewer.socket(&session);
     socket.send_frame(0x81, &vec![b' '; 1 << 20]);
     assert!(socket.end().is_none_or(|code| code == 1009), "a giant message");
-    let mut socket = viewer.socket(&cookie);
+    let mut socket = viewer.socket(&session);
     for _ in 0..40 {
         // Pieces of a message that never ends.
         socket.send_frame(0x01, &[b' '; 1000]);
         socket.send_frame(0x00, &[b' '; 1000]);
     }
     assert!(socket.end().is_none_or(|code| code >= 1002), "a message in many pieces");
-    goes_on(&viewer, &cookie);
+    goes_on(&viewer, &session);
 }
 
 #[test]
 fn numbers_beyond_all_bounds_do_nothing() {
     let viewer = Running::new();
-    let cookie = viewer.cookie();
-    let mut socket = viewer.socket(&cookie);
+    let session = viewer.session();
+    let mut socket = viewer.socket(&session);
     socket.wait_for("progress", |progress| progress["doing"] == "done");
     for text in [
         r#"{"type":"values","x":4294967295,"y":4294967295,"width":64,"height":64,"request":1}"#,
@@ -342,22 +368,22 @@ fn numbers_beyond_all_bounds_do_nothing() {
         // More than a parameter may be long.
         socket.say(&format!(r#"{{"type":"edit","path":"{}{i}","value":"1"}}"#, "x".repeat(2000)));
     }
-    goes_on(&viewer, &cookie);
+    goes_on(&viewer, &session);
 }
 
 #[test]
 fn floods_are_ended_and_a_hundred_readers_who_read_nothing_hold_no_one_up() {
     let viewer = Running::new();
-    let cookie = viewer.cookie();
-    let mut flood = viewer.socket(&cookie);
+    let session = viewer.session();
+    let mut flood = viewer.socket(&session);
     for _ in 0..3000 {
         flood.say(r#"{"type":"shown"}"#);
     }
     let end = flood.end();
     assert!(end.is_none_or(|code| code == 1008), "{end:?}");
     let before = memory();
-    let silent: Vec<_> = (0..100).map(|_| viewer.socket(&cookie)).collect();
-    let mut socket = viewer.socket(&cookie);
+    let silent: Vec<_> = (0..100).map(|_| viewer.socket(&session)).collect();
+    let mut socket = viewer.socket(&session);
     for sequence in 1..60 {
         socket.say(&format!(r#"{{"type":"reset","sequence":{sequence},"camera":0}}"#));
         while let Packet::Text(_) = socket.next() {}
@@ -367,13 +393,46 @@ fn floods_are_ended_and_a_hundred_readers_who_read_nothing_hold_no_one_up() {
         assert!(after < before + (64 << 20), "memory grows: {before} to {after}");
     }
     drop(silent);
-    goes_on(&viewer, &cookie);
-    // More connections than there are places.
-    let many: Vec<_> = (0..400).filter_map(|_| TcpStream::connect(viewer.address).ok()).collect();
-    assert!(many.len() > 256);
-    drop(many);
-    std::thread::sleep(Duration::from_millis(200));
-    goes_on(&viewer, &cookie);
+    goes_on(&viewer, &session);
+}
+
+#[test]
+fn strangers_who_connect_and_say_nothing_lock_no_one_out() {
+    let viewer = Running::new();
+    // More than there are places, of four kinds: silence, half a request, a request and no more, a socket without a greeting.
+    let mut strangers = Vec::new();
+    let mut add = |count: usize| {
+        for i in 0..count {
+            let Ok(mut stream) = TcpStream::connect(viewer.address) else { continue };
+            let host = viewer.host();
+            let said = match i % 4 {
+                0 => String::new(),
+                1 => format!("GET / HTTP/1.1\r\nHost: {host}"),
+                2 => format!("GET /viewer.js HTTP/1.1\r\nHost: {host}\r\n\r\n"),
+                _ => format!(
+                    "GET /socket HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
+                     Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+                ),
+            };
+            let _ = stream.write_all(said.as_bytes());
+            strangers.push(stream);
+        }
+    };
+    add(400);
+    // The user opens the address while they are there, and stays in whoever comes.
+    let session = viewer.session();
+    let mut socket = viewer.socket(&session);
+    add(400);
+    socket.say(r#"{"type":"reset","sequence":3,"camera":0}"#);
+    socket.wait_for("progress", |progress| progress["doing"] == "done");
+    goes_on(&viewer, &session);
+    // Those who were first had to go: what there is to be read of them has an end.
+    let first = &mut strangers[0];
+    first.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+    let mut rest = Vec::new();
+    assert!(first.read_to_end(&mut rest).is_ok() && rest.is_empty());
+    drop(strangers);
+    goes_on(&viewer, &session);
 }
 
 /// Bytes of memory in use, where the system tells.

@@ -26,7 +26,7 @@ fn finished(socket: &mut crate::client::Socket, sequence: u32) -> Vec<u8> {
 #[test]
 fn the_last_frame_has_the_pixels_of_the_picture_that_is_rendered() {
     let viewer = Running::new();
-    let mut socket = viewer.socket(&viewer.cookie());
+    let mut socket = viewer.socket(&viewer.session());
     let frame = finished(&mut socket, 0);
     let scene = lumbre::open(&viewer.path).unwrap();
     let picture = scene.render(&scene.options()).unwrap();
@@ -57,7 +57,7 @@ fn the_last_frame_has_the_pixels_of_the_picture_that_is_rendered() {
 #[test]
 fn a_page_asks_for_pixels_and_for_what_a_ray_meets() {
     let viewer = Running::new();
-    let mut socket = viewer.socket(&viewer.cookie());
+    let mut socket = viewer.socket(&viewer.session());
     finished(&mut socket, 0);
     socket.say(r#"{"type":"pick","x":24,"y":16,"request":5}"#);
     let picked = socket.wait_for("picked", |_| true);
@@ -81,7 +81,7 @@ fn a_page_asks_for_pixels_and_for_what_a_ray_meets() {
 #[test]
 fn kinds_of_shapes_are_called_what_the_scene_language_calls_them() {
     let viewer = Running::new();
-    let mut socket = viewer.socket(&viewer.cookie());
+    let mut socket = viewer.socket(&viewer.session());
     finished(&mut socket, 0);
     let ball = r#"Shape "sphere" "float radius" 1.25"#;
     let shapes = [
@@ -103,20 +103,24 @@ fn kinds_of_shapes_are_called_what_the_scene_language_calls_them() {
 #[test]
 fn a_pixel_of_the_picture_that_is_shown_is_explained_in_a_frame_that_runs_nothing() {
     let viewer = Running::new();
-    let cookie = viewer.cookie();
-    let mut socket = viewer.socket(&cookie);
+    let session = viewer.session();
+    let mut socket = viewer.socket(&session);
     let scene = socket.wait_for("scene", |_| true);
     assert_eq!(scene["scene"]["languages"], serde_json::json!([["la", "Latina"]]));
     finished(&mut socket, 0);
-    let asked = |path: &str, lines: &str| {
+    let asked = |path: &str| {
         let host = viewer.host();
-        let request = format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n{lines}Connection: close\r\n\r\n");
+        let request = format!("GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n");
         let answer = viewer.raw(request.as_bytes());
         let (head, body) = answer.split_once("\r\n\r\n").unwrap();
         (head.to_ascii_lowercase(), body.to_owned())
     };
-    let cookie = format!("Cookie: {cookie}\r\n");
-    let (head, body) = asked("/explanation/la/47/31", &cookie);
+    let mut errands = viewer.socket(&session);
+    let mut explained = |language: &str, x: u32, y: u32| {
+        let errand = format!(r#"{{"for":"explanation","language":"{language}","pixel":[{x},{y}]}}"#);
+        asked(&errands.ticket(&errand))
+    };
+    let (head, body) = explained("la", 47, 31);
     assert_eq!(body, "47 31 of 48 32 from 1");
     for line in [
         "http/1.1 200",
@@ -133,22 +137,22 @@ fn a_pixel_of_the_picture_that_is_shown_is_explained_in_a_frame_that_runs_nothin
     socket.say(&format!(r#"{{"type":"camera","sequence":7,"placement":{placement},"fov":null,"zoom":1}}"#));
     socket.say(r#"{"type":"set","scale":0.5}"#);
     socket.wait_for("progress", |told| told["doing"] == "done");
-    while asked("/explanation/la/23/15", &cookie).1 != "23 15 of 24 16 from 5" {
+    while explained("la", 23, 15).1 != "23 15 of 24 16 from 5" {
         socket.wait_for("progress", |told| told["doing"] == "done");
     }
-    let (head, body) = asked("/explanation/la/24/15", &cookie);
+    let (head, body) = explained("la", 24, 15);
     assert!(head.starts_with("http/1.1 422") && head.contains("text/plain"), "{head}");
     assert_eq!(body, "The picture of 24 by 16 pixels has no pixel 24, 15.");
-    let (head, body) = asked("/explanation/xx/3/2", &cookie);
+    let (head, body) = explained("xx", 3, 2);
     assert!(head.starts_with("http/1.1 422") && head.contains("text/plain"), "{head}");
     assert_eq!(body, "<b>xx</b> is not spoken here", "as text");
-    assert!(asked("/explanation/la/3/2", "").0.starts_with("http/1.1 403"));
+    assert!(asked("/ticket/la").0.starts_with("http/1.1 403"));
 }
 
 #[test]
 fn parameters_are_edited_and_wrong_ones_named() {
     let viewer = Running::new();
-    let mut socket = viewer.socket(&viewer.cookie());
+    let mut socket = viewer.socket(&viewer.session());
     let before = finished(&mut socket, 0);
     let path = "material.<b>wood</b>.reflectance";
     socket.say(&format!(r##"{{"type":"edit","path":"{path}","value":"#00ff00"}}"##));

@@ -37,6 +37,7 @@ mod part;
 mod picture;
 mod scene;
 mod setting;
+mod words;
 
 pub use lumbre_formats as formats;
 pub use lumbre_geometry as geometry;
@@ -71,6 +72,7 @@ pub use part::{Job, Part, PartError};
 pub use picture::Picture;
 pub use scene::{Scene, describe, open, open_with};
 pub use setting::Setting;
+pub use words::in_words;
 
 /// Compiles the examples of the project's README.
 #[cfg(doctest)]

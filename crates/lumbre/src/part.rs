@@ -1,16 +1,16 @@
 //! Parts of renders in files: to go on from, and to join.
 
 use std::collections::BTreeMap;
-use std::fs;
+use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use lumbre_formats::image::ImageFormat;
-use lumbre_formats::{FormatError, atomic_write};
-use lumbre_render::{MergeError, RenderOptions, RenderState};
+use lumbre_formats::{FormatError, atomic_write, open_regular};
+use lumbre_render::{MergeError, RenderOptions, RenderState, StateError};
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, Picture, SaveOptions};
+use crate::{Error, Picture, SaveOptions, in_words};
 
 /// What a part file begins with.
 const MAGIC: &[u8] = b"LUMBRE PART 1\n";
@@ -60,11 +60,11 @@ impl Job {
             ("version", env!("CARGO_PKG_VERSION").to_owned()),
             ("size", format!("{}x{}", options.width, options.height)),
             ("camera", options.camera.to_string()),
-            ("integrator", format!("{:?}", options.integrator)),
-            ("sampler", format!("{:?}", sampler.kind)),
+            ("integrator", in_words(&options.integrator)),
+            ("sampler", in_words(&sampler.kind)),
             ("seed", sampler.seed.to_string()),
-            ("filter", format!("{:?}", options.filter)),
-            ("exposure of samples", format!("{:?}", options.exposure)),
+            ("filter", in_words(&options.filter)),
+            ("exposure of samples", in_words(&options.exposure)),
             ("transparent", options.transparent.to_string()),
             ("features", options.features.to_string()),
             ("guides", options.guides.to_string()),
@@ -121,7 +121,7 @@ fn shown(value: Option<String>) -> String {
 /// The hash of a file (BLAKE3) in hexadecimal digits.
 fn hash_of_file(path: &Path) -> Result<String, Error> {
     let cannot_read = |e| Error::from(FormatError::io(path, "cannot read", e));
-    let mut file = fs::File::open(path).map_err(cannot_read)?;
+    let (mut file, _) = open_regular(path)?;
     let mut hasher = blake3::Hasher::new();
     let mut buffer = vec![0; 1 << 16];
     loop {
@@ -144,6 +144,14 @@ pub enum PartError {
     /// It is something else.
     #[error("it is no part of a render (expected a file of --samples, --checkpoint or --keep-sums)")]
     NoPart,
+    /// It would take more memory than it may.
+    #[error("it takes {needed} bytes of memory, limit {limit}; raise it with --max-memory")]
+    TooLarge {
+        /// The bytes that it takes.
+        needed: u64,
+        /// The bytes that it may take.
+        limit: u64,
+    },
     /// It is damaged.
     #[error("it is damaged: its checksum is not that of its bytes")]
     Damaged,
@@ -188,40 +196,56 @@ impl Part {
         let (head, state) = rest.split_at_checked(length).ok_or(PartError::Damaged)?;
         let invalid = |e: &dyn std::fmt::Display| PartError::Invalid(e.to_string());
         let job = serde_json::from_slice(head).map_err(|e| invalid(&e))?;
-        let state = RenderState::from_bytes(state, most_memory).map_err(|e| invalid(&e))?;
-        Ok(Self { job, state })
+        let state = RenderState::from_bytes(state, most_memory).map_err(|e| match e {
+            StateError::TooLarge { needed } => PartError::TooLarge { needed, limit: most_memory },
+            other => invalid(&other),
+        })?;
+        let part = Self { job, state };
+        let (bounds, (width, height)) = (part.state.bounds(), part.job.size);
+        if bounds.x1 > width || bounds.y1 > height {
+            return Err(PartError::Invalid("its pixels are not those of its picture".to_owned()));
+        }
+        Ok(part)
     }
 
-    /// Reads a part from a file of its own, or from an .exr that holds one beside its picture.
+    /// Bytes of memory that a part may take whatever its size, and more for each byte of its file: a part of an honest render takes a
+    /// tenth of it.
+    pub fn fair_memory(file_bytes: u64) -> u64 {
+        const FREE: u64 = 64 << 20;
+        const EACH: u64 = 32;
+        FREE.saturating_add(file_bytes.saturating_mul(EACH))
+    }
+
+    /// Reads a part from a file of its own, or from an .exr that holds one beside its picture. `most_memory` says how many bytes of memory
+    /// it may take, by the size of its file in bytes, and is asked before it is read: see [`Part::fair_memory`].
     ///
     /// # Errors
     /// [`PartError`].
-    pub fn open(path: &Path, most_memory: u64) -> Result<Self, PartError> {
-        let bytes = fs::read(path)?;
-        if let Some((rest, trailer)) = bytes.split_last_chunk::<{ TRAILER.len() }>()
-            && trailer == TRAILER
-            && let Some((rest, length)) = rest.split_last_chunk()
-        {
-            let length = usize::try_from(u64::from_le_bytes(*length)).map_err(|_| PartError::Damaged)?;
-            let start = rest.len().checked_sub(length).ok_or(PartError::Damaged)?;
-            return Self::from_bytes(&rest[start..], most_memory);
+    pub fn open(path: &Path, most_memory: impl FnOnce(u64) -> u64) -> Result<Self, PartError> {
+        let (mut file, size) = open_regular(path).map_err(|e| match e {
+            FormatError::Io { source, .. } => source,
+            other => io::Error::other(other.to_string()),
+        })?;
+        let most_memory = most_memory(size);
+        let (start, length) = place(&mut file, size)?;
+        if length > most_memory {
+            return Err(PartError::TooLarge { needed: length, limit: most_memory });
         }
+        let mut bytes = Vec::new();
+        let room = usize::try_from(length).ok().and_then(|length| bytes.try_reserve_exact(length).ok());
+        room.ok_or(PartError::TooLarge { needed: length, limit: most_memory })?;
+        file.seek(SeekFrom::Start(start))?;
+        file.take(length).read_to_end(&mut bytes)?;
         Self::from_bytes(&bytes, most_memory)
     }
 
     /// Whether a file holds a part, by how it begins and ends.
     pub fn is_in(path: &Path) -> bool {
-        let look = || -> io::Result<bool> {
-            let mut file = fs::File::open(path)?;
-            if !file.metadata()?.is_file() {
-                return Ok(false);
-            }
+        let look = || -> Option<bool> {
+            let (mut file, size) = open_regular(path).ok()?;
             let mut begin = [0; MAGIC.len()];
-            file.read_exact(&mut begin)?;
-            let mut end = [0; TRAILER.len()];
-            file.seek(SeekFrom::End(-(TRAILER.len() as i64)))?;
-            file.read_exact(&mut end)?;
-            Ok(begin == *MAGIC || end == *TRAILER)
+            file.read_exact(&mut begin).ok()?;
+            Some(begin == *MAGIC || place(&mut file, size).ok()?.0 > 0)
         };
         look().unwrap_or(false)
     }
@@ -252,6 +276,20 @@ impl Part {
     pub fn merge(&mut self, other: &Self) -> Result<(), MergeError> {
         self.state.merge(&other.state)
     }
+}
+
+/// Where in a file of this size a part is, and how long it is: after the picture of an .exr, or else all of it.
+fn place(file: &mut File, size: u64) -> Result<(u64, u64), PartError> {
+    const END: u64 = (TRAILER.len() + 8) as u64;
+    let Some(end) = size.checked_sub(END) else { return Ok((0, size)) };
+    let mut last = [0; END as usize];
+    file.seek(SeekFrom::Start(end))?;
+    file.read_exact(&mut last)?;
+    let (length, trailer) = last.split_at(8);
+    let (Ok(length), true) = (<[u8; 8]>::try_from(length), trailer == TRAILER) else { return Ok((0, size)) };
+    let length = u64::from_le_bytes(length);
+    let start = end.checked_sub(length).ok_or(PartError::Damaged)?;
+    Ok((start, length))
 }
 
 impl Picture {

@@ -9,6 +9,7 @@ use lumbre::formats::atomic_write;
 use lumbre::{DVec3, Ray, RenderOptions, Scene};
 use serde_json::json;
 
+use crate::console::{escaped_json, escaped_lines};
 use crate::failure::{Failure, print};
 use crate::language::Language;
 use crate::names::one_of;
@@ -264,13 +265,15 @@ fn written(request: &Request, name: &Path, sections: &[Section]) -> String {
     let name = name.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let title = title(&name, request.pixel, texts);
     match request.format {
-        Format::Text => writing::text(sections, request.only.is_empty(), texts.schoolbook),
-        Format::Markdown => format!("# {title}\n\n{}", writing::markdown(sections, texts.schoolbook)),
+        Format::Text => escaped_lines(&writing::text(sections, request.only.is_empty(), texts.schoolbook)),
+        Format::Markdown => {
+            format!("# {}\n\n{}", writing::literal(&title), writing::markdown(sections, texts.schoolbook))
+        }
         Format::Html => html::html(&title, texts.code, sections, texts.schoolbook),
         Format::Json => {
             let sections: Vec<_> = sections.iter().map(writing::json).collect();
             let report = json!({ "title": title, "sections": sections });
-            format!("{report:#}\n")
+            escaped_json(&report)
         }
     }
 }

@@ -111,13 +111,13 @@ pub(super) fn markdown(sections: &[Section], schoolbook: &str) -> String {
 
 fn write_markdown(section: &Section, level: usize, schoolbook: &str, out: &mut String) {
     // There are six levels of headings.
-    let _ = writeln!(out, "{} {}\n", "#".repeat(level.min(6)), section.title);
+    let _ = writeln!(out, "{} {}\n", "#".repeat(level.min(6)), literal(&section.title));
     let mut is_list = false;
     for item in &section.items {
         let line = match item {
             Item::Quantity(quantity) => markdown_of(quantity, schoolbook),
-            Item::Text(text) => format!("- {text}"),
-            Item::Remark(text) => format!("- **!** {text}"),
+            Item::Text(text) => format!("- {}", literal(text)),
+            Item::Remark(text) => format!("- **!** {}", literal(text)),
             Item::Table { columns, rows, .. } => {
                 if is_list {
                     out.push('\n');
@@ -125,7 +125,11 @@ fn write_markdown(section: &Section, level: usize, schoolbook: &str, out: &mut S
                 let row = |cells: Vec<String>| {
                     format!(
                         "| {} |\n",
-                        cells.iter().map(|cell| cell.replace('|', "\\|")).collect::<Vec<_>>().join(" | ")
+                        cells
+                            .iter()
+                            .map(|cell| literal(cell).replace('|', "\\|"))
+                            .collect::<Vec<_>>()
+                            .join(" | ")
                     )
                 };
                 out.push_str(&row(columns.iter().map(|column| column.title.clone()).collect()));
@@ -154,10 +158,29 @@ fn write_markdown(section: &Section, level: usize, schoolbook: &str, out: &mut S
     }
 }
 
+/// Text that Markdown shows as it is, on one line: names of a scene bring no HTML, no links, images or formulas.
+pub(super) fn literal(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '$' => out.push_str("\\$"),
+            '(' if out.ends_with(']') => out.push_str("&#40;"),
+            c if c.is_control() => out.extend(c.escape_default()),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
 fn markdown_of(quantity: &Quantity, schoolbook: &str) -> String {
     let Quantity { symbol, label, value, .. } = quantity;
     let label_after =
-        if label.is_empty() || symbol.is_empty() { String::new() } else { format!(" ({label})") };
+        if label.is_empty() || symbol.is_empty() { String::new() } else { format!(" ({})", literal(label)) };
+    let latex =
+        |formula: &str| latex(formula).replace('<', "\\lt ").replace('>', "\\gt ").replace('$', "\\$");
     let mut line = match (value.rows(), symbol.is_empty()) {
         (Some(rows), _) => {
             let rows = rows.map(|row| row.map(|cell| latex(&cell)).join(" & ")).join(" \\\\ ");
@@ -167,10 +190,10 @@ fn markdown_of(quantity: &Quantity, schoolbook: &str) -> String {
             if is_symbol {
                 format!("- ${} = {matrix}$", latex(name))
             } else {
-                format!("- {name}: ${matrix}$")
+                format!("- {}: ${matrix}$", literal(name))
             }
         }
-        (None, true) => format!("- {label}: {}", value.in_full()),
+        (None, true) => format!("- {}: {}", literal(label), literal(&value.in_full())),
         (None, false) => format!("- ${}${label_after}", latex(&chain(quantity, &value.in_full()))),
     };
     if let Some((formula, value)) = &quantity.schoolbook {

@@ -235,7 +235,11 @@ fn image_name(value: Value<'_>, index: usize) -> Read<String> {
 fn is_absent(file: &File<'_>, value: Value<'_>) -> Read<bool> {
     let Some(uri) = value.get("uri")? else { return Ok(false) };
     Ok(match target(&uri.string()?) {
-        Target::File(path) => !file.folder.join(path).is_file(),
+        Target::File(path) => {
+            let path = file.folder.join(path);
+            // Nothing is said of files that may not be opened, not even whether they are there.
+            !file.budget.allows(&path) || !path.is_file()
+        }
         Target::Scheme(_) => true,
         Target::Data(_) | Target::Malformed => false,
     })

@@ -235,6 +235,10 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       const hits = thing ? [{ ...thing, distance: this.picks.getFloat32(at + 4, true) }] : [];
       this.listener.told({ type: "picked", request: request2, x, y, ray: { hits } });
     }
+    /** There is nobody to give one. */
+    ticket() {
+      return Promise.reject(new Error("at rest"));
+    }
     send(message) {
       const { type, channel, x, y, width, height, request: request2 } = message;
       if (type === "set" && channel) void this.show(String(channel));
@@ -276,6 +280,53 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     for (const option of document.querySelectorAll("option[value=ids], option[value=variance]")) option.remove();
   }
 
+  // src/proof.ts
+  var IV = [1779033703, 3144134277, 1013904242, 2773480762, 1359893119, 2600822924, 528734635, 1541459225];
+  var ORDER = [2, 6, 3, 10, 7, 0, 4, 13, 1, 11, 12, 5, 9, 14, 15, 8];
+  var QUARTERS = [
+    [0, 4, 8, 12],
+    [1, 5, 9, 13],
+    [2, 6, 10, 14],
+    [3, 7, 11, 15],
+    [0, 5, 10, 15],
+    [1, 6, 11, 12],
+    [2, 7, 8, 13],
+    [3, 4, 9, 14]
+  ];
+  var FLAGS = 1 | 2 | 8 | 16;
+  var BLOCK = 64;
+  function keyedHash(key2, bytes2) {
+    if (key2.length !== 32 || bytes2.length > BLOCK) throw new Error("one block and a key of 32 bytes");
+    const words = (of, count) => {
+      const view = new DataView(Uint8Array.from({ length: 4 * count }, (_, i) => of[i] ?? 0).buffer);
+      return Array.from({ length: count }, (_, i) => view.getUint32(4 * i, true));
+    };
+    const v = Uint32Array.from([...words(key2, 8), ...IV.slice(0, 4), 0, 0, bytes2.length, FLAGS]);
+    const at = (i) => v[i] ?? 0;
+    const turned2 = (x, by) => x >>> by | x << 32 - by;
+    let block = words(bytes2, 16);
+    for (let round = 0; round < 7; round++) {
+      QUARTERS.forEach(([a, b, c, d], quarter) => {
+        for (const [which, first, second] of [[0, 16, 12], [1, 8, 7]]) {
+          v[a] = at(a) + at(b) + (block[2 * quarter + which] ?? 0);
+          v[d] = turned2(at(d) ^ at(a), first);
+          v[c] = at(c) + at(d);
+          v[b] = turned2(at(b) ^ at(c), second);
+        }
+      });
+      block = ORDER.map((from) => block[from] ?? 0);
+    }
+    const out = new DataView(new ArrayBuffer(32));
+    for (let i = 0; i < 8; i++) out.setUint32(4 * i, at(i) ^ at(i + 8), true);
+    return new Uint8Array(out.buffer);
+  }
+  var digits = (bytes2) => Array.from(bytes2, (byte) => byte.toString(16).padStart(2, "0")).join("");
+  var bytesOf = (text) => Uint8Array.from(text.match(/../g) ?? [], (pair) => parseInt(pair, 16));
+  function proof(secret2, side, viewers, pages) {
+    const bytes2 = [...new TextEncoder().encode(side), ...bytesOf(viewers).slice(0, 24), ...bytesOf(pages).slice(0, 24)];
+    return digits(keyedHash(bytesOf(secret2), Uint8Array.from(bytes2)));
+  }
+
   // src/protocol.ts
   var HEADER = 32;
   var MAGIC = 827151692;
@@ -288,45 +339,106 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
   }
 
   // src/connection.ts
+  var UNKNOWN = 4403;
+  var SECRET = "lumbre-session";
+  function secret() {
+    const token = /^#([0-9a-f]{64})$/.exec(location.hash)?.[1];
+    if (token) {
+      history.replaceState(null, "", location.pathname);
+      sessionStorage.setItem(SECRET, token);
+    }
+    return sessionStorage.getItem(SECRET);
+  }
   var Connection = class {
     constructor(listener2) {
       this.listener = listener2;
-      this.connect();
+      setTimeout(() => this.connect());
+      addEventListener("hashchange", () => {
+        if (!secret()) return;
+        clearTimeout(this.again);
+        const before = this.socket;
+        this.connect();
+        before?.close();
+      });
     }
     listener;
     socket;
     wait = 500;
+    again = 0;
+    isIn = false;
+    requests = 0;
+    waiting = /* @__PURE__ */ new Map();
     send(message) {
-      if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
+      if (this.isIn && this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
+    }
+    /** An address for an errand, which works once. */
+    ticket(errand) {
+      if (!this.isIn) return Promise.reject(new Error("not connected"));
+      const request2 = ++this.requests;
+      return new Promise((found) => {
+        this.waiting.set(request2, found);
+        this.send({ type: "ticket", request: request2, errand });
+      });
     }
     connect() {
+      this.isIn = false;
+      const known = secret();
+      if (!known) {
+        this.listener.stood("refused");
+        return;
+      }
       const socket = new WebSocket(`ws://${location.host}/socket`);
       socket.binaryType = "arraybuffer";
       this.socket = socket;
-      socket.onopen = () => {
-        this.wait = 500;
+      const nonce = digits(crypto.getRandomValues(new Uint8Array(32)));
+      let challenge = "";
+      const greet = (message) => {
+        if (message.type === "challenge" && !challenge && /^[0-9a-f]{64}$/.test(message.nonce)) {
+          challenge = message.nonce;
+          socket.send(JSON.stringify({ type: "hello", nonce, proof: proof(known, "page", challenge, nonce) }));
+          return true;
+        }
+        if (message.type !== "welcome" || !challenge || message.proof !== proof(known, "viewer", challenge, nonce)) return false;
+        if (message.session) sessionStorage.setItem(SECRET, message.session);
+        [this.isIn, this.wait] = [true, 500];
         this.listener.stood("open");
+        return true;
       };
+      const lost = (how) => {
+        if (this.socket !== socket) return;
+        [this.socket, this.isIn] = [void 0, false];
+        this.waiting.clear();
+        this.listener.stood(how);
+        this.again = setTimeout(() => this.connect(), this.wait);
+        this.wait = Math.min(this.wait * 1.5, 5e3);
+      };
+      socket.onclose = ({ code }) => lost(code === UNKNOWN ? "refused" : "gone");
       socket.onmessage = (event) => {
+        if (this.socket !== socket) return;
+        if (!this.isIn) {
+          let isViewer = false;
+          try {
+            isViewer = typeof event.data === "string" && greet(JSON.parse(event.data));
+          } catch {
+          }
+          if (isViewer) return;
+          lost("foreign");
+          socket.close();
+          return;
+        }
         if (typeof event.data === "string") {
-          this.listener.told(JSON.parse(event.data));
+          const message = JSON.parse(event.data);
+          if (message.type === "ticket") {
+            this.waiting.get(message.request)?.(message.address);
+            this.waiting.delete(message.request);
+          } else {
+            this.listener.told(message);
+          }
           return;
         }
         this.listener.framed(decoded(event.data));
         this.send({ type: "shown" });
       };
-      socket.onclose = () => void this.lost();
-    }
-    async lost() {
-      let how = "gone";
-      try {
-        const answer = await fetch("/", { cache: "no-store" });
-        if (answer.status === 403) how = "refused";
-      } catch {
-      }
-      this.listener.stood(how);
-      setTimeout(() => this.connect(), this.wait);
-      this.wait = Math.min(this.wait * 1.5, 5e3);
     }
   };
 
@@ -426,17 +538,21 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
 
   // src/explanation.ts
   var Explanation = class {
-    dialog = byId("explanation");
-    button = byId("explain");
-    language = byId("language");
-    languages = [];
-    pixel;
-    constructor() {
+    constructor(ticket) {
+      this.ticket = ticket;
       this.button.addEventListener("click", () => this.show());
-      this.language.addEventListener("change", () => this.load());
+      this.language.addEventListener("change", () => void this.load());
+      this.alone.addEventListener("click", () => setTimeout(() => void this.offerAlone()));
       byId("explanation-close").addEventListener("click", () => this.dialog.close());
       this.dialog.addEventListener("close", () => byId("explanation-text").replaceChildren());
     }
+    ticket;
+    dialog = byId("explanation");
+    button = byId("explain");
+    alone = byId("explanation-alone");
+    language = byId("language");
+    languages = [];
+    pixel;
     /** The languages in which there are explanations. */
     offer(languages) {
       this.languages = languages;
@@ -454,21 +570,33 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     /** Explains the pixel that was asked about. */
     show() {
       if (this.button.hidden) return;
-      this.load();
+      void this.load();
       this.dialog.showModal();
     }
     draw() {
       this.button.hidden = !this.pixel || this.languages.length === 0;
       this.button.textContent = `Explain pixel ${this.pixel?.join(", ") ?? ""}`;
     }
-    load() {
-      if (!this.pixel) return;
-      const address = `explanation/${this.language.value}/${this.pixel.join("/")}`;
-      byId("explanation-alone").href = address;
-      const frame = element("iframe", "", { title: this.button.textContent ?? "" });
-      frame.setAttribute("sandbox", "");
-      frame.src = address;
-      byId("explanation-text").replaceChildren(frame);
+    get errand() {
+      return this.pixel && { for: "explanation", language: this.language.value, pixel: this.pixel };
+    }
+    async offerAlone() {
+      this.alone.removeAttribute("href");
+      if (this.errand) this.alone.href = await this.ticket(this.errand);
+    }
+    async load() {
+      if (!this.errand) return;
+      const title = this.button.textContent ?? "";
+      try {
+        const address = await this.ticket(this.errand);
+        const frame = element("iframe", "", { title });
+        frame.setAttribute("sandbox", "");
+        frame.src = address;
+        byId("explanation-text").replaceChildren(frame);
+        await this.offerAlone();
+      } catch {
+        byId("explanation-text").replaceChildren(element("p", "The viewer does not answer."));
+      }
     }
   };
 
@@ -907,7 +1035,8 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     connected = how === "open";
     if (how === "open") alertOf("", "");
     if (how === "gone") alertOf("The viewer does not answer.", "It has ended, or the tunnel to it has. This page goes on when it is back.");
-    if (how === "refused") alertOf("The viewer was started anew.", "Open the address that it printed.");
+    if (how === "refused") alertOf("The viewer does not know this page.", "Open the address that lumbre view printed. It works once, in one tab: to have another one, start the viewer again.");
+    if (how === "foreign") alertOf("Another program answers in place of the viewer.", "It cannot prove to be the viewer, and was told nothing.");
     if (!connected) byId("progress").textContent = "Not connected";
   }
   function showProgress(progress) {
@@ -1022,7 +1151,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       else byId("pixel").textContent = "";
     }
   });
-  var explanation = new Explanation();
+  var explanation = new Explanation((errand) => connection.ticket(errand));
   var editor = new Editor(byId("parameters"), byId("filter"), (path, value) => connection.send({ type: "edit", path, value }));
   function on(id, event, act) {
     const input = byId(id);
@@ -1050,6 +1179,16 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
   on("variant", "change", ({ value }) => moment({ variant: value || null }));
   on("save-overlay", "click", () => save(`${state?.name ?? "scene"}.overlay.txt`, editor.overlay()));
   on("drop-edits", "click", () => editor.dropAll());
+  async function savePicture(format) {
+    try {
+      const link = element("a", "", { href: await connection.ticket({ for: "picture", format }), download: `picture.${format}` });
+      link.click();
+    } catch {
+      alertOf("The picture was not saved.", "The viewer does not answer.");
+    }
+  }
+  on("save-png", "click", () => void savePicture("png"));
+  on("save-exr", "click", () => void savePicture("exr"));
   function copy(text) {
     const shown = byId("copied");
     [shown.hidden, shown.value] = [false, text];
@@ -1086,7 +1225,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     if (!file) return;
     try {
       const headers = { "Content-Type": "application/octet-stream" };
-      const answer = await fetch("/scene", { method: "POST", headers, body: file });
+      const answer = await fetch(await connection.ticket({ for: "scene" }), { method: "POST", headers, body: file });
       if (!answer.ok) alertOf("The file was not opened.", await answer.text());
     } catch {
       alertOf("The file was not opened.", "The viewer does not answer.");

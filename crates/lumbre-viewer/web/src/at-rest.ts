@@ -81,6 +81,11 @@ export class AtRest {
     this.listener.told({ type: "picked", request, x, y, ray: { hits } });
   }
 
+  /** There is nobody to give one. */
+  ticket(): Promise<string> {
+    return Promise.reject(new Error("at rest"));
+  }
+
   send(message: object): void {
     const { type, channel, x, y, width, height, request } = message as Record<string, number> & { type: string; channel?: string };
     if (type === "set" && channel) void this.show(String(channel));

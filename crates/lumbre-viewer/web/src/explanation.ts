@@ -1,16 +1,20 @@
 // How the colour of a pixel comes about, as the viewer tells it: a page in a frame that can run nothing.
+import type { Errand } from "./connection";
 import { byId, element, options } from "./elements";
 
 export class Explanation {
   private readonly dialog = byId<HTMLDialogElement>("explanation");
   private readonly button = byId<HTMLButtonElement>("explain");
+  private readonly alone = byId<HTMLAnchorElement>("explanation-alone");
   private readonly language = byId<HTMLSelectElement>("language");
   private languages: [string, string][] = [];
   private pixel: [number, number] | undefined;
 
-  constructor() {
+  constructor(private readonly ticket: (errand: Errand) => Promise<string>) {
     this.button.addEventListener("click", () => this.show());
-    this.language.addEventListener("change", () => this.load());
+    this.language.addEventListener("change", () => void this.load());
+    // Its address works once: the next one is fetched when it was used.
+    this.alone.addEventListener("click", () => setTimeout(() => void this.offerAlone()));
     byId("explanation-close").addEventListener("click", () => this.dialog.close());
     this.dialog.addEventListener("close", () => byId("explanation-text").replaceChildren());
   }
@@ -34,7 +38,7 @@ export class Explanation {
   /** Explains the pixel that was asked about. */
   show(): void {
     if (this.button.hidden) return;
-    this.load();
+    void this.load();
     this.dialog.showModal();
   }
 
@@ -43,14 +47,28 @@ export class Explanation {
     this.button.textContent = `Explain pixel ${this.pixel?.join(", ") ?? ""}`;
   }
 
-  private load(): void {
-    if (!this.pixel) return;
-    const address = `explanation/${this.language.value}/${this.pixel.join("/")}`;
-    byId<HTMLAnchorElement>("explanation-alone").href = address;
-    // A new frame: one that goes to another address would be a step in the history of the page.
-    const frame = element("iframe", "", { title: this.button.textContent ?? "" });
-    frame.setAttribute("sandbox", "");
-    frame.src = address;
-    byId("explanation-text").replaceChildren(frame);
+  private get errand(): Errand | undefined {
+    return this.pixel && { for: "explanation", language: this.language.value, pixel: this.pixel };
+  }
+
+  private async offerAlone(): Promise<void> {
+    this.alone.removeAttribute("href");
+    if (this.errand) this.alone.href = await this.ticket(this.errand);
+  }
+
+  private async load(): Promise<void> {
+    if (!this.errand) return;
+    const title = this.button.textContent ?? "";
+    try {
+      const address = await this.ticket(this.errand);
+      // A new frame: one that goes to another address would be a step in the history of the page.
+      const frame = element("iframe", "", { title });
+      frame.setAttribute("sandbox", "");
+      frame.src = address;
+      byId("explanation-text").replaceChildren(frame);
+      await this.offerAlone();
+    } catch {
+      byId("explanation-text").replaceChildren(element("p", "The viewer does not answer."));
+    }
   }
 }

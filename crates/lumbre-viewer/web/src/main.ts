@@ -3,7 +3,7 @@ import { Camera } from "./camera";
 import { AtRest, hideWhatNeedsAViewer, type Data } from "./at-rest";
 import { Connection, type Listener } from "./connection";
 import { Editor } from "./edit";
-import { byId, large, options, save, short, spoken } from "./elements";
+import { byId, element, large, options, save, short, spoken } from "./elements";
 import { Explanation } from "./explanation";
 import { showFacts, showHits } from "./facts";
 import { attach } from "./hands";
@@ -119,11 +119,12 @@ function alertOf(title: string, text: string): void {
 }
 
 let connected = false;
-function stood(how: "open" | "gone" | "refused"): void {
+function stood(how: "open" | "gone" | "refused" | "foreign"): void {
   connected = how === "open";
   if (how === "open") alertOf("", "");
   if (how === "gone") alertOf("The viewer does not answer.", "It has ended, or the tunnel to it has. This page goes on when it is back.");
-  if (how === "refused") alertOf("The viewer was started anew.", "Open the address that it printed.");
+  if (how === "refused") alertOf("The viewer does not know this page.", "Open the address that lumbre view printed. It works once, in one tab: to have another one, start the viewer again.");
+  if (how === "foreign") alertOf("Another program answers in place of the viewer.", "It cannot prove to be the viewer, and was told nothing.");
   if (!connected) byId("progress").textContent = "Not connected";
 }
 
@@ -243,7 +244,7 @@ attach(sheet.picture, sheet, camera, {
   },
 });
 
-const explanation = new Explanation();
+const explanation = new Explanation((errand) => connection.ticket(errand));
 const editor = new Editor(byId("parameters"), byId("filter"), (path, value) => connection.send({ type: "edit", path, value }));
 
 function on(id: string, event: string, act: (input: HTMLInputElement) => void): void {
@@ -273,6 +274,18 @@ on("animation-time", "input", ({ value }) => moment({ time: Number(value) }));
 on("variant", "change", ({ value }) => moment({ variant: value || null }));
 on("save-overlay", "click", () => save(`${state?.name ?? "scene"}.overlay.txt`, editor.overlay()));
 on("drop-edits", "click", () => editor.dropAll());
+
+/** Takes the picture as a file, which the browser saves. */
+async function savePicture(format: "png" | "exr"): Promise<void> {
+  try {
+    const link = element("a", "", { href: await connection.ticket({ for: "picture", format }), download: `picture.${format}` });
+    link.click();
+  } catch {
+    alertOf("The picture was not saved.", "The viewer does not answer.");
+  }
+}
+on("save-png", "click", () => void savePicture("png"));
+on("save-exr", "click", () => void savePicture("exr"));
 
 function copy(text: string): void {
   const shown = byId<HTMLTextAreaElement>("copied");
@@ -315,7 +328,7 @@ async function drop(file: File | undefined): Promise<void> {
   if (!file) return;
   try {
     const headers = { "Content-Type": "application/octet-stream" };
-    const answer = await fetch("/scene", { method: "POST", headers, body: file });
+    const answer = await fetch(await connection.ticket({ for: "scene" }), { method: "POST", headers, body: file });
     if (!answer.ok) alertOf("The file was not opened.", await answer.text());
   } catch {
     alertOf("The file was not opened.", "The viewer does not answer.");

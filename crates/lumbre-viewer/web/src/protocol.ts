@@ -55,6 +55,7 @@ export type Told =
   | ({ type: "progress" } & Progress)
   | { type: "picked"; request: number; x: number; y: number; ray: { origin?: Vector; direction?: Vector; hits: Hit[] } }
   | { type: "values"; request: number; x: number; y: number; width: number; height: number; values: [Value, Value, Value][] }
+  | { type: "ticket"; request: number; address: string }
   | { type: "wrong"; what: string };
 
 /** A picture with its size, that of the whole one, and what it shows. */

@@ -1,10 +1,11 @@
 // What many clients take of a viewer's processor time while it renders: node tests/crowd.mjs SCENE CLIENTS SECONDS
 import { spawn } from "node:child_process";
 import { readFileSync } from "node:fs";
-import { get } from "node:http";
+import { randomBytes } from "node:crypto";
 import { connect } from "node:net";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
+import { proof } from "./proofs.mjs";
 
 const root = join(dirname(fileURLToPath(import.meta.url)), "../../../..");
 const program = process.env.LUMBRE ?? join(root, "target/release/lumbre");
@@ -12,16 +13,24 @@ const [scene, clients = "100", seconds = "30"] = process.argv.slice(2);
 const words = ["view", "--no-open", "--size", "1280x720", "--spp", "100000", scene];
 const child = spawn(program, words, { stdio: ["ignore", "pipe", "inherit"] });
 const url = new URL(await new Promise((done) => child.stdout.once("data", (bytes) => done(String(bytes).trim()))));
-const cookie = await new Promise((done) => get(url, (answer) => done(answer.headers["set-cookie"][0].split(";")[0])));
+// The token of the address, and then the session that it becomes.
+let secret = url.hash.slice(1);
 
 let frames = 0;
-/** Reads frames, and says of each picture that it was shown. */
-function client() {
+/** A frame of text, masked by zeros. */
+function packet(message) {
+  const bytes = Buffer.from(JSON.stringify(message));
+  const long = bytes.length < 126 ? [0x80 | bytes.length] : [0xfe, bytes.length >> 8, bytes.length & 255];
+  return Buffer.concat([Buffer.from([0x81, ...long, 0, 0, 0, 0]), bytes]);
+}
+/** Is let in, reads frames, and says of each picture that it was shown. */
+function client(isIn) {
   const socket = connect(Number(url.port), url.hostname);
-  socket.write(`GET /socket HTTP/1.1\r\nHost: ${url.host}\r\nOrigin: http://${url.host}\r\nCookie: ${cookie}\r\nConnection: Upgrade\r\n`
+  socket.write(`GET /socket HTTP/1.1\r\nHost: ${url.host}\r\nOrigin: http://${url.host}\r\nConnection: Upgrade\r\n`
     + "Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n");
-  const shown = Buffer.from('{"type":"shown"}');
-  const answer = Buffer.concat([Buffer.from([0x81, 0x80 | shown.length, 0, 0, 0, 0]), shown]);
+  const answer = packet({ type: "shown" });
+  const nonce = randomBytes(32).toString("hex");
+  let greetings = 2;
   let [head, skip, isOpen] = [Buffer.alloc(0), 0, false];
   socket.on("data", (bytes) => {
     for (;;) {
@@ -50,6 +59,17 @@ function client() {
         bytes = rest;
         continue;
       }
+      if (greetings > 0) {
+        // Both are shorter than what of a packet is kept here.
+        const message = JSON.parse(head.subarray(from, from + length).toString());
+        greetings -= 1;
+        if (message.type === "challenge") {
+          socket.write(packet({ type: "hello", nonce, proof: proof(secret, "page", message.nonce, nonce) }));
+        } else {
+          secret = message.session ?? secret;
+          isIn();
+        }
+      }
       if ((head[0] & 15) === 2) {
         frames += 1;
         socket.write(answer);
@@ -67,7 +87,7 @@ const spent = (path) => {
   return (Number(fields[11]) + Number(fields[12])) / 100;
 };
 const both = () => [spent(`/proc/${child.pid}/task/${child.pid}/stat`), spent(`/proc/${child.pid}/stat`)];
-for (let i = 0; i < Number(clients); i++) client();
+for (let i = 0; i < Number(clients); i++) await new Promise((isIn) => client(isIn));
 await new Promise((done) => setTimeout(done, 5000));
 const [served, all] = both();
 const before = frames;

@@ -8,6 +8,7 @@ import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { chromium } from "playwright-core";
 import { PNG } from "pngjs";
+import { attacks } from "./attacks.mjs";
 
 const here = dirname(fileURLToPath(import.meta.url));
 const root = join(here, "../../../..");
@@ -156,6 +157,8 @@ async function finds(page, what, rules = {}) {
 }
 
 const tests = {
+  ...attacks({ view, open, done, pixels, freePort, folder }),
+
   async "it opens once and converges to the pixels that are rendered"() {
     const path = join(folder, "scene.pbrt");
     const viewer = await view(path);
@@ -166,10 +169,20 @@ const tests = {
     execFileSync(program, ["render", path, "-o", out, "-q"]);
     const rendered = PNG.sync.read(readFileSync(out));
     assert.deepEqual(await pixels(page), [rendered.width, rendered.height, ...rendered.data]);
-    const saved = await page.evaluate(async () => [...new Uint8Array(await (await fetch("picture.png")).arrayBuffer())]);
-    assert.ok(PNG.sync.read(Buffer.from(saved)).data.equals(rendered.data), "the picture that is saved is the same");
-    const other = await open(viewer.url);
-    assert.match(await other.textContent("body"), /open to one browser/);
+    await page.click("#save-details > summary");
+    const [download] = await Promise.all([page.waitForEvent("download"), page.click("#save-png")]);
+    assert.equal(download.suggestedFilename(), "picture.png");
+    const saved = PNG.sync.read(readFileSync(await download.path()));
+    assert.ok(saved.data.equals(rendered.data), "the picture that is saved is the same");
+    // The same tab comes back; another one does not come in, by the address that was used or without.
+    assert.equal(page.url(), `${new URL(viewer.url).origin}/`);
+    await page.reload();
+    await done(page);
+    for (const address of [viewer.url, new URL(viewer.url).origin]) {
+      const other = await open(address);
+      await other.waitForFunction(() => /does not know this page/.test(document.getElementById("alert").textContent));
+      assert.equal(await other.isVisible("#picked table"), false);
+    }
     await viewer.stop();
   },
 
@@ -258,12 +271,19 @@ const tests = {
     await page.waitForSelector("#explain:visible");
     assert.equal(await page.textContent("#explain"), `Explain pixel ${x}, ${y}`);
     const explain = (...words) => execFileSync(program, ["explain", path, "--pixel", `${x},${y}`, "-q", ...words], { encoding: "utf8" });
-    const served = async () => (await page.request.get(await page.locator("#explanation iframe").evaluate((frame) => frame.src))).text();
-    await page.focus("#picture");
-    await page.keyboard.press("x");
+    /** What is shown in the frame after this. */
+    const served = async (act) => {
+      const isExplanation = (answer) => answer.url().includes("/ticket/") && answer.request().resourceType() === "document";
+      const [answer] = await Promise.all([page.waitForResponse(isExplanation), act()]);
+      return answer.text();
+    };
+    const pressX = async () => {
+      await page.focus("#picture");
+      await page.keyboard.press("x");
+    };
+    assert.equal(await served(pressX), explain("--format", "html"));
     const told = page.frameLocator("#explanation iframe").locator("main");
     await told.waitFor();
-    assert.equal(await served(), explain("--format", "html"));
     // The numbers that are seen are those that the program gives to other programs, and names are text.
     const report = JSON.parse(explain("--format", "json"));
     const sections = new Map(report.sections.map((section) => [section.key, section]));
@@ -278,9 +298,11 @@ const tests = {
     assert.ok(seen.includes("<img src=x onerror=evil()> (diffuse)"));
     assert.equal(await told.locator("img").count(), 0);
 
-    await page.selectOption("#language", "es");
+    assert.equal(await served(() => page.selectOption("#language", "es")), explain("--format", "html", "--lang", "es"));
     await page.frameLocator("#explanation iframe").locator("html[lang=es]").waitFor();
-    assert.equal(await served(), explain("--format", "html", "--lang", "es"));
+    await page.waitForSelector("#explanation-alone[href]");
+    const used = await page.locator("#explanation iframe").evaluate((frame) => frame.src);
+    assert.equal((await page.request.get(used)).status(), 403, "an address works once");
     const [alone] = await Promise.all([page.context().waitForEvent("page"), page.click("#explanation-alone")]);
     await alone.waitForLoadState();
     assert.equal(await alone.getAttribute("html", "lang"), "es");
@@ -300,15 +322,12 @@ const tests = {
     await becomes(page, before, false);
     const overlay = join(folder, "explained.txt");
     writeFileSync(overlay, "material.<img src=x onerror=evil()>.reflectance = #20c040\n");
-    await page.click("#explain");
-    assert.equal(await served(), explain("--format", "html", "--lang", "es", "--overlay", overlay));
+    assert.equal(await served(() => page.click("#explain")), explain("--format", "html", "--lang", "es", "--overlay", overlay));
     await page.click("#explanation-close");
     await page.focus("#picture");
     await page.keyboard.press("ArrowLeft", { delay: 80 });
     await page.waitForFunction(() => lumbreMeasured.latencies.length > 0);
-    await page.focus("#picture");
-    await page.keyboard.press("x");
-    assert.notEqual(await served(), explain("--format", "html", "--lang", "es", "--overlay", overlay));
+    assert.notEqual(await served(pressX), explain("--format", "html", "--lang", "es", "--overlay", overlay));
     await viewer.stop();
   },
 
@@ -503,7 +522,8 @@ const tests = {
         await page.keyboard.press("x");
         await page.frameLocator("#explanation iframe").locator("main").waitFor();
         await finds(page, `explanation, ${colorScheme} ${form}`);
-        await page.goto(await page.locator("#explanation iframe").evaluate((frame) => frame.src));
+        await page.waitForSelector("#explanation-alone[href]");
+        await page.goto(await page.locator("#explanation-alone").evaluate((link) => link.href));
         // Browsers let the keyboard into what scrolls.
         await finds(page, `explanation alone, ${colorScheme} ${form}`, { "scrollable-region-focusable": { enabled: false } });
         assert.ok(await page.evaluate(() => document.documentElement.scrollWidth) <= width, `${form}: the explanation is no wider than the screen`);
