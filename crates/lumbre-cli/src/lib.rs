@@ -48,7 +48,7 @@ pub use defaults::{Defaults, MODEL_SPP};
 pub use explain::{Explainer, Format, Request, Things, explain};
 pub use failure::Failure;
 pub use language::Language;
-pub use memory::memory_left;
+pub use memory::{check_picture, memory_left};
 
 /// Renders scenes, casts rays into them, says what is in them, and compares and joins pictures.
 #[derive(Parser)]

@@ -141,6 +141,14 @@ pub fn memory_left() -> u64 {
     if memory.bound == Bound::AddressSpace { memory.usable() } else { memory.most }
 }
 
+/// Refuses a picture that would not fit into the memory that is free, while it is rendered, saved or shown. `held` bytes are held already.
+///
+/// # Errors
+/// [`Failure::Limit`] with the prediction, and [`Failure::Usage`] for options that make no picture.
+pub fn check_picture(options: &RenderOptions, held: u64) -> Result<(), Failure> {
+    Memory::new(None).check_picture(options, held)
+}
+
 /// Bytes of memory that are free, or can be made so; `None` if the system does not tell.
 fn available_memory() -> Option<u64> {
     let memory = fs::read_to_string("/proc/meminfo").ok()?;

@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 
 use lumbre::{ReadOptions, SaveOptions, SceneDesc};
 use lumbre_cli::{Defaults, Explainer, MODEL_SPP};
-use lumbre_viewer::{Built, Closer, Moment, Options, Read, Source};
+use lumbre_viewer::{Built, Closer, Moment, Options, Read, Source, SourceError};
 use pyo3::exceptions::{PyOSError, PyRuntimeError};
 use pyo3::prelude::*;
 
@@ -39,7 +39,7 @@ impl Source for Live {
         }
     }
 
-    fn read(&self, moment: &Moment) -> Result<Read, String> {
+    fn read(&self, moment: &Moment) -> Result<Read, SourceError> {
         match &self.origin {
             Origin::Shapes(desc) => {
                 Ok(Read { desc: SceneDesc::clone(desc), files: Vec::new(), warnings: Vec::new() })
@@ -49,16 +49,16 @@ impl Source for Live {
                 options.frame = moment.time.or(options.frame);
                 options.variant = moment.variant.clone().or(options.variant);
                 let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
-                let (desc, diagnostics) = lumbre::describe(&paths, &options).map_err(|e| e.to_string())?;
+                let (desc, diagnostics) = lumbre::describe(&paths, &options)?;
                 Ok(Read { desc, files: diagnostics.files_read().to_vec(), warnings: diagnostics.lines() })
             }
         }
     }
 
-    fn build(&self, mut desc: SceneDesc) -> Result<Built, String> {
+    fn build(&self, mut desc: SceneDesc) -> Result<Built, SourceError> {
         let explain = Explainer::new(&desc, self.name());
         let defaults = Defaults::stage(&mut desc, self.size, None);
-        let scene = lumbre::Scene::from_description(desc).map_err(|e| e.to_string())?;
+        let scene = lumbre::Scene::from_description(desc)?;
         let mut options = scene.options();
         if let Some((width, height)) = self.size {
             options.resize(scene.resolved().film(), width, height);
@@ -68,10 +68,10 @@ impl Source for Live {
         let is_plain = self.spp.is_none() && defaults.is_plain(&scene);
         let own = if is_plain { MODEL_SPP } else { options.stop.spp };
         options.stop.spp = self.spp.unwrap_or(own);
-        options.bounds().map_err(|e| e.to_string())?;
+        self.check(&options)?;
         let mut save = SaveOptions::default();
         save.tone_map = defaults.tone_map();
-        save.exposure = defaults.exposure(&scene, &options).map_err(|e| e.to_string())?;
+        save.exposure = defaults.exposure(&scene, &options)?;
         Ok(Built {
             scene,
             options,
@@ -83,8 +83,14 @@ impl Source for Live {
         })
     }
 
+    fn check(&self, options: &lumbre::RenderOptions) -> Result<(), SourceError> {
+        Ok(lumbre_cli::check_picture(options, 0)?)
+    }
+
     fn of_file(&self, file: &Path) -> Arc<dyn Source> {
-        let origin = Origin::Files(vec![file.to_owned()], Box::default());
+        let mut options = lumbre::ReadOptions::default();
+        options.is_alone = true;
+        let origin = Origin::Files(vec![file.to_owned()], Box::new(options));
         Arc::new(Self { origin, size: self.size, spp: self.spp })
     }
 }

@@ -41,8 +41,9 @@ fn questions() -> Questions {
     let directions = [column(2.0, -1.0), column(2.0, -1.0), column(2.0, -1.0)];
     let u = [(); 4].map(|()| column(1.0, 0.0).iter().map(|&x| (x as f32).min(0.999_999)).collect());
     let mut direction = [(); 3].map(|()| Vec::new());
-    for i in 0..COUNT {
-        let unit = DVec3::from([0, 1, 2].map(|k| directions[k][i])).normalize().as_vec3().to_array();
+    let [x, y, z] = &directions;
+    for ((&x, &y), &z) in x.iter().zip(y).zip(z) {
+        let unit = DVec3::new(x, y, z).normalize().as_vec3().to_array();
         (0..3).for_each(|k| direction[k].push(unit[k]));
     }
     let normal = [0.0, 0.0, 1.0].map(|n| vec![n; COUNT]);
