@@ -204,7 +204,7 @@ enum Approach {
 fn approach(accel: &Accel, picture: &PictureStart, ray: &Ray, limit: f64) -> Approach {
     let start = &picture.start;
     let size = largest_component(ray) * start.scale;
-    if !(f64::MIN_POSITIVE <= size && size <= f64::MAX) {
+    if !(f64::MIN_POSITIVE..=f64::MAX).contains(&size) {
         return Approach::Unknown;
     }
     // So that its largest component is about 1, in tree units.
@@ -213,8 +213,10 @@ fn approach(accel: &Accel, picture: &PictureStart, ray: &Ray, limit: f64) -> App
     let from = (ray.origin - DVec3::from_slice(&start.tree_origin)) * start.scale;
     let mut zero = 0.0;
     let distance = from.abs().max_element();
-    if !(distance <= NEARBY) {
-        if !(distance <= MOVABLE && accel.infinite.is_empty()) {
+    let is_nearby = distance <= NEARBY;
+    if !is_nearby {
+        let is_movable = distance <= MOVABLE && accel.infinite.is_empty();
+        if !is_movable {
             return Approach::Unknown;
         }
         let along = direction * start.scale;
@@ -287,7 +289,8 @@ impl<'a> Others<'a> {
     #[inline(always)]
     fn offer(&mut self, crossing: Crossing, ray: &Ray) {
         let t = crossing.winner.root.t;
-        if !(t <= self.limit) {
+        let is_wanted = t <= self.limit;
+        if !is_wanted {
             return;
         }
         let is_first = match &self.nearest {
@@ -512,11 +515,8 @@ impl<'a> Others<'a> {
         if G::IS_ANY {
             return true;
         }
-        let Crossing { winner, enters, instance, nested } = found;
-        let nested = match instance {
-            Some(_) => Some(Box::new(Crossing { winner, enters, instance, nested }.into_hit(inner))),
-            None => None,
-        };
+        let (winner, enters) = (found.winner, found.enters);
+        let nested = if found.instance.is_some() { Some(Box::new(found.into_hit(inner))) } else { None };
         self.offer(Crossing { winner, enters, instance: Some(placed.geometry), nested }, ray);
         false
     }
@@ -606,12 +606,10 @@ impl Search<'_, '_> {
             }
             next = cursor.next_leaf::<G>(&mut stack);
         }
-        let triangle = match nearest.crossing(decider) {
-            Some((ids, uv, enters)) => {
-                Some(Crossing::on_triangle(ids, local.t(triangles.t_max()), uv, enters, ray))
-            }
-            None => None,
-        };
+        let mut triangle = None;
+        if let Some((ids, uv, enters)) = nearest.crossing(decider) {
+            triangle = Some(Crossing::on_triangle(ids, local.t(triangles.t_max()), uv, enters, ray));
+        }
         Outcome::Certain(if GENERAL {
             Crossing::nearer(triangle, others.nearest, accel, ray)
         } else {
