@@ -73,7 +73,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         } else {
             lumbre::read_image_within(path, limits)
         };
-        image.map_err(|error| memory.explain(error.into()))
+        image.map_err(|error| memory.explain(error))
     };
     let (a, b) = (read(&arguments.a)?, read(&arguments.b)?);
     let pixels = u64::from(a.width()) * u64::from(a.height());
