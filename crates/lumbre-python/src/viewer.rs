@@ -88,7 +88,7 @@ impl Source for Live {
     }
 
     fn of_file(&self, file: &Path) -> Arc<dyn Source> {
-        let mut options = lumbre::ReadOptions::default();
+        let mut options = ReadOptions::default();
         options.is_alone = true;
         let origin = Origin::Files(vec![file.to_owned()], Box::new(options));
         Arc::new(Self { origin, size: self.size, spp: self.spp })
