@@ -178,7 +178,7 @@ impl<'s> Wave<'s> {
         self.next.len = 0;
         self.legs.clear();
         self.crossings.clear();
-        self.next.reserve(count);
+        self.next.reserve(count + self.collided.len());
         self.shadows.reset(count);
         let mut queues = std::mem::take(&mut self.vertices.queues);
         for (kind, queue) in KINDS.into_iter().zip(&mut queues) {

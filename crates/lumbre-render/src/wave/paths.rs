@@ -2,7 +2,7 @@
 
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Vec3};
-use lumbre_scene::CameraRay;
+use lumbre_scene::{CameraRay, Footprint};
 use lumbre_shading::Spectrum;
 use lumbre_simd::{Double, Mask, Real, UInt, V3};
 
@@ -40,8 +40,9 @@ pub(crate) struct Slots<'s> {
     pub(crate) index: Vec<u32>,
     /// When its rays look.
     pub(crate) time: Vec<f64>,
-    /// The ray from the camera.
-    pub(crate) camera: Vec<CameraRay>,
+    /// The ray from the camera, and its footprint; none in a scene without textures.
+    pub(crate) rays: Vec<Ray>,
+    pub(crate) footprints: Vec<Footprint>,
     /// The light that the path has found.
     pub(crate) radiance: Vec<Spectrum>,
     /// The solids that it is inside of; empty in a scene without solids.
@@ -58,22 +59,32 @@ impl Slots<'_> {
         self.pixel.iter_mut().for_each(Vec::clear);
         self.index.clear();
         self.time.clear();
-        self.camera.clear();
+        self.rays.clear();
+        self.footprints.clear();
         self.radiance.clear();
         self.interiors.clear();
         self.distance_samples.clear();
         self.collisions.clear();
     }
 
+    /// The ray from the camera of a sample.
+    pub(crate) fn camera(&self, slot: usize) -> CameraRay {
+        let footprint = self.footprints.get(slot).copied().unwrap_or_default();
+        CameraRay { ray: self.rays[slot], footprint }
+    }
+
     /// Adds a sample.
-    pub(crate) fn push(&mut self, draw: Draw, camera: CameraRay, has_solids: bool) {
+    pub(crate) fn push(&mut self, draw: Draw, camera: &CameraRay, has_solids: bool) {
         let (pixel, index) = draw.words();
         self.draws.push(draw);
         self.pixel[0].push(pixel[0]);
         self.pixel[1].push(pixel[1]);
         self.index.push(index);
         self.time.push(camera.ray.time);
-        self.camera.push(camera);
+        self.rays.push(camera.ray);
+        if camera.footprint != Footprint::Point {
+            self.footprints.push(camera.footprint);
+        }
         self.radiance.push(Spectrum::BLACK);
         if has_solids {
             self.interiors.push(Interiors::default());
@@ -141,9 +152,8 @@ pub(crate) struct OnePath {
 }
 
 impl Paths {
-    /// Appends a path.
+    /// Appends a path, for which there is room.
     pub(crate) fn push_one(&mut self, path: &OnePath) {
-        self.reserve(self.len + 1);
         self.put(self.len, path);
         self.len += 1;
     }

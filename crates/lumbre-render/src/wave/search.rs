@@ -57,7 +57,7 @@ impl Hits {
     ) {
         let len = paths.len;
         self.is_single = precision == Precision::Single && !(is_seen && scene.has_one_sided());
-        let time = |path: usize| slots.camera[paths.slot[path] as usize].ray.time;
+        let time = |path: usize| slots.time[paths.slot[path] as usize];
         if !self.is_single {
             self.rays.clear();
             self.rays.extend((0..len).map(|path| paths.ray(path, time(path))));

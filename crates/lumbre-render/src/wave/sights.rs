@@ -27,13 +27,14 @@ impl<'a, 's> Sights<'a, 's> {
         view: &'a View,
         wave: &'a mut Wave<'s>,
         precision: Precision,
-        samples: impl Iterator<Item = (Draw, CameraRay)>,
+        samples: impl ExactSizeIterator<Item = (Draw, CameraRay)>,
         record: &mut Record,
     ) -> Self {
         let has_solids = scene.has_solids();
         wave.slots.clear();
         wave.paths.len = 0;
         wave.is_first = true;
+        wave.paths.reserve(samples.len());
         for (slot, (draw, mut camera)) in samples.enumerate() {
             let ray = &mut camera.ray;
             // Paths keep directions in single precision: all that is told of the ray is told of that one.
@@ -53,7 +54,7 @@ impl<'a, 's> Sights<'a, 's> {
                 width,
                 spread,
             });
-            wave.slots.push(draw, camera, has_solids);
+            wave.slots.push(draw, &camera, has_solids);
         }
         record.counts.camera += wave.paths.len as u64;
         wave.hits.search(scene, &wave.paths, &wave.slots, precision, true);
@@ -78,12 +79,12 @@ impl<'a, 's> Sights<'a, 's> {
 
     /// The ray from the camera of a sample.
     pub(crate) fn ray(&self, slot: usize) -> Ray {
-        self.wave.slots.camera[slot].ray
+        self.wave.slots.rays[slot]
     }
 
     /// The ray from the camera of a sample, and what it meets.
     pub(crate) fn sight(&self, slot: usize) -> Sight<'s> {
-        let ray = self.wave.slots.camera[slot];
+        let ray = self.wave.slots.camera(slot);
         Sight { ray, met: self.wave.hits.interaction(self.scene, slot, &ray.ray, &ray.footprint) }
     }
 
@@ -118,6 +119,7 @@ impl<'a, 's> Sights<'a, 's> {
         if self.wanted.len() < self.wave.paths.len {
             // What others see is known: only these rays are asked again, to the same answer.
             let mut kept = Paths::default();
+            kept.reserve(self.wanted.len());
             for &slot in &self.wanted {
                 kept.push_one(&self.wave.paths.get(slot as usize));
             }

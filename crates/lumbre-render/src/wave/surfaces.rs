@@ -2,11 +2,12 @@
 
 use lumbre_geometry::Ray;
 use lumbre_math::Vec3;
+use lumbre_scene::light::lanes::Receiver;
 use lumbre_scene::{Footprint, Interaction};
 use lumbre_shading::medium::{DistanceSample, sample_henyey_greenstein};
 use lumbre_shading::{HomogeneousMedium, ShadingFrame, ShadingNormals, Spectrum};
-use lumbre_simd::V3;
 use lumbre_simd::math::orthonormal_basis;
+use lumbre_simd::{UInt, V3};
 
 use crate::transport::Record;
 use crate::transport::interior::Interiors;
@@ -79,7 +80,8 @@ impl<'s> Wave<'s> {
     /// The footprint of a path's ray.
     fn footprint(&self, path: usize) -> Footprint {
         if self.is_first {
-            return self.slots.camera[self.paths.slot[path] as usize].footprint;
+            let slot = self.paths.slot[path] as usize;
+            return self.slots.footprints.get(slot).copied().unwrap_or_default();
         }
         match self.paths.width[path] {
             width if width > 0.0 => {
@@ -184,14 +186,27 @@ impl<'s> Wave<'s> {
             return;
         }
         let chosen = self.paths.pdf[path];
-        let receiver = self.paths.receiver(path).as_dvec3();
-        let pdf = match chosen {
-            f32::INFINITY => 0.0,
-            _ => setting.scene.light_pdf(ray.origin, receiver, here),
-        };
+        let pdf = if chosen == f32::INFINITY { 0.0 } else { self.light_pdf(setting, path, ray, here) };
         let weight = setting.weight_of_found(chosen, pdf);
         let throughput = self.paths.throughput(path);
         self.slots.radiance[slot] += record.added(Source::Surface, throughput, emitted, weight);
+    }
+
+    /// The density with which the last vertex would have sampled what a path met: as lanes do, where that is a triangle.
+    fn light_pdf(&self, setting: &Setting<'s>, path: usize, ray: &Ray, here: &Interaction<'s>) -> f32 {
+        let (scene, normal) = (setting.scene, self.paths.receiver(path));
+        let Some(met) = self.hits.triangle(path).filter(|_| here.light.is_some()) else {
+            return scene.light_pdf(ray.origin, normal.as_dvec3(), here);
+        };
+        let receiver = Receiver::<f32> {
+            from: V3::new(ray.origin.x, ray.origin.y, ray.origin.z),
+            normal: V3::new(normal.x, normal.y, normal.z),
+            time: setting.moves.then_some(ray.time),
+        };
+        let point = here.surface.point;
+        let (id, triangle) = (UInt::splat(met.id), UInt::splat(met.triangle));
+        let point = V3::new(point.x, point.y, point.z);
+        scene.lane_lights().pdf(scene, true, &receiver, id, triangle, point)
     }
 
     /// Goes through the medium before a surface; false where the path scatters or ends in it.
