@@ -68,7 +68,7 @@ REFUSED = "\ntry:\n    {}\nexcept MemoryError as error:\n    print('refused:', e
 
 @pytest.mark.parametrize(
     "query",
-    ["cast(o, d)", "cast(o, d, 0.1, 9.0, fields=('t',))", "occluded(o, d)", "count(o, d)", "cast_all(o, d)", "closest_point(o)", "inside(o)"],
+    ["cast(o, d)", "cast(o, d, 0.1, fields=('t',))", "occluded(o, d)", "count(o, d)", "cast_all(o, d)", "closest_point(o)", "inside(o)"],
 )
 def test_answers_that_do_not_fit_raise_memory_error(query: str) -> None:
     count = 20_000_000_000
@@ -98,7 +98,7 @@ def test_mixtures_of_mixtures_share_what_they_share() -> None:
     assert scene.render(1, (8, 6)).array.mean() > 0
     assert own_memory() - before < 64 << 20
     again = pickle.loads(pickle.dumps(material))
-    assert again == material
+    assert isinstance(again, lumbre.Mix) and again.first is again.second
     with pytest.raises(lumbre.LumbreError, match="more than 64 deep"):
         for _ in range(50):
             material = lumbre.Mix(material, material)

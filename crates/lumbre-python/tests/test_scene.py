@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import pickle
 import subprocess
 import sys
@@ -185,8 +186,8 @@ def test_render_options_out_of_range_are_refused() -> None:
         ({"camera": "left"}, 'no camera "left"'),
         ({"integrator": "pth"}, "did you mean path"),
         ({"time": -1.0}, "time"),
-        ({"seed": -1}, "render: seed is -1"),
-        ({"max_depth": "deep"}, "render: max_depth is deep"),
+        ({"seed": -1}, "seed is out of range"),
+        ({"max_depth": "deep"}, "max_depth is out of range .found 'deep'; expected a whole number"),
     ]:
         with pytest.raises(lumbre.LumbreError, match=message):
             scene.render(spp=1, **{"size": (4, 4), **options})
@@ -280,7 +281,7 @@ def test_loose_arrays_are_answered_with_what_is_accepted() -> None:
             scene.occluded(o, d, out=out)
     with pytest.raises(lumbre.LumbreError, match="fields are no names"):
         scene.cast(o, d, fields=3)
-    with pytest.raises(lumbre.LumbreError, match="a hit has no field 3"):
+    with pytest.raises(lumbre.LumbreError, match='a hit has no field "3"'):
         scene.cast(o, d, fields=(3,))
     for distance in ("3", math.nan, -1.0, None):
         with pytest.raises(lumbre.LumbreError, match="max_distance is out of range"):
@@ -289,6 +290,12 @@ def test_loose_arrays_are_answered_with_what_is_accepted() -> None:
         lumbre.Mesh(np.ma.masked_array(np.eye(3), mask=np.eye(3)), [[0, 1, 2]])
     with pytest.raises(lumbre.LumbreError, match="a texture has masked values"):
         lumbre.Texture(masked)
+    image = np.full((4, 8, 3), 0.5)
+    image[1, 6, 2] = np.nan
+    with pytest.warns(UserWarning, match=r"texel \(6, 1\) of an environment is not finite, and taken for black"):
+        sky = lumbre.EnvironmentLight(image=image)
+    lit = lumbre.Scene([lumbre.Sphere()], lights=[sky]).render(1, (16, 12), denoise=False).array
+    assert np.isfinite(lit).all() and lit.mean() > 0.1
     with pytest.raises(lumbre.LumbreError, match="pixel is out of range .* expected \\(x, y\\)"):
         scene.explain(("3", 4, 5))
     with pytest.raises(lumbre.LumbreError, match="size is out of range"):

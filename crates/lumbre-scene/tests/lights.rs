@@ -322,3 +322,24 @@ fn one_bright_texel_of_thousands_is_found_from_near_and_far() {
         }
     }
 }
+
+#[test]
+fn a_texel_that_is_not_finite_is_named_and_the_rest_of_the_sky_shines() {
+    for wrong in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let mut pixels = vec![Rgb::splat(0.5); 16 * 8];
+        pixels[5 * 16 + 9].b = wrong;
+        // Finite, though its channels are more than single precision when they are added up.
+        pixels[2 * 16 + 3] = Rgb::splat(3e38);
+        let image = Arc::new(Image::from_pixels(16, 8, pixels).unwrap());
+        let mapping = EnvironmentMapping::LatitudeLongitude;
+        let sky = LightDesc::Infinite {
+            world_from_light: Transform::IDENTITY,
+            radiance: Rgb::WHITE,
+            image: Some(EnvironmentDesc { image, mapping }),
+        };
+        let scene = Scene::build(SceneDesc { lights: vec![sky], ..SceneDesc::default() }).unwrap();
+        let said: Vec<String> = scene.warnings().iter().map(ToString::to_string).collect();
+        assert_eq!(said, ["light 0: texel (9, 5) of its picture is not finite, and taken for black"]);
+        assert_eq!(scene.lights().len(), 1);
+    }
+}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
@@ -383,6 +384,14 @@ class EnvironmentLight(Light):
     radiance: float | Iterable[float] = 1.0
     image: npt.ArrayLike | None = None
     up: Iterable[float] = (0.0, 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.image is not None:
+            is_finite = np.isfinite(array_of("image", self.image)).all(axis=-1)
+            if not is_finite.all():
+                y, x = np.argwhere(~is_finite)[0]
+                warnings.warn(f"texel ({x}, {y}) of an environment is not finite, and taken for black", stacklevel=3)
 
     def _native(self) -> _lumbre.Light:
         image = None if self.image is None else array_of("image", self.image).astype(np.float32, copy=False)

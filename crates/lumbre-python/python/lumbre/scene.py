@@ -638,7 +638,7 @@ def _columns(count: int, dtype: np.dtype[Any], fields: Sequence[str]) -> dict[st
     layouts: dict[str, tuple[tuple[int, ...], np.dtype[Any]]] = {}
     for name in fields:
         if name not in FIELDS:
-            raise LumbreError(f"a hit has no field {name!r} (expected some of {', '.join(FIELDS)})")
+            raise LumbreError(f'a hit has no field "{name}" (expected some of {", ".join(FIELDS)})')
         width = _WIDTHS.get(name)
         layouts[name] = ((count,) if width is None else (count, width), np.dtype(_KINDS.get(name, dtype)))
     nbytes = sum(math.prod(shape) * kind.itemsize for shape, kind in layouts.values())
@@ -679,7 +679,7 @@ def _checked(out: Mapping[str, Array]) -> dict[str, Array]:
         raise LumbreError(f"out has no arrays by name (found {out!r}; expected a dict of some of {', '.join(FIELDS)})")
     for name, array in out.items():
         if name not in FIELDS:
-            raise LumbreError(f"a hit has no field {name!r} (expected some of {', '.join(FIELDS)})")
+            raise LumbreError(f'a hit has no field "{name}" (expected some of {", ".join(FIELDS)})')
         _array(f"out: {name}", array)
     return dict(out)
 

@@ -298,9 +298,10 @@ fn light_of(texel: Spectrum) -> Spectrum {
     if texel.is_finite() { texel.map(|c| c.max(0.0)) } else { Spectrum::BLACK }
 }
 
-/// The mean of the channels, which does not overflow.
+/// The mean of the channels, also where their sum overflows.
 fn mean_of(colour: Spectrum) -> f64 {
-    colour.to_array().iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0
+    let mean = f64::from(colour.average());
+    if mean.is_finite() { mean } else { colour.to_array().iter().map(|&c| f64::from(c) / 3.0).sum() }
 }
 
 /// The pixel, wrapped if it is beyond an edge; see [`light_of`].
