@@ -103,6 +103,9 @@ impl<R: Real> LaneBsdf<R> for ConductorLanes<R> {
 
     #[inline(always)]
     fn eval(&self, wo: V3<R>, wi: V3<R>) -> (V3<R>, R) {
+        if self.facets.is_smooth().all() {
+            return (V3::splat(R::zero()), R::zero());
+        }
         let (density, fits) = self.facet_density(wo, wi);
         let m = (wo + wi).normalize();
         let both = self.facets.both_visible_per_cosines(wo, wi);
@@ -113,15 +116,19 @@ impl<R: Real> LaneBsdf<R> for ConductorLanes<R> {
     #[inline(always)]
     fn sample(&self, wo: V3<R>, _: R, u: [R; 2]) -> LaneSample<R> {
         let smooth = self.facets.is_smooth();
-        let up = V3::constant([0.0, 0.0, 1.0]);
-        let m = V3::select(smooth, up, self.facets.sample_visible(wo, u));
-        let wi = V3::select(smooth, mirrored(wo), reflect(wo, m));
-        let also_visible = R::select(smooth, R::one(), self.facets.also_visible(wo, wi));
-        let pdf = R::splat(0.25) * self.facets.density(m) * self.facets.visible_per_cosine(wo);
+        let mut m = V3::constant([0.0, 0.0, 1.0]);
+        let (mut wi, mut also_visible, mut pdf) = (mirrored(wo), R::one(), R::one());
+        if !smooth.all() {
+            m = V3::select(smooth, m, self.facets.sample_visible(wo, u));
+            wi = V3::select(smooth, wi, reflect(wo, m));
+            also_visible = R::select(smooth, also_visible, self.facets.also_visible(wo, wi));
+            let density = R::splat(0.25) * self.facets.density(m) * self.facets.visible_per_cosine(wo);
+            pdf = R::select(smooth, pdf, density);
+        }
         LaneSample {
             wi,
             weight: self.fresnel(wo.dot(m)) * also_visible,
-            pdf: R::select(smooth, R::one(), pdf),
+            pdf,
             valid: (wo.z * wi.z).simd_gt(R::zero()),
             delta: smooth,
             transmitted: R::Mask::splat(false),

@@ -147,6 +147,9 @@ impl<R: Real> DielectricLanes<R> {
     /// The density of [`DielectricLanes::sample_of`].
     #[inline(always)]
     pub(crate) fn pdf_of(&self, wo: V3<R>, wi: V3<R>, ways: Ways) -> R {
+        if self.is_delta().all() {
+            return R::zero();
+        }
         let (facet, fits) = self.facet(wo, wi);
         self.pdf_of_facet(&facet, wo, ways).or_zero(fits)
     }
@@ -165,8 +168,11 @@ impl<R: Real> DielectricLanes<R> {
     #[inline(always)]
     pub(crate) fn sample_of(&self, wo: V3<R>, lobe: R, u: [R; 2], ways: Ways) -> LaneSample<R> {
         let delta = self.is_delta();
-        let up = V3::constant([0.0, 0.0, 1.0]);
-        let m = V3::select(delta, up, self.facets.sample_visible(wo, u));
+        let is_rough = !delta;
+        let mut m = V3::constant([0.0, 0.0, 1.0]);
+        if is_rough.any() {
+            m = V3::select(delta, m, self.facets.sample_visible(wo, u));
+        }
         let reflected = fresnel::dielectric(wo.dot(m), self.eta);
         let (transmits, probability) = match ways {
             Ways::Both => {
@@ -178,19 +184,30 @@ impl<R: Real> DielectricLanes<R> {
         };
         let share = R::select(transmits, R::one() - reflected, reflected);
         let eta = R::select(transmits, self.eta_across(wo), R::one());
-        let (refracted, refracts) = refract(wo, m, eta);
-        let reflection = V3::select(delta, mirrored(wo), reflect(wo, m));
-        let wi = V3::select(transmits, refracted, reflection);
+        let mut wi = mirrored(wo);
+        if (is_rough & !transmits).any() {
+            wi = V3::select(delta, wi, reflect(wo, m));
+        }
+        let mut refracts = R::Mask::splat(false);
+        if transmits.any() {
+            let (refracted, is_refracted) = refract(wo, m, eta);
+            wi = V3::select(transmits, refracted, wi);
+            refracts = is_refracted;
+        }
         let sides = wo.z * wi.z;
         let on_its_side =
             (transmits & refracts & sides.simd_lt(R::zero())) | (!transmits & sides.simd_gt(R::zero()));
-        let pdf =
-            probability * self.facets.visible_density(wo, m) * Self::jacobian(wo, wi, m, eta, transmits);
-        let pdf = R::select(delta, R::one(), pdf);
-        let also_visible = R::select(delta, R::one(), self.facets.also_visible(wo, wi));
+        let mut weight = share / probability / (eta * eta);
+        let mut pdf = R::one();
+        if is_rough.any() {
+            let density =
+                probability * self.facets.visible_density(wo, m) * Self::jacobian(wo, wi, m, eta, transmits);
+            pdf = R::select(delta, pdf, density);
+            weight = R::select(delta, weight, weight * self.facets.also_visible(wo, wi));
+        }
         LaneSample {
             wi,
-            weight: V3::splat(share / probability / (eta * eta) * also_visible),
+            weight: V3::splat(weight),
             pdf,
             valid: on_its_side & share.simd_ne(R::zero()) & pdf.simd_gt(R::zero()) & pdf.is_finite(),
             delta,
@@ -211,6 +228,9 @@ impl<R: Real> LaneBsdf<R> for DielectricLanes<R> {
 
     #[inline(always)]
     fn eval(&self, wo: V3<R>, wi: V3<R>) -> (V3<R>, R) {
+        if self.is_delta().all() {
+            return (V3::splat(R::zero()), R::zero());
+        }
         let (facet, fits) = self.facet(wo, wi);
         let share = R::select(facet.transmits, R::one() - facet.fresnel, facet.fresnel);
         let value = share * self.eval_facet(&facet, wo, wi);

@@ -621,8 +621,10 @@ impl<R: Real> PrincipledLanes<R> {
         let (zero, one) = (R::zero(), R::one());
         let wo = self.facet_local(wo);
         let smooth = self.facets.is_smooth();
-        let up = V3::constant([0.0, 0.0, 1.0]);
-        let m = V3::select(smooth, up, self.facets.sample_visible(wo, u));
+        let mut m = V3::constant([0.0, 0.0, 1.0]);
+        if !smooth.all() {
+            m = V3::select(smooth, m, self.facets.sample_visible(wo, u));
+        }
         let shares = self.shares(wo.dot(m));
         let reflection = shares.reflection_probability();
         let reflected = V3::select(smooth, mirrored(wo), reflect(wo, m));
