@@ -275,9 +275,9 @@ def test_loose_arrays_are_answered_with_what_is_accepted() -> None:
             ask(masked)
     assert scene.cast(np.ma.masked_array(o), d).t.tolist() == [2.0, np.inf]
     for out in (3, "t", [o]):
-        with pytest.raises(lumbre.LumbreError, match="out has no arrays by name .* expected a dict of some of t, point"):
+        with pytest.raises(lumbre.LumbreError, match="(?s)out has no arrays by name .* expected a dict of some of t, point"):
             scene.cast(o, d, out=out)
-        with pytest.raises(lumbre.LumbreError, match="out is no array to write .* expected a numpy.ndarray"):
+        with pytest.raises(lumbre.LumbreError, match="(?s)out is no array to write .* expected a numpy.ndarray"):
             scene.occluded(o, d, out=out)
     with pytest.raises(lumbre.LumbreError, match="fields are no names"):
         scene.cast(o, d, fields=3)

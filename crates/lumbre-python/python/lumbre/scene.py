@@ -6,6 +6,7 @@ import hashlib
 import math
 import os
 import pickle
+import sys
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
@@ -572,8 +573,14 @@ def _again(source: dict[str, Any]) -> Scene:
 
 
 def _hash(source: Mapping[str, Any]) -> str:
-    """By which parts of a render are known to be of the same scene."""
-    return hashlib.sha256(pickle.dumps(source, protocol=4)).hexdigest()
+    """Identifies the scene that parts of a render are of."""
+    # Solids of solids may be hundreds deep, and a pickle takes several calls for each.
+    limit = sys.getrecursionlimit()
+    sys.setrecursionlimit(max(limit, 16384))
+    try:
+        return hashlib.sha256(pickle.dumps(source, protocol=4)).hexdigest()
+    finally:
+        sys.setrecursionlimit(limit)
 
 
 def load(
