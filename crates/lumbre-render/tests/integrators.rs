@@ -213,3 +213,22 @@ fn light_behind_glass_comes_back_through_its_square_of_eta() {
     // What is reflected down off the slab meets a black floor.
     assert_close(mean(&image)[0], 2.0 * through, 2e-3, "slab");
 }
+
+/// Cameras look through the backs of one-sided faces, by rays in double precision; what leaves the faces is traced in single.
+#[test]
+fn rays_that_leave_one_sided_meshes_do_not_meet_them_again() {
+    let [two_sided, one_sided] = [false, true].map(|one_sided| {
+        let mut desc = empty();
+        let white = add_material(&mut desc, Material { one_sided, ..diffuse(1.0) });
+        add(&mut desc, crate::terminator::globe(12, false), white);
+        desc.lights = crate::terminator::lit(crate::terminator::globe(12, false)).lights;
+        desc.cameras = crate::terminator::lit(crate::terminator::globe(12, false)).cameras;
+        let scene = Scene::build(desc).unwrap();
+        let rendered = picture(&scene, &options(&scene, 64, 64, 4));
+        let rays = rendered.stats.rays;
+        // A convex body: what bounces off it leaves.
+        assert!(rays.bounce > 4000 && rays.bounce <= rays.camera, "{one_sided}: {rays:?}");
+        mean(&rendered.image)
+    });
+    assert_close(one_sided[1], two_sided[1], 1e-5, "one-sided");
+}

@@ -96,7 +96,7 @@ pub(crate) struct FlatVertices<'a, 's> {
     pub(crate) paths: &'a Paths,
     pub(crate) vertices: &'a mut Vertices<'s>,
     pub(crate) found: &'a mut Vec<Found>,
-    /// Whether rays were rounded.
+    /// Whether the rays that leave are rounded.
     pub(crate) is_single: bool,
 }
 

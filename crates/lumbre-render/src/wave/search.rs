@@ -13,6 +13,8 @@ pub(crate) struct Hits {
     /// In double precision; used where `is_single` does not say otherwise.
     double: Vec<Option<Hit>>,
     is_single: bool,
+    /// Whether the rays that leave the hits are rounded, however these were found.
+    leaves_single: bool,
     rays: Vec<Ray>,
     times: Vec<f64>,
 }
@@ -56,7 +58,8 @@ impl Hits {
         is_seen: bool,
     ) {
         let len = paths.len;
-        self.is_single = precision == Precision::Single && !(is_seen && scene.has_one_sided());
+        self.leaves_single = precision == Precision::Single;
+        self.is_single = self.leaves_single && !(is_seen && scene.has_one_sided());
         let time = |path: usize| slots.time[paths.slot[path] as usize];
         if !self.is_single {
             self.rays.clear();
@@ -121,16 +124,22 @@ impl Hits {
         ray: &Ray,
         footprint: &Footprint,
     ) -> Option<Interaction<'s>> {
-        if self.is_single {
-            let hit = self.columns.to_hit(path)?;
-            Some(scene.picture_interaction(ray, &hit, footprint))
+        let whole;
+        let hit = if self.is_single {
+            whole = self.columns.to_hit(path)?;
+            &whole
         } else {
-            Some(scene.interaction(ray, self.double[path].as_ref()?, footprint))
-        }
+            self.double[path].as_ref()?
+        };
+        Some(if self.leaves_single {
+            scene.picture_interaction(ray, hit, footprint)
+        } else {
+            scene.interaction(ray, hit, footprint)
+        })
     }
 
-    /// Whether rays were rounded to single precision.
-    pub(crate) fn is_single(&self) -> bool {
-        self.is_single
+    /// Whether the rays that leave the hits are rounded to single precision.
+    pub(crate) fn leaves_single(&self) -> bool {
+        self.leaves_single
     }
 }
