@@ -186,7 +186,7 @@ fn is_looked_at(taken: u32) -> bool {
     taken >= LEAST && is_step
 }
 
-/// The number of samples at which pixels are looked at next that have so many.
+/// The next number of samples at which a pixel with `taken` samples is looked at.
 pub(crate) fn next_look(taken: u32) -> u32 {
     (taken.saturating_add(1)..=u32::MAX).find(|&count| is_looked_at(count)).unwrap_or(u32::MAX)
 }

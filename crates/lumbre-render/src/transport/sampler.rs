@@ -3,6 +3,7 @@
 use lumbre_math::random::PixelRandom;
 use lumbre_math::{DVec2, Vec2};
 use lumbre_scene::{SamplerDesc, SamplerKind};
+use lumbre_simd::random::{pcg4d, uniform};
 use lumbre_simd::{Real, UInt};
 
 /// How the numbers of a pixel's samples are made.
@@ -94,32 +95,6 @@ impl<R: Real> LaneDraw<R> {
         };
         [uniform(bits[0]), uniform(bits[1]), uniform(bits[2]), uniform(bits[3])]
     }
-}
-
-/// The multiple of 2⁻²⁴ in [0, 1) from the top bits of a word.
-#[inline(always)]
-fn uniform<R: Real>(bits: R::UInt) -> R {
-    R::from_int(bits.shr::<8>()) * R::splat(1.0 / 16_777_216.0)
-}
-
-/// Hashes four words to four: M. Jarzynski, M. Olano, "Hash Functions for GPU Rendering", JCGT 9(3), 2020.
-#[inline(always)]
-fn pcg4d<U: UInt>(v: [U; 4]) -> [U; 4] {
-    let (a, c) = (U::splat(1_664_525), U::splat(1_013_904_223));
-    let (mut x, mut y, mut z, mut w) = (v[0] * a + c, v[1] * a + c, v[2] * a + c, v[3] * a + c);
-    x = x + y * w;
-    y = y + z * x;
-    z = z + x * y;
-    w = w + y * z;
-    x = x ^ x.shr::<16>();
-    y = y ^ y.shr::<16>();
-    z = z ^ z.shr::<16>();
-    w = w ^ w.shr::<16>();
-    x = x + y * w;
-    y = y + z * x;
-    z = z + x * y;
-    w = w + y * z;
-    [x, y, z, w]
 }
 
 /// The word with its bits in reversed order.

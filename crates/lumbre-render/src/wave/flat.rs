@@ -33,7 +33,7 @@ pub(crate) struct FlatHits {
 }
 
 impl FlatHits {
-    /// Forgets all, with room for so many.
+    /// Forgets all, with room for `len` hits.
     pub(crate) fn reset(&mut self, len: usize) {
         self.len = 0;
         for column in [&mut self.path, &mut self.id, &mut self.triangle, &mut self.row, &mut self.flags] {

@@ -12,7 +12,7 @@ use crate::transport::interior::Interiors;
 /// Lanes beyond the last that a column has room for: a store writes whole vectors.
 pub(crate) const PAD: usize = 16;
 
-/// Makes a column hold so many, and a vector more.
+/// Makes a column hold `len` numbers, and a vector more.
 pub(crate) fn grow<T: Default + Clone>(column: &mut Vec<T>, len: usize) {
     if column.len() < len + PAD {
         column.resize(len + PAD, T::default());
@@ -207,7 +207,7 @@ impl Paths {
         self.spread[at] = path.spread;
     }
 
-    /// Room for so many.
+    /// Makes room for `len` paths.
     pub(crate) fn reserve(&mut self, len: usize) {
         grow(&mut self.slot, len);
         self.origin.iter_mut().for_each(|column| grow(column, len));

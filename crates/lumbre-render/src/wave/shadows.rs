@@ -60,7 +60,7 @@ pub(crate) struct Segment<R: Real> {
 pub(crate) const NEARLY_WHOLE: f64 = 1.0 - 1.0 / (1_u64 << 40) as f64;
 
 impl<'s> Shadows<'s> {
-    /// Forgets all, with room for so many.
+    /// Forgets all, with room for `len` segments.
     pub(crate) fn reset(&mut self, len: usize) {
         self.len = 0;
         self.legs.clear();

@@ -95,7 +95,7 @@ impl<R: Real> Place<R> {
 }
 
 impl<'s> Vertices<'s> {
-    /// Forgets all, with room for so many; `rows` are those of uniform materials.
+    /// Forgets all, with room for `len` vertices; `rows` are those of uniform materials.
     pub(crate) fn reset(&mut self, len: usize, rows: &[f32]) {
         self.len = 0;
         let f64s = self.point.iter_mut().chain(&mut self.risen).chain([&mut self.offset]);
