@@ -57,6 +57,7 @@
 //! | quadratic equations, roots of polynomials | [`quadratic::roots_of`], [`quadratic`], [`roots`] |
 //! | interval arithmetic, with derivatives | [`interval::Interval`], [`interval::Dual`] |
 //! | random numbers | [`random`], evenly spread [`sobol`] |
+//! | gradient noise | [`noise::noise`] |
 //! | random points of disks, spheres, triangles | [`warp`], [`warp64`] |
 //! | random choice by weight | [`distribution`] |
 
@@ -69,6 +70,7 @@ mod elementary;
 pub mod frame;
 pub mod interval;
 pub mod matrix;
+pub mod noise;
 pub mod optics;
 pub mod projection;
 pub mod quadratic;

@@ -86,6 +86,35 @@ impl SpectrumValue {
     }
 }
 
+/// The colours of black bodies by their temperature, each relative to its greatest spectral radiance: the integral of B/max B with the
+/// observer's functions, in linear Rec. 709. (Dark where most of a body's light is invisible; a luminance of 105 at 5000 K.)
+#[derive(Clone, Debug)]
+pub struct BlackbodyColours {
+    hottest: f32,
+    colours: Vec<Spectrum>,
+}
+
+impl BlackbodyColours {
+    /// Of temperatures up to `hottest` kelvin.
+    pub fn up_to(hottest: f32) -> Self {
+        const STEPS: u32 = 1024;
+        let hottest = if hottest.is_finite() { hottest.max(1.0) } else { 1.0 };
+        let colour = |i: u32| {
+            let kelvin = f64::from(hottest) * f64::from(i) / f64::from(STEPS);
+            spectrum(rec709_from_xyz(observe(|nm| blackbody(nm, kelvin))))
+        };
+        Self { hottest, colours: (0..=STEPS).map(colour).collect() }
+    }
+
+    /// The colour at a temperature in kelvin; that of the hottest one beyond.
+    pub fn at(&self, kelvin: f32) -> Spectrum {
+        let steps = self.colours.len() - 1;
+        let place = (kelvin / self.hottest).clamp(0.0, 1.0) * steps as f32;
+        let low = (place as usize).min(steps - 1);
+        self.colours[low].lerp(self.colours[low + 1], place - low as f32)
+    }
+}
+
 /// The index of refraction of a metal, (η, k), in the channels of light transport.
 ///
 /// Three channels cannot hold the spectrum, but can preserve the reflectance at normal incidence: η is the mean

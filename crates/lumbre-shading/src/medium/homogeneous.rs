@@ -1,13 +1,8 @@
-//! Homogeneous scattering media inside solids.
+//! Media that are the same everywhere.
 
-use std::f32::consts::PI;
-
-use lumbre_math::{Elementary, Vec2, Vec3};
-use lumbre_simd::math::{orthonormal_basis, sin_cos_turns};
-use lumbre_simd::{Real, V3};
+use lumbre_math::Elementary;
 
 use crate::Spectrum;
-use crate::lanes::{lane, square, vector};
 
 /// A homogeneous medium.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +31,16 @@ pub enum DistanceSample {
 }
 
 impl HomogeneousMedium {
+    /// What is left of light after a distance, which may be infinite.
+    pub fn transmittance(&self, distance: f64) -> Spectrum {
+        self.extinction.map(|sigma| left_after(sigma.into(), distance) as f32)
+    }
+
+    /// The part of light that is absorbed, rather than scattered, of what does not come through a distance: σ_a/σ_t (1 − exp(−σ_t d)).
+    pub fn absorbed(&self, distance: f64) -> Spectrum {
+        self.transmittance(distance).zip(self.albedo, |left, albedo| (1.0 - left) * (1.0 - albedo))
+    }
+
     /// Samples the distance that light of throughput `carried` travels within `distance`. `u` selects a channel
     /// and the collision; the density is the balance over all channels.
     ///
@@ -47,6 +52,10 @@ impl HomogeneousMedium {
         if sum.is_nan() || sum <= 0.0 {
             return DistanceSample::Through(Spectrum::BLACK);
         }
+        if self.albedo.is_black() {
+            // Nothing scatters: what is left is known.
+            return DistanceSample::Through(self.transmittance(distance));
+        }
         let shares = carried.map(|c| c / sum);
         let mut channel = 0;
         let mut rest = u[0];
@@ -54,10 +63,13 @@ impl HomogeneousMedium {
             rest -= shares[channel];
             channel += 1;
         }
-        // 1 - u is in (0, 1]; a channel without collisions gives infinity.
-        let free_path = -(1.0 - u[1]).logarithm() / sigma[channel];
+        // 1 - u is in (0, 1].
+        let free_path = match sigma[channel] {
+            sigma if sigma > 0.0 => -(1.0 - u[1]).logarithm() / sigma,
+            _ => f64::INFINITY,
+        };
         let end = if free_path < distance { free_path } else { distance };
-        let left = sigma.map(|sigma| (-sigma * end).exponential());
+        let left = sigma.map(|sigma| left_after(sigma, end));
         if free_path < distance {
             let density: f64 = (0..3).map(|i| shares[i] * sigma[i] * left[i]).sum();
             let albedo = self.albedo.to_array();
@@ -76,33 +88,9 @@ impl HomogeneousMedium {
     }
 }
 
-/// The phase function per solid angle at the cosine of the scattering angle: 1 is straight on.
-///
-/// L. Henyey, J. Greenstein, "Diffuse Radiation in the Galaxy", Astrophysical Journal 93, 1941.
-#[inline(always)]
-pub fn henyey_greenstein<R: Real>(cos: R, g: R) -> R {
-    let d = (R::one() + g * g - R::splat(2.0) * g * cos).simd_max(R::splat(1e-12));
-    (R::one() - g * g) / (R::splat(4.0 * PI) * d * d.sqrt())
-}
-
-/// A unit direction sampled about the unit vector `forward` by [`henyey_greenstein`], with its density.
-pub fn sample_henyey_greenstein(forward: Vec3, g: f32, u: Vec2) -> (Vec3, f32) {
-    let (w, density) = sample_henyey_greenstein_lanes(lane(forward), g, square(u));
-    (vector(w), density)
-}
-
-/// [`sample_henyey_greenstein`] over lanes.
-#[inline(always)]
-pub fn sample_henyey_greenstein_lanes<R: Real>(forward: V3<R>, g: R, u: [R; 2]) -> (V3<R>, R) {
-    let (one, two) = (R::one(), R::splat(2.0));
-    let s = (one - g * g) / (one + g - two * g * u[0]);
-    let cos = ((one + g * g - s * s) / (two * g)).simd_max(-one).simd_min(one);
-    let cos = R::select(g.abs().simd_lt(R::splat(1e-3)), one - two * u[0], cos);
-    let sin = (one - cos * cos).simd_max(R::zero()).sqrt();
-    let (sin_phi, cos_phi) = sin_cos_turns(u[1]);
-    let (x, y) = orthonormal_basis(forward);
-    let w = (x * (sin * cos_phi) + y * (sin * sin_phi) + forward * cos).normalize();
-    (w, henyey_greenstein(cos, g))
+/// exp(−σ d), where d may be infinite.
+fn left_after(sigma: f64, distance: f64) -> f64 {
+    if sigma > 0.0 { (-sigma * distance).exponential() } else { 1.0 }
 }
 
 /// The single-scattering albedo for the multiple-scattering colour of a deep medium.
@@ -174,22 +162,6 @@ mod tests {
                 DistanceSample::Through(weight) => assert!(weight.is_finite(), "{u:?}: {weight:?}"),
                 DistanceSample::Collision { weight, .. } => assert!(weight.is_finite(), "{u:?}: {weight:?}"),
             }
-        }
-    }
-
-    #[test]
-    fn directions_have_the_mean_cosine_of_their_asymmetry() {
-        let forward = Vec3::new(2.0, -3.0, 6.0) / 7.0;
-        let mut random = RandomStream::new(5);
-        for g in [-0.7, 0.0, 0.3, 0.9] {
-            let (mut sum, count) = (0.0, 100_000);
-            for _ in 0..count {
-                let u = Vec2::new(random.next_f32(), random.next_f32());
-                let (w, density) = sample_henyey_greenstein(forward, g, u);
-                assert!((density / henyey_greenstein(w.dot(forward), g) - 1.0).abs() < 1e-2);
-                sum += f64::from(w.dot(forward));
-            }
-            assert!((sum / f64::from(count) - f64::from(g)).abs() < 6e-3, "{g}: {}", sum / f64::from(count));
         }
     }
 
