@@ -33,6 +33,7 @@ fn hovering(lights: Vec<LightDesc>, catcher: bool) -> SceneDesc {
         screen_window: None,
         shutter_open: 0.0,
         shutter_close: 1.0,
+        medium: None,
     };
     let mut desc = SceneDesc {
         cameras: vec![camera],

@@ -8,6 +8,7 @@ mod ground;
 mod integrators;
 mod interiors;
 mod journal;
+mod media;
 mod motion;
 mod panes;
 mod parts;

@@ -40,6 +40,7 @@ fn flat_camera() -> Camera {
         world_from_camera: shift(0.0, 0.0, -5.0),
         shutter_open: 2.0,
         shutter_close: 6.0,
+        medium: None,
         ..look(-DVec3::Z, DVec3::ZERO, 45.0)
     }
 }

@@ -152,6 +152,7 @@ fn lamps(count: u32) -> Scene {
         world_from_object: Transform::IDENTITY,
         reverse_orientation: false,
         material: Some(MaterialId(0)),
+        boundary: None,
         area_light: Some(light),
         alpha: None,
     };

@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
-use crate::{GeometryDesc, InstanceDesc, MaterialId, ObjectId, SceneDesc, ShapeDesc, WithoutLight};
+use crate::{
+    Boundary, Camera, GeometryDesc, InstanceDesc, MaterialId, MediumId, ObjectId, SceneDesc, ShapeDesc,
+    WithoutLight,
+};
 
 impl SceneDesc {
     /// Adds all that another description has, in the same world.
@@ -18,6 +21,7 @@ impl SceneDesc {
             sampler,
             integrator,
             materials,
+            media,
             shapes,
             objects,
             instances,
@@ -40,10 +44,13 @@ impl SceneDesc {
         let after = After {
             index: next_index(self),
             material: self.materials.len() as u32,
+            medium: self.media.len() as u32,
             object: self.objects.len() as u32,
         };
-        self.cameras.extend(cameras);
+        let cameras = cameras.into_iter();
+        self.cameras.extend(cameras.map(|camera| Camera { medium: after.medium(camera.medium), ..camera }));
         self.materials.extend(materials);
+        self.media.extend(media);
         self.lights.extend(lights);
         self.shapes.extend(shapes.into_iter().map(|shape| after.shape(shape)));
         self.instances.extend(instances.into_iter().map(|instance| after.instance(instance)));
@@ -74,6 +81,7 @@ fn next_index(desc: &SceneDesc) -> u32 {
 struct After {
     index: u32,
     material: u32,
+    medium: u32,
     object: u32,
 }
 
@@ -81,6 +89,10 @@ impl After {
     fn shape(&self, mut shape: ShapeDesc) -> ShapeDesc {
         shape.index = shape.index.saturating_add(self.index);
         shape.material = shape.material.map(|MaterialId(id)| MaterialId(id + self.material));
+        shape.boundary = shape.boundary.map(|Boundary { inside, outside }| Boundary {
+            inside: self.medium(inside),
+            outside: self.medium(outside),
+        });
         if let GeometryDesc::Csg(csg) = &mut shape.geometry {
             for operand in &mut csg.operands {
                 let shapes = Arc::unwrap_or_clone(std::mem::take(operand)).into_iter();
@@ -88,6 +100,10 @@ impl After {
             }
         }
         shape
+    }
+
+    fn medium(&self, medium: Option<MediumId>) -> Option<MediumId> {
+        medium.map(|MediumId(id)| MediumId(id + self.medium))
     }
 
     fn instance(&self, instance: InstanceDesc) -> InstanceDesc {
@@ -103,7 +119,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        Camera, CameraKind, CsgDesc, CsgOperation, FilmDesc, NamedMaterial, ObjectDesc, Placement, UpAxis,
+        CameraKind, CsgDesc, CsgOperation, FilmDesc, NamedMaterial, ObjectDesc, Placement, UpAxis,
     };
 
     fn ball(index: u32, material: u32) -> ShapeDesc {
@@ -113,6 +129,7 @@ mod tests {
             world_from_object: Transform::IDENTITY,
             reverse_orientation: false,
             material: Some(MaterialId(material)),
+            boundary: None,
             area_light: None,
             alpha: None,
         }

@@ -15,6 +15,7 @@ use crate::light::{
     DistantLight, Environment, GoniometricLight, Light, LightId, MeshLight, MovingLight, PlacedLight,
     PointLight, ShapeLight, SpotLight, UniformLight, power,
 };
+use crate::media::{self, Boundaries, Media};
 use crate::mesh::{self, QuadOrder};
 use crate::surface::{ColourRamp, Form, SurfaceEntry};
 use crate::{
@@ -38,6 +39,8 @@ impl Scene {
             desc.lights.push(studio::light(desc.up, 0.0));
         }
         let ground = ground::lay(&mut desc)?;
+        let uses_media = media::check(&desc)?;
+        let separated = media::split(&mut desc);
         let SceneDesc {
             cameras,
             film,
@@ -45,6 +48,7 @@ impl Scene {
             sampler,
             integrator,
             materials,
+            media,
             shapes,
             objects,
             instances,
@@ -66,9 +70,11 @@ impl Scene {
         let moves = objects.iter().flat_map(|object| &object.instances).chain(&instances).any(is_moving)
             || objects.iter().flat_map(|object| &object.shapes).chain(&shapes).any(deforms)
             || lights.iter().any(|light| matches!(light, LightDesc::Moving { .. }));
+        let boundaries = separated.map(|separated| builder.boundaries(separated, &instances)).transpose()?;
         let objects = builder.objects(objects, &instances)?;
         let accel = Arc::new(builder.tree(shapes, &instances, &objects)?);
-        let bounds = accel.bounds();
+        let beyond = boundaries.as_ref().map_or(Aabb::EMPTY, |boundaries| boundaries.accel.bounds());
+        let bounds = accel.bounds().union(beyond);
 
         let cameras = if cameras.is_empty() {
             let aspect = film.width.zip(film.height).map_or(1.0, |(w, h)| f64::from(w) / f64::from(h));
@@ -124,6 +130,7 @@ impl Scene {
             tables: SurfaceTable::new(&builder.entries),
             entries: builder.entries,
             lights: builder.lights,
+            media: Media { media: if uses_media { media } else { vec![] }, boundaries },
             warnings: builder.warnings,
         })
     }
@@ -207,6 +214,19 @@ impl Builder {
             trees[position] = Some(Arc::new(tree));
         }
         Ok(trees.into_iter().flatten().collect())
+    }
+
+    /// The tree of shapes that do nothing but separate media, and of the objects that have such.
+    fn boundaries(
+        &mut self,
+        (shapes, objects): (Vec<ShapeDesc>, Vec<ObjectDesc>),
+        instances: &[InstanceDesc],
+    ) -> Result<Boundaries, BuildError> {
+        let mut own = Self { materials: self.materials.clone(), ..Self::default() };
+        let objects = own.objects(objects, instances)?;
+        let accel = Arc::new(own.tree(shapes, instances, &objects)?);
+        self.warnings.extend(own.warnings);
+        Ok(Boundaries { accel, entries: own.entries })
     }
 
     /// The tree of the world, whose instances refer to the objects.
@@ -421,6 +441,7 @@ impl Builder {
             emission: None,
             light: None,
             alpha: desc.alpha.clone(),
+            boundary: desc.boundary.filter(|boundary| boundary.inside != boundary.outside),
             reverse: desc.reverse_orientation,
             form: Form::Exact,
         })

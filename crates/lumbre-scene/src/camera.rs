@@ -9,7 +9,7 @@ use lumbre_math::{
     AnimatedTransform, DAffine3, DMat3, DVec2, DVec3, Elementary, SingularTransformError, Transform,
 };
 
-use crate::Footprint;
+use crate::{Footprint, MediumId};
 use crate::viewpoint::half_window;
 
 /// The mapping of directions to the picture of a spherical camera.
@@ -78,6 +78,8 @@ pub struct Camera {
     pub shutter_open: f64,
     /// The time when it closes; not before it opens.
     pub shutter_close: f64,
+    /// The medium that it stands in; `None` is a vacuum.
+    pub medium: Option<MediumId>,
 }
 
 impl Camera {
@@ -92,6 +94,7 @@ impl Camera {
             screen_window: None,
             shutter_open: 0.0,
             shutter_close: 1.0,
+            medium: None,
         }
     }
 
@@ -176,6 +179,7 @@ pub struct View {
     motion: Option<Arc<AnimatedTransform>>,
     shutter_open: f64,
     shutter_close: f64,
+    medium: Option<MediumId>,
     // The screen position of the film's (0, 0), and the size of a pixel on the screen. The screen of a
     // perspective camera is at z = 1, that of a spherical one is the unit square.
     corner: DVec2,
@@ -203,6 +207,7 @@ impl View {
             motion: camera.motion.clone(),
             shutter_open: camera.shutter_open,
             shutter_close: camera.shutter_close,
+            medium: camera.medium,
             corner,
             step: (opposite - corner) / pixels,
         }
@@ -211,6 +216,11 @@ impl View {
     /// The time at a fraction of the exposure: 0 is when the shutter opens, 1 when it closes.
     pub fn time(&self, part: f64) -> f64 {
         self.shutter_open + part * (self.shutter_close - self.shutter_open)
+    }
+
+    /// The medium that the camera stands in.
+    pub fn medium(&self) -> Option<MediumId> {
+        self.medium
     }
 
     /// Whether the camera moves.

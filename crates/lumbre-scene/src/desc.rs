@@ -6,9 +6,10 @@ use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
 use lumbre_kernel::{CustomGeometry, Placement};
 use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec2, Vec3, Vec4};
+use lumbre_shading::medium::Medium;
 use lumbre_shading::{FURTHER_SETS, FloatTexture, Material, MipMap, ShadingNormals};
 
-use crate::{Camera, Listing, MaterialId, ObjectId};
+use crate::{Camera, Listing, MaterialId, MediumId, ObjectId};
 
 /// A scene description.
 #[derive(Clone, Debug, Default)]
@@ -25,6 +26,8 @@ pub struct SceneDesc {
     pub integrator: IntegratorDesc,
     /// Materials; shapes refer to them by index.
     pub materials: Vec<NamedMaterial>,
+    /// Participating media; shapes and cameras refer to them by index.
+    pub media: Vec<Arc<Medium>>,
     /// Shapes in the world, in the order of the file.
     pub shapes: Vec<ShapeDesc>,
     /// Objects for instancing.
@@ -113,10 +116,21 @@ pub struct ShapeDesc {
     pub reverse_orientation: bool,
     /// The material; `None` for an interface, which does not scatter.
     pub material: Option<MaterialId>,
+    /// The media on its sides, where it separates two; `None` where light stays in the medium that it is in.
+    pub boundary: Option<Boundary>,
     /// The light it emits.
     pub area_light: Option<AreaLightDesc>,
     /// Alpha in [0, 1]; `None` is opaque.
     pub alpha: Option<Arc<FloatTexture>>,
+}
+
+/// The media on both sides of a surface; `None` is a vacuum.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Boundary {
+    /// Behind the surface, where its normal does not point.
+    pub inside: Option<MediumId>,
+    /// In front of it.
+    pub outside: Option<MediumId>,
 }
 
 /// The geometry of a shape.

@@ -24,6 +24,14 @@ pub enum BuildError {
         /// The number of materials.
         count: usize,
     },
+    /// A shape or a camera refers to a missing medium.
+    #[error("a shape or camera names medium {medium}, but there are {count}")]
+    NoSuchMedium {
+        /// The medium index.
+        medium: u32,
+        /// The number of media.
+        count: usize,
+    },
     /// An instance refers to a missing object.
     #[error("an instance names object {object}, but there are {count}")]
     NoSuchObject {

@@ -173,6 +173,7 @@ mod tests {
             world_from_object,
             reverse_orientation: false,
             material: Some(MaterialId(0)),
+            boundary: None,
             area_light: None,
             alpha: None,
         }

@@ -82,6 +82,7 @@ pub(crate) fn lay(desc: &mut SceneDesc) -> Result<Option<GroundDesc>, BuildError
         world_from_object: Transform::IDENTITY,
         reverse_orientation: false,
         material: Some(MaterialId(desc.materials.len() as u32)),
+        boundary: None,
         area_light: None,
         alpha: None,
     });

@@ -6,7 +6,7 @@ use lumbre_math::{DVec3, Vec2};
 use lumbre_shading::{Bsdf, LocalSurface, Material, ShadingFrame, ShadingNormals, Spectrum, TextureContext};
 
 use crate::light::{LightId, LightSample};
-use crate::{Emission, Footprint, Scene};
+use crate::{Boundary, Emission, Footprint, Scene};
 
 /// A ray's hit with everything that a path needs to continue.
 #[derive(Clone, Debug)]
@@ -27,6 +27,8 @@ pub struct Interaction<'s> {
     pub emission: Option<&'s Emission>,
     /// The light that samples this surface.
     pub light: Option<LightId>,
+    /// The media on the surface's sides, where these differ.
+    pub boundary: Option<Boundary>,
     /// [`crate::ShapeDesc::index`] of the shape.
     pub shape: u32,
     /// The time of the ray.

@@ -14,6 +14,7 @@ use crate::footprint::Spot;
 use crate::light::choice::LightChoice;
 use crate::light::lanes::LaneLights;
 use crate::light::{Light, LightId, LightSample, Place, Sampling};
+use crate::media::Media;
 use crate::surface::{Form, ShadingGeometry, SurfaceEntry};
 use crate::{
     BuildError, Camera, FilmDesc, FilterDesc, Footprint, GroundPlane, IntegratorDesc, Interaction,
@@ -26,6 +27,7 @@ pub struct Scene {
     pub(crate) accel: Arc<Accel>,
     pub(crate) entries: Vec<SurfaceEntry>,
     pub(crate) tables: SurfaceTable,
+    pub(crate) media: Media,
     pub(crate) lights: Vec<Light>,
     pub(crate) light_choice: LightChoice,
     pub(crate) lane_lights: LaneLights,
@@ -366,6 +368,7 @@ impl Scene {
             material: entry.material.as_deref(),
             emission: entry.emission.as_ref(),
             light,
+            boundary: self.entries[hit.id as usize].boundary,
             shape: entry.shape,
             primitive,
             geometric,

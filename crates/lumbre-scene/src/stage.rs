@@ -283,6 +283,7 @@ mod tests {
                 world_from_object: Transform::IDENTITY,
                 reverse_orientation: false,
                 material: Some(MaterialId(0)),
+                boundary: None,
                 area_light: None,
                 alpha: None,
             }],

@@ -9,7 +9,7 @@ use lumbre_shading::{FloatTexture, LocalSurface, Material, Spectrum, TextureCont
 
 use crate::csg::CsgForm;
 use crate::light::LightId;
-use crate::{ColouredShape, Emission, MeshDesc};
+use crate::{Boundary, ColouredShape, Emission, MeshDesc};
 
 /// The surface data for one id of the tree.
 #[derive(Clone, Debug)]
@@ -22,6 +22,8 @@ pub(crate) struct SurfaceEntry {
     /// The light that samples it; `None` if only rays that hit it find its light.
     pub light: Option<LightId>,
     pub alpha: Option<Arc<FloatTexture>>,
+    /// The media on its sides, where these differ.
+    pub boundary: Option<Boundary>,
     pub reverse: bool,
     /// Whether the material has textures, and needs footprints.
     pub looks_up: bool,

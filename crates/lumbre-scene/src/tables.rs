@@ -71,6 +71,7 @@ impl SurfaceTable {
         let is_flat =
             attributes.normals().is_none() && attributes.moving.is_none() && attributes.precise.is_none();
         let is_plain = entry.alpha.is_none()
+            && entry.boundary.is_none()
             && material.is_uniform()
             && !material.one_sided
             && !material.may_be_solid()

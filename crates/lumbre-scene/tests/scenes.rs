@@ -25,6 +25,7 @@ fn shape(index: u32, geometry: GeometryDesc) -> ShapeDesc {
         world_from_object: Transform::IDENTITY,
         reverse_orientation: false,
         material: Some(MaterialId(0)),
+        boundary: None,
         area_light: None,
         alpha: None,
     }
@@ -558,6 +559,7 @@ fn what_cannot_be_built_is_named() {
         screen_window: None,
         shutter_open: 0.0,
         shutter_close: 1.0,
+        medium: None,
     };
     let camera = SceneDesc { cameras: vec![camera], ..of_shapes(vec![]) };
     assert!(matches!(error(camera), BuildError::Camera { camera: 0, parameter: "fov", .. }));
@@ -607,6 +609,7 @@ fn a_camera_looks_through_the_back_of_what_is_one_sided_and_light_does_not() {
             world_from_object: Transform::scale(scale).unwrap(),
             reverse_orientation: reverse,
             material: Some(MaterialId(0)),
+            boundary: None,
             area_light: None,
             alpha: None,
         });

@@ -176,6 +176,7 @@ impl SceneBuilder {
             world_from_object,
             reverse_orientation: false,
             material: Some(id),
+            boundary: None,
             area_light: light,
             alpha: None,
         }

@@ -136,6 +136,7 @@ pub(super) static ENGLISH: Texts = Texts {
     throughput_after: "what the path carries then",
     from_surface: "light of the surface",
     from_infinity: "light from infinity",
+    from_medium: "light of the medium",
     from_sampled: "a light that was sampled",
     from_direct: "all lights that shine on it",
     end_depth: "The path has as many bounces as it may have.",

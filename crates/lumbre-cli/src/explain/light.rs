@@ -337,6 +337,7 @@ fn source_of(source: Source, texts: &Texts) -> &'static str {
     match source {
         Source::Surface => texts.from_surface,
         Source::Infinity => texts.from_infinity,
+        Source::Medium => texts.from_medium,
         Source::Sampled => texts.from_sampled,
         Source::Direct => texts.from_direct,
     }

@@ -136,6 +136,7 @@ pub(super) static SPANISH: Texts = Texts {
     throughput_after: "lo que transporta el camino después",
     from_surface: "luz de la superficie",
     from_infinity: "luz del infinito",
+    from_medium: "luz del medio",
     from_sampled: "una luz muestreada",
     from_direct: "todas las luces que la iluminan",
     end_depth: "El camino tiene tantos rebotes como puede tener.",

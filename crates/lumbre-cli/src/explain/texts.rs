@@ -140,6 +140,7 @@ pub(super) struct Texts {
     pub(super) throughput_after: &'static str,
     pub(super) from_surface: &'static str,
     pub(super) from_infinity: &'static str,
+    pub(super) from_medium: &'static str,
     pub(super) from_sampled: &'static str,
     pub(super) from_direct: &'static str,
     pub(super) end_depth: &'static str,

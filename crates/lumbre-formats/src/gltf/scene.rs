@@ -477,6 +477,7 @@ impl Builder<'_> {
                 world_from_object: Transform::IDENTITY,
                 reverse_orientation: false,
                 material: Some(dressing.material),
+                boundary: None,
                 area_light: dressing.area_light.clone(),
                 alpha: dressing.alpha.clone(),
             };
@@ -703,6 +704,7 @@ pub(super) fn camera(camera: Value<'_>, node: Value<'_>, world: &DAffine3) -> Re
         screen_window: window,
         shutter_open: 0.0,
         shutter_close: 1.0,
+        medium: None,
     })
 }
 

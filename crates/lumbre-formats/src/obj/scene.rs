@@ -125,6 +125,7 @@ pub(crate) fn obj_scene(
             world_from_object,
             reverse_orientation: false,
             material: Some(MaterialId(id as u32)),
+            boundary: None,
             area_light: finished.and_then(|f| f.light.clone()),
             alpha: finished.and_then(|f| f.alpha.clone()),
         });

@@ -8,9 +8,10 @@ use std::sync::Arc;
 use lumbre_image::Bitmap;
 use lumbre_math::{AnimatedTransform, Transform};
 use lumbre_scene::{
-    FilmDesc, GeometryDesc, InstanceDesc, MaterialId, MeshDesc, NamedMaterial, ObjectDesc, ObjectId,
-    Placement, SamplerDesc, SceneDesc, ShapeDesc, WithoutLight,
+    FilmDesc, GeometryDesc, InstanceDesc, MaterialId, MediumId, MeshDesc, NamedMaterial, ObjectDesc,
+    ObjectId, Placement, SamplerDesc, SceneDesc, ShapeDesc, WithoutLight,
 };
+use lumbre_shading::medium::Medium;
 use lumbre_shading::{
     FloatTexture, Material, MipMap, PrincipledParams, Spectrum, SpectrumTexture, Texture, TextureValue,
 };
@@ -51,9 +52,9 @@ pub(super) struct Converter<'b, 'd> {
     /// Constant textures by their bits: most are of a few values.
     pub constants: HashMap<u32, FloatArc>,
     pub constant_spectra: HashMap<[u32; 3], SpectrumArc>,
-    pub media: HashMap<String, ()>,
-    /// The places of first uses.
-    pub media_used: HashMap<String, Spot>,
+    /// Each with the place of its first use as long as it is undefined.
+    pub media: Vec<MediumSlot>,
+    pub medium_names: HashMap<Arc<str>, MediumId>,
     pub images: HashMap<ImageKey, Arc<MipMap>>,
     /// Images that are missing, when lenient.
     pub missing: HashSet<PathBuf>,
@@ -80,6 +81,13 @@ pub(super) struct MaterialSlot {
     pub first_use: Spot,
     /// Its depth of nested mixtures.
     pub depth: usize,
+}
+
+/// A medium, by its index in the table.
+pub(super) struct MediumSlot {
+    pub name: Arc<str>,
+    pub medium: Option<Arc<Medium>>,
+    pub first_use: Spot,
 }
 
 /// An object, by its index in the table.
@@ -171,8 +179,8 @@ impl<'b, 'd> Converter<'b, 'd> {
             spectrum_textures: HashMap::new(),
             constants: HashMap::new(),
             constant_spectra: HashMap::new(),
-            media: HashMap::new(),
-            media_used: HashMap::new(),
+            media: Vec::new(),
+            medium_names: HashMap::new(),
             images: HashMap::new(),
             missing: HashSet::new(),
             bitmaps: HashMap::new(),
@@ -422,34 +430,6 @@ impl<'b, 'd> Converter<'b, 'd> {
         }
     }
 
-    // Media.
-
-    pub fn medium(&mut self, name: &str, at: Spot, params: Params) -> Result<()> {
-        self.kept_name(name, at)?;
-        if self.media.insert(name.to_owned(), ()).is_some() {
-            return Err(at.error(format!("medium {} is defined twice", quoted(name))));
-        }
-        params.ignore_all();
-        self.note(params.spot, "media are not rendered yet: this one is left out");
-        Ok(())
-    }
-
-    pub fn medium_interface(&mut self, spot: Spot, names: Vec<(String, Spot)>) -> Result<()> {
-        let mut is_used = false;
-        for (name, at) in names.into_iter().filter(|(name, _)| !name.is_empty()) {
-            is_used = true;
-            // The first use of a name is told, where there is no such medium.
-            if !self.media_used.contains_key(&name) {
-                self.kept_name(&name, at)?;
-                self.media_used.insert(name, at);
-            }
-        }
-        if is_used {
-            self.note(spot, "media are not rendered yet: this border of one is left out");
-        }
-        Ok(())
-    }
-
     // The end of the scene.
 
     /// Completes deferred work: names, mesh files, lights on interfaces; and moves the tables into the scene.
@@ -505,6 +485,8 @@ impl<'b, 'd> Converter<'b, 'd> {
                 return Err(spot.error(message));
             }
         }
+        let media = std::mem::take(&mut self.media).into_iter();
+        self.scene.media = media.map(|slot| slot.medium.expect("names are checked")).collect();
         let materials = std::mem::take(&mut self.materials).into_iter();
         self.scene.materials = materials
             .map(|slot| NamedMaterial {
@@ -576,15 +558,10 @@ impl<'b, 'd> Converter<'b, 'd> {
             let wrong = Diagnostic::error(format!("object {} is not defined", quoted(&slot.name)));
             return Err(slot.first_use.wrong(wrong.suggest(&slot.name, known)));
         }
-        let mut media_used: Vec<_> = std::mem::take(&mut self.media_used).into_iter().collect();
-        media_used.sort_by_key(|(_, spot)| (spot.file, spot.line, spot.column));
-        for (name, spot) in media_used {
-            if !self.media.contains_key(&name) {
-                let (files, media) = (&self.files, &self.media);
-                self.diagnostics.warn(&format!("medium {} is not defined", quoted(&name)), |unknown| {
-                    files.locate(spot, unknown.suggest(&name, media.keys().map(String::as_str)))
-                });
-            }
+        if let Some(slot) = self.media.iter().find(|slot| slot.medium.is_none()) {
+            let known = self.media.iter().filter(|slot| slot.medium.is_some()).map(|slot| &*slot.name);
+            let wrong = Diagnostic::error(format!("medium {} is not defined", quoted(&slot.name)));
+            return Err(slot.first_use.wrong(wrong.suggest(&slot.name, known)));
         }
         Ok(())
     }

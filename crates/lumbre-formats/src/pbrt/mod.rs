@@ -17,6 +17,7 @@ mod images;
 mod lexer;
 mod lights;
 mod materials;
+mod media;
 #[cfg(test)]
 mod pages;
 mod params;

@@ -3,7 +3,7 @@
 use lumbre_image::ColourSpace;
 use lumbre_math::{Transform, Vec2};
 use lumbre_scene::{
-    Camera, CameraKind, FilterDesc, IntegratorDesc, IntegratorKind, SamplerDesc, SamplerKind,
+    Camera, CameraKind, FilterDesc, IntegratorDesc, IntegratorKind, MediumId, SamplerDesc, SamplerKind,
     SphericalMapping,
 };
 use lumbre_shading::ShadingNormals;
@@ -38,7 +38,13 @@ pub(super) const INTEGRATORS: [&str; 15] = [
 ];
 
 impl Converter<'_, '_> {
-    pub fn camera(&mut self, ty: &str, params: Params, world_from_camera: &[Transform; 2]) -> Result<()> {
+    pub fn camera(
+        &mut self,
+        ty: &str,
+        params: Params,
+        world_from_camera: &[Transform; 2],
+        medium: Option<MediumId>,
+    ) -> Result<()> {
         let spot = params.spot;
         let shutter_open = params.float("shutteropen", 0.0)?;
         let shutter_close = params.float("shutterclose", 1.0)?;
@@ -118,6 +124,7 @@ impl Converter<'_, '_> {
             screen_window,
             shutter_open,
             shutter_close,
+            medium,
         }];
         Ok(())
     }
@@ -428,6 +435,7 @@ impl Converter<'_, '_> {
                 screen_window: None,
                 shutter_open: 0.0,
                 shutter_close: 1.0,
+                medium: None,
             });
         }
         Ok(())

@@ -120,6 +120,7 @@ impl Converter<'_, '_> {
             world_from_object,
             reverse_orientation: state.reverse_orientation,
             material: state.material,
+            boundary: state.boundary(),
             area_light,
             alpha,
         };

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use lumbre_image::ColourSpace;
 use lumbre_math::Transform;
-use lumbre_scene::{AreaLightDesc, MaterialId};
+use lumbre_scene::{AreaLightDesc, Boundary, MaterialId, MediumId};
 
 use super::params::Defaults;
 use super::source::Spot;
@@ -48,6 +48,8 @@ pub(super) struct State {
     /// `None` for an interface.
     pub material: Option<MaterialId>,
     pub area_light: Option<Arc<AreaLight>>,
+    /// The media inside and outside of shapes; `None` is a vacuum.
+    pub media: [Option<MediumId>; 2],
     /// Defaults from `Attribute`, by [`EntityKind`].
     pub defaults: [Defaults; 5],
 }
@@ -61,8 +63,15 @@ impl State {
             space: ColourSpace::REC709,
             material: Some(material),
             area_light: None,
+            media: [None; 2],
             defaults: Default::default(),
         }
+    }
+
+    /// The media on the sides of a shape, where these differ.
+    pub fn boundary(&self) -> Option<Boundary> {
+        let [inside, outside] = self.media;
+        (inside != outside).then_some(Boundary { inside, outside })
     }
 
     /// Defaults for a kind of entity.

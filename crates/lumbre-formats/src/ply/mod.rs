@@ -188,6 +188,7 @@ pub(crate) fn push_thin(
             world_from_object,
             reverse_orientation: false,
             material: Some(material),
+            boundary: None,
             area_light: None,
             alpha: None,
         });
@@ -212,6 +213,7 @@ pub(crate) fn scene_of_meshes(meshes: impl IntoIterator<Item = MeshDesc>, up: Up
             world_from_object: Transform::IDENTITY,
             reverse_orientation: false,
             material: Some(material),
+            boundary: None,
             area_light: None,
             alpha: None,
         });

@@ -57,6 +57,7 @@ impl Integrator for Path {
             regularize: self.regularize,
             shading_normals: self.shading_normals,
             has_solids: scene.has_solids(),
+            has_media: scene.has_media(),
             has_panes: scene.lets_light_straight_on(),
             moves: scene.moves(),
             instruction_set: InstructionSet::detect(),

@@ -83,6 +83,8 @@ pub enum Source {
     Surface,
     /// A light at infinity.
     Infinity,
+    /// The medium that the path goes through.
+    Medium,
     /// What the surface scatters of a sampled light.
     Sampled,
     /// What the surface scatters of all lights.

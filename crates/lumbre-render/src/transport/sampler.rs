@@ -1,8 +1,10 @@
 //! Random numbers as a pure function of (seed, pixel, sample index, what they are for), for one sample or for lanes of them.
 
-use lumbre_math::random::PixelRandom;
+use lumbre_geometry::Ray;
+use lumbre_math::random::{PixelRandom, combine, hash_dvec3, hash_words};
 use lumbre_math::{DVec2, Vec2};
 use lumbre_scene::{SamplerDesc, SamplerKind};
+use lumbre_shading::medium::PassageNumbers;
 use lumbre_simd::random::{pcg4d, uniform};
 use lumbre_simd::{Real, UInt};
 
@@ -216,6 +218,18 @@ impl Draw {
     pub fn distance(&self, sample: u32) -> [f64; 2] {
         let [.., channel, distance] = self.four(in_medium(sample, 0));
         [channel.into(), distance.into()]
+    }
+
+    /// The numbers of a passage through a medium.
+    pub fn passage(&self, sample: u32) -> PassageNumbers {
+        let words = [self.pixel[0], self.pixel[1], self.index, in_medium(sample, 0)];
+        PassageNumbers::new(self.distance(sample), hash_words(&words.map(u64::from)))
+    }
+
+    /// The seed of what is decided along a ray.
+    pub fn along(&self, ray: &Ray) -> u64 {
+        let line = combine(hash_dvec3(ray.origin), hash_dvec3(ray.direction));
+        hash_words(&[self.pixel[0].into(), self.pixel[1].into(), self.index.into(), line])
     }
 
     /// The direction after the collision of a distance sample.

@@ -1,13 +1,15 @@
 //! Many paths side by side: plain data in columns, and stages that take them all one step further.
 //!
 //! A wave holds some thousand samples ([`Slots`]), each with its path ([`Paths`]). A bounce goes through the stages: the closest hits
-//! of all rays ([`search`]); what they met, written down as plain numbers, with media, emission and materials ([`surfaces`]); a light
+//! of all rays ([`search`]); what media do on the way there ([`media`]); what they met, written down as plain numbers, with emission
+//! and materials ([`surfaces`]); a light
 //! and a direction to go on in, for all of them ([`shade`]); what comes through of the lights ([`shadows`]). What a path does depends on
 //! nothing but its sample: neither the size of the wave nor the other paths in it show in the picture.
 
 mod escape;
 mod flat;
 mod lights;
+mod media;
 mod paths;
 mod search;
 mod shade;
@@ -22,7 +24,7 @@ use std::marker::PhantomData;
 use lumbre_geometry::Ray;
 use lumbre_kernel::PictureRounding;
 use lumbre_math::DVec3;
-use lumbre_scene::{SamplerKind, Scene};
+use lumbre_scene::{Crossing, SamplerKind, Scene};
 use lumbre_shading::lanes::{
     BsdfKind, CoatedConductorLanes, CoatedDiffuseLanes, ConductorLanes, DielectricLanes, DiffuseLanes,
     DiffuseTransmissionLanes, PrincipledLanes, ThinDielectricLanes, UberLanes,
@@ -39,6 +41,7 @@ use crate::transport::journal::{End, Event, Source};
 use crate::transport::{Record, Strategy};
 use crate::wave::escape::Escape;
 use crate::wave::flat::FlatHits;
+use crate::wave::media::Collision;
 use crate::wave::paths::{OnePath, Paths, Slots};
 use crate::wave::search::Hits;
 use crate::wave::shade::{Kind, Shade, ShadeKind};
@@ -61,6 +64,7 @@ pub(crate) struct Setting<'s> {
     pub(crate) regularize: bool,
     pub(crate) shading_normals: ShadingNormals,
     pub(crate) has_solids: bool,
+    pub(crate) has_media: bool,
     /// Whether light from points is followed straight on through panes.
     pub(crate) has_panes: bool,
     pub(crate) moves: bool,
@@ -110,8 +114,13 @@ pub(crate) struct Wave<'s> {
     shadows: Shadows<'s>,
     legs: Vec<Leg>,
     crossings: Vec<u32>,
-    /// Paths that scattered in a medium before they reached a surface.
+    /// Paths that scattered inside solids before they reached a surface.
     collided: Vec<OnePath>,
+    /// Where paths scattered in media between surfaces, and, in a scene with such media, which paths do not get to what they meet.
+    collisions: Vec<Collision>,
+    taken: Vec<bool>,
+    /// The boundaries of media along one ray.
+    boundaries: Vec<Crossing>,
     /// Whether rays come from the camera.
     is_first: bool,
 }
@@ -121,10 +130,11 @@ impl<'s> Wave<'s> {
     fn follow(&mut self, setting: &Setting<'s>, precision: Precision, record: &mut Record) {
         let mut traced = record.journal.is_some().then(Traced::default);
         loop {
+            self.cross_media(setting, record);
             self.escape(setting, record);
             self.surfaces(setting, record);
             self.shade(setting, precision, traced.as_mut());
-            self.cross_surfaces();
+            self.cross_surfaces(setting);
             self.light(setting, precision, traced.as_mut(), record);
             self.walk_legs(setting.scene, record);
             std::mem::swap(&mut self.paths, &mut self.next);
@@ -140,8 +150,11 @@ impl<'s> Wave<'s> {
     /// Adds the light at infinity that rays found which left the scene.
     fn escape(&mut self, setting: &Setting<'s>, record: &mut Record) {
         self.others.clear();
-        self.others
-            .extend((0..self.paths.len).filter(|&path| self.hits.is_miss(path)).map(|path| path as u32));
+        for path in 0..self.paths.len {
+            if self.hits.is_miss(path) && !self.is_taken(path) {
+                self.others.push(path as u32);
+            }
+        }
         let count = self.others.len();
         let Some(&last) = self.others.last() else { return };
         record.note(|| Event::Left { ray: self.paths.ray(0, self.slots.time[0]) });
@@ -174,7 +187,7 @@ impl<'s> Wave<'s> {
 
     /// Samples lights and directions at all vertices.
     fn shade(&mut self, setting: &Setting<'s>, precision: Precision, mut traced: Option<&mut Traced>) {
-        let count: usize = self.vertices.queues.iter().map(Vec::len).sum();
+        let count = self.vertices.queues.iter().map(Vec::len).sum::<usize>() + self.collisions.len();
         self.next.len = 0;
         self.legs.clear();
         self.crossings.clear();
@@ -206,11 +219,16 @@ impl<'s> Wave<'s> {
         for path in &self.collided {
             self.next.push_one(path);
         }
+        self.shade_collisions(setting, precision == Precision::Single, traced);
     }
 
-    /// Takes paths into the solids behind the surfaces that they go through, or out of them.
-    fn cross_surfaces(&mut self) {
+    /// Takes paths into the solids and media behind the surfaces that they go through, or out of them.
+    fn cross_surfaces(&mut self, setting: &Setting<'s>) {
         for &vertex in &self.crossings {
+            if setting.has_media {
+                let path = self.vertices.path[vertex as usize] as usize;
+                self.slots.medium[self.paths.slot[path] as usize] = self.vertices.media[1][vertex as usize];
+            }
             if let Some((solid, front)) = self.vertices.solid(vertex as usize) {
                 let path = self.vertices.path[vertex as usize] as usize;
                 self.slots.interiors[self.paths.slot[path] as usize].cross(solid, front);

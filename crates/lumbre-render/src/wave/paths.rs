@@ -47,7 +47,9 @@ pub(crate) struct Slots<'s> {
     pub(crate) radiance: Vec<Spectrum>,
     /// The solids that it is inside of; empty in a scene without solids.
     pub(crate) interiors: Vec<Interiors<'s>>,
-    /// Distances sampled in media, and collisions in them.
+    /// The medium around, as [`crate::wave::media::of_column`] reads it; empty in a scene without media.
+    pub(crate) medium: Vec<u32>,
+    /// Distances sampled in media, and collisions inside solids.
     pub(crate) distance_samples: Vec<u32>,
     pub(crate) collisions: Vec<u32>,
 }
@@ -63,6 +65,7 @@ impl Slots<'_> {
         self.footprints.clear();
         self.radiance.clear();
         self.interiors.clear();
+        self.medium.clear();
         self.distance_samples.clear();
         self.collisions.clear();
     }
@@ -73,8 +76,8 @@ impl Slots<'_> {
         CameraRay { ray: self.rays[slot], footprint }
     }
 
-    /// Adds a sample.
-    pub(crate) fn push(&mut self, draw: Draw, camera: &CameraRay, has_solids: bool) {
+    /// Adds a sample. In a scene with media, `medium` is what the camera stands in.
+    pub(crate) fn push(&mut self, draw: Draw, camera: &CameraRay, has_solids: bool, medium: Option<u32>) {
         let (pixel, index) = draw.words();
         self.draws.push(draw);
         self.pixel[0].push(pixel[0]);
@@ -88,8 +91,11 @@ impl Slots<'_> {
         self.radiance.push(Spectrum::BLACK);
         if has_solids {
             self.interiors.push(Interiors::default());
-            self.distance_samples.push(0);
             self.collisions.push(0);
+        }
+        self.medium.extend(medium);
+        if has_solids || medium.is_some() {
+            self.distance_samples.push(0);
         }
     }
 }

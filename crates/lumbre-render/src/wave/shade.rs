@@ -35,7 +35,7 @@ pub(crate) struct Shade<'a, 's> {
     /// First parts of rays of `next`.
     pub(crate) legs: &'a mut Vec<Leg>,
     pub(crate) shadows: &'a mut Shadows<'s>,
-    /// Vertices whose paths go through the surface, in scenes with solids.
+    /// Vertices whose paths go through the surface, in scenes with solids or media.
     pub(crate) crossings: &'a mut Vec<u32>,
     /// Whether rays are rounded to single precision.
     pub(crate) is_single: bool,
@@ -338,6 +338,12 @@ impl<'s> Shade<'_, 's> {
             return;
         }
         let first = self.shadows.len;
+        if self.setting.has_media {
+            let [before, behind] = &self.vertices.media;
+            let at = arrived.vertex_at;
+            let medium = R::UInt::select(crosses, R::UInt::gather(behind, at), R::UInt::gather(before, at));
+            medium.compress_store(found, &mut self.shadows.medium[first..]);
+        }
         self.shadows.push(found, &segment);
         if (found & stays).any() {
             push_legs::<R>(&mut self.shadows.legs, first, found, found & stays, receiver.from);
@@ -404,7 +410,7 @@ impl<'s> Shade<'_, 's> {
             let from = vertex.place.start(vertex.place.normal);
             push_legs::<R>(self.legs, first, survives, survives & stays, from);
         }
-        if self.setting.has_solids {
+        if self.setting.has_solids || self.setting.has_media {
             let crosses = survives & vertex.crosses(direction, sample.transmitted);
             push_crossings::<R>(self.crossings, crosses, arrived.vertex_at);
         }

@@ -10,6 +10,7 @@ use lumbre_simd::{Double, Mask, Real, UInt, V3};
 use crate::transport::Record;
 use crate::transport::interior::Interiors;
 use crate::transport::through::straight_on;
+use crate::wave::media::of_column;
 use crate::wave::paths::{Slots, grow};
 use crate::wave::{Leg, Setting};
 
@@ -25,6 +26,8 @@ pub(crate) struct Shadows<'s> {
     pub(crate) end: Vec<f64>,
     /// What the path receives where nothing is in the way.
     pub(crate) light: [Vec<f32>; 3],
+    /// The medium that a segment begins in, as [`of_column`] reads it; only in a scene with media.
+    pub(crate) medium: Vec<u32>,
     /// First parts of segments.
     pub(crate) legs: Vec<Leg>,
     /// Segments that panes let through.
@@ -56,6 +59,17 @@ pub(crate) struct Segment<R: Real> {
     pub(crate) light: V3<R>,
 }
 
+/// One segment: see [`Shadows`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OneSegment {
+    pub(crate) slot: u32,
+    pub(crate) origin: DVec3,
+    pub(crate) way: DVec3,
+    pub(crate) end: f64,
+    pub(crate) light: Spectrum,
+    pub(crate) medium: u32,
+}
+
 /// The part of a way to a point that a segment goes: allows for the rounding of its direction and of `t`.
 pub(crate) const NEARLY_WHOLE: f64 = 1.0 - 1.0 / (1_u64 << 40) as f64;
 
@@ -69,6 +83,21 @@ impl<'s> Shadows<'s> {
         let f64s = self.origin.iter_mut().chain(&mut self.way).chain([&mut self.end]);
         f64s.for_each(|column| grow(column, len));
         self.light.iter_mut().for_each(|column| grow(column, len));
+        grow(&mut self.medium, len);
+    }
+
+    /// Appends a segment, for which there is room.
+    pub(crate) fn push_one(&mut self, segment: &OneSegment) {
+        let at = self.len;
+        self.len += 1;
+        self.slot[at] = segment.slot;
+        for axis in 0..3 {
+            self.origin[axis][at] = segment.origin[axis];
+            self.way[axis][at] = segment.way[axis];
+            self.light[axis][at] = segment.light[axis];
+        }
+        self.end[at] = segment.end;
+        self.medium[at] = segment.medium;
     }
 
     /// Appends the lanes of a mask.
@@ -130,6 +159,12 @@ impl<'s> Shadows<'s> {
             if let Some(pane) = next_pane.next_if(|pane| pane.segment as usize == i) {
                 let ray = self.ray(i, slots.time[self.slot[i] as usize]);
                 passes = straight_on(scene, ray, &pane.sample, pane.around, setting.regularize, record);
+            }
+            if setting.has_media && !passes.is_black() {
+                let slot = self.slot[i] as usize;
+                let ray = self.ray(i, slots.time[slot]);
+                let seed = slots.draws[slot].along(&ray);
+                passes = passes * scene.transmittance(of_column(self.medium[i]), &ray, seed);
             }
             if !passes.is_black() {
                 slots.radiance[self.slot[i] as usize] += self.light(i) * passes;

@@ -6,6 +6,7 @@ use lumbre_scene::{CameraRay, Footprint, Scene, View};
 use lumbre_shading::Spectrum;
 
 use crate::transport::{Draw, Record, Sight};
+use crate::wave::media::to_column;
 use crate::wave::paths::{OnePath, Paths};
 use crate::wave::{Precision, Setting, Wave};
 
@@ -31,6 +32,7 @@ impl<'a, 's> Sights<'a, 's> {
         record: &mut Record,
     ) -> Self {
         let has_solids = scene.has_solids();
+        let medium = scene.has_media().then(|| to_column(view.medium()));
         wave.slots.clear();
         wave.paths.len = 0;
         wave.is_first = true;
@@ -54,7 +56,7 @@ impl<'a, 's> Sights<'a, 's> {
                 width,
                 spread,
             });
-            wave.slots.push(draw, &camera, has_solids);
+            wave.slots.push(draw, &camera, has_solids, medium);
         }
         record.counts.camera += wave.paths.len as u64;
         wave.hits.search(scene, &wave.paths, &wave.slots, precision, true);

@@ -13,6 +13,7 @@ use crate::transport::Record;
 use crate::transport::interior::Interiors;
 use crate::transport::journal::{End, Event, Met, Source};
 use crate::wave::flat::FlatVertices;
+use crate::wave::media::sides;
 use crate::wave::paths::{OnePath, SCATTERED};
 use crate::wave::vertices::{FOLDS, LIT_FROM_BELOW, SIDED};
 use crate::wave::{Setting, Wave};
@@ -34,7 +35,7 @@ impl<'s> Wave<'s> {
         let mut others = std::mem::take(&mut self.others);
         others.clear();
         for path in 0..self.paths.len {
-            if self.hits.is_miss(path) {
+            if self.hits.is_miss(path) || self.is_taken(path) {
                 continue;
             }
             let in_the_open =
@@ -62,6 +63,12 @@ impl<'s> Wave<'s> {
             is_single: self.hits.leaves_single(),
         });
         self.add_found(setting, Source::Surface, record);
+        if setting.has_media {
+            for vertex in 0..self.flat.len() {
+                let slot = self.paths.slot[self.vertices.path[vertex] as usize] as usize;
+                self.vertices.put_media(vertex, [self.slots.medium[slot]; 2]);
+            }
+        }
         if record.journal.is_some() && self.flat.len() > 0 && self.vertices.is_unqueued() {
             record.note(|| Event::Ended(End::Depth));
         }
@@ -119,6 +126,10 @@ impl<'s> Wave<'s> {
         if setting.has_solids && !self.cross_medium(path, slot, ray, here, record) {
             return;
         }
+        let media = setting.has_media.then(|| sides(here.boundary, here.front, self.slots.medium[slot]));
+        if let Some([before, _]) = media {
+            self.slots.medium[slot] = before;
+        }
         self.emission(setting, path, slot, ray, here, record);
         if depth == setting.max_depth {
             record.note(|| Event::Ended(End::Depth));
@@ -156,6 +167,9 @@ impl<'s> Wave<'s> {
             flags |= LIT_FROM_BELOW;
         }
         self.vertices.push_place(path, &here.surface, here.surface.point_error, here.towards_origin);
+        if let Some(media) = media {
+            self.vertices.put_media(self.vertices.len - 1, media);
+        }
         if flags & FOLDS != 0
             && let Some(risen) = here.terminator_origin()
         {

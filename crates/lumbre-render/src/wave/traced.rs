@@ -11,7 +11,7 @@ use lumbre_simd::{Double, Mask, Real, V3};
 use crate::transport::Record;
 use crate::transport::journal::{End, Event, SampledLight, Scattered, Source};
 use crate::wave::lights::first_sample;
-use crate::wave::paths::Departure;
+use crate::wave::paths::{Departure, OnePath};
 use crate::wave::shadows::Segment;
 
 /// What happens at the vertex of a wave of one path.
@@ -65,6 +65,31 @@ impl Traced {
             weight: weight.to_lanes()[0],
             shadow_ray: (found.to_bitmask() & 1 == 1).then_some(shadow_ray),
         });
+    }
+
+    /// A sample of a light at a collision in a medium.
+    pub(crate) fn collision_light(
+        &mut self,
+        sample: LightSample,
+        f: Spectrum,
+        bsdf_pdf: f32,
+        weight: f32,
+        shadow_ray: Option<Ray>,
+    ) {
+        self.light = Some(TracedLight { sample, f, bsdf_pdf, weight, shadow_ray });
+    }
+
+    /// A direction to go on in after a collision.
+    pub(crate) fn collision_scattered(&mut self, next: &OnePath, roulette: Option<(f32, bool)>) {
+        let event = Scattered {
+            ray: Ray::new(next.origin, next.direction.as_dvec3()),
+            weight: Spectrum::WHITE,
+            scatter: Scatter::Density(next.pdf),
+            transmitted: false,
+            eta: 1.0,
+            throughput: next.throughput,
+        };
+        self.scattered = Some(TracedScatter { goes_on: true, roulette, event });
     }
 
     /// A direction to go on in.

@@ -35,6 +35,9 @@ pub(crate) struct Vertices<'s> {
     pub(crate) queues: [Vec<u32>; BsdfKind::COUNT],
     /// The solids that surfaces belong to, and whether they were met from outside; none beyond the end.
     pub(crate) solids: Vec<Option<(&'s Material, bool)>>,
+    /// The media where the path comes from and behind the surface, as [`crate::wave::media::of_column`] reads them; only in a scene with
+    /// media.
+    pub(crate) media: [Vec<u32>; 2],
     /// The footprint of rays that leave: see [`lumbre_scene::Footprint::Cone`].
     pub(crate) width: Vec<f32>,
     pub(crate) spread: Vec<f32>,
@@ -107,6 +110,7 @@ impl<'s> Vertices<'s> {
         }
         grow(&mut self.width, len);
         grow(&mut self.spread, len);
+        self.media.iter_mut().for_each(|column| grow(column, len));
         if self.rows.len() < rows.len() {
             self.rows = rows.to_vec();
         }
@@ -166,6 +170,13 @@ impl<'s> Vertices<'s> {
     pub(crate) fn put_solid(&mut self, solid: &'s Material, front: bool) {
         self.solids.resize(self.len, None);
         self.solids[self.len - 1] = Some((solid, front));
+    }
+
+    /// Writes down the media on both sides of a vertex.
+    pub(crate) fn put_media(&mut self, vertex: usize, sides: [u32; 2]) {
+        for (column, medium) in self.media.iter_mut().zip(sides) {
+            column[vertex] = medium;
+        }
     }
 
     /// Where a vertex is.

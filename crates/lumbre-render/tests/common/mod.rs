@@ -42,6 +42,7 @@ pub(crate) fn add(desc: &mut SceneDesc, geometry: GeometryDesc, material: Materi
         world_from_object: Transform::IDENTITY,
         reverse_orientation: false,
         material: Some(material),
+        boundary: None,
         area_light: None,
         alpha: None,
     });
@@ -81,6 +82,7 @@ pub(crate) fn look(from: DVec3, at: DVec3, fov: f64) -> Camera {
         screen_window: None,
         shutter_open: 0.0,
         shutter_close: 1.0,
+        medium: None,
     }
 }
 

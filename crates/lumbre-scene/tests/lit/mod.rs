@@ -23,6 +23,7 @@ pub(crate) fn shining(index: u32, geometry: GeometryDesc, radiance: f32, two_sid
         world_from_object: Transform::IDENTITY,
         reverse_orientation: index.is_multiple_of(2),
         material: Some(MaterialId(0)),
+        boundary: None,
         area_light: Some(light),
         alpha: None,
     }

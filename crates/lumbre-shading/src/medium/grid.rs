@@ -80,6 +80,13 @@ impl<V: Voxel> Grid<V> {
     }
 }
 
+impl Grid<f32> {
+    /// The greatest value.
+    pub fn greatest(&self) -> f32 {
+        self.values.iter().copied().fold(f32::NEG_INFINITY, f32::max)
+    }
+}
+
 /// Linear interpolation between values at whole coordinates.
 pub(super) fn interpolate<V: Voxel>(p: DVec3, mut value: impl FnMut([i64; 3]) -> V) -> V {
     let cell = p.floor();

@@ -72,6 +72,13 @@ impl PassageNumbers {
         Self { first, used: 0, rest: RandomStream::new(seed) }
     }
 
+    /// All from one seed.
+    pub fn from_seed(seed: u64) -> Self {
+        let mut rest = RandomStream::new(seed);
+        let first = [rest.next_f64(), rest.next_f64()];
+        Self { first, used: 0, rest }
+    }
+
     /// The first two.
     fn first(&self) -> [f64; 2] {
         self.first

@@ -148,7 +148,7 @@ impl Parser<'_, '_> {
         let camera_from_world = self.state.ctm;
         let world_from_camera = camera_from_world.map(|t| t.inverse());
         self.coordinate_systems.insert("camera".to_owned(), world_from_camera);
-        self.converter.camera(&ty, params, &world_from_camera)
+        self.converter.camera(&ty, params, &world_from_camera, self.state.media[1])
     }
 
     fn film(&mut self, spot: Spot) -> Result<()> {
@@ -265,18 +265,20 @@ impl Parser<'_, '_> {
         let own = self.params()?;
         let defaults = self.state.defaults_for(EntityKind::Medium);
         let params = Params::new(format!("medium {}", quoted(&name)), spot, own, defaults);
-        self.converter.medium(&name, at, params)
+        self.converter.medium(&name, at, params, &self.state.ctm)
     }
 
-    fn medium_interface(&mut self, spot: Spot) -> Result<()> {
+    fn medium_interface(&mut self, _: Spot) -> Result<()> {
         let (inside, at) = self.string("MediumInterface", "a name in quotes")?;
+        let inside = self.converter.medium_of_side(&inside, at)?;
         let outside = match self.peek()? {
             Some(token) if token.kind == TokenKind::String => {
-                Some(self.string("MediumInterface", "a name in quotes")?)
+                let (outside, at) = self.string("MediumInterface", "a name in quotes")?;
+                self.converter.medium_of_side(&outside, at)?
             }
-            _ => None,
+            _ => inside,
         };
-        let names = [Some((inside, at)), outside].into_iter().flatten();
-        self.converter.medium_interface(spot, names.collect())
+        self.state.media = [inside, outside];
+        Ok(())
     }
 }

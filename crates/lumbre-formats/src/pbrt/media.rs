@@ -1,0 +1,313 @@
+//! Participating media.
+
+use std::sync::Arc;
+
+use lumbre_math::{DVec3, Transform};
+use lumbre_scene::MediumId;
+use lumbre_shading::medium::{
+    Cloud, Coefficients, Density, Glow, Grid, HeterogeneousMedium, HomogeneousMedium, Medium, preset,
+    preset_names,
+};
+use lumbre_shading::spectrum::BlackbodyColours;
+use lumbre_shading::{Spectrum, SpectrumValue};
+
+use super::colour;
+use super::convert::{Converter, MediumSlot};
+use super::params::{Param, Params, Type};
+use super::source::{AtSpot, Result, Spot};
+use super::textures::SpectrumUse;
+use crate::Diagnostic;
+use crate::diagnostic::{number, quoted};
+
+/// The types of media.
+pub(super) const MEDIA: [&str; 5] = ["homogeneous", "uniformgrid", "rgbgrid", "cloud", "nanovdb"];
+
+/// Beyond this, light goes all but straight on or back.
+const MOST_ASYMMETRY: f64 = 0.99;
+
+impl Converter<'_, '_> {
+    /// `MakeNamedMedium`: its space is the one in which it is made.
+    pub fn medium(&mut self, name: &str, at: Spot, params: Params, ctm: &[Transform; 2]) -> Result<()> {
+        let id = self.medium_named(name, at)?;
+        if self.media[id.0 as usize].medium.is_some() {
+            return Err(at.error(format!("medium {} is defined twice", quoted(name))));
+        }
+        if ctm[0] != ctm[1] {
+            self.note(params.spot, "the motion of this medium is left out: it stays where it starts");
+        }
+        let medium = self.medium_of(&params, ctm[0])?;
+        self.done(&params);
+        self.media[id.0 as usize].medium = Some(Arc::new(medium));
+        Ok(())
+    }
+
+    /// A medium by its name, which may be defined later; none for the empty name.
+    pub fn medium_of_side(&mut self, name: &str, at: Spot) -> Result<Option<MediumId>> {
+        if name.is_empty() { Ok(None) } else { self.medium_named(name, at).map(Some) }
+    }
+
+    fn medium_named(&mut self, name: &str, at: Spot) -> Result<MediumId> {
+        if let Some(id) = self.medium_names.get(name) {
+            return Ok(*id);
+        }
+        let name = self.kept_name(name, at)?;
+        self.keep(size_of::<MediumSlot>() + size_of::<Medium>(), "media", at)?;
+        let id = MediumId(self.media.len() as u32);
+        self.media.push(MediumSlot { name: name.clone(), medium: None, first_use: at });
+        self.medium_names.insert(name, id);
+        Ok(id)
+    }
+
+    fn medium_of(&mut self, params: &Params, world_from_medium: Transform) -> Result<Medium> {
+        let Some(ty) = params.string("type")?.map(str::to_owned) else {
+            let wrong = Diagnostic::error(format!("{} has no type", params.owner));
+            return Err(params.spot.wrong(wrong.expected("\"string type\" with one of its types")));
+        };
+        match &*ty {
+            "homogeneous" => self.homogeneous(params),
+            "uniformgrid" => self.uniform_grid(params, world_from_medium),
+            "rgbgrid" => self.rgb_grid(params, world_from_medium),
+            "cloud" => self.cloud(params, world_from_medium),
+            "nanovdb" => self.nanovdb(params, world_from_medium),
+            _ => {
+                params.ignore_all();
+                self.unknown(params.spot, "medium", &ty, &MEDIA, "a vacuum takes its place");
+                Ok(Medium::Homogeneous {
+                    medium: HomogeneousMedium {
+                        extinction: Spectrum::BLACK,
+                        albedo: Spectrum::BLACK,
+                        asymmetry: 0.0,
+                    },
+                    glow: Spectrum::BLACK,
+                })
+            }
+        }
+    }
+
+    fn homogeneous(&mut self, params: &Params) -> Result<Medium> {
+        let asymmetry = self.asymmetry(params)?;
+        let scale = params.float_at_least_zero("scale", 1.0)? as f32;
+        let named = match params.string("preset")?.map(str::to_owned) {
+            None => None,
+            Some(name) => {
+                let found = preset(&name);
+                if found.is_none() {
+                    let wrong = Diagnostic::warning(format!("unknown preset {}", quoted(&name)));
+                    let wrong = wrong.suggest(&name, preset_names());
+                    self.warn(params.spot_of("preset"), wrong.expected("the name of a measured medium"));
+                }
+                found
+            }
+        };
+        let (scattering, absorption) = match named {
+            Some(coefficients) => {
+                params.ignore(&["sigma_a", "sigma_s"]);
+                coefficients
+            }
+            None => (self.coefficient(params, "sigma_s")?, self.coefficient(params, "sigma_a")?),
+        };
+        let extinction = (scattering + absorption) * scale;
+        let albedo = scattering.zip(scattering + absorption, |s, t| if t > 0.0 { s / t } else { 0.0 });
+        let glow = self.glow(params)?.unwrap_or(Spectrum::BLACK)
+            * params.float_at_least_zero("Lescale", 1.0)? as f32;
+        Ok(Medium::Homogeneous { medium: HomogeneousMedium { extinction, albedo, asymmetry }, glow })
+    }
+
+    fn uniform_grid(&mut self, params: &Params, world_from_medium: Transform) -> Result<Medium> {
+        let size = size(params)?;
+        let Some(density) = self.voxels(params, "density", size)? else {
+            let wrong = Diagnostic::error(format!("{} has no density", params.owner));
+            return Err(params.spot.wrong(wrong.expected("\"float density\" with a number for each voxel")));
+        };
+        let scale = params.float_at_least_zero("scale", 1.0)? as f32;
+        let glow = self.grid_glow(params, size)?;
+        let coefficients = Coefficients::Scaled {
+            density: Density::Grid(density),
+            absorption: self.coefficient(params, "sigma_a")? * scale,
+            scattering: self.coefficient(params, "sigma_s")? * scale,
+        };
+        self.heterogeneous(params, world_from_medium, coefficients, glow)
+    }
+
+    fn rgb_grid(&mut self, params: &Params, world_from_medium: Transform) -> Result<Medium> {
+        let size = size(params)?;
+        let absorption = self.coloured_voxels(params, "sigma_a", size, SpectrumUse::Coefficient)?;
+        let scattering = self.coloured_voxels(params, "sigma_s", size, SpectrumUse::Coefficient)?;
+        if absorption.is_none() && scattering.is_none() {
+            let wrong = Diagnostic::error(format!("{} has neither sigma_a nor sigma_s", params.owner));
+            return Err(params.spot.wrong(wrong.expected("\"rgb sigma_a\" or \"rgb sigma_s\" of all voxels")));
+        }
+        let glow = match self.coloured_voxels(params, "Le", size, SpectrumUse::Light)? {
+            None => Glow::None,
+            Some(_) if absorption.is_none() => {
+                return Err(params.spot_of("Le").error("a medium that emits needs \"rgb sigma_a\", too"));
+            }
+            Some(radiance) => {
+                Glow::Coloured { radiance, scale: params.float_at_least_zero("Lescale", 1.0)? as f32 }
+            }
+        };
+        let scale = params.float_at_least_zero("scale", 1.0)? as f32;
+        let coefficients = Coefficients::Coloured { absorption, scattering, scale };
+        self.heterogeneous(params, world_from_medium, coefficients, glow)
+    }
+
+    fn cloud(&mut self, params: &Params, world_from_medium: Transform) -> Result<Medium> {
+        let cloud = Cloud {
+            density: params.float_at_least_zero("density", 1.0)?,
+            wispiness: params.float_at_least_zero("wispiness", 1.0)?,
+            frequency: params.float("frequency", 5.0)?,
+        };
+        let coefficients = Coefficients::Scaled {
+            density: Density::Cloud(cloud),
+            absorption: self.coefficient(params, "sigma_a")?,
+            scattering: self.coefficient(params, "sigma_s")?,
+        };
+        self.heterogeneous(params, world_from_medium, coefficients, Glow::None)
+    }
+
+    fn nanovdb(&mut self, params: &Params, _: Transform) -> Result<Medium> {
+        params.ignore_all();
+        Err(params.spot.error("nanovdb"))
+    }
+
+    /// A medium in the box from `p0` to `p1`.
+    fn heterogeneous(
+        &mut self,
+        params: &Params,
+        world_from_medium: Transform,
+        coefficients: Coefficients,
+        glow: Glow,
+    ) -> Result<Medium> {
+        let p0 = params.triple("p0", Type::Point3, DVec3::ZERO)?;
+        let p1 = params.triple("p1", Type::Point3, DVec3::ONE)?;
+        if p0.cmpeq(p1).any() {
+            let spot = params.spot_of(if params.has("p1") { "p1" } else { "p0" });
+            let wrong = Diagnostic::error("the box of this medium is flat");
+            return Err(spot.wrong(wrong.expected("p0 and p1 that differ on every axis")));
+        }
+        let asymmetry = self.asymmetry(params)?;
+        let medium_from_world = world_from_medium.inverse();
+        let medium = HeterogeneousMedium::new(medium_from_world, [p0, p1], asymmetry, coefficients, glow);
+        Ok(Medium::Heterogeneous(Box::new(medium)))
+    }
+
+    /// What a grid emits: one colour, or by temperature.
+    fn grid_glow(&mut self, params: &Params, size: [usize; 3]) -> Result<Glow> {
+        let radiance = self.glow(params)?;
+        let temperature = self.voxels(params, "temperature", size)?;
+        // A factor of one number is a grid of one voxel, as in pbrt: it falls to half on the faces.
+        let factor = match params.typed("Lescale", &[Type::Float])? {
+            None => None,
+            Some(param) if param.values.len() == 1 && size != [1; 3] => {
+                return Err(param.refuse("a number for each voxel"));
+            }
+            Some(_) => self.voxels(params, "Lescale", size)?,
+        };
+        let one = || Grid::new([1; 3], vec![1.0]).expect("one voxel");
+        match (radiance, temperature) {
+            (Some(_), Some(_)) => {
+                let wrong = Diagnostic::error("a medium has Le and a temperature");
+                Err(params.spot_of("temperature").wrong(wrong.expected("one of both")))
+            }
+            (None, None) => Ok(Glow::None),
+            (Some(radiance), None) => Ok(Glow::Scaled { radiance, factor: factor.unwrap_or_else(one) }),
+            (None, Some(temperature)) => {
+                let hottest = temperature.greatest();
+                self.heat(params, Density::Grid(temperature), hottest, factor.unwrap_or_else(one))
+            }
+        }
+    }
+
+    /// What is emitted by temperature.
+    fn heat(
+        &mut self,
+        params: &Params,
+        temperature: Density,
+        hottest: f32,
+        factor: Grid<f32>,
+    ) -> Result<Glow> {
+        let cutoff = params.float("temperaturecutoff", 0.0)?;
+        let offset = params.float("temperatureoffset", cutoff)? as f32;
+        let scale = params.float("temperaturescale", 1.0)? as f32;
+        let colours = BlackbodyColours::up_to((hottest - offset) * scale);
+        Ok(Glow::Heat { temperature, offset, scale, factor, colours })
+    }
+
+    /// A coefficient of absorption or scattering; 1 where none is given.
+    fn coefficient(&mut self, params: &Params, name: &'static str) -> Result<Spectrum> {
+        let value = self.spectrum_value(params, name, SpectrumUse::Coefficient)?;
+        Ok(value.as_ref().map_or(Spectrum::WHITE, SpectrumValue::unbounded_rgb))
+    }
+
+    fn glow(&mut self, params: &Params) -> Result<Option<Spectrum>> {
+        self.light_colour(params, "Le")
+    }
+
+    fn asymmetry(&mut self, params: &Params) -> Result<f32> {
+        let g = params.float("g", 0.0)?;
+        if g.abs() > MOST_ASYMMETRY {
+            let wrong = Diagnostic::warning("the asymmetry of this medium is held to 0.99 either way");
+            self.warn(params.spot_of("g"), wrong.found(number(g)).expected("more than -1 and less than 1"));
+        }
+        Ok(g.clamp(-MOST_ASYMMETRY, MOST_ASYMMETRY) as f32)
+    }
+
+    /// A number that is not negative for each voxel.
+    fn voxels(
+        &mut self,
+        params: &Params,
+        name: &'static str,
+        size: [usize; 3],
+    ) -> Result<Option<Grid<f32>>> {
+        let Some(param) = params.typed(name, &[Type::Float])? else { return Ok(None) };
+        let numbers = counted(param, size, 1)?;
+        self.budget.bytes((numbers.len() * size_of::<f32>()) as u64, "voxels").at(param.spot)?;
+        let values = numbers.iter().map(|&value| value as f32).collect();
+        Ok(Some(Grid::new(size, values).expect("they are counted")))
+    }
+
+    /// Three numbers that are not negative for each voxel.
+    fn coloured_voxels(
+        &mut self,
+        params: &Params,
+        name: &'static str,
+        size: [usize; 3],
+        usage: SpectrumUse,
+    ) -> Result<Option<Grid<Spectrum>>> {
+        let Some(param) = params.typed(name, &[Type::Rgb])? else { return Ok(None) };
+        let numbers = counted(param, size, 3)?;
+        self.budget.bytes((numbers.len() * size_of::<f32>()) as u64, "voxels").at(param.spot)?;
+        let colour = |rgb: &[f64]| {
+            let rgb = [rgb[0], rgb[1], rgb[2]];
+            match usage {
+                SpectrumUse::Light => colour::light(&param.space, rgb),
+                _ => colour::factor(&param.space, rgb),
+            }
+        };
+        let values = numbers.chunks_exact(3).map(colour).collect();
+        Ok(Some(Grid::new(size, values).expect("they are counted")))
+    }
+}
+
+/// Voxels along x, y and z.
+fn size(params: &Params) -> Result<[usize; 3]> {
+    Ok([params.count("nx", 1, 1)?, params.count("ny", 1, 1)?, params.count("nz", 1, 1)?].map(|n| n as usize))
+}
+
+/// The numbers of a parameter, as many as all voxels have and not negative.
+fn counted(param: &Param, size: [usize; 3], each: usize) -> Result<&[f64]> {
+    let numbers = param.numbers()?;
+    let voxels = size.into_iter().try_fold(each, usize::checked_mul);
+    if voxels != Some(numbers.len()) {
+        let [x, y, z] = size;
+        let every = if each == 1 { "a number".to_owned() } else { format!("{each} numbers") };
+        return Err(param.refuse(&format!("{every} for each of {x} × {y} × {z} voxels")));
+    }
+    let most = f64::from(f32::MAX);
+    if let Some(i) = numbers.iter().position(|v| !(0.0..=most).contains(v)) {
+        let wrong = Diagnostic::error(format!("wrong value for parameter {}", quoted(&param.name)));
+        let wrong = wrong.found(format!("{} at position {i}", number(numbers[i])));
+        return Err(param.spot.wrong(wrong.expected("numbers that are not negative")));
+    }
+    Ok(numbers)
+}

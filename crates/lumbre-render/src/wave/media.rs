@@ -1,0 +1,259 @@
+//! Media between surfaces: what they take from paths, add to them, and where they scatter them.
+
+use lumbre_geometry::Ray;
+use lumbre_math::{DVec3, Vec3};
+use lumbre_scene::light::LightPoint;
+use lumbre_scene::{Boundary, MediumId};
+use lumbre_shading::medium::{DistanceSample, Way, henyey_greenstein, sample_henyey_greenstein};
+use lumbre_shading::{Scatter, Spectrum};
+use lumbre_simd::V3;
+
+use crate::transport::journal::{End, Event, Source};
+use crate::transport::through::goes_straight_on;
+use crate::transport::{Record, Strategy};
+use crate::wave::paths::{OnePath, SCATTERED};
+use crate::wave::shade::power_heuristic;
+use crate::wave::shadows::{NEARLY_WHOLE, OneSegment, Pane};
+use crate::wave::traced::Traced;
+use crate::wave::vertices::Place;
+use crate::wave::{Setting, Wave};
+
+/// Where a medium scatters a path.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Collision {
+    /// The position of the path.
+    path: u32,
+    point: DVec3,
+    medium: MediumId,
+    /// The width of the footprint there.
+    width: f32,
+}
+
+/// A medium in a column: its index, or this for a vacuum.
+const VACUUM: u32 = u32::MAX;
+
+pub(crate) fn to_column(medium: Option<MediumId>) -> u32 {
+    medium.map_or(VACUUM, |id| id.0)
+}
+
+pub(crate) fn of_column(medium: u32) -> Option<MediumId> {
+    (medium != VACUUM).then_some(MediumId(medium))
+}
+
+/// The media where a path comes from and behind the surface that it met, as columns keep them, inside of `around` before.
+pub(crate) fn sides(boundary: Option<Boundary>, front: bool, around: u32) -> [u32; 2] {
+    match boundary {
+        None => [around; 2],
+        Some(Boundary { inside, outside }) if front => [outside, inside].map(to_column),
+        Some(Boundary { inside, outside }) => [inside, outside].map(to_column),
+    }
+}
+
+impl<'s> Wave<'s> {
+    /// Takes all paths through media to what they meet, and notes those that scatter or end before.
+    pub(super) fn cross_media(&mut self, setting: &Setting<'s>, record: &mut Record) {
+        self.collisions.clear();
+        self.taken.clear();
+        if !setting.has_media {
+            return;
+        }
+        for path in 0..self.paths.len {
+            let slot = self.paths.slot[path] as usize;
+            // The medium of a solid's material is all that there is inside of it.
+            let is_inside = self.slots.interiors.get(slot).is_some_and(|solids| solids.attenuates());
+            let arrives = is_inside || self.cross(setting, path, slot, record);
+            self.taken.push(!arrives);
+        }
+    }
+
+    /// Whether a path does not get to what its ray meets.
+    pub(super) fn is_taken(&self, path: usize) -> bool {
+        self.taken.get(path).is_some_and(|&taken| taken)
+    }
+
+    /// Takes a path through media to what it meets; false where it scatters or ends before.
+    fn cross(&mut self, setting: &Setting<'s>, path: usize, slot: usize, record: &mut Record) -> bool {
+        let scene = setting.scene;
+        let end = self.hits.distance_f64(path);
+        let ray = self.paths.ray(path, self.slots.time[slot]).with_range(0.0, end);
+        let mut boundaries = std::mem::take(&mut self.boundaries);
+        boundaries.clear();
+        scene.crossings(&ray, &mut boundaries);
+        let mut at = 0.0;
+        let mut arrives = true;
+        let ends = boundaries.iter().map(|crossing| (crossing.t, crossing.beyond));
+        for (end, beyond) in ends.map(Some).chain([None]).map(|next| next.unwrap_or((end, None))) {
+            if let Some(medium) = of_column(self.slots.medium[slot]) {
+                arrives = self.fly(setting, path, slot, medium, &ray, [at, end], record);
+                if !arrives {
+                    break;
+                }
+            }
+            at = end;
+            if end < ray.t_max {
+                self.slots.medium[slot] = to_column(beyond);
+            }
+        }
+        self.boundaries = boundaries;
+        arrives
+    }
+
+    /// Takes a path through a medium along a part of its ray; false where it scatters or ends there.
+    #[expect(clippy::too_many_arguments, reason = "the path, and its way")]
+    fn fly(
+        &mut self,
+        setting: &Setting<'s>,
+        path: usize,
+        slot: usize,
+        medium: MediumId,
+        ray: &Ray,
+        [start, end]: [f64; 2],
+        record: &mut Record,
+    ) -> bool {
+        let way = Way { origin: ray.at(start), direction: ray.direction, length: end - start };
+        let throughput = self.paths.throughput(path);
+        let numbers = self.slots.draws[slot].passage(self.slots.distance_samples[slot]);
+        self.slots.distance_samples[slot] += 1;
+        let passage = setting.scene.medium(medium).fly(&way, throughput, numbers);
+        let depth = self.paths.depth[path] & !SCATTERED;
+        if !passage.emitted.is_black() && depth < setting.max_depth {
+            self.slots.radiance[slot] += record.added(Source::Medium, throughput, passage.emitted, 1.0);
+        }
+        let (distance, weight, scattered) = match passage.flight {
+            DistanceSample::Through(weight) => (way.length, weight, false),
+            DistanceSample::Collision { distance, weight } => (distance, weight, true),
+        };
+        let throughput = throughput * weight;
+        self.paths.set_throughput(path, throughput);
+        record.note(|| Event::Medium { distance, scattered, throughput });
+        if throughput.is_black() {
+            record.note(|| Event::Ended(End::Medium));
+        } else if scattered && depth == setting.max_depth {
+            record.note(|| Event::Ended(End::Depth));
+        } else if scattered {
+            let width = self.paths.width[path] + self.paths.spread[path] * (start + distance) as f32;
+            let point = way.origin + distance * way.direction;
+            self.collisions.push(Collision { path: path as u32, point, medium, width });
+        }
+        !scattered && !throughput.is_black()
+    }
+
+    /// A sample of the lights and a direction to go on in at each collision.
+    pub(super) fn shade_collisions(
+        &mut self,
+        setting: &Setting<'s>,
+        is_single: bool,
+        mut traced: Option<&mut Traced>,
+    ) {
+        for i in 0..self.collisions.len() {
+            let collision = self.collisions[i];
+            self.light_collision(setting, is_single, &collision, traced.as_deref_mut());
+            self.scatter_collision(setting, &collision, traced.as_deref_mut());
+        }
+    }
+
+    fn light_collision(
+        &mut self,
+        setting: &Setting<'s>,
+        is_single: bool,
+        collision: &Collision,
+        traced: Option<&mut Traced>,
+    ) {
+        let (scene, from) = (setting.scene, collision.point);
+        let path = collision.path as usize;
+        let slot = self.paths.slot[path] as usize;
+        let (draw, time) = (&self.slots.draws[slot], self.slots.time[slot]);
+        let depth = self.paths.depth[path] & !SCATTERED;
+        let (choose, u) = (draw.light_choice(depth), draw.light_point(depth));
+        let sample = match setting.strategy {
+            Strategy::Lights => scene.sample_light_alone(from, DVec3::ZERO, time, choose, u),
+            Strategy::Both | Strategy::Bsdf => scene.sample_light(from, DVec3::ZERO, time, choose, u),
+        };
+        let Some(sample) = sample else { return };
+        let cos = self.paths.direction(path).dot(sample.towards.as_vec3());
+        let phase = henyey_greenstein(cos, scene.medium(collision.medium).asymmetry());
+        let (weight, pdf) = match (sample.scatter, setting.strategy) {
+            (Scatter::Delta, _) => (1.0, 1.0),
+            (Scatter::Density(pdf), Strategy::Both) => (power_heuristic(pdf, phase), pdf),
+            (Scatter::Density(pdf), Strategy::Lights) => (1.0, pdf),
+            (Scatter::Density(_), Strategy::Bsdf) => (0.0, 1.0),
+        };
+        let light = self.paths.throughput(path) * sample.radiance * (phase * weight / pdf);
+        let is_light = !light.is_black() && weight > 0.0;
+        let (way, end) = match sample.end {
+            None => (sample.towards, f64::INFINITY),
+            Some(end) => (stop(setting, is_single, &end, sample.towards) - from, NEARLY_WHOLE),
+        };
+        if let Some(traced) = traced {
+            let ray = is_light.then(|| Ray::new(from, way).with_range(0.0, end));
+            traced.collision_light(sample, Spectrum::splat(phase), phase, weight, ray);
+        }
+        if !is_light {
+            return;
+        }
+        if setting.has_panes && goes_straight_on(scene, &sample) {
+            let around = self.slots.interiors.get(slot).cloned().unwrap_or_default();
+            self.shadows.panes.push(Pane { segment: self.shadows.len as u32, sample, around });
+        }
+        self.shadows.push_one(&OneSegment {
+            slot: slot as u32,
+            origin: from,
+            way,
+            end,
+            light,
+            medium: collision.medium.0,
+        });
+    }
+
+    fn scatter_collision(
+        &mut self,
+        setting: &Setting<'s>,
+        collision: &Collision,
+        traced: Option<&mut Traced>,
+    ) {
+        let path = collision.path as usize;
+        let slot = self.paths.slot[path] as usize;
+        let draw = &self.slots.draws[slot];
+        let vertex = self.paths.depth[path] & !SCATTERED;
+        let asymmetry = setting.scene.medium(collision.medium).asymmetry();
+        let incoming = self.paths.direction(path);
+        let (along, pdf) = sample_henyey_greenstein(incoming, asymmetry, draw.direction(vertex));
+        let (mut throughput, eta_scale) = (self.paths.throughput(path), self.paths.eta_scale[path]);
+        let depth = vertex + 1;
+        let likely = throughput.max_component() * eta_scale;
+        let risky = setting.roulette_start < depth && likely < 1.0;
+        let survives = !risky || draw.survival(vertex) < likely;
+        if risky {
+            throughput = throughput / likely;
+        }
+        let next = OnePath {
+            slot: slot as u32,
+            origin: collision.point,
+            // Light comes from every side.
+            receiver: Vec3::ZERO,
+            direction: along.normalize(),
+            throughput,
+            eta_scale,
+            pdf,
+            depth: depth | SCATTERED,
+            width: collision.width,
+            spread: self.paths.spread[path],
+        };
+        if let Some(traced) = traced {
+            traced.collision_scattered(&next, risky.then_some((likely, survives)));
+        }
+        if survives {
+            self.next.push_one(&next);
+        }
+    }
+}
+
+/// Where a segment to a point of a light ends.
+fn stop(setting: &Setting<'_>, is_single: bool, end: &LightPoint, towards: DVec3) -> DVec3 {
+    let vector = |v: DVec3| V3::new(v.x, v.y, v.z);
+    let single = |v: DVec3| V3::new(v.x as f32, v.y as f32, v.z as f32);
+    let error = setting.rounding(is_single).grow::<f32>(vector(end.point), vector(end.error));
+    let V3 { x, y, z } =
+        Place::<f32>::new(vector(end.point), error, single(end.normal)).start(single(-towards));
+    DVec3::new(x, y, z)
+}

@@ -1,0 +1,180 @@
+//! Participating media in a scene, and the surfaces between them.
+//!
+//! Surfaces without material that separate two media stand in a tree of their own: light goes straight on through them, so that no other
+//! ray need know of them. Surfaces with a material stand among all others, and say by their [`Boundary`] what is on their sides.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use lumbre_geometry::{Ray, Surface};
+use lumbre_kernel::{Accel, Hit};
+use lumbre_shading::medium::{Medium, PassageNumbers, Way};
+use lumbre_shading::{MaterialKind, Spectrum};
+
+use crate::surface::{Form, SurfaceEntry};
+use crate::{
+    Boundary, BuildError, GeometryDesc, MediumId, NamedMaterial, ObjectDesc, Scene, SceneDesc, ShapeDesc,
+};
+
+/// The media of a scene.
+#[derive(Debug, Default)]
+pub(crate) struct Media {
+    pub media: Vec<Arc<Medium>>,
+    /// The surfaces without material between them; `None` where there are none.
+    pub boundaries: Option<Boundaries>,
+}
+
+/// A tree of surfaces that do nothing but separate media.
+#[derive(Debug)]
+pub(crate) struct Boundaries {
+    pub accel: Arc<Accel>,
+    pub entries: Vec<SurfaceEntry>,
+}
+
+/// Where a ray goes through a surface without material, from one medium to another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crossing {
+    /// How far along the ray, in units of its direction.
+    pub t: f64,
+    /// The medium beyond; `None` is a vacuum.
+    pub beyond: Option<MediumId>,
+    /// Whether the ray leaves the inside of the surface.
+    leaves: bool,
+}
+
+/// Takes the shapes that do nothing but separate media out of a description, and gives them as shapes and objects of their own.
+pub(crate) fn split(desc: &mut SceneDesc) -> Option<(Vec<ShapeDesc>, Vec<ObjectDesc>)> {
+    let materials = &desc.materials;
+    let mut found = false;
+    let mut taken = |shapes: &mut Vec<ShapeDesc>| {
+        let taken: Vec<_> = shapes.extract_if(.., |shape| separates(shape, materials)).collect();
+        found |= !taken.is_empty();
+        taken
+    };
+    let shapes = taken(&mut desc.shapes);
+    let objects: Vec<_> = desc
+        .objects
+        .iter_mut()
+        .map(|object| ObjectDesc {
+            name: object.name.clone(),
+            shapes: taken(&mut object.shapes),
+            instances: object.instances.clone(),
+        })
+        .collect();
+    found.then_some((shapes, objects))
+}
+
+/// Whether a shape has no material, and different media on its sides.
+fn separates(shape: &ShapeDesc, materials: &[NamedMaterial]) -> bool {
+    shape.boundary.is_some_and(|Boundary { inside, outside }| inside != outside)
+        && is_interface(shape, materials)
+}
+
+/// Whether no part of a shape has a material.
+fn is_interface(shape: &ShapeDesc, materials: &[NamedMaterial]) -> bool {
+    if let GeometryDesc::Csg(csg) = &shape.geometry {
+        return csg.operands.iter().flat_map(|operand| &**operand).all(|part| is_interface(part, materials));
+    }
+    let material = shape.material.and_then(|id| materials.get(id.0 as usize));
+    match material {
+        Some(named) => matches!(named.material.kind, MaterialKind::Interface),
+        None => shape.material.is_none(),
+    }
+}
+
+/// Whether anything is in a medium. Checks that every medium that is named is there.
+pub(crate) fn check(desc: &SceneDesc) -> Result<bool, BuildError> {
+    let count = desc.media.len();
+    let shapes = desc.objects.iter().flat_map(|object| &object.shapes).chain(&desc.shapes);
+    let of_shapes = shapes.filter_map(|shape| shape.boundary).flat_map(|b| [b.inside, b.outside]);
+    let of_cameras = desc.cameras.iter().map(|camera| camera.medium);
+    let mut is_used = false;
+    for MediumId(medium) in of_shapes.chain(of_cameras).flatten() {
+        is_used = true;
+        if medium as usize >= count {
+            return Err(BuildError::NoSuchMedium { medium, count });
+        }
+    }
+    Ok(is_used)
+}
+
+impl Boundaries {
+    /// Adds the places where a ray goes through, in their order.
+    fn crossings(&self, ray: &Ray, crossings: &mut Vec<Crossing>) {
+        let before = crossings.len();
+        self.accel.all(ray, |hit| {
+            crossings.extend(self.crossing(ray, hit));
+            ControlFlow::Continue(())
+        });
+        // Where two surfaces touch, one solid is left before the other is entered.
+        crossings[before..].sort_by(|a, b| a.t.total_cmp(&b.t).then(b.leaves.cmp(&a.leaves)));
+    }
+
+    fn crossing(&self, ray: &Ray, hit: &Hit) -> Option<Crossing> {
+        let entry = &self.entries[hit.id as usize];
+        let Boundary { inside, outside } = entry.boundary?;
+        let geometric = self.accel.surface(ray, hit);
+        let leaves = self.outward(entry, ray, hit, geometric).normal.dot(ray.direction) > 0.0;
+        Some(Crossing { t: hit.root.t, beyond: if leaves { outside } else { inside }, leaves })
+    }
+
+    /// The surface with its normal to the side that counts as outside.
+    fn outward(&self, entry: &SurfaceEntry, ray: &Ray, hit: &Hit, geometric: Surface) -> Surface {
+        let part = match entry.form {
+            Form::Csg(_) => 0,
+            _ => hit.primitive,
+        };
+        let placement = (!hit.instances.is_empty()).then(|| self.accel.world_from_object(ray, hit));
+        entry.shading_geometry(&geometric, part, hit.root.local, placement.as_ref(), ray.time).surface
+    }
+}
+
+impl Scene {
+    /// Whether any medium stands between its surfaces. (What scatters inside solids belongs to their materials.)
+    pub fn has_media(&self) -> bool {
+        !self.media.media.is_empty()
+    }
+
+    /// The medium of an index.
+    ///
+    /// # Panics
+    /// When the scene has none of this index.
+    pub fn medium(&self, id: MediumId) -> &Medium {
+        &self.media.media[id.0 as usize]
+    }
+
+    /// Bytes that the grids of all media take.
+    pub fn media_memory(&self) -> usize {
+        self.media.media.iter().map(|medium| medium.memory()).sum()
+    }
+
+    /// Adds the places where a ray goes through surfaces without material from one medium to another, in their order.
+    pub fn crossings(&self, ray: &Ray, crossings: &mut Vec<Crossing>) {
+        if let Some(boundaries) = &self.media.boundaries {
+            boundaries.crossings(ray, crossings);
+        }
+    }
+
+    /// An estimate of what media leave of light along a ray with a range, which begins in a medium. What else is in its way does not
+    /// count. `seed` chooses among such estimates.
+    pub fn transmittance(&self, medium: Option<MediumId>, ray: &Ray, seed: u64) -> Spectrum {
+        let mut crossings = Vec::new();
+        self.crossings(ray, &mut crossings);
+        let speed = ray.direction.length();
+        let direction = ray.direction / speed;
+        let (mut left, mut at, mut medium) = (Spectrum::WHITE, ray.t_min, medium);
+        let ends = crossings.iter().map(|crossing| (crossing.t, crossing.beyond));
+        for (part, (end, beyond)) in (0..).zip(ends.chain([(ray.t_max, None)])) {
+            if let Some(id) = medium {
+                let way = Way { origin: ray.at(at), direction, length: (end - at) * speed };
+                let numbers = PassageNumbers::from_seed(seed.wrapping_add(part));
+                left = left * self.medium(id).transmittance(&way, numbers);
+                if left.is_black() {
+                    return left;
+                }
+            }
+            (at, medium) = (end, beyond);
+        }
+        left
+    }
+}
