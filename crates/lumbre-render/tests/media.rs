@@ -142,7 +142,8 @@ fn single_scattering_of_a_beam_is_what_its_integral_says() {
 fn shadows_are_what_media_leave_of_the_light() {
     let absorption = Rgb::new(0.5, 1.0, 1.5);
     let mut desc = filled(homogeneous(absorption, Rgb::BLACK, 0.0, Rgb::BLACK), cube());
-    desc.lights = vec![LightDesc::Distant { towards: DVec3::Y, irradiance: Rgb::splat(std::f32::consts::PI) }];
+    desc.lights =
+        vec![LightDesc::Distant { towards: DVec3::Y, irradiance: Rgb::splat(std::f32::consts::PI) }];
     let grey = add_material(&mut desc, diffuse(0.5));
     let under = CENTER - 1.5 * DVec3::Y;
     let half = DVec3::new(0.2, 0.1, 0.2);

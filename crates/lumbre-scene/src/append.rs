@@ -118,9 +118,7 @@ mod tests {
     use lumbre_shading::Material;
 
     use super::*;
-    use crate::{
-        CameraKind, CsgDesc, CsgOperation, FilmDesc, NamedMaterial, ObjectDesc, Placement, UpAxis,
-    };
+    use crate::{CameraKind, CsgDesc, CsgOperation, FilmDesc, NamedMaterial, ObjectDesc, Placement, UpAxis};
 
     fn ball(index: u32, material: u32) -> ShapeDesc {
         ShapeDesc {

@@ -9,8 +9,8 @@ use lumbre_math::{
     AnimatedTransform, DAffine3, DMat3, DVec2, DVec3, Elementary, SingularTransformError, Transform,
 };
 
-use crate::{Footprint, MediumId};
 use crate::viewpoint::half_window;
+use crate::{Footprint, MediumId};
 
 /// The mapping of directions to the picture of a spherical camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

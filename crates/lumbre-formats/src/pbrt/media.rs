@@ -135,7 +135,9 @@ impl Converter<'_, '_> {
         let scattering = self.coloured_voxels(params, "sigma_s", size, SpectrumUse::Coefficient)?;
         if absorption.is_none() && scattering.is_none() {
             let wrong = Diagnostic::error(format!("{} has neither sigma_a nor sigma_s", params.owner));
-            return Err(params.spot.wrong(wrong.expected("\"rgb sigma_a\" or \"rgb sigma_s\" of all voxels")));
+            return Err(params
+                .spot
+                .wrong(wrong.expected("\"rgb sigma_a\" or \"rgb sigma_s\" of all voxels")));
         }
         let glow = match self.coloured_voxels(params, "Le", size, SpectrumUse::Light)? {
             None => Glow::None,
@@ -253,12 +255,7 @@ impl Converter<'_, '_> {
     }
 
     /// A number that is not negative for each voxel.
-    fn voxels(
-        &mut self,
-        params: &Params,
-        name: &'static str,
-        size: [usize; 3],
-    ) -> Result<Option<Grid<f32>>> {
+    fn voxels(&mut self, params: &Params, name: &'static str, size: [usize; 3]) -> Result<Option<Grid<f32>>> {
         let Some(param) = params.typed(name, &[Type::Float])? else { return Ok(None) };
         let numbers = counted(param, size, 1)?;
         self.budget.bytes((numbers.len() * size_of::<f32>()) as u64, "voxels").at(param.spot)?;

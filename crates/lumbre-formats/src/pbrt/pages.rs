@@ -6,7 +6,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use super::{lights, materials, read_bytes, settings, shapes, textures};
+use super::{lights, materials, media, read_bytes, settings, shapes, textures};
 use crate::{Budget, Diagnostics};
 
 /// A row of a table of parameters.
@@ -73,6 +73,8 @@ fn sample(page: &str, row: &Row) -> &'static str {
         (_, "uv") => "0 0 1 0 0 1",
         (_, "indices") => "0 1 2",
         (_, "faceIndices") => "5",
+        ("uniformgrid", "density" | "temperature" | "Lescale") => "0.5",
+        ("homogeneous", "preset") => r#""Wholemilk""#,
         (_, "encoding") => r#""linear""#,
         (_, "screenwindow") => "-1 1 -2 2",
         (_, "p1") => "3 4 5",
@@ -119,6 +121,7 @@ fn scene(kind: &str, name: &str, params: &str) -> String {
         "lights" if name == "diffuse" => {
             format!("WorldBegin AreaLightSource \"{name}\" {params} Shape \"sphere\"")
         }
+        "media" => format!("MakeNamedMedium \"m\" \"string type\" \"{name}\" {params}\nWorldBegin"),
         "lights" => format!("WorldBegin LightSource \"{name}\" {params}"),
         other => panic!("{other}"),
     }
@@ -134,11 +137,12 @@ fn described(text: &str) -> (String, Vec<String>) {
     (format!("{desc:?}"), warnings)
 }
 
-const KINDS: [(&str, &[&str]); 6] = [
+const KINDS: [(&str, &[&str]); 7] = [
     ("shapes", shapes::KNOWN),
     ("materials", &materials::KNOWN),
     ("textures", &textures::KNOWN_KINDS),
     ("lights", &lights::KNOWN),
+    ("media", &media::MEDIA),
     ("cameras", &settings::CAMERAS),
     ("integrators", &settings::INTEGRATORS),
 ];
