@@ -48,7 +48,11 @@ impl<'a> Bytes<'a> {
 
     /// What is wrong at a byte.
     pub(super) fn fault(self, at: u64, message: impl Into<String>) -> Diagnostic {
-        Diagnostic::error(message).at(Place::binary(self.name.clone(), self.base.saturating_add(at), self.path))
+        Diagnostic::error(message).at(Place::binary(
+            self.name.clone(),
+            self.base.saturating_add(at),
+            self.path,
+        ))
     }
 
     /// The bytes of a range, which may be outside.

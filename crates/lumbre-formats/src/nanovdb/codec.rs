@@ -53,7 +53,11 @@ pub(super) fn unpack(data: Bytes<'_>, codec: Codec, size: u64) -> Result<Vec<u8>
     if out.len() == size {
         return Ok(out);
     }
-    Err(data.fault(0, "a packed grid of another size").found(out.len()).expected(format!("{size} bytes")).into())
+    Err(data
+        .fault(0, "a packed grid of another size")
+        .found(out.len())
+        .expected(format!("{size} bytes"))
+        .into())
 }
 
 /// The bytes after a length.
@@ -87,7 +91,8 @@ fn frame_into(frame: Bytes<'_>, out: &mut Vec<u8>, most: usize) -> Result<(), Fo
         return Ok(());
     }
     if flags >> 5 != LZ4 || flags & BITS_SHUFFLED != 0 {
-        let wrong = frame.fault(2, "a Blosc frame that is packed in another way").found(format!("flags {flags}"));
+        let wrong =
+            frame.fault(2, "a Blosc frame that is packed in another way").found(format!("flags {flags}"));
         return Err(wrong.expected("LZ4, with or without a shuffle of bytes").into());
     }
     let type_size = usize::from(type_size);

@@ -111,7 +111,9 @@ const METADATA: u64 = 176;
 fn grids(bytes: Bytes<'_>, budget: &Budget) -> Result<Vec<Stored>, FormatError> {
     if bytes.all().starts_with(b" BDV") {
         let wrong = bytes.fault(0, "this is an OpenVDB file, not a NanoVDB one");
-        return Err(wrong.expected("a .nvdb file, as \"nanovdb_convert FILE.vdb FILE.nvdb\" makes it").into());
+        return Err(wrong
+            .expected("a .nvdb file, as \"nanovdb_convert FILE.vdb FILE.nvdb\" makes it")
+            .into());
     }
     let magic = bytes.array::<8>(0, "NanoVDB file")?;
     match &magic {
@@ -199,7 +201,9 @@ fn segments(bytes: Bytes<'_>, budget: &Budget) -> Result<Vec<Stored>, FormatErro
             })?;
             if size < GRID_HEADER || (codec == Codec::None && size != packed) {
                 let wrong = metadata.fault(0, "wrong size of a grid").found(size);
-                return Err(wrong.expected(format!("{GRID_HEADER} bytes or more, as many as are stored")).into());
+                return Err(wrong
+                    .expected(format!("{GRID_HEADER} bytes or more, as many as are stored"))
+                    .into());
             }
             let name_size = u64::from(metadata.u32(136, "length of a name")?);
             at += METADATA;

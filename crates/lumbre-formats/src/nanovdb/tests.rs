@@ -158,8 +158,10 @@ fn blosc(raw: &[u8]) -> Vec<u8> {
     for block in &blocks {
         starts.extend((16 + 4 * blocks.len() as u32 + body.len() as u32).to_le_bytes());
         let elements = block.len() / 4;
-        let mut shuffled: Vec<u8> =
-            (0..4).flat_map(|byte| (0..elements).map(move |i| (i, byte))).map(|(i, b)| block[4 * i + b]).collect();
+        let mut shuffled: Vec<u8> = (0..4)
+            .flat_map(|byte| (0..elements).map(move |i| (i, byte)))
+            .map(|(i, b)| block[4 * i + b])
+            .collect();
         shuffled.extend(&block[4 * elements..]);
         for stream in shuffled.chunks(if block.len() == BLOCK { BLOCK / 4 } else { block.len() }) {
             let packed = lz4_flex::block::compress(stream);
@@ -187,7 +189,8 @@ fn file(grids: &[(&str, Vec<u8>)], codec: u16, pack: impl Fn(&[u8]) -> Vec<u8>) 
     let mut body = vec![];
     for (name, grid) in grids {
         let packed = pack(grid);
-        let packed = if codec == 0 { packed } else { [&(packed.len() as u64).to_le_bytes()[..], &packed].concat() };
+        let packed =
+            if codec == 0 { packed } else { [&(packed.len() as u64).to_le_bytes()[..], &packed].concat() };
         let mut metadata = Out(vec![0; 176]);
         metadata.put(0, (grid.len() as u64).to_le_bytes());
         metadata.put(8, (packed.len() as u64).to_le_bytes());
@@ -305,10 +308,16 @@ fn what_is_wrong_is_said_with_its_byte() {
         (changed(296 + 88, &0_f64.to_le_bytes()), "a.nvdb:byte 384: the map of a grid cannot be undone"),
         (changed(672, &7_u64.to_le_bytes()), "a.nvdb:byte 672: the tree's leaves are not in the grid"),
         (changed(672 + 32, &[200]), "a.nvdb:byte 672: the tree's leaves are not in the grid"),
-        (changed(root + 28, &(-1_f32).to_le_bytes()), "byte 764: wrong value in a grid (found -1; expected a finite"),
+        (
+            changed(root + 28, &(-1_f32).to_le_bytes()),
+            "byte 764: wrong value in a grid (found -1; expected a finite",
+        ),
         (changed(root + 28, &f32::NAN.to_le_bytes()), "byte 764: wrong value in a grid (found NaN"),
         (changed(root + 12, &(1_i32 << 29).to_le_bytes()), "too many blocks"),
-        (changed(root + 64 + 8, &24_i64.to_le_bytes()), "byte 808: a node that is none of the tree's upper nodes"),
+        (
+            changed(root + 64 + 8, &24_i64.to_le_bytes()),
+            "byte 808: a node that is none of the tree's upper nodes",
+        ),
         (changed(plain.len() - 2144, &[77]), "a leaf stands in another place"),
     ];
     for (found, expected) in cases {
@@ -318,7 +327,10 @@ fn what_is_wrong_is_said_with_its_byte() {
     let mut surface = Out(plain.clone());
     surface.put(632, [1]);
     let found = error(&file(&[("density", surface.0)], 1, zip));
-    assert!(found.contains("a.nvdb:byte 632 of the unpacked grid \"density\": a grid that is a surface"), "{found}");
+    assert!(
+        found.contains("a.nvdb:byte 632 of the unpacked grid \"density\": a grid that is a surface"),
+        "{found}"
+    );
     // Fifty GiB from a few bytes.
     let mut bomb = Out(file(&[("density", plain)], 1, zip));
     bomb.put(16, (50_u64 << 30).to_le_bytes());
@@ -339,7 +351,8 @@ fn damaged_files_end_in_an_error_or_an_answer() {
         Ok(_) => answers += 1,
         Err(_) => errors += 1,
     };
-    for bytes in [file(&[("density", plain.clone())], 1, zip), file(&[("density", plain.clone())], 2, blosc)] {
+    for bytes in [file(&[("density", plain.clone())], 1, zip), file(&[("density", plain.clone())], 2, blosc)]
+    {
         for end in (0..bytes.len()).filter(|end| *end < 1200 || end % 37 == 0) {
             assert!(read_density(&bytes[..end]).is_err() || end == 0, "{end}");
         }

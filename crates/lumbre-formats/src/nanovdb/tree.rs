@@ -111,7 +111,13 @@ pub(super) fn read(bytes: Bytes<'_>, values: Values, budget: &Budget) -> Result<
             let wrong = bytes.fault(632, "a grid that is a surface (a level set), not a volume");
             return Err(wrong.expected("a fog volume").into());
         }
-        _ => return Err(bytes.fault(632, "a grid of another class").found(class).expected("a fog volume").into()),
+        _ => {
+            return Err(bytes
+                .fault(632, "a grid of another class")
+                .found(class)
+                .expected("a fog volume")
+                .into());
+        }
     }
     let number = bytes.u32(636, "grid")?;
     let kind = Kind::of(number).ok_or_else(|| {
@@ -147,7 +153,10 @@ pub(super) fn read(bytes: Bytes<'_>, values: Values, budget: &Budget) -> Result<
         return Err(bytes.fault(root, "a grid without any active voxel").into());
     }
     if first.cmplt(IVec3::splat(i32::MIN / 2)).any() || last.cmpgt(IVec3::splat(i32::MAX / 2)).any() {
-        return Err(bytes.fault(root, "a grid that reaches too far").found(format!("{first} to {last}")).into());
+        return Err(bytes
+            .fault(root, "a grid that reaches too far")
+            .found(format!("{first} to {last}"))
+            .into());
     }
     let mut reader =
         Reader { bytes, kind, values, bounds: [first, last], background: 0.0, leaves, lowers, uppers };
@@ -166,7 +175,8 @@ pub(super) fn read(bytes: Bytes<'_>, values: Values, budget: &Budget) -> Result<
     reader.root(root, &mut grid)?;
     for level in [reader.uppers, reader.lowers, reader.leaves] {
         if level.met != level.count {
-            let wrong = bytes.fault(tree, format!("the tree does not have as many {} as it says", level.what));
+            let wrong =
+                bytes.fault(tree, format!("the tree does not have as many {} as it says", level.what));
             return Err(wrong.found(level.met).expected(level.count).into());
         }
     }
@@ -229,11 +239,12 @@ impl Reader<'_> {
             return Ok(single);
         }
         let wrong = self.bytes.fault(at, "wrong value in a grid").found(value);
-        Err(wrong.expected(match self.values {
-            Values::Finite => "a finite number",
-            Values::NotNegative => "a finite number that is not negative",
-        })
-        .into())
+        Err(wrong
+            .expected(match self.values {
+                Values::Finite => "a finite number",
+                Values::NotNegative => "a finite number that is not negative",
+            })
+            .into())
     }
 
     fn root(&mut self, root: u64, grid: &mut SparseGrid) -> Result<(), FormatError> {
@@ -327,7 +338,10 @@ impl Reader<'_> {
                 let offset = self.bytes.i64(at, "lower node")?;
                 let place = self.child(node, offset, at, |reader| &mut reader.leaves)?;
                 if corner(self.bytes, place)?.map(|x| x & !7) != voxel {
-                    return Err(self.bytes.fault(place, "a leaf stands in another place than it says").into());
+                    return Err(self
+                        .bytes
+                        .fault(place, "a leaf stands in another place than it says")
+                        .into());
                 }
                 Brick::Values(self.leaf(place)?)
             };
