@@ -313,7 +313,7 @@ fn what_is_wrong_is_said_with_its_byte() {
             "byte 764: wrong value in a grid (found -1; expected a finite",
         ),
         (changed(root + 28, &f32::NAN.to_le_bytes()), "byte 764: wrong value in a grid (found NaN"),
-        (changed(root + 12, &(1_i32 << 29).to_le_bytes()), "too many blocks"),
+        (changed(root + 12, [[0, 0, 0, 32]; 3].as_flattened()), "voxels of a grid: needs"),
         (
             changed(root + 64 + 8, &24_i64.to_le_bytes()),
             "byte 808: a node that is none of the tree's upper nodes",
