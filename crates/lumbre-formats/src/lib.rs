@@ -13,6 +13,7 @@ pub mod ies;
 pub mod image;
 pub mod input;
 pub mod input_stream;
+pub mod nanovdb;
 pub mod obj;
 pub mod open;
 mod origin;

@@ -6,6 +6,8 @@
 
 use glam::DVec3;
 
+use crate::Elementary;
+
 /// Perlin's permutation of the bytes.
 #[rustfmt::skip]
 const PERMUTATION: [u8; 256] = [
@@ -58,6 +60,67 @@ pub fn noise(p: DVec3) -> f64 {
     lerp(wz, along_y(0), along_y(1))
 }
 
+/// From one octave of a sum to the next, how much finer it is. Not 2, so that points where noise is 0 do not fall together.
+const LACUNARITY: f64 = 1.99;
+
+/// Octaves of noise to be summed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Octaves {
+    /// How many at most.
+    pub count: u32,
+    /// The strength of an octave over that of the one before.
+    pub roughness: f64,
+}
+
+impl Octaves {
+    /// The sum of octaves of noise, fractional Brownian motion. `footprint` are the sides of what is looked at; octaves finer than it are
+    /// left out, the last one by degrees. A footprint of zero has all of them.
+    pub fn fbm(self, p: DVec3, footprint: [DVec3; 2]) -> f64 {
+        let (whole, part) = self.seen(footprint);
+        let (mut sum, mut scale, mut strength) = (0.0, 1.0, 1.0);
+        for _ in 0..whole {
+            sum += strength * noise(scale * p);
+            scale *= LACUNARITY;
+            strength *= self.roughness;
+        }
+        if part > 0.0 { sum + strength * part * noise(scale * p) } else { sum }
+    }
+
+    /// The sum of the absolute values of octaves of noise, turbulence. Octaves that are too fine count by their mean, about 0.2.
+    pub fn turbulence(self, p: DVec3, footprint: [DVec3; 2]) -> f64 {
+        const MEAN: f64 = 0.2;
+        let (whole, part) = self.seen(footprint);
+        let (mut sum, mut scale, mut strength) = (0.0, 1.0, 1.0);
+        for _ in 0..whole {
+            sum += strength * noise(scale * p).abs();
+            scale *= LACUNARITY;
+            strength *= self.roughness;
+        }
+        if whole < self.count {
+            // What is seen of the next octave, and its mean for the rest; it stands in the means of all that are left out once more,
+            // as in pbrt, so that pictures agree.
+            sum += strength * ((1.0 - part) * MEAN + part * noise(scale * p).abs());
+            for _ in whole..self.count {
+                sum += strength * MEAN;
+                strength *= self.roughness;
+            }
+        }
+        sum
+    }
+
+    /// How many octaves are seen whole, and how much of the next.
+    fn seen(self, [dx, dy]: [DVec3; 2]) -> (u32, f64) {
+        let most = f64::from(self.count);
+        let size = dx.length_squared().max(dy.length_squared());
+        // The Nyquist limit; infinite where the footprint is a point. NaN counts as a point.
+        let seen = -1.0 - 0.5 * size.logarithm_2();
+        let seen = if seen.is_nan() { most } else { seen.clamp(0.0, most) };
+        let whole = seen.floor();
+        let t = ((seen - whole - 0.3) / 0.4).clamp(0.0, 1.0);
+        (whole as u32, t * t * (3.0 - 2.0 * t))
+    }
+}
+
 /// 6t⁵ − 15t⁴ + 10t³.
 fn fade(t: f64) -> f64 {
     t * t * t * (t * (6.0 * t - 15.0) + 10.0)
@@ -100,5 +163,26 @@ mod tests {
         for p in [DVec3::splat(1e300), DVec3::splat(-1e17), DVec3::splat(f64::MAX)] {
             assert!(noise(p).is_finite());
         }
+    }
+
+    const POINT: [DVec3; 2] = [DVec3::ZERO; 2];
+
+    #[test]
+    fn octaves_are_summed_and_too_fine_ones_are_left_out() {
+        let p = DVec3::new(0.3, -1.7, 2.4);
+        let octaves = Octaves { count: 3, roughness: 0.6 };
+        let of = |i: i32| noise(p * 1.99_f64.powi(i));
+        let expected = of(0) + 0.6 * of(1) + 0.36 * of(2);
+        assert!((octaves.fbm(p, POINT) - expected).abs() < 1e-12);
+        let expected = of(0).abs() + 0.6 * of(1).abs() + 0.36 * of(2).abs();
+        assert!((octaves.turbulence(p, POINT) - expected).abs() < 1e-12);
+        // log2 of the size is -2.5, so one octave and a half are seen.
+        let half = [DVec3::X * 2.0_f64.powf(-2.5), DVec3::Y * 0.01];
+        assert!((octaves.fbm(p, half) - (of(0) + 0.5 * 0.6 * of(1))).abs() < 1e-12);
+        let rest = 0.6 * (0.1 + 0.5 * of(1).abs()) + 0.2 * (0.6 + 0.36);
+        assert!((octaves.turbulence(p, half) - (of(0).abs() + rest)).abs() < 1e-12);
+        let wide = [DVec3::ZERO, DVec3::Y * 10.0];
+        assert_eq!(octaves.fbm(p, wide), 0.0);
+        assert_eq!(Octaves { count: 0, ..octaves }.turbulence(p, POINT), 0.0);
     }
 }

@@ -78,6 +78,11 @@ impl Stop {
     }
 }
 
+/// How a film is exposed.
+fn exposure_of(film: &FilmDesc) -> Exposure {
+    Exposure { factor: film.exposure, max_component: film.max_component, sensor: film.sensor }
+}
+
 impl Default for RenderOptions {
     fn default() -> Self {
         let (width, height) = DEFAULT_SIZE;
@@ -90,7 +95,7 @@ impl Default for RenderOptions {
             integrator: IntegratorDesc::default(),
             sampler: SamplerDesc::default(),
             filter: FilterDesc::default(),
-            exposure: Exposure { factor: film.exposure, max_component: film.max_component },
+            exposure: exposure_of(&film),
             transparent: false,
             stop: Stop::at(DEFAULT_SPP),
             first_sample: 0,
@@ -112,7 +117,7 @@ impl RenderOptions {
             integrator: scene.integrator(),
             sampler: scene.sampler(),
             filter: scene.filter(),
-            exposure: Exposure { factor: film.exposure, max_component: film.max_component },
+            exposure: exposure_of(film),
             stop: Stop::at(scene.sampler().spp.unwrap_or(DEFAULT_SPP)),
             ..Self::default()
         };

@@ -13,7 +13,8 @@ use crate::light::environment::first_not_finite;
 use crate::light::lanes::LaneLights;
 use crate::light::{
     DistantLight, Environment, GoniometricLight, Light, LightId, MeshLight, MovingLight, PlacedLight,
-    PointLight, ShapeLight, SpotLight, UniformLight, power,
+    PointLight, PortalLight, ProjectionLight, ShapeLight, SpotLight, UniformLight, portal::PortalError,
+    power,
 };
 use crate::media::{self, Boundaries, Media};
 use crate::mesh::{self, QuadOrder};
@@ -530,11 +531,15 @@ impl Builder {
     fn light(&mut self, position: usize, desc: LightDesc) -> Result<(), BuildError> {
         let wrong = |reason| BuildError::Light { light: position, reason };
         let picture = match &desc {
-            LightDesc::Infinite { image, .. } => image.as_ref(),
+            LightDesc::Infinite { image, .. } | LightDesc::Portal { image, .. } => image.as_ref(),
             LightDesc::Goniometric { image, .. } => Some(image),
             _ => None,
         };
-        if let Some((x, y)) = picture.and_then(|picture| first_not_finite(&picture.image)) {
+        let picture = match &desc {
+            LightDesc::Projection { image, .. } => Some(image),
+            _ => picture.map(|picture| &picture.image),
+        };
+        if let Some((x, y)) = picture.and_then(|picture| first_not_finite(picture)) {
             self.warnings.push(BuildWarning::NotFiniteTexel { light: position, x, y });
         }
         let light = match desc {
@@ -575,6 +580,20 @@ impl Builder {
                     }
                 }
             }
+            LightDesc::Projection { world_from_light, intensity, image, fov } => {
+                if !intensity.is_finite() || !(0.0 < fov && fov < 180.0) {
+                    return Err(wrong(
+                        "its intensity is not finite, or its angle not between 0 and 180 degrees",
+                    ));
+                }
+                match ProjectionLight::new(world_from_light, intensity, image, f64::from(fov)) {
+                    Some(light) => Light::Projection(light),
+                    None => {
+                        self.warnings.push(BuildWarning::DarkEnvironment { light: position });
+                        return Ok(());
+                    }
+                }
+            }
             LightDesc::Distant { towards, irradiance } => {
                 let towards = towards.try_normalize().ok_or(wrong("its direction is zero or not finite"))?;
                 if !irradiance.is_finite() {
@@ -582,10 +601,22 @@ impl Builder {
                 }
                 Light::Distant(DistantLight { towards, irradiance })
             }
-            LightDesc::Infinite { radiance, .. } if !radiance.is_finite() => {
+            LightDesc::Infinite { radiance, .. } | LightDesc::Portal { radiance, .. }
+                if !radiance.is_finite() =>
+            {
                 return Err(wrong("its radiance is not finite"));
             }
             LightDesc::Infinite { radiance, image: None, .. } => Light::Uniform(UniformLight { radiance }),
+            LightDesc::Portal { world_from_light, radiance, image, corners } => {
+                match PortalLight::new(world_from_light, radiance, image, corners) {
+                    Ok(light) => Light::Portal(light),
+                    Err(PortalError::NoRectangle) => return Err(wrong("its portal is not a rectangle")),
+                    Err(PortalError::Dark) => {
+                        self.warnings.push(BuildWarning::DarkEnvironment { light: position });
+                        return Ok(());
+                    }
+                }
+            }
             LightDesc::Infinite { world_from_light, radiance, image: Some(picture) } => {
                 match Environment::new(picture.image, picture.mapping, world_from_light, radiance) {
                     Some(environment) => Light::Environment(environment),

@@ -316,6 +316,17 @@ pub enum LightDesc {
         /// Radiant intensity by direction.
         image: EnvironmentDesc,
     },
+    /// A point that throws a picture.
+    Projection {
+        /// The placement; the picture is along +z, its top towards +y, and its right towards +x.
+        world_from_light: Transform,
+        /// A factor on the picture.
+        intensity: Rgb,
+        /// Radiant intensity by direction.
+        image: Arc<lumbre_image::Image>,
+        /// The angle between the sides of the picture that are nearer to each other, in degrees.
+        fov: f32,
+    },
     /// A directional light.
     Distant {
         /// Unit vector towards the light.
@@ -331,6 +342,18 @@ pub enum LightDesc {
         radiance: Rgb,
         /// Radiance by direction; `None` for uniform.
         image: Option<EnvironmentDesc>,
+    },
+    /// An environment light that is seen through a rectangle alone.
+    Portal {
+        /// The placement of the environment: z is up.
+        world_from_light: Transform,
+        /// Radiance, or a factor on the image.
+        radiance: Rgb,
+        /// Radiance by direction; `None` for uniform.
+        image: Option<EnvironmentDesc>,
+        /// The corners of the rectangle in the world, one after the other around it. The vector product of the sides from the first to the
+        /// fourth and to the second points to the sky.
+        corners: [DVec3; 4],
     },
     /// A moving light other than an infinite one.
     Moving {
@@ -378,6 +401,9 @@ pub struct FilmDesc {
     pub iso: f32,
     /// The largest component of one sample; infinite by default.
     pub max_component: f32,
+    /// What a sensor makes of colours: the red, the green and the blue of the picture, each of the red, green and blue of light in linear
+    /// Rec. 709, after `max_component`. By default no other.
+    pub sensor: [[f32; 3]; 3],
     /// Whether files of light keep single precision; half precision by default.
     pub single_precision: bool,
 }
@@ -393,6 +419,7 @@ impl Default for FilmDesc {
             exposure: 1.0,
             iso: 100.0,
             max_component: f32::INFINITY,
+            sensor: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             single_precision: false,
         }
     }

@@ -38,7 +38,12 @@ impl GroundPlane {
         let mut local = vec![];
         for light in lights {
             match light {
-                Light::Point(_) | Light::Spot(_) | Light::Goniometric(_) | Light::Moving(_) => {
+                Light::Point(_)
+                | Light::Spot(_)
+                | Light::Goniometric(_)
+                | Light::Projection(_)
+                | Light::Portal(_)
+                | Light::Moving(_) => {
                     local.push(light.clone());
                 }
                 // These are constant over time.

@@ -10,6 +10,8 @@ mod mesh;
 mod moving;
 mod pairs;
 mod placed;
+pub(crate) mod portal;
+mod projection;
 mod rectangle;
 mod tree;
 
@@ -25,6 +27,8 @@ pub use environment::{Environment, UniformLight};
 pub use mesh::MeshLight;
 pub use moving::MovingLight;
 pub use placed::PlacedLight;
+pub use portal::PortalLight;
+pub use projection::ProjectionLight;
 pub(crate) use tree::Place;
 use tree::{Emitter, Facing};
 
@@ -43,12 +47,16 @@ pub enum Light {
     Spot(SpotLight),
     /// From a point, by direction as a picture says.
     Goniometric(GoniometricLight),
+    /// From a point, a picture.
+    Projection(ProjectionLight),
     /// Parallel light.
     Distant(DistantLight),
     /// The same from all around.
     Uniform(UniformLight),
     /// A picture all around.
     Environment(Environment),
+    /// Light from all around, through a rectangle.
+    Portal(PortalLight),
     /// One exact shape.
     Shape(ShapeLight),
     /// Triangles.
@@ -120,9 +128,11 @@ impl Light {
             Self::Point(light) => light.sample(from),
             Self::Spot(light) => light.sample(from),
             Self::Goniometric(light) => light.sample(from),
+            Self::Projection(light) => light.sample(from),
             Self::Distant(light) => Some(light.sample()),
             Self::Uniform(light) => Some(light.sample(u)),
             Self::Environment(light) => light.sample(u),
+            Self::Portal(light) => light.sample(from, u),
             Self::Shape(light) => light.sample(&entries[light.entry as usize], from, u),
             Self::Mesh(light) => light.sample(&entries[light.entry as usize], from, u),
             Self::Placed(light) => light.sample(entries, from, time, u),
@@ -143,11 +153,14 @@ impl Light {
                 Facing::cone(light.axis, light.cos_start, light.cos_end),
                 mean(light.intensity),
             ),
+            Self::Projection(light) => {
+                at(light.from, Facing::cone(light.axis, light.cos_corner, light.cos_corner), light.mean())
+            }
             Self::Shape(light) => light.emitter(&entries[light.entry as usize]).into_iter().collect(),
             Self::Mesh(light) => light.emitters(&entries[light.entry as usize]),
             Self::Placed(light) => light.emitter(entries).into_iter().collect(),
             Self::Moving(light) => light.emitter(entries).into_iter().collect(),
-            Self::Distant(_) | Self::Uniform(_) | Self::Environment(_) => Vec::new(),
+            Self::Distant(_) | Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => Vec::new(),
         }
     }
 
@@ -159,8 +172,10 @@ impl Light {
             Self::Point(_)
             | Self::Spot(_)
             | Self::Goniometric(_)
+            | Self::Projection(_)
             | Self::Uniform(_)
-            | Self::Environment(_) => None,
+            | Self::Environment(_)
+            | Self::Portal(_) => None,
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => None,
         }
     }
@@ -172,12 +187,13 @@ impl Light {
         match (self, surface) {
             (Self::Uniform(_), None) => UniformLight::pdf(),
             (Self::Environment(light), None) => light.pdf(ray.direction),
+            (Self::Portal(light), None) => light.pdf(ray.origin, ray.direction),
             (Self::Shape(light), Some((surface, _))) => light.pdf(ray, surface),
             (Self::Mesh(light), Some((surface, triangle))) => light.pdf(ray, surface, triangle),
             (Self::Placed(light), Some(surface)) => light.pdf(ray, surface),
-            (Self::Uniform(_) | Self::Environment(_), Some(_))
+            (Self::Uniform(_) | Self::Environment(_) | Self::Portal(_), Some(_))
             | (Self::Shape(_) | Self::Mesh(_) | Self::Placed(_), None)
-            | (Self::Point(_) | Self::Spot(_) | Self::Goniometric(_), _)
+            | (Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Projection(_), _)
             | (Self::Distant(_) | Self::Moving(_), _) => 0.0,
         }
     }
@@ -189,21 +205,28 @@ impl Light {
             Self::Shape(light) => light.surface_at(from, point),
             Self::Mesh(light) => Some(light.surface_at(point)),
             Self::Placed(light) => light.surface_at(from, point, time),
-            Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Distant(_) | Self::Moving(_) => {
-                None
-            }
-            Self::Uniform(_) | Self::Environment(_) => None,
+            Self::Point(_)
+            | Self::Spot(_)
+            | Self::Goniometric(_)
+            | Self::Projection(_)
+            | Self::Distant(_)
+            | Self::Moving(_) => None,
+            Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => None,
         }
     }
 
-    /// The radiance that arrives along the unit `direction` from infinitely far away.
-    pub fn escaped(&self, direction: DVec3) -> Spectrum {
+    /// The radiance that arrives at `from` along the unit `direction` from infinitely far away.
+    pub fn escaped(&self, from: DVec3, direction: DVec3) -> Spectrum {
         match self {
             Self::Uniform(light) => light.radiance,
             Self::Environment(light) => light.radiance(direction),
-            Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Distant(_) | Self::Moving(_) => {
-                Spectrum::BLACK
-            }
+            Self::Portal(light) => light.radiance(from, direction),
+            Self::Point(_)
+            | Self::Spot(_)
+            | Self::Goniometric(_)
+            | Self::Projection(_)
+            | Self::Distant(_)
+            | Self::Moving(_) => Spectrum::BLACK,
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => Spectrum::BLACK,
         }
     }
@@ -218,9 +241,11 @@ impl Light {
             Self::Point(light) => Some(of(light.sample(at))),
             Self::Spot(light) => Some(of(light.sample(at))),
             Self::Goniometric(light) => Some(of(light.sample(at))),
+            Self::Projection(light) => Some(of(light.sample(at))),
             Self::Distant(light) => Some(of(Some(light.sample()))),
             Self::Uniform(light) => Some(light.radiance * std::f32::consts::PI),
             Self::Environment(light) => Some(light.irradiance(normal)),
+            Self::Portal(light) => Some(light.irradiance(at, normal)),
             Self::Moving(light) => light.irradiance(at, time, normal),
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => None,
         }
@@ -229,10 +254,13 @@ impl Light {
     /// Whether rays that leave the scene meet it.
     pub fn is_infinite(&self) -> bool {
         match self {
-            Self::Uniform(_) | Self::Environment(_) => true,
-            Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Distant(_) | Self::Moving(_) => {
-                false
-            }
+            Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => true,
+            Self::Point(_)
+            | Self::Spot(_)
+            | Self::Goniometric(_)
+            | Self::Projection(_)
+            | Self::Distant(_)
+            | Self::Moving(_) => false,
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => false,
         }
     }
@@ -240,10 +268,13 @@ impl Light {
     /// Whether its light comes from one direction alone at each place.
     pub fn is_delta(&self) -> bool {
         match self {
-            Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Distant(_) | Self::Moving(_) => {
-                true
-            }
-            Self::Uniform(_) | Self::Environment(_) => false,
+            Self::Point(_)
+            | Self::Spot(_)
+            | Self::Goniometric(_)
+            | Self::Projection(_)
+            | Self::Distant(_)
+            | Self::Moving(_) => true,
+            Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => false,
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => false,
         }
     }
@@ -252,10 +283,13 @@ impl Light {
     pub(crate) fn is_surface(&self) -> bool {
         match self {
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => true,
-            Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Distant(_) | Self::Moving(_) => {
-                false
-            }
-            Self::Uniform(_) | Self::Environment(_) => false,
+            Self::Point(_)
+            | Self::Spot(_)
+            | Self::Goniometric(_)
+            | Self::Projection(_)
+            | Self::Distant(_)
+            | Self::Moving(_) => false,
+            Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => false,
         }
     }
 
@@ -267,10 +301,12 @@ impl Light {
         match self {
             Self::Point(light) => 4.0 * PI * mean(light.intensity),
             Self::Goniometric(light) => 4.0 * PI * light.mean(),
+            Self::Projection(light) => light.flux(),
             Self::Spot(light) => light.solid_angle() * mean(light.intensity),
             Self::Distant(light) => disk * mean(light.irradiance),
             Self::Uniform(light) => PI * disk * mean(light.radiance),
             Self::Environment(light) => PI * disk * light.mean(),
+            Self::Portal(light) => light.power(),
             Self::Shape(light) => light.power,
             Self::Mesh(light) => light.power,
             Self::Placed(light) => light.power(scene_radius),
@@ -284,8 +320,9 @@ impl Light {
             Self::Point(_) => "point",
             Self::Spot(_) => "spot",
             Self::Goniometric(_) => "goniometric",
+            Self::Projection(_) => "projection",
             Self::Distant(_) => "distant",
-            Self::Uniform(_) | Self::Environment(_) => "infinite",
+            Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => "infinite",
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => "diffuse",
             Self::Moving(light) => light.light.name(),
         }

@@ -455,13 +455,13 @@ impl Scene {
         self.infinite.iter().map(move |&id| {
             let light = &self.lights[id.0 as usize];
             let pdf = self.light_choice.pdf(&self.lights, id, ray, normal, None);
-            (light.escaped(ray.direction), pdf as f32)
+            (light.escaped(ray.origin, ray.direction), pdf as f32)
         })
     }
 
     /// The radiance of each infinite light along a ray that leaves the scene.
     pub fn background<'s>(&'s self, ray: &'s Ray) -> impl Iterator<Item = Spectrum> + 's {
-        self.infinite.iter().map(move |&id| self.lights[id.0 as usize].escaped(ray.direction))
+        self.infinite.iter().map(move |&id| self.lights[id.0 as usize].escaped(ray.origin, ray.direction))
     }
 
     /// The surface entry of a hit, that of a leaf for a CSG; the primitive; and whether it is flipped because

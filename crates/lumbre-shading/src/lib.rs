@@ -38,8 +38,8 @@ pub use mipmap::{AxisWrap, ImageFilter, MipMap, MipMapOptions, Wrap};
 pub use principled_params::{Convention, PrincipledParams, VolumeParams};
 pub use spectrum::{NamedSpectrum, SpectrumValue};
 pub use texture::{
-    FURTHER_SETS, FloatTexture, FurtherUv, ImageTexture, Mapping2d, SpectrumTexture, Texture, TextureContext,
-    TexturePoint, TextureValue, UvSet, VertexData,
+    FURTHER_SETS, FloatTexture, FurtherUv, ImageTexture, Mapping2d, Pattern, PatternKind, SpectrumTexture,
+    Texture, TextureContext, TexturePoint, TextureValue, UvSet, VertexData,
 };
 
 /// The channels of light transport: linear Rec. 709 at present.

@@ -8,6 +8,11 @@ use lumbre_math::{DVec2, DVec3, Elementary, Transform, Vec2, Vec3};
 
 use crate::{MipMap, Spectrum};
 
+mod dots;
+mod pattern;
+
+pub use pattern::{Pattern, PatternKind};
+
 /// Where a texture is evaluated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureContext {
@@ -236,6 +241,12 @@ pub trait TextureValue:
 
     /// The value, with negative numbers and NaN replaced by zero.
     fn clamp_negative(self) -> Self;
+
+    /// A number, as a grey colour.
+    fn from_number(number: f32) -> Self;
+
+    /// A colour, as a number by its luminance.
+    fn from_colour(colour: Spectrum) -> Self;
 }
 
 impl TextureValue for f32 {
@@ -254,6 +265,14 @@ impl TextureValue for f32 {
     fn clamp_negative(self) -> Self {
         self.max(0.0)
     }
+
+    fn from_number(number: f32) -> Self {
+        number
+    }
+
+    fn from_colour(colour: Spectrum) -> Self {
+        colour.luminance()
+    }
 }
 
 impl TextureValue for Spectrum {
@@ -271,6 +290,14 @@ impl TextureValue for Spectrum {
 
     fn clamp_negative(self) -> Self {
         self.map(|c| c.max(0.0))
+    }
+
+    fn from_number(number: f32) -> Self {
+        Self::splat(number)
+    }
+
+    fn from_colour(colour: Spectrum) -> Self {
+        colour
     }
 }
 
@@ -355,6 +382,15 @@ pub enum Texture<T: TextureValue> {
         /// The textures; the first at the origin.
         textures: [Arc<Texture<T>>; 2],
     },
+    /// Dots of one texture on another.
+    Dots {
+        /// From the surface to the plane, where each square of one unit about whole coordinates has one dot or none.
+        mapping: Mapping2d,
+        /// The textures inside and outside of the dots.
+        textures: [Arc<Texture<T>>; 2],
+    },
+    /// A pattern of noise.
+    Pattern(Pattern),
     /// An image.
     Image(ImageTexture),
 }
@@ -402,6 +438,10 @@ impl<T: TextureValue> Texture<T> {
                 let odd = (cell.x + cell.y + cell.z).rem_euclid(2.0) == 1.0;
                 textures[usize::from(odd)].evaluate(at)
             }
+            Self::Dots { mapping, textures } => {
+                textures[usize::from(!dots::is_inside(mapping.map(at).st))].evaluate(at)
+            }
+            Self::Pattern(pattern) => pattern.evaluate(at),
             Self::Image(image) => image.evaluate(at),
         }
     }

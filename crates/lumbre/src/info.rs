@@ -146,8 +146,9 @@ fn light_name(light: &LightDesc) -> &'static str {
         LightDesc::Point { .. } => "point",
         LightDesc::Spot { .. } => "spot",
         LightDesc::Goniometric { .. } => "goniometric",
+        LightDesc::Projection { .. } => "projection",
         LightDesc::Distant { .. } => "distant",
-        LightDesc::Infinite { .. } => "infinite",
+        LightDesc::Infinite { .. } | LightDesc::Portal { .. } => "infinite",
         LightDesc::Moving { light, .. } => light_name(light),
     }
 }

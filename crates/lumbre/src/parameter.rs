@@ -85,10 +85,13 @@ pub fn parameters(desc: &SceneDesc) -> Vec<Parameter> {
             LightDesc::Goniometric { intensity, .. } => {
                 add("goniometric", "intensity", ParameterKind::Light, numbers(*intensity));
             }
+            LightDesc::Projection { intensity, .. } => {
+                add("projection", "intensity", ParameterKind::Light, numbers(*intensity));
+            }
             LightDesc::Distant { irradiance, .. } => {
                 add("distant", "irradiance", ParameterKind::Light, numbers(*irradiance));
             }
-            LightDesc::Infinite { radiance, .. } => {
+            LightDesc::Infinite { radiance, .. } | LightDesc::Portal { radiance, .. } => {
                 add("infinite", "radiance", ParameterKind::Light, numbers(*radiance));
             }
             LightDesc::Moving { .. } => {}

@@ -181,8 +181,9 @@ impl Setting {
             LightDesc::Point { .. } => &["from", "intensity", "scale"],
             LightDesc::Spot { .. } => &["intensity", "coneangle", "conedeltaangle", "scale"],
             LightDesc::Goniometric { .. } => &["intensity", "scale"],
+            LightDesc::Projection { .. } => &["intensity", "fov", "scale"],
             LightDesc::Distant { .. } => &["irradiance", "scale"],
-            LightDesc::Infinite { .. } => &["radiance", "scale"],
+            LightDesc::Infinite { .. } | LightDesc::Portal { .. } => &["radiance", "scale"],
             LightDesc::Moving { .. } => &[],
         };
         if self.parameter == "scale" {
@@ -192,8 +193,10 @@ impl Setting {
                 LightDesc::Point { intensity: light, .. }
                 | LightDesc::Spot { intensity: light, .. }
                 | LightDesc::Goniometric { intensity: light, .. }
+                | LightDesc::Projection { intensity: light, .. }
                 | LightDesc::Distant { irradiance: light, .. }
-                | LightDesc::Infinite { radiance: light, .. } => *light *= factor,
+                | LightDesc::Infinite { radiance: light, .. }
+                | LightDesc::Portal { radiance: light, .. } => *light *= factor,
                 LightDesc::Moving { .. } => {}
             }
             return Ok(());
@@ -203,15 +206,19 @@ impl Setting {
             (
                 LightDesc::Point { intensity, .. }
                 | LightDesc::Spot { intensity, .. }
-                | LightDesc::Goniometric { intensity, .. },
+                | LightDesc::Goniometric { intensity, .. }
+                | LightDesc::Projection { intensity, .. },
                 "intensity",
             ) => Slot::Light(intensity),
             (LightDesc::Spot { cone_angle, .. }, "coneangle") => Slot::Plain(cone_angle, ANGLE),
+            (LightDesc::Projection { fov, .. }, "fov") => Slot::Plain(fov, ANGLE),
             (LightDesc::Spot { cone_delta_angle, .. }, "conedeltaangle") => {
                 Slot::Plain(cone_delta_angle, ANGLE)
             }
             (LightDesc::Distant { irradiance, .. }, "irradiance") => Slot::Light(irradiance),
-            (LightDesc::Infinite { radiance, .. }, "radiance") => Slot::Light(radiance),
+            (LightDesc::Infinite { radiance, .. } | LightDesc::Portal { radiance, .. }, "radiance") => {
+                Slot::Light(radiance)
+            }
             _ => return Err(self.unknown(&format!("light {index}"), known)),
         };
         self.set(slot)

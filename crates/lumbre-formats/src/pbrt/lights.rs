@@ -82,11 +82,7 @@ impl Converter<'_, '_> {
             }
             "infinite" => self.infinite(&params, state)?,
             "goniometric" => self.goniometric(&params, state)?,
-            "projection" => {
-                params.ignore_all();
-                self.note(spot, format!("light {} is not rendered yet: it is left out", quoted(ty)));
-                return Ok(());
-            }
+            "projection" => self.projection(&params, state)?,
             _ => {
                 params.ignore_all();
                 self.unknown(spot, "light", ty, &KNOWN, "it is left out");
@@ -128,10 +124,13 @@ impl Converter<'_, '_> {
         let mut scale = self.light_scale(params)?;
         let given = self.light_colour(params, "L")?;
         let lux = positive(params, "illuminance")?;
-        if params.find("portal").is_some() {
-            let message = "portals are not rendered yet: the light comes from all around";
-            self.note(params.spot_of("portal"), message);
-        }
+        let portal = portal(params)?;
+        let through_portal = |light: LightDesc| match (light, portal) {
+            (LightDesc::Infinite { world_from_light, radiance, image }, Some(corners)) => {
+                LightDesc::Portal { world_from_light, radiance, image, corners }
+            }
+            (light, _) => light,
+        };
         let is_old = params.has("mapname");
         if is_old {
             self.upgraded(params.spot_of("mapname"));
@@ -140,7 +139,7 @@ impl Converter<'_, '_> {
         let Some(filename) = params.string(key)?.map(str::to_owned) else {
             let white = || colour::light(&state.space, [1.0; 3]);
             let radiance = given.unwrap_or_else(white) * scale * lux.map_or(1.0, |lux| lux / PI) as f32;
-            return Ok(LightDesc::Infinite { world_from_light, radiance, image: None });
+            return Ok(through_portal(LightDesc::Infinite { world_from_light, radiance, image: None }));
         };
         let at = params.spot_of(key);
         match given {
@@ -168,7 +167,7 @@ impl Converter<'_, '_> {
             EnvironmentMapping::LatitudeLongitude => world_from_light * half_turn(),
         };
         let image = Some(EnvironmentDesc { image: image.into(), mapping });
-        Ok(LightDesc::Infinite { world_from_light, radiance: scale, image })
+        Ok(through_portal(LightDesc::Infinite { world_from_light, radiance: scale, image }))
     }
 
     /// A point light whose intensity by direction is the mean of an image's channels. Its y and z are swapped.
@@ -217,6 +216,38 @@ impl Converter<'_, '_> {
         Ok(LightDesc::Goniometric { world_from_light: turned, intensity: intensity * factor as f32, image })
     }
 
+    /// A point light that throws an image along +z.
+    fn projection(&mut self, params: &Params, state: &State) -> Result<LightDesc> {
+        let mut intensity = self.light_scale(params)?;
+        let lumens = positive(params, "power")?;
+        let fov = single(params, "fov", 90.0)?;
+        if !(0.0 < fov && fov < 180.0) {
+            return params.out_of_range("fov", f64::from(fov), "more than 0 and less than 180 degrees");
+        }
+        let is_old = params.has("mapname");
+        if is_old {
+            self.upgraded(params.spot_of("mapname"));
+            intensity *= self.emission(params, "I", state)?;
+        }
+        let key = if is_old { "mapname" } else { "filename" };
+        let Some(filename) = params.string(key)?.map(str::to_owned) else {
+            return Err(params.spot.error("a projection light has no \"string filename\""));
+        };
+        let at = params.spot_of(key);
+        let file = self.image_file(&filename, at)?;
+        let image = file.to_image(self.budget).map_err(|e| file_fault(at, e))?;
+        self.budget.release(file.bitmap.bytes() as u64);
+        if let Some(lumens) = lumens {
+            let found = projected_flux(&image, f64::from(fov));
+            if !(found > 0.0 && found.is_finite()) {
+                let message = "a power is asked of a projection light whose image is black";
+                return Err(params.spot_of("power").error(message));
+            }
+            intensity *= (lumens / found) as f32;
+        }
+        Ok(LightDesc::Projection { world_from_light: state.ctm[0], intensity, image: image.into(), fov })
+    }
+
     /// The area light of the following shapes.
     pub fn area_light(&mut self, ty: &str, params: Params, state: &State) -> Result<Option<AreaLight>> {
         let spot = params.spot;
@@ -258,6 +289,24 @@ impl Converter<'_, '_> {
         };
         self.done(&params);
         Ok(Some(AreaLight { desc, spot }))
+    }
+}
+
+/// The corners of the portal of an infinite light, which are in the world.
+fn portal(params: &Params) -> Result<Option<[DVec3; 4]>> {
+    let Some(param) = params.typed("portal", &[Type::Point3])? else { return Ok(None) };
+    let numbers = param.exactly::<12>()?;
+    let corners = std::array::from_fn(|i| DVec3::from_slice(&numbers[3 * i..3 * i + 3]));
+    let [p0, p1, p2, p3]: [DVec3; 4] = corners;
+    let (across, up) = (p3 - p0, p1 - p0);
+    let size = across.length().max(up.length());
+    let is_rectangle = across.length().min(up.length()) > 0.0
+        && across.dot(up).abs() < 1e-3 * across.length() * up.length()
+        && (p0 + across + up - p2).length() < 1e-3 * size;
+    if is_rectangle {
+        Ok(Some(corners))
+    } else {
+        Err(param.refuse("the 4 corners of a rectangle, around it"))
     }
 }
 
@@ -321,6 +370,23 @@ fn flux(image: &Image, mapping: EnvironmentMapping) -> f64 {
         (0..image.width()).map(|x| f64::from(image.pixel(x, y).luminance())).sum::<f64>() * solid_angle
     };
     (0..image.height()).map(row).sum()
+}
+
+/// The luminous flux of an image that is thrown with this angle between its nearer sides.
+fn projected_flux(image: &Image, fov: f64) -> f64 {
+    let (width, height) = (f64::from(image.width()), f64::from(image.height()));
+    let tangent = (0.5 * fov.to_radians()).tangent();
+    let [x, y] = [width, height].map(|side| tangent * side / width.min(height));
+    let row = |row: u32| {
+        let v = y * (1.0 - 2.0 * (f64::from(row) + 0.5) / height);
+        let of_column = |column: u32| {
+            let u = x * (2.0 * (f64::from(column) + 0.5) / width - 1.0);
+            let squared = 1.0 + u * u + v * v;
+            f64::from(image.pixel(column, row).luminance()) / (squared * squared.sqrt())
+        };
+        (0..image.width()).map(of_column).sum::<f64>()
+    };
+    (0..image.height()).map(row).sum::<f64>() * 4.0 * x * y / (width * height)
 }
 
 /// Illuminance, in units of the image, of a horizontal surface under the upper half of an environment.

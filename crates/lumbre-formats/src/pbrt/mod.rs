@@ -23,6 +23,7 @@ mod pages;
 mod params;
 mod parser;
 mod principled;
+mod sensors;
 mod settings;
 mod shapes;
 mod source;

@@ -68,6 +68,8 @@ fn sample(page: &str, row: &Row) -> &'static str {
         ("imagemap" | "diffuse", "filename") => r#""images/letter.png""#,
         ("infinite", "filename") => r#""images/sky.pfm""#,
         ("goniometric", "filename") => r#""images/lobes.png""#,
+        ("projection", "filename") => r#""images/letter.png""#,
+        ("infinite", "portal") => "0 0 0 0 1 0 2 1 0 2 0 0",
         (_, "P") => "0 0 0 1 0 0 0 1 0",
         (_, "N" | "S") => "0 0 1 0 0 1 0 0 1",
         (_, "uv") => "0 0 1 0 0 1",

@@ -1,7 +1,7 @@
 //! Camera, film, filter, sampler, integrator and options.
 
 use lumbre_image::ColourSpace;
-use lumbre_math::{Transform, Vec2};
+use lumbre_math::{DMat3, Transform, Vec2};
 use lumbre_scene::{
     Camera, CameraKind, FilterDesc, IntegratorDesc, IntegratorKind, MediumId, SamplerDesc, SamplerKind,
     SphericalMapping,
@@ -12,6 +12,7 @@ use super::convert::Converter;
 use super::lexer::{parse_number, whole};
 use super::params::{Params, Type};
 use super::source::{Result, Spot};
+use super::{colour, sensors};
 use crate::Diagnostic;
 use crate::diagnostic::{number, quoted};
 
@@ -185,13 +186,7 @@ impl Converter<'_, '_> {
                 self.upgraded(params.spot_of(old));
             }
         }
-        if let Some(sensor) = params.string("sensor")?.filter(|s| *s != "cie1931") {
-            let message = format!("sensor {} is not rendered yet: cie1931 takes its place", quoted(sensor));
-            self.note(params.spot_of("sensor"), message);
-        }
-        if params.float("whitebalance", 0.0)? != 0.0 {
-            self.note(params.spot_of("whitebalance"), "white balance is not rendered yet: it is left out");
-        }
+        let sensor = self.sensor(&params)?;
         let max_component = params.float_or_infinite("maxcomponentvalue", f64::INFINITY)?;
         if max_component <= 0.0 {
             return params.out_of_range("maxcomponentvalue", max_component, "more than 0");
@@ -209,8 +204,42 @@ impl Converter<'_, '_> {
         (film.width, film.height) = (Some(width), Some(height));
         (film.pixel_bounds, film.crop_window) = (pixel_bounds, crop_window);
         film.max_component = max_component as f32;
+        film.sensor = sensor;
         film.single_precision = single_precision;
         Ok(())
+    }
+
+    /// What the sensor of a film makes of colours.
+    fn sensor(&mut self, params: &Params) -> Result<[[f32; 3]; 3]> {
+        const CIE1931: &str = "cie1931";
+        let name = params.string("sensor")?.unwrap_or(CIE1931).to_owned();
+        let kelvin = params.float_at_least_zero("whitebalance", 0.0)?;
+        let balanced = (kelvin > 0.0).then_some(kelvin);
+        let matrix = if name == CIE1931 {
+            match balanced {
+                None => Some(DMat3::IDENTITY),
+                Some(kelvin) => colour::balanced(kelvin),
+            }
+        } else {
+            const DEFAULT_KELVIN: f64 = 6500.0;
+            let Some(matrix) = sensors::matrix(&name, balanced.unwrap_or(DEFAULT_KELVIN)) else {
+                let wrong = Diagnostic::error(format!("unknown sensor {}", quoted(&name)));
+                let known = sensors::names().chain([CIE1931]);
+                return Err(params.spot_of("sensor").wrong(wrong.suggest(&name, known)));
+            };
+            let message =
+                format!("colours are about those of sensor {}: its spectra are not rendered", quoted(&name));
+            self.note(params.spot_of("sensor"), message);
+            Some(matrix)
+        };
+        let Some(matrix) = matrix else {
+            return params.out_of_range(
+                "whitebalance",
+                kelvin,
+                "0, or a temperature at which bodies glow, in kelvin",
+            );
+        };
+        Ok(matrix.transpose().to_cols_array_2d().map(|row| row.map(|v| v as f32)))
     }
 
     pub fn sampler(&mut self, ty: &str, params: Params) -> Result<()> {

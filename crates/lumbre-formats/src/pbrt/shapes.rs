@@ -468,8 +468,10 @@ impl Converter<'_, '_> {
         let mut mesh = MeshDesc { positions, quads, ..MeshDesc::default() };
         self.mesh_parts(params, &mut mesh, &kept, given)?;
         if params.find("emissionfilename").is_some() {
-            let message = "an emission picture is not rendered yet: the patches shine evenly";
-            self.note(params.spot_of("emissionfilename"), message);
+            // In pbrt it says where the patches are sampled more often, and changes no light.
+            params.ignore(&["emissionfilename"]);
+            let message = "emissionfilename changes no light, and is left out; an AreaLightSource shines by its filename";
+            self.warn(params.spot_of("emissionfilename"), Diagnostic::note(message));
         }
         if mesh.quads.is_empty() {
             self.note(params.spot_of("indices"), "a mesh without a face is left out");

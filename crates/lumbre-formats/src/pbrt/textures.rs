@@ -4,9 +4,11 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use lumbre_image::Encoding;
+use lumbre_math::noise::Octaves;
 use lumbre_math::{DVec3, Transform, Vec2, Vec3};
 use lumbre_shading::{
-    ImageFilter, ImageTexture, Mapping2d, NamedSpectrum, Spectrum, SpectrumValue, Texture, TextureValue, Wrap,
+    ImageFilter, ImageTexture, Mapping2d, NamedSpectrum, Pattern, PatternKind, Spectrum, SpectrumValue,
+    Texture, TextureValue, Wrap,
 };
 
 use super::colour;
@@ -417,8 +419,31 @@ impl Converter<'_, '_> {
                     return Ok(());
                 }
             },
-            "dots" | "fbm" | "wrinkled" | "windy" | "marble" | "ptex" => {
-                self.replaced_texture::<T>(ty, &params)?
+            "dots" => {
+                let parts = [self.part::<T>(&params, "inside", 1.0)?, self.part(&params, "outside", 0.0)?];
+                let size = [size(&parts[0]), size(&parts[1])];
+                let textures = parts.map(|p| p.texture);
+                let mapping = mapping(&params, texture_from_world)?;
+                whole(Texture::Dots { mapping, textures }, &size, spot)?
+            }
+            "fbm" | "wrinkled" | "windy" | "marble" => {
+                let kind = match ty {
+                    "fbm" => PatternKind::Fbm(octaves(&params)?),
+                    "wrinkled" => PatternKind::Wrinkled(octaves(&params)?),
+                    "windy" => PatternKind::Windy,
+                    _ => PatternKind::Marble {
+                        octaves: octaves(&params)?,
+                        scale: f64::from(single(&params, "scale", 1.0)?),
+                        variation: f64::from(single(&params, "variation", 0.2)?),
+                    },
+                };
+                whole(Texture::Pattern(Pattern { texture_from_world, kind }), &[], spot)?
+            }
+            "ptex" => {
+                params.ignore_all();
+                let message = "Ptex textures are not read: the constant 1 takes its place";
+                self.note(spot, message);
+                Known::constant(T::grey(1.0))
             }
             _ => {
                 params.ignore_all();
@@ -435,22 +460,6 @@ impl Converter<'_, '_> {
         )?;
         T::table(self).insert(name.to_owned(), known);
         Ok(())
-    }
-
-    /// The constant that replaces a texture that is not rendered yet, with a warning.
-    fn replaced_texture<T: SceneValue>(&mut self, ty: &str, params: &Params) -> Result<Known<T>> {
-        // About the mean of each; dots cover less than half of the surface.
-        let mean = match ty {
-            "dots" => self.part::<T>(params, "outside", 0.0)?,
-            "wrinkled" => Known::constant(T::grey(0.4)),
-            "marble" => Known::constant(T::grey(0.8)),
-            "ptex" => Known::constant(T::grey(0.5)),
-            _ => Known::constant(T::grey(0.0)),
-        };
-        params.ignore_all();
-        let message = format!("texture {} is not rendered yet: a constant takes its place", quoted(ty));
-        self.note(params.spot, message);
-        Ok(mean)
     }
 
     /// An operand of a texture: a value or another texture.
@@ -553,6 +562,16 @@ pub(super) fn encoding(params: &Params) -> Result<Option<Encoding>> {
             Err(params.spot_of("encoding").wrong(wrong.expected("sRGB, linear or gamma G")))
         }
     }
+}
+
+/// The octaves of a pattern of noise.
+fn octaves(params: &Params) -> Result<Octaves> {
+    const MOST: u32 = 64;
+    let count = params.count("octaves", 8, 0)?;
+    if count > MOST {
+        return params.out_of_range("octaves", f64::from(count), &format!("0 to {MOST}"));
+    }
+    Ok(Octaves { count, roughness: f64::from(single(params, "roughness", 0.5)?) })
 }
 
 /// The mapping from the surface to the plane of a texture.

@@ -12,11 +12,14 @@ pub struct Exposure {
     pub factor: f32,
     /// The largest component that a sample may have; a brighter one keeps its hue. Infinite to leave all as they are.
     pub max_component: f32,
+    /// What a sensor makes of colours: the rows of a matrix to the red, green and blue of the picture. The identity leaves all as they are.
+    pub sensor: [[f32; 3]; 3],
 }
 
 impl Default for Exposure {
     fn default() -> Self {
-        Self { factor: 1.0, max_component: f32::INFINITY }
+        let sensor = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        Self { factor: 1.0, max_component: f32::INFINITY, sensor }
     }
 }
 
@@ -25,7 +28,9 @@ impl Exposure {
     pub fn colour(&self, radiance: Rgb) -> Rgb {
         let colour = radiance * self.factor;
         let most = colour.max_component();
-        if most > self.max_component { colour * (self.max_component / most) } else { colour }
+        let held = if most > self.max_component { colour * (self.max_component / most) } else { colour };
+        let [red, green, blue] = self.sensor.map(|[r, g, b]| r * held.r + g * held.g + b * held.b);
+        Rgb::new(red, green, blue)
     }
 }
 
@@ -332,7 +337,7 @@ mod tests {
         let mut tile = Tile::new(PixelBounds { x0: 5, y0: 7, x1: 9, y1: 10 }, extras);
         let coverage = Rgb::splat(0.25);
         let sample = |radiance| Sample { radiance, coverage, weight: 1.0, features: None, on_catcher: false };
-        let exposure = Exposure { factor: 2.0, max_component: 6.0 };
+        let exposure = Exposure { factor: 2.0, max_component: 6.0, ..Exposure::default() };
         assert!(tile.add(6, 9, &sample(Rgb::new(1.0, 2.0, 3.0)), &exposure));
         assert!(!tile.add(9, 9, &sample(Rgb::WHITE), &exposure));
         assert!(!tile.add(6, 6, &sample(Rgb::WHITE), &exposure));
@@ -388,8 +393,12 @@ mod tests {
 
     #[test]
     fn a_bright_sample_is_dimmed_and_keeps_its_hue() {
-        let exposure = Exposure { factor: 1.0, max_component: 10.0 };
+        let exposure = Exposure { max_component: 10.0, ..Exposure::default() };
         assert_eq!(exposure.colour(Rgb::new(40.0, 20.0, 4.0)), Rgb::new(10.0, 5.0, 1.0));
         assert_eq!(exposure.colour(Rgb::new(4.0, 2.0, 0.5)), Rgb::new(4.0, 2.0, 0.5));
+        // What a sensor makes of it comes after.
+        let sensor = [[0.5, 0.25, 0.0], [0.0, 2.0, 0.0], [0.0, 1.0, 1.0]];
+        let exposure = Exposure { factor: 0.5, sensor, ..exposure };
+        assert_eq!(exposure.colour(Rgb::new(40.0, 20.0, 4.0)), Rgb::new(6.25, 10.0, 6.0));
     }
 }

@@ -134,7 +134,7 @@ impl DistantLight {
     }
 }
 
-fn from_point(from: DVec3, at: DVec3, intensity: Spectrum) -> Option<LightSample> {
+pub(super) fn from_point(from: DVec3, at: DVec3, intensity: Spectrum) -> Option<LightSample> {
     let apart = from - at;
     let towards = apart.try_normalize()?;
     let radiance = intensity * (1.0 / apart.length_squared()) as f32;

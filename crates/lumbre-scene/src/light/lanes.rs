@@ -286,25 +286,13 @@ impl LaneLights {
         direction: V3<R>,
     ) -> (V3<R>, R) {
         let light = &self.elsewhere[self.infinite[position] as usize];
-        let (radiance, pdf) = light.escaped(scene, active, direction);
+        let (radiance, pdf) = light.escaped(scene, active, receiver, direction);
         let place = LanePlace::new(&self.table, receiver);
         let sum = self.sum_elsewhere(scene, active, &place, receiver);
         let share = self.share_elsewhere_at(active, &place, sum);
         let given = light.given(scene, active, &place, receiver);
         let probability = (share * (given / sum)).or_zero(given.simd_gt(R::zero()));
         (radiance, probability * pdf)
-    }
-
-    /// The radiance of one of the [`LaneLights::infinite_count`] infinite lights along a unit direction.
-    #[inline(always)]
-    pub fn background<R: Real>(
-        &self,
-        scene: &Scene,
-        position: usize,
-        active: R::Mask,
-        direction: V3<R>,
-    ) -> V3<R> {
-        self.elsewhere[self.infinite[position] as usize].escaped(scene, active, direction).0
     }
 
     /// What all lights that are everywhere give to a place, in arbitrary units.

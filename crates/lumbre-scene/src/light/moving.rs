@@ -14,7 +14,7 @@ use crate::surface::SurfaceEntry;
 /// A light in its own space, and the rigid motion of that space.
 #[derive(Clone, Debug)]
 pub struct MovingLight {
-    /// A point, spot, goniometric or directional light.
+    /// A point, spot, goniometric, projection or directional light.
     pub(super) light: Box<Light>,
     // Rotations, mirrors and translations only.
     motion: Arc<AnimatedTransform>,

@@ -61,6 +61,9 @@ pub enum SparseGridError {
     /// A block or brick does not start at a multiple of its size within the bounds.
     #[error("a brick at {0}, {1}, {2} is out of place")]
     OutOfPlace(i32, i32, i32),
+    /// It has more bricks than can be counted or held.
+    #[error("the grid has too many bricks: {0}")]
+    TooMany(u64),
 }
 
 impl SparseGrid {
@@ -85,6 +88,29 @@ impl SparseGrid {
         let blocks = vec![Cell::Constant(background); blocks as usize];
         let (split, bricks) = (Vec::new(), Vec::new());
         Ok(Self { index_from_medium, bounds, background, first, count, blocks, split, bricks })
+    }
+
+    /// Bytes that a grid takes, of so many blocks within its bounds, of which some are split, and so many bricks of values.
+    pub fn memory_of(blocks: u64, split: u64, bricks: u64) -> u64 {
+        let cells = blocks.saturating_add(split.saturating_mul((BLOCK * BLOCK * BLOCK) as u64));
+        let bricks = bricks.saturating_mul(size_of::<[f32; 512]>() as u64);
+        cells.saturating_mul(size_of::<Cell>() as u64).saturating_add(bricks)
+    }
+
+    /// Makes room for so many blocks that are split, and bricks of values, so that the grid takes no more than
+    /// [`SparseGrid::memory_of`] them.
+    ///
+    /// # Errors
+    /// [`SparseGridError::TooMany`].
+    pub fn reserve(&mut self, split: u64, bricks: u64) -> Result<(), SparseGridError> {
+        let cells = split.saturating_mul((BLOCK * BLOCK * BLOCK) as u64);
+        if cells.max(bricks) > u64::from(u32::MAX) {
+            return Err(SparseGridError::TooMany(split.max(bricks)));
+        }
+        let split = self.split.try_reserve_exact(cells as usize);
+        split
+            .and_then(|()| self.bricks.try_reserve_exact(bricks as usize))
+            .map_err(|_| SparseGridError::TooMany(bricks))
     }
 
     /// Fills a block of 128³ voxels, whose first voxel is given, with one value; what of it is out of bounds is left.

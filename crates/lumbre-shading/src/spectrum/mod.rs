@@ -6,12 +6,14 @@
 mod fluorescent;
 mod named;
 mod observer;
+mod white_point;
 
 use std::sync::LazyLock;
 
 use lumbre_math::Elementary;
 pub use named::NamedSpectrum;
 use observer::{FIRST_NM, LAST_NM, MATCHING, STEP_NM};
+pub use white_point::white_point;
 
 use crate::Spectrum;
 

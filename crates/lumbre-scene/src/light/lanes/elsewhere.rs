@@ -139,16 +139,23 @@ impl LaneElsewhere {
         }
     }
 
-    /// The radiance along a unit direction, and its density without the probability of the choice.
+    /// The radiance at a receiver along a unit direction, and its density without the probability of the choice.
     #[inline(always)]
-    pub(super) fn escaped<R: Real>(&self, scene: &Scene, active: R::Mask, direction: V3<R>) -> (V3<R>, R) {
+    pub(super) fn escaped<R: Real>(
+        &self,
+        scene: &Scene,
+        active: R::Mask,
+        receiver: &Receiver<R>,
+        direction: V3<R>,
+    ) -> (V3<R>, R) {
         match (self.kind, &scene.lights[self.light as usize]) {
             (Kind::Uniform { radiance }, _) => (V3::constant(radiance), R::splat(0.25 * FRAC_1_PI)),
             (Kind::Environment, Light::Environment(light)) => light.lane_escaped(direction),
             _ => {
                 let (mut radiance, mut pdf) = ([[0.0; MAX_LANES]; 3], [0.0; MAX_LANES]);
                 let directions = scalar::singles(direction);
-                escaped_scalar(scene, self.light, active.to_bitmask(), &directions, &mut radiance, &mut pdf);
+                let (lanes, receivers) = (active.to_bitmask(), Receivers::new(receiver));
+                escaped_scalar(scene, self.light, lanes, &receivers, &directions, &mut radiance, &mut pdf);
                 (scalar::from_singles(&radiance), R::from_lanes(&pdf))
             }
         }
@@ -200,6 +207,7 @@ fn escaped_scalar(
     scene: &Scene,
     light: u32,
     active: u32,
+    receivers: &Receivers,
     directions: &[[f32; MAX_LANES]; 3],
     radiance: &mut [[f32; MAX_LANES]; 3],
     pdf: &mut [f32; MAX_LANES],
@@ -207,11 +215,13 @@ fn escaped_scalar(
     let light = &scene.lights[light as usize];
     for lane in lanes_of(active) {
         let direction = DVec3::from(scalar::vector(directions, lane).map(f64::from)).normalize();
+        let from = receivers.place(lane).from;
         pdf[lane] = match light {
             Light::Environment(light) => light.pdf_beside_others(direction) as f32,
+            Light::Portal(light) => light.pdf(from, direction) as f32,
             _ => 0.0,
         };
-        for (column, number) in radiance.iter_mut().zip(light.escaped(direction).to_array()) {
+        for (column, number) in radiance.iter_mut().zip(light.escaped(from, direction).to_array()) {
             column[lane] = number;
         }
     }

@@ -1,0 +1,142 @@
+//! Scenes of pbrt beside their expected means, from closed forms and other programs, where their folder is present.
+//!
+//! Each row of its table is a part of a picture, its mean, and the standard error of that. A mean may be wrong by 0.3 % or what the row
+//! says, or by three standard errors, its own among them.
+
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use lumbre::Scene;
+use lumbre::formats::{Budget, Diagnostics, Limits, pbrt};
+
+/// Scenes that are not as expected yet. One that is has to be taken off.
+const NOT_YET: &[&str] = &[];
+
+/// A part of a picture.
+struct Row {
+    region: String,
+    /// x0, y0, x1, y1; upper ends are excluded.
+    pixels: [u32; 4],
+    mean: [f64; 3],
+    error: [f64; 3],
+    /// Relative.
+    tolerance: f64,
+}
+
+fn folder() -> Option<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let folders = ["../shared", "../../shared"].map(|shared| root.join(shared).join("cases/pbrt-rest"));
+    folders.into_iter().find(|folder| folder.join("EXPECTED.md").exists())
+}
+
+/// The rows of each scene.
+fn expected(text: &str) -> BTreeMap<String, Vec<Row>> {
+    let mut scenes: BTreeMap<String, Vec<Row>> = BTreeMap::new();
+    let mut scene = String::new();
+    let table = text.split("## Scenes").nth(1).unwrap().split("\n## ").next().unwrap();
+    for line in table.lines().filter(|line| line.starts_with('|')).skip(2) {
+        let cells: Vec<&str> = line.split('|').map(str::trim).collect();
+        let ["", name, region, pixels, mean, error, how, ..] = cells[..] else { panic!("{line}") };
+        if !name.is_empty() {
+            name.clone_into(&mut scene);
+        }
+        // What only spectra give.
+        if region.contains("spectral") {
+            continue;
+        }
+        let numbers =
+            |cell: &str| -> Vec<f64> { cell.split([' ', ',']).map(|n| n.parse().unwrap()).collect() };
+        let pixels: Vec<u32> = numbers(pixels).into_iter().map(|n| n as u32).collect();
+        let error = match numbers(error)[..] {
+            [all] => [all; 3],
+            ref each => each.try_into().unwrap(),
+        };
+        let percent = ["allow ", "within "]
+            .iter()
+            .find_map(|word| how.split(word).nth(1)?.split(' ').next()?.parse::<f64>().ok());
+        scenes.entry(scene.clone()).or_default().push(Row {
+            region: region.to_owned(),
+            pixels: pixels.try_into().unwrap(),
+            mean: numbers(mean).try_into().unwrap(),
+            error,
+            tolerance: percent.unwrap_or(0.3).max(0.3) / 100.0,
+        });
+    }
+    scenes
+}
+
+/// Renders of a scene by samples of their own each.
+const RENDERS: u32 = 8;
+
+/// What is not as expected of a scene.
+fn faults(path: &Path, rows: &[Row], spp: u32) -> Vec<String> {
+    let mut diagnostics = Diagnostics::new();
+    let desc = match pbrt::read_files(&[path], &Budget::new(Limits::default()), &mut diagnostics) {
+        Ok(desc) => desc,
+        Err(error) => return vec![error.to_string()],
+    };
+    let scene = match Scene::from_description(desc) {
+        Ok(scene) => scene,
+        Err(error) => return vec![error.to_string()],
+    };
+    let pictures: Vec<_> = (0..RENDERS)
+        .map(|i| {
+            let mut options = scene.options();
+            options.first_sample = i * spp;
+            options.stop.spp = spp;
+            scene.render(&options).unwrap()
+        })
+        .collect();
+    let mut faults = vec![];
+    for row in rows {
+        let [x0, y0, x1, y1] = row.pixels;
+        let means: Vec<[f64; 3]> = pictures
+            .iter()
+            .map(|picture| {
+                let mut sum = [0.0; 3];
+                for (x, y) in (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x, y))) {
+                    let colour = picture.image().pixel(x, y).to_array();
+                    sum.iter_mut().zip(colour).for_each(|(sum, c)| *sum += f64::from(c));
+                }
+                sum.map(|sum| sum / f64::from((x1 - x0) * (y1 - y0)))
+            })
+            .collect();
+        for c in 0..3 {
+            let count = f64::from(RENDERS);
+            let mean = means.iter().map(|m| m[c]).sum::<f64>() / count;
+            let variance = means.iter().map(|m| (m[c] - mean).powi(2)).sum::<f64>() / (count - 1.0);
+            let own = (variance / count).sqrt();
+            let allowed =
+                (row.tolerance * row.mean[c].abs()).max(3.0 * (row.error[c].powi(2) + own * own).sqrt());
+            if !((mean - row.mean[c]).abs() <= allowed + 1e-9) {
+                let channel = ["red", "green", "blue"][c];
+                faults.push(format!(
+                    "{}, {channel}: {mean:.6}, standard error {own:.6}; expected {}",
+                    row.region, row.mean[c]
+                ));
+            }
+        }
+    }
+    faults
+}
+
+#[test]
+fn scenes_have_the_means_that_are_expected_of_them() {
+    let Some(folder) = folder() else { return };
+    let only = std::env::var("LUMBRE_CASES").unwrap_or_default();
+    let scenes = expected(&fs::read_to_string(folder.join("EXPECTED.md")).unwrap());
+    let mut wrong = vec![];
+    for (name, rows) in scenes.iter().filter(|(name, _)| name.contains(&*only)) {
+        let faults = faults(&folder.join(format!("{name}.pbrt")), rows, 16);
+        println!("{name}: {}", if faults.is_empty() { "as expected" } else { "not" });
+        match (faults.is_empty(), NOT_YET.contains(&&**name)) {
+            (true, true) => wrong.push(format!("{name} is as expected: take it off the list")),
+            (false, false) => wrong.push(format!("{name}: {}", faults.join("\n    "))),
+            _ => {}
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
