@@ -5,19 +5,20 @@ use std::sync::Arc;
 use lumbre_math::{DVec3, Transform};
 use lumbre_scene::MediumId;
 use lumbre_shading::medium::{
-    Cloud, Coefficients, Density, Glow, Grid, HeterogeneousMedium, HomogeneousMedium, Medium, preset,
+    Cloud, Coefficients, Density, Factor, Glow, Grid, HeterogeneousMedium, HomogeneousMedium, Medium, preset,
     preset_names,
 };
 use lumbre_shading::spectrum::BlackbodyColours;
 use lumbre_shading::{Spectrum, SpectrumValue};
 
 use super::colour;
-use super::convert::{Converter, MediumSlot};
+use super::convert::{Converter, MediumSlot, file_fault};
 use super::params::{Param, Params, Type};
 use super::source::{AtSpot, Result, Spot};
 use super::textures::SpectrumUse;
-use crate::Diagnostic;
 use crate::diagnostic::{number, quoted};
+use crate::nanovdb::{self, NanoGrid, Values};
+use crate::{Diagnostic, Input};
 
 /// The types of media.
 pub(super) const MEDIA: [&str; 5] = ["homogeneous", "uniformgrid", "rgbgrid", "cloud", "nanovdb"];
@@ -139,14 +140,14 @@ impl Converter<'_, '_> {
                 .spot
                 .wrong(wrong.expected("\"rgb sigma_a\" or \"rgb sigma_s\" of all voxels")));
         }
-        let glow = match self.coloured_voxels(params, "Le", size, SpectrumUse::Light)? {
+        let radiance = self.coloured_voxels(params, "Le", size, SpectrumUse::Light)?;
+        let scale = params.float_at_least_zero("Lescale", 1.0)? as f32;
+        let glow = match radiance {
             None => Glow::None,
             Some(_) if absorption.is_none() => {
                 return Err(params.spot_of("Le").error("a medium that emits needs \"rgb sigma_a\", too"));
             }
-            Some(radiance) => {
-                Glow::Coloured { radiance, scale: params.float_at_least_zero("Lescale", 1.0)? as f32 }
-            }
+            Some(radiance) => Glow::Coloured { radiance, scale },
         };
         let scale = params.float_at_least_zero("scale", 1.0)? as f32;
         let coefficients = Coefficients::Coloured { absorption, scattering, scale };
@@ -167,9 +168,57 @@ impl Converter<'_, '_> {
         self.heterogeneous(params, world_from_medium, coefficients, Glow::None)
     }
 
-    fn nanovdb(&mut self, params: &Params, _: Transform) -> Result<Medium> {
-        params.ignore_all();
-        Err(params.spot.error("nanovdb"))
+    /// Grids of a file, whose world is the space of the medium.
+    fn nanovdb(&mut self, params: &Params, world_from_medium: Transform) -> Result<Medium> {
+        let Some(filename) = params.typed("filename", &[Type::String])? else {
+            let wrong = Diagnostic::error(format!("{} has no file", params.owner));
+            return Err(params.spot.wrong(wrong.expected("\"string filename\" with a NanoVDB file")));
+        };
+        let at = filename.spot;
+        let path = self.resolve(filename.one_string()?, at)?;
+        let fault = |error| file_fault(at, error);
+        let input = Input::open(&path, self.budget).map_err(fault)?;
+        let name = input.name().clone();
+        let bytes = input.into_bytes();
+        let grid = |name_of: &'static str, default: &str, values: Values| -> Result<Option<NanoGrid>> {
+            let wanted = params.string(name_of)?.unwrap_or(default).to_owned();
+            let found = nanovdb::read(&bytes, &name, &wanted, values, self.budget).map_err(fault)?;
+            // A grid of the usual name may be missing, one that is asked for may not.
+            if found.is_none() && (wanted != default || name_of == "gridname") {
+                let names = nanovdb::grid_names(&bytes, &name, self.budget).map_err(fault)?;
+                let names: Vec<String> = names.iter().map(|name| quoted(name)).collect();
+                let wrong = Diagnostic::error(format!("the file has no grid {}", quoted(&wanted)));
+                let known =
+                    if names.is_empty() { "a file with grids".to_owned() } else { names.join(" or ") };
+                return Err(params.spot_of(name_of).wrong(wrong.expected(known)));
+            }
+            Ok(found)
+        };
+        let density = grid("gridname", "density", Values::NotNegative)?;
+        let temperature = grid("temperaturename", "temperature", Values::Finite)?;
+        let NanoGrid { grid: density, world_bounds: [mut low, mut high] } = density.expect("it is there");
+        let factor = Factor::Constant(params.float_at_least_zero("Lescale", 1.0)? as f32);
+        let glow = match temperature {
+            None => {
+                params.ignore(&["temperatureoffset", "temperaturecutoff", "temperaturescale"]);
+                Glow::None
+            }
+            Some(NanoGrid { grid, world_bounds }) => {
+                (low, high) = (low.min(world_bounds[0]), high.max(world_bounds[1]));
+                let hottest = grid.greatest();
+                self.heat(params, Density::Sparse(grid), hottest, factor)?
+            }
+        };
+        let scale = params.float_at_least_zero("scale", 1.0)? as f32;
+        let coefficients = Coefficients::Scaled {
+            density: Density::Sparse(density),
+            absorption: self.coefficient(params, "sigma_a")? * scale,
+            scattering: self.coefficient(params, "sigma_s")? * scale,
+        };
+        let asymmetry = self.asymmetry(params)?;
+        let medium_from_world = world_from_medium.inverse();
+        let medium = HeterogeneousMedium::new(medium_from_world, [low, high], asymmetry, coefficients, glow);
+        Ok(Medium::Heterogeneous(Box::new(medium)))
     }
 
     /// A medium in the box from `p0` to `p1`.
@@ -205,29 +254,26 @@ impl Converter<'_, '_> {
             }
             Some(_) => self.voxels(params, "Lescale", size)?,
         };
-        let one = || Grid::new([1; 3], vec![1.0]).expect("one voxel");
+        let factor = Factor::Grid(match factor {
+            Some(factor) => factor,
+            None => Grid::new([1; 3], vec![1.0]).expect("one voxel"),
+        });
         match (radiance, temperature) {
             (Some(_), Some(_)) => {
                 let wrong = Diagnostic::error("a medium has Le and a temperature");
                 Err(params.spot_of("temperature").wrong(wrong.expected("one of both")))
             }
             (None, None) => Ok(Glow::None),
-            (Some(radiance), None) => Ok(Glow::Scaled { radiance, factor: factor.unwrap_or_else(one) }),
+            (Some(radiance), None) => Ok(Glow::Scaled { radiance, factor }),
             (None, Some(temperature)) => {
                 let hottest = temperature.greatest();
-                self.heat(params, Density::Grid(temperature), hottest, factor.unwrap_or_else(one))
+                self.heat(params, Density::Grid(temperature), hottest, factor)
             }
         }
     }
 
     /// What is emitted by temperature.
-    fn heat(
-        &mut self,
-        params: &Params,
-        temperature: Density,
-        hottest: f32,
-        factor: Grid<f32>,
-    ) -> Result<Glow> {
+    fn heat(&mut self, params: &Params, temperature: Density, hottest: f32, factor: Factor) -> Result<Glow> {
         let cutoff = params.float("temperaturecutoff", 0.0)?;
         let offset = params.float("temperatureoffset", cutoff)? as f32;
         let scale = params.float("temperaturescale", 1.0)? as f32;

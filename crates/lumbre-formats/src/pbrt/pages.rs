@@ -76,6 +76,7 @@ fn sample(page: &str, row: &Row) -> &'static str {
         (_, "indices") => "0 1 2",
         (_, "faceIndices") => "5",
         ("uniformgrid", "density" | "temperature" | "Lescale") => "0.5",
+        ("nanovdb", "filename") => r#""images/cloud.nvdb""#,
         ("homogeneous", "preset") => r#""Wholemilk""#,
         (_, "encoding") => r#""linear""#,
         (_, "screenwindow") => "-1 1 -2 2",

@@ -69,7 +69,7 @@ pub enum Glow {
         /// The colour.
         radiance: Spectrum,
         /// The factor.
-        factor: Grid<f32>,
+        factor: Factor,
     },
     /// By voxels that fill the medium's box.
     Coloured {
@@ -86,11 +86,36 @@ pub enum Glow {
         offset: f32,
         /// What the difference is multiplied by: kelvins.
         scale: f32,
-        /// A factor on the radiance, by place.
-        factor: Grid<f32>,
+        /// A factor on the radiance.
+        factor: Factor,
         /// The colours by temperature.
         colours: BlackbodyColours,
     },
+}
+
+/// A factor on what a medium emits.
+#[derive(Clone, Debug)]
+pub enum Factor {
+    /// The same everywhere.
+    Constant(f32),
+    /// By voxels that fill the medium's box.
+    Grid(Grid<f32>),
+}
+
+impl Factor {
+    fn at(&self, within: DVec3) -> f32 {
+        match self {
+            Self::Constant(factor) => *factor,
+            Self::Grid(grid) => grid.at(within),
+        }
+    }
+
+    fn memory(&self) -> usize {
+        match self {
+            Self::Constant(_) => 0,
+            Self::Grid(grid) => grid.memory(),
+        }
+    }
 }
 
 /// What a medium is like at a place.
@@ -519,7 +544,7 @@ mod tests {
             },
             Glow::Scaled {
                 radiance: Spectrum::new(1.0, 2.0, 3.0),
-                factor: Grid::new([1, 1, 1], vec![1.0]).unwrap(),
+                factor: Factor::Grid(Grid::new([1, 1, 1], vec![1.0]).unwrap()),
             },
         )
     }

@@ -206,6 +206,13 @@ impl SparseGrid {
         })
     }
 
+    /// The greatest value.
+    pub fn greatest(&self) -> f32 {
+        let mut greatest = self.background;
+        self.each(|_, most| greatest = greatest.max(most));
+        greatest
+    }
+
     /// Visits parts that may hold more than the background, by their first and last voxels, with the most that each holds.
     pub(super) fn each(&self, mut visit: impl FnMut([IVec3; 2], f32)) {
         let mut visit = |first: IVec3, side: i32, most: f32| {
