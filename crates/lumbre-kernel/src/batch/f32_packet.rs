@@ -15,6 +15,7 @@ use crate::intersect::box_ray::SlabRows;
 use crate::intersect::f32_ray::{F32Ray, within};
 use crate::intersect::watertight::{BEYOND, beyond};
 use crate::intersect::{Axes, Dispatch, Simd};
+use crate::ray32::{Hit32, Ray32};
 use crate::simd::{self, F32x16, Row, Vector};
 use crate::trace::decide::Decider;
 use crate::trace::f32_ray::SOME_HIT;
@@ -24,7 +25,6 @@ use crate::trace::{Outcome, precedes};
 use crate::tree::Corners;
 use crate::tree::node::TreeSpace;
 use crate::tree::triangle_block::TriangleBlock;
-use crate::{Hit32, Ray32};
 
 /// A ray of a packet: alone, in trees of triangles, or with the same ray in double precision, in trees of anything.
 pub(super) trait PacketRay: Sized + 'static {
@@ -112,7 +112,7 @@ impl<G: Goal, R: PacketRay> F32Bundle<'_, '_, G, R> {
             self.others.clear();
             for ray in rays {
                 let limit = ray.in_f64().map_or(f64::NEG_INFINITY, |ray| ray.t_max);
-                self.others.push(Others::new(self.decider.accel(), limit));
+                self.others.push(Others::new(self.decider.tree(), limit));
             }
         }
         let mut alive = state.alive;
@@ -489,7 +489,7 @@ impl PacketRay for Ray32 {
                 let with_this = triangle.with_bits(own);
                 rest &= !with_this;
                 let (geometry, primitive) = decider.ids(own >> 3, own & 7);
-                let id = decider.accel().geometries[geometry as usize].id;
+                let id = decider.tree().geometries[geometry as usize].id;
                 for (row, own) in ids.iter_mut().zip([id, primitive, geometry]) {
                     *row = L::F32x16::select(with_this, L::F32x16::splat(f32::from_bits(own)), *row);
                 }
@@ -556,7 +556,7 @@ impl PacketRay for PictureRay {
             }
             if state.is_among_triangles && bundle.others_started {
                 let other = bundle.others[i].nearest.take();
-                answer = Crossing::nearer(answer, other, decider.accel(), ray);
+                answer = Crossing::nearer(answer, other, decider.tree(), ray);
             }
             sink.put(first + i, Outcome::Certain(answer));
         }

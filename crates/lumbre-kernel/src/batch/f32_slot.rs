@@ -7,6 +7,7 @@ use crate::intersect::Simd;
 use crate::intersect::box_ray::Slabs;
 use crate::intersect::f32_ray::F32Ray;
 use crate::intersect::watertight;
+use crate::ray32::{Hit32, Ray32};
 use crate::simd::{F32x8, Vector};
 use crate::trace::decide::Decider;
 use crate::trace::f32_ray::{Nearest, Pass, SOME_HIT};
@@ -14,7 +15,6 @@ use crate::trace::stack::Goal;
 use crate::trace::{LaneHits, Outcome};
 use crate::tree::BLOCK;
 use crate::tree::triangle_block::TriangleBlock;
-use crate::{Hit32, Ray32};
 
 /// A ray among triangles, and the nearest that it has hit: a cache line.
 pub(super) struct F32Slot<'a, 'd, G> {

@@ -9,17 +9,18 @@ use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, Start,
 use super::sink::Sink;
 use crate::intersect::box_ray::SlabRows;
 use crate::intersect::box_ray::Slabs;
-use crate::intersect::filter_start::FilterStart;
 use crate::intersect::watertight::{
     self, BEYOND, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, FAR, HEIGHT_ERROR, Meeting, Met, Pairs,
     ROUNDINGS, SIZE_ERROR, TINY, beyond,
 };
 use crate::intersect::{Axes, Dispatch, Isa, Simd};
 use crate::simd::{self, F32x16, Row, Vector};
-use crate::trace::decide::{Candidate, Decider, heights, largest_component};
-use crate::trace::filtered::{FilteredGoal, FilteredRay};
+use crate::trace::decide::{Candidate, Decider, heights};
+use crate::trace::filtered_ray::{FilteredGoal, FilteredRay};
+use crate::trace::largest_component;
 use crate::trace::{ContextRef, Outcome, Winner};
 use crate::tree::Corners;
+use crate::tree::filter_start::FilterStart;
 use crate::tree::triangle_block::TriangleBlock;
 
 /// The rays of a packet.

@@ -438,7 +438,7 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
         let mut reference = self.decider.start.root;
         let state = &mut self.state;
         (state.alive, state.met, state.uncertain, state.work) = (state.chosen, 0, 0, 0);
-        if B::GENERAL && !self.decider.accel().infinite.is_empty() {
+        if B::GENERAL && !self.decider.tree().infinite.is_empty() {
             if !self.start_triangles::<L>() {
                 return false;
             }

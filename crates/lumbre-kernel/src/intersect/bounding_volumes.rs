@@ -1,6 +1,6 @@
 //! A ray against eight bounding volumes of shapes.
 
-use super::Simd;
+use super::operations::Simd;
 use crate::intersect::watertight::HeightRange;
 use crate::simd::{F32x8, F32x16, Row, Vector, WIDE};
 use crate::tree::BLOCK;

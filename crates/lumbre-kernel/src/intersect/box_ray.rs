@@ -2,7 +2,7 @@
 
 use lumbre_geometry::Ray;
 
-use super::Sides;
+use super::axes::Sides;
 use crate::simd::{F32x16, Row};
 use crate::tree::node::{
     LARGEST_NEAR, LARGEST_PLANE, ROUNDOFF, SMALLEST_NEAR, TINY_DIRECTION, TINY_NEAR, TreeSpace, slop,

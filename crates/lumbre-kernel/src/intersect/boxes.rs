@@ -3,7 +3,8 @@
 use std::hint::select_unpredictable;
 use std::mem::MaybeUninit;
 
-use super::{Room, Sides, Slots};
+use super::axes::Sides;
+use super::slots::{Room, Slots};
 use crate::intersect::box_ray::Slabs;
 use crate::intersect::box_ray::{Frustum, SlabRows};
 use crate::simd::vector::stack_entry;

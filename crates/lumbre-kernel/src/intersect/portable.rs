@@ -4,19 +4,21 @@ use bytemuck::Zeroable;
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
-use super::{Axes, CornersRoom, Crossings, Isa, Set, Sides, Simd};
-use crate::Ray32;
+use super::axes::{Axes, Sides};
+use super::isa::{Isa, Set};
+use super::operations::{CornersRoom, Crossings, Simd};
 use crate::intersect::box_ray::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs};
 use crate::intersect::f32_ray::F32Ray;
-use crate::intersect::filter_start::FilterStart;
 use crate::intersect::watertight::{
     BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, EdgeTest, HEIGHT_ERROR, HeightRange, Inside,
     SIZE_ERROR, Shear, TINY, edge_test,
 };
+use crate::ray32::Ray32;
 use crate::simd::vector::{Portable8, Portable16};
 use crate::simd::{F32x8, Row, Vector, WIDE};
 use crate::tree::BLOCK;
 use crate::tree::Corners;
+use crate::tree::filter_start::FilterStart;
 use crate::tree::node::TreeSpace;
 use crate::tree::triangle_block::{TriangleBlock, shared_row};
 

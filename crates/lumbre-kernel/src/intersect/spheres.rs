@@ -1,6 +1,6 @@
 //! A ray against eight spheres: see [`SphereRay`].
 
-use super::Simd;
+use super::operations::Simd;
 use crate::simd::{F32x8, Vector};
 use crate::tree::sphere_block::{SphereBlock, SphereRay};
 

@@ -7,58 +7,22 @@ use bytemuck::Zeroable;
 use lumbre_geometry::Ray;
 use lumbre_math::{DAffine3, DVec3, Transform};
 
-use super::{Axes, CornersRoom, Crossings, Dispatch, Isa, RayQuery, Set, Sides, Simd};
+use super::axes::{Axes, Sides};
+use super::isa::{Isa, Set};
+use super::operations::{CornersRoom, Crossings, Simd, corners_of_two};
 use crate::intersect::box_ray::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs};
 use crate::intersect::f32_ray::F32Ray;
-use crate::intersect::filter_start::FilterStart;
 use crate::intersect::watertight::{
     BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, EdgeTest, FAR, HEIGHT_ERROR, HeightRange,
     Inside, ROUNDINGS, SIZE_ERROR, Shear, TINY,
 };
+use crate::ray32::Ray32;
 use crate::simd::{self, F32x16, LastEight, Row, Vector, WIDE, vector};
 use crate::tree::BLOCK;
 use crate::tree::Corners;
+use crate::tree::filter_start::FilterStart;
 use crate::tree::node::{LARGEST_NEAR, SMALLEST_NEAR, TINY_NEAR, TreeSpace};
 use crate::tree::triangle_block::{SHARED_NUMBERS, TriangleBlock, shared_row};
-use crate::{Accel, Ray32};
-
-/// Dispatched work with x86 vectors: see [`CompilationUnit`](super::CompilationUnit).
-pub(super) trait OnX86 {
-    /// # Safety
-    /// The machine has these features.
-    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-    unsafe fn run_avx2<T: Dispatch>(task: T) -> T::Output {
-        task.run::<X86<false>>()
-    }
-
-    /// # Safety
-    /// The machine has these features.
-    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512cd,avx512dq,avx512vl")]
-    unsafe fn run_avx512<T: Dispatch>(task: T) -> T::Output {
-        task.run::<X86<true>>()
-    }
-}
-
-impl<H> OnX86 for H {}
-
-/// Ray queries with x86 vectors.
-pub(super) trait AskOnX86: RayQuery {
-    /// # Safety
-    /// The machine has these features.
-    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-    unsafe fn ask_avx2(accel: &Accel, ray: &Self::Ray) -> Self::Answer {
-        Self::ask::<X86<false>>(accel, ray)
-    }
-
-    /// # Safety
-    /// The machine has these features.
-    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512cd,avx512dq,avx512vl")]
-    unsafe fn ask_avx512(accel: &Accel, ray: &Self::Ray) -> Self::Answer {
-        Self::ask::<X86<true>>(accel, ray)
-    }
-}
-
-impl<Q: RayQuery> AskOnX86 for Q {}
 
 /// Of the two levels: only what is named after AVX-512 above instantiates `X86<true>`, and only what is named after AVX2 `X86<false>`.
 /// That is why the instructions below are there.
@@ -220,7 +184,7 @@ impl<const AVX512: bool> X86<AVX512> {
     {
         let first = Self::eights(Self::sheared_corners(blocks[0], rays[0]));
         let second = Self::eights(Self::sheared_corners(blocks[1], rays[1]));
-        super::corners_of_two(&first, &second)
+        corners_of_two(&first, &second)
     }
 
     /// Eight vertices of these rows from the `first` on.

@@ -12,13 +12,13 @@ use super::scenes::{
 };
 use crate::batch;
 use crate::batch::packet::PACKET;
-use crate::intersect::f32_ray::Precise;
-use crate::intersect::filter_start::FilterStart;
 use crate::intersect::{Isa, Portable, Simd, start_f32_by_four_at};
 use crate::simd::{F32x8, Vector};
+use crate::tree::filter_start::FilterStart;
+use crate::tree::filter_start::Precise;
 use crate::tree::node::Node;
 use crate::tree::triangle_block::Line;
-use crate::{Accel, BuildOptions, Geometry, GeometryKind, Hit, Hit32, Instance, Preset, Ray32, TriangleMesh};
+use crate::{Accel, BuildOptions, Geometry, GeometryKind, Hit, Hit32, Preset, Ray32, TriangleMesh};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 
@@ -110,11 +110,11 @@ fn has_one_sign(edges: [f64; 3]) -> bool {
 
 /// What a tree of nothing but meshes answers, by a loop over all triangles where the ray comes from nearby; and whether it does.
 fn by_reference(accel: &Accel, ray: &Ray32) -> (Option<Hit32>, bool) {
-    let start = accel.single.as_ref().expect("made for this");
+    let start = accel.tree.single.as_ref().expect("made for this");
     assert!(start.only_triangles);
     let Some(plain) = PlainRay::new(start, ray) else { return (widened(accel, ray), false) };
     let mut nearest: Option<(Hit32, bool)> = None;
-    for (geometry, Geometry { id, kind }) in accel.geometries.iter().enumerate() {
+    for (geometry, Geometry { id, kind }) in accel.tree.geometries.iter().enumerate() {
         let GeometryKind::Mesh(mesh) = kind else { unreachable!("nothing but meshes") };
         for (primitive, triangle) in mesh.indices.iter().enumerate() {
             let corners = triangle.map(|vertex| mesh.positions[vertex as usize]);
@@ -177,7 +177,7 @@ fn in_batch(accel: &Accel, isa: Isa, rays: &[Ray32], flies: bool) -> (Vec<Option
     // What would be wrong everywhere.
     let mut met: Vec<bool> = rays.iter().map(|ray| !accel.any_f32(ray)).collect();
     if flies {
-        batch::shims::f32(isa, accel, rays, &mut hits, &mut met);
+        batch::shims::f32(isa, &accel.tree, rays, &mut hits, &mut met);
     } else {
         accel.closest_batch_f32_at(isa, rays, &mut hits);
         accel.any_batch_f32_at(isa, rays, &mut met);
@@ -462,7 +462,7 @@ fn four_rays_start_together_as_each_does_alone() {
         for (_, meshes) in meshes(&mut random) {
             let meshes: Vec<_> = meshes.iter().map(|mesh| placed(mesh, size, origin)).collect();
             let accel = build(kinds(&meshes));
-            let Some(start) = &accel.single else { continue };
+            let Some(start) = &accel.tree.single else { continue };
             let mut rays: Vec<_> = (0..100).map(|_| ray(&mut random, &meshes, size)).collect();
             let odd = odd_ones(rays[0]);
             rays.extend(odd);
@@ -584,7 +584,7 @@ fn in_a_tree_that_caches_do_not_hold_batches_answer_as_single_rays_do() {
     let meshes = [mesh, soup.clone(), soup];
     let geometries = kinds(&meshes).into_iter().zip(5..).map(|(kind, id)| Geometry { id, kind }).collect();
     let accel = Accel::build(geometries, &BuildOptions { preset: Preset::Fast }).unwrap();
-    let tree = &accel.tree;
+    let tree = &accel.tree.packed;
     let bytes = size_of_val::<[Node]>(&tree.nodes) + size_of_val::<[Line]>(&tree.blocks);
     assert!(bytes >= 1 << 24, "{bytes} bytes are not far");
 
@@ -786,16 +786,10 @@ fn trees_of_more_than_meshes_answer_as_double_precision_does_rounded() {
         let mut random = Random(708);
         let ball = TriangleMesh { origin: CENTER, ..icosphere(2, DVec3::ZERO, 2.0) };
         let within = Arc::new(build(kinds(std::slice::from_ref(&ball))));
-        let twice = Arc::new(build(vec![GeometryKind::Instance(Instance {
-            accel: within.clone(),
-            world_from_object: Transform::translate(DVec3::new(0.5, 0.25, -0.5)).into(),
-        })]));
-        let instance = |accel: &Arc<Accel>| {
-            GeometryKind::Instance(Instance {
-                accel: accel.clone(),
-                world_from_object: Transform::IDENTITY.into(),
-            })
-        };
+        let twice = Arc::new(build(vec![GeometryKind::Instance(
+            within.instance(Transform::translate(DVec3::new(0.5, 0.25, -0.5))),
+        )]));
+        let instance = |accel: &Arc<Accel>| GeometryKind::Instance(accel.instance(Transform::IDENTITY));
         let cloud = scenes::cloud(&mut random, 60, DVec3::ZERO, CENTER, 3.0);
         let trees = [
             mixture(&mut random, CENTER, 3.0, 2, true),
@@ -823,7 +817,7 @@ fn trees_of_more_than_meshes_answer_as_double_precision_does_rounded() {
             assert!(hits > rays.len() / 8, "{number}: {hits} of {}", rays.len());
             let instances = expected.iter().flatten().filter(|hit| hit.instance != Hit32::NO_INSTANCE);
             let has_instances =
-                accel.geometries.iter().any(|one| matches!(one.kind, GeometryKind::Instance(_)));
+                accel.tree.geometries.iter().any(|one| matches!(one.kind, GeometryKind::Instance(_)));
             assert_eq!(instances.count() > 20, has_instances, "{number}");
         }
         // The outermost has the name.
@@ -942,7 +936,7 @@ fn a_tree_that_was_moved_answers_as_one_that_is_built_anew() {
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("tree.lumbre");
             accel.save(&path).unwrap();
-            let mapped = Accel::map(&path, accel.geometries.clone()).unwrap();
+            let mapped = Accel::map(&path, accel.tree.geometries.clone()).unwrap();
             check(&mapped, &rays, &expected, &[rays.len()]);
         }
     });
@@ -1027,9 +1021,9 @@ fn the_longest_side_of_all_triangles_is_known() {
         meshes.iter().enumerate().map(mesh).collect()
     };
     let mut accel = Accel::build(geometries(&meshes), &BuildOptions::default()).unwrap();
-    assert_eq!(accel.summary.sizes.longest_side, longest(&meshes));
+    assert_eq!(accel.tree.summary.sizes.longest_side, longest(&meshes));
     let again = Accel::from_bytes(&accel.to_bytes(), geometries(&meshes)).unwrap();
-    assert_eq!(again.summary.sizes.longest_side, longest(&meshes));
+    assert_eq!(again.tree.summary.sizes.longest_side, longest(&meshes));
     accel.refit(geometries(&small)).unwrap();
-    assert_eq!(accel.summary.sizes.longest_side, longest(&small));
+    assert_eq!(accel.tree.summary.sizes.longest_side, longest(&small));
 }

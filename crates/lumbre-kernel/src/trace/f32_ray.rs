@@ -39,19 +39,22 @@ use bytemuck::Zeroable;
 
 use super::cursor::NodeCursor;
 use super::decide::Decider;
+use super::filtered::Queries;
 use super::leaves::nearest_of;
 use super::stack::{AnyHit, ClosestHit, Goal, Stack};
 use super::{LaneHits, Outcome, precedes};
+use crate::hit::Hit;
 use crate::intersect::box_ray::Slabs;
-use crate::intersect::f32_ray::{F32Ray, Precise, within};
-use crate::intersect::filter_start::FilterStart;
+use crate::intersect::f32_ray::{F32Ray, within};
 use crate::intersect::watertight;
 use crate::intersect::{Axes, DispatchedQuery, Isa, RayQuery, Simd};
+use crate::ray32::{Hit32, Ray32};
 use crate::simd::{self, F32x8, F32x16, Vector};
 use crate::tree::BLOCK;
+use crate::tree::Tree;
+use crate::tree::filter_start::Precise;
 use crate::tree::node::tag;
 use crate::tree::triangle_block::TriangleBlock;
-use crate::{Accel, Hit, Hit32, Ray32};
 
 /// How a line passes the triangles of a block, as it is seen at first.
 pub(crate) struct Lines<E> {
@@ -264,7 +267,7 @@ impl Nearest {
         Some(Hit32 {
             t,
             local: [v / det, w / det],
-            id: decider.accel().geometries[geometry as usize].id,
+            id: decider.tree().geometries[geometry as usize].id,
             primitive,
             geometry,
             instance: Hit32::NO_INSTANCE,
@@ -457,6 +460,18 @@ pub(crate) fn rounded(hit: &Hit) -> Hit32 {
     }
 }
 
+/// The closest hit of a ray in single precision, found in double precision and rounded.
+#[inline(never)]
+pub(crate) fn closest_widened(isa: Isa, tree: &Tree, ray: &Ray32) -> Option<Hit32> {
+    Queries::of(isa, tree).closest.ask(tree, &ray.to_f64()).as_ref().map(rounded)
+}
+
+/// Whether a ray in single precision hits anything, found in double precision.
+#[inline(never)]
+pub(crate) fn any_widened(isa: Isa, tree: &Tree, ray: &Ray32) -> bool {
+    Queries::of(isa, tree).any.ask(tree, &ray.to_f64())
+}
+
 /// [`Accel::closest_f32`] and [`Accel::any_f32`] in trees of triangles, by function pointers for the instruction set.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct F32Queries {
@@ -466,8 +481,8 @@ pub(crate) struct F32Queries {
 
 impl F32Queries {
     /// `None` for a tree of anything else.
-    pub(crate) fn new(isa: Isa, start: Option<&FilterStart>) -> Option<Self> {
-        let start = start?;
+    pub(crate) fn of(isa: Isa, tree: &Tree) -> Option<Self> {
+        let start = tree.single.as_ref()?;
         start
             .only_triangles
             .then(|| Self { closest: isa.dispatched::<ClosestHit>(), any: isa.dispatched::<AnyHit>() })
@@ -479,11 +494,11 @@ impl RayQuery for ClosestHit {
     type Answer = Option<Hit32>;
 
     #[inline(always)]
-    fn ask<L: Simd>(accel: &Accel, ray: &Ray32) -> Option<Hit32> {
-        let Some(start) = &accel.single else { return accel.closest_widened(ray) };
-        match traverse::<Self, L>(&Decider::new(accel, start), &L::read_f32(ray)) {
+    fn ask<L: Simd>(tree: &Tree, ray: &Ray32) -> Option<Hit32> {
+        let Some(start) = &tree.single else { return closest_widened(L::isa(), tree, ray) };
+        match traverse::<Self, L>(&Decider::new(tree, start), &L::read_f32(ray)) {
             Outcome::Certain(hit) => hit,
-            Outcome::Uncertain => accel.closest_widened(ray),
+            Outcome::Uncertain => closest_widened(L::isa(), tree, ray),
         }
     }
 }
@@ -493,11 +508,11 @@ impl RayQuery for AnyHit {
     type Answer = bool;
 
     #[inline(always)]
-    fn ask<L: Simd>(accel: &Accel, ray: &Ray32) -> bool {
-        let Some(start) = &accel.single else { return accel.any_widened(ray) };
-        match traverse::<Self, L>(&Decider::new(accel, start), &L::read_f32(ray)) {
+    fn ask<L: Simd>(tree: &Tree, ray: &Ray32) -> bool {
+        let Some(start) = &tree.single else { return any_widened(L::isa(), tree, ray) };
+        match traverse::<Self, L>(&Decider::new(tree, start), &L::read_f32(ray)) {
             Outcome::Certain(hit) => hit.is_some(),
-            Outcome::Uncertain => accel.any_widened(ray),
+            Outcome::Uncertain => any_widened(L::isa(), tree, ray),
         }
     }
 }
