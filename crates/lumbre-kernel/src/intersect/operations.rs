@@ -10,7 +10,7 @@ use super::f32_ray::F32Ray;
 use super::isa::Isa;
 use super::watertight::{BlockRay, EdgeTest, Inside, Shear};
 use crate::ray32::Ray32;
-use crate::simd::{F32x8, F32x16, Row, WIDE, three_of_two};
+use crate::simd::{F32x8, F32x16, Row, WIDE};
 use crate::tree::filter_start::FilterStart;
 use crate::tree::node::TreeSpace;
 use crate::tree::triangle_block::TriangleBlock;
@@ -22,14 +22,8 @@ pub(crate) trait Simd {
     type F32x8: F32x8;
     /// How a line passes the edges of eight triangles.
     type Edges: Copy + Zeroable;
-    /// The same of two lines, each with its block.
-    type EdgesByTwo: Copy + Zeroable;
     /// Sixteen numbers, alike.
-    type F32x16: F32x16<Half = Self::F32x8>;
-    /// Whether two rays, each at a block of its own, are better met together than one after the other.
-    const INTERSECTS_BY_TWO: bool = false;
-    /// Whether rays in single precision are better started by four than one after the other.
-    const STARTS_BY_FOUR: bool = false;
+    type F32x16: F32x16;
     /// Whether rays go on together for a while where that no longer pays, for what they have done: see `packet`.
     const GOES_ON_TOGETHER: bool = true;
 
@@ -77,27 +71,9 @@ pub(crate) trait Simd {
     /// The same ray for triangles.
     fn start_f32_blocks(start: &FilterStart, ray: &Ray32, slabs: &Slabs) -> F32Ray;
 
-    /// Both of four rays, and a bit for each that comes from nearby and is sound; what is made of the others means nothing.
-    #[inline(always)]
-    fn start_f32_by_four(
-        start: &FilterStart,
-        rays: [&Ray32; 4],
-        places: [(&mut Slabs, &mut F32Ray); 4],
-    ) -> u32 {
-        start_f32_one_by_one::<Self>(start, rays, places)
-    }
-
     /// The corners of the triangles of a block in the ray's sheared space, `[x, y or z][corner]`, all with the sign turned; what lanes
     /// without a triangle have means nothing. No product is fused with a sum: it is the same on every machine.
     fn f32_corners(block: &TriangleBlock, ray: &F32Ray) -> [[Self::F32x8; 3]; 3];
-
-    /// The same of two blocks, each by its ray: those of the first, and those of the second.
-    #[inline(always)]
-    fn f32_corners_by_two(blocks: [&TriangleBlock; 2], rays: [&F32Ray; 2]) -> [[Self::F32x16; 3]; 3] {
-        let first = Self::f32_corners(blocks[0], rays[0]);
-        let second = Self::f32_corners(blocks[1], rays[1]);
-        corners_of_two(&first, &second)
-    }
 
     /// The numbers of rays in single precision, side by side: origin, start, direction, end.
     fn f32_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]);
@@ -108,15 +84,6 @@ pub(crate) trait Simd {
     /// A bit for each triangle that the line of the ray may meet, among them all that it does, and what [`Simd::place_crossings`]
     /// wants to know: see [`BlockRay`].
     fn intersect_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges);
-
-    /// The same of two blocks, each by its ray: those of the first, and those of the second.
-    fn intersect_triangles_by_two(
-        blocks: [&TriangleBlock; 2],
-        rays: [&BlockRay; 2],
-    ) -> (u32, Self::EdgesByTwo);
-
-    /// Of one of the two: `which` is 0 or 1.
-    fn edges_of(both: &Self::EdgesByTwo, which: usize) -> Self::Edges;
 
     /// For each number of a list, a bit for each place before it that has the same.
     fn equals_before(list: &[u32; 3 * BLOCK]) -> [u32; 3 * BLOCK];
@@ -136,34 +103,6 @@ pub(crate) trait Simd {
     /// How a ray passes the triangle in a lane, in double precision, and what its crossing inside is made of. `origin` has the order
     /// of the shear's axes.
     fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (EdgeTest, Inside);
-}
-
-/// The corners of the triangles of a block, and those of another.
-#[inline(always)]
-pub(super) fn corners_of_two<W: F32x16>(
-    first: &[[W::Half; 3]; 3],
-    second: &[[W::Half; 3]; 3],
-) -> [[W; 3]; 3] {
-    let [x, y, z] = first;
-    [three_of_two(x, &second[0]), three_of_two(y, &second[1]), three_of_two(z, &second[2])]
-}
-
-/// [`Simd::start_f32_by_four`], one ray after the other.
-#[inline(always)]
-pub(super) fn start_f32_one_by_one<L: Simd + ?Sized>(
-    start: &FilterStart,
-    rays: [&Ray32; 4],
-    places: [(&mut Slabs, &mut F32Ray); 4],
-) -> u32 {
-    let mut fit = 0;
-    for (i, (ray, (slabs, f32_ray))) in rays.into_iter().zip(places).enumerate() {
-        if let Some(started) = L::start_f32(start, ray) {
-            *f32_ray = L::start_f32_blocks(start, ray, &started);
-            *slabs = started;
-            fit |= 1 << i;
-        }
-    }
-    fit
 }
 
 /// Room for corners.

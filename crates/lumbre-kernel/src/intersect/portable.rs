@@ -59,7 +59,6 @@ fn local(start: &FilterStart, ray: &Ray32) -> [f32; 4] {
 impl Simd for Portable {
     type F32x8 = Portable8;
     type Edges = Edges;
-    type EdgesByTwo = [Edges; 2];
     type F32x16 = Portable16;
 
     #[inline]
@@ -273,18 +272,6 @@ impl Simd for Portable {
             }
         }
         corners
-    }
-
-    #[inline]
-    fn intersect_triangles_by_two(blocks: [&TriangleBlock; 2], rays: [&BlockRay; 2]) -> (u32, [Edges; 2]) {
-        let (first, of_first) = Self::intersect_triangles(blocks[0], rays[0]);
-        let (second, of_second) = Self::intersect_triangles(blocks[1], rays[1]);
-        (first | second << BLOCK, [of_first, of_second])
-    }
-
-    #[inline]
-    fn edges_of(both: &[Edges; 2], which: usize) -> Edges {
-        both[which % 2]
     }
 
     #[inline]

@@ -9,13 +9,12 @@ use super::boxes::{
     put_and_take_by_distance,
 };
 use super::dispatch::Dispatch;
-use super::f32_ray::F32Ray;
 use super::isa::Isa;
-use super::operations::{CornersRoom, Simd, start_f32_one_by_one};
+use super::operations::{CornersRoom, Simd};
 use super::slots::Slots;
 use super::watertight::BlockRay;
 use crate::ray32::Ray32;
-use crate::simd::{F32x8, F32x16, Row, Vector, WIDE};
+use crate::simd::{F32x16, Row, Vector, WIDE};
 use crate::tree::filter_start::FilterStart;
 use crate::tree::node::{Node, WIDTH};
 use crate::tree::triangle_block::TriangleBlock;
@@ -47,34 +46,6 @@ pub(crate) fn read_at(isa: Isa, ray: &Ray, f32_ray: &Ray32) -> (Ray, Ray32) {
         }
     }
     isa.run(Reading(ray, f32_ray))
-}
-
-/// What [`Simd::start_f32_by_four`] gives at an instruction set, and what it gives one by one, for tests.
-pub(crate) fn start_f32_by_four_at(
-    isa: Isa,
-    start: &FilterStart,
-    rays: [&Ray32; 4],
-) -> [[Option<(Slabs, F32Ray)>; 4]; 2] {
-    struct Starting<'a>(&'a FilterStart, [&'a Ray32; 4]);
-    impl Dispatch for Starting<'_> {
-        type Output = [[Option<(Slabs, F32Ray)>; 4]; 2];
-        #[inline(always)]
-        fn run<L: Simd>(self) -> Self::Output {
-            let Self(start, rays) = self;
-            [true, false].map(|is_together| {
-                let mut starts = [(Slabs::ZERO, F32Ray::of_none()); 4];
-                let [a, b, c, d] = &mut starts;
-                let places = [a, b, c, d].map(|(slabs, f32_ray)| (slabs, f32_ray));
-                let fit = if is_together {
-                    L::start_f32_by_four(start, rays, places)
-                } else {
-                    start_f32_one_by_one::<L>(start, rays, places)
-                };
-                std::array::from_fn(|i| (fit >> i & 1 != 0).then_some(starts[i]))
-            })
-        }
-    }
-    isa.run(Starting(start, rays))
 }
 
 /// What [`Simd::start_placed`] gives at an instruction set, for tests.
@@ -201,75 +172,6 @@ pub(crate) fn intersect_triangles_at(
         }
     }
     isa.run(Triangles(block, ray))
-}
-
-/// What a ray is told of a block, bit by bit, of lanes with a triangle: which it may meet, those in its range, those that it surely meets,
-/// where, and the corners as single precision has them.
-#[derive(Debug, PartialEq)]
-pub(crate) struct Told {
-    masks: [u32; 3],
-    heights: [[u32; BLOCK]; 2],
-    corners: [[[u32; BLOCK]; 3]; 3],
-}
-
-impl Told {
-    #[inline(always)]
-    fn of<L: Simd>(
-        (block, ray): (&TriangleBlock, &BlockRay),
-        (mask, edges): (u32, L::Edges),
-        corners: [[L::F32x8; 3]; 3],
-    ) -> Self {
-        let taken = block.taken();
-        let crossings = L::place_crossings(&edges, ray);
-        let mut told = Self {
-            masks: [mask, mask & crossings.in_range, mask & crossings.sure],
-            heights: [[0; BLOCK]; 2],
-            corners: [[[0; BLOCK]; 3]; 3],
-        };
-        for lane in (0..BLOCK).filter(|lane| taken >> lane & 1 != 0) {
-            let (from, to) = crossings.between(lane);
-            (told.heights[0][lane], told.heights[1][lane]) = (from.to_bits(), to.to_bits());
-            for (told, corners) in told.corners.iter_mut().zip(&corners) {
-                for (told, corner) in told.iter_mut().zip(corners) {
-                    told[lane] = corner.lane(lane).to_bits();
-                }
-            }
-        }
-        told
-    }
-}
-
-/// What two rays are told of two blocks at an instruction set, each of its own: by both together, and by each alone; for tests.
-pub(crate) fn told_at(
-    isa: Isa,
-    blocks: [&TriangleBlock; 2],
-    rays: [&BlockRay; 2],
-    f32_ray: [&F32Ray; 2],
-) -> [[Told; 2]; 2] {
-    struct Telling<'a>([&'a TriangleBlock; 2], [&'a BlockRay; 2], [&'a F32Ray; 2]);
-    impl Dispatch for Telling<'_> {
-        type Output = [[Told; 2]; 2];
-        #[inline(always)]
-        fn run<L: Simd>(self) -> Self::Output {
-            let Self(blocks, rays, f32_ray) = self;
-            let (mask, edges) = L::intersect_triangles_by_two(blocks, rays);
-            let [x, y, z] = L::f32_corners_by_two(blocks, f32_ray);
-            let one =
-                |row: &[L::F32x16; 3], which| [row[0].half(which), row[1].half(which), row[2].half(which)];
-            let together = |which: usize| {
-                let of_one = (mask >> (BLOCK * which) & L::F32x8::ALL, L::edges_of(&edges, which));
-                let corners = [one(&x, which), one(&y, which), one(&z, which)];
-                Told::of::<L>((blocks[which], rays[which]), of_one, corners)
-            };
-            let alone = |which: usize| {
-                let (block, ray) = (blocks[which], rays[which]);
-                let corners = L::f32_corners(block, f32_ray[which]);
-                Told::of::<L>((block, ray), L::intersect_triangles(block, ray), corners)
-            };
-            [[together(0), together(1)], [alone(0), alone(1)]]
-        }
-    }
-    isa.run(Telling(blocks, rays, f32_ray))
 }
 
 /// [`Simd::corners`] at an instruction set, for tests.

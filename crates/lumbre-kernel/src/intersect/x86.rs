@@ -9,7 +9,7 @@ use lumbre_math::{DAffine3, DVec3, Transform};
 
 use super::axes::{Axes, Sides};
 use super::isa::{Isa, Set};
-use super::operations::{CornersRoom, Crossings, Simd, corners_of_two};
+use super::operations::{CornersRoom, Crossings, Simd};
 use crate::intersect::box_ray::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs};
 use crate::intersect::f32_ray::F32Ray;
 use crate::intersect::watertight::{
@@ -17,12 +17,12 @@ use crate::intersect::watertight::{
     Inside, ROUNDINGS, SIZE_ERROR, Shear, TINY,
 };
 use crate::ray32::Ray32;
-use crate::simd::{self, F32x16, LastEight, Row, Vector, WIDE, vector};
+use crate::simd::{self, F32x16, Row, Vector, WIDE, vector};
 use crate::tree::BLOCK;
 use crate::tree::Corners;
 use crate::tree::filter_start::FilterStart;
 use crate::tree::node::{LARGEST_NEAR, SMALLEST_NEAR, TINY_NEAR, TreeSpace};
-use crate::tree::triangle_block::{SHARED_NUMBERS, TriangleBlock, shared_row};
+use crate::tree::triangle_block::{TriangleBlock, shared_row};
 
 /// Of the two levels: only what is named after AVX-512 above instantiates `X86<true>`, and only what is named after AVX2 `X86<false>`.
 /// That is why the instructions below are there.
@@ -174,17 +174,6 @@ impl<const AVX512: bool> X86<AVX512> {
         let of = vector::Eight256::<AVX512>::new;
         // SAFETY: see `X86`.
         unsafe { [[of(a), of(b), of(c)], [of(d), of(e), of(f)], [of(g), of(h), of(i)]] }
-    }
-
-    /// [`X86::sheared_corners`] of two blocks, each by its ray, one block after the other: those of the first, and those of the second.
-    #[inline(always)]
-    fn corners_of_each<S: Shears, W>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[W; 3]; 3]
-    where
-        W: F32x16<Half = vector::Eight256<AVX512>>,
-    {
-        let first = Self::eights(Self::sheared_corners(blocks[0], rays[0]));
-        let second = Self::eights(Self::sheared_corners(blocks[1], rays[1]));
-        corners_of_two(&first, &second)
     }
 
     /// Eight vertices of these rows from the `first` on.
@@ -470,139 +459,6 @@ impl<const AVX512: bool> X86<AVX512> {
         unsafe { (_mm_loadu_ps(numbers), _mm_loadu_ps(numbers.add(4))) }
     }
 
-    /// Four numbers from a place on, the same of others behind them.
-    ///
-    /// # Safety
-    /// There are as many at each, and it is of AVX-512.
-    #[inline(always)]
-    unsafe fn fours(numbers: [*const f32; 4], place: usize) -> __m512 {
-        let [a, b, c, d] = numbers;
-        // SAFETY: that is what is asked for.
-        unsafe {
-            let fours = _mm512_castps128_ps512(_mm_loadu_ps(a.add(place)));
-            let fours = _mm512_insertf32x4::<1>(fours, _mm_loadu_ps(b.add(place)));
-            let fours = _mm512_insertf32x4::<2>(fours, _mm_loadu_ps(c.add(place)));
-            _mm512_insertf32x4::<3>(fours, _mm_loadu_ps(d.add(place)))
-        }
-    }
-
-    /// The same four everywhere.
-    ///
-    /// # Safety
-    /// It is of AVX-512.
-    #[inline(always)]
-    unsafe fn four_times(numbers: &[f32; 4]) -> __m512 {
-        // SAFETY: that is what is asked for; the load is of an array of four.
-        unsafe { _mm512_broadcast_f32x4(_mm_loadu_ps(numbers.as_ptr())) }
-    }
-
-    /// Its numbers by four.
-    ///
-    /// # Safety
-    /// It is of AVX-512.
-    #[inline(always)]
-    unsafe fn by_four(v: __m512) -> [[f32; 4]; 4] {
-        let mut four = [[0.0; 4]; 4];
-        // SAFETY: that is what is asked for; the store is of sixteen f32.
-        unsafe { _mm512_storeu_ps(four.as_mut_ptr().cast(), v) };
-        four
-    }
-
-    /// [`Simd::start_f32_by_four`] of two.
-    #[inline(always)]
-    fn start_f32_by_two(
-        start: &FilterStart,
-        rays: [&Ray32; 2],
-        places: [(&mut Slabs, &mut F32Ray); 2],
-    ) -> u32 {
-        /// The last of each four.
-        const LAST: i32 = 0x88;
-        // As `start_f32` and `start_f32_blocks`, four numbers of the second ray behind those of the first.
-        // SAFETY: see `X86`. The loads are of arrays of four.
-        unsafe {
-            let ((first_origin, first_direction), (second_origin, second_direction)) =
-                (Self::f32_numbers(rays[0]), Self::f32_numbers(rays[1]));
-            let origin = _mm256_set_m128(second_origin, first_origin);
-            let direction = _mm256_set_m128(second_direction, first_direction);
-            let local = if let Some(mesh_origin) = &start.single_mesh_origin {
-                _mm256_sub_ps(origin, Self::twice(mesh_origin))
-            } else {
-                _mm256_set_m128(Self::local(start, second_origin), Self::local(start, first_origin))
-            };
-            let units_per_space = _mm256_set1_ps(start.units_per_space);
-            let from = _mm256_fmsub_ps(local, units_per_space, Self::twice(&start.shift));
-            let sign = _mm256_set1_ps(-0.0);
-            let (distance, length) = (_mm256_andnot_ps(sign, from), _mm256_andnot_ps(sign, direction));
-            let size = _mm256_blend_ps::<LAST>(length, origin);
-            let largest = _mm256_blend_ps::<LAST>(Self::twice(&start.longest), direction);
-            let fits = _mm256_and_ps(
-                _mm256_cmp_ps::<_CMP_LE_OQ>(distance, Self::twice(&start.farthest)),
-                _mm256_cmp_ps::<_CMP_LE_OQ>(size, largest),
-            );
-            let fits = _mm256_movemask_ps(fits) & !(_mm256_movemask_ps(origin) & LAST);
-            let is_long = _mm256_cmp_ps::<_CMP_GE_OQ>(length, _mm256_set1_ps(start.shortest));
-            let is_long = _mm256_movemask_ps(is_long) & !LAST;
-            let tiny_or_more = _mm256_max_ps(length, _mm256_set1_ps(start.tiny));
-            let size = _mm256_div_ps(_mm256_set1_ps(start.space_per_unit), tiny_or_more);
-            let inverse = _mm256_or_ps(size, _mm256_and_ps(direction, sign));
-            let per_distance = _mm256_set1_ps(TreeSpace::F32_MARGIN_PER_DISTANCE);
-            let margin = _mm256_fmadd_ps(distance, per_distance, _mm256_set1_ps(start.f32_margin));
-            let margin = _mm256_mul_ps(size, margin);
-            let first = _mm256_mul_ps(origin, _mm256_set1_ps(START_FACTOR));
-            let last = _mm256_mul_ps(direction, _mm256_set1_ps(END_FACTOR));
-            let last = _mm256_add_ps(last, _mm256_set1_ps(LITTLE as f32));
-            let near = _mm256_blend_ps::<LAST>(_mm256_fnmsub_ps(from, inverse, margin), first);
-            let far = _mm256_blend_ps::<LAST>(_mm256_fnmadd_ps(from, inverse, margin), last);
-            let signs = _mm256_movemask_ps(direction) as u32;
-            // x, y, x and y, z, z.
-            let sizes = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GE_OQ>(
-                _mm256_shuffle_ps::<0b00_00_01_00>(length, length),
-                _mm256_shuffle_ps::<0b10_10_10_01>(length, length),
-            )) as u32;
-            let axes = [Axes::by_bits(signs, sizes), Axes::by_bits(signs >> 4, sizes >> 4)];
-            let order_of = |axes: &Axes| _mm_loadu_si128(axes.order.as_ptr().cast());
-            let order = _mm256_set_m128i(order_of(axes[1]), order_of(axes[0]));
-            let of_last = _mm256_permutevar_ps(inverse, _mm256_shuffle_epi32::<0b10_10_10_10>(order));
-            let of_last = _mm256_mul_ps(of_last, units_per_space);
-            let shear = _mm256_blend_ps::<LAST>(_mm256_mul_ps(direction, of_last), direction);
-            let (shear, local) = (_mm256_permutevar_ps(shear, order), _mm256_permutevar_ps(local, order));
-            let minus_inverse = _mm256_xor_ps(of_last, sign);
-            let (inverse, near, far) = (Self::by_two(inverse), Self::by_two(near), Self::by_two(far));
-            let (shear, local, minus_inverse) =
-                (Self::by_two(shear), Self::by_two(local), Self::by_two(minus_inverse));
-            let mut fit = 0;
-            for (i, (slabs, f32_ray)) in places.into_iter().enumerate() {
-                slabs.inverse = inverse[i];
-                slabs.near_offset = near[i];
-                slabs.far_offset = far[i];
-                slabs.sides = Sides::new(signs >> (4 * i));
-                f32_ray.axes = axes[i];
-                f32_ray.origin = local[i];
-                f32_ray.shear = shear[i];
-                f32_ray.minus_inverse = minus_inverse[i][0];
-                let is_fit = fits >> (4 * i) & 0b1111 == 0b1111 && is_long >> (4 * i) & 0b111 != 0;
-                fit |= u32::from(is_fit) << i;
-            }
-            fit
-        }
-    }
-
-    /// The same four twice.
-    #[inline(always)]
-    fn twice(numbers: &[f32; 4]) -> __m256 {
-        // SAFETY: see `X86`. The load is of an array of four.
-        unsafe { _mm256_broadcast_ps(&_mm_loadu_ps(numbers.as_ptr())) }
-    }
-
-    /// Its numbers by four.
-    #[inline(always)]
-    fn by_two(v: __m256) -> [[f32; 4]; 2] {
-        let mut two = [[0.0; 4]; 2];
-        // SAFETY: see `X86`. The store is of eight f32.
-        unsafe { _mm256_storeu_ps(two.as_mut_ptr().cast(), v) };
-        two
-    }
-
     /// Three coordinates relative to the mesh, rounded once; the fourth number stays what it is.
     #[inline(always)]
     fn local(start: &FilterStart, origin: __m128) -> __m128 {
@@ -686,7 +542,7 @@ impl Shears for F32Ray {
     }
 }
 
-/// How a line passes the edges of eight triangles, or two lines those of eight each.
+/// How a line passes the edges of eight triangles.
 #[derive(Clone, Copy, Zeroable)]
 pub(crate) struct Edges<V> {
     /// The edge functions.
@@ -720,133 +576,17 @@ impl<V: Vector> Edges<V> {
     }
 }
 
-impl<W: F32x16> Edges<W> {
-    /// Those of one of the two lines: `which` is 0 or 1.
-    #[inline(always)]
-    fn half(&self, which: usize) -> Edges<W::Half> {
-        let Self { values: [u, v, w], heights: [a, b, c], within, minus_error, height_error } = self;
-        Edges {
-            values: [u.half(which), v.half(which), w.half(which)],
-            heights: [a.half(which), b.half(which), c.half(which)],
-            within: within.half(which),
-            minus_error: minus_error.half(which),
-            height_error: height_error.half(which),
-        }
-    }
-
-    /// Those of two lines.
-    #[inline(always)]
-    fn of_two(first: &Edges<W::Half>, second: &Edges<W::Half>) -> Self {
-        Self {
-            values: simd::three_of_two(&first.values, &second.values),
-            heights: simd::three_of_two(&first.heights, &second.heights),
-            within: W::of_two(first.within, second.within),
-            minus_error: W::of_two(first.minus_error, second.minus_error),
-            height_error: W::of_two(first.height_error, second.height_error),
-        }
-    }
-}
-
-impl X86<true> {
-    /// The corners of two blocks that share vertices.
-    #[inline(always)]
-    fn shared_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[vector::Avx512; 3]; 3] {
-        let [first, second] = blocks;
-        let a = Self::sheared_sixteen(first, simd::opaque(rays[0]));
-        let b = Self::sheared_sixteen(second, simd::opaque(rays[1]));
-        let last = LastEight::new().mask();
-        let mut corners = [[vector::Avx512::zeroed(); 3]; 3];
-        // SAFETY: see `X86`.
-        unsafe {
-            let shifts = _mm512_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28, 0, 4, 8, 12, 16, 20, 24, 28);
-            let places = _mm512_set1_epi32(SHARED_NUMBERS as i32 - 1);
-            // Of thirty-two numbers, the last sixteen.
-            let of_second = _mm512_maskz_set1_epi32(0xff00, SHARED_NUMBERS as i32);
-            const OR_AND: i32 = 0b1111_1000;
-            for (corner, (&of_a, of_b)) in first.corners().iter().zip(second.corners()).enumerate() {
-                let both = _mm512_mask_set1_epi32(_mm512_set1_epi32(of_a as i32), last, of_b as i32);
-                let both = _mm512_srlv_epi32(both, shifts);
-                let both = _mm512_ternarylogic_epi32::<OR_AND>(of_second, both, places);
-                corners[0][corner] = vector::Avx512::new(_mm512_permutex2var_ps(a[0], both, b[0]));
-                corners[1][corner] = vector::Avx512::new(_mm512_permutex2var_ps(a[1], both, b[1]));
-                corners[2][corner] = vector::Avx512::new(_mm512_permutex2var_ps(a[2], both, b[2]));
-            }
-        }
-        corners
-    }
-
-    /// The corners of two blocks that share none; `rests` are what rounding took from the origins of the rays.
-    #[inline(always)]
-    fn unshared_by_two<S: Shears>(
-        blocks: [&TriangleBlock; 2],
-        rays: [&S; 2],
-        rests: [&[f32; 4]; 2],
-    ) -> [[vector::Avx512; 3]; 3] {
-        let splat = vector::Avx512::splat_two;
-        let last = LastEight::new();
-        let [a, b] = [simd::opaque(rays[0]), simd::opaque(rays[1])];
-        let ([ax, ay, az, _], [bx, by, bz, _]) = (*a.origin(), *b.origin());
-        let origin = [splat(ax, bx, last), splat(ay, by, last), splat(az, bz, last)];
-        let rest = [splat(rests[0][0], rests[1][0], last), splat(rests[0][1], rests[1][1], last)];
-        let shear = [splat(a.shear()[0], b.shear()[0], last), splat(a.shear()[1], b.shear()[1], last)];
-        let (rows_a, rows_b) = (&a.axes().unshared_rows, &b.axes().unshared_rows);
-        let [first, second] = [blocks[0].words().as_ptr(), blocks[1].words().as_ptr()];
-        let mut corners = [[vector::Avx512::zeroed(); 3]; 3];
-        for (corner, sheared) in corners.iter_mut().enumerate() {
-            let mut arms = [vector::Avx512::zeroed(); 3];
-            for (axis, arm) in arms.iter_mut().enumerate() {
-                let (of_a, of_b) = (rows_a[axis] as usize, rows_b[axis] as usize);
-                let own = BLOCK * corner;
-                // SAFETY: see `X86`. The first twenty-four of such rows are read.
-                let vertices = unsafe {
-                    let low = _mm256_loadu_ps(first.add(of_a + own));
-                    let high = _mm256_loadu_ps(second.add(of_b + own));
-                    vector::Avx512::new(_mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high))
-                };
-                *arm = origin[axis] - vertices;
-            }
-            let [across, up, z] = arms;
-            *sheared = [shear[0].times_from(z, across + rest[0]), shear[1].times_from(z, up + rest[1]), z];
-        }
-        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners;
-        [[ax, bx, cx], [ay, by, cy], [az, bz, cz]]
-    }
-}
-
-/// Which sixteen numbers go with which level, and what is different with them.
+/// Which sixteen numbers go with which level.
 pub(crate) trait HasWide<const AVX512: bool> {
-    type F32x16: F32x16<Half = vector::Eight256<AVX512>>;
-
-    /// [`X86::sheared_corners`] of two blocks, each by its ray: those of the first, and those of the second.
-    fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[Self::F32x16; 3]; 3];
+    type F32x16: F32x16;
 }
 
 impl HasWide<true> for X86<true> {
     type F32x16 = vector::Avx512;
-
-    #[inline(always)]
-    fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[Self::F32x16; 3]; 3] {
-        let [first, second] = [blocks[0].is_unshared(), blocks[1].is_unshared()];
-        if !(first | second) {
-            return Self::shared_by_two(blocks, rays);
-        }
-        // Where there are no rests, there is so little to do that it pays no more to put both side by side first.
-        if first & second
-            && let (Some(a), Some(b)) = (rays[0].rest(), rays[1].rest())
-        {
-            return Self::unshared_by_two(blocks, rays, [a, b]);
-        }
-        Self::corners_of_each(blocks, rays)
-    }
 }
 
 impl HasWide<false> for X86<false> {
     type F32x16 = vector::Avx2;
-
-    #[inline(always)]
-    fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[Self::F32x16; 3]; 3] {
-        Self::corners_of_each(blocks, rays)
-    }
 }
 
 impl<const AVX512: bool> Simd for X86<AVX512>
@@ -855,10 +595,7 @@ where
 {
     type F32x8 = vector::Eight256<AVX512>;
     type Edges = Edges<Self::F32x8>;
-    type EdgesByTwo = Edges<Self::F32x16>;
     type F32x16 = <Self as HasWide<AVX512>>::F32x16;
-    const INTERSECTS_BY_TWO: bool = AVX512;
-    const STARTS_BY_FOUR: bool = true;
     // Packets take twice the instructions then, and a ray alone hardly more.
     const GOES_ON_TOGETHER: bool = AVX512;
 
@@ -1026,108 +763,8 @@ where
     }
 
     #[inline(always)]
-    fn start_f32_by_four(
-        start: &FilterStart,
-        rays: [&Ray32; 4],
-        places: [(&mut Slabs, &mut F32Ray); 4],
-    ) -> u32 {
-        if !AVX512 {
-            let ([a, b, c, d], [for_a, for_b, for_c, for_d]) = (rays, places);
-            let first = Self::start_f32_by_two(start, [a, b], [for_a, for_b]);
-            return first | Self::start_f32_by_two(start, [c, d], [for_c, for_d]) << 2;
-        }
-        /// The last of each four.
-        const LAST: u16 = 0x8888;
-        // As `start_f32` and `start_f32_blocks`, four numbers of each ray behind those of the one before.
-        // SAFETY: see `X86`. Rays are eight f32 each, and the other loads are of arrays of four.
-        unsafe {
-            let [a, b, c, d] = rays;
-            let numbers = [Self::f32_start(a), Self::f32_start(b), Self::f32_start(c), Self::f32_start(d)];
-            let (origin, direction) = (Self::fours(numbers, 0), Self::fours(numbers, 4));
-            let local = if let Some(mesh_origin) = &start.single_mesh_origin {
-                _mm512_sub_ps(origin, Self::four_times(mesh_origin))
-            } else {
-                let mesh_origin = _mm512_broadcast_f64x4(_mm256_loadu_pd(start.mesh_origin.as_ptr()));
-                let (first, last) = (_mm512_castps512_ps256(origin), _mm512_extractf32x8_ps::<1>(origin));
-                let first = _mm512_cvtpd_ps(_mm512_sub_pd(_mm512_cvtps_pd(first), mesh_origin));
-                let last = _mm512_cvtpd_ps(_mm512_sub_pd(_mm512_cvtps_pd(last), mesh_origin));
-                _mm512_insertf32x8::<1>(_mm512_castps256_ps512(first), last)
-            };
-            let units_per_space = _mm512_set1_ps(start.units_per_space);
-            let from = _mm512_fmsub_ps(local, units_per_space, Self::four_times(&start.shift));
-            let (distance, length) = (_mm512_abs_ps(from), _mm512_abs_ps(direction));
-            let size = _mm512_mask_blend_ps(LAST, length, origin);
-            let largest = _mm512_mask_blend_ps(LAST, Self::four_times(&start.longest), direction);
-            let is_near = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(distance, Self::four_times(&start.farthest));
-            let fits = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(is_near, size, largest);
-            let sign_of_last = _mm512_maskz_set1_epi32(LAST, i32::MIN);
-            let fits = _mm512_mask_testn_epi32_mask(fits, _mm512_castps_si512(origin), sign_of_last);
-            let is_long = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(length, _mm512_set1_ps(start.shortest));
-            let tiny_or_more = _mm512_max_ps(length, _mm512_set1_ps(start.tiny));
-            let size = _mm512_div_ps(_mm512_set1_ps(start.space_per_unit), tiny_or_more);
-            let sign = _mm512_set1_ps(-0.0);
-            let inverse = _mm512_or_ps(size, _mm512_and_ps(direction, sign));
-            let per_distance = _mm512_set1_ps(TreeSpace::F32_MARGIN_PER_DISTANCE);
-            let margin = _mm512_fmadd_ps(distance, per_distance, _mm512_set1_ps(start.f32_margin));
-            let margin = _mm512_mul_ps(size, margin);
-            let first = _mm512_mul_ps(origin, _mm512_set1_ps(START_FACTOR));
-            let last = _mm512_mul_ps(direction, _mm512_set1_ps(END_FACTOR));
-            let last = _mm512_add_ps(last, _mm512_set1_ps(LITTLE as f32));
-            let near = _mm512_mask_blend_ps(LAST, _mm512_fnmsub_ps(from, inverse, margin), first);
-            let far = _mm512_mask_blend_ps(LAST, _mm512_fnmadd_ps(from, inverse, margin), last);
-            let signs = u32::from(_mm512_movepi32_mask(_mm512_castps_si512(direction)));
-            // x, y, x and y, z, z.
-            let sizes = u32::from(_mm512_cmp_ps_mask::<_CMP_GE_OQ>(
-                _mm512_shuffle_ps::<0b00_00_01_00>(length, length),
-                _mm512_shuffle_ps::<0b10_10_10_01>(length, length),
-            ));
-            let axes = [
-                Axes::by_bits(signs, sizes),
-                Axes::by_bits(signs >> 4, sizes >> 4),
-                Axes::by_bits(signs >> 8, sizes >> 8),
-                Axes::by_bits(signs >> 12, sizes >> 12),
-            ];
-            let orders = [
-                axes[0].order.as_ptr().cast(),
-                axes[1].order.as_ptr().cast(),
-                axes[2].order.as_ptr().cast(),
-                axes[3].order.as_ptr().cast(),
-            ];
-            let order = _mm512_castps_si512(Self::fours(orders, 0));
-            let of_last = _mm512_permutevar_ps(inverse, _mm512_shuffle_epi32::<0b10_10_10_10>(order));
-            let of_last = _mm512_mul_ps(of_last, units_per_space);
-            let shear = _mm512_mask_blend_ps(LAST, _mm512_mul_ps(direction, of_last), direction);
-            let (shear, local) = (_mm512_permutevar_ps(shear, order), _mm512_permutevar_ps(local, order));
-            let minus_inverse = _mm512_xor_ps(of_last, sign);
-            let (inverse, near, far) = (Self::by_four(inverse), Self::by_four(near), Self::by_four(far));
-            let (shear, local, minus_inverse) =
-                (Self::by_four(shear), Self::by_four(local), Self::by_four(minus_inverse));
-            let (fits, is_long) = (u32::from(fits), u32::from(is_long));
-            let mut fit = 0;
-            for (i, (slabs, f32_ray)) in places.into_iter().enumerate() {
-                slabs.inverse = inverse[i];
-                slabs.near_offset = near[i];
-                slabs.far_offset = far[i];
-                slabs.sides = Sides::new(signs >> (4 * i));
-                f32_ray.axes = axes[i];
-                f32_ray.origin = local[i];
-                f32_ray.shear = shear[i];
-                f32_ray.minus_inverse = minus_inverse[i][0];
-                let is_fit = fits >> (4 * i) & 0b1111 == 0b1111 && is_long >> (4 * i) & 0b111 != 0;
-                fit |= u32::from(is_fit) << i;
-            }
-            fit
-        }
-    }
-
-    #[inline(always)]
     fn f32_corners(block: &TriangleBlock, ray: &F32Ray) -> [[vector::Eight256<AVX512>; 3]; 3] {
         Self::eights(Self::sheared_corners(block, ray))
-    }
-
-    #[inline(always)]
-    fn f32_corners_by_two(blocks: [&TriangleBlock; 2], rays: [&F32Ray; 2]) -> [[Self::F32x16; 3]; 3] {
-        Self::corners_by_two(blocks, rays)
     }
 
     #[inline(always)]
@@ -1267,26 +904,6 @@ where
         let corners = Self::eights(Self::sheared_corners(block, ray));
         let (mask, edges) = Edges::of(corners, Self::F32x8::splat(ray.least_size));
         (mask & block.taken(), edges)
-    }
-
-    #[inline(always)]
-    fn intersect_triangles_by_two(
-        blocks: [&TriangleBlock; 2],
-        rays: [&BlockRay; 2],
-    ) -> (u32, Self::EdgesByTwo) {
-        if !AVX512 {
-            let (first, of_first) = Self::intersect_triangles(blocks[0], rays[0]);
-            let (second, of_second) = Self::intersect_triangles(blocks[1], rays[1]);
-            return (first | second << BLOCK, Edges::of_two(&of_first, &of_second));
-        }
-        let least_size = Self::F32x16::splat_two(rays[0].least_size, rays[1].least_size, LastEight::new());
-        let (mask, edges) = Edges::of(Self::corners_by_two(blocks, rays), least_size);
-        (mask & (blocks[0].taken() | blocks[1].taken() << BLOCK), edges)
-    }
-
-    #[inline(always)]
-    fn edges_of(both: &Self::EdgesByTwo, which: usize) -> Self::Edges {
-        both.half(which)
     }
 
     #[inline(always)]

@@ -5,8 +5,6 @@ use std::ops::{Add, Index, Mul, Sub};
 
 use bytemuck::Zeroable;
 
-use super::opaque_number;
-
 /// Those that are sixteen.
 pub(crate) const WIDE: usize = 16;
 
@@ -72,14 +70,6 @@ pub(crate) trait F32x8: Vector<Array = [f32; 8]> + Zeroable {
 
 /// Sixteen.
 pub(crate) trait F32x16: Vector<Array = [f32; WIDE]> + Zeroable {
-    /// Eight of them.
-    type Half: F32x8;
-    /// Eight, and eight others.
-    fn of_two(first: Self::Half, second: Self::Half) -> Self;
-    /// Eight times the one, and eight times the other.
-    fn splat_two(first: f32, second: f32, last: LastEight) -> Self;
-    /// The first eight, or the last: `which` is 0 or 1.
-    fn half(&self, which: usize) -> Self::Half;
     fn load(row: &[f32; WIDE]) -> Self;
     fn store(self, row: &mut Row<f32>);
     /// Rounded.
@@ -159,24 +149,6 @@ pub(crate) trait F32x16: Vector<Array = [f32; WIDE]> + Zeroable {
             count += 1;
             rest &= rest - 1;
         }
-    }
-}
-
-/// The last eight of sixteen, as a mask of which the compiler knows nothing: where it does know, it shuffles numbers instead of reading each
-/// to where it belongs.
-#[derive(Clone, Copy)]
-pub(crate) struct LastEight(u32);
-
-impl LastEight {
-    #[inline(always)]
-    pub(crate) fn new() -> Self {
-        Self(opaque_number(0xff00))
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[inline(always)]
-    pub(crate) fn mask(self) -> u16 {
-        self.0 as u16
     }
 }
 
@@ -321,31 +293,6 @@ impl F32x8 for Portable8 {
 }
 
 impl F32x16 for Portable16 {
-    type Half = Portable8;
-
-    #[inline(always)]
-    fn of_two(first: Portable8, second: Portable8) -> Self {
-        let mut all = [0.0; WIDE];
-        for lane in 0..8 {
-            (all[lane], all[8 + lane]) = (first.0[lane], second.0[lane]);
-        }
-        Self(all)
-    }
-
-    #[inline(always)]
-    fn splat_two(first: f32, second: f32, _: LastEight) -> Self {
-        Self::of_two(Portable8::splat(first), Portable8::splat(second))
-    }
-
-    #[inline(always)]
-    fn half(&self, which: usize) -> Portable8 {
-        let mut half = [0.0; 8];
-        for (lane, one) in half.iter_mut().enumerate() {
-            *one = self.0[8 * (which % 2) + lane];
-        }
-        PortableVector(half)
-    }
-
     #[inline(always)]
     fn load(row: &[f32; WIDE]) -> Self {
         Self(*row)
@@ -506,7 +453,7 @@ mod x86 {
 
     use bytemuck::Zeroable;
 
-    use super::{AFTER_MIDDLE, BEFORE_MIDDLE, F32x8, F32x16, LANE_BITS, LastEight, Row, Vector, WIDE};
+    use super::{AFTER_MIDDLE, BEFORE_MIDDLE, F32x8, F32x16, LANE_BITS, Row, Vector, WIDE};
     use crate::simd::opaque_number;
 
     /// Only where `intersect::x86::X86<true>` is: the instructions are there.
@@ -629,28 +576,6 @@ mod x86 {
     }
 
     impl F32x16 for Avx512 {
-        type Half = Eight256<true>;
-
-        #[inline(always)]
-        fn of_two(first: Self::Half, second: Self::Half) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm512_insertf32x8::<1>(_mm512_castps256_ps512(first.0), second.0)) }
-        }
-
-        #[inline(always)]
-        fn splat_two(first: f32, second: f32, last: LastEight) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm512_mask_mov_ps(_mm512_set1_ps(first), last.mask(), _mm512_set1_ps(second))) }
-        }
-
-        #[inline(always)]
-        fn half(&self, which: usize) -> Self::Half {
-            // Where it is in memory, that is read from there.
-            let first: *const f32 = (&raw const self.0).cast();
-            // SAFETY: see the type. The load is of eight f32 of sixteen.
-            unsafe { Eight256(_mm256_loadu_ps(first.add(8 * (which % 2)))) }
-        }
-
         #[inline(always)]
         fn load(row: &[f32; WIDE]) -> Self {
             // SAFETY: see the type. The load is of sixteen f32.
@@ -1091,15 +1016,6 @@ mod x86 {
         }
     }
 
-    impl Avx512 {
-        /// # Safety
-        /// There must be what `intersect::x86::X86<true>` has.
-        #[inline(always)]
-        pub(crate) unsafe fn new(sixteen: __m512) -> Self {
-            Self(sixteen)
-        }
-    }
-
     impl<const AVX512: bool> Eight256<AVX512> {
         /// # Safety
         /// There must be what `intersect::x86::X86<AVX512>` has.
@@ -1197,23 +1113,6 @@ mod x86 {
     }
 
     impl F32x16 for Avx2 {
-        type Half = Eight256<false>;
-
-        #[inline(always)]
-        fn of_two(first: Self::Half, second: Self::Half) -> Self {
-            Self([first.0, second.0])
-        }
-
-        #[inline(always)]
-        fn splat_two(first: f32, second: f32, _: LastEight) -> Self {
-            Self::of_two(Eight256::splat(first), Eight256::splat(second))
-        }
-
-        #[inline(always)]
-        fn half(&self, which: usize) -> Self::Half {
-            Eight256(self.0[which % 2])
-        }
-
         #[inline(always)]
         fn load(row: &[f32; WIDE]) -> Self {
             // SAFETY: see the type. The loads are of eight f32 each, of sixteen.

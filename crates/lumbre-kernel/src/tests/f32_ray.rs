@@ -12,7 +12,7 @@ use super::scenes::{
 };
 use crate::batch;
 use crate::batch::packet::PACKET;
-use crate::intersect::{Isa, Portable, Simd, start_f32_by_four_at};
+use crate::intersect::{Isa, Portable, Simd};
 use crate::simd::{F32x8, Vector};
 use crate::tree::filter_start::FilterStart;
 use crate::tree::filter_start::Precise;
@@ -452,32 +452,6 @@ fn odd_ones(good: Ray32) -> Vec<Ray32> {
         Ray32 { direction: 1e12 * direction, ..good },
         Ray32 { direction: 1e-40 * direction, ..good },
     ]
-}
-
-#[test]
-fn four_rays_start_together_as_each_does_alone() {
-    let mut random = Random(713);
-    let (mut started, mut refused) = (0, 0);
-    for (size, origin) in SIZES_AND_ORIGINS {
-        for (_, meshes) in meshes(&mut random) {
-            let meshes: Vec<_> = meshes.iter().map(|mesh| placed(mesh, size, origin)).collect();
-            let accel = build(kinds(&meshes));
-            let Some(start) = &accel.tree.single else { continue };
-            let mut rays: Vec<_> = (0..100).map(|_| ray(&mut random, &meshes, size)).collect();
-            let odd = odd_ones(rays[0]);
-            rays.extend(odd);
-            for _ in 0..100 {
-                let four = [(); 4].map(|()| &rays[random.below(rays.len())]);
-                for isa in Isa::all() {
-                    let [together, one_by_one] = start_f32_by_four_at(isa, start, four);
-                    assert_eq!(format!("{together:?}"), format!("{one_by_one:?}"), "{isa:?} {four:?}");
-                    started += together.iter().flatten().count();
-                    refused += together.iter().filter(|one| one.is_none()).count();
-                }
-            }
-        }
-    }
-    assert!(started > 10_000 && refused > 1000, "{started} {refused}");
 }
 
 #[test]
