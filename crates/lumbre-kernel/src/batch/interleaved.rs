@@ -92,7 +92,13 @@ impl References {
     fn stations<W: F32x16>(&self) -> Stations {
         /// The last reference to a node, in the order of signed integers; those that are done are negative.
         const LAST_NODE: i32 = tag::reference(tag::INNER, tag::PLACE) as i32;
-        const { assert!(LAST_NODE > 0 && tag::reference(tag::TRIANGLES, tag::PLACE) as i32 > LAST_NODE && (DONE as i32) < 0) };
+        const {
+            assert!(
+                LAST_NODE > 0
+                    && tag::reference(tag::TRIANGLES, tag::PLACE) as i32 > LAST_NODE
+                    && (DONE as i32) < 0
+            )
+        };
         let (rows, _) = self.0.as_chunks::<WIDE>();
         let (mut leaves, mut done) = (0, 0);
         for (i, row) in rows.iter().enumerate() {
@@ -134,7 +140,12 @@ impl<'a, 'd, 'r, G: Goal, L: Simd> Interleaved<'a, 'd, 'r, G, L> {
             rays,
             slots: Box::new(std::array::from_fn(
                 #[inline(always)]
-                |_| Slot { slabs: Slabs::ZERO, position: ANSWERED, ray: F32Ray::of_none(), nearest: Nearest::NONE },
+                |_| Slot {
+                    slabs: Slabs::ZERO,
+                    position: ANSWERED,
+                    ray: F32Ray::of_none(),
+                    nearest: Nearest::NONE,
+                },
             )),
             stacks: Slots::many(),
             references: References([DONE; SLOTS]),

@@ -20,6 +20,7 @@ mod portable;
 mod shims;
 mod slots;
 mod spheres;
+mod triangles;
 pub(crate) mod watertight;
 #[cfg(target_arch = "x86_64")]
 mod x86;
@@ -34,7 +35,7 @@ pub(crate) use boxes::{
 };
 pub(crate) use dispatch::{Dispatch, DispatchedQuery, RayQuery};
 pub(crate) use isa::Isa;
-pub(crate) use operations::{CornersRoom, Crossings, Simd};
+pub(crate) use operations::{CornersRoom, Simd};
 pub(crate) use portable::Portable;
 #[cfg(test)]
 pub(crate) use shims::*;
@@ -42,3 +43,4 @@ pub(crate) use slots::{Room, STACK, Slots};
 pub(crate) use spheres::intersect_spheres;
 #[cfg(test)]
 pub(crate) use spheres::intersect_spheres_at;
+pub(crate) use triangles::Crossings;

@@ -1,6 +1,5 @@
 //! What a search does many at a time, for each instruction set.
 
-use bytemuck::Zeroable;
 use lumbre_geometry::Ray;
 use lumbre_math::Transform;
 
@@ -8,6 +7,7 @@ use super::axes::Axes;
 use super::box_ray::{BoxRay, Slabs};
 use super::f32_ray::F32Ray;
 use super::isa::Isa;
+use super::triangles::{Edges, Shears};
 use super::watertight::{BlockRay, EdgeTest, Inside, Shear};
 use crate::ray32::Ray32;
 use crate::simd::{F32x8, F32x16, Row, WIDE};
@@ -20,8 +20,6 @@ use crate::tree::{BLOCK, Corners};
 pub(crate) trait Simd {
     /// Eight numbers.
     type F32x8: F32x8;
-    /// How a line passes the edges of eight triangles.
-    type Edges: Copy + Zeroable;
     /// Sixteen numbers, alike.
     type F32x16: F32x16;
     /// Whether rays go on together for a while where that no longer pays, for what they have done: see `packet`.
@@ -71,19 +69,22 @@ pub(crate) trait Simd {
     /// The same ray for triangles.
     fn start_f32_blocks(start: &FilterStart, ray: &Ray32, slabs: &Slabs) -> F32Ray;
 
-    /// The corners of the triangles of a block in the ray's sheared space, `[x, y or z][corner]`, all with the sign turned; what lanes
-    /// without a triangle have means nothing. No product is fused with a sum: it is the same on every machine.
-    fn f32_corners(block: &TriangleBlock, ray: &F32Ray) -> [[Self::F32x8; 3]; 3];
-
     /// The numbers of rays in single precision, side by side: origin, start, direction, end.
     fn f32_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]);
 
     /// The numbers of rays, side by side: origin, direction and range.
     fn columns(rays: &[Ray; WIDE], columns: &mut [Row<f64>; 8]);
 
-    /// A bit for each triangle that the line of the ray may meet, among them all that it does, and what [`Simd::place_crossings`]
-    /// wants to know: see [`BlockRay`].
-    fn intersect_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges);
+    /// The corners of the triangles of a block in the ray's sheared space, `[x, y or z][corner]`: see [`Shears::apply`]. What lanes without
+    /// a triangle have means nothing.
+    fn sheared_corners<S: Shears>(block: &TriangleBlock, ray: &S) -> [[Self::F32x8; 3]; 3];
+
+    /// A bit for each triangle that the line of the ray may meet, among them all that it does, and what [`Edges::place`] wants to know.
+    #[inline(always)]
+    fn intersect_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Edges<Self::F32x8>) {
+        let (mask, edges) = Edges::of(Self::sheared_corners(block, ray), ray);
+        (mask & block.taken(), edges)
+    }
 
     /// For each number of a list, a bit for each place before it that has the same.
     fn equals_before(list: &[u32; 3 * BLOCK]) -> [u32; 3 * BLOCK];
@@ -93,9 +94,6 @@ pub(crate) trait Simd {
 
     /// The corners of the triangles of a block: where they stand there, or in this room.
     fn corners<'a>(block: &'a TriangleBlock, room: &'a mut CornersRoom) -> &'a Corners;
-
-    /// Where along the ray that is.
-    fn place_crossings(edges: &Self::Edges, ray: &BlockRay) -> Crossings<Self::F32x8>;
 
     /// [`Shear::new`] and [`Shear::local_origin`] of a ray that has these axes, for a mesh.
     fn shear(ray: &Ray, axes: &'static Axes, mesh_origin: &[f64; 4]) -> (Shear, [f64; 3]);
@@ -113,25 +111,5 @@ impl CornersRoom {
     #[inline(always)]
     pub(crate) fn new() -> Self {
         Self([[[0.0; BLOCK]; 3]; 3])
-    }
-}
-
-/// Where a ray may meet the triangles of a block.
-#[derive(Clone, Copy)]
-pub(crate) struct Crossings<E> {
-    /// A bit for each that may be met within the range, if its line meets it: among them all that are.
-    pub(crate) in_range: u32,
-    /// A bit for each that certainly is met there.
-    pub(crate) sure: u32,
-    /// Heights along the ray between which the crossing lies.
-    pub(crate) from: E,
-    pub(crate) to: E,
-}
-
-impl<E: F32x8> Crossings<E> {
-    /// The heights between which the crossing in a lane lies.
-    #[inline(always)]
-    pub(crate) fn between(&self, lane: usize) -> (f32, f32) {
-        (self.from.lane(lane), self.to.lane(lane))
     }
 }

@@ -166,7 +166,7 @@ pub(crate) fn intersect_triangles_at(
         #[inline(always)]
         fn run<L: Simd>(self) -> Self::Output {
             let (mask, edges) = L::intersect_triangles(self.0, self.1);
-            let crossings = L::place_crossings(&edges, self.1);
+            let crossings = edges.place(self.1);
             let between = std::array::from_fn(|lane| <[f32; 2]>::from(crossings.between(lane)));
             (mask & crossings.in_range, mask & crossings.sure, between)
         }

@@ -9,15 +9,14 @@ use lumbre_math::{DAffine3, DVec3, Transform};
 
 use super::axes::{Axes, Sides};
 use super::isa::{Isa, Set};
-use super::operations::{CornersRoom, Crossings, Simd};
+use super::operations::{CornersRoom, Simd};
+use super::triangles::Shears;
 use crate::intersect::box_ray::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs};
 use crate::intersect::f32_ray::F32Ray;
-use crate::intersect::watertight::{
-    BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, EdgeTest, FAR, HEIGHT_ERROR, HeightRange,
-    Inside, ROUNDINGS, SIZE_ERROR, Shear, TINY,
-};
+use crate::intersect::watertight::{BlockRay, EdgeTest, FAR, HeightRange, Inside, ROUNDINGS, Shear};
 use crate::ray32::Ray32;
-use crate::simd::{self, F32x16, Row, Vector, WIDE, vector};
+use crate::simd::vector::{Avx2, Avx512, Eight256};
+use crate::simd::{self, F32x16, Row, WIDE};
 use crate::tree::BLOCK;
 use crate::tree::Corners;
 use crate::tree::filter_start::FilterStart;
@@ -35,33 +34,6 @@ const _: () =
 const _: () = assert!(size_of::<Ray>() == 72 && offset_of!(Ray, time) == 64);
 
 impl<const AVX512: bool> X86<AVX512> {
-    /// A bit for each lane in which the comparison is true.
-    #[inline(always)]
-    fn compare<const HOW: i32>(a: __m256, b: __m256) -> u32 {
-        // SAFETY: see `X86`.
-        unsafe {
-            if AVX512 {
-                u32::from(_mm256_cmp_ps_mask::<HOW>(a, b))
-            } else {
-                _mm256_movemask_ps(_mm256_cmp_ps::<HOW>(a, b)) as u32
-            }
-        }
-    }
-
-    /// A bit for each lane in which both comparisons are true.
-    #[inline(always)]
-    fn both<const A: i32, const B: i32>(a: [__m256; 2], b: [__m256; 2]) -> u32 {
-        // SAFETY: see `X86`.
-        unsafe {
-            if AVX512 {
-                u32::from(_mm256_mask_cmp_ps_mask::<B>(_mm256_cmp_ps_mask::<A>(a[0], a[1]), b[0], b[1]))
-            } else {
-                let both = _mm256_and_ps(_mm256_cmp_ps::<A>(a[0], a[1]), _mm256_cmp_ps::<B>(b[0], b[1]));
-                _mm256_movemask_ps(both) as u32
-            }
-        }
-    }
-
     /// A component of three corners, the first of which is here.
     ///
     /// # Safety
@@ -134,98 +106,40 @@ impl<const AVX512: bool> X86<AVX512> {
         }
     }
 
-    /// The corners of the triangles of a block in the ray's sheared space, `[x, y or z][corner]`, all with the sign turned, which
-    /// their products do not have: so one operand can come from memory. What lanes without a triangle have means nothing.
-    #[inline(always)]
-    fn sheared_corners<S: Shears>(block: &TriangleBlock, ray: &S) -> [[__m256; 3]; 3] {
-        let axes = ray.axes();
-        if block.is_unshared() {
-            let a = Self::sheared_eight(block, ray, &axes.unshared_rows, 0);
-            let b = Self::sheared_eight(block, ray, &axes.unshared_rows, BLOCK);
-            let c = Self::sheared_eight(block, ray, &axes.unshared_rows, 2 * BLOCK);
-            return [[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]];
-        }
-        // SAFETY: see `X86`.
-        let mut corners = [[unsafe { _mm256_setzero_ps() }; 3]; 3];
-        if AVX512 {
-            let vertices = Self::sheared_sixteen(block, simd::opaque(ray));
-            for (corner, &places) in block.corners().iter().enumerate() {
-                let places = Self::places(places);
-                for axis in 0..3 {
-                    corners[axis][corner] = Self::of_sixteen(vertices[axis], places);
-                }
-            }
-        } else {
-            let near = Self::sheared_eight(block, ray, &axes.shared_rows, 0);
-            let far = Self::sheared_eight(block, ray, &axes.shared_rows, BLOCK);
-            for (corner, &places) in block.corners().iter().enumerate() {
-                let places = Self::places(places);
-                for axis in 0..3 {
-                    corners[axis][corner] = Self::of_two(near[axis], far[axis], places);
-                }
-            }
-        }
-        corners
-    }
-
-    /// The corners as numbers.
-    #[inline(always)]
-    fn eights([[a, b, c], [d, e, f], [g, h, i]]: [[__m256; 3]; 3]) -> [[vector::Eight256<AVX512>; 3]; 3] {
-        let of = vector::Eight256::<AVX512>::new;
-        // SAFETY: see `X86`.
-        unsafe { [[of(a), of(b), of(c)], [of(d), of(e), of(f)], [of(g), of(h), of(i)]] }
-    }
-
-    /// Eight vertices of these rows from the `first` on.
+    /// Eight vertices of these rows from the `first` on, sheared.
     #[inline(always)]
     fn sheared_eight<S: Shears>(
         block: &TriangleBlock,
         ray: &S,
         &[kx, ky, kz]: &[u32; 3],
         first: usize,
-    ) -> [__m256; 3] {
+    ) -> [Eight256<AVX512>; 3] {
         let words = block.words().as_ptr();
         // SAFETY: see `X86`. Of rows of a block that shares its vertices the first sixteen are read, of others the first twenty-four.
-        unsafe {
-            let load = |row: u32| _mm256_loadu_ps(words.add(row as usize + first));
-            let (origin, shear) = (ray.origin(), ray.shear());
-            let (shear_x, shear_y) = (_mm256_set1_ps(shear[0]), _mm256_set1_ps(shear[1]));
-            let z = _mm256_sub_ps(_mm256_set1_ps(origin[2]), load(kz));
-            let across = _mm256_sub_ps(_mm256_set1_ps(origin[0]), load(kx));
-            let up = _mm256_sub_ps(_mm256_set1_ps(origin[1]), load(ky));
-            let Some(rest) = ray.rest() else {
-                // No fused multiply-add: the same on every machine.
-                let x = _mm256_sub_ps(across, _mm256_mul_ps(shear_x, z));
-                return [x, _mm256_sub_ps(up, _mm256_mul_ps(shear_y, z)), z];
-            };
-            let x = _mm256_fnmadd_ps(shear_x, z, _mm256_add_ps(across, _mm256_set1_ps(rest[0])));
-            let y = _mm256_fnmadd_ps(shear_y, z, _mm256_add_ps(up, _mm256_set1_ps(rest[1])));
-            [x, y, z]
-        }
+        let vertices = unsafe {
+            [
+                Eight256::new(_mm256_loadu_ps(words.add(kx as usize + first))),
+                Eight256::new(_mm256_loadu_ps(words.add(ky as usize + first))),
+                Eight256::new(_mm256_loadu_ps(words.add(kz as usize + first))),
+            ]
+        };
+        ray.apply(vertices)
     }
 
-    /// The vertices that a block shares. For AVX-512 alone.
+    /// The vertices that a block shares, sheared. For AVX-512 alone.
     #[inline(always)]
-    fn sheared_sixteen<S: Shears>(block: &TriangleBlock, ray: &S) -> [__m512; 3] {
+    fn sheared_sixteen<S: Shears>(block: &TriangleBlock, ray: &S) -> [Avx512; 3] {
         let words = block.words().as_ptr();
         let [kx, ky, kz] = ray.axes().shared_rows;
         // SAFETY: as there.
-        unsafe {
-            let load = |row: u32| _mm512_loadu_ps(words.add(row as usize));
-            let (origin, shear) = (ray.origin(), ray.shear());
-            let (shear_x, shear_y) = (_mm512_set1_ps(shear[0]), _mm512_set1_ps(shear[1]));
-            let z = _mm512_sub_ps(_mm512_set1_ps(origin[2]), load(kz));
-            let across = _mm512_sub_ps(_mm512_set1_ps(origin[0]), load(kx));
-            let up = _mm512_sub_ps(_mm512_set1_ps(origin[1]), load(ky));
-            let Some(rest) = ray.rest() else {
-                // No fused multiply-add: the same on every machine.
-                let x = _mm512_sub_ps(across, _mm512_mul_ps(shear_x, z));
-                return [x, _mm512_sub_ps(up, _mm512_mul_ps(shear_y, z)), z];
-            };
-            let x = _mm512_fnmadd_ps(shear_x, z, _mm512_add_ps(across, _mm512_set1_ps(rest[0])));
-            let y = _mm512_fnmadd_ps(shear_y, z, _mm512_add_ps(up, _mm512_set1_ps(rest[1])));
-            [x, y, z]
-        }
+        let vertices = unsafe {
+            [
+                Avx512::new(_mm512_loadu_ps(words.add(kx as usize))),
+                Avx512::new(_mm512_loadu_ps(words.add(ky as usize))),
+                Avx512::new(_mm512_loadu_ps(words.add(kz as usize))),
+            ]
+        };
+        ray.apply(vertices)
     }
 
     /// Eight of sixteen numbers, each by its place. For AVX-512 alone.
@@ -488,113 +402,24 @@ impl<const AVX512: bool> X86<AVX512> {
     }
 }
 
-/// What shears the corners of triangles.
-pub(crate) trait Shears {
-    fn axes(&self) -> &'static Axes;
-    /// In the order of the axes, here and below.
-    fn origin(&self) -> &[f32; 4];
-    fn shear(&self) -> &[f32; 4];
-    /// What rounding took from the origin, where that counts.
-    fn rest(&self) -> Option<&[f32; 4]>;
-}
-
-impl Shears for BlockRay {
-    #[inline(always)]
-    fn axes(&self) -> &'static Axes {
-        self.axes
-    }
-
-    #[inline(always)]
-    fn origin(&self) -> &[f32; 4] {
-        &self.origin
-    }
-
-    #[inline(always)]
-    fn shear(&self) -> &[f32; 4] {
-        &self.shear
-    }
-
-    #[inline(always)]
-    fn rest(&self) -> Option<&[f32; 4]> {
-        Some(&self.rest)
-    }
-}
-
-impl Shears for F32Ray {
-    #[inline(always)]
-    fn axes(&self) -> &'static Axes {
-        self.axes
-    }
-
-    #[inline(always)]
-    fn origin(&self) -> &[f32; 4] {
-        &self.origin
-    }
-
-    #[inline(always)]
-    fn shear(&self) -> &[f32; 4] {
-        &self.shear
-    }
-
-    #[inline(always)]
-    fn rest(&self) -> Option<&[f32; 4]> {
-        None
-    }
-}
-
-/// How a line passes the edges of eight triangles.
-#[derive(Clone, Copy, Zeroable)]
-pub(crate) struct Edges<V> {
-    /// The edge functions.
-    values: [V; 3],
-    /// Of the corners.
-    heights: [V; 3],
-    /// The least of them or of their opposites, whichever is more: how far within the triangle the line is.
-    within: V,
-    /// By how much they may be wrong, below zero, and the heights.
-    minus_error: V,
-    height_error: V,
-}
-
-impl<V: Vector> Edges<V> {
-    /// Of corners in the sheared spaces of the rays, which have these [`least_size`](BlockRay::least_size)s, and a bit for each triangle that is
-    /// perhaps met.
-    #[inline(always)]
-    fn of([x, y, z]: [[V; 3]; 3], least_size: V) -> (u32, Self) {
-        let u = x[2].times_minus(y[1], y[2] * x[1]);
-        let v = x[0].times_minus(y[2], y[0] * x[2]);
-        let w = x[1].times_minus(y[0], y[1] * x[0]);
-        let within = u.min(v).min(w).max(u.max(v).max(w).turned_by(V::splat(-0.0)));
-        let across = x[0].larger(y[0]).max(x[1].larger(y[1])).max(x[2].larger(y[2]));
-        let along = z[0].larger(z[1]).larger(z[2]);
-        let size = across + along + least_size;
-        let minus_error = (size * V::splat(-EDGE_ERROR))
-            .times_minus(size.times_plus(V::splat(SIZE_ERROR), across), V::splat(TINY));
-        let height_error = size * V::splat(HEIGHT_ERROR);
-        let edges = Self { values: [u, v, w], heights: z, within, minus_error, height_error };
-        (minus_error.at_most(within), edges)
-    }
-}
-
 /// Which sixteen numbers go with which level.
 pub(crate) trait HasWide<const AVX512: bool> {
     type F32x16: F32x16;
 }
 
 impl HasWide<true> for X86<true> {
-    type F32x16 = vector::Avx512;
+    type F32x16 = Avx512;
 }
 
 impl HasWide<false> for X86<false> {
-    type F32x16 = vector::Avx2;
+    type F32x16 = Avx2;
 }
 
 impl<const AVX512: bool> Simd for X86<AVX512>
 where
     Self: HasWide<AVX512>,
 {
-    type F32x8 = vector::Eight256<AVX512>;
-    type Edges = Edges<Self::F32x8>;
+    type F32x8 = Eight256<AVX512>;
     type F32x16 = <Self as HasWide<AVX512>>::F32x16;
     // Packets take twice the instructions then, and a ray alone hardly more.
     const GOES_ON_TOGETHER: bool = AVX512;
@@ -763,11 +588,6 @@ where
     }
 
     #[inline(always)]
-    fn f32_corners(block: &TriangleBlock, ray: &F32Ray) -> [[vector::Eight256<AVX512>; 3]; 3] {
-        Self::eights(Self::sheared_corners(block, ray))
-    }
-
-    #[inline(always)]
     fn start_placed(
         start: &FilterStart,
         map: &Transform,
@@ -900,10 +720,38 @@ where
     }
 
     #[inline(always)]
-    fn intersect_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges) {
-        let corners = Self::eights(Self::sheared_corners(block, ray));
-        let (mask, edges) = Edges::of(corners, Self::F32x8::splat(ray.least_size));
-        (mask & block.taken(), edges)
+    fn sheared_corners<S: Shears>(block: &TriangleBlock, ray: &S) -> [[Self::F32x8; 3]; 3] {
+        let axes = ray.axes();
+        if block.is_unshared() {
+            let a = Self::sheared_eight(block, ray, &axes.unshared_rows, 0);
+            let b = Self::sheared_eight(block, ray, &axes.unshared_rows, BLOCK);
+            let c = Self::sheared_eight(block, ray, &axes.unshared_rows, 2 * BLOCK);
+            return [[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]];
+        }
+        let mut corners = [[Eight256::zeroed(); 3]; 3];
+        if AVX512 {
+            let vertices = Self::sheared_sixteen(block, simd::opaque(ray));
+            for (corner, &places) in block.corners().iter().enumerate() {
+                let places = Self::places(places);
+                for axis in 0..3 {
+                    let found = Self::of_sixteen(vertices[axis].raw(), places);
+                    // SAFETY: see `X86`.
+                    corners[axis][corner] = unsafe { Eight256::new(found) };
+                }
+            }
+        } else {
+            let near = Self::sheared_eight(block, ray, &axes.shared_rows, 0);
+            let far = Self::sheared_eight(block, ray, &axes.shared_rows, BLOCK);
+            for (corner, &places) in block.corners().iter().enumerate() {
+                let places = Self::places(places);
+                for axis in 0..3 {
+                    let found = Self::of_two(near[axis].raw(), far[axis].raw(), places);
+                    // SAFETY: see `X86`.
+                    corners[axis][corner] = unsafe { Eight256::new(found) };
+                }
+            }
+        }
+        corners
     }
 
     #[inline(always)]
@@ -977,54 +825,6 @@ where
             }
         }
         corners
-    }
-
-    #[inline(always)]
-    fn place_crossings(edges: &Self::Edges, ray: &BlockRay) -> Crossings<vector::Eight256<AVX512>> {
-        // SAFETY: see `X86`.
-        unsafe {
-            let ([u, v, w], [a, b, c]) = (edges.values, edges.heights);
-            let ([u, v, w], z) = ([u.raw(), v.raw(), w.raw()], [a.raw(), b.raw(), c.raw()]);
-            let (minus_error, height_error) = (edges.minus_error.raw(), edges.height_error.raw());
-            let sign = _mm256_set1_ps(-0.0);
-            let det = _mm256_add_ps(_mm256_add_ps(u, v), w);
-            let weight = _mm256_andnot_ps(sign, det);
-            let of_a_and_b = _mm256_fmadd_ps(v, z[1], _mm256_mul_ps(u, z[0]));
-            let of_c = _mm256_mul_ps(w, z[2]);
-            let of_c = _mm256_fmadd_ps(det, _mm256_set1_ps(ray.rest[2]), of_c);
-            let height = _mm256_add_ps(of_a_and_b, of_c);
-            let turn = _mm256_xor_ps(_mm256_set1_ps(ray.turn), _mm256_and_ps(det, sign));
-            let ahead = _mm256_xor_ps(height, turn);
-            let inverse = _mm256_div_ps(_mm256_set1_ps(1.0), weight);
-            let range = &ray.range;
-            let low = _mm256_min_ps(_mm256_min_ps(z[0], z[1]), z[2]);
-            let high = _mm256_max_ps(_mm256_max_ps(z[0], z[1]), z[2]);
-            let along_edges = _mm256_fmadd_ps(
-                height_error,
-                _mm256_fmadd_ps(minus_error, _mm256_set1_ps(-ERRORS_OF_EDGES), weight),
-                _mm256_set1_ps(TINY),
-            );
-            let spread = _mm256_fmadd_ps(
-                _mm256_mul_ps(minus_error, _mm256_set1_ps(-ERRORS_OF_EXTENT)),
-                _mm256_sub_ps(high, low),
-                along_edges,
-            );
-            let (from, to) = (_mm256_sub_ps(ahead, spread), _mm256_add_ps(ahead, spread));
-            // What is no number may be in range.
-            let in_range = Self::both::<_CMP_NLT_UQ, _CMP_NGT_UQ>(
-                [to, _mm256_mul_ps(weight, _mm256_set1_ps(range.first))],
-                [from, _mm256_mul_ps(weight, _mm256_set1_ps(range.last))],
-            );
-            let error = _mm256_xor_ps(minus_error, sign);
-            let inside = Self::compare::<_CMP_GT_OQ>(edges.within.raw(), error);
-            let surely_in_range = Self::both::<_CMP_GE_OQ, _CMP_LE_OQ>(
-                [from, _mm256_mul_ps(weight, _mm256_set1_ps(range.surely_first))],
-                [to, _mm256_mul_ps(weight, _mm256_set1_ps(range.surely_last))],
-            );
-            let (from, to) = (_mm256_mul_ps(from, inverse), _mm256_mul_ps(to, inverse));
-            let (from, to) = (vector::Eight256::new(from), vector::Eight256::new(to));
-            Crossings { in_range, sure: inside & surely_in_range, from, to }
-        }
     }
 
     #[inline(always)]

@@ -1016,6 +1016,20 @@ mod x86 {
         }
     }
 
+    impl Avx512 {
+        /// # Safety
+        /// There must be what `intersect::x86::X86<true>` has.
+        #[inline(always)]
+        pub(crate) unsafe fn new(sixteen: __m512) -> Self {
+            Self(sixteen)
+        }
+
+        #[inline(always)]
+        pub(crate) fn raw(self) -> __m512 {
+            self.0
+        }
+    }
+
     impl<const AVX512: bool> Eight256<AVX512> {
         /// # Safety
         /// There must be what `intersect::x86::X86<AVX512>` has.

@@ -374,7 +374,7 @@ impl<'a, L: Simd> Frame<'a, L> {
                     if mask == 0 {
                         continue;
                     }
-                    mask & L::place_crossings(&edges, ray).in_range
+                    mask & edges.place(ray).in_range
                 }
                 None => block.taken(),
             };

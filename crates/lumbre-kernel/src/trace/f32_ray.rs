@@ -281,7 +281,7 @@ impl F32Ray {
     /// How the line of the ray passes the triangles of a block, and a bit for each that it may pass through.
     #[inline(always)]
     pub(crate) fn lines<L: Simd>(&self, block: &TriangleBlock) -> (u32, Lines<L::F32x8>) {
-        let (mask, lines) = Lines::of(L::f32_corners(block, simd::opaque(self)));
+        let (mask, lines) = Lines::of(L::sheared_corners(block, simd::opaque(self)));
         (mask & block.taken(), lines)
     }
 

@@ -127,7 +127,6 @@ impl<'a, 'd, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, 'd, GENE
             Outcome::Uncertain => Outcome::Uncertain,
         }
     }
-
 }
 
 /// The closest hit.

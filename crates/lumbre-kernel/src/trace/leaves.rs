@@ -92,7 +92,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
             let block = self.decider.block(place);
             let (mask, edges) = L::intersect_triangles(block, simd::opaque(&self.blocks));
             if mask != 0 {
-                let crossings = L::place_crossings(&edges, &self.blocks);
+                let crossings = edges.place(&self.blocks);
                 let stop = if G::IS_ANY {
                     self.any_triangle::<L>((place, block), mask, &crossings, ray)
                 } else {
