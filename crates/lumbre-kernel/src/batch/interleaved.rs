@@ -255,8 +255,8 @@ impl<'a, 'd, 'r, G: Goal, L: Simd> Interleaved<'a, 'd, 'r, G, L> {
                 hit |= bit(is_hit, slot);
                 continue;
             }
-            let t = hits.at.least_of(hits.met);
-            let which = hits.at.at_most(L::F32x8::splat(t)) & hits.met;
+            let t = hits.at.reduce_min(hits.met);
+            let which = hits.at.simd_le(L::F32x8::splat(t)) & hits.met;
             let lane = which.trailing_zeros() as usize % BLOCK;
             if own.nearest.take_nearest(self.decider, &mut own.ray, place, hits, pass, (lane, t)) {
                 own.slabs.end_at(watertight::beyond(own.ray.t_max()));

@@ -285,7 +285,7 @@ fn images<W: F32x16>(boxes: &[SixteenBoxes], row: [f32; 3]) -> [f32; 2] {
         high = high.max(reach + image);
         low = low.max(reach - image);
     }
-    [-low.most(), high.most()]
+    [-low.reduce_max(), high.reduce_max()]
 }
 
 /// A node's box, back from tree units.

@@ -256,9 +256,9 @@ impl SlabRows {
         [least, per_distance]: [f32; 2],
     ) {
         let distance = from.abs();
-        let margin = inverse.abs() * distance.times_plus(W::splat(per_distance), W::splat(least));
+        let margin = inverse.abs() * distance.mul_add(W::splat(per_distance), W::splat(least));
         inverse.store(&mut self.inverse[axis]);
-        from.times_from(inverse, W::splat(0.0) - margin).store(&mut self.near_offset[axis]);
-        from.times_from(inverse, margin).store(&mut self.far_offset[axis]);
+        from.neg_mul_add(inverse, W::splat(0.0) - margin).store(&mut self.near_offset[axis]);
+        from.neg_mul_add(inverse, margin).store(&mut self.far_offset[axis]);
     }
 }

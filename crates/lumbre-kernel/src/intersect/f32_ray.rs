@@ -19,6 +19,6 @@ pub(crate) struct F32Ray {
 /// The least of the edge functions, or of their opposites, whichever is more: how far within the triangle the line is.
 #[inline(always)]
 pub(crate) fn within<V: Vector>([u, v, w]: [V; 3]) -> V {
-    let opposite = u.max(v).max(w).turned_by(V::splat(-0.0));
+    let opposite = u.max(v).max(w).xor_sign(V::splat(-0.0));
     u.min(v).min(w).max(opposite)
 }

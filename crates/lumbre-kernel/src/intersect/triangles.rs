@@ -30,8 +30,8 @@ pub(crate) trait Shears {
             // No fused multiply-add: the same on every machine.
             return [across - shear_x * z, up - shear_y * z, z];
         };
-        let x = shear_x.times_from(z, across + V::splat(rest[0]));
-        [x, shear_y.times_from(z, up + V::splat(rest[1])), z]
+        let x = shear_x.neg_mul_add(z, across + V::splat(rest[0]));
+        [x, shear_y.neg_mul_add(z, up + V::splat(rest[1])), z]
     }
 }
 
@@ -117,18 +117,18 @@ impl<V: F32x8> Edges<V> {
     /// Of corners in the sheared space of the ray, and a bit for each triangle that is perhaps met.
     #[inline(always)]
     pub(super) fn of([x, y, z]: [[V; 3]; 3], ray: &BlockRay) -> (u32, Self) {
-        let u = x[2].times_minus(y[1], y[2] * x[1]);
-        let v = x[0].times_minus(y[2], y[0] * x[2]);
-        let w = x[1].times_minus(y[0], y[1] * x[0]);
+        let u = x[2].mul_sub(y[1], y[2] * x[1]);
+        let v = x[0].mul_sub(y[2], y[0] * x[2]);
+        let w = x[1].mul_sub(y[0], y[1] * x[0]);
         let within = within([u, v, w]);
-        let across = x[0].larger(y[0]).max(x[1].larger(y[1])).max(x[2].larger(y[2]));
-        let along = z[0].larger(z[1]).larger(z[2]);
+        let across = x[0].max_abs(y[0]).max(x[1].max_abs(y[1])).max(x[2].max_abs(y[2]));
+        let along = z[0].max_abs(z[1]).max_abs(z[2]);
         let size = across + along + V::splat(ray.least_size);
         let minus_error = (size * V::splat(-EDGE_ERROR))
-            .times_minus(size.times_plus(V::splat(SIZE_ERROR), across), V::splat(TINY));
+            .mul_sub(size.mul_add(V::splat(SIZE_ERROR), across), V::splat(TINY));
         let height_error = size * V::splat(HEIGHT_ERROR);
         let edges = Self { values: [u, v, w], heights: z, within, minus_error, height_error };
-        (minus_error.at_most(within), edges)
+        (minus_error.simd_le(within), edges)
     }
 
     /// Where along the ray that is.
@@ -137,22 +137,23 @@ impl<V: F32x8> Edges<V> {
         let &Self { values: [u, v, w], heights: z, within, minus_error, height_error } = self;
         let det = u + v + w;
         let weight = det.abs();
-        let of_c = det.times_plus(V::splat(ray.rest[2]), w * z[2]);
-        let height = v.times_plus(z[1], u * z[0]) + of_c;
-        let ahead = height.turned_by(V::splat(ray.turn).turned_by(det));
-        let inverse = V::splat(1.0).over(weight);
+        let of_c = det.mul_add(V::splat(ray.rest[2]), w * z[2]);
+        let height = v.mul_add(z[1], u * z[0]) + of_c;
+        let ahead = height.xor_sign(V::splat(ray.turn).xor_sign(det));
+        let inverse = V::splat(1.0) / weight;
         let low = z[0].min(z[1]).min(z[2]);
         let high = z[0].max(z[1]).max(z[2]);
-        let along_edges = height_error
-            .times_plus(minus_error.times_plus(V::splat(-ERRORS_OF_EDGES), weight), V::splat(TINY));
-        let spread = (minus_error * V::splat(-ERRORS_OF_EXTENT)).times_plus(high - low, along_edges);
+        let along_edges =
+            height_error.mul_add(minus_error.mul_add(V::splat(-ERRORS_OF_EDGES), weight), V::splat(TINY));
+        let spread = (minus_error * V::splat(-ERRORS_OF_EXTENT)).mul_add(high - low, along_edges);
         let (from, to) = (ahead - spread, ahead + spread);
         let range = &ray.range;
         // What is no number may be in range.
-        let is_out = to.below(weight * V::splat(range.first)) | (weight * V::splat(range.last)).below(from);
-        let is_inside = minus_error.turned_by(V::splat(-0.0)).below(within);
-        let is_surely_in_range = (weight * V::splat(range.surely_first)).at_most(from)
-            & to.at_most(weight * V::splat(range.surely_last));
+        let is_out =
+            to.simd_lt(weight * V::splat(range.first)) | (weight * V::splat(range.last)).simd_lt(from);
+        let is_inside = minus_error.xor_sign(V::splat(-0.0)).simd_lt(within);
+        let is_surely_in_range = (weight * V::splat(range.surely_first)).simd_le(from)
+            & to.simd_le(weight * V::splat(range.surely_last));
         Crossings {
             in_range: V::ALL & !is_out,
             sure: is_inside & is_surely_in_range,

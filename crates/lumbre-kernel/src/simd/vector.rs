@@ -1,7 +1,7 @@
 //! Eight or sixteen numbers at once: those of as many boxes, rays, triangles or bounding volumes.
 
 use std::mem::MaybeUninit;
-use std::ops::{Add, Index, Mul, Sub};
+use std::ops::{Add, Div, Index, Mul, Sub};
 
 use bytemuck::Zeroable;
 
@@ -27,7 +27,9 @@ impl<T: Copy> Row<T> {
 }
 
 /// Numbers side by side, for arithmetic. A mask has a bit for each; comparisons with a NaN are false.
-pub(crate) trait Vector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+pub(crate) trait Vector:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
     /// How many there are.
     const COUNT: usize;
     /// The mask of all.
@@ -37,12 +39,11 @@ pub(crate) trait Vector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Ou
     /// All the same.
     fn splat(value: f32) -> Self;
     /// `self * factor + summand`, rounded once or twice.
-    fn times_plus(self, factor: Self, summand: Self) -> Self;
+    fn mul_add(self, factor: Self, summand: Self) -> Self;
     /// `summand - self * factor`, alike.
-    fn times_from(self, factor: Self, summand: Self) -> Self;
+    fn neg_mul_add(self, factor: Self, summand: Self) -> Self;
     /// `self * factor - other`, alike.
-    fn times_minus(self, factor: Self, other: Self) -> Self;
-    fn over(self, divisor: Self) -> Self;
+    fn mul_sub(self, factor: Self, other: Self) -> Self;
     fn sqrt(self) -> Self;
     /// Either where one of the two is a NaN.
     fn min(self, other: Self) -> Self;
@@ -50,20 +51,20 @@ pub(crate) trait Vector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Ou
     fn abs(self) -> Self;
     /// The larger of the absolute values.
     #[inline(always)]
-    fn larger(self, other: Self) -> Self {
+    fn max_abs(self, other: Self) -> Self {
         self.abs().max(other.abs())
     }
     /// With the sign changed wherever the other has one.
-    fn turned_by(self, other: Self) -> Self;
-    fn at_most(self, other: Self) -> u32;
-    fn below(self, other: Self) -> u32;
+    fn xor_sign(self, other: Self) -> Self;
+    fn simd_le(self, other: Self) -> u32;
+    fn simd_lt(self, other: Self) -> u32;
 }
 
 /// Eight.
 pub(crate) trait F32x8: Vector<Array = [f32; 8]> + Zeroable {
     fn load(eight: &[f32; 8]) -> Self;
     /// The least of those in the mask, of which none is a NaN; infinity where there are none.
-    fn least_of(self, mask: u32) -> f32;
+    fn reduce_min(self, mask: u32) -> f32;
     /// That in a lane.
     fn lane(self, lane: usize) -> f32;
 }
@@ -83,13 +84,13 @@ pub(crate) trait F32x16: Vector<Array = [f32; WIDE]> + Zeroable {
     /// From a place, rounded, and what rounding took.
     fn parted_from(row: &Row<f64>, place: f64) -> (Self, Self);
     /// The largest of all; any of them where one is a NaN.
-    fn most(self) -> f32;
+    fn reduce_max(self) -> f32;
     /// The same of each of eight.
-    fn most_of_eight(them: [Self; 8]) -> [f32; 8];
+    fn reduce_max_of_eight(them: [Self; 8]) -> [f32; 8];
     /// Whether all are the same number.
     fn are_equal(self) -> bool;
     /// Everywhere the place half way between two: those inside a square of four by four that are across from one another.
-    fn middle(self) -> Self;
+    fn midpoint(self) -> Self;
     /// The first of them.
     fn first(self) -> f32;
     /// The first where the mask has a bit, else the second; bit by bit.
@@ -97,18 +98,18 @@ pub(crate) trait F32x16: Vector<Array = [f32; WIDE]> + Zeroable {
     /// The larger as far as that is not negative, else anything that is. Integers, which have the same order there, are compared
     /// faster where there are instructions for it.
     #[inline(always)]
-    fn later(self, other: Self) -> Self {
+    fn max_nonneg(self, other: Self) -> Self {
         self.max(other)
     }
     /// The smaller, or anything negative where one is.
     #[inline(always)]
-    fn earlier(self, other: Self) -> Self {
+    fn min_nonneg(self, other: Self) -> Self {
         self.min(other)
     }
     /// Where this, which is not negative, is no larger than the other.
     #[inline(always)]
-    fn no_later(self, other: Self) -> u32 {
-        self.at_most(other)
+    fn le_nonneg(self, other: Self) -> u32 {
+        self.simd_le(other)
     }
     /// Where the bits are more, as an integer.
     fn bits_above(self, other: i32) -> u32;
@@ -174,6 +175,7 @@ macro_rules! by_lane {
 by_lane!(add, Add, +=);
 by_lane!(sub, Sub, -=);
 by_lane!(mul, Mul, *=);
+by_lane!(div, Div, /=);
 
 impl<const N: usize> Vector for PortableVector<N> {
     const COUNT: usize = N;
@@ -190,26 +192,18 @@ impl<const N: usize> Vector for PortableVector<N> {
     }
 
     #[inline(always)]
-    fn times_plus(self, factor: Self, summand: Self) -> Self {
+    fn mul_add(self, factor: Self, summand: Self) -> Self {
         self * factor + summand
     }
 
     #[inline(always)]
-    fn times_from(self, factor: Self, summand: Self) -> Self {
+    fn neg_mul_add(self, factor: Self, summand: Self) -> Self {
         summand - self * factor
     }
 
     #[inline(always)]
-    fn times_minus(self, factor: Self, other: Self) -> Self {
+    fn mul_sub(self, factor: Self, other: Self) -> Self {
         self * factor - other
-    }
-
-    #[inline(always)]
-    fn over(mut self, divisor: Self) -> Self {
-        for lane in 0..N {
-            self.0[lane] /= divisor.0[lane];
-        }
-        self
     }
 
     #[inline(always)]
@@ -245,7 +239,7 @@ impl<const N: usize> Vector for PortableVector<N> {
     }
 
     #[inline(always)]
-    fn turned_by(mut self, other: Self) -> Self {
+    fn xor_sign(mut self, other: Self) -> Self {
         for lane in 0..N {
             self.0[lane] = f32::from_bits(self.0[lane].to_bits() ^ other.0[lane].to_bits() & (1 << 31));
         }
@@ -253,7 +247,7 @@ impl<const N: usize> Vector for PortableVector<N> {
     }
 
     #[inline(always)]
-    fn at_most(self, other: Self) -> u32 {
+    fn simd_le(self, other: Self) -> u32 {
         let mut mask = 0;
         for lane in 0..N {
             mask |= u32::from(self.0[lane] <= other.0[lane]) << lane;
@@ -262,7 +256,7 @@ impl<const N: usize> Vector for PortableVector<N> {
     }
 
     #[inline(always)]
-    fn below(self, other: Self) -> u32 {
+    fn simd_lt(self, other: Self) -> u32 {
         let mut mask = 0;
         for lane in 0..N {
             mask |= u32::from(self.0[lane] < other.0[lane]) << lane;
@@ -278,7 +272,7 @@ impl F32x8 for Portable8 {
     }
 
     #[inline(always)]
-    fn least_of(self, mask: u32) -> f32 {
+    fn reduce_min(self, mask: u32) -> f32 {
         let mut least = f32::INFINITY;
         for lane in 0..8 {
             least = if mask >> lane & 1 != 0 && self.0[lane] < least { self.0[lane] } else { least };
@@ -350,7 +344,7 @@ impl F32x16 for Portable16 {
     }
 
     #[inline(always)]
-    fn most(self) -> f32 {
+    fn reduce_max(self) -> f32 {
         let mut most = self.0[0];
         for lane in 1..WIDE {
             most = if self.0[lane] > most { self.0[lane] } else { most };
@@ -359,10 +353,10 @@ impl F32x16 for Portable16 {
     }
 
     #[inline(always)]
-    fn most_of_eight(them: [Self; 8]) -> [f32; 8] {
+    fn reduce_max_of_eight(them: [Self; 8]) -> [f32; 8] {
         let mut most = [0.0; 8];
         for (most, one) in most.iter_mut().zip(them) {
-            *most = one.most();
+            *most = one.reduce_max();
         }
         most
     }
@@ -377,7 +371,7 @@ impl F32x16 for Portable16 {
     }
 
     #[inline(always)]
-    fn middle(self) -> Self {
+    fn midpoint(self) -> Self {
         Self::splat(0.5 * (self.0[BEFORE_MIDDLE] + self.0[AFTER_MIDDLE]))
     }
 
@@ -449,7 +443,7 @@ pub(crate) use x86::{Avx2, Avx512, Eight256};
 mod x86 {
     use std::arch::x86_64::*;
     use std::mem::MaybeUninit;
-    use std::ops::{Add, Mul, Sub};
+    use std::ops::{Add, Div, Mul, Sub};
 
     use bytemuck::Zeroable;
 
@@ -504,6 +498,7 @@ mod x86 {
     operator!(add, Add, _mm512_add_ps, _mm256_add_ps);
     operator!(sub, Sub, _mm512_sub_ps, _mm256_sub_ps);
     operator!(mul, Mul, _mm512_mul_ps, _mm256_mul_ps);
+    operator!(div, Div, _mm512_div_ps, _mm256_div_ps);
 
     macro_rules! by_one {
         ($name:ident($($other:ident),*) $instruction:ident) => {
@@ -526,10 +521,9 @@ mod x86 {
             row.0
         }
 
-        by_one!(times_plus(factor, summand) _mm512_fmadd_ps);
-        by_one!(times_from(factor, summand) _mm512_fnmadd_ps);
-        by_one!(times_minus(factor, other) _mm512_fmsub_ps);
-        by_one!(over(divisor) _mm512_div_ps);
+        by_one!(mul_add(factor, summand) _mm512_fmadd_ps);
+        by_one!(neg_mul_add(factor, summand) _mm512_fnmadd_ps);
+        by_one!(mul_sub(factor, other) _mm512_fmsub_ps);
         by_one!(sqrt() _mm512_sqrt_ps);
         by_one!(min(other) _mm512_min_ps);
         by_one!(max(other) _mm512_max_ps);
@@ -547,14 +541,14 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn larger(self, other: Self) -> Self {
+        fn max_abs(self, other: Self) -> Self {
             // The maximum by magnitude, without its sign.
             // SAFETY: see the type.
             unsafe { Self(_mm512_range_ps::<0b1011>(self.0, other.0)) }
         }
 
         #[inline(always)]
-        fn turned_by(self, other: Self) -> Self {
+        fn xor_sign(self, other: Self) -> Self {
             // SAFETY: see the type.
             unsafe {
                 let sign = _mm512_and_ps(other.0, _mm512_castsi512_ps(_mm512_set1_epi32(SIGN)));
@@ -563,13 +557,13 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn at_most(self, other: Self) -> u32 {
+        fn simd_le(self, other: Self) -> u32 {
             // SAFETY: see the type.
             unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0)) }
         }
 
         #[inline(always)]
-        fn below(self, other: Self) -> u32 {
+        fn simd_lt(self, other: Self) -> u32 {
             // SAFETY: see the type.
             unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0)) }
         }
@@ -646,18 +640,18 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn most(self) -> f32 {
+        fn reduce_max(self) -> f32 {
             // SAFETY: see the type.
             unsafe {
                 let low = _mm512_castps512_ps256(self.0);
-                most_of_eight(_mm256_max_ps(low, _mm512_extractf32x8_ps::<1>(self.0)))
+                max_of_eight(_mm256_max_ps(low, _mm512_extractf32x8_ps::<1>(self.0)))
             }
         }
 
         #[inline(always)]
-        fn most_of_eight(them: [Self; 8]) -> [f32; 8] {
-            let abcd = Self::most_of_four(them[0], them[1], them[2], them[3]);
-            let efgh = Self::most_of_four(them[4], them[5], them[6], them[7]);
+        fn reduce_max_of_eight(them: [Self; 8]) -> [f32; 8] {
+            let abcd = Self::max_of_four(them[0], them[1], them[2], them[3]);
+            let efgh = Self::max_of_four(them[4], them[5], them[6], them[7]);
             let mut most = [0.0; 8];
             // SAFETY: see the type. The store is of eight f32.
             unsafe {
@@ -680,7 +674,7 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn middle(self) -> Self {
+        fn midpoint(self) -> Self {
             // SAFETY: see the type.
             unsafe {
                 let before = _mm512_permutexvar_ps(_mm512_set1_epi32(BEFORE_MIDDLE as i32), self.0);
@@ -702,21 +696,21 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn later(self, other: Self) -> Self {
+        fn max_nonneg(self, other: Self) -> Self {
             let (a, b) = (self.integers(), other.integers());
             // SAFETY: see the type.
             unsafe { Self(_mm512_castsi512_ps(_mm512_max_epi32(a, b))) }
         }
 
         #[inline(always)]
-        fn earlier(self, other: Self) -> Self {
+        fn min_nonneg(self, other: Self) -> Self {
             let (a, b) = (self.integers(), other.integers());
             // SAFETY: see the type.
             unsafe { Self(_mm512_castsi512_ps(_mm512_min_epi32(a, b))) }
         }
 
         #[inline(always)]
-        fn no_later(self, other: Self) -> u32 {
+        fn le_nonneg(self, other: Self) -> u32 {
             // SAFETY: see the type.
             unsafe { u32::from(_mm512_cmple_epi32_mask(self.integers(), other.integers())) }
         }
@@ -808,7 +802,7 @@ mod x86 {
 
         /// In every four lanes, the largest that four have in those.
         #[inline(always)]
-        fn most_of_four(Self(a): Self, Self(b): Self, Self(c): Self, Self(d): Self) -> __m512 {
+        fn max_of_four(Self(a): Self, Self(b): Self, Self(c): Self, Self(d): Self) -> __m512 {
             // SAFETY: see the type.
             unsafe {
                 let ab = _mm512_max_ps(_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
@@ -829,7 +823,7 @@ mod x86 {
     /// # Safety
     /// There must be AVX2.
     #[inline(always)]
-    unsafe fn most_of_eight(v: __m256) -> f32 {
+    unsafe fn max_of_eight(v: __m256) -> f32 {
         // SAFETY: see above.
         unsafe {
             let v = _mm_max_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps::<1>(v));
@@ -883,7 +877,7 @@ mod x86 {
 
         /// In every four lanes of eight, the largest that four have in those or eight behind.
         #[inline(always)]
-        fn most_of_four(a: Self, b: Self, c: Self, d: Self) -> __m256 {
+        fn max_of_four(a: Self, b: Self, c: Self, d: Self) -> __m256 {
             // SAFETY: see the type.
             unsafe {
                 let a = _mm256_max_ps(a.0[0], a.0[1]);
@@ -945,10 +939,9 @@ mod x86 {
             eight
         }
 
-        by_one!(times_plus(factor, summand) _mm256_fmadd_ps);
-        by_one!(times_from(factor, summand) _mm256_fnmadd_ps);
-        by_one!(times_minus(factor, other) _mm256_fmsub_ps);
-        by_one!(over(divisor) _mm256_div_ps);
+        by_one!(mul_add(factor, summand) _mm256_fmadd_ps);
+        by_one!(neg_mul_add(factor, summand) _mm256_fnmadd_ps);
+        by_one!(mul_sub(factor, other) _mm256_fmsub_ps);
         by_one!(sqrt() _mm256_sqrt_ps);
         by_one!(min(other) _mm256_min_ps);
         by_one!(max(other) _mm256_max_ps);
@@ -966,7 +959,7 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn larger(self, other: Self) -> Self {
+        fn max_abs(self, other: Self) -> Self {
             // SAFETY: see the type.
             unsafe {
                 if AVX512 {
@@ -983,7 +976,7 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn turned_by(self, other: Self) -> Self {
+        fn xor_sign(self, other: Self) -> Self {
             // SAFETY: see the type.
             unsafe {
                 let sign = _mm256_and_ps(other.0, _mm256_castsi256_ps(_mm256_set1_epi32(SIGN)));
@@ -992,7 +985,7 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn at_most(self, other: Self) -> u32 {
+        fn simd_le(self, other: Self) -> u32 {
             // SAFETY: see the type.
             unsafe {
                 if AVX512 {
@@ -1004,7 +997,7 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn below(self, other: Self) -> u32 {
+        fn simd_lt(self, other: Self) -> u32 {
             // SAFETY: see the type.
             unsafe {
                 if AVX512 {
@@ -1052,7 +1045,7 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn least_of(self, mask: u32) -> f32 {
+        fn reduce_min(self, mask: u32) -> f32 {
             // SAFETY: see the type.
             unsafe {
                 let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
@@ -1095,16 +1088,15 @@ mod x86 {
             row.0
         }
 
-        by_halves!(times_plus(factor, summand));
-        by_halves!(times_from(factor, summand));
-        by_halves!(times_minus(factor, other));
-        by_halves!(over(divisor));
+        by_halves!(mul_add(factor, summand));
+        by_halves!(neg_mul_add(factor, summand));
+        by_halves!(mul_sub(factor, other));
         by_halves!(sqrt());
         by_halves!(min(other));
         by_halves!(max(other));
         by_halves!(abs());
-        by_halves!(larger(other));
-        by_halves!(turned_by(other));
+        by_halves!(max_abs(other));
+        by_halves!(xor_sign(other));
 
         #[inline(always)]
         fn splat(value: f32) -> Self {
@@ -1112,14 +1104,14 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn at_most(self, other: Self) -> u32 {
+        fn simd_le(self, other: Self) -> u32 {
             let ([a, b], [c, d]) = (self.0, other.0);
             // SAFETY: see the type.
             unsafe { Self::masks([_mm256_cmp_ps::<_CMP_LE_OQ>(a, c), _mm256_cmp_ps::<_CMP_LE_OQ>(b, d)]) }
         }
 
         #[inline(always)]
-        fn below(self, other: Self) -> u32 {
+        fn simd_lt(self, other: Self) -> u32 {
             let ([a, b], [c, d]) = (self.0, other.0);
             // SAFETY: see the type.
             unsafe { Self::masks([_mm256_cmp_ps::<_CMP_LT_OQ>(a, c), _mm256_cmp_ps::<_CMP_LT_OQ>(b, d)]) }
@@ -1219,15 +1211,15 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn most(self) -> f32 {
+        fn reduce_max(self) -> f32 {
             // SAFETY: see the type.
-            unsafe { most_of_eight(_mm256_max_ps(self.0[0], self.0[1])) }
+            unsafe { max_of_eight(_mm256_max_ps(self.0[0], self.0[1])) }
         }
 
         #[inline(always)]
-        fn most_of_eight(them: [Self; 8]) -> [f32; 8] {
-            let abcd = Self::most_of_four(them[0], them[1], them[2], them[3]);
-            let efgh = Self::most_of_four(them[4], them[5], them[6], them[7]);
+        fn reduce_max_of_eight(them: [Self; 8]) -> [f32; 8] {
+            let abcd = Self::max_of_four(them[0], them[1], them[2], them[3]);
+            let efgh = Self::max_of_four(them[4], them[5], them[6], them[7]);
             let mut most = [0.0; 8];
             // SAFETY: see the type. The store is of eight f32.
             unsafe {
@@ -1251,7 +1243,7 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn middle(self) -> Self {
+        fn midpoint(self) -> Self {
             let [low, high] = self.0;
             // SAFETY: see the type.
             unsafe {
@@ -1282,21 +1274,21 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn later(self, other: Self) -> Self {
+        fn max_nonneg(self, other: Self) -> Self {
             let ([a, b], [c, d]) = (self.integers(), other.integers());
             // SAFETY: see the type.
             unsafe { Self::of([_mm256_max_epi32(a, c), _mm256_max_epi32(b, d)]) }
         }
 
         #[inline(always)]
-        fn earlier(self, other: Self) -> Self {
+        fn min_nonneg(self, other: Self) -> Self {
             let ([a, b], [c, d]) = (self.integers(), other.integers());
             // SAFETY: see the type.
             unsafe { Self::of([_mm256_min_epi32(a, c), _mm256_min_epi32(b, d)]) }
         }
 
         #[inline(always)]
-        fn no_later(self, other: Self) -> u32 {
+        fn le_nonneg(self, other: Self) -> u32 {
             let ([a, b], [c, d]) = (self.integers(), other.integers());
             // SAFETY: see the type.
             let above = unsafe { Self::of([_mm256_cmpgt_epi32(a, c), _mm256_cmpgt_epi32(b, d)]) };

@@ -962,7 +962,7 @@ fn what_is_precise_at_once_is_precise_by_its_extent() {
         }
         let [products, z] = [products, z].map(|rows| rows.map(|row| Numbers::load(&row)));
         let (within, sum) = (Numbers::load(&within), Numbers::load(&sum));
-        let largest = products[0].larger(products[1]).larger(products[2]);
+        let largest = products[0].max_abs(products[1]).max_abs(products[2]);
         // Where triangles are of any size, nothing is at once.
         let [at_once, by_extent] = [side, f32::MAX].map(|longest_side| {
             Precise::new(space_per_unit, longest_side).of(0xff, largest, within, sum, z) & 0xff

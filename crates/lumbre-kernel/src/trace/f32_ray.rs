@@ -72,7 +72,7 @@ impl<E: Vector> Lines<E> {
         let products = [x[2] * y[1], x[0] * y[2], x[1] * y[0]];
         let edges = [products[0] - y[2] * x[1], products[1] - y[0] * x[2], products[2] - y[1] * x[0]];
         let within = within(edges);
-        (E::splat(0.0).at_most(within), Self { products, edges, within, heights })
+        (E::splat(0.0).simd_le(within), Self { products, edges, within, heights })
     }
 
     /// What is needed of triangles that it may pass through, and a bit for each of the mask that has to be looked at closer.
@@ -80,7 +80,7 @@ impl<E: Vector> Lines<E> {
     pub(crate) fn pass(self, mask: u32, precise: &Precise) -> (u32, Pass<E>) {
         let Self { products: [bc, ca, ab], edges: [u, v, w], within, heights: z } = self;
         let det = u + v + w;
-        let largest = bc.larger(ca).larger(ab);
+        let largest = bc.max_abs(ca).max_abs(ab);
         let uncertain = mask & !precise.of(mask, largest, within, det, z);
         (uncertain, Pass { height: u * z[0] + v * z[1] + w * z[2], weights: [v, w, det] })
     }
@@ -175,7 +175,7 @@ impl Nearest {
         (lane, t): (usize, f32),
     ) -> bool {
         let &LaneHits { met, uncertain, at } = crossing;
-        let others = at.at_most(E::splat(t)) & met & !(1 << lane);
+        let others = at.simd_le(E::splat(t)) & met & !(1 << lane);
         if uncertain | others == 0 && t < ray.t_max() {
             *self = Self::new(place, lane as u32, pass.weights_of(lane));
             ray.end_at(t);
@@ -290,8 +290,8 @@ impl F32Ray {
     pub(crate) fn cross<E: F32x8>(&self, mask: u32, pass: &Pass<E>) -> (u32, E) {
         // Read again: most lines pass through few blocks.
         let ray = simd::opaque(self);
-        let t = pass.height.over(pass.weights[2]) * E::splat(ray.minus_inverse);
-        (mask & E::splat(ray.t_min()).at_most(t) & t.at_most(E::splat(ray.t_max())), t)
+        let t = pass.height / pass.weights[2] * E::splat(ray.minus_inverse);
+        (mask & E::splat(ray.t_min()).simd_le(t) & t.simd_le(E::splat(ray.t_max())), t)
     }
 
     /// Which triangles of a block the ray meets; `None` where its line passes through none.

@@ -130,16 +130,16 @@ impl Precise {
     /// heights of the corners. Other bits mean nothing.
     #[inline(always)]
     pub(crate) fn of<V: Vector>(&self, mask: u32, largest: V, within: V, sum: V, z: [V; 3]) -> u32 {
-        let is_strict = V::splat(0.0).below(within);
+        let is_strict = V::splat(0.0).simd_lt(within);
         let largest = largest + V::splat(TINY);
         let sum = sum.abs();
-        let at_once = is_strict & largest.at_most(sum * V::splat(self.at_once));
+        let at_once = is_strict & largest.simd_le(sum * V::splat(self.at_once));
         if mask & !at_once == 0 {
             return at_once;
         }
         let extent = z[0].max(z[1]).max(z[2]) - z[0].min(z[1]).min(z[2]);
         let least = largest * (extent + V::splat(self.little));
-        at_once | is_strict & least.at_most(sum * V::splat(self.most))
+        at_once | is_strict & least.simd_le(sum * V::splat(self.most))
     }
 }
 
