@@ -11,7 +11,7 @@ use crate::intersect::box_ray::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs}
 use crate::intersect::f32_ray::F32Ray;
 use crate::intersect::watertight::{BlockRay, EdgeTest, HeightRange, Inside, Shear, edge_test};
 use crate::ray32::Ray32;
-use crate::simd::vector::{Portable8, Portable16};
+use crate::simd::portable::{Portable8, Portable16};
 use crate::simd::{F32x8, Row, Vector, WIDE};
 use crate::tree::BLOCK;
 use crate::tree::Corners;

@@ -15,7 +15,7 @@ use crate::intersect::box_ray::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs}
 use crate::intersect::f32_ray::F32Ray;
 use crate::intersect::watertight::{BlockRay, EdgeTest, FAR, HeightRange, Inside, ROUNDINGS, Shear};
 use crate::ray32::Ray32;
-use crate::simd::vector::{Avx2, Avx512, Eight256};
+use crate::simd::x86::{Avx2, Avx512, Eight256};
 use crate::simd::{self, F32x16, Row, WIDE};
 use crate::tree::BLOCK;
 use crate::tree::Corners;
