@@ -165,6 +165,20 @@ impl<G: Goal> Precision for Picture<G> {
         let (local, limit) = (LocalRay::new(*simd::opaque(local)), ray.t_max);
         Search { tree, picture, from: Start::WHOLE, ray, local, limit }.run::<G, L, true>()
     }
+
+    // Leaves of anything but triangles keep single rays busy.
+    #[inline(always)]
+    fn interleave<L: Simd>(
+        decider: &Decider,
+        _: bool,
+        rays: &[PictureRay],
+        positions: &[usize],
+        sink: &mut impl Sink<Option<Crossing>>,
+    ) {
+        for &i in positions {
+            sink.put(i, Self::traverse_alone::<L>(decider, simd::opaque(&rays[i])));
+        }
+    }
 }
 
 /// The answers of a piece in a tree of anything.

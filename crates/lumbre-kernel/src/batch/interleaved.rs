@@ -1,25 +1,83 @@
-//! Many rays interleaved, so that the arithmetic of some fills the memory and branch latency of others: rays in single precision, in
-//! trees of triangles.
+//! Many rays interleaved, so that the arithmetic of some fills the memory and branch latency of others.
 //!
 //! Up to 64 rays stand in slots. In each turn, those that are at nodes, or those that are at leaves, take a step in short loops with
-//! few branches: which slots a loop is for is told by a mask that the loop before it made.
+//! few branches: which slots a loop is for is told by a mask that the loop before it made. Triangles are tested for two rays at a time,
+//! each at a block of its own: eight of the one and eight of the other fill a vector of sixteen.
 
 use bytemuck::Zeroable;
 
 use super::sink::Sink;
 use crate::intersect::STACK;
 use crate::intersect::box_ray::Slabs;
-use crate::intersect::f32_ray::F32Ray;
-use crate::intersect::{self, Simd, Slots, watertight};
-use crate::ray32::{Hit32, Ray32};
-use crate::simd::{self, F32x8, F32x16, Vector, WIDE};
+use crate::intersect::{self, Simd, Slots};
+use crate::simd::{self, F32x16, Vector, WIDE};
 use crate::trace::decide::Decider;
-use crate::trace::f32_ray::{Nearest, Passed, SOME_HIT};
 use crate::trace::stack::Goal;
-use crate::trace::{LaneHits, Outcome};
+use crate::trace::{LaneHits, Outcome, Stop};
 use crate::tree::BLOCK;
 use crate::tree::node::{Node, WIDTH, tag};
-use crate::tree::triangle_block::Blocks;
+use crate::tree::triangle_block::{Blocks, TriangleBlock};
+
+/// A ray in a slot, in either precision.
+pub(super) trait RaySlot<'a, 'd, L: Simd>: Sized {
+    type Goal: Goal;
+    type Ray;
+    type Answer;
+    /// Whether the tree has leaves of anything but triangles.
+    const GENERAL: bool;
+    /// How its line passes the triangles of a block, and how two lines do, each those of its block.
+    type Pass;
+    type Passes: Copy + Zeroable;
+    /// Where it hits each triangle.
+    type At: Copy + Zeroable;
+
+    /// An empty slot.
+    fn new(decider: &'d Decider<'a>) -> Self;
+    /// Starts with a ray; `None` where it is not sound, or starts too far away for single precision.
+    fn start(&mut self, decider: &'d Decider<'a>, ray: &Self::Ray) -> Option<Slabs>;
+    /// How the lines of two pass the triangles of two blocks, each those of its own.
+    fn pass_by_two(
+        decider: &Decider,
+        slots: [&Self; 2],
+        blocks: [&TriangleBlock; 2],
+    ) -> (PassedLanes, Self::Passes);
+    /// That of one of the two: `which` is 0 or 1.
+    fn one_of(passes: &Self::Passes, which: usize) -> Self::Pass;
+    /// Which triangles in the mask it hits, and where.
+    fn intersect(&self, mask: u32, pass: &Self::Pass) -> LaneHits<Self::At>;
+    /// Whether it hits any of these, which are to be decided exactly.
+    fn hits_any(&self, decider: &Decider, ray: &Self::Ray, block: u32, uncertain: u32) -> Outcome<bool>;
+    /// Takes the closest hit in a block, if it is closer than the best; false where that is uncertain.
+    fn take_nearest(
+        &mut self,
+        decider: &Decider,
+        ray: &Self::Ray,
+        block: u32,
+        hits: &LaneHits<Self::At>,
+        pass: &Self::Pass,
+        slabs: &mut Slabs,
+    ) -> bool;
+    /// Tests what has no bounds.
+    #[inline(always)]
+    fn test_infinite(&mut self, _ray: &Self::Ray, _slabs: &mut Slabs) -> Option<Stop> {
+        None
+    }
+    /// Tests a leaf of anything but triangles, as a single ray does.
+    #[inline(always)]
+    fn test_leaf(&mut self, _leaf: u32, _ray: &Self::Ray, _slabs: &mut Slabs) -> Option<Stop> {
+        None
+    }
+    /// What was found; `is_hit` where any hit will do.
+    fn answer(&mut self, decider: &Decider, ray: &Self::Ray, is_hit: bool) -> Outcome<Self::Answer>;
+}
+
+/// The triangles of two blocks that two lines pass: eight bits for the first, and eight for the second.
+pub(super) struct PassedLanes {
+    /// Those that the rays may hit.
+    pub(super) mask: u32,
+    /// Those that are to be decided exactly.
+    pub(super) uncertain: u32,
+}
 
 /// A bit for each in a word.
 const SLOTS: usize = 64;
@@ -33,14 +91,14 @@ const ANSWERED: usize = usize::MAX;
 const DONE: u32 = tag::reference(tag::RETURN, 0);
 const HIT: u32 = tag::reference(tag::RETURN, 1);
 
-/// A ray: what nodes are tested with is a cache line, and what triangles are, with the nearest hit, the next.
+type Entry<'a, 'd, R, L> = <<R as RaySlot<'a, 'd, L>>::Goal as Goal>::Entry;
+
+/// A ray: what nodes are tested with is a cache line, and what triangles are, the next.
 #[repr(C, align(64))]
-struct Slot {
+struct Slot<R> {
     slabs: Slabs,
     position: usize,
-    /// Ends at the nearest hit.
-    ray: F32Ray,
-    nearest: Nearest,
+    ray: R,
 }
 
 /// The positions of the bits that are set, the lowest first.
@@ -55,6 +113,30 @@ impl Iterator for Bits {
         let first = self.0.trailing_zeros();
         self.0 &= self.0.wrapping_sub(1);
         (first < u64::BITS).then_some(first as usize % SLOTS)
+    }
+}
+
+impl Bits {
+    /// Two at a time; the last of an odd number comes with itself.
+    #[inline(always)]
+    fn by_two(self) -> ByTwo {
+        ByTwo(self)
+    }
+}
+
+/// See [`Bits::by_two`].
+struct ByTwo(Bits);
+
+impl Iterator for ByTwo {
+    type Item = [usize; 2];
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<[usize; 2]> {
+        let Self(bits) = self;
+        match (bits.next(), bits.next()) {
+            (Some(first), second) => Some([first, second.unwrap_or(first)]),
+            (None, _) => None,
+        }
     }
 }
 
@@ -74,11 +156,12 @@ fn rank(slots: u64, slot: usize) -> usize {
 #[repr(align(64))]
 struct References([u32; SLOTS]);
 
-/// A bit for each ray that is at a node, at a leaf, and done.
+/// A bit for each ray that is at a node, at a leaf of triangles, at another leaf, and done.
 #[derive(Clone, Copy)]
 struct Stations {
     nodes: u64,
-    leaves: u64,
+    triangles: u64,
+    others: u64,
     done: u64,
 }
 
@@ -89,50 +172,58 @@ impl References {
     }
 
     #[inline(always)]
-    fn stations<W: F32x16>(&self) -> Stations {
-        /// The last reference to a node, in the order of signed integers; those that are done are negative.
+    fn stations<W: F32x16, const GENERAL: bool>(&self) -> Stations {
+        /// The last reference of each kind, in the order of signed integers.
         const LAST_NODE: i32 = tag::reference(tag::INNER, tag::PLACE) as i32;
-        const {
-            assert!(
-                LAST_NODE > 0
-                    && tag::reference(tag::TRIANGLES, tag::PLACE) as i32 > LAST_NODE
-                    && (DONE as i32) < 0
-            )
-        };
+        const LAST_TRIANGLES: i32 = tag::reference(tag::TRIANGLES, tag::PLACE) as i32;
+        const BEFORE_DONE: i32 = DONE as i32 - 1;
+        const { assert!(LAST_NODE > 0 && LAST_TRIANGLES > LAST_NODE && BEFORE_DONE < 0) };
         let (rows, _) = self.0.as_chunks::<WIDE>();
-        let (mut leaves, mut done) = (0, 0);
+        let (mut leaves, mut others, mut negative, mut done) = (0, 0, 0, 0);
         for (i, row) in rows.iter().enumerate() {
             let row = W::load(bytemuck::cast_ref(row));
             let above = |last: i32| u64::from(row.bits_above(last)) << (WIDE * i);
-            done |= !above(-1) & 0xffff << (WIDE * i);
+            negative |= !above(-1) & 0xffff << (WIDE * i);
             leaves |= above(LAST_NODE);
+            if GENERAL {
+                others |= above(LAST_TRIANGLES);
+                done |= above(BEFORE_DONE);
+            }
         }
-        Stations { nodes: !(leaves | done), leaves, done }
+        let nodes = !(leaves | negative);
+        if !GENERAL {
+            return Stations { nodes, triangles: leaves, others: 0, done: negative };
+        }
+        // Of the negative ones, those that are done come last.
+        done &= negative;
+        Stations { nodes, triangles: leaves & !others, others: others | negative & !done, done }
     }
 }
 
 /// All rays in slots, and what one loop hands on to another.
-struct Interleaved<'a, 'd, 'r, G: Goal, L: Simd> {
+struct Interleaved<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Simd> {
     decider: &'d Decider<'a>,
     nodes: &'a [Node],
     blocks: Blocks<'a>,
-    rays: &'r [Ray32],
-    slots: Box<[Slot; SLOTS]>,
-    stacks: Box<[Slots<G::Entry>; SLOTS]>,
+    rays: &'r [R::Ray],
+    slots: Box<[Slot<R>; SLOTS]>,
+    stacks: Box<[Slots<Entry<'a, 'd, R, L>>; SLOTS]>,
     references: References,
     /// The nodes that they come from.
     parents: References,
-    /// Which children of its node each may hit.
+    /// Which children of its node, or triangles of its block, each may hit.
     masks: [u32; SLOTS],
     /// Where each enters the bounding boxes of the children.
     enters: [L::F32x16; SLOTS],
-    /// How each passes the triangles of its block.
-    passed: [Passed<L::F32x8>; SLOTS],
+    passes: [R::Passes; SLOTS / 2],
+    hits: [LaneHits<R::At>; SLOTS],
+    /// Which triangles are to be decided exactly.
+    uncertain: [u32; SLOTS],
 }
 
-impl<'a, 'd, 'r, G: Goal, L: Simd> Interleaved<'a, 'd, 'r, G, L> {
+impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Simd> Interleaved<'a, 'd, 'r, R, L> {
     #[inline(always)]
-    fn new(decider: &'d Decider<'a>, rays: &'r [Ray32]) -> Self {
+    fn new(decider: &'d Decider<'a>, rays: &'r [R::Ray]) -> Self {
         Self {
             decider,
             nodes: decider.nodes(),
@@ -140,48 +231,56 @@ impl<'a, 'd, 'r, G: Goal, L: Simd> Interleaved<'a, 'd, 'r, G, L> {
             rays,
             slots: Box::new(std::array::from_fn(
                 #[inline(always)]
-                |_| Slot {
-                    slabs: Slabs::ZERO,
-                    position: ANSWERED,
-                    ray: F32Ray::of_none(),
-                    nearest: Nearest::NONE,
-                },
+                |_| Slot { ray: R::new(decider), slabs: Slabs::ZERO, position: ANSWERED },
             )),
             stacks: Slots::many(),
             references: References([DONE; SLOTS]),
             parents: References([DONE; SLOTS]),
             masks: [0; SLOTS],
             enters: [L::F32x16::splat(0.0); SLOTS],
-            passed: [Zeroable::zeroed(); SLOTS],
+            passes: [R::Passes::zeroed(); SLOTS / 2],
+            hits: [LaneHits::zeroed(); SLOTS],
+            uncertain: [0; SLOTS],
         }
     }
 
     /// What is at the bottom of every stack.
     #[inline(always)]
-    fn bottom() -> G::Entry {
-        G::entry(DONE)
+    fn bottom() -> Entry<'a, 'd, R, L> {
+        R::Goal::entry(DONE)
     }
 
-    /// Starts with a ray at the root; false where the ray has to be answered otherwise.
+    /// Starts with a ray at the root; false where the exact traversal has to answer.
     #[inline(always)]
     fn start(&mut self, slot: usize, position: usize) -> bool {
         let ray = simd::opaque(&self.rays[position]);
-        let start = self.decider.start;
-        let Some(slabs) = L::start_f32(start, ray) else { return false };
         let own = &mut self.slots[slot];
-        own.ray = L::start_f32_blocks(start, ray, &slabs);
-        (own.slabs, own.position, own.nearest) = (slabs, position, Nearest::NONE);
+        let Some(slabs) = own.ray.start(self.decider, ray) else { return false };
+        (own.slabs, own.position) = (slabs, position);
         let stack = &mut self.stacks[slot];
         stack.clear();
         stack.push(Self::bottom());
-        *self.references.of(slot) = start.root;
+        let reference = self.references.of(slot);
+        *reference = self.decider.start.root;
+        if R::GENERAL
+            && let Some(stop) = own.ray.test_infinite(ray, &mut own.slabs)
+        {
+            *reference = if stop == Stop::Hit { HIT } else { DONE };
+            return stop == Stop::Hit;
+        }
         true
+    }
+
+    /// The ray of a slot, as it was asked.
+    #[inline(always)]
+    fn ray(&self, slot: usize) -> &'r R::Ray {
+        &self.rays[self.slots[slot].position]
     }
 
     /// Those that are at nodes go on to the child that comes first, or to the top of their stacks.
     #[inline(always)]
-    fn step_nodes(&mut self, at_nodes: u64, sink: &mut impl Sink<Option<Hit32>>) {
-        let too_deep = if G::IS_ANY { self.step_any(at_nodes) } else { self.step_closest(at_nodes) };
+    fn step_nodes(&mut self, at_nodes: u64, sink: &mut impl Sink<R::Answer>) {
+        let too_deep = if R::Goal::IS_ANY { self.step_any(at_nodes) } else { self.step_closest(at_nodes) };
         self.give_up(too_deep, sink);
     }
 
@@ -195,7 +294,7 @@ impl<'a, 'd, 'r, G: Goal, L: Simd> Interleaved<'a, 'd, 'r, G, L> {
             let slabs = simd::opaque(&self.slots[slot].slabs);
             let (mask, enter) = intersect::intersect_boxes::<L::F32x16>(node, slabs);
             let stack = &mut self.stacks[slot];
-            *reference = G::push_and_pop::<L>(node, mask, enter, stack);
+            *reference = R::Goal::push_and_pop::<L>(node, mask, enter, stack);
             too_deep |= bit(stack.len() > STACK - WIDTH, slot);
         }
         too_deep
@@ -224,58 +323,105 @@ impl<'a, 'd, 'r, G: Goal, L: Simd> Interleaved<'a, 'd, 'r, G, L> {
             let stack = &mut self.stacks[slot];
             let node = &nodes[*self.parents.of(slot) as usize];
             let (mask, enter) = (self.masks[slot], self.enters[rank(at_nodes, slot)]);
-            *self.references.of(slot) = G::push_and_pop::<L>(node, mask, enter, stack);
+            *self.references.of(slot) = R::Goal::push_and_pop::<L>(node, mask, enter, stack);
             too_deep |= bit(stack.len() > STACK - WIDTH, slot);
         }
         self.pop(none);
         too_deep
     }
 
-    /// Those that are at leaves go on to the next block, or to the top of their stacks.
+    /// Those that are at leaves of triangles go on to the next block, or to the top of their stacks.
     #[inline(always)]
-    fn step_leaves(&mut self, at_leaves: u64) {
-        let precise = &self.decider.start.precise;
-        let (mut passing, mut last, mut hit) = (0, 0, 0);
-        for slot in Bits(at_leaves) {
-            let block = self.blocks.block(self.references.0[slot] & tag::PLACE);
-            let own = &self.slots[slot].ray;
-            let (mask, lines) = own.lines::<L>(block);
-            let (uncertain, pass) = lines.pass(mask, precise);
-            let (met, at) = own.cross(mask & !uncertain, &pass);
-            self.passed[slot] = (LaneHits { met, uncertain, at }, pass);
-            passing |= bit(met | uncertain != 0, slot);
-            last |= bit(block.is_last(), slot);
+    fn step_triangles(&mut self, at_leaves: u64, sink: &mut impl Sink<R::Answer>) {
+        let (mut passing, mut last) = (0, 0);
+        for (at, [first, second]) in Bits(at_leaves).by_two().enumerate() {
+            let block_of = |slot: usize| self.blocks.block(self.references.0[slot] & tag::PLACE);
+            let (one, other) = (block_of(first), block_of(second));
+            let rays = [&self.slots[first].ray, &self.slots[second].ray];
+            let (both, passes) = R::pass_by_two(self.decider, rays, [one, other]);
+            self.passes[at % (SLOTS / 2)] = passes;
+            let halves = |mask: u32| (mask & L::F32x8::ALL, mask >> BLOCK);
+            let of_both = |(of_first, of_second)| bit(of_first != 0, first) | bit(of_second != 0, second);
+            (self.masks[first], self.masks[second]) = halves(both.mask);
+            (self.uncertain[first], self.uncertain[second]) = halves(both.uncertain);
+            passing |= of_both(halves(both.mask | both.uncertain));
+            last |= bit(one.is_last(), first) | bit(other.is_last(), second);
         }
+        let (mut met, mut undecided) = (0, 0);
         for slot in Bits(passing) {
-            let place = *self.references.of(slot) & tag::PLACE;
-            let own = &mut self.slots[slot];
-            let (hits, pass) = &self.passed[slot];
-            if G::IS_ANY {
-                let is_hit = hits.met != 0 || own.ray.meets_exactly(self.blocks.block(place), hits.uncertain);
-                hit |= bit(is_hit, slot);
-                continue;
-            }
-            let t = hits.at.reduce_min(hits.met);
-            let which = hits.at.simd_le(L::F32x8::splat(t)) & hits.met;
-            let lane = which.trailing_zeros() as usize % BLOCK;
-            if own.nearest.take_nearest(self.decider, &mut own.ray, place, hits, pass, (lane, t)) {
-                own.slabs.end_at(watertight::beyond(own.ray.t_max()));
+            let rank = rank(at_leaves, slot);
+            let pass = R::one_of(&self.passes[rank / 2], rank % 2);
+            let mut hits = self.slots[slot].ray.intersect(self.masks[slot], &pass);
+            met |= bit(hits.met != 0, slot);
+            hits.uncertain |= self.uncertain[slot];
+            undecided |= bit(hits.uncertain != 0, slot);
+            if R::Goal::IS_ANY {
+                self.uncertain[slot] = hits.uncertain;
+            } else {
+                self.hits[rank] = hits;
             }
         }
-        for slot in Bits(hit) {
-            *self.references.of(slot) = HIT;
+        let mut uncertain = 0;
+        if R::Goal::IS_ANY {
+            for slot in Bits(undecided & !met) {
+                let place = *self.references.of(slot) & tag::PLACE;
+                let (own, ray) = (&self.slots[slot], self.ray(slot));
+                match own.ray.hits_any(self.decider, ray, place, self.uncertain[slot]) {
+                    Outcome::Certain(is_hit) => met |= bit(is_hit, slot),
+                    Outcome::Uncertain => uncertain |= bit(true, slot),
+                }
+            }
+            self.stop_at_hits(met);
+        } else {
+            for slot in Bits(met | undecided) {
+                let place = *self.references.of(slot) & tag::PLACE;
+                let ray = self.ray(slot);
+                let own = &mut self.slots[slot];
+                let rank = rank(at_leaves, slot);
+                let pass = R::one_of(&self.passes[rank / 2], rank % 2);
+                let hits = &self.hits[rank];
+                let is_certain = own.ray.take_nearest(self.decider, ray, place, hits, &pass, &mut own.slabs);
+                uncertain |= bit(!is_certain, slot);
+            }
+            met = 0;
         }
-        for slot in Bits(at_leaves & !hit & !last) {
+        let going_on = at_leaves & !met & !uncertain;
+        for slot in Bits(going_on & !last) {
             let reference = self.references.of(slot);
             let place = *reference & tag::PLACE;
             *reference = tag::reference(tag::TRIANGLES, self.blocks.block(place).place_behind(place));
         }
-        self.pop(at_leaves & !hit & last);
+        self.give_up(uncertain, sink);
+        self.pop(going_on & last);
     }
 
-    /// Leaves those to be answered otherwise.
+    /// Those that are at other leaves test them one by one, and go on to the top of their stacks.
     #[inline(always)]
-    fn give_up(&mut self, slots: u64, sink: &mut impl Sink<Option<Hit32>>) {
+    fn step_others(&mut self, at_others: u64, sink: &mut impl Sink<R::Answer>) {
+        let (mut met, mut uncertain) = (0, 0);
+        for slot in Bits(at_others) {
+            let (leaf, ray) = (*self.references.of(slot), self.ray(slot));
+            let own = &mut self.slots[slot];
+            let stop = own.ray.test_leaf(leaf, ray, &mut own.slabs);
+            met |= bit(stop == Some(Stop::Hit), slot);
+            uncertain |= bit(stop == Some(Stop::Uncertain), slot);
+        }
+        self.stop_at_hits(met);
+        self.give_up(uncertain, sink);
+        self.pop(at_others & !met & !uncertain);
+    }
+
+    /// Those are done: they have a hit, and any will do.
+    #[inline(always)]
+    fn stop_at_hits(&mut self, slots: u64) {
+        for slot in Bits(slots) {
+            *self.references.of(slot) = HIT;
+        }
+    }
+
+    /// Leaves those to the exact traversal.
+    #[inline(always)]
+    fn give_up(&mut self, slots: u64, sink: &mut impl Sink<R::Answer>) {
         for slot in Bits(slots) {
             let position = &mut self.slots[slot].position;
             sink.put(*position, Outcome::Uncertain);
@@ -291,8 +437,8 @@ impl<'a, 'd, 'r, G: Goal, L: Simd> Interleaved<'a, 'd, 'r, G, L> {
             let mut beyond = 0;
             for slot in Bits(slots) {
                 let entry = self.stacks[slot].pop().unwrap_or(Self::bottom());
-                *self.references.of(slot) = G::reference(entry);
-                beyond |= bit(G::is_beyond(entry, self.slots[slot].slabs.s_max()), slot);
+                *self.references.of(slot) = R::Goal::reference(entry);
+                beyond |= bit(R::Goal::is_beyond(entry, self.slots[slot].slabs.s_max()), slot);
             }
             slots = beyond;
         }
@@ -301,32 +447,33 @@ impl<'a, 'd, 'r, G: Goal, L: Simd> Interleaved<'a, 'd, 'r, G, L> {
     /// Prefetches what those read next.
     #[inline(always)]
     fn prefetch(&mut self, slots: u64) {
-        let Stations { nodes, leaves, .. } = self.stations();
+        let Stations { nodes, triangles, .. } = self.stations();
         for slot in Bits(nodes & slots) {
             self.nodes.get(*self.references.of(slot) as usize).map(simd::fetch::<Node>);
         }
-        for slot in Bits(leaves & slots) {
+        for slot in Bits(triangles & slots) {
             self.blocks.block(*self.references.of(slot) & tag::PLACE).fetch();
         }
     }
 
     #[inline(always)]
     fn stations(&self) -> Stations {
-        self.references.stations::<L::F32x16>()
+        if R::GENERAL {
+            self.references.stations::<L::F32x16, true>()
+        } else {
+            self.references.stations::<L::F32x16, false>()
+        }
     }
 
     /// Hands out the answers of those that are done.
     #[inline(always)]
-    fn answer(&mut self, done: u64, sink: &mut impl Sink<Option<Hit32>>) {
+    fn answer(&mut self, done: u64, sink: &mut impl Sink<R::Answer>) {
         for slot in Bits(done) {
-            let own = &self.slots[slot];
+            let own = &mut self.slots[slot];
             if own.position != ANSWERED {
-                let hit = if G::IS_ANY {
-                    (*self.references.of(slot) == HIT).then_some(SOME_HIT)
-                } else {
-                    own.nearest.hit(self.decider, own.ray.t_max())
-                };
-                sink.put(own.position, Outcome::Certain(hit));
+                let is_hit = *self.references.of(slot) == HIT;
+                let ray = &self.rays[own.position];
+                sink.put(own.position, own.ray.answer(self.decider, ray, is_hit));
             }
         }
     }
@@ -334,15 +481,15 @@ impl<'a, 'd, 'r, G: Goal, L: Simd> Interleaved<'a, 'd, 'r, G, L> {
 
 /// Traverses the tree with those of the rays that have these positions; with `prefetches`, a ray prefetches what it reads next.
 #[inline(always)]
-pub(super) fn traverse<G: Goal, L: Simd>(
-    decider: &Decider,
+pub(super) fn traverse<'a, 'd, R: RaySlot<'a, 'd, L>, L: Simd>(
+    decider: &'d Decider<'a>,
     prefetches: bool,
-    rays: &[Ray32],
+    rays: &[R::Ray],
     positions: &[usize],
-    sink: &mut impl Sink<Option<Hit32>>,
+    sink: &mut impl Sink<R::Answer>,
 ) {
     let mut waiting = positions.iter();
-    let mut all = Interleaved::<G, L>::new(decider, rays);
+    let mut all = Interleaved::<R, L>::new(decider, rays);
     // All are done at first.
     let mut taken = u64::MAX;
     while taken != 0 {
@@ -355,12 +502,16 @@ pub(super) fn traverse<G: Goal, L: Simd>(
             continue;
         }
         // Where most of them are.
-        let moving = if at.nodes.count_ones() >= at.leaves.count_ones() {
+        let [nodes, triangles, others] = [at.nodes, at.triangles, at.others].map(u64::count_ones);
+        let moving = if R::GENERAL && others > nodes.max(triangles) {
+            all.step_others(at.others, sink);
+            at.others
+        } else if nodes >= triangles {
             all.step_nodes(at.nodes, sink);
             at.nodes
         } else {
-            all.step_leaves(at.leaves);
-            at.leaves
+            all.step_triangles(at.triangles, sink);
+            at.triangles
         };
         if prefetches {
             all.prefetch(moving);
@@ -370,11 +521,11 @@ pub(super) fn traverse<G: Goal, L: Simd>(
 
 /// Starts rays that wait in free slots: the slots that were taken.
 #[inline(always)]
-fn start_others<G: Goal, L: Simd>(
-    all: &mut Interleaved<'_, '_, '_, G, L>,
+fn start_others<'a, 'd, R: RaySlot<'a, 'd, L>, L: Simd>(
+    all: &mut Interleaved<'a, 'd, '_, R, L>,
     free: u64,
     waiting: &mut std::slice::Iter<usize>,
-    sink: &mut impl Sink<Option<Hit32>>,
+    sink: &mut impl Sink<R::Answer>,
 ) -> u64 {
     let mut taken = 0;
     for slot in Bits(free) {

@@ -1,11 +1,13 @@
 //! Many rays at once, in trees that have triangles: each answer has the bits that it has alone.
 //!
-//! Rays that are coherent are traversed as packets of sixteen (see [`packet`]). Of the others, rays in single precision in trees of
-//! triangles are interleaved (see [`interleaved`]), where that is faster; all else goes ray by ray, by the code of single rays.
+//! Rays that are coherent are traversed as packets of sixteen (see [`packet`]), the others interleaved (see [`interleaved`]). Triangles
+//! are tested so in either precision; leaves of anything else ray by ray, by the code of single rays.
 
 pub(crate) mod columns;
 mod f32_packet;
+mod f32_slot;
 mod f64_packet;
+mod f64_slot;
 mod interleaved;
 pub(crate) mod packet;
 #[cfg(test)]
@@ -18,7 +20,9 @@ use std::slice::Chunks;
 use lumbre_geometry::Ray;
 
 use self::f32_packet::F32Bundle;
+use self::f32_slot::F32Slot;
 use self::f64_packet::F64Bundle;
+use self::f64_slot::F64Slot;
 use self::packet::{Bundle, PACKET, Packet};
 pub(crate) use self::sink::Sink;
 use crate::hit::Hit;
@@ -250,7 +254,7 @@ impl Sink<Option<Hit32>> for F32AnySink<'_> {
     }
 }
 
-/// When rays in single precision are interleaved, and how.
+/// When rays are interleaved, and how.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plan {
     /// Fewer rays go one after another: to start many, and to wait for the last, takes its time.
@@ -311,20 +315,14 @@ trait Precision {
     /// Traverses the tree with one ray.
     fn traverse_alone<L: Simd>(decider: &Decider, ray: &Self::Ray) -> Outcome<Self::Answer>;
 
-    /// Traverses the tree with those of the rays that have these positions and go in no packet: one after another, unless overridden.
-    #[inline(always)]
-    fn traverse_others<L: Simd>(
+    /// Traverses the tree with those of the rays that have these positions, interleaved.
+    fn interleave<L: Simd>(
         decider: &Decider,
-        _plan: Plan,
+        prefetches: bool,
         rays: &[Self::Ray],
         positions: &[usize],
         sink: &mut impl Sink<Self::Answer>,
-    ) {
-        // Neither a call nor a closure: neither takes on the instruction set of the code around it.
-        for &i in positions {
-            sink.put(i, Self::traverse_alone::<L>(decider, simd::opaque(&rays[i])));
-        }
-    }
+    );
 }
 
 /// Double precision; `GENERAL` in trees of anything among triangles.
@@ -344,6 +342,17 @@ impl<G: FilteredGoal, const GENERAL: bool> Precision for F64<G, GENERAL> {
     #[inline(always)]
     fn traverse_alone<L: Simd>(decider: &Decider, ray: &Ray) -> Outcome<G::Found> {
         Traversal::<G, GENERAL, false>::whole(decider.tree(), decider.start, ray).run::<L>()
+    }
+
+    #[inline(always)]
+    fn interleave<L: Simd>(
+        decider: &Decider,
+        prefetches: bool,
+        rays: &[Ray],
+        positions: &[usize],
+        sink: &mut impl Sink<G::Found>,
+    ) {
+        interleaved::traverse::<F64Slot<'_, '_, G, GENERAL>, L>(decider, prefetches, rays, positions, sink);
     }
 }
 
@@ -366,19 +375,14 @@ impl<G: Goal> Precision for F32<G> {
     }
 
     #[inline(always)]
-    fn traverse_others<L: Simd>(
+    fn interleave<L: Simd>(
         decider: &Decider,
-        plan: Plan,
+        prefetches: bool,
         rays: &[Ray32],
         positions: &[usize],
         sink: &mut impl Sink<Option<Hit32>>,
     ) {
-        if positions.len() >= plan.least {
-            return interleaved::traverse::<G, L>(decider, plan.prefetches, rays, positions, sink);
-        }
-        for &i in positions {
-            sink.put(i, Self::traverse_alone::<L>(decider, simd::opaque(&rays[i])));
-        }
+        interleaved::traverse::<F32Slot<'_, '_, G>, L>(decider, prefetches, rays, positions, sink);
     }
 }
 
@@ -430,7 +434,7 @@ impl<'r, R> RaysAhead<'r, R> {
     }
 }
 
-/// Rays through a tree: packets first, then the others.
+/// Rays through a tree: packets first, and the others interleaved, or one after another where they are few.
 struct Batch<'a, 'r, P: Precision, S> {
     tree: &'a Tree,
     start: &'a FilterStart,
@@ -469,7 +473,14 @@ impl<P: Precision, S: Sink<P::Answer>> Dispatch for Batch<'_, '_, P, S> {
                 }
             }
             others.extend(first + PACKET * packets.len()..first + chunk.len());
-            P::traverse_others::<L>(decider, plan, rays, &others, sink);
+            if others.len() < plan.least {
+                // Neither a call nor a closure: neither takes on the instruction set of the code around it.
+                for &i in &others {
+                    sink.put(i, P::traverse_alone::<L>(decider, simd::opaque(&rays[i])));
+                }
+            } else {
+                P::interleave::<L>(decider, plan.prefetches, rays, &others, sink);
+            }
             others.clear();
         }
     }

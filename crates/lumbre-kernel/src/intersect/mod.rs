@@ -43,4 +43,4 @@ pub(crate) use slots::{Room, STACK, Slots};
 pub(crate) use spheres::intersect_spheres;
 #[cfg(test)]
 pub(crate) use spheres::intersect_spheres_at;
-pub(crate) use triangles::Crossings;
+pub(crate) use triangles::{Crossings, Edges};

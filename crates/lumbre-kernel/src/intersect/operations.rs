@@ -10,7 +10,7 @@ use super::isa::Isa;
 use super::triangles::{Edges, Shears};
 use super::watertight::{BlockRay, EdgeTest, Inside, Shear};
 use crate::ray32::Ray32;
-use crate::simd::{F32x8, F32x16, Row, WIDE};
+use crate::simd::{F32x8, F32x16, LastEight, Row, Vector, WIDE, three_of_two};
 use crate::tree::filter_start::FilterStart;
 use crate::tree::node::TreeSpace;
 use crate::tree::triangle_block::TriangleBlock;
@@ -21,7 +21,9 @@ pub(crate) trait Simd {
     /// Eight numbers.
     type F32x8: F32x8;
     /// Sixteen numbers, alike.
-    type F32x16: F32x16;
+    type F32x16: F32x16<Half = Self::F32x8>;
+    /// Whether two rays, each at a block of its own, are better met together than one after the other.
+    const INTERSECTS_BY_TWO: bool = false;
     /// Whether rays go on together for a while where that no longer pays, for what they have done: see `packet`.
     const GOES_ON_TOGETHER: bool = true;
 
@@ -79,11 +81,38 @@ pub(crate) trait Simd {
     /// a triangle have means nothing.
     fn sheared_corners<S: Shears>(block: &TriangleBlock, ray: &S) -> [[Self::F32x8; 3]; 3];
 
+    /// The same of two blocks, each by its ray: those of the first, and those of the second.
+    #[inline(always)]
+    fn sheared_corners_by_two<S: Shears>(
+        blocks: [&TriangleBlock; 2],
+        rays: [&S; 2],
+    ) -> [[Self::F32x16; 3]; 3] {
+        let [x, y, z] = Self::sheared_corners(blocks[0], rays[0]);
+        let [other_x, other_y, other_z] = Self::sheared_corners(blocks[1], rays[1]);
+        [three_of_two(&x, &other_x), three_of_two(&y, &other_y), three_of_two(&z, &other_z)]
+    }
+
     /// A bit for each triangle that the line of the ray may meet, among them all that it does, and what [`Edges::place`] wants to know.
     #[inline(always)]
     fn intersect_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Edges<Self::F32x8>) {
-        let (mask, edges) = Edges::of(Self::sheared_corners(block, ray), ray);
+        let (mask, edges) = Edges::of(Self::sheared_corners(block, ray), Self::F32x8::splat(ray.least_size));
         (mask & block.taken(), edges)
+    }
+
+    /// The same of two blocks, each by its ray: those of the first, and those of the second.
+    #[inline(always)]
+    fn intersect_triangles_by_two(
+        blocks: [&TriangleBlock; 2],
+        rays: [&BlockRay; 2],
+    ) -> (u32, Edges<Self::F32x16>) {
+        if !Self::INTERSECTS_BY_TWO {
+            let (first, of_first) = Self::intersect_triangles(blocks[0], rays[0]);
+            let (second, of_second) = Self::intersect_triangles(blocks[1], rays[1]);
+            return (first | second << BLOCK, Edges::of_two(&of_first, &of_second));
+        }
+        let least_size = Self::F32x16::splat_two(rays[0].least_size, rays[1].least_size, LastEight::new());
+        let (mask, edges) = Edges::of(Self::sheared_corners_by_two(blocks, rays), least_size);
+        (mask & (blocks[0].taken() | blocks[1].taken() << BLOCK), edges)
     }
 
     /// For each number of a list, a bit for each place before it that has the same.

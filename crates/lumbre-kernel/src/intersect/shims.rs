@@ -9,12 +9,14 @@ use super::boxes::{
     put_and_take_by_distance,
 };
 use super::dispatch::Dispatch;
+use super::f32_ray::F32Ray;
 use super::isa::Isa;
 use super::operations::{CornersRoom, Simd};
 use super::slots::Slots;
+use super::triangles::Edges;
 use super::watertight::BlockRay;
 use crate::ray32::Ray32;
-use crate::simd::{F32x16, Row, Vector, WIDE};
+use crate::simd::{F32x8, F32x16, Row, Vector, WIDE};
 use crate::tree::filter_start::FilterStart;
 use crate::tree::node::{Node, WIDTH};
 use crate::tree::triangle_block::TriangleBlock;
@@ -172,6 +174,75 @@ pub(crate) fn intersect_triangles_at(
         }
     }
     isa.run(Triangles(block, ray))
+}
+
+/// What a ray is told of a block, bit by bit, of lanes with a triangle: which it may meet, those in its range, those that it surely meets,
+/// where, and the corners as single precision has them.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Told {
+    masks: [u32; 3],
+    heights: [[u32; BLOCK]; 2],
+    corners: [[[u32; BLOCK]; 3]; 3],
+}
+
+impl Told {
+    #[inline(always)]
+    fn of<L: Simd>(
+        (block, ray): (&TriangleBlock, &BlockRay),
+        (mask, edges): (u32, Edges<L::F32x8>),
+        corners: [[L::F32x8; 3]; 3],
+    ) -> Self {
+        let taken = block.taken();
+        let crossings = edges.place(ray);
+        let mut told = Self {
+            masks: [mask, mask & crossings.in_range, mask & crossings.sure],
+            heights: [[0; BLOCK]; 2],
+            corners: [[[0; BLOCK]; 3]; 3],
+        };
+        for lane in (0..BLOCK).filter(|lane| taken >> lane & 1 != 0) {
+            let (from, to) = crossings.between(lane);
+            (told.heights[0][lane], told.heights[1][lane]) = (from.to_bits(), to.to_bits());
+            for (told, corners) in told.corners.iter_mut().zip(&corners) {
+                for (told, corner) in told.iter_mut().zip(corners) {
+                    told[lane] = corner.lane(lane).to_bits();
+                }
+            }
+        }
+        told
+    }
+}
+
+/// What two rays are told of two blocks at an instruction set, each of its own: by both together, and by each alone; for tests.
+pub(crate) fn told_at(
+    isa: Isa,
+    blocks: [&TriangleBlock; 2],
+    rays: [&BlockRay; 2],
+    f32_ray: [&F32Ray; 2],
+) -> [[Told; 2]; 2] {
+    struct Telling<'a>([&'a TriangleBlock; 2], [&'a BlockRay; 2], [&'a F32Ray; 2]);
+    impl Dispatch for Telling<'_> {
+        type Output = [[Told; 2]; 2];
+        #[inline(always)]
+        fn run<L: Simd>(self) -> Self::Output {
+            let Self(blocks, rays, f32_ray) = self;
+            let (mask, edges) = L::intersect_triangles_by_two(blocks, rays);
+            let [x, y, z] = L::sheared_corners_by_two(blocks, f32_ray);
+            let one =
+                |row: &[L::F32x16; 3], which| [row[0].half(which), row[1].half(which), row[2].half(which)];
+            let together = |which: usize| {
+                let of_one = (mask >> (BLOCK * which) & L::F32x8::ALL, edges.half(which));
+                let corners = [one(&x, which), one(&y, which), one(&z, which)];
+                Told::of::<L>((blocks[which], rays[which]), of_one, corners)
+            };
+            let alone = |which: usize| {
+                let (block, ray) = (blocks[which], rays[which]);
+                let corners = L::sheared_corners(block, f32_ray[which]);
+                Told::of::<L>((block, ray), L::intersect_triangles(block, ray), corners)
+            };
+            [[together(0), together(1)], [alone(0), alone(1)]]
+        }
+    }
+    isa.run(Telling(blocks, rays, f32_ray))
 }
 
 /// [`Simd::corners`] at an instruction set, for tests.

@@ -7,7 +7,7 @@ use super::f32_ray::{F32Ray, within};
 use super::watertight::{
     BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, HEIGHT_ERROR, SIZE_ERROR, TINY,
 };
-use crate::simd::{F32x8, Vector};
+use crate::simd::{self, F32x8, F32x16, Vector};
 
 /// What shears the corners of triangles.
 pub(crate) trait Shears {
@@ -99,7 +99,7 @@ impl<V: F32x8> Crossings<V> {
     }
 }
 
-/// How a line passes the edges of eight triangles.
+/// How a line passes the edges of eight triangles, or two lines those of eight each.
 #[derive(Clone, Copy, Zeroable)]
 pub(crate) struct Edges<V> {
     /// The edge functions.
@@ -113,24 +113,54 @@ pub(crate) struct Edges<V> {
     height_error: V,
 }
 
-impl<V: F32x8> Edges<V> {
-    /// Of corners in the sheared space of the ray, and a bit for each triangle that is perhaps met.
+impl<V: Vector> Edges<V> {
+    /// Of corners in the sheared spaces of the rays, which have these [`least_size`](BlockRay::least_size)s, and a bit for each triangle that is
+    /// perhaps met.
     #[inline(always)]
-    pub(super) fn of([x, y, z]: [[V; 3]; 3], ray: &BlockRay) -> (u32, Self) {
+    pub(super) fn of([x, y, z]: [[V; 3]; 3], least_size: V) -> (u32, Self) {
         let u = x[2].mul_sub(y[1], y[2] * x[1]);
         let v = x[0].mul_sub(y[2], y[0] * x[2]);
         let w = x[1].mul_sub(y[0], y[1] * x[0]);
         let within = within([u, v, w]);
         let across = x[0].max_abs(y[0]).max(x[1].max_abs(y[1])).max(x[2].max_abs(y[2]));
         let along = z[0].max_abs(z[1]).max_abs(z[2]);
-        let size = across + along + V::splat(ray.least_size);
+        let size = across + along + least_size;
         let minus_error = (size * V::splat(-EDGE_ERROR))
             .mul_sub(size.mul_add(V::splat(SIZE_ERROR), across), V::splat(TINY));
         let height_error = size * V::splat(HEIGHT_ERROR);
         let edges = Self { values: [u, v, w], heights: z, within, minus_error, height_error };
         (minus_error.simd_le(within), edges)
     }
+}
 
+impl<W: F32x16> Edges<W> {
+    /// Those of one of the two lines: `which` is 0 or 1.
+    #[inline(always)]
+    pub(crate) fn half(&self, which: usize) -> Edges<W::Half> {
+        let Self { values: [u, v, w], heights: [a, b, c], within, minus_error, height_error } = self;
+        Edges {
+            values: [u.half(which), v.half(which), w.half(which)],
+            heights: [a.half(which), b.half(which), c.half(which)],
+            within: within.half(which),
+            minus_error: minus_error.half(which),
+            height_error: height_error.half(which),
+        }
+    }
+
+    /// Those of two lines.
+    #[inline(always)]
+    pub(super) fn of_two(first: &Edges<W::Half>, second: &Edges<W::Half>) -> Self {
+        Self {
+            values: simd::three_of_two(&first.values, &second.values),
+            heights: simd::three_of_two(&first.heights, &second.heights),
+            within: W::of_two(first.within, second.within),
+            minus_error: W::of_two(first.minus_error, second.minus_error),
+            height_error: W::of_two(first.height_error, second.height_error),
+        }
+    }
+}
+
+impl<V: F32x8> Edges<V> {
     /// Where along the ray that is.
     #[inline(always)]
     pub(crate) fn place(&self, ray: &BlockRay) -> Crossings<V> {

@@ -7,7 +7,13 @@ pub(crate) mod vector;
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod x86;
 
-pub(crate) use vector::{F32x8, F32x16, LANE_BITS, Row, Vector, WIDE};
+pub(crate) use vector::{F32x8, F32x16, LANE_BITS, LastEight, Row, Vector, WIDE};
+
+/// Eight, and eight others, three times.
+#[inline(always)]
+pub(crate) fn three_of_two<W: F32x16>(first: &[W::Half; 3], second: &[W::Half; 3]) -> [W; 3] {
+    [W::of_two(first[0], second[0]), W::of_two(first[1], second[1]), W::of_two(first[2], second[2])]
+}
 
 /// The same, of which the compiler knows nothing: else it takes a ray apart ahead of a loop, into more pieces than there are
 /// registers, and writes them down once more.

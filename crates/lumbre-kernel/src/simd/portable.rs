@@ -4,7 +4,7 @@ use std::ops::{Add, Div, Mul, Sub};
 
 use bytemuck::Zeroable;
 
-use super::vector::{AFTER_MIDDLE, BEFORE_MIDDLE, F32x8, F32x16, LANE_BITS, Row, Vector, WIDE};
+use super::vector::{AFTER_MIDDLE, BEFORE_MIDDLE, F32x8, F32x16, LANE_BITS, LastEight, Row, Vector, WIDE};
 
 #[derive(Clone, Copy, Zeroable)]
 pub(crate) struct PortableVector<const N: usize>([f32; N]);
@@ -140,6 +140,31 @@ impl F32x8 for Portable8 {
 }
 
 impl F32x16 for Portable16 {
+    type Half = Portable8;
+
+    #[inline(always)]
+    fn of_two(first: Portable8, second: Portable8) -> Self {
+        let mut all = [0.0; WIDE];
+        for lane in 0..8 {
+            (all[lane], all[8 + lane]) = (first.0[lane], second.0[lane]);
+        }
+        Self(all)
+    }
+
+    #[inline(always)]
+    fn splat_two(first: f32, second: f32, _: LastEight) -> Self {
+        Self::of_two(Portable8::splat(first), Portable8::splat(second))
+    }
+
+    #[inline(always)]
+    fn half(&self, which: usize) -> Portable8 {
+        let mut half = [0.0; 8];
+        for (lane, one) in half.iter_mut().enumerate() {
+            *one = self.0[8 * (which % 2) + lane];
+        }
+        PortableVector(half)
+    }
+
     #[inline(always)]
     fn load(row: &[f32; WIDE]) -> Self {
         Self(*row)

@@ -5,6 +5,8 @@ use std::ops::{Add, Div, Index, Mul, Sub};
 
 use bytemuck::Zeroable;
 
+use super::opaque_number;
+
 /// Those that are sixteen.
 pub(crate) const WIDE: usize = 16;
 
@@ -71,6 +73,14 @@ pub(crate) trait F32x8: Vector<Array = [f32; 8]> + Zeroable {
 
 /// Sixteen.
 pub(crate) trait F32x16: Vector<Array = [f32; WIDE]> + Zeroable {
+    /// Eight of them.
+    type Half: F32x8;
+    /// Eight, and eight others.
+    fn of_two(first: Self::Half, second: Self::Half) -> Self;
+    /// Eight times the one, and eight times the other.
+    fn splat_two(first: f32, second: f32, last: LastEight) -> Self;
+    /// The first eight, or the last: `which` is 0 or 1.
+    fn half(&self, which: usize) -> Self::Half;
     fn load(row: &[f32; WIDE]) -> Self;
     fn store(self, row: &mut Row<f32>);
     /// Rounded.
@@ -150,6 +160,24 @@ pub(crate) trait F32x16: Vector<Array = [f32; WIDE]> + Zeroable {
             count += 1;
             rest &= rest - 1;
         }
+    }
+}
+
+/// The last eight of sixteen, as a mask of which the compiler knows nothing: where it does know, it shuffles numbers instead of reading each
+/// to where it belongs.
+#[derive(Clone, Copy)]
+pub(crate) struct LastEight(u32);
+
+impl LastEight {
+    #[inline(always)]
+    pub(crate) fn new() -> Self {
+        Self(opaque_number(0xff00))
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    pub(crate) fn mask(self) -> u16 {
+        self.0 as u16
     }
 }
 

@@ -12,8 +12,9 @@ use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::{Random, soup};
 use crate::build::pack;
+use crate::intersect::f32_ray::F32Ray;
 use crate::intersect::watertight::{BlockRay, Meeting, Shear, intersect};
-use crate::intersect::{Isa, corners_at, equals_before_at, intersect_triangles_at, truncated_at};
+use crate::intersect::{Isa, corners_at, equals_before_at, intersect_triangles_at, told_at, truncated_at};
 use crate::tree::BLOCK;
 use crate::tree::triangle_block::{BlockNames, Blocks, Line, TriangleBlock};
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Preset, TriangleMesh};
@@ -148,6 +149,40 @@ fn the_test_of_a_block_loses_nothing_and_invents_nothing() {
             assert!(tally.hits > 6000, "{}", tally.hits);
         }
     }
+}
+
+#[test]
+fn what_two_rays_are_told_of_two_blocks_together_is_what_each_is_told_alone() {
+    let mut random = Random(81);
+    let mut sharing = [0; 3];
+    for _ in 0..600 {
+        // Such as share many of their corners, and such as do not.
+        let tree_space = [(); 2].map(|()| {
+            let shares = [0.0, 0.0, 0.9][random.below(3)];
+            block(&mut random, shares, DVec3::ZERO, 1.0, 0.5)
+        });
+        let blocks =
+            [&tree_space[0], &tree_space[1]].map(|tree_space| Blocks::new(tree_space).at(0).unwrap());
+        sharing[blocks.iter().filter(|block| !block.is_unshared()).count()] += 1;
+        let rays = [(); 2].map(|()| {
+            let (origin, direction) = (3.0 * random.vector(), random.vector());
+            let shear = Shear::new(&direction);
+            let local = shear.local_origin(&origin, &DVec3::ZERO);
+            let f32_ray = F32Ray {
+                axes: shear.axes,
+                origin: [local[0] as f32, local[1] as f32, local[2] as f32, 0.0],
+                shear: [shear.x as f32, shear.y as f32, 0.0, f32::INFINITY],
+                minus_inverse: -1.0,
+            };
+            let t_max = random.between(0.5, 6.0);
+            (BlockRay::new(&shear, &local, 3.0, 0.0, t_max).unwrap(), f32_ray)
+        });
+        for isa in Isa::all() {
+            let [together, alone] = told_at(isa, blocks, [&rays[0].0, &rays[1].0], [&rays[0].1, &rays[1].1]);
+            assert_eq!(together, alone, "{isa:?}");
+        }
+    }
+    assert!(sharing.iter().all(|&pairs| pairs > 50), "{sharing:?}");
 }
 
 #[test]

@@ -49,7 +49,7 @@ use crate::intersect::f32_ray::{F32Ray, within};
 use crate::intersect::watertight;
 use crate::intersect::{Axes, DispatchedQuery, Isa, RayQuery, Simd};
 use crate::ray32::{Hit32, Ray32};
-use crate::simd::{self, F32x8, Vector};
+use crate::simd::{self, F32x8, F32x16, Vector};
 use crate::tree::BLOCK;
 use crate::tree::Tree;
 use crate::tree::filter_start::Precise;
@@ -96,7 +96,7 @@ pub(crate) struct Pass<E> {
 }
 
 /// How a line passes the triangles of a block, and which of these its ray meets.
-pub(crate) type Passed<E> = (LaneHits<E>, Pass<E>);
+type Passed<E> = (LaneHits<E>, Pass<E>);
 
 impl<E: F32x8> Pass<E> {
     /// The weights of one.
@@ -111,6 +111,24 @@ impl<E: F32x8> Pass<E> {
     fn all_weights(&self) -> [[f32; BLOCK]; 3] {
         let [v, w, det] = self.weights;
         [v.to_array(), w.to_array(), det.to_array()]
+    }
+}
+
+impl<W: F32x16> Pass<W> {
+    /// That of one of the two: `which` is 0 or 1.
+    #[inline(always)]
+    pub(crate) fn half(&self, which: usize) -> Pass<W::Half> {
+        let Self { height, weights: [v, w, det] } = self;
+        Pass { height: height.half(which), weights: [v.half(which), w.half(which), det.half(which)] }
+    }
+
+    /// Those of two.
+    #[inline(always)]
+    pub(crate) fn of_two(first: &Pass<W::Half>, second: &Pass<W::Half>) -> Self {
+        Self {
+            height: W::of_two(first.height, second.height),
+            weights: simd::three_of_two(&first.weights, &second.weights),
+        }
     }
 }
 
@@ -283,6 +301,16 @@ impl F32Ray {
     pub(crate) fn lines<L: Simd>(&self, block: &TriangleBlock) -> (u32, Lines<L::F32x8>) {
         let (mask, lines) = Lines::of(L::sheared_corners(block, simd::opaque(self)));
         (mask & block.taken(), lines)
+    }
+
+    /// The same of two rays, each among the triangles of its block: those of the first, and those of the second.
+    #[inline(always)]
+    pub(crate) fn lines_by_two<L: Simd>(
+        rays: [&Self; 2],
+        blocks: [&TriangleBlock; 2],
+    ) -> (u32, Lines<L::F32x16>) {
+        let (mask, lines) = Lines::of(L::sheared_corners_by_two(blocks, rays));
+        (mask & (blocks[0].taken() | blocks[1].taken() << BLOCK), lines)
     }
 
     /// Where the ray meets the triangles of a block that its line passes so, and which of those in the mask it does meet.

@@ -87,6 +87,12 @@ impl<'a, 'd, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, 'd, GENE
         }
     }
 
+    /// Starts with another ray, where there are triangles alone.
+    #[inline(always)]
+    pub(crate) fn restart(&mut self, (blocks, s_per_height): (BlockRay, f32)) {
+        (self.blocks, self.s_per_height, self.best) = (blocks, s_per_height, Candidate::NONE);
+    }
+
     /// Takes the closest hit so far from a packet.
     #[inline(always)]
     pub(crate) fn continue_from(&mut self, best: Candidate) {
@@ -126,6 +132,11 @@ impl<'a, 'd, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, 'd, GENE
             }
             Outcome::Uncertain => Outcome::Uncertain,
         }
+    }
+
+    #[inline(always)]
+    pub(crate) fn decider(&self) -> &'d Decider<'a> {
+        self.decider
     }
 }
 

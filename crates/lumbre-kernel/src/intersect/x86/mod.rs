@@ -36,13 +36,35 @@ const _: () =
     assert!(offset_of!(Ray, direction) == 24 && offset_of!(Ray, t_min) == 48 && offset_of!(Ray, t_max) == 56);
 const _: () = assert!(size_of::<Ray>() == 72 && offset_of!(Ray, time) == 64);
 
-/// Which sixteen numbers go with which level.
+/// Which sixteen numbers go with which level, and what is different with them.
 pub(crate) trait HasWide<const AVX512: bool> {
-    type F32x16: F32x16;
+    type F32x16: F32x16<Half = Eight256<AVX512>>;
+
+    /// [`Simd::sheared_corners_by_two`] as AVX-512 does it better; `None` where it does not.
+    #[inline(always)]
+    fn corners_by_two<S: Shears>(
+        _blocks: [&TriangleBlock; 2],
+        _rays: [&S; 2],
+    ) -> Option<[[Self::F32x16; 3]; 3]> {
+        None
+    }
 }
 
 impl HasWide<true> for X86<true> {
     type F32x16 = Avx512;
+
+    #[inline(always)]
+    fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> Option<[[Avx512; 3]; 3]> {
+        match [blocks[0].is_unshared(), blocks[1].is_unshared()] {
+            [false, false] => Some(Self::shared_by_two(blocks, rays)),
+            // Where there are no rests, there is so little to do that it pays no more to put both side by side first.
+            [true, true] => match (rays[0].rest(), rays[1].rest()) {
+                (Some(a), Some(b)) => Some(Self::unshared_by_two(blocks, rays, [a, b])),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
 }
 
 impl HasWide<false> for X86<false> {
@@ -55,6 +77,7 @@ where
 {
     type F32x8 = Eight256<AVX512>;
     type F32x16 = <Self as HasWide<AVX512>>::F32x16;
+    const INTERSECTS_BY_TWO: bool = AVX512;
     // Packets take twice the instructions then, and a ray alone hardly more.
     const GOES_ON_TOGETHER: bool = AVX512;
 
@@ -351,6 +374,19 @@ where
                 }
             }
         }
+    }
+
+    #[inline(always)]
+    fn sheared_corners_by_two<S: Shears>(
+        blocks: [&TriangleBlock; 2],
+        rays: [&S; 2],
+    ) -> [[Self::F32x16; 3]; 3] {
+        if let Some(corners) = Self::corners_by_two(blocks, rays) {
+            return corners;
+        }
+        let [x, y, z] = Self::sheared_corners(blocks[0], rays[0]);
+        let [other_x, other_y, other_z] = Self::sheared_corners(blocks[1], rays[1]);
+        [simd::three_of_two(&x, &other_x), simd::three_of_two(&y, &other_y), simd::three_of_two(&z, &other_z)]
     }
 
     #[inline(always)]

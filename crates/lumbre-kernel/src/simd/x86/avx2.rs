@@ -8,7 +8,7 @@ use bytemuck::Zeroable;
 
 use super::eight::{Eight256, max_of_eight};
 use crate::simd::opaque_number;
-use crate::simd::vector::{AFTER_MIDDLE, BEFORE_MIDDLE, F32x16, LANE_BITS, Row, Vector, WIDE};
+use crate::simd::vector::{AFTER_MIDDLE, BEFORE_MIDDLE, F32x16, LANE_BITS, LastEight, Row, Vector, WIDE};
 
 /// Only where `intersect::x86::X86<false>` is, alike.
 #[derive(Clone, Copy, Zeroable)]
@@ -180,6 +180,23 @@ impl Vector for Avx2 {
 }
 
 impl F32x16 for Avx2 {
+    type Half = Eight256<false>;
+
+    #[inline(always)]
+    fn of_two(first: Self::Half, second: Self::Half) -> Self {
+        Self([first.0, second.0])
+    }
+
+    #[inline(always)]
+    fn splat_two(first: f32, second: f32, _: LastEight) -> Self {
+        Self::of_two(Eight256::splat(first), Eight256::splat(second))
+    }
+
+    #[inline(always)]
+    fn half(&self, which: usize) -> Self::Half {
+        Eight256(self.0[which % 2])
+    }
+
     #[inline(always)]
     fn load(row: &[f32; WIDE]) -> Self {
         // SAFETY: see the type. The loads are of eight f32 each, of sixteen.

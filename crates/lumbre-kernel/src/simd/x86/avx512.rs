@@ -6,8 +6,8 @@ use std::ops::{Add, Div, Mul, Sub};
 
 use bytemuck::Zeroable;
 
-use super::eight::{SIGN, max_of_eight};
-use crate::simd::vector::{AFTER_MIDDLE, BEFORE_MIDDLE, F32x16, LANE_BITS, Row, Vector, WIDE};
+use super::eight::{Eight256, SIGN, max_of_eight};
+use crate::simd::vector::{AFTER_MIDDLE, BEFORE_MIDDLE, F32x16, LANE_BITS, LastEight, Row, Vector, WIDE};
 
 /// Only where `intersect::x86::X86<true>` is: the instructions are there.
 #[derive(Clone, Copy)]
@@ -81,6 +81,28 @@ impl Vector for Avx512 {
 }
 
 impl F32x16 for Avx512 {
+    type Half = Eight256<true>;
+
+    #[inline(always)]
+    fn of_two(first: Self::Half, second: Self::Half) -> Self {
+        // SAFETY: see the type.
+        unsafe { Self(_mm512_insertf32x8::<1>(_mm512_castps256_ps512(first.0), second.0)) }
+    }
+
+    #[inline(always)]
+    fn splat_two(first: f32, second: f32, last: LastEight) -> Self {
+        // SAFETY: see the type.
+        unsafe { Self(_mm512_mask_mov_ps(_mm512_set1_ps(first), last.mask(), _mm512_set1_ps(second))) }
+    }
+
+    #[inline(always)]
+    fn half(&self, which: usize) -> Self::Half {
+        // Where it is in memory, that is read from there.
+        let first: *const f32 = (&raw const self.0).cast();
+        // SAFETY: see the type. The load is of eight f32 of sixteen.
+        unsafe { Eight256(_mm256_loadu_ps(first.add(8 * (which % 2)))) }
+    }
+
     #[inline(always)]
     fn load(row: &[f32; WIDE]) -> Self {
         // SAFETY: see the type. The load is of sixteen f32.
