@@ -286,8 +286,8 @@ impl Accel {
     /// [`Accel::closest`] for every ray, with the same answers to the bit; `hits` has a slot for each.
     ///
     /// In a tree with triangles, sixteen rays in a row that are coherent (those of a square of four by four pixels, rather than of
-    /// sixteen pixels in a line) are traversed as a packet, which takes down to two fifths of the time; of others, those in
-    /// single precision are interleaved, which pays in large trees. A thousand rays or more at a time are answered fastest. Leaves of anything but triangles, and all trees on a machine
+    /// sixteen pixels in a line) are traversed as a packet, which takes down to two fifths of the time; many of the others are
+    /// interleaved. A thousand rays or more at a time are answered fastest. Leaves of anything but triangles, and all trees on a machine
     /// without AVX2, are traversed ray by ray. It works on the calling thread: to use more, split `rays` and `hits`.
     ///
     /// # Panics
