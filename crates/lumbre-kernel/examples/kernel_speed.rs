@@ -12,9 +12,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use lumbre_geometry::{Cone, Cuboid, Cylinder, PlacedShape, Plane, Ray, Shape, Sphere, Torus, Triangle};
-use lumbre_kernel::{
-    Accel, BuildOptions, Geometry, GeometryKind, HitColumns, Instance, RayColumns, TriangleMesh,
-};
+use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, HitColumns, RayColumns, TriangleMesh};
 use lumbre_math::{DVec3, Transform};
 
 struct Random(u64);
@@ -264,7 +262,7 @@ fn room_with_things() -> Vec<GeometryKind> {
         room(),
         GeometryKind::Shape(PlacedShape::new(sphere.into(), Transform::IDENTITY)),
         GeometryKind::Shape(PlacedShape::new(torus.into(), Transform::IDENTITY)),
-        GeometryKind::Instance(Instance { accel, world_from_object: place.into() }),
+        GeometryKind::Instance(accel.instance(place)),
     ]
 }
 
@@ -337,10 +335,7 @@ fn instances(n: usize) -> Vec<GeometryKind> {
             let world_from_object = Transform::translate(center)
                 * Transform::rotate(random.direction(), 360.0 * random.unit()).expect("an axis")
                 * Transform::scale(DVec3::splat(0.07 * step)).expect("not flat");
-            GeometryKind::Instance(Instance {
-                accel: Arc::clone(&accel),
-                world_from_object: world_from_object.into(),
-            })
+            GeometryKind::Instance(accel.instance(world_from_object))
         })
         .collect();
     kinds.push(ground());

@@ -1,155 +1,55 @@
 //! The tree and its queries.
 
-use std::fmt;
 use std::io;
 use std::ops::ControlFlow;
 use std::path::Path;
-use std::sync::OnceLock;
+use std::sync::Arc;
 
 use lumbre_geometry::{Aabb, Ray, Surface};
 use lumbre_math::{DVec3, Transform};
 
+use crate::batch;
+use crate::build::error::BuildError;
+use crate::build::options::BuildOptions;
+use crate::build::refit::RefitError;
 use crate::build::{input, rebuild, refit};
-use crate::columns::PictureStart;
+use crate::columns::{HitColumns, RayColumns};
+use crate::hit::{Hit, Target};
 use crate::intersect::Isa;
-use crate::intersect::filter_start::FilterStart;
+use crate::io::bytes::LoadError;
+use crate::io::mapped::MapError;
 use crate::io::{bytes, mapped};
-use crate::point::flats::Flats;
-use crate::point::winding::{self, Moments};
+use crate::point::closest_point::{ClosestPoint, NoClosestPoint};
+use crate::point::winding::{self, NoWindingNumber};
 use crate::point::{closest_point, inside};
+use crate::query::Query;
+use crate::ray32::{Hit32, Ray32};
+use crate::surface;
 use crate::trace::f32_ray::{self, F32Queries};
 use crate::trace::filtered::{self, Queries};
 use crate::trace::stack::{AnyHit, ClosestHit};
 use crate::trace::visitors::{Count, NextHits};
 use crate::trace::{ContextRef, Outcome, exact};
-use crate::tree::bounding_block::BoundingVolumes;
-use crate::tree::node::{TreeSpace, tag};
-use crate::tree::packed::{Entry, Packed};
-use crate::tree::summary::Sizes;
-use crate::tree::summary::Summary;
-use crate::{
-    ClosestPoint, Geometry, GeometryKind, Hit, Hit32, HitColumns, LoadError, MapError, NoClosestPoint,
-    NoWindingNumber, PictureRounding, Query, Ray32, RayColumns, RefitError, SphereCloud, Target, batch,
-    surface,
-};
+use crate::tree::flats::Flats;
+use crate::tree::geometry::Placement;
+use crate::tree::moments::Moments;
+use crate::tree::picture_start::PictureRounding;
+use crate::tree::{Geometry, Instance, Tree};
 
 /// A bounding volume hierarchy over geometries, ready for queries from any number of threads.
 ///
 /// The same geometries give the same tree from any number of threads, and every query the same answer on any machine:
 /// hits do not depend on the order of the visit, nor on the instruction set.
-#[derive(Debug)]
+///
+/// A clone shares the tree, and so do [instances](Accel::instance). None sees it change: see [`Accel::refit`].
+#[derive(Clone, Debug)]
 pub struct Accel {
-    pub(crate) geometries: Vec<Geometry>,
-    pub(crate) tree_space: TreeSpace,
-    pub(crate) tree: Packed,
-    // Kept out of the tree, and asked by every ray.
-    pub(crate) infinite: Vec<Entry>,
-    pub(crate) bounds: Aabb,
-    pub(crate) primitives: usize,
+    pub(crate) tree: Arc<Tree>,
     pub(crate) isa: Isa,
-    pub(crate) summary: Summary,
-    /// Where single precision can traverse the tree.
-    pub(crate) single: Option<FilterStart>,
-    /// Where rays of pictures traverse it in single precision.
-    pub(crate) picture: Option<PictureStart>,
     pub(crate) queries: Queries,
     /// Those of rays in single precision, where these are not asked in double.
     pub(crate) f32_queries: Option<F32Queries>,
-    /// What is asked of shapes first.
-    pub(crate) bounding_volumes: BoundingVolumes,
-    /// What a ray cost after the build, once that was asked for.
-    pub(crate) built_cost: Option<f64>,
-    // One for each geometry, or none.
-    pub(crate) masks: Vec<u32>,
-    /// For winding numbers, once one was asked for.
-    pub(crate) moments: OnceLock<Moments>,
-    /// For closest points, once one was asked for.
-    pub(crate) flats: OnceLock<Flats>,
 }
-
-/// What a build, or a file, makes.
-pub(crate) struct AccelParts {
-    pub(crate) tree_space: TreeSpace,
-    pub(crate) tree: Packed,
-    pub(crate) sizes: Sizes,
-    pub(crate) bounds: Aabb,
-    pub(crate) infinite: Vec<Entry>,
-    pub(crate) primitives: usize,
-}
-
-/// How a tree is built. Answers do not depend on it; how soon they come does.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct BuildOptions {
-    /// How much care is taken.
-    pub preset: Preset,
-}
-
-/// How much care is taken over a tree.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Preset {
-    /// Built soonest, for what changes from picture to picture: primitives are sorted along a curve (C. Lauterbach and
-    /// others, "Fast BVH Construction on GPUs", 2009), and only the ends of the tree are chosen by the surface area
-    /// heuristic.
-    Fast,
-    /// Binned by the surface area heuristic at every instruction set (I. Wald, "On fast Construction of SAH-based Bounding Volume
-    /// Hierarchies", 2007). Among the upper nodes of meshes, subtrees are put elsewhere where that makes the tree much better, as in
-    /// `Best`. Instances whose parts have much smaller boxes than the whole are entered part by part (after C. Benthin
-    /// and others, "Improved Two-Level BVHs using Partial Re-Braiding", 2017): at most eight parts for each on average, and 64.
-    #[default]
-    Balanced,
-    /// The balanced tree, then made better by putting subtrees of any size elsewhere (D. Meister, J. Bittner, "Parallel Reinsertion for
-    /// Bounding Volume Hierarchy Optimization", 2018): for what is built once and asked often.
-    Best,
-}
-
-impl Preset {
-    /// All of them, from the soonest to the best.
-    pub const ALL: [Self; 3] = [Self::Fast, Self::Balanced, Self::Best];
-}
-
-/// Why a tree cannot be built.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum BuildError {
-    /// A mesh names a vertex that it does not have.
-    VertexOutOfRange {
-        /// Position of the geometry in the list.
-        geometry: usize,
-        /// The triangle.
-        triangle: usize,
-    },
-    /// A coordinate or a radius is not finite.
-    NotFinite {
-        /// Position of the geometry in the list.
-        geometry: usize,
-        /// The vertex, sphere or primitive.
-        element: usize,
-    },
-    /// More primitives than a tree can name (2^28 - 1), or so many small leaves of triangles or of spheres that they fill
-    /// more than 2^25 blocks of eight.
-    TooMany,
-}
-
-impl fmt::Display for BuildError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::VertexOutOfRange { geometry, triangle } => {
-                write!(f, "triangle {triangle} of geometry {geometry} names a vertex that is not there")
-            }
-            Self::NotFinite { geometry, element } => {
-                write!(f, "element {element} of geometry {geometry} has a coordinate that is not finite")
-            }
-            Self::TooMany => write!(
-                f,
-                "too many primitives for one tree: at most {}, in {} blocks of eight triangles or spheres",
-                input::MOST_PRIMITIVES,
-                tag::BLOCK_PLACES
-            ),
-        }
-    }
-}
-
-impl std::error::Error for BuildError {}
 
 impl Accel {
     /// Builds a tree over `geometries`. Zero-area triangles and spheres without a radius are kept out: they are never hit.
@@ -161,7 +61,7 @@ impl Accel {
     /// [`BuildError`] when a mesh names vertices that it lacks, a coordinate or a radius is not finite, or there are 2^28 primitives
     /// or more.
     pub fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result<Self, BuildError> {
-        input::build(geometries, options)
+        input::build(geometries, options).map(Self::over)
     }
 
     /// Moves what stands in the tree: `geometries` are those that it was built from, with other vertices, shapes,
@@ -185,7 +85,7 @@ impl Accel {
     /// [`RefitError`] when the geometries are not sound, or not of the same kinds and sizes, or something that has no place
     /// in the tree would now need one. The tree is then as it was.
     pub fn refit(&mut self, geometries: Vec<Geometry>) -> Result<f64, RefitError> {
-        refit::refit(self, geometries)
+        self.change(|tree| refit::refit(tree, geometries))
     }
 
     /// Puts together anew what refits have moved: a partial rebuild. Queries answer as before, to the bit.
@@ -198,56 +98,34 @@ impl Accel {
     /// The answer is as that of [`refit`](Self::refit): the cost of a ray as a multiple of that after the build. What
     /// is said there of trees that hold this one holds here, too.
     pub fn rebuild_partially(&mut self, options: &BuildOptions) -> f64 {
-        rebuild::rebuild_partially(self, options)
+        self.change(|tree| rebuild::rebuild_partially(tree, options))
     }
 
-    /// Puts a tree together of what a build, or a file, makes.
-    pub(crate) fn assemble(isa: Isa, geometries: Vec<Geometry>, parts: AccelParts) -> Self {
-        let AccelParts { tree_space, tree, sizes, bounds, infinite, primitives } = parts;
-        let summary = Summary::new(&geometries, sizes);
-        let single = FilterStart::new(&summary, &tree_space, tree.root);
-        let picture = PictureStart::new(&geometries, single.as_ref());
-        Self {
-            bounding_volumes: BoundingVolumes::new(&geometries, &tree.entries, &tree_space),
-            queries: Queries::new(isa, single.as_ref()),
-            f32_queries: F32Queries::new(isa, single.as_ref()),
-            picture,
-            single,
-            tree_space,
-            summary,
-            tree,
-            infinite,
-            bounds,
-            primitives,
-            isa,
-            built_cost: None,
-            masks: Vec::new(),
-            moments: OnceLock::new(),
-            flats: OnceLock::new(),
-            geometries,
-        }
+    /// The queries of a tree.
+    pub(crate) fn over(tree: Tree) -> Self {
+        let isa = Isa::best();
+        let queries = Queries::of(isa, &tree);
+        let f32_queries = F32Queries::of(isa, &tree);
+        Self { tree: Arc::new(tree), isa, queries, f32_queries }
     }
 
-    /// The tree with these masks: one for each of its geometries, or none.
-    pub(crate) fn with_masks_unchecked(self, masks: Vec<u32>) -> Self {
-        Self { masks, ..self }
+    /// Changes the tree, or a copy of it where it is shared.
+    fn change<T>(&mut self, change: impl FnOnce(&mut Tree) -> T) -> T {
+        let result = change(Arc::make_mut(&mut self.tree));
+        self.queries = Queries::of(self.isa, &self.tree);
+        self.f32_queries = F32Queries::of(self.isa, &self.tree);
+        result
     }
 
-    /// Makes anew what traversals keep of the tree, which has changed.
-    pub(crate) fn follow_tree(&mut self) {
-        self.single = FilterStart::new(&self.summary, &self.tree_space, self.tree.root);
-        self.queries = Queries::new(self.isa, self.single.as_ref());
-        self.f32_queries = F32Queries::new(self.isa, self.single.as_ref());
-        self.picture = PictureStart::new(&self.geometries, self.single.as_ref());
-        self.bounding_volumes = BoundingVolumes::new(&self.geometries, &self.tree.entries, &self.tree_space);
-        self.moments = OnceLock::new();
-        self.flats = OnceLock::new();
+    /// The tree, placed: what stands in another tree as [`GeometryKind::Instance`](crate::GeometryKind::Instance).
+    pub fn instance(&self, world_from_object: impl Into<Placement>) -> Instance {
+        Instance { tree: Arc::clone(&self.tree), world_from_object: world_from_object.into() }
     }
 
     /// How the tree is put together, as bytes for a file: some six a triangle, whatever the machine. The geometries are not
     /// in them. Trees that stand in this one as instances are saved by themselves.
     pub fn to_bytes(&self) -> Vec<u8> {
-        bytes::to_bytes(self)
+        bytes::to_bytes(&self.tree)
     }
 
     /// The tree that [`Accel::to_bytes`] wrote down, over the geometries that it was built from: it is the same to the bit,
@@ -259,7 +137,7 @@ impl Accel {
     /// # Errors
     /// [`LoadError`] when the bytes are no tree, of another version, incomplete or damaged, or the geometries do not fit.
     pub fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Self, LoadError> {
-        bytes::from_bytes(bytes, geometries)
+        bytes::from_bytes(bytes, geometries).map(Self::over)
     }
 
     /// Writes the tree to a file that [`Accel::map`] uses in place: thirty to sixty bytes a triangle. The geometries are not in it,
@@ -269,7 +147,7 @@ impl Accel {
     /// # Errors
     /// When the file cannot be written, or the machine is not little-endian.
     pub fn save(&self, path: impl AsRef<Path>) -> io::Result<()> {
-        mapped::save(self, path.as_ref())
+        mapped::save(&self.tree, path.as_ref())
     }
 
     /// The tree that [`Accel::save`] wrote, over the geometries that it was saved with: its nodes and leaves stay in the file,
@@ -286,58 +164,62 @@ impl Accel {
     /// # Errors
     /// [`MapError`] when the file cannot be mapped, is damaged, of another version or of other geometries.
     pub fn map(path: impl AsRef<Path>, geometries: Vec<Geometry>) -> Result<Self, MapError> {
-        mapped::map(path.as_ref(), geometries)
+        mapped::map(path.as_ref(), geometries).map(Self::over)
     }
 
     /// The closest hit in the ray's range. Of hits at the same `t`, the one whose (path, geometry, primitive) comes
     /// first, by positions in the lists that the trees were built from.
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
-        self.queries.closest.ask(self, ray)
+        self.queries.closest.ask(&self.tree, ray)
     }
 
     /// Whether anything is hit in the ray's range.
     #[inline]
     pub fn any(&self, ray: &Ray) -> bool {
-        self.queries.any.ask(self, ray)
+        self.queries.any.ask(&self.tree, ray)
     }
 
     /// [`Accel::closest`] among what a query takes into account. Of a shape, each crossing counts by itself.
     #[inline]
     pub fn closest_with(&self, ray: &Ray, query: &Query) -> Option<Hit> {
-        if query.takes_all(self) { self.closest(ray) } else { self.closest_with_at(self.isa, ray, query) }
+        if query.takes_all(&self.tree) {
+            self.closest(ray)
+        } else {
+            self.closest_with_at(self.isa, ray, query)
+        }
     }
 
     /// [`Accel::any`] among what a query takes into account.
     #[inline]
     pub fn any_with(&self, ray: &Ray, query: &Query) -> bool {
-        if query.takes_all(self) { self.any(ray) } else { self.any_with_at(self.isa, ray, query) }
+        if query.takes_all(&self.tree) { self.any(ray) } else { self.any_with_at(self.isa, ray, query) }
     }
 
     pub(crate) fn closest_with_at(&self, isa: Isa, ray: &Ray, query: &Query) -> Option<Hit> {
-        match filtered::with_query::<ClosestHit>(isa, self, ray, query) {
-            Outcome::Certain(found) => found.into_hit(self, ContextRef::OUTSIDE),
-            Outcome::Uncertain => exact::closest(isa, self, ray, Some(query)),
+        match filtered::with_query::<ClosestHit>(isa, &self.tree, ray, query) {
+            Outcome::Certain(found) => found.into_hit(&self.tree, ContextRef::OUTSIDE),
+            Outcome::Uncertain => exact::closest(isa, &self.tree, ray, Some(query)),
         }
     }
 
     pub(crate) fn any_with_at(&self, isa: Isa, ray: &Ray, query: &Query) -> bool {
-        match filtered::with_query::<AnyHit>(isa, self, ray, query) {
+        match filtered::with_query::<AnyHit>(isa, &self.tree, ray, query) {
             Outcome::Certain(is_hit) => is_hit,
-            Outcome::Uncertain => exact::any(isa, self, ray, Some(query)),
+            Outcome::Uncertain => exact::any(isa, &self.tree, ray, Some(query)),
         }
     }
 
     /// [`Accel::closest`] by double precision alone: the same answer to the bit, slower. To be measured beside it.
     #[doc(hidden)]
     pub fn closest_exact(&self, ray: &Ray) -> Option<Hit> {
-        exact::closest(self.isa, self, ray, None)
+        exact::closest(self.isa, &self.tree, ray, None)
     }
 
     /// [`Accel::any`] by double precision alone. To be measured beside it.
     #[doc(hidden)]
     pub fn any_exact(&self, ray: &Ray) -> bool {
-        exact::any(self.isa, self, ray, None)
+        exact::any(self.isa, &self.tree, ray, None)
     }
 
     /// Every hit in the ray's range in ascending order of `t` (ties by path, geometry, primitive), until `visit` breaks.
@@ -353,7 +235,7 @@ impl Accel {
         let mut last = None;
         loop {
             let mut visitor = NextHits::new(ray, size, last.as_ref());
-            exact::traverse(isa, self, ray, &mut visitor);
+            exact::traverse(isa, &self.tree, ray, &mut visitor);
             let (mut hits, may_go_on) = visitor.into_hits();
             if hits.iter().any(|ranked| visit(&ranked.hit).is_break()) || !may_go_on {
                 return;
@@ -370,7 +252,7 @@ impl Accel {
 
     pub(crate) fn count_at(&self, isa: Isa, ray: &Ray) -> usize {
         let mut visitor = Count::new(ray);
-        exact::traverse(isa, self, ray, &mut visitor);
+        exact::traverse(isa, &self.tree, ray, &mut visitor);
         visitor.hits
     }
 
@@ -387,8 +269,8 @@ impl Accel {
     #[inline]
     pub fn closest_f32(&self, ray: &Ray32) -> Option<Hit32> {
         match &self.f32_queries {
-            Some(queries) => queries.closest.ask(self, ray),
-            None => self.closest_widened(ray),
+            Some(queries) => queries.closest.ask(&self.tree, ray),
+            None => f32_ray::closest_widened(self.isa, &self.tree, ray),
         }
     }
 
@@ -396,21 +278,9 @@ impl Accel {
     #[inline]
     pub fn any_f32(&self, ray: &Ray32) -> bool {
         match &self.f32_queries {
-            Some(queries) => queries.any.ask(self, ray),
-            None => self.any_widened(ray),
+            Some(queries) => queries.any.ask(&self.tree, ray),
+            None => f32_ray::any_widened(self.isa, &self.tree, ray),
         }
-    }
-
-    /// [`Accel::closest`] of a ray in single precision, rounded.
-    #[inline(never)]
-    pub(crate) fn closest_widened(&self, ray: &Ray32) -> Option<Hit32> {
-        self.closest(&ray.to_f64()).as_ref().map(f32_ray::rounded)
-    }
-
-    /// [`Accel::any`] of a ray in single precision.
-    #[inline(never)]
-    pub(crate) fn any_widened(&self, ray: &Ray32) -> bool {
-        self.any(&ray.to_f64())
     }
 
     /// [`Accel::closest`] for every ray, with the same answers to the bit; `hits` has a slot for each.
@@ -424,7 +294,7 @@ impl Accel {
     /// When `rays` and `hits` differ in length.
     pub fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         assert_eq!(rays.len(), hits.len(), "a slot for the hit of every ray");
-        batch::closest(self.isa, self, rays, hits);
+        batch::closest(self.isa, &self.tree, rays, hits);
     }
 
     /// [`Accel::any`] for every ray: see [`Accel::closest_batch`].
@@ -433,7 +303,7 @@ impl Accel {
     /// When `rays` and `hits` differ in length.
     pub fn any_batch(&self, rays: &[Ray], hits: &mut [bool]) {
         assert_eq!(rays.len(), hits.len(), "a slot for the answer of every ray");
-        batch::any(self.isa, self, rays, hits);
+        batch::any(self.isa, &self.tree, rays, hits);
     }
 
     /// [`Accel::closest_f32`] for every ray: see [`Accel::closest_batch`].
@@ -442,7 +312,7 @@ impl Accel {
     /// When `rays` and `hits` differ in length.
     pub fn closest_batch_f32(&self, rays: &[Ray32], hits: &mut [Option<Hit32>]) {
         assert_eq!(rays.len(), hits.len(), "a slot for the hit of every ray");
-        batch::closest_f32(self.isa, self, rays, hits);
+        batch::closest_f32(self.isa, &self.tree, rays, hits);
     }
 
     /// [`Accel::any_f32`] for every ray: see [`Accel::closest_batch`].
@@ -451,7 +321,7 @@ impl Accel {
     /// When `rays` and `hits` differ in length.
     pub fn any_batch_f32(&self, rays: &[Ray32], hits: &mut [bool]) {
         assert_eq!(rays.len(), hits.len(), "a slot for the answer of every ray");
-        batch::any_f32(self.isa, self, rays, hits);
+        batch::any_f32(self.isa, &self.tree, rays, hits);
     }
 
     /// By how much the rays of a picture are rounded where they start, and triangles of meshes in the tree itself with them;
@@ -477,7 +347,7 @@ impl Accel {
     /// d |L⁻ᵀn| across the plane of the triangle in its own space, and Σ |mᵢ| (|L| e)ᵢ ≥ Σ |nᵢ| eᵢ / |L⁻ᵀn|: there, too, it is moved by
     /// 3.3 Σ |nᵢ| eᵢ or more.
     pub fn picture_rounding(&self) -> Option<PictureRounding> {
-        PictureStart::of(self).map(|picture| picture.rounding)
+        self.tree.picture_start().map(|picture| picture.rounding)
     }
 
     /// [`Accel::surface`] at a hit of [`Accel::closest_columns`], with an error by which rays of pictures that leave it by
@@ -486,7 +356,7 @@ impl Accel {
     /// # Panics
     /// When `hit` comes from another tree and names what is not in this one.
     pub fn picture_surface(&self, ray: &Ray, hit: &Hit) -> Surface {
-        surface::picture_surface(self, ray, hit)
+        surface::picture_surface(&self.tree, ray, hit)
     }
 
     /// The closest hits of the rays of a picture.
@@ -501,7 +371,7 @@ impl Accel {
     /// # Panics
     /// When columns differ in length.
     pub fn closest_columns(&self, rays: &RayColumns, exact: bool, hits: &mut HitColumns) {
-        batch::columns::closest(self.isa, self, rays, exact, hits);
+        batch::columns::closest(self.isa, &self.tree, rays, exact, hits);
     }
 
     /// Whether anything is hit by the rays of a picture: whether [`Accel::closest_columns`] finds something.
@@ -509,7 +379,7 @@ impl Accel {
     /// # Panics
     /// When columns differ in length.
     pub fn any_columns(&self, rays: &RayColumns, exact: bool, occluded: &mut Vec<bool>) {
-        batch::columns::any(self.isa, self, rays, exact, occluded);
+        batch::columns::any(self.isa, &self.tree, rays, exact, occluded);
     }
 
     /// The tree with a mask for each of its geometries, by position, for [`Query::mask`]; without, all bits are set.
@@ -518,19 +388,10 @@ impl Accel {
     /// # Panics
     /// When there are not as many masks as geometries.
     #[must_use]
-    pub fn with_masks(self, masks: Vec<u32>) -> Self {
-        assert_eq!(masks.len(), self.geometries.len(), "a mask for each geometry");
-        Self { masks, ..self }
-    }
-
-    /// The queries at an instruction set.
-    pub(crate) fn queries_at(&self, isa: Isa) -> Queries {
-        if isa == self.isa { self.queries } else { Queries::new(isa, self.single.as_ref()) }
-    }
-
-    /// The same in single precision; `None` where they are asked in double.
-    pub(crate) fn f32_queries_at(&self, isa: Isa) -> Option<F32Queries> {
-        if isa == self.isa { self.f32_queries } else { F32Queries::new(isa, self.single.as_ref()) }
+    pub fn with_masks(mut self, masks: Vec<u32>) -> Self {
+        assert_eq!(masks.len(), self.tree.geometries.len(), "a mask for each geometry");
+        Arc::make_mut(&mut self.tree).masks = masks;
+        self
     }
 
     /// The nearest point of all surfaces within `max_distance` (itself included; infinite for anywhere), or `None` where there
@@ -549,7 +410,7 @@ impl Accel {
         point: DVec3,
         max_distance: f64,
     ) -> Result<Option<ClosestPoint>, NoClosestPoint> {
-        closest_point::closest_point(self, point, max_distance, 0.0)
+        closest_point::closest_point(&self.tree, point, max_distance, 0.0)
     }
 
     /// [`Accel::closest_point`] at a time, in the unit of the keys of what moves; without one, it is 0.
@@ -562,7 +423,7 @@ impl Accel {
         max_distance: f64,
         time: f64,
     ) -> Result<Option<ClosestPoint>, NoClosestPoint> {
-        closest_point::closest_point(self, point, max_distance, time)
+        closest_point::closest_point(&self.tree, point, max_distance, time)
     }
 
     /// Whether a point is inside of what stands here, even-odd: inside of two bodies that overlap, or in a body within a
@@ -572,12 +433,12 @@ impl Accel {
     /// of them decide: of closed meshes all say the same. What is open has no inside, and the answer there is some guess,
     /// always the same one. Nothing is around a point that is not finite.
     pub fn is_inside(&self, point: DVec3) -> bool {
-        inside::is_inside(self, point, 0.0)
+        inside::is_inside(&self.tree, point, 0.0)
     }
 
     /// [`Accel::is_inside`] at a time, in the unit of the keys of what moves; without one, it is 0.
     pub fn is_inside_at(&self, point: DVec3, time: f64) -> bool {
-        inside::is_inside(self, point, time)
+        inside::is_inside(&self.tree, point, time)
     }
 
     /// How often surfaces wind around a point: 1 inside of a closed mesh whose triangles run counter-clockwise as seen from
@@ -594,7 +455,7 @@ impl Accel {
     /// # Errors
     /// [`NoWindingNumber`] where there are open shapes (other than triangles), or custom geometry that offers none.
     pub fn winding_number(&self, point: DVec3) -> Result<f64, NoWindingNumber> {
-        winding::winding_number(self, point, 0.0, Some(winding::FAR))
+        winding::winding_number(&self.tree, point, 0.0, Some(winding::FAR))
     }
 
     /// [`Accel::winding_number`] at a time, in the unit of the keys of what moves; without one, it is 0.
@@ -602,7 +463,7 @@ impl Accel {
     /// # Errors
     /// As there.
     pub fn winding_number_at(&self, point: DVec3, time: f64) -> Result<f64, NoWindingNumber> {
-        winding::winding_number(self, point, time, Some(winding::FAR))
+        winding::winding_number(&self.tree, point, time, Some(winding::FAR))
     }
 
     /// [`Accel::winding_number`] as the sum over every triangle, exact up to rounding.
@@ -610,7 +471,7 @@ impl Accel {
     /// # Errors
     /// As there.
     pub fn winding_number_exact(&self, point: DVec3) -> Result<f64, NoWindingNumber> {
-        winding::winding_number(self, point, 0.0, None)
+        winding::winding_number(&self.tree, point, 0.0, None)
     }
 
     /// The surface at a hit of this tree, in the space of this tree. For triangles `uv` are the barycentrics (b1, b2).
@@ -618,7 +479,7 @@ impl Accel {
     /// # Panics
     /// When `hit` comes from another tree and names what is not in this one.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> Surface {
-        surface::surface(self, ray, hit)
+        surface::surface(&self.tree, ray, hit)
     }
 
     /// The surface at a hit of this tree, in the space of the hit's innermost instance.
@@ -626,7 +487,7 @@ impl Accel {
     /// # Panics
     /// When `hit` comes from another tree and names what is not in this one.
     pub fn surface_in_object(&self, ray: &Ray, hit: &Hit) -> Surface {
-        surface::surface_in_object(self, ray, hit)
+        surface::surface_in_object(&self.tree, ray, hit)
     }
 
     /// The map from the space of the hit's innermost instance to the space of this tree, at the time of the ray.
@@ -634,7 +495,7 @@ impl Accel {
     /// # Panics
     /// When `hit` comes from another tree and names what is not in this one.
     pub fn world_from_object(&self, ray: &Ray, hit: &Hit) -> Transform {
-        surface::world_from_object(self, ray, hit)
+        surface::world_from_object(&self.tree, ray, hit)
     }
 
     /// What was hit, and where it stands at the time of the ray.
@@ -642,17 +503,17 @@ impl Accel {
     /// # Panics
     /// When `hit` comes from another tree and names what is not in this one.
     pub fn target(&self, ray: &Ray, hit: &Hit) -> Target<'_> {
-        surface::target(self, ray, hit)
+        surface::target(&self.tree, ray, hit)
     }
 
     /// A box around everything finite in it.
     pub fn bounds(&self) -> Aabb {
-        self.bounds
+        self.tree.bounds
     }
 
     /// How many primitives it holds itself, those of its instances not counted.
     pub fn primitive_count(&self) -> usize {
-        self.primitives
+        self.tree.primitives
     }
 
     /// Bytes of the tree itself: nodes, leaves and references, not the meshes, not the instances' trees, and not what lies in a
@@ -662,49 +523,18 @@ impl Accel {
             v.capacity() * size_of::<T>()
         }
         size_of::<Self>()
-            + bytes(&self.geometries)
-            + self.tree.nodes.own_bytes()
-            + self.tree.blocks.own_bytes()
-            + self.tree.names.own_bytes()
-            + self.tree.entries.own_bytes()
-            + self.tree.sphere_blocks.own_bytes()
-            + self.tree.sphere_names.own_bytes()
-            + self.bounding_volumes.memory_bytes()
-            + bytes(&self.infinite)
-            + bytes(&self.masks)
-            + self.moments.get().map_or(0, Moments::memory_bytes)
-            + self.flats.get().map_or(0, Flats::memory_bytes)
-    }
-
-    /// What the corners of a mesh are relative to.
-    pub(crate) fn mesh_origin(&self, geometry: u32) -> DVec3 {
-        match &self.geometries[geometry as usize].kind {
-            GeometryKind::Mesh(mesh) => mesh.origin,
-            _ => unreachable!("blocks are of meshes"),
-        }
-    }
-
-    /// The corners of a triangle in double precision.
-    pub(crate) fn precise_corners(&self, geometry: u32, primitive: u32) -> [DVec3; 3] {
-        match &self.geometries[geometry as usize].kind {
-            GeometryKind::PreciseMesh(mesh) => mesh.corners(primitive),
-            _ => unreachable!("the leaf says so"),
-        }
-    }
-
-    /// A cloud of spheres.
-    #[inline(always)]
-    pub(crate) fn cloud(&self, geometry: u32) -> &SphereCloud {
-        match &self.geometries[geometry as usize].kind {
-            GeometryKind::Spheres(cloud) => cloud,
-            _ => unreachable!("blocks of spheres are of clouds"),
-        }
-    }
-
-    /// The entry of an instance: those in the tree count first, then those outside it.
-    #[inline(always)]
-    pub(crate) fn instance_entry(&self, index: usize) -> &Entry {
-        let inside = &self.tree.entries;
-        inside.get(index).unwrap_or_else(|| &self.infinite[index - inside.len()])
+            + size_of::<Tree>()
+            + bytes(&self.tree.geometries)
+            + self.tree.packed.nodes.own_bytes()
+            + self.tree.packed.blocks.own_bytes()
+            + self.tree.packed.names.own_bytes()
+            + self.tree.packed.entries.own_bytes()
+            + self.tree.packed.sphere_blocks.own_bytes()
+            + self.tree.packed.sphere_names.own_bytes()
+            + self.tree.bounding_volumes.memory_bytes()
+            + bytes(&self.tree.infinite)
+            + bytes(&self.tree.masks)
+            + self.tree.moments.get().map_or(0, Moments::memory_bytes)
+            + self.tree.flats.get().map_or(0, Flats::memory_bytes)
     }
 }

@@ -5,12 +5,13 @@ use std::ops::Range;
 use lumbre_geometry::{Ray, Root};
 use lumbre_math::{DVec3, Vec3};
 
-use crate::intersect::filter_start::FilterStart;
+use crate::hit::{Hit, InstancePath};
 use crate::intersect::watertight::root;
+use crate::ray32::Ray32;
 use crate::trace::Winner;
 use crate::trace::picture::Crossing;
-use crate::tree::node::{ROUNDOFF, round_up};
-use crate::{Accel, Geometry, GeometryKind, Hit, InstancePath, Placement, Ray32};
+use crate::tree::picture_start::PictureStart;
+use crate::tree::{GeometryKind, Tree};
 
 /// Rays of a picture, in columns of equal length: `t` starts at 0.
 #[derive(Clone, Copy, Debug)]
@@ -63,6 +64,23 @@ impl RayColumns<'_> {
             t_max: t_max.map(|column| &column[range.clone()]),
             time: time.map(|column| &column[range]),
         }
+    }
+
+    /// Where a ray starts, as single precision knows it.
+    #[inline(always)]
+    pub(crate) fn local(&self, picture: &PictureStart, i: usize) -> Ray32 {
+        let origin = DVec3::from_array(self.origin.map(|column| column[i])) - picture.rounding.origin;
+        Ray32 {
+            origin: origin.as_vec3(),
+            t_min: 0.0,
+            direction: Vec3::from_array(self.direction.map(|column| column[i])),
+            t_max: self.t_max.map_or(f32::INFINITY, |column| column[i]),
+        }
+    }
+
+    /// Adds some of them, rounded, relative to the mesh.
+    pub(crate) fn push_local(&self, picture: &PictureStart, range: Range<usize>, rays: &mut Vec<Ray32>) {
+        rays.extend(range.map(|i| self.local(picture, i)));
     }
 
     /// # Panics
@@ -182,32 +200,32 @@ impl HitColumns {
 
     /// A hit of a triangle in single precision, or of anything.
     #[inline(always)]
-    pub(crate) fn put_crossing(&mut self, i: usize, accel: &Accel, crossing: Crossing) {
+    pub(crate) fn put_crossing(&mut self, i: usize, tree: &Tree, crossing: Crossing) {
         let Winner { root, geometry, primitive } = crossing.winner;
-        if crossing.is_plain(accel) {
-            let id = accel.geometries[geometry as usize].id;
+        if crossing.is_plain(tree) {
+            let id = tree.geometries[geometry as usize].id;
             let local = [root.local.x as f32, root.local.y as f32];
             self.put_plain(i, (id, primitive, geometry), root.t as f32, local);
             return;
         }
-        match crossing.placed(accel) {
+        match crossing.placed(tree) {
             Some((id, instance)) => self.put_near(i, crossing.winner, id, instance, false),
-            None => self.put_hit(i, accel, crossing.into_hit(accel)),
+            None => self.put_hit(i, tree, crossing.into_hit(tree)),
         }
     }
 
     /// A hit in double precision, outside of instances.
     #[inline(always)]
-    pub(crate) fn put_winner(&mut self, i: usize, accel: &Accel, winner: Winner) {
-        let geometry = &accel.geometries[winner.geometry as usize];
+    pub(crate) fn put_winner(&mut self, i: usize, tree: &Tree, winner: Winner) {
+        let geometry = &tree.geometries[winner.geometry as usize];
         self.put_near(i, winner, geometry.id, None, matches!(geometry.kind, GeometryKind::Mesh(_)));
     }
 
     /// A hit in double precision.
-    pub(crate) fn put_hit(&mut self, i: usize, accel: &Accel, hit: Hit) {
+    pub(crate) fn put_hit(&mut self, i: usize, tree: &Tree, hit: Hit) {
         let Hit { root, id, primitive, geometry, .. } = hit;
         if hit.route.is_empty() {
-            return self.put_winner(i, accel, Winner { root, geometry, primitive });
+            return self.put_winner(i, tree, Winner { root, geometry, primitive });
         }
         self.put_rounded(i, (id, primitive), &root, 0);
         self.whole.push(WholeHit::Nested(Box::new(hit)));
@@ -237,100 +255,3 @@ fn hit(Winner { root, geometry, primitive }: Winner, id: u32, instance: Option<(
     }
     Hit { root, id, primitive, geometry, instances, route }
 }
-
-/// By how much rays of a picture are rounded, and triangles with them: see [`Accel::picture_rounding`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PictureRounding {
-    /// What rays in single precision start relative to.
-    pub origin: DVec3,
-    /// How far a ray's start moves on each axis, by its distance from the origin there.
-    pub relative: f64,
-    /// How far a triangle seems to be from where it is, by the size of the tree.
-    pub absolute: f64,
-}
-
-impl PictureRounding {
-    /// What [`Surface::point_error`](lumbre_geometry::Surface::point_error) is to grow by, axis by axis, for a point on a triangle of a
-    /// mesh that stands in the tree itself, so that the rays that leave it do not hit the triangle.
-    #[inline]
-    pub fn error(&self, point: DVec3) -> DVec3 {
-        (point - self.origin).abs() * self.relative + self.absolute
-    }
-}
-
-/// What rays of a picture need to start in single precision: relative to the mesh.
-#[derive(Clone, Debug)]
-pub(crate) struct PictureStart {
-    /// For rays that start relative to the mesh.
-    pub(crate) start: FilterStart,
-    pub(crate) rounding: PictureRounding,
-    /// How far a hit in the tree may be from its triangle, on each axis, as seen from a ray that comes to it as to an instance, and that
-    /// was not rounded: see `trace::picture`.
-    deviation: f64,
-    /// Whether there are triangles in single precision in the tree, or in its instances.
-    has_triangles: bool,
-}
-
-impl PictureStart {
-    /// That of a tree in which single precision is of use.
-    #[inline]
-    pub(crate) fn of(accel: &Accel) -> Option<&Self> {
-        accel.picture.as_ref().filter(|picture| picture.has_triangles)
-    }
-
-    /// Of a tree that has this start; `None` where pictures take double precision: also where instances move.
-    pub(crate) fn new(geometries: &[Geometry], start: Option<&FilterStart>) -> Option<Self> {
-        let start = start?;
-        let (mut within, mut has_triangles) = (0.0f64, false);
-        for geometry in geometries {
-            has_triangles |= matches!(geometry.kind, GeometryKind::Mesh(_));
-            let GeometryKind::Instance(instance) = &geometry.kind else { continue };
-            let Placement::Still(map) = &instance.world_from_object else { return None };
-            if let Some(picture) = &instance.accel.picture {
-                let linear = map.affine().matrix3;
-                let size = linear.x_axis.abs() + linear.y_axis.abs() + linear.z_axis.abs();
-                within = within.max(size.max_element() * picture.deviation);
-                has_triangles |= picture.has_triangles;
-            }
-        }
-        let shift = start.shift.iter().fold(0.0f32, |most, shift| most.max(shift.abs()));
-        let own = ROUNDOFF * (128.0 + 2.0 * f64::from(shift)) / start.scale;
-        let rounding = PictureRounding {
-            origin: DVec3::from_slice(&start.mesh_origin),
-            relative: RELATIVE * ROUNDOFF,
-            absolute: ABSOLUTE * ROUNDOFF / start.scale,
-        };
-        let room = within * start.scale;
-        // Also where that is no number.
-        (room <= MOST_ROOM).then(|| Self {
-            start: start.relative_to_mesh(round_up(room)),
-            rounding,
-            deviation: own.max(within),
-            has_triangles,
-        })
-    }
-
-    /// Where a ray starts, as single precision knows it.
-    #[inline(always)]
-    pub(crate) fn local(&self, columns: &RayColumns, i: usize) -> Ray32 {
-        let origin = DVec3::from_array(columns.origin.map(|column| column[i])) - self.rounding.origin;
-        Ray32 {
-            origin: origin.as_vec3(),
-            t_min: 0.0,
-            direction: Vec3::from_array(columns.direction.map(|column| column[i])),
-            t_max: columns.t_max.map_or(f32::INFINITY, |column| column[i]),
-        }
-    }
-
-    /// Adds rays, rounded, relative to the mesh.
-    pub(crate) fn push_rays(&self, columns: &RayColumns, range: Range<usize>, rays: &mut Vec<Ray32>) {
-        let columns = columns.slice(range);
-        rays.extend((0..columns.len()).map(|i| self.local(&columns, i)));
-    }
-}
-
-/// See [`Accel::picture_rounding`].
-const RELATIVE: f64 = 2.0;
-const ABSOLUTE: f64 = 20.0;
-/// By no more than this, in tree units, boxes may be moved for what is in instances.
-const MOST_ROOM: f64 = 1.0 / 1024.0;

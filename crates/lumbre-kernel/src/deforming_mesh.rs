@@ -3,9 +3,11 @@
 use lumbre_geometry::{Aabb, Ray, Root, Roots, Surface};
 use lumbre_math::{DVec3, Vec3};
 
-use crate::geometry::has_area;
+use crate::build::error::BuildError;
 use crate::intersect::watertight::{Meeting, Shear, intersect};
-use crate::{BuildError, CustomGeometry, TriangleMesh, surface};
+use crate::surface;
+use crate::tree::geometry::has_area;
+use crate::tree::geometry::{CustomGeometry, TriangleMesh};
 
 /// Triangles by index, each of whose vertices goes straight from where it is at one moment to where it is at the next.
 ///

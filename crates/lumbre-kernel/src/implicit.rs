@@ -3,7 +3,7 @@
 use lumbre_geometry::{Aabb, ImplicitSurface, Ray, Root, Roots, Surface};
 use lumbre_math::DVec3;
 
-use crate::CustomGeometry;
+use crate::tree::geometry::CustomGeometry;
 
 impl CustomGeometry for ImplicitSurface {
     fn primitive_count(&self) -> u32 {

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use crate::trace::{ContextRef, Winner};
-use crate::{Accel, Hit};
+use crate::hit::Hit;
+use crate::tree::Tree;
 
 /// What a query takes into account; by default everything. Queries without one pay nothing for it.
 ///
@@ -76,8 +76,8 @@ impl<'q> Query<'q> {
 
     /// Whether it certainly takes everything of a tree and of its instances.
     #[inline(always)]
-    pub(crate) fn takes_all(&self, accel: &Accel) -> bool {
-        let has_masks = !accel.masks.is_empty() || accel.summary.masks_within;
+    pub(crate) fn takes_all(&self, tree: &Tree) -> bool {
+        let has_masks = !tree.masks.is_empty() || tree.summary.masks_within;
         (!has_masks || self.mask == u32::MAX)
             && self.exclude.is_none()
             && self.faces == Faces::Both
@@ -93,67 +93,5 @@ impl fmt::Debug for Query<'_> {
             .field("faces", &self.faces)
             .field("has_filter", &self.filter.is_some())
             .finish()
-    }
-}
-
-/// What of one tree a query takes into account.
-#[derive(Clone, Copy)]
-pub(crate) struct TreeQuery<'a> {
-    query: &'a Query<'a>,
-    accel: &'a Accel,
-    context: ContextRef<'a>,
-    /// Geometry and primitive.
-    excluded: Option<(u32, u32)>,
-}
-
-impl<'a> TreeQuery<'a> {
-    /// In a tree that stands there.
-    #[inline(always)]
-    pub(crate) fn new(query: &'a Query<'a>, accel: &'a Accel, context: ContextRef<'a>) -> Self {
-        let excluded = match query.exclude {
-            Some(hit) if context.has_route(&hit.route) => Some((hit.geometry, hit.primitive)),
-            _ => None,
-        };
-        Self { query, accel, context, excluded }
-    }
-
-    /// The query.
-    #[inline(always)]
-    pub(crate) fn query(&self) -> &'a Query<'a> {
-        self.query
-    }
-
-    /// Whether the mask leaves a geometry.
-    #[inline(always)]
-    pub(crate) fn has_mask(&self, geometry: u32) -> bool {
-        let mask = self.query.mask;
-        mask == u32::MAX || self.accel.masks.get(geometry as usize).is_none_or(|own| own & mask != 0)
-    }
-
-    /// Whether a primitive may count, before it is tested.
-    #[inline(always)]
-    pub(crate) fn has_primitive(&self, geometry: u32, primitive: u32) -> bool {
-        self.excluded != Some((geometry, primitive)) && self.has_mask(geometry)
-    }
-
-    /// Whether both sides of a surface count.
-    #[inline(always)]
-    pub(crate) fn takes_both_faces(&self) -> bool {
-        self.query.faces == Faces::Both
-    }
-
-    /// Whether a side of a surface counts.
-    #[inline(always)]
-    pub(crate) fn takes_face(&self, is_front: bool) -> bool {
-        match self.query.faces {
-            Faces::Both => true,
-            Faces::Front => is_front,
-            Faces::Back => !is_front,
-        }
-    }
-
-    /// Whether the filter takes a hit.
-    pub(crate) fn accepts(&self, winner: &Winner) -> bool {
-        self.query.filter.is_none_or(|filter| filter(&winner.to_hit_in(self.accel, self.context)))
     }
 }

@@ -8,55 +8,55 @@ use lumbre_math::rounding::{UNIT_ROUNDOFF, gamma};
 use lumbre_math::{DMat3, DVec2, DVec3, Transform, Vec3};
 use smallvec::SmallVec;
 
-use crate::columns::PictureStart;
+use crate::hit::{Hit, Target, TargetShape};
 use crate::tree::sphere_block::ExactSphere;
-use crate::{Accel, GeometryKind, Hit, Instance, Target, TargetShape};
+use crate::tree::{GeometryKind, Instance, Tree};
 
 /// The instances along a hit's route, outermost first, and the tree within the last.
-fn along<'a>(accel: &'a Accel, hit: &Hit) -> (SmallVec<[&'a Instance; 4]>, &'a Accel) {
-    let mut inner = accel;
+fn along<'a>(tree: &'a Tree, hit: &Hit) -> (SmallVec<[&'a Instance; 4]>, &'a Tree) {
+    let mut inner = tree;
     let mut instances = SmallVec::with_capacity(hit.route.len());
     for &position in &hit.route {
         let GeometryKind::Instance(instance) = &inner.geometries[position as usize].kind else {
             panic!("a hit of another tree");
         };
         instances.push(instance);
-        inner = &instance.accel;
+        inner = &instance.tree;
     }
     (instances, inner)
 }
 
 /// The map from the innermost instance of a hit.
-pub(crate) fn world_from_object(accel: &Accel, ray: &Ray, hit: &Hit) -> Transform {
-    let (instances, _) = along(accel, hit);
+pub(crate) fn world_from_object(tree: &Tree, ray: &Ray, hit: &Hit) -> Transform {
+    let (instances, _) = along(tree, hit);
     let outwards = |outer, instance: &&Instance| outer * instance.world_from_object.at(ray.time);
     instances.iter().fold(Transform::IDENTITY, outwards)
 }
 
 /// The surface at a hit, in the space of `accel`.
 #[inline]
-pub(crate) fn surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
-    placed_surface::<false>(accel, ray, hit)
+pub(crate) fn surface(tree: &Tree, ray: &Ray, hit: &Hit) -> Surface {
+    placed_surface::<false>(tree, ray, hit)
 }
 
 /// The same for rays of pictures that leave it.
 #[inline]
-pub(crate) fn picture_surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
+pub(crate) fn picture_surface(tree: &Tree, ray: &Ray, hit: &Hit) -> Surface {
     // Without one, all rays are in double precision, in instances, too.
-    if PictureStart::of(accel).is_some() {
-        placed_surface::<true>(accel, ray, hit)
+    if tree.picture_start().is_some() {
+        placed_surface::<true>(tree, ray, hit)
     } else {
-        placed_surface::<false>(accel, ray, hit)
+        placed_surface::<false>(tree, ray, hit)
     }
 }
 
 /// The surface at a hit; `ROUNDED`: with the error of rays that are rounded where its triangle stands. Maps take that with them.
 #[inline]
-fn placed_surface<const ROUNDED: bool>(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
+fn placed_surface<const ROUNDED: bool>(tree: &Tree, ray: &Ray, hit: &Hit) -> Surface {
     if hit.route.is_empty() {
-        return rounded::<ROUNDED>(accel, hit, bare_surface(accel, ray, hit));
+        return rounded::<ROUNDED>(tree, hit, bare_surface(tree, ray, hit));
     }
-    let (instances, inner) = along(accel, hit);
+    let (instances, inner) = along(tree, hit);
     // The same steps as the search took, for the same bits.
     let ray = instances.iter().fold(*ray, |ray, instance| instance.world_from_object.object_ray(&ray));
     let surface = rounded::<ROUNDED>(inner, hit, bare_surface(inner, &ray, hit));
@@ -65,8 +65,8 @@ fn placed_surface<const ROUNDED: bool>(accel: &Accel, ray: &Ray, hit: &Hit) -> S
 }
 
 /// What was hit, and where it stands.
-pub(crate) fn target<'a>(accel: &'a Accel, ray: &Ray, hit: &Hit) -> Target<'a> {
-    let (instances, inner) = along(accel, hit);
+pub(crate) fn target<'a>(tree: &'a Tree, ray: &Ray, hit: &Hit) -> Target<'a> {
+    let (instances, inner) = along(tree, hit);
     let shape = match &inner.geometries[hit.geometry as usize].kind {
         GeometryKind::Shape(shape) => TargetShape::Exact(Cow::Borrowed(shape)),
         GeometryKind::Mesh(mesh) => {
@@ -86,18 +86,18 @@ pub(crate) fn target<'a>(accel: &'a Accel, ray: &Ray, hit: &Hit) -> Target<'a> {
 }
 
 /// The surface at a hit, in the space of its innermost instance.
-pub(crate) fn surface_in_object(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
-    let (instances, inner) = along(accel, hit);
+pub(crate) fn surface_in_object(tree: &Tree, ray: &Ray, hit: &Hit) -> Surface {
+    let (instances, inner) = along(tree, hit);
     let ray = instances.iter().fold(*ray, |ray, instance| instance.world_from_object.object_ray(&ray));
     bare_surface(inner, &ray, hit)
 }
 
 /// A surface of a tree, with the error of rays that are rounded there.
 #[inline]
-fn rounded<const ROUNDED: bool>(accel: &Accel, hit: &Hit, mut surface: Surface) -> Surface {
+fn rounded<const ROUNDED: bool>(tree: &Tree, hit: &Hit, mut surface: Surface) -> Surface {
     if ROUNDED
-        && let Some(picture) = &accel.picture
-        && matches!(accel.geometries[hit.geometry as usize].kind, GeometryKind::Mesh(_))
+        && let Some(picture) = &tree.picture
+        && matches!(tree.geometries[hit.geometry as usize].kind, GeometryKind::Mesh(_))
     {
         surface.point_error += picture.rounding.error(surface.point);
     }
@@ -106,8 +106,8 @@ fn rounded<const ROUNDED: bool>(accel: &Accel, hit: &Hit, mut surface: Surface) 
 
 /// The surface at a hit in the tree that its geometry stands in.
 #[inline]
-fn bare_surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
-    match &accel.geometries[hit.geometry as usize].kind {
+fn bare_surface(tree: &Tree, ray: &Ray, hit: &Hit) -> Surface {
+    match &tree.geometries[hit.geometry as usize].kind {
         GeometryKind::Shape(shape) => shape.surface(ray, &hit.root),
         GeometryKind::Mesh(mesh) => {
             let corners = mesh.indices[hit.primitive as usize].map(|vertex| mesh.positions[vertex as usize]);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use lumbre_geometry::{Aabb, BilinearPatch, PlacedShape, Shape};
-use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, Instance, Placement, TriangleMesh};
+use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, Placement, TriangleMesh};
 use lumbre_math::distribution::AliasTable;
 use lumbre_math::{DVec3, Elementary, Transform};
 use lumbre_shading::{Material, MaterialKind};
@@ -260,10 +260,7 @@ impl Builder {
             self.shape(shape, origin, standing, &mut geometries)?;
         }
         for ((id, instance), accel) in (0..).zip(instances).zip(accels) {
-            let kind = GeometryKind::Instance(Instance {
-                accel: accel.clone(),
-                world_from_object: instance.world_from_object.clone(),
-            });
+            let kind = GeometryKind::Instance(accel.instance(instance.world_from_object.clone()));
             geometries.push(Geometry { id, kind });
         }
         Ok(Accel::build(geometries, &BuildOptions::default())?)

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use anyhow::{Context, Result};
 use lumbre_geometry::{PlacedShape, Ray, Sphere};
 use lumbre_kernel::{
-    Accel, BuildOptions, Geometry, GeometryKind, Hit, Hit32, Instance, PreciseMesh, Preset, TriangleMesh,
+    Accel, BuildOptions, Geometry, GeometryKind, Hit, Hit32, PreciseMesh, Preset, TriangleMesh,
 };
 use lumbre_math::{DVec3, Transform, Vec3};
 
@@ -160,10 +160,7 @@ fn list(scene: &Scene, places_spheres: bool, is_precise: bool) -> Vec<Geometry> 
     let shapes = scene.shapes.iter().map(|shape| GeometryKind::Shape(shape.clone()));
     let instances = scene.placements.iter().map(|placement| {
         let world_from_object = placement.transform();
-        GeometryKind::Instance(Instance {
-            accel: Arc::clone(&nothing),
-            world_from_object: world_from_object.into(),
-        })
+        GeometryKind::Instance(nothing.instance(world_from_object))
     });
     let kinds = meshes.chain(spheres).chain(shapes).chain(instances);
     kinds.enumerate().map(|(i, kind)| Geometry { id: i as u32, kind }).collect()
@@ -191,7 +188,7 @@ fn build_list(scene: &Scene, mut list: Vec<Geometry>, preset: Preset, is_precise
     let first = list.len() - scene.placements.len();
     for (geometry, placement) in list[first..].iter_mut().zip(&scene.placements) {
         if let GeometryKind::Instance(instance) = &mut geometry.kind {
-            instance.accel = Arc::clone(&placed[placement.mesh]);
+            *instance = placed[placement.mesh].instance(instance.world_from_object.clone());
         }
     }
     Accel::build(list, &options).context("the scene")

@@ -10,37 +10,40 @@ use lumbre_geometry::Ray;
 
 use super::f32_packet::{F32Bundle, PictureRay};
 use super::{AnyHit, Batch, ClosestHit, F32, Plan, Precision, Sink, batch_f64};
-use crate::columns::PictureStart;
-use crate::intersect::filter_start::FilterStart;
+use crate::columns::{HitColumns, RayColumns};
 use crate::intersect::{Dispatch, Isa, Simd};
+use crate::ray32::{Hit32, Ray32};
 use crate::simd;
 use crate::trace::decide::Decider;
-use crate::trace::filtered::Found;
+use crate::trace::filtered::Queries;
+use crate::trace::filtered_ray::Found;
 use crate::trace::picture::{Crossing, LocalRay, Search};
 use crate::trace::stack::Goal;
 use crate::trace::{ContextRef, Outcome, exact, f32_ray};
+use crate::tree::Tree;
+use crate::tree::filter_start::FilterStart;
 use crate::tree::packed::Start;
-use crate::{Accel, Hit32, HitColumns, Ray32, RayColumns};
+use crate::tree::picture_start::PictureStart;
 
 /// How many rays are put side by side at a time.
 const PIECE: usize = 4096;
 
 /// [`Accel::closest_columns`].
-pub(crate) fn closest(isa: Isa, accel: &Accel, rays: &RayColumns, exact: bool, hits: &mut HitColumns) {
+pub(crate) fn closest(isa: Isa, tree: &Tree, rays: &RayColumns, exact: bool, hits: &mut HitColumns) {
     rays.check();
     hits.clear(rays.len());
-    match PictureStart::of(accel) {
+    match tree.picture_start() {
         Some(picture) if !exact => {
-            let answer = &mut Closest { accel, isa, rays, hits };
-            traverse_f32::<ClosestHit, _>(isa, accel, picture, rays, answer);
+            let answer = &mut Closest { tree, isa, rays, hits };
+            traverse_f32::<ClosestHit, _>(isa, tree, picture, rays, answer);
         }
         _ => traverse_f64(rays, |rays, first| {
-            let sink = &mut F64Closest { accel, isa, rays, first, hits };
-            if !batch_f64::<ClosestHit, _>(isa, accel, rays, sink, Plan::SINGLES) {
-                let closest = accel.queries_at(isa).closest;
+            let sink = &mut F64Closest { tree, isa, rays, first, hits };
+            if !batch_f64::<ClosestHit, _>(isa, tree, rays, sink, Plan::SINGLES) {
+                let closest = Queries::of(isa, tree).closest;
                 for (i, ray) in rays.iter().enumerate() {
-                    if let Some(hit) = closest.ask(accel, ray) {
-                        hits.put_hit(first + i, accel, hit);
+                    if let Some(hit) = closest.ask(tree, ray) {
+                        hits.put_hit(first + i, tree, hit);
                     }
                 }
             }
@@ -49,17 +52,17 @@ pub(crate) fn closest(isa: Isa, accel: &Accel, rays: &RayColumns, exact: bool, h
 }
 
 /// [`Accel::any_columns`].
-pub(crate) fn any(isa: Isa, accel: &Accel, rays: &RayColumns, exact: bool, occluded: &mut Vec<bool>) {
+pub(crate) fn any(isa: Isa, tree: &Tree, rays: &RayColumns, exact: bool, occluded: &mut Vec<bool>) {
     rays.check();
     occluded.clear();
     occluded.resize(rays.len(), false);
-    match PictureStart::of(accel) {
+    match tree.picture_start() {
         Some(picture) if !exact => {
-            let answer = &mut Any { accel, isa, rays, occluded };
-            traverse_f32::<AnyHit, _>(isa, accel, picture, rays, answer);
+            let answer = &mut Any { tree, isa, rays, occluded };
+            traverse_f32::<AnyHit, _>(isa, tree, picture, rays, answer);
         }
         _ => traverse_f64(rays, |rays, first| {
-            super::any_by(isa, accel, rays, &mut occluded[first..first + rays.len()], Plan::SINGLES);
+            super::any_by(isa, tree, rays, &mut occluded[first..first + rays.len()], Plan::SINGLES);
         }),
     }
 }
@@ -77,7 +80,7 @@ fn traverse_f64(columns: &RayColumns, mut answer: impl FnMut(&[Ray], usize)) {
 /// Rays in single precision, piece by piece.
 fn traverse_f32<G: Goal, A: Answer>(
     isa: Isa,
-    accel: &Accel,
+    tree: &Tree,
     picture: &PictureStart,
     columns: &RayColumns,
     answer: &mut A,
@@ -89,18 +92,18 @@ fn traverse_f32<G: Goal, A: Answer>(
         let range = first..columns.len().min(first + piece);
         if start.only_triangles {
             alone.clear();
-            picture.push_rays(columns, range, &mut alone);
+            columns.push_local(picture, range, &mut alone);
             let rays = &alone[..];
-            let sink = &mut F32Sink { accel, isa, start: picture, rays, first, answer };
-            batch::<F32<G>, _>(isa, accel, start, rays, sink, Plan::of_picture(accel));
+            let sink = &mut F32Sink { tree, isa, start: picture, rays, first, answer };
+            batch::<F32<G>, _>(isa, tree, start, rays, sink, Plan::of_picture(tree));
         } else {
             both.clear();
             let some = columns.slice(range);
             both.extend(
-                (0..some.len()).map(|i| PictureRay { local: picture.local(&some, i), ray: some.ray(i) }),
+                (0..some.len()).map(|i| PictureRay { local: some.local(picture, i), ray: some.ray(i) }),
             );
             let sink = &mut PictureSink { first, answer };
-            batch::<Picture<G>, _>(isa, accel, start, &both, sink, Plan::SINGLES);
+            batch::<Picture<G>, _>(isa, tree, start, &both, sink, Plan::SINGLES);
         }
     }
 }
@@ -108,22 +111,22 @@ fn traverse_f32<G: Goal, A: Answer>(
 /// Rays in packets, or one after the other where there are none.
 fn batch<P: Precision, S: Sink<P::Answer>>(
     isa: Isa,
-    accel: &Accel,
+    tree: &Tree,
     start: &FilterStart,
     rays: &[P::Ray],
     sink: &mut S,
     plan: Plan,
 ) {
-    if super::batched(isa, accel).is_some() {
-        isa.run_with_vectors(Batch::<P, S> { accel, start, rays, sink, plan });
+    if super::batched(isa, tree).is_some() {
+        isa.run_with_vectors(Batch::<P, S> { tree, start, rays, sink, plan });
     } else {
-        isa.run(OneByOne::<P, S> { accel, start, rays, sink });
+        isa.run(OneByOne::<P, S> { tree, start, rays, sink });
     }
 }
 
 /// Rays one after the other, where there are no packets.
 struct OneByOne<'a, P: Precision, S> {
-    accel: &'a Accel,
+    tree: &'a Tree,
     start: &'a FilterStart,
     rays: &'a [P::Ray],
     sink: &'a mut S,
@@ -134,7 +137,7 @@ impl<P: Precision, S: Sink<P::Answer>> Dispatch for OneByOne<'_, P, S> {
 
     #[inline(always)]
     fn run<L: Simd>(self) {
-        let decider = &Decider::new(self.accel, self.start);
+        let decider = &Decider::new(self.tree, self.start);
         for (i, ray) in self.rays.iter().enumerate() {
             self.sink.put(i, P::traverse_alone::<L>(decider, simd::opaque(ray)));
         }
@@ -156,11 +159,11 @@ impl<G: Goal> Precision for Picture<G> {
 
     #[inline(always)]
     fn traverse_alone<L: Simd>(decider: &Decider, ray: &PictureRay) -> Outcome<Option<Crossing>> {
-        let accel = decider.accel();
-        let Some(picture) = &accel.picture else { return Outcome::Uncertain };
+        let tree = decider.tree();
+        let Some(picture) = &tree.picture else { return Outcome::Uncertain };
         let PictureRay { local, ray } = ray;
         let (local, limit) = (LocalRay::new(*simd::opaque(local)), ray.t_max);
-        Search { accel, picture, from: Start::WHOLE, ray, local, limit }.run::<G, L, true>()
+        Search { tree, picture, from: Start::WHOLE, ray, local, limit }.run::<G, L, true>()
     }
 
     // Leaves of anything but triangles keep single rays busy.
@@ -197,7 +200,7 @@ impl<A: Answer> Sink<Option<Crossing>> for PictureSink<'_, A> {
 
 /// One ray, where a batch has given it up.
 struct Alone<'a, G> {
-    accel: &'a Accel,
+    tree: &'a Tree,
     picture: &'a PictureStart,
     ray: &'a Ray32,
     goal: PhantomData<G>,
@@ -208,7 +211,7 @@ impl<G: Goal> Dispatch for Alone<'_, G> {
 
     #[inline(always)]
     fn run<L: Simd>(self) -> Self::Output {
-        f32_ray::traverse::<G, L>(&Decider::new(self.accel, &self.picture.start), self.ray)
+        f32_ray::traverse::<G, L>(&Decider::new(self.tree, &self.picture.start), self.ray)
     }
 }
 
@@ -225,7 +228,7 @@ trait Answer {
 
 /// The answers of a piece.
 struct F32Sink<'a, A> {
-    accel: &'a Accel,
+    tree: &'a Tree,
     isa: Isa,
     start: &'a PictureStart,
     rays: &'a [Ray32],
@@ -237,8 +240,8 @@ impl<A: Answer> F32Sink<'_, A> {
     #[cold]
     #[inline(never)]
     fn put_alone(&mut self, position: usize) {
-        let (accel, picture, ray) = (self.accel, self.start, &self.rays[position]);
-        let alone = Alone::<A::Goal> { accel, picture, ray, goal: PhantomData };
+        let (tree, picture, ray) = (self.tree, self.start, &self.rays[position]);
+        let alone = Alone::<A::Goal> { tree, picture, ray, goal: PhantomData };
         match self.isa.run(alone) {
             Outcome::Certain(hit) => self.answer.put(self.first + position, hit),
             Outcome::Uncertain => self.answer.put_exactly(self.first + position),
@@ -258,7 +261,7 @@ impl<A: Answer> Sink<Option<Hit32>> for F32Sink<'_, A> {
 
 /// See [`closest`].
 struct Closest<'a> {
-    accel: &'a Accel,
+    tree: &'a Tree,
     isa: Isa,
     rays: &'a RayColumns<'a>,
     hits: &'a mut HitColumns,
@@ -276,20 +279,20 @@ impl Answer for Closest<'_> {
 
     #[inline(always)]
     fn put_crossing(&mut self, position: usize, crossing: Crossing) {
-        self.hits.put_crossing(position, self.accel, crossing);
+        self.hits.put_crossing(position, self.tree, crossing);
     }
 
     fn put_exactly(&mut self, position: usize) {
-        let closest = self.accel.queries_at(self.isa).closest;
-        if let Some(hit) = closest.ask(self.accel, &self.rays.ray(position)) {
-            self.hits.put_hit(position, self.accel, hit);
+        let closest = Queries::of(self.isa, self.tree).closest;
+        if let Some(hit) = closest.ask(self.tree, &self.rays.ray(position)) {
+            self.hits.put_hit(position, self.tree, hit);
         }
     }
 }
 
 /// See [`any`].
 struct Any<'a> {
-    accel: &'a Accel,
+    tree: &'a Tree,
     isa: Isa,
     rays: &'a RayColumns<'a>,
     occluded: &'a mut [bool],
@@ -309,14 +312,14 @@ impl Answer for Any<'_> {
     }
 
     fn put_exactly(&mut self, position: usize) {
-        let any = self.accel.queries_at(self.isa).any;
-        self.occluded[position] = any.ask(self.accel, &self.rays.ray(position));
+        let any = Queries::of(self.isa, self.tree).any;
+        self.occluded[position] = any.ask(self.tree, &self.rays.ray(position));
     }
 }
 
 /// See [`closest`].
 struct F64Closest<'a> {
-    accel: &'a Accel,
+    tree: &'a Tree,
     isa: Isa,
     rays: &'a [Ray],
     first: usize,
@@ -329,15 +332,15 @@ impl Sink<Found> for F64Closest<'_> {
         let hit = match outcome {
             Outcome::Certain(Found { winner, in_instance: None }) => {
                 if let Some(winner) = winner {
-                    self.hits.put_winner(self.first + position, self.accel, winner);
+                    self.hits.put_winner(self.first + position, self.tree, winner);
                 }
                 return;
             }
-            Outcome::Certain(found) => found.into_hit(self.accel, ContextRef::OUTSIDE),
-            Outcome::Uncertain => exact::closest(self.isa, self.accel, &self.rays[position], None),
+            Outcome::Certain(found) => found.into_hit(self.tree, ContextRef::OUTSIDE),
+            Outcome::Uncertain => exact::closest(self.isa, self.tree, &self.rays[position], None),
         };
         if let Some(hit) = hit {
-            self.hits.put_hit(self.first + position, self.accel, hit);
+            self.hits.put_hit(self.first + position, self.tree, hit);
         }
     }
 }

@@ -15,6 +15,7 @@ use crate::intersect::box_ray::SlabRows;
 use crate::intersect::f32_ray::{F32Ray, within};
 use crate::intersect::watertight::{BEYOND, beyond};
 use crate::intersect::{Axes, Dispatch, Simd};
+use crate::ray32::{Hit32, Ray32};
 use crate::simd::{self, F32x16, Row, Vector};
 use crate::trace::decide::Decider;
 use crate::trace::f32_ray::SOME_HIT;
@@ -24,7 +25,6 @@ use crate::trace::{Outcome, precedes};
 use crate::tree::Corners;
 use crate::tree::node::TreeSpace;
 use crate::tree::triangle_block::TriangleBlock;
-use crate::{Hit32, Ray32};
 
 /// A ray of a packet: alone, in trees of triangles, or with the same ray in double precision, in trees of anything.
 pub(super) trait PacketRay: Sized + 'static {
@@ -112,7 +112,7 @@ impl<G: Goal, R: PacketRay> F32Bundle<'_, '_, G, R> {
             self.others.clear();
             for ray in rays {
                 let limit = ray.in_f64().map_or(f64::NEG_INFINITY, |ray| ray.t_max);
-                self.others.push(Others::new(self.decider.accel(), limit));
+                self.others.push(Others::new(self.decider.tree(), limit));
             }
         }
         let mut alive = state.alive;
@@ -254,10 +254,10 @@ impl<'a, 'd, G: Goal, R: PacketRay> Bundle<'a, 'd> for F32Bundle<'a, 'd, G, R> {
             L::F32x16::load(&self.rows[6].0),
         );
         let negative =
-            [plus.turned_by(x).below(zero), plus.turned_by(y).below(zero), plus.turned_by(z).below(zero)];
+            [plus.xor_sign(x).simd_lt(zero), plus.xor_sign(y).simd_lt(zero), plus.xor_sign(z).simd_lt(zero)];
         let (x, y, z) = (x.abs(), y.abs(), z.abs());
-        let x_is_last = y.at_most(x) & z.at_most(x);
-        let y_is_last = z.at_most(y) & !x_is_last;
+        let x_is_last = y.simd_le(x) & z.simd_le(x);
+        let y_is_last = z.simd_le(y) & !x_is_last;
         Signs::of(one, negative, x_is_last, y_is_last)
     }
 
@@ -276,8 +276,8 @@ impl<'a, 'd, G: Goal, R: PacketRay> Bundle<'a, 'd> for F32Bundle<'a, 'd, G, R> {
         let zero = splat(0.0);
         let (t_min, t_max) = (L::F32x16::load(&rows[3].0), L::F32x16::load(&rows[7].0));
         // As of a single ray: minus zero is negative.
-        let is_before = splat(1.0).turned_by(t_min).below(zero);
-        let mut fits = zero.at_most(t_min) & t_min.at_most(t_max) & !is_before;
+        let is_before = splat(1.0).xor_sign(t_min).simd_lt(zero);
+        let mut fits = zero.simd_le(t_min) & t_min.simd_le(t_max) & !is_before;
         let (mut is_long, mut is_near) = (0, true);
         let (x, y, z) =
             (L::F32x16::load(&rows[0].0), L::F32x16::load(&rows[1].0), L::F32x16::load(&rows[2].0));
@@ -287,10 +287,9 @@ impl<'a, 'd, G: Goal, R: PacketRay> Bundle<'a, 'd> for F32Bundle<'a, 'd, G, R> {
         for axis in 0..3 {
             let direction = L::F32x16::load(&rows[4 + axis].0);
             let length = direction.abs();
-            fits &= length.at_most(splat(start.longest[axis]));
-            is_long |= splat(start.shortest).at_most(length);
-            inverse[axis] =
-                splat(start.space_per_unit).over(length.max(splat(start.tiny))).turned_by(direction);
+            fits &= length.simd_le(splat(start.longest[axis]));
+            is_long |= splat(start.shortest).simd_le(length);
+            inverse[axis] = (splat(start.space_per_unit) / length.max(splat(start.tiny))).xor_sign(direction);
             inverse[axis].store(&mut slabs.inverse[axis]);
             if has_one_origin {
                 let local = (f64::from(rows[axis].0[0]) - start.mesh_origin[axis]) as f32;
@@ -301,11 +300,11 @@ impl<'a, 'd, G: Goal, R: PacketRay> Bundle<'a, 'd> for F32Bundle<'a, 'd, G, R> {
                 let local = L::F32x16::load(&rows[axis].0).rounded_less(start.mesh_origin[axis]);
                 local.store(&mut rows[axis]);
                 let from = local * splat(start.units_per_space) - splat(start.shift[axis]);
-                let middle = from.middle();
-                fits &= from.abs().at_most(splat(start.farthest[axis]));
+                let middle = from.midpoint();
+                fits &= from.abs().simd_le(splat(start.farthest[axis]));
                 let margins = [start.f32_margin, TreeSpace::F32_MARGIN_PER_DISTANCE];
                 slabs.set_axis(axis, from, inverse[axis], margins);
-                off[axis] = (from - middle).abs().most();
+                off[axis] = (from - middle).abs().reduce_max();
                 center[axis] = middle.first();
             }
         }
@@ -336,20 +335,23 @@ impl<'a, 'd, G: Goal, R: PacketRay> Bundle<'a, 'd> for F32Bundle<'a, 'd, G, R> {
         for (place, &axis) in order.iter().enumerate() {
             let origin = L::F32x16::load(&self.rows[axis].0);
             origin.store(&mut self.origin[place]);
-            let middle = if self.has_one_origin { origin } else { origin.middle() };
+            let middle = if self.has_one_origin { origin } else { origin.midpoint() };
             off[place] = origin - middle;
             cull.middle[place] = middle.first();
         }
         for place in 0..2 {
             let shear = L::F32x16::load(&self.rows[4 + order[place]].0) * inverse;
-            let middle = shear.middle();
+            let middle = shear.midpoint();
             shear.store(&mut self.shear[place]);
             cull.middle_shear[place] = middle.first();
-            cull.spread[place] = (shear - middle).abs().most();
-            cull.apart[place] =
-                if self.has_one_origin { 0.0 } else { off[2].times_from(shear, off[place]).abs().most() };
+            cull.spread[place] = (shear - middle).abs().reduce_max();
+            cull.apart[place] = if self.has_one_origin {
+                0.0
+            } else {
+                off[2].neg_mul_add(shear, off[place]).abs().reduce_max()
+            };
         }
-        cull.apart[2] = if self.has_one_origin { 0.0 } else { off[2].abs().most() };
+        cull.apart[2] = if self.has_one_origin { 0.0 } else { off[2].abs().reduce_max() };
         (self.t_min, self.t_max, self.axes) = (self.rows[3], self.rows[7], axes);
         self.others_started = false;
         splat(f32::from_bits(NONE)).store(&mut self.triangle);
@@ -382,7 +384,7 @@ impl<'a, 'd, G: Goal, R: PacketRay> Bundle<'a, 'd> for F32Bundle<'a, 'd, G, R> {
         let (bc, ca, ab) = (cx * by, ax * cy, bx * ay);
         let (u, v, w) = (bc - cy * bx, ca - ay * cx, ab - by * ax);
         let within = within([u, v, w]);
-        let mask = splat(0.0).at_most(within) & state.alive;
+        let mask = splat(0.0).simd_le(within) & state.alive;
         // Where any hit will do, to go on costs less than a branch that is often mispredicted.
         if mask == 0 && !G::IS_ANY {
             return;
@@ -390,18 +392,18 @@ impl<'a, 'd, G: Goal, R: PacketRay> Bundle<'a, 'd> for F32Bundle<'a, 'd, G, R> {
         let det = u + v + w;
         let height = u * az + v * bz + w * cz;
         let precise = &own.decider.start.precise;
-        let precise = precise.of(mask, bc.larger(ca).larger(ab), within, det, [az, bz, cz]);
-        let t = height.over(det) * load(&own.minus_inverse.0);
+        let precise = precise.of(mask, bc.max_abs(ca).max_abs(ab), within, det, [az, bz, cz]);
+        let t = height / det * load(&own.minus_inverse.0);
         let t_max = load(&own.t_max.0);
-        let in_range = mask & precise & load(&own.t_min.0).at_most(t) & t.at_most(t_max);
+        let in_range = mask & precise & load(&own.t_min.0).simd_le(t) & t.simd_le(t_max);
         let uncertain = mask & !precise;
         if G::IS_ANY {
             state.stop_at_hits(in_range);
         } else if in_range != 0 {
             let triangle = load(&self.triangle.0);
-            let mut closer = t.below(t_max) | triangle.with_bits(NONE);
+            let mut closer = t.simd_lt(t_max) | triangle.with_bits(NONE);
             if in_range & !closer != 0 {
-                let enters = splat(0.0).below(det);
+                let enters = splat(0.0).simd_lt(det);
                 closer |= self.those_before(in_range & !closer, place, lane as u32, enters);
             }
             let closer = closer & in_range;
@@ -415,7 +417,7 @@ impl<'a, 'd, G: Goal, R: PacketRay> Bundle<'a, 'd> for F32Bundle<'a, 'd, G, R> {
             let end = t * splat(BEYOND) + splat(f32::MIN_POSITIVE);
             let s_max = L::F32x16::select(closer, end, load(&state.slabs.s_max.0));
             s_max.store(&mut state.slabs.s_max);
-            state.frustum.s_max = s_max.most();
+            state.frustum.s_max = s_max.reduce_max();
         }
         if uncertain != 0 {
             self.decide(state, uncertain, block, place, lane as u32);
@@ -479,7 +481,7 @@ impl PacketRay for Ray32 {
         if hits != 0 {
             let det = load(&bundle.weights[2].0);
             for (local, weight) in local.iter_mut().zip(&bundle.weights) {
-                load(&weight.0).over(det).store(local);
+                (load(&weight.0) / det).store(local);
             }
             let mut ids = [L::F32x16::splat(0.0); 3];
             let mut rest = hits;
@@ -489,7 +491,7 @@ impl PacketRay for Ray32 {
                 let with_this = triangle.with_bits(own);
                 rest &= !with_this;
                 let (geometry, primitive) = decider.ids(own >> 3, own & 7);
-                let id = decider.accel().geometries[geometry as usize].id;
+                let id = decider.tree().geometries[geometry as usize].id;
                 for (row, own) in ids.iter_mut().zip([id, primitive, geometry]) {
                     *row = L::F32x16::select(with_this, L::F32x16::splat(f32::from_bits(own)), *row);
                 }
@@ -556,7 +558,7 @@ impl PacketRay for PictureRay {
             }
             if state.is_among_triangles && bundle.others_started {
                 let other = bundle.others[i].nearest.take();
-                answer = Crossing::nearer(answer, other, decider.accel(), ray);
+                answer = Crossing::nearer(answer, other, decider.tree(), ray);
             }
             sink.put(first + i, Outcome::Certain(answer));
         }

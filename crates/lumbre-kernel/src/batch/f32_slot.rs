@@ -7,6 +7,7 @@ use crate::intersect::Simd;
 use crate::intersect::box_ray::Slabs;
 use crate::intersect::f32_ray::F32Ray;
 use crate::intersect::watertight;
+use crate::ray32::{Hit32, Ray32};
 use crate::simd::{F32x8, Vector};
 use crate::trace::decide::Decider;
 use crate::trace::f32_ray::{Nearest, Pass, SOME_HIT};
@@ -14,7 +15,6 @@ use crate::trace::stack::Goal;
 use crate::trace::{LaneHits, Outcome};
 use crate::tree::BLOCK;
 use crate::tree::triangle_block::TriangleBlock;
-use crate::{Hit32, Ray32};
 
 /// A ray among triangles, and the nearest that it has hit: a cache line.
 pub(super) struct F32Slot<'a, 'd, G> {
@@ -29,7 +29,6 @@ impl<'a, 'd, G: Goal, L: Simd> RaySlot<'a, 'd, L> for F32Slot<'a, 'd, G> {
     type Ray = Ray32;
     type Answer = Option<Hit32>;
     const GENERAL: bool = false;
-    const STARTS_BY_FOUR: bool = L::STARTS_BY_FOUR;
     type Pass = Pass<L::F32x8>;
     type Passes = Pass<L::F32x16>;
     /// `t`.
@@ -46,21 +45,6 @@ impl<'a, 'd, G: Goal, L: Simd> RaySlot<'a, 'd, L> for F32Slot<'a, 'd, G> {
         self.ray = L::start_f32_blocks(decider.start, ray, &slabs);
         self.nearest = Nearest::NONE;
         Some(slabs)
-    }
-
-    #[inline(always)]
-    fn start_by_four(
-        decider: &'d Decider<'a>,
-        rays: [&Ray32; 4],
-        slots: [(&mut Self, &mut Slabs); 4],
-    ) -> u32 {
-        let [(a, a_slabs), (b, b_slabs), (c, c_slabs), (d, d_slabs)] = slots;
-        for one in [&mut *a, &mut *b, &mut *c, &mut *d] {
-            one.nearest = Nearest::NONE;
-        }
-        let starts =
-            [(a_slabs, &mut a.ray), (b_slabs, &mut b.ray), (c_slabs, &mut c.ray), (d_slabs, &mut d.ray)];
-        L::start_f32_by_four(decider.start, rays, starts)
     }
 
     #[inline(always)]
@@ -110,8 +94,8 @@ impl<'a, 'd, G: Goal, L: Simd> RaySlot<'a, 'd, L> for F32Slot<'a, 'd, G> {
         pass: &Pass<L::F32x8>,
         slabs: &mut Slabs,
     ) -> bool {
-        let t = hits.at.least_of(hits.met);
-        let which = hits.at.at_most(L::F32x8::splat(t)) & hits.met;
+        let t = hits.at.reduce_min(hits.met);
+        let which = hits.at.simd_le(L::F32x8::splat(t)) & hits.met;
         let lane = which.trailing_zeros() as usize % BLOCK;
         if self.nearest.take_nearest(decider, &mut self.ray, block, hits, pass, (lane, t)) {
             slabs.end_at(watertight::beyond(self.ray.t_max()));

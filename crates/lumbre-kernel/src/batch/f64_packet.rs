@@ -9,17 +9,18 @@ use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, Start,
 use super::sink::Sink;
 use crate::intersect::box_ray::SlabRows;
 use crate::intersect::box_ray::Slabs;
-use crate::intersect::filter_start::FilterStart;
 use crate::intersect::watertight::{
     self, BEYOND, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, FAR, HEIGHT_ERROR, Meeting, Met, Pairs,
     ROUNDINGS, SIZE_ERROR, TINY, beyond,
 };
 use crate::intersect::{Axes, Dispatch, Isa, Simd};
 use crate::simd::{self, F32x16, Row, Vector};
-use crate::trace::decide::{Candidate, Decider, heights, largest_component};
-use crate::trace::filtered::{FilteredGoal, FilteredRay};
+use crate::trace::decide::{Candidate, Decider, heights};
+use crate::trace::filtered_ray::{FilteredGoal, FilteredRay};
+use crate::trace::largest_component;
 use crate::trace::{ContextRef, Outcome, Winner};
 use crate::tree::Corners;
+use crate::tree::filter_start::FilterStart;
 use crate::tree::triangle_block::TriangleBlock;
 
 /// The rays of a packet.
@@ -56,8 +57,8 @@ const OTHER: u32 = u32::MAX - 1;
 /// What a direction is to planes, as for a single ray.
 #[inline(always)]
 fn inverse_of<W: F32x16>(start: &FilterStart, direction: W) -> W {
-    let size = W::splat(start.space_per_unit).over(direction.abs().max(W::splat(start.tiny)));
-    size.turned_by(direction)
+    let size = W::splat(start.space_per_unit) / direction.abs().max(W::splat(start.tiny));
+    size.xor_sign(direction)
 }
 
 impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> F64Bundle<'a, 'd, G, GENERAL> {
@@ -286,12 +287,12 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
         for axis in 0..3 {
             let direction = L::F32x16::rounded(&self.columns[3 + axis]);
             length[axis] = direction.abs();
-            negative[axis] = L::F32x16::splat(1.0).turned_by(direction).below(zero);
+            negative[axis] = L::F32x16::splat(1.0).xor_sign(direction).simd_lt(zero);
         }
         // For each pair, where the first is longer and where the second is: rounding keeps their order, or makes them equal.
         let [x, y, z] = length;
-        let mut longer = [y.below(x), z.below(y), z.below(x)];
-        let shorter = [x.below(y), y.below(z), x.below(z)];
+        let mut longer = [y.simd_lt(x), z.simd_lt(y), z.simd_lt(x)];
+        let shorter = [x.simd_lt(y), y.simd_lt(z), x.simd_lt(z)];
         if (longer[0] | shorter[0]) & (longer[1] | shorter[1]) & (longer[2] | shorter[2]) != ALL {
             longer = self.no_shorter();
         }
@@ -319,13 +320,13 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
             && L::F32x16::are_same(&columns[2]);
         let zero = splat(0.0);
         let (t_min, t_max) = (L::F32x16::rounded(&columns[6]), L::F32x16::rounded(&columns[7]));
-        let mut fits = zero.at_most(t_min) & t_min.at_most(t_max);
+        let mut fits = zero.simd_le(t_min) & t_min.simd_le(t_max);
         let (mut is_long, mut is_near) = (0, true);
         let (mut inverse, mut center, mut off) = ([zero; 3], [0.0; 3], [0.0; 3]);
         for axis in 0..3 {
             let direction = L::F32x16::rounded(&columns[3 + axis]);
-            fits &= direction.abs().at_most(splat(start.longest[axis]));
-            is_long |= splat(start.shortest).at_most(direction.abs());
+            fits &= direction.abs().simd_le(splat(start.longest[axis]));
+            is_long |= splat(start.shortest).simd_le(direction.abs());
             inverse[axis] = inverse_of(start, direction);
             let (origin, scale) = (start.tree_origin[axis], start.scale);
             if has_one_origin {
@@ -333,10 +334,10 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
                 is_near &= center[axis].abs() <= start.farthest[axis];
             } else {
                 let from = L::F32x16::rounded_from(&columns[axis], origin, scale);
-                let middle = from.middle();
-                fits &= from.abs().at_most(splat(start.farthest[axis]));
+                let middle = from.midpoint();
+                fits &= from.abs().simd_le(splat(start.farthest[axis]));
                 slabs.set_axis(axis, from, inverse[axis], [start.margin, start.margin_per_distance]);
-                off[axis] = (from - middle).abs().most();
+                off[axis] = (from - middle).abs().reduce_max();
                 center[axis] = middle.first();
             }
         }
@@ -382,7 +383,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
                 (cull.middle[place], cull.apart[place]) = (origin, more.abs());
             } else {
                 let (origin, more) = L::F32x16::parted_from(&columns[axis], mesh_origin);
-                let middle = origin.middle();
+                let middle = origin.midpoint();
                 (rest[place], off[place]) = (more, origin - middle);
                 origin.store(&mut self.origin[place]);
                 cull.middle[place] = middle.first();
@@ -391,20 +392,20 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
         rest[2].store(&mut self.rest[2]);
         for place in 0..2 {
             let shear = L::F32x16::rounded(&columns[3 + order[place]]) * inverse;
-            let sheared = rest[2].times_from(shear, rest[place]);
-            let middle = shear.middle();
+            let sheared = rest[2].neg_mul_add(shear, rest[place]);
+            let middle = shear.midpoint();
             shear.store(&mut self.shear[place]);
             sheared.store(&mut self.rest[place]);
             cull.middle_shear[place] = middle.first();
-            cull.spread[place] = (shear - middle).abs().most();
+            cull.spread[place] = (shear - middle).abs().reduce_max();
             cull.apart[place] = if has_one_origin {
                 // Of the rest alone, with a shear of no more than one and few roundings.
                 1.5 * (cull.apart[place] + cull.apart[2])
             } else {
-                off[2].times_from(shear, off[place] + sheared).abs().most()
+                off[2].neg_mul_add(shear, off[place] + sheared).abs().reduce_max()
             };
         }
-        cull.apart[2] = if has_one_origin { 0.0 } else { off[2].abs().most() };
+        cull.apart[2] = if has_one_origin { 0.0 } else { off[2].abs().reduce_max() };
         let (t_min, t_max) = (L::F32x16::rounded(&columns[6]), L::F32x16::rounded(&columns[7]));
         let (far, roundings) = (splat(FAR), splat(ROUNDINGS));
         let heights = [(t_min * last.abs()).min(far), (t_max * last.abs()).min(far)];
@@ -439,42 +440,42 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
         let at = |axis: usize, corner: usize| splat(corners[axis][corner][lane]);
         // As `Simd::intersect_triangles`, with the signs turned.
         let (az, bz, cz) = (oz - at(kz, 0), oz - at(kz, 1), oz - at(kz, 2));
-        let ax = sx.times_from(az, ox - at(kx, 0) + rx);
-        let bx = sx.times_from(bz, ox - at(kx, 1) + rx);
-        let cx = sx.times_from(cz, ox - at(kx, 2) + rx);
-        let ay = sy.times_from(az, oy - at(ky, 0) + ry);
-        let by = sy.times_from(bz, oy - at(ky, 1) + ry);
-        let cy = sy.times_from(cz, oy - at(ky, 2) + ry);
-        let u = cx.times_minus(by, cy * bx);
-        let v = ax.times_minus(cy, ay * cx);
-        let w = bx.times_minus(ay, by * ax);
+        let ax = sx.neg_mul_add(az, ox - at(kx, 0) + rx);
+        let bx = sx.neg_mul_add(bz, ox - at(kx, 1) + rx);
+        let cx = sx.neg_mul_add(cz, ox - at(kx, 2) + rx);
+        let ay = sy.neg_mul_add(az, oy - at(ky, 0) + ry);
+        let by = sy.neg_mul_add(bz, oy - at(ky, 1) + ry);
+        let cy = sy.neg_mul_add(cz, oy - at(ky, 2) + ry);
+        let u = cx.mul_sub(by, cy * bx);
+        let v = ax.mul_sub(cy, ay * cx);
+        let w = bx.mul_sub(ay, by * ax);
         let (size, across) = (bounds.size[lane], bounds.across[lane]);
         let error = size * EDGE_ERROR * (size * SIZE_ERROR + across) + TINY;
         let (low, high) = (u.min(v).min(w), u.max(v).max(w));
-        let mask = (splat(-error).at_most(low) | high.at_most(splat(error))) & state.alive;
+        let mask = (splat(-error).simd_le(low) | high.simd_le(splat(error))) & state.alive;
         if mask == 0 {
             return;
         }
         let det = u + v + w;
         let weight = det.abs();
-        let height = det.times_plus(load(&own.rest[2].0), w.times_plus(cz, v.times_plus(bz, u * az)));
-        let ahead = height.turned_by(det).turned_by(splat(own.turn));
+        let height = det.mul_add(load(&own.rest[2].0), w.mul_add(cz, v.mul_add(bz, u * az)));
+        let ahead = height.xor_sign(det).xor_sign(splat(own.turn));
         let height_error = size * HEIGHT_ERROR;
         let extent = bounds.extent[lane] + height_error;
         let least_spread = error * (ERRORS_OF_EXTENT * extent + ERRORS_OF_EDGES * height_error) + TINY;
-        let spread = weight.times_plus(splat(height_error), splat(least_spread));
+        let spread = weight.mul_add(splat(height_error), splat(least_spread));
         let (from, to) = (ahead - spread, ahead + spread);
         // A NaN may be in range.
-        let is_out = to.below(weight * load(&own.first.0)) | (weight * load(&own.last.0)).below(from);
+        let is_out = to.simd_lt(weight * load(&own.first.0)) | (weight * load(&own.last.0)).simd_lt(from);
         let in_range = mask & !is_out;
         if in_range == 0 {
             return;
         }
-        let inside = splat(error).below(low) | high.below(splat(-error));
+        let inside = splat(error).simd_lt(low) | high.simd_lt(splat(-error));
         let certain = in_range
             & inside
-            & (weight * load(&own.surely_first.0)).at_most(from)
-            & to.at_most(weight * load(&own.surely_last.0));
+            & (weight * load(&own.surely_first.0)).simd_le(from)
+            & to.simd_le(weight * load(&own.surely_last.0));
         if G::IS_ANY {
             state.stop_at_hits(certain);
             let uncertain = in_range & !certain;
@@ -483,11 +484,11 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
             }
             return;
         }
-        let inverse = splat(1.0).over(weight);
+        let inverse = splat(1.0) / weight;
         let (from, to) = (from * inverse, to * inverse);
         let (best_from, best_to) = (load(&own.from.0), load(&own.to.0));
-        let closer = certain & to.below(best_from);
-        let doubtful = in_range & !closer & !best_to.below(from);
+        let closer = certain & to.simd_lt(best_from);
+        let doubtful = in_range & !closer & !best_to.simd_lt(from);
         if closer != 0 {
             let triangle = splat(f32::from_bits(place << 3 | lane as u32));
             L::F32x16::select(closer, from, best_from).store(&mut self.from);
@@ -496,10 +497,10 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
             L::F32x16::select(closer, triangle, load(&self.triangle.0)).store(&mut self.triangle);
             L::F32x16::select(closer, to, load(&self.last.0)).store(&mut self.last);
             let s = to * load(&self.s_per_height.0);
-            let end = s.times_plus(splat(BEYOND), splat(f32::MIN_POSITIVE));
+            let end = s.mul_add(splat(BEYOND), splat(f32::MIN_POSITIVE));
             let s_max = L::F32x16::select(closer, end, load(&state.slabs.s_max.0));
             s_max.store(&mut state.slabs.s_max);
-            state.frustum.s_max = s_max.most();
+            state.frustum.s_max = s_max.reduce_max();
         }
         if doubtful != 0 {
             self.decide_closest(state, L::isa(), doubtful, (place, lane as u32), rays);

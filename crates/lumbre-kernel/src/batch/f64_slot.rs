@@ -5,10 +5,11 @@ use lumbre_geometry::Ray;
 use super::interleaved::{PassedLanes, RaySlot};
 use crate::intersect::box_ray::Slabs;
 use crate::intersect::watertight::{BlockRay, HeightRange, Meeting};
-use crate::intersect::{Axes, Crossings, Dispatch, Isa, Simd};
+use crate::intersect::{Axes, Crossings, Dispatch, Edges, Isa, Simd};
 use crate::simd::{self, F32x8, Vector};
-use crate::trace::decide::{Candidate, Decider, heights, largest_component};
-use crate::trace::filtered::{FilteredGoal, FilteredRay};
+use crate::trace::decide::{Candidate, Decider, heights};
+use crate::trace::filtered_ray::{FilteredGoal, FilteredRay};
+use crate::trace::largest_component;
 use crate::trace::{ContextRef, LaneHits, Outcome, Stop, Winner};
 use crate::tree::BLOCK;
 use crate::tree::triangle_block::TriangleBlock;
@@ -133,8 +134,8 @@ impl<'a, 'd, G: FilteredGoal, L: Simd, const GENERAL: bool> RaySlot<'a, 'd, L>
     type Ray = Ray;
     type Answer = G::Found;
     const GENERAL: bool = GENERAL;
-    type Pass = L::Edges;
-    type Passes = L::EdgesByTwo;
+    type Pass = Edges<L::F32x8>;
+    type Passes = Edges<L::F32x16>;
     /// The interval of heights that holds the crossing.
     type At = [L::F32x8; 2];
 
@@ -169,21 +170,20 @@ impl<'a, 'd, G: FilteredGoal, L: Simd, const GENERAL: bool> RaySlot<'a, 'd, L>
         _: &Decider,
         slots: [&Self; 2],
         blocks: [&TriangleBlock; 2],
-    ) -> (PassedLanes, L::EdgesByTwo) {
+    ) -> (PassedLanes, Edges<L::F32x16>) {
         let (mask, edges) =
             L::intersect_triangles_by_two(blocks, [&slots[0].ray.blocks, &slots[1].ray.blocks]);
         (PassedLanes { mask, uncertain: 0 }, edges)
     }
 
     #[inline(always)]
-    fn one_of(passes: &L::EdgesByTwo, which: usize) -> L::Edges {
-        L::edges_of(passes, which)
+    fn one_of(passes: &Edges<L::F32x16>, which: usize) -> Edges<L::F32x8> {
+        passes.half(which)
     }
 
     #[inline(always)]
-    fn intersect(&self, mask: u32, edges: &L::Edges) -> LaneHits<[L::F32x8; 2]> {
-        let Crossings { in_range, sure, from, to } =
-            L::place_crossings(edges, simd::opaque(&self.ray.blocks));
+    fn intersect(&self, mask: u32, edges: &Edges<L::F32x8>) -> LaneHits<[L::F32x8; 2]> {
+        let Crossings { in_range, sure, from, to } = edges.place(simd::opaque(&self.ray.blocks));
         LaneHits { met: mask & sure, uncertain: mask & in_range & !sure, at: [from, to] }
     }
 
@@ -199,12 +199,12 @@ impl<'a, 'd, G: FilteredGoal, L: Simd, const GENERAL: bool> RaySlot<'a, 'd, L>
         ray: &Ray,
         block: u32,
         hits: &LaneHits<[L::F32x8; 2]>,
-        _: &L::Edges,
+        _: &Edges<L::F32x8>,
         slabs: &mut Slabs,
     ) -> bool {
         let &LaneHits { met, uncertain, at: [from, to] } = hits;
-        let nearest = to.least_of(met);
-        let which = from.at_most(L::F32x8::splat(nearest)) & met;
+        let nearest = to.reduce_min(met);
+        let which = from.simd_le(L::F32x8::splat(nearest)) & met;
         let is_alone = which & which.wrapping_sub(1) == 0;
         if uncertain == 0 && is_alone && nearest < self.ray.best.from {
             let lane = which.trailing_zeros();

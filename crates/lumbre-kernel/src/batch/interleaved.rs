@@ -25,8 +25,6 @@ pub(super) trait RaySlot<'a, 'd, L: Simd>: Sized {
     type Answer;
     /// Whether the tree has leaves of anything but triangles.
     const GENERAL: bool;
-    /// Whether four better start together.
-    const STARTS_BY_FOUR: bool = false;
     /// How its line passes the triangles of a block, and how two lines do, each those of its block.
     type Pass;
     type Passes: Copy + Zeroable;
@@ -37,22 +35,6 @@ pub(super) trait RaySlot<'a, 'd, L: Simd>: Sized {
     fn new(decider: &'d Decider<'a>) -> Self;
     /// Starts with a ray; `None` where it is not sound, or starts too far away for single precision.
     fn start(&mut self, decider: &'d Decider<'a>, ray: &Self::Ray) -> Option<Slabs>;
-    /// Starts with four; a bit for each that does.
-    #[inline(always)]
-    fn start_by_four(
-        decider: &'d Decider<'a>,
-        rays: [&Self::Ray; 4],
-        slots: [(&mut Self, &mut Slabs); 4],
-    ) -> u32 {
-        let mut started = 0;
-        for (i, (ray, (slot, slabs))) in rays.into_iter().zip(slots).enumerate() {
-            if let Some(own) = slot.start(decider, ray) {
-                *slabs = own;
-                started |= 1 << i;
-            }
-        }
-        started
-    }
     /// How the lines of two pass the triangles of two blocks, each those of its own.
     fn pass_by_two(
         decider: &Decider,
@@ -135,12 +117,6 @@ impl Iterator for Bits {
 }
 
 impl Bits {
-    /// The first four, if there are as many.
-    #[inline(always)]
-    fn first_four(mut self) -> Option<[usize; 4]> {
-        Some([self.next()?, self.next()?, self.next()?, self.next()?])
-    }
-
     /// Two at a time; the last of an odd number comes with itself.
     #[inline(always)]
     fn by_two(self) -> ByTwo {
@@ -293,29 +269,6 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Simd> Interleaved<'a, 'd, 'r, R, L> {
             return stop == Stop::Hit;
         }
         true
-    }
-
-    /// The same with four, in a tree of triangles; a bit for each.
-    #[inline(always)]
-    fn start_by_four(&mut self, four: [usize; 4], positions: [usize; 4]) -> u32 {
-        let Self { decider, rays, slots, .. } = self;
-        let Ok([a, b, c, d]) = slots.get_disjoint_mut(four) else { return 0 };
-        [a.position, b.position, c.position, d.position] = positions;
-        let rays = positions.map(|position| &rays[position]);
-        let slots = [
-            (&mut a.ray, &mut a.slabs),
-            (&mut b.ray, &mut b.slabs),
-            (&mut c.ray, &mut c.slabs),
-            (&mut d.ray, &mut d.slabs),
-        ];
-        let started = R::start_by_four(decider, rays, slots);
-        for (i, slot) in four.into_iter().enumerate() {
-            let stack = &mut self.stacks[slot];
-            stack.clear();
-            stack.push(Self::bottom());
-            *self.references.of(slot) = if started >> i & 1 != 0 { decider.start.root } else { DONE };
-        }
-        started
     }
 
     /// The ray of a slot, as it was asked.
@@ -570,34 +523,11 @@ pub(super) fn traverse<'a, 'd, R: RaySlot<'a, 'd, L>, L: Simd>(
 #[inline(always)]
 fn start_others<'a, 'd, R: RaySlot<'a, 'd, L>, L: Simd>(
     all: &mut Interleaved<'a, 'd, '_, R, L>,
-    mut free: u64,
+    free: u64,
     waiting: &mut std::slice::Iter<usize>,
     sink: &mut impl Sink<R::Answer>,
 ) -> u64 {
     let mut taken = 0;
-    if R::STARTS_BY_FOUR {
-        while let Some((&positions, behind)) = waiting.as_slice().split_first_chunk()
-            && let Some(four) = Bits(free).first_four()
-        {
-            // Every other one: two lie in a cache line.
-            for ahead in [AHEAD, AHEAD + 2] {
-                if let Some(&position) = waiting.as_slice().get(ahead) {
-                    simd::fetch(&all.rays[position]);
-                }
-            }
-            *waiting = behind.iter();
-            let started = all.start_by_four(four, positions);
-            for (i, (slot, position)) in four.into_iter().zip(positions).enumerate() {
-                if started >> i & 1 != 0 {
-                    sink.prefetch(position);
-                    taken |= bit(true, slot);
-                } else {
-                    sink.put(position, Outcome::Uncertain);
-                }
-            }
-            free &= !taken;
-        }
-    }
     for slot in Bits(free) {
         if let Some(&position) = waiting.as_slice().get(AHEAD) {
             simd::fetch(&all.rays[position]);

@@ -25,17 +25,21 @@ use self::f64_packet::F64Bundle;
 use self::f64_slot::F64Slot;
 use self::packet::{Bundle, PACKET, Packet};
 pub(crate) use self::sink::Sink;
-use crate::intersect::filter_start::FilterStart;
+use crate::hit::Hit;
 use crate::intersect::{Dispatch, Isa, Simd};
+use crate::ray32::{Hit32, Ray32};
 use crate::simd;
 use crate::trace::decide::Decider;
 use crate::trace::f32_ray::{self, F32Queries};
-use crate::trace::filtered::{FilteredGoal, Found, Traversal};
+use crate::trace::filtered::Queries;
+use crate::trace::filtered::Traversal;
+use crate::trace::filtered_ray::{FilteredGoal, Found};
 use crate::trace::stack::{AnyHit, ClosestHit, Goal};
 use crate::trace::{ContextRef, Outcome, exact};
+use crate::tree::Tree;
+use crate::tree::filter_start::FilterStart;
 use crate::tree::node::Node;
 use crate::tree::triangle_block::Line;
-use crate::{Accel, Hit, Hit32, Ray32};
 
 /// Trees of more bytes than this are hardly in the caches; interleaved rays prefetch what they read next.
 const FAR: usize = 1 << 24;
@@ -53,31 +57,31 @@ const AHEAD: usize = 3;
 const WIDENED: usize = 1024;
 
 /// [`Accel::closest`] for every ray.
-pub(crate) fn closest(isa: Isa, accel: &Accel, rays: &[Ray], hits: &mut [Option<Hit>]) {
-    let sink = &mut ClosestSink { accel, isa, rays, hits };
-    if !batch_f64::<ClosestHit, _>(isa, accel, rays, sink, Plan::of(accel)) {
-        let closest = accel.queries_at(isa).closest;
-        hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = closest.ask(accel, ray));
+pub(crate) fn closest(isa: Isa, tree: &Tree, rays: &[Ray], hits: &mut [Option<Hit>]) {
+    let sink = &mut ClosestSink { tree, isa, rays, hits };
+    if !batch_f64::<ClosestHit, _>(isa, tree, rays, sink, Plan::of(tree)) {
+        let closest = Queries::of(isa, tree).closest;
+        hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = closest.ask(tree, ray));
     }
 }
 
 /// [`Accel::any`] for every ray.
-pub(crate) fn any(isa: Isa, accel: &Accel, rays: &[Ray], hits: &mut [bool]) {
-    any_by(isa, accel, rays, hits, Plan::of(accel));
+pub(crate) fn any(isa: Isa, tree: &Tree, rays: &[Ray], hits: &mut [bool]) {
+    any_by(isa, tree, rays, hits, Plan::of(tree));
 }
 
 /// The same by a plan.
-fn any_by(isa: Isa, accel: &Accel, rays: &[Ray], hits: &mut [bool], plan: Plan) {
-    let sink = &mut AnySink { accel, isa, rays, hits };
-    if !batch_f64::<AnyHit, _>(isa, accel, rays, sink, plan) {
-        let any = accel.queries_at(isa).any;
-        hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = any.ask(accel, ray));
+fn any_by(isa: Isa, tree: &Tree, rays: &[Ray], hits: &mut [bool], plan: Plan) {
+    let sink = &mut AnySink { tree, isa, rays, hits };
+    if !batch_f64::<AnyHit, _>(isa, tree, rays, sink, plan) {
+        let any = Queries::of(isa, tree).any;
+        hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = any.ask(tree, ray));
     }
 }
 
 /// [`Accel::closest_f32`] for every ray.
-pub(crate) fn closest_f32(isa: Isa, accel: &Accel, rays: &[Ray32], hits: &mut [Option<Hit32>]) {
-    match accel.f32_queries_at(isa) {
+pub(crate) fn closest_f32(isa: Isa, tree: &Tree, rays: &[Ray32], hits: &mut [Option<Hit32>]) {
+    match F32Queries::of(isa, tree) {
         None => {
             let mut widened = Vec::with_capacity(rays.len().min(WIDENED));
             let mut found = vec![None; rays.len().min(WIDENED)];
@@ -85,60 +89,60 @@ pub(crate) fn closest_f32(isa: Isa, accel: &Accel, rays: &[Ray32], hits: &mut [O
                 widened.clear();
                 widened.extend(rays.iter().map(|ray| ray.to_f64()));
                 let found = &mut found[..rays.len()];
-                closest(isa, accel, &widened, found);
+                closest(isa, tree, &widened, found);
                 for (hit, found) in hits.iter_mut().zip(found) {
                     *hit = found.as_ref().map(f32_ray::rounded);
                 }
             }
         }
         Some(queries) => {
-            let sink = &mut F32ClosestSink { accel, queries, rays, hits };
-            if !batch_f32::<ClosestHit, _>(isa, accel, rays, sink, Plan::of(accel)) {
-                hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = queries.closest.ask(accel, ray));
+            let sink = &mut F32ClosestSink { tree, queries, rays, hits };
+            if !batch_f32::<ClosestHit, _>(isa, tree, rays, sink, Plan::of(tree)) {
+                hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = queries.closest.ask(tree, ray));
             }
         }
     }
 }
 
 /// [`Accel::any_f32`] for every ray.
-pub(crate) fn any_f32(isa: Isa, accel: &Accel, rays: &[Ray32], hits: &mut [bool]) {
-    match accel.f32_queries_at(isa) {
+pub(crate) fn any_f32(isa: Isa, tree: &Tree, rays: &[Ray32], hits: &mut [bool]) {
+    match F32Queries::of(isa, tree) {
         None => {
             let mut widened = Vec::with_capacity(rays.len().min(WIDENED));
             for (rays, hits) in rays.chunks(WIDENED).zip(hits.chunks_mut(WIDENED)) {
                 widened.clear();
                 widened.extend(rays.iter().map(|ray| ray.to_f64()));
-                any(isa, accel, &widened, hits);
+                any(isa, tree, &widened, hits);
             }
         }
         Some(queries) => {
-            let sink = &mut F32AnySink { accel, queries, rays, hits };
-            if !batch_f32::<AnyHit, _>(isa, accel, rays, sink, Plan::of(accel)) {
-                hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = queries.any.ask(accel, ray));
+            let sink = &mut F32AnySink { tree, queries, rays, hits };
+            if !batch_f32::<AnyHit, _>(isa, tree, rays, sink, Plan::of(tree)) {
+                hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = queries.any.ask(tree, ray));
             }
         }
     }
 }
 
 /// Whether a tree is traversed by batches: one of triangles, among others, on a machine with vectors.
-fn batched(isa: Isa, accel: &Accel) -> Option<&FilterStart> {
-    let has_triangles = !accel.tree.blocks.is_empty();
-    accel.single.as_ref().filter(|_| has_triangles && isa.has_vectors())
+fn batched(isa: Isa, tree: &Tree) -> Option<&FilterStart> {
+    let has_triangles = !tree.packed.blocks.is_empty();
+    tree.single.as_ref().filter(|_| has_triangles && isa.has_vectors())
 }
 
 /// False where the tree is not traversed by batches.
 fn batch_f64<G: FilteredGoal, S: Sink<G::Found>>(
     isa: Isa,
-    accel: &Accel,
+    tree: &Tree,
     rays: &[Ray],
     sink: &mut S,
     plan: Plan,
 ) -> bool {
-    let Some(start) = batched(isa, accel) else { return false };
+    let Some(start) = batched(isa, tree) else { return false };
     if start.only_triangles {
-        isa.run_with_vectors(Batch::<F64<G, false>, S> { accel, start, rays, sink, plan });
+        isa.run_with_vectors(Batch::<F64<G, false>, S> { tree, start, rays, sink, plan });
     } else {
-        isa.run_with_vectors(Batch::<F64<G, true>, S> { accel, start, rays, sink, plan });
+        isa.run_with_vectors(Batch::<F64<G, true>, S> { tree, start, rays, sink, plan });
     }
     true
 }
@@ -146,19 +150,19 @@ fn batch_f64<G: FilteredGoal, S: Sink<G::Found>>(
 /// The same in a tree of triangles.
 fn batch_f32<G: Goal, S: Sink<Option<Hit32>>>(
     isa: Isa,
-    accel: &Accel,
+    tree: &Tree,
     rays: &[Ray32],
     sink: &mut S,
     plan: Plan,
 ) -> bool {
-    let Some(start) = batched(isa, accel) else { return false };
-    isa.run_with_vectors(Batch::<F32<G>, S> { accel, start, rays, sink, plan });
+    let Some(start) = batched(isa, tree) else { return false };
+    isa.run_with_vectors(Batch::<F32<G>, S> { tree, start, rays, sink, plan });
     true
 }
 
 /// See [`closest`].
 struct ClosestSink<'a> {
-    accel: &'a Accel,
+    tree: &'a Tree,
     isa: Isa,
     rays: &'a [Ray],
     hits: &'a mut [Option<Hit>],
@@ -173,10 +177,10 @@ impl Sink<Found> for ClosestSink<'_> {
         match outcome {
             Outcome::Certain(Found { winner: None, .. }) => *slot = None,
             Outcome::Certain(Found { winner: Some(winner), in_instance: None }) => {
-                winner.put(self.accel, slot)
+                winner.put(self.tree, slot)
             }
-            Outcome::Certain(found) => *slot = found.into_hit(self.accel, ContextRef::OUTSIDE),
-            Outcome::Uncertain => *slot = exact::closest(self.isa, self.accel, &self.rays[position], None),
+            Outcome::Certain(found) => *slot = found.into_hit(self.tree, ContextRef::OUTSIDE),
+            Outcome::Uncertain => *slot = exact::closest(self.isa, self.tree, &self.rays[position], None),
         }
     }
 
@@ -188,7 +192,7 @@ impl Sink<Found> for ClosestSink<'_> {
 
 /// See [`any`].
 struct AnySink<'a> {
-    accel: &'a Accel,
+    tree: &'a Tree,
     isa: Isa,
     rays: &'a [Ray],
     hits: &'a mut [bool],
@@ -201,14 +205,14 @@ impl Sink<bool> for AnySink<'_> {
         shims::count(&outcome);
         self.hits[position] = match outcome {
             Outcome::Certain(is_hit) => is_hit,
-            Outcome::Uncertain => exact::any(self.isa, self.accel, &self.rays[position], None),
+            Outcome::Uncertain => exact::any(self.isa, self.tree, &self.rays[position], None),
         };
     }
 }
 
 /// See [`closest_f32`].
 struct F32ClosestSink<'a> {
-    accel: &'a Accel,
+    tree: &'a Tree,
     /// A batch may give up a ray that single precision answers alone.
     queries: F32Queries,
     rays: &'a [Ray32],
@@ -220,7 +224,7 @@ impl Sink<Option<Hit32>> for F32ClosestSink<'_> {
     fn put(&mut self, position: usize, outcome: Outcome<Option<Hit32>>) {
         self.hits[position] = match outcome {
             Outcome::Certain(hit) => hit,
-            Outcome::Uncertain => self.queries.closest.ask(self.accel, &self.rays[position]),
+            Outcome::Uncertain => self.queries.closest.ask(self.tree, &self.rays[position]),
         };
     }
 
@@ -234,7 +238,7 @@ impl Sink<Option<Hit32>> for F32ClosestSink<'_> {
 
 /// See [`any_f32`].
 struct F32AnySink<'a> {
-    accel: &'a Accel,
+    tree: &'a Tree,
     queries: F32Queries,
     rays: &'a [Ray32],
     hits: &'a mut [bool],
@@ -245,7 +249,7 @@ impl Sink<Option<Hit32>> for F32AnySink<'_> {
     fn put(&mut self, position: usize, outcome: Outcome<Option<Hit32>>) {
         self.hits[position] = match outcome {
             Outcome::Certain(hit) => hit.is_some(),
-            Outcome::Uncertain => self.queries.any.ask(self.accel, &self.rays[position]),
+            Outcome::Uncertain => self.queries.any.ask(self.tree, &self.rays[position]),
         };
     }
 }
@@ -268,8 +272,8 @@ impl Plan {
     const SINGLES: Self = Self { least: usize::MAX, prefetches: false, has_packets: true };
 
     /// The fastest for rays of a picture, incoherent ones of which are faster alone where the tree is small.
-    fn of_picture(accel: &Accel) -> Self {
-        let bytes = Self::bytes(accel);
+    fn of_picture(tree: &Tree) -> Self {
+        let bytes = Self::bytes(tree);
         if bytes >= FAR {
             Self::FAR
         } else if bytes >= SMALL {
@@ -280,13 +284,13 @@ impl Plan {
     }
 
     /// Those of a tree that rays read.
-    fn bytes(accel: &Accel) -> usize {
-        size_of_val::<[Line]>(&accel.tree.blocks) + size_of_val::<[Node]>(&accel.tree.nodes)
+    fn bytes(tree: &Tree) -> usize {
+        size_of_val::<[Line]>(&tree.packed.blocks) + size_of_val::<[Node]>(&tree.packed.nodes)
     }
 
     /// The fastest for a tree.
-    fn of(accel: &Accel) -> Self {
-        let bytes = Self::bytes(accel);
+    fn of(tree: &Tree) -> Self {
+        let bytes = Self::bytes(tree);
         if bytes >= FAR {
             Self::FAR
         } else if bytes >= NEAR {
@@ -337,7 +341,7 @@ impl<G: FilteredGoal, const GENERAL: bool> Precision for F64<G, GENERAL> {
 
     #[inline(always)]
     fn traverse_alone<L: Simd>(decider: &Decider, ray: &Ray) -> Outcome<G::Found> {
-        Traversal::<G, GENERAL, false>::whole(decider.accel(), decider.start, ray).run::<L>()
+        Traversal::<G, GENERAL, false>::whole(decider.tree(), decider.start, ray).run::<L>()
     }
 
     #[inline(always)]
@@ -432,7 +436,7 @@ impl<'r, R> RaysAhead<'r, R> {
 
 /// Rays through a tree: packets first, and the others interleaved, or one after another where they are few.
 struct Batch<'a, 'r, P: Precision, S> {
-    accel: &'a Accel,
+    tree: &'a Tree,
     start: &'a FilterStart,
     rays: &'r [P::Ray],
     sink: &'r mut S,
@@ -444,8 +448,8 @@ impl<P: Precision, S: Sink<P::Answer>> Dispatch for Batch<'_, '_, P, S> {
 
     #[inline(always)]
     fn run<L: Simd>(self) {
-        let Self { accel, start, rays, sink, plan } = self;
-        let decider = &Decider::new(accel, start);
+        let Self { tree, start, rays, sink, plan } = self;
+        let decider = &Decider::new(tree, start);
         let mut packet = Packet::<P::Bundle<'_, '_>>::new(decider);
         let mut trials = Trials::NEW;
         let mut others = Vec::with_capacity(rays.len().min(CHUNK));

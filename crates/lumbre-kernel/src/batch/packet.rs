@@ -227,37 +227,37 @@ impl Cull {
         let at = |axis: usize, corner: usize| E::load(&corners[axis][corner]);
         let (az, bz, cz) = (oz - at(kz, 0), oz - at(kz, 1), oz - at(kz, 2));
         let (ax, bx, cx) = (
-            sx.times_from(az, ox - at(kx, 0)),
-            sx.times_from(bz, ox - at(kx, 1)),
-            sx.times_from(cz, ox - at(kx, 2)),
+            sx.neg_mul_add(az, ox - at(kx, 0)),
+            sx.neg_mul_add(bz, ox - at(kx, 1)),
+            sx.neg_mul_add(cz, ox - at(kx, 2)),
         );
         let (ay, by, cy) = (
-            sy.times_from(az, oy - at(ky, 0)),
-            sy.times_from(bz, oy - at(ky, 1)),
-            sy.times_from(cz, oy - at(ky, 2)),
+            sy.neg_mul_add(az, oy - at(ky, 0)),
+            sy.neg_mul_add(bz, oy - at(ky, 1)),
+            sy.neg_mul_add(cz, oy - at(ky, 2)),
         );
         let (low_x, high_x) = (ax.min(bx).min(cx), ax.max(bx).max(cx));
         let (low_y, high_y) = (ay.min(by).min(cy), ay.max(by).max(cy));
         let along = az.abs().max(bz.abs()).max(cz.abs());
         let zero = E::splat(0.0);
-        let wide_x = along.times_plus(E::splat(own.spread[0]), E::splat(own.apart[0]));
-        let wide_y = along.times_plus(E::splat(own.spread[1]), E::splat(own.apart[1]));
+        let wide_x = along.mul_add(E::splat(own.spread[0]), E::splat(own.apart[0]));
+        let wide_y = along.mul_add(E::splat(own.spread[1]), E::splat(own.apart[1]));
         let (across_x, across_y) = ((zero - low_x).max(high_x), (zero - low_y).max(high_y));
         let across = (across_x + wide_x).max(across_y + wide_y);
         let size = across + along + E::splat(own.apart[2] + own.least_size);
         let slack = size * E::splat(CULL_ERROR);
         let (wide_x, wide_y) = (wide_x + slack, wide_y + slack);
         // The edge functions seen from the middle, and by how much those of the rays may differ.
-        let u = cx.times_minus(by, cy * bx);
-        let v = ax.times_minus(cy, ay * cx);
-        let w = bx.times_minus(ay, by * ax);
-        let off = across_y.times_plus(wide_x, wide_y.times_plus(wide_x, across_x * wide_y));
+        let u = cx.mul_sub(by, cy * bx);
+        let v = ax.mul_sub(cy, ay * cx);
+        let w = bx.mul_sub(ay, by * ax);
+        let off = across_y.mul_add(wide_x, wide_y.mul_add(wide_x, across_x * wide_y));
         let off = off * E::splat(2.0 + 8.0 * CULL_ERROR) + E::splat(TINY);
-        let mask = low_x.at_most(wide_x)
-            & (zero - wide_x).at_most(high_x)
-            & low_y.at_most(wide_y)
-            & (zero - wide_y).at_most(high_y)
-            & ((zero - off).at_most(u.min(v).min(w)) | u.max(v).max(w).at_most(off));
+        let mask = low_x.simd_le(wide_x)
+            & (zero - wide_x).simd_le(high_x)
+            & low_y.simd_le(wide_y)
+            & (zero - wide_y).simd_le(high_y)
+            & ((zero - off).simd_le(u.min(v).min(w)) | u.max(v).max(w).simd_le(off));
         let mut bounds = CullBounds { mask, size: [0.0; 8], across: [0.0; 8], extent: [0.0; 8] };
         if needs_bounds && mask != 0 {
             bounds.across = (across + slack).to_array();
@@ -405,13 +405,14 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
         }
         let Some(start) = bundle.start::<L>(decider, &mut state.slabs) else { return false };
         let (splat, [t_min, t_max]) = (L::F32x16::splat, start.range);
-        let s_max = t_max.times_plus(splat(END_FACTOR), splat(LITTLE as f32));
+        let s_max = t_max.mul_add(splat(END_FACTOR), splat(LITTLE as f32));
         L::F32x16::select(state.chosen, s_max, splat(-1.0)).store(&mut state.slabs.s_max);
         (t_min * splat(START_FACTOR)).store(&mut state.slabs.s_min);
         let [x, y, z] = start.inverse;
         let zero = splat(0.0);
         let minus_s_min = t_min * splat(-START_FACTOR);
-        let most = L::F32x16::most_of_eight([x, y, z, s_max, zero - x, zero - y, zero - z, minus_s_min]);
+        let most =
+            L::F32x16::reduce_max_of_eight([x, y, z, s_max, zero - x, zero - y, zero - z, minus_s_min]);
         let mut is_near = true;
         for axis in 0..3 {
             let (most_inverse, minus_least, off) = (most[axis], most[4 + axis], start.off[axis]);
@@ -438,7 +439,7 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
         let mut reference = self.decider.start.root;
         let state = &mut self.state;
         (state.alive, state.met, state.uncertain, state.work) = (state.chosen, 0, 0, 0);
-        if B::GENERAL && !self.decider.accel().infinite.is_empty() {
+        if B::GENERAL && !self.decider.tree().infinite.is_empty() {
             if !self.start_triangles::<L>() {
                 return false;
             }

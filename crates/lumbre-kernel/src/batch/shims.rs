@@ -8,12 +8,15 @@ use super::packet::{PACKET, Packet};
 use super::{
     AnySink, ClosestSink, F32AnySink, F32ClosestSink, F64Bundle, Plan, Sink, batch_f32, batch_f64, batched,
 };
+use crate::hit::Hit;
 use crate::intersect::{Dispatch, Isa, Simd};
+use crate::ray32::{Hit32, Ray32};
 use crate::trace::Outcome;
 use crate::trace::decide::Decider;
-use crate::trace::filtered::Found;
+use crate::trace::f32_ray::F32Queries;
+use crate::trace::filtered_ray::Found;
 use crate::trace::stack::{AnyHit, ClosestHit};
-use crate::{Accel, Hit, Hit32, Ray32};
+use crate::tree::Tree;
 
 /// Plans without packets.
 pub(crate) const INTERLEAVED: [Plan; 2] =
@@ -30,10 +33,10 @@ pub(super) fn count<A>(outcome: &Outcome<A>) {
 }
 
 /// Closest hits by a plan, each answered once; how many the exact traversal had to find.
-pub(crate) fn closest(isa: Isa, accel: &Accel, rays: &[Ray], hits: &mut [Option<Hit>], plan: Plan) -> usize {
+pub(crate) fn closest(isa: Isa, tree: &Tree, rays: &[Ray], hits: &mut [Option<Hit>], plan: Plan) -> usize {
     ANSWERED.set([0; 2]);
-    if !batch_f64::<ClosestHit, _>(isa, accel, rays, &mut ClosestSink { accel, isa, rays, hits }, plan) {
-        super::closest(isa, accel, rays, hits);
+    if !batch_f64::<ClosestHit, _>(isa, tree, rays, &mut ClosestSink { tree, isa, rays, hits }, plan) {
+        super::closest(isa, tree, rays, hits);
         return 0;
     }
     let [all, exactly] = ANSWERED.get();
@@ -42,10 +45,10 @@ pub(crate) fn closest(isa: Isa, accel: &Accel, rays: &[Ray], hits: &mut [Option<
 }
 
 /// The same of any hits.
-pub(crate) fn any(isa: Isa, accel: &Accel, rays: &[Ray], hits: &mut [bool], plan: Plan) -> usize {
+pub(crate) fn any(isa: Isa, tree: &Tree, rays: &[Ray], hits: &mut [bool], plan: Plan) -> usize {
     ANSWERED.set([0; 2]);
-    if !batch_f64::<AnyHit, _>(isa, accel, rays, &mut AnySink { accel, isa, rays, hits }, plan) {
-        super::any(isa, accel, rays, hits);
+    if !batch_f64::<AnyHit, _>(isa, tree, rays, &mut AnySink { tree, isa, rays, hits }, plan) {
+        super::any(isa, tree, rays, hits);
         return 0;
     }
     let [all, exactly] = ANSWERED.get();
@@ -54,19 +57,19 @@ pub(crate) fn any(isa: Isa, accel: &Accel, rays: &[Ray], hits: &mut [bool], plan
 }
 
 /// Closest and any hits in single precision by a plan that interleaves rays soon.
-pub(crate) fn f32(isa: Isa, accel: &Accel, rays: &[Ray32], hits: &mut [Option<Hit32>], are_hit: &mut [bool]) {
+pub(crate) fn f32(isa: Isa, tree: &Tree, rays: &[Ray32], hits: &mut [Option<Hit32>], are_hit: &mut [bool]) {
     let plan = Plan::MIDDLE;
-    let Some(queries) = accel.f32_queries_at(isa).filter(|_| batched(isa, accel).is_some()) else {
-        super::closest_f32(isa, accel, rays, hits);
-        super::any_f32(isa, accel, rays, are_hit);
+    let Some(queries) = F32Queries::of(isa, tree).filter(|_| batched(isa, tree).is_some()) else {
+        super::closest_f32(isa, tree, rays, hits);
+        super::any_f32(isa, tree, rays, are_hit);
         return;
     };
-    batch_f32::<ClosestHit, _>(isa, accel, rays, &mut F32ClosestSink { accel, queries, rays, hits }, plan);
-    batch_f32::<AnyHit, _>(isa, accel, rays, &mut F32AnySink { accel, queries, rays, hits: are_hit }, plan);
+    batch_f32::<ClosestHit, _>(isa, tree, rays, &mut F32ClosestSink { tree, queries, rays, hits }, plan);
+    batch_f32::<AnyHit, _>(isa, tree, rays, &mut F32AnySink { tree, queries, rays, hits: are_hit }, plan);
 }
 
 /// Those of some rays that a packet answers; none without vectors.
-pub(crate) fn answered_by_packet(isa: Isa, accel: &Accel, rays: &[Ray; PACKET]) -> u32 {
+pub(crate) fn answered_by_packet(isa: Isa, tree: &Tree, rays: &[Ray; PACKET]) -> u32 {
     struct Traversing<'a, const GENERAL: bool>(Decider<'a>, &'a [Ray; PACKET]);
     struct Nowhere;
     impl Sink<Found> for Nowhere {
@@ -83,8 +86,8 @@ pub(crate) fn answered_by_packet(isa: Isa, accel: &Accel, rays: &[Ray; PACKET]) 
     if !isa.has_vectors() {
         return 0;
     }
-    let start = accel.single.as_ref().expect("single precision traverses it");
-    let decider = Decider::new(accel, start);
+    let start = tree.single.as_ref().expect("single precision traverses it");
+    let decider = Decider::new(tree, start);
     if start.only_triangles {
         isa.run_with_vectors(Traversing::<false>(decider, rays))
     } else {

@@ -6,13 +6,13 @@
 
 use std::borrow::Cow;
 
-use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
-use crate::accel::Preset;
-use crate::build::boxes::Boxes;
-use crate::build::collapse::{Choices, Costs, Known, choose};
+use crate::build::binary_node::{BinaryNode, Costs, Known, choose};
+use crate::build::binary_tree::{Binary, Fork, SAH_DEPTH, Twig};
+use crate::build::boxes::{Boxes, fill};
 use crate::build::morton::{self, Code};
+use crate::build::options::Preset;
 use crate::build::partition::part;
 use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::build::reinsert::reinsert;
@@ -22,10 +22,6 @@ use crate::build::treelet;
 use crate::intersect::Isa;
 use crate::tree::Name;
 
-/// Levels that may be split by SAH; then come at most 32 more, each halving.
-const SAH_DEPTH: u32 = 64;
-/// No tree that has grown so is deeper: the last few are split in any way.
-pub(crate) const DEEPEST: u32 = SAH_DEPTH + 32 + FEW as u32;
 /// So many a fast build splits by SAH: leaves then are a tenth fuller, and nodes fewer, for a twentieth of its time.
 const FAST_FEW: usize = 48;
 /// From how many primitives on threads share the work.
@@ -34,112 +30,6 @@ pub(crate) const PARALLEL: usize = 4096;
 const LEAST_ALONE: usize = 1024;
 /// How many primitives a thread takes at a time in a node that is shared.
 const CHUNK: usize = 1 << 12;
-
-/// The binary tree, or a part of it.
-pub(crate) enum Binary<'p> {
-    /// Over many primitives.
-    Fork(Box<Fork<'p>>),
-    /// Over fewer, with their nodes in a row.
-    Twig(Twig<'p>),
-}
-
-/// A node with two children of their own.
-pub(crate) struct Fork<'p> {
-    pub(crate) bounds: Bounds,
-    pub(crate) costs: Costs,
-    pub(crate) choices: Choices,
-    pub(crate) children: [Binary<'p>; 2],
-    /// How many there are below it, with itself.
-    pub(crate) nodes: usize,
-    /// Whether the right child is of a higher rank than the left.
-    pub(crate) is_ranked: bool,
-}
-
-impl Binary<'_> {
-    /// The node over two.
-    pub(crate) fn over(children: [Self; 2]) -> Self {
-        Self::Fork(Box::new(Fork::over(children)))
-    }
-
-    /// A twig of such nodes.
-    pub(crate) fn twig(mut nodes: Vec<BinaryNode>) -> Self {
-        let costs = choose(&mut nodes, false);
-        Self::Twig(Twig { nodes: Cow::Owned(nodes), costs, known: Known::default() })
-    }
-}
-
-/// Nodes in depth-first order, the root first, each left child right after its parent.
-pub(crate) struct Twig<'p> {
-    /// As a rule where the primitives stood that they are over.
-    pub(crate) nodes: Cow<'p, [BinaryNode]>,
-    /// The costs of the root, for those above it.
-    pub(crate) costs: Costs,
-    /// Those of others, where they may come to stand elsewhere.
-    known: Known,
-}
-
-impl<'p> Twig<'p> {
-    /// The subtree of these nodes. Unless they stand where the primitives stood, they are copied.
-    pub(crate) fn part(&self, nodes: std::ops::Range<usize>) -> Self {
-        let costs = self.known.costs(nodes.start, &self.nodes[nodes.clone()]);
-        let nodes = match &self.nodes {
-            Cow::Borrowed(all) => Cow::Borrowed(&all[nodes]),
-            Cow::Owned(all) => Cow::Owned(all[nodes].to_vec()),
-        };
-        Self { nodes, costs, known: Known::default() }
-    }
-}
-
-/// A node of a twig: its box, named by two words.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(transparent)]
-pub(crate) struct BinaryNode(Bounds);
-
-const LEAF: u32 = 1 << 31;
-
-impl BinaryNode {
-    pub(crate) fn leaf(bounds: &Bounds, first: usize, count: usize) -> Self {
-        Self(bounds.with_names(first as u32, LEAF | count as u32))
-    }
-
-    /// A leaf from the box of one.
-    pub(crate) fn again(leaf: &Bounds) -> Self {
-        Self(*leaf)
-    }
-
-    /// An inner node, its right child so far behind it.
-    pub(crate) fn inner(bounds: &Bounds, right: usize) -> Self {
-        Self(bounds.with_names(right as u32, 0))
-    }
-
-    pub(crate) fn bounds(&self) -> &Bounds {
-        &self.0
-    }
-
-    /// The names of a leaf's primitives; `None` of an inner node.
-    #[inline(always)]
-    pub(crate) fn names(&self) -> Option<std::ops::Range<usize>> {
-        let first = self.0.first() as usize;
-        let count = (self.0.second() & !LEAF) as usize;
-        (self.0.second() & LEAF != 0).then(|| first..first + count)
-    }
-
-    /// How far behind an inner node its right child stands.
-    #[inline(always)]
-    pub(crate) fn right(&self) -> usize {
-        self.0.first() as usize
-    }
-
-    #[inline(always)]
-    pub(crate) fn choices(&self) -> Choices {
-        Choices(self.0.second())
-    }
-
-    #[inline(always)]
-    pub(crate) fn choose(&mut self, choices: Choices) {
-        self.0 = self.0.with_names(self.0.first(), choices.0);
-    }
-}
 
 /// A binary tree, and what is in its leaves.
 pub(crate) struct Grown<'p> {
@@ -217,12 +107,6 @@ fn sort_by_rank(primitives: &mut [Primitive], traits: &[Traits]) -> [usize; Kind
         primitives.sort_by_key(rank);
     }
     counts
-}
-
-/// Like `vec![value; count]`, by all threads where that is much: so many for each at least.
-pub(crate) fn fill<T: Clone + Send + Sync>(count: usize, value: T) -> Vec<T> {
-    const LEAST: usize = 1 << 14;
-    (0..count).into_par_iter().with_min_len(LEAST).map(|_| value.clone()).collect()
 }
 
 /// Which twigs there are to be, and what stands over them.

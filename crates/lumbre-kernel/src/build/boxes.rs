@@ -3,8 +3,8 @@
 use std::ops::{Deref, DerefMut};
 
 use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
 
-use crate::build::binary::fill;
 use crate::build::primitive::Bounds;
 
 /// Half of a box. Of what is aligned to more than 16 bytes, the standard library gives nothing back but by making a copy.
@@ -40,6 +40,12 @@ impl Boxes {
         let now = self.start();
         self.halves.copy_within(before..before + 2 * self.count, now);
     }
+}
+
+/// Like `vec![value; count]`, by all threads where that is much: so many for each at least.
+pub(crate) fn fill<T: Clone + Send + Sync>(count: usize, value: T) -> Vec<T> {
+    const LEAST: usize = 1 << 14;
+    (0..count).into_par_iter().with_min_len(LEAST).map(|_| value.clone()).collect()
 }
 
 impl Deref for Boxes {

@@ -4,10 +4,11 @@ use lumbre_geometry::Aabb;
 use lumbre_math::DVec3;
 use rayon::prelude::*;
 
+use crate::build::error::BuildError;
 use crate::build::primitive::{Bounds, Primitive};
+use crate::tree::geometry::SphereCloud;
 use crate::tree::node::TreeSpace;
 use crate::tree::sphere_block::{ExactSphere, has_radius};
-use crate::{BuildError, SphereCloud};
 
 /// Spheres that a thread looks at together.
 const CHUNK: usize = 1 << 13;

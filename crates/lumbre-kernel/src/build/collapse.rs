@@ -4,23 +4,25 @@
 //! dynamic programming: H. Ylitie, T. Karras, S. Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide
 //! BVHs", High Performance Graphics, 2017. Leaves are those of the binary tree.
 
-use std::cmp::Reverse;
-
 use rayon::prelude::*;
 
-use crate::build::binary::{Binary, BinaryNode, Fork};
+use crate::build::binary_node::{BinaryNode, Choices};
+use crate::build::binary_tree::{Binary, Fork};
+use crate::build::boxes::fill;
+use crate::build::error::BuildError;
 use crate::build::occlusion_order;
 use crate::build::pack::{self, Filled, LaneOrder};
 use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::intersect::Isa;
 use crate::tree::BLOCK;
 use crate::tree::Name;
+use crate::tree::geometry::SphereCloud;
 use crate::tree::node::{Node, TreeSpace, WIDTH, tag};
 use crate::tree::packed::{Entry, Packed};
 use crate::tree::sphere_block::SphereBlock;
 use crate::tree::storage::Store;
 use crate::tree::triangle_block::{BlockNames, Blocks};
-use crate::{BuildError, Geometry, GeometryKind, SphereCloud};
+use crate::tree::{Geometry, GeometryKind};
 
 impl Packed {
     /// Puts the triangles of a packed tree where its geometries, which stood elsewhere before, have them now. Where there may be none
@@ -77,236 +79,6 @@ impl Packed {
         }
         let names = self.names.to_mut();
         names.par_iter_mut().zip(orders).with_min_len(1 << 10).for_each(|(names, order)| order.put(names));
-    }
-}
-
-/// The least costs of putting a subtree into 1 to 15 children of a node; the first of the sixteen means nothing.
-pub(crate) type Costs = [f32; WIDTH];
-
-const LEAF_COSTS: Costs = [0.0; WIDTH];
-
-/// How a node of the binary tree shares the children that it is given, 2 to 16, among its own two, and how many are still too few for
-/// that. How many go to the left is chosen freely for up to eight and for sixteen; from the ninth to the fifteenth, one more goes to
-/// the side that it serves better. So all of it takes 29 bits, and trees are hardly worse for it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Choices(pub(crate) u32);
-
-/// The most children that are shared freely but for all.
-const FREELY: usize = WIDTH / 2;
-/// Where it stands how many go to the left, less one, of up to [`FREELY`].
-const LEFT_AT: [u32; FREELY + 2] = [0, 0, 0, 0, 1, 3, 5, 8, 11, 14];
-/// From here on, a bit each says whether the next goes to the left.
-const NEXT_AT: u32 = LEFT_AT[FREELY + 1];
-const LEFT_OF_ALL_AT: u32 = NEXT_AT + (WIDTH - FREELY - 1) as u32;
-const MOST_AS_ONE_AT: u32 = LEFT_OF_ALL_AT + 4;
-
-// The last bit of the word says that a node is a leaf; four bits hold what is below sixteen.
-const _: () = assert!(MOST_AS_ONE_AT + 4 < u32::BITS && WIDTH == 16);
-
-/// The choices where there is a leaf at the left, or at the right.
-const ALL_BUT_ONE_RIGHT: u32 = 0;
-const ALL_BUT_ONE_LEFT: u32 = {
-    let next = (1 << (LEFT_OF_ALL_AT - NEXT_AT)) - 1;
-    let mut choices = next << NEXT_AT | (WIDTH as u32 - 2) << LEFT_OF_ALL_AT;
-    let mut children = 2;
-    while children <= FREELY {
-        choices |= (children as u32 - 2) << LEFT_AT[children];
-        children += 1;
-    }
-    choices
-};
-
-impl Choices {
-    /// How many go to the left of two or more; 0 where it is better to be one child.
-    #[inline(always)]
-    fn left(self, children: usize) -> usize {
-        let bits = |from: u32, to: u32| (self.0 >> from & ((1 << (to - from)) - 1)) as usize;
-        if children <= bits(MOST_AS_ONE_AT, MOST_AS_ONE_AT + 4) {
-            0
-        } else if children <= FREELY {
-            1 + bits(LEFT_AT[children], LEFT_AT[children + 1])
-        } else if children < WIDTH {
-            let next = bits(NEXT_AT, NEXT_AT + (children - FREELY) as u32).count_ones() as usize;
-            1 + bits(LEFT_AT[FREELY], LEFT_AT[FREELY + 1]) + next
-        } else {
-            1 + bits(LEFT_OF_ALL_AT, MOST_AS_ONE_AT)
-        }
-    }
-}
-
-/// The least cost of sharing so many children, and how many go to the left.
-#[inline(always)]
-fn share_freely(children: usize, left: &Costs, right: &Costs) -> (f32, usize) {
-    let mut best = (f32::INFINITY, 1);
-    for first in 1..children {
-        let cost = left[first] + right[children - first];
-        if cost < best.0 {
-            best = (cost, first);
-        }
-    }
-    best
-}
-
-/// Chooses for a node over two children.
-#[inline(always)]
-fn share(area: f32, left: &Costs, right: &Costs) -> (Costs, Choices) {
-    let mut costs = LEAF_COSTS;
-    let beside_leaf = if left[1] == 0.0 {
-        Some((right, ALL_BUT_ONE_RIGHT))
-    } else if right[1] == 0.0 {
-        Some((left, ALL_BUT_ONE_LEFT))
-    } else {
-        None
-    };
-    if let Some((other, choices)) = beside_leaf {
-        // All but one are of use to the other alone.
-        costs[2..].copy_from_slice(&other[1..WIDTH - 1]);
-        return one_if_no_worse(costs, area + other[WIDTH - 1], choices);
-    }
-    let (mut choices, mut first) = (0, 1);
-    for children in 2..=FREELY {
-        (costs[children], first) = share_freely(children, left, right);
-        choices |= (first as u32 - 1) << LEFT_AT[children];
-    }
-    for children in FREELY + 1..WIDTH {
-        let cost = left[first] + right[children - first];
-        let next = left[first + 1] + right[children - first - 1];
-        let is_left = next < cost;
-        costs[children] = if is_left { next } else { cost };
-        first += usize::from(is_left);
-        choices |= u32::from(is_left) << (NEXT_AT as usize + children - FREELY - 1);
-    }
-    let (cost, first) = share_freely(WIDTH, left, right);
-    choices |= (first as u32 - 1) << LEFT_OF_ALL_AT;
-    one_if_no_worse(costs, area + cost, choices)
-}
-
-/// The costs of a node by those of sharing two children or more, where it may be one child instead.
-#[inline(always)]
-fn one_if_no_worse(mut costs: Costs, as_one: f32, choices: u32) -> (Costs, Choices) {
-    costs[1] = as_one;
-    // More children never cost more, so that those that do not help stand in a row.
-    let mut most_as_one = 1;
-    for (children, cost) in costs.iter_mut().enumerate().skip(2) {
-        if *cost >= as_one {
-            *cost = as_one;
-            most_as_one = children as u32;
-        }
-    }
-    (costs, Choices(choices | most_as_one << MOST_AS_ONE_AT))
-}
-
-/// The costs of putting leaves of so many instances: beside others where there is room for all, or else into a node of their own.
-fn costs_of_instances(count: usize, area: f32) -> Costs {
-    std::array::from_fn(|children| if children < count { area } else { 0.0 })
-}
-
-/// The costs of the larger subtrees of a twig, so that these can be put elsewhere without choosing again.
-#[derive(Default)]
-pub(crate) struct Known {
-    /// With their places, from the last to the first.
-    costs: Vec<(u32, Costs)>,
-}
-
-impl Known {
-    /// From how many nodes on a subtree is a larger one.
-    const LEAST: usize = 32;
-
-    /// Chooses for all nodes of a twig; returns the costs of its root, too.
-    pub(crate) fn choose(nodes: &mut [BinaryNode]) -> (Costs, Self) {
-        let mut known = Self { costs: Vec::with_capacity(nodes.len() / 16) };
-        let costs = choose_and(
-            nodes,
-            false,
-            #[inline(always)]
-            |place, count, costs| {
-                if count >= Self::LEAST {
-                    known.costs.push((place as u32, *costs));
-                }
-            },
-        );
-        (costs, known)
-    }
-
-    /// The costs of the subtree of these nodes, the first of which has that place in the twig.
-    pub(crate) fn costs(&self, place: usize, nodes: &[BinaryNode]) -> Costs {
-        let found = self.costs.binary_search_by_key(&Reverse(place as u32), |&(place, _)| Reverse(place));
-        found.map_or_else(|_| choose(&mut nodes.to_vec(), false), |found| self.costs[found].1)
-    }
-}
-
-/// Chooses for all nodes of a twig; returns the costs of its root.
-pub(crate) fn choose(nodes: &mut [BinaryNode], are_instances: bool) -> Costs {
-    choose_and(
-        nodes,
-        are_instances,
-        #[inline(always)]
-        |_, _, _| {},
-    )
-}
-
-/// The same; tells the place of each inner node, how many nodes its subtree has, and the costs of that.
-#[inline(always)]
-fn choose_and(
-    nodes: &mut [BinaryNode],
-    are_instances: bool,
-    mut tell: impl FnMut(usize, usize, &Costs),
-) -> Costs {
-    // Of the subtrees behind a node that have no parent there, from the last to the first: its children's are the last two.
-    let mut behind = Vec::new();
-    let mut ends = Vec::new();
-    for (place, node) in nodes.iter_mut().enumerate().rev() {
-        let mut costs = LEAF_COSTS;
-        let mut end = place + 1;
-        if let Some(names) = node.names() {
-            if are_instances {
-                costs = costs_of_instances(names.len(), node.bounds().half_area());
-            }
-        } else if let (Some(left), Some(right)) = (behind.pop(), behind.pop()) {
-            let choices;
-            (costs, choices) = share(node.bounds().half_area(), &left, &right);
-            node.choose(choices);
-            end = ends.pop().and_then(|_| ends.pop()).unwrap_or(end);
-            tell(place, end - place, &costs);
-        }
-        behind.push(costs);
-        ends.push(end);
-    }
-    behind.pop().unwrap_or(LEAF_COSTS)
-}
-
-impl Binary<'_> {
-    pub(crate) fn bounds(&self) -> &Bounds {
-        match self {
-            Self::Fork(fork) => &fork.bounds,
-            Self::Twig(twig) => twig.nodes[0].bounds(),
-        }
-    }
-
-    pub(crate) fn costs(&self) -> &Costs {
-        match self {
-            Self::Fork(fork) => &fork.costs,
-            Self::Twig(twig) => &twig.costs,
-        }
-    }
-
-    /// How many nodes it has.
-    fn nodes(&self) -> usize {
-        match self {
-            Self::Fork(fork) => fork.nodes,
-            Self::Twig(twig) => twig.nodes.len(),
-        }
-    }
-}
-
-impl<'p> Fork<'p> {
-    /// The one over two.
-    pub(crate) fn over(children: [Binary<'p>; 2]) -> Self {
-        let mut bounds = *children[0].bounds();
-        bounds.grow(children[1].bounds());
-        let (costs, choices) = share(bounds.half_area(), children[0].costs(), children[1].costs());
-        let nodes = 1 + children[0].nodes() + children[1].nodes();
-        Self { bounds, costs, choices, children, nodes, is_ranked: false }
     }
 }
 
@@ -468,7 +240,7 @@ pub(crate) fn lay_out(
     if total.blocks.max(total.sphere_blocks) > tag::BLOCK_PLACES as usize {
         return Err(BuildError::TooMany);
     }
-    let mut nodes = crate::build::binary::fill(total.nodes, Node::EMPTY);
+    let mut nodes = fill(total.nodes, Node::EMPTY);
     let mut spans = vec![Span { first: 0, count: 0 }; total.blocks];
     let mut sphere_spans = vec![Span { first: 0, count: 0 }; total.sphere_blocks];
     let mut entries = vec![Entry::new(0, 0, true); total.entries];
@@ -774,6 +546,7 @@ fn node_over(children: &[Cursor], references: [u32; WIDTH]) -> Node {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::build::binary_node::choose;
     use crate::tests::scenes::Random;
 
     /// A binary tree over boxes, depth first.

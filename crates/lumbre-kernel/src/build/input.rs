@@ -7,30 +7,29 @@ use lumbre_math::{DMat3, DVec3, Elementary, Transform, Vec3};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use crate::accel::AccelParts;
 use crate::build::binary::{Grown, PARALLEL, binary_tree};
 use crate::build::boxes::Boxes;
 use crate::build::clouds::CloudSurvey;
 use crate::build::collapse::lay_out;
+use crate::build::error::{BuildError, MOST_PRIMITIVES};
 use crate::build::open_instances;
+use crate::build::options::{BuildOptions, Preset};
 use crate::build::outline::Outline;
 use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
-use crate::geometry::has_area;
 use crate::intersect::{Dispatch, Isa, Simd};
-use crate::precise_mesh;
 use crate::tree::BLOCK;
-use crate::tree::node::{TreeSpace, tag};
+use crate::tree::assemble::TreeParts;
+use crate::tree::geometry::has_area;
+use crate::tree::geometry::{Placement, TriangleMesh};
+use crate::tree::node::TreeSpace;
 use crate::tree::packed::{Entry, Packed};
+use crate::tree::precise_mesh;
+use crate::tree::precise_mesh::PreciseMesh;
 use crate::tree::summary::Sizes;
-use crate::{
-    Accel, BuildError, BuildOptions, Geometry, GeometryKind, Placement, PreciseMesh, Preset, TriangleMesh,
-};
-
-/// Leaf entries and nodes are to have a place in a reference.
-pub(crate) const MOST_PRIMITIVES: usize = tag::PLACE as usize;
+use crate::tree::{Geometry, GeometryKind, Tree};
 
 /// See [`Accel::build`].
-pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result<Accel, BuildError> {
+pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result<Tree, BuildError> {
     if geometries.len() > MOST_PRIMITIVES {
         return Err(BuildError::TooMany);
     }
@@ -58,7 +57,7 @@ fn size_of_geometry(geometry: &Geometry) -> usize {
 }
 
 /// The same on the calling thread and those of its pool.
-fn build_here(geometries: Vec<Geometry>, preset: Preset) -> Result<Accel, BuildError> {
+fn build_here(geometries: Vec<Geometry>, preset: Preset) -> Result<Tree, BuildError> {
     let mut parts = take_apart(&geometries)?;
     let tree_space = units_of(&geometries, &parts);
     let traits: Vec<Traits> = geometries.iter().map(traits_of).collect();
@@ -97,24 +96,23 @@ fn build_here(geometries: Vec<Geometry>, preset: Preset) -> Result<Accel, BuildE
         layout.pack(isa, &tree_space, &geometries, names)
     };
     let (sizes, bounds, infinite) = (parts.sizes, parts.bounds, parts.infinite);
-    Ok(Accel::assemble(
-        isa,
+    Ok(Tree::assemble(
         geometries,
-        AccelParts { tree_space, tree, sizes, bounds, infinite, primitives: count },
+        TreeParts { tree_space, packed: tree, sizes, bounds, infinite, primitives: count },
     ))
 }
 
 /// A tree in which nothing stands yet.
-pub(crate) fn empty_over(geometries: Vec<Geometry>) -> Accel {
-    let parts = AccelParts {
+pub(crate) fn empty_over(geometries: Vec<Geometry>) -> Tree {
+    let parts = TreeParts {
         tree_space: TreeSpace::new(DVec3::ZERO, 1.0, 0.0, 1.0),
-        tree: Packed::default(),
+        packed: Packed::default(),
         sizes: Sizes::default(),
         bounds: Aabb::EMPTY,
         infinite: Vec::new(),
         primitives: 0,
     };
-    Accel::assemble(Isa::best(), geometries, parts)
+    Tree::assemble(geometries, parts)
 }
 
 /// What geometries consist of, triangles apart.
@@ -203,7 +201,7 @@ pub(crate) fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
                 }
             }
             GeometryKind::Instance(instance) => {
-                let is_infinite = !instance.accel.infinite.is_empty();
+                let is_infinite = !instance.tree.infinite.is_empty();
                 let bounds = boxes[position].unwrap_or(Aabb::EMPTY);
                 if is_infinite {
                     parts.bounds = parts.bounds.union(bounds);
@@ -228,15 +226,13 @@ fn boxes_of(geometries: &[Geometry]) -> Vec<Option<Aabb>> {
     let mut outlines: FxHashMap<usize, Outline> = FxHashMap::default();
     for geometry in geometries {
         if let GeometryKind::Instance(instance) = &geometry.kind {
-            outlines
-                .entry(Arc::as_ptr(&instance.accel).addr())
-                .or_insert_with(|| Outline::of(&instance.accel));
+            outlines.entry(Arc::as_ptr(&instance.tree).addr()).or_insert_with(|| Outline::of(&instance.tree));
         }
     }
     let bounds = |geometry: &Geometry| match &geometry.kind {
         GeometryKind::Shape(shape) => shape.bounds(),
         GeometryKind::Instance(instance) => {
-            let outline = &outlines[&Arc::as_ptr(&instance.accel).addr()];
+            let outline = &outlines[&Arc::as_ptr(&instance.tree).addr()];
             Some(outline.at(&instance.world_from_object))
         }
         GeometryKind::Mesh(_)
@@ -556,7 +552,7 @@ pub(crate) fn units_of(geometries: &[Geometry], parts: &Parts) -> TreeSpace {
     let condition = |geometry: &Geometry| match &geometry.kind {
         GeometryKind::Shape(shape) => condition_of(&shape.world_from_object()),
         GeometryKind::Instance(instance) => {
-            let inner = instance.accel.tree_space.condition;
+            let inner = instance.tree.tree_space.condition;
             let outer = match &instance.world_from_object {
                 Placement::Still(map) => condition_of(map),
                 Placement::Moving(motion) => motion.condition(),

@@ -4,13 +4,17 @@
 //! rays traverse. [`refit`] and [`rebuild`] follow geometries that move.
 
 pub(crate) mod binary;
+mod binary_node;
+mod binary_tree;
 mod boxes;
 mod clouds;
 pub(crate) mod collapse;
+pub(crate) mod error;
 pub(crate) mod input;
 mod morton;
 pub(crate) mod occlusion_order;
 pub(crate) mod open_instances;
+pub(crate) mod options;
 mod outline;
 pub(crate) mod pack;
 mod partition;

@@ -100,7 +100,7 @@ impl Sorter<'_> {
             len += 1;
         }
         // From the last to the first: by falling odds for their cost.
-        let keys = L::F32x16::load(&stops).over(L::F32x16::load(&costs)).lanes_in_bits();
+        let keys = (L::F32x16::load(&stops) / L::F32x16::load(&costs)).lanes_in_bits();
         let by_lane = keys.bits();
         let mut order = [0; WIDTH];
         for (lane, &key) in by_lane[..len].iter().enumerate() {
@@ -194,7 +194,7 @@ impl Areas {
             let low = L::F32x16::load(&node.planes[2 * axis]);
             let high = L::F32x16::load(&node.planes[2 * axis + 1]);
             sizes[axis] = (high - low).max(zero);
-            all[axis] = (high.most() + (zero - low).most()).max(0.0);
+            all[axis] = (high.reduce_max() + (zero - low).reduce_max()).max(0.0);
         }
         let ([x, y, z], [all_x, all_y, all_z]) = (sizes, all);
         let of_children = (x * y + y * z + z * x).to_array();

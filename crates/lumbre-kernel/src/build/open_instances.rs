@@ -22,10 +22,11 @@ use rustc_hash::FxHashMap;
 use crate::build::outline::{EightSizes, Outline, Placing, box_in_space};
 use crate::build::primitive::{Bounds, ONE, Primitive};
 use crate::intersect::{Dispatch, Isa, Simd};
+use crate::tree::geometry::Placement;
 use crate::tree::node::{TreeSpace, tag};
 use crate::tree::packed::Entry;
 use crate::tree::packed::Start;
-use crate::{Accel, Geometry, GeometryKind, Instance, Placement};
+use crate::tree::{Geometry, GeometryKind, Instance, Tree};
 
 /// How many leaves there may be more for each instance that stands still, and how many more for all: so many that a mean one may be opened once.
 const MORE: usize = 15;
@@ -47,8 +48,8 @@ struct Family {
 }
 
 impl Family {
-    fn of(inner: &Accel, reference: u32) -> Self {
-        let node = &inner.tree.nodes[reference as usize];
+    fn of(inner: &Tree, reference: u32) -> Self {
+        let node = &inner.packed.nodes[reference as usize];
         let lanes = 0..node.len();
         let children = lanes.map(|lane| (node.children[lane], box_in_space(&inner.tree_space, node, lane)));
         // What became empty by a refit is met by no ray.
@@ -73,9 +74,9 @@ pub(crate) struct Families {
 
 impl Families {
     /// The place of a node.
-    fn learn(&mut self, accel: &Arc<Accel>, node: u32) -> u32 {
-        *self.places.entry((Arc::as_ptr(accel).addr(), node)).or_insert_with(|| {
-            self.known.push(Family::of(accel, node));
+    fn learn(&mut self, tree: &Arc<Tree>, node: u32) -> u32 {
+        *self.places.entry((Arc::as_ptr(tree).addr(), node)).or_insert_with(|| {
+            self.known.push(Family::of(tree, node));
             self.known.len() as u32 - 1
         })
     }
@@ -85,26 +86,26 @@ impl Families {
     }
 
     /// Gets to know the children of one.
-    fn learn_children(&mut self, accel: &Arc<Accel>, place: u32) {
+    fn learn_children(&mut self, tree: &Arc<Tree>, place: u32) {
         let family = self.get(place);
         if family.families.len() < family.children.len() {
             let children = family.children.clone();
             self.known[place as usize].families =
-                children.into_iter().map(|child| self.learn(accel, child)).collect();
+                children.into_iter().map(|child| self.learn(tree, child)).collect();
         }
     }
 
     /// The boxes around those parts of a tree, whose nodes these are, in the space around the instance; `None` unless they
     /// together are all of the tree.
     fn boxes_of(&mut self, instance: &Instance, whole: &Aabb, nodes: &[u32]) -> Option<Vec<Aabb>> {
-        let Instance { accel, world_from_object } = instance;
-        accel.tree.root.filter(|&root| tag::is_inner(root))?;
+        let Instance { tree, world_from_object } = instance;
+        tree.packed.root.filter(|&root| tag::is_inner(root))?;
         let mut places: Vec<(u32, usize)> = nodes.iter().copied().zip(0..).collect();
         places.sort_unstable();
         let mut boxes = vec![None; nodes.len()];
-        let mut pending = vec![(self.learn(accel, 0), *whole)];
+        let mut pending = vec![(self.learn(tree, 0), *whole)];
         while let Some((place, around)) = pending.pop() {
-            self.learn_children(accel, place);
+            self.learn_children(tree, place);
             let family = self.get(place);
             if family.children.is_empty() {
                 return None;
@@ -154,8 +155,8 @@ pub(crate) fn open(
     let mut known = Families::default();
     let of = |primitive: &Primitive| still(&geometries[primitive.first() as usize]);
     let family = |primitive: &Primitive| match of(primitive) {
-        Some((Instance { accel, .. }, _)) if accel.tree.root.is_some_and(tag::is_inner) => {
-            known.learn(accel, 0)
+        Some((Instance { tree, .. }, _)) if tree.packed.root.is_some_and(tag::is_inner) => {
+            known.learn(tree, 0)
         }
         _ => NO_FAMILY,
     };
@@ -204,7 +205,7 @@ pub(crate) fn open(
         for place in opened {
             let part = primitives[first + place];
             let Some((instance, _)) = of(&part) else { continue };
-            known.learn_children(&instance.accel, families[place]);
+            known.learn_children(&instance.tree, families[place]);
             let family = known.get(families[place]);
             next.extend(&family.families);
             primitives.extend(family.children.iter().map(|&child| part.with_names(part.first(), child)));

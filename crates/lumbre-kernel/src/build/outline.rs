@@ -5,8 +5,9 @@ use lumbre_math::{AnimatedTransform, DMat3, DVec3, Transform};
 
 use crate::intersect::{Dispatch, Isa, Simd};
 use crate::simd::{F32x16, Row, WIDE};
+use crate::tree::Tree;
+use crate::tree::geometry::Placement;
 use crate::tree::node::{Node, TreeSpace, tag};
-use crate::{Accel, Placement};
 
 /// Boxes of an outline, about.
 const OUTLINE: usize = 256;
@@ -37,9 +38,9 @@ const IMAGE_ERROR: f64 = 32.0 / (1 << 24) as f64;
 
 impl Outline {
     /// Of a whole tree.
-    pub(crate) fn of(inner: &Accel) -> Self {
+    pub(crate) fn of(inner: &Tree) -> Self {
         let whole = inner.bounds;
-        match inner.tree.root.filter(|_| inner.infinite.is_empty()) {
+        match inner.packed.root.filter(|_| inner.infinite.is_empty()) {
             Some(root) => Self { whole, ..Self::below(inner, root, OUTLINE) },
             None => Self::of_box(whole),
         }
@@ -50,8 +51,8 @@ impl Outline {
     }
 
     /// Of what is below a node, by one box more than this at most, or by those of its children where they are more; of a leaf, by none.
-    pub(crate) fn below(inner: &Accel, reference: u32, count: usize) -> Self {
-        let node = |reference: u32| tag::is_inner(reference).then(|| &inner.tree.nodes[reference as usize]);
+    pub(crate) fn below(inner: &Tree, reference: u32, count: usize) -> Self {
+        let node = |reference: u32| tag::is_inner(reference).then(|| &inner.packed.nodes[reference as usize]);
         let Some(root) = node(reference) else { return Self::of_box(Aabb::EMPTY) };
         let children = |node: &Node| -> Vec<(Aabb, u32)> {
             (0..node.len())
@@ -284,7 +285,7 @@ fn images<W: F32x16>(boxes: &[SixteenBoxes], row: [f32; 3]) -> [f32; 2] {
         high = high.max(reach + image);
         low = low.max(reach - image);
     }
-    [-low.most(), high.most()]
+    [-low.reduce_max(), high.reduce_max()]
 }
 
 /// A node's box, back from tree units.

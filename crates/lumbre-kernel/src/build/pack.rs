@@ -3,15 +3,16 @@
 use lumbre_math::Vec3;
 use rayon::prelude::*;
 
-use crate::geometry::has_area;
 use crate::intersect::{Dispatch, Isa, Simd};
 use crate::simd;
 use crate::tree::BLOCK;
+use crate::tree::geometry::TriangleMesh;
+use crate::tree::geometry::has_area;
 use crate::tree::node::{Node, tag};
 use crate::tree::triangle_block::{
     BlockNames, Blocks, Head, Line, MARGIN, MOST_IN_HALF, QUAD, lines_of, row, shared_number, vertex_at,
 };
-use crate::{Geometry, GeometryKind, TriangleMesh};
+use crate::tree::{Geometry, GeometryKind};
 
 /// Blocks, and where each begins.
 pub(crate) struct Filled {

@@ -7,18 +7,20 @@ use lumbre_math::DVec3;
 use rayon::prelude::*;
 
 use crate::build::clouds::box_of;
+use crate::build::error::BuildError;
 use crate::build::input::{Boxer, Parts, take_apart, units_of};
 use crate::build::open_instances::{self, Families};
 use crate::build::primitive::Bounds;
-use crate::geometry::has_area;
+use crate::intersect::Isa;
 use crate::intersect::Portable;
+use crate::tree::geometry::SphereCloud;
+use crate::tree::geometry::has_area;
 use crate::tree::node::{Node, TreeSpace, tag};
 use crate::tree::packed::Entry;
 use crate::tree::packed::Start;
 use crate::tree::sphere_block::{SphereBlock, has_radius};
-use crate::tree::summary::Summary;
 use crate::tree::triangle_block::{BlockNames, Blocks};
-use crate::{Accel, BuildError, Geometry, GeometryKind, SphereCloud};
+use crate::tree::{Geometry, GeometryKind, Tree};
 
 /// Why a tree cannot be refitted. It is as it was before.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,31 +77,31 @@ impl std::error::Error for RefitError {
 }
 
 /// See [`Accel::refit`].
-pub(crate) fn refit(accel: &mut Accel, geometries: Vec<Geometry>) -> Result<f64, RefitError> {
-    if geometries.len() != accel.geometries.len() {
-        return Err(RefitError::OtherLength { expected: accel.geometries.len(), found: geometries.len() });
+pub(crate) fn refit(tree: &mut Tree, geometries: Vec<Geometry>) -> Result<f64, RefitError> {
+    if geometries.len() != tree.geometries.len() {
+        return Err(RefitError::OtherLength { expected: tree.geometries.len(), found: geometries.len() });
     }
-    for (geometry, (old, new)) in accel.geometries.iter().zip(&geometries).enumerate() {
+    for (geometry, (old, new)) in tree.geometries.iter().zip(&geometries).enumerate() {
         if !is_same_topology(&old.kind, &new.kind) {
             return Err(RefitError::OtherTopology { geometry });
         }
     }
     let parts = take_apart(&geometries).map_err(RefitError::Unsound)?;
-    check_infinite(accel, &parts)?;
-    let built_cost = accel.built_cost.unwrap_or_else(|| cost(&accel.tree.nodes));
-    let old = std::mem::replace(&mut accel.geometries, geometries);
-    match check_places(accel, &parts) {
+    check_infinite(tree, &parts)?;
+    let built_cost = tree.built_cost.unwrap_or_else(|| cost(&tree.packed.nodes));
+    let old = std::mem::replace(&mut tree.geometries, geometries);
+    match check_places(tree, &parts) {
         Ok(places) => {
-            accel.tree.move_triangles(accel.isa, &accel.geometries, &old, parts.has_flat);
-            fit(accel, parts, places);
+            tree.packed.move_triangles(Isa::best(), &tree.geometries, &old, parts.has_flat);
+            fit(tree, parts, places);
         }
         Err(error) => {
-            accel.geometries = old;
+            tree.geometries = old;
             return Err(error);
         }
     }
-    accel.built_cost = Some(built_cost);
-    let cost = cost(&accel.tree.nodes);
+    tree.built_cost = Some(built_cost);
+    let cost = cost(&tree.packed.nodes);
     Ok(if built_cost > 0.0 { cost / built_cost } else { 1.0 })
 }
 
@@ -112,35 +114,35 @@ pub(crate) struct Places {
 }
 
 /// Everything that can be hit is to have a place in the tree. Answers what the entries there are.
-pub(crate) fn check_places(accel: &Accel, parts: &Parts) -> Result<Places, RefitError> {
-    check_triangles(accel, &accel.geometries)?;
-    check_spheres(accel, &accel.geometries)?;
-    entry_boxes(accel, parts)
+pub(crate) fn check_places(tree: &Tree, parts: &Parts) -> Result<Places, RefitError> {
+    check_triangles(tree, &tree.geometries)?;
+    check_spheres(tree, &tree.geometries)?;
+    entry_boxes(tree, parts)
 }
 
 /// Gives the nodes, spheres and entries of a tree what its geometries say, whose parts and places these are. Triangles are packed
 /// already.
-pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
+pub(crate) fn fit(tree: &mut Tree, parts: Parts, places: Places) {
     let Places { boxes, starts } = places;
-    let geometries = &accel.geometries;
+    let geometries = &tree.geometries;
     let tree_space = units_of(geometries, &parts);
     let boxer = |geometry: &Geometry| match &geometry.kind {
         GeometryKind::Mesh(mesh) => Some(Boxer::new(mesh, &tree_space)),
         _ => None,
     };
     let boxers: Vec<Option<Boxer>> = geometries.iter().map(boxer).collect();
-    let tree = &mut accel.tree;
+    let packed = &mut tree.packed;
     for (place, start) in starts {
-        let old = tree.entries[place];
+        let old = packed.entries[place];
         if old.primitive() != start.word() {
-            tree.entries.to_mut()[place] = Entry::new(old.geometry, start.word(), old.is_last());
+            packed.entries.to_mut()[place] = Entry::new(old.geometry, start.word(), old.is_last());
         }
     }
-    let cloud_boxes: Vec<Bounds> = tree
+    let cloud_boxes: Vec<Bounds> = packed
         .sphere_blocks
         .to_mut()
         .par_iter_mut()
-        .zip(tree.sphere_names.par_iter())
+        .zip(packed.sphere_names.par_iter())
         .with_min_len(256)
         .map(|(block, names)| match &geometries[names.geometry as usize].kind {
             GeometryKind::Spheres(cloud) => fill_sphere_block(block, names, cloud, &tree_space),
@@ -153,9 +155,9 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
         .collect();
 
     // What is in leaves, then what is above: children stand behind their parents.
-    let mut node_boxes = vec![Bounds::EMPTY; tree.nodes.len()];
-    let (nodes, blocks) = (tree.nodes.to_mut(), Blocks::new(&tree.blocks));
-    let (names, entries) = (&*tree.names, &*tree.entries);
+    let mut node_boxes = vec![Bounds::EMPTY; packed.nodes.len()];
+    let (nodes, blocks) = (packed.nodes.to_mut(), Blocks::new(&packed.blocks));
+    let (names, entries) = (&*packed.names, &*packed.entries);
     nodes.par_iter_mut().zip(&mut node_boxes).with_min_len(64).for_each(|(node, whole)| {
         for lane in 0..node.len() {
             let child = node.children[lane];
@@ -199,12 +201,12 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
         }
     }
 
-    accel.summary = Summary::new(geometries, parts.sizes);
-    accel.primitives = parts.count();
-    accel.infinite = parts.infinite;
-    accel.tree_space = tree_space;
-    accel.bounds = parts.bounds;
-    accel.follow_tree();
+    tree.summary.sizes = parts.sizes;
+    tree.primitives = parts.count();
+    tree.infinite = parts.infinite;
+    tree.tree_space = tree_space;
+    tree.bounds = parts.bounds;
+    tree.follow();
 }
 
 fn is_same_topology(old: &GeometryKind, new: &GeometryKind) -> bool {
@@ -224,9 +226,9 @@ fn is_same_topology(old: &GeometryKind, new: &GeometryKind) -> bool {
 }
 
 /// What is infinite is to be the same as before.
-fn check_infinite(accel: &Accel, parts: &Parts) -> Result<(), RefitError> {
+fn check_infinite(tree: &Tree, parts: &Parts) -> Result<(), RefitError> {
     let name = |entry: &Entry| (entry.geometry, entry.primitive());
-    let (mut old, mut new) = (accel.infinite.iter().map(name), parts.infinite.iter().map(name));
+    let (mut old, mut new) = (tree.infinite.iter().map(name), parts.infinite.iter().map(name));
     loop {
         match (old.next(), new.next()) {
             (None, None) => return Ok(()),
@@ -243,9 +245,9 @@ fn check_infinite(accel: &Accel, parts: &Parts) -> Result<(), RefitError> {
 }
 
 /// Every triangle that has an area is to have a place in the tree.
-fn check_triangles(accel: &Accel, geometries: &[Geometry]) -> Result<(), RefitError> {
+fn check_triangles(tree: &Tree, geometries: &[Geometry]) -> Result<(), RefitError> {
     let mut named = vec![0; geometries.len()];
-    for names in &accel.tree.names {
+    for names in &tree.packed.names {
         let count = names.primitives.iter().filter(|&&primitive| primitive != u32::MAX).count();
         named[names.geometry as usize] += count;
     }
@@ -255,7 +257,7 @@ fn check_triangles(accel: &Accel, geometries: &[Geometry]) -> Result<(), RefitEr
             continue;
         }
         let mut has_place = vec![false; mesh.indices.len()];
-        for names in accel.tree.names.iter().filter(|names| names.geometry as usize == geometry) {
+        for names in tree.packed.names.iter().filter(|names| names.geometry as usize == geometry) {
             for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX) {
                 has_place[primitive as usize] = true;
             }
@@ -272,7 +274,7 @@ fn check_triangles(accel: &Accel, geometries: &[Geometry]) -> Result<(), RefitEr
 }
 
 /// Every sphere that has a radius is to have a place in the tree.
-fn check_spheres(accel: &Accel, geometries: &[Geometry]) -> Result<(), RefitError> {
+fn check_spheres(tree: &Tree, geometries: &[Geometry]) -> Result<(), RefitError> {
     let is_cloud = |geometry: &Geometry| matches!(geometry.kind, GeometryKind::Spheres(_));
     if !geometries.iter().any(is_cloud) {
         return Ok(());
@@ -284,7 +286,7 @@ fn check_spheres(accel: &Accel, geometries: &[Geometry]) -> Result<(), RefitErro
             _ => Vec::new(),
         })
         .collect();
-    for names in &accel.tree.sphere_names {
+    for names in &tree.packed.sphere_names {
         for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX) {
             has_place[names.geometry as usize][primitive as usize] = true;
         }
@@ -300,8 +302,8 @@ fn check_spheres(accel: &Accel, geometries: &[Geometry]) -> Result<(), RefitErro
 }
 
 /// What the entries in the tree are now.
-fn entry_boxes(accel: &Accel, parts: &Parts) -> Result<Places, RefitError> {
-    let (entries, geometries) = (&*accel.tree.entries, &accel.geometries);
+fn entry_boxes(tree: &Tree, parts: &Parts) -> Result<Places, RefitError> {
+    let (entries, geometries) = (&*tree.packed.entries, &tree.geometries);
     // In the order of their names, as they were taken apart.
     let mut has_place = vec![false; parts.boxed.len()];
     let mut boxes: Vec<Option<Aabb>> = entries

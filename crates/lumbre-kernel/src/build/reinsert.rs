@@ -6,7 +6,8 @@
 
 use rayon::prelude::*;
 
-use crate::build::binary::{Binary, BinaryNode};
+use crate::build::binary_node::BinaryNode;
+use crate::build::binary_tree::Binary;
 use crate::build::primitive::Bounds;
 use crate::intersect::{Dispatch, Isa, Simd};
 use crate::simd;

@@ -9,7 +9,8 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
-use crate::build::binary::{self, Binary, BinaryNode, Twig};
+use crate::build::binary_node::BinaryNode;
+use crate::build::binary_tree::{self, Binary, Twig};
 use crate::build::primitive::Bounds;
 use crate::build::reinsert::{self, NONE, Node, Tree};
 
@@ -25,7 +26,7 @@ const ROUNDS: usize = 10;
 const FIRST_GAIN: f64 = 0.03;
 const LEAST_GAIN: f64 = 0.005;
 /// Treelets that become deeper are given up: with what is below they are no deeper than other trees that were changed.
-const DEEPEST: u32 = reinsert::DEEPEST - binary::DEEPEST;
+const DEEPEST: u32 = reinsert::DEEPEST - binary_tree::DEEPEST;
 
 /// What stands at a node of a treelet.
 #[derive(Clone, Copy)]
@@ -152,10 +153,10 @@ fn over<'p>(tree: &Tree, place: u32, pieces: &mut [Option<Binary<'p>>]) -> Binar
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::Preset;
     use crate::build::binary::{Grown, binary_tree};
+    use crate::build::binary_node::choose;
     use crate::build::boxes::Boxes;
-    use crate::build::collapse::choose;
+    use crate::build::options::Preset;
     use crate::build::primitive::{Kind, Traits};
     use crate::intersect::Isa;
     use crate::tests::scenes::Random;

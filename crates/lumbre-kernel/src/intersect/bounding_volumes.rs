@@ -1,6 +1,6 @@
 //! A ray against eight bounding volumes of shapes.
 
-use super::Simd;
+use super::operations::Simd;
 use crate::intersect::watertight::HeightRange;
 use crate::simd::{F32x8, F32x16, Row, Vector, WIDE};
 use crate::tree::BLOCK;
@@ -52,7 +52,7 @@ fn pass<V: F32x8>(block: &BoundingBlock, ray: &BoundingVolumeRay, range: &Height
     let [ex, ey, ez] = ray.direction;
     let distance = w[0].abs().max(w[1].abs().max(w[2].abs()));
     let (per_distance, least_margin) = (load(&block.margins), load(&block.least_margins));
-    let margin = per_distance.times_plus(distance, least_margin);
+    let margin = per_distance.mul_add(distance, least_margin);
     let least = per_distance * V::splat(LEAST_COMPONENT);
     let half = [one + margin, load(&block.heights) + margin, one + margin];
     let (mut p, mut d) = ([zero; 3], [zero; 3]);
@@ -60,10 +60,10 @@ fn pass<V: F32x8>(block: &BoundingBlock, ray: &BoundingVolumeRay, range: &Height
     for axis in 0..3 {
         let [x, y, z] = &block.rows[axis];
         let (x, y, z) = (load(x), load(y), load(z));
-        p[axis] = x.times_plus(w[0], y.times_plus(w[1], z * w[2]));
-        d[axis] = x.times_plus(splat(ex), y.times_plus(splat(ey), z * splat(ez)));
-        let inverse = one.over(least.max(d[axis].abs()));
-        let at = p[axis].turned_by(d[axis]);
+        p[axis] = x.mul_add(w[0], y.mul_add(w[1], z * w[2]));
+        d[axis] = x.mul_add(splat(ex), y.mul_add(splat(ey), z * splat(ez)));
+        let inverse = one / least.max(d[axis].abs());
+        let at = p[axis].xor_sign(d[axis]);
         near[axis] = (zero - (at + half[axis])) * inverse;
         far[axis] = (half[axis] - at) * inverse;
     }
@@ -71,7 +71,7 @@ fn pass<V: F32x8>(block: &BoundingBlock, ray: &BoundingVolumeRay, range: &Height
     let leaves = far[0].min(far[1]).min(far[2]);
     let (from, to) = (enters.max(splat(range.first)), leaves.min(splat(range.last)));
     // Every comparison with a NaN is false, so that what is none is met.
-    Passages { p, d, margin, enters, leaves, from, to, missed: to.below(from) }
+    Passages { p, d, margin, enters, leaves, from, to, missed: to.simd_lt(from) }
 }
 
 /// What lines have in bounding volumes: `p + k d` for k from -1 to 1, at the heights `middle + k reach`.
@@ -100,42 +100,41 @@ fn look_into<V: F32x8, const SURE: bool>(
     let &Passages { p, d, margin, enters, leaves, from, to, missed } = passages;
     let (zero, half, one) = (V::splat(0.0), V::splat(0.5), V::splat(1.0));
     let (middle, reach) = (half * (from + to), half * (to - from));
-    let [px, py, pz] =
-        [middle.times_plus(d[0], p[0]), middle.times_plus(d[1], p[1]), middle.times_plus(d[2], p[2])];
+    let [px, py, pz] = [middle.mul_add(d[0], p[0]), middle.mul_add(d[1], p[1]), middle.mul_add(d[2], p[2])];
     let [dx, dy, dz] = [reach * d[0], reach * d[1], reach * d[2]];
     let [c, linear, e] = &block.profiles;
     let (c, linear, e) = (V::load(c), V::load(linear), V::load(e));
     let tolerance =
-        (V::splat(TOLERANCE_PER_MARGIN) * margin).times_plus(one + margin, V::splat(LEAST_TOLERANCE));
-    let a = dx.times_plus(dx, dy.times_plus(dy, c * dz * dz));
-    let slope = c.times_plus(pz, half * linear);
-    let b = px.times_plus(dx, py.times_plus(dy, slope * dz));
-    let k = px.times_plus(px, py.times_plus(py, c.times_plus(pz, linear).times_plus(pz, e)));
+        (V::splat(TOLERANCE_PER_MARGIN) * margin).mul_add(one + margin, V::splat(LEAST_TOLERANCE));
+    let a = dx.mul_add(dx, dy.mul_add(dy, c * dz * dz));
+    let slope = c.mul_add(pz, half * linear);
+    let b = px.mul_add(dx, py.mul_add(dy, slope * dz));
+    let k = px.mul_add(px, py.mul_add(py, c.mul_add(pz, linear).mul_add(pz, e)));
     let twice = b + b;
     let (first, last) = (k + (a - twice), k + (a + twice));
-    let is_beside_between = a.at_most(b.abs()) | (b * b).below((k - tolerance) * a);
-    let is_beside = tolerance.below(first) & tolerance.below(last) & is_beside_between;
+    let is_beside_between = a.simd_le(b.abs()) | (b * b).simd_lt((k - tolerance) * a);
+    let is_beside = tolerance.simd_lt(first) & tolerance.simd_lt(last) & is_beside_between;
     let mask = !(missed | is_beside) & V::ALL;
     let mut chords =
         Chords { p: [px, py, pz], d: [dx, dy, dz], middle, reach, margin, from, mask, sure: 0, outside: 0 };
     if SURE {
         let (start, end) = (V::splat(range.surely_first), V::splat(range.surely_last));
-        let comes = start.below(enters) | tolerance.below(first);
-        let goes = leaves.below(end) | tolerance.below(last);
+        let comes = start.simd_lt(enters) | tolerance.simd_lt(first);
+        let goes = leaves.simd_lt(end) | tolerance.simd_lt(last);
         chords.outside = comes | goes;
         let deep = one - margin;
         // Some place between the ends, near to where the parabola is least.
-        let least_at = ((zero - b).over(a)).max(zero - one).min(one);
-        let least = least_at.times_plus(least_at.times_plus(a, twice), k);
-        let x = least_at.times_plus(dx, px).abs();
-        let y = least_at.times_plus(dy, py).abs();
-        let z = least_at.times_plus(dz, pz).abs();
-        let height = least_at.times_plus(reach, middle);
-        let is_inside = x.max(y).max(z).at_most(deep)
-            & start.at_most(height)
-            & height.at_most(end)
-            & least.below(zero - tolerance)
-            & V::load(&block.tubes).below(zero);
+        let least_at = ((zero - b) / a).max(zero - one).min(one);
+        let least = least_at.mul_add(least_at.mul_add(a, twice), k);
+        let x = least_at.mul_add(dx, px).abs();
+        let y = least_at.mul_add(dy, py).abs();
+        let z = least_at.mul_add(dz, pz).abs();
+        let height = least_at.mul_add(reach, middle);
+        let is_inside = x.max(y).max(z).simd_le(deep)
+            & start.simd_le(height)
+            & height.simd_le(end)
+            & least.simd_lt(zero - tolerance)
+            & V::load(&block.tubes).simd_lt(zero);
         chords.sure = is_inside & chords.outside & mask;
     }
     chords
@@ -182,17 +181,17 @@ impl Chord {
         let half_piece = (dx * dx + dy * dy + dz * dz).sqrt() * ((1.0 + 1e-6) / WIDE as f32);
         let splat = W::splat;
         let k = W::load(&MIDDLES.0);
-        let x = k.times_plus(splat(dx), splat(px));
-        let y = k.times_plus(splat(dy), splat(py));
-        let z = k.times_plus(splat(dz), splat(pz));
-        let from_circle = x.times_plus(x, y * y).sqrt() - splat(1.0 - tube);
-        let out = from_circle.times_plus(from_circle, z * z).sqrt() - splat(tube);
-        let height = k.times_plus(splat(self.reach), splat(self.middle));
-        let in_range = splat(start).at_most(height) & height.at_most(splat(end));
+        let x = k.mul_add(splat(dx), splat(px));
+        let y = k.mul_add(splat(dy), splat(py));
+        let z = k.mul_add(splat(dz), splat(pz));
+        let from_circle = x.mul_add(x, y * y).sqrt() - splat(1.0 - tube);
+        let out = from_circle.mul_add(from_circle, z * z).sqrt() - splat(tube);
+        let height = k.mul_add(splat(self.reach), splat(self.middle));
+        let in_range = splat(start).simd_le(height) & height.simd_le(splat(end));
         SeenTube {
-            misses: splat(half_piece + error).below(out) == W::ALL,
-            is_inside: out.below(splat(-error)) & in_range != 0,
-            is_outside: splat(error).below(out) & in_range != 0,
+            misses: splat(half_piece + error).simd_lt(out) == W::ALL,
+            is_inside: out.simd_lt(splat(-error)) & in_range != 0,
+            is_outside: splat(error).simd_lt(out) & in_range != 0,
         }
     }
 }
@@ -207,7 +206,7 @@ impl<V: F32x8> Chords<V> {
     ) -> (u32, u32) {
         let (mut mask, mut sure) = (self.mask, self.sure);
         let tubes = &block.tubes;
-        let mut rings = V::splat(0.0).below(V::load(tubes)) & mask;
+        let mut rings = V::splat(0.0).simd_lt(V::load(tubes)) & mask;
         if rings == 0 {
             return (mask, sure);
         }

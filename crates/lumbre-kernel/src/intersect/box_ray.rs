@@ -2,7 +2,7 @@
 
 use lumbre_geometry::Ray;
 
-use super::Sides;
+use super::axes::Sides;
 use crate::simd::{F32x16, Row};
 use crate::tree::node::{
     LARGEST_NEAR, LARGEST_PLANE, ROUNDOFF, SMALLEST_NEAR, TINY_DIRECTION, TINY_NEAR, TreeSpace, slop,
@@ -256,9 +256,9 @@ impl SlabRows {
         [least, per_distance]: [f32; 2],
     ) {
         let distance = from.abs();
-        let margin = inverse.abs() * distance.times_plus(W::splat(per_distance), W::splat(least));
+        let margin = inverse.abs() * distance.mul_add(W::splat(per_distance), W::splat(least));
         inverse.store(&mut self.inverse[axis]);
-        from.times_from(inverse, W::splat(0.0) - margin).store(&mut self.near_offset[axis]);
-        from.times_from(inverse, margin).store(&mut self.far_offset[axis]);
+        from.neg_mul_add(inverse, W::splat(0.0) - margin).store(&mut self.near_offset[axis]);
+        from.neg_mul_add(inverse, margin).store(&mut self.far_offset[axis]);
     }
 }

@@ -3,7 +3,8 @@
 use std::hint::select_unpredictable;
 use std::mem::MaybeUninit;
 
-use super::{Room, Sides, Slots};
+use super::axes::Sides;
+use super::slots::{Room, Slots};
 use crate::intersect::box_ray::Slabs;
 use crate::intersect::box_ray::{Frustum, SlabRows};
 use crate::simd::vector::stack_entry;
@@ -29,16 +30,16 @@ pub(crate) fn intersect_boxes<W: F32x16>(node: &Node, ray: &Slabs) -> (u32, W) {
     let (near_z, far_z) = near_and_far(node, ray.sides, 2);
     let [x, y, z, _] = ray.inverse;
     let (near, far) = (&ray.near_offset, &ray.far_offset);
-    let near_x = W::load(near_x).times_plus(W::splat(x), W::splat(near[0]));
-    let near_y = W::load(near_y).times_plus(W::splat(y), W::splat(near[1]));
-    let near_z = W::load(near_z).times_plus(W::splat(z), W::splat(near[2]));
-    let far_x = W::load(far_x).times_plus(W::splat(x), W::splat(far[0]));
-    let far_y = W::load(far_y).times_plus(W::splat(y), W::splat(far[1]));
-    let far_z = W::load(far_z).times_plus(W::splat(z), W::splat(far[2]));
+    let near_x = W::load(near_x).mul_add(W::splat(x), W::splat(near[0]));
+    let near_y = W::load(near_y).mul_add(W::splat(y), W::splat(near[1]));
+    let near_z = W::load(near_z).mul_add(W::splat(z), W::splat(near[2]));
+    let far_x = W::load(far_x).mul_add(W::splat(x), W::splat(far[0]));
+    let far_y = W::load(far_y).mul_add(W::splat(y), W::splat(far[1]));
+    let far_z = W::load(far_z).mul_add(W::splat(z), W::splat(far[2]));
     // 0 <= s_min. What is negative gives way to it where the box is entered, and is a miss where it is left.
-    let enter = near_x.later(near_y).later(near_z.later(W::splat(ray.s_min())));
-    let leave = far_x.earlier(far_y).earlier(far_z.earlier(W::splat(ray.s_max())));
-    (enter.no_later(leave), enter)
+    let enter = near_x.max_nonneg(near_y).max_nonneg(near_z.max_nonneg(W::splat(ray.s_min())));
+    let leave = far_x.min_nonneg(far_y).min_nonneg(far_z.min_nonneg(W::splat(ray.s_max())));
+    (enter.le_nonneg(leave), enter)
 }
 
 /// The same of rays together: among them all that one of them meets, and no later than it enters.
@@ -54,10 +55,10 @@ pub(crate) fn intersect_frustum<W: F32x16>(node: &Node, frustum: &Frustum) -> (u
         let width = W::splat(frustum.width[axis]);
         let first = (near * least).min(near * most) - width;
         let last = (far * least).max(far * most) + width;
-        enter = enter.later(first);
-        leave = leave.earlier(last);
+        enter = enter.max_nonneg(first);
+        leave = leave.min_nonneg(last);
     }
-    (enter.no_later(leave), enter)
+    (enter.le_nonneg(leave), enter)
 }
 
 /// Of the children in the mask, those whose boxes any of the rays that are alive meets; and, if `is_ordered`, where the first of them
@@ -85,20 +86,20 @@ pub(crate) fn intersect_each<W: F32x16>(
     while rest != 0 {
         let child = rest.trailing_zeros() as usize % WIDTH;
         rest &= rest - 1;
-        let enter_x = x.times_plus(W::splat(near_x[child]), first_x);
-        let enter_y = y.times_plus(W::splat(near_y[child]), first_y);
-        let enter_z = z.times_plus(W::splat(near_z[child]), first_z);
-        let leave_x = x.times_plus(W::splat(far_x[child]), last_x);
-        let leave_y = y.times_plus(W::splat(far_y[child]), last_y);
-        let leave_z = z.times_plus(W::splat(far_z[child]), last_z);
+        let enter_x = x.mul_add(W::splat(near_x[child]), first_x);
+        let enter_y = y.mul_add(W::splat(near_y[child]), first_y);
+        let enter_z = z.mul_add(W::splat(near_z[child]), first_z);
+        let leave_x = x.mul_add(W::splat(far_x[child]), last_x);
+        let leave_y = y.mul_add(W::splat(far_y[child]), last_y);
+        let leave_z = z.mul_add(W::splat(far_z[child]), last_z);
         // As for one ray: see `intersect_boxes`.
-        let enter = enter_x.later(enter_y).later(enter_z.later(s_min));
-        let leave = leave_x.earlier(leave_y).earlier(leave_z.earlier(s_max));
-        let those = enter.no_later(leave) & alive;
+        let enter = enter_x.max_nonneg(enter_y).max_nonneg(enter_z.max_nonneg(s_min));
+        let leave = leave_x.min_nonneg(leave_y).min_nonneg(leave_z.min_nonneg(s_max));
+        let those = enter.le_nonneg(leave) & alive;
         met |= u32::from(those != 0) << child;
         if is_ordered && those != 0 {
             let before = W::splat(0.0) - W::select(those, enter, W::splat(f32::INFINITY));
-            enters = W::select(1 << child, W::splat(-before.most()), enters);
+            enters = W::select(1 << child, W::splat(-before.reduce_max()), enters);
         }
     }
     (met, enters)

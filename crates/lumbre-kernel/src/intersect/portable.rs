@@ -1,38 +1,25 @@
 //! Plain loops over arrays, for any machine.
 
-use bytemuck::Zeroable;
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
-use super::{Axes, CornersRoom, Crossings, Isa, Set, Sides, Simd};
-use crate::Ray32;
+use super::axes::{Axes, Sides};
+use super::isa::{Isa, Set};
+use super::operations::{CornersRoom, Simd};
+use super::triangles::Shears;
 use crate::intersect::box_ray::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs};
 use crate::intersect::f32_ray::F32Ray;
-use crate::intersect::filter_start::FilterStart;
-use crate::intersect::watertight::{
-    BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, EdgeTest, HEIGHT_ERROR, HeightRange, Inside,
-    SIZE_ERROR, Shear, TINY, edge_test,
-};
-use crate::simd::vector::{Portable8, Portable16};
+use crate::intersect::watertight::{BlockRay, EdgeTest, HeightRange, Inside, Shear, edge_test};
+use crate::ray32::Ray32;
+use crate::simd::portable::{Portable8, Portable16};
 use crate::simd::{F32x8, Row, Vector, WIDE};
 use crate::tree::BLOCK;
 use crate::tree::Corners;
+use crate::tree::filter_start::FilterStart;
 use crate::tree::node::TreeSpace;
 use crate::tree::triangle_block::{TriangleBlock, shared_row};
 
 pub(crate) struct Portable;
-
-/// How a line passes the edges of eight triangles.
-#[derive(Clone, Copy, Zeroable)]
-pub(crate) struct Edges {
-    /// The edge functions.
-    values: [[f32; BLOCK]; 3],
-    /// Of the corners.
-    heights: [[f32; BLOCK]; 3],
-    /// By how much the edge functions and the heights may be wrong.
-    error: [f32; BLOCK],
-    height_error: [f32; BLOCK],
-}
 
 // As the processor's instruction does it, which f32::max does not.
 #[inline(always)]
@@ -56,8 +43,6 @@ fn local(start: &FilterStart, ray: &Ray32) -> [f32; 4] {
 // There is no instruction set to be taken on: these are ordinary functions, and the compiler chooses where they go.
 impl Simd for Portable {
     type F32x8 = Portable8;
-    type Edges = Edges;
-    type EdgesByTwo = [Edges; 2];
     type F32x16 = Portable16;
 
     #[inline]
@@ -166,20 +151,15 @@ impl Simd for Portable {
     }
 
     #[inline]
-    fn f32_corners(block: &TriangleBlock, ray: &F32Ray) -> [[Self::F32x8; 3]; 3] {
-        let splat = Self::F32x8::splat;
-        let [kx, ky, kz] = ray.axes.order();
+    fn sheared_corners<S: Shears>(block: &TriangleBlock, ray: &S) -> [[Portable8; 3]; 3] {
+        let [kx, ky, kz] = ray.axes().order();
         let mut room = CornersRoom::new();
         let corners = Self::corners(block, &mut room);
-        let mut sheared = [[splat(0.0); 3]; 3];
+        let mut sheared = [[Portable8::splat(0.0); 3]; 3];
         for corner in 0..3 {
-            // All three with the sign turned, which their products do not have.
-            let z = splat(ray.origin[2]) - Self::F32x8::load(&corners[kz][corner]);
-            let across = splat(ray.origin[0]) - Self::F32x8::load(&corners[kx][corner]);
-            let up = splat(ray.origin[1]) - Self::F32x8::load(&corners[ky][corner]);
-            sheared[0][corner] = across - splat(ray.shear[0]) * z;
-            sheared[1][corner] = up - splat(ray.shear[1]) * z;
-            sheared[2][corner] = z;
+            let own = [kx, ky, kz].map(|axis| Portable8::load(&corners[axis][corner]));
+            let [x, y, z] = ray.apply(own);
+            (sheared[0][corner], sheared[1][corner], sheared[2][corner]) = (x, y, z);
         }
         sheared
     }
@@ -204,43 +184,6 @@ impl Simd for Portable {
             }
             (columns[6].0[i], columns[7].0[i]) = (ray.t_min, ray.t_max);
         }
-    }
-
-    #[inline]
-    fn intersect_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Edges) {
-        let mut x = [[0.0; BLOCK]; 3];
-        let mut y = [[0.0; BLOCK]; 3];
-        let mut z = [[0.0; BLOCK]; 3];
-        let [kx, ky, kz] = ray.axes.order();
-        let (origin, rest, shear) = (&ray.origin, &ray.rest, &ray.shear);
-        let mut room = CornersRoom::new();
-        let corners = Self::corners(block, &mut room);
-        for corner in 0..3 {
-            let [across, up, along] = [kx, ky, kz].map(|axis| &corners[axis][corner]);
-            for lane in 0..BLOCK {
-                // All three with the sign turned, which their products do not have.
-                let height = origin[2] - along[lane];
-                x[corner][lane] = ((origin[0] - across[lane]) + rest[0]) - shear[0] * height;
-                y[corner][lane] = ((origin[1] - up[lane]) + rest[1]) - shear[1] * height;
-                z[corner][lane] = height;
-            }
-        }
-        let mut mask = 0;
-        let mut values = [[0.0; BLOCK]; 3];
-        let (mut error, mut height_error) = ([0.0; BLOCK], [0.0; BLOCK]);
-        for lane in 0..BLOCK {
-            let edge = |p: usize, q: usize| x[p][lane] * y[q][lane] - y[p][lane] * x[q][lane];
-            let (u, v, w) = (edge(2, 1), edge(0, 2), edge(1, 0));
-            let across = (0..3).fold(0.0f32, |most, i| most.max(x[i][lane].abs()).max(y[i][lane].abs()));
-            let along = (0..3).fold(0.0f32, |most, i| most.max(z[i][lane].abs()));
-            let size = (across + along) + ray.least_size;
-            error[lane] = (size * EDGE_ERROR) * (size * SIZE_ERROR + across) + TINY;
-            height_error[lane] = size * HEIGHT_ERROR;
-            let (least, most) = (u.min(v).min(w), u.max(v).max(w));
-            mask |= u32::from(least >= -error[lane] || most <= error[lane]) << lane;
-            (values[0][lane], values[1][lane], values[2][lane]) = (u, v, w);
-        }
-        (mask & block.taken(), Edges { values, heights: z, error, height_error })
     }
 
     #[inline]
@@ -271,49 +214,6 @@ impl Simd for Portable {
             }
         }
         corners
-    }
-
-    #[inline]
-    fn intersect_triangles_by_two(blocks: [&TriangleBlock; 2], rays: [&BlockRay; 2]) -> (u32, [Edges; 2]) {
-        let (first, of_first) = Self::intersect_triangles(blocks[0], rays[0]);
-        let (second, of_second) = Self::intersect_triangles(blocks[1], rays[1]);
-        (first | second << BLOCK, [of_first, of_second])
-    }
-
-    #[inline]
-    fn edges_of(both: &[Edges; 2], which: usize) -> Edges {
-        both[which % 2]
-    }
-
-    #[inline]
-    fn place_crossings(edges: &Edges, ray: &BlockRay) -> Crossings<Portable8> {
-        let (mut all_in_range, mut sure) = (0, 0);
-        let (mut froms, mut tos) = ([0.0; BLOCK], [0.0; BLOCK]);
-        for lane in 0..BLOCK {
-            let [u, v, w] = [edges.values[0][lane], edges.values[1][lane], edges.values[2][lane]];
-            let [a, b, c] = [edges.heights[0][lane], edges.heights[1][lane], edges.heights[2][lane]];
-            let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-            let error = edges.error[lane];
-            let det = u + v + w;
-            let weight = det.abs();
-            let height = u * a + v * b + w * c + det * ray.rest[2];
-            let is_turned = ray.turn.is_sign_negative() != det.is_sign_negative();
-            let ahead = if is_turned { -height } else { height };
-            let height_error = edges.height_error[lane];
-            let along_edges = height_error * (error * ERRORS_OF_EDGES + weight) + TINY;
-            let spread = (error * ERRORS_OF_EXTENT) * (high - low) + along_edges;
-            let (from, to) = (ahead - spread, ahead + spread);
-            // What is no number may be in range.
-            let is_out = to < ray.range.first * weight || from > ray.range.last * weight;
-            all_in_range |= u32::from(!is_out) << lane;
-            let (least, most) = (u.min(v).min(w), u.max(v).max(w));
-            let is_inside = least > error || most < -error;
-            let is_in_range = ray.range.surely_first * weight <= from && to <= ray.range.surely_last * weight;
-            sure |= u32::from(is_inside && is_in_range) << lane;
-            let inverse = 1.0 / weight;
-            (froms[lane], tos[lane]) = (from * inverse, to * inverse);
-        }
-        Crossings { in_range: all_in_range, sure, from: Portable8::load(&froms), to: Portable8::load(&tos) }
     }
 
     #[inline]

@@ -1,6 +1,6 @@
 //! A ray against eight spheres: see [`SphereRay`].
 
-use super::Simd;
+use super::operations::Simd;
 use crate::simd::{F32x8, Vector};
 use crate::tree::sphere_block::{SphereBlock, SphereRay};
 
@@ -16,24 +16,24 @@ pub(crate) fn intersect_spheres<L: Simd>(block: &SphereBlock, ray: &SphereRay) -
     let z = load(&block.centers[2]) - splat(ray.origin[2]);
     let (radii, margin) = (load(&block.radii), splat(ray.margin));
     // How far along the line is what is nearest to the centre, and the square of the distance between them.
-    let along = x.times_plus(ex, y.times_plus(ey, z * ez));
-    let px = along.times_from(ex, x);
-    let py = along.times_from(ey, y);
-    let pz = along.times_from(ez, z);
-    let beside = px.times_plus(px, py.times_plus(py, pz * pz));
+    let along = x.mul_add(ex, y.mul_add(ey, z * ez));
+    let px = along.neg_mul_add(ex, x);
+    let py = along.neg_mul_add(ey, y);
+    let pz = along.neg_mul_add(ez, z);
+    let beside = px.mul_add(px, py.mul_add(py, pz * pz));
     let size = radii + margin;
-    let rest = size.times_minus(size, beside);
-    let mask = zero.at_most(rest);
+    let rest = size.mul_sub(size, beside);
+    let mask = zero.simd_le(rest);
     if mask == 0 {
         return (0, 0);
     }
     let half = rest.sqrt();
     let (from, last) = (along - half, along + half);
-    let in_range = mask & from.at_most(splat(ray.far)) & splat(ray.near).at_most(last);
+    let in_range = mask & from.simd_le(splat(ray.far)) & splat(ray.near).simd_le(last);
     let inner = radii - margin;
-    let is_crossed = zero.below(inner) & zero.at_most(inner.times_minus(inner, beside));
+    let is_crossed = zero.simd_lt(inner) & zero.simd_le(inner.mul_sub(inner, beside));
     let [start, end] = ray.surely_in;
-    let certain = in_range & is_crossed & splat(start).at_most(from) & along.at_most(splat(end));
+    let certain = in_range & is_crossed & splat(start).simd_le(from) & along.simd_le(splat(end));
     (in_range, certain)
 }
 

@@ -11,8 +11,9 @@
 use lumbre_geometry::{Ray, Root};
 use lumbre_math::{DVec2, DVec3};
 
-use crate::intersect::Axes;
+use super::axes::Axes;
 use crate::simd::{Row, WIDE};
+use crate::tree::filter_start::LEAST_SIZE;
 
 /// The shear that turns a ray's direction into the last axis: once a ray.
 #[derive(Clone, Copy, Debug)]
@@ -137,8 +138,6 @@ pub(crate) const HEIGHT_ERROR: f32 = 12.0 * ROUNDOFF;
 /// How often the error of an edge function stands in that of a height by the extent in z, and in the bound on all edge functions.
 pub(crate) const ERRORS_OF_EXTENT: f32 = 3.0;
 pub(crate) const ERRORS_OF_EDGES: f32 = 6.0;
-/// Of L.
-pub(crate) const LEAST_SIZE: f32 = 4.0 * ROUNDOFF;
 /// Above all that underflow may do.
 pub(crate) const TINY: f32 = 1.0 / (1u128 << 120) as f32;
 /// Above all that few roundings may do.

@@ -17,16 +17,17 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::ops::Range;
 
-use crate::accel::Accel;
+use crate::build::error::BuildError;
 use crate::build::input::{empty_over, take_apart};
 use crate::build::open_instances::is_part;
 use crate::build::refit::{self, RefitError};
 use crate::intersect::Isa;
+use crate::tree::Tree;
 use crate::tree::node::{Node, WIDTH, tag};
 use crate::tree::packed::{Entry, Packed};
 use crate::tree::sphere_block::SphereBlock;
 use crate::tree::triangle_block::BlockNames;
-use crate::{BuildError, Geometry, GeometryKind};
+use crate::tree::{Geometry, GeometryKind};
 
 const MAGIC: [u8; 8] = *b"LumbTree";
 /// Changes with the format, and with what the numbers mean.
@@ -113,40 +114,40 @@ pub(crate) fn signature(geometry: &Geometry) -> [u32; 2] {
 }
 
 /// See [`Accel::to_bytes`].
-pub(crate) fn to_bytes(accel: &Accel) -> Vec<u8> {
-    let tree = &accel.tree;
+pub(crate) fn to_bytes(tree: &Tree) -> Vec<u8> {
+    let packed = &tree.packed;
     let mut bytes = MAGIC.to_vec();
     let mut put = |number: u32| bytes.extend_from_slice(&number.to_le_bytes());
     put(VERSION);
-    put(accel.geometries.len() as u32);
-    put(tree.nodes.len() as u32);
-    put(tree.names.len() as u32);
-    put(tree.sphere_names.len() as u32);
-    put(tree.entries.len() as u32);
-    put(accel.masks.len() as u32);
+    put(tree.geometries.len() as u32);
+    put(packed.nodes.len() as u32);
+    put(packed.names.len() as u32);
+    put(packed.sphere_names.len() as u32);
+    put(packed.entries.len() as u32);
+    put(tree.masks.len() as u32);
     // References to triangles number blocks: where these begin is found again.
     let numbered = |reference: u32| {
         if tag::of(reference) == tag::TRIANGLES {
-            let numbers = tree.numbers(reference);
+            let numbers = packed.numbers(reference);
             tag::triangles(numbers.start as u32, numbers.len() as u32)
         } else {
             reference
         }
     };
-    put(tree.root.map_or(NONE, numbered));
-    accel.geometries.iter().flat_map(signature).for_each(&mut put);
-    for node in &tree.nodes {
+    put(packed.root.map_or(NONE, numbered));
+    tree.geometries.iter().flat_map(signature).for_each(&mut put);
+    for node in &packed.nodes {
         put(node.len() as u32);
         node.children[..node.len()].iter().map(|&child| numbered(child)).for_each(&mut put);
     }
-    for names in tree.names.iter().chain(&tree.sphere_names) {
+    for names in packed.names.iter().chain(&packed.sphere_names) {
         put(names.geometry);
         names.primitives.iter().copied().for_each(&mut put);
     }
-    for entry in &tree.entries {
+    for entry in &packed.entries {
         entry.to_words().into_iter().for_each(&mut put);
     }
-    accel.masks.iter().copied().for_each(&mut put);
+    tree.masks.iter().copied().for_each(&mut put);
     let checksum = checksum(&bytes);
     bytes.extend_from_slice(&checksum.to_le_bytes());
     bytes
@@ -176,7 +177,7 @@ const HEADER: usize = MAGIC.len() + 8 * 4;
 const CHECKSUM: usize = 8;
 
 /// See [`Accel::from_bytes`].
-pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Accel, LoadError> {
+pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Tree, LoadError> {
     let found = bytes.len();
     let Some(rest) = bytes.strip_prefix(&MAGIC) else { return Err(LoadError::NotATree) };
     if found < HEADER + CHECKSUM {
@@ -220,7 +221,7 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Acce
             return Err(LoadError::OtherGeometries(RefitError::OtherTopology { geometry }));
         }
     }
-    let mut tree = Packed { root: (root != NONE).then_some(root), ..Packed::default() };
+    let mut packed = Packed { root: (root != NONE).then_some(root), ..Packed::default() };
     let mut nodes = Vec::with_capacity(node_count as usize);
     for place in 0..node_count {
         let len = words.next().ok_or_else(ends)?;
@@ -236,24 +237,24 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Acce
         }
         nodes.push(node);
     }
-    tree.nodes = nodes.into();
+    packed.nodes = nodes.into();
     let mut names = Vec::with_capacity(block_count as usize);
     for _ in 0..block_count {
         let geometry = words.next().ok_or_else(ends)?;
         names.push(BlockNames { geometry, primitives: words.array().ok_or_else(ends)? });
     }
-    tree.names = names.into();
+    packed.names = names.into();
     let mut names = Vec::with_capacity(sphere_block_count as usize);
     for _ in 0..sphere_block_count {
         let geometry = words.next().ok_or_else(ends)?;
         names.push(BlockNames { geometry, primitives: words.array().ok_or_else(ends)? });
     }
-    tree.sphere_names = names.into();
+    packed.sphere_names = names.into();
     let mut entries = Vec::with_capacity(entry_count as usize);
     for _ in 0..entry_count {
         entries.push(Entry::from_words(words.array().ok_or_else(ends)?));
     }
-    tree.entries = entries.into();
+    packed.entries = entries.into();
     if mask_count != 0 && mask_count != geometry_count {
         return inconsistent(format!("{mask_count} masks for {geometry_count} geometries"));
     }
@@ -266,17 +267,17 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Acce
     }
     let unsound = |error: BuildError| LoadError::OtherGeometries(RefitError::Unsound(error));
     let parts = take_apart(&geometries).map_err(unsound)?;
-    check_structure(&tree, &geometries, |leaf| Some(tag::blocks(leaf)))?;
-    check_names(&tree, &geometries)?;
-    tree.pack_triangles(Isa::best(), &geometries, parts.has_flat);
-    tree.sphere_blocks = vec![SphereBlock::EMPTY; tree.sphere_names.len()].into();
+    check_structure(&packed, &geometries, |leaf| Some(tag::blocks(leaf)))?;
+    check_names(&packed, &geometries)?;
+    packed.pack_triangles(Isa::best(), &geometries, parts.has_flat);
+    packed.sphere_blocks = vec![SphereBlock::EMPTY; packed.sphere_names.len()].into();
 
-    let mut accel = empty_over(geometries);
-    accel.tree = tree;
-    accel.masks = masks;
-    let places = refit::check_places(&accel, &parts).map_err(LoadError::OtherGeometries)?;
-    refit::fit(&mut accel, parts, places);
-    Ok(accel)
+    let mut tree = empty_over(geometries);
+    tree.packed = packed;
+    tree.masks = masks;
+    let places = refit::check_places(&tree, &parts).map_err(LoadError::OtherGeometries)?;
+    refit::fit(&mut tree, parts, places);
+    Ok(tree)
 }
 
 fn inconsistent<T>(what: String) -> Result<T, LoadError> {
@@ -286,14 +287,14 @@ fn inconsistent<T>(what: String) -> Result<T, LoadError> {
 /// Every node but the first, every block and every entry is to be named by one reference, from a node before it. `numbers` tells
 /// those of the blocks of a leaf of triangles.
 pub(crate) fn check_structure(
-    tree: &Packed,
+    packed: &Packed,
     geometries: &[Geometry],
     numbers: impl Fn(u32) -> Option<Range<usize>>,
 ) -> Result<(), LoadError> {
-    let mut nodes = vec![false; tree.nodes.len()];
-    let mut blocks = vec![false; tree.names.len()];
-    let mut sphere_blocks = vec![false; tree.sphere_names.len()];
-    let mut entries = vec![false; tree.entries.len()];
+    let mut nodes = vec![false; packed.nodes.len()];
+    let mut blocks = vec![false; packed.names.len()];
+    let mut sphere_blocks = vec![false; packed.sphere_names.len()];
+    let mut entries = vec![false; packed.entries.len()];
     let mut take = |reference: u32, parent: Option<usize>| -> Option<()> {
         let once = |taken: &mut [bool], place: usize| {
             let taken = taken.get_mut(place)?;
@@ -307,15 +308,15 @@ pub(crate) fn check_structure(
             }
             tag::TRIANGLES => {
                 let numbers = numbers(reference)?;
-                are_of_one(tree.names.get(numbers.clone())?)?;
+                are_of_one(packed.names.get(numbers.clone())?)?;
                 numbers.into_iter().try_for_each(|block| once(&mut blocks, block))
             }
             tag::SPHERES => {
-                are_of_one(tree.sphere_names.get(tag::blocks(reference))?)?;
+                are_of_one(packed.sphere_names.get(tag::blocks(reference))?)?;
                 tag::blocks(reference).try_for_each(|block| once(&mut sphere_blocks, block))
             }
             kind @ (tag::SHAPES | tag::INSTANCE | tag::CUSTOM | tag::PRECISE) => {
-                for (place, entry) in tree.entries.iter().enumerate().skip(place) {
+                for (place, entry) in packed.entries.iter().enumerate().skip(place) {
                     once(&mut entries, place)?;
                     if signature(geometries.get(entry.geometry as usize)?)[0] != kind {
                         return None;
@@ -332,12 +333,12 @@ pub(crate) fn check_structure(
             _ => None,
         }
     };
-    if let Some(root) = tree.root
+    if let Some(root) = packed.root
         && take(root, None).is_none()
     {
         return inconsistent(format!("the root's reference {root:#010x} is out of range"));
     }
-    for (place, node) in tree.nodes.iter().enumerate() {
+    for (place, node) in packed.nodes.iter().enumerate() {
         for &child in &node.children[..node.len()] {
             if take(child, Some(place)).is_none() {
                 return inconsistent(format!(
@@ -362,7 +363,7 @@ fn are_of_one(names: &[BlockNames]) -> Option<()> {
 }
 
 /// Every name is to be of a primitive, which is named once but for instances that were opened.
-pub(crate) fn check_names(tree: &Packed, geometries: &[Geometry]) -> Result<(), LoadError> {
+pub(crate) fn check_names(packed: &Packed, geometries: &[Geometry]) -> Result<(), LoadError> {
     // Where the primitives of each geometry begin, in one list.
     let mut starts = Vec::with_capacity(geometries.len());
     let mut all = 0;
@@ -381,8 +382,8 @@ pub(crate) fn check_names(tree: &Packed, geometries: &[Geometry]) -> Result<(), 
         let place = starts[geometry as usize] + primitive as usize;
         (!std::mem::replace(&mut named[place], true)).then_some(())
     };
-    let of_triangles = (&tree.names, tag::TRIANGLES, ["block", "triangle", "mesh"]);
-    let of_spheres = (&tree.sphere_names, tag::SPHERES, ["block of spheres", "sphere", "cloud"]);
+    let of_triangles = (&packed.names, tag::TRIANGLES, ["block", "triangle", "mesh"]);
+    let of_spheres = (&packed.sphere_names, tag::SPHERES, ["block of spheres", "sphere", "cloud"]);
     for (list, kind, [what, one, all]) in [of_triangles, of_spheres] {
         for (block, names) in list.iter().enumerate() {
             let geometry = names.geometry;
@@ -401,7 +402,7 @@ pub(crate) fn check_names(tree: &Packed, geometries: &[Geometry]) -> Result<(), 
         }
     }
     let mut opened = BTreeSet::new();
-    for (place, entry) in tree.entries.iter().enumerate() {
+    for (place, entry) in packed.entries.iter().enumerate() {
         // Whether the parts of an instance are all of it is seen later, where their boxes are made.
         let is_part = is_part(entry, geometries);
         if is_part && !opened.insert(entry.geometry) {

@@ -25,18 +25,19 @@ use std::sync::Arc;
 use bytemuck::Pod;
 use memmap2::Mmap;
 
-use crate::accel::AccelParts;
 use crate::build::input::{Parts, take_apart, units_of};
+use crate::build::refit::RefitError;
 use crate::build::refit::{Places, check_places};
-use crate::intersect::Isa;
+use crate::io::bytes::LoadError;
 use crate::io::bytes::{check_names, check_structure, signature};
+use crate::tree::assemble::TreeParts;
 use crate::tree::node::{Node, WIDTH, tag};
 use crate::tree::packed::Start;
 use crate::tree::packed::{Entry, Packed};
 use crate::tree::sphere_block::SphereBlock;
 use crate::tree::storage::Store;
 use crate::tree::triangle_block::{BlockNames, Line};
-use crate::{Accel, Geometry, GeometryKind, LoadError, RefitError};
+use crate::tree::{Geometry, GeometryKind, Tree};
 
 const MAGIC: [u8; 8] = *b"LumbMap\0";
 /// Changes with the format, and with the layout of what is in it.
@@ -160,10 +161,10 @@ fn fingerprint(geometries: &[Geometry], parts: &Parts) -> u64 {
 }
 
 /// What the boxes of instances that were opened depend on, beside that.
-fn fingerprint_of_parts(tree: &Packed, places: &Places) -> u64 {
+fn fingerprint_of_parts(packed: &Packed, places: &Places) -> u64 {
     let mut sum = Sum::new();
     for (place, start) in &places.starts {
-        sum.add(bytemuck::cast_slice(&[tree.entries[*place].geometry, start.word()]));
+        sum.add(bytemuck::cast_slice(&[packed.entries[*place].geometry, start.word()]));
         if let Some(bounds) = &places.boxes[*place] {
             sum.add(bytemuck::cast_slice(&bounds.min.to_array()));
             sum.add(bytemuck::cast_slice(&bounds.max.to_array()));
@@ -173,16 +174,16 @@ fn fingerprint_of_parts(tree: &Packed, places: &Places) -> u64 {
 }
 
 /// The arrays of a tree as bytes, in the order of the file.
-fn arrays(accel: &Accel) -> [&[u8]; ARRAYS] {
-    let tree = &accel.tree;
+fn arrays(tree: &Tree) -> [&[u8]; ARRAYS] {
+    let packed = &tree.packed;
     [
-        bytemuck::cast_slice(&tree.nodes),
-        bytemuck::cast_slice(&tree.blocks),
-        bytemuck::cast_slice(&tree.names),
-        bytemuck::cast_slice(&tree.sphere_blocks),
-        bytemuck::cast_slice(&tree.sphere_names),
-        bytemuck::cast_slice(&tree.entries),
-        bytemuck::cast_slice(&accel.masks),
+        bytemuck::cast_slice(&packed.nodes),
+        bytemuck::cast_slice(&packed.blocks),
+        bytemuck::cast_slice(&packed.names),
+        bytemuck::cast_slice(&packed.sphere_blocks),
+        bytemuck::cast_slice(&packed.sphere_names),
+        bytemuck::cast_slice(&packed.entries),
+        bytemuck::cast_slice(&tree.masks),
     ]
 }
 
@@ -201,14 +202,14 @@ fn padding(len: usize) -> usize {
 }
 
 /// See [`Accel::save`].
-pub(crate) fn save(accel: &Accel, path: &Path) -> io::Result<()> {
+pub(crate) fn save(tree: &Tree, path: &Path) -> io::Result<()> {
     if cfg!(target_endian = "big") {
         return Err(io::Error::new(io::ErrorKind::Unsupported, MapError::ByteOrder));
     }
     let invalid = |error| io::Error::new(io::ErrorKind::InvalidData, error);
-    let parts = take_apart(&accel.geometries).map_err(|error| invalid(RefitError::Unsound(error)))?;
-    let places = check_places(accel, &parts).map_err(invalid)?;
-    let arrays = arrays(accel);
+    let parts = take_apart(&tree.geometries).map_err(|error| invalid(RefitError::Unsound(error)))?;
+    let places = check_places(tree, &parts).map_err(invalid)?;
+    let arrays = arrays(tree);
     let mut content = Sum::new();
     for array in arrays {
         content.add(array);
@@ -217,18 +218,18 @@ pub(crate) fn save(accel: &Accel, path: &Path) -> io::Result<()> {
     let words = [
         VERSION,
         BYTE_ORDER,
-        accel.geometries.len() as u32,
-        accel.masks.len() as u32,
-        accel.tree.root.unwrap_or(NONE),
+        tree.geometries.len() as u32,
+        tree.masks.len() as u32,
+        tree.packed.root.unwrap_or(NONE),
         0,
     ];
     words.iter().for_each(|word| header.extend_from_slice(&word.to_le_bytes()));
     for (array, size) in arrays.iter().zip(SIZES) {
         header.extend_from_slice(&((array.len() / size) as u64).to_le_bytes());
     }
-    header.extend_from_slice(&fingerprint(&accel.geometries, &parts).to_le_bytes());
+    header.extend_from_slice(&fingerprint(&tree.geometries, &parts).to_le_bytes());
     header.extend_from_slice(&content.finish().to_le_bytes());
-    header.extend_from_slice(&fingerprint_of_parts(&accel.tree, &places).to_le_bytes());
+    header.extend_from_slice(&fingerprint_of_parts(&tree.packed, &places).to_le_bytes());
     header.resize(SEAL, 0);
     let mut seal = Sum::new();
     seal.add(&header);
@@ -342,7 +343,7 @@ pub(crate) fn seal(bytes: &mut [u8]) {
 }
 
 /// See [`Accel::map`].
-pub(crate) fn map(path: &Path, geometries: Vec<Geometry>) -> Result<Accel, MapError> {
+pub(crate) fn map(path: &Path, geometries: Vec<Geometry>) -> Result<Tree, MapError> {
     if cfg!(target_endian = "big") {
         return Err(MapError::ByteOrder);
     }
@@ -358,7 +359,7 @@ fn map_file(file: &File) -> io::Result<Mmap> {
     unsafe { Mmap::map(file) }
 }
 
-fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Accel, LoadError> {
+fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Tree, LoadError> {
     let header = read_header(&file)?;
     if geometries.len() != header.geometries as usize {
         let error = RefitError::OtherLength { expected: header.geometries as usize, found: geometries.len() };
@@ -373,7 +374,7 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Accel, Load
         let what = || LoadError::Inconsistent { what: format!("array {i} is not aligned") };
         Store::mapped(file, header.arrays[i].clone()).ok_or_else(what)
     }
-    let tree = Packed {
+    let packed = Packed {
         nodes: array(&file, &header, 0)?,
         blocks: array(&file, &header, 1)?,
         names: array(&file, &header, 2)?,
@@ -382,38 +383,38 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Accel, Load
         entries: array(&file, &header, 5)?,
         root: (header.root != NONE).then_some(header.root),
     };
-    check_lanes(&tree)?;
-    let places = tree.blocks().places(&tree.names).ok_or_else(|| LoadError::Inconsistent {
+    check_lanes(&packed)?;
+    let places = packed.blocks().places(&packed.names).ok_or_else(|| LoadError::Inconsistent {
         what: "the blocks of triangles are not such as their names say".to_owned(),
     })?;
-    check_structure(&tree, &geometries, |leaf| {
-        let numbers = tree.blocks().numbers(leaf)?;
+    check_structure(&packed, &geometries, |leaf| {
+        let numbers = packed.blocks().numbers(leaf)?;
         (places.get(numbers.start) == Some(&(tag::place(leaf) as u32))).then_some(numbers)
     })?;
-    check_names(&tree, &geometries)?;
+    check_names(&packed, &geometries)?;
     let masks: Store<u32> = array(&file, &header, 6)?;
     let tree_space = units_of(&geometries, &parts);
     let (sizes, bounds, primitives) = (parts.sizes, parts.bounds, parts.count());
-    let accel_parts = AccelParts { tree_space, tree, sizes, bounds, infinite: Vec::new(), primitives };
-    let accel = Accel::assemble(Isa::best(), geometries, accel_parts).with_masks_unchecked(masks.to_vec());
-    let places = check_places(&accel, &parts).map_err(LoadError::OtherGeometries)?;
+    let tree_parts = TreeParts { tree_space, packed, sizes, bounds, infinite: Vec::new(), primitives };
+    let tree = Tree { masks: masks.to_vec(), ..Tree::assemble(geometries, tree_parts) };
+    let places = check_places(&tree, &parts).map_err(LoadError::OtherGeometries)?;
     let is_as_saved =
-        |&(place, start): &(usize, Start)| accel.tree.entries[place].primitive() == start.word();
-    let print = fingerprint_of_parts(&accel.tree, &places);
+        |&(place, start): &(usize, Start)| tree.packed.entries[place].primitive() == start.word();
+    let print = fingerprint_of_parts(&tree.packed, &places);
     if !places.starts.iter().all(is_as_saved) || print != header.fingerprint_of_parts {
         return Err(LoadError::Moved);
     }
-    Ok(Accel { infinite: parts.infinite, ..accel })
+    Ok(Tree { infinite: parts.infinite, ..tree })
 }
 
 /// Lanes that hold nothing are to be such that no ray meets them, so that nobody follows what stands there.
-fn check_lanes(tree: &Packed) -> Result<(), LoadError> {
-    if tree.sphere_blocks.len() != tree.sphere_names.len() {
+fn check_lanes(packed: &Packed) -> Result<(), LoadError> {
+    if packed.sphere_blocks.len() != packed.sphere_names.len() {
         return Err(LoadError::Inconsistent {
             what: "there are not as many names as blocks of spheres".to_owned(),
         });
     }
-    for (place, node) in tree.nodes.iter().enumerate() {
+    for (place, node) in packed.nodes.iter().enumerate() {
         let len = node.len();
         if len == 0 {
             return Err(LoadError::Inconsistent { what: format!("node {place} has no child") });
@@ -429,7 +430,7 @@ fn check_lanes(tree: &Packed) -> Result<(), LoadError> {
         }
     }
     let unnamed = |names: &BlockNames| names.primitives.map(|primitive| primitive == NONE);
-    for (place, (block, names)) in tree.sphere_blocks.iter().zip(&tree.sphere_names).enumerate() {
+    for (place, (block, names)) in packed.sphere_blocks.iter().zip(&packed.sphere_names).enumerate() {
         let is_nothing =
             |lane: usize| block.radii[lane].is_nan() && block.centers.iter().all(|axis| axis[lane].is_nan());
         if unnamed(names).into_iter().enumerate().any(|(lane, is_unnamed)| is_unnamed && !is_nothing(lane)) {

@@ -11,12 +11,15 @@ use std::fmt;
 use lumbre_geometry::{Aabb, NearestPoint, NoNearestPoint, nearest_on_triangle, similarity_factor};
 use lumbre_math::{DVec2, DVec3, Transform};
 
-use super::flats::{Below, FlatItem};
+use super::flats::flats;
+use crate::hit::InstancePath;
 use crate::trace::Context;
+use crate::tree::flats::{Below, FlatItem};
+use crate::tree::geometry::TriangleMesh;
 use crate::tree::node::{Node, tag};
 use crate::tree::packed::Start;
 use crate::tree::sphere_block::{ExactSphere, has_radius};
-use crate::{Accel, GeometryKind, Instance, InstancePath, TriangleMesh};
+use crate::tree::{GeometryKind, Instance, Tree};
 
 /// The point of all surfaces that is nearest to a given one.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,7 +75,7 @@ impl std::error::Error for NoClosestPoint {
 
 /// See [`Accel::closest_point`].
 pub(crate) fn closest_point(
-    accel: &Accel,
+    tree: &Tree,
     point: DVec3,
     max_distance: f64,
     time: f64,
@@ -81,7 +84,7 @@ pub(crate) fn closest_point(
     if !point.is_finite() || max_distance.is_nan() || max_distance < 0.0 {
         return Ok(None);
     }
-    let mut frames = vec![Frame::outermost(accel, point, time)];
+    let mut frames = vec![Frame::outermost(tree, point, time)];
     let mut pending = BinaryHeap::new();
     enter(&frames, Start::WHOLE, 0.0, &mut pending);
     enter_flats(&frames, 0.0, &mut pending);
@@ -92,7 +95,7 @@ pub(crate) fn closest_point(
         let frame = &frames[next.frame as usize];
         match next.what {
             Waiting::Reference(reference) if tag::is_inner(reference) => {
-                let node = &frame.accel.tree.nodes[reference as usize];
+                let node = &frame.tree.packed.nodes[reference as usize];
                 for lane in 0..node.len() {
                     let distance = frame.distance_to_box(node, lane).max(next.distance);
                     if distance <= search.limit {
@@ -102,8 +105,8 @@ pub(crate) fn closest_point(
                 }
             }
             Waiting::Reference(reference) if tag::of(reference) == tag::TRIANGLES => {
-                for names in &frame.accel.tree.names[frame.accel.tree.numbers(reference)] {
-                    if let GeometryKind::Mesh(mesh) = &frame.accel.geometries[names.geometry as usize].kind {
+                for names in &frame.tree.packed.names[frame.tree.packed.numbers(reference)] {
+                    if let GeometryKind::Mesh(mesh) = &frame.tree.geometries[names.geometry as usize].kind {
                         for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX)
                         {
                             search.intersect_triangle(frame, mesh, names.geometry, primitive);
@@ -112,7 +115,7 @@ pub(crate) fn closest_point(
                 }
             }
             Waiting::Reference(reference) if tag::of(reference) == tag::SPHERES => {
-                for names in &frame.accel.tree.sphere_names[tag::blocks(reference)] {
+                for names in &frame.tree.packed.sphere_names[tag::blocks(reference)] {
                     for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX) {
                         search.meet(frame, names.geometry, primitive, next.distance);
                     }
@@ -120,7 +123,7 @@ pub(crate) fn closest_point(
             }
             Waiting::Reference(reference) => {
                 let first = tag::place(reference);
-                for entry in &frame.accel.tree.entries[first..] {
+                for entry in &frame.tree.packed.entries[first..] {
                     let what = Waiting::Primitive(entry.geometry, entry.primitive());
                     pending.push(Pending { distance: next.distance, frame: next.frame, what });
                     if entry.is_last() {
@@ -129,7 +132,7 @@ pub(crate) fn closest_point(
                 }
             }
             Waiting::Flat(node) => {
-                let flats = frame.accel.flats();
+                let flats = flats(frame.tree);
                 match flats.node(node).below {
                     Below::Nodes(second) => {
                         for child in [node + 1, second] {
@@ -144,7 +147,7 @@ pub(crate) fn closest_point(
                     Below::Items(first, end) => {
                         let mut inner = Vec::new();
                         for &FlatItem { geometry, primitive } in flats.items(first, end) {
-                            match &frame.accel.geometries[geometry as usize].kind {
+                            match &frame.tree.geometries[geometry as usize].kind {
                                 GeometryKind::Mesh(mesh) => {
                                     search.intersect_triangle(frame, mesh, geometry, primitive);
                                 }
@@ -162,7 +165,7 @@ pub(crate) fn closest_point(
                 }
             }
             Waiting::Primitive(geometry, primitive) => {
-                if let GeometryKind::Instance(instance) = &frame.accel.geometries[geometry as usize].kind {
+                if let GeometryKind::Instance(instance) = &frame.tree.geometries[geometry as usize].kind {
                     let start = Start::of(primitive);
                     if start.is_nothing() {
                         continue;
@@ -183,16 +186,16 @@ pub(crate) fn closest_point(
 fn enter(frames: &[Frame], start: Start, distance: f64, pending: &mut BinaryHeap<Pending>) {
     let position = frames.len() - 1;
     let frame = position as u32;
-    let accel = frames[position].accel;
-    let root = accel.tree.root.map(|root| Waiting::Reference(start.below(root)));
-    let infinite = accel.infinite.iter().map(|entry| Waiting::Primitive(entry.geometry, entry.primitive()));
+    let tree = frames[position].tree;
+    let root = tree.packed.root.map(|root| Waiting::Reference(start.below(root)));
+    let infinite = tree.infinite.iter().map(|entry| Waiting::Primitive(entry.geometry, entry.primitive()));
     pending.extend(root.into_iter().chain(infinite).map(|what| Pending { distance, frame, what }));
 }
 
 /// The same of what has no area below the last frame.
 fn enter_flats(frames: &[Frame], distance: f64, pending: &mut BinaryHeap<Pending>) {
     let position = frames.len() - 1;
-    if let Some(root) = frames[position].accel.flats().root() {
+    if let Some(root) = flats(frames[position].tree).root() {
         let distance = frames[position].distance_to_flats(&root.bounds).max(distance);
         pending.push(Pending { distance, frame: position as u32, what: Waiting::Flat(0) });
     }
@@ -238,7 +241,7 @@ impl Eq for Pending {}
 
 /// A tree, and where it stands.
 pub(crate) struct Frame<'a> {
-    pub(crate) accel: &'a Accel,
+    pub(crate) tree: &'a Tree,
     /// From the tree's space to the outermost.
     pub(crate) map: Transform,
     is_identity: bool,
@@ -255,22 +258,22 @@ pub(crate) struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    pub(crate) fn outermost(accel: &'a Accel, point: DVec3, time: f64) -> Self {
-        Self::new(accel, Transform::IDENTITY, point, time, Context::default())
+    pub(crate) fn outermost(tree: &'a Tree, point: DVec3, time: f64) -> Self {
+        Self::new(tree, Transform::IDENTITY, point, time, Context::default())
     }
 
     /// A tree placed in this one.
     pub(crate) fn within(&self, geometry: u32, instance: &'a Instance) -> Self {
         let mut context = self.context.clone();
         context.route.push(geometry);
-        context.ids.push(self.accel.geometries[geometry as usize].id);
+        context.ids.push(self.tree.geometries[geometry as usize].id);
         let world_from_object = instance.world_from_object.at(self.time);
         let local = world_from_object.inverse_point(self.local);
-        Self::new(&instance.accel, self.map * world_from_object, local, self.time, context)
+        Self::new(&instance.tree, self.map * world_from_object, local, self.time, context)
     }
 
-    fn new(accel: &'a Accel, map: Transform, local: DVec3, time: f64, context: Context) -> Self {
-        let tree_space = &accel.tree_space;
+    fn new(tree: &'a Tree, map: Transform, local: DVec3, time: f64, context: Context) -> Self {
+        let tree_space = &tree.tree_space;
         let in_units = (local - tree_space.origin) * tree_space.scale;
         // The largest singular value of the inverse is no more than the root of the sum of squares.
         let stretch = similarity_factor(&map).map_or_else(
@@ -279,7 +282,7 @@ impl<'a> Frame<'a> {
         );
         let shrink = (1.0 - 1e-9) / stretch;
         let slop = 4.0 * tree_space.slop_of(local);
-        Self { accel, map, is_identity: map.is_identity(), shrink, local, time, context, in_units, slop }
+        Self { tree, map, is_identity: map.is_identity(), shrink, local, time, context, in_units, slop }
     }
 
     /// How far a child of a node is away at least, in the outermost space.
@@ -290,15 +293,15 @@ impl<'a> Frame<'a> {
             low.max(high).max(0.0)
         };
         let distance = DVec3::new(gap(0), gap(1), gap(2)).length() * (1.0 - 1e-12) - self.slop;
-        let distance = distance / self.accel.tree_space.scale * self.shrink;
+        let distance = distance / self.tree.tree_space.scale * self.shrink;
         // Also where it is no number.
         if distance > 0.0 { distance } else { 0.0 }
     }
 
     /// How far a box of what has no area is away at least, in the outermost space.
     fn distance_to_flats(&self, bounds: &Aabb) -> f64 {
-        let tree_space = &self.accel.tree_space;
-        let reach = self.local.abs() + self.accel.flats().reach;
+        let tree_space = &self.tree.tree_space;
+        let reach = self.local.abs() + flats(self.tree).reach;
         let slop = 4.0 * tree_space.slop_of(reach) / tree_space.scale;
         let gap = (bounds.min - self.local).max(self.local - bounds.max).max(DVec3::ZERO);
         let distance = (gap.length() * (1.0 - 1e-12) - slop) * self.shrink;
@@ -360,7 +363,7 @@ impl Search {
             point: found.point,
             part: found.part,
             uv: found.uv,
-            id: frame.accel.geometries[geometry as usize].id,
+            id: frame.tree.geometries[geometry as usize].id,
             primitive,
             geometry,
             instances: frame.context.ids.clone(),
@@ -395,7 +398,7 @@ impl Search {
 
     /// A shape, a sphere of a cloud, or a primitive of custom geometry, that is at least `distance` away.
     pub(crate) fn meet(&mut self, frame: &Frame, geometry: u32, primitive: u32, distance: f64) {
-        let standing = &frame.accel.geometries[geometry as usize];
+        let standing = &frame.tree.geometries[geometry as usize];
         let found = match &standing.kind {
             GeometryKind::Shape(shape) => shape.closest_point_under(&frame.map, self.point),
             GeometryKind::Spheres(cloud) => {

@@ -3,11 +3,13 @@
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
-use crate::trace::exact::{self, Crossing, Visitor, Wanted};
+use crate::intersect::Isa;
+use crate::trace::exact;
+use crate::trace::visitor::{Crossing, Visitor, Wanted};
 use crate::tree::node::tag;
 use crate::tree::packed::Start;
 use crate::tree::sphere_block::ExactSphere;
-use crate::{Accel, GeometryKind};
+use crate::tree::{GeometryKind, Tree};
 
 /// Which ways are looked: no axes of symmetry of anything likely, and no two near one line.
 const DIRECTIONS: [DVec3; 5] = [
@@ -19,17 +21,17 @@ const DIRECTIONS: [DVec3; 5] = [
 ];
 
 /// See [`Accel::is_inside`].
-pub(crate) fn is_inside(accel: &Accel, point: DVec3, time: f64) -> bool {
+pub(crate) fn is_inside(tree: &Tree, point: DVec3, time: f64) -> bool {
     if !point.is_finite() {
         return false;
     }
-    let in_solids = solids_around(accel, point, time) % 2 == 1;
+    let in_solids = solids_around(tree, point, time) % 2 == 1;
     let is_odd = |direction: &&DVec3| {
         let mut crossings = Parity { odd: false };
-        exact::traverse(accel.isa, accel, &Ray::new(point, **direction).at_time(time), &mut crossings);
+        exact::traverse(Isa::best(), tree, &Ray::new(point, **direction).at_time(time), &mut crossings);
         crossings.odd
     };
-    let odd = if has_surfaces(accel) { DIRECTIONS.iter().filter(is_odd).count() } else { 0 };
+    let odd = if has_surfaces(tree) { DIRECTIONS.iter().filter(is_odd).count() } else { 0 };
     let is_in_surfaces = 2 * odd > DIRECTIONS.len();
     in_solids != is_in_surfaces
 }
@@ -47,17 +49,17 @@ fn is_solid(kind: &GeometryKind) -> bool {
 }
 
 /// Whether there is anything else than such shapes.
-fn has_surfaces(accel: &Accel) -> bool {
-    !accel.geometries.iter().all(|geometry| is_solid(&geometry.kind))
+fn has_surfaces(tree: &Tree) -> bool {
+    !tree.geometries.iter().all(|geometry| is_solid(&geometry.kind))
 }
 
 /// How many solid shapes hold the point, in all instances.
-fn solids_around(accel: &Accel, point: DVec3, time: f64) -> usize {
+fn solids_around(tree: &Tree, point: DVec3, time: f64) -> usize {
     let mut count = 0;
-    let mut trees = vec![(accel, point, Start::WHOLE)];
+    let mut trees = vec![(tree, point, Start::WHOLE)];
     let mut stack = Vec::new();
-    while let Some((accel, point, start)) = trees.pop() {
-        let mut meet = |geometry: u32, primitive: u32| match &accel.geometries[geometry as usize].kind {
+    while let Some((tree, point, start)) = trees.pop() {
+        let mut meet = |geometry: u32, primitive: u32| match &tree.geometries[geometry as usize].kind {
             GeometryKind::Shape(shape) => {
                 let local = shape.world_from_object().inverse_point(point);
                 count += usize::from(shape.shape().contains(local));
@@ -65,21 +67,21 @@ fn solids_around(accel: &Accel, point: DVec3, time: f64) -> usize {
             GeometryKind::Instance(instance) => {
                 let local = instance.world_from_object.at(time).inverse_point(point);
                 let start = Start::of(primitive);
-                trees.extend((!start.is_nothing()).then_some((&*instance.accel, local, start)));
+                trees.extend((!start.is_nothing()).then_some((&*instance.tree, local, start)));
             }
             GeometryKind::Spheres(cloud) => {
                 count += usize::from(ExactSphere::of(cloud, primitive).contains(point));
             }
             GeometryKind::Mesh(_) | GeometryKind::PreciseMesh(_) | GeometryKind::Custom(_) => {}
         };
-        accel.infinite.iter().for_each(|entry| meet(entry.geometry, entry.primitive()));
-        let tree_space = &accel.tree_space;
+        tree.infinite.iter().for_each(|entry| meet(entry.geometry, entry.primitive()));
+        let tree_space = &tree.tree_space;
         let (local, slop) = ((point - tree_space.origin) * tree_space.scale, 4.0 * tree_space.slop_of(point));
-        stack.extend(accel.tree.root.map(|root| start.below(root)));
+        stack.extend(tree.packed.root.map(|root| start.below(root)));
         while let Some(reference) = stack.pop() {
             match tag::of(reference) {
                 tag::INNER => {
-                    let node = &accel.tree.nodes[reference as usize];
+                    let node = &tree.packed.nodes[reference as usize];
                     for lane in 0..node.len() {
                         // In doubt it is within, also where the slop is no number.
                         let is_beyond = (0..3).any(|axis| {
@@ -93,13 +95,13 @@ fn solids_around(accel: &Accel, point: DVec3, time: f64) -> usize {
                 }
                 tag::TRIANGLES => {}
                 tag::SPHERES => {
-                    for names in &accel.tree.sphere_names[tag::blocks(reference)] {
+                    for names in &tree.packed.sphere_names[tag::blocks(reference)] {
                         let there = names.primitives.iter().filter(|&&primitive| primitive != u32::MAX);
                         there.for_each(|&primitive| meet(names.geometry, primitive));
                     }
                 }
                 _ => {
-                    for entry in &accel.tree.entries[tag::place(reference)..] {
+                    for entry in &tree.packed.entries[tag::place(reference)..] {
                         meet(entry.geometry, entry.primitive());
                         if entry.is_last() {
                             break;
@@ -128,7 +130,7 @@ impl Visitor for Parity {
 
     fn visit(&mut self, crossing: &Crossing) -> bool {
         let crosses = crossing.root.multiplicity % 2 == 1;
-        self.odd ^= crosses && !is_solid(&crossing.accel.geometries[crossing.geometry as usize].kind);
+        self.odd ^= crosses && !is_solid(&crossing.tree.geometries[crossing.geometry as usize].kind);
         false
     }
 }

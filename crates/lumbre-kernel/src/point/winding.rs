@@ -13,12 +13,16 @@ use lumbre_geometry::{Shape, similarity_factor};
 use lumbre_math::{DMat3, DVec3, Elementary};
 use rayon::prelude::*;
 
-use crate::geometry::has_area;
+use crate::hit::InstancePath;
 use crate::point::closest_point::Frame;
+use crate::tree::geometry::TriangleMesh;
+use crate::tree::geometry::has_area;
+use crate::tree::moments::{Moment, Moments};
 use crate::tree::node::{Node, WIDTH, tag};
+use crate::tree::precise_mesh::PreciseMesh;
 use crate::tree::sphere_block::ExactSphere;
 use crate::tree::triangle_block::BlockNames;
-use crate::{Accel, GeometryKind, InstancePath, PreciseMesh, TriangleMesh, precise_mesh};
+use crate::tree::{GeometryKind, Tree, precise_mesh};
 
 /// Why there is no winding number: an open shape, or custom geometry that offers none.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -50,7 +54,7 @@ pub(crate) const FAR: f64 = 3.0;
 
 /// See [`Accel::winding_number`]; without `far`, everything is added up one by one.
 pub(crate) fn winding_number(
-    accel: &Accel,
+    tree: &Tree,
     point: DVec3,
     time: f64,
     far: Option<f64>,
@@ -59,18 +63,18 @@ pub(crate) fn winding_number(
         return Ok(0.0);
     }
     let mut sum = 0.0;
-    let mut frames = vec![Frame::outermost(accel, point, time)];
+    let mut frames = vec![Frame::outermost(tree, point, time)];
     while let Some(frame) = frames.pop() {
         // Angles are the same in the space of the tree where the map keeps them, and its meshes keep their sides there.
         let is_similar = similarity_factor(&frame.map).is_some();
         if let Some(far) = far.filter(|_| is_similar) {
-            let moments = frame.accel.moments.get_or_init(|| Moments::of(frame.accel));
-            sum += moments.around(frame.accel, frame.local, far);
+            let moments = frame.tree.moments.get_or_init(|| moments_of(frame.tree));
+            sum += around(moments, frame.tree, frame.local, far);
         } else {
             let linear = (!is_similar).then(|| frame.map.linear());
-            sum += meshes_around(frame.accel, frame.local, linear);
+            sum += meshes_around(frame.tree, frame.local, linear);
         }
-        for (geometry, standing) in frame.accel.geometries.iter().enumerate() {
+        for (geometry, standing) in frame.tree.geometries.iter().enumerate() {
             let geometry = geometry as u32;
             let no = || NoWindingNumber { id: standing.id, geometry, instances: frame.context.ids.clone() };
             match &standing.kind {
@@ -124,9 +128,9 @@ fn precise_corners(mesh: &PreciseMesh, point: DVec3, triangle: u32) -> Option<[D
 }
 
 /// Calls for every triangle in double precision of a leaf, relative to a point.
-fn for_each_precise(accel: &Accel, reference: u32, point: DVec3, mut f: impl FnMut([DVec3; 3])) {
-    for entry in &accel.tree.entries[tag::place(reference)..] {
-        if let GeometryKind::PreciseMesh(mesh) = &accel.geometries[entry.geometry as usize].kind
+fn for_each_precise(tree: &Tree, reference: u32, point: DVec3, mut f: impl FnMut([DVec3; 3])) {
+    for entry in &tree.packed.entries[tag::place(reference)..] {
+        if let GeometryKind::PreciseMesh(mesh) = &tree.geometries[entry.geometry as usize].kind
             && let Some(corners) = precise_corners(mesh, point, entry.primitive())
         {
             f(corners);
@@ -138,7 +142,7 @@ fn for_each_precise(accel: &Accel, reference: u32, point: DVec3, mut f: impl FnM
 }
 
 /// The winding number of all meshes of a tree, where needed under a linear map.
-fn meshes_around(accel: &Accel, point: DVec3, linear: Option<DMat3>) -> f64 {
+fn meshes_around(tree: &Tree, point: DVec3, linear: Option<DMat3>) -> f64 {
     let side = linear.map_or(1.0, |linear| linear.determinant().signum());
     let mut sum = 0.0;
     let mut add = |[a, b, c]: [DVec3; 3]| {
@@ -147,7 +151,7 @@ fn meshes_around(accel: &Accel, point: DVec3, linear: Option<DMat3>) -> f64 {
             Some(linear) => side * solid_angle(linear * a, linear * b, linear * c),
         };
     };
-    for geometry in &accel.geometries {
+    for geometry in &tree.geometries {
         match &geometry.kind {
             GeometryKind::Mesh(mesh) => {
                 let from_point = mesh.origin - point;
@@ -163,186 +167,82 @@ fn meshes_around(accel: &Accel, point: DVec3, linear: Option<DMat3>) -> f64 {
     sum / (4.0 * PI)
 }
 
-/// What the triangles below each node of a tree look like from far away. Places are relative to the tree's origin.
-#[derive(Debug)]
-pub(crate) struct Moments {
-    nodes: Vec<Moment>,
-}
-
-/// Of some triangles with normals n of the length of their areas, at δ from the center.
-#[derive(Clone, Copy, Debug)]
-struct Moment {
-    center: DVec3,
-    /// No corner is farther from the center.
-    radius: f64,
-    area: f64,
-    /// Σ n.
-    dipole: DVec3,
-    /// Σ δ nᵀ.
-    first: DMat3,
-    /// Σ n_k δ δᵀ for each k, δ all over the triangle.
-    second: [DMat3; 3],
-}
-
-fn outer(a: DVec3, b: DVec3) -> DMat3 {
-    DMat3::from_cols(b.x * a, b.y * a, b.z * a)
-}
-
-impl Moment {
-    const NOTHING: Self = Self {
-        center: DVec3::ZERO,
-        radius: 0.0,
-        area: 0.0,
-        dipole: DVec3::ZERO,
-        first: DMat3::ZERO,
-        second: [DMat3::ZERO; 3],
+/// What the triangles below each node look like from far away.
+fn moments_of(tree: &Tree) -> Moments {
+    let packed = &tree.packed;
+    // Of every block, then of the nodes from below: children stand behind their parents.
+    let block = |names: &BlockNames| {
+        let GeometryKind::Mesh(mesh) = &tree.geometries[names.geometry as usize].kind else {
+            return Moment::NOTHING;
+        };
+        let from_origin = mesh.origin - tree.tree_space.origin;
+        let triangles = triangles_of(names, mesh, from_origin);
+        let mut parts = [Moment::NOTHING; WIDTH];
+        let mut count = 0;
+        for (part, corners) in parts.iter_mut().zip(triangles) {
+            *part = Moment::of_triangle(corners);
+            count += 1;
+        }
+        Moment::of_all(&parts[..count])
     };
-
-    fn of_triangle([a, b, c]: [DVec3; 3]) -> Self {
-        let center = (a + b + c) / 3.0;
-        let arms = [a - center, b - center, c - center];
-        let dipole = 0.5 * (b - a).cross(c - a);
-        let spread = arms.iter().fold(DMat3::ZERO, |sum, &arm| sum + outer(arm, arm)) * (1.0 / 12.0);
-        Self {
-            center,
-            radius: arms.iter().fold(0.0, |most: f64, arm| most.max(arm.length())),
-            area: dipole.length(),
-            dipole,
-            first: DMat3::ZERO,
-            second: dipole.to_array().map(|n| spread * n),
-        }
-    }
-
-    /// All together, about their common center of area.
-    fn of_all(parts: &[Self]) -> Self {
-        let area: f64 = parts.iter().map(|part| part.area).sum();
-        if area <= 0.0 {
-            return Self::NOTHING;
-        }
-        let center = parts.iter().map(|part| part.area * part.center).sum::<DVec3>() / area;
-        let mut all = Self { center, area, ..Self::NOTHING };
-        for part in parts {
-            let shift = part.center - center;
-            all.radius = all.radius.max(shift.length() + part.radius);
-            all.dipole += part.dipole;
-            all.first += part.first + outer(shift, part.dipole);
-            for k in 0..3 {
-                let arm = part.first.col(k);
-                all.second[k] += part.second[k]
-                    + outer(shift, arm)
-                    + outer(arm, shift)
-                    + outer(shift, shift) * part.dipole[k];
-            }
-        }
-        all
-    }
-
-    /// Four π times the winding number around a far point: the integral of n·ρ/ρ³ with ρ from the point to the surface, up to
-    /// the second order in δ.
-    fn around(&self, point: DVec3) -> f64 {
-        let r = self.center - point;
-        let square = r.length_squared();
-        let cube = square * square.sqrt();
-        let trace = self.first.x_axis.x + self.first.y_axis.y + self.first.z_axis.z;
-        let first = trace - 3.0 * r.dot(self.first * r) / square;
-        let [x, y, z] = &self.second;
-        let across = DVec3::new(
-            x.x_axis.x + y.y_axis.x + z.z_axis.x,
-            x.x_axis.y + y.y_axis.y + z.z_axis.y,
-            x.x_axis.z + y.y_axis.z + z.z_axis.z,
-        );
-        let spread = |k: usize| {
-            let m = &self.second[k];
-            let trace = m.x_axis.x + m.y_axis.y + m.z_axis.z;
-            r[k] * (15.0 * r.dot(*m * r) / square - 3.0 * trace)
-        };
-        let second = 0.5 * (spread(0) + spread(1) + spread(2) - 6.0 * across.dot(r)) / square;
-        (self.dipole.dot(r) + first + second) / cube
-    }
-}
-
-impl Moments {
-    pub(crate) fn of(accel: &Accel) -> Self {
-        let tree = &accel.tree;
-        // Of every block, then of the nodes from below: children stand behind their parents.
-        let block = |names: &BlockNames| {
-            let GeometryKind::Mesh(mesh) = &accel.geometries[names.geometry as usize].kind else {
-                return Moment::NOTHING;
-            };
-            let from_origin = mesh.origin - accel.tree_space.origin;
-            let triangles = triangles_of(names, mesh, from_origin);
-            let mut parts = [Moment::NOTHING; WIDTH];
-            let mut count = 0;
-            for (part, corners) in parts.iter_mut().zip(triangles) {
-                *part = Moment::of_triangle(corners);
-                count += 1;
-            }
-            Moment::of_all(&parts[..count])
-        };
-        let blocks: Vec<Moment> = tree.names.par_iter().with_min_len(256).map(block).collect();
-        let mut nodes = vec![Moment::NOTHING; tree.nodes.len()];
-        let mut parts = Vec::new();
-        for (place, node) in tree.nodes.iter().enumerate().rev() {
-            parts.clear();
-            for &child in &node.children[..node.len()] {
-                match tag::of(child) {
-                    tag::INNER => parts.push(nodes[tag::place(child)]),
-                    tag::TRIANGLES => parts.extend_from_slice(&blocks[tree.numbers(child)]),
-                    tag::PRECISE => for_each_precise(accel, child, accel.tree_space.origin, |corners| {
-                        parts.push(Moment::of_triangle(corners));
-                    }),
-                    _ => {}
-                }
-            }
-            nodes[place] = Moment::of_all(&parts);
-            nodes[place].radius = nodes[place].radius.min(reach(node, accel, nodes[place].center));
-        }
-        Self { nodes }
-    }
-
-    /// Bytes that they take.
-    pub(crate) fn memory_bytes(&self) -> usize {
-        self.nodes.capacity() * size_of::<Moment>()
-    }
-
-    /// The winding number of all meshes of a tree.
-    fn around(&self, accel: &Accel, point: DVec3, far: f64) -> f64 {
-        let local = point - accel.tree_space.origin;
-        let mut sum = 0.0;
-        let mut stack: Vec<u32> = accel.tree.root.into_iter().collect();
-        while let Some(reference) = stack.pop() {
-            match tag::of(reference) {
-                tag::INNER => {
-                    let moment = &self.nodes[reference as usize];
-                    let far = far * moment.radius;
-                    if moment.area == 0.0 {
-                        continue;
-                    }
-                    if (moment.center - local).length_squared() > far * far {
-                        sum += moment.around(local);
-                        continue;
-                    }
-                    let node = &accel.tree.nodes[reference as usize];
-                    stack.extend_from_slice(&node.children[..node.len()]);
-                }
-                tag::TRIANGLES => {
-                    for names in &accel.tree.names[accel.tree.numbers(reference)] {
-                        let GeometryKind::Mesh(mesh) = &accel.geometries[names.geometry as usize].kind else {
-                            continue;
-                        };
-                        for [a, b, c] in triangles_of(names, mesh, mesh.origin - point) {
-                            sum += solid_angle(a, b, c);
-                        }
-                    }
-                }
-                tag::PRECISE => for_each_precise(accel, reference, point, |[a, b, c]| {
-                    sum += solid_angle(a, b, c);
+    let blocks: Vec<Moment> = packed.names.par_iter().with_min_len(256).map(block).collect();
+    let mut nodes = vec![Moment::NOTHING; packed.nodes.len()];
+    let mut parts = Vec::new();
+    for (place, node) in packed.nodes.iter().enumerate().rev() {
+        parts.clear();
+        for &child in &node.children[..node.len()] {
+            match tag::of(child) {
+                tag::INNER => parts.push(nodes[tag::place(child)]),
+                tag::TRIANGLES => parts.extend_from_slice(&blocks[packed.numbers(child)]),
+                tag::PRECISE => for_each_precise(tree, child, tree.tree_space.origin, |corners| {
+                    parts.push(Moment::of_triangle(corners));
                 }),
                 _ => {}
             }
         }
-        sum / (4.0 * PI)
+        nodes[place] = Moment::of_all(&parts);
+        nodes[place].radius = nodes[place].radius.min(reach(node, tree, nodes[place].center));
     }
+    Moments { nodes }
+}
+
+/// The winding number of all meshes of a tree.
+fn around(moments: &Moments, tree: &Tree, point: DVec3, far: f64) -> f64 {
+    let local = point - tree.tree_space.origin;
+    let mut sum = 0.0;
+    let mut stack: Vec<u32> = tree.packed.root.into_iter().collect();
+    while let Some(reference) = stack.pop() {
+        match tag::of(reference) {
+            tag::INNER => {
+                let moment = &moments.nodes[reference as usize];
+                let far = far * moment.radius;
+                if moment.area == 0.0 {
+                    continue;
+                }
+                if (moment.center - local).length_squared() > far * far {
+                    sum += moment.around(local);
+                    continue;
+                }
+                let node = &tree.packed.nodes[reference as usize];
+                stack.extend_from_slice(&node.children[..node.len()]);
+            }
+            tag::TRIANGLES => {
+                for names in &tree.packed.names[tree.packed.numbers(reference)] {
+                    let GeometryKind::Mesh(mesh) = &tree.geometries[names.geometry as usize].kind else {
+                        continue;
+                    };
+                    for [a, b, c] in triangles_of(names, mesh, mesh.origin - point) {
+                        sum += solid_angle(a, b, c);
+                    }
+                }
+            }
+            tag::PRECISE => for_each_precise(tree, reference, point, |[a, b, c]| {
+                sum += solid_angle(a, b, c);
+            }),
+            _ => {}
+        }
+    }
+    sum / (4.0 * PI)
 }
 
 /// The corners of the triangles of a block that have an area.
@@ -352,11 +252,11 @@ fn triangles_of(names: &BlockNames, mesh: &TriangleMesh, shift: DVec3) -> impl I
 }
 
 /// How far the boxes of a node reach from a place that is relative to the tree's origin.
-fn reach(node: &Node, accel: &Accel, center: DVec3) -> f64 {
+fn reach(node: &Node, tree: &Tree, center: DVec3) -> f64 {
     let mut farthest: f64 = 0.0;
     for lane in 0..node.len() {
         let arm = |axis: usize| {
-            let plane = |side: usize| f64::from(node.planes[2 * axis + side][lane]) / accel.tree_space.scale;
+            let plane = |side: usize| f64::from(node.planes[2 * axis + side][lane]) / tree.tree_space.scale;
             (plane(0) - center[axis]).abs().max((plane(1) - center[axis]).abs())
         };
         farthest = farthest.max(DVec3::new(arm(0), arm(1), arm(2)).length());

@@ -2,7 +2,10 @@
 
 #![allow(unsafe_code)]
 
+pub(crate) mod portable;
 pub(crate) mod vector;
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod x86;
 
 pub(crate) use vector::{F32x8, F32x16, LANE_BITS, LastEight, Row, Vector, WIDE};
 

@@ -12,12 +12,12 @@ use crate::batch;
 use crate::batch::packet::{self, PACKET};
 use crate::intersect::Isa;
 use crate::trace::Outcome;
-use crate::{Accel, Faces, GeometryKind, Hit, Instance, Query, TriangleMesh, brute};
+use crate::{Accel, Faces, GeometryKind, Hit, Query, TriangleMesh, brute};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 
 fn placed(accel: &Arc<Accel>, map: Transform) -> GeometryKind {
-    GeometryKind::Instance(Instance { accel: Arc::clone(accel), world_from_object: map.into() })
+    GeometryKind::Instance(accel.instance(map))
 }
 
 /// A closed mesh, long and thin, so that it is opened where it is placed.
@@ -80,7 +80,7 @@ fn everything(random: &mut Random) -> Accel {
         let first = random.placement(CENTER, 3.0, 0.5);
         let moved = Transform::translate(random.vector()) * first;
         let motion = AnimatedTransform::new(vec![(0.0, first), (1.0, moved)]);
-        let instance = Instance { accel: Arc::clone(tree), world_from_object: motion.unwrap().into() };
+        let instance = tree.instance(motion.unwrap());
         kinds.push(GeometryKind::Instance(instance));
     }
     build(kinds)
@@ -88,7 +88,7 @@ fn everything(random: &mut Random) -> Accel {
 
 /// A ray of any sort, or at a corner of the mesh, so that it meets that exactly or all but exactly.
 fn some_ray(random: &mut Random, accel: &Accel) -> Ray {
-    let made = match (&accel.geometries[0].kind, random.below(4)) {
+    let made = match (&accel.tree.geometries[0].kind, random.below(4)) {
         (GeometryKind::Mesh(mesh), 0) => {
             let corner = vertex(mesh, random.below(mesh.positions.len()) as u32);
             let along = [DVec3::X, -DVec3::Y, DVec3::Z, random.vector()][random.below(4)];
@@ -152,7 +152,7 @@ fn single_precision_answers_with_the_bits_of_double_precision_among_anything() {
 fn options_leave_the_same_bits_among_anything() {
     let mut random = Random(405);
     let accel = everything(&mut random);
-    let masks = (0..accel.geometries.len()).map(|_| 1 + random.below(7) as u32).collect();
+    let masks = (0..accel.tree.geometries.len()).map(|_| 1 + random.below(7) as u32).collect();
     let accel = accel.with_masks(masks);
     let (mut told, mut free, mut hits) = (0, 0, 0);
     for i in 0..1_500 {
@@ -227,7 +227,7 @@ fn company(random: &mut Random, is_endless: bool) -> Accel {
         let first = random.placement(CENTER, 3.0, 0.5);
         let moved = Transform::translate(random.vector()) * first;
         let motion = AnimatedTransform::new(vec![(0.0, first), (1.0, moved)]);
-        let instance = Instance { accel: Arc::clone(tree), world_from_object: motion.unwrap().into() };
+        let instance = tree.instance(motion.unwrap());
         kinds.push(GeometryKind::Instance(instance));
     }
     build(kinds)
@@ -258,7 +258,7 @@ fn rays_that_go_together_through_instances_are_answered_as_each_alone() {
                     Ray::new(from, direction).with_range(1e-3, t_max).at_time(random.unit())
                 });
                 check_packet(&accel, &rays);
-                let answered = batch::shims::answered_by_packet(accel.isa, &accel, &rays);
+                let answered = batch::shims::answered_by_packet(accel.isa, &accel.tree, &rays);
                 together += answered.count_ones();
                 let is_within = |ray: &&Ray| accel.closest(ray).is_some_and(|hit| !hit.route.is_empty());
                 if answered == packet::ALL {
@@ -304,7 +304,7 @@ fn of_hits_at_one_place_the_first_in_the_lists_wins() {
             assert!(check(&accel, &rays) > 280);
             for ray in &rays {
                 let hit = accel.closest(ray);
-                assert_eq!(hit, brute::closest(&accel, ray));
+                assert_eq!(hit, brute::closest(&accel.tree, ray));
                 assert_eq!(hit.is_some_and(|hit| hit.instances.is_empty()), has_own && accel.any(ray));
             }
         }
@@ -333,5 +333,5 @@ fn trees_are_searched_however_deep_they_stand() {
         }
     }
     let ray = Ray::new(5.0 * DVec3::Z, -DVec3::Z);
-    assert_eq!(accel.closest(&ray), brute::closest(&accel, &ray));
+    assert_eq!(accel.closest(&ray), brute::closest(&accel.tree, &ray));
 }

@@ -301,10 +301,10 @@ fn a_block_has_the_corners_of_its_triangles_however_many_they_share() {
         let geometry = grid(&mut random, own);
         let GeometryKind::Mesh(mesh) = geometry.kind.clone() else { unreachable!() };
         let accel = Accel::build(vec![geometry], &BuildOptions::default()).unwrap();
-        let blocks = accel.tree.blocks();
-        let places = blocks.places(&accel.tree.names).unwrap();
-        assert_eq!(places.len(), accel.tree.names.len());
-        for (number, (&place, names)) in places.iter().zip(&accel.tree.names).enumerate() {
+        let blocks = accel.tree.packed.blocks();
+        let places = blocks.places(&accel.tree.packed.names).unwrap();
+        assert_eq!(places.len(), accel.tree.packed.names.len());
+        for (number, (&place, names)) in places.iter().zip(&accel.tree.packed.names).enumerate() {
             let block = blocks.at(place).unwrap();
             assert_eq!(block.number() as usize, number);
             assert_eq!(block.taken().count_ones() as usize, names.primitives().count());
@@ -370,8 +370,9 @@ fn small_trees_of_triangles_alone_share_nothing() {
     let ball = Geometry { id: 1, kind: GeometryKind::Shape(ball) };
     let do_share = |geometries: Vec<Geometry>| {
         let accel = Accel::build(geometries, &BuildOptions::default()).unwrap();
-        let places = accel.tree.blocks().places(&accel.tree.names).unwrap();
-        let sharing = places.iter().filter(|&&place| !accel.tree.blocks().block(place).is_unshared()).count();
+        let places = accel.tree.packed.blocks().places(&accel.tree.packed.names).unwrap();
+        let sharing =
+            places.iter().filter(|&&place| !accel.tree.packed.blocks().block(place).is_unshared()).count();
         assert!(sharing == 0 || 2 * sharing > places.len(), "{sharing} of {}", places.len());
         sharing != 0
     };
@@ -394,10 +395,10 @@ fn no_eight_coordinates_lie_in_two_cache_lines_where_corners_have_their_own() {
     let mesh = Arc::new(soup(&mut Random(91), 100, DVec3::ZERO, 4.0));
     let geometry = Geometry { id: 0, kind: GeometryKind::Mesh(mesh) };
     let accel = Accel::build(vec![geometry], &BuildOptions::default()).unwrap();
-    let places = accel.tree.blocks().places(&accel.tree.names).unwrap();
+    let places = accel.tree.packed.blocks().places(&accel.tree.packed.names).unwrap();
     assert!(places.len() > 8);
     for place in places {
-        let block = accel.tree.blocks().block(place);
+        let block = accel.tree.packed.blocks().block(place);
         assert!(block.is_unshared());
         for eight in block.own_corners().as_flattened() {
             let [first, last] = [&raw const eight[0], &raw const eight[BLOCK - 1]].map(|at| at.addr() / 64);
@@ -412,7 +413,7 @@ fn vertices_in_one_place_are_one_to_a_block() {
     let apart = with_own_vertices(&geometry);
     let shared = Accel::build(vec![geometry], &BuildOptions::default()).unwrap();
     let apart = Accel::build(vec![apart], &BuildOptions::default()).unwrap();
-    assert_eq!(*shared.tree.blocks, *apart.tree.blocks);
+    assert_eq!(*shared.tree.packed.blocks, *apart.tree.packed.blocks);
 }
 
 /// The same mesh with its vertices elsewhere.
@@ -438,18 +439,18 @@ fn triangles_that_move_stand_where_packing_puts_them() {
         });
         for preset in [Preset::Fast, Preset::Balanced, Preset::Best] {
             let mut accel = Accel::build(two.to_vec(), &BuildOptions { preset }).unwrap();
-            let first = accel.tree.blocks.to_vec();
+            let first = accel.tree.packed.blocks.to_vec();
             for geometries in [&second, &third, &two.to_vec()] {
                 accel.refit(geometries.clone()).unwrap();
                 let again = Accel::from_bytes(&accel.to_bytes(), geometries.clone()).unwrap();
-                assert_eq!(accel.tree.names.len(), again.tree.names.len());
+                assert_eq!(accel.tree.packed.names.len(), again.tree.packed.names.len());
                 assert_eq!(
-                    bytemuck::cast_slice::<_, u8>(&accel.tree.nodes),
-                    bytemuck::cast_slice::<_, u8>(&again.tree.nodes)
+                    bytemuck::cast_slice::<_, u8>(&accel.tree.packed.nodes),
+                    bytemuck::cast_slice::<_, u8>(&again.tree.packed.nodes)
                 );
-                assert_eq!(*accel.tree.blocks, *again.tree.blocks, "{preset:?}");
+                assert_eq!(*accel.tree.packed.blocks, *again.tree.packed.blocks, "{preset:?}");
             }
-            assert_eq!(*accel.tree.blocks, first);
+            assert_eq!(*accel.tree.packed.blocks, first);
         }
     }
 }
@@ -464,11 +465,11 @@ fn triangles_that_come_apart_are_packed_again() {
     let all = with_positions(&together, |_, p| p + 0.1 * random.vector().as_vec3());
     for apart in [one, all] {
         let mut accel = Accel::build(vec![together.clone()], &BuildOptions::default()).unwrap();
-        let first = accel.tree.blocks.to_vec();
+        let first = accel.tree.packed.blocks.to_vec();
         let mut tree_space = first.clone();
         let mut put = |geometry: &Geometry| {
             let geometries = std::slice::from_ref(geometry);
-            pack::move_triangles(accel.isa, geometries, &accel.tree.names, true, &mut tree_space)
+            pack::move_triangles(accel.isa, geometries, &accel.tree.packed.names, true, &mut tree_space)
         };
         assert!(!put(&apart));
         assert!(put(&together));
@@ -476,7 +477,7 @@ fn triangles_that_come_apart_are_packed_again() {
 
         accel.refit(vec![apart.clone()]).unwrap();
         let again = Accel::from_bytes(&accel.to_bytes(), vec![apart.clone()]).unwrap();
-        assert_eq!(*accel.tree.blocks, *again.tree.blocks);
+        assert_eq!(*accel.tree.packed.blocks, *again.tree.packed.blocks);
     }
 }
 
@@ -484,12 +485,12 @@ fn triangles_that_come_apart_are_packed_again() {
 fn blocks_that_are_not_such_as_are_packed_are_told() {
     let mut random = Random(82);
     let accel = Accel::build(vec![grid(&mut random, 0.15)], &BuildOptions::default()).unwrap();
-    let bytes: Vec<u8> = bytemuck::cast_slice(&accel.tree.blocks).to_vec();
-    let places = accel.tree.blocks().places(&accel.tree.names).unwrap();
+    let bytes: Vec<u8> = bytemuck::cast_slice(&accel.tree.packed.blocks).to_vec();
+    let places = accel.tree.packed.blocks().places(&accel.tree.packed.names).unwrap();
     let is_sound = |bytes: &[u8]| {
         let mut lines = vec![Line::default(); bytes.len() / 64];
         bytemuck::cast_slice_mut(&mut lines).copy_from_slice(bytes);
-        Blocks::new(&lines).places(&accel.tree.names).is_some()
+        Blocks::new(&lines).places(&accel.tree.packed.names).is_some()
     };
     assert!(is_sound(&bytes));
     assert!(!is_sound(&bytes[..bytes.len() - 64]));
@@ -497,7 +498,7 @@ fn blocks_that_are_not_such_as_are_packed_are_told() {
     // In heads: the number, the layout, how many follow, and vertices of the other half of lanes, before the row and behind it.
     for place in places {
         let at = 64 * place as usize;
-        if accel.tree.blocks().block(place).is_unshared() {
+        if accel.tree.packed.blocks().block(place).is_unshared() {
             continue;
         }
         for (byte, value) in [
@@ -527,10 +528,10 @@ fn refitted_triangles_may_share_other_vertices() {
         let mut accel = Accel::build(vec![first.clone()], &BuildOptions::default()).unwrap();
         let fresh = Accel::build(vec![then.clone()], &BuildOptions::default()).unwrap();
         accel.refit(vec![then.clone()]).unwrap();
-        assert!(accel.tree.blocks().places(&accel.tree.names).is_some());
+        assert!(accel.tree.packed.blocks().places(&accel.tree.packed.names).is_some());
         let unshared = |accel: &Accel| {
-            let places = accel.tree.blocks().places(&accel.tree.names).unwrap();
-            places.iter().filter(|&&place| accel.tree.blocks().block(place).is_unshared()).count()
+            let places = accel.tree.packed.blocks().places(&accel.tree.packed.names).unwrap();
+            places.iter().filter(|&&place| accel.tree.packed.blocks().block(place).is_unshared()).count()
         };
         assert_eq!(unshared(&accel) > 0, unshared(&fresh) > 0);
         for _ in 0..500 {

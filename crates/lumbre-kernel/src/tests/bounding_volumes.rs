@@ -201,7 +201,11 @@ fn a_leaf_of_any_length_has_its_blocks_in_a_row() {
         }
     }
     let tree_space = tree_space(DVec3::ZERO, 3.0);
-    let bounding_volumes = BoundingVolumes::new(&geometries, &entries, &tree_space);
+    let shape = |entry: &Entry| match &geometries[entry.geometry as usize].kind {
+        GeometryKind::Shape(shape) => Some(shape),
+        _ => None,
+    };
+    let bounding_volumes = BoundingVolumes::new(&entries, &tree_space, shape);
     let mut first = 0;
     for length in lengths {
         for start in (0..length).step_by(BLOCK) {
@@ -291,7 +295,7 @@ fn rays_that_go_together_among_shapes_are_answered_as_each_alone() {
             for i in 0..if cfg!(miri) { 2 } else { 400 } {
                 let rays = alike(&mut random, &shapes[i % shapes.len()], center, size);
                 check_packet(&accel, &rays);
-                let answered = batch::shims::answered_by_packet(accel.isa, &accel, &rays);
+                let answered = batch::shims::answered_by_packet(accel.isa, &accel.tree, &rays);
                 together += answered.count_ones();
                 apart += answered.count_zeros() - (32 - PACKET as u32);
             }

@@ -9,11 +9,11 @@ use super::scenes::Random;
 use crate::Ray32;
 use crate::build::primitive::Bounds;
 use crate::intersect::box_ray::{BoxRay, Slabs};
-use crate::intersect::filter_start::FilterStart;
 use crate::intersect::{
     Isa, intersect_boxes_at, intersect_each_at, read_at, start_filter_at, start_placed_at,
 };
 use crate::simd::LANE_BITS;
+use crate::tree::filter_start::FilterStart;
 use crate::tree::node::{Node, TreeSpace, WIDTH};
 use crate::tree::summary::{Sizes, Summary};
 
@@ -131,8 +131,16 @@ fn reached_boxes_are_met(isa: Isa, seed: u64, rounds: usize) {
 /// For a tree of a mesh at this origin.
 fn start_of(tree_space: &TreeSpace, first_origin: DVec3) -> Option<FilterStart> {
     let sizes = Sizes { largest_corner: (1.0 / tree_space.scale) as f32, ..Sizes::default() };
-    let summary = Summary { first_origin, ..Summary::new(&[], sizes) };
-    FilterStart::new(&Summary { has_one_origin: true, ..summary }, tree_space, Some(0))
+    let summary = Summary {
+        only_triangles: true,
+        nesting: 0,
+        has_one_origin: true,
+        first_origin,
+        sizes,
+        has_one_cloud_origin: true,
+        masks_within: false,
+    };
+    FilterStart::new(&summary, tree_space, Some(0))
 }
 
 #[test]

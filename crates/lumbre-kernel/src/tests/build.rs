@@ -10,9 +10,7 @@ use super::scenes::{
     Balls, Random, build, cube, icosphere, mixture, options, ray, room, soup, with_every_preset,
 };
 use crate::tree::node::tag;
-use crate::{
-    Accel, BuildError, BuildOptions, CustomGeometry, Geometry, GeometryKind, Instance, Preset, TriangleMesh,
-};
+use crate::{Accel, BuildError, BuildOptions, CustomGeometry, Geometry, GeometryKind, Preset, TriangleMesh};
 
 /// Custom geometry of which nothing is ever met, and that writes down which threads ask for its boxes.
 #[derive(Debug)]
@@ -69,10 +67,7 @@ fn an_empty_tree_is_never_hit() {
     assert!(accel.bounds().is_empty());
     assert_eq!(accel.primitive_count(), 0);
 
-    let instance = Instance {
-        accel: Arc::new(accel),
-        world_from_object: Transform::translate(DVec3::splat(3.0)).into(),
-    };
+    let instance = accel.instance(Transform::translate(DVec3::splat(3.0)));
     let outer = build(vec![GeometryKind::Instance(instance), GeometryKind::Mesh(Arc::default())]);
     assert!(!outer.any(&ray));
     assert!(outer.bounds().is_empty());
@@ -142,7 +137,7 @@ fn check_that_threads_make_no_difference() {
             let kinds = kinds.map(|mesh| GeometryKind::Mesh(Arc::new(mesh)));
             let geometries = kinds.map(|kind| Geometry { id: 3, kind }).to_vec();
             let accel = Accel::build(geometries, &options).unwrap();
-            format!("{:?}", accel.tree)
+            format!("{:?}", accel.tree.packed)
         })
     };
     // Of few, threads leave less to one; and of a room, upper nodes are put elsewhere.
@@ -194,11 +189,11 @@ fn identical_primitives_end_and_stay_shallow() {
 
 fn depth(accel: &Accel) -> usize {
     let mut deepest = 0;
-    let mut pending = vec![(accel.tree.root.unwrap(), 1)];
+    let mut pending = vec![(accel.tree.packed.root.unwrap(), 1)];
     while let Some((reference, depth)) = pending.pop() {
         deepest = deepest.max(depth);
         if tag::is_inner(reference) {
-            let node = &accel.tree.nodes[reference as usize];
+            let node = &accel.tree.packed.nodes[reference as usize];
             pending.extend(node.children[..node.len()].iter().map(|&child| (child, depth + 1)));
         }
     }
@@ -229,6 +224,7 @@ fn boxes_hold_their_children_and_every_primitive_has_one_place() {
     let mut random = Random(17);
     let accel = mixture(&mut random, DVec3::new(2.0, 3.0, -4.0), 3.0, 1, false);
     let packed: usize = accel
+        .tree
         .geometries
         .iter()
         .map(|geometry| match &geometry.kind {
@@ -241,27 +237,28 @@ fn boxes_hold_their_children_and_every_primitive_has_one_place() {
             _ => 0,
         })
         .sum();
-    let others = accel.tree.entries.len();
+    let others = accel.tree.packed.entries.len();
     let in_blocks: usize = accel
         .tree
+        .packed
         .names
         .iter()
-        .chain(&accel.tree.sphere_names)
+        .chain(&accel.tree.packed.sphere_names)
         .map(|names| names.primitives.iter().filter(|&&primitive| primitive != u32::MAX).count())
         .sum();
     assert_eq!(in_blocks, packed);
     assert_eq!(in_blocks + others, accel.primitive_count());
-    let mut places: Vec<_> = accel.tree.entries.iter().map(|e| (e.geometry, e.primitive())).collect();
+    let mut places: Vec<_> = accel.tree.packed.entries.iter().map(|e| (e.geometry, e.primitive())).collect();
     places.sort_unstable();
     places.dedup();
     assert_eq!(places.len(), others);
-    for node in &accel.tree.nodes {
+    for node in &accel.tree.packed.nodes {
         for lane in 0..node.len() {
             let child = node.children[lane];
             if !tag::is_inner(child) {
                 continue;
             }
-            let child = &accel.tree.nodes[child as usize];
+            let child = &accel.tree.packed.nodes[child as usize];
             for axis in 0..3 {
                 for inner in 0..child.len() {
                     assert!(node.planes[2 * axis][lane] <= child.planes[2 * axis][inner]);
@@ -279,7 +276,7 @@ fn any_hit_asks_what_is_packed_first_and_instances_last() {
     // The first tag that is met below a reference, by the way of a search for any hit.
     let rank = |mut reference: u32| {
         while tag::is_inner(reference) {
-            let node = &accel.tree.nodes[reference as usize];
+            let node = &accel.tree.packed.nodes[reference as usize];
             reference = node.children[node.len() - 1];
         }
         match tag::of(reference) {
@@ -288,7 +285,7 @@ fn any_hit_asks_what_is_packed_first_and_instances_last() {
             _ => 1,
         }
     };
-    let root = &accel.tree.nodes[0];
+    let root = &accel.tree.packed.nodes[0];
     let ranks: Vec<u32> = root.children[..root.len()].iter().map(|&child| rank(child)).collect();
     assert!(ranks.is_sorted(), "{ranks:?}");
     assert_eq!(ranks.last(), Some(&2));
@@ -302,8 +299,8 @@ fn a_million_million_leaves_fit_by_nesting() {
     for isa in 0..40 {
         let step = DVec3::new(4.0 * 2f64.powi(isa), 0.0, 0.0);
         let place = |offset| {
-            let world_from_object = Transform::translate(offset).into();
-            GeometryKind::Instance(Instance { accel: Arc::clone(&tree), world_from_object })
+            let world_from_object = Transform::translate(offset);
+            GeometryKind::Instance(tree.instance(world_from_object))
         };
         let next = build(vec![place(DVec3::ZERO), place(step)]);
         bytes += next.memory_bytes();
@@ -330,14 +327,13 @@ fn instances_are_bounded_by_what_is_in_them() {
     let inner =
         Arc::new(build(vec![GeometryKind::Mesh(Arc::new(icosphere(3, DVec3::new(1.0, 2.0, 3.0), 2.0)))]));
     let map = Transform::rotate(DVec3::new(1.0, 1.0, 0.3), 45.0).unwrap();
-    let outer =
-        build(vec![GeometryKind::Instance(Instance { accel: inner.clone(), world_from_object: map.into() })]);
+    let outer = build(vec![GeometryKind::Instance(inner.instance(map))]);
     let center = map.point(DVec3::new(1.0, 2.0, 3.0));
     let exact = Aabb { min: center - 2.0, max: center + 2.0 };
     let ratio = outer.bounds().half_area() / exact.half_area();
     assert!(ratio < 1.6, "{ratio}");
     let ball = |p: &Vec3| outer.bounds().contains(map.point(p.as_dvec3()));
-    let GeometryKind::Mesh(mesh) = &inner.geometries[0].kind else { panic!("a mesh") };
+    let GeometryKind::Mesh(mesh) = &inner.tree.geometries[0].kind else { panic!("a mesh") };
     assert!(mesh.positions.iter().all(ball));
 }
 

@@ -10,7 +10,7 @@ use super::scenes::{
 };
 use crate::batch::columns;
 use crate::intersect::Isa;
-use crate::{Accel, GeometryKind, Hit, HitColumns, Instance, RayColumns, TargetShape, TriangleMesh};
+use crate::{Accel, GeometryKind, Hit, HitColumns, RayColumns, TargetShape, TriangleMesh};
 
 /// Rays, column by column.
 #[derive(Default)]
@@ -84,7 +84,7 @@ fn tree(meshes: &[TriangleMesh], place: (f64, DVec3)) -> Accel {
 }
 
 fn instance(accel: &Arc<Accel>, map: Transform) -> GeometryKind {
-    GeometryKind::Instance(Instance { accel: Arc::clone(accel), world_from_object: map.into() })
+    GeometryKind::Instance(accel.instance(map))
 }
 
 /// Meshes, and shapes, clouds, custom geometry and instances of meshes and of mixtures beside them, all of one size.
@@ -179,8 +179,8 @@ fn check_cuts(accel: &Accel, rays: &Rays, exact: bool) -> usize {
         for size in [1, 5, 16, 333, rays.len()] {
             for first in (0..rays.len()).step_by(size) {
                 let some = rays.columns(first, size.min(rays.len() - first));
-                columns::closest(isa, accel, &some, exact, &mut hits);
-                columns::any(isa, accel, &some, exact, &mut occluded);
+                columns::closest(isa, &accel.tree, &some, exact, &mut hits);
+                columns::any(isa, &accel.tree, &some, exact, &mut occluded);
                 assert_eq!((hits.len(), occluded.len()), (some.len(), some.len()));
                 for (i, &is_occluded) in occluded.iter().enumerate() {
                     let (found, expected) = (bits(&hits, i), bits(&expected, first + i));
@@ -329,7 +329,8 @@ fn exact_columns_are_the_hits_of_double_precision() {
             let expected = accel.closest(&rays.ray(i));
             assert_eq!(hits.to_hit(i), expected);
             let is_plain = expected.as_ref().is_some_and(|hit| {
-                let is_mesh = matches!(accel.geometries[hit.geometry as usize].kind, GeometryKind::Mesh(_));
+                let is_mesh =
+                    matches!(accel.tree.geometries[hit.geometry as usize].kind, GeometryKind::Mesh(_));
                 is_mesh && hit.instances.is_empty()
             });
             assert_eq!(hits.is_plain(i), is_plain);
@@ -366,7 +367,9 @@ fn rays_at_edges_and_corners_of_closed_meshes_hit() {
     for mesh in [icosphere(3, center, 0.9), bumpy(2, center, 0.7)] {
         for where_it_stands in PLACES {
             let accel = tree(std::slice::from_ref(&mesh), where_it_stands);
-            let GeometryKind::Mesh(own) = accel.geometries[0].kind.clone() else { unreachable!("it is one") };
+            let GeometryKind::Mesh(own) = accel.tree.geometries[0].kind.clone() else {
+                unreachable!("it is one")
+            };
             let (size, origin) = where_it_stands;
             let mut rays = Rays::default();
             for _ in 0..repeats(40_000) {
@@ -400,7 +403,7 @@ fn rays_at_edges_and_corners_hit_in_instances_and_beside_shapes() {
         for mesh in [icosphere(4, center, 0.9), bumpy(3, center, 0.7)] {
             for (size, origin) in PLACES {
                 let inner = Arc::new(tree(std::slice::from_ref(&mesh), (size, origin)));
-                let GeometryKind::Mesh(own) = inner.geometries[0].kind.clone() else {
+                let GeometryKind::Mesh(own) = inner.tree.geometries[0].kind.clone() else {
                     unreachable!("it is one")
                 };
                 for (distance, scale) in [(0.0, 1.0), (0.0, 1e-4 / size), (3e3, 0.2)] {

@@ -8,7 +8,7 @@ use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::oracle::check;
 use super::scenes::{Random, build, icosphere, ray, soup};
-use crate::{BuildError, CustomGeometry, DeformingMesh, GeometryKind, Hit, Instance, TriangleMesh};
+use crate::{BuildError, CustomGeometry, DeformingMesh, GeometryKind, Hit, TriangleMesh};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 
@@ -116,7 +116,7 @@ fn it_deforms_in_instances_and_is_refitted_and_saved_as_others_are() {
     mesh.origin = DVec3::new(2.0, 1.0, -3.0);
     let kind = |random: &mut Random| GeometryKind::Custom(Arc::new(bent(random, &mesh, 4, 1.0)));
     let inner = build(vec![kind(&mut random), GeometryKind::Mesh(Arc::new(icosphere(1, mesh.origin, 0.5)))]);
-    let mut geometries = inner.geometries.clone();
+    let mut geometries = inner.tree.geometries.clone();
     let mut inner = crate::Accel::from_bytes(&inner.to_bytes(), geometries.clone()).unwrap();
     for round in 0..2 {
         let accel = Arc::new(inner);
@@ -125,7 +125,7 @@ fn it_deforms_in_instances_and_is_refitted_and_saved_as_others_are() {
             * Transform::rotate(DVec3::new(1.0, 2.0, 0.5), 50.0).unwrap()
             * Transform::translate(-mesh.origin);
         let motion = lumbre_math::AnimatedTransform::new(vec![(0.0, place), (2.0, turn)]).unwrap();
-        let instance = Instance { accel: Arc::clone(&accel), world_from_object: motion.into() };
+        let instance = accel.instance(motion);
         let outer = build(vec![GeometryKind::Instance(instance)]);
         let mut hits = 0;
         for _ in 0..200 {

@@ -7,18 +7,18 @@ use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::refit::moved;
 use super::scenes::{
-    self, Random, build, bumpy, cube, icosphere, mixture, options, precise, repeats, soup, torus, vertex,
+    self, Random, build, bumpy, cube, icosphere, mixture, options, precise, repeats, soup, torus,
     with_every_preset,
 };
 use crate::batch;
 use crate::batch::packet::PACKET;
-use crate::intersect::f32_ray::Precise;
-use crate::intersect::filter_start::FilterStart;
-use crate::intersect::{Isa, Portable, Simd, start_f32_by_four_at};
+use crate::intersect::{Isa, Portable, Simd};
 use crate::simd::{F32x8, Vector};
+use crate::tree::filter_start::FilterStart;
+use crate::tree::filter_start::Precise;
 use crate::tree::node::Node;
 use crate::tree::triangle_block::Line;
-use crate::{Accel, BuildOptions, Geometry, GeometryKind, Hit, Hit32, Instance, Preset, Ray32, TriangleMesh};
+use crate::{Accel, BuildOptions, Geometry, GeometryKind, Hit, Hit32, Preset, Ray32, TriangleMesh};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 
@@ -110,11 +110,11 @@ fn has_one_sign(edges: [f64; 3]) -> bool {
 
 /// What a tree of nothing but meshes answers, by a loop over all triangles where the ray comes from nearby; and whether it does.
 fn by_reference(accel: &Accel, ray: &Ray32) -> (Option<Hit32>, bool) {
-    let start = accel.single.as_ref().expect("made for this");
+    let start = accel.tree.single.as_ref().expect("made for this");
     assert!(start.only_triangles);
     let Some(plain) = PlainRay::new(start, ray) else { return (widened(accel, ray), false) };
     let mut nearest: Option<(Hit32, bool)> = None;
-    for (geometry, Geometry { id, kind }) in accel.geometries.iter().enumerate() {
+    for (geometry, Geometry { id, kind }) in accel.tree.geometries.iter().enumerate() {
         let GeometryKind::Mesh(mesh) = kind else { unreachable!("nothing but meshes") };
         for (primitive, triangle) in mesh.indices.iter().enumerate() {
             let corners = triangle.map(|vertex| mesh.positions[vertex as usize]);
@@ -172,12 +172,17 @@ fn check(accel: &Accel, rays: &[Ray32], expected: &[Option<Hit32>], sizes: &[usi
 }
 
 /// What a batch meets, and whether; also where those that do not go together do not fly as a rule.
-fn in_batch(accel: &Accel, isa: Isa, rays: &[Ray32], flies: bool) -> (Vec<Option<Hit32>>, Vec<bool>) {
+pub(super) fn in_batch(
+    accel: &Accel,
+    isa: Isa,
+    rays: &[Ray32],
+    flies: bool,
+) -> (Vec<Option<Hit32>>, Vec<bool>) {
     let mut hits = vec![Some(STALE); rays.len()];
     // What would be wrong everywhere.
     let mut met: Vec<bool> = rays.iter().map(|ray| !accel.any_f32(ray)).collect();
     if flies {
-        batch::shims::f32(isa, accel, rays, &mut hits, &mut met);
+        batch::shims::f32(isa, &accel.tree, rays, &mut hits, &mut met);
     } else {
         accel.closest_batch_f32_at(isa, rays, &mut hits);
         accel.any_batch_f32_at(isa, rays, &mut met);
@@ -293,7 +298,7 @@ fn placed(mesh: &TriangleMesh, size: f64, origin: DVec3) -> TriangleMesh {
     TriangleMesh { origin, positions, indices: mesh.indices.clone() }
 }
 
-fn kinds(meshes: &[TriangleMesh]) -> Vec<GeometryKind> {
+pub(super) fn kinds(meshes: &[TriangleMesh]) -> Vec<GeometryKind> {
     meshes.iter().map(|mesh| GeometryKind::Mesh(Arc::new(mesh.clone()))).collect()
 }
 
@@ -455,32 +460,6 @@ fn odd_ones(good: Ray32) -> Vec<Ray32> {
 }
 
 #[test]
-fn four_rays_start_together_as_each_does_alone() {
-    let mut random = Random(713);
-    let (mut started, mut refused) = (0, 0);
-    for (size, origin) in SIZES_AND_ORIGINS {
-        for (_, meshes) in meshes(&mut random) {
-            let meshes: Vec<_> = meshes.iter().map(|mesh| placed(mesh, size, origin)).collect();
-            let accel = build(kinds(&meshes));
-            let Some(start) = &accel.single else { continue };
-            let mut rays: Vec<_> = (0..100).map(|_| ray(&mut random, &meshes, size)).collect();
-            let odd = odd_ones(rays[0]);
-            rays.extend(odd);
-            for _ in 0..100 {
-                let four = [(); 4].map(|()| &rays[random.below(rays.len())]);
-                for isa in Isa::all() {
-                    let [together, one_by_one] = start_f32_by_four_at(isa, start, four);
-                    assert_eq!(format!("{together:?}"), format!("{one_by_one:?}"), "{isa:?} {four:?}");
-                    started += together.iter().flatten().count();
-                    refused += together.iter().filter(|one| one.is_none()).count();
-                }
-            }
-        }
-    }
-    assert!(started > 10_000 && refused > 1000, "{started} {refused}");
-}
-
-#[test]
 fn batches_answer_as_single_rays_do() {
     let mut random = Random(703);
     for (size, origin) in SIZES_AND_ORIGINS {
@@ -584,7 +563,7 @@ fn in_a_tree_that_caches_do_not_hold_batches_answer_as_single_rays_do() {
     let meshes = [mesh, soup.clone(), soup];
     let geometries = kinds(&meshes).into_iter().zip(5..).map(|(kind, id)| Geometry { id, kind }).collect();
     let accel = Accel::build(geometries, &BuildOptions { preset: Preset::Fast }).unwrap();
-    let tree = &accel.tree;
+    let tree = &accel.tree.packed;
     let bytes = size_of_val::<[Node]>(&tree.nodes) + size_of_val::<[Line]>(&tree.blocks);
     assert!(bytes >= 1 << 24, "{bytes} bytes are not far");
 
@@ -608,127 +587,6 @@ fn in_a_tree_that_caches_do_not_hold_batches_answer_as_single_rays_do() {
     for (ray, expected) in rays.iter().zip(&expected).step_by(rays.len() / repeats(rays.len() / 200)) {
         assert_eq!(bits(&by_reference(&accel, ray).0), bits(expected), "{ray:?}");
     }
-}
-
-/// A prism over a polygon that is all but a square: on one of its sides corners lie no more than a roundoff apart, and those of its top
-/// and bottom, which are level, make fans of needles with a corner across.
-fn fans() -> TriangleMesh {
-    let step = 1.0 / (1 << 23) as f32;
-    let mut outline = vec![[-0.9, -0.7], [1.03, -0.8]];
-    outline.extend((0..150).map(|i| [1.03, 0.61 + i as f32 * step]));
-    outline.push([-0.8, 1.1]);
-    let n = outline.len() as u32;
-    let isa = |y: f32| outline.iter().map(move |&[x, z]| Vec3::new(x, y, z));
-    let positions = isa(-1.0).chain(isa(0.7)).collect();
-    let mut indices = Vec::new();
-    for i in 1..n - 1 {
-        indices.extend([[0, i, i + 1], [n, n + i + 1, n + i]]);
-    }
-    for i in 0..n {
-        let next = (i + 1) % n;
-        indices.extend([[i, n + i, n + next], [i, n + next, next]]);
-    }
-    TriangleMesh { origin: DVec3::ZERO, positions, indices }
-}
-
-/// Closed meshes, each with a point inside.
-fn closed_meshes() -> Vec<(&'static str, TriangleMesh, DVec3)> {
-    let ring = DVec3::new(-0.7, 0.4, 1.1);
-    vec![
-        ("cube", cube(), DVec3::new(1.3, 0.4, 3.9)),
-        ("cube from its middle", cube(), DVec3::new(1.75, 0.25, 4.25)),
-        ("ball", icosphere(3, DVec3::new(2.0, -3.5, 1.25), 2.5), DVec3::new(2.2, -3.1, 1.0)),
-        ("rock", bumpy(3, DVec3::new(-1.0, 2.5, 0.75), 2.5), DVec3::new(-0.9, 2.4, 0.8)),
-        ("torus", torus(40, 20, 2.5, 0.75), ring + DVec3::new(2.5, 0.01, 0.02)),
-        ("needles", torus(3, 400, 2.5, 0.01), ring + DVec3::new(2.499, 0.0, 0.001)),
-        ("hoop", torus(2000, 3, 2.5, 0.3), ring + DVec3::new(2.5, 0.001, 0.002)),
-        ("fans", fans(), DVec3::new(0.2, 0.05, 0.1)),
-    ]
-}
-
-/// The mesh as it is, far off by its origin and by its vertices, stretched, small and mirrored, and large; each with where the point
-/// inside comes to lie.
-fn placements(mesh: &TriangleMesh, inside: DVec3) -> Vec<(TriangleMesh, Vec3)> {
-    let moved = |factor: Vec3, by: Vec3| {
-        let positions = mesh.positions.iter().map(|&p| p * factor + by).collect();
-        let mesh = TriangleMesh { origin: DVec3::ZERO, positions, indices: mesh.indices.clone() };
-        (mesh, inside.as_vec3() * factor + by)
-    };
-    let far = Vec3::new(1.0e6, -3.0e5, 7.0e6);
-    let origin = far.as_dvec3() - inside + DVec3::new(1e-5, 7e-6, -1.3e-5);
-    vec![
-        moved(Vec3::ONE, Vec3::ZERO),
-        (TriangleMesh { origin, ..mesh.clone() }, far),
-        moved(Vec3::ONE, Vec3::new(1000.0, -300.0, 4000.0)),
-        moved(Vec3::new(1.0, 1e-3, 40.0), Vec3::new(3.0, 0.0, -1.0)),
-        moved(Vec3::splat(-3e-6), Vec3::ZERO),
-        moved(Vec3::new(2e5, 3e5, 2.5e5), Vec3::ZERO),
-    ]
-}
-
-/// A neighbour, two roundoffs away at most.
-fn shaken(random: &mut Random, p: Vec3) -> Vec3 {
-    p.map(|x| match random.below(5) {
-        0 => x.next_up(),
-        1 => x.next_down(),
-        2 => x.next_up().next_up(),
-        3 => x.next_down().next_down(),
-        _ => x,
-    })
-}
-
-#[test]
-fn no_ray_from_within_leaks_at_a_corner_or_an_edge() {
-    let mut random = Random(706);
-    let mut shot = 0;
-    with_every_preset(|| {
-        for (name, mesh, inside) in closed_meshes() {
-            for (number, (mesh, from)) in placements(&mesh, inside).into_iter().enumerate() {
-                let accel = build(kinds(std::slice::from_ref(&mesh)));
-                assert_eq!(accel.only_triangles(), Some(true));
-                let mut triangle = 0;
-                let mut rays = Vec::new();
-                for i in 0..2152 {
-                    // By turns sixteen neighbours and sixteen from anywhere.
-                    let are_alike = (i / PACKET).is_multiple_of(2);
-                    triangle = if are_alike && !i.is_multiple_of(PACKET) {
-                        (triangle + 1) % mesh.indices.len()
-                    } else {
-                        random.below(mesh.indices.len())
-                    };
-                    let corners = mesh.indices[triangle].map(|index| vertex(&mesh, index));
-                    let along = [0.5, 0.25, random.unit()][random.below(3)];
-                    let target = if i % 2 == 0 { corners[0] } else { corners[0].lerp(corners[1], along) };
-                    // There are few places to start at so far off.
-                    let is_shaken = number != 1 && random.below(4) == 0;
-                    let origin = if is_shaken { shaken(&mut random, from) } else { from };
-                    // From where it starts to the target, from there to the target as rounded, or a little beside.
-                    let direction = match random.below(3) {
-                        0 => (target - origin.as_dvec3()).as_vec3(),
-                        1 if number != 1 => target.as_vec3() - origin,
-                        _ => shaken(&mut random, (target - origin.as_dvec3()).as_vec3()),
-                    };
-                    rays.push(Ray32::new(origin, direction));
-                }
-                for isa in Isa::all() {
-                    for ray in &rays {
-                        let is_leak = accel.closest_f32_at(isa, ray).is_none() || !accel.any_f32_at(isa, ray);
-                        assert!(!is_leak, "{name}, place {number}, {isa:?}: a leak along {ray:?}");
-                    }
-                    for rays in [&rays[..], &rays[16..32], &rays[64..81]] {
-                        for flies in [false, true] {
-                            let (hits, met) = in_batch(&accel, isa, rays, flies);
-                            let leak = hits.iter().zip(met).position(|(hit, met)| hit.is_none() || !met);
-                            let about = format!("{name}, place {number}, {isa:?}, {flies}");
-                            assert_eq!(leak, None, "{about}: a leak along {rays:?}");
-                        }
-                    }
-                }
-                shot += rays.len();
-            }
-        }
-    });
-    assert!(shot > 300_000, "{shot}");
 }
 
 #[test]
@@ -786,16 +644,10 @@ fn trees_of_more_than_meshes_answer_as_double_precision_does_rounded() {
         let mut random = Random(708);
         let ball = TriangleMesh { origin: CENTER, ..icosphere(2, DVec3::ZERO, 2.0) };
         let within = Arc::new(build(kinds(std::slice::from_ref(&ball))));
-        let twice = Arc::new(build(vec![GeometryKind::Instance(Instance {
-            accel: within.clone(),
-            world_from_object: Transform::translate(DVec3::new(0.5, 0.25, -0.5)).into(),
-        })]));
-        let instance = |accel: &Arc<Accel>| {
-            GeometryKind::Instance(Instance {
-                accel: accel.clone(),
-                world_from_object: Transform::IDENTITY.into(),
-            })
-        };
+        let twice = Arc::new(build(vec![GeometryKind::Instance(
+            within.instance(Transform::translate(DVec3::new(0.5, 0.25, -0.5))),
+        )]));
+        let instance = |accel: &Arc<Accel>| GeometryKind::Instance(accel.instance(Transform::IDENTITY));
         let cloud = scenes::cloud(&mut random, 60, DVec3::ZERO, CENTER, 3.0);
         let trees = [
             mixture(&mut random, CENTER, 3.0, 2, true),
@@ -823,7 +675,7 @@ fn trees_of_more_than_meshes_answer_as_double_precision_does_rounded() {
             assert!(hits > rays.len() / 8, "{number}: {hits} of {}", rays.len());
             let instances = expected.iter().flatten().filter(|hit| hit.instance != Hit32::NO_INSTANCE);
             let has_instances =
-                accel.geometries.iter().any(|one| matches!(one.kind, GeometryKind::Instance(_)));
+                accel.tree.geometries.iter().any(|one| matches!(one.kind, GeometryKind::Instance(_)));
             assert_eq!(instances.count() > 20, has_instances, "{number}");
         }
         // The outermost has the name.
@@ -942,7 +794,7 @@ fn a_tree_that_was_moved_answers_as_one_that_is_built_anew() {
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("tree.lumbre");
             accel.save(&path).unwrap();
-            let mapped = Accel::map(&path, accel.geometries.clone()).unwrap();
+            let mapped = Accel::map(&path, accel.tree.geometries.clone()).unwrap();
             check(&mapped, &rays, &expected, &[rays.len()]);
         }
     });
@@ -994,7 +846,7 @@ fn what_is_precise_at_once_is_precise_by_its_extent() {
         }
         let [products, z] = [products, z].map(|rows| rows.map(|row| Numbers::load(&row)));
         let (within, sum) = (Numbers::load(&within), Numbers::load(&sum));
-        let largest = products[0].larger(products[1]).larger(products[2]);
+        let largest = products[0].max_abs(products[1]).max_abs(products[2]);
         // Where triangles are of any size, nothing is at once.
         let [at_once, by_extent] = [side, f32::MAX].map(|longest_side| {
             Precise::new(space_per_unit, longest_side).of(0xff, largest, within, sum, z) & 0xff
@@ -1027,9 +879,9 @@ fn the_longest_side_of_all_triangles_is_known() {
         meshes.iter().enumerate().map(mesh).collect()
     };
     let mut accel = Accel::build(geometries(&meshes), &BuildOptions::default()).unwrap();
-    assert_eq!(accel.summary.sizes.longest_side, longest(&meshes));
+    assert_eq!(accel.tree.summary.sizes.longest_side, longest(&meshes));
     let again = Accel::from_bytes(&accel.to_bytes(), geometries(&meshes)).unwrap();
-    assert_eq!(again.summary.sizes.longest_side, longest(&meshes));
+    assert_eq!(again.tree.summary.sizes.longest_side, longest(&meshes));
     accel.refit(geometries(&small)).unwrap();
-    assert_eq!(accel.summary.sizes.longest_side, longest(&small));
+    assert_eq!(accel.tree.summary.sizes.longest_side, longest(&small));
 }

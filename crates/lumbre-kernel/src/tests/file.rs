@@ -27,10 +27,10 @@ fn a_mapped_tree_answers_as_the_one_that_was_saved() {
             let (folder, path) = folder();
             let mut random = Random(seed);
             let accel = mixture(&mut random, CENTER, 3.0, depth, infinite);
-            let masks = (0..accel.geometries.len() as u32).collect();
+            let masks = (0..accel.tree.geometries.len() as u32).collect();
             let accel = accel.with_masks(masks);
             accel.save(&path).unwrap();
-            let mapped = Accel::map(&path, accel.geometries.clone()).unwrap();
+            let mapped = Accel::map(&path, accel.tree.geometries.clone()).unwrap();
             assert_eq!(format!("{mapped:?}"), format!("{accel:?}"));
             assert!(mapped.memory_bytes() < accel.memory_bytes());
             assert_eq!(mapped.to_bytes(), accel.to_bytes());
@@ -98,7 +98,7 @@ fn what_is_wrong_with_a_file_is_said() {
             other => panic!("{other:?}"),
         }
     };
-    let with = |bytes: &[u8]| load(bytes, accel.geometries.clone());
+    let with = |bytes: &[u8]| load(bytes, accel.tree.geometries.clone());
     assert_eq!(with(b"something else altogether"), LoadError::NotATree);
     assert_eq!(with(&bytes[..100]), LoadError::WrongLength { found: 100, expected: 256 });
     for cut in [256, 300, bytes.len() - 64, bytes.len() - 1] {
@@ -119,7 +119,7 @@ fn what_is_wrong_with_a_file_is_said() {
                 std::fs::write(&path, &damaged).unwrap();
                 &path
             },
-            accel.geometries.clone(),
+            accel.tree.geometries.clone(),
         ) {
             Err(MapError::Load(LoadError::Damaged)) => {}
             // Between the arrays nothing stands.
@@ -127,9 +127,9 @@ fn what_is_wrong_with_a_file_is_said() {
             other => panic!("{place}: {other:?}"),
         }
     }
-    let fewer = load(&bytes, accel.geometries[..1].to_vec());
+    let fewer = load(&bytes, accel.tree.geometries[..1].to_vec());
     assert_eq!(fewer, LoadError::OtherGeometries(RefitError::OtherLength { expected: 2, found: 1 }));
-    let mut exchanged = accel.geometries.clone();
+    let mut exchanged = accel.tree.geometries.clone();
     exchanged.reverse();
     assert_eq!(load(&bytes, exchanged), LoadError::Moved);
     assert!(matches!(Accel::map(folder.path().join("nowhere"), vec![]), Err(MapError::Io(_))));
@@ -168,7 +168,7 @@ fn hostile_files_are_refused_or_harmless() {
             hostile[place].copy_from_slice(&number.to_le_bytes());
         }
         std::fs::write(&path, sealed(hostile)).unwrap();
-        match Accel::map(&path, accel.geometries.clone()) {
+        match Accel::map(&path, accel.tree.geometries.clone()) {
             Ok(mapped) => {
                 taken += 1;
                 for _ in 0..8 {

@@ -37,7 +37,7 @@ fn a_tree_of_implicit_surfaces_and_triangles_finds_what_a_loop_finds() {
         assert!(hits > rays.len() / 3, "{hits} of {}", rays.len());
         check_batches(&accel, &rays);
         // Each winds once around its middle, and the boxes know how far they reach.
-        let GeometryKind::Custom(first) = &accel.geometries[0].kind else { panic!() };
+        let GeometryKind::Custom(first) = &accel.tree.geometries[0].kind else { panic!() };
         let bounds = first.bounds(0).expect("it is bounded");
         assert_eq!(first.winding_number(bounds.center()), Some(1.0));
         assert_eq!(first.winding_number(bounds.max), Some(0.0));

@@ -6,14 +6,14 @@ use lumbre_geometry::{Cuboid, PlacedShape, Plane, Sphere, Torus};
 use lumbre_math::{DVec3, Transform};
 
 use super::scenes::{Random, balls, build, bumpy, cube, icosphere, torus, with_every_preset};
-use crate::{Accel, GeometryKind, Instance, TriangleMesh};
+use crate::{Accel, GeometryKind, TriangleMesh};
 
 fn mesh(mesh: TriangleMesh) -> GeometryKind {
     GeometryKind::Mesh(Arc::new(mesh))
 }
 
 fn placed(accel: Accel, world_from_object: Transform) -> GeometryKind {
-    GeometryKind::Instance(Instance { accel: Arc::new(accel), world_from_object: world_from_object.into() })
+    GeometryKind::Instance(accel.instance(world_from_object))
 }
 
 #[test]
@@ -141,8 +141,7 @@ fn what_moves_is_where_it_is_at_that_time() {
     let slide = |x: f64| Transform::translate(DVec3::new(x, 0.0, 0.0));
     let motion = AnimatedTransform::new(vec![(0.0, slide(0.0)), (1.0, slide(8.0))]).unwrap();
     let inner = Arc::new(build(vec![mesh(cube())]));
-    let accel =
-        build(vec![GeometryKind::Instance(Instance { accel: inner, world_from_object: motion.into() })]);
+    let accel = build(vec![GeometryKind::Instance(inner.instance(motion))]);
     let middle = DVec3::new(1.75, 0.25, 4.25);
     for (time, x) in [(0.0, 0.0), (0.5, 4.0), (1.0, 8.0)] {
         let there = middle + DVec3::new(x, 0.0, 0.0);

@@ -9,6 +9,7 @@ mod build;
 mod columns;
 mod deforming;
 mod f32_ray;
+mod f32_watertight;
 mod file;
 mod implicit;
 mod inside;

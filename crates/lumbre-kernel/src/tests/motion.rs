@@ -7,7 +7,8 @@ use lumbre_math::{AnimatedTransform, DVec3, Transform};
 
 use super::oracle::check;
 use super::scenes::{Random, build, cube, icosphere, mixture, ray, with_every_preset};
-use crate::{Accel, BuildOptions, Geometry, GeometryKind, Instance, Placement, brute};
+use crate::tree::Tree;
+use crate::{Accel, BuildOptions, Geometry, GeometryKind, Placement, brute};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 
@@ -37,28 +38,27 @@ fn moving(random: &mut Random, depth: u32, infinite: bool) -> Accel {
         mixture(random, inner_center, 2.0, 0, infinite)
     });
     let inner_center = if depth > 1 { CENTER } else { inner_center };
-    let mut geometries = mixture(random, CENTER, 3.0, 1, false).geometries;
+    let mut geometries = mixture(random, CENTER, 3.0, 1, false).tree.geometries.clone();
     for id in 0..5 {
-        let world_from_object = motion(random, CENTER, 3.0, inner_center).into();
-        let kind = GeometryKind::Instance(Instance { accel: Arc::clone(&inner), world_from_object });
+        let world_from_object = motion(random, CENTER, 3.0, inner_center);
+        let kind = GeometryKind::Instance(inner.instance(world_from_object));
         geometries.push(Geometry { id: 500 + id, kind });
     }
     Accel::build(geometries, &BuildOptions::default()).unwrap()
 }
 
 /// The tree as it is at a time.
-fn frozen(accel: &Accel, time: f64) -> Accel {
+fn frozen(tree: &Tree, time: f64) -> Accel {
     let still = |geometry: &Geometry| {
         let kind = match &geometry.kind {
-            GeometryKind::Instance(instance) => GeometryKind::Instance(Instance {
-                accel: Arc::new(frozen(&instance.accel, time)),
-                world_from_object: instance.world_from_object.at(time).into(),
-            }),
+            GeometryKind::Instance(instance) => GeometryKind::Instance(
+                frozen(&instance.tree, time).instance(instance.world_from_object.at(time)),
+            ),
             kind => kind.clone(),
         };
         Geometry { id: geometry.id, kind }
     };
-    Accel::build(accel.geometries.iter().map(still).collect(), &BuildOptions::default()).unwrap()
+    Accel::build(tree.geometries.iter().map(still).collect(), &BuildOptions::default()).unwrap()
 }
 
 #[test]
@@ -68,15 +68,15 @@ fn queries_at_a_time_see_what_stands_still_there_then() {
         let accel = moving(&mut random, depth, infinite);
         let (mut hits, mut on_moving) = (0, 0);
         for time in [-5.0, 0.0, 0.13, 0.5, 0.77, 3.0] {
-            let frozen = frozen(&accel, time);
+            let frozen = frozen(&accel.tree, time);
             for _ in 0..150 {
                 let ray = ray(&mut random, CENTER, 3.0);
                 let timed = ray.at_time(time);
                 hits += check(&accel, &timed);
                 let hit = accel.closest(&timed);
-                assert_eq!(hit, brute::closest(&frozen, &ray));
+                assert_eq!(hit, brute::closest(&frozen.tree, &ray));
                 let Some(hit) = hit else { continue };
-                let moves = accel.geometries[hit.route.first().map_or(0, |&i| i as usize)].id >= 500;
+                let moves = accel.tree.geometries[hit.route.first().map_or(0, |&i| i as usize)].id >= 500;
                 on_moving += usize::from(moves);
                 assert_eq!(accel.surface(&timed, &hit), frozen.surface(&ray, &hit));
                 assert_eq!(accel.world_from_object(&timed, &hit), frozen.world_from_object(&ray, &hit));
@@ -103,7 +103,7 @@ fn batches_of_rays_at_different_times_answer_as_single_rays_do() {
     let mut is_hit = vec![false; rays.len()];
     accel.any_batch(&rays, &mut is_hit);
     for ((ray, hit), is_hit) in rays.iter().zip(&hits).zip(is_hit) {
-        assert_eq!(*hit, brute::closest(&accel, ray));
+        assert_eq!(*hit, brute::closest(&accel.tree, ray));
         assert_eq!(is_hit, hit.is_some());
     }
     assert!(hits.iter().flatten().count() > 100);
@@ -113,14 +113,13 @@ fn batches_of_rays_at_different_times_answer_as_single_rays_do() {
 fn a_box_holds_what_moves_at_every_time() {
     let mut random = Random(5);
     let inner = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(icosphere(2, CENTER, 1.5)))]));
-    let GeometryKind::Mesh(ball) = &inner.geometries[0].kind else { panic!("a mesh") };
+    let GeometryKind::Mesh(ball) = &inner.tree.geometries[0].kind else { panic!("a mesh") };
     let points: Vec<DVec3> = ball.positions.iter().map(|p| ball.origin + p.as_dvec3()).collect();
     let mut tightest = f64::INFINITY;
     for _ in 0..200 {
         let motion = motion(&mut random, DVec3::ZERO, 5.0, CENTER);
-        let world_from_object = motion.clone().into();
-        let accel =
-            build(vec![GeometryKind::Instance(Instance { accel: Arc::clone(&inner), world_from_object })]);
+        let world_from_object = motion.clone();
+        let accel = build(vec![GeometryKind::Instance(inner.instance(world_from_object))]);
         let mut seen = Aabb::EMPTY;
         for i in 0..=300 {
             let map = motion.at(-1.0 + 0.01 * f64::from(i));
@@ -141,7 +140,7 @@ fn refitted_and_saved_trees_know_where_things_move() {
     let mut random = Random(6);
     let accel = moving(&mut random, 1, false);
     let bytes = accel.to_bytes();
-    let mut geometries = accel.geometries.clone();
+    let mut geometries = accel.tree.geometries.clone();
     let mut loaded = Accel::from_bytes(&bytes, geometries.clone()).unwrap();
     for geometry in geometries.iter_mut().filter(|geometry| geometry.id >= 500) {
         let GeometryKind::Instance(instance) = &mut geometry.kind else { continue };
@@ -171,10 +170,10 @@ fn a_turning_cube_is_met_where_it_is() {
     with_every_preset(|| {
         let turn = |degrees: f64| Transform::rotate(DVec3::Z, degrees).unwrap();
         let keys = vec![(0.0, turn(0.0)), (1.0, turn(90.0)), (2.0, turn(180.0))];
-        let world_from_object = AnimatedTransform::new(keys).unwrap().into();
+        let world_from_object = AnimatedTransform::new(keys).unwrap();
         let cube = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(cube()))]));
         let size = cube.bounds();
-        let accel = build(vec![GeometryKind::Instance(Instance { accel: cube, world_from_object })]);
+        let accel = build(vec![GeometryKind::Instance(cube.instance(world_from_object))]);
         // Down along z, where a corner of the cube passes by.
         let start = DVec3::new(0.0, 0.0, size.max.z + 2.0);
         for i in 0..=40 {

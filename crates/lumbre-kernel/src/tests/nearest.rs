@@ -9,19 +9,19 @@ use super::scenes::{
     Random, balls, build, bumpy, cloud, cube, icosphere, mixture, precise, soup, with_every_preset,
 };
 use crate::point::closest_point::{Frame, Search};
-use crate::{Accel, ClosestPoint, Geometry, GeometryKind, Instance, TriangleMesh};
+use crate::{Accel, ClosestPoint, Geometry, GeometryKind, TriangleMesh};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 
 /// The loop: everything that has an answer, whatever has none, and all together.
 fn by_loop(accel: &Accel, point: DVec3, max_distance: f64) -> (Option<ClosestPoint>, bool) {
-    let mut frames = vec![Frame::outermost(accel, point, 0.0)];
+    let mut frames = vec![Frame::outermost(&accel.tree, point, 0.0)];
     let mut search = Search::new(point, max_distance);
     let mut position = 0;
     while position < frames.len() {
         let mut inner = Vec::new();
         let frame = &frames[position];
-        for (geometry, standing) in frame.accel.geometries.iter().enumerate() {
+        for (geometry, standing) in frame.tree.geometries.iter().enumerate() {
             let geometry = geometry as u32;
             match &standing.kind {
                 GeometryKind::Mesh(mesh) => {
@@ -115,10 +115,9 @@ fn what_has_no_area_is_as_near_as_it_is_and_no_ray_hits_it() {
         let mut points = flat_soup(&mut random, 20, center, 0.5);
         points.indices.iter_mut().for_each(|triangle| *triangle = [triangle[0]; 3]);
         let points = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(points))]));
-        let nested = Arc::new(build(vec![GeometryKind::Instance(Instance {
-            accel: points.clone(),
-            world_from_object: Transform::translate(DVec3::new(0.5, 0.25, -1.0)).into(),
-        })]));
+        let nested = Arc::new(build(vec![GeometryKind::Instance(
+            points.instance(Transform::translate(DVec3::new(0.5, 0.25, -1.0))),
+        )]));
         let mut kinds = vec![
             GeometryKind::Mesh(Arc::new(mesh)),
             GeometryKind::PreciseMesh(Arc::new(precise_mesh)),
@@ -128,7 +127,7 @@ fn what_has_no_area_is_as_near_as_it_is_and_no_ray_hits_it() {
             for _ in 0..4 {
                 let map = random.placement(center, 4.0, 0.5) * Transform::translate(-center);
                 let accel = Arc::clone(accel);
-                kinds.push(GeometryKind::Instance(Instance { accel, world_from_object: map.into() }));
+                kinds.push(GeometryKind::Instance(accel.instance(map)));
             }
         }
         let accel = build(kinds);
@@ -202,20 +201,14 @@ fn answerable(random: &mut Random, center: DVec3, extent: f64, depth: u32) -> Ac
     let meshes = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(rock))]));
     for _ in 0..3 {
         let map = random.placement(center, extent, 0.5) * Transform::translate(-center);
-        kinds.push(GeometryKind::Instance(Instance {
-            accel: Arc::clone(&meshes),
-            world_from_object: map.into(),
-        }));
+        kinds.push(GeometryKind::Instance(meshes.instance(map)));
     }
     if depth > 0 {
         let inner_center = DVec3::new(3.0, -2.0, 5.0);
         let inner = Arc::new(answerable(random, inner_center, 2.0, depth - 1));
         for _ in 0..3 {
             let map = similar(random, center, extent) * Transform::translate(-inner_center);
-            kinds.push(GeometryKind::Instance(Instance {
-                accel: Arc::clone(&inner),
-                world_from_object: map.into(),
-            }));
+            kinds.push(GeometryKind::Instance(inner.instance(map)));
         }
     }
     build(kinds)
@@ -318,12 +311,7 @@ fn two_to_the_fortieth_cubes_have_a_nearest_one() {
     let mut accel = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(cube()))]));
     for isa in 0..40 {
         let apart = 4.0 * 2f64.powi(isa);
-        let place = |offset: DVec3| {
-            GeometryKind::Instance(Instance {
-                accel: Arc::clone(&accel),
-                world_from_object: Transform::translate(offset).into(),
-            })
-        };
+        let place = |offset: DVec3| GeometryKind::Instance(accel.instance(Transform::translate(offset)));
         let pair = build(vec![place(DVec3::ZERO), place(DVec3::new(apart, 0.0, 0.0))]);
         accel = Arc::new(pair);
     }

@@ -34,7 +34,7 @@ fn corners(node: &Node, lane: usize) -> [DVec3; 2] {
 /// Checks the order of all children below a node, and counts those that were checked; what is to be expected of it, where there are
 /// nothing but triangles below.
 fn check_order(accel: &Accel, reference: u32, checked: &mut usize) -> Option<Odds> {
-    let tree = &accel.tree;
+    let tree = &accel.tree.packed;
     let node = &tree.nodes[reference as usize];
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let mut children = Vec::new();
@@ -51,7 +51,8 @@ fn check_order(accel: &Accel, reference: u32, checked: &mut usize) -> Option<Odd
                     for lane in (0..8).filter(|lane| block.taken() >> lane & 1 != 0) {
                         let [a, b, c] =
                             block.triangle(lane).map(|corner| DVec3::from_array(corner.map(f64::from)));
-                        let (b, c) = ((b - a) * accel.tree_space.scale, (c - a) * accel.tree_space.scale);
+                        let (b, c) =
+                            ((b - a) * accel.tree.tree_space.scale, (c - a) * accel.tree.tree_space.scale);
                         triangles += 0.5 * b.cross(c).length();
                         unsure += 1e-6 * b.length() * c.length();
                     }
@@ -88,8 +89,8 @@ fn check_order(accel: &Accel, reference: u32, checked: &mut usize) -> Option<Odd
 /// How many children stand in order, of how many there are.
 fn checked(accel: &Accel) -> (usize, usize) {
     let mut checked = 0;
-    check_order(accel, accel.tree.root.unwrap(), &mut checked);
-    (checked, accel.tree.nodes.iter().map(Node::len).sum())
+    check_order(accel, accel.tree.packed.root.unwrap(), &mut checked);
+    (checked, accel.tree.packed.nodes.iter().map(Node::len).sum())
 }
 
 #[test]
@@ -109,9 +110,9 @@ fn children_stand_by_how_likely_they_stop_a_ray_for_what_they_cost() {
             assert_eq!(found, all);
             let extent = accel.bounds().size().max_element();
             accel.refit(moved(&accel, random, accel.bounds().center(), extent)).unwrap();
-            let before = format!("{:?}", accel.tree.nodes);
+            let before = format!("{:?}", accel.tree.packed.nodes);
             accel.rebuild_partially(&options());
-            if before != format!("{:?}", accel.tree.nodes) {
+            if before != format!("{:?}", accel.tree.packed.nodes) {
                 let (found, all) = checked(&accel);
                 assert_eq!(found, all);
             }
@@ -138,10 +139,10 @@ fn a_wall_is_asked_before_a_larger_bush() {
     let count = mesh.indices.len() as u32;
     with_every_preset(|| {
         let accel = build(vec![GeometryKind::Mesh(Arc::new(mesh.clone()))]);
-        let root = &accel.tree.nodes[accel.tree.root.unwrap() as usize];
+        let root = &accel.tree.packed.nodes[accel.tree.packed.root.unwrap() as usize];
         let last = root.children[root.len() - 1];
         assert_eq!(tag::of(last), tag::TRIANGLES);
-        let names = &accel.tree.names[accel.tree.numbers(last).start];
+        let names = &accel.tree.packed.names[accel.tree.packed.numbers(last).start];
         assert!(names.primitives().any(|primitive| primitive >= count - 2), "{names:?}");
         let areas: Vec<f64> = (0..root.len())
             .map(|lane| {
@@ -161,6 +162,7 @@ fn the_order_is_the_same_by_every_instruction_set() {
         // Which is another one.
         let reversed: Vec<Node> = accel
             .tree
+            .packed
             .nodes
             .iter()
             .map(|node| {
@@ -174,7 +176,12 @@ fn the_order_is_the_same_by_every_instruction_set() {
             .into_iter()
             .map(|isa| {
                 let mut nodes = reversed.clone();
-                occlusion_order::sort_children(isa, &accel.tree_space, &mut nodes, accel.tree.blocks());
+                occlusion_order::sort_children(
+                    isa,
+                    &accel.tree.tree_space,
+                    &mut nodes,
+                    accel.tree.packed.blocks(),
+                );
                 format!("{nodes:?}")
             })
             .collect();

@@ -14,8 +14,8 @@ use crate::build::open_instances::is_part;
 use crate::tree::packed::Entry;
 use crate::tree::packed::Start;
 use crate::{
-    Accel, BuildOptions, Geometry, GeometryKind, Instance, LoadError, MapError, Placement, Preset, Query,
-    SphereCloud, TriangleMesh,
+    Accel, BuildOptions, Geometry, GeometryKind, LoadError, MapError, Placement, Preset, Query, SphereCloud,
+    TriangleMesh,
 };
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
@@ -93,7 +93,7 @@ fn motion(random: &mut Random) -> AnimatedTransform {
 }
 
 fn place(accel: &Arc<Accel>, map: impl Into<Placement>) -> GeometryKind {
-    GeometryKind::Instance(Instance { accel: Arc::clone(accel), world_from_object: map.into() })
+    GeometryKind::Instance(accel.instance(map))
 }
 
 fn scattered(random: &mut Random, trees: &[Arc<Accel>], count: usize) -> Accel {
@@ -102,8 +102,9 @@ fn scattered(random: &mut Random, trees: &[Arc<Accel>], count: usize) -> Accel {
 
 /// How many entries are parts, and how many instances they are of.
 fn parts(accel: &Accel) -> (usize, usize) {
-    let of = |entry: &&Entry| is_part(entry, &accel.geometries);
-    let mut names: Vec<u32> = accel.tree.entries.iter().filter(of).map(|entry| entry.geometry).collect();
+    let of = |entry: &&Entry| is_part(entry, &accel.tree.geometries);
+    let mut names: Vec<u32> =
+        accel.tree.packed.entries.iter().filter(of).map(|entry| entry.geometry).collect();
     let count = names.len();
     names.sort_unstable();
     names.dedup();
@@ -214,13 +215,13 @@ fn other_queries_answer_as_without_opening() {
     let fast = BuildOptions { preset: Preset::Fast };
     for (i, row) in rows(&mut random).into_iter().enumerate() {
         let mask = |i: usize| 1 << (i % 3);
-        let count = row.geometries.len();
+        let count = row.tree.geometries.len();
         let inner = Arc::new(row.with_masks((0..count).map(mask).collect()));
         let bar = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(bar(400)))]));
         let opened = scattered(&mut random, &[inner, bar], 18);
         assert!(parts(&opened).0 > 30);
         let masks = (0..18).map(|i| !mask(i)).collect::<Vec<_>>();
-        let whole = Accel::build(opened.geometries.clone(), &fast).unwrap().with_masks(masks.clone());
+        let whole = Accel::build(opened.tree.geometries.clone(), &fast).unwrap().with_masks(masks.clone());
         assert_eq!(parts(&whole).0, 0);
         let opened = opened.with_masks(masks);
         let (mut inside, mut near) = (0, 0);
@@ -234,7 +235,7 @@ fn other_queries_answer_as_without_opening() {
                 near += usize::from(nearest.is_some());
             }
             let p = Transform::point(
-                &opened.geometries[random.below(18)].kind.map_of_instance(),
+                &opened.tree.geometries[random.below(18)].kind.map_of_instance(),
                 on_line(&mut random),
             );
             assert_eq!(opened.is_inside(p), whole.is_inside(p), "kind {i} {p}");
@@ -275,7 +276,7 @@ fn only_what_gains_is_opened_and_only_so_far() {
     assert_eq!(parts(&moving), (0, 0));
     for count in [1, 9, 200] {
         let accel = scattered(&mut random, &[Arc::clone(&long)], count);
-        let entries = accel.tree.entries.len();
+        let entries = accel.tree.packed.entries.len();
         assert!(entries >= 12 * count && entries <= 16 * count + 64, "{count} became {entries}");
     }
 }
@@ -286,7 +287,7 @@ fn instances_fill_their_nodes() {
     let bars = [Arc::new(build(vec![GeometryKind::Mesh(Arc::new(bar(400)))]))];
     for count in [1, 3, 8, 9, 700] {
         let accel = scattered(&mut random, &bars, count);
-        let (nodes, entries) = (accel.tree.nodes.len(), accel.tree.entries.len());
+        let (nodes, entries) = (accel.tree.packed.nodes.len(), accel.tree.packed.entries.len());
         // A root, and nodes of eleven children in the mean.
         assert!(nodes - 1 <= entries / 10, "{nodes} nodes over {entries} entries");
         if count == 700 {
@@ -310,7 +311,7 @@ fn opened_trees_are_the_same_from_any_number_of_threads() {
                 let geometries = kinds.map(|kind| Geometry { id: 9, kind }).collect();
                 let accel = Accel::build(geometries, &options).unwrap();
                 assert_eq!(parts(&accel).0 > 5_000, options.preset != Preset::Fast);
-                format!("{:?}", accel.tree)
+                format!("{:?}", accel.tree.packed)
             })
         };
         let one = print(1);
@@ -325,7 +326,7 @@ fn with_tree(accel: &Accel, tree: &Arc<Accel>) -> Vec<Geometry> {
         let map = geometry.kind.map_of_instance();
         Geometry { id: geometry.id, kind: place(tree, map) }
     };
-    accel.geometries.iter().map(replaced).collect()
+    accel.tree.geometries.iter().map(replaced).collect()
 }
 
 #[test]
@@ -335,7 +336,7 @@ fn parts_follow_what_moves() {
         let inner = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(bar(400)))]));
         let mut accel = scattered(&mut random, &[inner], 14);
         for _ in 0..2 {
-            let mut geometries = accel.geometries.clone();
+            let mut geometries = accel.tree.geometries.clone();
             for geometry in &mut geometries {
                 let GeometryKind::Instance(instance) = &mut geometry.kind else { panic!() };
                 instance.world_from_object = slanted(&mut random).into();
@@ -345,7 +346,7 @@ fn parts_follow_what_moves() {
             check_rays(&accel, &mut random, 150);
         }
         // One begins to move.
-        let mut geometries = accel.geometries.clone();
+        let mut geometries = accel.tree.geometries.clone();
         let GeometryKind::Instance(instance) = &mut geometries[3].kind else { panic!() };
         instance.world_from_object = motion(&mut random).into();
         accel.refit(geometries).unwrap();
@@ -365,7 +366,7 @@ fn parts_follow_the_tree_that_they_are_of_and_stand_for_the_whole_of_another() {
         let mesh = bar(400);
         let mut inner = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(mesh.clone()))]));
         let mut accel = scattered(&mut random, &[inner.clone()], 14);
-        let before = format!("{:?}", accel.tree);
+        let before = format!("{:?}", accel.tree.packed);
         // The outer tree lets go of it: for another, for a tiny one, for one of nothing.
         let others = [
             build(vec![GeometryKind::Mesh(Arc::new(soup(&mut random, 700, MIDDLE, 1.0)))]),
@@ -381,11 +382,11 @@ fn parts_follow_the_tree_that_they_are_of_and_stand_for_the_whole_of_another() {
             } else {
                 check_rays(&accel, &mut random, 100);
             }
-            let loaded = Accel::from_bytes(&accel.to_bytes(), accel.geometries.clone()).unwrap();
-            assert_eq!(format!("{:?}", loaded.tree), format!("{:?}", accel.tree));
+            let loaded = Accel::from_bytes(&accel.to_bytes(), accel.tree.geometries.clone()).unwrap();
+            assert_eq!(format!("{:?}", loaded.tree.packed), format!("{:?}", accel.tree.packed));
         }
         accel.refit(with_tree(&accel, &inner)).unwrap();
-        assert_eq!(format!("{:?}", accel.tree), before);
+        assert_eq!(format!("{:?}", accel.tree.packed), before);
         // What is in it moves.
         accel.refit(with_tree(&accel, &Arc::new(build(vec![])))).unwrap();
         let bend = |p: &Vec3| *p + Vec3::new(0.0, 0.4 * (2.0 * p.x).sin(), 0.1 * p.x);
@@ -413,12 +414,12 @@ fn opened_trees_are_saved_and_mapped() {
         let inner = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(bar(400)))]));
         let accel = scattered(&mut random, &[inner], 14);
         assert_opened(&accel);
-        let loaded = Accel::from_bytes(&accel.to_bytes(), accel.geometries.clone()).unwrap();
+        let loaded = Accel::from_bytes(&accel.to_bytes(), accel.tree.geometries.clone()).unwrap();
         assert_eq!(format!("{loaded:?}"), format!("{accel:?}"));
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("tree");
         accel.save(&path).unwrap();
-        let mapped = Accel::map(&path, accel.geometries.clone()).unwrap();
+        let mapped = Accel::map(&path, accel.tree.geometries.clone()).unwrap();
         assert_eq!(format!("{mapped:?}"), format!("{accel:?}"));
         check_rays(&mapped, &mut random, 100);
 
@@ -455,9 +456,9 @@ fn opened_trees_are_saved_and_mapped() {
 fn hostile_parts_are_refused_or_stand_for_the_whole() {
     let mut random = Random(311);
     let inner = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(bar(400)))]));
-    let nodes = inner.tree.nodes.len();
+    let nodes = inner.tree.packed.nodes.len();
     let mut accel = scattered(&mut random, &[inner], 9);
-    let whole = accel.tree.entries.to_vec();
+    let whole = accel.tree.packed.entries.to_vec();
     assert!(parts(&accel).0 > 40 && nodes > 20);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("tree");
@@ -479,10 +480,10 @@ fn hostile_parts_are_refused_or_stand_for_the_whole() {
             entries[place] = Entry::new(geometry, word, true);
         }
         let is_same = entries.iter().zip(&whole).all(|(a, b)| a.to_words() == b.to_words());
-        accel.tree.entries = entries.into();
-        match Accel::from_bytes(&accel.to_bytes(), accel.geometries.clone()) {
+        Arc::make_mut(&mut accel.tree).packed.entries = entries.into();
+        match Accel::from_bytes(&accel.to_bytes(), accel.tree.geometries.clone()) {
             Ok(loaded) => {
-                let starts = loaded.tree.entries.iter().map(|entry| Start::of(entry.primitive()));
+                let starts = loaded.tree.packed.entries.iter().map(|entry| Start::of(entry.primitive()));
                 stand_in += usize::from(starts.into_iter().any(Start::is_nothing));
                 (0..4).for_each(|_| {
                     check(&loaded, &ray(&mut random, CENTER, 2.0));
@@ -495,7 +496,7 @@ fn hostile_parts_are_refused_or_stand_for_the_whole() {
             }
         }
         if accel.save(&path).is_ok() {
-            let mapped = Accel::map(&path, accel.geometries.clone());
+            let mapped = Accel::map(&path, accel.tree.geometries.clone());
             assert_eq!(mapped.is_ok(), is_same);
         }
     }

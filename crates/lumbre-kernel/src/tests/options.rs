@@ -9,20 +9,20 @@ use super::scenes::{
     Random, balls, build, cube, icosphere, mixture, ray, repeats, shape, soup, with_every_preset,
 };
 use crate::intersect::Isa;
-use crate::{Accel, Faces, GeometryKind, Hit, Instance, Query, TriangleMesh, brute};
+use crate::{Accel, Faces, GeometryKind, Hit, Query, TriangleMesh, brute};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 
 /// The masks of what a hit is in, outermost first.
 fn masks(accel: &Accel, hit: &Hit) -> Vec<u32> {
     let mut masks = Vec::new();
-    let mut accel = accel;
+    let mut tree = &accel.tree;
     for &position in &hit.route {
-        masks.push(accel.masks.get(position as usize).copied().unwrap_or(u32::MAX));
-        let GeometryKind::Instance(instance) = &accel.geometries[position as usize].kind else { panic!() };
-        accel = &instance.accel;
+        masks.push(tree.masks.get(position as usize).copied().unwrap_or(u32::MAX));
+        let GeometryKind::Instance(instance) = &tree.geometries[position as usize].kind else { panic!() };
+        tree = &instance.tree;
     }
-    masks.push(accel.masks.get(hit.geometry as usize).copied().unwrap_or(u32::MAX));
+    masks.push(tree.masks.get(hit.geometry as usize).copied().unwrap_or(u32::MAX));
     masks
 }
 
@@ -40,7 +40,7 @@ fn counts(accel: &Accel, ray: &Ray, hit: &Hit, options: &Query) -> bool {
 }
 
 fn with_random_masks(accel: Accel, random: &mut Random) -> Accel {
-    let masks = accel.geometries.iter().map(|_| random.bits() as u32 & 0b111_0000).collect();
+    let masks = accel.tree.geometries.iter().map(|_| random.bits() as u32 & 0b111_0000).collect();
     accel.with_masks(masks)
 }
 
@@ -50,22 +50,18 @@ fn options_leave_what_a_filter_leaves() {
     let inner = mixture(&mut random, CENTER, 1.5, 0, false);
     let inner = Arc::new(with_random_masks(inner, &mut random));
     let outer = mixture(&mut random, CENTER, 3.0, 1, true);
-    let mut kinds: Vec<_> = outer.geometries.iter().map(|geometry| geometry.kind.clone()).collect();
+    let mut kinds: Vec<_> = outer.tree.geometries.iter().map(|geometry| geometry.kind.clone()).collect();
     for _ in 0..3 {
         let place =
             Transform::translate(random.vector()) * Transform::scale(DVec3::new(-1.1, 0.9, 1.2)).unwrap();
-        kinds.push(GeometryKind::Instance(Instance {
-            accel: Arc::clone(&inner),
-            world_from_object: place.into(),
-        }));
+        kinds.push(GeometryKind::Instance(inner.instance(place)));
     }
     let accel = build(kinds);
     assert_ne!(accel.only_triangles(), Some(true));
     // At first there are masks in instances alone, and then everywhere.
     check(&accel, &mut random);
-    let placed = Instance { accel: Arc::new(accel), world_from_object: Transform::IDENTITY.into() };
+    let placed = accel.instance(Transform::IDENTITY);
     check(&build(vec![GeometryKind::Instance(placed.clone())]), &mut random);
-    let accel = Arc::into_inner(placed.accel).expect("its one owner");
     check(&with_random_masks(accel, &mut random), &mut random);
 }
 
@@ -82,9 +78,9 @@ fn they_do_so_in_trees_that_single_precision_searches() {
     for kinds in [meshes, mixed] {
         with_every_preset(|| {
             let accel = build(kinds.clone());
-            assert!(accel.single.is_some());
+            assert!(accel.tree.single.is_some());
             let masks = [0b011_0000, 0b101_0000, 0b010_0000].into_iter().cycle();
-            let masks = masks.take(accel.geometries.len()).collect();
+            let masks = masks.take(accel.tree.geometries.len()).collect();
             let accel = accel.with_masks(masks);
             check(&accel, &mut random);
         });
@@ -107,16 +103,13 @@ fn they_do_so_in_placed_trees_that_single_precision_searches() {
         Arc::new(tree.with_masks(vec![0b011_0000, 0b101_0000]))
     });
     let placed = |random: &mut Random, accel: &Arc<Accel>, at: DVec3| {
-        GeometryKind::Instance(Instance {
-            accel: Arc::clone(accel),
-            world_from_object: random.placement(at, 2.0, 0.8).into(),
-        })
+        GeometryKind::Instance(accel.instance(random.placement(at, 2.0, 0.8)))
     };
     let pair = build(trees[..2].iter().map(|tree| placed(&mut random, tree, zero)).collect());
     let pair = Arc::new(pair.with_masks(vec![0b001_0000, 0b111_0000]));
     let kinds = (0..12).map(|i| placed(&mut random, [&trees[2], &pair, &trees[i % 2]][i % 3], CENTER));
     let accel = build(kinds.collect());
-    assert!(accel.tree.entries.len() > 12);
+    assert!(accel.tree.packed.entries.len() > 12);
     check(&accel, &mut random);
     check(&with_random_masks(accel, &mut random), &mut random);
 }
@@ -126,7 +119,7 @@ fn check(accel: &Accel, random: &mut Random) {
     let count = repeats(3000);
     for i in 0..count {
         let ray = ray(random, CENTER, 3.0);
-        let all = brute::every(accel, &ray);
+        let all = brute::every(&accel.tree, &ray);
         let options = Query {
             mask: [u32::MAX, 0b001_0000, 0b110_0000][i % 3],
             exclude: if i % 2 == 0 { all.first() } else { None },

@@ -10,7 +10,7 @@ use lumbre_math::{DVec3, Transform};
 
 use super::scenes::{Random, balls, build, cube, icosphere, mixture, ray, soup, with_every_preset};
 use crate::intersect::Isa;
-use crate::{Accel, GeometryKind, Hit, Instance, Query, TriangleMesh, brute};
+use crate::{Accel, GeometryKind, Hit, Query, TriangleMesh, brute};
 
 fn every(isa: Isa, accel: &Accel, ray: &Ray) -> Vec<Hit> {
     let mut hits = Vec::new();
@@ -23,8 +23,8 @@ fn every(isa: Isa, accel: &Accel, ray: &Ray) -> Vec<Hit> {
 
 /// All queries on one ray; returns how many hits there were.
 pub(crate) fn check(accel: &Accel, ray: &Ray) -> usize {
-    let expected = brute::every(accel, ray);
-    let closest = brute::closest(accel, ray);
+    let expected = brute::every(&accel.tree, ray);
+    let closest = brute::closest(&accel.tree, ray);
     assert_eq!(closest, expected.first().cloned(), "{ray:?}");
     for isa in Isa::all() {
         let found = accel.closest_at(isa, ray);
@@ -156,20 +156,16 @@ fn placed_meshes_are_found_as_by_a_loop() {
             soups.to_vec(),
         ]
         .map(|kinds| Arc::new(build(kinds)));
-        assert_eq!(trees.each_ref().map(|tree| tree.single.is_some()), [true, true, false]);
+        assert_eq!(trees.each_ref().map(|tree| tree.tree.single.is_some()), [true, true, false]);
         let mut kinds = vec![GeometryKind::Mesh(Arc::new(soup(&mut random, 30, CENTER, 3.0)))];
         for i in 0..24 {
-            let world_from_object =
-                (random.placement(CENTER, 3.0, 0.5) * Transform::translate(-CENTER)).into();
-            kinds.push(GeometryKind::Instance(Instance { accel: trees[i % 3].clone(), world_from_object }));
+            let world_from_object = random.placement(CENTER, 3.0, 0.5) * Transform::translate(-CENTER);
+            kinds.push(GeometryKind::Instance(trees[i % 3].instance(world_from_object)));
         }
         let accel = build(kinds);
         check_many(&accel, &mut random, CENTER, 3.0, 3_000);
         // Exactly at corners of what is placed as it is.
-        let accel = build(vec![GeometryKind::Instance(Instance {
-            accel: trees[0].clone(),
-            world_from_object: Transform::IDENTITY.into(),
-        })]);
+        let accel = build(vec![GeometryKind::Instance(trees[0].instance(Transform::IDENTITY))]);
         let mut hits = 0;
         for position in &ball.positions {
             let corner = ball.origin + position.as_dvec3();
@@ -185,9 +181,7 @@ fn soup_in_and_beside_instances(random: &mut Random) -> Accel {
     let soup = GeometryKind::Mesh(Arc::new(soup(random, 150, CENTER, 3.0)));
     let inner = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(icosphere(2, CENTER, 2.5))), soup.clone()]));
     let map = random.placement(CENTER, 0.5, 1.0) * Transform::translate(-CENTER);
-    let instance = |accel: &Arc<Accel>, map: Transform| {
-        GeometryKind::Instance(Instance { accel: Arc::clone(accel), world_from_object: map.into() })
-    };
+    let instance = |accel: &Arc<Accel>, map: Transform| GeometryKind::Instance(accel.instance(map));
     build(vec![soup, instance(&inner, map), instance(&inner, Transform::IDENTITY)])
 }
 
@@ -198,7 +192,7 @@ fn a_filter_is_asked_once_about_each_crossing() {
     let mut dispatched = 0;
     for _ in 0..3000 {
         let ray = ray(&mut random, CENTER, 3.0);
-        let all = brute::every(&accel, &ray);
+        let all = brute::every(&accel.tree, &ray);
         let seen = RefCell::new(HashSet::new());
         let deny = |hit: &Hit| {
             assert!(all.contains(hit), "{hit:?} is no hit");
@@ -227,7 +221,7 @@ fn infinite_things_are_found_within_instances_and_without() {
     with_every_preset(|| {
         let mut random = Random(3);
         let accel = mixture(&mut random, CENTER, 3.0, 1, true);
-        assert!(!accel.infinite.is_empty());
+        assert!(!accel.tree.infinite.is_empty());
         check_many(&accel, &mut random, CENTER, 3.0, 2_000);
     });
 }
@@ -287,10 +281,7 @@ fn ill_conditioned_instances_lose_nothing() {
             * Transform::scale(DVec3::new(1.0, squeeze, 1.0)).unwrap()
             * Transform::rotate(random.vector(), 53.0).unwrap();
         let center = map.point(CENTER);
-        let accel = build(vec![GeometryKind::Instance(Instance {
-            accel: Arc::clone(&inner),
-            world_from_object: map.into(),
-        })]);
+        let accel = build(vec![GeometryKind::Instance(inner.instance(map))]);
         check_many(&accel, &mut random, center, 3.0, 3_000);
     }
 }
@@ -299,12 +290,7 @@ fn ill_conditioned_instances_lose_nothing() {
 fn ties_go_to_the_first_in_the_lists() {
     let cube = Arc::new(cube());
     let inner = Arc::new(build(vec![GeometryKind::Mesh(cube.clone()), GeometryKind::Mesh(cube.clone())]));
-    let instance = || {
-        GeometryKind::Instance(Instance {
-            accel: inner.clone(),
-            world_from_object: Transform::IDENTITY.into(),
-        })
-    };
+    let instance = || GeometryKind::Instance(inner.instance(Transform::IDENTITY));
     let accel = build(vec![
         instance(),
         GeometryKind::Mesh(cube.clone()),
@@ -390,7 +376,7 @@ fn all_stops_where_told() {
     let ray = Ray::new(CENTER + DVec3::new(0.3, -9.0, 0.2), DVec3::new(0.01, 1.0, -0.02));
     let hits = every(Isa::best(), &accel, &ray);
     assert!(hits.len() > 300, "{}", hits.len());
-    assert_eq!(hits, brute::every(&accel, &ray));
+    assert_eq!(hits, brute::every(&accel.tree, &ray));
     for stop in [1, 31, 32, 33, 160, 161, hits.len()] {
         let mut seen = Vec::new();
         accel.all(&ray, |hit| {

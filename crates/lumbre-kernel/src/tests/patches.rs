@@ -8,7 +8,7 @@ use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::oracle::check;
 use super::scenes::{Random, build};
-use crate::{Accel, GeometryKind, Instance, TriangleMesh};
+use crate::{Accel, GeometryKind, TriangleMesh};
 
 /// A closed body of quads: the surface of a cube of `n` × `n` × `n` cells about zero, its vertices moved by up to `bend` cells.
 struct Body {
@@ -119,7 +119,7 @@ fn no_ray_leaks_between_bent_patches_and_triangles() {
             bombard(name, &body, &accel, &map, rays, &mut random);
         }
         let inner = Arc::new(build(geometries(&body, Transform::IDENTITY, DVec3::ZERO, 0.5, &mut random)));
-        let instance = Instance { accel: inner, world_from_object: affine.into() };
+        let instance = inner.instance(affine);
         let accel = build(vec![GeometryKind::Instance(instance)]);
         bombard("in an instance", &body, &accel, &affine, rays, &mut random);
     }

@@ -9,7 +9,7 @@ use super::oracle::check;
 use super::scenes::{
     Random, build, bumpy, cube, icosphere, mesh, precise, ray, repeats, soup, torus, with_every_preset,
 };
-use crate::{Accel, BuildError, Faces, Geometry, GeometryKind, Instance, PreciseMesh, Query, TriangleMesh};
+use crate::{Accel, BuildError, Faces, Geometry, GeometryKind, PreciseMesh, Query, TriangleMesh};
 
 fn kind(mesh: PreciseMesh) -> GeometryKind {
     GeometryKind::PreciseMesh(Arc::new(mesh))
@@ -42,10 +42,8 @@ fn no_aimed_ray_leaks_through_fine_meshes_far_away() {
                 let accel = build(vec![kind(fine.clone())]);
                 let map =
                     random.placement(DVec3::new(5.0, 6.0, -7.0), 1.0, 1.0) * Transform::translate(-place);
-                let placed = build(vec![GeometryKind::Instance(Instance {
-                    accel: Arc::new(build(vec![kind(fine.clone())])),
-                    world_from_object: map.into(),
-                })]);
+                let placed =
+                    build(vec![GeometryKind::Instance(build(vec![kind(fine.clone())]).instance(map))]);
                 let from = place + 0.01 * inside;
                 for i in 0..3000 {
                     let corners = fine.corners(random.below(fine.indices.len()) as u32);

@@ -14,7 +14,7 @@ use super::scenes::{
     with_every_preset,
 };
 use crate::batch::packet::PACKET;
-use crate::{Accel, BuildOptions, Geometry, GeometryKind, Hit, Instance, Preset, TriangleMesh, brute};
+use crate::{Accel, BuildOptions, Geometry, GeometryKind, Hit, Preset, TriangleMesh, brute};
 
 /// Closed meshes, each with a point inside.
 fn closed_meshes() -> Vec<(&'static str, TriangleMesh, DVec3)> {
@@ -39,13 +39,7 @@ fn placements(mesh: &TriangleMesh, preset: Preset) -> [(Accel, Transform); 4] {
     let far = DVec3::new(1.0e6, -3.0e5, 7.0e6);
     let as_it_is = || tree(GeometryKind::Mesh(Arc::new(mesh.clone())), preset);
     let placed = |accel: Accel, world_from_object: Transform| {
-        tree(
-            GeometryKind::Instance(Instance {
-                accel: Arc::new(accel),
-                world_from_object: world_from_object.into(),
-            }),
-            preset,
-        )
+        tree(GeometryKind::Instance(accel.instance(world_from_object)), preset)
     };
     let squeezed = random.placement(DVec3::new(3.0, -1.0, 2.0), 1.0, 1e-6)
         * Transform::scale(DVec3::new(-1.0, 1.0, 1.0)).unwrap();
@@ -207,7 +201,7 @@ fn compare(rays: u64, seed: u64) -> u64 {
                 _ => rays.iter().map(|ray| (accel.closest(ray), accel.any(ray))).unzip(),
             };
             for ((ray, hit), any) in rays.iter().zip(hits).zip(any) {
-                let expected = brute::closest(&accel, ray);
+                let expected = brute::closest(&accel.tree, ray);
                 let bits = |hit: &Option<Hit>| hit.as_ref().map(|hit| hit.root.t.to_bits());
                 assert_eq!(hit, expected, "{ray:?}");
                 assert_eq!(bits(&hit), bits(&expected), "{ray:?}");

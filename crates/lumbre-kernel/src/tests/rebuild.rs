@@ -7,7 +7,7 @@ use lumbre_math::{DVec3, Transform, Vec3};
 use super::oracle::check;
 use super::refit::moved;
 use super::scenes::{Random, build, icosphere, mixture, options, ray, repeats, shape, with_every_preset};
-use crate::{Accel, Geometry, GeometryKind, Instance, Preset, TriangleMesh};
+use crate::{Accel, Geometry, GeometryKind, Preset, TriangleMesh};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 
@@ -27,8 +27,8 @@ fn a_tree_that_is_rebuilt_in_part_finds_what_a_loop_finds() {
                 let count = repeats(300);
                 let hits: usize = (0..count).map(|_| check(&accel, &ray(&mut random, center, extent))).sum();
                 assert!(hits > count / 4, "{hits}");
-                let again = Accel::from_bytes(&accel.to_bytes(), accel.geometries.clone()).unwrap();
-                assert!(format!("{:?}", again.tree) == format!("{:?}", accel.tree));
+                let again = Accel::from_bytes(&accel.to_bytes(), accel.tree.geometries.clone()).unwrap();
+                assert!(format!("{:?}", again.tree.packed) == format!("{:?}", accel.tree.packed));
             }
         }
     });
@@ -72,11 +72,11 @@ fn shapes(random: &mut Random) -> Vec<Geometry> {
 /// The cost of a ray after such a refit, after a partial rebuild, and after a build, each as a multiple of that of the tree before.
 fn growths(before: Vec<Geometry>, after: Vec<Geometry>) -> [f64; 3] {
     let mut accel = Accel::build(before, &options()).unwrap();
-    let built = crate::build::refit::cost(&accel.tree.nodes);
+    let built = crate::build::refit::cost(&accel.tree.packed.nodes);
     let anew = Accel::build(after.clone(), &options()).unwrap();
     let refitted = accel.refit(after).unwrap();
     let rebuilt = accel.rebuild_partially(&options());
-    [refitted, rebuilt, crate::build::refit::cost(&anew.tree.nodes) / built]
+    [refitted, rebuilt, crate::build::refit::cost(&anew.tree.packed.nodes) / built]
 }
 
 #[test]
@@ -155,15 +155,14 @@ fn trees_around_follow_one_that_is_rebuilt_in_part() {
             let instance = |id| {
                 let world_from_object = Transform::translate(CENTER + 8.0 * random.vector())
                     * Transform::rotate(random.vector(), 50.0).unwrap();
-                let world_from_object = world_from_object.into();
-                let kind = GeometryKind::Instance(Instance { accel: Arc::clone(inner), world_from_object });
+                let kind = GeometryKind::Instance(inner.instance(world_from_object));
                 Geometry { id, kind }
             };
             (0..12).map(instance).collect::<Vec<_>>()
         };
         let geometries = around(&inner, &mut Random(455));
         let mut accel = Accel::build(geometries, &options()).unwrap();
-        let is_opened = accel.tree.entries.len() > accel.geometries.len();
+        let is_opened = accel.tree.packed.entries.len() > accel.tree.geometries.len();
         assert_eq!(is_opened, options().preset != Preset::Fast);
         let nothing = Arc::new(build(vec![]));
         for _ in 0..2 {
@@ -177,7 +176,7 @@ fn trees_around_follow_one_that_is_rebuilt_in_part() {
             accel.refit(around(&inner, &mut Random(455))).unwrap();
             for _ in 0..2 {
                 let mut hits = 0;
-                for geometry in &accel.geometries {
+                for geometry in &accel.tree.geometries {
                     let GeometryKind::Instance(instance) = &geometry.kind else { continue };
                     let ball = instance
                         .world_from_object
@@ -207,7 +206,7 @@ fn it_is_the_same_from_any_number_of_threads() {
             }
             accel.refit(crowd(&places)).unwrap();
             accel.rebuild_partially(&options());
-            format!("{:?}", accel.tree)
+            format!("{:?}", accel.tree.packed)
         })
     };
     let one = print(1);

@@ -7,7 +7,8 @@ use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::oracle::check;
 use super::scenes::{Random, balls, build, cloud, cube, icosphere, mixture, ray, shape, with_every_preset};
-use crate::{Accel, BuildError, Geometry, GeometryKind, Instance, PreciseMesh, RefitError, TriangleMesh};
+use crate::Instance;
+use crate::{Accel, BuildError, Geometry, GeometryKind, PreciseMesh, RefitError, TriangleMesh};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 
@@ -47,9 +48,9 @@ pub(crate) fn moved(accel: &Accel, random: &mut Random, center: DVec3, extent: f
         }
         GeometryKind::Instance(instance) => {
             let world_from_object = random.placement(center, extent, 0.2 * extent)
-                * Transform::translate(-instance.accel.bounds().center());
+                * Transform::translate(-instance.tree.bounds.center());
             let world_from_object = world_from_object.into();
-            GeometryKind::Instance(Instance { accel: Arc::clone(&instance.accel), world_from_object })
+            GeometryKind::Instance(Instance { world_from_object, ..instance.clone() })
         }
         GeometryKind::Custom(custom) => {
             let count = custom.primitive_count() as usize;
@@ -57,6 +58,7 @@ pub(crate) fn moved(accel: &Accel, random: &mut Random, center: DVec3, extent: f
         }
     };
     accel
+        .tree
         .geometries
         .iter()
         .map(|geometry| Geometry { id: geometry.id, kind: move_kind(&geometry.kind) })
@@ -170,12 +172,8 @@ fn an_instance_follows_the_tree_in_it() {
     let ball = icosphere(2, DVec3::ZERO, 2.5);
     let inner = build(vec![GeometryKind::Mesh(Arc::new(ball.clone()))]);
     let place = Transform::translate(DVec3::new(7.0, 8.0, 9.0));
-    let instance = |accel: Arc<Accel>| {
-        vec![Geometry {
-            id: 6,
-            kind: GeometryKind::Instance(Instance { accel, world_from_object: place.into() }),
-        }]
-    };
+    let instance =
+        |accel: Arc<Accel>| vec![Geometry { id: 6, kind: GeometryKind::Instance(accel.instance(place)) }];
     let mut inner = Arc::new(inner);
     let mut outer = Accel::build(instance(Arc::clone(&inner)), &Default::default()).unwrap();
     let ray = Ray::new(DVec3::new(7.1, 8.2, -50.0), DVec3::Z);

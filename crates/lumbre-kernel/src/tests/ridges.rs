@@ -73,7 +73,9 @@ fn a_ray_that_grazes_a_ridge_enters_before_it_leaves() {
 
 /// The x of a triangle's normal.
 fn roof_normal(accel: &Accel, geometry: u32, primitive: u32) -> f64 {
-    let GeometryKind::Mesh(mesh) = &accel.geometries[geometry as usize].kind else { unreachable!("a mesh") };
+    let GeometryKind::Mesh(mesh) = &accel.tree.geometries[geometry as usize].kind else {
+        unreachable!("a mesh")
+    };
     let [a, b, c] = mesh.indices[primitive as usize].map(|i| mesh.positions[i as usize].as_dvec3());
     (b - a).cross(c - a).x
 }

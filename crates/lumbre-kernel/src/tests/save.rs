@@ -22,8 +22,8 @@ fn a_saved_tree_comes_back_to_the_bit() {
             let mut random = Random(seed);
             let accel = mixture(&mut random, CENTER, 3.0, depth, infinite);
             let bytes = accel.to_bytes();
-            let loaded = Accel::from_bytes(&bytes, accel.geometries.clone()).unwrap();
-            assert_eq!(format!("{:?}", loaded.tree), format!("{:?}", accel.tree));
+            let loaded = Accel::from_bytes(&bytes, accel.tree.geometries.clone()).unwrap();
+            assert_eq!(format!("{:?}", loaded.tree.packed), format!("{:?}", accel.tree.packed));
             assert_eq!(format!("{loaded:?}"), format!("{accel:?}"));
             assert_eq!(loaded.to_bytes(), bytes);
         }
@@ -45,7 +45,7 @@ fn a_saved_tree_is_small_and_may_be_empty() {
 fn over_moved_geometries_it_comes_refitted() {
     let mut random = Random(62);
     let accel = mixture(&mut random, CENTER, 3.0, 0, false);
-    let mut moved = accel.geometries.clone();
+    let mut moved = accel.tree.geometries.clone();
     for geometry in &mut moved {
         if let GeometryKind::Mesh(mesh) = &mut geometry.kind {
             Arc::make_mut(mesh).origin += DVec3::new(2.0, -3.0, 0.5);
@@ -73,7 +73,7 @@ fn two_meshes() -> Accel {
 #[test]
 fn what_is_wrong_with_bytes_is_said() {
     let accel = two_meshes();
-    let (bytes, geometries) = (accel.to_bytes(), accel.geometries.clone());
+    let (bytes, geometries) = (accel.to_bytes(), accel.tree.geometries.clone());
     let load = |bytes: &[u8]| Accel::from_bytes(bytes, geometries.clone()).map(|_| ()).unwrap_err();
     assert_eq!(load(b"something else altogether"), LoadError::NotATree);
     assert_eq!(load(&[]), LoadError::NotATree);
@@ -108,10 +108,10 @@ fn geometries_that_do_not_fit_are_refused() {
         other => panic!("{other:?}"),
     };
     assert_eq!(load(vec![]), RefitError::OtherLength { expected: 2, found: 0 });
-    let mut exchanged = accel.geometries.clone();
+    let mut exchanged = accel.tree.geometries.clone();
     exchanged.reverse();
     assert_eq!(load(exchanged), RefitError::OtherTopology { geometry: 0 });
-    let mut broken = accel.geometries.clone();
+    let mut broken = accel.tree.geometries.clone();
     let mesh = TriangleMesh { origin: DVec3::new(2.0, f64::NAN, 3.0), ..cube() };
     broken[1].kind = GeometryKind::Mesh(Arc::new(mesh));
     assert_eq!(load(broken), RefitError::Unsound(BuildError::NotFinite { geometry: 1, element: 0 }));
@@ -138,7 +138,7 @@ fn hostile_bytes_are_refused_or_harmless() {
             };
             hostile[place].copy_from_slice(&number.to_le_bytes());
         }
-        match Accel::from_bytes(&sealed(hostile), accel.geometries.clone()) {
+        match Accel::from_bytes(&sealed(hostile), accel.tree.geometries.clone()) {
             Ok(loaded) => {
                 taken += 1;
                 (0..3).for_each(|_| {
@@ -155,7 +155,7 @@ fn hostile_bytes_are_refused_or_harmless() {
 fn masks_are_saved_and_stay_through_a_refit() {
     let accel = two_meshes().with_masks(vec![1, 6]);
     let bytes = accel.to_bytes();
-    let mut loaded = Accel::from_bytes(&bytes, accel.geometries.clone()).unwrap();
+    let mut loaded = Accel::from_bytes(&bytes, accel.tree.geometries.clone()).unwrap();
     assert_eq!(loaded.to_bytes(), bytes);
     let ray = Ray::new(CENTER - 9.0 * DVec3::Z, DVec3::Z);
     let both = |accel: &Accel| {
@@ -167,14 +167,14 @@ fn masks_are_saved_and_stay_through_a_refit() {
     let expected = [Some(0), None, None];
     assert_eq!(both(&accel), expected);
     assert_eq!(both(&loaded), expected);
-    loaded.refit(accel.geometries.clone()).unwrap();
+    loaded.refit(accel.tree.geometries.clone()).unwrap();
     assert_eq!(both(&loaded), expected);
     // As many as geometries, or none.
     let mut fewer = bytes.clone();
     let place = fewer.len() - 16;
     fewer.drain(place..place + 4);
     fewer[32] = 1;
-    let error = Accel::from_bytes(&sealed(fewer), accel.geometries.clone()).unwrap_err();
+    let error = Accel::from_bytes(&sealed(fewer), accel.tree.geometries.clone()).unwrap_err();
     assert!(matches!(error, LoadError::Inconsistent { .. }), "{error}");
 }
 
@@ -190,6 +190,6 @@ fn a_leaf_with_blocks_of_two_meshes_is_refused() {
     for (node, is_sound) in [(apart, true), (together, false)] {
         tree.nodes = vec![node].into();
         let numbers = |leaf| Some(tag::blocks(leaf));
-        assert_eq!(check_structure(&tree, &accel.geometries, numbers).is_ok(), is_sound);
+        assert_eq!(check_structure(&tree, &accel.tree.geometries, numbers).is_ok(), is_sound);
     }
 }

@@ -10,7 +10,7 @@ use lumbre_geometry::{
 use lumbre_math::{DVec2, DVec3, Transform, Vec3};
 
 use crate::{
-    Accel, BuildOptions, CustomGeometry, Geometry, GeometryKind, Instance, PreciseMesh, Preset, SphereCloud,
+    Accel, BuildOptions, CustomGeometry, Geometry, GeometryKind, PreciseMesh, Preset, SphereCloud,
     TriangleMesh,
 };
 
@@ -382,8 +382,7 @@ pub(crate) fn mixture(random: &mut Random, center: DVec3, extent: f64, depth: u3
         for _ in 0..4 {
             let world_from_object =
                 random.placement(center, extent, 0.2 * extent) * Transform::translate(-inner_center);
-            let world_from_object = world_from_object.into();
-            kinds.push(GeometryKind::Instance(Instance { accel: Arc::clone(&inner), world_from_object }));
+            kinds.push(GeometryKind::Instance(inner.instance(world_from_object)));
         }
     }
     build(kinds)

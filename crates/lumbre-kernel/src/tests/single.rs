@@ -146,9 +146,9 @@ pub(super) fn check_interleaved(
     // What is wrong for each, so that none is left out.
     let mut hits: Vec<_> =
         expected.iter().map(|hit| if hit.is_some() { None } else { other.cloned() }).collect();
-    let closest = batch::shims::closest(isa, accel, rays, &mut hits, plan);
+    let closest = batch::shims::closest(isa, &accel.tree, rays, &mut hits, plan);
     let mut is_hit: Vec<_> = expected.iter().map(Option::is_none).collect();
-    let any = batch::shims::any(isa, accel, rays, &mut is_hit, plan);
+    let any = batch::shims::any(isa, &accel.tree, rays, &mut is_hit, plan);
     for (((ray, hit), is_hit), expected) in rays.iter().zip(&hits).zip(is_hit).zip(expected) {
         assert_eq!(hit, expected, "{isa:?} {plan:?} {ray:?}");
         assert_eq!(is_hit, expected.is_some(), "{isa:?} {plan:?} {ray:?}");
@@ -185,7 +185,8 @@ fn rays_that_go_together_are_answered_as_each_alone() {
             let list = kinds.zip(5..).map(|(kind, id)| Geometry { id, kind }).collect();
             let accel = Accel::build(list, &BuildOptions { preset }).unwrap();
             let packets: Vec<_> = (0..800).map(|i| alike(&mut random, &meshes[i % 2], size)).collect();
-            let together = |packet: &&_| batch::shims::answered_by_packet(accel.isa, &accel, packet) != 0;
+            let together =
+                |packet: &&_| batch::shims::answered_by_packet(accel.isa, &accel.tree, packet) != 0;
             let count = packets.iter().filter(together).count();
             assert!(count > 60 || !accel.isa.has_vectors(), "{count}");
             check(&accel, packets.as_flattened(), 1_500);
@@ -234,12 +235,12 @@ fn rays_that_are_not_sound_do_not_go_together() {
         Ray { origin: DVec3::new(0.1, 3e9, 0.2), ..sound },
     ];
     for isa in Isa::all().into_iter().filter(|isa| isa.has_vectors()) {
-        assert_eq!(batch::shims::answered_by_packet(isa, &accel, &packet), packet::ALL);
+        assert_eq!(batch::shims::answered_by_packet(isa, &accel.tree, &packet), packet::ALL);
         for (number, other) in others.iter().enumerate() {
             for place in 0..PACKET {
                 let mut packet = packet;
                 packet[place] = *other;
-                let answered = batch::shims::answered_by_packet(isa, &accel, &packet);
+                let answered = batch::shims::answered_by_packet(isa, &accel.tree, &packet);
                 assert_eq!(answered >> place & 1, 0, "{isa:?} {number} {place}");
                 check_packet(&accel, &packet);
             }
@@ -263,7 +264,7 @@ fn rays_of_several_octants_go_together_by_octants() {
             Ray::new(eye, forward + across * side + DVec3::splat(1e-3) * DVec3::new(1.0, 1.2, 1.4))
         });
         for isa in Isa::all().into_iter().filter(|isa| isa.has_vectors()) {
-            let answered = batch::shims::answered_by_packet(isa, &accel, &rays);
+            let answered = batch::shims::answered_by_packet(isa, &accel.tree, &rays);
             seen[i % 3] += u32::from(answered == packet::ALL);
         }
         check_packet(&accel, &rays);
@@ -378,7 +379,7 @@ fn check_with(isa: Isa, accel: &Accel, ray: &Ray, options: &Query) -> (Option<Hi
 
 /// Options of every sort along every ray, in a tree whose geometries get masks.
 fn check_options(accel: Accel, random: &mut Random, rays: &[Ray], least: u32) {
-    let masks = accel.geometries.iter().map(|_| random.bits() as u32 & 0b111).collect();
+    let masks = accel.tree.geometries.iter().map(|_| random.bits() as u32 & 0b111).collect();
     let accel = accel.with_masks(masks);
     for isa in Isa::all() {
         let (mut certain, mut hits, mut others) = (0, 0, 0);

@@ -14,7 +14,7 @@ use super::scenes::{
 };
 use crate::batch;
 use crate::batch::packet::{self, PACKET};
-use crate::{Accel, GeometryKind, Instance};
+use crate::{Accel, GeometryKind};
 
 /// How many random rays a tree is asked with: in the interpreter, every one takes seconds.
 const RAYS: usize = if cfg!(miri) { 2 } else { 6 };
@@ -30,7 +30,7 @@ fn some_of_each(random: &mut Random) -> Accel {
         GeometryKind::Spheres(Arc::new(cloud(random, 9, DVec3::ZERO, CENTER, 3.0))),
         GeometryKind::Shape(shape(random, CENTER, 3.0)),
         GeometryKind::Custom(Arc::new(balls(random, 3, CENTER, 3.0, None))),
-        GeometryKind::Instance(Instance { accel: inner, world_from_object: world_from_object.into() }),
+        GeometryKind::Instance(inner.instance(world_from_object)),
     ])
 }
 
@@ -72,7 +72,7 @@ fn sixteen_rays_that_go_together_are_answered_as_each_alone() {
     });
     // The portable path, which an interpreter takes, has no packets.
     let answered = if cfg!(miri) { 0 } else { packet::ALL };
-    assert_eq!(batch::shims::answered_by_packet(accel.isa, &accel, &rays), answered);
+    assert_eq!(batch::shims::answered_by_packet(accel.isa, &accel.tree, &rays), answered);
     let (mut hits, mut any) = (vec![None; rays.len()], vec![false; rays.len()]);
     accel.closest_batch(&rays, &mut hits);
     accel.any_batch(&rays, &mut any);
@@ -87,7 +87,7 @@ fn a_small_tree_is_refitted_saved_and_asked_for_points() {
     let mut random = Random(96);
     let mut accel = some_of_each(&mut random);
     let bytes = accel.to_bytes();
-    let geometries = accel.geometries.clone();
+    let geometries = accel.tree.geometries.clone();
     accel.refit(geometries.clone()).unwrap();
     let loaded = Accel::from_bytes(&bytes, geometries).unwrap();
     for _ in 0..3 {

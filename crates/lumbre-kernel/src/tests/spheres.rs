@@ -13,9 +13,7 @@ use crate::intersect::{Isa, intersect_spheres_at};
 use crate::trace::Outcome;
 use crate::tree::BLOCK;
 use crate::tree::sphere_block::{SphereBlock, SphereRay, has_radius};
-use crate::{
-    Accel, BuildError, BuildOptions, Geometry, GeometryKind, Hit, Instance, RefitError, SphereCloud,
-};
+use crate::{Accel, BuildError, BuildOptions, Geometry, GeometryKind, Hit, RefitError, SphereCloud};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 
@@ -142,10 +140,7 @@ fn a_placed_cloud_is_found_as_by_a_loop() {
     let inner = Arc::new(build(vec![spheres(cloud(&mut random, 60, CENTER, CENTER, 2.0))]));
     let instances = (0..5).map(|_| {
         let world_from_object = random.placement(CENTER, 2.0, 0.6) * Transform::translate(-CENTER);
-        GeometryKind::Instance(Instance {
-            accel: Arc::clone(&inner),
-            world_from_object: world_from_object.into(),
-        })
+        GeometryKind::Instance(inner.instance(world_from_object))
     });
     let accel = build(instances.collect());
     check_many(&accel, &mut random, CENTER, 3.0, 2_000);
@@ -264,10 +259,7 @@ fn a_cloud_holds_points_as_balls_do() {
     let cloud = cloud(&mut random, 80, CENTER, CENTER, 3.0);
     let map = Transform::translate(DVec3::new(9.0, 8.0, -7.0));
     let accel = Arc::new(build(vec![spheres(cloud.clone())]));
-    let placed = build(vec![GeometryKind::Instance(Instance {
-        accel: Arc::clone(&accel),
-        world_from_object: map.into(),
-    })]);
+    let placed = build(vec![GeometryKind::Instance(accel.instance(map))]);
     let mut inside = 0;
     for _ in 0..1_000 {
         let p = CENTER + 3.0 * random.vector();

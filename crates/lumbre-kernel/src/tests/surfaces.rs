@@ -5,11 +5,12 @@ use std::sync::Arc;
 use lumbre_math::DVec3;
 
 use super::scenes::{Random, mixture, ray, vertex};
+use crate::tree::Tree;
 use crate::{Accel, GeometryKind, Hit};
 
-fn innermost<'a>(accel: &'a Accel, hit: &Hit) -> &'a Accel {
-    hit.route.iter().fold(accel, |accel, &at| match &accel.geometries[at as usize].kind {
-        GeometryKind::Instance(instance) => &instance.accel,
+fn innermost<'a>(accel: &'a Accel, hit: &Hit) -> &'a Tree {
+    hit.route.iter().fold(&accel.tree, |tree, &at| match &tree.geometries[at as usize].kind {
+        GeometryKind::Instance(instance) => &instance.tree,
         _ => panic!("a route leads through instances"),
     })
 }
@@ -33,10 +34,10 @@ fn surfaces_lie_on_the_ray_and_on_the_triangle_through_any_instances() {
         let ids: Vec<u32> = hit
             .route
             .iter()
-            .scan(&accel, |at, &position| {
+            .scan(&accel.tree, |at, &position| {
                 let geometry = &at.geometries[position as usize];
                 let GeometryKind::Instance(instance) = &geometry.kind else { panic!("an instance") };
-                *at = &*instance.accel;
+                *at = &instance.tree;
                 Some(geometry.id)
             })
             .collect();
@@ -63,16 +64,13 @@ fn surfaces_lie_on_the_ray_and_on_the_triangle_through_any_instances() {
 
 #[test]
 fn a_mirror_keeps_the_front() {
-    use crate::{GeometryKind, Instance};
+    use crate::GeometryKind;
     use lumbre_geometry::Ray;
     use lumbre_math::Transform;
     let cube = super::scenes::cube();
     let mirror = Transform::scale(DVec3::new(-2.0, 1.5, 1.0)).unwrap();
     let inner = Arc::new(super::scenes::build(vec![GeometryKind::Mesh(Arc::new(cube))]));
-    let outer = super::scenes::build(vec![GeometryKind::Instance(Instance {
-        accel: inner,
-        world_from_object: mirror.into(),
-    })]);
+    let outer = super::scenes::build(vec![GeometryKind::Instance(inner.instance(mirror))]);
     let ray = Ray::new(DVec3::new(-3.0, 0.5, -4.0), DVec3::new(0.02, 0.01, 1.0));
     let mut sides = Vec::new();
     outer.all(&ray, |hit| {

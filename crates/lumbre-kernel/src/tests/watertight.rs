@@ -8,7 +8,7 @@ use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Transform};
 
 use super::scenes::{Random, build, cube, icosphere, torus, vertex, with_every_preset};
-use crate::{Accel, GeometryKind, Instance, Preset, TriangleMesh};
+use crate::{Accel, GeometryKind, Preset, TriangleMesh};
 
 fn meshes() -> Vec<(&'static str, TriangleMesh)> {
     vec![
@@ -32,14 +32,8 @@ fn placements(mesh: &TriangleMesh, random: &mut Random) -> Vec<(Accel, Transform
         let inner = Arc::new(build(vec![kind(mesh)]));
         let outer = random.placement(DVec3::new(3.0, -1.0, 2.0) * size, size, size);
         let middle = random.placement(DVec3::new(0.5, 4.0, -2.0), 1.0, 1.0);
-        let middle_tree = Arc::new(build(vec![GeometryKind::Instance(Instance {
-            accel: inner,
-            world_from_object: middle.into(),
-        })]));
-        let tree = build(vec![GeometryKind::Instance(Instance {
-            accel: middle_tree,
-            world_from_object: outer.into(),
-        })]);
+        let middle_tree = Arc::new(build(vec![GeometryKind::Instance(inner.instance(middle))]));
+        let tree = build(vec![GeometryKind::Instance(middle_tree.instance(outer))]);
         placed.push((tree, outer * middle));
     }
     placed

@@ -42,8 +42,8 @@ impl Dispatch for Together<'_> {
         }
         let (rounded, rest) = L::F32x16::parted_from(exact, place);
         Given {
-            most: L::F32x16::most_of_eight(wide),
-            middle: stored(first.middle()),
+            most: L::F32x16::reduce_max_of_eight(wide),
+            middle: stored(first.midpoint()),
             first: first.first(),
             with_bits: first.with_bits(rows[0].0[3].to_bits()),
             are_same: L::F32x16::are_same(exact),
@@ -109,21 +109,21 @@ fn arithmetic<V: Vector>(a: V, b: V, c: V) -> Results {
         a + b,
         a - b,
         a * b,
-        a.times_plus(b, c),
-        a.times_from(b, c),
-        a.times_minus(b, c),
-        a.over(V::splat(4.0)),
+        a.mul_add(b, c),
+        a.neg_mul_add(b, c),
+        a.mul_sub(b, c),
+        a / V::splat(4.0),
         (a * a).sqrt(),
         a.min(b),
         a.max(b),
         a.abs(),
-        a.turned_by(b),
+        a.xor_sign(b),
     ];
     let numbers = |v: V| {
         let array = v.to_array();
         (0..V::COUNT).map(|i| array[i]).collect()
     };
-    (results.into_iter().map(numbers).collect(), [a.at_most(b), a.below(b)])
+    (results.into_iter().map(numbers).collect(), [a.simd_le(b), a.simd_lt(b)])
 }
 
 /// The same of eight and of sixteen.

@@ -8,14 +8,14 @@ use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::{Random, balls, build, bumpy, cube, icosphere, mesh, soup, torus, with_every_preset};
 use crate::point::winding::winding_number;
-use crate::{Accel, Geometry, GeometryKind, Instance, TriangleMesh};
+use crate::{Accel, Geometry, GeometryKind, TriangleMesh};
 
 fn kind(mesh: TriangleMesh) -> GeometryKind {
     GeometryKind::Mesh(Arc::new(mesh))
 }
 
 fn placed(accel: &Arc<Accel>, world_from_object: Transform) -> GeometryKind {
-    GeometryKind::Instance(Instance { accel: Arc::clone(accel), world_from_object: world_from_object.into() })
+    GeometryKind::Instance(accel.instance(world_from_object))
 }
 
 fn turned_inside_out(mesh: &TriangleMesh) -> TriangleMesh {
@@ -209,7 +209,7 @@ fn errors_and_times_of_fast_sums() {
     let all = |far: Option<f64>| -> (Vec<f64>, f64) {
         accel.winding_number(center).unwrap();
         let start = std::time::Instant::now();
-        let numbers = points.iter().map(|&p| winding_number(&accel, p, 0.0, far).unwrap()).collect();
+        let numbers = points.iter().map(|&p| winding_number(&accel.tree, p, 0.0, far).unwrap()).collect();
         (numbers, start.elapsed().as_secs_f64() * 1e6 / points.len() as f64)
     };
     let (exact, exact_time) = all(None);

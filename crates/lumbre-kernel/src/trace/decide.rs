@@ -7,16 +7,15 @@
 use lumbre_geometry::{Ray, Root};
 use lumbre_math::DVec3;
 
-use super::filtered::IN_INSTANCE;
-use super::{Outcome, Winner, edges, meets_front, precedes};
-use crate::intersect::filter_start::FilterStart;
+use super::{IN_INSTANCE, Outcome, Winner, edges, largest_component, meets_front, precedes};
 use crate::intersect::watertight::{self, EdgeTest, Inside, Meeting, Shear};
 use crate::intersect::{Axes, Simd};
 use crate::simd;
 use crate::tree::BLOCK;
+use crate::tree::filter_start::FilterStart;
 use crate::tree::node::Node;
 use crate::tree::triangle_block::{Blocks, TriangleBlock};
-use crate::{Accel, GeometryKind};
+use crate::tree::{GeometryKind, Tree};
 
 /// The closest hit so far, as far as single precision knows it: a triangle by its place in the tree, or what is none, and the interval
 /// of heights along the ray that holds the crossing.
@@ -75,23 +74,23 @@ pub(crate) fn heights(t: f64, length: f64) -> (f32, f32) {
 #[cold]
 #[inline(never)]
 pub(crate) fn enters(
-    mut accel: &Accel,
+    mut tree: &Tree,
     ray: &Ray,
     route: &[u32],
     &Winner { ref root, geometry, primitive }: &Winner,
 ) -> Option<bool> {
     let mut ray = *ray;
     for &position in route {
-        let GeometryKind::Instance(instance) = &accel.geometries[position as usize].kind else { return None };
+        let GeometryKind::Instance(instance) = &tree.geometries[position as usize].kind else { return None };
         ray = instance.world_from_object.object_ray(&ray);
-        accel = &instance.accel;
+        tree = &instance.tree;
     }
-    let kind = &accel.geometries[geometry as usize].kind;
+    let kind = &tree.geometries[geometry as usize].kind;
     let meeting = match kind {
         GeometryKind::Shape(_) | GeometryKind::Spheres(_) | GeometryKind::Custom(_) => {
             return Some(meets_front(kind, primitive, &ray, root));
         }
-        GeometryKind::PreciseMesh(_) => edges::intersect_precise(accel, &ray, geometry, primitive),
+        GeometryKind::PreciseMesh(_) => edges::intersect_precise(tree, &ray, geometry, primitive),
         GeometryKind::Mesh(mesh) => {
             let shear = Shear::new(&ray.direction);
             let origin = shear.local_origin(&ray.origin, &mesh.origin);
@@ -108,16 +107,10 @@ pub(crate) fn enters(
     }
 }
 
-/// The height along a ray per unit of `t`.
-#[inline(always)]
-pub(crate) fn largest_component(ray: &Ray) -> f64 {
-    ray.direction.abs().max_element()
-}
-
 /// A tree whose triangles double precision decides about.
 #[derive(Clone, Copy)]
 pub(crate) struct Decider<'a> {
-    accel: &'a Accel,
+    tree: &'a Tree,
     pub(crate) start: &'a FilterStart,
     // Those of the tree, which may be mapped from a file.
     blocks: Blocks<'a>,
@@ -125,13 +118,13 @@ pub(crate) struct Decider<'a> {
 
 impl<'a> Decider<'a> {
     #[inline(always)]
-    pub(crate) fn new(accel: &'a Accel, start: &'a FilterStart) -> Self {
-        Self { accel, start, blocks: accel.tree.blocks() }
+    pub(crate) fn new(tree: &'a Tree, start: &'a FilterStart) -> Self {
+        Self { tree, start, blocks: tree.packed.blocks() }
     }
 
     #[inline(always)]
-    pub(crate) fn accel(&self) -> &'a Accel {
-        self.accel
+    pub(crate) fn tree(&self) -> &'a Tree {
+        self.tree
     }
 
     #[inline(always)]
@@ -146,7 +139,7 @@ impl<'a> Decider<'a> {
 
     #[inline(always)]
     pub(crate) fn nodes(&self) -> &'a [Node] {
-        &self.accel.tree.nodes
+        &self.tree.packed.nodes
     }
 
     /// Geometry and primitive of a triangle.
@@ -157,7 +150,7 @@ impl<'a> Decider<'a> {
 
     #[inline(always)]
     fn ids_in(&self, block: &TriangleBlock, lane: u32) -> (u32, u32) {
-        let ids = &self.accel.tree.names[block.number() as usize];
+        let ids = &self.tree.packed.names[block.number() as usize];
         (ids.geometry, ids.primitives[lane as usize % BLOCK])
     }
 
@@ -272,7 +265,7 @@ impl<'a> Decider<'a> {
 
     /// Whether a crossing of something in the tree meets the front, which its parts in instances are not: `None` there.
     fn meets_front(&self, ray: &Ray, winner: &Winner) -> Option<bool> {
-        if winner.geometry == IN_INSTANCE { None } else { enters(self.accel, ray, &[], winner) }
+        if winner.geometry == IN_INSTANCE { None } else { enters(self.tree, ray, &[], winner) }
     }
 
     /// The interval of heights of a crossing that is known in double precision, if it is in range and closer than the best.

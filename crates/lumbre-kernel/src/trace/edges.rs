@@ -14,19 +14,18 @@ use lumbre_math::{DVec3, Transform};
 use smallvec::SmallVec;
 
 use super::Context;
-use super::exact::{self, Crossing, Visitor, Wanted};
-use crate::intersect::Isa;
+use super::visitor::{Crossing, Visitor, Wanted};
 use crate::intersect::watertight::{self, Feature, Meeting, Shear};
-use crate::precise_mesh::has_area;
-use crate::{Accel, GeometryKind};
+use crate::tree::precise_mesh::has_area;
+use crate::tree::{GeometryKind, Tree};
 
 /// A face, a triangle or a bilinear patch, whose edges or corners a ray hits exactly.
 #[derive(Clone, Debug)]
 pub(crate) struct EdgeHit<'a> {
     /// The crossing; it may lie out of the ray's range.
-    root: Root,
+    pub(super) root: Root,
     /// Whether the rule for zeros gives the crossing to this face, so that it was visited already.
-    is_owned: bool,
+    pub(super) is_owned: bool,
     /// `None` for patches, which know it only once asked.
     is_front: Option<bool>,
     place: Place,
@@ -38,7 +37,7 @@ pub(crate) struct EdgeHit<'a> {
     primitive: u32,
     /// Which of the primitive's crossings.
     order: u32,
-    accel: &'a Accel,
+    tree: &'a Tree,
     context: Context,
 }
 
@@ -54,13 +53,13 @@ enum Place {
 }
 
 impl EdgeHit<'_> {
-    fn crossing<'c>(&'c self, ray: &'c Ray) -> Crossing<'c> {
-        let &Self { root, is_front, geometry, primitive, order, accel, ref context, .. } = self;
-        Crossing { root, first: root, geometry, primitive, order, is_front, ray, accel, context }
+    pub(super) fn crossing<'c>(&'c self, ray: &'c Ray) -> Crossing<'c> {
+        let &Self { root, is_front, geometry, primitive, order, tree, ref context, .. } = self;
+        Crossing { root, first: root, geometry, primitive, order, is_front, ray, tree, context }
     }
 
     fn is_patch(&self) -> bool {
-        matches!(self.accel.geometries[self.geometry as usize].kind, GeometryKind::Shape(_))
+        matches!(self.tree.geometries[self.geometry as usize].kind, GeometryKind::Shape(_))
     }
 
     /// The edges by their ends, but those that are points.
@@ -95,7 +94,7 @@ impl<'a> Patch<'a> {
     /// Shows a visitor the crossings that the patch owns, and collects its edge hits. True ends the traversal.
     pub(crate) fn visit<'e>(
         self,
-        (accel, geometry): (&'e Accel, u32),
+        (tree, geometry): (&'e Tree, u32),
         ray: &Ray,
         context: &Context,
         visitor: &mut dyn Visitor,
@@ -114,7 +113,7 @@ impl<'a> Patch<'a> {
                 geometry,
                 primitive: 0,
                 order,
-                accel,
+                tree,
                 context: context.clone(),
             });
         };
@@ -143,7 +142,7 @@ impl<'a> Patch<'a> {
             }
             let is_front = None;
             let crossing =
-                Crossing { root, first, geometry, primitive: 0, order, is_front, ray, accel, context };
+                Crossing { root, first, geometry, primitive: 0, order, is_front, ray, tree, context };
             if visitor.visit(&crossing) {
                 return true;
             }
@@ -157,7 +156,7 @@ pub(crate) struct Triangle<'a> {
     pub(crate) corners: [[f64; 3]; 3],
     /// Geometry and primitive.
     pub(crate) ids: (u32, u32),
-    pub(crate) accel: &'a Accel,
+    pub(crate) tree: &'a Tree,
 }
 
 impl<'a> Triangle<'a> {
@@ -170,7 +169,7 @@ impl<'a> Triangle<'a> {
         visitor: &mut dyn Visitor,
         edge_hits: &mut Vec<EdgeHit<'a>>,
     ) -> bool {
-        let Self { corners, ids: (geometry, primitive), accel } = self;
+        let Self { corners, ids: (geometry, primitive), tree } = self;
         let (root, is_front) = match meeting {
             Meeting::Miss => return false,
             Meeting::Hit { root, is_front } => (root, is_front),
@@ -189,11 +188,11 @@ impl<'a> Triangle<'a> {
                     is_front: Some(is_front),
                     place,
                     outline: Outline::from_slice(&corners),
-                    space: Space::of_mesh(accel, geometry),
+                    space: Space::of_mesh(tree, geometry),
                     geometry,
                     primitive,
                     order: 0,
-                    accel,
+                    tree,
                     context: context.clone(),
                 });
                 if !is_owned || !ray.contains(root.t) {
@@ -204,13 +203,13 @@ impl<'a> Triangle<'a> {
         };
         let is_front = Some(is_front);
         let (first, order) = (root, 0);
-        visitor.visit(&Crossing { root, first, geometry, primitive, order, is_front, ray, accel, context })
+        visitor.visit(&Crossing { root, first, geometry, primitive, order, is_front, ray, tree, context })
     }
 }
 
 /// How a ray meets a triangle in double precision.
-pub(crate) fn intersect_precise(accel: &Accel, ray: &Ray, geometry: u32, primitive: u32) -> Meeting {
-    let corners = accel.precise_corners(geometry, primitive);
+pub(crate) fn intersect_precise(tree: &Tree, ray: &Ray, geometry: u32, primitive: u32) -> Meeting {
+    let corners = tree.precise_corners(geometry, primitive);
     let meeting = watertight::intersect_precise(ray, Shear::new(&ray.direction), &corners);
     // After a refit, some in the tree may have lost their area.
     if matches!(meeting, Meeting::Miss) || has_area(&corners) { meeting } else { Meeting::Miss }
@@ -239,8 +238,8 @@ impl Space {
         Self([x, y, z, affine.translation.to_array()].map(position))
     }
 
-    fn of_mesh(accel: &Accel, geometry: u32) -> Self {
-        let origin = match &accel.geometries[geometry as usize].kind {
+    fn of_mesh(tree: &Tree, geometry: u32) -> Self {
+        let origin = match &tree.geometries[geometry as usize].kind {
             GeometryKind::Mesh(mesh) => mesh.origin,
             _ => DVec3::ZERO,
         };
@@ -264,7 +263,7 @@ struct Fan {
 
 /// Of the edge hits without an owner, those that count because they lie at a border. `hits` are to be all of the line, or those for
 /// which that makes no difference.
-fn at_borders(hits: &[EdgeHit]) -> Vec<usize> {
+pub(super) fn at_borders(hits: &[EdgeHit]) -> Vec<usize> {
     // Each mesh is a surface of its own, but the patches in a tree are one, together with the meshes beside them.
     let with_patches: HashSet<&[u32]> =
         hits.iter().filter(|hit| hit.is_patch()).map(|hit| hit.context.route.as_slice()).collect();
@@ -311,35 +310,7 @@ fn at_borders(hits: &[EdgeHit]) -> Vec<usize> {
     result
 }
 
-/// Shows a visitor what lies at borders, once the traversal has found these edge hits.
-#[cold]
-#[inline(never)]
-pub(crate) fn visit_borders(
-    isa: Isa,
-    accel: &Accel,
-    context: &mut Context,
-    ray: &Ray,
-    edge_hits: &[EdgeHit],
-    visitor: &mut dyn Visitor,
-) {
-    let matters = |hit: &EdgeHit, [first, last]: [f64; 2]| {
-        let t = hit.root.t;
-        !hit.is_owned && ray.contains(t) && first <= t && t <= last
-    };
-    // More triangles can only make fewer borders: without any now, there are none.
-    if !at_borders(edge_hits).iter().any(|&i| matters(&edge_hits[i], visitor.range())) {
-        return;
-    }
-    // Some of the neighbours may lie beyond what was traversed.
-    let all = exact::all_edge_hits(isa, accel, context, ray);
-    for i in at_borders(&all) {
-        if matters(&all[i], visitor.range()) && visitor.visit(&all[i].crossing(ray)) {
-            return;
-        }
-    }
-}
-
-/// The same for a loop over everything, which has found all edge hits.
+/// Shows a visitor what lies at borders, for a loop over everything, which has found all edge hits.
 #[cfg(test)]
 pub(crate) fn visit_borders_of_all(ray: &Ray, edge_hits: &[EdgeHit], visitor: &mut dyn Visitor) {
     for i in at_borders(edge_hits) {

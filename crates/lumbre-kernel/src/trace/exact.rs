@@ -9,13 +9,14 @@
 use lumbre_geometry::{Ray, Root};
 use lumbre_math::DVec3;
 
+use super::cloud_ray::CloudRay;
 use super::cursor::NodeCursor;
-use super::decide::largest_component;
 use super::edges::{self, EdgeHit, Patch};
-use super::leaves::CloudRay;
 use super::stack::{ClosestHit, Goal, Stack};
+use super::visitor::{Crossing, Visitor, Wanted};
 use super::visitors::{Any, Closest};
-use super::{Context, all_crossings, first_crossing, is_sound, meets_front};
+use super::{Context, all_crossings, first_crossing, is_sound, largest_component};
+use crate::hit::Hit;
 use crate::intersect::box_ray::{BoxRay, Progress};
 use crate::intersect::watertight::{self, BlockRay, EdgeTest, HeightRange, Shear};
 use crate::intersect::{self, BoundingHits, Dispatch, Isa, Simd};
@@ -27,128 +28,57 @@ use crate::tree::packed::Entry;
 use crate::tree::packed::Start;
 use crate::tree::summary::{Sizes, Summary};
 use crate::tree::triangle_block::{Blocks, TriangleBlock};
-use crate::{Accel, GeometryKind, Hit};
-
-/// Which crossings of one primitive a visitor wants.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Wanted {
-    /// None: only edge hits are collected.
-    None,
-    /// The first.
-    First,
-    /// Every one.
-    Every,
-}
-
-/// What crossings are shown to.
-pub(crate) trait Visitor {
-    /// Which crossings it wants.
-    fn wanted(&self) -> Wanted;
-
-    /// The `t` that it wants, from the first to the last; never grows.
-    fn range(&self) -> [f64; 2];
-
-    /// Whether it wants anything in an instance.
-    fn enters(&self, _accel: &Accel, _geometry: u32) -> bool {
-        true
-    }
-
-    /// Takes a crossing; true ends the traversal.
-    fn visit(&mut self, crossing: &Crossing) -> bool;
-}
-
-/// A crossing of a ray.
-pub(crate) struct Crossing<'c> {
-    pub(crate) root: Root,
-    /// The first of the primitive's crossings at this `t`.
-    pub(crate) first: Root,
-    pub(crate) geometry: u32,
-    pub(crate) primitive: u32,
-    /// Which of the primitive's crossings.
-    pub(crate) order: u32,
-    /// Whether the front is met, where that is known already.
-    pub(crate) is_front: Option<bool>,
-    /// The ray in the space of the geometry's tree.
-    pub(crate) ray: &'c Ray,
-    pub(crate) accel: &'c Accel,
-    pub(crate) context: &'c Context,
-}
-
-impl Crossing<'_> {
-    /// Whether the front is met.
-    pub(crate) fn is_front(&self) -> bool {
-        let kind = &self.accel.geometries[self.geometry as usize].kind;
-        self.is_front.unwrap_or_else(|| meets_front(kind, self.primitive, self.ray, &self.root))
-    }
-
-    /// Whether it comes before those at the same `t` that leave. Crossings of one primitive at the same `t` stay together.
-    pub(crate) fn enters(&self) -> bool {
-        let kind = &self.accel.geometries[self.geometry as usize].kind;
-        self.is_front.unwrap_or_else(|| meets_front(kind, self.primitive, self.ray, &self.first))
-    }
-
-    pub(crate) fn to_hit(&self) -> Hit {
-        let &Self { root, geometry, primitive, accel, context, .. } = self;
-        Hit {
-            root,
-            id: accel.geometries[geometry as usize].id,
-            primitive,
-            geometry,
-            instances: context.ids.clone(),
-            route: context.route.clone(),
-        }
-    }
-}
+use crate::tree::{GeometryKind, Tree};
 
 /// The closest hit.
 #[inline(never)]
-pub(crate) fn closest(isa: Isa, accel: &Accel, ray: &Ray, query: Option<&Query>) -> Option<Hit> {
-    closest_from(isa, accel, Start::WHOLE, &Context::default(), ray, query)
+pub(crate) fn closest(isa: Isa, tree: &Tree, ray: &Ray, query: Option<&Query>) -> Option<Hit> {
+    closest_from(isa, tree, Start::WHOLE, &Context::default(), ray, query)
 }
 
 /// Whether anything is hit.
 #[inline(never)]
-pub(crate) fn any(isa: Isa, accel: &Accel, ray: &Ray, query: Option<&Query>) -> bool {
-    any_from(isa, accel, Start::WHOLE, &Context::default(), ray, query)
+pub(crate) fn any(isa: Isa, tree: &Tree, ray: &Ray, query: Option<&Query>) -> bool {
+    any_from(isa, tree, Start::WHOLE, &Context::default(), ray, query)
 }
 
 /// The closest hit in a part of a tree that stands there.
 pub(crate) fn closest_from(
     isa: Isa,
-    accel: &Accel,
+    tree: &Tree,
     from: Start,
     context: &Context,
     ray: &Ray,
     query: Option<&Query>,
 ) -> Option<Hit> {
     let mut closest = Closest::new(ray, query);
-    traverse_from(isa, accel, from, context, ray, &mut closest);
+    traverse_from(isa, tree, from, context, ray, &mut closest);
     closest.into_hit()
 }
 
 /// Whether anything is hit in a part of a tree that stands there.
 pub(crate) fn any_from(
     isa: Isa,
-    accel: &Accel,
+    tree: &Tree,
     from: Start,
     context: &Context,
     ray: &Ray,
     query: Option<&Query>,
 ) -> bool {
     let mut any = Any::new(ray, query);
-    traverse_from(isa, accel, from, context, ray, &mut any);
+    traverse_from(isa, tree, from, context, ray, &mut any);
     any.is_hit
 }
 
 /// Shows a visitor the crossings of a ray.
-pub(crate) fn traverse(isa: Isa, accel: &Accel, ray: &Ray, visitor: &mut dyn Visitor) {
-    traverse_from(isa, accel, Start::WHOLE, &Context::default(), ray, visitor);
+pub(crate) fn traverse(isa: Isa, tree: &Tree, ray: &Ray, visitor: &mut dyn Visitor) {
+    traverse_from(isa, tree, Start::WHOLE, &Context::default(), ray, visitor);
 }
 
 /// The same in a part of a tree that stands there. Of edge hits, it may show those of the whole tree.
 fn traverse_from(
     isa: Isa,
-    accel: &Accel,
+    tree: &Tree,
     from: Start,
     context: &Context,
     ray: &Ray,
@@ -156,21 +86,43 @@ fn traverse_from(
 ) {
     let context = &mut context.clone();
     let mut edge_hits = Vec::new();
-    let traversal =
-        Traversal { accel, from, context, ray, visitor: &mut *visitor, edge_hits: &mut edge_hits };
+    let traversal = Traversal { tree, from, context, ray, visitor: &mut *visitor, edge_hits: &mut edge_hits };
     let is_over = isa.run(traversal);
     if !is_over && !edge_hits.is_empty() {
-        edges::visit_borders(isa, accel, context, ray, &edge_hits, visitor);
+        visit_borders(isa, tree, context, ray, &edge_hits, visitor);
+    }
+}
+
+/// Shows a visitor what lies at borders, once the traversal has found these edge hits.
+#[cold]
+#[inline(never)]
+fn visit_borders(
+    isa: Isa,
+    tree: &Tree,
+    context: &mut Context,
+    ray: &Ray,
+    edge_hits: &[EdgeHit],
+    visitor: &mut dyn Visitor,
+) {
+    let matters = |hit: &EdgeHit, [first, last]: [f64; 2]| {
+        let t = hit.root.t;
+        !hit.is_owned && ray.contains(t) && first <= t && t <= last
+    };
+    // More triangles can only make fewer borders: without any now, there are none.
+    if !edges::at_borders(edge_hits).iter().any(|&i| matters(&edge_hits[i], visitor.range())) {
+        return;
+    }
+    // Some of the neighbours may lie beyond what was traversed.
+    let all = all_edge_hits(isa, tree, context, ray);
+    for i in edges::at_borders(&all) {
+        if matters(&all[i], visitor.range()) && visitor.visit(&all[i].crossing(ray)) {
+            return;
+        }
     }
 }
 
 /// The edge hits of the whole line, within a tree that stands there.
-pub(crate) fn all_edge_hits<'a>(
-    isa: Isa,
-    accel: &'a Accel,
-    context: &mut Context,
-    ray: &Ray,
-) -> Vec<EdgeHit<'a>> {
+fn all_edge_hits<'a>(isa: Isa, tree: &'a Tree, context: &mut Context, ray: &Ray) -> Vec<EdgeHit<'a>> {
     /// Looks along the whole line.
     struct EdgeHitsOnly;
     impl Visitor for EdgeHitsOnly {
@@ -187,7 +139,7 @@ pub(crate) fn all_edge_hits<'a>(
     let line = ray.with_range(f64::NEG_INFINITY, f64::INFINITY);
     let mut edge_hits = Vec::new();
     isa.run(Traversal {
-        accel,
+        tree,
         from: Start::WHOLE,
         context,
         ray: &line,
@@ -199,7 +151,7 @@ pub(crate) fn all_edge_hits<'a>(
 
 /// A traversal with one ray.
 struct Traversal<'a, 't> {
-    accel: &'a Accel,
+    tree: &'a Tree,
     from: Start,
     /// As it was once the traversal is over, unless the visitor ended it.
     context: &'t mut Context,
@@ -215,13 +167,13 @@ impl Dispatch for Traversal<'_, '_> {
 
     #[inline(always)]
     fn run<L: Simd>(self) -> bool {
-        let Self { accel, from, context, ray, visitor, edge_hits } = self;
+        let Self { tree, from, context, ray, visitor, edge_hits } = self;
         if !is_sound(ray) {
             return false;
         }
         let mut stack: Stack<<ClosestHit as Goal>::Entry> = Stack::new();
         let mut suspended: Vec<Frame<L>> = Vec::new();
-        let mut frame = Frame::<L>::new(accel, *ray, visitor);
+        let mut frame = Frame::<L>::new(tree, *ray, visitor);
         if frame.enter(from, context, &mut stack, visitor) {
             return true;
         }
@@ -234,12 +186,12 @@ impl Dispatch for Traversal<'_, '_> {
                 tag::PRECISE => frame.test_precise(first, context, visitor, edge_hits),
                 tag::CUSTOM => frame.test_entries(first, context, visitor, edge_hits),
                 tag::INSTANCE => {
-                    let entry = frame.accel.instance_entry(first);
+                    let entry = frame.tree.instance_entry(first);
                     match frame.inside(entry, visitor) {
                         Some((inner, from)) => {
                             stack.push(ClosestHit::entry(tag::reference(tag::RETURN, 0)));
                             context.route.push(entry.geometry);
-                            context.ids.push(frame.accel.geometries[entry.geometry as usize].id);
+                            context.ids.push(frame.tree.geometries[entry.geometry as usize].id);
                             suspended.push(std::mem::replace(&mut frame, inner));
                             frame.enter(from, context, &mut stack, visitor)
                         }
@@ -265,7 +217,7 @@ impl Dispatch for Traversal<'_, '_> {
 
 /// A tree under traversal, with the ray in its space.
 struct Frame<'a, L> {
-    accel: &'a Accel,
+    tree: &'a Tree,
     cursor: NodeCursor<'a, L>,
     blocks: Blocks<'a>,
     ray: Ray,
@@ -292,16 +244,16 @@ struct MeshRay {
 
 impl<'a, L: Simd> Frame<'a, L> {
     #[inline(always)]
-    fn new(accel: &'a Accel, ray: Ray, visitor: &dyn Visitor) -> Self {
+    fn new(tree: &'a Tree, ray: Ray, visitor: &dyn Visitor) -> Self {
         let range @ [t_min, t_max] = visitor.range();
         let mut boxes = BoxRay::passing_all();
-        let meets_tree = accel.tree.root.is_some()
-            && (L::start_nearby(&accel.tree_space, &ray, t_min, t_max, &mut boxes)
-                || is_sound(&ray) && boxes.start_anywhere(&accel.tree_space, &ray, t_min, t_max));
+        let meets_tree = tree.packed.root.is_some()
+            && (L::start_nearby(&tree.tree_space, &ray, t_min, t_max, &mut boxes)
+                || is_sound(&ray) && boxes.start_anywhere(&tree.tree_space, &ray, t_min, t_max));
         Self {
-            accel,
-            cursor: NodeCursor::new(&accel.tree.nodes, boxes.slabs),
-            blocks: accel.tree.blocks(),
+            tree,
+            cursor: NodeCursor::new(&tree.packed.nodes, boxes.slabs),
+            blocks: tree.packed.blocks(),
             ray,
             progress: boxes.progress,
             meets_tree,
@@ -321,12 +273,12 @@ impl<'a, L: Simd> Frame<'a, L> {
         stack: &mut Stack<<ClosestHit as Goal>::Entry>,
         visitor: &mut dyn Visitor,
     ) -> bool {
-        if let Some(root) = self.accel.tree.root.filter(|_| self.meets_tree) {
+        if let Some(root) = self.tree.packed.root.filter(|_| self.meets_tree) {
             stack.push(ClosestHit::entry(from.below(root)));
         }
-        for (i, entry) in self.accel.infinite.iter().enumerate() {
-            if matches!(self.accel.geometries[entry.geometry as usize].kind, GeometryKind::Instance(_)) {
-                let index = self.accel.tree.entries.len() + i;
+        for (i, entry) in self.tree.infinite.iter().enumerate() {
+            if matches!(self.tree.geometries[entry.geometry as usize].kind, GeometryKind::Instance(_)) {
+                let index = self.tree.packed.entries.len() + i;
                 stack.push(ClosestHit::entry(tag::reference(tag::INSTANCE, index as u32)));
             } else if self.test_primitive(entry.geometry, entry.primitive(), context, visitor) {
                 return true;
@@ -353,13 +305,13 @@ impl<'a, L: Simd> Frame<'a, L> {
     #[inline(always)]
     fn inside(&self, entry: &Entry, visitor: &dyn Visitor) -> Option<(Self, Start)> {
         let (geometry, from) = (entry.geometry, Start::of(entry.primitive()));
-        if from.is_nothing() || !visitor.enters(self.accel, geometry) {
+        if from.is_nothing() || !visitor.enters(self.tree, geometry) {
             return None;
         }
-        let GeometryKind::Instance(instance) = &self.accel.geometries[geometry as usize].kind else {
+        let GeometryKind::Instance(instance) = &self.tree.geometries[geometry as usize].kind else {
             unreachable!("the tag says so");
         };
-        let inner = &*instance.accel;
+        let inner = &*instance.tree;
         let ray = instance.world_from_object.object_ray(&self.ray);
         let frame = Self::new(inner, ray, visitor);
         let meets_any = frame.meets_tree || !inner.infinite.is_empty() && is_sound(&ray);
@@ -376,16 +328,16 @@ impl<'a, L: Simd> Frame<'a, L> {
         context: &Context,
         visitor: &mut dyn Visitor,
     ) -> bool {
-        let &Self { accel, ref ray, .. } = self;
+        let &Self { tree, ref ray, .. } = self;
         let first = root;
-        visitor.visit(&Crossing { root, first, geometry, primitive, order, is_front, ray, accel, context })
+        visitor.visit(&Crossing { root, first, geometry, primitive, order, is_front, ray, tree, context })
     }
 
     /// Turns to the mesh of a block: to the first that the ray comes to, and to each where meshes have different origins.
     #[inline(always)]
     fn turn_to(&mut self, block: &TriangleBlock) -> MeshRay {
         let &Summary { has_one_origin, first_origin, sizes: Sizes { largest_corner, .. }, .. } =
-            &self.accel.summary;
+            &self.tree.summary;
         if has_one_origin && let Some(mesh) = self.mesh {
             return mesh;
         }
@@ -393,7 +345,7 @@ impl<'a, L: Simd> Frame<'a, L> {
         let mesh_origin = if has_one_origin {
             first_origin
         } else {
-            self.accel.mesh_origin(self.accel.tree.names[block.number() as usize].geometry)
+            self.tree.mesh_origin(self.tree.packed.names[block.number() as usize].geometry)
         };
         let origin = shear.local_origin(&self.ray.origin, &mesh_origin);
         let [t_min, t_max] = self.range;
@@ -422,7 +374,7 @@ impl<'a, L: Simd> Frame<'a, L> {
                     if mask == 0 {
                         continue;
                     }
-                    mask & L::place_crossings(&edges, ray).in_range
+                    mask & edges.place(ray).in_range
                 }
                 None => block.taken(),
             };
@@ -430,7 +382,7 @@ impl<'a, L: Simd> Frame<'a, L> {
                 let lane = mask.trailing_zeros() as usize % BLOCK;
                 mask &= mask - 1;
                 let ids = || {
-                    let ids = &self.accel.tree.names[block.number() as usize];
+                    let ids = &self.tree.packed.names[block.number() as usize];
                     (ids.geometry, ids.primitives[lane])
                 };
                 match L::pass(block, lane, &shear, &origin) {
@@ -452,7 +404,7 @@ impl<'a, L: Simd> Frame<'a, L> {
                         let corners = shear.axes.gather(block, lane);
                         let meeting = watertight::intersect(&self.ray, shear, origin, corners);
                         let corners = block.triangle(lane).map(|corner| corner.map(f64::from));
-                        let triangle = edges::Triangle { corners, ids: ids(), accel: self.accel };
+                        let triangle = edges::Triangle { corners, ids: ids(), tree: self.tree };
                         if triangle.visit(meeting, &self.ray, context, visitor, edge_hits) {
                             return true;
                         }
@@ -466,10 +418,10 @@ impl<'a, L: Simd> Frame<'a, L> {
     /// Tests a leaf of spheres of clouds.
     #[inline(always)]
     fn test_spheres(&mut self, leaf: u32, context: &Context, visitor: &mut dyn Visitor) -> bool {
-        let tree = &self.accel.tree;
+        let packed = &self.tree.packed;
         let places = tag::blocks(leaf);
-        for (ids, block) in tree.sphere_names[places.clone()].iter().zip(&tree.sphere_blocks[places]) {
-            let cloud = CloudRay::turn(&mut self.cloud, self.accel, &self.ray, ids.geometry);
+        for (ids, block) in packed.sphere_names[places.clone()].iter().zip(&packed.sphere_blocks[places]) {
+            let cloud = CloudRay::turn(&mut self.cloud, self.tree, &self.ray, ids.geometry);
             let mut mask = match cloud.within(self.range) {
                 Some(ray) => intersect::intersect_spheres::<L>(block, ray).0,
                 None => ids.lanes(),
@@ -494,20 +446,20 @@ impl<'a, L: Simd> Frame<'a, L> {
         visitor: &mut dyn Visitor,
         edge_hits: &mut Vec<EdgeHit<'a>>,
     ) -> bool {
-        let accel = self.accel;
-        if !self.progress.is_nearby() || accel.bounding_volumes.block(first).is_none() {
+        let tree = self.tree;
+        if !self.progress.is_nearby() || tree.bounding_volumes.block(first).is_none() {
             return self.test_entries(first, context, visitor, edge_hits);
         }
         let length = largest_component(&self.ray);
         let bounding_volumes = *self
             .bounding_volumes
-            .get_or_insert_with(|| BoundingVolumeRay::new(&accel.tree_space, &self.ray, length));
+            .get_or_insert_with(|| BoundingVolumeRay::new(&tree.tree_space, &self.ray, length));
         let range = HeightRange::new((self.range[0] * length) as f32, (self.range[1] * length) as f32);
-        while let Some((block, goes_on)) = accel.bounding_volumes.block(first) {
+        while let Some((block, goes_on)) = tree.bounding_volumes.block(first) {
             let BoundingHits { mut mask, .. } =
                 intersect::intersect_bounding_volumes::<L, false>(block, &bounding_volumes, &range);
             while mask != 0 {
-                let entry = &accel.tree.entries[first + mask.trailing_zeros() as usize];
+                let entry = &tree.packed.entries[first + mask.trailing_zeros() as usize];
                 mask &= mask - 1;
                 if self.test_entry(entry, context, visitor, edge_hits) {
                     return true;
@@ -529,13 +481,13 @@ impl<'a, L: Simd> Frame<'a, L> {
         visitor: &mut dyn Visitor,
         edge_hits: &mut Vec<EdgeHit<'a>>,
     ) -> bool {
-        for entry in &self.accel.tree.entries[first..] {
+        for entry in &self.tree.packed.entries[first..] {
             let (geometry, primitive) = (entry.geometry, entry.primitive());
-            let meeting = edges::intersect_precise(self.accel, &self.ray, geometry, primitive);
+            let meeting = edges::intersect_precise(self.tree, &self.ray, geometry, primitive);
             if !matches!(meeting, watertight::Meeting::Miss) {
                 let corners =
-                    self.accel.precise_corners(geometry, primitive).map(|corner: DVec3| corner.to_array());
-                let triangle = edges::Triangle { corners, ids: (geometry, primitive), accel: self.accel };
+                    self.tree.precise_corners(geometry, primitive).map(|corner: DVec3| corner.to_array());
+                let triangle = edges::Triangle { corners, ids: (geometry, primitive), tree: self.tree };
                 if triangle.visit(meeting, &self.ray, context, visitor, edge_hits) {
                     return true;
                 }
@@ -555,7 +507,7 @@ impl<'a, L: Simd> Frame<'a, L> {
         visitor: &mut dyn Visitor,
         edge_hits: &mut Vec<EdgeHit<'a>>,
     ) -> bool {
-        for entry in &self.accel.tree.entries[first..] {
+        for entry in &self.tree.packed.entries[first..] {
             if self.test_entry(entry, context, visitor, edge_hits) {
                 return true;
             }
@@ -575,9 +527,9 @@ impl<'a, L: Simd> Frame<'a, L> {
         visitor: &mut dyn Visitor,
         edge_hits: &mut Vec<EdgeHit<'a>>,
     ) -> bool {
-        let (accel, geometry) = (self.accel, entry.geometry);
-        if let Some(patch) = Patch::of(&accel.geometries[geometry as usize].kind) {
-            return patch.visit((accel, geometry), &self.ray, context, visitor, edge_hits);
+        let (tree, geometry) = (self.tree, entry.geometry);
+        if let Some(patch) = Patch::of(&tree.geometries[geometry as usize].kind) {
+            return patch.visit((tree, geometry), &self.ray, context, visitor, edge_hits);
         }
         self.test_primitive(entry.geometry, entry.primitive(), context, visitor)
     }
@@ -590,20 +542,20 @@ impl<'a, L: Simd> Frame<'a, L> {
         context: &Context,
         visitor: &mut dyn Visitor,
     ) -> bool {
-        visit_primitive(self.accel, &self.ray, (geometry, primitive), self.wanted, context, visitor)
+        visit_primitive(self.tree, &self.ray, (geometry, primitive), self.wanted, context, visitor)
     }
 }
 
 /// Shows a visitor the crossings of a primitive that is no triangle, bilinear patch or instance. True ends the traversal.
 pub(crate) fn visit_primitive(
-    accel: &Accel,
+    tree: &Tree,
     ray: &Ray,
     (geometry, primitive): (u32, u32),
     wanted: Wanted,
     context: &Context,
     visitor: &mut dyn Visitor,
 ) -> bool {
-    let kind = &accel.geometries[geometry as usize].kind;
+    let kind = &tree.geometries[geometry as usize].kind;
     let mut first = Root::at(f64::NAN);
     let mut visit = |root: Root, order: usize| {
         let order = order as u32;
@@ -620,7 +572,7 @@ pub(crate) fn visit_primitive(
                 order,
                 is_front: None,
                 ray,
-                accel,
+                tree,
                 context,
             })
     };

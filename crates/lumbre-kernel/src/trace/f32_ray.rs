@@ -39,19 +39,22 @@ use bytemuck::Zeroable;
 
 use super::cursor::NodeCursor;
 use super::decide::Decider;
+use super::filtered::Queries;
 use super::leaves::nearest_of;
 use super::stack::{AnyHit, ClosestHit, Goal, Stack};
 use super::{LaneHits, Outcome, precedes};
+use crate::hit::Hit;
 use crate::intersect::box_ray::Slabs;
-use crate::intersect::f32_ray::{F32Ray, Precise, within};
-use crate::intersect::filter_start::FilterStart;
+use crate::intersect::f32_ray::{F32Ray, within};
 use crate::intersect::watertight;
 use crate::intersect::{Axes, DispatchedQuery, Isa, RayQuery, Simd};
+use crate::ray32::{Hit32, Ray32};
 use crate::simd::{self, F32x8, F32x16, Vector};
 use crate::tree::BLOCK;
+use crate::tree::Tree;
+use crate::tree::filter_start::Precise;
 use crate::tree::node::tag;
 use crate::tree::triangle_block::TriangleBlock;
-use crate::{Accel, Hit, Hit32, Ray32};
 
 /// How a line passes the triangles of a block, as it is seen at first.
 pub(crate) struct Lines<E> {
@@ -69,7 +72,7 @@ impl<E: Vector> Lines<E> {
         let products = [x[2] * y[1], x[0] * y[2], x[1] * y[0]];
         let edges = [products[0] - y[2] * x[1], products[1] - y[0] * x[2], products[2] - y[1] * x[0]];
         let within = within(edges);
-        (E::splat(0.0).at_most(within), Self { products, edges, within, heights })
+        (E::splat(0.0).simd_le(within), Self { products, edges, within, heights })
     }
 
     /// What is needed of triangles that it may pass through, and a bit for each of the mask that has to be looked at closer.
@@ -77,7 +80,7 @@ impl<E: Vector> Lines<E> {
     pub(crate) fn pass(self, mask: u32, precise: &Precise) -> (u32, Pass<E>) {
         let Self { products: [bc, ca, ab], edges: [u, v, w], within, heights: z } = self;
         let det = u + v + w;
-        let largest = bc.larger(ca).larger(ab);
+        let largest = bc.max_abs(ca).max_abs(ab);
         let uncertain = mask & !precise.of(mask, largest, within, det, z);
         (uncertain, Pass { height: u * z[0] + v * z[1] + w * z[2], weights: [v, w, det] })
     }
@@ -190,7 +193,7 @@ impl Nearest {
         (lane, t): (usize, f32),
     ) -> bool {
         let &LaneHits { met, uncertain, at } = crossing;
-        let others = at.at_most(E::splat(t)) & met & !(1 << lane);
+        let others = at.simd_le(E::splat(t)) & met & !(1 << lane);
         if uncertain | others == 0 && t < ray.t_max() {
             *self = Self::new(place, lane as u32, pass.weights_of(lane));
             ray.end_at(t);
@@ -264,7 +267,7 @@ impl Nearest {
         Some(Hit32 {
             t,
             local: [v / det, w / det],
-            id: decider.accel().geometries[geometry as usize].id,
+            id: decider.tree().geometries[geometry as usize].id,
             primitive,
             geometry,
             instance: Hit32::NO_INSTANCE,
@@ -296,7 +299,7 @@ impl F32Ray {
     /// How the line of the ray passes the triangles of a block, and a bit for each that it may pass through.
     #[inline(always)]
     pub(crate) fn lines<L: Simd>(&self, block: &TriangleBlock) -> (u32, Lines<L::F32x8>) {
-        let (mask, lines) = Lines::of(L::f32_corners(block, simd::opaque(self)));
+        let (mask, lines) = Lines::of(L::sheared_corners(block, simd::opaque(self)));
         (mask & block.taken(), lines)
     }
 
@@ -306,7 +309,7 @@ impl F32Ray {
         rays: [&Self; 2],
         blocks: [&TriangleBlock; 2],
     ) -> (u32, Lines<L::F32x16>) {
-        let (mask, lines) = Lines::of(L::f32_corners_by_two(blocks, rays));
+        let (mask, lines) = Lines::of(L::sheared_corners_by_two(blocks, rays));
         (mask & (blocks[0].taken() | blocks[1].taken() << BLOCK), lines)
     }
 
@@ -315,8 +318,8 @@ impl F32Ray {
     pub(crate) fn cross<E: F32x8>(&self, mask: u32, pass: &Pass<E>) -> (u32, E) {
         // Read again: most lines pass through few blocks.
         let ray = simd::opaque(self);
-        let t = pass.height.over(pass.weights[2]) * E::splat(ray.minus_inverse);
-        (mask & E::splat(ray.t_min()).at_most(t) & t.at_most(E::splat(ray.t_max())), t)
+        let t = pass.height / pass.weights[2] * E::splat(ray.minus_inverse);
+        (mask & E::splat(ray.t_min()).simd_le(t) & t.simd_le(E::splat(ray.t_max())), t)
     }
 
     /// Which triangles of a block the ray meets; `None` where its line passes through none.
@@ -457,6 +460,18 @@ pub(crate) fn rounded(hit: &Hit) -> Hit32 {
     }
 }
 
+/// The closest hit of a ray in single precision, found in double precision and rounded.
+#[inline(never)]
+pub(crate) fn closest_widened(isa: Isa, tree: &Tree, ray: &Ray32) -> Option<Hit32> {
+    Queries::of(isa, tree).closest.ask(tree, &ray.to_f64()).as_ref().map(rounded)
+}
+
+/// Whether a ray in single precision hits anything, found in double precision.
+#[inline(never)]
+pub(crate) fn any_widened(isa: Isa, tree: &Tree, ray: &Ray32) -> bool {
+    Queries::of(isa, tree).any.ask(tree, &ray.to_f64())
+}
+
 /// [`Accel::closest_f32`] and [`Accel::any_f32`] in trees of triangles, by function pointers for the instruction set.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct F32Queries {
@@ -466,8 +481,8 @@ pub(crate) struct F32Queries {
 
 impl F32Queries {
     /// `None` for a tree of anything else.
-    pub(crate) fn new(isa: Isa, start: Option<&FilterStart>) -> Option<Self> {
-        let start = start?;
+    pub(crate) fn of(isa: Isa, tree: &Tree) -> Option<Self> {
+        let start = tree.single.as_ref()?;
         start
             .only_triangles
             .then(|| Self { closest: isa.dispatched::<ClosestHit>(), any: isa.dispatched::<AnyHit>() })
@@ -479,11 +494,11 @@ impl RayQuery for ClosestHit {
     type Answer = Option<Hit32>;
 
     #[inline(always)]
-    fn ask<L: Simd>(accel: &Accel, ray: &Ray32) -> Option<Hit32> {
-        let Some(start) = &accel.single else { return accel.closest_widened(ray) };
-        match traverse::<Self, L>(&Decider::new(accel, start), &L::read_f32(ray)) {
+    fn ask<L: Simd>(tree: &Tree, ray: &Ray32) -> Option<Hit32> {
+        let Some(start) = &tree.single else { return closest_widened(L::isa(), tree, ray) };
+        match traverse::<Self, L>(&Decider::new(tree, start), &L::read_f32(ray)) {
             Outcome::Certain(hit) => hit,
-            Outcome::Uncertain => accel.closest_widened(ray),
+            Outcome::Uncertain => closest_widened(L::isa(), tree, ray),
         }
     }
 }
@@ -493,11 +508,11 @@ impl RayQuery for AnyHit {
     type Answer = bool;
 
     #[inline(always)]
-    fn ask<L: Simd>(accel: &Accel, ray: &Ray32) -> bool {
-        let Some(start) = &accel.single else { return accel.any_widened(ray) };
-        match traverse::<Self, L>(&Decider::new(accel, start), &L::read_f32(ray)) {
+    fn ask<L: Simd>(tree: &Tree, ray: &Ray32) -> bool {
+        let Some(start) = &tree.single else { return any_widened(L::isa(), tree, ray) };
+        match traverse::<Self, L>(&Decider::new(tree, start), &L::read_f32(ray)) {
             Outcome::Certain(hit) => hit.is_some(),
-            Outcome::Uncertain => accel.any_widened(ray),
+            Outcome::Uncertain => any_widened(L::isa(), tree, ray),
         }
     }
 }

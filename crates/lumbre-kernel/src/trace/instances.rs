@@ -1,22 +1,25 @@
 //! A ray at an instance: the same traversal in the tree that it places.
 //!
 //! A tree of triangles is traversed at once, by the instruction set of the traversal around it; any other by a call, no deeper than
-//! [`FilterStart`](crate::intersect::filter_start::FilterStart) allows. What is hit there comes back in double precision, as the crossing of a shape does.
+//! [`FilterStart`](crate::tree::filter_start::FilterStart) allows. What is hit there comes back in double precision, as the crossing of a shape does.
 
 use std::marker::PhantomData;
 
 use lumbre_geometry::Ray;
 
-use super::decide::{enters, heights, largest_component};
-use super::filtered::{FilteredGoal, FilteredRay, Found, IN_INSTANCE, InInstance, Traversal};
-use super::{ContextRef, Outcome, Stop, Winner, precedes};
+use super::decide::{enters, heights};
+use super::filtered::Traversal;
+use super::filtered_ray::{FilteredGoal, FilteredRay, Found, InInstance};
+use super::{ContextRef, IN_INSTANCE, Outcome, Stop, Winner, largest_component, precedes};
+use crate::hit::Hit;
 use crate::intersect::box_ray::Slabs;
-use crate::intersect::filter_start::FilterStart;
 use crate::intersect::{Isa, Simd};
-use crate::query::{Query, TreeQuery};
+use crate::query::Query;
+use crate::trace::tree_query::TreeQuery;
+use crate::tree::filter_start::FilterStart;
 use crate::tree::packed::Entry;
 use crate::tree::packed::Start;
-use crate::{Accel, GeometryKind, Hit, Instance};
+use crate::tree::{GeometryKind, Instance, Tree};
 
 /// An instance, or a part of one.
 pub(super) struct Placed<'a> {
@@ -31,9 +34,9 @@ pub(super) struct Placed<'a> {
 impl<'a> Placed<'a> {
     /// `None` where an entry stands for nothing.
     #[inline(always)]
-    pub(super) fn of(accel: &'a Accel, entry: &Entry) -> Option<Self> {
+    pub(super) fn of(tree: &'a Tree, entry: &Entry) -> Option<Self> {
         let (geometry, from) = (entry.geometry, Start::of(entry.primitive()));
-        let placed = &accel.geometries[geometry as usize];
+        let placed = &tree.geometries[geometry as usize];
         let GeometryKind::Instance(instance) = &placed.kind else { unreachable!("the tag says so") };
         (!from.is_nothing()).then_some(Self { instance, from, geometry, id: placed.id })
     }
@@ -48,12 +51,12 @@ impl<const GENERAL: bool, const FILTERED: bool> FilteredRay<'_, '_, GENERAL, FIL
         ray: &Ray,
         slabs: &mut Slabs,
     ) -> Option<Stop> {
-        let placed = Placed::of(self.decider.accel(), entry)?;
+        let placed = Placed::of(self.decider.tree(), entry)?;
         if FILTERED && !self.query.is_some_and(|query| query.has_mask(placed.geometry)) {
             return None;
         }
         let range = [ray.t_min, if G::IS_ANY { ray.t_max } else { self.best.limit(ray) }];
-        let inner = &*placed.instance.accel;
+        let inner = &*placed.instance.tree;
         let context = self.context.within(placed.geometry, placed.id);
         let query = self.query.map(TreeQuery::query);
         let mut outcome = Outcome::Uncertain;
@@ -112,7 +115,7 @@ impl<const GENERAL: bool, const FILTERED: bool> FilteredRay<'_, '_, GENERAL, FIL
                     return Outcome::Uncertain;
                 };
                 let place = |hit: &InInstance| {
-                    let hit = hit.clone().into_hit(self.decider.accel(), self.context);
+                    let hit = hit.clone().into_hit(self.decider.tree(), self.context);
                     (hit.route, hit.geometry, hit.primitive)
                 };
                 Outcome::Certain((!enters, place(hit)) < (!best_enters, place(best)))
@@ -127,9 +130,9 @@ impl<const GENERAL: bool, const FILTERED: bool> FilteredRay<'_, '_, GENERAL, FIL
     /// Whether the ray enters what it hits in an instance.
     fn enters(&self, hit: &InInstance, ray: &Ray) -> Option<bool> {
         let Hit { root, geometry, primitive, route, .. } =
-            hit.clone().into_hit(self.decider.accel(), self.context);
+            hit.clone().into_hit(self.decider.tree(), self.context);
         let around = self.context.to_context().route.len();
-        enters(self.decider.accel(), ray, &route[around..], &Winner { root, geometry, primitive })
+        enters(self.decider.tree(), ray, &route[around..], &Winner { root, geometry, primitive })
     }
 
     /// Whether a crossing that is as near as the closest hit, and that is in an instance, comes before it.
@@ -163,10 +166,10 @@ fn test_triangles<G: FilteredGoal, L: Simd, const FILTERED: bool>(
     let map = placed.instance.world_from_object.map_at(ray.time, &mut moving);
     let (ray, slabs) = L::start_placed(start, map, ray, range);
     let Some(slabs) = slabs else { return Outcome::Uncertain };
-    let (accel, root, ray) = (&*placed.instance.accel, placed.from.below(start.root), &ray);
-    let query = query.map(|query| TreeQuery::new(query, accel, context));
+    let (tree, root, ray) = (&*placed.instance.tree, placed.from.below(start.root), &ray);
+    let query = query.map(|query| TreeQuery::new(query, tree, context));
     let query = query.as_ref();
-    Traversal::<G, false, FILTERED> { accel, start, root, ray, query, context, goal: PhantomData }
+    Traversal::<G, false, FILTERED> { tree, start, root, ray, query, context, goal: PhantomData }
         .run_from::<L>(slabs)
 }
 
@@ -180,18 +183,18 @@ fn test_any_tree<G: FilteredGoal, const FILTERED: bool>(
     query: Option<&Query>,
     context: ContextRef,
 ) -> G::Found {
-    let accel = &*placed.instance.accel;
+    let tree = &*placed.instance.tree;
     let ray = &placed.instance.world_from_object.object_ray(ray).with_range(t_min, t_max);
     let written = &context.to_context();
-    if let Some(start) = accel.single.as_ref().filter(|start| !start.only_triangles) {
+    if let Some(start) = tree.single.as_ref().filter(|start| !start.only_triangles) {
         let (root, context) = (placed.from.below(start.root), ContextRef::of(written));
-        let query = query.map(|query| TreeQuery::new(query, accel, context));
+        let query = query.map(|query| TreeQuery::new(query, tree, context));
         let query = query.as_ref();
         let traversal =
-            Traversal::<G, true, FILTERED> { accel, start, root, ray, query, context, goal: PhantomData };
+            Traversal::<G, true, FILTERED> { tree, start, root, ray, query, context, goal: PhantomData };
         if let Outcome::Certain(found) = isa.run(traversal) {
-            return G::in_context(found, accel, ContextRef::of(written));
+            return G::in_context(found, tree, ContextRef::of(written));
         }
     }
-    G::exactly(isa, accel, placed.from, written, ray, query)
+    G::exactly(isa, tree, placed.from, written, ray, query)
 }

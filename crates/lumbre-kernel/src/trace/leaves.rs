@@ -5,25 +5,27 @@
 use std::marker::PhantomData;
 
 use lumbre_geometry::{PatchCrossings, Ray, Root};
-use lumbre_math::DVec3;
 
-use super::decide::{Candidate, enters, heights, largest_component};
+use super::cloud_ray::CloudRay;
+use super::decide::{Candidate, enters, heights};
 use super::edges::{self, Patch};
-use super::filtered::{FilteredGoal, FilteredRay, IN_INSTANCE};
+use super::filtered_ray::{FilteredGoal, FilteredRay};
 use super::stack::Goal;
-use super::{Outcome, Stop, Winner, all_crossings, first_crossing, is_crossed, meets_front};
+use super::{
+    IN_INSTANCE, Outcome, Stop, Winner, all_crossings, first_crossing, is_crossed, largest_component,
+    meets_front,
+};
 use crate::intersect::box_ray::Slabs;
 use crate::intersect::watertight::Meeting;
 use crate::intersect::{self, BoundingHits, Crossings, Dispatch, Isa, Simd};
-use crate::query::TreeQuery;
 use crate::simd;
+use crate::trace::tree_query::TreeQuery;
 use crate::tree::BLOCK;
 use crate::tree::bounding_block::BoundingVolumeRay;
 use crate::tree::node::tag;
 use crate::tree::packed::Entry;
-use crate::tree::sphere_block::SphereRay;
 use crate::tree::triangle_block::TriangleBlock;
-use crate::{Accel, GeometryKind};
+use crate::tree::{GeometryKind, Tree};
 
 impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL, FILTERED> {
     /// Tests a leaf.
@@ -49,7 +51,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
             }
             tag::PRECISE => self.test_precise::<G>(leaf, ray, slabs),
             tag::INSTANCE => {
-                let entry = &self.accel().tree.entries[tag::place(leaf)];
+                let entry = &self.tree().packed.entries[tag::place(leaf)];
                 self.test_instance::<G, L>(entry, ray, slabs)
             }
             _ => self.test_entries::<G>(leaf, ray, slabs),
@@ -63,9 +65,9 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         ray: &Ray,
         slabs: &mut Slabs,
     ) -> Option<Stop> {
-        let accel = self.accel();
-        for entry in &*accel.infinite {
-            let stop = match accel.geometries[entry.geometry as usize].kind {
+        let tree = self.tree();
+        for entry in &*tree.infinite {
+            let stop = match tree.geometries[entry.geometry as usize].kind {
                 GeometryKind::Instance(_) => self.test_instance::<G, L>(entry, ray, slabs),
                 _ => self.test_entry::<G>(entry, ray, slabs),
             };
@@ -77,8 +79,8 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
     }
 
     #[inline(always)]
-    fn accel(&self) -> &'a Accel {
-        self.decider.accel()
+    fn tree(&self) -> &'a Tree {
+        self.decider.tree()
     }
 
     /// Tests a leaf of triangles, eight at a time.
@@ -90,7 +92,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
             let block = self.decider.block(place);
             let (mask, edges) = L::intersect_triangles(block, simd::opaque(&self.blocks));
             if mask != 0 {
-                let crossings = L::place_crossings(&edges, &self.blocks);
+                let crossings = edges.place(&self.blocks);
                 let stop = if G::IS_ANY {
                     self.any_triangle::<L>((place, block), mask, &crossings, ray)
                 } else {
@@ -241,15 +243,15 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
     /// Tests a leaf of shapes: those whose bounding volumes are hit, the nearest first.
     #[inline(always)]
     fn test_shapes<G: Goal, L: Simd>(&mut self, leaf: u32, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
-        let accel = self.accel();
-        let make = || BoundingVolumeRay::new(&accel.tree_space, ray, largest_component(ray));
+        let tree = self.tree();
+        let make = || BoundingVolumeRay::new(&tree.tree_space, ray, largest_component(ray));
         let bounding_volumes = *self.bounding_volumes.get_or_insert_with(make);
         let mut first = tag::place(leaf);
         loop {
-            let Some((block, goes_on)) = accel.bounding_volumes.block(first) else {
+            let Some((block, goes_on)) = tree.bounding_volumes.block(first) else {
                 return self.test_entries::<G>(leaf, ray, slabs);
             };
-            let entries = &accel.tree.entries[first..];
+            let entries = &tree.packed.entries[first..];
             let range = &self.blocks.range;
             let BoundingHits { mut mask, sure, near } = if G::IS_ANY && !FILTERED {
                 intersect::intersect_bounding_volumes::<L, true>(
@@ -289,7 +291,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
     /// Tests a leaf of user geometry, or of shapes one by one.
     #[inline(always)]
     fn test_entries<G: Goal>(&mut self, leaf: u32, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
-        for entry in &self.accel().tree.entries[tag::place(leaf)..] {
+        for entry in &self.tree().packed.entries[tag::place(leaf)..] {
             let stop = self.test_entry::<G>(entry, ray, slabs);
             if stop.is_some() || entry.is_last() {
                 return stop;
@@ -302,7 +304,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
     #[inline(always)]
     fn test_entry<G: Goal>(&mut self, entry: &Entry, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
         let (geometry, primitive) = (entry.geometry, entry.primitive());
-        let kind = &self.accel().geometries[geometry as usize].kind;
+        let kind = &self.tree().geometries[geometry as usize].kind;
         if let Some(patch) = Patch::of(kind) {
             return self.test_patch::<G>(patch, geometry, ray, slabs);
         }
@@ -329,7 +331,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
             return Some(Stop::Uncertain);
         }
         if FILTERED {
-            let kind = &self.accel().geometries[geometry as usize].kind;
+            let kind = &self.tree().geometries[geometry as usize].kind;
             return self.query_crossings::<G>(kind, (geometry, 0), ray, slabs);
         }
         let root = of_line.iter().map(|crossing| crossing.root).find(|root| ray.contains(root.t))?;
@@ -352,7 +354,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         {
             let (geometry, primitive) = ids();
             let winner = Winner { root, geometry, primitive };
-            return match self.precedes_instance(ray, enters(self.accel(), ray, &[], &winner), ids()) {
+            return match self.precedes_instance(ray, enters(self.tree(), ray, &[], &winner), ids()) {
                 Outcome::Certain(true) => {
                     self.keep_exact(winner, heights(best.root.t, largest_component(ray)), slabs);
                     None
@@ -411,14 +413,14 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
     /// Tests a leaf of spheres of clouds, eight at a time.
     #[inline(always)]
     fn test_spheres<G: Goal, L: Simd>(&mut self, leaf: u32, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
-        let accel = self.accel();
+        let tree = self.tree();
         let places = tag::blocks(leaf);
         let range = [ray.t_min, if G::IS_ANY { ray.t_max } else { self.best.limit(ray) }];
         for (ids, block) in
-            accel.tree.sphere_names[places.clone()].iter().zip(&accel.tree.sphere_blocks[places])
+            tree.packed.sphere_names[places.clone()].iter().zip(&tree.packed.sphere_blocks[places])
         {
-            let cloud = CloudRay::turn(&mut self.cloud, accel, ray, ids.geometry);
-            let origin = cloud.origin;
+            let cloud = CloudRay::turn(&mut self.cloud, tree, ray, ids.geometry);
+            let origin = cloud.origin();
             let (mut mask, certain) = match cloud.within(range) {
                 Some(spheres) => intersect::intersect_spheres::<L>(block, spheres),
                 None => (ids.lanes(), 0),
@@ -430,7 +432,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
                 let lane = mask.trailing_zeros() as usize % BLOCK;
                 mask &= mask - 1;
                 let stop = if FILTERED {
-                    let kind = &accel.geometries[ids.geometry as usize].kind;
+                    let kind = &tree.geometries[ids.geometry as usize].kind;
                     self.query_crossings::<G>(kind, (ids.geometry, ids.primitives[lane]), ray, slabs)
                 } else {
                     match block.sphere(lane, &origin).closest(ray) {
@@ -452,11 +454,11 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
     /// Tests a leaf of triangles in double precision.
     #[inline(never)]
     fn test_precise<G: Goal>(&mut self, leaf: u32, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
-        let accel = self.accel();
-        for entry in &accel.tree.entries[tag::place(leaf)..] {
+        let tree = self.tree();
+        for entry in &tree.packed.entries[tag::place(leaf)..] {
             let (geometry, primitive) = (entry.geometry, entry.primitive());
             if self.query.is_none_or(|query| query.has_primitive(geometry, primitive)) {
-                match edges::intersect_precise(accel, ray, geometry, primitive) {
+                match edges::intersect_precise(tree, ray, geometry, primitive) {
                     Meeting::Miss => {}
                     Meeting::Touch { .. } => return Some(Stop::Uncertain),
                     Meeting::Hit { root, is_front } => {
@@ -518,50 +520,6 @@ impl Dispatch for Comparison<'_, '_> {
     fn run<L: Simd>(self) -> Self::Output {
         let Self { decider, ray, axes, triangle, best } = self;
         decider.compare::<L>(ray, axes, triangle, best)
-    }
-}
-
-/// The ray for the spheres of one cloud, or of some with one origin.
-pub(crate) struct CloudRay {
-    geometry: u32,
-    /// The cloud's.
-    origin: DVec3,
-    /// Where single precision tells anything; and how many units of space there are for each of `t`.
-    spheres: Option<(SphereRay, f64)>,
-}
-
-impl CloudRay {
-    /// Turns the ray to a cloud.
-    #[inline(always)]
-    pub(crate) fn turn<'s>(
-        slot: &'s mut Option<Self>,
-        accel: &Accel,
-        ray: &Ray,
-        geometry: u32,
-    ) -> &'s mut Self {
-        // Where all clouds have one origin, ids need not be read from memory.
-        let is_turned = slot
-            .as_ref()
-            .is_some_and(|cloud| accel.summary.has_one_cloud_origin || cloud.geometry == geometry);
-        if !is_turned {
-            let origin = accel.cloud(geometry).origin;
-            let spheres = SphereRay::new(ray, &origin, accel.summary.sizes.sphere_reach);
-            *slot = Some(Self { geometry, origin, spheres });
-        }
-        slot.as_mut().expect("it was turned")
-    }
-
-    /// The origin of the cloud.
-    pub(super) fn origin(&self) -> DVec3 {
-        self.origin
-    }
-
-    /// The ray in this range of `t`; `None` where single precision tells nothing.
-    #[inline(always)]
-    pub(crate) fn within(&mut self, [t_min, t_max]: [f64; 2]) -> Option<&SphereRay> {
-        let (spheres, length) = self.spheres.as_mut()?;
-        spheres.set_range(*length, t_min, t_max);
-        Some(spheres)
     }
 }
 

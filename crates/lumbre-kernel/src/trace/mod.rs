@@ -6,23 +6,28 @@
 //! oracle of the other. Rays in single precision have a traversal of their own, [`f32_ray`], in trees of nothing but triangles, and
 //! [`picture`] takes it to trees of anything.
 
+mod cloud_ray;
 pub(crate) mod cursor;
 pub(crate) mod decide;
 pub(crate) mod edges;
 pub(crate) mod exact;
 pub(crate) mod f32_ray;
 pub(crate) mod filtered;
+pub(crate) mod filtered_ray;
 mod instances;
 mod leaves;
 pub(crate) mod picture;
 pub(crate) mod stack;
+pub(crate) mod tree_query;
+pub(crate) mod visitor;
 pub(crate) mod visitors;
 
 use bytemuck::Zeroable;
 use lumbre_geometry::{Ray, Root, Roots};
 
+use crate::hit::{Hit, InstancePath};
 use crate::tree::sphere_block::ExactSphere;
-use crate::{Accel, GeometryKind, Hit, InstancePath};
+use crate::tree::{GeometryKind, Tree};
 
 /// What single precision, and the double precision that it asks, come to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,11 +78,11 @@ pub(crate) struct Winner {
 impl Winner {
     /// As a hit outside of instances.
     #[inline(always)]
-    pub(crate) fn to_hit(self, accel: &Accel) -> Hit {
+    pub(crate) fn to_hit(self, tree: &Tree) -> Hit {
         let Self { root, geometry, primitive } = self;
         Hit {
             root,
-            id: accel.geometries[geometry as usize].id,
+            id: tree.geometries[geometry as usize].id,
             primitive,
             geometry,
             instances: InstancePath::new(),
@@ -86,27 +91,36 @@ impl Winner {
     }
 
     /// As a hit in a tree that stands there.
-    pub(crate) fn to_hit_in(self, accel: &Accel, context: ContextRef) -> Hit {
+    pub(crate) fn to_hit_in(self, tree: &Tree, context: ContextRef) -> Hit {
         let Context { route, ids } = context.to_context();
-        Hit { instances: ids, route, ..self.to_hit(accel) }
+        Hit { instances: ids, route, ..self.to_hit(tree) }
     }
 
     /// Writes the hit into a slot, field by field: a whole that is put together elsewhere stalls the store.
     #[inline(always)]
-    pub(crate) fn put(self, accel: &Accel, slot: &mut Option<Hit>) {
+    pub(crate) fn put(self, tree: &Tree, slot: &mut Option<Hit>) {
         let Some(hit) = slot else {
-            *slot = Some(self.to_hit(accel));
+            *slot = Some(self.to_hit(tree));
             return;
         };
         let Self { root, geometry, primitive } = self;
         hit.root = root;
-        hit.id = accel.geometries[geometry as usize].id;
+        hit.id = tree.geometries[geometry as usize].id;
         hit.primitive = primitive;
         hit.geometry = geometry;
         // Cheaper than clearing, which looks where a path is stored.
         hit.instances = InstancePath::new();
         hit.route = InstancePath::new();
     }
+}
+
+/// No geometry of the tree, and behind all of them: of two hits at the same `t`, one outside of instances comes first.
+pub(crate) const IN_INSTANCE: u32 = u32::MAX;
+
+/// The height along a ray per unit of `t`.
+#[inline(always)]
+pub(crate) fn largest_component(ray: &Ray) -> f64 {
+    ray.direction.abs().max_element()
 }
 
 /// The instances around a tree, outermost first.

@@ -25,26 +25,29 @@
 use lumbre_geometry::{Ray, Root};
 use lumbre_math::{DVec2, DVec3};
 
+use super::cloud_ray::CloudRay;
 use super::cursor::NodeCursor;
-use super::decide::{Decider, enters, largest_component};
+use super::decide::{Decider, enters};
 use super::edges::{self, Patch};
 use super::exact;
 use super::f32_ray::Nearest;
 use super::instances::Placed;
-use super::leaves::{CloudRay, nearest_of};
+use super::leaves::nearest_of;
 use super::stack::{Goal, Stack};
-use super::{Context, ContextRef, Outcome, Winner, first_crossing, is_crossed};
-use crate::columns::PictureStart;
+use super::{Context, ContextRef, Outcome, Winner, first_crossing, is_crossed, largest_component};
+use crate::hit::{Hit, InstancePath};
 use crate::intersect::box_ray::Slabs;
 use crate::intersect::f32_ray::F32Ray;
 use crate::intersect::watertight::{self, Feature, HeightRange, Meeting, beyond};
 use crate::intersect::{self, BoundingHits, Dispatch, Isa, Simd};
+use crate::ray32::Ray32;
 use crate::simd;
 use crate::tree::BLOCK;
 use crate::tree::bounding_block::BoundingVolumeRay;
 use crate::tree::node::tag;
 use crate::tree::packed::{Entry, Start};
-use crate::{Accel, GeometryKind, Hit, InstancePath, Ray32};
+use crate::tree::picture_start::PictureStart;
+use crate::tree::{GeometryKind, Tree};
 
 /// How far from a tree's origin a ray may start on each axis, in tree units, to enter an instance where it is.
 const NEARBY: f64 = 4.0;
@@ -83,11 +86,11 @@ impl Crossing {
 
     /// Which of two comes first.
     #[inline(always)]
-    pub(crate) fn nearer(one: Option<Self>, other: Option<Self>, accel: &Accel, ray: &Ray) -> Option<Self> {
+    pub(crate) fn nearer(one: Option<Self>, other: Option<Self>, tree: &Tree, ray: &Ray) -> Option<Self> {
         match (one, other) {
             (Some(one), Some(other)) => {
                 let (t, other_t) = (one.winner.root.t, other.winner.root.t);
-                let is_first = t < other_t || t == other_t && one.precedes(&other, accel, ray);
+                let is_first = t < other_t || t == other_t && one.precedes(&other, tree, ray);
                 Some(if is_first { one } else { other })
             }
             (one, None) => one,
@@ -108,34 +111,34 @@ impl Crossing {
 
     /// Whether it is on a triangle of a mesh in the tree itself.
     #[inline(always)]
-    pub(crate) fn is_plain(&self, accel: &Accel) -> bool {
+    pub(crate) fn is_plain(&self, tree: &Tree) -> bool {
         self.instance.is_none()
-            && matches!(accel.geometries[self.winner.geometry as usize].kind, GeometryKind::Mesh(_))
+            && matches!(tree.geometries[self.winner.geometry as usize].kind, GeometryKind::Mesh(_))
     }
 
     /// The id of the geometry, and position and id of the instance that it is in; `None` where it is in more than one.
     #[inline(always)]
-    pub(crate) fn placed(&self, accel: &Accel) -> Option<(u32, Option<(u32, u32)>)> {
+    pub(crate) fn placed(&self, tree: &Tree) -> Option<(u32, Option<(u32, u32)>)> {
         let geometry = self.winner.geometry as usize;
-        let Some(position) = self.instance else { return Some((accel.geometries[geometry].id, None)) };
-        let placed = &accel.geometries[position as usize];
+        let Some(position) = self.instance else { return Some((tree.geometries[geometry].id, None)) };
+        let placed = &tree.geometries[position as usize];
         match &placed.kind {
             GeometryKind::Instance(instance) if self.nested.is_none() => {
-                Some((instance.accel.geometries[geometry].id, Some((position, placed.id))))
+                Some((instance.tree.geometries[geometry].id, Some((position, placed.id))))
             }
             _ => None,
         }
     }
 
     /// As a hit of the tree.
-    pub(crate) fn into_hit(self, accel: &Accel) -> Hit {
-        let Some(position) = self.instance else { return self.winner.to_hit(accel) };
-        let placed = &accel.geometries[position as usize];
+    pub(crate) fn into_hit(self, tree: &Tree) -> Hit {
+        let Some(position) = self.instance else { return self.winner.to_hit(tree) };
+        let placed = &tree.geometries[position as usize];
         let GeometryKind::Instance(instance) = &placed.kind else { unreachable!("it was an instance") };
         match self.nested {
             None => {
                 let context = ContextRef::OUTSIDE.within(position, placed.id);
-                self.winner.to_hit_in(&instance.accel, context)
+                self.winner.to_hit_in(&instance.tree, context)
             }
             Some(mut hit) => {
                 hit.route.insert(0, position);
@@ -148,11 +151,11 @@ impl Crossing {
     /// Of two at the same `t`, whether it comes before the other.
     #[cold]
     #[inline(never)]
-    fn precedes(&self, other: &Self, accel: &Accel, ray: &Ray) -> bool {
+    fn precedes(&self, other: &Self, tree: &Tree, ray: &Ray) -> bool {
         let key = |crossing: &Self| {
-            let Hit { root, geometry, primitive, route, .. } = crossing.clone().into_hit(accel);
+            let Hit { root, geometry, primitive, route, .. } = crossing.clone().into_hit(tree);
             let winner = Winner { root, geometry, primitive };
-            let enters = crossing.enters.or_else(|| enters(accel, ray, &route, &winner)).unwrap_or(false);
+            let enters = crossing.enters.or_else(|| enters(tree, ray, &route, &winner)).unwrap_or(false);
             (!enters, !route.is_empty(), route, geometry, primitive)
         };
         key(self) < key(other)
@@ -201,7 +204,7 @@ enum Approach {
 
 /// The ray as single precision takes it in a tree; nothing beyond `limit` is wanted.
 #[inline(always)]
-fn approach(accel: &Accel, picture: &PictureStart, ray: &Ray, limit: f64) -> Approach {
+fn approach(tree: &Tree, picture: &PictureStart, ray: &Ray, limit: f64) -> Approach {
     let start = &picture.start;
     let size = largest_component(ray) * start.scale;
     if !(f64::MIN_POSITIVE..=f64::MAX).contains(&size) {
@@ -215,7 +218,7 @@ fn approach(accel: &Accel, picture: &PictureStart, ray: &Ray, limit: f64) -> App
     let distance = from.abs().max_element();
     let is_nearby = distance <= NEARBY;
     if !is_nearby {
-        let is_movable = distance <= MOVABLE && accel.infinite.is_empty();
+        let is_movable = distance <= MOVABLE && tree.infinite.is_empty();
         if !is_movable {
             return Approach::Unknown;
         }
@@ -251,7 +254,7 @@ fn power_of_two_over(size: f64) -> f64 {
 
 /// What a ray meets of anything but the tree's own triangles in single precision.
 pub(crate) struct Others<'a> {
-    accel: &'a Accel,
+    tree: &'a Tree,
     pub(crate) nearest: Option<Crossing>,
     /// What is beyond this is not wanted.
     limit: f64,
@@ -263,8 +266,8 @@ pub(crate) struct Others<'a> {
 
 impl<'a> Others<'a> {
     #[inline(always)]
-    pub(crate) fn new(accel: &'a Accel, limit: f64) -> Self {
-        Self { accel, nearest: None, limit, bounding_volumes: None, cloud: None }
+    pub(crate) fn new(tree: &'a Tree, limit: f64) -> Self {
+        Self { tree, nearest: None, limit, bounding_volumes: None, cloud: None }
     }
 
     /// Leaves out what is beyond this.
@@ -294,7 +297,7 @@ impl<'a> Others<'a> {
             return;
         }
         let is_first = match &self.nearest {
-            Some(nearest) if nearest.winner.root.t == t => crossing.precedes(nearest, self.accel, ray),
+            Some(nearest) if nearest.winner.root.t == t => crossing.precedes(nearest, self.tree, ray),
             nearest => nearest.as_ref().is_none_or(|nearest| t < nearest.winner.root.t),
         };
         if is_first {
@@ -311,7 +314,7 @@ impl<'a> Others<'a> {
             tag::SPHERES => self.test_spheres::<G, L>(leaf, ray),
             tag::PRECISE => self.test_precise::<G>(leaf, ray),
             tag::INSTANCE => {
-                let entry = &self.accel.tree.entries[tag::place(leaf)];
+                let entry = &self.tree.packed.entries[tag::place(leaf)];
                 self.test_instance::<G, L>(entry, ray)
             }
             _ => self.test_entries::<G>(leaf, ray),
@@ -321,10 +324,10 @@ impl<'a> Others<'a> {
     /// The same of what has no bounds.
     #[inline(always)]
     fn test_infinite<G: Goal, L: Simd>(&mut self, ray: &Ray) -> bool {
-        let accel = self.accel;
+        let tree = self.tree;
         // No closures: they do not inherit target features.
-        for entry in &*accel.infinite {
-            let is_met = match accel.geometries[entry.geometry as usize].kind {
+        for entry in &*tree.infinite {
+            let is_met = match tree.geometries[entry.geometry as usize].kind {
                 GeometryKind::Instance(_) => self.test_instance::<G, L>(entry, ray),
                 _ => self.test_entry::<G>(entry, ray),
             };
@@ -345,15 +348,15 @@ impl<'a> Others<'a> {
     /// A leaf of shapes: those whose bounding volumes are hit, the nearest first.
     #[inline(always)]
     fn test_shapes<G: Goal, L: Simd>(&mut self, leaf: u32, ray: &Ray) -> bool {
-        let accel = self.accel;
-        let make = || BoundingVolumeRay::new(&accel.tree_space, ray, largest_component(ray));
+        let tree = self.tree;
+        let make = || BoundingVolumeRay::new(&tree.tree_space, ray, largest_component(ray));
         let volumes = *self.bounding_volumes.get_or_insert_with(make);
         let mut first = tag::place(leaf);
         loop {
-            let Some((block, goes_on)) = accel.bounding_volumes.block(first) else {
+            let Some((block, goes_on)) = tree.bounding_volumes.block(first) else {
                 return self.test_entries::<G>(leaf, ray);
             };
-            let entries = &accel.tree.entries[first..];
+            let entries = &tree.packed.entries[first..];
             let mut range = self.heights(ray);
             let BoundingHits { mut mask, sure, near } = if G::IS_ANY {
                 intersect::intersect_bounding_volumes::<L, true>(block, simd::opaque(&volumes), &range)
@@ -385,7 +388,7 @@ impl<'a> Others<'a> {
     /// A leaf of custom geometry, or of shapes one by one.
     #[inline(never)]
     fn test_entries<G: Goal>(&mut self, leaf: u32, ray: &Ray) -> bool {
-        for entry in &self.accel.tree.entries[tag::place(leaf)..] {
+        for entry in &self.tree.packed.entries[tag::place(leaf)..] {
             if self.test_entry::<G>(entry, ray) {
                 return true;
             }
@@ -400,7 +403,7 @@ impl<'a> Others<'a> {
     #[inline(always)]
     fn test_entry<G: Goal>(&mut self, entry: &Entry, ray: &Ray) -> bool {
         let (geometry, primitive) = (entry.geometry, entry.primitive());
-        let kind = &self.accel.geometries[geometry as usize].kind;
+        let kind = &self.tree.geometries[geometry as usize].kind;
         let root = if let Some(patch) = Patch::of(kind) {
             patch
                 .line_crossings(ray)
@@ -425,12 +428,12 @@ impl<'a> Others<'a> {
     /// A leaf of spheres of clouds, eight at a time.
     #[inline(always)]
     fn test_spheres<G: Goal, L: Simd>(&mut self, leaf: u32, ray: &Ray) -> bool {
-        let (accel, places) = (self.accel, tag::blocks(leaf));
+        let (tree, places) = (self.tree, tag::blocks(leaf));
         let range = [ray.t_min, self.limit];
         for (ids, block) in
-            accel.tree.sphere_names[places.clone()].iter().zip(&accel.tree.sphere_blocks[places])
+            tree.packed.sphere_names[places.clone()].iter().zip(&tree.packed.sphere_blocks[places])
         {
-            let cloud = CloudRay::turn(&mut self.cloud, accel, ray, ids.geometry);
+            let cloud = CloudRay::turn(&mut self.cloud, tree, ray, ids.geometry);
             let origin = cloud.origin();
             let (mut mask, certain) = match cloud.within(range) {
                 Some(spheres) => intersect::intersect_spheres::<L>(block, spheres),
@@ -456,10 +459,10 @@ impl<'a> Others<'a> {
     /// A leaf of triangles in double precision.
     #[inline(never)]
     fn test_precise<G: Goal>(&mut self, leaf: u32, ray: &Ray) -> bool {
-        for entry in &self.accel.tree.entries[tag::place(leaf)..] {
+        for entry in &self.tree.packed.entries[tag::place(leaf)..] {
             let (geometry, primitive) = (entry.geometry, entry.primitive());
             let met =
-                match edges::intersect_precise(self.accel, ray, geometry, primitive) {
+                match edges::intersect_precise(self.tree, ray, geometry, primitive) {
                     Meeting::Hit { root, is_front } => Some((root, is_front)),
                     Meeting::Touch {
                         root, feature: Feature::Edge(_) | Feature::Vertex(_), is_front, ..
@@ -482,8 +485,8 @@ impl<'a> Others<'a> {
     /// An instance: one of triangles is entered at once, any other by a call.
     #[inline(always)]
     fn test_instance<G: Goal, L: Simd>(&mut self, entry: &Entry, ray: &Ray) -> bool {
-        let Some(placed) = Placed::of(self.accel, entry) else { return false };
-        let inner = &*placed.instance.accel;
+        let Some(placed) = Placed::of(self.tree, entry) else { return false };
+        let inner = &*placed.instance.tree;
         let object_ray = &placed.instance.world_from_object.object_ray(ray);
         let mut found = Outcome::Uncertain;
         if let Some(picture) = &inner.picture {
@@ -492,7 +495,7 @@ impl<'a> Others<'a> {
                 Approach::Unknown => {}
                 Approach::Ray(local) => {
                     let search = Search {
-                        accel: inner,
+                        tree: inner,
                         picture,
                         from: placed.from,
                         ray: object_ray,
@@ -525,13 +528,13 @@ impl<'a> Others<'a> {
 /// A part of a tree in double precision alone.
 #[cold]
 #[inline(never)]
-fn exactly<G: Goal>(isa: Isa, accel: &Accel, from: Start, ray: &Ray, limit: f64) -> Option<Crossing> {
+fn exactly<G: Goal>(isa: Isa, tree: &Tree, from: Start, ray: &Ray, limit: f64) -> Option<Crossing> {
     let context = &Context::default();
     if G::IS_ANY {
-        return exact::any_from(isa, accel, from, context, ray, None).then(Crossing::some);
+        return exact::any_from(isa, tree, from, context, ray, None).then(Crossing::some);
     }
     let ray = &ray.with_range(ray.t_min, limit);
-    let hit = exact::closest_from(isa, accel, from, context, ray, None)?;
+    let hit = exact::closest_from(isa, tree, from, context, ray, None)?;
     let winner = Winner { root: hit.root, geometry: hit.geometry, primitive: hit.primitive };
     if hit.route.is_empty() {
         return Some(Crossing::of(winner, None));
@@ -546,7 +549,7 @@ fn exactly<G: Goal>(isa: Isa, accel: &Accel, from: Start, ray: &Ray, limit: f64)
 
 /// A ray on its way through a part of a tree.
 pub(crate) struct Search<'a, 'r> {
-    pub(crate) accel: &'a Accel,
+    pub(crate) tree: &'a Tree,
     pub(crate) picture: &'a PictureStart,
     pub(crate) from: Start,
     pub(crate) ray: &'r Ray,
@@ -559,17 +562,17 @@ impl Search<'_, '_> {
     /// The nearest crossing, or any. `GENERAL`: in a tree of anything, not of triangles alone.
     #[inline(always)]
     pub(crate) fn run<G: Goal, L: Simd, const GENERAL: bool>(self) -> Outcome<Option<Crossing>> {
-        let Self { accel, picture, from, ray, local, limit } = self;
+        let Self { tree, picture, from, ray, local, limit } = self;
         let start = &picture.start;
         let Some(slabs) = L::start_f32(start, simd::opaque(&local.ray)) else { return Outcome::Uncertain };
-        let decider = &Decider::new(accel, start);
+        let decider = &Decider::new(tree, start);
         let mut cursor = NodeCursor::<L>::new(decider.nodes(), slabs);
         let mut stack = Stack::new();
         if !G::IS_ANY && limit < ray.t_max {
             shorten(&mut cursor.slabs, local.end(limit));
         }
         let mut next = cursor.descend::<G>(from.below(start.root), &mut stack);
-        if next.is_none() && (!GENERAL || accel.infinite.is_empty()) {
+        if next.is_none() && (!GENERAL || tree.infinite.is_empty()) {
             return Outcome::Certain(None);
         }
         let mut triangles = L::start_f32_blocks(start, simd::opaque(&local.ray), &cursor.slabs);
@@ -577,8 +580,8 @@ impl Search<'_, '_> {
             triangles.shorten(local.end(limit));
         }
         let mut nearest = Nearest::NONE;
-        let mut others = Others::new(accel, limit);
-        if GENERAL && !accel.infinite.is_empty() {
+        let mut others = Others::new(tree, limit);
+        if GENERAL && !tree.infinite.is_empty() {
             let (is_met, nearer) = others.test::<G, L>(None, ray);
             if is_met {
                 return Outcome::Certain(Some(Crossing::some()));
@@ -611,7 +614,7 @@ impl Search<'_, '_> {
             triangle = Some(Crossing::on_triangle(ids, local.t(triangles.t_max()), uv, enters, ray));
         }
         Outcome::Certain(if GENERAL {
-            Crossing::nearer(triangle, others.nearest, accel, ray)
+            Crossing::nearer(triangle, others.nearest, tree, ray)
         } else {
             triangle
         })

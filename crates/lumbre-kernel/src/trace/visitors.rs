@@ -5,9 +5,11 @@ use std::collections::BinaryHeap;
 
 use lumbre_geometry::Ray;
 
-use super::exact::{Crossing, Visitor, Wanted};
-use crate::query::{Query, TreeQuery};
-use crate::{Accel, Hit};
+use super::visitor::{Crossing, Visitor, Wanted};
+use crate::hit::Hit;
+use crate::query::Query;
+use crate::trace::tree_query::TreeQuery;
+use crate::tree::Tree;
 
 use super::ContextRef;
 
@@ -19,16 +21,16 @@ fn by_t(a: f64, b: f64) -> Ordering {
 /// Whether a query takes a crossing.
 fn takes(query: Option<&Query>, crossing: &Crossing) -> bool {
     let Some(query) = query else { return true };
-    let &Crossing { root, geometry, primitive, accel, context, .. } = crossing;
-    let tree = TreeQuery::new(query, accel, ContextRef::of(context));
-    tree.has_primitive(geometry, primitive)
-        && (tree.takes_both_faces() || tree.takes_face(crossing.is_front()))
-        && tree.accepts(&super::Winner { root, geometry, primitive })
+    let &Crossing { root, geometry, primitive, tree, context, .. } = crossing;
+    let query = TreeQuery::new(query, tree, ContextRef::of(context));
+    query.has_primitive(geometry, primitive)
+        && (query.takes_both_faces() || query.takes_face(crossing.is_front()))
+        && query.accepts(&super::Winner { root, geometry, primitive })
 }
 
 /// Whether a query takes anything in an instance.
-fn enters(query: Option<&Query>, accel: &Accel, geometry: u32) -> bool {
-    query.is_none_or(|query| TreeQuery::new(query, accel, ContextRef::OUTSIDE).has_mask(geometry))
+fn enters(query: Option<&Query>, tree: &Tree, geometry: u32) -> bool {
+    query.is_none_or(|query| TreeQuery::new(query, tree, ContextRef::OUTSIDE).has_mask(geometry))
 }
 
 /// Without a query, the first crossing of a primitive suffices.
@@ -64,8 +66,8 @@ impl Visitor for Closest<'_> {
         self.range
     }
 
-    fn enters(&self, accel: &Accel, geometry: u32) -> bool {
-        enters(self.query, accel, geometry)
+    fn enters(&self, tree: &Tree, geometry: u32) -> bool {
+        enters(self.query, tree, geometry)
     }
 
     fn visit(&mut self, crossing: &Crossing) -> bool {
@@ -111,8 +113,8 @@ impl Visitor for Any<'_> {
         self.range
     }
 
-    fn enters(&self, accel: &Accel, geometry: u32) -> bool {
-        enters(self.query, accel, geometry)
+    fn enters(&self, tree: &Tree, geometry: u32) -> bool {
+        enters(self.query, tree, geometry)
     }
 
     fn visit(&mut self, crossing: &Crossing) -> bool {

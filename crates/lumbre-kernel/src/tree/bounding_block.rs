@@ -1,14 +1,13 @@
 //! Shapes by eight: a first test in single precision of the bodies around them, which loses none.
 
 use bytemuck::{Pod, Zeroable};
-use lumbre_geometry::{BoundingVolume, Ray};
+use lumbre_geometry::{BoundingVolume, PlacedShape, Ray};
 use lumbre_math::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use crate::tree::BLOCK;
 use crate::tree::node::{TreeSpace, round_up};
 use crate::tree::packed::Entry;
-use crate::{Geometry, GeometryKind};
 
 /// Up to eight bounding volumes (see [`BoundingVolume`]), each by its centre, relative to the tree's origin, and the map from there to its cube.
 ///
@@ -126,7 +125,7 @@ impl BoundingBlock {
 }
 
 /// The bounding volumes of the shapes in a tree's leaves.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct BoundingVolumes {
     blocks: Vec<BoundingBlock>,
     /// For each entry of the tree, the block that it is in, and the top bit if that is not the last of its leaf; of what is no
@@ -137,14 +136,14 @@ pub(crate) struct BoundingVolumes {
 const GOES_ON: u32 = 1 << 31;
 
 impl BoundingVolumes {
-    /// Of the entries of a tree; none where single precision would tell nothing.
-    pub(crate) fn new(geometries: &[Geometry], entries: &[Entry], tree_space: &TreeSpace) -> Self {
-        let bounding_volume = |entry: &Entry| match &geometries[entry.geometry as usize].kind {
-            GeometryKind::Shape(shape) => shape.bounding_volume(),
-            _ => None,
-        };
-        let is_shape =
-            |entry: &Entry| matches!(geometries[entry.geometry as usize].kind, GeometryKind::Shape(_));
+    /// Of the entries of a tree, of which some are shapes; none where single precision would tell nothing.
+    pub(crate) fn new<'g>(
+        entries: &[Entry],
+        tree_space: &TreeSpace,
+        shape: impl Fn(&Entry) -> Option<&'g PlacedShape> + Sync,
+    ) -> Self {
+        let bounding_volume = |entry: &Entry| shape(entry)?.bounding_volume();
+        let is_shape = |entry: &Entry| shape(entry).is_some();
         let two_to = |exponent: i32| 2.0f64.powi(exponent);
         let is_fit = tree_space.near > 0.0 && (two_to(-40)..=two_to(40)).contains(&tree_space.scale);
         if !is_fit || !entries.iter().any(is_shape) {

@@ -45,7 +45,7 @@ impl Entry {
 }
 
 /// The packed tree.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Packed {
     /// Each before all that are below it.
     pub(crate) nodes: Store<Node>,

@@ -4,8 +4,8 @@ use bytemuck::{Pod, Zeroable};
 use lumbre_geometry::{Ray, Root, Roots, Sphere, Surface, sphere_crossings};
 use lumbre_math::DVec3;
 
-use crate::SphereCloud;
 use crate::tree::BLOCK;
+use crate::tree::geometry::SphereCloud;
 
 /// Up to eight spheres of one cloud. Unused lanes are NaN, which no ray hits.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]

@@ -2,8 +2,6 @@
 
 use lumbre_math::DVec3;
 
-use crate::{Geometry, GeometryKind, Instance};
-
 /// What is known of all the geometries of a tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Summary {
@@ -21,39 +19,6 @@ pub(crate) struct Summary {
     pub(crate) has_one_cloud_origin: bool,
     /// Whether geometries in instances have masks.
     pub(crate) masks_within: bool,
-}
-
-impl Summary {
-    pub(crate) fn new(geometries: &[Geometry], sizes: Sizes) -> Self {
-        let mut origins = geometries.iter().filter_map(|geometry| match &geometry.kind {
-            GeometryKind::Mesh(mesh) => Some(mesh.origin),
-            _ => None,
-        });
-        let first_origin = origins.next().unwrap_or(DVec3::NAN);
-        let mut cloud_origins = geometries.iter().filter_map(|geometry| match &geometry.kind {
-            GeometryKind::Spheres(cloud) => Some(cloud.origin),
-            _ => None,
-        });
-        let first_cloud_origin = cloud_origins.next();
-        let nesting_of = |geometry: &Geometry| match &geometry.kind {
-            GeometryKind::Instance(Instance { accel, .. }) => accel.summary.nesting.saturating_add(1),
-            _ => 0,
-        };
-        Self {
-            has_one_cloud_origin: cloud_origins.all(|origin| Some(origin) == first_cloud_origin),
-            only_triangles: geometries.iter().all(|geometry| matches!(geometry.kind, GeometryKind::Mesh(_))),
-            nesting: geometries.iter().map(nesting_of).max().unwrap_or(0),
-            has_one_origin: origins.all(|origin| origin == first_origin),
-            first_origin,
-            sizes,
-            masks_within: geometries.iter().any(|geometry| match &geometry.kind {
-                GeometryKind::Instance(Instance { accel, .. }) => {
-                    !accel.masks.is_empty() || accel.summary.masks_within
-                }
-                _ => false,
-            }),
-        }
-    }
 }
 
 /// The sizes of what is put into a tree.

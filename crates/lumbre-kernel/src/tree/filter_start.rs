@@ -1,14 +1,16 @@
 //! What rays need to start in single precision.
 
-use super::f32_ray::Precise;
-use super::watertight::LEAST_SIZE;
 use lumbre_math::DVec3;
 
-use crate::tree::node::{LARGEST_NEAR, SMALLEST_NEAR, TINY_NEAR, TreeSpace, round_up};
-use crate::tree::summary::Summary;
+use super::node::{LARGEST_NEAR, ROUNDOFF, SMALLEST_NEAR, TINY_NEAR, TreeSpace, round_up};
+use super::summary::Summary;
+use crate::simd::Vector;
 
 /// Instances within one another are traversed in single precision no deeper: each takes a few kilobytes of the thread's stack.
 const DEEPEST: u32 = 8;
+
+/// The smallest size L of `intersect::watertight`, by how far the tree and its triangles reach.
+pub(crate) const LEAST_SIZE: f32 = 4.0 * ROUNDOFF as f32;
 
 /// What a ray from nearby needs to start in single precision, in a tree where the corners of all triangles in single precision are
 /// relative to one origin.
@@ -102,3 +104,44 @@ impl FilterStart {
         Self { mesh_origin: [0.0; 4], single_mesh_origin: Some([0.0; 4]), f32_margin, ..self.clone() }
     }
 }
+
+/// Where weights are precise enough: the largest product times the extent of the triangle and a little is no more than their sum times
+/// so much. See above.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Precise {
+    /// The same by the longest side of all boxes in place of the extent: where the largest product is no more than the sum times this, one
+    /// need not look at heights. What these are wrong by, as rounded, is less than the little.
+    at_once: f32,
+    most: f32,
+    little: f32,
+}
+
+impl Precise {
+    /// For a tree in which no side of a triangle's box is longer, but for rounding.
+    pub(crate) fn new(space_per_unit: f32, longest_side: f32) -> Self {
+        let most = 2.0 * space_per_unit;
+        let little = most * (1.0 / 1024.0);
+        // More than what rounding may take away, here and of the side.
+        const MORE: f32 = 1.0 + 8.0 * f32::EPSILON;
+        Self { at_once: most / (MORE * (longest_side + little)), most, little }
+    }
+
+    /// A bit for each of the mask that is: by the largest product, how far within the triangle the line is, the sum of the edge functions, and the
+    /// heights of the corners. Other bits mean nothing.
+    #[inline(always)]
+    pub(crate) fn of<V: Vector>(&self, mask: u32, largest: V, within: V, sum: V, z: [V; 3]) -> u32 {
+        let is_strict = V::splat(0.0).simd_lt(within);
+        let largest = largest + V::splat(TINY);
+        let sum = sum.abs();
+        let at_once = is_strict & largest.simd_le(sum * V::splat(self.at_once));
+        if mask & !at_once == 0 {
+            return at_once;
+        }
+        let extent = z[0].max(z[1]).max(z[2]) - z[0].min(z[1]).min(z[2]);
+        let least = largest * (extent + V::splat(self.little));
+        at_once | is_strict & least.simd_le(sum * V::splat(self.most))
+    }
+}
+
+/// What products may lose by underflow is nothing beside this.
+const TINY: f32 = 1.0 / (1u128 << 80) as f32;

@@ -1,48 +1,10 @@
-//! What can stand in a tree.
+//! What geometries are made of, but for trees themselves: meshes, spheres, user geometry, and where an instance stands.
 
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use lumbre_geometry::{Aabb, NearestPoint, NoNearestPoint, PlacedShape, Ray, Root, Roots, Surface};
+use lumbre_geometry::{Aabb, NearestPoint, NoNearestPoint, Ray, Root, Roots, Surface};
 use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec3};
-
-use crate::{Accel, PreciseMesh};
-
-/// Something that rays can hit, under a name of the caller's.
-#[derive(Clone, Debug)]
-pub struct Geometry {
-    /// Returned in every [`crate::Hit`] on it; the caller's own, not necessarily unique. For an instance it joins the hit's
-    /// path.
-    pub id: u32,
-    /// What it is.
-    pub kind: GeometryKind,
-}
-
-/// The kinds of geometry.
-#[derive(Clone, Debug)]
-pub enum GeometryKind {
-    /// One exact shape, tested in double precision.
-    Shape(PlacedShape),
-    /// Triangles, watertight.
-    Mesh(Arc<TriangleMesh>),
-    /// Whole spheres in large numbers, tested in double precision: sixteen bytes each, where a shape takes some two hundred.
-    Spheres(Arc<SphereCloud>),
-    /// Triangles with vertices in double precision, watertight as well.
-    PreciseMesh(Arc<PreciseMesh>),
-    /// A whole tree, placed.
-    Instance(Instance),
-    /// A user's geometry.
-    Custom(Arc<dyn CustomGeometry>),
-}
-
-/// A tree under an invertible affine map, which may change with time; trees may hold instances in turn.
-#[derive(Clone, Debug)]
-pub struct Instance {
-    /// What is placed.
-    pub accel: Arc<Accel>,
-    /// Where.
-    pub world_from_object: Placement,
-}
 
 /// Where an instance stands.
 #[derive(Clone, Debug, PartialEq)]
