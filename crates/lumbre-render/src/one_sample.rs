@@ -8,6 +8,7 @@ use lumbre_shading::Spectrum;
 use crate::film::{FeatureSample, Filter, Sample};
 use crate::integrators::{Integrator, integrator};
 use crate::transport::{Draw, Event, Features, Record, Sampler, Seen, caught};
+use crate::wave::catcher::{Catcher, Places};
 use crate::wave::{Precision, SampleId, Sights, Wave, cone};
 use crate::{RenderError, RenderOptions};
 
@@ -26,6 +27,8 @@ pub(crate) struct Taker<'a> {
     moves: bool,
     wants_features: bool,
     lights_are_seen: bool,
+    /// Ground that catches shadows, for many samples at once where that can be.
+    catcher: Option<Catcher<'a>>,
     precision: Precision,
 }
 
@@ -58,6 +61,7 @@ impl<'a> Taker<'a> {
             filter: options.pixel_filter()?,
             wants_features: options.features || options.guides,
             lights_are_seen: !options.transparent,
+            catcher: Catcher::of(scene),
         })
     }
 
@@ -98,13 +102,38 @@ impl<'a> Taker<'a> {
         let mut seen = Vec::new();
         if self.wants_features || has_catcher || !self.lights_are_seen {
             seen.resize(sights.len(), (None, None));
+            let mut places = Places::default();
             sights.retain(|sights, slot| {
+                let is_caught = has_catcher && sights.is_on_ground(slot);
+                if is_caught
+                    && let Some(catcher) = &self.catcher
+                    && let Some(surface) = sights.surface(slot)
+                {
+                    let ray = sights.ray(slot);
+                    places.push(slot, surface.point, surface.offset_origin(-ray.direction));
+                    if self.wants_features {
+                        let features = Features::of_ground(&self.view, catcher.ground(), &ray, &surface);
+                        seen[slot].1 = Some(feature_sample(features));
+                    }
+                    return false;
+                }
+                let is_plain = if sights.is_miss(slot) { self.lights_are_seen } else { !self.wants_features };
+                if is_plain && !is_caught {
+                    return true;
+                }
                 let sight = sights.sight(slot);
                 let features = if self.wants_features { Features::of(&self.view, &sight) } else { None };
                 let caught = caught(self.scene, &sight, sights.draw(slot), self.lights_are_seen, record);
                 seen[slot] = (caught, features.map(feature_sample));
                 caught.is_none()
             });
+            if let Some(catcher) = &self.catcher {
+                let kind = self.sampler.kind();
+                let caught = sights.catch(catcher, &mut places, kind, self.lights_are_seen, record);
+                for (&slot, caught) in places.slots.iter().zip(caught) {
+                    seen[slot as usize].0 = Some(caught);
+                }
+            }
         }
         self.integrator.estimate(sights, &self.sampler, record);
         seen

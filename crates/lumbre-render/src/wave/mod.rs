@@ -5,6 +5,7 @@
 //! and a direction to go on in, for all of them ([`shade`]); what comes through of the lights ([`shadows`]). What a path does depends on
 //! nothing but its sample: neither the size of the wave nor the other paths in it show in the picture.
 
+pub(crate) mod catcher;
 mod escape;
 mod flat;
 mod lights;

@@ -1,6 +1,6 @@
 //! The closest hits of all rays of a wave.
 
-use lumbre_geometry::Ray;
+use lumbre_geometry::{Ray, Surface};
 use lumbre_kernel::{Hit, HitColumns, RayColumns};
 use lumbre_scene::{Footprint, Interaction, Scene};
 
@@ -13,8 +13,6 @@ pub(crate) struct Hits {
     /// In double precision; used where `is_single` does not say otherwise.
     double: Vec<Option<Hit>>,
     is_single: bool,
-    /// Whether the rays that leave the hits are rounded, however these were found.
-    leaves_single: bool,
     rays: Vec<Ray>,
     times: Vec<f64>,
 }
@@ -58,8 +56,7 @@ impl Hits {
         is_seen: bool,
     ) {
         let len = paths.len;
-        self.leaves_single = precision == Precision::Single;
-        self.is_single = self.leaves_single && !(is_seen && scene.has_one_sided());
+        self.is_single = precision == Precision::Single;
         let time = |path: usize| slots.time[paths.slot[path] as usize];
         if !self.is_single {
             self.rays.clear();
@@ -83,6 +80,35 @@ impl Hits {
             time: scene.moves().then_some(&self.times),
         };
         scene.accel().closest_columns(&rays, false, &mut self.columns);
+        if is_seen && scene.has_one_sided() {
+            self.look_through_backs(scene, paths, slots);
+        }
+    }
+
+    /// Puts what is seen through the backs of one-sided surfaces in their place.
+    fn look_through_backs(&mut self, scene: &Scene, paths: &Paths, slots: &Slots<'_>) {
+        for path in 0..paths.len {
+            let id = self.columns.id[path];
+            if id == HitColumns::MISS || !scene.may_be_one_sided(id) {
+                continue;
+            }
+            let ray = paths.ray(path, slots.time[paths.slot[path] as usize]);
+            let is_back = |hit: &Hit| scene.is_back_of_one_sided(&ray, hit);
+            if self.columns.to_hit(path).as_ref().is_some_and(is_back) {
+                self.columns.replace(path, scene.accel(), scene.closest_seen(&ray));
+            }
+        }
+    }
+
+    /// Keeps what the rays at these positions met, which ascend.
+    pub(crate) fn keep(&mut self, positions: &[u32]) {
+        if self.is_single {
+            self.columns.keep(positions);
+            return;
+        }
+        for (to, &from) in positions.iter().enumerate() {
+            self.double.swap(to, from as usize);
+        }
     }
 
     /// Whether a ray met nothing.
@@ -131,7 +157,7 @@ impl Hits {
         } else {
             self.double[path].as_ref()?
         };
-        Some(if self.leaves_single {
+        Some(if self.is_single {
             scene.picture_interaction(ray, hit, footprint)
         } else {
             scene.interaction(ray, hit, footprint)
@@ -139,7 +165,26 @@ impl Hits {
     }
 
     /// Whether the rays that leave the hits are rounded to single precision.
-    pub(crate) fn leaves_single(&self) -> bool {
-        self.leaves_single
+    pub(crate) fn is_single(&self) -> bool {
+        self.is_single
+    }
+
+    /// Whether a ray met the ground.
+    pub(crate) fn is_ground(&self, scene: &Scene, path: usize) -> bool {
+        if self.is_single {
+            let id = self.columns.id[path];
+            id != HitColumns::MISS && scene.is_ground(id)
+        } else {
+            self.double[path].as_ref().is_some_and(|hit| scene.is_ground(hit.id))
+        }
+    }
+
+    /// The surface that a ray met, as its geometry is.
+    pub(crate) fn surface(&self, scene: &Scene, path: usize, ray: &Ray) -> Option<Surface> {
+        if self.is_single {
+            Some(scene.accel().picture_surface(ray, &self.columns.to_hit(path)?))
+        } else {
+            Some(scene.accel().surface(ray, self.double[path].as_ref()?))
+        }
     }
 }

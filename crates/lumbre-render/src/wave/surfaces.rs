@@ -59,7 +59,7 @@ impl<'s> Wave<'s> {
             paths: &self.paths,
             vertices: &mut self.vertices,
             found: &mut self.found,
-            is_single: self.hits.leaves_single(),
+            is_single: self.hits.is_single(),
         });
         self.add_found(setting, Source::Surface, record);
         if record.journal.is_some() && self.flat.len() > 0 && self.vertices.is_unqueued() {
