@@ -14,6 +14,7 @@ mod search;
 mod shade;
 mod shadows;
 mod sights;
+mod smooth;
 mod surfaces;
 mod traced;
 mod vertices;
@@ -44,6 +45,7 @@ use crate::wave::paths::{OnePath, Paths, Slots};
 use crate::wave::search::Hits;
 use crate::wave::shade::{Kind, Shade, ShadeKind};
 use crate::wave::shadows::Shadows;
+use crate::wave::smooth::SmoothHits;
 use crate::wave::traced::Traced;
 use crate::wave::vertices::Vertices;
 
@@ -104,7 +106,8 @@ pub(crate) struct Wave<'s> {
     next: Paths,
     hits: Hits,
     flat: FlatHits,
-    /// Paths that left the scene, or that met what is not flat.
+    smooth: SmoothHits,
+    /// Paths that left the scene, or that met what is no such triangle.
     others: Vec<u32>,
     vertices: Vertices<'s>,
     found: Vec<Found>,
