@@ -150,25 +150,6 @@ impl HitColumns {
         Some(hit(Winner { root, geometry, primitive: self.primitive[i] }, id, None))
     }
 
-    /// Keeps the hits of the rays at these positions, which ascend, in their order.
-    pub fn keep(&mut self, positions: &[u32]) {
-        let Self { id, primitive, local: [u, v], t, geometry, .. } = self;
-        for column in [id, primitive, geometry] {
-            keep(column, positions);
-        }
-        for column in [u, v, t] {
-            keep(column, positions);
-        }
-    }
-
-    /// Puts another hit of `accel`, or none, in the place of one.
-    pub fn replace(&mut self, i: usize, accel: &Accel, hit: Option<Hit>) {
-        match hit {
-            Some(hit) => self.put_hit(i, accel, hit),
-            None => self.id[i] = Self::MISS,
-        }
-    }
-
     /// Makes room for the hits of so many rays, which are all misses until they are put.
     pub(crate) fn clear(&mut self, len: usize) {
         let Self { id, primitive, local: [u, v], t, geometry, whole } = self;
@@ -245,13 +226,6 @@ impl HitColumns {
         let local = [root.local.x as f32, root.local.y as f32];
         self.put_plain(i, (id, primitive, place), root.t as f32, local);
     }
-}
-
-fn keep<T: Copy>(column: &mut Vec<T>, positions: &[u32]) {
-    for (to, &from) in positions.iter().enumerate() {
-        column[to] = column[from as usize];
-    }
-    column.truncate(positions.len());
 }
 
 /// A hit in no instance, or in one: by position and id.

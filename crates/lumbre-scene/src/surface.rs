@@ -550,12 +550,7 @@ impl MeshAttributes {
     }
 
     /// Interpolates what textures read of vertices besides the first uv.
-    fn vertex_data<const N: usize>(
-        &self,
-        corners: [u32; N],
-        uvs: [Vec2; N],
-        blend: &Blend<N>,
-    ) -> VertexData {
+    fn vertex_data<const N: usize>(&self, corners: [u32; N], uvs: [Vec2; N], blend: &Blend<N>) -> VertexData {
         let mut vertex = VertexData::NONE;
         if let Some(colours) = &self.rest.colours {
             let colour = blend.value(corners.map(|i| {

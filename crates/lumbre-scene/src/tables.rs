@@ -5,12 +5,10 @@ use std::sync::Arc;
 use lumbre_kernel::TriangleMesh;
 use lumbre_math::{DVec3, Vec2, Vec3};
 use lumbre_shading::lanes::BsdfKind;
-use lumbre_shading::{
-    Bsdf, Material, ShadingFrame, ShadingNormals, TextureContext, VertexData,
-};
+use lumbre_shading::{Bsdf, Material, ShadingFrame, ShadingNormals, TextureContext, VertexData};
 
 use crate::Footprint;
-use crate::surface::{Form, MeshAttributes, TrianglePoint, SurfaceEntry};
+use crate::surface::{Form, MeshAttributes, SurfaceEntry, TrianglePoint};
 
 /// Surfaces by the id of a hit, and the numbers of their BSDFs.
 #[derive(Debug, Default)]

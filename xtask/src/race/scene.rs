@@ -76,11 +76,7 @@ pub(crate) struct Sky {
 impl Mesh {
     /// A parallelogram or any other flat quadrilateral.
     pub(crate) fn quad(corners: [Point; 4]) -> Self {
-        Self {
-            points: corners.map(single).to_vec(),
-            faces: vec![[0, 1, 2], [0, 2, 3]],
-            ..Self::default()
-        }
+        Self { points: corners.map(single).to_vec(), faces: vec![[0, 1, 2], [0, 2, 3]], ..Self::default() }
     }
 
     /// A box turned about the upright axis through its centre.

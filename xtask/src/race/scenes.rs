@@ -265,6 +265,7 @@ fn models() -> Scene {
         parts.add(back, principled(metals[k], 1.0, roughness));
     }
     let camera = Camera { eye: [0.0, 2.0, 6.0], target: [0.0, 0.6, 0.0], fov: 40.0 };
-    let about = "Smooth rings of plastic and metal, as glTF describes them, under a sky with a low, soft sun.";
+    let about =
+        "Smooth rings of plastic and metal, as glTF describes them, under a sky with a low, soft sun.";
     Scene { sky: Some(evening()), ..parts.scene("models", about, 5, camera) }
 }

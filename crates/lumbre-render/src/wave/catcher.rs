@@ -82,7 +82,16 @@ impl<'s> Catcher<'s> {
             // The scalar code counts samples of all lights in one row.
             for (k, &light) in self.lights.iter().enumerate() {
                 let number = sample * self.lights.len() as u32 + k as u32;
-                self.instruction_set.run(Light { catcher: self, places, slots, count, sampler, light, number, shadows });
+                self.instruction_set.run(Light {
+                    catcher: self,
+                    places,
+                    slots,
+                    count,
+                    sampler,
+                    light,
+                    number,
+                    shadows,
+                });
             }
         }
         record.counts.shadow += shadows.len as u64;
@@ -94,7 +103,13 @@ impl<'s> Catcher<'s> {
         let mut behind: [Vec<f32>; 3] = Default::default();
         behind.iter_mut().for_each(|column| grow(column, count));
         if lights_are_seen {
-            self.instruction_set.run(Background { scene: self.scene, places, paths, count, behind: &mut behind });
+            self.instruction_set.run(Background {
+                scene: self.scene,
+                places,
+                paths,
+                count,
+                behind: &mut behind,
+            });
         }
         places.slots.truncate(count);
         let seen = places.slots.iter().zip(&places.points).enumerate().map(|(at, (&slot, &point))| {
@@ -147,12 +162,10 @@ impl Job for Light<'_, '_> {
                 normal,
                 time: if scene.moves() { Some(R::Double::gather(&slots.time, slot)) } else { None },
             };
-            let sample =
-                scene.lane_lights().sample_one(scene, light, lanes, &receiver, [u[0], u[1], u[3]]);
+            let sample = scene.lane_lights().sample_one(scene, light, lanes, &receiver, [u[0], u[1], u[3]]);
             let cosine = normal.dot(sample.towards);
             let density = R::select(sample.delta, R::one(), sample.pdf);
-            let is_lit =
-                lanes & sample.valid & R::zero().simd_lt(cosine) & R::zero().simd_lt(density);
+            let is_lit = lanes & sample.valid & R::zero().simd_lt(cosine) & R::zero().simd_lt(density);
             let share = cosine / (density * R::splat(SAMPLES as f32));
             shadows.push(
                 is_lit,

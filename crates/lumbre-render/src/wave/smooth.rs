@@ -56,7 +56,13 @@ impl SmoothHits {
     }
 
     /// What was found of a hit, for the look-up of its material.
-    pub(crate) fn point(&self, at: usize, vertices: &Vertices<'_>, vertex: usize, direction: Vec3) -> TrianglePoint {
+    pub(crate) fn point(
+        &self,
+        at: usize,
+        vertices: &Vertices<'_>,
+        vertex: usize,
+        direction: Vec3,
+    ) -> TrianglePoint {
         TrianglePoint {
             triangle: self.base.triangle[at],
             local: [self.base.local[0][at], self.base.local[1][at]],

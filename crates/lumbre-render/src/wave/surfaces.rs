@@ -110,7 +110,8 @@ impl<'s> Wave<'s> {
             let footprint = self.footprint(path);
             let point = self.smooth.point(at, &self.vertices, vertex, self.paths.direction(path));
             let surface = self.smooth.base.surface(setting, at);
-            match surface.and_then(|surface| surface.scattering(&point, &footprint, setting.shading_normals)) {
+            match surface.and_then(|surface| surface.scattering(&point, &footprint, setting.shading_normals))
+            {
                 Some((material, frame, bsdf)) => {
                     let frame = frame_for(&bsdf, frame);
                     let mut flags = flags_of(setting.shading_normals, &frame, point.geometric);
