@@ -31,7 +31,7 @@ pub(crate) struct Race {
     /// Small pictures and few samples: two to three minutes.
     #[arg(long)]
     quick: bool,
-    /// Only these scenes, separated by commas: cornell, interior, lights, terrain, glass, coats.
+    /// Only these scenes, separated by commas: cornell, interior, lights, terrain, glass, coats, models.
     #[arg(long, value_delimiter = ',')]
     scenes: Vec<String>,
     /// Only these programs; by default all that are found. Lumbre always takes part.
@@ -327,7 +327,8 @@ fn reference(program: &mut Program, scene: &Scene, spp: u32, folder: &Path) -> R
     let mut hasher = DefaultHasher::new();
     write::pbrt(scene, 0).hash(&mut hasher);
     for object in &scene.objects {
-        object.mesh.points.iter().flatten().for_each(|x| x.to_bits().hash(&mut hasher));
+        let numbers = object.mesh.points.iter().chain(&object.mesh.normals);
+        numbers.flatten().for_each(|x| x.to_bits().hash(&mut hasher));
     }
     if let Some(sky) = &scene.sky {
         sky.pixels.iter().flatten().for_each(|x| x.to_bits().hash(&mut hasher));

@@ -7,7 +7,8 @@ use lumbre_shading::Spectrum;
 
 use crate::film::{FeatureSample, Filter, Sample};
 use crate::integrators::{Integrator, integrator};
-use crate::transport::{Draw, Event, Features, Record, Sampler, Seen, caught};
+use crate::transport::{Draw, Event, Features, Record, Sampler, Seen, Sight, caught};
+use crate::wave::catcher::{Catcher, Places};
 use crate::wave::{Precision, SampleId, Sights, Wave, cone};
 use crate::{RenderError, RenderOptions};
 
@@ -26,7 +27,19 @@ pub(crate) struct Taker<'a> {
     moves: bool,
     wants_features: bool,
     lights_are_seen: bool,
+    /// Ground that catches shadows, for many samples at once where that can be.
+    catcher: Option<Catcher<'a>>,
     precision: Precision,
+}
+
+/// What a sample sees besides what an integrator finds.
+#[derive(Clone, Copy, Default)]
+struct SeenSample {
+    /// In place of that.
+    caught: Option<Seen>,
+    features: Option<FeatureSample>,
+    /// How much of what is behind it covers, where that is neither all nor said by what it caught.
+    covered: Option<Spectrum>,
 }
 
 /// Where on the film a sample is taken, and through which point of the lens.
@@ -58,6 +71,7 @@ impl<'a> Taker<'a> {
             filter: options.pixel_filter()?,
             wants_features: options.features || options.guides,
             lights_are_seen: !options.transparent,
+            catcher: Catcher::of(scene),
         })
     }
 
@@ -80,34 +94,75 @@ impl<'a> Taker<'a> {
         let seen = self.see(&mut sights, record);
         for (slot, ((&id, &weight), &radiance)) in ids.iter().zip(&weights).zip(sights.radiance()).enumerate()
         {
-            let (seen, features) = seen.get(slot).copied().unwrap_or_default();
+            let SeenSample { caught, features, covered } = seen.get(slot).copied().unwrap_or_default();
+            let coverage = covered.unwrap_or(Spectrum::WHITE);
             let Seen { radiance, coverage, on_catcher } =
-                seen.unwrap_or(Seen { radiance, coverage: Spectrum::WHITE, on_catcher: false });
+                caught.unwrap_or(Seen { radiance, coverage, on_catcher: false });
             put(id, Sample { radiance, coverage, weight, features, on_catcher });
         }
     }
 
     /// Has the integrator find the light of all sights but those that see something else, and gives what these see and all features;
     /// nothing where no sample has any of both.
-    fn see(
-        &self,
-        sights: &mut Sights<'_, 'a>,
-        record: &mut Record,
-    ) -> Vec<(Option<Seen>, Option<FeatureSample>)> {
+    fn see(&self, sights: &mut Sights<'_, 'a>, record: &mut Record) -> Vec<SeenSample> {
+        sights.show_background(self.lights_are_seen);
         let has_catcher = self.scene.ground().is_some_and(|ground| ground.catcher);
         let mut seen = Vec::new();
         if self.wants_features || has_catcher || !self.lights_are_seen {
-            seen.resize(sights.len(), (None, None));
+            seen.resize(sights.len(), SeenSample::default());
+            let mut places = Places::default();
             sights.retain(|sights, slot| {
+                let is_caught = has_catcher && sights.is_on_ground(slot);
+                if is_caught
+                    && let Some(catcher) = &self.catcher
+                    && let Some(surface) = sights.surface(slot)
+                {
+                    let ray = sights.ray(slot);
+                    places.push(slot, surface.point, surface.offset_origin(-ray.direction));
+                    if self.wants_features {
+                        let features = Features::of_ground(&self.view, catcher.ground(), &ray, &surface);
+                        seen[slot].features = Some(feature_sample(features));
+                    }
+                    return false;
+                }
+                let is_plain = if sights.is_miss(slot) { self.lights_are_seen } else { !self.wants_features };
+                if is_plain && !is_caught {
+                    return true;
+                }
                 let sight = sights.sight(slot);
+                let draw = sights.draw(slot);
                 let features = if self.wants_features { Features::of(&self.view, &sight) } else { None };
-                let caught = caught(self.scene, &sight, sights.draw(slot), self.lights_are_seen, record);
-                seen[slot] = (caught, features.map(feature_sample));
+                let left = self.left_by_media(&sight, draw);
+                let features = features.map(|features| feature_sample(features.behind(left)));
+                if sight.met.is_none() && left != Spectrum::WHITE && !self.lights_are_seen {
+                    // What is seen is the medium alone.
+                    seen[slot] = SeenSample { caught: None, features, covered: Some(Spectrum::WHITE - left) };
+                    return true;
+                }
+                let caught = caught(self.scene, &sight, draw, self.lights_are_seen, record);
+                seen[slot] = SeenSample { caught, features, covered: None };
                 caught.is_none()
             });
+            if let Some(catcher) = &self.catcher {
+                let kind = self.sampler.kind();
+                let caught = sights.catch(catcher, &mut places, kind, self.lights_are_seen, record);
+                for (&slot, caught) in places.slots.iter().zip(caught) {
+                    seen[slot as usize].caught = Some(caught);
+                }
+            }
         }
         self.integrator.estimate(sights, &self.sampler, record);
         seen
+    }
+
+    /// An estimate of what media leave of the light of what a camera sees.
+    fn left_by_media(&self, sight: &Sight<'_>, draw: &Draw) -> Spectrum {
+        if !self.scene.has_media() {
+            return Spectrum::WHITE;
+        }
+        let ray = sight.ray.ray;
+        let end = sight.met.as_ref().map_or(f64::INFINITY, |met| (met.surface.point - ray.origin).length());
+        self.scene.transmittance(self.view.medium(), &ray.with_range(0.0, end), draw.along(&ray))
     }
 
     fn aim(&self, id: SampleId, draw: &Draw) -> Aim {
@@ -142,7 +197,7 @@ impl<'a> Taker<'a> {
         let (mut wave, mut record) = (Wave::default(), Record::with_journal());
         let one = std::iter::once((draw, camera));
         let mut sights = Sights::new(self.scene, &self.view, &mut wave, self.precision, one, &mut record);
-        let seen = self.see(&mut sights, &mut record).first().and_then(|seen| seen.0);
+        let seen = self.see(&mut sights, &mut record).first().and_then(|seen| seen.caught);
         let radiance = seen.map_or(sights.radiance()[0], |seen| seen.radiance);
         (sights.ray(0), radiance, record.journal.unwrap_or_default())
     }

@@ -23,6 +23,8 @@ pub struct GroundPlane {
     pub point: DVec3,
     /// Whether it is a shadow catcher.
     pub catcher: bool,
+    /// Its albedo: that of a diffuse surface.
+    pub albedo: Spectrum,
     /// Its unoccluded irradiance from infinite lights, equal everywhere.
     open: Spectrum,
     /// Lights other than surfaces whose contribution varies with position or time.
@@ -54,7 +56,10 @@ impl GroundPlane {
             }
         }
         let ids = (0..).zip(lights).filter(|(_, light)| !light.is_surface()).map(|(id, _)| LightId(id));
-        Self { normal, point: desc.point, catcher: desc.catcher, open, local, lights: ids.collect() }
+        // 0 for NaN.
+        let albedo = desc.reflectance.map(|share| share.max(0.0).min(1.0));
+        let lights = ids.collect();
+        Self { normal, point: desc.point, catcher: desc.catcher, albedo, open, local, lights }
     }
 
     /// Whether an interaction is on the ground.

@@ -41,5 +41,6 @@ pub use lumbre_kernel::Placement;
 pub use media::Crossing;
 pub use scene::{BuildWarning, Scene};
 pub use stage::{Ground, Stage, StageLight, Staged, Surroundings};
-pub use tables::{FlatSurface, SurfaceTable};
+pub use surface::TrianglePoint;
+pub use tables::{SurfaceTable, TriangleSurface, UniformBsdf};
 pub use viewpoint::Viewpoint;

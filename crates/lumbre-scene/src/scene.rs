@@ -286,6 +286,14 @@ impl Scene {
         self.entries[id as usize].shape
     }
 
+    /// Whether what has an id in the tree is the ground.
+    ///
+    /// # Panics
+    /// When there is no such id.
+    pub fn is_ground(&self, id: u32) -> bool {
+        self.entries[id as usize].shape == crate::ground::SHAPE
+    }
+
     /// Surfaces as plain rows.
     pub fn tables(&self) -> &SurfaceTable {
         &self.tables
@@ -509,7 +517,16 @@ impl Scene {
         shaded
     }
 
-    fn is_back_of_one_sided(&self, ray: &Ray, hit: &Hit) -> bool {
+    /// Whether cameras may look through the back of what has an id in the tree.
+    ///
+    /// # Panics
+    /// When there is no such id.
+    pub fn may_be_one_sided(&self, id: u32) -> bool {
+        self.has_one_sided && self.entries[id as usize].is_one_sided_anywhere()
+    }
+
+    /// Whether a hit is on the back of a one-sided surface, which cameras look through.
+    pub fn is_back_of_one_sided(&self, ray: &Ray, hit: &Hit) -> bool {
         let (entry, _, turned) = self.leaf(hit);
         entry.is_one_sided() && {
             // By the orientation of its faces, not by vertex normals.

@@ -9,7 +9,7 @@ use lumbre_shading::{FloatTexture, LocalSurface, Material, Spectrum, TextureCont
 
 use crate::csg::CsgForm;
 use crate::light::LightId;
-use crate::{Boundary, ColouredShape, Emission, MeshDesc};
+use crate::{Boundary, ColouredShape, Emission, Footprint, MeshDesc};
 
 /// The surface data for one id of the tree.
 #[derive(Clone, Debug)]
@@ -320,13 +320,7 @@ impl SurfaceEntry {
 impl ShadingGeometry {
     /// The context of texture lookups, with derivatives of u and v over a pixel.
     pub(crate) fn context(&self, dpdx: Vec3, dpdy: Vec3, duv_dx: Vec2, duv_dy: Vec2) -> TextureContext {
-        // From derivatives by u and v to derivatives over a pixel.
-        let mut vertex = self.vertex;
-        for place in &mut vertex.further {
-            let (by_u, by_v) = (place.duv_dx, place.duv_dy);
-            place.duv_dx = by_u * duv_dx.x + by_v * duv_dx.y;
-            place.duv_dy = by_u * duv_dy.x + by_v * duv_dy.y;
-        }
+        let vertex = over_pixel(self.vertex, duv_dx, duv_dy);
         TextureContext {
             point: self.surface.point,
             normal: self.shading.normal,
@@ -359,6 +353,16 @@ impl ShadingGeometry {
     }
 }
 
+/// From derivatives by u and v to derivatives over a pixel.
+fn over_pixel(mut vertex: VertexData, duv_dx: Vec2, duv_dy: Vec2) -> VertexData {
+    for place in &mut vertex.further {
+        let (by_u, by_v) = (place.duv_dx, place.duv_dy);
+        place.duv_dx = by_u * duv_dx.x + by_v * duv_dx.y;
+        place.duv_dy = by_u * duv_dy.x + by_v * duv_dy.y;
+    }
+    vertex
+}
+
 fn plain(surface: &Surface) -> ShadingGeometry {
     ShadingGeometry {
         surface: *surface,
@@ -372,6 +376,81 @@ fn plain(surface: &Surface) -> ShadingGeometry {
             handedness: 1.0,
         },
         vertex: VertexData::NONE,
+    }
+}
+
+/// What lanes found of a triangle that a ray met.
+#[derive(Clone, Copy, Debug)]
+pub struct TrianglePoint {
+    /// The triangle of its mesh.
+    pub triangle: u32,
+    /// The barycentrics of its second and third corner.
+    pub local: [f32; 2],
+    /// The point.
+    pub point: DVec3,
+    /// The unit geometric normal that points outside.
+    pub geometric: Vec3,
+    /// The shading normal on its side.
+    pub normal: Vec3,
+    /// The unit direction of the ray.
+    pub direction: Vec3,
+    /// How far it went.
+    pub distance: f32,
+}
+
+impl MeshAttributes {
+    /// What materials read at a point of a triangle of a mesh that stands still in the world itself, but the change of its normal.
+    pub(crate) fn texture_context(
+        &self,
+        met: &TrianglePoint,
+        footprint: &Footprint,
+    ) -> (TextureContext, LocalSurface) {
+        let corners = self.mesh.indices[met.triangle as usize];
+        let [p0, p1, p2] = at(&self.mesh.positions, corners).map(|p| p.as_dvec3());
+        let uvs = self.corner_uvs(met.triangle);
+        let blend = triangle_blend(Vec2::from(met.local).as_dvec2());
+        let [uv0, uv1, uv2] = uvs.map(|uv| uv.as_dvec2());
+        let [w0, w1, w2] = blend.weights;
+        let uv = w0 * uv0 + w1 * uv1 + w2 * uv2;
+        let (along_a, along_b, by_a, by_b) = (p1 - p0, p2 - p0, uv1 - uv0, uv2 - uv0);
+        let scale = 1.0 / (by_a.x * by_b.y - by_a.y * by_b.x);
+        let dpdu = (along_a * by_b.y - along_b * by_a.y) * scale;
+        let dpdv = (along_b * by_a.x - along_a * by_b.x) * scale;
+        let has_parameters = dpdu.is_finite() && dpdv.is_finite() && dpdu.cross(dpdv).length_squared() > 0.0;
+        let (dpdu, dpdv) = if has_parameters {
+            (dpdu, dpdv)
+        } else {
+            along_a.cross(along_b).normalize_or(DVec3::Z).any_orthonormal_pair()
+        };
+        let spot = footprint.on_plane(
+            met.point,
+            met.geometric.as_dvec3(),
+            dpdu,
+            dpdv,
+            met.direction.as_dvec3(),
+            met.distance.into(),
+        );
+        let mut surface = LocalSurface {
+            normal: met.normal,
+            dpdu: dpdu.as_vec3(),
+            dpdv: dpdv.as_vec3(),
+            dndu: Vec3::ZERO,
+            dndv: Vec3::ZERO,
+            geometric: met.geometric,
+            handedness: 1.0,
+        };
+        self.align(&mut surface, corners, &blend, None);
+        let context = TextureContext {
+            point: met.point,
+            normal: met.normal,
+            uv: uv.as_vec2(),
+            dpdx: spot.dpdx,
+            dpdy: spot.dpdy,
+            duv_dx: spot.duv_dx,
+            duv_dy: spot.duv_dy,
+            vertex: over_pixel(self.vertex_data(corners, uvs, &blend), spot.duv_dx, spot.duv_dy),
+        };
+        (context, surface)
     }
 }
 
@@ -468,19 +547,25 @@ impl MeshAttributes {
         placement: Option<&Transform>,
         time: f64,
     ) -> ShadingGeometry {
-        let mut shaded = self.shape(geometric, corners, uvs, blend, placement, time);
+        let vertex = self.vertex_data(corners, uvs, blend);
+        ShadingGeometry { vertex, ..self.shape(geometric, corners, uvs, blend, placement, time) }
+    }
+
+    /// Interpolates what textures read of vertices besides the first uv.
+    fn vertex_data<const N: usize>(&self, corners: [u32; N], uvs: [Vec2; N], blend: &Blend<N>) -> VertexData {
+        let mut vertex = VertexData::NONE;
         if let Some(colours) = &self.rest.colours {
             let colour = blend.value(corners.map(|i| {
                 let Spectrum { r, g, b } = colours[i as usize];
                 Vec3::new(r, g, b).as_dvec3()
             }));
-            shaded.vertex.colour = Spectrum::new(colour.x as f32, colour.y as f32, colour.z as f32);
+            vertex.colour = Spectrum::new(colour.x as f32, colour.y as f32, colour.z as f32);
         }
         if let Some(coverages) = &self.rest.coverages {
             let coverages = corners.map(|i| DVec3::splat(f64::from(coverages[i as usize])));
-            shaded.vertex.coverage = blend.value(coverages).x as f32;
+            vertex.coverage = blend.value(coverages).x as f32;
         }
-        for (list, place) in self.rest.further_uvs.iter().zip(&mut shaded.vertex.further) {
+        for (list, place) in self.rest.further_uvs.iter().zip(&mut vertex.further) {
             let Some(list) = list else { continue };
             let flat = |uv: Vec2| uv.as_dvec2().extend(0.0);
             let further = corners.map(|i| flat(list[i as usize]));
@@ -495,7 +580,7 @@ impl MeshAttributes {
                 (place.duv_dx, place.duv_dy) = (by_u, by_v);
             }
         }
-        shaded
+        vertex
     }
 
     fn shape<const N: usize>(
@@ -533,7 +618,7 @@ impl MeshAttributes {
 
         let Some(normals) = self.corner_normals(corners, time) else {
             let mut shaded = plain(&surface);
-            self.align(&mut shaded, corners, blend, placement);
+            self.align(&mut shaded.shading, corners, blend, placement);
             return shaded;
         };
         let moved = |n: DVec3| placement.map_or(n, |m| m.normal(n));
@@ -541,7 +626,7 @@ impl MeshAttributes {
         let length = sum.length();
         if length.is_nan() || length <= 0.0 {
             let mut shaded = plain(&surface);
-            self.align(&mut shaded, corners, blend, placement);
+            self.align(&mut shaded.shading, corners, blend, placement);
             return shaded;
         }
         let normal = sum / length;
@@ -562,7 +647,7 @@ impl MeshAttributes {
             if has_parameters { by_uv(turned(by_a), turned(by_b)) } else { (DVec3::ZERO, DVec3::ZERO) };
         shaded.shading.dndu = dndu.as_vec3();
         shaded.shading.dndv = dndv.as_vec3();
-        self.align(&mut shaded, corners, blend, placement);
+        self.align(&mut shaded.shading, corners, blend, placement);
         shaded
     }
 
@@ -570,7 +655,7 @@ impl MeshAttributes {
     /// side.
     fn align<const N: usize>(
         &self,
-        shaded: &mut ShadingGeometry,
+        shading: &mut LocalSurface,
         corners: [u32; N],
         blend: &Blend<N>,
         placement: Option<&Transform>,
@@ -580,13 +665,13 @@ impl MeshAttributes {
         let side: f32 = tangents.iter().map(|t| t.w).sum();
         let mirrored = placement.is_some_and(Transform::is_mirror);
         if side != 0.0 && (side < 0.0) != mirrored {
-            shaded.shading.handedness = -1.0;
+            shading.handedness = -1.0;
         }
         let tangent = blend.value(std::array::from_fn(|i| tangents[i].truncate().as_dvec3()));
         let tangent = placement.map_or(tangent, |m| m.vector(tangent)).as_vec3();
-        let n = shaded.shading.normal;
+        let n = shading.normal;
         if let Some(unit) = (tangent - n * n.dot(tangent)).try_normalize() {
-            shaded.shading.dpdu = unit * shaded.shading.dpdu.length();
+            shading.dpdu = unit * shading.dpdu.length();
         }
     }
 }

@@ -1,36 +1,46 @@
-//! Surfaces as plain rows: what lanes read of triangles that need nothing but their corners and a row of numbers.
+//! Surfaces as plain rows: what lanes read of triangles, and the numbers of BSDFs that are the same everywhere.
 
 use std::sync::Arc;
 
 use lumbre_kernel::TriangleMesh;
 use lumbre_math::{DVec3, Vec2, Vec3};
 use lumbre_shading::lanes::BsdfKind;
-use lumbre_shading::{TextureContext, VertexData};
+use lumbre_shading::{Bsdf, Material, ShadingFrame, ShadingNormals, TextureContext, VertexData};
 
-use crate::surface::{Form, SurfaceEntry};
+use crate::Footprint;
+use crate::surface::{Form, MeshAttributes, SurfaceEntry, TrianglePoint};
 
 /// Surfaces by the id of a hit, and the numbers of their BSDFs.
 #[derive(Debug, Default)]
 pub struct SurfaceTable {
-    surfaces: Vec<Option<FlatSurface>>,
+    surfaces: Vec<Option<TriangleSurface>>,
     rows: Vec<f32>,
 }
 
-/// A mesh in the world itself, still, of flat opaque faces that have one BSDF and emit the same everywhere.
+/// A mesh in the world itself, still, of faces that emit the same everywhere.
 #[derive(Clone, Debug)]
-pub struct FlatSurface {
+pub struct TriangleSurface {
     /// Its triangles.
     pub mesh: Arc<TriangleMesh>,
-    /// 1 where the normals of its triangles point outside, −1 where they point inside.
+    /// 1 where the normals of its triangles, or else of its vertices, point outside, −1 where they point inside.
     pub outward: f32,
-    /// The kind of its BSDF, which looks the same from everywhere around the normal.
-    pub kind: BsdfKind,
-    /// Where the row of its BSDF begins in [`SurfaceTable::rows`].
-    pub row: u32,
+    /// Its BSDF, which looks the same from everywhere around the normal; `None` where the material is to be looked up.
+    pub bsdf: Option<UniformBsdf>,
     /// Whether light from below its horizon counts.
     pub transmits: bool,
     /// The radiance that it emits, and whether its back does, too.
     pub emission: Option<([f32; 3], bool)>,
+    attributes: Arc<MeshAttributes>,
+    material: Arc<Material>,
+}
+
+/// A BSDF that is the same everywhere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UniformBsdf {
+    /// Its kind.
+    pub kind: BsdfKind,
+    /// Where its row begins in [`SurfaceTable::rows`].
+    pub row: u32,
 }
 
 /// A uniform material is the same everywhere.
@@ -49,15 +59,15 @@ impl SurfaceTable {
     pub(crate) fn new(entries: &[SurfaceEntry]) -> Self {
         let mut table = Self::default();
         for entry in entries {
-            let surface = table.flat(entry);
+            let surface = table.triangles(entry);
             table.surfaces.push(surface);
         }
         table
     }
 
-    /// The surface with the id of a hit, if it is flat.
+    /// The surface with the id of a hit, if it is one of triangles.
     #[inline]
-    pub fn surface(&self, id: u32) -> Option<&FlatSurface> {
+    pub fn surface(&self, id: u32) -> Option<&TriangleSurface> {
         self.surfaces.get(id as usize)?.as_ref()
     }
 
@@ -66,35 +76,65 @@ impl SurfaceTable {
         &self.rows
     }
 
-    fn flat(&mut self, entry: &SurfaceEntry) -> Option<FlatSurface> {
+    fn triangles(&mut self, entry: &SurfaceEntry) -> Option<TriangleSurface> {
         let (Form::Mesh(attributes), Some(material)) = (&entry.form, &entry.material) else { return None };
-        let is_flat =
-            attributes.normals().is_none() && attributes.moving.is_none() && attributes.precise.is_none();
-        let is_plain = entry.alpha.is_none()
-            && entry.boundary.is_none()
-            && material.is_uniform()
-            && !material.one_sided
-            && !material.may_be_solid()
-            && entry
-                .emission
-                .as_ref()
-                .is_none_or(|emission| emission.image.is_none() && !emission.by_vertices);
-        if !is_flat || !is_plain {
+        let is_still = attributes.moving.is_none() && attributes.precise.is_none();
+        let shines_evenly = entry.emission.as_ref().is_none_or(|emission| {
+            emission.image.is_none() && !emission.by_vertices && entry.alpha.is_none()
+        });
+        let is_plain = !material.may_be_solid() && !material.has_displacement() && entry.boundary.is_none();
+        if !is_still || !shines_evenly || !is_plain {
             return None;
         }
-        let bsdf = material.bsdf(&ANYWHERE)?;
+        Some(TriangleSurface {
+            mesh: attributes.mesh.clone(),
+            outward: if entry.reverse { -1.0 } else { 1.0 },
+            bsdf: self.uniform(material),
+            transmits: material.lets_light_through(),
+            emission: entry.emission.as_ref().map(|e| (e.radiance.to_array(), e.two_sided)),
+            attributes: attributes.clone(),
+            material: material.clone(),
+        })
+    }
+
+    /// The BSDF of a material, if that is the same everywhere.
+    fn uniform(&mut self, material: &Material) -> Option<UniformBsdf> {
+        let bsdf = material.is_uniform().then(|| material.bsdf(&ANYWHERE))??;
         if !bsdf.is_isotropic() {
             return None;
         }
         let row = self.rows.len() as u32;
         self.rows.extend(bsdf.row());
-        Some(FlatSurface {
-            mesh: attributes.mesh.clone(),
-            outward: if entry.reverse { -1.0 } else { 1.0 },
-            kind: bsdf.kind(),
-            row,
-            transmits: material.lets_light_through(),
-            emission: entry.emission.as_ref().map(|e| (e.radiance.to_array(), e.two_sided)),
-        })
+        Some(UniformBsdf { kind: bsdf.kind(), row })
+    }
+}
+
+impl TriangleSurface {
+    /// Whether there are normals of vertices.
+    #[inline]
+    pub fn is_smooth(&self) -> bool {
+        self.attributes.normals().is_some()
+    }
+
+    /// The normals of some vertices.
+    #[inline]
+    pub fn normals(&self, corners: [u32; 3]) -> Option<[Vec3; 3]> {
+        let normals = self.attributes.normals()?;
+        Some(corners.map(|corner| normals[corner as usize]))
+    }
+
+    /// The material at a point, with mixtures resolved, the shading frame and the BSDF: as [`crate::Interaction::resolved`] and
+    /// [`Material::shading`]; `None` for what does not scatter.
+    pub fn scattering(
+        &self,
+        met: &TrianglePoint,
+        footprint: &Footprint,
+        normals: ShadingNormals,
+    ) -> Option<(&Material, ShadingFrame, Bsdf)> {
+        let (at, surface) = self.attributes.texture_context(met, footprint);
+        let towards = -met.direction;
+        let material = self.material.resolve(&at, towards);
+        let (frame, bsdf) = material.shading(&at, &surface, towards, normals)?;
+        Some((material, frame, bsdf))
     }
 }

@@ -134,7 +134,9 @@ impl Bsdf {
             Self::Dielectric(bsdf) => &[bsdf.facets],
             Self::CoatedDiffuse(bsdf) => &[bsdf.coat.face.facets],
             Self::CoatedConductor(bsdf) => &[bsdf.coat.face.facets, bsdf.base.facets],
-            Self::Principled(_) | Self::Uber(_) => return false,
+            Self::Principled(bsdf) if bsdf.coat.weight <= 0.0 || bsdf.coat.normal.z >= 1.0 => &[bsdf.facets],
+            Self::Principled(_) => return false,
+            Self::Uber(bsdf) => &[bsdf.facets],
         };
         facets.iter().all(|facets| facets.alpha().x == facets.alpha().y)
     }

@@ -16,7 +16,7 @@ pub enum ShadingNormals {
 
 impl ShadingNormals {
     /// How far the cosine between a shading normal and the geometric one may be from 1 by rounding.
-    const ROUNDING: f32 = 1e-6;
+    pub const ROUNDING: f32 = 1e-6;
 
     /// The one of that name, `lumbre` or `pbrt`.
     pub fn from_name(name: &str) -> Option<Self> {

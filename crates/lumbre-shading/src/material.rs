@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use lumbre_math::random::{combine, hash_dvec3, hash_vec3, uniform_f32};
 use lumbre_math::{Vec2, Vec3};
+use lumbre_simd::V3;
 use smallvec::{SmallVec, smallvec};
 
 use crate::coated::{Coat, CoatedConductor, CoatedDiffuse};
@@ -285,6 +286,22 @@ impl Material {
             }
         }
         false
+    }
+
+    /// Whether it has a bump map, which looks at how the surface curves; of a mixture, any part; true when in doubt.
+    pub fn has_displacement(&self) -> bool {
+        let mut rest: SmallVec<[&Self; 4]> = smallvec![self];
+        // Mixtures may share materials, so the number of steps is bounded.
+        for _ in 0..64 {
+            let Some(material) = rest.pop() else { return false };
+            if material.displacement.is_some() {
+                return true;
+            }
+            if let MaterialKind::Mix { materials, .. } = &material.kind {
+                rest.extend(materials.iter().map(|material| &**material));
+            }
+        }
+        true
     }
 
     /// Whether light may pass to the other side; of a mixture, through any part.
@@ -638,18 +655,11 @@ pub(crate) fn index(eta: f32) -> f32 {
     if eta > 0.0 && eta.is_finite() { eta } else { 1.0 }
 }
 
-/// The smallest cosine between a shading normal and the viewing direction.
-const LEAST_SEEN: f32 = 1e-3;
-
-/// A shading normal, turned just far enough to be on the side of `towards` that the geometric normal is on.
+/// [`crate::lanes::facing`] of one surface.
 fn facing(normal: Vec3, geometric: Vec3, towards: Vec3) -> Vec3 {
-    let cos = normal.dot(towards);
-    let missing = if geometric.dot(towards) < 0.0 { LEAST_SEEN + cos } else { LEAST_SEEN - cos };
-    if missing <= 0.0 {
-        return normal;
-    }
-    let side = if geometric.dot(towards) < 0.0 { -towards } else { towards };
-    (normal + missing * side).try_normalize().unwrap_or(geometric)
+    let lane = |v: Vec3| V3::new(v.x, v.y, v.z);
+    let V3 { x, y, z } = crate::lanes::facing::<f32>(lane(normal), lane(geometric), lane(towards));
+    Vec3::new(x, y, z)
 }
 
 /// The frame about a tilted normal of any length.

@@ -58,7 +58,7 @@ impl Kind {
         let same = |material: &Material| match self {
             Self::Lumbre => true,
             Self::MitsubaLlvm | Self::MitsubaScalar | Self::Cycles => {
-                !matches!(material, Material::Coated { .. })
+                !matches!(material, Material::Coated { .. } | Material::Principled { .. })
             }
             Self::Luxcore => matches!(material, Material::Diffuse { .. } | Material::Glass { .. }),
             // It renders by wavelengths.
@@ -69,8 +69,15 @@ impl Kind {
 
     /// Whether it can show a scene at all.
     pub(crate) fn shows(self, scene: &Scene) -> bool {
-        // pbrt-v4 maps skies to a square, and LuxCore turns them in a way that the race does not know yet.
-        scene.sky.is_none() || !matches!(self, Self::Pbrt | Self::Luxcore)
+        let is_principled = |material: &Material| matches!(material, Material::Principled { .. });
+        match self {
+            Self::Lumbre | Self::MitsubaLlvm | Self::MitsubaScalar => true,
+            // What glTF describes is written for those alone.
+            _ if scene.materials.iter().any(is_principled) => false,
+            // pbrt-v4 maps skies to a square, and LuxCore turns them in a way that the race does not know yet.
+            Self::Pbrt | Self::Luxcore => scene.sky.is_none(),
+            Self::Cycles => true,
+        }
     }
 
     fn script(self) -> Option<Script> {

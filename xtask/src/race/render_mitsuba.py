@@ -38,6 +38,15 @@ def material(m):
             "nonlinear": True,
             "diffuse_reflectance": rgb(m["reflectance"]),
         }
+    elif m["kind"] == "principled":
+        # Of the index of refraction 1.5, as glTF has it; its roughness is the root of alpha, too.
+        bsdf = {
+            "type": "principled",
+            "base_color": rgb(m["base"]),
+            "metallic": m["metallic"],
+            "roughness": m["roughness"],
+            "eta": 1.5,
+        }
     return {"type": "twosided", "bsdf": bsdf}
 
 
@@ -52,7 +61,7 @@ def describe():
         shape = {
             "type": "ply",
             "filename": path(o["ply"]),
-            "face_normals": True,
+            "face_normals": not o["smooth"],
             "bsdf": {"type": "ref", "id": f"material{o['material']}"},
         }
         if o["emission"]:

@@ -41,6 +41,8 @@ pub(crate) enum Material {
     Coated { reflectance: Rgb, eta: f64, alpha: f64 },
     /// A smooth dielectric.
     Glass { eta: f64 },
+    /// The base colour, metalness and roughness of glTF: a metal, or a diffuse base under facets of index 1.5.
+    Principled { base: Rgb, metallic: f64, roughness: f64 },
 }
 
 /// A mesh of one material, which may shine.
@@ -53,11 +55,13 @@ pub(crate) struct Object {
     pub(crate) emission: Option<Rgb>,
 }
 
-/// Flat triangles, counterclockwise from outside.
+/// Triangles, counterclockwise from outside.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Mesh {
     pub(crate) points: Vec<[f32; 3]>,
     pub(crate) faces: Vec<[u32; 3]>,
+    /// A normal for each point; none for flat triangles.
+    pub(crate) normals: Vec<[f32; 3]>,
 }
 
 /// Light from all around.
@@ -72,7 +76,7 @@ pub(crate) struct Sky {
 impl Mesh {
     /// A parallelogram or any other flat quadrilateral.
     pub(crate) fn quad(corners: [Point; 4]) -> Self {
-        Self { points: corners.map(single).to_vec(), faces: vec![[0, 1, 2], [0, 2, 3]] }
+        Self { points: corners.map(single).to_vec(), faces: vec![[0, 1, 2], [0, 2, 3]], ..Self::default() }
     }
 
     /// A box turned about the upright axis through its centre.
@@ -87,6 +91,7 @@ impl Mesh {
         Self {
             points: (0..8).map(corner).collect(),
             faces: sides.iter().flat_map(|s| [[s[0], s[1], s[2]], [s[0], s[2], s[3]]]).collect(),
+            ..Self::default()
         }
     }
 
@@ -149,10 +154,36 @@ impl Mesh {
         mesh
     }
 
-    /// Adds the triangles of another mesh.
+    /// A ring in an upright plane that is turned by `degrees`, knotted by waves, with the normals of the smooth surface: 4 * cells²
+    /// triangles.
+    pub(crate) fn ring(centre: Point, radii: [f64; 2], degrees: f64, waves: f64, cells: u32) -> Self {
+        use std::f64::consts::TAU;
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let place = |u: f64, v: f64| {
+            let ([a, b], around, across) = ([TAU * u, TAU * v], radii[0], radii[1]);
+            let across = across * (1.0 + 0.2 * (waves * a).sin());
+            let out = around + across * b.cos();
+            let (x, y, z) = (out * a.cos(), out * a.sin(), -across * b.sin());
+            [centre[0] + cos * x + sin * z, centre[1] + y, centre[2] - sin * x + cos * z]
+        };
+        let (columns, rows) = (2 * cells, cells);
+        let mut mesh = Self::grid(columns, rows, place);
+        for j in 0..=rows {
+            for i in 0..=columns {
+                let (u, v) = (f64::from(i) / f64::from(columns), f64::from(j) / f64::from(rows));
+                let by_u = minus(place(u + 1e-4, v), place(u - 1e-4, v));
+                let by_v = minus(place(u, v + 1e-4), place(u, v - 1e-4));
+                mesh.normals.push(single(normalized(cross(by_v, by_u))));
+            }
+        }
+        mesh
+    }
+
+    /// Adds the triangles of another mesh; both have normals, or none has.
     pub(crate) fn add(&mut self, other: &Self) {
         let first = self.points.len() as u32;
         self.points.extend(&other.points);
+        self.normals.extend(&other.normals);
         self.faces.extend(other.faces.iter().map(|face| face.map(|i| i + first)));
     }
 }
@@ -204,6 +235,21 @@ mod tests {
     fn six_volumes(mesh: &Mesh) -> f64 {
         let corner = |i: u32| mesh.points[i as usize].map(f64::from);
         mesh.faces.iter().map(|&[a, b, c]| dot(corner(a), cross(corner(b), corner(c)))).sum()
+    }
+
+    #[test]
+    fn a_ring_has_its_volume_and_normals_that_face_outwards() {
+        let ring = Mesh::ring([3.0, -2.0, 5.0], [2.5, 0.7], 30.0, 0.0, 64);
+        let volume = six_volumes(&ring) / 6.0;
+        let torus = 2.0 * std::f64::consts::PI.powi(2) * 2.5 * 0.7_f64.powi(2);
+        assert!((volume / torus - 1.0).abs() < 0.01, "{volume} {torus}");
+        assert_eq!(ring.normals.len(), ring.points.len());
+        let corner = |i: u32| ring.points[i as usize].map(f64::from);
+        for &[a, b, c] in &ring.faces {
+            let face = normalized(cross(minus(corner(b), corner(a)), minus(corner(c), corner(a))));
+            let normal = ring.normals[a as usize].map(f64::from);
+            assert!(dot(face, normal) > 0.98, "{face:?} {normal:?}");
+        }
     }
 
     #[test]

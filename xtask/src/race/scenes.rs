@@ -4,7 +4,7 @@ use super::scene::{Camera, Material, Mesh, Object, Point, Random, Rgb, Scene, Sk
 
 /// All of them.
 pub(crate) fn all() -> Vec<Scene> {
-    vec![cornell(), interior(), lights(), terrain(1000, 500), glass(), coats()]
+    vec![cornell(), interior(), lights(), terrain(1000, 500), glass(), coats(), models()]
 }
 
 const WHITE: Material = Material::Diffuse { reflectance: [0.75, 0.75, 0.75] };
@@ -245,4 +245,27 @@ fn coats() -> Scene {
     parts.add_light(ceiling([2.0, 2.6], 3.5, [1.2, 1.8]), [40.0, 48.0, 60.0]);
     let camera = Camera { eye: [0.0, 2.3, 6.0], target: [0.0, 0.55, 0.0], fov: 40.0 };
     parts.scene("coats", "Plastics and metals of growing roughness under two lamps.", 7, camera)
+}
+
+fn principled(base: Rgb, metallic: f64, roughness: f64) -> Material {
+    Material::Principled { base, metallic, roughness }
+}
+
+/// Smooth meshes of what glTF brings.
+fn models() -> Scene {
+    let mut parts = Parts::default();
+    parts.add(floor([-8.0, 8.0], 0.0, [-8.0, 8.0]), diffuse([0.4, 0.4, 0.42]));
+    let plastics = [[0.7, 0.12, 0.08], [0.1, 0.4, 0.5], [0.75, 0.6, 0.15], [0.3, 0.55, 0.15]];
+    let metals = [[0.95, 0.64, 0.54], [0.9, 0.75, 0.35], [0.92, 0.92, 0.9], [0.56, 0.57, 0.58]];
+    for (k, roughness) in [0.25, 0.35, 0.5, 0.7].into_iter().enumerate() {
+        let (x, turned) = (1.4 * k as f64 - 2.1, 25.0 * k as f64 - 30.0);
+        let front = Mesh::ring([x, 0.56, 0.9], [0.38, 0.14], turned, 5.0, 64);
+        parts.add(front, principled(plastics[k], 0.0, roughness));
+        let back = Mesh::ring([x + 0.4, 0.85, -0.9], [0.55, 0.25], -turned, 3.0, 64);
+        parts.add(back, principled(metals[k], 1.0, roughness));
+    }
+    let camera = Camera { eye: [0.0, 2.0, 6.0], target: [0.0, 0.6, 0.0], fov: 40.0 };
+    let about =
+        "Smooth rings of plastic and metal, as glTF describes them, under a sky with a low, soft sun.";
+    Scene { sky: Some(evening()), ..parts.scene("models", about, 5, camera) }
 }

@@ -74,6 +74,10 @@ pub(crate) fn pbrt(scene: &Scene, size: u32) -> String {
                 numbers(reflectance)
             ),
             Material::Glass { eta } => format!("\"string type\" \"dielectric\" \"float eta\" {eta}"),
+            Material::Principled { base, metallic, roughness } => format!(
+                "\"string type\" \"principled\" \"rgb base_color\" [{}] \"float metallic\" {metallic} \"float roughness\" {roughness}",
+                numbers(base)
+            ),
         };
         let _ = writeln!(out, "MakeNamedMaterial \"m{i}\" {parameters}");
     }
@@ -98,6 +102,9 @@ fn description(scene: &Scene, size: u32) -> Value {
             json!({"kind": "coated", "reflectance": reflectance, "eta": eta, "alpha": alpha})
         }
         Material::Glass { eta } => json!({"kind": "glass", "eta": eta}),
+        Material::Principled { base, metallic, roughness } => {
+            json!({"kind": "principled", "base": base, "metallic": metallic, "roughness": roughness})
+        }
     };
     let objects = scene.objects.iter().enumerate();
     json!({
@@ -106,7 +113,10 @@ fn description(scene: &Scene, size: u32) -> Value {
         "camera": {"eye": scene.camera.eye, "target": scene.camera.target, "fov": scene.camera.fov},
         "materials": scene.materials.iter().map(material).collect::<Vec<_>>(),
         "objects": objects
-            .map(|(i, o)| json!({"ply": mesh_name(i), "material": o.material, "emission": o.emission}))
+            .map(|(i, o)| {
+                let is_smooth = !o.mesh.normals.is_empty();
+                json!({"ply": mesh_name(i), "material": o.material, "emission": o.emission, "smooth": is_smooth})
+            })
             .collect::<Vec<_>>(),
         "sky": scene.sky.as_ref().map(|_| SKY_NAME),
     })
@@ -114,15 +124,18 @@ fn description(scene: &Scene, size: u32) -> Value {
 
 /// The mesh as a binary, little-endian .ply.
 fn ply(mesh: &Mesh) -> Vec<u8> {
+    let normals = ["", "property float nx\nproperty float ny\nproperty float nz\n"];
     let mut out = format!(
-        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n{}\
          element face {}\nproperty list uchar int vertex_indices\nend_header\n",
         mesh.points.len(),
+        normals[usize::from(!mesh.normals.is_empty())],
         mesh.faces.len()
     )
     .into_bytes();
-    for x in mesh.points.as_flattened() {
-        out.extend(x.to_le_bytes());
+    for (i, point) in mesh.points.iter().enumerate() {
+        let normal = mesh.normals.get(i).into_iter().flatten();
+        point.iter().chain(normal).for_each(|x| out.extend(x.to_le_bytes()));
     }
     for face in &mesh.faces {
         out.push(3);

@@ -5,6 +5,8 @@
 use std::array;
 use std::ops::Range;
 
+use lumbre_simd::{InstructionSet, Job, Real};
+
 use crate::CancelToken;
 use crate::workers::Workers;
 
@@ -43,11 +45,23 @@ const LEAST_VARIANCE: f32 = 1e-12;
 const BAND: usize = 16;
 
 /// Nearly exp(-x), and exactly 0 from 4 on.
-#[inline]
+#[inline(always)]
 fn kernel(x: f32) -> f32 {
     let t = (1.0 - 0.25 * x).max(0.0);
     let t = t * t;
     t * t
+}
+
+/// The larger of two numbers; the second where one of them is NaN. (`max` asks for NaN, which vectors have no instruction for.)
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// The smaller of two numbers; the second where one of them is NaN.
+#[inline(always)]
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
 /// Three channels of the filtered layer; `None` where it is cancelled.
@@ -60,14 +74,34 @@ pub(super) fn filter(
     let starts = (0..layer.height).step_by(BAND);
     let mut bands: Vec<(Range<usize>, [Vec<f32>; 3])> =
         starts.map(|y| (y..(y + BAND).min(layer.height), Default::default())).collect();
-    workers.for_each(&mut bands, |(rows, band)| *band = filter_rows(layer, groups, rows.clone(), cancel));
+    workers.for_each(&mut bands, |(rows, band)| {
+        *band = InstructionSet::detect().run(FilterRows { layer, groups, rows: rows.clone(), cancel });
+    });
     if cancel.is_cancelled() {
         return None;
     }
     Some(array::from_fn(|c| bands.iter().flat_map(|(_, band)| &band[c]).copied().collect()))
 }
 
+/// [`filter_rows`] at any instruction set: its loops go over rows of numbers, of which the compiler makes vectors as wide as there are.
+struct FilterRows<'a> {
+    layer: &'a Layer,
+    groups: &'a [Group],
+    rows: Range<usize>,
+    cancel: &'a CancelToken,
+}
+
+impl Job for FilterRows<'_> {
+    type Output = [Vec<f32>; 3];
+
+    #[inline(always)]
+    fn run<R: Real>(self) -> Self::Output {
+        filter_rows(self.layer, self.groups, self.rows, self.cancel)
+    }
+}
+
 /// The rows of the filtered layer: each half by weights from the other. Where it is cancelled, they are of no use.
+#[inline(always)]
 fn filter_rows(layer: &Layer, groups: &[Group], rows: Range<usize>, cancel: &CancelToken) -> [Vec<f32>; 3] {
     let (width, height) = (layer.width, layer.height);
     let count = rows.len() * width;
@@ -120,20 +154,22 @@ fn filter_rows(layer: &Layer, groups: &[Group], rows: Range<usize>, cancel: &Can
                 weights.fill(0.0);
                 for row in y.saturating_sub(PATCH)..(y + PATCH + 1).min(height) {
                     let patch = &across[(row - reached.start) * width + left..][..span];
-                    weights.iter_mut().zip(patch).for_each(|(sum, difference)| *sum += difference);
-                }
-                for (weight, surface) in weights.iter_mut().zip(&*surfaces) {
-                    // What is less different than by noise is not different.
-                    *weight = near * kernel((*weight * share).max(*surface).max(0.0));
+                    for x in 0..span {
+                        weights[x] += patch[x];
+                    }
                 }
                 let known = &layer.known[other][there..][..span];
-                weights.iter_mut().zip(known).for_each(|(weight, known)| *weight *= known);
                 let total = &mut totals[other][out..][..span];
-                total.iter_mut().zip(&*weights).for_each(|(total, weight)| *total += weight);
+                for x in 0..span {
+                    // What is less different than by noise is not different.
+                    let difference = larger(larger(weights[x] * share, surfaces[x]), 0.0);
+                    weights[x] = near * kernel(difference) * known[x];
+                    total[x] += weights[x];
+                }
                 for (sum, values) in sums[other].iter_mut().zip(&layer.halves[other]) {
                     let (sum, values) = (&mut sum[out..][..span], &values[there..][..span]);
-                    for ((sum, value), weight) in sum.iter_mut().zip(values).zip(&*weights) {
-                        *sum += weight * value;
+                    for x in 0..span {
+                        sum[x] += weights[x] * values[x];
                     }
                 }
             }
@@ -152,39 +188,43 @@ fn filter_rows(layer: &Layer, groups: &[Group], rows: Range<usize>, cancel: &Can
 }
 
 /// The squared differences of light of the pixels from `p` on and those from `q` on, less what noise makes of them, in units of it.
+#[inline(always)]
 fn compare_light(half: &[Vec<f32>; 3], variance: &[f32], p: usize, q: usize, out: &mut [f32]) {
     let span = out.len();
-    let [pr, pg, pb] = half.each_ref().map(|channel| &channel[p..][..span]);
-    let [qr, qg, qb] = half.each_ref().map(|channel| &channel[q..][..span]);
+    let [r, g, b] = half;
+    let (pr, pg, pb) = (&r[p..][..span], &g[p..][..span], &b[p..][..span]);
+    let (qr, qg, qb) = (&r[q..][..span], &g[q..][..span], &b[q..][..span]);
     let (vp, vq) = (&variance[p..][..span], &variance[q..][..span]);
     for x in 0..span {
         let (r, g, b) = (pr[x] - qr[x], pg[x] - qg[x], pb[x] - qb[x]);
-        let noise = vp[x] + vp[x].min(vq[x]);
+        let noise = vp[x] + smaller(vp[x], vq[x]);
         out[x] = (r * r + g * g + b * b - noise) / (LEAST_VARIANCE + STRENGTH_SQUARED * (vp[x] + vq[x]));
     }
 }
 
 /// The greatest squared difference of any group of features of the pixels from `p` on and those from `q` on, in units of each group.
+#[inline(always)]
 fn compare_surfaces(groups: &[Group], p: usize, q: usize, out: &mut [f32]) {
     let span = out.len();
     out.fill(0.0);
     for Group { planes, variance, sharpness } in groups {
         let (vp, vq) = (&variance[p..][..span], &variance[q..][..span]);
         let sharpness = &sharpness[p..][..span];
-        let noise = |x: usize| vp[x] + vp[x].min(vq[x]);
         if let [a, b, c] = &planes[..] {
-            let [pa, pb, pc] = [a, b, c].map(|plane| &plane[p..][..span]);
-            let [qa, qb, qc] = [a, b, c].map(|plane| &plane[q..][..span]);
+            let (pa, pb, pc) = (&a[p..][..span], &b[p..][..span], &c[p..][..span]);
+            let (qa, qb, qc) = (&a[q..][..span], &b[q..][..span], &c[q..][..span]);
             for x in 0..span {
                 let (a, b, c) = (pa[x] - qa[x], pb[x] - qb[x], pc[x] - qc[x]);
-                out[x] = out[x].max((a * a + b * b + c * c - noise(x)) * sharpness[x]);
+                let noise = vp[x] + smaller(vp[x], vq[x]);
+                out[x] = larger(out[x], (a * a + b * b + c * c - noise) * sharpness[x]);
             }
         } else {
             for plane in planes {
                 let (p, q) = (&plane[p..][..span], &plane[q..][..span]);
                 for x in 0..span {
                     let d = p[x] - q[x];
-                    out[x] = out[x].max((d * d - noise(x)) * sharpness[x]);
+                    let noise = vp[x] + smaller(vp[x], vq[x]);
+                    out[x] = larger(out[x], (d * d - noise) * sharpness[x]);
                 }
             }
         }
@@ -192,6 +232,7 @@ fn compare_surfaces(groups: &[Group], p: usize, q: usize, out: &mut [f32]) {
 }
 
 /// Sums of each value and its neighbours to the left and the right, as far as patches reach.
+#[inline(always)]
 fn sum_across(values: &[f32], out: &mut [f32]) {
     let width = values.len();
     let inside = PATCH..width.saturating_sub(PATCH).max(PATCH);
@@ -204,8 +245,9 @@ fn sum_across(values: &[f32], out: &mut [f32]) {
     let inner = &mut out[inside.clone()];
     inner.copy_from_slice(&values[..inside.len()]);
     for shift in 1..=2 * PATCH {
-        for (sum, value) in inner.iter_mut().zip(&values[shift..]) {
-            *sum += value;
+        let values = &values[shift..][..inner.len()];
+        for x in 0..inner.len() {
+            inner[x] += values[x];
         }
     }
 }

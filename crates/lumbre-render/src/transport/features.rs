@@ -1,7 +1,8 @@
 //! What a picture can show besides light: reflectance, normals, depth and surface parameters.
 
+use lumbre_geometry::{Ray, Surface};
 use lumbre_math::{Vec2, Vec3};
-use lumbre_scene::View;
+use lumbre_scene::{GroundPlane, View};
 use lumbre_shading::Spectrum;
 
 use crate::transport::Sight;
@@ -64,6 +65,12 @@ pub struct Features {
 }
 
 impl Features {
+    /// What is left of them behind media that leave a part of the light; what media scatter counts as white, and faces no side.
+    pub(crate) fn behind(self, left: Spectrum) -> Self {
+        let albedo = self.albedo * left + (Spectrum::WHITE - left);
+        Self { albedo, normal: self.normal * left.average(), ..self }
+    }
+
     /// The features of what is met, if anything is.
     pub fn of(view: &View, sight: &Sight) -> Option<Self> {
         let met = sight.met.as_ref()?;
@@ -79,6 +86,17 @@ impl Features {
             depth: view.depth(met.surface.point, met.time) as f32,
             uv: met.uv(),
         })
+    }
+
+    /// The features of the ground, where a ray meets its surface.
+    pub(crate) fn of_ground(view: &View, ground: &GroundPlane, ray: &Ray, surface: &Surface) -> Self {
+        let normal = if ground.normal.dot(ray.direction) < 0.0 { ground.normal } else { -ground.normal };
+        Self {
+            albedo: ground.albedo,
+            normal: normal.as_vec3(),
+            depth: view.depth(surface.point, ray.time) as f32,
+            uv: surface.uv.as_vec2(),
+        }
     }
 
     /// One of them as a colour: the normal as it is, with signs; uv in red and green.

@@ -6,7 +6,7 @@ mod features;
 pub(crate) mod interior;
 pub(crate) mod journal;
 pub(crate) mod sampler;
-mod seen;
+pub(crate) mod seen;
 mod sight;
 mod strategy;
 pub(crate) mod through;

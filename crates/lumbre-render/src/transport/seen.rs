@@ -12,9 +12,9 @@ use crate::transport::through::{goes_straight_on, light_through, straight_on};
 use crate::transport::{Draw, Record, Sight};
 
 /// Samples of each light that each sample of a shadow takes: few rays, where a whole path would be many.
-const SAMPLES: u32 = 2;
+pub(crate) const SAMPLES: u32 = 2;
 /// Lights that each such sample asks: of more, as many by chance.
-const MOST_LIGHTS: usize = 4;
+pub(crate) const MOST_LIGHTS: usize = 4;
 
 /// Each way of light through clear things has as many vertices of a draw as two to the power of this.
 const WAY_BITS: u32 = 6;
@@ -51,12 +51,9 @@ pub(crate) fn caught(
     let catcher = scene.ground().filter(|ground| ground.catcher);
     match (&sight.met, catcher) {
         (Some(met), Some(ground)) if ground.holds(met) => {
-            let blocked = blocked(scene, ground, met, draw, record);
-            record.note(|| Event::Caught { blocked });
-            let left = Spectrum::WHITE - blocked;
-            let coverage = if lights_are_seen { Spectrum::WHITE } else { blocked };
-            let radiance = record.added(Source::Infinity, left, behind(&sight.ray.ray), 1.0);
-            Some(Seen { radiance, coverage, on_catcher: true })
+            let lost = lost(scene, ground, met, draw, record);
+            let open = ground.open_irradiance(met.surface.point, met.time);
+            Some(Seen::of_catcher(lost, open, lights_are_seen, behind(&sight.ray.ray), record))
         }
         (None, _) if !lights_are_seen => {
             Some(Seen { radiance: Spectrum::BLACK, coverage: covered, on_catcher: false })
@@ -65,8 +62,26 @@ pub(crate) fn caught(
     }
 }
 
-/// An estimate of the share of the light on the ground that something blocks.
-fn blocked(
+impl Seen {
+    /// Ground that catches shadows and has lost some of the irradiance that it has in the open, before a background.
+    pub(crate) fn of_catcher(
+        lost: Spectrum,
+        open: Spectrum,
+        lights_are_seen: bool,
+        behind: Spectrum,
+        record: &mut Record,
+    ) -> Self {
+        let part = |lost: f32, open: f32| if open > 0.0 { lost / open } else { 0.0 };
+        let blocked = Spectrum::new(part(lost.r, open.r), part(lost.g, open.g), part(lost.b, open.b));
+        record.note(|| Event::Caught { blocked });
+        let coverage = if lights_are_seen { Spectrum::WHITE } else { blocked };
+        let radiance = record.added(Source::Infinity, Spectrum::WHITE - blocked, behind, 1.0);
+        Self { radiance, coverage, on_catcher: true }
+    }
+}
+
+/// An estimate of the irradiance on the ground that something blocks.
+fn lost(
     scene: &Scene,
     ground: &GroundPlane,
     at: &Interaction<'_>,
@@ -97,12 +112,15 @@ fn blocked(
             continue;
         }
         let shadow_ray = at.shadow_ray(&sample);
-        let left = if goes_straight_on(scene, &sample) {
+        let mut left = if goes_straight_on(scene, &sample) {
             straight_on(scene, shadow_ray, &sample, Interiors::default(), false, record)
         } else {
             record.counts.shadow += 1;
             if scene.is_occluded(&shadow_ray) { Spectrum::BLACK } else { Spectrum::WHITE }
         };
+        if scene.has_media() {
+            left = left * scene.transmittance(None, &shadow_ray, draw.along(&shadow_ray));
+        }
         if left == Spectrum::WHITE {
             continue;
         }
@@ -111,9 +129,7 @@ fn blocked(
     if scene.lets_light_through() {
         lost = lost - passed(scene, ground, at, draw, record);
     }
-    let open = ground.open_irradiance(at.surface.point, at.time);
-    let part = |lost: f32, open: f32| if open > 0.0 { lost / open } else { 0.0 };
-    Spectrum::new(part(lost.r, open.r), part(lost.g, open.g), part(lost.b, open.b))
+    lost
 }
 
 /// An estimate of the irradiance by light at infinity that comes through clear things.

@@ -1,8 +1,8 @@
 //! Vertices on flat triangles, in lanes: points with their errors, normals, and the light that such surfaces emit.
 
+use lumbre_scene::TriangleSurface;
 use lumbre_scene::light::lanes::Receiver;
 use lumbre_shading::Spectrum;
-use lumbre_shading::lanes::BsdfKind;
 use lumbre_simd::math::orthonormal_basis;
 use lumbre_simd::{Double, Job, Mask, Real, UInt, V3};
 
@@ -15,19 +15,19 @@ use crate::wave::{Found, Setting};
 #[derive(Debug, Default)]
 pub(crate) struct FlatHits {
     len: usize,
-    path: Vec<u32>,
+    pub(crate) path: Vec<u32>,
     id: Vec<u32>,
-    triangle: Vec<u32>,
+    pub(crate) triangle: Vec<u32>,
     /// Where the row of the BSDF begins.
-    row: Vec<u32>,
+    pub(crate) row: Vec<u32>,
     /// [`LIT_FROM_BELOW`] or 0.
-    flags: Vec<u32>,
+    pub(crate) flags: Vec<u32>,
     /// The corners relative to the origin, corner by corner.
     corners: [Vec<f32>; 9],
     origin: [Vec<f64>; 3],
-    local: [Vec<f32>; 2],
-    distance: Vec<f32>,
-    outward: Vec<f32>,
+    pub(crate) local: [Vec<f32>; 2],
+    pub(crate) distance: Vec<f32>,
+    pub(crate) outward: Vec<f32>,
     /// The radiance that the surface emits, and 0, 1 or 2 for the number of its sides that do.
     emission: [Vec<f32>; 4],
 }
@@ -48,22 +48,20 @@ impl FlatHits {
         self.len
     }
 
-    /// Notes what a path met, if that is flat, and gives the kind of its BSDF.
+    /// The surface of a hit.
+    pub(crate) fn surface<'s>(&self, setting: &Setting<'s>, at: usize) -> Option<&'s TriangleSurface> {
+        setting.scene.tables().surface(self.id[at])
+    }
+
+    /// Notes what a path met.
     #[inline]
-    pub(crate) fn push(
-        &mut self,
-        setting: &Setting<'_>,
-        path: usize,
-        met: MetTriangle,
-        distance: f32,
-    ) -> Option<BsdfKind> {
-        let surface = setting.scene.tables().surface(met.id)?;
+    pub(crate) fn push(&mut self, surface: &TriangleSurface, path: usize, met: MetTriangle, distance: f32) {
         let at = self.len;
         self.len += 1;
         self.path[at] = path as u32;
         self.id[at] = met.id;
         self.triangle[at] = met.triangle;
-        self.row[at] = surface.row;
+        self.row[at] = surface.bsdf.map_or(0, |bsdf| bsdf.row);
         self.flags[at] = if surface.transmits { LIT_FROM_BELOW } else { 0 };
         let corners = surface.mesh.indices[met.triangle as usize];
         for (corner, columns) in corners.into_iter().zip(self.corners.chunks_exact_mut(3)) {
@@ -85,7 +83,6 @@ impl FlatHits {
         for (column, x) in self.emission.iter_mut().zip([radiance[0], radiance[1], radiance[2], sides]) {
             column[at] = x;
         }
-        Some(surface.kind)
     }
 }
 
@@ -135,15 +132,32 @@ impl Job for FlatVertices<'_, '_> {
             width.copy_to_slice(&mut vertices.width[to..]);
             spread.copy_to_slice(&mut vertices.spread[to..]);
 
-            let sides = R::from_slice(&hits.emission[3][done..]);
-            let shines = lanes & (sides.simd_eq(R::splat(2.0)) | (sides.simd_eq(R::one()) & front));
-            if shines.any() {
-                let pdf = light_pdf::<R>(setting, hits, paths, done, at, shines, point);
-                push_found::<R>(found, hits, done, shines, at, pdf);
-            }
+            find_light::<R>(setting, hits, paths, done, at, lanes, front, point, found);
             done += R::LANES;
         }
         vertices.len += hits.len;
+    }
+}
+
+/// Adds the light of surfaces that shine on the side of the viewer.
+#[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "lanes, as they stand in registers")]
+pub(crate) fn find_light<R: Real>(
+    setting: &Setting<'_>,
+    hits: &FlatHits,
+    paths: &Paths,
+    done: usize,
+    at: R::UInt,
+    lanes: R::Mask,
+    front: R::Mask,
+    point: V3<R::Double>,
+    found: &mut Vec<Found>,
+) {
+    let sides = R::from_slice(&hits.emission[3][done..]);
+    let shines = lanes & (sides.simd_eq(R::splat(2.0)) | (sides.simd_eq(R::one()) & front));
+    if shines.any() {
+        let pdf = light_pdf::<R>(setting, hits, paths, done, at, shines, point);
+        push_found::<R>(found, hits, done, shines, at, pdf);
     }
 }
 
@@ -152,7 +166,11 @@ impl Job for FlatVertices<'_, '_> {
 /// The error is that of the combination, γ₇ Σ|bᵢ pᵢ| (M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering", 3rd edition, 2016,
 /// section 3.9), and one rounding for the mesh's origin.
 #[inline(always)]
-fn triangle<R: Real>(hits: &FlatHits, at: usize, outward: R) -> (V3<R::Double>, V3<R::Double>, V3<R>) {
+pub(crate) fn triangle<R: Real>(
+    hits: &FlatHits,
+    at: usize,
+    outward: R,
+) -> (V3<R::Double>, V3<R::Double>, V3<R>) {
     use lumbre_math::rounding::{UNIT_ROUNDOFF, gamma};
     let (p0, p1, p2) = (corner::<R>(hits, at, 0), corner::<R>(hits, at, 3), corner::<R>(hits, at, 6));
     let b1 = R::Double::from_single(R::from_slice(&hits.local[0][at..]));
@@ -176,7 +194,7 @@ fn triangle<R: Real>(hits: &FlatHits, at: usize, outward: R) -> (V3<R::Double>, 
 }
 
 #[inline(always)]
-fn corner<R: Real>(hits: &FlatHits, at: usize, first: usize) -> V3<R::Double> {
+pub(crate) fn corner<R: Real>(hits: &FlatHits, at: usize, first: usize) -> V3<R::Double> {
     V3 {
         x: R::Double::from_single(R::from_slice(&hits.corners[first][at..])),
         y: R::Double::from_single(R::from_slice(&hits.corners[first + 1][at..])),
@@ -190,14 +208,14 @@ fn abs<R: Real>(v: V3<R::Double>) -> V3<R::Double> {
 }
 
 #[inline(always)]
-fn put3<R: Real>(columns: &mut [Vec<f32>; 3], at: usize, v: V3<R>) {
+pub(crate) fn put3<R: Real>(columns: &mut [Vec<f32>; 3], at: usize, v: V3<R>) {
     v.x.copy_to_slice(&mut columns[0][at..]);
     v.y.copy_to_slice(&mut columns[1][at..]);
     v.z.copy_to_slice(&mut columns[2][at..]);
 }
 
 #[inline(always)]
-fn put64<R: Real>(columns: &mut [Vec<f64>; 3], at: usize, v: V3<R::Double>) {
+pub(crate) fn put64<R: Real>(columns: &mut [Vec<f64>; 3], at: usize, v: V3<R::Double>) {
     v.x.copy_to_slice(&mut columns[0][at..]);
     v.y.copy_to_slice(&mut columns[1][at..]);
     v.z.copy_to_slice(&mut columns[2][at..]);

@@ -6,6 +6,7 @@
 //! and a direction to go on in, for all of them ([`shade`]); what comes through of the lights ([`shadows`]). What a path does depends on
 //! nothing but its sample: neither the size of the wave nor the other paths in it show in the picture.
 
+pub(crate) mod catcher;
 mod escape;
 mod flat;
 mod lights;
@@ -15,6 +16,7 @@ mod search;
 mod shade;
 mod shadows;
 mod sights;
+mod smooth;
 mod surfaces;
 mod traced;
 mod vertices;
@@ -46,6 +48,7 @@ use crate::wave::paths::{OnePath, Paths, Slots};
 use crate::wave::search::Hits;
 use crate::wave::shade::{Kind, Shade, ShadeKind};
 use crate::wave::shadows::Shadows;
+use crate::wave::smooth::SmoothHits;
 use crate::wave::traced::Traced;
 use crate::wave::vertices::Vertices;
 
@@ -107,7 +110,8 @@ pub(crate) struct Wave<'s> {
     next: Paths,
     hits: Hits,
     flat: FlatHits,
-    /// Paths that left the scene, or that met what is not flat.
+    smooth: SmoothHits,
+    /// Paths that left the scene, or that met what is no such triangle.
     others: Vec<u32>,
     vertices: Vertices<'s>,
     found: Vec<Found>,
@@ -123,6 +127,8 @@ pub(crate) struct Wave<'s> {
     boundaries: Vec<Crossing>,
     /// Whether rays come from the camera.
     is_first: bool,
+    /// Whether rays from the camera that leave the scene find nothing.
+    hides_background: bool,
 }
 
 impl<'s> Wave<'s> {
@@ -151,7 +157,8 @@ impl<'s> Wave<'s> {
     fn escape(&mut self, setting: &Setting<'s>, record: &mut Record) {
         self.others.clear();
         for path in 0..self.paths.len {
-            if self.hits.is_miss(path) && !self.is_taken(path) {
+            let is_hidden = self.hides_background && self.paths.depth[path] == 0;
+            if self.hits.is_miss(path) && !self.is_taken(path) && !is_hidden {
                 self.others.push(path as u32);
             }
         }

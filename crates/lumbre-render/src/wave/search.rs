@@ -1,6 +1,8 @@
 //! The closest hits of all rays of a wave.
 
-use lumbre_geometry::Ray;
+use std::borrow::Cow;
+
+use lumbre_geometry::{Ray, Surface};
 use lumbre_kernel::{Hit, HitColumns, RayColumns};
 use lumbre_scene::{Footprint, Interaction, Scene};
 
@@ -13,8 +15,10 @@ pub(crate) struct Hits {
     /// In double precision; used where `is_single` does not say otherwise.
     double: Vec<Option<Hit>>,
     is_single: bool,
-    /// Whether the rays that leave the hits are rounded, however these were found.
-    leaves_single: bool,
+    /// The position in the columns of what each ray met; empty where that is the ray's own.
+    kept: Vec<u32>,
+    /// What is seen through the backs of one-sided surfaces in their place, by ascending position in the columns.
+    behind: Vec<(u32, Option<Hit>)>,
     rays: Vec<Ray>,
     times: Vec<f64>,
 }
@@ -58,8 +62,9 @@ impl Hits {
         is_seen: bool,
     ) {
         let len = paths.len;
-        self.leaves_single = precision == Precision::Single;
-        self.is_single = self.leaves_single && !(is_seen && scene.has_one_sided());
+        self.is_single = precision == Precision::Single;
+        self.kept.clear();
+        self.behind.clear();
         let time = |path: usize| slots.time[paths.slot[path] as usize];
         if !self.is_single {
             self.rays.clear();
@@ -83,25 +88,88 @@ impl Hits {
             time: scene.moves().then_some(&self.times),
         };
         scene.accel().closest_columns(&rays, false, &mut self.columns);
+        if is_seen && scene.has_one_sided() {
+            self.look_through_backs(scene, paths, slots);
+        }
+    }
+
+    /// Notes what is seen through the backs of one-sided surfaces.
+    fn look_through_backs(&mut self, scene: &Scene, paths: &Paths, slots: &Slots<'_>) {
+        for path in 0..paths.len {
+            let id = self.columns.id[path];
+            if id == HitColumns::MISS || !scene.may_be_one_sided(id) {
+                continue;
+            }
+            let ray = paths.ray(path, slots.time[paths.slot[path] as usize]);
+            let is_back = |hit: &Hit| scene.is_back_of_one_sided(&ray, hit);
+            if self.columns.to_hit(path).as_ref().is_some_and(is_back) {
+                self.behind.push((path as u32, scene.closest_seen(&ray)));
+            }
+        }
+    }
+
+    /// Keeps what the rays at these positions met, which ascend.
+    pub(crate) fn keep(&mut self, positions: &[u32]) {
+        if self.is_single {
+            self.kept.clear();
+            self.kept.extend(positions);
+            return;
+        }
+        for (to, &from) in positions.iter().enumerate() {
+            self.double.swap(to, from as usize);
+        }
+    }
+
+    /// The position in the columns of what a ray met.
+    #[inline]
+    fn column(&self, path: usize) -> usize {
+        self.kept.get(path).map_or(path, |&at| at as usize)
+    }
+
+    /// What is seen through a back at a position in the columns; `None` where that is not the back of a one-sided surface.
+    #[inline]
+    fn seen_through(&self, column: usize) -> Option<&Option<Hit>> {
+        if self.behind.is_empty() {
+            return None;
+        }
+        let at = self.behind.binary_search_by_key(&(column as u32), |&(at, _)| at).ok()?;
+        Some(&self.behind[at].1)
+    }
+
+    /// What a ray met.
+    fn hit(&self, path: usize) -> Option<Cow<'_, Hit>> {
+        if !self.is_single {
+            return self.double[path].as_ref().map(Cow::Borrowed);
+        }
+        let column = self.column(path);
+        match self.seen_through(column) {
+            Some(hit) => hit.as_ref().map(Cow::Borrowed),
+            None => self.columns.to_hit(column).map(Cow::Owned),
+        }
     }
 
     /// Whether a ray met nothing.
     pub(crate) fn is_miss(&self, path: usize) -> bool {
-        if self.is_single { self.columns.id[path] == HitColumns::MISS } else { self.double[path].is_none() }
+        if !self.is_single {
+            return self.double[path].is_none();
+        }
+        let column = self.column(path);
+        self.seen_through(column).map_or(self.columns.id[column] == HitColumns::MISS, Option::is_none)
     }
 
     /// The triangle in the world itself that a ray met.
     #[inline]
     pub(crate) fn triangle(&self, path: usize) -> Option<MetTriangle> {
-        if self.is_single {
+        let column = self.column(path);
+        if self.is_single && self.seen_through(column).is_none() {
             let columns = &self.columns;
-            return columns.is_plain(path).then(|| MetTriangle {
-                id: columns.id[path],
-                triangle: columns.primitive[path],
-                local: [columns.local[0][path], columns.local[1][path]],
+            return columns.is_plain(column).then(|| MetTriangle {
+                id: columns.id[column],
+                triangle: columns.primitive[column],
+                local: [columns.local[0][column], columns.local[1][column]],
             });
         }
-        let hit = self.double[path].as_ref().filter(|hit| hit.instances.is_empty())?;
+        let hit = self.hit(path).filter(|hit| hit.instances.is_empty())?;
         let local = hit.root.local.as_vec2().to_array();
         Some(MetTriangle { id: hit.id, triangle: hit.primitive, local })
     }
@@ -109,11 +177,11 @@ impl Hits {
     /// How far a ray went.
     #[inline]
     pub(crate) fn distance(&self, path: usize) -> f32 {
-        if self.is_single {
-            self.columns.t[path]
-        } else {
-            self.double[path].as_ref().map_or(0.0, |hit| hit.root.t as f32)
+        let column = self.column(path);
+        if self.is_single && self.seen_through(column).is_none() {
+            return self.columns.t[column];
         }
+        self.hit(path).map_or(0.0, |hit| hit.root.t as f32)
     }
 
     /// How far a ray went; infinite where it met nothing.
@@ -135,22 +203,33 @@ impl Hits {
         ray: &Ray,
         footprint: &Footprint,
     ) -> Option<Interaction<'s>> {
-        let whole;
-        let hit = if self.is_single {
-            whole = self.columns.to_hit(path)?;
-            &whole
+        let hit = self.hit(path)?;
+        Some(if self.is_single {
+            scene.picture_interaction(ray, &hit, footprint)
         } else {
-            self.double[path].as_ref()?
-        };
-        Some(if self.leaves_single {
-            scene.picture_interaction(ray, hit, footprint)
-        } else {
-            scene.interaction(ray, hit, footprint)
+            scene.interaction(ray, &hit, footprint)
         })
     }
 
     /// Whether the rays that leave the hits are rounded to single precision.
-    pub(crate) fn leaves_single(&self) -> bool {
-        self.leaves_single
+    pub(crate) fn is_single(&self) -> bool {
+        self.is_single
+    }
+
+    /// Whether a ray met the ground.
+    pub(crate) fn is_ground(&self, scene: &Scene, path: usize) -> bool {
+        let column = self.column(path);
+        if self.is_single && self.seen_through(column).is_none() {
+            let id = self.columns.id[column];
+            return id != HitColumns::MISS && scene.is_ground(id);
+        }
+        self.hit(path).is_some_and(|hit| scene.is_ground(hit.id))
+    }
+
+    /// The surface that a ray met, as its geometry is.
+    pub(crate) fn surface(&self, scene: &Scene, path: usize, ray: &Ray) -> Option<Surface> {
+        let hit = self.hit(path)?;
+        let accel = scene.accel();
+        Some(if self.is_single { accel.picture_surface(ray, &hit) } else { accel.surface(ray, &hit) })
     }
 }

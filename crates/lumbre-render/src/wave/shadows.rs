@@ -37,7 +37,8 @@ pub(crate) struct Shadows<'s> {
     direction: [Vec<f32>; 3],
     t_max: Vec<f32>,
     times: Vec<f64>,
-    blocked: Vec<bool>,
+    /// Whether something is in the way of each, once it was searched for.
+    pub(crate) blocked: Vec<bool>,
 }
 
 /// A segment that goes straight on through panes.
@@ -176,7 +177,7 @@ impl<'s> Shadows<'s> {
     }
 
     /// Finds whether something is in the way of each segment.
-    fn search(&mut self, scene: &Scene, is_single: bool, slots: &Slots<'_>) {
+    pub(crate) fn search(&mut self, scene: &Scene, is_single: bool, slots: &Slots<'_>) {
         let len = self.len;
         let time = |slot: &u32| slots.time[*slot as usize];
         if !is_single {

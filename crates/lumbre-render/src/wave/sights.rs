@@ -1,11 +1,12 @@
 //! A wave as integrators see it: samples of pixels, and what their rays from the camera meet.
 
-use lumbre_geometry::Ray;
+use lumbre_geometry::{Ray, Surface};
 use lumbre_math::{DVec3, Vec3};
-use lumbre_scene::{CameraRay, Footprint, Scene, View};
+use lumbre_scene::{CameraRay, Footprint, SamplerKind, Scene, View};
 use lumbre_shading::Spectrum;
 
-use crate::transport::{Draw, Record, Sight};
+use crate::transport::{Draw, Record, Seen, Sight};
+use crate::wave::catcher::{Catcher, Places};
 use crate::wave::media::to_column;
 use crate::wave::paths::{OnePath, Paths};
 use crate::wave::{Precision, Setting, Wave};
@@ -74,6 +75,11 @@ impl<'a, 's> Sights<'a, 's> {
         self.view
     }
 
+    /// Whether light at infinity is seen by the rays from the camera, too, and not only by those that scattered.
+    pub(crate) fn show_background(&mut self, is_shown: bool) {
+        self.wave.hides_background = !is_shown;
+    }
+
     /// How many samples there are.
     pub(crate) fn len(&self) -> usize {
         self.wave.slots.draws.len()
@@ -88,6 +94,35 @@ impl<'a, 's> Sights<'a, 's> {
     pub(crate) fn sight(&self, slot: usize) -> Sight<'s> {
         let ray = self.wave.slots.camera(slot);
         Sight { ray, met: self.wave.hits.interaction(self.scene, slot, &ray.ray, &ray.footprint) }
+    }
+
+    /// Whether a ray meets the ground.
+    pub(crate) fn is_on_ground(&self, slot: usize) -> bool {
+        self.wave.hits.is_ground(self.scene, slot)
+    }
+
+    /// Whether a ray meets nothing.
+    pub(crate) fn is_miss(&self, slot: usize) -> bool {
+        self.wave.hits.is_miss(slot)
+    }
+
+    /// The surface that a ray meets, as its geometry is.
+    pub(crate) fn surface(&self, slot: usize) -> Option<Surface> {
+        self.wave.hits.surface(self.scene, slot, &self.wave.slots.rays[slot])
+    }
+
+    /// What samples see that meet ground which catches shadows, in the order of the places.
+    pub(crate) fn catch(
+        &mut self,
+        catcher: &Catcher<'s>,
+        places: &mut Places,
+        sampler: SamplerKind,
+        lights_are_seen: bool,
+        record: &mut Record,
+    ) -> Vec<Seen> {
+        let is_single = self.precision == Precision::Single;
+        let Wave { slots, paths, shadows, .. } = &mut *self.wave;
+        catcher.see(places, slots, paths, shadows, sampler, is_single, lights_are_seen, record)
     }
 
     /// The random numbers of a sample.
@@ -119,15 +154,14 @@ impl<'a, 's> Sights<'a, 's> {
     /// Follows a path from each ray.
     pub(crate) fn follow(&mut self, setting: &Setting<'s>, record: &mut Record) {
         if self.wanted.len() < self.wave.paths.len {
-            // What others see is known: only these rays are asked again, to the same answer.
+            // What others see is known.
             let mut kept = Paths::default();
             kept.reserve(self.wanted.len());
             for &slot in &self.wanted {
                 kept.push_one(&self.wave.paths.get(slot as usize));
             }
             self.wave.paths = kept;
-            let Wave { hits, paths, slots, .. } = &mut *self.wave;
-            hits.search(self.scene, paths, slots, self.precision, true);
+            self.wave.hits.keep(&self.wanted);
         }
         self.wave.follow(setting, self.precision, record);
     }

@@ -5,8 +5,7 @@ use lumbre_math::Vec3;
 use lumbre_scene::light::lanes::Receiver;
 use lumbre_scene::{Footprint, Interaction};
 use lumbre_shading::medium::{DistanceSample, sample_henyey_greenstein};
-use lumbre_shading::{HomogeneousMedium, ShadingFrame, ShadingNormals, Spectrum};
-use lumbre_simd::math::orthonormal_basis;
+use lumbre_shading::{HomogeneousMedium, Spectrum};
 use lumbre_simd::{UInt, V3};
 
 use crate::transport::Record;
@@ -15,7 +14,8 @@ use crate::transport::journal::{End, Event, Met, Source};
 use crate::wave::flat::FlatVertices;
 use crate::wave::media::sides;
 use crate::wave::paths::{OnePath, SCATTERED};
-use crate::wave::vertices::{FOLDS, LIT_FROM_BELOW, SIDED};
+use crate::wave::smooth::{SmoothVertices, flags_of, frame_for};
+use crate::wave::vertices::{FOLDS, LIT_FROM_BELOW};
 use crate::wave::{Setting, Wave};
 
 /// Collisions inside media that every path may have before Russian roulette.
@@ -29,9 +29,10 @@ impl<'s> Wave<'s> {
         let scene = setting.scene;
         self.vertices.reset(self.paths.len, scene.tables().rows());
         self.flat.reset(self.paths.len);
+        self.smooth.reset(self.paths.len);
         self.found.clear();
         self.collided.clear();
-        let takes_flat = !setting.regularize;
+        let takes_triangles = !setting.regularize;
         let mut others = std::mem::take(&mut self.others);
         others.clear();
         for path in 0..self.paths.len {
@@ -40,18 +41,25 @@ impl<'s> Wave<'s> {
             }
             let in_the_open =
                 self.slots.interiors.get(self.paths.slot[path] as usize).is_none_or(Interiors::is_empty);
-            let met = if takes_flat && in_the_open { self.hits.triangle(path) } else { None };
-            let kind = met.and_then(|met| self.flat.push(setting, path, met, self.hits.distance(path)));
-            let Some(kind) = kind else {
+            let met = if takes_triangles && in_the_open { self.hits.triangle(path) } else { None };
+            let surface = met.and_then(|met| Some((scene.tables().surface(met.id)?, met)));
+            let Some((surface, met)) = surface else {
                 others.push(path as u32);
                 continue;
             };
-            let ends = self.paths.depth[path] & !SCATTERED == setting.max_depth;
-            if !ends {
-                self.vertices.queue(self.flat.len() - 1, kind);
+            let distance = self.hits.distance(path);
+            match surface.bsdf {
+                Some(bsdf) if !surface.is_smooth() => {
+                    self.flat.push(surface, path, met, distance);
+                    let ends = self.paths.depth[path] & !SCATTERED == setting.max_depth;
+                    if !ends {
+                        self.vertices.queue(self.flat.len() - 1, bsdf.kind);
+                    }
+                }
+                _ => self.smooth.push(surface, path, met, distance),
             }
             if record.journal.is_some() {
-                self.tell_flat(setting, path, record);
+                self.tell_triangle(setting, path, record);
             }
         }
         setting.instruction_set.run(FlatVertices {
@@ -60,11 +68,19 @@ impl<'s> Wave<'s> {
             paths: &self.paths,
             vertices: &mut self.vertices,
             found: &mut self.found,
-            is_single: self.hits.leaves_single(),
+            is_single: self.hits.is_single(),
+        });
+        setting.instruction_set.run(SmoothVertices {
+            setting,
+            hits: &mut self.smooth,
+            paths: &self.paths,
+            vertices: &mut self.vertices,
+            found: &mut self.found,
+            is_single: self.hits.is_single(),
         });
         self.add_found(setting, Source::Surface, record);
         if setting.has_media {
-            for vertex in 0..self.flat.len() {
+            for vertex in 0..self.vertices.len {
                 let slot = self.paths.slot[self.vertices.path[vertex] as usize] as usize;
                 self.vertices.put_media(vertex, [self.slots.medium[slot]; 2]);
             }
@@ -72,6 +88,7 @@ impl<'s> Wave<'s> {
         if record.journal.is_some() && self.flat.len() > 0 && self.vertices.is_unqueued() {
             record.note(|| Event::Ended(End::Depth));
         }
+        self.scatter_smooth(setting, record);
         for &path in &others {
             let path = path as usize;
             let slot = self.paths.slot[path] as usize;
@@ -82,6 +99,37 @@ impl<'s> Wave<'s> {
             }
         }
         self.others = others;
+    }
+
+    /// Queues the vertices of smooth hits, which come after the flat ones, and looks up the materials that are not the same everywhere.
+    fn scatter_smooth(&mut self, setting: &Setting<'s>, record: &mut Record) {
+        let first = self.flat.len();
+        for at in 0..self.smooth.base.len() {
+            let (vertex, path) = (first + at, self.smooth.base.path[at] as usize);
+            if self.paths.depth[path] & !SCATTERED == setting.max_depth {
+                record.note(|| Event::Ended(End::Depth));
+                continue;
+            }
+            if let Some(kind) = self.smooth.kinds[at] {
+                self.vertices.queue(vertex, kind);
+                continue;
+            }
+            let footprint = self.footprint(path);
+            let point = self.smooth.point(at, &self.vertices, vertex, self.paths.direction(path));
+            let surface = self.smooth.base.surface(setting, at);
+            match surface.and_then(|surface| surface.scattering(&point, &footprint, setting.shading_normals))
+            {
+                Some((material, frame, bsdf)) => {
+                    let frame = frame_for(&bsdf, frame);
+                    let mut flags = flags_of(setting.shading_normals, &frame, point.geometric);
+                    if material.lets_light_through() {
+                        flags |= LIT_FROM_BELOW;
+                    }
+                    self.vertices.put_looked_up(vertex, &frame, &bsdf, flags);
+                }
+                None => record.note(|| Event::Ended(End::Nothing)),
+            }
+        }
     }
 
     /// The footprint of a path's ray.
@@ -98,8 +146,8 @@ impl<'s> Wave<'s> {
         }
     }
 
-    /// Tells of a flat surface that a path met.
-    fn tell_flat(&self, setting: &Setting<'s>, path: usize, record: &mut Record) {
+    /// Tells of a triangle that a path met.
+    fn tell_triangle(&self, setting: &Setting<'s>, path: usize, record: &mut Record) {
         let ray = self.paths.ray(path, self.slots.time[self.paths.slot[path] as usize]);
         if let Some(here) = self.hits.interaction(setting.scene, path, &ray, &self.footprint(path)) {
             let (depth, throughput) = (self.paths.depth[path] & !SCATTERED, self.paths.throughput(path));
@@ -138,7 +186,7 @@ impl<'s> Wave<'s> {
         let towards = here.towards_origin.as_vec3();
         let scattering = material
             .and_then(|material| material.shading(&here.at, &here.shading, towards, setting.shading_normals));
-        let (Some((mut frame, mut bsdf)), Some(material)) = (scattering, material) else {
+        let (Some((frame, mut bsdf)), Some(material)) = (scattering, material) else {
             record.note(|| Event::Ended(End::Nothing));
             return;
         };
@@ -151,18 +199,8 @@ impl<'s> Wave<'s> {
         if setting.regularize && self.paths.depth[path] & SCATTERED != 0 {
             bsdf = bsdf.regularized();
         }
-        if bsdf.is_isotropic() {
-            // As on flat surfaces, so that their random numbers mean the same directions.
-            let (s, t) = orthonormal_basis(V3::new(frame.n.x, frame.n.y, frame.n.z));
-            frame = ShadingFrame { s: Vec3::new(s.x, s.y, s.z), t: Vec3::new(t.x, t.y, t.z), n: frame.n };
-        }
-        let mut flags = 0;
-        if ShadingNormals::differ(frame.n, here.shading.geometric) {
-            flags |= match setting.shading_normals {
-                ShadingNormals::Lumbre => FOLDS,
-                ShadingNormals::Pbrt => SIDED | LIT_FROM_BELOW,
-            };
-        }
+        let frame = frame_for(&bsdf, frame);
+        let mut flags = flags_of(setting.shading_normals, &frame, here.shading.geometric);
         if material.lets_light_through() {
             flags |= LIT_FROM_BELOW;
         }

@@ -143,6 +143,17 @@ impl<'s> Vertices<'s> {
         self.queue(at, bsdf.kind());
     }
 
+    /// Writes down how the surface of a vertex scatters that was made in lanes, and queues it.
+    pub(crate) fn put_looked_up(&mut self, at: usize, frame: &ShadingFrame, bsdf: &Bsdf, flags: u32) {
+        put(&mut self.frame_s, at, frame.s);
+        put(&mut self.frame_n, at, frame.n);
+        let rises = flags & FOLDS != 0 && self.flags[at] & RISES != 0;
+        self.flags[at] = flags | if rises { RISES | LIT_FROM_BELOW } else { 0 };
+        self.bsdf[at] = self.rows.len() as u32;
+        self.rows.extend(bsdf.row());
+        self.queue(at, bsdf.kind());
+    }
+
     /// Has a vertex shaded.
     pub(crate) fn queue(&mut self, vertex: usize, kind: BsdfKind) {
         self.queues[kind as usize].push(vertex as u32);

@@ -205,6 +205,25 @@ impl LaneLights {
         sample
     }
 
+    /// The position of a light that is everywhere, for [`LaneLights::sample_one`]; `None` for any other.
+    pub fn position(&self, light: LightId) -> Option<usize> {
+        self.elsewhere.iter().position(|elsewhere| elsewhere.light == light.0)
+    }
+
+    /// A sample of one light that is everywhere, for those who find light in no other way: as [`Scene::sample_one_light`]. `u` is a point of
+    /// it, and further digits of the first coordinate.
+    #[inline(always)]
+    pub fn sample_one<R: Real>(
+        &self,
+        scene: &Scene,
+        position: usize,
+        active: R::Mask,
+        receiver: &Receiver<R>,
+        u: [R; 3],
+    ) -> LaneLightSample<R> {
+        self.elsewhere[position].sample(scene, active, receiver, u, Sampling::LightsOnly)
+    }
+
     /// The density per unit solid angle with which [`LaneLights::sample`] with [`Sampling::Mis`] would have chosen what a ray met: the point
     /// of triangle `primitive` of the geometry with the id `entry`. 0 for what it never chooses.
     #[inline(always)]
@@ -260,6 +279,19 @@ impl LaneLights {
     /// The number of lights that rays meet which leave the scene.
     pub fn infinite_count(&self) -> usize {
         self.infinite.len()
+    }
+
+    /// The radiance of one of the [`LaneLights::infinite_count`] infinite lights along a unit direction from a receiver.
+    #[inline(always)]
+    pub fn background<R: Real>(
+        &self,
+        scene: &Scene,
+        position: usize,
+        active: R::Mask,
+        receiver: &Receiver<R>,
+        direction: V3<R>,
+    ) -> V3<R> {
+        self.elsewhere[self.infinite[position] as usize].escaped(scene, active, receiver, direction).0
     }
 
     /// The radiance of one of the [`LaneLights::infinite_count`] infinite lights along a unit direction, and the density with which
