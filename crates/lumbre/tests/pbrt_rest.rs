@@ -111,7 +111,8 @@ fn faults(path: &Path, rows: &[Row], spp: u32) -> Vec<String> {
             let own = (variance / count).sqrt();
             let allowed =
                 (row.tolerance * row.mean[c].abs()).max(3.0 * (row.error[c].powi(2) + own * own).sqrt());
-            if !((mean - row.mean[c]).abs() <= allowed + 1e-9) {
+            let is_near = (mean - row.mean[c]).abs() <= allowed + 1e-9;
+            if !is_near {
                 let channel = ["red", "green", "blue"][c];
                 faults.push(format!(
                     "{}, {channel}: {mean:.6}, standard error {own:.6}; expected {}",
