@@ -13,7 +13,27 @@ use lumbre::Scene;
 use lumbre::formats::{Budget, Diagnostics, Limits, pbrt};
 
 /// Scenes that are not as expected yet. One that is has to be taken off.
-const NOT_YET: &[&str] = &[];
+const NOT_YET: &[&str] = &[
+    "camera-realistic-sky",
+    "caustic-ball",
+    "caustic-pool",
+    "curve-arc",
+    "curve-bspline",
+    "curve-cylinder-lit",
+    "curve-flat-area",
+    "curve-flat-lit",
+    "curve-taper",
+    "dispersion-prism",
+    "film-sensor-canon",
+    "hair-furnace-white",
+    "hair-lit-above",
+    "hair-lit-front",
+    "measured-lit",
+    "measured-sky",
+    // Negative lanes and reflectances above 1 are clipped; saturated colours are 0.45 % off.
+    "spectra-metals",
+    "spectra-reflectance",
+];
 
 /// A part of a picture.
 struct Row {
@@ -78,6 +98,11 @@ fn faults(path: &Path, rows: &[Row], spp: u32) -> Vec<String> {
         Ok(desc) => desc,
         Err(error) => return vec![error.to_string()],
     };
+    // A picture may be right because what is left out cannot be seen.
+    let warnings = diagnostics.lines();
+    if !warnings.is_empty() {
+        return warnings;
+    }
     let scene = match Scene::from_description(desc) {
         Ok(scene) => scene,
         Err(error) => return vec![error.to_string()],
