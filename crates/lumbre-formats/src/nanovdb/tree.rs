@@ -180,7 +180,11 @@ pub(super) fn read(bytes: Bytes<'_>, values: Values, budget: &Budget) -> Result<
             return Err(wrong.found(level.met).expected(level.count).into());
         }
     }
-    Ok(NanoGrid { grid, world_bounds: world_bounds(&world_from_index, reader.bounds) })
+    let world_bounds = world_bounds(&world_from_index, reader.bounds);
+    if !world_bounds.iter().all(|corner| corner.is_finite()) {
+        return Err(bytes.fault(root, "a grid whose map makes it endless").into());
+    }
+    Ok(NanoGrid { grid, world_bounds })
 }
 
 /// World from index space.

@@ -11,6 +11,7 @@ pub(crate) mod gltf_meshopt;
 pub(crate) mod ies;
 pub(crate) mod image;
 pub(crate) mod mesh_kinds;
+pub(crate) mod nanovdb;
 pub(crate) mod obj;
 pub(crate) mod pbrt;
 pub(crate) mod ply;
@@ -38,7 +39,7 @@ fn read_both_ways<T>(
 type Check = fn(&[u8]);
 
 /// What reads each kind of file, by the name of its fuzz target.
-pub(crate) const CHECKS: [(&str, Check); 12] = [
+pub(crate) const CHECKS: [(&str, Check); 13] = [
     ("gltf", gltf::run),
     ("gltf_buffer", gltf_buffer::run),
     ("gltf_draco", gltf_draco::run),
@@ -47,6 +48,7 @@ pub(crate) const CHECKS: [(&str, Check); 12] = [
     ("ies", ies::run),
     ("image", image::run),
     ("mesh_kinds", mesh_kinds::run),
+    ("nanovdb", nanovdb::run),
     ("obj", obj::run),
     ("pbrt", pbrt::run),
     ("ply", ply::run),
