@@ -74,12 +74,12 @@ impl Accel {
     /// passes 1.1, and build again where it is still more than 1.5 then: with more than a few rays for every primitive, queries lose
     /// more time than that takes.
     ///
-    /// Where an instance was opened (see [`Preset::Balanced`]) and its new tree has other nodes, it is whole again, until a tree
-    /// comes that has these nodes.
+    /// Where an instance was opened (see [`Preset::Balanced`](crate::Preset::Balanced)) and its new tree has other nodes, it is whole
+    /// again, until a tree comes that has these nodes.
     ///
-    /// Trees that hold this one as an instance are to be refitted after it, from the inside out. It is no part of
-    /// them: they hold it in an [`Arc`](std::sync::Arc), which [`Arc::get_mut`](std::sync::Arc::get_mut) opens only for its
-    /// one owner.
+    /// Where an instance or a clone shares the tree, a copy is refitted, and they keep the old one. So trees that hold this one as an
+    /// instance are to be refitted after it, with its new [`Accel::instance`], from the inside out. To save the copy, drop the others
+    /// first.
     ///
     /// # Errors
     /// [`RefitError`] when the geometries are not sound, or not of the same kinds and sizes, or something that has no place

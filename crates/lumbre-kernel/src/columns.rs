@@ -151,7 +151,7 @@ impl HitColumns {
         self.id[i] != Self::MISS && (self.geometry[i] & WHOLE == 0 || self.geometry[i] & PLAIN != 0)
     }
 
-    /// The whole hit of a ray, as [`Accel::surface`] and its like take it.
+    /// The whole hit of a ray, as [`Accel::surface`](crate::Accel::surface) and its like take it.
     pub fn to_hit(&self, i: usize) -> Option<Hit> {
         let (id, geometry) = (self.id[i], self.geometry[i]);
         if id == Self::MISS {

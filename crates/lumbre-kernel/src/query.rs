@@ -48,7 +48,7 @@ impl<'q> Query<'q> {
     }
 
     /// Only geometry whose mask shares a bit with `mask`, and in instances only where theirs does, too: see
-    /// [`Accel::with_masks`]. `u32::MAX` takes all geometry, even that with a mask of zero.
+    /// [`Accel::with_masks`](crate::Accel::with_masks). `u32::MAX` takes all geometry, even that with a mask of zero.
     #[must_use]
     pub fn mask(self, mask: u32) -> Self {
         Self { mask, ..self }
