@@ -3,7 +3,7 @@
 use lumbre_image::Rgb;
 
 use crate::film::pixel::Sums;
-use crate::film::{FeatureSample, FeatureSums, GuideSums, Pixel, PixelBounds, Tint};
+use crate::film::{ExactSum, FeatureSample, FeatureSums, GuideSums, Pixel, PixelBounds, Tint};
 
 /// How radiance becomes the colour of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,6 +21,12 @@ impl Default for Exposure {
 }
 
 impl Exposure {
+    /// Whether a sample is finite, and brighter than a sum of samples holds: it is added as bright as that.
+    pub fn clamps(&self, sample: &Sample) -> bool {
+        let most = f64::from(self.colour(sample.radiance).max_component());
+        most.is_finite() && !ExactSum::holds(most * sample.weight)
+    }
+
     /// The colour that a sample of this radiance adds.
     pub fn colour(&self, radiance: Rgb) -> Rgb {
         let colour = radiance * self.factor;
