@@ -230,3 +230,22 @@ fn only_scripts_and_pictures_of_lumbre_are_replaced() {
     );
     done(&folder, "farm slurm scene.pbrt --tasks 2 -o other.exr");
 }
+
+#[test]
+fn an_image_behind_the_picture_is_named_to_the_merge() {
+    let folder = folder();
+    done(&folder, "farm slurm scene.pbrt --tasks 2 --spp 2 -o a.png -- --env none --background wood.png");
+    for task in ["0", "1"] {
+        let mut command = Command::new(folder.path("scene.farm/render.sh"));
+        assert!(command.env("SLURM_ARRAY_TASK_ID", task).output().unwrap().status.success());
+    }
+    assert!(Command::new(folder.path("scene.farm/merge.sh")).output().unwrap().status.success());
+    done(&folder, "render scene.pbrt --spp 2 -o b.png --env none --background wood.png");
+    assert_eq!(bytes(&folder, "a.png"), bytes(&folder, "b.png"));
+}
+
+#[test]
+fn logs_are_in_no_folder_whose_name_slurm_would_read_otherwise() {
+    let folder = folder();
+    refused(&folder, r"farm slurm scene.pbrt --tasks 2 --folder a\b", 2, "expected --folder with one without backslashes");
+}

@@ -61,6 +61,9 @@ impl Moments {
     }
 }
 
+/// Times the kurtosis: so many samples tell a mean.
+const KNOWN: f64 = 8.0;
+
 impl Known {
     /// `None` where there are fewer than two samples.
     pub(crate) fn of(pixel: &Pixel) -> Option<Self> {
@@ -123,8 +126,10 @@ impl Spread {
         let own = self.expectation();
         let (n, k) = (self.samples, wider.kurtosis);
         let mean = |own: f64, wider: f64| if n + k > 0.0 { (n * own + k * wider) / (n + k) } else { 0.0 };
+        // Of a few samples of rare light, those are bright that have met it, and all others dark: no mean is taken of them.
+        let is_known = n >= KNOWN * k && n > 0.0;
         Expectation {
-            mean: mean(own.mean, wider.mean),
+            mean: if is_known { own.mean } else { wider.mean },
             variance: mean(own.variance, wider.variance),
             kurtosis: mean(own.kurtosis, wider.kurtosis),
         }

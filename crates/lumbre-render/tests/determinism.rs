@@ -190,10 +190,11 @@ fn samples_that_are_no_numbers_are_dropped_counted_and_named() {
 }
 
 /// Finite light that is brighter than a sum of samples holds.
+#[derive(Debug)]
 struct Blinding;
 
 impl RayIntegrator for Blinding {
-    fn estimate(&self, _: &Scene, _: &Sight, _: &Draw, _: &mut Record) -> Spectrum {
+    fn radiance(&self, _: &Scene, _: &View, _: Sight<'_>, _: &Draw, _: &mut Record) -> Spectrum {
         Spectrum::splat(1e19)
     }
 }
