@@ -145,11 +145,8 @@ fn slurm(arguments: &SlurmArguments) -> Result<(), Failure> {
         head("lumbre"),
         quoted(&format!("{logs}/%a.log"))
     );
-    let merge = format!(
-        "{}#SBATCH --output={}\n{start}{merge}",
-        head("merge"),
-        quoted(&format!("{logs}/merge.log"))
-    );
+    let merge =
+        format!("{}#SBATCH --output={}\n{start}{merge}", head("merge"), quoted(&format!("{logs}/merge.log")));
     let submit = format!(
         "{MARK}set -eu\ncd {}\njob=$(sbatch --parsable {})\nsbatch --parsable --dependency=afterok:\"${{job%%;*}}\" {}\n",
         quoted(&names.here),

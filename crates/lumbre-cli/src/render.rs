@@ -761,15 +761,7 @@ fn picture(
     if !arguments.quiet {
         replaced.iter().for_each(Replaced::say);
         let name = if is_piped { "standard output".into() } else { output.display().to_string() };
-        summary(
-            arguments.verbose,
-            &options.stop,
-            &scene,
-            &picture,
-            &name,
-            render_time,
-            denoised,
-        );
+        summary(arguments.verbose, &options.stop, &scene, &picture, &name, render_time, denoised);
     }
     Ok(())
 }

@@ -115,7 +115,12 @@ pub(crate) fn summary(
         format!("a coarse picture of {}", counted(stats.samples, "sample"))
     };
     let missed = missed(stats, stop).map_or_else(String::new, |missed| format!("; {missed}"));
-    say!("{output}: {}x{}, {samples}, {}{denoised}{missed}", image.width(), image.height(), spoken(render_time));
+    say!(
+        "{output}: {}x{}, {samples}, {}{denoised}{missed}",
+        image.width(),
+        image.height(),
+        spoken(render_time)
+    );
     if verbose {
         let rays = stats.rays;
         let total = rays.camera + rays.bounce + rays.shadow;

@@ -247,5 +247,10 @@ fn an_image_behind_the_picture_is_named_to_the_merge() {
 #[test]
 fn logs_are_in_no_folder_whose_name_slurm_would_read_otherwise() {
     let folder = folder();
-    refused(&folder, r"farm slurm scene.pbrt --tasks 2 --folder a\b", 2, "expected --folder with one without backslashes");
+    refused(
+        &folder,
+        r"farm slurm scene.pbrt --tasks 2 --folder a\b",
+        2,
+        "expected --folder with one without backslashes",
+    );
 }

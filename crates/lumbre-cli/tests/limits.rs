@@ -159,7 +159,10 @@ fn peak(folder: &Folder, arguments: &[&str]) -> Option<u64> {
         return None;
     }
     let mut command = Command::new(time);
-    command.args(["-f", "peak %M", env!("CARGO_BIN_EXE_lumbre")]).args(arguments).current_dir(folder.path(""));
+    command
+        .args(["-f", "peak %M", env!("CARGO_BIN_EXE_lumbre")])
+        .args(arguments)
+        .current_dir(folder.path(""));
     let (status, said) = answer(command.output().unwrap());
     assert_eq!(status, 0, "{arguments:?}: {said}");
     let last = said.lines().rev().find_map(|line| line.strip_prefix("peak "));

@@ -153,7 +153,8 @@ mod tests {
         let looks: Vec<usize> = (1..200).filter(|&count| lax.is_done(3, 2, &alternating(count))).collect();
         assert_eq!(looks, [16, 24, 32, 48, 64, 96, 128, 192]);
         let patient = Adaptive { min_spp: 50, ..lax };
-        let looks: Vec<usize> = (1..200).filter(|&count| patient.is_done(3, 2, &alternating(count))).collect();
+        let looks: Vec<usize> =
+            (1..200).filter(|&count| patient.is_done(3, 2, &alternating(count))).collect();
         assert_eq!(looks, [50, 64, 96, 128, 192]);
         let mut next = vec![patient.next_look(0)];
         while next.len() < 5 {

@@ -467,7 +467,7 @@ impl Job<'_> {
                 if first_dropped.len() < REMEMBERED {
                     first_dropped.push(DroppedSample { x, y, sample: index });
                 }
-            } else if self.options.exposure.clamps(&sample) {
+            } else if self.options.exposure.clamps(sample.radiance) {
                 *clamped += 1;
             }
         });

@@ -214,9 +214,12 @@ mod tests {
         values.iter().for_each(|&value| moments.add(value));
         let mean = values.iter().sum::<f64>() / 7.0;
         let power = |p| values.iter().map(|v| (v - mean).powi(p)).sum::<f64>();
-        for (found, expected) in
-            [(moments.mean, mean), (moments.second, power(2)), (moments.third, power(3)), (moments.fourth, power(4))]
-        {
+        for (found, expected) in [
+            (moments.mean, mean),
+            (moments.second, power(2)),
+            (moments.third, power(3)),
+            (moments.fourth, power(4)),
+        ] {
             assert!((found - expected).abs() < 1e-12 * expected.abs(), "{found} {expected}");
         }
     }

@@ -102,7 +102,11 @@ mod tests {
             let expected = ((1.0 - share) / share / f64::from(n)).sqrt() / (1.1 * 1.1);
             let noise = found(n, share, bright);
             println!("{n} {share}: {noise} {expected}");
-            assert!((noise / expected - 1.0).abs() < 0.35, "{n} samples, 1 in {}: {noise} {expected}", 1.0 / share);
+            assert!(
+                (noise / expected - 1.0).abs() < 0.35,
+                "{n} samples, 1 in {}: {noise} {expected}",
+                1.0 / share
+            );
         }
     }
 }

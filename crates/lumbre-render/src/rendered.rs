@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::film::{ExactSum, Extras, FeatureSums, GuideSums, Pixel, PixelBounds, Tile};
+use crate::film::{Extras, FeatureSums, GuideSums, MAX_SAMPLE, Pixel, PixelBounds, Tile};
 use crate::transport::{Feature, RayCounts};
 use lumbre_image::{Image, Rgb};
 
@@ -45,7 +45,7 @@ pub struct Stats {
     pub rays: RayCounts,
     /// Samples that were not finite, and are not in the picture.
     pub dropped: u64,
-    /// Samples that were brighter than a sum of them holds (about 10¹²), and are in the picture as bright as that.
+    /// Samples that were brighter than [`Stats::MAX_SAMPLE`], and are in the picture as bright as that.
     pub clamped: u64,
     /// The first of those that were dropped.
     pub first_dropped: Vec<DroppedSample>,
@@ -65,7 +65,7 @@ pub struct Stats {
 
 impl Stats {
     /// The most that a sample counts for: see [`Stats::clamped`].
-    pub const MAX_SAMPLE: f64 = ExactSum::LIMIT;
+    pub const MAX_SAMPLE: f64 = MAX_SAMPLE;
 
     /// Whether a noise was asked for, and that of the picture is above it, or not known.
     pub fn misses_noise_target(&self) -> bool {

@@ -74,8 +74,8 @@ impl Trial {
                     if cancel.is_cancelled() || is_over(1) {
                         return;
                     }
-                    let samples = (0..small.width)
-                        .flat_map(|x| (first..first + SPP).map(move |index| (x, index)));
+                    let samples =
+                        (0..small.width).flat_map(|x| (first..first + SPP).map(move |index| (x, index)));
                     let ids: Vec<SampleId> =
                         samples.map(|(x, index)| SampleId { x, y: row.y, index }).collect();
                     taker.take(&mut wave, &ids, &mut Record::default(), |id, sample| {

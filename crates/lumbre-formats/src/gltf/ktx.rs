@@ -158,4 +158,3 @@ fn in_words(error: &basisu::Error) -> String {
         _ => "what the decoder does not read".to_owned(),
     }
 }
-

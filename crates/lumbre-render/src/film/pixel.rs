@@ -23,27 +23,25 @@ pub struct Pixel {
     pub taken: u32,
 }
 
+/// The largest component that a sample counts for: half of what a sum holds, for the weights of filters that are more than 1.
+pub(crate) const MAX_SAMPLE: f64 = ExactSum::LIMIT / 2.0;
+
 /// Luminance up to which noise is told apart.
 pub(crate) const MAX_LUMINANCE: f64 = 1e6;
 
-/// What makes the largest of some numbers as large as a sum holds.
-fn scale_of(weighted: [f64; 3]) -> f64 {
-    ExactSum::LIMIT / weighted.into_iter().map(f64::abs).fold(0.0, f64::max)
-}
-
 impl Pixel {
     /// Adds a sample, whose colour is multiplied by its coverage. False, and nothing is added, where it is not finite. One that is brighter
-    /// than a sum holds is added as bright as one holds, in its hue ([`ExactSum::LIMIT`]).
+    /// than [`MAX_SAMPLE`] is added as bright as that, in its hue.
     pub fn add(&mut self, colour: Rgb, coverage: f32, weight: f64) -> bool {
-        let weighted = colour.to_array().map(|channel| weight * f64::from(channel));
+        let most = colour.to_array().into_iter().map(|channel| f64::from(channel.abs())).fold(0.0, f64::max);
+        let scale = if most > MAX_SAMPLE { weight * (MAX_SAMPLE / most) } else { weight };
+        let weighted = colour.to_array().map(|channel| scale * f64::from(channel));
         let covered = weight * f64::from(coverage);
-        let is_held = [weight, covered].into_iter().all(ExactSum::holds);
-        if !is_held || !weighted.into_iter().all(f64::is_finite) {
+        if !colour.is_finite() || ![weight, covered].into_iter().chain(weighted).all(ExactSum::holds) {
             return false;
         }
-        let scale = if weighted.into_iter().all(ExactSum::holds) { 1.0 } else { scale_of(weighted) };
         for (sum, number) in self.sum.iter_mut().zip(weighted) {
-            sum.add(scale * number);
+            sum.add(number);
         }
         self.covered.add(covered);
         self.weight.add(weight);
@@ -253,10 +251,10 @@ mod tests {
 
     #[test]
     fn what_is_brighter_than_a_sum_holds_is_as_bright_in_its_hue() {
-        let most = ExactSum::LIMIT as f32;
+        let most = MAX_SAMPLE as f32;
         for bright in [2.0 * most, 1e18, 1e19, f32::MAX] {
             let mut pixel = Pixel::default();
-            assert!(pixel.add(Rgb::new(0.5 * bright, bright, 0.0), 1.0, 1.0));
+            assert!(pixel.add(Rgb::new(0.5 * bright, bright, 0.0), 1.0, 1.25));
             assert_eq!(pixel.colour(), Rgb::new(0.5 * most, most, 0.0), "{bright}");
             assert_eq!((pixel.samples, pixel.coverage()), (1, 1.0));
         }

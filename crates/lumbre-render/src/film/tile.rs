@@ -2,8 +2,8 @@
 
 use lumbre_image::Rgb;
 
-use crate::film::pixel::Sums;
-use crate::film::{ExactSum, FeatureSample, FeatureSums, GuideSums, Pixel, PixelBounds, Tint};
+use crate::film::pixel::{MAX_SAMPLE, Sums};
+use crate::film::{FeatureSample, FeatureSums, GuideSums, Pixel, PixelBounds, Tint};
 
 /// How radiance becomes the colour of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,10 +21,9 @@ impl Default for Exposure {
 }
 
 impl Exposure {
-    /// Whether a sample is finite, and brighter than a sum of samples holds: it is added as bright as that.
-    pub fn clamps(&self, sample: &Sample) -> bool {
-        let most = f64::from(self.colour(sample.radiance).max_component());
-        most.is_finite() && !ExactSum::holds(most * sample.weight)
+    /// Whether a sample of this radiance is brighter than any counts for: it is added as bright as that.
+    pub fn clamps(&self, radiance: Rgb) -> bool {
+        f64::from(self.colour(radiance).max_component()) > MAX_SAMPLE
     }
 
     /// The colour that a sample of this radiance adds.
