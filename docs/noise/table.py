@@ -13,7 +13,6 @@ import subprocess
 import tempfile
 import time
 
-TARGET = 0.05
 MATT = 'Material "diffuse" "rgb reflectance" [.6 .6 .6]\n'
 ROOM = """AttributeBegin
 ReverseOrientation
@@ -51,23 +50,23 @@ def walls(side):
     return MATT + "".join(quad.format(corners) for corners in low + high)
 
 
-# Pixels across, samples of each reference, and the world. Hard ones are small, so that their references end.
+# Pixels across, samples of each reference, the target, and the world. Hard ones are small and have a higher target, so that they end.
 SCENES = {
-    "plain sphere": (96, 4096, 'LightSource "infinite" "rgb L" [1 1 1]\n' + MATT + FLOOR + BALL),
-    "cornell": (96, 4096, walls(0) + 'AttributeBegin\nAreaLightSource "diffuse" "rgb L" [15 15 15]\nTranslate 0 0 2.99\nRotate 180 1 0 0\n'
+    "plain sphere": (64, 512, 0.05, 'LightSource "infinite" "rgb L" [1 1 1]\n' + MATT + FLOOR + BALL),
+    "cornell": (64, 512, 0.05, walls(0) + 'AttributeBegin\nAreaLightSource "diffuse" "rgb L" [15 15 15]\nTranslate 0 0 2.99\nRotate 180 1 0 0\n'
         'Shape "disk" "float radius" .5\nAttributeEnd\n' + BALL),
-    "lamp behind others": (96, 4096, lamp(400, "0 0 4", 0.05) + lamp(40000, "0 0 -3", 0.05) + MATT + FLOOR + BALL),
-    "bright texels": (96, 4096, 'LightSource "infinite" "string filename" "sky.pfm"\n' + MATT + FLOOR + BALL),
-    "wires": (96, 4096, 'LightSource "infinite" "rgb L" [.3 .3 .3]\n' + MATT + FLOOR + "".join(
+    "lamp behind others": (64, 512, 0.05, lamp(400, "0 0 4", 0.05) + lamp(40000, "0 0 -3", 0.05) + MATT + FLOOR + BALL),
+    "bright texels": (64, 512, 0.05, 'LightSource "infinite" "string filename" "sky.pfm"\n' + MATT + FLOOR + BALL),
+    "wires": (64, 512, 0.05, 'LightSource "infinite" "rgb L" [.3 .3 .3]\n' + MATT + FLOOR + "".join(
         f'AttributeBegin\nAreaLightSource "diffuse" "rgb L" [60 60 60]\nTranslate {x} 0 .8\nRotate 90 0 1 0\n'
         'Shape "cylinder" "float radius" .004 "float zmin" -.3 "float zmax" .3\nAttributeEnd\n' for x in (-1, 0, 1))),
-    "glossy interreflection": (96, 4096, lamp(60, "0 -1 2.5", 0.2) + 'Material "conductor" "float roughness" .05\n' + FLOOR + BALL),
-    "slit": (48, 16384, walls(0.02) + lamp(2000, "0 -1 4.5", 0.3) + BALL),
-    "door ajar": (48, 16384, walls(0.15) + 'LightSource "infinite" "rgb L" [1 1 1]\n' + BALL),
-    "dark room, environment": (48, 16384, walls(0.6) + 'LightSource "infinite" "string filename" "sky.pfm"\n' + BALL),
-    "ball": (48, 16384, lamp(200, "0 -1 2.5", 0.1) + MATT + FLOOR + glass("0 0 .6", 0.6)),
-    "bulb": (24, 65536, lamp(300, "0 0 1.6", 0.08) + glass("0 0 1.6", 0.3) + glass("0 0 1.6", 0.28) + MATT + FLOOR),
-    "caustic": (24, 65536, 'LightSource "infinite" "rgb L" [.02 .02 .02]\n' + lamp(1000, "0 -1 2.5", 0.1) + glass("0 -1 2.5", 0.24) + MATT + FLOOR),
+    "glossy interreflection": (64, 512, 0.05, lamp(60, "0 -1 2.5", 0.2) + 'Material "conductor" "float roughness" .05\n' + FLOOR + BALL),
+    "slit": (32, 2048, 0.1, walls(0.02) + lamp(2000, "0 -1 4.5", 0.3) + BALL),
+    "door ajar": (32, 2048, 0.1, walls(0.15) + 'LightSource "infinite" "rgb L" [1 1 1]\n' + BALL),
+    "dark room, environment": (32, 2048, 0.1, walls(0.6) + 'LightSource "infinite" "string filename" "sky.pfm"\n' + BALL),
+    "ball": (32, 2048, 0.1, lamp(200, "0 -1 2.5", 0.1) + MATT + FLOOR + glass("0 0 .6", 0.6)),
+    "bulb": (16, 8192, 0.2, lamp(300, "0 0 1.6", 0.08) + glass("0 0 1.6", 0.3) + glass("0 0 1.6", 0.28) + MATT + FLOOR),
+    "caustic": (16, 16384, 0.2, 'LightSource "infinite" "rgb L" [.02 .02 .02]\n' + lamp(1000, "0 -1 2.5", 0.1) + glass("0 -1 2.5", 0.24) + MATT + FLOOR),
 }
 HEAD = """LookAt 0 -3.8 1  0 0 .7  0 0 1
 Camera "perspective" "float fov" 45
@@ -117,9 +116,9 @@ def main():
     parser.add_argument("--most", type=float, default=600, help="seconds for a picture to the target")
     parser.add_argument("scenes", nargs="*")
     arguments = parser.parse_args()
-    print("| scene | size | samples a pixel | said | true error | s | denoised | s | as many samples everywhere | s |")
-    print("|---|---|---|---|---|---|---|---|---|---|")
-    for name, (width, spp, world) in SCENES.items():
+    print("| scene | size | target | samples a pixel | said | true error | s | denoised | s | as many samples everywhere | s |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|")
+    for name, (width, spp, target, world) in SCENES.items():
         if arguments.scenes and name not in arguments.scenes:
             continue
         height = width * 3 // 4
@@ -136,14 +135,14 @@ def main():
                 square = mean(((a - b) / s) ** 2 for a, b, s in zip(picture, reference, scale))
                 return math.sqrt(max(square - own, 0.0))
 
-            to_target = ("--noise", TARGET, "--time", f"{arguments.most}s")
+            to_target = ("--noise", target, "--time", f"{arguments.most}s")
             picture, stats, seconds = run(arguments.program, folder, "noise", *to_target)
             denoised, _, denoised_seconds = run(arguments.program, folder, "denoised", *to_target, "--denoise")
             each = stats["rays"]["camera"] / (width * height)
             plain, _, plain_seconds = run(arguments.program, folder, "plain", "--spp", max(round(each), 1))
             said = f"{stats['noise']:.3f}" + ("" if stats["noise_target_met"] else ", not met")
             print(
-                f"| {name} | {width}x{height} | {stats['spp']} to {stats['most_spp']}, mean {each:.0f} | {said} | {error(picture):.3f} | {seconds:.1f} "
+                f"| {name} | {width}x{height} | {target} | {stats['spp']} to {stats['most_spp']}, mean {each:.0f} | {said} | {error(picture):.3f} | {seconds:.1f} "
                 f"| {error(denoised):.3f} | {denoised_seconds:.1f} | {error(plain):.3f} | {plain_seconds:.1f} |",
                 flush=True,
             )

@@ -24,7 +24,7 @@ const MAX_SPP: u32 = 1 << 14;
 const SHARE: f64 = 1.0 / 32.0;
 /// The share of the time of a render that it may take to be continued.
 const SHARE_OF_TIME: u32 = 8;
-/// Rare light is looked for in each pixel until it is to be expected once in so many times its samples.
+/// A pixel may end when it has this share of the samples in which rare light is to be expected once.
 const HARDNESS: f64 = 0.25;
 /// The fewest samples of a pixel before its noise is looked at.
 const MIN_SPP: u32 = 16;
