@@ -5,13 +5,15 @@ use crate::film::{PixelBounds, Tile};
 use crate::neighbourhoods::{Known, Neighbourhoods, Spread};
 use crate::rendered::put_together;
 
+/// So few bright samples tell no mean.
+const FEW: f64 = 2.0;
 /// Cells along the longer side of the grid of neighbourhoods.
 const SIDE: u32 = 256;
 
 /// The noise of the tiles of a picture, as [`crate::Stop::noise`] defines it; `None` where no pixel has two samples.
 ///
 /// A pixel of n samples with light in one of them has an error as large as its luminance, and knows not how rare that light is. So the
-/// luminance that its error is measured against is that of its neighbourhood, as far as that is less. And light that the trial has met, and
+/// luminance that its error is measured against is that of its neighbourhood, as far as that is less and its own is in doubt. And light that the trial has met, and
 /// these pixels not yet, counts as far as they have too few samples for it.
 pub(crate) fn noise<'t>(
     tiles: impl Iterator<Item = &'t Tile>,
@@ -48,7 +50,9 @@ pub(crate) fn noise<'t>(
         let Some(known) = *known else { continue };
         let Known { samples: n, mean: luminance, error } = known;
         let around = Spread::of_pixel(known).within(neighbourhoods.at(x, y)).mean;
-        squares += relative(error * error, luminance.min(around));
+        // Of one or two bright samples the mean says nothing; of twenty it does, as at the edge of a lamp.
+        let doubt = (FEW * (error / luminance.max(f64::MIN_POSITIVE)).powi(2)).min(1.0);
+        squares += relative(error * error, luminance - doubt * (luminance - around).max(0.0));
         if let Some(adaptive) = adaptive {
             let trial = adaptive.expectation(bounds.x0 + x, bounds.y0 + y);
             expected += relative(trial.variance / n, around.max(trial.mean));
@@ -108,5 +112,23 @@ mod tests {
                 1.0 / share
             );
         }
+    }
+
+    #[test]
+    fn the_edge_of_a_lamp_beside_the_dark_is_not_taken_for_rare_light() {
+        // The left column is half covered by a lamp of 30; all else is 0.1, without noise.
+        let bounds = PixelBounds::whole(64, 48);
+        let mut tile = Tile::new(bounds, EXTRAS);
+        for (x, y) in bounds.pixels() {
+            for k in 0..256 {
+                let radiance = Rgb::splat(if x == 0 && k % 2 == 0 { 30.0 } else { 0.1 });
+                let sample =
+                    Sample { radiance, coverage: Rgb::WHITE, weight: 1.0, features: None, on_catcher: false };
+                assert!(tile.add(x, y, &sample, &Exposure::default()));
+            }
+        }
+        // An error of 15 / 16 beside a mean of 15, in one pixel of 64.
+        let noise = noise([&tile].into_iter(), bounds, None).unwrap();
+        assert!((0.0075..0.0083).contains(&noise), "{noise}");
     }
 }
