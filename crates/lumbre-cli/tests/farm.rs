@@ -234,13 +234,13 @@ fn only_scripts_and_pictures_of_lumbre_are_replaced() {
 #[test]
 fn an_image_behind_the_picture_is_named_to_the_merge() {
     let folder = folder();
-    done(&folder, "farm slurm scene.pbrt --tasks 2 --spp 2 -o a.png -- --env none --background wood.png");
+    done(&folder, "farm slurm scene.pbrt --tasks 2 --spp 2 -o a.png -- --background wood.png");
     for task in ["0", "1"] {
         let mut command = Command::new(folder.path("scene.farm/render.sh"));
         assert!(command.env("SLURM_ARRAY_TASK_ID", task).output().unwrap().status.success());
     }
     assert!(Command::new(folder.path("scene.farm/merge.sh")).output().unwrap().status.success());
-    done(&folder, "render scene.pbrt --spp 2 -o b.png --env none --background wood.png");
+    done(&folder, "render scene.pbrt --spp 2 -o b.png --background wood.png");
     assert_eq!(bytes(&folder, "a.png"), bytes(&folder, "b.png"));
 }
 

@@ -530,7 +530,7 @@ fn merge_opens_no_image_that_only_a_part_names() {
     for (samples, name) in [("0..2", "a.part"), ("2..3", "b.part")] {
         done(
             &folder,
-            &format!("render scene.pbrt -q -o {name} --samples {samples} --env none --background wood.png"),
+            &format!("render scene.pbrt -q -o {name} --samples {samples} --background wood.png"),
         );
     }
     let merge = "merge a.part b.part -o joined.png";
@@ -538,7 +538,7 @@ fn merge_opens_no_image_that_only_a_part_names() {
     refused(&folder, merge, 2, "expected --background with its name");
     assert!(!folder.path("joined.png").exists());
     done(&folder, &format!("{merge} --background wood.png"));
-    done(&folder, "render scene.pbrt -q -o whole.png --spp 3 --env none --background wood.png");
+    done(&folder, "render scene.pbrt -q -o whole.png --spp 3 --background wood.png");
     assert_eq!(bytes(&folder, "joined.png"), bytes(&folder, "whole.png"));
     refused(&folder, "merge a.part b.part -o wood.png --background wood.png", 2, "wood.png");
     // What needs no picture needs no image.
@@ -548,6 +548,6 @@ fn merge_opens_no_image_that_only_a_part_names() {
     part.job.shown.insert("background".to_owned(), "file /dev/zero".to_owned());
     part.save(&folder.path("foreign.part")).unwrap();
     refused(&folder, "merge foreign.part -o x.png", 2, "the image /dev/zero, which is not opened unasked");
-    done(&folder, "render scene.pbrt -q -o plain.part --samples 0..1 --env none --background #fa0");
+    done(&folder, "render scene.pbrt -q -o plain.part --samples 0..1 --background #fa0");
     refused(&folder, "merge plain.part -o x.png --background wood.png", 2, "stands before no image");
 }
