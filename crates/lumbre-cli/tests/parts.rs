@@ -528,10 +528,7 @@ mod interrupted {
 fn merge_opens_no_image_that_only_a_part_names() {
     let folder = folder();
     for (samples, name) in [("0..2", "a.part"), ("2..3", "b.part")] {
-        done(
-            &folder,
-            &format!("render scene.pbrt -q -o {name} --samples {samples} --background wood.png"),
-        );
+        done(&folder, &format!("render scene.pbrt -q -o {name} --samples {samples} --background wood.png"));
     }
     let merge = "merge a.part b.part -o joined.png";
     refused(&folder, merge, 2, "stands before the image wood.png, which is not opened unasked");
