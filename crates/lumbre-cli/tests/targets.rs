@@ -64,7 +64,7 @@ fn a_noise_that_is_not_reached_is_said_with_the_option_that_goes_on() {
         stats["noise"].as_f64().unwrap() > 0.02 && stats["noisy_pixels"].as_u64().unwrap() > 200,
         "{stats}"
     );
-    let (_, said, _) = run("--noise 0.001 --time 500ms");
+    let (_, said, _) = run("--noise 0.001 --time 3s");
     assert!(said.contains("the target of 0.001 was not met (more --time goes on)"), "{said}");
     // Without an end by number or time it is reached, also by more samples than 1024.
     let (_, said, stats) = run("--noise 0.1");

@@ -71,7 +71,8 @@ impl Trial {
             workers.for_each(&mut rows, |row| {
                 let mut wave = Wave::default();
                 for first in (first..end).step_by(SPP as usize) {
-                    if cancel.is_cancelled() || is_over(1) {
+                    // Half of the time is for the picture.
+                    if cancel.is_cancelled() || is_over(2) {
                         return;
                     }
                     let samples =
