@@ -99,7 +99,83 @@ fn what_cannot_fit_into_memory_is_refused_before_work_begins() {
     });
     world("names.pbrt", &|i| format!("CoordinateSystem \"{i}\"\n"));
     let groups: String = (0..10_000).map(|i| format!("g {i}\nf 1 2 3\n")).collect();
-    folder.write("materials.obj", &of(&|i| format!("usemtl m{i}\nf 1 2 3\n")));
+    folder.write("groups.obj", &format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{groups}"));
+    let (code, said) = folder.lumbre(&["render", "scene.pbrt", "-o", "a.png"]);
+    assert_eq!(code, 0, "{said}");
+    for (option, arguments) in [
+        ("30000", &["render", "scene.pbrt", "-o", "b.png"][..]),
+        ("2G", &["render", "film.pbrt", "-o", "b.png"]),
+        ("2G", &["render", "missing.pbrt", "-o", "b.png", "--size", "20000x20000"]),
+        ("1500k", &["render", "many.pbrt", "-o", "b.png"]),
+        ("1500k", &["info", "many.pbrt"]),
+        ("1500k", &["cast", "many.pbrt", "--rays", "rays.csv"]),
+        ("10k", &["diff", "a.png", "a.png"]),
+        // Lists of everything that a file may have.
+        ("2M", &["info", "shapes.pbrt"]),
+        ("2M", &["info", "materials.pbrt"]),
+        ("2M", &["info", "objects.pbrt"]),
+        ("2M", &["info", "instances.pbrt"]),
+        ("2M", &["info", "numbers.pbrt"]),
+        ("2M", &["info", "names.pbrt"]),
+        ("2M", &["info", "groups.obj"]),
+    ] {
+        let (code, said) = folder.lumbre(&[arguments, &["--max-memory", option]].concat());
+        assert_eq!(code, 5, "{arguments:?}: {said}");
+        assert!(said.contains("needs") && said.contains("--max-memory"), "{arguments:?}: {said}");
+        assert!(!folder.path("b.png").exists());
+    }
+    // A part of such a film fits.
+    let (code, said) = folder.lumbre(&[
+        "render",
+        "film.pbrt",
+        "-o",
+        "b.png",
+        "--crop",
+        "10,20,40,50",
+        "--max-memory",
+        "2G",
+        "-q",
+    ]);
+    assert_eq!((code, &*said), (0, ""));
+    // The system's own limit counts likewise.
+    for arguments in [
+        &["render", "film.pbrt", "-o", "c.png"][..],
+        &["render", "scene.pbrt", "-o", "c.exr", "--size", "9000x7000"],
+    ] {
+        let (code, said) = limited(&folder, &mut Command::new("sh"), "-v 1000000", arguments);
+        assert_eq!(code, 5, "{arguments:?}: {said}");
+        assert!(said.contains("ulimit -v"), "{arguments:?}: {said}");
+    }
+    let (code, said) =
+        limited(&folder, &mut Command::new("sh"), "-v 1000000", &["render", "scene.pbrt", "-q"]);
+    assert_eq!((code, &*said), (0, ""));
+}
+
+/// The largest memory of a command, in KiB; `None` where there is no program that measures it.
+fn peak(folder: &Folder, arguments: &[&str]) -> Option<u64> {
+    let time = Path::new("/usr/bin/time");
+    if !time.is_file() {
+        println!("skipped: no /usr/bin/time");
+        return None;
+    }
+    let mut command = Command::new(time);
+    command
+        .args(["-f", "peak %M", env!("CARGO_BIN_EXE_lumbre")])
+        .args(arguments)
+        .current_dir(folder.path(""));
+    let (status, said) = answer(command.output().unwrap());
+    assert_eq!(status, 0, "{arguments:?}: {said}");
+    let last = said.lines().rev().find_map(|line| line.strip_prefix("peak "));
+    Some(last.unwrap().parse().unwrap())
+}
+
+#[test]
+fn many_shapes_take_32_bytes_for_each_of_their_file_and_64_mib() {
+    let folder = Folder::new();
+    let start = SPHERE.split("Shape").next().unwrap();
+    folder.write("spheres.pbrt", &(start.to_owned() + &"Shape \"sphere\"\n".repeat(300_000)));
+    let faces: String = (0..50_000).map(|i| format!("usemtl m{i}\nf 1 2 3\n")).collect();
+    folder.write("materials.obj", &format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{faces}"));
     for name in ["spheres.pbrt", "materials.obj"] {
         let allowed = (64 << 10) + 32 * fs::metadata(folder.path(name)).unwrap().len() / 1024;
         let Some(peak) = peak(&folder, &["info", name]) else { return };
