@@ -22,7 +22,7 @@ use crate::units::{self, counted};
 pub(crate) struct PartArguments {
     /// Take these samples of every pixel alone, from A to before B, into a part: an .exr, whose picture other programs show, or a
     /// .part. lumbre merge makes of parts, in any order, what one run would have made.
-    #[arg(long, value_name = "A..B", value_parser = samples, conflicts_with_all = ["time", "noise", "denoise", "turntable"])]
+    #[arg(long, value_name = "A..B", value_parser = samples, conflicts_with_all = ["time", "noise", "min_spp", "denoise", "turntable"])]
     samples: Option<Range<u32>>,
     /// Keep the samples in this file while they are taken, to go on from with --resume. Without, a render that takes more than two
     /// minutes keeps them beside its picture, in OUT.checkpoint, until it is done.

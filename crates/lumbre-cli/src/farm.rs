@@ -118,14 +118,15 @@ fn slurm(arguments: &SlurmArguments) -> Result<(), Failure> {
     let here = std::env::current_dir().map_err(|e| Failure::Io(format!("the current folder: {e}")))?;
     let program = std::env::current_exe().map_err(|e| Failure::Io(format!("the program's own name: {e}")))?;
     let names = Names {
-        scene: in_script(&arguments.scene, "%")?,
-        output: in_script(&output, "%")?,
-        folder: in_script(&folder, "%")?,
-        here: in_script(&here, "")?,
-        program: in_script(&program, "")?,
+        scene: in_script(&arguments.scene)?,
+        output: in_script(&output)?,
+        folder: in_script(&folder)?,
+        here: in_script(&here)?,
+        program: in_script(&program)?,
     };
+    let logs = in_pattern(&names.folder)?;
     for option in arguments.sbatch.iter().chain(&arguments.render) {
-        in_script(Path::new(option), "")?;
+        in_script(Path::new(option))?;
     }
     let task = task(arguments, &names)?;
     let (render, merge) = match &arguments.frames {
@@ -142,13 +143,10 @@ fn slurm(arguments: &SlurmArguments) -> Result<(), Failure> {
     let render = format!(
         "{}#SBATCH --array=0-{last}\n#SBATCH --requeue\n#SBATCH --output={}\n{start}{TASK}{render}",
         head("lumbre"),
-        quoted(&format!("{}/%a.log", names.folder))
+        quoted(&format!("{logs}/%a.log"))
     );
-    let merge = format!(
-        "{}#SBATCH --output={}\n{start}{merge}",
-        head("merge"),
-        quoted(&format!("{}/merge.log", names.folder))
-    );
+    let merge =
+        format!("{}#SBATCH --output={}\n{start}{merge}", head("merge"), quoted(&format!("{logs}/merge.log")));
     let submit = format!(
         "{MARK}set -eu\ncd {}\njob=$(sbatch --parsable {})\nsbatch --parsable --dependency=afterok:\"${{job%%;*}}\" {}\n",
         quoted(&names.here),
@@ -215,20 +213,30 @@ fn refuse_others(output: &Path, frames: Option<&Frames>) -> Result<(), Failure> 
     }
 }
 
-/// A name as a script has it: no option, and all on one line. `forbidden` are characters that mean something there.
+/// A folder as Slurm reads it in the pattern of a log's name, where % begins the number of a job, and %% is %. Behind a backslash it
+/// replaces nothing, so that all tasks would have one log.
+///
+/// # Errors
+/// [`Failure::Usage`] for a name with a backslash.
+fn in_pattern(folder: &str) -> Result<String, Failure> {
+    if folder.contains('\\') {
+        let why = "Slurm cannot have logs in a folder of this name (expected --folder with one without backslashes)";
+        return Err(Failure::Usage(format!("{folder}: {why}")));
+    }
+    Ok(folder.replace('%', "%%"))
+}
+
+/// A name as a script has it: no option, and all on one line.
 ///
 /// # Errors
 /// [`Failure::Usage`] for a name that no script can hold.
-fn in_script(path: &Path, forbidden: &str) -> Result<String, Failure> {
-    let name = path.to_str().filter(|name| !name.chars().any(|c| c.is_control() || forbidden.contains(c)));
+fn in_script(path: &Path) -> Result<String, Failure> {
+    let name = path.to_str().filter(|name| !name.chars().any(char::is_control));
     match name {
-        None => {
-            let which = if forbidden.is_empty() { "" } else { " and %" };
-            Err(Failure::Usage(format!(
-                "{}: a job script cannot hold this name (expected one of UTF-8 without line feeds, other control characters{which})",
-                path.display()
-            )))
-        }
+        None => Err(Failure::Usage(format!(
+            "{}: a job script cannot hold this name (expected one of UTF-8 without line feeds and other control characters)",
+            path.display()
+        ))),
         Some("-") => Err(Failure::Usage("-: every task reads the scene (expected a file)".to_owned())),
         Some(name) if name.starts_with('-') => Ok(format!("./{name}")),
         Some(name) => Ok(name.to_owned()),
@@ -310,7 +318,11 @@ fn sample_scripts(
     let parts = format!(
         "set --\ntask=0\nwhile [ \"$task\" -lt {tasks} ]; do\n  set -- \"$@\" {base}\"$task.part\"\n  task=$((task + 1))\ndone\n"
     );
-    let merge = format!("{parts}exec \"$lumbre\" merge \"$@\" -o {}\n", quoted(&names.output));
+    let background = match task.background_file() {
+        Some(path) => format!(" --background {}", quoted(&in_script(path)?)),
+        None => String::new(),
+    };
+    let merge = format!("{parts}exec \"$lumbre\" merge \"$@\" -o {}{background}\n", quoted(&names.output));
     Ok((render, merge))
 }
 

@@ -5,7 +5,7 @@ use std::fmt;
 use std::path::PathBuf;
 
 use clap::Args;
-use lumbre::{CancelToken, Part, Scene, Stage, StageLight};
+use lumbre::{CancelToken, Part, Scene, SceneInfo, Stage};
 use serde_json::json;
 
 use crate::checkpoint::open_part;
@@ -44,20 +44,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let part = open_part(path, arguments.reading.memory())?;
         return print(&about_part(&part, arguments.json));
     }
-    let (desc, mut diagnostics) = arguments.reading.describe(&arguments.scene)?;
+    let (mut desc, mut diagnostics) = arguments.reading.describe(&arguments.scene)?;
     arguments.reading.check_build(&desc, &diagnostics)?;
-    let mut shown = desc.clone();
-    let staged = Stage::default().set(&mut shown);
+    // What is in the file, before it is set on a stage: a model without a camera is measured as `lumbre render` shows it.
+    let mut info = SceneInfo::of(&desc);
+    Stage::default().set(&mut desc);
     let scene = Scene::of_file(desc, &arguments.scene[0], &mut diagnostics)?;
-    let info = scene.info().clone();
-    // A model without a camera is measured as `lumbre render` shows it.
-    let is_staged = staged.framed || staged.grounded || staged.light != StageLight::Own;
-    let scene = if is_staged {
-        drop(scene);
-        Scene::from_description(shown)?
-    } else {
-        scene
-    };
+    (info.bounds, info.memory_bytes) = (scene.info().bounds, scene.info().memory_bytes);
     let predicted = Predicted::of(&scene);
     if arguments.json {
         let animations = info.listing.animations.iter().map(|a| json!({ "name": a.name, "seconds": a.end }));

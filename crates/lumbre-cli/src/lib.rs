@@ -4,6 +4,7 @@
 use std::ffi::OsString;
 
 use clap::{CommandFactory, Parser, Subcommand};
+use lumbre_simd::InstructionSet;
 
 /// Prints a message to standard error, ignoring errors.
 macro_rules! say {
@@ -95,6 +96,10 @@ pub fn run(words: Vec<OsString>) -> u8 {
         Ok(arguments) => arguments,
         Err(status) => return status,
     };
+    if let Err(wrong) = InstructionSet::from_environment() {
+        say!("error: {wrong}");
+        return Failure::Usage(String::new()).status();
+    }
     threads::start();
     let outcome = match arguments.command {
         Command::Render(arguments) => render::run(&arguments),

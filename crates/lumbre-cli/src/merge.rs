@@ -48,6 +48,9 @@ pub(crate) struct Arguments {
     /// Tone mapping, for .png and .jpg, in place of the parts' own, which has to be the same without it.
     #[arg(long, value_name = "NAME", value_parser = one_of(&ToneMap::NAMES, ToneMap::from_name))]
     tonemap: Option<ToneMap>,
+    /// The image behind the picture, of parts that were rendered with --background FILE. No file that only a part names is opened.
+    #[arg(long, value_name = "FILE")]
+    background: Option<PathBuf>,
     /// Bytes of memory that a part may take. By default 64 MiB and 32 for each byte of its file.
     #[arg(long, value_name = "SIZE", value_parser = units::bytes)]
     max_memory: Option<u64>,
@@ -99,7 +102,7 @@ fn frame_of(part: &Part) -> Option<u32> {
 
 /// Joins parts of one picture, of at least so many samples.
 fn merge(arguments: &Arguments, parts: &[PathBuf], output: &Path, spp: u32) -> Result<(), Failure> {
-    Inputs::of(arguments.parts.iter().map(PathBuf::as_path)).refuse(output)?;
+    Inputs::of(arguments.parts.iter().chain(&arguments.background).map(PathBuf::as_path)).refuse(output)?;
     probe_writable(output).map_err(|e| Failure::from(lumbre::Error::from(e)))?;
     let whole = joined(arguments, parts)?;
     let bounds = whole.state.bounds();
@@ -229,7 +232,7 @@ fn save(arguments: &Arguments, whole: &Part, output: &Path) -> Result<(), Failur
         Some(ImageFormat::Exr) => shown("layers").split(',').filter_map(Feature::from_name).collect(),
         _ => Vec::new(),
     };
-    let picture = match background(shown("background"))? {
+    let picture = match background(shown("background"), arguments.background.as_deref())? {
         Some(background) => whole.picture().over(background),
         None => whole.picture(),
     };
@@ -239,13 +242,29 @@ fn save(arguments: &Arguments, whole: &Part, output: &Path) -> Result<(), Failur
     Ok(picture.save_with(output, &options, &layers)?)
 }
 
-/// The background that a part's picture is shown over.
-fn background(name: &str) -> Result<Option<Background>, Failure> {
+/// The background that a part's picture is shown over. A part may come from anyone: an image is opened by the name that the user gives, never
+/// by that in the part.
+fn background(name: &str, given: Option<&Path>) -> Result<Option<Background>, Failure> {
+    match (name.strip_prefix("file "), given) {
+        (Some(_), Some(path)) => {
+            let image = lumbre::read_image(path)?;
+            return Ok(Some(Background::Picture(crate::staging::opaque(image))));
+        }
+        (Some(named), None) => {
+            return Err(Failure::Usage(format!(
+                "the picture of the parts stands before the image {named}, which is not opened unasked (expected --background with its name)"
+            )));
+        }
+        (None, Some(path)) => {
+            return Err(Failure::Usage(format!(
+                "--background {}: the picture of the parts stands before no image",
+                path.display()
+            )));
+        }
+        (None, None) => {}
+    }
     if name == "studio" {
         return Ok(Some(Background::studio()));
-    }
-    if let Some(path) = name.strip_prefix("file ") {
-        return Ok(Some(Background::Picture(crate::staging::opaque(lumbre::read_image(path.as_ref())?))));
     }
     let colour = name.strip_prefix("colour ").map(|digits| {
         let mut channels =

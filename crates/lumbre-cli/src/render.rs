@@ -16,7 +16,7 @@ use lumbre::math::Elementary;
 use lumbre::shading::ShadingNormals;
 use lumbre::{
     CancelToken, DVec3, Feature, Job, Keeper, Picture, PixelBounds, RenderOptions, SaveOptions, Scene,
-    SceneDesc, Stage, Staged, in_words,
+    SceneDesc, Stage, Staged, Stop, in_words,
 };
 use serde_json::json;
 
@@ -88,10 +88,14 @@ pub(crate) struct Arguments {
     /// Stop after this time, counted from the start (of each frame), as 90s, 2m or 1h30m.
     #[arg(long, value_name = "DUR", value_parser = units::duration)]
     time: Option<Duration>,
-    /// Stop sampling a pixel when its noise is estimated to be below this share of its luminance, such as 0.02; at 1024 samples at
-    /// the latest, or at --spp.
+    /// Stop sampling a pixel when its noise is estimated to be below this share of its luminance, such as 0.02; at --spp or --time at the
+    /// latest. Without these it takes as long as it takes: the progress says how long, and Ctrl-C saves what is there.
     #[arg(long, value_name = "R", value_parser = noise)]
     noise: Option<f64>,
+    /// With --noise, the samples that every pixel has before its noise may end it. By default 16, or up to 256 where most of the light
+    /// comes by rare samples.
+    #[arg(long, value_name = "N", requires = "noise", value_parser = clap::value_parser!(u32).range(1..))]
+    min_spp: Option<u32>,
     /// Take the noise out of the picture: by Lumbre's own filter (own or auto, the same), or by Open Image Denoise where it is installed
     /// (oidn; its folder can be named by the variable OIDN_DIR). An .exr keeps the noisy picture too, in noisy.R, noisy.G and noisy.B.
     /// By default none; own for a model without camera and light, where none of --spp, --time and --noise is given.
@@ -305,15 +309,17 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 /// How long a picture is rendered even if reading took all of its time.
 const LEAST_TIME: Duration = Duration::from_millis(400);
 
-/// Samples per pixel at most, where its noise ends its sampling: some never come to little noise.
-const MOST_FOR_NOISE: u32 = 1024;
-
 const READING: Phase = Phase::Preparing("reading the scene");
 
 impl Arguments {
     /// The samples per pixel that are asked for.
     pub(crate) fn spp(&self) -> Option<u32> {
         self.spp
+    }
+
+    /// The image that is the background.
+    pub(crate) fn background_file(&self) -> Option<&Path> {
+        self.staging.background_file()
     }
 
     /// The scene.
@@ -755,15 +761,7 @@ fn picture(
     if !arguments.quiet {
         replaced.iter().for_each(Replaced::say);
         let name = if is_piped { "standard output".into() } else { output.display().to_string() };
-        summary(
-            arguments.verbose,
-            options.stop.noise.is_some(),
-            &scene,
-            &picture,
-            &name,
-            render_time,
-            denoised,
-        );
+        summary(arguments.verbose, &options.stop, &scene, &picture, &name, render_time, denoised);
     }
     Ok(())
 }
@@ -859,9 +857,10 @@ fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failur
     options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
     options.stop.time = arguments.time;
     options.stop.noise = arguments.noise;
+    options.stop.min_spp = arguments.min_spp;
     options.stop.spp = match arguments.spp {
         Some(spp) => spp,
-        None if arguments.noise.is_some() => MOST_FOR_NOISE,
+        None if arguments.noise.is_some() => Stop::MAX_FOR_NOISE,
         // With a time, samples are not limited.
         None if arguments.time.is_some() => u32::MAX,
         None => options.stop.spp,

@@ -3,7 +3,7 @@
 use std::fs;
 use std::time::Duration;
 
-use lumbre::{Picture, Scene};
+use lumbre::{Picture, Scene, Stats, Stop};
 use serde_json::json;
 
 use crate::threads;
@@ -23,6 +23,11 @@ pub(crate) fn warn_of_losses(threads_are_asked: bool, picture: &Picture) {
     let unsaid = stats.dropped.saturating_sub(stats.first_dropped.len() as u64);
     if unsaid > 0 {
         say!("warning: {} more not finite and dropped", counted(unsaid, "sample"));
+    }
+    if stats.clamped > 0 {
+        let count = counted(stats.clamped, "sample");
+        let most = Stats::MAX_SAMPLE;
+        say!("warning: {count} brighter than {most:.1e}, which is the most that a sample counts for");
     }
 }
 
@@ -47,6 +52,9 @@ pub(crate) fn statistics(
         "rays": { "camera": stats.rays.camera, "bounce": stats.rays.bounce, "shadow": stats.rays.shadow },
         "paths_per_second": stats.paths_per_second(),
         "noise": stats.noise,
+        "noise_target": stats.noise_target,
+        "noise_target_met": stats.noise_target.map(|_| !stats.misses_noise_target()),
+        "noisy_pixels": stats.noisy_pixels,
         "build": {
             "primitives": primitives,
             "primitives_per_second": primitives as f64 / build_seconds.max(1e-9),
@@ -54,6 +62,7 @@ pub(crate) fn statistics(
         },
         "peak_memory_bytes": peak_memory(),
         "dropped_samples": stats.dropped,
+        "clamped_samples": stats.clamped,
         "warnings": warnings,
     })
 }
@@ -65,10 +74,26 @@ fn peak_memory() -> Option<u64> {
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kib| kib * 1024)
 }
 
+/// What is to be said of a noise that was asked for and is not reached: by the whole picture, or by some of its pixels.
+fn missed(stats: &Stats, stop: &Stop) -> Option<String> {
+    let target = stats.noise_target?;
+    // Where a signal ended it, everyone knows what goes on.
+    let more = match stop.time {
+        _ if stats.cancelled => "",
+        Some(_) if stats.spp < stop.spp => " (more --time goes on)",
+        _ => " (more --spp goes on)",
+    };
+    if stats.misses_noise_target() {
+        return Some(format!("the target of {target} was not met{more}"));
+    }
+    let (noisy, are) = (stats.noisy_pixels, if stats.noisy_pixels == 1 { "is" } else { "are" });
+    (noisy > 0).then(|| format!("{} {are} above {target}{more}", counted(noisy, "pixel")))
+}
+
 /// The last line of a render; with `verbose`, the lines after it.
 pub(crate) fn summary(
     verbose: bool,
-    has_noise_limit: bool,
+    stop: &Stop,
     scene: &Scene,
     picture: &Picture,
     output: &str,
@@ -81,7 +106,7 @@ pub(crate) fn summary(
     let image = picture.image();
     let samples = if stats.spp > 0 {
         match stats.noise {
-            Some(noise) if has_noise_limit => {
+            Some(noise) if stop.noise.is_some() => {
                 format!("{} to {} samples a pixel, noise {noise:.4}", stats.spp, stats.most_spp)
             }
             _ => format!("{} a pixel", counted(u64::from(stats.spp), "sample")),
@@ -89,7 +114,13 @@ pub(crate) fn summary(
     } else {
         format!("a coarse picture of {}", counted(stats.samples, "sample"))
     };
-    say!("{output}: {}x{}, {samples}, {}{denoised}", image.width(), image.height(), spoken(render_time));
+    let missed = missed(stats, stop).map_or_else(String::new, |missed| format!("; {missed}"));
+    say!(
+        "{output}: {}x{}, {samples}, {}{denoised}{missed}",
+        image.width(),
+        image.height(),
+        spoken(render_time)
+    );
     if verbose {
         let rays = stats.rays;
         let total = rays.camera + rays.bounce + rays.shadow;

@@ -197,13 +197,17 @@ impl StagingArguments {
         }
     }
 
-    /// The files that the stage is made of.
-    pub(crate) fn inputs(&self) -> impl Iterator<Item = &Path> {
-        let background = match &self.background {
+    /// The image that is the background.
+    pub(crate) fn background_file(&self) -> Option<&Path> {
+        match &self.background {
             Some(BackgroundArgument::File(path)) => Some(path.as_path()),
             _ => None,
-        };
-        self.env.as_deref().into_iter().chain(background)
+        }
+    }
+
+    /// The files that the stage is made of.
+    pub(crate) fn inputs(&self) -> impl Iterator<Item = &Path> {
+        self.env.as_deref().into_iter().chain(self.background_file())
     }
 }
 

@@ -114,6 +114,8 @@ fn options_after_the_dashes_are_read_and_those_that_a_task_cannot_have_are_refus
         "--output x.exr",
         "--time 3s",
         "--noise 0.1",
+        "--min-spp 3",
+        "--noise 0.1 --min-spp 3",
         "--samples 0..2",
         "--resume",
         "--checkpoint x",
@@ -149,7 +151,7 @@ fn names_reach_a_script_as_names_and_what_no_script_can_hold_is_refused() {
     let farm = |scene: &str, more: &[&str]| {
         folder.lumbre(&[&["farm", "slurm", scene, "--tasks", "2", "--spp", "2"][..], more].concat())
     };
-    for name in ["a\n#SBATCH --uid=0\n.pbrt", "a\r.pbrt", "50%j.pbrt", "a\u{85}.pbrt"] {
+    for name in ["a\n#SBATCH --uid=0\n.pbrt", "a\r.pbrt", "a\u{85}.pbrt"] {
         fs::write(folder.path(name), &scene).unwrap();
         let (status, said) = farm(name, &[]);
         assert!(
@@ -170,7 +172,7 @@ fn names_reach_a_script_as_names_and_what_no_script_can_hold_is_refused() {
     }
     assert_eq!(farm("-", &[]).0, 2);
     // A dash before a name makes it no option of lumbre, sh or sbatch; quotes and dollars are letters like others.
-    for name in ["-x.pbrt", "it's $(touch x) \"a\" `b`.pbrt"] {
+    for name in ["-x.pbrt", "50%j 100%%.pbrt", "it's $(touch x) \"a\" `b`.pbrt"] {
         fs::write(folder.path(name), &scene).unwrap();
         let (stem, path) = (name.strip_suffix(".pbrt").unwrap(), format!("./{name}"));
         let (status, said) = farm(&path, &[&format!("-o={stem}.png"), &format!("--folder={stem}.farm")]);
@@ -185,6 +187,15 @@ fn names_reach_a_script_as_names_and_what_no_script_can_hold_is_refused() {
         assert!(folder.path(&format!("{stem}.png")).exists() && !folder.path("x").exists());
         let submit = fs::read_to_string(folder.path(&format!("{stem}.farm/submit.sh"))).unwrap();
         assert!(!submit.contains(" '-") && !submit.contains(" -x"), "{submit}");
+        // Slurm reads % in the names of logs alone.
+        for (script, log) in [("render.sh", "%a"), ("merge.sh", "merge")] {
+            let script = fs::read_to_string(folder.path(&format!("{stem}.farm/{script}"))).unwrap();
+            let line = script.lines().find(|line| line.starts_with("#SBATCH --output=")).unwrap();
+            let escaped = format!("{stem}.farm/{log}.log");
+            let escaped = escaped.replace("50%j 100%%", "50%%j 100%%%%").replace('\'', r"'\''");
+            assert!(line.contains(&escaped), "{line}");
+            assert!(!script.contains("%%j") || script.matches("%%j").count() == 1, "{script}");
+        }
     }
 }
 
@@ -218,4 +229,28 @@ fn only_scripts_and_pictures_of_lumbre_are_replaced() {
         "scene.exr is there, and not known to be Lumbre's",
     );
     done(&folder, "farm slurm scene.pbrt --tasks 2 -o other.exr");
+}
+
+#[test]
+fn an_image_behind_the_picture_is_named_to_the_merge() {
+    let folder = folder();
+    done(&folder, "farm slurm scene.pbrt --tasks 2 --spp 2 -o a.png -- --background wood.png");
+    for task in ["0", "1"] {
+        let mut command = Command::new(folder.path("scene.farm/render.sh"));
+        assert!(command.env("SLURM_ARRAY_TASK_ID", task).output().unwrap().status.success());
+    }
+    assert!(Command::new(folder.path("scene.farm/merge.sh")).output().unwrap().status.success());
+    done(&folder, "render scene.pbrt --spp 2 -o b.png --background wood.png");
+    assert_eq!(bytes(&folder, "a.png"), bytes(&folder, "b.png"));
+}
+
+#[test]
+fn logs_are_in_no_folder_whose_name_slurm_would_read_otherwise() {
+    let folder = folder();
+    refused(
+        &folder,
+        r"farm slurm scene.pbrt --tasks 2 --folder a\b",
+        2,
+        "expected --folder with one without backslashes",
+    );
 }

@@ -5,6 +5,7 @@
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
+use std::path::Path;
 use std::process::Command;
 
 use crate::files::{Folder, answer};
@@ -148,4 +149,37 @@ fn what_cannot_fit_into_memory_is_refused_before_work_begins() {
     let (code, said) =
         limited(&folder, &mut Command::new("sh"), "-v 1000000", &["render", "scene.pbrt", "-q"]);
     assert_eq!((code, &*said), (0, ""));
+}
+
+/// The largest memory of a command, in KiB; `None` where there is no program that measures it.
+fn peak(folder: &Folder, arguments: &[&str]) -> Option<u64> {
+    let time = Path::new("/usr/bin/time");
+    if !time.is_file() {
+        println!("skipped: no /usr/bin/time");
+        return None;
+    }
+    let mut command = Command::new(time);
+    command
+        .args(["-f", "peak %M", env!("CARGO_BIN_EXE_lumbre")])
+        .args(arguments)
+        .current_dir(folder.path(""));
+    let (status, said) = answer(command.output().unwrap());
+    assert_eq!(status, 0, "{arguments:?}: {said}");
+    let last = said.lines().rev().find_map(|line| line.strip_prefix("peak "));
+    Some(last.unwrap().parse().unwrap())
+}
+
+#[test]
+fn many_shapes_take_32_bytes_for_each_of_their_file_and_64_mib() {
+    let folder = Folder::new();
+    let start = SPHERE.split("Shape").next().unwrap();
+    folder.write("spheres.pbrt", &(start.to_owned() + &"Shape \"sphere\"\n".repeat(300_000)));
+    let faces: String = (0..50_000).map(|i| format!("usemtl m{i}\nf 1 2 3\n")).collect();
+    folder.write("materials.obj", &format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{faces}"));
+    for name in ["spheres.pbrt", "materials.obj"] {
+        let allowed = (64 << 10) + 32 * fs::metadata(folder.path(name)).unwrap().len() / 1024;
+        let Some(peak) = peak(&folder, &["info", name]) else { return };
+        println!("{name}: {peak} KiB of {allowed}");
+        assert!(peak <= allowed, "{name}: {peak} KiB, allowed {allowed}");
+    }
 }

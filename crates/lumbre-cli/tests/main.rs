@@ -18,5 +18,6 @@ mod parts;
 mod program;
 mod slurm;
 mod stops;
+mod targets;
 mod topics;
 mod viewers;

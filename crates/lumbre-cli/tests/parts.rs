@@ -242,7 +242,7 @@ fn forged(folder: &Folder, (width, height): (u32, u32)) -> Vec<u8> {
     let whole = part.to_bytes();
     let start = 14 + 8 + u64::from_le_bytes(whole[14..22].try_into().unwrap()) as usize;
     // Corners, flags, one piece, no dropped samples, counts of rays and the rest: then the planes.
-    let head = &whole[start..start + 16 + 12 + 4 + 24 + 4 + 40];
+    let head = &whole[start..start + 16 + 12 + 4 + 24 + 4 + 48];
     assert_eq!(head[..16], [0u32, 0, 20, 14].map(u32::to_le_bytes).concat());
     let sealed = |head: &[u8], planes: usize| {
         let mut bytes = [&whole[..start], head, &vec![0; planes]].concat();
@@ -522,4 +522,29 @@ mod interrupted {
             "of an unfinished render (--resume goes on from it",
         );
     }
+}
+
+#[test]
+fn merge_opens_no_image_that_only_a_part_names() {
+    let folder = folder();
+    for (samples, name) in [("0..2", "a.part"), ("2..3", "b.part")] {
+        done(&folder, &format!("render scene.pbrt -q -o {name} --samples {samples} --background wood.png"));
+    }
+    let merge = "merge a.part b.part -o joined.png";
+    refused(&folder, merge, 2, "stands before the image wood.png, which is not opened unasked");
+    refused(&folder, merge, 2, "expected --background with its name");
+    assert!(!folder.path("joined.png").exists());
+    done(&folder, &format!("{merge} --background wood.png"));
+    done(&folder, "render scene.pbrt -q -o whole.png --spp 3 --background wood.png");
+    assert_eq!(bytes(&folder, "joined.png"), bytes(&folder, "whole.png"));
+    refused(&folder, "merge a.part b.part -o wood.png --background wood.png", 2, "wood.png");
+    // What needs no picture needs no image.
+    done(&folder, "merge a.part b.part -o both.part");
+    // A part that names something else, as one from a stranger may.
+    let mut part = lumbre::Part::open(&folder.path("a.part"), |_| u64::MAX).unwrap();
+    part.job.shown.insert("background".to_owned(), "file /dev/zero".to_owned());
+    part.save(&folder.path("foreign.part")).unwrap();
+    refused(&folder, "merge foreign.part -o x.png", 2, "the image /dev/zero, which is not opened unasked");
+    done(&folder, "render scene.pbrt -q -o plain.part --samples 0..1 --background #fa0");
+    refused(&folder, "merge plain.part -o x.png --background wood.png", 2, "stands before no image");
 }

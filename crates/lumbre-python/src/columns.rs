@@ -9,7 +9,7 @@ use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
 
-use crate::errors::{filled, invalid, list};
+use crate::errors::{filled, invalid, list, tuple};
 use crate::rays::Real;
 
 /// So many numbers are sooner copied than handed over.
@@ -230,8 +230,8 @@ fn table<'py, T: Element>(
     if *array.shape() == [count, width] {
         return Ok(Some(array));
     }
-    let found = array.shape();
-    Err(invalid(format!("out: {name} has the wrong shape (found {found:?}; expected ({count}, {width}))")))
+    let found = tuple(array.shape());
+    Err(invalid(format!("out: {name} has the wrong shape (found {found}; expected ({count}, {width}))")))
 }
 
 fn wrong(name: &str, error: &PyErr) -> PyErr {

@@ -35,6 +35,18 @@ pub(crate) fn failed(failure: Failure) -> PyErr {
     }
 }
 
+/// Refuses an environment variable of Lumbre's with a value that it does not know.
+pub(crate) fn check_environment() -> PyResult<()> {
+    lumbre_simd::InstructionSet::from_environment().map(drop).map_err(|wrong| invalid(wrong.to_string()))
+}
+
+/// Numbers as a tuple of Python.
+pub(crate) fn tuple<T: std::fmt::Display>(numbers: &[T]) -> String {
+    let words: Vec<String> = numbers.iter().map(T::to_string).collect();
+    let end = if words.len() == 1 { "," } else { "" };
+    format!("({}{end})", words.join(", "))
+}
+
 /// The system's number of the error, from which Python makes `FileNotFoundError` and its like.
 fn system_error(error: &Error) -> Option<i32> {
     let mut source: Option<&(dyn std::error::Error + 'static)> = Some(error);

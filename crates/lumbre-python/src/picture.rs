@@ -11,7 +11,7 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray3, PyUn
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::errors::{invalid, list, raised};
+use crate::errors::{invalid, list, raised, tuple};
 use crate::scene::{Shown, unknown};
 
 /// A rendered picture, with the sums of its samples.
@@ -201,7 +201,12 @@ impl Picture {
         all.set_item("samples", stats.samples)?;
         all.set_item("rays", rays)?;
         all.set_item("dropped", stats.dropped)?;
+        all.set_item("clamped", stats.clamped)?;
+        all.set_item("most_spp", stats.most_spp)?;
         all.set_item("noise", stats.noise)?;
+        all.set_item("noise_target", stats.noise_target)?;
+        all.set_item("noise_target_met", stats.noise_target.map(|_| !stats.misses_noise_target()))?;
+        all.set_item("noisy_pixels", stats.noisy_pixels)?;
         all.set_item("threads", stats.threads)?;
         all.set_item("seconds", stats.elapsed.as_secs_f64())?;
         Ok(all)
@@ -302,8 +307,8 @@ pub(crate) fn write_image(
     (options.tone_map, options.exposure) = (tone_map(tonemap)?, exposure);
     let &[height, width, 3] = pixels.shape() else {
         return Err(invalid(format!(
-            "an image has the wrong shape (found {:?}; expected (h, w, 3))",
-            pixels.shape()
+            "an image has the wrong shape (found {}; expected (h, w, 3))",
+            tuple(pixels.shape())
         )));
     };
     let view = pixels.as_array();

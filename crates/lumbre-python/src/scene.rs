@@ -19,7 +19,7 @@ use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
 
-use crate::errors::{failed, invalid, raised, too_large};
+use crate::errors::{check_environment, failed, invalid, raised, too_large, tuple};
 use crate::picture::{Look, Picture};
 use crate::rays::{Rays, Triples, is_single};
 use crate::shape::{Camera, Light, Placed, placed, transform};
@@ -87,6 +87,7 @@ impl Scene {
         variant: Option<String>,
         settings: Vec<(String, String)>,
     ) -> PyResult<(Self, Vec<String>)> {
+        check_environment()?;
         let mut options = ReadOptions::default();
         options.strictness = match strictness {
             "lenient" => Strictness::Lenient,
@@ -121,6 +122,7 @@ impl Scene {
         up: [f64; 3],
         settings: Vec<(String, String)>,
     ) -> PyResult<Self> {
+        check_environment()?;
         let mut builder = SceneBuilder::new();
         for shape in &shapes {
             builder = builder.shape(placed(shape)?);
@@ -129,8 +131,8 @@ impl Scene {
             let shapes = shapes.iter().map(placed).collect::<PyResult<Vec<_>>>()?;
             if places.shape()[1..] != [4, 4] {
                 return Err(invalid(format!(
-                    "the places of an instance have the wrong shape (found {:?}; expected (N, 4, 4))",
-                    places.shape()
+                    "the places of an instance have the wrong shape (found {}; expected (N, 4, 4))",
+                    tuple(places.shape())
                 )));
             }
             let matrix = |place: numpy::ndarray::ArrayView2<'_, f64>| {
@@ -602,6 +604,7 @@ fn ask(asked: &mut Asked, name: &str, value: &Bound<'_, PyAny>) -> PyResult<()> 
         "seed" => options.sampler.seed = value.extract()?,
         "threads" => options.threads = value.extract()?,
         "noise" => options.stop.noise = Some(value.extract()?),
+        "min_spp" => options.stop.min_spp = Some(value.extract()?),
         "time" => {
             let seconds: f64 = value.extract()?;
             let time = Duration::try_from_secs_f64(seconds)

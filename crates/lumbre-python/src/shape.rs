@@ -15,7 +15,7 @@ use numpy::ndarray::ArrayView2;
 use numpy::{PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::errors::{invalid, list};
+use crate::errors::{invalid, list, tuple};
 use crate::material::{Material, colour};
 use crate::scene::unknown;
 
@@ -75,7 +75,8 @@ fn check_width<T: numpy::Element>(name: &str, array: &PyReadonlyArray2<'_, T>, w
     if array.shape()[1] == width {
         return Ok(());
     }
-    Err(invalid(format!("{name} has the wrong shape (found {:?}; expected (N, {width}))", array.shape())))
+    let found = tuple(array.shape());
+    Err(invalid(format!("{name} has the wrong shape (found {found}; expected (N, {width}))")))
 }
 
 #[pymethods]
@@ -321,8 +322,8 @@ impl Light {
         };
         let &[height, width, 3] = image.shape() else {
             return Err(invalid(format!(
-                "image has the wrong shape (found {:?}; expected (h, 2h, 3))",
-                image.shape()
+                "image has the wrong shape (found {}; expected (h, 2h, 3))",
+                tuple(image.shape())
             )));
         };
         let view = image.as_array();
@@ -396,8 +397,9 @@ impl Camera {
 }
 
 fn no_view(eye: Triple, target: Triple, up: Triple) -> PyErr {
+    let [eye, target, up] = [eye, target, up].map(|place| tuple(&place));
     invalid(format!(
-        "a camera at {eye:?} does not see {target:?} with {up:?} upwards (expected two places, and another direction up)"
+        "a camera at {eye} does not see {target} with {up} upwards (expected two places, and another direction up)"
     ))
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -237,3 +238,40 @@ def test_a_spot_lights_a_disk_of_its_angle() -> None:
     # At the edge, a pixel has half of the light of a cosine to the third power.
     lit = seen > 0.5 * np.cos(np.radians(30)) ** 3 * seen[20, 20]
     assert lit.mean() * 16 == pytest.approx(np.pi * radius**2, rel=0.05)
+
+
+def test_mixtures_that_share_mixtures_are_compared_hashed_and_written_once() -> None:
+    def nested(depth: int, last: lumbre.Material) -> lumbre.Material:
+        for _ in range(depth):
+            last = lumbre.Mix(last, last)
+        return last
+
+    # Each has 2^64 leaves.
+    one, same, other = (nested(64, lumbre.Diffuse(share)) for share in (0.3, 0.3, 0.4))
+    assert one is not same and one == same and hash(one) == hash(same)
+    assert one != other and other != one and one != nested(63, lumbre.Diffuse(0.3)) and one != lumbre.Diffuse(0.3)
+    text = repr(one)
+    assert text.count("Diffuse(") == 2 and len(text) < 20_000
+    assert text.startswith("Mix(normal_map=None, bump_map=None, first=Mix#1(") and "second=Mix#1, amount=0.5)" in text
+    # What shares nothing is written as ever, and its parts may be equal without being the same.
+    plain = lumbre.Mix(lumbre.Mix(amount=0.2), lumbre.Mix(amount=0.2))
+    assert plain == lumbre.Mix(plain.first, plain.first) and "#" not in repr(plain)
+    assert plain != lumbre.Mix(plain.first, lumbre.Mix(amount=0.3)) and plain != lumbre.Mix(plain.first, plain.first, 0.4)
+    again = pickle.loads(pickle.dumps(one))
+    assert again == one and hash(again) == hash(one)
+
+
+def test_a_noise_that_is_not_reached_is_said() -> None:
+    scene = lumbre.Scene([lumbre.Sphere()], lights=[lumbre.PointLight((3, -4, 5), 200)])
+    with pytest.warns(UserWarning, match="that of 0.001 was not reached: more spp goes on"):
+        image = scene.render(20, (16, 12), noise=0.001, denoise=False)
+    stats = image.stats
+    assert stats["noise_target"] == 0.001 and stats["noise_target_met"] is False
+    assert stats["noise"] > 0.001 and stats["noisy_pixels"] > 0
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        stats = scene.render(size=(16, 12), noise=0.2, min_spp=40, denoise=False).stats
+    assert stats["noise_target_met"] is True and stats["spp"] >= 40 and stats["noisy_pixels"] == 0
+    with pytest.raises(lumbre.LumbreError, match="min_spp is for a render to a noise"):
+        scene.render(1, (8, 6), min_spp=3)
+    assert scene.render(1, (8, 6)).stats["noise_target_met"] is None

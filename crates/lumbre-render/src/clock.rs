@@ -121,19 +121,19 @@ mod tests {
             (endless, time, noise, Some(10.0), (0.25, Some(1600), Some(6))),
             (endless, time, noise, Some(5.0), (0.4, Some(1000), Some(3))),
         ] {
-            let state = state(Stop { spp, time, noise }, quiet_at, 400, 2);
+            let state = state(Stop { spp, time, noise, min_spp: None }, quiet_at, 400, 2);
             let (share, total, left) = expected;
             assert_eq!((state.share, state.total), (share, total), "{state:?}");
             assert_eq!(state.left.map(|left| left.as_secs()), left, "{state:?}");
         }
         // Over time and beyond the expected noise, it is at its end.
-        let late = state(Stop { spp: endless, time, noise }, Some(1.0), 400, 9);
+        let late = state(Stop { spp: endless, time, noise, min_spp: None }, Some(1.0), 400, 9);
         assert_eq!((late.share, late.total, late.left), (1.0, Some(400), Some(Duration::ZERO)));
     }
 
     #[test]
     fn what_an_earlier_run_took_is_no_work_of_this_one() {
-        let stop = Stop { spp: 8, time: None, noise: None };
+        let stop = Stop::at(8);
         let clock = Clock::new(Instant::now(), 200, stop, 400, &NoProgress);
         // 800 of 1600 samples, 400 of them in 2 s: as many again are left twice.
         let state = clock.state(800, Duration::from_secs(2));

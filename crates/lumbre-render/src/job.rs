@@ -8,14 +8,16 @@ use std::time::{Duration, Instant};
 use lumbre_math::{DVec3, Elementary};
 use lumbre_scene::{Scene, View};
 
-use crate::adaptive::{self, Adaptive, Spread, TRIAL_SIDE, TRIAL_SPP, Trial};
+use crate::adaptive::{self, Adaptive};
 use crate::clock::Clock;
-use crate::film::{Extras, MAX_LUMINANCE, Tile};
+use crate::film::{Extras, Tile};
 use crate::integrators::{Integrator, integrator};
+use crate::noise::noise;
 use crate::one_sample::Taker;
-use crate::rendered::{noise, picture, rendered_of};
+use crate::rendered::{picture, rendered_of};
 use crate::state::{Piece, REMEMBERED, RenderState};
 use crate::transport::{RayCounts, Record};
+use crate::trial::Trial;
 use crate::wave::{SampleId, WAVE, Wave};
 use crate::workers::Workers;
 use crate::{
@@ -24,8 +26,9 @@ use crate::{
 
 /// Pixels along the side of a tile.
 const TILE: u32 = 16;
-/// Samples of the longest pass.
+/// Samples of the longest pass, unless they are less than one part in so many of those that are done.
 const MAX_STEP: u32 = 16;
+const LONG: u32 = 64;
 /// The first pass goes over the picture in squares of so many pixels a side, one sample in each, and then in smaller ones, so that a
 /// render which is stopped in it is a whole picture, if a coarse one.
 const STRIDES: [u32; 7] = [256, 64, TILE, 8, 4, 2, 1];
@@ -108,15 +111,19 @@ pub fn render_from(
     let before =
         owners.iter().flat_map(|owner| owner.tile.pixels()).map(|pixel| u64::from(pixel.taken)).sum();
     let workers = Workers::start(options.threads);
+    let deadline = options.stop.time.and_then(|time| start.checked_add(time));
     let adaptive = match options.stop.noise {
-        Some(limit) => Some(Adaptive::new(limit, trial(scene, options, integrator, cancel, &workers)?)),
+        Some(limit) => {
+            let trial = Trial::take(scene, options, limit, integrator, cancel, deadline, &workers)?;
+            Some(Adaptive::new(limit, options.stop.min_spp, trial))
+        }
         None => None,
     };
     let job = Job {
         options,
         taker,
         adaptive,
-        deadline: options.stop.time.and_then(|time| start.checked_add(time)),
+        deadline,
         cancel,
         pause: keeper.map(|keeper| Pause::new(start, keeper.every)),
         clock: Clock::new(start, bounds.area(), options.stop, before, progress),
@@ -176,7 +183,7 @@ pub fn render_from(
             break;
         }
         let tiles = || owners.iter().map(|owner| &owner.tile);
-        let reached = noise(tiles());
+        let reached = noise(tiles(), bounds, job.adaptive.as_ref());
         progress.pass(&Snapshot {
             spp: done,
             noise: reached,
@@ -209,8 +216,11 @@ pub fn render_from(
         samples: state.rays.camera,
         rays: state.rays,
         dropped: state.dropped,
+        clamped: state.clamped,
         first_dropped: state.first_dropped.clone(),
-        noise: noise(state.tiles.iter()),
+        noise: noise(state.tiles.iter(), bounds, job.adaptive.as_ref()),
+        noise_target: options.stop.noise,
+        noisy_pixels: job.adaptive.as_ref().map_or(0, |adaptive| adaptive.noisy_pixels(&state.tiles)),
         threads: workers.count(),
         refused_threads: workers.refused(),
         elapsed: start.elapsed(),
@@ -223,47 +233,18 @@ fn least_taken(owners: &[Owner]) -> u32 {
     owners.iter().map(|owner| owner.tile.least_taken()).min().unwrap_or(0)
 }
 
-/// A small picture of the whole film, for what it says of the noise of the large one: the same for every crop.
-fn trial(
-    scene: &Scene,
-    options: &RenderOptions,
-    integrator: &dyn Integrator,
-    cancel: &CancelToken,
-    workers: &Workers,
-) -> Result<Trial, RenderError> {
-    let longer_side = TRIAL_SIDE.min(f64::from(options.width.max(options.height)));
-    let small = RenderOptions { features: false, guides: false, ..options.smaller(longer_side) };
-    let taker = Taker::new(scene, &small, integrator)?;
-    let mut rows: Vec<(u32, f64, Vec<Spread>)> = (0..small.height).map(|y| (y, 0.0, Vec::new())).collect();
-    workers.for_each(&mut rows, |(y, sum, spreads)| {
-        let y = *y;
-        let ids: Vec<SampleId> = (0..small.width)
-            .flat_map(|x| (0..TRIAL_SPP).map(move |index| SampleId { x, y, index }))
-            .filter(|_| !cancel.is_cancelled())
-            .collect();
-        let mut luminances = vec![Vec::with_capacity(TRIAL_SPP as usize); small.width as usize];
-        taker.take(&mut Wave::default(), &ids, &mut Record::default(), |id, sample| {
-            let luminance = f64::from(small.exposure.colour(sample.radiance).luminance());
-            if luminance.is_finite() {
-                luminances[id.x as usize].push(luminance.clamp(0.0, MAX_LUMINANCE));
-            }
-        });
-        *sum = luminances.iter().flatten().sum();
-        *spreads = luminances.iter().map(|pixel| Spread::of(pixel)).collect();
-    });
-    let samples = f64::from(small.width) * f64::from(small.height) * f64::from(TRIAL_SPP);
-    let mean = rows.iter().map(|(_, sum, _)| sum).sum::<f64>() / samples;
-    let spreads: Vec<Spread> = rows.into_iter().flat_map(|(.., spreads)| spreads).collect();
-    Ok(Trial::new(mean, [options.width, options.height], small.width as usize, &spreads))
-}
-
 /// The number of samples at which a render next looks at its noise, and shows what there is: always the same, whatever came between.
 fn next_count(done: u32) -> u32 {
     if done < MAX_STEP {
         return (done + 1).next_power_of_two();
     }
-    let step = (done / 8).next_power_of_two().min(MAX_STEP);
+    let step = (done / 8).next_power_of_two().min(MAX_STEP).max(power_of_two_below(done / LONG));
     (done / step + 1) * step
+}
+
+/// The largest power of two that is not above a number; 0 for 0.
+fn power_of_two_below(number: u32) -> u32 {
+    if number == 0 { 0 } else { 1 << number.ilog2() }
 }
 
 /// A power of two near the largest depth that there may be.
@@ -302,7 +283,7 @@ fn owners_of(
     };
     let mut owners: Vec<Owner> = tiles.into_iter().map(Owner::new).collect();
     if let Some(owner) = owners.first_mut() {
-        (owner.record.counts, owner.dropped) = (state.rays, state.dropped);
+        (owner.record.counts, owner.dropped, owner.clamped) = (state.rays, state.dropped, state.clamped);
         owner.first_dropped = state.first_dropped;
     }
     Ok(owners)
@@ -325,6 +306,7 @@ fn state_of(owners: Vec<Owner>, bounds: PixelBounds, options: &RenderOptions) ->
         pieces: vec![Piece { bounds, samples: first..first.saturating_add(wanted) }],
         rays,
         dropped: owners.iter().map(|owner| owner.dropped).sum(),
+        clamped: owners.iter().map(|owner| owner.clamped).sum(),
         first_dropped,
         tiles: owners.into_iter().map(|owner| owner.tile).collect(),
     }
@@ -395,6 +377,7 @@ struct Owner {
     has_worked: bool,
     record: Record,
     dropped: u64,
+    clamped: u64,
     first_dropped: Vec<DroppedSample>,
 }
 
@@ -406,6 +389,7 @@ impl Owner {
             has_worked: false,
             record: Record::default(),
             dropped: 0,
+            clamped: 0,
             first_dropped: Vec::new(),
         }
     }
@@ -435,14 +419,15 @@ impl Job<'_> {
     /// Takes the samples of every pixel of a tile up to this number, in waves of some samples of all pixels, so that a tile which is stopped
     /// has all of one sample before it has any of the next.
     fn run(&self, owner: &mut Owner, end: u32) {
-        let mut first = adaptive::least_wanted(&owner.tile, self.adaptive.as_ref()).unwrap_or(end);
         let may_stop = self.deadline.is_some() || self.pause.is_some();
         let most = if may_stop { WAVE_BY_THE_CLOCK } else { WAVE };
-        let step = (most / owner.tile.pixels().len()).max(1) as u32;
+        let Some(mut first) = adaptive::least_wanted(&owner.tile, self.adaptive.as_ref()) else { return };
         while first < end {
+            let wanting = adaptive::wanting(&owner.tile, self.adaptive.as_ref()).count();
+            let step = (most / wanting.max(1)).max(1) as u32;
             let mut next = first.saturating_add(step).min(end);
-            if self.adaptive.is_some() {
-                next = next.min(adaptive::next_look(first));
+            if let Some(adaptive) = &self.adaptive {
+                next = next.min(adaptive.next_look(first));
             }
             if !self.take(owner, first..next, |_, _| true) {
                 return;
@@ -475,13 +460,15 @@ impl Job<'_> {
         owner.has_worked = true;
         let rays = owner.record.counts.total();
         let mut wave = self.waves.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default();
-        let Owner { tile, record, dropped, first_dropped, .. } = owner;
+        let Owner { tile, record, dropped, clamped, first_dropped, .. } = owner;
         self.taker.take(&mut wave, &ids, record, |SampleId { x, y, index }, sample| {
             if !tile.add(x, y, &sample, &self.options.exposure) {
                 *dropped += 1;
                 if first_dropped.len() < REMEMBERED {
                     first_dropped.push(DroppedSample { x, y, sample: index });
                 }
+            } else if self.options.exposure.clamps(sample.radiance) {
+                *clamped += 1;
             }
         });
         self.waves.lock().unwrap_or_else(PoisonError::into_inner).push(wave);

@@ -12,12 +12,15 @@ mod error;
 pub mod film;
 pub mod integrators;
 mod job;
+mod neighbourhoods;
+mod noise;
 mod one_sample;
 mod options;
 mod progress;
 mod rendered;
 mod state;
 pub mod transport;
+mod trial;
 mod wave;
 mod workers;
 

@@ -11,6 +11,7 @@ use crate::denoise::BYTES_A_PIXEL;
 use crate::film::{
     Exposure, FeatureSums, Filter, FilterShape, GuideSums, MAX_PIXELS, Pixel, PixelBounds, Tint,
 };
+use crate::neighbourhoods::Known;
 
 /// Everything about a picture that is not in the scene.
 ///
@@ -60,9 +61,12 @@ pub struct Stop {
     pub time: Option<Duration>,
     /// For each pixel, when its noise is estimated to be below this: the standard error of its luminance, divided by luminance
     /// (plus a tenth of the mean of a small picture, so that black pixels do not count for much). A pixel is looked at when it has
-    /// 16, 24, 32, 48, 64 samples and so on, and by its own samples alone. The noise of a picture is the root mean square of that
-    /// of its pixels.
+    /// [`Stop::min_spp`] samples, and then at 16, 24, 32, 48, 64 samples and so on; what it finds depends on its own samples and those of
+    /// the small picture alone, which is taken first. The noise of a picture is the root mean square of that of its pixels.
     pub noise: Option<f64>,
+    /// The samples that every pixel has before its noise may end it. By default 16, or up to 256 where the small picture finds
+    /// that much of the light comes by rare samples.
+    pub min_spp: Option<u32>,
 }
 
 /// Samples a pixel, where nobody says how many.
@@ -72,9 +76,13 @@ const DEFAULT_SIZE: (u32, u32) = (1280, 720);
 const MAX_SIDE: u32 = 65_536;
 
 impl Stop {
+    /// The most samples per pixel of a render to a noise, where no one says how many: as many as it takes. A sum of samples holds sixteen
+    /// times as many.
+    pub const MAX_FOR_NOISE: u32 = 1 << 20;
+
     /// At this many samples a pixel.
     pub fn at(spp: u32) -> Self {
-        Self { spp, time: None, noise: None }
+        Self { spp, time: None, noise: None, min_spp: None }
     }
 }
 
@@ -182,7 +190,7 @@ impl RenderOptions {
     /// # Errors
     /// As for [`RenderOptions::bounds`].
     pub fn memory_bytes(&self) -> Result<u64, RenderError> {
-        let mut each = size_of::<Pixel>() + size_of::<Rgb>();
+        let mut each = size_of::<Pixel>() + size_of::<Rgb>() + size_of::<Option<Known>>();
         if self.transparent {
             // Coverage by colour, and the alpha and the coverage of the picture.
             each += size_of::<Tint>() + size_of::<f32>() + size_of::<Rgb>();

@@ -2,8 +2,7 @@
 
 use std::time::Duration;
 
-use crate::adaptive::FLOOR;
-use crate::film::{Extras, FeatureSums, GuideSums, Pixel, PixelBounds, Tile};
+use crate::film::{Extras, FeatureSums, GuideSums, MAX_SAMPLE, Pixel, PixelBounds, Tile};
 use crate::transport::{Feature, RayCounts};
 use lumbre_image::{Image, Rgb};
 
@@ -46,10 +45,16 @@ pub struct Stats {
     pub rays: RayCounts,
     /// Samples that were not finite, and are not in the picture.
     pub dropped: u64,
-    /// The first of them.
+    /// Samples that were brighter than [`Stats::MAX_SAMPLE`], and are in the picture as bright as that.
+    pub clamped: u64,
+    /// The first of those that were dropped.
     pub first_dropped: Vec<DroppedSample>,
     /// The noise, as [`crate::Stop::noise`] defines it; `None` for fewer than two samples a pixel.
     pub noise: Option<f64>,
+    /// The noise that was asked for.
+    pub noise_target: Option<f64>,
+    /// Pixels whose sampling was to end at that noise, and ended before.
+    pub noisy_pixels: u64,
     /// Threads.
     pub threads: usize,
     /// More threads that were asked for, and that the system refused.
@@ -59,6 +64,14 @@ pub struct Stats {
 }
 
 impl Stats {
+    /// The most that a sample counts for: see [`Stats::clamped`].
+    pub const MAX_SAMPLE: f64 = MAX_SAMPLE;
+
+    /// Whether a noise was asked for, and that of the picture is above it, or not known.
+    pub fn misses_noise_target(&self) -> bool {
+        self.noise_target.is_some_and(|target| self.noise.is_none_or(|noise| noise > target))
+    }
+
     /// Paths in a second.
     pub fn paths_per_second(&self) -> f64 {
         let seconds = self.elapsed.as_secs_f64();
@@ -154,7 +167,7 @@ pub(crate) fn guides<'t>(tiles: impl Iterator<Item = &'t Tile>, bounds: PixelBou
 }
 
 /// The values of all pixels, row by row, from those of tiles; `none` where there is no tile.
-fn put_together<'t, T: Copy, I: Iterator<Item = T>>(
+pub(crate) fn put_together<'t, T: Copy, I: Iterator<Item = T>>(
     tiles: impl Iterator<Item = &'t Tile>,
     bounds: PixelBounds,
     none: T,
@@ -172,19 +185,4 @@ fn put_together<'t, T: Copy, I: Iterator<Item = T>>(
 
 fn image_of(bounds: PixelBounds, pixels: Vec<Rgb>) -> Image {
     Image::from_pixels(bounds.width(), bounds.height(), pixels).expect("a value for each pixel")
-}
-
-/// The noise of some tiles, as [`crate::Stop::noise`] defines it.
-pub(crate) fn noise<'t>(tiles: impl Iterator<Item = &'t Tile> + Clone) -> Option<f64> {
-    let errors = || tiles.clone().flat_map(Tile::pixels).filter_map(Pixel::luminance_with_error);
-    let count = errors().count();
-    if count == 0 {
-        return None;
-    }
-    let mean = errors().map(|(mean, _)| mean).sum::<f64>() / count as f64;
-    if mean <= 0.0 {
-        return Some(0.0);
-    }
-    let square = |(luminance, error): (f64, f64)| (error / (luminance.max(0.0) + FLOOR * mean)).powi(2);
-    Some((errors().map(square).sum::<f64>() / count as f64).sqrt())
 }

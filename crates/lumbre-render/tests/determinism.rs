@@ -189,6 +189,26 @@ fn samples_that_are_no_numbers_are_dropped_counted_and_named() {
     assert!(sampler.draw(first.x, first.y, first.sample).lobe(7) < 1.0 / 97.0);
 }
 
+/// Finite light that is brighter than a sum of samples holds.
+#[derive(Debug)]
+struct Blinding;
+
+impl RayIntegrator for Blinding {
+    fn radiance(&self, _: &Scene, _: &View, _: Sight<'_>, _: &Draw, _: &mut Record) -> Spectrum {
+        Spectrum::splat(1e19)
+    }
+}
+
+#[test]
+fn samples_that_are_too_bright_are_clamped_and_counted_under_their_own_name() {
+    let scene = Scene::build(still_life(DVec3::ZERO)).unwrap();
+    let options = options(&scene, 40, 30, 4);
+    let rendered = render_with(&scene, &options, &Blinding, &NoProgress, &CancelToken::new()).unwrap();
+    assert_eq!((rendered.stats.dropped, rendered.stats.clamped), (0, 4 * 1200));
+    let most = lumbre_render::Stats::MAX_SAMPLE as f32;
+    assert!(rendered.image.pixels().iter().all(|&c| c == Rgb::splat(most)));
+}
+
 /// Cancels after a number of passes, and writes down what it is told.
 struct Impatient {
     cancel: CancelToken,

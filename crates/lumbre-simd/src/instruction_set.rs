@@ -37,7 +37,11 @@ pub struct UnknownInstructionSet(pub String);
 
 impl fmt::Display for UnknownInstructionSet {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "LUMBRE_SIMD is {:?}; it can be scalar, avx2 or avx512", self.0)
+        write!(
+            f,
+            "LUMBRE_SIMD names no instruction set (found \"{}\"; expected scalar, avx2 or avx512)",
+            self.0
+        )
     }
 }
 

@@ -354,5 +354,8 @@ fn an_instruction_set_can_be_limited_by_name() {
     }
     assert!(all.contains(&InstructionSet::detect()));
     let error = InstructionSet::limited_to("neon").unwrap_err();
-    assert_eq!(error.to_string(), "LUMBRE_SIMD is \"neon\"; it can be scalar, avx2 or avx512");
+    assert_eq!(
+        error.to_string(),
+        "LUMBRE_SIMD names no instruction set (found \"neon\"; expected scalar, avx2 or avx512)"
+    );
 }

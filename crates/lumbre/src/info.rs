@@ -35,8 +35,8 @@ pub struct SceneInfo {
 }
 
 impl SceneInfo {
-    /// Counts the contents of a description; bounds and trees are known only after building.
-    pub(crate) fn of(desc: &SceneDesc) -> Self {
+    /// Counts the contents of a description; bounds and trees are known only after building: see [`crate::Scene::info`].
+    pub fn of(desc: &SceneDesc) -> Self {
         let mut info = Self::default();
         let objects = || desc.objects.iter().flat_map(|object| &object.shapes);
         for shape in desc.shapes.iter().chain(objects()) {

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::{Error, Picture, SaveOptions, in_words};
 
 /// What a part file begins with.
-const MAGIC: &[u8] = b"LUMBRE PART 1\n";
+const MAGIC: &[u8] = b"LUMBRE PART 2\n";
 /// What an .exr ends with that holds a part, after the length of the part as eight bytes.
 const TRAILER: &[u8] = b"LUMBREPT";
 /// Bytes of a checksum.

@@ -623,7 +623,9 @@ impl<'a> Value<'a> {
             return Ok(numbers);
         }
         let expected = format!("numbers from {} to {}", range.start(), range.end());
-        let wrong = value.wrong("number out of range").found(format!("{numbers:?}"));
+        let wrong = value
+            .wrong("number out of range")
+            .found(format!("[{}]", numbers.map(|number| number.to_string()).join(", ")));
         Err(wrong.expected(expected).into())
     }
 

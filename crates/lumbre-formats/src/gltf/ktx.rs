@@ -60,7 +60,7 @@ pub(super) fn read(file: &File<'_>, bytes: &[u8], name: &Arc<str>) -> Read<Bitma
     let (data, has_alpha) = contained("KTX 2.0 texture", &place, || {
         let failed = |error: basisu::Error| {
             let wrong = Diagnostic::error("KTX 2.0 texture that cannot be read").at(place.clone());
-            FormatError::from(wrong.found(format!("{error:?}")))
+            FormatError::from(wrong.found(in_words(&error)))
         };
         let texture = Transcoder::new(bytes).map_err(failed)?;
         let data = texture.transcode(0, TargetFormat::Rgba32, DecodeFlags::NONE).map_err(failed)?;
@@ -141,4 +141,20 @@ fn zstandard_size(data: &[u8]) -> Option<[u64; 2]> {
         }
     }
     Some([least.max(declared), most.max(declared)])
+}
+
+/// What a decoder found.
+fn in_words(error: &basisu::Error) -> String {
+    match error {
+        basisu::Error::InvalidData => "data that is not of Basis Universal".to_owned(),
+        basisu::Error::Truncated => "data that ends too early".to_owned(),
+        basisu::Error::Unsupported { .. } => "a kind of texture that is not decoded to colours".to_owned(),
+        basisu::Error::UnsupportedFeature(what) => format!("what is not supported: {what}"),
+        basisu::Error::VideoRequiresState => "a video".to_owned(),
+        basisu::Error::InvalidImageOrLevel => "no first level".to_owned(),
+        basisu::Error::OutputTooSmall { needed } => format!("{needed} bytes of pixels"),
+        basisu::Error::ZstdRequired => "levels compressed by Zstandard".to_owned(),
+        // Of later versions of the decoder.
+        _ => "what the decoder does not read".to_owned(),
+    }
 }

@@ -40,6 +40,18 @@ impl Mode {
         })
     }
 
+    fn name(self) -> &'static str {
+        match self {
+            Self::Points => "points",
+            Self::Lines => "lines",
+            Self::LineLoop => "a line loop",
+            Self::LineStrip => "a line strip",
+            Self::Triangles => "triangles",
+            Self::TriangleStrip => "a triangle strip",
+            Self::TriangleFan => "a triangle fan",
+        }
+    }
+
     /// Whether it makes a surface.
     pub(super) fn is_surface(self) -> bool {
         matches!(self, Self::Triangles | Self::TriangleStrip | Self::TriangleFan)
@@ -309,7 +321,7 @@ impl<'a> Primitive<'a> {
         if let Some(count) = count.filter(|&count| mode.whole(count) != count) {
             let warning = value
                 .wrong("vertices that make no whole shape were left out")
-                .found(format!("{count} of {mode:?}"));
+                .found(format!("{count} of {}", mode.name()));
             file.push(crate::Diagnostic { severity: crate::Severity::Warning, ..warning });
         }
         let mut targets = vec![];

@@ -96,7 +96,9 @@ impl Encoded<'_> {
             other => {
                 let wrong =
                     Diagnostic::error(format!("unsupported {} image", format.name())).at(place.clone());
-                return Err(wrong.found(format!("{other:?}")).expected("8 or 16 bits a channel").into());
+                let bits = other.bits_per_pixel() / u16::from(other.channel_count());
+                let found = format!("{bits} bits a channel");
+                return Err(wrong.found(found).expected("8 or 16 bits a channel").into());
             }
         };
         let bitmap = Bitmap::new(width, height, channels, data, Encoding::Srgb).expect("counted above");

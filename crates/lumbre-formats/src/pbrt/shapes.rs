@@ -185,7 +185,7 @@ impl Converter<'_, '_> {
                     params.out_of_range(parameter, found, expected)
                 }
                 Err(ShapeError::Degenerate(why)) => Err(params.spot.error(why)),
-                Err(other) => Err(params.spot.error(format!("this shape cannot be made: {other:?}"))),
+                Err(other) => Err(params.spot.error(format!("this shape cannot be made: {other}"))),
             };
         }
         match ty {

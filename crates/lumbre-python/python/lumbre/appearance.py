@@ -94,7 +94,7 @@ class Texture:
 
 def _given(part: Any) -> dict[str, Any]:
     """What a part was made of, without what was made of it."""
-    return {name: value for name, value in part.__dict__.items() if name != "_made"}
+    return {name: value for name, value in part.__dict__.items() if name not in ("_made", "_hash")}
 
 
 def _textured(value: Any) -> Any:
@@ -294,9 +294,12 @@ class Principled(Material):
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Mix(Material):
     """One material or another from place to place: `amount` is the share of the second.
+
+    A mixture of mixtures may share them. Then each is compared, hashed and written once: a shared one has a number where `repr` writes it
+    first, and is that number from there on.
 
     >>> Mix(Diffuse(0.8), Metal(0.9), np.eye(2)).amount.image.shape
     (2, 2)
@@ -308,6 +311,71 @@ class Mix(Material):
 
     def _kind(self) -> _lumbre.Material:
         return _lumbre.Material.mix(self.first._native(), self.second._native(), _number_map("amount", self.amount))
+
+    def _own(self) -> tuple[Any, ...]:
+        """What it is besides its two materials."""
+        return self.normal_map, self.bump_map, self.amount
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Mix) or type(other) is not type(self):
+            return NotImplemented
+        # Pairs that are equal if all others are: each is in a class, by the identity of one of it (Hopcroft and Karp, "A linear algorithm
+        # for testing equivalence of finite automata", 1971).
+        classes: dict[int, int] = {}
+
+        def of(material: Material) -> int:
+            found = id(material)
+            while (next := classes.get(found, found)) != found:
+                classes[found] = classes.get(next, next)
+                found = next
+            return found
+
+        pairs: list[tuple[Material, Material]] = [(self, other)]
+        while pairs:
+            a, b = pairs.pop()
+            if (one := of(a)) == (two := of(b)):
+                continue
+            if not isinstance(a, Mix) or not isinstance(b, Mix) or type(a) is not type(b):
+                if a != b:
+                    return False
+                continue
+            if a._own() != b._own():
+                return False
+            classes[one] = two
+            pairs += (a.first, b.first), (a.second, b.second)
+        return True
+
+    def __hash__(self) -> int:
+        if "_hash" not in self.__dict__:
+            object.__setattr__(self, "_hash", hash((self._own(), self.first, self.second)))
+        value: int = self.__dict__["_hash"]
+        return value
+
+    def __repr__(self) -> str:
+        # How often each mixture is used by those of this one.
+        uses: dict[int, int] = {}
+        left: list[Material] = [self]
+        while left:
+            material = left.pop()
+            uses[id(material)] = uses.get(id(material), 0) + 1
+            if isinstance(material, Mix) and uses[id(material)] == 1:
+                left += material.first, material.second
+        numbers: dict[int, int] = {}
+
+        def written(material: Material) -> str:
+            if not isinstance(material, Mix):
+                return repr(material)
+            if id(material) in numbers:
+                return f"{type(material).__name__}#{numbers[id(material)]}"
+            name = type(material).__name__
+            if uses[id(material)] > 1:
+                numbers[id(material)] = len(numbers) + 1
+                name += f"#{len(numbers)}"
+            maps = f"normal_map={material.normal_map!r}, bump_map={material.bump_map!r}"
+            parts = f"first={written(material.first)}, second={written(material.second)}, amount={material.amount!r}"
+            return f"{name}({maps}, {parts})"
+
+        return written(self)
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,7 @@ def render(
     scene : Scene or path
     client : distributed.Client
     spp, size, and others by name
-        As of `Scene.render`, but for noise and denoise, which need the whole picture.
+        As of `Scene.render`, but for noise, min_spp and denoise, which need the whole picture.
     frames : times in seconds, optional
         Of a file; a list of pictures is returned then.
     time : seconds, optional
@@ -85,7 +85,7 @@ def render(
 
     Raises what a task raises, and `LumbreError` where workers keep dying.
     """
-    for name in ("noise", "denoise", "first_sample"):
+    for name in ("noise", "min_spp", "denoise", "first_sample"):
         if options.pop(name, None):
             raise LumbreError(f"{name} is not for renders on many machines")
     sources = [_Source.of(scene, ship, frame) for frame in frames] if frames is not None else [_Source.of(scene, ship, None)]

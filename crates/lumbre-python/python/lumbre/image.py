@@ -57,7 +57,7 @@ class Image:
 
     @property
     def stats(self) -> dict[str, Any]:
-        """spp, samples, rays, dropped, noise, threads, seconds."""
+        """spp, most_spp, samples, rays, dropped, clamped, noise, noise_target, noise_target_met, noisy_pixels, threads, seconds."""
         return self._native.stats()
 
     def save(

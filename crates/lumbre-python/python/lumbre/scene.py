@@ -396,6 +396,7 @@ class Scene:
         threads: int | None = None,
         time: float | None = None,
         noise: float | None = None,
+        min_spp: int | None = None,
         transparent: bool = False,
         features: bool = False,
         denoise: bool | None = None,
@@ -417,7 +418,11 @@ class Scene:
         seed : whole number, 0 or more
         threads : 0 for one a core
         time, noise : seconds, and relative noise
-            The render stops at whichever of spp, time and noise comes first; a pixel whose noise stays high at 1024 samples.
+            The render stops at whichever of spp, time and noise comes first. With noise alone it takes as long as it takes. Where spp or
+            time comes first and the noise is not reached, a `UserWarning` says so, as do `noise_target_met`, `noise` and
+            `noisy_pixels` of `Image.stats`.
+        min_spp : samples per pixel, with noise
+            What every pixel has before its noise may end it; by default 16, or up to 256 where most of the light comes by rare samples.
         transparent : leave out what is behind everything, and keep the coverage as `Image.alpha`
         features : gather albedo, normal, depth and uv as well, for `Image.feature`
         denoise : take the noise out; by default only of a model without camera and light, where none of spp, time and noise is given
@@ -445,6 +450,7 @@ class Scene:
             "threads": threads,
             "time": time,
             "noise": noise,
+            "min_spp": min_spp,
             "transparent": transparent,
             "features": features,
             "denoise": denoise,
@@ -453,15 +459,23 @@ class Scene:
         options = _options(given)
         if not (progress is None or isinstance(progress, bool) or callable(progress)):
             raise LumbreError(f"progress is no callable (found {progress!r}; expected True, or a function of samples, total and share)")
+        if min_spp is not None and noise is None:
+            raise LumbreError("min_spp is for a render to a noise (expected noise as well)")
         if spp is None and noise is not None:
-            # As in the program: some pixels never come to little noise.
-            options["spp"] = 1024
+            # As in the program: as many as it takes.
+            options["spp"] = 2**20
         elif spp is None and time is not None:
             options["spp"] = 2**32 - 1
         if progress is True:
             with _Bar() as bar:
-                return Image(self._native.render(options, bar))
-        return Image(self._native.render(options, progress or None))
+                image = Image(self._native.render(options, bar))
+        else:
+            image = Image(self._native.render(options, progress or None))
+        stats = image.stats
+        if stats["noise_target_met"] is False:
+            more = "time" if time is not None and stats["spp"] < options["spp"] else "spp"
+            warnings.warn(f"the noise is {stats['noise']}, and that of {noise} was not reached: more {more} goes on", stacklevel=2)
+        return image
 
     def explain(
         self,
@@ -661,7 +675,7 @@ def _options(given: Mapping[str, Any]) -> dict[str, Any]:
             options[name] = wholes(name, value, "width, height", 1)
         elif name == "crop":
             options[name] = wholes(name, value, "x0, y0, x1, y1")
-        elif name == "spp":
+        elif name in ("spp", "min_spp"):
             options[name] = whole(name, value, 1)
         elif name in ("max_depth", "threads", "first_sample"):
             options[name] = whole(name, value)

@@ -19,4 +19,4 @@ pub use guide::{Count, FEATURES, GuideSums, RatioSums};
 pub use pixel::{FeatureSample, FeatureSums, Pixel, Tint};
 pub use tile::{Exposure, Extras, Sample, Tile};
 
-pub(crate) use pixel::MAX_LUMINANCE;
+pub(crate) use pixel::{MAX_LUMINANCE, MAX_SAMPLE};

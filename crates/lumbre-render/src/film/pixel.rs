@@ -23,16 +23,21 @@ pub struct Pixel {
     pub taken: u32,
 }
 
+/// The largest component that a sample counts for: half of what a sum holds, for the weights of filters that are more than 1.
+pub(crate) const MAX_SAMPLE: f64 = ExactSum::LIMIT / 2.0;
+
 /// Luminance up to which noise is told apart.
 pub(crate) const MAX_LUMINANCE: f64 = 1e6;
 
 impl Pixel {
-    /// Adds a sample, whose colour is multiplied by its coverage. False, and nothing is added, where it is not finite, or beyond what
-    /// a sum holds.
+    /// Adds a sample, whose colour is multiplied by its coverage. False, and nothing is added, where it is not finite. One that is brighter
+    /// than [`MAX_SAMPLE`] is added as bright as that, in its hue.
     pub fn add(&mut self, colour: Rgb, coverage: f32, weight: f64) -> bool {
-        let weighted = colour.to_array().map(|channel| weight * f64::from(channel));
+        let most = colour.to_array().into_iter().map(|channel| f64::from(channel.abs())).fold(0.0, f64::max);
+        let scale = if most > MAX_SAMPLE { weight * (MAX_SAMPLE / most) } else { weight };
+        let weighted = colour.to_array().map(|channel| scale * f64::from(channel));
         let covered = weight * f64::from(coverage);
-        if ![weight, covered].into_iter().chain(weighted).all(ExactSum::holds) {
+        if !colour.is_finite() || ![weight, covered].into_iter().chain(weighted).all(ExactSum::holds) {
             return false;
         }
         for (sum, number) in self.sum.iter_mut().zip(weighted) {
@@ -236,12 +241,23 @@ mod tests {
         assert!(pixel.add(Rgb::new(2.0, 4.0, 8.0), 0.75, 3.0));
         assert!(pixel.add(Rgb::new(6.0, 0.0, 4.0), -0.25, 1.0));
         let before = pixel;
-        for colour in [f32::NAN, f32::INFINITY, 2e12] {
+        for colour in [f32::NAN, f32::INFINITY] {
             assert!(!pixel.add(Rgb::new(1.0, colour, 1.0), 1.0, 1.0));
         }
         assert_eq!(pixel, before);
         assert_eq!(pixel.coverage(), 0.5);
         assert_eq!(pixel.colour(), Rgb::new(3.0, 3.0, 7.0));
+    }
+
+    #[test]
+    fn what_is_brighter_than_a_sum_holds_is_as_bright_in_its_hue() {
+        let most = MAX_SAMPLE as f32;
+        for bright in [2.0 * most, 1e18, 1e19, f32::MAX] {
+            let mut pixel = Pixel::default();
+            assert!(pixel.add(Rgb::new(0.5 * bright, bright, 0.0), 1.0, 1.25));
+            assert_eq!(pixel.colour(), Rgb::new(0.5 * most, most, 0.0), "{bright}");
+            assert_eq!((pixel.samples, pixel.coverage()), (1, 1.0));
+        }
     }
 
     #[test]

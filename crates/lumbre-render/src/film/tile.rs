@@ -2,7 +2,7 @@
 
 use lumbre_image::Rgb;
 
-use crate::film::pixel::Sums;
+use crate::film::pixel::{MAX_SAMPLE, Sums};
 use crate::film::{FeatureSample, FeatureSums, GuideSums, Pixel, PixelBounds, Tint};
 
 /// How radiance becomes the colour of a pixel.
@@ -24,6 +24,11 @@ impl Default for Exposure {
 }
 
 impl Exposure {
+    /// Whether a sample of this radiance is brighter than any counts for: it is added as bright as that.
+    pub fn clamps(&self, radiance: Rgb) -> bool {
+        f64::from(self.colour(radiance).max_component()) > MAX_SAMPLE
+    }
+
     /// The colour that a sample of this radiance adds.
     pub fn colour(&self, radiance: Rgb) -> Rgb {
         let colour = radiance * self.factor;

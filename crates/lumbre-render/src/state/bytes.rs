@@ -48,7 +48,7 @@ impl RenderState {
         }
         words(&[self.first_dropped.len() as u32]);
         self.first_dropped.iter().for_each(|d| words(&[d.x, d.y, d.sample]));
-        let counts = [self.rays.camera, self.rays.bounce, self.rays.shadow, self.dropped];
+        let counts = [self.rays.camera, self.rays.bounce, self.rays.shadow, self.dropped, self.clamped];
         counts.into_iter().chain([extras.depth_unit.to_bits()]).for_each(|n| out.extend(n.to_le_bytes()));
         let film = self.film();
         planes(&mut out, film.pixels(), pixel_numbers);
@@ -90,7 +90,7 @@ impl RenderState {
             let [x, y, sample] = input.words()?;
             first_dropped.push(DroppedSample { x, y, sample });
         }
-        let [camera, bounce, shadow, dropped, depth_unit] = input.longs()?;
+        let [camera, bounce, shadow, dropped, clamped, depth_unit] = input.longs()?;
         let depth_unit = f64::from_bits(depth_unit);
         if !(depth_unit.is_normal() && depth_unit > 0.0) {
             return Err(StateError::Invalid("depths"));
@@ -112,7 +112,7 @@ impl RenderState {
             return Err(StateError::TooLong);
         }
         let rays = RayCounts { camera, bounce, shadow };
-        Ok(Self { bounds, tiles: vec![film], pieces, rays, dropped, first_dropped })
+        Ok(Self { bounds, tiles: vec![film], pieces, rays, dropped, clamped, first_dropped })
     }
 }
 
@@ -290,6 +290,7 @@ mod tests {
             ],
             rays: RayCounts { camera: 1, bounce: u64::MAX, shadow: 3 },
             dropped: 1,
+            clamped: 2,
             first_dropped: vec![DroppedSample { x: 7, y: 3, sample: 2 }],
         }
     }
@@ -301,7 +302,7 @@ mod tests {
         let back = RenderState::from_bytes(&bytes, u64::MAX).unwrap();
         assert_eq!(back.film(), state.film());
         assert_eq!(back.to_bytes(), bytes);
-        assert_eq!((back.rays, back.dropped), (state.rays, state.dropped));
+        assert_eq!((back.rays, back.dropped, back.clamped), (state.rays, state.dropped, state.clamped));
         assert_eq!(back.first_dropped, state.first_dropped);
         assert_eq!(back.pieces, [state.pieces[1].clone(), state.pieces[0].clone()]);
     }

@@ -10,7 +10,8 @@ use std::ops::Range;
 use lumbre_image::Image;
 
 use crate::film::{Extras, Pixel, Tile};
-use crate::rendered::{noise, rendered_of, variance_picture};
+use crate::noise::noise;
+use crate::rendered::{rendered_of, variance_picture};
 use crate::{DroppedSample, PixelBounds, RayCounts, Rendered, Stats};
 
 pub use bytes::StateError;
@@ -31,6 +32,8 @@ pub struct RenderState {
     pub(crate) rays: RayCounts,
     /// Samples that were not finite.
     pub(crate) dropped: u64,
+    /// Samples that were brighter than a sum holds.
+    pub(crate) clamped: u64,
     /// The first of them.
     pub(crate) first_dropped: Vec<DroppedSample>,
 }
@@ -171,8 +174,9 @@ impl RenderState {
             samples: self.rays.camera,
             rays: self.rays,
             dropped: self.dropped,
+            clamped: self.clamped,
             first_dropped: self.first_dropped.clone(),
-            noise: noise(iter::once(&*film)),
+            noise: noise(iter::once(&*film), self.bounds, None),
             ..Stats::default()
         };
         Rendered { stats, ..rendered }
@@ -209,6 +213,7 @@ impl RenderState {
         self.pieces.extend(other.pieces.iter().cloned());
         self.rays += other.rays;
         self.dropped += other.dropped;
+        self.clamped += other.clamped;
         self.first_dropped.extend(&other.first_dropped);
         self.first_dropped.sort_unstable_by_key(|d| (d.sample, d.y, d.x));
         self.first_dropped.truncate(REMEMBERED);
@@ -288,6 +293,7 @@ mod tests {
             pieces,
             rays: RayCounts::default(),
             dropped: 0,
+            clamped: 0,
             first_dropped: Vec::new(),
         }
     }

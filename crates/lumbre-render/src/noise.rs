@@ -1,0 +1,134 @@
+//! The noise of a picture.
+
+use crate::adaptive::{Adaptive, FLOOR};
+use crate::film::{PixelBounds, Tile};
+use crate::neighbourhoods::{Known, Neighbourhoods, Spread};
+use crate::rendered::put_together;
+
+/// So few bright samples tell no mean.
+const FEW: f64 = 2.0;
+/// Cells along the longer side of the grid of neighbourhoods.
+const SIDE: u32 = 256;
+
+/// The noise of the tiles of a picture, as [`crate::Stop::noise`] defines it; `None` where no pixel has two samples.
+///
+/// A pixel of n samples with light in one of them has an error as large as its luminance, and knows not how rare that light is. So the
+/// luminance that its error is measured against is that of its neighbourhood, as far as that is less and its own is in doubt. And light that the trial has met, and
+/// these pixels not yet, counts as far as they have too few samples for it.
+pub(crate) fn noise<'t>(
+    tiles: impl Iterator<Item = &'t Tile>,
+    bounds: PixelBounds,
+    adaptive: Option<&Adaptive>,
+) -> Option<f64> {
+    let pixels = put_together(tiles, bounds, None, |tile| tile.pixels().iter().map(Known::of));
+    let (width, height) = (bounds.width(), bounds.height());
+    let side = width.max(height).div_ceil(SIDE).max(1);
+    let columns = width.div_ceil(side) as usize;
+    let mut spreads = vec![Spread::default(); columns * height.div_ceil(side) as usize];
+    let places = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    let (mut count, mut sum) = (0.0, 0.0);
+    for ((x, y), known) in places().zip(&pixels) {
+        let Some(known) = *known else { continue };
+        let spread = &mut spreads[(y / side) as usize * columns + (x / side) as usize];
+        *spread = spread.and(&Spread::of_pixel(known));
+        (count, sum) = (count + 1.0, sum + known.mean);
+    }
+    if count == 0.0 {
+        return None;
+    }
+    // Cells at the right and lower edges may reach beyond the picture.
+    let size = [columns as u32 * side, height.div_ceil(side) * side];
+    let neighbourhoods = Neighbourhoods::new(size, columns, &spreads);
+    let floor = FLOOR * (sum / count).max(0.0);
+    let (mut squares, mut expected, mut kurtosis, mut samples) = (0.0, 0.0, 0.0, 0.0);
+    let relative = |square: f64, luminance: f64| {
+        let scale = luminance.max(0.0) + floor;
+        // A black picture has no noise that would be seen.
+        if scale > 0.0 { square / (scale * scale) } else { 0.0 }
+    };
+    for ((x, y), known) in places().zip(&pixels) {
+        let Some(known) = *known else { continue };
+        let Known { samples: n, mean: luminance, error } = known;
+        let around = Spread::of_pixel(known).within(neighbourhoods.at(x, y)).mean;
+        // Of one or two bright samples the mean says nothing; of twenty it does, as at the edge of a lamp.
+        let doubt = (FEW * (error / luminance.max(f64::MIN_POSITIVE)).powi(2)).min(1.0);
+        squares += relative(error * error, luminance - doubt * (luminance - around).max(0.0));
+        if let Some(adaptive) = adaptive {
+            let trial = adaptive.expectation(bounds.x0 + x, bounds.y0 + y);
+            expected += relative(trial.variance / n, around.max(trial.mean));
+            kurtosis += trial.kurtosis;
+            samples += n;
+        }
+    }
+    let square = match samples > 0.0 {
+        // How much the samples say beside those of the trial.
+        true => {
+            let kurtosis = kurtosis / count;
+            (samples * squares + kurtosis * expected) / (samples + kurtosis)
+        }
+        false => squares,
+    };
+    Some((square / count).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use lumbre_image::Rgb;
+    use lumbre_math::random::RandomStream;
+
+    use super::*;
+    use crate::film::{Exposure, Extras, Sample};
+
+    const EXTRAS: Extras = Extras { features: false, tints: false, guides: false, depth_unit: 1.0 };
+
+    /// A tile of 64 by 48 pixels of n samples, of which a share has this luminance and the rest 0.1, and its noise.
+    fn found(n: u32, share: f64, bright: f64) -> f64 {
+        let bounds = PixelBounds::whole(64, 48);
+        let mut tile = Tile::new(bounds, EXTRAS);
+        let mut random = RandomStream::new(9);
+        for (x, y) in bounds.pixels() {
+            for _ in 0..n {
+                let value = if random.next_f64() < share { bright } else { 0.1 };
+                let radiance = Rgb::splat(value as f32);
+                let sample =
+                    Sample { radiance, coverage: Rgb::WHITE, weight: 1.0, features: None, on_catcher: false };
+                assert!(tile.add(x, y, &sample, &Exposure { factor: 1.0, max_component: f32::INFINITY }));
+            }
+        }
+        noise([&tile].into_iter(), bounds, None).unwrap()
+    }
+
+    #[test]
+    fn light_that_few_pixels_have_met_counts_as_much_as_where_all_have() {
+        for (n, share) in [(64, 0.25), (16, 0.01), (16, 0.001), (32, 3e-4)] {
+            let bright = 0.1 + 1.0 / share;
+            // The mean is 1.1, and the variance is (bright - 0.1)² pq.
+            let expected = ((1.0 - share) / share / f64::from(n)).sqrt() / (1.1 * 1.1);
+            let noise = found(n, share, bright);
+            println!("{n} {share}: {noise} {expected}");
+            assert!(
+                (noise / expected - 1.0).abs() < 0.35,
+                "{n} samples, 1 in {}: {noise} {expected}",
+                1.0 / share
+            );
+        }
+    }
+
+    #[test]
+    fn the_edge_of_a_lamp_beside_the_dark_is_not_taken_for_rare_light() {
+        // The left column is half covered by a lamp of 30; all else is 0.1, without noise.
+        let bounds = PixelBounds::whole(64, 48);
+        let mut tile = Tile::new(bounds, EXTRAS);
+        for (x, y) in bounds.pixels() {
+            for k in 0..256 {
+                let radiance = Rgb::splat(if x == 0 && k % 2 == 0 { 30.0 } else { 0.1 });
+                let sample =
+                    Sample { radiance, coverage: Rgb::WHITE, weight: 1.0, features: None, on_catcher: false };
+                assert!(tile.add(x, y, &sample, &Exposure::default()));
+            }
+        }
+        // An error of 15 / 16 beside a mean of 15, in one pixel of 64.
+        let noise = noise([&tile].into_iter(), bounds, None).unwrap();
+        assert!((0.0075..0.0083).contains(&noise), "{noise}");
+    }
+}
