@@ -92,7 +92,7 @@ mod tests {
                 let radiance = Rgb::splat(value as f32);
                 let sample =
                     Sample { radiance, coverage: Rgb::WHITE, weight: 1.0, features: None, on_catcher: false };
-                assert!(tile.add(x, y, &sample, &Exposure { factor: 1.0, max_component: f32::INFINITY }));
+                assert!(tile.add(x, y, &sample, &Exposure::default()));
             }
         }
         noise([&tile].into_iter(), bounds, None).unwrap()

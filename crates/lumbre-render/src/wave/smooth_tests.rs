@@ -88,6 +88,7 @@ fn scene(material: Material, reverse: bool) -> Scene {
         screen_window: None,
         shutter_open: 0.0,
         shutter_close: 1.0,
+        medium: None,
     };
     let shape = ShapeDesc {
         index: 0,
@@ -95,6 +96,7 @@ fn scene(material: Material, reverse: bool) -> Scene {
         world_from_object: Transform::IDENTITY,
         reverse_orientation: reverse,
         material: Some(MaterialId(0)),
+        boundary: None,
         area_light: None,
         alpha: None,
     };
@@ -123,6 +125,7 @@ fn first_vertices<'s>(
         regularize: one_by_one,
         shading_normals,
         has_solids: false,
+        has_media: false,
         has_panes: false,
         moves: false,
         instruction_set: set,
