@@ -298,7 +298,9 @@ fn definer(sources: &BTreeMap<Module, Source>, path: &[String], seen: &mut Vec<M
     }
     source.exports.iter().find_map(|export| match export.split_last() {
         Some((last, _)) if last == name => definer(sources, export, seen),
-        Some((last, all)) if last == "*" => definer(sources, &[all, &[name.clone()]].concat(), seen),
+        Some((last, all)) if last == "*" => {
+            definer(sources, &[all, std::slice::from_ref(name)].concat(), seen)
+        }
         _ => None,
     })
 }

@@ -578,7 +578,7 @@ impl Builder {
                 }
             }
             LightDesc::Projection { world_from_light, intensity, image, fov } => {
-                if !intensity.is_finite() || !(0.0 < fov && fov < 180.0) {
+                if !(intensity.is_finite() && 0.0 < fov && fov < 180.0) {
                     return Err(wrong(
                         "its intensity is not finite, or its angle not between 0 and 180 degrees",
                     ));

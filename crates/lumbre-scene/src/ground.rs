@@ -56,8 +56,7 @@ impl GroundPlane {
             }
         }
         let ids = (0..).zip(lights).filter(|(_, light)| !light.is_surface()).map(|(id, _)| LightId(id));
-        // 0 for NaN.
-        let albedo = desc.reflectance.map(|share| share.max(0.0).min(1.0));
+        let albedo = desc.reflectance.map(|share| if share > 0.0 { share.min(1.0) } else { 0.0 });
         let lights = ids.collect();
         Self { normal, point: desc.point, catcher: desc.catcher, albedo, open, local, lights }
     }

@@ -168,7 +168,7 @@ impl Scene {
             if let Some(id) = medium {
                 let way = Way { origin: ray.at(at), direction, length: (end - at) * speed };
                 let numbers = PassageNumbers::from_seed(seed.wrapping_add(part));
-                left = left * self.medium(id).transmittance(&way, numbers);
+                left *= self.medium(id).transmittance(&way, numbers);
                 if left.is_black() {
                     return left;
                 }

@@ -106,7 +106,7 @@ fn frame_into(frame: Bytes<'_>, out: &mut Vec<u8>, most: usize) -> Result<(), Fo
         let length = block_size.min(size - block * block_size);
         let splits = flags & NOT_SPLIT == 0 && type_size <= 16 && block_size / type_size >= 128;
         let streams = if splits && length == block_size { type_size } else { 1 };
-        if length % streams != 0 {
+        if !length.is_multiple_of(streams) {
             return Err(frame.fault(8, "a Blosc frame whose blocks are not of whole elements").into());
         }
         let start = out.len();

@@ -120,7 +120,7 @@ fn grids(bytes: Bytes<'_>, budget: &Budget) -> Result<Vec<Stored>, FormatError> 
         b"NanoVDB1" => raw_grids(bytes, budget),
         b"NanoVDB0" if is_raw(bytes) => raw_grids(bytes, budget),
         b"NanoVDB0" | b"NanoVDB2" => segments(bytes, budget),
-        [b'0'..=b'9', rest @ ..] if rest == b"BDVonaN" => {
+        [b'0'..=b'9', b'B', b'D', b'V', b'o', b'n', b'a', b'N'] => {
             Err(bytes.fault(0, "a NanoVDB file of big-endian numbers").expected("little-endian ones").into())
         }
         _ => {

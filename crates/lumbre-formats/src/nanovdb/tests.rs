@@ -212,9 +212,7 @@ fn zip(raw: &[u8]) -> Vec<u8> {
 }
 
 fn read_density(bytes: &[u8]) -> Result<Option<NanoGrid>, FormatError> {
-    let mut limits = Limits::default();
-    limits.memory = 64 << 20;
-    let budget = Budget::new(limits);
+    let budget = Budget::new(Limits { memory: 64 << 20, ..Limits::default() });
     let read = read(bytes, &"a.nvdb".into(), "density", Values::NotNegative, &budget);
     assert!(budget.memory_peak() <= 64 << 20);
     read

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use lumbre_math::{DVec3, Transform};
 use lumbre_scene::MediumId;
 use lumbre_shading::medium::{
-    Cloud, Coefficients, Density, Factor, Glow, Grid, HeterogeneousMedium, HomogeneousMedium, Medium, preset,
-    preset_names,
+    Cloud, Coefficients, Density, Factor, Glow, Grid, Heat, HeterogeneousMedium, HomogeneousMedium, Medium,
+    preset, preset_names,
 };
 use lumbre_shading::spectrum::BlackbodyColours;
 use lumbre_shading::{Spectrum, SpectrumValue};
@@ -206,12 +206,12 @@ impl Converter<'_, '_> {
             Some(NanoGrid { grid, world_bounds }) => {
                 (low, high) = (low.min(world_bounds[0]), high.max(world_bounds[1]));
                 let hottest = grid.greatest();
-                self.heat(params, Density::Sparse(grid), hottest, factor)?
+                self.heat(params, Density::Sparse(Box::new(grid)), hottest, factor)?
             }
         };
         let scale = params.float_at_least_zero("scale", 1.0)? as f32;
         let coefficients = Coefficients::Scaled {
-            density: Density::Sparse(density),
+            density: Density::Sparse(Box::new(density)),
             absorption: self.coefficient(params, "sigma_a")? * scale,
             scattering: self.coefficient(params, "sigma_s")? * scale,
         };
@@ -278,7 +278,7 @@ impl Converter<'_, '_> {
         let offset = params.float("temperatureoffset", cutoff)? as f32;
         let scale = params.float("temperaturescale", 1.0)? as f32;
         let colours = BlackbodyColours::up_to((hottest - offset) * scale);
-        Ok(Glow::Heat { temperature, offset, scale, factor, colours })
+        Ok(Glow::Heat(Box::new(Heat { temperature, offset, scale, factor, colours })))
     }
 
     /// A coefficient of absorption or scattering; 1 where none is given.

@@ -119,7 +119,7 @@ fn lost(
             if scene.is_occluded(&shadow_ray) { Spectrum::BLACK } else { Spectrum::WHITE }
         };
         if scene.has_media() {
-            left = left * scene.transmittance(None, &shadow_ray, draw.along(&shadow_ray));
+            left *= scene.transmittance(None, &shadow_ray, draw.along(&shadow_ray));
         }
         if left == Spectrum::WHITE {
             continue;

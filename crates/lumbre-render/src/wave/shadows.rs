@@ -165,7 +165,7 @@ impl<'s> Shadows<'s> {
                 let slot = self.slot[i] as usize;
                 let ray = self.ray(i, slots.time[slot]);
                 let seed = slots.draws[slot].along(&ray);
-                passes = passes * scene.transmittance(of_column(self.medium[i]), &ray, seed);
+                passes *= scene.transmittance(of_column(self.medium[i]), &ray, seed);
             }
             if !passes.is_black() {
                 slots.radiance[self.slot[i] as usize] += self.light(i) * passes;

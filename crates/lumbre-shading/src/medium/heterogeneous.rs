@@ -31,7 +31,7 @@ pub enum Density {
     /// Of voxels that fill the medium's box.
     Grid(Grid<f32>),
     /// Of voxels with a map of their own.
-    Sparse(SparseGrid),
+    Sparse(Box<SparseGrid>),
     /// Procedural.
     Cloud(Cloud),
 }
@@ -78,19 +78,23 @@ pub enum Glow {
         /// A factor on it.
         scale: f32,
     },
-    /// That of a black body; none at 100 K and below.
-    Heat {
-        /// The temperature before the offset and the scale.
-        temperature: Density,
-        /// What is subtracted from it.
-        offset: f32,
-        /// What the difference is multiplied by: kelvins.
-        scale: f32,
-        /// A factor on the radiance.
-        factor: Factor,
-        /// The colours by temperature.
-        colours: BlackbodyColours,
-    },
+    /// By temperature.
+    Heat(Box<Heat>),
+}
+
+/// The radiance of black bodies; none at 100 K and below.
+#[derive(Clone, Debug)]
+pub struct Heat {
+    /// The temperature before the offset and the scale.
+    pub temperature: Density,
+    /// What is subtracted from it.
+    pub offset: f32,
+    /// What the difference is multiplied by: kelvins.
+    pub scale: f32,
+    /// A factor on the radiance.
+    pub factor: Factor,
+    /// The colours by temperature.
+    pub colours: BlackbodyColours,
 }
 
 /// A factor on what a medium emits.
@@ -168,7 +172,7 @@ impl HeterogeneousMedium {
             Glow::None => 0,
             Glow::Scaled { factor, .. } => factor.memory(),
             Glow::Coloured { radiance, .. } => radiance.memory(),
-            Glow::Heat { temperature, factor, .. } => temperature.memory() + factor.memory(),
+            Glow::Heat(heat) => heat.temperature.memory() + heat.factor.memory(),
         };
         coefficients + glow + size_of_val(self.majorants.most.as_slice())
     }
@@ -217,7 +221,7 @@ impl HeterogeneousMedium {
         let mut tentative = self.tentative(way);
         while let Some((t, majorant)) = tentative.next(numbers) {
             let Local { absorption, scattering } = self.at(tentative.point(t));
-            left = left * (absorption + scattering).map(|extinction| (1.0 - extinction / majorant).max(0.0));
+            left *= (absorption + scattering).map(|extinction| (1.0 - extinction / majorant).max(0.0));
             let part = left.max_component();
             if !goes_on(&mut left, part, numbers) {
                 return Spectrum::BLACK;
@@ -248,7 +252,8 @@ impl HeterogeneousMedium {
             Glow::None => Spectrum::BLACK,
             Glow::Scaled { radiance, factor } => *radiance * factor.at(within(p, &self.bounds)),
             Glow::Coloured { radiance, scale } => radiance.at(within(p, &self.bounds)) * *scale,
-            Glow::Heat { temperature, offset, scale, factor, colours } => {
+            Glow::Heat(heat) => {
+                let Heat { temperature, offset, scale, factor, colours } = &**heat;
                 let kelvin = (temperature.at(p, &self.bounds) - offset) * scale;
                 if kelvin > 100.0 {
                     colours.at(kelvin) * factor.at(within(p, &self.bounds))
@@ -501,7 +506,7 @@ impl<'a> Cells<'a> {
             let [nx, ny, nz] = self.majorants.size.map(|n| n as i64);
             let [x, y, z] = self.cell;
             let is_inside = (0..nx).contains(&x) && (0..ny).contains(&y) && (0..nz).contains(&z);
-            if !is_inside || !(self.at < self.end) {
+            if !is_inside || self.at >= self.end {
                 return None;
             }
             let most = self.majorants.most[((z * ny + y) * nx + x) as usize];

@@ -18,7 +18,7 @@ use crate::Spectrum;
 
 pub use cloud::Cloud;
 pub use grid::{Grid, GridError, Voxel};
-pub use heterogeneous::{Coefficients, Density, Factor, Glow, HeterogeneousMedium};
+pub use heterogeneous::{Coefficients, Density, Factor, Glow, Heat, HeterogeneousMedium};
 pub use homogeneous::{DistanceSample, HomogeneousMedium, albedo_of_many_collisions};
 pub use phase::{henyey_greenstein, sample_henyey_greenstein, sample_henyey_greenstein_lanes};
 pub use presets::{preset, preset_names};
