@@ -186,13 +186,7 @@ impl Hits {
 
     /// How far a ray went; infinite where it met nothing.
     pub(crate) fn distance_f64(&self, path: usize) -> f64 {
-        if self.is_miss(path) {
-            f64::INFINITY
-        } else if self.is_single {
-            self.columns.t[path].into()
-        } else {
-            self.double[path].as_ref().map_or(f64::INFINITY, |hit| hit.root.t)
-        }
+        self.hit(path).map_or(f64::INFINITY, |hit| hit.root.t)
     }
 
     /// What a ray met, with all that one may want to know of it.
