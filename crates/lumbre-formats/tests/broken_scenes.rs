@@ -310,8 +310,8 @@ const CASES: &[(&str, &str)] = &[
         "1:65: medium \"m\" is defined twice",
     ),
     (
-        "MediumInterface \"fog\" WorldBegin MakeNamedMedium \"foggy\" \"string type\" \"homogeneous\"",
-        "1:17: medium \"fog\" is not defined (did you mean \"foggy\"?)",
+        "MediumInterface \"fog\" WorldBegin MakeNamedMedium \"fogs\" \"string type\" \"homogeneous\"",
+        "1:17: medium \"fog\" is not defined (did you mean \"fogs\"?)",
     ),
     (
         "MakeNamedMedium \"m\" \"rgb sigma_a\" [1 1 1]",
@@ -323,11 +323,11 @@ const CASES: &[(&str, &str)] = &[
     ),
     (
         "MakeNamedMedium \"m\" \"string type\" \"uniformgrid\" \"integer nx\" 2 \"float density\" [1 2 3]",
-        "1:65: wrong value for parameter \"density\" (found 3 numbers; expected a number for each of 2 × 1 × 1 voxels)",
+        "1:64: wrong value for parameter \"density\" (found 3 numbers; expected a number for each of 2 × 1 × 1 voxels)",
     ),
     (
         "MakeNamedMedium \"m\" \"string type\" \"uniformgrid\" \"integer nx\" 2 \"float density\" [1 -2]",
-        "1:65: wrong value for parameter \"density\" (found -2 at position 1; expected numbers that are not negative)",
+        "1:64: wrong value for parameter \"density\" (found -2 at position 1; expected numbers that are not negative)",
     ),
     (
         "MakeNamedMedium \"m\" \"string type\" \"cloud\" \"point3 p1\" [1 0 1]",
@@ -339,7 +339,7 @@ const CASES: &[(&str, &str)] = &[
     ),
     (
         "MakeNamedMedium \"m\" \"string type\" \"uniformgrid\" \"float density\" 1 \"rgb Le\" [1 1 1] \"float temperature\" 900",
-        "1:88: a medium has Le and a temperature (expected one of both)",
+        "1:84: a medium has Le and a temperature (expected one of both)",
     ),
     // Spectra, materials and lights.
     (

@@ -23,6 +23,9 @@ use crate::{Diagnostic, Input};
 /// The types of media.
 pub(super) const MEDIA: [&str; 5] = ["homogeneous", "uniformgrid", "rgbgrid", "cloud", "nanovdb"];
 
+/// What says how a medium glows by its temperature, and does nothing without.
+const OF_HEAT: [&str; 3] = ["temperatureoffset", "temperaturecutoff", "temperaturescale"];
+
 /// Beyond this, light goes all but straight on or back.
 const MOST_ASYMMETRY: f64 = 0.99;
 
@@ -200,7 +203,7 @@ impl Converter<'_, '_> {
         let factor = Factor::Constant(params.float_at_least_zero("Lescale", 1.0)? as f32);
         let glow = match temperature {
             None => {
-                params.ignore(&["temperatureoffset", "temperaturecutoff", "temperaturescale"]);
+                params.ignore(&OF_HEAT);
                 Glow::None
             }
             Some(NanoGrid { grid, world_bounds }) => {
@@ -263,8 +266,14 @@ impl Converter<'_, '_> {
                 let wrong = Diagnostic::error("a medium has Le and a temperature");
                 Err(params.spot_of("temperature").wrong(wrong.expected("one of both")))
             }
-            (None, None) => Ok(Glow::None),
-            (Some(radiance), None) => Ok(Glow::Scaled { radiance, factor }),
+            (None, None) => {
+                params.ignore(&OF_HEAT);
+                Ok(Glow::None)
+            }
+            (Some(radiance), None) => {
+                params.ignore(&OF_HEAT);
+                Ok(Glow::Scaled { radiance, factor })
+            }
             (None, Some(temperature)) => {
                 let hottest = temperature.greatest();
                 self.heat(params, Density::Grid(temperature), hottest, factor)
