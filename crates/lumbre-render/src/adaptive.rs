@@ -1,7 +1,7 @@
 //! Adaptive sampling: when a pixel has samples enough.
 
 use crate::film::{Pixel, Tile};
-use crate::neighbourhoods::Expectation;
+use crate::neighbourhoods::{Expectation, FLOOR};
 use crate::trial::Trial;
 
 /// Ends the sampling of each pixel where its noise is low enough.
@@ -23,9 +23,6 @@ pub(crate) struct Adaptive {
 
 /// How much an estimate of n samples is raised, times √n.
 const CAUTION: f64 = 2.0;
-/// The share of the picture's mean luminance that is added to that of each pixel, so that black pixels count for little.
-pub(crate) const FLOOR: f64 = 0.1;
-
 impl Adaptive {
     /// For a limit of noise, and a trial of the whole picture. Every pixel gets `min_spp` samples, or as many as the trial asks for.
     pub(crate) fn new(limit: f64, min_spp: Option<u32>, trial: Trial) -> Self {
@@ -84,11 +81,6 @@ impl Adaptive {
         let share = self.share_of_limit(x, y, pixel).unwrap_or(1.0);
         (taken * share * share).max(taken).max(f64::from(self.min_spp)).min(f64::from(most))
     }
-}
-
-/// How many samples of this variance have a mean with an error of `allowed`.
-pub(crate) fn needed(variance: f64, allowed: f64) -> f64 {
-    if variance > 0.0 { variance / (allowed * allowed) } else { 0.0 }
 }
 
 /// 1, 2, 3, 4, 6, 8, 12, 16, 24 and so on: numbers of samples after which a Sobol sequence is even.

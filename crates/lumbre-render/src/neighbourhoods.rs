@@ -2,6 +2,14 @@
 
 use crate::film::Pixel;
 
+/// The share of the picture's mean luminance that is added to that of each pixel, so that black pixels count for little.
+pub(crate) const FLOOR: f64 = 0.1;
+
+/// How many samples of this variance have a mean with an error of `allowed`.
+pub(crate) fn needed(variance: f64, allowed: f64) -> f64 {
+    if variance > 0.0 { variance / (allowed * allowed) } else { 0.0 }
+}
+
 /// Sums over the luminances of samples. Those of several pixels add up.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Spread {

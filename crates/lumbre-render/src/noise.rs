@@ -1,8 +1,8 @@
 //! The noise of a picture.
 
-use crate::adaptive::{Adaptive, FLOOR};
+use crate::adaptive::Adaptive;
 use crate::film::{PixelBounds, Tile};
-use crate::neighbourhoods::{Known, Neighbourhoods, Spread};
+use crate::neighbourhoods::{FLOOR, Known, Neighbourhoods, Spread};
 use crate::rendered::put_together;
 
 /// So few bright samples tell no mean.

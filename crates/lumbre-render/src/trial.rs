@@ -4,10 +4,9 @@ use std::time::Instant;
 
 use lumbre_scene::Scene;
 
-use crate::adaptive::{FLOOR, needed};
 use crate::film::MAX_LUMINANCE;
 use crate::integrators::Integrator;
-use crate::neighbourhoods::{Expectation, Moments, Neighbourhoods, Spread};
+use crate::neighbourhoods::{Expectation, FLOOR, Moments, Neighbourhoods, Spread, needed};
 use crate::one_sample::Taker;
 use crate::transport::Record;
 use crate::wave::{SampleId, Wave};

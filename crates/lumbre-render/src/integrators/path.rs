@@ -5,7 +5,8 @@ use lumbre_simd::InstructionSet;
 
 use crate::integrators::Integrator;
 use crate::transport::{Record, Sampler, Strategy};
-use crate::wave::{Setting, Sights};
+use crate::wave::Sights;
+use crate::wave::setting::Setting;
 
 /// Kajiya's path tracing: at each surface one sample of a light and one of the BSDF, combined by the power heuristic,
 /// and Russian roulette by throughput from the sixth bounce on. Many paths go side by side, in waves.

@@ -5,8 +5,8 @@ use lumbre_shading::Spectrum;
 use lumbre_simd::{Double, Job, Mask, Real, UInt};
 
 use crate::wave::paths::{Paths, Slots};
+use crate::wave::setting::{Found, Setting};
 use crate::wave::vertices::{gather3, gather64};
-use crate::wave::{Found, Setting};
 
 /// Finds the light of one infinite light for all paths of a queue.
 pub(crate) struct Escape<'a, 's> {

@@ -8,8 +8,8 @@ use lumbre_simd::{Double, Job, Mask, Real, UInt, V3};
 
 use crate::wave::paths::{Paths, grow};
 use crate::wave::search::MetTriangle;
+use crate::wave::setting::{Found, Setting};
 use crate::wave::vertices::{LIT_FROM_BELOW, Place, Vertices, gather3, gather64};
-use crate::wave::{Found, Setting};
 
 /// Flat triangles that paths met, in columns.
 #[derive(Debug, Default)]

@@ -2,8 +2,8 @@
 
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Vec3};
+use lumbre_scene::MediumId;
 use lumbre_scene::light::LightPoint;
-use lumbre_scene::{Boundary, MediumId};
 use lumbre_shading::medium::{DistanceSample, Way, henyey_greenstein, sample_henyey_greenstein};
 use lumbre_shading::{Scatter, Spectrum};
 use lumbre_simd::V3;
@@ -11,43 +11,12 @@ use lumbre_simd::V3;
 use crate::transport::journal::{End, Event, Source};
 use crate::transport::through::goes_straight_on;
 use crate::transport::{Record, Strategy};
-use crate::wave::paths::{OnePath, SCATTERED};
-use crate::wave::shade::power_heuristic;
+use crate::wave::Wave;
+use crate::wave::paths::{Collision, OnePath, SCATTERED, of_column, to_column};
+use crate::wave::setting::{Setting, power_heuristic};
 use crate::wave::shadows::{NEARLY_WHOLE, OneSegment, Pane};
 use crate::wave::traced::Traced;
 use crate::wave::vertices::Place;
-use crate::wave::{Setting, Wave};
-
-/// Where a medium scatters a path.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Collision {
-    /// The position of the path.
-    path: u32,
-    point: DVec3,
-    medium: MediumId,
-    /// The width of the footprint there.
-    width: f32,
-}
-
-/// A medium in a column: its index, or this for a vacuum.
-const VACUUM: u32 = u32::MAX;
-
-pub(crate) fn to_column(medium: Option<MediumId>) -> u32 {
-    medium.map_or(VACUUM, |id| id.0)
-}
-
-pub(crate) fn of_column(medium: u32) -> Option<MediumId> {
-    (medium != VACUUM).then_some(MediumId(medium))
-}
-
-/// The media where a path comes from and behind the surface that it met, as columns keep them, inside of `around` before.
-pub(crate) fn sides(boundary: Option<Boundary>, front: bool, around: u32) -> [u32; 2] {
-    match boundary {
-        None => [around; 2],
-        Some(Boundary { inside, outside }) if front => [outside, inside].map(to_column),
-        Some(Boundary { inside, outside }) => [inside, outside].map(to_column),
-    }
-}
 
 impl<'s> Wave<'s> {
     /// Takes all paths through media to what they meet, and notes those that scatter or end before.

@@ -13,6 +13,7 @@ mod lights;
 mod media;
 mod paths;
 mod search;
+pub(crate) mod setting;
 mod shade;
 mod shadows;
 mod sights;
@@ -24,28 +25,26 @@ mod vertices;
 use std::marker::PhantomData;
 
 use lumbre_geometry::Ray;
-use lumbre_kernel::PictureRounding;
-use lumbre_math::DVec3;
-use lumbre_scene::{Crossing, SamplerKind, Scene};
+use lumbre_scene::{Crossing, Scene};
+use lumbre_shading::Spectrum;
 use lumbre_shading::lanes::{
     BsdfKind, CoatedConductorLanes, CoatedDiffuseLanes, ConductorLanes, DielectricLanes, DiffuseLanes,
     DiffuseTransmissionLanes, PrincipledLanes, ThinDielectricLanes, UberLanes,
 };
-use lumbre_shading::{ShadingNormals, Spectrum};
-use lumbre_simd::{Double, InstructionSet, Real, V3};
+use lumbre_simd::Real;
 
 pub(crate) use paths::SampleId;
 pub(crate) use search::Precision;
 pub use sights::Sights;
 pub(crate) use sights::cone;
 
+use crate::transport::Record;
 use crate::transport::journal::{End, Event, Source};
-use crate::transport::{Record, Strategy};
 use crate::wave::escape::Escape;
 use crate::wave::flat::FlatHits;
-use crate::wave::media::Collision;
-use crate::wave::paths::{OnePath, Paths, Slots};
+use crate::wave::paths::{Collision, OnePath, Paths, Slots};
 use crate::wave::search::Hits;
+use crate::wave::setting::{Found, Leg, Setting};
 use crate::wave::shade::{Kind, Shade, ShadeKind};
 use crate::wave::shadows::Shadows;
 use crate::wave::smooth::SmoothHits;
@@ -54,52 +53,6 @@ use crate::wave::vertices::Vertices;
 
 /// Samples of a wave, about: enough to fill lanes and to keep the kernel busy, few enough to stay in the caches.
 pub(crate) const WAVE: usize = 4096;
-
-/// What all paths of a render have in common.
-#[derive(Debug)]
-pub(crate) struct Setting<'s> {
-    pub(crate) scene: &'s Scene,
-    pub(crate) sampler: SamplerKind,
-    pub(crate) strategy: Strategy,
-    pub(crate) max_depth: u32,
-    /// Bounces that every path may take before Russian roulette.
-    pub(crate) roulette_start: u32,
-    pub(crate) regularize: bool,
-    pub(crate) shading_normals: ShadingNormals,
-    pub(crate) has_solids: bool,
-    pub(crate) has_media: bool,
-    /// Whether light from points is followed straight on through panes.
-    pub(crate) has_panes: bool,
-    pub(crate) moves: bool,
-    pub(crate) instruction_set: InstructionSet,
-}
-
-/// The first part of a ray: from a face to the smooth surface over it, where the ray itself starts.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Leg {
-    /// The position of the ray.
-    pub(crate) ray: u32,
-    /// Where it comes from.
-    pub(crate) from: DVec3,
-}
-
-/// Light that a path found by itself.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Found {
-    /// The position of the path.
-    pub(crate) path: u32,
-    pub(crate) radiance: Spectrum,
-    /// The density with which the last vertex would have sampled it; 0 where that does not matter.
-    pub(crate) light_pdf: f32,
-}
-
-/// By how much rays of pictures are rounded: see [`PictureRounding`]; by nothing in double precision.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Rounding {
-    origin: DVec3,
-    relative: f64,
-    absolute: f64,
-}
 
 /// A wave's columns, kept from one wave to the next.
 #[derive(Debug, Default)]
@@ -326,45 +279,3 @@ kinds!(
     Principled: PrincipledLanes,
     Uber: UberLanes,
 );
-
-impl Setting<'_> {
-    /// The weight of light that a ray found by itself, against a sample of the light with this density.
-    fn weight_of_found(&self, chosen: f32, light_pdf: f32) -> f32 {
-        match self.strategy {
-            _ if chosen == f32::INFINITY => 1.0,
-            Strategy::Bsdf => 1.0,
-            Strategy::Lights => f32::from(u8::from(light_pdf <= 0.0)),
-            Strategy::Both => shade::power_heuristic(chosen, light_pdf),
-        }
-    }
-
-    /// By how much rays are rounded.
-    #[inline(always)]
-    fn rounding(&self, is_single: bool) -> Rounding {
-        match self.scene.accel().picture_rounding() {
-            Some(PictureRounding { origin, relative, absolute }) if is_single => {
-                Rounding { origin, relative, absolute }
-            }
-            _ => Rounding { origin: DVec3::ZERO, relative: 0.0, absolute: 0.0 },
-        }
-    }
-}
-
-impl Rounding {
-    /// The error of points, grown so that rays which leave them do not meet their surfaces again.
-    #[inline(always)]
-    fn grow<R: Real>(&self, point: V3<R::Double>, error: V3<R::Double>) -> V3<R::Double> {
-        let [x, y, z] = self.origin.to_array();
-        V3 {
-            x: self.grown::<R>(point.x, error.x, x),
-            y: self.grown::<R>(point.y, error.y, y),
-            z: self.grown::<R>(point.z, error.z, z),
-        }
-    }
-
-    #[inline(always)]
-    fn grown<R: Real>(&self, x: R::Double, error: R::Double, origin: f64) -> R::Double {
-        let s = R::Double::splat;
-        error + ((x - s(origin)).abs() * s(self.relative) + s(self.absolute))
-    }
-}

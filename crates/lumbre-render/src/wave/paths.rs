@@ -2,7 +2,7 @@
 
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Vec3};
-use lumbre_scene::{CameraRay, Footprint};
+use lumbre_scene::{Boundary, CameraRay, Footprint, MediumId};
 use lumbre_shading::Spectrum;
 use lumbre_simd::{Double, Mask, Real, UInt, V3};
 
@@ -16,6 +16,26 @@ pub(crate) const PAD: usize = 16;
 pub(crate) fn grow<T: Default + Clone>(column: &mut Vec<T>, len: usize) {
     if column.len() < len + PAD {
         column.resize(len + PAD, T::default());
+    }
+}
+
+/// A medium in a column: its index, or this for a vacuum.
+const VACUUM: u32 = u32::MAX;
+
+pub(crate) fn to_column(medium: Option<MediumId>) -> u32 {
+    medium.map_or(VACUUM, |id| id.0)
+}
+
+pub(crate) fn of_column(medium: u32) -> Option<MediumId> {
+    (medium != VACUUM).then_some(MediumId(medium))
+}
+
+/// The media where a path comes from and behind the surface that it met, as columns keep them, inside of `around` before.
+pub(crate) fn sides(boundary: Option<Boundary>, front: bool, around: u32) -> [u32; 2] {
+    match boundary {
+        None => [around; 2],
+        Some(Boundary { inside, outside }) if front => [outside, inside].map(to_column),
+        Some(Boundary { inside, outside }) => [inside, outside].map(to_column),
     }
 }
 
@@ -47,7 +67,7 @@ pub(crate) struct Slots<'s> {
     pub(crate) radiance: Vec<Spectrum>,
     /// The solids that it is inside of; empty in a scene without solids.
     pub(crate) interiors: Vec<Interiors<'s>>,
-    /// The medium around, as [`crate::wave::media::of_column`] reads it; empty in a scene without media.
+    /// The medium around, as [`of_column`] reads it; empty in a scene without media.
     pub(crate) medium: Vec<u32>,
     /// Distances sampled in media, and collisions inside solids.
     pub(crate) distance_samples: Vec<u32>,
@@ -155,6 +175,17 @@ pub(crate) struct OnePath {
     pub(crate) depth: u32,
     pub(crate) width: f32,
     pub(crate) spread: f32,
+}
+
+/// Where a medium scatters a path.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Collision {
+    /// The position of the path.
+    pub(crate) path: u32,
+    pub(crate) point: DVec3,
+    pub(crate) medium: MediumId,
+    /// The width of the footprint there.
+    pub(crate) width: f32,
 }
 
 impl Paths {

@@ -12,10 +12,10 @@ use crate::transport::Strategy;
 use crate::transport::sampler::LaneDraw;
 use crate::wave::lights::{pass_solids, push_panes};
 use crate::wave::paths::{Departure, Paths, SCATTERED, Slots};
+use crate::wave::setting::{Leg, Setting, power_heuristic};
 use crate::wave::shadows::{NEARLY_WHOLE, Segment, Shadows};
 use crate::wave::traced::Traced;
 use crate::wave::vertices::{FOLDS, LIT_FROM_BELOW, Place, RISES, SIDED, Vertices, gather3, gather64};
-use crate::wave::{Leg, Setting};
 
 /// BSDFs of one kind, whatever the lanes.
 pub(crate) trait Kind {
@@ -109,15 +109,6 @@ fn alike<R: Real>(a: R::Mask, b: R::Mask) -> R::Mask {
 #[inline(always)]
 fn mirrored<R: Real>(w: V3<R>, normal: V3<R>) -> V3<R> {
     w - normal * (R::splat(2.0) * normal.dot(w))
-}
-
-/// The power heuristic (Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997) for two ways, by their ratio, for a
-/// square may overflow.
-#[inline(always)]
-pub(crate) fn power_heuristic<R: Real>(this: R, other: R) -> R {
-    let ratio = other / this;
-    let weight = (R::one() + ratio * ratio).recip();
-    R::select(this.simd_eq(R::splat(f32::INFINITY)), R::one(), weight)
 }
 
 impl<R: Real> Vertex<R> {
@@ -439,19 +430,5 @@ fn push_crossings<R: Real>(crossings: &mut Vec<u32>, mask: R::Mask, at: R::UInt)
     while bits != 0 {
         crossings.push(at[bits.trailing_zeros() as usize]);
         bits &= bits - 1;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::power_heuristic;
-
-    #[test]
-    fn the_weights_of_both_ways_sum_to_one_at_any_size() {
-        for (a, b) in [(2.0_f32, 3.0), (1e30, 2e30), (1e-30, 5e-30), (7.0, 0.0), (0.5, 1e25)] {
-            let sum = power_heuristic(a, b) + if b > 0.0 { power_heuristic(b, a) } else { 0.0 };
-            assert!((sum - 1.0).abs() < 1e-6, "{a} {b} {sum}");
-        }
-        assert_eq!(power_heuristic(f32::INFINITY, 2.0), 1.0);
     }
 }

@@ -10,9 +10,8 @@ use lumbre_simd::{Double, Mask, Real, UInt, V3};
 use crate::transport::Record;
 use crate::transport::interior::Interiors;
 use crate::transport::through::straight_on;
-use crate::wave::media::of_column;
-use crate::wave::paths::{Slots, grow};
-use crate::wave::{Leg, Setting};
+use crate::wave::paths::{Slots, grow, of_column};
+use crate::wave::setting::{Leg, Setting};
 
 /// Shadow segments, in columns.
 #[derive(Debug, Default)]

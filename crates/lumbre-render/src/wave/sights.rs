@@ -7,9 +7,9 @@ use lumbre_shading::Spectrum;
 
 use crate::transport::{Draw, Record, Seen, Sight};
 use crate::wave::catcher::{Catcher, Places};
-use crate::wave::media::to_column;
-use crate::wave::paths::{OnePath, Paths};
-use crate::wave::{Precision, Setting, Wave};
+use crate::wave::paths::{OnePath, Paths, to_column};
+use crate::wave::setting::Setting;
+use crate::wave::{Precision, Wave};
 
 /// Samples whose rays from the camera have met what they meet first. An integrator gives each its radiance.
 #[derive(Debug)]

@@ -10,8 +10,8 @@ use lumbre_simd::{Double, Job, Mask, Real, UInt, V3};
 use crate::wave::flat::{FlatHits, corner, find_light, put3, put64, triangle};
 use crate::wave::paths::{Paths, grow};
 use crate::wave::search::MetTriangle;
+use crate::wave::setting::{Found, Setting};
 use crate::wave::vertices::{FOLDS, LIT_FROM_BELOW, Place, RISES, SIDED, Vertices, gather3};
-use crate::wave::{Found, Setting};
 
 /// Triangles that paths met and that need more than [`FlatHits`], in columns.
 #[derive(Debug, Default)]

@@ -17,8 +17,9 @@ use lumbre_shading::{
 use lumbre_simd::InstructionSet;
 
 use crate::transport::{Record, Sampler, Strategy};
+use crate::wave::setting::Setting;
 use crate::wave::vertices::{FOLDS, RISES, SIDED};
-use crate::wave::{Precision, Setting, Sights, Wave};
+use crate::wave::{Precision, Sights, Wave};
 
 const SIDE: u32 = 48;
 const CENTRE: DVec3 = DVec3::new(3.0, -2.0, 5.0);

@@ -11,12 +11,12 @@ use lumbre_simd::{UInt, V3};
 use crate::transport::Record;
 use crate::transport::interior::Interiors;
 use crate::transport::journal::{End, Event, Met, Source};
+use crate::wave::Wave;
 use crate::wave::flat::FlatVertices;
-use crate::wave::media::sides;
-use crate::wave::paths::{OnePath, SCATTERED};
+use crate::wave::paths::{OnePath, SCATTERED, sides};
+use crate::wave::setting::Setting;
 use crate::wave::smooth::{SmoothVertices, flags_of, frame_for};
 use crate::wave::vertices::{FOLDS, LIT_FROM_BELOW};
-use crate::wave::{Setting, Wave};
 
 /// Collisions inside media that every path may have before Russian roulette.
 const ROULETTE_START_IN_MEDIA: u32 = 4;

@@ -35,7 +35,7 @@ pub(crate) struct Vertices<'s> {
     pub(crate) queues: [Vec<u32>; BsdfKind::COUNT],
     /// The solids that surfaces belong to, and whether they were met from outside; none beyond the end.
     pub(crate) solids: Vec<Option<(&'s Material, bool)>>,
-    /// The media where the path comes from and behind the surface, as [`crate::wave::media::of_column`] reads them; only in a scene with
+    /// The media where the path comes from and behind the surface, as [`crate::wave::paths::of_column`] reads them; only in a scene with
     /// media.
     pub(crate) media: [Vec<u32>; 2],
     /// The footprint of rays that leave: see [`lumbre_scene::Footprint::Cone`].

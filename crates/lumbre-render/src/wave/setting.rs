@@ -1,0 +1,120 @@
+//! What all stages of a wave share: the setting of a render, and the small things that they hand on to each other.
+
+use lumbre_kernel::PictureRounding;
+use lumbre_math::DVec3;
+use lumbre_scene::{SamplerKind, Scene};
+use lumbre_shading::{ShadingNormals, Spectrum};
+use lumbre_simd::{Double, InstructionSet, Real, V3};
+
+use crate::transport::Strategy;
+
+/// What all paths of a render have in common.
+#[derive(Debug)]
+pub(crate) struct Setting<'s> {
+    pub(crate) scene: &'s Scene,
+    pub(crate) sampler: SamplerKind,
+    pub(crate) strategy: Strategy,
+    pub(crate) max_depth: u32,
+    /// Bounces that every path may take before Russian roulette.
+    pub(crate) roulette_start: u32,
+    pub(crate) regularize: bool,
+    pub(crate) shading_normals: ShadingNormals,
+    pub(crate) has_solids: bool,
+    pub(crate) has_media: bool,
+    /// Whether light from points is followed straight on through panes.
+    pub(crate) has_panes: bool,
+    pub(crate) moves: bool,
+    pub(crate) instruction_set: InstructionSet,
+}
+
+/// The first part of a ray: from a face to the smooth surface over it, where the ray itself starts.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Leg {
+    /// The position of the ray.
+    pub(crate) ray: u32,
+    /// Where it comes from.
+    pub(crate) from: DVec3,
+}
+
+/// Light that a path found by itself.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Found {
+    /// The position of the path.
+    pub(crate) path: u32,
+    pub(crate) radiance: Spectrum,
+    /// The density with which the last vertex would have sampled it; 0 where that does not matter.
+    pub(crate) light_pdf: f32,
+}
+
+/// By how much rays of pictures are rounded: see [`PictureRounding`]; by nothing in double precision.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rounding {
+    origin: DVec3,
+    relative: f64,
+    absolute: f64,
+}
+
+impl Setting<'_> {
+    /// The weight of light that a ray found by itself, against a sample of the light with this density.
+    pub(crate) fn weight_of_found(&self, chosen: f32, light_pdf: f32) -> f32 {
+        match self.strategy {
+            _ if chosen == f32::INFINITY => 1.0,
+            Strategy::Bsdf => 1.0,
+            Strategy::Lights => f32::from(u8::from(light_pdf <= 0.0)),
+            Strategy::Both => power_heuristic(chosen, light_pdf),
+        }
+    }
+
+    /// By how much rays are rounded.
+    #[inline(always)]
+    pub(crate) fn rounding(&self, is_single: bool) -> Rounding {
+        match self.scene.accel().picture_rounding() {
+            Some(PictureRounding { origin, relative, absolute }) if is_single => {
+                Rounding { origin, relative, absolute }
+            }
+            _ => Rounding { origin: DVec3::ZERO, relative: 0.0, absolute: 0.0 },
+        }
+    }
+}
+
+impl Rounding {
+    /// The error of points, grown so that rays which leave them do not meet their surfaces again.
+    #[inline(always)]
+    pub(crate) fn grow<R: Real>(&self, point: V3<R::Double>, error: V3<R::Double>) -> V3<R::Double> {
+        let [x, y, z] = self.origin.to_array();
+        V3 {
+            x: self.grown::<R>(point.x, error.x, x),
+            y: self.grown::<R>(point.y, error.y, y),
+            z: self.grown::<R>(point.z, error.z, z),
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn grown<R: Real>(&self, x: R::Double, error: R::Double, origin: f64) -> R::Double {
+        let s = R::Double::splat;
+        error + ((x - s(origin)).abs() * s(self.relative) + s(self.absolute))
+    }
+}
+
+/// The power heuristic (Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997) for two ways, by their ratio, for a
+/// square may overflow.
+#[inline(always)]
+pub(crate) fn power_heuristic<R: Real>(this: R, other: R) -> R {
+    let ratio = other / this;
+    let weight = (R::one() + ratio * ratio).recip();
+    R::select(this.simd_eq(R::splat(f32::INFINITY)), R::one(), weight)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::power_heuristic;
+
+    #[test]
+    fn the_weights_of_both_ways_sum_to_one_at_any_size() {
+        for (a, b) in [(2.0_f32, 3.0), (1e30, 2e30), (1e-30, 5e-30), (7.0, 0.0), (0.5, 1e25)] {
+            let sum = power_heuristic(a, b) + if b > 0.0 { power_heuristic(b, a) } else { 0.0 };
+            assert!((sum - 1.0).abs() < 1e-6, "{a} {b} {sum}");
+        }
+        assert_eq!(power_heuristic(f32::INFINITY, 2.0), 1.0);
+    }
+}
