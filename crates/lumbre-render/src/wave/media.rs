@@ -51,7 +51,7 @@ impl<'s> Wave<'s> {
         let mut at = 0.0;
         let mut arrives = true;
         let ends = boundaries.iter().map(|crossing| (crossing.t, crossing.beyond));
-        for (end, beyond) in ends.map(Some).chain([None]).map(|next| next.unwrap_or((end, None))) {
+        for (end, beyond) in ends.chain([(end, None)]) {
             if let Some(medium) = of_column(self.slots.medium[slot]) {
                 arrives = self.fly(setting, path, slot, medium, &ray, [at, end], record);
                 if !arrives {
