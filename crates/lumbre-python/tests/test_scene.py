@@ -257,7 +257,9 @@ def test_loose_options_are_answered_with_what_is_accepted(options: dict[str, Any
 
 def test_numbers_of_numpy_are_options() -> None:
     scene = lumbre.Scene([lumbre.Sphere()])
-    image = scene.render(np.int64(1), np.array([8, 6]), seed=np.uint64(3), noise=np.float32(0.5), transparent=np.bool_(True))
+    size, seed, transparent = np.array([8, 6]), np.uint64(3), np.bool_(True)
+    with pytest.warns(UserWarning, match="the noise is not known yet, and that of 0.5 was not reached"):
+        image = scene.render(np.int64(1), size, seed=seed, noise=np.float32(0.5), transparent=transparent)
     assert image.shape == (6, 8, 3)
 
 

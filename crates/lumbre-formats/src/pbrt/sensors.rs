@@ -2,7 +2,7 @@
 //! Rec. 709 of light to that of the picture which comes nearest to the camera's over a set of common reflectances.
 //!
 //! Computed from the spectral sensitivities of PhysLight, by Anders Langlands and Luca Fascione, which are licensed under the Apache
-//! License, Version 2.0 (https://www.apache.org/licenses/LICENSE-2.0). "Physlight: An End-to-End Pipeline for Scene-Referred Lighting",
+//! License, Version 2.0 (<https://www.apache.org/licenses/LICENSE-2.0>). "Physlight: An End-to-End Pipeline for Scene-Referred Lighting",
 //! SIGGRAPH 2020 Talks.
 
 use lumbre_math::DMat3;

@@ -474,7 +474,8 @@ class Scene:
         stats = image.stats
         if stats["noise_target_met"] is False:
             more = "time" if time is not None and stats["spp"] < options["spp"] else "spp"
-            warnings.warn(f"the noise is {stats['noise']}, and that of {noise} was not reached: more {more} goes on", stacklevel=2)
+            reached = "not known yet" if stats["noise"] is None else stats["noise"]
+            warnings.warn(f"the noise is {reached}, and that of {noise} was not reached: more {more} goes on", stacklevel=2)
         return image
 
     def explain(
