@@ -31,7 +31,7 @@ pub(crate) const MAX_LUMINANCE: f64 = 1e6;
 
 impl Pixel {
     /// Adds a sample, whose colour is multiplied by its coverage. False, and nothing is added, where it is not finite. One that is brighter
-    /// than [`MAX_SAMPLE`] is added as bright as that, in its hue.
+    /// than the film holds is added as bright as that, in its hue.
     pub fn add(&mut self, colour: Rgb, coverage: f32, weight: f64) -> bool {
         let most = colour.to_array().into_iter().map(|channel| f64::from(channel.abs())).fold(0.0, f64::max);
         let scale = if most > MAX_SAMPLE { weight * (MAX_SAMPLE / most) } else { weight };
