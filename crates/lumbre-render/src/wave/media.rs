@@ -53,7 +53,7 @@ impl<'s> Wave<'s> {
         let ends = boundaries.iter().map(|crossing| (crossing.t, crossing.beyond));
         for (end, beyond) in ends.chain([(end, None)]) {
             if let Some(medium) = of_column(self.slots.medium[slot]) {
-                arrives = self.fly(setting, path, slot, medium, &ray, [at, end], record);
+                arrives = self.pass(setting, path, slot, medium, &ray, [at, end], record);
                 if !arrives {
                     break;
                 }
@@ -69,7 +69,7 @@ impl<'s> Wave<'s> {
 
     /// Takes a path through a medium along a part of its ray; false where it scatters or ends there.
     #[expect(clippy::too_many_arguments, reason = "the path, and its way")]
-    fn fly(
+    fn pass(
         &mut self,
         setting: &Setting<'s>,
         path: usize,
@@ -83,12 +83,12 @@ impl<'s> Wave<'s> {
         let throughput = self.paths.throughput(path);
         let numbers = self.slots.draws[slot].passage(self.slots.distance_samples[slot]);
         self.slots.distance_samples[slot] += 1;
-        let passage = setting.scene.medium(medium).fly(&way, throughput, numbers);
+        let passage = setting.scene.medium(medium).sample(&way, throughput, numbers);
         let depth = self.paths.depth[path] & !SCATTERED;
         if !passage.emitted.is_black() && depth < setting.max_depth {
             self.slots.radiance[slot] += record.added(Source::Medium, throughput, passage.emitted, 1.0);
         }
-        let (distance, weight, scattered) = match passage.flight {
+        let (distance, weight, scattered) = match passage.outcome {
             DistanceSample::Through(weight) => (way.length, weight, false),
             DistanceSample::Collision { distance, weight } => (distance, weight, true),
         };

@@ -139,7 +139,7 @@ impl Job for SmoothVertices<'_, '_> {
             flags = flags | flag_where::<R>(folds, FOLDS);
             flags = flags | flag_where::<R>(differs & is_pbrt, SIDED | LIT_FROM_BELOW);
             let looks_up = R::UInt::from_slice(&hits.looks_up[done..]).simd_eq(R::UInt::splat(1));
-            // Where the frame is still to be tilted, whoever looks that up decides.
+            // Where the frame is still to be tilted, the texture look-up decides.
             let may_rise = lanes & differ::<R>(shading, geometric) & (folds | (looks_up & !is_pbrt));
             let to = vertices.len + done;
             if may_rise.any() {

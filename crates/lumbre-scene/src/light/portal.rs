@@ -12,7 +12,7 @@ use super::LightSample;
 use super::environment::Panorama;
 use crate::EnvironmentDesc;
 
-/// Light of infinitely far away that is seen through a rectangle alone: whoever sees it from another side, or beside it, sees none of it.
+/// Light of infinitely far away that is seen through a rectangle alone: from another side, or beside it, none of it is seen.
 #[derive(Clone, Debug)]
 pub struct PortalLight {
     // The unit axes of the rectangle: its sides, and what points to the sky.

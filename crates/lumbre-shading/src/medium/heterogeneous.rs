@@ -177,8 +177,8 @@ impl HeterogeneousMedium {
         coefficients + glow + size_of_val(self.majorants.most.as_slice())
     }
 
-    /// See [`super::Medium::fly`].
-    pub(super) fn fly(&self, way: &Way, carried: Spectrum, numbers: &mut PassageNumbers) -> Passage {
+    /// See [`super::Medium::sample`].
+    pub(super) fn sample(&self, way: &Way, carried: Spectrum, numbers: &mut PassageNumbers) -> Passage {
         let mut weight = Spectrum::WHITE;
         let mut emitted = Spectrum::BLACK;
         let start = carried.max_component();
@@ -197,21 +197,21 @@ impl HeterogeneousMedium {
             let carries = carried * weight;
             let (scatters, passes) = (sum(carries * scattering), sum(carries * null));
             if scatters + passes <= 0.0 {
-                return Passage { flight: DistanceSample::Through(Spectrum::BLACK), emitted };
+                return Passage { outcome: DistanceSample::Through(Spectrum::BLACK), emitted };
             }
             let probability = scatters / (scatters + passes);
             if (numbers.next() as f32) < probability {
                 let weight = weight * scattering / (majorant * probability);
-                return Passage { flight: DistanceSample::Collision { distance: t, weight }, emitted };
+                return Passage { outcome: DistanceSample::Collision { distance: t, weight }, emitted };
             }
             weight = weight * null / (majorant * (1.0 - probability));
             let part = (carried * weight).max_component() / start;
             if !goes_on(&mut weight, part, numbers) {
-                return Passage { flight: DistanceSample::Through(Spectrum::BLACK), emitted };
+                return Passage { outcome: DistanceSample::Through(Spectrum::BLACK), emitted };
             }
         }
         let left = if tentative.is_lost() { Spectrum::BLACK } else { weight };
-        Passage { flight: DistanceSample::Through(left), emitted }
+        Passage { outcome: DistanceSample::Through(left), emitted }
     }
 
     /// See [`super::Medium::transmittance`]: the product over all tentative collisions of what is not there (J. Novák and others,
@@ -599,9 +599,9 @@ mod tests {
         for _ in 0..count {
             let mut numbers =
                 || PassageNumbers::new([random.next_f64(), random.next_f64()], random.next_u64());
-            let passage = medium.fly(&way, carried, &mut numbers());
+            let passage = medium.sample(&way, carried, &mut numbers());
             add(2, passage.emitted);
-            match passage.flight {
+            match passage.outcome {
                 DistanceSample::Through(weight) => add(0, weight),
                 DistanceSample::Collision { weight, distance } => {
                     assert!(distance < way.length);
@@ -654,8 +654,8 @@ mod tests {
             Glow::None,
         );
         let way = Way { origin: DVec3::new(-1.0, 0.5, 0.5), direction: DVec3::X, length: f64::INFINITY };
-        let passage = dense.fly(&way, Spectrum::WHITE, &mut numbers());
-        assert!(matches!(passage.flight, DistanceSample::Collision { .. }), "{passage:?}");
+        let passage = dense.sample(&way, Spectrum::WHITE, &mut numbers());
+        assert!(matches!(passage.outcome, DistanceSample::Collision { .. }), "{passage:?}");
         assert_eq!(dense.transmittance(&way, &mut numbers()), Spectrum::BLACK);
     }
 }

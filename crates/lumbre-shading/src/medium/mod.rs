@@ -1,6 +1,6 @@
 //! Participating media: what absorbs, scatters and emits light between surfaces.
 //!
-//! A medium says what becomes of light along a straight way through it: [`Medium::fly`] samples where it scatters,
+//! A medium says what becomes of light along a straight way through it: [`Medium::sample`] samples where it scatters,
 //! [`Medium::transmittance`] estimates what is left of it at the end. Coefficients are per unit of length of the world.
 
 mod cloud;
@@ -42,7 +42,7 @@ pub enum Medium {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Passage {
     /// How far it comes.
-    pub flight: DistanceSample,
+    pub outcome: DistanceSample,
     /// An estimate of what the medium adds on the way: a radiance, to be multiplied by the throughput before the way.
     pub emitted: Spectrum,
 }
@@ -121,13 +121,13 @@ impl Medium {
     }
 
     /// Samples where light of throughput `carried` scatters along a way, if it does.
-    pub fn fly(&self, way: &Way, carried: Spectrum, mut numbers: PassageNumbers) -> Passage {
+    pub fn sample(&self, way: &Way, carried: Spectrum, mut numbers: PassageNumbers) -> Passage {
         match self {
             Self::Homogeneous { medium, glow } => Passage {
-                flight: medium.sample_distance(carried, way.length, numbers.first()),
+                outcome: medium.sample_distance(carried, way.length, numbers.first()),
                 emitted: if glow.is_black() { *glow } else { *glow * medium.absorbed(way.length) },
             },
-            Self::Heterogeneous(medium) => medium.fly(way, carried, &mut numbers),
+            Self::Heterogeneous(medium) => medium.sample(way, carried, &mut numbers),
         }
     }
 
