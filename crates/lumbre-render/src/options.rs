@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use lumbre_image::Rgb;
 use lumbre_math::DVec2;
-use lumbre_scene::{FilmDesc, FilterDesc, IntegratorDesc, SamplerDesc, Scene};
+use lumbre_scene::{FilmDesc, FilterDesc, IntegratorDesc, IntegratorKind, SamplerDesc, Scene};
 
 use crate::RenderError;
 use crate::denoise::BYTES_A_PIXEL;
@@ -202,7 +202,11 @@ impl RenderOptions {
         if self.features || self.guides {
             each += size_of::<FeatureSums>() + 4 * size_of::<Rgb>();
         }
-        Ok(self.bounds()?.area().saturating_mul(each as u64))
+        let photons = match self.integrator.kind {
+            IntegratorKind::Caustics => crate::caustics::memory_bytes(self.width, self.height),
+            _ => 0,
+        };
+        Ok(self.bounds()?.area().saturating_mul(each as u64).saturating_add(photons))
     }
 
     pub(crate) fn pixel_filter(&self) -> Result<Filter, RenderError> {
