@@ -1,5 +1,6 @@
 //! Pictures against closed forms and against themselves, in one binary, which links once.
 
+mod caustics;
 mod common;
 mod determinism;
 mod direct_light;

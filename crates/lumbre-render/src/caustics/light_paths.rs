@@ -60,8 +60,10 @@ impl<'s> Beginnings<'s> {
         let direction = warp64::square_to_sphere(draw.lens());
         let (across, up) = orthonormal_basis(direction);
         let offset = sphere.radius * warp64::square_to_disk(draw.filter());
-        let start = sphere.center + offset.x * across + offset.y * up - sphere.radius * direction;
-        Ray::new(start, direction).with_range(0.0, 2.0 * sphere.radius)
+        let half = (sphere.radius * sphere.radius - offset.length_squared()).max(0.0).sqrt();
+        let middle = sphere.center + offset.x * across + offset.y * up;
+        // No farther than the sphere, or points outside it would count more often than their density says.
+        Ray::new(middle - half * direction, direction).with_range(0.0, 2.0 * half)
     }
 }
 

@@ -15,9 +15,9 @@ use super::{Beginnings, PhotonMap, SAMPLES_A_PASS};
 
 /// The radius in which a vertex that the camera sees collects photons of the first pass, in widths of the footprint of a sample, which is
 /// a quarter of a pixel wide.
-const WIDTHS: f64 = 8.0;
+const WIDTHS: f64 = 6.0;
 /// Vertices further along a path collect from so many times as far: they are not seen sharply.
-const WIDER: f32 = 4.0;
+const WIDER: f32 = 3.0;
 
 /// The photons that the paths of a wave are merged with.
 #[derive(Debug)]
