@@ -12,6 +12,7 @@ use crate::checkpoint::open_part;
 use crate::console::{escaped_json, escaped_line};
 use crate::failure::{Failure, print};
 use crate::reading::{ReadingArguments, print_warnings};
+use crate::report::{caustics_line, caustics_not_found};
 use crate::signals::Signals;
 use crate::units::counted;
 
@@ -52,6 +53,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let scene = Scene::of_file(desc, &arguments.scene[0], &mut diagnostics)?;
     (info.bounds, info.memory_bytes) = (scene.info().bounds, scene.info().memory_bytes);
     let predicted = Predicted::of(&scene);
+    let caustics = caustics_not_found(&scene, &scene.options());
     if arguments.json {
         let animations = info.listing.animations.iter().map(|a| json!({ "name": a.name, "seconds": a.end }));
         let textures = info.listing.textures.iter();
@@ -69,6 +71,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             "textures": textures.collect::<Vec<_>>(),
             "bounds": bounds,
             "memory_bytes": info.memory_bytes,
+            "caustic_share": scene.caustic_share(&scene.options()).ok(),
             "picture": predicted.as_ref().ok().map(|predicted| json!({
                 "width": predicted.width,
                 "height": predicted.height,
@@ -117,6 +120,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         listed("textures", textures.collect()),
         line("bounds", bounds),
         line("memory", format!("{:.1} MiB", mebibytes(info.memory_bytes))),
+        caustics.map_or_else(String::new, |share| line("caustics", caustics_line(share))),
         line("picture", predicted.map_or_else(|wrong| wrong.to_string(), |predicted| predicted.to_string())),
     ];
     print(&report.concat())?;

@@ -29,7 +29,7 @@ use crate::output::{self, Inputs, Pictures, Replaced, is_standard_stream};
 use crate::preview::{Preview, Protocol};
 use crate::progress::{Display, PictureViewer, Series, Style, Watched};
 use crate::reading::{Frames, ReadingArguments, print_warnings};
-use crate::report::{statistics, summary, warn_of_losses};
+use crate::report::{caustics_line, caustics_not_found, statistics, summary, warn_of_losses};
 use crate::signals::{Deadline, Phase, Signals};
 use crate::staging::{self, Behind, StagingArguments};
 use crate::tev::Tev;
@@ -762,6 +762,9 @@ fn picture(
         replaced.iter().for_each(Replaced::say);
         let name = if is_piped { "standard output".into() } else { output.display().to_string() };
         summary(arguments.verbose, &options.stop, &scene, &picture, &name, render_time, denoised);
+        if is_first && let Some(share) = caustics_not_found(&scene, &options) {
+            say!("hint: {}", caustics_line(share));
+        }
     }
     Ok(())
 }

@@ -3,7 +3,8 @@
 use std::fs;
 use std::time::Duration;
 
-use lumbre::{Picture, Scene, Stats, Stop};
+use lumbre::description::IntegratorKind;
+use lumbre::{Picture, RenderOptions, Scene, Stats, Stop};
 use serde_json::json;
 
 use crate::threads;
@@ -88,6 +89,22 @@ fn missed(stats: &Stats, stop: &Stop) -> Option<String> {
     }
     let (noisy, are) = (stats.noisy_pixels, if stats.noisy_pixels == 1 { "is" } else { "are" });
     (noisy > 0).then(|| format!("{} {are} above {target}{more}", counted(noisy, "pixel")))
+}
+
+/// The share of light from lamps that the integrator of a scene, if it is `path`, hardly finds; `None` where that is little.
+pub(crate) fn caustics_not_found(scene: &Scene, options: &RenderOptions) -> Option<f64> {
+    const MUCH: f64 = 0.01;
+    let is_path = matches!(options.integrator.kind, IntegratorKind::Path { .. });
+    let share = if is_path { scene.caustic_share(options).ok()? } else { 0.0 };
+    (share > MUCH).then_some(share)
+}
+
+/// What is said of it.
+pub(crate) fn caustics_line(share: f64) -> String {
+    let percent = (100.0 * share).round();
+    format!(
+        "{percent} % of the light from lamps comes over mirrors or through glass: --integrator caustics finds it"
+    )
 }
 
 /// The last line of a render; with `verbose`, the lines after it.

@@ -26,6 +26,7 @@ mod wave;
 mod workers;
 
 pub use cancel::CancelToken;
+pub use caustics::caustic_share;
 pub use denoise::{Denoised, denoise, denoise_unless};
 pub use error::RenderError;
 pub use job::{Keeper, render, render_from, render_with};

@@ -31,7 +31,8 @@ impl BoundingSphere {
         point.distance_squared(self.center) <= self.radius * self.radius
     }
 
-    fn around(bounds: &Aabb) -> Self {
+    /// The sphere around a box, through its corners.
+    pub fn around(bounds: &Aabb) -> Self {
         Self { center: bounds.center(), radius: 0.5 * bounds.size().length() }
     }
 }

@@ -311,6 +311,15 @@ impl Scene {
         Ok(stats.elapsed.as_secs_f64() * pixels as f64 / stats.samples.max(1) as f64)
     }
 
+    /// An estimate of the share of all light from lamps on surfaces that the integrator `path` hardly finds and `caustics` does: see
+    /// [`lumbre_render::caustic_share`].
+    ///
+    /// # Errors
+    /// As for [`Scene::render`].
+    pub fn caustic_share(&self, options: &RenderOptions) -> Result<f64, Error> {
+        Ok(lumbre_render::caustic_share(&self.resolved, options)?)
+    }
+
     /// Puts a camera in the place of the one at a position, for pictures from elsewhere; nothing is built anew.
     ///
     /// # Errors

@@ -25,6 +25,8 @@ use crate::wave::paths::{of_column, sides, to_column};
 const VERTICES_A_PATH: u32 = 1 << 10;
 /// Points on a line that light paths begin in, at most.
 const MAX_POINTS: u32 = 64;
+/// A ray meets a point where it comes as near to it as this, relative to the size of its coordinates and to the length of the ray.
+const NEARLY_THERE: f64 = 1e-7;
 /// Bounces that every light path may take before Russian roulette.
 const ROULETTE_START: u32 = 6;
 
@@ -37,9 +39,13 @@ pub(crate) struct Beginnings<'s> {
 }
 
 impl<'s> Beginnings<'s> {
-    /// `None` where nothing is specular.
+    /// On what is specular in a scene; `None` where nothing is.
     pub(crate) fn new(scene: &'s Scene) -> Option<Self> {
-        let spheres = scene.specular_spheres();
+        Self::within(scene.specular_spheres())
+    }
+
+    /// In some spheres; `None` where these have no volume.
+    pub(crate) fn within(spheres: &'s [BoundingSphere]) -> Option<Self> {
         let squares: f64 = spheres.iter().map(|sphere| sphere.radius * sphere.radius).sum();
         (squares > 0.0 && squares.is_finite()).then_some(Self { spheres, whole: TAU * squares })
     }
@@ -80,6 +86,18 @@ pub(crate) struct Tracer<'s> {
     pub(crate) goes_straight_on: bool,
 }
 
+/// Light that arrives at a surface straight from a lamp.
+struct Lit<'s> {
+    sample: LightSample,
+    /// From the lamp.
+    ray: Ray,
+    here: Interaction<'s>,
+    /// The density with which the lamp was sampled, per unit solid angle; infinite for light from points and in one direction.
+    pdf: f64,
+    /// The power, of one line.
+    flux: Spectrum,
+}
+
 /// A light path on its way.
 struct LightPath<'s> {
     interiors: Interiors<'s>,
@@ -88,6 +106,11 @@ struct LightPath<'s> {
     flux: Spectrum,
     flux_at_start: f32,
     density: f64,
+    /// The solid angle of the lamp where the path began; its area across the path, unless it is infinitely far away; and the length of the
+    /// path so far, from the lamp on.
+    lamp: f64,
+    lamp_area: Option<f64>,
+    length: f64,
     bounces: u32,
     /// Whether it can be found by other means so far.
     is_straight: bool,
@@ -97,55 +120,89 @@ impl<'s> Tracer<'s> {
     /// The photons of some lines of a pass.
     pub(crate) fn trace(&self, pass: u32, lines: Range<u32>, photons: &mut Vec<Photon>) {
         for line in lines {
-            // No pixel is there.
-            let draw = self.sampler.draw(u32::MAX, pass, line);
-            let time = self.view.time(draw.time());
-            let chord = self.beginnings.line(&draw).at_time(time);
-            let mut points = 0;
-            self.scene.accel().all(&chord, |hit| {
-                if self.scene.may_be_specular(hit) {
-                    points += 1;
-                    self.begin(chord.at(hit.root.t), time, &draw, points * VERTICES_A_PATH, photons);
-                }
-                if points < MAX_POINTS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+            self.each_point(pass, line, true, |point, draw, vertex, time| {
+                self.begin(point, time, draw, vertex, photons);
             });
         }
     }
 
+    /// The power, of one line, that comes straight from lamps to surfaces that are not specular, by some lines.
+    pub(crate) fn direct_power(&self, pass: u32, lines: Range<u32>) -> f64 {
+        let count = f64::from(lines.end - lines.start);
+        let mut sum = 0.0;
+        for line in lines {
+            self.each_point(pass, line, false, |point, draw, vertex, time| {
+                let lit = self.light(point, time, draw, vertex);
+                sum += lit.map_or(0.0, |lit| f64::from(lit.flux.average()));
+            });
+        }
+        sum / count
+    }
+
+    /// Visits the points in which a line meets surfaces that may be specular, or those that surely are not, each with its random numbers,
+    /// the first vertex that they are of, and the time.
+    fn each_point(
+        &self,
+        pass: u32,
+        line: u32,
+        are_specular: bool,
+        mut visit: impl FnMut(DVec3, &Draw, u32, f64),
+    ) {
+        // No pixel is there.
+        let draw = self.sampler.draw(u32::MAX, pass, line);
+        let time = self.view.time(draw.time());
+        let chord = self.beginnings.line(&draw).at_time(time);
+        let mut points = 0;
+        self.scene.accel().all(&chord, |hit| {
+            if self.scene.may_be_specular(hit) == are_specular {
+                points += 1;
+                visit(chord.at(hit.root.t), &draw, points * VERTICES_A_PATH, time);
+            }
+            if points < MAX_POINTS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        });
+    }
+
     /// Follows light that arrives at a point of a surface.
     fn begin(&self, point: DVec3, time: f64, draw: &Draw, vertex: u32, photons: &mut Vec<Photon>) {
-        let (choose, u) = (draw.light_choice(vertex), draw.light_point(vertex));
-        let Some(sample) = self.scene.sample_light(point, DVec3::ZERO, time, choose, u) else { return };
-        let ray = self.ray_to(point, &sample).at_time(time);
-        let Some(hit) = self.scene.closest(&ray) else { return };
-        let here = self.scene.interaction(&ray, &hit, &Footprint::Point);
-        let size = point.abs().max_element() + (point - ray.origin).length();
-        if here.surface.point.distance(point) > 1e-7 * size {
-            // Something is in the way.
+        let Some(Lit { sample, ray, here, pdf, flux }) = self.light(point, time, draw, vertex) else {
             return;
-        }
-        let pdf = match sample.scatter {
-            Scatter::Density(pdf) => f64::from(pdf),
-            Scatter::Delta => f64::INFINITY,
         };
-        let density = self.beginnings.density(point);
-        let cosine = here.surface.normal.dot(sample.towards).abs();
-        let share = if pdf == f64::INFINITY { 1.0 } else { 1.0 / pdf };
-        let flux = sample.radiance * (cosine * share / density) as f32;
-        if flux.is_black() || !flux.is_finite() {
-            return;
-        }
+        let length = point.distance(ray.origin);
         let mut path = LightPath {
             interiors: Interiors::default(),
             medium: None,
             flux,
             flux_at_start: flux.max_component(),
-            density: density * pdf,
+            density: self.beginnings.density(point) * pdf,
+            lamp: 1.0 / pdf,
+            lamp_area: sample.end.map(|_| length * length / pdf),
+            length,
             bounces: 0,
             is_straight: pdf == f64::INFINITY && self.goes_straight_on,
         };
         self.arrive(&mut path, &sample, &here, draw);
         self.follow(path, ray, here, draw, vertex, photons);
+    }
+
+    /// The light of one sample that arrives at a point of a surface on a line.
+    fn light(&self, point: DVec3, time: f64, draw: &Draw, vertex: u32) -> Option<Lit<'s>> {
+        let (choose, u) = (draw.light_choice(vertex), draw.light_point(vertex));
+        let sample = self.scene.sample_light(point, DVec3::ZERO, time, choose, u)?;
+        let ray = self.ray_to(point, &sample).at_time(time);
+        let hit = self.scene.closest(&ray)?;
+        let here = self.scene.interaction(&ray, &hit, &Footprint::Point);
+        let size = point.abs().max_element() + (point - ray.origin).length();
+        if here.surface.point.distance(point) > NEARLY_THERE * size {
+            // Something is in the way.
+            return None;
+        }
+        let (pdf, share) = match sample.scatter {
+            Scatter::Density(pdf) => (f64::from(pdf), 1.0 / f64::from(pdf)),
+            Scatter::Delta => (f64::INFINITY, 1.0),
+        };
+        let cosine = here.surface.normal.dot(sample.towards).abs();
+        let flux = sample.radiance * (cosine * share / self.beginnings.density(point)) as f32;
+        (!flux.is_black() && flux.is_finite()).then_some(Lit { sample, ray, here, pdf, flux })
     }
 
     /// The ray from a light to a point.
@@ -218,6 +275,7 @@ impl<'s> Tracer<'s> {
             path.interiors.arrive(&next, next.resolved());
             let way = next.surface.point.distance(ray.origin);
             path.flux *= path.interiors.transmittance(way);
+            path.length += way;
             if self.scene.has_media() {
                 self.cross_media(&mut path, &ray.with_range(0.0, way), draw);
             }
@@ -281,6 +339,7 @@ fn photon(path: &LightPath<'_>, ray: &Ray, here: &Interaction<'_>) -> Photon {
         normal: facing.as_vec3(),
         flux: path.flux,
         density: path.density as f32,
+        lamp: path.lamp_area.map_or(path.lamp, |area| area / (path.length * path.length)) as f32,
         bounces: path.bounces,
     }
 }

@@ -6,6 +6,7 @@
 mod light_paths;
 mod merging;
 mod photons;
+mod share;
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -14,6 +15,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 pub(crate) use light_paths::{Beginnings, Tracer};
 pub(crate) use merging::{Merging, radius};
 pub(crate) use photons::{Photon, PhotonMap};
+pub use share::caustic_share;
 
 /// Samples of a pixel that a pass of light paths is for.
 pub(crate) const SAMPLES_A_PASS: u32 = 4;

@@ -17,6 +17,8 @@ pub(crate) struct Photon {
     /// The density with which light paths begin at the specular surface next to the light and choose that light: per unit of area and
     /// solid angle, of one line. Infinite for light that no path from the camera finds.
     pub(crate) density: f32,
+    /// About the solid angle that the lamp has, seen from here over the specular surfaces; 0 for light from points and in one direction.
+    pub(crate) lamp: f32,
     /// Specular bounces on its way.
     pub(crate) bounces: u32,
 }
@@ -114,6 +116,7 @@ mod tests {
                 normal: Vec3::Z,
                 flux: Spectrum::splat(i as f32),
                 density: 1.0,
+                lamp: 0.0,
                 bounces: 1,
             })
             .collect()

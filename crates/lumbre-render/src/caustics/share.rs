@@ -1,0 +1,51 @@
+//! How much of a scene's light paths hardly find.
+
+use lumbre_scene::{BoundingSphere, Scene, View};
+
+use super::{Beginnings, Tracer};
+use crate::transport::Sampler;
+use crate::{RenderError, RenderOptions};
+
+/// Lines of the trial.
+const LINES: u32 = 1 << 12;
+/// A lamp of this solid angle is found by about one in a thousand diffuse bounces.
+const SMALL: f32 = 0.003;
+/// The pass of the trial: none of a picture.
+const PASS: u32 = u32::MAX;
+
+/// An estimate of the share of all light from lamps on surfaces that comes over mirrors and smooth glass from lamps so small that paths
+/// hardly find them, or never: what [`crate::integrators::Caustics`] is for. In [0, 1], by a trial of a few thousand light paths; the same
+/// for the same scene, camera and seed.
+///
+/// # Errors
+/// [`RenderError::NoSuchCamera`].
+pub fn caustic_share(scene: &Scene, options: &RenderOptions) -> Result<f64, RenderError> {
+    let count = scene.cameras().len();
+    let camera = scene.cameras().get(options.camera);
+    let camera = camera.ok_or(RenderError::NoSuchCamera { index: options.camera, count })?;
+    let Some(beginnings) = Beginnings::new(scene).filter(|_| !scene.lights().is_empty()) else {
+        return Ok(0.0);
+    };
+    let whole = [BoundingSphere::around(&scene.bounds())];
+    let everywhere = Beginnings::within(&whole);
+    let view = View::new(camera, options.width, options.height);
+    let tracer = |beginnings| Tracer {
+        scene,
+        view: &view,
+        beginnings,
+        sampler: Sampler::new(&options.sampler),
+        normals: options.integrator.shading_normals,
+        max_bounces: options.integrator.max_depth.saturating_sub(1),
+        goes_straight_on: scene.lets_light_straight_on(),
+    };
+    let mut photons = Vec::new();
+    tracer(&beginnings).trace(PASS, 0..LINES, &mut photons);
+    let hard = photons.iter().filter(|photon| photon.lamp <= SMALL);
+    let hard = hard.map(|photon| f64::from(photon.flux.average())).sum::<f64>() / f64::from(LINES);
+    if hard <= 0.0 {
+        return Ok(0.0);
+    }
+    let direct =
+        everywhere.as_ref().map_or(0.0, |everywhere| tracer(everywhere).direct_power(PASS, 0..LINES));
+    Ok(hard / (hard + direct))
+}
