@@ -93,7 +93,7 @@ fn missed(stats: &Stats, stop: &Stop) -> Option<String> {
 
 /// The share of light from lamps that the integrator of a scene, if it is `path`, hardly finds; `None` where that is little.
 pub(crate) fn caustics_not_found(scene: &Scene, options: &RenderOptions) -> Option<f64> {
-    const MUCH: f64 = 0.01;
+    const MUCH: f64 = 0.003;
     let is_path = matches!(options.integrator.kind, IntegratorKind::Path { .. });
     let share = if is_path { scene.caustic_share(options).ok()? } else { 0.0 };
     (share > MUCH).then_some(share)

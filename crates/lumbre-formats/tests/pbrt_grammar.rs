@@ -935,6 +935,7 @@ fn samplers_and_integrators_are_read_and_the_last_wins() {
         assert_eq!(scene.sampler, SamplerDesc { kind: SamplerKind::Independent, spp: Some(3), seed: 42 });
     }
     for (name, kind) in [
+        ("caustics", IntegratorKind::Caustics),
         ("whitted", IntegratorKind::Whitted { light_samples: 1, sky: false }),
         ("normals", IntegratorKind::Normals),
         ("depth", IntegratorKind::Depth),
@@ -948,8 +949,25 @@ fn samplers_and_integrators_are_read_and_the_last_wins() {
 }
 
 #[test]
+fn integrators_that_find_caustics_are_rendered_by_the_one_that_does() {
+    for (name, differs) in [
+        ("sppm", "its radius is a few pixels"),
+        ("bdpt", "it connects no vertices"),
+        ("mlt", "it mutates no paths"),
+        ("lightpath", "is not black"),
+    ] {
+        let (scene, diagnostics) = try_read(&format!("Integrator \"{name}\" \"integer maxdepth\" 7 WorldBegin"));
+        let integrator = scene.unwrap().integrator;
+        assert_eq!((integrator.kind, integrator.max_depth), (IntegratorKind::Caustics, 7));
+        let lines = diagnostics.lines();
+        let is_note = |line: &String| line.starts_with("note") && line.contains(differs);
+        assert!(lines.len() == 1 && lines.iter().all(is_note), "{lines:?}");
+    }
+}
+
+#[test]
 fn every_integrator_says_what_it_makes_of_shading_normals() {
-    for name in ["path", "whitted", "ambientocclusion"] {
+    for name in ["path", "caustics", "whitted", "ambientocclusion"] {
         for (value, expected) in [
             ("", ShadingNormals::Lumbre),
             ("\"string shadingnormals\" \"lumbre\"", ShadingNormals::Lumbre),

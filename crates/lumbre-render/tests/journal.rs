@@ -4,10 +4,11 @@
 
 use crate::common::*;
 use crate::determinism::still_life;
+use lumbre_image::Rgb;
 use lumbre_math::DVec3;
 use lumbre_render::transport::{End, Source};
 use lumbre_render::{Event, explain_sample};
-use lumbre_scene::{IntegratorKind, Scene};
+use lumbre_scene::{IntegratorKind, LightDesc, Scene};
 use lumbre_shading::Spectrum;
 
 /// The light of a path as its journal tells it.
@@ -20,6 +21,26 @@ fn told(events: &[Event]) -> Spectrum {
 
 fn bits(light: Spectrum) -> [u32; 3] {
     light.to_array().map(f32::to_bits)
+}
+
+#[test]
+fn the_journal_of_a_sample_with_photons_sums_to_the_pixel_of_the_render() {
+    let mut desc = still_life(DVec3::ZERO);
+    desc.lights.push(LightDesc::Point { from: DVec3::new(0.5, -2.0, 5.0), intensity: Rgb::splat(40.0) });
+    let scene = Scene::build(desc).unwrap();
+    let mut found = 0;
+    let mut options = options(&scene, 24, 16, 1);
+    options.first_sample = 6;
+    options.integrator.kind = IntegratorKind::Caustics;
+    let image = picture(&scene, &options).image;
+    for (x, y) in (0..16).map(|i| (i + 4, 15 - i / 2)) {
+        let sample = explain_sample(&scene, &options, (x, y), 6).unwrap();
+        assert_eq!(bits(told(&sample.events)), bits(sample.radiance), "({x}, {y})");
+        assert_eq!(image.pixel(x, y).to_array().map(f32::to_bits), bits(sample.radiance), "({x}, {y})");
+        let is_photons = |event: &&Event| matches!(event, Event::Added { source: Source::Caustics, .. });
+        found += sample.events.iter().filter(is_photons).count();
+    }
+    assert!(found > 0);
 }
 
 #[test]

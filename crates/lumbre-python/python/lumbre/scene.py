@@ -413,7 +413,7 @@ class Scene:
         crop : (x0, y0, x1, y1), upper ends excluded
             Only these pixels.
         camera : position or name
-        integrator : path, whitted, ambientocclusion, normals, depth, albedo or uv
+        integrator : path, caustics, whitted, ambientocclusion, normals, depth, albedo or uv
         max_depth : bounces at most
         seed : whole number, 0 or more
         threads : 0 for one a core
