@@ -92,21 +92,52 @@ impl Curves {
         if let Some(far) = strand.points().iter().find(|&&p| !relative(p).is_finite()) {
             check::finite("P", DVec3::INFINITY.copysign(*far - origin))?;
         }
-        let too_many = ShapeError::Degenerate("too many curves for one shape: more than 2^32 control points");
-        if u32::try_from(self.points.len() + strand.points().len()).is_err() {
-            return Err(too_many);
-        }
+        let first = self.first_of_more(strand.points().len())?;
         self.strands.push(self.segments.len() as u32);
-        let first = self.points.len();
         self.points.extend(strand.points().iter().map(|&p| relative(p)));
         for (i, widths) in strand.widths().windows(2).enumerate() {
             let widths = [widths[0] as f32, widths[1] as f32];
-            self.segments.push(Segment { first: (first + 3 * i) as u32, widths });
+            self.segments.push(Segment { first: first + 3 * i as u32, widths });
         }
         if is_ribbon {
             self.normals.extend(strand.normals().windows(2).map(|n| [n[0].as_vec3(), n[1].as_vec3()]));
         }
         Ok(())
+    }
+
+    /// Adds all of other curves of the same kind.
+    ///
+    /// # Errors
+    /// [`ShapeError`] where they are too far away or too many, or of another kind; nothing is added then.
+    pub fn append(&mut self, other: &Self) -> Result<(), ShapeError> {
+        if self.kind != other.kind {
+            return Err(ShapeError::Degenerate("these curves are of another kind"));
+        }
+        if self.points.is_empty() {
+            let splits = self.splits;
+            *self = Self { splits, ..other.clone() };
+            return Ok(());
+        }
+        let offset = other.origin - self.origin;
+        let relative = |p: &Vec3| (p.as_dvec3() + offset).as_vec3();
+        if !other.points.iter().all(|p| relative(p).is_finite()) {
+            return Err(ShapeError::Degenerate("these curves are too far apart for one shape"));
+        }
+        let first = self.first_of_more(other.points.len())?;
+        let segments = self.segments.len() as u32;
+        self.points.extend(other.points.iter().map(relative));
+        self.segments.extend(other.segments.iter().map(|s| Segment { first: s.first + first, ..*s }));
+        self.strands.extend(other.strands.iter().map(|first| first + segments));
+        self.normals.extend(&other.normals);
+        Ok(())
+    }
+
+    /// Where so many more control points begin.
+    fn first_of_more(&self, count: usize) -> Result<u32, ShapeError> {
+        match u32::try_from(self.points.len() + count) {
+            Ok(_) => Ok(self.points.len() as u32),
+            Err(_) => Err(ShapeError::Degenerate("curves of more than 2^32 control points make no shape")),
+        }
     }
 
     /// The same curves, each segment in 2^`splits` primitives; at most 64. More primitives have tighter boxes and take more memory. They
@@ -116,6 +147,12 @@ impl Curves {
         let most = (u32::MAX / self.segments.len().max(1) as u32).ilog2();
         self.splits = splits.min(most).min(6);
         self
+    }
+
+    /// The same curves, in as many primitives as suit a tree.
+    #[must_use]
+    pub fn for_tree(self) -> Self {
+        self.with_splits(0)
     }
 
     /// How each is shaded.
@@ -149,6 +186,11 @@ impl Curves {
             + size_of_val(&self.segments[..])
             + size_of_val(&self.strands[..])
             + size_of_val(&self.normals[..])
+    }
+
+    /// The segment that a primitive is of, among those of all curves.
+    pub fn segment_of(&self, primitive: u32) -> u32 {
+        primitive >> self.splits
     }
 
     /// The curve that a primitive is of, and which of its segments it is of; both from 0.

@@ -322,6 +322,18 @@ impl Builder {
                 entry.form = Form::Csg(Arc::new(form));
                 self.push(entry, geometries, GeometryKind::Shape(placed))?;
             }
+            GeometryDesc::Curves(curves) => {
+                if let Some(light) = area_light {
+                    let growth = desc.world_from_object.determinant().abs().cube_root().powi(2);
+                    entry.emission =
+                        Some(emission(light, || standing.area_factor() * growth * curves.area()));
+                    self.warnings.push(BuildWarning::UnsampledLight { shape: desc.index });
+                }
+                let curves = Arc::new(Arc::unwrap_or_clone(curves).for_tree());
+                entry.form = Form::Curves(curves.clone());
+                let placed = custom::placed(curves, desc.world_from_object);
+                self.push(entry, geometries, GeometryKind::Custom(placed))?;
+            }
             GeometryDesc::Custom(geometry) => {
                 if let Some(light) = area_light {
                     if light.power.is_some() {
@@ -722,6 +734,7 @@ fn origin(shapes: &[ShapeDesc], instances: &[InstanceDesc], accels: &[Arc<Accel>
             GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) => {
                 Some(mesh_bounds(mesh, &shape.world_from_object))
             }
+            GeometryDesc::Curves(curves) => custom::bounds(&**curves, &shape.world_from_object),
             GeometryDesc::Custom(geometry) => custom::bounds(&**geometry, &shape.world_from_object),
             GeometryDesc::Csg(_) => None,
         };

@@ -66,18 +66,23 @@ impl SceneInfo {
     }
 
     fn add_shape(&mut self, shape: &ShapeDesc) {
+        let mut count = 1;
         match &shape.geometry {
             GeometryDesc::Mesh(mesh) => {
                 self.triangles += mesh.triangles.len() as u64 + 2 * mesh.quads.len() as u64;
                 self.memory_bytes += mesh_bytes(mesh);
             }
             GeometryDesc::BilinearMesh(mesh) => self.memory_bytes += mesh_bytes(mesh),
+            GeometryDesc::Curves(curves) => {
+                self.memory_bytes += curves.bytes() as u64;
+                count = curves.len() as u64;
+            }
             GeometryDesc::Exact(_)
             | GeometryDesc::Coloured(_)
             | GeometryDesc::Csg(_)
             | GeometryDesc::Custom(_) => {}
         }
-        *self.shapes.entry(shape.geometry.name().to_owned()).or_default() += 1;
+        *self.shapes.entry(shape.geometry.name().to_owned()).or_default() += count;
         if let Some(AreaLightDesc { .. }) = shape.area_light {
             *self.lights.entry("area".to_owned()).or_default() += 1;
         }

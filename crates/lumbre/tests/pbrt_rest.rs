@@ -15,12 +15,6 @@ use lumbre::formats::{Budget, Diagnostics, Limits, pbrt};
 /// Scenes that are not as expected yet. One that is has to be taken off.
 const NOT_YET: &[&str] = &[
     "camera-realistic-sky",
-    "curve-arc",
-    "curve-bspline",
-    "curve-cylinder-lit",
-    "curve-flat-area",
-    "curve-flat-lit",
-    "curve-taper",
     "dispersion-prism",
     "film-sensor-canon",
     "hair-furnace-white",

@@ -29,7 +29,7 @@ use lumbre_scene::{Crossing, Scene};
 use lumbre_shading::Spectrum;
 use lumbre_shading::lanes::{
     BsdfKind, CoatedConductorLanes, CoatedDiffuseLanes, ConductorLanes, DielectricLanes, DiffuseLanes,
-    DiffuseTransmissionLanes, PrincipledLanes, ThinDielectricLanes, UberLanes,
+    DiffuseTransmissionLanes, HairLanes, PrincipledLanes, ThinDielectricLanes, UberLanes,
 };
 use lumbre_simd::Real;
 
@@ -243,6 +243,7 @@ const KINDS: [BsdfKind; BsdfKind::COUNT] = [
     BsdfKind::CoatedConductor,
     BsdfKind::Principled,
     BsdfKind::Uber,
+    BsdfKind::Hair,
 ];
 
 macro_rules! kinds {
@@ -278,4 +279,5 @@ kinds!(
     CoatedConductor: CoatedConductorLanes,
     Principled: PrincipledLanes,
     Uber: UberLanes,
+    Hair: HairLanes,
 );
