@@ -9,6 +9,7 @@ use lumbre_geometry::{Ray, Shape};
 use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Transform, Vec2, Vec3};
 use lumbre_scene::*;
+use lumbre_shading::hair::HairColour;
 use lumbre_shading::{
     Convention, Mapping2d, MaterialKind, PrincipledParams, ShadingNormals, Spectrum, Texture,
 };
@@ -460,7 +461,10 @@ fn what_is_not_rendered_is_said_and_still_counts() {
         r#"Shape "nurbs" "integer nu" 4
            Shape "sphere""#,
     );
-    assert!(warnings[0].ends_with("shape \"nurbs\" of pbrt-v3 is not rendered: it is left out"), "{warnings:?}");
+    assert!(
+        warnings[0].ends_with("shape \"nurbs\" of pbrt-v3 is not rendered: it is left out"),
+        "{warnings:?}"
+    );
     assert_eq!((scene.shapes.len(), scene.shapes[0].index), (1, 1));
 }
 
@@ -491,7 +495,10 @@ fn curves_that_differ_in_their_points_alone_are_one_shape() {
     let sizes: Vec<_> = (0..6).map(|i| (curves(i).len(), curves(i).segment_count())).collect();
     assert_eq!(sizes, [(3, 4), (1, 1), (1, 1), (1, 1), (1, 1), (1, 1)]);
     let joined = curves(0);
-    assert_eq!((joined.width(0, 0.5), joined.width(1, 0.0), joined.width(1, 1.0)), (0.1f32.into(), 0.5, 0.25));
+    assert_eq!(
+        (joined.width(0, 0.5), joined.width(1, 0.0), joined.width(1, 1.0)),
+        (0.1f32.into(), 0.5, 0.25)
+    );
     assert_eq!((joined.width(2, 0.0), joined.width(3, 0.3)), (1.0, 1.0));
     let [p0, p1, _, p3] = joined.control_points(1);
     let near = |p: DVec3, x: f64, y: f64| assert!((p - DVec3::new(x, y, 0.0)).length() < 1e-6, "{p}");
@@ -504,11 +511,9 @@ fn curves_that_differ_in_their_points_alone_are_one_shape() {
 
 #[test]
 fn normals_of_a_curve_that_is_no_ribbon_are_left_out_with_a_warning() {
-    let (scene, warnings) = warned(r#"Shape "curve" "normal N" [0 0 1 0 1 0] "point3 P" [0 0 0 1 0 0 1 1 0 2 2 0]"#);
-    assert_eq!(
-        warnings,
-        ["warning: scene.pbrt:1:26: normals are of use to curves of type \"ribbon\" only"]
-    );
+    let (scene, warnings) =
+        warned(r#"Shape "curve" "normal N" [0 0 1 0 1 0] "point3 P" [0 0 0 1 0 0 1 1 0 2 2 0]"#);
+    assert_eq!(warnings, ["warning: scene.pbrt:1:26: normals are of use to curves of type \"ribbon\" only"]);
     assert_eq!(scene.shapes.len(), 1);
 }
 
@@ -524,16 +529,21 @@ fn hair_is_coloured_by_one_of_its_parameters() {
     assert_eq!((constant(eumelanin), constant(pheomelanin)), (1.3, 0.0));
     let numbers = [&plain.eta, &plain.beta_m, &plain.beta_n, &plain.alpha].map(|texture| constant(texture));
     assert_eq!(numbers, [1.55, 0.3, 0.3, 2.0]);
-    let HairColour::Melanin { eumelanin, pheomelanin } = colour("\"float pheomelanin\" 2").colour else { panic!() };
+    let HairColour::Melanin { eumelanin, pheomelanin } = colour("\"float pheomelanin\" 2").colour else {
+        panic!()
+    };
     assert_eq!((constant(&eumelanin), constant(&pheomelanin)), (0.0, 2.0));
     for name in ["reflectance", "color"] {
-        let HairColour::Reflectance(colour) = colour(&format!("\"rgb {name}\" [.1 .2 .3]")).colour else { panic!() };
+        let HairColour::Reflectance(colour) = colour(&format!("\"rgb {name}\" [.1 .2 .3]")).colour else {
+            panic!()
+        };
         assert_eq!(constant(&colour), Rgb::new(0.1, 0.2, 0.3));
     }
     let HairColour::Absorption(sigma) = colour("\"rgb sigma_a\" [1 2 30]").colour else { panic!() };
     assert_eq!(constant(&sigma), Rgb::new(1.0, 2.0, 30.0));
-    let (_, warnings) =
-        warned(r#"Material "hair" "rgb sigma_a" [1 2 3] "float eumelanin" 1 "rgb color" [1 1 1] Shape "sphere""#);
+    let (_, warnings) = warned(
+        r#"Material "hair" "rgb sigma_a" [1 2 3] "float eumelanin" 1 "rgb color" [1 1 1] Shape "sphere""#,
+    );
     assert_eq!(warnings.len(), 2, "{warnings:?}");
     assert!(warnings[0].ends_with("\"color\" is not used where \"sigma_a\" is given"), "{warnings:?}");
 }

@@ -374,7 +374,12 @@ impl Converter<'_, '_> {
                 HairColour::Reflectance(self.hair_texture(params, name, SpectrumUse::Reflectance)?)
             }
             _ => HairColour::Melanin {
-                eumelanin: self.hair_number(params, "eumelanin", if counts.is_none() { 1.3 } else { 0.0 }, 0.0)?,
+                eumelanin: self.hair_number(
+                    params,
+                    "eumelanin",
+                    if counts.is_none() { 1.3 } else { 0.0 },
+                    0.0,
+                )?,
                 pheomelanin: self.hair_number(params, "pheomelanin", 0.0, 0.0)?,
             },
         };
@@ -387,7 +392,12 @@ impl Converter<'_, '_> {
         })))
     }
 
-    fn hair_texture(&mut self, params: &Params, name: &'static str, usage: SpectrumUse) -> Result<SpectrumArc> {
+    fn hair_texture(
+        &mut self,
+        params: &Params,
+        name: &'static str,
+        usage: SpectrumUse,
+    ) -> Result<SpectrumArc> {
         let colour = self.spectrum_texture_or(params, name, usage, 0.0)?;
         if let Texture::Constant(Spectrum { r, g, b }) = *colour
             && let Some(negative) = [r, g, b].into_iter().find(|c| *c < 0.0)
@@ -398,7 +408,13 @@ impl Converter<'_, '_> {
     }
 
     /// A number or a texture; a number that is too small is refused.
-    fn hair_number(&mut self, params: &Params, name: &'static str, default: f32, least: f32) -> Result<FloatArc> {
+    fn hair_number(
+        &mut self,
+        params: &Params,
+        name: &'static str,
+        default: f32,
+        least: f32,
+    ) -> Result<FloatArc> {
         let found = self.float_texture_or(params, name, default)?;
         match *found {
             Texture::Constant(v) if v < least || !v.is_finite() => {
