@@ -220,9 +220,7 @@ impl Material {
         }
         let colour = match color {
             Some(color) => HairColour::Reflectance(color.texture("color")?),
-            None => {
-                HairColour::Melanin { eumelanin: number(melanin[0]), pheomelanin: number(melanin[1]) }
-            }
+            None => HairColour::Melanin { eumelanin: number(melanin[0]), pheomelanin: number(melanin[1]) },
         };
         made(MaterialKind::Hair(Box::new(HairParams {
             colour,

@@ -4,15 +4,18 @@ use std::sync::Arc;
 
 use lumbre::description::{Camera as CameraDesc, CameraView, CsgOperation, LightDesc, MeshDesc};
 use lumbre::geometry::{
-    BilinearPatch, Capsule, Cone, Csg, Cuboid, CurveKind, Curves, Cylinder, Disk, Hyperboloid, Paraboloid, Plane, Quadric,
-    Shape, ShapeError, Sphere, Strand, Torus, Triangle,
+    BilinearPatch, Capsule, Cone, Csg, Cuboid, CurveKind, Curves, Cylinder, Disk, Hyperboloid, Paraboloid,
+    Plane, Quadric, Shape, ShapeError, Sphere, Strand, Torus, Triangle,
 };
 use lumbre::image::{Image, Rgb};
 use lumbre::math::{DMat4, Vec2, Vec3};
 use lumbre::shading::{Material as MaterialDesc, MaterialKind, SpectrumTexture};
 use lumbre::{DVec2, DVec3, EnvironmentDesc, ShapeBuilder, Transform};
 use numpy::ndarray::ArrayView2;
-use numpy::{PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{
+    PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+    PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 use crate::errors::{invalid, list, tuple};

@@ -124,7 +124,7 @@ fn thing(
         }
         TargetShape::Triangle([a, b, c]) => (Triangle::new(*a, *b, *c).ok().map(Shape::from), None, inner),
         TargetShape::Custom => match resolved.curves_at(hit) {
-            Some((_, map)) => (None, Some(map).filter(|map| !map.is_identity()), inner.into_object(map)),
+            Some((_, map)) => (None, Some(*map).filter(|map| !map.is_identity()), inner.into_object(map)),
             None => (None, None, inner),
         },
     };
