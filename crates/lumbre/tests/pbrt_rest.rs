@@ -17,9 +17,6 @@ const NOT_YET: &[&str] = &[
     "camera-realistic-sky",
     "dispersion-prism",
     "film-sensor-canon",
-    "hair-furnace-white",
-    "hair-lit-above",
-    "hair-lit-front",
     "measured-lit",
     "measured-sky",
     // Negative lanes and reflectances above 1 are clipped; saturated colours are 0.45 % off.
