@@ -241,6 +241,59 @@ const CASES: &[(&str, &str)] = &[
         "WorldBegin Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0]",
         "1:12: a bilinearmesh of other than 4 points has no \"integer indices\"",
     ),
+    ("WorldBegin Shape \"curve\"", "1:12: a curve has no \"point3 P\""),
+    (
+        "WorldBegin Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0]",
+        "1:26: wrong value for parameter \"P\" (found 8 numbers; expected three numbers each)",
+    ),
+    (
+        "WorldBegin Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0]",
+        "1:26: wrong number of control points: a cubic Bézier curve of n segments has 3 n + 1 control points (found 3)",
+    ),
+    (
+        "WorldBegin Shape \"curve\" \"string basis\" \"bspline\" \"point3 P\" [0 0 0 1 0 0 2 0 0]",
+        "1:51: wrong number of control points: a cubic B-spline has 4 control points or more (found 3)",
+    ),
+    (
+        "WorldBegin Shape \"curve\" \"integer degree\" 4 \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0]",
+        "1:26: parameter \"degree\" of shape \"curve\" is out of range (found 4; expected 2 or 3)",
+    ),
+    (
+        "WorldBegin Shape \"curve\" \"string type\" \"round\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0]",
+        "1:26: wrong value for parameter \"type\" (found string \"round\"; expected one of flat, cylinder, ribbon)",
+    ),
+    (
+        "WorldBegin Shape \"curve\" \"string basis\" \"nurbs\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0]",
+        "1:26: wrong value for parameter \"basis\" (found string \"nurbs\"; expected one of bezier, bspline)",
+    ),
+    (
+        "WorldBegin Shape \"curve\" \"float width1\" -2 \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0]",
+        "1:26: parameter \"width1\" of shape \"curve\" is out of range (found -2; expected more than 0)",
+    ),
+    (
+        "WorldBegin Shape \"curve\" \"float width\" 0 \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0]",
+        "1:26: parameter \"width\" of shape \"curve\" is out of range (found 0; expected more than 0)",
+    ),
+    (
+        "WorldBegin Shape \"curve\" \"string type\" \"ribbon\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0]",
+        "1:12: a ribbon has no \"normal N\"",
+    ),
+    (
+        "WorldBegin Shape \"curve\" \"string type\" \"ribbon\" \"normal N\" [0 0 1] \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0]",
+        "1:49: wrong number of normals (found 1; expected 2, one at each end of each segment)",
+    ),
+    (
+        "WorldBegin Material \"hair\" \"float eta\" 0",
+        "1:28: parameter \"eta\" of material \"hair\" is out of range (found 0; expected more than 0)",
+    ),
+    (
+        "WorldBegin Material \"hair\" \"float eumelanin\" -1",
+        "1:28: parameter \"eumelanin\" of material \"hair\" is out of range (found -1; expected 0 or more)",
+    ),
+    (
+        "WorldBegin Material \"hair\" \"rgb sigma_a\" [1 -1 0]",
+        "1:28: parameter \"sigma_a\" of material \"hair\" is out of range (found -1; expected 0 or more)",
+    ),
     ("WorldBegin Shape \"plymesh\"", "1:12: a plymesh has no \"string filename\""),
     (
         "WorldBegin Shape \"plymesh\" \"string filename\" \"m.ply\"",

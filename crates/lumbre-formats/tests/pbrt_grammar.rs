@@ -9,6 +9,7 @@ use lumbre_geometry::{Ray, Shape};
 use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Transform, Vec2, Vec3};
 use lumbre_scene::*;
+use lumbre_shading::hair::HairColour;
 use lumbre_shading::{
     Convention, Mapping2d, MaterialKind, PrincipledParams, ShadingNormals, Spectrum, Texture,
 };
@@ -457,11 +458,94 @@ fn closed_meshes_are_solids_whatever_their_vertices_share() {
 #[test]
 fn what_is_not_rendered_is_said_and_still_counts() {
     let (scene, warnings) = warned(
-        r#"Shape "curve" "point3 P" [0 0 0 1 0 0 1 1 0 2 2 0] "float width" .1
+        r#"Shape "nurbs" "integer nu" 4
            Shape "sphere""#,
     );
-    assert_eq!(warnings, ["warning: scene.pbrt:1:12: shape \"curve\" is not rendered yet: it is left out"]);
+    assert!(
+        warnings[0].ends_with("shape \"nurbs\" of pbrt-v3 is not rendered: it is left out"),
+        "{warnings:?}"
+    );
     assert_eq!((scene.shapes.len(), scene.shapes[0].index), (1, 1));
+}
+
+// Curves and hair.
+
+#[test]
+fn curves_that_differ_in_their_points_alone_are_one_shape() {
+    let scene = world(
+        r#"Shape "curve" "point3 P" [0 0 0 1 0 0 1 1 0 2 2 0] "float width" .1
+           Shape "curve" "point3 P" [3 0 0 4 0 0 4 1 0] "integer degree" 2 "float width0" .5 "float width1" .25
+           Shape "curve" "string basis" "bspline" "integer splitdepth" 5 "point3 P" [0 0 0 1 0 0 1 1 0 2 2 0 3 2 0]
+           Shape "curve" "string type" "cylinder" "point3 P" [0 0 0 1 0 0 1 1 0 2 2 0]
+           Translate 0 0 2
+           Shape "curve" "string type" "cylinder" "point3 P" [0 0 0 1 0 0 1 1 0 2 2 0]
+           Material "hair"
+           Shape "curve" "string type" "cylinder" "point3 P" [0 0 0 1 0 0 1 1 0 2 2 0]
+           ReverseOrientation
+           Shape "curve" "string type" "cylinder" "point3 P" [0 0 0 1 0 0 1 1 0 2 2 0]
+           Shape "curve" "string type" "ribbon" "normal N" [0 0 1 0 1 0] "point3 P" [0 0 0 1 0 0 1 1 0 2 2 0]
+           Shape "sphere""#,
+    );
+    let curves = |i: usize| {
+        let GeometryDesc::Curves(curves) = &scene.shapes[i].geometry else { panic!("{i}") };
+        curves
+    };
+    let indices: Vec<u32> = scene.shapes.iter().map(|shape| shape.index).collect();
+    assert_eq!(indices, [0, 3, 4, 5, 6, 7, 8]);
+    let sizes: Vec<_> = (0..6).map(|i| (curves(i).len(), curves(i).segment_count())).collect();
+    assert_eq!(sizes, [(3, 4), (1, 1), (1, 1), (1, 1), (1, 1), (1, 1)]);
+    let joined = curves(0);
+    assert_eq!(
+        (joined.width(0, 0.5), joined.width(1, 0.0), joined.width(1, 1.0)),
+        (0.1f32.into(), 0.5, 0.25)
+    );
+    assert_eq!((joined.width(2, 0.0), joined.width(3, 0.3)), (1.0, 1.0));
+    let [p0, p1, _, p3] = joined.control_points(1);
+    let near = |p: DVec3, x: f64, y: f64| assert!((p - DVec3::new(x, y, 0.0)).length() < 1e-6, "{p}");
+    near(p0, 3.0, 0.0);
+    near(p1, 3.0 + 2.0 / 3.0, 0.0);
+    near(p3, 4.0, 1.0);
+    near(joined.control_points(2)[0], 5.0 / 6.0, 1.0 / 6.0);
+    assert_eq!([1, 2, 3].map(|i| joined.strand_of(i)), [(1, 0), (2, 0), (2, 1)]);
+}
+
+#[test]
+fn normals_of_a_curve_that_is_no_ribbon_are_left_out_with_a_warning() {
+    let (scene, warnings) =
+        warned(r#"Shape "curve" "normal N" [0 0 1 0 1 0] "point3 P" [0 0 0 1 0 0 1 1 0 2 2 0]"#);
+    assert_eq!(warnings, ["warning: scene.pbrt:1:26: normals are of use to curves of type \"ribbon\" only"]);
+    assert_eq!(scene.shapes.len(), 1);
+}
+
+#[test]
+fn hair_is_coloured_by_one_of_its_parameters() {
+    let colour = |text: &str| {
+        let scene = world(&format!("Material \"hair\" {text} Shape \"sphere\""));
+        let MaterialKind::Hair(params) = kind(&scene, 0) else { panic!() };
+        params.clone()
+    };
+    let plain = colour("");
+    let HairColour::Melanin { eumelanin, pheomelanin } = &plain.colour else { panic!() };
+    assert_eq!((constant(eumelanin), constant(pheomelanin)), (1.3, 0.0));
+    let numbers = [&plain.eta, &plain.beta_m, &plain.beta_n, &plain.alpha].map(|texture| constant(texture));
+    assert_eq!(numbers, [1.55, 0.3, 0.3, 2.0]);
+    let HairColour::Melanin { eumelanin, pheomelanin } = colour("\"float pheomelanin\" 2").colour else {
+        panic!()
+    };
+    assert_eq!((constant(&eumelanin), constant(&pheomelanin)), (0.0, 2.0));
+    for name in ["reflectance", "color"] {
+        let HairColour::Reflectance(colour) = colour(&format!("\"rgb {name}\" [.1 .2 .3]")).colour else {
+            panic!()
+        };
+        assert_eq!(constant(&colour), Rgb::new(0.1, 0.2, 0.3));
+    }
+    let HairColour::Absorption(sigma) = colour("\"rgb sigma_a\" [1 2 30]").colour else { panic!() };
+    assert_eq!(constant(&sigma), Rgb::new(1.0, 2.0, 30.0));
+    let (_, warnings) = warned(
+        r#"Material "hair" "rgb sigma_a" [1 2 3] "float eumelanin" 1 "rgb color" [1 1 1] Shape "sphere""#,
+    );
+    assert_eq!(warnings.len(), 2, "{warnings:?}");
+    assert!(warnings[0].ends_with("\"color\" is not used where \"sigma_a\" is given"), "{warnings:?}");
 }
 
 // Materials and textures.

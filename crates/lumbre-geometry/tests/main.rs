@@ -3,6 +3,7 @@
 mod contract;
 mod conventions;
 mod csg;
+mod curves;
 mod exactness;
 mod explain;
 mod explain_formulas;

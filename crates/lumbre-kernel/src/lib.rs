@@ -7,6 +7,7 @@ mod accel;
 mod batch;
 mod build;
 mod columns;
+mod curves;
 mod deforming_mesh;
 mod hit;
 mod implicit;

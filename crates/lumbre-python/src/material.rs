@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use lumbre::image::{Bitmap, Channels, Encoding, PixelData};
 use lumbre::math::Vec2;
+use lumbre::shading::hair::{HairColour, HairParams};
 use lumbre::shading::{
     AxisWrap, FloatTexture, ImageFilter, ImageTexture, Mapping2d, Material as MaterialDesc, MaterialKind,
     MipMap, MipMapOptions, PrincipledParams, Roughness, Spectrum, SpectrumTexture, Texture as TextureDesc,
@@ -198,6 +199,36 @@ impl Material {
             transmittance: transmittance.texture("transmittance")?,
             scale: 1.0,
         })
+    }
+
+    /// Hair by its pigments, or by the colour of a mass of it.
+    #[staticmethod]
+    fn hair(
+        melanin: [f32; 2],
+        color: Option<Colour<'_>>,
+        roughness: Number<'_>,
+        azimuthal_roughness: Number<'_>,
+        tilt: f32,
+        ior: f32,
+    ) -> PyResult<Self> {
+        let number = |x: f32| Arc::new(FloatTexture::Constant(x));
+        if let Some(found) = melanin.into_iter().find(|x| !(*x >= 0.0 && x.is_finite())) {
+            return Err(invalid(format!("melanin is out of range (found {found}; expected 0 or more)")));
+        }
+        if !tilt.is_finite() {
+            return Err(invalid(format!("tilt is not finite (found {tilt})")));
+        }
+        let colour = match color {
+            Some(color) => HairColour::Reflectance(color.texture("color")?),
+            None => HairColour::Melanin { eumelanin: number(melanin[0]), pheomelanin: number(melanin[1]) },
+        };
+        made(MaterialKind::Hair(Box::new(HairParams {
+            colour,
+            eta: number(index(ior)?),
+            beta_m: roughness.share("roughness")?,
+            beta_n: azimuthal_roughness.share("azimuthal_roughness")?,
+            alpha: number(tilt),
+        })))
     }
 
     #[staticmethod]

@@ -4,15 +4,18 @@ use std::sync::Arc;
 
 use lumbre::description::{Camera as CameraDesc, CameraView, CsgOperation, LightDesc, MeshDesc};
 use lumbre::geometry::{
-    BilinearPatch, Capsule, Cone, Csg, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, Plane, Quadric,
-    Shape, ShapeError, Sphere, Torus, Triangle,
+    BilinearPatch, Capsule, Cone, Csg, Cuboid, CurveKind, Curves, Cylinder, Disk, Hyperboloid, Paraboloid,
+    Plane, Quadric, Shape, ShapeError, Sphere, Strand, Torus, Triangle,
 };
 use lumbre::image::{Image, Rgb};
 use lumbre::math::{DMat4, Vec2, Vec3};
 use lumbre::shading::{Material as MaterialDesc, MaterialKind, SpectrumTexture};
 use lumbre::{DVec2, DVec3, EnvironmentDesc, ShapeBuilder, Transform};
 use numpy::ndarray::ArrayView2;
-use numpy::{PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{
+    PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+    PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 use crate::errors::{invalid, list, tuple};
@@ -148,6 +151,37 @@ impl Geometry {
     #[staticmethod]
     fn patch(p00: Triple, p10: Triple, p01: Triple, p11: Triple) -> PyResult<Self> {
         exact(BilinearPatch::new(p00.into(), p10.into(), p01.into(), p11.into()))
+    }
+
+    /// Smooth curves through (P, 3) points, with a width at each; `counts` is how many points each curve has.
+    #[staticmethod]
+    fn curves(
+        points: PyReadonlyArray2<'_, f64>,
+        widths: PyReadonlyArray1<'_, f64>,
+        counts: PyReadonlyArray1<'_, i64>,
+        kind: &str,
+    ) -> PyResult<Self> {
+        let kind = match kind {
+            "flat" => CurveKind::Flat,
+            "cylinder" => CurveKind::Cylinder,
+            _ => return Err(unknown("kind", kind, &["flat", "cylinder"])),
+        };
+        check_width("points", &points, 3)?;
+        let places: Vec<DVec3> = rows(&points.as_array(), |place: Triple| place.into())?;
+        let widths: Vec<f64> = widths.as_array().iter().copied().collect();
+        let mut curves = Curves::new(kind);
+        let mut first = 0;
+        for (number, &count) in counts.as_array().iter().enumerate() {
+            let last = usize::try_from(count).ok().and_then(|count| first.checked_add(count));
+            let part = last.filter(|&last| last <= places.len() && last <= widths.len());
+            let Some(last) = part else { return Err(invalid(format!("curve {number} has no points"))) };
+            let strand = Strand::through(&places[first..last], &widths[first..last]);
+            strand
+                .and_then(|strand| curves.push(&strand))
+                .map_err(|wrong| invalid(format!("curve {number}: {wrong}")))?;
+            first = last;
+        }
+        Ok(ShapeBuilder::curves(curves).into())
     }
 
     /// CSG of operands, each the union of its shapes.

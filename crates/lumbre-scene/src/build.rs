@@ -26,6 +26,9 @@ use crate::{
     extent, framing, ground, stage, studio,
 };
 
+/// Segments of curves are this often halved for the tree.
+const CURVE_SPLITS: u32 = 1;
+
 /// The maximal depth of nested objects.
 const MAX_NESTING: usize = 64;
 
@@ -324,6 +327,18 @@ impl Builder {
                 let placed = csg::shape_of(&form);
                 entry.form = Form::Csg(Arc::new(form));
                 self.push(entry, geometries, GeometryKind::Shape(placed))?;
+            }
+            GeometryDesc::Curves(curves) => {
+                if let Some(light) = area_light {
+                    let growth = desc.world_from_object.determinant().abs().cube_root().powi(2);
+                    entry.emission =
+                        Some(emission(light, || standing.area_factor() * growth * curves.area()));
+                    self.warnings.push(BuildWarning::UnsampledLight { shape: desc.index });
+                }
+                let curves = Arc::new(Arc::unwrap_or_clone(curves).with_splits(CURVE_SPLITS));
+                entry.form = Form::Curves(curves.clone(), Box::new(desc.world_from_object));
+                let placed = custom::placed(curves, desc.world_from_object);
+                self.push(entry, geometries, GeometryKind::Custom(placed))?;
             }
             GeometryDesc::Custom(geometry) => {
                 if let Some(light) = area_light {
@@ -725,6 +740,7 @@ fn origin(shapes: &[ShapeDesc], instances: &[InstanceDesc], accels: &[Arc<Accel>
             GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) => {
                 Some(mesh_bounds(mesh, &shape.world_from_object))
             }
+            GeometryDesc::Curves(curves) => custom::bounds(&**curves, &shape.world_from_object),
             GeometryDesc::Custom(geometry) => custom::bounds(&**geometry, &shape.world_from_object),
             GeometryDesc::Csg(_) => None,
         };

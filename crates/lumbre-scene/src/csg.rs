@@ -124,6 +124,7 @@ fn solid(
             Csg::solid(Arc::new(solid)).map_err(|e| wrong(e.to_string()))
         }
         GeometryDesc::BilinearMesh(_) => Err(wrong("a bilinear mesh is no solid".to_owned())),
+        GeometryDesc::Curves(_) => Err(wrong("a curve is no solid".to_owned())),
         GeometryDesc::Custom(_) => Err(wrong("custom geometry is not known to be a solid".to_owned())),
         GeometryDesc::Csg(inner) => {
             let reverse = entry.reverse;

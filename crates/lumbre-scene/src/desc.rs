@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lumbre_geometry::Shape;
+use lumbre_geometry::{Curves, Shape};
 use lumbre_image::Rgb;
 use lumbre_kernel::{CustomGeometry, Placement};
 use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec2, Vec3, Vec4};
@@ -146,6 +146,8 @@ pub enum GeometryDesc {
     BilinearMesh(Arc<MeshDesc>),
     /// CSG of solids, each surface with its own material.
     Csg(CsgDesc),
+    /// Curves with a width: hair, fur, grass. Many of them are one shape.
+    Curves(Arc<Curves>),
     /// Geometry that a program brings, such as a [`lumbre_geometry::ImplicitSurface`].
     Custom(Arc<dyn CustomGeometry>),
 }
@@ -159,6 +161,7 @@ impl GeometryDesc {
             Self::Mesh(_) => "mesh",
             Self::BilinearMesh(_) => "bilinearmesh",
             Self::Csg(_) => "csg",
+            Self::Curves(_) => "curve",
             Self::Custom(_) => "custom",
         }
     }

@@ -134,6 +134,10 @@ fn each_point_of(shape: &ShapeDesc, used: &Used, visit: &mut dyn FnMut(DVec3)) {
             GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) => {
                 each_vertex(mesh, used, &mut |p| visit(placement.point(p)));
             }
+            GeometryDesc::Curves(curves) => {
+                let bounds = custom::bounds(&**curves, &placement).filter(|bounds| !bounds.is_empty());
+                bounds.iter().flat_map(corners).for_each(&mut *visit);
+            }
             GeometryDesc::Custom(geometry) => {
                 let bounds = custom::bounds(&**geometry, &placement).filter(|bounds| !bounds.is_empty());
                 bounds.iter().flat_map(corners).for_each(&mut *visit);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lumbre_geometry::{Aabb, Ray, Surface};
+use lumbre_geometry::{Aabb, Curves, Ray, Surface};
 use lumbre_kernel::{Accel, Hit, Query};
 use lumbre_math::distribution::AliasTable;
 use lumbre_math::random::{combine, hash_dvec3, uniform_f32};
@@ -186,6 +186,15 @@ impl Scene {
     pub fn primitive_index(&self, hit: &Hit) -> u32 {
         let (entry, part, _) = self.leaf(hit);
         entry.primitive(part)
+    }
+
+    /// The curves that a hit is on, in their own space, and the map from there to the innermost instance around; `None` for other
+    /// shapes.
+    pub fn curves_at(&self, hit: &Hit) -> Option<(&Curves, &Transform)> {
+        match &self.leaf(hit).0.form {
+            Form::Curves(curves, place) => Some((curves, place)),
+            _ => None,
+        }
     }
 
     /// Whether any material transmits light: glass, panes, leaves. Cut-outs do not count.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lumbre_geometry::Surface;
+use lumbre_geometry::{Curves, Surface};
 use lumbre_kernel::{DeformingMesh, PreciseMesh, TriangleMesh};
 use lumbre_math::{DVec2, DVec3, Transform, Vec2, Vec3, Vec4};
 use lumbre_shading::{FloatTexture, LocalSurface, Material, Spectrum, TextureContext, VertexData};
@@ -36,6 +36,7 @@ impl SurfaceEntry {
         match self.form {
             Form::Patch { primitive, .. } => primitive,
             Form::Mesh(_) | Form::Custom => part,
+            Form::Curves(ref curves, _) => curves.segment_of(part),
             Form::Exact | Form::Coloured(_) | Form::Csg(_) => 0,
         }
     }
@@ -52,6 +53,8 @@ pub(crate) enum Form {
     Mesh(Arc<MeshAttributes>),
     /// A patch of a mesh, from a quad that is not flat.
     Patch { attributes: Arc<MeshAttributes>, corners: [u32; 4], primitive: u32 },
+    /// None, of a segment of curves, which are placed by a map.
+    Curves(Arc<Curves>, Box<Transform>),
     /// None, of one of many primitives.
     Custom,
     /// A CSG: the surface data of each leaf.
@@ -181,7 +184,7 @@ impl SurfaceEntry {
     /// 1 if it faces as its geometry does, or −1 if flipped; `None` where vertex normals flip a part of a triangle.
     pub(crate) fn outward(&self, triangle: u32) -> Option<f64> {
         let outward = match &self.form {
-            Form::Exact | Form::Coloured(_) | Form::Custom => 1.0,
+            Form::Exact | Form::Coloured(_) | Form::Curves(..) | Form::Custom => 1.0,
             Form::Mesh(mesh) => mesh.outward(triangle)?,
             Form::Patch { .. } | Form::Csg(_) => return None,
         };
@@ -252,7 +255,7 @@ impl SurfaceEntry {
         time: f64,
     ) -> ShadingGeometry {
         let mut shaded = match &self.form {
-            Form::Exact | Form::Custom | Form::Csg(_) => plain(surface),
+            Form::Exact | Form::Curves(..) | Form::Custom | Form::Csg(_) => plain(surface),
             Form::Coloured(ramp) => {
                 ShadingGeometry { vertex: ramp.at(surface.point, placement), ..plain(surface) }
             }

@@ -6,6 +6,7 @@ use crate::coated::{Coat, CoatedConductor, CoatedDiffuse};
 use crate::conductor::Conductor;
 use crate::dielectric::{Dielectric, ThinDielectric};
 use crate::diffuse::{Diffuse, DiffuseTransmission};
+use crate::hair::Hair;
 use crate::principled::Principled;
 use crate::uber::Uber;
 use crate::{LocalDir, Spectrum};
@@ -59,6 +60,8 @@ pub enum Bsdf {
     Principled(Box<Principled>),
     /// pbrt-v3's lobes side by side.
     Uber(Uber),
+    /// A fibre.
+    Hair(Hair),
 }
 
 impl Bsdf {
@@ -74,6 +77,7 @@ impl Bsdf {
             Self::CoatedConductor(bsdf) => bsdf.eval(wo, wi),
             Self::Principled(bsdf) => bsdf.eval(wo, wi),
             Self::Uber(bsdf) => bsdf.eval(wo, wi),
+            Self::Hair(bsdf) => bsdf.eval(wo, wi),
         }
     }
 
@@ -90,6 +94,7 @@ impl Bsdf {
             Self::CoatedConductor(bsdf) => bsdf.pdf(wo, wi),
             Self::Principled(bsdf) => bsdf.pdf(wo, wi),
             Self::Uber(bsdf) => bsdf.pdf(wo, wi),
+            Self::Hair(bsdf) => bsdf.pdf(wo, wi),
         }
     }
 
@@ -105,6 +110,7 @@ impl Bsdf {
             Self::CoatedConductor(bsdf) => bsdf.sample(wo, lobe, u),
             Self::Principled(bsdf) => bsdf.sample(wo, lobe, u),
             Self::Uber(bsdf) => bsdf.sample(wo, lobe, u),
+            Self::Hair(bsdf) => bsdf.sample(wo, lobe, u),
         }
     }
 
@@ -116,7 +122,7 @@ impl Bsdf {
     /// Whether all parts are deltas, so that light sampling is useless.
     pub fn is_delta(&self) -> bool {
         match self {
-            Self::Diffuse(_) | Self::DiffuseTransmission(_) | Self::CoatedDiffuse(_) => false,
+            Self::Diffuse(_) | Self::DiffuseTransmission(_) | Self::CoatedDiffuse(_) | Self::Hair(_) => false,
             Self::Conductor(bsdf) => bsdf.facets.is_smooth(),
             Self::Dielectric(bsdf) => bsdf.is_delta(),
             Self::ThinDielectric(_) => true,
@@ -135,7 +141,7 @@ impl Bsdf {
             Self::CoatedDiffuse(bsdf) => &[bsdf.coat.face.facets],
             Self::CoatedConductor(bsdf) => &[bsdf.coat.face.facets, bsdf.base.facets],
             Self::Principled(bsdf) if bsdf.coat.weight <= 0.0 || bsdf.coat.normal.z >= 1.0 => &[bsdf.facets],
-            Self::Principled(_) => return false,
+            Self::Principled(_) | Self::Hair(_) => return false,
             Self::Uber(bsdf) => &[bsdf.facets],
         };
         facets.iter().all(|facets| facets.alpha().x == facets.alpha().y)
@@ -153,6 +159,7 @@ impl Bsdf {
             Self::CoatedConductor(bsdf) => bsdf.albedo_estimate(),
             Self::Principled(bsdf) => bsdf.albedo_estimate(),
             Self::Uber(bsdf) => bsdf.albedo_estimate(),
+            Self::Hair(bsdf) => bsdf.albedo_estimate(),
         }
     }
 
@@ -175,7 +182,7 @@ impl Bsdf {
         let glass = |bsdf: Dielectric| Dielectric { facets: bsdf.facets.regularized(), ..bsdf };
         let coated = |coat: Coat| Coat { face: glass(coat.face), ..coat };
         match self {
-            Self::Diffuse(_) | Self::DiffuseTransmission(_) | Self::ThinDielectric(_) => self,
+            Self::Diffuse(_) | Self::DiffuseTransmission(_) | Self::ThinDielectric(_) | Self::Hair(_) => self,
             Self::Conductor(bsdf) => Self::Conductor(metal(bsdf)),
             Self::Dielectric(bsdf) => Self::Dielectric(glass(bsdf)),
             Self::CoatedDiffuse(bsdf) => {

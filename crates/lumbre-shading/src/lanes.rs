@@ -12,6 +12,7 @@ pub use crate::coated_lanes::{CoatLanes, CoatedConductorLanes, CoatedDiffuseLane
 pub use crate::conductor::ConductorLanes;
 pub use crate::dielectric::{DielectricLanes, ThinDielectricLanes};
 pub use crate::diffuse::{DiffuseLanes, DiffuseTransmissionLanes};
+pub use crate::hair::HairLanes;
 pub use crate::microfacet::FacetLanes;
 pub use crate::principled_lanes::{ClearcoatLanes, PrincipledLanes};
 pub use crate::sheen::SheenLanes;
@@ -103,11 +104,13 @@ pub enum BsdfKind {
     Principled,
     /// [`UberLanes`].
     Uber,
+    /// [`HairLanes`].
+    Hair,
 }
 
 impl BsdfKind {
     /// How many there are.
-    pub const COUNT: usize = Self::Uber as usize + 1;
+    pub const COUNT: usize = Self::Hair as usize + 1;
 }
 
 /// The parameters of a BSDF as plain numbers: [`LaneBsdf::ROW`] of them.
@@ -126,6 +129,7 @@ impl Bsdf {
             Self::CoatedConductor(_) => BsdfKind::CoatedConductor,
             Self::Principled(_) => BsdfKind::Principled,
             Self::Uber(_) => BsdfKind::Uber,
+            Self::Hair(_) => BsdfKind::Hair,
         }
     }
 
@@ -141,6 +145,7 @@ impl Bsdf {
             Self::CoatedConductor(bsdf) => bsdf.row().collect(),
             Self::Principled(bsdf) => bsdf.row(),
             Self::Uber(bsdf) => bsdf.row(),
+            Self::Hair(bsdf) => bsdf.row(),
         }
     }
 }

@@ -13,6 +13,7 @@ pub mod dielectric;
 pub mod diffuse;
 mod frame;
 pub mod fresnel;
+pub mod hair;
 pub mod lanes;
 mod material;
 pub mod medium;

@@ -11,6 +11,7 @@ use crate::coated::{Coat, CoatedConductor, CoatedDiffuse};
 use crate::conductor::Conductor;
 use crate::dielectric::{Dielectric, ThinDielectric};
 use crate::diffuse::{Diffuse, DiffuseTransmission};
+use crate::hair::HairParams;
 use crate::microfacet::Microfacets;
 use crate::uber::UberParams;
 use crate::{
@@ -155,6 +156,8 @@ pub enum MaterialKind {
     Principled(Box<PrincipledParams>),
     /// pbrt-v3's `uber` and `plastic`: lobes side by side.
     Uber(Box<UberParams>),
+    /// Hair and fur, on curves.
+    Hair(Box<HairParams>),
     /// One of two, chosen at random by position and direction.
     Mix {
         /// The materials at amount 0 and 1.
@@ -168,7 +171,7 @@ pub enum MaterialKind {
 
 impl MaterialKind {
     /// The names of the kinds in the scene language, in the order of this enum.
-    pub const NAMES: [&str; 11] = [
+    pub const NAMES: [&str; 12] = [
         "diffuse",
         "conductor",
         "dielectric",
@@ -178,6 +181,7 @@ impl MaterialKind {
         "diffusetransmission",
         "principled",
         "uber",
+        "hair",
         "mix",
         "interface",
     ];
@@ -194,6 +198,7 @@ impl MaterialKind {
             Self::DiffuseTransmission { .. } => "diffusetransmission",
             Self::Principled(_) => "principled",
             Self::Uber(_) => "uber",
+            Self::Hair(_) => "hair",
             Self::Mix { .. } => "mix",
             Self::Interface => "interface",
         }
@@ -309,7 +314,8 @@ impl Material {
         self.has_part(|kind| match kind {
             MaterialKind::Dielectric { .. }
             | MaterialKind::ThinDielectric { .. }
-            | MaterialKind::DiffuseTransmission { .. } => true,
+            | MaterialKind::DiffuseTransmission { .. }
+            | MaterialKind::Hair(_) => true,
             MaterialKind::Principled(params) => params.lets_light_through(),
             MaterialKind::Uber(params) => params.lets_light_through(),
             _ => false,
@@ -450,6 +456,12 @@ impl Material {
                 }
             }
         }
+        // Across the fibre as it is seen, whichever way v runs.
+        if let Bsdf::Hair(hair) = &mut bsdf
+            && surface.dpdv.dot(towards.cross(frame.s)) < 0.0
+        {
+            hair.h = -hair.h;
+        }
         Some((frame, bsdf))
     }
 
@@ -569,6 +581,7 @@ impl Material {
             }
             MaterialKind::Principled(params) => Bsdf::Principled(Box::new(params.bsdf(at))),
             MaterialKind::Uber(params) => Bsdf::Uber(params.bsdf(at)),
+            MaterialKind::Hair(params) => Bsdf::Hair(params.bsdf(at)),
             MaterialKind::Mix { .. } | MaterialKind::Interface => return None,
         };
         Some(bsdf)

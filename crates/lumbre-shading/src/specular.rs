@@ -19,7 +19,7 @@ impl Bsdf {
     fn delta_parts(&self, wo: LocalDir) -> Specular {
         let nowhere = Vec2::ZERO;
         match self {
-            Self::Diffuse(_) | Self::DiffuseTransmission(_) => Specular::new(),
+            Self::Diffuse(_) | Self::Hair(_) | Self::DiffuseTransmission(_) => Specular::new(),
             Self::Conductor(bsdf) if bsdf.facets.is_smooth() => {
                 bsdf.sample(wo, nowhere).into_iter().collect()
             }

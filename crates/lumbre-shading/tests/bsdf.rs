@@ -15,6 +15,7 @@ use lumbre_shading::coated::{Coat, CoatedConductor, CoatedDiffuse};
 use lumbre_shading::conductor::Conductor;
 use lumbre_shading::dielectric::{Dielectric, ThinDielectric};
 use lumbre_shading::diffuse::{Diffuse, DiffuseTransmission};
+use lumbre_shading::hair::Hair;
 use lumbre_shading::lanes::{self, BsdfKind, LaneBsdf};
 use lumbre_shading::microfacet::Microfacets;
 use lumbre_shading::principled::{Body, Clearcoat, Principled};
@@ -159,6 +160,17 @@ fn principled() -> Vec<(&'static str, Principled)> {
     ]
 }
 
+/// Fibres at different places, smooth and rough, clear and dark.
+fn hair() -> Vec<(&'static str, Hair)> {
+    let brown = Spectrum::new(0.3, 0.8, 1.6);
+    vec![
+        ("brown", Hair::new(brown, 0.4, 1.55, 0.3, 0.3, 2.0)),
+        ("rough", Hair::new(brown, -0.8, 1.55, 0.9, 0.7, 5.0)),
+        ("clear", Hair::new(Spectrum::BLACK, 0.1, 1.33, 0.5, 0.4, 0.0)),
+        ("edge", Hair::new(brown, 1.0, 1.55, 0.4, 0.9, -3.0)),
+    ]
+}
+
 /// Half of the difference of η between blue and red.
 fn spread(bsdf: &Principled) -> f32 {
     match bsdf.body {
@@ -230,6 +242,9 @@ fn all() -> Vec<(String, Bsdf)> {
         for (name, bsdf) in [("plastic", uber), ("clear", clear), ("glossy", glossy)] {
             list.push((format!("uber {name} {eta}"), Bsdf::Uber(bsdf)));
         }
+    }
+    for (name, bsdf) in hair() {
+        list.push((format!("hair {name}"), Bsdf::Hair(bsdf)));
     }
     for (name, bsdf) in principled().into_iter().chain([("leaning coat", leaning())]) {
         list.push((format!("principled {name}"), Bsdf::Principled(Box::new(bsdf))));
@@ -487,6 +502,8 @@ fn light_goes_back_the_way_it_came() {
     for (name, bsdf) in all() {
         let eta = match &bsdf {
             Bsdf::CoatedDiffuse(_) | Bsdf::CoatedConductor(_) => continue,
+            // What it absorbs, and its tilt, are those of the viewer's angle.
+            Bsdf::Hair(_) => continue,
             // Under a coat it need not.
             Bsdf::Principled(bsdf) if bsdf.coat.weight > 0.0 => continue,
             // Each lane of a prism has an index of its own.
@@ -703,6 +720,9 @@ fn what_promises_to_conserve_energy_does() {
         ),
         ("mirror", Bsdf::Conductor(Conductor::from_reflectance(grey(1.0), Microfacets::SMOOTH))),
     ];
+    for (h, beta_m, beta_n) in [(0.0, 0.3, 0.3), (0.7, 0.05, 0.6), (-0.99, 1.0, 0.1), (1.0, 0.4, 1.0)] {
+        list.push(("hair", Bsdf::Hair(Hair::new(Spectrum::BLACK, h, 1.55, beta_m, beta_n, 0.0))));
+    }
     for eta in [GLASS, 1.0 / GLASS, 2.4, 1.0] {
         list.push(("dielectric", glass(eta, (0.0, 0.0))));
         list.push(("thindielectric", Bsdf::ThinDielectric(ThinDielectric { eta })));
@@ -715,7 +735,7 @@ fn what_promises_to_conserve_energy_does() {
             count += 1;
         }
     }
-    assert_eq!(count, 11 * 7);
+    assert_eq!(count, 15 * 7);
 }
 
 #[test]
@@ -1365,7 +1385,7 @@ kinds! {
     DiffuseKind = DiffuseLanes, DiffuseTransmissionKind = DiffuseTransmissionLanes, ConductorKind = ConductorLanes,
     DielectricKind = DielectricLanes, ThinDielectricKind = ThinDielectricLanes,
     CoatedDiffuseKind = CoatedDiffuseLanes, CoatedConductorKind = CoatedConductorLanes,
-    PrincipledKind = PrincipledLanes, UberKind = UberLanes
+    PrincipledKind = PrincipledLanes, UberKind = UberLanes, HairKind = HairLanes
 }
 
 #[test]
@@ -1411,6 +1431,11 @@ fn lanes_scatter_as_scalar_code_does_to_the_bit() {
         let facets = Microfacets::new(x * x + 1e-3, y + 1e-3);
         let eta = 0.6 + 1.5 * random.next_f32();
         Bsdf::Uber(Uber { diffuse, glossy, mirror, refracted, passed, eta, facets })
+    });
+    assert_lanes_agree::<HairKind>(BsdfKind::Hair, |random| {
+        let absorption = random_colour(random) * 3.0;
+        let [h, beta_m, beta_n] = std::array::from_fn(|_| random.next_f32());
+        Bsdf::Hair(Hair::new(absorption, 2.0 * h - 1.0, 1.2 + random.next_f32(), beta_m, beta_n, 4.0 * h))
     });
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lumbre_geometry::Shape;
+use lumbre_geometry::{Curves, Shape};
 use lumbre_image::Rgb;
 use lumbre_kernel::CustomGeometry;
 use lumbre_math::Transform;
@@ -41,6 +41,11 @@ impl ShapeBuilder {
     /// An exact shape.
     pub fn exact(shape: impl Into<Shape>) -> Self {
         Self::new(GeometryDesc::Exact(shape.into()))
+    }
+
+    /// Curves with a width: hair, grass.
+    pub fn curves(curves: Curves) -> Self {
+        Self::new(GeometryDesc::Curves(Arc::new(curves)))
     }
 
     /// An implicit surface `F(x, y, z) = 0`, or other geometry of a program's own.

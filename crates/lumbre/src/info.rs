@@ -66,18 +66,23 @@ impl SceneInfo {
     }
 
     fn add_shape(&mut self, shape: &ShapeDesc) {
+        let mut count = 1;
         match &shape.geometry {
             GeometryDesc::Mesh(mesh) => {
                 self.triangles += mesh.triangles.len() as u64 + 2 * mesh.quads.len() as u64;
                 self.memory_bytes += mesh_bytes(mesh);
             }
             GeometryDesc::BilinearMesh(mesh) => self.memory_bytes += mesh_bytes(mesh),
+            GeometryDesc::Curves(curves) => {
+                self.memory_bytes += curves.bytes() as u64;
+                count = curves.len() as u64;
+            }
             GeometryDesc::Exact(_)
             | GeometryDesc::Coloured(_)
             | GeometryDesc::Csg(_)
             | GeometryDesc::Custom(_) => {}
         }
-        *self.shapes.entry(shape.geometry.name().to_owned()).or_default() += 1;
+        *self.shapes.entry(shape.geometry.name().to_owned()).or_default() += count;
         if let Some(AreaLightDesc { .. }) = shape.area_light {
             *self.lights.entry("area".to_owned()).or_default() += 1;
         }
@@ -95,7 +100,10 @@ pub fn predicted_build_bytes(desc: &SceneDesc) -> u64 {
     // Each object that is placed has a tree of its own, however small; of the others, there is only a list.
     const PLACED: u64 = 4096;
     const OBJECT: u64 = 160;
+    // A segment of a curve is two primitives.
+    const SEGMENT: u64 = 256;
     let (mut triangles, mut others, mut lights) = (0_u64, 0_u64, desc.lights.len() as u64);
+    let mut segments = 0_u64;
     let mut add = |shape: &ShapeDesc| {
         others += 1;
         let shines = shape.area_light.is_some();
@@ -106,6 +114,8 @@ pub fn predicted_build_bytes(desc: &SceneDesc) -> u64 {
             lights += if shines { count } else { 0 };
         } else if let GeometryDesc::BilinearMesh(mesh) = &shape.geometry {
             others += mesh.quads.len() as u64;
+        } else if let GeometryDesc::Curves(curves) = &shape.geometry {
+            segments += curves.segment_count() as u64;
         }
     };
     desc.shapes.iter().for_each(&mut add);
@@ -117,6 +127,7 @@ pub fn predicted_build_bytes(desc: &SceneDesc) -> u64 {
     let instances = desc.instances.len() + objects().map(|object| object.instances.len()).sum::<usize>();
     let parts = [
         (triangles, TRIANGLE),
+        (segments, SEGMENT),
         (others + instances as u64, OTHER),
         (lights, LIGHT),
         (placed.len() as u64, PLACED),

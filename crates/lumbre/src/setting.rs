@@ -7,6 +7,7 @@ use lumbre_formats::diagnostic::{nearest_name, number, quoted};
 use lumbre_image::{Rgb, srgb_to_linear};
 use lumbre_math::DVec3;
 use lumbre_scene::{Camera, CameraKind, FilmDesc, GeometryDesc, LightDesc, SceneDesc, ShapeDesc};
+use lumbre_shading::hair::HairColour;
 use lumbre_shading::{
     FloatTexture, Material, MaterialKind, Metal, PrincipledParams, Roughness, SpectrumTexture, Texture,
 };
@@ -417,6 +418,11 @@ pub(crate) fn material_parameters(kind: &MaterialKind) -> &'static [&'static str
         MaterialKind::Uber(_) => {
             &["Kd", "Ks", "Kr", "Kt", "opacity", "index", "roughness", "uroughness", "vroughness"]
         }
+        MaterialKind::Hair(params) => match params.colour {
+            HairColour::Absorption(_) => &["eta", "beta_m", "beta_n", "alpha"],
+            HairColour::Reflectance(_) => &["reflectance", "eta", "beta_m", "beta_n", "alpha"],
+            HairColour::Melanin { .. } => &["eumelanin", "pheomelanin", "eta", "beta_m", "beta_n", "alpha"],
+        },
         MaterialKind::Mix { .. } => &["amount"],
         MaterialKind::Interface => &[],
     }
@@ -447,6 +453,16 @@ pub(crate) fn material_slot<'m>(kind: &'m mut MaterialKind, name: &str) -> Optio
     use MaterialKind as Kind;
     Some(match (kind, name) {
         (Kind::Principled(params), name) => return principled_slot(params, name),
+        (Kind::Hair(params), name) => match (name, &mut params.colour) {
+            ("reflectance", HairColour::Reflectance(colour)) => Slot::Colour(colour),
+            ("eumelanin", HairColour::Melanin { eumelanin, .. }) => Slot::Number(eumelanin, FROM_ZERO),
+            ("pheomelanin", HairColour::Melanin { pheomelanin, .. }) => Slot::Number(pheomelanin, FROM_ZERO),
+            ("eta", _) => Slot::Number(&mut params.eta, Range(0.1, 10.0)),
+            ("beta_m", _) => Slot::Number(&mut params.beta_m, UNIT),
+            ("beta_n", _) => Slot::Number(&mut params.beta_n, UNIT),
+            ("alpha", _) => Slot::Number(&mut params.alpha, Range(-90.0, 90.0)),
+            _ => return None,
+        },
         (Kind::Uber(params), name) => match name {
             "Kd" => Slot::Colour(&mut params.kd),
             "Ks" => Slot::Colour(&mut params.ks),

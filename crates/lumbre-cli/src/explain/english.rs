@@ -57,6 +57,12 @@ pub(super) static ENGLISH: Texts = Texts {
     as_direction: "the direction as a direction, w = 0",
     t_is_kept: "D′ is not made a unit vector, so t means the same point in both spaces. By unit directions it would be |D′| times as large.",
     equation: "The crossings",
+    curve: "A segment of a curve, a cubic by its control points. Half of its width is how near the ray has to pass; where it passes nearest, the \
+            segment is crossed at the depth of its axis.",
+    curve_segment: "segment of the curves",
+    curve_width: "width there",
+    curve_axis: "axis where the ray passes nearest",
+    curve_distance: "distance of the ray from the axis",
     custom: "Geometry of a program's own: how it finds its crossings is not known here.",
     hit: "The crossing at t = {0}",
     t_of_search: "as the search found it",

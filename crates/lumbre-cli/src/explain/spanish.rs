@@ -57,6 +57,12 @@ pub(super) static SPANISH: Texts = Texts {
     as_direction: "la dirección como dirección, w = 0",
     t_is_kept: "D′ no se normaliza, así que t designa el mismo punto en ambos espacios. Con direcciones unitarias sería |D′| veces mayor.",
     equation: "Las intersecciones",
+    curve: "Un segmento de una curva, una cúbica dada por sus puntos de control. El rayo lo corta si pasa a menos de la mitad de su anchura; \
+            donde pasa más cerca, lo corta a la profundidad de su eje.",
+    curve_segment: "segmento de las curvas",
+    curve_width: "anchura en ese lugar",
+    curve_axis: "eje donde el rayo pasa más cerca",
+    curve_distance: "distancia del rayo al eje",
     custom: "Geometría propia de un programa: aquí no se sabe cómo halla sus intersecciones.",
     hit: "La intersección en t = {0}",
     t_of_search: "tal como lo halló la búsqueda",

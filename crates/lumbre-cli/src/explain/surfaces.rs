@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use lumbre::geometry::{Shape, Triangle};
+use lumbre::geometry::{Curves, Shape, Triangle};
 use lumbre::kernel::{Hit, Target, TargetShape};
 use lumbre::math::glam::{DMat3, DMat4, DQuat, EulerRot};
 use lumbre::math::matrix::affine4;
@@ -123,7 +123,10 @@ fn thing(
             (Some(placed.shape().clone()), own, placed.object_ray(&inner))
         }
         TargetShape::Triangle([a, b, c]) => (Triangle::new(*a, *b, *c).ok().map(Shape::from), None, inner),
-        TargetShape::Custom => (None, None, inner),
+        TargetShape::Custom => match resolved.curves_at(hit) {
+            Some((_, map)) => (None, Some(*map).filter(|map| !map.is_identity()), inner.into_object(map)),
+            None => (None, None, inner),
+        },
     };
     let mut scope = Scope::default();
     let chain: Vec<Transform> = placements.into_iter().chain(own).collect();
@@ -145,11 +148,40 @@ fn thing(
             shape::tell(&mut equation, &explanation, &object.ray, &mut scope, &rename, texts);
             section.sections.push(equation);
         }
-        None => section.text(texts.custom),
+        None => match resolved.curves_at(hit) {
+            Some((curves, _)) => section.sections.push(curve(curves, hits, &object.ray, texts)),
+            None => section.text(texts.custom),
+        },
     }
     for &hit in hits {
         let is_first = first.is_some_and(|first| first == hit);
         section.sections.push(at_hit(scene, ray, hit, is_first, &object, texts));
+    }
+    section
+}
+
+/// A segment of curves, and where a ray passes it nearest, both in the space of the curves.
+fn curve(curves: &Curves, hits: &[&Hit], ray: &Ray, texts: &Texts) -> Section {
+    let primitive = hits[0].primitive;
+    let mut section = Section::new("equation", texts.equation);
+    section.text(texts.curve);
+    section.fact(texts.curve_segment, f64::from(curves.segment_of(primitive)));
+    let points = curves.control_points(primitive);
+    for (name, point) in ["P₀", "P₁", "P₂", "P₃"].into_iter().zip(points) {
+        section.fact(name, point);
+    }
+    for hit in hits {
+        let u = hit.root.local.x;
+        let mut scope = Scope::default();
+        section.quantity(&mut scope, "t", texts.t_of_search, "", hit.root.t);
+        section.quantity(&mut scope, "u", "", "", u);
+        section.quantity(&mut scope, "w", texts.curve_width, "", curves.width(hit.primitive, u));
+        let formula = "(1−u)³·P₀ + 3u(1−u)²·P₁ + 3u²(1−u)·P₂ + u³·P₃";
+        let v = 1.0 - u;
+        let weights = [v * v * v, 3.0 * u * v * v, 3.0 * u * u * v, u * u * u];
+        let axis: DVec3 = weights.into_iter().zip(points).map(|(weight, point)| weight * point).sum();
+        section.fact(format!("C = {formula}: {}", texts.curve_axis), axis);
+        section.fact(texts.curve_distance, (axis - ray.at(hit.root.t)).length());
     }
     section
 }

@@ -418,6 +418,15 @@ impl<'b, 'd> Converter<'b, 'd> {
     }
 
     /// Adds a shape to the open object, or else to the world. `leaves` and `depth` are those of a CSG.
+    /// The last shape of the object that is open, or of the world, unless its alpha is still to come.
+    pub fn shape_before(&mut self) -> Option<&mut ShapeDesc> {
+        let before = match self.open_object {
+            None => self.scene.shapes.last_mut(),
+            Some(id) => self.objects[id.0 as usize].object.as_mut()?.shapes.last_mut(),
+        }?;
+        (!self.alphas_later.contains_key(&before.index)).then_some(before)
+    }
+
     pub fn push_shape(&mut self, shape: ShapeDesc, leaves: u64, depth: usize) {
         match self.open_object {
             None => self.scene.shapes.push(shape),
@@ -598,6 +607,7 @@ impl Completion {
             GeometryDesc::Exact(_)
             | GeometryDesc::Coloured(_)
             | GeometryDesc::BilinearMesh(_)
+            | GeometryDesc::Curves(_)
             | GeometryDesc::Custom(_) => {}
         }
     }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use lumbre_image::Encoding;
 use lumbre_math::Vec2;
 use lumbre_scene::MaterialId;
+use lumbre_shading::hair::{HairColour, HairParams};
 use lumbre_shading::spectrum::conductor_rgb;
 use lumbre_shading::uber::UberParams;
 use lumbre_shading::{
@@ -202,7 +203,8 @@ impl Converter<'_, '_> {
                 MaterialKind::Interface
             }
             "principled" => self.principled(params)?,
-            "hair" | "measured" | "subsurface" | "openpbr" => self.replaced_material(ty, params)?,
+            "hair" => self.hair(params)?,
+            "measured" | "subsurface" | "openpbr" => self.replaced_material(ty, params)?,
             _ => match self.old_material(ty, params)? {
                 Some(kind) => {
                     self.upgraded(spot);
@@ -349,6 +351,78 @@ impl Converter<'_, '_> {
             max_depth: params.count("maxdepth", 10, 1)?,
             samples: params.count("nsamples", 1, 1)?,
         })
+    }
+
+    fn hair(&mut self, params: &Params) -> Result<MaterialKind> {
+        // Of several, the first counts.
+        let names = ["sigma_a", "reflectance", "color", "eumelanin", "pheomelanin"];
+        let counts = names.into_iter().find(|name| params.has(name));
+        let is_melanin = |name: &str| name.ends_with("melanin");
+        for name in names {
+            let is_part = counts.is_none_or(|first| first == name || is_melanin(first) && is_melanin(name));
+            if let (Some(first), true, false) = (counts, params.has(name), is_part) {
+                params.ignore(&[name]);
+                let message = format!("{} is not used where {} is given", quoted(name), quoted(first));
+                self.note(params.spot_of(name), message);
+            }
+        }
+        let colour = match counts {
+            Some(name @ "sigma_a") => {
+                HairColour::Absorption(self.hair_texture(params, name, SpectrumUse::Coefficient)?)
+            }
+            Some(name @ ("reflectance" | "color")) => {
+                HairColour::Reflectance(self.hair_texture(params, name, SpectrumUse::Reflectance)?)
+            }
+            _ => HairColour::Melanin {
+                eumelanin: self.hair_number(
+                    params,
+                    "eumelanin",
+                    if counts.is_none() { 1.3 } else { 0.0 },
+                    0.0,
+                )?,
+                pheomelanin: self.hair_number(params, "pheomelanin", 0.0, 0.0)?,
+            },
+        };
+        Ok(MaterialKind::Hair(Box::new(HairParams {
+            colour,
+            eta: self.hair_number(params, "eta", 1.55, f32::MIN_POSITIVE)?,
+            beta_m: self.hair_number(params, "beta_m", 0.3, 0.0)?,
+            beta_n: self.hair_number(params, "beta_n", 0.3, 0.0)?,
+            alpha: self.hair_number(params, "alpha", 2.0, f32::MIN)?,
+        })))
+    }
+
+    fn hair_texture(
+        &mut self,
+        params: &Params,
+        name: &'static str,
+        usage: SpectrumUse,
+    ) -> Result<SpectrumArc> {
+        let colour = self.spectrum_texture_or(params, name, usage, 0.0)?;
+        if let Texture::Constant(Spectrum { r, g, b }) = *colour
+            && let Some(negative) = [r, g, b].into_iter().find(|c| *c < 0.0)
+        {
+            return params.out_of_range(name, f64::from(negative), "0 or more");
+        }
+        Ok(colour)
+    }
+
+    /// A number or a texture; a number that is too small is refused.
+    fn hair_number(
+        &mut self,
+        params: &Params,
+        name: &'static str,
+        default: f32,
+        least: f32,
+    ) -> Result<FloatArc> {
+        let found = self.float_texture_or(params, name, default)?;
+        match *found {
+            Texture::Constant(v) if v < least || !v.is_finite() => {
+                let expected = if least > 0.0 { "more than 0" } else { "0 or more" };
+                params.out_of_range(name, f64::from(v), expected)
+            }
+            _ => Ok(found),
+        }
     }
 
     fn mix(&mut self, params: &Params) -> Result<(MaterialKind, usize)> {

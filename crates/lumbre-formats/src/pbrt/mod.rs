@@ -12,6 +12,7 @@
 
 mod colour;
 mod convert;
+mod curves;
 mod exact_shapes;
 mod images;
 mod lexer;

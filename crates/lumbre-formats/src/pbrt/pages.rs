@@ -70,6 +70,7 @@ fn sample(page: &str, row: &Row) -> &'static str {
         ("goniometric", "filename") => r#""images/lobes.png""#,
         ("projection", "filename") => r#""images/letter.png""#,
         ("infinite", "portal") => "0 0 0 0 1 0 2 1 0 2 0 0",
+        ("curve", "P") => "0 0 0 1 0 0 1 1 0 2 2 0",
         (_, "P") => "0 0 0 1 0 0 0 1 0",
         (_, "N" | "S") => "0 0 1 0 0 1 0 0 1",
         (_, "uv") => "0 0 1 0 0 1",

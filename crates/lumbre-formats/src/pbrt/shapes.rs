@@ -9,6 +9,7 @@ use lumbre_scene::{CsgDesc, CsgOperation, GeometryDesc, MaterialId, MeshDesc, Sh
 use lumbre_shading::Texture;
 
 use super::convert::{Converter, MeshFile, file_fault};
+use super::curves::joined;
 use super::exact_shapes::exact_shape;
 use super::params::{Param, Params, Type};
 use super::source::{AtSpot, Fault, Result, Spot};
@@ -113,7 +114,6 @@ impl Converter<'_, '_> {
             GeometryDesc::Mesh(_) | GeometryDesc::BilinearMesh(_) => size_of::<MeshDesc>(),
             _ => 0,
         };
-        self.keep(size_of::<ShapeDesc>() + boxed, "shapes", spot)?;
         let shape = ShapeDesc {
             index,
             geometry: form.geometry,
@@ -124,7 +124,18 @@ impl Converter<'_, '_> {
             area_light,
             alpha,
         };
-        match self.motion(spot, &state.ctm, "shape")? {
+        let is_alone = self.alphas_later.contains_key(&index);
+        let motion = self.motion(spot, &state.ctm, "shape")?;
+        let shape = if motion.is_none() && !is_alone {
+            match joined(self.shape_before(), shape) {
+                Some(shape) => shape,
+                None => return Ok(()),
+            }
+        } else {
+            shape
+        };
+        self.keep(size_of::<ShapeDesc>() + boxed, "shapes", spot)?;
+        match motion {
             None => self.push_shape(shape, form.leaves, form.depth),
             Some(motion) => {
                 let world_from_object = placed.unwrap_or(Transform::IDENTITY);
@@ -194,10 +205,7 @@ impl Converter<'_, '_> {
             "bilinearmesh" => Ok(self.bilinear_mesh(params)?.map(Form::from)),
             "plymesh" => self.ply_mesh(params).map(|g| Some(g.into())),
             "loopsubdiv" => self.loop_subdivision(params).map(|mesh| Some(mesh.into())),
-            "curve" => {
-                self.note(params.spot, "shape \"curve\" is not rendered yet: it is left out");
-                Ok(None)
-            }
+            "curve" => self.curve(params).map(|curve| Some(curve.into())),
             "heightfield" | "nurbs" => {
                 self.upgraded(params.spot);
                 let message = format!("shape {} of pbrt-v3 is not rendered: it is left out", quoted(ty));

@@ -7,6 +7,7 @@ mod bounding_volumes;
 mod boxes;
 mod build;
 mod columns;
+mod curves;
 mod deforming;
 mod f32_ray;
 mod f32_watertight;

@@ -66,6 +66,8 @@ class Geometry:
     @staticmethod
     def patch(p00: _Triple, p10: _Triple, p01: _Triple, p11: _Triple) -> Geometry: ...
     @staticmethod
+    def curves(points: _Array, widths: _Array, counts: _Array, kind: str) -> Geometry: ...
+    @staticmethod
     def csg(operation: str, operands: Sequence[Sequence[_Placed]]) -> Geometry: ...
     @staticmethod
     def mesh(
@@ -95,6 +97,15 @@ class Material:
     def coated(reflectance: _Colour, roughness: _Number, eta: float) -> Material: ...
     @staticmethod
     def translucent(reflectance: _Colour, transmittance: _Colour) -> Material: ...
+    @staticmethod
+    def hair(
+        melanin: tuple[float, float],
+        color: _Colour | None,
+        roughness: _Number,
+        azimuthal_roughness: _Number,
+        tilt: float,
+        ior: float,
+    ) -> Material: ...
     @staticmethod
     def mix(first: Material, second: Material, amount: _Number) -> Material: ...
     @staticmethod

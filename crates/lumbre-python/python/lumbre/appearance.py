@@ -121,7 +121,7 @@ NumberMap = float | Texture | npt.NDArray[Any]
 
 @dataclass(frozen=True)
 class Material:
-    """The appearance of a surface: one of Diffuse, Metal, Glass, ThinGlass, Coated, Translucent, Principled and Mix.
+    """The appearance of a surface: one of Diffuse, Metal, Glass, ThinGlass, Coated, Translucent, Hair, Principled and Mix.
 
     Parameters are numbers; colours are numbers or (r, g, b), linear. Each that is a colour, and each that may differ from place to place
     (said by its type), may be a `Texture` or an array of one, (h, w) or (h, w, 3). `normal_map` is an image of normals in tangent space,
@@ -156,7 +156,7 @@ class Material:
         return self._kind().tilted(normals, heights)
 
     def _kind(self) -> _lumbre.Material:
-        raise LumbreError("a material is one of Diffuse, Metal, Glass, ThinGlass, Coated, Translucent, Principled and Mix")
+        raise LumbreError("a material is one of Diffuse, Metal, Glass, ThinGlass, Coated, Translucent, Hair, Principled and Mix")
 
 
 @dataclass(frozen=True)
@@ -248,6 +248,32 @@ class Translucent(Material):
     def _kind(self) -> _lumbre.Material:
         reflectance = _colour_map("reflectance", self.reflectance)
         return _lumbre.Material.translucent(reflectance, _colour_map("transmittance", self.transmittance))
+
+
+@dataclass(frozen=True)
+class Hair(Material):
+    """Hair and fur, on `Curves`.
+
+    `eumelanin` is the brown pigment (0.3 is blond, 1.3 brown, 8 black), `pheomelanin` the red one; `color`, if given, takes their place:
+    the colour of a mass of such hair. Roughness along and around the fibre is in [0, 1]; `tilt` is that of its scales, in degrees.
+
+    >>> Hair(eumelanin=0.3).ior
+    1.55
+    """
+
+    eumelanin: float = 1.3
+    pheomelanin: float = 0.0
+    color: ColourMap | None = None
+    roughness: NumberMap = 0.3
+    azimuthal_roughness: NumberMap = 0.3
+    tilt: float = 2.0
+    ior: float = 1.55
+
+    def _kind(self) -> _lumbre.Material:
+        color = None if self.color is None else _colour_map("color", self.color)
+        along = _number_map("roughness", self.roughness)
+        around = _number_map("azimuthal_roughness", self.azimuthal_roughness)
+        return _lumbre.Material.hair((self.eumelanin, self.pheomelanin), color, along, around, self.tilt, self.ior)
 
 
 @dataclass(frozen=True)

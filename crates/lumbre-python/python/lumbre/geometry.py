@@ -305,6 +305,51 @@ class Patch(Shape):
 
 
 @dataclass(frozen=True, eq=False)
+class Curves(Shape):
+    """Hair, fur, grass: smooth curves through points, with a width at each. All of them are one shape.
+
+    Parameters
+    ----------
+    points : (N, K, 3) array, or N arrays of (K, 3)
+        Two points or more of each curve.
+    widths : number, (N, K) array, or N arrays of (K,)
+        The whole width at each point, above 0.
+    kind : "flat" or "cylinder"
+        Bands that face every ray, or the same with the normals of tubes.
+
+    In results `primitive` is the segment between two points, among those of all curves.
+
+    >>> Curves([[[0, 0, 0], [0, 0, 1], [0, 0.5, 2]]], 0.1).kind
+    'flat'
+    """
+
+    points: Any
+    widths: Any
+    kind: str = "flat"
+
+    def __post_init__(self) -> None:
+        points = [_table("points", curve) for curve in self.points]
+        widths = self.widths
+        if np.ndim(widths) == 0 and not isinstance(widths, (list, tuple)):
+            widths = [np.full(len(curve), widths) for curve in points]
+        widths = [real(array_of("widths", each)) for each in widths]
+        if len(widths) != len(points) or any(w.shape != (len(p),) for w, p in zip(widths, points, strict=True)):
+            raise LumbreError("widths have the wrong shape (expected one for each point)")
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "widths", widths)
+        super().__post_init__()
+
+    def _geometry(self) -> _lumbre.Geometry:
+        counts = np.array([len(curve) for curve in self.points], dtype=np.int64)
+        points = np.concatenate([np.zeros((0, 3)), *self.points]).astype(np.float64, copy=False)
+        widths = np.concatenate([np.zeros(0), *self.widths]).astype(np.float64, copy=False)
+        return _lumbre.Geometry.curves(points, widths, counts, self.kind)
+
+    def __repr__(self) -> str:
+        return f"Curves({len(self.points)} curves)"
+
+
+@dataclass(frozen=True, eq=False)
 class Mesh(Shape):
     """Triangles or quads by index.
 

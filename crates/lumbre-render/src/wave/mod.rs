@@ -30,7 +30,7 @@ use lumbre_scene::{Crossing, Scene};
 use lumbre_shading::Spectrum;
 use lumbre_shading::lanes::{
     BsdfKind, CoatedConductorLanes, CoatedDiffuseLanes, ConductorLanes, DielectricLanes, DiffuseLanes,
-    DiffuseTransmissionLanes, PrincipledLanes, ThinDielectricLanes, UberLanes,
+    DiffuseTransmissionLanes, HairLanes, PrincipledLanes, ThinDielectricLanes, UberLanes,
 };
 use lumbre_simd::{InstructionSet, Real};
 
@@ -258,6 +258,7 @@ const KINDS: [BsdfKind; BsdfKind::COUNT] = [
     BsdfKind::CoatedConductor,
     BsdfKind::Principled,
     BsdfKind::Uber,
+    BsdfKind::Hair,
 ];
 
 macro_rules! kinds {
@@ -304,4 +305,5 @@ kinds!(
     CoatedConductor: CoatedConductorLanes,
     Principled: PrincipledLanes,
     Uber: UberLanes,
+    Hair: HairLanes,
 );
