@@ -13,4 +13,5 @@ mod motion;
 mod panes;
 mod parts;
 mod shading_normals;
+mod subsurface;
 mod terminator;

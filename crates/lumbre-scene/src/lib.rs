@@ -15,6 +15,7 @@ mod framing;
 mod ground;
 mod id;
 mod interaction;
+mod lens;
 pub mod light;
 mod listing;
 mod media;
@@ -27,6 +28,7 @@ mod surface;
 mod tables;
 mod viewpoint;
 
+pub use lens::{ApertureImage, Lens, LensError, LensSurface};
 pub use camera::{Camera, CameraKind, CameraRay, SphericalMapping, View};
 pub use desc::*;
 pub use emission::Emission;

@@ -11,7 +11,9 @@ use crate::coated::{Coat, CoatedConductor, CoatedDiffuse};
 use crate::conductor::Conductor;
 use crate::dielectric::{Dielectric, ThinDielectric};
 use crate::diffuse::{Diffuse, DiffuseTransmission};
+use crate::measured::{Measured, MeasuredTables};
 use crate::microfacet::Microfacets;
+use crate::subsurface::SubsurfaceParams;
 use crate::uber::UberParams;
 use crate::{
     Bsdf, FloatTexture, HomogeneousMedium, ImageTexture, PrincipledParams, ShadingFrame, ShadingNormals,
@@ -155,6 +157,10 @@ pub enum MaterialKind {
     Principled(Box<PrincipledParams>),
     /// pbrt-v3's `uber` and `plastic`: lobes side by side.
     Uber(Box<UberParams>),
+    /// A measured surface.
+    Measured(Arc<MeasuredTables>),
+    /// A body that light wanders through below its surface.
+    Subsurface(Box<SubsurfaceParams>),
     /// One of two, chosen at random by position and direction.
     Mix {
         /// The materials at amount 0 and 1.
@@ -168,7 +174,7 @@ pub enum MaterialKind {
 
 impl MaterialKind {
     /// The names of the kinds in the scene language, in the order of this enum.
-    pub const NAMES: [&str; 11] = [
+    pub const NAMES: [&str; 13] = [
         "diffuse",
         "conductor",
         "dielectric",
@@ -178,6 +184,8 @@ impl MaterialKind {
         "diffusetransmission",
         "principled",
         "uber",
+        "measured",
+        "subsurface",
         "mix",
         "interface",
     ];
@@ -194,6 +202,8 @@ impl MaterialKind {
             Self::DiffuseTransmission { .. } => "diffusetransmission",
             Self::Principled(_) => "principled",
             Self::Uber(_) => "uber",
+            Self::Measured(_) => "measured",
+            Self::Subsurface(_) => "subsurface",
             Self::Mix { .. } => "mix",
             Self::Interface => "interface",
         }
@@ -268,7 +278,9 @@ impl Material {
                     reflectance.is_constant() && smooth(roughness)
                 }
                 MaterialKind::Dielectric { roughness, .. } => smooth(roughness),
-                MaterialKind::ThinDielectric { .. } | MaterialKind::Interface => true,
+                MaterialKind::ThinDielectric { .. }
+                | MaterialKind::Measured(_)
+                | MaterialKind::Interface => true,
                 MaterialKind::CoatedDiffuse { reflectance, roughness, thickness, g, albedo, .. } => {
                     let base = reflectance.is_constant() && smooth(roughness);
                     base && thickness.is_constant() && g.is_constant() && albedo.is_constant()
@@ -309,7 +321,8 @@ impl Material {
         self.has_part(|kind| match kind {
             MaterialKind::Dielectric { .. }
             | MaterialKind::ThinDielectric { .. }
-            | MaterialKind::DiffuseTransmission { .. } => true,
+            | MaterialKind::DiffuseTransmission { .. }
+            | MaterialKind::Subsurface(_) => true,
             MaterialKind::Principled(params) => params.lets_light_through(),
             MaterialKind::Uber(params) => params.lets_light_through(),
             _ => false,
@@ -449,9 +462,20 @@ impl Material {
 
     /// The medium inside a solid of this material, if it scatters light; else `None`. Its extinction is that of
     /// [`Material::interior_attenuation`].
-    pub fn interior_medium(&self) -> Option<HomogeneousMedium> {
+    ///
+    /// Where it is not the same for all light, it is that which enters at a position.
+    pub fn interior_medium(&self, at: &TextureContext) -> Option<HomogeneousMedium> {
         match &self.kind {
             MaterialKind::Principled(params) => params.interior_medium(),
+            MaterialKind::Subsurface(params) => Some(params.medium(at)),
+            _ => None,
+        }
+    }
+
+    /// The body below the surface, if it is one that light wanders through.
+    pub fn subsurface(&self) -> Option<&SubsurfaceParams> {
+        match &self.kind {
+            MaterialKind::Subsurface(params) => Some(params),
             _ => None,
         }
     }
@@ -464,9 +488,11 @@ impl Material {
 
     /// Whether it, or a part of the mixture, may be solid: see [`Material::is_solid`].
     pub fn may_be_solid(&self) -> bool {
-        self.has_part(
-            |kind| matches!(kind, MaterialKind::Principled(params) if params.interior_index().is_some()),
-        )
+        self.has_part(|kind| match kind {
+            MaterialKind::Principled(params) => params.interior_index().is_some(),
+            MaterialKind::Subsurface(_) => true,
+            _ => false,
+        })
     }
 
     /// The index of refraction inside a solid of this material, against vacuum; `None` where light cannot get
@@ -474,6 +500,7 @@ impl Material {
     pub fn interior_index(&self) -> Option<f32> {
         match &self.kind {
             MaterialKind::Principled(params) => params.interior_index(),
+            MaterialKind::Subsurface(params) => Some(index(params.eta)),
             _ => None,
         }
     }
@@ -551,6 +578,8 @@ impl Material {
             }
             MaterialKind::Principled(params) => Bsdf::Principled(Box::new(params.bsdf(at))),
             MaterialKind::Uber(params) => Bsdf::Uber(params.bsdf(at)),
+            MaterialKind::Measured(tables) => Bsdf::Measured(Measured(tables.clone())),
+            MaterialKind::Subsurface(params) => Bsdf::Subsurface(params.bsdf(at)),
             MaterialKind::Mix { .. } | MaterialKind::Interface => return None,
         };
         Some(bsdf)
@@ -605,7 +634,7 @@ impl Roughness {
     }
 
     /// The microfacets at a position.
-    fn facets(&self, at: &TextureContext) -> Microfacets {
+    pub(crate) fn facets(&self, at: &TextureContext) -> Microfacets {
         let alpha = |texture: &FloatTexture| {
             let roughness = texture.evaluate(at).max(0.0);
             if self.remap { roughness.sqrt() } else { roughness }

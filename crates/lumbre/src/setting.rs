@@ -242,6 +242,7 @@ impl Setting {
                 CameraKind::Perspective { .. } => (&["fov", "lensradius", "focaldistance"], "perspective"),
                 CameraKind::Orthographic { .. } => (&["lensradius", "focaldistance"], "orthographic"),
                 CameraKind::Spherical { .. } => (&[], "spherical"),
+                CameraKind::Realistic(_) => (&[], "realistic"),
             };
             let slot = match (&mut camera.kind, &*self.parameter) {
                 (CameraKind::Perspective { fov, .. }, "fov") => Slot::Double(fov, Range(0.001, 179.0)),
@@ -418,7 +419,8 @@ pub(crate) fn material_parameters(kind: &MaterialKind) -> &'static [&'static str
             &["Kd", "Ks", "Kr", "Kt", "opacity", "index", "roughness", "uroughness", "vroughness"]
         }
         MaterialKind::Mix { .. } => &["amount"],
-        MaterialKind::Interface => &[],
+        MaterialKind::Subsurface(_) => &["eta", "roughness", "uroughness", "vroughness", "g", "scale"],
+        MaterialKind::Measured(_) | MaterialKind::Interface => &[],
     }
 }
 
@@ -447,6 +449,15 @@ pub(crate) fn material_slot<'m>(kind: &'m mut MaterialKind, name: &str) -> Optio
     use MaterialKind as Kind;
     Some(match (kind, name) {
         (Kind::Principled(params), name) => return principled_slot(params, name),
+        (Kind::Subsurface(params), name) => match name {
+            "eta" => Slot::Plain(&mut params.eta, Range(0.1, 10.0)),
+            "g" => Slot::Plain(&mut params.asymmetry, Range(-0.99, 0.99)),
+            "scale" => Slot::Plain(&mut params.scale, FROM_ZERO),
+            "roughness" => Slot::Roughness(&mut params.roughness),
+            "uroughness" => Slot::Number(&mut params.roughness.u, FROM_ZERO),
+            "vroughness" => Slot::Number(&mut params.roughness.v, FROM_ZERO),
+            _ => return None,
+        },
         (Kind::Uber(params), name) => match name {
             "Kd" => Slot::Colour(&mut params.kd),
             "Ks" => Slot::Colour(&mut params.ks),

@@ -14,7 +14,6 @@ use lumbre::formats::{Budget, Diagnostics, Limits, pbrt};
 
 /// Scenes that are not as expected yet. One that is has to be taken off.
 const NOT_YET: &[&str] = &[
-    "camera-realistic-sky",
     "curve-arc",
     "curve-bspline",
     "curve-cylinder-lit",
@@ -22,12 +21,9 @@ const NOT_YET: &[&str] = &[
     "curve-flat-lit",
     "curve-taper",
     "dispersion-prism",
-    "film-sensor-canon",
     "hair-furnace-white",
     "hair-lit-above",
     "hair-lit-front",
-    "measured-lit",
-    "measured-sky",
     // Negative lanes and reflectances above 1 are clipped; saturated colours are 0.45 % off.
     "spectra-metals",
     "spectra-reflectance",

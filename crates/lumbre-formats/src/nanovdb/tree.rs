@@ -6,7 +6,7 @@ use lumbre_math::glam::{DAffine3, DMat3, IVec3};
 use lumbre_math::{DVec3, Transform};
 use lumbre_shading::medium::{Brick, SparseGrid};
 
-use super::bytes::Bytes;
+use crate::bytes::Bytes;
 use super::{GRID_HEADER, NanoGrid, Values, check_version};
 use crate::budget::Budget;
 use crate::diagnostic::FormatError;

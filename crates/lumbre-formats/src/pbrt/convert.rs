@@ -11,12 +11,14 @@ use lumbre_scene::{
     FilmDesc, GeometryDesc, InstanceDesc, MaterialId, MediumId, MeshDesc, NamedMaterial, ObjectDesc,
     ObjectId, Placement, SamplerDesc, SceneDesc, ShapeDesc, WithoutLight,
 };
+use lumbre_shading::measured::MeasuredTables;
 use lumbre_shading::medium::Medium;
 use lumbre_shading::{
     FloatTexture, Material, MipMap, PrincipledParams, Spectrum, SpectrumTexture, Texture, TextureValue,
 };
 
 use super::images::ImageKey;
+use super::lens::LensLater;
 use super::params::{Param, Params};
 use super::parser;
 use super::shapes::ReadMeshes;
@@ -56,6 +58,8 @@ pub(super) struct Converter<'b, 'd> {
     pub media: Vec<MediumSlot>,
     pub medium_names: HashMap<Arc<str>, MediumId>,
     pub images: HashMap<ImageKey, Arc<MipMap>>,
+    /// Measured materials by their files.
+    pub measured: HashMap<PathBuf, Arc<MeasuredTables>>,
     /// Images that are missing, when lenient.
     pub missing: HashSet<PathBuf>,
     /// The first pixels of each image file.
@@ -71,6 +75,10 @@ pub(super) struct Converter<'b, 'd> {
     /// The times of the two current transforms.
     pub transform_times: [f64; 2],
     pub exposure: Exposure,
+    /// The lens of the camera, which needs the film.
+    pub lens: Option<LensLater>,
+    /// The diagonal of the film, in millimetres.
+    pub film_diagonal: f64,
     upgraded: Option<Spot>,
 }
 
@@ -182,6 +190,7 @@ impl<'b, 'd> Converter<'b, 'd> {
             media: Vec::new(),
             medium_names: HashMap::new(),
             images: HashMap::new(),
+            measured: HashMap::new(),
             missing: HashSet::new(),
             bitmaps: HashMap::new(),
             mesh_files: vec![],
@@ -191,6 +200,8 @@ impl<'b, 'd> Converter<'b, 'd> {
             sampler_seed: None,
             transform_times: [0.0, 1.0],
             exposure: Exposure { shutter: 1.0, iso: 100.0, scale: 1.0 },
+            lens: None,
+            film_diagonal: 35.0,
             upgraded: None,
         }
     }

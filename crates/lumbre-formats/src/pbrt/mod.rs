@@ -14,6 +14,7 @@ mod colour;
 mod convert;
 mod exact_shapes;
 mod images;
+mod lens;
 mod lexer;
 mod lights;
 mod materials;

@@ -29,7 +29,8 @@ use lumbre_scene::{Crossing, Scene};
 use lumbre_shading::Spectrum;
 use lumbre_shading::lanes::{
     BsdfKind, CoatedConductorLanes, CoatedDiffuseLanes, ConductorLanes, DielectricLanes, DiffuseLanes,
-    DiffuseTransmissionLanes, PrincipledLanes, ThinDielectricLanes, UberLanes,
+    DiffuseTransmissionLanes, MeasuredLanes, PrincipledLanes, SubsurfaceLanes,
+    ThinDielectricLanes, UberLanes,
 };
 use lumbre_simd::Real;
 
@@ -191,7 +192,11 @@ impl<'s> Wave<'s> {
             }
             if let Some((solid, front)) = self.vertices.solid(vertex as usize) {
                 let path = self.vertices.path[vertex as usize] as usize;
-                self.slots.interiors[self.paths.slot[path] as usize].cross(solid, front);
+                let interiors = &mut self.slots.interiors[self.paths.slot[path] as usize];
+                match self.vertices.inside(vertex as usize) {
+                    Some(medium) if front => interiors.enter(solid, medium),
+                    _ => interiors.cross(solid, front),
+                }
             }
         }
     }
@@ -243,6 +248,8 @@ const KINDS: [BsdfKind; BsdfKind::COUNT] = [
     BsdfKind::CoatedConductor,
     BsdfKind::Principled,
     BsdfKind::Uber,
+    BsdfKind::Measured,
+    BsdfKind::Subsurface,
 ];
 
 macro_rules! kinds {
@@ -278,4 +285,6 @@ kinds!(
     CoatedConductor: CoatedConductorLanes,
     Principled: PrincipledLanes,
     Uber: UberLanes,
+    Measured: MeasuredLanes,
+    Subsurface: SubsurfaceLanes,
 );
