@@ -22,7 +22,7 @@ use crate::diagnostic::quoted;
 use crate::{Diagnostic, Input, measured};
 
 /// The material types of pbrt-v4.
-pub(super) const KNOWN: [&str; 13] = [
+pub(super) const KNOWN: [&str; 14] = [
     "diffuse",
     "coateddiffuse",
     "coatedconductor",
@@ -36,6 +36,7 @@ pub(super) const KNOWN: [&str; 13] = [
     "measured",
     "subsurface",
     "principled",
+    "openpbr",
 ];
 
 /// The maximal depth of nested mixtures.
@@ -206,7 +207,8 @@ impl Converter<'_, '_> {
             "principled" => self.principled(params)?,
             "measured" => self.measured(params)?,
             "subsurface" => self.subsurface(params, "reflectance", 1.33)?,
-            "hair" | "openpbr" => self.replaced_material(ty, params)?,
+            "openpbr" => self.openpbr(params)?,
+            "hair" => self.replaced_material(ty, params)?,
             _ => match self.old_material(ty, params)? {
                 Some(kind) => {
                     self.upgraded(spot);
@@ -224,14 +226,7 @@ impl Converter<'_, '_> {
 
     /// The diffuse material that replaces one that is not rendered yet, with a warning.
     fn replaced_material(&mut self, ty: &str, params: &Params) -> Result<MaterialKind> {
-        let base_color = match ty {
-            "openpbr" => self.spectrum_texture(params, "base_color", SpectrumUse::Reflectance)?,
-            _ => None,
-        };
-        let kind = match base_color {
-            Some(known) => MaterialKind::Diffuse { reflectance: known.texture },
-            None => self.diffuse(params)?,
-        };
+        let kind = self.diffuse(params)?;
         params.ignore_all();
         let message = format!("material {} is not rendered yet: a diffuse one takes its place", quoted(ty));
         self.note(params.spot, message);

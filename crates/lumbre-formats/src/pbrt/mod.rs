@@ -12,6 +12,7 @@
 
 mod colour;
 mod convert;
+mod displacement;
 mod exact_shapes;
 mod images;
 mod lens;
@@ -19,6 +20,8 @@ mod lexer;
 mod lights;
 mod materials;
 mod media;
+mod old_shapes;
+mod openpbr;
 #[cfg(test)]
 mod pages;
 mod params;

@@ -404,7 +404,15 @@ impl Converter<'_, '_> {
                 }
             },
             // No effect: there is no GPU pass, and nothing to gain from another space.
-            "wavefront" | "rendercoordsys" | "displacementedgescale" => {}
+            "displacementedgescale" => {
+                let scale = parse_number(value.as_bytes()).filter(|scale| 0.0 < *scale && scale.is_finite());
+                let Some(scale) = scale else {
+                    let wrong = Diagnostic::error("wrong value of the option \"displacementedgescale\"");
+                    return Err(at.wrong(wrong.found(quoted(value)).expected("a number above 0")));
+                };
+                self.displaced_edge_scale = scale;
+            }
+            "wavefront" | "rendercoordsys" => {}
             "pixelstats" | "msereferenceimage" | "msereferenceout" => {
                 self.note(at, format!("the option {} is left out: it is not of the picture", quoted(name)));
             }
