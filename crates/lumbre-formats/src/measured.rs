@@ -51,7 +51,8 @@ pub fn read(bytes: &[u8], name: &Arc<str>, budget: &Budget) -> Result<MeasuredTa
     budget.bytes(((numbers + colours) * size_of::<f32>()) as u64, "measured material")?;
     let [rows, columns] = of_colour.map(Size::Exactly);
     let colours = if file.has("rgb") {
-        let rgb = file.numbers("rgb", &[of_phi, of_theta, Size::Exactly(3), rows, columns], Sign::Any, hold)?;
+        let rgb =
+            file.numbers("rgb", &[of_phi, of_theta, Size::Exactly(3), rows, columns], Sign::Any, hold)?;
         in_channels(&rgb, of_colour, 3, &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     } else {
         let wavelengths = file.ascending("wavelengths", hold)?;
@@ -74,7 +75,12 @@ pub fn read(bytes: &[u8], name: &Arc<str>, budget: &Budget) -> Result<MeasuredTa
 }
 
 /// Weighted sums over the third index of an array.
-fn in_channels(array: &Array, [rows, columns]: [usize; 2], count: usize, weights: &[[f64; 3]]) -> [Vec<f32>; 3] {
+fn in_channels(
+    array: &Array,
+    [rows, columns]: [usize; 2],
+    count: usize,
+    weights: &[[f64; 3]],
+) -> [Vec<f32>; 3] {
     let each = rows * columns;
     let mut channels = [const { Vec::new() }; 3];
     for slice in array.values.chunks_exact(count * each) {
@@ -259,7 +265,10 @@ impl<'a> Tensors<'a> {
             _ => {
                 let wrong = field.fault("reaches beyond the end of the file");
                 let found = format!("{} numbers from byte {}", shown(count), field.offset);
-                return Err(wrong.found(found).expected(format!("at most {} bytes", self.bytes.len())).into());
+                return Err(wrong
+                    .found(found)
+                    .expected(format!("at most {} bytes", self.bytes.len()))
+                    .into());
             }
         };
         let count = data.len() / width as usize;
@@ -270,7 +279,8 @@ impl<'a> Tensors<'a> {
             if !value.is_finite() || (sign == Sign::NotNegative && value < 0.0) {
                 let at = field.offset + i as u64 * width;
                 let wrong = self.bytes.fault(at, format!("field {}: wrong number", quoted(name)));
-                let what = if sign == Sign::Any { "a finite number" } else { "a number that is not negative" };
+                let what =
+                    if sign == Sign::Any { "a finite number" } else { "a number that is not negative" };
                 return Err(wrong.found(value).expected(what).into());
             }
             values.push(value);

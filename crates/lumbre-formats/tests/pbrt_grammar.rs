@@ -1372,9 +1372,7 @@ fn heightfields_and_nurbs_of_pbrt_v3_become_triangles() {
         assert!(warnings.len() == 1 && warnings[0].contains("upgraded"), "{warnings:?}");
         scene
     };
-    let scene = upgraded(
-        r#"Shape "heightfield" "integer nu" 3 "integer nv" 2 "float Pz" [0 1 2  3 4 5]"#,
-    );
+    let scene = upgraded(r#"Shape "heightfield" "integer nu" 3 "integer nv" 2 "float Pz" [0 1 2  3 4 5]"#);
     let field = mesh(&scene.shapes[0]);
     assert_eq!(field.positions[4], Vec3::new(0.5, 1.0, 4.0));
     assert_eq!(field.triangles, [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]]);
@@ -1465,6 +1463,7 @@ fn subsurface_and_openpbr_take_their_parameters_by_name() {
     near_rgb(constant(&cloth.base_color), [0.25, 0.125, 0.0625]);
     near_rgb(constant(&cloth.sheen_color), [0.5, 0.5, 0.5]);
     assert_eq!((cloth.ior, constant(&cloth.iridescence_thickness)), (1.7, 300.0));
-    let (_, warnings) = warned(r#"Material "openpbr" "float subsurface_weight" 1 "rgb coat_color" [1 .5 1] Shape "sphere""#);
+    let (_, warnings) =
+        warned(r#"Material "openpbr" "float subsurface_weight" 1 "rgb coat_color" [1 .5 1] Shape "sphere""#);
     assert!(warnings.len() == 2 && warnings[0].contains("subsurface_weight"), "{warnings:?}");
 }

@@ -28,7 +28,6 @@ mod surface;
 mod tables;
 mod viewpoint;
 
-pub use lens::{ApertureImage, Lens, LensError, LensSurface};
 pub use camera::{Camera, CameraKind, CameraRay, SphericalMapping, View};
 pub use desc::*;
 pub use emission::Emission;
@@ -37,6 +36,7 @@ pub use footprint::Footprint;
 pub use ground::GroundPlane;
 pub use id::{MaterialId, MediumId, ObjectId};
 pub use interaction::Interaction;
+pub use lens::{ApertureImage, Lens, LensError, LensSurface};
 pub use light::{Light, LightId, LightSample};
 pub use listing::{AnimationListing, Listing, TextureListing};
 pub use lumbre_kernel::Placement;

@@ -194,10 +194,9 @@ impl Bsdf {
         let glass = |bsdf: Dielectric| Dielectric { facets: bsdf.facets.regularized(), ..bsdf };
         let coated = |coat: Coat| Coat { face: glass(coat.face), ..coat };
         match self {
-            Self::Diffuse(_)
-            | Self::DiffuseTransmission(_)
-            | Self::ThinDielectric(_)
-            | Self::Measured(_) => self,
+            Self::Diffuse(_) | Self::DiffuseTransmission(_) | Self::ThinDielectric(_) | Self::Measured(_) => {
+                self
+            }
             Self::Conductor(bsdf) => Self::Conductor(metal(bsdf)),
             Self::Dielectric(bsdf) => Self::Dielectric(glass(bsdf)),
             Self::CoatedDiffuse(bsdf) => {

@@ -278,9 +278,9 @@ impl Material {
                     reflectance.is_constant() && smooth(roughness)
                 }
                 MaterialKind::Dielectric { roughness, .. } => smooth(roughness),
-                MaterialKind::ThinDielectric { .. }
-                | MaterialKind::Measured(_)
-                | MaterialKind::Interface => true,
+                MaterialKind::ThinDielectric { .. } | MaterialKind::Measured(_) | MaterialKind::Interface => {
+                    true
+                }
                 MaterialKind::CoatedDiffuse { reflectance, roughness, thickness, g, albedo, .. } => {
                     let base = reflectance.is_constant() && smooth(roughness);
                     base && thickness.is_constant() && g.is_constant() && albedo.is_constant()

@@ -110,7 +110,8 @@ impl MeasuredTables {
         let (theta_o, phi_o) = angles(wo);
         let (theta_m, phi_m) = angles(m);
         let at_o = [from_theta(theta_o), from_phi(phi_o)];
-        let mut at_m = [from_theta(theta_m), from_phi(if self.is_relative() { phi_m - phi_o } else { phi_m })];
+        let mut at_m =
+            [from_theta(theta_m), from_phi(if self.is_relative() { phi_m - phi_o } else { phi_m })];
         at_m[1] -= at_m[1].floor();
 
         let between = self.between(theta_o, phi_o);

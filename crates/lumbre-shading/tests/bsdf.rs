@@ -185,11 +185,12 @@ fn measured(alpha: (f64, f64)) -> Measured {
         let length = (x / alpha.0).powi(2) + (y / alpha.1).powi(2) + z * z;
         1.0 / (PI * alpha.0 * alpha.1 * length * length)
     };
-    let area = |[x, y, z]: [f64; 3]| {
-        0.5 * (z + ((alpha.0 * x).powi(2) + (alpha.1 * y).powi(2) + z * z).sqrt())
-    };
+    let area =
+        |[x, y, z]: [f64; 3]| 0.5 * (z + ((alpha.0 * x).powi(2) + (alpha.1 * y).powi(2) + z * z).sqrt());
     let square = |f: &dyn Fn([f64; 3]) -> f64| -> Vec<f32> {
-        ramp(height).flat_map(|v| ramp(width).map(move |u| f(normal(u, v)) as f32).collect::<Vec<_>>()).collect()
+        ramp(height)
+            .flat_map(|v| ramp(width).map(move |u| f(normal(u, v)) as f32).collect::<Vec<_>>())
+            .collect()
     };
     let theta_i: Vec<f64> = ramp(angles).map(|t| 1.5 * t).collect();
     let phi_i: Vec<f64> = ramp(azimuths.max(2)).take(azimuths).map(|t| (2.0 * t - 1.0) * PI).collect();

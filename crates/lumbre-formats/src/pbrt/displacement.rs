@@ -25,7 +25,10 @@ pub(super) enum Refused {
     /// It has no texture coordinates.
     NoUvs,
     /// The texture is not finite at a vertex.
-    NotFinite { vertex: usize, point: DVec3 },
+    NotFinite {
+        vertex: usize,
+        point: DVec3,
+    },
 }
 
 impl From<LimitError> for Refused {

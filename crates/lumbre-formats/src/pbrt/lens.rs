@@ -103,7 +103,9 @@ impl Converter<'_, '_> {
 
     /// Puts the lens before the film.
     pub fn finish_lens(&mut self) -> Result<()> {
-        let Some(LensLater { surfaces, stop, focus_distance, spot }) = self.lens.take() else { return Ok(()) };
+        let Some(LensLater { surfaces, stop, focus_distance, spot }) = self.lens.take() else {
+            return Ok(());
+        };
         let diagonal = METRES_PER_MM * self.film_diagonal;
         let lens = Lens::new(surfaces, stop, focus_distance, diagonal).map_err(|error| {
             let wrong = Diagnostic::error(error.to_string());

@@ -78,7 +78,12 @@ impl Converter<'_, '_> {
             anisotropy: self.float_texture_or(params, "specular_roughness_anisotropy", 0.0)?,
             ior,
             specular: self.float_texture_or(params, "specular_weight", 1.0)?,
-            specular_color: self.spectrum_texture_or(params, "specular_color", SpectrumUse::Reflectance, 1.0)?,
+            specular_color: self.spectrum_texture_or(
+                params,
+                "specular_color",
+                SpectrumUse::Reflectance,
+                1.0,
+            )?,
             transmission,
             dispersion: dispersion.max(of_spectrum.max(0.0)),
             volume,
@@ -112,11 +117,7 @@ impl Converter<'_, '_> {
             }
             return Ok(VolumeParams::default());
         }
-        Ok(VolumeParams {
-            attenuation_color: colour,
-            attenuation_distance: depth,
-            ..VolumeParams::default()
-        })
+        Ok(VolumeParams { attenuation_color: colour, attenuation_distance: depth, ..VolumeParams::default() })
     }
 
     /// A colour times a number.

@@ -29,8 +29,8 @@ use lumbre_scene::{Crossing, Scene};
 use lumbre_shading::Spectrum;
 use lumbre_shading::lanes::{
     BsdfKind, CoatedConductorLanes, CoatedDiffuseLanes, ConductorLanes, DielectricLanes, DiffuseLanes,
-    DiffuseTransmissionLanes, MeasuredLanes, PrincipledLanes, SubsurfaceLanes,
-    ThinDielectricLanes, UberLanes,
+    DiffuseTransmissionLanes, MeasuredLanes, PrincipledLanes, SubsurfaceLanes, ThinDielectricLanes,
+    UberLanes,
 };
 use lumbre_simd::Real;
 

@@ -96,7 +96,8 @@ fn stops_by_name_let_as_much_light_through_as_a_round_one() {
 
 #[test]
 fn what_makes_no_lens_is_refused() {
-    let refused = |surfaces: Vec<LensSurface>, distance| Lens::new(surfaces, None, distance, 0.035).unwrap_err();
+    let refused =
+        |surfaces: Vec<LensSurface>, distance| Lens::new(surfaces, None, distance, 0.035).unwrap_err();
     assert_eq!(refused(vec![], 2.0), LensError::Surface);
     let mut negative = surfaces(10.0);
     negative[1].thickness = -1.0;
