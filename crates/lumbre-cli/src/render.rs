@@ -890,6 +890,7 @@ pub(crate) fn camera(scene: &Scene, wanted: &str) -> Result<usize, Failure> {
                 (None, CameraKind::Perspective { .. }) => format!("{i} (perspective)"),
                 (None, CameraKind::Orthographic { .. }) => format!("{i} (orthographic)"),
                 (None, CameraKind::Spherical { .. }) => format!("{i} (spherical)"),
+                (None, CameraKind::Realistic(_)) => format!("{i} (realistic)"),
             })
             .collect();
         Failure::Usage(format!("--camera: there is no \"{wanted}\" (expected one of: {})", known.join(", ")))

@@ -119,6 +119,10 @@ impl ViewArguments {
                 let option = self.fov.map(|_| "--fov").or(self.zoom.map(|_| "--zoom"));
                 option.map(|option| (option, "sees all directions"))
             }
+            CameraKind::Realistic(_) => {
+                let option = self.fov.map(|_| "--fov").or(self.zoom.map(|_| "--zoom"));
+                option.map(|option| (option, "has a lens of its file"))
+            }
         };
         match refused {
             Some((option, why)) => Err(Failure::Usage(format!("{option}: {name} {why}"))),

@@ -6,6 +6,7 @@
 
 pub mod atomic;
 pub mod budget;
+mod bytes;
 mod contained;
 pub mod diagnostic;
 pub mod gltf;
@@ -13,6 +14,7 @@ pub mod ies;
 pub mod image;
 pub mod input;
 pub mod input_stream;
+pub mod measured;
 pub mod nanovdb;
 pub mod obj;
 pub mod open;

@@ -394,6 +394,30 @@ const CASES: &[(&str, &str)] = &[
         "MakeNamedMedium \"m\" \"string type\" \"uniformgrid\" \"float density\" 1 \"rgb Le\" [1 1 1] \"float temperature\" 900",
         "1:84: a medium has Le and a temperature (expected one of both)",
     ),
+    (
+        "WorldBegin Material \"measured\"",
+        "1:12: material \"measured\" has no file (expected \"string filename\" with a .bsdf file of the RGL material database)",
+    ),
+    (
+        "WorldBegin Material \"subsurface\" \"string name\" \"Skin\"",
+        "1:34: unknown medium \"Skin\" (did you mean \"Skin1\"?; expected the name of a measured medium)",
+    ),
+    (
+        "WorldBegin Material \"subsurface\" \"rgb sigma_s\" [1 2 3]",
+        "1:34: \"sigma_s\" without \"sigma_a\" (expected both or neither)",
+    ),
+    (
+        "WorldBegin Material \"subsurface\" \"rgb reflectance\" [.5 .5 .5] \"rgb mfp\" [1 0 2]",
+        "1:65: parameter \"mfp\" of material \"subsurface\" is out of range (found 0; expected more than 0)",
+    ),
+    (
+        "Camera \"realistic\" WorldBegin",
+        "1:1: camera \"realistic\" has no lens (expected \"string lensfile\" with a file of its surfaces)",
+    ),
+    (
+        "Film \"rgb\" \"float diagonal\" 0 WorldBegin",
+        "1:12: parameter \"diagonal\" of film \"rgb\" is out of range (found 0; expected more than 0)",
+    ),
     // Spectra, materials and lights.
     (
         "WorldBegin Material \"diffuse\" \"rgb reflectance\" [1 -1 0]",

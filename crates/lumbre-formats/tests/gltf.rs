@@ -1335,7 +1335,8 @@ fn unlit_shines_and_solids_scatter_inside() {
         "KHR_materials_volume":{"thicknessFactor":1,"attenuationDistance":2,"attenuationColor":[0.5,0.5,0.5]},
         "KHR_materials_volume_scatter":{"multiscatterColor":[0.5,0.5,0.5],"scatterAnisotropy":0.25}}}"#;
     let (scene, _) = dressed(volume);
-    let medium = scene.materials[0].material.interior_medium().unwrap();
+    let MaterialKind::Principled(params) = &scene.materials[0].material.kind else { panic!() };
+    let medium = params.interior_medium().unwrap();
     assert!(medium.albedo.r > 0.7 && medium.asymmetry == 0.25, "{medium:?}");
 }
 

@@ -1040,7 +1040,8 @@ fn integrators_that_find_caustics_are_rendered_by_the_one_that_does() {
         ("mlt", "it mutates no paths"),
         ("lightpath", "is not black"),
     ] {
-        let (scene, diagnostics) = try_read(&format!("Integrator \"{name}\" \"integer maxdepth\" 7 WorldBegin"));
+        let (scene, diagnostics) =
+            try_read(&format!("Integrator \"{name}\" \"integer maxdepth\" 7 WorldBegin"));
         let integrator = scene.unwrap().integrator;
         assert_eq!((integrator.kind, integrator.max_depth), (IntegratorKind::Caustics, 7));
         let lines = diagnostics.lines();
@@ -1465,4 +1466,107 @@ fn inline_meshes_far_away_keep_their_digits() {
     for (a, b) in octahedron(0.0).iter().zip(&far) {
         assert!((*a - *b).abs().max_element() < 1e-6, "{a} {b}");
     }
+}
+
+#[test]
+fn heightfields_and_nurbs_of_pbrt_v3_become_triangles() {
+    let upgraded = |text: &str| {
+        let (scene, warnings) = warned(text);
+        assert!(warnings.len() == 1 && warnings[0].contains("upgraded"), "{warnings:?}");
+        scene
+    };
+    let scene = upgraded(r#"Shape "heightfield" "integer nu" 3 "integer nv" 2 "float Pz" [0 1 2  3 4 5]"#);
+    let field = mesh(&scene.shapes[0]);
+    assert_eq!(field.positions[4], Vec3::new(0.5, 1.0, 4.0));
+    assert_eq!(field.triangles, [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]]);
+    assert_eq!((field.uvs.as_ref().unwrap()[2], &field.normals), (Vec2::new(1.0, 0.0), &None));
+
+    // A quarter of a cylinder of radius 2 about z: a rational arc by a straight line.
+    let w = 0.5_f64.sqrt();
+    let scene = upgraded(&format!(
+        r#"Shape "nurbs" "integer nu" 3 "integer uorder" 3 "float uknots" [0 0 0 1 1 1]
+           "integer nv" 2 "integer vorder" 2 "float vknots" [0 0 3 3]
+           "float Pw" [2 0 0 1  {p} {p} 0 {w}  0 2 0 1   2 0 5 1  {p} {p} {q} {w}  0 2 5 1]"#,
+        p = 2.0 * w,
+        q = 5.0 * w
+    ));
+    let arc = mesh(&scene.shapes[0]);
+    assert_eq!((arc.positions.len(), arc.triangles.len()), (900, 2 * 29 * 29));
+    for (position, normal) in arc.positions.iter().zip(arc.normals.as_ref().unwrap()) {
+        assert!((position.truncate().length() - 2.0).abs() < 1e-5 && position.z <= 5.0, "{position}");
+        let outwards = position.truncate().normalize().extend(0.0);
+        assert!((*normal - outwards).length() < 1e-4, "{normal} {outwards}");
+    }
+    assert_eq!(arc.positions[899], Vec3::new(0.0, 2.0, 5.0));
+    assert_eq!(arc.uvs.as_ref().unwrap()[899], Vec2::new(1.0, 3.0));
+}
+
+#[test]
+fn a_plymesh_is_displaced_by_a_texture_that_may_come_later() {
+    let folder = tempfile::tempdir().unwrap();
+    let ply = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+               property float u\nproperty float v\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+               0 0 0 0 0\n2 0 0 1 0\n2 2 0 1 1\n0 2 0 0 1\n4 0 1 2 3\n";
+    fs::write(folder.path().join("square.ply"), ply).unwrap();
+    let scene = |rest: &str| {
+        let text = format!(
+            "Option \"displacementedgescale\" 0.5\nWorldBegin Scale 3 3 3\n\
+             Shape \"plymesh\" \"string filename\" \"square.ply\" \"texture displacement\" \"h\" {rest}\n\
+             Shape \"plymesh\" \"string filename\" \"square.ply\"\nTexture \"h\" \"float\" \"constant\" \"float value\" 0.25"
+        );
+        let path = folder.path().join("scene.pbrt");
+        fs::write(&path, text).unwrap();
+        let mut diagnostics = Diagnostics::new();
+        let scene = pbrt::read_files(&[&*path], &Budget::default(), &mut diagnostics);
+        assert_eq!(diagnostics.lines(), [""; 0]);
+        scene
+    };
+    let read = scene("\"float edgelength\" 2").unwrap();
+    let (moved, plain) = (mesh(&read.shapes[0]), mesh(&read.shapes[1]));
+    assert_eq!(plain.positions.len(), 4);
+    assert!(moved.triangles.len() > 100 && moved.positions.iter().all(|p| (p.z - 0.25).abs() < 1e-6));
+    for face in &moved.triangles {
+        for i in 0..3 {
+            let [a, b] = [face[i], face[(i + 1) % 3]].map(|i| moved.positions[i as usize]);
+            assert!(3.0 * (a - b).length() < 1.0, "{a} {b}");
+        }
+    }
+    let refused = scene("\"float edgelength\" 1e-7").unwrap_err().to_diagnostic().to_string();
+    assert!(refused.contains("edgelength") && refused.contains("--max-"), "{refused}");
+}
+
+#[test]
+fn subsurface_and_openpbr_take_their_parameters_by_name() {
+    let scene = world(
+        r#"Material "subsurface" "string name" "Marble" "float scale" 10 Shape "sphere"
+           Material "subsurface" "rgb reflectance" [.2 .4 .6] "rgb mfp" [1 2 4] "float g" .5 "float eta" 1.4 Shape "sphere"
+           Material "openpbr" "rgb base_color" [.5 .25 .125] "float base_weight" .5 "float specular_ior" 1.7
+             "float transmission_weight" 0 "float thin_film_thickness" .3 "float fuzz_weight" .5 Shape "sphere""#,
+    );
+    let MaterialKind::Subsurface(marble) = kind(&scene, 0) else { panic!("{:?}", kind(&scene, 0)) };
+    let anywhere = |params: &lumbre_shading::subsurface::SubsurfaceParams| {
+        let at = lumbre_shading::TextureContext {
+            point: DVec3::ONE,
+            normal: Vec3::Z,
+            uv: Vec2::ZERO,
+            dpdx: Vec3::ZERO,
+            dpdy: Vec3::ZERO,
+            duv_dx: Vec2::ZERO,
+            duv_dy: Vec2::ZERO,
+            vertex: lumbre_shading::VertexData::NONE,
+        };
+        params.medium(&at)
+    };
+    near_rgb(anywhere(marble).extinction, [21.921, 26.241, 30.071]);
+    assert_eq!(marble.eta, 1.33);
+    let MaterialKind::Subsurface(wax) = kind(&scene, 1) else { panic!("{:?}", kind(&scene, 1)) };
+    near_rgb(anywhere(wax).extinction, [1.0, 0.5, 0.25]);
+    assert_eq!((wax.eta, wax.asymmetry, anywhere(wax).asymmetry), (1.4, 0.5, 0.5));
+    let MaterialKind::Principled(cloth) = kind(&scene, 2) else { panic!("{:?}", kind(&scene, 2)) };
+    near_rgb(constant(&cloth.base_color), [0.25, 0.125, 0.0625]);
+    near_rgb(constant(&cloth.sheen_color), [0.5, 0.5, 0.5]);
+    assert_eq!((cloth.ior, constant(&cloth.iridescence_thickness)), (1.7, 300.0));
+    let (_, warnings) =
+        warned(r#"Material "openpbr" "float subsurface_weight" 1 "rgb coat_color" [1 .5 1] Shape "sphere""#);
+    assert!(warnings.len() == 2 && warnings[0].contains("subsurface_weight"), "{warnings:?}");
 }

@@ -170,7 +170,7 @@ impl Geometry {
         let places: Vec<DVec3> = rows(&points.as_array(), |place: Triple| place.into())?;
         let widths: Vec<f64> = widths.as_array().iter().copied().collect();
         let mut curves = Curves::new(kind);
-        let mut first = 0;
+        let mut first = 0_usize;
         for (number, &count) in counts.as_array().iter().enumerate() {
             let last = usize::try_from(count).ok().and_then(|count| first.checked_add(count));
             let part = last.filter(|&last| last <= places.len() && last <= widths.len());

@@ -87,14 +87,24 @@ impl<'a> Taker<'a> {
         let aimed = ids.iter().map(|&id| {
             let draw = self.sampler.draw(id.x, id.y, id.index);
             let aim = self.aim(id, &draw);
-            weights.push(aim.weight);
-            (draw, self.camera_ray(&draw, &aim))
+            let camera = self.camera_ray(&draw, &aim);
+            weights.push((aim.weight, camera.weight));
+            (draw, camera)
         });
         let mut sights = Sights::new(self.scene, &self.view, wave, self.precision, aimed, record);
         let seen = self.see(&mut sights, record);
-        for (slot, ((&id, &weight), &radiance)) in ids.iter().zip(&weights).zip(sights.radiance()).enumerate()
+        for (slot, ((&id, &(weight, passes)), &radiance)) in
+            ids.iter().zip(&weights).zip(sights.radiance()).enumerate()
         {
-            let SeenSample { caught, features, covered } = seen.get(slot).copied().unwrap_or_default();
+            let SeenSample { mut caught, mut features, covered } =
+                seen.get(slot).copied().unwrap_or_default();
+            if passes == 0.0 {
+                (caught, features) = (None, None);
+            }
+            let radiance = through_lens(radiance, passes);
+            if let Some(caught) = &mut caught {
+                caught.radiance = through_lens(caught.radiance, passes);
+            }
             let coverage = covered.unwrap_or(Spectrum::WHITE);
             let Seen { radiance, coverage, on_catcher } =
                 caught.unwrap_or(Seen { radiance, coverage, on_catcher: false });
@@ -189,6 +199,7 @@ impl<'a> Taker<'a> {
         let Aim { film, lens, weight } = self.aim(id, &draw);
         let camera = self.camera_ray(&draw, &Aim { film, lens, weight });
         let (ray, radiance, events) = self.explain_sight(draw, camera);
+        let radiance = through_lens(radiance, camera.weight);
         ExplainedSample { film, lens, ray, radiance, weight, events }
     }
 
@@ -200,6 +211,18 @@ impl<'a> Taker<'a> {
         let seen = self.see(&mut sights, &mut record).first().and_then(|seen| seen.caught);
         let radiance = seen.map_or(sights.radiance()[0], |seen| seen.radiance);
         (sights.ray(0), radiance, record.journal.unwrap_or_default())
+    }
+}
+
+/// What a picture has of radiance along a camera's ray of this weight.
+fn through_lens(radiance: Spectrum, weight: f64) -> Spectrum {
+    if weight == 1.0 {
+        radiance
+    } else if weight == 0.0 {
+        // Whatever is behind what the lens stops.
+        Spectrum::BLACK
+    } else {
+        radiance * weight as f32
     }
 }
 
@@ -279,7 +302,7 @@ pub fn explain_ray(
     let taker = Taker::new(scene, options, &*integrator)?;
     // With the random numbers of a pixel.
     let draw = taker.sampler.draw(0, 0, index);
-    let camera = CameraRay { ray: *ray, footprint: Footprint::Point };
+    let camera = CameraRay { ray: *ray, footprint: Footprint::Point, weight: 1.0 };
     let (_, radiance, events) = taker.explain_sight(draw, camera);
     Ok((radiance, events))
 }

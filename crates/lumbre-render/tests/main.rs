@@ -14,4 +14,5 @@ mod motion;
 mod panes;
 mod parts;
 mod shading_normals;
+mod subsurface;
 mod terminator;

@@ -798,7 +798,7 @@ pub(crate) fn check_cameras(cameras: &[Camera]) -> Result<(), BuildError> {
                 Some((lens_radius, focal_distance))
             }
             CameraKind::Orthographic { lens_radius, focal_distance } => Some((lens_radius, focal_distance)),
-            CameraKind::Spherical { .. } => None,
+            CameraKind::Spherical { .. } | CameraKind::Realistic(_) => None,
         };
         if let Some((radius, distance)) = lens {
             if !(radius >= 0.0 && radius.is_finite()) {

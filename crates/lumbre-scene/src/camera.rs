@@ -10,7 +10,7 @@ use lumbre_math::{
 };
 
 use crate::viewpoint::half_window;
-use crate::{Footprint, MediumId};
+use crate::{Footprint, Lens, MediumId};
 
 /// The mapping of directions to the picture of a spherical camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,6 +46,8 @@ pub enum CameraKind {
         /// The mapping of directions.
         mapping: SphericalMapping,
     },
+    /// A lens of several surfaces before a film; units of the world are metres.
+    Realistic(Arc<Lens>),
 }
 
 impl CameraKind {
@@ -55,6 +57,7 @@ impl CameraKind {
             Self::Perspective { .. } => "perspective",
             Self::Orthographic { .. } => "orthographic",
             Self::Spherical { .. } => "spherical",
+            Self::Realistic(_) => "realistic",
         }
     }
 }
@@ -166,6 +169,8 @@ pub struct CameraRay {
     pub ray: Ray,
     /// The rays through neighbouring points of the film.
     pub footprint: Footprint,
+    /// What the picture has of the radiance that comes along it: 1, but for real lenses. 0 where the lens stops it.
+    pub weight: f64,
 }
 
 /// A camera with a picture size, which gives the ray for every point of the film.
@@ -181,7 +186,7 @@ pub struct View {
     shutter_close: f64,
     medium: Option<MediumId>,
     // The screen position of the film's (0, 0), and the size of a pixel on the screen. The screen of a
-    // perspective camera is at z = 1, that of a spherical one is the unit square.
+    // perspective camera is at z = 1, that of a spherical one is the unit square, that of a lens its film.
     corner: DVec2,
     step: DVec2,
     size: [u32; 2],
@@ -201,6 +206,11 @@ impl View {
             }
             CameraKind::Orthographic { .. } => (DVec2::new(x0, y1), DVec2::new(x1, y0)),
             CameraKind::Spherical { .. } => (DVec2::ZERO, DVec2::ONE),
+            // A lens turns its picture upside down.
+            CameraKind::Realistic(ref lens) => {
+                let half = lens.half_film(pixels.x / pixels.y);
+                (DVec2::new(half.x, -half.y), DVec2::new(-half.x, half.y))
+            }
         };
         Self {
             kind: camera.kind.clone(),
@@ -240,19 +250,21 @@ impl View {
     pub fn ray(&self, film: DVec2, lens: DVec2, time: f64, spacing: f64) -> CameraRay {
         let placement = self.placement(time);
         let line = |film| self.line(&placement, film, lens);
-        let (origin, direction) = line(film);
-        let (x_origin, x_direction) = line(film + DVec2::new(spacing, 0.0));
-        let (y_origin, y_direction) = line(film + DVec2::new(0.0, spacing));
-        CameraRay {
-            ray: Ray::new(origin, direction).at_time(time),
-            footprint: Footprint::Neighbours { x_origin, x_direction, y_origin, y_direction },
-        }
+        let (origin, direction, weight) = line(film);
+        let (x_origin, x_direction, x_weight) = line(film + DVec2::new(spacing, 0.0));
+        let (y_origin, y_direction, y_weight) = line(film + DVec2::new(0.0, spacing));
+        let footprint = if x_weight > 0.0 && y_weight > 0.0 {
+            Footprint::Neighbours { x_origin, x_direction, y_origin, y_direction }
+        } else {
+            Footprint::Point
+        };
+        CameraRay { ray: Ray::new(origin, direction).at_time(time), footprint, weight }
     }
 
     /// [`View::ray`] without a footprint.
     pub fn bare_ray(&self, film: DVec2, lens: DVec2, time: f64) -> CameraRay {
-        let (origin, direction) = self.line(&self.placement(time), film, lens);
-        CameraRay { ray: Ray::new(origin, direction).at_time(time), footprint: Footprint::Point }
+        let (origin, direction, weight) = self.line(&self.placement(time), film, lens);
+        CameraRay { ray: Ray::new(origin, direction).at_time(time), footprint: Footprint::Point, weight }
     }
 
     /// The depth of a world-space point along the camera's axis at a time; for a spherical camera, the
@@ -275,7 +287,8 @@ impl View {
     }
 
     /// Where a point of the film is on the screen: that of a perspective camera is at z = 1 of camera space, with x to the right and y
-    /// up; that of an orthographic one at z = 0; that of a spherical one is the unit square.
+    /// up; that of an orthographic one at z = 0; that of a spherical one is the unit square; that of a real lens is its film at z = 0, in
+    /// metres, with the picture upside down.
     pub fn on_screen(&self, film: DVec2) -> DVec2 {
         self.corner + self.step * film
     }
@@ -287,12 +300,14 @@ impl View {
                 lens_radius > 0.0
             }
             CameraKind::Spherical { .. } => false,
+            CameraKind::Realistic(_) => true,
         }
     }
 
-    /// The world-space origin and unit direction.
-    fn line(&self, placement: &Transform, film: DVec2, lens: DVec2) -> (DVec3, DVec3) {
+    /// The world-space origin, the unit direction, and the weight.
+    fn line(&self, placement: &Transform, film: DVec2, lens: DVec2) -> (DVec3, DVec3, f64) {
         let on_screen = self.on_screen(film);
+        let mut weight = 1.0;
         let (origin, direction) = match self.kind {
             CameraKind::Perspective { lens_radius, focal_distance, .. } => {
                 let towards = on_screen.extend(1.0);
@@ -310,8 +325,14 @@ impl View {
                 let d = equal_area_square_to_sphere(equal_area_wrap(on_screen));
                 (DVec3::ZERO, DVec3::new(d.x, d.z, d.y))
             }
+            CameraKind::Realistic(ref glass) => {
+                let (origin, direction, share) =
+                    glass.ray(on_screen, lens).unwrap_or((DVec3::ZERO, DVec3::Z, 0.0));
+                weight = share;
+                (origin, direction)
+            }
         };
-        (placement.point(origin), placement.vector(direction).normalize())
+        (placement.point(origin), placement.vector(direction).normalize(), weight)
     }
 }
 

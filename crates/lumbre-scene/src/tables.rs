@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use lumbre_kernel::TriangleMesh;
 use lumbre_math::{DVec3, Vec2, Vec3};
-use lumbre_shading::lanes::BsdfKind;
+use lumbre_shading::lanes::{BsdfKind, Rows};
 use lumbre_shading::{Bsdf, Material, ShadingFrame, ShadingNormals, TextureContext, VertexData};
 
 use crate::Footprint;
@@ -14,7 +14,7 @@ use crate::surface::{Form, MeshAttributes, SurfaceEntry, TrianglePoint};
 #[derive(Debug, Default)]
 pub struct SurfaceTable {
     surfaces: Vec<Option<TriangleSurface>>,
-    rows: Vec<f32>,
+    rows: Rows,
 }
 
 /// A mesh in the world itself, still, of faces that emit the same everywhere.
@@ -71,8 +71,8 @@ impl SurfaceTable {
         self.surfaces.get(id as usize)?.as_ref()
     }
 
-    /// The rows of all BSDFs, one after the other.
-    pub fn rows(&self) -> &[f32] {
+    /// The rows of all BSDFs.
+    pub fn rows(&self) -> &Rows {
         &self.rows
     }
 
@@ -103,8 +103,7 @@ impl SurfaceTable {
         if !bsdf.is_isotropic() {
             return None;
         }
-        let row = self.rows.len() as u32;
-        self.rows.extend(bsdf.row());
+        let row = self.rows.push(&bsdf);
         Some(UniformBsdf { kind: bsdf.kind(), row })
     }
 }

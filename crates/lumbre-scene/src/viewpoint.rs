@@ -53,7 +53,7 @@ impl Viewpoint {
         self.zoom != 1.0 || self.fov.is_some()
     }
 
-    /// Changes the lens of a camera for a picture of this aspect ratio; a spherical one has none.
+    /// Changes the lens of a camera for a picture of this aspect ratio; a spherical one has none, and a real one stays what it is.
     pub(crate) fn set_lens(&self, camera: &mut Camera, aspect: f64) {
         if let (CameraKind::Perspective { fov, .. }, Some(asked)) = (&mut camera.kind, self.fov) {
             *fov = asked;
@@ -68,7 +68,7 @@ impl Viewpoint {
         }
         let aspect = camera.frame_aspect.unwrap_or(aspect);
         match (&mut camera.kind, camera.screen_window) {
-            (CameraKind::Spherical { .. }, _) => {}
+            (CameraKind::Spherical { .. } | CameraKind::Realistic(_), _) => {}
             (CameraKind::Perspective { fov, .. }, None) => {
                 *fov = 2.0 * ((0.5 * fov.to_radians()).tangent() / self.zoom).arc_tangent().to_degrees();
             }

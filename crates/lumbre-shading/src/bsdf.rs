@@ -7,7 +7,9 @@ use crate::conductor::Conductor;
 use crate::dielectric::{Dielectric, ThinDielectric};
 use crate::diffuse::{Diffuse, DiffuseTransmission};
 use crate::hair::Hair;
+use crate::measured::Measured;
 use crate::principled::Principled;
+use crate::subsurface::Subsurface;
 use crate::uber::Uber;
 use crate::{LocalDir, Spectrum};
 
@@ -62,6 +64,10 @@ pub enum Bsdf {
     Uber(Uber),
     /// A fibre.
     Hair(Hair),
+    /// Measured.
+    Measured(Measured),
+    /// The boundary of a body that light wanders through.
+    Subsurface(Subsurface),
 }
 
 impl Bsdf {
@@ -78,6 +84,8 @@ impl Bsdf {
             Self::Principled(bsdf) => bsdf.eval(wo, wi),
             Self::Uber(bsdf) => bsdf.eval(wo, wi),
             Self::Hair(bsdf) => bsdf.eval(wo, wi),
+            Self::Measured(bsdf) => bsdf.eval(wo, wi),
+            Self::Subsurface(bsdf) => bsdf.eval(wo, wi),
         }
     }
 
@@ -95,6 +103,8 @@ impl Bsdf {
             Self::Principled(bsdf) => bsdf.pdf(wo, wi),
             Self::Uber(bsdf) => bsdf.pdf(wo, wi),
             Self::Hair(bsdf) => bsdf.pdf(wo, wi),
+            Self::Measured(bsdf) => bsdf.pdf(wo, wi),
+            Self::Subsurface(bsdf) => bsdf.pdf(wo, wi),
         }
     }
 
@@ -111,18 +121,25 @@ impl Bsdf {
             Self::Principled(bsdf) => bsdf.sample(wo, lobe, u),
             Self::Uber(bsdf) => bsdf.sample(wo, lobe, u),
             Self::Hair(bsdf) => bsdf.sample(wo, lobe, u),
+            Self::Measured(bsdf) => bsdf.sample(wo, u),
+            Self::Subsurface(bsdf) => bsdf.sample(wo, lobe, u),
         }
     }
 
     /// Whether [`Bsdf::sample`] reads `lobe`.
     pub fn has_lobes(&self) -> bool {
-        !matches!(self, Self::Diffuse(_) | Self::Conductor(_))
+        !matches!(self, Self::Diffuse(_) | Self::Conductor(_) | Self::Measured(_))
     }
 
     /// Whether all parts are deltas, so that light sampling is useless.
     pub fn is_delta(&self) -> bool {
         match self {
-            Self::Diffuse(_) | Self::DiffuseTransmission(_) | Self::CoatedDiffuse(_) | Self::Hair(_) => false,
+            Self::Diffuse(_)
+            | Self::DiffuseTransmission(_)
+            | Self::CoatedDiffuse(_)
+            | Self::Hair(_)
+            | Self::Measured(_)
+            | Self::Subsurface(_) => false,
             Self::Conductor(bsdf) => bsdf.facets.is_smooth(),
             Self::Dielectric(bsdf) => bsdf.is_delta(),
             Self::ThinDielectric(_) => true,
@@ -143,23 +160,26 @@ impl Bsdf {
             Self::Principled(bsdf) if bsdf.coat.weight <= 0.0 || bsdf.coat.normal.z >= 1.0 => &[bsdf.facets],
             Self::Principled(_) | Self::Hair(_) => return false,
             Self::Uber(bsdf) => &[bsdf.facets],
+            Self::Measured(bsdf) => return bsdf.0.is_isotropic(),
+            Self::Subsurface(bsdf) => &[bsdf.face.facets],
         };
         facets.iter().all(|facets| facets.alpha().x == facets.alpha().y)
     }
 
     /// An estimate of the hemispherical albedo for the AOV of that name: exact for diffuse surfaces, the
-    /// reflectance at normal incidence for metals, 1 for glass.
+    /// reflectance at normal incidence for metals, 1 for glass and boundaries, that of light from the normal for measured surfaces.
     pub fn albedo(&self) -> Spectrum {
         match self {
             Self::Diffuse(bsdf) => bsdf.reflectance,
             Self::DiffuseTransmission(bsdf) => bsdf.reflectance + bsdf.transmittance,
             Self::Conductor(bsdf) => bsdf.fresnel(1.0),
-            Self::Dielectric(_) | Self::ThinDielectric(_) => Spectrum::WHITE,
+            Self::Dielectric(_) | Self::ThinDielectric(_) | Self::Subsurface(_) => Spectrum::WHITE,
             Self::CoatedDiffuse(bsdf) => bsdf.albedo_estimate(),
             Self::CoatedConductor(bsdf) => bsdf.albedo_estimate(),
             Self::Principled(bsdf) => bsdf.albedo_estimate(),
             Self::Uber(bsdf) => bsdf.albedo_estimate(),
             Self::Hair(bsdf) => bsdf.albedo_estimate(),
+            Self::Measured(bsdf) => bsdf.albedo_estimate(),
         }
     }
 
@@ -175,14 +195,18 @@ impl Bsdf {
 
     /// The surface with mirrors and sharp lobes made rougher, for parts of a path that are not seen directly:
     /// less noise, fewer sharp details. Each α below 0.3 is doubled and clamped to [0.1, 0.3]. A thin pane is
-    /// returned unchanged, since light passes straight through it, and the delta parts of [`Uber`] stay what they are.
+    /// returned unchanged, since light passes straight through it, and so is a measured surface; the delta parts of [`Uber`] stay what they are.
     #[must_use]
     pub fn regularized(self) -> Self {
         let metal = |bsdf: Conductor| Conductor { facets: bsdf.facets.regularized(), ..bsdf };
         let glass = |bsdf: Dielectric| Dielectric { facets: bsdf.facets.regularized(), ..bsdf };
         let coated = |coat: Coat| Coat { face: glass(coat.face), ..coat };
         match self {
-            Self::Diffuse(_) | Self::DiffuseTransmission(_) | Self::ThinDielectric(_) | Self::Hair(_) => self,
+            Self::Diffuse(_)
+            | Self::DiffuseTransmission(_)
+            | Self::ThinDielectric(_)
+            | Self::Hair(_)
+            | Self::Measured(_) => self,
             Self::Conductor(bsdf) => Self::Conductor(metal(bsdf)),
             Self::Dielectric(bsdf) => Self::Dielectric(glass(bsdf)),
             Self::CoatedDiffuse(bsdf) => {
@@ -192,6 +216,7 @@ impl Bsdf {
                 Self::CoatedConductor(CoatedConductor { base: metal(bsdf.base), coat: coated(bsdf.coat) })
             }
             Self::Principled(bsdf) => Self::Principled(Box::new(bsdf.regularized())),
+            Self::Subsurface(bsdf) => Self::Subsurface(Subsurface { face: glass(bsdf.face), ..bsdf }),
             Self::Uber(bsdf) => Self::Uber(Uber { facets: bsdf.facets.regularized(), ..bsdf }),
         }
     }

@@ -4,6 +4,8 @@
 //! but of one kind. All results have the same bits at every instruction set. Directions are unit vectors in the local frame, whose z axis
 //! is the shading normal.
 
+use std::sync::Arc;
+
 use lumbre_math::{Vec2, Vec3};
 use lumbre_simd::{Real, UInt, V3};
 use smallvec::SmallVec;
@@ -13,9 +15,11 @@ pub use crate::conductor::ConductorLanes;
 pub use crate::dielectric::{DielectricLanes, ThinDielectricLanes};
 pub use crate::diffuse::{DiffuseLanes, DiffuseTransmissionLanes};
 pub use crate::hair::HairLanes;
+pub use crate::measured::{MeasuredLanes, MeasuredList};
 pub use crate::microfacet::FacetLanes;
 pub use crate::principled_lanes::{ClearcoatLanes, PrincipledLanes};
 pub use crate::sheen::SheenLanes;
+pub use crate::subsurface::SubsurfaceLanes;
 pub use crate::thin_film::ThinFilmLanes;
 pub use crate::uber_lanes::UberLanes;
 
@@ -68,6 +72,13 @@ pub trait LaneBsdf<R: Real>: Sized {
     /// If a row reaches beyond the table.
     fn load(table: &[f32], at: R::UInt) -> Self;
 
+    /// The same with the tables of measured surfaces, to which rows refer.
+    #[inline(always)]
+    #[must_use]
+    fn with_measured(self, _: &MeasuredList) -> Self {
+        self
+    }
+
     /// f · |cos θi|, and the density of [`LaneBsdf::sample`]: both without delta parts.
     fn eval(&self, wo: V3<R>, wi: V3<R>) -> (V3<R>, R);
 
@@ -106,11 +117,15 @@ pub enum BsdfKind {
     Uber,
     /// [`HairLanes`].
     Hair,
+    /// [`MeasuredLanes`].
+    Measured,
+    /// [`SubsurfaceLanes`].
+    Subsurface,
 }
 
 impl BsdfKind {
     /// How many there are.
-    pub const COUNT: usize = Self::Hair as usize + 1;
+    pub const COUNT: usize = Self::Subsurface as usize + 1;
 }
 
 /// The parameters of a BSDF as plain numbers: [`LaneBsdf::ROW`] of them.
@@ -130,10 +145,13 @@ impl Bsdf {
             Self::Principled(_) => BsdfKind::Principled,
             Self::Uber(_) => BsdfKind::Uber,
             Self::Hair(_) => BsdfKind::Hair,
+            Self::Measured(_) => BsdfKind::Measured,
+            Self::Subsurface(_) => BsdfKind::Subsurface,
         }
     }
 
-    /// The row from which [`LaneBsdf::load`] of its kind makes the same BSDF.
+    /// The row from which [`LaneBsdf::load`] of its kind makes the same BSDF. That of a measured surface refers to the first of the tables;
+    /// [`Rows::push`] writes the right one.
     pub fn row(&self) -> Row {
         match self {
             Self::Diffuse(bsdf) => Row::from_slice(&bsdf.row()),
@@ -146,7 +164,50 @@ impl Bsdf {
             Self::Principled(bsdf) => bsdf.row(),
             Self::Uber(bsdf) => bsdf.row(),
             Self::Hair(bsdf) => bsdf.row(),
+            Self::Measured(_) => Row::from_slice(&[0.0]),
+            Self::Subsurface(bsdf) => Row::from_slice(&bsdf.row()),
         }
+    }
+}
+
+/// Rows of BSDFs, one after the other, and the tables of measured surfaces that they refer to.
+#[derive(Clone, Debug, Default)]
+pub struct Rows {
+    numbers: Vec<f32>,
+    measured: MeasuredList,
+}
+
+impl Rows {
+    /// Appends the row of a BSDF; returns where it begins.
+    pub fn push(&mut self, bsdf: &Bsdf) -> u32 {
+        let at = self.numbers.len() as u32;
+        let mut row = bsdf.row();
+        if let Bsdf::Measured(bsdf) = bsdf {
+            let place = self.measured.iter().position(|known| Arc::ptr_eq(known, &bsdf.0));
+            row[0] = place.unwrap_or(self.measured.len()) as f32;
+            if place.is_none() {
+                Arc::make_mut(&mut self.measured).push(bsdf.0.clone());
+            }
+        }
+        self.numbers.extend(row);
+        at
+    }
+
+    /// Forgets all rows but those of `first`, with which they began or begin now.
+    pub fn reset(&mut self, first: &Self) {
+        if self.numbers.len() < first.numbers.len() {
+            *self = Self { numbers: first.numbers.clone(), measured: Arc::new(first.measured.to_vec()) };
+        }
+        self.numbers.truncate(first.numbers.len());
+    }
+
+    /// The BSDF of one kind whose row begins here, in each lane.
+    ///
+    /// # Panics
+    /// If a row reaches beyond the last one.
+    #[inline(always)]
+    pub fn load<R: Real, B: LaneBsdf<R>>(&self, at: R::UInt) -> B {
+        B::load(&self.numbers, at).with_measured(&self.measured)
     }
 }
 

@@ -12,7 +12,9 @@ use crate::conductor::Conductor;
 use crate::dielectric::{Dielectric, ThinDielectric};
 use crate::diffuse::{Diffuse, DiffuseTransmission};
 use crate::hair::HairParams;
+use crate::measured::{Measured, MeasuredTables};
 use crate::microfacet::Microfacets;
+use crate::subsurface::SubsurfaceParams;
 use crate::uber::UberParams;
 use crate::{
     Bsdf, FloatTexture, HomogeneousMedium, ImageTexture, PrincipledParams, ShadingFrame, ShadingNormals,
@@ -158,6 +160,10 @@ pub enum MaterialKind {
     Uber(Box<UberParams>),
     /// Hair and fur, on curves.
     Hair(Box<HairParams>),
+    /// A measured surface.
+    Measured(Arc<MeasuredTables>),
+    /// A body that light wanders through below its surface.
+    Subsurface(Box<SubsurfaceParams>),
     /// One of two, chosen at random by position and direction.
     Mix {
         /// The materials at amount 0 and 1.
@@ -171,7 +177,7 @@ pub enum MaterialKind {
 
 impl MaterialKind {
     /// The names of the kinds in the scene language, in the order of this enum.
-    pub const NAMES: [&str; 12] = [
+    pub const NAMES: [&str; 14] = [
         "diffuse",
         "conductor",
         "dielectric",
@@ -182,6 +188,8 @@ impl MaterialKind {
         "principled",
         "uber",
         "hair",
+        "measured",
+        "subsurface",
         "mix",
         "interface",
     ];
@@ -199,6 +207,8 @@ impl MaterialKind {
             Self::Principled(_) => "principled",
             Self::Uber(_) => "uber",
             Self::Hair(_) => "hair",
+            Self::Measured(_) => "measured",
+            Self::Subsurface(_) => "subsurface",
             Self::Mix { .. } => "mix",
             Self::Interface => "interface",
         }
@@ -273,7 +283,9 @@ impl Material {
                     reflectance.is_constant() && smooth(roughness)
                 }
                 MaterialKind::Dielectric { roughness, .. } => smooth(roughness),
-                MaterialKind::ThinDielectric { .. } | MaterialKind::Interface => true,
+                MaterialKind::ThinDielectric { .. } | MaterialKind::Measured(_) | MaterialKind::Interface => {
+                    true
+                }
                 MaterialKind::CoatedDiffuse { reflectance, roughness, thickness, g, albedo, .. } => {
                     let base = reflectance.is_constant() && smooth(roughness);
                     base && thickness.is_constant() && g.is_constant() && albedo.is_constant()
@@ -315,7 +327,8 @@ impl Material {
             MaterialKind::Dielectric { .. }
             | MaterialKind::ThinDielectric { .. }
             | MaterialKind::DiffuseTransmission { .. }
-            | MaterialKind::Hair(_) => true,
+            | MaterialKind::Hair(_)
+            | MaterialKind::Subsurface(_) => true,
             MaterialKind::Principled(params) => params.lets_light_through(),
             MaterialKind::Uber(params) => params.lets_light_through(),
             _ => false,
@@ -346,7 +359,9 @@ impl Material {
             MaterialKind::ThinDielectric { .. } => true,
             MaterialKind::Principled(params) => params.may_be_specular(),
             MaterialKind::Uber(params) => params.may_be_specular(),
+            MaterialKind::Subsurface(params) => params.roughness.may_be_smooth(),
             MaterialKind::Diffuse { .. } | MaterialKind::DiffuseTransmission { .. } => false,
+            MaterialKind::Hair(_) | MaterialKind::Measured(_) => false,
             MaterialKind::Mix { .. } | MaterialKind::Interface => false,
         })
     }
@@ -479,9 +494,20 @@ impl Material {
 
     /// The medium inside a solid of this material, if it scatters light; else `None`. Its extinction is that of
     /// [`Material::interior_attenuation`].
-    pub fn interior_medium(&self) -> Option<HomogeneousMedium> {
+    ///
+    /// Where it is not the same for all light, it is that which enters at a position.
+    pub fn interior_medium(&self, at: &TextureContext) -> Option<HomogeneousMedium> {
         match &self.kind {
             MaterialKind::Principled(params) => params.interior_medium(),
+            MaterialKind::Subsurface(params) => Some(params.medium(at)),
+            _ => None,
+        }
+    }
+
+    /// The body below the surface, if it is one that light wanders through.
+    pub fn subsurface(&self) -> Option<&SubsurfaceParams> {
+        match &self.kind {
+            MaterialKind::Subsurface(params) => Some(params),
             _ => None,
         }
     }
@@ -494,9 +520,11 @@ impl Material {
 
     /// Whether it, or a part of the mixture, may be solid: see [`Material::is_solid`].
     pub fn may_be_solid(&self) -> bool {
-        self.has_part(
-            |kind| matches!(kind, MaterialKind::Principled(params) if params.interior_index().is_some()),
-        )
+        self.has_part(|kind| match kind {
+            MaterialKind::Principled(params) => params.interior_index().is_some(),
+            MaterialKind::Subsurface(_) => true,
+            _ => false,
+        })
     }
 
     /// The index of refraction inside a solid of this material, against vacuum; `None` where light cannot get
@@ -504,6 +532,7 @@ impl Material {
     pub fn interior_index(&self) -> Option<f32> {
         match &self.kind {
             MaterialKind::Principled(params) => params.interior_index(),
+            MaterialKind::Subsurface(params) => Some(index(params.eta)),
             _ => None,
         }
     }
@@ -582,6 +611,8 @@ impl Material {
             MaterialKind::Principled(params) => Bsdf::Principled(Box::new(params.bsdf(at))),
             MaterialKind::Uber(params) => Bsdf::Uber(params.bsdf(at)),
             MaterialKind::Hair(params) => Bsdf::Hair(params.bsdf(at)),
+            MaterialKind::Measured(tables) => Bsdf::Measured(Measured(tables.clone())),
+            MaterialKind::Subsurface(params) => Bsdf::Subsurface(params.bsdf(at)),
             MaterialKind::Mix { .. } | MaterialKind::Interface => return None,
         };
         Some(bsdf)
@@ -636,7 +667,7 @@ impl Roughness {
     }
 
     /// The microfacets at a position.
-    fn facets(&self, at: &TextureContext) -> Microfacets {
+    pub(crate) fn facets(&self, at: &TextureContext) -> Microfacets {
         let u = self.alpha(self.u.evaluate(at));
         let v = if Arc::ptr_eq(&self.u, &self.v) { u } else { self.alpha(self.v.evaluate(at)) };
         Microfacets::new(u, v)

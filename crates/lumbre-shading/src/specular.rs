@@ -19,7 +19,9 @@ impl Bsdf {
     fn delta_parts(&self, wo: LocalDir) -> Specular {
         let nowhere = Vec2::ZERO;
         match self {
-            Self::Diffuse(_) | Self::Hair(_) | Self::DiffuseTransmission(_) => Specular::new(),
+            Self::Diffuse(_) | Self::DiffuseTransmission(_) | Self::Hair(_) | Self::Measured(_) => {
+                Specular::new()
+            }
             Self::Conductor(bsdf) if bsdf.facets.is_smooth() => {
                 bsdf.sample(wo, nowhere).into_iter().collect()
             }
@@ -29,6 +31,8 @@ impl Bsdf {
                 .filter_map(|way| bsdf.sample_of(wo, 0.0, nowhere, way))
                 .collect(),
             Self::Dielectric(_) => Specular::new(),
+            Self::Subsurface(bsdf) if wo.cos_theta() > 0.0 => Self::Dielectric(bsdf.face).delta_parts(wo),
+            Self::Subsurface(_) => Specular::new(),
             Self::ThinDielectric(bsdf) => bsdf.specular(wo),
             Self::CoatedDiffuse(bsdf) => bsdf.specular(wo).into_iter().collect(),
             Self::CoatedConductor(bsdf) => bsdf.specular(wo).into_iter().collect(),

@@ -7,6 +7,7 @@
 
 use std::f64::consts::{PI, TAU};
 use std::marker::PhantomData;
+use std::sync::Arc;
 use std::thread;
 
 use lumbre_math::random::RandomStream;
@@ -16,10 +17,12 @@ use lumbre_shading::conductor::Conductor;
 use lumbre_shading::dielectric::{Dielectric, ThinDielectric};
 use lumbre_shading::diffuse::{Diffuse, DiffuseTransmission};
 use lumbre_shading::hair::Hair;
-use lumbre_shading::lanes::{self, BsdfKind, LaneBsdf};
+use lumbre_shading::lanes::{self, BsdfKind, LaneBsdf, Rows};
+use lumbre_shading::measured::{Measured, MeasuredParts, MeasuredTables};
 use lumbre_shading::microfacet::Microfacets;
 use lumbre_shading::principled::{Body, Clearcoat, Principled};
 use lumbre_shading::sheen::Sheen;
+use lumbre_shading::subsurface::Subsurface;
 use lumbre_shading::thin_film::ThinFilm;
 use lumbre_shading::uber::Uber;
 use lumbre_shading::{Bsdf, LocalDir, Scatter, ShadingFrame, Spectrum, fresnel};
@@ -179,6 +182,75 @@ fn spread(bsdf: &Principled) -> f32 {
     }
 }
 
+/// The tables of facets of GGX of this roughness along both axes, with colours that are brighter along the square.
+fn measured(alpha: (f64, f64)) -> Measured {
+    let (angles, width, height, side) = (9, 32, 20, 6);
+    let azimuths = if alpha.0 == alpha.1 { 1 } else { 9 };
+    let ramp = |n: usize| (0..n).map(move |i| i as f64 / (n - 1) as f64);
+    let theta = |u: f64| u * u * 0.5 * PI;
+    let phi = |v: f64| (2.0 * v - 1.0) * PI;
+    let normal = |u: f64, v: f64| {
+        let ((sin, cos), (y, x)) = (theta(u).sin_cos(), phi(v).sin_cos());
+        [sin * x, sin * y, cos]
+    };
+    let density = |[x, y, z]: [f64; 3]| {
+        let length = (x / alpha.0).powi(2) + (y / alpha.1).powi(2) + z * z;
+        1.0 / (PI * alpha.0 * alpha.1 * length * length)
+    };
+    let area =
+        |[x, y, z]: [f64; 3]| 0.5 * (z + ((alpha.0 * x).powi(2) + (alpha.1 * y).powi(2) + z * z).sqrt());
+    let square = |f: &dyn Fn([f64; 3]) -> f64| -> Vec<f32> {
+        ramp(height)
+            .flat_map(|v| ramp(width).map(move |u| f(normal(u, v)) as f32).collect::<Vec<_>>())
+            .collect()
+    };
+    let theta_i: Vec<f64> = ramp(angles).map(|t| 1.5 * t).collect();
+    let phi_i: Vec<f64> = ramp(azimuths.max(2)).take(azimuths).map(|t| (2.0 * t - 1.0) * PI).collect();
+    let (mut vndf, mut luminance, mut colours) = (vec![], vec![], [const { Vec::new() }; 3]);
+    for &phi_o in &phi_i {
+        // Azimuths of facets are relative to the viewer's where it has but one.
+        let phi_o = if azimuths == 1 { 0.0 } else { phi_o };
+        for &theta_o in &theta_i {
+            let ((sin, cos), (y, x)) = (theta_o.sin_cos(), phi_o.sin_cos());
+            let o = [sin * x, sin * y, cos];
+            for v in ramp(height) {
+                for u in ramp(width) {
+                    let m = normal(u, v);
+                    let seen: f64 = (0..3).map(|k| o[k] * m[k]).sum();
+                    vndf.push((density(m) * seen.max(0.0) * u * theta(u).sin() + 1e-6) as f32);
+                }
+            }
+            for y in ramp(side) {
+                for x in ramp(side) {
+                    let bright = 0.3 + 0.4 * x + 0.2 * y;
+                    luminance.push(bright as f32);
+                    let shares = [1.0, 0.6, 0.2];
+                    colours.iter_mut().zip(shares).for_each(|(c, share)| c.push((bright * share) as f32));
+                }
+            }
+        }
+    }
+    let single = |angles: Vec<f64>| angles.into_iter().map(|v| v as f32).collect();
+    let of_facets = [height, width];
+    Measured(Arc::new(
+        MeasuredTables::new(MeasuredParts {
+            theta_i: single(theta_i),
+            phi_i: single(phi_i),
+            size: [of_facets, of_facets, of_facets, [side, side]],
+            ndf: square(&density),
+            sigma: square(&area),
+            vndf,
+            luminance,
+            colours,
+        })
+        .unwrap(),
+    ))
+}
+
+fn boundary(alpha: f32) -> Bsdf {
+    Bsdf::Subsurface(Subsurface::new(Dielectric { eta: 1.33, facets: Microfacets::new(alpha, alpha) }))
+}
+
 /// A coat that leans.
 fn leaning() -> Principled {
     let coat = Clearcoat { weight: 0.7, alpha: 0.15, normal: Vec3::new(0.3, -0.2, 0.9).normalize() };
@@ -245,6 +317,12 @@ fn all() -> Vec<(String, Bsdf)> {
     }
     for (name, bsdf) in hair() {
         list.push((format!("hair {name}"), Bsdf::Hair(bsdf)));
+    }
+    for alpha in [(0.4, 0.4), (0.5, 0.25)] {
+        list.push((format!("measured {alpha:?}"), Bsdf::Measured(measured(alpha))));
+    }
+    for alpha in [0.0, 0.3] {
+        list.push((format!("subsurface {alpha}"), boundary(alpha)));
     }
     for (name, bsdf) in principled().into_iter().chain([("leaning coat", leaning())]) {
         list.push((format!("principled {name}"), Bsdf::Principled(Box::new(bsdf))));
@@ -504,6 +582,8 @@ fn light_goes_back_the_way_it_came() {
             Bsdf::CoatedDiffuse(_) | Bsdf::CoatedConductor(_) => continue,
             // What it absorbs, and its tilt, are those of the viewer's angle.
             Bsdf::Hair(_) => continue,
+            // As far as it is measured well, and not where light leaves otherwise than it comes.
+            Bsdf::Measured(_) | Bsdf::Subsurface(_) => continue,
             // Under a coat it need not.
             Bsdf::Principled(bsdf) if bsdf.coat.weight > 0.0 => continue,
             // Each lane of a prism has an index of its own.
@@ -1141,7 +1221,7 @@ fn a_coat_looks_the_same_from_both_sides() {
 
 /// Directions, random numbers and rows of one kind, to run at any number of lanes.
 struct Columns {
-    table: Vec<f32>,
+    table: Rows,
     at: Vec<u32>,
     wo: [Vec<f32>; 3],
     wi: [Vec<f32>; 3],
@@ -1152,13 +1232,12 @@ struct Columns {
 impl Columns {
     /// The row of each lane is one of the BSDFs'; directions are of all kinds, samples of theirs and such that have no side among them.
     fn new(bsdfs: &[Bsdf], count: usize, seed: u64) -> Self {
-        let mut table = vec![f32::NAN; 5];
-        let mut starts = Vec::new();
-        for bsdf in bsdfs {
-            let row = bsdf.row();
-            starts.push(table.len() as u32);
-            table.extend_from_slice(&row);
-        }
+        let mut table = Rows::default();
+        (0..5).for_each(|_| {
+            table.push(&Bsdf::ThinDielectric(ThinDielectric { eta: f32::NAN }));
+        });
+        let starts: Vec<u32> = bsdfs.iter().map(|bsdf| table.push(bsdf)).collect();
+        assert_eq!(starts[0], 5);
         let mut random = RandomStream::new(seed);
         let mut columns = Self {
             table,
@@ -1212,7 +1291,8 @@ impl<K: Kind> Job for Scattering<'_, K> {
                 bits |= u32::from(columns.regularized[start + lane]) << lane;
             }
             let at = R::UInt::from_slice(&columns.at[start..]);
-            let bsdf = K::Lanes::<R>::load(&columns.table, at).regularized(R::Mask::from_bitmask(bits));
+            let bsdf: K::Lanes<R> = columns.table.load(at);
+            let bsdf = bsdf.regularized(R::Mask::from_bitmask(bits));
             let (wo, wi) = (load::<R>(&columns.wo, start), load(&columns.wi, start));
             let V3 { x: lobe, y: u, z: v } = load(&columns.u, start);
             let (value, pdf) = bsdf.eval(wo, wi);
@@ -1385,7 +1465,8 @@ kinds! {
     DiffuseKind = DiffuseLanes, DiffuseTransmissionKind = DiffuseTransmissionLanes, ConductorKind = ConductorLanes,
     DielectricKind = DielectricLanes, ThinDielectricKind = ThinDielectricLanes,
     CoatedDiffuseKind = CoatedDiffuseLanes, CoatedConductorKind = CoatedConductorLanes,
-    PrincipledKind = PrincipledLanes, UberKind = UberLanes, HairKind = HairLanes
+    PrincipledKind = PrincipledLanes, UberKind = UberLanes, HairKind = HairLanes, MeasuredKind = MeasuredLanes,
+    SubsurfaceKind = SubsurfaceLanes
 }
 
 #[test]
@@ -1420,6 +1501,14 @@ fn lanes_scatter_as_scalar_code_does_to_the_bit() {
     });
     assert_lanes_agree::<PrincipledKind>(BsdfKind::Principled, |random| {
         Bsdf::Principled(Box::new(random_principled(random)))
+    });
+    let tables = [measured((0.4, 0.4)), measured((0.2, 0.2)), measured((0.5, 0.25))];
+    assert_lanes_agree::<MeasuredKind>(BsdfKind::Measured, |random| {
+        Bsdf::Measured(tables[(3.0 * random.next_f32()) as usize].clone())
+    });
+    assert_lanes_agree::<SubsurfaceKind>(BsdfKind::Subsurface, |random| {
+        let face = Dielectric { eta: 1.05 + random.next_f32(), facets: random_facets(random) };
+        Bsdf::Subsurface(Subsurface::new(face))
     });
     assert_lanes_agree::<UberKind>(BsdfKind::Uber, |random| {
         let mut part = || {

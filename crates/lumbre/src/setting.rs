@@ -243,6 +243,7 @@ impl Setting {
                 CameraKind::Perspective { .. } => (&["fov", "lensradius", "focaldistance"], "perspective"),
                 CameraKind::Orthographic { .. } => (&["lensradius", "focaldistance"], "orthographic"),
                 CameraKind::Spherical { .. } => (&[], "spherical"),
+                CameraKind::Realistic(_) => (&[], "realistic"),
             };
             let slot = match (&mut camera.kind, &*self.parameter) {
                 (CameraKind::Perspective { fov, .. }, "fov") => Slot::Double(fov, Range(0.001, 179.0)),
@@ -424,7 +425,8 @@ pub(crate) fn material_parameters(kind: &MaterialKind) -> &'static [&'static str
             HairColour::Melanin { .. } => &["eumelanin", "pheomelanin", "eta", "beta_m", "beta_n", "alpha"],
         },
         MaterialKind::Mix { .. } => &["amount"],
-        MaterialKind::Interface => &[],
+        MaterialKind::Subsurface(_) => &["eta", "roughness", "uroughness", "vroughness", "g", "scale"],
+        MaterialKind::Measured(_) | MaterialKind::Interface => &[],
     }
 }
 
@@ -461,6 +463,15 @@ pub(crate) fn material_slot<'m>(kind: &'m mut MaterialKind, name: &str) -> Optio
             ("beta_m", _) => Slot::Number(&mut params.beta_m, UNIT),
             ("beta_n", _) => Slot::Number(&mut params.beta_n, UNIT),
             ("alpha", _) => Slot::Number(&mut params.alpha, Range(-90.0, 90.0)),
+            _ => return None,
+        },
+        (Kind::Subsurface(params), name) => match name {
+            "eta" => Slot::Plain(&mut params.eta, Range(0.1, 10.0)),
+            "g" => Slot::Plain(&mut params.asymmetry, Range(-0.99, 0.99)),
+            "scale" => Slot::Plain(&mut params.scale, FROM_ZERO),
+            "roughness" => Slot::Roughness(&mut params.roughness),
+            "uroughness" => Slot::Number(&mut params.roughness.u, FROM_ZERO),
+            "vroughness" => Slot::Number(&mut params.roughness.v, FROM_ZERO),
             _ => return None,
         },
         (Kind::Uber(params), name) => match name {

@@ -14,11 +14,7 @@ use lumbre::formats::{Budget, Diagnostics, Limits, pbrt};
 
 /// Scenes that are not as expected yet. One that is has to be taken off.
 const NOT_YET: &[&str] = &[
-    "camera-realistic-sky",
     "dispersion-prism",
-    "film-sensor-canon",
-    "measured-lit",
-    "measured-sky",
     // Negative lanes and reflectances above 1 are clipped; saturated colours are 0.45 % off.
     "spectra-metals",
     "spectra-reflectance",

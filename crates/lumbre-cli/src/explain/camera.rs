@@ -61,6 +61,11 @@ fn kind(kind: &CameraKind, texts: &Texts) -> String {
         }
         CameraKind::Orthographic { .. } => texts.orthographic.to_owned(),
         CameraKind::Spherical { .. } => texts.spherical.to_owned(),
+        CameraKind::Realistic(lens) => {
+            let mm = [lens.focal_length(), lens.film_distance(), lens.diagonal()];
+            let mm = mm.map(|metres| super::document::exact((1e6 * metres).round() / 1e3));
+            filled(texts.realistic, &[&mm[0], &mm[1], &mm[2]])
+        }
     }
 }
 
@@ -83,7 +88,7 @@ fn projection(
             is_centred.then(|| perspective(fovy, (high.x - low.x) / (low.y - high.y), NEAR, FAR))??
         }
         CameraKind::Orthographic { .. } => orthographic(low.x, high.x, high.y, low.y, NEAR, FAR)?,
-        CameraKind::Spherical { .. } => return None,
+        CameraKind::Spherical { .. } | CameraKind::Realistic(_) => return None,
     };
     Some((matrix, label))
 }

@@ -26,6 +26,7 @@ pub(super) static SPANISH: Texts = Texts {
     lens: "con una lente de radio {0} enfocada a {1}",
     orthographic: "ortográfica",
     spherical: "esférica, todas las direcciones a la vez",
+    realistic: "un objetivo real de distancia focal {0} mm, a {1} mm de la película, cuya diagonal mide {2} mm",
     pixel: "píxel",
     film_point: "punto de la película, en píxeles desde la esquina superior izquierda",
     screen_point: "punto de la pantalla (a distancia 1 en una perspectiva)",

@@ -30,6 +30,7 @@ pub(super) struct Texts {
     pub(super) lens: &'static str,
     pub(super) orthographic: &'static str,
     pub(super) spherical: &'static str,
+    pub(super) realistic: &'static str,
     pub(super) pixel: &'static str,
     pub(super) film_point: &'static str,
     pub(super) screen_point: &'static str,

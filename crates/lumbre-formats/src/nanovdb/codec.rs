@@ -6,7 +6,7 @@ use std::io::Read;
 
 use flate2::read::ZlibDecoder;
 
-use super::bytes::Bytes;
+use crate::bytes::Bytes;
 use crate::diagnostic::FormatError;
 
 /// How a grid is packed.

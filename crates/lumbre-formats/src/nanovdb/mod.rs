@@ -3,7 +3,6 @@
 //! K. Museth, "NanoVDB: A GPU-Friendly and Portable VDB Data Structure For Real-Time Rendering And Simulation", SIGGRAPH Talks 2021. Read
 //! are grids of single and double precision and of quantised numbers that are fog volumes; they stay as sparse as they are stored.
 
-mod bytes;
 mod codec;
 mod tree;
 
@@ -20,7 +19,7 @@ use lumbre_shading::medium::SparseGrid;
 use crate::budget::{Budget, Hold};
 use crate::diagnostic::{FormatError, quoted};
 
-use bytes::Bytes;
+use crate::bytes::Bytes;
 use codec::Codec;
 
 /// A grid of numbers, and where it is.

@@ -6,9 +6,9 @@ use lumbre_math::glam::{DAffine3, DMat3, IVec3};
 use lumbre_math::{DVec3, Transform};
 use lumbre_shading::medium::{Brick, SparseGrid};
 
-use super::bytes::Bytes;
 use super::{GRID_HEADER, NanoGrid, Values, check_version};
 use crate::budget::Budget;
+use crate::bytes::Bytes;
 use crate::diagnostic::FormatError;
 
 /// Voxels along a side of what a root, an upper and a lower node list.

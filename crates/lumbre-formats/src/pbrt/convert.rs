@@ -11,12 +11,14 @@ use lumbre_scene::{
     FilmDesc, GeometryDesc, InstanceDesc, MaterialId, MediumId, MeshDesc, NamedMaterial, ObjectDesc,
     ObjectId, Placement, SamplerDesc, SceneDesc, ShapeDesc, WithoutLight,
 };
+use lumbre_shading::measured::MeasuredTables;
 use lumbre_shading::medium::Medium;
 use lumbre_shading::{
     FloatTexture, Material, MipMap, PrincipledParams, Spectrum, SpectrumTexture, Texture, TextureValue,
 };
 
 use super::images::ImageKey;
+use super::lens::LensLater;
 use super::params::{Param, Params};
 use super::parser;
 use super::shapes::ReadMeshes;
@@ -56,6 +58,8 @@ pub(super) struct Converter<'b, 'd> {
     pub media: Vec<MediumSlot>,
     pub medium_names: HashMap<Arc<str>, MediumId>,
     pub images: HashMap<ImageKey, Arc<MipMap>>,
+    /// Measured materials by their files.
+    pub measured: HashMap<PathBuf, Arc<MeasuredTables>>,
     /// Images that are missing, when lenient.
     pub missing: HashSet<PathBuf>,
     /// The first pixels of each image file.
@@ -63,6 +67,8 @@ pub(super) struct Converter<'b, 'd> {
     /// Mesh files to be read at the end, and their indices by path.
     pub mesh_files: Vec<MeshFile>,
     pub mesh_paths: HashMap<PathBuf, usize>,
+    /// What moves the vertices of mesh files, by their indices, and where that is asked for.
+    pub displaced: HashMap<usize, (Displaced, Spot)>,
     /// Emissive shapes whose material is not yet known to be a surface.
     pub lights_to_check: Vec<(MaterialId, Spot)>,
     /// Meshes in CSG shapes, which can be checked only after they are read.
@@ -71,6 +77,12 @@ pub(super) struct Converter<'b, 'd> {
     /// The times of the two current transforms.
     pub transform_times: [f64; 2],
     pub exposure: Exposure,
+    /// The lens of the camera, which needs the film.
+    pub lens: Option<LensLater>,
+    /// A factor on the edges of displaced meshes.
+    pub displaced_edge_scale: f64,
+    /// The diagonal of the film, in millimetres.
+    pub film_diagonal: f64,
     upgraded: Option<Spot>,
 }
 
@@ -108,6 +120,13 @@ pub(super) struct MeshFile {
     pub path: PathBuf,
     pub spot: Spot,
     pub placeholder: Arc<MeshDesc>,
+}
+
+/// A displacement whose texture may be defined later.
+pub(super) struct Displaced {
+    pub texture: std::result::Result<FloatArc, Box<Param>>,
+    pub edge_length: f64,
+    pub world_from_object: Transform,
 }
 
 /// The exposure settings, which camera and film share.
@@ -182,15 +201,20 @@ impl<'b, 'd> Converter<'b, 'd> {
             media: Vec::new(),
             medium_names: HashMap::new(),
             images: HashMap::new(),
+            measured: HashMap::new(),
             missing: HashSet::new(),
             bitmaps: HashMap::new(),
             mesh_files: vec![],
             mesh_paths: HashMap::new(),
+            displaced: HashMap::new(),
             lights_to_check: vec![],
             meshes_to_close: vec![],
             sampler_seed: None,
             transform_times: [0.0, 1.0],
             exposure: Exposure { shutter: 1.0, iso: 100.0, scale: 1.0 },
+            lens: None,
+            displaced_edge_scale: 1.0,
+            film_diagonal: 35.0,
             upgraded: None,
         }
     }

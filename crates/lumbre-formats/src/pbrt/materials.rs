@@ -6,22 +6,24 @@ use lumbre_image::Encoding;
 use lumbre_math::Vec2;
 use lumbre_scene::MaterialId;
 use lumbre_shading::hair::{HairColour, HairParams};
+use lumbre_shading::medium::{preset, preset_names};
 use lumbre_shading::spectrum::conductor_rgb;
+use lumbre_shading::subsurface::{Inside, SubsurfaceParams};
 use lumbre_shading::uber::UberParams;
 use lumbre_shading::{
     ImageFilter, ImageTexture, Mapping2d, Material, MaterialKind, Metal, NamedSpectrum, Roughness, Spectrum,
     SpectrumTexture, SpectrumValue, Texture, Wrap,
 };
 
-use super::convert::{Converter, FloatArc, SpectrumArc};
+use super::convert::{Converter, FloatArc, Known, SpectrumArc, file_fault};
 use super::params::{Params, Type, Values};
 use super::source::{Result, Spot};
 use super::textures::{SpectrumUse, single};
-use crate::Diagnostic;
 use crate::diagnostic::quoted;
+use crate::{Diagnostic, Input, measured};
 
 /// The material types of pbrt-v4.
-pub(super) const KNOWN: [&str; 13] = [
+pub(super) const KNOWN: [&str; 14] = [
     "diffuse",
     "coateddiffuse",
     "coatedconductor",
@@ -35,6 +37,7 @@ pub(super) const KNOWN: [&str; 13] = [
     "measured",
     "subsurface",
     "principled",
+    "openpbr",
 ];
 
 /// The maximal depth of nested mixtures.
@@ -204,7 +207,9 @@ impl Converter<'_, '_> {
             }
             "principled" => self.principled(params)?,
             "hair" => self.hair(params)?,
-            "measured" | "subsurface" | "openpbr" => self.replaced_material(ty, params)?,
+            "measured" => self.measured(params)?,
+            "subsurface" => self.subsurface(params, "reflectance", 1.33)?,
+            "openpbr" => self.openpbr(params)?,
             _ => match self.old_material(ty, params)? {
                 Some(kind) => {
                     self.upgraded(spot);
@@ -220,20 +225,95 @@ impl Converter<'_, '_> {
         Ok(Some((kind, depth)))
     }
 
-    /// The diffuse material that replaces one that is not rendered yet, with a warning.
-    fn replaced_material(&mut self, ty: &str, params: &Params) -> Result<MaterialKind> {
-        let base_color = match ty {
-            "openpbr" => self.spectrum_texture(params, "base_color", SpectrumUse::Reflectance)?,
-            _ => None,
+    /// A measured material by its file.
+    fn measured(&mut self, params: &Params) -> Result<MaterialKind> {
+        let Some(filename) = params.typed("filename", &[Type::String])? else {
+            let wrong = Diagnostic::error(format!("{} has no file", params.owner));
+            let wrong = wrong.expected("\"string filename\" with a .bsdf file of the RGL material database");
+            return Err(params.spot.wrong(wrong));
         };
-        let kind = match base_color {
-            Some(known) => MaterialKind::Diffuse { reflectance: known.texture },
-            None => self.diffuse(params)?,
+        let at = filename.spot;
+        let path = self.resolve(filename.one_string()?, at)?;
+        if let Some(known) = self.measured.get(&path) {
+            return Ok(MaterialKind::Measured(known.clone()));
+        }
+        let fault = |error| file_fault(at, error);
+        let input = Input::open(&path, self.budget).map_err(fault)?;
+        let tables = Arc::new(measured::read(&input, input.name(), self.budget).map_err(fault)?);
+        self.keep(path.as_os_str().len() + 128, "measured materials", at)?;
+        self.measured.insert(path, tables.clone());
+        Ok(MaterialKind::Measured(tables))
+    }
+
+    /// A body that light wanders through; `reflectance` names the parameter of its albedo.
+    fn subsurface(
+        &mut self,
+        params: &Params,
+        reflectance: &'static str,
+        default_eta: f32,
+    ) -> Result<MaterialKind> {
+        let mut asymmetry = params.float("g", 0.0)?;
+        if !(-1.0 < asymmetry && asymmetry < 1.0) {
+            return params.out_of_range("g", asymmetry, "more than -1 and less than 1");
+        }
+        let scale = params.float_above("scale", 1.0, 0.0)? as f32;
+        let has = |name| params.find(name).is_some();
+        let of_old = reflectance == "Kd";
+        let usage = SpectrumUse::Coefficient;
+        let inside = if let Some(name) = params.string("name")?.map(str::to_owned) {
+            let Some((scattering, absorption)) = preset(&name) else {
+                let wrong = Diagnostic::error(format!("unknown medium {}", quoted(&name)));
+                let wrong = wrong.suggest(&name, preset_names());
+                return Err(params.spot_of("name").wrong(wrong.expected("the name of a measured medium")));
+            };
+            params.ignore(&["sigma_a", "sigma_s", "mfp"]);
+            params.ignore(&[reflectance]);
+            if asymmetry != 0.0 {
+                let message = "measured media scatter evenly in all directions: g is left out";
+                self.note(params.spot_of("g"), message);
+                asymmetry = 0.0;
+            }
+            Inside::Coefficients { absorption: constant(absorption), scattering: constant(scattering) }
+        } else if !of_old && (has("sigma_a") || has("sigma_s")) {
+            for (given, missing) in [("sigma_a", "sigma_s"), ("sigma_s", "sigma_a")] {
+                if !has(missing) {
+                    let wrong = Diagnostic::error(format!("{} without {}", quoted(given), quoted(missing)));
+                    return Err(params.spot_of(given).wrong(wrong.expected("both or neither")));
+                }
+            }
+            params.ignore(&["mfp"]);
+            params.ignore(&[reflectance]);
+            Inside::Coefficients {
+                absorption: self.spectrum_texture_or(params, "sigma_a", usage, 1.0)?,
+                scattering: self.spectrum_texture_or(params, "sigma_s", usage, 1.0)?,
+            }
+        } else if of_old || has(reflectance) {
+            let mean_free_path = self.spectrum_texture(params, "mfp", usage)?;
+            if let Some(path) = mean_free_path.as_ref().and_then(Known::value)
+                && path.min_component() <= 0.0
+            {
+                return params.out_of_range("mfp", f64::from(path.min_component()), "more than 0");
+            }
+            Inside::Reflectance {
+                reflectance: self.reflectance(params, reflectance, 0.5)?,
+                mean_free_path: mean_free_path
+                    .map_or_else(|| constant(Spectrum::splat(1.0)), |known| known.texture),
+            }
+        } else {
+            params.ignore(&["mfp"]);
+            // Whole milk, per millimetre.
+            Inside::Coefficients {
+                absorption: constant(Spectrum::new(0.0011, 0.0024, 0.014)),
+                scattering: constant(Spectrum::new(2.55, 3.21, 3.77)),
+            }
         };
-        params.ignore_all();
-        let message = format!("material {} is not rendered yet: a diffuse one takes its place", quoted(ty));
-        self.note(params.spot, message);
-        Ok(kind)
+        Ok(MaterialKind::Subsurface(Box::new(SubsurfaceParams {
+            inside,
+            scale,
+            asymmetry: asymmetry as f32,
+            eta: self.index_of_refraction(params, "eta", default_eta)?,
+            roughness: self.roughness(params, ROUGHNESS, 0.0)?,
+        })))
     }
 
     // Parts.
@@ -590,11 +670,15 @@ impl Converter<'_, '_> {
                 }
             }
             "disney" => self.disney(params)?,
-            "fourier" | "kdsubsurface" => {
+            "kdsubsurface" => {
+                dropped(self, &["Kr", "Kt"]);
+                self.subsurface(params, "Kd", 1.3)?
+            }
+            "fourier" => {
                 let reflectance = self.reflectance(params, "Kd", 0.5)?;
                 params.ignore_all();
-                let message =
-                    format!("material {} is not rendered yet: a diffuse one takes its place", quoted(ty));
+                let message = "tabulated Fourier series are of pbrt-v3 alone and are not read: a diffuse material takes \
+                               the place of \"fourier\"";
                 self.note(spot, message);
                 MaterialKind::Diffuse { reflectance }
             }

@@ -13,12 +13,16 @@
 mod colour;
 mod convert;
 mod curves;
+mod displacement;
 mod exact_shapes;
 mod images;
+mod lens;
 mod lexer;
 mod lights;
 mod materials;
 mod media;
+mod old_shapes;
+mod openpbr;
 #[cfg(test)]
 mod pages;
 mod params;

@@ -77,6 +77,10 @@ fn sample(page: &str, row: &Row) -> &'static str {
         (_, "indices") => "0 1 2",
         (_, "faceIndices") => "5",
         ("uniformgrid", "density" | "temperature" | "Lescale") => "0.5",
+        ("measured", "filename") => r#""images/satin.bsdf""#,
+        ("realistic", "lensfile") => r#""images/triplet.txt""#,
+        ("realistic", "aperture") => r#""star""#,
+        ("subsurface", "name") => r#""Skin1""#,
         ("nanovdb", "filename") => r#""images/cloud.nvdb""#,
         ("homogeneous", "preset") => r#""Wholemilk""#,
         (_, "encoding") => r#""linear""#,
@@ -95,6 +99,9 @@ fn sample(page: &str, row: &Row) -> &'static str {
 fn context(row: &Row) -> &'static str {
     match &*row.name {
         "v1" | "v2" => " \"string mapping\" \"planar\"",
+        "mfp" => " \"rgb reflectance\" [0.5 0.5 0.5]",
+        "sigma_a" if row.default.is_none() => " \"rgb sigma_s\" [1 1 1]",
+        "sigma_s" if row.default.is_none() => " \"rgb sigma_a\" [1 1 1]",
         _ => "",
     }
 }

@@ -1,25 +1,60 @@
 //! What cameras make of colours: for each camera, and for each temperature of the light that it takes for white, the matrix from the linear
-//! Rec. 709 of light to that of the picture which comes nearest to the camera's over a set of common reflectances.
+//! Rec. 709 of light to that of the picture which comes nearest to the camera's over a set of common reflectances. Grey is exact.
 //!
 //! Computed from the spectral sensitivities of PhysLight, by Anders Langlands and Luca Fascione, which are licensed under the Apache
 //! License, Version 2.0 (<https://www.apache.org/licenses/LICENSE-2.0>). "Physlight: An End-to-End Pipeline for Scene-Referred Lighting",
 //! SIGGRAPH 2020 Talks.
 
-use lumbre_math::DMat3;
+mod curves;
+
+use lumbre_math::{DMat3, DVec3};
+use lumbre_shading::spectrum::response_to_d65;
+
+use super::colour;
+use curves::{CURVES, Curves, FIRST_NM, STEP_NM};
 
 /// The temperatures of the matrices, in kelvin.
 const KELVIN: [f64; 12] =
     [2800.0, 3200.0, 3600.0, 4000.0, 4500.0, 5000.0, 5500.0, 6000.0, 6500.0, 7500.0, 9000.0, 12_000.0];
 
 /// The matrix of a camera for light of this temperature, between those of the temperatures beside it in steps of 1/T, and as at the end
-/// of the table beyond; `None` for an unknown camera.
+/// of the table beyond; `None` for an unknown camera. Grey under D65 becomes what the camera makes of that spectrum; the rest comes as near
+/// as three channels can.
 pub(super) fn matrix(name: &str, kelvin: f64) -> Option<DMat3> {
     let (_, matrices) = SENSORS.iter().find(|(known, _)| *known == name)?;
-    let after = KELVIN.partition_point(|&of_table| of_table <= kelvin).clamp(1, KELVIN.len() - 1);
-    let (low, high) = (1.0 / KELVIN[after - 1], 1.0 / KELVIN[after]);
-    let t = ((1.0 / kelvin - low) / (high - low)).clamp(0.0, 1.0);
+    let curves = CURVES.iter().find(|known| known.name == name)?;
     let rows = |i: usize| DMat3::from_cols_array(&matrices[i].map(f64::from)).transpose();
-    Some(rows(after - 1) * (1.0 - t) + rows(after) * t)
+    let fitted = |kelvin| {
+        let (low, high, t) = between(&KELVIN, kelvin);
+        rows(low) * (1.0 - t) + rows(high) * t
+    };
+    // By how much the fit is off for grey, at the temperatures for which that is known.
+    let missed = |i: usize| white(curves, i) / (fitted(curves::KELVIN[i]) * DVec3::ONE);
+    let (low, high, t) = between(&curves::KELVIN, kelvin);
+    let missed = missed(low) * (1.0 - t) + missed(high) * t;
+    Some(DMat3::from_diagonal(missed) * fitted(kelvin))
+}
+
+/// The temperatures of a table about one, and the share of the second in steps of 1/T.
+fn between(table: &[f64], kelvin: f64) -> (usize, usize, f64) {
+    let after = table.partition_point(|&of_table| of_table <= kelvin).clamp(1, table.len() - 1);
+    let (low, high) = (1.0 / table[after - 1], 1.0 / table[after]);
+    (after - 1, after, ((1.0 / kelvin - low) / (high - low)).clamp(0.0, 1.0))
+}
+
+/// The colour that a camera gives to light of the spectrum of D65 and luminance 1, for white light of one of its temperatures.
+fn white(curves: &Curves, temperature: usize) -> DVec3 {
+    let response = |channel: usize| {
+        response_to_d65(|nm| {
+            let curve = &curves.rgb[channel];
+            let place = ((nm - FIRST_NM) / STEP_NM).clamp(0.0, (curve.len() - 1) as f64);
+            let low = (place as usize).min(curve.len() - 2);
+            f64::from(curve[low]) + f64::from(curve[low + 1] - curve[low]) * (place - low as f64)
+        })
+    };
+    let recorded = DVec3::new(response(0), response(1), response(2));
+    let xyz = DMat3::from_cols_array(&curves.xyz[temperature].map(f64::from)).transpose() * recorded;
+    DVec3::from_array(colour::rgb_from_xyz(xyz.to_array()))
 }
 
 /// The names of the cameras.
@@ -278,15 +313,25 @@ mod tests {
     fn matrices_are_those_of_the_table_and_between_them() {
         let near = |a: DMat3, b: DMat3| (a - b).to_cols_array().iter().all(|d| d.abs() < 1e-6);
         let of = |kelvin| matrix("nikon_d850", kelvin).unwrap();
-        // White stays white at the temperature that is taken for white, and grey at 6500 K for every camera.
+        // Grey stays about grey at 6500 K for every camera.
         for name in names() {
-            let grey = matrix(name, 6500.0).unwrap() * lumbre_math::DVec3::ONE;
-            assert!((grey - 1.0).abs().max_element() < 0.01, "{name}: {grey}");
+            let grey = matrix(name, 6500.0).unwrap() * DVec3::ONE;
+            assert!((grey - 1.0).abs().max_element() < 0.03, "{name}: {grey}");
         }
-        let middle = 1.0 / (0.5 / 5000.0 + 0.5 / 5500.0);
-        assert!(near(of(middle), (of(5000.0) + of(5500.0)) * 0.5));
+        let middle = 1.0 / (0.5 / 6000.0 + 0.5 / 6500.0);
+        let step = |i: usize| of([6000.0, middle, 6500.0][i]);
+        assert!((step(1) - (step(0) + step(2)) * 0.5).to_cols_array().iter().all(|d| d.abs() < 1e-4));
         assert!(near(of(2.0), of(2800.0)) && near(of(1e6), of(12_000.0)));
         assert!(of(3200.0).z_axis.z > 2.0 && of(3200.0).x_axis.x < 0.8);
         assert!(matrix("nikon", 6500.0).is_none());
+        assert!(CURVES.iter().map(|curves| curves.name).eq(names()));
+    }
+
+    #[test]
+    fn a_camera_gives_grey_the_colour_that_its_sensitivities_do() {
+        // Integrated elsewhere: light of 0.7 under D65.
+        let grey = matrix("canon_eos_5d_mkiv", 6500.0).unwrap() * DVec3::splat(0.7);
+        let expected = DVec3::new(0.69442, 0.6951, 0.68963);
+        assert!(((grey - expected) / expected).abs().max_element() < 1e-3, "{grey}");
     }
 }

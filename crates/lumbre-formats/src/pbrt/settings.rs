@@ -57,6 +57,7 @@ impl Converter<'_, '_> {
                 wrong.expected(format!("shutterclose after shutteropen = {}", number(shutter_open))),
             ));
         }
+        self.lens = None;
         self.exposure.shutter = shutter_close - shutter_open;
         let frame_aspect = params.float_opt("frameaspectratio")?;
         if let Some(aspect) = frame_aspect.filter(|a| *a <= 0.0) {
@@ -102,11 +103,7 @@ impl Converter<'_, '_> {
                 CameraKind::Spherical { mapping: SphericalMapping::Equirectangular }
             }
             "realistic" => {
-                params.ignore_all();
-                self.note(
-                    spot,
-                    "camera \"realistic\" is not rendered yet: a perspective one takes its place",
-                );
+                self.lens = Some(self.lens(&params)?);
                 perspective(90.0)
             }
             _ => {
@@ -192,8 +189,7 @@ impl Converter<'_, '_> {
         if max_component <= 0.0 {
             return params.out_of_range("maxcomponentvalue", max_component, "more than 0");
         }
-        // The diagonal is for the realistic camera only.
-        params.ignore(&["diagonal"]);
+        self.film_diagonal = params.float_above("diagonal", 35.0, 0.0)?;
         let single_precision = !params.boolean("savefp16", true)?;
         if space != ColourSpace::REC709 {
             self.note(spot, "a film in another colour space is not made yet: the picture is in that of sRGB");
@@ -228,9 +224,6 @@ impl Converter<'_, '_> {
                 let known = sensors::names().chain([CIE1931]);
                 return Err(params.spot_of("sensor").wrong(wrong.suggest(&name, known)));
             };
-            let message =
-                format!("colours are about those of sensor {}: its spectra are not rendered", quoted(&name));
-            self.note(params.spot_of("sensor"), message);
             Some(matrix)
         };
         let Some(matrix) = matrix else {
@@ -425,7 +418,15 @@ impl Converter<'_, '_> {
                 }
             },
             // No effect: there is no GPU pass, and nothing to gain from another space.
-            "wavefront" | "rendercoordsys" | "displacementedgescale" => {}
+            "displacementedgescale" => {
+                let scale = parse_number(value.as_bytes()).filter(|scale| 0.0 < *scale && scale.is_finite());
+                let Some(scale) = scale else {
+                    let wrong = Diagnostic::error("wrong value of the option \"displacementedgescale\"");
+                    return Err(at.wrong(wrong.found(quoted(value)).expected("a number above 0")));
+                };
+                self.displaced_edge_scale = scale;
+            }
+            "wavefront" | "rendercoordsys" => {}
             "pixelstats" | "msereferenceimage" | "msereferenceout" => {
                 self.note(at, format!("the option {} is left out: it is not of the picture", quoted(name)));
             }
@@ -468,6 +469,7 @@ impl Converter<'_, '_> {
         if let Some(seed) = self.sampler_seed {
             self.scene.sampler.seed = seed;
         }
+        self.finish_lens()?;
         if self.scene.cameras.is_empty() {
             self.scene.cameras.push(Camera {
                 name: None,

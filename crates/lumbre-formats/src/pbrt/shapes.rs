@@ -8,8 +8,9 @@ use lumbre_math::{DVec3, Transform, Vec2, Vec3, Vec4};
 use lumbre_scene::{CsgDesc, CsgOperation, GeometryDesc, MaterialId, MeshDesc, ShapeDesc};
 use lumbre_shading::Texture;
 
-use super::convert::{Converter, MeshFile, file_fault};
+use super::convert::{Converter, Displaced, MeshFile, file_fault};
 use super::curves::joined;
+use super::displacement::{Displacement, Refused};
 use super::exact_shapes::exact_shape;
 use super::params::{Param, Params, Type};
 use super::source::{AtSpot, Fault, Result, Spot};
@@ -87,7 +88,7 @@ impl Converter<'_, '_> {
             _ => self.float_texture(&params, "alpha")?,
         };
         let alpha = alpha.filter(|alpha| !matches!(**alpha, Texture::Constant(v) if v == 1.0));
-        let Some(form) = self.form(ty, &params)? else {
+        let Some(form) = self.form(ty, &params, state)? else {
             params.ignore_all();
             return Ok(());
         };
@@ -188,7 +189,7 @@ impl Converter<'_, '_> {
     }
 
     /// The geometry of a shape; `None` for one that is ignored with a warning.
-    fn form(&mut self, ty: &str, params: &Params) -> Result<Option<Form>> {
+    fn form(&mut self, ty: &str, params: &Params, state: &State) -> Result<Option<Form>> {
         if let Some(made) = exact_shape(ty, params)? {
             return match made {
                 Ok(shape) => Ok(Some(GeometryDesc::Exact(shape).into())),
@@ -203,14 +204,16 @@ impl Converter<'_, '_> {
             "csg" => self.csg(params).map(Some),
             "trianglemesh" => Ok(self.triangle_mesh(params)?.map(Form::from)),
             "bilinearmesh" => Ok(self.bilinear_mesh(params)?.map(Form::from)),
-            "plymesh" => self.ply_mesh(params).map(|g| Some(g.into())),
+            "plymesh" => self.ply_mesh(params, &state.ctm[0]).map(|g| Some(g.into())),
             "loopsubdiv" => self.loop_subdivision(params).map(|mesh| Some(mesh.into())),
             "curve" => self.curve(params).map(|curve| Some(curve.into())),
-            "heightfield" | "nurbs" => {
+            "heightfield" => {
                 self.upgraded(params.spot);
-                let message = format!("shape {} of pbrt-v3 is not rendered: it is left out", quoted(ty));
-                self.note(params.spot, message);
-                Ok(None)
+                self.heightfield(params).map(|mesh| Some(mesh.into()))
+            }
+            "nurbs" => {
+                self.upgraded(params.spot);
+                self.nurbs(params).map(|mesh| Some(mesh.into()))
             }
             _ => {
                 self.unknown(params.spot, "shape", ty, KNOWN, "it is left out");
@@ -514,7 +517,7 @@ impl Converter<'_, '_> {
     }
 
     /// A mesh from a file, which is read at the end with the others.
-    fn ply_mesh(&mut self, params: &Params) -> Result<GeometryDesc> {
+    fn ply_mesh(&mut self, params: &Params, world_from_object: &Transform) -> Result<GeometryDesc> {
         let Some(filename) = params.string("filename")?.map(str::to_owned) else {
             return Err(params.spot.error("a plymesh has no \"string filename\""));
         };
@@ -528,11 +531,25 @@ impl Converter<'_, '_> {
                 at,
             )?;
         }
-        if params.find("displacement").is_some() {
-            let message = "displacement of a plymesh is not rendered yet: the mesh stays as it is";
-            self.note(params.spot_of("displacement"), message);
+        let edge_length = params.float_above("edgelength", 1.0, 0.0)? * self.displaced_edge_scale;
+        let texture = match params.find("displacement") {
+            Some(param) if self.is_texture_to_come(param) => {
+                self.keep(size_of::<Param>() + param.bytes(), "textures that are not defined yet", at)?;
+                Some(Err(Box::new(param.clone())))
+            }
+            _ => self.float_texture(params, "displacement")?.map(Ok),
+        };
+        if let Some(texture) = texture {
+            // It depends on where the mesh is, so none shares it.
+            let placed = *world_from_object;
+            let displaced = Displaced { texture, edge_length, world_from_object: placed };
+            let each = size_of::<MeshFile>() + size_of::<Displaced>() + size_of::<MeshDesc>();
+            self.keep(each + filename.len() + 512, "mesh files", at)?;
+            self.displaced.insert(self.mesh_files.len(), (displaced, params.spot_of("displacement")));
+            let placeholder: Arc<MeshDesc> = Arc::default();
+            self.mesh_files.push(MeshFile { path, spot: at, placeholder: placeholder.clone() });
+            return Ok(GeometryDesc::Mesh(placeholder));
         }
-        params.ignore(&["edgelength"]);
         let file = *self.mesh_paths.entry(path.clone()).or_insert_with(|| {
             self.mesh_files.push(MeshFile { path, spot: at, placeholder: Arc::default() });
             self.mesh_files.len() - 1
@@ -574,7 +591,8 @@ impl Converter<'_, '_> {
             }
         });
         let mut meshes = HashMap::new();
-        for (file, result) in files.iter().zip(results) {
+        let displaced = std::mem::take(&mut self.displaced);
+        for (index, (file, result)) in files.iter().zip(results).enumerate() {
             // What no worker has read, as there was none or it died, is read here.
             let (mesh, diagnostics) = result.unwrap_or_else(|| read(file));
             self.diagnostics.append(diagnostics);
@@ -592,12 +610,40 @@ impl Converter<'_, '_> {
             }
             if mesh.mesh.triangles.is_empty() && mesh.mesh.quads.is_empty() {
                 self.note(file.spot, "a plymesh without faces shows nothing");
+            } else if let Some((displaced, at)) = displaced.get(&index) {
+                mesh.mesh = self.displaced(displaced, *at, &mesh)?;
             }
             meshes.insert(Arc::as_ptr(&file.placeholder), (Arc::new(mesh.mesh), mesh.origin));
         }
         // Pointers identify placeholders as long as these live.
         self.mesh_files = files;
         Ok(meshes)
+    }
+}
+
+impl Converter<'_, '_> {
+    /// The mesh of a file with its vertices moved.
+    fn displaced(&mut self, displaced: &Displaced, at: Spot, file: &PlyFile) -> Result<MeshDesc> {
+        let texture = match &displaced.texture {
+            Ok(texture) => texture.clone(),
+            Err(param) => self.texture_named(param)?.texture,
+        };
+        let displacement = Displacement {
+            texture,
+            edge_length: displaced.edge_length,
+            world_from_object: displaced.world_from_object,
+        };
+        displacement.apply(&file.mesh, file.origin, self.budget).map_err(|refused| match refused {
+            Refused::Limit(limit) => Fault::Limit(at, Box::new(limit)),
+            Refused::NoUvs => {
+                let wrong = Diagnostic::error("a mesh without texture coordinates cannot be displaced");
+                at.wrong(wrong.expected("a file with u and v of its vertices"))
+            }
+            Refused::NotFinite { vertex, point } => {
+                let wrong = Diagnostic::error(format!("the displacement takes vertex {vertex} away"));
+                at.wrong(wrong.found(format!("not a finite number at {point}")))
+            }
+        })
     }
 }
 

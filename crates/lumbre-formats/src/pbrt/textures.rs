@@ -1,6 +1,7 @@
 //! Spectra and textures.
 
 use std::collections::HashMap;
+use std::path::Path;
 use std::sync::Arc;
 
 use lumbre_image::Encoding;
@@ -197,30 +198,34 @@ impl Converter<'_, '_> {
                 return Err(at.wrong(wrong.expected("the name of a built-in spectrum or of a file")));
             }
         };
-        let input = Input::open(&path, self.budget).map_err(|e| file_fault(at, e))?;
-        let file = self.files.add(input.name().clone(), Some(at));
-        let numbers_at_most = input.len() as u64 / 2 + 1;
-        let mut lexer = Lexer::new(input, file)?;
-        // A vector that grows may be twice as long.
-        let _while_read = self
-            .budget
-            .hold(numbers_at_most * 2 * size_of::<f64>() as u64, "numbers of a spectrum")
-            .at(at)?;
-        let mut numbers = vec![];
-        while let Some(token) = lexer.next()? {
-            match parse_number(lexer.raw(token)).filter(|v| v.is_finite()) {
-                Some(v) if token.kind == TokenKind::Bare => numbers.push(v),
-                _ => {
-                    let wrong = Diagnostic::error("wrong value in a spectrum").found(lexer.shown(token));
-                    return Err(lexer.spot(token).wrong(wrong.expected("a number")));
-                }
-            }
-        }
+        let numbers = self.numbers_in_file(&path, "a spectrum", at)?;
         let pairs = pairs(&numbers).map_err(|expected| {
             let wrong = Diagnostic::error(format!("wrong spectrum {}", quoted(name)));
             at.wrong(wrong.found(format!("{} numbers", numbers.len())).expected(expected))
         })?;
         Ok(SpectrumValue::Sampled(pairs))
+    }
+
+    /// The numbers of a text file, which `what` names.
+    pub fn numbers_in_file(&mut self, path: &Path, what: &str, at: Spot) -> Result<Vec<f64>> {
+        let input = Input::open(path, self.budget).map_err(|e| file_fault(at, e))?;
+        let file = self.files.add(input.name().clone(), Some(at));
+        let numbers_at_most = input.len() as u64 / 2 + 1;
+        let mut lexer = Lexer::new(input, file)?;
+        // A vector that grows may be twice as long.
+        let most = numbers_at_most * 2 * size_of::<f64>() as u64;
+        let _while_read = self.budget.hold(most, &format!("numbers of {what}")).at(at)?;
+        let mut numbers = vec![];
+        while let Some(token) = lexer.next()? {
+            match parse_number(lexer.raw(token)).filter(|v| v.is_finite()) {
+                Some(v) if token.kind == TokenKind::Bare => numbers.push(v),
+                _ => {
+                    let wrong = Diagnostic::error(format!("wrong value in {what}")).found(lexer.shown(token));
+                    return Err(lexer.spot(token).wrong(wrong.expected("a number")));
+                }
+            }
+        }
+        Ok(numbers)
     }
 
     /// A spectrum by wavelength or as a colour, but not a texture.

@@ -10,6 +10,7 @@ pub(crate) mod gltf_ktx;
 pub(crate) mod gltf_meshopt;
 pub(crate) mod ies;
 pub(crate) mod image;
+pub(crate) mod measured;
 pub(crate) mod mesh_kinds;
 pub(crate) mod nanovdb;
 pub(crate) mod obj;
@@ -39,7 +40,7 @@ fn read_both_ways<T>(
 type Check = fn(&[u8]);
 
 /// What reads each kind of file, by the name of its fuzz target.
-pub(crate) const CHECKS: [(&str, Check); 13] = [
+pub(crate) const CHECKS: [(&str, Check); 14] = [
     ("gltf", gltf::run),
     ("gltf_buffer", gltf_buffer::run),
     ("gltf_draco", gltf_draco::run),
@@ -47,6 +48,7 @@ pub(crate) const CHECKS: [(&str, Check); 13] = [
     ("gltf_meshopt", gltf_meshopt::run),
     ("ies", ies::run),
     ("image", image::run),
+    ("measured", measured::run),
     ("mesh_kinds", mesh_kinds::run),
     ("nanovdb", nanovdb::run),
     ("obj", obj::run),

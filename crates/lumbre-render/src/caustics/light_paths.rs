@@ -264,7 +264,10 @@ impl<'s> Tracer<'s> {
                 return;
             };
             if part.crosses {
-                path.interiors.cross(vertex.material, here.front);
+                match vertex.material.interior_medium(&here.at) {
+                    Some(medium) if here.front => path.interiors.enter(vertex.material, medium),
+                    _ => path.interiors.cross(vertex.material, here.front),
+                }
             }
             path.medium = of_column(
                 sides(here.boundary, here.front, to_column(path.medium))[usize::from(part.crosses)],

@@ -13,7 +13,26 @@ use smallvec::SmallVec;
 /// the one that was entered last counts.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Interiors<'s> {
-    around: SmallVec<[&'s Material; 2]>,
+    around: SmallVec<[Solid<'s>; 2]>,
+}
+
+/// A solid around a point.
+#[derive(Clone, Copy, Debug)]
+struct Solid<'s> {
+    material: &'s Material,
+    /// What scatters light in it, as where it was entered.
+    medium: Option<HomogeneousMedium>,
+}
+
+impl<'s> Solid<'s> {
+    fn is_of(&self, material: &Material) -> bool {
+        std::ptr::eq(self.material, material)
+    }
+
+    /// σ of the law of Beer and Lambert.
+    fn attenuation(&self) -> Option<Spectrum> {
+        self.medium.map(|medium| medium.extinction).or_else(|| self.material.interior_attenuation())
+    }
 }
 
 impl<'s> Interiors<'s> {
@@ -21,20 +40,20 @@ impl<'s> Interiors<'s> {
     /// one that the path began in; until then nothing is known of it.
     pub(crate) fn arrive(&mut self, here: &Interaction<'s>, material: Option<&'s Material>) {
         if let Some(material) = material.filter(|material| !here.front && material.is_solid())
-            && !self.around.iter().any(|&solid| std::ptr::eq(solid, material))
+            && !self.around.iter().any(|solid| solid.is_of(material))
         {
-            self.around.insert(0, material);
+            self.around.insert(0, Solid { material, medium: material.interior_medium(&here.at) });
         }
     }
 
     /// What scatters light in the innermost solid.
     pub(crate) fn medium(&self) -> Option<HomogeneousMedium> {
-        self.around.last().and_then(|solid| solid.interior_medium())
+        self.around.last().and_then(|solid| solid.medium)
     }
 
     /// What is left of light after a distance inside the innermost solid.
     pub(crate) fn transmittance(&self, distance: f64) -> Spectrum {
-        let sigma = self.around.last().and_then(|solid| solid.interior_attenuation());
+        let sigma = self.around.last().and_then(Solid::attenuation);
         sigma.map_or(Spectrum::WHITE, |sigma| {
             sigma.map(|sigma| (-f64::from(sigma) * distance).exponential() as f32)
         })
@@ -47,7 +66,7 @@ impl<'s> Interiors<'s> {
 
     /// Whether light loses anything here.
     pub(crate) fn attenuates(&self) -> bool {
-        self.around.last().is_some_and(|solid| solid.interior_attenuation().is_some())
+        self.around.last().is_some_and(|solid| solid.attenuation().is_some())
     }
 
     /// Goes through a surface, into the solid behind it or out of it.
@@ -56,12 +75,21 @@ impl<'s> Interiors<'s> {
             return;
         }
         if inwards {
-            // Open meshes are entered time and again and never left.
-            if self.around.len() < 64 {
-                self.around.push(material);
-            }
-        } else if let Some(place) = self.around.iter().rposition(|&solid| std::ptr::eq(solid, material)) {
+            self.push(material, None);
+        } else if let Some(place) = self.around.iter().rposition(|solid| solid.is_of(material)) {
             self.around.remove(place);
+        }
+    }
+
+    /// Goes through a surface into a solid, in which this scatters light.
+    pub(crate) fn enter(&mut self, material: &'s Material, medium: HomogeneousMedium) {
+        self.push(material, Some(medium));
+    }
+
+    fn push(&mut self, material: &'s Material, medium: Option<HomogeneousMedium>) {
+        // Open meshes are entered time and again and never left.
+        if self.around.len() < 64 {
+            self.around.push(Solid { material, medium });
         }
     }
 
@@ -72,12 +100,12 @@ impl<'s> Interiors<'s> {
             outer.next()
         } else {
             let mut is_left = false;
-            outer.find(|&&solid| {
-                let this = !is_left && std::ptr::eq(solid, material);
+            outer.find(|solid| {
+                let this = !is_left && solid.is_of(material);
                 is_left |= this;
                 !this
             })
         };
-        solid.and_then(|solid| solid.interior_index()).unwrap_or(1.0)
+        solid.and_then(|solid| solid.material.interior_index()).unwrap_or(1.0)
     }
 }

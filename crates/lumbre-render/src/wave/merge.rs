@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 
 use lumbre_math::Vec3;
 use lumbre_shading::Spectrum;
-use lumbre_shading::lanes::{BsdfKind, LaneBsdf};
+use lumbre_shading::lanes::BsdfKind;
 use lumbre_simd::{Job, Real, UInt, V3};
 
 use crate::caustics::{Merging, Photon, radius};
@@ -175,7 +175,7 @@ impl<K: Kind> Job for MergeKind<'_, '_, K> {
             let vertex_at = R::UInt::from_slice(&merges.vertex[done..]);
             let at = R::UInt::gather(&vertices.path, vertex_at);
             let vertex = Vertex::new(vertices, vertex_at, -gather3::<R>(&paths.direction, at));
-            let bsdf = K::Bsdf::<R>::load(&vertices.rows, R::UInt::gather(&vertices.bsdf, vertex_at));
+            let bsdf: K::Bsdf<R> = vertices.rows.load(R::UInt::gather(&vertices.bsdf, vertex_at));
             let scattered = vertex.eval(&bsdf, load3(&merges.towards, done));
             let weight = (R::one() + scattered.pdf * R::from_slice(&merges.share[done..])).recip();
             let light = load3::<R>(&merges.light, done) * scattered.f * weight;

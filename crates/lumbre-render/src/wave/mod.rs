@@ -30,7 +30,8 @@ use lumbre_scene::{Crossing, Scene};
 use lumbre_shading::Spectrum;
 use lumbre_shading::lanes::{
     BsdfKind, CoatedConductorLanes, CoatedDiffuseLanes, ConductorLanes, DielectricLanes, DiffuseLanes,
-    DiffuseTransmissionLanes, HairLanes, PrincipledLanes, ThinDielectricLanes, UberLanes,
+    DiffuseTransmissionLanes, HairLanes, MeasuredLanes, PrincipledLanes, SubsurfaceLanes,
+    ThinDielectricLanes, UberLanes,
 };
 use lumbre_simd::{InstructionSet, Real};
 
@@ -206,7 +207,11 @@ impl<'s> Wave<'s> {
             }
             if let Some((solid, front)) = self.vertices.solid(vertex as usize) {
                 let path = self.vertices.path[vertex as usize] as usize;
-                self.slots.interiors[self.paths.slot[path] as usize].cross(solid, front);
+                let interiors = &mut self.slots.interiors[self.paths.slot[path] as usize];
+                match self.vertices.inside(vertex as usize) {
+                    Some(medium) if front => interiors.enter(solid, medium),
+                    _ => interiors.cross(solid, front),
+                }
             }
         }
     }
@@ -259,6 +264,8 @@ const KINDS: [BsdfKind; BsdfKind::COUNT] = [
     BsdfKind::Principled,
     BsdfKind::Uber,
     BsdfKind::Hair,
+    BsdfKind::Measured,
+    BsdfKind::Subsurface,
 ];
 
 macro_rules! kinds {
@@ -306,4 +313,6 @@ kinds!(
     Principled: PrincipledLanes,
     Uber: UberLanes,
     Hair: HairLanes,
+    Measured: MeasuredLanes,
+    Subsurface: SubsurfaceLanes,
 );

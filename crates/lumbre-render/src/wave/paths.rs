@@ -96,7 +96,7 @@ impl Slots<'_> {
     /// The ray from the camera of a sample.
     pub(crate) fn camera(&self, slot: usize) -> CameraRay {
         let footprint = self.footprints.get(slot).copied().unwrap_or_default();
-        CameraRay { ray: self.rays[slot], footprint }
+        CameraRay { ray: self.rays[slot], footprint, weight: 1.0 }
     }
 
     /// Adds a sample. In a scene with media, `medium` is what the camera stands in.

@@ -268,7 +268,7 @@ impl<'s> Shade<'_, 's> {
                 ],
                 index: R::UInt::gather(&self.slots.index, slot),
             };
-            let bsdf = B::load(&self.vertices.rows, R::UInt::gather(&self.vertices.bsdf, vertex_at));
+            let bsdf: B = self.vertices.rows.load(R::UInt::gather(&self.vertices.bsdf, vertex_at));
             let useful = lanes & !bsdf.is_delta();
             if useful.any() {
                 self.light(useful, &arrived, &bsdf, draw.light(arrived.depth));

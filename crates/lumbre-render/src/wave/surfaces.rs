@@ -5,7 +5,8 @@ use lumbre_math::Vec3;
 use lumbre_scene::light::lanes::Receiver;
 use lumbre_scene::{Footprint, Interaction};
 use lumbre_shading::medium::{DistanceSample, sample_henyey_greenstein};
-use lumbre_shading::{HomogeneousMedium, Spectrum};
+use lumbre_shading::subsurface::SubsurfaceParams;
+use lumbre_shading::{HomogeneousMedium, Material, Spectrum};
 use lumbre_simd::{UInt, V3};
 
 use crate::transport::Record;
@@ -174,6 +175,17 @@ impl<'s> Wave<'s> {
         if setting.has_solids && !self.cross_medium(path, slot, ray, here, record) {
             return;
         }
+        let mut depth = depth;
+        if let Some(body) = material.and_then(Material::subsurface)
+            && !here.front
+        {
+            if self.reflect_inside(path, slot, ray, here, body, record) {
+                return;
+            }
+            // The way below the surface does not count.
+            depth = depth.saturating_sub(1);
+            self.paths.depth[path] = depth | SCATTERED;
+        }
         let media = setting.has_media.then(|| sides(here.boundary, here.front, self.slots.medium[slot]));
         if let Some([before, _]) = media {
             self.slots.medium[slot] = before;
@@ -218,7 +230,8 @@ impl<'s> Wave<'s> {
             flags |= LIT_FROM_BELOW;
         }
         if material.is_solid() {
-            self.vertices.put_solid(material, here.front);
+            let inside = if here.front { material.interior_medium(&here.at) } else { None };
+            self.vertices.put_solid(material, here.front, inside);
         }
         self.vertices.put_bsdf(&frame, &bsdf, flags, self.cone_at(path, here));
     }
@@ -231,6 +244,47 @@ impl<'s> Wave<'s> {
         }
         let spread = f64::from(self.paths.spread[path]);
         (f64::from(self.paths.width[path]) + spread * self.hits.distance_f64(path), spread)
+    }
+
+    /// Reflects a path at the boundary of a body that it is inside of, or ends it; false where it leaves.
+    fn reflect_inside(
+        &mut self,
+        path: usize,
+        slot: usize,
+        ray: &Ray,
+        here: &Interaction<'s>,
+        body: &SubsurfaceParams,
+        record: &mut Record,
+    ) -> bool {
+        let normal = here.surface.normal;
+        let cos = here.towards_origin.dot(normal);
+        let u = self.slots.draws[slot].scattered(self.slots.distance_samples[slot]);
+        self.slots.distance_samples[slot] += 1;
+        if u.x >= body.reflected_inside(cos as f32) {
+            return false;
+        }
+        let throughput = self.paths.throughput(path);
+        if self.slots.collisions[slot] >= MAX_COLLISIONS || throughput.max_component() <= 0.0 {
+            record.note(|| Event::Ended(End::Medium));
+            return true;
+        }
+        self.slots.collisions[slot] += 1;
+        let along = ray.direction - 2.0 * ray.direction.dot(normal) * normal;
+        let (width, spread) = here.cone();
+        self.collided.push(OnePath {
+            slot: slot as u32,
+            origin: here.surface.offset_origin(along),
+            receiver: Vec3::ZERO,
+            direction: along.as_vec3().normalize(),
+            throughput,
+            eta_scale: self.paths.eta_scale[path],
+            pdf: f32::INFINITY,
+            merging: f32::INFINITY,
+            depth: self.paths.depth[path] | SCATTERED,
+            width: width as f32,
+            spread: spread as f32,
+        });
+        true
     }
 
     /// Adds the light of the surface that was found.

@@ -2,8 +2,8 @@
 
 use lumbre_geometry::Surface;
 use lumbre_math::{DVec3, Vec3};
-use lumbre_shading::lanes::BsdfKind;
-use lumbre_shading::{Bsdf, Material, ShadingFrame};
+use lumbre_shading::lanes::{BsdfKind, Rows};
+use lumbre_shading::{Bsdf, HomogeneousMedium, Material, ShadingFrame};
 use lumbre_simd::{Double, Real, V3};
 
 use crate::wave::paths::grow;
@@ -30,11 +30,13 @@ pub(crate) struct Vertices<'s> {
     pub(crate) risen: [Vec<f64>; 3],
     /// Where the row of the BSDF begins in [`Vertices::rows`].
     pub(crate) bsdf: Vec<u32>,
-    pub(crate) rows: Vec<f32>,
+    pub(crate) rows: Rows,
     /// The vertices to be shaded by the kind of their BSDF.
     pub(crate) queues: [Vec<u32>; BsdfKind::COUNT],
     /// The solids that surfaces belong to, and whether they were met from outside; none beyond the end.
     pub(crate) solids: Vec<Option<(&'s Material, bool)>>,
+    /// The media that light enters there, where a solid has one; none beyond the end.
+    inside: Vec<Option<HomogeneousMedium>>,
     /// The media where the path comes from and behind the surface, as [`crate::wave::paths::of_column`] reads them; only in a scene with
     /// media.
     pub(crate) media: [Vec<u32>; 2],
@@ -99,7 +101,7 @@ impl<R: Real> Place<R> {
 
 impl<'s> Vertices<'s> {
     /// Forgets all, with room for `len` vertices; `rows` are those of uniform materials.
-    pub(crate) fn reset(&mut self, len: usize, rows: &[f32]) {
+    pub(crate) fn reset(&mut self, len: usize, rows: &Rows) {
         self.len = 0;
         let f64s = self.point.iter_mut().chain(&mut self.risen).chain([&mut self.offset]);
         f64s.for_each(|column| grow(column, len));
@@ -111,11 +113,9 @@ impl<'s> Vertices<'s> {
         grow(&mut self.width, len);
         grow(&mut self.spread, len);
         self.media.iter_mut().for_each(|column| grow(column, len));
-        if self.rows.len() < rows.len() {
-            self.rows = rows.to_vec();
-        }
-        self.rows.truncate(rows.len());
+        self.rows.reset(rows);
         self.solids.clear();
+        self.inside.clear();
         self.queues.iter_mut().for_each(Vec::clear);
     }
 
@@ -138,8 +138,7 @@ impl<'s> Vertices<'s> {
         put(&mut self.frame_n, at, frame.n);
         self.flags[at] |= flags;
         (self.width[at], self.spread[at]) = (cone.0 as f32, cone.1 as f32);
-        self.bsdf[at] = self.rows.len() as u32;
-        self.rows.extend(bsdf.row());
+        self.bsdf[at] = self.rows.push(bsdf);
         self.queue(at, bsdf.kind());
     }
 
@@ -149,8 +148,7 @@ impl<'s> Vertices<'s> {
         put(&mut self.frame_n, at, frame.n);
         let rises = flags & FOLDS != 0 && self.flags[at] & RISES != 0;
         self.flags[at] = flags | if rises { RISES | LIT_FROM_BELOW } else { 0 };
-        self.bsdf[at] = self.rows.len() as u32;
-        self.rows.extend(bsdf.row());
+        self.bsdf[at] = self.rows.push(bsdf);
         self.queue(at, bsdf.kind());
     }
 
@@ -177,10 +175,19 @@ impl<'s> Vertices<'s> {
         self.solids.get(vertex).copied().flatten()
     }
 
-    /// Writes down the solid of the last vertex.
-    pub(crate) fn put_solid(&mut self, solid: &'s Material, front: bool) {
+    /// The medium that light enters at a vertex.
+    pub(crate) fn inside(&self, vertex: usize) -> Option<HomogeneousMedium> {
+        self.inside.get(vertex).copied().flatten()
+    }
+
+    /// Writes down the solid of the last vertex, and the medium inside.
+    pub(crate) fn put_solid(&mut self, solid: &'s Material, front: bool, inside: Option<HomogeneousMedium>) {
         self.solids.resize(self.len, None);
         self.solids[self.len - 1] = Some((solid, front));
+        if inside.is_some() {
+            self.inside.resize(self.len, None);
+            self.inside[self.len - 1] = inside;
+        }
     }
 
     /// Writes down the media on both sides of a vertex.

@@ -192,11 +192,53 @@ fn observe(mut value: impl FnMut(f64) -> f64) -> [f64; 3] {
     xyz
 }
 
+/// Each channel's response to D65.
+static WHITE: LazyLock<[f64; 3]> = LazyLock::new(|| rec709_from_xyz(observe(named::d65)));
+
 /// The mean of a spectrum over each channel's response to D65.
 fn weigh(mut value: impl FnMut(f64) -> f64) -> Spectrum {
-    static WHITE: LazyLock<[f64; 3]> = LazyLock::new(|| rec709_from_xyz(observe(named::d65)));
     let rgb = rec709_from_xyz(observe(|nm| value(nm) * named::d65(nm)));
     spectrum(std::array::from_fn(|c| rgb[c] / WHITE[c]))
+}
+
+/// What a sensor of this sensitivity by wavelength in nm records of light that has the spectrum of D65 and luminance (CIE Y) 1.
+pub fn response_to_d65(mut sensitivity: impl FnMut(f64) -> f64) -> f64 {
+    let wavelengths = || (0..=(LAST_NM - FIRST_NM) as u32).map(|i| FIRST_NM + f64::from(i));
+    let luminance: f64 = wavelengths().map(|nm| matching(nm)[1] * named::d65(nm)).sum();
+    let recorded: f64 = wavelengths().map(|nm| sensitivity(nm) * named::d65(nm)).sum();
+    recorded / luminance
+}
+
+/// For each of these ascending wavelengths in nm, what a value there adds to each channel of a spectrum that is linear between them and
+/// constant beyond, weighed as [`SpectrumValue::reflectance_rgb`] does, but not clipped. Weights of a channel sum to 1.
+pub fn channel_weights(nm: &[f32]) -> Vec<[f64; 3]> {
+    let mut weights = vec![[0.0; 3]; nm.len()];
+    let mut add = |i: usize, share: f64, light: [f64; 3]| {
+        for (weight, light) in weights[i].iter_mut().zip(light) {
+            *weight += share * light;
+        }
+    };
+    for i in 0..=(LAST_NM - FIRST_NM) as u32 {
+        let at = FIRST_NM + f64::from(i);
+        let light = matching(at).map(|response| response * named::d65(at));
+        let after = nm.partition_point(|&node| f64::from(node) <= at);
+        match (after.checked_sub(1), nm.get(after)) {
+            (None, None) => {}
+            (Some(last), None) => add(last, 1.0, light),
+            (None, Some(_)) => add(0, 1.0, light),
+            (Some(low), Some(&high)) => {
+                let from = f64::from(nm[low]);
+                let t = (at - from) / (f64::from(high) - from);
+                add(low, 1.0 - t, light);
+                add(low + 1, t, light);
+            }
+        }
+    }
+    for weight in &mut weights {
+        let rgb = rec709_from_xyz(*weight);
+        *weight = std::array::from_fn(|c| rgb[c] / WHITE[c]);
+    }
+    weights
 }
 
 /// Linear Rec. 709 from XYZ: the inverse of the matrix of the primaries of ITU-R BT.709 with D65 at (0.3127, 0.3290).
@@ -331,6 +373,20 @@ mod tests {
         assert!(close(grey.unbounded_rgb(), [0.37; 3], 1e-6));
         let white = named("stdillum-D65").illuminant_rgb();
         assert!(close(white, [1.0; 3], 1.5e-3), "{white:?}");
+    }
+
+    #[test]
+    fn channels_are_sums_of_the_values_at_nodes() {
+        let nodes = [350.0, 420.0, 433.5, 500.0, 610.0, 700.0];
+        let values = [0.3, 0.1, 0.7, 0.2, 0.9, 0.4];
+        let pairs = nodes.iter().zip(values).map(|(&nm, v)| (f64::from(nm), v)).collect();
+        let expected = SpectrumValue::Sampled(pairs).reflectance_rgb();
+        let weights = channel_weights(&nodes);
+        let sum = |values: &[f64]| {
+            spectrum(std::array::from_fn(|c| weights.iter().zip(values).map(|(w, v)| w[c] * v).sum()))
+        };
+        assert!(close(sum(&values), expected.to_array(), 1e-6), "{:?} {expected:?}", sum(&values));
+        assert!(close(sum(&[1.0; 6]), [1.0; 3], 1e-6));
     }
 
     #[test]
