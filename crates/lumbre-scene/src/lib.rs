@@ -19,6 +19,7 @@ pub mod light;
 mod listing;
 mod media;
 mod mesh;
+pub mod pov;
 mod scene;
 mod solid;
 mod stage;

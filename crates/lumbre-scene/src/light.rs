@@ -63,6 +63,8 @@ pub enum Light {
     Mesh(MeshLight),
     /// One of the two in an object that stands in the world once, moving or not.
     Placed(PlacedLight),
+    /// A light by POV-Ray's laws.
+    Pov(std::sync::Arc<crate::pov::PovLight>),
     /// A light from a point or in one direction that moves.
     Moving(MovingLight),
 }
@@ -136,6 +138,7 @@ impl Light {
             Self::Shape(light) => light.sample(&entries[light.entry as usize], from, u),
             Self::Mesh(light) => light.sample(&entries[light.entry as usize], from, u),
             Self::Placed(light) => light.sample(entries, from, time, u),
+            Self::Pov(light) => light.sample(from, u),
             Self::Moving(light) => light.sample(entries, from, time, u),
         }
     }
@@ -160,7 +163,11 @@ impl Light {
             Self::Mesh(light) => light.emitters(&entries[light.entry as usize]),
             Self::Placed(light) => light.emitter(entries).into_iter().collect(),
             Self::Moving(light) => light.emitter(entries).into_iter().collect(),
-            Self::Distant(_) | Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => Vec::new(),
+            Self::Distant(_)
+            | Self::Uniform(_)
+            | Self::Environment(_)
+            | Self::Portal(_)
+            | Self::Pov(_) => Vec::new(),
         }
     }
 
@@ -173,6 +180,7 @@ impl Light {
             | Self::Spot(_)
             | Self::Goniometric(_)
             | Self::Projection(_)
+            | Self::Pov(_)
             | Self::Uniform(_)
             | Self::Environment(_)
             | Self::Portal(_) => None,
@@ -194,7 +202,7 @@ impl Light {
             (Self::Uniform(_) | Self::Environment(_) | Self::Portal(_), Some(_))
             | (Self::Shape(_) | Self::Mesh(_) | Self::Placed(_), None)
             | (Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Projection(_), _)
-            | (Self::Distant(_) | Self::Moving(_), _) => 0.0,
+            | (Self::Distant(_) | Self::Moving(_) | Self::Pov(_), _) => 0.0,
         }
     }
 
@@ -210,6 +218,7 @@ impl Light {
             | Self::Goniometric(_)
             | Self::Projection(_)
             | Self::Distant(_)
+            | Self::Pov(_)
             | Self::Moving(_) => None,
             Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => None,
         }
@@ -226,6 +235,7 @@ impl Light {
             | Self::Goniometric(_)
             | Self::Projection(_)
             | Self::Distant(_)
+            | Self::Pov(_)
             | Self::Moving(_) => Spectrum::BLACK,
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => Spectrum::BLACK,
         }
@@ -243,6 +253,7 @@ impl Light {
             Self::Goniometric(light) => Some(of(light.sample(at))),
             Self::Projection(light) => Some(of(light.sample(at))),
             Self::Distant(light) => Some(of(Some(light.sample()))),
+            Self::Pov(light) => Some(of(light.sample(at, DVec2::splat(0.5)))),
             Self::Uniform(light) => Some(light.radiance * std::f32::consts::PI),
             Self::Environment(light) => Some(light.irradiance(normal)),
             Self::Portal(light) => Some(light.irradiance(at, normal)),
@@ -260,6 +271,7 @@ impl Light {
             | Self::Goniometric(_)
             | Self::Projection(_)
             | Self::Distant(_)
+            | Self::Pov(_)
             | Self::Moving(_) => false,
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => false,
         }
@@ -273,6 +285,7 @@ impl Light {
             | Self::Goniometric(_)
             | Self::Projection(_)
             | Self::Distant(_)
+            | Self::Pov(_)
             | Self::Moving(_) => true,
             Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => false,
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => false,
@@ -288,6 +301,7 @@ impl Light {
             | Self::Goniometric(_)
             | Self::Projection(_)
             | Self::Distant(_)
+            | Self::Pov(_)
             | Self::Moving(_) => false,
             Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => false,
         }
@@ -304,6 +318,7 @@ impl Light {
             Self::Projection(light) => light.flux(),
             Self::Spot(light) => light.solid_angle() * mean(light.intensity),
             Self::Distant(light) => disk * mean(light.irradiance),
+            Self::Pov(light) => disk * mean(light.irradiance()),
             Self::Uniform(light) => PI * disk * mean(light.radiance),
             Self::Environment(light) => PI * disk * light.mean(),
             Self::Portal(light) => light.power(),
@@ -322,6 +337,7 @@ impl Light {
             Self::Goniometric(_) => "goniometric",
             Self::Projection(_) => "projection",
             Self::Distant(_) => "distant",
+            Self::Pov(_) => "pov",
             Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => "infinite",
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => "diffuse",
             Self::Moving(light) => light.light.name(),

@@ -155,6 +155,8 @@ pub enum MaterialKind {
     Principled(Box<PrincipledParams>),
     /// pbrt-v3's `uber` and `plastic`: lobes side by side.
     Uber(Box<UberParams>),
+    /// A texture of a POV-Ray scene.
+    Pov(Arc<crate::pov::PovMaterial>),
     /// One of two, chosen at random by position and direction.
     Mix {
         /// The materials at amount 0 and 1.
@@ -167,7 +169,7 @@ pub enum MaterialKind {
 }
 
 impl MaterialKind {
-    /// The names of the kinds in the scene language, in the order of this enum.
+    /// The names of the kinds in the scene language, in the order of this enum, which has others that it cannot say.
     pub const NAMES: [&str; 11] = [
         "diffuse",
         "conductor",
@@ -194,6 +196,7 @@ impl MaterialKind {
             Self::DiffuseTransmission { .. } => "diffusetransmission",
             Self::Principled(_) => "principled",
             Self::Uber(_) => "uber",
+            Self::Pov(_) => "pov",
             Self::Mix { .. } => "mix",
             Self::Interface => "interface",
         }
@@ -312,6 +315,7 @@ impl Material {
             | MaterialKind::DiffuseTransmission { .. } => true,
             MaterialKind::Principled(params) => params.lets_light_through(),
             MaterialKind::Uber(params) => params.lets_light_through(),
+            MaterialKind::Pov(material) => material.lets_light_through(),
             _ => false,
         })
     }
@@ -323,6 +327,7 @@ impl Material {
             MaterialKind::Dielectric { eta, .. } => index(*eta) == 1.0,
             MaterialKind::Principled(params) => params.lets_light_straight_on(),
             MaterialKind::Uber(params) => params.lets_light_straight_on(),
+            MaterialKind::Pov(material) => material.lets_light_straight_on(),
             _ => false,
         })
     }
@@ -381,6 +386,10 @@ impl Material {
     /// finite.
     pub fn frame(&self, at: &TextureContext, surface: &LocalSurface) -> ShadingFrame {
         let plain = || ShadingFrame::new(surface.normal, surface.dpdu);
+        if let MaterialKind::Pov(material) = &self.kind {
+            let normal = material.tilted(at, surface.normal);
+            return turned(normal, surface.dpdu, surface).unwrap_or_else(plain);
+        }
         if let Some(map) = &self.normal_map {
             return mapped(map, at, surface);
         }
@@ -551,6 +560,7 @@ impl Material {
             }
             MaterialKind::Principled(params) => Bsdf::Principled(Box::new(params.bsdf(at))),
             MaterialKind::Uber(params) => Bsdf::Uber(params.bsdf(at)),
+            MaterialKind::Pov(material) => Bsdf::Uber(material.bsdf(at)),
             MaterialKind::Mix { .. } | MaterialKind::Interface => return None,
         };
         Some(bsdf)

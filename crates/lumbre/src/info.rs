@@ -149,6 +149,7 @@ fn light_name(light: &LightDesc) -> &'static str {
         LightDesc::Projection { .. } => "projection",
         LightDesc::Distant { .. } => "distant",
         LightDesc::Infinite { .. } | LightDesc::Portal { .. } => "infinite",
+        LightDesc::Pov(_) => "pov",
         LightDesc::Moving { light, .. } => light_name(light),
     }
 }

@@ -184,6 +184,7 @@ impl Setting {
             LightDesc::Projection { .. } => &["intensity", "fov", "scale"],
             LightDesc::Distant { .. } => &["irradiance", "scale"],
             LightDesc::Infinite { .. } | LightDesc::Portal { .. } => &["radiance", "scale"],
+            LightDesc::Pov(_) => &["scale"],
             LightDesc::Moving { .. } => &[],
         };
         if self.parameter == "scale" {
@@ -197,6 +198,7 @@ impl Setting {
                 | LightDesc::Distant { irradiance: light, .. }
                 | LightDesc::Infinite { radiance: light, .. }
                 | LightDesc::Portal { radiance: light, .. } => *light *= factor,
+                LightDesc::Pov(light) => Arc::make_mut(light).colour *= factor,
                 LightDesc::Moving { .. } => {}
             }
             return Ok(());
@@ -417,6 +419,7 @@ pub(crate) fn material_parameters(kind: &MaterialKind) -> &'static [&'static str
         MaterialKind::Uber(_) => {
             &["Kd", "Ks", "Kr", "Kt", "opacity", "index", "roughness", "uroughness", "vroughness"]
         }
+        MaterialKind::Pov(_) => &[],
         MaterialKind::Mix { .. } => &["amount"],
         MaterialKind::Interface => &[],
     }

@@ -15,6 +15,7 @@ pub(crate) mod nanovdb;
 pub(crate) mod obj;
 pub(crate) mod pbrt;
 pub(crate) mod ply;
+pub(crate) mod pov;
 pub(crate) mod stl;
 
 /// Reads strictly and leniently in little memory: what is refused has a message that begins as it should.
@@ -39,7 +40,7 @@ fn read_both_ways<T>(
 type Check = fn(&[u8]);
 
 /// What reads each kind of file, by the name of its fuzz target.
-pub(crate) const CHECKS: [(&str, Check); 13] = [
+pub(crate) const CHECKS: [(&str, Check); 14] = [
     ("gltf", gltf::run),
     ("gltf_buffer", gltf_buffer::run),
     ("gltf_draco", gltf_draco::run),
@@ -52,5 +53,6 @@ pub(crate) const CHECKS: [(&str, Check); 13] = [
     ("obj", obj::run),
     ("pbrt", pbrt::run),
     ("ply", ply::run),
+    ("pov", pov::run),
     ("stl", stl::run),
 ];

@@ -4,10 +4,12 @@ mod ambient_occlusion;
 mod features;
 mod integrator;
 mod path;
+mod pov;
 mod whitted;
 
 pub use ambient_occlusion::AmbientOcclusion;
 pub use features::FeatureIntegrator;
 pub use integrator::{Integrator, RayIntegrator, integrator};
 pub use path::Path;
+pub use pov::Pov;
 pub use whitted::Whitted;
