@@ -220,7 +220,7 @@ impl Builder {
     }
 
     fn geometry(&mut self, leaf: &Leaf<'_>) -> Option<(GeometryDesc, Transform)> {
-        if let Form::Mesh(mesh, _) = &leaf.object.form {
+        if let Form::Mesh(mesh) = &leaf.object.form {
             if mesh.triangles.is_empty() {
                 return None;
             }

@@ -52,19 +52,19 @@ impl Parser<'_, '_> {
         let (corners, normals) = self.smooth_corners()?;
         let mut all = Triangles { has_normals: true, ..Triangles::default() };
         push(&mut all, corners, Some(normals), None);
-        Ok(Form::Mesh(Arc::new(all.mesh()), None))
+        Ok(Form::Mesh(Arc::new(all.mesh())))
     }
 
     /// A mesh, up to what modifies it: its triangles by their textures.
     pub(super) fn mesh(&mut self) -> Result<Object> {
         let mut by_texture: HashMap<usize, (Option<Arc<lumbre_shading::pov::Texture>>, Triangles)> = HashMap::new();
-        let mut inside = None;
         loop {
             let word = self.word()?;
             let Some(word @ ("triangle" | "smooth_triangle" | "inside_vector")) = word.as_deref() else { break };
             self.peeked = None;
             if word == "inside_vector" {
-                inside = Some(self.vector()?);
+                self.vector()?;
+                self.warn("the inside of a mesh is not cut out");
                 continue;
             }
             let is_smooth = word == "smooth_triangle";
@@ -105,7 +105,7 @@ impl Parser<'_, '_> {
         let mut parts: Vec<(usize, Object)> = Vec::new();
         for (_, (texture, triangles)) in by_texture {
             let first = triangles.positions.first().map_or(0, |p| p.x.to_bits() as usize);
-            let mut part = Object::new(Form::Mesh(Arc::new(triangles.mesh()), inside));
+            let mut part = Object::new(Form::Mesh(Arc::new(triangles.mesh())));
             part.texture = texture;
             parts.push((first, part));
         }
@@ -141,7 +141,6 @@ impl Parser<'_, '_> {
     pub(super) fn mesh2(&mut self) -> Result<Object> {
         let (mut vertices, mut normals, mut uvs) = (Vec::new(), Vec::new(), Vec::new());
         let (mut faces, mut normal_faces, mut uv_faces) = (Vec::new(), Vec::new(), Vec::new());
-        let mut inside = None;
         let mut has_textures = false;
         loop {
             let word = self.word()?;
@@ -154,7 +153,10 @@ impl Parser<'_, '_> {
             };
             self.peeked = None;
             match word {
-                "inside_vector" => inside = Some(self.vector()?),
+                "inside_vector" => {
+                    self.vector()?;
+                    self.warn("the inside of a mesh is not cut out");
+                }
                 "vertex_vectors" => vertices = self.vectors()?,
                 "normal_vectors" => normals = self.vectors()?,
                 "uv_vectors" => uvs = self.vectors()?,
@@ -184,7 +186,7 @@ impl Parser<'_, '_> {
             let uv = corner(&uvs, uv_faces.get(i).unwrap_or(face));
             push(&mut all, corners, smooth, uv.map(|uv| uv.map(|uv| uv.truncate())));
         }
-        Ok(Object::new(Form::Mesh(Arc::new(all.mesh()), inside)))
+        Ok(Object::new(Form::Mesh(Arc::new(all.mesh()))))
     }
 
     fn vectors(&mut self) -> Result<Vec<DVec3>> {
@@ -242,7 +244,7 @@ impl Parser<'_, '_> {
         for triangle in triangles {
             push(&mut all, triangle.map(|p| origin + s * p.x + t * p.y), None, None);
         }
-        Ok(Form::Mesh(Arc::new(all.mesh()), None))
+        Ok(Form::Mesh(Arc::new(all.mesh())))
     }
 
     /// A blob, up to what modifies it.

@@ -5,11 +5,13 @@
 mod build;
 mod built_ins;
 mod camera;
+mod curves;
 mod directives;
 mod expression;
 mod files;
 mod functions;
 mod images;
+mod iso;
 mod lexer;
 mod lights;
 mod maps;
@@ -19,6 +21,8 @@ mod patterns;
 mod settings;
 mod solids;
 mod source;
+mod swept;
+mod text;
 mod textures;
 mod transforms;
 mod value;
@@ -127,6 +131,7 @@ struct Parser<'a, 'b> {
     declaring: Option<(usize, usize)>,
     streams: Vec<u32>,
     written: HashMap<String, String>,
+    fonts: text::Fonts,
     settings: Settings,
     defaults: Defaults,
     default_camera: CameraStatement,
@@ -167,6 +172,7 @@ impl<'a, 'b> Parser<'a, 'b> {
             declaring: None,
             streams: Vec::new(),
             written: HashMap::new(),
+            fonts: HashMap::new(),
             settings: Settings::new(),
             defaults: Defaults::new(),
             default_camera: CameraStatement::DEFAULT,

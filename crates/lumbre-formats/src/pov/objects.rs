@@ -44,12 +44,14 @@ pub(super) enum Form {
     Plane(DVec3, f64),
     Disc { center: DVec3, normal: DVec3, radius: f64, hole: f64 },
     Triangle([DVec3; 3]),
-    Mesh(Arc<MeshDesc>, Option<DVec3>),
+    Mesh(Arc<MeshDesc>),
     /// The exponents of a superellipsoid.
     Superellipsoid(f64, f64),
     /// Coefficients in falling powers of x, then y, then z, with the degree.
     Poly(u32, Arc<[f64]>),
     Blob(Arc<super::solids::Blob>),
+    Swept(Arc<super::swept::Swept>),
+    Iso(Arc<super::iso::Iso>),
     Group(Operation, Vec<Rc<Object>>),
     Light(Rc<LightStatement>),
     /// A group of lights that light only its objects.
@@ -238,6 +240,12 @@ impl Parser<'_, '_> {
                 self.poly(degree)?
             }
             "blob" => return self.blob(),
+            "prism" => self.prism()?,
+            "lathe" => self.lathe()?,
+            "sor" => self.sor()?,
+            "text" => self.text()?,
+            "isosurface" => self.isosurface()?,
+            "height_field" => self.height_field()?,
             "union" | "merge" | "intersection" | "difference" => {
                 let operation = match word {
                     "union" => Operation::Union,

@@ -10,7 +10,9 @@ use lumbre_kernel::CustomGeometry;
 use lumbre_math::interval::{Dual, Interval};
 use lumbre_math::{DVec2, DVec3, Transform};
 
+use super::iso::Iso;
 use super::objects::{Form, Object, Operation};
+use super::swept::Swept;
 
 /// A surface in the world, with what is inside of it.
 #[derive(Clone, Debug)]
@@ -18,6 +20,44 @@ pub(super) enum Solid {
     /// The surface, and where it is open the same one closed.
     Exact { surface: PlacedShape, closed: Option<PlacedShape> },
     Implicit { surface: ImplicitSurface, world_from_object: Transform },
+    Body { body: Body, world_from_object: Transform },
+}
+
+/// A solid that says itself where rays cross it, in its own space.
+#[derive(Clone, Debug)]
+pub(super) enum Body {
+    Swept(Arc<Swept>),
+    Iso(Arc<Iso>),
+}
+
+impl Body {
+    fn roots(&self, ray: &Ray, out: &mut Roots) {
+        match self {
+            Self::Swept(swept) => swept.roots(ray, out),
+            Self::Iso(iso) => iso.roots(ray, out),
+        }
+    }
+
+    fn normal(&self, p: DVec3, root: &Root) -> DVec3 {
+        match self {
+            Self::Swept(swept) => swept.normal(p, root),
+            Self::Iso(iso) => iso.normal(p, root),
+        }
+    }
+
+    fn contains(&self, p: DVec3) -> bool {
+        match self {
+            Self::Swept(swept) => swept.contains(p),
+            Self::Iso(iso) => iso.contains(p),
+        }
+    }
+
+    fn bounds(&self) -> Aabb {
+        match self {
+            Self::Swept(swept) => swept.bounds(),
+            Self::Iso(iso) => iso.bounds(),
+        }
+    }
 }
 
 /// Surfaces without a natural bound are looked for within this distance.
@@ -69,6 +109,8 @@ impl Solid {
                 let blob = Arc::clone(blob);
                 implicit(ImplicitSurface::new(blob.bounds(), move |p| blob.field(p))?)
             }
+            Form::Swept(swept) => Self::Body { body: Body::Swept(Arc::clone(swept)), world_from_object: *map },
+            Form::Iso(iso) => Self::Body { body: Body::Iso(Arc::clone(iso)), world_from_object: *map },
             Form::Mesh(..) | Form::Group(..) | Form::Light(_) | Form::LightGroup(..) | Form::Nothing => return Ok(None),
         }))
     }
@@ -79,6 +121,7 @@ impl Solid {
             Self::Implicit { surface, world_from_object } => {
                 out.extend(surface.roots(&ray.into_object(world_from_object)));
             }
+            Self::Body { body, world_from_object } => body.roots(&ray.into_object(world_from_object), out),
         }
     }
 
@@ -93,11 +136,29 @@ impl Solid {
                 let point_error = map.point_error(inner.point, inner.point_error);
                 Surface { point, point_error, normal, dpdu, dpdv, ..inner }
             }
+            Self::Body { body, world_from_object: map } => {
+                let inner = ray.into_object(map).at(root.t);
+                let normal = map.normal(body.normal(inner, root)).normalize_or(DVec3::Y);
+                let (dpdu, dpdv) = normal.any_orthonormal_pair();
+                let size = (ray.origin.abs() + (ray.direction * root.t).abs()).max_element();
+                Surface {
+                    point: ray.at(root.t),
+                    // Roots of polynomials are right to some of their last digits.
+                    point_error: DVec3::splat(1e-10 * size),
+                    normal,
+                    uv: root.local,
+                    dpdu,
+                    dpdv,
+                    dndu: DVec3::ZERO,
+                    dndv: DVec3::ZERO,
+                }
+            }
         }
     }
 
     pub(super) fn contains(&self, p: DVec3) -> bool {
         match self {
+            Self::Body { body, world_from_object } => body.contains(world_from_object.inverse_point(p)),
             Self::Exact { surface, closed } => {
                 let shape = closed.as_ref().unwrap_or(surface);
                 shape.shape().contains(shape.world_from_object().inverse_point(p))
@@ -109,16 +170,19 @@ impl Solid {
     pub(super) fn bounds(&self) -> Option<Aabb> {
         match self {
             Self::Exact { surface, .. } => surface.shape().bounds(&surface.world_from_object()),
-            Self::Implicit { surface, world_from_object } => {
-                let Aabb { min, max } = surface.bounds();
-                let corner = |i: usize| {
-                    let pick = |axis: usize| if i >> axis & 1 == 1 { max[axis] } else { min[axis] };
-                    world_from_object.point(DVec3::new(pick(0), pick(1), pick(2)))
-                };
-                Some(Aabb::around((0..8).map(corner)))
-            }
+            Self::Implicit { surface, world_from_object } => Some(moved(&surface.bounds(), world_from_object)),
+            Self::Body { body, world_from_object } => Some(moved(&body.bounds(), world_from_object)),
         }
     }
+}
+
+/// A box around a box that was moved.
+fn moved(&Aabb { min, max }: &Aabb, map: &Transform) -> Aabb {
+    let corner = |i: usize| {
+        let pick = |axis: usize| if i >> axis & 1 == 1 { max[axis] } else { min[axis] };
+        map.point(DVec3::new(pick(0), pick(1), pick(2)))
+    };
+    Aabb::around((0..8).map(corner))
 }
 
 /// A part of space.
@@ -346,7 +410,7 @@ pub(super) fn bounds(object: &Object) -> Option<Aabb> {
     let mut is_bounded = true;
     leaves(object, &Transform::IDENTITY, &[], false, &mut Vec::new(), &mut |leaf, _| {
         let bounds = match (&leaf.object.form, Solid::new(&leaf.object.form, &leaf.map)) {
-            (Form::Mesh(mesh, _), _) => {
+            (Form::Mesh(mesh), _) => {
                 Some(Aabb::around(mesh.positions.iter().map(|p| leaf.map.point(p.as_dvec3()))))
             }
             (_, Ok(Some(solid))) => Clipped::new(Arc::new(solid), leaf.regions, false).bounds,
