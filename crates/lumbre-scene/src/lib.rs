@@ -28,7 +28,7 @@ mod surface;
 mod tables;
 mod viewpoint;
 
-pub use camera::{Camera, CameraKind, CameraRay, SphericalMapping, View};
+pub use camera::{Camera, CameraKind, CameraRay, SphericalMapping, View, WideProjection};
 pub use desc::*;
 pub use emission::Emission;
 pub use error::BuildError;

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use lumbre::Scene;
 use lumbre::formats::image::open_image;
+use lumbre::formats::pov::{PovOptions, SYSTEM_LIBRARY, written_files};
 use lumbre::formats::{Budget, Diagnostics, ReadOptions, open_scene};
 
 /// Scenes that are not as expected yet. One that is has to be taken off.
@@ -110,4 +111,46 @@ fn pictures_are_those_of_povray() {
         }
     }
     assert!(wrong.is_empty(), "{right} of {} are right:\n{}", names.len(), wrong.join("\n"));
+}
+
+/// The values that POV-Ray itself prints, where they are.
+#[test]
+fn values_are_those_of_povray() {
+    let Some(folder) = folder() else { return };
+    let library = Path::new(SYSTEM_LIBRARY[0]);
+    let (Ok(scene), Ok(expected)) =
+        (std::fs::read_to_string(folder.join("values.pov")), std::fs::read_to_string(folder.join("values.csv")))
+    else {
+        return;
+    };
+    if !library.is_dir() {
+        return;
+    }
+    let mut options = PovOptions::default();
+    options.library.push(library.to_owned());
+    let mut diagnostics = Diagnostics::new();
+    let budget = Budget::default();
+    let files = written_files(&scene, "values.pov", &folder, &options, &budget, &mut diagnostics);
+    let found = &files.unwrap_or_else(|error| panic!("{error}"))["values.csv"];
+    let mut wrong: Vec<String> = Vec::new();
+    for (i, expected) in expected.lines().enumerate() {
+        let found = found.lines().nth(i).unwrap_or("");
+        if !VALUES_NOT_YET.iter().any(|name| expected.starts_with(name)) && !is_near(found, expected) {
+            wrong.push(format!("{found}   expected   {expected}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{} wrong:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+/// Rows of values that are not there yet.
+const VALUES_NOT_YET: &[&str] = &[];
+
+/// Whether two rows say the same, to some digits.
+fn is_near(found: &str, expected: &str) -> bool {
+    let (found, expected): (Vec<&str>, Vec<&str>) = (found.split(',').collect(), expected.split(',').collect());
+    found.len() == expected.len()
+        && found.iter().zip(&expected).all(|(a, b)| match (a.parse::<f64>(), b.parse::<f64>()) {
+            (Ok(a), Ok(b)) => (a - b).abs() <= 2e-6 * (1.0 + b.abs()),
+            _ => a == b,
+        })
 }

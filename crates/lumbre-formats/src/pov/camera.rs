@@ -2,9 +2,10 @@
 
 use std::rc::Rc;
 
-use lumbre_math::{DAffine3, DMat3, DVec3, Elementary, Transform};
-use lumbre_scene::{Camera, CameraKind};
+use lumbre_math::{DAffine3, DMat3, DVec2, DVec3, Elementary, Transform};
+use lumbre_scene::{Camera, CameraKind, SphericalMapping, WideProjection};
 
+use super::lexer::Kind;
 use super::value::Value;
 use super::{Parser, Result};
 
@@ -19,6 +20,8 @@ pub(super) struct CameraStatement {
     pub sky: DVec3,
     pub look_at: Option<DVec3>,
     pub angle: Option<f64>,
+    /// The angle upwards of a spherical camera.
+    pub height_angle: Option<f64>,
     pub aperture: f64,
     pub focal_point: Option<DVec3>,
     /// Whether the scene gives its frame.
@@ -29,6 +32,12 @@ pub(super) struct CameraStatement {
 pub(super) enum Projection {
     Perspective,
     Orthographic,
+    Fisheye,
+    UltraWide,
+    Panoramic,
+    /// 1 to 4.
+    Cylinder(u32),
+    Spherical,
 }
 
 impl CameraStatement {
@@ -41,6 +50,7 @@ impl CameraStatement {
         sky: DVec3::Y,
         look_at: None,
         angle: None,
+        height_angle: None,
         aperture: 0.0,
         focal_point: None,
         has_frame: false,
@@ -101,7 +111,7 @@ impl CameraStatement {
             && up.dot(direction).abs() < 1e-9 * lengths.y * lengths.z;
         // Unit axes where they can be, so that a lens is round; else those of the scene, askew.
         let (axes, half) = if is_square {
-            let scale = if self.kind == Projection::Perspective { lengths.z } else { 1.0 };
+            let scale = if self.kind == Projection::Orthographic { 1.0 } else { lengths.z };
             (DMat3::from_cols(right / lengths.x, up / lengths.y, direction / lengths.z), lengths * (0.5 / scale))
         } else {
             (DMat3::from_cols(right, up, direction), DVec3::splat(0.5))
@@ -110,13 +120,41 @@ impl CameraStatement {
         let focal_distance = self.focal_point.map_or(1.0, |p| map.inverse_point(p).z);
         let has_lens = self.aperture > 0.0 && self.focal_point.is_some() && focal_distance > 0.0;
         let lens_radius = if has_lens { 0.5 * self.aperture } else { 0.0 };
+        if let Some(wide) = self.wide(lengths) {
+            let mapping = SphericalMapping::Wide(wide);
+            return Some(Camera::new(CameraKind::Spherical { mapping }, map));
+        }
         let kind = match self.kind {
             Projection::Perspective => CameraKind::Perspective { fov: 90.0, lens_radius, focal_distance },
-            Projection::Orthographic => CameraKind::Orthographic { lens_radius, focal_distance },
+            _ => CameraKind::Orthographic { lens_radius, focal_distance },
         };
         let mut camera = Camera::new(kind, map);
         camera.screen_window = Some([-half.x, half.x, -half.y, half.y]);
         Some(camera)
+    }
+
+    /// The wide projection of the camera, if it has one; by the lengths of its axes.
+    fn wide(&self, lengths: DVec3) -> Option<WideProjection> {
+        let angle = self.angle.unwrap_or(90.0);
+        Some(match self.kind {
+            Projection::Perspective | Projection::Orthographic => return None,
+            Projection::Fisheye => {
+                WideProjection::Fisheye { angle: self.angle.unwrap_or(180.0), size: DVec2::new(lengths.x, lengths.y) }
+            }
+            Projection::UltraWide => {
+                WideProjection::UltraWide { angles: DVec2::new(angle, angle * lengths.y / lengths.x) }
+            }
+            Projection::Panoramic => WideProjection::Panoramic { axes: lengths },
+            Projection::Cylinder(kind) if kind % 2 == 1 => {
+                WideProjection::UprightCylinder { angle, height: lengths.y, moves: kind == 3 }
+            }
+            Projection::Cylinder(kind) => WideProjection::LyingCylinder { angle, width: lengths.x, moves: kind == 4 },
+            Projection::Spherical => {
+                let across = self.angle.unwrap_or(360.0);
+                let upwards = self.height_angle.unwrap_or(0.5 * across);
+                WideProjection::Sphere { angles: DVec2::new(across, upwards) }
+            }
+        })
     }
 }
 
@@ -144,13 +182,12 @@ impl Parser<'_, '_> {
             match &*word {
                 "perspective" => camera.kind = Projection::Perspective,
                 "orthographic" => camera.kind = Projection::Orthographic,
-                "fisheye" | "ultra_wide_angle" | "panoramic" | "omnimax" | "spherical" => {
-                    self.warn(&format!("the camera {word} is rendered in perspective"));
-                }
-                "cylinder" => {
-                    self.float()?;
-                    self.warn("the camera cylinder is rendered in perspective");
-                }
+                "fisheye" => camera.kind = Projection::Fisheye,
+                "ultra_wide_angle" => camera.kind = Projection::UltraWide,
+                "panoramic" => camera.kind = Projection::Panoramic,
+                "spherical" => camera.kind = Projection::Spherical,
+                "omnimax" => self.warn("the camera omnimax is rendered in perspective"),
+                "cylinder" => camera.kind = Projection::Cylinder(self.whole(1.0, 4.0)?),
                 "mesh_camera" | "user_defined" => {
                     self.warn(&format!("the camera {word} is rendered in perspective"));
                     self.expect(b'{')?;
@@ -170,8 +207,8 @@ impl Parser<'_, '_> {
                 "look_at" => camera.look_at = Some(self.vector()?),
                 "angle" => {
                     camera.angle = Some(self.finite()?);
-                    if self.take(b',')? {
-                        self.float()?;
+                    if self.take(b',')? || matches!(self.peek()?, Some(Kind::Number(_))) {
+                        camera.height_angle = Some(self.finite()?);
                     }
                 }
                 "aperture" => camera.aperture = self.finite()?,
@@ -205,7 +242,9 @@ impl Parser<'_, '_> {
             camera.aim();
             // What follows is in the place of what it looked at.
             camera.look_at = None;
-            camera.angle = None;
+            if camera.kind == Projection::Perspective {
+                camera.angle = None;
+            }
         }
         self.declaring = outer;
         Ok(camera)

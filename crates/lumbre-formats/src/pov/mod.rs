@@ -17,6 +17,7 @@ mod lights;
 mod maps;
 mod meshes;
 mod objects;
+mod patches;
 mod patterns;
 mod settings;
 mod solids;

@@ -244,6 +244,7 @@ impl Parser<'_, '_> {
             "lathe" => self.lathe()?,
             "sor" => self.sor()?,
             "text" => self.text()?,
+            "bicubic_patch" => self.bicubic_patch()?,
             "isosurface" => self.isosurface()?,
             "height_field" => self.height_field()?,
             "union" | "merge" | "intersection" | "difference" => {

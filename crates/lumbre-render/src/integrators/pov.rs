@@ -62,6 +62,10 @@ impl RayIntegrator for Pov {
         });
         let tracer = Tracer { scene, world, lights: lights.collect() };
         let ray = sight.ray.ray;
+        // Where a camera sees nothing.
+        if !ray.direction.is_finite() {
+            return Spectrum::BLACK;
+        }
         let first = Traced {
             inside: tracer.around(ray.origin),
             ray,
