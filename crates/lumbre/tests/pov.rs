@@ -154,3 +154,52 @@ fn is_near(found: &str, expected: &str) -> bool {
             _ => a == b,
         })
 }
+
+/// How many scenes of a folder are read: `LUMBRE_POV_CORPUS=/usr/share/doc/povray/examples cargo test -p lumbre --test pov -- --ignored --nocapture`.
+#[test]
+#[ignore = "its scenes are where POV-Ray's examples are installed"]
+fn the_corpus_is_read() {
+    let Ok(folder) = std::env::var("LUMBRE_POV_CORPUS") else { return };
+    let mut folders = vec![PathBuf::from(folder)];
+    let mut scenes = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "pov") {
+                scenes.push(path);
+            }
+        }
+    }
+    scenes.sort();
+    let (mut read, mut clean) = (0, 0);
+    let mut warnings: std::collections::BTreeMap<String, u32> = std::collections::BTreeMap::new();
+    for path in &scenes {
+        let mut options = ReadOptions::default();
+        options.pov.frame_number = 1;
+        match open_scene(path, &options) {
+            Ok((_, diagnostics)) => {
+                read += 1;
+                clean += u32::from(diagnostics.warnings() == 0);
+                let said: std::collections::BTreeSet<String> = diagnostics
+                    .kept()
+                    .iter()
+                    .filter(|d| d.severity == lumbre::formats::Severity::Warning)
+                    .map(|d| d.message.clone())
+                    .collect();
+                for message in said {
+                    *warnings.entry(message).or_default() += 1;
+                }
+            }
+            Err(error) => println!("{}: {error}", path.display()),
+        }
+    }
+    let mut warnings: Vec<_> = warnings.into_iter().collect();
+    warnings.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    for (message, count) in warnings.iter().take(40) {
+        println!("{count} scenes: {message}");
+    }
+    println!("{} scenes, {read} read, {clean} of them without a warning", scenes.len());
+    assert!(!scenes.is_empty());
+}

@@ -261,8 +261,10 @@ impl Builder {
         }
         let chain: Vec<(&Object, &Transform)> =
             around.iter().copied().chain([leaf.object]).zip(&maps).collect();
+        let any = |of: &dyn Fn(&Object) -> bool| chain.iter().any(|(object, _)| of(object));
+        let uses_uv = any(&|object| object.uv_mapping);
         let placed = |texture: &Arc<Texture>, map: &Transform| {
-            if map.is_identity() { Arc::clone(texture) } else { texture.moved(&Arc::new(*map)) }
+            if uses_uv || map.is_identity() { Arc::clone(texture) } else { texture.moved(&Arc::new(*map)) }
         };
         let from = |of: &dyn Fn(&Object) -> Option<Arc<Texture>>| {
             chain.iter().rev().find_map(|(object, map)| Some(placed(&of(object)?, map)))
@@ -270,8 +272,6 @@ impl Builder {
         let texture = from(&|object| object.texture.clone());
         let interior_texture = from(&|object| object.interior_texture.clone());
         let interior = chain.iter().rev().find_map(|(object, _)| object.interior.clone());
-        let any = |of: &dyn Fn(&Object) -> bool| chain.iter().any(|(object, _)| of(object));
-        let uses_uv = any(&|object| object.uv_mapping);
         let mut texture = texture.unwrap_or_else(|| Arc::clone(&self.default_texture));
         if uses_uv {
             texture = mapped(&texture);

@@ -88,8 +88,11 @@ impl Object {
 
     fn move_by(&mut self, map: &Arc<Transform>) {
         self.transform = **map * self.transform;
-        self.texture = self.texture.take().map(|texture| texture.moved(map));
-        self.interior_texture = self.interior_texture.take().map(|texture| texture.moved(map));
+        // Textures in the coordinates of a surface stay on it.
+        if !self.uv_mapping {
+            self.texture = self.texture.take().map(|texture| texture.moved(map));
+            self.interior_texture = self.interior_texture.take().map(|texture| texture.moved(map));
+        }
         if let Form::Light(light) = &self.form {
             self.form = Form::Light(Rc::new(light.moved(map)));
             self.transform = Transform::IDENTITY;

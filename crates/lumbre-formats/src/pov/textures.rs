@@ -445,8 +445,7 @@ impl Parser<'_, '_> {
         match word {
             "pigment" => {
                 self.expect(b'{')?;
-                let base = Some(Arc::clone(&self.defaults.layer.pigment)).filter(|_| !self.is_raw_mark(b'}'));
-                layer.pigment = self.pigment_body(base, b'}')?;
+                layer.pigment = self.pigment_body(None, b'}')?;
             }
             "normal" => {
                 self.expect(b'{')?;
