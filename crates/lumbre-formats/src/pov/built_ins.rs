@@ -6,7 +6,6 @@ use lumbre_math::{DVec3, Elementary};
 use lumbre_shading::pov::Octaves;
 use lumbre_shading::pov::function::{Binary, Unary};
 
-use super::lexer::Kind;
 use super::value::{Num, Value};
 use super::{Parser, Result};
 use crate::Diagnostic;
@@ -306,11 +305,6 @@ impl Parser<'_, '_> {
         self.comma()?;
         let digits = self.float()?;
         Ok((width.clamp(-MOST_DIGITS, MOST_DIGITS), digits.clamp(-1.0, MOST_DIGITS)))
-    }
-
-    /// Whether the next token is this, as it stands.
-    pub(super) fn is_raw_mark(&self, mark: u8) -> bool {
-        self.peeked.is_none() && self.raw_ahead(0) == Some(&Kind::Mark(mark))
     }
 }
 

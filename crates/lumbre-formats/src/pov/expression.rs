@@ -6,6 +6,7 @@ use lumbre_shading::pov::SplineKind;
 use lumbre_shading::pov::function::{Binary, Unary};
 
 use super::lexer::{GREATER_OR_EQUAL, Kind, LESS_OR_EQUAL, NOT_EQUAL, unescaped};
+use super::functions::NATIVE_PARAMETERS;
 use super::value::{Array, Num, Value};
 use super::words::is_reserved;
 use super::{Parser, Result};
@@ -345,7 +346,9 @@ impl Parser<'_, '_> {
             self.comma()?;
         }
         self.expect(b')')?;
-        if arguments.len() != count {
+        // The functions of the language's own have as many as they like.
+        let is_right = arguments.len() == count || (count == NATIVE_PARAMETERS && arguments.len() <= count);
+        if !is_right {
             let wrong = Diagnostic::error("a function is called with a wrong number of arguments");
             return Err(self.diagnostic(wrong.found(arguments.len()).expected(count)).into());
         }

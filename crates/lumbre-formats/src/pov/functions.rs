@@ -11,6 +11,9 @@ use super::value::Value;
 use super::{Parser, Result};
 use crate::{Diagnostic, FormatError};
 
+/// The parameters of a function that the language has by itself: a point, and ten numbers.
+pub(super) const NATIVE_PARAMETERS: usize = 13;
+
 /// A function that is being compiled.
 struct Draft {
     parameters: Vec<Rc<str>>,
@@ -53,7 +56,7 @@ impl Parser<'_, '_> {
     }
 
     fn native_function(&mut self) -> Result<Arc<Function>> {
-        let parameters = (0..13).map(|i| format!("p{i}").into()).collect();
+        let parameters = (0..NATIVE_PARAMETERS).map(|i| format!("p{i}").into()).collect();
         self.body(parameters)
     }
 
@@ -361,7 +364,7 @@ impl Parser<'_, '_> {
             let name = natives::NAMES.get(index as usize).copied().unwrap_or("internal");
             self.warn(&format!("the function f_{name} is not computed: it counts as 0"));
         }
-        let is_native = matches!(&*function, Function::Code(code) if code.parameters == 13);
+        let is_native = matches!(&*function, Function::Code(code) if code.parameters == NATIVE_PARAMETERS);
         if !is_native && arguments.len() != function.parameters() {
             let wrong = Diagnostic::error("a function is called with a wrong number of arguments");
             return Err(self.diagnostic(wrong.found(arguments.len()).expected(function.parameters())).into());

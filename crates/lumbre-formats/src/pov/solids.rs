@@ -392,6 +392,12 @@ pub(super) fn trace(object: &Object, from: DVec3, direction: DVec3) -> Option<(D
     let ray = Ray::new(from, direction).with_range(1e-9, f64::INFINITY);
     let mut best: Option<(f64, DVec3, DVec3)> = None;
     leaves(object, &Transform::IDENTITY, &[], false, &mut Vec::new(), &mut |leaf, _| {
+        if let Form::Mesh(mesh) = &leaf.object.form
+            && let Some((t, normal)) = mesh_hit(mesh, &leaf.map, &ray)
+            && best.is_none_or(|(best, ..)| t < best)
+        {
+            best = Some((t, ray.at(t), normal));
+        }
         let Ok(Some(solid)) = Solid::new(&leaf.object.form, &leaf.map) else { return };
         let clipped = Clipped::new(Arc::new(solid), leaf.regions, leaf.is_flipped);
         if let Some(root) = clipped.closest(0, &ray)
@@ -402,6 +408,28 @@ pub(super) fn trace(object: &Object, from: DVec3, direction: DVec3) -> Option<(D
         }
     });
     best.map(|(_, point, normal)| (point, normal))
+}
+
+/// The first triangle of a mesh along a ray, with its unit normal: interpolated, where the mesh has normals.
+fn mesh_hit(mesh: &lumbre_scene::MeshDesc, map: &Transform, ray: &Ray) -> Option<(f64, DVec3)> {
+    let inner = ray.into_object(map);
+    let mut best: Option<(f64, DVec3)> = None;
+    for face in &mesh.triangles {
+        let corner = |i: usize| mesh.positions[face[i] as usize].as_dvec3();
+        let Ok(triangle) = Triangle::new(corner(0), corner(1), corner(2)) else { continue };
+        let Some(root) = triangle.closest(&inner) else { continue };
+        if best.is_some_and(|(t, _)| t <= root.t) {
+            continue;
+        }
+        let flat = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+        let normal = mesh.normals.as_ref().map_or(flat, |normals| {
+            let at = |i: usize| normals[face[i] as usize].as_dvec3();
+            let DVec2 { x, y } = root.local;
+            at(0) * (1.0 - x - y) + at(1) * x + at(2) * y
+        });
+        best = Some((root.t, map.normal(normal).normalize_or(DVec3::Y)));
+    }
+    best
 }
 
 /// A box around an object; `None` if it is not bounded.
