@@ -42,6 +42,10 @@ pub(crate) struct ReadingArguments {
     /// The material variant of a glTF.
     #[arg(long, value_name = "NAME")]
     variant: Option<String>,
+    /// A folder of files that a POV-Ray scene includes, besides its own folder and where Debian has POV-Ray's own; several times for
+    /// several, the first first.
+    #[arg(long, value_name = "DIR")]
+    pov_include: Vec<PathBuf>,
     /// Set a parameter of the scene: material.NAME.PARAM, light.INDEX.PARAM, light.area.scale, camera.PARAM or film.PARAM. A name
     /// that is not there is answered with those that are.
     #[arg(short = 'D', long = "define", value_name = "PATH=VALUE", help_heading = "Parameters", value_parser = Setting::from_str)]
@@ -112,6 +116,7 @@ impl Default for ReadingArguments {
             fps: 24.0,
             animation: None,
             variant: None,
+            pov_include: Vec::new(),
             settings: Vec::new(),
             overlay: Vec::new(),
             max_memory: None,
@@ -289,6 +294,7 @@ impl ReadingArguments {
             ));
         }
         let mut options = lumbre::ReadOptions::default();
+        options.pov.library.clone_from(&self.pov_include);
         options.limits = self.limits();
         options.format = self.input_format;
         options.strictness = self.strictness();

@@ -23,6 +23,7 @@ mod origin;
 pub mod pbrt;
 pub mod ply;
 mod polygon;
+pub mod pov;
 mod standing;
 pub mod stl;
 mod thin;

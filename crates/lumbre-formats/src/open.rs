@@ -30,6 +30,8 @@ pub struct ReadOptions {
     pub animation: Option<String>,
     /// The material variant of a glTF.
     pub variant: Option<String>,
+    /// Options of a POV-Ray scene.
+    pub pov: crate::pov::PovOptions,
     /// Whether the scene may use no other files than those that are named: for a scene from a stranger.
     pub is_alone: bool,
 }
@@ -48,19 +50,22 @@ pub enum SceneFormat {
     Stl,
     /// glTF, as JSON or as GLB.
     Gltf,
+    /// The scene language of POV-Ray.
+    Pov,
 }
 
 /// The extensions of [`open_scene`].
-const ENDINGS: &str = ".pbrt, .pbrt.gz, .gltf, .glb, .obj, .ply, .ply.gz, .stl, .stl.gz";
+const ENDINGS: &str = ".pbrt, .pbrt.gz, .pov, .gltf, .glb, .obj, .ply, .ply.gz, .stl, .stl.gz";
 
 impl SceneFormat {
     /// The names for options, which are extensions without their dot.
-    pub const NAMES: [&'static str; 6] = ["pbrt", "gltf", "glb", "obj", "ply", "stl"];
+    pub const NAMES: [&'static str; 7] = ["pbrt", "pov", "gltf", "glb", "obj", "ply", "stl"];
 
     /// The format of a name among [`SceneFormat::NAMES`].
     pub fn from_name(name: &str) -> Option<Self> {
         match name {
             "pbrt" => Some(Self::Pbrt),
+            "pov" => Some(Self::Pov),
             "obj" => Some(Self::Obj),
             "ply" => Some(Self::Ply),
             "stl" => Some(Self::Stl),
@@ -185,7 +190,7 @@ impl<'p, 'b> Source<'p, 'b> {
         let input = if is_standard_input {
             Input::from_stream("standard input", std::io::stdin().lock(), budget, |first| {
                 match options.format.or_else(|| SceneFormat::from_bytes(first)) {
-                    Some(SceneFormat::Pbrt | SceneFormat::Obj) => Ok(true),
+                    Some(SceneFormat::Pbrt | SceneFormat::Obj | SceneFormat::Pov) => Ok(true),
                     // Both have a binary form.
                     Some(SceneFormat::Ply | SceneFormat::Stl) => Ok(false),
                     Some(SceneFormat::Gltf) => Ok(!first.starts_with(b"glTF")),
@@ -239,6 +244,11 @@ fn read_group<'b>(
         SceneFormat::Ply => ply_scene(input, folder, budget, diagnostics),
         SceneFormat::Obj => obj_scene(input, folder, budget, diagnostics),
         SceneFormat::Stl => stl_scene(input, budget, diagnostics),
+        SceneFormat::Pov => {
+            let mut pov = options.pov.clone();
+            pov.library.extend(crate::pov::SYSTEM_LIBRARY.iter().map(std::path::PathBuf::from));
+            crate::pov::pov_scene(&input, folder, &pov, budget, diagnostics)
+        }
         SceneFormat::Gltf | SceneFormat::Pbrt => {
             let gltf = GltfOptions {
                 frame: options.frame,

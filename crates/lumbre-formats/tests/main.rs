@@ -10,6 +10,7 @@ mod images;
 mod obj;
 mod pbrt_grammar;
 mod ply;
+mod pov;
 mod regressions;
 mod shown;
 mod stl;

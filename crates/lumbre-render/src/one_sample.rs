@@ -26,6 +26,8 @@ pub(crate) struct Taker<'a> {
     /// Whether it matters when a ray looks.
     moves: bool,
     wants_features: bool,
+    /// Whether the one sample of a pixel is in its middle.
+    is_centred: bool,
     lights_are_seen: bool,
     /// Ground that catches shadows, for many samples at once where that can be.
     catcher: Option<Catcher<'a>>,
@@ -70,6 +72,7 @@ impl<'a> Taker<'a> {
             sampler: Sampler::new(&options.sampler),
             filter: options.pixel_filter()?,
             wants_features: options.features || options.guides,
+            is_centred: options.integrator.kind == lumbre_scene::IntegratorKind::Pov && options.stop.spp == 1,
             lights_are_seen: !options.transparent,
             catcher: Catcher::of(scene),
         })
@@ -180,7 +183,8 @@ impl<'a> Taker<'a> {
         let pixel = DVec2::new(f64::from(id.x) + 0.5, f64::from(id.y) + 0.5);
         // A lens without width has no place but its middle.
         let lens = if self.view.has_lens() { draw.lens() } else { DVec2::splat(0.5) };
-        Aim { film: pixel + place.offset, lens, weight: place.weight }
+        let offset = if self.is_centred { DVec2::ZERO } else { place.offset };
+        Aim { film: pixel + offset, lens, weight: place.weight }
     }
 
     fn camera_ray(&self, draw: &Draw, aim: &Aim) -> CameraRay {

@@ -30,6 +30,7 @@ impl SceneDesc {
             up,
             up_is_guessed,
             ground,
+            pov,
             listing,
         } = other;
         self.listing.append(listing);
@@ -41,6 +42,7 @@ impl SceneDesc {
             self.without_light = without_light;
         }
         self.ground = self.ground.or(ground);
+        self.pov = self.pov.take().or(pov);
         let after = After {
             index: next_index(self),
             material: self.materials.len() as u32,

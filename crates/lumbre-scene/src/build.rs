@@ -63,6 +63,7 @@ impl Scene {
             up,
             ground: _,
             up_is_guessed: _,
+            pov,
             listing: _,
         } = desc;
         check_cameras(&cameras)?;
@@ -123,6 +124,7 @@ impl Scene {
             filter,
             sampler,
             integrator,
+            pov,
             bounds,
             has_holes,
             lets_light_through,
@@ -615,6 +617,12 @@ impl Builder {
                     return Err(wrong("its irradiance is not finite"));
                 }
                 Light::Distant(DistantLight { towards, irradiance })
+            }
+            LightDesc::Pov(light) => {
+                if !(light.from.is_finite() && light.point_at.is_finite() && light.colour.is_finite()) {
+                    return Err(wrong("its place or its colour is not finite"));
+                }
+                Light::Pov(light)
             }
             LightDesc::Infinite { radiance, .. } | LightDesc::Portal { radiance, .. }
                 if !radiance.is_finite() =>

@@ -13,13 +13,114 @@ use crate::viewpoint::half_window;
 use crate::{Footprint, Lens, MediumId};
 
 /// The mapping of directions to the picture of a spherical camera.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum SphericalMapping {
     /// Equal areas (Clarberg 2008).
     #[default]
     EqualArea,
     /// Longitude and latitude.
     Equirectangular,
+    /// One of POV-Ray's wide projections.
+    Wide(WideProjection),
+}
+
+/// POV-Ray's projections of wide views. The picture is about +z, with y up; angles are in degrees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum WideProjection {
+    /// The distance from the middle of the picture is the angle from the axis: `angle` across the unit circle, outside of which nothing
+    /// is seen. The picture is so wide and high.
+    Fisheye {
+        /// Across the circle.
+        angle: f64,
+        /// Width and height of the picture, in radii of the circle halved.
+        size: DVec2,
+    },
+    /// Angles to the side and upwards.
+    UltraWide {
+        /// Across and upwards.
+        angles: DVec2,
+    },
+    /// Half a turn across; straight upwards.
+    Panoramic {
+        /// The lengths of the vectors to the right, up and forwards.
+        axes: DVec3,
+    },
+    /// A turn about the vertical axis; straight upwards.
+    UprightCylinder {
+        /// Across.
+        angle: f64,
+        /// The height of the picture at distance 1.
+        height: f64,
+        /// Whether heights move the eye and not the view.
+        moves: bool,
+    },
+    /// A turn about the horizontal axis; straight sideways.
+    LyingCylinder {
+        /// From bottom to top.
+        angle: f64,
+        /// The width of the picture at distance 1.
+        width: f64,
+        /// Whether widths move the eye and not the view.
+        moves: bool,
+    },
+    /// Longitude and latitude.
+    Sphere {
+        /// Across and upwards.
+        angles: DVec2,
+    },
+}
+
+impl WideProjection {
+    /// The origin and the direction of the ray at a place of the picture, both coordinates from -1/2 to 1/2; not a number where
+    /// nothing is seen.
+    fn line(&self, at: DVec2) -> (DVec3, DVec3) {
+        let center = DVec3::ZERO;
+        match *self {
+            Self::Fisheye { angle, size } => {
+                let place = 2.0 * at * size;
+                let radius = place.length();
+                if radius > 1.0 {
+                    return (center, DVec3::NAN);
+                }
+                let (sine, cosine) = (radius * 0.5 * angle.to_radians()).sine_cosine();
+                let side = if radius > 0.0 { place / radius } else { DVec2::ZERO };
+                (center, (side * sine).extend(cosine))
+            }
+            Self::UltraWide { angles } => {
+                let (sx, cx) = (at.x * angles.x.to_radians()).sine_cosine();
+                let (sy, cy) = (at.y * angles.y.to_radians()).sine_cosine();
+                (center, DVec3::new(sx, sy, cx * cy))
+            }
+            Self::Panoramic { axes } => {
+                let (sine, cosine) = (std::f64::consts::PI * (0.5 - at.x)).sine_cosine();
+                let height = (std::f64::consts::PI * at.y).tangent();
+                (center, DVec3::new(cosine, height, sine) * axes)
+            }
+            Self::UprightCylinder { angle, height, moves } => {
+                let (sine, cosine) = (at.x * angle.to_radians()).sine_cosine();
+                let y = at.y * height;
+                if moves {
+                    (DVec3::Y * y, DVec3::new(sine, 0.0, cosine))
+                } else {
+                    (center, DVec3::new(sine, y, cosine))
+                }
+            }
+            Self::LyingCylinder { angle, width, moves } => {
+                let (sine, cosine) = (at.y * angle.to_radians()).sine_cosine();
+                let x = at.x * width;
+                if moves {
+                    (DVec3::X * x, DVec3::new(0.0, sine, cosine))
+                } else {
+                    (center, DVec3::new(x, sine, cosine))
+                }
+            }
+            Self::Sphere { angles } => {
+                let (sx, cx) = (at.x * angles.x.to_radians()).sine_cosine();
+                let (sy, cy) = (at.y * angles.y.to_radians()).sine_cosine();
+                (center, DVec3::new(sx * cy, sy, cx * cy))
+            }
+        }
+    }
 }
 
 /// The kinds of camera. Camera space is pbrt's: x right, y up, z forward (left-handed).
@@ -321,6 +422,9 @@ impl View {
                 let (sin_phi, cos_phi) = (std::f64::consts::TAU * on_screen.x).sine_cosine();
                 (DVec3::ZERO, DVec3::new(sin_theta * cos_phi, cos_theta, sin_theta * sin_phi))
             }
+            CameraKind::Spherical { mapping: SphericalMapping::Wide(wide) } => {
+                wide.line(DVec2::new(on_screen.x - 0.5, 0.5 - on_screen.y))
+            }
             CameraKind::Spherical { mapping: SphericalMapping::EqualArea } => {
                 let d = equal_area_square_to_sphere(equal_area_wrap(on_screen));
                 (DVec3::ZERO, DVec3::new(d.x, d.z, d.y))
@@ -472,10 +576,8 @@ mod tests {
                 let direction = view.ray(film, MIDDLE, 0.0, 1.0).ray.direction;
                 assert!((direction.length() - 1.0).abs() < 1e-12);
                 // A row of the equirectangular picture covers less of the sphere towards the poles, which are at y.
-                let weight = match mapping {
-                    SphericalMapping::EqualArea => 1.0,
-                    SphericalMapping::Equirectangular => (1.0 - direction.y * direction.y).sqrt(),
-                };
+                let is_even = matches!(mapping, SphericalMapping::EqualArea);
+                let weight = if is_even { 1.0 } else { (1.0 - direction.y * direction.y).sqrt() };
                 sum += weight * direction;
                 squares += weight * direction * direction;
                 weights += weight;

@@ -44,6 +44,8 @@ pub struct SceneDesc {
     pub up_is_guessed: bool,
     /// The ground plane.
     pub ground: Option<GroundDesc>,
+    /// What is around the objects of a POV-Ray scene.
+    pub pov: Option<Arc<crate::pov::PovWorld>>,
     /// What its files hold by name.
     pub listing: Listing,
 }
@@ -358,6 +360,8 @@ pub enum LightDesc {
         /// fourth and to the second points to the sky.
         corners: [DVec3; 4],
     },
+    /// A light by POV-Ray's laws.
+    Pov(Arc<crate::pov::PovLight>),
     /// A moving light other than an infinite one.
     Moving {
         /// The light, in its own space.
@@ -534,6 +538,8 @@ pub enum IntegratorKind {
         /// Whether infinite lights illuminate surfaces, beyond being visible as background.
         sky: bool,
     },
+    /// The local illumination of POV-Ray, with its mirrors, refractions and shadows, of POV-Ray's scenes.
+    Pov,
     /// Ambient occlusion.
     AmbientOcclusion {
         /// Cosine-weighted or uniform.
@@ -555,7 +561,7 @@ impl IntegratorKind {
     /// Whether its picture of a scene without light is black.
     pub fn needs_light(&self) -> bool {
         match self {
-            Self::Path { .. } | Self::Caustics | Self::Whitted { .. } => true,
+            Self::Path { .. } | Self::Caustics | Self::Whitted { .. } | Self::Pov => true,
             Self::AmbientOcclusion { .. } | Self::Normals | Self::Depth | Self::Albedo | Self::Uv => false,
         }
     }
@@ -563,15 +569,15 @@ impl IntegratorKind {
     /// Whether its picture is of what is there, and not an estimate of light, with the noise of one.
     pub fn is_feature(&self) -> bool {
         match self {
-            Self::Path { .. } | Self::Caustics => false,
-            Self::Whitted { .. } | Self::AmbientOcclusion { .. } => false,
+            Self::Path { .. } | Self::Caustics | Self::Whitted { .. } | Self::Pov => false,
+            Self::AmbientOcclusion { .. } => false,
             Self::Normals | Self::Depth | Self::Albedo | Self::Uv => true,
         }
     }
 
     /// The names of all.
-    pub const NAMES: [&'static str; 8] =
-        ["path", "caustics", "whitted", "ambientocclusion", "normals", "depth", "albedo", "uv"];
+    pub const NAMES: [&'static str; 9] =
+        ["path", "caustics", "whitted", "pov", "ambientocclusion", "normals", "depth", "albedo", "uv"];
 
     /// The integrator of a name in the scene language, with default parameters.
     pub fn from_name(name: &str) -> Option<Self> {
@@ -579,6 +585,7 @@ impl IntegratorKind {
             "path" => Some(Self::Path { regularize: false }),
             "caustics" => Some(Self::Caustics),
             "whitted" => Some(Self::Whitted { light_samples: 1, sky: false }),
+            "pov" => Some(Self::Pov),
             "ambientocclusion" => Some(Self::AmbientOcclusion { cosine: true, max_distance: f64::INFINITY }),
             "normals" => Some(Self::Normals),
             "depth" => Some(Self::Depth),

@@ -45,6 +45,7 @@ impl GroundPlane {
                 | Light::Goniometric(_)
                 | Light::Projection(_)
                 | Light::Portal(_)
+                | Light::Pov(_)
                 | Light::Moving(_) => {
                     local.push(light.clone());
                 }

@@ -20,6 +20,7 @@ pub mod light;
 mod listing;
 mod media;
 mod mesh;
+pub mod pov;
 mod scene;
 mod solid;
 mod specular;
@@ -29,7 +30,7 @@ mod surface;
 mod tables;
 mod viewpoint;
 
-pub use camera::{Camera, CameraKind, CameraRay, SphericalMapping, View};
+pub use camera::{Camera, CameraKind, CameraRay, SphericalMapping, View, WideProjection};
 pub use desc::*;
 pub use emission::Emission;
 pub use error::BuildError;

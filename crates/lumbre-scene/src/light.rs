@@ -64,6 +64,8 @@ pub enum Light {
     Mesh(MeshLight),
     /// One of the two in an object that stands in the world once, moving or not.
     Placed(PlacedLight),
+    /// A light by POV-Ray's laws.
+    Pov(std::sync::Arc<crate::pov::PovLight>),
     /// A light from a point or in one direction that moves.
     Moving(MovingLight),
 }
@@ -137,6 +139,7 @@ impl Light {
             Self::Shape(light) => light.sample(&entries[light.entry as usize], from, u),
             Self::Mesh(light) => light.sample(&entries[light.entry as usize], from, u),
             Self::Placed(light) => light.sample(entries, from, time, u),
+            Self::Pov(light) => light.sample(from, u),
             Self::Moving(light) => light.sample(entries, from, time, u),
         }
     }
@@ -161,7 +164,9 @@ impl Light {
             Self::Mesh(light) => light.emitters(&entries[light.entry as usize]),
             Self::Placed(light) => light.emitter(entries).into_iter().collect(),
             Self::Moving(light) => light.emitter(entries).into_iter().collect(),
-            Self::Distant(_) | Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => Vec::new(),
+            Self::Distant(_) | Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) | Self::Pov(_) => {
+                Vec::new()
+            }
         }
     }
 
@@ -174,6 +179,7 @@ impl Light {
             | Self::Spot(_)
             | Self::Goniometric(_)
             | Self::Projection(_)
+            | Self::Pov(_)
             | Self::Uniform(_)
             | Self::Environment(_)
             | Self::Portal(_) => None,
@@ -195,7 +201,7 @@ impl Light {
             (Self::Uniform(_) | Self::Environment(_) | Self::Portal(_), Some(_))
             | (Self::Shape(_) | Self::Mesh(_) | Self::Placed(_), None)
             | (Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Projection(_), _)
-            | (Self::Distant(_) | Self::Moving(_), _) => 0.0,
+            | (Self::Distant(_) | Self::Moving(_) | Self::Pov(_), _) => 0.0,
         }
     }
 
@@ -211,6 +217,7 @@ impl Light {
             | Self::Goniometric(_)
             | Self::Projection(_)
             | Self::Distant(_)
+            | Self::Pov(_)
             | Self::Moving(_) => None,
             Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => None,
         }
@@ -227,6 +234,7 @@ impl Light {
             | Self::Goniometric(_)
             | Self::Projection(_)
             | Self::Distant(_)
+            | Self::Pov(_)
             | Self::Moving(_) => Spectrum::BLACK,
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => Spectrum::BLACK,
         }
@@ -244,6 +252,7 @@ impl Light {
             Self::Goniometric(light) => Some(of(light.sample(at))),
             Self::Projection(light) => Some(of(light.sample(at))),
             Self::Distant(light) => Some(of(Some(light.sample()))),
+            Self::Pov(light) => Some(of(light.sample(at, DVec2::splat(0.5)))),
             Self::Uniform(light) => Some(light.radiance * std::f32::consts::PI),
             Self::Environment(light) => Some(light.irradiance(normal)),
             Self::Portal(light) => Some(light.irradiance(at, normal)),
@@ -261,6 +270,7 @@ impl Light {
             | Self::Goniometric(_)
             | Self::Projection(_)
             | Self::Distant(_)
+            | Self::Pov(_)
             | Self::Moving(_) => false,
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => false,
         }
@@ -274,6 +284,7 @@ impl Light {
             | Self::Goniometric(_)
             | Self::Projection(_)
             | Self::Distant(_)
+            | Self::Pov(_)
             | Self::Moving(_) => true,
             Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => false,
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => false,
@@ -289,6 +300,7 @@ impl Light {
             | Self::Goniometric(_)
             | Self::Projection(_)
             | Self::Distant(_)
+            | Self::Pov(_)
             | Self::Moving(_) => false,
             Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => false,
         }
@@ -305,6 +317,7 @@ impl Light {
             Self::Projection(light) => light.flux(),
             Self::Spot(light) => light.solid_angle() * mean(light.intensity),
             Self::Distant(light) => disk * mean(light.irradiance),
+            Self::Pov(light) => disk * mean(light.irradiance()),
             Self::Uniform(light) => PI * disk * mean(light.radiance),
             Self::Environment(light) => PI * disk * light.mean(),
             Self::Portal(light) => light.power(),
@@ -323,6 +336,7 @@ impl Light {
             Self::Goniometric(_) => "goniometric",
             Self::Projection(_) => "projection",
             Self::Distant(_) => "distant",
+            Self::Pov(_) => "pov",
             Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => "infinite",
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => "diffuse",
             Self::Moving(light) => light.light.name(),

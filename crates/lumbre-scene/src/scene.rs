@@ -39,6 +39,7 @@ pub struct Scene {
     pub(crate) filter: FilterDesc,
     pub(crate) sampler: SamplerDesc,
     pub(crate) integrator: IntegratorDesc,
+    pub(crate) pov: Option<Arc<crate::pov::PovWorld>>,
     pub(crate) bounds: Aabb,
     pub(crate) ground: Option<GroundPlane>,
     pub(crate) specular_spheres: Vec<BoundingSphere>,
@@ -150,6 +151,11 @@ impl Scene {
     /// The integrator settings of the description.
     pub fn integrator(&self) -> IntegratorDesc {
         self.integrator
+    }
+
+    /// What is around the objects of a POV-Ray scene.
+    pub fn pov(&self) -> Option<&crate::pov::PovWorld> {
+        self.pov.as_deref()
     }
 
     /// Whether anything moves, other than cameras.

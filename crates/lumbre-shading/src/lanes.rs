@@ -201,6 +201,11 @@ impl Rows {
         self.numbers.truncate(first.numbers.len());
     }
 
+    /// All rows, one after the other.
+    pub fn numbers(&self) -> &[f32] {
+        &self.numbers
+    }
+
     /// The BSDF of one kind whose row begins here, in each lane.
     ///
     /// # Panics

@@ -20,6 +20,7 @@ pub mod measured;
 pub mod medium;
 pub mod microfacet;
 mod mipmap;
+pub mod pov;
 pub mod principled;
 mod principled_lanes;
 mod principled_params;

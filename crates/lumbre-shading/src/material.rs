@@ -164,6 +164,8 @@ pub enum MaterialKind {
     Measured(Arc<MeasuredTables>),
     /// A body that light wanders through below its surface.
     Subsurface(Box<SubsurfaceParams>),
+    /// A texture of a POV-Ray scene.
+    Pov(Arc<crate::pov::PovMaterial>),
     /// One of two, chosen at random by position and direction.
     Mix {
         /// The materials at amount 0 and 1.
@@ -176,7 +178,7 @@ pub enum MaterialKind {
 }
 
 impl MaterialKind {
-    /// The names of the kinds in the scene language, in the order of this enum.
+    /// The names of the kinds in the scene language, in the order of this enum, which has others that it cannot say.
     pub const NAMES: [&str; 14] = [
         "diffuse",
         "conductor",
@@ -209,6 +211,7 @@ impl MaterialKind {
             Self::Hair(_) => "hair",
             Self::Measured(_) => "measured",
             Self::Subsurface(_) => "subsurface",
+            Self::Pov(_) => "pov",
             Self::Mix { .. } => "mix",
             Self::Interface => "interface",
         }
@@ -331,6 +334,7 @@ impl Material {
             | MaterialKind::Subsurface(_) => true,
             MaterialKind::Principled(params) => params.lets_light_through(),
             MaterialKind::Uber(params) => params.lets_light_through(),
+            MaterialKind::Pov(material) => material.lets_light_through(),
             _ => false,
         })
     }
@@ -342,6 +346,7 @@ impl Material {
             MaterialKind::Dielectric { eta, .. } => index(*eta) == 1.0,
             MaterialKind::Principled(params) => params.lets_light_straight_on(),
             MaterialKind::Uber(params) => params.lets_light_straight_on(),
+            MaterialKind::Pov(material) => material.lets_light_straight_on(),
             _ => false,
         })
     }
@@ -360,6 +365,7 @@ impl Material {
             MaterialKind::Principled(params) => params.may_be_specular(),
             MaterialKind::Uber(params) => params.may_be_specular(),
             MaterialKind::Subsurface(params) => params.roughness.may_be_smooth(),
+            MaterialKind::Pov(material) => material.may_be_specular(),
             MaterialKind::Diffuse { .. } | MaterialKind::DiffuseTransmission { .. } => false,
             MaterialKind::Hair(_) | MaterialKind::Measured(_) => false,
             MaterialKind::Mix { .. } | MaterialKind::Interface => false,
@@ -420,6 +426,10 @@ impl Material {
     /// finite.
     pub fn frame(&self, at: &TextureContext, surface: &LocalSurface) -> ShadingFrame {
         let plain = || ShadingFrame::new(surface.normal, surface.dpdu);
+        if let MaterialKind::Pov(material) = &self.kind {
+            let normal = material.tilted(at, surface.normal);
+            return turned(normal, surface.dpdu, surface).unwrap_or_else(plain);
+        }
         if let Some(map) = &self.normal_map {
             return mapped(map, at, surface);
         }
@@ -613,6 +623,7 @@ impl Material {
             MaterialKind::Hair(params) => Bsdf::Hair(params.bsdf(at)),
             MaterialKind::Measured(tables) => Bsdf::Measured(Measured(tables.clone())),
             MaterialKind::Subsurface(params) => Bsdf::Subsurface(params.bsdf(at)),
+            MaterialKind::Pov(material) => Bsdf::Uber(material.bsdf(at)),
             MaterialKind::Mix { .. } | MaterialKind::Interface => return None,
         };
         Some(bsdf)

@@ -160,6 +160,7 @@ fn light_name(light: &LightDesc) -> &'static str {
         LightDesc::Projection { .. } => "projection",
         LightDesc::Distant { .. } => "distant",
         LightDesc::Infinite { .. } | LightDesc::Portal { .. } => "infinite",
+        LightDesc::Pov(_) => "pov",
         LightDesc::Moving { light, .. } => light_name(light),
     }
 }

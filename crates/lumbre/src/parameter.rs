@@ -94,7 +94,7 @@ pub fn parameters(desc: &SceneDesc) -> Vec<Parameter> {
             LightDesc::Infinite { radiance, .. } | LightDesc::Portal { radiance, .. } => {
                 add("infinite", "radiance", ParameterKind::Light, numbers(*radiance));
             }
-            LightDesc::Moving { .. } => {}
+            LightDesc::Pov(_) | LightDesc::Moving { .. } => {}
         }
     }
     let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);

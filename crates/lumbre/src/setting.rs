@@ -185,6 +185,7 @@ impl Setting {
             LightDesc::Projection { .. } => &["intensity", "fov", "scale"],
             LightDesc::Distant { .. } => &["irradiance", "scale"],
             LightDesc::Infinite { .. } | LightDesc::Portal { .. } => &["radiance", "scale"],
+            LightDesc::Pov(_) => &["scale"],
             LightDesc::Moving { .. } => &[],
         };
         if self.parameter == "scale" {
@@ -198,6 +199,7 @@ impl Setting {
                 | LightDesc::Distant { irradiance: light, .. }
                 | LightDesc::Infinite { radiance: light, .. }
                 | LightDesc::Portal { radiance: light, .. } => *light *= factor,
+                LightDesc::Pov(light) => Arc::make_mut(light).colour *= factor,
                 LightDesc::Moving { .. } => {}
             }
             return Ok(());
@@ -424,6 +426,7 @@ pub(crate) fn material_parameters(kind: &MaterialKind) -> &'static [&'static str
             HairColour::Reflectance(_) => &["reflectance", "eta", "beta_m", "beta_n", "alpha"],
             HairColour::Melanin { .. } => &["eumelanin", "pheomelanin", "eta", "beta_m", "beta_n", "alpha"],
         },
+        MaterialKind::Pov(_) => &[],
         MaterialKind::Mix { .. } => &["amount"],
         MaterialKind::Subsurface(_) => &["eta", "roughness", "uroughness", "vroughness", "g", "scale"],
         MaterialKind::Measured(_) | MaterialKind::Interface => &[],

@@ -16,6 +16,7 @@ pub(crate) mod nanovdb;
 pub(crate) mod obj;
 pub(crate) mod pbrt;
 pub(crate) mod ply;
+pub(crate) mod pov;
 pub(crate) mod stl;
 
 /// Reads strictly and leniently in little memory: what is refused has a message that begins as it should.
@@ -54,5 +55,6 @@ pub(crate) const CHECKS: [(&str, Check); 14] = [
     ("obj", obj::run),
     ("pbrt", pbrt::run),
     ("ply", ply::run),
+    ("pov", pov::run),
     ("stl", stl::run),
 ];

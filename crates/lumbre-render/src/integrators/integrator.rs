@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use lumbre_scene::{IntegratorDesc, IntegratorKind, Scene, View};
 use lumbre_shading::Spectrum;
 
-use crate::integrators::{AmbientOcclusion, Caustics, FeatureIntegrator, Path, Whitted};
+use crate::integrators::{AmbientOcclusion, Caustics, FeatureIntegrator, Path, Pov, Whitted};
 use crate::transport::{Draw, Feature, Record, Sampler, Sight};
 use crate::wave::Sights;
 
@@ -51,6 +51,7 @@ pub fn integrator(desc: &IntegratorDesc) -> Box<dyn Integrator> {
         IntegratorKind::Whitted { light_samples, sky } => {
             Box::new(Whitted { max_depth, light_samples, sky, shading_normals })
         }
+        IntegratorKind::Pov => Box::new(Pov),
         IntegratorKind::AmbientOcclusion { cosine, max_distance } => {
             Box::new(AmbientOcclusion { cosine, max_distance, shading_normals })
         }

@@ -5,6 +5,7 @@ mod caustics;
 mod features;
 mod integrator;
 mod path;
+mod pov;
 mod whitted;
 
 pub use ambient_occlusion::AmbientOcclusion;
@@ -12,4 +13,5 @@ pub use caustics::Caustics;
 pub use features::FeatureIntegrator;
 pub use integrator::{Integrator, RayIntegrator, integrator};
 pub use path::Path;
+pub use pov::Pov;
 pub use whitted::Whitted;

@@ -188,7 +188,7 @@ fn compare(material: Material, reverse: bool, shading_normals: ShadingNormals) -
         assert!(kind.is_some());
         let (row, other) = (a.bsdf[i] as usize, b.bsdf[i] as usize);
         for k in 0..12 {
-            let (x, y) = (a.rows[row + k], b.rows[other + k]);
+            let (x, y) = (a.rows.numbers()[row + k], b.rows.numbers()[other + k]);
             assert!((x - y).abs() < 1e-4, "{k}: {x} {y}");
         }
     }

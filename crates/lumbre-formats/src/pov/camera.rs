@@ -1,0 +1,269 @@
+//! Cameras.
+
+use std::rc::Rc;
+
+use lumbre_math::{DAffine3, DMat3, DVec2, DVec3, Elementary, Transform};
+use lumbre_scene::{Camera, CameraKind, SphericalMapping, WideProjection};
+
+use super::lexer::Kind;
+use super::value::Value;
+use super::{Parser, Result};
+
+/// A camera as the scene describes it.
+#[derive(Clone, Debug)]
+pub(super) struct CameraStatement {
+    pub kind: Projection,
+    pub location: DVec3,
+    pub direction: DVec3,
+    pub up: DVec3,
+    pub right: DVec3,
+    pub sky: DVec3,
+    pub look_at: Option<DVec3>,
+    pub angle: Option<f64>,
+    /// The angle upwards of a spherical camera.
+    pub height_angle: Option<f64>,
+    pub aperture: f64,
+    pub focal_point: Option<DVec3>,
+    /// Whether the scene gives its frame.
+    pub has_frame: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Projection {
+    Perspective,
+    Orthographic,
+    Fisheye,
+    UltraWide,
+    Panoramic,
+    /// 1 to 4.
+    Cylinder(u32),
+    Spherical,
+}
+
+impl CameraStatement {
+    pub(super) const DEFAULT: Self = Self {
+        kind: Projection::Perspective,
+        location: DVec3::ZERO,
+        direction: DVec3::Z,
+        up: DVec3::Y,
+        right: DVec3::new(1.33, 0.0, 0.0),
+        sky: DVec3::Y,
+        look_at: None,
+        angle: None,
+        height_angle: None,
+        aperture: 0.0,
+        focal_point: None,
+        has_frame: false,
+    };
+
+    /// Width over height of the picture that it is made for.
+    pub(super) fn aspect(&self) -> f64 {
+        self.right.length() / self.up.length()
+    }
+
+    /// Turns to what it looks at, by the angle that it has.
+    fn aim(&mut self) {
+        if let Some(angle) = self.angle
+            && self.kind == Projection::Perspective
+        {
+            let slope = (0.5 * angle.to_radians()).tangent();
+            let length = 0.5 * self.right.length() / slope;
+            self.direction = self.direction.normalize_or(DVec3::Z) * length;
+        }
+        let mut distance = None;
+        if let Some(target) = self.look_at {
+            let way = target - self.location;
+            if let Some(unit) = way.try_normalize() {
+                distance = Some(way.length());
+                let is_left = self.up.cross(self.direction).dot(self.right) > 0.0;
+                let (right, up, length) = (self.right.length(), self.up.length(), self.direction.length());
+                let sideways = self.sky.cross(unit);
+                let side = sideways.try_normalize().unwrap_or_else(|| self.right.normalize_or(DVec3::X));
+                self.direction = unit * length;
+                self.up = unit.cross(side) * up;
+                self.right = side * if is_left { right } else { -right };
+            }
+        }
+        if self.kind == Projection::Orthographic
+            && let Some(distance) = distance
+            && (self.angle.is_some() || !self.has_frame)
+        {
+            let scale = distance / self.direction.length();
+            self.right *= scale;
+            self.up *= scale;
+        }
+    }
+
+    fn move_by(&mut self, map: &Transform) {
+        self.location = map.point(self.location);
+        self.direction = map.vector(self.direction);
+        self.up = map.vector(self.up);
+        self.right = map.vector(self.right);
+        self.focal_point = self.focal_point.map(|p| map.point(p));
+    }
+
+    /// The camera of the scene; `None` if its axes lie in a plane.
+    pub(super) fn camera(&self) -> Option<Camera> {
+        let (right, up, direction) = (self.right, self.up, self.direction);
+        let lengths = DVec3::new(right.length(), up.length(), direction.length());
+        let is_square = right.dot(up).abs() < 1e-9 * lengths.x * lengths.y
+            && right.dot(direction).abs() < 1e-9 * lengths.x * lengths.z
+            && up.dot(direction).abs() < 1e-9 * lengths.y * lengths.z;
+        // Unit axes where they can be, so that a lens is round; else those of the scene, askew.
+        let (axes, half) = if is_square {
+            let scale = if self.kind == Projection::Orthographic { 1.0 } else { lengths.z };
+            (
+                DMat3::from_cols(right / lengths.x, up / lengths.y, direction / lengths.z),
+                lengths * (0.5 / scale),
+            )
+        } else {
+            (DMat3::from_cols(right, up, direction), DVec3::splat(0.5))
+        };
+        let map = Transform::from_affine(DAffine3 { matrix3: axes, translation: self.location }).ok()?;
+        let focal_distance = self.focal_point.map_or(1.0, |p| map.inverse_point(p).z);
+        let has_lens = self.aperture > 0.0 && self.focal_point.is_some() && focal_distance > 0.0;
+        let lens_radius = if has_lens { 0.5 * self.aperture } else { 0.0 };
+        if let Some(wide) = self.wide(lengths) {
+            let mapping = SphericalMapping::Wide(wide);
+            return Some(Camera::new(CameraKind::Spherical { mapping }, map));
+        }
+        let kind = match self.kind {
+            Projection::Perspective => CameraKind::Perspective { fov: 90.0, lens_radius, focal_distance },
+            _ => CameraKind::Orthographic { lens_radius, focal_distance },
+        };
+        let mut camera = Camera::new(kind, map);
+        camera.screen_window = Some([-half.x, half.x, -half.y, half.y]);
+        Some(camera)
+    }
+
+    /// The wide projection of the camera, if it has one; by the lengths of its axes.
+    fn wide(&self, lengths: DVec3) -> Option<WideProjection> {
+        let angle = self.angle.unwrap_or(90.0);
+        Some(match self.kind {
+            Projection::Perspective | Projection::Orthographic => return None,
+            Projection::Fisheye => WideProjection::Fisheye {
+                angle: self.angle.unwrap_or(180.0),
+                size: DVec2::new(lengths.x, lengths.y),
+            },
+            Projection::UltraWide => {
+                WideProjection::UltraWide { angles: DVec2::new(angle, angle * lengths.y / lengths.x) }
+            }
+            Projection::Panoramic => WideProjection::Panoramic { axes: lengths },
+            Projection::Cylinder(kind) if kind % 2 == 1 => {
+                WideProjection::UprightCylinder { angle, height: lengths.y, moves: kind == 3 }
+            }
+            Projection::Cylinder(kind) => {
+                WideProjection::LyingCylinder { angle, width: lengths.x, moves: kind == 4 }
+            }
+            Projection::Spherical => {
+                let across = self.angle.unwrap_or(360.0);
+                let upwards = self.height_angle.unwrap_or(0.5 * across);
+                WideProjection::Sphere { angles: DVec2::new(across, upwards) }
+            }
+        })
+    }
+}
+
+impl Parser<'_, '_> {
+    /// A camera in braces, from one without them.
+    pub(super) fn camera_block(&mut self, mut camera: CameraStatement) -> Result<CameraStatement> {
+        let outer = self.declaring.take();
+        self.expect(b'{')?;
+        let mut is_aimed = false;
+        while !self.take(b'}')? {
+            if self.take(b',')? {
+                continue;
+            }
+            let is_transform = matches!(
+                self.word()?.as_deref(),
+                Some("translate" | "rotate" | "scale" | "matrix" | "transform")
+            );
+            if is_transform && let Some(map) = self.transform()? {
+                if !std::mem::replace(&mut is_aimed, true) {
+                    camera.aim();
+                }
+                camera.move_by(&map);
+                continue;
+            }
+            let Some(word) = self.word()? else { return Err(self.unexpected("what a camera has")) };
+            self.peeked = None;
+            match &*word {
+                "perspective" => camera.kind = Projection::Perspective,
+                "orthographic" => camera.kind = Projection::Orthographic,
+                "fisheye" => camera.kind = Projection::Fisheye,
+                "ultra_wide_angle" => camera.kind = Projection::UltraWide,
+                "panoramic" => camera.kind = Projection::Panoramic,
+                "spherical" => camera.kind = Projection::Spherical,
+                "omnimax" => self.warn("the camera omnimax is rendered in perspective"),
+                "cylinder" => camera.kind = Projection::Cylinder(self.whole(1.0, 4.0)?),
+                "mesh_camera" | "user_defined" => {
+                    self.warn(&format!("the camera {word} is rendered in perspective"));
+                    self.expect(b'{')?;
+                    self.skip_to(b'}')?;
+                }
+                "location" => camera.location = self.vector()?,
+                "direction" => camera.direction = self.vector()?,
+                "up" => {
+                    camera.up = self.vector()?;
+                    camera.has_frame = true;
+                }
+                "right" => {
+                    camera.right = self.vector()?;
+                    camera.has_frame = true;
+                }
+                "sky" => camera.sky = self.vector()?,
+                "look_at" => camera.look_at = Some(self.vector()?),
+                "angle" => {
+                    camera.angle = Some(self.finite()?);
+                    if self.take(b',')? || matches!(self.peek()?, Some(Kind::Number(_))) {
+                        camera.height_angle = Some(self.finite()?);
+                    }
+                }
+                "aperture" => camera.aperture = self.finite()?,
+                "focal_point" => camera.focal_point = Some(self.vector()?),
+                "blur_samples" => {
+                    self.float()?;
+                    if self.take(b',')? {
+                        self.float()?;
+                    }
+                }
+                "confidence" | "variance" => {
+                    self.float()?;
+                }
+                "normal" => {
+                    self.warn("the normal of a camera is not rendered");
+                    self.expect(b'{')?;
+                    self.skip_to(b'}')?;
+                }
+                _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
+                    Some(Value::Camera(known)) => {
+                        camera = (*known).clone();
+                        is_aimed = true;
+                    }
+                    Some(other) => {
+                        return Err(self.error(format!("a camera is needed, not {}", other.name())));
+                    }
+                    None if super::words::is_reserved(&word) => {
+                        return Err(self.error(format!("{word} has no meaning for a camera")));
+                    }
+                    None => return Err(self.undeclared(&word)),
+                },
+            }
+        }
+        if !is_aimed {
+            camera.aim();
+            // What follows is in the place of what it looked at.
+            camera.look_at = None;
+            if camera.kind == Projection::Perspective {
+                camera.angle = None;
+            }
+        }
+        self.declaring = outer;
+        Ok(camera)
+    }
+}
+
+/// A camera for values.
+pub(super) fn shared(camera: CameraStatement) -> Value {
+    Value::Camera(Rc::new(camera))
+}

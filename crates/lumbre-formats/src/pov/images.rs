@@ -1,0 +1,134 @@
+//! Images of a scene.
+
+use std::sync::Arc;
+
+use lumbre_shading::Spectrum;
+use lumbre_shading::pov::{Colour, ImageMap, ImageProjection, ImageSource};
+
+use super::lexer::Kind;
+use super::{Parser, Result};
+use crate::Diagnostic;
+use crate::diagnostic::quoted;
+
+impl Parser<'_, '_> {
+    /// An image with what modifies it, up to its closing brace.
+    pub(super) fn image_body(&mut self) -> Result<ImageMap> {
+        let mut image = self.image_source()?;
+        while !self.take(b'}')? {
+            if self.take(b',')? {
+                continue;
+            }
+            let Some(word) = self.word()? else { return Err(self.unexpected("what modifies an image")) };
+            self.peeked = None;
+            match &*word {
+                "once" => image.once = true,
+                "interpolate" => image.interpolate = self.float()? != 0.0,
+                "map_type" => {
+                    image.projection = match self.float()? as i64 {
+                        0 => ImageProjection::Planar,
+                        1 => ImageProjection::Spherical,
+                        2 => ImageProjection::Cylindrical,
+                        5 => ImageProjection::Toroidal,
+                        _ => {
+                            self.warn("a map_type that is not rendered: the image lies in a plane");
+                            ImageProjection::Planar
+                        }
+                    }
+                }
+                "filter" | "transmit" => {
+                    if self.take_word("all")? {
+                        let value = Some(self.finite()? as f32);
+                        if &*word == "filter" { image.filter = value } else { image.transmit = value }
+                    } else {
+                        self.float()?;
+                        self.comma()?;
+                        self.float()?;
+                        self.warn("the transparency of single colours of a palette is not rendered");
+                    }
+                }
+                "gamma" => {
+                    if !self.take_word("srgb")? {
+                        self.float()?;
+                    }
+                    self.warn("the gamma of an image is that of its file");
+                }
+                "premultiplied" | "use_alpha" | "use_color" | "use_colour" | "use_index" => {
+                    self.optional_bool()?;
+                }
+                _ => return Err(self.error(format!("{word} has no meaning for an image"))),
+            }
+        }
+        Ok(image)
+    }
+
+    fn image_source(&mut self) -> Result<ImageMap> {
+        let mut image = ImageMap {
+            source: ImageSource::Pixels(Arc::from([Colour::default()])),
+            width: 1,
+            height: 1,
+            projection: ImageProjection::Planar,
+            once: false,
+            interpolate: false,
+            filter: None,
+            transmit: None,
+        };
+        if self.take_word("function")? {
+            image.width = self.whole(2.0, 65_536.0)?;
+            self.comma()?;
+            image.height = self.whole(2.0, 65_536.0)?;
+            image.source = ImageSource::Function(self.function_block(&["x", "y", "z"])?);
+            return Ok(image);
+        }
+        // The kind is told by the file.
+        if !matches!(self.peek()?, Some(Kind::Text(_)))
+            && matches!(
+                self.word()?.as_deref(),
+                Some(
+                    "png"
+                        | "jpeg"
+                        | "tga"
+                        | "ppm"
+                        | "pgm"
+                        | "tiff"
+                        | "gif"
+                        | "sys"
+                        | "exr"
+                        | "hdr"
+                        | "iff"
+                        | "pot"
+                )
+            )
+        {
+            self.peeked = None;
+        }
+        let name = self.file_name()?;
+        let Some(path) = self.find(&name) else {
+            let wrong = Diagnostic::error("an image that is not there").found(quoted(&name));
+            return Err(self.diagnostic(wrong).into());
+        };
+        let read = crate::image::open_image(&path, self.budget, self.diagnostics);
+        match read.and_then(|file| file.to_image(self.budget)) {
+            Ok(read) => {
+                (image.width, image.height) = (read.width(), read.height());
+                let mut pixels =
+                    self.budget.vec(u64::from(image.width) * u64::from(image.height), "pixels")?;
+                for y in 0..image.height {
+                    for x in 0..image.width {
+                        let rgb = read.pixel(x, y);
+                        let c = self.settings.from_linear(Spectrum::new(rgb.r, rgb.g, rgb.b));
+                        let alpha = read.alpha().map_or(1.0, |alpha| alpha[(y * image.width + x) as usize]);
+                        pixels.push(Colour { transmit: 1.0 - alpha, ..Colour::opaque(c) });
+                    }
+                }
+                image.source = ImageSource::Pixels(pixels.into());
+            }
+            Err(error) => {
+                let wrong = Diagnostic::warning("an image that cannot be read is black")
+                    .found(quoted(&error.to_string()));
+                let wrong = self.diagnostic(wrong);
+                self.diagnostics.push(wrong);
+            }
+        }
+        Ok(image)
+    }
+}

@@ -1,0 +1,349 @@
+//! Surfaces of functions, and fields of heights.
+
+use std::sync::Arc;
+
+use lumbre_geometry::{Aabb, Ray, Root, Roots};
+use lumbre_math::{DVec2, DVec3, Vec2, Vec3};
+use lumbre_scene::MeshDesc;
+use lumbre_shading::pov::Function;
+
+use super::lexer::Kind;
+use super::objects::Form;
+use super::{Parser, Result};
+use crate::Diagnostic;
+use crate::diagnostic::quoted;
+
+/// Where a function of x, y and z is below a threshold, within a box or a sphere.
+#[derive(Clone, Debug)]
+pub(super) struct Iso {
+    function: Arc<Function>,
+    container: Container,
+    threshold: f64,
+    accuracy: f64,
+    max_gradient: f64,
+    open: bool,
+}
+
+#[derive(Clone, Debug)]
+enum Container {
+    Cuboid(DVec3, DVec3),
+    Sphere(DVec3, f64),
+}
+
+impl Container {
+    fn range(&self, ray: &Ray) -> Option<[f64; 2]> {
+        match self {
+            Self::Cuboid(low, high) => {
+                let (a, b) = ((*low - ray.origin) / ray.direction, (*high - ray.origin) / ray.direction);
+                let (near, far) = (a.min(b).max_element(), a.max(b).min_element());
+                (near < far).then_some([near, far])
+            }
+            Self::Sphere(center, radius) => {
+                let away = ray.origin - *center;
+                let a = ray.direction.length_squared();
+                let half = away.dot(ray.direction);
+                let rest = half * half - a * (away.length_squared() - radius * radius);
+                (rest > 0.0).then(|| [(-half - rest.sqrt()) / a, (-half + rest.sqrt()) / a])
+            }
+        }
+    }
+
+    fn contains(&self, p: DVec3) -> bool {
+        match self {
+            Self::Cuboid(low, high) => low.cmple(p).all() && p.cmple(*high).all(),
+            Self::Sphere(center, radius) => (p - *center).length() <= *radius,
+        }
+    }
+
+    fn normal(&self, p: DVec3) -> DVec3 {
+        match self {
+            Self::Cuboid(low, high) => {
+                let q = (p - 0.5 * (*low + *high)) / (0.5 * (*high - *low));
+                let size = q.abs();
+                let axis = if size.x >= size.y && size.x >= size.z {
+                    DVec3::X
+                } else if size.y >= size.z {
+                    DVec3::Y
+                } else {
+                    DVec3::Z
+                };
+                axis * q.dot(axis).signum()
+            }
+            Self::Sphere(center, _) => p - *center,
+        }
+    }
+}
+
+/// The part of roots on the container.
+const ON_CONTAINER: u32 = 1;
+/// A ray looks at the function at most so often.
+const MOST_EVALUATIONS: u32 = 50_000;
+
+impl Iso {
+    fn value(&self, p: DVec3) -> f64 {
+        self.function.value(&p.to_array()) - self.threshold
+    }
+
+    pub(super) fn contains(&self, p: DVec3) -> bool {
+        self.container.contains(p) && self.value(p) < 0.0
+    }
+
+    pub(super) fn bounds(&self) -> Aabb {
+        match &self.container {
+            Container::Cuboid(min, max) => Aabb { min: *min, max: *max },
+            Container::Sphere(center, radius) => {
+                Aabb { min: *center - DVec3::splat(*radius), max: *center + DVec3::splat(*radius) }
+            }
+        }
+    }
+
+    pub(super) fn normal(&self, p: DVec3, root: &Root) -> DVec3 {
+        if root.part == ON_CONTAINER {
+            return self.container.normal(p);
+        }
+        let step = self.accuracy;
+        let here = self.value(p);
+        let slope = |axis: DVec3| self.value(p + axis * step) - here;
+        DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z))
+    }
+
+    pub(super) fn roots(&self, ray: &Ray, out: &mut Roots) {
+        let Some([near, far]) = self.container.range(ray) else { return };
+        // The sides of the container that are inside of the surface.
+        let on_container = |t: f64, out: &mut Roots| {
+            if !self.open && ray.contains(t) && self.value(ray.at(t)) < 0.0 {
+                out.push(Root { part: ON_CONTAINER, ..Root::at(t) });
+            }
+        };
+        on_container(near, out);
+        let (low, high) = (near.max(ray.t_min), far.min(ray.t_max));
+        if low < high {
+            let length = ray.direction.length();
+            let slope = self.max_gradient * length;
+            let least = self.accuracy / length;
+            let at = |t: f64| self.value(ray.at(t));
+            // Pieces, the nearest last.
+            let mut pieces = vec![(low, at(low), high, at(high))];
+            let mut evaluations = 0;
+            while let Some((a, fa, b, fb)) = pieces.pop() {
+                let changes = (fa < 0.0) != (fb < 0.0);
+                // No slower than this it can have been at zero between.
+                if !changes && fa.abs() + fb.abs() > slope * (b - a) {
+                    continue;
+                }
+                if b - a < least || evaluations > MOST_EVALUATIONS {
+                    if changes {
+                        out.push(Root::at(refined(&at, a, b, fa < 0.0)));
+                    }
+                    continue;
+                }
+                evaluations += 1;
+                let middle = 0.5 * (a + b);
+                let fm = at(middle);
+                pieces.push((middle, fm, b, fb));
+                pieces.push((a, fa, middle, fm));
+            }
+        }
+        on_container(far, out);
+    }
+}
+
+/// The place where a function changes its sign.
+fn refined(at: &impl Fn(f64) -> f64, mut a: f64, mut b: f64, begins_inside: bool) -> f64 {
+    for _ in 0..24 {
+        let middle = 0.5 * (a + b);
+        if (at(middle) < 0.0) == begins_inside {
+            a = middle;
+        } else {
+            b = middle;
+        }
+    }
+    0.5 * (a + b)
+}
+
+impl Parser<'_, '_> {
+    /// An isosurface, up to what modifies it.
+    pub(super) fn isosurface(&mut self) -> Result<Form> {
+        if !self.take_word("function")? {
+            return Err(self.unexpected("function"));
+        }
+        let known = match self.peek()? {
+            Some(Kind::Mark(b'{')) => None,
+            _ => Some(()),
+        };
+        if known.is_some() {
+            return Err(self.unexpected("a function in braces"));
+        }
+        let function = self.function_block(&["x", "y", "z"])?;
+        let mut iso = Iso {
+            function,
+            container: Container::Cuboid(-DVec3::ONE, DVec3::ONE),
+            threshold: 0.0,
+            accuracy: 0.001,
+            max_gradient: 1.1,
+            open: false,
+        };
+        loop {
+            let word = self.word()?;
+            match word.as_deref() {
+                Some("contained_by") => {
+                    self.peeked = None;
+                    iso.container = self.container()?;
+                }
+                Some("threshold") => {
+                    self.peeked = None;
+                    iso.threshold = self.finite()?;
+                }
+                Some("accuracy") => {
+                    self.peeked = None;
+                    iso.accuracy = self.finite()?.max(1e-9);
+                }
+                Some("max_gradient") => {
+                    self.peeked = None;
+                    iso.max_gradient = self.finite()?.abs();
+                }
+                Some("evaluate") => {
+                    self.peeked = None;
+                    iso.max_gradient = self.finite()?.abs();
+                    self.comma()?;
+                    self.float()?;
+                    self.comma()?;
+                    self.float()?;
+                    // The function may be steeper than where it begins.
+                    iso.max_gradient *= 2.0;
+                }
+                Some("open") => {
+                    self.peeked = None;
+                    iso.open = true;
+                }
+                Some("max_trace") => {
+                    self.peeked = None;
+                    self.float()?;
+                }
+                Some("all_intersections") => self.peeked = None,
+                _ => return Ok(Form::Iso(Arc::new(iso))),
+            }
+        }
+    }
+
+    fn container(&mut self) -> Result<Container> {
+        self.expect(b'{')?;
+        let Some(word) = self.word()? else { return Err(self.unexpected("a box or a sphere")) };
+        self.peeked = None;
+        self.expect(b'{')?;
+        let first = self.vector()?;
+        self.comma()?;
+        let container = match &*word {
+            "box" => {
+                let second = self.vector()?;
+                Container::Cuboid(first.min(second), first.max(second))
+            }
+            "sphere" => Container::Sphere(first, self.finite()?.abs()),
+            _ => return Err(self.error("what contains an isosurface is a box or a sphere")),
+        };
+        self.expect(b'}')?;
+        self.expect(b'}')?;
+        Ok(container)
+    }
+
+    /// A field of heights as a mesh over the unit square, up to what modifies it.
+    pub(super) fn height_field(&mut self) -> Result<Form> {
+        let (width, height, heights) = self.heights()?;
+        let (mut is_smooth, mut water) = (false, 0.0);
+        loop {
+            if self.take_word("smooth")? {
+                is_smooth = self.optional_bool()?;
+            } else if self.take_word("water_level")? {
+                water = self.finite()?;
+            } else if self.take_word("hierarchy")? {
+                self.optional_bool()?;
+            } else {
+                break;
+            }
+        }
+        let at = |x: u32, y: u32| f64::from(heights[(y * width + x) as usize]);
+        let place = |x: u32, y: u32| {
+            let (u, v) = (f64::from(x) / f64::from(width - 1), f64::from(y) / f64::from(height - 1));
+            // The first row is at the far side.
+            DVec3::new(u, at(x, y), 1.0 - v)
+        };
+        let count = u64::from(width) * u64::from(height);
+        self.budget.elements(2 * count, "triangles of a height field")?;
+        self.budget.bytes(56 * count, "triangles of a height field")?;
+        let mut mesh = MeshDesc::default();
+        let mut normals = Vec::new();
+        let mut uvs = Vec::new();
+        for y in 0..height {
+            for x in 0..width {
+                let p = place(x, y);
+                mesh.positions.push(Vec3::new(p.x as f32, p.y as f32, p.z as f32));
+                uvs.push(Vec2::new(p.x as f32, p.z as f32));
+                let (left, right) = (place(x.saturating_sub(1), y), place((x + 1).min(width - 1), y));
+                let (up, down) = (place(x, y.saturating_sub(1)), place(x, (y + 1).min(height - 1)));
+                let n = (up - down).cross(right - left).normalize_or(DVec3::Y);
+                normals.push(Vec3::new(n.x as f32, n.y as f32, n.z as f32));
+            }
+        }
+        for y in 0..height - 1 {
+            for x in 0..width - 1 {
+                let i = y * width + x;
+                let [a, b, c, d] = [i, i + 1, i + width, i + width + 1];
+                for face in [[a, b, c], [b, d, c]] {
+                    if face.iter().any(|&i| f64::from(mesh.positions[i as usize].y) >= water) {
+                        mesh.triangles.push(face);
+                    }
+                }
+            }
+        }
+        mesh.uvs = Some(uvs);
+        mesh.normals = is_smooth.then_some(normals);
+        Ok(Form::Mesh(Arc::new(mesh)))
+    }
+
+    /// Columns, rows, and heights row by row.
+    fn heights(&mut self) -> Result<(u32, u32, Vec<f32>)> {
+        if self.take_word("function")? {
+            let width = self.whole(2.0, 65_536.0)?;
+            self.comma()?;
+            let height = self.whole(2.0, 65_536.0)?;
+            let function = self.function_block(&["x", "y", "z"])?;
+            let mut heights = self.budget.vec(u64::from(width) * u64::from(height), "heights")?;
+            let step = |i: u32, n: u32| f64::from(i) / f64::from(n - 1);
+            for y in 0..height {
+                for x in 0..width {
+                    let p = DVec2::new(step(x, width), step(y, height));
+                    heights.push(function.value(&[p.x, p.y, 0.0]).clamp(0.0, 1.0) as f32);
+                }
+            }
+            return Ok((width, height, heights));
+        }
+        if matches!(self.peek()?, Some(Kind::Word(word)) if !matches!(&**word, "concat")) {
+            self.peeked = None;
+        }
+        let name = self.file_name()?;
+        let Some(path) = self.find(&name) else {
+            let wrong = Diagnostic::error("an image that is not there").found(quoted(&name));
+            return Err(self.diagnostic(wrong).into());
+        };
+        let file = crate::image::open_image(&path, self.budget, self.diagnostics)?;
+        let bitmap = &file.bitmap;
+        let (width, height) = (bitmap.width(), bitmap.height());
+        if width < 2 || height < 2 {
+            return Err(self.error("the image of a height field has two columns and rows or more"));
+        }
+        let mut heights = self.budget.vec(u64::from(width) * u64::from(height), "heights")?;
+        let is_gray = matches!(bitmap.channels(), lumbre_image::Channels::Y | lumbre_image::Channels::Ya);
+        for y in 0..height {
+            for x in 0..width {
+                // Numbers as they are stored; of colours red is the high byte and green the low one.
+                let value = if is_gray {
+                    bitmap.stored(x, y, 0)
+                } else {
+                    (bitmap.stored(x, y, 0) * 256.0 + bitmap.stored(x, y, 1)) / 257.0
+                };
+                heights.push(value);
+            }
+        }
+        Ok((width, height, heights))
+    }
+}

@@ -1,0 +1,741 @@
+//! Pigments, normals, finishes, textures, interiors and materials.
+
+use std::rc::Rc;
+use std::sync::Arc;
+
+use lumbre_shading::Spectrum;
+use lumbre_shading::pov::{
+    Colour, ColourMap, Finish, Interior, Layer, Normal, NormalKind, Pattern, PatternKind, Pigment,
+    PigmentKind, Texture, TextureKind, Warps,
+};
+
+use super::lexer::Kind;
+use super::maps::{Map, default_blocks, default_colours};
+use super::patterns::Draft;
+use super::value::Value;
+use super::{Parser, Result};
+
+pub(super) type FinishStatement = Finish;
+pub(super) type InteriorStatement = Interior;
+
+/// A texture with an interior.
+#[derive(Clone, Debug, Default)]
+pub(super) struct MaterialStatement {
+    pub texture: Option<Arc<Texture>>,
+    pub interior_texture: Option<Arc<Texture>>,
+    pub interior: Option<Rc<Interior>>,
+}
+
+/// What a scene has set by `#default`.
+#[derive(Clone, Debug)]
+pub(super) struct Defaults {
+    pub layer: Layer,
+    /// A texture that is no single layer.
+    pub texture: Option<Arc<Texture>>,
+}
+
+impl Defaults {
+    pub(super) fn new() -> Self {
+        let pigment = Arc::new(Pigment::plain(Colour::default()));
+        Self { layer: Layer { pigment, normal: None, finish: Arc::new(Finish::DEFAULT) }, texture: None }
+    }
+
+    pub(super) fn texture(&self) -> Arc<Texture> {
+        self.texture.clone().unwrap_or_else(|| Arc::new(Texture::plain(self.layer.clone())))
+    }
+}
+
+impl Parser<'_, '_> {
+    /// `#default { … }`.
+    pub(super) fn default_directive(&mut self) -> Result<()> {
+        self.expect(b'{')?;
+        while !self.take(b'}')? {
+            let Some(word) = self.word()? else {
+                return Err(self.unexpected("texture, pigment, normal, finish"));
+            };
+            self.peeked = None;
+            match &*word {
+                "texture" => {
+                    self.expect(b'{')?;
+                    let texture = self.texture_body(b'}')?;
+                    match &texture.kind {
+                        TextureKind::Plain(layer) if texture.warps.0.is_empty() => {
+                            self.defaults.layer = layer.clone();
+                            self.defaults.texture = None;
+                        }
+                        _ => self.defaults.texture = Some(texture),
+                    }
+                }
+                "pigment" => {
+                    self.expect(b'{')?;
+                    self.defaults.layer.pigment = self.pigment_body(None, b'}')?;
+                }
+                "normal" => {
+                    self.expect(b'{')?;
+                    self.defaults.layer.normal = Some(self.normal_body(None, b'}')?);
+                }
+                "finish" => {
+                    let base = (*self.defaults.layer.finish).clone();
+                    self.defaults.layer.finish = Arc::new(self.finish_block(base)?);
+                }
+                "camera" => {
+                    let camera = self.camera_block(self.default_camera.clone())?;
+                    self.default_camera = camera;
+                }
+                "radiosity" | "interior" => {
+                    self.expect(b'{')?;
+                    self.skip_to(b'}')?;
+                }
+                _ => return Err(self.error("what cannot have a default")),
+            }
+        }
+        Ok(())
+    }
+
+    /// A pigment up to a closing mark.
+    pub(super) fn pigment_body(&mut self, base: Option<Arc<Pigment>>, end: u8) -> Result<Arc<Pigment>> {
+        let mut draft = Draft::new(None, Warps::default(), false);
+        let mut kind = PigmentKind::Colour(Colour::default());
+        let mut map: Option<Rc<Map>> = None;
+        let mut blocks: Vec<Arc<Pigment>> = Vec::new();
+        let mut is_average = false;
+        if let Some(base) = base {
+            (draft, kind) = opened(&base);
+        }
+        while !self.take(end)? {
+            if self.take(b',')? {
+                continue;
+            }
+            if self.is_colour()? {
+                let colour = self.colour()?.as_colour();
+                match &draft.pattern {
+                    Some(pattern) if pattern.is_block() => blocks.push(Arc::new(Pigment::plain(colour))),
+                    _ => kind = PigmentKind::Colour(colour),
+                }
+                continue;
+            }
+            let Some(word) = self.word()? else { return Err(self.unexpected("a pigment")) };
+            if let Some(found) = self.map(&word)? {
+                map = Some(found);
+                continue;
+            }
+            if let Some(found) = self.pattern_kind(&word)? {
+                let mut pattern = Pattern::new(found, self.settings.generator);
+                pattern.octaves = draft.octaves;
+                draft.pattern = Some(pattern);
+                continue;
+            }
+            if self.pattern_modifier(&word, &mut draft)? {
+                continue;
+            }
+            match &*word {
+                "pigment" => {
+                    self.peeked = None;
+                    self.expect(b'{')?;
+                    blocks.push(self.pigment_body(None, b'}')?);
+                }
+                "average" => {
+                    self.peeked = None;
+                    is_average = true;
+                }
+                "image_map" => {
+                    self.peeked = None;
+                    self.expect(b'{')?;
+                    kind = PigmentKind::Image(Box::new(self.image_body()?));
+                }
+                "quick_color" | "quick_colour" => {
+                    self.peeked = None;
+                    self.colour()?;
+                }
+                "object" | "density_file" | "magnet" | "pavement" | "tiling" | "facets" => {
+                    self.peeked = None;
+                    self.warn(&format!("the pattern {word} is not rendered"));
+                    if self.is_mark(b'{')? {
+                        self.expect(b'{')?;
+                        self.skip_to(b'}')?;
+                    }
+                    while matches!(self.peek()?, Some(Kind::Text(_) | Kind::Number(_))) {
+                        self.next()?;
+                    }
+                    draft.pattern = Some(Pattern::new(PatternKind::Noise, self.settings.generator));
+                }
+                _ => {
+                    let Some(cell) = self.lookup(&word).cloned() else {
+                        return Err(if super::words::is_reserved(&word) {
+                            self.unexpected("a pigment")
+                        } else {
+                            self.undeclared(&word)
+                        });
+                    };
+                    self.peeked = None;
+                    let value = cell.borrow().clone();
+                    match self.indexed(value)? {
+                        Value::Pigment(base) if draft.pattern.as_ref().is_some_and(Pattern::is_block) => {
+                            blocks.push(base)
+                        }
+                        Value::Pigment(base) => (draft, kind) = opened(&base),
+                        Value::Num(num) => kind = PigmentKind::Colour(num.as_colour()),
+                        other => return Err(self.error(format!("a pigment is needed, not {}", other.name()))),
+                    }
+                }
+            }
+        }
+        let kind = self.pigment_kind(&mut draft, kind, map, blocks, is_average)?;
+        Ok(Arc::new(Pigment { kind, warps: draft.warps, uv: draft.uv }))
+    }
+
+    fn pigment_kind(
+        &mut self,
+        draft: &mut Draft,
+        kind: PigmentKind,
+        map: Option<Rc<Map>>,
+        mut blocks: Vec<Arc<Pigment>>,
+        is_average: bool,
+    ) -> Result<PigmentKind> {
+        if is_average {
+            return match map.as_deref() {
+                Some(Map::Pigments(entries)) => Ok(PigmentKind::Average(entries.clone().into())),
+                Some(Map::Colours(entries)) => Ok(PigmentKind::Average(
+                    entries
+                        .iter()
+                        .map(|(weight, colour)| (*weight, Arc::new(Pigment::plain(*colour))))
+                        .collect(),
+                )),
+                _ => Err(self.error("an average without a map")),
+            };
+        }
+        let Some(pattern) = draft.pattern.take() else { return Ok(kind) };
+        let pattern = Box::new(pattern);
+        match (map.as_deref(), kind) {
+            (Some(Map::Colours(entries)), _) => {
+                Ok(PigmentKind::Map(pattern, Arc::new(ColourMap::new(entries.clone()))))
+            }
+            (Some(Map::Pigments(entries)), _) => Ok(PigmentKind::Pigments(pattern, entries.clone().into())),
+            (Some(_), _) => Err(self.error("a pigment has a map of colours or pigments")),
+            (None, PigmentKind::Map(_, map)) => Ok(PigmentKind::Map(pattern, map)),
+            (None, PigmentKind::Pigments(_, map)) => Ok(PigmentKind::Pigments(pattern, map)),
+            (None, PigmentKind::Blocks(_, known)) if blocks.is_empty() => {
+                Ok(PigmentKind::Blocks(pattern, known))
+            }
+            (None, _) => match pattern.block_count() {
+                Some(count) => {
+                    let is_brick = matches!(pattern.kind, PatternKind::Brick { .. });
+                    let rest = default_blocks(count, is_brick).into_iter().skip(blocks.len());
+                    blocks.extend(rest.map(|colour| Arc::new(Pigment::plain(colour))));
+                    Ok(PigmentKind::Blocks(pattern, blocks.into()))
+                }
+                None => {
+                    let map = ColourMap::new(default_colours(&pattern.kind));
+                    Ok(PigmentKind::Map(pattern, Arc::new(map)))
+                }
+            },
+        }
+    }
+
+    /// A normal up to a closing mark.
+    pub(super) fn normal_body(&mut self, base: Option<Arc<Normal>>, end: u8) -> Result<Arc<Normal>> {
+        let mut draft = Draft::new(None, Warps::default(), false);
+        let mut amount = 0.5;
+        let mut accuracy = 0.02;
+        let mut no_bump_scale = false;
+        let mut special: Option<Rc<str>> = None;
+        let mut map: Option<Rc<Map>> = None;
+        let mut kept: Option<Arc<Normal>> = base;
+        let mut is_average = false;
+        let mut is_ignored = false;
+        let mut blocks: Vec<Arc<Normal>> = Vec::new();
+        while !self.take(end)? {
+            if self.take(b',')? {
+                continue;
+            }
+            // The amount stands behind the pattern.
+            if draft.pattern.is_some() || kept.is_some() || is_average {
+                if let Some(Kind::Number(_) | Kind::Mark(b'-' | b'+' | b'(' | b'.')) = self.peek()? {
+                    amount = self.finite()?;
+                    continue;
+                }
+            }
+            let Some(word) = self.word()? else { return Err(self.unexpected("a normal")) };
+            if let Some(found) = self.map(&word)? {
+                map = Some(found);
+                continue;
+            }
+            if let Some(found) = self.pattern_kind(&word)? {
+                let mut pattern = Pattern::new(found, self.settings.generator);
+                pattern.octaves = draft.octaves;
+                draft.pattern = Some(pattern);
+                special = Some(word);
+                continue;
+            }
+            if self.pattern_modifier(&word, &mut draft)? {
+                continue;
+            }
+            self.peeked = None;
+            match &*word {
+                "bump_size" => amount = self.finite()?,
+                "accuracy" => accuracy = self.finite()?.max(1e-9),
+                "no_bump_scale" => no_bump_scale = self.optional_bool()?,
+                "average" => is_average = true,
+                "normal" => {
+                    self.expect(b'{')?;
+                    blocks.push(self.normal_body(None, b'}')?);
+                }
+                "bump_map" | "facets" | "object" | "density_file" | "tiling" | "pavement" | "magnet" => {
+                    self.warn(&format!("the normal {word} is not rendered"));
+                    is_ignored = true;
+                    if self.is_mark(b'{')? {
+                        self.expect(b'{')?;
+                        self.skip_to(b'}')?;
+                    }
+                    while matches!(self.peek()?, Some(Kind::Text(_) | Kind::Number(_)))
+                        || matches!(self.word()?.as_deref(), Some("coords" | "size" | "interpolate"))
+                    {
+                        self.next()?;
+                    }
+                }
+                _ => {
+                    let value = match self.lookup(&word).cloned() {
+                        Some(cell) => self.indexed(cell.borrow().clone())?,
+                        None if super::words::is_reserved(&word) => {
+                            return Err(self.error(format!("{word} has no meaning in a normal")));
+                        }
+                        None => return Err(self.undeclared(&word)),
+                    };
+                    match value {
+                        Value::Normal(known) => {
+                            draft.warps = known.warps.clone();
+                            amount = known.amount;
+                            kept = Some(known);
+                        }
+                        Value::Num(num) if draft.pattern.is_some() => amount = num.v[0],
+                        other => return Err(self.error(format!("a normal is needed, not {}", other.name()))),
+                    }
+                }
+            }
+        }
+        let kind = if is_average {
+            match map.as_deref() {
+                Some(Map::Normals(entries)) => NormalKind::Average(entries.clone().into()),
+                _ => return Err(self.error("an average without a map")),
+            }
+        } else if let Some(pattern) = draft.pattern {
+            normal_kind(pattern, special.as_deref(), map.as_deref(), blocks)
+        } else if let Some(known) = &kept {
+            accuracy = known.accuracy;
+            no_bump_scale |= known.no_bump_scale;
+            known.kind.clone()
+        } else {
+            if !is_ignored && map.is_some() {
+                return Err(self.error("a normal without a pattern"));
+            }
+            NormalKind::Average(Arc::from([]))
+        };
+        Ok(Arc::new(Normal { kind, warps: draft.warps, amount, accuracy, no_bump_scale, uv: draft.uv }))
+    }
+
+    /// A texture up to a closing mark.
+    pub(super) fn texture_body(&mut self, end: u8) -> Result<Arc<Texture>> {
+        let mut layer = self.defaults.layer.clone();
+        let mut base: Option<Arc<Texture>> = self.defaults.texture.clone();
+        let mut layers: Vec<Arc<Texture>> = Vec::new();
+        let mut blocks: Vec<Arc<Texture>> = Vec::new();
+        let mut map: Option<Rc<Map>> = None;
+        let mut draft = Draft::new(None, Warps::default(), false);
+        let mut is_average = false;
+        while !self.take(end)? {
+            if self.take(b',')? {
+                continue;
+            }
+            let Some(word) = self.word()? else { return Err(self.unexpected("a texture")) };
+            match &*word {
+                "pigment" | "normal" | "finish" => {
+                    self.peeked = None;
+                    // What is known changes; where it has been moved, this is written into what has been moved.
+                    if let Some(known) = &base
+                        && let TextureKind::Plain(inner) = &known.kind
+                    {
+                        layer = inner.clone();
+                    }
+                    self.layer_part(&word, &mut layer)?;
+                    base = base.and_then(|known| match &known.kind {
+                        TextureKind::Plain(_) => Some(Arc::new(Texture {
+                            kind: TextureKind::Plain(layer.clone()),
+                            warps: known.warps.clone(),
+                            uv: known.uv,
+                        })),
+                        _ => None,
+                    });
+                    continue;
+                }
+                "texture" => {
+                    self.peeked = None;
+                    self.expect(b'{')?;
+                    let inner = self.texture_body(b'}')?;
+                    if draft.pattern.is_some() {
+                        blocks.push(inner)
+                    } else {
+                        layers.push(inner)
+                    }
+                    continue;
+                }
+                "average" => {
+                    self.peeked = None;
+                    is_average = true;
+                    continue;
+                }
+                "material_map" => {
+                    self.peeked = None;
+                    self.warn("material_map is not rendered");
+                    self.expect(b'{')?;
+                    self.skip_to(b'}')?;
+                    continue;
+                }
+                "tiles" | "tile2" => {
+                    self.peeked = None;
+                    if &*word == "tiles" {
+                        draft.pattern = Some(Pattern::new(PatternKind::Checker, self.settings.generator));
+                        self.expect(b'{')?;
+                        while !self.take(b'}')? {
+                            if self.take_word("tile2")? {
+                                continue;
+                            }
+                            if !self.take_word("texture")? {
+                                return Err(self.unexpected("the texture of a tile"));
+                            }
+                            self.expect(b'{')?;
+                            blocks.push(self.texture_body(b'}')?);
+                        }
+                    }
+                    continue;
+                }
+                _ => {}
+            }
+            if let Some(found) = self.map(&word)? {
+                map = Some(found);
+                continue;
+            }
+            if let Some(found) = self.pattern_kind(&word)? {
+                draft.pattern = Some(Pattern::new(found, self.settings.generator));
+                continue;
+            }
+            // Transforms move what is written before them.
+            if draft.pattern.is_none()
+                && map.is_none()
+                && let Some(moved) = self.transform()?
+            {
+                let known = base.take().unwrap_or_else(|| Arc::new(Texture::plain(layer.clone())));
+                base = Some(known.moved(&moved));
+                layers.iter_mut().for_each(|layer| *layer = layer.moved(&moved));
+                continue;
+            }
+            if self.pattern_modifier(&word, &mut draft)? {
+                continue;
+            }
+            let Some(cell) = self.lookup(&word).cloned() else {
+                return Err(if super::words::is_reserved(&word) {
+                    self.unexpected("a texture")
+                } else {
+                    self.undeclared(&word)
+                });
+            };
+            self.peeked = None;
+            let value = cell.borrow().clone();
+            match self.indexed(value)? {
+                Value::Texture(known) if draft.pattern.is_some() => blocks.push(known),
+                Value::Texture(known) => base = Some(known),
+                Value::Pigment(pigment) => layer.pigment = pigment,
+                other => return Err(self.error(format!("a texture is needed, not {}", other.name()))),
+            }
+        }
+        let kind = match (draft.pattern, map.as_deref()) {
+            _ if is_average => match map.as_deref() {
+                Some(Map::Textures(entries)) => TextureKind::Average(entries.clone().into()),
+                _ => return Err(self.error("an average without a map")),
+            },
+            (Some(pattern), Some(Map::Textures(entries))) => {
+                TextureKind::Map(Box::new(pattern), entries.clone().into())
+            }
+            (Some(pattern), None) if !blocks.is_empty() => {
+                TextureKind::Blocks(Box::new(pattern), blocks.into())
+            }
+            (Some(_), _) => return Err(self.error("the pattern of a texture needs textures")),
+            (None, _) => {
+                return Ok(match layers.len() {
+                    0 => {
+                        let texture = base.unwrap_or_else(|| Arc::new(Texture::plain(layer)));
+                        if draft.uv { Arc::new(Texture { uv: true, ..(*texture).clone() }) } else { texture }
+                    }
+                    1 => layers.swap_remove(0),
+                    _ => Arc::new(Texture {
+                        kind: TextureKind::Layers(layers.into()),
+                        warps: Warps::default(),
+                        uv: draft.uv,
+                    }),
+                });
+            }
+        };
+        Ok(Arc::new(Texture { kind, warps: draft.warps, uv: draft.uv }))
+    }
+
+    /// The pigment, the normal or the finish of a layer, whose word was taken.
+    pub(super) fn layer_part(&mut self, word: &str, layer: &mut Layer) -> Result<()> {
+        match word {
+            "pigment" => {
+                self.expect(b'{')?;
+                layer.pigment = self.pigment_body(None, b'}')?;
+            }
+            "normal" => {
+                self.expect(b'{')?;
+                layer.normal = Some(self.normal_body(None, b'}')?);
+            }
+            _ => {
+                let base = (*self.defaults.layer.finish).clone();
+                layer.finish = Arc::new(self.finish_block(base)?);
+            }
+        }
+        Ok(())
+    }
+
+    /// A finish in braces, from what it is without them.
+    pub(super) fn finish_block(&mut self, mut finish: Finish) -> Result<Finish> {
+        self.expect(b'{')?;
+        while !self.take(b'}')? {
+            let Some(word) = self.word()? else { return Err(self.unexpected("a finish")) };
+            self.peeked = None;
+            match &*word {
+                "ambient" => finish.ambient = self.rgb()?,
+                "emission" => finish.emission = self.rgb()?,
+                "diffuse" => {
+                    finish.diffuse_albedo = self.take_word("albedo")?;
+                    finish.diffuse = self.finite()? as f32;
+                    finish.diffuse_back = if self.take(b',')? { self.finite()? as f32 } else { 0.0 };
+                }
+                "brilliance" => finish.brilliance = self.finite()? as f32,
+                "crand" => finish.crand = self.finite()? as f32,
+                "phong" => {
+                    finish.phong_albedo = self.take_word("albedo")?;
+                    finish.phong = self.finite()? as f32;
+                }
+                "phong_size" => finish.phong_size = self.finite()? as f32,
+                "specular" => {
+                    finish.specular_albedo = self.take_word("albedo")?;
+                    finish.specular = self.finite()? as f32;
+                }
+                "roughness" => finish.roughness = self.finite()?.max(1e-9) as f32,
+                "metallic" => finish.metallic = self.optional_float(1.0)? as f32,
+                "reflection" => self.reflection(&mut finish)?,
+                "reflection_exponent" => finish.reflection.exponent = self.finite()? as f32,
+                "conserve_energy" => finish.conserve_energy = self.optional_bool()?,
+                "irid" => {
+                    self.expect(b'{')?;
+                    finish.irid = [self.finite()? as f32, 0.0, 0.0];
+                    loop {
+                        if self.take_word("thickness")? {
+                            finish.irid[1] = self.finite()? as f32;
+                        } else if self.take_word("turbulence")? {
+                            finish.irid[2] = self.float()? as f32;
+                        } else {
+                            break;
+                        }
+                    }
+                    self.expect(b'}')?;
+                }
+                "subsurface" => {
+                    self.warn("subsurface is not rendered");
+                    self.expect(b'{')?;
+                    self.skip_to(b'}')?;
+                }
+                "use_alpha" => {
+                    self.optional_bool()?;
+                }
+                "fresnel" => {
+                    self.optional_bool()?;
+                }
+                // Old words that became those of the interior.
+                "ior" | "caustics" | "fade_power" | "fade_distance" | "refraction" | "irid_wavelength" => {
+                    self.expression()?;
+                }
+                _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
+                    Some(Value::Finish(known)) => finish = (*known).clone(),
+                    Some(other) => {
+                        return Err(self.error(format!("a finish is needed, not {}", other.name())));
+                    }
+                    None if super::words::is_reserved(&word) => {
+                        return Err(self.error(format!("{word} has no meaning in a finish")));
+                    }
+                    None => return Err(self.undeclared(&word)),
+                },
+            }
+        }
+        Ok(finish)
+    }
+
+    pub(super) fn rgb(&mut self) -> Result<Spectrum> {
+        Ok(self.colour()?.as_colour().rgb)
+    }
+
+    fn optional_float(&mut self, otherwise: f64) -> Result<f64> {
+        match self.peek()? {
+            Some(Kind::Number(_) | Kind::Mark(b'(' | b'-' | b'+')) => self.finite(),
+            Some(Kind::Word(word)) => {
+                let word = Rc::clone(word);
+                match self.lookup(&word).map(|cell| cell.borrow().clone()) {
+                    Some(Value::Num(_)) => self.finite(),
+                    _ if matches!(&*word, "on" | "off" | "yes" | "no" | "true" | "false") => self.finite(),
+                    _ => Ok(otherwise),
+                }
+            }
+            _ => Ok(otherwise),
+        }
+    }
+
+    fn reflection(&mut self, finish: &mut Finish) -> Result<()> {
+        let mirror = &mut finish.reflection;
+        if !self.take(b'{')? {
+            let colour = self.rgb()?;
+            (mirror.least, mirror.most, mirror.fresnel, mirror.falloff) = (colour, colour, false, 1.0);
+            return Ok(());
+        }
+        let first = self.rgb()?;
+        let mut second = None;
+        if self.take(b',')? || self.is_colour()? || matches!(self.peek()?, Some(Kind::Number(_))) {
+            second = Some(self.rgb()?);
+        }
+        let mut mirror = lumbre_shading::pov::Reflection::NONE;
+        while !self.take(b'}')? {
+            let Some(word) = self.word()? else { return Err(self.unexpected("what modifies a reflection")) };
+            self.peeked = None;
+            match &*word {
+                "falloff" => mirror.falloff = self.finite()? as f32,
+                "fresnel" => mirror.fresnel = self.optional_bool()?,
+                "exponent" => mirror.exponent = self.finite()? as f32,
+                "metallic" => mirror.metallic = self.optional_float(1.0)? as f32,
+                _ => return Err(self.error(format!("{word} has no meaning in a reflection"))),
+            }
+        }
+        (mirror.least, mirror.most) = match second {
+            Some(second) => (first, second),
+            None if mirror.fresnel => (Spectrum::BLACK, first),
+            None => (first, first),
+        };
+        finish.reflection = mirror;
+        Ok(())
+    }
+
+    /// An interior in braces.
+    pub(super) fn interior_block(&mut self) -> Result<Rc<Interior>> {
+        self.expect(b'{')?;
+        let mut interior = Interior::DEFAULT;
+        while !self.take(b'}')? {
+            let Some(word) = self.word()? else { return Err(self.unexpected("an interior")) };
+            self.peeked = None;
+            match &*word {
+                "ior" => interior.ior = self.finite()? as f32,
+                "caustics" => interior.caustics = self.finite()? as f32,
+                "fade_distance" => interior.fade_distance = self.finite()? as f32,
+                "fade_power" => interior.fade_power = self.finite()? as f32,
+                "fade_color" | "fade_colour" => interior.fade_colour = self.rgb()?,
+                "dispersion" | "dispersion_samples" => {
+                    self.float()?;
+                    self.warn("dispersion is not rendered");
+                }
+                "media" => {
+                    self.warn("media is not rendered");
+                    self.expect(b'{')?;
+                    self.skip_to(b'}')?;
+                }
+                _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
+                    Some(Value::Interior(known)) => interior = (*known).clone(),
+                    Some(Value::Ignored(_)) => {}
+                    Some(other) => {
+                        return Err(self.error(format!("an interior is needed, not {}", other.name())));
+                    }
+                    None if super::words::is_reserved(&word) => {
+                        return Err(self.error(format!("{word} has no meaning in an interior")));
+                    }
+                    None => return Err(self.undeclared(&word)),
+                },
+            }
+        }
+        Ok(Rc::new(interior))
+    }
+
+    /// A material in braces.
+    pub(super) fn material_block(&mut self) -> Result<MaterialStatement> {
+        self.expect(b'{')?;
+        let mut material = MaterialStatement::default();
+        while !self.take(b'}')? {
+            if let Some(map) = self.transform()? {
+                material.texture = material.texture.map(|texture| texture.moved(&map));
+                continue;
+            }
+            let Some(word) = self.word()? else { return Err(self.unexpected("a material")) };
+            self.peeked = None;
+            match &*word {
+                "texture" => {
+                    self.expect(b'{')?;
+                    let texture = self.texture_body(b'}')?;
+                    material.texture = Some(layered(material.texture, texture));
+                }
+                "interior_texture" => {
+                    self.expect(b'{')?;
+                    material.interior_texture = Some(self.texture_body(b'}')?);
+                }
+                "interior" => material.interior = Some(self.interior_block()?),
+                _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
+                    Some(Value::Material(known)) => material = (*known).clone(),
+                    Some(other) => {
+                        return Err(self.error(format!("a material is needed, not {}", other.name())));
+                    }
+                    None => return Err(self.undeclared(&word)),
+                },
+            }
+        }
+        Ok(material)
+    }
+}
+
+/// A texture on top of others.
+pub(super) fn layered(below: Option<Arc<Texture>>, top: Arc<Texture>) -> Arc<Texture> {
+    let Some(below) = below else { return top };
+    let mut layers: Vec<Arc<Texture>> = match &below.kind {
+        TextureKind::Layers(layers) if below.warps.0.is_empty() => layers.to_vec(),
+        _ => vec![Arc::clone(&below)],
+    };
+    layers.push(top);
+    Arc::new(Texture { kind: TextureKind::Layers(layers.into()), warps: Warps::default(), uv: false })
+}
+
+/// A pigment taken apart, to be changed.
+fn opened(pigment: &Arc<Pigment>) -> (Draft, PigmentKind) {
+    let pattern = match &pigment.kind {
+        PigmentKind::Map(pattern, _)
+        | PigmentKind::Pigments(pattern, _)
+        | PigmentKind::Blocks(pattern, _) => Some((**pattern).clone()),
+        _ => None,
+    };
+    (Draft::new(pattern, pigment.warps.clone(), pigment.uv), pigment.kind.clone())
+}
+
+fn normal_kind(
+    pattern: Pattern,
+    word: Option<&str>,
+    map: Option<&Map>,
+    blocks: Vec<Arc<Normal>>,
+) -> NormalKind {
+    let pattern = Box::new(pattern);
+    match (map, word) {
+        (Some(Map::Normals(entries)), _) => NormalKind::Normals(pattern, entries.clone().into()),
+        (Some(Map::Slopes(entries)), _) => NormalKind::Slope { pattern, map: Some(entries.clone().into()) },
+        _ if !blocks.is_empty() => {
+            let entries = blocks.into_iter().enumerate().map(|(i, normal)| (i as f64, normal)).collect();
+            NormalKind::Normals(pattern, entries)
+        }
+        (_, Some("bumps")) => NormalKind::Bumps(pattern),
+        (_, Some("dents")) => NormalKind::Dents(pattern),
+        (_, Some("wrinkles")) => NormalKind::Wrinkles(pattern),
+        (_, Some("ripples" | "waves")) => NormalKind::Waves(pattern),
+        (_, Some("quilted")) => NormalKind::Quilted(pattern),
+        _ => NormalKind::Slope { pattern, map: None },
+    }
+}

@@ -1,0 +1,137 @@
+//! POV-Ray's scene language: its values, its errors, and what becomes of a scene.
+
+use std::path::Path;
+
+use lumbre_formats::pov::{PovOptions, written_files};
+use lumbre_formats::{Budget, Diagnostics, FormatError, Input, Limits};
+use lumbre_scene::SceneDesc;
+
+/// Reads a scene from a text.
+fn read(text: &str) -> (Result<SceneDesc, FormatError>, Diagnostics) {
+    let mut limits = Limits::default();
+    (limits.memory, limits.elements) = (64 << 20, 1_000_000);
+    let budget = Budget::new(limits);
+    let mut diagnostics = Diagnostics::new();
+    let input = Input::from_reader("a.pov", text.as_bytes(), &budget).unwrap();
+    let scene = lumbre_formats::pov::pov_scene(
+        &input,
+        Path::new("/nowhere"),
+        &PovOptions::default(),
+        &budget,
+        &mut diagnostics,
+    );
+    (scene, diagnostics)
+}
+
+/// What `#write(F, …)` writes.
+fn written(statements: &str) -> String {
+    let text = format!("#fopen F \"f\" write\n{statements}\n#fclose F");
+    let budget = Budget::default();
+    let options = PovOptions::default();
+    let files =
+        written_files(&text, "a.pov", Path::new("/nowhere"), &options, &budget, &mut Diagnostics::new());
+    files.unwrap_or_else(|error| panic!("{statements}: {error}"))["f"].clone()
+}
+
+/// The value of an expression, as `str` prints it.
+fn value(expression: &str) -> String {
+    written(&format!("#write(F, str(({expression}), 0, 6))"))
+}
+
+#[test]
+fn operators_have_the_ranks_and_values_of_the_language() {
+    for (expression, expected) in [
+        ("1 | 0 & 0", "0.000000"),
+        ("-2*3+4/8-1", "-6.500000"),
+        ("2-3-4", "-5.000000"),
+        ("1e-11 ? 5 : 6", "6.000000"),
+        ("2 = 2.00000000001", "1.000000"),
+        ("mod(-7.5, 2)", "-1.500000"),
+        ("div(-7, 2)", "-3.000000"),
+        ("(<1,2,3>+1).z", "4.000000"),
+        ("(<1,2,3>*<4,5>).z", "0.000000"),
+        ("rgb<.2,.4,.8>.gray", "0.386200"),
+        ("vlength(vcross(x, y) - z)", "0.000000"),
+        ("strcmp(\"abc\", \"abd\")", "-1.000000"),
+        ("strlen(concat(\"ab\", str(1.5, -8, 2)))", "10.000000"),
+    ] {
+        assert_eq!(value(expression), expected, "{expression}");
+    }
+}
+
+#[test]
+fn a_macro_changes_the_identifier_that_it_is_given() {
+    let text = "#macro Next(A, B) #declare B = A*2; #local A2 = A + 1; A2 #end
+        #declare R = 0; #declare I = 3; #declare J = Next(I, R);
+        #macro Twice(X) X*2 #end
+        #write(F, R, \" \", J, \" \", Twice(1+2), \" \", <Twice(1), 2, 3>)";
+    assert_eq!(written(text), "6 4 6 <2, 2, 3>");
+}
+
+#[test]
+fn loops_and_choices_go_where_they_should() {
+    let text = "#declare I = 0; #while (I < 3) #write(F, I) #declare I = I + 1 #end
+        #for (A, 0, 1, 0.25) #if (A > 0.6) #break #end #write(F, \" \", A) #end #write(F, \" then \", A)
+        #switch (5) #case (1) #write(F, \"no\") #range (4, 6) #write(F, \" a\") #case (9) #write(F, \" b\") #break #else #write(F, \"no\") #end
+        #ifdef (Nothing) #write(F, \"no\") #else #write(F, \" c\") #end";
+    assert_eq!(written(text), "012 0 0.25 0.5 then 0.75 a b c");
+}
+
+#[test]
+fn what_a_scene_writes_it_can_read() {
+    let text = "#fopen G \"g\" write #write(G, 1.5, \",\", <1, -2, 3>, \",\\\"text\\\"\") #fclose G
+        #fopen G \"g\" read #read(G, A, B, C) #write(F, A, B, C) #ifdef (G) #write(F, \"no\") #end";
+    assert_eq!(written(text), "1.5<1, -2, 3>text");
+}
+
+#[test]
+fn malformed_scenes_are_errors_with_places() {
+    for (text, expected) in [
+        ("sphere { 0, ", "a.pov:1:11: the scene ends here"),
+        ("sphere { 0, 1", "the scene ends here"),
+        ("#if (1) sphere { 0, 1 }", "a.pov:1:1: a directive without its #end"),
+        ("#while (1) #end", "a.pov:1:1: a loop that has not ended after"),
+        ("#declare x = 1;", "a.pov:1:10: a word of the language cannot be declared (found \"x\")"),
+        ("#declare A = B;", "an identifier that is not declared (found \"B\")"),
+        ("#declare Sphere1 = 1; #declare B = Sphere2;", "did you mean \"Sphere1\"?"),
+        ("#include \"missing.inc\"", "the file of an #include is not there (found \"missing.inc\""),
+        ("#include \"../secret\"", "the file of an #include is not there"),
+        (
+            "#declare A = array[2] { 1, 2 } #declare B = A[2];",
+            "an index that the array does not have (found 2; expected 0 to 1)",
+        ),
+        ("#declare A = array[1000000000][1000000000];", "--max-memory"),
+        ("#macro M(A) M(A) #end M(1)", "--max-nesting"),
+        ("#macro M(A) sphere { 0, A * } #end M(1)", "by the macro M"),
+        ("#error \"no\"", "the scene says: \"no\""),
+        ("/* sphere", "a comment without an end"),
+        ("#declare A = \"b", "a text without an end"),
+        ("#break", "#break outside of a loop"),
+        ("#foo", "unknown directive (found \"foo\")"),
+        ("camera { direction x right x }", "the axes of the camera lie in a plane"),
+        ("quartic { <1, 2> }", "too few coefficients (found 2; expected 35)"),
+    ] {
+        let (scene, _) = read(text);
+        let error = scene.map(|_| ()).expect_err(text).to_diagnostic().to_string();
+        assert!(error.contains(expected), "{text}\n  {error}\n  expected {expected}");
+    }
+    let deep = format!("#declare A = {}1{};", "(".repeat(5000), ")".repeat(5000));
+    assert!(read(&deep).0.is_err());
+    let deep = format!("{}sphere {{ 0, 1 }}{}", "union { ".repeat(5000), " }".repeat(5000));
+    assert!(read(&deep).0.is_err());
+}
+
+#[test]
+fn a_scene_becomes_shapes_lights_and_a_camera() {
+    let text = "#version 3.7; global_settings { assumed_gamma 1 }
+        camera { location <0, 1, -5> look_at 0 angle 40 right x*4/3 }
+        light_source { <2, 3, -5> rgb 1 }
+        difference { box { -1, 1 } sphere { <0, 0, -1>, 0.7 } pigment { rgb <1, 0, 0> } translate x }
+        plane { y, -1 pigment { checker rgb 1, rgb 0 } }
+        text { ttf \"timrom.ttf\" \"A\" 1, 0 }";
+    let (scene, diagnostics) = read(text);
+    let scene = scene.unwrap();
+    assert_eq!((scene.shapes.len(), scene.lights.len(), scene.cameras.len()), (3, 1, 1));
+    assert_eq!(diagnostics.warnings(), 1, "{:?}", diagnostics.lines());
+    assert!(diagnostics.lines()[0].contains("the object text is not rendered"));
+}

@@ -1,0 +1,575 @@
+//! POV-Ray's local illumination: ambient, diffuse and highlights of each layer, mirrors, refraction, filtered shadows and fog.
+
+use std::f64::consts::FRAC_PI_2;
+
+use lumbre_geometry::Ray;
+use lumbre_math::{DVec2, DVec3, Elementary};
+use lumbre_scene::pov::{PovLight, PovWorld};
+use lumbre_scene::{Footprint, Interaction, Light, Scene, View};
+use lumbre_shading::pov::{Eye, Finish, LayerAt, PovMaterial};
+use lumbre_shading::{MaterialKind, Spectrum};
+use smallvec::SmallVec;
+
+use crate::integrators::RayIntegrator;
+use crate::transport::{Draw, Record, Sight};
+
+/// The light of POV-Ray's scenes as POV-Ray computes it, after its reference manual. Colours are in the scene's working space
+/// until they are summed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pov;
+
+/// Shadow rays look through at most so many surfaces.
+const MOST_SURFACES: u32 = 256;
+/// Hits nearer than this are no hits.
+const NEAR: f64 = 1e-4;
+/// Light that grazes a surface by less than this cosine does not reach it.
+const GRAZING: f64 = 1e-10;
+
+/// The solids that a ray is in.
+type Inside<'s> = SmallVec<[&'s PovMaterial; 4]>;
+
+/// A ray with what it carries.
+struct Traced<'s> {
+    ray: Ray,
+    inside: Inside<'s>,
+    level: u32,
+    /// The most that it can add to the picture.
+    weight: f32,
+    is_mirrored: bool,
+    is_camera: bool,
+}
+
+/// What all rays of a picture need.
+struct Tracer<'s> {
+    scene: &'s Scene,
+    world: &'s PovWorld,
+    lights: Vec<&'s PovLight>,
+}
+
+impl RayIntegrator for Pov {
+    fn radiance(&self, scene: &Scene, _: &View, sight: Sight<'_>, _: &Draw, record: &mut Record) -> Spectrum {
+        let Some(world) = scene.pov() else { return Spectrum::BLACK };
+        let lights = scene.lights().iter().filter_map(|light| match light {
+            Light::Pov(light) => Some(&**light),
+            _ => None,
+        });
+        let tracer = Tracer { scene, world, lights: lights.collect() };
+        let ray = sight.ray.ray;
+        // Where a camera sees nothing.
+        if !ray.direction.is_finite() {
+            return Spectrum::BLACK;
+        }
+        let first = Traced {
+            inside: tracer.around(ray.origin),
+            ray,
+            level: 0,
+            weight: 1.0,
+            is_mirrored: false,
+            is_camera: true,
+        };
+        let colour = tracer.trace(&first, record);
+        if world.gamma == 1.0 { colour } else { colour.map(|c| c.max(0.0).power(world.gamma)) }
+    }
+}
+
+impl<'s> Tracer<'s> {
+    /// The solids around a point: those that a ray from it leaves without having entered.
+    fn around(&self, _p: DVec3) -> Inside<'s> {
+        Inside::new()
+    }
+
+    fn material(here: &Interaction<'s>) -> Option<&'s PovMaterial> {
+        match &here.material?.kind {
+            MaterialKind::Pov(material) => Some(material),
+            _ => None,
+        }
+    }
+
+    /// The first surface along a ray that is not hidden from it.
+    fn closest(&self, traced: &Traced<'s>) -> Option<(Interaction<'s>, &'s PovMaterial, f64)> {
+        let mut ray = traced.ray;
+        for _ in 0..MOST_SURFACES {
+            let hit = self.scene.closest(&ray)?;
+            let here = self.scene.interaction(&ray, &hit, &Footprint::Point);
+            let material = Self::material(&here)?;
+            let visible = material.visibility;
+            let is_hidden =
+                (visible.no_image && traced.is_camera) || (visible.no_reflection && traced.is_mirrored);
+            let distance = (here.surface.point - traced.ray.origin).length();
+            if !is_hidden && distance >= NEAR * f64::from(u8::from(!traced.is_camera)) {
+                return Some((here, material, distance));
+            }
+            ray = here.leave(ray.direction);
+        }
+        None
+    }
+
+    fn trace(&self, traced: &Traced<'s>, record: &mut Record) -> Spectrum {
+        if traced.level >= self.world.max_trace_level || traced.weight < self.world.adc_bailout {
+            return Spectrum::BLACK;
+        }
+        let direction = traced.ray.direction.normalize();
+        let (colour, length) = match self.closest(traced) {
+            Some((here, material, distance)) => {
+                let mut colour = self.shade(traced, &here, material, record);
+                // Inside of solids light fades, by the way to where it leaves them.
+                for solid in &traced.inside {
+                    colour = colour * solid.interior.transmittance(distance as f32);
+                }
+                (colour, distance)
+            }
+            None => (self.sky(direction), f64::INFINITY),
+        };
+        if traced.inside.iter().all(|solid| solid.hollow) {
+            self.in_fog(colour, traced.ray.origin, direction, length)
+        } else {
+            colour
+        }
+    }
+
+    fn sky(&self, direction: DVec3) -> Spectrum {
+        let eye = Eye { normal: -direction, direction: -direction, uv: DVec2::ZERO };
+        self.world.sky.iter().fold(self.world.background, |below, pigment| {
+            let colour = pigment.colour(direction, &eye);
+            colour.rgb * (1.0 - colour.filter - colour.transmit) + below * colour.passing()
+        })
+    }
+
+    fn in_fog(&self, mut colour: Spectrum, origin: DVec3, direction: DVec3, length: f64) -> Spectrum {
+        for fog in &self.world.fogs {
+            let left = fog.transmittance(origin, direction, length);
+            let tinted = Spectrum::splat(1.0 - fog.filter) + fog.rgb * fog.filter;
+            colour = colour * tinted * left + fog.rgb * (1.0 - left);
+        }
+        colour
+    }
+
+    fn shade(
+        &self,
+        traced: &Traced<'s>,
+        here: &Interaction<'s>,
+        material: &'s PovMaterial,
+        record: &mut Record,
+    ) -> Spectrum {
+        let direction = traced.ray.direction.normalize();
+        let smooth = here.shading.normal.as_dvec3();
+        let normal = if smooth.dot(direction) > 0.0 { -smooth } else { smooth };
+        let eye = Eye {
+            normal,
+            direction: -direction,
+            uv: material.surface_uv(here.surface.point, here.at.uv.as_dvec2()),
+        };
+        // A solid that the ray is in is left.
+        let is_inside = traced.inside.iter().any(|solid| std::ptr::eq(*solid, material));
+        let mut sum = Spectrum::BLACK;
+        for (share, layers) in &material.stacks(here.surface.point, &eye, !is_inside) {
+            sum += self.stack(traced, here, material, layers, is_inside, record) * *share;
+        }
+        sum
+    }
+
+    /// The light of layers, the bottom first.
+    fn stack(
+        &self,
+        traced: &Traced<'s>,
+        here: &Interaction<'s>,
+        material: &'s PovMaterial,
+        layers: &[LayerAt<'_>],
+        is_inside: bool,
+        record: &mut Record,
+    ) -> Spectrum {
+        let mut sum = Spectrum::BLACK;
+        let mut left = Spectrum::WHITE;
+        // What the lights give is the same for layers of the same normal.
+        let mut shadows: Vec<Option<Spectrum>> = vec![None; self.lights.len()];
+        for layer in layers.iter().rev() {
+            let (colour, finish) = (layer.colour, layer.finish);
+            let opacity = material.opacity(colour);
+            let own = finish.emission + finish.ambient * self.world.ambient_light;
+            sum += left * colour.rgb * own * opacity;
+            for (light, shadow) in self.lights.iter().zip(&mut shadows) {
+                sum += left * self.lit(traced, here, material, layer, light, opacity, shadow, record);
+            }
+            sum += self.mirror(traced, here, material, layer, record);
+            left = left * colour.passing();
+            if finish.conserve_energy {
+                let mirrored = self.reflectance(traced, material, layer);
+                left = left * (Spectrum::WHITE - mirrored).map(|c| c.clamp(0.0, 1.0));
+            }
+        }
+        if let Some(top) = layers.last()
+            && gray(left) >= self.world.adc_bailout
+        {
+            sum += left * self.passing(traced, here, material, top, gray(left), is_inside, record);
+        }
+        sum
+    }
+
+    /// Diffuse light and highlights of a light on a layer.
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "a layer under a light is seen by a ray, and leaves its shadow"
+    )]
+    fn lit(
+        &self,
+        traced: &Traced<'s>,
+        here: &Interaction<'s>,
+        material: &PovMaterial,
+        layer: &LayerAt<'_>,
+        light: &PovLight,
+        opacity: f32,
+        shadow: &mut Option<Spectrum>,
+        record: &mut Record,
+    ) -> Spectrum {
+        let lights_it = match light.group {
+            Some(group) => material.light_groups.contains(&group),
+            None => material.global_lights,
+        };
+        let p = here.surface.point;
+        let needs_light = layer.finish.diffuse != 0.0
+            || layer.finish.diffuse_back != 0.0
+            || layer.finish.phong != 0.0
+            || layer.finish.specular != 0.0;
+        if !lights_it || !needs_light {
+            return Spectrum::BLACK;
+        }
+        if let Some(area) = &light.area
+            && area.illumination
+        {
+            let mut sum = Spectrum::BLACK;
+            let [n, m] = area.counts;
+            for i in 0..n {
+                for j in 0..m {
+                    let from = light.place(DVec2::new(step(i, n), step(j, m)), p);
+                    let arriving = light.arriving(p, from);
+                    let shaded = self.shaded(traced, here, material, layer, light, from, arriving, opacity);
+                    if !shaded.is_black() {
+                        sum += shaded * self.shadow(here, light, from, record);
+                    }
+                }
+            }
+            return sum * (1.0 / (n * m) as f32);
+        }
+        let arriving = light.arriving(p, light.from);
+        let shaded = self.shaded(traced, here, material, layer, light, light.from, arriving, opacity);
+        if shaded.is_black() || light.shadowless {
+            return shaded;
+        }
+        let passes = *shadow.get_or_insert_with(|| self.shadows(here, light, record));
+        shaded * passes
+    }
+
+    /// What a layer makes of light that arrives from a place.
+    #[allow(clippy::too_many_arguments, reason = "a layer under a light is seen by a ray")]
+    fn shaded(
+        &self,
+        traced: &Traced<'s>,
+        here: &Interaction<'s>,
+        material: &PovMaterial,
+        layer: &LayerAt<'_>,
+        light: &PovLight,
+        from: DVec3,
+        arriving: Spectrum,
+        opacity: f32,
+    ) -> Spectrum {
+        let Some((towards, _)) = light.towards(here.surface.point, from) else { return Spectrum::BLACK };
+        if arriving.is_black() {
+            return Spectrum::BLACK;
+        }
+        let (n, finish) = (layer.normal, layer.finish);
+        let cosine = n.dot(towards);
+        let is_behind = cosine < GRAZING;
+        if is_behind && !material.double_illuminate && finish.diffuse_back == 0.0 {
+            return Spectrum::BLACK;
+        }
+        let strength = if is_behind && !material.double_illuminate {
+            finish.diffuse_strength() * (finish.diffuse_back / finish.diffuse.max(1e-9))
+        } else {
+            finish.diffuse_strength()
+        };
+        let cosine = cosine.abs();
+        let falloff =
+            if finish.brilliance == 1.0 { cosine as f32 } else { (cosine as f32).power(finish.brilliance) };
+        let mut sum = layer.colour.rgb * arriving * (opacity * strength * falloff);
+        let d = traced.ray.direction.normalize();
+        if !light.shadowless && !is_behind {
+            sum += self.highlights(finish, layer, d, towards, arriving);
+        }
+        if finish.irid[0] != 0.0 {
+            sum = sum * self.irid(finish, cosine, n.dot(d).abs(), here.surface.point);
+        }
+        sum
+    }
+
+    fn highlights(
+        &self,
+        finish: &Finish,
+        layer: &LayerAt<'_>,
+        d: DVec3,
+        towards: DVec3,
+        arriving: Spectrum,
+    ) -> Spectrum {
+        let n = layer.normal;
+        let mut strength = 0.0;
+        if finish.phong > 0.0 {
+            let mirrored = d - n * (2.0 * n.dot(d));
+            let cosine = mirrored.dot(towards);
+            if cosine > 0.0 {
+                strength += finish.phong_strength() * (cosine as f32).power(finish.phong_size);
+            }
+        }
+        if finish.specular > 0.0 {
+            let half = (towards - d).normalize_or_zero();
+            let cosine = n.dot(half);
+            if cosine > 0.0 {
+                strength +=
+                    finish.specular_strength() * (cosine as f32).power(1.0 / finish.roughness.max(1e-9));
+            }
+        }
+        if strength == 0.0 {
+            return Spectrum::BLACK;
+        }
+        arriving * metallic(finish.metallic, n.dot(towards), layer.colour.rgb) * strength
+    }
+
+    fn irid(&self, finish: &Finish, to_light: f64, to_eye: f64, p: DVec3) -> Spectrum {
+        let [amount, thickness, turbulence] = finish.irid;
+        let mut thickness = f64::from(thickness);
+        if turbulence != 0.0 {
+            let noise = lumbre_shading::pov::Octaves::default()
+                .turbulence(p, lumbre_shading::pov::NoiseGenerator::Corrected);
+            thickness *= 1.0 + f64::from(turbulence) * (2.0 * noise - 1.0);
+        }
+        let wave = |length: f32| {
+            let phase = std::f64::consts::TAU * thickness * (to_light + to_eye) / f64::from(length);
+            1.0 + amount * phase.cosine() as f32
+        };
+        self.world.irid_wavelength.map(wave)
+    }
+
+    fn reflectance(&self, traced: &Traced<'s>, material: &PovMaterial, layer: &LayerAt<'_>) -> Spectrum {
+        let mirror = &layer.finish.reflection;
+        if mirror.is_none() {
+            return Spectrum::BLACK;
+        }
+        let d = traced.ray.direction.normalize();
+        let cosine = -layer.normal.dot(d);
+        let is_inside = traced.inside.iter().any(|solid| std::ptr::eq(*solid, material));
+        let eta = if is_inside { 1.0 / material.interior.ior } else { material.interior.ior };
+        let reflectance = mirror.at(cosine.clamp(0.0, 1.0) as f32, eta);
+        reflectance * metallic(mirror.metallic, cosine, layer.colour.rgb)
+    }
+
+    fn mirror(
+        &self,
+        traced: &Traced<'s>,
+        here: &Interaction<'s>,
+        material: &'s PovMaterial,
+        layer: &LayerAt<'_>,
+        record: &mut Record,
+    ) -> Spectrum {
+        let reflectance = self.reflectance(traced, material, layer);
+        let weight = traced.weight * reflectance.max_component();
+        if weight < self.world.adc_bailout {
+            return Spectrum::BLACK;
+        }
+        let d = traced.ray.direction.normalize();
+        let raw = if here.surface.normal.dot(d) > 0.0 { -here.surface.normal } else { here.surface.normal };
+        let mut direction = d - layer.normal * (2.0 * layer.normal.dot(d));
+        if direction.dot(raw) < 0.0 {
+            // What would enter the surface is bent back at it.
+            direction -= raw * (2.0 * direction.dot(raw));
+        }
+        let next = Traced {
+            ray: here.leave(direction.normalize()),
+            inside: traced.inside.clone(),
+            level: traced.level + 1,
+            weight,
+            is_mirrored: true,
+            is_camera: false,
+        };
+        record.counts.bounce += 1;
+        let seen = self.trace(&next, record);
+        let exponent = layer.finish.reflection.exponent;
+        let seen = if exponent == 1.0 { seen } else { seen.map(|c| c.max(0.0).power(1.0 / exponent)) };
+        reflectance * seen
+    }
+
+    /// What is seen through a surface.
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "a ray passes a layer of a solid, in or out, with what is left of it"
+    )]
+    fn passing(
+        &self,
+        traced: &Traced<'s>,
+        here: &Interaction<'s>,
+        material: &'s PovMaterial,
+        layer: &LayerAt<'_>,
+        left: f32,
+        is_inside: bool,
+        record: &mut Record,
+    ) -> Spectrum {
+        let d = traced.ray.direction.normalize();
+        let index = |inside: &Inside<'s>| inside.last().map_or(1.0, |solid| f64::from(solid.interior.ior));
+        let from = index(&traced.inside);
+        let mut inside = traced.inside.clone();
+        if is_inside {
+            inside.retain(|solid| !std::ptr::eq(*solid, material));
+        } else {
+            inside.push(material);
+        }
+        let to = index(&inside);
+        let eta = from / to;
+        let n = layer.normal;
+        let cosine = -n.dot(d);
+        let under = 1.0 - eta * eta * (1.0 - cosine * cosine);
+        let is_straight = (eta - 1.0).abs() < 1e-12;
+        let (direction, inside, is_mirrored) = if is_straight {
+            (d, inside, false)
+        } else if under < 0.0 {
+            // All light is mirrored.
+            (d + n * (2.0 * cosine), traced.inside.clone(), true)
+        } else {
+            (d * eta + n * (eta * cosine - under.sqrt()), inside, false)
+        };
+        let next = Traced {
+            ray: here.leave(direction.normalize()),
+            inside,
+            level: if is_straight { traced.level } else { traced.level + 1 },
+            weight: traced.weight * left,
+            is_mirrored: traced.is_mirrored || is_mirrored,
+            is_camera: traced.is_camera,
+        };
+        record.counts.bounce += 1;
+        self.trace_straight(next, is_straight, record)
+    }
+
+    /// A ray that goes straight on counts as the same ray, but not without end.
+    fn trace_straight(&self, mut next: Traced<'s>, is_straight: bool, record: &mut Record) -> Spectrum {
+        if is_straight {
+            next.weight *= 1.0 - 1.0 / MOST_SURFACES as f32;
+        }
+        self.trace(&next, record)
+    }
+
+    /// What comes through of a light, by its area.
+    fn shadows(&self, here: &Interaction<'s>, light: &PovLight, record: &mut Record) -> Spectrum {
+        let Some(area) = &light.area else { return self.shadow(here, light, light.from, record) };
+        let [n, m] = area.counts;
+        if n * m <= 1 {
+            return self.shadow(here, light, light.from, record);
+        }
+        let mut known: Vec<Option<Spectrum>> = vec![None; (n * m) as usize];
+        self.grid(here, light, [0, 0, n - 1, m - 1], 0, &mut known, record)
+    }
+
+    /// The mean over a part of a grid, as its quarters where its corners differ.
+    fn grid(
+        &self,
+        here: &Interaction<'s>,
+        light: &PovLight,
+        [u1, v1, u2, v2]: [u32; 4],
+        level: u32,
+        known: &mut [Option<Spectrum>],
+        record: &mut Record,
+    ) -> Spectrum {
+        let Some(area) = &light.area else { return Spectrum::WHITE };
+        let [n, m] = area.counts;
+        let mut corner = |u: u32, v: u32, record: &mut Record| {
+            *known[(u * m + v) as usize].get_or_insert_with(|| {
+                let from = light.place(DVec2::new(step(u, n), step(v, m)), here.surface.point);
+                self.shadow(here, light, from, record)
+            })
+        };
+        let corners =
+            [corner(u1, v1, record), corner(u2, v1, record), corner(u1, v2, record), corner(u2, v2, record)];
+        let differ = |a: usize, b: usize| (corners[a] - corners[b]).map(f32::abs).max_component() > 0.1;
+        let is_uneven = differ(0, 1) || differ(2, 3) || differ(0, 2) || differ(1, 3);
+        let is_wide = u2 - u1 > 1 || v2 - v1 > 1;
+        if is_wide && (level < area.adaptive || is_uneven) {
+            let (ul, uh) = ((u1 + u2) / 2, (u1 + u2).div_ceil(2));
+            let (vl, vh) = ((v1 + v2) / 2, (v1 + v2).div_ceil(2));
+            let quarters = [[u1, v1, ul, vl], [uh, v1, u2, vl], [u1, vh, ul, v2], [uh, vh, u2, v2]];
+            let mut sum = Spectrum::BLACK;
+            for quarter in quarters {
+                sum += self.grid(here, light, quarter, level + 1, known, record);
+            }
+            return sum * 0.25;
+        }
+        corners.into_iter().sum::<Spectrum>() * 0.25
+    }
+
+    /// What comes through to a point from a place of a light.
+    fn shadow(&self, here: &Interaction<'s>, light: &PovLight, from: DVec3, record: &mut Record) -> Spectrum {
+        let Some((towards, distance)) = light.towards(here.surface.point, from) else {
+            return Spectrum::WHITE;
+        };
+        record.counts.shadow += 1;
+        let target = here.surface.point + towards * distance;
+        let mut left = Spectrum::WHITE;
+        let mut inside: Inside<'s> = Inside::new();
+        let mut ray = here.leave(towards);
+        let mut travelled = 0.0;
+        for _ in 0..MOST_SURFACES {
+            let rest = (target - ray.origin).dot(towards);
+            let Some(hit) = self.scene.closest(&ray.with_range(0.0, rest - NEAR)) else { return left };
+            let there = self.scene.interaction(&ray, &hit, &Footprint::Point);
+            let Some(material) = Self::material(&there) else { return left };
+            let step = (there.surface.point - ray.origin).length();
+            let is_near = travelled + step < NEAR;
+            travelled += step;
+            if !material.visibility.no_shadow && !is_near {
+                let smooth = there.shading.normal.as_dvec3();
+                let normal = if smooth.dot(towards) > 0.0 { -smooth } else { smooth };
+                let eye = Eye {
+                    normal,
+                    direction: -towards,
+                    uv: material.surface_uv(there.surface.point, there.at.uv.as_dvec2()),
+                };
+                let is_inside = inside.iter().any(|solid| std::ptr::eq(*solid, material));
+                let mut passes = Spectrum::BLACK;
+                for (share, layers) in &material.stacks(there.surface.point, &eye, !is_inside) {
+                    passes += layers
+                        .iter()
+                        .fold(Spectrum::splat(*share), |left, layer| left * layer.colour.passing());
+                }
+                if material.interior.caustics != 0.0 {
+                    passes =
+                        passes * (1.0 + (normal.dot(towards).abs() as f32).power(material.interior.caustics));
+                }
+                left = left * passes;
+                if is_inside {
+                    left = left * material.interior.transmittance(step as f32);
+                    inside.retain(|solid| !std::ptr::eq(*solid, material));
+                } else {
+                    inside.push(material);
+                }
+                if left.max_component() < self.world.adc_bailout {
+                    return Spectrum::BLACK;
+                }
+            }
+            ray = there.leave(towards);
+        }
+        left
+    }
+}
+
+/// Where one of so many stands between 0 and 1; one alone in the middle.
+fn step(i: u32, count: u32) -> f64 {
+    if count <= 1 { 0.5 } else { f64::from(i) / f64::from(count - 1) }
+}
+
+fn gray(c: Spectrum) -> f32 {
+    0.297 * c.r + 0.589 * c.g + 0.114 * c.b
+}
+
+/// How highlights and mirrors of metal are tinted, at a cosine.
+fn metallic(amount: f32, cosine: f64, colour: Spectrum) -> Spectrum {
+    if amount == 0.0 {
+        return Spectrum::WHITE;
+    }
+    let x = cosine.clamp(-1.0, 1.0).abs().arc_cosine() / FRAC_PI_2;
+    let m = (0.014_567_225 / (x - 1.12).powi(2) - 0.011_612_903).clamp(0.0, 1.0);
+    Spectrum::WHITE + (colour - Spectrum::WHITE) * (amount * (1.0 - m) as f32)
+}

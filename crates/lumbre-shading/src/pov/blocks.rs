@@ -1,0 +1,137 @@
+//! Patterns of cells: bricks, checks, hexagons, and distances to random points.
+
+use lumbre_math::{DVec3, Elementary};
+
+use super::noise::{NoiseGenerator, hash3, noise, random};
+use super::pattern::Crackle;
+
+/// What coordinates are raised by, so that faces at whole numbers lie in one cell.
+const TINY: f64 = 1e-10;
+
+/// 0 in mortar, 1 in bricks.
+pub(super) fn brick(p: DVec3, size: DVec3, mortar: f64) -> f64 {
+    let p = p + DVec3::splat(mortar + TINY);
+    let fraction = |x: f64| x - x.floor();
+    if fraction(p.y / size.y) <= mortar / size.y {
+        return 0.0;
+    }
+    let is_odd = fraction(p.y / (2.0 * size.y)) <= 0.5;
+    let shift = |is_shifted: bool| if is_shifted { 0.5 } else { 0.0 };
+    let in_mortar = fraction(p.x / size.x + shift(!is_odd)) <= mortar / size.x
+        || fraction(p.z / size.z + shift(is_odd)) <= mortar / size.z;
+    if in_mortar { 0.0 } else { 1.0 }
+}
+
+/// A random number for each cube.
+pub(super) fn cell(p: DVec3) -> f64 {
+    let cell = (p + DVec3::splat(TINY)).floor();
+    random(hash3(cell.x as i64, cell.y as i64, cell.z as i64))
+}
+
+/// 0 or 1 by cubes.
+pub(super) fn checker(p: DVec3) -> f64 {
+    let cell = (p + DVec3::splat(TINY)).floor();
+    (cell.x + cell.y + cell.z).rem_euclid(2.0)
+}
+
+/// The face of a cube about the origin that a point lies behind: +x, +y, +z, -x, -y, -z.
+pub(super) fn cube_face(p: DVec3) -> f64 {
+    let size = p.abs();
+    let axis = if size.x >= size.y && size.x >= size.z {
+        0
+    } else if size.y >= size.z {
+        1
+    } else {
+        2
+    };
+    let face = if p[axis] >= 0.0 { axis } else { axis + 3 };
+    face as f64
+}
+
+/// 0, 1 or 2 by hexagons of side ½ in x and z.
+pub(super) fn hexagon(p: DVec3) -> f64 {
+    const HEIGHT: f64 = 0.866_025_404;
+    let x = p.x.abs();
+    let z = if p.z < 0.0 { 6.0 * HEIGHT - p.z.abs() } else { p.z };
+    let (x, z) = ((x / 0.5) % 6.0, (z / HEIGHT).rem_euclid(6.0));
+    let (i, j) = (x.floor() as usize, (z.floor() as usize).min(5));
+    let value = match i {
+        0 | 5 => [0, 1, 1, 2, 2, 0][j],
+        2 | 3 => [2, 2, 0, 0, 1, 1][j],
+        _ => {
+            let a = x - x.floor();
+            let a = if (i + j) % 2 == 1 { 1.0 - a } else { a };
+            let b = z - z.floor();
+            let a = if a == 0.0 { TINY } else { a };
+            if b / a < 1.0 { [0, 2, 1, 0, 2, 1][j] } else { [2, 1, 0, 2, 1, 0][j] }
+        }
+    };
+    f64::from(value)
+}
+
+/// 0 to 3 by squares in x and z.
+pub(super) fn square(p: DVec3) -> f64 {
+    let odd = |x: f64| (x + TINY).floor().rem_euclid(2.0) == 1.0;
+    match (odd(p.x), odd(p.z)) {
+        (false, false) => 0.0,
+        (false, true) => 1.0,
+        (true, true) => 2.0,
+        (true, false) => 3.0,
+    }
+}
+
+/// 0 to 5 by triangles of side 1 in x and z.
+pub(super) fn triangular(p: DVec3) -> f64 {
+    const HEIGHT: f64 = 0.866_025_403_784_438_6;
+    let row = (p.z / HEIGHT).floor();
+    let b = p.z / HEIGHT - row;
+    let x = p.x - 0.5 * row;
+    let column = x.floor();
+    let a = x - column;
+    let is_upper = a + b > 1.0;
+    let third = (column - row).rem_euclid(3.0);
+    2.0 * third + if is_upper { 1.0 } else { 0.0 }
+}
+
+/// The distances to the nearest of random points, one in each cube.
+pub(super) fn crackle(p: DVec3, crackle: &Crackle, generator: NoiseGenerator) -> f64 {
+    let base = (p - DVec3::splat(TINY)).floor();
+    let mut nearest = [f64::INFINITY; 3];
+    let mut nucleus = DVec3::ZERO;
+    for x in -2_i32..=2 {
+        for y in -2_i32..=2 {
+            for z in -2_i32..=2 {
+                if [x, y, z].iter().filter(|d| d.abs() == 2).count() >= 2 {
+                    continue;
+                }
+                let cell = base + DVec3::new(f64::from(x), f64::from(y), f64::from(z));
+                let seed = hash3(cell.x as i64, cell.y as i64, cell.z as i64);
+                let point = cell + DVec3::new(random(seed), random(seed + 1), random(seed + 2));
+                let distance = measure(point - p, crackle);
+                if distance < nearest[0] {
+                    nearest = [distance, nearest[0], nearest[1]];
+                    nucleus = point;
+                } else if distance < nearest[1] {
+                    nearest = [nearest[0], distance, nearest[1]];
+                } else if distance < nearest[2] {
+                    nearest[2] = distance;
+                }
+            }
+        }
+    }
+    if crackle.is_solid {
+        return noise(nucleus, generator);
+    }
+    let root = |sum: f64| if crackle.metric == 2.0 { sum.sqrt() } else { sum.power(1.0 / crackle.metric) };
+    let distances = DVec3::from_array(nearest.map(root));
+    crackle.form.dot(distances).clamp(0.0, 1.0)
+}
+
+/// The distance in a metric, before the root.
+fn measure(v: DVec3, crackle: &Crackle) -> f64 {
+    if crackle.metric == 2.0 {
+        return v.length_squared() + crackle.offset * crackle.offset;
+    }
+    let power = |x: f64| x.abs().power(crackle.metric);
+    power(v.x) + power(v.y) + power(v.z) + power(crackle.offset)
+}
