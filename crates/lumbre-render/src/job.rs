@@ -99,7 +99,7 @@ pub fn render_from(
     let spp = options.stop.spp.max(1);
     let catches_shadows = scene.ground().is_some_and(|ground| ground.catcher);
     let extras = Extras {
-        features: options.features || options.guides,
+        features: options.features,
         tints: options.transparent && catches_shadows,
         guides: options.guides,
         depth_unit: depth_unit(scene, &taker.view),
@@ -126,9 +126,16 @@ pub fn render_from(
         deadline,
         cancel,
         pause: keeper.map(|keeper| Pause::new(start, keeper.every)),
-        clock: Clock::new(start, bounds.area(), options.stop, before, progress),
+        clock: Clock::new(start, start.elapsed(), bounds.area(), options.stop, before, progress),
         waves: Mutex::default(),
     };
+    let expect_quiet = |owners: &[Owner]| {
+        let Some(adaptive) = &job.adaptive else { return };
+        let pixels = owners.iter().flat_map(|owner| owner.tile.bounds().pixels().zip(owner.tile.pixels()));
+        let expected: f64 = pixels.map(|((x, y), pixel)| adaptive.expected(x, y, pixel, spp)).sum();
+        job.clock.expect_quiet_at(expected / bounds.area() as f64);
+    };
+    expect_quiet(&owners);
     let hand_over = |owners: &[Owner]| {
         if let (Some(keeper), Some(pause)) = (keeper, &job.pause) {
             (keeper.keep)(state_of(owners.to_vec(), bounds, options));
@@ -151,7 +158,7 @@ pub fn render_from(
                 workers.for_each(&mut owners, |owner| {
                     job.run_coarsely(owner, (bounds.x0, bounds.y0), side, last)
                 });
-                if job.must_stop() || owners.iter().all(|owner| owner.next_side <= side) {
+                if job.must_stop_at(side) || owners.iter().all(|owner| owner.next_side <= side) {
                     break;
                 }
                 hand_over(&owners);
@@ -189,11 +196,7 @@ pub fn render_from(
             noise: reached,
             picture: &|| picture(tiles(), bounds, options.transparent),
         });
-        if let Some(adaptive) = &job.adaptive {
-            let pixels = tiles().flat_map(|tile| tile.bounds().pixels().zip(tile.pixels()));
-            let expected: f64 = pixels.map(|((x, y), pixel)| adaptive.expected(x, y, pixel, spp)).sum();
-            job.clock.expect_quiet_at(expected / bounds.area() as f64);
-        }
+        expect_quiet(&owners);
         if job.must_stop() || least_wanted(&owners).is_none() {
             break;
         }
@@ -275,18 +278,29 @@ fn owners_of(
     let places = bounds.tiles(TILE);
     // Those of a render that goes on in the same program are not copied: there may be gigabytes.
     let are_in_place = state.tiles.iter().map(Tile::bounds).eq(places.iter().copied());
-    let tiles = if are_in_place {
-        state.tiles
-    } else {
-        let film = state.film();
-        places.into_iter().map(|place| film.placed_in(place)).collect()
-    };
+    let tiles = if are_in_place { state.tiles } else { placed(state.tiles, &places, extras) };
     let mut owners: Vec<Owner> = tiles.into_iter().map(Owner::new).collect();
     if let Some(owner) = owners.first_mut() {
         (owner.record.counts, owner.dropped, owner.clamped) = (state.rays, state.dropped, state.clamped);
         owner.first_dropped = state.first_dropped;
     }
     Ok(owners)
+}
+
+/// The sums of some tiles in others, which are in rows from above. The first are dropped as soon as all is taken from them.
+fn placed(tiles: Vec<Tile>, places: &[PixelBounds], extras: Extras) -> Vec<Tile> {
+    let mut rest = tiles;
+    let mut above = 0;
+    let take = |place: &PixelBounds| {
+        if place.y0 > above {
+            above = place.y0;
+            rest.retain(|tile| tile.bounds().y1 > above);
+        }
+        let mut tile = Tile::new(*place, extras);
+        rest.iter().for_each(|from| tile.take(from));
+        tile
+    };
+    places.iter().map(take).collect()
 }
 
 /// What the owners gathered.
@@ -396,6 +410,11 @@ impl Owner {
 }
 
 impl Job<'_> {
+    /// Whether the squares of this side must stop: the clock does not stop the largest, without which there is no picture.
+    fn must_stop_at(&self, side: u32) -> bool {
+        if side == STRIDES[0] { self.cancel.is_cancelled() } else { self.must_stop() }
+    }
+
     fn must_stop(&self) -> bool {
         self.cancel.is_cancelled() || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
@@ -411,7 +430,7 @@ impl Job<'_> {
             (x - corner.0).is_multiple_of(side) && (y - corner.1).is_multiple_of(side)
         };
         let is_new = |x, y| starts(x, y, side) && !last.is_some_and(|last| starts(x, y, last));
-        if self.take(owner, 0..1, is_new) {
+        if self.take(owner, 0..1, is_new, || self.must_stop_at(side)) {
             owner.next_side = side;
         }
     }
@@ -429,7 +448,7 @@ impl Job<'_> {
             if let Some(adaptive) = &self.adaptive {
                 next = next.min(adaptive.next_look(first));
             }
-            if !self.take(owner, first..next, |_, _| true) {
+            if !self.take(owner, first..next, |_, _| true, || self.must_stop()) {
                 return;
             }
             first = next;
@@ -437,7 +456,13 @@ impl Job<'_> {
     }
 
     /// Takes samples of those pixels of a tile that have none of these numbers yet and need them; false where it had to stop before.
-    fn take(&self, owner: &mut Owner, numbers: Range<u32>, is_wanted: impl Fn(u32, u32) -> bool) -> bool {
+    fn take(
+        &self,
+        owner: &mut Owner,
+        numbers: Range<u32>,
+        is_wanted: impl Fn(u32, u32) -> bool,
+        must_stop: impl Fn() -> bool,
+    ) -> bool {
         let mut ids = Vec::new();
         for number in numbers {
             for (x, y) in owner.tile.bounds().pixels() {
@@ -453,7 +478,7 @@ impl Job<'_> {
             return true;
         }
         // However short the time between two pauses, some work is done.
-        if self.must_stop() || (owner.has_worked && self.is_paused()) {
+        if must_stop() || (owner.has_worked && self.is_paused()) {
             owner.has_worked = false;
             return false;
         }

@@ -5,7 +5,8 @@ use lumbre_math::random::{combine, mix, uniform_f64};
 
 use super::{denoise, denoise_unless};
 use crate::film::{Exposure, Extras, FeatureSample, PixelBounds, Sample, Tile};
-use crate::rendered::{guides, picture};
+use crate::film::Guides;
+use crate::rendered::picture;
 use crate::{Rendered, Stats};
 
 const WIDTH: u32 = 40;
@@ -37,7 +38,7 @@ fn rendered(samples: u32, scene: &Scene) -> Rendered {
         coverage: None,
         bounds,
         features: vec![],
-        guides: Some(guides(tiles(), bounds)),
+        guides: Some(Guides::new(tiles())),
         stats: Stats { spp: samples, stride: Some(1), threads: 1, ..Stats::default() },
     }
 }
@@ -117,7 +118,7 @@ fn few_samples_and_none_give_numbers() {
     let black = rendered(2, &|_, _, _| (Rgb::BLACK, Rgb::BLACK, UP));
     let single = rendered(1, &noisy);
     let mut holes = rendered(2, &noisy);
-    let all = holes.guides.as_mut().unwrap();
+    let (_, _, _, all) = holes.guides.as_mut().unwrap().tiles_mut()[0].sums_mut();
     for i in [0, 7, 500] {
         all[i] = Default::default();
     }
