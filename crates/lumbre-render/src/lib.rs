@@ -6,6 +6,7 @@
 
 mod adaptive;
 mod cancel;
+mod caustics;
 mod clock;
 mod denoise;
 mod error;

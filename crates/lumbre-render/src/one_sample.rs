@@ -176,7 +176,7 @@ impl<'a> Taker<'a> {
     fn camera_ray(&self, draw: &Draw, aim: &Aim) -> CameraRay {
         let part = if self.moves { draw.time() } else { 0.0 };
         let time = self.view.time(part);
-        if self.scene.is_textured() {
+        if self.scene.is_textured() || self.integrator.needs_footprints() {
             self.view.ray(aim.film, aim.lens, time, SPACING)
         } else {
             self.view.bare_ray(aim.film, aim.lens, time)

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use lumbre_image::Rgb;
 use lumbre_math::DVec2;
-use lumbre_scene::{FilmDesc, FilterDesc, IntegratorDesc, SamplerDesc, Scene};
+use lumbre_scene::{FilmDesc, FilterDesc, IntegratorDesc, IntegratorKind, SamplerDesc, Scene};
 
 use crate::RenderError;
 use crate::denoise;
@@ -205,7 +205,11 @@ impl RenderOptions {
             all = all.saturating_add(pixels.saturating_mul(size_of::<GuideSums>() as u64));
             all = all.saturating_add(denoise::memory_bytes(pixels, Workers::wanted(self.threads)));
         }
-        Ok(all)
+        let photons = match self.integrator.kind {
+            IntegratorKind::Caustics => crate::caustics::memory_bytes(self.width, self.height),
+            _ => 0,
+        };
+        Ok(all.saturating_add(photons))
     }
 
     pub(crate) fn pixel_filter(&self) -> Result<Filter, RenderError> {

@@ -18,6 +18,7 @@ use crate::light::{
 };
 use crate::media::{self, Boundaries, Media};
 use crate::mesh::{self, QuadOrder};
+use crate::specular::Specular;
 use crate::surface::{ColourRamp, Form, SurfaceEntry};
 use crate::{
     AreaLightDesc, BuildError, BuildWarning, Camera, CameraKind, Emission, GeometryDesc, GroundPlane,
@@ -42,6 +43,7 @@ impl Scene {
         let ground = ground::lay(&mut desc)?;
         let uses_media = media::check(&desc)?;
         let separated = media::split(&mut desc);
+        let specular = Specular::of(&desc);
         let SceneDesc {
             cameras,
             film,
@@ -127,6 +129,7 @@ impl Scene {
             has_instances: !objects.is_empty(),
             moves,
             looks_up,
+            specular_spheres: specular.spheres(&bounds),
             ground: ground.map(|desc| GroundPlane::new(desc, &builder.lights)),
             tables: SurfaceTable::new(&builder.entries),
             entries: builder.entries,

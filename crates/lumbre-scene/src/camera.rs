@@ -184,6 +184,7 @@ pub struct View {
     // perspective camera is at z = 1, that of a spherical one is the unit square.
     corner: DVec2,
     step: DVec2,
+    size: [u32; 2],
 }
 
 impl View {
@@ -210,7 +211,13 @@ impl View {
             medium: camera.medium,
             corner,
             step: (opposite - corner) / pixels,
+            size: [width.max(1), height.max(1)],
         }
+    }
+
+    /// The pixels of the picture: how many across and down.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
     }
 
     /// The time at a fraction of the exposure: 0 is when the shutter opens, 1 when it closes.

@@ -522,6 +522,8 @@ pub enum IntegratorKind {
         /// Whether to roughen surfaces after the first diffuse bounce.
         regularize: bool,
     },
+    /// Path tracing with photons for the light that comes over mirrors and smooth glass.
+    Caustics,
     /// Whitted 1980: direct light, perfect reflection and refraction.
     Whitted {
         /// Samples on each area light, at least 1.
@@ -550,7 +552,7 @@ impl IntegratorKind {
     /// Whether its picture of a scene without light is black.
     pub fn needs_light(&self) -> bool {
         match self {
-            Self::Path { .. } | Self::Whitted { .. } => true,
+            Self::Path { .. } | Self::Caustics | Self::Whitted { .. } => true,
             Self::AmbientOcclusion { .. } | Self::Normals | Self::Depth | Self::Albedo | Self::Uv => false,
         }
     }
@@ -558,19 +560,21 @@ impl IntegratorKind {
     /// Whether its picture is of what is there, and not an estimate of light, with the noise of one.
     pub fn is_feature(&self) -> bool {
         match self {
-            Self::Path { .. } | Self::Whitted { .. } | Self::AmbientOcclusion { .. } => false,
+            Self::Path { .. } | Self::Caustics => false,
+            Self::Whitted { .. } | Self::AmbientOcclusion { .. } => false,
             Self::Normals | Self::Depth | Self::Albedo | Self::Uv => true,
         }
     }
 
     /// The names of all.
-    pub const NAMES: [&'static str; 7] =
-        ["path", "whitted", "ambientocclusion", "normals", "depth", "albedo", "uv"];
+    pub const NAMES: [&'static str; 8] =
+        ["path", "caustics", "whitted", "ambientocclusion", "normals", "depth", "albedo", "uv"];
 
     /// The integrator of a name in the scene language, with default parameters.
     pub fn from_name(name: &str) -> Option<Self> {
         match name {
             "path" => Some(Self::Path { regularize: false }),
+            "caustics" => Some(Self::Caustics),
             "whitted" => Some(Self::Whitted { light_samples: 1, sky: false }),
             "ambientocclusion" => Some(Self::AmbientOcclusion { cosine: true, max_distance: f64::INFINITY }),
             "normals" => Some(Self::Normals),

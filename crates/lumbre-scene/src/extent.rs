@@ -68,6 +68,13 @@ impl<'d> Extent<'d> {
         }
     }
 
+    /// The bounds of one shape; empty where it has none.
+    pub(crate) fn bounds_of(&self, shape: &ShapeDesc) -> Aabb {
+        let mut bounds = Aabb::EMPTY;
+        each_point_of(shape, &self.used, &mut |p| bounds = bounds.union(Aabb { min: p, max: p }));
+        bounds
+    }
+
     pub(crate) fn bounds(&self) -> Aabb {
         let mut bounds = Aabb::EMPTY;
         self.each_point(&mut |p| bounds = bounds.union(Aabb { min: p, max: p }));

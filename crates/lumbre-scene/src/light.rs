@@ -26,6 +26,7 @@ pub use delta::{DistantLight, GoniometricLight, PointLight, SpotLight};
 pub use environment::{Environment, UniformLight};
 pub use mesh::MeshLight;
 pub use moving::MovingLight;
+pub(crate) use moving::swept;
 pub use placed::PlacedLight;
 pub use portal::PortalLight;
 pub use projection::ProjectionLight;

@@ -17,8 +17,8 @@ use crate::light::{Light, LightId, LightSample, Place, Sampling};
 use crate::media::Media;
 use crate::surface::{Form, ShadingGeometry, SurfaceEntry};
 use crate::{
-    BuildError, Camera, FilmDesc, FilterDesc, Footprint, GroundPlane, IntegratorDesc, Interaction,
-    SamplerDesc, SurfaceTable,
+    BoundingSphere, BuildError, Camera, FilmDesc, FilterDesc, Footprint, GroundPlane, IntegratorDesc,
+    Interaction, SamplerDesc, SurfaceTable,
 };
 
 /// An immutable scene, which any number of threads can render.
@@ -41,6 +41,7 @@ pub struct Scene {
     pub(crate) integrator: IntegratorDesc,
     pub(crate) bounds: Aabb,
     pub(crate) ground: Option<GroundPlane>,
+    pub(crate) specular_spheres: Vec<BoundingSphere>,
     pub(crate) warnings: Vec<BuildWarning>,
     // Whether shadow rays must check every hit: there are cut-outs or interfaces.
     pub(crate) has_holes: bool,
@@ -206,6 +207,11 @@ impl Scene {
     /// Whether the hit surface may transmit light straight on.
     pub fn is_pane(&self, hit: &Hit) -> bool {
         self.leaf(hit).0.lets_light_straight_on()
+    }
+
+    /// Whether the hit surface may reflect or refract without blur: see [`lumbre_shading::Material::may_be_specular`].
+    pub fn may_be_specular(&self, hit: &Hit) -> bool {
+        self.leaf(hit).0.material.as_ref().is_some_and(|material| material.may_be_specular())
     }
 
     /// The closest hit, skipping cut-outs and interfaces.

@@ -327,6 +327,24 @@ impl Material {
         })
     }
 
+    /// Whether [`Bsdf::specular`] may have any part anywhere on it: a mirror, smooth glass, a smooth coat; of a mixture, on any part.
+    pub fn may_be_specular(&self) -> bool {
+        self.has_part(|kind| match kind {
+            MaterialKind::Conductor { roughness, .. }
+            | MaterialKind::ConductorReflectance { roughness, .. }
+            | MaterialKind::Dielectric { roughness, .. }
+            | MaterialKind::CoatedDiffuse { roughness, .. }
+            | MaterialKind::CoatedConductor { interface_roughness: roughness, .. } => {
+                roughness.may_be_smooth()
+            }
+            MaterialKind::ThinDielectric { .. } => true,
+            MaterialKind::Principled(params) => params.may_be_specular(),
+            MaterialKind::Uber(params) => params.may_be_specular(),
+            MaterialKind::Diffuse { .. } | MaterialKind::DiffuseTransmission { .. } => false,
+            MaterialKind::Mix { .. } | MaterialKind::Interface => false,
+        })
+    }
+
     /// Whether it, or a part of the mixture, is of some kind; true when in doubt, for mixtures of very many
     /// parts.
     fn has_part(&self, is: impl Fn(&MaterialKind) -> bool) -> bool {
@@ -606,13 +624,24 @@ impl Roughness {
 
     /// The microfacets at a position.
     fn facets(&self, at: &TextureContext) -> Microfacets {
-        let alpha = |texture: &FloatTexture| {
-            let roughness = texture.evaluate(at).max(0.0);
-            if self.remap { roughness.sqrt() } else { roughness }
-        };
-        let u = alpha(&self.u);
-        let v = if Arc::ptr_eq(&self.u, &self.v) { u } else { alpha(&self.v) };
+        let u = self.alpha(self.u.evaluate(at));
+        let v = if Arc::ptr_eq(&self.u, &self.v) { u } else { self.alpha(self.v.evaluate(at)) };
         Microfacets::new(u, v)
+    }
+
+    /// The width α of the microfacets of a roughness.
+    fn alpha(&self, roughness: f32) -> f32 {
+        let roughness = roughness.max(0.0);
+        if self.remap { roughness.sqrt() } else { roughness }
+    }
+
+    /// Whether the surface may be smooth anywhere: surely not where the roughness is a number that makes it rough.
+    fn may_be_smooth(&self) -> bool {
+        let is_rough = |texture: &FloatTexture| match texture {
+            Texture::Constant(roughness) => !Microfacets::new(self.alpha(*roughness), 0.0).is_smooth(),
+            _ => false,
+        };
+        !is_rough(&self.u) && !is_rough(&self.v)
     }
 }
 

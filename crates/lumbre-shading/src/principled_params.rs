@@ -219,17 +219,22 @@ impl PrincipledParams {
         opens(&self.transmission) || opens(&self.diffuse_transmission)
     }
 
+    /// Whether it, or its coat, may be smooth anywhere.
+    pub(crate) fn may_be_specular(&self) -> bool {
+        let is_rough = |texture: &FloatTexture| is_constantly(texture, is_rough);
+        !is_rough(&self.roughness)
+            || !(is_rough(&self.clearcoat_roughness) || is_constantly(&self.clearcoat, |v| v <= 0.0))
+    }
+
     /// Whether any light may be transmitted straight on; see [`crate::Material::lets_light_straight_on`].
     pub(crate) fn lets_light_straight_on(&self) -> bool {
-        let is_constantly =
-            |texture: &FloatTexture, is: fn(f32) -> bool| matches!(texture, Texture::Constant(v) if is(*v));
         if is_constantly(&self.transmission, |v| v <= 0.0) || is_constantly(&self.metallic, |v| v >= 1.0) {
             return false;
         }
         match self.interior_index() {
             Some(index) => (index - 1.0).abs() < Principled::NO_BORDER,
             // Anisotropy only makes it rougher.
-            None => !is_constantly(&self.roughness, |v| !Microfacets::new(v * v, v * v).is_smooth()),
+            None => !is_constantly(&self.roughness, is_rough),
         }
     }
 
@@ -352,6 +357,16 @@ fn hue(color: Spectrum, amount: f32) -> Spectrum {
         return Spectrum::WHITE;
     }
     Spectrum::WHITE.lerp(color / luminance, amount)
+}
+
+/// Whether a texture is a number that meets a condition.
+fn is_constantly(texture: &FloatTexture, is: fn(f32) -> bool) -> bool {
+    matches!(texture, Texture::Constant(v) if is(*v))
+}
+
+/// Whether facets of this roughness are not smooth.
+fn is_rough(roughness: f32) -> bool {
+    !Microfacets::new(roughness * roughness, roughness * roughness).is_smooth()
 }
 
 fn number(v: f32) -> Arc<FloatTexture> {

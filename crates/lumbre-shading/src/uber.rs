@@ -45,6 +45,11 @@ impl UberParams {
         !is_everywhere(&self.kt, Spectrum::BLACK) || self.lets_light_straight_on()
     }
 
+    /// Whether it may have a mirror or smooth refraction anywhere.
+    pub(crate) fn may_be_specular(&self) -> bool {
+        !is_everywhere(&self.kr, Spectrum::BLACK) || self.lets_light_through()
+    }
+
     /// Whether light may pass to the other side unbent.
     pub(crate) fn lets_light_straight_on(&self) -> bool {
         let may_be_one = match *self.eta {

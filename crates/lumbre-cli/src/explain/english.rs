@@ -139,6 +139,7 @@ pub(super) static ENGLISH: Texts = Texts {
     from_medium: "light of the medium",
     from_sampled: "a light that was sampled",
     from_direct: "all lights that shine on it",
+    from_caustics: "photons near the point",
     end_depth: "The path has as many bounces as it may have.",
     end_nothing: "Nothing scatters here.",
     end_absorbed: "All is absorbed.",

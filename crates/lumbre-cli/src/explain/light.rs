@@ -340,6 +340,7 @@ fn source_of(source: Source, texts: &Texts) -> &'static str {
         Source::Medium => texts.from_medium,
         Source::Sampled => texts.from_sampled,
         Source::Direct => texts.from_direct,
+        Source::Caustics => texts.from_caustics,
     }
 }
 

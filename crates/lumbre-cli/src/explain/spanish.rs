@@ -139,6 +139,7 @@ pub(super) static SPANISH: Texts = Texts {
     from_medium: "luz del medio",
     from_sampled: "una luz muestreada",
     from_direct: "todas las luces que la iluminan",
+    from_caustics: "fotones cercanos al punto",
     end_depth: "El camino tiene tantos rebotes como puede tener.",
     end_nothing: "Aquí nada dispersa.",
     end_absorbed: "Todo se absorbe.",

@@ -143,6 +143,7 @@ pub(super) struct Texts {
     pub(super) from_medium: &'static str,
     pub(super) from_sampled: &'static str,
     pub(super) from_direct: &'static str,
+    pub(super) from_caustics: &'static str,
     pub(super) end_depth: &'static str,
     pub(super) end_nothing: &'static str,
     pub(super) end_absorbed: &'static str,

@@ -20,8 +20,9 @@ use crate::diagnostic::{number, quoted};
 pub(super) const CAMERAS: [&str; 4] = ["perspective", "orthographic", "spherical", "realistic"];
 
 /// The types of integrators.
-pub(super) const INTEGRATORS: [&str; 15] = [
+pub(super) const INTEGRATORS: [&str; 16] = [
     "path",
+    "caustics",
     "volpath",
     "simplepath",
     "simplevolpath",
@@ -360,10 +361,23 @@ impl Converter<'_, '_> {
             "depth" => IntegratorKind::Depth,
             "albedo" => IntegratorKind::Albedo,
             "uv" => IntegratorKind::Uv,
-            "bdpt" | "mlt" | "sppm" | "lightpath" | "randomwalk" | "function" => {
+            "caustics" => IntegratorKind::Caustics,
+            "bdpt" | "mlt" | "sppm" | "lightpath" => {
+                params.ignore_all();
+                let differs = match ty {
+                    "bdpt" => "it connects no vertices: light around corners is found as by path",
+                    "mlt" => "it mutates no paths: samples are independent",
+                    "sppm" => "its radius is a few pixels, and photons are for caustics alone",
+                    _ => "what is seen in mirrors and through glass is not black",
+                };
+                let message = format!("integrator {} is rendered by caustics: {differs}", quoted(ty));
+                self.warn(spot, Diagnostic::note(message));
+                IntegratorKind::Caustics
+            }
+            "randomwalk" | "function" => {
                 let kind = path(&params)?;
                 params.ignore_all();
-                let message = format!("integrator {} is not rendered yet: path takes its place", quoted(ty));
+                let message = format!("integrator {} is not rendered: path takes its place", quoted(ty));
                 self.note(spot, message);
                 kind
             }

@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use lumbre_scene::{IntegratorDesc, IntegratorKind, Scene, View};
 use lumbre_shading::Spectrum;
 
-use crate::integrators::{AmbientOcclusion, FeatureIntegrator, Path, Whitted};
+use crate::integrators::{AmbientOcclusion, Caustics, FeatureIntegrator, Path, Whitted};
 use crate::transport::{Draw, Feature, Record, Sampler, Sight};
 use crate::wave::Sights;
 
@@ -13,6 +13,11 @@ use crate::wave::Sights;
 pub trait Integrator: Debug + Send + Sync {
     /// Gives each of the samples an estimate of the radiance along its ray from the camera.
     fn estimate(&self, sights: &mut Sights<'_, '_>, sampler: &Sampler, record: &mut Record);
+
+    /// Whether rays from the camera are to have footprints, also in scenes without textures.
+    fn needs_footprints(&self) -> bool {
+        false
+    }
 }
 
 /// An estimator that takes one ray from the camera after the other.
@@ -42,6 +47,7 @@ pub fn integrator(desc: &IntegratorDesc) -> Box<dyn Integrator> {
         IntegratorKind::Path { regularize } => {
             Box::new(Path { regularize, shading_normals, ..Path::new(max_depth) })
         }
+        IntegratorKind::Caustics => Box::new(Caustics::new(max_depth, shading_normals)),
         IntegratorKind::Whitted { light_samples, sky } => {
             Box::new(Whitted { max_depth, light_samples, sky, shading_normals })
         }

@@ -1,5 +1,6 @@
 //! Path tracing with next-event estimation and multiple importance sampling.
 
+use lumbre_scene::Scene;
 use lumbre_shading::ShadingNormals;
 use lumbre_simd::InstructionSet;
 
@@ -46,10 +47,10 @@ impl Path {
     }
 }
 
-impl Integrator for Path {
-    fn estimate(&self, sights: &mut Sights<'_, '_>, sampler: &Sampler, record: &mut Record) {
-        let scene = sights.scene();
-        let setting = Setting {
+impl Path {
+    /// What all paths have in common.
+    pub(crate) fn setting<'s>(&self, scene: &'s Scene, sampler: &Sampler) -> Setting<'s> {
+        Setting {
             scene,
             sampler: sampler.kind(),
             strategy: self.strategy,
@@ -62,7 +63,13 @@ impl Integrator for Path {
             has_panes: scene.lets_light_straight_on(),
             moves: scene.moves(),
             instruction_set: InstructionSet::detect(),
-        };
-        sights.follow(&setting, record);
+            merging: None,
+        }
+    }
+}
+
+impl Integrator for Path {
+    fn estimate(&self, sights: &mut Sights<'_, '_>, sampler: &Sampler, record: &mut Record) {
+        sights.follow(&self.setting(sights.scene(), sampler), record);
     }
 }

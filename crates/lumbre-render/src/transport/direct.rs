@@ -202,6 +202,21 @@ impl<'a, 's> Vertex<'a, 's> {
         }
     }
 
+    /// By how much a specular bounce concentrates the power of light that comes from `wo`, for it is by the shading normal that light is
+    /// bent, and by the geometric one that it falls on the surface.
+    ///
+    /// E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997, 5.3.2.
+    pub(crate) fn concentration(&self, wi: DVec3) -> f32 {
+        let normal = self.met.shading.geometric;
+        if !ShadingNormals::differ(self.frame.n, normal) {
+            return 1.0;
+        }
+        let (wo, wi) = (self.met.towards_origin.as_vec3(), wi.as_vec3());
+        let ratio = |w: Vec3| (w.dot(normal) / w.dot(self.frame.n)).abs();
+        let concentration = ratio(wi) / ratio(wo);
+        if concentration.is_finite() { concentration } else { 0.0 }
+    }
+
     /// What of the light that comes from straight behind goes straight on: see [`Bsdf::straight_on`].
     pub(crate) fn straight_on(&self) -> Spectrum {
         self.bsdf.straight_on(self.wo)

@@ -89,6 +89,8 @@ pub enum Source {
     Sampled,
     /// What the surface scatters of all lights.
     Direct,
+    /// What the surface scatters of photons near the point.
+    Caustics,
 }
 
 /// Why a path ends.

@@ -232,7 +232,8 @@ fn light_pdf<R: Real>(
     shines: R::Mask,
     point: V3<R::Double>,
 ) -> R {
-    let chosen = shines & R::gather(&paths.pdf, at).simd_lt(R::splat(f32::INFINITY));
+    let least = R::gather(&paths.pdf, at).simd_min(R::gather(&paths.merging, at));
+    let chosen = shines & least.simd_lt(R::splat(f32::INFINITY));
     if chosen.none() {
         return R::zero();
     }

@@ -204,6 +204,7 @@ impl<'s> Wave<'s> {
             throughput,
             eta_scale,
             pdf,
+            merging: f32::INFINITY,
             depth: depth | SCATTERED,
             width: collision.width,
             spread: self.paths.spread[path],

@@ -11,7 +11,8 @@ mod escape;
 mod flat;
 mod lights;
 mod media;
-mod paths;
+mod merge;
+pub(crate) mod paths;
 mod search;
 pub(crate) mod setting;
 mod shade;
@@ -31,7 +32,7 @@ use lumbre_shading::lanes::{
     BsdfKind, CoatedConductorLanes, CoatedDiffuseLanes, ConductorLanes, DielectricLanes, DiffuseLanes,
     DiffuseTransmissionLanes, PrincipledLanes, ThinDielectricLanes, UberLanes,
 };
-use lumbre_simd::Real;
+use lumbre_simd::{InstructionSet, Real};
 
 pub(crate) use paths::SampleId;
 pub(crate) use search::Precision;
@@ -42,6 +43,7 @@ use crate::transport::Record;
 use crate::transport::journal::{End, Event, Source};
 use crate::wave::escape::Escape;
 use crate::wave::flat::FlatHits;
+use crate::wave::merge::{Merge, MergeKind, Merges};
 use crate::wave::paths::{Collision, OnePath, Paths, Slots};
 use crate::wave::search::Hits;
 use crate::wave::setting::{Found, Leg, Setting};
@@ -78,6 +80,7 @@ pub(crate) struct Wave<'s> {
     taken: Vec<bool>,
     /// The boundaries of media along one ray.
     boundaries: Vec<Crossing>,
+    merges: Merges,
     /// Whether rays come from the camera.
     is_first: bool,
     /// Whether rays from the camera that leave the scene find nothing.
@@ -92,6 +95,7 @@ impl<'s> Wave<'s> {
             self.cross_media(setting, record);
             self.escape(setting, record);
             self.surfaces(setting, record);
+            self.merge(setting, record);
             self.shade(setting, precision, traced.as_mut());
             self.cross_surfaces(setting);
             self.light(setting, precision, traced.as_mut(), record);
@@ -139,9 +143,20 @@ impl<'s> Wave<'s> {
     fn add_found(&mut self, setting: &Setting<'s>, source: Source, record: &mut Record) {
         for &Found { path, radiance, light_pdf } in &self.found {
             let path = path as usize;
-            let weight = setting.weight_of_found(self.paths.pdf[path], light_pdf);
+            let weight = self.weight_of_found(setting, path, light_pdf);
             let added = record.added(source, self.paths.throughput(path), radiance, weight);
             self.slots.radiance[self.paths.slot[path] as usize] += added;
+        }
+    }
+
+    /// The weight of light that a path found by itself: see [`Setting::weight_of_found`].
+    fn weight_of_found(&self, setting: &Setting<'s>, path: usize, light_pdf: f32) -> f32 {
+        let merged = self.paths.merging[path];
+        match &setting.merging {
+            Some(merging) if self.paths.pdf[path] == f32::INFINITY && merged < f32::INFINITY => {
+                merging.weight_of_found(merged, self.paths.origin(path), light_pdf)
+            }
+            _ => setting.weight_of_found(self.paths.pdf[path], light_pdf),
         }
     }
 
@@ -261,6 +276,17 @@ macro_rules! kinds {
                 match kind {
                     $(BsdfKind::$kind => {
                         instruction_set.run(ShadeKind { shade: self, kind: PhantomData::<$kind> });
+                    })*
+                }
+            }
+        }
+
+        impl Merge<'_, '_> {
+            /// Evaluates BSDFs that are of a kind.
+            fn of_kind(self, instruction_set: InstructionSet, kind: BsdfKind) {
+                match kind {
+                    $(BsdfKind::$kind => {
+                        instruction_set.run(MergeKind { merge: self, kind: PhantomData::<$kind> });
                     })*
                 }
             }

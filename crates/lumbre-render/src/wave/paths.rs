@@ -72,6 +72,8 @@ pub(crate) struct Slots<'s> {
     /// Distances sampled in media, and collisions inside solids.
     pub(crate) distance_samples: Vec<u32>,
     pub(crate) collisions: Vec<u32>,
+    /// The radius in which photons are collected, per width of a footprint; only where there are photons.
+    pub(crate) widths: Vec<f32>,
 }
 
 impl Slots<'_> {
@@ -88,6 +90,7 @@ impl Slots<'_> {
         self.medium.clear();
         self.distance_samples.clear();
         self.collisions.clear();
+        self.widths.clear();
     }
 
     /// The ray from the camera of a sample.
@@ -137,6 +140,9 @@ pub(crate) struct Paths {
     pub(crate) eta_scale: Vec<f32>,
     /// The density with which the direction was chosen; infinite where it was the only one.
     pub(crate) pdf: Vec<f32>,
+    /// For light that is found behind specular surfaces: the density with which the direction before them was chosen, over the number of
+    /// lines of a pass and the area in which photons are collected there. Infinite where photons do not bring that light.
+    pub(crate) merging: Vec<f32>,
     /// Bounces off surfaces, and [`SCATTERED`].
     pub(crate) depth: Vec<u32>,
     /// The width of the footprint where the ray starts, and its growth with distance: see [`lumbre_scene::Footprint::Cone`].
@@ -157,6 +163,7 @@ pub(crate) struct Departure<R: Real> {
     pub(crate) throughput: V3<R>,
     pub(crate) eta_scale: R,
     pub(crate) pdf: R,
+    pub(crate) merging: R,
     pub(crate) depth: R::UInt,
     pub(crate) width: R,
     pub(crate) spread: R,
@@ -172,6 +179,7 @@ pub(crate) struct OnePath {
     pub(crate) throughput: Spectrum,
     pub(crate) eta_scale: f32,
     pub(crate) pdf: f32,
+    pub(crate) merging: f32,
     pub(crate) depth: u32,
     pub(crate) width: f32,
     pub(crate) spread: f32,
@@ -219,6 +227,7 @@ impl Paths {
             throughput: self.throughput(at),
             eta_scale: self.eta_scale[at],
             pdf: self.pdf[at],
+            merging: self.merging[at],
             depth: self.depth[at],
             width: self.width[at],
             spread: self.spread[at],
@@ -239,6 +248,7 @@ impl Paths {
         self.set_throughput(at, path.throughput);
         self.eta_scale[at] = path.eta_scale;
         self.pdf[at] = path.pdf;
+        self.merging[at] = path.merging;
         self.depth[at] = path.depth;
         self.width[at] = path.width;
         self.spread[at] = path.spread;
@@ -251,7 +261,8 @@ impl Paths {
         self.receiver.iter_mut().for_each(|column| grow(column, len));
         self.direction.iter_mut().for_each(|column| grow(column, len));
         self.throughput.iter_mut().for_each(|column| grow(column, len));
-        for column in [&mut self.eta_scale, &mut self.pdf, &mut self.width, &mut self.spread] {
+        let f32s = [&mut self.eta_scale, &mut self.pdf, &mut self.merging, &mut self.width, &mut self.spread];
+        for column in f32s {
             grow(column, len);
         }
         grow(&mut self.depth, len);
@@ -276,6 +287,7 @@ impl Paths {
         path.throughput.z.compress_store(mask, &mut self.throughput[2][to..]);
         path.eta_scale.compress_store(mask, &mut self.eta_scale[to..]);
         path.pdf.compress_store(mask, &mut self.pdf[to..]);
+        path.merging.compress_store(mask, &mut self.merging[to..]);
         path.depth.compress_store(mask, &mut self.depth[to..]);
         path.width.compress_store(mask, &mut self.width[to..]);
         path.spread.compress_store(mask, &mut self.spread[to..]);

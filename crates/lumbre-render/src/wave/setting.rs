@@ -6,6 +6,7 @@ use lumbre_scene::{SamplerKind, Scene};
 use lumbre_shading::{ShadingNormals, Spectrum};
 use lumbre_simd::{Double, InstructionSet, Real, V3};
 
+use crate::caustics::Merging;
 use crate::transport::Strategy;
 
 /// What all paths of a render have in common.
@@ -25,6 +26,8 @@ pub(crate) struct Setting<'s> {
     pub(crate) has_panes: bool,
     pub(crate) moves: bool,
     pub(crate) instruction_set: InstructionSet,
+    /// Photons, where caustics are found by them.
+    pub(crate) merging: Option<Merging<'s>>,
 }
 
 /// The first part of a ray: from a face to the smooth surface over it, where the ray itself starts.

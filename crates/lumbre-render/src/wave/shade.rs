@@ -8,6 +8,7 @@ use lumbre_scene::light::lanes::{LaneLightSample, Receiver};
 use lumbre_shading::lanes::{LaneBsdf, LaneSample};
 use lumbre_simd::{Double, Job, Mask, Real, UInt, V3};
 
+use crate::caustics::radius;
 use crate::transport::Strategy;
 use crate::transport::sampler::LaneDraw;
 use crate::wave::lights::{pass_solids, push_panes};
@@ -72,7 +73,7 @@ impl<K: Kind> Job for ShadeKind<'_, '_, '_, K> {
 /// edge of a face. J. Hanika ("Hacking the Shadow Terminator", 2021) starts all rays there; here those that leave a face upwards start
 /// on it. What lies between the face and the smooth surface stands in the way of such rays: it is their first leg.
 #[derive(Clone, Copy)]
-struct Vertex<R: Real> {
+pub(super) struct Vertex<R: Real> {
     place: Place<R>,
     /// The normal for which lights are sampled.
     receiver: V3<R>,
@@ -91,9 +92,9 @@ struct Vertex<R: Real> {
 
 /// f · |cos θ| towards a direction, and the density of the BSDF's choice of it.
 #[derive(Clone, Copy)]
-struct Scattered<R: Real> {
-    f: V3<R>,
-    pdf: R,
+pub(super) struct Scattered<R: Real> {
+    pub(super) f: V3<R>,
+    pub(super) pdf: R,
 }
 
 #[inline(always)]
@@ -113,7 +114,7 @@ fn mirrored<R: Real>(w: V3<R>, normal: V3<R>) -> V3<R> {
 
 impl<R: Real> Vertex<R> {
     #[inline(always)]
-    fn new(vertices: &Vertices<'_>, at: R::UInt, towards: V3<R>) -> Self {
+    pub(super) fn new(vertices: &Vertices<'_>, at: R::UInt, towards: V3<R>) -> Self {
         let flags = R::UInt::gather(&vertices.flags, at);
         let folds = has::<R>(flags, FOLDS);
         let rises = has::<R>(flags, RISES);
@@ -155,7 +156,7 @@ impl<R: Real> Vertex<R> {
 
     /// What the BSDF scatters to a direction of the world, by itself and by directions that are folded onto it.
     #[inline(always)]
-    fn eval<B: LaneBsdf<R>>(&self, bsdf: &B, wi: V3<R>) -> Scattered<R> {
+    pub(super) fn eval<B: LaneBsdf<R>>(&self, bsdf: &B, wi: V3<R>) -> Scattered<R> {
         let local = self.to_local(wi);
         let (f, pdf) = bsdf.eval(self.wo, local);
         if self.folds.none() {
@@ -377,14 +378,19 @@ impl<'s> Shade<'_, 's> {
         let scattered = R::UInt::gather(&self.paths.depth, at) & R::UInt::splat(SCATTERED);
         let scattered = R::UInt::select(sample.delta, scattered, R::UInt::splat(SCATTERED));
         let (origin, stays) = vertex.start(direction);
+        let (mut receiver, mut merging) = (vertex.receiver, R::splat(f32::INFINITY));
+        if self.setting.merging.is_some() {
+            (receiver, merging) = self.merging(arrived, sample.delta, pdf);
+        }
         let path = Departure {
             slot: arrived.slot,
             origin,
-            receiver: vertex.receiver,
+            receiver,
             direction,
             throughput,
             eta_scale,
             pdf,
+            merging,
             depth: depth | scattered,
             width: R::gather(&self.vertices.width, arrived.vertex_at),
             spread: R::gather(&self.vertices.spread, arrived.vertex_at),
@@ -405,6 +411,22 @@ impl<'s> Shade<'_, 's> {
             let crosses = survives & vertex.crosses(direction, sample.transmitted);
             push_crossings::<R>(self.crossings, crosses, arrived.vertex_at);
         }
+    }
+}
+
+impl Shade<'_, '_> {
+    /// What a path takes along to weigh light that it finds against photons: the receiver of that light, and
+    /// [`Paths::merging`]. Photons begin at specular surfaces with light from every side.
+    #[inline(always)]
+    fn merging<R: Real>(&self, arrived: &Arrived<R>, delta: R::Mask, pdf: R) -> (V3<R>, R) {
+        let Some(merging) = &self.setting.merging else { return (arrived.vertex.receiver, pdf) };
+        let flags = R::UInt::gather(&self.paths.depth, arrived.at) & R::UInt::splat(SCATTERED);
+        let has_scattered = !flags.simd_eq(R::UInt::splat(0));
+        let width = R::gather(&self.vertices.width, arrived.vertex_at);
+        let radius = radius::<R>(R::gather(&self.slots.widths, arrived.slot), width, has_scattered);
+        let own = pdf * merging.spread(radius);
+        let receiver = arrived.vertex.receiver.or_zero(!delta);
+        (receiver, R::select(delta, R::gather(&self.paths.merging, arrived.at), own))
     }
 }
 

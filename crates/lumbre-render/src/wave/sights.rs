@@ -5,9 +5,10 @@ use lumbre_math::{DVec3, Vec3};
 use lumbre_scene::{CameraRay, Footprint, SamplerKind, Scene, View};
 use lumbre_shading::Spectrum;
 
+use crate::caustics::Merging;
 use crate::transport::{Draw, Record, Seen, Sight};
 use crate::wave::catcher::{Catcher, Places};
-use crate::wave::paths::{OnePath, Paths, to_column};
+use crate::wave::paths::{OnePath, Paths, Slots, to_column};
 use crate::wave::setting::Setting;
 use crate::wave::{Precision, Wave};
 
@@ -53,6 +54,7 @@ impl<'a, 's> Sights<'a, 's> {
                 throughput: Spectrum::WHITE,
                 eta_scale: 1.0,
                 pdf: f32::INFINITY,
+                merging: f32::INFINITY,
                 depth: 0,
                 width,
                 spread,
@@ -151,6 +153,11 @@ impl<'a, 's> Sights<'a, 's> {
         }
     }
 
+    /// The numbers of the samples that an integrator is asked for.
+    pub(crate) fn indices(&self) -> impl Iterator<Item = u32> {
+        self.wanted.iter().map(|&slot| self.wave.slots.index[slot as usize])
+    }
+
     /// Follows a path from each ray.
     pub(crate) fn follow(&mut self, setting: &Setting<'s>, record: &mut Record) {
         if self.wanted.len() < self.wave.paths.len {
@@ -162,6 +169,10 @@ impl<'a, 's> Sights<'a, 's> {
             }
             self.wave.paths = kept;
             self.wave.hits.keep(&self.wanted);
+        }
+        if setting.merging.is_some() {
+            let Slots { index, widths, .. } = &mut self.wave.slots;
+            widths.extend(index.iter().map(|&index| Merging::widths(index)));
         }
         self.wave.follow(setting, self.precision, record);
     }

@@ -130,6 +130,7 @@ fn first_vertices<'s>(
         has_panes: false,
         moves: false,
         instruction_set: set,
+        merging: None,
     };
     let view = View::new(&scene.cameras()[0], SIDE, SIDE);
     let sampler = Sampler::new(&SamplerDesc { kind: SamplerKind::Sobol, spp: None, seed: 3 });

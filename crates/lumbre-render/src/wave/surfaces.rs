@@ -220,7 +220,17 @@ impl<'s> Wave<'s> {
         if material.is_solid() {
             self.vertices.put_solid(material, here.front);
         }
-        self.vertices.put_bsdf(&frame, &bsdf, flags, here.cone());
+        self.vertices.put_bsdf(&frame, &bsdf, flags, self.cone_at(path, here));
+    }
+
+    /// The cone of a path where it met a surface: also in scenes whose surfaces do not look at it.
+    fn cone_at(&self, path: usize, here: &Interaction<'s>) -> (f64, f64) {
+        let cone = here.cone();
+        if cone.0 > 0.0 {
+            return cone;
+        }
+        let spread = f64::from(self.paths.spread[path]);
+        (f64::from(self.paths.width[path]) + spread * self.hits.distance_f64(path), spread)
     }
 
     /// Adds the light of the surface that was found.
@@ -237,9 +247,9 @@ impl<'s> Wave<'s> {
         if emitted.is_black() {
             return;
         }
-        let chosen = self.paths.pdf[path];
-        let pdf = if chosen == f32::INFINITY { 0.0 } else { self.light_pdf(setting, path, ray, here) };
-        let weight = setting.weight_of_found(chosen, pdf);
+        let matters = self.paths.pdf[path].min(self.paths.merging[path]) < f32::INFINITY;
+        let pdf = if matters { self.light_pdf(setting, path, ray, here) } else { 0.0 };
+        let weight = self.weight_of_found(setting, path, pdf);
         let throughput = self.paths.throughput(path);
         self.slots.radiance[slot] += record.added(Source::Surface, throughput, emitted, weight);
     }
@@ -338,6 +348,7 @@ impl<'s> Wave<'s> {
             eta_scale,
             // Lights are behind a surface that bends what comes from them: paths find them.
             pdf: f32::INFINITY,
+            merging: f32::INFINITY,
             depth: self.paths.depth[path] | SCATTERED,
             width: width as f32,
             spread: spread as f32,

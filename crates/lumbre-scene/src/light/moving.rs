@@ -69,7 +69,7 @@ impl MovingLight {
 }
 
 /// A box that holds another one at all times of its motion.
-pub(super) fn swept(bounds: &Aabb, motion: &AnimatedTransform) -> Aabb {
+pub(crate) fn swept(bounds: &Aabb, motion: &AnimatedTransform) -> Aabb {
     if motion.is_still() {
         return moved(bounds, &motion.keys()[0].1).outward(8);
     }

@@ -1,0 +1,159 @@
+//! Photons for caustics: light that comes from lamps over mirrors and smooth glass, which paths from the camera hardly ever find.
+//!
+//! A pass of light paths belongs to a few samples of every pixel, and is a function of scene, options, seed and its number. Whoever needs a
+//! pass first traces it; all who need it meanwhile help.
+
+mod light_paths;
+mod merging;
+mod photons;
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+
+pub(crate) use light_paths::{Beginnings, Tracer};
+pub(crate) use merging::{Merging, radius};
+pub(crate) use photons::{Photon, PhotonMap};
+
+/// Samples of a pixel that a pass of light paths is for.
+pub(crate) const SAMPLES_A_PASS: u32 = 4;
+/// Lines that light paths of a pass begin on: one for each pixel, within these limits.
+const MIN_LINES: u32 = 1 << 12;
+const MAX_LINES: u32 = 1 << 18;
+/// Pieces of a pass that threads trace by themselves.
+const PIECES: u32 = 32;
+/// Passes that are kept: those of the samples that a render takes between two looks at its noise.
+const KEPT: usize = 8;
+
+/// The lines of a pass for a picture of a size.
+pub(crate) fn lines_of(width: u32, height: u32) -> u32 {
+    width.saturating_mul(height).clamp(MIN_LINES, MAX_LINES)
+}
+
+/// Bytes that the passes of a picture of a size may take. A line may begin several light paths, and most begin none.
+pub(crate) fn memory_bytes(width: u32, height: u32) -> u64 {
+    KEPT as u64 * u64::from(lines_of(width, height)) * 2 * size_of::<Photon>() as u64
+}
+
+/// The passes of a render that are at hand.
+#[derive(Debug, Default)]
+pub(crate) struct Passes {
+    kept: Mutex<Vec<(Key, Arc<Pass>)>>,
+}
+
+/// What passes are told apart by: the size of the picture, and their number.
+type Key = ([u32; 2], u32);
+
+/// A pass, as threads trace it.
+#[derive(Debug, Default)]
+struct Pass {
+    next_piece: AtomicU32,
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    pieces: Vec<Option<Vec<Photon>>>,
+    has_failed: bool,
+    map: Option<Arc<PhotonMap>>,
+}
+
+impl Passes {
+    /// The photons of a pass of a picture of a size, traced where they are not at hand.
+    pub(crate) fn get(&self, tracer: &Tracer<'_>, size: [u32; 2], number: u32) -> Arc<PhotonMap> {
+        let pass = self.find((size, number));
+        pass.help(tracer, lines_of(size[0], size[1]), number);
+        pass.wait()
+    }
+
+    fn find(&self, key: Key) -> Arc<Pass> {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let pass = match kept.iter().position(|(other, _)| *other == key) {
+            Some(position) => kept.remove(position).1,
+            None => Arc::default(),
+        };
+        kept.push((key, Arc::clone(&pass)));
+        if kept.len() > KEPT {
+            kept.remove(0);
+        }
+        pass
+    }
+}
+
+impl Pass {
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Traces pieces until none is left to begin.
+    fn help(&self, tracer: &Tracer<'_>, lines: u32, number: u32) {
+        loop {
+            let piece = self.next_piece.fetch_add(1, Ordering::Relaxed);
+            if piece >= PIECES {
+                // Not so often that it begins anew.
+                self.next_piece.store(PIECES, Ordering::Relaxed);
+                return;
+            }
+            let attempt = Attempt { pass: self };
+            let mut photons = Vec::new();
+            tracer.trace(number, lines_of_piece(lines, piece), &mut photons);
+            std::mem::forget(attempt);
+            self.put(piece, photons);
+        }
+    }
+
+    /// Hands in a piece; the last one completes the map.
+    fn put(&self, piece: u32, photons: Vec<Photon>) {
+        let mut state = self.state();
+        state.pieces.resize(PIECES as usize, None);
+        state.pieces[piece as usize] = Some(photons);
+        if state.pieces.iter().all(Option::is_some) {
+            let pieces = std::mem::take(&mut state.pieces);
+            state.map = Some(Arc::new(PhotonMap::new(pieces.into_iter().flatten().flatten().collect())));
+            self.changed.notify_all();
+        }
+    }
+
+    fn wait(&self) -> Arc<PhotonMap> {
+        let mut state = self.state();
+        loop {
+            assert!(!state.has_failed, "another thread failed to trace light paths");
+            if let Some(map) = &state.map {
+                return Arc::clone(map);
+            }
+            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+}
+
+/// A piece that is being traced. Where that panics, nobody waits for it in vain.
+struct Attempt<'a> {
+    pass: &'a Pass,
+}
+
+impl Drop for Attempt<'_> {
+    fn drop(&mut self) {
+        self.pass.state().has_failed = true;
+        self.pass.changed.notify_all();
+    }
+}
+
+/// The lines of a piece.
+fn lines_of_piece(lines: u32, piece: u32) -> Range<u32> {
+    let start = |piece: u32| (u64::from(lines) * u64::from(piece) / u64::from(PIECES)) as u32;
+    start(piece)..start(piece + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_are_all_lines_of_a_pass() {
+        for lines in [MIN_LINES, 5000, MAX_LINES] {
+            let pieces: Vec<u32> = (0..PIECES).flat_map(|piece| lines_of_piece(lines, piece)).collect();
+            assert!(pieces.into_iter().eq(0..lines));
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! Path tracing with photons for caustics.
+
+use lumbre_shading::ShadingNormals;
+
+use crate::caustics::{Beginnings, Merging, Passes, Tracer, lines_of};
+use crate::integrators::{Integrator, Path};
+use crate::transport::{Record, Sampler};
+use crate::wave::Sights;
+
+/// [`Path`], and photons for the light that comes from lamps over mirrors and smooth glass to what scatters it: caustics, rooms behind
+/// panes, lamps in bulbs. Paths find such light by chance if the lamp is large, and never if it is a point; photons find it the better the
+/// smaller the lamp. Both are weighed by multiple importance sampling.
+///
+/// The photons of a few samples of each pixel are one pass, and are collected within a few pixels. That blurs caustics a little, and less
+/// with every pass, so that the mean comes to be right. What catches shadows (ground of the studio) collects none, and neither do media.
+#[derive(Debug)]
+pub struct Caustics {
+    path: Path,
+    passes: Passes,
+}
+
+impl Caustics {
+    /// An integrator of so many bounces.
+    pub fn new(max_depth: u32, shading_normals: ShadingNormals) -> Self {
+        Self { path: Path { shading_normals, ..Path::new(max_depth) }, passes: Passes::default() }
+    }
+}
+
+impl Integrator for Caustics {
+    fn estimate(&self, sights: &mut Sights<'_, '_>, sampler: &Sampler, record: &mut Record) {
+        let (scene, view) = (sights.scene(), sights.view());
+        let mut setting = self.path.setting(scene, sampler);
+        if let Some(beginnings) = Beginnings::new(scene).filter(|_| !scene.lights().is_empty()) {
+            let tracer = Tracer {
+                scene,
+                view,
+                beginnings: &beginnings,
+                sampler: *sampler,
+                normals: self.path.shading_normals,
+                max_bounces: self.path.max_depth.saturating_sub(1),
+                goes_straight_on: setting.has_panes,
+            };
+            let mut numbers: Vec<u32> = sights.indices().map(Merging::pass_of).collect();
+            numbers.sort_unstable();
+            numbers.dedup();
+            let [width, height] = view.size();
+            let passes =
+                numbers.into_iter().map(|number| (number, self.passes.get(&tracer, [width, height], number)));
+            let passes = passes.collect();
+            setting.merging = Some(Merging { beginnings, passes, lines: lines_of(width, height).into() });
+        }
+        sights.follow(&setting, record);
+    }
+
+    fn needs_footprints(&self) -> bool {
+        true
+    }
+}
