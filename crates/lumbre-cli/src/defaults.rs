@@ -49,9 +49,9 @@ impl Defaults {
     /// in that of an environment map.
     pub fn denoises(&self) -> bool {
         let is_staged = match self.staged.light {
-            StageLight::Own => false,
             StageLight::Studio => true,
             StageLight::Map => self.staged.framed,
+            _ => false,
         };
         is_staged && self.is_of_light
     }
