@@ -32,6 +32,8 @@ const LONG: u32 = 64;
 /// The first pass goes over the picture in squares of so many pixels a side, one sample in each, and then in smaller ones, so that a
 /// render which is stopped in it is a whole picture, if a coarse one.
 const STRIDES: [u32; 7] = [256, 64, TILE, 8, 4, 2, 1];
+/// The clock does not stop a coarse picture of so few samples: a small picture in place of none.
+const UNSTOPPED: u64 = 8192;
 /// Samples of a wave, at most, where a clock or a pause may stop the render: so many take a few milliseconds.
 const WAVE_BY_THE_CLOCK: usize = 1024;
 
@@ -122,6 +124,7 @@ pub fn render_from(
     let job = Job {
         options,
         taker,
+        pixels: bounds.area(),
         adaptive,
         deadline,
         cancel,
@@ -346,6 +349,7 @@ fn spread(owners: &[Owner], bounds: PixelBounds, side: u32) -> Vec<Tile> {
 struct Job<'a> {
     options: &'a RenderOptions,
     taker: Taker<'a>,
+    pixels: u64,
     /// When pixels have enough, if not at the number of samples alone.
     adaptive: Option<Adaptive>,
     deadline: Option<Instant>,
@@ -410,9 +414,10 @@ impl Owner {
 }
 
 impl Job<'_> {
-    /// Whether the squares of this side must stop: the clock does not stop the largest, without which there is no picture.
+    /// Whether the squares of this side must stop. The clock does not stop the first, and no few: see [`UNSTOPPED`].
     fn must_stop_at(&self, side: u32) -> bool {
-        if side == STRIDES[0] { self.cancel.is_cancelled() } else { self.must_stop() }
+        let count = self.pixels.div_ceil(u64::from(side) * u64::from(side));
+        if side == STRIDES[0] || count <= UNSTOPPED { self.cancel.is_cancelled() } else { self.must_stop() }
     }
 
     fn must_stop(&self) -> bool {

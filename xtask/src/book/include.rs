@@ -28,6 +28,16 @@ pub(crate) fn expanded(name: &Path, folder: &Path, text: &str) -> Result<String>
             && lines.peek().is_some_and(|(_, next)| next.trim().starts_with("{{#include "));
         if named.is_none() && !is_asked {
             result.push_str(line);
+            if trimmed.starts_with("```") {
+                // Another block, as it is.
+                let fence = &trimmed[..trimmed.len() - trimmed.trim_start_matches('`').len()];
+                for (_, line) in lines.by_ref() {
+                    result.push_str(line);
+                    if line.trim() == fence {
+                        break;
+                    }
+                }
+            }
             continue;
         }
         let indent = &line[..line.len() - line.trim_start().len()];
