@@ -61,7 +61,9 @@ pub(crate) fn test() -> Result<()> {
     match find_mdbook() {
         Some(mdbook) => build(&mdbook, true),
         None => {
-            eprintln!("\nThe links of the book are not tried: it needs mdbook 0.5 (cargo xtask book --install-only)");
+            eprintln!(
+                "\nThe links of the book are not tried: it needs mdbook 0.5 (cargo xtask book --install-only)"
+            );
             prepare(true, false).map(drop)
         }
     }
@@ -213,7 +215,9 @@ mod tests {
         let mut faults = Vec::new();
         for page in pages.into_iter().chain([root().join("README.md")]) {
             let text = fs::read_to_string(&page).expect("it can be read");
-            faults.extend(missing(&page, &text).into_iter().map(|fault| format!("{}: {fault}", page.display())));
+            faults.extend(
+                missing(&page, &text).into_iter().map(|fault| format!("{}: {fault}", page.display())),
+            );
         }
         assert!(faults.is_empty(), "cargo xtask book --update mends these:\n{}", faults.join("\n"));
     }
@@ -223,7 +227,10 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         fs::write(folder.path().join("a.pbrt"), "one\n").expect("a file");
         let missing = |text: &str| missing(&folder.path().join("page.md"), text).len();
-        assert_eq!(missing("<!-- include a.pbrt -->\n```\none\n```\n```console\n$ a\nb\n```\n![x](a.pbrt)\n"), 0);
+        assert_eq!(
+            missing("<!-- include a.pbrt -->\n```\none\n```\n```console\n$ a\nb\n```\n![x](a.pbrt)\n"),
+            0
+        );
         for text in [
             "<!-- include a.pbrt -->\n```\ntwo\n```\n",
             "```\n{{#include a.pbrt}}\n```\n",

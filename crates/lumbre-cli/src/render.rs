@@ -700,7 +700,9 @@ fn picture(
             say!("{} keeps what was rendered: --resume goes on from there", path.display());
         }
         Ok(None) if !is_done && !arguments.quiet && checkpoint.is_possible() => {
-            say!("hint: --checkpoint FILE keeps what was rendered, for --resume (as renders of two minutes do by themselves)");
+            say!(
+                "hint: --checkpoint FILE keeps what was rendered, for --resume (as renders of two minutes do by themselves)"
+            );
         }
         Ok(_) => {}
         // The picture may be saved all the same.

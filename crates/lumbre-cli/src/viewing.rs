@@ -89,12 +89,10 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         let why = "is no address that a browser can open (expected one of this machine's, or --allow-host NAME:PORT too)";
         return Err(Failure::Usage(format!("--host {} {why}", arguments.host)));
     }
-    // What lumbre render would refuse at once is refused here, too; what an edit mends is shown in the page.
-    for path in &arguments.scene {
-        let read = std::fs::File::open(path).map_err(|e| Failure::Io(format!("{}: cannot read: {e}", path.display())));
-        if !is_standard_stream(path) {
-            read?;
-        }
+    // A file that is not there is said here; what an edit mends is shown in the page.
+    for path in arguments.scene.iter().filter(|path| !is_standard_stream(path)) {
+        let opened = std::fs::File::open(path);
+        opened.map_err(|e| Failure::Io(format!("{}: cannot open: {e}", path.display())))?;
     }
     let cancel = CancelToken::new();
     let signals = Signals::listen(&cancel)?;

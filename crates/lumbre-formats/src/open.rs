@@ -184,13 +184,11 @@ impl<'p, 'b> Source<'p, 'b> {
         let is_elsewhere = OTHERS.iter().any(|(endings, _)| has_ending(path, endings));
         // Whether or not there is such a file, its name does not say what it is.
         if !is_standard_input && options.format.is_none() && (!path.is_file() || is_elsewhere) {
-            let is_missing = is_elsewhere && !path.exists();
-            // The name says enough, and there is none: that is said first.
-            return Err(if is_missing {
-                FormatError::io(path, "cannot read", std::io::ErrorKind::NotFound.into())
-            } else {
-                unknown(path, path.display().to_string().into())
-            });
+            // A name that says enough, and there is no such file: that is said first.
+            if is_elsewhere && !path.exists() {
+                Input::open(path, budget)?;
+            }
+            return Err(unknown(path, path.display().to_string().into()));
         }
         let input = if is_standard_input {
             Input::from_stream("standard input", std::io::stdin().lock(), budget, |first| {

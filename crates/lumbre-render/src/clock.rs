@@ -76,7 +76,8 @@ impl<'a> Clock<'a> {
         let pixels = self.pixels as f64;
         let of_noise = samples / (f64::from_bits(self.quiet_at.load(Ordering::Relaxed)) * pixels);
         let of_spp = samples / (f64::from(self.stop.spp) * pixels);
-        let of_time = self.stop.time.map_or(0.0, |time| (elapsed.as_secs_f64() / time.as_secs_f64()).min(1.0));
+        let of_time =
+            self.stop.time.map_or(0.0, |time| (elapsed.as_secs_f64() / time.as_secs_f64()).min(1.0));
         // A render without a limit of its own for the number of samples has the largest.
         let counts = self.stop.spp < u32::MAX || (self.stop.time.is_none() && self.stop.noise.is_none());
         let share = of_noise.max(of_time).max(if counts { of_spp } else { 0.0 }).clamp(0.0, 1.0);
@@ -95,14 +96,7 @@ impl<'a> Clock<'a> {
             true => Some(self.pixels.saturating_mul(u64::from(self.stop.spp))),
             false => is_known.then(|| ((samples / share) as u64).max(done)),
         };
-        State {
-            samples: done,
-            rays: self.rays.load(Ordering::Relaxed),
-            total,
-            share,
-            elapsed,
-            left,
-        }
+        State { samples: done, rays: self.rays.load(Ordering::Relaxed), total, share, elapsed, left }
     }
 }
 

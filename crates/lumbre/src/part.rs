@@ -243,7 +243,9 @@ impl Part {
         };
         let mut hashed = Hashed::new(input.take(body));
         let read = Self::read_body(&mut hashed, body, most_memory);
-        if let Err(PartError::NoPart | PartError::Version | PartError::TooLarge { .. } | PartError::Io(_)) = read {
+        if let Err(PartError::NoPart | PartError::Version | PartError::TooLarge { .. } | PartError::Io(_)) =
+            read
+        {
             return read;
         }
         let at_end = hashed.length == body;

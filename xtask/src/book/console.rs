@@ -137,7 +137,8 @@ mod tests {
 
     #[test]
     fn what_fails_or_should_have_is_named_with_its_line() {
-        for text in ["false", "true # fails", "exit 101", "exit 101 # fails", "kill $$ # fails", "echo '$ a'"] {
+        for text in ["false", "true # fails", "exit 101", "exit 101 # fails", "kill $$ # fails", "echo '$ a'"]
+        {
             assert_eq!(run("console", &format!("\n$ {text}")).expect_err(text).0, 1, "{text}");
         }
         assert_eq!(run("console", "lumbre").expect_err("no command").0, 0);

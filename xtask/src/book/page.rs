@@ -86,8 +86,7 @@ impl<'a> Preparer<'a> {
             fs::write(&page, book).with_context(|| format!("cannot write {}", page.display()))?;
             if kept != text && self.update {
                 let original = self.root.join(&name);
-                fs::write(&original, kept)
-                    .with_context(|| format!("cannot write {}", original.display()))?;
+                fs::write(&original, kept).with_context(|| format!("cannot write {}", original.display()))?;
             } else if let Some(line) = first_difference(&text, &kept) {
                 faults.push(format!("{}:{line}: not up to date (cargo xtask book --update)", name.display()));
             }

@@ -80,7 +80,8 @@ impl Kept {
     pub(crate) fn write(&self, pages: &Path) -> Result<()> {
         let lines = self.sums.iter().map(|(name, sum)| format!("{sum} {name}\n"));
         let file = pages.join(SUMS);
-        fs::write(&file, lines.collect::<String>()).with_context(|| format!("cannot write {}", file.display()))
+        fs::write(&file, lines.collect::<String>())
+            .with_context(|| format!("cannot write {}", file.display()))
     }
 
     /// Whether the picture of this name is of this scene as it is now.

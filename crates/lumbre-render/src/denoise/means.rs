@@ -183,7 +183,8 @@ fn filter_block(
                     sum_across(&differences, first, across);
                     continue;
                 }
-                let known = (&layer.known[half][here..][..outer.len()], &layer.known[half][there..][..outer.len()]);
+                let known =
+                    (&layer.known[half][here..][..outer.len()], &layer.known[half][there..][..outer.len()]);
                 for x in 0..outer.len() {
                     inside[x] *= known.0[x] * known.1[x];
                 }

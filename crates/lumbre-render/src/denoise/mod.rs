@@ -65,6 +65,7 @@ pub fn denoise_unless(rendered: &Rendered, threads: usize, cancel: &CancelToken)
         coverage: rendered.coverage.as_ref(),
         guides,
         bounds: rendered.bounds,
+        block: BLOCK,
     };
     match rendered.stats.stride? {
         1 => noisy.denoised(&workers, cancel),
@@ -77,7 +78,7 @@ pub fn denoise_unless(rendered: &Rendered, threads: usize, cancel: &CancelToken)
             };
             let bounds = PixelBounds::whole(image.width(), image.height());
             let guides = &guides.smaller(rendered.bounds, side);
-            let small = Noisy { image: &image, coverage: coverage.as_ref(), guides, bounds };
+            let small = Noisy { image: &image, coverage: coverage.as_ref(), guides, bounds, block: BLOCK };
             let Denoised { image, coverage } = small.denoised(&workers, cancel)?;
             let coverage = match coverage {
                 Some(coverage) => Some(larger(&coverage, size, side)?),
@@ -94,6 +95,8 @@ struct Noisy<'a> {
     coverage: Option<&'a Image>,
     guides: &'a Guides,
     bounds: PixelBounds,
+    /// Columns and rows of its blocks, which do not show.
+    block: (usize, usize),
 }
 
 /// Rows of the denoised picture, to be filled in.
@@ -108,17 +111,17 @@ impl Noisy<'_> {
     fn denoised(&self, workers: &Workers, cancel: &CancelToken) -> Option<Denoised> {
         let count = self.bounds.area() as usize;
         let width = self.bounds.width() as usize;
-        let catches_shadows =
-            self.image.alpha().is_some() && self.guides.iter().any(|guide| guide.shadow != RatioSums::default());
+        let catches_shadows = self.image.alpha().is_some()
+            && self.guides.iter().any(|guide| guide.shadow != RatioSums::default());
         let is_single = self.guides.iter().all(|guide| guide.count.samples < 2);
         let mut pixels = vec![Rgb::BLACK; count];
         let mut coverage = vec![Rgb::BLACK; if catches_shadows { count } else { 0 }];
         {
-            let mut covered = coverage.chunks_mut((width * BLOCK.1).max(1));
-            let rows = pixels.chunks_mut((width * BLOCK.1).max(1)).enumerate();
+            let mut covered = coverage.chunks_mut((width * self.block.1).max(1));
+            let rows = pixels.chunks_mut((width * self.block.1).max(1)).enumerate();
             let mut bands: Vec<Band<'_>> = rows
                 .map(|(i, pixels)| Band {
-                    y0: self.bounds.y0 + (i * BLOCK.1) as u32,
+                    y0: self.bounds.y0 + (i * self.block.1) as u32,
                     pixels,
                     coverage: covered.next().unwrap_or_default(),
                 })
@@ -147,11 +150,11 @@ impl Noisy<'_> {
     fn fill(&self, band: &mut Band<'_>, is_single: bool, cancel: &CancelToken) {
         let width = self.bounds.width() as usize;
         let y1 = band.y0 + (band.pixels.len() / width) as u32;
-        for x0 in (self.bounds.x0..self.bounds.x1).step_by(BLOCK.0) {
+        for x0 in (self.bounds.x0..self.bounds.x1).step_by(self.block.0) {
             if cancel.is_cancelled() {
                 return;
             }
-            let x1 = x0.saturating_add(BLOCK.0 as u32).min(self.bounds.x1);
+            let x1 = x0.saturating_add(self.block.0 as u32).min(self.bounds.x1);
             let block = PixelBounds { x0, y0: band.y0, x1, y1 };
             let border = BORDER as u32;
             let around = PixelBounds {
@@ -181,7 +184,8 @@ impl Noisy<'_> {
         // The guide of a pixel of the block, and its place in the band.
         let places = || {
             block.pixels().map(|(x, y)| {
-                let place = (y - band.y0) as usize * self.bounds.width() as usize + (x - self.bounds.x0) as usize;
+                let place =
+                    (y - band.y0) as usize * self.bounds.width() as usize + (x - self.bounds.x0) as usize;
                 (&guides[around.position(x, y)], place)
             })
         };

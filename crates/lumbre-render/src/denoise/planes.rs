@@ -59,7 +59,10 @@ pub(super) fn layer<const UNDER: usize>(
     let has_part: Vec<f32> = known[0].iter().zip(&known[1]).map(|(a, b)| a.max(*b)).collect();
     let parts = mean_around(&has_part, size, VARIANCE_RADIUS);
     let mut smooth = mean_around(&by_samples, size, VARIANCE_RADIUS);
-    smooth.iter_mut().zip(parts).for_each(|(variance, part)| *variance /= if part > 0.0 { part } else { 1.0 });
+    smooth
+        .iter_mut()
+        .zip(parts)
+        .for_each(|(variance, part)| *variance /= if part > 0.0 { part } else { 1.0 });
     let (wide_samples, wide_halves) =
         (mean_around(&by_samples, size, SCALE_RADIUS), mean_around(&by_halves, size, SCALE_RADIUS));
     let variance = if is_single {

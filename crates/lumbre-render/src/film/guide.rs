@@ -81,7 +81,8 @@ impl<const UNDER: usize> RatioSums<UNDER> {
         let is_odd = half == 1 && count.samples > 1;
         let sum = |all: f32, odd: f32| if is_odd { odd } else { all - odd };
         (0..3).any(|c| {
-            sum(self.over[c], self.odd_over[c]) != 0.0 || sum(self.under[Self::under(c)], self.odd_under[Self::under(c)]) != 0.0
+            sum(self.over[c], self.odd_over[c]) != 0.0
+                || sum(self.under[Self::under(c)], self.odd_under[Self::under(c)]) != 0.0
         })
     }
 
@@ -99,7 +100,10 @@ impl<const UNDER: usize> RatioSums<UNDER> {
         let least_odd = least * count.weight * odd as f32 / count.samples as f32;
         let least_even = least * count.weight - least_odd;
         let even_under = (self.under[Self::under(c)] - self.odd_under[Self::under(c)]).max(least_even);
-        [(self.over[c] - self.odd_over[c]) / even_under, self.odd_over[c] / self.odd_under[Self::under(c)].max(least_odd)]
+        [
+            (self.over[c] - self.odd_over[c]) / even_under,
+            self.odd_over[c] / self.odd_under[Self::under(c)].max(least_odd),
+        ]
     }
 
     /// The variance of the ratio, as if samples were independent (W. Cochran, "Sampling Techniques", 1977, 6.4). `None` for fewer than
@@ -115,7 +119,8 @@ impl<const UNDER: usize> RatioSums<UNDER> {
             self.over_squares[c] - self.over[c] * self.over[c] / n
         } else {
             let ratio = self.over[c] / under;
-            self.over_squares[c] - 2.0 * ratio * self.products[c] + ratio * ratio * self.under_squares[Self::under(c)]
+            self.over_squares[c] - 2.0 * ratio * self.products[c]
+                + ratio * ratio * self.under_squares[Self::under(c)]
         };
         Some(squares.max(0.0) * n / (n - 1.0) / (under * under))
     }

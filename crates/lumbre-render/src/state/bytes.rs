@@ -59,7 +59,9 @@ impl RenderState {
             planes(out, &mut bytes, strip.pixels(), pixel_numbers)?;
             planes(out, &mut bytes, strip.tints(), |tint| [tint.red, tint.blue].map(ExactSum::units))?;
             planes(out, &mut bytes, strip.features(), feature_numbers)?;
-            planes(out, &mut bytes, strip.guides(), |guide| guide.words().map(|word| i128::from(word as i32)))?;
+            planes(out, &mut bytes, strip.guides(), |guide| {
+                guide.words().map(|word| i128::from(word as i32))
+            })?;
         }
         Ok(())
     }
