@@ -803,14 +803,23 @@ fn is_done_before(path: &Path, job: &Job, options: &RenderOptions) -> bool {
     let is_fixed = options.stop.time.is_none() && options.stop.noise.is_none();
     let says = |name: &str| {
         let value = wanted.iter().find(|(known, _)| known == name).map_or("", |(_, value)| value);
-        // As a text of a PNG, and as a line of an .exr.
-        let mut texts = [format!("{name}\0{value}"), format!("{name}: {value}")].into_iter();
-        texts.any(|text| {
-            let mut places = start.windows(text.len() + 1).filter(|here| here.starts_with(text.as_bytes()));
-            places.any(|here| !here[text.len()].is_ascii_digit())
-        })
+        let mut places = start.windows(name.len()).enumerate().filter(|(_, here)| *here == name.as_bytes());
+        places.any(|(at, _)| text_of(&start, at, name.len()) == Some(value.as_bytes()))
     };
     read.is_ok() && says("lumbreScene") && (!is_fixed || says("lumbreSamples"))
+}
+
+/// The text of a name at this place in a file: that of a chunk iTXt of a PNG, or a line of an .exr.
+fn text_of(file: &[u8], at: usize, length: usize) -> Option<&[u8]> {
+    if let Some(chunk) = file.get(at.checked_sub(8)?..at)
+        && chunk.ends_with(b"iTXt")
+    {
+        let bytes = u32::from_be_bytes([chunk[0], chunk[1], chunk[2], chunk[3]]) as usize;
+        // Between them are the end of the name, two bytes of compression, and no language.
+        return file.get(at + length + 5..at + bytes);
+    }
+    let text = file.get(at + length..)?.strip_prefix(b": ")?;
+    text.split(|&byte| byte == b'\n' || byte == 0).next()
 }
 
 /// What may help where next to nothing is lit.

@@ -175,7 +175,8 @@ fn progress_goes_by_whichever_limit_comes_first() {
             let (left, seconds) =
                 (state["seconds_left"].as_f64().unwrap(), state["seconds"].as_f64().unwrap());
             assert!(0.0 < share && share <= 1.0 && left < 60.0, "{state}");
-            assert!((left - seconds * (1.0 / share - 1.0)).abs() < 1e-3, "{state}");
+            // What came before the first sample takes no more time.
+            assert!(left <= seconds * (1.0 / share - 1.0) + 1e-3, "{state}");
             assert!(state["samples"].as_u64() <= state["total"].as_u64(), "{state}");
             assert!(state["rays_per_second"].as_f64() > Some(0.0) && state["frame"].is_null(), "{state}");
             count += 1;
