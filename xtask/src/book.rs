@@ -1,4 +1,5 @@
-//! The book: the pages of `docs/` with their pictures rendered, their examples run and their links tried, as static pages.
+//! The book: the pages of `docs/` with their pictures rendered, their examples run and their links tried, as static pages. The pages of the
+//! repository have small pictures, what examples print, and the files that they show, too: `cargo xtask book --update` writes them.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,6 +15,7 @@ use page::Preparer;
 
 mod console;
 mod formula;
+mod include;
 mod links;
 mod page;
 mod picture;
@@ -31,6 +33,10 @@ pub(crate) struct Book {
     /// Pictures of one sample a pixel and a quarter of the width and height, by the program as the tests build it: for the checks alone.
     #[arg(long)]
     quick: bool,
+    /// Brings the pages of the repository up to date, and builds no book: files that they show, what their examples print, and small pictures of
+    /// scenes that are new or have changed.
+    #[arg(long, conflicts_with_all = ["quick", "install_only"])]
+    update: bool,
     /// Only gets mdbook where there is none.
     #[arg(long)]
     install_only: bool,
@@ -39,6 +45,9 @@ pub(crate) struct Book {
 impl Book {
     /// Builds the book into `target/book/html`, where mdbook is found or can be had.
     pub(crate) fn run(self) -> Result<()> {
+        if self.update {
+            return prepare(false, true).map(drop);
+        }
         let mdbook = match find_mdbook() {
             Some(mdbook) => mdbook,
             None => install_mdbook()?,
@@ -47,13 +56,15 @@ impl Book {
     }
 }
 
-/// The checks of the book, where mdbook is found; else that is said.
+/// The checks of the book; where mdbook is not found, those that need none, which is said.
 pub(crate) fn test() -> Result<()> {
     match find_mdbook() {
         Some(mdbook) => build(&mdbook, true),
         None => {
-            eprintln!("\nThe book is left out: it needs mdbook 0.5 (cargo xtask book --install-only)");
-            Ok(())
+            eprintln!(
+                "\nThe links of the book are not tried: it needs mdbook 0.5 (cargo xtask book --install-only)"
+            );
+            prepare(true, false).map(drop)
         }
     }
 }
@@ -87,32 +98,39 @@ fn install_mdbook() -> Result<PathBuf> {
 }
 
 fn build(mdbook: &Path, quick: bool) -> Result<()> {
+    let pages = prepare(quick, false)?;
+    let html = target().join("book/html");
+    if html.exists() {
+        fs::remove_dir_all(&html).with_context(|| format!("cannot remove {}", html.display()))?;
+    }
+    run_mdbook(mdbook, &pages, &html)?;
+    refuse(&links::check(&html, &pages)?)?;
+    eprintln!("The book is {}", html.join("index.html").display());
+    Ok(())
+}
+
+/// Prepares a copy of the pages for mdbook, or brings those of the repository up to date. The folder of the copy.
+fn prepare(quick: bool, update: bool) -> Result<PathBuf> {
     let program = program(quick)?;
     let book = target().join("book");
-    let (copy, html) = (book.join("root"), book.join("html"));
-    for folder in [&copy, &html] {
-        if folder.exists() {
-            fs::remove_dir_all(folder).with_context(|| format!("cannot remove {}", folder.display()))?;
-        }
+    let copy = book.join("root");
+    if copy.exists() {
+        fs::remove_dir_all(&copy).with_context(|| format!("cannot remove {}", copy.display()))?;
     }
     for part in BESIDE.into_iter().chain([PAGES]) {
         files::copy(&root().join(part), &copy.join(part))?;
     }
-    let pages = copy.join(PAGES);
-    let (root, kept) = (root(), book.join("pictures"));
-    let preparer = Preparer::new(&root, &copy, &program, &kept, quick);
-    let mut faults = preparer.prepare_all()?;
-    if faults.is_empty() {
-        run_mdbook(mdbook, &pages, &html)?;
-        faults = links::check(&html, &pages)?;
-    }
-    for fault in &faults {
+    let (root, rendered) = (root(), book.join("pictures"));
+    let preparer = Preparer::new(&root, &copy, &program, &rendered, quick, update)?;
+    refuse(&preparer.prepare_all()?)?;
+    Ok(copy.join(PAGES))
+}
+
+fn refuse(faults: &[String]) -> Result<()> {
+    for fault in faults {
         eprintln!("error: {fault}");
     }
-    match faults.len() {
-        0 => eprintln!("The book is {}", html.join("index.html").display()),
-        count => bail!("{count} faults in the book"),
-    }
+    anyhow::ensure!(faults.is_empty(), "{} faults in the book", faults.len());
     Ok(())
 }
 
@@ -144,4 +162,82 @@ fn run_mdbook(mdbook: &Path, pages: &Path, html: &Path) -> Result<()> {
         bail!("mdbook refuses the book:\n{said}");
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use pulldown_cmark::{CodeBlockKind, Event, Parser, Tag, TagEnd};
+
+    use super::*;
+
+    /// All that is missing in a page where it is read in the repository, without running anything.
+    fn missing(page: &Path, text: &str) -> Vec<String> {
+        let mut faults = Vec::new();
+        let folder = page.parent().unwrap_or(page);
+        match include::expanded(page, folder, text) {
+            Ok(expanded) if expanded == text => {}
+            Ok(_) => faults.push("a file that it shows has changed".to_owned()),
+            Err(error) => faults.push(format!("{error:#}")),
+        }
+        let mut example = None;
+        for event in Parser::new(text) {
+            match event {
+                Event::Start(Tag::Image { dest_url, .. }) if !dest_url.contains(':') => {
+                    if !folder.join(&*dest_url).is_file() {
+                        faults.push(format!("there is no picture {dest_url}"));
+                    }
+                }
+                Event::Start(Tag::CodeBlock(CodeBlockKind::Fenced(info))) if info.starts_with("console") => {
+                    example = Some(String::new());
+                }
+                Event::Text(part) => {
+                    if let Some(example) = &mut example {
+                        example.push_str(&part);
+                    }
+                }
+                Event::End(TagEnd::CodeBlock) => {
+                    if let Some(example) = example.take()
+                        && example.lines().all(|line| line.is_empty() || line.starts_with("$ "))
+                    {
+                        faults.push(format!("an example without output: {}", example.trim()));
+                    }
+                }
+                _ => {}
+            }
+        }
+        faults
+    }
+
+    #[test]
+    fn pages_are_whole_where_they_are_read() {
+        let pages = files::with_ending(&root().join(PAGES), "md").expect("there are pages");
+        assert!(pages.len() > 30, "{}", pages.len());
+        let mut faults = Vec::new();
+        for page in pages.into_iter().chain([root().join("README.md")]) {
+            let text = fs::read_to_string(&page).expect("it can be read");
+            faults.extend(
+                missing(&page, &text).into_iter().map(|fault| format!("{}: {fault}", page.display())),
+            );
+        }
+        assert!(faults.is_empty(), "cargo xtask book --update mends these:\n{}", faults.join("\n"));
+    }
+
+    #[test]
+    fn what_is_missing_in_a_page_is_found() {
+        let folder = tempfile::tempdir().expect("a folder");
+        fs::write(folder.path().join("a.pbrt"), "one\n").expect("a file");
+        let missing = |text: &str| missing(&folder.path().join("page.md"), text).len();
+        assert_eq!(
+            missing("<!-- include a.pbrt -->\n```\none\n```\n```console\n$ a\nb\n```\n![x](a.pbrt)\n"),
+            0
+        );
+        for text in [
+            "<!-- include a.pbrt -->\n```\ntwo\n```\n",
+            "```\n{{#include a.pbrt}}\n```\n",
+            "```console\n$ a\n\n$ b\n```\n",
+            "![x](a.png)\n",
+        ] {
+            assert_eq!(missing(text), 1, "{text}");
+        }
+    }
 }

@@ -7,7 +7,7 @@ use xtask::command::{release_program, root, run};
 
 use crate::files;
 
-/// Renders every scene under `scenes/` whose path contains `filter` to a PNG beside it.
+/// Renders every scene under `scenes/` whose path contains `filter` to a PNG beside it, without noise.
 pub(crate) fn render_all(filter: Option<&str>) -> Result<()> {
     let program = release_program()?;
     let program = program.to_string_lossy();
@@ -23,7 +23,8 @@ pub(crate) fn render_all(filter: Option<&str>) -> Result<()> {
     }
     for scene in scenes {
         let picture = scene.with_extension("png");
-        run(&program, &["render", &scene.to_string_lossy(), "-o", &picture.to_string_lossy()])?;
+        let (scene, picture) = (scene.to_string_lossy(), picture.to_string_lossy());
+        run(&program, &["render", &scene, "--denoise", "own", "-o", &picture])?;
     }
     Ok(())
 }

@@ -32,8 +32,9 @@ pub(crate) struct PartArguments {
     #[arg(long, value_name = "DUR", value_parser = units::duration, default_value = "30s")]
     checkpoint_every: Duration,
     /// Go on from the checkpoint, or from the picture if it was saved with --keep-sums, to the very picture of a run without a
-    /// break; with more samples than before, to that of as many. Where there is neither, begin.
-    #[arg(long, conflicts_with_all = ["frames", "turntable"])]
+    /// break; with more samples than before, to that of as many. Where there is neither, begin. Of --frames and --turntable, pictures that
+    /// are done (.png, .exr) are not rendered again.
+    #[arg(long)]
     resume: bool,
     /// Keep no checkpoint, however long it takes.
     #[arg(long, conflicts_with_all = ["checkpoint", "resume"])]
@@ -63,6 +64,11 @@ impl PartArguments {
     /// The samples that are asked for.
     pub(crate) fn samples(&self) -> Option<Range<u32>> {
         self.samples.clone()
+    }
+
+    /// Whether it goes on from what there is.
+    pub(crate) fn resumes(&self) -> bool {
+        self.resume
     }
 
     /// Whether the output holds the sums of its samples.
@@ -184,6 +190,8 @@ pub(crate) struct Checkpoint {
     /// `None` where none is kept.
     path: Option<PathBuf>,
     is_asked: bool,
+    /// Whether a run goes on from what there is: what was gone on with once is kept until it is done.
+    resumes: bool,
     every: Duration,
     start: Instant,
     identified: Identified,
@@ -313,6 +321,7 @@ impl Checkpoint {
         memory: Memory,
         spp: u32,
         is_quiet: bool,
+        is_one_of_several: bool,
         job: impl FnOnce() -> Result<Job, lumbre::Error> + Send + 'static,
     ) -> Result<(Self, Option<RenderState>), Failure> {
         let is_file = !is_standard_stream(output) && (output.is_file() || !output.exists());
@@ -331,6 +340,7 @@ impl Checkpoint {
             _lock: arguments.checkpoint.as_deref().map(Lock::take).transpose()?,
             path: kept,
             is_asked: arguments.checkpoint.is_some(),
+            resumes: arguments.resume,
             every: arguments.checkpoint_every,
             start: Instant::now(),
             identified: Identified(Mutex::new(Finding::Running(thread))),
@@ -343,7 +353,7 @@ impl Checkpoint {
             // Whatever keeps it from being known is told before hours are spent.
             checkpoint.identified.get()?;
         }
-        let state = checkpoint.find(arguments, output, memory, spp, is_quiet)?;
+        let state = checkpoint.find(arguments, output, memory, spp, is_quiet, is_one_of_several)?;
         Ok((checkpoint, state))
     }
 
@@ -355,6 +365,7 @@ impl Checkpoint {
         memory: Memory,
         spp: u32,
         is_quiet: bool,
+        is_one_of_several: bool,
     ) -> Result<Option<RenderState>, Failure> {
         let held = self.path.iter().map(PathBuf::as_path).find(|path| path.is_file());
         let found = match held {
@@ -363,7 +374,7 @@ impl Checkpoint {
             None => None,
         };
         let begins = || {
-            if arguments.resume && !is_quiet {
+            if arguments.resume && !is_quiet && !is_one_of_several {
                 say!("nothing to resume: the render begins");
             }
             Ok(None)
@@ -374,7 +385,7 @@ impl Checkpoint {
         let part = match Part::open(&path, |bytes| memory.for_part(bytes)) {
             Ok(part) => part,
             // The checkpoint that is named is yet to come, and the picture is to be replaced.
-            Err(PartError::NoPart) if is_output && self.is_asked => return begins(),
+            Err(PartError::NoPart) if is_output && (self.is_asked || is_one_of_several) => return begins(),
             Err(PartError::NoPart) if is_output => {
                 return Err(Failure::Usage(format!(
                     "{name}: the picture cannot be resumed (expected one that was saved with --keep-sums, or a checkpoint)"
@@ -446,11 +457,16 @@ impl Checkpoint {
         }
         let Ok(job) = self.identified.get() else { return };
         self.is_own.store(true, Ordering::Relaxed);
-        let write = move || Part { job, state }.save(&path);
+        let write = move || Part { job, state }.save_as(&path);
         *writing = Some(Background::start("checkpoint", write));
     }
 
-    /// Ends with the last state: an unfinished render keeps it, a finished one only where a checkpoint was asked for.
+    /// Whether one could be kept: what an unfinished render may be told that kept none.
+    pub(crate) fn is_possible(&self) -> bool {
+        self.path.is_some()
+    }
+
+    /// Ends with the last state: an unfinished render keeps it if it was long or resumed, a finished one only where a checkpoint was asked for.
     ///
     /// # Errors
     /// [`Failure::Io`] where the checkpoint cannot be written.
@@ -461,8 +477,8 @@ impl Checkpoint {
             let _ = thread.join();
         }
         let Some(path) = &self.path else { return Ok(None) };
-        let is_long = self.start.elapsed() >= LONG;
-        if self.is_asked || (!is_done && is_long && state.taken() > self.others) {
+        let is_worth_it = self.resumes || self.start.elapsed() >= LONG;
+        if self.is_asked || (!is_done && is_worth_it && state.taken() > self.others) {
             Part { job: self.identified.get()?, state: state.clone() }.save(path)?;
             return Ok(Some(path));
         }

@@ -6,7 +6,7 @@ use lumbre::math::Elementary;
 use lumbre::{Background, Error, Ground, RenderOptions, Scene, SceneDesc, Stage, StageLight, Staged};
 
 /// Samples per pixel of a model without camera and light, of which the noise is taken out.
-pub const MODEL_SPP: u32 = 16;
+const MODEL_SPP: u32 = 16;
 
 /// What is to be known of a scene on its stage.
 #[derive(Clone, Copy, Debug)]
@@ -45,10 +45,21 @@ impl Defaults {
         (self.is_of_light && self.staged.light == StageLight::Studio).then(Background::studio)
     }
 
-    /// Whether it is a model by itself, which is clean soon: where nobody asks for samples, it has [`MODEL_SPP`], and the noise is taken out.
-    pub fn is_plain(&self, scene: &Scene) -> bool {
-        let is_model = self.staged.framed && self.staged.light != StageLight::Own && self.is_of_light;
-        is_model && scene.resolved().sampler().spp.is_none()
+    /// Whether the noise is taken out of its picture, where nobody says otherwise: in the light of the studio, and of a model without a camera
+    /// in that of an environment map.
+    pub fn denoises(&self) -> bool {
+        let is_staged = match self.staged.light {
+            StageLight::Studio => true,
+            StageLight::Map => self.staged.framed,
+            _ => false,
+        };
+        is_staged && self.is_of_light
+    }
+
+    /// Samples per pixel of a picture whose noise is taken out, where neither the caller nor the file says how many: 16 where
+    /// [`Defaults::denoises`] holds.
+    pub fn spp(&self, scene: &Scene) -> Option<u32> {
+        (self.denoises() && scene.resolved().sampler().spp.is_none()).then_some(MODEL_SPP)
     }
 
     /// The tone mapping of pictures for displays: neutral in the light of a stage.

@@ -65,6 +65,14 @@ impl Denoiser {
         }
     }
 
+    /// Whether it takes a picture with one sample for squares of so many pixels a side: [`lumbre::Stats::stride`].
+    pub(crate) fn takes(&self, stride: Option<u32>) -> bool {
+        match self {
+            Self::Own => stride.is_some(),
+            Self::Oidn(_) => stride == Some(1),
+        }
+    }
+
     /// Takes the noise out of a picture, and says how long that took.
     ///
     /// # Errors

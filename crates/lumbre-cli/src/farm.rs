@@ -246,7 +246,7 @@ fn in_script(path: &Path) -> Result<String, Failure> {
 /// The options of a task, as lumbre render will take them; what it would refuse is refused now, and not on the cluster.
 fn task(arguments: &SlurmArguments, names: &Names) -> Result<crate::render::Arguments, Failure> {
     let own: &[&str] = match arguments.frames {
-        Some(_) => &["--frames", "0..1", "-o", &names.output, "--progress", "plain"],
+        Some(_) => &["--frames", "0..1", "-o", &names.output, "--resume", "--progress", "plain"],
         None => &[
             "--samples",
             "0..1",
@@ -265,7 +265,7 @@ fn task(arguments: &SlurmArguments, names: &Names) -> Result<crate::render::Argu
     let words = words.chain(spp.into_iter().flatten()).chain(arguments.render.iter().cloned());
     let wrong = |why: &str| {
         let own = if arguments.frames.is_some() {
-            "--frames, -o and --progress"
+            "--frames, -o, --resume and --progress"
         } else {
             "--samples, -o, --checkpoint, --resume and --progress"
         };
@@ -344,7 +344,7 @@ fn frame_scripts(
     let out = quoted(&names.output);
     let render = format!(
         "first=$(({first} + task * {count} / {tasks}))\nlast=$(({first} + (task + 1) * {count} / {tasks} - 1))\n\
-         exec \"$lumbre\" render {} --frames \"$first..$last\" -o {out}{spp} --progress plain{}\n",
+         exec \"$lumbre\" render {} --frames \"$first..$last\" -o {out}{spp} --resume --progress plain{}\n",
         quoted(&names.scene),
         options(arguments)
     );

@@ -5,12 +5,14 @@ use std::fmt;
 use std::path::PathBuf;
 
 use clap::Args;
-use lumbre::{CancelToken, Part, Scene, SceneInfo, Stage};
+use lumbre::{CancelToken, Part, Scene, SceneInfo};
 use serde_json::json;
 
 use crate::checkpoint::open_part;
 use crate::console::{escaped_json, escaped_line};
+use crate::defaults::Defaults;
 use crate::failure::{Failure, print};
+use crate::memory::picture_bytes;
 use crate::reading::{ReadingArguments, print_warnings};
 use crate::report::{caustics_line, caustics_not_found};
 use crate::signals::Signals;
@@ -49,10 +51,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     arguments.reading.check_build(&desc, &diagnostics)?;
     // What is in the file, before it is set on a stage: a model without a camera is measured as `lumbre render` shows it.
     let mut info = SceneInfo::of(&desc);
-    Stage::default().set(&mut desc);
+    let defaults = Defaults::stage(&mut desc, None, None);
     let scene = Scene::of_file(desc, &arguments.scene[0], &mut diagnostics)?;
     (info.bounds, info.memory_bytes) = (scene.info().bounds, scene.info().memory_bytes);
-    let predicted = Predicted::of(&scene);
+    let predicted = Predicted::of(&scene, &defaults);
     let caustics = caustics_not_found(&scene, &scene.options());
     if arguments.json {
         let animations = info.listing.animations.iter().map(|a| json!({ "name": a.name, "seconds": a.end }));
@@ -139,12 +141,15 @@ struct Predicted {
 }
 
 impl Predicted {
-    fn of(scene: &Scene) -> Result<Self, lumbre::Error> {
-        let options = scene.options();
+    /// As `lumbre render` makes it, where no option asks for another.
+    fn of(scene: &Scene, defaults: &Defaults) -> Result<Self, lumbre::Error> {
+        let mut options = scene.options();
+        options.transparent = defaults.background().is_some();
+        options.guides = defaults.denoises();
         Ok(Self {
             width: options.width,
             height: options.height,
-            bytes: options.memory_bytes()?,
+            bytes: picture_bytes(&options)?,
             seconds_per_sample: scene.seconds_per_sample(&options)?,
             threads: rayon::current_num_threads(),
         })

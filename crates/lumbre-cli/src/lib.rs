@@ -45,7 +45,7 @@ mod verb;
 mod view;
 mod viewing;
 
-pub use defaults::{Defaults, MODEL_SPP};
+pub use defaults::Defaults;
 pub use explain::{Explainer, Format, Request, Things, explain};
 pub use failure::Failure;
 pub use language::Language;
@@ -54,6 +54,9 @@ pub use memory::{check_picture, memory_left};
 /// Renders scenes, casts rays into them, says what is in them, and compares and joins pictures.
 #[derive(Parser)]
 #[command(name = "lumbre", version, about, max_term_width = 110)]
+#[command(
+    override_usage = "lumbre SCENE… [OPTIONS]      a picture of it, as lumbre render\n       lumbre <COMMAND> …"
+)]
 #[command(after_help = "Examples:
   lumbre model.glb                              a picture of a model: without a command, files are rendered
   lumbre render scene.pbrt                      a picture under the scene's own film name

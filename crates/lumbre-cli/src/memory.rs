@@ -123,15 +123,22 @@ impl Memory {
     /// # Errors
     /// [`Failure::Limit`] with the prediction, and [`Failure::Usage`] for options that make no picture.
     pub(crate) fn check_picture(self, options: &RenderOptions, held: u64) -> Result<(), Failure> {
-        // The picture, one over its background, and what encoders make of it; each layer as numbers and as their encoding.
-        const SAVED: u64 = 100;
-        const LAYERS: u64 = 170;
-        let each = if options.features || options.guides { SAVED + LAYERS } else { SAVED };
-        let pixels = options.bounds().map_err(lumbre::Error::from)?.area();
-        let rendered = options.memory_bytes().map_err(lumbre::Error::from)?;
         let what = format!("a picture of {} by {} pixels", options.width, options.height);
-        self.check(&what, rendered.max(pixels.saturating_mul(each)), held)
+        self.check(&what, picture_bytes(options)?, held)
     }
+}
+
+/// Bytes that a picture takes besides its scene, while it is rendered, denoised and saved.
+///
+/// # Errors
+/// [`lumbre::Error::Render`] for options that make no picture.
+pub(crate) fn picture_bytes(options: &RenderOptions) -> Result<u64, lumbre::Error> {
+    // The picture, one over its background, and what encoders make of it; each layer as numbers and as their encoding.
+    const SAVED: u64 = 100;
+    const LAYERS: u64 = 170;
+    let each = if options.features { SAVED + LAYERS } else { SAVED };
+    let pixels = options.bounds()?.area();
+    Ok(options.memory_bytes()?.max(pixels.saturating_mul(each)))
 }
 
 /// Bytes that are left for what is asked for next: in the machine, in its control groups, and by what the system grants

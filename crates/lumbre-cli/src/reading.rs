@@ -288,11 +288,13 @@ impl ReadingArguments {
                 "--shutter needs the time of a picture (expected --frame or --frames, too)".to_owned(),
             ));
         }
-        if self.animation.is_some() && frame.is_none() {
-            return Err(Failure::Usage(
-                "--animation needs the time of a picture (expected --frame or --frames, too)".to_owned(),
-            ));
-        }
+        let frame = match (frame, &self.animation) {
+            (None, Some(animation)) => {
+                say!("the animation {animation} is shown at 0 s (--frame takes another time)");
+                Some(0.0)
+            }
+            (frame, _) => frame,
+        };
         let mut options = lumbre::ReadOptions::default();
         options.pov.library.clone_from(&self.pov_include);
         options.limits = self.limits();

@@ -2,7 +2,8 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::io::IsTerminal;
+use std::fs::File;
+use std::io::{IsTerminal, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
@@ -21,7 +22,7 @@ use lumbre::{
 use serde_json::json;
 
 use crate::checkpoint::{Checkpoint, PartArguments, is_bare_part};
-use crate::defaults::{Defaults, MODEL_SPP};
+use crate::defaults::Defaults;
 use crate::denoiser::{Choice, Denoiser};
 use crate::failure::{Failure, print_bytes};
 use crate::names::one_of;
@@ -98,7 +99,7 @@ pub(crate) struct Arguments {
     min_spp: Option<u32>,
     /// Take the noise out of the picture: by Lumbre's own filter (own or auto, the same), or by Open Image Denoise where it is installed
     /// (oidn; its folder can be named by the variable OIDN_DIR). An .exr keeps the noisy picture too, in noisy.R, noisy.G and noisy.B.
-    /// By default none; own for a model without camera and light, where none of --spp, --time and --noise is given.
+    /// By default own in the light of the studio, else none.
     #[arg(long, value_name = "WITH", num_args = 0..=1, default_missing_value = "auto",
           value_parser = one_of(&Choice::NAMES, Choice::from_name))]
     denoise: Option<Choice>,
@@ -585,12 +586,14 @@ fn picture(
         || arguments.time.is_some()
         || arguments.noise.is_some()
         || arguments.parts.keeps_sums();
-    let is_plain = !samples_are_asked && defaults.is_plain(&scene);
-    // A model by itself is clean soon; who asks for samples has these and nothing else.
-    let denoiser = denoiser.or((is_plain && arguments.denoise.is_none()).then_some(&Denoiser::Own));
-    if is_plain && denoiser.is_some() {
-        options.stop.spp = MODEL_SPP;
+    // Parts hold samples alone.
+    let denoises = arguments.denoise.is_none() && !arguments.parts.keeps_sums() && defaults.denoises();
+    let denoiser = denoiser.or(denoises.then_some(&Denoiser::Own));
+    if let (Some(spp), Some(_), false) = (defaults.spp(&scene), denoiser, samples_are_asked) {
+        options.stop.spp = spp;
     }
+    // Open Image Denoise asks for albedo and normals.
+    options.features |= matches!(denoiser, Some(Denoiser::Oidn(_)));
     options.guides = denoiser.is_some();
     let held = diagnostics.memory_held().saturating_add(scene.resolved().accel().memory_bytes() as u64);
     arguments.reading.memory().check_picture(&options, held)?;
@@ -662,8 +665,28 @@ fn picture(
         let files = files.iter().map(PathBuf::as_path);
         Ok(Job { shown, ..Job::new(files, settings, &job_options)? })
     };
-    let (checkpoint, state) =
-        Checkpoint::begin(&arguments.parts, &output, memory, options.stop.spp, arguments.quiet, job)?;
+    let job: Box<dyn FnOnce() -> Result<Job, lumbre::Error> + Send> =
+        if number.is_some() && arguments.parts.resumes() {
+            let found = job().map_err(Failure::from)?;
+            if is_done_before(&output, &found, &options) {
+                if !arguments.quiet {
+                    say!("{} is done", output.display());
+                }
+                return Ok(());
+            }
+            Box::new(move || Ok(found))
+        } else {
+            Box::new(job)
+        };
+    let (checkpoint, state) = Checkpoint::begin(
+        &arguments.parts,
+        &output,
+        memory,
+        options.stop.spp,
+        arguments.quiet,
+        number.is_some(),
+        job,
+    )?;
     let keep = |state| checkpoint.keep(state);
     let keeper = checkpoint.every().map(|every| Keeper { every, keep: &keep });
     signals.enter(Phase::Rendering);
@@ -676,14 +699,18 @@ fn picture(
         Ok(Some(path)) if !is_done && !arguments.quiet => {
             say!("{} keeps what was rendered: --resume goes on from there", path.display());
         }
+        Ok(None) if !is_done && !arguments.quiet && checkpoint.is_possible() => {
+            say!(
+                "hint: --checkpoint FILE keeps what was rendered, for --resume (as renders of two minutes do by themselves)"
+            );
+        }
         Ok(_) => {}
         // The picture may be saved all the same.
         Err(why) => say!("warning: the checkpoint cannot be written: {why}"),
     }
-    check_whole(arguments, &picture, &output, signals.received())?;
+    check_whole(arguments, &picture, signals.received())?;
     let denoised = match denoiser {
-        // What is coarser than its pixels says nothing of noise.
-        Some(denoiser) if picture.stats().stride == Some(1) => {
+        Some(denoiser) if denoiser.takes(picture.stats().stride) => {
             Some((denoiser.name(), denoiser.apply(&mut picture, options.threads)?))
         }
         _ => None,
@@ -769,6 +796,35 @@ fn picture(
     Ok(())
 }
 
+/// Whether a file is the picture of this render with all its samples, by what it says of itself.
+fn is_done_before(path: &Path, job: &Job, options: &RenderOptions) -> bool {
+    const NEAR: u64 = 64 << 10;
+    let mut start = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(NEAR).read_to_end(&mut start));
+    let first = options.first_sample;
+    let wanted = job.metadata(&(first..first.saturating_add(options.stop.spp)));
+    let is_fixed = options.stop.time.is_none() && options.stop.noise.is_none();
+    let says = |name: &str| {
+        let value = wanted.iter().find(|(known, _)| known == name).map_or("", |(_, value)| value);
+        let mut places = start.windows(name.len()).enumerate().filter(|(_, here)| *here == name.as_bytes());
+        places.any(|(at, _)| text_of(&start, at, name.len()) == Some(value.as_bytes()))
+    };
+    read.is_ok() && says("lumbreScene") && (!is_fixed || says("lumbreSamples"))
+}
+
+/// The text of a name at this place in a file: that of a chunk iTXt of a PNG, or a line of an .exr.
+fn text_of(file: &[u8], at: usize, length: usize) -> Option<&[u8]> {
+    if let Some(chunk) = file.get(at.checked_sub(8)?..at)
+        && chunk.ends_with(b"iTXt")
+    {
+        let bytes = u32::from_be_bytes([chunk[0], chunk[1], chunk[2], chunk[3]]) as usize;
+        // Between them are the end of the name, two bytes of compression, and no language.
+        return file.get(at + length + 5..at + bytes);
+    }
+    let text = file.get(at + length..)?.strip_prefix(b": ")?;
+    text.split(|&byte| byte == b'\n' || byte == 0).next()
+}
+
 /// What may help where next to nothing is lit.
 const DARK_HINT: &str = "hint: next to nothing in the picture is lit: --fit shows what is closed from outside, where its light does not come in
   (--eye and --target put a camera inside, where its lights may be), --env FILE lights it from all around, --exposure EV
@@ -813,14 +869,9 @@ fn check_format(path: &Path, layers: bool) -> Result<(), Failure> {
     }
 }
 
-/// Refuses to save what is no whole picture: where not every pixel has a sample, what there is takes no file's place, and is saved
-/// only when the time was over, if it has every pixel of a coarser one.
-fn check_whole(
-    arguments: &Arguments,
-    picture: &Picture,
-    output: &Path,
-    signal: Option<u8>,
-) -> Result<(), Failure> {
+/// Refuses to save what is no whole picture: where a signal came before every pixel had a sample. When the time was over, there is a coarser
+/// one.
+fn check_whole(arguments: &Arguments, picture: &Picture, signal: Option<u8>) -> Result<(), Failure> {
     if picture.stats().spp > 0 {
         return Ok(());
     }
@@ -831,11 +882,10 @@ fn check_whole(
     let time = arguments.time.map(spoken).unwrap_or_default();
     let over = format!("--time: {time} were over before every pixel had a sample");
     match picture.stats().stride {
-        Some(stride) if !output.is_file() => {
+        Some(stride) => {
             say!("warning: {over}; the picture has one for {stride} by {stride} pixels");
             Ok(())
         }
-        Some(_) => Err(Failure::Limit(format!("{over}; {} is as it was", output.display()))),
         None => Err(Failure::Limit(format!("{over}; nothing was saved"))),
     }
 }

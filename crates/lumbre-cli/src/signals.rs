@@ -33,6 +33,8 @@ pub(crate) enum Phase {
 const PREPARING_GRACE: Duration = Duration::from_secs(1);
 /// How long a render may take to stop.
 const GRACE: Duration = Duration::from_millis(1500);
+/// How much later than its end a render may stop by itself: its first, coarse picture is taken whatever the time.
+const COARSE_GRACE: Duration = Duration::from_secs(10);
 /// How long a picture that took its time to render may take to be saved. Who cannot wait sends another signal.
 const SAVING_GRACE: Duration = Duration::from_secs(20);
 /// Between two looks.
@@ -252,7 +254,7 @@ fn check(phase: Phase, deadline: Deadline) {
         Phase::Preparing(what) if over > PREPARING_GRACE => {
             say!("error: --time: {time} were over while {what}; nothing was rendered");
         }
-        Phase::Rendering if over > GRACE => {
+        Phase::Rendering if over > COARSE_GRACE => {
             say!("error: --time: {time} are over, and the render takes too long to stop; nothing was saved");
         }
         Phase::Opening(since) if over.min(since.elapsed()) > GRACE => {

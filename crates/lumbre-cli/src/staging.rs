@@ -7,7 +7,7 @@ use clap::Args;
 use lumbre::description::GroundPlane;
 use lumbre::formats::Limits;
 use lumbre::formats::diagnostic::nearest_name;
-use lumbre::image::{Image, Rgb, srgb_to_linear};
+use lumbre::image::{Image, Rgb};
 use lumbre::{Background, EnvironmentDesc, Ground, Stage, Surroundings};
 
 use crate::defaults::Defaults;
@@ -49,21 +49,6 @@ enum BackgroundArgument {
     File(PathBuf),
 }
 
-const COLOURS: [(&str, u32); 12] = [
-    ("white", 0xff_ff_ff),
-    ("black", 0x00_00_00),
-    ("grey", 0x80_80_80),
-    ("gray", 0x80_80_80),
-    ("silver", 0xc0_c0_c0),
-    ("red", 0xff_00_00),
-    ("green", 0x00_80_00),
-    ("blue", 0x00_00_ff),
-    ("yellow", 0xff_ff_00),
-    ("cyan", 0x00_ff_ff),
-    ("magenta", 0xff_00_ff),
-    ("navy", 0x00_00_80),
-];
-
 fn background(text: &str) -> Result<BackgroundArgument, String> {
     let lower = text.to_ascii_lowercase();
     match &*lower {
@@ -72,34 +57,22 @@ fn background(text: &str) -> Result<BackgroundArgument, String> {
         "studio" => return Ok(BackgroundArgument::Studio),
         _ => {}
     }
-    if let Some((_, code)) = COLOURS.iter().find(|(name, _)| *name == lower) {
-        return Ok(BackgroundArgument::Colour(colour(*code)));
+    if let Some(colour) = lumbre::colour(text) {
+        return Ok(BackgroundArgument::Colour(colour));
     }
-    if let Some(digits) = lower.strip_prefix('#') {
-        let wide = match digits.len() {
-            3 => digits.chars().flat_map(|c| [c, c]).collect(),
-            _ => digits.to_owned(),
-        };
-        let code = u32::from_str_radix(&wide, 16).ok().filter(|_| wide.len() == 6 && !wide.starts_with('+'));
-        return code.map(|code| BackgroundArgument::Colour(colour(code))).ok_or_else(|| {
-            "expected a colour of three or six hexadecimal digits, as #fa0 or #e8e0d8".to_owned()
-        });
+    if lower.starts_with('#') {
+        return Err("expected a colour of three or six hexadecimal digits, as #fa0 or #e8e0d8".to_owned());
     }
     if Path::new(text).extension().is_some() || text.contains(std::path::MAIN_SEPARATOR) {
         return Ok(BackgroundArgument::File(text.into()));
     }
-    let names: Vec<&str> = COLOURS.iter().map(|(name, _)| *name).collect();
+    let names: Vec<&str> = lumbre::colour_names().collect();
     let near = nearest_name(text, names.iter().copied().chain(["env", "studio", "transparent"]));
     let tip = near.map_or_else(String::new, |near| format!("; did you mean {near}?"));
     Err(format!(
         "expected env, studio, transparent, a colour ({}, or as #e8e0d8) or an image file{tip}",
         names.join(", ")
     ))
-}
-
-fn colour(code: u32) -> Rgb {
-    let channel = |shift: u32| srgb_to_linear((code >> shift & 0xff) as f32 / 255.0);
-    Rgb::new(channel(16), channel(8), channel(0))
 }
 
 /// The background of a picture.

@@ -21,7 +21,8 @@ pub(crate) fn with_render(mut arguments: Vec<OsString>, program: &Command) -> Ve
         Some(first) if names_command(first) || is_for_program(first) => false,
         // Options may come first.
         Some(first) if is_option(first) => arguments[2..].iter().any(is_scene),
-        Some(first) => is_scene(first),
+        // What looks like the name of a file and is none is said by the command that looks for it.
+        Some(first) => is_scene(first) || looks_like_a_file(first),
     };
     if renders {
         arguments.insert(1, "render".into());
@@ -41,6 +42,12 @@ pub(crate) fn with_render(mut arguments: Vec<OsString>, program: &Command) -> Ve
 fn is_scene(argument: &OsString) -> bool {
     let path = Path::new(argument);
     argument == "-" || SceneFormat::from_path(path).is_some() || path.is_file()
+}
+
+/// Whether a word is no command, by its form or because there is a folder of that name.
+fn looks_like_a_file(argument: &OsString) -> bool {
+    let path = Path::new(argument);
+    path.extension().is_some() || path.components().count() > 1 || path.is_dir()
 }
 
 #[cfg(test)]
@@ -72,6 +79,9 @@ mod tests {
             (&["fox.glb"][..], true),
             (&["a.pbrt.gz", "-o", "b.png"], true),
             (&["-"], true),
+            (&["fox.fbx"], true),
+            (&["models/fox"], true),
+            (&["."], true),
             (&["--spp", "4", "a.OBJ"], true),
             (&["info", "a.obj"], false),
             (&["help"], false),

@@ -11,10 +11,10 @@ use lumbre::image::ToneMap;
 use lumbre::{CancelToken, ErrorKind, RenderOptions, SaveOptions, SceneDesc};
 use lumbre_viewer::{Built, Explain, Moment, Options, Read, Source, SourceError, Viewer, export};
 
-use crate::defaults::MODEL_SPP;
 use crate::explain::Explainer;
 use crate::failure::{Failure, print};
 use crate::names::one_of;
+use crate::output::is_standard_stream;
 use crate::reading::ReadingArguments;
 use crate::render::exposure;
 use crate::shown::{Shown, Wish, shown};
@@ -88,6 +88,11 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
     if arguments.host.is_unspecified() && arguments.allow_host.is_empty() {
         let why = "is no address that a browser can open (expected one of this machine's, or --allow-host NAME:PORT too)";
         return Err(Failure::Usage(format!("--host {} {why}", arguments.host)));
+    }
+    // A file that is not there is said here; what an edit mends is shown in the page.
+    for path in arguments.scene.iter().filter(|path| !is_standard_stream(path)) {
+        let opened = std::fs::File::open(path);
+        opened.map_err(|e| Failure::Io(format!("{}: cannot open: {e}", path.display())))?;
     }
     let cancel = CancelToken::new();
     let signals = Signals::listen(&cancel)?;
@@ -247,11 +252,8 @@ impl Files {
         let Shown { scene, defaults, behind, mut options, is_of_light, diagnostics } = shown(desc, &wish)?;
         let mut warnings = diagnostics.lines();
         options.threads = rayon::current_num_threads();
-        let is_plain = self.arguments.spp.is_none() && defaults.is_plain(&scene);
-        if is_plain {
-            options.stop.spp = MODEL_SPP;
-        }
-        options.stop.spp = self.arguments.spp.unwrap_or(options.stop.spp);
+        let own = defaults.spp(&scene).unwrap_or(options.stop.spp);
+        options.stop.spp = self.arguments.spp.unwrap_or(own);
         let held = diagnostics.memory_held().saturating_add(scene.resolved().accel().memory_bytes() as u64);
         reading.memory().check_picture(&options, held)?;
         if scene.is_dark() && is_of_light {
@@ -271,6 +273,6 @@ impl Files {
             Behind::Background(background) => Some(background),
             Behind::Lights | Behind::Nothing => None,
         };
-        Ok(Built { scene, options, save, background, denoise: is_plain, warnings, explain })
+        Ok(Built { scene, options, save, background, denoise: defaults.denoises(), warnings, explain })
     }
 }

@@ -90,17 +90,31 @@ fn a_denoiser_that_is_not_there_is_missed_before_anything_is_rendered() {
     assert!(!desk.path("out.png").exists());
 }
 
+/// A triangle and a camera.
+const GLTF: &str = r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
+"nodes": [{"mesh": 0}, {"camera": 0, "translation": [0, 1, 9]}],
+"cameras": [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}}],
+"meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+"accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [-3, 0, 0], "max": [4, 2, 0]}],
+"bufferViews": [{"buffer": 0, "byteLength": 36}],
+"buffers": [{"byteLength": 36, "uri": "data:application/octet-stream;base64,AABAwAAAAAAAAAAAAACAQAAAAAAAAAAAAAAAAAAAAEAAAAAA"}]}"#;
+
 #[test]
-fn a_model_by_itself_has_few_samples_and_no_noise_unless_others_are_asked_for() {
+fn a_model_in_the_studio_has_no_noise_unless_it_is_asked_for_and_few_samples_unless_others_are() {
     let desk = Desk::new();
     desk.write("a.obj", "v -3 0 0\nv 4 0 0\nv 4 2 1\nv -3 2 1\nf 1 2 3 4\n");
     desk.write("sphere.pbrt", SPHERE);
+    desk.write("own.gltf", GLTF);
     for (arguments, samples, is_denoised) in [
         (&["a.obj"][..], " 16 samples", true),
         (&["a.obj", "--denoise"], " 16 samples", true),
         (&["a.obj", "--denoise", "none"], " 64 samples", false),
-        (&["a.obj", "--spp", "3"], " 3 samples", false),
-        (&["a.obj", "--spp", "3", "--denoise"], " 3 samples", true),
+        (&["a.obj", "--spp", "3"], " 3 samples", true),
+        (&["a.obj", "--spp", "3", "--denoise", "none"], " 3 samples", false),
+        (&["a.obj", "--noise", "0.5", "--min-spp", "5"], " 5 to ", true),
+        (&["a.obj", "--spp", "99999", "--time", "300ms"], " samples", true),
+        (&["own.gltf"], " 16 samples", true),
+        (&["a.obj", "--env", "none"], " 64 samples", false),
         (&["a.obj", "--integrator", "normals"], " 64 samples", false),
         (&["sphere.pbrt"], " 4 samples", false),
     ] {

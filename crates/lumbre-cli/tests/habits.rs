@@ -44,6 +44,29 @@ fn image(desk: &Desk, name: &str) -> lumbre::image::Image {
 }
 
 #[test]
+fn what_looks_like_a_file_is_looked_for_and_what_cannot_be_read_is_told_apart() {
+    let desk = Desk::new();
+    desk.write("part.STP", "ISO-10303-21;");
+    fs::create_dir(desk.path("model")).unwrap();
+    desk.write("model/scene.pbrt", "WorldBegin\nShape \"sphere\"\n");
+    for (arguments, status, expected) in [
+        (&["fox.fbx"][..], 4, "fox.fbx: cannot open"),
+        (
+            &["part.STP"],
+            3,
+            "part.STP: files of this kind are not read (expected an .stl, as FreeCAD exports it",
+        ),
+        (&["model"], 3, "model: this is a folder (expected a file, such as model/scene.pbrt)"),
+        (&["view", "none.glb", "--no-open"], 4, "none.glb: cannot open"),
+        (&["explain", "model/scene.pbrt"], 2, "nothing is asked for (expected --pixel X,Y"),
+    ] {
+        let out = desk.lumbre(arguments);
+        assert_eq!(code(&out), status, "{arguments:?}: {}", stderr(&out));
+        assert!(stderr(&out).starts_with(&format!("error: {expected}")), "{}", stderr(&out));
+    }
+}
+
+#[test]
 fn a_file_without_a_verb_is_rendered() {
     let desk = Desk::new();
     desk.write("scene.pbrt", SPHERE);

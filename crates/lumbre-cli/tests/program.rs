@@ -665,7 +665,6 @@ fn frames_that_make_no_sense_are_refused() {
         (&["--shutter", "half"], "a share of a frame"),
         (&["--fps", "0"], "frames a second"),
         (&["--shutter", "0.5"], "--shutter needs the time of a picture"),
-        (&["--animation", "Run"], "--animation needs the time of a picture"),
     ] {
         let mut whole = vec!["render", "missing.gltf"];
         whole.extend(arguments);

@@ -135,13 +135,16 @@ fn a_signal_ends_reading_and_waiting_for_pipes() {
 }
 
 #[test]
-fn time_that_is_over_in_the_first_pass_leaves_a_coarse_whole_picture_or_the_old_one() {
+fn time_that_is_over_in_the_first_pass_leaves_a_coarse_whole_picture() {
     let folder = Folder::new();
     // So large that no machine ends a pass in time.
     room(&folder, (3000, 2000), 200);
-    let arguments = ["render", "room.pbrt", "-o", "a.png", "--time", "1s", "--progress", "none"];
-    let (code, said) = end_of(start(&folder, &arguments));
-    if code == 0 {
+    for time in ["1s", "1ms"] {
+        // Whatever stands there: it was asked for.
+        folder.write("a.png", "the old file");
+        let arguments = ["render", "room.pbrt", "-o", "a.png", "--time", time, "--progress", "none"];
+        let (code, said) = end_of(start(&folder, &arguments));
+        assert_eq!(code, 0, "{said}");
         assert!(said.contains("the picture has one for"), "{said}");
         assert!(
             said.contains("a.png: 3000x2000, a coarse picture of ") && !said.contains("0 samples a pixel"),
@@ -152,14 +155,7 @@ fn time_that_is_over_in_the_first_pass_leaves_a_coarse_whole_picture_or_the_old_
         for y in (0..2000).step_by(16) {
             assert!((0..3000).any(|x| picture.pixel(x, y).max_component() > 0.0), "row {y}");
         }
-    } else {
-        assert!(code == 5 && said.contains("--time"), "{said}");
-        assert_eq!(folder.names(), ["room.pbrt"]);
     }
-    folder.write("a.png", "the old file");
-    let (code, said) = end_of(start(&folder, &arguments));
-    assert_eq!((code, said.contains("--time")), (5, true), "{said}");
-    assert_eq!(fs::read(folder.path("a.png")).unwrap(), b"the old file");
 }
 
 #[test]
@@ -179,7 +175,8 @@ fn progress_goes_by_whichever_limit_comes_first() {
             let (left, seconds) =
                 (state["seconds_left"].as_f64().unwrap(), state["seconds"].as_f64().unwrap());
             assert!(0.0 < share && share <= 1.0 && left < 60.0, "{state}");
-            assert!((left - seconds * (1.0 / share - 1.0)).abs() < 1e-3, "{state}");
+            // What came before the first sample takes no more time.
+            assert!(left <= seconds * (1.0 / share - 1.0) + 1e-3, "{state}");
             assert!(state["samples"].as_u64() <= state["total"].as_u64(), "{state}");
             assert!(state["rays_per_second"].as_f64() > Some(0.0) && state["frame"].is_null(), "{state}");
             count += 1;

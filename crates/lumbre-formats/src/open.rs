@@ -183,8 +183,16 @@ impl<'p, 'b> Source<'p, 'b> {
         if let Some(format) = by_name {
             return Ok(Self { path, format, input: None });
         }
+        if !is_standard_input && path.is_dir() {
+            return Err(folder(path));
+        }
+        let is_elsewhere = OTHERS.iter().any(|(endings, _)| has_ending(path, endings));
         // Whether or not there is such a file, its name does not say what it is.
-        if !is_standard_input && options.format.is_none() && !path.is_file() {
+        if !is_standard_input && options.format.is_none() && (!path.is_file() || is_elsewhere) {
+            // A name that says enough, and there is no such file: that is said first.
+            if is_elsewhere && !path.exists() {
+                Input::open(path, budget)?;
+            }
             return Err(unknown(path, path.display().to_string().into()));
         }
         let input = if is_standard_input {
@@ -217,7 +225,36 @@ impl<'p, 'b> Source<'p, 'b> {
     }
 }
 
+/// Formats of other programs that are not read, by their endings, and what makes a file of them that is.
+const OTHERS: [(&[&str], &str); 4] = [
+    (&["fbx", "dae", "blend", "3ds", "abc", "usd", "usda", "usdc", "usdz"], "a .glb, as Blender exports it"),
+    (&["step", "stp", "iges", "igs", "3dm", "f3d"], "an .stl, as FreeCAD exports it"),
+    (&["3mf", "off", "amf", "x3d", "wrl"], "a .ply or an .stl, as MeshLab exports it"),
+    (&["xml", "mtlx"], "a .pbrt"),
+];
+
+fn has_ending(path: &Path, endings: &[&str]) -> bool {
+    path.extension().is_some_and(|ending| endings.iter().any(|known| ending.eq_ignore_ascii_case(known)))
+}
+
+/// A folder is no scene; one that is in it is named.
+fn folder(path: &Path) -> FormatError {
+    let files = std::fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut scenes: Vec<_> = files.filter(|file| SceneFormat::from_path(file).is_some()).collect();
+    scenes.sort();
+    let wrong = Diagnostic::error("this is a folder").at(Place::whole(path.display().to_string()));
+    let expected = match scenes.first() {
+        Some(scene) => format!("a file, such as {}", scene.display()),
+        None => "a file".to_owned(),
+    };
+    wrong.expected(expected).into()
+}
+
 fn unknown(path: &Path, name: Arc<str>) -> FormatError {
+    if let Some((_, made)) = OTHERS.iter().find(|(endings, _)| has_ending(path, endings)) {
+        let wrong = Diagnostic::error("files of this kind are not read").at(Place::whole(name));
+        return wrong.expected(format!("{made}; {ENDINGS} are read")).into();
+    }
     let found = match path.extension() {
         _ if path.as_os_str() == "-" => "bytes of no known format".to_owned(),
         Some(ending) => quoted(&ending.to_string_lossy()),

@@ -13,7 +13,7 @@ use lumbre::{
     CancelToken, Job, Part as PartDesc, PixelBounds, Progress, Ray, ReadOptions, RenderOptions, SceneBuilder,
     SceneDesc, State, UpAxis,
 };
-use lumbre_cli::{Defaults, Format, Language, MODEL_SPP, Request, Things, memory_left};
+use lumbre_cli::{Defaults, Format, Language, Request, Things, memory_left};
 use numpy::{PyArray1, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
@@ -314,8 +314,7 @@ impl Scene {
                 let render = || {
                     let (mut picture, state) =
                         shown.scene.render_from(&options, &watch, &cancel, None, None)?;
-                    // What is coarser than its pixels says nothing of noise.
-                    if denoises && picture.stats().stride == Some(1) {
+                    if denoises && picture.stats().stride.is_some() {
                         picture.denoise_unless(options.threads, &cancel)?;
                     }
                     Ok((picture, state))
@@ -537,13 +536,14 @@ impl Scene {
             options.resize(shown.scene.resolved().film(), width, height);
         }
         // As the program does.
-        let samples_are_asked = ["spp", "time", "noise", "part"]
-            .iter()
-            .any(|name| given.get_item(name).is_ok_and(|found| found.is_some()));
-        let is_plain = !samples_are_asked && shown.defaults.is_plain(&shown.scene);
-        let denoises = named(given, "denoise")?.unwrap_or(is_plain);
-        if is_plain && denoises {
-            options.stop.spp = MODEL_SPP;
+        let is_given = |name: &str| given.get_item(name).is_ok_and(|found| found.is_some());
+        let samples_are_asked = ["spp", "time", "noise", "part"].into_iter().any(is_given);
+        // Parts hold samples alone.
+        let keeps_part = named(given, "part")?.unwrap_or(false);
+        let by_default = shown.defaults.denoises() && !keeps_part;
+        let denoises = named(given, "denoise")?.unwrap_or(by_default);
+        if let (Some(spp), true, false) = (shown.defaults.spp(&shown.scene), denoises, samples_are_asked) {
+            options.stop.spp = spp;
         }
         let mut asked = Asked { shown, options, is_transparent: false, denoises, keeps_part: false };
         for (name, value) in given {

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 use lumbre::{ReadOptions, SaveOptions, SceneDesc};
-use lumbre_cli::{Defaults, Explainer, MODEL_SPP};
+use lumbre_cli::{Defaults, Explainer};
 use lumbre_viewer::{Built, Closer, Moment, Options, Read, Source, SourceError};
 use pyo3::exceptions::{PyOSError, PyRuntimeError};
 use pyo3::prelude::*;
@@ -65,8 +65,7 @@ impl Source for Live {
         }
         options.transparent = defaults.background().is_some();
         options.threads = rayon::current_num_threads();
-        let is_plain = self.spp.is_none() && defaults.is_plain(&scene);
-        let own = if is_plain { MODEL_SPP } else { options.stop.spp };
+        let own = defaults.spp(&scene).unwrap_or(options.stop.spp);
         options.stop.spp = self.spp.unwrap_or(own);
         self.check(&options)?;
         let mut save = SaveOptions::default();
@@ -77,7 +76,7 @@ impl Source for Live {
             options,
             save,
             background: defaults.background(),
-            denoise: is_plain,
+            denoise: defaults.denoises(),
             warnings: Vec::new(),
             explain: Some(Box::new(explain)),
         })

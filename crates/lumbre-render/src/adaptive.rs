@@ -1,7 +1,7 @@
 //! Adaptive sampling: when a pixel has samples enough.
 
 use crate::film::{Pixel, Tile};
-use crate::neighbourhoods::{Expectation, FLOOR};
+use crate::neighbourhoods::{Expectation, FLOOR, needed};
 use crate::trial::Trial;
 
 /// Ends the sampling of each pixel where its noise is low enough.
@@ -76,6 +76,12 @@ impl Adaptive {
         let taken = f64::from(pixel.taken);
         if self.is_done(x, y, pixel) {
             return taken;
+        }
+        if pixel.taken < self.min_spp {
+            // Its own samples say too little.
+            let Expectation { mean, variance, .. } = self.trial.at(x, y);
+            let needed = needed(variance, self.limit * (mean.max(0.0) + self.floor));
+            return needed.max(f64::from(self.min_spp)).min(f64::from(most));
         }
         // Noise falls with the square root of the number of samples.
         let share = self.share_of_limit(x, y, pixel).unwrap_or(1.0);

@@ -12,6 +12,8 @@ const REPORT_EVERY: Duration = Duration::from_millis(100);
 /// Counts samples, and tells of them now and then.
 pub(crate) struct Clock<'a> {
     start: Instant,
+    /// The time from the start to the first sample.
+    prepared: Duration,
     pixels: u64,
     stop: Stop,
     done: AtomicU64,
@@ -26,9 +28,10 @@ pub(crate) struct Clock<'a> {
 }
 
 impl<'a> Clock<'a> {
-    /// A clock of a render of so many pixels, of which an earlier run took so many samples.
+    /// A clock of a render of so many pixels, of which an earlier run took so many samples, and which took so long to be prepared.
     pub(crate) fn new(
         start: Instant,
+        prepared: Duration,
         pixels: u64,
         stop: Stop,
         before: u64,
@@ -37,6 +40,7 @@ impl<'a> Clock<'a> {
         let never = AtomicU64::new(f64::INFINITY.to_bits());
         Self {
             start,
+            prepared,
             pixels,
             stop,
             done: AtomicU64::new(before),
@@ -72,26 +76,27 @@ impl<'a> Clock<'a> {
         let pixels = self.pixels as f64;
         let of_noise = samples / (f64::from_bits(self.quiet_at.load(Ordering::Relaxed)) * pixels);
         let of_spp = samples / (f64::from(self.stop.spp) * pixels);
-        let of_time = self.stop.time.map_or(0.0, |time| elapsed.as_secs_f64() / time.as_secs_f64());
+        let of_time =
+            self.stop.time.map_or(0.0, |time| (elapsed.as_secs_f64() / time.as_secs_f64()).min(1.0));
         // A render without a limit of its own for the number of samples has the largest.
         let counts = self.stop.spp < u32::MAX || (self.stop.time.is_none() && self.stop.noise.is_none());
         let share = of_noise.max(of_time).max(if counts { of_spp } else { 0.0 }).clamp(0.0, 1.0);
         let is_known = share > 0.0;
         // The share of this run.
         let own = share * (samples - self.before as f64) / samples;
-        let left = (is_known && own > 0.0).then(|| elapsed.as_secs_f64() * (1.0 - share) / own);
+        let left = match self.stop.time {
+            Some(time) if of_time >= share => Some(time.saturating_sub(elapsed)),
+            _ if is_known && own > 0.0 => {
+                let worked = elapsed.saturating_sub(self.prepared).as_secs_f64();
+                Duration::try_from_secs_f64(worked * (1.0 - share) / own).ok()
+            }
+            _ => None,
+        };
         let total = match counts && of_spp >= share {
             true => Some(self.pixels.saturating_mul(u64::from(self.stop.spp))),
             false => is_known.then(|| ((samples / share) as u64).max(done)),
         };
-        State {
-            samples: done,
-            rays: self.rays.load(Ordering::Relaxed),
-            total,
-            share,
-            elapsed,
-            left: left.and_then(|left| Duration::try_from_secs_f64(left).ok()),
-        }
+        State { samples: done, rays: self.rays.load(Ordering::Relaxed), total, share, elapsed, left }
     }
 }
 
@@ -101,7 +106,7 @@ mod tests {
     use crate::NoProgress;
 
     fn state(stop: Stop, quiet_at: Option<f64>, done: u64, elapsed: u64) -> State {
-        let clock = Clock::new(Instant::now(), 200, stop, 0, &NoProgress);
+        let clock = Clock::new(Instant::now(), Duration::ZERO, 200, stop, 0, &NoProgress);
         quiet_at.into_iter().for_each(|spp| clock.expect_quiet_at(spp));
         clock.state(done, Duration::from_secs(elapsed))
     }
@@ -132,9 +137,19 @@ mod tests {
     }
 
     #[test]
+    fn what_came_before_the_first_sample_is_no_measure_of_samples() {
+        let stop = Stop { noise: Some(0.02), ..Stop::at(1 << 20) };
+        let clock = Clock::new(Instant::now(), Duration::from_secs(6), 200, stop, 0, &NoProgress);
+        clock.expect_quiet_at(10.0);
+        // 400 of 2000 samples in 2 s.
+        let state = clock.state(400, Duration::from_secs(8));
+        assert_eq!((state.share, state.left), (0.2, Some(Duration::from_secs(8))));
+    }
+
+    #[test]
     fn what_an_earlier_run_took_is_no_work_of_this_one() {
         let stop = Stop::at(8);
-        let clock = Clock::new(Instant::now(), 200, stop, 400, &NoProgress);
+        let clock = Clock::new(Instant::now(), Duration::ZERO, 200, stop, 400, &NoProgress);
         // 800 of 1600 samples, 400 of them in 2 s: as many again are left twice.
         let state = clock.state(800, Duration::from_secs(2));
         assert_eq!((state.share, state.left), (0.5, Some(Duration::from_secs(4))));

@@ -32,6 +32,8 @@ const LONG: u32 = 64;
 /// The first pass goes over the picture in squares of so many pixels a side, one sample in each, and then in smaller ones, so that a
 /// render which is stopped in it is a whole picture, if a coarse one.
 const STRIDES: [u32; 7] = [256, 64, TILE, 8, 4, 2, 1];
+/// The clock does not stop a coarse picture of so few samples: a small picture in place of none.
+const UNSTOPPED: u64 = 8192;
 /// Samples of a wave, at most, where a clock or a pause may stop the render: so many take a few milliseconds.
 const WAVE_BY_THE_CLOCK: usize = 1024;
 
@@ -99,7 +101,7 @@ pub fn render_from(
     let spp = options.stop.spp.max(1);
     let catches_shadows = scene.ground().is_some_and(|ground| ground.catcher);
     let extras = Extras {
-        features: options.features || options.guides,
+        features: options.features,
         tints: options.transparent && catches_shadows,
         guides: options.guides,
         depth_unit: depth_unit(scene, &taker.view),
@@ -122,13 +124,21 @@ pub fn render_from(
     let job = Job {
         options,
         taker,
+        pixels: bounds.area(),
         adaptive,
         deadline,
         cancel,
         pause: keeper.map(|keeper| Pause::new(start, keeper.every)),
-        clock: Clock::new(start, bounds.area(), options.stop, before, progress),
+        clock: Clock::new(start, start.elapsed(), bounds.area(), options.stop, before, progress),
         waves: Mutex::default(),
     };
+    let expect_quiet = |owners: &[Owner]| {
+        let Some(adaptive) = &job.adaptive else { return };
+        let pixels = owners.iter().flat_map(|owner| owner.tile.bounds().pixels().zip(owner.tile.pixels()));
+        let expected: f64 = pixels.map(|((x, y), pixel)| adaptive.expected(x, y, pixel, spp)).sum();
+        job.clock.expect_quiet_at(expected / bounds.area() as f64);
+    };
+    expect_quiet(&owners);
     let hand_over = |owners: &[Owner]| {
         if let (Some(keeper), Some(pause)) = (keeper, &job.pause) {
             (keeper.keep)(state_of(owners.to_vec(), bounds, options));
@@ -151,7 +161,7 @@ pub fn render_from(
                 workers.for_each(&mut owners, |owner| {
                     job.run_coarsely(owner, (bounds.x0, bounds.y0), side, last)
                 });
-                if job.must_stop() || owners.iter().all(|owner| owner.next_side <= side) {
+                if job.must_stop_at(side) || owners.iter().all(|owner| owner.next_side <= side) {
                     break;
                 }
                 hand_over(&owners);
@@ -189,11 +199,7 @@ pub fn render_from(
             noise: reached,
             picture: &|| picture(tiles(), bounds, options.transparent),
         });
-        if let Some(adaptive) = &job.adaptive {
-            let pixels = tiles().flat_map(|tile| tile.bounds().pixels().zip(tile.pixels()));
-            let expected: f64 = pixels.map(|((x, y), pixel)| adaptive.expected(x, y, pixel, spp)).sum();
-            job.clock.expect_quiet_at(expected / bounds.area() as f64);
-        }
+        expect_quiet(&owners);
         if job.must_stop() || least_wanted(&owners).is_none() {
             break;
         }
@@ -275,18 +281,29 @@ fn owners_of(
     let places = bounds.tiles(TILE);
     // Those of a render that goes on in the same program are not copied: there may be gigabytes.
     let are_in_place = state.tiles.iter().map(Tile::bounds).eq(places.iter().copied());
-    let tiles = if are_in_place {
-        state.tiles
-    } else {
-        let film = state.film();
-        places.into_iter().map(|place| film.placed_in(place)).collect()
-    };
+    let tiles = if are_in_place { state.tiles } else { placed(state.tiles, &places, extras) };
     let mut owners: Vec<Owner> = tiles.into_iter().map(Owner::new).collect();
     if let Some(owner) = owners.first_mut() {
         (owner.record.counts, owner.dropped, owner.clamped) = (state.rays, state.dropped, state.clamped);
         owner.first_dropped = state.first_dropped;
     }
     Ok(owners)
+}
+
+/// The sums of some tiles in others, which are in rows from above. The first are dropped as soon as all is taken from them.
+fn placed(tiles: Vec<Tile>, places: &[PixelBounds], extras: Extras) -> Vec<Tile> {
+    let mut rest = tiles;
+    let mut above = 0;
+    let take = |place: &PixelBounds| {
+        if place.y0 > above {
+            above = place.y0;
+            rest.retain(|tile| tile.bounds().y1 > above);
+        }
+        let mut tile = Tile::new(*place, extras);
+        rest.iter().for_each(|from| tile.take(from));
+        tile
+    };
+    places.iter().map(take).collect()
 }
 
 /// What the owners gathered.
@@ -332,6 +349,7 @@ fn spread(owners: &[Owner], bounds: PixelBounds, side: u32) -> Vec<Tile> {
 struct Job<'a> {
     options: &'a RenderOptions,
     taker: Taker<'a>,
+    pixels: u64,
     /// When pixels have enough, if not at the number of samples alone.
     adaptive: Option<Adaptive>,
     deadline: Option<Instant>,
@@ -396,6 +414,12 @@ impl Owner {
 }
 
 impl Job<'_> {
+    /// Whether the squares of this side must stop. The clock does not stop the first, and no few: see [`UNSTOPPED`].
+    fn must_stop_at(&self, side: u32) -> bool {
+        let count = self.pixels.div_ceil(u64::from(side) * u64::from(side));
+        if side == STRIDES[0] || count <= UNSTOPPED { self.cancel.is_cancelled() } else { self.must_stop() }
+    }
+
     fn must_stop(&self) -> bool {
         self.cancel.is_cancelled() || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
@@ -411,7 +435,7 @@ impl Job<'_> {
             (x - corner.0).is_multiple_of(side) && (y - corner.1).is_multiple_of(side)
         };
         let is_new = |x, y| starts(x, y, side) && !last.is_some_and(|last| starts(x, y, last));
-        if self.take(owner, 0..1, is_new) {
+        if self.take(owner, 0..1, is_new, || self.must_stop_at(side)) {
             owner.next_side = side;
         }
     }
@@ -429,7 +453,7 @@ impl Job<'_> {
             if let Some(adaptive) = &self.adaptive {
                 next = next.min(adaptive.next_look(first));
             }
-            if !self.take(owner, first..next, |_, _| true) {
+            if !self.take(owner, first..next, |_, _| true, || self.must_stop()) {
                 return;
             }
             first = next;
@@ -437,7 +461,13 @@ impl Job<'_> {
     }
 
     /// Takes samples of those pixels of a tile that have none of these numbers yet and need them; false where it had to stop before.
-    fn take(&self, owner: &mut Owner, numbers: Range<u32>, is_wanted: impl Fn(u32, u32) -> bool) -> bool {
+    fn take(
+        &self,
+        owner: &mut Owner,
+        numbers: Range<u32>,
+        is_wanted: impl Fn(u32, u32) -> bool,
+        must_stop: impl Fn() -> bool,
+    ) -> bool {
         let mut ids = Vec::new();
         for number in numbers {
             for (x, y) in owner.tile.bounds().pixels() {
@@ -453,7 +483,7 @@ impl Job<'_> {
             return true;
         }
         // However short the time between two pauses, some work is done.
-        if self.must_stop() || (owner.has_worked && self.is_paused()) {
+        if must_stop() || (owner.has_worked && self.is_paused()) {
             owner.has_worked = false;
             return false;
         }

@@ -7,11 +7,12 @@ use lumbre_math::DVec2;
 use lumbre_scene::{FilmDesc, FilterDesc, IntegratorDesc, IntegratorKind, SamplerDesc, Scene};
 
 use crate::RenderError;
-use crate::denoise::BYTES_A_PIXEL;
+use crate::denoise;
 use crate::film::{
     Exposure, FeatureSums, Filter, FilterShape, GuideSums, MAX_PIXELS, Pixel, PixelBounds, Tint,
 };
 use crate::neighbourhoods::Known;
+use crate::workers::Workers;
 
 /// Everything about a picture that is not in the scene.
 ///
@@ -45,7 +46,7 @@ pub struct RenderOptions {
     pub first_sample: u32,
     /// Whether to gather albedo, normals, depth and uv too.
     pub features: bool,
-    /// Whether to gather what [`crate::denoise`] wants to know, with the features. The picture is the same.
+    /// Whether to gather what [`crate::denoise`] wants to know. The picture is the same.
     pub guides: bool,
     /// Threads; 0 for one a core.
     pub threads: usize,
@@ -195,18 +196,20 @@ impl RenderOptions {
             // Coverage by colour, and the alpha and the coverage of the picture.
             each += size_of::<Tint>() + size_of::<f32>() + size_of::<Rgb>();
         }
-        if self.guides {
-            // In the film, in the picture, and taken apart for the filter.
-            each += 2 * size_of::<GuideSums>() + BYTES_A_PIXEL;
-        }
-        if self.features || self.guides {
+        if self.features {
             each += size_of::<FeatureSums>() + 4 * size_of::<Rgb>();
+        }
+        let pixels = self.bounds()?.area();
+        let mut all = pixels.saturating_mul(each as u64);
+        if self.guides {
+            all = all.saturating_add(pixels.saturating_mul(size_of::<GuideSums>() as u64));
+            all = all.saturating_add(denoise::memory_bytes(pixels, Workers::wanted(self.threads)));
         }
         let photons = match self.integrator.kind {
             IntegratorKind::Caustics => crate::caustics::memory_bytes(self.width, self.height),
             _ => 0,
         };
-        Ok(self.bounds()?.area().saturating_mul(each as u64).saturating_add(photons))
+        Ok(all.saturating_add(photons))
     }
 
     pub(crate) fn pixel_filter(&self) -> Result<Filter, RenderError> {

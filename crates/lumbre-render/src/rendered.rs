@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::film::{Extras, FeatureSums, GuideSums, MAX_SAMPLE, Pixel, PixelBounds, Tile};
+use crate::film::{Extras, FeatureSums, Guides, MAX_SAMPLE, Pixel, PixelBounds, Tile};
 use crate::transport::{Feature, RayCounts};
 use lumbre_image::{Image, Rgb};
 
@@ -20,8 +20,8 @@ pub struct Rendered {
     pub bounds: PixelBounds,
     /// Feature images, if they were asked for: albedo, normal (with signs), depth, uv (in red and green).
     pub features: Vec<(Feature, Image)>,
-    /// What a denoiser wants to know of every pixel, row by row, if it was asked for.
-    pub guides: Option<Vec<GuideSums>>,
+    /// What a denoiser wants to know of every pixel, if it was asked for.
+    pub guides: Option<Guides>,
     /// What it took.
     pub stats: Stats,
 }
@@ -104,7 +104,7 @@ pub(crate) fn rendered_of<'t>(
         coverage: coverage_picture(tiles.clone(), bounds),
         bounds,
         features: wanted.iter().map(|&f| (f, feature_picture(tiles.clone(), bounds, f))).collect(),
-        guides: extras.guides.then(|| guides(tiles, bounds)),
+        guides: extras.guides.then(|| Guides::new(tiles)),
         stats: Stats::default(),
     }
 }
@@ -159,11 +159,6 @@ pub(crate) fn variance_picture<'t>(tiles: impl Iterator<Item = &'t Tile>, bounds
     let variances =
         |tile: &'t Tile| tile.pixels().iter().map(move |pixel| Rgb::splat(variance(pixel) as f32));
     image_of(bounds, put_together(tiles, bounds, Rgb::BLACK, variances))
-}
-
-/// What a denoiser wants to know of every pixel.
-pub(crate) fn guides<'t>(tiles: impl Iterator<Item = &'t Tile>, bounds: PixelBounds) -> Vec<GuideSums> {
-    put_together(tiles, bounds, GuideSums::default(), |tile| tile.guides().iter().copied())
 }
 
 /// The values of all pixels, row by row, from those of tiles; `none` where there is no tile.

@@ -12,10 +12,7 @@ pub(crate) struct Workers {
 impl Workers {
     /// So many threads; 0 for one a core.
     pub(crate) fn start(threads: usize) -> Self {
-        let wanted = match threads {
-            0 => std::thread::available_parallelism().map_or(1, usize::from),
-            threads => threads,
-        };
+        let wanted = Self::wanted(threads);
         // The first try lets rayon look at its environment, too.
         let mut count = threads;
         loop {
@@ -27,6 +24,14 @@ impl Workers {
             if count == 0 {
                 return Self { pool: None, refused: wanted - 1 };
             }
+        }
+    }
+
+    /// How many are asked for: 0 is one a core.
+    pub(crate) fn wanted(threads: usize) -> usize {
+        match threads {
+            0 => std::thread::available_parallelism().map_or(1, usize::from),
+            threads => threads,
         }
     }
 

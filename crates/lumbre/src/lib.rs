@@ -28,6 +28,7 @@
 mod background;
 mod builder;
 mod cast;
+mod colour;
 pub mod description;
 mod error;
 mod files;
@@ -49,6 +50,7 @@ pub use lumbre_shading as shading;
 pub use background::Background;
 pub use builder::{SceneBuilder, ShapeBuilder};
 pub use cast::{CastHit, CastPoint};
+pub use colour::{colour, colour_names};
 pub use error::{Error, ErrorKind};
 pub use files::{SaveOptions, read_image, read_image_from, read_image_within, write_image};
 pub use info::{SceneInfo, predicted_build_bytes};

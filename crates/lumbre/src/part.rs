@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use lumbre_formats::image::ImageFormat;
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::{Error, Picture, SaveOptions, in_words};
 
 /// What a part file begins with.
-const MAGIC: &[u8] = b"LUMBRE PART 2\n";
+const MAGIC: &[u8] = b"LUMBRE PART 3\n";
 /// What an .exr ends with that holds a part, after the length of the part as eight bytes.
 const TRAILER: &[u8] = b"LUMBREPT";
 /// Bytes of a checksum.
@@ -163,19 +163,67 @@ pub enum PartError {
     Invalid(String),
 }
 
+/// Hashes what passes through.
+struct Hashed<T> {
+    inner: T,
+    hasher: blake3::Hasher,
+    /// Bytes.
+    length: u64,
+}
+
+impl<T> Hashed<T> {
+    fn new(inner: T) -> Self {
+        Self { inner, hasher: blake3::Hasher::new(), length: 0 }
+    }
+
+    fn count(&mut self, bytes: &[u8]) {
+        self.hasher.update(bytes);
+        self.length += bytes.len() as u64;
+    }
+}
+
+impl<W: Write> Write for Hashed<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let count = self.inner.write(bytes)?;
+        self.count(&bytes[..count]);
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.inner.flush()
+    }
+}
+
+impl<R: Read> Read for Hashed<R> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        let count = self.inner.read(bytes)?;
+        self.count(&bytes[..count]);
+        Ok(count)
+    }
+}
+
 impl Part {
+    /// Writes the bytes of a file of its own, and says how many. The sums are dropped as they are written, unless others share them.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write_to(self, out: &mut dyn Write) -> io::Result<u64> {
+        let head = serde_json::to_vec(&self.job).unwrap_or_default();
+        let mut out = Hashed::new(out);
+        out.write_all(MAGIC)?;
+        out.write_all(&(head.len() as u64).to_le_bytes())?;
+        out.write_all(&head)?;
+        self.state.write_to(&mut out)?;
+        let checksum = out.hasher.finalize();
+        out.write_all(checksum.as_bytes())?;
+        Ok(out.length)
+    }
+
     /// The bytes of a file of its own.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let head = serde_json::to_vec(&self.job).unwrap_or_default();
-        let state = self.state.to_bytes();
-        let mut out = Vec::with_capacity(MAGIC.len() + 8 + head.len() + state.len() + CHECKSUM);
-        out.extend(MAGIC);
-        out.extend((head.len() as u64).to_le_bytes());
-        out.extend(head);
-        out.extend(state);
-        let checksum = blake3::hash(&out);
-        out.extend(checksum.as_bytes());
-        out
+        let mut bytes = Vec::new();
+        self.clone().write_to(&mut bytes).expect("memory takes all bytes");
+        bytes
     }
 
     /// The part of bytes, which may take so many bytes of memory.
@@ -183,21 +231,59 @@ impl Part {
     /// # Errors
     /// [`PartError`].
     pub fn from_bytes(bytes: &[u8], most_memory: u64) -> Result<Self, PartError> {
-        let Some(rest) = bytes.strip_prefix(MAGIC) else {
-            let is_of_another_version = bytes.starts_with(&MAGIC[..MAGIC.len() - 2]);
-            return Err(if is_of_another_version { PartError::Version } else { PartError::NoPart });
+        Self::read_from(&mut &bytes[..], bytes.len() as u64, most_memory)
+    }
+
+    /// Reads so many bytes, which may take so many bytes of memory. What is damaged is called that, and not what it seems to say.
+    fn read_from(input: &mut dyn Read, length: u64, most_memory: u64) -> Result<Self, PartError> {
+        let Some(body) = length.checked_sub(CHECKSUM as u64) else {
+            let mut begin = vec![0; length as usize];
+            input.read_exact(&mut begin)?;
+            return Err(if begin.starts_with(MAGIC) { PartError::Damaged } else { PartError::NoPart });
         };
-        let (body, checksum) = bytes.split_last_chunk::<CHECKSUM>().ok_or(PartError::Damaged)?;
-        if blake3::hash(body).as_bytes() != checksum || rest.len() < CHECKSUM + 8 {
+        let mut hashed = Hashed::new(input.take(body));
+        let read = Self::read_body(&mut hashed, body, most_memory);
+        if let Err(PartError::NoPart | PartError::Version | PartError::TooLarge { .. } | PartError::Io(_)) =
+            read
+        {
+            return read;
+        }
+        let at_end = hashed.length == body;
+        io::copy(&mut hashed, &mut io::sink())?;
+        let checksum = hashed.hasher.finalize();
+        let mut expected = [0; CHECKSUM];
+        input.read_exact(&mut expected)?;
+        match read {
+            _ if checksum.as_bytes() != &expected => Err(PartError::Damaged),
+            Ok(_) if !at_end => Err(PartError::Invalid("more follows than its head says".to_owned())),
+            read => read,
+        }
+    }
+
+    /// Reads what stands before the checksum.
+    fn read_body(input: &mut dyn Read, length: u64, most_memory: u64) -> Result<Self, PartError> {
+        let mut begin = vec![0; MAGIC.len()];
+        if length < MAGIC.len() as u64 {
+            return Err(PartError::NoPart);
+        }
+        input.read_exact(&mut begin)?;
+        if begin != MAGIC {
+            let is_of_another_version = begin[..MAGIC.len() - 2] == MAGIC[..MAGIC.len() - 2];
+            return Err(if is_of_another_version { PartError::Version } else { PartError::NoPart });
+        }
+        let invalid = |e: &dyn std::fmt::Display| PartError::Invalid(e.to_string());
+        let mut count = [0; 8];
+        input.read_exact(&mut count).map_err(|_| PartError::Damaged)?;
+        let count = u64::from_le_bytes(count);
+        if count > length {
             return Err(PartError::Damaged);
         }
-        let (length, rest) = rest[..rest.len() - CHECKSUM].split_first_chunk().ok_or(PartError::Damaged)?;
-        let length = usize::try_from(u64::from_le_bytes(*length)).map_err(|_| PartError::Damaged)?;
-        let (head, state) = rest.split_at_checked(length).ok_or(PartError::Damaged)?;
-        let invalid = |e: &dyn std::fmt::Display| PartError::Invalid(e.to_string());
-        let job = serde_json::from_slice(head).map_err(|e| invalid(&e))?;
-        let state = RenderState::from_bytes(state, most_memory).map_err(|e| match e {
+        let mut head = Vec::new();
+        input.take(count).read_to_end(&mut head)?;
+        let job: Job = serde_json::from_slice(&head).map_err(|e| invalid(&e))?;
+        let state = RenderState::read_from(input, most_memory).map_err(|e| match e {
             StateError::TooLarge { needed } => PartError::TooLarge { needed, limit: most_memory },
+            StateError::Io(error) => PartError::Io(error),
             other => invalid(&other),
         })?;
         let part = Self { job, state };
@@ -228,15 +314,8 @@ impl Part {
         })?;
         let most_memory = most_memory(size);
         let (start, length) = place(&mut file, size)?;
-        if length > most_memory {
-            return Err(PartError::TooLarge { needed: length, limit: most_memory });
-        }
-        let mut bytes = Vec::new();
-        let room = usize::try_from(length).ok().and_then(|length| bytes.try_reserve_exact(length).ok());
-        room.ok_or(PartError::TooLarge { needed: length, limit: most_memory })?;
         file.seek(SeekFrom::Start(start))?;
-        file.take(length).read_to_end(&mut bytes)?;
-        Self::from_bytes(&bytes, most_memory)
+        Self::read_from(&mut io::BufReader::with_capacity(256 << 10, file), length, most_memory)
     }
 
     /// Whether a file holds a part, by how it begins and ends.
@@ -255,8 +334,15 @@ impl Part {
     /// # Errors
     /// [`Error::Format`].
     pub fn save(&self, path: &Path) -> Result<(), Error> {
-        let bytes = self.to_bytes();
-        Ok(atomic_write(path, |file| file.write_all(&bytes))?)
+        self.clone().save_as(path)
+    }
+
+    /// [`Part::save`], which drops the sums as they are written, unless others share them.
+    ///
+    /// # Errors
+    /// [`Error::Format`].
+    pub fn save_as(self, path: &Path) -> Result<(), Error> {
+        Ok(atomic_write(path, |file| self.write_to(file).map(drop))?)
     }
 
     /// The picture of its samples.
@@ -304,12 +390,12 @@ impl Picture {
         layers: &[crate::Feature],
         part: &Part,
     ) -> Result<(), Error> {
-        let mut bytes = self.encode(ImageFormat::Exr, options, layers)?;
-        let part = part.to_bytes();
-        let length = (part.len() as u64).to_le_bytes();
-        bytes.extend(part);
-        bytes.extend(length);
-        bytes.extend(TRAILER);
-        Ok(atomic_write(path, |file| file.write_all(&bytes))?)
+        let picture = self.encode(ImageFormat::Exr, options, layers)?;
+        Ok(atomic_write(path, |file| {
+            file.write_all(&picture)?;
+            let length = part.clone().write_to(file)?;
+            file.write_all(&length.to_le_bytes())?;
+            file.write_all(TRAILER)
+        })?)
     }
 }

@@ -4,13 +4,15 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use lumbre_formats::diagnostic::{nearest_name, number, quoted};
-use lumbre_image::{Rgb, srgb_to_linear};
+use lumbre_image::Rgb;
 use lumbre_math::DVec3;
 use lumbre_scene::{Camera, CameraKind, FilmDesc, GeometryDesc, LightDesc, SceneDesc, ShapeDesc};
 use lumbre_shading::hair::HairColour;
 use lumbre_shading::{
     FloatTexture, Material, MaterialKind, Metal, PrincipledParams, Roughness, SpectrumTexture, Texture,
 };
+
+use crate::colour;
 
 /// A value for a parameter of a description, whatever format it was read from. Texts are
 ///
@@ -19,7 +21,7 @@ use lumbre_shading::{
 /// - `camera.NAME.PARAM=VALUE`, or `camera.PARAM=VALUE` of all cameras;
 /// - `film.PARAM=VALUE`, of the parameters of the scene language, and `film.exposure` of all that the exposure is multiplied from.
 ///
-/// Values are numbers, colours (one number, three with commas between, or `#rrggbb` in sRGB) or points. A parameter that is not
+/// Values are numbers, colours (one number, three with commas between, a name such as `red`, or `#rrggbb` in sRGB) or points. A parameter that is not
 /// there is answered with those that are.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
@@ -325,13 +327,10 @@ impl Setting {
         if let Some([grey]) = self.numbers(range) {
             return Ok(Rgb::splat(grey as f32));
         }
-        let digits =
-            self.value.strip_prefix('#').filter(|digits| digits.len() == 6 && !digits.starts_with('+'));
-        if let Some(code) = digits.and_then(|digits| u32::from_str_radix(digits, 16).ok()) {
-            let channel = |shift: u32| srgb_to_linear((code >> shift & 0xff) as f32 / 255.0);
-            return Ok(Rgb::new(channel(16), channel(8), channel(0)));
+        if let Some(colour) = colour(&self.value) {
+            return Ok(colour);
         }
-        Err(self.refused(&format!("{}, three of them or a colour such as #e8e0d8", range.said())))
+        Err(self.refused(&format!("{}, three of them or a colour such as red or #e8e0d8", range.said())))
     }
 
     /// So many numbers in the range, if the value is these.

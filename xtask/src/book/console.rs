@@ -1,16 +1,21 @@
-//! Live examples: the commands of a page are run, and what they print is shown below each.
+//! Live examples: the commands of a page are run, and what they print stands below each, in the page itself.
 
 use std::path::Path;
 use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-/// What is said of a block in the line that opens it: `console` or `console,head=20`.
+/// What is said of a block in the line that opens it: `console`, `console,head=20` or `console,varies`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Example {
     /// How many lines of each output are shown, if not all.
     head: Option<usize>,
+    /// Whether the numbers of an output are others each time, as times are.
+    varies: bool,
 }
+
+/// How a command ends that has to fail.
+const FAILS: &str = "# fails";
 
 impl Example {
     /// `None` for blocks of other kinds.
@@ -19,17 +24,24 @@ impl Example {
         if words.next() != Some("console") {
             return Ok(None);
         }
-        let mut head = None;
+        let mut example = Self { head: None, varies: false };
         for word in words {
             match word.strip_prefix("head=").and_then(|number| number.parse().ok()) {
-                Some(lines) => head = Some(lines),
-                None => bail!("{word} says nothing of an example: head=NUMBER does"),
+                Some(lines) => example.head = Some(lines),
+                None if word == "varies" => example.varies = true,
+                None => bail!("{word} says nothing of an example: head=NUMBER and varies do"),
             }
         }
-        Ok(Some(Self { head }))
+        Ok(Some(example))
     }
 
-    /// The commands with what they print, or which line (from 0) is wrong and why.
+    /// Whether one run of the example shows the same as another.
+    pub(crate) fn is_same(self, shown: &str, other: &str) -> bool {
+        shown == other || (self.varies && without_numbers(shown) == without_numbers(other))
+    }
+
+    /// The commands with what they print, or which line (from 0) is wrong and why. What `text` has between its commands is what they printed
+    /// before.
     pub(crate) fn run(
         self,
         text: &str,
@@ -37,7 +49,11 @@ impl Example {
         program: &Path,
     ) -> Result<String, (usize, anyhow::Error)> {
         let mut shown = String::new();
-        for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+        let starts = |line: &str| line.starts_with("$ ");
+        if !text.trim_start().starts_with("$ ") {
+            return Err((0, anyhow::anyhow!("an example begins with a command, after $")));
+        }
+        for (number, line) in text.lines().enumerate().filter(|(_, line)| starts(line)) {
             if !shown.is_empty() {
                 shown.push('\n');
             }
@@ -48,11 +64,8 @@ impl Example {
     }
 
     fn run_line(self, line: &str, folder: &Path, program: &Path) -> Result<String> {
-        let (command, must_fail) = match (line.strip_prefix("$ "), line.strip_prefix("$! ")) {
-            (Some(command), _) => (command, false),
-            (_, Some(command)) => (command, true),
-            _ => bail!("an example holds only commands, each after $ or, where it has to fail, after $!"),
-        };
+        let command = line.strip_prefix("$ ").context("a command stands after $")?;
+        let must_fail = command.ends_with(FAILS);
         // A function in place of a folder of the path, as the program may have any name.
         let script = format!("lumbre() {{ \"$LUMBRE_PROGRAM\" \"$@\"; }}\nexec 2>&1\n{command}");
         let output = Command::new("sh")
@@ -76,6 +89,7 @@ impl Example {
         let most = self.head.unwrap_or(usize::MAX);
         let mut shown = format!("$ {command}\n");
         for line in lines.iter().take(most) {
+            anyhow::ensure!(!line.starts_with("$ "), "{command} prints {line}, which looks like a command");
             shown.push_str(line);
             shown.push('\n');
         }
@@ -84,6 +98,21 @@ impl Example {
         }
         Ok(shown)
     }
+}
+
+/// A text with a mark in place of each number.
+fn without_numbers(text: &str) -> String {
+    let mut result = String::new();
+    let mut characters = text.chars().peekable();
+    while let Some(character) = characters.next() {
+        if !character.is_ascii_digit() {
+            result.push(character);
+            continue;
+        }
+        result.push('#');
+        while characters.next_if(|c| c.is_ascii_digit() || matches!(c, '.' | 'e' | '-')).is_some() {}
+    }
+    result
 }
 
 #[cfg(all(test, unix))]
@@ -97,18 +126,31 @@ mod tests {
 
     #[test]
     fn what_a_command_prints_stands_below_it() {
-        let shown = run("console", "$ lumbre a 'b  c'\n$! lumbre d; false\n").expect("both as they should");
-        assert_eq!(shown, "$ lumbre a 'b  c'\na b  c\n\n$ lumbre d; false\nd\n");
+        let expected = "$ lumbre a 'b  c'\na b  c\n\n$ lumbre d; false # fails\nd\n";
+        let commands = "$ lumbre a 'b  c'\n$ lumbre d; false # fails\n";
+        for text in [commands, expected] {
+            assert_eq!(run("console", text).expect("both as they should"), expected);
+        }
         let cut = run("console,head=2", "$ printf '1\\n2\\n3\\n'").expect("it prints");
         assert_eq!(cut, "$ printf '1\\n2\\n3\\n'\n1\n2\n…\n");
     }
 
     #[test]
     fn what_fails_or_should_have_is_named_with_its_line() {
-        for text in ["\n$ false", "\n$! true", "\n$ exit 101", "\n$! exit 101", "\n$! kill $$", "\nlumbre"] {
-            assert_eq!(run("console", text).expect_err(text).0, 1, "{text}");
+        for text in ["false", "true # fails", "exit 101", "exit 101 # fails", "kill $$ # fails", "echo '$ a'"]
+        {
+            assert_eq!(run("console", &format!("\n$ {text}")).expect_err(text).0, 1, "{text}");
         }
+        assert_eq!(run("console", "lumbre").expect_err("no command").0, 0);
         assert_eq!(Example::from_info("rust").expect("another kind"), None);
         assert!(Example::from_info("console,tail=3").is_err());
+    }
+
+    #[test]
+    fn times_are_other_numbers_where_that_is_said() {
+        let example = |info| Example::from_info(info).expect("known words").expect("an example");
+        let (one, other) = ("a 1.25 s, 3 pixels", "a 12e-3 s, 3 pixels");
+        assert!(example("console,varies").is_same(one, other) && !example("console").is_same(one, other));
+        assert!(!example("console,varies").is_same(one, "a 1.25 s, 3 rays"));
     }
 }

@@ -1,6 +1,8 @@
-//! Pages as mdbook takes them: formulas become MathML, examples are run, pictures rendered, and links that leave the book lead to the
-//! repository.
+//! Pages as they are read in the repository, and as mdbook takes them: files that they show and what their examples print are up to date in
+//! both; for mdbook formulas become MathML, pictures are rendered, and links that leave the book lead to the repository.
 
+use std::borrow::Cow;
+use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::fs;
@@ -13,8 +15,8 @@ use pulldown_cmark::{CodeBlockKind, CowStr, Event, Options, Parser, Tag};
 use crate::files;
 
 use super::console::Example;
-use super::picture::Pictures;
-use super::{PAGES, formula};
+use super::picture::{Kept, Pictures};
+use super::{PAGES, formula, include};
 
 /// Where the sources are to be seen.
 const REPOSITORY: &str = env!("CARGO_PKG_REPOSITORY");
@@ -28,6 +30,12 @@ struct Change {
     text: String,
 }
 
+/// A page as it is to stand in the repository, and as mdbook takes it.
+struct Prepared {
+    kept: String,
+    book: String,
+}
+
 /// Prepares the pages of a copy of what the book is made of.
 #[derive(Debug)]
 pub(crate) struct Preparer<'a> {
@@ -37,6 +45,10 @@ pub(crate) struct Preparer<'a> {
     copy: &'a Path,
     program: &'a Path,
     pictures: Pictures<'a>,
+    /// The small pictures of the repository.
+    kept: RefCell<Kept>,
+    /// Whether the repository is brought up to date, and nothing else.
+    update: bool,
 }
 
 impl<'a> Preparer<'a> {
@@ -44,13 +56,17 @@ impl<'a> Preparer<'a> {
         root: &'a Path,
         copy: &'a Path,
         program: &'a Path,
-        kept: &'a Path,
+        rendered: &'a Path,
         quick: bool,
-    ) -> Self {
-        Self { root, copy, program, pictures: Pictures { program, kept, quick } }
+        update: bool,
+    ) -> Result<Self> {
+        let pictures = Pictures { program, kept: rendered, quick };
+        let kept = RefCell::new(Kept::read(&root.join(PAGES))?);
+        Ok(Self { root, copy, program, pictures, kept, update })
     }
 
-    /// Prepares every page, and says all that is wrong in them.
+    /// Prepares every page, and says all that is wrong in them: also where the page of the repository is not up to date, unless it is brought up
+    /// to date.
     pub(crate) fn prepare_all(&self) -> Result<Vec<Fault>> {
         let folder = self.copy.join(PAGES);
         let mut faults = Vec::new();
@@ -66,15 +82,36 @@ impl<'a> Preparer<'a> {
             }
             let text =
                 fs::read_to_string(&page).with_context(|| format!("cannot read {}", page.display()))?;
-            let prepared = self.prepare(&name, &text, &mut faults)?;
-            fs::write(&page, prepared).with_context(|| format!("cannot write {}", page.display()))?;
+            let Prepared { kept, book } = self.prepare(&name, &text, &mut faults)?;
+            fs::write(&page, book).with_context(|| format!("cannot write {}", page.display()))?;
+            if kept != text && self.update {
+                let original = self.root.join(&name);
+                fs::write(&original, kept).with_context(|| format!("cannot write {}", original.display()))?;
+            } else if let Some(line) = first_difference(&text, &kept) {
+                faults.push(format!("{}:{line}: not up to date (cargo xtask book --update)", name.display()));
+            }
+        }
+        if self.update {
+            self.kept.borrow().write(&self.root.join(PAGES))?;
         }
         Ok(faults)
     }
 
     /// The page of this name, relative to the root, prepared.
-    fn prepare(&self, name: &Path, text: &str, faults: &mut Vec<Fault>) -> Result<String> {
+    fn prepare(&self, name: &Path, text: &str, faults: &mut Vec<Fault>) -> Result<Prepared> {
+        // Their lines may be others then: what is wrong is said with that of the page that was read.
+        let folder = self.copy.join(name);
+        let text = match include::expanded(name, folder.parent().unwrap_or(&folder), text) {
+            Ok(expanded) => Cow::Owned(expanded),
+            Err(error) => {
+                faults.push(format!("{error:#}"));
+                Cow::Borrowed(text)
+            }
+        };
+        let text = &*text;
         let mut changes = Vec::new();
+        // What is shown by examples, which is to stand in the repository, too.
+        let mut shown_there = Vec::new();
         let mut say = |at: usize, error: &anyhow::Error| {
             let line = 1 + text[..at].matches('\n').count();
             faults.push(format!("{}:{line}: {error:#}", name.display()));
@@ -101,7 +138,18 @@ impl<'a> Preparer<'a> {
                     Some((example, place, commands)) => {
                         let folder = self.copy.join(PAGES);
                         match example.run(&commands, &folder, self.program) {
-                            Ok(shown) => Ok(Some(fenced(&shown, text, &place))),
+                            Ok(shown) => {
+                                let commands = commands.trim_end();
+                                let is_same = example.is_same(commands, shown.trim_end());
+                                let shown = if is_same { commands } else { &shown };
+                                let info = text[place.clone()].lines().next().unwrap_or_default();
+                                let info = info.trim_start_matches('`');
+                                shown_there.push(Change {
+                                    place: place.clone(),
+                                    text: fenced(shown, info, text, &place),
+                                });
+                                Ok(Some(fenced(shown, "console", text, &place)))
+                            }
                             Err((number, error)) => {
                                 let lines = text[place.clone()].split_inclusive('\n').take(number + 1);
                                 say(place.start + lines.map(str::len).sum::<usize>(), &error);
@@ -125,16 +173,10 @@ impl<'a> Preparer<'a> {
                 Err(error) => say(place.start, &error),
             }
         }
-        // mdbook would say which file, and not where.
-        for (at, _) in text.match_indices("{{#include ") {
-            let named =
-                text[at..].trim_start_matches("{{#include ").split(['}', ':']).next().unwrap_or_default();
-            let file = self.copy.join(name).with_file_name(named.trim());
-            if !file.is_file() {
-                say(at, &anyhow::anyhow!("there is no {named} to be included"));
-            }
+        if let Some(at) = text.find("{{#include ") {
+            say(at, &anyhow::anyhow!("an include that stands in no block of code by itself"));
         }
-        Ok(changed(text, &changes))
+        Ok(Prepared { kept: changed(text, &shown_there), book: changed(text, &changes) })
     }
 
     /// Renders a picture that has its scene beside it, and takes in one from outside the pages. Where it is then, if not where it was.
@@ -143,10 +185,19 @@ impl<'a> Preparer<'a> {
         let (from, to) = (self.root.join(&file), self.copy.join(&file));
         let scene = to.with_extension("pbrt");
         if file.starts_with(PAGES) {
-            if !from.exists() && scene.exists() && file.extension() == Some(OsStr::new("png")) {
+            if scene.exists() && file.extension() == Some(OsStr::new("png")) {
+                let name = file.strip_prefix(PAGES)?;
+                let mut kept = self.kept.borrow_mut();
+                if self.update {
+                    kept.update(name, &scene, &from, self.program)?;
+                    return Ok(None);
+                }
+                let is_current = from.exists() && kept.is_current(name, &scene)?;
                 let picture = self.pictures.picture_of(&scene)?;
                 fs::copy(&picture, &to).with_context(|| format!("cannot copy {}", picture.display()))?;
+                anyhow::ensure!(is_current, "{link} is not of its scene (cargo xtask book --update)");
             }
+            anyhow::ensure!(from.exists(), "there is no picture {link}");
             return Ok(None);
         }
         let inside = Path::new("outside").join(&file);
@@ -203,8 +254,14 @@ fn relinked(markdown: &str, from: &str, to: Option<String>) -> Option<String> {
     Some(format!("{before}{}{after}", to?))
 }
 
+/// The first line that is another, from 1; `None` where there is none.
+fn first_difference(text: &str, other: &str) -> Option<usize> {
+    let same = text.lines().zip(other.lines()).take_while(|(a, b)| a == b).count();
+    (text != other).then_some(same + 1)
+}
+
 /// A block of code of what was shown, indented as the one that it replaces.
-fn fenced(shown: &str, text: &str, place: &Range<usize>) -> String {
+fn fenced(shown: &str, info: &str, text: &str, place: &Range<usize>) -> String {
     let line = text[..place.start].rfind('\n').map_or(0, |end| end + 1);
     let indent = " ".repeat(text[line..place.start].chars().count());
     let mut longest = 2;
@@ -212,7 +269,7 @@ fn fenced(shown: &str, text: &str, place: &Range<usize>) -> String {
         longest = longest.max(run.len());
     }
     let fence = "`".repeat(longest + 1);
-    let mut block = format!("{fence}console\n");
+    let mut block = format!("{fence}{info}\n");
     for line in shown.lines() {
         block.push_str(if line.is_empty() { "" } else { &indent });
         block.push_str(line);
@@ -242,7 +299,7 @@ fn changed(text: &str, changes: &[Change]) -> String {
 mod tests {
     use super::*;
 
-    fn prepared(text: &str) -> (String, Vec<Fault>) {
+    fn prepared(text: &str) -> (Prepared, Vec<Fault>) {
         let folder = tempfile::tempdir().expect("a folder");
         let (root, copy) = (folder.path().join("root"), folder.path().join("copy"));
         for folder in [&root, &copy] {
@@ -250,7 +307,8 @@ mod tests {
         }
         fs::write(root.join("seen.png"), "picture").expect("a file");
         let kept = folder.path().join("kept");
-        let preparer = Preparer::new(&root, &copy, Path::new("echo"), &kept, true);
+        let preparer =
+            Preparer::new(&root, &copy, Path::new("echo"), &kept, true, false).expect("nothing is kept");
         let mut faults = Vec::new();
         let page =
             preparer.prepare(Path::new("docs/more/page.md"), text, &mut faults).expect("it can be read");
@@ -260,8 +318,9 @@ mod tests {
     #[test]
     fn formulas_examples_and_links_are_replaced() {
         let page = "Cost `$x$` \\$5, $x$.\n\n1. one\n   ```console\n   $ lumbre `echo hi`\n   ```\n\n[a](../../seen.png) ![b](../../seen.png) [c](../d.md#e)\n";
-        let (page, faults) = prepared(page);
+        let (Prepared { kept, book: page }, faults) = prepared(page);
         assert_eq!(faults, [""; 0]);
+        assert!(kept.contains("   $ lumbre `echo hi`\n   hi\n   ```\n\n[a](../../seen.png)"), "{kept}");
         assert!(page.starts_with("Cost `$x$` \\$5, <math"), "{page}");
         assert!(page.contains("1. one\n   ```console\n   $ lumbre `echo hi`\n   hi\n   ```\n"), "{page}");
         assert!(page.contains("/blob/main/seen.png)"), "{page}");
@@ -271,13 +330,13 @@ mod tests {
     #[test]
     fn what_is_wrong_is_said_with_its_line() {
         let (_, faults) = prepared(
-            "one\n\n$\\nosuch$\n\n[a](../../none.md)\n\n```console\n$ true\n$ false\n```\n{{#include none}}",
+            "one\n\n$\\nosuch$\n\n[a](../../none.md)\n\n```console\n$ true\n\n$ false\n```\n{{#include none}}",
         );
         let places: Vec<&str> =
             faults.iter().map(|fault| fault.split(": ").next().unwrap_or_default()).collect();
         assert_eq!(
             places,
-            ["docs/more/page.md:3", "docs/more/page.md:5", "docs/more/page.md:9", "docs/more/page.md:11"],
+            ["docs/more/page.md:3", "docs/more/page.md:5", "docs/more/page.md:10", "docs/more/page.md:12"],
             "{faults:?}"
         );
     }

@@ -1,4 +1,5 @@
-//! Pictures of the book: each is rendered of the scene beside it, and again only where that or the program has changed.
+//! Pictures of the book: each is rendered of the scene beside it, and again only where that or the program has changed. The repository keeps
+//! them small, for those who read the pages there.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -50,6 +51,97 @@ impl Pictures<'_> {
     }
 }
 
+/// Pixels across of a picture that the repository keeps, and samples of each.
+const SMALL: u32 = 256;
+const SMALL_SPP: &str = "16";
+/// The file that says of which scenes the small pictures are, in the folder of the pages.
+const SUMS: &str = "pictures.sums";
+
+/// The small pictures of the repository: by name the sum of the scene that each was rendered of.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(crate) struct Kept {
+    sums: BTreeMap<String, String>,
+}
+
+impl Kept {
+    /// Reads which there are.
+    pub(crate) fn read(pages: &Path) -> Result<Self> {
+        let file = pages.join(SUMS);
+        let text = match fs::read_to_string(&file) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
+            Err(error) => return Err(error).with_context(|| format!("cannot read {}", file.display())),
+        };
+        let line = |line: &str| line.split_once(' ').map(|(sum, name)| (name.to_owned(), sum.to_owned()));
+        Ok(Self { sums: text.lines().filter_map(line).collect() })
+    }
+
+    /// Says which there are.
+    pub(crate) fn write(&self, pages: &Path) -> Result<()> {
+        let lines = self.sums.iter().map(|(name, sum)| format!("{sum} {name}\n"));
+        let file = pages.join(SUMS);
+        fs::write(&file, lines.collect::<String>())
+            .with_context(|| format!("cannot write {}", file.display()))
+    }
+
+    /// Whether the picture of this name is of this scene as it is now.
+    pub(crate) fn is_current(&self, name: &Path, scene: &Path) -> Result<bool> {
+        Ok(self.sums.get(&slashed(name)) == Some(&sum(scene)?))
+    }
+
+    /// Renders the picture of this name into a file, unless it is current: as large as [`SMALL`], without noise.
+    pub(crate) fn update(&mut self, name: &Path, scene: &Path, to: &Path, program: &Path) -> Result<()> {
+        if to.exists() && self.is_current(name, scene)? {
+            return Ok(());
+        }
+        let mut files = BTreeMap::new();
+        read_with_named(scene, &mut files)?;
+        let side = |name| files.values().find_map(|text| number_after(text, name));
+        let (width, height) = (side("xresolution").unwrap_or(1280), side("yresolution").unwrap_or(720));
+        let small = width.min(SMALL);
+        let size = format!("{small}x{}", (height * small).div_ceil(width));
+        // A picture of normals and the like has no noise, and is not denoised.
+        let mut said = String::new();
+        for denoiser in ["own", "none"] {
+            let output = Command::new(program)
+                .arg("render")
+                .arg(scene)
+                .args(["--progress", "none", "--no-checkpoint", "--size", &size, "--spp", SMALL_SPP])
+                .args(["--denoise", denoiser, "-o"])
+                .arg(to)
+                .output()
+                .context("cannot start the program")?;
+            if output.status.success() {
+                eprintln!("{}", to.display());
+                self.sums.insert(slashed(name), sum(scene)?);
+                return Ok(());
+            }
+            said = String::from_utf8_lossy(&output.stderr).into_owned();
+        }
+        bail!("{}: {}", scene.display(), said.trim_end())
+    }
+}
+
+/// A name of a file as it is on all systems.
+fn slashed(name: &Path) -> String {
+    name.to_string_lossy().replace('\\', "/")
+}
+
+/// A sum of all bytes of a scene and what it names (G. Fowler, L. C. Noll, K.-P. Vo, FNV-1a, 64 bits).
+fn sum(scene: &Path) -> Result<String> {
+    let mut files = BTreeMap::new();
+    read_with_named(scene, &mut files)?;
+    let mut sum = 0xcbf2_9ce4_8422_2325_u64;
+    let folder = scene.parent().unwrap_or(scene);
+    for (path, bytes) in &files {
+        let name = slashed(path.strip_prefix(folder).unwrap_or(path));
+        for byte in name.bytes().chain([0]).chain(bytes.iter().copied()) {
+            sum = (sum ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
+        }
+    }
+    Ok(format!("{sum:016x}"))
+}
+
 /// The bytes of a file, and of those that it names in quotes, relative to itself.
 fn read_with_named(file: &Path, files: &mut BTreeMap<PathBuf, Vec<u8>>) -> Result<()> {
     if files.contains_key(file) {
@@ -94,6 +186,14 @@ mod tests {
         read_with_named(&scene, &mut files).expect("both can be read");
         let names: Vec<_> = files.keys().filter_map(|path| path.file_name()?.to_str()).collect();
         assert_eq!(names, ["scene.pbrt", "studio.pbrt"]);
+        let before = sum(&scene).expect("both can be read");
+        let mut kept = Kept::default();
+        kept.sums.insert("sub/scene.png".to_owned(), before.clone());
+        kept.write(folder.path()).expect("it can be written");
+        let kept = Kept::read(folder.path()).expect("it is there");
+        assert!(kept.is_current(Path::new("sub/scene.png"), &scene).expect("both can be read"));
+        file("studio.pbrt", "Film \"rgb\" \"integer xresolution\" [ 320 ] ");
+        assert!(!kept.is_current(Path::new("sub/scene.png"), &scene).expect("both can be read"));
         let widths: Vec<_> = files.values().filter_map(|text| number_after(text, "xresolution")).collect();
         assert_eq!(widths, [320]);
     }

@@ -91,7 +91,7 @@ pub(crate) struct Arguments {
 #[derive(Args, Clone, Debug)]
 pub struct Request {
     /// The pixel, from 0,0 in the upper left corner.
-    #[arg(long, value_name = "X,Y", value_parser = pixel, required_unless_present = "ray")]
+    #[arg(long, value_name = "X,Y", value_parser = pixel)]
     pub pixel: Option<(u32, u32)>,
     /// A ray instead: its origin and its direction, of any length but 0; then, where it is not 0 to infinity, its range of t.
     #[arg(long, value_name = "OX,OY,OZ,DX,DY,DZ[,TMIN,TMAX]", allow_hyphen_values = true, value_parser = ray, conflicts_with = "pixel")]
@@ -171,6 +171,10 @@ fn ray(text: &str) -> Result<Ray, String> {
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.staging.turntable().is_some() {
         return Err(Failure::Usage("--turntable makes many pictures (expected no --turntable)".to_owned()));
+    }
+    if arguments.request.pixel.is_none() && arguments.request.ray.is_none() {
+        let why = "nothing is asked for (expected --pixel X,Y, from 0,0 in the upper left corner, or --ray OX,OY,OZ,DX,DY,DZ)";
+        return Err(Failure::Usage(why.to_owned()));
     }
     let named = arguments.scene.iter().map(PathBuf::as_path).chain(arguments.staging.inputs());
     if let Some(output) = &arguments.output {

@@ -41,7 +41,7 @@ fn read_both_ways<T>(
 type Check = fn(&[u8]);
 
 /// What reads each kind of file, by the name of its fuzz target.
-pub(crate) const CHECKS: [(&str, Check); 14] = [
+pub(crate) const CHECKS: [(&str, Check); 15] = [
     ("gltf", gltf::run),
     ("gltf_buffer", gltf_buffer::run),
     ("gltf_draco", gltf_draco::run),

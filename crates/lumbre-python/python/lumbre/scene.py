@@ -425,7 +425,7 @@ class Scene:
             What every pixel has before its noise may end it; by default 16, or up to 256 where most of the light comes by rare samples.
         transparent : leave out what is behind everything, and keep the coverage as `Image.alpha`
         features : gather albedo, normal, depth and uv as well, for `Image.feature`
-        denoise : take the noise out; by default only of a model without camera and light, where none of spp, time and noise is given
+        denoise : take the noise out; by default only in the light of the studio
         first_sample : index of the first sample of each pixel, for parts of a render
         progress : callable, or True
             Called as progress(samples, total, share) now and then on this thread; total is None while unknown. True shows a bar where

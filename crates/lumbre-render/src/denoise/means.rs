@@ -8,7 +8,6 @@ use std::ops::Range;
 use lumbre_simd::{InstructionSet, Job, Real};
 
 use crate::CancelToken;
-use crate::workers::Workers;
 
 /// A picture in two independent halves.
 pub(super) struct Layer {
@@ -20,6 +19,24 @@ pub(super) struct Layer {
     pub(super) variance: Vec<f32>,
     /// 1, or 0 where a half says nothing of the pixel.
     pub(super) known: [Vec<f32>; 2],
+}
+
+impl Layer {
+    /// Whether a half says something of every pixel.
+    fn is_known(&self, half: usize) -> bool {
+        self.known[half].iter().all(|&known| known == 1.0)
+    }
+
+    /// The values of all pixels that are known, if they are the same in both halves: nothing is to be filtered. Black where none is known.
+    fn constant(&self) -> Option<[f32; 3]> {
+        let known = |half: usize| {
+            let values = (0..self.width * self.height).filter(move |&i| self.known[half][i] == 1.0);
+            values.map(move |i| self.halves[half].each_ref().map(|plane| plane[i]))
+        };
+        let mut all = known(0).chain(known(1));
+        let first = all.next().unwrap_or_default();
+        all.all(|value| value == first).then_some(first)
+    }
 }
 
 /// What tells surfaces apart: a group is compared as one.
@@ -35,14 +52,13 @@ pub(super) struct Group {
 const RADIUS: isize = 8;
 /// Pixels to each side of one that are compared with those of another.
 const PATCH: usize = 3;
+/// Pixels beyond one that its mean depends on, by the layer and the groups.
+pub(super) const REACH: usize = RADIUS as usize + PATCH;
 /// The square of the number of standard deviations with which differences of light are compared.
 const STRENGTH_SQUARED: f32 = 0.36;
 
 /// Added to variances, so that two pixels without noise that differ are different.
 const LEAST_VARIANCE: f32 = 1e-12;
-
-/// Rows that one thread filters at once.
-const BAND: usize = 16;
 
 /// Nearly exp(-x), and exactly 0 from 4 on.
 #[inline(always)]
@@ -64,105 +80,162 @@ fn smaller(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// Three channels of the filtered layer; `None` where it is cancelled.
+/// Three channels of some columns and rows of the filtered layer, row by row; of no use where it is cancelled.
+///
+/// What lies further than [`REACH`] from them does not show, so that a picture can be filtered block by block.
 pub(super) fn filter(
     layer: &Layer,
     groups: &[Group],
-    workers: &Workers,
+    columns: Range<usize>,
+    rows: Range<usize>,
     cancel: &CancelToken,
-) -> Option<[Vec<f32>; 3]> {
-    let starts = (0..layer.height).step_by(BAND);
-    let mut bands: Vec<(Range<usize>, [Vec<f32>; 3])> =
-        starts.map(|y| (y..(y + BAND).min(layer.height), Default::default())).collect();
-    workers.for_each(&mut bands, |(rows, band)| {
-        *band = InstructionSet::detect().run(FilterRows { layer, groups, rows: rows.clone(), cancel });
-    });
-    if cancel.is_cancelled() {
-        return None;
+) -> [Vec<f32>; 3] {
+    if let Some(constant) = layer.constant() {
+        return constant.map(|value| vec![value; columns.len() * rows.len()]);
     }
-    Some(array::from_fn(|c| bands.iter().flat_map(|(_, band)| &band[c]).copied().collect()))
+    InstructionSet::detect().run(FilterBlock { layer, groups, columns, rows, cancel })
 }
 
-/// [`filter_rows`] at any instruction set: its loops go over rows of numbers, of which the compiler makes vectors as wide as there are.
-struct FilterRows<'a> {
+/// [`filter_block`] at any instruction set: its loops go over rows of numbers, of which the compiler makes vectors as wide as there are.
+struct FilterBlock<'a> {
     layer: &'a Layer,
     groups: &'a [Group],
+    columns: Range<usize>,
     rows: Range<usize>,
     cancel: &'a CancelToken,
 }
 
-impl Job for FilterRows<'_> {
+impl Job for FilterBlock<'_> {
     type Output = [Vec<f32>; 3];
 
     #[inline(always)]
     fn run<R: Real>(self) -> Self::Output {
-        filter_rows(self.layer, self.groups, self.rows, self.cancel)
+        filter_block(self.layer, self.groups, self.columns, self.rows, self.cancel)
     }
 }
 
-/// The rows of the filtered layer: each half by weights from the other. Where it is cancelled, they are of no use.
+/// The columns of a range whose neighbour at this distance is in a picture of this width.
 #[inline(always)]
-fn filter_rows(layer: &Layer, groups: &[Group], rows: Range<usize>, cancel: &CancelToken) -> [Vec<f32>; 3] {
-    let (width, height) = (layer.width, layer.height);
-    let count = rows.len() * width;
+fn with_neighbour(columns: &Range<usize>, dx: isize, width: usize) -> Range<usize> {
+    let first = columns.start.max((-dx).max(0) as usize);
+    let end = columns.end.min(width.saturating_sub(dx.max(0) as usize));
+    first..end.max(first)
+}
+
+/// Some pixels of the filtered layer: each half by weights from the other.
+#[inline(always)]
+fn filter_block(
+    layer: &Layer,
+    groups: &[Group],
+    columns: Range<usize>,
+    rows: Range<usize>,
+    cancel: &CancelToken,
+) -> [Vec<f32>; 3] {
+    let (width, height, across_width) = (layer.width, layer.height, columns.len());
+    let count = rows.len() * across_width;
     let mut sums: [[Vec<f32>; 3]; 2] = array::from_fn(|_| array::from_fn(|_| vec![0.0; count]));
     let mut totals: [Vec<f32>; 2] = array::from_fn(|_| vec![0.0; count]);
-    // Rows of patches reach beyond those of their pixels.
+    // Patches reach beyond their pixels.
     let reached = rows.start.saturating_sub(PATCH)..(rows.end + PATCH).min(height);
-    let mut across: [Vec<f32>; 2] = array::from_fn(|_| vec![0.0; reached.len() * width]);
-    let mut differences = vec![0.0; width];
-    let mut surfaces = vec![0.0; width];
-    let mut weights = vec![0.0; width];
+    let wide = columns.start.saturating_sub(PATCH)..(columns.end + PATCH).min(width);
+    let mut across: [Vec<f32>; 2] = array::from_fn(|_| vec![0.0; reached.len() * across_width]);
+    let mut differences = vec![0.0; wide.len()];
+    let mut surfaces = vec![0.0; across_width];
+    let mut weights = vec![0.0; across_width];
     let share = 1.0 / ((2 * PATCH + 1) * (2 * PATCH + 1)) as f32;
+    // Where a half says nothing of some pixels, these are compared with none, and a patch counts the pairs that it compares.
+    let is_known = [0, 1].map(|half| layer.is_known(half));
+    let mut pairs: [Vec<f32>; 2] =
+        is_known.map(|known| vec![0.0; if known { 0 } else { reached.len() * across_width }]);
+    let mut compared = vec![0.0; across_width];
     for (dx, dy) in (-RADIUS..=RADIUS).flat_map(|dy| (-RADIUS..=RADIUS).map(move |dx| (dx, dy))) {
         // Less with the distance, and nothing beyond a circle: what stands out is spread softly.
         let near = 1.0 - (dx * dx + dy * dy) as f32 / ((RADIUS + 1) * (RADIUS + 1)) as f32;
-        // Columns whose neighbour is in the picture.
-        let (left, right) = ((-dx).max(0) as usize, width as isize - dx.max(0));
-        if near <= 0.0 || right <= left as isize {
+        let inner = with_neighbour(&columns, dx, width);
+        let outer = with_neighbour(&wide, dx, width);
+        if near <= 0.0 || inner.is_empty() {
             continue;
         }
         if cancel.is_cancelled() {
             break;
         }
-        let span = right as usize - left;
-        let start = |y: usize| y * width + left;
-        let moved = |y: usize| {
+        let moved = |y: usize, column: usize| {
             let row = y.checked_add_signed(dy).filter(|&row| row < height)?;
-            (row * width + left).checked_add_signed(dx)
+            (row * width + column).checked_add_signed(dx)
         };
         for y in reached.clone() {
-            for (across, half) in across.iter_mut().zip(&layer.halves) {
-                let across = &mut across[(y - reached.start) * width..][..width];
-                let Some(there) = moved(y) else {
+            for half in 0..2 {
+                let place = (y - reached.start) * across_width;
+                let across = &mut across[half][place..][..across_width];
+                let Some(there) = moved(y, outer.start) else {
                     across.fill(0.0);
+                    if !is_known[half] {
+                        pairs[half][place..][..across_width].fill(0.0);
+                    }
                     continue;
                 };
+                let here = y * width + outer.start;
+                let (before, first) = (outer.start - wide.start, columns.start - wide.start);
                 differences.fill(0.0);
-                compare_light(half, &layer.variance, start(y), there, &mut differences[left..][..span]);
-                sum_across(&differences, across);
+                let inside = &mut differences[before..][..outer.len()];
+                compare_light(&layer.halves[half], &layer.variance, here, there, inside);
+                if is_known[half] {
+                    sum_across(&differences, first, across);
+                    continue;
+                }
+                let known =
+                    (&layer.known[half][here..][..outer.len()], &layer.known[half][there..][..outer.len()]);
+                for x in 0..outer.len() {
+                    inside[x] *= known.0[x] * known.1[x];
+                }
+                sum_across(&differences, first, across);
+                let inside = &mut differences[before..][..outer.len()];
+                for x in 0..outer.len() {
+                    inside[x] = known.0[x] * known.1[x];
+                }
+                sum_across(&differences, first, &mut pairs[half][place..][..across_width]);
             }
         }
+        let span = inner.len();
+        let left = inner.start - columns.start;
         for y in rows.clone() {
-            let Some(there) = moved(y) else { continue };
+            let Some(there) = moved(y, inner.start) else { continue };
             let surfaces = &mut surfaces[..span];
-            compare_surfaces(groups, start(y), there, surfaces);
-            let out = (y - rows.start) * width + left;
+            compare_surfaces(groups, y * width + inner.start, there, surfaces);
+            let out = (y - rows.start) * across_width + left;
             // The weights of one half are for the other.
-            for (across, other) in across.iter().zip([1, 0]) {
+            for (half, other) in [(0, 1), (1, 0)] {
+                let patches = y.saturating_sub(PATCH)..(y + PATCH + 1).min(height);
                 let weights = &mut weights[..span];
                 weights.fill(0.0);
-                for row in y.saturating_sub(PATCH)..(y + PATCH + 1).min(height) {
-                    let patch = &across[(row - reached.start) * width + left..][..span];
+                for row in patches.clone() {
+                    let patch = &across[half][(row - reached.start) * across_width + left..][..span];
                     for x in 0..span {
                         weights[x] += patch[x];
+                    }
+                }
+                if is_known[half] {
+                    for x in 0..span {
+                        weights[x] *= share;
+                    }
+                } else {
+                    let compared = &mut compared[..span];
+                    compared.fill(0.0);
+                    for row in patches {
+                        let patch = &pairs[half][(row - reached.start) * across_width + left..][..span];
+                        for x in 0..span {
+                            compared[x] += patch[x];
+                        }
+                    }
+                    for x in 0..span {
+                        weights[x] /= larger(compared[x], 1.0);
                     }
                 }
                 let known = &layer.known[other][there..][..span];
                 let total = &mut totals[other][out..][..span];
                 for x in 0..span {
                     // What is less different than by noise is not different.
-                    let difference = larger(larger(weights[x] * share, surfaces[x]), 0.0);
+                    let difference = larger(larger(weights[x], surfaces[x]), 0.0);
                     weights[x] = near * kernel(difference) * known[x];
                     total[x] += weights[x];
                 }
@@ -231,21 +304,24 @@ fn compare_surfaces(groups: &[Group], p: usize, q: usize, out: &mut [f32]) {
     }
 }
 
-/// Sums of each value and its neighbours to the left and the right, as far as patches reach.
+/// For each of `out`, the sum of a value and its neighbours to the left and the right, as far as patches reach and there are any. The value
+/// of the first is `values[first]`.
 #[inline(always)]
-fn sum_across(values: &[f32], out: &mut [f32]) {
-    let width = values.len();
-    let inside = PATCH..width.saturating_sub(PATCH).max(PATCH);
-    for x in (0..width).filter(|x| !inside.contains(x)) {
-        out[x] = values[x.saturating_sub(PATCH)..(x + PATCH + 1).min(width)].iter().sum();
+fn sum_across(values: &[f32], first: usize, out: &mut [f32]) {
+    let inside = PATCH.saturating_sub(first)..(values.len() - first).saturating_sub(PATCH).min(out.len());
+    let inside = inside.start.min(out.len())..inside.end.max(inside.start.min(out.len()));
+    for x in (0..out.len()).filter(|x| !inside.contains(x)) {
+        let at = first + x;
+        out[x] = values[at.saturating_sub(PATCH)..(at + PATCH + 1).min(values.len())].iter().sum();
     }
     if inside.is_empty() {
         return;
     }
-    let inner = &mut out[inside.clone()];
-    inner.copy_from_slice(&values[..inside.len()]);
+    let start = first + inside.start - PATCH;
+    let inner = &mut out[inside];
+    inner.copy_from_slice(&values[start..][..inner.len()]);
     for shift in 1..=2 * PATCH {
-        let values = &values[shift..][..inner.len()];
+        let values = &values[start + shift..][..inner.len()];
         for x in 0..inner.len() {
             inner[x] += values[x];
         }

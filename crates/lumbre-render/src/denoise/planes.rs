@@ -1,7 +1,7 @@
 //! What the film keeps of pixels as planes of numbers, with variances that are less noisy than single ones.
 
-use crate::denoise::means::{Group, Layer};
-use crate::film::{FEATURES, GuideSums, RatioSums};
+use crate::denoise::means::{Group, Layer, REACH};
+use crate::film::{GROUPS, GuideSums, RatioSums};
 
 /// Pixels around one whose variances are averaged.
 const VARIANCE_RADIUS: usize = 2;
@@ -10,13 +10,26 @@ const SCALE_RADIUS: usize = 5;
 /// Pixels around one whose spread stands for the variance of a single sample.
 const SPREAD_RADIUS: usize = 2;
 
-/// A ratio of every pixel by two halves of its samples. Unless it is everywhere, pixels without any part in it say nothing.
-pub(super) fn layer(
+/// Pixels beyond one that its mean depends on.
+pub(super) const BORDER: usize = REACH + SCALE_RADIUS + OUTLIER_RADIUS;
+
+/// What a layer is made of.
+#[derive(Clone, Copy)]
+pub(super) struct Kind {
+    /// The least mean denominator.
+    pub(super) least: f32,
+    /// Whether all pixels have a part in it; else those without say nothing.
+    pub(super) is_everywhere: bool,
+    /// Whether no pixel of the picture has more than one sample.
+    pub(super) is_single: bool,
+}
+
+/// A ratio of every pixel by two halves of its samples.
+pub(super) fn layer<const UNDER: usize>(
     guides: &[GuideSums],
     size: (usize, usize),
-    ratio: impl Fn(&GuideSums) -> &RatioSums,
-    least: f32,
-    is_everywhere: bool,
+    ratio: impl Fn(&GuideSums) -> &RatioSums<UNDER>,
+    Kind { least, is_everywhere, is_single }: Kind,
 ) -> Layer {
     let finite = |x: f32| if x.is_finite() { x } else { 0.0 };
     let is_sampled = |guide: &GuideSums| guide.count.samples > 0 && guide.count.weight > 0.0;
@@ -38,10 +51,20 @@ pub(super) fn layer(
     let by_halves: Vec<f32> = (0..guides.len())
         .map(|i| (0..3).map(|c| 0.25 * (halves[0][c][i] - halves[1][c][i]).powi(2)).sum())
         .collect();
-    let smooth = mean_around(&by_samples, size, VARIANCE_RADIUS);
+    let known = [0, 1].map(|half| {
+        let is_known = |guide: &GuideSums| is_everywhere || ratio(guide).is_known(half, guide.count);
+        guides.iter().map(|guide| if is_known(guide) { 1.0 } else { 0.0 }).collect::<Vec<f32>>()
+    });
+    // The mean variance of those pixels that have one.
+    let has_part: Vec<f32> = known[0].iter().zip(&known[1]).map(|(a, b)| a.max(*b)).collect();
+    let parts = mean_around(&has_part, size, VARIANCE_RADIUS);
+    let mut smooth = mean_around(&by_samples, size, VARIANCE_RADIUS);
+    smooth
+        .iter_mut()
+        .zip(parts)
+        .for_each(|(variance, part)| *variance /= if part > 0.0 { part } else { 1.0 });
     let (wide_samples, wide_halves) =
         (mean_around(&by_samples, size, SCALE_RADIUS), mean_around(&by_halves, size, SCALE_RADIUS));
-    let is_single = guides.iter().all(|guide| guide.count.samples < 2);
     let variance = if is_single {
         spread(&halves[0], size)
     } else {
@@ -53,10 +76,6 @@ pub(super) fn layer(
             })
             .collect()
     };
-    let known = [0, 1].map(|half| {
-        let is_known = |guide: &GuideSums| is_everywhere || ratio(guide).is_known(half, guide.count);
-        guides.iter().map(|guide| if is_known(guide) { 1.0 } else { 0.0 }).collect()
-    });
     Layer { width: size.0, height: size.1, halves, variance, known }
 }
 
@@ -116,13 +135,9 @@ fn spread(channels: &[Vec<f32>; 3], size: (usize, usize)) -> Vec<f32> {
 /// Albedo, normals and depth, and from where on they are different.
 pub(super) fn surfaces(guides: &[GuideSums], size: (usize, usize)) -> Vec<Group> {
     let value = |f: usize| -> Vec<f32> { guides.iter().map(|guide| guide.feature(f)).collect() };
-    let albedo = 0..3;
-    let normal = 3..6;
-    let depth = 6..FEATURES;
-    let group = |features: std::ops::Range<usize>, least: &dyn Fn(usize) -> f32| {
-        let planes: Vec<Vec<f32>> = features.clone().map(value).collect();
-        let variance: Vec<f32> =
-            guides.iter().map(|guide| features.clone().map(|f| guide.feature_variance(f)).sum()).collect();
+    let group = |which: usize, least: &dyn Fn(usize) -> f32| {
+        let planes: Vec<Vec<f32>> = GROUPS[which].clone().map(value).collect();
+        let variance: Vec<f32> = guides.iter().map(|guide| guide.group_variance(which)).collect();
         let sharpness = (0..guides.len())
             .map(|i| {
                 let slope: f32 = planes.iter().map(|plane| slope_squared(plane, size, i)).sum();
@@ -133,9 +148,9 @@ pub(super) fn surfaces(guides: &[GuideSums], size: (usize, usize)) -> Vec<Group>
         Group { planes, variance, sharpness }
     };
     vec![
-        group(albedo, &|_| LEAST_ALBEDO),
-        group(normal, &|_| LEAST_NORMAL),
-        group(depth, &|i| (LEAST_DEPTH * guides[i].feature(6)).powi(2).max(f32::MIN_POSITIVE)),
+        group(0, &|_| LEAST_ALBEDO),
+        group(1, &|_| LEAST_NORMAL),
+        group(2, &|i| (LEAST_DEPTH * guides[i].feature(6)).powi(2).max(f32::MIN_POSITIVE)),
     ]
 }
 
@@ -148,12 +163,21 @@ const LEAST_NORMAL: f32 = 0.01;
 /// A difference of depth, as a share of it.
 const LEAST_DEPTH: f32 = 0.01;
 
-/// The square of the slope at a pixel, a pixel far: to the side that is more alike, so that edges are none.
+/// Pixels over which a slope goes on, so that it is none of the narrow ramp that the film's filter makes of an edge.
+const SLOPE: usize = 3;
+
+/// The square of the slope at a pixel, a pixel far: to the side that is more alike, and no more than that of the pixels that follow, so
+/// that edges are none.
 fn slope_squared(plane: &[f32], (width, height): (usize, usize), i: usize) -> f32 {
     let (x, y) = (i % width, i / width);
-    let to = |is_there: bool, j: usize| if is_there { (plane[j] - plane[i]).abs() } else { f32::INFINITY };
-    let across = to(x > 0, i.wrapping_sub(1)).min(to(x + 1 < width, i + 1));
-    let down = to(y > 0, i.wrapping_sub(width)).min(to(y + 1 < height, i + width));
+    // To one side, on which there are so many pixels, `step` apart.
+    let to = |count: usize, step: isize| {
+        let at = |k: usize| plane[i.wrapping_add_signed(step * k as isize)];
+        let steps = (1..=SLOPE.min(count)).map(|k| (at(k) - at(k - 1)).abs());
+        steps.reduce(f32::min).unwrap_or(f32::INFINITY)
+    };
+    let across = to(x, -1).min(to(width - 1 - x, 1));
+    let down = to(y, -(width as isize)).min(to(height - 1 - y, width as isize));
     let square = |d: f32| if d.is_finite() { d * d } else { 0.0 };
     square(across) + square(down)
 }

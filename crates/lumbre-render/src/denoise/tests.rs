@@ -4,8 +4,9 @@ use lumbre_image::{Image, Rgb};
 use lumbre_math::random::{combine, mix, uniform_f64};
 
 use super::{denoise, denoise_unless};
+use crate::film::Guides;
 use crate::film::{Exposure, Extras, FeatureSample, PixelBounds, Sample, Tile};
-use crate::rendered::{guides, picture};
+use crate::rendered::picture;
 use crate::{Rendered, Stats};
 
 const WIDTH: u32 = 40;
@@ -37,7 +38,7 @@ fn rendered(samples: u32, scene: &Scene) -> Rendered {
         coverage: None,
         bounds,
         features: vec![],
-        guides: Some(guides(tiles(), bounds)),
+        guides: Some(Guides::new(tiles())),
         stats: Stats { spp: samples, stride: Some(1), threads: 1, ..Stats::default() },
     }
 }
@@ -117,7 +118,7 @@ fn few_samples_and_none_give_numbers() {
     let black = rendered(2, &|_, _, _| (Rgb::BLACK, Rgb::BLACK, UP));
     let single = rendered(1, &noisy);
     let mut holes = rendered(2, &noisy);
-    let all = holes.guides.as_mut().unwrap();
+    let (_, _, _, all) = holes.guides.as_mut().unwrap().tiles_mut()[0].sums_mut();
     for i in [0, 7, 500] {
         all[i] = Default::default();
     }
@@ -128,11 +129,58 @@ fn few_samples_and_none_give_numbers() {
     }
     let denoised = denoise(&single, 1).unwrap().image;
     assert!(squared_error(&denoised) * 3.0 < squared_error(&single.image));
-    let mut coarse = single.clone();
-    coarse.stats.stride = Some(4);
-    assert_eq!(denoise(&coarse, 1), None);
-    coarse = Rendered { guides: None, ..single };
-    assert_eq!(denoise(&coarse, 1), None);
+    let mut nothing = single.clone();
+    nothing.stats.stride = None;
+    assert_eq!(denoise(&nothing, 1), None);
+    nothing = Rendered { guides: None, ..single };
+    assert_eq!(denoise(&nothing, 1), None);
+}
+
+#[test]
+fn a_coarse_picture_is_filtered_as_the_small_one_that_it_is_and_enlarged() {
+    // Every third pixel has samples.
+    let coarse = |side: u32| {
+        let mut rendered = rendered(8, &noisy);
+        rendered.stats.stride = Some(side);
+        denoise(&rendered, 2).unwrap().image
+    };
+    let image = coarse(3);
+    assert_eq!((image.width(), image.height()), (WIDTH, HEIGHT));
+    // Those of a wall are near the truth, and what is between two of them is between.
+    for (x, y) in [(12, 3), (27, 9), (15, 24), (33, 27)] {
+        let (light, albedo, _) = truth(x, y);
+        let (found, expected) = (image.pixel(x, y), light * albedo);
+        assert!((found - expected).map(f32::abs).max_component() < 0.25 * expected.max_component());
+    }
+    for (x, y) in [(12, 3), (27, 24)] {
+        let (left, right) = (image.pixel(x, y), image.pixel(x + 3, y));
+        let (found, expected) = (image.pixel(x + 1, y), left * (2.0 / 3.0) + right * (1.0 / 3.0));
+        assert!((found - expected).map(f32::abs).max_component() < 1e-6, "{found:?} {expected:?}");
+    }
+    assert_eq!(coarse(1), denoise(&rendered(8, &noisy), 1).unwrap().image);
+}
+
+#[test]
+fn blocks_do_not_show() {
+    for samples in [1, 5] {
+        let rendered = rendered(samples, &noisy);
+        let bytes = |block| -> Vec<u32> {
+            let noisy = super::Noisy {
+                image: &rendered.image,
+                coverage: None,
+                guides: rendered.guides.as_ref().unwrap(),
+                bounds: rendered.bounds,
+                block,
+            };
+            let workers = crate::workers::Workers::start(2);
+            let image = noisy.denoised(&workers, &crate::CancelToken::new()).unwrap().image;
+            image.pixels().iter().flat_map(|c| c.to_array().map(f32::to_bits)).collect()
+        };
+        let whole = bytes((100, 100));
+        for block in [(7, 5), (40, 1), (1, 32), (13, 100)] {
+            assert_eq!(bytes(block), whole, "{samples} {block:?}");
+        }
+    }
 }
 
 #[test]

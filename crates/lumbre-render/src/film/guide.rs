@@ -1,53 +1,79 @@
 //! What a denoiser wants to know of the samples of one pixel besides their mean.
 
+use std::ops::Range;
+
 use crate::film::FeatureSample;
 
-/// Sums for a ratio of two means by samples, for each of three channels: its value, its variance, and its value by every other
-/// sample alone.
+/// Sums for a ratio of two means by samples: its value, its variance, and its value by every other sample alone. The numerator has three
+/// channels, the denominator `UNDER` of them: three, or one for all.
 ///
 /// Single precision is enough: all of it is compared with noise.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct RatioSums {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RatioSums<const UNDER: usize> {
     /// Σ numerator.
     over: [f32; 3],
     /// Σ denominator.
-    under: [f32; 3],
+    under: [f32; UNDER],
     /// Σ numerator of the odd samples.
     odd_over: [f32; 3],
     /// Σ denominator of the odd samples.
-    odd_under: [f32; 3],
+    odd_under: [f32; UNDER],
     /// Σ numerator².
     over_squares: [f32; 3],
     /// Σ numerator × denominator.
     products: [f32; 3],
     /// Σ denominator².
-    under_squares: [f32; 3],
+    under_squares: [f32; UNDER],
 }
 
-impl RatioSums {
+impl<const UNDER: usize> Default for RatioSums<UNDER> {
+    fn default() -> Self {
+        let (over, under) = ([0.0; 3], [0.0; UNDER]);
+        Self {
+            over,
+            under,
+            odd_over: over,
+            odd_under: under,
+            over_squares: over,
+            products: over,
+            under_squares: under,
+        }
+    }
+}
+
+impl<const UNDER: usize> RatioSums<UNDER> {
     /// Adds a sample.
-    pub fn add(&mut self, over: [f32; 3], under: [f32; 3], is_odd: bool) {
+    pub fn add(&mut self, over: [f32; 3], under: [f32; UNDER], is_odd: bool) {
         for c in 0..3 {
             self.over[c] += over[c];
-            self.under[c] += under[c];
+            self.over_squares[c] += over[c] * over[c];
+            self.products[c] += over[c] * under[Self::under(c)];
             if is_odd {
                 self.odd_over[c] += over[c];
+            }
+        }
+        for c in 0..UNDER {
+            self.under[c] += under[c];
+            self.under_squares[c] += under[c] * under[c];
+            if is_odd {
                 self.odd_under[c] += under[c];
             }
-            self.over_squares[c] += over[c] * over[c];
-            self.products[c] += over[c] * under[c];
-            self.under_squares[c] += under[c] * under[c];
         }
+    }
+
+    /// Which denominator is that of a channel.
+    fn under(c: usize) -> usize {
+        c.min(UNDER - 1)
     }
 
     /// The mean denominator.
     pub fn denominator(&self, c: usize, count: Count) -> f32 {
-        self.under[c] / count.weight
+        self.under[Self::under(c)] / count.weight
     }
 
     /// The ratio of the means, with a mean denominator of at least `least`.
     pub fn value(&self, c: usize, count: Count, least: f32) -> f32 {
-        self.over[c] / self.under[c].max(least * count.weight)
+        self.over[c] / self.under[Self::under(c)].max(least * count.weight)
     }
 
     /// Whether the even samples (0) or the odd ones (1) have a numerator or a denominator; with a single sample, that one for both.
@@ -55,13 +81,14 @@ impl RatioSums {
         let is_odd = half == 1 && count.samples > 1;
         let sum = |all: f32, odd: f32| if is_odd { odd } else { all - odd };
         (0..3).any(|c| {
-            sum(self.over[c], self.odd_over[c]) != 0.0 || sum(self.under[c], self.odd_under[c]) != 0.0
+            sum(self.over[c], self.odd_over[c]) != 0.0
+                || sum(self.under[Self::under(c)], self.odd_under[Self::under(c)]) != 0.0
         })
     }
 
     /// Whether neither numerator nor denominator is there: the pixel has no part in the ratio.
     pub fn is_absent(&self, c: usize) -> bool {
-        self.over[c] == 0.0 && self.under[c] == 0.0
+        self.over[c] == 0.0 && self.under[Self::under(c)] == 0.0
     }
 
     /// The ratio by the even samples and that by the odd ones; that of all where there are none of them.
@@ -72,8 +99,11 @@ impl RatioSums {
         }
         let least_odd = least * count.weight * odd as f32 / count.samples as f32;
         let least_even = least * count.weight - least_odd;
-        let even_under = (self.under[c] - self.odd_under[c]).max(least_even);
-        [(self.over[c] - self.odd_over[c]) / even_under, self.odd_over[c] / self.odd_under[c].max(least_odd)]
+        let even_under = (self.under[Self::under(c)] - self.odd_under[Self::under(c)]).max(least_even);
+        [
+            (self.over[c] - self.odd_over[c]) / even_under,
+            self.odd_over[c] / self.odd_under[Self::under(c)].max(least_odd),
+        ]
     }
 
     /// The variance of the ratio, as if samples were independent (W. Cochran, "Sampling Techniques", 1977, 6.4). `None` for fewer than
@@ -83,13 +113,14 @@ impl RatioSums {
             return None;
         }
         let n = count.samples as f32;
-        let under = self.under[c].max(least * count.weight);
+        let under = self.under[Self::under(c)].max(least * count.weight);
         // Where the denominator is not that of the samples, it has no share in the variance.
-        let squares = if under > self.under[c] {
+        let squares = if under > self.under[Self::under(c)] {
             self.over_squares[c] - self.over[c] * self.over[c] / n
         } else {
             let ratio = self.over[c] / under;
-            self.over_squares[c] - 2.0 * ratio * self.products[c] + ratio * ratio * self.under_squares[c]
+            self.over_squares[c] - 2.0 * ratio * self.products[c]
+                + ratio * ratio * self.under_squares[Self::under(c)]
         };
         Some(squares.max(0.0) * n / (n - 1.0) / (under * under))
     }
@@ -107,34 +138,38 @@ pub struct Count {
 /// What tells one surface from another, as numbers: albedo, normal, depth.
 pub const FEATURES: usize = 7;
 
+/// Which features are compared as one: albedo, normal, depth.
+pub const GROUPS: [Range<usize>; 3] = [0..3, 3..6, 6..FEATURES];
+
 /// Sums over the samples of one pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GuideSums {
     /// Light over reflectance.
-    pub light: RatioSums,
+    pub light: RatioSums<3>,
     /// How much of the ground is in shadow, over how much of the pixel is ground: where shadows are caught in a transparent picture.
-    pub shadow: RatioSums,
+    pub shadow: RatioSums<1>,
     features: [f32; FEATURES],
-    feature_squares: [f32; FEATURES],
+    /// Σ of the squares of the features of each group.
+    group_squares: [f32; GROUPS.len()],
     /// How many samples.
     pub count: Count,
 }
 
 /// Numbers of [`GuideSums`].
-pub(crate) const WORDS: usize = 2 * RATIO_WORDS + 2 * FEATURES + 2;
-const RATIO_WORDS: usize = 21;
+pub(crate) const WORDS: usize = 21 + 15 + FEATURES + GROUPS.len() + 2;
 
-impl RatioSums {
-    fn lists(&mut self) -> [&mut [f32; 3]; RATIO_WORDS / 3] {
+impl<const UNDER: usize> RatioSums<UNDER> {
+    fn numbers(&mut self) -> impl Iterator<Item = &mut f32> {
         let Self { over, under, odd_over, odd_under, over_squares, products, under_squares } = self;
-        [over, under, odd_over, odd_under, over_squares, products, under_squares]
+        let overs = [over, odd_over, over_squares, products].into_iter().flatten();
+        overs.chain([under, odd_under, under_squares].into_iter().flatten())
     }
 }
 
 impl GuideSums {
     fn numbers(&mut self) -> impl Iterator<Item = &mut f32> {
-        let ratios = self.light.lists().into_iter().chain(self.shadow.lists()).flatten();
-        let features = self.features.iter_mut().chain(&mut self.feature_squares);
+        let ratios = self.light.numbers().chain(self.shadow.numbers());
+        let features = self.features.iter_mut().chain(&mut self.group_squares);
         ratios.chain(features).chain(std::iter::once(&mut self.count.weight))
     }
 
@@ -160,9 +195,9 @@ impl GuideSums {
         self.count.weight += weight;
         let Some(FeatureSample { albedo, normal, depth, .. }) = sample else { return };
         let values = [albedo.r, albedo.g, albedo.b, normal[0], normal[1], normal[2], *depth];
-        for (i, value) in values.into_iter().enumerate() {
-            self.features[i] += value;
-            self.feature_squares[i] += value * value;
+        self.features.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+        for (squares, group) in self.group_squares.iter_mut().zip(GROUPS) {
+            *squares += values[group].iter().map(|value| value * value).sum::<f32>();
         }
     }
 
@@ -171,14 +206,14 @@ impl GuideSums {
         self.features[i] / self.count.samples.max(1) as f32
     }
 
-    /// The variance of that mean, as if samples were independent; 0 for fewer than two samples.
-    pub fn feature_variance(&self, i: usize) -> f32 {
+    /// The variance of the means of a group, summed over its features, as if samples were independent; 0 for fewer than two samples.
+    pub fn group_variance(&self, group: usize) -> f32 {
         if self.count.samples < 2 {
             return 0.0;
         }
         let n = self.count.samples as f32;
-        let mean = self.features[i] / n;
-        (self.feature_squares[i] / n - mean * mean).max(0.0) / (n - 1.0)
+        let means: f32 = GROUPS[group].clone().map(|i| (self.features[i] / n) * (self.features[i] / n)).sum();
+        (self.group_squares[group] / n - means).max(0.0) / (n - 1.0)
     }
 }
 
@@ -204,7 +239,7 @@ mod tests {
         let [even, odd] = sums.halves(1, count, 0.01);
         assert!((even - 2.5).abs() < 1e-6 && (odd - 2.5).abs() < 1e-6, "{even} {odd}");
         assert_eq!((sums.value(0, count, 0.01), sums.variance(0, count, 0.01)), (0.0, Some(0.0)));
-        assert_eq!(RatioSums::default().variance(0, one, 0.01), None);
+        assert_eq!(RatioSums::<3>::default().variance(0, one, 0.01), None);
     }
 
     #[test]
@@ -214,7 +249,12 @@ mod tests {
             let sample = FeatureSample { albedo: Rgb::WHITE, normal: [0.0, 1.0, 0.0], depth, uv: [0.0; 2] };
             sums.add_features(Some(&sample), 1.0);
         }
-        assert_eq!((sums.feature(6), sums.feature_variance(6)), (4.0, 1.0));
-        assert_eq!((sums.feature(4), sums.feature_variance(4)), (1.0, 0.0));
+        assert_eq!((sums.feature(6), sums.group_variance(2)), (4.0, 1.0));
+        assert_eq!((sums.feature(4), sums.group_variance(1)), (1.0, 0.0));
+        let tilted = FeatureSample { albedo: Rgb::WHITE, normal: [1.0, 0.0, 0.0], depth: 4.0, uv: [0.0; 2] };
+        sums.add_features(Some(&tilted), 1.0);
+        sums.add_features(Some(&tilted), 1.0);
+        // Each of two components is 0 or 1 by halves: a variance of 1/4, and a third of that for the mean.
+        assert!((sums.group_variance(1) - 2.0 / 12.0).abs() < 1e-6);
     }
 }

@@ -8,6 +8,7 @@ mod bounds;
 mod exact;
 mod filter;
 mod guide;
+mod guides;
 mod pixel;
 mod tile;
 
@@ -15,7 +16,8 @@ pub(crate) use bounds::MAX_PIXELS;
 pub use bounds::PixelBounds;
 pub use exact::ExactSum;
 pub use filter::{Filter, FilterSample, FilterShape};
-pub use guide::{Count, FEATURES, GuideSums, RatioSums};
+pub use guide::{Count, FEATURES, GROUPS, GuideSums, RatioSums};
+pub use guides::Guides;
 pub use pixel::{FeatureSample, FeatureSums, Pixel, Tint};
 pub use tile::{Exposure, Extras, Sample, Tile};
 

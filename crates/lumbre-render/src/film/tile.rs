@@ -1,5 +1,7 @@
 //! A part of the film that one thread owns at a time.
 
+use std::sync::Arc;
+
 use lumbre_image::Rgb;
 
 use crate::film::pixel::{MAX_SAMPLE, Sums};
@@ -54,10 +56,17 @@ pub struct Sample {
     pub on_catcher: bool,
 }
 
-/// The pixels of a rectangle.
+/// The pixels of a rectangle. A clone shares its sums with the original until one of them gets another sample, so that it is cheap.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tile {
     bounds: PixelBounds,
+    sums: Arc<TileSums>,
+    depth_unit: f64,
+}
+
+/// The sums of a tile.
+#[derive(Clone, Debug, PartialEq)]
+struct TileSums {
     pixels: Vec<Pixel>,
     // Empty unless features are wanted; else as many as pixels.
     features: Vec<FeatureSums>,
@@ -65,7 +74,6 @@ pub struct Tile {
     tints: Vec<Tint>,
     // Empty unless guides are wanted; else as many as pixels.
     guides: Vec<GuideSums>,
-    depth_unit: f64,
 }
 
 /// What is wanted of samples besides the colour of pixels and their coverage.
@@ -91,14 +99,13 @@ impl Tile {
     /// No samples yet.
     pub fn new(bounds: PixelBounds, extras: Extras) -> Self {
         let count = bounds.area() as usize;
-        Self {
-            bounds,
+        let sums = TileSums {
             pixels: vec![Pixel::default(); count],
             features: vec![FeatureSums::default(); if extras.features { count } else { 0 }],
             tints: vec![Tint::default(); if extras.tints { count } else { 0 }],
             guides: vec![GuideSums::default(); if extras.guides { count } else { 0 }],
-            depth_unit: extras.depth_unit,
-        }
+        };
+        Self { bounds, sums: Arc::new(sums), depth_unit: extras.depth_unit }
     }
 
     /// Which pixels.
@@ -108,7 +115,7 @@ impl Tile {
 
     /// The sums of every pixel, row by row.
     pub fn pixels(&self) -> &[Pixel] {
-        &self.pixels
+        &self.sums.pixels
     }
 
     /// What depths are measured in.
@@ -118,28 +125,28 @@ impl Tile {
 
     /// The features of every pixel, row by row; empty where they are not wanted.
     pub fn features(&self) -> &[FeatureSums] {
-        &self.features
+        &self.sums.features
     }
 
     /// What a denoiser wants to know of every pixel, row by row; empty where it is not wanted.
     pub fn guides(&self) -> &[GuideSums] {
-        &self.guides
+        &self.sums.guides
     }
 
     /// By how much the coverage of each colour is another, row by row; empty where it is not wanted.
     pub fn tints(&self) -> &[Tint] {
-        &self.tints
+        &self.sums.tints
     }
 
     /// The coverage of every pixel by colour, row by row; where that is not wanted, of all colours alike.
     pub fn coverages(&self) -> impl Iterator<Item = Rgb> + '_ {
-        let tints = self.tints.iter().copied().chain(std::iter::repeat(Tint::default()));
-        self.pixels.iter().zip(tints).map(|(pixel, tint)| tint.coverage(pixel))
+        let tints = self.sums.tints.iter().copied().chain(std::iter::repeat(Tint::default()));
+        self.sums.pixels.iter().zip(tints).map(|(pixel, tint)| tint.coverage(pixel))
     }
 
     /// Whether the coverage of any pixel is not that of all colours alike.
     pub fn is_tinted(&self) -> bool {
-        self.tints.iter().any(|tint| *tint != Tint::default())
+        self.sums.tints.iter().any(|tint| *tint != Tint::default())
     }
 
     /// Adds a sample to the pixel in column `x` and row `y` of the picture. False, and nothing is added, when the sample
@@ -151,19 +158,20 @@ impl Tile {
         }
         let colour = exposure.colour(sample.radiance);
         let position = b.position(x, y);
-        let pixel = &mut self.pixels[position];
+        let sums = Arc::make_mut(&mut self.sums);
+        let pixel = &mut sums.pixels[position];
         pixel.taken += 1;
         if !sample.coverage.is_finite() || !pixel.add(colour, sample.coverage.average(), sample.weight) {
             return false;
         }
-        if let Some(tint) = self.tints.get_mut(position) {
+        if let Some(tint) = sums.tints.get_mut(position) {
             tint.add(sample.coverage, sample.weight);
         }
-        if let Some(sums) = self.features.get_mut(position) {
-            sums.add(sample.features.as_ref(), sample.weight, self.depth_unit);
+        if let Some(features) = sums.features.get_mut(position) {
+            features.add(sample.features.as_ref(), sample.weight, self.depth_unit);
         }
-        let catches_shadows = !self.tints.is_empty();
-        if let Some(guide) = self.guides.get_mut(position) {
+        let catches_shadows = !sums.tints.is_empty();
+        if let Some(guide) = sums.guides.get_mut(position) {
             let is_shadow = sample.on_catcher && catches_shadows;
             let reflectance = match &sample.features {
                 _ if is_shadow => Rgb::BLACK,
@@ -175,8 +183,8 @@ impl Tile {
             let is_odd = guide.count.samples % 2 == 1;
             guide.light.add(weighted(colour), weighted(reflectance), is_odd);
             let (shadow, ground) =
-                if is_shadow { (sample.coverage, Rgb::WHITE) } else { (Rgb::BLACK, Rgb::BLACK) };
-            guide.shadow.add(weighted(shadow), weighted(ground), is_odd);
+                if is_shadow { (sample.coverage, [sample.weight as f32]) } else { (Rgb::BLACK, [0.0]) };
+            guide.shadow.add(weighted(shadow), ground, is_odd);
             guide.add_features(sample.features.as_ref(), sample.weight as f32);
         }
         true
@@ -199,14 +207,13 @@ impl Tile {
         }
         let places = || both.pixels().map(move |(x, y)| (from.position(x, y), to.position(x, y)));
         let count = bounds.area();
-        Self {
-            bounds,
-            pixels: taken(&self.pixels, count, places()),
-            features: taken(&self.features, count, places()),
-            tints: taken(&self.tints, count, places()),
-            guides: taken(&self.guides, count, places()),
-            depth_unit: self.depth_unit,
-        }
+        let sums = TileSums {
+            pixels: taken(&self.sums.pixels, count, places()),
+            features: taken(&self.sums.features, count, places()),
+            tints: taken(&self.sums.tints, count, places()),
+            guides: taken(&self.sums.guides, count, places()),
+        };
+        Self { bounds, sums: Arc::new(sums), depth_unit: self.depth_unit }
     }
 
     /// Adds what another tile of the same kind gathered, all of whose pixels this one has.
@@ -216,27 +223,29 @@ impl Tile {
                 to.merge(other);
             }
         }
+        let (sums, others) = (Arc::make_mut(&mut self.sums), &other.sums);
         for (from, (x, y)) in other.bounds.pixels().enumerate() {
             let at = self.bounds.position(x, y);
-            add(&mut self.pixels, at, &other.pixels, from);
-            add(&mut self.features, at, &other.features, from);
-            add(&mut self.tints, at, &other.tints, from);
+            add(&mut sums.pixels, at, &others.pixels, from);
+            add(&mut sums.features, at, &others.features, from);
+            add(&mut sums.tints, at, &others.tints, from);
         }
     }
 
-    /// Takes the sums of a tile of the same kind, all of whose pixels this one has.
+    /// Takes the sums of those pixels of a tile of the same kind that this one has, too.
     pub(crate) fn take(&mut self, other: &Self) {
         fn copy<T: Copy>(to: &mut [T], at: usize, other: &[T], from: usize) {
             if let (Some(to), Some(&other)) = (to.get_mut(at), other.get(from)) {
                 *to = other;
             }
         }
-        for (from, (x, y)) in other.bounds.pixels().enumerate() {
-            let at = self.bounds.position(x, y);
-            copy(&mut self.pixels, at, &other.pixels, from);
-            copy(&mut self.features, at, &other.features, from);
-            copy(&mut self.tints, at, &other.tints, from);
-            copy(&mut self.guides, at, &other.guides, from);
+        let (sums, others) = (Arc::make_mut(&mut self.sums), &other.sums);
+        for (x, y) in self.bounds.intersection(&other.bounds).pixels() {
+            let (at, from) = (self.bounds.position(x, y), other.bounds.position(x, y));
+            copy(&mut sums.pixels, at, &others.pixels, from);
+            copy(&mut sums.features, at, &others.features, from);
+            copy(&mut sums.tints, at, &others.tints, from);
+            copy(&mut sums.guides, at, &others.guides, from);
         }
     }
 
@@ -254,22 +263,23 @@ impl Tile {
 
     /// All sums, to be set.
     pub(crate) fn sums_mut(&mut self) -> (&mut [Pixel], &mut [Tint], &mut [FeatureSums], &mut [GuideSums]) {
-        (&mut self.pixels, &mut self.tints, &mut self.features, &mut self.guides)
+        let TileSums { pixels, features, tints, guides } = Arc::make_mut(&mut self.sums);
+        (pixels, tints, features, guides)
     }
 
     /// What is gathered besides colours.
     pub fn extras(&self) -> Extras {
         Extras {
-            features: !self.features.is_empty(),
-            tints: !self.tints.is_empty(),
-            guides: !self.guides.is_empty(),
+            features: !self.sums.features.is_empty(),
+            tints: !self.sums.tints.is_empty(),
+            guides: !self.sums.guides.is_empty(),
             depth_unit: self.depth_unit,
         }
     }
 
     /// The samples of the pixel with the fewest, with those that were dropped.
     pub(crate) fn least_taken(&self) -> u32 {
-        self.pixels.iter().map(|pixel| pixel.taken).min().unwrap_or(0)
+        self.sums.pixels.iter().map(|pixel| pixel.taken).min().unwrap_or(0)
     }
 
     /// The sums of the pixel in column `x` and row `y` of the picture.
@@ -277,34 +287,28 @@ impl Tile {
     /// # Panics
     /// Where that is not in the tile.
     pub fn pixel(&self, x: u32, y: u32) -> &Pixel {
-        &self.pixels[self.bounds.position(x, y)]
+        &self.sums.pixels[self.bounds.position(x, y)]
     }
 
     /// The first pixel as a tile of its own.
     pub fn corner(&self) -> Self {
         let bounds = PixelBounds { x1: self.bounds.x0 + 1, y1: self.bounds.y0 + 1, ..self.bounds };
-        Self {
-            bounds,
-            pixels: self.pixels.first().copied().into_iter().collect(),
-            features: self.features.first().copied().into_iter().collect(),
-            tints: self.tints.first().copied().into_iter().collect(),
-            guides: self.guides.first().copied().into_iter().collect(),
-            depth_unit: self.depth_unit,
-        }
+        self.placed_in(bounds)
     }
 
     /// Gives the first pixel the sums of that of another tile of the same picture, unless it has a sample.
     pub fn take_corner(&mut self, other: &Self) {
-        if self.pixels.first().is_none_or(|pixel| pixel.samples > 0) {
+        if self.sums.pixels.first().is_none_or(|pixel| pixel.samples > 0) {
             return;
         }
         fn copy<T: Copy>(to: &mut [T], from: &[T]) {
             to.iter_mut().zip(from).take(1).for_each(|(to, from)| *to = *from);
         }
-        copy(&mut self.pixels, &other.pixels);
-        copy(&mut self.features, &other.features);
-        copy(&mut self.tints, &other.tints);
-        copy(&mut self.guides, &other.guides);
+        let (sums, others) = (Arc::make_mut(&mut self.sums), &other.sums);
+        copy(&mut sums.pixels, &others.pixels);
+        copy(&mut sums.features, &others.features);
+        copy(&mut sums.tints, &others.tints);
+        copy(&mut sums.guides, &others.guides);
     }
 
     /// Gives every pixel that has no sample the sums of the first pixel of its square of `side` by `side` pixels, counted from
@@ -312,21 +316,22 @@ impl Tile {
     pub fn spread(&mut self, side: u32) {
         let width = self.bounds.width() as usize;
         let side = side.max(1) as usize;
-        for at in 0..self.pixels.len() {
-            if self.pixels[at].samples > 0 {
+        let TileSums { pixels, features, tints, guides } = Arc::make_mut(&mut self.sums);
+        for at in 0..pixels.len() {
+            if pixels[at].samples > 0 {
                 continue;
             }
             let (x, y) = (at % width, at / width);
             let from = (y - y % side) * width + (x - x % side);
-            self.pixels[at] = self.pixels[from];
-            if let Some(&tint) = self.tints.get(from) {
-                self.tints[at] = tint;
+            pixels[at] = pixels[from];
+            if let Some(&tint) = tints.get(from) {
+                tints[at] = tint;
             }
-            if let Some(&sums) = self.features.get(from) {
-                self.features[at] = sums;
+            if let Some(&sums) = features.get(from) {
+                features[at] = sums;
             }
-            if let Some(&guide) = self.guides.get(from) {
-                self.guides[at] = guide;
+            if let Some(&guide) = guides.get(from) {
+                guides[at] = guide;
             }
         }
     }

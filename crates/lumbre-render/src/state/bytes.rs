@@ -1,22 +1,25 @@
 //! The state of a render as bytes.
 //!
-//! Numbers are little-endian. After a head come planes: one number of every pixel, row by row, each as the lowest `n` bytes of its
-//! two's complement, where `n`, the first byte of the plane, is as small as all of them allow.
+//! Numbers are little-endian. After a head come strips of [`STRIP`] rows, so that neither writing nor reading needs all bytes in memory. A
+//! strip has planes: one number of every pixel, row by row, each as the lowest `n` bytes of its two's complement, where `n`, the first byte
+//! of the plane, is as small as all of them allow.
+
+use std::io::{self, Read, Write};
 
 use crate::film::{ExactSum, Extras, FeatureSums, GuideSums, MAX_PIXELS, Pixel, Tile, Tint};
 use crate::state::{Piece, REMEMBERED, RenderState};
 use crate::{DroppedSample, PixelBounds, RayCounts};
 
 /// What is wrong with the bytes of a state.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum StateError {
+    /// They cannot be read.
+    #[error("cannot read: {0}")]
+    Io(io::Error),
     /// They end too early.
     #[error("it ends too early")]
     Truncated,
-    /// More follows.
-    #[error("more follows than its head says")]
-    TooLong,
     /// Its numbers make no state.
     #[error("its {0} make no sense")]
     Invalid(&'static str),
@@ -28,12 +31,42 @@ pub enum StateError {
     },
 }
 
+impl From<io::Error> for StateError {
+    fn from(error: io::Error) -> Self {
+        if error.kind() == io::ErrorKind::UnexpectedEof { Self::Truncated } else { Self::Io(error) }
+    }
+}
+
 /// Pieces at most.
 const MAX_PIECES: u32 = 1 << 20;
+/// Rows of a strip.
+const STRIP: u32 = 16;
 
 impl RenderState {
-    /// The state as bytes: the same for the same state, whatever it was merged of.
-    pub fn to_bytes(&self) -> Vec<u8> {
+    /// Writes the state as bytes: the same for the same state, whatever it was merged of. Sums are dropped as they are written, unless others
+    /// share them.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write_to(mut self, out: &mut dyn Write) -> io::Result<()> {
+        out.write_all(&self.head())?;
+        let (bounds, extras) = (self.bounds, self.extras());
+        let mut bytes = Vec::new();
+        for place in strips(bounds) {
+            let mut strip = Tile::new(place, extras);
+            self.tiles.iter().for_each(|tile| strip.take(tile));
+            self.tiles.retain(|tile| tile.bounds().y1 > place.y1);
+            planes(out, &mut bytes, strip.pixels(), pixel_numbers)?;
+            planes(out, &mut bytes, strip.tints(), |tint| [tint.red, tint.blue].map(ExactSum::units))?;
+            planes(out, &mut bytes, strip.features(), feature_numbers)?;
+            planes(out, &mut bytes, strip.guides(), |guide| {
+                guide.words().map(|word| i128::from(word as i32))
+            })?;
+        }
+        Ok(())
+    }
+
+    fn head(&self) -> Vec<u8> {
         let mut out = Vec::new();
         let mut words = |words: &[u32]| words.iter().for_each(|word| out.extend(word.to_le_bytes()));
         words(&corners(self.bounds()));
@@ -50,20 +83,15 @@ impl RenderState {
         self.first_dropped.iter().for_each(|d| words(&[d.x, d.y, d.sample]));
         let counts = [self.rays.camera, self.rays.bounce, self.rays.shadow, self.dropped, self.clamped];
         counts.into_iter().chain([extras.depth_unit.to_bits()]).for_each(|n| out.extend(n.to_le_bytes()));
-        let film = self.film();
-        planes(&mut out, film.pixels(), pixel_numbers);
-        planes(&mut out, film.tints(), |tint| [tint.red, tint.blue].map(ExactSum::units));
-        planes(&mut out, film.features(), feature_numbers);
-        planes(&mut out, film.guides(), |guide| guide.words().map(i128::from));
         out
     }
 
-    /// The state of bytes that take no more than so many bytes of memory.
+    /// Reads a state that takes no more than so many bytes of memory.
     ///
     /// # Errors
     /// [`StateError`].
-    pub fn from_bytes(bytes: &[u8], most_memory: u64) -> Result<Self, StateError> {
-        let mut input = Input(bytes);
+    pub fn read_from(input: &mut dyn Read, most_memory: u64) -> Result<Self, StateError> {
+        let mut input = Input(input);
         let bounds = input.bounds()?;
         if bounds.is_empty() || bounds.area() > MAX_PIXELS {
             return Err(StateError::Invalid("bounds"));
@@ -100,20 +128,28 @@ impl RenderState {
         if needed > most_memory {
             return Err(StateError::TooLarge { needed });
         }
-        let mut film = Tile::new(bounds, extras);
-        let (pixels, tints, features, guides) = film.sums_mut();
-        input.planes(pixels, pixel_of)?;
-        input.planes(tints, |[red, blue]| {
-            Some(Tint { red: ExactSum::from_units(red), blue: ExactSum::from_units(blue) })
-        })?;
-        input.planes(features, |numbers| Some(features_of(numbers)))?;
-        input.planes(guides, |numbers| Some(GuideSums::of_words(numbers.map(|number| number as u32))))?;
-        if !input.0.is_empty() {
-            return Err(StateError::TooLong);
+        let mut tiles = Vec::new();
+        for place in strips(bounds) {
+            let mut strip = Tile::new(place, extras);
+            let (pixels, tints, features, guides) = strip.sums_mut();
+            input.planes(pixels, pixel_of)?;
+            input.planes(tints, |[red, blue]| {
+                Some(Tint { red: ExactSum::from_units(red), blue: ExactSum::from_units(blue) })
+            })?;
+            input.planes(features, |numbers| Some(features_of(numbers)))?;
+            input.planes(guides, |numbers| Some(GuideSums::of_words(numbers.map(|number| number as u32))))?;
+            tiles.push(strip);
         }
         let rays = RayCounts { camera, bounce, shadow };
-        Ok(Self { bounds, tiles: vec![film], pieces, rays, dropped, clamped, first_dropped })
+        Ok(Self { bounds, tiles, pieces, rays, dropped, clamped, first_dropped })
     }
+}
+
+/// The strips of a picture, from above.
+fn strips(bounds: PixelBounds) -> impl Iterator<Item = PixelBounds> {
+    let y1 = bounds.y1;
+    let ends = move |y0: u32| PixelBounds { y0, y1: y0.saturating_add(STRIP).min(y1), ..bounds };
+    (bounds.y0..bounds.y1).step_by(STRIP as usize).map(ends)
 }
 
 fn corners(bounds: PixelBounds) -> [u32; 4] {
@@ -152,49 +188,50 @@ fn features_of(numbers: [i128; 11]) -> FeatureSums {
     FeatureSums { albedo: [r, g, b], normal: [x, y, z], depth, uv: [u, v], met, weight }
 }
 
-/// Writes a plane for each number of the sums.
-fn planes<T, const N: usize>(out: &mut Vec<u8>, sums: &[T], numbers: impl Fn(&T) -> [i128; N]) {
+/// Writes a plane for each number of the sums, each put together in `bytes`.
+fn planes<T, const N: usize>(
+    out: &mut dyn Write,
+    bytes: &mut Vec<u8>,
+    sums: &[T],
+    numbers: impl Fn(&T) -> [i128; N],
+) -> io::Result<()> {
     if sums.is_empty() {
-        return;
+        return Ok(());
     }
     // Of each plane, the bits that differ from the sign in any number, and whether any is other than 0.
     let mut bits = [0_i128; N];
     let mut is_used = [false; N];
-    for sums in sums {
-        for (i, number) in numbers(sums).into_iter().enumerate() {
+    let all: Vec<[i128; N]> = sums.iter().map(numbers).collect();
+    for numbers in &all {
+        for (i, number) in numbers.iter().enumerate() {
             bits[i] |= number ^ (number >> 127);
-            is_used[i] |= number != 0;
+            is_used[i] |= *number != 0;
         }
     }
     for i in 0..N {
         let width = if is_used[i] { (128 - bits[i].leading_zeros() as usize) / 8 + 1 } else { 0 };
-        out.push(width as u8);
-        let start = out.len();
-        let end = start + width * sums.len();
+        bytes.clear();
+        bytes.push(width as u8);
+        let end = 1 + width * sums.len();
         // Each is written whole, as that is faster, and the next one takes the place of what is too much of it.
-        out.resize(end + 16, 0);
-        for (k, sums) in sums.iter().enumerate() {
-            let at = start + width * k;
-            out[at..at + 16].copy_from_slice(&numbers(sums)[i].to_le_bytes());
+        bytes.resize(end + 16, 0);
+        for (k, numbers) in all.iter().enumerate() {
+            let at = 1 + width * k;
+            bytes[at..at + 16].copy_from_slice(&numbers[i].to_le_bytes());
         }
-        out.truncate(end);
+        out.write_all(&bytes[..end])?;
     }
+    Ok(())
 }
 
 /// What is left to read.
-struct Input<'a>(&'a [u8]);
+struct Input<'a>(&'a mut dyn Read);
 
-impl<'a> Input<'a> {
-    fn take(&mut self, count: usize) -> Result<&'a [u8], StateError> {
-        let (taken, rest) = self.0.split_at_checked(count).ok_or(StateError::Truncated)?;
-        self.0 = rest;
-        Ok(taken)
-    }
-
+impl Input<'_> {
     fn word(&mut self) -> Result<u32, StateError> {
-        let (bytes, rest) = self.0.split_first_chunk().ok_or(StateError::Truncated)?;
-        self.0 = rest;
-        Ok(u32::from_le_bytes(*bytes))
+        let mut bytes = [0; 4];
+        self.0.read_exact(&mut bytes)?;
+        Ok(u32::from_le_bytes(bytes))
     }
 
     fn words<const N: usize>(&mut self) -> Result<[u32; N], StateError> {
@@ -228,16 +265,25 @@ impl<'a> Input<'a> {
         if sums.is_empty() {
             return Ok(());
         }
-        let mut planes: [(usize, &[u8]); N] = [(0, &[]); N];
-        for plane in &mut planes {
-            let width = usize::from(self.take(1)?[0]);
+        let mut all = vec![[0; N]; sums.len()];
+        let mut bytes = Vec::new();
+        for i in 0..N {
+            let mut width = [0];
+            self.0.read_exact(&mut width)?;
+            let width = usize::from(width[0]);
             if width > 16 {
                 return Err(StateError::Invalid("planes"));
             }
-            *plane = (width, self.take(width * sums.len())?);
+            if width == 0 {
+                continue;
+            }
+            bytes.resize(width * sums.len(), 0);
+            self.0.read_exact(&mut bytes)?;
+            for (numbers, bytes) in all.iter_mut().zip(bytes.chunks_exact(width)) {
+                numbers[i] = number(bytes);
+            }
         }
-        for (i, sums) in sums.iter_mut().enumerate() {
-            let numbers = planes.map(|(width, bytes)| number(&bytes[i * width..(i + 1) * width]));
+        for (sums, numbers) in sums.iter_mut().zip(all) {
             *sums = of(numbers).ok_or(StateError::Invalid("counts"))?;
         }
         Ok(())
@@ -261,7 +307,7 @@ mod tests {
     use crate::film::{Exposure, FeatureSample, Sample};
 
     fn state() -> RenderState {
-        let bounds = PixelBounds { x0: 5, y0: 2, x1: 9, y1: 5 };
+        let bounds = PixelBounds { x0: 5, y0: 2, x1: 9, y1: 21 };
         let extras = Extras { features: true, tints: true, guides: true, depth_unit: 0.25 };
         let mut film = Tile::new(bounds, extras);
         let mut random = RandomStream::new(1);
@@ -295,36 +341,45 @@ mod tests {
         }
     }
 
+    fn bytes_of(state: &RenderState) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        state.clone().write_to(&mut bytes).unwrap();
+        bytes
+    }
+
     #[test]
     fn a_state_comes_back_from_its_bytes() {
         let state = state();
-        let bytes = state.to_bytes();
-        let back = RenderState::from_bytes(&bytes, u64::MAX).unwrap();
+        let bytes = bytes_of(&state);
+        let mut rest = &bytes[..];
+        let back = RenderState::read_from(&mut rest, u64::MAX).unwrap();
+        assert_eq!((back.tiles.len(), rest.len()), (2, 0));
         assert_eq!(back.film(), state.film());
-        assert_eq!(back.to_bytes(), bytes);
+        assert_eq!(bytes_of(&back), bytes);
         assert_eq!((back.rays, back.dropped, back.clamped), (state.rays, state.dropped, state.clamped));
         assert_eq!(back.first_dropped, state.first_dropped);
         assert_eq!(back.pieces, [state.pieces[1].clone(), state.pieces[0].clone()]);
+        // However it is cut into tiles.
+        let film = state.film();
+        let tiles = state.bounds.tiles(3).into_iter().rev().map(|tile| film.placed_in(tile)).collect();
+        assert_eq!(bytes_of(&RenderState { tiles, ..state.clone() }), bytes);
     }
 
     #[test]
     fn bytes_that_are_no_state_are_refused() {
-        let bytes = state().to_bytes();
+        let bytes = bytes_of(&state());
         for end in 0..bytes.len() {
-            let error = RenderState::from_bytes(&bytes[..end], u64::MAX).unwrap_err();
+            let error = RenderState::read_from(&mut &bytes[..end], u64::MAX).unwrap_err();
             assert!(matches!(error, StateError::Truncated | StateError::Invalid(_)), "{end}: {error}");
         }
-        let mut longer = bytes.clone();
-        longer.push(0);
-        assert_eq!(RenderState::from_bytes(&longer, u64::MAX), Err(StateError::TooLong));
-        assert!(matches!(RenderState::from_bytes(&bytes, 100), Err(StateError::TooLarge { .. })));
+        assert!(matches!(RenderState::read_from(&mut &bytes[..], 100), Err(StateError::TooLarge { .. })));
         let mut random = RandomStream::new(2);
         for _ in 0..2000 {
             let mut broken = bytes.clone();
             let place = random.next_below(broken.len().min(300));
             broken[place] = random.next_u64() as u8;
             // Whatever comes of it, it comes without panic and without the memory that a head asks for.
-            let _ = RenderState::from_bytes(&broken, 1 << 20);
+            let _ = RenderState::read_from(&mut &broken[..], 1 << 20);
         }
     }
 
@@ -344,7 +399,7 @@ mod tests {
             // Among smaller ones of either sign.
             let numbers = [0, number, number >> 3, number];
             let mut out = Vec::new();
-            planes(&mut out, &numbers, |number| [*number]);
+            planes(&mut out, &mut Vec::new(), &numbers, |number| [*number]).unwrap();
             assert_eq!((usize::from(out[0]), out.len()), (bytes, 1 + 4 * bytes), "{number}");
             if bytes > 0 {
                 let back = out[1..].chunks(bytes).map(super::number);

@@ -1,0 +1,60 @@
+//! What a denoiser wants to know of a picture.
+
+use crate::film::{Extras, GuideSums, PixelBounds, Tile};
+
+/// The guides of every pixel of a picture. They share the memory of the film: see [`Tile`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Guides {
+    tiles: Vec<Tile>,
+}
+
+impl Guides {
+    /// Those of some tiles.
+    pub(crate) fn new<'t>(tiles: impl Iterator<Item = &'t Tile>) -> Self {
+        Self { tiles: tiles.cloned().collect() }
+    }
+
+    /// The guides of all pixels, in no order.
+    pub fn iter(&self) -> impl Iterator<Item = &GuideSums> {
+        self.tiles.iter().flat_map(Tile::guides)
+    }
+
+    /// The guides of a rectangle of pixels, row by row; those of no sample where there is no pixel.
+    pub fn within(&self, bounds: PixelBounds) -> Vec<GuideSums> {
+        let mut guides = vec![GuideSums::default(); bounds.area() as usize];
+        for tile in &self.tiles {
+            let both = tile.bounds().intersection(&bounds);
+            if both.is_empty() {
+                continue;
+            }
+            for y in both.y0..both.y1 {
+                let (from, to) = (tile.bounds().position(both.x0, y), bounds.position(both.x0, y));
+                let count = both.width() as usize;
+                guides[to..to + count].copy_from_slice(&tile.guides()[from..from + count]);
+            }
+        }
+        guides
+    }
+
+    /// The guides of the first pixel of each square of `side` by `side` pixels of a picture, as those of a small picture.
+    pub(crate) fn smaller(&self, bounds: PixelBounds, side: u32) -> Self {
+        let small = PixelBounds::whole(bounds.width().div_ceil(side), bounds.height().div_ceil(side));
+        let mut film = Tile::new(small, Extras { guides: true, ..Extras::default() });
+        let (_, _, _, guides) = film.sums_mut();
+        for tile in &self.tiles {
+            for ((x, y), guide) in tile.bounds().pixels().zip(tile.guides()) {
+                let (x, y) = (x - bounds.x0, y - bounds.y0);
+                if x.is_multiple_of(side) && y.is_multiple_of(side) {
+                    guides[small.position(x / side, y / side)] = *guide;
+                }
+            }
+        }
+        Self { tiles: vec![film] }
+    }
+
+    /// Those of these tiles, to be changed.
+    #[cfg(test)]
+    pub(crate) fn tiles_mut(&mut self) -> &mut [Tile] {
+        &mut self.tiles
+    }
+}
