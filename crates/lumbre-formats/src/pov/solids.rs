@@ -192,6 +192,8 @@ pub(super) enum Region {
     Not(Arc<Region>),
     All(Vec<Arc<Region>>),
     Any(Vec<Arc<Region>>),
+    /// Where the surface of one of the parts of a group is seen, by what the others are.
+    Others { operation: Operation, parts: Arc<[Arc<Region>]>, except: usize },
 }
 
 impl Region {
@@ -233,6 +235,10 @@ impl Region {
             Self::Not(region) => !region.contains(p),
             Self::All(regions) => regions.iter().all(|region| region.contains(p)),
             Self::Any(regions) => regions.iter().any(|region| region.contains(p)),
+            Self::Others { operation, parts, except } => {
+                let mut others = parts.iter().enumerate().filter(|(j, _)| j != except);
+                others.all(|(j, part)| part.contains(p) == is_inside_of(*operation, j))
+            }
         }
     }
 
@@ -253,7 +259,25 @@ impl Region {
                 }
                 all
             }
+            Self::Others { operation, parts, except } => {
+                // Of very many parts a box would take longer than it saves.
+                let others = parts.iter().enumerate().take(MOST_BOUNDED).filter(|(j, _)| j != except);
+                let around = others.filter(|(j, _)| is_inside_of(*operation, *j));
+                around.filter_map(|(_, part)| part.bounds()).reduce(|a, b| common(&a, &b))
+            }
         }
+    }
+}
+
+/// Of so many parts of an intersection the boxes are looked at.
+const MOST_BOUNDED: usize = 64;
+
+/// Whether the surfaces of a group are inside of its part of a number, or outside.
+fn is_inside_of(operation: Operation, part: usize) -> bool {
+    match operation {
+        Operation::Union | Operation::Merge => false,
+        Operation::Intersection => true,
+        Operation::Difference => part == 0,
     }
 }
 
@@ -360,21 +384,16 @@ pub(super) fn leaves<'o>(
         return;
     };
     around.push(object);
-    let insides: Vec<Arc<Region>> = match operation {
-        Operation::Union if !object.inverse => Vec::new(),
-        _ => parts.iter().map(|part| Region::of(part, &map)).collect(),
+    // What has no inside is shown as far as the others let it be seen, and lets all be seen of them.
+    let nothing = || Arc::new(if *operation == Operation::Intersection { Region::All(Vec::new()) } else { Region::Any(Vec::new()) });
+    let insides: Arc<[Arc<Region>]> = match operation {
+        Operation::Union if !object.inverse => Arc::from([]),
+        _ => parts.iter().map(|part| if has_inside(part) { Region::of(part, &map) } else { nothing() }).collect(),
     };
     for (i, part) in parts.iter().enumerate() {
         let mut within = regions.clone();
-        if has_inside(part) {
-            for (j, other) in insides.iter().enumerate().filter(|(j, _)| *j != i && has_inside(&parts[*j])) {
-                let is_inside = match operation {
-                    Operation::Union | Operation::Merge => false,
-                    Operation::Intersection => true,
-                    Operation::Difference => j == 0,
-                };
-                within.push(if is_inside { Arc::clone(other) } else { Arc::new(Region::Not(Arc::clone(other))) });
-            }
+        if has_inside(part) && insides.len() > 1 {
+            within.push(Arc::new(Region::Others { operation: *operation, parts: Arc::clone(&insides), except: i }));
         }
         let is_cut = *operation == Operation::Difference && i > 0;
         leaves(part, &map, &within, is_flipped ^ is_cut, around, visit);
