@@ -44,6 +44,12 @@ fn assert_same(a: &Rendered, b: &Rendered, what: &str) {
     assert!((noise(a) - noise(b)).abs() < 1e-12 * noise(b), "{what}");
 }
 
+fn bytes_of(state: &RenderState) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    state.clone().write_to(&mut bytes).unwrap();
+    bytes
+}
+
 #[test]
 fn a_render_goes_on_from_any_state_to_the_same_picture() {
     let scene = Scene::build(still_life(DVec3::ZERO)).unwrap();
@@ -51,7 +57,7 @@ fn a_render_goes_on_from_any_state_to_the_same_picture() {
         let whole = run(&scene, &options, None, None).unwrap();
         let states = RefCell::new(Vec::new());
         // Without a pause between two looks: a state of every wave, also from the first, coarse pass.
-        let keep = |state: RenderState| states.borrow_mut().push(state.to_bytes());
+        let keep = |state: RenderState| states.borrow_mut().push(bytes_of(&state));
         let keeper = Keeper { every: Duration::ZERO, keep: &keep };
         let mut slow = options.clone();
         slow.threads = 1;
@@ -61,13 +67,13 @@ fn a_render_goes_on_from_any_state_to_the_same_picture() {
         assert_same(&kept.0, &small.0, "with hand-overs");
         let states = states.into_inner();
         assert!(states.len() > 20, "{}", states.len());
-        let state_of = |bytes: &Vec<u8>| RenderState::from_bytes(bytes, u64::MAX).unwrap();
+        let state_of = |bytes: &Vec<u8>| RenderState::read_from(&mut &bytes[..], u64::MAX).unwrap();
         assert!(states.iter().map(state_of).any(|state| state.least_samples() == 0 && state.taken() > 0));
         for state in states.iter().step_by(7).map(state_of) {
             assert!(state.taken() < state.wanted());
             let resumed = run(&scene, &slow, Some(state), None).unwrap();
             assert_same(&resumed.0, &small.0, "resumed");
-            assert_eq!(resumed.1.to_bytes(), small.1.to_bytes());
+            assert_eq!(bytes_of(&resumed.1), bytes_of(&small.1));
         }
         // More samples for a finished render.
         let mut fewer = options.clone();
