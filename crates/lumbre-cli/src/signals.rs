@@ -30,7 +30,7 @@ pub(crate) enum Phase {
 }
 
 /// How much later than its end preparing may be done, for a coarse picture rather than none.
-const PREPARING_GRACE: Duration = Duration::from_secs(1);
+const PREPARING_GRACE: Duration = Duration::from_secs(10);
 /// How long a render may take to stop.
 const GRACE: Duration = Duration::from_millis(1500);
 /// How much later than its end a render may stop by itself: its first, coarse picture is taken whatever the time.

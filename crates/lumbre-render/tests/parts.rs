@@ -44,9 +44,9 @@ fn assert_same(a: &Rendered, b: &Rendered, what: &str) {
     assert!((noise(a) - noise(b)).abs() < 1e-12 * noise(b), "{what}");
 }
 
-fn bytes_of(state: RenderState) -> Vec<u8> {
+fn bytes_of(state: &RenderState) -> Vec<u8> {
     let mut bytes = Vec::new();
-    state.write_to(&mut bytes).unwrap();
+    state.clone().write_to(&mut bytes).unwrap();
     bytes
 }
 
@@ -57,7 +57,7 @@ fn a_render_goes_on_from_any_state_to_the_same_picture() {
         let whole = run(&scene, &options, None, None).unwrap();
         let states = RefCell::new(Vec::new());
         // Without a pause between two looks: a state of every wave, also from the first, coarse pass.
-        let keep = |state: RenderState| states.borrow_mut().push(bytes_of(state));
+        let keep = |state: RenderState| states.borrow_mut().push(bytes_of(&state));
         let keeper = Keeper { every: Duration::ZERO, keep: &keep };
         let mut slow = options.clone();
         slow.threads = 1;
@@ -73,7 +73,7 @@ fn a_render_goes_on_from_any_state_to_the_same_picture() {
             assert!(state.taken() < state.wanted());
             let resumed = run(&scene, &slow, Some(state), None).unwrap();
             assert_same(&resumed.0, &small.0, "resumed");
-            assert_eq!(bytes_of(resumed.1), bytes_of(small.1.clone()));
+            assert_eq!(bytes_of(&resumed.1), bytes_of(&small.1));
         }
         // More samples for a finished render.
         let mut fewer = options.clone();

@@ -183,15 +183,15 @@ fn filter_block(
                     sum_across(&differences, first, across);
                     continue;
                 }
-                let known =
-                    (&layer.known[half][here..][..outer.len()], &layer.known[half][there..][..outer.len()]);
+                let known = &layer.known[half];
+                let (p, q) = (&known[here..][..outer.len()], &known[there..][..outer.len()]);
                 for x in 0..outer.len() {
-                    inside[x] *= known.0[x] * known.1[x];
+                    inside[x] *= p[x] * q[x];
                 }
                 sum_across(&differences, first, across);
                 let inside = &mut differences[before..][..outer.len()];
                 for x in 0..outer.len() {
-                    inside[x] = known.0[x] * known.1[x];
+                    inside[x] = p[x] * q[x];
                 }
                 sum_across(&differences, first, &mut pairs[half][place..][..across_width]);
             }
@@ -215,8 +215,8 @@ fn filter_block(
                     }
                 }
                 if is_known[half] {
-                    for x in 0..span {
-                        weights[x] *= share;
+                    for weight in weights.iter_mut() {
+                        *weight *= share;
                     }
                 } else {
                     let compared = &mut compared[..span];

@@ -52,11 +52,11 @@ impl<const UNDER: usize> RatioSums<UNDER> {
                 self.odd_over[c] += over[c];
             }
         }
-        for c in 0..UNDER {
-            self.under[c] += under[c];
-            self.under_squares[c] += under[c] * under[c];
+        for (c, under) in under.into_iter().enumerate() {
+            self.under[c] += under;
+            self.under_squares[c] += under * under;
             if is_odd {
-                self.odd_under[c] += under[c];
+                self.odd_under[c] += under;
             }
         }
     }
