@@ -7,9 +7,9 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use lumbre::DVec3;
 use lumbre::geometry::{CurveBasis, CurveKind, Curves, Ray, Strand};
 use lumbre::kernel::{Accel, BuildOptions, Geometry, GeometryKind};
-use lumbre::DVec3;
 use lumbre::math::random::RandomStream;
 
 fn vector(random: &mut RandomStream) -> DVec3 {
