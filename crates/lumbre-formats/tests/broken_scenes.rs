@@ -292,7 +292,7 @@ const CASES: &[(&str, &str)] = &[
     ),
     (
         "WorldBegin Material \"hair\" \"rgb sigma_a\" [1 -1 0]",
-        "1:28: parameter \"sigma_a\" of material \"hair\" is out of range (found -1; expected 0 or more)",
+        "1:28: wrong value for parameter \"sigma_a\" (found 1 -1 0; expected 3 numbers that are not negative)",
     ),
     ("WorldBegin Shape \"plymesh\"", "1:12: a plymesh has no \"string filename\""),
     (

@@ -462,7 +462,7 @@ fn what_is_not_rendered_is_said_and_still_counts() {
            Shape "sphere""#,
     );
     assert!(
-        warnings[0].ends_with("shape \"nurbs\" of pbrt-v3 is not rendered: it is left out"),
+        warnings[1].ends_with("shape \"nurbs\" of pbrt-v3 is not rendered: it is left out"),
         "{warnings:?}"
     );
     assert_eq!((scene.shapes.len(), scene.shapes[0].index), (1, 1));

@@ -149,12 +149,6 @@ impl Curves {
         self
     }
 
-    /// The same curves, in as many primitives as suit a tree.
-    #[must_use]
-    pub fn for_tree(self) -> Self {
-        self.with_splits(0)
-    }
-
     /// How each is shaded.
     pub fn kind(&self) -> CurveKind {
         self.kind

@@ -26,9 +26,6 @@ use crate::{
     extent, framing, ground, stage, studio,
 };
 
-/// Segments of curves are this often halved for the tree.
-const CURVE_SPLITS: u32 = 1;
-
 /// The maximal depth of nested objects.
 const MAX_NESTING: usize = 64;
 
@@ -337,7 +334,6 @@ impl Builder {
                         Some(emission(light, || standing.area_factor() * growth * curves.area()));
                     self.warnings.push(BuildWarning::UnsampledLight { shape: desc.index });
                 }
-                let curves = Arc::new(Arc::unwrap_or_clone(curves).with_splits(CURVE_SPLITS));
                 entry.form = Form::Curves(curves.clone(), Box::new(desc.world_from_object));
                 let placed = custom::placed(curves, desc.world_from_object);
                 self.push(entry, geometries, GeometryKind::Custom(placed))?;

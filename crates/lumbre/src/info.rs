@@ -100,7 +100,7 @@ pub fn predicted_build_bytes(desc: &SceneDesc) -> u64 {
     // Each object that is placed has a tree of its own, however small; of the others, there is only a list.
     const PLACED: u64 = 4096;
     const OBJECT: u64 = 160;
-    // A segment of a curve is two primitives.
+    // Measured for hairs of two segments, which took 350 to 440 bytes in the tree.
     const SEGMENT: u64 = 256;
     let (mut triangles, mut others, mut lights) = (0_u64, 0_u64, desc.lights.len() as u64);
     let mut segments = 0_u64;

@@ -1,16 +1,16 @@
 //! How long a tree of many hairs takes to build, what it weighs, and how many rays a second it answers.
 //!
-//! `cargo run --release -p lumbre-kernel --example curve_speed -- 1000000 1`: so many hairs, each segment halved so often.
+//! `cargo run --release -p lumbre --example curve_speed -- 1000000 1`: so many hairs, each segment halved so often.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "an example may")]
 
 use std::sync::Arc;
 use std::time::Instant;
 
-use lumbre_geometry::{CurveBasis, CurveKind, Curves, Ray, Strand};
-use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind};
-use lumbre_math::DVec3;
-use lumbre_math::random::RandomStream;
+use lumbre::DVec3;
+use lumbre::geometry::{CurveBasis, CurveKind, Curves, Ray, Strand};
+use lumbre::kernel::{Accel, BuildOptions, Geometry, GeometryKind};
+use lumbre::math::random::RandomStream;
 
 fn vector(random: &mut RandomStream) -> DVec3 {
     DVec3::from_array(std::array::from_fn(|_| 2.0 * random.next_f64() - 1.0))
