@@ -74,7 +74,8 @@ impl SubsurfaceParams {
                 let extinction = path.map(|path| 1.0 / path.max(LEAST_PATH));
                 // The share of even light from inside that the boundary reflects back.
                 let back = 1.0 - transmitted_from_outside(index(self.eta)) / index(self.eta).powi(2);
-                let albedo = reflectance.evaluate(at).map(|c| albedo_of_body(crate::unit(c), back, asymmetry));
+                let albedo =
+                    reflectance.evaluate(at).map(|c| albedo_of_body(crate::unit(c), back, asymmetry));
                 HomogeneousMedium { extinction, albedo, asymmetry }
             }
         }
