@@ -400,7 +400,7 @@ const CASES: &[(&str, &str)] = &[
     ),
     (
         "WorldBegin Material \"subsurface\" \"string name\" \"Skin\"",
-        "1:34: unknown medium \"Skin\" (did you mean \"Skin1\"?; expected the name of a measured medium)",
+        "1:34: unknown medium \"Skin\" (expected the name of a measured medium; did you mean \"Skin1\"?)",
     ),
     (
         "WorldBegin Material \"subsurface\" \"rgb sigma_s\" [1 2 3]",
@@ -408,7 +408,7 @@ const CASES: &[(&str, &str)] = &[
     ),
     (
         "WorldBegin Material \"subsurface\" \"rgb reflectance\" [.5 .5 .5] \"rgb mfp\" [1 0 2]",
-        "1:65: parameter \"mfp\" of material \"subsurface\" is out of range (found 0; expected more than 0)",
+        "1:63: parameter \"mfp\" of material \"subsurface\" is out of range (found 0; expected more than 0)",
     ),
     (
         "Camera \"realistic\" WorldBegin",

@@ -90,7 +90,7 @@ fn a_deep_body_gives_back_the_share_that_is_asked_for_under_a_sky_and_under_a_di
     for (channel, found) in render(desc, peer(top, DVec3::Z), 1, 4, 4096).into_iter().enumerate() {
         // What is reflected, and the share of what enters. At one bounce: the way below the surface does not count.
         let expected = bare + (1.0 - bare) * f64::from(reflectance.to_array()[channel]);
-        assert_close(found, expected, 0.04, &format!("sky {channel}"));
+        assert_close(found, expected, 0.06, &format!("sky {channel}"));
     }
     // Two thirds of the way down from the zenith.
     let (mut desc, top) = deep(reflectance);
@@ -105,7 +105,7 @@ fn a_deep_body_gives_back_the_share_that_is_asked_for_under_a_sky_and_under_a_di
         let share = f64::from(reflectance.to_array()[channel]);
         let through = 1.0 - f64::from(fresnel::dielectric(slant.cos() as f32, ETA));
         let even = through * slant.cos() / (std::f64::consts::PI * passes);
-        assert_close(found, 2.0 * (1.0 - bare) * share * even, 0.04, &format!("distant {channel}"));
+        assert_close(found, 2.0 * (1.0 - bare) * share * even, 0.06, &format!("distant {channel}"));
     }
 }
 

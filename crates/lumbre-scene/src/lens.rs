@@ -36,7 +36,8 @@ impl ApertureImage {
     pub fn new(width: usize, height: usize, mut values: Vec<f32>) -> Option<Self> {
         let mean = values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len() as f64;
         let fits = width > 0 && height > 0 && width.checked_mul(height) == Some(values.len());
-        if !fits || !(mean > 0.0 && mean.is_finite()) || values.iter().any(|&v| v < 0.0) {
+        let lets_light_through = mean > 0.0 && mean.is_finite() && values.iter().all(|&v| v >= 0.0);
+        if !fits || !lets_light_through {
             return None;
         }
         let scale = (FRAC_PI_4 / mean) as f32;
@@ -78,7 +79,8 @@ impl ApertureImage {
 
     /// The share at a point of the stop, whose square is [-1, 1]²: linear between the middles of pixels.
     fn at(&self, point: DVec2) -> f64 {
-        if !(point.abs().max_element() <= 1.0) {
+        let is_inside = point.abs().max_element() <= 1.0;
+        if !is_inside {
             return 0.0;
         }
         let place = |v: f64, count: usize| {
@@ -172,7 +174,8 @@ impl Lens {
             let numbers = [s.curvature, s.thickness, s.eta, s.aperture];
             numbers.iter().all(|v| v.is_finite()) && s.thickness >= 0.0 && s.eta >= 0.0 && s.aperture > 0.0
         };
-        if surfaces.is_empty() || !surfaces.iter().all(is_surface) || !(diagonal > 0.0) {
+        let has_film = diagonal > 0.0;
+        if surfaces.is_empty() || !surfaces.iter().all(is_surface) || !has_film {
             return Err(LensError::Surface);
         }
         let mut lens = Self { surfaces, stop, diagonal, focal_length: 0.0, pupils: vec![] };
@@ -278,7 +281,8 @@ impl Lens {
             _ if off_axis.length_squared() > surface.aperture * surface.aperture => return None,
             _ => 1.0,
         };
-        if !(share > 0.0) {
+        let passes = share > 0.0;
+        if !passes {
             return None;
         }
         line.origin = point;
@@ -320,7 +324,8 @@ impl Lens {
         let image = 0.5 * (between - under.sqrt());
         let last = self.surfaces.len() - 1;
         let thickness = self.surfaces[last].thickness + image - film_side;
-        if !(thickness > 0.0) {
+        let is_before = thickness > 0.0;
+        if !is_before {
             return Err(LensError::TooNear);
         }
         self.surfaces[last].thickness = thickness;

@@ -99,9 +99,8 @@ impl MeasuredTables {
     /// f · |cos θi| and the density of [`MeasuredTables::sample`].
     fn eval(&self, wo: Vec3, wi: Vec3) -> (Spectrum, f32) {
         const NONE: (Spectrum, f32) = (Spectrum::BLACK, 0.0);
-        let sides = wo.z * wi.z;
-        // False for NaN.
-        if !(sides > 0.0) {
+        let on_one_side = wo.z * wi.z > 0.0;
+        if !on_one_side {
             return NONE;
         }
         let flip = if wo.z < 0.0 { -1.0 } else { 1.0 };

@@ -100,8 +100,6 @@ fn context(row: &Row) -> &'static str {
     match &*row.name {
         "v1" | "v2" => " \"string mapping\" \"planar\"",
         "mfp" => " \"rgb reflectance\" [0.5 0.5 0.5]",
-        "sigma_a" if row.default.is_none() => " \"rgb sigma_s\" [1 1 1]",
-        "sigma_s" if row.default.is_none() => " \"rgb sigma_a\" [1 1 1]",
         _ => "",
     }
 }

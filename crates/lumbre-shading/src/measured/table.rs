@@ -50,7 +50,7 @@ impl Table {
     /// `None` unless there are whole slices of at least 2 × 2 numbers.
     pub(super) fn new([height, width]: [usize; 2], values: Vec<f32>) -> Option<Self> {
         let each = height.checked_mul(width)?;
-        let is_whole = height >= 2 && width >= 2 && !values.is_empty() && values.len() % each == 0;
+        let is_whole = height >= 2 && width >= 2 && !values.is_empty() && values.len().is_multiple_of(each);
         is_whole.then_some(Self { width, height, values })
     }
 
@@ -132,7 +132,7 @@ impl Warp {
                 values.fill(1.0);
             }
             let mut below = 0.0;
-            for y in 0..height {
+            for (y, up) in up.iter_mut().enumerate() {
                 let mut sum = 0.0;
                 for x in 1..width {
                     let place = y * width + x;
@@ -142,7 +142,7 @@ impl Warp {
                 if y > 0 {
                     let row = |y: usize| f64::from(along[y * width + width - 1]);
                     below += 0.5 * dy * (row(y - 1) + row(y));
-                    up[y] = below as f32;
+                    *up = below as f32;
                 }
             }
         }
