@@ -311,7 +311,7 @@ impl Pattern {
             }
             PatternKind::Slope(slope) => slope.value(p, eye),
             PatternKind::AngleOfIncidence => {
-                eye.normal.dot(eye.direction).clamp(-1.0, 1.0).arc_cosine() / PI
+                (-eye.normal.dot(eye.direction)).clamp(-1.0, 1.0).arc_cosine() / PI
             }
             PatternKind::Spiral1(arms) => spiral(p, *arms, self.own_turbulence(p)).0,
             PatternKind::Spiral2(arms) => {
