@@ -28,7 +28,8 @@ fn written(statements: &str) -> String {
     let text = format!("#fopen F \"f\" write\n{statements}\n#fclose F");
     let budget = Budget::default();
     let options = PovOptions::default();
-    let files = written_files(&text, "a.pov", Path::new("/nowhere"), &options, &budget, &mut Diagnostics::new());
+    let files =
+        written_files(&text, "a.pov", Path::new("/nowhere"), &options, &budget, &mut Diagnostics::new());
     files.unwrap_or_else(|error| panic!("{statements}: {error}"))["f"].clone()
 }
 
@@ -95,7 +96,10 @@ fn malformed_scenes_are_errors_with_places() {
         ("#declare Sphere1 = 1; #declare B = Sphere2;", "did you mean \"Sphere1\"?"),
         ("#include \"missing.inc\"", "the file of an #include is not there (found \"missing.inc\""),
         ("#include \"../secret\"", "the file of an #include is not there"),
-        ("#declare A = array[2] { 1, 2 } #declare B = A[2];", "an index that the array does not have (found 2; expected 0 to 1)"),
+        (
+            "#declare A = array[2] { 1, 2 } #declare B = A[2];",
+            "an index that the array does not have (found 2; expected 0 to 1)",
+        ),
         ("#declare A = array[1000000000][1000000000];", "--max-memory"),
         ("#macro M(A) M(A) #end M(1)", "--max-nesting"),
         ("#macro M(A) sphere { 0, A * } #end M(1)", "by the macro M"),

@@ -99,12 +99,20 @@ impl WideProjection {
             Self::UprightCylinder { angle, height, moves } => {
                 let (sine, cosine) = (at.x * angle.to_radians()).sine_cosine();
                 let y = at.y * height;
-                if moves { (DVec3::Y * y, DVec3::new(sine, 0.0, cosine)) } else { (center, DVec3::new(sine, y, cosine)) }
+                if moves {
+                    (DVec3::Y * y, DVec3::new(sine, 0.0, cosine))
+                } else {
+                    (center, DVec3::new(sine, y, cosine))
+                }
             }
             Self::LyingCylinder { angle, width, moves } => {
                 let (sine, cosine) = (at.y * angle.to_radians()).sine_cosine();
                 let x = at.x * width;
-                if moves { (DVec3::X * x, DVec3::new(0.0, sine, cosine)) } else { (center, DVec3::new(x, sine, cosine)) }
+                if moves {
+                    (DVec3::X * x, DVec3::new(0.0, sine, cosine))
+                } else {
+                    (center, DVec3::new(x, sine, cosine))
+                }
             }
             Self::Sphere { angles } => {
                 let (sx, cx) = (at.x * angles.x.to_radians()).sine_cosine();

@@ -163,11 +163,9 @@ impl Light {
             Self::Mesh(light) => light.emitters(&entries[light.entry as usize]),
             Self::Placed(light) => light.emitter(entries).into_iter().collect(),
             Self::Moving(light) => light.emitter(entries).into_iter().collect(),
-            Self::Distant(_)
-            | Self::Uniform(_)
-            | Self::Environment(_)
-            | Self::Portal(_)
-            | Self::Pov(_) => Vec::new(),
+            Self::Distant(_) | Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) | Self::Pov(_) => {
+                Vec::new()
+            }
         }
     }
 

@@ -174,7 +174,8 @@ impl PovLight {
         }
         // A white surface of albedo 1 that faces it has its colour.
         let radiance = self.linear(arriving) * std::f32::consts::PI;
-        let end = Some(LightPoint { point: at + towards * distance, error: DVec3::ZERO, normal: DVec3::ZERO });
+        let end =
+            Some(LightPoint { point: at + towards * distance, error: DVec3::ZERO, normal: DVec3::ZERO });
         Some(LightSample { towards, end, radiance, scatter: Scatter::Delta })
     }
 

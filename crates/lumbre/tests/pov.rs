@@ -140,9 +140,10 @@ fn pictures_are_those_of_povray() {
 fn values_are_those_of_povray() {
     let Some(folder) = folder() else { return };
     let library = Path::new(SYSTEM_LIBRARY[0]);
-    let (Ok(scene), Ok(expected)) =
-        (std::fs::read_to_string(folder.join("values.pov")), std::fs::read_to_string(folder.join("values.csv")))
-    else {
+    let (Ok(scene), Ok(expected)) = (
+        std::fs::read_to_string(folder.join("values.pov")),
+        std::fs::read_to_string(folder.join("values.csv")),
+    ) else {
         return;
     };
     if !library.is_dir() {
@@ -189,7 +190,8 @@ const VALUES_NOT_YET: &[&str] = &[
 
 /// Whether two rows say the same, to some digits.
 fn is_near(found: &str, expected: &str) -> bool {
-    let (found, expected): (Vec<&str>, Vec<&str>) = (found.split(',').collect(), expected.split(',').collect());
+    let (found, expected): (Vec<&str>, Vec<&str>) =
+        (found.split(',').collect(), expected.split(',').collect());
     found.len() == expected.len()
         && found.iter().zip(&expected).all(|(a, b)| match (a.parse::<f64>(), b.parse::<f64>()) {
             (Ok(a), Ok(b)) => (a - b).abs() <= 2e-6 * (1.0 + b.abs()),

@@ -9,8 +9,8 @@ use lumbre_image::{Image, Rgb};
 use lumbre_math::{DVec3, Elementary, Transform, Vec2};
 use lumbre_scene::pov::PovWorld;
 use lumbre_scene::{
-    AreaLightDesc, EnvironmentDesc, EnvironmentMapping, FilterDesc, GeometryDesc, IntegratorDesc, IntegratorKind, LightDesc,
-    MaterialId, NamedMaterial, SceneDesc, ShapeDesc, UpAxis, WithoutLight,
+    AreaLightDesc, EnvironmentDesc, EnvironmentMapping, FilterDesc, GeometryDesc, IntegratorDesc,
+    IntegratorKind, LightDesc, MaterialId, NamedMaterial, SceneDesc, ShapeDesc, UpAxis, WithoutLight,
 };
 use lumbre_shading::pov::{Eye, Interior, PovMaterial, Texture, TextureKind, UvForm};
 use lumbre_shading::{Material, MaterialKind, Spectrum};
@@ -151,7 +151,8 @@ fn sky_image(world: &PovWorld) -> EnvironmentDesc {
             pixels.push(linear(c, world.gamma));
         }
     }
-    let image = Image::from_pixels(WIDTH, HEIGHT, pixels).unwrap_or_else(|| Image::filled(1, 1, Rgb::new(0.0, 0.0, 0.0)));
+    let image = Image::from_pixels(WIDTH, HEIGHT, pixels)
+        .unwrap_or_else(|| Image::filled(1, 1, Rgb::new(0.0, 0.0, 0.0)));
     EnvironmentDesc { image: Arc::new(image), mapping: EnvironmentMapping::LatitudeLongitude }
 }
 
@@ -175,7 +176,9 @@ impl Builder {
             return;
         }
         let mut found: Vec<(Leaf<'_>, Vec<&Object>)> = Vec::new();
-        leaves(object, parent, &[], false, &mut Vec::new(), &mut |leaf, around| found.push((leaf, around.to_vec())));
+        leaves(object, parent, &[], false, &mut Vec::new(), &mut |leaf, around| {
+            found.push((leaf, around.to_vec()))
+        });
         for (leaf, around) in found {
             self.leaf(&leaf, &around, parent);
         }
@@ -280,7 +283,9 @@ impl Builder {
         }
         let uv = match &leaf.object.form {
             Form::Sphere(center, radius) => (UvForm::Sphere(*center, *radius), Some(Arc::new(leaf.map))),
-            Form::Cuboid(low, high) => (UvForm::Cuboid(low.min(*high), low.max(*high)), Some(Arc::new(leaf.map))),
+            Form::Cuboid(low, high) => {
+                (UvForm::Cuboid(low.min(*high), low.max(*high)), Some(Arc::new(leaf.map)))
+            }
             Form::Torus(major, _) => (UvForm::Torus(*major), Some(Arc::new(leaf.map))),
             _ => (UvForm::Surface, None),
         };
@@ -292,7 +297,8 @@ impl Builder {
         PovMaterial {
             texture,
             interior_texture,
-            interior: interior.map_or_else(|| Arc::new(Interior::DEFAULT), |interior| Arc::new((*interior).clone())),
+            interior: interior
+                .map_or_else(|| Arc::new(Interior::DEFAULT), |interior| Arc::new((*interior).clone())),
             visibility,
             double_illuminate: any(&|object| object.double_illuminate),
             hollow: any(&|object| object.hollow),
@@ -305,7 +311,8 @@ impl Builder {
     }
 
     fn material_id(&mut self, material: PovMaterial) -> MaterialId {
-        let is_mapped = matches!(&material.texture.kind, TextureKind::Plain(layer) if layer.pigment.uniform().is_none()) && material.uv.1.is_some();
+        let is_mapped = matches!(&material.texture.kind, TextureKind::Plain(layer) if layer.pigment.uniform().is_none())
+            && material.uv.1.is_some();
         let key = Key {
             texture: Arc::as_ptr(&material.texture) as usize,
             inside: material.interior_texture.as_ref().map_or(0, |texture| Arc::as_ptr(texture) as usize),
@@ -336,7 +343,9 @@ impl Builder {
 
     /// The light that a surface gives to path tracers: its emission, and ambient light where it scatters next to nothing.
     fn glow(&self, id: MaterialId) -> Option<AreaLightDesc> {
-        let MaterialKind::Pov(material) = &self.scene.materials[id.0 as usize].material.kind else { return None };
+        let MaterialKind::Pov(material) = &self.scene.materials[id.0 as usize].material.kind else {
+            return None;
+        };
         let TextureKind::Plain(layer) = &material.texture.kind else { return None };
         let colour = layer.pigment.uniform()?;
         let finish = &layer.finish;
@@ -346,13 +355,20 @@ impl Builder {
         }
         let radiance = linear(colour.rgb * strength * material.opacity(colour).max(0.0), self.gamma);
         let is_dark = radiance.r <= 0.0 && radiance.g <= 0.0 && radiance.b <= 0.0;
-        (!is_dark).then_some(AreaLightDesc { radiance, image: None, by_vertices: false, two_sided: true, power: None })
+        (!is_dark).then_some(AreaLightDesc {
+            radiance,
+            image: None,
+            by_vertices: false,
+            two_sided: true,
+            power: None,
+        })
     }
 }
 
 fn hashed(interior: &Interior) -> usize {
     let c = interior.fade_colour;
-    let numbers = [interior.ior, interior.caustics, interior.fade_distance, interior.fade_power, c.r, c.g, c.b];
+    let numbers =
+        [interior.ior, interior.caustics, interior.fade_distance, interior.fade_power, c.r, c.g, c.b];
     numbers.iter().fold(0, |hash: usize, x| hash.wrapping_mul(1_000_003).wrapping_add(x.to_bits() as usize))
 }
 

@@ -112,7 +112,10 @@ impl CameraStatement {
         // Unit axes where they can be, so that a lens is round; else those of the scene, askew.
         let (axes, half) = if is_square {
             let scale = if self.kind == Projection::Orthographic { 1.0 } else { lengths.z };
-            (DMat3::from_cols(right / lengths.x, up / lengths.y, direction / lengths.z), lengths * (0.5 / scale))
+            (
+                DMat3::from_cols(right / lengths.x, up / lengths.y, direction / lengths.z),
+                lengths * (0.5 / scale),
+            )
         } else {
             (DMat3::from_cols(right, up, direction), DVec3::splat(0.5))
         };
@@ -138,9 +141,10 @@ impl CameraStatement {
         let angle = self.angle.unwrap_or(90.0);
         Some(match self.kind {
             Projection::Perspective | Projection::Orthographic => return None,
-            Projection::Fisheye => {
-                WideProjection::Fisheye { angle: self.angle.unwrap_or(180.0), size: DVec2::new(lengths.x, lengths.y) }
-            }
+            Projection::Fisheye => WideProjection::Fisheye {
+                angle: self.angle.unwrap_or(180.0),
+                size: DVec2::new(lengths.x, lengths.y),
+            },
             Projection::UltraWide => {
                 WideProjection::UltraWide { angles: DVec2::new(angle, angle * lengths.y / lengths.x) }
             }
@@ -148,7 +152,9 @@ impl CameraStatement {
             Projection::Cylinder(kind) if kind % 2 == 1 => {
                 WideProjection::UprightCylinder { angle, height: lengths.y, moves: kind == 3 }
             }
-            Projection::Cylinder(kind) => WideProjection::LyingCylinder { angle, width: lengths.x, moves: kind == 4 },
+            Projection::Cylinder(kind) => {
+                WideProjection::LyingCylinder { angle, width: lengths.x, moves: kind == 4 }
+            }
             Projection::Spherical => {
                 let across = self.angle.unwrap_or(360.0);
                 let upwards = self.height_angle.unwrap_or(0.5 * across);
@@ -168,8 +174,10 @@ impl Parser<'_, '_> {
             if self.take(b',')? {
                 continue;
             }
-            let is_transform =
-                matches!(self.word()?.as_deref(), Some("translate" | "rotate" | "scale" | "matrix" | "transform"));
+            let is_transform = matches!(
+                self.word()?.as_deref(),
+                Some("translate" | "rotate" | "scale" | "matrix" | "transform")
+            );
             if is_transform && let Some(map) = self.transform()? {
                 if !std::mem::replace(&mut is_aimed, true) {
                     camera.aim();
@@ -232,8 +240,12 @@ impl Parser<'_, '_> {
                         camera = (*known).clone();
                         is_aimed = true;
                     }
-                    Some(other) => return Err(self.error(format!("a camera is needed, not {}", other.name()))),
-                    None if super::words::is_reserved(&word) => return Err(self.error(format!("{word} has no meaning for a camera"))),
+                    Some(other) => {
+                        return Err(self.error(format!("a camera is needed, not {}", other.name())));
+                    }
+                    None if super::words::is_reserved(&word) => {
+                        return Err(self.error(format!("{word} has no meaning for a camera")));
+                    }
                     None => return Err(self.undeclared(&word)),
                 },
             }

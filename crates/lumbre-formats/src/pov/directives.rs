@@ -191,7 +191,9 @@ impl Parser<'_, '_> {
 
     fn end_block(&mut self) -> Result<()> {
         let Some(frame) = self.frames.last_mut() else { return Ok(()) };
-        let Some(block) = frame.blocks.last_mut() else { return Err(self.error("#end without a directive that it ends")) };
+        let Some(block) = frame.blocks.last_mut() else {
+            return Err(self.error("#end without a directive that it ends"));
+        };
         block.rounds += 1;
         match &block.kind {
             BlockKind::If | BlockKind::Switch => {
@@ -402,7 +404,8 @@ impl Parser<'_, '_> {
         if self.peeked.is_some() {
             return Ok(None);
         }
-        let (Some(Kind::Word(name)), Some(Kind::Mark(b',' | b')'))) = (self.raw_ahead(0), self.raw_ahead(1)) else {
+        let (Some(Kind::Word(name)), Some(Kind::Mark(b',' | b')'))) = (self.raw_ahead(0), self.raw_ahead(1))
+        else {
             return Ok(None);
         };
         let name = Rc::clone(name);
@@ -474,7 +477,9 @@ impl Parser<'_, '_> {
         drop(array);
         let value = self.declared_value()?;
         let mut target = cell.borrow_mut();
-        let Value::Array(array) = &mut *target else { return Err(self.error("what has an index is no array")) };
+        let Value::Array(array) = &mut *target else {
+            return Err(self.error("what has an index is no array"));
+        };
         let array: &mut Array = Rc::make_mut(array);
         if let Some(element) = array.elements.get_mut(index) {
             *element = value;
@@ -537,7 +542,8 @@ impl Parser<'_, '_> {
         let shown: String = text.trim().chars().take(MOST_SHOWN).collect();
         if !shown.is_empty() {
             let message = format!("the scene says: {}", quoted(&shown));
-            let made = if word == "warning" { Diagnostic::warning(message) } else { Diagnostic::note(message) };
+            let made =
+                if word == "warning" { Diagnostic::warning(message) } else { Diagnostic::note(message) };
             let made = self.diagnostic(made);
             self.diagnostics.push(made);
         }

@@ -5,8 +5,8 @@ use std::rc::Rc;
 use lumbre_shading::pov::SplineKind;
 use lumbre_shading::pov::function::{Binary, Unary};
 
-use super::lexer::{GREATER_OR_EQUAL, Kind, LESS_OR_EQUAL, NOT_EQUAL, unescaped};
 use super::functions::NATIVE_PARAMETERS;
+use super::lexer::{GREATER_OR_EQUAL, Kind, LESS_OR_EQUAL, NOT_EQUAL, unescaped};
 use super::value::{Array, Num, Value};
 use super::words::is_reserved;
 use super::{Parser, Result};
@@ -48,7 +48,10 @@ impl Parser<'_, '_> {
         let mut v = num.v;
         // What follows replaces a component.
         while let Some(word) = self.word_if_same_statement()? {
-            let Some(i) = component(&word).filter(|_| word.len() > 1 && &*word != "gray" && &*word != "grey") else { break };
+            let Some(i) = component(&word).filter(|_| word.len() > 1 && &*word != "gray" && &*word != "grey")
+            else {
+                break;
+            };
             self.peeked = None;
             v[i] = self.float()?;
         }
@@ -71,7 +74,8 @@ impl Parser<'_, '_> {
     pub(super) fn expression(&mut self) -> Result<Num> {
         self.depth += 1;
         let checked = self.budget.nesting(self.depth, "expressions");
-        let result = checked.map_err(|e| FormatError::from(e).or_at(|| self.place())).and_then(|()| self.sum());
+        let result =
+            checked.map_err(|e| FormatError::from(e).or_at(|| self.place())).and_then(|()| self.sum());
         self.depth -= 1;
         result
     }
@@ -153,7 +157,9 @@ impl Parser<'_, '_> {
 
     fn comparison(&mut self) -> Result<Num> {
         let mut left = if let Some(order) = self.text_comparison()? { order } else { self.expression()? };
-        while let Some(mark) = self.operator(&[b'<', b'>', b'=', LESS_OR_EQUAL, GREATER_OR_EQUAL, NOT_EQUAL])? {
+        while let Some(mark) =
+            self.operator(&[b'<', b'>', b'=', LESS_OR_EQUAL, GREATER_OR_EQUAL, NOT_EQUAL])?
+        {
             let right = self.expression()?;
             let of = match mark {
                 b'<' => Binary::Less,
@@ -179,7 +185,8 @@ impl Parser<'_, '_> {
             return Ok(None);
         }
         let left = self.string()?;
-        let Some(mark) = self.operator(&[b'<', b'>', b'=', LESS_OR_EQUAL, GREATER_OR_EQUAL, NOT_EQUAL])? else {
+        let Some(mark) = self.operator(&[b'<', b'>', b'=', LESS_OR_EQUAL, GREATER_OR_EQUAL, NOT_EQUAL])?
+        else {
             return Err(self.unexpected("a comparison of texts"));
         };
         let right = self.string()?;
@@ -229,7 +236,9 @@ impl Parser<'_, '_> {
                 value = Num::float(0.297 * value.v[0] + 0.589 * value.v[1] + 0.114 * value.v[2]);
                 continue;
             }
-            let Some(i) = component(&word) else { return Err(self.error("no component of a vector or a colour")) };
+            let Some(i) = component(&word) else {
+                return Err(self.error("no component of a vector or a colour"));
+            };
             value = Num::float(value.promoted(5)[i]);
         }
         Ok(value)
@@ -379,7 +388,8 @@ impl Parser<'_, '_> {
 
     pub(super) fn undeclared(&self, name: &str) -> FormatError {
         let known = self.globals.keys().map(|key| &**key);
-        let wrong = Diagnostic::error("an identifier that is not declared").found(quoted(name)).suggest(name, known);
+        let wrong =
+            Diagnostic::error("an identifier that is not declared").found(quoted(name)).suggest(name, known);
         self.diagnostic(wrong).into()
     }
 
@@ -401,7 +411,9 @@ impl Parser<'_, '_> {
                         Some(element) => value = element,
                     }
                 }
-                Value::Dictionary(entries) if !self.ends_here() && (self.is_mark(b'.')? || self.is_mark(b'[')?) => {
+                Value::Dictionary(entries)
+                    if !self.ends_here() && (self.is_mark(b'.')? || self.is_mark(b'[')?) =>
+                {
                     let entries = Rc::clone(entries);
                     let key: Rc<str> = if self.take(b'.')? {
                         let Some(key) = self.word()? else { return Err(self.unexpected("a key")) };
@@ -456,7 +468,9 @@ impl Parser<'_, '_> {
             let whole = (index + 1e-6 * index.signum()).trunc();
             if !(0.0..size as f64).contains(&whole) {
                 let wrong = Diagnostic::error("an index that the array does not have");
-                return Err(self.diagnostic(wrong.found(index).expected(format!("0 to {}", size.saturating_sub(1)))).into());
+                return Err(self
+                    .diagnostic(wrong.found(index).expected(format!("0 to {}", size.saturating_sub(1))))
+                    .into());
             }
             let rest: usize = array.sizes[taken + 1..].iter().product();
             offset += whole as usize * rest;

@@ -52,7 +52,8 @@ impl Parser<'_, '_> {
 
     /// Whether `{ internal(n) }` comes next.
     fn is_native_call(&mut self) -> Result<bool> {
-        Ok(self.is_mark(b'{')? && matches!(self.raw_ahead(0), Some(Kind::Word(word)) if &**word == "internal"))
+        Ok(self.is_mark(b'{')?
+            && matches!(self.raw_ahead(0), Some(Kind::Word(word)) if &**word == "internal"))
     }
 
     fn native_function(&mut self) -> Result<Arc<Function>> {
@@ -154,7 +155,9 @@ impl Parser<'_, '_> {
 
     fn f_logic(&mut self, draft: &mut Draft) -> Result<Register> {
         self.depth += 1;
-        self.budget.nesting(self.depth, "functions").map_err(|e| FormatError::from(e).or_at(|| self.place()))?;
+        self.budget
+            .nesting(self.depth, "functions")
+            .map_err(|e| FormatError::from(e).or_at(|| self.place()))?;
         let mut left = self.f_comparison(draft)?;
         while let Some(mark) = self.f_operator(b"&|")? {
             let right = self.f_comparison(draft)?;
@@ -178,7 +181,9 @@ impl Parser<'_, '_> {
 
     fn f_comparison(&mut self, draft: &mut Draft) -> Result<Register> {
         let mut left = self.f_sum(draft)?;
-        while let Some(mark) = self.f_operator(&[b'<', b'>', b'=', LESS_OR_EQUAL, GREATER_OR_EQUAL, NOT_EQUAL])? {
+        while let Some(mark) =
+            self.f_operator(&[b'<', b'>', b'=', LESS_OR_EQUAL, GREATER_OR_EQUAL, NOT_EQUAL])?
+        {
             let right = self.f_sum(draft)?;
             let of = match mark {
                 b'<' => Binary::Less,
@@ -283,7 +288,9 @@ impl Parser<'_, '_> {
                 let all = self.f_list(draft)?;
                 return match all[..] {
                     [x, negative, rest] => Ok(draft.push(Operation::Select([x, negative, rest, rest]))),
-                    [x, negative, zero, positive] => Ok(draft.push(Operation::Select([x, negative, zero, positive]))),
+                    [x, negative, zero, positive] => {
+                        Ok(draft.push(Operation::Select([x, negative, zero, positive])))
+                    }
                     _ => Err(self.error("select has two or three choices")),
                 };
             }
@@ -296,7 +303,8 @@ impl Parser<'_, '_> {
                 self.expect(b'(')?;
                 let index = self.whole(0.0, 1000.0)?;
                 self.expect(b')')?;
-                let arguments = (0..draft.parameters.len()).map(|i| draft.push(Operation::Argument(i))).collect();
+                let arguments =
+                    (0..draft.parameters.len()).map(|i| draft.push(Operation::Argument(i))).collect();
                 return Ok(draft.push(Operation::Native(index, arguments)));
             }
             _ => {}
@@ -310,7 +318,11 @@ impl Parser<'_, '_> {
             return Ok(draft.number(value.v[0]));
         }
         let Some(cell) = self.lookup(word).cloned() else {
-            return Err(if super::words::is_reserved(word) { self.unexpected("what a function knows") } else { self.undeclared(word) });
+            return Err(if super::words::is_reserved(word) {
+                self.unexpected("what a function knows")
+            } else {
+                self.undeclared(word)
+            });
         };
         self.peeked = None;
         let value = cell.borrow().clone();

@@ -81,7 +81,23 @@ impl Parser<'_, '_> {
         }
         // The kind is told by the file.
         if !matches!(self.peek()?, Some(Kind::Text(_)))
-            && matches!(self.word()?.as_deref(), Some("png" | "jpeg" | "tga" | "ppm" | "pgm" | "tiff" | "gif" | "sys" | "exr" | "hdr" | "iff" | "pot"))
+            && matches!(
+                self.word()?.as_deref(),
+                Some(
+                    "png"
+                        | "jpeg"
+                        | "tga"
+                        | "ppm"
+                        | "pgm"
+                        | "tiff"
+                        | "gif"
+                        | "sys"
+                        | "exr"
+                        | "hdr"
+                        | "iff"
+                        | "pot"
+                )
+            )
         {
             self.peeked = None;
         }
@@ -94,7 +110,8 @@ impl Parser<'_, '_> {
         match read.and_then(|file| file.to_image(self.budget)) {
             Ok(read) => {
                 (image.width, image.height) = (read.width(), read.height());
-                let mut pixels = self.budget.vec(u64::from(image.width) * u64::from(image.height), "pixels")?;
+                let mut pixels =
+                    self.budget.vec(u64::from(image.width) * u64::from(image.height), "pixels")?;
                 for y in 0..image.height {
                     for x in 0..image.width {
                         let rgb = read.pixel(x, y);
@@ -106,7 +123,8 @@ impl Parser<'_, '_> {
                 image.source = ImageSource::Pixels(pixels.into());
             }
             Err(error) => {
-                let wrong = Diagnostic::warning("an image that cannot be read is black").found(quoted(&error.to_string()));
+                let wrong = Diagnostic::warning("an image that cannot be read is black")
+                    .found(quoted(&error.to_string()));
                 let wrong = self.diagnostic(wrong);
                 self.diagnostics.push(wrong);
             }

@@ -138,8 +138,10 @@ impl Cutter<'_> {
                     return Kind::Mark(pair);
                 }
                 match first {
-                    b'{' | b'}' | b'(' | b')' | b'[' | b']' | b'<' | b'>' | b',' | b';' | b'+' | b'-' | b'*'
-                    | b'/' | b'=' | b'!' | b'&' | b'|' | b'?' | b':' | b'.' | b'#' => Kind::Mark(first),
+                    b'{' | b'}' | b'(' | b')' | b'[' | b']' | b'<' | b'>' | b',' | b';' | b'+' | b'-'
+                    | b'*' | b'/' | b'=' | b'!' | b'&' | b'|' | b'?' | b':' | b'.' | b'#' => {
+                        Kind::Mark(first)
+                    }
                     _ => {
                         // All bytes of one character.
                         while self.peek(0) & 0xC0 == 0x80 {

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use lumbre_math::Transform;
 use lumbre_scene::pov::{PovArea, PovCone, PovLight};
 
-
 use super::objects::Object;
 use super::{Parser, Result};
 
@@ -59,8 +58,12 @@ impl Parser<'_, '_> {
         let light = &mut statement.light;
         match word {
             "color" | "colour" | "rgb" => light.colour = self.rgb()?,
-            "spotlight" => light.cone = Some(PovCone { is_cylinder: false, radius: 30.0, falloff: 45.0, tightness: 0.0 }),
-            "cylinder" => light.cone = Some(PovCone { is_cylinder: true, radius: 0.75, falloff: 1.0, tightness: 0.0 }),
+            "spotlight" => {
+                light.cone = Some(PovCone { is_cylinder: false, radius: 30.0, falloff: 45.0, tightness: 0.0 })
+            }
+            "cylinder" => {
+                light.cone = Some(PovCone { is_cylinder: true, radius: 0.75, falloff: 1.0, tightness: 0.0 })
+            }
             "point_at" => light.point_at = self.vector()?,
             "radius" | "falloff" | "tightness" => {
                 let value = self.finite()?;
@@ -154,4 +157,3 @@ impl Parser<'_, '_> {
         }
     }
 }
-

@@ -29,7 +29,13 @@ impl Parser<'_, '_> {
     pub(super) fn map(&mut self, word: &str) -> Result<Option<Rc<Map>>> {
         let is_map = matches!(
             word,
-            "color_map" | "colour_map" | "pigment_map" | "normal_map" | "texture_map" | "slope_map" | "density_map"
+            "color_map"
+                | "colour_map"
+                | "pigment_map"
+                | "normal_map"
+                | "texture_map"
+                | "slope_map"
+                | "density_map"
         );
         if !is_map {
             return Ok(None);

@@ -57,10 +57,13 @@ impl Parser<'_, '_> {
 
     /// A mesh, up to what modifies it: its triangles by their textures.
     pub(super) fn mesh(&mut self) -> Result<Object> {
-        let mut by_texture: HashMap<usize, (Option<Arc<lumbre_shading::pov::Texture>>, Triangles)> = HashMap::new();
+        let mut by_texture: HashMap<usize, (Option<Arc<lumbre_shading::pov::Texture>>, Triangles)> =
+            HashMap::new();
         loop {
             let word = self.word()?;
-            let Some(word @ ("triangle" | "smooth_triangle" | "inside_vector")) = word.as_deref() else { break };
+            let Some(word @ ("triangle" | "smooth_triangle" | "inside_vector")) = word.as_deref() else {
+                break;
+            };
             self.peeked = None;
             if word == "inside_vector" {
                 self.vector()?;
@@ -115,7 +118,10 @@ impl Parser<'_, '_> {
         Ok(match parts.len() {
             0 => Object::new(Form::Nothing),
             1 => parts.swap_remove(0),
-            _ => Object::new(Form::Group(super::objects::Operation::Union, parts.into_iter().map(Rc::new).collect())),
+            _ => Object::new(Form::Group(
+                super::objects::Operation::Union,
+                parts.into_iter().map(Rc::new).collect(),
+            )),
         })
     }
 
@@ -145,8 +151,8 @@ impl Parser<'_, '_> {
         loop {
             let word = self.word()?;
             let Some(
-                word @ ("vertex_vectors" | "normal_vectors" | "uv_vectors" | "face_indices" | "normal_indices"
-                | "uv_indices" | "texture_list" | "inside_vector"),
+                word @ ("vertex_vectors" | "normal_vectors" | "uv_vectors" | "face_indices"
+                | "normal_indices" | "uv_indices" | "texture_list" | "inside_vector"),
             ) = word.as_deref()
             else {
                 break;
@@ -173,7 +179,8 @@ impl Parser<'_, '_> {
         if has_textures {
             self.warn("the texture_list of a mesh2 is not rendered");
         }
-        let mut all = Triangles { has_normals: !normals.is_empty(), has_uvs: !uvs.is_empty(), ..Triangles::default() };
+        let mut all =
+            Triangles { has_normals: !normals.is_empty(), has_uvs: !uvs.is_empty(), ..Triangles::default() };
         for (i, face) in faces.iter().enumerate() {
             let corner = |list: &[DVec3], face: &[u32; 3]| -> Option<[DVec3; 3]> {
                 let at = |k: usize| list.get(face[k] as usize).copied();
@@ -238,7 +245,8 @@ impl Parser<'_, '_> {
         let Some((origin, s, t)) = plane_of(&points) else {
             return Err(self.error("a polygon without area"));
         };
-        let flat: Vec<DVec2> = points.iter().map(|&p| DVec2::new((p - origin).dot(s), (p - origin).dot(t))).collect();
+        let flat: Vec<DVec2> =
+            points.iter().map(|&p| DVec2::new((p - origin).dot(s), (p - origin).dot(t))).collect();
         let triangles = super::solids::triangulated(&flat);
         let mut all = Triangles::default();
         for triangle in triangles {
@@ -253,7 +261,9 @@ impl Parser<'_, '_> {
         let mut textured = false;
         loop {
             let word = self.word()?;
-            let Some(word @ ("threshold" | "sphere" | "cylinder" | "component")) = word.as_deref() else { break };
+            let Some(word @ ("threshold" | "sphere" | "cylinder" | "component")) = word.as_deref() else {
+                break;
+            };
             self.peeked = None;
             match word {
                 "threshold" => blob.threshold = self.finite()?,
@@ -317,7 +327,10 @@ fn push(all: &mut Triangles, corners: [DVec3; 3], normals: Option<[DVec3; 3]>, u
 /// A point of the plane of a polygon, with two unit vectors in it.
 fn plane_of(points: &[DVec3]) -> Option<(DVec3, DVec3, DVec3)> {
     let origin = *points.first()?;
-    let first = points.iter().map(|&p| p - origin).max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))?;
+    let first = points
+        .iter()
+        .map(|&p| p - origin)
+        .max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))?;
     let s = first.try_normalize()?;
     let across = points
         .iter()

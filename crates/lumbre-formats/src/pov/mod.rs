@@ -203,7 +203,9 @@ impl<'a, 'b> Parser<'a, 'b> {
             self.objects.push(Rc::new(object));
             return Ok(());
         }
-        let Some(word) = self.word()? else { return Err(self.unexpected("an object, a light, a camera or a directive")) };
+        let Some(word) = self.word()? else {
+            return Err(self.unexpected("an object, a light, a camera or a directive"));
+        };
         self.peeked = None;
         match &*word {
             "camera" => {
@@ -430,7 +432,8 @@ impl<'a, 'b> Parser<'a, 'b> {
             }
             return Ok(Array { sizes: vec![elements.len()], elements });
         }
-        let count = sizes.iter().try_fold(1_u64, |count, &size| count.checked_mul(size as u64)).unwrap_or(u64::MAX);
+        let count =
+            sizes.iter().try_fold(1_u64, |count, &size| count.checked_mul(size as u64)).unwrap_or(u64::MAX);
         let mut elements = self.budget.vec(count, "arrays")?;
         elements.resize(count as usize, Value::Nothing);
         let mut array = Array { sizes, elements };

@@ -38,11 +38,20 @@ pub(super) enum Form {
     Sphere(DVec3, f64),
     Cuboid(DVec3, DVec3),
     /// From a point with a radius to another, closed or open.
-    Cone { ends: [DVec3; 2], radii: [f64; 2], open: bool },
+    Cone {
+        ends: [DVec3; 2],
+        radii: [f64; 2],
+        open: bool,
+    },
     Torus(f64, f64),
     /// The unit normal and the distance along it.
     Plane(DVec3, f64),
-    Disc { center: DVec3, normal: DVec3, radius: f64, hole: f64 },
+    Disc {
+        center: DVec3,
+        normal: DVec3,
+        radius: f64,
+        hole: f64,
+    },
     Triangle([DVec3; 3]),
     Mesh(Arc<MeshDesc>),
     /// The exponents of a superellipsoid.
@@ -106,11 +115,42 @@ impl Parser<'_, '_> {
         let Some(word) = self.word()? else { return Ok(None) };
         let is_object = matches!(
             &*word,
-            "sphere" | "box" | "cylinder" | "cone" | "torus" | "plane" | "disc" | "triangle" | "smooth_triangle" | "mesh"
-                | "mesh2" | "superellipsoid" | "quadric" | "cubic" | "quartic" | "poly" | "polygon" | "blob" | "union"
-                | "merge" | "intersection" | "difference" | "object" | "light_source" | "light_group" | "height_field"
-                | "isosurface" | "text" | "lathe" | "sor" | "prism" | "sphere_sweep" | "bicubic_patch" | "julia_fractal"
-                | "parametric" | "ovus"
+            "sphere"
+                | "box"
+                | "cylinder"
+                | "cone"
+                | "torus"
+                | "plane"
+                | "disc"
+                | "triangle"
+                | "smooth_triangle"
+                | "mesh"
+                | "mesh2"
+                | "superellipsoid"
+                | "quadric"
+                | "cubic"
+                | "quartic"
+                | "poly"
+                | "polygon"
+                | "blob"
+                | "union"
+                | "merge"
+                | "intersection"
+                | "difference"
+                | "object"
+                | "light_source"
+                | "light_group"
+                | "height_field"
+                | "isosurface"
+                | "text"
+                | "lathe"
+                | "sor"
+                | "prism"
+                | "sphere_sweep"
+                | "bicubic_patch"
+                | "julia_fractal"
+                | "parametric"
+                | "ovus"
         );
         if !is_object {
             return Ok(None);
@@ -122,7 +162,8 @@ impl Parser<'_, '_> {
         self.peeked = None;
         let outer = self.declaring.take();
         self.expect(b'{')?;
-        let mut object = if let Some(object) = self.named_object(&word)? { object } else { self.object_form(&word)? };
+        let mut object =
+            if let Some(object) = self.named_object(&word)? { object } else { self.object_form(&word)? };
         self.modifiers(&mut object)?;
         self.declaring = outer;
         self.depth -= 1;
@@ -316,7 +357,9 @@ impl Parser<'_, '_> {
                 continue;
             }
             let Some(name) = self.word()? else { break };
-            let Some(Value::Object(object)) = self.lookup(&name).map(|cell| cell.borrow().clone()) else { break };
+            let Some(Value::Object(object)) = self.lookup(&name).map(|cell| cell.borrow().clone()) else {
+                break;
+            };
             self.peeked = None;
             parts.push(object);
         }
@@ -373,7 +416,8 @@ impl Parser<'_, '_> {
                 "no_reflection" => object.visibility.no_reflection = self.optional_bool()?,
                 "double_illuminate" => object.double_illuminate = self.optional_bool()?,
                 "uv_mapping" => object.uv_mapping = self.optional_bool()?,
-                "no_radiosity" | "sturm" | "hierarchy" | "cutaway_textures" | "split_union" | "evaluate" | "smooth" => {
+                "no_radiosity" | "sturm" | "hierarchy" | "cutaway_textures" | "split_union" | "evaluate"
+                | "smooth" => {
                     self.optional_bool()?;
                 }
                 "photons" | "radiosity" => {
@@ -425,7 +469,11 @@ impl Parser<'_, '_> {
                     self.layer_part(word, &mut layer)?;
                     *top = changed(layer, top);
                 }
-                Arc::new(Texture { kind: TextureKind::Layers(layers.into()), warps: known.warps.clone(), uv: known.uv })
+                Arc::new(Texture {
+                    kind: TextureKind::Layers(layers.into()),
+                    warps: known.warps.clone(),
+                    uv: known.uv,
+                })
             }
             _ => {
                 let mut layer = self.defaults.layer.clone();

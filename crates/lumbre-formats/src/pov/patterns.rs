@@ -1,9 +1,9 @@
 //! The words of patterns, with what modifies them.
 
-
 use lumbre_math::{DVec2, DVec3};
 use lumbre_shading::pov::{
-    BlackHole, Crackle, Fractal, NoiseGenerator, Octaves, Pattern, PatternKind, Slope, Unrolling, Warp, Warps, Wave,
+    BlackHole, Crackle, Fractal, NoiseGenerator, Octaves, Pattern, PatternKind, Slope, Unrolling, Warp,
+    Warps, Wave,
 };
 
 use super::{Parser, Result};
@@ -59,8 +59,8 @@ impl Parser<'_, '_> {
             "wood" => PatternKind::Wood,
             "wrinkles" => PatternKind::Wrinkles,
             "aoi" => PatternKind::AngleOfIncidence,
-            "gradient" | "spiral1" | "spiral2" | "mandel" | "julia" | "function" | "slope" | "pigment_pattern"
-            | "image_pattern" => {
+            "gradient" | "spiral1" | "spiral2" | "mandel" | "julia" | "function" | "slope"
+            | "pigment_pattern" | "image_pattern" => {
                 self.peeked = None;
                 return self.pattern_with_parameters(word).map(Some);
             }
@@ -163,7 +163,9 @@ impl Parser<'_, '_> {
                         match &mut draft.pattern {
                             Some(pattern) => pattern.turbulence = amount,
                             // Of what has no pattern of its own, such as an average or an image: a warp that acts first.
-                            None => draft.warps.0.insert(0, Warp::Turbulence { amount, octaves: draft.octaves }),
+                            None => {
+                                draft.warps.0.insert(0, Warp::Turbulence { amount, octaves: draft.octaves })
+                            }
                         }
                     }
                     "octaves" => draft.octaves.octaves = self.whole(1.0, 10.0)?,
@@ -422,4 +424,3 @@ pub(super) fn generator(number: f64) -> NoiseGenerator {
         _ => NoiseGenerator::Corrected,
     }
 }
-

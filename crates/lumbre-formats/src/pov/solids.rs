@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use lumbre_geometry::{
-    Aabb, Cone, Cuboid, Cylinder, Disk, ImplicitSurface, PlacedShape, Plane, Ray, Root, Roots, Shape, ShapeError, Sphere,
-    Surface, Torus, Triangle,
+    Aabb, Cone, Cuboid, Cylinder, Disk, ImplicitSurface, PlacedShape, Plane, Ray, Root, Roots, Shape,
+    ShapeError, Sphere, Surface, Torus, Triangle,
 };
 use lumbre_kernel::CustomGeometry;
 use lumbre_math::interval::{Dual, Interval};
@@ -18,9 +18,18 @@ use super::swept::Swept;
 #[derive(Clone, Debug)]
 pub(super) enum Solid {
     /// The surface, and where it is open the same one closed.
-    Exact { surface: PlacedShape, closed: Option<PlacedShape> },
-    Implicit { surface: ImplicitSurface, world_from_object: Transform },
-    Body { body: Body, world_from_object: Transform },
+    Exact {
+        surface: PlacedShape,
+        closed: Option<PlacedShape>,
+    },
+    Implicit {
+        surface: ImplicitSurface,
+        world_from_object: Transform,
+    },
+    Body {
+        body: Body,
+        world_from_object: Transform,
+    },
 }
 
 /// A solid that says itself where rays cross it, in its own space.
@@ -84,7 +93,9 @@ impl Solid {
                 let closed = if *open { Some(place(shape(true)?)) } else { None };
                 Self::Exact { surface: place(shape(!open)?), closed }
             }
-            Form::Torus(major, minor) => exact(Torus::new(DVec3::ZERO, DVec3::Y, *major, minor.abs())?.into()),
+            Form::Torus(major, minor) => {
+                exact(Torus::new(DVec3::ZERO, DVec3::Y, *major, minor.abs())?.into())
+            }
             Form::Plane(normal, distance) => exact(Plane::new(*normal * *distance, *normal)?.into()),
             Form::Disc { center, normal, radius, hole } => {
                 // Inside is the whole half-space behind it.
@@ -109,9 +120,13 @@ impl Solid {
                 let blob = Arc::clone(blob);
                 implicit(ImplicitSurface::new(blob.bounds(), move |p| blob.field(p))?)
             }
-            Form::Swept(swept) => Self::Body { body: Body::Swept(Arc::clone(swept)), world_from_object: *map },
+            Form::Swept(swept) => {
+                Self::Body { body: Body::Swept(Arc::clone(swept)), world_from_object: *map }
+            }
             Form::Iso(iso) => Self::Body { body: Body::Iso(Arc::clone(iso)), world_from_object: *map },
-            Form::Mesh(..) | Form::Group(..) | Form::Light(_) | Form::LightGroup(..) | Form::Nothing => return Ok(None),
+            Form::Mesh(..) | Form::Group(..) | Form::Light(_) | Form::LightGroup(..) | Form::Nothing => {
+                return Ok(None);
+            }
         }))
     }
 
@@ -163,14 +178,18 @@ impl Solid {
                 let shape = closed.as_ref().unwrap_or(surface);
                 shape.shape().contains(shape.world_from_object().inverse_point(p))
             }
-            Self::Implicit { surface, world_from_object } => surface.contains(world_from_object.inverse_point(p)),
+            Self::Implicit { surface, world_from_object } => {
+                surface.contains(world_from_object.inverse_point(p))
+            }
         }
     }
 
     pub(super) fn bounds(&self) -> Option<Aabb> {
         match self {
             Self::Exact { surface, .. } => surface.shape().bounds(&surface.world_from_object()),
-            Self::Implicit { surface, world_from_object } => Some(moved(&surface.bounds(), world_from_object)),
+            Self::Implicit { surface, world_from_object } => {
+                Some(moved(&surface.bounds(), world_from_object))
+            }
             Self::Body { body, world_from_object } => Some(moved(&body.bounds(), world_from_object)),
         }
     }
@@ -193,7 +212,11 @@ pub(super) enum Region {
     All(Vec<Arc<Region>>),
     Any(Vec<Arc<Region>>),
     /// Where the surface of one of the parts of a group is seen, by what the others are.
-    Others { operation: Operation, parts: Arc<[Arc<Region>]>, except: usize },
+    Others {
+        operation: Operation,
+        parts: Arc<[Arc<Region>]>,
+        except: usize,
+    },
 }
 
 impl Region {
@@ -202,14 +225,17 @@ impl Region {
         let map = *parent * object.transform;
         let mut region = match &object.form {
             Form::Group(operation, parts) => {
-                let parts: Vec<Arc<Self>> = parts.iter().filter(|part| has_inside(part)).map(|part| Self::of(part, &map)).collect();
+                let parts: Vec<Arc<Self>> =
+                    parts.iter().filter(|part| has_inside(part)).map(|part| Self::of(part, &map)).collect();
                 match operation {
                     Operation::Union | Operation::Merge => Self::Any(parts),
                     Operation::Intersection => Self::All(parts),
                     Operation::Difference => {
                         let mut parts = parts.into_iter();
                         let first = parts.next();
-                        Self::All(first.into_iter().chain(parts.map(|part| Arc::new(Self::Not(part)))).collect())
+                        Self::All(
+                            first.into_iter().chain(parts.map(|part| Arc::new(Self::Not(part)))).collect(),
+                        )
                     }
                 }
             }
@@ -247,7 +273,9 @@ impl Region {
         match self {
             Self::Solid(solid) => solid.bounds(),
             Self::Not(_) => None,
-            Self::All(regions) => regions.iter().filter_map(|region| region.bounds()).reduce(|a, b| common(&a, &b)),
+            Self::All(regions) => {
+                regions.iter().filter_map(|region| region.bounds()).reduce(|a, b| common(&a, &b))
+            }
             Self::Any(regions) => {
                 let mut all: Option<Aabb> = None;
                 for region in regions {
@@ -306,7 +334,12 @@ impl Clipped {
         let all = regions.iter().filter_map(|region| region.bounds()).chain(solid.bounds());
         // Wider than it is by rounding.
         let bounds = all.reduce(|a, b| common(&a, &b)).map(|b| {
-            let margin = DVec3::splat(1e-9 * (b.max - b.min).max_element().max(b.max.abs().max_element()).max(b.min.abs().max_element()));
+            let margin = DVec3::splat(
+                1e-9 * (b.max - b.min)
+                    .max_element()
+                    .max(b.max.abs().max_element())
+                    .max(b.min.abs().max_element()),
+            );
             Aabb { min: b.min - margin, max: b.max + margin }
         });
         Self { solid, regions, is_flipped, bounds }
@@ -385,15 +418,28 @@ pub(super) fn leaves<'o>(
     };
     around.push(object);
     // What has no inside is shown as far as the others let it be seen, and lets all be seen of them.
-    let nothing = || Arc::new(if *operation == Operation::Intersection { Region::All(Vec::new()) } else { Region::Any(Vec::new()) });
+    let nothing = || {
+        Arc::new(if *operation == Operation::Intersection {
+            Region::All(Vec::new())
+        } else {
+            Region::Any(Vec::new())
+        })
+    };
     let insides: Arc<[Arc<Region>]> = match operation {
         Operation::Union if !object.inverse => Arc::from([]),
-        _ => parts.iter().map(|part| if has_inside(part) { Region::of(part, &map) } else { nothing() }).collect(),
+        _ => parts
+            .iter()
+            .map(|part| if has_inside(part) { Region::of(part, &map) } else { nothing() })
+            .collect(),
     };
     for (i, part) in parts.iter().enumerate() {
         let mut within = regions.clone();
         if has_inside(part) && insides.len() > 1 {
-            within.push(Arc::new(Region::Others { operation: *operation, parts: Arc::clone(&insides), except: i }));
+            within.push(Arc::new(Region::Others {
+                operation: *operation,
+                parts: Arc::clone(&insides),
+                except: i,
+            }));
         }
         let is_cut = *operation == Operation::Difference && i > 0;
         leaves(part, &map, &within, is_flipped ^ is_cut, around, visit);
@@ -485,7 +531,8 @@ fn power(x: Dual, exponent: f64) -> Dual {
     }
     let margin = 8.0 * f64::EPSILON;
     let (low, high) = (x.value.low.max(0.0), x.value.high.max(0.0));
-    let value = Interval { low: low.power(exponent) * (1.0 - margin), high: high.power(exponent) * (1.0 + margin) };
+    let value =
+        Interval { low: low.power(exponent) * (1.0 - margin), high: high.power(exponent) * (1.0 + margin) };
     // e·x^(e−1), which grows or falls throughout.
     let at = |x: f64| exponent * x.power(exponent - 1.0);
     let ends = [at(low), at(high)];
@@ -586,7 +633,8 @@ impl Blob {
         let mut all: Option<Aabb> = None;
         for part in &self.parts {
             let reach = DVec3::splat(part.radius);
-            let (low, high) = (part.ends[0].min(part.ends[1]) - reach, part.ends[0].max(part.ends[1]) + reach);
+            let (low, high) =
+                (part.ends[0].min(part.ends[1]) - reach, part.ends[0].max(part.ends[1]) + reach);
             let corner = |i: usize| {
                 let pick = |axis: usize| if i >> axis & 1 == 1 { high[axis] } else { low[axis] };
                 part.world_from_ball.point(DVec3::new(pick(0), pick(1), pick(2)))

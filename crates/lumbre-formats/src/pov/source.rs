@@ -118,7 +118,10 @@ impl Parser<'_, '_> {
     pub(super) fn find(&self, name: &str) -> Option<PathBuf> {
         let name = Path::new(name);
         // No scene reads files of its reader's computer by a path of its own.
-        let is_inside = |path: &Path| path.components().all(|part| matches!(part, std::path::Component::Normal(_) | std::path::Component::CurDir));
+        let is_inside = |path: &Path| {
+            path.components()
+                .all(|part| matches!(part, std::path::Component::Normal(_) | std::path::Component::CurDir))
+        };
         if !is_inside(name) {
             return None;
         }
@@ -157,7 +160,8 @@ impl Parser<'_, '_> {
             return Ok(());
         }
         // The loop that went round most often is the one that does not end.
-        let busiest = self.frames.iter().flat_map(|frame| frame.blocks.iter().map(move |block| (frame, block)));
+        let busiest =
+            self.frames.iter().flat_map(|frame| frame.blocks.iter().map(move |block| (frame, block)));
         let busiest = busiest.filter(|(_, block)| block.rounds > 0).max_by_key(|(_, block)| block.rounds);
         let limit = LimitError {
             what: "the steps of a scene".to_owned(),

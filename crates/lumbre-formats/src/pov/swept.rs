@@ -236,7 +236,9 @@ fn section(p: DVec3, conic: bool) -> DVec2 {
 
 /// Height and squared radius at both ends.
 fn ends(outline: &Outline) -> [(f64, f64); 2] {
-    let (Some(first), Some(last)) = (outline.pieces.first(), outline.pieces.last()) else { return [(0.0, 0.0); 2] };
+    let (Some(first), Some(last)) = (outline.pieces.first(), outline.pieces.last()) else {
+        return [(0.0, 0.0); 2];
+    };
     [(first.b[0], first.a[0]), (at(&last.b, 1.0), at(&last.a, 1.0))]
 }
 

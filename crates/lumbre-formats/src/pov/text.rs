@@ -96,12 +96,18 @@ impl Parser<'_, '_> {
                 at.x = -face.glyph_bounding_box(glyph).map_or(0.0, |b| f64::from(b.x_min)) * scale;
             }
             at.x += before.map_or(0.0, |before| f64::from(kerning(&face, before, glyph)) * scale);
-            let mut pen = Pen { outline: Outline::default(), offset: at, scale, start: DVec2::ZERO, at: DVec2::ZERO };
+            let mut pen =
+                Pen { outline: Outline::default(), offset: at, scale, start: DVec2::ZERO, at: DVec2::ZERO };
             face.outline_glyph(glyph, &mut pen);
             if !pen.outline.is_empty() {
                 self.budget.elements(1, "glyphs")?;
                 self.budget.bytes(4096, "glyphs")?;
-                let swept = Swept::Prism { outline: pen.outline, heights: [0.0, thickness], conic: false, open: false };
+                let swept = Swept::Prism {
+                    outline: pen.outline,
+                    heights: [0.0, thickness],
+                    conic: false,
+                    open: false,
+                };
                 let mut object = Object::new(Form::Swept(Arc::new(swept)));
                 // What is up in a prism goes into the picture, and its z is up.
                 let axes = DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::Y);
@@ -124,8 +130,10 @@ impl Parser<'_, '_> {
         }
         let with_ending = format!("{name}.ttf");
         let Some(path) = self.find(name).or_else(|| self.find(&with_ending)) else {
-            let wrong = Diagnostic::warning("a font that is not there: its text is not rendered").found(quoted(name));
-            let wrong = self.diagnostic(wrong.expected("a file beside the scene or in a folder of --pov-include"));
+            let wrong =
+                Diagnostic::warning("a font that is not there: its text is not rendered").found(quoted(name));
+            let wrong =
+                self.diagnostic(wrong.expected("a file beside the scene or in a folder of --pov-include"));
             self.diagnostics.push(wrong);
             return Ok(None);
         };

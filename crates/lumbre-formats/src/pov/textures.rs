@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use lumbre_shading::Spectrum;
 use lumbre_shading::pov::{
-    Colour, ColourMap, Finish, Interior, Layer, Normal, NormalKind, Pattern, PatternKind, Pigment, PigmentKind, Texture,
-    TextureKind, Warps,
+    Colour, ColourMap, Finish, Interior, Layer, Normal, NormalKind, Pattern, PatternKind, Pigment,
+    PigmentKind, Texture, TextureKind, Warps,
 };
 
 use super::lexer::Kind;
@@ -50,7 +50,9 @@ impl Parser<'_, '_> {
     pub(super) fn default_directive(&mut self) -> Result<()> {
         self.expect(b'{')?;
         while !self.take(b'}')? {
-            let Some(word) = self.word()? else { return Err(self.unexpected("texture, pigment, normal, finish")) };
+            let Some(word) = self.word()? else {
+                return Err(self.unexpected("texture, pigment, normal, finish"));
+            };
             self.peeked = None;
             match &*word {
                 "texture" => {
@@ -164,12 +166,18 @@ impl Parser<'_, '_> {
                 }
                 _ => {
                     let Some(cell) = self.lookup(&word).cloned() else {
-                        return Err(if super::words::is_reserved(&word) { self.unexpected("a pigment") } else { self.undeclared(&word) });
+                        return Err(if super::words::is_reserved(&word) {
+                            self.unexpected("a pigment")
+                        } else {
+                            self.undeclared(&word)
+                        });
                     };
                     self.peeked = None;
                     let value = cell.borrow().clone();
                     match self.indexed(value)? {
-                        Value::Pigment(base) if draft.pattern.as_ref().is_some_and(Pattern::is_block) => blocks.push(base),
+                        Value::Pigment(base) if draft.pattern.as_ref().is_some_and(Pattern::is_block) => {
+                            blocks.push(base)
+                        }
                         Value::Pigment(base) => (draft, kind) = opened(&base),
                         Value::Num(num) => kind = PigmentKind::Colour(num.as_colour()),
                         other => return Err(self.error(format!("a pigment is needed, not {}", other.name()))),
@@ -193,7 +201,10 @@ impl Parser<'_, '_> {
             return match map.as_deref() {
                 Some(Map::Pigments(entries)) => Ok(PigmentKind::Average(entries.clone().into())),
                 Some(Map::Colours(entries)) => Ok(PigmentKind::Average(
-                    entries.iter().map(|(weight, colour)| (*weight, Arc::new(Pigment::plain(*colour)))).collect(),
+                    entries
+                        .iter()
+                        .map(|(weight, colour)| (*weight, Arc::new(Pigment::plain(*colour))))
+                        .collect(),
                 )),
                 _ => Err(self.error("an average without a map")),
             };
@@ -208,7 +219,9 @@ impl Parser<'_, '_> {
             (Some(_), _) => Err(self.error("a pigment has a map of colours or pigments")),
             (None, PigmentKind::Map(_, map)) => Ok(PigmentKind::Map(pattern, map)),
             (None, PigmentKind::Pigments(_, map)) => Ok(PigmentKind::Pigments(pattern, map)),
-            (None, PigmentKind::Blocks(_, known)) if blocks.is_empty() => Ok(PigmentKind::Blocks(pattern, known)),
+            (None, PigmentKind::Blocks(_, known)) if blocks.is_empty() => {
+                Ok(PigmentKind::Blocks(pattern, known))
+            }
             (None, _) => match pattern.block_count() {
                 Some(count) => {
                     let is_brick = matches!(pattern.kind, PatternKind::Brick { .. });
@@ -279,14 +292,18 @@ impl Parser<'_, '_> {
                         self.expect(b'{')?;
                         self.skip_to(b'}')?;
                     }
-                    while matches!(self.peek()?, Some(Kind::Text(_) | Kind::Number(_))) || matches!(self.word()?.as_deref(), Some("coords" | "size" | "interpolate")) {
+                    while matches!(self.peek()?, Some(Kind::Text(_) | Kind::Number(_)))
+                        || matches!(self.word()?.as_deref(), Some("coords" | "size" | "interpolate"))
+                    {
                         self.next()?;
                     }
                 }
                 _ => {
                     let value = match self.lookup(&word).cloned() {
                         Some(cell) => self.indexed(cell.borrow().clone())?,
-                        None if super::words::is_reserved(&word) => return Err(self.error(format!("{word} has no meaning in a normal"))),
+                        None if super::words::is_reserved(&word) => {
+                            return Err(self.error(format!("{word} has no meaning in a normal")));
+                        }
                         None => return Err(self.undeclared(&word)),
                     };
                     match value {
@@ -346,7 +363,11 @@ impl Parser<'_, '_> {
                     }
                     self.layer_part(&word, &mut layer)?;
                     base = base.and_then(|known| match &known.kind {
-                        TextureKind::Plain(_) => Some(Arc::new(Texture { kind: TextureKind::Plain(layer.clone()), warps: known.warps.clone(), uv: known.uv })),
+                        TextureKind::Plain(_) => Some(Arc::new(Texture {
+                            kind: TextureKind::Plain(layer.clone()),
+                            warps: known.warps.clone(),
+                            uv: known.uv,
+                        })),
                         _ => None,
                     });
                     continue;
@@ -355,7 +376,11 @@ impl Parser<'_, '_> {
                     self.peeked = None;
                     self.expect(b'{')?;
                     let inner = self.texture_body(b'}')?;
-                    if draft.pattern.is_some() { blocks.push(inner) } else { layers.push(inner) }
+                    if draft.pattern.is_some() {
+                        blocks.push(inner)
+                    } else {
+                        layers.push(inner)
+                    }
                     continue;
                 }
                 "average" => {
@@ -412,7 +437,11 @@ impl Parser<'_, '_> {
                 continue;
             }
             let Some(cell) = self.lookup(&word).cloned() else {
-                return Err(if super::words::is_reserved(&word) { self.unexpected("a texture") } else { self.undeclared(&word) });
+                return Err(if super::words::is_reserved(&word) {
+                    self.unexpected("a texture")
+                } else {
+                    self.undeclared(&word)
+                });
             };
             self.peeked = None;
             let value = cell.borrow().clone();
@@ -428,8 +457,12 @@ impl Parser<'_, '_> {
                 Some(Map::Textures(entries)) => TextureKind::Average(entries.clone().into()),
                 _ => return Err(self.error("an average without a map")),
             },
-            (Some(pattern), Some(Map::Textures(entries))) => TextureKind::Map(Box::new(pattern), entries.clone().into()),
-            (Some(pattern), None) if !blocks.is_empty() => TextureKind::Blocks(Box::new(pattern), blocks.into()),
+            (Some(pattern), Some(Map::Textures(entries))) => {
+                TextureKind::Map(Box::new(pattern), entries.clone().into())
+            }
+            (Some(pattern), None) if !blocks.is_empty() => {
+                TextureKind::Blocks(Box::new(pattern), blocks.into())
+            }
             (Some(_), _) => return Err(self.error("the pattern of a texture needs textures")),
             (None, _) => {
                 return Ok(match layers.len() {
@@ -438,7 +471,11 @@ impl Parser<'_, '_> {
                         if draft.uv { Arc::new(Texture { uv: true, ..(*texture).clone() }) } else { texture }
                     }
                     1 => layers.swap_remove(0),
-                    _ => Arc::new(Texture { kind: TextureKind::Layers(layers.into()), warps: Warps::default(), uv: draft.uv }),
+                    _ => Arc::new(Texture {
+                        kind: TextureKind::Layers(layers.into()),
+                        warps: Warps::default(),
+                        uv: draft.uv,
+                    }),
                 });
             }
         };
@@ -525,8 +562,12 @@ impl Parser<'_, '_> {
                 }
                 _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
                     Some(Value::Finish(known)) => finish = (*known).clone(),
-                    Some(other) => return Err(self.error(format!("a finish is needed, not {}", other.name()))),
-                    None if super::words::is_reserved(&word) => return Err(self.error(format!("{word} has no meaning in a finish"))),
+                    Some(other) => {
+                        return Err(self.error(format!("a finish is needed, not {}", other.name())));
+                    }
+                    None if super::words::is_reserved(&word) => {
+                        return Err(self.error(format!("{word} has no meaning in a finish")));
+                    }
                     None => return Err(self.undeclared(&word)),
                 },
             }
@@ -611,8 +652,12 @@ impl Parser<'_, '_> {
                 _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
                     Some(Value::Interior(known)) => interior = (*known).clone(),
                     Some(Value::Ignored(_)) => {}
-                    Some(other) => return Err(self.error(format!("an interior is needed, not {}", other.name()))),
-                    None if super::words::is_reserved(&word) => return Err(self.error(format!("{word} has no meaning in an interior"))),
+                    Some(other) => {
+                        return Err(self.error(format!("an interior is needed, not {}", other.name())));
+                    }
+                    None if super::words::is_reserved(&word) => {
+                        return Err(self.error(format!("{word} has no meaning in an interior")));
+                    }
                     None => return Err(self.undeclared(&word)),
                 },
             }
@@ -644,7 +689,9 @@ impl Parser<'_, '_> {
                 "interior" => material.interior = Some(self.interior_block()?),
                 _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
                     Some(Value::Material(known)) => material = (*known).clone(),
-                    Some(other) => return Err(self.error(format!("a material is needed, not {}", other.name()))),
+                    Some(other) => {
+                        return Err(self.error(format!("a material is needed, not {}", other.name())));
+                    }
                     None => return Err(self.undeclared(&word)),
                 },
             }
@@ -667,15 +714,20 @@ pub(super) fn layered(below: Option<Arc<Texture>>, top: Arc<Texture>) -> Arc<Tex
 /// A pigment taken apart, to be changed.
 fn opened(pigment: &Arc<Pigment>) -> (Draft, PigmentKind) {
     let pattern = match &pigment.kind {
-        PigmentKind::Map(pattern, _) | PigmentKind::Pigments(pattern, _) | PigmentKind::Blocks(pattern, _) => {
-            Some((**pattern).clone())
-        }
+        PigmentKind::Map(pattern, _)
+        | PigmentKind::Pigments(pattern, _)
+        | PigmentKind::Blocks(pattern, _) => Some((**pattern).clone()),
         _ => None,
     };
     (Draft::new(pattern, pigment.warps.clone(), pigment.uv), pigment.kind.clone())
 }
 
-fn normal_kind(pattern: Pattern, word: Option<&str>, map: Option<&Map>, blocks: Vec<Arc<Normal>>) -> NormalKind {
+fn normal_kind(
+    pattern: Pattern,
+    word: Option<&str>,
+    map: Option<&Map>,
+    blocks: Vec<Arc<Normal>>,
+) -> NormalKind {
     let pattern = Box::new(pattern);
     match (map, word) {
         (Some(Map::Normals(entries)), _) => NormalKind::Normals(pattern, entries.clone().into()),

@@ -42,6 +42,7 @@ water_level waves while width wood wrinkles write x y yes z";
 pub(super) fn is_reserved(word: &str) -> bool {
     use std::collections::HashSet;
     use std::sync::LazyLock;
-    static WORDS: LazyLock<HashSet<&'static str>> = LazyLock::new(|| RESERVED.split_ascii_whitespace().collect());
+    static WORDS: LazyLock<HashSet<&'static str>> =
+        LazyLock::new(|| RESERVED.split_ascii_whitespace().collect());
     WORDS.contains(word)
 }

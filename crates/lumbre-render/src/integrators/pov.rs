@@ -47,14 +47,7 @@ struct Tracer<'s> {
 }
 
 impl RayIntegrator for Pov {
-    fn radiance(
-        &self,
-        scene: &Scene,
-        _: &View,
-        sight: Sight<'_>,
-        _: &Draw,
-        record: &mut Record,
-    ) -> Spectrum {
+    fn radiance(&self, scene: &Scene, _: &View, sight: Sight<'_>, _: &Draw, record: &mut Record) -> Spectrum {
         let Some(world) = scene.pov() else { return Spectrum::BLACK };
         let lights = scene.lights().iter().filter_map(|light| match light {
             Light::Pov(light) => Some(&**light),
@@ -100,7 +93,8 @@ impl<'s> Tracer<'s> {
             let here = self.scene.interaction(&ray, &hit, &Footprint::Point);
             let material = Self::material(&here)?;
             let visible = material.visibility;
-            let is_hidden = (visible.no_image && traced.is_camera) || (visible.no_reflection && traced.is_mirrored);
+            let is_hidden =
+                (visible.no_image && traced.is_camera) || (visible.no_reflection && traced.is_mirrored);
             let distance = (here.surface.point - traced.ray.origin).length();
             if !is_hidden && distance >= NEAR * f64::from(u8::from(!traced.is_camera)) {
                 return Some((here, material, distance));
@@ -215,7 +209,10 @@ impl<'s> Tracer<'s> {
     }
 
     /// Diffuse light and highlights of a light on a layer.
-    #[allow(clippy::too_many_arguments, reason = "a layer under a light is seen by a ray, and leaves its shadow")]
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "a layer under a light is seen by a ray, and leaves its shadow"
+    )]
     fn lit(
         &self,
         traced: &Traced<'s>,
@@ -294,7 +291,8 @@ impl<'s> Tracer<'s> {
             finish.diffuse_strength()
         };
         let cosine = cosine.abs();
-        let falloff = if finish.brilliance == 1.0 { cosine as f32 } else { (cosine as f32).power(finish.brilliance) };
+        let falloff =
+            if finish.brilliance == 1.0 { cosine as f32 } else { (cosine as f32).power(finish.brilliance) };
         let mut sum = layer.colour.rgb * arriving * (opacity * strength * falloff);
         let d = traced.ray.direction.normalize();
         if !light.shadowless && !is_behind {
@@ -306,7 +304,14 @@ impl<'s> Tracer<'s> {
         sum
     }
 
-    fn highlights(&self, finish: &Finish, layer: &LayerAt<'_>, d: DVec3, towards: DVec3, arriving: Spectrum) -> Spectrum {
+    fn highlights(
+        &self,
+        finish: &Finish,
+        layer: &LayerAt<'_>,
+        d: DVec3,
+        towards: DVec3,
+        arriving: Spectrum,
+    ) -> Spectrum {
         let n = layer.normal;
         let mut strength = 0.0;
         if finish.phong > 0.0 {
@@ -320,7 +325,8 @@ impl<'s> Tracer<'s> {
             let half = (towards - d).normalize_or_zero();
             let cosine = n.dot(half);
             if cosine > 0.0 {
-                strength += finish.specular_strength() * (cosine as f32).power(1.0 / finish.roughness.max(1e-9));
+                strength +=
+                    finish.specular_strength() * (cosine as f32).power(1.0 / finish.roughness.max(1e-9));
             }
         }
         if strength == 0.0 {
@@ -393,7 +399,10 @@ impl<'s> Tracer<'s> {
     }
 
     /// What is seen through a surface.
-    #[allow(clippy::too_many_arguments, reason = "a ray passes a layer of a solid, in or out, with what is left of it")]
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "a ray passes a layer of a solid, in or out, with what is left of it"
+    )]
     fn passing(
         &self,
         traced: &Traced<'s>,
@@ -476,12 +485,8 @@ impl<'s> Tracer<'s> {
                 self.shadow(here, light, from, record)
             })
         };
-        let corners = [
-            corner(u1, v1, record),
-            corner(u2, v1, record),
-            corner(u1, v2, record),
-            corner(u2, v2, record),
-        ];
+        let corners =
+            [corner(u1, v1, record), corner(u2, v1, record), corner(u1, v2, record), corner(u2, v2, record)];
         let differ = |a: usize, b: usize| (corners[a] - corners[b]).map(f32::abs).max_component() > 0.1;
         let is_uneven = differ(0, 1) || differ(2, 3) || differ(0, 2) || differ(1, 3);
         let is_wide = u2 - u1 > 1 || v2 - v1 > 1;
@@ -500,7 +505,9 @@ impl<'s> Tracer<'s> {
 
     /// What comes through to a point from a place of a light.
     fn shadow(&self, here: &Interaction<'s>, light: &PovLight, from: DVec3, record: &mut Record) -> Spectrum {
-        let Some((towards, distance)) = light.towards(here.surface.point, from) else { return Spectrum::WHITE };
+        let Some((towards, distance)) = light.towards(here.surface.point, from) else {
+            return Spectrum::WHITE;
+        };
         record.counts.shadow += 1;
         let target = here.surface.point + towards * distance;
         let mut left = Spectrum::WHITE;
@@ -526,10 +533,13 @@ impl<'s> Tracer<'s> {
                 let is_inside = inside.iter().any(|solid| std::ptr::eq(*solid, material));
                 let mut passes = Spectrum::BLACK;
                 for (share, layers) in &material.stacks(there.surface.point, &eye, !is_inside) {
-                    passes += layers.iter().fold(Spectrum::splat(*share), |left, layer| left * layer.colour.passing());
+                    passes += layers
+                        .iter()
+                        .fold(Spectrum::splat(*share), |left, layer| left * layer.colour.passing());
                 }
                 if material.interior.caustics != 0.0 {
-                    passes = passes * (1.0 + (normal.dot(towards).abs() as f32).power(material.interior.caustics));
+                    passes =
+                        passes * (1.0 + (normal.dot(towards).abs() as f32).power(material.interior.caustics));
                 }
                 left = left * passes;
                 if is_inside {

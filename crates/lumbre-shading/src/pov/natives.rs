@@ -9,17 +9,85 @@ use super::noise::{NoiseGenerator, noise};
 
 /// The names, in the order of their numbers.
 pub const NAMES: [&str; 79] = [
-    "algbr_cyl1", "algbr_cyl2", "algbr_cyl3", "algbr_cyl4", "bicorn", "bifolia", "blob", "blob2", "boy_surface",
-    "comma", "cross_ellipsoids", "crossed_trough", "cubic_saddle", "cushion", "devils_curve", "devils_curve_2d",
-    "dupin_cyclid", "ellipsoid", "enneper", "flange_cover", "folium_surface", "folium_surface_2d", "glob", "heart",
-    "helical_torus", "helix1", "helix2", "hex_x", "hex_y", "hetero_mf", "hunt_surface", "hyperbolic_torus",
-    "isect_ellipsoids", "kampyle_of_eudoxus", "kampyle_of_eudoxus_2d", "klein_bottle", "kummer_surface_v1",
-    "kummer_surface_v2", "lemniscate_of_gerono", "lemniscate_of_gerono_2d", "mesh1", "mitre", "nodal_cubic", "odd",
-    "ovals_of_cassini", "paraboloid", "parabolic_torus", "ph", "pillow", "piriform", "piriform_2d", "poly4",
-    "polytubes", "quantum", "quartic_paraboloid", "quartic_saddle", "quartic_cylinder", "r", "ridge", "ridged_mf",
-    "rounded_box", "sphere", "spikes", "spikes_2d", "spiral", "steiners_roman", "strophoid", "strophoid_2d",
-    "superellipsoid", "th", "torus", "torus2", "torus_gumdrop", "umbrella", "witch_of_agnesi", "witch_of_agnesi_2d",
-    "noise3d", "pattern", "noise_generator",
+    "algbr_cyl1",
+    "algbr_cyl2",
+    "algbr_cyl3",
+    "algbr_cyl4",
+    "bicorn",
+    "bifolia",
+    "blob",
+    "blob2",
+    "boy_surface",
+    "comma",
+    "cross_ellipsoids",
+    "crossed_trough",
+    "cubic_saddle",
+    "cushion",
+    "devils_curve",
+    "devils_curve_2d",
+    "dupin_cyclid",
+    "ellipsoid",
+    "enneper",
+    "flange_cover",
+    "folium_surface",
+    "folium_surface_2d",
+    "glob",
+    "heart",
+    "helical_torus",
+    "helix1",
+    "helix2",
+    "hex_x",
+    "hex_y",
+    "hetero_mf",
+    "hunt_surface",
+    "hyperbolic_torus",
+    "isect_ellipsoids",
+    "kampyle_of_eudoxus",
+    "kampyle_of_eudoxus_2d",
+    "klein_bottle",
+    "kummer_surface_v1",
+    "kummer_surface_v2",
+    "lemniscate_of_gerono",
+    "lemniscate_of_gerono_2d",
+    "mesh1",
+    "mitre",
+    "nodal_cubic",
+    "odd",
+    "ovals_of_cassini",
+    "paraboloid",
+    "parabolic_torus",
+    "ph",
+    "pillow",
+    "piriform",
+    "piriform_2d",
+    "poly4",
+    "polytubes",
+    "quantum",
+    "quartic_paraboloid",
+    "quartic_saddle",
+    "quartic_cylinder",
+    "r",
+    "ridge",
+    "ridged_mf",
+    "rounded_box",
+    "sphere",
+    "spikes",
+    "spikes_2d",
+    "spiral",
+    "steiners_roman",
+    "strophoid",
+    "strophoid_2d",
+    "superellipsoid",
+    "th",
+    "torus",
+    "torus2",
+    "torus_gumdrop",
+    "umbrella",
+    "witch_of_agnesi",
+    "witch_of_agnesi_2d",
+    "noise3d",
+    "pattern",
+    "noise_generator",
 ];
 
 /// Those that are not here.
@@ -27,7 +95,9 @@ pub const MISSING: [&str; 6] = ["comma", "enneper", "helical_torus", "hex_x", "h
 
 /// Whether the function of a number is here.
 pub fn is_known(index: u32) -> bool {
-    NAMES.get(index as usize).is_some_and(|name| !MISSING.contains(name) && *name != "spiral" && *name != "pattern")
+    NAMES
+        .get(index as usize)
+        .is_some_and(|name| !MISSING.contains(name) && *name != "spiral" && *name != "pattern")
 }
 
 /// The value of the function of a number; 0 for those that are not here.
@@ -58,7 +128,11 @@ fn surface(name: &str, p: DVec3, [a, b, c, d, f]: [f64; 5]) -> Option<f64> {
         "crossed_trough" => y - xx * zz,
         "cubic_saddle" => x.powi(3) - y.powi(3) - z,
         "cushion" => {
-            zz * zz - xx * zz + 2.0 * z * xx - 2.0 * z * zz - xx + zz + square(xx - z) + yy * yy + 2.0 * xx * yy
+            zz * zz - xx * zz + 2.0 * z * xx - 2.0 * z * zz - xx
+                + zz
+                + square(xx - z)
+                + yy * yy
+                + 2.0 * xx * yy
                 + yy * zz
                 - 2.0 * yy * z
                 - yy
@@ -80,9 +154,7 @@ fn surface(name: &str, p: DVec3, [a, b, c, d, f]: [f64; 5]) -> Option<f64> {
             let (plus, minus) = (sum + 2.0 * y - 1.0, sum - 2.0 * y - 1.0);
             plus * (minus * minus - 8.0 * zz) + 16.0 * x * z * minus
         }
-        "kummer_surface_v1" => {
-            xx * xx + yy * yy + zz * zz - sum - xx * yy - xx * zz - yy * zz + 1.0
-        }
+        "kummer_surface_v1" => xx * xx + yy * yy + zz * zz - sum - xx * yy - xx * zz - yy * zz + 1.0,
         "kummer_surface_v2" => {
             xx * xx + yy * yy + zz * zz + a * sum + b * (xx * yy + xx * zz + yy * zz) + c * x * y * z - 1.0
         }
@@ -90,7 +162,11 @@ fn surface(name: &str, p: DVec3, [a, b, c, d, f]: [f64; 5]) -> Option<f64> {
         "mitre" => 4.0 * xx * sum - yy * (1.0 - yy - zz),
         "nodal_cubic" => y.powi(3) + z.powi(3) - 6.0 * y * z,
         "odd" => {
-            zz * zz - xx * zz + 2.0 * z * xx - 2.0 * z * zz - xx + zz + square(xx - z) + yy * yy + 2.0 * xx * yy
+            zz * zz - xx * zz + 2.0 * z * xx - 2.0 * z * zz - xx
+                + zz
+                + square(xx - z)
+                + yy * yy
+                + 2.0 * xx * yy
                 + yy * zz
                 - 2.0 * yy * z
                 - yy
@@ -112,9 +188,7 @@ fn surface(name: &str, p: DVec3, [a, b, c, d, f]: [f64; 5]) -> Option<f64> {
         "steiners_roman" => xx * yy + xx * zz + yy * zz + x * y * z,
         "strophoid" => (b - x) * (yy + zz) - c * c * a * xx - c * c * x.powi(3),
         "torus2" => square(sum) - 2.0 * (aa + bb) * (xx + zz) + 2.0 * (aa - bb) * yy + square(aa - bb),
-        "torus_gumdrop" => {
-            4.0 * (xx * xx + square(yy + zz)) + 17.0 * xx * (yy + zz) - 20.0 * sum + 17.0
-        }
+        "torus_gumdrop" => 4.0 * (xx * xx + square(yy + zz)) + 17.0 * xx * (yy + zz) - 20.0 * sum + 17.0,
         "umbrella" => xx - yy * z,
         "witch_of_agnesi" => a * (y - 1.0) + (xx + zz) * y,
         "boy_surface" => -a * boy(x, y, z),
@@ -131,7 +205,9 @@ fn boy(x: f64, y: f64, z: f64) -> f64 {
         + 12.0
             * rest
             * z
-            * (27.0 * (xx + yy).powi(2) - 24.0 * zz * (xx + yy) + 36.0 * root * y * z * (yy - 3.0 * xx) + 4.0 * zz * zz)
+            * (27.0 * (xx + yy).powi(2) - 24.0 * zz * (xx + yy)
+                + 36.0 * root * y * z * (yy - 3.0 * xx)
+                + 4.0 * zz * zz)
         + (9.0 * xx + 9.0 * yy - 2.0 * zz)
             * (-81.0 * (xx + yy).powi(2) - 72.0 * zz * (xx + yy)
                 + 108.0 * root * x * z * (xx - 3.0 * yy)
@@ -176,7 +252,9 @@ fn flat(name: &str, p: DVec3, parameters: &[f64]) -> Option<f64> {
             let g = u.abs() * uu - uu + vv;
             return Some((at(0) * g).clamp(-at(1), at(1).max(-at(1))));
         }
-        "algbr_cyl2" => return Some(limited(at(0), at(1), 2.0 * uu * uu - 3.0 * uu * v + vv - 2.0 * vv * v + vv * vv)),
+        "algbr_cyl2" => {
+            return Some(limited(at(0), at(1), 2.0 * uu * uu - 3.0 * uu * v + vv - 2.0 * vv * v + vv * vv));
+        }
         "algbr_cyl3" => return Some(limited(at(0), at(1), uu * uu + uu * vv - 2.0 * uu * v - u * vv + vv)),
         "algbr_cyl4" => {
             return Some(limited(at(0), at(1), uu * uu + vv * vv + 2.0 * uu * vv + 3.0 * uu * v - vv * v));
@@ -274,7 +352,11 @@ fn section(x: f64, z: f64, corner: f64, degrees: f64) -> f64 {
     }
     let (sine, cosine) = degrees.to_radians().sine_cosine();
     let (x, z) = ((x * cosine - z * sine).abs(), (x * sine + z * cosine).abs());
-    if corner == 0.0 { x.max(z) } else { power(power(x, 2.0 / corner) + power(z, 2.0 / corner), 0.5 * corner) }
+    if corner == 0.0 {
+        x.max(z)
+    } else {
+        power(power(x, 2.0 / corner) + power(z, 2.0 / corner), 0.5 * corner)
+    }
 }
 
 fn helix(p: DVec3, [n, f, r, major, s, corner, degrees]: [f64; 7]) -> f64 {

@@ -90,7 +90,9 @@ impl Normal {
     fn in_pattern(&self, p: DVec3, n: DVec3, eye: &Eye) -> DVec3 {
         match &self.kind {
             NormalKind::Bumps(_) => n + self.amount * vector_noise(p),
-            NormalKind::Dents(pattern) => n + self.amount * noise(p, pattern.generator).powi(3) * vector_noise(p),
+            NormalKind::Dents(pattern) => {
+                n + self.amount * noise(p, pattern.generator).powi(3) * vector_noise(p)
+            }
             NormalKind::Wrinkles(_) => {
                 let octave = |i: i32| vector_noise(p * f64::from(1 << i)).abs() / f64::from(1 << i);
                 n + self.amount * (0..10).map(octave).sum::<DVec3>()

@@ -90,7 +90,9 @@ fn pigment_may_pass(pigment: &Pigment) -> bool {
         PigmentKind::Colour(colour) => !colour.passing().is_black(),
         PigmentKind::Map(_, map) => map.may_pass(),
         PigmentKind::Pigments(_, map) => map.iter().any(|(_, pigment)| pigment_may_pass(pigment)),
-        PigmentKind::Blocks(_, pigments) => pigments.iter().any(|pigment: &Arc<Pigment>| pigment_may_pass(pigment)),
+        PigmentKind::Blocks(_, pigments) => {
+            pigments.iter().any(|pigment: &Arc<Pigment>| pigment_may_pass(pigment))
+        }
         PigmentKind::Average(pigments) => pigments.iter().any(|(_, pigment)| pigment_may_pass(pigment)),
         PigmentKind::Image(_) => true,
     }

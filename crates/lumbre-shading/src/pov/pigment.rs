@@ -120,7 +120,10 @@ impl Pigment {
             PigmentKind::Blocks(pattern, pigments) => {
                 let p = pattern.point(self.warps.apply(p));
                 let index = pattern.value(p, eye) as usize;
-                pigments.get(index).or(pigments.last()).map_or(Colour::default(), |pigment| pigment.colour(p, eye))
+                pigments
+                    .get(index)
+                    .or(pigments.last())
+                    .map_or(Colour::default(), |pigment| pigment.colour(p, eye))
             }
             PigmentKind::Average(pigments) => {
                 let p = self.warps.apply(p);

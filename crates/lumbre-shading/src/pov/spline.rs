@@ -102,9 +102,8 @@ impl Spline {
             return entries[last].1;
         }
         let i = entries.partition_point(|entry| entry.0 <= t).clamp(2, last) - 1;
-        let secant = |j: usize, c: usize| {
-            (entries[j + 1].1[c] - entries[j].1[c]) / (entries[j + 1].0 - entries[j].0)
-        };
+        let secant =
+            |j: usize, c: usize| (entries[j + 1].1[c] - entries[j].1[c]) / (entries[j + 1].0 - entries[j].0);
         let slope = |j: usize, c: usize| 0.5 * (secant(j - 1, c) + secant(j, c));
         let width = entries[i + 1].0 - entries[i].0;
         let x = (t - entries[i].0) / width;

@@ -176,13 +176,8 @@ pub struct Interior {
 
 impl Interior {
     /// What an object is filled with unless the scene says otherwise.
-    pub const DEFAULT: Self = Self {
-        ior: 1.0,
-        caustics: 0.0,
-        fade_distance: 0.0,
-        fade_power: 0.0,
-        fade_colour: Spectrum::BLACK,
-    };
+    pub const DEFAULT: Self =
+        Self { ior: 1.0, caustics: 0.0, fade_distance: 0.0, fade_power: 0.0, fade_colour: Spectrum::BLACK };
 
     /// What is left of light after a distance inside.
     pub fn transmittance(&self, distance: f32) -> Spectrum {
@@ -227,10 +222,7 @@ impl UvForm {
             }
             Self::Torus(radius) => {
                 let across = p.x.hypotenuse(p.z) - radius;
-                DVec2::new(
-                    1.0 - (p.z.angle_from(p.x) + PI) / TAU,
-                    (p.y.angle_from(across) + PI) / TAU,
-                )
+                DVec2::new(1.0 - (p.z.angle_from(p.x) + PI) / TAU, (p.y.angle_from(across) + PI) / TAU)
             }
             Self::Cuboid(low, high) => cross((p - *low) / (*high - *low)),
         }
