@@ -14,25 +14,18 @@ use lumbre::formats::{Budget, Diagnostics, ReadOptions, open_scene};
 
 /// Scenes that are not as expected yet. One that is has to be taken off.
 const NOT_YET: &[&str] = &[
-    "csg-clip-bound",
     "int-refraction",
     "lgt-area-full",
     "lgt-spot-cyl-parallel",
     "media-simple",
-    "nrm-patterns",
     "obj-height-field",
     "obj-patch-mesh",
     "obj-sweep-blob",
-    "obj-text",
     "pat-blocks",
-    "pat-cells-waves",
     "pat-fractal",
-    "pat-function-slope",
     "pat-image-map",
-    "pat-noise",
     "pat-turbulence-warp",
     "shadow-filter",
-    "sky-fog",
     "uv-mapping",
 ];
 
