@@ -176,9 +176,6 @@ const VALUES_NOT_YET: &[&str] = &[
     "text Lumbre",
     "trace height_field",
     "normal height_field",
-    "noise_generator 3",
-    "waves",
-    "normal bicubic_patch",
 ];
 
 /// Whether two rows say the same, to some digits.
