@@ -219,6 +219,9 @@ pub struct PovWorld {
     pub irid_wavelength: Spectrum,
 }
 
+/// Fog over an infinite way is that over this length.
+const FAR: f64 = 1e7;
+
 /// A fog.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PovFog {
@@ -242,6 +245,7 @@ impl PovFog {
         if self.distance <= 0.0 {
             return 1.0;
         }
+        let length = length.min(FAR);
         let density = match self.ground {
             None => 1.0,
             Some([offset, altitude]) => self.mean_density(origin, direction, length, offset, altitude),
@@ -252,7 +256,6 @@ impl PovFog {
 
     /// The mean of the density over a way: 1 below the offset, 1 / (1 + (h / altitude)²) above it.
     fn mean_density(&self, origin: DVec3, direction: DVec3, length: f64, offset: f64, altitude: f64) -> f64 {
-        let length = length.min(1e7);
         let at = |t: f64| (origin + direction * t).dot(self.up) - offset;
         let (from, to) = (at(0.0), at(length));
         let difference = to - from;

@@ -208,7 +208,9 @@ impl Builder {
         let material = self.material(leaf, around, parent);
         let id = self.material_id(material);
         let Some((geometry, map)) = self.geometry(leaf) else { return };
-        let area_light = self.glow(id);
+        // What is infinite cannot be sampled as a light.
+        let is_plane = matches!(leaf.object.form, Form::Plane(..));
+        let area_light = if is_plane { None } else { self.glow(id) };
         let index = self.scene.shapes.len() as u32;
         self.scene.shapes.push(ShapeDesc {
             index,

@@ -54,7 +54,7 @@ impl Parser<'_, '_> {
             for i in 0..across {
                 let a = j * (across + 1) + i;
                 let [b, c, d] = [a + 1, a + across + 1, a + across + 2];
-                mesh.triangles.extend([[a, b, d], [a, d, c]]);
+                mesh.triangles.extend([[a, d, b], [a, c, d]]);
             }
         }
         (mesh.normals, mesh.uvs) = (Some(normals), Some(uvs));
@@ -82,5 +82,5 @@ fn place(points: &[DVec3; 16], u: f64, v: f64) -> (DVec3, DVec3) {
         sum
     };
     let (du, dv) = (sum(slopes(u), weights(v)), sum(weights(u), slopes(v)));
-    (sum(weights(u), weights(v)), du.cross(dv).normalize_or(DVec3::Y))
+    (sum(weights(u), weights(v)), dv.cross(du).normalize_or(DVec3::Y))
 }

@@ -91,6 +91,10 @@ impl Parser<'_, '_> {
         let mut before: Option<GlyphId> = None;
         for c in text.chars() {
             let glyph = face.glyph_index(c).unwrap_or(GlyphId(0));
+            if before.is_none() {
+                // The first glyph begins at 0.
+                at.x = -face.glyph_bounding_box(glyph).map_or(0.0, |b| f64::from(b.x_min)) * scale;
+            }
             at.x += before.map_or(0.0, |before| f64::from(kerning(&face, before, glyph)) * scale);
             let mut pen =
                 Pen { outline: Outline::default(), offset: at, scale, start: DVec2::ZERO, at: DVec2::ZERO };

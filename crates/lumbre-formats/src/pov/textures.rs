@@ -154,7 +154,12 @@ impl Parser<'_, '_> {
                         self.expect(b'{')?;
                         self.skip_to(b'}')?;
                     }
-                    while matches!(self.peek()?, Some(Kind::Text(_) | Kind::Number(_))) {
+                    while matches!(self.peek()?, Some(Kind::Text(_) | Kind::Number(_)))
+                        || matches!(
+                            self.word()?.as_deref(),
+                            Some("number_of_sides" | "number_of_tiles" | "pattern" | "interior" | "exterior")
+                        )
+                    {
                         self.next()?;
                     }
                     draft.pattern = Some(Pattern::new(PatternKind::Noise, self.settings.generator));

@@ -135,13 +135,16 @@ impl<'s> Tracer<'s> {
         })
     }
 
-    fn in_fog(&self, mut colour: Spectrum, origin: DVec3, direction: DVec3, length: f64) -> Spectrum {
+    /// Light through all fogs: what each leaves is multiplied, and what each adds is added.
+    fn in_fog(&self, colour: Spectrum, origin: DVec3, direction: DVec3, length: f64) -> Spectrum {
+        let (mut left, mut added) = (Spectrum::WHITE, Spectrum::BLACK);
         for fog in &self.world.fogs {
-            let left = fog.transmittance(origin, direction, length);
-            let tinted = Spectrum::splat(1.0 - fog.filter) + fog.rgb * fog.filter;
-            colour = colour * tinted * left + fog.rgb * (1.0 - left);
+            let passes = fog.transmittance(origin, direction, length);
+            let tint = Spectrum::splat(1.0 - fog.filter) + fog.rgb * fog.filter;
+            left = left * tint * passes;
+            added += fog.rgb * (1.0 - passes);
         }
-        colour
+        colour * left + added
     }
 
     fn shade(
@@ -162,7 +165,7 @@ impl<'s> Tracer<'s> {
         // A solid that the ray is in is left.
         let is_inside = traced.inside.iter().any(|solid| std::ptr::eq(*solid, material));
         let mut sum = Spectrum::BLACK;
-        for (share, layers) in &material.stacks(here.surface.point, &eye, !is_inside) {
+        for (share, layers) in &material.stacks(here.surface.point, &eye, here.front) {
             sum += self.stack(traced, here, material, layers, is_inside, record) * *share;
         }
         sum

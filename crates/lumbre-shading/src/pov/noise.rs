@@ -48,8 +48,7 @@ impl Tables {
         let mut state = -560_851_967_i32;
         let mut wave_frequencies = Vec::with_capacity(MOST_WAVES);
         for _ in 0..MOST_WAVES {
-            wave_frequencies.push(f64::from((state >> 16) & 0x7FFF) * 0.000_030_518_509_476 + 0.01);
-            step(&mut state);
+            wave_frequencies.push(f64::from(draw(&mut state)) * 0.000_030_518_509_476 + 0.01);
         }
         Self {
             hash: hash_table(),
@@ -237,7 +236,7 @@ fn gradient_noise(p: DVec3) -> f64 {
         let [dx, dy, dz] = [corner & 1, corner >> 1 & 1, corner >> 2];
         let row = usize::from(tables.permutation[index(cell.x, dx)]) + index(cell.y, dy);
         let row = usize::from(tables.permutation[row]) + index(cell.z, dz);
-        let gradient = tables.gradients[usize::from(tables.permutation[row])];
+        let gradient = tables.gradients[row];
         let share = |is_far: usize, s: f64| if is_far == 1 { s } else { 1.0 - s };
         let weight = share(dx, s.x) * share(dy, s.y) * share(dz, s.z);
         sum += weight * gradient.dot(f - DVec3::new(dx as f64, dy as f64, dz as f64));

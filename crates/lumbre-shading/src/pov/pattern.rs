@@ -310,7 +310,9 @@ impl Pattern {
                 0.2 * (2.5 + waves.sum::<f64>() / f64::from(*count))
             }
             PatternKind::Slope(slope) => slope.value(p, eye),
-            PatternKind::AngleOfIncidence => eye.normal.dot(eye.direction).clamp(-1.0, 1.0).arc_cosine() / PI,
+            PatternKind::AngleOfIncidence => {
+                (-eye.normal.dot(eye.direction)).clamp(-1.0, 1.0).arc_cosine() / PI
+            }
             PatternKind::Spiral1(arms) => spiral(p, *arms, self.own_turbulence(p)).0,
             PatternKind::Spiral2(arms) => {
                 let (turned, radius) = spiral(p, *arms, self.own_turbulence(p));
