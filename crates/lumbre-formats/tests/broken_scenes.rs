@@ -760,7 +760,7 @@ fn kinds_of_file_are_told_by_their_ending() {
     let cases = [
         (
             "a.xyz",
-            "a.xyz: unknown kind of scene file (found \"xyz\"; expected .pbrt, .pbrt.gz, .gltf, .glb, ",
+            "a.xyz: unknown kind of scene file (found \"xyz\"; expected .pbrt, .pbrt.gz, .pov, .gltf, .glb, ",
         ),
         ("noending", "noending: unknown kind of scene file (found no ending; "),
         ("a.glb", "a.glb: cannot open"),

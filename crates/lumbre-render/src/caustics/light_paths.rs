@@ -32,13 +32,13 @@ const ROULETTE_START: u32 = 6;
 
 /// Where light paths begin: on surfaces in spheres that may overlap.
 #[derive(Debug)]
-pub(crate) struct Beginnings<'s> {
+pub(crate) struct ChordSampler<'s> {
     spheres: &'s [BoundingSphere],
     /// 2π times the sum of the squares of all radii: the inverse of the density of a point in one sphere, per line and area.
     whole: f64,
 }
 
-impl<'s> Beginnings<'s> {
+impl<'s> ChordSampler<'s> {
     /// On what is specular in a scene; `None` where nothing is.
     pub(crate) fn new(scene: &'s Scene) -> Option<Self> {
         Self::within(scene.specular_spheres())
@@ -55,7 +55,7 @@ impl<'s> Beginnings<'s> {
         self.spheres.iter().filter(|sphere| sphere.contains(point)).count() as f64 / self.whole
     }
 
-    /// The line of a draw: the chord of a sphere. The probability of a sphere is that of its share of [`Beginnings::whole`].
+    /// The line of a draw: the chord of a sphere. The probability of a sphere is that of its share of [`ChordSampler::whole`].
     fn line(&self, draw: &Draw) -> Ray {
         let mut left = f64::from(draw.survival(0)) * self.whole / TAU;
         let is_chosen = |sphere: &&BoundingSphere| {
@@ -74,10 +74,10 @@ impl<'s> Beginnings<'s> {
 }
 
 /// Follows the light paths of lines.
-pub(crate) struct Tracer<'s> {
+pub(crate) struct LightTracer<'s> {
     pub(crate) scene: &'s Scene,
     pub(crate) view: &'s View,
-    pub(crate) beginnings: &'s Beginnings<'s>,
+    pub(crate) chords: &'s ChordSampler<'s>,
     pub(crate) sampler: Sampler,
     pub(crate) normals: ShadingNormals,
     /// Specular bounces at most.
@@ -116,7 +116,7 @@ struct LightPath<'s> {
     is_straight: bool,
 }
 
-impl<'s> Tracer<'s> {
+impl<'s> LightTracer<'s> {
     /// The photons of some lines of a pass.
     pub(crate) fn trace(&self, pass: u32, lines: Range<u32>, photons: &mut Vec<Photon>) {
         for line in lines {
@@ -151,7 +151,7 @@ impl<'s> Tracer<'s> {
         // No pixel is there.
         let draw = self.sampler.draw(u32::MAX, pass, line);
         let time = self.view.time(draw.time());
-        let chord = self.beginnings.line(&draw).at_time(time);
+        let chord = self.chords.line(&draw).at_time(time);
         let mut points = 0;
         self.scene.accel().all(&chord, |hit| {
             if self.scene.may_be_specular(hit) == are_specular {
@@ -173,7 +173,7 @@ impl<'s> Tracer<'s> {
             medium: None,
             flux,
             flux_at_start: flux.max_component(),
-            density: self.beginnings.density(point) * pdf,
+            density: self.chords.density(point) * pdf,
             lamp: 1.0 / pdf,
             lamp_area: sample.end.map(|_| length * length / pdf),
             length,
@@ -201,7 +201,7 @@ impl<'s> Tracer<'s> {
             Scatter::Delta => (f64::INFINITY, 1.0),
         };
         let cosine = here.surface.normal.dot(sample.towards).abs();
-        let flux = sample.radiance * (cosine * share / self.beginnings.density(point)) as f32;
+        let flux = sample.radiance * (cosine * share / self.chords.density(point)) as f32;
         (!flux.is_black() && flux.is_finite()).then_some(Lit { sample, ray, here, pdf, flux })
     }
 

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use lumbre_math::{DVec3, Elementary};
 use lumbre_simd::Real;
 
-use super::{Beginnings, PhotonMap, SAMPLES_A_PASS};
+use super::{ChordSampler, PhotonMap, SAMPLES_A_PASS};
 
 /// The radius in which a vertex that the camera sees collects photons of the first pass, in widths of the footprint of a sample, which is
 /// a quarter of a pixel wide.
@@ -22,7 +22,7 @@ const WIDER: f32 = 3.0;
 /// The photons that the paths of a wave are merged with.
 #[derive(Debug)]
 pub(crate) struct Merging<'s> {
-    pub(crate) beginnings: Beginnings<'s>,
+    pub(crate) chords: ChordSampler<'s>,
     /// The passes of all samples of the wave, each with its number.
     pub(crate) passes: Vec<(u32, Arc<PhotonMap>)>,
     /// Lines of a pass.
@@ -57,7 +57,7 @@ impl Merging<'_> {
     /// The weight of light that a path found behind specular surfaces, of which the last is at `from`. `merging` is what
     /// [`crate::wave::paths::Paths::merging`] says, and `light_pdf` the density with which the light would have been sampled there.
     pub(crate) fn weight_of_found(&self, merging: f32, from: DVec3, light_pdf: f32) -> f32 {
-        let density = self.beginnings.density(from) as f32 * light_pdf;
+        let density = self.chords.density(from) as f32 * light_pdf;
         if density > 0.0 { merging / (merging + density) } else { 1.0 }
     }
 }

@@ -12,7 +12,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-pub(crate) use light_paths::{Beginnings, Tracer};
+pub(crate) use light_paths::{ChordSampler, LightTracer};
 pub(crate) use merging::{Merging, radius};
 pub(crate) use photons::{Photon, PhotonMap};
 pub use share::caustic_share;
@@ -63,7 +63,7 @@ struct State {
 
 impl Passes {
     /// The photons of a pass of a picture of a size, traced where they are not at hand.
-    pub(crate) fn get(&self, tracer: &Tracer<'_>, size: [u32; 2], number: u32) -> Arc<PhotonMap> {
+    pub(crate) fn get(&self, tracer: &LightTracer<'_>, size: [u32; 2], number: u32) -> Arc<PhotonMap> {
         let pass = self.find((size, number));
         pass.help(tracer, lines_of(size[0], size[1]), number);
         pass.wait()
@@ -89,7 +89,7 @@ impl Pass {
     }
 
     /// Traces pieces until none is left to begin.
-    fn help(&self, tracer: &Tracer<'_>, lines: u32, number: u32) {
+    fn help(&self, tracer: &LightTracer<'_>, lines: u32, number: u32) {
         loop {
             let piece = self.next_piece.fetch_add(1, Ordering::Relaxed);
             if piece >= PIECES {

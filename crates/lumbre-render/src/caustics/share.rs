@@ -2,7 +2,7 @@
 
 use lumbre_scene::{BoundingSphere, Scene, View};
 
-use super::{Beginnings, Tracer};
+use super::{ChordSampler, LightTracer};
 use crate::transport::Sampler;
 use crate::{RenderError, RenderOptions};
 
@@ -23,23 +23,23 @@ pub fn caustic_share(scene: &Scene, options: &RenderOptions) -> Result<f64, Rend
     let count = scene.cameras().len();
     let camera = scene.cameras().get(options.camera);
     let camera = camera.ok_or(RenderError::NoSuchCamera { index: options.camera, count })?;
-    let Some(beginnings) = Beginnings::new(scene).filter(|_| !scene.lights().is_empty()) else {
+    let Some(chords) = ChordSampler::new(scene).filter(|_| !scene.lights().is_empty()) else {
         return Ok(0.0);
     };
     let whole = [BoundingSphere::around(&scene.bounds())];
-    let everywhere = Beginnings::within(&whole);
+    let everywhere = ChordSampler::within(&whole);
     let view = View::new(camera, options.width, options.height);
-    let tracer = |beginnings| Tracer {
+    let tracer = |chords| LightTracer {
         scene,
         view: &view,
-        beginnings,
+        chords,
         sampler: Sampler::new(&options.sampler),
         normals: options.integrator.shading_normals,
         max_bounces: options.integrator.max_depth.saturating_sub(1),
         goes_straight_on: scene.lets_light_straight_on(),
     };
     let mut photons = Vec::new();
-    tracer(&beginnings).trace(PASS, 0..LINES, &mut photons);
+    tracer(&chords).trace(PASS, 0..LINES, &mut photons);
     let hard = photons.iter().filter(|photon| photon.lamp <= SMALL);
     let hard = hard.map(|photon| f64::from(photon.flux.average())).sum::<f64>() / f64::from(LINES);
     if hard <= 0.0 {

@@ -2,7 +2,7 @@
 
 use lumbre_shading::ShadingNormals;
 
-use crate::caustics::{Beginnings, Merging, Passes, Tracer, lines_of};
+use crate::caustics::{ChordSampler, LightTracer, Merging, Passes, lines_of};
 use crate::integrators::{Integrator, Path};
 use crate::transport::{Record, Sampler};
 use crate::wave::Sights;
@@ -30,11 +30,11 @@ impl Integrator for Caustics {
     fn estimate(&self, sights: &mut Sights<'_, '_>, sampler: &Sampler, record: &mut Record) {
         let (scene, view) = (sights.scene(), sights.view());
         let mut setting = self.path.setting(scene, sampler);
-        if let Some(beginnings) = Beginnings::new(scene).filter(|_| !scene.lights().is_empty()) {
-            let tracer = Tracer {
+        if let Some(chords) = ChordSampler::new(scene).filter(|_| !scene.lights().is_empty()) {
+            let tracer = LightTracer {
                 scene,
                 view,
-                beginnings: &beginnings,
+                chords: &chords,
                 sampler: *sampler,
                 normals: self.path.shading_normals,
                 max_bounces: self.path.max_depth.saturating_sub(1),
@@ -47,7 +47,7 @@ impl Integrator for Caustics {
             let passes =
                 numbers.into_iter().map(|number| (number, self.passes.get(&tracer, [width, height], number)));
             let passes = passes.collect();
-            setting.merging = Some(Merging { beginnings, passes, lines: lines_of(width, height).into() });
+            setting.merging = Some(Merging { chords, passes, lines: lines_of(width, height).into() });
         }
         sights.follow(&setting, record);
     }

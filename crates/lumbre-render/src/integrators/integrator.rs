@@ -2,11 +2,10 @@
 
 use std::fmt::Debug;
 
-use lumbre_scene::{IntegratorDesc, IntegratorKind, Scene, View};
+use lumbre_scene::{Scene, View};
 use lumbre_shading::Spectrum;
 
-use crate::integrators::{AmbientOcclusion, Caustics, FeatureIntegrator, Path, Pov, Whitted};
-use crate::transport::{Draw, Feature, Record, Sampler, Sight};
+use crate::transport::{Draw, Record, Sampler, Sight};
 use crate::wave::Sights;
 
 /// An estimator of the radiance that arrives at the camera, of many samples at a time.
@@ -37,27 +36,5 @@ impl<T: RayIntegrator> Integrator for T {
     fn estimate(&self, sights: &mut Sights<'_, '_>, _: &Sampler, record: &mut Record) {
         let (scene, view) = (sights.scene(), sights.view());
         sights.each(|sight, draw| self.radiance(scene, view, sight, draw, record));
-    }
-}
-
-/// The integrator that a description asks for.
-pub fn integrator(desc: &IntegratorDesc) -> Box<dyn Integrator> {
-    let IntegratorDesc { max_depth, shading_normals, .. } = *desc;
-    match desc.kind {
-        IntegratorKind::Path { regularize } => {
-            Box::new(Path { regularize, shading_normals, ..Path::new(max_depth) })
-        }
-        IntegratorKind::Caustics => Box::new(Caustics::new(max_depth, shading_normals)),
-        IntegratorKind::Whitted { light_samples, sky } => {
-            Box::new(Whitted { max_depth, light_samples, sky, shading_normals })
-        }
-        IntegratorKind::Pov => Box::new(Pov),
-        IntegratorKind::AmbientOcclusion { cosine, max_distance } => {
-            Box::new(AmbientOcclusion { cosine, max_distance, shading_normals })
-        }
-        IntegratorKind::Normals => Box::new(FeatureIntegrator(Feature::Normal)),
-        IntegratorKind::Depth => Box::new(FeatureIntegrator(Feature::Depth)),
-        IntegratorKind::Albedo => Box::new(FeatureIntegrator(Feature::Albedo)),
-        IntegratorKind::Uv => Box::new(FeatureIntegrator(Feature::Uv)),
     }
 }

@@ -2,6 +2,7 @@
 
 mod ambient_occlusion;
 mod caustics;
+mod choice;
 mod features;
 mod integrator;
 mod path;
@@ -10,8 +11,9 @@ mod whitted;
 
 pub use ambient_occlusion::AmbientOcclusion;
 pub use caustics::Caustics;
+pub use choice::integrator;
 pub use features::FeatureIntegrator;
-pub use integrator::{Integrator, RayIntegrator, integrator};
+pub use integrator::{Integrator, RayIntegrator};
 pub use path::Path;
 pub use pov::Pov;
 pub use whitted::Whitted;

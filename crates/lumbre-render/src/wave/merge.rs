@@ -1,68 +1,22 @@
 //! Photons near vertices: light from lamps that came over mirrors and smooth glass.
 
 use std::f32::consts::FRAC_1_SQRT_2;
-use std::marker::PhantomData;
 
 use lumbre_math::Vec3;
 use lumbre_shading::Spectrum;
 use lumbre_shading::lanes::BsdfKind;
-use lumbre_simd::{Job, Real, UInt, V3};
 
-use crate::caustics::{Merging, Photon, radius};
+use crate::caustics::{Merging, radius};
 use crate::transport::Record;
 use crate::transport::journal::Source;
-use crate::wave::flat::put3;
-use crate::wave::paths::{PAD, Paths, SCATTERED, grow};
+use crate::wave::pairs::{Merge, Merges};
+use crate::wave::paths::{PAD, Paths, SCATTERED};
 use crate::wave::setting::Setting;
-use crate::wave::shade::{Kind, Vertex};
-use crate::wave::vertices::{Vertices, gather3};
+use crate::wave::vertices::Vertices;
 use crate::wave::{KINDS, Wave};
 
 /// Photons that are merged at a time, about.
 const BATCH: usize = 1 << 14;
-/// Light that grazes a surface more than this is taken as if it did not.
-const MIN_COSINE: f32 = 1e-3;
-
-/// Pairs of a vertex and a photon near it, in columns.
-#[derive(Debug, Default)]
-pub(crate) struct Merges {
-    len: usize,
-    vertex: Vec<u32>,
-    /// Where the photon came from.
-    towards: [Vec<f32>; 3],
-    /// Its irradiance over the disk around the vertex, by the area that the light is perpendicular to.
-    light: [Vec<f32>; 3],
-    /// What a density of directions of the vertex becomes one of pairs by, over the density of the photon's light path.
-    share: Vec<f32>,
-    /// What the vertex scatters of it.
-    scattered: [Vec<f32>; 3],
-}
-
-impl Merges {
-    fn push(&mut self, vertex: u32, photon: &Photon, spread: f32) {
-        if self.vertex.len() < self.len + 1 + PAD {
-            let len = 2 * (self.len + PAD);
-            let columns = self.towards.iter_mut().chain(&mut self.light).chain(&mut self.scattered);
-            columns.chain([&mut self.share]).for_each(|column| grow(column, len));
-            grow(&mut self.vertex, len);
-        }
-        let at = self.len;
-        self.len += 1;
-        self.vertex[at] = vertex;
-        let cosine = photon.normal.dot(photon.towards).max(MIN_COSINE);
-        for (column, x) in self.towards.iter_mut().zip(photon.towards.to_array()) {
-            column[at] = x;
-        }
-        for (column, x) in self.light.iter_mut().zip((photon.flux * (spread / cosine)).to_array()) {
-            column[at] = x;
-        }
-        self.share[at] = spread / photon.density;
-    }
-
-    fn scattered(&self, at: usize) -> Spectrum {
-        Spectrum::new(self.scattered[0][at], self.scattered[1][at], self.scattered[2][at])
-    }
-}
 
 impl<'s> Wave<'s> {
     /// Adds the light of photons near the vertices that are to be shaded.
@@ -148,48 +102,5 @@ fn add(
         let path = vertices.path[vertex as usize] as usize;
         radiance[paths.slot[path] as usize] +=
             record.added(Source::Caustics, paths.throughput(path), sum, 1.0);
-    }
-}
-
-/// Evaluates BSDFs at pairs.
-pub(super) struct Merge<'a, 's> {
-    vertices: &'a Vertices<'s>,
-    paths: &'a Paths,
-    merges: &'a mut Merges,
-}
-
-/// [`Merge`] with BSDFs of one kind, at any instruction set.
-pub(super) struct MergeKind<'a, 's, K> {
-    pub(super) merge: Merge<'a, 's>,
-    pub(super) kind: PhantomData<K>,
-}
-
-impl<K: Kind> Job for MergeKind<'_, '_, K> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<R: Real>(self) {
-        let Merge { vertices, paths, merges } = self.merge;
-        let mut done = 0;
-        while done < merges.len {
-            let vertex_at = R::UInt::from_slice(&merges.vertex[done..]);
-            let at = R::UInt::gather(&vertices.path, vertex_at);
-            let vertex = Vertex::new(vertices, vertex_at, -gather3::<R>(&paths.direction, at));
-            let bsdf: K::Bsdf<R> = vertices.rows.load(R::UInt::gather(&vertices.bsdf, vertex_at));
-            let scattered = vertex.eval(&bsdf, load3(&merges.towards, done));
-            let weight = (R::one() + scattered.pdf * R::from_slice(&merges.share[done..])).recip();
-            let light = load3::<R>(&merges.light, done) * scattered.f * weight;
-            put3(&mut merges.scattered, done, light);
-            done += R::LANES;
-        }
-    }
-}
-
-#[inline(always)]
-fn load3<R: Real>(columns: &[Vec<f32>; 3], at: usize) -> V3<R> {
-    V3 {
-        x: R::from_slice(&columns[0][at..]),
-        y: R::from_slice(&columns[1][at..]),
-        z: R::from_slice(&columns[2][at..]),
     }
 }

@@ -1,3 +1,5 @@
+use std::f64::consts::PI;
+
 use super::*;
 
 fn surface(curvature: f64, thickness: f64, eta: f64, diameter: f64) -> LensSurface {
@@ -50,9 +52,9 @@ fn rays_from_a_point_of_the_film_meet_where_the_lens_is_focused() {
             let spread = (points[0] - points[1]).length().max((points[0] - points[2]).length());
             // By a tenth of the pupil, which is 4 mm wide, rays part far more without a lens.
             assert!(spread < 2e-4 * distance, "{distance} {film}: {spread}");
-            // Upside down, as large as distances say.
+            // Upside down, as large as a thin lens makes it.
             let image = points[0].truncate() / film;
-            let scale = -(distance - lens.film_distance()) / lens.focal_length();
+            let scale = 1.0 - (distance - lens.film_distance()) / lens.focal_length();
             let is_turned = film == DVec2::ZERO || (image / scale - 1.0).abs().max_element() < 0.15;
             assert!(is_turned, "{distance}: {image} {scale}");
         }
@@ -68,9 +70,12 @@ fn brightness_is_that_of_the_stop_as_far_as_its_rim_does_not_hide_it() {
     let corner = 0.5 * 0.035 * (1.0 - 4.0 / 64.0) * DVec2::new(0.5_f64.sqrt(), -(0.5_f64.sqrt()));
     let corner = brightness(&lens, corner);
     assert!((corner / 0.0749 - 1.0).abs() < 0.02, "{corner}");
-    // A stop of half the diameter lets a quarter through.
+    // π sin² of the angle of the stop, whose tangent is half as large for half the diameter.
     let narrow = brightness(&Lens::new(surfaces(5.0), None, 2.0, 0.035).unwrap(), DVec2::ZERO);
-    assert!((narrow / middle - 0.25).abs() < 0.005, "{narrow}");
+    let squared_sine = middle / PI;
+    let squared_tangent = 0.25 * squared_sine / (1.0 - squared_sine);
+    let expected = PI * squared_tangent / (1.0 + squared_tangent);
+    assert!((narrow / expected - 1.0).abs() < 0.01, "{narrow}, expected {expected}");
 }
 
 #[test]

@@ -289,7 +289,7 @@ mod tests {
                 sum += 1.0 / density;
             }
             // The mean of 1 / density is the area; a cell's share is the integral of its density.
-            assert!((sum / f64::from(n * n) - 1.0).abs() < 2e-2, "{sum}");
+            assert!((sum / f64::from(n * n) - 1.0).abs() < 3e-2, "{sum}");
             for (y, row) in counts.iter().enumerate() {
                 for (x, &count) in row.iter().enumerate() {
                     let steps = 40;
