@@ -12,7 +12,7 @@ fn read(text: &str) -> (Result<SceneDesc, FormatError>, Diagnostics) {
     (limits.memory, limits.elements) = (64 << 20, 1_000_000);
     let budget = Budget::new(limits);
     let mut diagnostics = Diagnostics::new();
-    let input = Input::from_reader("a.pov", text.as_bytes(), &budget).unwrap();
+    let input = Input::from_reader("a.pov", text.as_bytes(), &budget).expect("it can be read");
     let scene = lumbre_formats::pov::pov_scene(
         &input,
         Path::new("/nowhere"),

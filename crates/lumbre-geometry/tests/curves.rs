@@ -22,12 +22,12 @@ fn wander(random: &mut RandomStream, points: usize, widths: [f64; 2]) -> Strand 
             p
         })
         .collect();
-    Strand::new(CurveBasis::BSpline, 3, &points, widths).unwrap()
+    Strand::new(CurveBasis::BSpline, 3, &points, widths).expect("it is a curve")
 }
 
 fn of(kind: CurveKind, strands: &[Strand]) -> Curves {
     let mut curves = Curves::new(kind);
-    strands.iter().for_each(|strand| curves.push(strand).unwrap());
+    strands.iter().for_each(|strand| curves.push(strand).expect("it is near"));
     curves
 }
 

@@ -46,7 +46,7 @@ fn assert_same(a: &Rendered, b: &Rendered, what: &str) {
 
 fn bytes_of(state: &RenderState) -> Vec<u8> {
     let mut bytes = Vec::new();
-    state.clone().write_to(&mut bytes).unwrap();
+    state.clone().write_to(&mut bytes).expect("a vector takes all bytes");
     bytes
 }
 

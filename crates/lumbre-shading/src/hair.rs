@@ -89,7 +89,7 @@ pub fn absorption_of_colour(colour: Spectrum, beta_n: f32) -> Spectrum {
 
 fn roughness(beta: f32) -> f32 {
     // NaN is the least.
-    beta.max(0.01).min(1.0)
+    if beta.is_nan() { 0.01 } else { beta.clamp(0.01, 1.0) }
 }
 
 /// A fibre, at one place across it: a rough dielectric cylinder that absorbs, with tilted scales. Light is reflected (R), goes through
@@ -525,7 +525,7 @@ mod tests {
         for (wo, wi, h, expected) in [
             (
                 Vec3::new(0.30943, 0.20628, 0.92828),
-                Vec3::new(0.70711, 0.0, 0.70711),
+                Vec3::new(std::f32::consts::FRAC_1_SQRT_2, 0.0, std::f32::consts::FRAC_1_SQRT_2),
                 -0.2169,
                 [0.0031606, 0.001553, 0.0014176],
             ),

@@ -243,7 +243,7 @@ fn measured(alpha: (f64, f64)) -> Measured {
             luminance,
             colours,
         })
-        .unwrap(),
+        .expect("the tables fit"),
     ))
 }
 

@@ -143,7 +143,7 @@ impl Displacement {
             if !is_long {
                 work.faces.push(face);
                 work.of_face.push(number as u32);
-                if work.faces.len() % STRIDE == 0 {
+                if work.faces.len().is_multiple_of(STRIDE) {
                     hold.grow(STRIDE as u64 * FACE_BYTES, WHAT)?;
                 }
                 continue;
@@ -152,7 +152,7 @@ impl Displacement {
             let middle = match work.edges.get(&(a.min(b), a.max(b))) {
                 Some(&middle) => middle,
                 None => {
-                    if work.positions.len() % STRIDE == 0 {
+                    if work.positions.len().is_multiple_of(STRIDE) {
                         hold.grow(STRIDE as u64 * VERTEX_BYTES, WHAT)?;
                         budget.elements(STRIDE as u64, WHAT)?;
                     }

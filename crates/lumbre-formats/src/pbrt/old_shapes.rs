@@ -169,15 +169,18 @@ impl Converter<'_, '_> {
     }
 }
 
+/// Numbers of functions, with values and derivatives.
+type Row = Vec<(usize, f64, f64)>;
+
 /// The functions of one parameter.
 struct Basis {
     count: usize,
     /// For each place its parameter, and the functions that are not 0 there: their numbers, values and derivatives.
-    values: Vec<(f64, Vec<(usize, f64, f64)>)>,
+    values: Vec<(f64, Row)>,
 }
 
 /// The B-splines of an order that are not 0 at a place, by the recursion of Cox and de Boor.
-fn functions(knots: &[f64], count: usize, order: usize, t: f64) -> Vec<(usize, f64, f64)> {
+fn functions(knots: &[f64], count: usize, order: usize, t: f64) -> Row {
     // The last span that is not empty holds its upper end, too.
     let mut span = knots[..=count].partition_point(|&knot| knot <= t).clamp(order, count) - 1;
     while span + 1 > order && knots[span] == knots[span + 1] {

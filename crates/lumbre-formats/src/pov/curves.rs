@@ -78,7 +78,7 @@ impl Parser<'_, '_> {
                 }
                 // What is not closed is closed by a straight line.
                 let end = rest.len() - 1;
-                curve(&mut outline, &rest[..], spline);
+                curve(&mut outline, rest, spline);
                 if let (Some(last), Some(first)) = (rest.get(end - tail.min(end)), start) {
                     outline.line(*last, first);
                 }

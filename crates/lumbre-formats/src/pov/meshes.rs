@@ -307,10 +307,7 @@ impl Parser<'_, '_> {
 
 fn push(all: &mut Triangles, corners: [DVec3; 3], normals: Option<[DVec3; 3]>, uvs: Option<[DVec2; 3]>) {
     let flat = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-    let normals = normals.map(|normals| {
-        all.has_normals = true;
-        normals
-    });
+    all.has_normals |= normals.is_some();
     let normals = normals.unwrap_or([flat; 3]);
     // The front is where most of the normals point.
     let is_turned = normals.iter().sum::<DVec3>().dot(flat) < 0.0;

@@ -68,12 +68,14 @@ impl Settings {
     }
 
     /// Linear light in the working space.
+    #[expect(clippy::wrong_self_convention, reason = "from linear numbers or sRGB, by the settings")]
     pub(super) fn from_linear(&self, c: Spectrum) -> Spectrum {
         let gamma = self.gamma();
         if gamma == 1.0 { c } else { c.map(|c| c.max(0.0).power((1.0 / gamma) as f32)) }
     }
 
     /// A colour of sRGB in the working space.
+    #[expect(clippy::wrong_self_convention, reason = "from linear numbers or sRGB, by the settings")]
     pub(super) fn from_srgb(&self, v: [f64; 5]) -> [f64; 5] {
         let gamma = self.gamma();
         let decode = |c: f64| {

@@ -254,11 +254,11 @@ impl Parser<'_, '_> {
                 continue;
             }
             // The amount stands behind the pattern.
-            if draft.pattern.is_some() || kept.is_some() || is_average {
-                if let Some(Kind::Number(_) | Kind::Mark(b'-' | b'+' | b'(' | b'.')) = self.peek()? {
-                    amount = self.finite()?;
-                    continue;
-                }
+            if (draft.pattern.is_some() || kept.is_some() || is_average)
+                && let Some(Kind::Number(_) | Kind::Mark(b'-' | b'+' | b'(' | b'.')) = self.peek()?
+            {
+                amount = self.finite()?;
+                continue;
             }
             let Some(word) = self.word()? else { return Err(self.unexpected("a normal")) };
             if let Some(found) = self.map(&word)? {

@@ -39,7 +39,8 @@ impl PhotonMap {
     pub(crate) fn new(photons: Vec<Photon>) -> Self {
         let mut numbered: Vec<(u32, Photon)> = (0..).zip(photons).collect();
         let mut axes = vec![0; numbered.len()];
-        let mut ranges = vec![0..numbered.len()];
+        let mut ranges = Vec::new();
+        ranges.push(0..numbered.len());
         while let Some(range) = ranges.pop() {
             if range.is_empty() {
                 continue;

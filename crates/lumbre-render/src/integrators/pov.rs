@@ -114,7 +114,7 @@ impl<'s> Tracer<'s> {
                 let mut colour = self.shade(traced, &here, material, record);
                 // Inside of solids light fades, by the way to where it leaves them.
                 for solid in &traced.inside {
-                    colour = colour * solid.interior.transmittance(distance as f32);
+                    colour *= solid.interior.transmittance(distance as f32);
                 }
                 (colour, distance)
             }
@@ -194,10 +194,10 @@ impl<'s> Tracer<'s> {
                 sum += left * self.lit(traced, here, material, layer, light, opacity, shadow, record);
             }
             sum += self.mirror(traced, here, material, layer, record);
-            left = left * colour.passing();
+            left *= colour.passing();
             if finish.conserve_energy {
                 let mirrored = self.reflectance(traced, material, layer);
-                left = left * (Spectrum::WHITE - mirrored).map(|c| c.clamp(0.0, 1.0));
+                left *= (Spectrum::WHITE - mirrored).map(|c| c.clamp(0.0, 1.0));
             }
         }
         if let Some(top) = layers.last()
@@ -299,7 +299,7 @@ impl<'s> Tracer<'s> {
             sum += self.highlights(finish, layer, d, towards, arriving);
         }
         if finish.irid[0] != 0.0 {
-            sum = sum * self.irid(finish, cosine, n.dot(d).abs(), here.surface.point);
+            sum *= self.irid(finish, cosine, n.dot(d).abs(), here.surface.point);
         }
         sum
     }
@@ -538,12 +538,11 @@ impl<'s> Tracer<'s> {
                         .fold(Spectrum::splat(*share), |left, layer| left * layer.colour.passing());
                 }
                 if material.interior.caustics != 0.0 {
-                    passes =
-                        passes * (1.0 + (normal.dot(towards).abs() as f32).power(material.interior.caustics));
+                    passes *= 1.0 + (normal.dot(towards).abs() as f32).power(material.interior.caustics);
                 }
-                left = left * passes;
+                left *= passes;
                 if is_inside {
-                    left = left * material.interior.transmittance(step as f32);
+                    left *= material.interior.transmittance(step as f32);
                     inside.retain(|solid| !std::ptr::eq(*solid, material));
                 } else {
                     inside.push(material);

@@ -27,6 +27,9 @@ pub struct Normal {
     pub uv: bool,
 }
 
+/// A value of a pattern, with the height and the slope there.
+pub(super) type HeightAt = (f64, [f64; 2]);
+
 /// The kinds of normal.
 #[derive(Clone, Debug)]
 pub enum NormalKind {
@@ -35,7 +38,7 @@ pub enum NormalKind {
         /// The pattern.
         pattern: Box<Pattern>,
         /// Heights and slopes by its values.
-        map: Option<Arc<[(f64, [f64; 2])]>>,
+        map: Option<Arc<[HeightAt]>>,
     },
     /// Noise: `bumps`.
     Bumps(Box<Pattern>),

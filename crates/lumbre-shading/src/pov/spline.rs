@@ -130,6 +130,7 @@ impl Spline {
 }
 
 /// The second derivatives of a natural spline, by the tridiagonal system that makes slopes agree.
+#[expect(clippy::needless_range_loop, reason = "a component of several lists at once")]
 fn bends(entries: &[(f64, Values)]) -> Vec<Values> {
     let n = entries.len();
     let mut bends = vec![[0.0; 5]; n];
