@@ -159,8 +159,8 @@ const CIRCLES: &[(&str, &[usize])] = &[
     ("lumbre-math", &[4]),
     ("lumbre-python", &[4]),
     ("lumbre-render", &[5, 3, 3]),
-    ("lumbre-scene", &[31, 2]),
-    ("lumbre-shading", &[21, 3]),
+    ("lumbre-scene", &[34, 2]),
+    ("lumbre-shading", &[25, 5, 3]),
     ("lumbre-simd", &[2]),
     ("lumbre-viewer", &[2]),
 ];
