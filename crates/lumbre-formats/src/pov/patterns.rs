@@ -22,6 +22,12 @@ impl Draft {
         let octaves = pattern.as_ref().map_or_else(Octaves::default, |pattern| pattern.octaves);
         Self { pattern, warps, uv, octaves }
     }
+
+    /// Begins a pattern, with the octaves that stood before it.
+    pub(super) fn begin(&mut self, kind: PatternKind, generator: NoiseGenerator) {
+        let octaves = self.octaves;
+        self.pattern = Some(Pattern { octaves, ..Pattern::new(kind, generator) });
+    }
 }
 
 impl Parser<'_, '_> {

@@ -120,9 +120,7 @@ impl Parser<'_, '_> {
                 continue;
             }
             if let Some(found) = self.pattern_kind(&word)? {
-                let mut pattern = Pattern::new(found, self.settings.generator);
-                pattern.octaves = draft.octaves;
-                draft.pattern = Some(pattern);
+                draft.begin(found, self.settings.generator);
                 continue;
             }
             if self.pattern_modifier(&word, &mut draft)? {
@@ -266,9 +264,7 @@ impl Parser<'_, '_> {
                 continue;
             }
             if let Some(found) = self.pattern_kind(&word)? {
-                let mut pattern = Pattern::new(found, self.settings.generator);
-                pattern.octaves = draft.octaves;
-                draft.pattern = Some(pattern);
+                draft.begin(found, self.settings.generator);
                 special = Some(word);
                 continue;
             }

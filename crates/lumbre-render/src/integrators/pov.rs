@@ -60,7 +60,8 @@ impl RayIntegrator for Pov {
             return Spectrum::BLACK;
         }
         let first = Traced {
-            inside: tracer.around(ray.origin),
+            // A camera stands outside of all solids.
+            inside: Inside::new(),
             ray,
             level: 0,
             weight: 1.0,
@@ -73,11 +74,6 @@ impl RayIntegrator for Pov {
 }
 
 impl<'s> Tracer<'s> {
-    /// The solids around a point: those that a ray from it leaves without having entered.
-    fn around(&self, _p: DVec3) -> Inside<'s> {
-        Inside::new()
-    }
-
     fn material(here: &Interaction<'s>) -> Option<&'s PovMaterial> {
         match &here.material?.kind {
             MaterialKind::Pov(material) => Some(material),
