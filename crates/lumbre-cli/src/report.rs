@@ -101,9 +101,10 @@ pub(crate) fn caustics_not_found(scene: &Scene, options: &RenderOptions) -> Opti
 
 /// What is said of it.
 pub(crate) fn caustics_line(share: f64) -> String {
-    let percent = (100.0 * share).round();
+    let percent = 100.0 * share;
+    let digits = usize::from(percent < 10.0);
     format!(
-        "{percent} % of the light from lamps comes over mirrors or through glass: --integrator caustics finds it"
+        "{percent:.digits$} % of the light from lamps comes over mirrors or through glass: --integrator caustics finds it"
     )
 }
 
