@@ -17,7 +17,7 @@ def test_a_curve_goes_through_its_points_and_is_as_wide_as_it_says() -> None:
     assert np.allclose(hits.t[hits.hit], 4.0)
     assert (hits.shape[hits.hit] == 0).all()
     later = scene.cast([[5.0, -4.0, 2.5]], [[0.0, 1.0, 0.0]])
-    assert later.primitive.tolist() == [5]
+    assert later.prim.tolist() == [5]
 
 
 def test_what_is_no_curve_is_refused() -> None:
