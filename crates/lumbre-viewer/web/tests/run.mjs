@@ -1,6 +1,6 @@
 // The page in a browser: LUMBRE is the program, CHROMIUM the browser. With --pictures, the screenshots of the docs are made anew.
 import assert from "node:assert/strict";
-import { spawn, execFileSync } from "node:child_process";
+import { spawn, spawnSync, execFileSync } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync, writeFileSync, existsSync, mkdirSync } from "node:fs";
 import { createServer } from "node:net";
 import { tmpdir } from "node:os";
@@ -393,11 +393,9 @@ const tests = {
     await page.waitForFunction(() => !document.getElementById("alert").hidden);
     assert.match(await page.textContent("#alert"), /dropped\.glb/);
     await viewer.stop();
-    const missing = await view(join(folder, "missing.pbrt"));
-    const other = await open(missing.url);
-    await other.waitForFunction(() => !document.getElementById("alert").hidden);
-    assert.match(await other.textContent("#alert"), /missing\.pbrt/);
-    await missing.stop();
+    const missing = spawnSync(program, ["view", "--no-open", join(folder, "missing.pbrt")], { encoding: "utf8" });
+    assert.equal(missing.status, 4);
+    assert.match(missing.stderr, /missing\.pbrt: cannot open/);
   },
 
   async "the time of an animation and the variants of a model make the pictures that are rendered"() {
