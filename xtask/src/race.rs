@@ -31,7 +31,7 @@ pub(crate) struct Race {
     /// Small pictures and few samples: two to three minutes.
     #[arg(long)]
     quick: bool,
-    /// Only these scenes, separated by commas: cornell, interior, lights, terrain, glass, coats, models.
+    /// Only these scenes, separated by commas: cornell, interior, lights, terrain, glass, coats, models, tumbler, pool.
     #[arg(long, value_delimiter = ',')]
     scenes: Vec<String>,
     /// Only these programs; by default all that are found. Lumbre always takes part.
@@ -167,10 +167,10 @@ fn heat(
     let references = References::make(scene, &mut programs, extent, &folder, &mut notes)?;
     let mut curves: Vec<Curve> = Vec::new();
     for (place, program) in programs.iter().enumerate() {
-        for sampler in program.kind.samplers() {
-            let name = [program.kind.name(), sampler].join(" ").trim_end().to_owned();
+        for way in program.kind.ways(scene) {
+            let name = [program.kind.name(), way].join(" ").trim_end().to_owned();
             let (kind, version) = (program.kind, program.version.clone());
-            curves.push(Curve { kind, version, name, sampler, place, points: Vec::new(), brightness: 0.0 });
+            curves.push(Curve { kind, version, name, way, place, points: Vec::new(), brightness: 0.0 });
         }
     }
     for &spp in extent.ladder {
@@ -189,7 +189,7 @@ fn heat(
                 let program = &mut programs[curve.place];
                 let out = folder.join(format!("{}-{spp}.pfm", curve.name.replace(' ', "-")));
                 let rendered = program
-                    .render(spp, 1 + run, curve.sampler, &out)
+                    .render(spp, 1 + run, curve.way, &out)
                     .and_then(|cost| Ok((cost, Picture::read(&out)?)))
                     .and_then(|(cost, picture)| {
                         Ok((cost, picture.relative_mse(&references.of(curve.kind).picture)?, picture.mean()))
@@ -339,7 +339,7 @@ fn reference(program: &mut Program, scene: &Scene, spp: u32, folder: &Path) -> R
         if !file.exists() {
             println!("  half of a reference by {} with {spp} samples", program.kind.name());
             let unfinished = file.with_extension("part.pfm");
-            program.render(spp / 2, seed, program.kind.samplers()[0], &unfinished)?;
+            program.render(spp / 2, seed, program.kind.ways(scene)[0], &unfinished)?;
             fs::rename(&unfinished, &file)?;
         }
         Picture::read(&file)

@@ -45,10 +45,12 @@ impl Kind {
         }
     }
 
-    /// What it is asked to sample by, where it can be asked: the best of them counts.
-    pub(crate) fn samplers(self) -> &'static [&'static str] {
+    /// The ways in which it is asked to render a scene, by sampler or by integrator: the best of them counts.
+    pub(crate) fn ways(self, scene: &Scene) -> &'static [&'static str] {
         match self {
             Self::MitsubaLlvm | Self::MitsubaScalar => &["independent", "orthogonal"],
+            Self::Lumbre if scene.has_caustics => &["caustics", "path"],
+            Self::Luxcore if scene.has_caustics => &["bidirectional", "photons", "path"],
             _ => &[""],
         }
     }
@@ -252,7 +254,7 @@ impl Program {
     }
 
     /// Renders the picture to a .pfm.
-    pub(crate) fn render(&mut self, spp: u32, seed: u32, sampler: &str, out: &Path) -> Result<Cost> {
+    pub(crate) fn render(&mut self, spp: u32, seed: u32, way: &str, out: &Path) -> Result<Cost> {
         match &mut self.how {
             How::Lumbre(program) => {
                 let stats = self.folder.join("stats.json");
@@ -273,6 +275,9 @@ impl Program {
                     "none",
                     "-q",
                 ]);
+                if !way.is_empty() {
+                    command.args(["--integrator", way]);
+                }
                 run(command.args(["--strict", "--threads", &self.threads.to_string()]))?;
                 let stats: Value = serde_json::from_slice(&fs::read(stats)?)?;
                 let seconds =
@@ -299,7 +304,7 @@ impl Program {
                 let share = f64::from(spp) / f64::from(spp.max(2) - 1);
                 Ok(Cost { spp, seconds: if *one > 0.0 { (whole - *one).max(0.0) * share } else { whole } })
             }
-            How::Worker(worker) => worker.render(spp, seed, sampler, out),
+            How::Worker(worker) => worker.render(spp, seed, way, out),
         }
     }
 }
@@ -336,8 +341,8 @@ impl Worker {
         Ok((worker, version))
     }
 
-    fn render(&mut self, spp: u32, seed: u32, sampler: &str, out: &Path) -> Result<Cost> {
-        let request = json!({"spp": spp, "seed": seed, "sampler": sampler, "out": out.to_string_lossy()});
+    fn render(&mut self, spp: u32, seed: u32, way: &str, out: &Path) -> Result<Cost> {
+        let request = json!({"spp": spp, "seed": seed, "way": way, "out": out.to_string_lossy()});
         writeln!(self.requests, "{request}").with_context(|| self.said())?;
         let answer = self.answer()?;
         let spp = answer["spp"].as_u64().and_then(|n| u32::try_from(n).ok());

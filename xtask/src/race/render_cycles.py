@@ -148,7 +148,7 @@ whole(1, 0)
 one = min(whole(1, seed) for seed in (1, 2, 3))
 
 
-def render(spp, seed, _sampler):
+def render(spp, seed, _way):
     seconds = max(whole(spp, seed + 10) - one, 0) * spp / max(spp - 1, 1)
     picture = bpy.data.images.load(path("cycles.exr"))
     picture.colorspace_settings.name = "Non-Color"

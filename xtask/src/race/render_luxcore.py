@@ -67,10 +67,31 @@ for i, item in enumerate(SCENE["objects"]):
     give({f"scene.objects.o{i}.shape": f"s{i}", f"scene.objects.o{i}.material": f"m{i}"})
 
 
-def render(spp, seed, _sampler):
+def integrator(way):
+    """The settings of a way to render."""
+    if way == "bidirectional":
+        depth = SCENE["bounces"] + 1
+        return {"renderengine.type": "BIDIRCPU", "light.maxdepth": depth, "path.maxdepth": depth}
+    settings = {"renderengine.type": "PATHCPU"}
+    if way == "photons":
+        cache = "path.photongi."
+        settings |= {
+            cache + "sampler.type": "METROPOLIS",
+            cache + "photon.maxcount": 20000000,
+            cache + "photon.maxdepth": SCENE["bounces"] + 1,
+            cache + "indirect.enabled": False,
+            cache + "caustic.enabled": True,
+            cache + "caustic.maxsize": 1000000,
+            cache + "caustic.lookup.radius": 0.02,
+        }
+    return settings
+
+
+def render(spp, seed, way):
     properties = pyluxcore.Properties()
+    for name, value in integrator(way).items():
+        properties.Set(pyluxcore.Property(name, value))
     for name, value in {
-        "renderengine.type": "PATHCPU",
         "renderengine.seed": seed + 1,
         "sampler.type": "SOBOL",
         "sampler.sobol.adaptive.strength": 0.0,
@@ -91,13 +112,16 @@ def render(spp, seed, _sampler):
     }.items():
         properties.Set(pyluxcore.Property(name, value))
     session = pyluxcore.RenderSession(pyluxcore.RenderConfig(properties, scene))
+    start = time.perf_counter()
+    # Fills the cache of photons.
     session.Start()
+    filled = time.perf_counter() - start if way == "photons" else 0.0
     while not session.HasDone():
         time.sleep(0.005)
         session.UpdateStats()
     session.UpdateStats()
     stats = session.GetStats()
-    seconds = stats.Get("stats.renderengine.time").GetFloat()
+    seconds = filled + stats.Get("stats.renderengine.time").GetFloat()
     taken = stats.Get("stats.renderengine.pass").GetInt()
     pixels = np.zeros(size * size * 3, np.float32)
     session.GetFilm().GetOutputFloat(pyluxcore.FilmOutputType.RGB_IMAGEPIPELINE, pixels, 0)

@@ -30,13 +30,13 @@ pub(crate) struct Heat {
     pub(crate) target: Option<f64>,
 }
 
-/// How one program, by one sampler, comes to less error in more time.
+/// How one program, in one way, comes to less error in more time.
 #[derive(Debug)]
 pub(crate) struct Curve {
     pub(crate) kind: Kind,
     pub(crate) version: String,
     pub(crate) name: String,
-    pub(crate) sampler: &'static str,
+    pub(crate) way: &'static str,
     /// The place of its program among those of the heat.
     pub(crate) place: usize,
     /// In the order of their samples.
@@ -62,7 +62,7 @@ impl Heat {
         Some((time.seconds, time.measured))
     }
 
-    /// The least time of a program, over its samplers.
+    /// The least time of a program, over its ways.
     fn best(&self, kind: Kind) -> Option<(f64, bool)> {
         let times = self.curves.iter().filter(|c| c.kind == kind).filter_map(|c| self.seconds(c));
         times.min_by(|a, b| a.0.total_cmp(&b.0))
@@ -178,7 +178,9 @@ pub(crate) fn write(heats: &[Heat], ladder: &[u32], size: u32, folder: &Path) ->
         machine(),
         versions.join(", ")
     );
-    text.push_str("How many times as long as Lumbre each program takes to the same error, by the better of its samplers:\n\n");
+    text.push_str(
+        "How many times as long as Lumbre each program takes to the same error, in the best of its ways:\n\n",
+    );
     text.push_str(&summary(heats));
     for heat in heats {
         let points = |curve: &Curve| curve.points.iter().map(|p| [p.seconds, p.error]).collect();

@@ -19,6 +19,8 @@ pub(crate) struct Scene {
     pub(crate) materials: Vec<Material>,
     pub(crate) objects: Vec<Object>,
     pub(crate) sky: Option<Sky>,
+    /// Whether most of what is interesting is light that comes through glass from a small lamp: programs that have an integrator for it use it.
+    pub(crate) has_caustics: bool,
 }
 
 /// A pinhole camera of a square picture.
@@ -179,6 +181,27 @@ impl Mesh {
         mesh
     }
 
+    /// A line of points (distance from the y axis, height) turned about that axis: 2 * cells triangles for each of its segments, half as many where
+    /// one ends on the axis. Their outer side is to the right of the line.
+    pub(crate) fn turned(line: &[[f64; 2]], cells: u32) -> Self {
+        let mut mesh = Self::default();
+        for &[radius, height] in line {
+            for i in 0..cells {
+                let (sin, cos) = (std::f64::consts::TAU * f64::from(i) / f64::from(cells)).sin_cos();
+                mesh.points.push(single([radius * cos, height, -radius * sin]));
+            }
+        }
+        for (j, ends) in (0..).zip(line.windows(2)) {
+            for i in 0..cells {
+                let (a, b) = (j * cells + i, j * cells + (i + 1) % cells);
+                let (c, d) = (a + cells, b + cells);
+                mesh.faces.extend((ends[0][0] > 0.0).then_some([a, b, c]));
+                mesh.faces.extend((ends[1][0] > 0.0).then_some([b, d, c]));
+            }
+        }
+        mesh
+    }
+
     /// Adds the triangles of another mesh; both have normals, or none has.
     pub(crate) fn add(&mut self, other: &Self) {
         let first = self.points.len() as u32;
@@ -250,6 +273,18 @@ mod tests {
             let normal = ring.normals[a as usize].map(f64::from);
             assert!(dot(face, normal) > 0.98, "{face:?} {normal:?}");
         }
+    }
+
+    #[test]
+    fn a_turned_line_has_its_volume_and_faces_outwards() {
+        let cone = Mesh::turned(&[[0.0, 0.0], [2.0, 0.0], [1.0, 3.0], [0.0, 3.0]], 256);
+        let volume = std::f64::consts::PI * 3.0 * (4.0 + 2.0 + 1.0) / 3.0;
+        assert_eq!(cone.faces.len(), 256 * 4);
+        assert!(
+            (six_volumes(&cone) / 6.0 / volume - 1.0).abs() < 1e-3,
+            "{} {volume}",
+            six_volumes(&cone) / 6.0
+        );
     }
 
     #[test]

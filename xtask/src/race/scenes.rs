@@ -4,7 +4,7 @@ use super::scene::{Camera, Material, Mesh, Object, Point, Random, Rgb, Scene, Sk
 
 /// All of them.
 pub(crate) fn all() -> Vec<Scene> {
-    vec![cornell(), interior(), lights(), terrain(1000, 500), glass(), coats(), models()]
+    vec![cornell(), interior(), lights(), terrain(1000, 500), glass(), coats(), models(), tumbler(), pool()]
 }
 
 const WHITE: Material = Material::Diffuse { reflectance: [0.75, 0.75, 0.75] };
@@ -42,7 +42,16 @@ impl Parts {
         bounces: u32,
         camera: Camera,
     ) -> Scene {
-        Scene { name, about, bounces, camera, materials: self.materials, objects: self.objects, sky: None }
+        Scene {
+            name,
+            about,
+            bounces,
+            camera,
+            materials: self.materials,
+            objects: self.objects,
+            sky: None,
+            has_caustics: false,
+        }
     }
 }
 
@@ -268,4 +277,46 @@ fn models() -> Scene {
     let about =
         "Smooth rings of plastic and metal, as glTF describes them, under a sky with a low, soft sun.";
     Scene { sky: Some(evening()), ..parts.scene("models", about, 5, camera) }
+}
+
+/// A glass with water in it, as closed boundaries between two media each: so no program needs to know which medium goes before another.
+fn tumbler() -> Scene {
+    let mut parts = Parts::default();
+    parts.add(floor([-6.0, 6.0], 0.0, [-6.0, 6.0]), diffuse([0.6, 0.58, 0.52]));
+    parts.add(back([-6.0, 6.0], [0.0, 6.0], -4.0), diffuse([0.45, 0.5, 0.55]));
+    let (glass, water) = (1.5, 1.33);
+    // The glass from outside, over its rim, and down inside to the water.
+    let wall = [[0.0, 0.02], [0.62, 0.02], [0.66, 0.06], [0.8, 1.9], [0.78, 1.92], [0.74, 1.9], [0.682, 1.2]];
+    parts.add(Mesh::turned(&wall, 128), Material::Glass { eta: glass });
+    // Below the water, from its edge down to the middle of the bottom: water behind glass.
+    let below = [[0.682, 1.2], [0.6, 0.2], [0.57, 0.16], [0.0, 0.16]];
+    parts.add(Mesh::turned(&below, 128), Material::Glass { eta: water / glass });
+    let surface = [[0.682, 1.2], [0.0, 1.2]];
+    parts.add(Mesh::turned(&surface, 128), Material::Glass { eta: water });
+    parts.add_light(ceiling([-3.3, -2.7], 3.6, [0.7, 1.3]), [140.0, 130.0, 115.0]);
+    let camera = Camera { eye: [0.6, 3.0, 5.6], target: [0.5, 0.6, 0.0], fov: 36.0 };
+    let about = "A glass of water under a small lamp: all that is bright on the table came through it.";
+    Scene { has_caustics: true, ..parts.scene("tumbler", about, 16, camera) }
+}
+
+/// Water in a basin, with waves.
+fn pool() -> Scene {
+    let mut parts = Parts::default();
+    let (side, depth) = ([-2.0, 2.0], [-1.4, 0.4]);
+    parts.add(floor(side, -1.4, side), diffuse([0.55, 0.7, 0.72]));
+    parts.add(back(side, depth, -2.0), diffuse([0.6, 0.66, 0.7]));
+    parts.add(front(side, depth, 2.0), diffuse([0.6, 0.66, 0.7]));
+    parts.add(left(-2.0, depth, side), diffuse([0.7, 0.5, 0.4]));
+    parts.add(right(2.0, depth, side), diffuse([0.4, 0.55, 0.7]));
+    parts.add(Mesh::block([0.6, -1.1, 0.2], [0.35, 0.299, 0.35], 24.0), diffuse([0.75, 0.6, 0.2]));
+    let waves = |u: f64, v: f64| {
+        let (x, z) = (4.0 * u - 2.0, 4.0 * v - 2.0);
+        let height = 0.03 * (5.1 * x + 1.3 * z).sin() + 0.025 * (2.2 * x - 6.3 * z + 1.0).sin();
+        [x, height + 0.012 * (9.0 * z + 7.0 * x).cos(), z]
+    };
+    parts.add(Mesh::grid(160, 160, waves), Material::Glass { eta: 1.33 });
+    parts.add_light(ceiling([-0.75, -0.45], 5.0, [3.25, 3.55]), [1100.0, 1060.0, 980.0]);
+    let camera = Camera { eye: [0.0, 4.8, 2.4], target: [0.0, -0.9, 0.0], fov: 36.0 };
+    let about = "A basin of water with waves under a small lamp: its floor is lit by caustics alone.";
+    Scene { has_caustics: true, ..parts.scene("pool", about, 12, camera) }
 }

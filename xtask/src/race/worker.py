@@ -48,10 +48,10 @@ def answer(value):
 
 
 def serve(version, render):
-    """Answers each request, a line of JSON, until there are no more. render(spp, seed, sampler) -> (pixels, spp, seconds)."""
+    """Answers each request, a line of JSON, until there are no more. render(spp, seed, way) -> (pixels, spp, seconds)."""
     answer({"version": version})
     for line in sys.stdin:
         request = json.loads(line)
-        pixels, spp, seconds = render(request["spp"], request["seed"], request["sampler"])
+        pixels, spp, seconds = render(request["spp"], request["seed"], request["way"])
         write_pfm(request["out"], pixels)
         answer({"spp": spp, "seconds": seconds})
