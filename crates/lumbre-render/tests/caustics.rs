@@ -9,8 +9,10 @@ use lumbre_geometry::{Cuboid, Disk, Sphere};
 use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Transform};
 use lumbre_scene::{
-    InstanceDesc, IntegratorKind, LightDesc, ObjectDesc, ObjectId, Placement, Scene, SceneDesc,
+    Camera, InstanceDesc, IntegratorKind, LightDesc, MediumId, ObjectDesc, ObjectId, Placement, Scene,
+    SceneDesc,
 };
+use lumbre_shading::medium::{HomogeneousMedium, Medium};
 use lumbre_shading::{
     FloatTexture, Material, MaterialKind, PrincipledParams, Roughness, SpectrumTexture, VolumeParams,
 };
@@ -130,6 +132,34 @@ fn lit_by_a_large_lamp() -> SceneDesc {
 fn what_paths_find_photons_and_paths_find_together() {
     let desc = lit_by_a_large_lamp();
     assert_close(by_photons(desc.clone(), 512), by_paths(desc, 2048), 0.005, "a large lamp");
+}
+
+/// A scene in thin fog.
+fn in_fog(desc: SceneDesc) -> SceneDesc {
+    changed(desc, |desc| {
+        let extinction = Rgb::new(0.1, 0.12, 0.15);
+        let medium = HomogeneousMedium { extinction, albedo: Rgb::splat(0.8), asymmetry: 0.3 };
+        desc.media.push(Arc::new(Medium::Homogeneous { medium, glow: Rgb::BLACK }));
+        desc.cameras[0].medium = Some(MediumId(0));
+    })
+}
+
+#[test]
+fn what_paths_find_in_fog_photons_and_paths_find_together() {
+    let desc = in_fog(lit_by_a_large_lamp());
+    assert_close(by_photons(desc.clone(), 512), by_paths(desc, 2048), 0.005, "a large lamp in fog");
+}
+
+#[test]
+fn a_lamp_in_a_small_ball_of_glass_shines_into_fog_as_it_does_without() {
+    let at = DVec3::new(0.3, 0.1, 2.0);
+    let mut bare = in_fog(floor(vec![lamp(at)]));
+    // The fog alone scatters: the floor is black. The lamp is beside the picture.
+    bare.materials[0].material = Arc::new(diffuse(0.0));
+    let beside = look(DVec3::new(3.0, 1.0, 3.0), DVec3::new(0.0, -2.0, 1.0), 40.0);
+    bare.cameras[0] = Camera { medium: Some(MediumId(0)), ..beside };
+    let ball = with(bare.clone(), glass(1.5), Sphere::new(at, 0.02).unwrap());
+    assert_close(by_photons(ball, 1024), by_paths(bare, 1024), 0.01, "a lamp in fog");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use std::ops::{ControlFlow, Range};
 
 use lumbre_geometry::Ray;
 use lumbre_math::rounding::offset_point;
-use lumbre_math::{DVec3, orthonormal_basis, warp64};
+use lumbre_math::{DVec3, Vec3, orthonormal_basis, warp64};
 use lumbre_scene::{BoundingSphere, Footprint, Interaction, LightSample, MediumId, Scene, View};
 use lumbre_shading::{Scatter, ShadingNormals, Spectrum};
 use smallvec::SmallVec;
@@ -273,7 +273,12 @@ impl<'s> LightTracer<'s> {
                 sides(here.boundary, here.front, to_column(path.medium))[usize::from(part.crosses)],
             );
             ray = vertex.leave(&part);
-            let Some(hit) = self.scene.closest(&ray) else { return };
+            let hit = self.scene.closest(&ray);
+            if self.scene.has_media() && !path.is_straight {
+                let end = hit.as_ref().map_or(f64::INFINITY, |hit| hit.root.t);
+                photons.extend(self.photon_in_medium(&path, &ray.with_range(0.0, end), draw, number));
+            }
+            let Some(hit) = hit else { return };
             let next = self.scene.interaction(&ray, &hit, &Footprint::Point);
             path.interiors.arrive(&next, next.resolved());
             let way = next.surface.point.distance(ray.origin);
@@ -321,6 +326,43 @@ impl<'s> LightTracer<'s> {
         Some(part)
     }
 
+    /// A photon at a random point along a light path's next ray, where that is in a medium and before what the ray meets. As many are within
+    /// the [`typical_way`] as beyond it.
+    fn photon_in_medium(
+        &self,
+        path: &LightPath<'s>,
+        segment: &Ray,
+        draw: &Draw,
+        vertex: u32,
+    ) -> Option<Photon> {
+        if path.interiors.attenuates() {
+            return None;
+        }
+        let typical = typical_way(self.scene);
+        let u = f64::from(draw.direction(vertex).x);
+        let at = typical * u / (1.0 - u);
+        if at >= segment.t_max {
+            return None;
+        }
+        let density = typical / ((typical + at) * (typical + at));
+        let before = segment.with_range(0.0, at);
+        let mut crossings = Vec::new();
+        self.scene.crossings(&before, &mut crossings);
+        let medium = crossings.last().map_or(path.medium, |crossing| crossing.beyond)?;
+        let transmittance = self.scene.transmittance(path.medium, &before, draw.along(&before));
+        let photon = Photon {
+            point: segment.at(at),
+            towards: -segment.direction.as_vec3(),
+            normal: Vec3::ZERO,
+            medium: to_column(Some(medium)),
+            flux: path.flux * transmittance / density as f32,
+            density: path.density as f32,
+            lamp: path.lamp_seen(path.length + at),
+            bounces: path.bounces,
+        };
+        (!photon.flux.is_black() && photon.flux.is_finite()).then_some(photon)
+    }
+
     /// Takes a light path through media along its next segment.
     fn cross_media(&self, path: &mut LightPath<'s>, segment: &Ray, draw: &Draw) {
         path.flux *= self.scene.transmittance(path.medium, segment, draw.along(segment));
@@ -332,6 +374,19 @@ impl<'s> LightTracer<'s> {
     }
 }
 
+impl LightPath<'_> {
+    /// About the solid angle of the lamp, seen over a way of a length.
+    fn lamp_seen(&self, length: f64) -> f32 {
+        self.lamp_area.map_or(self.lamp, |area| area / (length * length)) as f32
+    }
+}
+
+/// A typical length of a way between two surfaces of a scene: a quarter of its diagonal.
+pub(crate) fn typical_way(scene: &Scene) -> f64 {
+    let bounds = scene.bounds();
+    if bounds.is_empty() { 1.0 } else { bounds.size().length() / 4.0 }
+}
+
 /// The photon of a light path that arrives at a surface.
 fn photon(path: &LightPath<'_>, ray: &Ray, here: &Interaction<'_>) -> Photon {
     let normal = here.surface.normal;
@@ -340,9 +395,10 @@ fn photon(path: &LightPath<'_>, ray: &Ray, here: &Interaction<'_>) -> Photon {
         point: here.surface.point,
         towards: -ray.direction.as_vec3(),
         normal: facing.as_vec3(),
+        medium: to_column(path.medium),
         flux: path.flux,
         density: path.density as f32,
-        lamp: path.lamp_area.map_or(path.lamp, |area| area / (path.length * path.length)) as f32,
+        lamp: path.lamp_seen(path.length),
         bounces: path.bounces,
     }
 }

@@ -11,22 +11,26 @@ use std::sync::Arc;
 use lumbre_math::{DVec3, Elementary};
 use lumbre_simd::Real;
 
-use super::{ChordSampler, PhotonMap, SAMPLES_A_PASS};
+use super::{ChordSampler, Photons, SAMPLES_A_PASS};
 
 /// The radius in which a vertex that the camera sees collects photons of the first pass, in widths of the footprint of a sample, which is
 /// a quarter of a pixel wide.
 const WIDTHS: f64 = 6.0;
 /// Vertices further along a path collect from so many times as far: they are not seen sharply.
 const WIDER: f32 = 3.0;
+/// The least width in media, in typical ways: photons are first collected within an eightieth of one.
+const MIN_WIDTH_IN_MEDIUM: f64 = 1.0 / 512.0;
 
 /// The photons that the paths of a wave are merged with.
 #[derive(Debug)]
 pub(crate) struct Merging<'s> {
     pub(crate) chords: ChordSampler<'s>,
     /// The passes of all samples of the wave, each with its number.
-    pub(crate) passes: Vec<(u32, Arc<PhotonMap>)>,
+    pub(crate) passes: Vec<(u32, Arc<Photons>)>,
     /// Lines of a pass.
     pub(crate) lines: f64,
+    /// [`super::typical_way`]: the inverse of what stands for the density of a photon along its way, where photons and paths are weighed.
+    pub(crate) typical_way: f64,
 }
 
 impl Merging<'_> {
@@ -36,7 +40,7 @@ impl Merging<'_> {
     }
 
     /// The photons for a sample.
-    pub(crate) fn photons(&self, sample: u32) -> Option<&PhotonMap> {
+    pub(crate) fn photons(&self, sample: u32) -> Option<&Photons> {
         let pass = Self::pass_of(sample);
         self.passes.iter().find(|(number, _)| *number == pass).map(|(_, photons)| &**photons)
     }
@@ -52,6 +56,22 @@ impl Merging<'_> {
     #[inline(always)]
     pub(crate) fn spread<R: Real>(&self, radius: R) -> R {
         (radius * radius * R::splat((std::f64::consts::PI * self.lines) as f32)).recip()
+    }
+
+    /// The radius in which a point of a medium collects photons. Near the camera a footprint is too small to find any but by chance.
+    pub(crate) fn radius_in_medium(&self, widths: f32, width: f32) -> f32 {
+        widths * width.max((self.typical_way * MIN_WIDTH_IN_MEDIUM) as f32)
+    }
+
+    /// The inverse of what lines a pass has times the volume around a point of a medium in which it collects photons.
+    pub(crate) fn spread_in_medium(&self, radius: f32) -> f32 {
+        let radius = f64::from(radius);
+        (4.0 / 3.0 * std::f64::consts::PI * radius * radius * radius * self.lines).recip() as f32
+    }
+
+    /// The same for densities, by which photons and paths are weighed: with the density of a photon along its way.
+    pub(crate) fn share_in_medium(&self, spread: f32) -> f32 {
+        spread * self.typical_way as f32
     }
 
     /// The weight of light that a path found behind specular surfaces, of which the last is at `from`. `merging` is what

@@ -12,9 +12,9 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-pub(crate) use light_paths::{ChordSampler, LightTracer};
+pub(crate) use light_paths::{ChordSampler, LightTracer, typical_way};
 pub(crate) use merging::{Merging, radius};
-pub(crate) use photons::{Photon, PhotonMap};
+pub(crate) use photons::{Photon, Photons};
 pub use share::caustic_share;
 
 /// Samples of a pixel that a pass of light paths is for.
@@ -58,12 +58,12 @@ struct Pass {
 struct State {
     pieces: Vec<Option<Vec<Photon>>>,
     has_failed: bool,
-    map: Option<Arc<PhotonMap>>,
+    photons: Option<Arc<Photons>>,
 }
 
 impl Passes {
     /// The photons of a pass of a picture of a size, traced where they are not at hand.
-    pub(crate) fn get(&self, tracer: &LightTracer<'_>, size: [u32; 2], number: u32) -> Arc<PhotonMap> {
+    pub(crate) fn get(&self, tracer: &LightTracer<'_>, size: [u32; 2], number: u32) -> Arc<Photons> {
         let pass = self.find((size, number));
         pass.help(tracer, lines_of(size[0], size[1]), number);
         pass.wait()
@@ -105,24 +105,24 @@ impl Pass {
         }
     }
 
-    /// Hands in a piece; the last one completes the map.
+    /// Hands in a piece; the last one completes the pass.
     fn put(&self, piece: u32, photons: Vec<Photon>) {
         let mut state = self.state();
         state.pieces.resize(PIECES as usize, None);
         state.pieces[piece as usize] = Some(photons);
         if state.pieces.iter().all(Option::is_some) {
             let pieces = std::mem::take(&mut state.pieces);
-            state.map = Some(Arc::new(PhotonMap::new(pieces.into_iter().flatten().flatten().collect())));
+            state.photons = Some(Arc::new(Photons::new(pieces.into_iter().flatten().flatten().collect())));
             self.changed.notify_all();
         }
     }
 
-    fn wait(&self) -> Arc<PhotonMap> {
+    fn wait(&self) -> Arc<Photons> {
         let mut state = self.state();
         loop {
             assert!(!state.has_failed, "another thread failed to trace light paths");
-            if let Some(map) = &state.map {
-                return Arc::clone(map);
+            if let Some(photons) = &state.photons {
+                return Arc::clone(photons);
             }
             state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }

@@ -1,18 +1,20 @@
-//! Photons in a k-d tree: where light that came over mirrors and glass falls on something that scatters it.
+//! Photons in k-d trees: where light that came over mirrors and glass falls on something that scatters it.
 
 use lumbre_math::{DVec3, Vec3};
 use lumbre_shading::Spectrum;
 
-/// Light that falls on a surface.
+/// Light that falls on a surface, or that goes through a point of a medium.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Photon {
     /// The place.
     pub(crate) point: DVec3,
     /// The unit direction that it came from.
     pub(crate) towards: Vec3,
-    /// The unit geometric normal on that side.
+    /// The unit geometric normal on that side; zero in a medium.
     pub(crate) normal: Vec3,
-    /// The power that it stands for.
+    /// The medium that it is in, as [`crate::wave::paths::to_column`] writes it; of no meaning on a surface.
+    pub(crate) medium: u32,
+    /// The power that it stands for, on a surface; in a medium that power over the density of its place along the way.
     pub(crate) flux: Spectrum,
     /// The density with which light paths begin at the specular surface next to the light and choose that light: per unit of area and
     /// solid angle, of one line. Infinite for light that no path from the camera finds.
@@ -23,7 +25,24 @@ pub(crate) struct Photon {
     pub(crate) bounces: u32,
 }
 
-/// Photons of a pass, laid out as a k-d tree: the middle of a range divides it, along the axis that its node names (J. L. Bentley,
+/// The photons of a pass.
+#[derive(Debug, Default)]
+pub(crate) struct Photons {
+    /// Those on surfaces.
+    pub(crate) surfaces: PhotonMap,
+    /// Those in media.
+    pub(crate) media: PhotonMap,
+}
+
+impl Photons {
+    /// All photons of a pass.
+    pub(crate) fn new(photons: Vec<Photon>) -> Self {
+        let (media, surfaces) = photons.into_iter().partition(|photon| photon.normal == Vec3::ZERO);
+        Self { surfaces: PhotonMap::new(surfaces), media: PhotonMap::new(media) }
+    }
+}
+
+/// Photons laid out as a k-d tree: the middle of a range divides it, along the axis that its node names (J. L. Bentley,
 /// "Multidimensional Binary Search Trees Used for Associative Searching", 1975).
 ///
 /// The tree depends on the photons and their order alone, and so does the order in which a search finds them.
@@ -115,6 +134,7 @@ mod tests {
                 point: at(i),
                 towards: Vec3::Z,
                 normal: Vec3::Z,
+                medium: 0,
                 flux: Spectrum::splat(i as f32),
                 density: 1.0,
                 lamp: 0.0,

@@ -1,8 +1,9 @@
 //! How much of a scene's light paths hardly find.
 
+use lumbre_math::Vec3;
 use lumbre_scene::{BoundingSphere, Scene, View};
 
-use super::{ChordSampler, LightTracer};
+use super::{ChordSampler, LightTracer, Photon};
 use crate::transport::Sampler;
 use crate::{RenderError, RenderOptions};
 
@@ -40,7 +41,8 @@ pub fn caustic_share(scene: &Scene, options: &RenderOptions) -> Result<f64, Rend
     };
     let mut photons = Vec::new();
     tracer(&chords).trace(PASS, 0..LINES, &mut photons);
-    let hard = photons.iter().filter(|photon| photon.lamp <= SMALL);
+    let is_on_surface = |photon: &&Photon| photon.normal != Vec3::ZERO;
+    let hard = photons.iter().filter(is_on_surface).filter(|photon| photon.lamp <= SMALL);
     let hard = hard.map(|photon| f64::from(photon.flux.average())).sum::<f64>() / f64::from(LINES);
     if hard <= 0.0 {
         return Ok(0.0);

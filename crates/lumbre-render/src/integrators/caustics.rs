@@ -2,7 +2,7 @@
 
 use lumbre_shading::ShadingNormals;
 
-use crate::caustics::{ChordSampler, LightTracer, Merging, Passes, lines_of};
+use crate::caustics::{ChordSampler, LightTracer, Merging, Passes, lines_of, typical_way};
 use crate::integrators::{Integrator, Path};
 use crate::transport::{Record, Sampler};
 use crate::wave::Sights;
@@ -12,7 +12,7 @@ use crate::wave::Sights;
 /// smaller the lamp. Both are weighed by multiple importance sampling.
 ///
 /// The photons of a few samples of each pixel are one pass, and are collected within a few pixels. That blurs caustics a little, and less
-/// with every pass, so that the mean comes to be right. What catches shadows (ground of the studio) collects none, and neither do media.
+/// with every pass, so that the mean comes to be right. What catches shadows (ground of the studio) collects none.
 #[derive(Debug)]
 pub struct Caustics {
     path: Path,
@@ -47,7 +47,8 @@ impl Integrator for Caustics {
             let passes =
                 numbers.into_iter().map(|number| (number, self.passes.get(&tracer, [width, height], number)));
             let passes = passes.collect();
-            setting.merging = Some(Merging { chords, passes, lines: lines_of(width, height).into() });
+            let lines = lines_of(width, height).into();
+            setting.merging = Some(Merging { chords, passes, lines, typical_way: typical_way(scene) });
         }
         sights.follow(&setting, record);
     }

@@ -195,6 +195,10 @@ impl<'s> Wave<'s> {
         if risky {
             throughput = throughput / likely;
         }
+        let merging = setting.merging.as_ref().map_or(f32::INFINITY, |merging| {
+            let radius = merging.radius_in_medium(self.slots.widths[slot], collision.width);
+            pdf * merging.share_in_medium(merging.spread_in_medium(radius))
+        });
         let next = OnePath {
             slot: slot as u32,
             origin: collision.point,
@@ -204,7 +208,7 @@ impl<'s> Wave<'s> {
             throughput,
             eta_scale,
             pdf,
-            merging: f32::INFINITY,
+            merging,
             depth: depth | SCATTERED,
             width: collision.width,
             spread: self.paths.spread[path],

@@ -1,16 +1,17 @@
-//! Photons near vertices: light from lamps that came over mirrors and smooth glass.
+//! Photons near vertices and near collisions in media: light from lamps that came over mirrors and smooth glass.
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
 use lumbre_math::Vec3;
 use lumbre_shading::Spectrum;
 use lumbre_shading::lanes::BsdfKind;
+use lumbre_shading::medium::henyey_greenstein;
 
 use crate::caustics::{Merging, radius};
 use crate::transport::Record;
 use crate::transport::journal::Source;
 use crate::wave::pairs::{Merge, Merges};
-use crate::wave::paths::{PAD, Paths, SCATTERED};
+use crate::wave::paths::{Collision, PAD, Paths, SCATTERED, to_column};
 use crate::wave::setting::Setting;
 use crate::wave::vertices::Vertices;
 use crate::wave::{KINDS, Wave};
@@ -38,6 +39,40 @@ impl<'s> Wave<'s> {
             }
         }
         self.merges = merges;
+        for i in 0..self.collisions.len() {
+            self.merge_in_medium(setting, merging, i, record);
+        }
+    }
+
+    /// Adds the light of photons near a collision in a medium.
+    fn merge_in_medium(
+        &mut self,
+        setting: &Setting<'s>,
+        merging: &Merging<'s>,
+        collision: usize,
+        record: &mut Record,
+    ) {
+        let Collision { path, point, medium, width } = self.collisions[collision];
+        let path = path as usize;
+        let slot = self.paths.slot[path] as usize;
+        let Some(photons) = merging.photons(self.slots.index[slot]) else { return };
+        let radius = merging.radius_in_medium(self.slots.widths[slot], width);
+        let spread = merging.spread_in_medium(radius);
+        if !spread.is_finite() {
+            return;
+        }
+        let share = merging.share_in_medium(spread);
+        let bounces_left = setting.max_depth.saturating_sub((self.paths.depth[path] & !SCATTERED) + 1);
+        let direction = self.paths.direction(path);
+        let asymmetry = setting.scene.medium(medium).asymmetry();
+        let mut sum = Spectrum::BLACK;
+        photons.media.within(point, radius.into(), |photon| {
+            if photon.medium == to_column(Some(medium)) && photon.bounces <= bounces_left {
+                let phase = henyey_greenstein(direction.dot(photon.towards), asymmetry);
+                sum += photon.flux * (spread * phase / (1.0 + phase * share / photon.density));
+            }
+        });
+        self.slots.radiance[slot] += record.added(Source::Caustics, self.paths.throughput(path), sum, 1.0);
     }
 
     /// Finds the photons near a vertex.
@@ -56,7 +91,7 @@ impl<'s> Wave<'s> {
         if !spread.is_finite() {
             return;
         }
-        photons.within(self.vertices.point(at), radius.into(), |photon| {
+        photons.surfaces.within(self.vertices.point(at), radius.into(), |photon| {
             // What lies around a corner is of another surface.
             let is_level = photon.normal.dot(normal).abs() >= FRAC_1_SQRT_2;
             if is_level && photon.bounces <= bounces_left {

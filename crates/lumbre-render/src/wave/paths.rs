@@ -141,7 +141,8 @@ pub(crate) struct Paths {
     /// The density with which the direction was chosen; infinite where it was the only one.
     pub(crate) pdf: Vec<f32>,
     /// For light that is found behind specular surfaces: the density with which the direction before them was chosen, over the number of
-    /// lines of a pass and the area in which photons are collected there. Infinite where photons do not bring that light.
+    /// lines of a pass and the area in which photons are collected there (the volume, per length, in a medium). Infinite where photons do not
+    /// bring that light.
     pub(crate) merging: Vec<f32>,
     /// Bounces off surfaces, and [`SCATTERED`].
     pub(crate) depth: Vec<u32>,
