@@ -115,7 +115,7 @@ fn a_slab_of_stained_glass_leaves_what_the_series_of_its_reflections_does() {
 }
 
 /// A scene whose lamp paths find, too: a ball of glass, a mirror and a pane under a large lamp.
-fn lit_by_a_large_lamp() -> SceneDesc {
+pub(crate) fn lit_by_a_large_lamp() -> SceneDesc {
     let mut desc = floor(vec![]);
     desc.materials[0].material = Arc::new(diffuse(0.6));
     desc.cameras = vec![look(DVec3::new(3.0, 1.0, 3.0), DVec3::new(0.0, 0.0, 0.3), 40.0)];

@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::time::Duration;
 
+use crate::caustics::lit_by_a_large_lamp;
 use crate::common::*;
 use crate::determinism::still_life;
 use lumbre_math::DVec3;
@@ -12,7 +13,14 @@ use lumbre_render::{
     CancelToken, Keeper, NoProgress, PixelBounds, RenderError, RenderOptions, RenderState, Rendered,
     render_from,
 };
-use lumbre_scene::{SamplerKind, Scene};
+use lumbre_scene::{IntegratorKind, SamplerKind, Scene};
+
+/// A scene by paths, and one by paths and photons.
+fn scenes() -> [Scene; 2] {
+    let mut glass = lit_by_a_large_lamp();
+    glass.integrator.kind = IntegratorKind::Caustics;
+    [still_life(DVec3::ZERO), glass].map(|desc| Scene::build(desc).unwrap())
+}
 
 fn all_options(scene: &Scene) -> [RenderOptions; 4] {
     let base = options(scene, 45, 35, 11);
@@ -52,9 +60,11 @@ fn bytes_of(state: &RenderState) -> Vec<u8> {
 
 #[test]
 fn a_render_goes_on_from_any_state_to_the_same_picture() {
-    let scene = Scene::build(still_life(DVec3::ZERO)).unwrap();
-    for options in all_options(&scene) {
-        let whole = run(&scene, &options, None, None).unwrap();
+    let [by_paths, by_photons] = scenes();
+    let with_options = |scene| all_options(scene).map(|options| (scene, options));
+    let some_of = all_options(&by_photons).into_iter().take(1).map(|options| (&by_photons, options));
+    for (scene, options) in with_options(&by_paths).into_iter().chain(some_of) {
+        let whole = run(scene, &options, None, None).unwrap();
         let states = RefCell::new(Vec::new());
         // Without a pause between two looks: a state of every wave, also from the first, coarse pass.
         let keep = |state: RenderState| states.borrow_mut().push(bytes_of(&state));
@@ -62,8 +72,8 @@ fn a_render_goes_on_from_any_state_to_the_same_picture() {
         let mut slow = options.clone();
         slow.threads = 1;
         (slow.width, slow.height, slow.stop.spp) = (12, 9, 200);
-        let small = run(&scene, &slow, None, None).unwrap();
-        let kept = run(&scene, &slow, None, Some(&keeper)).unwrap();
+        let small = run(scene, &slow, None, None).unwrap();
+        let kept = run(scene, &slow, None, Some(&keeper)).unwrap();
         assert_same(&kept.0, &small.0, "with hand-overs");
         let states = states.into_inner();
         assert!(states.len() > 20, "{}", states.len());
@@ -71,30 +81,31 @@ fn a_render_goes_on_from_any_state_to_the_same_picture() {
         assert!(states.iter().map(state_of).any(|state| state.least_samples() == 0 && state.taken() > 0));
         for state in states.iter().step_by(7).map(state_of) {
             assert!(state.taken() < state.wanted());
-            let resumed = run(&scene, &slow, Some(state), None).unwrap();
+            let resumed = run(scene, &slow, Some(state), None).unwrap();
             assert_same(&resumed.0, &small.0, "resumed");
             assert_eq!(bytes_of(&resumed.1), bytes_of(&small.1));
         }
         // More samples for a finished render.
         let mut fewer = options.clone();
         fewer.stop.spp /= 2;
-        let first = run(&scene, &fewer, None, None).unwrap();
-        let both = run(&scene, &options, Some(first.1), None).unwrap();
+        let first = run(scene, &fewer, None, None).unwrap();
+        let both = run(scene, &options, Some(first.1), None).unwrap();
         assert_same(&both.0, &whole.0, "more samples");
     }
 }
 
 #[test]
 fn parts_are_merged_to_the_picture_of_the_whole() {
-    let scene = Scene::build(still_life(DVec3::ZERO)).unwrap();
-    let [base, with_features, ..] = all_options(&scene);
-    for options in [base, with_features] {
-        let whole = run(&scene, &options, None, None).unwrap();
+    let [by_paths, by_photons] = scenes();
+    let [base, with_features, ..] = all_options(&by_paths);
+    let [photons, ..] = all_options(&by_photons);
+    for (scene, options) in [(&by_paths, base), (&by_paths, with_features), (&by_photons, photons)] {
+        let whole = run(scene, &options, None, None).unwrap();
         let part = |bounds: PixelBounds, first: u32, last: u32, threads: usize| {
             let mut part = options.clone();
             part.crop = Some(bounds);
             (part.first_sample, part.stop.spp, part.threads) = (first, last - first, threads);
-            run(&scene, &part, None, None).unwrap().1
+            run(scene, &part, None, None).unwrap().1
         };
         let all = options.bounds().unwrap();
         let (left, right) = (PixelBounds { x1: 19, ..all }, PixelBounds { x0: 19, ..all });
