@@ -87,6 +87,12 @@ def test_many_machines_render_the_bytes_of_one(client, scene) -> None:
     np.testing.assert_array_equal(crop.array, expected.array[4:29, 3:21])
 
 
+def test_caustics_are_the_same_on_many_machines(client) -> None:
+    path = SCENES.parent / "docs" / "pictures" / "integrator-caustics.pbrt"
+    expected = lumbre.load(path).render(spp=9, size=(40, 25)).array
+    np.testing.assert_array_equal(render(path, client, 9, (40, 25), tile=17, samples_per_task=2).array, expected)
+
+
 def test_the_scheduler_is_asked_who_is_there_once_and_not_for_each_task(client, scene, monkeypatch) -> None:
     asked = {"nthreads": 0, "processing": 0}
 
