@@ -31,8 +31,8 @@ pub(crate) struct PartArguments {
     /// The time between two checkpoints.
     #[arg(long, value_name = "DUR", value_parser = units::duration, default_value = "30s")]
     checkpoint_every: Duration,
-    /// Go on from the checkpoint, or from the picture if it was saved with --keep-sums, to the very picture of a run without a
-    /// break; with more samples than before, to that of as many. Where there is neither, begin. Of --frames and --turntable, pictures that
+    /// Go on from a checkpoint, to the very picture of a run without a break. Or go on from the picture if it was saved with --keep-sums.
+    /// With more samples than before, the picture is that of as many. Where there is neither, begin. Of --frames and --turntable, pictures that
     /// are done (.png, .exr) are not rendered again.
     #[arg(long)]
     resume: bool,

@@ -34,6 +34,7 @@ mod progress;
 mod reading;
 mod render;
 mod report;
+mod short_help;
 mod shown;
 mod signals;
 mod staging;

@@ -89,15 +89,15 @@ pub(crate) struct Arguments {
     /// Stop after this time, counted from the start (of each frame), as 90s, 2m or 1h30m.
     #[arg(long, value_name = "DUR", value_parser = units::duration)]
     time: Option<Duration>,
-    /// Stop sampling a pixel when its noise is estimated to be below this share of its luminance, such as 0.02; at --spp or --time at the
-    /// latest. Without these it takes as long as it takes: the progress says how long, and Ctrl-C saves what is there.
+    /// Stop sampling a pixel when its noise is below this share of its luminance, such as 0.02. It ends at --spp or --time at the latest.
+    /// Without these it takes as long as it takes: the progress says how long, and Ctrl-C saves what is there.
     #[arg(long, value_name = "R", value_parser = noise)]
     noise: Option<f64>,
     /// With --noise, the samples that every pixel has before its noise may end it. By default 16, or up to 256 where most of the light
     /// comes by rare samples.
     #[arg(long, value_name = "N", requires = "noise", value_parser = clap::value_parser!(u32).range(1..))]
     min_spp: Option<u32>,
-    /// Take the noise out of the picture: by Lumbre's own filter (own or auto, the same), or by Open Image Denoise where it is installed
+    /// Take the noise out of the picture. By Lumbre's own filter (own or auto, the same), or by Open Image Denoise where it is installed
     /// (oidn; its folder can be named by the variable OIDN_DIR). An .exr keeps the noisy picture too, in noisy.R, noisy.G and noisy.B.
     /// By default own in the light of the studio, else none.
     #[arg(long, value_name = "WITH", num_args = 0..=1, default_missing_value = "auto",
@@ -115,7 +115,7 @@ pub(crate) struct Arguments {
     /// A camera by name or 0-based position.
     #[arg(long, value_name = "NAME|INDEX", help_heading = "View")]
     camera: Option<String>,
-    /// What is computed for each pixel: light along paths, or a quantity of what is seen.
+    /// What is computed for each pixel. It is light along paths, or a quantity of what is seen.
     #[arg(long, value_name = "NAME", value_parser = one_of(&IntegratorKind::NAMES, IntegratorKind::from_name))]
     integrator: Option<IntegratorKind>,
     /// The maximal number of bounces.

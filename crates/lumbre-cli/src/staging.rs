@@ -22,8 +22,8 @@ pub(crate) struct StagingArguments {
     /// shadow where both camera and light are automatic.
     #[arg(long, value_name = "WHAT", value_parser = one_of(&Ground::NAMES, Ground::from_name))]
     ground: Option<Ground>,
-    /// Light from all around: a picture twice as wide as high, or square in pbrt's equal-area mapping (.hdr, .exr, …); studio; or
-    /// none besides the file's own. By default studio for what brings no light, and for a glTF without a camera.
+    /// Light from all around: a picture (.hdr, .exr, …), studio, or none. A picture is twice as wide as high, or square in pbrt's equal-area
+    /// mapping; with none the file's own lights are all. By default studio for what brings no light, and for a glTF without a camera.
     #[arg(long, value_name = "FILE|studio|none")]
     env: Option<PathBuf>,
     /// What is behind everything: env (the light from there), studio (grey paper), transparent, a colour (white, "#e8e0d8") or

@@ -8,6 +8,7 @@ use clap::{Command, CommandFactory, Error, Parser};
 use lumbre::formats::diagnostic::nearest_name;
 
 use crate::console::{escaped, has_colours};
+use crate::short_help::shorten;
 
 /// Words of other programs for an option.
 const OPTIONS: &[(&str, &[&str])] = &[
@@ -96,7 +97,11 @@ const COMMANDS: &[(&str, &[&str])] = &[
 /// # Errors
 /// The exit status: 0 for help, 2 for wrong usage.
 pub(crate) fn parse<P: Parser + CommandFactory>(arguments: &[OsString]) -> Result<P, u8> {
-    P::try_parse_from(arguments).map_err(|mut error| {
+    let read = |words: &[OsString]| {
+        let matches = shorten(P::command()).try_get_matches_from(words)?;
+        P::from_arg_matches(&matches)
+    };
+    read(arguments).map_err(|mut error| {
         // What the user wrote is in the message, where it must not drive the terminal; in a styled message it can no
         // longer be told from the styles.
         let harmless: Vec<OsString> = arguments
@@ -104,7 +109,7 @@ pub(crate) fn parse<P: Parser + CommandFactory>(arguments: &[OsString]) -> Resul
             .map(|argument| escaped(&argument.to_string_lossy()).into_owned().into())
             .collect();
         if harmless != arguments
-            && let Err(same) = P::try_parse_from(&harmless)
+            && let Err(same) = read(&harmless)
         {
             error = same;
         }
