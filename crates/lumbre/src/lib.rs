@@ -66,7 +66,7 @@ pub use lumbre_scene::{
 };
 /// What happens along the path of one sample: see [`Scene::explain_sample`].
 pub mod journal {
-    pub use lumbre_render::transport::{End, Event, Met, SampledLight, Scattered, Source};
+    pub use lumbre_render::transport::{End, Event, MergedPhoton, Met, SampledLight, Scattered, Source};
 }
 
 pub use parameter::{Parameter, ParameterKind, parameters};

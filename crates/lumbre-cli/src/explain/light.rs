@@ -1,7 +1,7 @@
 //! The light that comes along a ray: what happens along its path, and what each light gives.
 
 use lumbre::description::{Footprint, Interaction, LightId};
-use lumbre::journal::{End, Event, Met, SampledLight, Scattered, Source};
+use lumbre::journal::{End, Event, MergedPhoton, Met, SampledLight, Scattered, Source};
 use lumbre::math::optics::{facing, reflect, refract};
 use lumbre::shading::{Material, MaterialKind, Scatter, Spectrum};
 use lumbre::{DVec2, DVec3, Ray, Scene};
@@ -70,6 +70,7 @@ impl Path<'_> {
                         (*added).into(),
                     ]);
                 }
+                Event::Photons(photons) => place.sections.push(self.photons(photons)),
                 Event::Scattered(scattered) => place.sections.push(self.scattered(scattered)),
                 Event::Roulette { probability, survives } => {
                     let text = if *survives { texts.survives } else { texts.does_not_survive };
@@ -296,6 +297,38 @@ impl Path<'_> {
             let what = filled(texts.shape, &[&shape.to_string(), self.things.kind(shape)]);
             section.text(filled(texts.blocked_by, &[&what, &super::document::exact(hit.root.t)]));
         }
+    }
+
+    /// The photons near a point: the brightest one by one, the others together.
+    fn photons(&self, photons: &[MergedPhoton]) -> Section {
+        const MOST: usize = 6;
+        let texts = self.texts;
+        let mut section = Section::new("photons", texts.photons);
+        let mut sorted = photons.to_vec();
+        sorted.sort_by(|a, b| b.scattered.max_component().total_cmp(&a.scattered.max_component()));
+        let column = |key, title: &str| Column { key, title: title.to_owned() };
+        let columns = vec![
+            column("direction", texts.photon_from),
+            column("irradiance", texts.photon_irradiance),
+            column("weight", "w"),
+            column("scattered", texts.photon_scattered),
+        ];
+        let (told, others) = sorted.split_at(sorted.len().min(MOST));
+        let row = |photon: &MergedPhoton| {
+            vec![
+                photon.towards.as_dvec3().into(),
+                photon.irradiance.into(),
+                photon.weight.into(),
+                photon.scattered.into(),
+            ]
+        };
+        section.items.push(Item::Table { key: "photons", columns, rows: told.iter().map(row).collect() });
+        if !others.is_empty() {
+            let rest = others.iter().fold(Spectrum::BLACK, |sum, photon| sum + photon.scattered);
+            let rest = Value::from(rest).in_full();
+            section.text(filled(texts.more_photons, &[&others.len().to_string(), &rest]));
+        }
+        section
     }
 
     fn scattered(&self, scattered: &Scattered) -> Section {

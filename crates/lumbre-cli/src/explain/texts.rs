@@ -150,6 +150,12 @@ pub(super) struct Texts {
     pub(super) from_sampled: &'static str,
     pub(super) from_direct: &'static str,
     pub(super) from_caustics: &'static str,
+    pub(super) photons: &'static str,
+    pub(super) photon_from: &'static str,
+    pub(super) photon_irradiance: &'static str,
+    pub(super) photon_scattered: &'static str,
+    /// How many, and what they bring together.
+    pub(super) more_photons: &'static str,
     pub(super) end_depth: &'static str,
     pub(super) end_nothing: &'static str,
     pub(super) end_absorbed: &'static str,

@@ -42,6 +42,8 @@ pub enum Event {
         /// The product.
         added: Spectrum,
     },
+    /// Photons were found near the point; the light that they bring is added next.
+    Photons(Vec<MergedPhoton>),
     /// A direction was chosen to go on in.
     Scattered(Box<Scattered>),
     /// The path goes on by chance.
@@ -148,6 +150,20 @@ pub struct SampledLight {
     pub shadow_ray: Option<Ray>,
     /// What comes through between the light and the surface; black where something is in its way.
     pub passes: Spectrum,
+}
+
+/// A photon near a point, and what the path gets of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MergedPhoton {
+    /// The unit direction that it came from.
+    pub towards: Vec3,
+    /// Its irradiance on what it falls on straight: its power over the area in which photons are collected and the number of light paths.
+    /// In a medium it is the radiance from all directions, by the volume.
+    pub irradiance: Spectrum,
+    /// The weight against the other way to find its light.
+    pub weight: f32,
+    /// What is scattered of it towards the viewer, weighed.
+    pub scattered: Spectrum,
 }
 
 /// A direction that was chosen to go on in.

@@ -13,7 +13,7 @@ pub(crate) mod through;
 
 pub use counts::RayCounts;
 pub use features::{Feature, Features};
-pub use journal::{End, Event, Met, Record, SampledLight, Scattered, Source};
+pub use journal::{End, Event, MergedPhoton, Met, Record, SampledLight, Scattered, Source};
 pub use sampler::{Draw, Sampler};
 pub(crate) use seen::{Seen, caught};
 pub use sight::Sight;

@@ -9,7 +9,7 @@ use lumbre_shading::medium::henyey_greenstein;
 
 use crate::caustics::{Merging, radius};
 use crate::transport::Record;
-use crate::transport::journal::Source;
+use crate::transport::journal::{Event, MergedPhoton, Source};
 use crate::wave::pairs::{Merge, Merges};
 use crate::wave::paths::{Collision, PAD, Paths, SCATTERED, to_column};
 use crate::wave::setting::Setting;
@@ -66,12 +66,22 @@ impl<'s> Wave<'s> {
         let direction = self.paths.direction(path);
         let asymmetry = setting.scene.medium(medium).asymmetry();
         let mut sum = Spectrum::BLACK;
+        let mut seen = Vec::new();
         photons.media.within(point, radius.into(), |photon| {
             if photon.medium == to_column(Some(medium)) && photon.bounces <= bounces_left {
                 let phase = henyey_greenstein(direction.dot(photon.towards), asymmetry);
-                sum += photon.flux * (spread * phase / (1.0 + phase * share / photon.density));
+                let weight = 1.0 / (1.0 + phase * share / photon.density);
+                let irradiance = photon.flux * spread;
+                let scattered = irradiance * (phase * weight);
+                sum += scattered;
+                if record.journal.is_some() {
+                    seen.push(MergedPhoton { towards: photon.towards, irradiance, weight, scattered });
+                }
             }
         });
+        if !seen.is_empty() {
+            record.note(|| Event::Photons(seen));
+        }
         self.slots.radiance[slot] += record.added(Source::Caustics, self.paths.throughput(path), sum, 1.0);
     }
 
@@ -129,11 +139,13 @@ fn add(
     let mut at = 0;
     while at < merges.len {
         let vertex = merges.vertex[at];
+        let first = at;
         let mut sum = Spectrum::BLACK;
         while at < merges.len && merges.vertex[at] == vertex {
             sum += merges.scattered(at);
             at += 1;
         }
+        record.note(|| Event::Photons((first..at).map(|pair| merges.merged(pair)).collect()));
         let path = vertices.path[vertex as usize] as usize;
         radiance[paths.slot[path] as usize] +=
             record.added(Source::Caustics, paths.throughput(path), sum, 1.0);

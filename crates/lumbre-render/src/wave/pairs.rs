@@ -2,10 +2,12 @@
 
 use std::marker::PhantomData;
 
+use lumbre_math::Vec3;
 use lumbre_shading::Spectrum;
 use lumbre_simd::{Job, Real, UInt, V3};
 
 use crate::caustics::Photon;
+use crate::transport::journal::MergedPhoton;
 use crate::wave::flat::put3;
 use crate::wave::paths::{PAD, Paths, grow};
 use crate::wave::shade::{Kind, Vertex};
@@ -25,7 +27,8 @@ pub(crate) struct Merges {
     light: [Vec<f32>; 3],
     /// What a density of directions of the vertex becomes one of pairs by, over the density of the photon's light path.
     share: Vec<f32>,
-    /// What the vertex scatters of it.
+    /// Its weight against paths that find its light, and what the vertex scatters of it.
+    weight: Vec<f32>,
     scattered: [Vec<f32>; 3],
 }
 
@@ -34,7 +37,7 @@ impl Merges {
         if self.vertex.len() < self.len + 1 + PAD {
             let len = 2 * (self.len + PAD);
             let columns = self.towards.iter_mut().chain(&mut self.light).chain(&mut self.scattered);
-            columns.chain([&mut self.share]).for_each(|column| grow(column, len));
+            columns.chain([&mut self.share, &mut self.weight]).for_each(|column| grow(column, len));
             grow(&mut self.vertex, len);
         }
         let at = self.len;
@@ -48,6 +51,18 @@ impl Merges {
             column[at] = x;
         }
         self.share[at] = spread / photon.density;
+    }
+
+    /// A pair, for those who want to see it.
+    pub(super) fn merged(&self, at: usize) -> MergedPhoton {
+        let [x, y, z] = self.towards.each_ref().map(|column| column[at]);
+        let [r, g, b] = self.light.each_ref().map(|column| column[at]);
+        MergedPhoton {
+            towards: Vec3::new(x, y, z),
+            irradiance: Spectrum::new(r, g, b),
+            weight: self.weight[at],
+            scattered: self.scattered(at),
+        }
     }
 
     pub(super) fn scattered(&self, at: usize) -> Spectrum {
@@ -84,6 +99,7 @@ impl<K: Kind> Job for MergeKind<'_, '_, K> {
             let weight = (R::one() + scattered.pdf * R::from_slice(&merges.share[done..])).recip();
             let light = load3::<R>(&merges.light, done) * scattered.f * weight;
             put3(&mut merges.scattered, done, light);
+            weight.copy_to_slice(&mut merges.weight[done..]);
             done += R::LANES;
         }
     }
