@@ -16,6 +16,7 @@ use lumbre_cli::{Format, Language, Request, Things, memory_left};
 use numpy::{PyArray1, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
 use pyo3::types::{PyDict, PyList, PyTuple};
 
 use crate::errors::{check_environment, failed, invalid, raised, too_large, tuple, unknown};
@@ -524,7 +525,10 @@ impl Scene {
 
     /// On the stage of a picture. Pictures from elsewhere and in other light share its tree.
     fn shown(&self, py: Python<'_>, wish: Wish) -> PyResult<Arc<Shown>> {
-        interruptible(py, |_| self.stages.shown(&wish), |_| Ok(()))?.map_err(raised)
+        let building = self.stages.building.lock_py_attached(py);
+        let shown = interruptible(py, |_| self.stages.shown(&wish), |_| Ok(()));
+        drop(building);
+        shown?.map_err(raised)
     }
 
     /// Which render it is.

@@ -87,6 +87,8 @@ pub(crate) struct Stages {
     shown: Mutex<Vec<(Wish, Arc<Shown>)>>,
     /// Trees that were built so far.
     trees: AtomicUsize,
+    /// Held by the thread of Python that builds, so that threads which ask for the same build it once.
+    pub(crate) building: Mutex<()>,
 }
 
 /// How many of the last stages, descriptions with overrides, and trees with ground are kept.
@@ -100,6 +102,7 @@ impl Stages {
             others: Mutex::default(),
             shown: Mutex::default(),
             trees: AtomicUsize::new(1),
+            building: Mutex::default(),
         }
     }
 
@@ -129,18 +132,11 @@ impl Stages {
     }
 
     fn kept_or_staged(&self, wish: &Wish) -> Result<Arc<Shown>, lumbre::Error> {
-        let mut kept = self.shown.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(position) = kept.iter().position(|(other, _)| wish.shows_the_same(other)) {
-            let found = kept.remove(position);
-            let shown = Arc::clone(&found.1);
-            kept.push(found);
+        if let Some((_, shown)) = found(&self.shown, |(other, _)| wish.shows_the_same(other)) {
             return Ok(shown);
         }
-        // Two threads that ask for the same build it once.
         let shown = Arc::new(self.staged(wish)?);
-        kept.push((wish.clone(), Arc::clone(&shown)));
-        let surplus = kept.len().saturating_sub(KEPT);
-        kept.drain(..surplus);
+        keep(&self.shown, (wish.clone(), Arc::clone(&shown)));
         Ok(shown)
     }
 
@@ -164,21 +160,18 @@ impl Stages {
         if !defaults.is_grounded() {
             return Ok(Shown { scene: Arc::new(base.scene.relit(&desc)?), defaults });
         }
-        let mut grounded = base.grounded.lock().unwrap_or_else(PoisonError::into_inner);
         let wanted = desc.ground;
-        let stands_on = |scene: &&Arc<lumbre::Scene>| {
+        let stands_on = |scene: &Arc<lumbre::Scene>| {
             scene.resolved().ground().zip(wanted).is_some_and(|(has, wants)| {
                 (has.point, has.catcher) == (wants.point, wants.catcher)
                     && has.normal == wants.normal.normalize()
             })
         };
-        if let Some(tree) = grounded.iter().find(stands_on) {
+        if let Some(tree) = found(&base.grounded, stands_on) {
             return Ok(Shown { scene: Arc::new(tree.relit(&desc)?), defaults });
         }
         let scene = Arc::new(self.built(desc)?);
-        grounded.push(Arc::clone(&scene));
-        let surplus = grounded.len().saturating_sub(KEPT);
-        grounded.drain(..surplus);
+        keep(&base.grounded, Arc::clone(&scene));
         Ok(Shown { scene, defaults })
     }
 
@@ -192,9 +185,8 @@ impl Stages {
         if overrides.is_empty() {
             return Ok(Arc::clone(&self.own));
         }
-        let mut others = self.others.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(found) = others.iter().find(|base| base.overrides == overrides) {
-            return Ok(Arc::clone(found));
+        if let Some(found) = found(&self.others, |base| base.overrides == overrides) {
+            return Ok(found);
         }
         let mut desc = SceneDesc::clone(&self.own.desc);
         for text in overrides {
@@ -204,9 +196,7 @@ impl Stages {
         let scene = Arc::new(self.built(desc.clone())?);
         let overrides = overrides.to_vec();
         let base = Arc::new(Base { overrides, desc: Arc::new(desc), scene, grounded: Mutex::default() });
-        others.push(Arc::clone(&base));
-        let surplus = others.len().saturating_sub(KEPT);
-        others.drain(..surplus);
+        keep(&self.others, Arc::clone(&base));
         Ok(base)
     }
 }
@@ -257,6 +247,23 @@ impl Wish {
         }
         settings
     }
+}
+
+/// One of the last that were kept; it counts as the last from now on.
+fn found<T: Clone>(kept: &Mutex<Vec<T>>, is_wanted: impl Fn(&T) -> bool) -> Option<T> {
+    // Nothing is built while this is locked: a thread of the pool that waits for its work takes up other work, which may want this, too.
+    let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
+    let position = kept.iter().position(is_wanted)?;
+    let wanted = kept.remove(position);
+    kept.push(wanted.clone());
+    Some(wanted)
+}
+
+fn keep<T>(kept: &Mutex<Vec<T>>, last: T) {
+    let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
+    kept.push(last);
+    let surplus = kept.len().saturating_sub(KEPT);
+    kept.drain(..surplus);
 }
 
 /// A hash of an image's pixels, the same in every process of this version.

@@ -576,7 +576,8 @@ class SunLight(Light):
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentLight(Light):
-    """Light from all around: this radiance, or a factor on `image`, (h, 2h, 3), by longitude and latitude with `up` at its top.
+    """Light from all around: this radiance, or a factor on `image`, (h, 2h, 3), by longitude and latitude with `up` at its top; where that is z,
+    x is in its middle, and y three quarters of its width to the right.
 
     >>> EnvironmentLight(0.5).radiance
     0.5

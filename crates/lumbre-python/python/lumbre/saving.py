@@ -62,6 +62,7 @@ from .geometry import (
     Torus,
     Triangle,
     _Csg,
+    _listed,
 )
 
 
@@ -201,7 +202,7 @@ class _Writer:
 
     def environment(self, light: EnvironmentLight | SkyLight) -> None:
         factor = (1.0, 1.0, 1.0) if isinstance(light, SkyLight) else colour("radiance", light.radiance)
-        pixels = light._map() if isinstance(light, SkyLight) else light.image
+        pixels = light._map() if isinstance(light, SkyLight) else None if light.image is None else np.asarray(light.image)
         if pixels is None:
             self.lights.append(f'LightSource "infinite" {_param("rgb", "L", factor)}')
             return
@@ -210,7 +211,12 @@ class _Writer:
         if not factor[0] == factor[1] == factor[2]:
             raise LumbreError(f"an EnvironmentLight with an image is saved with a grey radiance (found {factor})")
         name = self.image(np.asarray(pixels, dtype=np.float32))
-        self.lights.append(f'LightSource "infinite" {_param("string", "filename", name)} {_param("float", "scale", factor[0])}')
+        line = f'LightSource "infinite" {_param("string", "filename", name)} {_param("float", "scale", factor[0])}'
+        if pixels.shape[0] == pixels.shape[1]:
+            self.lights.append(line)
+            return
+        # Here x is in the middle of a wide map, in files it is at its edges.
+        self.lights += ["AttributeBegin", "  Rotate 180 0 0 1", f"  {line}", "AttributeEnd"]
 
     def image(self, pixels: npt.NDArray[np.float32]) -> str:
         name = f"{self.target.stem}-{len(self.images)}.pfm"
@@ -234,7 +240,7 @@ class _Writer:
         if shape.medium is not None:
             lines.append(f'  MediumInterface "{self.medium(shape.medium)}" ""')
         if isinstance(shape, _Csg):
-            operands = [list(operand) if isinstance(operand, (tuple, list)) else [operand] for operand in shape.operands]
+            operands = [_listed(operand) for operand in shape.operands]
             names = " ".join(f'"{self.object(operand, own, light)}"' for operand in operands)
             lines.append(f'  Shape "csg" {_param("string", "operation", shape._operation)} "string operands" [{names}]')
         else:
@@ -429,7 +435,7 @@ def _texture(value: Any) -> Texture:
     return value if isinstance(value, Texture) else Texture(value)
 
 
-def _transform(place: npt.NDArray[np.float64]) -> str:
+def _transform(place: npt.NDArray[Any]) -> str:
     """The scene language has columns one after the other."""
     return f"Transform [{_numbers(place.T.reshape(-1).tolist())}]"
 
@@ -438,6 +444,5 @@ def _shines(part: Any) -> bool:
     if isinstance(part, Instances):
         return any(_shines(shape) for shape in ([part.shapes] if isinstance(part.shapes, Shape) else part.shapes))
     if isinstance(part, _Csg) and part._light() is None:
-        operands = [shape for operand in part.operands for shape in (operand if isinstance(operand, (tuple, list)) else [operand])]
-        return any(_shines(shape) for shape in operands)
+        return any(_shines(shape) for operand in part.operands for shape in _listed(operand))
     return isinstance(part, Shape) and part._light() is not None

@@ -273,7 +273,7 @@ class Scene:
         given = [lights] if isinstance(lights, (Light, Shape)) else list(lights)
         # Shapes that emit are lights, too.
         parts += [light for light in given if isinstance(light, Shape) and light._light() is not None]
-        lamps = [light for light in given if not (isinstance(light, Shape) and light._light() is not None)]
+        lamps: list[Any] = [light for light in given if not (isinstance(light, Shape) and light._light() is not None)]
         kinds = ((parts, (Shape, Instances, Scene), "shape"), (cameras, Camera, "camera"), (lamps, Light, "light"))
         for what, kind, name in kinds:
             for part in what:
@@ -284,7 +284,7 @@ class Scene:
         source: dict[str, Any] = {"shapes": parts, "camera": cameras, "lights": lamps, "up": upwards}
         self._source = source
         self._warnings: tuple[str, ...] = sum((part.warnings for part in parts if isinstance(part, Scene)), ())
-        self._native = _lumbre.Scene.build(
+        self._native: _lumbre.Scene = _lumbre.Scene.build(
             [part._native if isinstance(part, Scene) else part._native() for part in parts],
             [camera._native() for camera in cameras],
             [light._native() for light in lamps],

@@ -107,4 +107,5 @@ def clear_sky(sun: Triple, zenith: npt.NDArray[np.float64], height: int = 128) -
     # Light from below: the mean of the sky, weighed by the cosine, off ground of reflectance 0.2.
     weight = np.where(z > 0, z, 0) * np.cos(latitude)
     below = 0.2 * (sky * weight[..., None]).sum(axis=(0, 1)) / weight.sum()
-    return np.where(is_up, sky, below).astype(np.float32)
+    whole: npt.NDArray[np.float32] = np.where(is_up, sky, below).astype(np.float32)
+    return whole
