@@ -19,7 +19,7 @@ from ._words import no_attribute
 class Image:
     """A rendered picture: an array of linear light, which shows itself in a notebook.
 
-    `numpy.asarray(image)` is `image.array`.
+    `numpy.asarray(image)` is `image.array`. Pickles keep all but what a denoised picture was before, and the part of a distributed one.
 
     >>> import lumbre, numpy as np
     >>> image = lumbre.Scene([lumbre.Sphere()]).render(spp=1, size=(8, 6), features=True)

@@ -174,9 +174,10 @@ class _Writer:
                     distance = _param("float", "focaldistance", math.dist(eye, target))
                     kind += f" {_param('float', 'lensradius', camera.lens_radius)} {distance}"
             else:
-                half = 0.5 * camera.height
-                x, y = half * max(1.0, width / height), half * max(1.0, height / width)
-                kind = f'"orthographic" {_param("float", "screenwindow", (-x, x, -y, y))}'
+                # The window is 2 high, or wide, along the shorter side of any picture.
+                factor = _number(2 / camera.height)
+                self.head.insert(0, f"Scale {factor} {factor} 1")
+                kind = '"orthographic"'
         else:
             raise LumbreError(f"a camera of type {type(camera).__name__} is not saved (expected Perspective, Orthographic or Pinhole)")
         film = f'Film "rgb" {_param("integer", "xresolution", width)} {_param("integer", "yresolution", height)}'
