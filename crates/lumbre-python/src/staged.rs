@@ -8,7 +8,7 @@ use lumbre::{DVec3, EnvironmentDesc, Ground, SceneDesc, Setting, Stage, Surround
 use lumbre_cli::Defaults;
 
 /// How a scene is to be shown.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Wish {
     /// For which pictures; only the camera that frames everything depends on it.
     pub(crate) size: Option<(u32, u32)>,
@@ -45,21 +45,6 @@ impl Around {
             (Self::Map(a), Self::Map(b)) => Arc::ptr_eq(&a.image, &b.image),
             (Self::Light(a), Self::Light(b)) => Arc::ptr_eq(a, b),
             _ => std::mem::discriminant(self) == std::mem::discriminant(other),
-        }
-    }
-}
-
-impl Default for Wish {
-    fn default() -> Self {
-        Self {
-            size: None,
-            integrator: None,
-            view: Viewpoint::default(),
-            fit: false,
-            eye: None,
-            ground: Ground::default(),
-            surroundings: Around::default(),
-            overrides: Vec::new(),
         }
     }
 }
@@ -151,7 +136,7 @@ impl Stages {
             Around::Own => Surroundings::Own,
             Around::Studio => Surroundings::Studio,
             Around::Map(map) => Surroundings::Map(map.clone()),
-            Around::Light(light) => Surroundings::Light(LightDesc::clone(light)),
+            Around::Light(light) => Surroundings::Light(Box::new(LightDesc::clone(light))),
         };
         let defaults = Defaults::on(&stage, &mut desc, wish.integrator);
         if defaults.is_bare() && !wish.view.changes_lens() {

@@ -52,7 +52,7 @@ pub enum Surroundings {
     /// behind the model as seen from the unrotated automatic camera.
     Map(EnvironmentDesc),
     /// A light at infinity, as it stands, in place of the description's infinite lights.
-    Light(LightDesc),
+    Light(Box<LightDesc>),
 }
 
 /// The ground under a model.
@@ -155,7 +155,7 @@ impl Stage {
             }
             Surroundings::Light(light) => {
                 desc.lights.retain(|light| !matches!(light, LightDesc::Infinite { .. }));
-                desc.lights.push(light.clone());
+                desc.lights.push(LightDesc::clone(light));
                 StageLight::Map
             }
             Surroundings::Studio => {
