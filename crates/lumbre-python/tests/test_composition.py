@@ -109,7 +109,7 @@ def test_colours_are_materials() -> None:
         view = lumbre.Perspective((0, -4, 0), fov=20)
         seen = lumbre.Scene(sphere).render(spp=1, size=(3, 3), integrator="albedo", camera=view).array[1, 1]
         np.testing.assert_allclose(seen, expected, atol=1e-6)
-    with pytest.raises(lumbre.LumbreError, match="no colour \"redd\".*did you mean red"):
+    with pytest.raises(lumbre.LumbreError, match='no colour "redd".*did you mean red'):
         lumbre.Sphere(material="redd")
     with pytest.raises(lumbre.LumbreError, match="material is no material"):
         lumbre.Sphere(material=object())
@@ -137,8 +137,8 @@ def test_an_expression_is_the_surface_where_it_is_zero() -> None:
         ("x +", "found its end; expected a number, a name or a parenthesis"),
         ("2x", 'found "x" at position 2; expected an operator'),
         ("x**0.3", "a whole exponent from -64 to 64, or 0.5"),
-        ("w", "no name \"w\""),
-        ("sqr(x)", "no function \"sqr\".*did you mean sqrt"),
+        ("w", 'no name "w"'),
+        ("sqr(x)", 'no function "sqr".*did you mean sqrt'),
         ("sqrt(x, y)", "sqrt has 2 arguments .expected one"),
         ("min(x)", "min has 1 arguments .expected two or more"),
         ("(x", 'expected "\\)"'),
@@ -256,7 +256,8 @@ def everything() -> list[lumbre.Shape | lumbre.Instances]:
         lumbre.Hyperboloid(transform=lumbre.translate(-2, 5, 0)),
         lumbre.Quadric(coefficients=(1, 2, 3, 0.1, 0, 0, 0, 0, 0, -0.4), transform=lumbre.translate(2, 5, 0.3)),
         lumbre.Triangle(p0=(0, 8, 0.1), p1=(1, 8, 0), p2=(0, 8, 1)),
-        lumbre.Box(p0=(6, 0, 0), p1=(7, 1, 1), material=0.6) - (lumbre.Sphere(center=(6.5, 0.5, 1), radius=0.4) | lumbre.Capsule(p0=(6, 0, 1))),
+        lumbre.Box(p0=(6, 0, 0), p1=(7, 1, 1), material=0.6)
+        - (lumbre.Sphere(center=(6.5, 0.5, 1), radius=0.4) | lumbre.Capsule(p0=(6, 0, 1))),
         lumbre.Sphere(center=(0, -2, 3), radius=0.3, emission=(4, 5, 6)),
         lumbre.Box(p0=(2, -4, 0), p1=(3, -3, 1), medium=lumbre.Medium(scattering=(1, 2, 3), absorption=0.25)),
         lumbre.Instances([lumbre.Sphere(radius=0.2, material="teal")], np.stack([lumbre.translate(i, -5, 0) for i in range(3)])),
@@ -372,7 +373,9 @@ def test_names_that_people_try_are_answered_with_ours() -> None:
         _ = fewer.normal
 
 
-@pytest.mark.parametrize("kind", [lumbre.Sphere, lumbre.Diffuse, lumbre.Perspective, lumbre.SunLight, lumbre.Mesh, lumbre.Pinhole, lumbre.Medium])
+@pytest.mark.parametrize(
+    "kind", [lumbre.Sphere, lumbre.Diffuse, lumbre.Perspective, lumbre.SunLight, lumbre.Mesh, lumbre.Pinhole, lumbre.Medium]
+)
 def test_help_is_for_users(kind: type) -> None:
     text = io.StringIO()
     with contextlib.redirect_stdout(text):

@@ -132,7 +132,8 @@ class Material(metaclass=Described):
 
     Where a material is expected, a colour stands for `Diffuse` of it.
 
-    Parameters are numbers; colours are numbers, (r, g, b) in linear light, names such as "red", or "#e8e0d8" in sRGB. Each that is a colour, and each that may differ from place to place
+    Parameters are numbers; colours are numbers, (r, g, b) in linear light, names such as "red", or "#e8e0d8" in
+    sRGB. Each that is a colour, and each that may differ from place to place
     (said by its type), may be a `Texture` or an array of one, (h, w) or (h, w, 3). `normal_map` is an image of normals in tangent space,
     as in glTF, and `bump_map` one of heights. Wrong numbers raise `LumbreError` at once.
     """
@@ -452,7 +453,7 @@ class Medium(metaclass=Described):
 
     @staticmethod
     def measured(name: str, units_per_mm: float = 1.0) -> Medium:
-        """A measured medium, such as "Wholemilk" or "Marble", by the name that scene files have for it; its coefficients are per millimetre,
+        """A measured medium, such as "Wholemilk" or "Marble", by the name that scene files have for it; its coefficients are per mm,
         which are `units_per_mm` units of the world.
 
         >>> Medium.measured("Skimmilk", units_per_mm=0.1).scattering[0].__round__(3)
@@ -552,8 +553,8 @@ class DistantLight(Light):
 
 @dataclass(frozen=True)
 class SunLight(Light):
-    """The sun: parallel light from where it stands, by its azimuth in degrees clockwise from north, which is y, and its elevation in degrees
-    above the horizon. `irradiance` is that of a surface that faces it; by default as of a high sun whose sky is `SkyLight()`. Below the
+    """The sun: parallel light from where it stands, by its azimuth in degrees clockwise from north, which is y, and its elevation in
+    degrees above the horizon. `irradiance` is that of a surface that faces it; by default as of a high sun whose sky is `SkyLight()`. Below the
     horizon it gives none. `solar_position` says where it stands at a time and a place.
 
     >>> SunLight(azimuth=180, elevation=45).towards[1] < 0
@@ -576,8 +577,8 @@ class SunLight(Light):
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentLight(Light):
-    """Light from all around: this radiance, or a factor on `image`, (h, 2h, 3), by longitude and latitude with `up` at its top; where that is z,
-    x is in its middle, and y three quarters of its width to the right.
+    """Light from all around: this radiance, or a factor on `image`, (h, 2h, 3), by longitude and latitude with `up` at its top; where that is
+    z, x is in its middle, and y three quarters of its width to the right.
 
     >>> EnvironmentLight(0.5).radiance
     0.5
@@ -593,7 +594,7 @@ class EnvironmentLight(Light):
             is_finite = np.isfinite(array_of("image", self.image)).all(axis=-1)
             if not is_finite.all():
                 y, x = np.argwhere(~is_finite)[0]
-                warnings.warn(f"texel ({x}, {y}) of an environment is not finite, and taken for black", stacklevel=3)
+                warnings.warn(f"texel ({x}, {y}) of an environment is not finite, and taken for black", stacklevel=4)
 
     def _new(self) -> _lumbre.Light:
         image = None if self.image is None else array_of("image", self.image).astype(np.float32, copy=False)
@@ -604,8 +605,8 @@ class EnvironmentLight(Light):
 
 @dataclass(frozen=True)
 class SkyLight(Light):
-    """A clear sky without its sun, whose place is as of `SunLight`: brightest near the sun, brighter at the horizon, blue. `radiance` is that
-    of the zenith.
+    """A clear sky without its sun, whose place is as of `SunLight`: brightest near the sun, brighter at the horizon, blue. `radiance` is
+    that of the zenith.
 
     Its distribution is the CIE standard clear sky of low turbidity (CIE S 011/E:2003, type 12); its colour goes from blue in the zenith to
     white at the horizon and near the sun. Below the horizon it is as bright as the ground that it lights would be.
@@ -646,7 +647,7 @@ def environment(value: Any) -> str | _lumbre.Light | _lumbre.Environment:
     if isinstance(value, (int, float, tuple, list, np.ndarray)) and not isinstance(value, bool):
         return EnvironmentLight(value)._native()
     raise LumbreError(
-        f'env is no light from all around (found {value!r}; expected a file, an (h, 2h, 3) array, an EnvironmentLight, a SkyLight, '
+        f"env is no light from all around (found {value!r}; expected a file, an (h, 2h, 3) array, an EnvironmentLight, a SkyLight, "
         'a radiance, "studio" or "none")'
     )
 
@@ -755,8 +756,8 @@ class Pinhole(Camera):
     pose : (4, 4) array
         World from camera: its last column is the camera's place. For extrinsics, which are camera from world, give `np.linalg.inv` of them.
     axes : "opencv" or "opengl"
-        What the axes of the camera are: x to the right, y down and z forwards (OpenCV, COLMAP), or x to the right, y upwards and z backwards
-        (OpenGL, Blender, NeRF).
+        What the axes of the camera are: x to the right, y down and z forwards (OpenCV, COLMAP), or x to the right, y upwards and z
+        backwards (OpenGL, Blender, NeRF).
 
     Lens distortion is not taken into account: use the numbers of undistorted pictures. Raises `LumbreError` where the pose is no rigid
     motion.

@@ -325,8 +325,8 @@ class Implicit(Shape):
     bounds : two corners of a box
         Where the surface is cut off, and open.
 
-    Crossings are isolated by interval arithmetic: none is lost, however thin the surface is (Mitchell, "Robust Ray Intersection with Interval
-    Arithmetic", 1990). That takes some thousand times as long as a sphere. `closest_point` has no answer for it. A function of Python is
+    Crossings are isolated by interval arithmetic: none is lost, however thin the surface is (Mitchell, "Robust Ray Intersection with
+    Interval Arithmetic", 1990). That takes some thousand times as long as a sphere. `closest_point` has no answer for it. A function of Python is
     not taken, as it would hold the interpreter's lock for every ray: sample it to a mesh.
 
     >>> gyroid = Implicit("sin(x)*cos(y) + sin(y)*cos(z) + sin(z)*cos(x)", bounds=((-3, -3, -3), (3, 3, 3)))
@@ -732,8 +732,8 @@ def translate(x: float | Iterable[float], y: float | None = None, z: float | Non
 
 
 def rotate(axis: str | Iterable[float], degrees: float, about: Iterable[float] = _ORIGIN) -> npt.NDArray[np.float64]:
-    """The (4, 4) map that turns by an angle in degrees about an axis, "x", "y", "z" or a vector, through the point `about`: counter-clockwise
-    as seen from the axis's tip.
+    """The (4, 4) map that turns by an angle in degrees about an axis, "x", "y", "z" or a vector, through the point `about`:
+    counter-clockwise as seen from the axis's tip.
 
     >>> (rotate("z", 90) @ [1, 0, 0, 1]).round(12).tolist()
     [0.0, 1.0, 0.0, 1.0]

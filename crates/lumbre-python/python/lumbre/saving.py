@@ -28,7 +28,6 @@ from .appearance import (
     Metal,
     Mix,
     Orthographic,
-    Panorama,
     Perspective,
     Pinhole,
     PointLight,

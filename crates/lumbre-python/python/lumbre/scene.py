@@ -621,7 +621,7 @@ class Scene:
         if stats["noise_target_met"] is False:
             more = "time" if time is not None and stats["spp"] < options["spp"] else "spp"
             reached = "not known yet" if stats["noise"] is None else stats["noise"]
-            warnings.warn(f"the noise is {reached}, and that of {noise} was not reached: more {more} goes on", stacklevel=2)
+            warnings.warn(f"the noise is {reached}, and that of {noise} was not reached: more {more} goes on", stacklevel=3)
         return image
 
     @answers_names
@@ -842,7 +842,7 @@ def load(
     scene._native = native
     scene._warnings = tuple(lines)
     for line in lines:
-        warnings.warn(line, stacklevel=2)
+        warnings.warn(line, stacklevel=3)
     return scene
 
 
@@ -923,7 +923,9 @@ def _position(value: Any) -> int:
     try:
         return whole("camera", value)
     except LumbreError as error:
-        raise LumbreError(f"camera is out of range (found {value!r}; expected a Camera, or the position or name of one of the scene's)") from error
+        raise LumbreError(
+            f"camera is out of range (found {value!r}; expected a Camera, or the position or name of one of the scene's)"
+        ) from error
 
 
 def _degrees(name: str, value: Any) -> float:

@@ -28,7 +28,7 @@ def sun_direction(azimuth: float, elevation: float) -> Triple:
 
 
 def solar_position(when: Any, latitude: float, longitude: float) -> tuple[Any, Any]:
-    """Where the sun stands: its azimuth in degrees clockwise from north, and its elevation in degrees above the horizon, without refraction.
+    """Where the sun stands: its azimuth in degrees clockwise from north, and its elevation in degrees above the horizon, unrefracted.
 
     Parameters
     ----------
