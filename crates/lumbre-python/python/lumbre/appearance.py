@@ -553,9 +553,15 @@ class DistantLight(Light):
 
 @dataclass(frozen=True)
 class SunLight(Light):
-    """The sun: parallel light from where it stands, by its azimuth in degrees clockwise from north, which is y, and its elevation in
-    degrees above the horizon. `irradiance` is that of a surface that faces it; by default as of a high sun whose sky is `SkyLight()`. Below the
-    horizon it gives none. `solar_position` says where it stands at a time and a place.
+    """The sun: parallel light from where it stands.
+
+    Parameters
+    ----------
+    azimuth : degrees clockwise from north, which is y; x is east
+    elevation : degrees above the horizon; below it the sun gives no light
+    irradiance : that of a surface that faces it; by default as of a high sun whose sky is `SkyLight()`
+
+    `solar_position` says where the sun stands at a time and a place.
 
     >>> SunLight(azimuth=180, elevation=45).towards[1] < 0
     True
@@ -577,8 +583,8 @@ class SunLight(Light):
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentLight(Light):
-    """Light from all around: this radiance, or a factor on `image`, (h, 2h, 3), by longitude and latitude with `up` at its top; where that is
-    z, x is in its middle, and y three quarters of its width to the right.
+    """Light from all around: this radiance, or a factor on `image`, (h, 2h, 3), by longitude and latitude with `up` at its top; where that
+    is z, x is in its middle, and y three quarters of its width to the right.
 
     >>> EnvironmentLight(0.5).radiance
     0.5

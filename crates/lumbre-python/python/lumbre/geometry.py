@@ -326,8 +326,8 @@ class Implicit(Shape):
         Where the surface is cut off, and open.
 
     Crossings are isolated by interval arithmetic: none is lost, however thin the surface is (Mitchell, "Robust Ray Intersection with
-    Interval Arithmetic", 1990). That takes some thousand times as long as a sphere. `closest_point` has no answer for it. A function of Python is
-    not taken, as it would hold the interpreter's lock for every ray: sample it to a mesh.
+    Interval Arithmetic", 1990). That takes longer than a sphere by far. `closest_point` has no answer for it. A function of Python
+    is not taken, as it would hold the interpreter's lock for every ray: sample it to a mesh.
 
     >>> gyroid = Implicit("sin(x)*cos(y) + sin(y)*cos(z) + sin(z)*cos(x)", bounds=((-3, -3, -3), (3, 3, 3)))
     >>> rounded = Implicit("max(abs(x) - 1, abs(y) - 1, abs(z) - 1, length(x, y, z) - 1.3)", bounds=((-2, -2, -2), (2, 2, 2)))
