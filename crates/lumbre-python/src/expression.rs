@@ -53,10 +53,8 @@ impl Expression {
             return Err(parser.wrong("an operator"));
         }
         let expression = Self { steps: parser.steps };
-        if expression.steps.len() > MOST_STEPS || expression.waiting() > MOST_WAITING {
-            return Err(invalid(format!(
-                "the expression is too long (expected at most {MOST_STEPS} steps, and {MOST_WAITING} open at a time)"
-            )));
+        if expression.waiting() > MOST_WAITING {
+            return Err(too_long());
         }
         Ok(expression)
     }
@@ -132,6 +130,12 @@ fn least(a: Dual, b: Dual) -> Dual {
     let value = Interval { low: a.value.low.min(b.value.low), high: a.value.high.min(b.value.high) };
     let slope = Interval { low: a.slope.low.min(b.slope.low), high: a.slope.high.max(b.slope.high) };
     Dual { value, slope }
+}
+
+fn too_long() -> PyErr {
+    invalid(format!(
+        "the expression is too long (expected at most {MOST_STEPS} steps, and {MOST_WAITING} open at a time)"
+    ))
 }
 
 struct Parser<'a> {
@@ -269,6 +273,9 @@ impl<'a> Parser<'a> {
     }
 
     fn atom(&mut self) -> PyResult<()> {
+        if self.steps.len() > MOST_STEPS {
+            return Err(too_long());
+        }
         if self.takes("(") {
             self.sum()?;
             return self.expect(")");
@@ -331,6 +338,10 @@ impl<'a> Parser<'a> {
                 "expression {:?}: {name} has {count} arguments (expected {expected})",
                 self.text
             )));
+        }
+        // A tangent has its argument twice, so that those in each other grow fast.
+        if self.steps.len() > MOST_STEPS {
+            return Err(too_long());
         }
         match name {
             "sqrt" | "length" => self.steps.push(Step::Sqrt),

@@ -144,6 +144,8 @@ def test_an_expression_is_the_surface_where_it_is_zero() -> None:
         ("(x", 'expected "\\)"'),
         ("(" * 300 + "x" + ")" * 300, "parentheses in each other"),
         ("x+" * 5000 + "x", "too long"),
+        ("tan(" * 60 + "x" + ")" * 60, "too long"),
+        ("x+(" * 60 + "x" + ")" * 60, "too long"),
     ]:
         with pytest.raises(lumbre.LumbreError, match=message):
             lumbre.Implicit(text)
