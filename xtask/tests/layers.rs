@@ -157,7 +157,6 @@ const CIRCLES: &[(&str, &[usize])] = &[
     ("lumbre-cli", &[8, 4]),
     ("lumbre-formats", &[12, 7, 6, 3, 2]),
     ("lumbre-math", &[4]),
-    ("lumbre-python", &[4]),
     ("lumbre-render", &[5, 3, 3]),
     ("lumbre-scene", &[34, 2]),
     ("lumbre-shading", &[25, 5, 3]),

@@ -19,9 +19,16 @@ impl Defaults {
     /// Sets a description on the stage that nobody has asked to be otherwise, for a picture of this size. `integrator` is the one in place
     /// of the description's own.
     pub fn stage(desc: &mut SceneDesc, size: Option<(u32, u32)>, integrator: Option<IntegratorKind>) -> Self {
-        let is_of_light = integrator.unwrap_or(desc.integrator.kind).needs_light();
         let mut stage = Stage::default();
-        (stage.size, stage.ground) = (size, Self::ground(Ground::default(), is_of_light));
+        stage.size = size;
+        Self::on(&stage, desc, integrator)
+    }
+
+    /// Sets a description on this stage, as [`Defaults::stage`] does on that which nobody has asked to be otherwise.
+    pub fn on(stage: &Stage, desc: &mut SceneDesc, integrator: Option<IntegratorKind>) -> Self {
+        let is_of_light = integrator.unwrap_or(desc.integrator.kind).needs_light();
+        let mut stage = stage.clone();
+        stage.ground = Self::ground(stage.ground, is_of_light);
         Self::new(stage.set(desc), is_of_light)
     }
 
@@ -38,6 +45,11 @@ impl Defaults {
     /// Whether the stage has changed nothing, so that the scene of the bare description is that of its pictures, too.
     pub fn is_bare(&self) -> bool {
         !self.staged.framed && !self.staged.grounded && self.staged.light == StageLight::Own
+    }
+
+    /// Whether there is ground under what the description has.
+    pub fn is_grounded(&self) -> bool {
+        self.staged.grounded
     }
 
     /// What is behind the picture, which then is rendered without its background: the paper of a studio. `None` for what the scene has.

@@ -1,6 +1,6 @@
 //! Crossings, and the surface at a hit.
 
-use lumbre_math::rounding::offset_point;
+use lumbre_math::rounding::{gamma, offset_point};
 use lumbre_math::{DVec2, DVec3};
 use smallvec::SmallVec;
 
@@ -53,6 +53,32 @@ pub struct Surface {
 }
 
 impl Surface {
+    /// The surface at a point, by its normal alone, of any length: flat, without parameters, and with a bound on the point's error of a few
+    /// units in its last place. For custom geometry that has no more to say.
+    ///
+    /// ```
+    /// use lumbre_geometry::Surface;
+    /// use lumbre_math::DVec3;
+    ///
+    /// let surface = Surface::new(DVec3::new(3.0, -4.0, 0.5), DVec3::new(0.0, 0.0, 2.0));
+    /// assert_eq!(surface.normal, DVec3::Z);
+    /// assert!(surface.dpdu.cross(surface.dpdv).dot(surface.normal) > 0.99);
+    /// ```
+    pub fn new(point: DVec3, normal: DVec3) -> Self {
+        let normal = normal.try_normalize().unwrap_or(DVec3::Z);
+        let (dpdu, dpdv) = normal.any_orthonormal_pair();
+        Self {
+            point,
+            point_error: gamma(8) * point.abs(),
+            normal,
+            uv: DVec2::ZERO,
+            dpdu,
+            dpdv,
+            dndu: DVec3::ZERO,
+            dndv: DVec3::ZERO,
+        }
+    }
+
     /// The origin of a ray that leaves along `direction`, by [`offset_point`].
     pub fn offset_origin(&self, direction: DVec3) -> DVec3 {
         offset_point(self.point, self.point_error, self.normal, direction)

@@ -102,19 +102,9 @@ impl ImplicitSurface {
             // At a singular point every direction is as good.
             (-ray.direction).normalize_or(DVec3::Z)
         });
-        let (dpdu, dpdv) = normal.any_orthonormal_pair();
         // That of the point's two roundings, and of `t`, which is right to some of its last bits.
         let point_error = gamma(16) * (ray.origin.abs() + (root.t * ray.direction).abs());
-        Surface {
-            point,
-            point_error,
-            normal,
-            uv: lumbre_math::DVec2::ZERO,
-            dpdu,
-            dpdv,
-            dndu: DVec3::ZERO,
-            dndv: DVec3::ZERO,
-        }
+        Surface { point_error, ..Surface::new(point, normal) }
     }
 
     /// The gradient of `F`.

@@ -1,5 +1,6 @@
 //! Errors as exceptions.
 
+use lumbre::formats::diagnostic::nearest_name;
 use lumbre::{Error, ErrorKind};
 use lumbre_cli::Failure;
 use pyo3::exceptions::{PyMemoryError, PyOSError, PyValueError};
@@ -87,4 +88,11 @@ pub(crate) fn filled<T: Clone>(value: T, count: usize) -> PyResult<Vec<T>> {
 /// The exception for what is wrong with a value.
 pub(crate) fn invalid(message: impl std::fmt::Display) -> PyErr {
     LumbreError::new_err(message.to_string())
+}
+
+/// The error for a name that is not there.
+pub(crate) fn unknown(noun: &str, name: &str, known: &[&str]) -> PyErr {
+    let tip = nearest_name(name, known.iter().copied());
+    let tip = tip.map_or_else(String::new, |near| format!("; did you mean {near}?"));
+    invalid(format!("there is no {noun} \"{name}\" (expected {}{tip})", known.join(", ")))
 }

@@ -3,13 +3,17 @@
 mod cast;
 mod columns;
 mod errors;
+mod expression;
 mod material;
+mod medium;
+mod meshes;
 mod picture;
 mod points;
 mod program;
 mod rays;
 mod scene;
 mod shape;
+mod staged;
 mod viewer;
 mod work;
 
@@ -19,7 +23,11 @@ mod _lumbre {
     #[pymodule_export]
     use crate::errors::LumbreError;
     #[pymodule_export]
-    use crate::material::{Material, Texture};
+    use crate::material::{Material, Texture, named_colour};
+    #[pymodule_export]
+    use crate::medium::Medium;
+    #[pymodule_export]
+    use crate::meshes::PlacedMesh;
     #[pymodule_export]
     use crate::picture::{Part, Picture, read_image, write_image};
     #[pymodule_export]
@@ -27,7 +35,7 @@ mod _lumbre {
     #[pymodule_export]
     use crate::scene::Scene;
     #[pymodule_export]
-    use crate::shape::{Camera, Geometry, Light};
+    use crate::shape::{Camera, Environment, Geometry, Light};
     #[pymodule_export]
     use crate::viewer::Viewer;
     #[pymodule_export]

@@ -13,8 +13,7 @@ use lumbre::shading::{
 use numpy::{PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::errors::{invalid, list};
-use crate::scene::unknown;
+use crate::errors::{invalid, list, unknown};
 
 /// An image on a surface.
 #[pyclass(frozen, module = "lumbre._lumbre")]
@@ -126,6 +125,24 @@ pub(crate) fn colour(name: &str, [r, g, b]: [f32; 3]) -> PyResult<Spectrum> {
         return Ok(Spectrum::new(r, g, b));
     }
     Err(invalid(format!("{name} is no colour (found {r}, {g}, {b}; expected finite numbers, 0 or greater)")))
+}
+
+/// The colour of a name, or of hexadecimal digits in sRGB, in linear light.
+///
+/// # Errors
+/// Says which names there are.
+#[pyfunction]
+pub(crate) fn named_colour(text: &str) -> PyResult<[f32; 3]> {
+    if let Some(found) = lumbre::colour(text) {
+        return Ok(found.to_array());
+    }
+    if text.starts_with('#') {
+        return Err(invalid(format!(
+            "\"{text}\" is no colour (expected three or six hexadecimal digits, as #fa0 or #e8e0d8)"
+        )));
+    }
+    let names: Vec<&str> = lumbre::colour_names().collect();
+    Err(unknown("colour", text, &names))
 }
 
 fn index(ior: f32) -> PyResult<f32> {

@@ -6,13 +6,15 @@ use std::sync::{Mutex, PoisonError};
 
 use lumbre::formats::image::{ExrPrecision, ImageFormat, PngDepth};
 use lumbre::image::{Image, Rgb, ToneMap};
-use lumbre::{Background, Feature, Part as PartDesc, RenderOptions, SaveOptions};
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray3, PyUntypedArrayMethods};
+use lumbre::{Background, Feature, Part as PartDesc, PixelBounds, RenderOptions, SaveOptions};
+use numpy::{
+    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::errors::{invalid, list, raised, tuple};
-use crate::scene::{Shown, unknown};
+use crate::errors::{invalid, list, raised, tuple, unknown};
+use crate::staged::Shown;
 
 /// A rendered picture, with the sums of its samples.
 #[pyclass(frozen, module = "lumbre._lumbre")]
@@ -24,28 +26,37 @@ pub(crate) struct Picture {
 
 impl Picture {
     pub(crate) fn new(picture: lumbre::Picture, look: Look, part: Option<PartDesc>) -> Self {
-        let picture = if look.has_paper { picture.over(Background::studio()) } else { picture };
+        let picture = match &look.background {
+            Some(background) => picture.over(background.clone()),
+            None => picture,
+        };
         Self { picture, look, part: Mutex::new(part) }
     }
 }
 
 /// How a picture is saved where nobody says otherwise.
+#[derive(Clone)]
 pub(crate) struct Look {
     tone_map: ToneMap,
     exposure: f32,
     precision: ExrPrecision,
-    /// Whether it stands before the paper of the studio.
-    has_paper: bool,
+    /// What it stands before.
+    background: Option<Background>,
+}
+
+/// What is behind everything in a picture.
+pub(crate) enum Behind {
+    /// The lights at infinity.
+    Lights,
+    /// Nothing: the picture has coverage.
+    Nothing,
+    Background(Background),
 }
 
 impl Look {
     /// As the program saves it.
-    pub(crate) fn of(
-        shown: &Shown,
-        options: &RenderOptions,
-        is_transparent: bool,
-    ) -> Result<Self, lumbre::Error> {
-        let Shown { scene, defaults, .. } = shown;
+    pub(crate) fn of(shown: &Shown, options: &RenderOptions, behind: Behind) -> Result<Self, lumbre::Error> {
+        let Shown { scene, defaults } = shown;
         Ok(Self {
             tone_map: defaults.tone_map(),
             exposure: defaults.exposure(scene, options)?,
@@ -53,12 +64,18 @@ impl Look {
                 true => ExrPrecision::Float,
                 false => ExrPrecision::Half,
             },
-            has_paper: !is_transparent && defaults.background().is_some(),
+            background: match behind {
+                Behind::Background(background) => Some(background),
+                Behind::Lights | Behind::Nothing => None,
+            },
         })
     }
 
     /// By name, in the words of the program's own parts.
-    pub(crate) fn named(&self) -> BTreeMap<String, String> {
+    ///
+    /// # Errors
+    /// For a background that is a picture, which has no name.
+    pub(crate) fn named(&self) -> PyResult<BTreeMap<String, String>> {
         let precision = if self.precision == ExrPrecision::Float { "float" } else { "half" };
         let tone_map =
             ToneMap::NAMES.into_iter().find(|name| ToneMap::from_name(name) == Some(self.tone_map));
@@ -69,8 +86,22 @@ impl Look {
             entry("precision", precision),
             entry("layers", ""),
         ]);
-        names.extend(self.has_paper.then(|| entry("background", "studio")));
-        names
+        match &self.background {
+            None => {}
+            Some(Background::Colour(colour)) => {
+                let [r, g, b] = colour.to_array().map(f32::to_bits);
+                names.extend([entry("background", &format!("colour {r:08x} {g:08x} {b:08x}"))]);
+            }
+            Some(background) if *background == Background::studio() => {
+                names.extend([entry("background", "studio")]);
+            }
+            Some(_) => {
+                return Err(invalid(
+                    "the background of a picture that is rendered in parts is no picture (expected env, studio, transparent or a colour)",
+                ));
+            }
+        }
+        Ok(names)
     }
 
     /// The options of a file, where what is not given is as it is here.
@@ -109,7 +140,7 @@ impl Look {
             tone_map: ToneMap::from_name(text("tone map")).unwrap_or_default(),
             exposure: text("exposure").parse().unwrap_or(0.0),
             precision: if text("precision") == "float" { ExrPrecision::Float } else { ExrPrecision::Half },
-            has_paper: text("background") == "studio",
+            background: background(text("background")),
         }
     }
 }
@@ -128,6 +159,18 @@ fn array(py: Python<'_>, image: &Image) -> PyResult<Py<PyArray3<f32>>> {
 
 fn tone_map(name: &str) -> PyResult<ToneMap> {
     ToneMap::from_name(name).ok_or_else(|| unknown("tonemap", name, &ToneMap::NAMES))
+}
+
+/// The background of a name in a part.
+fn background(name: &str) -> Option<Background> {
+    if name == "studio" {
+        return Some(Background::studio());
+    }
+    let channels = name.strip_prefix("colour ")?.split(' ');
+    let channels = channels.map(|bits| u32::from_str_radix(bits, 16).map(f32::from_bits));
+    let channels: Vec<f32> = channels.collect::<Result<_, _>>().ok()?;
+    let channels: [f32; 3] = channels.try_into().ok()?;
+    Some(Background::Colour(Rgb::from(channels)))
 }
 
 fn features(names: &[String]) -> PyResult<Vec<Feature>> {
@@ -157,6 +200,72 @@ impl Picture {
         let feature = features(&[name.to_owned()])?[0];
         let Some(image) = self.picture.feature(feature) else { return Ok(None) };
         Ok(Some((array(py, image)?, feature.channels().len())))
+    }
+
+    /// All that it is made of, by name, for pickles: arrays, numbers and texts.
+    fn kept<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let picture = &self.picture;
+        let kept = PyDict::new(py);
+        let image = picture.image();
+        let shape = [image.height() as usize, image.width() as usize];
+        kept.set_item("pixels", array(py, image)?)?;
+        if let Some(alpha) = image.alpha() {
+            kept.set_item("alpha", PyArray1::from_slice(py, alpha).reshape(shape)?)?;
+        }
+        if let Some(coverage) = picture.coverage() {
+            kept.set_item("coverage", array(py, coverage)?)?;
+        }
+        let features = PyDict::new(py);
+        for feature in Feature::ALL {
+            if let Some(image) = picture.feature(feature) {
+                features.set_item(feature.name(), array(py, image)?)?;
+            }
+        }
+        kept.set_item("features", features)?;
+        let PixelBounds { x0, y0, x1, y1 } = picture.bounds();
+        kept.set_item("bounds", (x0, y0, x1, y1))?;
+        kept.set_item("whole", picture.whole())?;
+        match &self.look.background {
+            Some(Background::Picture(image)) => {
+                kept.set_item("background", array(py, image)?)?;
+                kept.set_item("look", Look { background: None, ..self.look.clone() }.named()?)?;
+            }
+            _ => kept.set_item("look", self.look.named()?)?,
+        }
+        Ok(kept)
+    }
+
+    /// A picture of what another one was made of; without its part.
+    #[staticmethod]
+    fn restored(kept: &Bound<'_, PyDict>) -> PyResult<Self> {
+        let given = |name: &str| {
+            kept.get_item(name)?.ok_or_else(|| invalid(format!("a pickled picture has no {name}")))
+        };
+        let image = |name: &str| -> PyResult<Option<Image>> {
+            let Some(pixels) = kept.get_item(name)? else { return Ok(None) };
+            image_of(name, &pixels.extract()?).map(Some)
+        };
+        let mut pixels = image_of("pixels", &given("pixels")?.extract()?)?;
+        if let Some(alpha) = kept.get_item("alpha")? {
+            let alpha: PyReadonlyArray2<'_, f32> = alpha.extract()?;
+            let alpha = alpha.as_array().iter().copied().collect();
+            pixels = pixels.with_alpha(alpha).ok_or_else(|| invalid("alpha is of another size"))?;
+        }
+        let mut features = Vec::new();
+        for (name, pixels) in given("features")?.cast::<PyDict>()? {
+            let name: String = name.extract()?;
+            let feature = self::features(std::slice::from_ref(&name))?[0];
+            features.push((feature, image_of(&name, &pixels.extract()?)?));
+        }
+        let (x0, y0, x1, y1) = given("bounds")?.extract()?;
+        let bounds = PixelBounds { x0, y0, x1, y1 };
+        let whole = given("whole")?.extract()?;
+        let picture = lumbre::Picture::restored(pixels, image("coverage")?, bounds, whole, features);
+        let mut look = Look::from_names(&given("look")?.extract()?);
+        if let Some(background) = image("background")? {
+            look.background = Some(Background::Picture(background));
+        }
+        Ok(Self::new(picture, look, None))
     }
 
     /// Writes a file.
@@ -305,17 +414,20 @@ pub(crate) fn write_image(
 ) -> PyResult<()> {
     let mut options = SaveOptions::default();
     (options.tone_map, options.exposure) = (tone_map(tonemap)?, exposure);
+    let image = image_of("an image", &pixels)?;
+    py.detach(|| lumbre::write_image(&path, &image, &options)).map_err(raised)
+}
+
+/// An image of an array, (h, w, 3).
+pub(crate) fn image_of(name: &str, pixels: &PyReadonlyArray3<'_, f32>) -> PyResult<Image> {
     let &[height, width, 3] = pixels.shape() else {
-        return Err(invalid(format!(
-            "an image has the wrong shape (found {}; expected (h, w, 3))",
-            tuple(pixels.shape())
-        )));
+        let found = tuple(pixels.shape());
+        return Err(invalid(format!("{name} has the wrong shape (found {found}; expected (h, w, 3))")));
     };
     let view = pixels.as_array();
     let pixel = |i: usize| Rgb::from(std::array::from_fn(|channel| view[[i / width, i % width, channel]]));
     let mut colours = list(width * height)?;
     colours.extend((0..width * height).map(pixel));
-    let image = Image::from_pixels(width as u32, height as u32, colours);
-    let image = image.ok_or_else(|| invalid(format!("there is no image of {width} by {height} pixels")))?;
-    py.detach(|| lumbre::write_image(&path, &image, &options)).map_err(raised)
+    Image::from_pixels(width as u32, height as u32, colours)
+        .ok_or_else(|| invalid(format!("there is no image of {width} by {height} pixels")))
 }

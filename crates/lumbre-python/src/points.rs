@@ -31,14 +31,16 @@ impl First {
     }
 }
 
-/// The nearest point of all surfaces, for every point: its distance as `t`, and the columns of a hit that have a meaning here.
+/// The nearest point of all surfaces, for every point: its distance as `t`, and the columns of a hit that have a meaning here. A point
+/// that has no answer has nan for distance; then it says why the first of them has none.
 pub(crate) fn closest<T: Real>(
     py: Python<'_>,
     scene: &Scene,
     points: &Triples<'_, T>,
     max_distance: f64,
     out: &Bound<'_, PyDict>,
-) -> PyResult<()> {
+) -> PyResult<Option<String>> {
+    const UNKNOWN: Row = Row { t: f64::NAN, ..Row::MISS };
     let (points, count) = (points.view(), points.len());
     let mut outputs = Outputs::<T>::new(out, count)?;
     let pieces = outputs.columns(count)?.pieces(piece_size(count)?)?;
@@ -55,12 +57,15 @@ pub(crate) fn closest<T: Real>(
                     instance: found.instance.map_or(NONE, |instance| instance as i32),
                     ..Row::MISS
                 },
-                Err(error) => return first.keep(error),
+                Err(error) => {
+                    first.keep(error);
+                    UNKNOWN
+                }
             };
             piece.write(row, &values);
         }
     })?;
-    first.result()
+    Ok(first.0.into_inner().ok().flatten().map(|error| error.to_string()))
 }
 
 /// Whether every point is inside of what stands here, even-odd.

@@ -6,23 +6,26 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
-use lumbre::description::IntegratorKind;
-use lumbre::formats::diagnostic::nearest_name;
+use lumbre::description::{IntegratorKind, LightDesc};
 use lumbre::formats::{Diagnostics, Strictness};
 use lumbre::{
-    CancelToken, Job, Part as PartDesc, PixelBounds, Progress, Ray, ReadOptions, RenderOptions, SceneBuilder,
-    SceneDesc, State, UpAxis,
+    Background, CancelToken, DVec3, Ground, Job, Part as PartDesc, PixelBounds, Progress, Ray, ReadOptions,
+    RenderOptions, SceneBuilder, SceneDesc, State, Transform, UpAxis,
 };
-use lumbre_cli::{Defaults, Format, Language, Request, Things, memory_left};
+use lumbre_cli::{Format, Language, Request, Things, memory_left};
 use numpy::{PyArray1, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
 use pyo3::types::{PyDict, PyList, PyTuple};
 
-use crate::errors::{check_environment, failed, invalid, raised, too_large, tuple};
-use crate::picture::{Look, Picture};
+use crate::errors::{check_environment, failed, invalid, raised, too_large, tuple, unknown};
+use crate::material::colour;
+use crate::meshes::{self, PlacedMesh};
+use crate::picture::{Behind, Look, Picture, image_of};
 use crate::rays::{Rays, Triples, is_single};
-use crate::shape::{Camera, Light, Placed, placed, transform};
+use crate::shape::{Camera, Environment, Light, Placed, placed, transform};
+use crate::staged::{Around, Shown, Stages, Wish};
 use crate::viewer::{Origin, Viewer};
 use crate::work::interruptible;
 use crate::{cast, points, rays};
@@ -43,19 +46,10 @@ pub(crate) struct Scene {
     settings: Vec<(String, String)>,
     /// Hashes of the files by their names, once someone has asked for a part.
     hashes: OnceLock<BTreeMap<String, String>>,
-    /// As the last picture showed it.
-    shown: Mutex<Option<Arc<Shown>>>,
+    /// As its pictures show it.
+    stages: Stages,
     /// What is called how, once someone has asked for an explanation.
     things: OnceLock<Things>,
-}
-
-/// A scene on its stage, as the program shows it.
-pub(crate) struct Shown {
-    pub(crate) scene: Arc<lumbre::Scene>,
-    pub(crate) defaults: Defaults,
-    /// For which pictures.
-    size: Option<(u32, u32)>,
-    is_of_light: bool,
 }
 
 /// Does the same in the precision of an array, which goes by the name given.
@@ -111,54 +105,71 @@ impl Scene {
         Ok((Self::new(scene, desc.into(), origin, name, files, settings), diagnostics.lines()))
     }
 
-    /// Builds a scene of shapes, of shapes with many places each, of cameras and of lights.
+    /// Builds a scene of shapes, of shapes with many places each, and of whole scenes, with cameras and lights besides theirs.
     #[staticmethod]
     fn build(
         py: Python<'_>,
-        shapes: Vec<Placed<'_>>,
-        instances: Vec<(Vec<Placed<'_>>, PyReadonlyArray3<'_, f64>)>,
+        pieces: Vec<Piece<'_>>,
         cameras: Vec<Bound<'_, Camera>>,
         lights: Vec<Bound<'_, Light>>,
-        up: [f64; 3],
+        up: Option<[f64; 3]>,
         settings: Vec<(String, String)>,
     ) -> PyResult<Self> {
         check_environment()?;
-        let mut builder = SceneBuilder::new();
-        for shape in &shapes {
-            builder = builder.shape(placed(shape)?);
-        }
-        for (shapes, places) in &instances {
-            let shapes = shapes.iter().map(placed).collect::<PyResult<Vec<_>>>()?;
-            if places.shape()[1..] != [4, 4] {
-                return Err(invalid(format!(
-                    "the places of an instance have the wrong shape (found {}; expected (N, 4, 4))",
-                    tuple(places.shape())
-                )));
-            }
-            let matrix = |place: numpy::ndarray::ArrayView2<'_, f64>| {
-                transform(std::array::from_fn(|row| std::array::from_fn(|column| place[[row, column]])))
-            };
-            let places = places.as_array().outer_iter().map(matrix).collect::<PyResult<Vec<_>>>()?;
-            builder = builder.instances(shapes, places);
-        }
-        for camera in &cameras {
-            builder = builder.camera(camera.get().0.clone());
-        }
-        for light in &lights {
-            builder = builder.light(light.get().0.clone());
-        }
-        let mut desc = builder.description().clone();
-        drop(builder);
-        desc.up = match up {
-            [x, y, z] if x == 0.0 && z == 0.0 && y > 0.0 => UpAxis::Y,
-            [x, y, z] if x == 0.0 && y == 0.0 && z > 0.0 => UpAxis::Z,
-            towards => UpAxis::Towards(towards.into()),
+        let mut desc: Option<SceneDesc> = None;
+        let mut add = |more: SceneDesc| match &mut desc {
+            Some(desc) => desc.append(more),
+            None => desc = Some(more),
         };
+        let (mut builder, mut is_begun) = (SceneBuilder::new(), false);
+        let mut files = Vec::new();
+        for piece in &pieces {
+            match piece {
+                Piece::Shape(shape) => builder = builder.shape(placed(shape)?),
+                Piece::Instances((shapes, places)) => {
+                    let shapes = shapes.iter().map(placed).collect::<PyResult<Vec<_>>>()?;
+                    builder = builder.instances(shapes, transforms(places)?);
+                }
+                Piece::Scene(scene) => {
+                    if is_begun {
+                        add(std::mem::take(&mut builder).description().clone());
+                    }
+                    is_begun = false;
+                    let scene = scene.get();
+                    add(SceneDesc::clone(&scene.desc));
+                    files.extend(scene.files.iter().cloned());
+                    continue;
+                }
+            }
+            is_begun = true;
+        }
+        if is_begun || pieces.is_empty() {
+            add(builder.description().clone());
+        }
+        drop(builder);
+        let mut desc = desc.unwrap_or_default();
+        // Those that are given come first, and the first is the default.
+        let given = cameras.iter().map(|camera| camera.get().0.clone());
+        desc.cameras.splice(0..0, given);
+        desc.lights.extend(lights.iter().map(|light| LightDesc::clone(&light.get().0)));
+        if let Some(up) = up {
+            desc.up_is_guessed = false;
+            desc.up = match up {
+                [x, y, z] if x == 0.0 && z == 0.0 && y > 0.0 => UpAxis::Y,
+                [x, y, z] if x == 0.0 && y == 0.0 && z > 0.0 => UpAxis::Z,
+                towards => UpAxis::Towards(towards.into()),
+            };
+        }
         let build = || lumbre::Scene::from_description(desc.clone());
         let scene = interruptible(py, |_| build(), |_| Ok(()))?.map_err(raised)?;
         let desc = Arc::new(desc);
         let origin = Origin::Shapes(Arc::clone(&desc));
-        Ok(Self::new(scene, desc, origin, "scene".into(), Vec::new(), settings))
+        Ok(Self::new(scene, desc, origin, "scene".into(), files, settings))
+    }
+
+    /// Its meshes, those of instances in each of their places.
+    fn meshes(&self) -> Vec<PlacedMesh> {
+        meshes::meshes(&self.desc)
     }
 
     /// The closest hits, into the arrays of `out`.
@@ -257,14 +268,15 @@ impl Scene {
         })
     }
 
-    /// The nearest points of all surfaces, into the arrays of `out`.
+    /// The nearest points of all surfaces, into the arrays of `out`. Says why some points have no answer, where there are such: their
+    /// distance is nan.
     fn closest_point(
         &self,
         py: Python<'_>,
         points: &Bound<'_, PyAny>,
         max_distance: f64,
         out: &Bound<'_, PyDict>,
-    ) -> PyResult<()> {
+    ) -> PyResult<Option<String>> {
         by_precision!(points, Real => {
                 points::closest::<Real>(py, &self.scene, &Triples::new("points", points)?, max_distance, out)
         })
@@ -301,12 +313,15 @@ impl Scene {
         options: &Bound<'_, PyDict>,
         progress: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Picture> {
-        let Asked { shown, options, is_transparent, denoises, keeps_part } = self.asked(py, options)?;
+        let Asked { shown, options, behind, denoises, keeps_part, settings } = self.asked(py, options)?;
         check_memory(&options)?;
-        let look = py.detach(|| Look::of(&shown, &options, is_transparent)).map_err(raised)?;
+        let look = py.detach(|| Look::of(&shown, &options, behind)).map_err(raised)?;
         let tells = progress.map(Bound::unbind);
         let (watch, cancel) = (Watch::default(), CancelToken::new());
-        let job = if keeps_part { Some(Job { shown: look.named(), ..self.job(&options)? }) } else { None };
+        let job = match keeps_part {
+            true => Some(Job { shown: look.named()?, ..self.job(&options, settings)? }),
+            false => None,
+        };
         // The render has threads of its own; those that wait for it here look for Ctrl-C.
         let rendered = py.detach(|| {
             std::thread::scope(|scope| {
@@ -380,7 +395,7 @@ impl Scene {
 
     /// Reads its files once more for the hashes by which parts of a render are known; later they may go away.
     fn hash_files(&self) -> PyResult<()> {
-        self.job(&self.scene.options()).map(drop)
+        self.job(&self.scene.options(), Vec::new()).map(drop)
     }
 
     /// Samples a pixel, where nobody says how many.
@@ -416,11 +431,38 @@ impl Scene {
         py.detach(explain).map_err(failed)
     }
 
+    /// How many trees were built so far, for ray queries and for pictures.
+    fn trees(&self) -> usize {
+        self.stages.trees()
+    }
+
     /// The size of its picture, where none is asked for.
     fn size(&self, py: Python<'_>) -> PyResult<(u32, u32)> {
-        let options = self.shown(py, None, None)?.scene.options();
+        let options = self.shown(py, Wish::default())?.scene.options();
         Ok((options.width, options.height))
     }
+}
+
+/// What a scene is built of.
+#[derive(FromPyObject)]
+enum Piece<'py> {
+    Scene(Bound<'py, Scene>),
+    Shape(Placed<'py>),
+    Instances((Vec<Placed<'py>>, PyReadonlyArray3<'py, f64>)),
+}
+
+/// The maps of (N, 4, 4) matrices.
+fn transforms(places: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Transform>> {
+    if places.shape()[1..] != [4, 4] {
+        return Err(invalid(format!(
+            "the places of an instance have the wrong shape (found {}; expected (N, 4, 4))",
+            tuple(places.shape())
+        )));
+    }
+    let matrix = |place: numpy::ndarray::ArrayView2<'_, f64>| {
+        transform(std::array::from_fn(|row| std::array::from_fn(|column| place[[row, column]])))
+    };
+    places.as_array().outer_iter().map(matrix).collect()
 }
 
 /// Between two looks at a render.
@@ -449,11 +491,13 @@ impl Watch {
 struct Asked {
     shown: Arc<Shown>,
     options: RenderOptions,
-    /// Whether nothing is to be behind the picture.
-    is_transparent: bool,
+    /// What is behind everything.
+    behind: Behind,
     denoises: bool,
     /// Whether its sums are to be kept, for merging.
     keeps_part: bool,
+    /// What the picture depends on besides the scene and the options, by name.
+    settings: Vec<(String, String)>,
 }
 
 impl Scene {
@@ -465,56 +509,38 @@ impl Scene {
         files: Vec<PathBuf>,
         settings: Vec<(String, String)>,
     ) -> Self {
+        let scene = Arc::new(scene);
         Self {
-            scene: Arc::new(scene),
+            stages: Stages::new(Arc::clone(&desc), Arc::clone(&scene)),
+            scene,
             desc,
             origin,
             name,
             files,
             settings,
             hashes: OnceLock::new(),
-            shown: Mutex::default(),
             things: OnceLock::new(),
         }
     }
 
-    /// On the stage of a picture of this size. That of the last one is kept, for the next is most likely of the same size.
-    fn shown(
-        &self,
-        py: Python<'_>,
-        size: Option<(u32, u32)>,
-        integrator: Option<IntegratorKind>,
-    ) -> PyResult<Arc<Shown>> {
-        let is_of_light = integrator.unwrap_or(self.desc.integrator.kind).needs_light();
-        let last = || self.shown.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(shown) = &*last()
-            && (shown.size, shown.is_of_light) == (size, is_of_light)
-        {
-            return Ok(Arc::clone(shown));
-        }
-        let build = || -> Result<Shown, lumbre::Error> {
-            let mut desc = SceneDesc::clone(&self.desc);
-            let defaults = Defaults::stage(&mut desc, size, integrator);
-            let scene = match defaults.is_bare() {
-                true => Arc::clone(&self.scene),
-                false => Arc::new(lumbre::Scene::from_description(desc)?),
-            };
-            Ok(Shown { scene, defaults, size, is_of_light })
-        };
-        let shown = Arc::new(interruptible(py, |_| build(), |_| Ok(()))?.map_err(raised)?);
-        *last() = Some(Arc::clone(&shown));
-        Ok(shown)
+    /// On the stage of a picture. Pictures from elsewhere and in other light share its tree.
+    fn shown(&self, py: Python<'_>, wish: Wish) -> PyResult<Arc<Shown>> {
+        let building = self.stages.building.lock_py_attached(py);
+        let shown = interruptible(py, |_| self.stages.shown(&wish), |_| Ok(()));
+        drop(building);
+        shown?.map_err(raised)
     }
 
     /// Which render it is.
-    fn job(&self, options: &RenderOptions) -> PyResult<Job> {
+    fn job(&self, options: &RenderOptions, staged: Vec<(String, String)>) -> PyResult<Job> {
         if self.hashes.get().is_none() {
             let files = self.files.iter().map(PathBuf::as_path).filter(|file| Path::is_file(file));
             let mut identity = Job::new(files, [], options).map_err(raised)?.identity;
             identity.retain(|name, _| name.starts_with("file "));
             self.hashes.get_or_init(|| identity);
         }
-        let mut job = Job::new([], self.settings.iter().cloned(), options).map_err(raised)?;
+        let settings = self.settings.iter().cloned().chain(staged);
+        let mut job = Job::new([], settings, options).map_err(raised)?;
         job.identity.extend(self.hashes.get().cloned().unwrap_or_default());
         Ok(job)
     }
@@ -529,8 +555,15 @@ impl Scene {
                     .ok_or_else(|| unknown("integrator", &name, &IntegratorKind::NAMES))?,
             ),
         };
-        let shown = self.shown(py, size, integrator)?;
+        let view = match given.get_item("view")? {
+            Some(view) => Some(view.cast::<Camera>()?.get().0.clone()),
+            None => None,
+        };
+        let wish = wish(given, size, integrator, view.as_ref())?;
+        let settings = wish.settings();
+        let shown = self.shown(py, wish)?;
         let mut options = shown.scene.options();
+        options.view = view;
         options.integrator.kind = integrator.unwrap_or(options.integrator.kind);
         if let Some((width, height)) = size {
             options.resize(shown.scene.resolved().film(), width, height);
@@ -545,14 +578,15 @@ impl Scene {
         if let (Some(spp), true, false) = (shown.defaults.spp(&shown.scene), denoises, samples_are_asked) {
             options.stop.spp = spp;
         }
-        let mut asked = Asked { shown, options, is_transparent: false, denoises, keeps_part: false };
+        let behind = shown.defaults.background().map_or(Behind::Lights, Behind::Background);
+        let mut asked = Asked { shown, options, behind, denoises, keeps_part: false, settings };
         for (name, value) in given {
             let name: String = name.extract()?;
             ask(&mut asked, &name, &value).map_err(|error| of_value(&name, &value, error))?;
         }
         asked.options.guides = asked.denoises;
         asked.options.features |= asked.denoises;
-        asked.options.transparent = asked.is_transparent || asked.shown.defaults.background().is_some();
+        asked.options.transparent = !matches!(asked.behind, Behind::Lights);
         Ok(asked)
     }
 }
@@ -593,7 +627,8 @@ fn of_value(name: &str, value: &Bound<'_, PyAny>, error: PyErr) -> PyErr {
 fn ask(asked: &mut Asked, name: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
     let options = &mut asked.options;
     match name {
-        "size" | "integrator" | "denoise" => {}
+        "size" | "integrator" | "denoise" | "view" | "azimuth" | "elevation" | "zoom" | "fit" | "ground"
+        | "env" | "overrides" => {}
         "spp" => options.stop.spp = value.extract()?,
         "crop" => {
             let (x0, y0, x1, y1) = value.extract()?;
@@ -612,12 +647,75 @@ fn ask(asked: &mut Asked, name: &str, value: &Bound<'_, PyAny>) -> PyResult<()> 
             options.stop.time = Some(time);
         }
         "first_sample" => options.first_sample = value.extract()?,
-        "transparent" => asked.is_transparent = value.extract()?,
+        "transparent" => {
+            if value.extract()? {
+                asked.behind = Behind::Nothing;
+            }
+        }
+        "background" => asked.behind = behind(value)?,
         "features" => options.features = value.extract()?,
         "part" => asked.keeps_part = value.extract()?,
         _ => return Err(invalid(format!("render has no option {name}"))),
     }
     Ok(())
+}
+
+/// How a scene is to be shown, by the names of options.
+fn wish(
+    given: &Bound<'_, PyDict>,
+    size: Option<(u32, u32)>,
+    integrator: Option<IntegratorKind>,
+    camera: Option<&lumbre::description::Camera>,
+) -> PyResult<Wish> {
+    let mut wish = Wish { size, integrator, ..Wish::default() };
+    wish.eye = camera.map(|camera| camera.world_from_camera.point(DVec3::ZERO));
+    let view = &mut wish.view;
+    view.azimuth = named(given, "azimuth")?.unwrap_or(view.azimuth);
+    view.elevation = named(given, "elevation")?.unwrap_or(view.elevation);
+    view.zoom = named(given, "zoom")?.unwrap_or(view.zoom);
+    wish.fit = named(given, "fit")?.unwrap_or(false);
+    if let Some(name) = named::<String>(given, "ground")? {
+        wish.ground = Ground::from_name(&name).ok_or_else(|| unknown("ground", &name, &Ground::NAMES))?;
+    }
+    if let Some(env) = given.get_item("env")? {
+        wish.surroundings = around(&env)?;
+    }
+    wish.overrides = named(given, "overrides")?.unwrap_or_default();
+    Ok(wish)
+}
+
+fn around(env: &Bound<'_, PyAny>) -> PyResult<Around> {
+    if let Ok(light) = env.cast::<Light>() {
+        let light = &light.get().0;
+        return match **light {
+            LightDesc::Infinite { .. } => Ok(Around::Light(Arc::clone(light))),
+            _ => Err(invalid("env is no light from all around (expected an EnvironmentLight)")),
+        };
+    }
+    if let Ok(map) = env.cast::<Environment>() {
+        return Ok(Around::Map(map.get().0.clone()));
+    }
+    match &*env.extract::<String>()? {
+        "studio" => Ok(Around::Studio),
+        "none" => Ok(Around::Own),
+        other => Err(unknown("env", other, &["studio", "none"])),
+    }
+}
+
+fn behind(value: &Bound<'_, PyAny>) -> PyResult<Behind> {
+    if let Ok(image) = value.extract::<PyReadonlyArray3<'_, f32>>() {
+        return Ok(Behind::Background(Background::Picture(image_of("background", &image)?)));
+    }
+    if let Ok(rgb) = value.extract::<[f32; 3]>() {
+        return Ok(Behind::Background(Background::Colour(colour("background", rgb)?)));
+    }
+    let name = value.extract::<String>()?;
+    match &*name {
+        "env" => Ok(Behind::Lights),
+        "transparent" => Ok(Behind::Nothing),
+        "studio" => Ok(Behind::Background(Background::studio())),
+        _ => Err(unknown("background", &name, &["env", "studio", "transparent"])),
+    }
 }
 
 fn camera(scene: &lumbre::Scene, wanted: &Bound<'_, PyAny>) -> PyResult<usize> {
@@ -632,11 +730,4 @@ fn camera(scene: &lumbre::Scene, wanted: &Bound<'_, PyAny>) -> PyResult<usize> {
         return Ok(index);
     }
     Err(invalid(format!("there is no camera {index} (expected 0 to {})", cameras.len().saturating_sub(1))))
-}
-
-/// The error for a name that is not there.
-pub(crate) fn unknown(noun: &str, name: &str, known: &[&str]) -> PyErr {
-    let tip = nearest_name(name, known.iter().copied());
-    let tip = tip.map_or_else(String::new, |near| format!("; did you mean {near}?"));
-    invalid(format!("there is no {noun} \"{name}\" (expected {}{tip})", known.join(", ")))
 }

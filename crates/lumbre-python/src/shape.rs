@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use lumbre::description::{Camera as CameraDesc, CameraView, CsgOperation, LightDesc, MeshDesc};
+use lumbre::description::{Camera as CameraDesc, CameraKind, CameraView, CsgOperation, LightDesc, MeshDesc};
 use lumbre::geometry::{
     BilinearPatch, Capsule, Cone, Csg, Cuboid, CurveKind, Curves, Cylinder, Disk, Hyperboloid, Paraboloid,
     Plane, Quadric, Shape, ShapeError, Sphere, Strand, Torus, Triangle,
 };
-use lumbre::image::{Image, Rgb};
+use lumbre::image::Rgb;
 use lumbre::math::{DMat4, Vec2, Vec3};
 use lumbre::shading::{Material as MaterialDesc, MaterialKind, SpectrumTexture};
 use lumbre::{DVec2, DVec3, EnvironmentDesc, ShapeBuilder, Transform};
@@ -18,9 +18,11 @@ use numpy::{
 };
 use pyo3::prelude::*;
 
-use crate::errors::{invalid, list, tuple};
+use crate::errors::{invalid, list, tuple, unknown};
+use crate::expression;
 use crate::material::{Material, colour};
-use crate::scene::unknown;
+use crate::medium::Medium;
+use crate::picture::image_of;
 
 type Triple = [f64; 3];
 
@@ -45,12 +47,17 @@ impl From<ShapeBuilder> for Geometry {
     }
 }
 
-/// A geometry with its place, material and emitted radiance.
-pub(crate) type Placed<'py> =
-    (Bound<'py, Geometry>, Option<[[f64; 4]; 4]>, Option<Bound<'py, Material>>, Option<[f32; 3]>);
+/// A geometry with its place, material, emitted radiance and medium.
+pub(crate) type Placed<'py> = (
+    Bound<'py, Geometry>,
+    Option<[[f64; 4]; 4]>,
+    Option<Bound<'py, Material>>,
+    Option<[f32; 3]>,
+    Option<Bound<'py, Medium>>,
+);
 
 /// The shape of these.
-pub(crate) fn placed((geometry, place, material, emission): &Placed<'_>) -> PyResult<ShapeBuilder> {
+pub(crate) fn placed((geometry, place, material, emission, medium): &Placed<'_>) -> PyResult<ShapeBuilder> {
     let mut shape = geometry.get().shape.clone();
     if let Some(place) = place {
         shape = shape.at(transform(*place)?);
@@ -60,6 +67,9 @@ pub(crate) fn placed((geometry, place, material, emission): &Placed<'_>) -> PyRe
     }
     if let Some(emission) = emission {
         shape = shape.shining(colour("emission", *emission)?);
+    }
+    if let Some(medium) = medium {
+        shape = shape.medium(Arc::clone(&medium.get().0));
     }
     Ok(shape)
 }
@@ -160,11 +170,25 @@ impl Geometry {
         widths: PyReadonlyArray1<'_, f64>,
         counts: PyReadonlyArray1<'_, i64>,
         kind: &str,
+        normals: Option<PyReadonlyArray2<'_, f64>>,
     ) -> PyResult<Self> {
         let kind = match kind {
             "flat" => CurveKind::Flat,
             "cylinder" => CurveKind::Cylinder,
-            _ => return Err(unknown("kind", kind, &["flat", "cylinder"])),
+            "ribbon" => CurveKind::Ribbon,
+            _ => return Err(unknown("kind", kind, &["flat", "cylinder", "ribbon"])),
+        };
+        if normals.is_some() != (kind == CurveKind::Ribbon) {
+            return Err(invalid(
+                "normals are for ribbons, and ribbons need them (expected kind=\"ribbon\", and a normal at each point)",
+            ));
+        }
+        let normals: Vec<DVec3> = match &normals {
+            Some(normals) => {
+                check_width("normals", normals, 3)?;
+                rows(&normals.as_array(), |normal: Triple| normal.into())?
+            }
+            None => Vec::new(),
         };
         check_width("points", &points, 3)?;
         let places: Vec<DVec3> = rows(&points.as_array(), |place: Triple| place.into())?;
@@ -173,15 +197,28 @@ impl Geometry {
         let mut first = 0_usize;
         for (number, &count) in counts.as_array().iter().enumerate() {
             let last = usize::try_from(count).ok().and_then(|count| first.checked_add(count));
-            let part = last.filter(|&last| last <= places.len() && last <= widths.len());
+            let has_normals = |last: usize| normals.is_empty() || last <= normals.len();
+            let part = last.filter(|&last| last <= places.len() && last <= widths.len() && has_normals(last));
             let Some(last) = part else { return Err(invalid(format!("curve {number} has no points"))) };
             let strand = Strand::through(&places[first..last], &widths[first..last]);
+            let strand = strand.and_then(|strand| match normals.get(first..last) {
+                Some(normals) if !normals.is_empty() => strand.with_normals(normals),
+                _ => Ok(strand),
+            });
             strand
                 .and_then(|strand| curves.push(&strand))
                 .map_err(|wrong| invalid(format!("curve {number}: {wrong}")))?;
             first = last;
         }
         Ok(ShapeBuilder::curves(curves).into())
+    }
+
+    /// The surface where an expression in x, y and z is zero, within a box; it is negative inside.
+    #[staticmethod]
+    fn implicit(text: &str, p0: Triple, p1: Triple) -> PyResult<Self> {
+        let (p0, p1) = (DVec3::from(p0), DVec3::from(p1));
+        let bounds = lumbre::geometry::Aabb { min: p0.min(p1), max: p0.max(p1) };
+        Ok(ShapeBuilder::custom(expression::surface(text, bounds)?).into())
     }
 
     /// CSG of operands, each the union of its shapes.
@@ -290,7 +327,7 @@ impl Geometry {
 
 /// A light other than a shape.
 #[pyclass(frozen, module = "lumbre._lumbre")]
-pub(crate) struct Light(pub(crate) LightDesc);
+pub(crate) struct Light(pub(crate) Arc<LightDesc>);
 
 #[pymethods]
 impl Light {
@@ -300,7 +337,7 @@ impl Light {
         if !from.is_finite() {
             return Err(invalid(format!("position is not finite (found {from})")));
         }
-        Ok(Self(LightDesc::Point { from, intensity: colour("intensity", intensity)? }))
+        Ok(Self::of(LightDesc::Point { from, intensity: colour("intensity", intensity)? }))
     }
 
     /// A cone of this half-angle in degrees, of which the outer part fades out.
@@ -323,7 +360,7 @@ impl Light {
         let turn = lumbre::math::DQuat::from_rotation_arc(DVec3::Z, along);
         let world_from_light =
             Transform::from_scale_rotation_translation(DVec3::ONE, turn, from).map_err(invalid)?;
-        Ok(Self(LightDesc::Spot {
+        Ok(Self::of(LightDesc::Spot {
             world_from_light,
             intensity: colour("intensity", intensity)?,
             cone_angle: angle,
@@ -336,7 +373,7 @@ impl Light {
         let towards = DVec3::from(towards).try_normalize();
         let towards =
             towards.ok_or_else(|| invalid("towards is no direction (expected a vector of some length)"))?;
-        Ok(Self(LightDesc::Distant { towards, irradiance: colour("irradiance", irradiance)? }))
+        Ok(Self::of(LightDesc::Distant { towards, irradiance: colour("irradiance", irradiance)? }))
     }
 
     /// Light from all around: `image` is (h, 2h, 3), by longitude and latitude, with this axis up.
@@ -352,31 +389,40 @@ impl Light {
         let world_from_light =
             Transform::from_scale_rotation_translation(DVec3::ONE, turn, DVec3::ZERO).map_err(invalid)?;
         let Some(image) = image else {
-            return Ok(Self(LightDesc::Infinite { world_from_light, radiance, image: None }));
+            return Ok(Self::of(LightDesc::Infinite { world_from_light, radiance, image: None }));
         };
-        let &[height, width, 3] = image.shape() else {
-            return Err(invalid(format!(
-                "image has the wrong shape (found {}; expected (h, 2h, 3))",
-                tuple(image.shape())
-            )));
-        };
-        let view = image.as_array();
-        let pixel = |i: usize| {
-            Rgb::new(
-                view[[i / width, i % width, 0]],
-                view[[i / width, i % width, 1]],
-                view[[i / width, i % width, 2]],
-            )
-        };
-        let mut pixels = list(width * height)?;
-        pixels.extend((0..width * height).map(pixel));
-        let described = Image::from_pixels(width as u32, height as u32, pixels)
-            .and_then(|image| EnvironmentDesc::of_image(Arc::new(image)));
-        let described = described.ok_or_else(|| {
-            invalid(format!("image is no environment map (found {width} by {height} pixels; expected twice as wide as high)"))
-        })?;
-        Ok(Self(LightDesc::Infinite { world_from_light, radiance, image: Some(described) }))
+        let described = environment(&image)?;
+        Ok(Self::of(LightDesc::Infinite { world_from_light, radiance, image: Some(described) }))
     }
+}
+
+impl Light {
+    fn of(light: LightDesc) -> Self {
+        Self(Arc::new(light))
+    }
+}
+
+/// An environment map, which stands as the model is looked at.
+#[pyclass(frozen, module = "lumbre._lumbre")]
+pub(crate) struct Environment(pub(crate) EnvironmentDesc);
+
+#[pymethods]
+impl Environment {
+    /// Of an array, (h, 2h, 3) by longitude and latitude, or square in pbrt's equal-area mapping.
+    #[new]
+    fn new(image: PyReadonlyArray3<'_, f32>) -> PyResult<Self> {
+        environment(&image).map(Self)
+    }
+}
+
+fn environment(image: &PyReadonlyArray3<'_, f32>) -> PyResult<EnvironmentDesc> {
+    let image = image_of("image", image)?;
+    let (width, height) = (image.width(), image.height());
+    EnvironmentDesc::of_image(Arc::new(image)).ok_or_else(|| {
+        invalid(format!(
+            "image is no environment map (found {width} by {height} pixels; expected twice as wide as high)"
+        ))
+    })
 }
 
 /// A camera.
@@ -394,6 +440,17 @@ impl Camera {
         }
         let camera = CameraDesc::perspective(eye.into(), target.into(), up.into(), fov);
         Ok(Self(camera.map_err(|_| no_view(eye, target, up))?.with_lens(lens_radius)))
+    }
+
+    /// A pinhole by the lines of a picture: x0, x1, y0, y1 of its edges at distance 1, and the place of its camera, whose axes are x to
+    /// the right, y upwards and z backwards.
+    #[staticmethod]
+    fn pinhole(window: [f64; 4], pose: [[f64; 4]; 4]) -> PyResult<Self> {
+        // Camera space is left-handed: its z goes forwards.
+        let world_from_camera =
+            transform(pose)? * Transform::scale(DVec3::new(1.0, 1.0, -1.0)).map_err(invalid)?;
+        let kind = CameraKind::Perspective { fov: 90.0, lens_radius: 0.0, focal_distance: 1.0 };
+        Ok(Self(CameraDesc { screen_window: Some(window), ..CameraDesc::new(kind, world_from_camera) }))
     }
 
     #[staticmethod]
@@ -431,6 +488,16 @@ impl Camera {
 }
 
 fn no_view(eye: Triple, target: Triple, up: Triple) -> PyErr {
+    let (view, upwards) = (DVec3::from(target) - DVec3::from(eye), DVec3::from(up));
+    let is_view = view.is_finite() && upwards.is_finite() && view.length() > 0.0 && upwards.length() > 0.0;
+    if is_view && view.normalize().cross(upwards.normalize()).length() < 1e-9 {
+        let other = if view.normalize().z.abs() > 0.9 { "(0, 1, 0)" } else { "(0, 0, 1)" };
+        return invalid(format!(
+            "up is parallel to the view (found up {} and a view along {}; give another, such as up={other})",
+            tuple(&up),
+            tuple(&view.to_array())
+        ));
+    }
     let [eye, target, up] = [eye, target, up].map(|place| tuple(&place));
     invalid(format!(
         "a camera at {eye} does not see {target} with {up} upwards (expected two places, and another direction up)"

@@ -227,8 +227,9 @@ def test_a_mesh_that_is_inside_out_has_the_same_signed_distances() -> None:
 
 def test_what_has_no_answer_says_so() -> None:
     squeezed = lumbre.Torus(transform=np.diag([1.0, 2.0, 3.0, 1.0]))
-    with pytest.raises(lumbre.LumbreError, match="no nearest point"):
-        lumbre.Scene([squeezed]).closest_point(np.full((100, 3), 0.1))
+    with pytest.warns(UserWarning, match="not known for 100 of 100 points: .*no nearest point"):
+        nearest = lumbre.Scene([squeezed]).closest_point(np.full((100, 3), 0.1))
+    assert np.isnan(nearest.distance).all() and (nearest.shape == -1).all()
 
 
 @pytest.mark.parametrize(

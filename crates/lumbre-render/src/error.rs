@@ -23,6 +23,9 @@ pub enum RenderError {
         /// How many there are.
         count: usize,
     },
+    /// The camera of the options makes no picture of this scene.
+    #[error("{0}")]
+    Camera(#[from] lumbre_scene::BuildError),
     /// The state to go on from is not that of this render.
     #[error("the state to go on from is of other pixels, samples or sums")]
     OtherState,

@@ -59,9 +59,7 @@ impl<'a> Taker<'a> {
         options: &RenderOptions,
         integrator: &'a dyn Integrator,
     ) -> Result<Self, RenderError> {
-        let count = scene.cameras().len();
-        let camera = scene.cameras().get(options.camera);
-        let camera = camera.ok_or(RenderError::NoSuchCamera { index: options.camera, count })?;
+        let camera = options.camera_of(scene)?;
         let view = View::new(camera, options.width, options.height);
         Ok(Self {
             scene,

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use lumbre_image::Rgb;
 use lumbre_math::DVec2;
-use lumbre_scene::{FilmDesc, FilterDesc, IntegratorDesc, IntegratorKind, SamplerDesc, Scene};
+use lumbre_scene::{Camera, FilmDesc, FilterDesc, IntegratorDesc, IntegratorKind, SamplerDesc, Scene};
 
 use crate::RenderError;
 use crate::denoise;
@@ -29,6 +29,8 @@ pub struct RenderOptions {
     pub crop: Option<PixelBounds>,
     /// Position of the camera among those of the scene.
     pub camera: usize,
+    /// A camera in place of that one. Pictures of one scene from many places build nothing anew.
+    pub view: Option<Camera>,
     /// The integrator.
     pub integrator: IntegratorDesc,
     /// The sampler; its `spp` is not looked at.
@@ -101,6 +103,7 @@ impl Default for RenderOptions {
             height,
             crop: None,
             camera: 0,
+            view: None,
             integrator: IntegratorDesc::default(),
             sampler: SamplerDesc::default(),
             filter: FilterDesc::default(),
@@ -137,6 +140,33 @@ impl RenderOptions {
             (a, b) => a.or(b),
         };
         options
+    }
+
+    /// The same with this many samples a pixel: [`Stop::spp`].
+    ///
+    /// ```
+    /// use lumbre_render::RenderOptions;
+    ///
+    /// assert_eq!(RenderOptions::default().with_spp(16).stop.spp, 16);
+    /// ```
+    #[doc(alias = "spp")]
+    #[must_use]
+    pub fn with_spp(mut self, spp: u32) -> Self {
+        self.stop.spp = spp;
+        self
+    }
+
+    /// The camera of a picture of this scene: [`RenderOptions::view`], or else the scene's own at [`RenderOptions::camera`].
+    ///
+    /// # Errors
+    /// [`RenderError::NoSuchCamera`], and [`RenderError::Camera`] for a view that makes no picture.
+    pub fn camera_of<'a>(&'a self, scene: &'a Scene) -> Result<&'a Camera, RenderError> {
+        if let Some(view) = &self.view {
+            scene.check_camera(view)?;
+            return Ok(view);
+        }
+        let cameras = scene.cameras();
+        cameras.get(self.camera).ok_or(RenderError::NoSuchCamera { index: self.camera, count: cameras.len() })
     }
 
     /// Another size, of which the film's crop keeps its share.

@@ -63,6 +63,18 @@ pub struct Stats {
     pub elapsed: Duration,
 }
 
+impl Rendered {
+    /// A picture that was rendered before, without guides and statistics.
+    pub fn restored(
+        image: Image,
+        coverage: Option<Image>,
+        bounds: PixelBounds,
+        features: Vec<(Feature, Image)>,
+    ) -> Self {
+        Self { image, coverage, bounds, features, guides: None, stats: Stats::default() }
+    }
+}
+
 impl Stats {
     /// The most that a sample counts for: see [`Stats::clamped`].
     pub const MAX_SAMPLE: f64 = MAX_SAMPLE;

@@ -21,9 +21,9 @@ use crate::mesh::{self, QuadOrder};
 use crate::specular::Specular;
 use crate::surface::{ColourRamp, Form, SurfaceEntry};
 use crate::{
-    AreaLightDesc, BuildError, BuildWarning, Camera, CameraKind, Emission, GeometryDesc, GroundPlane,
-    InstanceDesc, LightDesc, MeshDesc, ObjectDesc, Scene, SceneDesc, ShapeDesc, SurfaceTable, csg, custom,
-    extent, framing, ground, stage, studio,
+    AreaLightDesc, BuildError, BuildWarning, Camera, CameraKind, Emission, FilmDesc, GeometryDesc,
+    GroundPlane, InstanceDesc, LightDesc, MeshDesc, ObjectDesc, Scene, SceneDesc, ShapeDesc, SurfaceTable,
+    csg, custom, extent, framing, ground, stage, studio,
 };
 
 /// The maximal depth of nested objects.
@@ -94,16 +94,8 @@ impl Scene {
         if lights.is_empty() && !builder.entries.iter().any(SurfaceEntry::shines) {
             builder.warnings.push(BuildWarning::NoLight);
         }
-        for (position, light) in lights.into_iter().enumerate() {
-            builder.light(position, light)?;
-        }
-
-        let radius = if bounds.is_empty() { 1.0 } else { 0.5 * bounds.size().length() };
-        let powers: Vec<f64> = builder.lights.iter().map(|light| light.power(radius)).collect();
-        let infinite = (0..builder.lights.len() as u32).map(LightId);
-        let infinite: Vec<LightId> =
-            infinite.filter(|id| builder.lights[id.0 as usize].is_infinite()).collect();
-        let light_choice = LightChoice::new(&builder.lights, &builder.entries, radius);
+        builder.place_lights(lights)?;
+        let lighting = Lighting::new(std::mem::take(&mut builder.lights), &builder.entries, &bounds);
         let has_holes = builder.entries.iter().any(SurfaceEntry::has_holes);
         let lets_light_through = builder.entries.iter().any(SurfaceEntry::lets_light_through);
         let lets_light_straight_on = builder.entries.iter().any(SurfaceEntry::lets_light_straight_on);
@@ -112,10 +104,6 @@ impl Scene {
         let looks_up = builder.entries.iter().any(SurfaceEntry::looks_up_anywhere);
         Ok(Self {
             accel,
-            lane_lights: LaneLights::new(&builder.lights, &builder.entries, &light_choice, &infinite),
-            light_choice,
-            light_by_power: AliasTable::new(&powers),
-            infinite,
             cameras,
             film,
             filter,
@@ -132,13 +120,103 @@ impl Scene {
             moves,
             looks_up,
             specular_spheres: specular.spheres(&bounds),
-            ground: ground.map(|desc| GroundPlane::new(desc, &builder.lights)),
-            tables: SurfaceTable::new(&builder.entries),
-            entries: builder.entries,
-            lights: builder.lights,
-            media: Media { media: if uses_media { media } else { vec![] }, boundaries },
+            ground: ground.map(|desc| GroundPlane::new(desc, &lighting.lights)),
+            lane_lights: lighting.lane_lights,
+            light_choice: lighting.light_choice,
+            light_by_power: lighting.light_by_power,
+            infinite: lighting.infinite,
+            lights: lighting.lights,
+            tables: Arc::new(SurfaceTable::new(&builder.entries)),
+            entries: Arc::new(builder.entries),
+            media: Media {
+                media: if uses_media { media } else { vec![] },
+                boundaries: boundaries.map(Arc::new),
+            },
             warnings: builder.warnings,
         })
+    }
+
+    /// The same surfaces under other lights, on the film of other cameras. The tree and all that belongs to surfaces are shared, and
+    /// lights that are surfaces stay.
+    ///
+    /// # Errors
+    /// [`BuildError`], naming the camera or light at fault, and where there is no camera.
+    pub fn relit(
+        &self,
+        cameras: Vec<Camera>,
+        film: FilmDesc,
+        lights: Vec<LightDesc>,
+    ) -> Result<Self, BuildError> {
+        if cameras.is_empty() {
+            return Err(BuildError::NoSuchCamera { position: 0, count: 0 });
+        }
+        cameras.iter().try_for_each(|camera| self.check_camera(camera))?;
+        // Surfaces know their lights by their position.
+        let surfaces = self.lights.iter().take_while(|light| light.is_surface()).cloned().collect();
+        let warnings = self.warnings.iter().filter(|warning| !warning.is_of_lights()).cloned().collect();
+        let mut builder = Builder { lights: surfaces, warnings, ..Builder::default() };
+        if lights.is_empty() && !self.entries.iter().any(SurfaceEntry::shines) {
+            builder.warnings.push(BuildWarning::NoLight);
+        }
+        let moves = self.moves || lights.iter().any(|light| matches!(light, LightDesc::Moving { .. }));
+        builder.place_lights(lights)?;
+        let lighting = Lighting::new(builder.lights, &self.entries, &self.bounds);
+        let ground = self.ground.as_ref().map(|ground| GroundPlane::new(ground.desc(), &lighting.lights));
+        Ok(Self {
+            accel: Arc::clone(&self.accel),
+            entries: Arc::clone(&self.entries),
+            tables: Arc::clone(&self.tables),
+            media: self.media.clone(),
+            lights: lighting.lights,
+            light_choice: lighting.light_choice,
+            lane_lights: lighting.lane_lights,
+            light_by_power: lighting.light_by_power,
+            infinite: lighting.infinite,
+            cameras,
+            film,
+            filter: self.filter,
+            sampler: self.sampler,
+            integrator: self.integrator,
+            pov: self.pov.clone(),
+            bounds: self.bounds,
+            ground,
+            specular_spheres: self.specular_spheres.clone(),
+            warnings: builder.warnings,
+            has_holes: self.has_holes,
+            lets_light_through: self.lets_light_through,
+            lets_light_straight_on: self.lets_light_straight_on,
+            has_solids: self.has_solids,
+            has_one_sided: self.has_one_sided,
+            has_instances: self.has_instances,
+            moves,
+            looks_up: self.looks_up,
+        })
+    }
+
+    /// Whether another scene stands on the same tree: one is [`Scene::relit`] from the other, or both are from a third.
+    pub fn shares_tree(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.accel, &other.accel)
+    }
+}
+
+/// All lights of a scene, and how they are chosen.
+struct Lighting {
+    lights: Vec<Light>,
+    light_choice: LightChoice,
+    lane_lights: LaneLights,
+    light_by_power: Option<AliasTable>,
+    infinite: Vec<LightId>,
+}
+
+impl Lighting {
+    fn new(lights: Vec<Light>, entries: &[SurfaceEntry], bounds: &Aabb) -> Self {
+        let radius = if bounds.is_empty() { 1.0 } else { 0.5 * bounds.size().length() };
+        let powers: Vec<f64> = lights.iter().map(|light| light.power(radius)).collect();
+        let ids = (0..lights.len() as u32).map(LightId);
+        let infinite: Vec<LightId> = ids.filter(|id| lights[id.0 as usize].is_infinite()).collect();
+        let light_choice = LightChoice::new(&lights, entries, radius);
+        let lane_lights = LaneLights::new(&lights, entries, &light_choice, &infinite);
+        Self { lights, light_choice, lane_lights, light_by_power: AliasTable::new(&powers), infinite }
     }
 }
 
@@ -539,6 +617,11 @@ impl Builder {
         };
         entry.light = Some(LightId(self.lights.len() as u32));
         self.lights.push(light);
+    }
+
+    /// The lights other than shapes, after those.
+    fn place_lights(&mut self, lights: Vec<LightDesc>) -> Result<(), BuildError> {
+        lights.into_iter().enumerate().try_for_each(|(position, light)| self.light(position, light))
     }
 
     fn light(&mut self, position: usize, desc: LightDesc) -> Result<(), BuildError> {

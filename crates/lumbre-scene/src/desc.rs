@@ -292,7 +292,7 @@ pub struct AreaLightDesc {
 }
 
 /// Lights other than shapes, in world space, with photometric units resolved.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum LightDesc {
     /// A point light.
     Point {

@@ -62,6 +62,12 @@ impl GroundPlane {
         Self { normal, point: desc.point, catcher: desc.catcher, albedo, open, local, lights }
     }
 
+    /// What it was made of.
+    pub(crate) fn desc(&self) -> GroundDesc {
+        let Self { normal, point, catcher, albedo, .. } = *self;
+        GroundDesc { point, normal, reflectance: albedo, catcher }
+    }
+
     /// Whether an interaction is on the ground.
     pub fn holds(&self, met: &Interaction) -> bool {
         met.shape == SHAPE

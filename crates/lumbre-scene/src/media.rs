@@ -17,11 +17,11 @@ use crate::{
 };
 
 /// The media of a scene.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Media {
     pub media: Vec<Arc<Medium>>,
     /// The surfaces without material between them; `None` where there are none.
-    pub boundaries: Option<Boundaries>,
+    pub boundaries: Option<Arc<Boundaries>>,
 }
 
 /// A tree of surfaces that do nothing but separate media.

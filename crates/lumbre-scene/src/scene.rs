@@ -18,15 +18,15 @@ use crate::media::Media;
 use crate::surface::{Form, ShadingGeometry, SurfaceEntry};
 use crate::{
     BoundingSphere, BuildError, Camera, FilmDesc, FilterDesc, Footprint, GroundPlane, IntegratorDesc,
-    Interaction, SamplerDesc, SurfaceTable,
+    Interaction, MediumId, SamplerDesc, SurfaceTable,
 };
 
 /// An immutable scene, which any number of threads can render.
 #[derive(Debug)]
 pub struct Scene {
     pub(crate) accel: Arc<Accel>,
-    pub(crate) entries: Vec<SurfaceEntry>,
-    pub(crate) tables: SurfaceTable,
+    pub(crate) entries: Arc<Vec<SurfaceEntry>>,
+    pub(crate) tables: Arc<SurfaceTable>,
     pub(crate) media: Media,
     pub(crate) lights: Vec<Light>,
     pub(crate) light_choice: LightChoice,
@@ -58,6 +58,13 @@ pub struct Scene {
     pub(crate) moves: bool,
     // Whether any material has textures, so that rays need footprints.
     pub(crate) looks_up: bool,
+}
+
+impl BuildWarning {
+    /// Whether it is about lights other than shapes.
+    pub(crate) fn is_of_lights(&self) -> bool {
+        matches!(self, Self::NoLight | Self::DarkEnvironment { .. } | Self::NotFiniteTexel { .. })
+    }
 }
 
 /// Below this cosine between shading and geometric normal, the mesh stands for a smooth surface.
@@ -131,6 +138,21 @@ impl Scene {
         check_cameras(&cameras)?;
         self.cameras = cameras;
         Ok(())
+    }
+
+    /// Whether a camera makes pictures of this scene.
+    ///
+    /// # Errors
+    /// [`BuildError`] for a camera that [`Scene::build`] would refuse.
+    pub fn check_camera(&self, camera: &Camera) -> Result<(), BuildError> {
+        check_cameras(std::slice::from_ref(camera))?;
+        let count = self.media.media.len();
+        match camera.medium {
+            Some(MediumId(medium)) if medium as usize >= count => {
+                Err(BuildError::NoSuchMedium { medium, count })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The film settings of the description.

@@ -51,6 +51,8 @@ pub enum Surroundings {
     /// An image in place of the description's infinite lights. The centre of a latitude-longitude image is
     /// behind the model as seen from the unrotated automatic camera.
     Map(EnvironmentDesc),
+    /// A light at infinity, as it stands, in place of the description's infinite lights.
+    Light(Box<LightDesc>),
 }
 
 /// The ground under a model.
@@ -103,7 +105,7 @@ pub enum StageLight {
     Own,
     /// Studio light, and the rest of the description's.
     Studio,
-    /// [`Surroundings::Map`], and the rest of the description's lights.
+    /// [`Surroundings::Map`] or [`Surroundings::Light`], and the rest of the description's lights.
     Map,
 }
 
@@ -149,6 +151,11 @@ impl Stage {
             Surroundings::Map(map) => {
                 desc.lights.retain(|light| !matches!(light, LightDesc::Infinite { .. }));
                 desc.lights.push(around(desc.up, map));
+                StageLight::Map
+            }
+            Surroundings::Light(light) => {
+                desc.lights.retain(|light| !matches!(light, LightDesc::Infinite { .. }));
+                desc.lights.push(LightDesc::clone(light));
                 StageLight::Map
             }
             Surroundings::Studio => {

@@ -7,10 +7,12 @@ use lumbre_image::Rgb;
 use lumbre_kernel::CustomGeometry;
 use lumbre_math::Transform;
 use lumbre_scene::{
-    AreaLightDesc, Camera, CsgDesc, CsgOperation, FilmDesc, GeometryDesc, InstanceDesc, IntegratorDesc,
-    LightDesc, MaterialId, MeshDesc, NamedMaterial, ObjectDesc, ObjectId, SamplerDesc, SceneDesc, ShapeDesc,
+    AreaLightDesc, Boundary, Camera, CsgDesc, CsgOperation, FilmDesc, GeometryDesc, InstanceDesc,
+    IntegratorDesc, LightDesc, MaterialId, MediumId, MeshDesc, NamedMaterial, ObjectDesc, ObjectId,
+    SamplerDesc, SceneDesc, ShapeDesc,
 };
-use lumbre_shading::Material;
+use lumbre_shading::medium::Medium;
+use lumbre_shading::{Material, MaterialKind};
 
 use crate::{Error, Scene};
 
@@ -28,6 +30,7 @@ pub struct ShapeBuilder {
     world_from_object: Transform,
     material: Option<Arc<Material>>,
     light: Option<AreaLightDesc>,
+    medium: Option<Arc<Medium>>,
 }
 
 #[derive(Clone, Debug)]
@@ -84,7 +87,7 @@ impl ShapeBuilder {
     }
 
     fn of(form: Form) -> Self {
-        Self { form, world_from_object: Transform::IDENTITY, material: None, light: None }
+        Self { form, world_from_object: Transform::IDENTITY, material: None, light: None, medium: None }
     }
 
     /// Sets the transform.
@@ -97,6 +100,25 @@ impl ShapeBuilder {
     #[must_use]
     pub fn material(self, material: impl Into<Arc<Material>>) -> Self {
         Self { material: Some(material.into()), ..self }
+    }
+
+    /// Fills its inside with a medium. Without a material its surface is not seen: light goes straight on through it.
+    ///
+    /// ```
+    /// use lumbre::geometry::Sphere;
+    /// use lumbre::shading::medium::{HomogeneousMedium, Medium};
+    /// use lumbre::shading::Spectrum;
+    /// use lumbre::{DVec3, SceneBuilder, ShapeBuilder};
+    ///
+    /// let haze = HomogeneousMedium { extinction: Spectrum::splat(0.2), albedo: Spectrum::splat(0.9), asymmetry: 0.3 };
+    /// let haze = Medium::Homogeneous { medium: haze, glow: Spectrum::BLACK };
+    /// let cloud = ShapeBuilder::exact(Sphere::new(DVec3::ZERO, 3.0)?).medium(haze);
+    /// assert!(SceneBuilder::new().shape(cloud).build()?.resolved().has_media());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn medium(self, medium: impl Into<Arc<Medium>>) -> Self {
+        Self { medium: Some(medium.into()), ..self }
     }
 
     /// Makes its front emit a radiance.
@@ -151,7 +173,11 @@ impl SceneBuilder {
 
     /// The description of a shape, with an index and a material of its own.
     fn described(&mut self, shape: ShapeBuilder) -> ShapeDesc {
-        let ShapeBuilder { form, world_from_object, material, light } = shape;
+        let ShapeBuilder { form, world_from_object, material, light, medium } = shape;
+        let boundary =
+            medium.map(|medium| Boundary { inside: Some(self.described_medium(medium)), outside: None });
+        let material =
+            material.or_else(|| boundary.map(|_| Arc::new(Material::new(MaterialKind::Interface))));
         // Every shape has a material, so that their numbers are the same; a CSG has those of its first shape.
         let id = MaterialId(self.desc.materials.len() as u32);
         let index = id.0;
@@ -181,10 +207,20 @@ impl SceneBuilder {
             world_from_object,
             reverse_orientation: false,
             material: Some(id),
-            boundary: None,
+            boundary,
             area_light: light,
             alpha: None,
         }
+    }
+
+    /// The number of a medium, the same for all shapes that share it.
+    fn described_medium(&mut self, medium: Arc<Medium>) -> MediumId {
+        let media = &mut self.desc.media;
+        let position = media.iter().position(|known| Arc::ptr_eq(known, &medium));
+        MediumId(position.unwrap_or_else(|| {
+            media.push(medium);
+            media.len() - 1
+        }) as u32)
     }
 
     /// Adds a light other than a shape.

@@ -70,6 +70,7 @@ impl Job {
             ("guides", options.guides.to_string()),
         ];
         identity.extend(entries.map(|(name, value)| (name.to_owned(), value)));
+        identity.extend(options.view.as_ref().map(|view| ("view".to_owned(), in_words(view))));
         let mut folder = None;
         for file in files {
             // By their names from the folder of the first, so that a render is the same wherever its files are.

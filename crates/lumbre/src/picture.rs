@@ -33,6 +33,24 @@ impl Picture {
         &self.rendered.image
     }
 
+    /// A picture that was rendered before: its image (by its alpha, if it has coverage), its coverage by colour, and its features, of these
+    /// pixels of a whole of this size.
+    pub fn restored(
+        image: Image,
+        coverage: Option<Image>,
+        bounds: PixelBounds,
+        whole: (u32, u32),
+        features: Vec<(Feature, Image)>,
+    ) -> Self {
+        let rendered = Rendered::restored(image, coverage, bounds, features);
+        Self { rendered, whole, background: None, noisy: None }
+    }
+
+    /// Width and height of the picture that this is the whole of, or a part.
+    pub fn whole(&self) -> (u32, u32) {
+        self.whole
+    }
+
     /// Puts the picture over a background, for saving. It shows where the picture is transparent
     /// ([`crate::RenderOptions::transparent`]): with its exact colours in display formats, and as light in the
     /// others.

@@ -320,6 +320,33 @@ impl Scene {
         Ok(lumbre_render::caustic_share(&self.resolved, options)?)
     }
 
+    /// The same surfaces on another stage: those of a description that differs from this scene's in cameras, film and lights other than
+    /// shapes alone. Its shapes, materials and ground are not looked at; the tree is shared.
+    ///
+    /// ```
+    /// use lumbre::description::{Camera, LightDesc};
+    /// use lumbre::geometry::Sphere;
+    /// use lumbre::image::Rgb;
+    /// use lumbre::{DVec3, SceneBuilder, ShapeBuilder};
+    ///
+    /// let builder = SceneBuilder::new().shape(ShapeBuilder::exact(Sphere::new(DVec3::ZERO, 2.0)?));
+    /// let mut desc = builder.description().clone();
+    /// let scene = builder.build()?;
+    /// desc.cameras = vec![Camera::perspective(DVec3::new(0.0, -9.0, 2.0), DVec3::ZERO, DVec3::Z, 40.0)?];
+    /// desc.lights = vec![LightDesc::Point { from: DVec3::new(3.0, -4.0, 5.0), intensity: Rgb::WHITE }];
+    /// assert!(scene.relit(&desc)?.resolved().shares_tree(scene.resolved()));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Build`] for a camera or a light out of range, and for a description without a camera.
+    pub fn relit(&self, desc: &SceneDesc) -> Result<Self, Error> {
+        let resolved = self.resolved.relit(desc.cameras.clone(), desc.film.clone(), desc.lights.clone())?;
+        let mut info = SceneInfo::of(desc);
+        (info.bounds, info.memory_bytes) = (self.info.bounds, self.info.memory_bytes);
+        Ok(Self { resolved, info, build_time: self.build_time })
+    }
+
     /// Puts a camera in the place of the one at a position, for pictures from elsewhere; nothing is built anew.
     ///
     /// # Errors

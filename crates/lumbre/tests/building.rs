@@ -174,6 +174,47 @@ fn a_camera_is_replaced_and_the_picture_is_that_of_a_scene_made_with_it() {
 }
 
 #[test]
+fn one_tree_has_pictures_from_elsewhere_and_in_other_light() {
+    let ball = || {
+        // One lamp is a shape: its light stays where lights other than shapes are others.
+        let lamp = Sphere::new(CENTER + DVec3::new(3.0, -2.0, 4.0), 0.5).unwrap();
+        SceneBuilder::new()
+            .shape(ShapeBuilder::exact(Sphere::new(CENTER, 0.75).unwrap()))
+            .shape(ShapeBuilder::exact(lamp).shining(Rgb::splat(20.0)))
+            .film(film(9, 7))
+    };
+    let [here, there] = [4.0 * DVec3::X, DVec3::new(-3.0, 4.0, 1.0)]
+        .map(|eye| Camera::perspective(CENTER + eye, CENTER, DVec3::Z, 40.0).unwrap());
+    let lamp = LightDesc::Point { from: CENTER + 5.0 * DVec3::Z, intensity: Rgb::new(9.0, 8.0, 7.0) };
+    let scene = ball().light(sky()).camera(here.clone()).build().unwrap();
+    let other = ball().light(lamp).camera(there.clone());
+    let desc = other.description().clone();
+    let expected = other.build().unwrap();
+    let picture = |scene: &Scene, view: Option<Camera>| {
+        let mut options = scene.options().with_spp(4);
+        options.view = view;
+        scene.render(&options).map(|picture| picture.image().clone())
+    };
+    let relit = scene.relit(&desc).unwrap();
+    assert!(
+        relit.resolved().shares_tree(scene.resolved()) && !relit.resolved().shares_tree(expected.resolved())
+    );
+    assert_eq!(picture(&relit, None).unwrap(), picture(&expected, None).unwrap());
+    assert_eq!(relit.info().lights, expected.info().lights);
+    assert_ne!(picture(&scene, None).unwrap(), picture(&expected, None).unwrap());
+    // A view is a camera of the options.
+    assert_eq!(picture(&relit, Some(here.clone())).unwrap(), picture(&expected, Some(here)).unwrap());
+    assert_eq!(
+        picture(&scene.relit(&desc).unwrap(), Some(there.clone())).unwrap(),
+        picture(&relit, None).unwrap()
+    );
+    let wrong = picture(&scene, Some(there.with_lens(-1.0))).unwrap_err();
+    assert!(wrong.to_string().contains("lensradius"), "{wrong}");
+    let none = lumbre::SceneDesc { cameras: vec![], ..desc };
+    assert!(scene.relit(&none).is_err());
+}
+
+#[test]
 fn a_picture_that_no_one_wants_is_not_put_together() {
     struct Gone;
     impl lumbre::Progress for Gone {

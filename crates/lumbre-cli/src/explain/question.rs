@@ -34,7 +34,7 @@ impl Question<'_> {
         pixel: (u32, u32),
     ) -> Result<Vec<Section>, Failure> {
         let sample = scene.explain_sample(options, pixel, self.sample)?;
-        let camera = &scene.resolved().cameras()[options.camera];
+        let camera = options.camera_of(scene.resolved()).map_err(lumbre::Error::from)?;
         let whole = (options.width, options.height);
         let mut section = camera::camera(camera, whole, pixel, &sample, self.texts);
         section.fact(self.texts.sample, f64::from(self.sample));

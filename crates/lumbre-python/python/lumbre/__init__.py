@@ -20,20 +20,25 @@ from .appearance import (
     Hair,
     Light,
     Material,
+    Medium,
     Metal,
     Mix,
     Orthographic,
     Panorama,
     Perspective,
+    Pinhole,
     PointLight,
     Principled,
+    SkyLight,
     SpotLight,
+    SunLight,
     Texture,
     ThinGlass,
     Translucent,
 )
 from .explanation import Explanation
 from .geometry import (
+    AreaLight,
     Box,
     Capsule,
     Cone,
@@ -42,6 +47,7 @@ from .geometry import (
     Difference,
     Disk,
     Hyperboloid,
+    Implicit,
     Instances,
     Intersection,
     Mesh,
@@ -54,15 +60,20 @@ from .geometry import (
     Torus,
     Triangle,
     Union,
+    rotate,
+    scale,
+    translate,
 )
 from .image import Image, read_image, write_image
-from .scene import AllHits, Hits, Nearest, Scene, load
+from .scene import AllHits, Hits, Nearest, Scene, SceneMesh, load
+from .sky import solar_position, sun_direction
 from .viewing import Viewer
 
 __version__ = "0.1.0"
 
 __all__ = [
     "AllHits",
+    "AreaLight",
     "Box",
     "Camera",
     "Capsule",
@@ -81,11 +92,13 @@ __all__ = [
     "Hits",
     "Hyperboloid",
     "Image",
+    "Implicit",
     "Instances",
     "Intersection",
     "Light",
     "LumbreError",
     "Material",
+    "Medium",
     "Mesh",
     "Metal",
     "Mix",
@@ -95,14 +108,18 @@ __all__ = [
     "Paraboloid",
     "Patch",
     "Perspective",
+    "Pinhole",
     "Plane",
     "PointLight",
     "Principled",
     "Quadric",
     "Scene",
+    "SceneMesh",
     "Shape",
+    "SkyLight",
     "Sphere",
     "SpotLight",
+    "SunLight",
     "Texture",
     "ThinGlass",
     "Torus",
@@ -112,6 +129,11 @@ __all__ = [
     "Viewer",
     "load",
     "read_image",
+    "rotate",
+    "scale",
+    "solar_position",
+    "sun_direction",
     "thread_count",
+    "translate",
     "write_image",
 ]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import functools
+import math
+import os
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -11,21 +14,25 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _lumbre
-from ._arrays import Triple, array_of, triple
+from ._arrays import Triple, array_of, positive, real, triple, wholes
 from ._lumbre import LumbreError
+from ._words import Described
+from .sky import clear_sky, sun_direction
 
 Colour = tuple[float, float, float]
 
 
-def colour(name: str, value: float | Iterable[float]) -> Colour:
-    """A colour: one number for grey, or linear red, green and blue."""
-    if isinstance(value, (int, float)):
+def colour(name: str, value: float | str | Iterable[float]) -> Colour:
+    """A colour: one number for grey, linear red, green and blue, or a name."""
+    if isinstance(value, str):
+        return _lumbre.named_colour(value)
+    if isinstance(value, (int, float, np.integer, np.floating)):
         return float(value), float(value), float(value)
     return triple(name, value)
 
 
 @dataclass(frozen=True, eq=False)
-class Texture:
+class Texture(metaclass=Described):
     """An image on a surface, by its texture coordinates.
 
     Parameters
@@ -115,15 +122,18 @@ def _number_map(name: str, value: Any) -> _lumbre.Texture | float:
         raise LumbreError(f"{name} is no number (found {value!r}; expected a number, a Texture or an (h, w) array)") from error
 
 
-ColourMap = float | Iterable[float] | Texture | npt.NDArray[Any]
+ColourMap = float | str | Iterable[float] | Texture | npt.NDArray[Any]
 NumberMap = float | Texture | npt.NDArray[Any]
 
 
 @dataclass(frozen=True)
-class Material:
+class Material(metaclass=Described):
     """The appearance of a surface: one of Diffuse, Metal, Glass, ThinGlass, Coated, Translucent, Hair, Principled and Mix.
 
-    Parameters are numbers; colours are numbers or (r, g, b), linear. Each that is a colour, and each that may differ from place to place
+    Where a material is expected, a colour stands for `Diffuse` of it.
+
+    Parameters are numbers; colours are numbers, (r, g, b) in linear light, names such as "red", or "#e8e0d8" in
+    sRGB. Each that is a colour, and each that may differ from place to place
     (said by its type), may be a `Texture` or an array of one, (h, w) or (h, w, 3). `normal_map` is an image of normals in tangent space,
     as in glTF, and `bump_map` one of heights. Wrong numbers raise `LumbreError` at once.
     """
@@ -157,6 +167,17 @@ class Material:
 
     def _kind(self) -> _lumbre.Material:
         raise LumbreError("a material is one of Diffuse, Metal, Glass, ThinGlass, Coated, Translucent, Hair, Principled and Mix")
+
+
+def material_of(value: Any) -> Material | None:
+    """A material, or the matt one of a colour."""
+    if value is None or isinstance(value, Material):
+        return value
+    is_texture = isinstance(value, Texture) or (isinstance(value, np.ndarray) and value.ndim > 1)
+    is_colour = isinstance(value, (str, int, float, np.integer, np.floating, tuple, list, np.ndarray)) and not isinstance(value, bool)
+    if is_texture or is_colour:
+        return Diffuse(value)
+    raise LumbreError(f"material is no material (found {value!r}; expected one, such as Diffuse(0.5), or a colour)")
 
 
 @dataclass(frozen=True)
@@ -405,14 +426,77 @@ class Mix(Material):
 
 
 @dataclass(frozen=True)
-class Light:
-    """A light other than a shape: one of PointLight, SpotLight, DistantLight and EnvironmentLight."""
+class Medium(metaclass=Described):
+    """What fills a shape, the same everywhere: haze, smoke, water, milk. Shapes take it as `medium=`; without a material their surface is
+    not seen.
+
+    Parameters
+    ----------
+    absorption, scattering : colours, coefficients per unit of length of the world
+        Light that goes straight on over a distance d has exp(-(absorption + scattering) d) left.
+    asymmetry : from -1, backwards, to 1, forwards
+        Of the phase function of Henyey and Greenstein; 0 scatters all around alike.
+    emission : colour, the radiance that it tends to where it is deep and does not scatter
+
+    >>> Medium(scattering=0.2).asymmetry
+    0.0
+    """
+
+    absorption: float | str | Iterable[float] = 0.0
+    scattering: float | str | Iterable[float] = 1.0
+    asymmetry: float = 0.0
+    emission: float | str | Iterable[float] = 0.0
 
     def __post_init__(self) -> None:
-        self._native()
+        colours = [colour(name, getattr(self, name)) for name in ("absorption", "scattering", "emission")]
+        object.__setattr__(self, "_made", _lumbre.Medium(colours[0], colours[1], self.asymmetry, colours[2]))
+
+    @staticmethod
+    def measured(name: str, units_per_mm: float = 1.0) -> Medium:
+        """A measured medium, such as "Wholemilk" or "Marble", by the name that scene files have for it; its coefficients are per mm,
+        which are `units_per_mm` units of the world.
+
+        >>> Medium.measured("Skimmilk", units_per_mm=0.1).scattering[0].__round__(3)
+        7.0
+        """
+        absorption, scattering = _lumbre.Medium.measured(name)
+        per = 1 / positive("units_per_mm", units_per_mm)
+        return Medium(tuple(per * x for x in absorption), tuple(per * x for x in scattering))
+
+    def _native(self) -> _lumbre.Medium:
+        made: _lumbre.Medium = self.__dict__["_made"]
+        return made
+
+    def __getstate__(self) -> dict[str, Any]:
+        return _given(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.__post_init__()
+
+
+@dataclass(frozen=True)
+class Light(metaclass=Described):
+    """A light other than a shape: one of PointLight, SpotLight, DistantLight, SunLight, SkyLight and EnvironmentLight. Shapes with
+    `emission` are lights, too; `AreaLight` makes such a rectangle."""
+
+    def __post_init__(self) -> None:
+        # Made once: what is made of an image takes its time, and pictures know by it that they are in the same light.
+        object.__setattr__(self, "_made", self._new())
 
     def _native(self) -> _lumbre.Light:
-        raise LumbreError("a light is one of PointLight, SpotLight, DistantLight and EnvironmentLight")
+        made: _lumbre.Light = self.__dict__["_made"]
+        return made
+
+    def __getstate__(self) -> dict[str, Any]:
+        return _given(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.__post_init__()
+
+    def _new(self) -> _lumbre.Light:
+        raise LumbreError("a light is one of PointLight, SpotLight, DistantLight, SunLight, SkyLight and EnvironmentLight")
 
 
 @dataclass(frozen=True)
@@ -424,9 +508,9 @@ class PointLight(Light):
     """
 
     position: Iterable[float]
-    intensity: float | Iterable[float] = 1.0
+    intensity: float | str | Iterable[float] = 1.0
 
-    def _native(self) -> _lumbre.Light:
+    def _new(self) -> _lumbre.Light:
         position = triple("position", self.position)
         return _lumbre.Light.point(position, colour("intensity", self.intensity))
 
@@ -442,11 +526,11 @@ class SpotLight(Light):
 
     position: Iterable[float]
     target: Iterable[float] = (0.0, 0.0, 0.0)
-    intensity: float | Iterable[float] = 1.0
+    intensity: float | str | Iterable[float] = 1.0
     angle: float = 30.0
     falloff: float = 5.0
 
-    def _native(self) -> _lumbre.Light:
+    def _new(self) -> _lumbre.Light:
         position, target = triple("position", self.position), triple("target", self.target)
         return _lumbre.Light.spot(position, target, colour("intensity", self.intensity), self.angle, self.falloff)
 
@@ -460,22 +544,53 @@ class DistantLight(Light):
     """
 
     towards: Iterable[float]
-    irradiance: float | Iterable[float] = 1.0
+    irradiance: float | str | Iterable[float] = 1.0
 
-    def _native(self) -> _lumbre.Light:
+    def _new(self) -> _lumbre.Light:
         towards = triple("towards", self.towards)
         return _lumbre.Light.distant(towards, colour("irradiance", self.irradiance))
 
 
+@dataclass(frozen=True)
+class SunLight(Light):
+    """The sun: parallel light from where it stands.
+
+    Parameters
+    ----------
+    azimuth : degrees clockwise from north, which is y; x is east
+    elevation : degrees above the horizon; below it the sun gives no light
+    irradiance : that of a surface that faces it; by default as of a high sun whose sky is `SkyLight()`
+
+    `solar_position` says where the sun stands at a time and a place.
+
+    >>> SunLight(azimuth=180, elevation=45).towards[1] < 0
+    True
+    """
+
+    azimuth: float = 180.0
+    elevation: float = 45.0
+    irradiance: float | str | Iterable[float] = (3.0, 2.8, 2.5)
+
+    @property
+    def towards(self) -> Triple:
+        """The unit vector towards the sun."""
+        return sun_direction(self.azimuth, self.elevation)
+
+    def _new(self) -> _lumbre.Light:
+        irradiance = colour("irradiance", self.irradiance)
+        return _lumbre.Light.distant(self.towards, irradiance if self.elevation > 0 else (0.0, 0.0, 0.0))
+
+
 @dataclass(frozen=True, eq=False)
 class EnvironmentLight(Light):
-    """Light from all around: this radiance, or a factor on `image`, (h, 2h, 3), by longitude and latitude with `up` at its top.
+    """Light from all around: this radiance, or a factor on `image`, (h, 2h, 3), by longitude and latitude with `up` at its top; where that
+    is z, x is in its middle, and y three quarters of its width to the right.
 
     >>> EnvironmentLight(0.5).radiance
     0.5
     """
 
-    radiance: float | Iterable[float] = 1.0
+    radiance: float | str | Iterable[float] = 1.0
     image: npt.ArrayLike | None = None
     up: Iterable[float] = (0.0, 0.0, 1.0)
 
@@ -485,9 +600,9 @@ class EnvironmentLight(Light):
             is_finite = np.isfinite(array_of("image", self.image)).all(axis=-1)
             if not is_finite.all():
                 y, x = np.argwhere(~is_finite)[0]
-                warnings.warn(f"texel ({x}, {y}) of an environment is not finite, and taken for black", stacklevel=3)
+                warnings.warn(f"texel ({x}, {y}) of an environment is not finite, and taken for black", stacklevel=4)
 
-    def _native(self) -> _lumbre.Light:
+    def _new(self) -> _lumbre.Light:
         image = None if self.image is None else array_of("image", self.image).astype(np.float32, copy=False)
         if image is not None and image.ndim != 3:
             raise LumbreError(f"image has the wrong shape (found {image.shape}; expected (h, 2h, 3))")
@@ -495,38 +610,113 @@ class EnvironmentLight(Light):
 
 
 @dataclass(frozen=True)
-class Camera:
-    """Where a picture is taken from: one of Perspective, Orthographic and Panorama.
+class SkyLight(Light):
+    """A clear sky without its sun, whose place is as of `SunLight`: brightest near the sun, brighter at the horizon, blue. `radiance` is
+    that of the zenith.
 
-    `eye` sees `target` in the middle of the picture, with `up` upwards. Raises `LumbreError` where these make no view.
+    Its distribution is the CIE standard clear sky of low turbidity (CIE S 011/E:2003, type 12); its colour goes from blue in the zenith to
+    white at the horizon and near the sun. Below the horizon it is as bright as the ground that it lights would be.
+
+    >>> SkyLight(elevation=30).radiance
+    0.5
     """
 
-    eye: Iterable[float]
-    target: Iterable[float] = (0.0, 0.0, 0.0)
-    up: Iterable[float] = (0.0, 0.0, 1.0)
+    azimuth: float = 180.0
+    elevation: float = 45.0
+    radiance: float | str | Iterable[float] = 0.5
+
+    def _map(self) -> npt.NDArray[np.float32]:
+        return clear_sky(sun_direction(self.azimuth, self.elevation), np.array(colour("radiance", self.radiance)))
+
+    def _new(self) -> _lumbre.Light:
+        return _lumbre.Light.environment((1.0, 1.0, 1.0), self._map(), (0.0, 0.0, 1.0))
+
+
+@functools.lru_cache(maxsize=4)
+def _map_of(path: str, modified: int, size: int) -> _lumbre.Environment:
+    pixels, _ = _lumbre.read_image(path)
+    return _lumbre.Environment(pixels)
+
+
+def environment(value: Any) -> str | _lumbre.Light | _lumbre.Environment:
+    """Light from all around, as `Scene.render` takes it."""
+    if isinstance(value, EnvironmentLight | SkyLight):
+        return value._native()
+    if isinstance(value, str) and value in ("studio", "none"):
+        return value
+    if isinstance(value, (str, os.PathLike)):
+        path = os.path.abspath(os.fspath(value))
+        state = os.stat(path)
+        return _map_of(path, state.st_mtime_ns, state.st_size)
+    if isinstance(value, np.ndarray) and value.ndim == 3:
+        return _lumbre.Environment(array_of("env", value).astype(np.float32, copy=False))
+    if isinstance(value, (int, float, tuple, list, np.ndarray)) and not isinstance(value, bool):
+        return EnvironmentLight(value)._native()
+    raise LumbreError(
+        f"env is no light from all around (found {value!r}; expected a file, an (h, 2h, 3) array, an EnvironmentLight, a SkyLight, "
+        'a radiance, "studio" or "none")'
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Camera(metaclass=Described):
+    """Where a picture is taken from: one of Perspective, Orthographic, Panorama and Pinhole."""
 
     def __post_init__(self) -> None:
-        self._native()
-
-    def _view(self) -> tuple[Triple, Triple, Triple]:
-        return triple("eye", self.eye), triple("target", self.target), triple("up", self.up)
+        object.__setattr__(self, "_made", self._new())
 
     def _native(self) -> _lumbre.Camera:
-        raise LumbreError("a camera is one of Perspective, Orthographic and Panorama")
+        made: _lumbre.Camera = self.__dict__["_made"]
+        return made
 
-    def rays(self, width: int, height: int) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    def __getstate__(self) -> dict[str, Any]:
+        return _given(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.__post_init__()
+
+    def _new(self) -> _lumbre.Camera:
+        raise LumbreError("a camera is one of Perspective, Orthographic, Panorama and Pinhole")
+
+    def _size(self) -> tuple[int, int] | None:
+        """Width and height of its pictures, where it knows them."""
+        return None
+
+    def rays(self, width: int | None = None, height: int | None = None) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
         """The rays through the centres of a picture's pixels, row by row from the top: origins and unit directions, (height, width, 3).
+        A `Pinhole` knows its width and height.
 
         >>> origins, directions = Perspective((0, -5, 0), fov=40).rays(4, 3)
         >>> directions.shape
         (3, 4, 3)
         """
+        own = self._size()
+        if width is None or height is None:
+            if own is None or width is not height:
+                raise LumbreError("rays needs width and height in pixels")
+            width, height = own
         return self._native().rays(width, height)
 
 
 @dataclass(frozen=True)
-class Perspective(Camera):
-    """A pinhole, or a thin lens; `fov` is the full angle in degrees along the shorter side of the picture.
+class _Looking(Camera):
+    """A camera by what it looks at."""
+
+    eye: Iterable[float]
+    target: Iterable[float] = (0.0, 0.0, 0.0)
+    up: Iterable[float] = (0.0, 0.0, 1.0)
+
+    def _view(self) -> tuple[Triple, Triple, Triple]:
+        return triple("eye", self.eye), triple("target", self.target), triple("up", self.up)
+
+
+@dataclass(frozen=True)
+class Perspective(_Looking):
+    """A pinhole, or a thin lens, at `eye`: it sees `target` in the middle of the picture, with `up` upwards. `fov` is the full angle in
+    degrees along the shorter side of the picture; `lens_radius` above 0 blurs what is nearer or farther than `target`.
+
+    Raises `LumbreError` where eye and target coincide, and where `up` is parallel to the view.
 
     >>> Perspective((0, -5, 1), fov=40).fov
     40
@@ -535,13 +725,104 @@ class Perspective(Camera):
     fov: float = 40.0
     lens_radius: float = 0.0
 
-    def _native(self) -> _lumbre.Camera:
+    def _new(self) -> _lumbre.Camera:
         return _lumbre.Camera.perspective(*self._view(), self.fov, self.lens_radius)
+
+    @staticmethod
+    def from_intrinsics(
+        fx: float,
+        fy: float,
+        cx: float,
+        cy: float,
+        size: tuple[int, int],
+        pose: npt.ArrayLike,
+        axes: str = "opencv",
+    ) -> Pinhole:
+        """A calibrated pinhole, by the numbers of data sets: see `Pinhole`.
+
+        >>> camera = Perspective.from_intrinsics(500, 500, 320, 240, (640, 480), np.eye(4))
+        >>> camera.rays()[1][240, 320].round(3).tolist()
+        [0.001, 0.001, 1.0]
+        """
+        return Pinhole(fx, fy, cx, cy, size, pose, axes)
+
+
+@dataclass(frozen=True, eq=False)
+class Pinhole(Camera):
+    """A calibrated pinhole: how data sets give cameras.
+
+    Parameters
+    ----------
+    fx, fy : focal lengths in pixels, above 0
+    cx, cy : the principal point in pixels from the picture's upper left corner
+        In the middle of the picture it is (width / 2, height / 2), as COLMAP counts. Where calibrations count from the middle of the first
+        pixel, as OpenCV's do, add 0.5 to both.
+    size : (width, height) in pixels
+        The size of its pictures, where none is asked for; in another size the same is seen.
+    pose : (4, 4) array
+        World from camera: its last column is the camera's place. For extrinsics, which are camera from world, give `np.linalg.inv` of them.
+    axes : "opencv" or "opengl"
+        What the axes of the camera are: x to the right, y down and z forwards (OpenCV, COLMAP), or x to the right, y upwards and z
+        backwards (OpenGL, Blender, NeRF).
+
+    Lens distortion is not taken into account: use the numbers of undistorted pictures. Raises `LumbreError` where the pose is no rigid
+    motion.
+
+    >>> pose = np.eye(4)
+    >>> pose[:3, 3] = [0, 0, -5]
+    >>> Pinhole(600, 600, 320, 240, size=(640, 480), pose=pose).rays()[0][0, 0].tolist()
+    [0.0, 0.0, -5.0]
+    """
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    size: tuple[int, int]
+    pose: npt.ArrayLike
+    axes: str = "opencv"
+
+    def _size(self) -> tuple[int, int] | None:
+        width, height = wholes("size", self.size, "width, height", 1)
+        return width, height
+
+    def _new(self) -> _lumbre.Camera:
+        width, height = wholes("size", self.size, "width, height", 1)
+        fx, fy = (positive(name, getattr(self, name), "pixels, above 0") for name in ("fx", "fy"))
+        cx, cy = (float(value) for value in (self.cx, self.cy))
+        if not (math.isfinite(cx) and math.isfinite(cy)):
+            raise LumbreError(f"cx, cy are not finite (found {self.cx!r}, {self.cy!r}; expected pixels)")
+        pose = rigid("pose", self.pose)
+        if self.axes not in ("opencv", "opengl"):
+            raise LumbreError(f"axes are unknown (found {self.axes!r}; expected opencv, opengl)")
+        if self.axes == "opencv":
+            pose = pose @ np.diag([1.0, -1.0, -1.0, 1.0])
+        window = (-cx / fx, (width - cx) / fx, (cy - height) / fy, cy / fy)
+        return _lumbre.Camera.pinhole(window, pose.tolist())
+
+
+def rigid(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """A (4, 4) matrix that turns and moves, and no more; (3, 4) is taken, too."""
+    matrix = real(array_of(name, value)).astype(np.float64, copy=False)
+    if matrix.shape == (3, 4):
+        matrix = np.vstack([matrix, [0.0, 0.0, 0.0, 1.0]])
+    if matrix.shape != (4, 4):
+        raise LumbreError(f"{name} has the wrong shape (found {matrix.shape}; expected (4, 4))")
+    if not np.isfinite(matrix).all() or not np.allclose(matrix[3], [0, 0, 0, 1], atol=1e-6):
+        hint = "; it seems transposed" if np.allclose(matrix[:, 3], [0, 0, 0, 1], atol=1e-6) else ""
+        raise LumbreError(f"{name} is no pose (found the last row {matrix[3].tolist()}; expected [0, 0, 0, 1]{hint})")
+    turn = matrix[:3, :3]
+    if not np.allclose(turn.T @ turn, np.eye(3), atol=1e-3):
+        lengths = np.linalg.norm(turn, axis=0).round(6).tolist()
+        raise LumbreError(f"{name} is no rigid motion (found columns of lengths {lengths}; expected three unit columns at right angles)")
+    if np.linalg.det(turn) < 0:
+        raise LumbreError(f"{name} is a mirror (found determinant -1; expected a rotation: are its axes those of axes=?)")
+    return matrix
 
 
 @dataclass(frozen=True)
-class Orthographic(Camera):
-    """No perspective: the shorter side of the picture is `height` long in the world.
+class Orthographic(_Looking):
+    """No perspective, as `Perspective` but for that: the shorter side of the picture is `height` long in the world.
 
     >>> Orthographic((0, -5, 1), height=3).height
     3
@@ -549,17 +830,17 @@ class Orthographic(Camera):
 
     height: float = 1.0
 
-    def _native(self) -> _lumbre.Camera:
-        return _lumbre.Camera.orthographic(*self._view(), self.height)
+    def _new(self) -> _lumbre.Camera:
+        return _lumbre.Camera.orthographic(*self._view(), positive("height", self.height, "a length above 0"))
 
 
 @dataclass(frozen=True)
-class Panorama(Camera):
-    """All directions at once, by longitude and latitude.
+class Panorama(_Looking):
+    """All directions at once, by longitude and latitude, with `target` in the middle and `up` at the top.
 
     >>> Panorama((0, 0, 1), target=(0, 5, 1)).target
     (0, 5, 1)
     """
 
-    def _native(self) -> _lumbre.Camera:
+    def _new(self) -> _lumbre.Camera:
         return _lumbre.Camera.panorama(*self._view())

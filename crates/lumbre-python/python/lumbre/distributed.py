@@ -30,8 +30,9 @@ import numpy.typing as npt
 from . import _lumbre
 from ._arrays import rays
 from ._lumbre import LumbreError
+from .appearance import Camera
 from .image import Image
-from .scene import FIELDS, Hits, Progress, Scene, _checked, _columns, load
+from .scene import FIELDS, Hits, Progress, Scene, _checked, _columns, _options, load
 
 # A render ends unevenly by about a task, and Dask takes some milliseconds for each: many for few threads, fewer for many.
 _TASKS_PER_THREAD = (4, 32)
@@ -89,7 +90,9 @@ def render(
         if options.pop(name, None):
             raise LumbreError(f"{name} is not for renders on many machines")
     sources = [_Source.of(scene, ship, frame) for frame in frames] if frames is not None else [_Source.of(scene, ship, None)]
-    width, height = size if size is not None else _known(sources[0]).size
+    camera = options.get("camera")
+    own = camera._size() if isinstance(camera, Camera) else None
+    width, height = size or own or _known(sources[0]).size
     crop = options.pop("crop", None) or (0, 0, width, height)
     given = {name: value for name, value in options.items() if value is not None}
     given |= {"size": (width, height), "threads": threads}
@@ -266,7 +269,7 @@ def _shared(content: bytes) -> bytes:
 def _render_part(content: bytes, key: str, options: dict[str, Any], crop: tuple[int, int, int, int], first: int, end: int) -> bytes:
     native = _scene(content, key)._native
     given = {**options, "crop": crop, "first_sample": first, "spp": end - first, "part": True}
-    return native.render(given, None).take_part().to_bytes()
+    return native.render(_options(given), None).take_part().to_bytes()
 
 
 def _cast_part(content: bytes, key: str, o: Any, d: Any, low: Any, high: Any, fields: tuple[str, ...]) -> dict[str, Any]:

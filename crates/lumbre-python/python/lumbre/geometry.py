@@ -13,35 +13,42 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _lumbre
-from ._arrays import Array, Triple, array_of, real, triple
+from ._arrays import Array, Triple, array_of, positive, real, triple
 from ._lumbre import LumbreError
-from .appearance import Colour, Material, colour
+from ._words import Described
+from .appearance import Colour, Diffuse, Material, Medium, colour, material_of
 
 _ORIGIN: Triple = (0.0, 0.0, 0.0)
 _UP: Triple = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class Shape(metaclass=Described):
     """What all shapes have.
 
     Parameters
     ----------
     transform : (4, 4) array, optional
         The place: world from object, with the translation in the last column.
-    material : Material, optional
-        The appearance in pictures; by default matt and grey, or that of the CSG that it is a part of.
+    material : Material or colour, optional
+        The appearance in pictures; by default matt and grey, or that of the CSG that it is a part of. A colour stands for `Diffuse` of it.
     emission : colour, optional
-        Radiance that its front emits, as a number or (r, g, b).
+        Radiance that its front emits, as a number, (r, g, b) or a name.
+    medium : Medium, optional
+        What it is filled with; without a material its surface is not seen then.
 
     Solids are combined by `a | b`, `a & b` and `a - b`: see `Union`, `Intersection` and `Difference`.
     """
 
     transform: npt.ArrayLike | None = field(default=None, kw_only=True)
-    material: Material | None = field(default=None, kw_only=True)
-    emission: float | Colour | None = field(default=None, kw_only=True)
+    material: Material | float | str | Iterable[float] | None = field(default=None, kw_only=True)
+    emission: float | str | Iterable[float] | None = field(default=None, kw_only=True)
+    medium: Medium | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "material", material_of(self.material))
+        if not (self.medium is None or isinstance(self.medium, Medium)):
+            raise LumbreError(f"medium is no medium (found {self.medium!r}; expected a Medium)")
         # Frozen, so that a scene and its pickle stay the same.
         object.__setattr__(self, "_made", (self._geometry(), self._place(), self._light()))
 
@@ -62,7 +69,9 @@ class Shape:
 
     def _native(self) -> _lumbre._Placed:
         geometry, place, light = self.__dict__["_made"]
-        return geometry, place, None if self.material is None else self.material._native(), light
+        material: Any = self.material
+        medium = None if self.medium is None else self.medium._native()
+        return geometry, place, None if material is None else material._native(), light, medium
 
     def __or__(self, other: Shape) -> Union:
         return Union(self, other)
@@ -305,6 +314,79 @@ class Patch(Shape):
 
 
 @dataclass(frozen=True, eq=False)
+class Implicit(Shape):
+    """The surface where an expression in x, y and z is zero, cut off by a box; inside, the expression is negative, as a signed distance is.
+
+    Parameters
+    ----------
+    expression : str, in the words of Python
+        Of numbers, `x`, `y`, `z`, `pi`, `e`, `+ - * /`, `**` with whole exponents and 0.5, parentheses, and the functions `sqrt`, `abs`,
+        `sin`, `cos`, `tan`, `exp`, `min`, `max` and `length`. It need not be a distance.
+    bounds : two corners of a box
+        Where the surface is cut off, and open.
+
+    Crossings are isolated by interval arithmetic: none is lost, however thin the surface is (Mitchell, "Robust Ray Intersection with
+    Interval Arithmetic", 1990). That takes longer than a sphere by far. `closest_point` has no answer for it. A function of Python
+    is not taken, as it would hold the interpreter's lock for every ray: sample it to a mesh.
+
+    >>> gyroid = Implicit("sin(x)*cos(y) + sin(y)*cos(z) + sin(z)*cos(x)", bounds=((-3, -3, -3), (3, 3, 3)))
+    >>> rounded = Implicit("max(abs(x) - 1, abs(y) - 1, abs(z) - 1, length(x, y, z) - 1.3)", bounds=((-2, -2, -2), (2, 2, 2)))
+    >>> import lumbre
+    >>> lumbre.Scene(rounded).cast([[0.0, 0.0, 5.0]], [[0.0, 0.0, -1.0]]).t.tolist()
+    [4.0]
+    """
+
+    expression: str
+    bounds: tuple[Iterable[float], Iterable[float]] = ((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0))
+
+    def _geometry(self) -> _lumbre.Geometry:
+        if not isinstance(self.expression, str):
+            raise LumbreError(f'expression is no text (found {self.expression!r}; expected one such as "x**2 + y**2 + z**2 - 1")')
+        try:
+            p0, p1 = self.bounds
+        except (TypeError, ValueError) as error:
+            raise LumbreError(f"bounds are no box (found {self.bounds!r}; expected two corners)") from error
+        return _lumbre.Geometry.implicit(self.expression, triple("bounds", p0), triple("bounds", p1))
+
+
+@dataclass(frozen=True, eq=False)
+class AreaLight(Shape):
+    """A rectangle that emits light towards `target`: `width` (along the horizon) by `height` units, with this radiance.
+
+    It is a shape like any other, of a `Patch`, and seen in pictures.
+
+    >>> AreaLight(center=(0, 0, 4), width=2, height=1, radiance=10).radiance
+    10
+    """
+
+    center: Iterable[float]
+    target: Iterable[float] = _ORIGIN
+    width: float = 1.0
+    height: float = 1.0
+    radiance: float | str | Iterable[float] = 1.0
+
+    def _geometry(self) -> _lumbre.Geometry:
+        center, target = np.array(triple("center", self.center)), np.array(triple("target", self.target))
+        along = target - center
+        distance = float(np.linalg.norm(along))
+        if not 0 < distance < np.inf:
+            raise LumbreError(f"target is no direction from center (found {self.target!r} for both; expected another place)")
+        along /= distance
+        across = np.cross(along, _UP)
+        across = across if np.linalg.norm(across) > 1e-6 else np.array([1.0, 0.0, 0.0])
+        across = across / np.linalg.norm(across)
+        upwards = np.cross(across, along)
+        x = 0.5 * positive("width", self.width, "a length above 0") * across
+        y = 0.5 * positive("height", self.height, "a length above 0") * upwards
+        # Its front is where u and v turn counter-clockwise.
+        corners = [triple("corner", corner) for corner in (center + x - y, center - x - y, center + x + y, center - x + y)]
+        return _lumbre.Geometry.patch(*corners)
+
+    def _light(self) -> Colour | None:
+        return colour("radiance", self.radiance)
+
+
+@dataclass(frozen=True, eq=False)
 class Curves(Shape):
     """Hair, fur, grass: smooth curves through points, with a width at each. All of them are one shape.
 
@@ -314,8 +396,10 @@ class Curves(Shape):
         Two points or more of each curve.
     widths : number, (N, K) array, or N arrays of (K,)
         The whole width at each point, above 0.
-    kind : "flat" or "cylinder"
-        Bands that face every ray, or the same with the normals of tubes.
+    kind : "flat", "cylinder" or "ribbon"
+        Bands that face every ray, the same with the normals of tubes, or bands that face along `normals`.
+    normals : (N, K, 3) array, or N arrays of (K, 3), for ribbons
+        Where the band faces, at each point.
 
     In results `primitive` is the segment between two points, among those of all curves.
 
@@ -326,9 +410,15 @@ class Curves(Shape):
     points: Any
     widths: Any
     kind: str = "flat"
+    normals: Any = None
 
     def __post_init__(self) -> None:
         points = [_table("points", curve) for curve in self.points]
+        if self.normals is not None:
+            normals = [_table("normals", each) for each in self.normals]
+            if [len(each) for each in normals] != [len(curve) for curve in points]:
+                raise LumbreError("normals have the wrong shape (expected one for each point)")
+            object.__setattr__(self, "normals", normals)
         widths = self.widths
         if np.ndim(widths) == 0 and not isinstance(widths, (list, tuple)):
             widths = [np.full(len(curve), widths) for curve in points]
@@ -343,7 +433,10 @@ class Curves(Shape):
         counts = np.array([len(curve) for curve in self.points], dtype=np.int64)
         points = np.concatenate([np.zeros((0, 3)), *self.points]).astype(np.float64, copy=False)
         widths = np.concatenate([np.zeros(0), *self.widths]).astype(np.float64, copy=False)
-        return _lumbre.Geometry.curves(points, widths, counts, self.kind)
+        normals = None
+        if self.normals is not None:
+            normals = np.concatenate([np.zeros((0, 3)), *self.normals]).astype(np.float64, copy=False)
+        return _lumbre.Geometry.curves(points, widths, counts, self.kind, normals)
 
     def __repr__(self) -> str:
         return f"Curves({len(self.points)} curves)"
@@ -386,17 +479,26 @@ class Mesh(Shape):
 
     def __init__(
         self,
-        vertices: npt.ArrayLike,
-        faces: npt.ArrayLike,
+        vertices: Any,
+        faces: npt.ArrayLike | None = None,
         normals: npt.ArrayLike | None = None,
         uvs: npt.ArrayLike | None = None,
         precision: str = "auto",
         *,
         colors: npt.ArrayLike | None = None,
         transform: npt.ArrayLike | None = None,
-        material: Material | None = None,
-        emission: float | Colour | None = None,
+        material: Material | float | str | Iterable[float] | None = None,
+        emission: float | str | Iterable[float] | None = None,
+        medium: Medium | None = None,
     ) -> None:
+        if faces is None:
+            if not is_trimesh(vertices):
+                raise LumbreError("faces are missing (expected an (F, 3) array of vertex numbers, or a trimesh.Trimesh alone)")
+            taken = _of_trimesh(vertices)
+            vertices, faces = taken["vertices"], taken["faces"]
+            uvs = taken["uvs"] if uvs is None else uvs
+            if material is None and colors is None:
+                material, colors = taken["material"], taken["colors"]
         if precision not in ("auto", "single", "double"):
             raise LumbreError(f'precision is unknown (found "{precision}"; expected auto, single, double)')
         tables = {"vertices": vertices, "normals": normals, "uvs": uvs, "colors": colors}
@@ -409,10 +511,31 @@ class Mesh(Shape):
         if corners.ndim != 2:
             raise LumbreError(f"faces have the wrong shape (found {corners.shape}; expected (F, 3) or (F, 4))")
         given |= {"faces": corners, "precision": precision}
-        given |= {"transform": transform, "material": material, "emission": emission}
+        given |= {"transform": transform, "material": material, "emission": emission, "medium": medium}
         for name, value in given.items():
             object.__setattr__(self, name, value)
         self.__post_init__()
+
+    @staticmethod
+    def from_trimesh(
+        mesh: Any,
+        *,
+        precision: str = "auto",
+        transform: npt.ArrayLike | None = None,
+        material: Material | float | str | Iterable[float] | None = None,
+        emission: float | str | Iterable[float] | None = None,
+        medium: Medium | None = None,
+    ) -> Mesh:
+        """The mesh of a `trimesh.Trimesh`, with its texture coordinates, and its colours or its picture where it has such and no `material`
+        is given. `Mesh(mesh)` is the same.
+
+        >>> import trimesh
+        >>> Mesh.from_trimesh(trimesh.creation.box()).faces.shape
+        (12, 3)
+        """
+        if not is_trimesh(mesh):
+            raise LumbreError(f"mesh is no trimesh.Trimesh (found {type(mesh).__name__})")
+        return Mesh(mesh, precision=precision, transform=transform, material=material, emission=emission, medium=medium)
 
     def _geometry(self) -> _lumbre.Geometry:
         def double(array: Array | None) -> Array | None:
@@ -429,6 +552,48 @@ class Mesh(Shape):
 
     def __repr__(self) -> str:
         return f"Mesh({len(self.vertices)} vertices, {len(self.faces)} faces)"
+
+
+def is_trimesh(value: Any) -> bool:
+    """Whether something is a mesh of trimesh, which need not be installed."""
+    return any(kind.__module__.split(".")[0] == "trimesh" and kind.__name__ == "Trimesh" for kind in type(value).__mro__)
+
+
+def _of_trimesh(mesh: Any) -> dict[str, Any]:
+    """What there is in a mesh of trimesh, by our names."""
+    taken: dict[str, Any] = {"vertices": np.asarray(mesh.vertices), "faces": np.asarray(mesh.faces)}
+    taken |= dict.fromkeys(("uvs", "colors", "material"))
+    visual = getattr(mesh, "visual", None)
+    if visual is None or not getattr(visual, "defined", False):
+        return taken
+    uv = getattr(visual, "uv", None)
+    if uv is not None and len(uv) == len(taken["vertices"]):
+        taken["uvs"] = np.asarray(uv, dtype=np.float64)
+    if visual.kind == "texture":
+        look = visual.material
+        image = getattr(look, "baseColorTexture", None) if hasattr(look, "baseColorTexture") else getattr(look, "image", None)
+        if image is not None and taken["uvs"] is not None:
+            taken["material"] = Diffuse(np.asarray(image.convert("RGB")))
+        else:
+            taken["material"] = Diffuse(tuple(_linear(np.asarray(look.main_color[:3]))))
+    elif visual.kind == "vertex":
+        taken["colors"] = _linear(np.asarray(visual.vertex_colors)[:, :3])
+    elif visual.kind == "face":
+        colours = np.asarray(visual.face_colors)[:, :3]
+        if (colours == colours[0]).all():
+            taken["material"] = Diffuse(tuple(_linear(colours[0])))
+        else:
+            # Each face has corners of its own.
+            taken["vertices"] = taken["vertices"][taken["faces"]].reshape(-1, 3)
+            taken["colors"] = np.repeat(_linear(colours), 3, axis=0)
+            taken["faces"] = np.arange(len(taken["vertices"])).reshape(-1, 3)
+    return taken
+
+
+def _linear(colours: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    """Linear light of bytes in sRGB (IEC 61966-2-1)."""
+    encoded = np.asarray(colours, dtype=np.float64) / 255
+    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
 
 
 def _table(name: str, value: npt.ArrayLike) -> Array:
@@ -450,8 +615,9 @@ class _Csg(Shape):
         self,
         *operands: Shape | Sequence[Shape],
         transform: npt.ArrayLike | None = None,
-        material: Material | None = None,
-        emission: float | Colour | None = None,
+        material: Material | float | str | Iterable[float] | None = None,
+        emission: float | str | Iterable[float] | None = None,
+        medium: Medium | None = None,
     ) -> None:
         name = type(self).__name__
         if len(operands) < 2:
@@ -461,7 +627,7 @@ class _Csg(Shape):
                 if not isinstance(shape, Shape):
                     raise LumbreError(f"an operand of {name} is no shape: {shape!r}")
         kept = tuple(operand if isinstance(operand, Shape) else tuple(operand) for operand in operands)
-        given = {"operands": kept, "transform": transform, "material": material, "emission": emission}
+        given = {"operands": kept, "transform": transform, "material": material, "emission": emission, "medium": medium}
         for field_name, value in given.items():
             object.__setattr__(self, field_name, value)
         self.__post_init__()
@@ -521,7 +687,7 @@ class Difference(_Csg):
 
 
 @dataclass(frozen=True, eq=False)
-class Instances:
+class Instances(metaclass=Described):
     """The same shapes in many places, at the memory of one.
 
     Parameters
@@ -551,3 +717,71 @@ class Instances:
     def _native(self) -> tuple[list[_lumbre._Placed], Array]:
         shapes = [self.shapes] if isinstance(self.shapes, Shape) else self.shapes
         return [shape._native() for shape in shapes], self._places()
+
+
+def translate(x: float | Iterable[float], y: float | None = None, z: float | None = None) -> npt.NDArray[np.float64]:
+    """The (4, 4) map that moves by three numbers, or by a triple: for `transform=`. Maps are multiplied by `@`, the last one first.
+
+    >>> (translate(1, 2, 3) @ [0, 0, 0, 1]).tolist()
+    [1.0, 2.0, 3.0, 1.0]
+    """
+    given: Any = x if y is None and z is None else (x, y, z)
+    matrix = np.eye(4)
+    matrix[:3, 3] = _finite("translate", triple("translate", given))
+    return matrix
+
+
+def rotate(axis: str | Iterable[float], degrees: float, about: Iterable[float] = _ORIGIN) -> npt.NDArray[np.float64]:
+    """The (4, 4) map that turns by an angle in degrees about an axis, "x", "y", "z" or a vector, through the point `about`:
+    counter-clockwise as seen from the axis's tip.
+
+    >>> (rotate("z", 90) @ [1, 0, 0, 1]).round(12).tolist()
+    [0.0, 1.0, 0.0, 1.0]
+    """
+    named = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+    if isinstance(axis, str):
+        if axis not in named:
+            raise LumbreError(f'axis is unknown (found "{axis}"; expected "x", "y", "z" or a vector)')
+        axis = named[axis]
+    a = np.array(_finite("axis", triple("axis", axis)))
+    length = float(np.linalg.norm(a))
+    if length == 0:
+        raise LumbreError("axis is no direction (found (0, 0, 0); expected a vector of some length)")
+    if isinstance(degrees, bool) or not isinstance(degrees, (int, float, np.integer, np.floating)) or not np.isfinite(degrees):
+        raise LumbreError(f"degrees are out of range (found {degrees!r}; expected a finite number)")
+    x, y, z = a / length
+    # Whole quarters of a turn are exact.
+    quarters, rest = divmod(float(degrees), 90.0)
+    sine, cosine = np.sin(np.radians(rest)), np.cos(np.radians(rest))
+    for _ in range(int(quarters) % 4):
+        sine, cosine = cosine, -sine
+    skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    turn = cosine * np.eye(3) + sine * skew + (1 - cosine) * np.outer((x, y, z), (x, y, z))
+    matrix = np.eye(4)
+    matrix[:3, :3] = turn
+    center = np.array(_finite("about", triple("about", about)))
+    matrix[:3, 3] = center - turn @ center
+    return matrix
+
+
+def scale(x: float | Iterable[float], y: float | None = None, z: float | None = None) -> npt.NDArray[np.float64]:
+    """The (4, 4) map that scales by one number, by three, or by a triple; none of them 0.
+
+    >>> (scale(1, 2, 3) @ [1, 1, 1, 1]).tolist()
+    [1.0, 2.0, 3.0, 1.0]
+    >>> (scale(2) @ [1, 1, 1, 1]).tolist()
+    [2.0, 2.0, 2.0, 1.0]
+    """
+    given: Any = (x, y, z)
+    if y is None and z is None:
+        given = (x, x, x) if isinstance(x, (int, float, np.integer, np.floating)) else x
+    factors = _finite("scale", triple("scale", given))
+    if 0.0 in factors:
+        raise LumbreError(f"scale is out of range (found {factors}; expected numbers other than 0)")
+    return np.diag([*factors, 1.0])
+
+
+def _finite(name: str, value: Triple) -> Triple:
+    if not np.isfinite(value).all():
+        raise LumbreError(f"{name} is not finite (found {value}; expected three numbers)")
+    return value

@@ -13,12 +13,13 @@ import numpy.typing as npt
 from . import _lumbre
 from ._arrays import array_of
 from ._lumbre import LumbreError
+from ._words import no_attribute
 
 
 class Image:
     """A rendered picture: an array of linear light, which shows itself in a notebook.
 
-    `numpy.asarray(image)` is `image.array`.
+    `numpy.asarray(image)` is `image.array`. Pickles keep all but what a denoised picture was before, and the part of a distributed one.
 
     >>> import lumbre, numpy as np
     >>> image = lumbre.Scene([lumbre.Sphere()]).render(spp=1, size=(8, 6), features=True)
@@ -28,6 +29,10 @@ class Image:
 
     def __init__(self, native: _lumbre.Picture) -> None:
         self._native = native
+        self._stats: dict[str, Any] | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        raise no_attribute(self, name, _HINTS)
 
     @cached_property
     def array(self) -> npt.NDArray[np.float32]:
@@ -47,18 +52,29 @@ class Image:
     def feature(self, name: str) -> npt.NDArray[np.float32]:
         """An AOV: albedo (h, w, 3), normal (h, w, 3), depth (h, w) along the camera's axis, or uv (h, w, 2).
 
+        Each is the mean of what the samples of a pixel met. Where they met nothing, depth is inf, and the others are 0.
+
         Raises `LumbreError` where the picture was rendered without `features`.
+
+        >>> import lumbre
+        >>> image = lumbre.Scene([lumbre.Sphere()]).render(spp=1, size=(9, 9), features=True, ground="none")
+        >>> depth = image.feature("depth")
+        >>> bool(depth[4, 4] > 0), float(depth[0, 0])
+        (True, inf)
         """
         found = self._native.feature(name)
         if found is None:
             raise LumbreError(f"the {name} layer was not rendered (expected features=True)")
         array, channels = found
+        if name == "depth":
+            # Nothing that is seen is at the camera itself.
+            array = np.where(array == 0, np.float32(np.inf), array)
         return array[..., 0] if channels == 1 else array[..., :channels]
 
     @property
     def stats(self) -> dict[str, Any]:
         """spp, most_spp, samples, rays, dropped, clamped, noise, noise_target, noise_target_met, noisy_pixels, threads, seconds."""
-        return self._native.stats()
+        return self._native.stats() if self._stats is None else dict(self._stats)
 
     def save(
         self,
@@ -99,12 +115,40 @@ class Image:
             raise ValueError("another dtype needs a copy")
         return np.array(self.array, dtype=dtype)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # As it was rendered, before exposure and tone mapping.
+        return _restored, (self._native.kept(), self.stats)
+
     def __repr__(self) -> str:
         height, width = self.array.shape[:2]
         return f"<lumbre.Image {width} x {height}, {self.stats['spp']} samples a pixel>"
 
     def _repr_png_(self) -> bytes:
         return self.png()
+
+
+_HINTS = {
+    "show": "it shows itself in a notebook; save(path) writes a file",
+    "to_pil": "PIL.Image.open(io.BytesIO(image.png())) is one",
+    "to_numpy": "array is its numpy array",
+    "numpy": "array is its numpy array",
+    "data": "array is its numpy array",
+    "pixels": "array is its numpy array",
+    "size": "shape is (height, width, 3)",
+    "width": "shape is (height, width, 3)",
+    "height": "shape is (height, width, 3)",
+    "depth": 'feature("depth") of a picture that was rendered with features=True',
+    "normal": 'feature("normal") of a picture that was rendered with features=True',
+    "normals": 'feature("normal") of a picture that was rendered with features=True',
+    "albedo": 'feature("albedo") of a picture that was rendered with features=True',
+    "write": "save(path) writes a file",
+}
+
+
+def _restored(kept: dict[str, Any], stats: dict[str, Any]) -> Image:
+    image = Image(_lumbre.Picture.restored(kept))
+    image._stats = stats
+    return image
 
 
 def read_image(path: str | os.PathLike[str]) -> npt.NDArray[np.float32]:

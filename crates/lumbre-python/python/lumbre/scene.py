@@ -9,17 +9,20 @@ import pickle
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _lumbre
-from ._arrays import Array, fits, flag, positive, rays, rows, triple, whole, wholes
+from ._arrays import Array, array_of, fits, flag, positive, rays, rows, triple, whole, wholes
 from ._lumbre import LumbreError
-from .appearance import Camera, Light
+from ._words import Described, answers_names, no_attribute
+from .appearance import Camera, Light, colour, environment
 from .explanation import Explanation
-from .geometry import Instances, Shape
+from .geometry import Instances, Mesh, Shape, is_trimesh
 from .image import Image
 from .viewing import Viewer
 
@@ -30,6 +33,34 @@ _WIDTHS = {"point": 3, "normal": 3, "uv": 2}
 _KINDS: dict[str, type[Any]] = {"front": np.bool_, "shape": np.int32, "prim": np.int32, "instance": np.int32}
 _ndarray = np.ndarray
 _NEAREST = ("distance", "point", "shape", "prim", "instance")
+
+# What fields of hits are called elsewhere.
+_OTHER_WORDS = {
+    "normals": "normal",
+    "points": "point",
+    "position": "point",
+    "positions": "point",
+    "location": "point",
+    "locations": "point",
+    "distance": "t",
+    "distances": "t",
+    "depth": "t",
+    "t_hit": "t",
+    "uvs": "uv",
+    "face": "prim",
+    "faces": "prim",
+    "triangle": "prim",
+    "triangles": "prim",
+    "primitive": "prim",
+    "primitive_ids": "prim",
+    "prims": "prim",
+    "shapes": "shape",
+    "geometry_ids": "shape",
+    "instances": "instance",
+    "hits": "hit",
+    "is_hit": "hit",
+    "mask": "hit",
+}
 
 Progress = Callable[[int, "int | None", float], object]
 
@@ -73,7 +104,9 @@ class Hits:
         self.__dict__ = columns
 
     def __getattr__(self, name: str) -> Array:
-        raise AttributeError(f"these hits have no {name} (cast with it among the fields)")
+        if name in FIELDS:
+            raise AttributeError(f"these hits have no {name} (cast with it among the fields)")
+        raise no_attribute(self, name, {word: f"it is {ours}" for word, ours in _OTHER_WORDS.items()})
 
     @property
     def hit(self) -> npt.NDArray[np.bool_]:
@@ -126,7 +159,7 @@ class Nearest:
     Attributes
     ----------
     distance : (N,)
-        Never negative; inf where there is nothing within the distance asked for.
+        Never negative; inf where there is nothing within the distance asked for, and nan where the answer is not known.
     point : (N, 3)
         The place; nan where there is none.
     shape, prim, instance : (N,) of int32
@@ -152,19 +185,69 @@ class Nearest:
         return f"Nearest({len(self)} points)"
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class SceneMesh(metaclass=Described):
+    """A mesh of a scene in one of its places: arrays in world space, made when they are asked for, of `Scene.meshes`.
+
+    Attributes
+    ----------
+    shape, instance : int
+        As of `Hits`: the position of the shape in its scene, and the outermost instance, -1 where it is in none.
+    vertices : (V, 3) float64
+    faces : (F, 3) int64
+        Counter-clockwise from the front, in the order of `Hits.prim`; a quad is two triangles, after those that were triangles.
+    normals : (V, 3) float64, or None
+        Unit vectors for shading.
+    uvs : (V, 2) float64, or None
+        Texture coordinates.
+    """
+
+    shape: int
+    instance: int
+    _native: _lumbre.PlacedMesh
+
+    @cached_property
+    def vertices(self) -> npt.NDArray[np.float64]:
+        """Places in the world, (V, 3)."""
+        return self._native.vertices()
+
+    @cached_property
+    def faces(self) -> npt.NDArray[np.int64]:
+        """Vertex numbers of triangles, (F, 3)."""
+        return self._native.faces()
+
+    @cached_property
+    def normals(self) -> npt.NDArray[np.float64] | None:
+        """Shading normals, (V, 3); None where it has none."""
+        return self._native.normals()
+
+    @cached_property
+    def uvs(self) -> npt.NDArray[np.float64] | None:
+        """Texture coordinates, (V, 2); None where it has none."""
+        return self._native.uvs()
+
+    def __getattr__(self, name: str) -> Any:
+        raise no_attribute(self, name, {"uv": "it is uvs", "triangles": "it is faces"})
+
+    def __repr__(self) -> str:
+        where = "" if self.instance < 0 else f" in instance {self.instance}"
+        return f"<lumbre.SceneMesh of shape {self.shape}{where}>"
+
+
 class Scene:
     """Shapes with a camera and lights, ready for ray queries and pictures.
 
     Parameters
     ----------
-    shapes : shapes and `Instances`
-        What stands there. `Hits.shape` is the position among all shapes, those of instances after the others.
+    shapes : shapes, `Instances`, other scenes, and meshes of trimesh
+        What stands there; of other scenes, all that they have, their lights and cameras, too. `Hits.shape` is the position among all
+        shapes, in this order, those of instances after the other shapes between two scenes.
     camera : Camera or list of them, optional
-        The first is the default; by default one that sees everything.
+        The first is the default; by default that of the first scene that has one, else one that sees everything.
     lights : list of lights, optional
         By default studio light, unless a shape emits. With neither camera nor light, everything also stands on its shadow in pictures.
-    up : triple
-        What is up for the default camera and light; z unless you say otherwise.
+    up : triple, optional
+        What is up for the default camera and light: by default what it is in the first scene among the shapes, else z.
 
     A scene does not change. It may be used from many threads at once, and is pickled by what it was made of. Queries release the
     interpreter's lock, use every core (or as many as RAYON_NUM_THREADS says) and end on Ctrl-C.
@@ -175,32 +258,42 @@ class Scene:
     3
     """
 
+    @answers_names
     def __init__(
         self,
-        shapes: Iterable[Shape | Instances] | Shape | Instances,
+        shapes: Any,
         *,
         camera: Camera | Sequence[Camera] | None = None,
-        lights: Iterable[Light] = (),
-        up: Iterable[float] = (0.0, 0.0, 1.0),
+        lights: Iterable[Light | Shape] | Light = (),
+        up: Iterable[float] | None = None,
     ) -> None:
-        parts = [shapes] if isinstance(shapes, (Shape, Instances)) else list(shapes)
+        is_one = isinstance(shapes, (Shape, Instances, Scene)) or is_trimesh(shapes)
+        parts = [Mesh(part) if is_trimesh(part) else part for part in ([shapes] if is_one else list(shapes))]
         cameras = [] if camera is None else [camera] if isinstance(camera, Camera) else list(camera)
-        lamps = list(lights)
-        for what, kinds, name in ((parts, (Shape, Instances), "shape"), (cameras, Camera, "camera"), (lamps, Light, "light")):
+        given = [lights] if isinstance(lights, (Light, Shape)) else list(lights)
+        # Shapes that emit are lights, too.
+        parts += [light for light in given if isinstance(light, Shape) and light._light() is not None]
+        lamps: list[Any] = [light for light in given if not (isinstance(light, Shape) and light._light() is not None)]
+        kinds = ((parts, (Shape, Instances, Scene), "shape"), (cameras, Camera, "camera"), (lamps, Light, "light"))
+        for what, kind, name in kinds:
             for part in what:
-                if not isinstance(part, kinds):
+                if not isinstance(part, kind):
                     raise LumbreError(f"this is no {name}: {part!r}")
-        source: dict[str, Any] = {"shapes": parts, "camera": cameras, "lights": lamps, "up": triple("up", up)}
+        has_scenes = any(isinstance(part, Scene) for part in parts)
+        upwards = triple("up", up) if up is not None else None if has_scenes else (0.0, 0.0, 1.0)
+        source: dict[str, Any] = {"shapes": parts, "camera": cameras, "lights": lamps, "up": upwards}
         self._source = source
-        self._warnings: tuple[str, ...] = ()
-        self._native = _lumbre.Scene.build(
-            [shape._native() for shape in parts if isinstance(shape, Shape)],
-            [shape._native() for shape in parts if isinstance(shape, Instances)],
+        self._warnings: tuple[str, ...] = sum((part.warnings for part in parts if isinstance(part, Scene)), ())
+        self._native: _lumbre.Scene = _lumbre.Scene.build(
+            [part._native if isinstance(part, Scene) else part._native() for part in parts],
             [camera._native() for camera in cameras],
             [light._native() for light in lamps],
-            source["up"],
+            upwards,
             [("scene", _hash(source))],
         )
+
+    def __getattr__(self, name: str) -> Any:
+        raise no_attribute(self, name, _HINTS)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -217,6 +310,22 @@ class Scene:
         """The lowest and the highest corner of everything finite, (2, 3); None where nothing is."""
         bounds = self.info["bounds"]
         return None if bounds is None else np.array(bounds)
+
+    @property
+    def meshes(self) -> list[SceneMesh]:
+        """The meshes as arrays in world space, those of instances once for each place; meshes in CSG are not among them.
+
+        >>> import lumbre
+        >>> mesh = lumbre.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], transform=lumbre.translate(0, 0, 5))
+        >>> lumbre.Scene([lumbre.Sphere(), mesh]).meshes[0].vertices.tolist()
+        [[0.0, 0.0, 5.0], [1.0, 0.0, 5.0], [0.0, 1.0, 5.0]]
+        """
+
+        def of(native: _lumbre.PlacedMesh) -> SceneMesh:
+            shape, instance = native.place()
+            return SceneMesh(shape, -1 if instance is None else instance, native)
+
+        return [of(native) for native in self._native.meshes()]
 
     def cast(
         self,
@@ -329,7 +438,8 @@ class Scene:
     def closest_point(self, points: npt.ArrayLike, max_distance: float = math.inf) -> Nearest:
         """The nearest point of all surfaces, for (N, 3) points.
 
-        Raises `LumbreError` where something may be nearer that has no answer, such as some shapes under maps that change angles.
+        Where something may be nearer that has no answer, such as CSG, or some shapes under maps that change angles, the distance is nan,
+        `shape` -1, and a `UserWarning` says for how many points, and why.
 
         >>> import lumbre
         >>> nearest = lumbre.Scene([lumbre.Sphere(radius=2)]).closest_point([[0.0, 0.0, 5.0]])
@@ -340,7 +450,10 @@ class Scene:
             raise LumbreError(f"max_distance is out of range (found {max_distance!r}; expected a number, 0 or more)")
         places = _points(points)
         columns = _columns(len(places), places.dtype, ("t", "point", "shape", "prim", "instance"))
-        self._native.closest_point(places, max_distance, columns)
+        why = self._native.closest_point(places, max_distance, columns)
+        if why is not None:
+            unknown = int(np.isnan(columns["t"]).sum())
+            warnings.warn(f"the nearest point is not known for {unknown} of {len(places)} points: {why}", stacklevel=2)
         return Nearest({"distance" if name == "t" else name: column for name, column in columns.items()})
 
     def inside(self, points: npt.ArrayLike) -> npt.NDArray[np.bool_]:
@@ -373,7 +486,7 @@ class Scene:
         """The distance of (N, 3) points to the nearest surface, negative inside: where surfaces wind around a point
         more than 0.5 times, in either direction. So a closed mesh that is inside out has the same signs, as `inside` does.
 
-        Raises `LumbreError` as `closest_point` and `winding_number` do.
+        Raises `LumbreError` as `winding_number` does; nan where `closest_point` has no answer.
 
         >>> import lumbre
         >>> lumbre.Scene([lumbre.Sphere(radius=2)]).signed_distance([[0.0, 0.0, 1.5], [0.0, 0.0, 4.0]]).tolist()
@@ -383,13 +496,22 @@ class Scene:
         distance = self.closest_point(places).distance
         return np.where(np.abs(self.winding_number(places)) > 0.5, -distance, distance)
 
+    @answers_names
     def render(
         self,
         spp: int | None = None,
         size: tuple[int, int] | None = None,
         *,
+        camera: Camera | int | str | None = None,
+        azimuth: float | None = None,
+        elevation: float | None = None,
+        zoom: float | None = None,
+        fit: bool = False,
+        env: Any = None,
+        ground: str | None = None,
+        background: Any = None,
+        overrides: Mapping[str, Any] | None = None,
         crop: tuple[int, int, int, int] | None = None,
-        camera: int | str | None = None,
         integrator: str | None = None,
         max_depth: int | None = None,
         seed: int | None = None,
@@ -410,9 +532,25 @@ class Scene:
         spp : samples per pixel
             By default what the scene says, else 64; 16 for a model without camera and light, whose noise is taken out.
         size : (width, height) in pixels
+            By default that of a `Pinhole`, else what the scene says.
+        camera : Camera, position or name
+            A camera of any kind for any scene, or one of the scene's own. Pictures by many cameras share what was built for the first: the
+            tree, the lights and the ground. So the studio stands still, while a model is looked at from all sides.
+        azimuth, elevation : degrees by which the camera that frames everything goes to the right, and up
+            The studio goes along, as of `lumbre render --azimuth`.
+        zoom : how many times as large everything is in the picture of the scene's own camera, or of that which frames everything
+        fit : frame everything, even if the scene has a camera
+        env : light from all around, in place of the scene's own
+            A file or an (h, 2h, 3) array by longitude and latitude, its middle behind the model; an `EnvironmentLight` or `SkyLight` as
+            it stands; a radiance; "studio"; or "none" besides the scene's own.
+        ground : "none", "shadow" (ground of which only the shadow is seen), "plane" (matt and grey) or "auto"
+        background : what is behind everything
+            "env" (the light from there), "studio" (grey paper), "transparent", a colour, an (h, w, 3) array or a file.
+        overrides : values by name, as the program's -D
+            "material.NAME.PARAM", "light.NUMBER.PARAM", "camera.PARAM" or "film.PARAM": numbers, colours or names of such. A tree is built
+            for each new set of them; the last two are kept.
         crop : (x0, y0, x1, y1), upper ends excluded
             Only these pixels.
-        camera : position or name
         integrator : path, caustics, whitted, ambientocclusion, normals, depth, albedo or uv
         max_depth : bounces at most
         seed : whole number, 0 or more
@@ -444,6 +582,14 @@ class Scene:
             "size": size,
             "crop": crop,
             "camera": camera,
+            "azimuth": azimuth,
+            "elevation": elevation,
+            "zoom": zoom,
+            "fit": fit or None,
+            "env": env,
+            "ground": ground,
+            "background": background,
+            "overrides": overrides,
             "integrator": integrator,
             "max_depth": max_depth,
             "seed": seed,
@@ -451,7 +597,7 @@ class Scene:
             "time": time,
             "noise": noise,
             "min_spp": min_spp,
-            "transparent": transparent,
+            "transparent": transparent or None,
             "features": features,
             "denoise": denoise,
             "first_sample": first_sample,
@@ -475,9 +621,10 @@ class Scene:
         if stats["noise_target_met"] is False:
             more = "time" if time is not None and stats["spp"] < options["spp"] else "spp"
             reached = "not known yet" if stats["noise"] is None else stats["noise"]
-            warnings.warn(f"the noise is {reached}, and that of {noise} was not reached: more {more} goes on", stacklevel=2)
+            warnings.warn(f"the noise is {reached}, and that of {noise} was not reached: more {more} goes on", stacklevel=3)
         return image
 
+    @answers_names
     def explain(
         self,
         pixel: tuple[int, int] | None = None,
@@ -490,7 +637,7 @@ class Scene:
         nearest: bool = False,
         lang: str = "en",
         size: tuple[int, int] | None = None,
-        camera: int | str | None = None,
+        camera: Camera | int | str | None = None,
         integrator: str | None = None,
         seed: int | None = None,
     ) -> Explanation:
@@ -535,6 +682,7 @@ class Scene:
         native = self._native
         return Explanation(lambda format: native.explain(options, pixel, asked, sample, depth, nearest, lang, format))
 
+    @answers_names
     def view(self, *, size: tuple[int, int] | None = None, spp: int | None = None, open: bool = True) -> Viewer:
         """Shows the scene in a page of the browser while it is rendered: `lumbre view`, from Python.
 
@@ -559,6 +707,26 @@ class Scene:
             viewer.open()
         return viewer
 
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the scene as a .pbrt, which the program and `load` read; images and meshes are written beside it, under its name.
+
+        A scene of a file is in that file. Raises `LumbreError` for what a .pbrt cannot hold, and says what that is: `Curves`, `Implicit`,
+        patches, colours of vertices, several cameras, and scenes without a camera or light of their own. Meshes are rounded to single
+        precision, with a `UserWarning` where that changes them.
+
+        >>> import lumbre, pathlib, tempfile
+        >>> scene = lumbre.Scene([lumbre.Sphere(radius=2)], camera=lumbre.Perspective((0, -9, 0)), lights=[lumbre.EnvironmentLight(1)])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     path = pathlib.Path(folder, "ball.pbrt")
+        ...     scene.save(path)
+        ...     lumbre.load(path)
+        <lumbre.Scene of 1 sphere>
+        """
+        # Half of the package, for scenes that are saved alone.
+        from .saving import save
+
+        save(self._source, self.size, path)
+
     @property
     def size(self) -> tuple[int, int]:
         """Width and height of its pictures, where none is asked for."""
@@ -576,6 +744,32 @@ class Scene:
 
     def __reduce__(self) -> tuple[Callable[..., Scene], tuple[Any, ...]]:
         return _again, (self._source,)
+
+
+_HINTS = {
+    "intersect": "cast(origins, directions) finds the closest hits",
+    "intersects": "occluded(origins, directions) says whether anything is hit",
+    "raycast": "cast(origins, directions) finds the closest hits",
+    "ray_cast": "cast(origins, directions) finds the closest hits",
+    "cast_rays": "cast(origins, directions) finds the closest hits",
+    "trace": "cast(origins, directions) finds the closest hits",
+    "closest": "cast(origins, directions) finds the closest hits",
+    "any": "occluded(origins, directions) says whether anything is hit",
+    "all": "cast_all(origins, directions) finds every hit",
+    "bbox": "bounds has the lowest and the highest corner",
+    "aabb": "bounds has the lowest and the highest corner",
+    "show": "view() opens it in the browser; in a notebook it shows itself",
+    "vertices": "meshes has the arrays of each mesh",
+    "faces": "meshes has the arrays of each mesh",
+    "triangles": "meshes has the arrays of each mesh",
+    "mesh": "meshes has the arrays of each mesh",
+    "contains": "inside(points) says which are within closed bodies",
+    "distance": "closest_point(points).distance, or signed_distance(points)",
+    "sdf": "signed_distance(points)",
+    "to_pbrt": "save(path) writes a .pbrt",
+    "export": "save(path) writes a .pbrt",
+    "write": "save(path) writes a .pbrt",
+}
 
 
 def _again(source: dict[str, Any]) -> Scene:
@@ -598,6 +792,7 @@ def _hash(source: Mapping[str, Any]) -> str:
         sys.setrecursionlimit(limit)
 
 
+@answers_names
 def load(
     *paths: str | os.PathLike[str],
     lenient: bool = False,
@@ -607,7 +802,7 @@ def load(
     animation: str | None = None,
     variant: str | None = None,
 ) -> Scene:
-    """Opens scene files as one scene: .pbrt (also .gz), .gltf, .glb, .obj, .ply or .stl.
+    """Opens scene files as one scene: .pbrt (also .gz), .gltf, .glb, .obj, .ply, .stl or .pov.
 
     Parameters
     ----------
@@ -647,7 +842,7 @@ def load(
     scene._native = native
     scene._warnings = tuple(lines)
     for line in lines:
-        warnings.warn(line, stacklevel=2)
+        warnings.warn(line, stacklevel=3)
     return scene
 
 
@@ -671,7 +866,22 @@ def _columns(count: int, dtype: np.dtype[Any], fields: Sequence[str]) -> dict[st
 def _options(given: Mapping[str, Any]) -> dict[str, Any]:
     """Options of a render that are given, each of its kind and in its range."""
     options = {name: value for name, value in given.items() if value is not None}
+    camera = options.get("camera")
+    if isinstance(camera, Camera):
+        del options["camera"]
+        options["view"] = camera._native()
+        if "size" not in options and (size := camera._size()) is not None:
+            options["size"] = size
+    for name in ("azimuth", "elevation", "zoom", "fit"):
+        is_own = name == "zoom" and not isinstance(camera, Camera)
+        if name in options and camera is not None and not is_own:
+            what = "the camera" if isinstance(camera, Camera) else "a camera of the scene"
+            raise LumbreError(f"camera and {name} exclude each other: {name} moves the camera that frames everything, not {what}")
+    if "transparent" in options and "background" in options:
+        raise LumbreError('transparent and background exclude each other (transparent=True is background="transparent")')
     for name, value in options.items():
+        if name == "view":
+            continue
         if name == "size":
             options[name] = wholes(name, value, "width, height", 1)
         elif name == "crop":
@@ -683,7 +893,20 @@ def _options(given: Mapping[str, Any]) -> dict[str, Any]:
         elif name == "seed":
             options[name] = whole(name, value, 0, 2**64 - 1)
         elif name == "camera":
-            options[name] = value if isinstance(value, str) else whole("camera", value)
+            options[name] = value if isinstance(value, str) else _position(value)
+        elif name in ("azimuth", "elevation"):
+            options[name] = _degrees(name, value)
+        elif name == "zoom":
+            options[name] = positive(name, value, "a factor above 0, such as 1.5")
+        elif name == "env":
+            options[name] = environment(value)
+        elif name == "ground":
+            if not isinstance(value, str):
+                raise LumbreError(f'ground is no name (found {value!r}; expected "auto", "none", "shadow" or "plane")')
+        elif name == "background":
+            options[name] = _background(value)
+        elif name == "overrides":
+            options[name] = _settings(value)
         elif name == "integrator":
             if not isinstance(value, str):
                 raise LumbreError(f"integrator is no name (found {value!r})")
@@ -694,6 +917,58 @@ def _options(given: Mapping[str, Any]) -> dict[str, Any]:
         else:
             options[name] = flag(name, value)
     return options
+
+
+def _position(value: Any) -> int:
+    try:
+        return whole("camera", value)
+    except LumbreError as error:
+        raise LumbreError(
+            f"camera is out of range (found {value!r}; expected a Camera, or the position or name of one of the scene's)"
+        ) from error
+
+
+def _degrees(name: str, value: Any) -> float:
+    is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    if not is_number or not abs(value) <= 1e6:
+        raise LumbreError(f"{name} is out of range (found {value!r}; expected degrees, such as 30 or -90)")
+    return float(value)
+
+
+def _background(value: Any) -> Any:
+    """What is behind everything, as the native half takes it."""
+    if isinstance(value, str) and value in ("env", "studio", "transparent"):
+        return value
+    is_path = isinstance(value, os.PathLike) or (isinstance(value, str) and not value.startswith("#") and os.path.splitext(value)[1] != "")
+    if is_path:
+        return _lumbre.read_image(os.fspath(value))[0]
+    if isinstance(value, np.ndarray) and value.ndim == 3:
+        return array_of("background", value).astype(np.float32, copy=False)
+    try:
+        return colour("background", value)
+    except LumbreError as error:
+        expected = 'expected "env", "studio", "transparent", a colour, an (h, w, 3) array or a file'
+        raise LumbreError(f"background is no such thing ({expected}): {error}") from error
+
+
+def _settings(given: Any) -> list[str]:
+    """Overrides as the program takes them, `material.wood.reflectance=0.5,0.25,0.125`."""
+    if not isinstance(given, Mapping):
+        raise LumbreError(f'overrides have no names (found {given!r}; expected a dict such as {{"camera.fov": 30}})')
+    lines = []
+    for name, value in given.items():
+        if not isinstance(name, str):
+            raise LumbreError(f"overrides: a name is no text (found {name!r})")
+        if isinstance(value, str):
+            text = value
+        elif isinstance(value, (bool, np.bool_)):
+            text = str(bool(value)).lower()
+        elif np.ndim(value) == 0:
+            text = repr(float(value)) if not isinstance(value, (int, np.integer)) else str(int(value))
+        else:
+            text = ",".join(repr(float(number)) for number in value)
+        lines.append(f"{name}={text}")
+    return lines
 
 
 def _checked(out: Mapping[str, Array]) -> dict[str, Array]:

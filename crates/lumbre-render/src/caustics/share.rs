@@ -19,11 +19,9 @@ const PASS: u32 = u32::MAX;
 /// for the same scene, camera and seed.
 ///
 /// # Errors
-/// [`RenderError::NoSuchCamera`].
+/// As for [`RenderOptions::camera_of`].
 pub fn caustic_share(scene: &Scene, options: &RenderOptions) -> Result<f64, RenderError> {
-    let count = scene.cameras().len();
-    let camera = scene.cameras().get(options.camera);
-    let camera = camera.ok_or(RenderError::NoSuchCamera { index: options.camera, count })?;
+    let camera = options.camera_of(scene)?;
     let Some(chords) = ChordSampler::new(scene).filter(|_| !scene.lights().is_empty()) else {
         return Ok(0.0);
     };
