@@ -5,11 +5,13 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-/// What is said of a block in the line that opens it: `console`, `console,head=20` or `console,varies`.
+/// What is said of a block in the line that opens it: `console`, `console,head=20`, `console,result` or `console,varies`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Example {
     /// How many lines of each output are shown, if not all.
     head: Option<usize>,
+    /// Whether only the results of `lumbre math` are shown, without the steps.
+    only_results: bool,
     /// Whether the numbers of an output are others each time, as times are.
     varies: bool,
 }
@@ -24,12 +26,13 @@ impl Example {
         if words.next() != Some("console") {
             return Ok(None);
         }
-        let mut example = Self { head: None, varies: false };
+        let mut example = Self { head: None, only_results: false, varies: false };
         for word in words {
             match word.strip_prefix("head=").and_then(|number| number.parse().ok()) {
                 Some(lines) => example.head = Some(lines),
+                None if word == "result" => example.only_results = true,
                 None if word == "varies" => example.varies = true,
-                None => bail!("{word} says nothing of an example: head=NUMBER and varies do"),
+                None => bail!("{word} says nothing of an example: head=NUMBER, result and varies do"),
             }
         }
         Ok(Some(example))
@@ -85,7 +88,11 @@ impl Example {
                 if must_fail { ", which is not as it has to fail" } else { "" }
             );
         }
-        let lines: Vec<&str> = said.lines().map(str::trim_end).collect();
+        let mut lines: Vec<&str> = said.lines().map(str::trim_end).collect();
+        if self.only_results {
+            lines = results(&lines);
+            anyhow::ensure!(!lines.is_empty(), "{command} prints no result, which is a line that begins with =");
+        }
         let most = self.head.unwrap_or(usize::MAX);
         let mut shown = format!("$ {command}\n");
         for line in lines.iter().take(most) {
@@ -98,6 +105,19 @@ impl Example {
         }
         Ok(shown)
     }
+}
+
+/// The results among the lines that `lumbre math` prints: each begins with `=`, and goes on while its brackets are open.
+fn results<'a>(lines: &[&'a str]) -> Vec<&'a str> {
+    let mut shown = Vec::new();
+    let mut open = 0_usize;
+    for line in lines {
+        if open > 0 || line.starts_with("= ") {
+            open = (open + line.matches('[').count()).saturating_sub(line.matches(']').count());
+            shown.push(*line);
+        }
+    }
+    shown
 }
 
 /// A text with a mark in place of each number.
@@ -133,6 +153,14 @@ mod tests {
         }
         let cut = run("console,head=2", "$ printf '1\\n2\\n3\\n'").expect("it prints");
         assert_eq!(cut, "$ printf '1\\n2\\n3\\n'\n1\n2\n…\n");
+    }
+
+    #[test]
+    fn only_results_are_shown_where_that_is_asked() {
+        let text = "$ printf 'cross(a, b)\\n  = [1·2]\\n= 5\\nM\\n= [[1, 2],\\n   [3, 4]]\\ntail\\n'";
+        let shown = run("console,result", text).expect("it prints");
+        assert_eq!(shown, format!("{text}\n= 5\n= [[1, 2],\n   [3, 4]]\n"));
+        assert_eq!(run("console,result", "\n$ echo 5").expect_err("no result").0, 1);
     }
 
     #[test]
