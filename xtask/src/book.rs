@@ -28,7 +28,7 @@ const PAGES: &str = "docs";
 const BESIDE: [&str; 2] = ["scenes", "crates/lumbre/examples"];
 
 /// How the book is built.
-#[derive(Args, Clone, Copy, Debug)]
+#[derive(Args, Clone, Debug)]
 pub(crate) struct Book {
     /// Pictures of one sample a pixel and a quarter of the width and height, by the program as the tests build it: for the checks alone.
     #[arg(long)]
@@ -37,6 +37,9 @@ pub(crate) struct Book {
     /// scenes that are new or have changed.
     #[arg(long, conflicts_with_all = ["quick", "install_only"])]
     update: bool,
+    /// With --update, only pages whose path contains one of these, such as light/ or quadric.md.
+    #[arg(requires = "update", value_name = "PAGE")]
+    pages: Vec<String>,
     /// Only gets mdbook where there is none.
     #[arg(long)]
     install_only: bool,
@@ -46,7 +49,7 @@ impl Book {
     /// Builds the book into `target/book/html`, where mdbook is found or can be had.
     pub(crate) fn run(self) -> Result<()> {
         if self.update {
-            return prepare(false, true).map(drop);
+            return prepare(false, true, &self.pages).map(drop);
         }
         let mdbook = match find_mdbook() {
             Some(mdbook) => mdbook,
@@ -64,7 +67,7 @@ pub(crate) fn test() -> Result<()> {
             eprintln!(
                 "\nThe links of the book are not tried: it needs mdbook 0.5 (cargo xtask book --install-only)"
             );
-            prepare(true, false).map(drop)
+            prepare(true, false, &[]).map(drop)
         }
     }
 }
@@ -98,7 +101,7 @@ fn install_mdbook() -> Result<PathBuf> {
 }
 
 fn build(mdbook: &Path, quick: bool) -> Result<()> {
-    let pages = prepare(quick, false)?;
+    let pages = prepare(quick, false, &[])?;
     let html = target().join("book/html");
     if html.exists() {
         fs::remove_dir_all(&html).with_context(|| format!("cannot remove {}", html.display()))?;
@@ -109,8 +112,9 @@ fn build(mdbook: &Path, quick: bool) -> Result<()> {
     Ok(())
 }
 
-/// Prepares a copy of the pages for mdbook, or brings those of the repository up to date. The folder of the copy.
-fn prepare(quick: bool, update: bool) -> Result<PathBuf> {
+/// Prepares a copy of the pages for mdbook, or brings those of the repository up to date, of which only those that contain one of `only`, if any.
+/// The folder of the copy.
+fn prepare(quick: bool, update: bool, only: &[String]) -> Result<PathBuf> {
     let program = program(quick)?;
     let book = target().join("book");
     let copy = book.join("root");
@@ -122,7 +126,7 @@ fn prepare(quick: bool, update: bool) -> Result<PathBuf> {
     }
     let (root, rendered) = (root(), book.join("pictures"));
     let preparer = Preparer::new(&root, &copy, &program, &rendered, quick, update)?;
-    refuse(&preparer.prepare_all()?)?;
+    refuse(&preparer.prepare_all(only)?)?;
     Ok(copy.join(PAGES))
 }
 
@@ -220,6 +224,40 @@ mod tests {
             );
         }
         assert!(faults.is_empty(), "cargo xtask book --update mends these:\n{}", faults.join("\n"));
+    }
+
+    /// The exercises of a page whose answer neither has a command that computes it, nor is marked as one of reasoning alone.
+    fn uncomputed(text: &str) -> Vec<String> {
+        let answers = text.split("<details>").skip(1).filter_map(|rest| rest.split("</details>").next());
+        let is_computed = |answer: &&str| !answer.contains("```console") && !answer.contains(REASONED);
+        answers.filter(is_computed).map(str::to_owned).collect()
+    }
+
+    /// What an answer has in place of a command where there is nothing to compute.
+    const REASONED: &str = "<!-- reasoned -->";
+
+    #[test]
+    fn answers_of_exercises_are_computed() {
+        let (mut exercises, mut reasoned) = (0, 0);
+        let mut faults = Vec::new();
+        for folder in ["mathematics", "light"] {
+            for page in files::with_ending(&root().join(PAGES).join(folder), "md").expect("there are pages") {
+                let text = fs::read_to_string(&page).expect("it can be read");
+                exercises += text.matches("<details>").count();
+                reasoned += text.matches(REASONED).count();
+                faults.extend(
+                    uncomputed(&text).into_iter().map(|answer| format!("{}: {answer}", page.display())),
+                );
+            }
+        }
+        assert!(faults.is_empty(), "a command is missing in these answers:\n{}", faults.join("\n"));
+        assert!(
+            exercises > 100 && reasoned * 10 < exercises,
+            "{exercises} exercises, {reasoned} without a command"
+        );
+        let page =
+            "<details>a</details><details>```console\n$ b\n```</details><details><!-- reasoned --></details>";
+        assert_eq!(uncomputed(page), ["a"]);
     }
 
     #[test]

@@ -5,11 +5,13 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-/// What is said of a block in the line that opens it: `console`, `console,head=20` or `console,varies`.
+/// What is said of a block in the line that opens it: `console`, `console,head=20`, `console,result` or `console,varies`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Example {
     /// How many lines of each output are shown, if not all.
     head: Option<usize>,
+    /// Whether only the results of `lumbre math` are shown, without the steps.
+    only_results: bool,
     /// Whether the numbers of an output are others each time, as times are.
     varies: bool,
 }
@@ -24,12 +26,13 @@ impl Example {
         if words.next() != Some("console") {
             return Ok(None);
         }
-        let mut example = Self { head: None, varies: false };
+        let mut example = Self { head: None, only_results: false, varies: false };
         for word in words {
             match word.strip_prefix("head=").and_then(|number| number.parse().ok()) {
                 Some(lines) => example.head = Some(lines),
+                None if word == "result" => example.only_results = true,
                 None if word == "varies" => example.varies = true,
-                None => bail!("{word} says nothing of an example: head=NUMBER and varies do"),
+                None => bail!("{word} says nothing of an example: head=NUMBER, result and varies do"),
             }
         }
         Ok(Some(example))
@@ -85,7 +88,14 @@ impl Example {
                 if must_fail { ", which is not as it has to fail" } else { "" }
             );
         }
-        let lines: Vec<&str> = said.lines().map(str::trim_end).collect();
+        let mut lines: Vec<&str> = said.lines().map(str::trim_end).collect();
+        if self.only_results {
+            lines = results(&lines);
+            anyhow::ensure!(
+                !lines.is_empty(),
+                "{command} prints no result, which is a line that begins with ="
+            );
+        }
         let most = self.head.unwrap_or(usize::MAX);
         let mut shown = format!("$ {command}\n");
         for line in lines.iter().take(most) {
@@ -100,20 +110,35 @@ impl Example {
     }
 }
 
-/// A text with a mark in place of each number.
+/// The results among the lines that `lumbre math` prints: each begins with `=`, and goes on while its brackets are open.
+fn results<'a>(lines: &[&'a str]) -> Vec<&'a str> {
+    let mut shown = Vec::new();
+    let mut open = 0_usize;
+    for line in lines {
+        if open > 0 || line.starts_with("= ") {
+            open = (open + line.matches('[').count()).saturating_sub(line.matches(']').count());
+            shown.push(*line);
+        }
+    }
+    shown
+}
+
+/// A text with a mark in place of each number, together with its unit where that is one of time: a slower run takes seconds in place of milliseconds.
 fn without_numbers(text: &str) -> String {
     let mut result = String::new();
-    let mut characters = text.chars().peekable();
-    while let Some(character) = characters.next() {
-        if !character.is_ascii_digit() {
-            result.push(character);
-            continue;
-        }
+    let mut rest = text;
+    while let Some(at) = rest.find(|c: char| c.is_ascii_digit()) {
+        result.push_str(&rest[..at]);
         result.push('#');
-        while characters.next_if(|c| c.is_ascii_digit() || matches!(c, '.' | 'e' | '-')).is_some() {}
+        rest = rest[at..].trim_start_matches(|c: char| c.is_ascii_digit() || matches!(c, '.' | 'e' | '-'));
+        let unit = TIME_UNITS.iter().find_map(|unit| rest.strip_prefix(unit));
+        rest = unit.filter(|after| !after.starts_with(char::is_alphanumeric)).unwrap_or(rest);
     }
-    result
+    result + rest
 }
+
+/// Units of time, as they stand after a number.
+const TIME_UNITS: [&str; 6] = [" ns", " µs", " ms", " s", " min", " h"];
 
 #[cfg(all(test, unix))]
 mod tests {
@@ -136,6 +161,14 @@ mod tests {
     }
 
     #[test]
+    fn only_results_are_shown_where_that_is_asked() {
+        let text = "$ printf 'cross(a, b)\\n  = [1·2]\\n= 5\\nM\\n= [[1, 2],\\n   [3, 4]]\\ntail\\n'";
+        let shown = run("console,result", text).expect("it prints");
+        assert_eq!(shown, format!("{text}\n= 5\n= [[1, 2],\n   [3, 4]]\n"));
+        assert_eq!(run("console,result", "\n$ echo 5").expect_err("no result").0, 1);
+    }
+
+    #[test]
     fn what_fails_or_should_have_is_named_with_its_line() {
         for text in ["false", "true # fails", "exit 101", "exit 101 # fails", "kill $$ # fails", "echo '$ a'"]
         {
@@ -152,5 +185,7 @@ mod tests {
         let (one, other) = ("a 1.25 s, 3 pixels", "a 12e-3 s, 3 pixels");
         assert!(example("console,varies").is_same(one, other) && !example("console").is_same(one, other));
         assert!(!example("console,varies").is_same(one, "a 1.25 s, 3 rays"));
+        assert!(example("console,varies").is_same(one, "a 999 ms, 3 pixels"));
+        assert!(!example("console,varies").is_same("2 shapes", "2 handles"));
     }
 }

@@ -66,15 +66,16 @@ impl<'a> Preparer<'a> {
     }
 
     /// Prepares every page, and says all that is wrong in them: also where the page of the repository is not up to date, unless it is brought up
-    /// to date.
-    pub(crate) fn prepare_all(&self) -> Result<Vec<Fault>> {
+    /// to date. With `only`, those alone whose path contains one of them.
+    pub(crate) fn prepare_all(&self, only: &[String]) -> Result<Vec<Fault>> {
         let folder = self.copy.join(PAGES);
         let mut faults = Vec::new();
         let summary = fs::read_to_string(folder.join("SUMMARY.md")).context("cannot read SUMMARY.md")?;
         let listed: BTreeSet<PathBuf> = links_of(&summary).map(|link| folder.join(&*link)).collect();
         for page in files::with_ending(&folder, "md")? {
             let name = page.strip_prefix(self.copy).unwrap_or(&page).to_owned();
-            if page.file_name() == Some(OsStr::new("SUMMARY.md")) {
+            let is_asked = only.is_empty() || only.iter().any(|part| name.to_string_lossy().contains(part));
+            if page.file_name() == Some(OsStr::new("SUMMARY.md")) || !is_asked {
                 continue;
             }
             if !listed.contains(&page) {
