@@ -125,6 +125,10 @@ pub(crate) struct Arguments {
     /// edges and leaks, pbrt takes them as pbrt-v4 does. By default what the scene says, else lumbre.
     #[arg(long, value_name = "HOW", value_parser = one_of(&SHADING_NORMALS, ShadingNormals::from_name))]
     shading_normals: Option<ShadingNormals>,
+    /// Carry three wavelengths along each path in place of red, green and blue: colours that multiply many times, light by its spectrum
+    /// and glass that disperses are right. For the integrator path. By default where the scene's film is spectral.
+    #[arg(long)]
+    spectral: bool,
     /// Seed of the random numbers.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -582,6 +586,7 @@ fn picture(
     }
     let mut options = options(arguments, &scene)?;
     options.transparent = behind.is_transparent();
+    options.spectral |= arguments.spectral;
     let samples_are_asked = arguments.spp.is_some()
         || arguments.time.is_some()
         || arguments.noise.is_some()

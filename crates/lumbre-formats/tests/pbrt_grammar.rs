@@ -1366,13 +1366,18 @@ fn every_parameter_of_uber_and_plastic_is_kept() {
 }
 
 #[test]
-fn the_dispersion_of_a_glass_is_rendered_or_said_to_be_left_out() {
+fn the_dispersion_of_a_glass_is_kept() {
     let text = |material: &str| {
         format!("WorldBegin Material {material} \"spectrum eta\" \"glass-F11\" Shape \"sphere\"")
     };
     for material in ["\"dielectric\"", "\"thindielectric\""] {
-        let lines = try_read(&text(material)).1.lines();
-        assert!(lines.len() == 1 && lines[0].contains("dispersion is not rendered yet"), "{lines:?}");
+        let scene = read(&text(material));
+        let index = scene.materials[0].material.dispersion.as_ref().unwrap();
+        // At the d line and in the blue, by the catalogue of SF11.
+        for (nm, expected) in [(587.6, 1.78472), (435.8, 1.82518)] {
+            let found = index.at(nm).unwrap();
+            assert!((found - expected).abs() < 2e-4, "{material} at {nm}: {found}");
+        }
     }
     let scene = read(&text("\"principled\" \"float spec_trans\" 1"));
     // The language's F11 is SF11, whose Abbe number is 25.76 by its catalogue.
@@ -1551,6 +1556,7 @@ fn subsurface_and_openpbr_take_their_parameters_by_name() {
             duv_dx: Vec2::ZERO,
             duv_dy: Vec2::ZERO,
             vertex: lumbre_shading::VertexData::NONE,
+            spectral: None,
         };
         params.medium(&at)
     };

@@ -7,7 +7,7 @@ use lumbre_shading::Spectrum;
 
 use crate::film::{FeatureSample, Filter, Sample};
 use crate::integrators::{Integrator, integrator};
-use crate::transport::{Draw, Event, Features, Record, Sampler, Seen, Sight, caught};
+use crate::transport::{Draw, Event, Features, Record, Sampler, Seen, Sight, WavelengthChoice, caught};
 use crate::wave::catcher::{Catcher, Places};
 use crate::wave::{Precision, SampleId, Sights, Wave, cone};
 use crate::{RenderError, RenderOptions};
@@ -32,6 +32,8 @@ pub(crate) struct Taker<'a> {
     /// Ground that catches shadows, for many samples at once where that can be.
     catcher: Option<Catcher<'a>>,
     precision: Precision,
+    /// How samples choose their wavelengths; `None` in RGB.
+    wavelengths: Option<WavelengthChoice>,
 }
 
 /// What a sample sees besides what an integrator finds.
@@ -63,6 +65,9 @@ impl<'a> Taker<'a> {
         let camera = scene.cameras().get(options.camera);
         let camera = camera.ok_or(RenderError::NoSuchCamera { index: options.camera, count })?;
         let view = View::new(camera, options.width, options.height);
+        if options.spectral && !integrator.carries_wavelengths() {
+            return Err(RenderError::NoWavelengths);
+        }
         Ok(Self {
             scene,
             moves: scene.moves() || view.moves(),
@@ -75,6 +80,7 @@ impl<'a> Taker<'a> {
             is_centred: options.integrator.kind == lumbre_scene::IntegratorKind::Pov && options.stop.spp == 1,
             lights_are_seen: !options.transparent,
             catcher: Catcher::of(scene),
+            wavelengths: options.spectral.then_some(WavelengthChoice::Visible),
         })
     }
 
@@ -94,7 +100,8 @@ impl<'a> Taker<'a> {
             weights.push((aim.weight, camera.weight));
             (draw, camera)
         });
-        let mut sights = Sights::new(self.scene, &self.view, wave, self.precision, aimed, record);
+        let mut sights =
+            Sights::new(self.scene, &self.view, wave, self.precision, aimed, self.wavelengths, record);
         let seen = self.see(&mut sights, record);
         for (slot, ((&id, &(weight, passes)), &radiance)) in
             ids.iter().zip(&weights).zip(sights.radiance()).enumerate()
@@ -104,6 +111,7 @@ impl<'a> Taker<'a> {
             if passes == 0.0 {
                 (caught, features) = (None, None);
             }
+            let radiance = sights.wavelengths(slot).map_or(radiance, |w| w.rec709(radiance));
             let radiance = through_lens(radiance, passes);
             if let Some(caught) = &mut caught {
                 caught.radiance = through_lens(caught.radiance, passes);
@@ -175,7 +183,7 @@ impl<'a> Taker<'a> {
         }
         let ray = sight.ray.ray;
         let end = sight.met.as_ref().map_or(f64::INFINITY, |met| (met.surface.point - ray.origin).length());
-        self.scene.transmittance(self.view.medium(), &ray.with_range(0.0, end), draw.along(&ray))
+        self.scene.transmittance(self.view.medium(), &ray.with_range(0.0, end), draw.along(&ray), None)
     }
 
     fn aim(&self, id: SampleId, draw: &Draw) -> Aim {
@@ -211,7 +219,9 @@ impl<'a> Taker<'a> {
     fn explain_sight(&self, draw: Draw, camera: CameraRay) -> (Ray, Spectrum, Vec<Event>) {
         let (mut wave, mut record) = (Wave::default(), Record::with_journal());
         let one = std::iter::once((draw, camera));
-        let mut sights = Sights::new(self.scene, &self.view, &mut wave, self.precision, one, &mut record);
+        // What is told of a path is told in colours.
+        let mut sights =
+            Sights::new(self.scene, &self.view, &mut wave, self.precision, one, None, &mut record);
         let seen = self.see(&mut sights, &mut record).first().and_then(|seen| seen.caught);
         let radiance = seen.map_or(sights.radiance()[0], |seen| seen.radiance);
         (sights.ray(0), radiance, record.journal.unwrap_or_default())

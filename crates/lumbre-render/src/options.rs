@@ -40,6 +40,9 @@ pub struct RenderOptions {
     /// Whether what the camera sees where there is nothing is left out: the picture then says how much each pixel covers.
     /// Lights at infinity still light what there is.
     pub transparent: bool,
+    /// Whether samples carry wavelengths in place of linear Rec. 709: see [`Wavelengths`](lumbre_shading::spectrum::Wavelengths). Only the
+    /// path integrator does.
+    pub spectral: bool,
     /// When to stop.
     pub stop: Stop,
     /// The index of the first sample of every pixel: parts of a render begin where others end.
@@ -106,6 +109,7 @@ impl Default for RenderOptions {
             filter: FilterDesc::default(),
             exposure: exposure_of(&film),
             transparent: false,
+            spectral: false,
             stop: Stop::at(DEFAULT_SPP),
             first_sample: 0,
             features: false,

@@ -16,6 +16,7 @@ use crate::light::{
     PointLight, PortalLight, ProjectionLight, ShapeLight, SpotLight, UniformLight, portal::PortalError,
     power,
 };
+use crate::light_colour::LightColour;
 use crate::media::{self, Boundaries, Media};
 use crate::mesh::{self, QuadOrder};
 use crate::specular::Specular;
@@ -94,8 +95,12 @@ impl Scene {
         if lights.is_empty() && !builder.entries.iter().any(SurfaceEntry::shines) {
             builder.warnings.push(BuildWarning::NoLight);
         }
+        let mut light_colours = vec![LightColour::Surface; builder.lights.len()];
         for (position, light) in lights.into_iter().enumerate() {
+            let colour = LightColour::of(&light);
             builder.light(position, light)?;
+            // One that does not shine was dropped.
+            light_colours.resize(builder.lights.len(), colour);
         }
 
         let radius = if bounds.is_empty() { 1.0 } else { 0.5 * bounds.size().length() };
@@ -136,6 +141,7 @@ impl Scene {
             tables: SurfaceTable::new(&builder.entries),
             entries: builder.entries,
             lights: builder.lights,
+            light_colours,
             media: Media { media: if uses_media { media } else { vec![] }, boundaries },
             warnings: builder.warnings,
         })
@@ -548,6 +554,7 @@ impl Builder {
             LightDesc::Goniometric { image, .. } => Some(image),
             _ => None,
         };
+
         let picture = match &desc {
             LightDesc::Projection { image, .. } => Some(image),
             _ => picture.map(|picture| &picture.image),
@@ -556,6 +563,7 @@ impl Builder {
             self.warnings.push(BuildWarning::NotFiniteTexel { light: position, x, y });
         }
         let light = match desc {
+            LightDesc::Spectral { light, .. } => return self.light(position, *light),
             LightDesc::Moving { light, world_from_light } => {
                 let before = self.lights.len();
                 self.light(position, *light)?;
@@ -666,8 +674,8 @@ fn freeing<T>(mut items: Vec<T>) -> impl Iterator<Item = T> {
 
 /// The emission of an area light, with its power converted to radiance.
 pub(crate) fn emission(desc: AreaLightDesc, area: impl FnOnce() -> f64) -> Emission {
-    let AreaLightDesc { radiance, image, by_vertices, two_sided, power } = desc;
-    let mut emission = Emission { radiance, image, by_vertices, two_sided };
+    let AreaLightDesc { radiance, image, by_vertices, two_sided, power, spectrum } = desc;
+    let mut emission = Emission { radiance, image, by_vertices, two_sided, spectrum };
     if let Some(power) = power {
         // L stays a factor, as in pbrt-v4: the power is that of a radiance of 1, or of the image.
         let of_image = Emission { radiance: lumbre_image::Rgb::WHITE, ..emission.clone() }.mean().luminance();

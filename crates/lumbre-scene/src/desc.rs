@@ -7,6 +7,7 @@ use lumbre_image::Rgb;
 use lumbre_kernel::{CustomGeometry, Placement};
 use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec2, Vec3, Vec4};
 use lumbre_shading::medium::Medium;
+use lumbre_shading::spectrum::LightCurve;
 use lumbre_shading::{FURTHER_SETS, FloatTexture, Material, MipMap, ShadingNormals};
 
 use crate::{Camera, Listing, MaterialId, MediumId, ObjectId};
@@ -289,6 +290,8 @@ pub struct AreaLightDesc {
     pub two_sided: bool,
     /// Total power in lumens that a `radiance` of 1 stands for, as in pbrt-v4; if given, `radiance` is a factor on it.
     pub power: Option<f32>,
+    /// The spectrum of the radiance, with luminance 1, where it is more than a colour: for renders that carry wavelengths.
+    pub spectrum: Option<Arc<LightCurve>>,
 }
 
 /// Lights other than shapes, in world space, with photometric units resolved.
@@ -362,6 +365,13 @@ pub enum LightDesc {
     },
     /// A light by POV-Ray's laws.
     Pov(Arc<crate::pov::PovLight>),
+    /// A light of one spectrum, whose colours are this one's but for a factor.
+    Spectral {
+        /// The light. Its image, if it has one, is grey.
+        light: Box<LightDesc>,
+        /// Its spectrum with luminance 1, for renders that carry wavelengths.
+        spectrum: Arc<LightCurve>,
+    },
     /// A moving light other than an infinite one.
     Moving {
         /// The light, in its own space.
@@ -369,6 +379,16 @@ pub enum LightDesc {
         /// The placement, by rotations, mirrors and translations only, since lights do not scale.
         world_from_light: Arc<AnimatedTransform>,
     },
+}
+
+impl LightDesc {
+    /// The light without its spectrum.
+    pub fn bare(&self) -> &Self {
+        match self {
+            Self::Spectral { light, .. } => light.bare(),
+            light => light,
+        }
+    }
 }
 
 /// An environment map: linear radiance by direction.

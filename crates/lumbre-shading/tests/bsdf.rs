@@ -232,7 +232,7 @@ fn measured(alpha: (f64, f64)) -> Measured {
     }
     let single = |angles: Vec<f64>| angles.into_iter().map(|v| v as f32).collect();
     let of_facets = [height, width];
-    Measured(Arc::new(
+    Measured::new(Arc::new(
         MeasuredTables::new(MeasuredParts {
             theta_i: single(theta_i),
             phi_i: single(phi_i),

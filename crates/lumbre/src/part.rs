@@ -70,6 +70,9 @@ impl Job {
             ("guides", options.guides.to_string()),
         ];
         identity.extend(entries.map(|(name, value)| (name.to_owned(), value)));
+        if options.spectral {
+            identity.insert("spectral".to_owned(), "true".to_owned());
+        }
         let mut folder = None;
         for file in files {
             // By their names from the folder of the first, so that a render is the same wherever its files are.

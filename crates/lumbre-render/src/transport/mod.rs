@@ -10,6 +10,7 @@ pub(crate) mod seen;
 mod sight;
 mod strategy;
 pub(crate) mod through;
+mod wavelengths;
 
 pub use counts::RayCounts;
 pub use features::{Feature, Features};
@@ -18,3 +19,4 @@ pub use sampler::{Draw, Sampler};
 pub(crate) use seen::{Seen, caught};
 pub use sight::Sight;
 pub use strategy::Strategy;
+pub(crate) use wavelengths::WavelengthChoice;

@@ -11,10 +11,13 @@ mod phase;
 mod presets;
 mod sparse;
 
+use std::sync::Arc;
+
 use lumbre_math::DVec3;
 use lumbre_math::random::RandomStream;
 
-use crate::Spectrum;
+use crate::spectrum::{LightCurve, Wavelengths};
+use crate::{Spectrum, SpectrumValue};
 
 pub use cloud::Cloud;
 pub use grid::{Grid, GridError, Voxel};
@@ -33,9 +36,62 @@ pub enum Medium {
         medium: HomogeneousMedium,
         /// The radiance that it tends to where it is deep and does not scatter: it emits σ_a times this per unit of length.
         glow: Spectrum,
+        /// What is known of both by wavelength.
+        spectra: Option<Box<MediumSpectra>>,
     },
     /// By place.
     Heterogeneous(Box<HeterogeneousMedium>),
+}
+
+/// What is known of a medium by wavelength, where it is more than colours.
+#[derive(Clone, Debug, Default)]
+pub struct MediumSpectra {
+    /// The absorption coefficient.
+    pub absorption: Option<SpectrumValue>,
+    /// The scattering coefficient.
+    pub scattering: Option<SpectrumValue>,
+    /// A factor on both.
+    pub scale: f32,
+    /// The spectrum of what it emits.
+    pub glow: Option<Arc<LightCurve>>,
+}
+
+impl MediumSpectra {
+    /// A coefficient at some wavelengths, of which this is the colour.
+    fn coefficient(
+        spectrum: Option<&SpectrumValue>,
+        scale: f32,
+        colour: Spectrum,
+        wavelengths: &Wavelengths,
+    ) -> Spectrum {
+        let values = spectrum.and_then(|spectrum| wavelengths.values(spectrum));
+        values.map_or_else(
+            || wavelengths.coefficient(colour),
+            |values| values.map(|value| (value * scale).max(0.0)),
+        )
+    }
+
+    /// Absorption and scattering at some wavelengths, of which these are the colours.
+    fn coefficients(
+        spectra: Option<&Self>,
+        [absorption, scattering]: [Spectrum; 2],
+        wavelengths: &Wavelengths,
+    ) -> [Spectrum; 2] {
+        let scale = spectra.map_or(1.0, |spectra| spectra.scale);
+        let of = |spectrum, colour| Self::coefficient(spectrum, scale, colour, wavelengths);
+        [
+            of(spectra.and_then(|spectra| spectra.absorption.as_ref()), absorption),
+            of(spectra.and_then(|spectra| spectra.scattering.as_ref()), scattering),
+        ]
+    }
+
+    /// Emitted light at some wavelengths, of which this is the colour.
+    fn glow_at(spectra: Option<&Self>, glow: Spectrum, wavelengths: &Wavelengths) -> Spectrum {
+        match spectra.and_then(|spectra| spectra.glow.as_ref()) {
+            Some(curve) => wavelengths.curve(curve) * glow.luminance(),
+            None => wavelengths.light(glow),
+        }
+    }
 }
 
 /// What becomes of light along a way through a medium.
@@ -120,22 +176,46 @@ impl Medium {
         }
     }
 
-    /// Samples where light of throughput `carried` scatters along a way, if it does.
-    pub fn sample(&self, way: &Way, carried: Spectrum, mut numbers: PassageNumbers) -> Passage {
+    /// Samples where light of throughput `carried` scatters along a way, if it does. Channels are those of linear Rec. 709, or the
+    /// wavelengths that are given.
+    pub fn sample(
+        &self,
+        way: &Way,
+        carried: Spectrum,
+        mut numbers: PassageNumbers,
+        wavelengths: Option<&Wavelengths>,
+    ) -> Passage {
         match self {
-            Self::Homogeneous { medium, glow } => Passage {
-                outcome: medium.sample_distance(carried, way.length, numbers.first()),
-                emitted: if glow.is_black() { *glow } else { *glow * medium.absorbed(way.length) },
-            },
-            Self::Heterogeneous(medium) => medium.sample(way, carried, &mut numbers),
+            Self::Homogeneous { medium, glow, spectra } => {
+                let spectra = spectra.as_deref();
+                let medium = medium.at(spectra, wavelengths);
+                let glow = match wavelengths {
+                    Some(wavelengths) if !glow.is_black() => {
+                        MediumSpectra::glow_at(spectra, *glow, wavelengths)
+                    }
+                    _ => *glow,
+                };
+                Passage {
+                    outcome: medium.sample_distance(carried, way.length, numbers.first()),
+                    emitted: if glow.is_black() { glow } else { glow * medium.absorbed(way.length) },
+                }
+            }
+            Self::Heterogeneous(medium) => medium.sample(way, carried, &mut numbers, wavelengths),
         }
     }
 
     /// What is left of light at the end of a way; where the medium is not the same everywhere, an estimate of it.
-    pub fn transmittance(&self, way: &Way, mut numbers: PassageNumbers) -> Spectrum {
+    pub fn transmittance(
+        &self,
+        way: &Way,
+        mut numbers: PassageNumbers,
+        wavelengths: Option<&Wavelengths>,
+    ) -> Spectrum {
         match self {
-            Self::Homogeneous { medium, .. } => medium.transmittance(way.length),
-            Self::Heterogeneous(medium) => medium.transmittance(way, &mut numbers),
+            Self::Homogeneous { medium, spectra, .. } => {
+                medium.at(spectra.as_deref(), wavelengths).transmittance(way.length)
+            }
+            Self::Heterogeneous(medium) => medium.transmittance(way, &mut numbers, wavelengths),
         }
     }
 }

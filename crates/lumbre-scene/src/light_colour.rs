@@ -1,0 +1,67 @@
+//! What spectra lights have, where a render carries wavelengths.
+
+use std::sync::Arc;
+
+use lumbre_shading::Spectrum;
+use lumbre_shading::spectrum::{LightCurve, Wavelengths};
+
+use crate::LightDesc;
+
+/// What a light's colours are made of.
+#[derive(Clone, Debug)]
+pub(crate) enum LightColour {
+    /// One colour, times a factor by direction and place.
+    Constant {
+        /// The colour.
+        colour: Spectrum,
+        /// Its spectrum with luminance 1, where it has one of its own.
+        spectrum: Option<Arc<LightCurve>>,
+    },
+    /// Colours that vary from place to place.
+    Varied,
+    /// What a surface emits, which says so itself.
+    Surface,
+}
+
+impl LightColour {
+    /// Of a light.
+    pub(crate) fn of(desc: &LightDesc) -> Self {
+        let one = |colour: &Spectrum| Self::Constant { colour: *colour, spectrum: None };
+        match desc {
+            LightDesc::Point { intensity, .. } | LightDesc::Spot { intensity, .. } => one(intensity),
+            LightDesc::Distant { irradiance, .. } => one(irradiance),
+            LightDesc::Infinite { radiance, image: None, .. }
+            | LightDesc::Portal { radiance, image: None, .. } => one(radiance),
+            LightDesc::Infinite { .. }
+            | LightDesc::Portal { .. }
+            | LightDesc::Goniometric { .. }
+            | LightDesc::Projection { .. }
+            | LightDesc::Pov(_) => Self::Varied,
+            LightDesc::Moving { light, .. } => Self::of(light),
+            LightDesc::Spectral { light, spectrum } => {
+                let spectrum = Some(spectrum.clone());
+                match (Self::of(light), &**light) {
+                    (Self::Constant { colour, .. }, _) => Self::Constant { colour, spectrum },
+                    (_, LightDesc::Goniometric { intensity, .. }) => {
+                        Self::Constant { colour: *intensity, spectrum }
+                    }
+                    (other, _) => other,
+                }
+            }
+        }
+    }
+
+    /// Light at some wavelengths, of which `radiance` is the colour.
+    pub(crate) fn at_wavelengths(&self, radiance: Spectrum, wavelengths: &Wavelengths) -> Spectrum {
+        let Self::Constant { colour, spectrum } = self else { return wavelengths.varied_light(radiance) };
+        let factor = radiance.average() / colour.average();
+        if !(factor > 0.0 && factor.is_finite()) {
+            // A NaN is for the film to find.
+            return if factor.is_nan() && !radiance.is_black() { radiance } else { Spectrum::BLACK };
+        }
+        match spectrum {
+            Some(spectrum) => wavelengths.curve(spectrum) * (colour.luminance() * factor),
+            None => wavelengths.light(*colour) * factor,
+        }
+    }
+}
