@@ -617,6 +617,10 @@ fn picture(
     if staged.guessed_up && is_first && !arguments.quiet {
         say!("{}: z is taken for up, by the plane that it stands on (--up y takes y)", name.display());
     }
+    if !options.spectral && is_first && is_of_light && scene.resolved().disperses() {
+        let what = "glass does not disperse light without --spectral: each has its index at 587.6 nm";
+        warn(format!("{}: {what}", name.display()))?;
+    }
     if scene.is_dark() && is_of_light {
         warn(format!("{}: the scene has no light, its picture is black", name.display()))?;
     }

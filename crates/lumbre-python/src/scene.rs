@@ -613,6 +613,7 @@ fn ask(asked: &mut Asked, name: &str, value: &Bound<'_, PyAny>) -> PyResult<()> 
         }
         "first_sample" => options.first_sample = value.extract()?,
         "transparent" => asked.is_transparent = value.extract()?,
+        "spectral" => options.spectral = value.extract()?,
         "features" => options.features = value.extract()?,
         "part" => asked.keeps_part = value.extract()?,
         _ => return Err(invalid(format!("render has no option {name}"))),

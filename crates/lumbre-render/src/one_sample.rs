@@ -1,9 +1,12 @@
 //! Samples of pixels.
 
+use std::sync::Arc;
+
 use lumbre_geometry::Ray;
 use lumbre_math::DVec2;
 use lumbre_scene::{CameraRay, Footprint, Scene, View};
 use lumbre_shading::Spectrum;
+use lumbre_shading::spectrum::SensorCurves;
 
 use crate::film::{FeatureSample, Filter, Sample};
 use crate::integrators::{Integrator, integrator};
@@ -34,6 +37,8 @@ pub(crate) struct Taker<'a> {
     precision: Precision,
     /// How samples choose their wavelengths; `None` in RGB.
     wavelengths: Option<WavelengthChoice>,
+    /// The camera that records them, if it is not the eye.
+    sensor_curves: Option<Arc<SensorCurves>>,
 }
 
 /// What a sample sees besides what an integrator finds.
@@ -80,7 +85,11 @@ impl<'a> Taker<'a> {
             is_centred: options.integrator.kind == lumbre_scene::IntegratorKind::Pov && options.stop.spp == 1,
             lights_are_seen: !options.transparent,
             catcher: Catcher::of(scene),
-            wavelengths: options.spectral.then_some(WavelengthChoice::Visible),
+            wavelengths: options.spectral.then_some(match options.even_wavelengths {
+                None => WavelengthChoice::Visible,
+                Some(ends) => WavelengthChoice::Even(ends),
+            }),
+            sensor_curves: options.sensor_curves.clone(),
         })
     }
 
@@ -111,7 +120,11 @@ impl<'a> Taker<'a> {
             if passes == 0.0 {
                 (caught, features) = (None, None);
             }
-            let radiance = sights.wavelengths(slot).map_or(radiance, |w| w.rec709(radiance));
+            let radiance = match (sights.wavelengths(slot), &self.sensor_curves) {
+                (None, _) => radiance,
+                (Some(wavelengths), None) => wavelengths.rec709(radiance),
+                (Some(wavelengths), Some(sensor)) => wavelengths.recorded(radiance, sensor),
+            };
             let radiance = through_lens(radiance, passes);
             if let Some(caught) = &mut caught {
                 caught.radiance = through_lens(caught.radiance, passes);

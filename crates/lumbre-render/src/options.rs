@@ -1,10 +1,12 @@
 //! What to render, and when to stop.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use lumbre_image::Rgb;
 use lumbre_math::DVec2;
 use lumbre_scene::{FilmDesc, FilterDesc, IntegratorDesc, IntegratorKind, SamplerDesc, Scene};
+use lumbre_shading::spectrum::SensorCurves;
 
 use crate::RenderError;
 use crate::denoise;
@@ -43,6 +45,10 @@ pub struct RenderOptions {
     /// Whether samples carry wavelengths in place of linear Rec. 709: see [`Wavelengths`](lumbre_shading::spectrum::Wavelengths). Only the
     /// path integrator does.
     pub spectral: bool,
+    /// The range in nm of a spectral render whose wavelengths are chosen evenly, for a film that keeps light by wavelength.
+    pub even_wavelengths: Option<[f32; 2]>,
+    /// The camera whose sensor a spectral render has, in place of that of the exposure.
+    pub sensor_curves: Option<Arc<SensorCurves>>,
     /// When to stop.
     pub stop: Stop,
     /// The index of the first sample of every pixel: parts of a render begin where others end.
@@ -110,6 +116,8 @@ impl Default for RenderOptions {
             exposure: exposure_of(&film),
             transparent: false,
             spectral: false,
+            even_wavelengths: None,
+            sensor_curves: None,
             stop: Stop::at(DEFAULT_SPP),
             first_sample: 0,
             features: false,
@@ -131,6 +139,9 @@ impl RenderOptions {
             sampler: scene.sampler(),
             filter: scene.filter(),
             exposure: exposure_of(film),
+            spectral: film.spectral.is_some(),
+            even_wavelengths: film.spectral.map(|film| film.range_nm),
+            sensor_curves: film.camera.clone(),
             stop: Stop::at(scene.sampler().spp.unwrap_or(DEFAULT_SPP)),
             ..Self::default()
         };
@@ -214,6 +225,14 @@ impl RenderOptions {
             _ => 0,
         };
         Ok(all.saturating_add(photons))
+    }
+
+    /// How samples become the colours of pixels.
+    pub(crate) fn sample_exposure(&self) -> Exposure {
+        match &self.sensor_curves {
+            Some(curves) if self.spectral => Exposure { sensor: curves.rec709, ..self.exposure },
+            _ => self.exposure,
+        }
     }
 
     pub(crate) fn pixel_filter(&self) -> Result<Filter, RenderError> {

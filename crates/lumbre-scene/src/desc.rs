@@ -7,7 +7,7 @@ use lumbre_image::Rgb;
 use lumbre_kernel::{CustomGeometry, Placement};
 use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec2, Vec3, Vec4};
 use lumbre_shading::medium::Medium;
-use lumbre_shading::spectrum::LightCurve;
+use lumbre_shading::spectrum::{LightCurve, SensorCurves};
 use lumbre_shading::{FURTHER_SETS, FloatTexture, Material, MipMap, ShadingNormals};
 
 use crate::{Camera, Listing, MaterialId, MediumId, ObjectId};
@@ -431,8 +431,21 @@ pub struct FilmDesc {
     /// What a sensor makes of colours: the red, the green and the blue of the picture, each of the red, green and blue of light in linear
     /// Rec. 709, after `max_component`. By default no other.
     pub sensor: [[f32; 3]; 3],
+    /// The sensitivities of the camera whose sensor it is: for renders that carry wavelengths, in place of `sensor`.
+    pub camera: Option<Arc<SensorCurves>>,
+    /// Whether the picture is to be had by wavelength, which paths then carry.
+    pub spectral: Option<SpectralFilm>,
     /// Whether files of light keep single precision; half precision by default.
     pub single_precision: bool,
+}
+
+/// A film that keeps light by wavelength.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpectralFilm {
+    /// The number of parts of the range.
+    pub buckets: u32,
+    /// The first and the last wavelength in nm.
+    pub range_nm: [f32; 2],
 }
 
 impl Default for FilmDesc {
@@ -447,6 +460,8 @@ impl Default for FilmDesc {
             iso: 100.0,
             max_component: f32::INFINITY,
             sensor: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            camera: None,
+            spectral: None,
             single_precision: false,
         }
     }

@@ -5,8 +5,8 @@ use std::sync::LazyLock;
 use lumbre_math::Elementary;
 
 use super::{
-    FIRST_NM, LAST_NM, LightCurve, Sigmoid, SpectrumValue, WHITE, blackbody, matching, named, observe,
-    rec709_from_xyz,
+    FIRST_NM, LAST_NM, LightCurve, SensorCurves, Sigmoid, SpectrumValue, WHITE, blackbody, matching, named,
+    observe, rec709_from_xyz,
 };
 use crate::Spectrum;
 
@@ -92,6 +92,18 @@ impl Wavelengths {
         // The tabulated D65 is exactly white.
         let [r, g, b] = std::array::from_fn(|c| (rgb[c] * (of_white / WHITE[c])) as f32);
         Spectrum::new(r, g, b)
+    }
+
+    /// What a sample of this radiance adds to what a camera records, before its matrix.
+    pub fn recorded(&self, radiance: Spectrum, sensor: &SensorCurves) -> Spectrum {
+        let [even, _] = *LUMINANCE;
+        let mut recorded = [0.0; 3];
+        for (i, radiance) in radiance.to_array().into_iter().enumerate() {
+            let share = f64::from(radiance) / (f64::from(self.pdf[i]) * even * Self::COUNT as f64);
+            let sensitivities = sensor.at(self.nm[i]);
+            (0..3).for_each(|c| recorded[c] += f64::from(sensitivities[c]) * share);
+        }
+        Spectrum::from(recorded.map(|c| c as f32))
     }
 
     /// A reflectance of this colour, clamped to [0, 1].
@@ -260,6 +272,27 @@ mod tests {
         near(mean(Wavelengths::visible, |w| w.light(colour)), wanted, 5e-4);
         near(mean(Wavelengths::visible, |w| w.varied_light(colour)), wanted, 5e-3);
         near(mean(Wavelengths::visible, |w| w.light(colour * 20.0)), wanted.map(|c| 20.0 * c), 1e-2);
+    }
+
+    #[test]
+    fn a_camera_records_as_much_as_the_integral_over_its_sensitivities() {
+        // Two triangles and a constant.
+        let sensor = SensorCurves {
+            sensitivities: [vec![0.0, 1.0, 0.0], vec![0.5; 3], vec![2.0, 0.0, 0.0]],
+            first_nm: 450.0,
+            step_nm: 50.0,
+            rec709: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        };
+        let mut sum = [0.0; 3];
+        const COUNT: u32 = 60_000;
+        for i in 0..COUNT {
+            let wavelengths = Wavelengths::visible((i as f32 + 0.5) / COUNT as f32);
+            let recorded = wavelengths.recorded(Spectrum::splat(3.0), &sensor).to_array();
+            (0..3).for_each(|c| sum[c] += f64::from(recorded[c]) / f64::from(COUNT));
+        }
+        // Over the sum of the eye's ȳ. The last one goes on below 450 nm.
+        let even = LUMINANCE[0];
+        near(sum, [3.0 * 50.0 / even, 3.0 * 0.5 * 470.0 / even, 3.0 * 2.0 * (90.0 + 25.0) / even], 5e-3);
     }
 
     #[test]
