@@ -586,6 +586,7 @@ fn picture(
     }
     let mut options = options(arguments, &scene)?;
     options.transparent = behind.is_transparent();
+    options.spectral &= matches!(kind, IntegratorKind::Path { .. });
     options.spectral |= arguments.spectral;
     let samples_are_asked = arguments.spp.is_some()
         || arguments.time.is_some()

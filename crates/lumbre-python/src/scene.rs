@@ -532,6 +532,7 @@ impl Scene {
         let shown = self.shown(py, size, integrator)?;
         let mut options = shown.scene.options();
         options.integrator.kind = integrator.unwrap_or(options.integrator.kind);
+        options.spectral &= matches!(options.integrator.kind, IntegratorKind::Path { .. });
         if let Some((width, height)) = size {
             options.resize(shown.scene.resolved().film(), width, height);
         }

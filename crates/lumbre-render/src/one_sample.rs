@@ -10,7 +10,7 @@ use lumbre_shading::spectrum::SensorCurves;
 
 use crate::film::{FeatureSample, Filter, Sample};
 use crate::integrators::{Integrator, integrator};
-use crate::transport::{Draw, Event, Features, Record, Sampler, Seen, Sight, WavelengthChoice, caught};
+use crate::transport::{Draw, Event, Features, Record, Sampler, Seen, Sight, caught};
 use crate::wave::catcher::{Catcher, Places};
 use crate::wave::{Precision, SampleId, Sights, Wave, cone};
 use crate::{RenderError, RenderOptions};
@@ -35,8 +35,8 @@ pub(crate) struct Taker<'a> {
     /// Ground that catches shadows, for many samples at once where that can be.
     catcher: Option<Catcher<'a>>,
     precision: Precision,
-    /// How samples choose their wavelengths; `None` in RGB.
-    wavelengths: Option<WavelengthChoice>,
+    /// Whether samples carry wavelengths.
+    is_spectral: bool,
     /// The camera that records them, if it is not the eye.
     sensor_curves: Option<Arc<SensorCurves>>,
 }
@@ -85,10 +85,7 @@ impl<'a> Taker<'a> {
             is_centred: options.integrator.kind == lumbre_scene::IntegratorKind::Pov && options.stop.spp == 1,
             lights_are_seen: !options.transparent,
             catcher: Catcher::of(scene),
-            wavelengths: options.spectral.then_some(match options.even_wavelengths {
-                None => WavelengthChoice::Visible,
-                Some(ends) => WavelengthChoice::Even(ends),
-            }),
+            is_spectral: options.spectral,
             sensor_curves: options.sensor_curves.clone(),
         })
     }
@@ -110,7 +107,7 @@ impl<'a> Taker<'a> {
             (draw, camera)
         });
         let mut sights =
-            Sights::new(self.scene, &self.view, wave, self.precision, aimed, self.wavelengths, record);
+            Sights::new(self.scene, &self.view, wave, self.precision, aimed, self.is_spectral, record);
         let seen = self.see(&mut sights, record);
         for (slot, ((&id, &(weight, passes)), &radiance)) in
             ids.iter().zip(&weights).zip(sights.radiance()).enumerate()
@@ -234,7 +231,7 @@ impl<'a> Taker<'a> {
         let one = std::iter::once((draw, camera));
         // What is told of a path is told in colours.
         let mut sights =
-            Sights::new(self.scene, &self.view, &mut wave, self.precision, one, None, &mut record);
+            Sights::new(self.scene, &self.view, &mut wave, self.precision, one, false, &mut record);
         let seen = self.see(&mut sights, &mut record).first().and_then(|seen| seen.caught);
         let radiance = seen.map_or(sights.radiance()[0], |seen| seen.radiance);
         (sights.ray(0), radiance, record.journal.unwrap_or_default())

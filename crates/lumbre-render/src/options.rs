@@ -45,8 +45,6 @@ pub struct RenderOptions {
     /// Whether samples carry wavelengths in place of linear Rec. 709: see [`Wavelengths`](lumbre_shading::spectrum::Wavelengths). Only the
     /// path integrator does.
     pub spectral: bool,
-    /// The range in nm of a spectral render whose wavelengths are chosen evenly, for a film that keeps light by wavelength.
-    pub even_wavelengths: Option<[f32; 2]>,
     /// The camera whose sensor a spectral render has, in place of that of the exposure.
     pub sensor_curves: Option<Arc<SensorCurves>>,
     /// When to stop.
@@ -116,7 +114,6 @@ impl Default for RenderOptions {
             exposure: exposure_of(&film),
             transparent: false,
             spectral: false,
-            even_wavelengths: None,
             sensor_curves: None,
             stop: Stop::at(DEFAULT_SPP),
             first_sample: 0,
@@ -139,8 +136,7 @@ impl RenderOptions {
             sampler: scene.sampler(),
             filter: scene.filter(),
             exposure: exposure_of(film),
-            spectral: film.spectral.is_some(),
-            even_wavelengths: film.spectral.map(|film| film.range_nm),
+            spectral: film.spectral && matches!(scene.integrator().kind, IntegratorKind::Path { .. }),
             sensor_curves: film.camera.clone(),
             stop: Stop::at(scene.sampler().spp.unwrap_or(DEFAULT_SPP)),
             ..Self::default()

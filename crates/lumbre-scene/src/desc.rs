@@ -433,19 +433,10 @@ pub struct FilmDesc {
     pub sensor: [[f32; 3]; 3],
     /// The sensitivities of the camera whose sensor it is: for renders that carry wavelengths, in place of `sensor`.
     pub camera: Option<Arc<SensorCurves>>,
-    /// Whether the picture is to be had by wavelength, which paths then carry.
-    pub spectral: Option<SpectralFilm>,
+    /// Whether paths are to carry wavelengths, where the integrator is `path`.
+    pub spectral: bool,
     /// Whether files of light keep single precision; half precision by default.
     pub single_precision: bool,
-}
-
-/// A film that keeps light by wavelength.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SpectralFilm {
-    /// The number of parts of the range.
-    pub buckets: u32,
-    /// The first and the last wavelength in nm.
-    pub range_nm: [f32; 2],
 }
 
 impl Default for FilmDesc {
@@ -461,7 +452,7 @@ impl Default for FilmDesc {
             max_component: f32::INFINITY,
             sensor: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             camera: None,
-            spectral: None,
+            spectral: false,
             single_precision: false,
         }
     }

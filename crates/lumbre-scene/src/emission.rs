@@ -6,7 +6,7 @@ use lumbre_math::Vec2;
 use lumbre_shading::spectrum::{LightCurve, Wavelengths};
 use lumbre_shading::{MipMap, Spectrum};
 
-use crate::light_colour::LightColour;
+use crate::light_colour;
 
 /// The emitted radiance, equal in all directions.
 #[derive(Clone, Debug)]
@@ -50,12 +50,10 @@ impl Emission {
     /// Emitted radiance at some wavelengths, of which this is the colour.
     pub fn at_wavelengths(&self, radiance: Spectrum, wavelengths: &Wavelengths) -> Spectrum {
         let is_varied = self.image.is_some() || self.by_vertices;
-        let colour = if is_varied {
-            LightColour::Varied
-        } else {
-            LightColour::Constant { colour: self.radiance, spectrum: self.spectrum.clone() }
-        };
-        colour.at_wavelengths(radiance, wavelengths)
+        if is_varied {
+            return wavelengths.varied_light(radiance);
+        }
+        light_colour::constant(self.radiance, self.spectrum.as_deref(), radiance, wavelengths)
     }
 
     /// The number of emissive sides.

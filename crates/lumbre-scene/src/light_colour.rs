@@ -53,15 +53,30 @@ impl LightColour {
 
     /// Light at some wavelengths, of which `radiance` is the colour.
     pub(crate) fn at_wavelengths(&self, radiance: Spectrum, wavelengths: &Wavelengths) -> Spectrum {
-        let Self::Constant { colour, spectrum } = self else { return wavelengths.varied_light(radiance) };
-        let factor = radiance.average() / colour.average();
-        if !(factor > 0.0 && factor.is_finite()) {
-            // A NaN is for the film to find.
-            return if factor.is_nan() && !radiance.is_black() { radiance } else { Spectrum::BLACK };
+        match self {
+            Self::Constant { colour, spectrum } => {
+                constant(*colour, spectrum.as_deref(), radiance, wavelengths)
+            }
+            Self::Varied | Self::Surface => wavelengths.varied_light(radiance),
         }
-        match spectrum {
-            Some(spectrum) => wavelengths.curve(spectrum) * (colour.luminance() * factor),
-            None => wavelengths.light(*colour) * factor,
-        }
+    }
+}
+
+/// Light at some wavelengths, of which `radiance` is the colour: that of a light of one colour, which may have a spectrum of luminance 1,
+/// times a factor.
+pub(crate) fn constant(
+    colour: Spectrum,
+    spectrum: Option<&LightCurve>,
+    radiance: Spectrum,
+    wavelengths: &Wavelengths,
+) -> Spectrum {
+    let factor = radiance.average() / colour.average();
+    if !factor.is_finite() {
+        // It is for the film to find.
+        return if radiance.is_black() { Spectrum::BLACK } else { radiance };
+    }
+    match spectrum {
+        Some(spectrum) => wavelengths.curve(spectrum) * (colour.luminance() * factor),
+        None => wavelengths.light(colour) * factor,
     }
 }

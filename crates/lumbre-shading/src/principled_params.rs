@@ -289,6 +289,7 @@ impl PrincipledParams {
             f0: colour(bsdf.f0),
             transmission_color: colour(bsdf.transmission_color),
             diffuse_transmission_color: colour(bsdf.diffuse_transmission_color),
+            film: ThinFilm { nm: spectral.wavelengths.nm(), ..bsdf.film },
             sheen: bsdf.sheen.coloured(colour(bsdf.sheen.color)),
             eta,
             body,
@@ -334,7 +335,7 @@ impl PrincipledParams {
         } else {
             let thickness = self.iridescence_thickness.evaluate(at).max(0.0);
             let eta = if self.iridescence_ior > 1.0 { self.iridescence_ior.min(10.0) } else { 1.0 };
-            ThinFilm { weight: film, eta, thickness: thickness.min(1e6) }
+            ThinFilm { weight: film, eta, thickness: thickness.min(1e6), ..ThinFilm::NONE }
         };
         // 20 over the Abbe number V, and V = (η − 1) / (η of blue − η of red): half of that difference.
         let spread = 0.5 * (eta - 1.0).max(0.0) * self.dispersion.max(0.0) / 20.0;

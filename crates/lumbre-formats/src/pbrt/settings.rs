@@ -6,7 +6,7 @@ use lumbre_image::ColourSpace;
 use lumbre_math::{DMat3, Transform, Vec2};
 use lumbre_scene::{
     Camera, CameraKind, FilterDesc, IntegratorDesc, IntegratorKind, MediumId, SamplerDesc, SamplerKind,
-    SpectralFilm, SphericalMapping,
+    SphericalMapping,
 };
 use lumbre_shading::ShadingNormals;
 use lumbre_shading::spectrum::SensorCurves;
@@ -133,11 +133,15 @@ impl Converter<'_, '_> {
 
     pub fn film(&mut self, ty: &str, params: Params, space: ColourSpace) -> Result<()> {
         let spot = params.spot;
-        let mut spectral = None;
+        let mut spectral = false;
         match ty {
             "rgb" => {}
             "image" => self.upgraded(spot),
-            "spectral" => spectral = Some(spectral_film(&params)?),
+            "spectral" => {
+                check_spectral_film(&params)?;
+                spectral = true;
+                self.note(spot, "the buckets of film \"spectral\" are not written yet: the picture is made of wavelengths, and has their colours");
+            }
             "gbuffer" => {
                 params.ignore(&["coordinatesystem"]);
                 let message = format!("film {} is not rendered yet: an rgb one takes its place", quoted(ty));
@@ -208,7 +212,7 @@ impl Converter<'_, '_> {
         film.max_component = max_component as f32;
         film.sensor = sensor;
         film.camera = camera.map(Arc::new);
-        film.spectral = spectral;
+        film.spectral |= spectral;
         film.single_precision = single_precision;
         Ok(())
     }
@@ -342,6 +346,11 @@ impl Converter<'_, '_> {
         let path = |params: &Params| -> Result<IntegratorKind> {
             Ok(IntegratorKind::Path { regularize: params.boolean("regularize", false)? })
         };
+        // Ours: pbrt-v4 is always so.
+        let is_path = matches!(ty, "path" | "volpath" | "simplepath" | "simplevolpath");
+        if is_path && params.boolean("spectral", false)? {
+            self.scene.film.spectral = true;
+        }
         let kind = match ty {
             "path" | "volpath" | "simplepath" | "simplevolpath" => path(&params)?,
             "whitted" => {
@@ -496,8 +505,8 @@ impl Converter<'_, '_> {
     }
 }
 
-/// The range of a film that keeps light by wavelength.
-fn spectral_film(params: &Params) -> Result<SpectralFilm> {
+/// Refuses a film that keeps light by wavelength whose wavelengths cannot be.
+fn check_spectral_film(params: &Params) -> Result<()> {
     const LEAST: f64 = 360.0;
     const GREATEST: f64 = 830.0;
     let buckets = params.count("nbuckets", 16, 1)?;
@@ -513,7 +522,7 @@ fn spectral_film(params: &Params) -> Result<SpectralFilm> {
     if low >= high {
         return params.out_of_range("lambdamin", low, "less than lambdamax");
     }
-    Ok(SpectralFilm { buckets, range_nm: [low as f32, high as f32] })
+    Ok(())
 }
 
 /// Parts of the range of a film that keeps light by wavelength: one a nanometre.

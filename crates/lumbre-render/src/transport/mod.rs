@@ -10,7 +10,6 @@ pub(crate) mod seen;
 mod sight;
 mod strategy;
 pub(crate) mod through;
-mod wavelengths;
 
 pub use counts::RayCounts;
 pub use features::{Feature, Features};
@@ -19,4 +18,3 @@ pub use sampler::{Draw, Sampler};
 pub(crate) use seen::{Seen, caught};
 pub use sight::Sight;
 pub use strategy::Strategy;
-pub(crate) use wavelengths::WavelengthChoice;

@@ -7,7 +7,7 @@ use lumbre_shading::Spectrum;
 use lumbre_shading::spectrum::Wavelengths;
 
 use crate::caustics::Merging;
-use crate::transport::{Draw, Record, Seen, Sight, WavelengthChoice};
+use crate::transport::{Draw, Record, Seen, Sight};
 use crate::wave::catcher::{Catcher, Places};
 use crate::wave::paths::{OnePath, Paths, Slots, to_column};
 use crate::wave::setting::Setting;
@@ -32,7 +32,7 @@ impl<'a, 's> Sights<'a, 's> {
         wave: &'a mut Wave<'s>,
         precision: Precision,
         samples: impl ExactSizeIterator<Item = (Draw, CameraRay)>,
-        wavelengths: Option<WavelengthChoice>,
+        is_spectral: bool,
         record: &mut Record,
     ) -> Self {
         let has_solids = scene.has_solids();
@@ -61,7 +61,7 @@ impl<'a, 's> Sights<'a, 's> {
                 width,
                 spread,
             });
-            let wavelengths = wavelengths.map(|choice| choice.of(&draw));
+            let wavelengths = is_spectral.then(|| Wavelengths::visible(draw.wavelength()));
             wave.slots.push(draw, &camera, has_solids, medium, wavelengths);
         }
         record.counts.camera += wave.paths.len as u64;
