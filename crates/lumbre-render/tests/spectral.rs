@@ -201,15 +201,10 @@ fn neither_threads_nor_parts_show() {
 fn integrators_that_follow_colours_refuse_wavelengths() {
     let scene = Scene::build(still_life(DVec3::ZERO)).unwrap();
     let base = spectral(&scene, 8, 8, 1);
-    for kind in [
-        IntegratorKind::Whitted { light_samples: 1, sky: Default::default() },
-        IntegratorKind::AmbientOcclusion { cosine: true, max_distance: f32::INFINITY.into() },
-        IntegratorKind::Caustics,
-        IntegratorKind::Albedo,
-        IntegratorKind::Pov,
-    ] {
+    for name in IntegratorKind::NAMES.into_iter().filter(|name| *name != "path") {
+        let kind = IntegratorKind::from_name(name).unwrap();
         let options = changed(base.clone(), |it| it.integrator.kind = kind);
         let refused = render(&scene, &options, &NoProgress, &CancelToken::new()).unwrap_err();
-        assert_eq!(refused, RenderError::NoWavelengths, "{kind:?}");
+        assert_eq!(refused, RenderError::NoWavelengths, "{name}");
     }
 }
