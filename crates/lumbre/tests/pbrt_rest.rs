@@ -60,7 +60,8 @@ fn expected(text: &str) -> BTreeMap<String, Vec<Row>> {
             .iter()
             .find_map(|word| how.split(word).nth(1)?.split(' ').next()?.parse::<f64>().ok());
         let rows = scenes.entry(scene.clone()).or_default();
-        let mut holds_in = [!how.contains("needs spectra"), !how.contains("RGB transport")];
+        let needs_spectra = how.contains("needs spectra") || how.contains("traced per nm");
+        let mut holds_in = [!needs_spectra, !how.contains("RGB transport")];
         if let Some(region) = region.strip_suffix(", spectral") {
             holds_in = [false, true];
             rows.iter_mut().filter(|row| row.region == region).for_each(|row| row.holds_in[1] = false);

@@ -40,11 +40,11 @@ impl Sigmoid {
         cached(colour)
     }
 
-    /// [`Self::of`] from a table, with an error of some thousandths.
+    /// [`Self::of`] from a table and a step of Newton's method, with an error of less than a thousandth for most colours.
     pub fn by_table(colour: Spectrum) -> Self {
         static TABLE: LazyLock<Table> = LazyLock::new(Table::new);
         let colour = colour.map(crate::unit);
-        Self::of_grey(colour).unwrap_or_else(|| TABLE.look_up(colour))
+        Self::of_grey(colour).unwrap_or_else(|| TABLE.look_up(colour).improved(colour))
     }
 
     /// The value at a wavelength in nm.
@@ -59,6 +59,20 @@ impl Sigmoid {
     fn of_grey(colour: Spectrum) -> Option<Self> {
         let is_grey = colour.r == colour.g && colour.g == colour.b;
         is_grey.then(|| Self { coefficients: [0.0, 0.0, inverse(colour.r.into()) as f32] })
+    }
+
+    /// One step of Newton's method nearer to a colour, where that is a small one: faces of the cube have no fit.
+    fn improved(self, colour: Spectrum) -> Self {
+        const LARGE: f64 = 0.3;
+        let before = self.coefficients.map(f64::from);
+        let (found, derivatives) = COARSE_NODES.colour(before);
+        let target = colour.to_array().map(f64::from);
+        let Some(step) = solve(derivatives, array::from_fn(|k| target[k] - found[k])) else { return self };
+        let greatest = |numbers: [f64; 3]| numbers.iter().fold(0.0, |most: f64, c| most.max(c.abs()));
+        if greatest(step) > LARGE * (1.0 + greatest(before)) {
+            return self;
+        }
+        Self::from_fit(array::from_fn(|k| before[k] + step[k]))
     }
 
     fn from_fit(fit: [f64; 3]) -> Self {
@@ -117,13 +131,18 @@ struct Nodes {
     weights: Vec<[f64; 3]>,
 }
 
-static NODES: LazyLock<Nodes> = LazyLock::new(|| {
-    let nm: Vec<f32> = (0..236_u16).map(|i| 360.0 + 2.0 * f32::from(i)).collect();
-    let x = nm.iter().map(|&nm| (f64::from(nm) - MIDDLE_NM) / HALF_NM).collect();
-    Nodes { x, weights: channel_weights(&nm) }
-});
+/// Every 2 nm, and, for what is looked up often, every 5 nm.
+static NODES: LazyLock<Nodes> = LazyLock::new(|| Nodes::every(2));
+static COARSE_NODES: LazyLock<Nodes> = LazyLock::new(|| Nodes::every(5));
 
 impl Nodes {
+    /// Wavelengths from 360 to 830 nm.
+    fn every(step_nm: u16) -> Self {
+        let nm: Vec<f32> = (360..=830_u16).step_by(step_nm.into()).map(f32::from).collect();
+        let x = nm.iter().map(|&nm| (f64::from(nm) - MIDDLE_NM) / HALF_NM).collect();
+        Self { x, weights: channel_weights(&nm) }
+    }
+
     /// The colour of a polynomial, and its derivatives by each coefficient.
     fn colour(&self, [a, b, c]: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
         let (mut colour, mut derivatives) = ([0.0; 3], [[0.0; 3]; 3]);
@@ -429,6 +448,13 @@ mod tests {
                 sum += (found - wanted).abs() / (3.0 * f32::from(count));
             }
         }
-        assert!(worst < 0.006 && sum < 0.001, "{worst} {sum}");
+        assert!(worst < 0.002 && sum < 0.0002, "{worst} {sum}");
+        // As light of this colour, which is looked up at half of its greatest channel.
+        for rgb in [[0.5, 0.0625, 0.0625], [0.0625, 0.5, 0.0625], [0.0625, 0.0625, 0.5]] {
+            let found = colour_of(Sigmoid::by_table(Spectrum::from(rgb)));
+            for (found, wanted) in found.into_iter().zip(rgb) {
+                assert!((found / wanted - 1.0).abs() < 3e-3, "{rgb:?}: {found}");
+            }
+        }
     }
 }
