@@ -90,7 +90,8 @@ fn metals_reflect_each_wavelength_by_their_tables() {
     });
     for u in [0.1, 0.4, 0.9] {
         let (wavelengths, here) = lookup(u);
-        let sample = copper.bsdf(&here).unwrap().sample(LocalDir(Vec3::Z), 0.5, Vec2::splat(0.5)).unwrap();
+        let sample =
+            copper.bsdf(&here).unwrap().sample(LocalDir::new(Vec3::Z), 0.5, Vec2::splat(0.5)).unwrap();
         let reflected = wavelengths.nm().map(|nm| {
             let (eta, k) = (eta.at(nm.into()).unwrap(), k.at(nm.into()).unwrap());
             (((eta - 1.0).powi(2) + k * k) / ((eta + 1.0).powi(2) + k * k)) as f32
