@@ -65,7 +65,7 @@ impl Sigmoid {
     fn improved(self, colour: Spectrum) -> Self {
         const LARGE: f64 = 0.3;
         let before = self.coefficients.map(f64::from);
-        let (found, derivatives) = COARSE_NODES.colour(before);
+        let (found, derivatives) = NODES.colour(before);
         let target = colour.to_array().map(f64::from);
         let Some(step) = solve(derivatives, array::from_fn(|k| target[k] - found[k])) else { return self };
         let greatest = |numbers: [f64; 3]| numbers.iter().fold(0.0, |most: f64, c| most.max(c.abs()));
@@ -131,18 +131,14 @@ struct Nodes {
     weights: Vec<[f64; 3]>,
 }
 
-/// Every 2 nm, and, for what is looked up often, every 5 nm.
-static NODES: LazyLock<Nodes> = LazyLock::new(|| Nodes::every(2));
-static COARSE_NODES: LazyLock<Nodes> = LazyLock::new(|| Nodes::every(5));
+/// Every 2 nm: with 5, colours of small channels are off by half a per cent.
+static NODES: LazyLock<Nodes> = LazyLock::new(|| {
+    let nm: Vec<f32> = (360..=830_u16).step_by(2).map(f32::from).collect();
+    let x = nm.iter().map(|&nm| (f64::from(nm) - MIDDLE_NM) / HALF_NM).collect();
+    Nodes { x, weights: channel_weights(&nm) }
+});
 
 impl Nodes {
-    /// Wavelengths from 360 to 830 nm.
-    fn every(step_nm: u16) -> Self {
-        let nm: Vec<f32> = (360..=830_u16).step_by(step_nm.into()).map(f32::from).collect();
-        let x = nm.iter().map(|&nm| (f64::from(nm) - MIDDLE_NM) / HALF_NM).collect();
-        Self { x, weights: channel_weights(&nm) }
-    }
-
     /// The colour of a polynomial, and its derivatives by each coefficient.
     fn colour(&self, [a, b, c]: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
         let (mut colour, mut derivatives) = ([0.0; 3], [[0.0; 3]; 3]);
