@@ -129,6 +129,7 @@ fn first_vertices<'s>(
         has_media: false,
         has_panes: false,
         moves: false,
+        is_spectral: false,
         instruction_set: set,
         merging: None,
     };
