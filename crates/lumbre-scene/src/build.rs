@@ -6,7 +6,7 @@ use lumbre_geometry::{Aabb, BilinearPatch, PlacedShape, Shape};
 use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, Placement, TriangleMesh};
 use lumbre_math::distribution::AliasTable;
 use lumbre_math::{DVec3, Elementary, Transform};
-use lumbre_shading::{Material, MaterialKind};
+use lumbre_shading::{Material, MaterialKind, Spectrum};
 
 use crate::light::choice::LightChoice;
 use crate::light::environment::first_not_finite;
@@ -97,7 +97,7 @@ impl Scene {
         }
         let mut light_colours = vec![LightColour::Surface; builder.lights.len()];
         for (position, light) in lights.into_iter().enumerate() {
-            let colour = LightColour::of(&light);
+            let colour = colour_of(&light);
             builder.light(position, light)?;
             // One that does not shine was dropped.
             light_colours.resize(builder.lights.len(), colour);
@@ -656,6 +656,33 @@ impl Builder {
         };
         self.lights.push(light);
         Ok(())
+    }
+}
+
+/// What the colours of a light are made of.
+fn colour_of(desc: &LightDesc) -> LightColour {
+    let one = |colour: &Spectrum| LightColour::Constant { colour: *colour, spectrum: None };
+    match desc {
+        LightDesc::Point { intensity, .. } | LightDesc::Spot { intensity, .. } => one(intensity),
+        LightDesc::Distant { irradiance, .. } => one(irradiance),
+        LightDesc::Infinite { radiance, image: None, .. }
+        | LightDesc::Portal { radiance, image: None, .. } => one(radiance),
+        LightDesc::Infinite { .. }
+        | LightDesc::Portal { .. }
+        | LightDesc::Goniometric { .. }
+        | LightDesc::Projection { .. }
+        | LightDesc::Pov(_) => LightColour::Varied,
+        LightDesc::Moving { light, .. } => colour_of(light),
+        LightDesc::Spectral { light, spectrum } => {
+            let spectrum = Some(spectrum.clone());
+            match (colour_of(light), &**light) {
+                (LightColour::Constant { colour, .. }, _) => LightColour::Constant { colour, spectrum },
+                (_, LightDesc::Goniometric { intensity, .. }) => {
+                    LightColour::Constant { colour: *intensity, spectrum }
+                }
+                (other, _) => other,
+            }
+        }
     }
 }
 

@@ -5,8 +5,6 @@ use std::sync::Arc;
 use lumbre_shading::Spectrum;
 use lumbre_shading::spectrum::{LightCurve, Wavelengths};
 
-use crate::LightDesc;
-
 /// What a light's colours are made of.
 #[derive(Clone, Debug)]
 pub(crate) enum LightColour {
@@ -24,33 +22,6 @@ pub(crate) enum LightColour {
 }
 
 impl LightColour {
-    /// Of a light.
-    pub(crate) fn of(desc: &LightDesc) -> Self {
-        let one = |colour: &Spectrum| Self::Constant { colour: *colour, spectrum: None };
-        match desc {
-            LightDesc::Point { intensity, .. } | LightDesc::Spot { intensity, .. } => one(intensity),
-            LightDesc::Distant { irradiance, .. } => one(irradiance),
-            LightDesc::Infinite { radiance, image: None, .. }
-            | LightDesc::Portal { radiance, image: None, .. } => one(radiance),
-            LightDesc::Infinite { .. }
-            | LightDesc::Portal { .. }
-            | LightDesc::Goniometric { .. }
-            | LightDesc::Projection { .. }
-            | LightDesc::Pov(_) => Self::Varied,
-            LightDesc::Moving { light, .. } => Self::of(light),
-            LightDesc::Spectral { light, spectrum } => {
-                let spectrum = Some(spectrum.clone());
-                match (Self::of(light), &**light) {
-                    (Self::Constant { colour, .. }, _) => Self::Constant { colour, spectrum },
-                    (_, LightDesc::Goniometric { intensity, .. }) => {
-                        Self::Constant { colour: *intensity, spectrum }
-                    }
-                    (other, _) => other,
-                }
-            }
-        }
-    }
-
     /// Light at some wavelengths, of which `radiance` is the colour.
     pub(crate) fn at_wavelengths(&self, radiance: Spectrum, wavelengths: &Wavelengths) -> Spectrum {
         match self {

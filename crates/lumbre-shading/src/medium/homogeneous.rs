@@ -2,7 +2,7 @@
 
 use lumbre_math::Elementary;
 
-use super::MediumSpectra;
+use super::spectra::MediumSpectra;
 use crate::Spectrum;
 use crate::spectrum::Wavelengths;
 

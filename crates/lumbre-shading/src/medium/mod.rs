@@ -10,14 +10,13 @@ mod homogeneous;
 mod phase;
 mod presets;
 mod sparse;
-
-use std::sync::Arc;
+mod spectra;
 
 use lumbre_math::DVec3;
 use lumbre_math::random::RandomStream;
 
-use crate::spectrum::{LightCurve, Wavelengths};
-use crate::{Spectrum, SpectrumValue};
+use crate::Spectrum;
+use crate::spectrum::Wavelengths;
 
 pub use cloud::Cloud;
 pub use grid::{Grid, GridError, Voxel};
@@ -26,6 +25,7 @@ pub use homogeneous::{DistanceSample, HomogeneousMedium, albedo_of_many_collisio
 pub use phase::{henyey_greenstein, sample_henyey_greenstein, sample_henyey_greenstein_lanes};
 pub use presets::{preset, preset_names};
 pub use sparse::{Brick, SparseGrid, SparseGridError};
+pub use spectra::MediumSpectra;
 
 /// A participating medium.
 #[derive(Clone, Debug)]
@@ -41,57 +41,6 @@ pub enum Medium {
     },
     /// By place.
     Heterogeneous(Box<HeterogeneousMedium>),
-}
-
-/// What is known of a medium by wavelength, where it is more than colours.
-#[derive(Clone, Debug, Default)]
-pub struct MediumSpectra {
-    /// The absorption coefficient.
-    pub absorption: Option<SpectrumValue>,
-    /// The scattering coefficient.
-    pub scattering: Option<SpectrumValue>,
-    /// A factor on both.
-    pub scale: f32,
-    /// The spectrum of what it emits.
-    pub glow: Option<Arc<LightCurve>>,
-}
-
-impl MediumSpectra {
-    /// A coefficient at some wavelengths, of which this is the colour.
-    fn coefficient(
-        spectrum: Option<&SpectrumValue>,
-        scale: f32,
-        colour: Spectrum,
-        wavelengths: &Wavelengths,
-    ) -> Spectrum {
-        let values = spectrum.and_then(|spectrum| wavelengths.values(spectrum));
-        values.map_or_else(
-            || wavelengths.coefficient(colour),
-            |values| values.map(|value| (value * scale).max(0.0)),
-        )
-    }
-
-    /// Absorption and scattering at some wavelengths, of which these are the colours.
-    fn coefficients(
-        spectra: Option<&Self>,
-        [absorption, scattering]: [Spectrum; 2],
-        wavelengths: &Wavelengths,
-    ) -> [Spectrum; 2] {
-        let scale = spectra.map_or(1.0, |spectra| spectra.scale);
-        let of = |spectrum, colour| Self::coefficient(spectrum, scale, colour, wavelengths);
-        [
-            of(spectra.and_then(|spectra| spectra.absorption.as_ref()), absorption),
-            of(spectra.and_then(|spectra| spectra.scattering.as_ref()), scattering),
-        ]
-    }
-
-    /// Emitted light at some wavelengths, of which this is the colour.
-    fn glow_at(spectra: Option<&Self>, glow: Spectrum, wavelengths: &Wavelengths) -> Spectrum {
-        match spectra.and_then(|spectra| spectra.glow.as_ref()) {
-            Some(curve) => wavelengths.curve(curve) * glow.luminance(),
-            None => wavelengths.light(glow),
-        }
-    }
 }
 
 /// What becomes of light along a way through a medium.
