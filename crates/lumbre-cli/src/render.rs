@@ -125,6 +125,10 @@ pub(crate) struct Arguments {
     /// edges and leaks, pbrt takes them as pbrt-v4 does. By default what the scene says, else lumbre.
     #[arg(long, value_name = "HOW", value_parser = one_of(&SHADING_NORMALS, ShadingNormals::from_name))]
     shading_normals: Option<ShadingNormals>,
+    /// Carry three wavelengths along each path in place of red, green and blue: colours that multiply many times, light by its spectrum
+    /// and glass that disperses are right. For the integrator path. By default where the scene's film is spectral.
+    #[arg(long)]
+    spectral: bool,
     /// Seed of the random numbers.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -582,6 +586,8 @@ fn picture(
     }
     let mut options = options(arguments, &scene)?;
     options.transparent = behind.is_transparent();
+    options.spectral &= matches!(kind, IntegratorKind::Path { .. });
+    options.spectral |= arguments.spectral;
     let samples_are_asked = arguments.spp.is_some()
         || arguments.time.is_some()
         || arguments.noise.is_some()
@@ -611,6 +617,10 @@ fn picture(
     }
     if staged.guessed_up && is_first && !arguments.quiet {
         say!("{}: z is taken for up, by the plane that it stands on (--up y takes y)", name.display());
+    }
+    if !options.spectral && is_first && is_of_light && scene.resolved().disperses() {
+        let what = "glass does not disperse light without --spectral: each has its index at 587.6 nm";
+        warn(format!("{}: {what}", name.display()))?;
     }
     if scene.is_dark() && is_of_light {
         warn(format!("{}: the scene has no light, its picture is black", name.display()))?;

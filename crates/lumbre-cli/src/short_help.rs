@@ -15,6 +15,7 @@ const ESSENTIAL: [(&str, &[&str]); 3] = [
             "noise",
             "denoise",
             "integrator",
+            "spectral",
             "camera",
             "azimuth",
             "elevation",

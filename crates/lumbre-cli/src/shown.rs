@@ -56,6 +56,7 @@ pub(crate) fn shown(mut desc: SceneDesc, wish: &Wish<'_>) -> Result<Shown, Failu
     let scene = Scene::of_file(desc, name, &mut diagnostics)?;
     let mut options = scene.options();
     options.integrator.kind = kind;
+    options.spectral &= matches!(kind, IntegratorKind::Path { .. });
     if let Some((width, height)) = size {
         options.resize(scene.resolved().film(), width, height);
     }

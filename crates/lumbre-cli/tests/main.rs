@@ -17,6 +17,7 @@ mod pages;
 mod parts;
 mod program;
 mod slurm;
+mod spectral;
 mod stops;
 mod targets;
 mod topics;

@@ -1102,6 +1102,7 @@ fn place(colour: Rgb) -> TextureContext {
         duv_dx: Vec2::ZERO,
         duv_dy: Vec2::ZERO,
         vertex: VertexData { colour, ..VertexData::NONE },
+        spectral: None,
     }
 }
 
@@ -1336,7 +1337,7 @@ fn unlit_shines_and_solids_scatter_inside() {
         "KHR_materials_volume_scatter":{"multiscatterColor":[0.5,0.5,0.5],"scatterAnisotropy":0.25}}}"#;
     let (scene, _) = dressed(volume);
     let MaterialKind::Principled(params) = &scene.materials[0].material.kind else { panic!() };
-    let medium = params.interior_medium().unwrap();
+    let medium = params.interior_medium(None).unwrap();
     assert!(medium.albedo.r > 0.7 && medium.asymmetry == 0.25, "{medium:?}");
 }
 
@@ -1421,6 +1422,7 @@ fn coverage_is_by_mode_and_light_by_strength() {
         duv_dx: Vec2::ZERO,
         duv_dy: Vec2::ZERO,
         vertex: VertexData { coverage: 128.0 / 255.0, ..VertexData::NONE },
+        spectral: None,
     };
     let coverage = |material: &str| with(material).alpha.map(|alpha| alpha.evaluate(&at));
     let colour = r#""pbrMetallicRoughness":{"baseColorFactor":[1,1,1,0.5]}"#;

@@ -73,7 +73,7 @@ fn kind(scene: &SceneDesc, shape: usize) -> &MaterialKind {
 
 fn constant<T: lumbre_shading::TextureValue>(texture: &Texture<T>) -> T {
     match texture {
-        Texture::Constant(v) => *v,
+        Texture::Constant(v) | Texture::Spectrum { value: v, .. } => *v,
         other => panic!("{other:?}"),
     }
 }
@@ -783,10 +783,13 @@ fn rgb_lights_keep_their_numbers_and_other_spectra_become_one_nit() {
            LightSource "point" "spectrum I" "stdillum-A"
            LightSource "point""#,
     );
-    let intensity = |i: usize| match scene.lights[i] {
-        LightDesc::Point { intensity, .. } => intensity,
-        ref other => panic!("{other:?}"),
+    let intensity = |i: usize| match scene.lights[i].bare() {
+        LightDesc::Point { intensity, .. } => *intensity,
+        other => panic!("{other:?}"),
     };
+    // A spectrum is kept beside the colour.
+    let has_spectrum = |i: usize| matches!(scene.lights[i], LightDesc::Spectral { .. });
+    assert_eq!([0, 1, 2, 3, 4].map(has_spectrum), [false, true, true, true, false]);
     near_rgb(intensity(0), [6.0, 8.0, 10.0]);
     assert!((intensity(1).luminance() - 2.0).abs() < 1e-4 && intensity(1).r > intensity(1).b);
     assert!((intensity(2).luminance() - 1.0).abs() < 1e-4);
@@ -808,7 +811,7 @@ fn photometric_units_replace_the_normalisation() {
     let pi = std::f32::consts::PI;
     let LightDesc::Point { intensity, .. } = scene.lights[0] else { panic!() };
     near_rgb(intensity, [100.0 / (4.0 * pi); 3]);
-    let LightDesc::Spot { intensity, .. } = scene.lights[1] else { panic!() };
+    let LightDesc::Spot { intensity, .. } = *scene.lights[1].bare() else { panic!() };
     // 2π((1 − cos 0) + (cos 0 − cos 60°)/2)
     assert!((intensity.luminance() - 100.0 / (2.0 * pi * 0.25)).abs() < 1e-3);
     let LightDesc::Distant { towards, irradiance } = scene.lights[2] else { panic!() };
@@ -1242,7 +1245,7 @@ WorldEnd"#,
     assert_eq!(constant(reflectance), Spectrum::splat(0.9));
     let LightDesc::Distant { irradiance, .. } = scene.lights[0] else { panic!() };
     near_rgb(irradiance, [2.0, 4.0, 6.0]);
-    let LightDesc::Point { intensity, .. } = scene.lights[1] else { panic!() };
+    let LightDesc::Point { intensity, .. } = *scene.lights[1].bare() else { panic!() };
     assert!((intensity.luminance() - 3.0).abs() < 1e-3);
 }
 
@@ -1366,13 +1369,40 @@ fn every_parameter_of_uber_and_plastic_is_kept() {
 }
 
 #[test]
-fn the_dispersion_of_a_glass_is_rendered_or_said_to_be_left_out() {
+fn a_scene_asks_for_wavelengths_by_its_film_or_its_integrator() {
+    for (asks, text) in [
+        (false, "Film \"rgb\" Integrator \"path\""),
+        (true, "Film \"spectral\" \"integer nbuckets\" 12 \"float lambdamin\" 400 \"float lambdamax\" 700"),
+        (true, "Integrator \"volpath\" \"bool spectral\" true Film \"rgb\""),
+        (true, "Film \"rgb\" Integrator \"path\" \"bool spectral\" true"),
+    ] {
+        assert_eq!(try_read(&format!("{text} WorldBegin")).0.unwrap().film.spectral, asks, "{text}");
+    }
+    for (wrong, expected) in [
+        ("\"float lambdamin\" 300", "360 to 830 nm"),
+        ("\"float lambdamax\" 900", "360 to 830 nm"),
+        ("\"float lambdamin\" 700 \"float lambdamax\" 500", "less than lambdamax"),
+        ("\"integer nbuckets\" 0", "nbuckets"),
+        ("\"integer nbuckets\" 1000", "1 to 471"),
+    ] {
+        let error = try_read(&format!("Film \"spectral\" {wrong} WorldBegin")).0.unwrap_err().to_string();
+        assert!(error.contains(expected), "{wrong}: {error}");
+    }
+}
+
+#[test]
+fn the_dispersion_of_a_glass_is_kept() {
     let text = |material: &str| {
         format!("WorldBegin Material {material} \"spectrum eta\" \"glass-F11\" Shape \"sphere\"")
     };
     for material in ["\"dielectric\"", "\"thindielectric\""] {
-        let lines = try_read(&text(material)).1.lines();
-        assert!(lines.len() == 1 && lines[0].contains("dispersion is not rendered yet"), "{lines:?}");
+        let scene = read(&text(material));
+        let index = scene.materials[0].material.dispersion.as_ref().unwrap();
+        // At the d line and in the blue, by the catalogue of SF11.
+        for (nm, expected) in [(587.6, 1.78472), (435.8, 1.82518)] {
+            let found = index.at(nm).unwrap();
+            assert!((found - expected).abs() < 2e-4, "{material} at {nm}: {found}");
+        }
     }
     let scene = read(&text("\"principled\" \"float spec_trans\" 1"));
     // The language's F11 is SF11, whose Abbe number is 25.76 by its catalogue.
@@ -1551,6 +1581,7 @@ fn subsurface_and_openpbr_take_their_parameters_by_name() {
             duv_dx: Vec2::ZERO,
             duv_dy: Vec2::ZERO,
             vertex: lumbre_shading::VertexData::NONE,
+            spectral: None,
         };
         params.medium(&at)
     };

@@ -258,6 +258,7 @@ fn place() -> TextureContext {
         duv_dx: Vec2::ZERO,
         duv_dy: Vec2::ZERO,
         vertex: VertexData::NONE,
+        spectral: None,
     }
 }
 

@@ -26,7 +26,7 @@ impl Medium {
         let extinction = absorption + scattering;
         let albedo = scattering.zip(extinction, |s, t| if t > 0.0 { s / t } else { 0.0 });
         let medium = HomogeneousMedium { extinction, albedo, asymmetry };
-        Ok(Self(Arc::new(MediumDesc::Homogeneous { medium, glow: colour("emission", glow)? })))
+        Ok(Self(Arc::new(MediumDesc::Homogeneous { medium, glow: colour("emission", glow)?, spectra: None })))
     }
 
     /// The absorption and the reduced scattering coefficient of a measured medium, per millimetre.

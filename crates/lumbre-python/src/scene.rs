@@ -565,6 +565,7 @@ impl Scene {
         let mut options = shown.scene.options();
         options.view = view;
         options.integrator.kind = integrator.unwrap_or(options.integrator.kind);
+        options.spectral &= matches!(options.integrator.kind, IntegratorKind::Path { .. });
         if let Some((width, height)) = size {
             options.resize(shown.scene.resolved().film(), width, height);
         }
@@ -653,6 +654,7 @@ fn ask(asked: &mut Asked, name: &str, value: &Bound<'_, PyAny>) -> PyResult<()> 
             }
         }
         "background" => asked.behind = behind(value)?,
+        "spectral" => options.spectral = value.extract()?,
         "features" => options.features = value.extract()?,
         "part" => asked.keeps_part = value.extract()?,
         _ => return Err(invalid(format!("render has no option {name}"))),

@@ -32,6 +32,9 @@ pub enum RenderError {
     /// The pixel filter has no width.
     #[error("the pixel filter needs a positive radius, and more than zero inside it")]
     Filter,
+    /// The integrator follows colours only.
+    #[error("this integrator does not carry wavelengths: a spectral render needs the path integrator")]
+    NoWavelengths,
     /// Nobody wants the picture any longer: [`crate::Progress::is_wanted`].
     #[error("the picture is not wanted any longer")]
     Unwanted,

@@ -491,13 +491,14 @@ impl Job<'_> {
         let rays = owner.record.counts.total();
         let mut wave = self.waves.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default();
         let Owner { tile, record, dropped, clamped, first_dropped, .. } = owner;
+        let exposure = self.options.sample_exposure();
         self.taker.take(&mut wave, &ids, record, |SampleId { x, y, index }, sample| {
-            if !tile.add(x, y, &sample, &self.options.exposure) {
+            if !tile.add(x, y, &sample, &exposure) {
                 *dropped += 1;
                 if first_dropped.len() < REMEMBERED {
                     first_dropped.push(DroppedSample { x, y, sample: index });
                 }
-            } else if self.options.exposure.clamps(sample.radiance) {
+            } else if exposure.clamps(sample.radiance) {
                 *clamped += 1;
             }
         });

@@ -1,9 +1,12 @@
 //! Samples of pixels.
 
+use std::sync::Arc;
+
 use lumbre_geometry::Ray;
 use lumbre_math::DVec2;
 use lumbre_scene::{CameraRay, Footprint, Scene, View};
 use lumbre_shading::Spectrum;
+use lumbre_shading::spectrum::SensorCurves;
 
 use crate::film::{FeatureSample, Filter, Sample};
 use crate::integrators::{Integrator, integrator};
@@ -32,6 +35,10 @@ pub(crate) struct Taker<'a> {
     /// Ground that catches shadows, for many samples at once where that can be.
     catcher: Option<Catcher<'a>>,
     precision: Precision,
+    /// Whether samples carry wavelengths.
+    is_spectral: bool,
+    /// The camera that records them, if it is not the eye.
+    sensor_curves: Option<Arc<SensorCurves>>,
 }
 
 /// What a sample sees besides what an integrator finds.
@@ -61,6 +68,9 @@ impl<'a> Taker<'a> {
     ) -> Result<Self, RenderError> {
         let camera = options.camera_of(scene)?;
         let view = View::new(camera, options.width, options.height);
+        if options.spectral && !integrator.carries_wavelengths() {
+            return Err(RenderError::NoWavelengths);
+        }
         Ok(Self {
             scene,
             moves: scene.moves() || view.moves(),
@@ -73,6 +83,8 @@ impl<'a> Taker<'a> {
             is_centred: options.integrator.kind == lumbre_scene::IntegratorKind::Pov && options.stop.spp == 1,
             lights_are_seen: !options.transparent,
             catcher: Catcher::of(scene),
+            is_spectral: options.spectral,
+            sensor_curves: options.sensor_curves.clone(),
         })
     }
 
@@ -92,7 +104,8 @@ impl<'a> Taker<'a> {
             weights.push((aim.weight, camera.weight));
             (draw, camera)
         });
-        let mut sights = Sights::new(self.scene, &self.view, wave, self.precision, aimed, record);
+        let mut sights =
+            Sights::new(self.scene, &self.view, wave, self.precision, aimed, self.is_spectral, record);
         let seen = self.see(&mut sights, record);
         for (slot, ((&id, &(weight, passes)), &radiance)) in
             ids.iter().zip(&weights).zip(sights.radiance()).enumerate()
@@ -102,6 +115,11 @@ impl<'a> Taker<'a> {
             if passes == 0.0 {
                 (caught, features) = (None, None);
             }
+            let radiance = match (sights.wavelengths(slot), &self.sensor_curves) {
+                (None, _) => radiance,
+                (Some(wavelengths), None) => wavelengths.rec709(radiance),
+                (Some(wavelengths), Some(sensor)) => wavelengths.recorded(radiance, sensor),
+            };
             let radiance = through_lens(radiance, passes);
             if let Some(caught) = &mut caught {
                 caught.radiance = through_lens(caught.radiance, passes);
@@ -173,7 +191,7 @@ impl<'a> Taker<'a> {
         }
         let ray = sight.ray.ray;
         let end = sight.met.as_ref().map_or(f64::INFINITY, |met| (met.surface.point - ray.origin).length());
-        self.scene.transmittance(self.view.medium(), &ray.with_range(0.0, end), draw.along(&ray))
+        self.scene.transmittance(self.view.medium(), &ray.with_range(0.0, end), draw.along(&ray), None)
     }
 
     fn aim(&self, id: SampleId, draw: &Draw) -> Aim {
@@ -209,7 +227,9 @@ impl<'a> Taker<'a> {
     fn explain_sight(&self, draw: Draw, camera: CameraRay) -> (Ray, Spectrum, Vec<Event>) {
         let (mut wave, mut record) = (Wave::default(), Record::with_journal());
         let one = std::iter::once((draw, camera));
-        let mut sights = Sights::new(self.scene, &self.view, &mut wave, self.precision, one, &mut record);
+        // What is told of a path is told in colours.
+        let mut sights =
+            Sights::new(self.scene, &self.view, &mut wave, self.precision, one, false, &mut record);
         let seen = self.see(&mut sights, &mut record).first().and_then(|seen| seen.caught);
         let radiance = seen.map_or(sights.radiance()[0], |seen| seen.radiance);
         (sights.ray(0), radiance, record.journal.unwrap_or_default())

@@ -1,10 +1,12 @@
 //! What to render, and when to stop.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use lumbre_image::Rgb;
 use lumbre_math::DVec2;
 use lumbre_scene::{Camera, FilmDesc, FilterDesc, IntegratorDesc, IntegratorKind, SamplerDesc, Scene};
+use lumbre_shading::spectrum::SensorCurves;
 
 use crate::RenderError;
 use crate::denoise;
@@ -42,6 +44,11 @@ pub struct RenderOptions {
     /// Whether what the camera sees where there is nothing is left out: the picture then says how much each pixel covers.
     /// Lights at infinity still light what there is.
     pub transparent: bool,
+    /// Whether samples carry wavelengths in place of linear Rec. 709: see [`Wavelengths`](lumbre_shading::spectrum::Wavelengths). Only the
+    /// path integrator does.
+    pub spectral: bool,
+    /// The camera whose sensor a spectral render has, in place of that of the exposure.
+    pub sensor_curves: Option<Arc<SensorCurves>>,
     /// When to stop.
     pub stop: Stop,
     /// The index of the first sample of every pixel: parts of a render begin where others end.
@@ -109,6 +116,8 @@ impl Default for RenderOptions {
             filter: FilterDesc::default(),
             exposure: exposure_of(&film),
             transparent: false,
+            spectral: false,
+            sensor_curves: None,
             stop: Stop::at(DEFAULT_SPP),
             first_sample: 0,
             features: false,
@@ -130,6 +139,8 @@ impl RenderOptions {
             sampler: scene.sampler(),
             filter: scene.filter(),
             exposure: exposure_of(film),
+            spectral: film.spectral && matches!(scene.integrator().kind, IntegratorKind::Path { .. }),
+            sensor_curves: film.camera.clone(),
             stop: Stop::at(scene.sampler().spp.unwrap_or(DEFAULT_SPP)),
             ..Self::default()
         };
@@ -240,6 +251,14 @@ impl RenderOptions {
             _ => 0,
         };
         Ok(all.saturating_add(photons))
+    }
+
+    /// How samples become the colours of pixels.
+    pub(crate) fn sample_exposure(&self) -> Exposure {
+        match &self.sensor_curves {
+            Some(curves) if self.spectral => Exposure { sensor: curves.rec709, ..self.exposure },
+            _ => self.exposure,
+        }
     }
 
     pub(crate) fn pixel_filter(&self) -> Result<Filter, RenderError> {

@@ -79,7 +79,8 @@ impl Trial {
                     let ids: Vec<SampleId> =
                         samples.map(|(x, index)| SampleId { x, y: row.y, index }).collect();
                     taker.take(&mut wave, &ids, &mut Record::default(), |id, sample| {
-                        let luminance = f64::from(small.exposure.colour(sample.radiance).luminance());
+                        let luminance =
+                            f64::from(small.sample_exposure().colour(sample.radiance).luminance());
                         if luminance.is_finite() {
                             row.pixels[id.x as usize].add(luminance.clamp(0.0, MAX_LUMINANCE));
                         }

@@ -139,7 +139,7 @@ fn in_fog(desc: SceneDesc) -> SceneDesc {
     changed(desc, |desc| {
         let extinction = Rgb::new(0.1, 0.12, 0.15);
         let medium = HomogeneousMedium { extinction, albedo: Rgb::splat(0.8), asymmetry: 0.3 };
-        desc.media.push(Arc::new(Medium::Homogeneous { medium, glow: Rgb::BLACK }));
+        desc.media.push(Arc::new(Medium::Homogeneous { medium, glow: Rgb::BLACK, spectra: None }));
         desc.cameras[0].medium = Some(MediumId(0));
     })
 }

@@ -14,5 +14,6 @@ mod motion;
 mod panes;
 mod parts;
 mod shading_normals;
+mod spectral;
 mod subsurface;
 mod terminator;

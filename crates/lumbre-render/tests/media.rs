@@ -22,7 +22,7 @@ const CENTER: DVec3 = DVec3::new(3.0, -7.0, 11.0);
 fn homogeneous(absorption: Rgb, scattering: Rgb, asymmetry: f32, glow: Rgb) -> Medium {
     let extinction = absorption + scattering;
     let albedo = scattering.zip(extinction, |s, t| if t > 0.0 { s / t } else { 0.0 });
-    Medium::Homogeneous { medium: HomogeneousMedium { extinction, albedo, asymmetry }, glow }
+    Medium::Homogeneous { medium: HomogeneousMedium { extinction, albedo, asymmetry }, glow, spectra: None }
 }
 
 /// Voxels of uneven density in the cube about the centre that is as wide as the sphere of radius 1.

@@ -145,6 +145,7 @@ fn lamps(count: u32) -> Scene {
         by_vertices: false,
         two_sided: false,
         power: None,
+        spectrum: None,
     };
     let shape = ShapeDesc {
         index: 0,

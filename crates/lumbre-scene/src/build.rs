@@ -6,7 +6,7 @@ use lumbre_geometry::{Aabb, BilinearPatch, PlacedShape, Shape};
 use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, Placement, TriangleMesh};
 use lumbre_math::distribution::AliasTable;
 use lumbre_math::{DVec3, Elementary, Transform};
-use lumbre_shading::{Material, MaterialKind};
+use lumbre_shading::{Material, MaterialKind, Spectrum};
 
 use crate::light::choice::LightChoice;
 use crate::light::environment::first_not_finite;
@@ -16,6 +16,7 @@ use crate::light::{
     PointLight, PortalLight, ProjectionLight, ShapeLight, SpotLight, UniformLight, portal::PortalError,
     power,
 };
+use crate::light_colour::LightColour;
 use crate::media::{self, Boundaries, Media};
 use crate::mesh::{self, QuadOrder};
 use crate::specular::Specular;
@@ -73,7 +74,7 @@ impl Scene {
         let deforms = |shape: &ShapeDesc| matches!(&shape.geometry, GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) if mesh.motion.is_some());
         let moves = objects.iter().flat_map(|object| &object.instances).chain(&instances).any(is_moving)
             || objects.iter().flat_map(|object| &object.shapes).chain(&shapes).any(deforms)
-            || lights.iter().any(|light| matches!(light, LightDesc::Moving { .. }));
+            || lights.iter().any(|light| matches!(light.bare(), LightDesc::Moving { .. }));
         let boundaries = separated.map(|separated| builder.boundaries(separated, &instances)).transpose()?;
         let objects = builder.objects(objects, &instances)?;
         let accel = Arc::new(builder.tree(shapes, &instances, &objects)?);
@@ -95,7 +96,12 @@ impl Scene {
             builder.warnings.push(BuildWarning::NoLight);
         }
         builder.place_lights(lights)?;
-        let lighting = Lighting::new(std::mem::take(&mut builder.lights), &builder.entries, &bounds);
+        let lighting = Lighting::new(
+            std::mem::take(&mut builder.lights),
+            builder.light_colours,
+            &builder.entries,
+            &bounds,
+        );
         let has_holes = builder.entries.iter().any(SurfaceEntry::has_holes);
         let lets_light_through = builder.entries.iter().any(SurfaceEntry::lets_light_through);
         let lets_light_straight_on = builder.entries.iter().any(SurfaceEntry::lets_light_straight_on);
@@ -126,6 +132,7 @@ impl Scene {
             light_by_power: lighting.light_by_power,
             infinite: lighting.infinite,
             lights: lighting.lights,
+            light_colours: lighting.light_colours,
             tables: Arc::new(SurfaceTable::new(&builder.entries)),
             entries: Arc::new(builder.entries),
             media: Media {
@@ -158,9 +165,9 @@ impl Scene {
         if lights.is_empty() && !self.entries.iter().any(SurfaceEntry::shines) {
             builder.warnings.push(BuildWarning::NoLight);
         }
-        let moves = self.moves || lights.iter().any(|light| matches!(light, LightDesc::Moving { .. }));
+        let moves = self.moves || lights.iter().any(|light| matches!(light.bare(), LightDesc::Moving { .. }));
         builder.place_lights(lights)?;
-        let lighting = Lighting::new(builder.lights, &self.entries, &self.bounds);
+        let lighting = Lighting::new(builder.lights, builder.light_colours, &self.entries, &self.bounds);
         let ground = self.ground.as_ref().map(|ground| GroundPlane::new(ground.desc(), &lighting.lights));
         Ok(Self {
             accel: Arc::clone(&self.accel),
@@ -168,6 +175,7 @@ impl Scene {
             tables: Arc::clone(&self.tables),
             media: self.media.clone(),
             lights: lighting.lights,
+            light_colours: lighting.light_colours,
             light_choice: lighting.light_choice,
             lane_lights: lighting.lane_lights,
             light_by_power: lighting.light_by_power,
@@ -202,6 +210,7 @@ impl Scene {
 /// All lights of a scene, and how they are chosen.
 struct Lighting {
     lights: Vec<Light>,
+    light_colours: Vec<LightColour>,
     light_choice: LightChoice,
     lane_lights: LaneLights,
     light_by_power: Option<AliasTable>,
@@ -209,14 +218,20 @@ struct Lighting {
 }
 
 impl Lighting {
-    fn new(lights: Vec<Light>, entries: &[SurfaceEntry], bounds: &Aabb) -> Self {
+    fn new(
+        lights: Vec<Light>,
+        light_colours: Vec<LightColour>,
+        entries: &[SurfaceEntry],
+        bounds: &Aabb,
+    ) -> Self {
         let radius = if bounds.is_empty() { 1.0 } else { 0.5 * bounds.size().length() };
         let powers: Vec<f64> = lights.iter().map(|light| light.power(radius)).collect();
         let ids = (0..lights.len() as u32).map(LightId);
         let infinite: Vec<LightId> = ids.filter(|id| lights[id.0 as usize].is_infinite()).collect();
         let light_choice = LightChoice::new(&lights, entries, radius);
         let lane_lights = LaneLights::new(&lights, entries, &light_choice, &infinite);
-        Self { lights, light_choice, lane_lights, light_by_power: AliasTable::new(&powers), infinite }
+        let light_by_power = AliasTable::new(&powers);
+        Self { lights, light_colours, light_choice, lane_lights, light_by_power, infinite }
     }
 }
 
@@ -247,6 +262,8 @@ pub(crate) struct Builder {
     pub materials: Vec<Arc<Material>>,
     pub entries: Vec<SurfaceEntry>,
     lights: Vec<Light>,
+    /// Of each light.
+    light_colours: Vec<LightColour>,
     pub warnings: Vec<BuildWarning>,
 }
 
@@ -621,7 +638,14 @@ impl Builder {
 
     /// The lights other than shapes, after those.
     fn place_lights(&mut self, lights: Vec<LightDesc>) -> Result<(), BuildError> {
-        lights.into_iter().enumerate().try_for_each(|(position, light)| self.light(position, light))
+        self.light_colours = vec![LightColour::Surface; self.lights.len()];
+        for (position, light) in lights.into_iter().enumerate() {
+            let colour = colour_of(&light);
+            self.light(position, light)?;
+            // One that does not shine was dropped.
+            self.light_colours.resize(self.lights.len(), colour);
+        }
+        Ok(())
     }
 
     fn light(&mut self, position: usize, desc: LightDesc) -> Result<(), BuildError> {
@@ -631,6 +655,7 @@ impl Builder {
             LightDesc::Goniometric { image, .. } => Some(image),
             _ => None,
         };
+
         let picture = match &desc {
             LightDesc::Projection { image, .. } => Some(image),
             _ => picture.map(|picture| &picture.image),
@@ -639,6 +664,7 @@ impl Builder {
             self.warnings.push(BuildWarning::NotFiniteTexel { light: position, x, y });
         }
         let light = match desc {
+            LightDesc::Spectral { light, .. } => return self.light(position, *light),
             LightDesc::Moving { light, world_from_light } => {
                 let before = self.lights.len();
                 self.light(position, *light)?;
@@ -734,6 +760,33 @@ impl Builder {
     }
 }
 
+/// What the colours of a light are made of.
+fn colour_of(desc: &LightDesc) -> LightColour {
+    let one = |colour: &Spectrum| LightColour::Constant { colour: *colour, spectrum: None };
+    match desc {
+        LightDesc::Point { intensity, .. } | LightDesc::Spot { intensity, .. } => one(intensity),
+        LightDesc::Distant { irradiance, .. } => one(irradiance),
+        LightDesc::Infinite { radiance, image: None, .. }
+        | LightDesc::Portal { radiance, image: None, .. } => one(radiance),
+        LightDesc::Infinite { .. }
+        | LightDesc::Portal { .. }
+        | LightDesc::Goniometric { .. }
+        | LightDesc::Projection { .. }
+        | LightDesc::Pov(_) => LightColour::Varied,
+        LightDesc::Moving { light, .. } => colour_of(light),
+        LightDesc::Spectral { light, spectrum } => {
+            let spectrum = Some(spectrum.clone());
+            match (colour_of(light), &**light) {
+                (LightColour::Constant { colour, .. }, _) => LightColour::Constant { colour, spectrum },
+                (_, LightDesc::Goniometric { intensity, .. }) => {
+                    LightColour::Constant { colour: *intensity, spectrum }
+                }
+                (other, _) => other,
+            }
+        }
+    }
+}
+
 /// The items of a list, whose memory is freed as they are taken: descriptions are as large as what is made of them.
 fn freeing<T>(mut items: Vec<T>) -> impl Iterator<Item = T> {
     const PIECE: usize = 1 << 14;
@@ -749,8 +802,8 @@ fn freeing<T>(mut items: Vec<T>) -> impl Iterator<Item = T> {
 
 /// The emission of an area light, with its power converted to radiance.
 pub(crate) fn emission(desc: AreaLightDesc, area: impl FnOnce() -> f64) -> Emission {
-    let AreaLightDesc { radiance, image, by_vertices, two_sided, power } = desc;
-    let mut emission = Emission { radiance, image, by_vertices, two_sided };
+    let AreaLightDesc { radiance, image, by_vertices, two_sided, power, spectrum } = desc;
+    let mut emission = Emission { radiance, image, by_vertices, two_sided, spectrum };
     if let Some(power) = power {
         // L stays a factor, as in pbrt-v4: the power is that of a radiance of 1, or of the image.
         let of_image = Emission { radiance: lumbre_image::Rgb::WHITE, ..emission.clone() }.mean().luminance();

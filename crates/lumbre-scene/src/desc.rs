@@ -7,6 +7,7 @@ use lumbre_image::Rgb;
 use lumbre_kernel::{CustomGeometry, Placement};
 use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec2, Vec3, Vec4};
 use lumbre_shading::medium::Medium;
+use lumbre_shading::spectrum::{LightCurve, SensorCurves};
 use lumbre_shading::{FURTHER_SETS, FloatTexture, Material, MipMap, ShadingNormals};
 
 use crate::{Camera, Listing, MaterialId, MediumId, ObjectId};
@@ -289,6 +290,8 @@ pub struct AreaLightDesc {
     pub two_sided: bool,
     /// Total power in lumens that a `radiance` of 1 stands for, as in pbrt-v4; if given, `radiance` is a factor on it.
     pub power: Option<f32>,
+    /// The spectrum of the radiance, with luminance 1, where it is more than a colour: for renders that carry wavelengths.
+    pub spectrum: Option<Arc<LightCurve>>,
 }
 
 /// Lights other than shapes, in world space, with photometric units resolved.
@@ -362,6 +365,13 @@ pub enum LightDesc {
     },
     /// A light by POV-Ray's laws.
     Pov(Arc<crate::pov::PovLight>),
+    /// A light of one spectrum, whose colours are this one's but for a factor.
+    Spectral {
+        /// The light. Its image, if it has one, is grey.
+        light: Box<LightDesc>,
+        /// Its spectrum with luminance 1, for renders that carry wavelengths.
+        spectrum: Arc<LightCurve>,
+    },
     /// A moving light other than an infinite one.
     Moving {
         /// The light, in its own space.
@@ -369,6 +379,16 @@ pub enum LightDesc {
         /// The placement, by rotations, mirrors and translations only, since lights do not scale.
         world_from_light: Arc<AnimatedTransform>,
     },
+}
+
+impl LightDesc {
+    /// The light without its spectrum.
+    pub fn bare(&self) -> &Self {
+        match self {
+            Self::Spectral { light, .. } => light.bare(),
+            light => light,
+        }
+    }
 }
 
 /// An environment map: linear radiance by direction.
@@ -411,6 +431,10 @@ pub struct FilmDesc {
     /// What a sensor makes of colours: the red, the green and the blue of the picture, each of the red, green and blue of light in linear
     /// Rec. 709, after `max_component`. By default no other.
     pub sensor: [[f32; 3]; 3],
+    /// The sensitivities of the camera whose sensor it is: for renders that carry wavelengths, in place of `sensor`.
+    pub camera: Option<Arc<SensorCurves>>,
+    /// Whether paths are to carry wavelengths, where the integrator is `path`.
+    pub spectral: bool,
     /// Whether files of light keep single precision; half precision by default.
     pub single_precision: bool,
 }
@@ -427,6 +451,8 @@ impl Default for FilmDesc {
             iso: 100.0,
             max_component: f32::INFINITY,
             sensor: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            camera: None,
+            spectral: false,
             single_precision: false,
         }
     }

@@ -3,7 +3,10 @@
 use std::sync::Arc;
 
 use lumbre_math::Vec2;
+use lumbre_shading::spectrum::{LightCurve, Wavelengths};
 use lumbre_shading::{MipMap, Spectrum};
+
+use crate::light_colour;
 
 /// The emitted radiance, equal in all directions.
 #[derive(Clone, Debug)]
@@ -16,6 +19,8 @@ pub struct Emission {
     pub by_vertices: bool,
     /// Whether the back emits, too.
     pub two_sided: bool,
+    /// The spectrum of the radiance, with luminance 1, where it is more than a colour.
+    pub spectrum: Option<Arc<LightCurve>>,
 }
 
 impl Emission {
@@ -40,6 +45,15 @@ impl Emission {
         let grid = |i: u32| (i as f32 + 0.5) / SIDE as f32;
         let points = (0..SIDE * SIDE).map(|i| Vec2::new(grid(i % SIDE), grid(i / SIDE)));
         points.map(|uv| self.at(true, uv, Spectrum::WHITE)).sum::<Spectrum>() / (SIDE * SIDE) as f32
+    }
+
+    /// Emitted radiance at some wavelengths, of which this is the colour.
+    pub fn at_wavelengths(&self, radiance: Spectrum, wavelengths: &Wavelengths) -> Spectrum {
+        let is_varied = self.image.is_some() || self.by_vertices;
+        if is_varied {
+            return wavelengths.varied_light(radiance);
+        }
+        light_colour::constant(self.radiance, self.spectrum.as_deref(), radiance, wavelengths)
     }
 
     /// The number of emissive sides.

@@ -17,6 +17,7 @@ mod id;
 mod interaction;
 mod lens;
 pub mod light;
+mod light_colour;
 mod listing;
 mod media;
 mod mesh;

@@ -3,6 +3,7 @@
 mod area;
 mod brightness;
 pub(crate) mod choice;
+mod colour;
 mod delta;
 pub(crate) mod environment;
 pub mod lanes;

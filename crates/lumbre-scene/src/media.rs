@@ -9,6 +9,7 @@ use std::sync::Arc;
 use lumbre_geometry::{Ray, Surface};
 use lumbre_kernel::{Accel, Hit};
 use lumbre_shading::medium::{Medium, PassageNumbers, Way};
+use lumbre_shading::spectrum::Wavelengths;
 use lumbre_shading::{MaterialKind, Spectrum};
 
 use crate::surface::{Form, SurfaceEntry};
@@ -156,8 +157,14 @@ impl Scene {
     }
 
     /// An estimate of what media leave of light along a ray with a range, which begins in a medium. What else is in its way does not
-    /// count. `seed` chooses among such estimates.
-    pub fn transmittance(&self, medium: Option<MediumId>, ray: &Ray, seed: u64) -> Spectrum {
+    /// count. `seed` chooses among such estimates. Channels are those of linear Rec. 709, or the wavelengths that are given.
+    pub fn transmittance(
+        &self,
+        medium: Option<MediumId>,
+        ray: &Ray,
+        seed: u64,
+        wavelengths: Option<&Wavelengths>,
+    ) -> Spectrum {
         let mut crossings = Vec::new();
         self.crossings(ray, &mut crossings);
         let speed = ray.direction.length();
@@ -168,7 +175,7 @@ impl Scene {
             if let Some(id) = medium {
                 let way = Way { origin: ray.at(at), direction, length: (end - at) * speed };
                 let numbers = PassageNumbers::from_seed(seed.wrapping_add(part));
-                left *= self.medium(id).transmittance(&way, numbers);
+                left *= self.medium(id).transmittance(&way, numbers, wavelengths);
                 if left.is_black() {
                     return left;
                 }

@@ -14,6 +14,7 @@ use crate::footprint::Spot;
 use crate::light::choice::LightChoice;
 use crate::light::lanes::LaneLights;
 use crate::light::{Light, LightId, LightSample, Place, Sampling};
+use crate::light_colour::LightColour;
 use crate::media::Media;
 use crate::surface::{Form, ShadingGeometry, SurfaceEntry};
 use crate::{
@@ -29,6 +30,7 @@ pub struct Scene {
     pub(crate) tables: Arc<SurfaceTable>,
     pub(crate) media: Media,
     pub(crate) lights: Vec<Light>,
+    pub(crate) light_colours: Vec<LightColour>,
     pub(crate) light_choice: LightChoice,
     pub(crate) lane_lights: LaneLights,
     // By power; `None` without lights.
@@ -342,6 +344,11 @@ impl Scene {
         &self.tables
     }
 
+    /// Whether anything has an index of refraction by wavelength, which only a spectral render shows.
+    pub fn disperses(&self) -> bool {
+        self.entries.iter().any(SurfaceEntry::disperses)
+    }
+
     /// Whether shadow rays and paths go through some surfaces: cut-outs and interfaces.
     pub fn has_holes(&self) -> bool {
         self.has_holes
@@ -447,7 +454,7 @@ impl Scene {
         choose: f64,
         u: DVec2,
     ) -> Option<LightSample> {
-        self.sample_light_for(Sampling::Mis, from, normal, time, choose, u)
+        Some(self.sample_light_for(Sampling::Mis, from, normal, time, choose, u)?.1)
     }
 
     /// [`Scene::sample_light`] for those who find light in no other way.
@@ -459,10 +466,11 @@ impl Scene {
         choose: f64,
         u: DVec2,
     ) -> Option<LightSample> {
-        self.sample_light_for(Sampling::LightsOnly, from, normal, time, choose, u)
+        Some(self.sample_light_for(Sampling::LightsOnly, from, normal, time, choose, u)?.1)
     }
 
-    fn sample_light_for(
+    /// [`Scene::sample_light`] or [`Scene::sample_light_alone`], and which light the sample is of.
+    pub fn sample_light_for(
         &self,
         sampling: Sampling,
         from: DVec3,
@@ -470,7 +478,7 @@ impl Scene {
         time: f64,
         choose: f64,
         u: DVec2,
-    ) -> Option<LightSample> {
+    ) -> Option<(LightId, LightSample)> {
         let place = Place { from, normal };
         self.light_choice.sample(&self.lights, &self.entries, &place, time, [choose, u.x, u.y], sampling)
     }

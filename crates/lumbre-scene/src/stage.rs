@@ -145,11 +145,11 @@ impl Stage {
         };
         let turns = camera.as_ref().map_or(0.0, |framed| framed.turns);
         let photometric = desc.without_light == WithoutLight::StudioUnlessStaged
-            && desc.lights.iter().any(|light| !matches!(light, LightDesc::Infinite { .. }));
+            && desc.lights.iter().any(|light| !matches!(light.bare(), LightDesc::Infinite { .. }));
 
         let light = match &self.surroundings {
             Surroundings::Map(map) => {
-                desc.lights.retain(|light| !matches!(light, LightDesc::Infinite { .. }));
+                desc.lights.retain(|light| !matches!(light.bare(), LightDesc::Infinite { .. }));
                 desc.lights.push(around(desc.up, map));
                 StageLight::Map
             }
@@ -159,7 +159,7 @@ impl Stage {
                 StageLight::Map
             }
             Surroundings::Studio => {
-                desc.lights.retain(|light| !matches!(light, LightDesc::Infinite { .. }));
+                desc.lights.retain(|light| !matches!(light.bare(), LightDesc::Infinite { .. }));
                 StageLight::Studio
             }
             Surroundings::Automatic if wants_studio(desc) => StageLight::Studio,
@@ -364,6 +364,7 @@ mod tests {
             by_vertices: false,
             two_sided: false,
             power: None,
+            spectrum: None,
         };
         let light = |without_light, cameras: Vec<Camera>, lights: Vec<LightDesc>, glows: bool| {
             let mut desc = SceneDesc { cameras, lights, without_light, ..ball() };

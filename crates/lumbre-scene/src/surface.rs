@@ -236,6 +236,14 @@ impl SurfaceEntry {
         }
     }
 
+    /// Whether its material, or a part of it, has an index of refraction by wavelength.
+    pub(crate) fn disperses(&self) -> bool {
+        match &self.form {
+            Form::Csg(csg) => csg.leaves.iter().any(Self::disperses),
+            _ => self.material.as_ref().is_some_and(|material| material.has_dispersion()),
+        }
+    }
+
     /// Whether any part of it may be passed by light.
     pub(crate) fn has_holes(&self) -> bool {
         match &self.form {
@@ -333,6 +341,7 @@ impl ShadingGeometry {
             duv_dx,
             duv_dy,
             vertex,
+            spectral: None,
         }
     }
 
@@ -452,6 +461,7 @@ impl MeshAttributes {
             duv_dx: spot.duv_dx,
             duv_dy: spot.duv_dy,
             vertex: over_pixel(self.vertex_data(corners, uvs, &blend), spot.duv_dx, spot.duv_dy),
+            spectral: None,
         };
         (context, surface)
     }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use lumbre_kernel::TriangleMesh;
 use lumbre_math::{DVec3, Vec2, Vec3};
 use lumbre_shading::lanes::{BsdfKind, Rows};
+use lumbre_shading::spectrum::SpectralLookup;
 use lumbre_shading::{Bsdf, Material, ShadingFrame, ShadingNormals, TextureContext, VertexData};
 
 use crate::Footprint;
@@ -53,6 +54,7 @@ const ANYWHERE: TextureContext = TextureContext {
     duv_dx: Vec2::ZERO,
     duv_dy: Vec2::ZERO,
     vertex: VertexData::NONE,
+    spectral: None,
 };
 
 impl SurfaceTable {
@@ -123,14 +125,16 @@ impl TriangleSurface {
     }
 
     /// The material at a point, with mixtures resolved, the shading frame and the BSDF: as [`crate::Interaction::resolved`] and
-    /// [`Material::shading`]; `None` for what does not scatter.
+    /// [`Material::shading`]; `None` for what does not scatter. Colours are linear Rec. 709, or at the wavelengths that are given.
     pub fn scattering(
         &self,
         met: &TrianglePoint,
         footprint: &Footprint,
         normals: ShadingNormals,
+        spectral: Option<SpectralLookup>,
     ) -> Option<(&Material, ShadingFrame, Bsdf)> {
-        let (at, surface) = self.attributes.texture_context(met, footprint);
+        let (mut at, surface) = self.attributes.texture_context(met, footprint);
+        at.spectral = spectral;
         let towards = -met.direction;
         let material = self.material.resolve(&at, towards);
         let (frame, bsdf) = material.shading(&at, &surface, towards, normals)?;

@@ -47,6 +47,7 @@ fn glow() -> AreaLightDesc {
         by_vertices: false,
         two_sided: false,
         power: None,
+        spectrum: None,
     }
 }
 

@@ -160,7 +160,7 @@ impl Bsdf {
             Self::Principled(bsdf) if bsdf.coat.weight <= 0.0 || bsdf.coat.normal.z >= 1.0 => &[bsdf.facets],
             Self::Principled(_) | Self::Hair(_) => return false,
             Self::Uber(bsdf) => &[bsdf.facets],
-            Self::Measured(bsdf) => return bsdf.0.is_isotropic(),
+            Self::Measured(bsdf) => return bsdf.tables.is_isotropic(),
             Self::Subsurface(bsdf) => &[bsdf.face.facets],
         };
         facets.iter().all(|facets| facets.alpha().x == facets.alpha().y)

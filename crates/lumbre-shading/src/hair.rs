@@ -48,10 +48,10 @@ impl HairParams {
     pub(crate) fn bsdf(&self, at: &TextureContext) -> Hair {
         let beta_n = roughness(self.beta_n.evaluate(at));
         let absorption = match &self.colour {
-            HairColour::Absorption(absorption) => absorption.evaluate(at),
+            HairColour::Absorption(absorption) => absorption.evaluate_unbounded(at),
             HairColour::Reflectance(colour) => absorption_of_colour(colour.evaluate(at), beta_n),
             HairColour::Melanin { eumelanin, pheomelanin } => {
-                absorption_of_melanin(eumelanin.evaluate(at), pheomelanin.evaluate(at))
+                at.coefficient(absorption_of_melanin(eumelanin.evaluate(at), pheomelanin.evaluate(at)))
             }
         };
         Hair::new(

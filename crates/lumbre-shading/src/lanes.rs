@@ -164,7 +164,7 @@ impl Bsdf {
             Self::Principled(bsdf) => bsdf.row(),
             Self::Uber(bsdf) => bsdf.row(),
             Self::Hair(bsdf) => bsdf.row(),
-            Self::Measured(_) => Row::from_slice(&[0.0]),
+            Self::Measured(bsdf) => bsdf.row(),
             Self::Subsurface(bsdf) => Row::from_slice(&bsdf.row()),
         }
     }
@@ -183,10 +183,10 @@ impl Rows {
         let at = self.numbers.len() as u32;
         let mut row = bsdf.row();
         if let Bsdf::Measured(bsdf) = bsdf {
-            let place = self.measured.iter().position(|known| Arc::ptr_eq(known, &bsdf.0));
+            let place = self.measured.iter().position(|known| Arc::ptr_eq(known, &bsdf.tables));
             row[0] = place.unwrap_or(self.measured.len()) as f32;
             if place.is_none() {
-                Arc::make_mut(&mut self.measured).push(bsdf.0.clone());
+                Arc::make_mut(&mut self.measured).push(bsdf.tables.clone());
             }
         }
         self.numbers.extend(row);

@@ -14,11 +14,12 @@ use crate::diffuse::{Diffuse, DiffuseTransmission};
 use crate::hair::HairParams;
 use crate::measured::{Measured, MeasuredTables};
 use crate::microfacet::Microfacets;
+use crate::spectrum::Wavelengths;
 use crate::subsurface::SubsurfaceParams;
 use crate::uber::UberParams;
 use crate::{
     Bsdf, FloatTexture, HomogeneousMedium, ImageTexture, PrincipledParams, ShadingFrame, ShadingNormals,
-    Spectrum, SpectrumTexture, Texture, TextureContext,
+    Spectrum, SpectrumTexture, SpectrumValue, Texture, TextureContext,
 };
 
 /// The roughness group of parameters.
@@ -67,6 +68,9 @@ pub struct Material {
     pub normal_map: Option<ImageTexture>,
     /// Whether camera rays pass through its back. Light does not: it still casts shadows.
     pub one_sided: bool,
+    /// The index of refraction of a dielectric, or of a coat, by wavelength, which takes the place of its number where paths carry
+    /// wavelengths.
+    pub dispersion: Option<Arc<SpectrumValue>>,
 }
 
 /// The kinds of material. Parameters and defaults are those of the scene language.
@@ -243,7 +247,7 @@ pub struct LocalSurface {
 impl Material {
     /// A material of a kind, without bump or normal map.
     pub fn new(kind: MaterialKind) -> Self {
-        Self { kind, displacement: None, normal_map: None, one_sided: false }
+        Self { kind, displacement: None, normal_map: None, one_sided: false, dispersion: None }
     }
 
     /// Resolves mixtures to the one material that applies at a position. The choice is a hash of the position
@@ -375,6 +379,11 @@ impl Material {
     /// Whether it, or a part of the mixture, is of some kind; true when in doubt, for mixtures of very many
     /// parts.
     fn has_part(&self, is: impl Fn(&MaterialKind) -> bool) -> bool {
+        self.any_part(&|part| is(&part.kind))
+    }
+
+    /// [`Self::has_part`] of whole materials.
+    fn any_part(&self, is: &dyn Fn(&Self) -> bool) -> bool {
         let mut rest: SmallVec<[&Self; 4]> = smallvec![self];
         // Mixtures may share materials, so the number of steps is bounded.
         for _ in 0..64 {
@@ -383,7 +392,7 @@ impl Material {
                 MaterialKind::Mix { materials, .. } => {
                     rest.extend(materials.iter().map(|material| &**material));
                 }
-                kind if is(kind) => return true,
+                _ if is(material) => return true,
                 _ => {}
             }
         }
@@ -494,10 +503,10 @@ impl Material {
     /// world-space length: exp(−σ d) of the light remains after a distance d. `None` where nothing is absorbed,
     /// or light cannot get inside. The normal points out of the solid.
     ///
-    /// The caller tracks the distance travelled inside.
-    pub fn interior_attenuation(&self) -> Option<Spectrum> {
+    /// The caller tracks the distance travelled inside. Channels are those of linear Rec. 709, or the wavelengths that are given.
+    pub fn interior_attenuation(&self, wavelengths: Option<&Wavelengths>) -> Option<Spectrum> {
         match &self.kind {
-            MaterialKind::Principled(params) => params.interior_attenuation(),
+            MaterialKind::Principled(params) => params.interior_attenuation(wavelengths),
             _ => None,
         }
     }
@@ -508,7 +517,9 @@ impl Material {
     /// Where it is not the same for all light, it is that which enters at a position.
     pub fn interior_medium(&self, at: &TextureContext) -> Option<HomogeneousMedium> {
         match &self.kind {
-            MaterialKind::Principled(params) => params.interior_medium(),
+            MaterialKind::Principled(params) => {
+                params.interior_medium(at.spectral.as_ref().map(|spectral| &spectral.wavelengths))
+            }
             MaterialKind::Subsurface(params) => Some(params.medium(at)),
             _ => None,
         }
@@ -563,9 +574,11 @@ impl Material {
                 Bsdf::Conductor(by_reflectance(reflectance, at, roughness.facets(at)))
             }
             MaterialKind::Dielectric { eta, roughness } => {
-                Bsdf::Dielectric(Dielectric { eta: index(*eta), facets: roughness.facets(at) })
+                Bsdf::Dielectric(Dielectric { eta: self.index_at(*eta, at), facets: roughness.facets(at) })
             }
-            MaterialKind::ThinDielectric { eta } => Bsdf::ThinDielectric(ThinDielectric { eta: index(*eta) }),
+            MaterialKind::ThinDielectric { eta } => {
+                Bsdf::ThinDielectric(ThinDielectric { eta: self.index_at(*eta, at) })
+            }
             MaterialKind::CoatedDiffuse {
                 reflectance,
                 roughness,
@@ -578,7 +591,7 @@ impl Material {
             } => Bsdf::CoatedDiffuse(CoatedDiffuse {
                 base: Diffuse { reflectance: albedo(reflectance.evaluate(at)) },
                 coat: Coat {
-                    face: Dielectric { eta: index(*eta), facets: roughness.facets(at) },
+                    face: Dielectric { eta: self.index_at(*eta, at), facets: roughness.facets(at) },
                     thickness: thickness.evaluate(at).max(0.0),
                     g: asymmetry(g.evaluate(at)),
                     albedo: albedo(medium.evaluate(at)),
@@ -597,7 +610,7 @@ impl Material {
                 max_depth,
                 samples,
             } => {
-                let interface_eta = index(*interface_eta);
+                let interface_eta = self.index_at(*interface_eta, at);
                 let base = metal.conductor(at, roughness.facets(at));
                 Bsdf::CoatedConductor(CoatedConductor {
                     // The index was given against vacuum.
@@ -621,12 +634,49 @@ impl Material {
             MaterialKind::Principled(params) => Bsdf::Principled(Box::new(params.bsdf(at))),
             MaterialKind::Uber(params) => Bsdf::Uber(params.bsdf(at)),
             MaterialKind::Hair(params) => Bsdf::Hair(params.bsdf(at)),
-            MaterialKind::Measured(tables) => Bsdf::Measured(Measured(tables.clone())),
+            MaterialKind::Measured(tables) => Bsdf::Measured(Measured {
+                tables: tables.clone(),
+                nm: at.spectral.map(|spectral| spectral.wavelengths.nm()),
+            }),
             MaterialKind::Subsurface(params) => Bsdf::Subsurface(params.bsdf(at)),
-            MaterialKind::Pov(material) => Bsdf::Uber(material.bsdf(at)),
+            MaterialKind::Pov(material) => {
+                let bsdf = material.bsdf(at);
+                Bsdf::Uber(match &at.spectral {
+                    None => bsdf,
+                    Some(spectral) => bsdf.with_colours(|colour| spectral.varied(colour)),
+                })
+            }
             MaterialKind::Mix { .. } | MaterialKind::Interface => return None,
         };
         Some(bsdf)
+    }
+
+    /// The index of refraction at a place: that of the hero wavelength, where there are wavelengths and the index depends on them.
+    fn index_at(&self, eta: f32, at: &TextureContext) -> f32 {
+        let spectral = self.dispersion.as_ref().zip(at.spectral.as_ref());
+        let of_hero = spectral.and_then(|(index, spectral)| index.at(spectral.wavelengths.nm()[0].into()));
+        index(of_hero.map_or(eta, |eta| eta as f32))
+    }
+
+    /// Whether it bends each wavelength by an index of its own, so that a path through it can follow the hero wavelength alone. Mixtures must
+    /// be resolved first.
+    pub fn disperses(&self) -> bool {
+        match &self.kind {
+            MaterialKind::Dielectric { .. }
+            | MaterialKind::ThinDielectric { .. }
+            | MaterialKind::CoatedDiffuse { .. }
+            | MaterialKind::CoatedConductor { .. } => self.dispersion.is_some(),
+            MaterialKind::Principled(params) => params.disperses(),
+            _ => false,
+        }
+    }
+
+    /// Whether it, or a part of the mixture, has an index of refraction by wavelength.
+    pub fn has_dispersion(&self) -> bool {
+        match &self.kind {
+            MaterialKind::Mix { .. } => self.any_part(&|part| part.dispersion.is_some()),
+            _ => self.dispersion.is_some(),
+        }
     }
 
     /// The default material: diffuse, 0.5.
@@ -707,7 +757,11 @@ fn by_index(
     facets: Microfacets,
 ) -> Conductor {
     let not_negative = |c: Spectrum| c.map(|c| c.max(0.0));
-    Conductor { eta: not_negative(eta.evaluate(at)), k: not_negative(k.evaluate(at)), facets }
+    Conductor {
+        eta: not_negative(eta.evaluate_unbounded(at)),
+        k: not_negative(k.evaluate_unbounded(at)),
+        facets,
+    }
 }
 
 fn by_reflectance(reflectance: &SpectrumTexture, at: &TextureContext, facets: Microfacets) -> Conductor {
@@ -795,6 +849,7 @@ mod tests {
             duv_dx: Vec2::splat(1e-3),
             duv_dy: Vec2::splat(1e-3),
             vertex: crate::VertexData::NONE,
+            spectral: None,
         }
     }
 

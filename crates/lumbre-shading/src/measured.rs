@@ -12,7 +12,8 @@ use std::sync::Arc;
 use lumbre_math::{DVec3, Elementary, Vec2, Vec3};
 use lumbre_simd::{MAX_LANES, Mask, Real, V3};
 
-use crate::lanes::{LaneBsdf, LaneSample, field};
+use crate::lanes::{LaneBsdf, LaneSample, Row, colour, field};
+use crate::spectrum::Sigmoid;
 use crate::{BsdfSample, LocalDir, Scatter, Spectrum};
 use table::{Between, Table, Warp};
 
@@ -171,22 +172,44 @@ fn from_phi(phi: f64) -> f64 {
 
 /// A measured surface. It reflects on both sides; it is reciprocal as far as its measurement is.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Measured(pub Arc<MeasuredTables>);
+pub struct Measured {
+    /// Its tables.
+    pub tables: Arc<MeasuredTables>,
+    /// The wavelengths in nm that its channels are; `None` where they are linear Rec. 709.
+    pub nm: Option<[f32; 3]>,
+}
+
+/// A colour at some wavelengths in nm: tables keep colours, which smooth spectra stand for; 0 in place of the first where there are none.
+fn at_wavelengths(colour: Spectrum, nm: [f32; 3]) -> Spectrum {
+    let most = 2.0 * colour.max_component();
+    if nm[0] == 0.0 || most <= 0.0 {
+        return colour;
+    }
+    let sigmoid = Sigmoid::by_table(colour / most);
+    let [r, g, b] = nm.map(|nm| most * sigmoid.at(nm));
+    Spectrum::new(r, g, b)
+}
 
 impl Measured {
+    /// A surface of these tables, in linear Rec. 709.
+    pub fn new(tables: Arc<MeasuredTables>) -> Self {
+        Self { tables, nm: None }
+    }
+
     /// f · |cos θi|.
     pub fn eval(&self, wo: LocalDir, wi: LocalDir) -> Spectrum {
-        self.0.eval(wo.vec(), wi.vec()).0
+        at_wavelengths(self.tables.eval(wo.vec(), wi.vec()).0, self.nm.unwrap_or_default())
     }
 
     /// The density of [`Measured::sample`].
     pub fn pdf(&self, wo: LocalDir, wi: LocalDir) -> f32 {
-        self.0.eval(wo.vec(), wi.vec()).1
+        self.tables.eval(wo.vec(), wi.vec()).1
     }
 
     /// A reflection, about as bright as the surface is in its direction.
     pub fn sample(&self, wo: LocalDir, u: Vec2) -> Option<BsdfSample> {
-        let (wi, weight, pdf) = self.0.sample(wo.vec(), u.to_array())?;
+        let (wi, weight, pdf) = self.tables.sample(wo.vec(), u.to_array())?;
+        let weight = at_wavelengths(weight, self.nm.unwrap_or_default());
         let wi = LocalDir(wi);
         Some(BsdfSample { wi, weight, scatter: Scatter::Density(pdf), transmitted: false, eta: 1.0 })
     }
@@ -197,10 +220,17 @@ impl Measured {
         let cell = |i: u32| (i as f32 + 0.5) / SIDE as f32;
         let mut sum = Spectrum::BLACK;
         for i in 0..SIDE * SIDE {
-            let sample = self.0.sample(Vec3::Z, [cell(i % SIDE), cell(i / SIDE)]);
+            let sample = self.tables.sample(Vec3::Z, [cell(i % SIDE), cell(i / SIDE)]);
             sum += sample.map_or(Spectrum::BLACK, |(_, weight, _)| weight);
         }
-        (sum / (SIDE * SIDE) as f32).map(crate::unit)
+        let mean = at_wavelengths(sum / (SIDE * SIDE) as f32, self.nm.unwrap_or_default());
+        mean.map(crate::unit)
+    }
+
+    /// Its row, but for the place of its tables.
+    pub(crate) fn row(&self) -> Row {
+        let [r, g, b] = self.nm.unwrap_or_default();
+        Row::from_slice(&[0.0, r, g, b])
     }
 }
 
@@ -212,6 +242,8 @@ pub type MeasuredList = Arc<Vec<Arc<MeasuredTables>>>;
 pub struct MeasuredLanes<R: Real> {
     /// Which of the tables, as a whole number.
     row: R,
+    /// The wavelengths in nm; 0 where channels are linear Rec. 709.
+    nm: V3<R>,
     tables: Option<MeasuredList>,
 }
 
@@ -243,11 +275,11 @@ fn together<R: Real>(lanes: &[Vec3; MAX_LANES]) -> V3<R> {
 }
 
 impl<R: Real> LaneBsdf<R> for MeasuredLanes<R> {
-    const ROW: usize = 1;
+    const ROW: usize = 4;
 
     #[inline(always)]
     fn load(table: &[f32], at: R::UInt) -> Self {
-        Self { row: field(table, at, 0), tables: None }
+        Self { row: field(table, at, 0), nm: colour(table, at, 1), tables: None }
     }
 
     #[inline(always)]
@@ -257,11 +289,11 @@ impl<R: Real> LaneBsdf<R> for MeasuredLanes<R> {
 
     #[inline(always)]
     fn eval(&self, wo: V3<R>, wi: V3<R>) -> (V3<R>, R) {
-        let (rows, wo, wi) = (self.row.to_lanes(), each(wo), each(wi));
+        let (rows, nm, wo, wi) = (self.row.to_lanes(), each(self.nm), each(wo), each(wi));
         let (mut values, mut pdfs) = ([Vec3::ZERO; MAX_LANES], [0.0; MAX_LANES]);
         for i in 0..R::LANES {
             let (value, pdf) = self.tables(i, &rows).eval(wo[i], wi[i]);
-            values[i] = Vec3::from_array(value.to_array());
+            values[i] = Vec3::from_array(at_wavelengths(value, nm[i].to_array()).to_array());
             pdfs[i] = pdf;
         }
         (together(&values), R::from_lanes(&pdfs))
@@ -269,7 +301,7 @@ impl<R: Real> LaneBsdf<R> for MeasuredLanes<R> {
 
     #[inline(always)]
     fn sample(&self, wo: V3<R>, _: R, u: [R; 2]) -> LaneSample<R> {
-        let (rows, wo, u) = (self.row.to_lanes(), each(wo), u.map(R::to_lanes));
+        let (rows, nm, wo, u) = (self.row.to_lanes(), each(self.nm), each(wo), u.map(R::to_lanes));
         let (mut directions, mut weights) = ([Vec3::Z; MAX_LANES], [Vec3::ZERO; MAX_LANES]);
         let (mut pdfs, mut valid) = ([0.0; MAX_LANES], 0);
         for i in 0..R::LANES {
@@ -277,7 +309,7 @@ impl<R: Real> LaneBsdf<R> for MeasuredLanes<R> {
             let Some((wi, weight, pdf)) = tables.sample(wo[i], [u[0][i], u[1][i]]) else { continue };
             valid |= 1 << i;
             directions[i] = wi;
-            weights[i] = Vec3::from_array(weight.to_array());
+            weights[i] = Vec3::from_array(at_wavelengths(weight, nm[i].to_array()).to_array());
             pdfs[i] = pdf;
         }
         LaneSample {

@@ -251,6 +251,7 @@ impl Principled {
         row.extend(self.sheen.color.to_array());
         row.extend([self.sheen.roughness(), self.coat.weight, self.coat.alpha]);
         row.extend(self.coat.normal.to_array());
+        row.extend(self.film.nm);
         row
     }
 }

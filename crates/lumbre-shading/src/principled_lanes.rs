@@ -785,10 +785,15 @@ impl<R: Real> Task<R> for Eval<'_, R> {
 }
 
 impl<R: Real> LaneBsdf<R> for PrincipledLanes<R> {
-    const ROW: usize = 35;
+    const ROW: usize = 38;
 
     #[inline(always)]
     fn load(table: &[f32], at: R::UInt) -> Self {
+        let film: R = field(table, at, 23);
+        let mut nm = V3::splat(R::zero());
+        if film.simd_ne(R::zero()).any() {
+            nm = colour(table, at, 35);
+        }
         Self {
             base: colour(table, at, 0),
             metallic: field(table, at, 3),
@@ -804,9 +809,10 @@ impl<R: Real> LaneBsdf<R> for PrincipledLanes<R> {
             diffuse_transmission: field(table, at, 19),
             diffuse_transmission_color: colour(table, at, 20),
             film: ThinFilmLanes {
-                weight: field(table, at, 23),
+                weight: film,
                 eta: field(table, at, 24),
                 thickness: field(table, at, 25),
+                nm,
             },
             sheen: SheenLanes { color: colour(table, at, 26), roughness: field(table, at, 29) },
             coat: ClearcoatLanes {

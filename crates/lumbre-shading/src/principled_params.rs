@@ -9,8 +9,14 @@ use crate::medium::{HomogeneousMedium, albedo_of_many_collisions};
 use crate::microfacet::Microfacets;
 use crate::principled::{Body, Clearcoat, Principled};
 use crate::sheen::Sheen;
+use crate::spectrum::Wavelengths;
 use crate::thin_film::{ThinFilm, index_of};
 use crate::{FloatTexture, ImageTexture, Spectrum, SpectrumTexture, Texture, TextureContext, fresnel};
+
+/// The lines of helium and hydrogen by which glass is catalogued.
+const D_LINE_NM: f32 = 587.6;
+const F_LINE_NM: f32 = 486.1;
+const C_LINE_NM: f32 = 656.3;
 
 /// Which convention parameters follow where the two families differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -240,27 +246,63 @@ impl PrincipledParams {
 
     /// σ of the Beer–Lambert law inside, per unit of length; see [`crate::Material::interior_attenuation`]. A
     /// channel of 0 counts as a millionth.
-    pub fn interior_attenuation(&self) -> Option<Spectrum> {
+    pub fn interior_attenuation(&self, wavelengths: Option<&Wavelengths>) -> Option<Spectrum> {
         self.interior_index()?;
         let volume = self.volume?;
         let distance = volume.attenuation_distance.max(f32::MIN_POSITIVE);
-        let sigma = volume.attenuation_color.map(|left| -crate::unit(left).max(1e-6).logarithm() / distance);
+        let left = wavelengths.map_or(volume.attenuation_color, |w| w.reflectance(volume.attenuation_color));
+        let sigma = left.map(|left| -crate::unit(left).max(1e-6).logarithm() / distance);
         (sigma.is_finite() && !sigma.is_black()).then_some(sigma)
     }
 
     /// The medium inside, if it scatters light; see [`crate::Material::interior_medium`].
-    pub fn interior_medium(&self) -> Option<HomogeneousMedium> {
-        let extinction = self.interior_attenuation()?;
+    pub fn interior_medium(&self, wavelengths: Option<&Wavelengths>) -> Option<HomogeneousMedium> {
+        let extinction = self.interior_attenuation(wavelengths)?;
         let volume = self.volume.filter(|volume| !volume.scatter_color.is_black())?;
         let g = volume.scatter_anisotropy;
         let asymmetry = if g.is_nan() { 0.0 } else { g.clamp(-0.999, 0.999) };
-        let albedo = volume.scatter_color.map(|c| albedo_of_many_collisions(c, asymmetry));
+        let scattered = wavelengths.map_or(volume.scatter_color, |w| w.reflectance(volume.scatter_color));
+        let albedo = scattered.map(|c| albedo_of_many_collisions(c, asymmetry));
         Some(HomogeneousMedium { extinction, albedo, asymmetry })
     }
 
     /// The BSDF at a position. Its coat is along the shading normal until [`crate::Material::shading`] orients
     /// it.
     pub fn bsdf(&self, at: &TextureContext) -> Principled {
+        // Tints and strengths come from colours: wavelengths come in at the end.
+        let Some(spectral) = &at.spectral else { return self.bsdf_in_rgb(at) };
+        let is_uniform = self.is_uniform();
+        let colour = |c: Spectrum| if is_uniform { spectral.constant(c) } else { spectral.varied(c) };
+        let bsdf = self.bsdf_in_rgb(&at.in_rgb());
+        let (eta, body) = match bsdf.body {
+            // The index of the hero wavelength, of a glass of Cauchy's.
+            Body::Solid { spread } if spread > 0.0 => {
+                let inverse_square = |nm: f32| 1.0 / (nm * nm);
+                let between_lines = inverse_square(F_LINE_NM) - inverse_square(C_LINE_NM);
+                let away = inverse_square(spectral.wavelengths.nm()[0]) - inverse_square(D_LINE_NM);
+                (bsdf.eta + 2.0 * spread * away / between_lines, Body::Solid { spread: 0.0 })
+            }
+            body => (bsdf.eta, body),
+        };
+        Principled {
+            base: colour(bsdf.base),
+            f0: colour(bsdf.f0),
+            transmission_color: colour(bsdf.transmission_color),
+            diffuse_transmission_color: colour(bsdf.diffuse_transmission_color),
+            film: ThinFilm { nm: spectral.wavelengths.nm(), ..bsdf.film },
+            sheen: bsdf.sheen.coloured(colour(bsdf.sheen.color)),
+            eta,
+            body,
+            ..bsdf
+        }
+    }
+
+    /// Whether it has another index for each wavelength.
+    pub(crate) fn disperses(&self) -> bool {
+        self.dispersion > 0.0 && self.interior_index().is_some()
+    }
+
+    fn bsdf_in_rgb(&self, at: &TextureContext) -> Principled {
         let share = |texture: &FloatTexture| crate::unit(texture.evaluate(at));
         let base = albedo(self.base_color.evaluate(at));
         let (metallic, transmission) = (share(&self.metallic), share(&self.transmission));
@@ -293,7 +335,7 @@ impl PrincipledParams {
         } else {
             let thickness = self.iridescence_thickness.evaluate(at).max(0.0);
             let eta = if self.iridescence_ior > 1.0 { self.iridescence_ior.min(10.0) } else { 1.0 };
-            ThinFilm { weight: film, eta, thickness: thickness.min(1e6) }
+            ThinFilm { weight: film, eta, thickness: thickness.min(1e6), ..ThinFilm::NONE }
         };
         // 20 over the Abbe number V, and V = (η − 1) / (η of blue − η of red): half of that difference.
         let spread = 0.5 * (eta - 1.0).max(0.0) * self.dispersion.max(0.0) / 20.0;

@@ -35,6 +35,11 @@ impl Sheen {
         Self { color: color.map(crate::unit), roughness }
     }
 
+    /// The same in another colour.
+    pub(crate) fn coloured(self, color: Spectrum) -> Self {
+        Self { color, ..self }
+    }
+
     /// No sheen.
     pub const NONE: Self = Self { color: Spectrum::BLACK, roughness: 1.0 };
 

@@ -63,14 +63,14 @@ impl SubsurfaceParams {
         let not_negative = |c: f32| if c > 0.0 { c.min(f32::MAX) } else { 0.0 };
         match &self.inside {
             Inside::Coefficients { absorption, scattering } => {
-                let absorption = absorption.evaluate(at).map(not_negative);
-                let scattering = scattering.evaluate(at).map(not_negative);
+                let absorption = absorption.evaluate_unbounded(at).map(not_negative);
+                let scattering = scattering.evaluate_unbounded(at).map(not_negative);
                 let extinction = absorption + scattering;
                 let albedo = scattering.zip(extinction, |s, t| if t > 0.0 { s / t } else { 0.0 });
                 HomogeneousMedium { extinction: extinction * self.scale, albedo, asymmetry }
             }
             Inside::Reflectance { reflectance, mean_free_path } => {
-                let path = mean_free_path.evaluate(at) * self.scale;
+                let path = mean_free_path.evaluate_unbounded(at) * self.scale;
                 let extinction = path.map(|path| 1.0 / path.max(LEAST_PATH));
                 // The share of even light from inside that the boundary reflects back.
                 let back = 1.0 - transmitted_from_outside(index(self.eta)) / index(self.eta).powi(2);
@@ -280,6 +280,7 @@ mod tests {
             duv_dx: Vec2::ZERO,
             duv_dy: Vec2::ZERO,
             vertex: VertexData::NONE,
+            spectral: None,
         }
     }
 

@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 use lumbre_math::{DVec2, DVec3, Elementary, Transform, Vec2, Vec3};
 
-use crate::{MipMap, Spectrum};
+use crate::spectrum::SpectralLookup;
+use crate::{MipMap, Spectrum, SpectrumValue};
 
 mod dots;
 mod pattern;
@@ -32,6 +33,21 @@ pub struct TextureContext {
     pub duv_dy: Vec2,
     /// Further vertex data of a mesh.
     pub vertex: VertexData,
+    /// The wavelengths that colours are looked up at; `None` for their linear Rec. 709.
+    pub spectral: Option<SpectralLookup>,
+}
+
+impl TextureContext {
+    /// The same place, where colours are linear Rec. 709.
+    #[must_use]
+    pub fn in_rgb(&self) -> Self {
+        Self { spectral: None, ..*self }
+    }
+
+    /// A colour that is a coefficient, not a reflectance, at the wavelengths, if there are any.
+    pub(crate) fn coefficient(&self, colour: Spectrum) -> Spectrum {
+        self.spectral.map_or(colour, |spectral| spectral.wavelengths.varied_coefficient(colour))
+    }
 }
 
 /// Vertex data of a mesh other than position, normal and first uv.
@@ -247,6 +263,15 @@ pub trait TextureValue:
 
     /// A colour, as a number by its luminance.
     fn from_colour(colour: Spectrum) -> Self;
+
+    /// A value that is the same everywhere, at the wavelengths of a place, if there are any.
+    fn constant_at(self, at: &TextureContext) -> Self;
+
+    /// A value that varies from place to place, at the wavelengths of a place, if there are any.
+    fn varied_at(self, at: &TextureContext) -> Self;
+
+    /// The values of a spectrum at the wavelengths of a place; itself where there are none.
+    fn spectrum_at(self, spectrum: &SpectrumValue, at: &TextureContext) -> Self;
 }
 
 impl TextureValue for f32 {
@@ -273,6 +298,20 @@ impl TextureValue for f32 {
     fn from_colour(colour: Spectrum) -> Self {
         colour.luminance()
     }
+
+    #[inline]
+    fn constant_at(self, _: &TextureContext) -> Self {
+        self
+    }
+
+    #[inline]
+    fn varied_at(self, _: &TextureContext) -> Self {
+        self
+    }
+
+    fn spectrum_at(self, _: &SpectrumValue, _: &TextureContext) -> Self {
+        self
+    }
 }
 
 impl TextureValue for Spectrum {
@@ -298,6 +337,31 @@ impl TextureValue for Spectrum {
 
     fn from_colour(colour: Spectrum) -> Self {
         colour
+    }
+
+    #[inline]
+    fn constant_at(self, at: &TextureContext) -> Self {
+        match &at.spectral {
+            None => self,
+            Some(spectral) => spectral.constant(self),
+        }
+    }
+
+    #[inline]
+    fn varied_at(self, at: &TextureContext) -> Self {
+        match &at.spectral {
+            None => self,
+            Some(spectral) => spectral.varied(self),
+        }
+    }
+
+    fn spectrum_at(self, spectrum: &SpectrumValue, at: &TextureContext) -> Self {
+        let Some(spectral) = &at.spectral else { return self };
+        match spectral.wavelengths.values(spectrum) {
+            None => spectral.constant(self),
+            Some(values) if spectral.is_unbounded => values,
+            Some(values) => values.map(crate::unit),
+        }
     }
 }
 
@@ -327,6 +391,13 @@ impl ImageTexture {
 pub enum Texture<T: TextureValue> {
     /// A uniform value.
     Constant(T),
+    /// A spectrum.
+    Spectrum {
+        /// Its colour.
+        value: T,
+        /// What it is by wavelength.
+        spectrum: Arc<SpectrumValue>,
+    },
     /// A product.
     Scale {
         /// The value.
@@ -406,25 +477,36 @@ impl<T: TextureValue> Texture<T> {
 
     /// Whether it is uniform by its kind alone.
     pub fn is_constant(&self) -> bool {
-        matches!(self, Self::Constant(_))
+        matches!(self, Self::Constant(_) | Self::Spectrum { .. })
     }
 
     /// The value at a position. A texture of zero weight is not evaluated.
     #[inline]
     pub fn evaluate(&self, at: &TextureContext) -> T {
         match self {
-            Self::Constant(value) => *value,
+            Self::Constant(value) => value.constant_at(at),
+            Self::Spectrum { value, spectrum } => value.spectrum_at(spectrum, at),
             Self::Scale { texture, scale } => texture.evaluate(at) * scale.evaluate(at),
-            Self::Product([first, second]) => first.evaluate(at) * second.evaluate(at),
-            Self::Step { input, edge, values } => values[usize::from(input.evaluate(at) >= *edge)],
-            Self::Vertices => T::from_vertices(&at.vertex),
+            Self::Product([first, second]) => match at.spectral {
+                None => first.evaluate(at) * second.evaluate(at),
+                // The second colours the first: what is looked up is the colour that this gives.
+                Some(_) => {
+                    let rgb = at.in_rgb();
+                    (first.evaluate(&rgb) * second.evaluate(&rgb)).varied_at(at)
+                }
+            },
+            Self::Step { input, edge, values } => {
+                values[usize::from(input.evaluate(at) >= *edge)].constant_at(at)
+            }
+            Self::Vertices => T::from_vertices(&at.vertex).varied_at(at),
             Self::Mix { textures, amount } => blend(textures, amount.evaluate(at), at),
             Self::DirectionMix { textures, direction } => {
                 blend(textures, 1.0 - at.normal.dot(*direction).abs(), at)
             }
             Self::Bilerp { mapping, corners: [v00, v01, v10, v11] } => {
                 let Vec2 { x: s, y: t } = mapping.map(at).st;
-                (*v00 * (1.0 - t) + *v01 * t) * (1.0 - s) + (*v10 * (1.0 - t) + *v11 * t) * s
+                let value = (*v00 * (1.0 - t) + *v01 * t) * (1.0 - s) + (*v10 * (1.0 - t) + *v11 * t) * s;
+                value.varied_at(at)
             }
             Self::Checkerboard2d { mapping, textures } => {
                 let place = mapping.map(at);
@@ -441,8 +523,19 @@ impl<T: TextureValue> Texture<T> {
             Self::Dots { mapping, textures } => {
                 textures[usize::from(!dots::is_inside(mapping.map(at).st))].evaluate(at)
             }
-            Self::Pattern(pattern) => pattern.evaluate(at),
-            Self::Image(image) => image.evaluate(at),
+            Self::Pattern(pattern) => pattern.evaluate::<T>(at).varied_at(at),
+            Self::Image(image) => image.evaluate::<T>(at).varied_at(at),
+        }
+    }
+
+    /// [`Self::evaluate`] for coefficients, which may be more than 1 at the wavelengths of a place.
+    pub fn evaluate_unbounded(&self, at: &TextureContext) -> T {
+        match at.spectral {
+            None => self.evaluate(at),
+            Some(spectral) => {
+                let spectral = Some(SpectralLookup { is_unbounded: true, ..spectral });
+                self.evaluate(&TextureContext { spectral, ..*at })
+            }
         }
     }
 }
@@ -496,6 +589,7 @@ mod tests {
             duv_dx: Vec2::ZERO,
             duv_dy: Vec2::ZERO,
             vertex: VertexData::NONE,
+            spectral: None,
         }
     }
 

@@ -3,7 +3,7 @@
 use std::f32::consts::PI;
 
 use lumbre_simd::math::{exp, sin_cos_turns};
-use lumbre_simd::{Real, Task, V3};
+use lumbre_simd::{Mask, Real, Task, V3};
 
 use crate::albedo::unit;
 use crate::lanes::{colour_lane, spectrum};
@@ -23,11 +23,13 @@ pub struct ThinFilm {
     pub eta: f32,
     /// In nanometres, ≥ 0.
     pub thickness: f32,
+    /// The wavelengths in nm that channels are; 0 where they are linear Rec. 709.
+    pub nm: [f32; 3],
 }
 
 impl ThinFilm {
     /// No film.
-    pub const NONE: Self = Self { weight: 0.0, eta: 1.3, thickness: 0.0 };
+    pub const NONE: Self = Self { weight: 0.0, eta: 1.3, thickness: 0.0, nm: [0.0; 3] };
 
     /// The reflectance at a cosine (outside) where the bare surface has the reflectance `f0` at normal
     /// incidence; each channel in [0, 1].
@@ -41,7 +43,8 @@ impl ThinFilm {
     }
 
     pub(crate) fn lane(&self) -> ThinFilmLanes<f32> {
-        ThinFilmLanes { weight: self.weight, eta: self.eta, thickness: self.thickness }
+        let Self { weight, eta, thickness, nm } = *self;
+        ThinFilmLanes { weight, eta, thickness, nm: V3::new(nm[0], nm[1], nm[2]) }
     }
 }
 
@@ -54,6 +57,8 @@ pub struct ThinFilmLanes<R: Real> {
     pub eta: R,
     /// In nanometres, ≥ 0.
     pub thickness: R,
+    /// The wavelengths in nm that channels are; 0 where they are linear Rec. 709.
+    pub nm: V3<R>,
 }
 
 impl<R: Real> ThinFilmLanes<R> {
@@ -70,15 +75,15 @@ impl<R: Real> ThinFilmLanes<R> {
     pub(crate) fn reflectance(&self, cos: V3<R>, f0: V3<R>) -> V3<R> {
         let [x, y, z] = REC709_FROM_XYZ;
         V3::new(
-            R::call(Channel { film: self, cos: cos.x, f0: f0.x, row: x }),
-            R::call(Channel { film: self, cos: cos.y, f0: f0.y, row: y }),
-            R::call(Channel { film: self, cos: cos.z, f0: f0.z, row: z }),
+            R::call(Channel { film: self, cos: cos.x, f0: f0.x, row: x, nm: self.nm.x }),
+            R::call(Channel { film: self, cos: cos.y, f0: f0.y, row: y, nm: self.nm.y }),
+            R::call(Channel { film: self, cos: cos.z, f0: f0.z, row: z, nm: self.nm.z }),
         )
     }
 
-    /// The reflectance in a channel, by its row of [`REC709_FROM_XYZ`].
+    /// The reflectance in a channel, by its row of [`REC709_FROM_XYZ`] or at its wavelength.
     #[inline(always)]
-    fn channel(&self, cos: R, f0: R, row: [f32; 3]) -> R {
+    fn channel(&self, cos: R, f0: R, row: [f32; 3], nm: R) -> R {
         let (one, two) = (R::one(), R::splat(2.0));
         let eta = self.eta_of_thickness();
         let cos = cos.simd_max(R::zero()).simd_min(one);
@@ -95,8 +100,15 @@ impl<R: Real> ThinFilmLanes<R> {
         let series = passes * passes * inner / (one - both).simd_max(R::splat(1e-6));
         let root = both.sqrt();
         let first = (series - passes) * root;
-        let orders = first * row_of(sensitivity(detour, shift), row)
+        let mut orders = first * row_of(sensitivity(detour, shift), row)
             + first * root * row_of(sensitivity(two * detour, two * shift), row);
+        let is_wavelength = R::zero().simd_lt(nm);
+        if is_wavelength.any() {
+            // The sum over all orders, of cosines of multiples of the phase: that of Airy.
+            let (_, wave) = sin_cos_turns(detour * R::splat(1e9) / nm.simd_max(one) + shift);
+            let airy = first * (wave - root) / (one + both - two * root * wave).simd_max(R::splat(1e-6));
+            orders = R::select(is_wavelength, airy, orders);
+        }
         unit(outer + series + two * orders)
     }
 
@@ -115,13 +127,14 @@ struct Channel<'a, R: Real> {
     cos: R,
     f0: R,
     row: [f32; 3],
+    nm: R,
 }
 
 impl<R: Real> Task<R> for Channel<'_, R> {
     type Output = R;
     #[inline(always)]
     fn run(self) -> R {
-        self.film.channel(self.cos, self.f0, self.row)
+        self.film.channel(self.cos, self.f0, self.row, self.nm)
     }
 }
 
@@ -187,7 +200,7 @@ mod tests {
         for eta in [1.3, 1.5, 2.0_f32] {
             let f0 = fresnel::dielectric(1.0, eta);
             for thickness in [120.0, 400.0, 900.0] {
-                let film = ThinFilm { weight: 1.0, eta, thickness };
+                let film = ThinFilm { weight: 1.0, eta, thickness, ..ThinFilm::NONE };
                 for cos in [0.2, 0.6, 1.0] {
                     let ours = film.reflectance(cos, Spectrum::splat(f0));
                     let bare = fresnel::dielectric(cos, eta);
@@ -205,10 +218,11 @@ mod tests {
     #[test]
     fn no_film_changes_nothing_and_a_thick_one_loses_its_colours() {
         let f0 = Spectrum::new(0.04, 0.5, 0.9);
-        let none = ThinFilm { weight: 1.0, eta: 1.4, thickness: 0.0 }.reflectance(1.0, f0);
+        let none = ThinFilm { weight: 1.0, eta: 1.4, thickness: 0.0, ..ThinFilm::NONE }.reflectance(1.0, f0);
         assert!((none - f0).map(f32::abs).max_component() < 1e-3, "{none:?}");
         // Far beyond coherence intensities add: R12 + T² R23 / (1 − R12 R23).
-        let thick = ThinFilm { weight: 1.0, eta: 1.4, thickness: 30_000.0 }.reflectance(1.0, f0);
+        let thick =
+            ThinFilm { weight: 1.0, eta: 1.4, thickness: 30_000.0, ..ThinFilm::NONE }.reflectance(1.0, f0);
         for (ours, f0) in thick.to_array().into_iter().zip(f0.to_array()) {
             let (outer, inner) =
                 (fresnel::dielectric(1.0, 1.4), fresnel::dielectric(1.0, index_of(f0) / 1.4));
@@ -220,7 +234,7 @@ mod tests {
     #[test]
     fn films_have_the_colours_of_an_integral_over_wavelengths() {
         // A quarter of a wave at 550 nm of an index between: green interferes away, red and blue remain.
-        let film = ThinFilm { weight: 1.0, eta: 1.38, thickness: 550.0 / 4.0 / 1.38 };
+        let film = ThinFilm { weight: 1.0, eta: 1.38, thickness: 550.0 / 4.0 / 1.38, ..ThinFilm::NONE };
         let coated = film.reflectance(1.0, Spectrum::splat(0.16));
         let airy = |wavelength: f32| {
             let (outer, inner) = ((1.38_f32 - 1.0) / 2.38, (index_of(0.16) - 1.38) / (index_of(0.16) + 1.38));
@@ -229,6 +243,12 @@ mod tests {
             (outer * outer + inner * inner + 2.0 * both * phase) / (1.0 + both * both + 2.0 * both * phase)
         };
         assert!((coated.g - airy(550.0)).abs() < 0.01, "{coated:?} {}", airy(550.0));
+        // And at wavelengths exactly.
+        let nm = [450.0, 550.0, 640.0];
+        let spectral = ThinFilm { nm, ..film }.reflectance(1.0, Spectrum::splat(0.16));
+        for (ours, nm) in spectral.to_array().into_iter().zip(nm) {
+            assert!((ours - airy(nm)).abs() < 1e-4, "{nm}: {ours} {}", airy(nm));
+        }
         assert!(coated.r > coated.g && coated.b > coated.g && coated.max_component() < 0.16, "{coated:?}");
     }
 }

@@ -117,6 +117,19 @@ pub struct Uber {
 }
 
 impl Uber {
+    /// With each colour as a function of itself.
+    #[must_use]
+    pub(crate) fn with_colours(self, of: impl Fn(Spectrum) -> Spectrum) -> Self {
+        Self {
+            diffuse: of(self.diffuse),
+            glossy: of(self.glossy),
+            mirror: of(self.mirror),
+            refracted: of(self.refracted),
+            passed: of(self.passed),
+            ..self
+        }
+    }
+
     /// f · |cos θi|, without the delta parts.
     pub fn eval(&self, wo: LocalDir, wi: LocalDir) -> Spectrum {
         spectrum(self.lane().eval(wo.lane(), wi.lane()).0)
@@ -215,6 +228,7 @@ mod tests {
             duv_dx: Vec2::ZERO,
             duv_dy: Vec2::ZERO,
             vertex: crate::VertexData::NONE,
+            spectral: None,
         };
         params.bsdf(&at)
     }

@@ -100,7 +100,7 @@ fn principled() -> Vec<(&'static str, Principled)> {
     let metal = Principled { metallic: 1.0, base: Spectrum::new(1.0, 0.7, 0.3), ..plastic };
     let pane = Principled { transmission: 1.0, transmission_color: Spectrum::new(1.0, 0.9, 0.8), ..plastic };
     let solid = Principled { body: Body::Solid { spread: 0.0 }, ..pane };
-    let film = ThinFilm { weight: 0.8, eta: 1.4, thickness: 380.0 };
+    let film = ThinFilm { weight: 0.8, eta: 1.4, thickness: 380.0, ..ThinFilm::NONE };
     let sheen = Sheen::new(Spectrum::new(0.9, 0.3, 0.6), 0.4);
     let coat = Clearcoat { weight: 0.7, alpha: 0.15, normal: Vec3::Z };
     let leaf = Principled {
@@ -232,7 +232,7 @@ fn measured(alpha: (f64, f64)) -> Measured {
     }
     let single = |angles: Vec<f64>| angles.into_iter().map(|v| v as f32).collect();
     let of_facets = [height, width];
-    Measured(Arc::new(
+    Measured::new(Arc::new(
         MeasuredTables::new(MeasuredParts {
             theta_i: single(theta_i),
             phi_i: single(phi_i),
@@ -1440,7 +1440,12 @@ fn random_principled(random: &mut RandomStream) -> Principled {
         },
         diffuse_transmission,
         diffuse_transmission_color: random_colour(random),
-        film: ThinFilm { weight: film, eta: 1.0 + random.next_f32(), thickness: 800.0 * random.next_f32() },
+        film: ThinFilm {
+            weight: film,
+            eta: 1.0 + random.next_f32(),
+            thickness: 800.0 * random.next_f32(),
+            ..ThinFilm::NONE
+        },
         sheen: if sheen > 0.5 { Sheen::new(random_colour(random), random.next_f32()) } else { Sheen::NONE },
         coat: Clearcoat {
             weight: coat,

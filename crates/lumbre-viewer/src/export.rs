@@ -65,6 +65,7 @@ pub fn export(source: &dyn Source, folder: &Path, cancel: &CancelToken) -> Resul
     ] {
         let mut options = options.clone();
         (options.integrator.kind, options.transparent, options.guides) = (kind, false, false);
+        options.spectral = false;
         options.exposure = lumbre::RenderOptions::default().exposure;
         options.stop = Stop::at(FEATURE_SPP);
         let picture = scene.render(&options)?;

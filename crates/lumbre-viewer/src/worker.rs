@@ -183,6 +183,7 @@ impl Worker {
             Channel::Uv => IntegratorKind::Uv,
             Channel::Variance | Channel::Ids => options.integrator.kind,
         };
+        options.spectral &= matches!(options.integrator.kind, IntegratorKind::Path { .. });
         if !matches!(wanted.channel, Channel::Beauty | Channel::Variance) {
             options.transparent = false;
             options.exposure = RenderOptions::default().exposure;

@@ -124,8 +124,14 @@ impl ShapeBuilder {
     /// Makes its front emit a radiance.
     #[must_use]
     pub fn shining(self, radiance: Rgb) -> Self {
-        let light =
-            AreaLightDesc { radiance, image: None, by_vertices: false, two_sided: false, power: None };
+        let light = AreaLightDesc {
+            radiance,
+            image: None,
+            by_vertices: false,
+            two_sided: false,
+            power: None,
+            spectrum: None,
+        };
         Self { light: Some(light), ..self }
     }
 }

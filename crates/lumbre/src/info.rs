@@ -161,6 +161,6 @@ fn light_name(light: &LightDesc) -> &'static str {
         LightDesc::Distant { .. } => "distant",
         LightDesc::Infinite { .. } | LightDesc::Portal { .. } => "infinite",
         LightDesc::Pov(_) => "pov",
-        LightDesc::Moving { light, .. } => light_name(light),
+        LightDesc::Moving { light, .. } | LightDesc::Spectral { light, .. } => light_name(light),
     }
 }

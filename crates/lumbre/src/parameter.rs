@@ -66,7 +66,7 @@ pub fn parameters(desc: &SceneDesc) -> Vec<Parameter> {
     }
     for (index, light) in desc.lights.iter().enumerate() {
         let mut light = light;
-        while let LightDesc::Moving { light: inner, .. } = light {
+        while let LightDesc::Moving { light: inner, .. } | LightDesc::Spectral { light: inner, .. } = light {
             light = inner;
         }
         let mut add = |kind_name: &str, name: &str, kind, value| {
@@ -94,7 +94,7 @@ pub fn parameters(desc: &SceneDesc) -> Vec<Parameter> {
             LightDesc::Infinite { radiance, .. } | LightDesc::Portal { radiance, .. } => {
                 add("infinite", "radiance", ParameterKind::Light, numbers(*radiance));
             }
-            LightDesc::Pov(_) | LightDesc::Moving { .. } => {}
+            LightDesc::Pov(_) | LightDesc::Moving { .. } | LightDesc::Spectral { .. } => {}
         }
     }
     let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);
@@ -116,13 +116,13 @@ fn described(slot: Slot<'_>) -> (ParameterKind, Option<Vec<f64>>) {
         ParameterKind::Number { low, high }
     };
     let constant = |texture: &Texture<f32>| match texture {
-        Texture::Constant(value) => Some(vec![f64::from(*value)]),
+        Texture::Constant(value) | Texture::Spectrum { value, .. } => Some(vec![f64::from(*value)]),
         _ => None,
     };
     match slot {
         Slot::Colour(texture) => {
             let value = match &**texture {
-                Texture::Constant(colour) => Some(numbers(*colour)),
+                Texture::Constant(colour) | Texture::Spectrum { value: colour, .. } => Some(numbers(*colour)),
                 _ => None,
             };
             (ParameterKind::Colour, value)

@@ -71,6 +71,9 @@ impl Job {
         ];
         identity.extend(entries.map(|(name, value)| (name.to_owned(), value)));
         identity.extend(options.view.as_ref().map(|view| ("view".to_owned(), in_words(view))));
+        if options.spectral {
+            identity.insert("spectral".to_owned(), "true".to_owned());
+        }
         let mut folder = None;
         for file in files {
             // By their names from the folder of the first, so that a render is the same wherever its files are.

@@ -177,7 +177,11 @@ impl Setting {
             return Err(self.missing("light", &names));
         };
         let mut light = &mut desc.lights[index];
-        while let LightDesc::Moving { light: inner, .. } = light {
+        if ["intensity", "irradiance", "radiance"].contains(&&*self.parameter) {
+            // A colour takes the place of the spectrum.
+            *light = light.bare().clone();
+        }
+        while let LightDesc::Moving { light: inner, .. } | LightDesc::Spectral { light: inner, .. } = light {
             light = inner;
         }
         let known: &[&str] = match light {
@@ -188,7 +192,7 @@ impl Setting {
             LightDesc::Distant { .. } => &["irradiance", "scale"],
             LightDesc::Infinite { .. } | LightDesc::Portal { .. } => &["radiance", "scale"],
             LightDesc::Pov(_) => &["scale"],
-            LightDesc::Moving { .. } => &[],
+            LightDesc::Moving { .. } | LightDesc::Spectral { .. } => &[],
         };
         if self.parameter == "scale" {
             let mut factor = 1.0;
@@ -202,7 +206,7 @@ impl Setting {
                 | LightDesc::Infinite { radiance: light, .. }
                 | LightDesc::Portal { radiance: light, .. } => *light *= factor,
                 LightDesc::Pov(light) => Arc::make_mut(light).colour *= factor,
-                LightDesc::Moving { .. } => {}
+                LightDesc::Moving { .. } | LightDesc::Spectral { .. } => {}
             }
             return Ok(());
         }

@@ -202,6 +202,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         print_warnings(&shown.diagnostics);
     }
     let Shown { scene, mut options, .. } = shown;
+    if options.spectral && !arguments.quiet {
+        say!("warning: its picture carries wavelengths; what is explained is a path of red, green and blue");
+    }
+    options.spectral = false;
     options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
     let written = explain(&scene, &options, &things, name, &arguments.request)?;
     match &arguments.output {

@@ -265,7 +265,7 @@ impl<'f> Seam<'_, 'f> {
         let two_sided = self.parameters.double_sided || self.parameters.unlit;
         // Vertex colours multiply the base colour, which an unlit surface shows.
         let by_vertices = self.has_colours && self.parameters.unlit;
-        Ok(Some(AreaLightDesc { radiance, image, by_vertices, two_sided, power: None }))
+        Ok(Some(AreaLightDesc { radiance, image, by_vertices, two_sided, power: None, spectrum: None }))
     }
 
     fn coverage(&self) -> Read<Option<Arc<FloatTexture>>> {

@@ -108,7 +108,7 @@ fn a_known_material_has_the_values_and_densities_of_another_reader() {
     let colour = SpectrumValue::Sampled(pairs).reflectance_rgb();
     let at_550 = 0.2 + 0.6 * (550.0 - 360.0) / 470.0;
     for (i, leans) in [false, true].into_iter().enumerate() {
-        let measured = Measured(Arc::new(read_bytes(&file(&tensors(leans))).unwrap()));
+        let measured = Measured::new(Arc::new(read_bytes(&file(&tensors(leans))).unwrap()));
         for (view, light, values, densities) in expected {
             for side in [1.0, -1.0] {
                 let turned = |angles| {
@@ -133,7 +133,7 @@ fn files_of_three_channels_are_read_too() {
     list.retain(|tensor| !matches!(tensor.name, "wavelengths" | "spectra"));
     let values = (0..10).flat_map(|_| [0.25_f32, 0.5, 0.75].into_iter().flat_map(|v| [v; 64])).collect();
     list.push(Tensor { name: "rgb", shape: vec![1, 10, 3, 8, 8], values });
-    let measured = Measured(Arc::new(read_bytes(&file(&list)).unwrap()));
+    let measured = Measured::new(Arc::new(read_bytes(&file(&list)).unwrap()));
     let local = |v: Vec3| ShadingFrame { s: Vec3::X, t: Vec3::Y, n: Vec3::Z }.to_local(v.normalize());
     let value = measured.eval(local(Vec3::new(0.1, 0.2, 0.7)), local(Vec3::new(-0.3, 0.2, 0.6)));
     assert!(value.r > 0.01);

@@ -277,7 +277,14 @@ impl Builder<'_> {
                 }
                 None => None,
             };
-            Some(AreaLightDesc { radiance, image, by_vertices: false, two_sided: true, power: None })
+            Some(AreaLightDesc {
+                radiance,
+                image,
+                by_vertices: false,
+                two_sided: true,
+                power: None,
+                spectrum: None,
+            })
         };
         Ok(Finished { name: m.name.clone(), material: Arc::new(material), light, alpha })
     }

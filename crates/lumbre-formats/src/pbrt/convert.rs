@@ -13,8 +13,10 @@ use lumbre_scene::{
 };
 use lumbre_shading::measured::MeasuredTables;
 use lumbre_shading::medium::Medium;
+use lumbre_shading::spectrum::LightCurve;
 use lumbre_shading::{
-    FloatTexture, Material, MipMap, PrincipledParams, Spectrum, SpectrumTexture, Texture, TextureValue,
+    FloatTexture, Material, MipMap, PrincipledParams, Spectrum, SpectrumTexture, SpectrumValue, Texture,
+    TextureValue,
 };
 
 use super::images::ImageKey;
@@ -54,6 +56,8 @@ pub(super) struct Converter<'b, 'd> {
     /// Constant textures by their bits: most are of a few values.
     pub constants: HashMap<u32, FloatArc>,
     pub constant_spectra: HashMap<[u32; 3], SpectrumArc>,
+    /// The last spectrum of a light, and its curve: the next one often has the same.
+    pub last_light: Option<(SpectrumValue, Arc<LightCurve>)>,
     /// Each with the place of its first use as long as it is undefined.
     pub media: Vec<MediumSlot>,
     pub medium_names: HashMap<Arc<str>, MediumId>,
@@ -161,7 +165,7 @@ impl<T: TextureValue> Known<T> {
     /// The value, if it is uniform.
     pub fn value(&self) -> Option<T> {
         match *self.texture {
-            Texture::Constant(value) => Some(value),
+            Texture::Constant(value) | Texture::Spectrum { value, .. } => Some(value),
             _ => None,
         }
     }
@@ -198,6 +202,7 @@ impl<'b, 'd> Converter<'b, 'd> {
             spectrum_textures: HashMap::new(),
             constants: HashMap::new(),
             constant_spectra: HashMap::new(),
+            last_light: None,
             media: Vec::new(),
             medium_names: HashMap::new(),
             images: HashMap::new(),

@@ -86,6 +86,7 @@ impl Displacement {
                 duv_dx: Vec2::ZERO,
                 duv_dy: Vec2::ZERO,
                 vertex: VertexData::NONE,
+                spectral: None,
             };
             let moved = *position + self.texture.evaluate(&at) * directions[i];
             if !moved.is_finite() {

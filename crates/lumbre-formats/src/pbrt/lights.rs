@@ -2,10 +2,12 @@
 //! that of the colour space's white; a power or an illuminance in photometric units multiplies that.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use lumbre_image::Image;
 use lumbre_math::{DAffine3, DMat3, DVec3, Elementary, Transform};
 use lumbre_scene::{AreaLightDesc, EnvironmentDesc, EnvironmentMapping, LightDesc};
+use lumbre_shading::spectrum::LightCurve;
 use lumbre_shading::{ImageFilter, Spectrum, SpectrumValue, Wrap};
 
 use super::colour;
@@ -13,7 +15,7 @@ use super::convert::{Converter, file_fault};
 use super::params::{Params, Type};
 use super::source::{AtSpot, Result, Spot};
 use super::state::{AreaLight, State};
-use super::textures::{SpectrumUse, single};
+use super::textures::{LightSpectrum, SpectrumUse, single};
 use crate::Diagnostic;
 use crate::diagnostic::quoted;
 
@@ -36,9 +38,10 @@ impl Converter<'_, '_> {
         let light = match ty {
             "point" => {
                 let scale = self.light_scale(&params)?;
-                let intensity = self.emission(&params, "I", state)? * scale * power(&params, 4.0 * PI)?;
+                let LightSpectrum { colour, curve } = self.emission(&params, "I", state)?;
+                let intensity = colour * scale * power(&params, 4.0 * PI)?;
                 let from = ctm.point(params.triple("from", Type::Point3, DVec3::ZERO)?);
-                LightDesc::Point { from, intensity }
+                spectral(LightDesc::Point { from, intensity }, curve, scale)
             }
             "spot" => {
                 let scale = self.light_scale(&params)?;
@@ -52,7 +55,8 @@ impl Converter<'_, '_> {
                 }
                 let (inner, outer) = ((angle - delta).to_radians().cosine(), angle.to_radians().cosine());
                 let around = 2.0 * PI * ((1.0 - inner) + 0.5 * (inner - outer));
-                let intensity = self.emission(&params, "I", state)? * scale * power(&params, around)?;
+                let LightSpectrum { colour, curve } = self.emission(&params, "I", state)?;
+                let intensity = colour * scale * power(&params, around)?;
                 let from = params.triple("from", Type::Point3, DVec3::ZERO)?;
                 let to = params.triple("to", Type::Point3, DVec3::Z)?;
                 let Some(turn) = frame_along(to - from) else {
@@ -60,16 +64,17 @@ impl Converter<'_, '_> {
                         .spot_of("to")
                         .error("a spot shines from a point to itself: from and to are equal"));
                 };
-                LightDesc::Spot {
+                let light = LightDesc::Spot {
                     world_from_light: ctm * Transform::translate(from) * turn,
                     intensity,
                     cone_angle: angle as f32,
                     cone_delta_angle: delta as f32,
-                }
+                };
+                spectral(light, curve, scale)
             }
             "distant" => {
                 let scale = self.light_scale(&params)?;
-                let emission = self.emission(&params, "L", state)?;
+                let LightSpectrum { colour, curve } = self.emission(&params, "L", state)?;
                 let lux = positive(&params, "illuminance")?.unwrap_or(1.0);
                 let from = params.triple("from", Type::Point3, DVec3::ZERO)?;
                 let to = params.triple("to", Type::Point3, DVec3::Z)?;
@@ -78,7 +83,8 @@ impl Converter<'_, '_> {
                     let message = "a distant light shines from a point to itself: from and to are equal";
                     return Err(params.spot_of("to").error(message));
                 }
-                LightDesc::Distant { towards, irradiance: emission * scale * lux as f32 }
+                let light = LightDesc::Distant { towards, irradiance: colour * scale * lux as f32 };
+                spectral(light, curve, scale)
             }
             "infinite" => self.infinite(&params, state)?,
             "goniometric" => self.goniometric(&params, state)?,
@@ -97,9 +103,10 @@ impl Converter<'_, '_> {
     }
 
     /// The colour of a light: the parameter of this name, else the white of the colour space.
-    fn emission(&mut self, params: &Params, name: &'static str, state: &State) -> Result<Spectrum> {
+    fn emission(&mut self, params: &Params, name: &'static str, state: &State) -> Result<LightSpectrum> {
         let given = self.light_colour(params, name)?;
-        Ok(given.unwrap_or_else(|| colour::light(&state.space, [1.0; 3])))
+        let white = || LightSpectrum { colour: colour::light(&state.space, [1.0; 3]), curve: None };
+        Ok(given.unwrap_or_else(white))
     }
 
     /// `scale`, a number; a colour in pbrt-v3.
@@ -138,13 +145,15 @@ impl Converter<'_, '_> {
         let key = if is_old { "mapname" } else { "filename" };
         let Some(filename) = params.string(key)?.map(str::to_owned) else {
             let white = || colour::light(&state.space, [1.0; 3]);
-            let radiance = given.unwrap_or_else(white) * scale * lux.map_or(1.0, |lux| lux / PI) as f32;
-            return Ok(through_portal(LightDesc::Infinite { world_from_light, radiance, image: None }));
+            let (colour, curve) = given.map_or_else(|| (white(), None), |given| (given.colour, given.curve));
+            let radiance = colour * scale * lux.map_or(1.0, |lux| lux / PI) as f32;
+            let light = through_portal(LightDesc::Infinite { world_from_light, radiance, image: None });
+            return Ok(spectral(light, curve, scale));
         };
         let at = params.spot_of(key);
         match given {
             // A factor in pbrt-v3.
-            Some(l) if is_old => scale *= l,
+            Some(l) if is_old => scale *= l.colour,
             Some(_) => return Err(spot.error("an infinite light has both L and filename: give one of them")),
             None => {}
         }
@@ -173,7 +182,9 @@ impl Converter<'_, '_> {
     /// A point light whose intensity by direction is the mean of an image's channels. Its y and z are swapped.
     fn goniometric(&mut self, params: &Params, state: &State) -> Result<LightDesc> {
         let ctm = state.ctm[0];
-        let intensity = self.emission(params, "I", state)? * self.light_scale(params)?;
+        let LightSpectrum { colour, curve } = self.emission(params, "I", state)?;
+        let scale = self.light_scale(params)?;
+        let intensity = colour * scale;
         let lumens = positive(params, "power")?;
         let is_old = params.has("mapname");
         if is_old {
@@ -186,10 +197,9 @@ impl Converter<'_, '_> {
                 "a goniometric light without a filename shines the same in all directions",
             );
             let around = lumens.map_or(1.0, |lumens| lumens / (4.0 * PI));
-            return Ok(LightDesc::Point {
-                from: ctm.point(DVec3::ZERO),
-                intensity: intensity * around as f32,
-            });
+            let intensity = intensity * around as f32;
+            let light = LightDesc::Point { from: ctm.point(DVec3::ZERO), intensity };
+            return Ok(spectral(light, curve, scale));
         };
         let at = params.spot_of(key);
         let file = self.image_file(&filename, at)?;
@@ -213,7 +223,9 @@ impl Converter<'_, '_> {
             EnvironmentMapping::LatitudeLongitude => ctm * exchanged() * half_turn(),
         };
         let image = EnvironmentDesc { image: image.into(), mapping };
-        Ok(LightDesc::Goniometric { world_from_light: turned, intensity: intensity * factor as f32, image })
+        let intensity = intensity * factor as f32;
+        let light = LightDesc::Goniometric { world_from_light: turned, intensity, image };
+        Ok(spectral(light, curve, scale))
     }
 
     /// A point light that throws an image along +z.
@@ -227,7 +239,7 @@ impl Converter<'_, '_> {
         let is_old = params.has("mapname");
         if is_old {
             self.upgraded(params.spot_of("mapname"));
-            intensity *= self.emission(params, "I", state)?;
+            intensity *= self.emission(params, "I", state)?.colour;
         }
         let key = if is_old { "mapname" } else { "filename" };
         let Some(filename) = params.string(key)?.map(str::to_owned) else {
@@ -269,16 +281,19 @@ impl Converter<'_, '_> {
         let scale = self.light_scale(&params)?;
         let given = self.light_colour(&params, "L")?;
         let filename = params.string("filename")?.map(str::to_owned);
-        let (colour, image) = match (given, filename) {
+        let (LightSpectrum { colour, curve }, image) = match (given, filename) {
             (Some(_), Some(_)) => {
                 return Err(spot.error("an area light has both L and filename: give one of them"));
             }
             (None, Some(filename)) => {
                 let at = params.spot_of("filename");
                 let image = self.mip_map(&filename, at, None, Wrap::Clamp, ImageFilter::Bilinear)?;
-                (Spectrum::WHITE, Some(image))
+                (LightSpectrum { colour: Spectrum::WHITE, curve: None }, Some(image))
             }
-            (given, None) => (given.unwrap_or_else(|| colour::light(&state.space, [1.0; 3])), None),
+            (given, None) => {
+                let white = || LightSpectrum { colour: colour::light(&state.space, [1.0; 3]), curve: None };
+                (given.unwrap_or_else(white), None)
+            }
         };
         let desc = AreaLightDesc {
             radiance: colour * scale,
@@ -286,10 +301,23 @@ impl Converter<'_, '_> {
             by_vertices: false,
             two_sided: params.boolean("twosided", false)?,
             power: positive(&params, "power")?.map(|lumens| lumens as f32),
+            spectrum: curve.filter(|_| is_grey(scale)),
         };
         self.done(&params);
         Ok(Some(AreaLight { desc, spot }))
     }
+}
+
+/// A light with the spectrum that it was given; a coloured factor leaves its colour alone.
+fn spectral(light: LightDesc, curve: Option<Arc<LightCurve>>, scale: Spectrum) -> LightDesc {
+    match curve.filter(|_| is_grey(scale)) {
+        Some(spectrum) => LightDesc::Spectral { light: Box::new(light), spectrum },
+        None => light,
+    }
+}
+
+fn is_grey(colour: Spectrum) -> bool {
+    colour.r == colour.g && colour.g == colour.b
 }
 
 /// The corners of the portal of an infinite light, which are in the world.

@@ -129,6 +129,7 @@ impl Converter<'_, '_> {
         // Names that pbrt-v4 gives to the shape and the medium, and `MakeNamedMaterial` to the type.
         params.ignore(&["type"]);
         let mut material = Material::new(kind);
+        material.dispersion = self.dispersion(params, &material.kind)?;
         if !matches!(material.kind, MaterialKind::Mix { .. } | MaterialKind::Interface) {
             material.displacement = self.float_texture(params, "displacement")?;
             if params.has("bumpmap") {
@@ -336,13 +337,28 @@ impl Converter<'_, '_> {
 
     /// An index of refraction: a number, or a spectrum's value at the yellow helium line.
     fn index_of_refraction(&mut self, params: &Params, name: &'static str, default: f32) -> Result<f32> {
-        let (index, dispersion) = self.index_and_dispersion(params, name, default)?;
-        if dispersion != 0.0 {
-            let message = "dispersion is not rendered yet: one index takes the place of a spectrum";
-            let found = format!("{index} at 587.6 nm");
-            self.warn(params.spot_of(name), Diagnostic::warning(message).found(found));
+        Ok(self.index_and_dispersion(params, name, default)?.0)
+    }
+
+    /// The index of refraction of a dielectric or a coat by wavelength, where it is given so.
+    fn dispersion(&mut self, params: &Params, kind: &MaterialKind) -> Result<Option<Arc<SpectrumValue>>> {
+        let name = match kind {
+            MaterialKind::CoatedConductor { .. } => "interface.eta",
+            MaterialKind::Dielectric { .. } | MaterialKind::ThinDielectric { .. } => "eta",
+            MaterialKind::CoatedDiffuse { .. } => "eta",
+            _ => return Ok(None),
+        };
+        let is_spectrum = |name| params.find(name).is_some_and(|param| param.ty == Type::Spectrum);
+        // pbrt-v3 has another name, which comes first.
+        let Some(name) = ["index", name].into_iter().find(|name| params.has(name)) else { return Ok(None) };
+        if !is_spectrum(name) {
+            return Ok(None);
         }
-        Ok(index)
+        let value = self.spectrum_value(params, name, SpectrumUse::Coefficient)?;
+        if let Some(SpectrumValue::Sampled(pairs)) = &value {
+            self.keep(size_of_val(pairs.as_slice()), "spectra", params.spot_of(name))?;
+        }
+        Ok(value.map(Arc::new))
     }
 
     /// An index of refraction, and its dispersion: 20 over the Abbe number.
@@ -403,15 +419,22 @@ impl Converter<'_, '_> {
         if is_texture(eta) || is_texture(k) {
             let mut one = |name, default| -> Result<SpectrumArc> {
                 let known = self.spectrum_texture(params, name, SpectrumUse::Coefficient)?;
-                Ok(known.map_or_else(|| constant(copper(default).unbounded_rgb()), |known| known.texture))
+                match known {
+                    Some(known) => Ok(known.texture),
+                    None => {
+                        let copper = copper(default);
+                        self.spectrum_constant(copper.unbounded_rgb(), copper, params.spot)
+                    }
+                }
             };
             return Ok((one(eta, "metal-Cu-eta")?, one(k, "metal-Cu-k")?));
         }
         let usage = SpectrumUse::Coefficient;
         let eta = self.spectrum_value(params, eta, usage)?.unwrap_or_else(|| copper("metal-Cu-eta"));
         let k = self.spectrum_value(params, k, usage)?.unwrap_or_else(|| copper("metal-Cu-k"));
-        let (eta, k) = conductor_rgb(&eta, &k);
-        Ok((constant(eta), constant(k)))
+        let (eta_rgb, k_rgb) = conductor_rgb(&eta, &k);
+        let spot = params.spot;
+        Ok((self.spectrum_constant(eta_rgb, eta, spot)?, self.spectrum_constant(k_rgb, k, spot)?))
     }
 
     fn coated_diffuse(

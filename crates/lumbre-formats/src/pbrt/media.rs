@@ -6,16 +6,16 @@ use lumbre_math::{DVec3, Transform};
 use lumbre_scene::MediumId;
 use lumbre_shading::medium::{
     Cloud, Coefficients, Density, Factor, Glow, Grid, Heat, HeterogeneousMedium, HomogeneousMedium, Medium,
-    preset, preset_names,
+    MediumSpectra, preset, preset_names,
 };
-use lumbre_shading::spectrum::BlackbodyColours;
+use lumbre_shading::spectrum::{BlackbodyColours, LightCurve};
 use lumbre_shading::{Spectrum, SpectrumValue};
 
 use super::colour;
 use super::convert::{Converter, MediumSlot, file_fault};
 use super::params::{Param, Params, Type};
 use super::source::{AtSpot, Result, Spot};
-use super::textures::SpectrumUse;
+use super::textures::{LightSpectrum, SpectrumUse};
 use crate::diagnostic::{number, quoted};
 use crate::nanovdb::{self, NanoGrid, Values};
 use crate::{Diagnostic, Input};
@@ -83,6 +83,7 @@ impl Converter<'_, '_> {
                         asymmetry: 0.0,
                     },
                     glow: Spectrum::BLACK,
+                    spectra: None,
                 })
             }
         }
@@ -103,18 +104,30 @@ impl Converter<'_, '_> {
                 found
             }
         };
+        let (mut scattering_spectrum, mut absorption_spectrum) = (None, None);
         let (scattering, absorption) = match named {
             Some(coefficients) => {
                 params.ignore(&["sigma_a", "sigma_s"]);
                 coefficients
             }
-            None => (self.coefficient(params, "sigma_s")?, self.coefficient(params, "sigma_a")?),
+            None => {
+                let (scattering, absorption);
+                (scattering, scattering_spectrum) = self.coefficient(params, "sigma_s")?;
+                (absorption, absorption_spectrum) = self.coefficient(params, "sigma_a")?;
+                (scattering, absorption)
+            }
         };
         let extinction = (scattering + absorption) * scale;
         let albedo = scattering.zip(scattering + absorption, |s, t| if t > 0.0 { s / t } else { 0.0 });
-        let glow = self.glow(params)?.unwrap_or(Spectrum::BLACK)
-            * params.float_at_least_zero("Lescale", 1.0)? as f32;
-        Ok(Medium::Homogeneous { medium: HomogeneousMedium { extinction, albedo, asymmetry }, glow })
+        let glow = self.glow(params)?;
+        let (glow, curve) = glow.map_or((Spectrum::BLACK, None), |glow| (glow.colour, glow.curve));
+        let glow = glow * params.float_at_least_zero("Lescale", 1.0)? as f32;
+        let spectra = spectra([absorption_spectrum, scattering_spectrum], scale, curve);
+        Ok(Medium::Homogeneous {
+            medium: HomogeneousMedium { extinction, albedo, asymmetry },
+            glow,
+            spectra: spectra.map(Box::new),
+        })
     }
 
     fn uniform_grid(&mut self, params: &Params, world_from_medium: Transform) -> Result<Medium> {
@@ -124,13 +137,16 @@ impl Converter<'_, '_> {
             return Err(params.spot.wrong(wrong.expected("\"float density\" with a number for each voxel")));
         };
         let scale = params.float_at_least_zero("scale", 1.0)? as f32;
-        let glow = self.grid_glow(params, size)?;
+        let (glow, curve) = self.grid_glow(params, size)?;
+        let (absorption, of_absorption) = self.coefficient(params, "sigma_a")?;
+        let (scattering, of_scattering) = self.coefficient(params, "sigma_s")?;
         let coefficients = Coefficients::Scaled {
             density: Density::Grid(density),
-            absorption: self.coefficient(params, "sigma_a")? * scale,
-            scattering: self.coefficient(params, "sigma_s")? * scale,
+            absorption: absorption * scale,
+            scattering: scattering * scale,
         };
-        self.heterogeneous(params, world_from_medium, coefficients, glow)
+        let spectra = spectra([of_absorption, of_scattering], scale, curve);
+        self.heterogeneous(params, world_from_medium, coefficients, glow, spectra)
     }
 
     fn rgb_grid(&mut self, params: &Params, world_from_medium: Transform) -> Result<Medium> {
@@ -154,7 +170,7 @@ impl Converter<'_, '_> {
         };
         let scale = params.float_at_least_zero("scale", 1.0)? as f32;
         let coefficients = Coefficients::Coloured { absorption, scattering, scale };
-        self.heterogeneous(params, world_from_medium, coefficients, glow)
+        self.heterogeneous(params, world_from_medium, coefficients, glow, None)
     }
 
     fn cloud(&mut self, params: &Params, world_from_medium: Transform) -> Result<Medium> {
@@ -163,12 +179,11 @@ impl Converter<'_, '_> {
             wispiness: params.float_at_least_zero("wispiness", 1.0)?,
             frequency: params.float("frequency", 5.0)?,
         };
-        let coefficients = Coefficients::Scaled {
-            density: Density::Cloud(cloud),
-            absorption: self.coefficient(params, "sigma_a")?,
-            scattering: self.coefficient(params, "sigma_s")?,
-        };
-        self.heterogeneous(params, world_from_medium, coefficients, Glow::None)
+        let (absorption, of_absorption) = self.coefficient(params, "sigma_a")?;
+        let (scattering, of_scattering) = self.coefficient(params, "sigma_s")?;
+        let coefficients = Coefficients::Scaled { density: Density::Cloud(cloud), absorption, scattering };
+        let spectra = spectra([of_absorption, of_scattering], 1.0, None);
+        self.heterogeneous(params, world_from_medium, coefficients, Glow::None, spectra)
     }
 
     /// Grids of a file, whose world is the space of the medium.
@@ -213,14 +228,17 @@ impl Converter<'_, '_> {
             }
         };
         let scale = params.float_at_least_zero("scale", 1.0)? as f32;
+        let (absorption, of_absorption) = self.coefficient(params, "sigma_a")?;
+        let (scattering, of_scattering) = self.coefficient(params, "sigma_s")?;
         let coefficients = Coefficients::Scaled {
             density: Density::Sparse(Box::new(density)),
-            absorption: self.coefficient(params, "sigma_a")? * scale,
-            scattering: self.coefficient(params, "sigma_s")? * scale,
+            absorption: absorption * scale,
+            scattering: scattering * scale,
         };
         let asymmetry = self.asymmetry(params)?;
         let medium_from_world = world_from_medium.inverse();
-        let medium = HeterogeneousMedium::new(medium_from_world, [low, high], asymmetry, coefficients, glow);
+        let medium = HeterogeneousMedium::new(medium_from_world, [low, high], asymmetry, coefficients, glow)
+            .with_spectra(spectra([of_absorption, of_scattering], scale, None));
         Ok(Medium::Heterogeneous(Box::new(medium)))
     }
 
@@ -231,6 +249,7 @@ impl Converter<'_, '_> {
         world_from_medium: Transform,
         coefficients: Coefficients,
         glow: Glow,
+        spectra: Option<MediumSpectra>,
     ) -> Result<Medium> {
         let p0 = params.triple("p0", Type::Point3, DVec3::ZERO)?;
         let p1 = params.triple("p1", Type::Point3, DVec3::ONE)?;
@@ -241,12 +260,13 @@ impl Converter<'_, '_> {
         }
         let asymmetry = self.asymmetry(params)?;
         let medium_from_world = world_from_medium.inverse();
-        let medium = HeterogeneousMedium::new(medium_from_world, [p0, p1], asymmetry, coefficients, glow);
+        let medium = HeterogeneousMedium::new(medium_from_world, [p0, p1], asymmetry, coefficients, glow)
+            .with_spectra(spectra);
         Ok(Medium::Heterogeneous(Box::new(medium)))
     }
 
     /// What a grid emits: one colour, or by temperature.
-    fn grid_glow(&mut self, params: &Params, size: [usize; 3]) -> Result<Glow> {
+    fn grid_glow(&mut self, params: &Params, size: [usize; 3]) -> Result<(Glow, Option<Arc<LightCurve>>)> {
         let radiance = self.glow(params)?;
         let temperature = self.voxels(params, "temperature", size)?;
         // A factor of one number is a grid of one voxel, as in pbrt: it falls to half on the faces.
@@ -268,15 +288,15 @@ impl Converter<'_, '_> {
             }
             (None, None) => {
                 params.ignore(&OF_HEAT);
-                Ok(Glow::None)
+                Ok((Glow::None, None))
             }
-            (Some(radiance), None) => {
+            (Some(LightSpectrum { colour: radiance, curve }), None) => {
                 params.ignore(&OF_HEAT);
-                Ok(Glow::Scaled { radiance, factor })
+                Ok((Glow::Scaled { radiance, factor }, curve))
             }
             (None, Some(temperature)) => {
                 let hottest = temperature.greatest();
-                self.heat(params, Density::Grid(temperature), hottest, factor)
+                Ok((self.heat(params, Density::Grid(temperature), hottest, factor)?, None))
             }
         }
     }
@@ -290,13 +310,22 @@ impl Converter<'_, '_> {
         Ok(Glow::Heat(Box::new(Heat { temperature, offset, scale, factor, colours })))
     }
 
-    /// A coefficient of absorption or scattering; 1 where none is given.
-    fn coefficient(&mut self, params: &Params, name: &'static str) -> Result<Spectrum> {
+    /// A coefficient of absorption or scattering, 1 where none is given, and its spectrum where it is more than a colour.
+    fn coefficient(
+        &mut self,
+        params: &Params,
+        name: &'static str,
+    ) -> Result<(Spectrum, Option<SpectrumValue>)> {
         let value = self.spectrum_value(params, name, SpectrumUse::Coefficient)?;
-        Ok(value.as_ref().map_or(Spectrum::WHITE, SpectrumValue::unbounded_rgb))
+        let colour = value.as_ref().map_or(Spectrum::WHITE, SpectrumValue::unbounded_rgb);
+        let spectrum = value.filter(|value| !matches!(value, SpectrumValue::Rgb(_)));
+        if let Some(SpectrumValue::Sampled(pairs)) = &spectrum {
+            self.keep(size_of_val(pairs.as_slice()), "spectra", params.spot_of(name))?;
+        }
+        Ok((colour, spectrum))
     }
 
-    fn glow(&mut self, params: &Params) -> Result<Option<Spectrum>> {
+    fn glow(&mut self, params: &Params) -> Result<Option<LightSpectrum>> {
         self.light_colour(params, "Le")
     }
 
@@ -339,6 +368,16 @@ impl Converter<'_, '_> {
         let values = numbers.chunks_exact(3).map(colour).collect();
         Ok(Some(Grid::new(size, values).expect("they are counted")))
     }
+}
+
+/// What is known of a medium by wavelength; `None` where that is only colours.
+fn spectra(
+    [absorption, scattering]: [Option<SpectrumValue>; 2],
+    scale: f32,
+    glow: Option<Arc<LightCurve>>,
+) -> Option<MediumSpectra> {
+    let is_more = absorption.is_some() || scattering.is_some() || glow.is_some();
+    is_more.then_some(MediumSpectra { absorption, scattering, scale, glow })
 }
 
 /// Voxels along x, y and z.

@@ -8,7 +8,7 @@
 mod curves;
 
 use lumbre_math::{DMat3, DVec3};
-use lumbre_shading::spectrum::response_to_d65;
+use lumbre_shading::spectrum::{SensorCurves, response_to_d65};
 
 use super::colour;
 use curves::{CURVES, Curves, FIRST_NM, STEP_NM};
@@ -33,6 +33,33 @@ pub(super) fn matrix(name: &str, kelvin: f64) -> Option<DMat3> {
     let (low, high, t) = between(&curves::KELVIN, kelvin);
     let missed = missed(low) * (1.0 - t) + missed(high) * t;
     Some(DMat3::from_diagonal(missed) * fitted(kelvin))
+}
+
+/// The sensitivities of a camera, and its matrix for light of this temperature, for paths that carry wavelengths; `None` for an unknown
+/// camera. Beyond the temperatures that are known of its sensitivities, the matrix changes as that for colours does.
+pub(super) fn spectral(name: &str, kelvin: f64) -> Option<SensorCurves> {
+    let curves = CURVES.iter().find(|known| known.name == name)?;
+    let rows = |i: usize| DMat3::from_cols_array(&curves.xyz[i].map(f64::from)).transpose();
+    let (low, high, t) = between(&curves::KELVIN, kelvin);
+    let xyz = rows(low) * (1.0 - t) + rows(high) * t;
+    let known = kelvin.clamp(curves::KELVIN[0], curves::KELVIN[curves::KELVIN.len() - 1]);
+    let beyond = if known == kelvin {
+        DMat3::IDENTITY
+    } else {
+        matrix(name, kelvin)? * matrix(name, known)?.inverse()
+    };
+    let row = |c: usize| {
+        let of_xyz = |axis: DVec3| colour::rgb_from_xyz(axis.to_array())[c];
+        DVec3::new(of_xyz(DVec3::X), of_xyz(DVec3::Y), of_xyz(DVec3::Z))
+    };
+    let rec709_from_xyz = DMat3::from_cols(row(0), row(1), row(2)).transpose();
+    let rec709 = beyond * rec709_from_xyz * xyz;
+    Some(SensorCurves {
+        sensitivities: curves.rgb.each_ref().map(|curve| curve.to_vec()),
+        first_nm: FIRST_NM as f32,
+        step_nm: STEP_NM as f32,
+        rec709: rec709.transpose().to_cols_array_2d().map(|row| row.map(|v| v as f32)),
+    })
 }
 
 /// The temperatures of a table about one, and the share of the second in steps of 1/T.

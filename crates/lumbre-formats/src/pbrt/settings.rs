@@ -1,5 +1,7 @@
 //! Camera, film, filter, sampler, integrator and options.
 
+use std::sync::Arc;
+
 use lumbre_image::ColourSpace;
 use lumbre_math::{DMat3, Transform, Vec2};
 use lumbre_scene::{
@@ -7,6 +9,7 @@ use lumbre_scene::{
     SphericalMapping,
 };
 use lumbre_shading::ShadingNormals;
+use lumbre_shading::spectrum::SensorCurves;
 
 use super::convert::Converter;
 use super::lexer::{parse_number, whole};
@@ -130,11 +133,17 @@ impl Converter<'_, '_> {
 
     pub fn film(&mut self, ty: &str, params: Params, space: ColourSpace) -> Result<()> {
         let spot = params.spot;
+        let mut spectral = false;
         match ty {
             "rgb" => {}
             "image" => self.upgraded(spot),
-            "gbuffer" | "spectral" => {
-                params.ignore(&["coordinatesystem", "nbuckets", "lambdamin", "lambdamax"]);
+            "spectral" => {
+                check_spectral_film(&params)?;
+                spectral = true;
+                self.note(spot, "the buckets of film \"spectral\" are not written yet: the picture is made of wavelengths, and has their colours");
+            }
+            "gbuffer" => {
+                params.ignore(&["coordinatesystem"]);
                 let message = format!("film {} is not rendered yet: an rgb one takes its place", quoted(ty));
                 self.note(spot, message);
             }
@@ -184,7 +193,7 @@ impl Converter<'_, '_> {
                 self.upgraded(params.spot_of(old));
             }
         }
-        let sensor = self.sensor(&params)?;
+        let (sensor, camera) = self.sensor(&params)?;
         let max_component = params.float_or_infinite("maxcomponentvalue", f64::INFINITY)?;
         if max_component <= 0.0 {
             return params.out_of_range("maxcomponentvalue", max_component, "more than 0");
@@ -202,16 +211,19 @@ impl Converter<'_, '_> {
         (film.pixel_bounds, film.crop_window) = (pixel_bounds, crop_window);
         film.max_component = max_component as f32;
         film.sensor = sensor;
+        film.camera = camera.map(Arc::new);
+        film.spectral |= spectral;
         film.single_precision = single_precision;
         Ok(())
     }
 
-    /// What the sensor of a film makes of colours.
-    fn sensor(&mut self, params: &Params) -> Result<[[f32; 3]; 3]> {
+    /// What the sensor of a film makes of colours, and of wavelengths where it is a camera's.
+    fn sensor(&mut self, params: &Params) -> Result<([[f32; 3]; 3], Option<SensorCurves>)> {
         const CIE1931: &str = "cie1931";
         let name = params.string("sensor")?.unwrap_or(CIE1931).to_owned();
         let kelvin = params.float_at_least_zero("whitebalance", 0.0)?;
         let balanced = (kelvin > 0.0).then_some(kelvin);
+        let mut camera = None;
         let matrix = if name == CIE1931 {
             match balanced {
                 None => Some(DMat3::IDENTITY),
@@ -224,6 +236,7 @@ impl Converter<'_, '_> {
                 let known = sensors::names().chain([CIE1931]);
                 return Err(params.spot_of("sensor").wrong(wrong.suggest(&name, known)));
             };
+            camera = sensors::spectral(&name, balanced.unwrap_or(DEFAULT_KELVIN));
             Some(matrix)
         };
         let Some(matrix) = matrix else {
@@ -233,7 +246,7 @@ impl Converter<'_, '_> {
                 "0, or a temperature at which bodies glow, in kelvin",
             );
         };
-        Ok(matrix.transpose().to_cols_array_2d().map(|row| row.map(|v| v as f32)))
+        Ok((matrix.transpose().to_cols_array_2d().map(|row| row.map(|v| v as f32)), camera))
     }
 
     pub fn sampler(&mut self, ty: &str, params: Params) -> Result<()> {
@@ -333,6 +346,11 @@ impl Converter<'_, '_> {
         let path = |params: &Params| -> Result<IntegratorKind> {
             Ok(IntegratorKind::Path { regularize: params.boolean("regularize", false)? })
         };
+        // Ours: pbrt-v4 is always so.
+        let is_path = matches!(ty, "path" | "volpath" | "simplepath" | "simplevolpath");
+        if is_path && params.boolean("spectral", false)? {
+            self.scene.film.spectral = true;
+        }
         let kind = match ty {
             "path" | "volpath" | "simplepath" | "simplevolpath" => path(&params)?,
             "whitted" => {
@@ -486,6 +504,29 @@ impl Converter<'_, '_> {
         Ok(())
     }
 }
+
+/// Refuses a film that keeps light by wavelength whose wavelengths cannot be.
+fn check_spectral_film(params: &Params) -> Result<()> {
+    const LEAST: f64 = 360.0;
+    const GREATEST: f64 = 830.0;
+    let buckets = params.count("nbuckets", 16, 1)?;
+    if buckets > MAX_BUCKETS {
+        return params.out_of_range("nbuckets", f64::from(buckets), &format!("1 to {MAX_BUCKETS}"));
+    }
+    let (low, high) = (params.float("lambdamin", LEAST)?, params.float("lambdamax", GREATEST)?);
+    for (name, nm) in [("lambdamin", low), ("lambdamax", high)] {
+        if !(LEAST..=GREATEST).contains(&nm) {
+            return params.out_of_range(name, nm, "360 to 830 nm");
+        }
+    }
+    if low >= high {
+        return params.out_of_range("lambdamin", low, "less than lambdamax");
+    }
+    Ok(())
+}
+
+/// Parts of the range of a film that keeps light by wavelength: one a nanometre.
+const MAX_BUCKETS: u32 = 471;
 
 /// The value under its pbrt-v3 name, else the default.
 fn params_v3(params: &Params, name: &'static str, default: f64) -> Result<f64> {

@@ -7,9 +7,10 @@ use std::sync::Arc;
 use lumbre_image::Encoding;
 use lumbre_math::noise::Octaves;
 use lumbre_math::{DVec3, Transform, Vec2, Vec3};
+use lumbre_shading::spectrum::LightCurve;
 use lumbre_shading::{
-    ImageFilter, ImageTexture, Mapping2d, NamedSpectrum, Pattern, PatternKind, Spectrum, SpectrumValue,
-    Texture, TextureValue, Wrap,
+    ImageFilter, ImageTexture, Mapping2d, NamedSpectrum, Pattern, PatternKind, Spectrum, SpectrumTexture,
+    SpectrumValue, Texture, TextureValue, Wrap,
 };
 
 use super::colour;
@@ -111,6 +112,12 @@ pub(super) fn single(params: &Params, name: &'static str, default: f32) -> Resul
         return Ok(value as f32);
     }
     params.out_of_range(name, value, "a number of single precision")
+}
+
+/// The colour of a light, and its spectrum with luminance 1, where it is more than a colour.
+pub(super) struct LightSpectrum {
+    pub colour: Spectrum,
+    pub curve: Option<Arc<LightCurve>>,
 }
 
 /// Why an image cannot be had, and where it is named.
@@ -241,10 +248,41 @@ impl Converter<'_, '_> {
 
     /// A photometric colour of light: `rgb` times the colour space's white, whose luminance is 1; any other
     /// spectrum with luminance 1.
-    pub fn light_colour(&mut self, params: &Params, name: &'static str) -> Result<Option<Spectrum>> {
+    pub fn light_colour(&mut self, params: &Params, name: &'static str) -> Result<Option<LightSpectrum>> {
         let Some(param) = params.typed(name, &SPECTRAL)? else { return Ok(None) };
         let (spectrum, scale) = self.spectrum(param, SpectrumUse::Light)?;
-        Ok(Some(spectrum.illuminant_rgb() * scale))
+        let colour = spectrum.illuminant_rgb() * scale;
+        Ok(Some(LightSpectrum { colour, curve: self.light_curve(spectrum, param.spot)? }))
+    }
+
+    /// The curve of a light's spectrum, shared with the light before where that has the same.
+    fn light_curve(&mut self, spectrum: SpectrumValue, spot: Spot) -> Result<Option<Arc<LightCurve>>> {
+        if let Some((last, curve)) = &self.last_light
+            && *last == spectrum
+        {
+            return Ok(Some(curve.clone()));
+        }
+        let Some(curve) = LightCurve::of(&spectrum) else { return Ok(None) };
+        self.keep(LightCurve::BYTES, "spectra", spot)?;
+        let curve = Arc::new(curve);
+        self.last_light = Some((spectrum, curve.clone()));
+        Ok(Some(curve))
+    }
+
+    /// A texture that is a spectrum of this colour; of a colour alone, that colour.
+    pub fn spectrum_constant(
+        &mut self,
+        colour: Spectrum,
+        spectrum: SpectrumValue,
+        spot: Spot,
+    ) -> Result<SpectrumArc> {
+        let pairs = match &spectrum {
+            SpectrumValue::Rgb(_) => return Ok(self.colour(colour)),
+            SpectrumValue::Sampled(pairs) => size_of_val(pairs.as_slice()),
+            SpectrumValue::Blackbody(_) | SpectrumValue::Named(_) => 0,
+        };
+        self.keep(size_of::<SpectrumTexture>() + size_of::<SpectrumValue>() + pairs, "spectra", spot)?;
+        Ok(Arc::new(Texture::Spectrum { value: colour, spectrum: Arc::new(spectrum) }))
     }
 
     // Textures as parameters.
@@ -267,7 +305,14 @@ impl Converter<'_, '_> {
             SpectrumUse::Coefficient => value.unbounded_rgb(),
             SpectrumUse::Light => value.illuminant_rgb(),
         };
-        Ok(Some(Known::of(self.colour(colour))))
+        let texture = match usage {
+            // The spectrum of a light is of another scale than its colour.
+            SpectrumUse::Light => self.colour(colour),
+            SpectrumUse::Reflectance | SpectrumUse::Coefficient => {
+                self.spectrum_constant(colour, value, param.spot)?
+            }
+        };
+        Ok(Some(Known::of(texture)))
     }
 
     /// [`Self::spectrum_texture`] with a grey default.

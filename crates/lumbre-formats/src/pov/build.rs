@@ -361,6 +361,7 @@ impl Builder {
             by_vertices: false,
             two_sided: true,
             power: None,
+            spectrum: None,
         })
     }
 }

@@ -15,7 +15,7 @@ pub(crate) fn run(bytes: &[u8]) {
             return;
         }
     };
-    let bsdf = Measured(tables.into());
+    let bsdf = Measured::new(tables.into());
     let frame = ShadingFrame { s: Vec3::X, t: Vec3::Y, n: Vec3::Z };
     let directions = [[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [-0.3, 0.9, 0.2], [0.1, -0.99, -0.05]];
     let directions = directions.map(|w| frame.to_local(Vec3::from_array(w).normalize()));

@@ -520,6 +520,7 @@ class Scene:
         noise: float | None = None,
         min_spp: int | None = None,
         transparent: bool = False,
+        spectral: bool | None = None,
         features: bool = False,
         denoise: bool | None = None,
         first_sample: int = 0,
@@ -562,6 +563,8 @@ class Scene:
         min_spp : samples per pixel, with noise
             What every pixel has before its noise may end it; by default 16, or up to 256 where most of the light comes by rare samples.
         transparent : leave out what is behind everything, and keep the coverage as `Image.alpha`
+        spectral : carry three wavelengths along each path in place of red, green and blue, by the integrator path
+            By default where the scene's film is spectral.
         features : gather albedo, normal, depth and uv as well, for `Image.feature`
         denoise : take the noise out; by default only in the light of the studio
         first_sample : index of the first sample of each pixel, for parts of a render
@@ -598,6 +601,7 @@ class Scene:
             "noise": noise,
             "min_spp": min_spp,
             "transparent": transparent or None,
+            "spectral": spectral,
             "features": features,
             "denoise": denoise,
             "first_sample": first_sample,

@@ -237,7 +237,7 @@ impl<'s> LightTracer<'s> {
                 Some(end) => Ray::new(start, end.point - start).with_range(0.0, 1.0),
                 None => Ray::new(start, sample.towards),
             };
-            path.flux *= self.scene.transmittance(path.medium, &back, draw.along(&back));
+            path.flux *= self.scene.transmittance(path.medium, &back, draw.along(&back), None);
         }
     }
 
@@ -349,7 +349,7 @@ impl<'s> LightTracer<'s> {
         let mut crossings = Vec::new();
         self.scene.crossings(&before, &mut crossings);
         let medium = crossings.last().map_or(path.medium, |crossing| crossing.beyond)?;
-        let transmittance = self.scene.transmittance(path.medium, &before, draw.along(&before));
+        let transmittance = self.scene.transmittance(path.medium, &before, draw.along(&before), None);
         let photon = Photon {
             point: segment.at(at),
             towards: -segment.direction.as_vec3(),
@@ -365,7 +365,7 @@ impl<'s> LightTracer<'s> {
 
     /// Takes a light path through media along its next segment.
     fn cross_media(&self, path: &mut LightPath<'s>, segment: &Ray, draw: &Draw) {
-        path.flux *= self.scene.transmittance(path.medium, segment, draw.along(segment));
+        path.flux *= self.scene.transmittance(path.medium, segment, draw.along(segment), None);
         let mut crossings = Vec::new();
         self.scene.crossings(segment, &mut crossings);
         if let Some(last) = crossings.last() {

@@ -13,6 +13,11 @@ pub trait Integrator: Debug + Send + Sync {
     /// Gives each of the samples an estimate of the radiance along its ray from the camera.
     fn estimate(&self, sights: &mut Sights<'_, '_>, sampler: &Sampler, record: &mut Record);
 
+    /// Whether it takes samples that carry wavelengths in place of linear Rec. 709.
+    fn carries_wavelengths(&self) -> bool {
+        false
+    }
+
     /// Whether rays from the camera are to have footprints, also in scenes without textures.
     fn needs_footprints(&self) -> bool {
         false

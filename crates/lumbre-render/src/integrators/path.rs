@@ -62,6 +62,7 @@ impl Path {
             has_media: scene.has_media(),
             has_panes: scene.lets_light_straight_on(),
             moves: scene.moves(),
+            is_spectral: false,
             instruction_set: InstructionSet::detect(),
             merging: None,
         }
@@ -70,6 +71,12 @@ impl Path {
 
 impl Integrator for Path {
     fn estimate(&self, sights: &mut Sights<'_, '_>, sampler: &Sampler, record: &mut Record) {
-        sights.follow(&self.setting(sights.scene(), sampler), record);
+        let is_spectral = sights.are_spectral();
+        let setting = Setting { is_spectral, ..self.setting(sights.scene(), sampler) };
+        sights.follow(&setting, record);
+    }
+
+    fn carries_wavelengths(&self) -> bool {
+        true
     }
 }

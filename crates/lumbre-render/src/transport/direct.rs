@@ -262,7 +262,7 @@ impl<'a, 's> Vertex<'a, 's> {
         record: &mut Record,
     ) -> Spectrum {
         let around = self.around(self.crosses(sample), interiors);
-        straight_on(self.scene, self.shadow_ray(sample), sample, around, regularize, record)
+        straight_on(self.scene, self.shadow_ray(sample), sample, around, regularize, false, record)
     }
 
     /// Whether a light's sample comes through the solid whose surface this is.

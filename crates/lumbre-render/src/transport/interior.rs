@@ -2,6 +2,7 @@
 
 use lumbre_math::Elementary;
 use lumbre_scene::Interaction;
+use lumbre_shading::spectrum::{SpectralLookup, Wavelengths};
 use lumbre_shading::{HomogeneousMedium, Material, Spectrum};
 use smallvec::SmallVec;
 
@@ -14,6 +15,8 @@ use smallvec::SmallVec;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Interiors<'s> {
     around: SmallVec<[Solid<'s>; 2]>,
+    /// What the channels of light are, where that is not linear Rec. 709.
+    wavelengths: Option<Wavelengths>,
 }
 
 /// A solid around a point.
@@ -30,12 +33,23 @@ impl<'s> Solid<'s> {
     }
 
     /// σ of the law of Beer and Lambert.
-    fn attenuation(&self) -> Option<Spectrum> {
-        self.medium.map(|medium| medium.extinction).or_else(|| self.material.interior_attenuation())
+    fn attenuation(&self, wavelengths: Option<&Wavelengths>) -> Option<Spectrum> {
+        let of_medium = self.medium.map(|medium| medium.extinction);
+        of_medium.or_else(|| self.material.interior_attenuation(wavelengths))
     }
 }
 
 impl<'s> Interiors<'s> {
+    /// None, for light of some wavelengths or in RGB.
+    pub(crate) fn of(wavelengths: Option<Wavelengths>) -> Self {
+        Self { around: SmallVec::new(), wavelengths }
+    }
+
+    /// What colours are to light here.
+    pub(crate) fn spectral(&self) -> Option<SpectralLookup> {
+        Some(SpectralLookup { wavelengths: self.wavelengths?, is_unbounded: false })
+    }
+
     /// Comes to a surface, whose material there is `material`. A solid that is met from inside without having been entered is
     /// one that the path began in; until then nothing is known of it.
     pub(crate) fn arrive(&mut self, here: &Interaction<'s>, material: Option<&'s Material>) {
@@ -53,7 +67,7 @@ impl<'s> Interiors<'s> {
 
     /// What is left of light after a distance inside the innermost solid.
     pub(crate) fn transmittance(&self, distance: f64) -> Spectrum {
-        let sigma = self.around.last().and_then(Solid::attenuation);
+        let sigma = self.around.last().and_then(|solid| solid.attenuation(self.wavelengths.as_ref()));
         sigma.map_or(Spectrum::WHITE, |sigma| {
             sigma.map(|sigma| (-f64::from(sigma) * distance).exponential() as f32)
         })
@@ -66,7 +80,7 @@ impl<'s> Interiors<'s> {
 
     /// Whether light loses anything here.
     pub(crate) fn attenuates(&self) -> bool {
-        self.around.last().is_some_and(|solid| solid.attenuation().is_some())
+        self.around.last().is_some_and(|solid| solid.attenuation(self.wavelengths.as_ref()).is_some())
     }
 
     /// Goes through a surface, into the solid behind it or out of it.

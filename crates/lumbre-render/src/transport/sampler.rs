@@ -174,6 +174,11 @@ impl Draw {
         self.four(FILTER)[2].into()
     }
 
+    /// Which wavelengths: even over the samples of a pixel.
+    pub fn wavelength(&self) -> f32 {
+        self.four(FILTER)[3]
+    }
+
     /// Which light, at a vertex: a multiple of 2⁻⁴⁸.
     pub fn light_choice(&self, vertex: u32) -> f64 {
         let [.., choice, more] = self.four(of_light(vertex));

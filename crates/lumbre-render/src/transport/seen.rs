@@ -113,13 +113,13 @@ fn lost(
         }
         let shadow_ray = at.shadow_ray(&sample);
         let mut left = if goes_straight_on(scene, &sample) {
-            straight_on(scene, shadow_ray, &sample, Interiors::default(), false, record)
+            straight_on(scene, shadow_ray, &sample, Interiors::default(), false, false, record)
         } else {
             record.counts.shadow += 1;
             if scene.is_occluded(&shadow_ray) { Spectrum::BLACK } else { Spectrum::WHITE }
         };
         if scene.has_media() {
-            left *= scene.transmittance(None, &shadow_ray, draw.along(&shadow_ray));
+            left *= scene.transmittance(None, &shadow_ray, draw.along(&shadow_ray), None);
         }
         if left == Spectrum::WHITE {
             continue;

@@ -2,7 +2,8 @@
 
 use lumbre_geometry::Ray;
 use lumbre_scene::{Footprint, Interaction, LightSample, Scene};
-use lumbre_shading::{Scatter, ShadingNormals, Spectrum};
+use lumbre_shading::spectrum::Wavelengths;
+use lumbre_shading::{Material, Scatter, ShadingNormals, Spectrum};
 
 use crate::transport::direct::Vertex;
 use crate::transport::interior::Interiors;
@@ -20,6 +21,11 @@ const INDEX_ERROR: f32 = 1e-4;
 /// The way from a ray's origin to what it met; its direction is unit.
 pub(crate) fn ray_length(ray: &Ray, here: &Interaction) -> f64 {
     (here.surface.point - ray.origin).length()
+}
+
+/// The throughput of the hero wavelength, which goes on in place of all of them.
+pub(crate) fn hero_alone(throughput: Spectrum) -> Spectrum {
+    Spectrum::new(Wavelengths::COUNT as f32 * throughput.r, 0.0, 0.0)
 }
 
 /// An estimate of the light at infinity that comes back along a ray which meets something first: refracted, spread by what is
@@ -95,6 +101,7 @@ pub(crate) fn straight_on<'s>(
     sample: &LightSample,
     mut interiors: Interiors<'s>,
     regularize: bool,
+    mut is_alone: bool,
     record: &mut Record,
 ) -> Spectrum {
     let mut left = Spectrum::WHITE;
@@ -109,7 +116,8 @@ pub(crate) fn straight_on<'s>(
         if !scene.is_pane(&hit) {
             return Spectrum::BLACK;
         }
-        let pane = scene.interaction(&ray, &hit, &Footprint::Point);
+        let mut pane = scene.interaction(&ray, &hit, &Footprint::Point);
+        pane.at.spectral = interiors.spectral();
         let material = pane.resolved();
         interiors.arrive(&pane, material);
         left *= interiors.transmittance(ray_length(&ray, &pane));
@@ -123,6 +131,10 @@ pub(crate) fn straight_on<'s>(
             .sum::<Spectrum>();
         if left.is_black() {
             return Spectrum::BLACK;
+        }
+        if !is_alone && pane.at.spectral.is_some() && material.is_some_and(Material::disperses) {
+            is_alone = true;
+            left = hero_alone(left);
         }
         if let Some(material) = material {
             interiors.cross(material, pane.front);

@@ -61,6 +61,40 @@ impl Samples {
     }
 }
 
+/// The radiance of samples at the wavelengths of their paths, in the lanes of a mask.
+#[inline(always)]
+pub(crate) fn at_wavelengths<R: Real>(
+    shade: &Shade<'_, '_>,
+    lanes: R::Mask,
+    slot: R::UInt,
+    light: &LaneLightSample<R>,
+) -> V3<R> {
+    let V3 { x, y, z } = light.radiance;
+    let mut radiance = [x.to_lanes(), y.to_lanes(), z.to_lanes()];
+    colour(shade, lanes.to_bitmask(), &slot.to_lanes(), &light.source.to_lanes(), &mut radiance);
+    from_lanes(&radiance)
+}
+
+#[inline(never)]
+fn colour(
+    shade: &Shade<'_, '_>,
+    mut lanes: u32,
+    slot: &[u32; 16],
+    source: &[u32; 16],
+    radiance: &mut [[f32; 16]; 3],
+) {
+    let scene = shade.setting.scene;
+    while lanes != 0 {
+        let lane = lanes.trailing_zeros() as usize;
+        lanes &= lanes - 1;
+        let id = scene.lane_lights().light_of(scene, source[lane]);
+        let colour = Spectrum::new(radiance[0][lane], radiance[1][lane], radiance[2][lane]);
+        let wavelengths = &shade.slots.wavelengths[slot[lane] as usize];
+        let values = scene.light_at_wavelengths(id, colour, wavelengths).to_array();
+        (0..3).for_each(|k| radiance[k][lane] = values[k]);
+    }
+}
+
 /// A light sample of the first lane.
 pub(crate) fn first_sample<R: Real>(light: &LaneLightSample<R>) -> LightSample {
     to_samples(light).get(0)

@@ -3,7 +3,7 @@
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Vec3};
 use lumbre_scene::MediumId;
-use lumbre_scene::light::LightPoint;
+use lumbre_scene::light::{LightPoint, Sampling};
 use lumbre_shading::medium::{DistanceSample, Way, henyey_greenstein, sample_henyey_greenstein};
 use lumbre_shading::{Scatter, Spectrum};
 use lumbre_simd::V3;
@@ -83,7 +83,8 @@ impl<'s> Wave<'s> {
         let throughput = self.paths.throughput(path);
         let numbers = self.slots.draws[slot].passage(self.slots.distance_samples[slot]);
         self.slots.distance_samples[slot] += 1;
-        let passage = setting.scene.medium(medium).sample(&way, throughput, numbers);
+        let wavelengths = self.slots.wavelengths.get(slot);
+        let passage = setting.scene.medium(medium).sample(&way, throughput, numbers, wavelengths);
         let depth = self.paths.depth[path] & !SCATTERED;
         if !passage.emitted.is_black() && depth < setting.max_depth {
             self.slots.radiance[slot] += record.added(Source::Medium, throughput, passage.emitted, 1.0);
@@ -134,11 +135,15 @@ impl<'s> Wave<'s> {
         let (draw, time) = (&self.slots.draws[slot], self.slots.time[slot]);
         let depth = self.paths.depth[path] & !SCATTERED;
         let (choose, u) = (draw.light_choice(depth), draw.light_point(depth));
-        let sample = match setting.strategy {
-            Strategy::Lights => scene.sample_light_alone(from, DVec3::ZERO, time, choose, u),
-            Strategy::Both | Strategy::Bsdf => scene.sample_light(from, DVec3::ZERO, time, choose, u),
+        let sampling = match setting.strategy {
+            Strategy::Lights => Sampling::LightsOnly,
+            Strategy::Both | Strategy::Bsdf => Sampling::Mis,
         };
-        let Some(sample) = sample else { return };
+        let sample = scene.sample_light_for(sampling, from, DVec3::ZERO, time, choose, u);
+        let Some((id, mut sample)) = sample else { return };
+        if let Some(wavelengths) = self.slots.wavelengths.get(slot) {
+            sample.radiance = scene.light_at_wavelengths(id, sample.radiance, wavelengths);
+        }
         let cos = self.paths.direction(path).dot(sample.towards.as_vec3());
         let phase = henyey_greenstein(cos, scene.medium(collision.medium).asymmetry());
         let (weight, pdf) = match (sample.scatter, setting.strategy) {

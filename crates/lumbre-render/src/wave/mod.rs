@@ -137,6 +137,14 @@ impl<'s> Wave<'s> {
                 light,
                 found: &mut self.found,
             });
+            if setting.is_spectral {
+                let id = setting.scene.lane_lights().infinite_light(light);
+                for found in &mut self.found {
+                    let slot = self.paths.slot[found.path as usize] as usize;
+                    let wavelengths = &self.slots.wavelengths[slot];
+                    found.radiance = setting.scene.light_at_wavelengths(id, found.radiance, wavelengths);
+                }
+            }
             self.add_found(setting, Source::Infinity, record);
         }
     }

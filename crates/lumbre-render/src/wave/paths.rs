@@ -4,6 +4,7 @@ use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Vec3};
 use lumbre_scene::{Boundary, CameraRay, Footprint, MediumId};
 use lumbre_shading::Spectrum;
+use lumbre_shading::spectrum::{SpectralLookup, Wavelengths};
 use lumbre_simd::{Double, Mask, Real, UInt, V3};
 
 use crate::transport::Draw;
@@ -69,6 +70,10 @@ pub(crate) struct Slots<'s> {
     pub(crate) interiors: Vec<Interiors<'s>>,
     /// The medium around, as [`of_column`] reads it; empty in a scene without media.
     pub(crate) medium: Vec<u32>,
+    /// The wavelengths that channels are; none in RGB.
+    pub(crate) wavelengths: Vec<Wavelengths>,
+    /// Whether the hero wavelength goes on alone, once it was bent by an index of its own; none in RGB.
+    pub(crate) is_alone: Vec<bool>,
     /// Distances sampled in media, and collisions inside solids.
     pub(crate) distance_samples: Vec<u32>,
     pub(crate) collisions: Vec<u32>,
@@ -88,6 +93,8 @@ impl Slots<'_> {
         self.radiance.clear();
         self.interiors.clear();
         self.medium.clear();
+        self.wavelengths.clear();
+        self.is_alone.clear();
         self.distance_samples.clear();
         self.collisions.clear();
         self.widths.clear();
@@ -99,8 +106,21 @@ impl Slots<'_> {
         CameraRay { ray: self.rays[slot], footprint, weight: 1.0 }
     }
 
-    /// Adds a sample. In a scene with media, `medium` is what the camera stands in.
-    pub(crate) fn push(&mut self, draw: Draw, camera: &CameraRay, has_solids: bool, medium: Option<u32>) {
+    /// What colours are to a sample; `None` in RGB.
+    pub(crate) fn spectral(&self, slot: usize) -> Option<SpectralLookup> {
+        let wavelengths = *self.wavelengths.get(slot)?;
+        Some(SpectralLookup { wavelengths, is_unbounded: false })
+    }
+
+    /// Adds a sample. In a scene with media, `medium` is what the camera stands in; in a spectral render it has wavelengths.
+    pub(crate) fn push(
+        &mut self,
+        draw: Draw,
+        camera: &CameraRay,
+        has_solids: bool,
+        medium: Option<u32>,
+        wavelengths: Option<Wavelengths>,
+    ) {
         let (pixel, index) = draw.words();
         self.draws.push(draw);
         self.pixel[0].push(pixel[0]);
@@ -113,10 +133,12 @@ impl Slots<'_> {
         }
         self.radiance.push(Spectrum::BLACK);
         if has_solids {
-            self.interiors.push(Interiors::default());
+            self.interiors.push(Interiors::of(wavelengths));
             self.collisions.push(0);
         }
         self.medium.extend(medium);
+        self.wavelengths.extend(wavelengths);
+        self.is_alone.extend(wavelengths.map(|_| false));
         if has_solids || medium.is_some() {
             self.distance_samples.push(0);
         }

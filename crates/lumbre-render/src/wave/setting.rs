@@ -25,6 +25,8 @@ pub(crate) struct Setting<'s> {
     /// Whether light from points is followed straight on through panes.
     pub(crate) has_panes: bool,
     pub(crate) moves: bool,
+    /// Whether channels are wavelengths.
+    pub(crate) is_spectral: bool,
     pub(crate) instruction_set: InstructionSet,
     /// Photons, where caustics are found by them.
     pub(crate) merging: Option<Merging<'s>>,

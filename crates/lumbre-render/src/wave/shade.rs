@@ -11,7 +11,7 @@ use lumbre_simd::{Double, Job, Mask, Real, UInt, V3};
 use crate::caustics::radius;
 use crate::transport::Strategy;
 use crate::transport::sampler::LaneDraw;
-use crate::wave::lights::{pass_solids, push_panes};
+use crate::wave::lights::{at_wavelengths, pass_solids, push_panes};
 use crate::wave::paths::{Departure, Paths, SCATTERED, Slots};
 use crate::wave::setting::{Leg, Setting, power_heuristic};
 use crate::wave::shadows::{NEARLY_WHOLE, Segment, Shadows};
@@ -291,8 +291,11 @@ impl<'s> Shade<'_, 's> {
             Strategy::Lights => Sampling::LightsOnly,
             Strategy::Both | Strategy::Bsdf => Sampling::Mis,
         };
-        let light: LaneLightSample<R> =
+        let mut light: LaneLightSample<R> =
             scene.lane_lights().sample(scene, useful, &receiver, [u[2], u[0], u[1], u[3]], sampling);
+        if self.setting.is_spectral {
+            light.radiance = at_wavelengths(self, useful & light.valid, arrived.slot, &light);
+        }
         let Scattered { f, pdf: bsdf_pdf } = vertex.eval(bsdf, light.towards);
         let weight = match self.setting.strategy {
             Strategy::Both => power_heuristic(light.pdf, bsdf_pdf),

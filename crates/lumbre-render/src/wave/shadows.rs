@@ -158,13 +158,22 @@ impl<'s> Shadows<'s> {
             let mut passes = if self.blocked[i] { Spectrum::BLACK } else { Spectrum::WHITE };
             if let Some(pane) = next_pane.next_if(|pane| pane.segment as usize == i) {
                 let ray = self.ray(i, slots.time[self.slot[i] as usize]);
-                passes = straight_on(scene, ray, &pane.sample, pane.around, setting.regularize, record);
+                passes = straight_on(
+                    scene,
+                    ray,
+                    &pane.sample,
+                    pane.around,
+                    setting.regularize,
+                    slots.is_alone.get(self.slot[i] as usize).is_some_and(|&alone| alone),
+                    record,
+                );
             }
             if setting.has_media && !passes.is_black() {
                 let slot = self.slot[i] as usize;
                 let ray = self.ray(i, slots.time[slot]);
                 let seed = slots.draws[slot].along(&ray);
-                passes *= scene.transmittance(of_column(self.medium[i]), &ray, seed);
+                let wavelengths = slots.wavelengths.get(slot);
+                passes *= scene.transmittance(of_column(self.medium[i]), &ray, seed, wavelengths);
             }
             if !passes.is_black() {
                 slots.radiance[self.slot[i] as usize] += self.light(i) * passes;

@@ -4,6 +4,7 @@ use lumbre_geometry::{Ray, Surface};
 use lumbre_math::{DVec3, Vec3};
 use lumbre_scene::{CameraRay, Footprint, SamplerKind, Scene, View};
 use lumbre_shading::Spectrum;
+use lumbre_shading::spectrum::Wavelengths;
 
 use crate::caustics::Merging;
 use crate::transport::{Draw, Record, Seen, Sight};
@@ -31,6 +32,7 @@ impl<'a, 's> Sights<'a, 's> {
         wave: &'a mut Wave<'s>,
         precision: Precision,
         samples: impl ExactSizeIterator<Item = (Draw, CameraRay)>,
+        is_spectral: bool,
         record: &mut Record,
     ) -> Self {
         let has_solids = scene.has_solids();
@@ -59,7 +61,8 @@ impl<'a, 's> Sights<'a, 's> {
                 width,
                 spread,
             });
-            wave.slots.push(draw, &camera, has_solids, medium);
+            let wavelengths = is_spectral.then(|| Wavelengths::visible(draw.wavelength()));
+            wave.slots.push(draw, &camera, has_solids, medium, wavelengths);
         }
         record.counts.camera += wave.paths.len as u64;
         wave.hits.search(scene, &wave.paths, &wave.slots, precision, true);
@@ -142,6 +145,16 @@ impl<'a, 's> Sights<'a, 's> {
     /// The radiance of every sample; black where an integrator gave none.
     pub(crate) fn radiance(&self) -> &[Spectrum] {
         &self.wave.slots.radiance
+    }
+
+    /// Whether samples carry wavelengths.
+    pub(crate) fn are_spectral(&self) -> bool {
+        !self.wave.slots.wavelengths.is_empty()
+    }
+
+    /// The wavelengths of a sample; `None` in RGB.
+    pub(crate) fn wavelengths(&self, slot: usize) -> Option<&Wavelengths> {
+        self.wave.slots.wavelengths.get(slot)
     }
 
     /// Gives each sample the radiance that a function finds along its ray, one after the other.

@@ -1,7 +1,7 @@
 //! Vertices on triangles with normals of vertices, or whose materials are looked up, in lanes.
 
 use lumbre_math::Vec3;
-use lumbre_scene::{TrianglePoint, TriangleSurface};
+use lumbre_scene::{TrianglePoint, TriangleSurface, UniformBsdf};
 use lumbre_shading::lanes::{BsdfKind, facing};
 use lumbre_shading::{Bsdf, ShadingFrame, ShadingNormals};
 use lumbre_simd::math::orthonormal_basis;
@@ -39,9 +39,16 @@ impl SmoothHits {
         columns.for_each(|column| grow(column, len));
     }
 
-    /// Notes what a path met.
+    /// Notes what a path met, whose BSDF is this, or else is to be looked up.
     #[inline]
-    pub(crate) fn push(&mut self, surface: &TriangleSurface, path: usize, met: MetTriangle, distance: f32) {
+    pub(crate) fn push(
+        &mut self,
+        surface: &TriangleSurface,
+        path: usize,
+        met: MetTriangle,
+        distance: f32,
+        bsdf: Option<UniformBsdf>,
+    ) {
         let at = self.base.len();
         self.base.push(surface, path, met, distance);
         let corners = surface.mesh.indices[met.triangle as usize];
@@ -51,8 +58,8 @@ impl SmoothHits {
             columns[1][at] = normal.y;
             columns[2][at] = normal.z;
         }
-        self.kinds.push(surface.bsdf.map(|bsdf| bsdf.kind));
-        self.looks_up[at] = u32::from(surface.bsdf.is_none());
+        self.kinds.push(bsdf.map(|bsdf| bsdf.kind));
+        self.looks_up[at] = u32::from(bsdf.is_none());
     }
 
     /// What was found of a hit, for the look-up of its material.

@@ -129,6 +129,7 @@ fn first_vertices<'s>(
         has_media: false,
         has_panes: false,
         moves: false,
+        is_spectral: false,
         instruction_set: set,
         merging: None,
     };
@@ -143,7 +144,7 @@ fn first_vertices<'s>(
         .collect();
     let mut wave = Wave::default();
     let mut record = Record::default();
-    Sights::new(scene, &view, &mut wave, Precision::Single, samples.into_iter(), &mut record);
+    Sights::new(scene, &view, &mut wave, Precision::Single, samples.into_iter(), false, &mut record);
     wave.surfaces(&setting, &mut record);
     wave
 }

@@ -12,6 +12,7 @@ use lumbre_simd::{UInt, V3};
 use crate::transport::Record;
 use crate::transport::interior::Interiors;
 use crate::transport::journal::{End, Event, Met, Source};
+use crate::transport::through::hero_alone;
 use crate::wave::Wave;
 use crate::wave::flat::FlatVertices;
 use crate::wave::paths::{OnePath, SCATTERED, sides};
@@ -49,7 +50,9 @@ impl<'s> Wave<'s> {
                 continue;
             };
             let distance = self.hits.distance(path);
-            match surface.bsdf {
+            // What a material is like at the wavelengths of a path is to be looked up.
+            let bsdf = surface.bsdf.filter(|_| !setting.is_spectral);
+            match bsdf {
                 Some(bsdf) if !surface.is_smooth() => {
                     self.flat.push(surface, path, met, distance);
                     let ends = self.paths.depth[path] & !SCATTERED == setting.max_depth;
@@ -57,7 +60,7 @@ impl<'s> Wave<'s> {
                         self.vertices.queue(self.flat.len() - 1, bsdf.kind);
                     }
                 }
-                _ => self.smooth.push(surface, path, met, distance),
+                _ => self.smooth.push(surface, path, met, distance, bsdf),
             }
             if record.journal.is_some() {
                 self.tell_triangle(setting, path, record);
@@ -79,6 +82,14 @@ impl<'s> Wave<'s> {
             found: &mut self.found,
             is_single: self.hits.is_single(),
         });
+        if setting.is_spectral {
+            for found in &mut self.found {
+                let path = found.path as usize;
+                let Some(met) = self.hits.triangle(path) else { continue };
+                let wavelengths = &self.slots.wavelengths[self.paths.slot[path] as usize];
+                found.radiance = scene.emission_at_wavelengths(met.id, found.radiance, wavelengths);
+            }
+        }
         self.add_found(setting, Source::Surface, record);
         if setting.has_media {
             for vertex in 0..self.vertices.len {
@@ -95,7 +106,8 @@ impl<'s> Wave<'s> {
             let slot = self.paths.slot[path] as usize;
             let ray = self.paths.ray(path, self.slots.time[slot]);
             let footprint = self.footprint(path);
-            if let Some(here) = self.hits.interaction(scene, path, &ray, &footprint) {
+            if let Some(mut here) = self.hits.interaction(scene, path, &ray, &footprint) {
+                here.at.spectral = self.slots.spectral(slot);
                 self.surface(setting, path, slot, &ray, &here, record);
             }
         }
@@ -118,9 +130,16 @@ impl<'s> Wave<'s> {
             let footprint = self.footprint(path);
             let point = self.smooth.point(at, &self.vertices, vertex, self.paths.direction(path));
             let surface = self.smooth.base.surface(setting, at);
-            match surface.and_then(|surface| surface.scattering(&point, &footprint, setting.shading_normals))
-            {
+            let slot = self.paths.slot[path] as usize;
+            let spectral = self.slots.spectral(slot);
+            let scattering = surface.and_then(|surface| {
+                surface.scattering(&point, &footprint, setting.shading_normals, spectral)
+            });
+            match scattering {
                 Some((material, frame, bsdf)) => {
+                    if setting.is_spectral && material.disperses() {
+                        self.follow_hero(path, slot);
+                    }
                     let frame = frame_for(&bsdf, frame);
                     let mut flags = flags_of(setting.shading_normals, &frame, point.geometric);
                     if material.lets_light_through() {
@@ -130,6 +149,14 @@ impl<'s> Wave<'s> {
                 }
                 None => record.note(|| Event::Ended(End::Nothing)),
             }
+        }
+    }
+
+    /// Has the hero wavelength of a path go on in place of all of them, if it is not alone yet: each would be bent another way.
+    fn follow_hero(&mut self, path: usize, slot: usize) {
+        if !std::mem::replace(&mut self.slots.is_alone[slot], true) {
+            let throughput = self.paths.throughput(path);
+            self.paths.set_throughput(path, hero_alone(throughput));
         }
     }
 
@@ -210,6 +237,9 @@ impl<'s> Wave<'s> {
         }
         if setting.regularize && self.paths.depth[path] & SCATTERED != 0 {
             bsdf = bsdf.regularized();
+        }
+        if setting.is_spectral && material.disperses() {
+            self.follow_hero(path, slot);
         }
         let frame = frame_for(&bsdf, frame);
         let mut flags = flags_of(setting.shading_normals, &frame, here.shading.geometric);
@@ -297,9 +327,12 @@ impl<'s> Wave<'s> {
         here: &Interaction<'s>,
         record: &mut Record,
     ) {
-        let emitted = here.emitted();
+        let mut emitted = here.emitted();
         if emitted.is_black() {
             return;
+        }
+        if let (Some(wavelengths), Some(emission)) = (self.slots.wavelengths.get(slot), here.emission) {
+            emitted = emission.at_wavelengths(emitted, wavelengths);
         }
         let matters = self.paths.pdf[path].min(self.paths.merging[path]) < f32::INFINITY;
         let pdf = if matters { self.light_pdf(setting, path, ray, here) } else { 0.0 };

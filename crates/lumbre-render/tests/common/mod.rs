@@ -64,6 +64,7 @@ pub(crate) fn glow(radiance: f32) -> AreaLightDesc {
         by_vertices: false,
         two_sided: false,
         power: None,
+        spectrum: None,
     }
 }
 

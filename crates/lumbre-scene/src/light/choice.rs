@@ -79,8 +79,8 @@ impl LightChoice {
         choice
     }
 
-    /// A sample of a light that `choose` chooses for a place, in a direction by `x` and `y`. Its density, or the radiance of a delta light,
-    /// includes the probability of the choice.
+    /// The light that `choose` chooses for a place, and a sample of it in a direction by `x` and `y`. Its density, or the radiance of a
+    /// delta light, includes the probability of the choice.
     pub(crate) fn sample(
         &self,
         lights: &[Light],
@@ -89,27 +89,28 @@ impl LightChoice {
         time: f64,
         [choose, x, y]: [f64; 3],
         sampling: Sampling,
-    ) -> Option<LightSample> {
+    ) -> Option<(LightId, LightSample)> {
         let u = DVec2::new(x, y);
         let sum = self.sum_elsewhere(lights, place.normal, time);
         let share_elsewhere = self.share_elsewhere_at(place, sum);
-        let (sample, probability) = if choose < share_elsewhere {
+        let (id, sample, probability) = if choose < share_elsewhere {
             let (id, probability) =
                 self.choose_elsewhere(lights, place.normal, time, choose / share_elsewhere * sum)?;
             let sample = match &lights[id as usize] {
                 Light::Environment(light) if sampling == Sampling::Mis => light.sample_beside_others(u),
                 light => light.sample(entries, place.from, time, u),
             };
-            (sample?, share_elsewhere * (probability / sum))
+            (id, sample?, share_elsewhere * (probability / sum))
         } else {
             let share = 1.0 - share_elsewhere;
             let chosen = self.tree.as_ref()?.choose(place, (choose - share_elsewhere) / share)?;
             (
+                self.emitters[chosen.emitter].0,
                 self.sample_emitter(lights, entries, chosen.emitter, place.from, time, u)?,
                 share * chosen.probability,
             )
         };
-        Some(sample.of_density(probability))
+        Some((LightId(id), sample.of_density(probability)))
     }
 
     /// A sample of an emitter of the tree.

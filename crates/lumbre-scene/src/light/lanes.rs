@@ -44,6 +44,8 @@ pub struct LaneLightSample<R: Real> {
     pub delta: R::Mask,
     /// Whether any light arrives.
     pub valid: R::Mask,
+    /// Which light it is of: see [`LaneLights::light_of`].
+    pub source: R::UInt,
 }
 
 /// Who is lit, in each lane.
@@ -78,6 +80,9 @@ fn below_one<R: Real>() -> R {
     R::splat(1.0 - 0.5 * f32::EPSILON)
 }
 
+/// The bit of a source that says that the rest is a position among the lights that are everywhere; else it is an emitter.
+const ELSEWHERE: u32 = 1 << 31;
+
 /// The steps of uniform numbers.
 const STEP: f32 = 1.0 / 16_777_216.0;
 
@@ -96,12 +101,13 @@ impl<R: Real> LaneLightSample<R> {
             pdf: R::zero(),
             delta: none,
             valid: none,
+            source: R::UInt::splat(0),
         }
     }
 
-    /// `other` in some lanes, where directions are this many times as likely.
+    /// `other` of a light in some lanes, where directions are this many times as likely.
     #[inline(always)]
-    fn with(self, mask: R::Mask, other: Self, probability: R) -> Self {
+    fn with(self, mask: R::Mask, other: Self, probability: R, source: R::UInt) -> Self {
         let radiance = V3::select(other.delta, other.radiance * probability.recip(), other.radiance);
         Self {
             towards: V3::select(mask, other.towards, self.towards),
@@ -113,6 +119,7 @@ impl<R: Real> LaneLightSample<R> {
             pdf: R::select(mask, other.pdf * probability, self.pdf),
             delta: (mask & other.delta) | (!mask & self.delta),
             valid: (mask & other.valid) | (!mask & self.valid),
+            source: R::UInt::select(mask, source, self.source),
         }
     }
 }
@@ -168,7 +175,8 @@ impl LaneLights {
                 if here.any() {
                     let light = &self.elsewhere[position];
                     let of_light = light.sample(scene, here, receiver, [u[1], u[2], u[3]], sampling);
-                    sample = sample.with(here, of_light, probability);
+                    let source = R::UInt::splat(ELSEWHERE | position as u32);
+                    sample = sample.with(here, of_light, probability, source);
                 }
                 position += 1;
             }
@@ -185,12 +193,12 @@ impl LaneLights {
             if pieces.any() {
                 let of_piece =
                     piece::sample(&self.table, pieces, chosen.emitter, receiver.from, [u[1], u[2]]);
-                sample = sample.with(pieces, of_piece, probability);
+                sample = sample.with(pieces, of_piece, probability, chosen.emitter);
             }
             let points = chosen.valid & kinds.simd_eq(R::UInt::splat(kind::POINT));
             if points.any() {
                 let of_point = point::sample(&self.table, points, chosen.emitter, receiver.from);
-                sample = sample.with(points, of_point, probability);
+                sample = sample.with(points, of_point, probability, chosen.emitter);
             }
             let others = chosen.valid & kinds.simd_eq(R::UInt::splat(kind::SCALAR));
             if others.any() {
@@ -199,10 +207,23 @@ impl LaneLights {
                 let receivers = Receivers::new(receiver);
                 let emitters = chosen.emitter.to_lanes();
                 sample_emitters(scene, others.to_bitmask(), &emitters, &receivers, &u, &mut samples);
-                sample = sample.with(others, samples.to_lanes(), probability);
+                sample = sample.with(others, samples.to_lanes(), probability, chosen.emitter);
             }
         }
         sample
+    }
+
+    /// The light of a sample by its [`LaneLightSample::source`].
+    pub fn light_of(&self, scene: &Scene, source: u32) -> LightId {
+        LightId(match source & ELSEWHERE {
+            0 => scene.light_choice.emitters[source as usize].0,
+            _ => self.elsewhere[(source & !ELSEWHERE) as usize].light,
+        })
+    }
+
+    /// One of the [`LaneLights::infinite_count`] infinite lights.
+    pub fn infinite_light(&self, position: usize) -> LightId {
+        LightId(self.elsewhere[self.infinite[position] as usize].light)
     }
 
     /// The position of a light that is everywhere, for [`LaneLights::sample_one`]; `None` for any other.

@@ -22,6 +22,11 @@ impl PlacedLight {
         Self { light: Box::new(light), placement }
     }
 
+    /// The light in the object.
+    pub(super) fn inner(&self) -> &Light {
+        &self.light
+    }
+
     pub(super) fn power(&self, scene_radius: f64) -> f64 {
         self.light.power(scene_radius)
     }

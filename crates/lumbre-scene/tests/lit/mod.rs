@@ -16,7 +16,8 @@ use lumbre_shading::Material;
 
 pub(crate) fn shining(index: u32, geometry: GeometryDesc, radiance: f32, two_sided: bool) -> ShapeDesc {
     let radiance = Rgb::splat(radiance);
-    let light = AreaLightDesc { radiance, image: None, by_vertices: false, two_sided, power: None };
+    let light =
+        AreaLightDesc { radiance, image: None, by_vertices: false, two_sided, power: None, spectrum: None };
     ShapeDesc {
         index,
         geometry,

@@ -10,8 +10,8 @@ use lumbre_math::glam::IVec3;
 use lumbre_math::{DVec3, Elementary, Transform};
 
 use crate::Spectrum;
-use crate::medium::{Cloud, DistanceSample, Grid, Passage, PassageNumbers, SparseGrid, Way};
-use crate::spectrum::BlackbodyColours;
+use crate::medium::{Cloud, DistanceSample, Grid, MediumSpectra, Passage, PassageNumbers, SparseGrid, Way};
+use crate::spectrum::{BlackbodyColours, Wavelengths};
 
 /// A medium that differs from place to place within a box; there is nothing outside of it.
 #[derive(Clone, Debug)]
@@ -23,6 +23,7 @@ pub struct HeterogeneousMedium {
     /// Henyey–Greenstein asymmetry.
     pub(super) asymmetry: f32,
     majorants: Majorants,
+    spectra: Option<Box<MediumSpectra>>,
 }
 
 /// A number for each place.
@@ -129,6 +130,20 @@ struct Local {
     scattering: Spectrum,
 }
 
+impl Local {
+    const BLACK: Self = Self { absorption: Spectrum::BLACK, scattering: Spectrum::BLACK };
+}
+
+/// What the channels of light are on a way: linear Rec. 709, or wavelengths.
+#[derive(Clone, Copy)]
+struct Channels<'w> {
+    wavelengths: Option<&'w Wavelengths>,
+    /// The coefficients at density 1, where they are in proportion to one.
+    unit: Local,
+    /// By how much majorants may be more.
+    of_majorant: f32,
+}
+
 /// Bounds on the extinction in cells of the medium's box.
 #[derive(Clone, Debug)]
 struct Majorants {
@@ -154,7 +169,41 @@ impl HeterogeneousMedium {
     ) -> Self {
         let bounds = [bounds[0].min(bounds[1]), bounds[0].max(bounds[1])];
         let majorants = Majorants::new(&coefficients, bounds);
-        Self { medium_from_world, bounds, coefficients, glow, asymmetry, majorants }
+        Self { medium_from_world, bounds, coefficients, glow, asymmetry, majorants, spectra: None }
+    }
+
+    /// With what is known by wavelength of coefficients in proportion to a density, and of a glow of one colour.
+    #[must_use]
+    pub fn with_spectra(self, spectra: Option<MediumSpectra>) -> Self {
+        Self { spectra: spectra.map(Box::new), ..self }
+    }
+
+    /// What channels are.
+    fn channels<'w>(&self, wavelengths: Option<&'w Wavelengths>) -> Channels<'w> {
+        let mut channels = Channels { wavelengths, unit: Local::BLACK, of_majorant: 1.0 };
+        if let Coefficients::Scaled { absorption, scattering, .. } = &self.coefficients {
+            channels.unit = Local { absorption: *absorption, scattering: *scattering };
+        }
+        let Some(wavelengths) = wavelengths else { return channels };
+        let Local { absorption, scattering } = channels.unit;
+        match self.coefficients {
+            Coefficients::Scaled { .. } => {
+                let [at_absorption, at_scattering] = MediumSpectra::coefficients(
+                    self.spectra.as_deref(),
+                    [absorption, scattering],
+                    wavelengths,
+                );
+                let most = (absorption + scattering).max_component();
+                if most > 0.0 {
+                    channels.of_majorant = (at_absorption + at_scattering).max_component() / most;
+                }
+                channels.unit = Local { absorption: at_absorption, scattering: at_scattering };
+            }
+            // A spectrum may be twice as large as the greatest channel of its colour, and that of absorption another than that of
+            // scattering.
+            Coefficients::Coloured { .. } => channels.of_majorant = 4.0,
+        }
+        channels
     }
 
     pub(super) fn glows(&self) -> bool {
@@ -178,20 +227,27 @@ impl HeterogeneousMedium {
     }
 
     /// See [`super::Medium::sample`].
-    pub(super) fn sample(&self, way: &Way, carried: Spectrum, numbers: &mut PassageNumbers) -> Passage {
+    pub(super) fn sample(
+        &self,
+        way: &Way,
+        carried: Spectrum,
+        numbers: &mut PassageNumbers,
+        wavelengths: Option<&Wavelengths>,
+    ) -> Passage {
+        let channels = self.channels(wavelengths);
         let mut weight = Spectrum::WHITE;
         let mut emitted = Spectrum::BLACK;
         let start = carried.max_component();
-        let mut tentative = self.tentative(way);
+        let mut tentative = self.tentative(way, channels.of_majorant);
         while let Some((t, majorant)) = tentative.next(numbers) {
             let p = tentative.point(t);
-            let Local { absorption, scattering } = self.at(p);
+            let Local { absorption, scattering } = self.at(p, &channels);
             let extinction = absorption + scattering;
             if extinction.is_black() {
                 continue;
             }
             if self.glows() {
-                emitted += weight * absorption * self.glow_at(p) / majorant;
+                emitted += weight * absorption * self.glow_at(p, wavelengths) / majorant;
             }
             let null = extinction.map(|extinction| (majorant - extinction).max(0.0));
             let carries = carried * weight;
@@ -216,11 +272,17 @@ impl HeterogeneousMedium {
 
     /// See [`super::Medium::transmittance`]: the product over all tentative collisions of what is not there (J. Novák and others,
     /// "Residual Ratio Tracking for Estimating Attenuation in Participating Media", ACM Transactions on Graphics 33, 2014).
-    pub(super) fn transmittance(&self, way: &Way, numbers: &mut PassageNumbers) -> Spectrum {
+    pub(super) fn transmittance(
+        &self,
+        way: &Way,
+        numbers: &mut PassageNumbers,
+        wavelengths: Option<&Wavelengths>,
+    ) -> Spectrum {
+        let channels = self.channels(wavelengths);
         let mut left = Spectrum::WHITE;
-        let mut tentative = self.tentative(way);
+        let mut tentative = self.tentative(way, channels.of_majorant);
         while let Some((t, majorant)) = tentative.next(numbers) {
-            let Local { absorption, scattering } = self.at(tentative.point(t));
+            let Local { absorption, scattering } = self.at(tentative.point(t), &channels);
             left *= (absorption + scattering).map(|extinction| (1.0 - extinction / majorant).max(0.0));
             let part = left.max_component();
             if !goes_on(&mut left, part, numbers) {
@@ -231,32 +293,44 @@ impl HeterogeneousMedium {
     }
 
     /// Absorption and scattering at a point of the medium's space, in its box.
-    fn at(&self, p: DVec3) -> Local {
+    fn at(&self, p: DVec3, channels: &Channels<'_>) -> Local {
         match &self.coefficients {
-            Coefficients::Scaled { density, absorption, scattering } => {
+            Coefficients::Scaled { density, .. } => {
                 let density = density.at(p, &self.bounds);
-                Local { absorption: *absorption * density, scattering: *scattering * density }
+                let Local { absorption, scattering } = channels.unit;
+                Local { absorption: absorption * density, scattering: scattering * density }
             }
             Coefficients::Coloured { absorption, scattering, scale } => {
                 let within = within(p, &self.bounds);
                 let of = |grid: &Option<Grid<Spectrum>>| {
-                    grid.as_ref().map_or(Spectrum::WHITE, |grid| grid.at(within)) * *scale
+                    let Some(grid) = grid else { return Spectrum::splat(*scale) };
+                    let colour = grid.at(within);
+                    channels.wavelengths.map_or(colour, |w| w.varied_coefficient(colour)) * *scale
                 };
                 Local { absorption: of(absorption), scattering: of(scattering) }
             }
         }
     }
 
-    fn glow_at(&self, p: DVec3) -> Spectrum {
+    fn glow_at(&self, p: DVec3, wavelengths: Option<&Wavelengths>) -> Spectrum {
         match &self.glow {
             Glow::None => Spectrum::BLACK,
-            Glow::Scaled { radiance, factor } => *radiance * factor.at(within(p, &self.bounds)),
-            Glow::Coloured { radiance, scale } => radiance.at(within(p, &self.bounds)) * *scale,
+            Glow::Scaled { radiance, factor } => {
+                let spectra = self.spectra.as_deref();
+                let radiance =
+                    wavelengths.map_or(*radiance, |w| MediumSpectra::glow_at(spectra, *radiance, w));
+                radiance * factor.at(within(p, &self.bounds))
+            }
+            Glow::Coloured { radiance, scale } => {
+                let colour = radiance.at(within(p, &self.bounds));
+                wavelengths.map_or(colour, |w| w.varied_light(colour)) * *scale
+            }
             Glow::Heat(heat) => {
                 let Heat { temperature, offset, scale, factor, colours } = &**heat;
                 let kelvin = (temperature.at(p, &self.bounds) - offset) * scale;
                 if kelvin > 100.0 {
-                    colours.at(kelvin) * factor.at(within(p, &self.bounds))
+                    let colour = wavelengths.map_or_else(|| colours.at(kelvin), |w| w.blackbody(kelvin));
+                    colour * factor.at(within(p, &self.bounds))
                 } else {
                     Spectrum::BLACK
                 }
@@ -264,11 +338,21 @@ impl HeterogeneousMedium {
         }
     }
 
-    fn tentative<'a>(&'a self, way: &Way) -> Tentative<'a> {
+    fn tentative<'a>(&'a self, way: &Way, of_majorant: f32) -> Tentative<'a> {
         let origin = self.medium_from_world.point(way.origin);
         let direction = self.medium_from_world.vector(way.direction);
         let cells = Cells::new(&self.majorants, &self.bounds, origin, direction, way.length);
-        Tentative { origin, direction, cells, at: 0.0, end: 0.0, majorant: 0.0, depth: None, count: 0 }
+        Tentative {
+            origin,
+            direction,
+            cells,
+            of_majorant,
+            at: 0.0,
+            end: 0.0,
+            majorant: 0.0,
+            depth: None,
+            count: 0,
+        }
     }
 }
 
@@ -405,6 +489,8 @@ struct Tentative<'a> {
     origin: DVec3,
     direction: DVec3,
     cells: Cells<'a>,
+    /// A factor on majorants.
+    of_majorant: f32,
     /// The part of the way that is still to go in the present cell.
     at: f64,
     end: f64,
@@ -433,6 +519,7 @@ impl Tentative<'_> {
             }
             depth -= ((self.end - self.at) * majorant).max(0.0);
             (self.at, self.end, self.majorant) = self.cells.next()?;
+            self.majorant *= self.of_majorant;
             depth = depth.max(0.0);
         }
     }
@@ -570,7 +657,7 @@ mod tests {
             if p.cmplt(medium.bounds[0]).any() || p.cmpgt(medium.bounds[1]).any() {
                 continue;
             }
-            let (local, glow) = (medium.at(p), medium.glow_at(p).to_array());
+            let (local, glow) = (medium.at(p, &medium.channels(None)), medium.glow_at(p, None).to_array());
             let (absorption, scattering) = (local.absorption.to_array(), local.scattering.to_array());
             for c in 0..3 {
                 let extinction = f64::from(absorption[c] + scattering[c]);
@@ -599,7 +686,7 @@ mod tests {
         for _ in 0..count {
             let mut numbers =
                 || PassageNumbers::new([random.next_f64(), random.next_f64()], random.next_u64());
-            let passage = medium.sample(&way, carried, &mut numbers());
+            let passage = medium.sample(&way, carried, &mut numbers(), None);
             add(2, passage.emitted);
             match passage.outcome {
                 DistanceSample::Through(weight) => add(0, weight),
@@ -608,7 +695,7 @@ mod tests {
                     add(1, weight);
                 }
             }
-            add(3, medium.transmittance(&way, &mut numbers()));
+            add(3, medium.transmittance(&way, &mut numbers(), None));
         }
         for (which, expected) in [(0, left), (1, scattered), (2, emitted), (3, left)] {
             for (sum, expected) in sums[which].iter().zip(expected.to_array()) {
@@ -626,7 +713,7 @@ mod tests {
         for _ in 0..50_000 {
             let u = DVec3::new(random.next_f64(), random.next_f64(), random.next_f64());
             let p = medium.bounds[0] + u * (medium.bounds[1] - medium.bounds[0]);
-            let Local { absorption, scattering } = medium.at(p);
+            let Local { absorption, scattering } = medium.at(p, &medium.channels(None));
             let size = medium.majorants.size;
             let cell = (u * DVec3::from_array(size.map(|n| n as f64))).floor().as_usizevec3();
             let most = medium.majorants.most[(cell.z * size[1] + cell.y) * size[0] + cell.x];
@@ -639,9 +726,9 @@ mod tests {
         let medium = medium();
         let numbers = || PassageNumbers::new([0.5, 0.0], 3);
         let away = Way { origin: DVec3::splat(100.0), direction: DVec3::X, length: f64::INFINITY };
-        assert_eq!(medium.transmittance(&away, &mut numbers()), Spectrum::WHITE);
+        assert_eq!(medium.transmittance(&away, &mut numbers(), None), Spectrum::WHITE);
         let through = Way { length: f64::INFINITY, ..way() };
-        assert!(medium.transmittance(&through, &mut numbers()).is_finite());
+        assert!(medium.transmittance(&through, &mut numbers(), None).is_finite());
         let dense = HeterogeneousMedium::new(
             Transform::IDENTITY,
             [DVec3::ZERO, DVec3::ONE],
@@ -654,8 +741,8 @@ mod tests {
             Glow::None,
         );
         let way = Way { origin: DVec3::new(-1.0, 0.5, 0.5), direction: DVec3::X, length: f64::INFINITY };
-        let passage = dense.sample(&way, Spectrum::WHITE, &mut numbers());
+        let passage = dense.sample(&way, Spectrum::WHITE, &mut numbers(), None);
         assert!(matches!(passage.outcome, DistanceSample::Collision { .. }), "{passage:?}");
-        assert_eq!(dense.transmittance(&way, &mut numbers()), Spectrum::BLACK);
+        assert_eq!(dense.transmittance(&way, &mut numbers(), None), Spectrum::BLACK);
     }
 }

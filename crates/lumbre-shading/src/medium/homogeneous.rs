@@ -2,7 +2,9 @@
 
 use lumbre_math::Elementary;
 
+use super::spectra::MediumSpectra;
 use crate::Spectrum;
+use crate::spectrum::Wavelengths;
 
 /// A homogeneous medium.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +33,18 @@ pub enum DistanceSample {
 }
 
 impl HomogeneousMedium {
+    /// The same at some wavelengths, if there are any.
+    pub(super) fn at(&self, spectra: Option<&MediumSpectra>, wavelengths: Option<&Wavelengths>) -> Self {
+        let Some(wavelengths) = wavelengths else { return *self };
+        let scattering = self.extinction * self.albedo;
+        let absorption = self.extinction * (Spectrum::WHITE - self.albedo);
+        let [absorption, scattering] =
+            MediumSpectra::coefficients(spectra, [absorption, scattering], wavelengths);
+        let extinction = absorption + scattering;
+        let albedo = scattering.zip(extinction, |s, t| if t > 0.0 { s / t } else { 0.0 });
+        Self { extinction, albedo, ..*self }
+    }
+
     /// What is left of light after a distance, which may be infinite.
     pub fn transmittance(&self, distance: f64) -> Spectrum {
         self.extinction.map(|sigma| left_after(sigma.into(), distance) as f32)

@@ -10,11 +10,13 @@ mod homogeneous;
 mod phase;
 mod presets;
 mod sparse;
+mod spectra;
 
 use lumbre_math::DVec3;
 use lumbre_math::random::RandomStream;
 
 use crate::Spectrum;
+use crate::spectrum::Wavelengths;
 
 pub use cloud::Cloud;
 pub use grid::{Grid, GridError, Voxel};
@@ -23,6 +25,7 @@ pub use homogeneous::{DistanceSample, HomogeneousMedium, albedo_of_many_collisio
 pub use phase::{henyey_greenstein, sample_henyey_greenstein, sample_henyey_greenstein_lanes};
 pub use presets::{preset, preset_names};
 pub use sparse::{Brick, SparseGrid, SparseGridError};
+pub use spectra::MediumSpectra;
 
 /// A participating medium.
 #[derive(Clone, Debug)]
@@ -33,6 +36,8 @@ pub enum Medium {
         medium: HomogeneousMedium,
         /// The radiance that it tends to where it is deep and does not scatter: it emits σ_a times this per unit of length.
         glow: Spectrum,
+        /// What is known of both by wavelength.
+        spectra: Option<Box<MediumSpectra>>,
     },
     /// By place.
     Heterogeneous(Box<HeterogeneousMedium>),
@@ -120,22 +125,46 @@ impl Medium {
         }
     }
 
-    /// Samples where light of throughput `carried` scatters along a way, if it does.
-    pub fn sample(&self, way: &Way, carried: Spectrum, mut numbers: PassageNumbers) -> Passage {
+    /// Samples where light of throughput `carried` scatters along a way, if it does. Channels are those of linear Rec. 709, or the
+    /// wavelengths that are given.
+    pub fn sample(
+        &self,
+        way: &Way,
+        carried: Spectrum,
+        mut numbers: PassageNumbers,
+        wavelengths: Option<&Wavelengths>,
+    ) -> Passage {
         match self {
-            Self::Homogeneous { medium, glow } => Passage {
-                outcome: medium.sample_distance(carried, way.length, numbers.first()),
-                emitted: if glow.is_black() { *glow } else { *glow * medium.absorbed(way.length) },
-            },
-            Self::Heterogeneous(medium) => medium.sample(way, carried, &mut numbers),
+            Self::Homogeneous { medium, glow, spectra } => {
+                let spectra = spectra.as_deref();
+                let medium = medium.at(spectra, wavelengths);
+                let glow = match wavelengths {
+                    Some(wavelengths) if !glow.is_black() => {
+                        MediumSpectra::glow_at(spectra, *glow, wavelengths)
+                    }
+                    _ => *glow,
+                };
+                Passage {
+                    outcome: medium.sample_distance(carried, way.length, numbers.first()),
+                    emitted: if glow.is_black() { glow } else { glow * medium.absorbed(way.length) },
+                }
+            }
+            Self::Heterogeneous(medium) => medium.sample(way, carried, &mut numbers, wavelengths),
         }
     }
 
     /// What is left of light at the end of a way; where the medium is not the same everywhere, an estimate of it.
-    pub fn transmittance(&self, way: &Way, mut numbers: PassageNumbers) -> Spectrum {
+    pub fn transmittance(
+        &self,
+        way: &Way,
+        mut numbers: PassageNumbers,
+        wavelengths: Option<&Wavelengths>,
+    ) -> Spectrum {
         match self {
-            Self::Homogeneous { medium, .. } => medium.transmittance(way.length),
-            Self::Heterogeneous(medium) => medium.transmittance(way, &mut numbers),
+            Self::Homogeneous { medium, spectra, .. } => {
+                medium.at(spectra.as_deref(), wavelengths).transmittance(way.length)
+            }
+            Self::Heterogeneous(medium) => medium.transmittance(way, &mut numbers, wavelengths),
         }
     }
 }

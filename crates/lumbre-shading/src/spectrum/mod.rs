@@ -4,15 +4,23 @@
 //! read, with the CIE 1931 standard observer between 360 and 830 nm.
 
 mod fluorescent;
+mod light_curve;
 mod named;
 mod observer;
+mod sensor;
+mod sigmoid;
+mod wavelengths;
 mod white_point;
 
 use std::sync::LazyLock;
 
+pub use light_curve::LightCurve;
 use lumbre_math::Elementary;
 pub use named::NamedSpectrum;
 use observer::{FIRST_NM, LAST_NM, MATCHING, STEP_NM};
+pub use sensor::SensorCurves;
+pub use sigmoid::Sigmoid;
+pub use wavelengths::{SpectralLookup, Wavelengths};
 pub use white_point::white_point;
 
 use crate::Spectrum;

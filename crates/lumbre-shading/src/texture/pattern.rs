@@ -101,6 +101,7 @@ mod tests {
             duv_dx: Vec2::ZERO,
             duv_dy: Vec2::ZERO,
             vertex: VertexData::NONE,
+            spectral: None,
         }
     }
 

@@ -3,7 +3,7 @@
 use std::f32::consts::FRAC_1_PI;
 
 use lumbre_math::DVec3;
-use lumbre_simd::{Double, MAX_LANES, Mask, Real, V3, math};
+use lumbre_simd::{Double, MAX_LANES, Mask, Real, UInt, V3, math};
 
 use super::scalar::{self, Receivers, Samples, lanes_of};
 use super::tree::{LanePlace, SLACK};
@@ -108,6 +108,7 @@ impl LaneElsewhere {
             pdf: R::zero(),
             delta: none,
             valid: active,
+            source: R::UInt::splat(0),
         };
         match (self.kind, &scene.lights[self.light as usize]) {
             (Kind::Uniform { radiance }, _) => {

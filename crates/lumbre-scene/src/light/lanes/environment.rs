@@ -284,6 +284,7 @@ impl Environment {
             radiance,
             pdf,
             delta: R::Mask::splat(false),
+            source: R::UInt::splat(0),
             valid: active
                 & pdf.simd_gt(R::zero())
                 & pdf.is_finite()

@@ -164,6 +164,7 @@ pub(super) fn sample<R: Real>(
         radiance,
         pdf,
         delta: none,
+        source: R::UInt::splat(0),
         valid: active
             & shines
             & squared.simd_gt(R::zero())

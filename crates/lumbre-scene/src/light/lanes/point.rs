@@ -38,6 +38,7 @@ pub(super) fn sample<R: Real>(
         radiance,
         pdf: R::zero(),
         delta: active,
+        source: R::UInt::splat(0),
         valid: active
             & share.simd_gt(R::zero())
             & squared.simd_gt(R::zero())

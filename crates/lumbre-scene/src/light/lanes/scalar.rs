@@ -2,7 +2,7 @@
 
 use lumbre_math::{DVec2, DVec3};
 use lumbre_shading::Scatter;
-use lumbre_simd::{Double, MAX_LANES, Mask, Real, V3};
+use lumbre_simd::{Double, MAX_LANES, Mask, Real, UInt, V3};
 
 use super::{LaneLightSample, Receiver};
 use crate::light::{LightSample, Place};
@@ -101,6 +101,7 @@ impl Samples {
             pdf: R::from_lanes(&self.pdf),
             delta: R::Mask::from_bitmask(self.delta),
             valid: R::Mask::from_bitmask(self.valid),
+            source: R::UInt::splat(0),
         }
     }
 }
