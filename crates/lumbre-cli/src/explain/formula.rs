@@ -3,6 +3,8 @@
 use std::collections::HashMap;
 use std::fmt::Write;
 
+use super::document::Value;
+
 /// A piece of a formula.
 #[derive(Clone, Debug, PartialEq)]
 enum Token {
@@ -22,7 +24,7 @@ enum Token {
 const FUNCTIONS: [&str; 8] = ["min", "max", "sin", "cos", "tan", "atan2", "det", "sign"];
 
 /// Subscripts with the characters that they stand for.
-const SUBSCRIPTS: [(char, char); 23] = [
+const SUBSCRIPTS: [(char, char); 25] = [
     ('₀', '0'),
     ('₁', '1'),
     ('₂', '2'),
@@ -44,6 +46,8 @@ const SUBSCRIPTS: [(char, char); 23] = [
     ('ₙ', 'n'),
     ('ₒ', 'o'),
     ('ₚ', 'p'),
+    ('ᵣ', 'r'),
+    ('ₛ', 's'),
     ('ₓ', 'x'),
     ('ₜ', 't'),
 ];
@@ -150,20 +154,38 @@ fn tokens(formula: &str) -> Vec<Token> {
 
 /// What the symbols of a formula stand for, each written as it is put in its place.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Scope(HashMap<String, String>);
+pub(super) struct Scope(HashMap<String, Entry>);
+
+/// What a symbol stands for, and whether a digit of it is left out.
+#[derive(Clone, Debug)]
+struct Entry {
+    written: String,
+    is_rounded: bool,
+}
+
+/// A formula with numbers in it.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct PutIn {
+    pub(super) written: String,
+    /// Whether digits of the numbers are left out, so that it is nearly equal.
+    pub(super) is_rounded: bool,
+}
 
 impl Scope {
     /// Gives a symbol a value from here on.
-    pub(super) fn set(&mut self, symbol: &str, written: String) {
-        self.0.insert(symbol.to_owned(), written);
+    pub(super) fn set(&mut self, symbol: &str, value: &Value) {
+        let written = value.in_short();
+        let is_rounded = written != value.in_full();
+        self.0.insert(symbol.to_owned(), Entry { written, is_rounded });
     }
 
     /// The formula with the numbers in it; `None` where that says nothing new.
-    pub(super) fn put_in(&self, formula: &str) -> Option<String> {
+    pub(super) fn put_in(&self, formula: &str) -> Option<PutIn> {
         let tokens = tokens(formula);
         let mut written = String::new();
         let mut is_changed = false;
         let mut is_whole = true;
+        let mut is_any_rounded = false;
         for (i, token) in tokens.iter().enumerate() {
             let Token::Symbol { base, .. } = token else {
                 plain(token, &mut written);
@@ -172,8 +194,9 @@ impl Scope {
             let mut symbol = String::new();
             plain(token, &mut symbol);
             match self.0.get(&symbol) {
-                Some(number) => {
+                Some(Entry { written: number, is_rounded }) => {
                     is_changed = true;
+                    is_any_rounded |= is_rounded;
                     let is_first = written.trim_end().is_empty() || written.ends_with(['(', '|', '√']);
                     let is_raised = matches!(tokens.get(i + 1), Some(Token::Power(_)));
                     let is_negative = number.starts_with('-');
@@ -189,7 +212,7 @@ impl Scope {
                 }
             }
         }
-        (is_changed && is_whole).then_some(written)
+        (is_changed && is_whole).then_some(PutIn { written, is_rounded: is_any_rounded })
     }
 }
 
@@ -323,6 +346,11 @@ fn closings(tokens: &[Token]) -> Closings {
     found
 }
 
+/// The sign between what stands before and its result: numbers that were rounded are nearly equal to it.
+pub(super) fn sign_after(written: &str) -> &'static str {
+    if written.contains('≈') { "≈" } else { "=" }
+}
+
 /// Text with the characters replaced that mean something in HTML.
 pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
@@ -405,18 +433,21 @@ mod tests {
     #[test]
     fn numbers_take_the_place_of_symbols() {
         let mut scope = Scope::default();
-        scope.set("h", "-5".to_owned());
-        scope.set("a", "1".to_owned());
-        scope.set("c", "24".to_owned());
-        scope.set("t₁", "4".to_owned());
-        scope.set("O", "(0, 0, -5)".to_owned());
-        assert_eq!(scope.put_in("h² − a·c").as_deref(), Some("(-5)² − 1·24"));
-        assert_eq!(scope.put_in("a − h").as_deref(), Some("1 − (-5)"));
-        assert_eq!(scope.put_in("h − √(h)").as_deref(), Some("-5 − √(-5)"));
-        assert_eq!(scope.put_in("max(a, t₁)").as_deref(), Some("max(1, 4)"));
+        for (symbol, number) in [("h", -5.0), ("a", 1.0), ("c", 24.0), ("t₁", 4.0)] {
+            scope.set(symbol, &Value::from(number));
+        }
+        scope.set("x₀", &Value::from(1.0 / 3.0));
+        let put_in = |formula: &str| scope.put_in(formula).map(|it| (it.written, it.is_rounded));
+        let exactly = |written: &str| Some((written.to_owned(), false));
+        assert_eq!(put_in("h² − a·c"), exactly("(-5)² − 1·24"));
+        assert_eq!(put_in("a − h"), exactly("1 − (-5)"));
+        assert_eq!(put_in("h − √(h)"), exactly("-5 − √(-5)"));
+        assert_eq!(put_in("max(a, t₁)"), exactly("max(1, 4)"));
+        // Six digits of a third are not all of them.
+        assert_eq!(put_in("a + x₀"), Some(("1 + 0.333333".to_owned(), true)));
         // What is only partly known says nothing.
-        assert_eq!(scope.put_in("a + x"), None);
-        assert_eq!(scope.put_in("2·3"), None);
+        assert_eq!(put_in("a + x"), None);
+        assert_eq!(put_in("2·3"), None);
     }
 
     #[test]

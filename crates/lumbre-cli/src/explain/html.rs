@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::document::{Item, Quantity, Section, Value};
-use super::formula::{escaped, mathml};
+use super::formula::{escaped, mathml, sign_after};
 
 const STYLE: &str = "
 :root { color-scheme: light dark; --line: #8884; --weak: light-dark(#5c6370, #a9b0bb); --mark: #b50; }
@@ -75,30 +75,27 @@ fn write_section(section: &Section, level: usize, schoolbook: &str, out: &mut St
 }
 
 fn write_quantity(quantity: &Quantity, schoolbook: &str, out: &mut String) {
-    let Quantity { symbol, label, formula, numbers, value, .. } = quantity;
+    let Quantity { symbol, label, value, .. } = quantity;
     let label_after = if label.is_empty() || symbol.is_empty() {
         String::new()
     } else {
         format!(" <span class=\"label\">{}</span>", escaped(label))
     };
     let before = if symbol.is_empty() { format!("{}: ", escaped(label)) } else { String::new() };
-    let mut formulas: Vec<&str> = [symbol.as_str(), formula, numbers.as_deref().unwrap_or("")]
-        .into_iter()
-        .filter(|part| !part.is_empty())
-        .collect();
-    formulas.dedup();
-    let equals = if symbol.is_empty() { "" } else { " = " };
+    let chain = quantity.chain();
+    let parts = chain.iter().map(|(part, sign)| format!("{} {sign} ", mathml(part)));
     // A table cannot stand in a paragraph.
     let (open, close) =
         if value.rows().is_some() { ("<div class=\"wide\">", "</div>") } else { ("<p>", "</p>") };
     let _ = writeln!(
         out,
-        "{open}{before}{}{equals}{}{label_after}{close}",
-        formulas.iter().map(|part| mathml(part)).collect::<Vec<_>>().join(" = "),
+        "{open}{before}{}{}{label_after}{close}",
+        parts.collect::<String>(),
         shown(value)
     );
     if let Some((formula, value)) = &quantity.schoolbook {
-        let _ = writeln!(out, "<p class=\"book\">{schoolbook}: {} = {}</p>", mathml(formula), shown(value));
+        let sign = sign_after(formula);
+        let _ = writeln!(out, "<p class=\"book\">{schoolbook}: {} {sign} {}</p>", mathml(formula), shown(value));
     }
 }
 

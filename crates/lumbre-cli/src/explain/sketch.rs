@@ -25,7 +25,7 @@ pub(super) struct Scenery {
 
 impl Scenery {
     /// Adds the lines of constant u and v of a shape under a map to the world, which is met at a surface there.
-    pub(super) fn add(&mut self, shape: &Shape, map: &Transform, met: &Surface) {
+    pub(super) fn add(&mut self, shape: &Shape, map: &Transform, met: Option<&Surface>) {
         let before = self.lines.len();
         if shape.bounds(&Transform::IDENTITY).is_some() {
             for part in 0..PARTS {
@@ -35,6 +35,11 @@ impl Scenery {
         if self.lines.len() == before {
             self.lines.extend(boxed(shape, map, met));
         }
+    }
+
+    /// Whether there is anything to draw.
+    pub(super) fn is_anything(&self) -> bool {
+        !self.lines.is_empty()
     }
 }
 
@@ -63,7 +68,7 @@ fn lines_of(shape: &Shape, part: u32, map: &Transform) -> Vec<Vec<DVec3>> {
 }
 
 /// The edges of a shape's box; of an infinite shape, a square about where it was met.
-fn boxed(shape: &Shape, map: &Transform, met: &Surface) -> Vec<Vec<DVec3>> {
+fn boxed(shape: &Shape, map: &Transform, met: Option<&Surface>) -> Vec<Vec<DVec3>> {
     if let Some(bounds) = shape.bounds(map) {
         let corner = |i: usize| {
             let pick = |axis: usize| if i >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
@@ -73,6 +78,7 @@ fn boxed(shape: &Shape, map: &Transform, met: &Surface) -> Vec<Vec<DVec3>> {
             .flat_map(|i| (0..3).filter(move |axis| i >> axis & 1 == 0).map(move |axis| (i, i | 1 << axis)));
         return edges.map(|(from, to)| vec![corner(from), corner(to)]).collect();
     }
+    let Some(met) = met else { return Vec::new() };
     let place = met.point;
     let size = place.length().max(1.0) * 0.5;
     let frame = Frame::from_z(met.normal);
@@ -108,7 +114,11 @@ pub(super) fn svg(
     }
     // The ray begins in the picture, if need be nearer than it does.
     let extent = (high - low).length().max(1e-9);
-    let first = hits.first().map_or(ray.at(1.0), |(point, _)| *point);
+    // Past what it misses, the ray is drawn where it is nearest to the middle of that.
+    let things = scenery.lines.iter().flatten().copied();
+    let (sum, count) = things.fold((DVec3::ZERO, 0.0), |(sum, count), p| (sum + p, count + 1.0));
+    let nearest = if count > 0.0 { (sum / count - ray.origin).dot(along).max(0.0) } else { 1.0 };
+    let first = hits.first().map_or(ray.origin + nearest * along, |(point, _)| *point);
     let last = hits.last().map_or(first, |(point, _)| *point);
     let from = (first - ray.origin).length().min(0.7 * extent);
     let (start, end) = (first - from * along, last + 0.25 * extent * along);

@@ -1,6 +1,6 @@
 //! What the shapes of a file are called, and what they are made of.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use lumbre::SceneDesc;
 use lumbre::description::{GeometryDesc, ShapeDesc};
@@ -25,8 +25,9 @@ type Parameter = (String, Option<Vec<f64>>);
 /// A material of a file.
 #[derive(Clone, Debug)]
 pub(super) struct Substance {
-    /// Its name and kind.
-    pub(super) name: String,
+    /// Its name, if it has one, and its kind.
+    pub(super) name: Option<String>,
+    pub(super) kind: &'static str,
     /// Its parameters.
     pub(super) parameters: Vec<Parameter>,
 }
@@ -42,7 +43,7 @@ impl Things {
         let materials = desc.materials.iter().enumerate().map(|(index, named)| {
             let called = named.name.clone().unwrap_or_else(|| index.to_string());
             let parameters = by_owner.remove(&format!("material.{called}.")).unwrap_or_default();
-            Substance { name: named.label(), parameters }
+            Substance { name: named.name.clone(), kind: named.material.kind.name(), parameters }
         });
         let materials = materials.collect();
         let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);
@@ -62,6 +63,19 @@ impl Things {
     /// What kind of shape has this number, in the words of the scene language; the ground is of no file.
     pub(super) fn kind(&self, shape: u32) -> &'static str {
         self.shapes.get(&shape).map_or("ground", |thing| thing.kind)
+    }
+
+    /// Whether a shape is asked for by this name: its number, its kind, or the name of its material.
+    pub(super) fn is_called(&self, shape: u32, name: &str) -> bool {
+        let material = self.material(shape).and_then(|material| material.name.as_deref());
+        name.parse() == Ok(shape) || self.kind(shape) == name || material == Some(name)
+    }
+
+    /// The names by which the shapes of the file can be asked for, beside their numbers.
+    pub(super) fn names(&self) -> BTreeSet<&str> {
+        let kinds = self.shapes.values().map(|thing| thing.kind);
+        let materials = self.shapes.keys().filter_map(|shape| self.material(*shape)?.name.as_deref());
+        kinds.chain(materials).collect()
     }
 
     /// What a shape is made of.
