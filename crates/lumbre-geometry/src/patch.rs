@@ -526,7 +526,8 @@ impl Sheared {
     /// Whether the ray runs along the ruling `u`: seen along the ray, the ruling is a point.
     pub(crate) fn runs_along_ruling(&self, u: f64) -> bool {
         let [first, last] = [0.0, 1.0].map(|v| self.at(DVec2::new(u, v)));
-        let size = self.corners.iter().fold(0.0_f64, |most, corner| most.max(corner.x.abs().max(corner.y.abs())));
+        let size =
+            self.corners.iter().fold(0.0_f64, |most, corner| most.max(corner.x.abs().max(corner.y.abs())));
         let is_centred = |p: DVec3| p.x.abs().max(p.y.abs()) <= 1e-14 * size;
         size > 0.0 && is_centred(first) && is_centred(last)
     }

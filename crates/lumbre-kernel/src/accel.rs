@@ -24,7 +24,6 @@ use crate::point::winding::{self, NoWindingNumber};
 use crate::point::{closest_point, inside};
 use crate::query::Query;
 use crate::ray32::{Hit32, Ray32};
-use crate::{listing, surface};
 use crate::trace::f32_ray::{self, F32Queries};
 use crate::trace::filtered::{self, Queries};
 use crate::trace::stack::{AnyHit, ClosestHit};
@@ -35,6 +34,7 @@ use crate::tree::geometry::Placement;
 use crate::tree::moments::Moments;
 use crate::tree::picture_start::PictureRounding;
 use crate::tree::{Geometry, Instance, Tree};
+use crate::{listing, surface};
 
 /// A bounding volume hierarchy over geometries, ready for queries from any number of threads.
 ///

@@ -20,11 +20,7 @@ pub(crate) fn each(tree: &Tree, visit: &mut impl FnMut(&Hit) -> ControlFlow<()>)
     within(tree, &mut hit, visit)
 }
 
-fn within(
-    tree: &Tree,
-    hit: &mut Hit,
-    visit: &mut impl FnMut(&Hit) -> ControlFlow<()>,
-) -> ControlFlow<()> {
+fn within(tree: &Tree, hit: &mut Hit, visit: &mut impl FnMut(&Hit) -> ControlFlow<()>) -> ControlFlow<()> {
     for (position, geometry) in tree.geometries.iter().enumerate() {
         let count = match &geometry.kind {
             GeometryKind::Shape(_) => 1,

@@ -143,18 +143,28 @@ fn projection(kind: &CameraKind, view: &CameraView, (width, height): (u32, u32))
     let (dx, dy) = (-(right + left) / (right - left), -(top + bottom) / (top - bottom));
     let depth = FAR - NEAR;
     match kind {
-        CameraKind::Perspective { .. } => Some(rows4([
-            [x, 0.0, dx, 0.0],
-            [0.0, y, dy, 0.0],
-            [0.0, 0.0, (FAR + NEAR) / depth, -2.0 * FAR * NEAR / depth],
-            [0.0, 0.0, 1.0, 0.0],
-        ].concat().try_into().ok()?)),
-        CameraKind::Orthographic { .. } => Some(rows4([
-            [x, 0.0, 0.0, dx],
-            [0.0, y, 0.0, dy],
-            [0.0, 0.0, 2.0 / depth, -(FAR + NEAR) / depth],
-            [0.0, 0.0, 0.0, 1.0],
-        ].concat().try_into().ok()?)),
+        CameraKind::Perspective { .. } => Some(rows4(
+            [
+                [x, 0.0, dx, 0.0],
+                [0.0, y, dy, 0.0],
+                [0.0, 0.0, (FAR + NEAR) / depth, -2.0 * FAR * NEAR / depth],
+                [0.0, 0.0, 1.0, 0.0],
+            ]
+            .concat()
+            .try_into()
+            .ok()?,
+        )),
+        CameraKind::Orthographic { .. } => Some(rows4(
+            [
+                [x, 0.0, 0.0, dx],
+                [0.0, y, 0.0, dy],
+                [0.0, 0.0, 2.0 / depth, -(FAR + NEAR) / depth],
+                [0.0, 0.0, 0.0, 1.0],
+            ]
+            .concat()
+            .try_into()
+            .ok()?,
+        )),
         CameraKind::Spherical { .. } | CameraKind::Realistic(_) => None,
     }
 }
@@ -204,8 +214,8 @@ pub(super) fn given(ray: &Ray, texts: &Texts) -> Section {
 
 #[cfg(test)]
 mod tests {
-    use lumbre::math::random::RandomStream;
     use lumbre::SceneDesc;
+    use lumbre::math::random::RandomStream;
 
     use super::*;
 
@@ -221,8 +231,14 @@ mod tests {
                     r#""orthographic" "float screenwindow" [-3 3 -2 2]"#,
                     r#""orthographic" "float screenwindow" [-1 5 -4 0] "float lensradius" 0.2 "float focaldistance" 7"#,
                 ] {
-                    let text = format!("{hand}{look} Camera {kind} Film \"rgb\" \"integer xresolution\" 90 \"integer yresolution\" 60 WorldBegin Shape \"sphere\"");
-                    let folder = std::env::temp_dir().join(format!("lumbre-camera-{}-{}", std::process::id(), all.len()));
+                    let text = format!(
+                        "{hand}{look} Camera {kind} Film \"rgb\" \"integer xresolution\" 90 \"integer yresolution\" 60 WorldBegin Shape \"sphere\""
+                    );
+                    let folder = std::env::temp_dir().join(format!(
+                        "lumbre-camera-{}-{}",
+                        std::process::id(),
+                        all.len()
+                    ));
                     std::fs::write(&folder, &text).expect("a file");
                     let path = folder.with_extension("pbrt");
                     std::fs::rename(&folder, &path).expect("a name");

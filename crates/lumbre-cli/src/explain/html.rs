@@ -87,15 +87,11 @@ fn write_quantity(quantity: &Quantity, schoolbook: &str, out: &mut String) {
     // A table cannot stand in a paragraph.
     let (open, close) =
         if value.rows().is_some() { ("<div class=\"wide\">", "</div>") } else { ("<p>", "</p>") };
-    let _ = writeln!(
-        out,
-        "{open}{before}{}{}{label_after}{close}",
-        parts.collect::<String>(),
-        shown(value)
-    );
+    let _ = writeln!(out, "{open}{before}{}{}{label_after}{close}", parts.collect::<String>(), shown(value));
     if let Some((formula, value)) = &quantity.schoolbook {
         let sign = sign_after(formula);
-        let _ = writeln!(out, "<p class=\"book\">{schoolbook}: {} {sign} {}</p>", mathml(formula), shown(value));
+        let _ =
+            writeln!(out, "<p class=\"book\">{schoolbook}: {} {sign} {}</p>", mathml(formula), shown(value));
     }
 }
 

@@ -49,7 +49,8 @@ impl Question<'_> {
         let mut section = camera::camera(camera, whole, pixel, &sample, self.texts);
         section.fact(self.texts.sample, f64::from(self.sample));
         section.fact(self.texts.weight, sample.weight);
-        let exposed = light::Exposed { radiance: sample.radiance, exposure: options.exposure, weight: sample.weight };
+        let exposed =
+            light::Exposed { radiance: sample.radiance, exposure: options.exposure, weight: sample.weight };
         self.along(section, scene, options, &sample.ray, Some(exposed), sample.radiance, &sample.events)
     }
 

@@ -39,7 +39,8 @@ pub(super) fn tell(
     }
     if !explanation.candidates.is_empty() {
         let mut crossings = Section::new("crossings", texts.fates);
-        let names: Vec<&str> = explanation.operands.iter().map(|operand| (texts.kind_of)(operand.name)).collect();
+        let names: Vec<&'static str> =
+            explanation.operands.iter().map(|operand| (texts.kind_of)(operand.name)).collect();
         crossings.items.push(candidates(&explanation.candidates, &names, texts));
         section.sections.push(crossings);
     }
@@ -91,7 +92,7 @@ fn tell_step(
     section
 }
 
-fn candidates(candidates: &[Candidate], operands: &[&str], texts: &Texts) -> Item {
+fn candidates(candidates: &[Candidate], operands: &[&'static str], texts: &Texts) -> Item {
     let name = |operand: usize| operands.get(operand).copied().unwrap_or_default();
     let column = |key, title: &str| Column { key, title: title.to_owned() };
     let columns = vec![

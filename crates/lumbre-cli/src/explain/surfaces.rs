@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
+use lumbre::description::Footprint;
 use lumbre::geometry::{Curves, Shape, Triangle};
 use lumbre::kernel::{Hit, Target, TargetShape};
-use lumbre::description::Footprint;
 use lumbre::math::Elementary;
 use lumbre::math::glam::{DMat3, DMat4};
 use lumbre::math::matrix::affine4;
@@ -430,19 +430,37 @@ mod tests {
             (scale(-1.0, -2.0, -3.0), [-1.0, -2.0, -3.0], [0.0; 3]),
             (turn(DVec3::Z, 30.0) * scale(-1.0, 2.0, 3.0), [-1.0, 2.0, 3.0], [0.0, 0.0, 30.0]),
             (turn(DVec3::Z, 180.0), [1.0; 3], [0.0, 0.0, 180.0]),
-            (turn(DVec3::Z, 20.0) * turn(DVec3::Y, -40.0) * turn(DVec3::X, 70.0), [1.0; 3], [70.0, -40.0, 20.0]),
+            (
+                turn(DVec3::Z, 20.0) * turn(DVec3::Y, -40.0) * turn(DVec3::X, 70.0),
+                [1.0; 3],
+                [70.0, -40.0, 20.0],
+            ),
             // At the poles x ∓ z is all that there is.
             (turn(DVec3::Z, 20.0) * turn(DVec3::Y, 90.0) * turn(DVec3::X, 70.0), [1.0; 3], [50.0, 90.0, 0.0]),
-            (turn(DVec3::Z, 20.0) * turn(DVec3::Y, -90.0) * turn(DVec3::X, 70.0), [1.0; 3], [90.0, -90.0, 0.0]),
+            (
+                turn(DVec3::Z, 20.0) * turn(DVec3::Y, -90.0) * turn(DVec3::X, 70.0),
+                [1.0; 3],
+                [90.0, -90.0, 0.0],
+            ),
         ] {
             let parts = decomposed(&map).expect("no shear");
-            assert!((parts.scale - DVec3::from_array(sizes)).length() < 1e-12, "{} for {sizes:?}", parts.scale);
-            assert!((parts.angles - DVec3::from_array(angles)).length() < 1e-9, "{} for {angles:?}", parts.angles);
+            assert!(
+                (parts.scale - DVec3::from_array(sizes)).length() < 1e-12,
+                "{} for {sizes:?}",
+                parts.scale
+            );
+            assert!(
+                (parts.angles - DVec3::from_array(angles)).length() < 1e-9,
+                "{} for {angles:?}",
+                parts.angles
+            );
             assert_eq!(parts.is_at_pole, parts.angles.y.abs() == 90.0);
             // The parts are the map.
             let again = [(DVec3::X, parts.angles.x), (DVec3::Y, parts.angles.y), (DVec3::Z, parts.angles.z)]
                 .into_iter()
-                .fold(Transform::scale(parts.scale).expect("not singular"), |inner, (axis, angle)| turn(axis, angle) * inner);
+                .fold(Transform::scale(parts.scale).expect("not singular"), |inner, (axis, angle)| {
+                    turn(axis, angle) * inner
+                });
             let off = (again.linear() - map.linear()).to_cols_array();
             assert!(off.iter().all(|entry| entry.abs() < 1e-12), "{off:?}");
         }

@@ -190,7 +190,11 @@ fn markdown_of(quantity: &Quantity, schoolbook: &str) -> String {
         (None, false) => format!("- ${}${label_after}", latex(&chain(quantity, &value.in_full()))),
     };
     if let Some((formula, value)) = &quantity.schoolbook {
-        let _ = write!(line, "\n  - {schoolbook}: ${}$", latex(&format!("{formula} {} {}", sign_after(formula), value.in_full())));
+        let _ = write!(
+            line,
+            "\n  - {schoolbook}: ${}$",
+            latex(&format!("{formula} {} {}", sign_after(formula), value.in_full()))
+        );
     }
     line
 }

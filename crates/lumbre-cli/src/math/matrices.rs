@@ -40,10 +40,22 @@ fn transpose(call: &mut Call) -> Result<Value, Wrong> {
 macro_rules! of_size {
     ($m:expr, $rows:ident => $body:expr) => {
         match $m.rows {
-            1 => { let $rows = rows::<1>($m); $body }
-            2 => { let $rows = rows::<2>($m); $body }
-            3 => { let $rows = rows::<3>($m); $body }
-            _ => { let $rows = rows::<4>($m); $body }
+            1 => {
+                let $rows = rows::<1>($m);
+                $body
+            }
+            2 => {
+                let $rows = rows::<2>($m);
+                $body
+            }
+            3 => {
+                let $rows = rows::<3>($m);
+                $body
+            }
+            _ => {
+                let $rows = rows::<4>($m);
+                $body
+            }
         }
     };
 }

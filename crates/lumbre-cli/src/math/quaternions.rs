@@ -164,7 +164,8 @@ fn angles(call: &mut Call) -> Result<Value, Wrong> {
         () if sum <= 1e-15 * difference => texts.south.to_owned(),
         () => format!("σ = atan2(b+c, a+d),  δ = atan2(c-b, a-d),  {of_heading} = σ + δ,  {of_bank} = σ - δ"),
     });
-    let told = names.iter().zip([heading, attitude, bank]).map(|(name, x)| format!("{name} = {}°", number(x)));
+    let told =
+        names.iter().zip([heading, attitude, bank]).map(|(name, x)| format!("{name} = {}°", number(x)));
     call.work.line(told.collect::<Vec<_>>().join(",  "));
     Ok(Value::Vector(vec![heading, attitude, bank]))
 }

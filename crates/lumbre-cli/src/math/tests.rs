@@ -155,7 +155,10 @@ fn mistakes_say_where_what_and_what_would_do() {
             "1e200 * 1e200",
             "expression:1:7: the result is not finite (found inf; expected numbers that stay finite)\n  1e200 * 1e200\n        ^",
         ),
-        ("0^0", "expression:1:2: 0^0 has no value: x^0 is 1 and 0^y is 0, so that no value suits both (found 0^0; expected a base or an exponent above 0)\n  0^0\n   ^"),
+        (
+            "0^0",
+            "expression:1:2: 0^0 has no value: x^0 is 1 and 0^y is 0, so that no value suits both (found 0^0; expected a base or an exponent above 0)\n  0^0\n   ^",
+        ),
         (
             "sqrt(-1)",
             "expression:1:6: wrong argument 1 of sqrt (found -1; expected 0 or more: the square of a real number is not negative)\n  sqrt(-1)\n       ^",

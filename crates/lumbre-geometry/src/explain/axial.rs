@@ -130,11 +130,7 @@ impl Axial {
             let (across, offset) = (ray.direction.cross(self.axis), w.cross(self.axis));
             let first = if is_from_first { self.r1 } else { self.r2 };
             let (e, g) = (first + self.k * w.dot(self.axis), self.k * ray.direction.dot(self.axis));
-            [
-                across.length_squared() - g * g,
-                across.dot(offset) - e * g,
-                offset.length_squared() - e * e,
-            ]
+            [across.length_squared() - g * g, across.dot(offset) - e * g, offset.length_squared() - e * e]
         };
         let is_at_tip = {
             let terms = exact.e.abs() + (exact.g * (exact.h / exact.a)).abs();

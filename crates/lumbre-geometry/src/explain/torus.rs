@@ -30,7 +30,11 @@ impl Schoolbook {
     fn roots(&self) -> Vec<f64> {
         let Self(coefficients) = self;
         let fits = coefficients.iter().all(|c| c.is_finite());
-        if fits { quartic_roots_between(coefficients, f64::NEG_INFINITY, f64::INFINITY).to_vec() } else { vec![] }
+        if fits {
+            quartic_roots_between(coefficients, f64::NEG_INFINITY, f64::INFINITY).to_vec()
+        } else {
+            vec![]
+        }
     }
 }
 
@@ -39,7 +43,8 @@ impl Schoolbook {
 fn settled(torus: &Torus, ray: &Ray, t: f64) -> Option<f64> {
     let p = twofold::place(ray.origin, torus.center(), t, ray.direction);
     let (d, v) = (components::<Twofold>(ray.direction), components::<Twofold>(torus.axis()));
-    let (big, small) = (Twofold::product(torus.major(), torus.major()), Twofold::product(torus.minor(), torus.minor()));
+    let (big, small) =
+        (Twofold::product(torus.major(), torus.major()), Twofold::product(torus.minor(), torus.minor()));
     let four = big * Twofold::from(4.0) / dot(v, v);
     let (offset, across) = (cross(p, v), cross(d, v));
     let k = dot(p, p) + big - small;
