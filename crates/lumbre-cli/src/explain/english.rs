@@ -165,6 +165,8 @@ pub(super) static ENGLISH: Texts = Texts {
     no_such_key: "--only {0}: no section has this key (expected some of {1})",
     no_sections: "There is no such section for this ray.",
     outside_picture: "--pixel {0}: outside of the picture (expected less than {1}; --size gives another)",
+    no_turntable: "--turntable makes many pictures (expected no --turntable)",
+    nothing_asked: "nothing is asked for (expected --pixel X,Y, from 0,0 in the upper left corner, or --ray OX,OY,OZ,DX,DY,DZ)",
     frame_of_same_hand: "Camera space has x along u, y along v and z along w. Here u×v points along w: it has the same hand as the scene's axes.",
     frame_of_other_hand: "Camera space has x along u, y along v and z along w. Here u×v points against w: it has the other hand than the scene's axes, left-handed where these are right-handed.",
     projected: "Back to the picture: the look-at matrix and then the projection matrix take a point of the ray to its pixel.",

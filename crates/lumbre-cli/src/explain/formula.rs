@@ -356,64 +356,110 @@ pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// The formula as MathML, which browsers set without help.
+/// The formula as MathML, which browsers set without help; quotients are stacked.
 pub(super) fn mathml(formula: &str) -> String {
     let tokens = tokens(formula);
-    let closings = closings(&tokens);
-    let mut out = String::from("<math>");
-    let mut last: Option<String> = None;
-    let flush = |last: &mut Option<String>, out: &mut String| {
-        if let Some(element) = last.take() {
-            out.push_str(&element);
-        }
-    };
-    for (i, token) in tokens.iter().enumerate() {
-        match token {
-            Token::Symbol { base, primes, subscript } => {
-                flush(&mut last, &mut out);
-                let name = format!("<mi>{}</mi>", escaped(base));
-                let primes = format!("<mo>{}</mo>", "′".repeat(*primes));
-                let low = format!("<mi>{subscript}</mi>");
-                last = Some(match (primes.len() > "<mo></mo>".len(), subscript.is_empty()) {
-                    (false, true) => name,
-                    (true, true) => format!("<msup>{name}{primes}</msup>"),
-                    (false, false) => format!("<msub>{name}{low}</msub>"),
-                    (true, false) => format!("<msubsup>{name}{low}{primes}</msubsup>"),
-                });
+    format!("<math>{}</math>", row(&tokens).concat())
+}
+
+/// The elements of a row: each factor is one, and each sign between.
+fn row(tokens: &[Token]) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    let mut at = 0;
+    while at < tokens.len() {
+        match &tokens[at] {
+            Token::Sign(c) if c.is_whitespace() => at += 1,
+            // What stands before is over the factor that follows.
+            Token::Sign('/') if !out.is_empty() && at + 1 < tokens.len() => {
+                let over = out.pop().unwrap_or_default();
+                let mut rest = at + 1;
+                let under = factor(tokens, &mut rest);
+                let [over, under] = [over, under].map(|part| without_parentheses(&part));
+                out.push(format!("<mfrac>{over}{under}</mfrac>"));
+                at = rest;
             }
-            Token::Number { digits, exponent } => {
-                flush(&mut last, &mut out);
-                let number = format!("<mn>{digits}</mn>");
-                last = Some(if exponent.is_empty() {
-                    number
-                } else {
-                    format!("<mrow>{number}<mo>·</mo><msup><mn>10</mn><mn>{exponent}</mn></msup></mrow>")
-                });
-            }
-            Token::Power(digits) => {
-                let base = last.take().unwrap_or_else(|| "<mrow></mrow>".to_owned());
-                last = Some(format!("<msup>{base}<mn>{digits}</mn></msup>"));
-            }
-            Token::Root => flush(&mut last, &mut out),
-            Token::Sign('(') if closings.roots.contains(&i) => {
-                flush(&mut last, &mut out);
-                out.push_str("<msqrt>");
-            }
-            Token::Sign(')') if closings.ends.contains(&i) => {
-                flush(&mut last, &mut out);
-                out.push_str("</msqrt>");
-            }
-            Token::Sign(c) if c.is_whitespace() => {}
-            Token::Sign(c) => {
-                flush(&mut last, &mut out);
-                let stretches = if matches!(c, '(' | ')' | '|') { " stretchy=\"false\"" } else { "" };
-                last = Some(format!("<mo{stretches}>{}</mo>", escaped(&c.to_string())));
-            }
+            _ => out.push(factor(tokens, &mut at)),
         }
     }
-    flush(&mut last, &mut out);
-    out.push_str("</math>");
     out
+}
+
+/// A factor with its powers, or a sign; `at` is moved behind it.
+fn factor(tokens: &[Token], at: &mut usize) -> String {
+    let mut element = match &tokens[*at] {
+        Token::Symbol { base, primes, subscript } => {
+            let name = format!("<mi>{}</mi>", escaped(base));
+            let low = format!("<mi>{subscript}</mi>");
+            let marks = format!("<mo>{}</mo>", "′".repeat(*primes));
+            match (*primes > 0, subscript.is_empty()) {
+                (false, true) => name,
+                (true, true) => format!("<msup>{name}{marks}</msup>"),
+                (false, false) => format!("<msub>{name}{low}</msub>"),
+                (true, false) => format!("<msubsup>{name}{low}{marks}</msubsup>"),
+            }
+        }
+        Token::Number { digits, exponent } if exponent.is_empty() => format!("<mn>{digits}</mn>"),
+        Token::Number { digits, exponent } => {
+            format!("<mrow><mn>{digits}</mn><mo>·</mo><msup><mn>10</mn><mn>{exponent}</mn></msup></mrow>")
+        }
+        // Without anything below, a power stands by itself.
+        Token::Power(digits) => format!("<msup><mrow></mrow><mn>{digits}</mn></msup>"),
+        Token::Root => match closing(tokens, *at + 1) {
+            Some(end) => {
+                let inner = row(&tokens[*at + 2..end]).concat();
+                *at = end;
+                format!("<msqrt>{inner}</msqrt>")
+            }
+            None => "<mo>√</mo>".to_owned(),
+        },
+        Token::Sign('(' | '|' | '⟨') => match closing(tokens, *at) {
+            Some(end) => {
+                let [open, close] = [*at, end].map(|place| sign(&tokens[place]));
+                let inner = row(&tokens[*at + 1..end]).concat();
+                *at = end;
+                format!("<mrow>{open}{inner}{close}</mrow>")
+            }
+            None => sign(&tokens[*at]),
+        },
+        other => sign(other),
+    };
+    *at += 1;
+    while let Some(Token::Power(digits)) = tokens.get(*at) {
+        element = format!("<msup>{element}<mn>{digits}</mn></msup>");
+        *at += 1;
+    }
+    element
+}
+
+/// A sign as an element.
+fn sign(token: &Token) -> String {
+    let Token::Sign(c) = token else { return String::new() };
+    let stretches = if matches!(c, '(' | ')' | '|') { " stretchy=\"false\"" } else { "" };
+    format!("<mo{stretches}>{}</mo>", escaped(&c.to_string()))
+}
+
+/// Where the bracket that opens at this place closes.
+fn closing(tokens: &[Token], open: usize) -> Option<usize> {
+    let Some(Token::Sign(sign @ ('(' | '|' | '⟨'))) = tokens.get(open) else { return None };
+    let mut depth = 0;
+    for (i, token) in tokens.iter().enumerate().skip(open + 1) {
+        match token {
+            Token::Sign('|') if *sign == '|' && depth == 0 => return Some(i),
+            Token::Sign('(' | '⟨') => depth += 1,
+            Token::Sign(')' | '⟩') if depth == 0 => return (*sign != '|').then_some(i),
+            Token::Sign(')' | '⟩') => depth -= 1,
+            _ => {}
+        }
+    }
+    None
+}
+
+/// The element without the parentheses about all of it: the line of a quotient says as much.
+fn without_parentheses(element: &str) -> String {
+    let inner = element
+        .strip_prefix("<mrow><mo stretchy=\"false\">(</mo>")
+        .and_then(|rest| rest.strip_suffix("<mo stretchy=\"false\">)</mo></mrow>"));
+    inner.map_or_else(|| element.to_owned(), |inner| format!("<mrow>{inner}</mrow>"))
 }
 
 #[cfg(test)]
@@ -470,5 +516,17 @@ mod tests {
         assert_eq!(ml.matches("</msqrt>").count(), 1);
         assert!(ml.contains("<msup><mi>h</mi><mn>2</mn></msup>") && ml.contains("&lt;"), "{ml}");
         assert!(ml.contains("<msub><mi>t</mi><mi>1</mi></msub>"), "{ml}");
+        let ml = mathml("t₀ + (−b − √(b² − 4·a·c))/(2·a) − |D×V|²/q");
+        assert_eq!(ml.matches("<mfrac>").count(), 2, "{ml}");
+        assert!(ml.contains("<mfrac><mrow><mo>−</mo><mi>b</mi>"), "{ml}");
+        assert!(ml.contains("<mrow><mn>2</mn><mo>·</mo><mi>a</mi></mrow></mfrac>"), "{ml}");
+        for tag in ["math", "mrow", "msup", "mfrac", "msqrt", "mo", "mi", "mn"] {
+            let opened = ml.matches(&format!("<{tag}>")).count() + ml.matches(&format!("<{tag} ")).count();
+            assert_eq!(opened, ml.matches(&format!("</{tag}>")).count(), "{tag}: {ml}");
+        }
+        // What is not closed, or has nothing to divide, stays as it is.
+        for odd in ["(a", "|a", "/a", "a/", "√a", "⟨1, 2⟩", "²", "[0, 1] ∪ (2)"] {
+            assert!(mathml(odd).ends_with("</math>"), "{odd}");
+        }
     }
 }

@@ -178,11 +178,10 @@ fn ray(text: &str) -> Result<Ray, String> {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.staging.turntable().is_some() {
-        return Err(Failure::Usage("--turntable makes many pictures (expected no --turntable)".to_owned()));
+        return Err(Failure::Usage(texts(arguments.request.lang).no_turntable.to_owned()));
     }
     if arguments.request.pixel.is_none() && arguments.request.ray.is_none() {
-        let why = "nothing is asked for (expected --pixel X,Y, from 0,0 in the upper left corner, or --ray OX,OY,OZ,DX,DY,DZ)";
-        return Err(Failure::Usage(why.to_owned()));
+        return Err(Failure::Usage(texts(arguments.request.lang).nothing_asked.to_owned()));
     }
     let named = arguments.scene.iter().map(PathBuf::as_path).chain(arguments.staging.inputs());
     if let Some(output) = &arguments.output {

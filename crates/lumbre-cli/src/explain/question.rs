@@ -1,8 +1,9 @@
 //! What is told of a pixel or of a ray.
 
+use lumbre::description::CameraView;
 use lumbre::journal::Event;
 use lumbre::shading::Spectrum;
-use lumbre::{Ray, RenderOptions, Scene};
+use lumbre::{DVec3, Ray, RenderOptions, Scene};
 
 use super::document::{Item, Section};
 use super::texts::Texts;
@@ -71,6 +72,15 @@ impl Question<'_> {
         self.along(camera::given(ray, self.texts), scene, options, ray, None, radiance, &events)
     }
 
+    /// The axis of the world that is most upwards in the picture.
+    fn up(&self, scene: &Scene, options: &RenderOptions) -> DVec3 {
+        let Some(camera) = scene.resolved().cameras().get(options.camera) else { return DVec3::Y };
+        let view = CameraView::new(camera, options.width, options.height);
+        let up = view.placement(0.0).vector(DVec3::Y);
+        let axis = (0..3).fold(0, |best, i| if up[i].abs() > up[best].abs() { i } else { best });
+        DVec3::AXES[axis] * up[axis].signum()
+    }
+
     /// Where the ray comes from, what it meets, and the light along it.
     #[allow(clippy::too_many_arguments, reason = "the parts of one explanation")]
     fn along(
@@ -87,7 +97,9 @@ impl Question<'_> {
         let asked = surfaces::Wanted { nearest, is_from_camera: true, shapes: self.shapes.as_ref() };
         let mut met = surfaces::surfaces(scene, ray, things, &asked, texts)?;
         if !met.hits.is_empty() || met.scenery.is_anything() {
-            let drawing = sketch::svg(&met.scenery, ray, &met.hits, &light::corners(events), texts.sketch);
+            let corners = light::corners(events);
+            let drawing =
+                sketch::svg(&met.scenery, ray, &met.hits, &corners, self.up(scene, options), texts.sketch);
             met.section.items.insert(0, Item::Sketch(drawing));
         }
         let path = light::Path { scene, things, texts, depth, kind: &options.integrator.kind };

@@ -165,6 +165,8 @@ pub(super) static SPANISH: Texts = Texts {
     no_such_key: "--only {0}: ninguna sección tiene esta clave (se esperaba alguna de {1})",
     no_sections: "Este rayo no tiene ninguna sección así.",
     outside_picture: "--pixel {0}: fuera de la imagen (se esperaba menos de {1}; --size da otro tamaño)",
+    no_turntable: "--turntable hace muchas imágenes (no se esperaba --turntable)",
+    nothing_asked: "no se pide nada (se esperaba --pixel X,Y, desde 0,0 en la esquina superior izquierda, o --ray OX,OY,OZ,DX,DY,DZ)",
     frame_of_same_hand: "El espacio de la cámara tiene x según u, y según v y z según w. Aquí u×v apunta según w: tiene el mismo sentido que los ejes de la escena.",
     frame_of_other_hand: "El espacio de la cámara tiene x según u, y según v y z según w. Aquí u×v apunta contra w: tiene el otro sentido que los ejes de la escena, a izquierdas si estos son a derechas.",
     projected: "De vuelta a la imagen: la matriz look-at y después la de proyección llevan un punto del rayo a su píxel.",

@@ -173,6 +173,8 @@ pub(super) struct Texts {
     pub(super) no_such_key: &'static str,
     pub(super) no_sections: &'static str,
     pub(super) outside_picture: &'static str,
+    pub(super) no_turntable: &'static str,
+    pub(super) nothing_asked: &'static str,
     pub(super) frame_of_same_hand: &'static str,
     pub(super) frame_of_other_hand: &'static str,
     pub(super) projected: &'static str,
