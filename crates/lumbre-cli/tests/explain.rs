@@ -414,6 +414,26 @@ fn u_and_v_of_a_mesh_are_those_of_its_file() {
     let hit = section(&told, "hit").unwrap();
     assert_eq!(quantity(hit, "u, v"), &serde_json::json!([1.25, 10.0]));
     assert_eq!(quantity(hit, "b₁, b₂ (barycentric coordinates)"), &serde_json::json!([0.125, 0.5]));
+    // Flat and curved patches, under a map that mirrors: the corners of the file, and its own uv.
+    for (height, told_corners) in [(0.0, 3), (1.0, 4)] {
+        let shapes = format!(
+            r#"Translate 0 0 3 Scale -2 1 1 Shape "bilinearmesh" "point3 P" [0 0 0  1 0 0  0 1 0  1 1 {height}] "integer indices" [0 1 2 3] "point2 uv" [0 0  4 0  0 8  4 8]"#
+        );
+        desk.write("a.pbrt", &bare(&shapes, "", ""));
+        let told = explained(&desk, &["--ray", "-0.5,0.5,-5,0,0,1", "--nearest"]);
+        let mesh = section(&told, "mesh").unwrap();
+        assert_eq!(quantity(mesh, "P₁"), &serde_json::json!([1.0, 0.0, 0.0]));
+        assert_eq!(quantity(mesh, "u, v (P₃)"), &serde_json::json!([4.0, 8.0]));
+        assert_eq!(quantity(mesh, "M")[0], serde_json::json!([-2.0, 0.0, 0.0, 0.0]));
+        let uv: Vec<f64> = list(quantity(section(&told, "hit").unwrap(), "u, v"))
+            .iter()
+            .map(|x| x.as_f64().unwrap())
+            .collect();
+        assert!((uv[0] - 1.0).abs() < 1e-6 && (uv[1] - 4.0).abs() < 1e-6, "{uv:?}");
+        let said = all_texts(mesh);
+        assert_eq!(said.iter().any(|text| text.contains("two triangles")), told_corners == 3, "{said:?}");
+        assert!(said.iter().any(|text| text.contains("M mirrors")), "{said:?}");
+    }
 }
 
 #[test]

@@ -112,6 +112,11 @@ pub(crate) struct Subject {
 }
 
 impl Subject {
+    /// The same equation, of another shape that has it.
+    pub(crate) fn with_shape(self, shape: Shape) -> Self {
+        Self { shape, ..self }
+    }
+
     /// a, h and c of F = a t² + 2 h t + c along a ray, exactly.
     pub(crate) fn coefficients(&self, ray: &Ray) -> [Exact; 3] {
         (self.equation)(ray)

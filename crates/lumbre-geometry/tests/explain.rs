@@ -534,7 +534,7 @@ fn whole_shapes() -> Vec<Whole> {
         } else {
             lumbre_geometry::Cone::new(p1, p2, r1, r2, true).map(Shape::from)
         };
-        exactness::Subject { shape: shape.unwrap(), ..exactness::axial("capped", p1, p2, r1, r2) }
+        exactness::axial("capped", p1, p2, r1, r2).with_shape(shape.unwrap())
     };
     let whole = |subject, on: &[DVec3], along: &[DVec3], tip| Whole {
         subject,

@@ -18,7 +18,7 @@ use super::question::Asked;
 use super::shape;
 use super::sketch::Scenery;
 use super::texts::Texts;
-use super::things::Things;
+use super::things::{Face, Things};
 use crate::failure::Failure;
 use crate::language::filled;
 
@@ -201,6 +201,16 @@ fn tell(
     let rename = |formula: &str| {
         if object.is_placed() { with_primes(formula, &["O", "D"]) } else { formula.to_owned() }
     };
+    let told = match &object.shape {
+        Some(Shape::Triangle(triangle)) => triangle.corners().to_vec(),
+        Some(Shape::BilinearPatch(patch)) => patch.corners().to_vec(),
+        _ => Vec::new(),
+    };
+    if !told.is_empty()
+        && let Some(face) = things.face(index, resolved.primitive_index(hit), &told)
+    {
+        section.sections.push(in_file(&face, told.len(), texts));
+    }
     match &object.shape {
         Some(exact) => {
             let surface = hits.first().map(|hit| resolved.accel().surface(ray, hit));
@@ -218,6 +228,30 @@ fn tell(
     for &hit in hits {
         let is_first = first.is_some_and(|first| first == hit);
         section.sections.push(at_hit(scene, ray, hit, is_first, &object, texts));
+    }
+    section
+}
+
+/// A face as it stands in its file, which is tested as a face with `told` corners under its map.
+fn in_file(face: &Face, told: usize, texts: &Texts) -> Section {
+    let mut section = Section::new("mesh", texts.in_file);
+    let mut scope = Scope::default();
+    let names = ["P₀", "P₁", "P₂", "P₃"];
+    for (name, corner) in names.into_iter().zip(&face.corners) {
+        section.quantity(&mut scope, name, "", "", *corner);
+    }
+    for (name, uv) in names.into_iter().zip(face.uvs.iter().flatten()) {
+        section.fact(format!("u, v ({name})"), Value::Numbers(vec![uv.x, uv.y]));
+    }
+    if !face.map.is_identity() {
+        section.fact("M", DMat4::from(*face.map.affine()));
+        section.text(texts.baked);
+        if face.map.is_mirror() {
+            section.text(texts.mirrored);
+        }
+    }
+    if told < face.corners.len() {
+        section.text(texts.split);
     }
     section
 }
