@@ -137,7 +137,7 @@ const ARGUMENTS: &[(&str, &str, &str)] = &[
         "NOMBRE|ÍNDICE",
     ),
     (
-        "define",
+        "settings",
         "Cambia un parámetro de la escena: material.NOMBRE.PARÁM, light.ÍNDICE.PARÁM, light.area.scale, camera.PARÁM o film.PARÁM. A un nombre que no existe se responde con los que hay",
         "RUTA=VALOR",
     ),
@@ -225,7 +225,12 @@ fn translated_argument(argument: Arg) -> Arg {
         None if argument.is_positional() => "Argumentos",
         None => "Opciones",
     };
-    let argument = argument.help_heading(heading).hide_possible_values(true).hide_default_value(true);
+    let argument = argument.help_heading(heading);
+    // What clap adds by itself would be English; the texts have it.
+    let argument = match argument.get_action().takes_values() {
+        true => argument.hide_possible_values(true).hide_default_value(true),
+        false => argument,
+    };
     let id = argument.get_id().to_string();
     let Some((_, about, value)) = ARGUMENTS.iter().find(|(name, ..)| *name == id) else { return argument };
     let argument = argument.help(*about).long_help(*about);

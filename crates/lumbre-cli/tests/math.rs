@@ -528,7 +528,7 @@ fn vectors_of_any_length_have_angles_and_parts() {
         ("reject([1e200, 0, 0], [1, 1, 0])", "= [0, 1, 0]\n"),
         ("projected_length([1e-200, 0, 0], [3, 1, 0])", "= 3\n"),
         ("normal(scale([1e200, 1e200, 1]), [0, 0, 2])", "= [0, 0, 1]\n"),
-        ("inverse(quat(1e200, 0, 0, 0))", "= quat(1e-200, 0, 0, 0)\n"),
+        ("inverse(quat(2^700, 0, 0, 0)) * 2^700", "= quat(1, 0, 0, 0)\n"),
         ("length(quat(3e200, 0, 0, 4e200))", "= 5e200\n"),
         ("rotate(quat(1e-200, 0, 0, 1e-200), [1, 0, 0])", "= [0, 1, 0]\n"),
         ("quat(2e-200, 0, 0, 0) / quat(1e-200, 0, 0, 0)", "= quat(2, 0, 0, 0)\n"),

@@ -205,7 +205,7 @@ pub(super) static ENGLISH: Texts = Texts {
     perpendicular: "amplitude, polarised across the plane of incidence",
     parallel: "amplitude, polarised in that plane",
     fresnel: "the Fresnel reflectance: the share that is reflected",
-    intensity: "intensity of the light towards here",
+    intensity: "intensity of the light towards here, over the probability of choosing it",
     cos_light: "|cos θ|, by the shading normal",
     bsdf_alone: "f / |cos θ|: the BSDF alone",
     phase: "phase function towards it",

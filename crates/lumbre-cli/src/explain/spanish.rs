@@ -205,7 +205,7 @@ pub(super) static SPANISH: Texts = Texts {
     perpendicular: "amplitud polarizada perpendicularmente al plano de incidencia",
     parallel: "amplitud polarizada en ese plano",
     fresnel: "la reflectancia de Fresnel: la fracción que se refleja",
-    intensity: "intensidad de la luz hacia aquí",
+    intensity: "intensidad de la luz hacia aquí, entre la probabilidad de elegirla",
     cos_light: "|cos θ|, con la normal de sombreado",
     bsdf_alone: "f / |cos θ|: la BSDF sola",
     phase: "función de fase hacia ella",

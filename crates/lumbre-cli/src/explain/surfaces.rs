@@ -167,7 +167,7 @@ fn tell(
         section.text(texts.is_missed);
         if let Some(Nearest { distance, t, in_object }) = nearest {
             let text = if in_object { texts.passes_in_object } else { texts.passes };
-            section.text(filled(text, &[&exact(distance), &exact(t)]));
+            section.text(filled(text, &[&exact(distance), &Value::from(t).in_short()]));
         }
     }
     if let Some(&instance) = hit.instances.first() {
