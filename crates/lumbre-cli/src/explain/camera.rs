@@ -140,7 +140,8 @@ fn projection(kind: &CameraKind, view: &CameraView, (width, height): (u32, u32))
     let last = view.on_screen(DVec2::new(f64::from(width), f64::from(height)));
     let (left, top, right, bottom) = (first.x, first.y, last.x, last.y);
     let (x, y) = (2.0 / (right - left), 2.0 / (top - bottom));
-    let (dx, dy) = (-(right + left) / (right - left), -(top + bottom) / (top - bottom));
+    // 0 has no sign.
+    let (dx, dy) = (0.0 - (right + left) / (right - left), 0.0 - (top + bottom) / (top - bottom));
     let depth = FAR - NEAR;
     match kind {
         CameraKind::Perspective { .. } => Some(rows4(

@@ -206,6 +206,7 @@ fn tell(
         Some(Shape::BilinearPatch(patch)) => patch.corners().to_vec(),
         _ => Vec::new(),
     };
+    let told: Vec<DVec3> = told.iter().map(|p| own.map_or(*p, |own| own.point(*p))).collect();
     if !told.is_empty()
         && let Some(face) = things.face(index, resolved.primitive_index(hit), &told)
     {

@@ -114,15 +114,10 @@ impl Things {
         for vertices in faces {
             let corners: Vec<DVec3> = vertices.iter().filter_map(|vertex| position(*vertex)).collect();
             let size = told.iter().fold(0.0_f64, |most, p| most.max(p.abs().max_element()));
-            // An exact patch keeps the corners of its file, and its map.
-            let placed = [*map, Transform::IDENTITY].into_iter().find(|map| {
-                let is_there =
-                    |p: &DVec3| corners.iter().any(|q| (map.point(*q) - *p).length() <= 1e-5 * size);
-                corners.len() == vertices.len() && told.iter().all(is_there)
-            });
-            if let Some(map) = placed {
+            let is_there = |p: &DVec3| corners.iter().any(|q| (map.point(*q) - *p).length() <= 1e-5 * size);
+            if corners.len() == vertices.len() && told.iter().all(is_there) {
                 let uv = |vertex: &u32| mesh.uvs.as_ref()?.get(*vertex as usize).map(|uv| uv.as_dvec2());
-                return Some(Face { corners, uvs: vertices.iter().map(uv).collect(), map });
+                return Some(Face { corners, uvs: vertices.iter().map(uv).collect(), map: *map });
             }
         }
         None
