@@ -37,6 +37,7 @@ mod report;
 mod short_help;
 mod shown;
 mod signals;
+mod spanish;
 mod staging;
 mod tev;
 mod threads;

@@ -52,14 +52,26 @@ const ESSENTIAL: [(&str, &[&str]); 3] = [
     (
         "explain",
         &[
-            "scene", "pixel", "ray", "nearest", "sample", "depth", "only", "format", "output", "lang",
-            "size", "camera",
+            "scene",
+            "pixel",
+            "shape",
+            "all_shapes",
+            "ray",
+            "nearest",
+            "sample",
+            "depth",
+            "only",
+            "format",
+            "output",
+            "lang",
+            "size",
+            "camera",
         ],
     ),
 ];
 
-/// Makes `-h` short for all commands.
-pub(crate) fn shorten(program: Command) -> Command {
+/// Makes `-h` short for all commands; `more` says that there is more.
+pub(crate) fn shorten(program: Command, more: &str) -> Command {
     program.mut_subcommands(|command| {
         let name = command.get_name().to_owned();
         let essential = ESSENTIAL.iter().find(|(of, _)| *of == name).map(|(_, options)| *options);
@@ -70,11 +82,8 @@ pub(crate) fn shorten(program: Command) -> Command {
         });
         let Some(examples) = command.get_after_help().map(ToString::to_string) else { return command };
         let first = examples.split("\n\n").next().unwrap_or_default();
-        let rest = if essential.is_some() {
-            format!("\n\nAll options, and more examples: lumbre {name} --help")
-        } else {
-            String::new()
-        };
+        let rest =
+            if essential.is_some() { format!("\n\n{more}: lumbre {name} --help") } else { String::new() };
         let short = format!("{first}{rest}");
         command.after_help(short).after_long_help(examples)
     })
@@ -107,7 +116,7 @@ mod tests {
 
     #[test]
     fn short_help_fits_on_a_screen_and_long_help_has_all() {
-        let mut program = shorten(crate::Arguments::command());
+        let mut program = shorten(crate::Arguments::command(), "More");
         for (name, _) in ESSENTIAL {
             let command = program.find_subcommand_mut(name).expect(name);
             let (short, long) = (command.render_help().to_string(), command.render_long_help().to_string());

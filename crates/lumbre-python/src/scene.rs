@@ -414,6 +414,8 @@ impl Scene {
         sample: u32,
         depth: u32,
         nearest: bool,
+        shape: Option<String>,
+        all_shapes: bool,
         lang: &str,
         format: &str,
     ) -> PyResult<String> {
@@ -423,7 +425,8 @@ impl Scene {
             Ray::new(origin.into(), direction.into()).with_range(from, to)
         });
         let Asked { shown, options, .. } = self.asked(py, options)?;
-        let request = Request { pixel, ray, format, lang, depth, sample, nearest, only: Vec::new() };
+        let only = Vec::new();
+        let request = Request { pixel, ray, format, lang, depth, sample, nearest, shape, all_shapes, only };
         let explain = || {
             let things = self.things.get_or_init(|| Things::of(&self.desc));
             lumbre_cli::explain(&shown.scene, &options, things, &self.name, &request)

@@ -272,6 +272,8 @@ class Scene:
         sample: int,
         depth: int,
         nearest: bool,
+        shape: str | None,
+        all_shapes: bool,
         lang: str,
         format: str,
     ) -> str: ...

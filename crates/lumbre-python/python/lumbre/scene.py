@@ -639,6 +639,8 @@ class Scene:
         sample: int = 0,
         depth: int = 0,
         nearest: bool = False,
+        shape: str | int | None = None,
+        all_shapes: bool = False,
         lang: str = "en",
         size: tuple[int, int] | None = None,
         camera: Camera | int | str | None = None,
@@ -655,6 +657,8 @@ class Scene:
             The radiance is that which `render` adds to the pixel for it.
         depth : of how many of the rays that follow the crossings are told, too
         nearest : tell only the surface that is seen, not those behind it
+        shape : tell of this shape, whether the ray meets it or not: its number, its kind, or the name of its material
+        all_shapes : tell of all shapes, those that the ray misses too
         lang : en or es
         size, camera, integrator, seed : as of `render`
 
@@ -684,7 +688,8 @@ class Scene:
                 raise LumbreError(f"this is no ray (found {ray} from {tmin} to {tmax}; expected finite numbers, and a direction)")
             asked = (origin, direction, float(tmin), float(tmax))
         native = self._native
-        return Explanation(lambda format: native.explain(options, pixel, asked, sample, depth, nearest, lang, format))
+        told = None if shape is None else str(shape)
+        return Explanation(lambda format: native.explain(options, pixel, asked, sample, depth, nearest, told, all_shapes, lang, format))
 
     @answers_names
     def view(self, *, size: tuple[int, int] | None = None, spp: int | None = None, open: bool = True) -> Viewer:
