@@ -426,11 +426,25 @@ impl Parser<'_, '_> {
         Ok(Some(cell))
     }
 
+    fn declared_name(&mut self) -> Result<Rc<str>> {
+        match self.raw()?.map(|token| token.kind) {
+            Some(Kind::Word(name)) => Ok(name),
+            _ => Err(self.error("the name of an identifier is missing")),
+        }
+    }
+
     fn declare(&mut self, is_local: bool) -> Result<()> {
-        let Some(token) = self.raw()? else { return Err(self.error("the name of an identifier is missing")) };
-        let Kind::Word(name) = token.kind else {
-            return Err(self.error("the name of an identifier is missing"));
-        };
+        let mut name = self.declared_name()?;
+        // `deprecated once "message"` before a name asks for a warning where the name is used.
+        if &*name == "deprecated" && self.raw_ahead(0) != Some(&Kind::Mark(b'=')) {
+            if matches!(self.raw_ahead(0), Some(Kind::Word(word)) if &**word == "once") {
+                self.raw()?;
+            }
+            if matches!(self.raw_ahead(0), Some(Kind::Text(_))) {
+                self.raw()?;
+            }
+            name = self.declared_name()?;
+        }
         if is_reserved(&name) {
             return Err(self.reserved(&name));
         }
@@ -458,6 +472,7 @@ impl Parser<'_, '_> {
         let blocks = self.frames.last().map_or(0, |frame| frame.blocks.len());
         let outer = self.declaring.replace((self.frames.len(), blocks));
         let value = self.value()?;
+        self.ends_here()?;
         self.semicolon()?;
         self.declaring = outer;
         Ok(value)

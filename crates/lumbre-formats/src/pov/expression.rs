@@ -59,7 +59,7 @@ impl Parser<'_, '_> {
     }
 
     fn word_if_same_statement(&mut self) -> Result<Option<Rc<str>>> {
-        if self.ends_here() { Ok(None) } else { self.word() }
+        if self.ends_here()? { Ok(None) } else { self.word() }
     }
 
     pub(super) fn as_float(&self, num: &Num) -> Result<f64> {
@@ -81,7 +81,7 @@ impl Parser<'_, '_> {
     }
 
     fn operator(&mut self, marks: &[u8]) -> Result<Option<u8>> {
-        if self.ends_here() {
+        if self.ends_here()? {
             return Ok(None);
         }
         match self.peek()? {
@@ -402,7 +402,7 @@ impl Parser<'_, '_> {
     pub(super) fn indexed(&mut self, mut value: Value) -> Result<Value> {
         loop {
             match &value {
-                Value::Array(array) if !self.ends_here() && self.is_mark(b'[')? => {
+                Value::Array(array) if !self.ends_here()? && self.is_mark(b'[')? => {
                     let array = Rc::clone(array);
                     match self.element(&array)? {
                         Some(Value::Nothing) | None => {
@@ -412,7 +412,7 @@ impl Parser<'_, '_> {
                     }
                 }
                 Value::Dictionary(entries)
-                    if !self.ends_here() && (self.is_mark(b'.')? || self.is_mark(b'[')?) =>
+                    if !self.ends_here()? && (self.is_mark(b'.')? || self.is_mark(b'[')?) =>
                 {
                     let entries = Rc::clone(entries);
                     let key: Rc<str> = if self.take(b'.')? {
@@ -460,7 +460,7 @@ impl Parser<'_, '_> {
     fn indices(&mut self, array: &Array) -> Result<(usize, usize)> {
         let mut offset = 0;
         let mut taken = 0;
-        while taken < array.sizes.len() && (taken == 0 || !self.ends_here()) && self.take(b'[')? {
+        while taken < array.sizes.len() && (taken == 0 || !self.ends_here()?) && self.take(b'[')? {
             let index = self.float()?;
             self.expect(b']')?;
             let size = array.sizes[taken];

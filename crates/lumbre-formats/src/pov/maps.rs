@@ -20,8 +20,6 @@ pub(super) enum Map {
     Textures(Vec<(f64, Arc<Texture>)>),
     /// Heights with their slopes.
     Slopes(Vec<(f64, [f64; 2])>),
-    /// Of what is read over.
-    Ignored,
 }
 
 impl Parser<'_, '_> {
@@ -57,17 +55,14 @@ impl Parser<'_, '_> {
         let map = match word {
             "color_map" | "colour_map" => Map::Colours(self.colour_entries()?),
             "pigment_map" => Map::Pigments(self.entries(|parser| parser.pigment_body(None, b']'))?),
+            "density_map" => Map::Pigments(self.entries(|parser| parser.density_body(b']'))?),
             "normal_map" => Map::Normals(self.entries(|parser| parser.normal_body(None, b']'))?),
             "texture_map" => Map::Textures(self.entries(|parser| parser.texture_body(b']'))?),
-            "slope_map" => Map::Slopes(self.entries(|parser| {
+            _ => Map::Slopes(self.entries(|parser| {
                 let v = parser.vector()?;
                 parser.expect(b']')?;
                 Ok([v.x, v.y])
             })?),
-            _ => {
-                self.entries(|parser| parser.skip_to(b']'))?;
-                Map::Ignored
-            }
         };
         Ok(Some(Rc::new(map)))
     }

@@ -15,6 +15,7 @@ mod iso;
 mod lexer;
 mod lights;
 mod maps;
+mod media;
 mod meshes;
 mod objects;
 mod patches;
@@ -34,6 +35,7 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use lumbre_scene::SceneDesc;
+use lumbre_shading::pov::Media;
 
 use crate::{Budget, Diagnostic, Diagnostics, FormatError, Input};
 use camera::CameraStatement;
@@ -140,12 +142,16 @@ struct Parser<'a, 'b> {
     light_is_closed: bool,
     /// Whether a texture of the object was just read, so that the next one is a layer on it.
     after_texture: bool,
+    /// Whether what is read as a pigment is a density.
+    is_density: bool,
     // The scene.
     camera: Option<CameraStatement>,
     objects: Vec<Rc<Object>>,
     background: Option<[f32; 3]>,
     sky: SkySphere,
     fogs: Vec<Fog>,
+    /// What fills the air.
+    air: Vec<Media>,
 }
 
 impl<'a, 'b> Parser<'a, 'b> {
@@ -179,11 +185,13 @@ impl<'a, 'b> Parser<'a, 'b> {
             default_camera: CameraStatement::DEFAULT,
             light_is_closed: false,
             after_texture: false,
+            is_density: false,
             camera: None,
             objects: Vec::new(),
             background: None,
             sky: Vec::new(),
             fogs: Vec::new(),
+            air: Vec::new(),
         }
     }
 
@@ -213,6 +221,7 @@ impl<'a, 'b> Parser<'a, 'b> {
                 self.camera = Some(camera);
             }
             "global_settings" => self.global_settings()?,
+            "default" => self.default_directive()?,
             "background" => {
                 self.expect(b'{')?;
                 let c = self.colour()?.as_colour().rgb;
@@ -224,8 +233,13 @@ impl<'a, 'b> Parser<'a, 'b> {
                 self.fogs.push(fog);
             }
             "sky_sphere" => self.sky = self.sky_sphere_block()?,
-            "rainbow" | "media" => {
-                self.warn(&format!("{word} is not rendered"));
+            "media" => {
+                let media = self.media_block()?;
+                self.budget.bytes(size_of::<Media>() as u64, "media")?;
+                self.air.push(media);
+            }
+            "rainbow" => {
+                self.warn("rainbow is not rendered");
                 self.expect(b'{')?;
                 self.skip_to(b'}')?;
             }
@@ -330,7 +344,7 @@ impl<'a, 'b> Parser<'a, 'b> {
         Ok(Some(match &**word {
             "texture" => {
                 let mut texture = None;
-                while !self.ends_here() && self.take_word("texture")? {
+                while !self.ends_here()? && self.take_word("texture")? {
                     self.expect(b'{')?;
                     let next = self.texture_body(b'}')?;
                     texture = Some(textures::layered(texture, next));
@@ -395,15 +409,19 @@ impl<'a, 'b> Parser<'a, 'b> {
                 take(self);
                 self.dictionary()?
             }
-            "media" | "density" | "rainbow" => {
+            "media" => {
+                take(self);
+                Value::Media(Rc::new(self.media_block()?))
+            }
+            "density" => {
+                take(self);
+                Value::Density(self.density_block()?)
+            }
+            "rainbow" => {
                 take(self);
                 self.expect(b'{')?;
                 self.skip_to(b'}')?;
-                Value::Ignored(match &**word {
-                    "media" => "a medium",
-                    "density" => "a density",
-                    _ => "a rainbow",
-                })
+                Value::Ignored("a rainbow")
             }
             _ => return Ok(None),
         }))
@@ -413,7 +431,7 @@ impl<'a, 'b> Parser<'a, 'b> {
     fn array(&mut self) -> Result<Array> {
         self.take_word("mixed")?;
         let mut sizes: Vec<usize> = Vec::new();
-        while !self.ends_here() && self.take(b'[')? {
+        while !self.ends_here()? && self.take(b'[')? {
             let size = self.float()?;
             self.expect(b']')?;
             if !(1.0..=1e9).contains(&size) || sizes.len() == 5 {
@@ -437,7 +455,7 @@ impl<'a, 'b> Parser<'a, 'b> {
         let mut elements = self.budget.vec(count, "arrays")?;
         elements.resize(count as usize, Value::Nothing);
         let mut array = Array { sizes, elements };
-        if !self.ends_here() && self.is_mark(b'{')? {
+        if !self.ends_here()? && self.is_mark(b'{')? {
             self.array_values(&mut array, 0, 0)?;
         }
         Ok(array)
@@ -463,7 +481,7 @@ impl<'a, 'b> Parser<'a, 'b> {
 
     fn dictionary(&mut self) -> Result<Value> {
         let mut entries: HashMap<Rc<str>, Value> = HashMap::new();
-        if !self.ends_here() && self.take(b'{')? {
+        if !self.ends_here()? && self.take(b'{')? {
             while !self.take(b'}')? {
                 let key: Rc<str> = if self.take(b'[')? {
                     let key = self.string()?.into();

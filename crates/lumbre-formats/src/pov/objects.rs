@@ -5,10 +5,12 @@ use std::sync::Arc;
 
 use lumbre_math::{DVec3, Transform};
 use lumbre_scene::MeshDesc;
-use lumbre_shading::pov::{Interior, Layer, Texture, TextureKind, Visibility};
+use lumbre_shading::pov::{
+    InsideTest, Interior, Layer, PatternKind, Texture, TextureKind, Visibility,
+};
 
 use super::lights::LightStatement;
-use super::textures::layered;
+use super::textures::{layered, moved_interior};
 use super::value::{Num, Value};
 use super::{Parser, Result};
 use crate::Diagnostic;
@@ -22,7 +24,7 @@ pub(super) struct Object {
     pub transform: Transform,
     pub texture: Option<Arc<Texture>>,
     pub interior_texture: Option<Arc<Texture>>,
-    pub interior: Option<Rc<Interior>>,
+    pub interior: Option<Arc<Interior>>,
     pub visibility: Visibility,
     pub hollow: bool,
     pub double_illuminate: bool,
@@ -102,12 +104,16 @@ impl Object {
             self.texture = self.texture.take().map(|texture| texture.moved(map));
             self.interior_texture = self.interior_texture.take().map(|texture| texture.moved(map));
         }
+        self.interior = self.interior.take().map(|interior| moved_interior(interior, map));
         if let Form::Light(light) = &self.form {
             self.form = Form::Light(Rc::new(light.moved(map)));
             self.transform = Transform::IDENTITY;
         }
     }
 }
+
+/// Superellipsoids of smaller exponents have this one: their edges are as sharp as can be told.
+const LEAST_EXPONENT: f64 = 1e-3;
 
 impl Parser<'_, '_> {
     /// The object of a word, which comes next; `None` if it is the word of none.
@@ -267,10 +273,10 @@ impl Parser<'_, '_> {
             "polygon" => self.polygon()?,
             "superellipsoid" => {
                 let v = self.expression()?;
-                if v.n < 2 || v.v[0] <= 0.0 || v.v[1] <= 0.0 {
-                    return Err(self.error("a superellipsoid has two exponents greater than 0"));
+                if v.n < 2 || v.v[0] < 0.0 || v.v[1] < 0.0 {
+                    return Err(self.error("a superellipsoid has two exponents that are not negative"));
                 }
-                Form::Superellipsoid(v.v[0], v.v[1])
+                Form::Superellipsoid(v.v[0].max(LEAST_EXPONENT), v.v[1].max(LEAST_EXPONENT))
             }
             "quadric" => self.quadric()?,
             "cubic" => self.poly(3)?,
@@ -307,13 +313,8 @@ impl Parser<'_, '_> {
                 return Ok(Object::new(Form::Light(Rc::new(light))));
             }
             "light_group" => {
-                let mut parts = self.parts()?;
-                let mut global = true;
-                while self.take_word("global_lights")? {
-                    global = self.optional_bool()?;
-                    parts.extend(self.parts()?);
-                }
-                Form::LightGroup(parts, global)
+                // Lights of no group light it only where `global_lights` says so.
+                Form::LightGroup(self.parts()?, false)
             }
             "object" => match self.object()? {
                 Some(inner) => return Ok(inner),
@@ -415,6 +416,12 @@ impl Parser<'_, '_> {
                 "no_image" => object.visibility.no_image = self.optional_bool()?,
                 "no_reflection" => object.visibility.no_reflection = self.optional_bool()?,
                 "double_illuminate" => object.double_illuminate = self.optional_bool()?,
+                "global_lights" if matches!(object.form, Form::LightGroup(..)) => {
+                    let on = self.optional_bool()?;
+                    if let Form::LightGroup(_, global) = &mut object.form {
+                        *global = on;
+                    }
+                }
                 "uv_mapping" => object.uv_mapping = self.optional_bool()?,
                 "no_radiosity" | "sturm" | "hierarchy" | "cutaway_textures" | "split_union" | "evaluate"
                 | "smooth" => {
@@ -528,6 +535,18 @@ impl Parser<'_, '_> {
             return Err(self.diagnostic(wrong).into());
         }
         Ok(Form::Poly(degree, terms.into()))
+    }
+
+    /// `object { … }` as a pattern: 1 inside of the object, 0 outside. What it names stands behind the object, before the brace that
+    /// closes it.
+    pub(super) fn inside_pattern(&mut self) -> Result<PatternKind> {
+        self.expect(b'{')?;
+        let object = match self.object()? {
+            Some(object) => Rc::new(object),
+            None => self.object_argument()?,
+        };
+        let region = super::solids::Region::of(&object, &Transform::IDENTITY);
+        Ok(PatternKind::Inside(InsideTest(Arc::new(move |p| region.contains(p)))))
     }
 
     /// The object of a name, for functions that ask about it.

@@ -3,6 +3,7 @@
 use std::rc::Rc;
 use std::sync::Arc;
 
+use lumbre_math::Transform;
 use lumbre_shading::Spectrum;
 use lumbre_shading::pov::{
     Colour, ColourMap, Finish, Interior, Layer, Normal, NormalKind, Pattern, PatternKind, Pigment,
@@ -23,7 +24,7 @@ pub(super) type InteriorStatement = Interior;
 pub(super) struct MaterialStatement {
     pub texture: Option<Arc<Texture>>,
     pub interior_texture: Option<Arc<Texture>>,
-    pub interior: Option<Rc<Interior>>,
+    pub interior: Option<Arc<Interior>>,
 }
 
 /// What a scene has set by `#default`.
@@ -102,7 +103,16 @@ impl Parser<'_, '_> {
         if let Some(base) = base {
             (draft, kind) = opened(&base);
         }
-        while !self.take(end)? {
+        // Whether the braces of a pattern are open in which its parts stand.
+        let mut in_pattern = false;
+        loop {
+            if in_pattern && self.take(b'}')? {
+                in_pattern = false;
+                continue;
+            }
+            if self.take(end)? {
+                break;
+            }
             if self.take(b',')? {
                 continue;
             }
@@ -145,7 +155,17 @@ impl Parser<'_, '_> {
                     self.peeked = None;
                     self.colour()?;
                 }
-                "object" | "density_file" | "magnet" | "pavement" | "tiling" | "facets" => {
+                "object" => {
+                    self.peeked = None;
+                    let kind = self.inside_pattern()?;
+                    draft.begin(kind, self.settings.generator);
+                    in_pattern = true;
+                }
+                "density" => {
+                    self.peeked = None;
+                    blocks.push(self.density_block()?);
+                }
+                "density_file" | "pavement" | "tiling" | "facets" => {
                     self.peeked = None;
                     self.warn(&format!("the pattern {word} is not rendered"));
                     if self.is_mark(b'{')? {
@@ -176,7 +196,7 @@ impl Parser<'_, '_> {
                         Value::Pigment(base) if draft.pattern.as_ref().is_some_and(Pattern::is_block) => {
                             blocks.push(base)
                         }
-                        Value::Pigment(base) => (draft, kind) = opened(&base),
+                        Value::Pigment(base) | Value::Density(base) => (draft, kind) = opened(&base),
                         Value::Num(num) => kind = PigmentKind::Colour(num.as_colour()),
                         other => return Err(self.error(format!("a pigment is needed, not {}", other.name()))),
                     }
@@ -228,7 +248,8 @@ impl Parser<'_, '_> {
                     Ok(PigmentKind::Blocks(pattern, blocks.into()))
                 }
                 None => {
-                    let map = ColourMap::new(default_colours(&pattern.kind));
+                    let kind = if self.is_density { &PatternKind::Noise } else { &pattern.kind };
+                    let map = ColourMap::new(default_colours(kind));
                     Ok(PigmentKind::Map(pattern, Arc::new(map)))
                 }
             },
@@ -247,7 +268,15 @@ impl Parser<'_, '_> {
         let mut is_average = false;
         let mut is_ignored = false;
         let mut blocks: Vec<Arc<Normal>> = Vec::new();
-        while !self.take(end)? {
+        let mut in_pattern = false;
+        loop {
+            if in_pattern && self.take(b'}')? {
+                in_pattern = false;
+                continue;
+            }
+            if self.take(end)? {
+                break;
+            }
             if self.take(b',')? {
                 continue;
             }
@@ -281,7 +310,13 @@ impl Parser<'_, '_> {
                     self.expect(b'{')?;
                     blocks.push(self.normal_body(None, b'}')?);
                 }
-                "bump_map" | "facets" | "object" | "density_file" | "tiling" | "pavement" | "magnet" => {
+                "object" => {
+                    let kind = self.inside_pattern()?;
+                    draft.begin(kind, self.settings.generator);
+                    special = Some(word);
+                    in_pattern = true;
+                }
+                "bump_map" | "facets" | "density_file" | "tiling" | "pavement" => {
                     self.warn(&format!("the normal {word} is not rendered"));
                     is_ignored = true;
                     if self.is_mark(b'{')? {
@@ -343,12 +378,27 @@ impl Parser<'_, '_> {
         let mut map: Option<Rc<Map>> = None;
         let mut draft = Draft::new(None, Warps::default(), false);
         let mut is_average = false;
-        while !self.take(end)? {
+        let mut in_pattern = false;
+        loop {
+            if in_pattern && self.take(b'}')? {
+                in_pattern = false;
+                continue;
+            }
+            if self.take(end)? {
+                break;
+            }
             if self.take(b',')? {
                 continue;
             }
             let Some(word) = self.word()? else { return Err(self.unexpected("a texture")) };
             match &*word {
+                "object" => {
+                    self.peeked = None;
+                    let kind = self.inside_pattern()?;
+                    draft.begin(kind, self.settings.generator);
+                    in_pattern = true;
+                    continue;
+                }
                 "pigment" | "normal" | "finish" => {
                     self.peeked = None;
                     // What is known changes; where it has been moved, this is written into what has been moved.
@@ -624,10 +674,14 @@ impl Parser<'_, '_> {
     }
 
     /// An interior in braces.
-    pub(super) fn interior_block(&mut self) -> Result<Rc<Interior>> {
+    pub(super) fn interior_block(&mut self) -> Result<Arc<Interior>> {
         self.expect(b'{')?;
         let mut interior = Interior::DEFAULT;
         while !self.take(b'}')? {
+            if let Some(map) = self.transform()? {
+                interior = with_moved_media(&interior, &map);
+                continue;
+            }
             let Some(word) = self.word()? else { return Err(self.unexpected("an interior")) };
             self.peeked = None;
             match &*word {
@@ -641,13 +695,13 @@ impl Parser<'_, '_> {
                     self.warn("dispersion is not rendered");
                 }
                 "media" => {
-                    self.warn("media is not rendered");
-                    self.expect(b'{')?;
-                    self.skip_to(b'}')?;
+                    let media = self.media_block()?;
+                    self.budget.bytes(size_of_val(&media) as u64, "media")?;
+                    interior.media.push(media);
                 }
                 _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
                     Some(Value::Interior(known)) => interior = (*known).clone(),
-                    Some(Value::Ignored(_)) => {}
+                    Some(Value::Media(known)) => interior.media.push((*known).clone()),
                     Some(other) => {
                         return Err(self.error(format!("an interior is needed, not {}", other.name())));
                     }
@@ -658,7 +712,7 @@ impl Parser<'_, '_> {
                 },
             }
         }
-        Ok(Rc::new(interior))
+        Ok(Arc::new(interior))
     }
 
     /// A material in braces.
@@ -668,6 +722,7 @@ impl Parser<'_, '_> {
         while !self.take(b'}')? {
             if let Some(map) = self.transform()? {
                 material.texture = material.texture.map(|texture| texture.moved(&map));
+                material.interior = material.interior.map(|interior| moved_interior(interior, &map));
                 continue;
             }
             let Some(word) = self.word()? else { return Err(self.unexpected("a material")) };
@@ -694,6 +749,17 @@ impl Parser<'_, '_> {
         }
         Ok(material)
     }
+}
+
+/// An interior that is moved: the same one where there is nothing in it that has a place.
+pub(super) fn moved_interior(interior: Arc<Interior>, map: &Arc<Transform>) -> Arc<Interior> {
+    if interior.media.is_empty() { interior } else { Arc::new(with_moved_media(&interior, map)) }
+}
+
+/// An interior whose media are moved.
+pub(super) fn with_moved_media(interior: &Interior, map: &Arc<Transform>) -> Interior {
+    let media = interior.media.iter().map(|media| media.moved(map)).collect();
+    Interior { media, ..interior.clone() }
 }
 
 /// A texture on top of others.

@@ -198,10 +198,10 @@ pub struct ImageMap {
     pub once: bool,
     /// Whether colours between pixels are interpolated.
     pub interpolate: bool,
-    /// Replaces the filter of all its colours.
-    pub filter: Option<f32>,
-    /// Replaces the transparency of all its colours.
-    pub transmit: Option<f32>,
+    /// Added to the filter of all its colours.
+    pub filter: f32,
+    /// Added to the transparency of all its colours.
+    pub transmit: f32,
 }
 
 /// Where the colours of an image come from.
@@ -232,8 +232,8 @@ impl ImageMap {
         let none = Colour { rgb: Spectrum::BLACK, filter: 0.0, transmit: 1.0 };
         let Some([u, v]) = self.place(p) else { return none };
         let mut colour = if self.interpolate { self.interpolated(u, v) } else { self.nearest(u, v) };
-        colour.filter = self.filter.unwrap_or(colour.filter);
-        colour.transmit = self.transmit.unwrap_or(colour.transmit);
+        colour.filter += self.filter;
+        colour.transmit += self.transmit;
         colour
     }
 
