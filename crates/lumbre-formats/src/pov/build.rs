@@ -307,8 +307,7 @@ impl Builder {
         };
         let texture = from(&|object| object.texture.clone());
         let interior_texture = from(&|object| object.interior_texture.clone());
-        let interior =
-            chain.iter().rev().find_map(|(object, map)| Some((object.interior.clone()?, **map)));
+        let interior = chain.iter().rev().find_map(|(object, map)| Some((object.interior.clone()?, **map)));
         let mut texture = texture.unwrap_or_else(|| Arc::clone(&self.default_texture));
         if uses_uv {
             texture = mapped(&texture);
@@ -319,7 +318,8 @@ impl Builder {
                 (UvForm::Cuboid(low.min(*high), low.max(*high)), Some(Arc::new(leaf.map)))
             }
             Form::Torus(major, _) => (UvForm::Torus(*major), Some(Arc::new(leaf.map))),
-            Form::Mesh(_) | Form::Swept(_) => (UvForm::Surface, None),
+            Form::Mesh(_) => (UvForm::Surface, None),
+            Form::Swept(swept) if swept.is_turned() => (UvForm::Surface, None),
             _ => (UvForm::Plane, None),
         };
         let interior = match interior {

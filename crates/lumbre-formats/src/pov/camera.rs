@@ -235,7 +235,7 @@ impl Parser<'_, '_> {
                     self.expect(b'{')?;
                     self.skip_to(b'}')?;
                 }
-                _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
+                _ => match self.known(&word)? {
                     Some(Value::Camera(known)) => {
                         camera = (*known).clone();
                         is_aimed = true;

@@ -22,10 +22,11 @@ impl Parser<'_, '_> {
     /// What follows a `#`.
     pub(super) fn directive(&mut self) -> Result<()> {
         let at = self.frames.last().map_or(0, |frame| frame.at.saturating_sub(1));
-        let Some(token) = self.raw()? else { return Err(self.error("a # at the end")) };
-        let Kind::Word(word) = token.kind else {
-            return Err(self.error("a # without the word of a directive"));
-        };
+        if !matches!(self.raw_ahead(0), Some(Kind::Word(_))) {
+            self.warn("a # without the word of a directive is left out");
+            return Ok(());
+        }
+        let Some(Kind::Word(word)) = self.raw()?.map(|token| token.kind) else { return Ok(()) };
         match &*word {
             "declare" | "local" => self.declare(&*word == "local"),
             "undef" => self.undef(),

@@ -398,6 +398,16 @@ impl Parser<'_, '_> {
         self.diagnostic(wrong).into()
     }
 
+    /// What a name stands for, whose word was taken: of an array or a dictionary, the element that follows.
+    pub(super) fn known(&mut self, name: &str) -> Result<Option<Value>> {
+        let Some(cell) = self.lookup(name).cloned() else { return Ok(None) };
+        let value = cell.borrow().clone();
+        match value {
+            Value::Array(_) | Value::Dictionary(_) => self.indexed(value).map(Some),
+            _ => Ok(Some(value)),
+        }
+    }
+
     /// Elements of arrays and dictionaries behind a value.
     pub(super) fn indexed(&mut self, mut value: Value) -> Result<Value> {
         loop {

@@ -4,6 +4,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use lumbre_shading::Spectrum;
+use lumbre_shading::pov::function::Unary;
 use lumbre_shading::pov::{Colour, Normal, Pigment, Texture};
 
 use super::expression::begins_colour;
@@ -72,7 +73,8 @@ impl Parser<'_, '_> {
         let mut entries: Vec<(f64, T)> = Vec::new();
         while !self.take(b'}')? {
             self.expect(b'[')?;
-            let v = self.finite()?;
+            // Of an average, the weight may be left out.
+            let v = if self.is_number()? { self.finite()? } else { 1.0 };
             self.comma()?;
             self.budget.bytes(size_of::<(f64, T)>() as u64, "maps")?;
             entries.push((v, read(self)?));
@@ -83,6 +85,28 @@ impl Parser<'_, '_> {
             return Err(self.error("a map without entries"));
         }
         Ok(entries)
+    }
+
+    /// Whether a number comes next.
+    fn is_number(&mut self) -> Result<bool> {
+        let word = match self.peek()? {
+            Some(Kind::Number(_) | Kind::Mark(b'-' | b'+' | b'(' | b'!')) => return Ok(true),
+            Some(Kind::Word(word)) => Rc::clone(word),
+            _ => return Ok(false),
+        };
+        if Unary::from_name(&word).is_some() || self.constant(&word).is_some_and(|num| num.n == 1) {
+            return Ok(true);
+        }
+        Ok(match self.lookup(&word).map(|cell| cell.borrow().clone()) {
+            Some(Value::Num(num)) => num.n == 1,
+            Some(Value::Array(array)) => {
+                matches!(array.elements.first(), Some(Value::Num(num)) if num.n == 1)
+            }
+            Some(Value::Function(_)) => true,
+            _ => {
+                matches!(&*word, "pow" | "min" | "max" | "mod" | "rand" | "div" | "atan2" | "select" | "val")
+            }
+        })
     }
 
     fn colour_entries(&mut self) -> Result<Vec<(f64, Colour)>> {

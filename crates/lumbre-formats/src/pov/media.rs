@@ -49,7 +49,7 @@ impl Parser<'_, '_> {
                 "collect" => {
                     self.optional_bool()?;
                 }
-                _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
+                _ => match self.known(&word)? {
                     Some(Value::Media(known)) => media = (*known).clone(),
                     Some(Value::Density(known)) => media.densities.push(known),
                     _ => return Err(self.error(format!("{word} has no meaning in a medium"))),

@@ -2,6 +2,8 @@
 //!
 //! A scene may read files beside it and in the folders of its library, and no others; what it writes stays in memory.
 
+mod algebraic;
+mod blob;
 mod build;
 mod built_ins;
 mod camera;
@@ -9,13 +11,17 @@ mod curves;
 mod directives;
 mod expression;
 mod files;
+mod fractals;
 mod functions;
 mod images;
 mod iso;
+mod job;
+mod julia;
 mod lexer;
 mod lights;
 mod maps;
 mod media;
+mod mesh_tree;
 mod meshes;
 mod objects;
 mod patches;
@@ -23,6 +29,7 @@ mod patterns;
 mod settings;
 mod solids;
 mod source;
+mod sweep;
 mod swept;
 mod text;
 mod textures;
@@ -46,6 +53,8 @@ use source::{Frame, Source};
 use textures::Defaults;
 use value::{Array, Cell, Value};
 
+pub use job::PovJob;
+
 type Result<T> = std::result::Result<T, FormatError>;
 
 /// Options of reading a POV-Ray scene.
@@ -56,6 +65,12 @@ pub struct PovOptions {
     pub library: Vec<PathBuf>,
     /// The value of `clock`.
     pub clock: f64,
+    /// The values of `clock` in the first and in the last frame.
+    pub clocks: [f64; 2],
+    /// The numbers of the first and of the last frame; `None` for a still.
+    pub frames: Option<[u32; 2]>,
+    /// Numbers and texts that are declared before the scene is read.
+    pub declares: Vec<(String, String)>,
     /// The value of `frame_number`.
     pub frame_number: u32,
     /// The value of `image_width`.
@@ -66,7 +81,16 @@ pub struct PovOptions {
 
 impl Default for PovOptions {
     fn default() -> Self {
-        Self { library: Vec::new(), clock: 0.0, frame_number: 0, width: 640, height: 480 }
+        Self {
+            library: Vec::new(),
+            clock: 0.0,
+            clocks: [0.0, 1.0],
+            frames: None,
+            declares: Vec::new(),
+            frame_number: 0,
+            width: 640,
+            height: 480,
+        }
     }
 }
 
@@ -135,6 +159,7 @@ struct Parser<'a, 'b> {
     streams: Vec<u32>,
     written: HashMap<String, String>,
     fonts: text::Fonts,
+    mesh_trees: mesh_tree::MeshTrees,
     settings: Settings,
     defaults: Defaults,
     default_camera: CameraStatement,
@@ -161,6 +186,13 @@ impl<'a, 'b> Parser<'a, 'b> {
         budget: &'b Budget,
         diagnostics: &'a mut Diagnostics,
     ) -> Self {
+        let globals = options.declares.iter().map(|(name, value)| {
+            let value = match value.parse() {
+                Ok(number) => Value::Num(value::Num::float(number)),
+                Err(_) => Value::Text(value.trim_matches('"').into()),
+            };
+            (Rc::from(&**name), Rc::new(std::cell::RefCell::new(value)))
+        });
         Self {
             budget,
             diagnostics,
@@ -169,7 +201,7 @@ impl<'a, 'b> Parser<'a, 'b> {
             library: options.library.clone(),
             frames: Vec::new(),
             least_frames: 1,
-            globals: HashMap::new(),
+            globals: globals.collect(),
             macro_count: 0,
             sources: HashMap::new(),
             peeked: None,
@@ -180,6 +212,7 @@ impl<'a, 'b> Parser<'a, 'b> {
             streams: Vec::new(),
             written: HashMap::new(),
             fonts: HashMap::new(),
+            mesh_trees: HashMap::new(),
             settings: Settings::new(),
             defaults: Defaults::new(),
             default_camera: CameraStatement::DEFAULT,

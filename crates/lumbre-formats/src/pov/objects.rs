@@ -5,10 +5,9 @@ use std::sync::Arc;
 
 use lumbre_math::{DVec3, Transform};
 use lumbre_scene::MeshDesc;
-use lumbre_shading::pov::{
-    InsideTest, Interior, Layer, PatternKind, Texture, TextureKind, Visibility,
-};
+use lumbre_shading::pov::{InsideTest, Interior, Layer, PatternKind, Texture, TextureKind, Visibility};
 
+use super::algebraic::{Algebraic, MOST_DEGREE};
 use super::lights::LightStatement;
 use super::textures::{layered, moved_interior};
 use super::value::{Num, Value};
@@ -58,11 +57,12 @@ pub(super) enum Form {
     Mesh(Arc<MeshDesc>),
     /// The exponents of a superellipsoid.
     Superellipsoid(f64, f64),
-    /// Coefficients in falling powers of x, then y, then z, with the degree.
-    Poly(u32, Arc<[f64]>),
-    Blob(Arc<super::solids::Blob>),
+    Poly(Arc<Algebraic>),
+    Blob(Arc<super::blob::Blob>),
     Swept(Arc<super::swept::Swept>),
     Iso(Arc<super::iso::Iso>),
+    Sweep(Arc<super::sweep::Sweep>),
+    Julia(Arc<super::julia::Julia>),
     Group(Operation, Vec<Rc<Object>>),
     Light(Rc<LightStatement>),
     /// A group of lights that light only its objects.
@@ -284,7 +284,7 @@ impl Parser<'_, '_> {
             "poly" => {
                 let degree = self.whole(0.0, 99.0)?;
                 self.comma()?;
-                if !(2..=15).contains(&degree) {
+                if !(2..=MOST_DEGREE).contains(&degree) {
                     return Err(self.error("the degree of a poly is from 2 to 15"));
                 }
                 self.poly(degree)?
@@ -296,6 +296,8 @@ impl Parser<'_, '_> {
             "text" => self.text()?,
             "bicubic_patch" => self.bicubic_patch()?,
             "isosurface" => self.isosurface()?,
+            "sphere_sweep" => self.sphere_sweep()?,
+            "julia_fractal" => self.julia_fractal()?,
             "height_field" => self.height_field()?,
             "union" | "merge" | "intersection" | "difference" => {
                 let operation = match word {
@@ -358,11 +360,20 @@ impl Parser<'_, '_> {
                 continue;
             }
             let Some(name) = self.word()? else { break };
-            let Some(Value::Object(object)) = self.lookup(&name).map(|cell| cell.borrow().clone()) else {
-                break;
+            let is_object = |value: &Value| match value {
+                Value::Object(_) | Value::Light(_) => true,
+                Value::Array(array) => matches!(array.elements.first(), Some(Value::Object(_))),
+                _ => false,
             };
+            if !self.lookup(&name).is_some_and(|cell| is_object(&cell.borrow())) {
+                break;
+            }
             self.peeked = None;
-            parts.push(object);
+            match self.known(&name)? {
+                Some(Value::Object(object)) => parts.push(object),
+                Some(Value::Light(light)) => parts.push(Rc::new(Object::new(Form::Light(light)))),
+                _ => return Err(self.unexpected("an object")),
+            }
         }
         Ok(parts)
     }
@@ -516,7 +527,7 @@ impl Parser<'_, '_> {
         // In falling powers of x, then y, then z.
         let terms =
             [square.x, mixed.x, mixed.y, linear.x, square.y, mixed.z, linear.y, square.z, linear.z, j];
-        Ok(Form::Poly(2, Arc::from(terms)))
+        Ok(Form::Poly(Arc::new(Algebraic::new(2, Arc::from(terms)))))
     }
 
     fn poly(&mut self, degree: u32) -> Result<Form> {
@@ -534,7 +545,7 @@ impl Parser<'_, '_> {
             let wrong = Diagnostic::error("too few coefficients").found(terms.len()).expected(count);
             return Err(self.diagnostic(wrong).into());
         }
-        Ok(Form::Poly(degree, terms.into()))
+        Ok(Form::Poly(Arc::new(Algebraic::new(degree, terms.into()))))
     }
 
     /// `object { … }` as a pattern: 1 inside of the object, 0 outside. What it names stands behind the object, before the brace that
@@ -576,7 +587,7 @@ impl Parser<'_, '_> {
                 let from = self.vector()?;
                 self.comma()?;
                 let direction = self.vector()?;
-                let hit = super::solids::trace(&object, from, direction);
+                let hit = super::solids::trace(&mut self.mesh_trees, &object, from, direction);
                 if self.take(b',')? {
                     let Some(name) = self.word()? else { return Err(self.unexpected("an identifier")) };
                     let Some(cell) = self.lookup(&name).cloned() else { return Err(self.undeclared(&name)) };

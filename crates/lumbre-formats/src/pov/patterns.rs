@@ -2,8 +2,8 @@
 
 use lumbre_math::{DVec2, DVec3};
 use lumbre_shading::pov::{
-    BlackHole, Crackle, Fractal, Magnet, NoiseGenerator, Octaves, Pattern, PatternKind, Slope, Unrolling, Warp,
-    Warps, Wave,
+    BlackHole, Crackle, Fractal, Magnet, NoiseGenerator, Octaves, Pattern, PatternKind, Slope, Unrolling,
+    Warp, Warps, Wave,
 };
 
 use super::{Parser, Result};

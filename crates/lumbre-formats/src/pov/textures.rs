@@ -175,7 +175,7 @@ impl Parser<'_, '_> {
                     while matches!(self.peek()?, Some(Kind::Text(_) | Kind::Number(_)))
                         || matches!(
                             self.word()?.as_deref(),
-                            Some("number_of_sides" | "number_of_tiles" | "pattern" | "interior" | "exterior")
+                            Some("number_of_sides" | "number_of_tiles" | "pattern" | "interpolate" | "df3")
                         )
                     {
                         self.next()?;
@@ -324,7 +324,7 @@ impl Parser<'_, '_> {
                         self.skip_to(b'}')?;
                     }
                     while matches!(self.peek()?, Some(Kind::Text(_) | Kind::Number(_)))
-                        || matches!(self.word()?.as_deref(), Some("coords" | "size" | "interpolate"))
+                        || matches!(self.word()?.as_deref(), Some("coords" | "size" | "interpolate" | "df3"))
                     {
                         self.next()?;
                     }
@@ -361,10 +361,16 @@ impl Parser<'_, '_> {
             no_bump_scale |= known.no_bump_scale;
             known.kind.clone()
         } else {
-            if !is_ignored && map.is_some() {
-                return Err(self.error("a normal without a pattern"));
+            // What modifies a pattern without naming one modifies that of the normal that is the default.
+            match self.defaults.layer.normal.as_ref().map(|normal| &normal.kind) {
+                Some(NormalKind::Slope { pattern, .. }) if !is_ignored => {
+                    normal_kind((**pattern).clone(), None, map.as_deref(), blocks)
+                }
+                _ if !is_ignored && map.is_some() => {
+                    return Err(self.error("a normal without a pattern"));
+                }
+                _ => NormalKind::Average(Arc::from([])),
             }
-            NormalKind::Average(Arc::from([]))
         };
         Ok(Arc::new(Normal { kind, warps: draft.warps, amount, accuracy, no_bump_scale, uv: draft.uv }))
     }
@@ -606,7 +612,7 @@ impl Parser<'_, '_> {
                 "ior" | "caustics" | "fade_power" | "fade_distance" | "refraction" | "irid_wavelength" => {
                     self.expression()?;
                 }
-                _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
+                _ => match self.known(&word)? {
                     Some(Value::Finish(known)) => finish = (*known).clone(),
                     Some(other) => {
                         return Err(self.error(format!("a finish is needed, not {}", other.name())));
@@ -699,7 +705,7 @@ impl Parser<'_, '_> {
                     self.budget.bytes(size_of_val(&media) as u64, "media")?;
                     interior.media.push(media);
                 }
-                _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
+                _ => match self.known(&word)? {
                     Some(Value::Interior(known)) => interior = (*known).clone(),
                     Some(Value::Media(known)) => interior.media.push((*known).clone()),
                     Some(other) => {
@@ -738,7 +744,7 @@ impl Parser<'_, '_> {
                     material.interior_texture = Some(self.texture_body(b'}')?);
                 }
                 "interior" => material.interior = Some(self.interior_block()?),
-                _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
+                _ => match self.known(&word)? {
                     Some(Value::Material(known)) => material = (*known).clone(),
                     Some(other) => {
                         return Err(self.error(format!("a material is needed, not {}", other.name())));

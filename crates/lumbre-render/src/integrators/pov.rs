@@ -60,13 +60,13 @@ impl RayIntegrator for Pov {
         });
         let tracer = Tracer { scene, world, lights: lights.collect() };
         let ray = sight.ray.ray;
-        // Where a camera sees nothing.
-        if !ray.direction.is_finite() {
-            return Spectrum::BLACK;
-        }
         let is_at_eye = ray.origin.distance(world.eye) <= NEAR * (1.0 + world.eye.length());
         let first = Traced {
-            inside: if is_at_eye { world.around_eye.iter().map(|solid| &**solid).collect() } else { Inside::new() },
+            inside: if is_at_eye {
+                world.around_eye.iter().map(|solid| &**solid).collect()
+            } else {
+                Inside::new()
+            },
             ray,
             level: 0,
             weight: 1.0,
@@ -472,8 +472,7 @@ impl<'s> Tracer<'s> {
         let [n, m] = area.counts;
         let mut known: Vec<Option<Spectrum>> = vec![None; (n * m) as usize];
         let mut corner = |u: u32, v: u32| {
-            *known[(u * m + v) as usize]
-                .get_or_insert_with(|| at(DVec2::new(step(u, n), step(v, m)), record))
+            *known[(u * m + v) as usize].get_or_insert_with(|| at(DVec2::new(step(u, n), step(v, m)), record))
         };
         mean_of_grid(area.adaptive, [0, 0, n - 1, m - 1], 0, &mut corner)
     }

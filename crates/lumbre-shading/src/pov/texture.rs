@@ -180,13 +180,13 @@ pub struct Interior {
 impl Interior {
     /// What an object is filled with unless the scene says otherwise.
     pub const DEFAULT: Self = Self {
-            ior: 1.0,
-            caustics: 0.0,
-            fade_distance: 0.0,
-            fade_power: 0.0,
-            fade_colour: Spectrum::BLACK,
-            media: Vec::new(),
-        };
+        ior: 1.0,
+        caustics: 0.0,
+        fade_distance: 0.0,
+        fade_power: 0.0,
+        fade_colour: Spectrum::BLACK,
+        media: Vec::new(),
+    };
 
     /// What is left of light after a distance inside.
     pub fn transmittance(&self, distance: f32) -> Spectrum {

@@ -65,7 +65,8 @@ impl<'s> Tracer<'s> {
                 extinction += media.extinction() * density;
                 added += media.emission * density;
                 if let Some(scattering) = &media.scattering {
-                    let light = self.light_at(p, traced, direction, record, &|cosine| scattering.phase.at(cosine));
+                    let light =
+                        self.light_at(p, traced, direction, record, &|cosine| scattering.phase.at(cosine));
                     added += scattering.colour * density * light;
                 }
             }
