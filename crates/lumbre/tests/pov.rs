@@ -166,8 +166,6 @@ const VALUES_NOT_YET: &[&str] = &[
     "f_hex_y",
     "f_mesh1",
     "normal prism cubic_spline",
-    "trace sphere_sweep",
-    "normal sphere_sweep",
     "trace ovus",
     "normal ovus",
     "trace julia",

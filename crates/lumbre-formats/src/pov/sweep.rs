@@ -5,6 +5,8 @@ use lumbre_math::{DVec2, DVec3, DVec4};
 
 /// A segment of a curve that is no line is taken for so many round cones; the error is below the square of its inverse.
 const PIECES: u32 = 512;
+/// As near as it begins, few steps are exact.
+const NEWTON_STEPS: u32 = 3;
 /// So many round cones have a box together.
 const GROUP: usize = 16;
 
@@ -136,8 +138,25 @@ impl Sweep {
     /// The normal, of any length: away from the center of the sphere that the point is on.
     pub(super) fn normal(&self, p: DVec3, root: &Root) -> DVec3 {
         let Some(cone) = self.cones.get(root.part as usize) else { return DVec3::Y };
-        let u = cone.range[0] + root.local.x * (cone.range[1] - cone.range[0]);
-        p - at(&self.segments[cone.segment as usize], u).truncate()
+        let cubic = &self.segments[cone.segment as usize];
+        let mut u = cone.range[0] + root.local.x * (cone.range[1] - cone.range[0]);
+        // The spheres that touch their envelope at p have no slope of |p − C|² − r²; the round cone gives where that is nearly so.
+        for _ in 0..NEWTON_STEPS {
+            let sphere = at(cubic, u);
+            let first = (3.0 * cubic[3] * u + 2.0 * cubic[2]) * u + cubic[1];
+            let second = 6.0 * cubic[3] * u + 2.0 * cubic[2];
+            let away = p - sphere.truncate();
+            let slope = away.dot(first.truncate()) + sphere.w * first.w;
+            let change = away.dot(second.truncate()) - first.truncate().length_squared()
+                + first.w * first.w
+                + sphere.w * second.w;
+            let next = (u - slope / change).clamp(cone.range[0], cone.range[1]);
+            if !next.is_finite() {
+                break;
+            }
+            u = next;
+        }
+        p - at(cubic, u).truncate()
     }
 }
 
