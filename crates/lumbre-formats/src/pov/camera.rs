@@ -64,7 +64,7 @@ impl CameraStatement {
     /// Turns to what it looks at, by the angle that it has.
     fn aim(&mut self) {
         if let Some(angle) = self.angle
-            && self.kind == Projection::Perspective
+            && matches!(self.kind, Projection::Perspective | Projection::Orthographic)
         {
             let slope = (0.5 * angle.to_radians()).tangent();
             let length = 0.5 * self.right.length() / slope;

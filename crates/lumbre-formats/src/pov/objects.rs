@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use lumbre_math::{DVec3, Transform};
 use lumbre_scene::MeshDesc;
-use lumbre_shading::pov::{InsideTest, Interior, Layer, PatternKind, Texture, TextureKind, Visibility};
+use lumbre_shading::pov::{InsideTest, Interior, PatternKind, Texture, Visibility};
 
 use super::algebraic::{Algebraic, MOST_DEGREE};
 use super::lights::LightStatement;
@@ -468,37 +468,7 @@ impl Parser<'_, '_> {
 
     fn part_of_texture(&mut self, word: &str, object: &mut Object) -> Result<()> {
         let known = object.texture.take().unwrap_or_else(|| self.defaults.texture());
-        let changed = |layer: Layer, known: &Texture| {
-            Arc::new(Texture { kind: TextureKind::Plain(layer), warps: known.warps.clone(), uv: known.uv })
-        };
-        object.texture = Some(match &known.kind {
-            TextureKind::Plain(layer) => {
-                let mut layer = layer.clone();
-                self.layer_part(word, &mut layer)?;
-                changed(layer, &known)
-            }
-            // The top layer.
-            TextureKind::Layers(layers) => {
-                let mut layers = layers.to_vec();
-                if let Some(top) = layers.last_mut()
-                    && let TextureKind::Plain(layer) = &top.kind
-                {
-                    let mut layer = layer.clone();
-                    self.layer_part(word, &mut layer)?;
-                    *top = changed(layer, top);
-                }
-                Arc::new(Texture {
-                    kind: TextureKind::Layers(layers.into()),
-                    warps: known.warps.clone(),
-                    uv: known.uv,
-                })
-            }
-            _ => {
-                let mut layer = self.defaults.layer.clone();
-                self.layer_part(word, &mut layer)?;
-                Arc::new(Texture::plain(layer))
-            }
-        });
+        object.texture = Some(self.changed_texture(word, &known)?);
         Ok(())
     }
 

@@ -407,6 +407,14 @@ impl Parser<'_, '_> {
                 }
                 "pigment" | "normal" | "finish" => {
                     self.peeked = None;
+                    // Of layers, the top one changes.
+                    if let Some(known) = &base
+                        && matches!(known.kind, TextureKind::Layers(_))
+                    {
+                        let known = Arc::clone(known);
+                        base = Some(self.changed_texture(&word, &known)?);
+                        continue;
+                    }
                     // What is known changes; where it has been moved, this is written into what has been moved.
                     if let Some(known) = &base
                         && let TextureKind::Plain(inner) = &known.kind
@@ -532,6 +540,33 @@ impl Parser<'_, '_> {
             }
         };
         Ok(Arc::new(Texture { kind, warps: draft.warps, uv: draft.uv }))
+    }
+
+    /// A texture with another pigment, normal or finish, whose word was taken; of layers, the top one has it.
+    pub(super) fn changed_texture(&mut self, word: &str, known: &Arc<Texture>) -> Result<Arc<Texture>> {
+        let changed = |layer: Layer, known: &Texture| {
+            Arc::new(Texture { kind: TextureKind::Plain(layer), warps: known.warps.clone(), uv: known.uv })
+        };
+        match &known.kind {
+            TextureKind::Plain(layer) => {
+                let mut layer = layer.clone();
+                self.layer_part(word, &mut layer)?;
+                Ok(changed(layer, known))
+            }
+            TextureKind::Layers(layers) => {
+                let mut layers = layers.to_vec();
+                if let Some(top) = layers.last_mut() {
+                    *top = self.changed_texture(word, top)?;
+                }
+                let kind = TextureKind::Layers(layers.into());
+                Ok(Arc::new(Texture { kind, warps: known.warps.clone(), uv: known.uv }))
+            }
+            _ => {
+                let mut layer = self.defaults.layer.clone();
+                self.layer_part(word, &mut layer)?;
+                Ok(Arc::new(Texture::plain(layer)))
+            }
+        }
     }
 
     /// The pigment, the normal or the finish of a layer, whose word was taken.

@@ -52,6 +52,12 @@ impl Colour {
         0.297 * self.rgb.r + 0.589 * self.rgb.g + 0.114 * self.rgb.b
     }
 
+    /// How much of its own light is shown; by the rule before version 3.7, a filter is as clear as it is bright.
+    pub fn opacity(self, is_old: bool) -> f32 {
+        let filtered = if is_old { self.filter * self.rgb.max_component() } else { self.filter };
+        1.0 - (filtered + self.transmit)
+    }
+
     /// What light that passes is multiplied by.
     pub fn passing(self) -> Spectrum {
         self.rgb * self.filter + Spectrum::splat(self.transmit)

@@ -317,10 +317,6 @@ impl PovMaterial {
 
     /// How much of the light of a pigment's own a layer shows.
     pub fn opacity(&self, colour: Colour) -> f32 {
-        if self.old_opacity {
-            1.0 - (colour.filter * colour.rgb.max_component() + colour.transmit)
-        } else {
-            1.0 - colour.filter - colour.transmit
-        }
+        colour.opacity(self.old_opacity)
     }
 }
