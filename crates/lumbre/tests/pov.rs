@@ -16,17 +16,11 @@ use lumbre::formats::{Budget, Diagnostics, ReadOptions, open_scene};
 const NOT_YET: &[&str] = &[
     "int-refraction",
     "lgt-area-full",
-    "lgt-spot-cyl-parallel",
     "media-simple",
     "obj-height-field",
     "obj-patch-mesh",
-    "obj-sweep-blob",
     "pat-blocks",
-    "pat-fractal",
-    "pat-image-map",
     "pat-turbulence-warp",
-    "shadow-filter",
-    "uv-mapping",
 ];
 
 const SIZE: [u32; 2] = [48, 36];
