@@ -272,11 +272,11 @@ impl Parser<'_, '_> {
             "mesh2" => return self.mesh2(),
             "polygon" => self.polygon()?,
             "superellipsoid" => {
-                let v = self.expression()?;
-                if v.n < 2 || v.v[0] < 0.0 || v.v[1] < 0.0 {
+                let [e, n, ..] = self.expression()?.promoted(2);
+                if !(e >= 0.0 && n >= 0.0) {
                     return Err(self.error("a superellipsoid has two exponents that are not negative"));
                 }
-                Form::Superellipsoid(v.v[0].max(LEAST_EXPONENT), v.v[1].max(LEAST_EXPONENT))
+                Form::Superellipsoid(e.max(LEAST_EXPONENT), n.max(LEAST_EXPONENT))
             }
             "quadric" => self.quadric()?,
             "cubic" => self.poly(3)?,

@@ -51,7 +51,8 @@ impl<'s> Tracer<'s> {
             return behind * left + emission * mean_transmittance(extinction, length as f32) * length as f32;
         }
         let asked = media.iter().map(|media| media.samples).max().unwrap_or(1);
-        let samples = if is_lit { asked } else { asked.max(LEAST_SAMPLES) };
+        let samples = asked.max(LEAST_SAMPLES);
+        let length = self.seen_length(&media, origin, length);
         let step = length / f64::from(samples);
         let (mut left, mut sum) = (Spectrum::WHITE, Spectrum::BLACK);
         for i in 0..samples {
@@ -78,6 +79,16 @@ impl<'s> Tracer<'s> {
             }
         }
         behind * left + sum
+    }
+
+    /// How far media can be seen into: where they are the same everywhere, until next to nothing comes through.
+    fn seen_length(&self, media: &[&Media], origin: DVec3, length: f64) -> f64 {
+        if !media.iter().all(|media| media.is_uniform()) {
+            return length;
+        }
+        let extinction = media.iter().map(|media| media.extinction() * media.density(origin)).sum::<Spectrum>();
+        let least = extinction.r.min(extinction.g).min(extinction.b);
+        if least > 0.0 { length.min(f64::from(-FAINT.logarithm() / least)) } else { length }
     }
 
     /// The light of all lights at a point in a medium, by its share towards a ray.
