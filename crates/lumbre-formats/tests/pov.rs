@@ -78,9 +78,11 @@ fn a_value_is_declared_before_the_next_statement() {
         #declare U = #if (T < 0) 7 #else 8 #end #declare V = U + 1;
         #macro Own() #local X1 = 10; X1 #end #macro Keep() #local X1 = Own(); #local Y1 = X1 + 1; Y1 #end
         #declare W = Keep();
+        #macro Ended() #local Q1 = 12; #if (Q1) Q1; #else 0; #end #end #macro Use() #local Q2 = Ended() Q2 #end
+        #declare Z1 = Use();
         #declare deprecated once \"not this\" Old = 5; #declare deprecated = 6;
-        #write(F, R, \" \", S, \" \", T, \" \", U, \" \", V, \" \", W, \" \", Old, \" \", deprecated)";
-    assert_eq!(written(text), "4 -1 -2 7 8 11 5 6");
+        #write(F, R, \" \", S, \" \", T, \" \", U, \" \", V, \" \", W, \" \", Z1, \" \", Old, \" \", deprecated)";
+    assert_eq!(written(text), "4 -1 -2 7 8 11 12 5 6");
 }
 
 #[test]

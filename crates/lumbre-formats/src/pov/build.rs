@@ -51,6 +51,8 @@ struct Builder {
     problems: Vec<String>,
     /// Interiors of objects that were moved by what they are part of: one for all surfaces of a solid.
     moved_interiors: HashMap<(usize, MapBits), (Arc<Interior>, Arc<Interior>)>,
+    /// Whether dispersion was said to be left out.
+    has_dispersion: bool,
     /// Where the camera is, and what it is inside of.
     eye: DVec3,
     around_eye: Vec<Arc<PovMaterial>>,
@@ -76,6 +78,7 @@ impl Parser<'_, '_> {
             group_count: 0,
             problems: Vec::new(),
             moved_interiors: HashMap::new(),
+            has_dispersion: false,
             eye: camera.location,
             around_eye: Vec::new(),
         };
@@ -324,7 +327,12 @@ impl Builder {
             _ => (UvForm::Plane, None),
         };
         let interior = match interior {
-            Some((interior, map)) => self.moved_interior(interior, &map),
+            Some((interior, map)) => {
+                if interior.dispersion != 1.0 && !std::mem::replace(&mut self.has_dispersion, true) {
+                    self.problems.push("dispersion is not rendered".to_owned());
+                }
+                self.moved_interior(interior, &map)
+            }
             None => Arc::new(Interior::DEFAULT),
         };
         let visibility = lumbre_shading::pov::Visibility {

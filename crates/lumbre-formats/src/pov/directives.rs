@@ -475,6 +475,9 @@ impl Parser<'_, '_> {
         let value = self.value()?;
         self.ends_here()?;
         self.semicolon()?;
+        // That was perhaps the semicolon of a macro, behind the value that it yields.
+        self.ends_here()?;
+        self.semicolon()?;
         self.declaring = outer;
         Ok(value)
     }

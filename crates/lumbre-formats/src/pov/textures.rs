@@ -281,7 +281,7 @@ impl Parser<'_, '_> {
                 continue;
             }
             // The amount stands behind the pattern.
-            if (draft.pattern.is_some() || kept.is_some() || is_average)
+            if (draft.pattern.is_some() || kept.is_some() || is_average || is_ignored)
                 && let Some(Kind::Number(_) | Kind::Mark(b'-' | b'+' | b'(' | b'.')) = self.peek()?
             {
                 amount = self.finite()?;
@@ -731,9 +731,9 @@ impl Parser<'_, '_> {
                 "fade_distance" => interior.fade_distance = self.finite()? as f32,
                 "fade_power" => interior.fade_power = self.finite()? as f32,
                 "fade_color" | "fade_colour" => interior.fade_colour = self.rgb()?,
-                "dispersion" | "dispersion_samples" => {
+                "dispersion" => interior.dispersion = self.finite()? as f32,
+                "dispersion_samples" => {
                     self.float()?;
-                    self.warn("dispersion is not rendered");
                 }
                 "media" => {
                     let media = self.media_block()?;

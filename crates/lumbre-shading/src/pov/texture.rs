@@ -173,6 +173,8 @@ pub struct Interior {
     pub fade_power: f32,
     /// The colour to which it fades.
     pub fade_colour: Spectrum,
+    /// The index of refraction of violet over that of red; what lights surfaces takes the mean for all.
+    pub dispersion: f32,
     /// What is in it, which is seen where the object is hollow.
     pub media: Vec<Media>,
 }
@@ -185,6 +187,7 @@ impl Interior {
         fade_distance: 0.0,
         fade_power: 0.0,
         fade_colour: Spectrum::BLACK,
+        dispersion: 1.0,
         media: Vec::new(),
     };
 

@@ -86,7 +86,8 @@ impl<'s> Tracer<'s> {
         if !media.iter().all(|media| media.is_uniform()) {
             return length;
         }
-        let extinction = media.iter().map(|media| media.extinction() * media.density(origin)).sum::<Spectrum>();
+        let extinction =
+            media.iter().map(|media| media.extinction() * media.density(origin)).sum::<Spectrum>();
         let least = extinction.r.min(extinction.g).min(extinction.b);
         if least > 0.0 { length.min(f64::from(-FAINT.logarithm() / least)) } else { length }
     }
@@ -132,6 +133,11 @@ impl<'s> Tracer<'s> {
         let mut left = Spectrum::WHITE;
         for media in hollow.chain(air) {
             left *= transmittance(media, ray.origin, ray.direction, length.clamp(0.0, FAR));
+        }
+        if light.media_attenuation && is_clear {
+            for fog in &self.world.fogs {
+                left *= fog.transmittance(ray.origin, ray.direction, length.max(0.0));
+            }
         }
         left
     }
