@@ -220,8 +220,6 @@ pub struct PovWorld {
     pub background: Spectrum,
     /// The sky over it, the bottom layer first.
     pub sky: Vec<Arc<Pigment>>,
-    /// Whether pigments are opaque by the rule before version 3.7.
-    pub old_opacity: bool,
     /// Fogs.
     pub fogs: Vec<PovFog>,
     /// The wavelengths of red, green and blue for thin films.

@@ -118,7 +118,6 @@ impl Parser<'_, '_> {
             gamma,
             background,
             sky: self.sky.clone(),
-            old_opacity: settings.version < 3.7,
             fogs: self.fogs.clone(),
             irid_wavelength: settings.irid_wavelength,
             air: self.air.clone(),
@@ -165,7 +164,7 @@ fn sky_image(world: &PovWorld) -> EnvironmentDesc {
             let mut c = world.background;
             for pigment in &world.sky {
                 let colour = pigment.colour(direction, &Eye::NOWHERE);
-                c = colour.rgb * colour.opacity(world.old_opacity) + c * colour.passing();
+                c = colour.rgb * colour.opacity(false) + c * colour.passing();
             }
             pixels.push(linear(c, world.gamma));
         }

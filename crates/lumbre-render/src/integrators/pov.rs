@@ -132,7 +132,7 @@ impl<'s> Tracer<'s> {
         let eye = Eye { normal: -direction, direction: -direction, uv: DVec2::ZERO };
         self.world.sky.iter().fold(self.world.background, |below, pigment| {
             let colour = pigment.colour(direction, &eye);
-            colour.rgb * colour.opacity(self.world.old_opacity) + below * colour.passing()
+            colour.rgb * colour.opacity(false) + below * colour.passing()
         })
     }
 
