@@ -29,6 +29,7 @@ mod merge;
 mod names;
 mod oidn;
 mod output;
+mod povray;
 mod preview;
 mod progress;
 mod reading;
@@ -96,6 +97,13 @@ enum Command {
 /// Runs the program with these words, the first of which is its own name, and returns its exit status. Signals end the process.
 pub fn run(words: Vec<OsString>) -> u8 {
     let words = verb::with_render(words, &Arguments::command());
+    let words = match povray::translated(words) {
+        Ok(words) => words,
+        Err(failure) => {
+            say!("error: {failure}");
+            return failure.status();
+        }
+    };
     let words = math::with_negative_expressions(words);
     let arguments: Arguments = match tips::parse(&words) {
         Ok(arguments) => arguments,
@@ -107,7 +115,10 @@ pub fn run(words: Vec<OsString>) -> u8 {
     }
     threads::start();
     let outcome = match arguments.command {
-        Command::Render(arguments) => render::run(&arguments),
+        Command::Render(mut arguments) => {
+            arguments.tell_reader();
+            render::run(&arguments)
+        }
         Command::View(arguments) => viewing::run(*arguments),
         Command::Cast(arguments) => cast::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
+use lumbre::formats::pov::PovOptions;
 use lumbre::formats::{Budget, Diagnostics, Input, Limits, SceneFormat, Strictness};
 use lumbre::{Error, Scene, SceneDesc, Setting, in_words};
 
@@ -46,6 +47,22 @@ pub(crate) struct ReadingArguments {
     /// several, the first first.
     #[arg(long, value_name = "DIR")]
     pov_include: Vec<PathBuf>,
+    /// The clock of a POV-Ray scene; two, as 0..2, are those of the first and of the last frame of --frames.
+    #[arg(long, value_name = "K|A..B", value_parser = Clock::from_str, allow_hyphen_values = true, hide_short_help = true,
+          help_heading = "Animation")]
+    pov_clock: Option<Clock>,
+    /// The frames that the clock of a POV-Ray scene runs over, where --frames are some of them only.
+    #[arg(long, value_name = "A..B", hide_short_help = true, help_heading = "Animation")]
+    pov_frames: Option<Frames>,
+    /// The frame after the last one of a POV-Ray scene is the first one again.
+    #[arg(long, hide_short_help = true, help_heading = "Animation")]
+    pov_cyclic: bool,
+    /// Declare a number or a text before a POV-Ray scene is read.
+    #[arg(long, value_name = "NAME=VALUE", value_parser = declared, hide_short_help = true, help_heading = "Parameters")]
+    pov_declare: Vec<(String, String)>,
+    /// The size of the picture, which POV-Ray scenes ask for.
+    #[arg(skip)]
+    picture_size: Option<(u32, u32)>,
     /// Set a parameter of the scene: material.NAME.PARAM, light.INDEX.PARAM, light.area.scale, camera.PARAM or film.PARAM. A name
     /// that is not there is answered with those that are.
     #[arg(short = 'D', long = "define", value_name = "PATH=VALUE", help_heading = "Parameters", value_parser = Setting::from_str)]
@@ -104,6 +121,33 @@ impl FromStr for Frames {
     }
 }
 
+/// The clock of a POV-Ray scene: in a still, or in the first and in the last frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Clock([f64; 2]);
+
+impl FromStr for Clock {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (from, to) = text.split_once("..").unwrap_or((text, text));
+        let number = |text: &str| text.parse().ok().filter(|x: &f64| x.is_finite());
+        let wrong = || "expected a number, or two, such as 0..1".to_owned();
+        Ok(Self([number(from).ok_or_else(wrong)?, number(to).ok_or_else(wrong)?]))
+    }
+}
+
+fn declared(text: &str) -> Result<(String, String), String> {
+    let is_name = |name: &str| {
+        let mut bytes = name.bytes();
+        let first = bytes.next().is_some_and(|byte| byte.is_ascii_alphabetic() || byte == b'_');
+        first && bytes.all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
+    };
+    match text.split_once('=') {
+        Some((name, value)) if is_name(name) => Ok((name.to_owned(), value.to_owned())),
+        _ => Err("expected NAME=VALUE, such as Turns=3".to_owned()),
+    }
+}
+
 impl Default for ReadingArguments {
     /// Those of a command line that says nothing of it.
     fn default() -> Self {
@@ -117,6 +161,11 @@ impl Default for ReadingArguments {
             animation: None,
             variant: None,
             pov_include: Vec::new(),
+            pov_clock: None,
+            pov_frames: None,
+            pov_cyclic: false,
+            pov_declare: Vec::new(),
+            picture_size: None,
             settings: Vec::new(),
             overlay: Vec::new(),
             max_memory: None,
@@ -129,6 +178,12 @@ impl Default for ReadingArguments {
 }
 
 impl ReadingArguments {
+    /// Tells POV-Ray scenes the size of the picture, and the frames that their clock runs over if nothing else does.
+    pub(crate) fn tell_pov(&mut self, size: Option<(u32, u32)>, frames: Option<&Frames>) {
+        self.picture_size = size;
+        self.pov_frames = self.pov_frames.take().or_else(|| frames.cloned());
+    }
+
     /// The memory that is left.
     pub(crate) fn memory(&self) -> Memory {
         Memory::new(self.max_memory)
@@ -192,7 +247,7 @@ impl ReadingArguments {
     /// # Errors
     /// As for [`ReadingArguments::open`].
     pub(crate) fn describe(&self, paths: &[PathBuf]) -> Result<(SceneDesc, Diagnostics), Failure> {
-        self.describe_at(paths, self.frame)
+        self.describe_at(paths, self.frame, None)
     }
 
     /// [`Self::describe`] at the frame of this number.
@@ -204,7 +259,7 @@ impl ReadingArguments {
         paths: &[PathBuf],
         number: u32,
     ) -> Result<(SceneDesc, Diagnostics), Failure> {
-        self.describe_at(paths, Some(f64::from(number) / self.fps))
+        self.describe_at(paths, Some(f64::from(number) / self.fps), Some(number))
     }
 
     /// [`Self::describe`] at another moment, and with another variant, where they are given. A scene that is alone may use no files but
@@ -219,23 +274,30 @@ impl ReadingArguments {
         variant: Option<&str>,
         is_alone: bool,
     ) -> Result<(SceneDesc, Diagnostics), Failure> {
-        self.describe_as(paths, time.or(self.frame), variant.or(self.variant.as_deref()), is_alone)
+        self.describe_as(paths, time.or(self.frame), None, variant.or(self.variant.as_deref()), is_alone)
     }
 
-    fn describe_at(&self, paths: &[PathBuf], time: Option<f64>) -> Result<(SceneDesc, Diagnostics), Failure> {
-        self.describe_as(paths, time, self.variant.as_deref(), false)
+    fn describe_at(
+        &self,
+        paths: &[PathBuf],
+        time: Option<f64>,
+        number: Option<u32>,
+    ) -> Result<(SceneDesc, Diagnostics), Failure> {
+        self.describe_as(paths, time, number, self.variant.as_deref(), false)
     }
 
     fn describe_as(
         &self,
         paths: &[PathBuf],
         time: Option<f64>,
+        number: Option<u32>,
         variant: Option<&str>,
         is_alone: bool,
     ) -> Result<(SceneDesc, Diagnostics), Failure> {
         let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
         let memory = self.memory();
         let mut options = self.options(time)?;
+        self.pov_options(number, &mut options.pov);
         options.variant = variant.map(str::to_owned);
         options.is_alone = is_alone;
         let read = lumbre::describe(&paths, &options);
@@ -252,12 +314,14 @@ impl ReadingArguments {
     /// What the scene depends on besides its files, by name.
     pub(crate) fn scene_settings(&self) -> Vec<(String, String)> {
         let Self { lenient, frame, shutter, fps, animation, variant, settings, .. } = self;
+        let Self { pov_clock, pov_frames, pov_cyclic, pov_declare, .. } = self;
         let text = |name: &str, value: String| (name.to_owned(), value);
         vec![
             text("lenient", lenient.to_string()),
             text("frame", in_words(&(frame, shutter, fps, animation))),
             text("variant", in_words(variant)),
             text("settings", in_words(settings)),
+            text("pov", in_words(&(pov_clock, pov_frames, pov_cyclic, pov_declare))),
         ]
     }
 
@@ -282,6 +346,28 @@ impl ReadingArguments {
         Ok(())
     }
 
+    /// What a POV-Ray scene is told of the picture and of the frame.
+    fn pov_options(&self, number: Option<u32>, pov: &mut PovOptions) {
+        pov.library.clone_from(&self.pov_include);
+        pov.declares.clone_from(&self.pov_declare);
+        if let Some((width, height)) = self.picture_size {
+            (pov.width, pov.height) = (width, height);
+        }
+        if let Some(Clock(clocks)) = self.pov_clock {
+            pov.clocks = clocks;
+            pov.clock = clocks[0];
+        }
+        if let (Some(number), Some(Frames(frames))) = (number, &self.pov_frames) {
+            let (first, last) = (*frames.start(), *frames.end());
+            let [from, to] = pov.clocks;
+            let steps = last - first + u32::from(self.pov_cyclic);
+            pov.frames = Some([first, last]);
+            pov.frame_number = number;
+            let done = f64::from(number.saturating_sub(first)) / f64::from(steps.max(1));
+            pov.clock = from + (to - from) * done;
+        }
+    }
+
     fn options(&self, frame: Option<f64>) -> Result<lumbre::ReadOptions, Failure> {
         if self.shutter.is_some() && frame.is_none() {
             return Err(Failure::Usage(
@@ -296,7 +382,6 @@ impl ReadingArguments {
             (frame, _) => frame,
         };
         let mut options = lumbre::ReadOptions::default();
-        options.pov.library.clone_from(&self.pov_include);
         options.limits = self.limits();
         options.format = self.input_format;
         options.strictness = self.strictness();

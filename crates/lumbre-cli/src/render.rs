@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use lumbre::description::{Camera, CameraKind, GroundDesc, IntegratorKind};
 use lumbre::formats::image::{ExrPrecision, ImageFormat};
-use lumbre::formats::{Diagnostics, probe_writable};
+use lumbre::formats::{Diagnostics, SceneFormat, probe_writable};
 use lumbre::image::{Image, ToneMap};
 use lumbre::math::Elementary;
 use lumbre::shading::ShadingNormals;
@@ -317,6 +317,13 @@ const LEAST_TIME: Duration = Duration::from_millis(400);
 const READING: Phase = Phase::Preparing("reading the scene");
 
 impl Arguments {
+    /// Tells what reads POV-Ray scenes about the pictures.
+    pub(crate) fn tell_reader(&mut self) {
+        if self.scene.iter().any(|path| SceneFormat::from_path(path) == Some(SceneFormat::Pov)) {
+            self.reading.tell_pov(self.size, self.frames.as_ref());
+        }
+    }
+
     /// The samples per pixel that are asked for.
     pub(crate) fn spp(&self) -> Option<u32> {
         self.spp

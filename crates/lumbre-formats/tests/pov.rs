@@ -68,6 +68,45 @@ fn a_macro_changes_the_identifier_that_it_is_given() {
     assert_eq!(written(text), "6 4 6 <2, 2, 3>");
 }
 
+/// What a value comes from, such as a macro or a branch, is left before the next statement is read.
+#[test]
+fn a_value_is_declared_before_the_next_statement() {
+    let text = "#macro Pair() #local P = array[2] { 3, 4 } P #end
+        #macro Outer() #local A = Pair() #local B = A[1]; B #end
+        #macro Sign(S) #if (S < 0) -1 #else 1 #end #end
+        #declare R = Outer(); #declare S = Sign(-5) #declare T = S * 2;
+        #declare U = #if (T < 0) 7 #else 8 #end #declare V = U + 1;
+        #macro Own() #local X1 = 10; X1 #end #macro Keep() #local X1 = Own(); #local Y1 = X1 + 1; Y1 #end
+        #declare W = Keep();
+        #macro Ended() #local Q1 = 12; #if (Q1) Q1; #else 0; #end #end #macro Use() #local Q2 = Ended() Q2 #end
+        #declare Z1 = Use();
+        #declare deprecated once \"not this\" Old = 5; #declare deprecated = 6;
+        #write(F, R, \" \", S, \" \", T, \" \", U, \" \", V, \" \", W, \" \", Z1, \" \", Old, \" \", deprecated)";
+    assert_eq!(written(text), "4 -1 -2 7 8 11 12 5 6");
+}
+
+#[test]
+fn parts_of_textures_come_from_arrays_and_maps_without_weights() {
+    let text = "#version 3.7; global_settings { assumed_gamma 1 }
+        default { finish { ambient 0.2 } }
+        camera { location <0, 1, -5> look_at 0# }
+        #declare Finishes = array[2] { finish { ambient 0.3 }, finish { phong 0.4 } }
+        #declare Balls = array[2] { sphere { 0, 1 }, sphere { x*3, 1 } }
+        union { Balls[0] object { Balls[1] } finish { Finishes[1] } }
+        plane { y, -2 pigment { average pigment_map { [gradient x] [2 bozo] [1 rgb 0.5] } } }
+        sphere_sweep { linear_spline 2, <0, 3, 0>, 0.4, <1, 3, 0>, 0.2 }
+        julia_fractal { <-0.083, 0, -0.83, -0.025> quaternion cube max_iteration 6 precision 30 translate y*5 }
+        union { light_group { light_source { 9, 1 } sphere { 0, 1 } global_lights on translate x } }
+        box { -1, 1 hollow pigment { object { sphere { 0, 1.2 } rgb 1, rgb x } }
+          interior { ior 1.2 media { scattering { 5, 0.2 eccentricity 0.3 } density { spherical density_map { [0 rgb 0] [1 rgb 2] } } } } }";
+    let (scene, diagnostics) = read(text);
+    let scene = scene.unwrap();
+    assert_eq!((scene.shapes.len(), scene.lights.len()), (7, 1));
+    let lines = diagnostics.lines();
+    assert_eq!(diagnostics.warnings(), 1, "{lines:?}");
+    assert!(lines[0].contains("a # without the word of a directive"), "{lines:?}");
+}
+
 #[test]
 fn loops_and_choices_go_where_they_should() {
     let text = "#declare I = 0; #while (I < 3) #write(F, I) #declare I = I + 1 #end
@@ -110,6 +149,25 @@ fn malformed_scenes_are_errors_with_places() {
         ("#foo", "unknown directive (found \"foo\")"),
         ("camera { direction x right x }", "the axes of the camera lie in a plane"),
         ("quartic { <1, 2> }", "too few coefficients (found 2; expected 35)"),
+        ("sphere_sweep { b_spline 3, 0, 1, x, 1, y, 1 }", "too few spheres for a sphere_sweep"),
+        ("sphere_sweep { bezier_spline 4, 0, 1 }", "expected linear_spline, b_spline or cubic_spline"),
+        ("sphere_sweep { linear_spline 1000000000, 0, 1 }", "unexpected (found \"}\""),
+        (
+            "julia_fractal { <0, 0, 0, 0> slice x, 0 }",
+            "the slice of a julia_fractal whose normal has no fourth",
+        ),
+        ("julia_fractal { 1e999 }", "a vector that is not finite"),
+        ("media { scattering { 1 } }", "unexpected (found \"}\""),
+        ("media { glow 1 }", "glow has no meaning in a medium"),
+        ("sphere { 0, 1 interior { media { density { [ } } } }", "unexpected (found \"[\""),
+        ("plane { y, 0 pigment { object { 5 } } }", "expected the name of an object"),
+        ("superellipsoid { <-1, 1> }", "a superellipsoid has two exponents that are not negative"),
+        ("#declare deprecated once", "the name of an identifier is missing"),
+        (
+            "mesh2 { vertex_vectors { 3, 0, x, y } face_indices { 1, <0, 1, 2>, 7 } }",
+            "a texture that the mesh2 does not have",
+        ),
+        ("pigment { mandel }", "an object, a light, a camera or a directive"),
     ] {
         let (scene, _) = read(text);
         let error = scene.map(|_| ()).expect_err(text).to_diagnostic().to_string();

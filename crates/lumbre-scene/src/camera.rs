@@ -71,16 +71,16 @@ pub enum WideProjection {
 }
 
 impl WideProjection {
-    /// The origin and the direction of the ray at a place of the picture, both coordinates from -1/2 to 1/2; not a number where
-    /// nothing is seen.
-    fn line(&self, at: DVec2) -> (DVec3, DVec3) {
+    /// The origin and the direction of the ray at a place of the picture, both coordinates from -1/2 to 1/2; `None` where nothing is
+    /// seen.
+    fn line(&self, at: DVec2) -> Option<(DVec3, DVec3)> {
         let center = DVec3::ZERO;
-        match *self {
+        Some(match *self {
             Self::Fisheye { angle, size } => {
                 let place = 2.0 * at * size;
                 let radius = place.length();
                 if radius > 1.0 {
-                    return (center, DVec3::NAN);
+                    return None;
                 }
                 let (sine, cosine) = (radius * 0.5 * angle.to_radians()).sine_cosine();
                 let side = if radius > 0.0 { place / radius } else { DVec2::ZERO };
@@ -119,7 +119,7 @@ impl WideProjection {
                 let (sy, cy) = (at.y * angles.y.to_radians()).sine_cosine();
                 (center, DVec3::new(sx * cy, sy, cx * cy))
             }
-        }
+        })
     }
 }
 
@@ -270,7 +270,8 @@ pub struct CameraRay {
     pub ray: Ray,
     /// The rays through neighbouring points of the film.
     pub footprint: Footprint,
-    /// What the picture has of the radiance that comes along it: 1, but for real lenses. 0 where the lens stops it.
+    /// What the picture has of the radiance that comes along it: 1, but for real lenses. 0 where the lens stops it, or where a wide
+    /// camera sees nothing.
     pub weight: f64,
 }
 
@@ -423,7 +424,11 @@ impl View {
                 (DVec3::ZERO, DVec3::new(sin_theta * cos_phi, cos_theta, sin_theta * sin_phi))
             }
             CameraKind::Spherical { mapping: SphericalMapping::Wide(wide) } => {
-                wide.line(DVec2::new(on_screen.x - 0.5, 0.5 - on_screen.y))
+                let line = wide.line(DVec2::new(on_screen.x - 0.5, 0.5 - on_screen.y));
+                if line.is_none() {
+                    weight = 0.0;
+                }
+                line.unwrap_or((DVec3::ZERO, DVec3::Z))
             }
             CameraKind::Spherical { mapping: SphericalMapping::EqualArea } => {
                 let d = equal_area_square_to_sphere(equal_area_wrap(on_screen));

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use lumbre_math::{DVec2, DVec3, Elementary};
-use lumbre_shading::pov::Pigment;
+use lumbre_shading::pov::{Media, Pigment, PovMaterial};
 use lumbre_shading::{Scatter, Spectrum};
 
 use crate::light::{LightPoint, LightSample};
@@ -33,6 +33,10 @@ pub struct PovLight {
     pub group: Option<u32>,
     /// The exponent from the working space to linear light.
     pub gamma: f32,
+    /// Whether media scatter its light.
+    pub media_interaction: bool,
+    /// Whether media in the air take from its light.
+    pub media_attenuation: bool,
 }
 
 /// Where a light shines.
@@ -82,6 +86,8 @@ impl PovLight {
             area: None,
             group: None,
             gamma: 1.0,
+            media_interaction: true,
+            media_attenuation: false,
         }
     }
 
@@ -91,7 +97,8 @@ impl PovLight {
 
     /// The unit direction to the light from a point, and how far that is; by another place of it, as areas have.
     pub fn towards(&self, p: DVec3, from: DVec3) -> Option<(DVec3, f64)> {
-        if self.is_parallel {
+        // In a cylinder of light all rays are parallel to its axis, too.
+        if self.is_parallel || self.cone.is_some_and(|cone| cone.is_cylinder) {
             let axis = self.axis();
             return Some((-axis, (p - from).dot(axis)));
         }
@@ -217,6 +224,12 @@ pub struct PovWorld {
     pub fogs: Vec<PovFog>,
     /// The wavelengths of red, green and blue for thin films.
     pub irid_wavelength: Spectrum,
+    /// What fills the air.
+    pub air: Vec<Media>,
+    /// Where the scene's camera is.
+    pub eye: DVec3,
+    /// What the scene's camera is inside of.
+    pub around_eye: Vec<Arc<PovMaterial>>,
 }
 
 /// Fog over an infinite way is that over this length.

@@ -14,7 +14,7 @@ use lumbre_render::{
     CancelToken, ExplainedSample, Feature, Keeper, NoProgress, Progress, RenderOptions, RenderState, Stop,
     render_from,
 };
-use lumbre_scene::{BuildWarning, Footprint, SceneDesc};
+use lumbre_scene::{BuildWarning, Footprint, IntegratorKind, SceneDesc};
 use lumbre_shading::Spectrum;
 
 use crate::{CastHit, CastPoint, Error, Picture, SceneInfo};
@@ -81,6 +81,7 @@ impl Scene {
     pub fn of_file(desc: SceneDesc, path: &Path, diagnostics: &mut Diagnostics) -> Result<Self, Error> {
         // Problems of the whole scene have a file but no line.
         let file = || Place::whole(path.display().to_string());
+        let is_pov = desc.integrator.kind == IntegratorKind::Pov;
         let scene = match Self::from_description(desc) {
             Err(Error::Build(wrong)) => {
                 return Err(FormatError::from(Diagnostic::error(wrong.to_string()).at(file())).into());
@@ -88,9 +89,18 @@ impl Scene {
             scene => scene?,
         };
         // Ray queries need no light: it concerns only pictures ([`Scene::is_dark`]).
-        let of_any_use = |warning: &&BuildWarning| **warning != BuildWarning::NoLight;
-        for warning in scene.resolved.warnings().iter().filter(of_any_use) {
-            diagnostics.push(Diagnostic::warning(warning.to_string()).at(file()));
+        let mut found_by_chance = 0_u32;
+        for warning in scene.resolved.warnings() {
+            match warning {
+                BuildWarning::NoLight => {}
+                // Surfaces of POV-Ray's scenes light each other by other integrators only.
+                BuildWarning::UnsampledLight { .. } if is_pov => found_by_chance += 1,
+                _ => diagnostics.push(Diagnostic::warning(warning.to_string()).at(file())),
+            }
+        }
+        if found_by_chance > 0 {
+            let note = "the light of surfaces of solids is found by chance only by the integrator path, which is slow";
+            diagnostics.push(Diagnostic::note(note).at(file()).found(found_by_chance));
         }
         diagnostics.check()?;
         Ok(scene)

@@ -18,8 +18,12 @@ use lumbre_shading::{Material, MaterialKind, Spectrum};
 use super::camera::CameraStatement;
 use super::objects::{Form, Object};
 use super::solids::{Clipped, Leaf, Solid, leaves};
+use super::textures::moved_interior;
 use super::{Parser, Result};
 use crate::Diagnostic;
+
+/// A place as the bits of its map.
+type MapBits = [u64; 12];
 
 /// What makes two materials the same.
 #[derive(PartialEq, Eq, Hash)]
@@ -45,6 +49,13 @@ struct Builder {
     global: bool,
     group_count: u32,
     problems: Vec<String>,
+    /// Interiors of objects that were moved by what they are part of: one for all surfaces of a solid.
+    moved_interiors: HashMap<(usize, MapBits), (Arc<Interior>, Arc<Interior>)>,
+    /// Whether dispersion was said to be left out.
+    has_dispersion: bool,
+    /// Where the camera is, and what it is inside of.
+    eye: DVec3,
+    around_eye: Vec<Arc<PovMaterial>>,
 }
 
 impl Parser<'_, '_> {
@@ -54,6 +65,7 @@ impl Parser<'_, '_> {
             self.diagnostics.push(Diagnostic::note("the scene has no #version: it counts as 3.62"));
         }
         let gamma = self.settings.gamma() as f32;
+        let camera = self.camera.clone().unwrap_or(CameraStatement { ..self.default_camera.clone() });
         let mut builder = Builder {
             scene: SceneDesc::default(),
             materials: HashMap::new(),
@@ -65,6 +77,10 @@ impl Parser<'_, '_> {
             global: true,
             group_count: 0,
             problems: Vec::new(),
+            moved_interiors: HashMap::new(),
+            has_dispersion: false,
+            eye: camera.location,
+            around_eye: Vec::new(),
         };
         for object in std::mem::take(&mut self.objects) {
             builder.object(&object);
@@ -73,8 +89,7 @@ impl Parser<'_, '_> {
             self.diagnostics.push(Diagnostic::warning(problem));
         }
         let mut scene = builder.scene;
-        self.around(&mut scene, gamma);
-        let camera = self.camera.clone().unwrap_or(CameraStatement { ..self.default_camera.clone() });
+        self.around(&mut scene, gamma, camera.location, builder.around_eye);
         match camera.camera() {
             Some(made) => scene.cameras.push(made),
             None => return Err(Diagnostic::error("the axes of the camera lie in a plane").into()),
@@ -93,7 +108,7 @@ impl Parser<'_, '_> {
     }
 
     /// Background, sky and fog.
-    fn around(&self, scene: &mut SceneDesc, gamma: f32) {
+    fn around(&self, scene: &mut SceneDesc, gamma: f32, eye: DVec3, around_eye: Vec<Arc<PovMaterial>>) {
         let settings = &self.settings;
         let background = self.background.map_or(Spectrum::BLACK, |[r, g, b]| Spectrum::new(r, g, b));
         let world = PovWorld {
@@ -105,6 +120,9 @@ impl Parser<'_, '_> {
             sky: self.sky.clone(),
             fogs: self.fogs.clone(),
             irid_wavelength: settings.irid_wavelength,
+            air: self.air.clone(),
+            eye,
+            around_eye,
         };
         let light = if world.sky.is_empty() {
             (!background.is_black()).then(|| LightDesc::Infinite {
@@ -146,7 +164,7 @@ fn sky_image(world: &PovWorld) -> EnvironmentDesc {
             let mut c = world.background;
             for pigment in &world.sky {
                 let colour = pigment.colour(direction, &Eye::NOWHERE);
-                c = colour.rgb * (1.0 - colour.filter - colour.transmit) + c * colour.passing();
+                c = colour.rgb * colour.opacity(false) + c * colour.passing();
             }
             pixels.push(linear(c, world.gamma));
         }
@@ -163,16 +181,7 @@ impl Builder {
 
     fn placed(&mut self, object: &Rc<Object>, parent: &Transform) {
         if let Form::LightGroup(parts, global) = &object.form {
-            self.group_count += 1;
-            let map = *parent * object.transform;
-            let outer_global = self.global;
-            self.groups.push(self.group_count);
-            self.global = outer_global && *global;
-            for part in parts {
-                self.placed(part, &map);
-            }
-            self.groups.pop();
-            self.global = outer_global;
+            self.light_group(parts, *global, &(*parent * object.transform));
             return;
         }
         let mut found: Vec<(Leaf<'_>, Vec<&Object>)> = Vec::new();
@@ -182,6 +191,18 @@ impl Builder {
         for (leaf, around) in found {
             self.leaf(&leaf, &around, parent);
         }
+    }
+
+    fn light_group(&mut self, parts: &[Rc<Object>], global: bool, map: &Transform) {
+        self.group_count += 1;
+        let outer_global = self.global;
+        self.groups.push(self.group_count);
+        self.global = outer_global && global;
+        for part in parts {
+            self.placed(part, map);
+        }
+        self.groups.pop();
+        self.global = outer_global;
     }
 
     fn leaf(&mut self, leaf: &Leaf<'_>, around: &[&Object], parent: &Transform) {
@@ -199,15 +220,25 @@ impl Builder {
                 }
                 return;
             }
-            Form::LightGroup(..) => {
-                self.problems.push("a light_group in another object is not rendered".to_owned());
+            Form::LightGroup(parts, global) => {
+                if !leaf.regions.is_empty() {
+                    self.problems.push("a light_group in CSG, or clipped, is shown whole".to_owned());
+                }
+                self.light_group(parts, *global, &leaf.map);
                 return;
             }
             _ => {}
         }
         let material = self.material(leaf, around, parent);
-        let id = self.material_id(material);
-        let Some((geometry, map)) = self.geometry(leaf) else { return };
+        let Some((geometry, map, is_around_eye)) = self.geometry(leaf) else { return };
+        let has_interior = around.iter().chain([&leaf.object]).any(|object| object.interior.is_some());
+        let id = self.material_id(material, has_interior);
+        if is_around_eye
+            && let MaterialKind::Pov(material) = &self.scene.materials[id.0 as usize].material.kind
+            && !self.around_eye.iter().any(|known| known.is_of_solid(material))
+        {
+            self.around_eye.push(Arc::clone(material));
+        }
         // What is infinite cannot be sampled as a light.
         let is_plane = matches!(leaf.object.form, Form::Plane(..));
         let area_light = if is_plane { None } else { self.glow(id) };
@@ -224,7 +255,8 @@ impl Builder {
         });
     }
 
-    fn geometry(&mut self, leaf: &Leaf<'_>) -> Option<(GeometryDesc, Transform)> {
+    /// The surface of a leaf with its place, and whether the camera is inside of it.
+    fn geometry(&mut self, leaf: &Leaf<'_>) -> Option<(GeometryDesc, Transform, bool)> {
         if let Form::Mesh(mesh) = &leaf.object.form {
             if mesh.triangles.is_empty() {
                 return None;
@@ -232,7 +264,7 @@ impl Builder {
             if !leaf.regions.is_empty() {
                 self.problems.push("a mesh in CSG, or clipped, is shown whole".to_owned());
             }
-            return Some((GeometryDesc::Mesh(Arc::clone(mesh)), leaf.map));
+            return Some((GeometryDesc::Mesh(Arc::clone(mesh)), leaf.map, false));
         }
         let solid = match Solid::new(&leaf.object.form, &leaf.map) {
             Ok(Some(solid)) => solid,
@@ -242,22 +274,24 @@ impl Builder {
                 return None;
             }
         };
+        let is_around_eye = solid.contains(self.eye) != leaf.is_flipped
+            && leaf.regions.iter().all(|region| region.contains(self.eye));
         match solid {
             Solid::Exact { surface, .. } if leaf.regions.is_empty() => {
                 let shape: Shape = surface.shape().clone();
-                Some((GeometryDesc::Exact(shape), surface.world_from_object()))
+                Some((GeometryDesc::Exact(shape), surface.world_from_object(), is_around_eye))
             }
             Solid::Implicit { surface, world_from_object } if leaf.regions.is_empty() => {
-                Some((GeometryDesc::Custom(Arc::new(surface)), world_from_object))
+                Some((GeometryDesc::Custom(Arc::new(surface)), world_from_object, is_around_eye))
             }
             solid => {
                 let clipped = Clipped::new(Arc::new(solid), leaf.regions.clone(), leaf.is_flipped);
-                Some((GeometryDesc::Custom(Arc::new(clipped)), Transform::IDENTITY))
+                Some((GeometryDesc::Custom(Arc::new(clipped)), Transform::IDENTITY, is_around_eye))
             }
         }
     }
 
-    fn material(&self, leaf: &Leaf<'_>, around: &[&Object], parent: &Transform) -> PovMaterial {
+    fn material(&mut self, leaf: &Leaf<'_>, around: &[&Object], parent: &Transform) -> PovMaterial {
         // From the object itself outwards, the first that has one.
         let mut maps = vec![*parent];
         for object in around {
@@ -276,7 +310,7 @@ impl Builder {
         };
         let texture = from(&|object| object.texture.clone());
         let interior_texture = from(&|object| object.interior_texture.clone());
-        let interior = chain.iter().rev().find_map(|(object, _)| object.interior.clone());
+        let interior = chain.iter().rev().find_map(|(object, map)| Some((object.interior.clone()?, **map)));
         let mut texture = texture.unwrap_or_else(|| Arc::clone(&self.default_texture));
         if uses_uv {
             texture = mapped(&texture);
@@ -287,7 +321,18 @@ impl Builder {
                 (UvForm::Cuboid(low.min(*high), low.max(*high)), Some(Arc::new(leaf.map)))
             }
             Form::Torus(major, _) => (UvForm::Torus(*major), Some(Arc::new(leaf.map))),
-            _ => (UvForm::Surface, None),
+            Form::Mesh(_) => (UvForm::Surface, None),
+            Form::Swept(swept) if swept.is_turned() => (UvForm::Surface, None),
+            _ => (UvForm::Plane, None),
+        };
+        let interior = match interior {
+            Some((interior, map)) => {
+                if interior.dispersion != 1.0 && !std::mem::replace(&mut self.has_dispersion, true) {
+                    self.problems.push("dispersion is not rendered".to_owned());
+                }
+                self.moved_interior(interior, &map)
+            }
+            None => Arc::new(Interior::DEFAULT),
         };
         let visibility = lumbre_shading::pov::Visibility {
             no_shadow: any(&|object| object.visibility.no_shadow),
@@ -297,8 +342,7 @@ impl Builder {
         PovMaterial {
             texture,
             interior_texture,
-            interior: interior
-                .map_or_else(|| Arc::new(Interior::DEFAULT), |interior| Arc::new((*interior).clone())),
+            interior,
             visibility,
             double_illuminate: any(&|object| object.double_illuminate),
             hollow: any(&|object| object.hollow),
@@ -310,14 +354,24 @@ impl Builder {
         }
     }
 
-    fn material_id(&mut self, material: PovMaterial) -> MaterialId {
+    /// An interior where its object is: the same one for all surfaces of that object.
+    fn moved_interior(&mut self, interior: Arc<Interior>, map: &Transform) -> Arc<Interior> {
+        if interior.media.is_empty() || map.is_identity() {
+            return interior;
+        }
+        let bits = map.affine().to_cols_array().map(f64::to_bits);
+        let key = (Arc::as_ptr(&interior) as usize, bits);
+        let made = || (Arc::clone(&interior), moved_interior(Arc::clone(&interior), &Arc::new(*map)));
+        Arc::clone(&self.moved_interiors.entry(key).or_insert_with(made).1)
+    }
+
+    fn material_id(&mut self, material: PovMaterial, has_interior: bool) -> MaterialId {
         let is_mapped = matches!(&material.texture.kind, TextureKind::Plain(layer) if layer.pigment.uniform().is_none())
             && material.uv.1.is_some();
         let key = Key {
             texture: Arc::as_ptr(&material.texture) as usize,
             inside: material.interior_texture.as_ref().map_or(0, |texture| Arc::as_ptr(texture) as usize),
-            // Interiors are small: told apart by what they say.
-            interior: hashed(&material.interior),
+            interior: if has_interior { Arc::as_ptr(&material.interior) as usize } else { 0 },
             flags: [
                 material.visibility.no_shadow,
                 material.visibility.no_image,
@@ -364,13 +418,6 @@ impl Builder {
             spectrum: None,
         })
     }
-}
-
-fn hashed(interior: &Interior) -> usize {
-    let c = interior.fade_colour;
-    let numbers =
-        [interior.ior, interior.caustics, interior.fade_distance, interior.fade_power, c.r, c.g, c.b];
-    numbers.iter().fold(0, |hash: usize, x| hash.wrapping_mul(1_000_003).wrapping_add(x.to_bits() as usize))
 }
 
 /// A texture in the coordinates of its surface.

@@ -34,11 +34,17 @@ impl Parser<'_, '_> {
             "true" | "yes" | "on" => Num::float(1.0),
             "false" | "no" | "off" => Num::float(0.0),
             "clock" => Num::float(frame.clock),
-            "clock_delta" | "clock_on" | "initial_clock" => Num::float(0.0),
-            "final_clock" => Num::float(1.0),
+            "clock_delta" => {
+                let steps = frame.frames.map_or(0, |[first, last]| last.saturating_sub(first));
+                let [from, to] = frame.clocks;
+                Num::float(if steps == 0 { 0.0 } else { (to - from) / f64::from(steps) })
+            }
+            "clock_on" => Num::float(f64::from(u8::from(frame.frames.is_some()))),
+            "initial_clock" => Num::float(frame.clocks[0]),
+            "final_clock" => Num::float(frame.clocks[1]),
             "frame_number" => Num::float(f64::from(frame.frame_number)),
-            "initial_frame" => Num::float(0.0),
-            "final_frame" => Num::float(0.0),
+            "initial_frame" => Num::float(frame.frames.map_or(0.0, |[first, _]| f64::from(first))),
+            "final_frame" => Num::float(frame.frames.map_or(0.0, |[_, last]| f64::from(last))),
             "image_width" => Num::float(f64::from(frame.width)),
             "image_height" => Num::float(f64::from(frame.height)),
             "version" => Num::float(self.settings.version),

@@ -64,7 +64,7 @@ impl CameraStatement {
     /// Turns to what it looks at, by the angle that it has.
     fn aim(&mut self) {
         if let Some(angle) = self.angle
-            && self.kind == Projection::Perspective
+            && matches!(self.kind, Projection::Perspective | Projection::Orthographic)
         {
             let slope = (0.5 * angle.to_radians()).tangent();
             let length = 0.5 * self.right.length() / slope;
@@ -235,7 +235,7 @@ impl Parser<'_, '_> {
                     self.expect(b'{')?;
                     self.skip_to(b'}')?;
                 }
-                _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
+                _ => match self.known(&word)? {
                     Some(Value::Camera(known)) => {
                         camera = (*known).clone();
                         is_aimed = true;

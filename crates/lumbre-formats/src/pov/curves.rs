@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use lumbre_math::DVec2;
+use lumbre_math::{DVec2, DVec4};
 
 use super::objects::Form;
+use super::sweep::Sweep;
 use super::swept::{Outline, Swept};
 use super::{Parser, Result};
 
@@ -100,6 +101,34 @@ impl Parser<'_, '_> {
             return Err(self.error("too few points for a lathe"));
         }
         Ok(Form::Swept(Arc::new(Swept::Lathe(outline))))
+    }
+
+    /// A sphere sweep, up to what modifies it.
+    pub(super) fn sphere_sweep(&mut self) -> Result<Form> {
+        let Some(word) = self.word()? else { return Err(self.unexpected("the spline of a sphere_sweep")) };
+        let (sweep, least): (fn(&[DVec4]) -> Sweep, u32) = match &*word {
+            "linear_spline" => (Sweep::linear, 2),
+            "b_spline" => (Sweep::b_spline, 4),
+            "cubic_spline" => (Sweep::cubic, 4),
+            _ => return Err(self.unexpected("linear_spline, b_spline or cubic_spline")),
+        };
+        self.peeked = None;
+        let count = self.whole(0.0, 1e7)?;
+        if count < least {
+            return Err(self.error("too few spheres for a sphere_sweep"));
+        }
+        let mut spheres = Vec::new();
+        for _ in 0..count {
+            self.budget.bytes(Sweep::SEGMENT_BYTES, "spheres of a sweep")?;
+            self.comma()?;
+            let center = self.vector()?;
+            self.comma()?;
+            spheres.push(center.extend(self.finite()?));
+        }
+        if self.take_word("tolerance")? {
+            self.float()?;
+        }
+        Ok(Form::Sweep(Arc::new(sweep(&spheres))))
     }
 
     pub(super) fn sor(&mut self) -> Result<Form> {

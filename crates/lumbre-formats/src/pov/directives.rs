@@ -22,10 +22,11 @@ impl Parser<'_, '_> {
     /// What follows a `#`.
     pub(super) fn directive(&mut self) -> Result<()> {
         let at = self.frames.last().map_or(0, |frame| frame.at.saturating_sub(1));
-        let Some(token) = self.raw()? else { return Err(self.error("a # at the end")) };
-        let Kind::Word(word) = token.kind else {
-            return Err(self.error("a # without the word of a directive"));
-        };
+        if !matches!(self.raw_ahead(0), Some(Kind::Word(_))) {
+            self.warn("a # without the word of a directive is left out");
+            return Ok(());
+        }
+        let Some(Kind::Word(word)) = self.raw()?.map(|token| token.kind) else { return Ok(()) };
         match &*word {
             "declare" | "local" => self.declare(&*word == "local"),
             "undef" => self.undef(),
@@ -426,11 +427,25 @@ impl Parser<'_, '_> {
         Ok(Some(cell))
     }
 
+    fn declared_name(&mut self) -> Result<Rc<str>> {
+        match self.raw()?.map(|token| token.kind) {
+            Some(Kind::Word(name)) => Ok(name),
+            _ => Err(self.error("the name of an identifier is missing")),
+        }
+    }
+
     fn declare(&mut self, is_local: bool) -> Result<()> {
-        let Some(token) = self.raw()? else { return Err(self.error("the name of an identifier is missing")) };
-        let Kind::Word(name) = token.kind else {
-            return Err(self.error("the name of an identifier is missing"));
-        };
+        let mut name = self.declared_name()?;
+        // `deprecated once "message"` before a name asks for a warning where the name is used.
+        if &*name == "deprecated" && self.raw_ahead(0) != Some(&Kind::Mark(b'=')) {
+            if matches!(self.raw_ahead(0), Some(Kind::Word(word)) if &**word == "once") {
+                self.raw()?;
+            }
+            if matches!(self.raw_ahead(0), Some(Kind::Text(_))) {
+                self.raw()?;
+            }
+            name = self.declared_name()?;
+        }
         if is_reserved(&name) {
             return Err(self.reserved(&name));
         }
@@ -458,6 +473,10 @@ impl Parser<'_, '_> {
         let blocks = self.frames.last().map_or(0, |frame| frame.blocks.len());
         let outer = self.declaring.replace((self.frames.len(), blocks));
         let value = self.value()?;
+        self.ends_here()?;
+        self.semicolon()?;
+        // That was perhaps the semicolon of a macro, behind the value that it yields.
+        self.ends_here()?;
         self.semicolon()?;
         self.declaring = outer;
         Ok(value)

@@ -59,7 +59,7 @@ impl Parser<'_, '_> {
     }
 
     fn word_if_same_statement(&mut self) -> Result<Option<Rc<str>>> {
-        if self.ends_here() { Ok(None) } else { self.word() }
+        if self.ends_here()? { Ok(None) } else { self.word() }
     }
 
     pub(super) fn as_float(&self, num: &Num) -> Result<f64> {
@@ -81,7 +81,7 @@ impl Parser<'_, '_> {
     }
 
     fn operator(&mut self, marks: &[u8]) -> Result<Option<u8>> {
-        if self.ends_here() {
+        if self.ends_here()? {
             return Ok(None);
         }
         match self.peek()? {
@@ -398,11 +398,21 @@ impl Parser<'_, '_> {
         self.diagnostic(wrong).into()
     }
 
+    /// What a name stands for, whose word was taken: of an array or a dictionary, the element that follows.
+    pub(super) fn known(&mut self, name: &str) -> Result<Option<Value>> {
+        let Some(cell) = self.lookup(name).cloned() else { return Ok(None) };
+        let value = cell.borrow().clone();
+        match value {
+            Value::Array(_) | Value::Dictionary(_) => self.indexed(value).map(Some),
+            _ => Ok(Some(value)),
+        }
+    }
+
     /// Elements of arrays and dictionaries behind a value.
     pub(super) fn indexed(&mut self, mut value: Value) -> Result<Value> {
         loop {
             match &value {
-                Value::Array(array) if !self.ends_here() && self.is_mark(b'[')? => {
+                Value::Array(array) if !self.ends_here()? && self.is_mark(b'[')? => {
                     let array = Rc::clone(array);
                     match self.element(&array)? {
                         Some(Value::Nothing) | None => {
@@ -412,7 +422,7 @@ impl Parser<'_, '_> {
                     }
                 }
                 Value::Dictionary(entries)
-                    if !self.ends_here() && (self.is_mark(b'.')? || self.is_mark(b'[')?) =>
+                    if !self.ends_here()? && (self.is_mark(b'.')? || self.is_mark(b'[')?) =>
                 {
                     let entries = Rc::clone(entries);
                     let key: Rc<str> = if self.take(b'.')? {
@@ -460,7 +470,7 @@ impl Parser<'_, '_> {
     fn indices(&mut self, array: &Array) -> Result<(usize, usize)> {
         let mut offset = 0;
         let mut taken = 0;
-        while taken < array.sizes.len() && (taken == 0 || !self.ends_here()) && self.take(b'[')? {
+        while taken < array.sizes.len() && (taken == 0 || !self.ends_here()?) && self.take(b'[')? {
             let index = self.float()?;
             self.expect(b']')?;
             let size = array.sizes[taken];

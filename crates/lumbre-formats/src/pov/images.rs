@@ -37,7 +37,7 @@ impl Parser<'_, '_> {
                 }
                 "filter" | "transmit" => {
                     if self.take_word("all")? {
-                        let value = Some(self.finite()? as f32);
+                        let value = self.finite()? as f32;
                         if &*word == "filter" { image.filter = value } else { image.transmit = value }
                     } else {
                         self.float()?;
@@ -69,8 +69,8 @@ impl Parser<'_, '_> {
             projection: ImageProjection::Planar,
             once: false,
             interpolate: false,
-            filter: None,
-            transmit: None,
+            filter: 0.0,
+            transmit: 0.0,
         };
         if self.take_word("function")? {
             image.width = self.whole(2.0, 65_536.0)?;

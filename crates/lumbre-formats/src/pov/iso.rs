@@ -288,7 +288,7 @@ impl Parser<'_, '_> {
             for x in 0..width - 1 {
                 let i = y * width + x;
                 let [a, b, c, d] = [i, i + 1, i + width, i + width + 1];
-                for face in [[a, b, c], [b, d, c]] {
+                for face in [[a, d, c], [a, b, d]] {
                     if face.iter().any(|&i| f64::from(mesh.positions[i as usize].y) >= water) {
                         mesh.triangles.push(face);
                     }

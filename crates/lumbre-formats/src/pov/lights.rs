@@ -133,9 +133,8 @@ impl Parser<'_, '_> {
                 self.expect(b'{')?;
                 self.skip_to(b'}')?;
             }
-            "media_interaction" | "media_attenuation" => {
-                self.optional_bool()?;
-            }
+            "media_interaction" => light.media_interaction = self.optional_bool()?,
+            "media_attenuation" => light.media_attenuation = self.optional_bool()?,
             _ => return Err(self.error(format!("{word} has no meaning for a light"))),
         }
         Ok(())

@@ -4,6 +4,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use lumbre_shading::Spectrum;
+use lumbre_shading::pov::function::Unary;
 use lumbre_shading::pov::{Colour, Normal, Pigment, Texture};
 
 use super::expression::begins_colour;
@@ -20,8 +21,6 @@ pub(super) enum Map {
     Textures(Vec<(f64, Arc<Texture>)>),
     /// Heights with their slopes.
     Slopes(Vec<(f64, [f64; 2])>),
-    /// Of what is read over.
-    Ignored,
 }
 
 impl Parser<'_, '_> {
@@ -57,17 +56,14 @@ impl Parser<'_, '_> {
         let map = match word {
             "color_map" | "colour_map" => Map::Colours(self.colour_entries()?),
             "pigment_map" => Map::Pigments(self.entries(|parser| parser.pigment_body(None, b']'))?),
+            "density_map" => Map::Pigments(self.entries(|parser| parser.density_body(b']'))?),
             "normal_map" => Map::Normals(self.entries(|parser| parser.normal_body(None, b']'))?),
             "texture_map" => Map::Textures(self.entries(|parser| parser.texture_body(b']'))?),
-            "slope_map" => Map::Slopes(self.entries(|parser| {
+            _ => Map::Slopes(self.entries(|parser| {
                 let v = parser.vector()?;
                 parser.expect(b']')?;
                 Ok([v.x, v.y])
             })?),
-            _ => {
-                self.entries(|parser| parser.skip_to(b']'))?;
-                Map::Ignored
-            }
         };
         Ok(Some(Rc::new(map)))
     }
@@ -77,7 +73,8 @@ impl Parser<'_, '_> {
         let mut entries: Vec<(f64, T)> = Vec::new();
         while !self.take(b'}')? {
             self.expect(b'[')?;
-            let v = self.finite()?;
+            // Of an average, the weight may be left out.
+            let v = if self.is_number()? { self.finite()? } else { 1.0 };
             self.comma()?;
             self.budget.bytes(size_of::<(f64, T)>() as u64, "maps")?;
             entries.push((v, read(self)?));
@@ -88,6 +85,28 @@ impl Parser<'_, '_> {
             return Err(self.error("a map without entries"));
         }
         Ok(entries)
+    }
+
+    /// Whether a number comes next.
+    fn is_number(&mut self) -> Result<bool> {
+        let word = match self.peek()? {
+            Some(Kind::Number(_) | Kind::Mark(b'-' | b'+' | b'(' | b'!')) => return Ok(true),
+            Some(Kind::Word(word)) => Rc::clone(word),
+            _ => return Ok(false),
+        };
+        if Unary::from_name(&word).is_some() || self.constant(&word).is_some_and(|num| num.n == 1) {
+            return Ok(true);
+        }
+        Ok(match self.lookup(&word).map(|cell| cell.borrow().clone()) {
+            Some(Value::Num(num)) => num.n == 1,
+            Some(Value::Array(array)) => {
+                matches!(array.elements.first(), Some(Value::Num(num)) if num.n == 1)
+            }
+            Some(Value::Function(_)) => true,
+            _ => {
+                matches!(&*word, "pow" | "min" | "max" | "mod" | "rand" | "div" | "atan2" | "select" | "val")
+            }
+        })
     }
 
     fn colour_entries(&mut self) -> Result<Vec<(f64, Colour)>> {

@@ -6,9 +6,10 @@ use std::sync::Arc;
 
 use lumbre_math::{DVec2, DVec3, Vec2, Vec3};
 use lumbre_scene::MeshDesc;
+use lumbre_shading::pov::Texture;
 
-use super::objects::{Form, Object};
-use super::solids::{Ball, Blob};
+use super::blob::{Ball, Blob};
+use super::objects::{Form, Object, Operation};
 use super::value::Value;
 use super::{Parser, Result};
 
@@ -57,8 +58,7 @@ impl Parser<'_, '_> {
 
     /// A mesh, up to what modifies it: its triangles by their textures.
     pub(super) fn mesh(&mut self) -> Result<Object> {
-        let mut by_texture: HashMap<usize, (Option<Arc<lumbre_shading::pov::Texture>>, Triangles)> =
-            HashMap::new();
+        let mut by_texture: HashMap<usize, (Option<Arc<Texture>>, Triangles)> = HashMap::new();
         loop {
             let word = self.word()?;
             let Some(word @ ("triangle" | "smooth_triangle" | "inside_vector")) = word.as_deref() else {
@@ -114,19 +114,11 @@ impl Parser<'_, '_> {
         }
         // In an order that does not depend on addresses.
         parts.sort_by_key(|(first, _)| *first);
-        let mut parts: Vec<Object> = parts.into_iter().map(|(_, part)| part).collect();
-        Ok(match parts.len() {
-            0 => Object::new(Form::Nothing),
-            1 => parts.swap_remove(0),
-            _ => Object::new(Form::Group(
-                super::objects::Operation::Union,
-                parts.into_iter().map(Rc::new).collect(),
-            )),
-        })
+        Ok(joined(parts.into_iter().map(|(_, part)| part).collect()))
     }
 
     /// A texture up to its brace; one that is only a name is that of the name.
-    fn shared_texture(&mut self) -> Result<Arc<lumbre_shading::pov::Texture>> {
+    fn shared_texture(&mut self) -> Result<Arc<Texture>> {
         if let Some(name) = self.word()?
             && self.is_raw_brace()
             && let Some(Value::Texture(known)) = self.lookup(&name).map(|cell| cell.borrow().clone())
@@ -147,7 +139,8 @@ impl Parser<'_, '_> {
     pub(super) fn mesh2(&mut self) -> Result<Object> {
         let (mut vertices, mut normals, mut uvs) = (Vec::new(), Vec::new(), Vec::new());
         let (mut faces, mut normal_faces, mut uv_faces) = (Vec::new(), Vec::new(), Vec::new());
-        let mut has_textures = false;
+        let mut textures: Vec<Arc<Texture>> = Vec::new();
+        let mut faces_of: Vec<Option<usize>> = Vec::new();
         loop {
             let word = self.word()?;
             let Some(
@@ -166,21 +159,16 @@ impl Parser<'_, '_> {
                 "vertex_vectors" => vertices = self.vectors()?,
                 "normal_vectors" => normals = self.vectors()?,
                 "uv_vectors" => uvs = self.vectors()?,
-                "face_indices" => faces = self.face_list()?,
-                "normal_indices" => normal_faces = self.face_list()?,
-                "uv_indices" => uv_faces = self.face_list()?,
-                _ => {
-                    has_textures = true;
-                    self.expect(b'{')?;
-                    self.skip_to(b'}')?;
-                }
+                "face_indices" => (faces, faces_of) = self.face_list()?,
+                "normal_indices" => normal_faces = self.face_list()?.0,
+                "uv_indices" => uv_faces = self.face_list()?.0,
+                _ => textures = self.textures()?,
             }
         }
-        if has_textures {
-            self.warn("the texture_list of a mesh2 is not rendered");
-        }
-        let mut all =
-            Triangles { has_normals: !normals.is_empty(), has_uvs: !uvs.is_empty(), ..Triangles::default() };
+        let (has_normals, has_uvs) = (!normals.is_empty(), !uvs.is_empty());
+        // By texture; those without one of their own are the first.
+        let mut all: Vec<Triangles> = Vec::new();
+        all.resize_with(textures.len() + 1, || Triangles { has_normals, has_uvs, ..Triangles::default() });
         for (i, face) in faces.iter().enumerate() {
             let corner = |list: &[DVec3], face: &[u32; 3]| -> Option<[DVec3; 3]> {
                 let at = |k: usize| list.get(face[k] as usize).copied();
@@ -191,9 +179,47 @@ impl Parser<'_, '_> {
             };
             let smooth = corner(&normals, normal_faces.get(i).unwrap_or(face));
             let uv = corner(&uvs, uv_faces.get(i).unwrap_or(face));
-            push(&mut all, corners, smooth, uv.map(|uv| uv.map(|uv| uv.truncate())));
+            let texture = faces_of.get(i).copied().flatten().map_or(0, |texture| texture + 1);
+            let Some(triangles) = all.get_mut(texture) else {
+                return Err(self.error("a face of a texture that the mesh2 does not have"));
+            };
+            push(triangles, corners, smooth, uv.map(|uv| uv.map(|uv| uv.truncate())));
         }
-        Ok(Object::new(Form::Mesh(Arc::new(all.mesh()))))
+        let textures = std::iter::once(None).chain(textures.into_iter().map(Some));
+        let mut parts: Vec<Object> = Vec::new();
+        for (texture, triangles) in textures.zip(all) {
+            if !triangles.positions.is_empty() {
+                let mut part = Object::new(Form::Mesh(Arc::new(triangles.mesh())));
+                part.texture = texture;
+                parts.push(part);
+            }
+        }
+        Ok(joined(parts))
+    }
+
+    /// The textures of a `mesh2`.
+    fn textures(&mut self) -> Result<Vec<Arc<Texture>>> {
+        self.expect(b'{')?;
+        self.whole(0.0, 1e7)?;
+        let mut textures = Vec::new();
+        while !self.take(b'}')? {
+            if self.take(b',')? {
+                continue;
+            }
+            self.budget.bytes(size_of::<Texture>() as u64, "textures of a mesh2")?;
+            if self.take_word("texture")? {
+                self.expect(b'{')?;
+                textures.push(self.shared_texture()?);
+                continue;
+            }
+            let Some(name) = self.word()? else { return Err(self.unexpected("a texture")) };
+            self.peeked = None;
+            match self.known(&name)? {
+                Some(Value::Texture(known)) => textures.push(known),
+                _ => return Err(self.unexpected("a texture")),
+            }
+        }
+        Ok(textures)
     }
 
     fn vectors(&mut self) -> Result<Vec<DVec3>> {
@@ -212,24 +238,31 @@ impl Parser<'_, '_> {
         Ok(list)
     }
 
-    fn face_list(&mut self) -> Result<Vec<[u32; 3]>> {
+    /// Faces by the numbers of their corners, with the texture of the first corner where textures follow.
+    fn face_list(&mut self) -> Result<(Vec<[u32; 3]>, Vec<Option<usize>>)> {
         self.expect(b'{')?;
         self.float()?;
         self.comma()?;
-        let mut list = Vec::new();
+        let (mut list, mut textures): (Vec<[u32; 3]>, Vec<Option<usize>>) = (Vec::new(), Vec::new());
+        let mut others_differ = false;
         while !self.take(b'}')? {
-            if self.is_mark(b'<')? {
+            let num = self.expression()?;
+            if num.n > 1 {
                 self.budget.elements(1, "triangles")?;
-                self.budget.bytes(108, "triangles")?;
-                let v = self.vector()?;
-                list.push(v.to_array().map(|x| x.max(0.0) as u32));
-            } else {
-                // The textures of its corners.
-                self.float()?;
+                self.budget.bytes(124, "triangles")?;
+                list.push(num.dvec3().to_array().map(|x| x.max(0.0) as u32));
+                textures.push(None);
+            } else if let Some(texture) = textures.last_mut() {
+                let found = num.v[0].max(0.0) as usize;
+                others_differ |= texture.is_some_and(|first| first != found);
+                texture.get_or_insert(found);
             }
             self.comma()?;
         }
-        Ok(list)
+        if others_differ {
+            self.warn("a face of a mesh2 has the texture of its first corner");
+        }
+        Ok((list, textures))
     }
 
     /// A plane polygon of closed loops, as triangles.
@@ -319,6 +352,15 @@ fn push(all: &mut Triangles, corners: [DVec3; 3], normals: Option<[DVec3; 3]>, u
         all.uvs.push(Vec2::new(uv.x as f32, uv.y as f32));
     }
     all.has_uvs |= uvs.is_some();
+}
+
+/// The parts of a mesh as one object.
+fn joined(mut parts: Vec<Object>) -> Object {
+    match parts.len() {
+        0 => Object::new(Form::Nothing),
+        1 => parts.swap_remove(0),
+        _ => Object::new(Form::Group(Operation::Union, parts.into_iter().map(Rc::new).collect())),
+    }
 }
 
 /// A point of the plane of a polygon, with two unit vectors in it.

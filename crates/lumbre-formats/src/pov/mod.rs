@@ -2,6 +2,8 @@
 //!
 //! A scene may read files beside it and in the folders of its library, and no others; what it writes stays in memory.
 
+mod algebraic;
+mod blob;
 mod build;
 mod built_ins;
 mod camera;
@@ -9,12 +11,17 @@ mod curves;
 mod directives;
 mod expression;
 mod files;
+mod fractals;
 mod functions;
 mod images;
 mod iso;
+mod job;
+mod julia;
 mod lexer;
 mod lights;
 mod maps;
+mod media;
+mod mesh_tree;
 mod meshes;
 mod objects;
 mod patches;
@@ -22,6 +29,7 @@ mod patterns;
 mod settings;
 mod solids;
 mod source;
+mod sweep;
 mod swept;
 mod text;
 mod textures;
@@ -34,6 +42,7 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use lumbre_scene::SceneDesc;
+use lumbre_shading::pov::Media;
 
 use crate::{Budget, Diagnostic, Diagnostics, FormatError, Input};
 use camera::CameraStatement;
@@ -43,6 +52,8 @@ use settings::{Fog, Settings, SkySphere};
 use source::{Frame, Source};
 use textures::Defaults;
 use value::{Array, Cell, Value};
+
+pub use job::PovJob;
 
 type Result<T> = std::result::Result<T, FormatError>;
 
@@ -54,6 +65,12 @@ pub struct PovOptions {
     pub library: Vec<PathBuf>,
     /// The value of `clock`.
     pub clock: f64,
+    /// The values of `clock` in the first and in the last frame.
+    pub clocks: [f64; 2],
+    /// The numbers of the first and of the last frame; `None` for a still.
+    pub frames: Option<[u32; 2]>,
+    /// Numbers and texts that are declared before the scene is read.
+    pub declares: Vec<(String, String)>,
     /// The value of `frame_number`.
     pub frame_number: u32,
     /// The value of `image_width`.
@@ -64,7 +81,16 @@ pub struct PovOptions {
 
 impl Default for PovOptions {
     fn default() -> Self {
-        Self { library: Vec::new(), clock: 0.0, frame_number: 0, width: 640, height: 480 }
+        Self {
+            library: Vec::new(),
+            clock: 0.0,
+            clocks: [0.0, 1.0],
+            frames: None,
+            declares: Vec::new(),
+            frame_number: 0,
+            width: 640,
+            height: 480,
+        }
     }
 }
 
@@ -133,6 +159,7 @@ struct Parser<'a, 'b> {
     streams: Vec<u32>,
     written: HashMap<String, String>,
     fonts: text::Fonts,
+    mesh_trees: mesh_tree::MeshTrees,
     settings: Settings,
     defaults: Defaults,
     default_camera: CameraStatement,
@@ -140,12 +167,16 @@ struct Parser<'a, 'b> {
     light_is_closed: bool,
     /// Whether a texture of the object was just read, so that the next one is a layer on it.
     after_texture: bool,
+    /// Whether what is read as a pigment is a density.
+    is_density: bool,
     // The scene.
     camera: Option<CameraStatement>,
     objects: Vec<Rc<Object>>,
     background: Option<[f32; 3]>,
     sky: SkySphere,
     fogs: Vec<Fog>,
+    /// What fills the air.
+    air: Vec<Media>,
 }
 
 impl<'a, 'b> Parser<'a, 'b> {
@@ -155,6 +186,13 @@ impl<'a, 'b> Parser<'a, 'b> {
         budget: &'b Budget,
         diagnostics: &'a mut Diagnostics,
     ) -> Self {
+        let globals = options.declares.iter().map(|(name, value)| {
+            let value = match value.parse() {
+                Ok(number) => Value::Num(value::Num::float(number)),
+                Err(_) => Value::Text(value.trim_matches('"').into()),
+            };
+            (Rc::from(&**name), Rc::new(std::cell::RefCell::new(value)))
+        });
         Self {
             budget,
             diagnostics,
@@ -163,7 +201,7 @@ impl<'a, 'b> Parser<'a, 'b> {
             library: options.library.clone(),
             frames: Vec::new(),
             least_frames: 1,
-            globals: HashMap::new(),
+            globals: globals.collect(),
             macro_count: 0,
             sources: HashMap::new(),
             peeked: None,
@@ -174,16 +212,19 @@ impl<'a, 'b> Parser<'a, 'b> {
             streams: Vec::new(),
             written: HashMap::new(),
             fonts: HashMap::new(),
+            mesh_trees: HashMap::new(),
             settings: Settings::new(),
             defaults: Defaults::new(),
             default_camera: CameraStatement::DEFAULT,
             light_is_closed: false,
             after_texture: false,
+            is_density: false,
             camera: None,
             objects: Vec::new(),
             background: None,
             sky: Vec::new(),
             fogs: Vec::new(),
+            air: Vec::new(),
         }
     }
 
@@ -213,6 +254,7 @@ impl<'a, 'b> Parser<'a, 'b> {
                 self.camera = Some(camera);
             }
             "global_settings" => self.global_settings()?,
+            "default" => self.default_directive()?,
             "background" => {
                 self.expect(b'{')?;
                 let c = self.colour()?.as_colour().rgb;
@@ -224,8 +266,13 @@ impl<'a, 'b> Parser<'a, 'b> {
                 self.fogs.push(fog);
             }
             "sky_sphere" => self.sky = self.sky_sphere_block()?,
-            "rainbow" | "media" => {
-                self.warn(&format!("{word} is not rendered"));
+            "media" => {
+                let media = self.media_block()?;
+                self.budget.bytes(size_of::<Media>() as u64, "media")?;
+                self.air.push(media);
+            }
+            "rainbow" => {
+                self.warn("rainbow is not rendered");
                 self.expect(b'{')?;
                 self.skip_to(b'}')?;
             }
@@ -330,7 +377,7 @@ impl<'a, 'b> Parser<'a, 'b> {
         Ok(Some(match &**word {
             "texture" => {
                 let mut texture = None;
-                while !self.ends_here() && self.take_word("texture")? {
+                while !self.ends_here()? && self.take_word("texture")? {
                     self.expect(b'{')?;
                     let next = self.texture_body(b'}')?;
                     texture = Some(textures::layered(texture, next));
@@ -395,15 +442,19 @@ impl<'a, 'b> Parser<'a, 'b> {
                 take(self);
                 self.dictionary()?
             }
-            "media" | "density" | "rainbow" => {
+            "media" => {
+                take(self);
+                Value::Media(Rc::new(self.media_block()?))
+            }
+            "density" => {
+                take(self);
+                Value::Density(self.density_block()?)
+            }
+            "rainbow" => {
                 take(self);
                 self.expect(b'{')?;
                 self.skip_to(b'}')?;
-                Value::Ignored(match &**word {
-                    "media" => "a medium",
-                    "density" => "a density",
-                    _ => "a rainbow",
-                })
+                Value::Ignored("a rainbow")
             }
             _ => return Ok(None),
         }))
@@ -413,7 +464,7 @@ impl<'a, 'b> Parser<'a, 'b> {
     fn array(&mut self) -> Result<Array> {
         self.take_word("mixed")?;
         let mut sizes: Vec<usize> = Vec::new();
-        while !self.ends_here() && self.take(b'[')? {
+        while !self.ends_here()? && self.take(b'[')? {
             let size = self.float()?;
             self.expect(b']')?;
             if !(1.0..=1e9).contains(&size) || sizes.len() == 5 {
@@ -437,7 +488,7 @@ impl<'a, 'b> Parser<'a, 'b> {
         let mut elements = self.budget.vec(count, "arrays")?;
         elements.resize(count as usize, Value::Nothing);
         let mut array = Array { sizes, elements };
-        if !self.ends_here() && self.is_mark(b'{')? {
+        if !self.ends_here()? && self.is_mark(b'{')? {
             self.array_values(&mut array, 0, 0)?;
         }
         Ok(array)
@@ -463,7 +514,7 @@ impl<'a, 'b> Parser<'a, 'b> {
 
     fn dictionary(&mut self) -> Result<Value> {
         let mut entries: HashMap<Rc<str>, Value> = HashMap::new();
-        if !self.ends_here() && self.take(b'{')? {
+        if !self.ends_here()? && self.take(b'{')? {
             while !self.take(b'}')? {
                 let key: Rc<str> = if self.take(b'[')? {
                     let key = self.string()?.into();

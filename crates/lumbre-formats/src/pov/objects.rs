@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use lumbre_math::{DVec3, Transform};
 use lumbre_scene::MeshDesc;
-use lumbre_shading::pov::{Interior, Layer, Texture, TextureKind, Visibility};
+use lumbre_shading::pov::{InsideTest, Interior, PatternKind, Texture, Visibility};
 
+use super::algebraic::{Algebraic, MOST_DEGREE};
 use super::lights::LightStatement;
-use super::textures::layered;
+use super::textures::{layered, moved_interior};
 use super::value::{Num, Value};
 use super::{Parser, Result};
 use crate::Diagnostic;
@@ -22,7 +23,7 @@ pub(super) struct Object {
     pub transform: Transform,
     pub texture: Option<Arc<Texture>>,
     pub interior_texture: Option<Arc<Texture>>,
-    pub interior: Option<Rc<Interior>>,
+    pub interior: Option<Arc<Interior>>,
     pub visibility: Visibility,
     pub hollow: bool,
     pub double_illuminate: bool,
@@ -56,11 +57,12 @@ pub(super) enum Form {
     Mesh(Arc<MeshDesc>),
     /// The exponents of a superellipsoid.
     Superellipsoid(f64, f64),
-    /// Coefficients in falling powers of x, then y, then z, with the degree.
-    Poly(u32, Arc<[f64]>),
-    Blob(Arc<super::solids::Blob>),
+    Poly(Arc<Algebraic>),
+    Blob(Arc<super::blob::Blob>),
     Swept(Arc<super::swept::Swept>),
     Iso(Arc<super::iso::Iso>),
+    Sweep(Arc<super::sweep::Sweep>),
+    Julia(Arc<super::julia::Julia>),
     Group(Operation, Vec<Rc<Object>>),
     Light(Rc<LightStatement>),
     /// A group of lights that light only its objects.
@@ -102,12 +104,16 @@ impl Object {
             self.texture = self.texture.take().map(|texture| texture.moved(map));
             self.interior_texture = self.interior_texture.take().map(|texture| texture.moved(map));
         }
+        self.interior = self.interior.take().map(|interior| moved_interior(interior, map));
         if let Form::Light(light) = &self.form {
             self.form = Form::Light(Rc::new(light.moved(map)));
             self.transform = Transform::IDENTITY;
         }
     }
 }
+
+/// Superellipsoids of smaller exponents have this one: their edges are as sharp as can be told.
+const LEAST_EXPONENT: f64 = 1e-3;
 
 impl Parser<'_, '_> {
     /// The object of a word, which comes next; `None` if it is the word of none.
@@ -266,11 +272,11 @@ impl Parser<'_, '_> {
             "mesh2" => return self.mesh2(),
             "polygon" => self.polygon()?,
             "superellipsoid" => {
-                let v = self.expression()?;
-                if v.n < 2 || v.v[0] <= 0.0 || v.v[1] <= 0.0 {
-                    return Err(self.error("a superellipsoid has two exponents greater than 0"));
+                let [e, n, ..] = self.expression()?.promoted(2);
+                if !(e >= 0.0 && n >= 0.0) {
+                    return Err(self.error("a superellipsoid has two exponents that are not negative"));
                 }
-                Form::Superellipsoid(v.v[0], v.v[1])
+                Form::Superellipsoid(e.max(LEAST_EXPONENT), n.max(LEAST_EXPONENT))
             }
             "quadric" => self.quadric()?,
             "cubic" => self.poly(3)?,
@@ -278,7 +284,7 @@ impl Parser<'_, '_> {
             "poly" => {
                 let degree = self.whole(0.0, 99.0)?;
                 self.comma()?;
-                if !(2..=15).contains(&degree) {
+                if !(2..=MOST_DEGREE).contains(&degree) {
                     return Err(self.error("the degree of a poly is from 2 to 15"));
                 }
                 self.poly(degree)?
@@ -290,6 +296,8 @@ impl Parser<'_, '_> {
             "text" => self.text()?,
             "bicubic_patch" => self.bicubic_patch()?,
             "isosurface" => self.isosurface()?,
+            "sphere_sweep" => self.sphere_sweep()?,
+            "julia_fractal" => self.julia_fractal()?,
             "height_field" => self.height_field()?,
             "union" | "merge" | "intersection" | "difference" => {
                 let operation = match word {
@@ -307,13 +315,8 @@ impl Parser<'_, '_> {
                 return Ok(Object::new(Form::Light(Rc::new(light))));
             }
             "light_group" => {
-                let mut parts = self.parts()?;
-                let mut global = true;
-                while self.take_word("global_lights")? {
-                    global = self.optional_bool()?;
-                    parts.extend(self.parts()?);
-                }
-                Form::LightGroup(parts, global)
+                // Lights of no group light it only where `global_lights` says so.
+                Form::LightGroup(self.parts()?, false)
             }
             "object" => match self.object()? {
                 Some(inner) => return Ok(inner),
@@ -357,11 +360,20 @@ impl Parser<'_, '_> {
                 continue;
             }
             let Some(name) = self.word()? else { break };
-            let Some(Value::Object(object)) = self.lookup(&name).map(|cell| cell.borrow().clone()) else {
-                break;
+            let is_object = |value: &Value| match value {
+                Value::Object(_) | Value::Light(_) => true,
+                Value::Array(array) => matches!(array.elements.first(), Some(Value::Object(_))),
+                _ => false,
             };
+            if !self.lookup(&name).is_some_and(|cell| is_object(&cell.borrow())) {
+                break;
+            }
             self.peeked = None;
-            parts.push(object);
+            match self.known(&name)? {
+                Some(Value::Object(object)) => parts.push(object),
+                Some(Value::Light(light)) => parts.push(Rc::new(Object::new(Form::Light(light)))),
+                _ => return Err(self.unexpected("an object")),
+            }
         }
         Ok(parts)
     }
@@ -415,6 +427,12 @@ impl Parser<'_, '_> {
                 "no_image" => object.visibility.no_image = self.optional_bool()?,
                 "no_reflection" => object.visibility.no_reflection = self.optional_bool()?,
                 "double_illuminate" => object.double_illuminate = self.optional_bool()?,
+                "global_lights" if matches!(object.form, Form::LightGroup(..)) => {
+                    let on = self.optional_bool()?;
+                    if let Form::LightGroup(_, global) = &mut object.form {
+                        *global = on;
+                    }
+                }
                 "uv_mapping" => object.uv_mapping = self.optional_bool()?,
                 "no_radiosity" | "sturm" | "hierarchy" | "cutaway_textures" | "split_union" | "evaluate"
                 | "smooth" => {
@@ -450,37 +468,7 @@ impl Parser<'_, '_> {
 
     fn part_of_texture(&mut self, word: &str, object: &mut Object) -> Result<()> {
         let known = object.texture.take().unwrap_or_else(|| self.defaults.texture());
-        let changed = |layer: Layer, known: &Texture| {
-            Arc::new(Texture { kind: TextureKind::Plain(layer), warps: known.warps.clone(), uv: known.uv })
-        };
-        object.texture = Some(match &known.kind {
-            TextureKind::Plain(layer) => {
-                let mut layer = layer.clone();
-                self.layer_part(word, &mut layer)?;
-                changed(layer, &known)
-            }
-            // The top layer.
-            TextureKind::Layers(layers) => {
-                let mut layers = layers.to_vec();
-                if let Some(top) = layers.last_mut()
-                    && let TextureKind::Plain(layer) = &top.kind
-                {
-                    let mut layer = layer.clone();
-                    self.layer_part(word, &mut layer)?;
-                    *top = changed(layer, top);
-                }
-                Arc::new(Texture {
-                    kind: TextureKind::Layers(layers.into()),
-                    warps: known.warps.clone(),
-                    uv: known.uv,
-                })
-            }
-            _ => {
-                let mut layer = self.defaults.layer.clone();
-                self.layer_part(word, &mut layer)?;
-                Arc::new(Texture::plain(layer))
-            }
-        });
+        object.texture = Some(self.changed_texture(word, &known)?);
         Ok(())
     }
 
@@ -509,7 +497,7 @@ impl Parser<'_, '_> {
         // In falling powers of x, then y, then z.
         let terms =
             [square.x, mixed.x, mixed.y, linear.x, square.y, mixed.z, linear.y, square.z, linear.z, j];
-        Ok(Form::Poly(2, Arc::from(terms)))
+        Ok(Form::Poly(Arc::new(Algebraic::new(2, Arc::from(terms)))))
     }
 
     fn poly(&mut self, degree: u32) -> Result<Form> {
@@ -527,7 +515,19 @@ impl Parser<'_, '_> {
             let wrong = Diagnostic::error("too few coefficients").found(terms.len()).expected(count);
             return Err(self.diagnostic(wrong).into());
         }
-        Ok(Form::Poly(degree, terms.into()))
+        Ok(Form::Poly(Arc::new(Algebraic::new(degree, terms.into()))))
+    }
+
+    /// `object { … }` as a pattern: 1 inside of the object, 0 outside. What it names stands behind the object, before the brace that
+    /// closes it.
+    pub(super) fn inside_pattern(&mut self) -> Result<PatternKind> {
+        self.expect(b'{')?;
+        let object = match self.object()? {
+            Some(object) => Rc::new(object),
+            None => self.object_argument()?,
+        };
+        let region = super::solids::Region::of(&object, &Transform::IDENTITY);
+        Ok(PatternKind::Inside(InsideTest(Arc::new(move |p| region.contains(p)))))
     }
 
     /// The object of a name, for functions that ask about it.
@@ -557,7 +557,7 @@ impl Parser<'_, '_> {
                 let from = self.vector()?;
                 self.comma()?;
                 let direction = self.vector()?;
-                let hit = super::solids::trace(&object, from, direction);
+                let hit = super::solids::trace(&mut self.mesh_trees, &object, from, direction);
                 if self.take(b',')? {
                     let Some(name) = self.word()? else { return Err(self.unexpected("an identifier")) };
                     let Some(cell) = self.lookup(&name).cloned() else { return Err(self.undeclared(&name)) };

@@ -2,8 +2,8 @@
 
 use lumbre_math::{DVec2, DVec3};
 use lumbre_shading::pov::{
-    BlackHole, Crackle, Fractal, NoiseGenerator, Octaves, Pattern, PatternKind, Slope, Unrolling, Warp,
-    Warps, Wave,
+    BlackHole, Crackle, Fractal, Magnet, NoiseGenerator, Octaves, Pattern, PatternKind, Slope, Unrolling,
+    Warp, Warps, Wave,
 };
 
 use super::{Parser, Result};
@@ -65,7 +65,7 @@ impl Parser<'_, '_> {
             "wood" => PatternKind::Wood,
             "wrinkles" => PatternKind::Wrinkles,
             "aoi" => PatternKind::AngleOfIncidence,
-            "gradient" | "spiral1" | "spiral2" | "mandel" | "julia" | "function" | "slope"
+            "gradient" | "spiral1" | "spiral2" | "mandel" | "julia" | "magnet" | "function" | "slope"
             | "pigment_pattern" | "image_pattern" => {
                 self.peeked = None;
                 return self.pattern_with_parameters(word).map(Some);
@@ -84,8 +84,18 @@ impl Parser<'_, '_> {
             },
             "spiral1" => PatternKind::Spiral1(self.float()?),
             "spiral2" => PatternKind::Spiral2(self.float()?),
-            "mandel" | "julia" => {
-                let julia = if word == "julia" {
+            "mandel" | "julia" | "magnet" => {
+                let magnet = match word {
+                    "magnet" if self.whole(1.0, 2.0)? == 1 => Some(Magnet::First),
+                    "magnet" => Some(Magnet::Second),
+                    _ => None,
+                };
+                let has_point = word == "julia"
+                    || magnet.is_some() && {
+                        let is_mandel = self.take_word("mandel")?;
+                        !is_mandel && self.take_word("julia")?
+                    };
+                let julia = if has_point {
                     let c = self.vector()?.truncate();
                     self.comma()?;
                     Some(c)
@@ -94,6 +104,7 @@ impl Parser<'_, '_> {
                 };
                 let iterations = self.whole(1.0, 10_000.0)?;
                 PatternKind::Fractal(Box::new(Fractal {
+                    magnet,
                     julia,
                     exponent: 2,
                     iterations,
@@ -274,7 +285,7 @@ impl Parser<'_, '_> {
     /// A truth that may be left out.
     pub(super) fn optional_bool(&mut self) -> Result<bool> {
         use super::lexer::Kind;
-        if self.ends_here() {
+        if self.ends_here()? {
             return Ok(true);
         }
         match self.peek()? {

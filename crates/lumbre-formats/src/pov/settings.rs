@@ -173,7 +173,7 @@ impl Parser<'_, '_> {
                 "turb_depth" | "octaves" | "omega" | "lambda" => {
                     self.float()?;
                 }
-                _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
+                _ => match self.known(&word)? {
                     Some(Value::Fog(known)) => {
                         fog = (*known).clone();
                         if let Some([o, a]) = fog.ground {
@@ -211,7 +211,7 @@ impl Parser<'_, '_> {
                 "emission" => {
                     self.rgb()?;
                 }
-                _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
+                _ => match self.known(&word)? {
                     Some(Value::SkySphere(known)) => sky = (*known).clone(),
                     _ => return Err(self.error(format!("{word} has no meaning for a sky"))),
                 },

@@ -10,8 +10,13 @@ use lumbre_kernel::CustomGeometry;
 use lumbre_math::interval::{Dual, Interval};
 use lumbre_math::{DVec2, DVec3, Transform};
 
+use super::algebraic::Algebraic;
+use super::blob::Blob;
 use super::iso::Iso;
+use super::julia::Julia;
+use super::mesh_tree::{MeshTrees, mesh_hit};
 use super::objects::{Form, Object, Operation};
+use super::sweep::Sweep;
 use super::swept::Swept;
 
 /// A surface in the world, with what is inside of it.
@@ -37,6 +42,10 @@ pub(super) enum Solid {
 pub(super) enum Body {
     Swept(Arc<Swept>),
     Iso(Arc<Iso>),
+    Sweep(Arc<Sweep>),
+    Julia(Arc<Julia>),
+    Algebraic(Arc<Algebraic>),
+    Blob(Arc<Blob>),
 }
 
 impl Body {
@@ -44,6 +53,10 @@ impl Body {
         match self {
             Self::Swept(swept) => swept.roots(ray, out),
             Self::Iso(iso) => iso.roots(ray, out),
+            Self::Sweep(sweep) => sweep.roots(ray, out),
+            Self::Julia(julia) => julia.roots(ray, out),
+            Self::Algebraic(poly) => poly.roots(ray, out),
+            Self::Blob(blob) => blob.roots(ray, out),
         }
     }
 
@@ -51,6 +64,18 @@ impl Body {
         match self {
             Self::Swept(swept) => swept.normal(p, root),
             Self::Iso(iso) => iso.normal(p, root),
+            Self::Sweep(sweep) => sweep.normal(p, root),
+            Self::Julia(julia) => julia.normal(p),
+            Self::Algebraic(poly) => poly.normal(p),
+            Self::Blob(blob) => blob.normal(p),
+        }
+    }
+
+    /// The coordinates on the surface.
+    fn uv(&self, p: DVec3, root: &Root) -> DVec2 {
+        match self {
+            Self::Swept(swept) => swept.uv(p, root),
+            _ => root.local,
         }
     }
 
@@ -58,26 +83,30 @@ impl Body {
         match self {
             Self::Swept(swept) => swept.contains(p),
             Self::Iso(iso) => iso.contains(p),
+            Self::Sweep(sweep) => sweep.contains(p),
+            Self::Julia(julia) => julia.contains(p),
+            Self::Algebraic(poly) => poly.contains(p),
+            Self::Blob(blob) => blob.contains(p),
         }
     }
 
-    fn bounds(&self) -> Aabb {
-        match self {
+    fn bounds(&self) -> Option<Aabb> {
+        Some(match self {
             Self::Swept(swept) => swept.bounds(),
             Self::Iso(iso) => iso.bounds(),
-        }
+            Self::Sweep(sweep) => sweep.bounds(),
+            Self::Julia(julia) => julia.bounds(),
+            Self::Algebraic(_) => return None,
+            Self::Blob(blob) => blob.bounds(),
+        })
     }
 }
-
-/// Surfaces without a natural bound are looked for within this distance.
-const FAR: f64 = 1000.0;
 
 impl Solid {
     /// The solid of a form; `None` for those that are none by themselves.
     pub(super) fn new(form: &Form, map: &Transform) -> Result<Option<Self>, ShapeError> {
         let exact = |shape: Shape| Self::Exact { surface: PlacedShape::new(shape, *map), closed: None };
         let implicit = |surface| Self::Implicit { surface, world_from_object: *map };
-        let far = Aabb { min: DVec3::splat(-FAR), max: DVec3::splat(FAR) };
         Ok(Some(match form {
             Form::Sphere(center, radius) => exact(Sphere::new(*center, radius.abs())?.into()),
             Form::Cuboid(low, high) => exact(Cuboid::new(low.min(*high), low.max(*high))?.into()),
@@ -112,18 +141,20 @@ impl Solid {
                     power(across, e / n) + power(z.abs(), 2.0 / n) - 1.0
                 })?)
             }
-            Form::Poly(degree, terms) => {
-                let (degree, terms) = (*degree, Arc::clone(terms));
-                implicit(ImplicitSurface::new(far, move |p| polynomial(degree, &terms, p))?)
+            Form::Poly(poly) => {
+                Self::Body { body: Body::Algebraic(Arc::clone(poly)), world_from_object: *map }
             }
-            Form::Blob(blob) => {
-                let blob = Arc::clone(blob);
-                implicit(ImplicitSurface::new(blob.bounds(), move |p| blob.field(p))?)
-            }
+            Form::Blob(blob) => Self::Body { body: Body::Blob(Arc::clone(blob)), world_from_object: *map },
             Form::Swept(swept) => {
                 Self::Body { body: Body::Swept(Arc::clone(swept)), world_from_object: *map }
             }
             Form::Iso(iso) => Self::Body { body: Body::Iso(Arc::clone(iso)), world_from_object: *map },
+            Form::Sweep(sweep) => {
+                Self::Body { body: Body::Sweep(Arc::clone(sweep)), world_from_object: *map }
+            }
+            Form::Julia(julia) => {
+                Self::Body { body: Body::Julia(Arc::clone(julia)), world_from_object: *map }
+            }
             Form::Mesh(..) | Form::Group(..) | Form::Light(_) | Form::LightGroup(..) | Form::Nothing => {
                 return Ok(None);
             }
@@ -161,7 +192,7 @@ impl Solid {
                     // Roots of polynomials are right to some of their last digits.
                     point_error: DVec3::splat(1e-10 * size),
                     normal,
-                    uv: root.local,
+                    uv: body.uv(inner, root),
                     dpdu,
                     dpdv,
                     dndu: DVec3::ZERO,
@@ -190,7 +221,7 @@ impl Solid {
             Self::Implicit { surface, world_from_object } => {
                 Some(moved(&surface.bounds(), world_from_object))
             }
-            Self::Body { body, world_from_object } => Some(moved(&body.bounds(), world_from_object)),
+            Self::Body { body, world_from_object } => Some(moved(&body.bounds()?, world_from_object)),
         }
     }
 }
@@ -453,12 +484,17 @@ pub(super) fn contains(object: &Object, p: DVec3) -> bool {
 }
 
 /// The first point of an object along a ray, and the unit normal there.
-pub(super) fn trace(object: &Object, from: DVec3, direction: DVec3) -> Option<(DVec3, DVec3)> {
+pub(super) fn trace(
+    trees: &mut MeshTrees,
+    object: &Object,
+    from: DVec3,
+    direction: DVec3,
+) -> Option<(DVec3, DVec3)> {
     let ray = Ray::new(from, direction).with_range(1e-9, f64::INFINITY);
     let mut best: Option<(f64, DVec3, DVec3)> = None;
     leaves(object, &Transform::IDENTITY, &[], false, &mut Vec::new(), &mut |leaf, _| {
         if let Form::Mesh(mesh) = &leaf.object.form
-            && let Some((t, normal)) = mesh_hit(mesh, &leaf.map, &ray)
+            && let Some((t, normal)) = mesh_hit(trees, mesh, &leaf.map, &ray)
             && best.is_none_or(|(best, ..)| t < best)
         {
             best = Some((t, ray.at(t), normal));
@@ -473,28 +509,6 @@ pub(super) fn trace(object: &Object, from: DVec3, direction: DVec3) -> Option<(D
         }
     });
     best.map(|(_, point, normal)| (point, normal))
-}
-
-/// The first triangle of a mesh along a ray, with its unit normal: interpolated, where the mesh has normals.
-fn mesh_hit(mesh: &lumbre_scene::MeshDesc, map: &Transform, ray: &Ray) -> Option<(f64, DVec3)> {
-    let inner = ray.into_object(map);
-    let mut best: Option<(f64, DVec3)> = None;
-    for face in &mesh.triangles {
-        let corner = |i: usize| mesh.positions[face[i] as usize].as_dvec3();
-        let Ok(triangle) = Triangle::new(corner(0), corner(1), corner(2)) else { continue };
-        let Some(root) = triangle.closest(&inner) else { continue };
-        if best.is_some_and(|(t, _)| t <= root.t) {
-            continue;
-        }
-        let flat = (corner(1) - corner(0)).cross(corner(2) - corner(0));
-        let normal = mesh.normals.as_ref().map_or(flat, |normals| {
-            let at = |i: usize| normals[face[i] as usize].as_dvec3();
-            let DVec2 { x, y } = root.local;
-            at(0) * (1.0 - x - y) + at(1) * x + at(2) * y
-        });
-        best = Some((root.t, map.normal(normal).normalize_or(DVec3::Y)));
-    }
-    best
 }
 
 /// A box around an object; `None` if it is not bounded.
@@ -543,114 +557,6 @@ fn power(x: Dual, exponent: f64) -> Dual {
         Interval::WHOLE
     };
     Dual { value, slope: factor * x.slope }
-}
-
-/// A polynomial with its terms in falling powers of x, then y, then z, by Horner's rule.
-fn polynomial(degree: u32, terms: &[f64], [x, y, z]: [Dual; 3]) -> Dual {
-    let mut at = 0;
-    let mut in_x: Option<Dual> = None;
-    for i in (0..=degree).rev() {
-        let mut in_y: Option<Dual> = None;
-        for j in (0..=degree - i).rev() {
-            let mut in_z: Option<Dual> = None;
-            for _ in (0..=degree - i - j).rev() {
-                let term = Dual::from(terms[at]);
-                at += 1;
-                in_z = Some(in_z.map_or(term, |sum| sum * z + term));
-            }
-            let row = in_z.unwrap_or(Dual::from(0.0));
-            in_y = Some(in_y.map_or(row, |sum| sum * y + row));
-        }
-        let sheet = in_y.unwrap_or(Dual::from(0.0));
-        in_x = Some(in_x.map_or(sheet, |sum| sum * x + sheet));
-    }
-    in_x.unwrap_or(Dual::from(0.0))
-}
-
-/// Balls and cylinders whose fields are added.
-#[derive(Clone, Debug)]
-pub(super) struct Blob {
-    pub threshold: f64,
-    pub parts: Vec<Ball>,
-}
-
-/// A field about a segment.
-#[derive(Clone, Debug)]
-pub(super) struct Ball {
-    ends: [DVec3; 2],
-    radius: f64,
-    strength: f64,
-    pub world_from_ball: Transform,
-}
-
-impl Ball {
-    pub(super) fn new(ends: [DVec3; 2], radius: f64, strength: f64) -> Self {
-        Self { ends, radius: radius.abs().max(1e-9), strength, world_from_ball: Transform::IDENTITY }
-    }
-
-    /// Its field: s (1 − d² / r²)², and 0 beyond r.
-    fn field(&self, p: [Dual; 3]) -> Dual {
-        let back = self.world_from_ball.inverse_affine();
-        let row = |i: usize| {
-            let (m, t) = (back.matrix3, back.translation[i]);
-            p[0] * m.x_axis[i] + p[1] * m.y_axis[i] + p[2] * m.z_axis[i] + t
-        };
-        let q = [row(0) - self.ends[0].x, row(1) - self.ends[0].y, row(2) - self.ends[0].z];
-        let axis = self.ends[1] - self.ends[0];
-        let squared = |v: [Dual; 3]| v[0].square() + v[1].square() + v[2].square();
-        let d = if axis == DVec3::ZERO {
-            squared(q)
-        } else {
-            // The nearest point of the segment.
-            let along = (q[0] * axis.x + q[1] * axis.y + q[2] * axis.z) * (1.0 / axis.length_squared());
-            let along = clamped(along);
-            squared([q[0] - along * axis.x, q[1] - along * axis.y, q[2] - along * axis.z])
-        };
-        let rest = positive(Dual::from(1.0) - d * (1.0 / (self.radius * self.radius)));
-        rest.square() * self.strength
-    }
-}
-
-/// The larger of a number and 0.
-fn positive(x: Dual) -> Dual {
-    if x.value.low >= 0.0 {
-        return x;
-    }
-    if x.value.high <= 0.0 {
-        return Dual::from(0.0);
-    }
-    let value = Interval { low: 0.0, high: x.value.high };
-    Dual { value, slope: Interval { low: x.slope.low.min(0.0), high: x.slope.high.max(0.0) } }
-}
-
-/// A number cut off below 0 and above 1.
-fn clamped(x: Dual) -> Dual {
-    positive(Dual::from(1.0) - positive(Dual::from(1.0) - x))
-}
-
-impl Blob {
-    fn bounds(&self) -> Aabb {
-        let mut all: Option<Aabb> = None;
-        for part in &self.parts {
-            let reach = DVec3::splat(part.radius);
-            let (low, high) =
-                (part.ends[0].min(part.ends[1]) - reach, part.ends[0].max(part.ends[1]) + reach);
-            let corner = |i: usize| {
-                let pick = |axis: usize| if i >> axis & 1 == 1 { high[axis] } else { low[axis] };
-                part.world_from_ball.point(DVec3::new(pick(0), pick(1), pick(2)))
-            };
-            let bounds = Aabb::around((0..8).map(corner));
-            all = Some(match all {
-                Some(all) => Aabb { min: all.min.min(bounds.min), max: all.max.max(bounds.max) },
-                None => bounds,
-            });
-        }
-        all.unwrap_or(Aabb { min: DVec3::ZERO, max: DVec3::ONE })
-    }
-
-    fn field(&self, p: [Dual; 3]) -> Dual {
-        self.parts.iter().fold(Dual::from(self.threshold), |sum, part| sum - part.field(p))
-    }
 }
 
 /// Closed loops of a plane as triangles, by trapezoids between the heights of their corners: inside by the even–odd rule.

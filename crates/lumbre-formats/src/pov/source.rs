@@ -300,24 +300,32 @@ impl Parser<'_, '_> {
         Ok(is)
     }
 
-    /// Where an operator may come, whether what comes next is a directive that begins another statement.
-    pub(super) fn ends_here(&self) -> bool {
-        if self.peeked.is_some() {
-            return false;
-        }
-        let Some((frame, blocks)) = self.declaring else { return false };
-        if frame != self.frames.len() {
-            return false;
-        }
-        let (Some(Kind::Mark(b'#')), Some(Kind::Word(word))) = (self.raw_ahead(0), self.raw_ahead(1)) else {
-            return false;
-        };
-        match &**word {
-            "else" | "elseif" | "end" | "break" | "case" | "range" => {
-                self.frames.last().is_none_or(|frame| frame.blocks.len() <= blocks)
+    /// Where an operator may come, whether what comes next is a directive that begins another statement. What a value came from, such as
+    /// a macro or a branch of an `#if`, is left first.
+    pub(super) fn ends_here(&mut self) -> Result<bool> {
+        while let Some((frames, blocks)) = self.declaring
+            && self.peeked.is_none()
+        {
+            let Some(frame) = self.frames.last() else { return Ok(false) };
+            let is_deeper = self.frames.len() > frames;
+            if frame.at >= frame.end {
+                if !is_deeper || !self.leave_frame()? {
+                    return Ok(false);
+                }
+                continue;
             }
-            _ => true,
+            let (Some(Kind::Mark(b'#')), Some(Kind::Word(word))) = (self.raw_ahead(0), self.raw_ahead(1))
+            else {
+                return Ok(false);
+            };
+            let closes = matches!(&**word, "else" | "elseif" | "end" | "break" | "case" | "range");
+            if !is_deeper && !(closes && frame.blocks.len() > blocks) {
+                return Ok(true);
+            }
+            self.raw()?;
+            self.directive()?;
         }
+        Ok(false)
     }
 
     /// Takes a semicolon, if it comes next as it stands.

@@ -2,13 +2,16 @@
 
 use lumbre_geometry::{Aabb, Ray, Root, Roots};
 use lumbre_math::roots::roots_between;
-use lumbre_math::{DVec2, DVec3};
+use lumbre_math::{DVec2, DVec3, Elementary};
 
 /// A piece of a curve, a cubic in u from 0 to 1, whose second coordinate only rises or only falls.
 #[derive(Clone, Debug)]
 pub(super) struct Piece {
     a: [f64; 4],
     b: [f64; 4],
+    /// The number of the curve that it is of, and where it begins and ends on it.
+    curve: u32,
+    range: [f64; 2],
 }
 
 fn at(c: &[f64; 4], u: f64) -> f64 {
@@ -29,6 +32,7 @@ fn cut(c: &[f64; 4], low: f64, high: f64) -> [f64; 4] {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Outline {
     pieces: Vec<Piece>,
+    curves: u32,
 }
 
 impl Outline {
@@ -40,8 +44,11 @@ impl Outline {
         ends.extend(turns.iter().copied().filter(|u| 0.0 < *u && *u < 1.0));
         ends.push(1.0);
         for pair in ends.windows(2) {
-            self.pieces.push(Piece { a: cut(&a, pair[0], pair[1]), b: cut(&b, pair[0], pair[1]) });
+            let (low, high) = (pair[0], pair[1]);
+            let (a, b) = (cut(&a, low, high), cut(&b, low, high));
+            self.pieces.push(Piece { a, b, curve: self.curves, range: [low, high] });
         }
+        self.curves += 1;
     }
 
     pub(super) fn line(&mut self, from: DVec2, to: DVec2) {
@@ -179,6 +186,30 @@ impl Swept {
         };
         let step = normal.normalize_or_zero() * 1e-6 * (1.0 + p.abs().max_element());
         if self.contains(p + step) && !self.contains(p - step) { -normal } else { normal }
+    }
+
+    /// Whether it is turned about y.
+    pub(super) fn is_turned(&self) -> bool {
+        !matches!(self, Self::Prism { .. })
+    }
+
+    /// The coordinates on the surface: around y, and along the outline.
+    pub(super) fn uv(&self, p: DVec3, root: &Root) -> DVec2 {
+        let turn = p.z.angle_from(p.x) / std::f64::consts::TAU;
+        let around = if turn < 0.0 { turn + 1.0 } else { turn };
+        match self {
+            Self::Prism { .. } => root.local,
+            Self::Lathe(outline) => {
+                let piece = &outline.pieces[root.part as usize];
+                let [low, high] = piece.range;
+                let along = f64::from(piece.curve) + low + root.local.x * (high - low);
+                DVec2::new(around, along / f64::from(outline.curves))
+            }
+            Self::Revolution { outline, .. } => {
+                let [(first, _), (last, _)] = ends(outline);
+                DVec2::new(around, (p.y - first) / (last - first))
+            }
+        }
     }
 
     fn is_upright(&self) -> bool {

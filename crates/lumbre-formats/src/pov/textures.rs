@@ -3,6 +3,7 @@
 use std::rc::Rc;
 use std::sync::Arc;
 
+use lumbre_math::Transform;
 use lumbre_shading::Spectrum;
 use lumbre_shading::pov::{
     Colour, ColourMap, Finish, Interior, Layer, Normal, NormalKind, Pattern, PatternKind, Pigment,
@@ -23,7 +24,7 @@ pub(super) type InteriorStatement = Interior;
 pub(super) struct MaterialStatement {
     pub texture: Option<Arc<Texture>>,
     pub interior_texture: Option<Arc<Texture>>,
-    pub interior: Option<Rc<Interior>>,
+    pub interior: Option<Arc<Interior>>,
 }
 
 /// What a scene has set by `#default`.
@@ -102,7 +103,16 @@ impl Parser<'_, '_> {
         if let Some(base) = base {
             (draft, kind) = opened(&base);
         }
-        while !self.take(end)? {
+        // Whether the braces of a pattern are open in which its parts stand.
+        let mut in_pattern = false;
+        loop {
+            if in_pattern && self.take(b'}')? {
+                in_pattern = false;
+                continue;
+            }
+            if self.take(end)? {
+                break;
+            }
             if self.take(b',')? {
                 continue;
             }
@@ -145,7 +155,17 @@ impl Parser<'_, '_> {
                     self.peeked = None;
                     self.colour()?;
                 }
-                "object" | "density_file" | "magnet" | "pavement" | "tiling" | "facets" => {
+                "object" => {
+                    self.peeked = None;
+                    let kind = self.inside_pattern()?;
+                    draft.begin(kind, self.settings.generator);
+                    in_pattern = true;
+                }
+                "density" => {
+                    self.peeked = None;
+                    blocks.push(self.density_block()?);
+                }
+                "density_file" | "pavement" | "tiling" | "facets" => {
                     self.peeked = None;
                     self.warn(&format!("the pattern {word} is not rendered"));
                     if self.is_mark(b'{')? {
@@ -155,7 +175,7 @@ impl Parser<'_, '_> {
                     while matches!(self.peek()?, Some(Kind::Text(_) | Kind::Number(_)))
                         || matches!(
                             self.word()?.as_deref(),
-                            Some("number_of_sides" | "number_of_tiles" | "pattern" | "interior" | "exterior")
+                            Some("number_of_sides" | "number_of_tiles" | "pattern" | "interpolate" | "df3")
                         )
                     {
                         self.next()?;
@@ -176,7 +196,7 @@ impl Parser<'_, '_> {
                         Value::Pigment(base) if draft.pattern.as_ref().is_some_and(Pattern::is_block) => {
                             blocks.push(base)
                         }
-                        Value::Pigment(base) => (draft, kind) = opened(&base),
+                        Value::Pigment(base) | Value::Density(base) => (draft, kind) = opened(&base),
                         Value::Num(num) => kind = PigmentKind::Colour(num.as_colour()),
                         other => return Err(self.error(format!("a pigment is needed, not {}", other.name()))),
                     }
@@ -228,7 +248,8 @@ impl Parser<'_, '_> {
                     Ok(PigmentKind::Blocks(pattern, blocks.into()))
                 }
                 None => {
-                    let map = ColourMap::new(default_colours(&pattern.kind));
+                    let kind = if self.is_density { &PatternKind::Noise } else { &pattern.kind };
+                    let map = ColourMap::new(default_colours(kind));
                     Ok(PigmentKind::Map(pattern, Arc::new(map)))
                 }
             },
@@ -247,12 +268,20 @@ impl Parser<'_, '_> {
         let mut is_average = false;
         let mut is_ignored = false;
         let mut blocks: Vec<Arc<Normal>> = Vec::new();
-        while !self.take(end)? {
+        let mut in_pattern = false;
+        loop {
+            if in_pattern && self.take(b'}')? {
+                in_pattern = false;
+                continue;
+            }
+            if self.take(end)? {
+                break;
+            }
             if self.take(b',')? {
                 continue;
             }
             // The amount stands behind the pattern.
-            if (draft.pattern.is_some() || kept.is_some() || is_average)
+            if (draft.pattern.is_some() || kept.is_some() || is_average || is_ignored)
                 && let Some(Kind::Number(_) | Kind::Mark(b'-' | b'+' | b'(' | b'.')) = self.peek()?
             {
                 amount = self.finite()?;
@@ -281,7 +310,13 @@ impl Parser<'_, '_> {
                     self.expect(b'{')?;
                     blocks.push(self.normal_body(None, b'}')?);
                 }
-                "bump_map" | "facets" | "object" | "density_file" | "tiling" | "pavement" | "magnet" => {
+                "object" => {
+                    let kind = self.inside_pattern()?;
+                    draft.begin(kind, self.settings.generator);
+                    special = Some(word);
+                    in_pattern = true;
+                }
+                "bump_map" | "facets" | "density_file" | "tiling" | "pavement" => {
                     self.warn(&format!("the normal {word} is not rendered"));
                     is_ignored = true;
                     if self.is_mark(b'{')? {
@@ -289,7 +324,7 @@ impl Parser<'_, '_> {
                         self.skip_to(b'}')?;
                     }
                     while matches!(self.peek()?, Some(Kind::Text(_) | Kind::Number(_)))
-                        || matches!(self.word()?.as_deref(), Some("coords" | "size" | "interpolate"))
+                        || matches!(self.word()?.as_deref(), Some("coords" | "size" | "interpolate" | "df3"))
                     {
                         self.next()?;
                     }
@@ -326,10 +361,16 @@ impl Parser<'_, '_> {
             no_bump_scale |= known.no_bump_scale;
             known.kind.clone()
         } else {
-            if !is_ignored && map.is_some() {
-                return Err(self.error("a normal without a pattern"));
+            // What modifies a pattern without naming one modifies that of the normal that is the default.
+            match self.defaults.layer.normal.as_ref().map(|normal| &normal.kind) {
+                Some(NormalKind::Slope { pattern, .. }) if !is_ignored => {
+                    normal_kind((**pattern).clone(), None, map.as_deref(), blocks)
+                }
+                _ if !is_ignored && map.is_some() => {
+                    return Err(self.error("a normal without a pattern"));
+                }
+                _ => NormalKind::Average(Arc::from([])),
             }
-            NormalKind::Average(Arc::from([]))
         };
         Ok(Arc::new(Normal { kind, warps: draft.warps, amount, accuracy, no_bump_scale, uv: draft.uv }))
     }
@@ -343,14 +384,37 @@ impl Parser<'_, '_> {
         let mut map: Option<Rc<Map>> = None;
         let mut draft = Draft::new(None, Warps::default(), false);
         let mut is_average = false;
-        while !self.take(end)? {
+        let mut in_pattern = false;
+        loop {
+            if in_pattern && self.take(b'}')? {
+                in_pattern = false;
+                continue;
+            }
+            if self.take(end)? {
+                break;
+            }
             if self.take(b',')? {
                 continue;
             }
             let Some(word) = self.word()? else { return Err(self.unexpected("a texture")) };
             match &*word {
+                "object" => {
+                    self.peeked = None;
+                    let kind = self.inside_pattern()?;
+                    draft.begin(kind, self.settings.generator);
+                    in_pattern = true;
+                    continue;
+                }
                 "pigment" | "normal" | "finish" => {
                     self.peeked = None;
+                    // Of layers, the top one changes.
+                    if let Some(known) = &base
+                        && matches!(known.kind, TextureKind::Layers(_))
+                    {
+                        let known = Arc::clone(known);
+                        base = Some(self.changed_texture(&word, &known)?);
+                        continue;
+                    }
                     // What is known changes; where it has been moved, this is written into what has been moved.
                     if let Some(known) = &base
                         && let TextureKind::Plain(inner) = &known.kind
@@ -478,6 +542,33 @@ impl Parser<'_, '_> {
         Ok(Arc::new(Texture { kind, warps: draft.warps, uv: draft.uv }))
     }
 
+    /// A texture with another pigment, normal or finish, whose word was taken; of layers, the top one has it.
+    pub(super) fn changed_texture(&mut self, word: &str, known: &Arc<Texture>) -> Result<Arc<Texture>> {
+        let changed = |layer: Layer, known: &Texture| {
+            Arc::new(Texture { kind: TextureKind::Plain(layer), warps: known.warps.clone(), uv: known.uv })
+        };
+        match &known.kind {
+            TextureKind::Plain(layer) => {
+                let mut layer = layer.clone();
+                self.layer_part(word, &mut layer)?;
+                Ok(changed(layer, known))
+            }
+            TextureKind::Layers(layers) => {
+                let mut layers = layers.to_vec();
+                if let Some(top) = layers.last_mut() {
+                    *top = self.changed_texture(word, top)?;
+                }
+                let kind = TextureKind::Layers(layers.into());
+                Ok(Arc::new(Texture { kind, warps: known.warps.clone(), uv: known.uv }))
+            }
+            _ => {
+                let mut layer = self.defaults.layer.clone();
+                self.layer_part(word, &mut layer)?;
+                Ok(Arc::new(Texture::plain(layer)))
+            }
+        }
+    }
+
     /// The pigment, the normal or the finish of a layer, whose word was taken.
     pub(super) fn layer_part(&mut self, word: &str, layer: &mut Layer) -> Result<()> {
         match word {
@@ -556,7 +647,7 @@ impl Parser<'_, '_> {
                 "ior" | "caustics" | "fade_power" | "fade_distance" | "refraction" | "irid_wavelength" => {
                     self.expression()?;
                 }
-                _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
+                _ => match self.known(&word)? {
                     Some(Value::Finish(known)) => finish = (*known).clone(),
                     Some(other) => {
                         return Err(self.error(format!("a finish is needed, not {}", other.name())));
@@ -624,10 +715,14 @@ impl Parser<'_, '_> {
     }
 
     /// An interior in braces.
-    pub(super) fn interior_block(&mut self) -> Result<Rc<Interior>> {
+    pub(super) fn interior_block(&mut self) -> Result<Arc<Interior>> {
         self.expect(b'{')?;
         let mut interior = Interior::DEFAULT;
         while !self.take(b'}')? {
+            if let Some(map) = self.transform()? {
+                interior = with_moved_media(&interior, &map);
+                continue;
+            }
             let Some(word) = self.word()? else { return Err(self.unexpected("an interior")) };
             self.peeked = None;
             match &*word {
@@ -636,18 +731,18 @@ impl Parser<'_, '_> {
                 "fade_distance" => interior.fade_distance = self.finite()? as f32,
                 "fade_power" => interior.fade_power = self.finite()? as f32,
                 "fade_color" | "fade_colour" => interior.fade_colour = self.rgb()?,
-                "dispersion" | "dispersion_samples" => {
+                "dispersion" => interior.dispersion = self.finite()? as f32,
+                "dispersion_samples" => {
                     self.float()?;
-                    self.warn("dispersion is not rendered");
                 }
                 "media" => {
-                    self.warn("media is not rendered");
-                    self.expect(b'{')?;
-                    self.skip_to(b'}')?;
+                    let media = self.media_block()?;
+                    self.budget.bytes(size_of_val(&media) as u64, "media")?;
+                    interior.media.push(media);
                 }
-                _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
+                _ => match self.known(&word)? {
                     Some(Value::Interior(known)) => interior = (*known).clone(),
-                    Some(Value::Ignored(_)) => {}
+                    Some(Value::Media(known)) => interior.media.push((*known).clone()),
                     Some(other) => {
                         return Err(self.error(format!("an interior is needed, not {}", other.name())));
                     }
@@ -658,7 +753,7 @@ impl Parser<'_, '_> {
                 },
             }
         }
-        Ok(Rc::new(interior))
+        Ok(Arc::new(interior))
     }
 
     /// A material in braces.
@@ -668,6 +763,7 @@ impl Parser<'_, '_> {
         while !self.take(b'}')? {
             if let Some(map) = self.transform()? {
                 material.texture = material.texture.map(|texture| texture.moved(&map));
+                material.interior = material.interior.map(|interior| moved_interior(interior, &map));
                 continue;
             }
             let Some(word) = self.word()? else { return Err(self.unexpected("a material")) };
@@ -683,7 +779,7 @@ impl Parser<'_, '_> {
                     material.interior_texture = Some(self.texture_body(b'}')?);
                 }
                 "interior" => material.interior = Some(self.interior_block()?),
-                _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
+                _ => match self.known(&word)? {
                     Some(Value::Material(known)) => material = (*known).clone(),
                     Some(other) => {
                         return Err(self.error(format!("a material is needed, not {}", other.name())));
@@ -694,6 +790,17 @@ impl Parser<'_, '_> {
         }
         Ok(material)
     }
+}
+
+/// An interior that is moved: the same one where there is nothing in it that has a place.
+pub(super) fn moved_interior(interior: Arc<Interior>, map: &Arc<Transform>) -> Arc<Interior> {
+    if interior.media.is_empty() { interior } else { Arc::new(with_moved_media(&interior, map)) }
+}
+
+/// An interior whose media are moved.
+pub(super) fn with_moved_media(interior: &Interior, map: &Arc<Transform>) -> Interior {
+    let media = interior.media.iter().map(|media| media.moved(map)).collect();
+    Interior { media, ..interior.clone() }
 }
 
 /// A texture on top of others.

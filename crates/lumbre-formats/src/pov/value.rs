@@ -6,7 +6,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use lumbre_math::{DVec3, Transform};
-use lumbre_shading::pov::{Colour, Function, Normal, Pigment, Spline, Texture};
+use lumbre_shading::pov::{Colour, Function, Media, Normal, Pigment, Spline, Texture};
 
 use super::camera::CameraStatement;
 use super::lights::LightStatement;
@@ -86,7 +86,9 @@ pub(super) enum Value {
     Pigment(Arc<Pigment>),
     Normal(Arc<Normal>),
     Finish(Rc<FinishStatement>),
-    Interior(Rc<InteriorStatement>),
+    Interior(Arc<InteriorStatement>),
+    Media(Rc<Media>),
+    Density(Arc<Pigment>),
     Material(Rc<MaterialStatement>),
     Map(Rc<Map>),
     Camera(Rc<CameraStatement>),
@@ -95,7 +97,7 @@ pub(super) enum Value {
     SkySphere(Rc<SkySphere>),
     /// A file that the scene has opened.
     File(Rc<RefCell<File>>),
-    /// Something that is read over: media, density, rainbow.
+    /// Something that is read over: a rainbow.
     Ignored(&'static str),
     Dictionary(Rc<HashMap<Rc<str>, Value>>),
 }
@@ -120,6 +122,8 @@ impl Value {
             Self::Normal(_) => "a normal",
             Self::Finish(_) => "a finish",
             Self::Interior(_) => "an interior",
+            Self::Media(_) => "a medium",
+            Self::Density(_) => "a density",
             Self::Material(_) => "a material",
             Self::Map(_) => "a map",
             Self::Camera(_) => "a camera",

@@ -1,10 +1,12 @@
 //! POV-Ray's local illumination: ambient, diffuse and highlights of each layer, mirrors, refraction, filtered shadows and fog.
 
+mod media;
+
 use std::f64::consts::FRAC_PI_2;
 
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec2, DVec3, Elementary};
-use lumbre_scene::pov::{PovLight, PovWorld};
+use lumbre_scene::pov::{PovArea, PovLight, PovWorld};
 use lumbre_scene::{Footprint, Interaction, Light, Scene, View};
 use lumbre_shading::pov::{Eye, Finish, LayerAt, PovMaterial};
 use lumbre_shading::{MaterialKind, Spectrum};
@@ -24,6 +26,9 @@ const MOST_SURFACES: u32 = 256;
 const NEAR: f64 = 1e-4;
 /// Light that grazes a surface by less than this cosine does not reach it.
 const GRAZING: f64 = 1e-10;
+
+/// The exponent of the cosine by which `caustics 1` gathers light.
+const CAUSTICS: f32 = 45.0;
 
 /// The solids that a ray is in.
 type Inside<'s> = SmallVec<[&'s PovMaterial; 4]>;
@@ -55,13 +60,13 @@ impl RayIntegrator for Pov {
         });
         let tracer = Tracer { scene, world, lights: lights.collect() };
         let ray = sight.ray.ray;
-        // Where a camera sees nothing.
-        if !ray.direction.is_finite() {
-            return Spectrum::BLACK;
-        }
+        let is_at_eye = ray.origin.distance(world.eye) <= NEAR * (1.0 + world.eye.length());
         let first = Traced {
-            // A camera stands outside of all solids.
-            inside: Inside::new(),
+            inside: if is_at_eye {
+                world.around_eye.iter().map(|solid| &**solid).collect()
+            } else {
+                Inside::new()
+            },
             ray,
             level: 0,
             weight: 1.0,
@@ -116,18 +121,18 @@ impl<'s> Tracer<'s> {
             }
             None => (self.sky(direction), f64::INFINITY),
         };
-        if traced.inside.iter().all(|solid| solid.hollow) {
-            self.in_fog(colour, traced.ray.origin, direction, length)
-        } else {
-            colour
+        if traced.inside.iter().any(|solid| !solid.hollow) {
+            return colour;
         }
+        let colour = self.through_media(traced, direction, length, colour, record);
+        self.in_fog(colour, traced.ray.origin, direction, length)
     }
 
     fn sky(&self, direction: DVec3) -> Spectrum {
         let eye = Eye { normal: -direction, direction: -direction, uv: DVec2::ZERO };
         self.world.sky.iter().fold(self.world.background, |below, pigment| {
             let colour = pigment.colour(direction, &eye);
-            colour.rgb * (1.0 - colour.filter - colour.transmit) + below * colour.passing()
+            colour.rgb * colour.opacity(false) + below * colour.passing()
         })
     }
 
@@ -159,7 +164,7 @@ impl<'s> Tracer<'s> {
             uv: material.surface_uv(here.surface.point, here.at.uv.as_dvec2()),
         };
         // A solid that the ray is in is left.
-        let is_inside = traced.inside.iter().any(|solid| std::ptr::eq(*solid, material));
+        let is_inside = traced.inside.iter().any(|solid| solid.is_of_solid(material));
         let mut sum = Spectrum::BLACK;
         for (share, layers) in &material.stacks(here.surface.point, &eye, here.front) {
             sum += self.stack(traced, here, material, layers, is_inside, record) * *share;
@@ -199,7 +204,7 @@ impl<'s> Tracer<'s> {
         if let Some(top) = layers.last()
             && gray(left) >= self.world.adc_bailout
         {
-            sum += left * self.passing(traced, here, material, top, gray(left), is_inside, record);
+            sum += self.passing(traced, here, material, top, left, is_inside, record);
         }
         sum
     }
@@ -235,19 +240,12 @@ impl<'s> Tracer<'s> {
         if let Some(area) = &light.area
             && area.illumination
         {
-            let mut sum = Spectrum::BLACK;
-            let [n, m] = area.counts;
-            for i in 0..n {
-                for j in 0..m {
-                    let from = light.place(DVec2::new(step(i, n), step(j, m)), p);
-                    let arriving = light.arriving(p, from);
-                    let shaded = self.shaded(traced, here, material, layer, light, from, arriving, opacity);
-                    if !shaded.is_black() {
-                        sum += shaded * self.shadow(here, light, from, record);
-                    }
-                }
-            }
-            return sum * (1.0 / (n * m) as f32);
+            return self.mean_of_area(area, record, &mut |u, record| {
+                let from = light.place(u, p);
+                let arriving = light.arriving(p, from);
+                let shaded = self.shaded(traced, here, material, layer, light, from, arriving, opacity);
+                if shaded.is_black() { shaded } else { shaded * self.shadow(here, light, from, record) }
+            });
         }
         let arriving = light.arriving(p, light.from);
         let shaded = self.shaded(traced, here, material, layer, light, light.from, arriving, opacity);
@@ -353,7 +351,7 @@ impl<'s> Tracer<'s> {
         }
         let d = traced.ray.direction.normalize();
         let cosine = -layer.normal.dot(d);
-        let is_inside = traced.inside.iter().any(|solid| std::ptr::eq(*solid, material));
+        let is_inside = traced.inside.iter().any(|solid| solid.is_of_solid(material));
         let eta = if is_inside { 1.0 / material.interior.ior } else { material.interior.ior };
         let reflectance = mirror.at(cosine.clamp(0.0, 1.0) as f32, eta);
         reflectance * metallic(mirror.metallic, cosine, layer.colour.rgb)
@@ -405,7 +403,7 @@ impl<'s> Tracer<'s> {
         here: &Interaction<'s>,
         material: &'s PovMaterial,
         layer: &LayerAt<'_>,
-        left: f32,
+        left: Spectrum,
         is_inside: bool,
         record: &mut Record,
     ) -> Spectrum {
@@ -414,7 +412,7 @@ impl<'s> Tracer<'s> {
         let from = index(&traced.inside);
         let mut inside = traced.inside.clone();
         if is_inside {
-            inside.retain(|solid| !std::ptr::eq(*solid, material));
+            inside.retain(|solid| !solid.is_of_solid(material));
         } else {
             inside.push(material);
         }
@@ -424,24 +422,26 @@ impl<'s> Tracer<'s> {
         let cosine = -n.dot(d);
         let under = 1.0 - eta * eta * (1.0 - cosine * cosine);
         let is_straight = (eta - 1.0).abs() < 1e-12;
-        let (direction, inside, is_mirrored) = if is_straight {
-            (d, inside, false)
-        } else if under < 0.0 {
-            // All light is mirrored.
-            (d + n * (2.0 * cosine), traced.inside.clone(), true)
+        let is_total = under < 0.0 && !is_straight;
+        let (direction, inside) = if is_straight {
+            (d, inside)
+        } else if is_total {
+            // All light is mirrored, and nothing is filtered.
+            (d + n * (2.0 * cosine), traced.inside.clone())
         } else {
-            (d * eta + n * (eta * cosine - under.sqrt()), inside, false)
+            (d * eta + n * (eta * cosine - under.sqrt()), inside)
         };
         let next = Traced {
             ray: here.leave(direction.normalize()),
             inside,
             level: if is_straight { traced.level } else { traced.level + 1 },
-            weight: traced.weight * left,
-            is_mirrored: traced.is_mirrored || is_mirrored,
+            weight: traced.weight * gray(left),
+            is_mirrored: traced.is_mirrored || is_total,
             is_camera: traced.is_camera,
         };
         record.counts.bounce += 1;
-        self.trace_straight(next, is_straight, record)
+        let seen = self.trace_straight(next, is_straight, record);
+        if is_total { seen } else { left * seen }
     }
 
     /// A ray that goes straight on counts as the same ray, but not without end.
@@ -454,70 +454,60 @@ impl<'s> Tracer<'s> {
 
     /// What comes through of a light, by its area.
     fn shadows(&self, here: &Interaction<'s>, light: &PovLight, record: &mut Record) -> Spectrum {
-        let Some(area) = &light.area else { return self.shadow(here, light, light.from, record) };
-        let [n, m] = area.counts;
-        if n * m <= 1 {
-            return self.shadow(here, light, light.from, record);
+        match &light.area {
+            Some(area) if area.counts != [1, 1] => self.mean_of_area(area, record, &mut |u, record| {
+                self.shadow(here, light, light.place(u, here.surface.point), record)
+            }),
+            _ => self.shadow(here, light, light.from, record),
         }
-        let mut known: Vec<Option<Spectrum>> = vec![None; (n * m) as usize];
-        self.grid(here, light, [0, 0, n - 1, m - 1], 0, &mut known, record)
     }
 
-    /// The mean over a part of a grid, as its quarters where its corners differ.
-    fn grid(
+    /// The mean over the grid of an area of what is asked for at places in the unit square.
+    fn mean_of_area(
         &self,
-        here: &Interaction<'s>,
+        area: &PovArea,
+        record: &mut Record,
+        at: &mut dyn FnMut(DVec2, &mut Record) -> Spectrum,
+    ) -> Spectrum {
+        let [n, m] = area.counts;
+        let mut known: Vec<Option<Spectrum>> = vec![None; (n * m) as usize];
+        let mut corner = |u: u32, v: u32| {
+            *known[(u * m + v) as usize].get_or_insert_with(|| at(DVec2::new(step(u, n), step(v, m)), record))
+        };
+        mean_of_grid(area.adaptive, [0, 0, n - 1, m - 1], 0, &mut corner)
+    }
+
+    /// What comes through to a point of a surface from a place of a light.
+    fn shadow(&self, here: &Interaction<'s>, light: &PovLight, from: DVec3, record: &mut Record) -> Spectrum {
+        let p = here.surface.point;
+        let Some((towards, distance)) = light.towards(p, from) else { return Spectrum::WHITE };
+        self.between(here.leave(towards), p + towards * distance, Inside::new(), light, record)
+    }
+
+    /// What comes through of a light from a target to where a ray begins that goes there, inside of some solids.
+    fn between(
+        &self,
+        mut ray: Ray,
+        target: DVec3,
+        mut inside: Inside<'s>,
         light: &PovLight,
-        [u1, v1, u2, v2]: [u32; 4],
-        level: u32,
-        known: &mut [Option<Spectrum>],
         record: &mut Record,
     ) -> Spectrum {
-        let Some(area) = &light.area else { return Spectrum::WHITE };
-        let [n, m] = area.counts;
-        let mut corner = |u: u32, v: u32, record: &mut Record| {
-            *known[(u * m + v) as usize].get_or_insert_with(|| {
-                let from = light.place(DVec2::new(step(u, n), step(v, m)), here.surface.point);
-                self.shadow(here, light, from, record)
-            })
-        };
-        let corners =
-            [corner(u1, v1, record), corner(u2, v1, record), corner(u1, v2, record), corner(u2, v2, record)];
-        let differ = |a: usize, b: usize| (corners[a] - corners[b]).map(f32::abs).max_component() > 0.1;
-        let is_uneven = differ(0, 1) || differ(2, 3) || differ(0, 2) || differ(1, 3);
-        let is_wide = u2 - u1 > 1 || v2 - v1 > 1;
-        if is_wide && (level < area.adaptive || is_uneven) {
-            let (ul, uh) = ((u1 + u2) / 2, (u1 + u2).div_ceil(2));
-            let (vl, vh) = ((v1 + v2) / 2, (v1 + v2).div_ceil(2));
-            let quarters = [[u1, v1, ul, vl], [uh, v1, u2, vl], [u1, vh, ul, v2], [uh, vh, u2, v2]];
-            let mut sum = Spectrum::BLACK;
-            for quarter in quarters {
-                sum += self.grid(here, light, quarter, level + 1, known, record);
-            }
-            return sum * 0.25;
-        }
-        corners.into_iter().sum::<Spectrum>() * 0.25
-    }
-
-    /// What comes through to a point from a place of a light.
-    fn shadow(&self, here: &Interaction<'s>, light: &PovLight, from: DVec3, record: &mut Record) -> Spectrum {
-        let Some((towards, distance)) = light.towards(here.surface.point, from) else {
-            return Spectrum::WHITE;
-        };
         record.counts.shadow += 1;
-        let target = here.surface.point + towards * distance;
+        let towards = ray.direction;
         let mut left = Spectrum::WHITE;
-        let mut inside: Inside<'s> = Inside::new();
-        let mut ray = here.leave(towards);
         let mut travelled = 0.0;
         for _ in 0..MOST_SURFACES {
             let rest = (target - ray.origin).dot(towards);
-            let Some(hit) = self.scene.closest(&ray.with_range(0.0, rest - NEAR)) else { return left };
+            let Some(hit) = self.scene.closest(&ray.with_range(0.0, rest - NEAR)) else {
+                return left * self.media_passing(&inside, &ray, rest, light);
+            };
             let there = self.scene.interaction(&ray, &hit, &Footprint::Point);
             let Some(material) = Self::material(&there) else { return left };
             let step = (there.surface.point - ray.origin).length();
             let is_near = travelled + step < NEAR;
             travelled += step;
+            left *= self.media_passing(&inside, &ray, step, light);
             if !material.visibility.no_shadow && !is_near {
                 let smooth = there.shading.normal.as_dvec3();
                 let normal = if smooth.dot(towards) > 0.0 { -smooth } else { smooth };
@@ -526,7 +516,7 @@ impl<'s> Tracer<'s> {
                     direction: -towards,
                     uv: material.surface_uv(there.surface.point, there.at.uv.as_dvec2()),
                 };
-                let is_inside = inside.iter().any(|solid| std::ptr::eq(*solid, material));
+                let is_inside = inside.iter().any(|solid| solid.is_of_solid(material));
                 let mut passes = Spectrum::BLACK;
                 for (share, layers) in &material.stacks(there.surface.point, &eye, !is_inside) {
                     passes += layers
@@ -534,12 +524,13 @@ impl<'s> Tracer<'s> {
                         .fold(Spectrum::splat(*share), |left, layer| left * layer.colour.passing());
                 }
                 if material.interior.caustics != 0.0 {
-                    passes *= 1.0 + (normal.dot(towards).abs() as f32).power(material.interior.caustics);
+                    let focus = CAUSTICS * material.interior.caustics;
+                    passes *= 1.0 + (normal.dot(towards).abs() as f32).power(focus);
                 }
                 left *= passes;
                 if is_inside {
                     left *= material.interior.transmittance(step as f32);
-                    inside.retain(|solid| !std::ptr::eq(*solid, material));
+                    inside.retain(|solid| !solid.is_of_solid(material));
                 } else {
                     inside.push(material);
                 }
@@ -551,6 +542,29 @@ impl<'s> Tracer<'s> {
         }
         left
     }
+}
+
+/// The mean over a part of a grid, as its quarters where its corners differ.
+fn mean_of_grid(
+    adaptive: u32,
+    [u1, v1, u2, v2]: [u32; 4],
+    level: u32,
+    corner: &mut dyn FnMut(u32, u32) -> Spectrum,
+) -> Spectrum {
+    let corners = [corner(u1, v1), corner(u2, v1), corner(u1, v2), corner(u2, v2)];
+    let differ = |a: usize, b: usize| (corners[a] - corners[b]).map(f32::abs).max_component() > 0.1;
+    let is_uneven = differ(0, 1) || differ(2, 3) || differ(0, 2) || differ(1, 3);
+    let is_wide = u2 - u1 > 1 || v2 - v1 > 1;
+    if !is_wide || !(level < adaptive || is_uneven) {
+        return corners.into_iter().sum::<Spectrum>() * 0.25;
+    }
+    let (ul, uh) = ((u1 + u2) / 2, (u1 + u2).div_ceil(2));
+    let (vl, vh) = ((v1 + v2) / 2, (v1 + v2).div_ceil(2));
+    let mut sum = Spectrum::BLACK;
+    for quarter in [[u1, v1, ul, vl], [uh, v1, u2, vl], [u1, vh, ul, v2], [uh, vh, u2, v2]] {
+        sum += mean_of_grid(adaptive, quarter, level + 1, corner);
+    }
+    sum * 0.25
 }
 
 /// Where one of so many stands between 0 and 1; one alone in the middle.

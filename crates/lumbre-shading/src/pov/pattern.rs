@@ -136,6 +136,18 @@ pub enum PatternKind {
     Pigment(Arc<super::Pigment>),
     /// An image.
     Image(Box<super::ImageMap>),
+    /// 1 inside of an object, 0 outside.
+    Inside(InsideTest),
+}
+
+/// Whether a point is inside of an object.
+#[derive(Clone)]
+pub struct InsideTest(pub Arc<dyn Fn(DVec3) -> bool + Send + Sync>);
+
+impl std::fmt::Debug for InsideTest {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.write_str("InsideTest")
+    }
 }
 
 /// What is made of the distances to random points.
@@ -234,7 +246,7 @@ impl Pattern {
     /// Of how many it names one; `None` for continuous patterns.
     pub fn block_count(&self) -> Option<usize> {
         match self.kind {
-            PatternKind::Checker | PatternKind::Brick { .. } => Some(2),
+            PatternKind::Checker | PatternKind::Brick { .. } | PatternKind::Inside(_) => Some(2),
             PatternKind::Hexagon => Some(3),
             PatternKind::Square => Some(4),
             PatternKind::Cubic | PatternKind::Triangular => Some(6),
@@ -339,6 +351,7 @@ impl Pattern {
             }
             PatternKind::Pigment(pigment) => f64::from(pigment.colour(p, eye).gray()),
             PatternKind::Image(image) => image.value(p),
+            PatternKind::Inside(test) => f64::from(u8::from((test.0)(p))),
         }
     }
 

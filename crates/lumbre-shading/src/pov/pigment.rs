@@ -52,6 +52,12 @@ impl Colour {
         0.297 * self.rgb.r + 0.589 * self.rgb.g + 0.114 * self.rgb.b
     }
 
+    /// How much of its own light is shown; by the rule before version 3.7, a filter is as clear as it is bright.
+    pub fn opacity(self, is_old: bool) -> f32 {
+        let filtered = if is_old { self.filter * self.rgb.max_component() } else { self.filter };
+        1.0 - (filtered + self.transmit)
+    }
+
     /// What light that passes is multiplied by.
     pub fn passing(self) -> Spectrum {
         self.rgb * self.filter + Spectrum::splat(self.transmit)
@@ -198,10 +204,10 @@ pub struct ImageMap {
     pub once: bool,
     /// Whether colours between pixels are interpolated.
     pub interpolate: bool,
-    /// Replaces the filter of all its colours.
-    pub filter: Option<f32>,
-    /// Replaces the transparency of all its colours.
-    pub transmit: Option<f32>,
+    /// Added to the filter of all its colours.
+    pub filter: f32,
+    /// Added to the transparency of all its colours.
+    pub transmit: f32,
 }
 
 /// Where the colours of an image come from.
@@ -232,8 +238,8 @@ impl ImageMap {
         let none = Colour { rgb: Spectrum::BLACK, filter: 0.0, transmit: 1.0 };
         let Some([u, v]) = self.place(p) else { return none };
         let mut colour = if self.interpolate { self.interpolated(u, v) } else { self.nearest(u, v) };
-        colour.filter = self.filter.unwrap_or(colour.filter);
-        colour.transmit = self.transmit.unwrap_or(colour.transmit);
+        colour.filter += self.filter;
+        colour.transmit += self.transmit;
         colour
     }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use lumbre_math::{DVec2, DVec3, Elementary, Transform};
 use smallvec::SmallVec;
 
+use super::media::Media;
 use super::normal::Normal;
 use super::pattern::Pattern;
 use super::pigment::{Colour, Pigment, between};
@@ -160,7 +161,7 @@ impl Texture {
 }
 
 /// What an object is filled with.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Interior {
     /// The index of refraction.
     pub ior: f32,
@@ -172,12 +173,23 @@ pub struct Interior {
     pub fade_power: f32,
     /// The colour to which it fades.
     pub fade_colour: Spectrum,
+    /// The index of refraction of violet over that of red; what lights surfaces takes the mean for all.
+    pub dispersion: f32,
+    /// What is in it, which is seen where the object is hollow.
+    pub media: Vec<Media>,
 }
 
 impl Interior {
     /// What an object is filled with unless the scene says otherwise.
-    pub const DEFAULT: Self =
-        Self { ior: 1.0, caustics: 0.0, fade_distance: 0.0, fade_power: 0.0, fade_colour: Spectrum::BLACK };
+    pub const DEFAULT: Self = Self {
+        ior: 1.0,
+        caustics: 0.0,
+        fade_distance: 0.0,
+        fade_power: 0.0,
+        fade_colour: Spectrum::BLACK,
+        dispersion: 1.0,
+        media: Vec::new(),
+    };
 
     /// What is left of light after a distance inside.
     pub fn transmittance(&self, distance: f32) -> Spectrum {
@@ -196,8 +208,10 @@ impl Interior {
 /// How the coordinates of a surface are found, in the space of its object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum UvForm {
-    /// As the shape gives them: those of meshes and patches.
+    /// As the shape gives them: those of meshes, patches and what is turned about an axis.
     Surface,
+    /// x and y of the world: of shapes that have none of their own.
+    Plane,
     /// Longitude and latitude about a center.
     Sphere(DVec3, f64),
     /// A cross of six faces, between two corners.
@@ -216,6 +230,7 @@ impl UvForm {
         };
         match self {
             Self::Surface => surface,
+            Self::Plane => p.truncate(),
             Self::Sphere(center, radius) => {
                 let q = (p - *center) / *radius;
                 DVec2::new(around(q.x, q.z), 0.5 + q.y.clamp(-1.0, 1.0).arc_sine() / PI)
@@ -263,7 +278,7 @@ pub struct PovMaterial {
     pub texture: Arc<Texture>,
     /// The texture as seen from inside, where it is another.
     pub interior_texture: Option<Arc<Texture>>,
-    /// What it is filled with.
+    /// What it is filled with, one for all surfaces of a solid.
     pub interior: Arc<Interior>,
     /// From what it is hidden.
     pub visibility: Visibility,
@@ -284,6 +299,11 @@ pub struct PovMaterial {
 }
 
 impl PovMaterial {
+    /// Whether it is of the same solid: the surfaces of one share what it is filled with.
+    pub fn is_of_solid(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.interior, &other.interior)
+    }
+
     /// The coordinates of a point of the surface.
     pub fn surface_uv(&self, p: DVec3, uv: DVec2) -> DVec2 {
         let (form, map) = &self.uv;
@@ -300,10 +320,6 @@ impl PovMaterial {
 
     /// How much of the light of a pigment's own a layer shows.
     pub fn opacity(&self, colour: Colour) -> f32 {
-        if self.old_opacity {
-            1.0 - (colour.filter * colour.rgb.max_component() + colour.transmit)
-        } else {
-            1.0 - colour.filter - colour.transmit
-        }
+        colour.opacity(self.old_opacity)
     }
 }

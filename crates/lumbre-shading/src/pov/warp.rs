@@ -206,9 +206,18 @@ fn unrolled(p: DVec3, shape: Unrolling, orientation: DVec3, exponent: f64) -> DV
 }
 
 fn planar(p: DVec3, normal: DVec3, distance: f64) -> DVec3 {
-    // The plane is turned so that its normal is z.
+    // Planes across an axis only set that coordinate; others are turned so that their normal is z.
+    if normal == DVec3::X {
+        return DVec3::new(distance, p.y, p.z);
+    }
+    if normal == DVec3::Y {
+        return DVec3::new(p.x, -distance, p.z);
+    }
+    if normal == DVec3::Z {
+        return DVec3::new(p.x, p.y, distance);
+    }
     let (s, t) = normal.any_orthonormal_pair();
-    if normal == DVec3::Z { DVec3::new(p.x, p.y, distance) } else { DVec3::new(p.dot(s), p.dot(t), distance) }
+    DVec3::new(p.dot(s), p.dot(t), distance)
 }
 
 fn cubic(p: DVec3) -> DVec3 {
