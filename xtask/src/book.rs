@@ -228,6 +228,34 @@ mod tests {
         assert!(faults.is_empty(), "cargo xtask book --update mends these:\n{}", faults.join("\n"));
     }
 
+    /// The exercises of a page whose answer neither has a command that computes it, nor is marked as one of reasoning alone.
+    fn uncomputed(text: &str) -> Vec<String> {
+        let answers = text.split("<details>").skip(1).filter_map(|rest| rest.split("</details>").next());
+        let is_computed = |answer: &&str| !answer.contains("```console") && !answer.contains(REASONED);
+        answers.filter(is_computed).map(str::to_owned).collect()
+    }
+
+    /// What an answer has in place of a command where there is nothing to compute.
+    const REASONED: &str = "<!-- reasoned -->";
+
+    #[test]
+    fn answers_of_exercises_are_computed() {
+        let (mut exercises, mut reasoned) = (0, 0);
+        let mut faults = Vec::new();
+        for folder in ["mathematics", "light"] {
+            for page in files::with_ending(&root().join(PAGES).join(folder), "md").expect("there are pages") {
+                let text = fs::read_to_string(&page).expect("it can be read");
+                exercises += text.matches("<details>").count();
+                reasoned += text.matches(REASONED).count();
+                faults.extend(uncomputed(&text).into_iter().map(|answer| format!("{}: {answer}", page.display())));
+            }
+        }
+        assert!(faults.is_empty(), "a command is missing in these answers:\n{}", faults.join("\n"));
+        assert!(exercises > 100 && reasoned * 10 < exercises, "{exercises} exercises, {reasoned} without a command");
+        let page = "<details>a</details><details>```console\n$ b\n```</details><details><!-- reasoned --></details>";
+        assert_eq!(uncomputed(page), ["a"]);
+    }
+
     #[test]
     fn what_is_missing_in_a_page_is_found() {
         let folder = tempfile::tempdir().expect("a folder");
