@@ -138,8 +138,8 @@ mod tests {
                 }
                 None => return None,
             };
-            let takes_language = TRANSLATED.iter().any(|name| format!("{command} ").starts_with(name));
-            let english = command.replacen(" --lang es", "", 1);
+            let takes_language = TRANSLATED.iter().any(|name| format!("{command} ").contains(name));
+            let english = command.replace(" --lang es", "");
             let is_asked = english != command;
             let is_right = is_asked == (is_spanish && takes_language) || (is_asked && !is_spanish);
             Some(if is_right { english } else { format!("{command} (--lang es?)") })
