@@ -49,6 +49,7 @@ mod tests {
         /// Sorted, since the order of words is another; without the words in them.
         formulas: Vec<String>,
         commands: Vec<String>,
+        commands_in_text: Vec<String>,
         /// The blocks of code, by the line that opens each.
         code: Vec<String>,
         /// Figures and links, from the folder of the pages, links sorted; without the folder of a language.
@@ -90,6 +91,10 @@ mod tests {
                         let is_shell = outline.code.last().is_some_and(|info| info == "sh");
                         outline.commands.extend(commands(&code, is_shell, is_spanish));
                     }
+                    // Those of tables and of the text.
+                    Event::Code(code) if code.starts_with("lumbre ") => {
+                        outline.commands_in_text.push(code.replace(" --lang es", ""));
+                    }
                     Event::Start(Tag::Image { dest_url, .. }) => {
                         outline.figures.push(neutral(page, &dest_url));
                     }
@@ -110,6 +115,7 @@ mod tests {
                 }
             }
             outline.formulas.sort();
+            outline.commands_in_text.sort();
             outline.links.sort();
             outline
         }
@@ -207,6 +213,7 @@ mod tests {
         compare("headings", &ours.headings, &theirs.headings);
         compare("formulas", &ours.formulas, &theirs.formulas);
         compare("commands", &ours.commands, &theirs.commands);
+        compare("commands in the text", &ours.commands_in_text, &theirs.commands_in_text);
         compare("blocks of code", &ours.code, &theirs.code);
         compare("figures", &ours.figures, &theirs.figures);
         compare("links", &ours.links, &theirs.links);
@@ -312,9 +319,9 @@ mod tests {
 
     #[test]
     fn differences_between_languages_are_found() {
-        let english = "# A\n\n[Español](../es/m/a.md)\n\n## B\n\nThe $x$ of $$y = \\text{one } z$$ is [here](b.md#c).\n\n![p](f/p.svg)\n\n\
+        let english = "# A\n\n[Español](../es/m/a.md)\n\n## B\n\nThe $x$ of $$y = \\text{one } z$$ is [here](b.md#c) (`lumbre info`).\n\n![p](f/p.svg)\n\n\
                        | a | b |\n|---|---|\n| 1 | 2 |\n\n```console\n$ lumbre math '1'\n= 1\n\n$ lumbre cast a\n0\n```\n\n1. Q\n   <details>A</details>\n";
-        let spanish = "# Á\n\n[English](../../m/a.md)\n\n## B\n\nEn $$y = \\text{un } z$$, [aquí](b.md#d), la $x$.\n\n![p](../../m/f/p.svg)\n\n\
+        let spanish = "# Á\n\n[English](../../m/a.md)\n\n## B\n\nEn $$y = \\text{un } z$$, [aquí](b.md#d) (`lumbre info`), la $x$.\n\n![p](../../m/f/p.svg)\n\n\
                        | a | b |\n|---|---|\n| 1 | 2 |\n\n```console\n$ lumbre math --lang es '1'\n= 1\n\n$ lumbre cast a\n0\n```\n\n1. P\n   <details>R</details>\n";
         let found = |spanish: &str| differences(Path::new("m/a.md"), english, spanish);
         assert_eq!(found(spanish), Vec::<String>::new());
@@ -330,6 +337,7 @@ mod tests {
             (" --lang es", ""),
             ("lumbre cast a", "lumbre cast --lang es a"),
             ("lumbre cast a", "lumbre cast b"),
+            ("lumbre info", "lumbre --help"),
             ("```console", "```text"),
             ("f/p.svg", "f/q.svg"),
             ("b.md#d", "c.md#d"),
