@@ -311,7 +311,7 @@ mod tests {
     fn words(svg: &str) -> Vec<&str> {
         let is_word = |label: &&str| {
             let mut words = label.split(|c: char| !c.is_alphabetic());
-            words.any(|word| word.len() > 2 && !["cos", "sin", "tan"].contains(&word))
+            words.any(|word| word.chars().count() > 2 && !["cos", "sin", "tan"].contains(&word))
         };
         let labels = svg.split("<text").skip(1).filter_map(|part| part.split_once('>'));
         labels.map(|(_, label)| label.split('<').next().unwrap_or_default()).filter(is_word).collect()
