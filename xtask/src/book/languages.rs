@@ -49,7 +49,7 @@ mod tests {
         /// Sorted, since the order of words is another; without the words in them.
         formulas: Vec<String>,
         commands: Vec<String>,
-        commands_in_text: Vec<String>,
+        commands_in_tables: Vec<String>,
         /// The blocks of code, by the line that opens each.
         code: Vec<String>,
         /// Figures and links, from the folder of the pages, links sorted; without the folder of a language.
@@ -65,7 +65,7 @@ mod tests {
         fn of(page: &Path, text: &str, is_spanish: bool) -> Self {
             let mut outline = Self { exercises: text.matches("<details>").count(), ..Self::default() };
             let options = Options::ENABLE_MATH | Options::ENABLE_TABLES | Options::ENABLE_FOOTNOTES;
-            let mut code = None;
+            let (mut code, mut is_in_table) = (None, false);
             for event in Parser::new_ext(text, options) {
                 match event {
                     Event::Start(Tag::Heading { level, .. }) => outline.headings.push(level.to_string()),
@@ -91,9 +91,8 @@ mod tests {
                         let is_shell = outline.code.last().is_some_and(|info| info == "sh");
                         outline.commands.extend(commands(&code, is_shell, is_spanish));
                     }
-                    // Those of tables and of the text.
-                    Event::Code(code) if code.starts_with("lumbre ") => {
-                        outline.commands_in_text.push(code.replace(" --lang es", ""));
+                    Event::Code(code) if is_in_table && code.starts_with("lumbre ") => {
+                        outline.commands_in_tables.push(code.replace(" --lang es", ""));
                     }
                     Event::Start(Tag::Image { dest_url, .. }) => {
                         outline.figures.push(neutral(page, &dest_url));
@@ -105,6 +104,8 @@ mod tests {
                             outline.links.push(target);
                         }
                     }
+                    Event::Start(Tag::Table(_)) => is_in_table = true,
+                    Event::End(TagEnd::Table) => is_in_table = false,
                     Event::Start(Tag::TableHead | Tag::TableRow) => outline.rows.push(0),
                     Event::Start(Tag::TableCell) => {
                         if let Some(cells) = outline.rows.last_mut() {
@@ -115,7 +116,7 @@ mod tests {
                 }
             }
             outline.formulas.sort();
-            outline.commands_in_text.sort();
+            outline.commands_in_tables.sort();
             outline.links.sort();
             outline
         }
@@ -213,7 +214,7 @@ mod tests {
         compare("headings", &ours.headings, &theirs.headings);
         compare("formulas", &ours.formulas, &theirs.formulas);
         compare("commands", &ours.commands, &theirs.commands);
-        compare("commands in the text", &ours.commands_in_text, &theirs.commands_in_text);
+        compare("commands in tables", &ours.commands_in_tables, &theirs.commands_in_tables);
         compare("blocks of code", &ours.code, &theirs.code);
         compare("figures", &ours.figures, &theirs.figures);
         compare("links", &ours.links, &theirs.links);
@@ -319,10 +320,10 @@ mod tests {
 
     #[test]
     fn differences_between_languages_are_found() {
-        let english = "# A\n\n[Español](../es/m/a.md)\n\n## B\n\nThe $x$ of $$y = \\text{one } z$$ is [here](b.md#c) (`lumbre info`).\n\n![p](f/p.svg)\n\n\
-                       | a | b |\n|---|---|\n| 1 | 2 |\n\n```console\n$ lumbre math '1'\n= 1\n\n$ lumbre cast a\n0\n```\n\n1. Q\n   <details>A</details>\n";
-        let spanish = "# Á\n\n[English](../../m/a.md)\n\n## B\n\nEn $$y = \\text{un } z$$, [aquí](b.md#d) (`lumbre info`), la $x$.\n\n![p](../../m/f/p.svg)\n\n\
-                       | a | b |\n|---|---|\n| 1 | 2 |\n\n```console\n$ lumbre math --lang es '1'\n= 1\n\n$ lumbre cast a\n0\n```\n\n1. P\n   <details>R</details>\n";
+        let english = "# A\n\n[Español](../es/m/a.md)\n\n## B\n\nThe $x$ of $$y = \\text{one } z$$ is [here](b.md#c).\n\n![p](f/p.svg)\n\n\
+                       | a | b |\n|---|---|\n| 1 | `lumbre info` |\n\n```console\n$ lumbre math '1'\n= 1\n\n$ lumbre cast a\n0\n```\n\n1. Q\n   <details>A</details>\n";
+        let spanish = "# Á\n\n[English](../../m/a.md)\n\n## B\n\nEn $$y = \\text{un } z$$, [aquí](b.md#d), la $x$.\n\n![p](../../m/f/p.svg)\n\n\
+                       | a | b |\n|---|---|\n| 1 | `lumbre info` |\n\n```console\n$ lumbre math --lang es '1'\n= 1\n\n$ lumbre cast a\n0\n```\n\n1. P\n   <details>R</details>\n";
         let found = |spanish: &str| differences(Path::new("m/a.md"), english, spanish);
         assert_eq!(found(spanish), Vec::<String>::new());
         let strays = |pages: &[&str]| {
@@ -342,7 +343,7 @@ mod tests {
             ("f/p.svg", "f/q.svg"),
             ("b.md#d", "c.md#d"),
             ("<details>", "<p>"),
-            ("| 1 | 2 |\n", ""),
+            ("| 1 | `lumbre info` |\n", ""),
             ("../../m/a.md", "../m/a.md"),
         ] {
             let changed = spanish.replacen(from, to, 1);
