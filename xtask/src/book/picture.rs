@@ -51,9 +51,10 @@ impl Pictures<'_> {
     }
 }
 
-/// Pixels across of a picture that the repository keeps, and samples of each.
+/// Pixels across of a picture that the repository keeps.
 const SMALL: u32 = 256;
-const SMALL_SPP: &str = "16";
+/// The least samples of a pixel of it; a scene that asks for more than four times as many gets a quarter of them.
+const MIN_SMALL_SPP: u32 = 16;
 /// The file that says of which scenes the small pictures are, in the folder of the pages.
 const SUMS: &str = "pictures.sums";
 
@@ -100,13 +101,15 @@ impl Kept {
         let (width, height) = (side("xresolution").unwrap_or(1280), side("yresolution").unwrap_or(720));
         let small = width.min(SMALL);
         let size = format!("{small}x{}", (height * small).div_ceil(width));
+        let asked = files.values().filter_map(|text| number_after(text, "pixelsamples")).max();
+        let samples = MIN_SMALL_SPP.max(asked.unwrap_or(0) / 4).to_string();
         // A picture of normals and the like has no noise, and is not denoised.
         let mut said = String::new();
         for denoiser in ["own", "none"] {
             let output = Command::new(program)
                 .arg("render")
                 .arg(scene)
-                .args(["--progress", "none", "--no-checkpoint", "--size", &size, "--spp", SMALL_SPP])
+                .args(["--progress", "none", "--no-checkpoint", "--size", &size, "--spp", &samples])
                 .args(["--denoise", denoiser, "-o"])
                 .arg(to)
                 .output()
