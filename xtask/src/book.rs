@@ -247,12 +247,18 @@ mod tests {
                 let text = fs::read_to_string(&page).expect("it can be read");
                 exercises += text.matches("<details>").count();
                 reasoned += text.matches(REASONED).count();
-                faults.extend(uncomputed(&text).into_iter().map(|answer| format!("{}: {answer}", page.display())));
+                faults.extend(
+                    uncomputed(&text).into_iter().map(|answer| format!("{}: {answer}", page.display())),
+                );
             }
         }
         assert!(faults.is_empty(), "a command is missing in these answers:\n{}", faults.join("\n"));
-        assert!(exercises > 100 && reasoned * 10 < exercises, "{exercises} exercises, {reasoned} without a command");
-        let page = "<details>a</details><details>```console\n$ b\n```</details><details><!-- reasoned --></details>";
+        assert!(
+            exercises > 100 && reasoned * 10 < exercises,
+            "{exercises} exercises, {reasoned} without a command"
+        );
+        let page =
+            "<details>a</details><details>```console\n$ b\n```</details><details><!-- reasoned --></details>";
         assert_eq!(uncomputed(page), ["a"]);
     }
 

@@ -106,7 +106,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .shape(ShapeBuilder::exact(Sphere::new(DVec3::new(1.2, 0.5, 0.9), 0.9)?))
         .build()?;
     let (eye, target) = (DVec3::new(0.0, -7.0, 3.0), DVec3::new(0.1, 0.0, 0.8));
-    let camera = View::look_at(eye, target, DVec3::Z, Handedness::Right).ok_or("the camera looks somewhere")?;
+    let camera =
+        View::look_at(eye, target, DVec3::Z, Handedness::Right).ok_or("the camera looks somewhere")?;
     let image = trace(&camera, &scene, 320, 240);
     write_image(Path::new("trace.png"), &image, &SaveOptions::default())?;
     Ok(())

@@ -91,7 +91,10 @@ impl Example {
         let mut lines: Vec<&str> = said.lines().map(str::trim_end).collect();
         if self.only_results {
             lines = results(&lines);
-            anyhow::ensure!(!lines.is_empty(), "{command} prints no result, which is a line that begins with =");
+            anyhow::ensure!(
+                !lines.is_empty(),
+                "{command} prints no result, which is a line that begins with ="
+            );
         }
         let most = self.head.unwrap_or(usize::MAX);
         let mut shown = format!("$ {command}\n");
