@@ -39,7 +39,8 @@ mod tests {
     /// The folders of `docs` all of whose pages are there in both languages.
     const WHOLE: [&str; 2] = ["mathematics", "light"];
     /// What commands look for in what they print: in English, and in Spanish.
-    const SOUGHT: [(&str, &str); 1] = [("By chance the path", "Por azar el camino")];
+    const SOUGHT: [(&str, &str); 2] =
+        [("By chance the path", "Por azar el camino"), ("over the density", "entre la densidad")];
     /// The commands that take `--lang`.
     const TRANSLATED: [&str; 2] = ["lumbre explain ", "lumbre math "];
 
