@@ -36,6 +36,7 @@ mod render;
 mod report;
 mod shown;
 mod signals;
+mod spanish;
 mod staging;
 mod tev;
 mod threads;

@@ -8,6 +8,7 @@ use clap::{Command, CommandFactory, Error, Parser};
 use lumbre::formats::diagnostic::nearest_name;
 
 use crate::console::{escaped, has_colours};
+use crate::spanish;
 
 /// Words of other programs for an option.
 const OPTIONS: &[(&str, &[&str])] = &[
@@ -96,6 +97,20 @@ const COMMANDS: &[(&str, &[&str])] = &[
 /// # Errors
 /// The exit status: 0 for help, 2 for wrong usage.
 pub(crate) fn parse<P: Parser + CommandFactory>(arguments: &[OsString]) -> Result<P, u8> {
+    if spanish::is_asked_for(arguments) {
+        let matches = spanish::translated(P::command()).try_get_matches_from(arguments);
+        return matches.and_then(|mut matches| P::from_arg_matches_mut(&mut matches)).map_err(|mut error| {
+            let mut program = P::command();
+            program.build();
+            let command = arguments.get(1).and_then(|name| program.find_subcommand(name)).unwrap_or(&program);
+            give_tip(&mut error, command);
+            if error.use_stderr() {
+                let _ = io::stderr().lock().write_all(spanish::said(&error).as_bytes());
+                return 2;
+            }
+            show(&error)
+        });
+    }
     P::try_parse_from(arguments).map_err(|mut error| {
         // What the user wrote is in the message, where it must not drive the terminal; in a styled message it can no
         // longer be told from the styles.

@@ -308,3 +308,307 @@ fn names_are_text_in_markdown_and_drive_no_terminal() {
         assert!(told.contains("onerror"), "{format}");
     }
 }
+
+/// The texts of a section and of all below it.
+fn texts(section: &Value, out: &mut Vec<String>) {
+    for kind in ["texts", "remarks"] {
+        out.extend(list(&section[kind]).iter().filter_map(|text| text.as_str().map(str::to_owned)));
+    }
+    list(&section["sections"]).iter().for_each(|inner| texts(inner, out));
+}
+
+fn all_texts(told: &Value) -> Vec<String> {
+    let mut all = Vec::new();
+    texts(told, &mut all);
+    all
+}
+
+const BARE: &str = r#"LookAt 0 0 -5 0 0 0 0 1 0 Camera "perspective" "float fov" 40
+Film "rgb" "integer xresolution" 40 "integer yresolution" 30 "string filename" "a.pfm" FILM
+PixelFilter "box" "float xradius" 0.5 "float yradius" 0.5
+Sampler "independent" "integer pixelsamples" 1
+INTEGRATOR WorldBegin LightSource "infinite" "rgb L" [0.5 0.25 2]
+"#;
+
+/// A scene of shapes, with parameters of the film and an integrator.
+fn bare(shapes: &str, film: &str, integrator: &str) -> String {
+    BARE.replace("FILM", film).replace("INTEGRATOR", integrator) + shapes
+}
+
+#[test]
+fn a_shape_that_is_missed_is_explained_and_by_how_much() {
+    let desk = Desk::new();
+    let shapes = r#"MakeNamedMaterial "clay" "string type" "diffuse" NamedMaterial "clay" Shape "sphere" "float radius" 1
+        AttributeBegin Translate 40 0 0 Scale 2 2 2 Shape "sphere" "float radius" 1 AttributeEnd
+        AttributeBegin Translate 0 0 7 Shape "trianglemesh" "point3 P" [-4 -3 0  -2 -3 0  -4 -1 0] "integer indices" [0 1 2] AttributeEnd"#;
+    desk.write("a.pbrt", &bare(shapes, "", ""));
+    let miss = ["--ray", "0,2,-5,0,0,1"];
+    let told = explained(&desk, &miss);
+    let surfaces = section(&told, "surfaces").unwrap();
+    let keys: Vec<_> = list(&surfaces["sections"]).iter().map(|section| section["key"].clone()).collect();
+    // The nearest first: 1, then the triangle, whose edge is from (-2, -3) to (-4, -1), then 36 beside and 2 above.
+    assert_eq!(keys, ["shape 0", "shape 2", "shape 1"], "{surfaces}");
+    let ball = &surfaces["sections"][0];
+    let said = all_texts(ball);
+    assert!(said.contains(&"It passes it at a distance of 1, nearest at t = 5.".to_owned()), "{said:?}");
+    assert!(said.contains(&"The line misses it.".to_owned()), "{said:?}");
+    let discriminant = section(ball, "Discriminant").unwrap();
+    assert_eq!(quantity(discriminant, "Δ"), -3.0);
+    let far = all_texts(&surfaces["sections"][2]);
+    let distance = 1604.0_f64.sqrt() - 2.0;
+    assert!(
+        far.iter()
+            .any(|text| text.starts_with(&format!("It passes it at a distance of {distance:.9}")[..40])),
+        "{far:?}"
+    );
+    // Why a triangle is missed: a weight is negative.
+    let triangle = section(&surfaces["sections"][1], "crossings").unwrap();
+    assert!(
+        triangle["tables"]["crossings"][0]["fate"].as_str().unwrap().starts_with("outside the edges"),
+        "{triangle}"
+    );
+    // By name, by number and by material, whether it is met or not.
+    for (name, expected) in [("sphere", 2), ("1", 1), ("clay", 3), ("mesh", 1)] {
+        let told = explained(&desk, &[&miss[..], &["--shape", name]].concat());
+        assert_eq!(list(&section(&told, "surfaces").unwrap()["sections"]).len(), expected, "{name}");
+    }
+    let all = explained(&desk, &["--ray", "0,0,-5,0,0,1", "--all-shapes"]);
+    let sections = list(&section(&all, "surfaces").unwrap()["sections"]).to_vec();
+    assert_eq!(sections.len(), 3);
+    assert!(section(&sections[0], "hit").is_some() && section(&sections[1], "hit").is_none());
+    // What a miss has not is no mistake.
+    let out = desk.lumbre(&["explain", "a.pbrt", "--ray", "0,2,-5,0,0,1", "--only", "hit"]);
+    assert_eq!((code(&out), stdout(&out).as_str()), (0, "There is no such section for this ray.\n"));
+    let out = desk.lumbre(&["explain", "a.pbrt", "--ray", "0,2,-5,0,0,1", "--shape", "cone"]);
+    assert_eq!(code(&out), 2);
+    assert!(stderr(&out).contains("--shape cone: no shape has this number, kind or material (expected a number, or one of clay, mesh, sphere)"), "{}", stderr(&out));
+}
+
+#[test]
+fn the_intervals_of_csg_are_those_of_the_whole_line_and_operands_have_names() {
+    let desk = Desk::new();
+    let shapes = r#"ObjectBegin "ball" Translate 0 0 -2 Shape "sphere" "float radius" 1.5 ObjectEnd
+        ObjectBegin "block" Translate 0 0 0.5 Shape "box" "point3 p0" [-1 -1 -1] "point3 p1" [1 1 1] ObjectEnd
+        Shape "csg" "string operation" "union" "string operands" ["ball" "block"]"#;
+    desk.write("a.pbrt", &bare(shapes, "", ""));
+    // The ray begins in the gap, or behind both: the intervals are the same.
+    for (start, shift) in [("0,0,0", 0.0), ("0,0,-0.5", 0.5), ("0,0,5", -5.0)] {
+        let told = explained(&desk, &["--ray", &format!("{start},0,0,1"), "--all-shapes"]);
+        let intervals = section(&told, "Intervals").unwrap();
+        let expected = [[-3.5 + shift, -0.5 + shift], [-0.5 + shift, 1.5 + shift]];
+        assert_eq!(quantity(intervals, "I₁"), &serde_json::json!([expected[0]]), "{start}");
+        assert_eq!(quantity(intervals, "I₂"), &serde_json::json!([expected[1]]), "{start}");
+        assert_eq!(quantity(intervals, "I"), &serde_json::json!([[-3.5 + shift, 1.5 + shift]]), "{start}");
+    }
+    let told = explained(&desk, &["--ray", "0,0,-9,0,0,1", "--all-shapes", "--lang", "es"]);
+    let titles = told.to_string();
+    assert!(titles.contains("Operando 0, esfera") && titles.contains("operando 1 (caja)"), "{titles}");
+}
+
+#[test]
+fn u_and_v_of_a_mesh_are_those_of_its_file() {
+    let desk = Desk::new();
+    let shapes = r#"Shape "trianglemesh" "point3 P" [0 0 0  1 0 0  0 1 0] "integer indices" [0 1 2] "point2 uv" [0 0  10 0  0 20]"#;
+    desk.write("a.pbrt", &bare(shapes, "", ""));
+    let told = explained(&desk, &["--ray", "0.125,0.5,-5,0,0,1", "--nearest"]);
+    let hit = section(&told, "hit").unwrap();
+    assert_eq!(quantity(hit, "u, v"), &serde_json::json!([1.25, 10.0]));
+    assert_eq!(quantity(hit, "b₁, b₂ (barycentric coordinates)"), &serde_json::json!([0.125, 0.5]));
+    // Flat and curved patches, under a map that mirrors: the corners of the file, and its own uv.
+    for (height, told_corners) in [(0.0, 3), (1.0, 4)] {
+        let shapes = format!(
+            r#"Translate 0 0 3 Scale -2 1 1 Shape "bilinearmesh" "point3 P" [0 0 0  1 0 0  0 1 0  1 1 {height}] "integer indices" [0 1 2 3] "point2 uv" [0 0  4 0  0 8  4 8]"#
+        );
+        desk.write("a.pbrt", &bare(&shapes, "", ""));
+        let told = explained(&desk, &["--ray", "-0.5,0.5,-5,0,0,1", "--nearest"]);
+        let mesh = section(&told, "mesh").unwrap();
+        assert_eq!(quantity(mesh, "P₁"), &serde_json::json!([1.0, 0.0, 0.0]));
+        assert_eq!(quantity(mesh, "u, v (P₃)"), &serde_json::json!([4.0, 8.0]));
+        assert_eq!(quantity(mesh, "M")[0], serde_json::json!([-2.0, 0.0, 0.0, 0.0]));
+        let uv: Vec<f64> = list(quantity(section(&told, "hit").unwrap(), "u, v"))
+            .iter()
+            .map(|x| x.as_f64().unwrap())
+            .collect();
+        assert!((uv[0] - 1.0).abs() < 1e-6 && (uv[1] - 4.0).abs() < 1e-6, "{uv:?}");
+        let said = all_texts(mesh);
+        assert_eq!(said.iter().any(|text| text.contains("two triangles")), told_corners == 3, "{said:?}");
+        assert!(said.iter().any(|text| text.contains("M mirrors")), "{said:?}");
+    }
+}
+
+#[test]
+fn the_radiance_is_told_as_the_film_adds_it() {
+    let desk = Desk::new();
+    let ball = r#"Material "diffuse" "rgb reflectance" [0.5 0.5 0.5] Shape "sphere" "float radius" 1"#;
+    for film in [r#""float iso" 250"#, r#""float iso" 400 "float maxcomponentvalue" 1.5"#] {
+        desk.write("a.pbrt", &bare(ball, film, ""));
+        assert_eq!(code(&desk.lumbre(&["render", "a.pbrt", "-q", "-o", "a.pfm"])), 0);
+        let pixels = pfm(&std::fs::read(desk.path("a.pfm")).unwrap());
+        for (x, y) in [(20, 15), (0, 0)] {
+            let told = explained(&desk, &["--pixel", &format!("{x},{y}")]);
+            let radiance = section(&told, "radiance").unwrap();
+            let label = "radiance of this sample, as the render adds it to the pixel";
+            let rgb: Vec<f32> =
+                list(quantity(radiance, label)).iter().map(|x| x.as_f64().unwrap() as f32).collect();
+            assert_eq!(rgb, pixels[(29 - y) * 40 + x], "{film} ({x}, {y})");
+            // What the path adds up to is that before the film.
+            let sum: Vec<f32> = list(&radiance["tables"]["added"]).iter().fold(vec![0.0; 3], |sum, row| {
+                (0..3).map(|i| sum[i] + row["added"][i].as_f64().unwrap() as f32).collect()
+            });
+            let before: Vec<f32> =
+                list(quantity(radiance, "Lₛ")).iter().map(|x| x.as_f64().unwrap() as f32).collect();
+            assert_eq!(before, sum, "{film}");
+        }
+    }
+}
+
+#[test]
+fn what_is_no_light_and_no_surface_is_not_called_so() {
+    let desk = Desk::new();
+    let ball = r#"Material "diffuse" Shape "sphere" "float radius" 1"#;
+    for (integrator, expected) in [
+        ("normals", "the shading normal as a colour, (n + 1)/2"),
+        ("ambientocclusion", "1 where nothing near is in that direction, else 0"),
+    ] {
+        desk.write("a.pbrt", &bare(ball, "", &format!("Integrator \"{integrator}\"")));
+        let told = explained(&desk, &["--pixel", "20,15"]);
+        let added = section(section(&told, "light").unwrap(), "added").unwrap();
+        assert_eq!(added["title"], expected);
+        assert!(!added.to_string().contains("light"), "{added}");
+    }
+    // In a medium there is no cosine.
+    let fog = r#"MakeNamedMedium "fog" "string type" "homogeneous" "rgb sigma_a" [0.01 0.01 0.01] "rgb sigma_s" [9 9 9]
+        LightSource "point" "point3 from" [2 4 -5] "rgb I" [30 30 30]
+        MediumInterface "fog" "" Material "interface" Shape "sphere" "float radius" 1"#;
+    desk.write("a.pbrt", &bare(fog, "", r#"Integrator "path" "integer maxdepth" 8"#));
+    let mut phases = 0;
+    for sample in 0..12 {
+        let told = explained(&desk, &["--pixel", "20,15", "--sample", &sample.to_string()]);
+        let said = told.to_string();
+        assert!(!said.contains("|cos θ|"), "{said}");
+        phases += said.matches("phase function towards it").count();
+    }
+    assert!(phases > 5, "{phases}");
+}
+
+#[test]
+fn whitteds_rays_are_told_as_a_tree() {
+    let desk = Desk::new();
+    let glass = r#"Material "dielectric" "float eta" 1.5 Shape "sphere" "float radius" 1
+        Material "diffuse" Translate 0 0 4 Shape "disk" "float radius" 3"#;
+    desk.write("a.pbrt", &bare(glass, "", r#"Integrator "whitted" "integer maxdepth" 4"#));
+    let told = explained(&desk, &["--ray", "0.3,0.2,-5,0,0,1"]);
+    let light = section(&told, "light").unwrap();
+    // One root, which has two branches: what is reflected leaves the scene, what is refracted meets the back.
+    let roots: Vec<_> = list(&light["sections"]).iter().map(|section| section["key"].clone()).collect();
+    assert_eq!(roots, ["vertex 0", "radiance"]);
+    let branches: Vec<_> = list(&light["sections"][0]["sections"])
+        .iter()
+        .map(|section| section["key"].as_str().unwrap().to_owned())
+        .filter(|key| key.starts_with("vertex") || key == "left")
+        .collect();
+    assert_eq!(branches.len(), 2, "{branches:?}");
+    assert!(
+        branches.contains(&"vertex 1".to_owned()) && branches.contains(&"left".to_owned()),
+        "{branches:?}"
+    );
+}
+
+#[test]
+fn the_matrices_of_the_camera_lead_back_to_the_pixel() {
+    let desk = Desk::new();
+    for (look, hand) in
+        [("LookAt 0 0 -5 0 0 0 0 1 0", "with the other hand"), ("Scale -1 1 1 LookAt 0 0 -5 0 0 0 0 1 0", "")]
+    {
+        let scene = bare(r#"Shape "sphere""#, "", "").replace("LookAt 0 0 -5 0 0 0 0 1 0", look);
+        desk.write("a.pbrt", &scene);
+        let told = explained(&desk, &["--pixel", "7,22"]);
+        let camera = section(&told, "camera").unwrap();
+        let place = |label: &str| -> Vec<f64> {
+            list(quantity(camera, label)).iter().map(|x| x.as_f64().unwrap()).collect()
+        };
+        let forth = place("point of the film, in pixels from the upper left corner");
+        let back = place("point of the film, in pixels from the upper left corner, y downwards");
+        assert!(forth.iter().zip(&back).all(|(x, y)| (x - y).abs() < 1e-9), "{forth:?} {back:?}");
+        let [u, v, w] = ["u", "v", "w"].map(|symbol| place(symbol));
+        let turn = (u[1] * v[2] - u[2] * v[1]) * w[0]
+            + (u[2] * v[0] - u[0] * v[2]) * w[1]
+            + (u[0] * v[1] - u[1] * v[0]) * w[2];
+        let said = all_texts(camera);
+        let expected = if turn > 0.0 { "has the same hand" } else { "has the other hand" };
+        assert!(said.iter().any(|text| text.contains(expected)), "{hand}: {said:?}");
+    }
+}
+
+#[test]
+fn light_comes_in_steps_with_their_own_numbers() {
+    let desk = Desk::new();
+    desk.write("a.pbrt", SCENE);
+    // The lamp's light thins out with the square of the distance, and hits the ball at an angle.
+    for sample in 0..16 {
+        let told = explained(&desk, &["--pixel", "12,6", "--sample", &sample.to_string()]);
+        let Some(light) = section(&told, "sampled light") else { continue };
+        let symbols: Vec<_> = list(&light["quantities"]).iter().map(|q| q["symbol"].clone()).collect();
+        if !symbols.contains(&"d".into()) {
+            continue;
+        }
+        let numbers = |name: &str| -> Vec<f64> {
+            match quantity(light, name) {
+                Value::Array(all) => all.iter().map(|x| x.as_f64().unwrap()).collect(),
+                one => vec![one.as_f64().unwrap(); 3],
+            }
+        };
+        let (d, intensity, arriving) = (numbers("d"), numbers("I"), numbers("Lᵢ"));
+        for i in 0..3 {
+            assert!((intensity[i] / (d[i] * d[i]) - arriving[i]).abs() < 1e-6 * arriving[i]);
+            assert!((intensity[i] - [30.0, 28.0, 25.0][i]).abs() < 1e-4, "{intensity:?}");
+        }
+        // A Lambertian surface scatters its reflectance over π.
+        let bsdf = numbers("f / |cos θ|: the BSDF alone");
+        for i in 0..3 {
+            assert!((bsdf[i] - [0.6, 0.4, 0.3][i] / std::f64::consts::PI).abs() < 1e-6, "{bsdf:?}");
+        }
+        // The glass below has a Fresnel reflectance of (0.5 / 2.5)² where the ray is straight.
+        let told = explained(&desk, &["--ray", "0,-1.6,-3,0,0,1", "--nearest"]);
+        let reflectance = quantity(section(&told, "mirror").unwrap(), "F").as_f64().unwrap();
+        assert!((reflectance - 0.04).abs() < 1e-7, "{reflectance}");
+        return;
+    }
+    panic!("the lamp was never sampled");
+}
+
+#[test]
+fn rounded_numbers_in_a_formula_are_nearly_equal() {
+    let desk = Desk::new();
+    desk.write("a.pbrt", &bare(r#"Shape "sphere" "float radius" 1"#, "", ""));
+    let out = stdout(&desk.lumbre(&["explain", "a.pbrt", "--ray", "0,0,-5,0,0,1", "--only", "Quadratic"]));
+    assert!(out.contains("h = w·D = (0, 0, -5)·(0, 0, 1) = -5\n"), "{out}");
+    let out =
+        stdout(&desk.lumbre(&["explain", "a.pbrt", "--ray", "0,0.1234567,-5,0,0,1", "--only", "Quadratic"]));
+    assert!(out.contains("c = w·w − r² ≈ (0, 0.123457, -5)·(0, 0.123457, -5) − 1² ≈ 24."), "{out}");
+}
+
+#[test]
+fn kinds_and_mistakes_are_told_in_spanish() {
+    let desk = Desk::new();
+    desk.write("a.pbrt", SCENE);
+    let told = explained(&desk, &["--pixel", "12,8", "--lang", "es", "--depth", "2"]).to_string();
+    assert!(
+        told.contains("forma 1, esfera") && told.contains("clay (difuso)") && told.contains("1 (puntual)"),
+        "{told}"
+    );
+    for english in ["sphere", "disk", "dielectric", "conductor", "(diffuse)", "(point)"] {
+        assert!(
+            !told.contains(&format!("\"{english}")) && !told.contains(&format!(", {english}")),
+            "{english}: {told}"
+        );
+    }
+    let out = desk.lumbre(&["explain", "a.pbrt", "--pixel", "99,0", "--lang", "es"]);
+    assert!(
+        stderr(&out).contains("--pixel 99,0: fuera de la imagen (se esperaba menos de 24,16"),
+        "{}",
+        stderr(&out)
+    );
+    let out = desk.lumbre(&["explain", "a.pbrt", "--pixel", "1,0", "--only", "colour", "--lang", "es"]);
+    assert!(stderr(&out).contains("--only colour: ninguna sección tiene esta clave"), "{}", stderr(&out));
+}

@@ -254,8 +254,11 @@ M p
 = [0.125, 0.5, 1.25]
 ",
         ),
-        ("det([[0, 2], [3, 0]])", "det(M)\n  m11 m22 - m12 m21 = 0·0 - 2·3\n  < 0: refleja\n= -6\n"),
-        ("help angles", "angles(q)\n    heading, attitude y bank de un cuaternión, en grados\n"),
+        (
+            "det([[0, 2], [3, 0]])",
+            "det(M)\n  m11 m22 - m12 m21 = 0·0 - 2·3 = -6\n  la suma es exacta y se redondea una sola vez\n  < 0: refleja\n= -6\n",
+        ),
+        ("help angles", "angles(q)\n    rumbo, actitud e inclinación de un cuaternión, en grados\n"),
     ] {
         let out = desk.lumbre(&["math", "--lang", "es", expression]);
         assert_eq!(code(&out), 0, "{}", stderr(&out));
@@ -264,14 +267,14 @@ M p
     for (expression, expected) in [
         (
             "x + dott(x, y)",
-            "error: expresión:1:5: función desconocida (hay \"dott\"; se esperaba: un nombre de la lista que da `help`; ¿quería decir \"dot\"?)
+            "error: expresión:1:5: función desconocida (se encontró: \"dott\"; se esperaba: un nombre de la lista que da `help`; ¿quería decir \"dot\"?)
   x + dott(x, y)
       ^
 ",
         ),
         (
             "cross([1, 2, 3], [4, 5])",
-            "error: expresión:1:18: el argumento 2 de cross no vale (hay [4, 5]; se esperaba: un vector de 3)
+            "error: expresión:1:18: el argumento 2 de cross no es válido (se encontró: [4, 5]; se esperaba: un vector de 3)
   cross([1, 2, 3], [4, 5])
                    ^
 ",
@@ -284,7 +287,9 @@ M p
     let out = piped(&["math", "--lang", "es"], "1 +\n");
     assert_eq!(code(&out), 3);
     assert!(
-        stderr(&out).starts_with("error: entrada estándar:1:4: esto no va aquí (hay el final"),
+        stderr(&out).starts_with(
+            "error: entrada estándar:1:4: aquí no se esperaba esto (se encontró: el final de la expresión"
+        ),
         "{}",
         stderr(&out)
     );
@@ -422,5 +427,115 @@ fn the_manual_has_every_form_of_every_function_with_an_example_that_is_right() {
     for (pair, row) in values.chunks(2).zip(shown) {
         // The sign of zero is not printed.
         assert_eq!(numbers(&pair[0]), numbers(&pair[1]), "{row}");
+    }
+}
+
+/// The text that an expression prints.
+fn told(expression: &str) -> String {
+    let out = Desk::new().lumbre(&["math", expression]);
+    assert_eq!(code(&out), 0, "{expression}: {}", stderr(&out));
+    stdout(&out)
+}
+
+#[test]
+fn matrices_are_singular_by_one_rule() {
+    let desk = Desk::new();
+    let singular = [
+        "cross_matrix([0.1, 0.2, 0.3])",
+        "[[1, 2], [2, 4]]",
+        "[[0.1, 0.3], [0.2, 0.6]]",
+        "[[1, 2, 3], [4, 5, 6], [7, 8, 9]]",
+    ];
+    for matrix in singular {
+        assert!(told(&format!("det({matrix})")).ends_with("= 0: no inverse\n= 0\n"), "{matrix}");
+        let size = if matrix.matches('[').count() == 3 { "[1, 5]" } else { "[1, 2, 4]" };
+        let out = desk.lumbre(&["math", &format!("inverse({matrix})")]);
+        assert!(stderr(&out).contains("this has no inverse"), "{matrix}: {}", stderr(&out));
+        let out = desk.lumbre(&["math", &format!("solve({matrix}, {size})")]);
+        assert!(stderr(&out).contains("M x = b has no solution"), "{matrix}: {}", stderr(&out));
+        let zero = if size == "[1, 5]" { "[0, 0]" } else { "[0, 0, 0]" };
+        let out = desk.lumbre(&["math", &format!("solve({matrix}, {zero})")]);
+        assert!(stderr(&out).contains("M x = b has more than one solution"), "{matrix}: {}", stderr(&out));
+    }
+    // Nearly singular is not singular, and it is said.
+    let near = told("solve([[1, 1], [1, 1 + 2^-50]], [2, 2 + 2^-50])");
+    assert!(
+        near.contains("nearly singular: rows of these lengths allow a determinant 1/4.4e-16 times as large"),
+        "{near}"
+    );
+    assert!(near.ends_with("= [1, 1]\n"), "{near}");
+    for (expression, result) in [
+        ("solve([[2]], 3)", "= [1.5]\n"),
+        (
+            "solve([[2, 0, 0, 0], [0, 4, 0, 0], [0, 0, 8, 0], [1, 1, 1, 1]], [2, 4, 8, 10])",
+            "= [1, 1, 1, 7]\n",
+        ),
+        (
+            "inverse([[2, 0, 0, 0], [0, 4, 0, 0], [0, 0, 8, 0], [2, 4, 8, 1]]) * [2, 4, 8, 1]",
+            "= [1, 1, 1, -13]\n",
+        ),
+        ("det([[1, 2, 0, 0], [3, 4, 0, 0], [0, 0, 5, 6], [0, 0, 7, 8]])", "= 4\n"),
+    ] {
+        assert!(told(expression).ends_with(result), "{expression}: {}", told(expression));
+    }
+}
+
+#[test]
+fn steps_show_how_determinants_inverses_powers_and_quaternions_come_about() {
+    let det = told("det([[2, 0, 1], [0, 3, 0], [1, 0, 1]])");
+    assert!(
+        det.contains("= 2·(3·1 - 0·0) - 0·(0·1 - 0·1) + 1·(0·0 - 3·1)\n  = 2·3 - 0·0 + 1·(-3) = 3\n"),
+        "{det}"
+    );
+    let inverse = told("inverse([[1, 2], [3, 4]])");
+    assert!(
+        inverse.contains("C = |  4  -3 |   det M = -2\n      | -2   1 |") || inverse.contains("  det M = -2"),
+        "{inverse}"
+    );
+    assert!(inverse.contains("M M⁻¹ = I"), "{inverse}");
+    assert!(told("inverse([[0.1, 0.7], [0.3, 0.9]])").contains("M M⁻¹ ≈ I"));
+    let power = told("[[1, 1], [0, 1]]^5");
+    assert!(
+        power.contains("by squares: M^5 = M^1 M^4") && power.ends_with("= [[1, 5],\n   [0, 1]]\n"),
+        "{power}"
+    );
+    assert!(told("rotate_z(90)^3 * x").ends_with("= [0, -1, 0]\n"));
+    assert!(told("[[2, 0], [0, 4]]^-2").ends_with("= [[0.25,      0],\n   [   0, 0.0625]]\n"));
+    assert!(told("[[2, 5], [7, 4]]^0").ends_with("= [[1, 0],\n   [0, 1]]\n"));
+    assert!(told("quat(0, 1, 0, 0)^2").ends_with("= quat(-1, 0, 0, 0)\n"));
+    let sum = told("quat(1, 2, 3, 4) + quat(1, -1, 1, 1)");
+    assert!(sum.contains("  i:  2 + (-1) = 1\n"), "{sum}");
+    let quotient = told("quat(1, 1, 0, 0) / quat(1, 0, 1, 0)");
+    assert!(
+        quotient.contains("q⁻¹ = conj q / |q|² =") && quotient.contains("  k:  a1d2 + b1c2 - c1b2 + d1a2 ="),
+        "{quotient}"
+    );
+    assert!(quotient.ends_with("= quat(0.5, 0.5, -0.5, -0.5)\n"), "{quotient}");
+    let slerp = told("slerp(quat_about(z, 0), quat_about(z, 90), 0.5) * 1");
+    assert!(slerp.contains("cos θ = p·q"), "{slerp}");
+    let half = told("angles(slerp(quat_about(y, 10), quat_about(y, 50), 0.25))");
+    let heading: f64 =
+        half.lines().last().unwrap().trim_start_matches("= [").split(',').next().unwrap().parse().unwrap();
+    assert!((heading - 20.0).abs() < 1e-12, "{half}");
+}
+
+#[test]
+fn vectors_of_any_length_have_angles_and_parts() {
+    for (expression, result) in [
+        ("angle([1e-200, 0, 0], [0, 1e-200, 0])", "= 90\n"),
+        ("angle([1e200, 0, 0], [1e200, 1e200, 0])", "= 45\n"),
+        ("project([1e200, 0, 0], [1, 1, 0])", "= [1, 0, 0]\n"),
+        ("reject([1e200, 0, 0], [1, 1, 0])", "= [0, 1, 0]\n"),
+        ("projected_length([1e-200, 0, 0], [3, 1, 0])", "= 3\n"),
+        ("normal(scale([1e200, 1e200, 1]), [0, 0, 2])", "= [0, 0, 1]\n"),
+        ("inverse(quat(1e200, 0, 0, 0))", "= quat(1e-200, 0, 0, 0)\n"),
+        ("length(quat(3e200, 0, 0, 4e200))", "= 5e200\n"),
+        ("rotate(quat(1e-200, 0, 0, 1e-200), [1, 0, 0])", "= [0, 1, 0]\n"),
+        ("quat(2e-200, 0, 0, 0) / quat(1e-200, 0, 0, 0)", "= quat(2, 0, 0, 0)\n"),
+        ("angles(quat(1e-200, 0, 1e-200, 0))", "= [90, 0, 0]\n"),
+    ] {
+        let text = told(expression);
+        assert!(text.ends_with(result), "{expression}: {text}");
+        assert!(!text.contains("inf") && !text.contains("NaN"), "{text}");
     }
 }

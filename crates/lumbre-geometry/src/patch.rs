@@ -523,6 +523,15 @@ impl Sheared {
         if decisive >= 0.0 { uvs.map(into) } else { [None, None] }
     }
 
+    /// Whether the ray runs along the ruling `u`: seen along the ray, the ruling is a point.
+    pub(crate) fn runs_along_ruling(&self, u: f64) -> bool {
+        let [first, last] = [0.0, 1.0].map(|v| self.at(DVec2::new(u, v)));
+        let size =
+            self.corners.iter().fold(0.0_f64, |most, corner| most.max(corner.x.abs().max(corner.y.abs())));
+        let is_centred = |p: DVec3| p.x.abs().max(p.y.abs()) <= 1e-14 * size;
+        size > 0.0 && is_centred(first) && is_centred(last)
+    }
+
     /// The point of a ruling that is nearest to the ray.
     pub(crate) fn on_ruling(&self, u: f64) -> DVec2 {
         let [p00, p10, p01, p11] = self.corners;

@@ -111,6 +111,18 @@ pub(crate) struct Subject {
     pub(crate) size: f64,
 }
 
+impl Subject {
+    /// The same equation, of another shape that has it.
+    pub(crate) fn with_shape(self, shape: Shape) -> Self {
+        Self { shape, ..self }
+    }
+
+    /// a, h and c of F = a t² + 2 h t + c along a ray, exactly.
+    pub(crate) fn coefficients(&self, ray: &Ray) -> [Exact; 3] {
+        (self.equation)(ray)
+    }
+}
+
 fn round_to(x: f64) -> f64 {
     f64::from(x as f32)
 }
@@ -133,7 +145,7 @@ fn lateral(p1: DVec3, p2: DVec3, r1: f64, r2: f64) -> Box<dyn Fn(&Ray) -> Coeffi
     })
 }
 
-fn axial(name: &'static str, p1: DVec3, p2: DVec3, r1: f64, r2: f64) -> Subject {
+pub(crate) fn axial(name: &'static str, p1: DVec3, p2: DVec3, r1: f64, r2: f64) -> Subject {
     let shape: Result<Shape, ShapeError> = if r1 == r2 {
         Cylinder::new(p1, p2, r1, false).map(Shape::from)
     } else {
@@ -148,7 +160,7 @@ fn axial(name: &'static str, p1: DVec3, p2: DVec3, r1: f64, r2: f64) -> Subject 
     }
 }
 
-fn sphere(center: DVec3, radius: f64) -> Subject {
+pub(crate) fn sphere(center: DVec3, radius: f64) -> Subject {
     Subject {
         name: "sphere",
         shape: Sphere::new(center, radius).unwrap().into(),
@@ -161,7 +173,7 @@ fn sphere(center: DVec3, radius: f64) -> Subject {
     }
 }
 
-fn paraboloid(radius: f64, height: f64) -> Subject {
+pub(crate) fn paraboloid(radius: f64, height: f64) -> Subject {
     Subject {
         name: "paraboloid",
         shape: Paraboloid::new(radius, 0.0, height, 360.0).unwrap().into(),
@@ -178,7 +190,7 @@ fn paraboloid(radius: f64, height: f64) -> Subject {
     }
 }
 
-fn hyperboloid(p1: DVec3, p2: DVec3) -> Subject {
+pub(crate) fn hyperboloid(p1: DVec3, p2: DVec3) -> Subject {
     let along = minus(p2, p1);
     Subject {
         name: "hyperboloid",
@@ -205,7 +217,7 @@ fn hyperboloid(p1: DVec3, p2: DVec3) -> Subject {
     }
 }
 
-fn quadric(name: &'static str, coefficients: [f64; 10], size: f64) -> Subject {
+pub(crate) fn quadric(name: &'static str, coefficients: [f64; 10], size: f64) -> Subject {
     Subject {
         name,
         shape: Quadric::new(coefficients, None).unwrap().into(),

@@ -515,3 +515,237 @@ fn a_crossing_of_an_operand_that_is_none_of_the_result_names_the_operand_that_is
     assert_eq!(interval, [[f64::NEG_INFINITY, 1.0], [2.0, 3.0]]);
     assert!(fates.iter().all(|(_, fate)| *fate == Fate::Hit) && fates.len() == 3);
 }
+
+/// A shape of whole numbers, with a place on it that is whole too, directions along it, and the tip of a cone.
+struct Whole {
+    subject: exactness::Subject,
+    on: Vec<DVec3>,
+    along: Vec<DVec3>,
+    tip: Option<DVec3>,
+    has_caps: bool,
+}
+
+fn whole_shapes() -> Vec<Whole> {
+    let v = DVec3::new;
+    let axial = |p1: DVec3, p2: DVec3, r1: f64, r2: f64| exactness::axial("axial", p1, p2, r1, r2);
+    let capped = |p1: DVec3, p2: DVec3, r1: f64, r2: f64| {
+        let shape: Result<Shape, ShapeError> = if r1 == r2 {
+            lumbre_geometry::Cylinder::new(p1, p2, r1, true).map(Shape::from)
+        } else {
+            lumbre_geometry::Cone::new(p1, p2, r1, r2, true).map(Shape::from)
+        };
+        exactness::axial("capped", p1, p2, r1, r2).with_shape(shape.unwrap())
+    };
+    let whole = |subject, on: &[DVec3], along: &[DVec3], tip| Whole {
+        subject,
+        on: on.to_vec(),
+        along: along.to_vec(),
+        tip,
+        has_caps: false,
+    };
+    let mut all = vec![
+        whole(
+            exactness::sphere(v(1.0, 2.0, -1.0), 3.0),
+            &[v(4.0, 2.0, -1.0), v(2.0, 4.0, 1.0), v(1.0, 2.0, 2.0)],
+            &[v(0.0, 1.0, 0.0), v(2.0, -1.0, 0.0), v(1.0, 0.0, 0.0)],
+            None,
+        ),
+        whole(
+            exactness::paraboloid(2.0, 4.0),
+            &[v(0.0, 0.0, 0.0), v(1.0, 0.0, 1.0), v(0.0, -2.0, 4.0)],
+            &[DVec3::Z, v(1.0, 0.0, 2.0), DVec3::X],
+            None,
+        ),
+        // Its generators go through (1, 0, 0): one is along (0, 1, 1).
+        whole(
+            exactness::hyperboloid(v(1.0, -2.0, -2.0), v(1.0, 2.0, 2.0)),
+            &[v(1.0, 0.0, 0.0), v(0.0, 0.0, 0.0), v(2.0, 0.0, 0.0)],
+            &[v(0.0, 1.0, 1.0), v(0.0, -1.0, 1.0), DVec3::Z],
+            None,
+        ),
+        whole(
+            exactness::quadric("pipe", [1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -25.0], 5.0),
+            &[v(3.0, 4.0, 0.0), v(0.0, 5.0, 7.0), v(1.0, 1.0, 1.0), v(9.0, 0.0, 0.0)],
+            &[DVec3::Z, v(4.0, -3.0, 0.0), v(4.0, -3.0, 5.0)],
+            None,
+        ),
+        whole(
+            exactness::quadric("saddle", [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0], 1.0),
+            &[DVec3::ZERO, v(2.0, 3.0, 6.0), v(1.0, 1.0, 4.0)],
+            &[DVec3::X, DVec3::Y, v(1.0, 0.0, 3.0)],
+            None,
+        ),
+    ];
+    // Along z, and along (2, 1, 2), which is 3 long.
+    for (first, step) in [(v(1.0, -2.0, 0.0), v(0.0, 0.0, 6.0)), (v(0.0, 1.0, -1.0), v(4.0, 2.0, 4.0))] {
+        let second = first + step;
+        let side = if step.x == 0.0 { v(3.0, 0.0, 0.0) } else { v(2.0, -2.0, -1.0) };
+        for is_capped in [false, true] {
+            let made = |r1: f64, r2: f64| {
+                if is_capped { capped(first, second, r1, r2) } else { axial(first, second, r1, r2) }
+            };
+            all.push(Whole {
+                has_caps: is_capped,
+                ..whole(
+                    made(3.0, 3.0),
+                    &[first + side, first, first + 2.0 * side],
+                    &[step, side, step + side],
+                    None,
+                )
+            });
+            all.push(Whole {
+                has_caps: is_capped,
+                ..whole(
+                    made(3.0, 0.0),
+                    &[second, first + side, first, first + 2.0 * side],
+                    &[step - side, step, side, step + side],
+                    Some(second),
+                )
+            });
+            all.push(Whole {
+                has_caps: is_capped,
+                ..whole(
+                    made(3.0, 6.0),
+                    &[first - step, first + side, first, second + 2.0 * side],
+                    &[step + side, step, side, step - side],
+                    Some(first - step),
+                )
+            });
+        }
+    }
+    all
+}
+
+/// What the remarks and fates of an explanation claim of a ray of whole numbers, held to exact arithmetic; counts them by name.
+fn hold_claims(whole: &Whole, ray: &Ray, said: &mut BTreeMap<&'static str, usize>) {
+    let shape = &whole.subject.shape;
+    let explanation = shape.explain(ray);
+    let [a, h, c] = whole.subject.coefficients(ray);
+    let delta = &(&h * &h) - &(&a * &c);
+    let sign = |x: &exactness::Exact| x.value().partial_cmp(&0.0).unwrap() as i32;
+    let (a, h, c, delta) =
+        (sign(&a), sign(&h), sign(&c), (sign(&delta), a.value(), h.value(), delta.value()));
+    let (delta, a_value, h_value, delta_value) = delta;
+    let context =
+        || format!("{}: {ray:?} a {a} h {h} c {c} Δ {delta} {:#?}", whole.subject.name, explanation.steps);
+    let roots = explanation.steps.iter().find(|step| step.topic == Topic::Roots).unwrap();
+    let discriminant = explanation.steps.iter().find(|step| step.topic == Topic::Discriminant).unwrap();
+    let mut count = |name| *said.entry(name).or_default() += 1;
+    // Of the line, exactly one thing is said, and it is so.
+    let mut claims = 0;
+    for remark in &roots.remarks {
+        let (name, is_so) = match *remark {
+            Remark::Misses => ("misses", delta < 0 || (a, h) == (0, 0) && c > 0),
+            Remark::InsideThroughout => ("inside", (a, h) == (0, 0) && c < 0),
+            Remark::InSurface => ("in the surface", (a, h, c) == (0, 0, 0) && !whole.has_caps),
+            Remark::InCappedSide => {
+                ("in a side", (a, h, c) == (0, 0, 0) && whole.has_caps && whole.tip.is_none())
+            }
+            Remark::AlongGenerator => {
+                ("a generator", (a, h, c) == (0, 0, 0) && whole.has_caps && whole.tip.is_some())
+            }
+            Remark::Touches | Remark::ThroughTip => {
+                let tip = whole.tip.map(|tip| (ray.at(-h_value / a_value) - tip).length());
+                let is_at_tip = tip.is_some_and(|distance| distance < 1e-9);
+                let is_tip = *remark == Remark::ThroughTip;
+                (
+                    if is_tip { "through the tip" } else { "touches" },
+                    delta == 0 && a != 0 && is_at_tip == is_tip,
+                )
+            }
+            Remark::AtInfinity => ("at infinity", a == 0 && h != 0),
+            Remark::Cancellation { digits } => {
+                // By the larger of both errors of the textbook's roots.
+                let root = |sign: f64| (-h_value + sign * delta_value.sqrt()) / a_value;
+                let [plus, minus] = [root(1.0), root(-1.0)];
+                let q = -(h_value + delta_value.sqrt().copysign(h_value));
+                let c_value = whole.subject.coefficients(ray)[2].value();
+                let exact = [q / a_value, c_value / q];
+                let mut off: f64 = 0.0;
+                for quantity in roots.quantities.iter().filter(|quantity| quantity.symbol.starts_with('t')) {
+                    let Some((_, Value::Number(theirs))) = &quantity.schoolbook else { continue };
+                    let nearest =
+                        exact.into_iter().min_by(|x, y| (x - theirs).abs().total_cmp(&(y - theirs).abs()));
+                    off = off.max(((theirs - nearest.unwrap()) / nearest.unwrap()).abs());
+                }
+                let expected = (off / (0.5 * f64::EPSILON)).log10().min(16.0);
+                assert!((digits - expected).abs() < 0.5, "{digits} {expected} {plus} {minus} {}", context());
+                ("loses digits", true)
+            }
+            ref other => panic!("{other:?} {}", context()),
+        };
+        assert!(is_so, "{name}: {}", context());
+        claims += usize::from(!matches!(remark, Remark::Cancellation { .. } | Remark::AtInfinity));
+        count(name);
+    }
+    let crosses_twice = delta > 0 && a != 0;
+    let expected = usize::from(!(crosses_twice || a == 0 && h != 0));
+    assert_eq!(claims, expected, "{}", context());
+    for remark in &discriminant.remarks {
+        let theirs =
+            match &discriminant.quantities.iter().find(|quantity| quantity.symbol == "Δ").unwrap().schoolbook
+            {
+                Some((_, Value::Number(theirs))) => *theirs,
+                other => panic!("{other:?}"),
+            };
+        match remark {
+            Remark::SchoolbookHits => assert!(theirs >= 0.0 && delta < 0, "{}", context()),
+            Remark::SchoolbookMisses => assert!(theirs < 0.0 && delta >= 0, "{}", context()),
+            other => panic!("{other:?} {}", context()),
+        }
+        count("rounding decides for the textbook");
+    }
+    for candidate in &explanation.candidates {
+        assert!(is_true(shape, ray, &explanation, candidate), "{candidate:?} {}", context());
+        count(match candidate.fate {
+            Fate::Hit => "hit",
+            Fate::Behind => "behind",
+            Fate::OtherNappe { .. } => "other nappe",
+            _ => "another fate",
+        });
+    }
+}
+
+#[test]
+fn what_is_said_of_degenerate_lines_of_whole_numbers_is_so() {
+    let mut random = RandomStream::new(31);
+    let mut whole = |most: usize| (random.next_below(2 * most + 1) as f64) - most as f64;
+    let shapes = whole_shapes();
+    let mut said = BTreeMap::new();
+    let mut rays = 0;
+    for round in 0..200 {
+        for shape in &shapes {
+            let on = shape.on[round % shape.on.len()];
+            let along = shape.along[round / shape.on.len() % shape.along.len()];
+            let direction = match round % 3 {
+                // Along, or nearly: a whole number away.
+                0 | 1 => along * [1.0, -2.0, 3.0][round % 5 % 3],
+                _ => DVec3::new(whole(3), whole(3), whole(3)),
+            };
+            let beside = if round % 4 == 3 { DVec3::new(whole(2), whole(2), whole(2)) } else { DVec3::ZERO };
+            if direction == DVec3::ZERO {
+                continue;
+            }
+            // From near and from a million lengths away.
+            let back = [0.0, 1.0, 5.0, 1e6][round / 3 % 4];
+            hold_claims(shape, &Ray::new(on + beside - back * direction, direction), &mut said);
+            rays += 1;
+        }
+    }
+    println!("{rays} {said:#?}");
+    assert!(rays > 2500, "{rays}");
+    let common = [
+        "misses",
+        "inside",
+        "in the surface",
+        "in a side",
+        "a generator",
+        "touches",
+        "through the tip",
+        "at infinity",
+        "behind",
+    ];
+    for name in common {
+        assert!(said.get(name).is_some_and(|count| *count >= 10), "{name}: {said:?}");
+    }
+}

@@ -24,7 +24,6 @@ use crate::point::winding::{self, NoWindingNumber};
 use crate::point::{closest_point, inside};
 use crate::query::Query;
 use crate::ray32::{Hit32, Ray32};
-use crate::surface;
 use crate::trace::f32_ray::{self, F32Queries};
 use crate::trace::filtered::{self, Queries};
 use crate::trace::stack::{AnyHit, ClosestHit};
@@ -35,6 +34,7 @@ use crate::tree::geometry::Placement;
 use crate::tree::moments::Moments;
 use crate::tree::picture_start::PictureRounding;
 use crate::tree::{Geometry, Instance, Tree};
+use crate::{listing, surface};
 
 /// A bounding volume hierarchy over geometries, ready for queries from any number of threads.
 ///
@@ -504,6 +504,12 @@ impl Accel {
     /// When `hit` comes from another tree and names what is not in this one.
     pub fn target(&self, ray: &Ray, hit: &Hit) -> Target<'_> {
         surface::target(&self.tree, ray, hit)
+    }
+
+    /// Visits every primitive, also those that no ray meets, as a hit without a crossing (its `t` is not a number), until `visit`
+    /// breaks; the primitives of an instance come once for each instance. [`Accel::target`] says what each is, and where it stands.
+    pub fn each_primitive(&self, mut visit: impl FnMut(&Hit) -> ControlFlow<()>) {
+        let _ = listing::each(&self.tree, &mut visit);
     }
 
     /// A box around everything finite in it.

@@ -13,6 +13,7 @@ mod hit;
 mod implicit;
 mod intersect;
 mod io;
+mod listing;
 mod point;
 mod query;
 mod ray32;

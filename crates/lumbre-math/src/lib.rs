@@ -31,7 +31,8 @@
 //! | frame from one direction, from two | [`orthonormal_basis`], [`Frame::from_z`], [`Frame::from_two`] |
 //! | change of coordinates | [`Frame::to_local`], [`Frame::to_world`], [`Transform::from_frame`] |
 //! | product and transpose of matrices | `*` and `transpose` of glam; of any size [`matrix::product`], [`matrix::transpose`] |
-//! | linear equations, Cramer's rule | [`matrix::solve`] |
+//! | linear equations, Cramer's rule | [`matrix::solve`]; of any size, and how many solutions there are, [`exact::solve`] |
+//! | determinant, cofactors, inverse without rounding on the way | [`exact::determinant`], [`exact::cofactors`], [`exact::inverse`] |
 //! | inverse of an affine matrix | [`Transform::from_matrix`] and [`Transform::inverse`] |
 //! | scale, shear, rotation, mirror of the plane | [`matrix::scale2`], [`matrix::shear2`], [`matrix::rotation2`], [`matrix::mirror2_about_y`] |
 //! | scale, shear, translation of space | [`Transform::scale`], [`Transform::shear`], [`Transform::translate`] |
@@ -47,6 +48,7 @@
 //! | normals | [`Transform::normal`], [`matrix::transform_normal`] |
 //! | area under a transform | [`Transform::area_factor`] |
 //! | quaternions: sum, product, conjugate | `+`, `*`, `conjugate()` of glam's [`DQuat`] |
+//! | length, unit, slerp of quaternions of any length | [`quaternion::length`], [`quaternion::unit`], [`quaternion::slerp`] |
 //! | inverse, quotient, rotation of a vector, matrix both ways | [`quaternion::inverse`], [`quaternion::divide`], [`quaternion::rotate`], [`quaternion::to_matrix`], [`quaternion::from_matrix`] |
 //! | Euler angles both ways | [`quaternion::Euler`] |
 //! | look-at of either hand | [`Transform::look_at_right`], [`Transform::look_at_left`], [`view::View`] |
@@ -67,6 +69,7 @@ pub use glam::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, Vec2, Vec3, V
 pub mod animated;
 pub mod distribution;
 mod elementary;
+pub mod exact;
 pub mod frame;
 pub mod interval;
 pub mod matrix;

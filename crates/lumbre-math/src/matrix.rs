@@ -20,8 +20,9 @@
 
 use glam::{DMat2, DMat3, DMat4, DVec2, DVec3, DVec4};
 
+use crate::exact::{self, Solutions};
 use crate::transform::sin_cos_degrees;
-use crate::vector::{cross, dot, mixed_product, unit};
+use crate::vector::{cross, dot, scaled_to_one, unit};
 
 /// The product of an R×K and a K×C matrix: `product[i][j] = Σ_k a[i][k] b[k][j]`.
 pub fn product<const R: usize, const K: usize, const C: usize>(
@@ -196,20 +197,29 @@ pub fn normal_matrix(linear: &DMat3) -> DMat3 {
 }
 
 /// The image of the normal `n` of a surface under `linear`, with length 1; `None` when it has no direction.
+///
+/// Columns and normals of any length do: products neither overflow nor vanish.
 pub fn transform_normal(linear: &DMat3, n: DVec3) -> Option<DVec3> {
-    unit(normal_matrix(linear) * n)
+    // cof(L S) = cof(L) cof(S) for the diagonal matrix S that gives each column a length near 1.
+    let (columns, factors) = {
+        let scaled = [linear.x_axis, linear.y_axis, linear.z_axis].map(scaled_to_one);
+        (scaled.map(|(column, _)| column), DVec3::from_array(scaled.map(|(_, factor)| factor)))
+    };
+    let cofactors = normal_matrix(&DMat3::from_cols(columns[0], columns[1], columns[2]));
+    let back = scaled_to_one(n).0 * (factors / factors.max_element());
+    unit(cofactors * scaled_to_one(back).0)
 }
 
 /// The `x` with `m x = b`, by Cramer's rule: each component is the determinant of `m` with that column replaced
-/// by `b`, over that of `m`. `None` when the quotient is not finite, as for a singular matrix.
+/// by `b`, over that of `m`. `None` for a singular matrix, and where a quotient is not finite.
 ///
-/// In three dimensions it costs no more than elimination, and with accurate determinants it loses no digits.
+/// The determinants are exact (see [`exact`](crate::exact)), so that each component is within 1.5 units in its last place.
 pub fn solve(m: &DMat3, b: DVec3) -> Option<DVec3> {
-    let [c0, c1, c2] = [m.x_axis, m.y_axis, m.z_axis];
-    let determinants =
-        DVec3::new(mixed_product(b, c1, c2), mixed_product(c0, b, c2), mixed_product(c0, c1, b));
-    let x = determinants / mixed_product(c0, c1, c2);
-    x.is_finite().then_some(x)
+    let rows = std::array::from_fn(|i| std::array::from_fn(|j| m.col(j)[i]));
+    match exact::solve(&rows, &b.to_array()) {
+        Solutions::One(x) => Some(DVec3::from_array(x)),
+        Solutions::None | Solutions::Many | Solutions::NotFinite => None,
+    }
 }
 
 /// The mirror z to -z: turns right-handed coordinates into left-handed ones and back.

@@ -1,15 +1,14 @@
 //! Quaternions of any non-zero length as rotations, and Euler angles that are accurate at the poles.
 //!
 //! The type is glam's [`DQuat`], which lists `x, y, z, w`; most texts list the real part first, as
-//! [`from_wxyz`] does. glam has the sum `p + q`, the product `p * q` ("first q"), `q.conjugate()`, `q.length()`
-//! and the interpolation `p.slerp(q, s)`. Its `inverse`, `q * v` and `from_quat` require unit quaternions; the
-//! functions here do not.
+//! [`from_wxyz`] does. glam has the sum `p + q`, the product `p * q` ("first q") and `q.conjugate()`. Its `inverse`, `q * v` and `from_quat` require unit quaternions; the
+//! functions here do not, and take quaternions of any length: they are scaled by a power of two first, which changes no digit.
 
 use crate::Elementary;
 use glam::{DMat3, DQuat, DVec3};
 
 use crate::transform::sin_cos_degrees;
-use crate::vector::unit;
+use crate::vector::{self, power_of_two_over};
 
 /// The quaternion `w + x i + y j + z k`.
 pub fn from_wxyz(wxyz: [f64; 4]) -> DQuat {
@@ -24,20 +23,61 @@ pub fn to_wxyz(q: DQuat) -> [f64; 4] {
 
 /// `q⁻¹ = conj q / |q|²`; `None` when it is not finite, as for zero.
 pub fn inverse(q: DQuat) -> Option<DQuat> {
-    let inverse = q.conjugate() * (1.0 / q.length_squared());
+    let (q, factor) = scaled_to_one(q);
+    let inverse = q.conjugate() * (1.0 / q.length_squared()) * factor;
     inverse.is_finite().then_some(inverse)
+}
+
+/// `|q|`, without overflow or underflow of the squares.
+pub fn length(q: DQuat) -> f64 {
+    let (q, factor) = scaled_to_one(q);
+    q.length() / factor
+}
+
+/// `q / |q|`; `None` for zero and for what is not finite.
+pub fn unit(q: DQuat) -> Option<DQuat> {
+    let (q, _) = scaled_to_one(q);
+    let unit = q * (1.0 / q.length());
+    unit.is_finite().then_some(unit)
+}
+
+/// `q` times a power of two that makes its largest part about 1, and that power.
+fn scaled_to_one(q: DQuat) -> (DQuat, f64) {
+    let size = to_wxyz(q).into_iter().fold(0.0_f64, |most, part| most.max(part.abs()));
+    let factor = power_of_two_over(size);
+    (q * factor, factor)
+}
+
+/// The rotation a share `s` of the way from `p` to `q`, the shorter way about at a steady pace: `(sin((1-s)θ) p + sin(sθ) q) / sin θ`
+/// for unit quaternions with the angle θ between them. It is a unit quaternion; `None` where `p` or `q` is zero or anything is
+/// not finite.
+///
+/// K. Shoemake, "Animating rotation with quaternion curves", SIGGRAPH, 1985. θ is twice the angle whose tangent is `|p - q| / |p + q|`,
+/// which is accurate for small angles as well.
+pub fn slerp(p: DQuat, q: DQuat, s: f64) -> Option<DQuat> {
+    let (p, q) = (unit(p)?, unit(q)?);
+    // q and -q are the same rotation.
+    let q = if p.dot(q) < 0.0 { -q } else { q };
+    let angle = 2.0 * (p - q).length().angle_from((p + q).length());
+    let sine = angle.sine();
+    let [from, to] = match sine == 0.0 {
+        true => [1.0 - s, s],
+        false => [((1.0 - s) * angle).sine() / sine, (s * angle).sine() / sine],
+    };
+    unit(p * from + q * to)
 }
 
 /// The quotient `p q⁻¹`, whose product with `q` is `p`; `None` when it is not finite, as for a `q` of zero.
 pub fn divide(p: DQuat, q: DQuat) -> Option<DQuat> {
-    let quotient = p * inverse(q)?;
+    let ((p, of_p), (q, of_q)) = (scaled_to_one(p), scaled_to_one(q));
+    let quotient = p * inverse(q)? * (of_q / of_p);
     quotient.is_finite().then_some(quotient)
 }
 
 /// The rotation by `degrees` about `axis`, of any length but zero, x towards y when it is z: `(cos θ/2, a sin θ/2)`.
 /// `None` when the axis is zero or anything is not finite.
 pub fn from_axis_angle(axis: DVec3, degrees: f64) -> Option<DQuat> {
-    let a = unit(axis)?;
+    let a = vector::unit(axis)?;
     // A quaternion has a period of 720°; 360° gives -1.
     let (sin, cos) = sin_cos_degrees(0.5 * degrees);
     let q = DQuat::from_xyzw(a.x * sin, a.y * sin, a.z * sin, cos);
@@ -46,6 +86,7 @@ pub fn from_axis_angle(axis: DVec3, degrees: f64) -> Option<DQuat> {
 
 /// `v` rotated by `q`: `q v q⁻¹`, for `q` of any non-zero length. `q` and `-q` are the same rotation.
 pub fn rotate(q: DQuat, v: DVec3) -> DVec3 {
+    let (q, _) = scaled_to_one(q);
     let r = q.xyz();
     let across = 2.0 * r.cross(v) / q.length_squared();
     v + q.w * across + r.cross(across)
@@ -53,6 +94,7 @@ pub fn rotate(q: DQuat, v: DVec3) -> DVec3 {
 
 /// The rotation matrix of `q`, of any length but zero.
 pub fn to_matrix(q: DQuat) -> DMat3 {
+    let (q, _) = scaled_to_one(q);
     let square = q.length_squared();
     let [a, b, c, d] = to_wxyz(q);
     let (aa, bb, cc, dd) = (a * a, b * b, c * c, d * d);
@@ -127,7 +169,7 @@ impl Euler {
     /// "Quaternion to Euler Angles Conversion: A Direct, General and Computationally Efficient Method", PLoS
     /// ONE 17(11), 2022.
     pub fn from_quaternion(q: DQuat) -> Self {
-        let [a, b, c, d] = to_wxyz(q);
+        let [a, b, c, d] = to_wxyz(scaled_to_one(q).0);
         let (sum, difference) = ((a + d).hypotenuse(b + c), (a - d).hypotenuse(c - b));
         let attitude = 2.0 * sum.angle_from(difference).to_degrees() - 90.0;
         let half_sum = || (b + c).angle_from(a + d).to_degrees();
@@ -174,6 +216,51 @@ mod tests {
         let quotient = divide(from_wxyz([1.0, 1.0, 0.0, 0.0]), from_wxyz([1.0, 0.0, 1.0, 0.0])).unwrap();
         assert_eq!(to_wxyz(quotient), [0.5, 0.5, -0.5, -0.5]);
         assert_eq!(divide(p, from_wxyz([0.0; 4])), None);
+    }
+
+    #[test]
+    fn the_length_of_a_quaternion_does_not_matter() {
+        let q = from_wxyz([1.0, -2.0, 0.5, 4.0]);
+        let (p, v) = (from_wxyz([0.5, 0.25, -3.0, 1.0]), DVec3::new(1.0, 2.0, -0.5));
+        for size in [1e-320, 1e-300, 1e-160, 1.0, 1e160, 1e300] {
+            let scaled = q * size;
+            // A subnormal number has few digits.
+            let slack = if size < 1e-310 { 1e-3 } else { 1e-14 };
+            assert!((rotate(scaled, v) - rotate(q, v)).length() < slack);
+            assert!(largest(to_matrix(scaled) - to_matrix(q)) < slack);
+            assert!((length(scaled) / size / length(q) - 1.0).abs() < slack);
+            assert!((unit(scaled).unwrap() - unit(q).unwrap()).length() < slack);
+            let (found, expected) = (Euler::from_quaternion(scaled), Euler::from_quaternion(q));
+            assert!((found.heading - expected.heading).abs() < 100.0 * slack);
+            if size > 1e-310 {
+                let product = scaled * inverse(scaled).unwrap();
+                assert!((product - DQuat::IDENTITY).length() < slack, "{size} {product}");
+                let quotient = divide(p * size, scaled).unwrap();
+                assert!((quotient - divide(p, q).unwrap()).length() < slack, "{size}");
+            }
+        }
+        assert_eq!((unit(from_wxyz([0.0; 4])), inverse(from_wxyz([0.0; 4]))), (None, None));
+    }
+
+    #[test]
+    fn slerp_turns_at_a_steady_pace_the_shorter_way() {
+        let axis = DVec3::new(1.0, 2.0, -2.0);
+        let about = |degrees: f64| from_axis_angle(axis, degrees).unwrap();
+        for (from, to) in [(10.0, 130.0), (-20.0, 155.0), (0.0, 1e-7), (40.0, 40.0), (5.0, 184.0)] {
+            for s in [0.0, 0.25, 0.5, 0.9, 1.0] {
+                let expected = about(from + s * (to - from));
+                // Lengths and signs do not matter.
+                for q in [about(to), -about(to), about(to) * 1e-200] {
+                    let found = slerp(about(from) * 3.0, q, s).unwrap();
+                    assert!(largest(to_matrix(found) - to_matrix(expected)) < 1e-14, "{from} {to} {s}");
+                }
+            }
+        }
+        // 200° one way are 160° the other.
+        let found = slerp(about(0.0), about(200.0), 0.5).unwrap();
+        assert!(largest(to_matrix(found) - to_matrix(about(-80.0))) < 1e-14);
+        assert_eq!(slerp(from_wxyz([0.0; 4]), about(1.0), 0.5), None);
+        assert_eq!(slerp(about(2.0), about(1.0), f64::NAN), None);
     }
 
     #[test]

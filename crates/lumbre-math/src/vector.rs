@@ -57,27 +57,52 @@ pub fn unit(a: DVec3) -> Option<DVec3> {
     unit.is_finite().then_some(unit)
 }
 
+/// `a` times a power of two that makes its largest component about 1, and that power: no digit changes, and squares and products
+/// neither overflow nor vanish. Zero and what is not finite stay as they are.
+pub(crate) fn scaled_to_one(a: DVec3) -> (DVec3, f64) {
+    let factor = power_of_two_over(a.abs().max_element());
+    (a * factor, factor)
+}
+
+/// The power of two that takes `size` to [1, 2); 1 for zero and what is not finite. A subnormal size is taken as far as
+/// 2^1022 goes.
+pub(crate) fn power_of_two_over(size: f64) -> f64 {
+    if size == 0.0 || !size.is_finite() {
+        return 1.0;
+    }
+    match size.to_bits() >> 52 {
+        0 => f64::from_bits(2045 << 52),
+        // 2^-1023 is subnormal, and still a power of two.
+        2046 => f64::from_bits(1 << 51),
+        biased => f64::from_bits((2046 - biased) << 52),
+    }
+}
+
 /// The angle between two vectors in radians, in `[0, π]`; 0 when one is zero.
 ///
 /// From both the sine and the cosine: the arc cosine of the dot product alone cannot resolve angles under 1e-8.
 pub fn angle(a: DVec3, b: DVec3) -> f64 {
+    let (a, b) = (scaled_to_one(a).0, scaled_to_one(b).0);
     length(cross(a, b)).angle_from(dot(a, b))
 }
 
 /// The signed length of `b` along `a`: negative when the angle is obtuse. Not finite if `a` is zero.
 pub fn projected_length(a: DVec3, b: DVec3) -> f64 {
-    dot(a, b) / length(a)
+    let ((a, _), (b, factor)) = (scaled_to_one(a), scaled_to_one(b));
+    dot(a, b) / length(a) / factor
 }
 
 /// The part of `b` that is parallel to `a`. Not finite if `a` is zero.
 pub fn project(a: DVec3, b: DVec3) -> DVec3 {
-    (dot(a, b) / a.length_squared()) * a
+    let ((a, _), (b, factor)) = (scaled_to_one(a), scaled_to_one(b));
+    (dot(a, b) / a.length_squared()) * a / factor
 }
 
 /// The part of `b` that is perpendicular to `a`. Not finite if `a` is zero.
 pub fn reject(a: DVec3, b: DVec3) -> DVec3 {
+    let ((a, _), (b, factor)) = (scaled_to_one(a), scaled_to_one(b));
     // a × (b × a) / |a|²: no difference of nearly equal vectors when b is nearly parallel to a.
-    cross(a, cross(b, a)) / a.length_squared()
+    cross(a, cross(b, a)) / a.length_squared() / factor
 }
 
 /// A vector perpendicular to `a`, at least `√⅔` times as long; zero only if `a` is zero.
@@ -157,6 +182,20 @@ mod tests {
             assert!((length(v * size) / size - 7.0).abs() < 1e-14);
             assert!((unit(v * size).unwrap() - v / 7.0).length() < 1e-15);
         }
+        for size in [1e-300, 1e-200, 1e-30, 1.0, 1e200, 1e300] {
+            for other in [1e-280, 1e-160, 3.0, 1e250] {
+                let (a, b) = (v * size, DVec3::new(1.0, 1.0, 0.5) * other);
+                let near = |found: f64, expected: f64| (found / other - expected).abs() < 1e-14;
+                assert!((angle(a, b) - angle(v, b / other)).abs() < 1e-15, "{size} {other}");
+                // a·b = 2 - 3 + 3 over a length of 7.
+                assert!(near(projected_length(a, b), 2.0 / 7.0), "{size} {other}");
+                assert!((project(a, b) / other - v * (2.0 / 49.0)).length() < 1e-15, "{size} {other}");
+                assert!(((project(a, b) + reject(a, b)) / other - b / other).length() < 1e-15);
+            }
+        }
+        assert_eq!(angle(DVec3::X * 1e-200, DVec3::Y * 1e-200).to_degrees(), 90.0);
+        assert_eq!(project(DVec3::X * 1e200, DVec3::new(1.0, 1.0, 0.0)), DVec3::X);
+        assert_eq!(reject(DVec3::X * 5e-324, DVec3::new(1.0, 1.0, 0.0)), DVec3::Y);
         assert_eq!(unit(DVec3::ZERO), None);
         assert_eq!(unit(DVec3::new(f64::INFINITY, 0.0, 0.0)), None);
         assert_eq!(perpendicular(DVec3::ZERO), DVec3::ZERO);

@@ -57,6 +57,7 @@ pub use info::{SceneInfo, predicted_build_bytes};
 pub use lumbre_formats::ReadOptions;
 pub use lumbre_geometry::Ray;
 pub use lumbre_math::{DVec2, DVec3, Transform};
+pub use lumbre_render::film::Exposure;
 pub use lumbre_render::{
     CancelToken, Denoised, ExplainedSample, Feature, Keeper, MergeError, NoProgress, Piece, PixelBounds,
     Progress, RayCounts, RenderError, RenderOptions, RenderState, Snapshot, State, Stats, Stop,

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use lumbre::math::glam::DMat4;
 use lumbre::{DVec3, Ray};
 
-use super::formula::Scope;
+use super::formula::{PutIn, Scope};
 use crate::units::number;
 
 /// A part of what is told.
@@ -54,7 +54,7 @@ pub(super) struct Quantity {
     /// The formula; may be empty.
     pub(super) formula: String,
     /// The formula with its numbers, where it has one.
-    pub(super) numbers: Option<String>,
+    pub(super) numbers: Option<PutIn>,
     pub(super) value: Value,
     /// The textbook's formula and what it gives.
     pub(super) schoolbook: Option<(String, Value)>,
@@ -196,8 +196,32 @@ fn single(x: f32) -> String {
 impl Scope {
     /// Gives the symbols of a ray's origin and direction their values.
     pub(super) fn set_ray(&mut self, [origin, direction]: [&str; 2], ray: &Ray) {
-        self.set(origin, Value::from(ray.origin).in_short());
-        self.set(direction, Value::from(ray.direction).in_short());
+        self.set(origin, &Value::from(ray.origin));
+        self.set(direction, &Value::from(ray.direction));
+    }
+}
+
+impl Quantity {
+    /// The parts of `symbol = formula = numbers = value` but the last, each with the sign after it, as far as there are such:
+    /// numbers that are rounded are nearly equal to what is beside them.
+    pub(super) fn chain(&self) -> Vec<(&str, &'static str)> {
+        let Self { symbol, formula, numbers, .. } = self;
+        let is_rounded = numbers.as_ref().is_some_and(|numbers| numbers.is_rounded);
+        let mut parts: Vec<(&str, &'static str)> = Vec::new();
+        if !symbol.is_empty() {
+            parts.push((symbol, "="));
+        }
+        if !formula.is_empty() && formula != symbol {
+            parts.push((formula, "="));
+        }
+        if let Some(numbers) = numbers {
+            let sign = if is_rounded { "≈" } else { "=" };
+            if let Some(last) = parts.last_mut() {
+                last.1 = sign;
+            }
+            parts.push((&numbers.written, sign));
+        }
+        parts
     }
 }
 
@@ -250,7 +274,7 @@ impl Section {
             value: value.clone(),
             schoolbook: None,
         }));
-        scope.set(symbol, value.in_short());
+        scope.set(symbol, &value);
     }
 
     pub(super) fn text(&mut self, text: impl Into<String>) {
@@ -263,6 +287,6 @@ impl Section {
 }
 
 /// The numbers in a formula, where they say more than its result.
-pub(super) fn numbers(scope: &Scope, formula: &str, value: &Value) -> Option<String> {
-    scope.put_in(formula).filter(|numbers| *numbers != value.in_full())
+pub(super) fn numbers(scope: &Scope, formula: &str, value: &Value) -> Option<PutIn> {
+    scope.put_in(formula).filter(|numbers| numbers.written != value.in_full())
 }

@@ -3,7 +3,7 @@
 use lumbre::geometry::{Fate, Remark, Topic};
 
 use super::document::exact;
-use super::texts::Texts;
+use super::texts::{OperandName, Texts};
 
 pub(super) static ENGLISH: Texts = Texts {
     code: "en",
@@ -11,6 +11,8 @@ pub(super) static ENGLISH: Texts = Texts {
     topic,
     remark,
     fate_of,
+    kind_of,
+    symbol,
     camera: "The camera",
     kind: "kind",
     name: "name",
@@ -19,9 +21,8 @@ pub(super) static ENGLISH: Texts = Texts {
     right: "to the right of the picture",
     up: "upwards",
     forward: "into the picture",
-    frame: "Camera space has x along u, y along v and z along w: a left-handed frame in a right-handed world.",
     look_at: "look-at matrix, from the world to the camera",
-    projection: "projection matrix, for a camera that looks along -z, from {0} to {1} (rays need neither end)",
+    projection: "projection matrix, from camera space with depths from {0} to {1} (rays need neither end)",
     perspective: "perspective, {0}° along the shorter side",
     lens: "with a lens of radius {0} in focus at {1}",
     orthographic: "orthographic",
@@ -155,6 +156,62 @@ pub(super) static ENGLISH: Texts = Texts {
     schoolbook: "by the textbook",
     title: "How Lumbre computes it",
     sketch: "The ray, what it meets, and the normals there",
+    is_missed: "The ray misses it.",
+    passes: "It passes it at a distance of {0}, nearest at t = {1}.",
+    passes_in_object: "In the object's own space it passes it at a distance of {0}, nearest at t = {1}.",
+    missed: "Shapes that the ray misses:",
+    missed_nearest: "The shapes that it passes nearest, and why it misses them:",
+    no_such_shape: "--shape {0}: no shape has this number, kind or material (expected a number, or one of {1})",
+    no_such_key: "--only {0}: no section has this key (expected some of {1})",
+    no_sections: "There is no such section for this ray.",
+    outside_picture: "--pixel {0}: outside of the picture (expected less than {1}; --size gives another)",
+    in_file: "The face in its file",
+    baked: "M takes these corners to those of the equation.",
+    mirrored: "M mirrors: the corners go round the other way.",
+    split: "The face is flat, and is tested as two triangles.",
+    no_turntable: "--turntable makes many pictures (expected no --turntable)",
+    nothing_asked: "nothing is asked for (expected --pixel X,Y, from 0,0 in the upper left corner, or --ray OX,OY,OZ,DX,DY,DZ)",
+    frame_of_same_hand: "Camera space has x along u, y along v and z along w. Here u×v points along w: it has the same hand as the scene's axes.",
+    frame_of_other_hand: "Camera space has x along u, y along v and z along w. Here u×v points against w: it has the other hand than the scene's axes, left-handed where these are right-handed.",
+    projected: "Back to the picture: the look-at matrix and then the projection matrix take a point of the ray to its pixel.",
+    in_focus: "where the ray is in focus; without a lens, at a distance of 1",
+    point_of_ray: "a point of the ray",
+    by_look_at: "in camera space, by the look-at matrix",
+    by_projection: "by the projection matrix, with w",
+    by_division: "divided by w: in the cube [-1, 1]³, y upwards",
+    back_on_film: "point of the film, in pixels from the upper left corner, y downwards",
+    north_pole: "At a pole, 90° about y, x and z turn about the same axis: only x − z is determined, and z is set to 0.",
+    south_pole: "At a pole, −90° about y, x and z turn about the same axis: only x + z is determined, and z is set to 0.",
+    barycentrics: "b₁, b₂ (barycentric coordinates)",
+    shown_feature: "What is shown",
+    openness: "How open it is here",
+    normal_as_colour: "the shading normal as a colour, (n + 1)/2",
+    depth_along_axis: "the depth along the camera's axis",
+    reflectance: "the reflectance",
+    uv_as_colour: "u and v as red and green",
+    is_open: "1 where nothing near is in that direction, else 0",
+    tree: "The tree of rays: below each vertex stand those that its mirrored and refracted rays meet.",
+    roulette_factor: "factor for having gone on, the inverse of that probability",
+    radiance_along_ray: "radiance along the ray",
+    radiance_before_film: "radiance of this sample",
+    exposure: "exposure of the film: shutter time times ISO / 100",
+    exposed: "exposed",
+    max_component: "largest component that the film takes",
+    held: "scaled down to that, with the same hue",
+    sensor: "times the matrix of the sensor",
+    filter_weight: "weight of the pixel's filter there",
+    weighted: "added to the pixel's sum, and φ to its sum of weights: the pixel is their quotient",
+    cos_refracted: "cosine of the angle of refraction",
+    perpendicular: "amplitude, polarised across the plane of incidence",
+    parallel: "amplitude, polarised in that plane",
+    fresnel: "the Fresnel reflectance: the share that is reflected",
+    intensity: "intensity of the light towards here",
+    cos_light: "|cos θ|, by the shading normal",
+    bsdf_alone: "f / |cos θ|: the BSDF alone",
+    phase: "phase function towards it",
+    phase_weight: "phase function over the density",
+    is_scattered: "The medium scatters it.",
+    eta_entered: "index of the side that it enters over that of the side it leaves",
     sample: "sample",
     weight: "weight in the pixel",
 };
@@ -181,6 +238,9 @@ fn topic(topic: Topic) -> &'static str {
         Topic::Quartic => "The quartic",
         Topic::QuarticExtrema => "Where the quartic turns",
         Topic::QuarticRoots => "The roots of the quartic",
+        Topic::TextbookQuartic => {
+            "For comparison: the textbook's quartic c₄·t⁴ + c₃·t³ + c₂·t² + c₁·t + c₀ = 0"
+        }
         Topic::Shear => "The shear that puts the ray on an axis",
         Topic::EdgeFunctions => "The edge functions (watertight)",
         Topic::MollerTrumbore => "For comparison: Möller and Trumbore",
@@ -192,7 +252,7 @@ fn topic(topic: Topic) -> &'static str {
     }
 }
 
-fn remark(remark: &Remark) -> String {
+fn remark(remark: &Remark, name: &OperandName<'_>) -> String {
     let text = match remark {
         Remark::NoRay => {
             "Something in the ray is not a number, or its direction is zero or infinite: it meets nothing."
@@ -202,16 +262,34 @@ fn remark(remark: &Remark) -> String {
         Remark::Parallel => "The line is parallel to it.",
         Remark::Between => "The line lies in it, or between both planes all the way.",
         Remark::AtInfinity => "a = 0: the equation is linear, and one root has gone to infinity.",
-        Remark::InsideThroughout => "The line is inside from end to end, and crosses nothing.",
-        Remark::AlongGenerator => "The line is along a generator of the cone, and inside from the tip on.",
+        Remark::InsideThroughout => {
+            "a = h = 0 and c < 0: the line is inside of it all the way, and does not cross it."
+        }
+        Remark::InSurface => "a = h = c = 0: the line lies in the surface, and crosses it nowhere.",
+        Remark::InCappedSide => "a = h = c = 0: the line lies in the side, and counts as inside.",
+        Remark::AlongGenerator => {
+            "a = h = c = 0: the line is a generator of the cone, and counts as inside from the tip on."
+        }
+        Remark::ThroughTip => "The line passes the tip: both roots are one.",
+        Remark::AlongRuling => {
+            "The line runs along this ruling: it is on the patch from where it enters to where it leaves."
+        }
+        Remark::EveryRuling => {
+            "a = h = c = 0: every ruling of this family meets the line, which is one of the other family."
+        }
+        Remark::SchoolbookCount { crossings, roots } => {
+            return format!(
+                "The rounded coefficients have another number of roots, {roots}, than there are crossings: {crossings}."
+            );
+        }
         Remark::SetUpNearby { start } => {
             return format!(
-                "The ray begins far away: the equation is set up at t₀ = {}, where it keeps its digits.",
+                "The equation is set up at t₀ = {}, where fewer of its digits cancel than at the ray's origin.",
                 exact(*start)
             );
         }
         Remark::TwicePrecision => {
-            "Doubles could not decide, or would lose digits: it is computed in twice the precision, and told rounded."
+            "Doubles do not prove how many roots there are, or would lose digits: it is computed in twice the precision."
         }
         Remark::Cancellation { digits } => {
             return format!("The textbook's formula loses {digits:.0} of about 16 digits here.");
@@ -236,11 +314,12 @@ fn remark(remark: &Remark) -> String {
             "The crossings were found between the places where the quartic turns, piece by piece."
         }
         Remark::StartsInside { operand } => {
-            return format!("The line begins inside operand {operand}.");
+            return format!("The line begins inside operand {operand} ({}).", name(*operand));
         }
         Remark::NotLookedAt { operand } => {
             return format!(
-                "The search does not look at operand {operand}: the ray misses its box, or it could change nothing."
+                "The search does not look at operand {operand} ({}): the line misses its box, or it could change nothing.",
+                name(*operand)
             );
         }
     };
@@ -249,7 +328,7 @@ fn remark(remark: &Remark) -> String {
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-fn fate_of(fate: &Fate) -> String {
+fn fate_of(fate: &Fate, name: &OperandName<'_>) -> String {
     let text = match *fate {
         Fate::Hit => "a hit",
         Fate::Behind => "behind the ray's origin",
@@ -303,15 +382,49 @@ fn fate_of(fate: &Fate) -> String {
         Fate::Flat => "the triangle has no area",
         Fate::Touch => "the line only touches the operand",
         Fate::InsideOperand { operand } => {
-            return format!("inside operand {operand}: nothing begins or ends there");
+            return format!("inside operand {operand} ({}): nothing begins or ends there", name(operand));
         }
         Fate::OutsideOperand { operand } => {
-            return format!("outside operand {operand}: nothing begins or ends there");
+            return format!("outside operand {operand} ({}): nothing begins or ends there", name(operand));
         }
-        Fate::Coincides { operand } => return format!("on the surface of operand {operand} as well"),
+        Fate::Coincides { operand } => {
+            return format!("on the surface of operand {operand} ({}) as well", name(operand));
+        }
         Fate::NoChange { inside: true } => "inside the result on both sides",
         Fate::NoChange { inside: false } => "outside the result on both sides",
         Fate::NotReturned => "not returned by the search",
     };
     text.to_owned()
+}
+
+fn kind_of(kind: &'static str) -> &'static str {
+    kind
+}
+
+fn symbol(topic: Topic, symbol: &str) -> &'static str {
+    match (topic, symbol) {
+        (Topic::Parameters, "C") => "centre",
+        (Topic::Parameters, "r") => "radius",
+        (Topic::Parameters, "R") => "radius of the circle in the middle of the tube",
+        (Topic::Parameters, "r₁") => "radius at the first end",
+        (Topic::Parameters, "r₂") => "radius at the second end",
+        (Topic::Parameters, "k") => "what the radius grows by along the axis",
+        (Topic::Parameters, "V") => "unit axis",
+        (Topic::ScaledRay, "f") => "factor of the direction",
+        (Topic::SetUp, "w") => "the ray's origin as seen from the shape",
+        (Topic::SetUp, "t₀") => "where the equation is set up",
+        (Topic::SetUp, "w₀") => "the place there",
+        (Topic::Quadratic, "S") => "axis from end to end, with a length near 1",
+        (Topic::Quadratic, "κ") => "what the radius grows by along S, times its length",
+        (Topic::Quadratic, "ρ₀") => "radius where w begins, times S·S",
+        (Topic::Quadratic, "ε₂") => "bound on the error of a, in units of 2⁻⁵³",
+        (Topic::Quadratic, "ε₁") => "the same for h",
+        (Topic::Quadratic, "ε₀") => "the same for c",
+        (Topic::Discriminant, "l") => "from the centre to the nearest point of the line",
+        (Topic::Discriminant, "ε") => "bound on the error of Δ",
+        (Topic::Nappe, "g") => "what the radius grows by along the ray",
+        (Topic::Nappe, "ρ") => "radius in the middle of the roots; negative on the other nappe",
+        (Topic::TextbookQuartic, "τ") => "its real roots",
+        _ => "",
+    }
 }

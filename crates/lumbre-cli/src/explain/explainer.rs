@@ -37,7 +37,8 @@ impl Explain for Explainer {
         language: &str,
     ) -> Result<String, String> {
         let texts = texts(Language::from_str(language, false)?);
-        let question = Question { things: &self.things, texts, sample: 0, depth: 0, nearest: false };
+        let question =
+            Question { things: &self.things, texts, sample: 0, depth: 0, nearest: false, shapes: None };
         let sections = question.of_pixel(scene, options, pixel).map_err(|failure| failure.to_string())?;
         Ok(html::html(&title(&self.name, Some(pixel), texts), texts.code, &sections, texts.schoolbook))
     }

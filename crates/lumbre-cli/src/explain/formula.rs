@@ -3,6 +3,8 @@
 use std::collections::HashMap;
 use std::fmt::Write;
 
+use super::document::Value;
+
 /// A piece of a formula.
 #[derive(Clone, Debug, PartialEq)]
 enum Token {
@@ -22,7 +24,7 @@ enum Token {
 const FUNCTIONS: [&str; 8] = ["min", "max", "sin", "cos", "tan", "atan2", "det", "sign"];
 
 /// Subscripts with the characters that they stand for.
-const SUBSCRIPTS: [(char, char); 23] = [
+const SUBSCRIPTS: [(char, char); 25] = [
     ('₀', '0'),
     ('₁', '1'),
     ('₂', '2'),
@@ -44,6 +46,8 @@ const SUBSCRIPTS: [(char, char); 23] = [
     ('ₙ', 'n'),
     ('ₒ', 'o'),
     ('ₚ', 'p'),
+    ('ᵣ', 'r'),
+    ('ₛ', 's'),
     ('ₓ', 'x'),
     ('ₜ', 't'),
 ];
@@ -150,20 +154,38 @@ fn tokens(formula: &str) -> Vec<Token> {
 
 /// What the symbols of a formula stand for, each written as it is put in its place.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Scope(HashMap<String, String>);
+pub(super) struct Scope(HashMap<String, Entry>);
+
+/// What a symbol stands for, and whether a digit of it is left out.
+#[derive(Clone, Debug)]
+struct Entry {
+    written: String,
+    is_rounded: bool,
+}
+
+/// A formula with numbers in it.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct PutIn {
+    pub(super) written: String,
+    /// Whether digits of the numbers are left out, so that it is nearly equal.
+    pub(super) is_rounded: bool,
+}
 
 impl Scope {
     /// Gives a symbol a value from here on.
-    pub(super) fn set(&mut self, symbol: &str, written: String) {
-        self.0.insert(symbol.to_owned(), written);
+    pub(super) fn set(&mut self, symbol: &str, value: &Value) {
+        let written = value.in_short();
+        let is_rounded = written != value.in_full();
+        self.0.insert(symbol.to_owned(), Entry { written, is_rounded });
     }
 
     /// The formula with the numbers in it; `None` where that says nothing new.
-    pub(super) fn put_in(&self, formula: &str) -> Option<String> {
+    pub(super) fn put_in(&self, formula: &str) -> Option<PutIn> {
         let tokens = tokens(formula);
         let mut written = String::new();
         let mut is_changed = false;
         let mut is_whole = true;
+        let mut is_any_rounded = false;
         for (i, token) in tokens.iter().enumerate() {
             let Token::Symbol { base, .. } = token else {
                 plain(token, &mut written);
@@ -172,8 +194,9 @@ impl Scope {
             let mut symbol = String::new();
             plain(token, &mut symbol);
             match self.0.get(&symbol) {
-                Some(number) => {
+                Some(Entry { written: number, is_rounded }) => {
                     is_changed = true;
+                    is_any_rounded |= is_rounded;
                     let is_first = written.trim_end().is_empty() || written.ends_with(['(', '|', '√']);
                     let is_raised = matches!(tokens.get(i + 1), Some(Token::Power(_)));
                     let is_negative = number.starts_with('-');
@@ -189,7 +212,7 @@ impl Scope {
                 }
             }
         }
-        (is_changed && is_whole).then_some(written)
+        (is_changed && is_whole).then_some(PutIn { written, is_rounded: is_any_rounded })
     }
 }
 
@@ -323,69 +346,120 @@ fn closings(tokens: &[Token]) -> Closings {
     found
 }
 
+/// The sign between what stands before and its result: numbers that were rounded are nearly equal to it.
+pub(super) fn sign_after(written: &str) -> &'static str {
+    if written.contains('≈') { "≈" } else { "=" }
+}
+
 /// Text with the characters replaced that mean something in HTML.
 pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// The formula as MathML, which browsers set without help.
+/// The formula as MathML, which browsers set without help; quotients are stacked.
 pub(super) fn mathml(formula: &str) -> String {
     let tokens = tokens(formula);
-    let closings = closings(&tokens);
-    let mut out = String::from("<math>");
-    let mut last: Option<String> = None;
-    let flush = |last: &mut Option<String>, out: &mut String| {
-        if let Some(element) = last.take() {
-            out.push_str(&element);
-        }
-    };
-    for (i, token) in tokens.iter().enumerate() {
-        match token {
-            Token::Symbol { base, primes, subscript } => {
-                flush(&mut last, &mut out);
-                let name = format!("<mi>{}</mi>", escaped(base));
-                let primes = format!("<mo>{}</mo>", "′".repeat(*primes));
-                let low = format!("<mi>{subscript}</mi>");
-                last = Some(match (primes.len() > "<mo></mo>".len(), subscript.is_empty()) {
-                    (false, true) => name,
-                    (true, true) => format!("<msup>{name}{primes}</msup>"),
-                    (false, false) => format!("<msub>{name}{low}</msub>"),
-                    (true, false) => format!("<msubsup>{name}{low}{primes}</msubsup>"),
-                });
+    format!("<math>{}</math>", row(&tokens).concat())
+}
+
+/// The elements of a row: each factor is one, and each sign between.
+fn row(tokens: &[Token]) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    let mut at = 0;
+    while at < tokens.len() {
+        match &tokens[at] {
+            Token::Sign(c) if c.is_whitespace() => at += 1,
+            // What stands before is over the factor that follows.
+            Token::Sign('/') if !out.is_empty() && at + 1 < tokens.len() => {
+                let over = out.pop().unwrap_or_default();
+                let mut rest = at + 1;
+                let under = factor(tokens, &mut rest);
+                let [over, under] = [over, under].map(|part| without_parentheses(&part));
+                out.push(format!("<mfrac>{over}{under}</mfrac>"));
+                at = rest;
             }
-            Token::Number { digits, exponent } => {
-                flush(&mut last, &mut out);
-                let number = format!("<mn>{digits}</mn>");
-                last = Some(if exponent.is_empty() {
-                    number
-                } else {
-                    format!("<mrow>{number}<mo>·</mo><msup><mn>10</mn><mn>{exponent}</mn></msup></mrow>")
-                });
-            }
-            Token::Power(digits) => {
-                let base = last.take().unwrap_or_else(|| "<mrow></mrow>".to_owned());
-                last = Some(format!("<msup>{base}<mn>{digits}</mn></msup>"));
-            }
-            Token::Root => flush(&mut last, &mut out),
-            Token::Sign('(') if closings.roots.contains(&i) => {
-                flush(&mut last, &mut out);
-                out.push_str("<msqrt>");
-            }
-            Token::Sign(')') if closings.ends.contains(&i) => {
-                flush(&mut last, &mut out);
-                out.push_str("</msqrt>");
-            }
-            Token::Sign(c) if c.is_whitespace() => {}
-            Token::Sign(c) => {
-                flush(&mut last, &mut out);
-                let stretches = if matches!(c, '(' | ')' | '|') { " stretchy=\"false\"" } else { "" };
-                last = Some(format!("<mo{stretches}>{}</mo>", escaped(&c.to_string())));
-            }
+            _ => out.push(factor(tokens, &mut at)),
         }
     }
-    flush(&mut last, &mut out);
-    out.push_str("</math>");
     out
+}
+
+/// A factor with its powers, or a sign; `at` is moved behind it.
+fn factor(tokens: &[Token], at: &mut usize) -> String {
+    let mut element = match &tokens[*at] {
+        Token::Symbol { base, primes, subscript } => {
+            let name = format!("<mi>{}</mi>", escaped(base));
+            let low = format!("<mi>{subscript}</mi>");
+            let marks = format!("<mo>{}</mo>", "′".repeat(*primes));
+            match (*primes > 0, subscript.is_empty()) {
+                (false, true) => name,
+                (true, true) => format!("<msup>{name}{marks}</msup>"),
+                (false, false) => format!("<msub>{name}{low}</msub>"),
+                (true, false) => format!("<msubsup>{name}{low}{marks}</msubsup>"),
+            }
+        }
+        Token::Number { digits, exponent } if exponent.is_empty() => format!("<mn>{digits}</mn>"),
+        Token::Number { digits, exponent } => {
+            format!("<mrow><mn>{digits}</mn><mo>·</mo><msup><mn>10</mn><mn>{exponent}</mn></msup></mrow>")
+        }
+        // Without anything below, a power stands by itself.
+        Token::Power(digits) => format!("<msup><mrow></mrow><mn>{digits}</mn></msup>"),
+        Token::Root => match closing(tokens, *at + 1) {
+            Some(end) => {
+                let inner = row(&tokens[*at + 2..end]).concat();
+                *at = end;
+                format!("<msqrt>{inner}</msqrt>")
+            }
+            None => "<mo>√</mo>".to_owned(),
+        },
+        Token::Sign('(' | '|' | '⟨') => match closing(tokens, *at) {
+            Some(end) => {
+                let [open, close] = [*at, end].map(|place| sign(&tokens[place]));
+                let inner = row(&tokens[*at + 1..end]).concat();
+                *at = end;
+                format!("<mrow>{open}{inner}{close}</mrow>")
+            }
+            None => sign(&tokens[*at]),
+        },
+        other => sign(other),
+    };
+    *at += 1;
+    while let Some(Token::Power(digits)) = tokens.get(*at) {
+        element = format!("<msup>{element}<mn>{digits}</mn></msup>");
+        *at += 1;
+    }
+    element
+}
+
+/// A sign as an element.
+fn sign(token: &Token) -> String {
+    let Token::Sign(c) = token else { return String::new() };
+    let stretches = if matches!(c, '(' | ')' | '|') { " stretchy=\"false\"" } else { "" };
+    format!("<mo{stretches}>{}</mo>", escaped(&c.to_string()))
+}
+
+/// Where the bracket that opens at this place closes.
+fn closing(tokens: &[Token], open: usize) -> Option<usize> {
+    let Some(Token::Sign(sign @ ('(' | '|' | '⟨'))) = tokens.get(open) else { return None };
+    let mut depth = 0;
+    for (i, token) in tokens.iter().enumerate().skip(open + 1) {
+        match token {
+            Token::Sign('|') if *sign == '|' && depth == 0 => return Some(i),
+            Token::Sign('(' | '⟨') => depth += 1,
+            Token::Sign(')' | '⟩') if depth == 0 => return (*sign != '|').then_some(i),
+            Token::Sign(')' | '⟩') => depth -= 1,
+            _ => {}
+        }
+    }
+    None
+}
+
+/// The element without the parentheses about all of it: the line of a quotient says as much.
+fn without_parentheses(element: &str) -> String {
+    let inner = element
+        .strip_prefix("<mrow><mo stretchy=\"false\">(</mo>")
+        .and_then(|rest| rest.strip_suffix("<mo stretchy=\"false\">)</mo></mrow>"));
+    inner.map_or_else(|| element.to_owned(), |inner| format!("<mrow>{inner}</mrow>"))
 }
 
 #[cfg(test)]
@@ -405,18 +479,21 @@ mod tests {
     #[test]
     fn numbers_take_the_place_of_symbols() {
         let mut scope = Scope::default();
-        scope.set("h", "-5".to_owned());
-        scope.set("a", "1".to_owned());
-        scope.set("c", "24".to_owned());
-        scope.set("t₁", "4".to_owned());
-        scope.set("O", "(0, 0, -5)".to_owned());
-        assert_eq!(scope.put_in("h² − a·c").as_deref(), Some("(-5)² − 1·24"));
-        assert_eq!(scope.put_in("a − h").as_deref(), Some("1 − (-5)"));
-        assert_eq!(scope.put_in("h − √(h)").as_deref(), Some("-5 − √(-5)"));
-        assert_eq!(scope.put_in("max(a, t₁)").as_deref(), Some("max(1, 4)"));
+        for (symbol, number) in [("h", -5.0), ("a", 1.0), ("c", 24.0), ("t₁", 4.0)] {
+            scope.set(symbol, &Value::from(number));
+        }
+        scope.set("x₀", &Value::from(1.0 / 3.0));
+        let put_in = |formula: &str| scope.put_in(formula).map(|it| (it.written, it.is_rounded));
+        let exactly = |written: &str| Some((written.to_owned(), false));
+        assert_eq!(put_in("h² − a·c"), exactly("(-5)² − 1·24"));
+        assert_eq!(put_in("a − h"), exactly("1 − (-5)"));
+        assert_eq!(put_in("h − √(h)"), exactly("-5 − √(-5)"));
+        assert_eq!(put_in("max(a, t₁)"), exactly("max(1, 4)"));
+        // Six digits of a third are not all of them.
+        assert_eq!(put_in("a + x₀"), Some(("1 + 0.333333".to_owned(), true)));
         // What is only partly known says nothing.
-        assert_eq!(scope.put_in("a + x"), None);
-        assert_eq!(scope.put_in("2·3"), None);
+        assert_eq!(put_in("a + x"), None);
+        assert_eq!(put_in("2·3"), None);
     }
 
     #[test]
@@ -439,5 +516,17 @@ mod tests {
         assert_eq!(ml.matches("</msqrt>").count(), 1);
         assert!(ml.contains("<msup><mi>h</mi><mn>2</mn></msup>") && ml.contains("&lt;"), "{ml}");
         assert!(ml.contains("<msub><mi>t</mi><mi>1</mi></msub>"), "{ml}");
+        let ml = mathml("t₀ + (−b − √(b² − 4·a·c))/(2·a) − |D×V|²/q");
+        assert_eq!(ml.matches("<mfrac>").count(), 2, "{ml}");
+        assert!(ml.contains("<mfrac><mrow><mo>−</mo><mi>b</mi>"), "{ml}");
+        assert!(ml.contains("<mrow><mn>2</mn><mo>·</mo><mi>a</mi></mrow></mfrac>"), "{ml}");
+        for tag in ["math", "mrow", "msup", "mfrac", "msqrt", "mo", "mi", "mn"] {
+            let opened = ml.matches(&format!("<{tag}>")).count() + ml.matches(&format!("<{tag} ")).count();
+            assert_eq!(opened, ml.matches(&format!("</{tag}>")).count(), "{tag}: {ml}");
+        }
+        // What is not closed, or has nothing to divide, stays as it is.
+        for odd in ["(a", "|a", "/a", "a/", "√a", "⟨1, 2⟩", "²", "[0, 1] ∪ (2)"] {
+            assert!(mathml(odd).ends_with("</math>"), "{odd}");
+        }
     }
 }

@@ -3,14 +3,16 @@
 use std::fmt::Write;
 
 use super::document::{Item, Quantity, Section, Value};
-use super::formula::{escaped, mathml};
+use super::formula::{escaped, mathml, sign_after};
 
 const STYLE: &str = "
 :root { color-scheme: light dark; --line: #8884; --weak: light-dark(#5c6370, #a9b0bb); --mark: #b50; }
 body { background: Canvas; color: CanvasText; font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 1rem auto; padding: 0 1rem; }
 h1 { font-size: 1.5rem; } h2 { font-size: 1.25rem; margin-top: 2rem; border-bottom: 1px solid var(--line); }
 h3 { font-size: 1.1rem; } h4, h5, h6 { font-size: 1rem; margin-bottom: .2rem; }
+summary { cursor: pointer; } summary > * { display: inline-block; margin: .6rem 0 .2rem; } body { overflow-wrap: anywhere; }
 section section { margin-left: .8rem; padding-left: .8rem; border-left: 2px solid var(--line); }
+@media (max-width: 40rem) { section section { margin-left: .2rem; padding-left: .4rem; } body { padding: 0 .5rem; } }
 p { margin: .25rem 0; overflow: auto hidden; }
 .matrix { display: inline-table; vertical-align: middle; border-left: 1px solid; border-right: 1px solid; border-radius: .5rem; margin: .2rem; }
 .matrix td { border: 0; text-align: right; padding: 0 .5rem; } math { font-size: 1.05em; }
@@ -38,7 +40,9 @@ pub(super) fn html(title: &str, language: &str, sections: &[Section], schoolbook
 
 fn write_section(section: &Section, level: usize, schoolbook: &str, out: &mut String) {
     let heading = level.min(6);
-    let _ = writeln!(out, "<section>\n<h{heading}>{}</h{heading}>", escaped(&section.title));
+    let title = escaped(&section.title);
+    // Each folds, and is open at first.
+    let _ = writeln!(out, "<section>\n<details open><summary><h{heading}>{title}</h{heading}></summary>");
     for item in &section.items {
         match item {
             Item::Quantity(quantity) => write_quantity(quantity, schoolbook, out),
@@ -71,34 +75,27 @@ fn write_section(section: &Section, level: usize, schoolbook: &str, out: &mut St
     for section in &section.sections {
         write_section(section, level + 1, schoolbook, out);
     }
-    out.push_str("</section>\n");
+    out.push_str("</details>\n</section>\n");
 }
 
 fn write_quantity(quantity: &Quantity, schoolbook: &str, out: &mut String) {
-    let Quantity { symbol, label, formula, numbers, value, .. } = quantity;
+    let Quantity { symbol, label, value, .. } = quantity;
     let label_after = if label.is_empty() || symbol.is_empty() {
         String::new()
     } else {
         format!(" <span class=\"label\">{}</span>", escaped(label))
     };
     let before = if symbol.is_empty() { format!("{}: ", escaped(label)) } else { String::new() };
-    let mut formulas: Vec<&str> = [symbol.as_str(), formula, numbers.as_deref().unwrap_or("")]
-        .into_iter()
-        .filter(|part| !part.is_empty())
-        .collect();
-    formulas.dedup();
-    let equals = if symbol.is_empty() { "" } else { " = " };
+    let chain = quantity.chain();
+    let parts = chain.iter().map(|(part, sign)| format!("{} {sign} ", mathml(part)));
     // A table cannot stand in a paragraph.
     let (open, close) =
         if value.rows().is_some() { ("<div class=\"wide\">", "</div>") } else { ("<p>", "</p>") };
-    let _ = writeln!(
-        out,
-        "{open}{before}{}{equals}{}{label_after}{close}",
-        formulas.iter().map(|part| mathml(part)).collect::<Vec<_>>().join(" = "),
-        shown(value)
-    );
+    let _ = writeln!(out, "{open}{before}{}{}{label_after}{close}", parts.collect::<String>(), shown(value));
     if let Some((formula, value)) = &quantity.schoolbook {
-        let _ = writeln!(out, "<p class=\"book\">{schoolbook}: {} = {}</p>", mathml(formula), shown(value));
+        let sign = sign_after(formula);
+        let _ =
+            writeln!(out, "<p class=\"book\">{schoolbook}: {} {sign} {}</p>", mathml(formula), shown(value));
     }
 }
 

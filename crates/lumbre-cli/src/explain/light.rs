@@ -1,14 +1,14 @@
 //! The light that comes along a ray: what happens along its path, and what each light gives.
 
-use lumbre::description::{Footprint, Interaction, LightId};
+use lumbre::description::{Footprint, IntegratorKind, Interaction, LightId};
 use lumbre::journal::{End, Event, Met, SampledLight, Scattered, Source};
 use lumbre::math::optics::{facing, reflect, refract};
 use lumbre::shading::{Material, MaterialKind, Scatter, Spectrum};
-use lumbre::{DVec2, DVec3, Ray, Scene};
+use lumbre::{DVec2, DVec3, Exposure, Ray, Scene};
 
 use super::document::{Column, Item, Section, Value};
 use super::formula::Scope;
-use super::surfaces::surfaces;
+use super::surfaces::{Wanted, material_of, surfaces};
 use super::texts::Texts;
 use super::things::Things;
 use crate::language::filled;
@@ -20,40 +20,77 @@ const MOST_LIGHTS: usize = 16;
 pub(super) struct Path<'a> {
     pub(super) scene: &'a Scene,
     pub(super) things: &'a Things,
-    pub(super) texts: &'a Texts,
+    pub(super) texts: &'static Texts,
     /// Rays after the first whose crossings are told as well.
     pub(super) depth: u32,
+    /// What is computed for each pixel.
+    pub(super) kind: &'a IntegratorKind,
+}
+
+/// How the radiance of a sample becomes what a render adds to its pixel.
+#[derive(Clone, Copy)]
+pub(super) struct Exposed {
+    pub(super) radiance: Spectrum,
+    pub(super) exposure: Exposure,
+    /// The weight of the pixel's filter.
+    pub(super) weight: f64,
+}
+
+/// A vertex of a tree of rays, or where a ray of it leaves the scene.
+struct Place {
+    section: Section,
+    /// The place that its ray comes from.
+    parent: Option<usize>,
+    /// The rays that go on from it.
+    rays: Vec<Ray>,
+}
+
+impl Place {
+    fn new(section: Section, parent: Option<usize>) -> Self {
+        Self { section, parent, rays: Vec::new() }
+    }
 }
 
 impl Path<'_> {
     /// What happens along a path, and the light that it comes to.
-    pub(super) fn tell(&self, radiance: Spectrum, events: &[Event]) -> Section {
+    pub(super) fn tell(&self, exposed: Option<Exposed>, radiance: Spectrum, events: &[Event]) -> Section {
         let texts = self.texts;
-        let mut section = Section::new("light", texts.light);
+        let mut section = Section::new("light", self.title());
         let mut rows = Vec::new();
-        let mut vertex: Option<Section> = None;
+        let mut places: Vec<Place> = Vec::new();
         let mut met: Option<&Met> = None;
         for event in events {
-            if let Event::Met(_) | Event::Left { .. } = event {
-                section.sections.extend(vertex.take());
-            }
-            let place = vertex.get_or_insert_with(|| Section::new("start", texts.start));
-            match event {
+            let begun = match event {
                 Event::Met(here) => {
                     met = Some(here);
-                    *place = self.vertex(here);
+                    Some((self.vertex(here), &here.ray))
                 }
                 Event::Left { ray } => {
-                    *place = Section::new("left", texts.left);
-                    place.fact("O", ray.origin);
-                    place.fact("D", ray.direction);
+                    let mut left = Section::new("left", texts.left);
+                    left.fact("O", ray.origin);
+                    left.fact("D", ray.direction);
+                    Some((left, ray))
                 }
+                _ => None,
+            };
+            if let Some((begun, ray)) = begun {
+                let parent = places.iter().rposition(|place| place.rays.contains(ray));
+                places.push(Place::new(begun, parent));
+                continue;
+            }
+            if places.is_empty() {
+                places.push(Place::new(Section::new("start", texts.start), None));
+            }
+            let Some(Place { section: place, rays, .. }) = places.last_mut() else { continue };
+            match event {
+                Event::Met(_) | Event::Left { .. } => {}
                 Event::Sampled(light) => place.sections.push(self.sampled(light, met)),
                 Event::Added { source, radiance, weight, throughput, added } => {
                     let mut scope = Scope::default();
-                    let mut told = Section::new("added", source_of(*source, texts));
+                    let source = self.source_of(*source);
+                    let mut told = Section::new("added", source);
                     told.quantity(&mut scope, "β", texts.throughput, "", *throughput);
-                    told.quantity(&mut scope, "L", texts.radiance, "", *radiance);
+                    told.quantity(&mut scope, "L", self.arriving(), "", *radiance);
                     if *weight != 1.0 {
                         told.quantity(&mut scope, "w", texts.mis_weight, "", *weight);
                         told.quantity(&mut scope, "A", texts.added, "β·L·w", *added);
@@ -61,21 +98,28 @@ impl Path<'_> {
                         told.quantity(&mut scope, "A", texts.added, "β·L", *added);
                     }
                     place.sections.push(told);
-                    let from = Value::from(source_of(*source, texts));
                     rows.push(vec![
-                        from,
+                        Value::from(source),
                         (*throughput).into(),
                         (*radiance).into(),
                         (*weight).into(),
                         (*added).into(),
                     ]);
                 }
-                Event::Scattered(scattered) => place.sections.push(self.scattered(scattered)),
+                Event::Scattered(scattered) => {
+                    rays.push(scattered.ray);
+                    place.sections.push(self.scattered(scattered, met.is_some()));
+                }
                 Event::Roulette { probability, survives } => {
                     let text = if *survives { texts.survives } else { texts.does_not_survive };
                     place.text(filled(text, &[&Value::from(*probability).in_full()]));
+                    if *survives {
+                        place.fact(texts.roulette_factor, 1.0 / *probability);
+                    }
                 }
                 Event::Medium { distance, scattered, throughput } => {
+                    // What is sampled from here on is no surface's.
+                    met = met.filter(|_| !*scattered);
                     let mut told = Section::new("medium", texts.medium);
                     told.fact(texts.distance, *distance);
                     told.text(if *scattered { texts.medium_scattered } else { texts.medium_passed });
@@ -90,12 +134,62 @@ impl Path<'_> {
                 Event::Ended(end) => place.text(end_of(*end, texts)),
             }
         }
-        section.sections.extend(vertex);
-        section.sections.push(self.sum(radiance, rows));
+        if matches!(self.kind, IntegratorKind::Whitted { .. } | IntegratorKind::Pov) {
+            section.text(texts.tree);
+            // Those that come from a place are after it in the list: from the last on, each goes before the later ones of its place.
+            let own: Vec<usize> = places.iter().map(|place| place.section.sections.len()).collect();
+            for i in (0..places.len()).rev() {
+                if let Some(parent) = places[i].parent {
+                    let branch = std::mem::take(&mut places[i].section);
+                    places[parent].section.sections.insert(own[parent], branch);
+                }
+            }
+            places.retain(|place| place.parent.is_none());
+        }
+        section.sections.extend(places.into_iter().map(|place| place.section));
+        section.sections.push(self.sum(exposed, radiance, rows));
         section
     }
 
-    fn sum(&self, radiance: Spectrum, rows: Vec<Vec<Value>>) -> Section {
+    /// What the section of all this is called.
+    fn title(&self) -> &'static str {
+        match self.kind {
+            IntegratorKind::Normals | IntegratorKind::Depth | IntegratorKind::Albedo | IntegratorKind::Uv => {
+                self.texts.shown_feature
+            }
+            IntegratorKind::AmbientOcclusion { .. } => self.texts.openness,
+            _ => self.texts.light,
+        }
+    }
+
+    /// What the number is that light is for other integrators.
+    fn arriving(&self) -> &'static str {
+        let texts = self.texts;
+        match self.kind {
+            IntegratorKind::Normals => texts.normal_as_colour,
+            IntegratorKind::Depth => texts.depth_along_axis,
+            IntegratorKind::Albedo => texts.reflectance,
+            IntegratorKind::Uv => texts.uv_as_colour,
+            IntegratorKind::AmbientOcclusion { .. } => texts.is_open,
+            _ => texts.radiance,
+        }
+    }
+
+    fn source_of(&self, source: Source) -> &'static str {
+        let is_light = matches!(
+            self.kind,
+            IntegratorKind::Path { .. }
+                | IntegratorKind::Caustics
+                | IntegratorKind::Whitted { .. }
+                | IntegratorKind::Pov
+        );
+        match source {
+            Source::Surface | Source::Sampled if !is_light => self.arriving(),
+            _ => source_of(source, self.texts),
+        }
+    }
+
+    fn sum(&self, exposed: Option<Exposed>, radiance: Spectrum, rows: Vec<Vec<Value>>) -> Section {
         let texts = self.texts;
         let mut section = Section::new("radiance", texts.sum);
         let column = |key, title: &str| Column { key, title: title.to_owned() };
@@ -111,19 +205,22 @@ impl Path<'_> {
         } else {
             section.items.push(Item::Table { key: "added", columns, rows });
         }
-        section.fact(texts.radiance_of_sample, radiance);
+        match exposed {
+            Some(exposed) => expose(&mut section, &exposed, texts),
+            None => section.fact(texts.radiance_along_ray, radiance),
+        }
         section
     }
 
     fn vertex(&self, met: &Met) -> Section {
         let texts = self.texts;
-        let what = filled(texts.shape, &[&met.shape.to_string(), self.things.kind(met.shape)]);
+        let what = self.shape(met.shape);
         let mut section = Section::new(
             format!("vertex {}", met.depth),
             filled(texts.vertex, &[&met.depth.to_string(), &what]),
         );
         let mut scope = Scope::default();
-        scope.set("D", Value::from(met.ray.direction).in_short());
+        scope.set("D", &Value::from(met.ray.direction));
         section.quantity(&mut scope, "P", texts.point, "", met.point);
         section.quantity(&mut scope, "N", texts.normal, "", met.normal);
         let shading = met.shading_normal.as_dvec3();
@@ -133,7 +230,7 @@ impl Path<'_> {
         section.text(if met.front { texts.front } else { texts.back });
         section.quantity(&mut scope, "β", texts.throughput, "", met.throughput);
         if let Some(material) = self.things.material(met.shape) {
-            section.fact(texts.material, material.name.clone());
+            section.fact(texts.material, material_of(self.things, met.shape, texts));
             for (name, numbers) in &material.parameters {
                 let value = match numbers {
                     Some(numbers) => Value::Numbers(numbers.iter().map(|x| as_written(*x)).collect()),
@@ -143,8 +240,9 @@ impl Path<'_> {
             }
         }
         if met.depth > 0 && met.depth <= self.depth {
-            let told = surfaces(self.scene, &met.ray, self.things, true, false, texts);
-            section.sections.push(told.section);
+            let wanted = Wanted { nearest: true, is_from_camera: false, shapes: None };
+            let told = surfaces(self.scene, &met.ray, self.things, &wanted, texts);
+            section.sections.extend(told.ok().map(|told| told.section));
         }
         if let Some(here) = self.interaction(met) {
             section.sections.push(self.mirrors(met, &here));
@@ -153,6 +251,11 @@ impl Path<'_> {
             }
         }
         section
+    }
+
+    /// The number and the kind of a shape.
+    fn shape(&self, shape: u32) -> String {
+        filled(self.texts.shape, &[&shape.to_string(), (self.texts.kind_of)(self.things.kind(shape))])
     }
 
     fn interaction(&self, met: &Met) -> Option<Interaction<'_>> {
@@ -176,9 +279,8 @@ impl Path<'_> {
         };
         // From outside to inside, or back.
         let eta = if met.front { 1.0 / index } else { index };
-        section.fact(texts.index, index);
+        section.quantity(&mut scope, "i", texts.index, "", index);
         let formula = if met.front { "1/i" } else { "i" };
-        scope.set("i", Value::from(index).in_short());
         section.quantity(&mut scope, "η", texts.eta, formula, eta);
         let cosine = -direction.dot(normal);
         section.quantity(&mut scope, "c₁", texts.cos_incident, "−(D·n)", cosine);
@@ -187,6 +289,20 @@ impl Path<'_> {
         match refract(direction, normal, eta) {
             Some(refracted) => {
                 section.quantity(&mut scope, "T", texts.refracted, "η·D + (η·c₁ − √(k))·n", refracted);
+                let across = k.sqrt();
+                section.quantity(&mut scope, "c₂", texts.cos_refracted, "√(k)", across);
+                let perpendicular = (eta * cosine - across) / (eta * cosine + across);
+                let parallel = (cosine - eta * across) / (cosine + eta * across);
+                section.quantity(
+                    &mut scope,
+                    "r₁",
+                    texts.perpendicular,
+                    "(η·c₁ − c₂)/(η·c₁ + c₂)",
+                    perpendicular,
+                );
+                section.quantity(&mut scope, "r₂", texts.parallel, "(c₁ − η·c₂)/(c₁ + η·c₂)", parallel);
+                let reflectance = 0.5 * (perpendicular * perpendicular + parallel * parallel);
+                section.quantity(&mut scope, "F", texts.fresnel, "(r₁² + r₂²)/2", reflectance);
             }
             None => section.text(texts.total_reflection),
         }
@@ -229,7 +345,7 @@ impl Path<'_> {
             let contribution =
                 if is_visible { scattered * sample.radiance / divisor } else { Spectrum::BLACK };
             rows.push(vec![
-                Value::Text(format!("{id} ({})", light.name())),
+                Value::Text(format!("{id} ({})", (texts.kind_of)(light.name()))),
                 sample.towards.into(),
                 sample.end.map_or(Value::from(f64::INFINITY), |end| {
                     (end.point - here.surface.point).length().into()
@@ -255,17 +371,41 @@ impl Path<'_> {
         let mut section = Section::new("sampled light", texts.sampled_light);
         let mut scope = Scope::default();
         section.quantity(&mut scope, "ω", texts.towards_light, "", sample.towards);
-        if let (Some(end), Some(met)) = (sample.end, met) {
-            section.fact(texts.distance, (end.point - met.point).length());
+        let is_point = matches!(sample.scatter, Scatter::Delta);
+        let distance = sample.end.zip(met).map(|(end, met)| (end.point - met.point).length());
+        match distance {
+            Some(distance) if is_point => {
+                // The light of a point thins out with the square of the distance.
+                section.quantity(&mut scope, "d", texts.distance, "", distance);
+                let intensity = sample.radiance * (distance * distance) as f32;
+                section.quantity(&mut scope, "I", texts.intensity, "", intensity);
+                section.quantity(&mut scope, "Lᵢ", texts.arriving, "I/d²", sample.radiance);
+            }
+            _ => {
+                if let Some(distance) = distance {
+                    section.fact(texts.distance, distance);
+                }
+                section.quantity(&mut scope, "Lᵢ", texts.arriving, "", sample.radiance);
+            }
         }
-        section.quantity(&mut scope, "Lᵢ", texts.arriving, "", sample.radiance);
-        section.quantity(&mut scope, "f", texts.scattered, "", *scattered);
+        match met {
+            Some(met) => {
+                scope.set("Nₛ", &Value::from(met.shading_normal.as_dvec3()));
+                let cosine = met.shading_normal.as_dvec3().dot(sample.towards).abs();
+                section.quantity(&mut scope, "c", texts.cos_light, "|Nₛ·ω|", cosine);
+                section.quantity(&mut scope, "f", texts.scattered, "", *scattered);
+                if cosine > 1e-6 {
+                    section.fact(texts.bsdf_alone, *scattered * (1.0 / cosine) as f32);
+                }
+            }
+            None => section.quantity(&mut scope, "f", texts.phase, "", *scattered),
+        }
         let Some(shadow_ray) = shadow_ray else {
             section.text(texts.no_shadow_ray);
             return section;
         };
         self.shadow(&mut section, shadow_ray, *passes);
-        scope.set("V", Value::from(*passes).in_short());
+        scope.set("V", &Value::from(*passes));
         match sample.scatter {
             Scatter::Density(pdf) => {
                 section.quantity(&mut scope, "p", texts.pdf, "", pdf);
@@ -293,28 +433,62 @@ impl Path<'_> {
             && let Some(hit) = self.scene.resolved().closest(ray)
         {
             let shape = self.scene.resolved().shape_index(&hit);
-            let what = filled(texts.shape, &[&shape.to_string(), self.things.kind(shape)]);
-            section.text(filled(texts.blocked_by, &[&what, &super::document::exact(hit.root.t)]));
+            section
+                .text(filled(texts.blocked_by, &[&self.shape(shape), &super::document::exact(hit.root.t)]));
         }
     }
 
-    fn scattered(&self, scattered: &Scattered) -> Section {
+    fn scattered(&self, scattered: &Scattered, by_surface: bool) -> Section {
         let texts = self.texts;
         let Scattered { ray, weight, scatter, transmitted, eta, throughput } = scattered;
         let mut section = Section::new("scattered", texts.goes_on);
-        section.text(if *transmitted { texts.transmitted } else { texts.is_reflected });
+        section.text(match (by_surface, *transmitted) {
+            (false, _) => texts.is_scattered,
+            (true, true) => texts.transmitted,
+            (true, false) => texts.is_reflected,
+        });
         section.fact("O", ray.origin);
         section.fact("D", ray.direction);
         if *transmitted && *eta != 1.0 {
-            section.fact("η", *eta);
+            section.fact(format!("1/η: {}", texts.eta_entered), *eta);
         }
         match scatter {
             Scatter::Density(pdf) => section.fact(texts.pdf, *pdf),
             Scatter::Delta => section.text(texts.only_direction),
         }
-        section.fact(texts.bsdf_weight, *weight);
+        section.fact(if by_surface { texts.bsdf_weight } else { texts.phase_weight }, *weight);
         section.fact(texts.throughput_after, *throughput);
         section
+    }
+}
+
+/// What the film makes of the radiance of a sample, step by step.
+fn expose(section: &mut Section, &Exposed { radiance, exposure, weight }: &Exposed, texts: &Texts) {
+    let Exposure { factor, max_component, sensor } = exposure;
+    let colour = exposure.colour(radiance);
+    let is_sensor = sensor != Exposure::default().sensor;
+    let is_plain = factor == 1.0 && max_component == f32::INFINITY && !is_sensor;
+    let mut scope = Scope::default();
+    if !is_plain {
+        section.quantity(&mut scope, "Lₛ", texts.radiance_before_film, "", radiance);
+        section.quantity(&mut scope, "e", texts.exposure, "", factor);
+        let exposed = radiance * factor;
+        section.quantity(&mut scope, "C", texts.exposed, "e·Lₛ", exposed);
+        let most = exposed.max_component();
+        if most > max_component {
+            section.quantity(&mut scope, "m", texts.max_component, "", max_component);
+            section.fact(texts.held, exposed * (max_component / most));
+        }
+        if is_sensor {
+            let rows = sensor.map(|row| Value::Numbers(row.map(f64::from).to_vec()).in_full());
+            section.fact(texts.sensor, format!("[{}]", rows.map(|row| format!("[{row}]")).join(", ")));
+        }
+    }
+    section.fact(texts.radiance_of_sample, colour);
+    if weight != 1.0 {
+        section.quantity(&mut scope, "φ", texts.filter_weight, "", weight);
+        let weighted = colour.to_array().map(|c| f64::from(c) * weight);
+        section.fact(texts.weighted, Value::Numbers(weighted.to_vec()));
     }
 }
 

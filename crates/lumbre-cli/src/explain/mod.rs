@@ -11,7 +11,7 @@ use serde_json::json;
 
 use crate::console::{escaped_json, escaped_lines};
 use crate::failure::{Failure, print};
-use crate::language::Language;
+use crate::language::{Language, filled};
 use crate::names::one_of;
 use crate::output::Inputs;
 use crate::reading::{ReadingArguments, print_warnings};
@@ -27,6 +27,7 @@ mod explainer;
 mod formula;
 mod html;
 mod light;
+mod misses;
 mod question;
 mod shape;
 mod sketch;
@@ -39,7 +40,7 @@ mod writing;
 use document::Section;
 use english::ENGLISH;
 pub use explainer::Explainer;
-use question::Question;
+use question::{Asked, Question};
 use spanish::SPANISH;
 use texts::Texts;
 pub use things::Things;
@@ -50,6 +51,7 @@ pub use things::Things;
 #[command(after_help = "Examples:
   lumbre explain scene.pbrt --pixel 320,240
   lumbre explain scene.pbrt --ray 0,0,-5,0,0,1 --nearest
+  lumbre explain scene.pbrt --ray 0,2,-5,0,0,1 --shape sphere     why the ray misses it
   lumbre explain scene.pbrt --pixel 320,240 --only equation,radiance
   lumbre explain scene.pbrt --pixel 320,240 --format html -o pixel.html
   lumbre explain scene.pbrt --pixel 320,240 --sample 7 --depth 2
@@ -111,6 +113,12 @@ pub struct Request {
     /// Tell only the surface that is seen, not those behind it.
     #[arg(long)]
     pub nearest: bool,
+    /// Tell of this shape, whether the ray meets it or not: its number, its kind, or the name of its material.
+    #[arg(long, value_name = "NAME|N", conflicts_with = "nearest")]
+    pub shape: Option<String>,
+    /// Tell of all shapes, those that the ray misses too.
+    #[arg(long, conflicts_with_all = ["nearest", "shape"])]
+    pub all_shapes: bool,
     /// Tell only the sections with these keys, as JSON names them: camera, equation, Quadratic, hit, transform, light, radiance, …
     #[arg(long, value_name = "KEY,…", value_delimiter = ',')]
     pub only: Vec<String>,
@@ -170,11 +178,10 @@ fn ray(text: &str) -> Result<Ray, String> {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.staging.turntable().is_some() {
-        return Err(Failure::Usage("--turntable makes many pictures (expected no --turntable)".to_owned()));
+        return Err(Failure::Usage(texts(arguments.request.lang).no_turntable.to_owned()));
     }
     if arguments.request.pixel.is_none() && arguments.request.ray.is_none() {
-        let why = "nothing is asked for (expected --pixel X,Y, from 0,0 in the upper left corner, or --ray OX,OY,OZ,DX,DY,DZ)";
-        return Err(Failure::Usage(why.to_owned()));
+        return Err(Failure::Usage(texts(arguments.request.lang).nothing_asked.to_owned()));
     }
     let named = arguments.scene.iter().map(PathBuf::as_path).chain(arguments.staging.inputs());
     if let Some(output) = &arguments.output {
@@ -225,7 +232,7 @@ pub fn explain(
 ) -> Result<String, Failure> {
     let mut sections = told(request, scene, options, things)?;
     if !request.only.is_empty() {
-        sections = only(sections, &request.only)?;
+        sections = only(sections, &request.only, texts(request.lang))?;
     }
     Ok(written(request, name, &sections))
 }
@@ -237,30 +244,98 @@ fn told(
     things: &Things,
 ) -> Result<Vec<Section>, Failure> {
     let &Request { sample, depth, nearest, .. } = request;
-    let question = Question { things, texts: texts(request.lang), sample, depth, nearest };
+    let shapes = match &request.shape {
+        Some(name) => Some(Asked::Called(name.clone())),
+        None => request.all_shapes.then_some(Asked::All),
+    };
+    let texts = texts(request.lang);
+    let question = Question { things, texts, sample, depth, nearest, shapes };
     let Some((x, y)) = request.pixel else {
         let ray = request.ray.unwrap_or(Ray::new(DVec3::ZERO, DVec3::Z));
         return question.of_ray(scene, options, &ray);
     };
     let (width, height) = (options.width, options.height);
     if x >= width || y >= height {
-        return Err(Failure::Usage(format!(
-            "--pixel {x},{y}: outside of the picture (expected less than {width},{height}; --size gives another)"
-        )));
+        let (pixel, size) = (format!("{x},{y}"), format!("{width},{height}"));
+        return Err(Failure::Usage(filled(texts.outside_picture, &[&pixel, &size])));
     }
     question.of_pixel(scene, options, (x, y))
 }
 
-/// The sections with these keys, each with all below it.
-fn only(sections: Vec<Section>, keys: &[String]) -> Result<Vec<Section>, Failure> {
+/// The keys of sections that an explanation may have, beside those with numbers: `shape 2`, `operand 0`, `transform 1`, `vertex 0`.
+const KEYS: [&str; 50] = [
+    "Parameters",
+    "ScaledRay",
+    "SetUp",
+    "Quadratic",
+    "Discriminant",
+    "Roots",
+    "Nappe",
+    "Tip",
+    "FirstCut",
+    "SecondCut",
+    "FirstBall",
+    "SecondBall",
+    "Plane",
+    "Slabs",
+    "Span",
+    "TorusFrame",
+    "TorusBounds",
+    "Quartic",
+    "QuarticExtrema",
+    "QuarticRoots",
+    "TextbookQuartic",
+    "Shear",
+    "EdgeFunctions",
+    "MollerTrumbore",
+    "PlaneAndSides",
+    "Winding",
+    "Rulings",
+    "Intervals",
+    "Surface",
+    "camera",
+    "ray",
+    "surfaces",
+    "transform",
+    "equation",
+    "crossings",
+    "hit",
+    "light",
+    "start",
+    "left",
+    "added",
+    "medium",
+    "mirror",
+    "lights",
+    "sampled light",
+    "scattered",
+    "radiance",
+    "shape",
+    "operand",
+    "vertex",
+    "mesh",
+];
+
+/// Whether some explanation has a section with this key, if not this one.
+fn is_key(key: &str) -> bool {
+    let is_number = |text: &str| text.parse::<u32>().is_ok();
+    KEYS.contains(&key)
+        || key.split_once(' ').is_some_and(|(kind, number)| {
+            ["shape", "operand", "transform", "vertex"].contains(&kind) && is_number(number)
+        })
+}
+
+/// The sections with these keys, each with all below it. A kind of section that this ray has none of, such as the hit of a ray
+/// that meets nothing, is no mistake.
+fn only(sections: Vec<Section>, keys: &[String], texts: &Texts) -> Result<Vec<Section>, Failure> {
     let mut known = BTreeSet::new();
     sections.iter().for_each(|section| section.collect_keys(&mut known));
-    match keys.iter().find(|key| !known.contains(key.as_str())) {
+    match keys.iter().find(|key| !known.contains(key.as_str()) && !is_key(key)) {
         None => Ok(sections.into_iter().flat_map(|section| section.with_keys(keys)).collect()),
-        Some(key) => Err(Failure::Usage(format!(
-            "--only {key}: no section has this key (expected some of {})",
-            Vec::from_iter(known).join(", ")
-        ))),
+        Some(key) => {
+            let known = Vec::from_iter(known).join(", ");
+            Err(Failure::Usage(filled(texts.no_such_key, &[key, &known])))
+        }
     }
 }
 
@@ -269,6 +344,7 @@ fn written(request: &Request, name: &Path, sections: &[Section]) -> String {
     let name = name.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let title = title(&name, request.pixel, texts);
     match request.format {
+        Format::Text if sections.is_empty() => format!("{}\n", texts.no_sections),
         Format::Text => escaped_lines(&writing::text(sections, request.only.is_empty(), texts.schoolbook)),
         Format::Markdown => {
             format!("# {}\n\n{}", writing::literal(&title), writing::markdown(sections, texts.schoolbook))

@@ -1,8 +1,9 @@
 //! What is told of a pixel or of a ray.
 
+use lumbre::description::CameraView;
 use lumbre::journal::Event;
 use lumbre::shading::Spectrum;
-use lumbre::{Ray, RenderOptions, Scene};
+use lumbre::{DVec3, Ray, RenderOptions, Scene};
 
 use super::document::{Item, Section};
 use super::texts::Texts;
@@ -20,6 +21,16 @@ pub(super) struct Question<'a> {
     pub(super) depth: u32,
     /// Whether only the surface that is seen is told.
     pub(super) nearest: bool,
+    /// The shapes that are told, met or not; `None` for those that the ray meets.
+    pub(super) shapes: Option<Asked>,
+}
+
+/// Which shapes are asked for.
+#[derive(Clone, Debug)]
+pub(super) enum Asked {
+    All,
+    /// By number, kind, or the name of the material.
+    Called(String),
 }
 
 impl Question<'_> {
@@ -39,7 +50,9 @@ impl Question<'_> {
         let mut section = camera::camera(camera, whole, pixel, &sample, self.texts);
         section.fact(self.texts.sample, f64::from(self.sample));
         section.fact(self.texts.weight, sample.weight);
-        Ok(self.along(section, scene, &sample.ray, sample.radiance, &sample.events))
+        let exposed =
+            light::Exposed { radiance: sample.radiance, exposure: options.exposure, weight: sample.weight };
+        self.along(section, scene, options, &sample.ray, Some(exposed), sample.radiance, &sample.events)
     }
 
     /// Of a ray, whose direction is of any length but 0.
@@ -56,25 +69,40 @@ impl Question<'_> {
         let scaled = ray.direction / ray.direction.abs().max_element();
         let unit = Ray { direction: scaled.normalize(), ..*ray };
         let (radiance, events) = scene.explain_ray(options, &unit, self.sample)?;
-        Ok(self.along(camera::given(ray, self.texts), scene, ray, radiance, &events))
+        self.along(camera::given(ray, self.texts), scene, options, ray, None, radiance, &events)
+    }
+
+    /// The axis of the world that is most upwards in the picture.
+    fn up(&self, scene: &Scene, options: &RenderOptions) -> DVec3 {
+        let Some(camera) = scene.resolved().cameras().get(options.camera) else { return DVec3::Y };
+        let view = CameraView::new(camera, options.width, options.height);
+        let up = view.placement(0.0).vector(DVec3::Y);
+        let axis = (0..3).fold(0, |best, i| if up[i].abs() > up[best].abs() { i } else { best });
+        DVec3::AXES[axis] * up[axis].signum()
     }
 
     /// Where the ray comes from, what it meets, and the light along it.
+    #[allow(clippy::too_many_arguments, reason = "the parts of one explanation")]
     fn along(
         &self,
         from: Section,
         scene: &Scene,
+        options: &RenderOptions,
         ray: &Ray,
+        exposed: Option<light::Exposed>,
         radiance: Spectrum,
         events: &[Event],
-    ) -> Vec<Section> {
+    ) -> Result<Vec<Section>, Failure> {
         let &Self { things, texts, depth, nearest, .. } = self;
-        let mut met = surfaces::surfaces(scene, ray, things, nearest, true, texts);
-        if !met.hits.is_empty() {
-            let drawing = sketch::svg(&met.scenery, ray, &met.hits, &light::corners(events), texts.sketch);
+        let asked = surfaces::Wanted { nearest, is_from_camera: true, shapes: self.shapes.as_ref() };
+        let mut met = surfaces::surfaces(scene, ray, things, &asked, texts)?;
+        if !met.hits.is_empty() || met.scenery.is_anything() {
+            let corners = light::corners(events);
+            let drawing =
+                sketch::svg(&met.scenery, ray, &met.hits, &corners, self.up(scene, options), texts.sketch);
             met.section.items.insert(0, Item::Sketch(drawing));
         }
-        let path = light::Path { scene, things, texts, depth };
-        vec![from, met.section, path.tell(radiance, events)]
+        let path = light::Path { scene, things, texts, depth, kind: &options.integrator.kind };
+        Ok(vec![from, met.section, path.tell(exposed, radiance, events)])
     }
 }

@@ -35,17 +35,20 @@ pub(super) fn tell(
     // The textbook's symbols are its own.
     let mut schoolbook = scope.clone();
     for step in &explanation.steps {
-        section.sections.push(tell_step(step, scope, &mut schoolbook, rename, texts));
+        section.sections.push(tell_step(step, explanation, scope, &mut schoolbook, rename, texts));
     }
     if !explanation.candidates.is_empty() {
         let mut crossings = Section::new("crossings", texts.fates);
-        crossings.items.push(candidates(&explanation.candidates, texts));
+        let names: Vec<&'static str> =
+            explanation.operands.iter().map(|operand| (texts.kind_of)(operand.name)).collect();
+        crossings.items.push(candidates(&explanation.candidates, &names, texts));
         section.sections.push(crossings);
     }
 }
 
 fn tell_step(
     step: &Step,
+    explanation: &Explanation,
     scope: &mut Scope,
     schoolbook: &mut Scope,
     rename: &dyn Fn(&str) -> String,
@@ -58,29 +61,39 @@ fn tell_step(
         let theirs = told.schoolbook.as_ref().map(|(formula, value)| {
             let (formula, value) = (rename(formula), Value::from(value));
             if let Some((name, _)) = formula.split_once(" = ") {
-                schoolbook.set(name.trim(), value.in_short());
+                schoolbook.set(name.trim(), &value);
             }
             let put_in = schoolbook.put_in(formula.split_once(" = ").map_or(&*formula, |(_, right)| right));
-            (put_in.map_or_else(|| formula.clone(), |numbers| format!("{formula} = {numbers}")), value)
+            let put_in = put_in.filter(|numbers| numbers.written != value.in_full());
+            let written = match put_in {
+                Some(numbers) => {
+                    let sign = if numbers.is_rounded { "≈" } else { "=" };
+                    format!("{formula} {sign} {}", numbers.written)
+                }
+                None => formula.clone(),
+            };
+            (written, value)
         });
         section.items.push(Item::Quantity(Quantity {
             symbol: symbol.clone(),
-            label: String::new(),
+            label: (texts.symbol)(step.topic, &told.symbol).to_owned(),
             numbers: numbers(scope, &formula, &value),
             formula,
             value: value.clone(),
             schoolbook: theirs,
         }));
-        scope.set(&symbol, value.in_short());
-        schoolbook.set(&symbol, value.in_short());
+        scope.set(&symbol, &value);
+        schoolbook.set(&symbol, &value);
     }
     for remark in &step.remarks {
-        section.remark((texts.remark)(remark));
+        let name = |operand: usize| explanation.operands.get(operand).map_or("", |operand| operand.name);
+        section.remark((texts.remark)(remark, &|operand| (texts.kind_of)(name(operand))));
     }
     section
 }
 
-fn candidates(candidates: &[Candidate], texts: &Texts) -> Item {
+fn candidates(candidates: &[Candidate], operands: &[&'static str], texts: &Texts) -> Item {
+    let name = |operand: usize| operands.get(operand).copied().unwrap_or_default();
     let column = |key, title: &str| Column { key, title: title.to_owned() };
     let columns = vec![
         column("t", "t"),
@@ -94,14 +107,14 @@ fn candidates(candidates: &[Candidate], texts: &Texts) -> Item {
             Value::from(candidate.t),
             Value::Text(candidate.part.to_string()),
             Value::Text(multiplicity),
-            Value::Text((texts.fate_of)(&candidate.fate)),
+            Value::Text((texts.fate_of)(&candidate.fate, &name)),
         ]
     });
     Item::Table { key: "crossings", columns, rows: rows.collect() }
 }
 
 fn tell_operand(index: usize, operand: &Operand, ray: &Ray, texts: &Texts) -> Section {
-    let title = filled(texts.operand, &[&index.to_string(), operand.name]);
+    let title = filled(texts.operand, &[&index.to_string(), (texts.kind_of)(operand.name)]);
     let mut section = Section::new(format!("operand {index}"), title);
     let m = &operand.world_from_object;
     let own = if m.is_identity() { *ray } else { ray.into_object(m) };

@@ -21,11 +21,15 @@ const PARTS: u32 = 6;
 pub(super) struct Scenery {
     /// Lines on the surfaces, in the world.
     lines: Vec<Vec<DVec3>>,
+    /// How many of them are of the first shape, which the picture is about.
+    of_first: usize,
+    /// The middle of the first shape, where it has one.
+    middle: Option<DVec3>,
 }
 
 impl Scenery {
     /// Adds the lines of constant u and v of a shape under a map to the world, which is met at a surface there.
-    pub(super) fn add(&mut self, shape: &Shape, map: &Transform, met: &Surface) {
+    pub(super) fn add(&mut self, shape: &Shape, map: &Transform, met: Option<&Surface>) {
         let before = self.lines.len();
         if shape.bounds(&Transform::IDENTITY).is_some() {
             for part in 0..PARTS {
@@ -35,6 +39,19 @@ impl Scenery {
         if self.lines.len() == before {
             self.lines.extend(boxed(shape, map, met));
         }
+        if before == 0 {
+            self.of_first = self.lines.len();
+            self.middle = match shape {
+                Shape::Sphere(sphere) => Some(map.point(sphere.center())),
+                Shape::Torus(torus) => Some(map.point(torus.center())),
+                _ => None,
+            };
+        }
+    }
+
+    /// Whether there is anything to draw.
+    pub(super) fn is_anything(&self) -> bool {
+        !self.lines.is_empty()
     }
 }
 
@@ -63,7 +80,7 @@ fn lines_of(shape: &Shape, part: u32, map: &Transform) -> Vec<Vec<DVec3>> {
 }
 
 /// The edges of a shape's box; of an infinite shape, a square about where it was met.
-fn boxed(shape: &Shape, map: &Transform, met: &Surface) -> Vec<Vec<DVec3>> {
+fn boxed(shape: &Shape, map: &Transform, met: Option<&Surface>) -> Vec<Vec<DVec3>> {
     if let Some(bounds) = shape.bounds(map) {
         let corner = |i: usize| {
             let pick = |axis: usize| if i >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
@@ -73,6 +90,7 @@ fn boxed(shape: &Shape, map: &Transform, met: &Surface) -> Vec<Vec<DVec3>> {
             .flat_map(|i| (0..3).filter(move |axis| i >> axis & 1 == 0).map(move |axis| (i, i | 1 << axis)));
         return edges.map(|(from, to)| vec![corner(from), corner(to)]).collect();
     }
+    let Some(met) = met else { return Vec::new() };
     let place = met.point;
     let size = place.length().max(1.0) * 0.5;
     let frame = Frame::from_z(met.normal);
@@ -86,17 +104,21 @@ pub(super) fn svg(
     ray: &Ray,
     hits: &[(DVec3, DVec3)],
     path: &[DVec3],
+    up: DVec3,
     title: &str,
 ) -> String {
     let along = ray.direction.normalize_or(DVec3::Z);
-    // From the side, and a little from above and behind.
-    let up = if along.y.abs() < 0.8 { DVec3::Y } else { DVec3::X };
+    // From the side, and a little from above and behind; along what is up, from anywhere.
+    let up = if along.dot(up).abs() < 0.95 { up } else { up.any_orthonormal_vector() };
     let side = along.cross(up).normalize_or(DVec3::X);
     let frame = Frame::from_two_or_any(0.8 * side + 0.35 * up - 0.3 * along, up)
         .unwrap_or_else(|| Frame::from_z(DVec3::Z));
     let flat = |p: DVec3| DVec2::new(p.dot(frame.x), -p.dot(frame.y));
 
-    let things = scenery.lines.iter().flatten().copied().chain(hits.iter().map(|(point, _)| *point));
+    // What is explained fills the picture; what is behind it, such as the ground, may stick out.
+    let first_lines = &scenery.lines[..scenery.of_first];
+    let first_hits = hits.iter().take(2).map(|(point, _)| *point);
+    let things = first_lines.iter().flatten().copied().chain(first_hits);
     let mut low = DVec2::INFINITY;
     let mut high = DVec2::NEG_INFINITY;
     for p in things.map(flat) {
@@ -108,8 +130,12 @@ pub(super) fn svg(
     }
     // The ray begins in the picture, if need be nearer than it does.
     let extent = (high - low).length().max(1e-9);
-    let first = hits.first().map_or(ray.at(1.0), |(point, _)| *point);
-    let last = hits.last().map_or(first, |(point, _)| *point);
+    // Past what it misses, the ray is drawn where it is nearest to the middle of that.
+    let things = first_lines.iter().flatten().copied();
+    let (sum, count) = things.fold((DVec3::ZERO, 0.0), |(sum, count), p| (sum + p, count + 1.0));
+    let nearest = if count > 0.0 { (sum / count - ray.origin).dot(along).max(0.0) } else { 1.0 };
+    let first = hits.first().map_or(ray.origin + nearest * along, |(point, _)| *point);
+    let last = hits.iter().take(2).next_back().map_or(first, |(point, _)| *point);
     let from = (first - ray.origin).length().min(0.7 * extent);
     let (start, end) = (first - from * along, last + 0.25 * extent * along);
     for p in [start, end].map(flat) {
@@ -138,19 +164,36 @@ pub(super) fn svg(
     if way.len() > 1 {
         line(&way, "stroke=\"#d9822b\" stroke-width=\"1.2\" stroke-dasharray=\"4 3\"", &mut out);
     }
-    for (point, normal) in hits {
+    let label = |text: &str, at: DVec2, colour: &str, out: &mut String| {
+        // Labels stay in the picture.
+        let at = at.clamp(DVec2::new(2.0, 12.0), DVec2::new(WIDTH - 34.0, HEIGHT - 4.0));
+        let _ = write!(
+            out,
+            "<text x=\"{:.1}\" y=\"{:.1}\" font-size=\"13\" font-family=\"serif\" font-style=\"italic\" fill=\"{colour}\">{text}</text>",
+            at.x, at.y
+        );
+    };
+    for (i, (point, normal)) in hits.iter().enumerate() {
         let tip = *point + (0.14 * extent) * *normal;
         line(&[*point, tip], "stroke=\"#2f9e62\" stroke-width=\"2\"", &mut out);
         let dot = place(*point);
         let _ = write!(out, "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"3.5\" fill=\"#c0392b\"/>", dot.x, dot.y);
+        if i < 2 {
+            label(["t₁", "t₂"][i], dot + DVec2::new(6.0, 14.0), "#c0392b", &mut out);
+            label("N", place(tip) + DVec2::new(3.0, -2.0), "#2f9e62", &mut out);
+        }
     }
-    let at = place(start);
-    let _ = write!(
-        out,
-        "<text x=\"{:.1}\" y=\"{:.1}\" font-size=\"12\" font-family=\"sans-serif\" fill=\"#d9822b\">O + tD</text>",
-        at.x + 4.0,
-        at.y - 6.0
-    );
+    if let Some(middle) = scenery.middle {
+        let dot = place(middle);
+        let _ = write!(out, "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"2\" fill=\"#7a8ca5\"/>", dot.x, dot.y);
+        label("C", dot + DVec2::new(5.0, -4.0), "#7a8ca5", &mut out);
+    }
+    if (start - ray.origin).length() <= 1e-9 * extent {
+        let dot = place(start);
+        let _ = write!(out, "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"3\" fill=\"#d9822b\"/>", dot.x, dot.y);
+        label("O", dot + DVec2::new(-12.0, 14.0), "#d9822b", &mut out);
+    }
+    label("O + t·D", place(start) + DVec2::new(4.0, -6.0), "#d9822b", &mut out);
     out.push_str("</svg>");
     out
 }

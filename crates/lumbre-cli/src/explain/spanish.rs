@@ -3,7 +3,7 @@
 use lumbre::geometry::{Fate, Remark, Topic};
 
 use super::document::exact;
-use super::texts::Texts;
+use super::texts::{OperandName, Texts};
 
 pub(super) static SPANISH: Texts = Texts {
     code: "es",
@@ -11,6 +11,8 @@ pub(super) static SPANISH: Texts = Texts {
     topic,
     remark,
     fate_of,
+    kind_of,
+    symbol,
     camera: "La cámara",
     kind: "tipo",
     name: "nombre",
@@ -19,9 +21,8 @@ pub(super) static SPANISH: Texts = Texts {
     right: "hacia la derecha de la imagen",
     up: "hacia arriba",
     forward: "hacia dentro de la imagen",
-    frame: "El espacio de la cámara tiene x según u, y según v y z según w: un marco de mano izquierda en un mundo de mano derecha.",
     look_at: "matriz look-at, del mundo a la cámara",
-    projection: "matriz de proyección, para una cámara que mira hacia -z, de {0} a {1} (los rayos no necesitan ninguno de los dos límites)",
+    projection: "matriz de proyección, desde el espacio de la cámara con profundidades de {0} a {1} (los rayos no necesitan ninguno de los dos límites)",
     perspective: "perspectiva, {0}° en el lado más corto",
     lens: "con una lente de radio {0} enfocada a {1}",
     orthographic: "ortográfica",
@@ -53,7 +54,7 @@ pub(super) static SPANISH: Texts = Texts {
     scale: "escala S en x, y, z",
     rotations: "rotaciones alrededor de x, y, z en grados",
     translation: "traslación T",
-    sheared: "M contiene una cizalladura: no es una escala con rotaciones y una traslación.",
+    sheared: "M contiene un cizallamiento: no es una escala con rotaciones y una traslación.",
     as_point: "el origen como punto, w = 1",
     as_direction: "la dirección como dirección, w = 0",
     t_is_kept: "D′ no se normaliza, así que t designa el mismo punto en ambos espacios. Con direcciones unitarias sería |D′| veces mayor.",
@@ -73,8 +74,8 @@ pub(super) static SPANISH: Texts = Texts {
     normal_in_object: "normal exterior en el espacio del objeto",
     by_inverse_transpose: "por la traspuesta de la inversa",
     normal: "normal exterior unitaria",
-    front: "N·D < 0: el rayo encuentra la cara externa; la normal que le da la cara es N.",
-    back: "N·D > 0: el rayo encuentra la cara interna; la normal que le da la cara es −N.",
+    front: "N·D < 0: el rayo encuentra la cara externa; la normal orientada hacia el rayo es N.",
+    back: "N·D > 0: el rayo encuentra la cara interna; la normal orientada hacia el rayo es −N.",
     grazing: "N·D = 0: el rayo es tangente a la superficie.",
     part: "parte",
     multiplicity: "multiplicidad",
@@ -107,8 +108,8 @@ pub(super) static SPANISH: Texts = Texts {
     vertex: "Vértice {0} del camino: {1}",
     shading_normal: "normal de sombreado",
     texture: "(por una textura)",
-    mirror: "Un espejo, y un límite liso",
-    facing: "la normal que da la cara al rayo",
+    mirror: "Un espejo, y una superficie lisa de separación",
+    facing: "la normal orientada hacia el rayo",
     reflected: "la dirección reflejada",
     index: "índice de refracción",
     eta: "índice de este lado entre el del otro",
@@ -123,17 +124,17 @@ pub(super) static SPANISH: Texts = Texts {
     arriving: "radiancia que llega",
     pdf: "densidad por ángulo sólido",
     visible: "se ve",
-    contribution: "lo que se dispersa de ella",
+    contribution: "la luz dispersada por la superficie",
     yes: "sí",
     no: "no",
     more_lights: "Hay {0} luces; se muestran las primeras.",
     sampled_light: "Se muestrea una luz",
     scattered: "f·|cos θ| hacia ella",
-    no_shadow_ray: "No se dispersaría nada de ella: ningún rayo mira si se ve.",
+    no_shadow_ray: "La superficie no dispersaría nada de ella: ningún rayo comprueba si se ve.",
     bsdf_pdf: "densidad con que el material elegiría esta dirección",
     shadow_origin: "origen del rayo de sombra, separado de la superficie por su error",
     shadow_direction: "dirección del rayo de sombra",
-    visibility: "lo que pasa",
+    visibility: "fracción que llega",
     blocked_by: "Se interpone: {0}, en t = {1}.",
     goes_on: "El camino sigue",
     transmitted: "Se transmite.",
@@ -148,13 +149,69 @@ pub(super) static SPANISH: Texts = Texts {
     from_direct: "todas las luces que la iluminan",
     from_caustics: "fotones cercanos al punto",
     end_depth: "El camino tiene tantos rebotes como puede tener.",
-    end_nothing: "Aquí nada dispersa.",
+    end_nothing: "Aquí nada dispersa la luz.",
     end_absorbed: "Todo se absorbe.",
     end_roulette: "Termina por azar.",
     end_medium: "Termina en el medio.",
     schoolbook: "según el libro de texto",
     title: "Cómo lo calcula Lumbre",
     sketch: "El rayo, lo que encuentra y las normales allí",
+    is_missed: "El rayo no la corta.",
+    passes: "Pasa a una distancia de {0}; el punto más cercano está en t = {1}.",
+    passes_in_object: "En el espacio del objeto pasa a una distancia de {0}; el punto más cercano está en t = {1}.",
+    missed: "Formas que el rayo no corta:",
+    missed_nearest: "Las formas por las que pasa más cerca, y por qué no las corta:",
+    no_such_shape: "--shape {0}: ninguna forma tiene este número, tipo o material (se esperaba un número, o uno de {1})",
+    no_such_key: "--only {0}: ninguna sección tiene esta clave (se esperaba alguna de {1})",
+    no_sections: "Este rayo no tiene ninguna sección así.",
+    outside_picture: "--pixel {0}: fuera de la imagen (se esperaba menos de {1}; --size da otro tamaño)",
+    in_file: "La cara en su archivo",
+    baked: "M lleva estos vértices a los de la ecuación.",
+    mirrored: "M refleja: los vértices giran en el otro sentido.",
+    split: "La cara es plana, y se examina como dos triángulos.",
+    no_turntable: "--turntable hace muchas imágenes (no se esperaba --turntable)",
+    nothing_asked: "no se pide nada (se esperaba --pixel X,Y, desde 0,0 en la esquina superior izquierda, o --ray OX,OY,OZ,DX,DY,DZ)",
+    frame_of_same_hand: "El espacio de la cámara tiene x según u, y según v y z según w. Aquí u×v apunta según w: tiene el mismo sentido que los ejes de la escena.",
+    frame_of_other_hand: "El espacio de la cámara tiene x según u, y según v y z según w. Aquí u×v apunta contra w: tiene el otro sentido que los ejes de la escena, a izquierdas si estos son a derechas.",
+    projected: "De vuelta a la imagen: la matriz look-at y después la de proyección llevan un punto del rayo a su píxel.",
+    in_focus: "dónde está enfocado el rayo; sin lente, a distancia 1",
+    point_of_ray: "un punto del rayo",
+    by_look_at: "en el espacio de la cámara, por la matriz look-at",
+    by_projection: "por la matriz de proyección, con w",
+    by_division: "dividido entre w: en el cubo [-1, 1]³, y hacia arriba",
+    back_on_film: "punto de la película, en píxeles desde la esquina superior izquierda, y hacia abajo",
+    north_pole: "En un polo, 90° alrededor de y, x y z giran alrededor del mismo eje: solo x − z está determinado, y se toma z = 0.",
+    south_pole: "En un polo, −90° alrededor de y, x y z giran alrededor del mismo eje: solo x + z está determinado, y se toma z = 0.",
+    barycentrics: "b₁, b₂ (coordenadas baricéntricas)",
+    shown_feature: "Lo que se muestra",
+    openness: "Lo despejado que está el punto",
+    normal_as_colour: "la normal de sombreado como color, (n + 1)/2",
+    depth_along_axis: "la profundidad según el eje de la cámara",
+    reflectance: "la reflectancia",
+    uv_as_colour: "u y v como rojo y verde",
+    is_open: "1 si no hay nada cerca en esa dirección; si no, 0",
+    tree: "El árbol de rayos: bajo cada vértice están los que encuentran sus rayos reflejados y refractados.",
+    roulette_factor: "factor por haber seguido, el inverso de esa probabilidad",
+    radiance_along_ray: "radiancia a lo largo del rayo",
+    radiance_before_film: "radiancia de esta muestra",
+    exposure: "exposición de la película: tiempo de obturación por ISO / 100",
+    exposed: "expuesta",
+    max_component: "mayor componente que admite la película",
+    held: "reducida a ese valor, con el mismo tono",
+    sensor: "por la matriz del sensor",
+    filter_weight: "peso del filtro del píxel en ese punto",
+    weighted: "lo que se suma al píxel, y φ a su suma de pesos: el píxel es su cociente",
+    cos_refracted: "coseno del ángulo de refracción",
+    perpendicular: "amplitud polarizada perpendicularmente al plano de incidencia",
+    parallel: "amplitud polarizada en ese plano",
+    fresnel: "la reflectancia de Fresnel: la fracción que se refleja",
+    intensity: "intensidad de la luz hacia aquí",
+    cos_light: "|cos θ|, con la normal de sombreado",
+    bsdf_alone: "f / |cos θ|: la BSDF sola",
+    phase: "función de fase hacia ella",
+    phase_weight: "función de fase entre la densidad",
+    is_scattered: "El medio la dispersa.",
+    eta_entered: "índice del lado al que entra entre el del lado del que sale",
     sample: "muestra",
     weight: "peso en el píxel",
 };
@@ -181,7 +238,10 @@ fn topic(topic: Topic) -> &'static str {
         Topic::Quartic => "La ecuación de cuarto grado",
         Topic::QuarticExtrema => "Los extremos del polinomio de cuarto grado",
         Topic::QuarticRoots => "Las raíces de la ecuación de cuarto grado",
-        Topic::Shear => "La cizalladura que lleva el rayo a un eje",
+        Topic::TextbookQuartic => {
+            "Para comparar: la ecuación del libro de texto c₄·t⁴ + c₃·t³ + c₂·t² + c₁·t + c₀ = 0"
+        }
+        Topic::Shear => "El cizallamiento que lleva el rayo a un eje",
         Topic::EdgeFunctions => "Las funciones de las aristas (sin grietas)",
         Topic::MollerTrumbore => "Para comparar: Möller y Trumbore",
         Topic::PlaneAndSides => "Para comparar: el plano y los lados de las aristas",
@@ -192,7 +252,7 @@ fn topic(topic: Topic) -> &'static str {
     }
 }
 
-fn remark(remark: &Remark) -> String {
+fn remark(remark: &Remark, name: &OperandName<'_>) -> String {
     let text = match remark {
         Remark::NoRay => {
             "Algo en el rayo no es un número, o su dirección es cero o infinita: no encuentra nada."
@@ -202,16 +262,36 @@ fn remark(remark: &Remark) -> String {
         Remark::Parallel => "La recta es paralela.",
         Remark::Between => "La recta está contenida en él, o todo el camino entre ambos planos.",
         Remark::AtInfinity => "a = 0: la ecuación es lineal, y una raíz se ha ido al infinito.",
-        Remark::InsideThroughout => "La recta está dentro de extremo a extremo, y no corta nada.",
-        Remark::AlongGenerator => "La recta sigue una generatriz del cono, y está dentro desde el vértice.",
+        Remark::InsideThroughout => "a = h = 0 y c < 0: toda la recta está dentro, y no la corta.",
+        Remark::InSurface => {
+            "a = h = c = 0: la recta está contenida en la superficie, y no la corta en ningún punto."
+        }
+        Remark::InCappedSide => {
+            "a = h = c = 0: la recta está contenida en la superficie lateral, y cuenta como interior."
+        }
+        Remark::AlongGenerator => {
+            "a = h = c = 0: la recta es una generatriz del cono, y cuenta como interior desde el vértice."
+        }
+        Remark::ThroughTip => "La recta pasa por el vértice: ambas raíces son una.",
+        Remark::AlongRuling => {
+            "La recta sigue esta generatriz: está sobre el parche desde donde entra hasta donde sale."
+        }
+        Remark::EveryRuling => {
+            "a = h = c = 0: todas las generatrices de esta familia cortan la recta, que es una de la otra familia."
+        }
+        Remark::SchoolbookCount { crossings, roots } => {
+            return format!(
+                "Los coeficientes redondeados tienen otro número de raíces, {roots}, que intersecciones hay: {crossings}."
+            );
+        }
         Remark::SetUpNearby { start } => {
             return format!(
-                "El rayo empieza lejos: la ecuación se plantea en t₀ = {}, donde conserva sus dígitos.",
+                "La ecuación se plantea en t₀ = {}, donde se cancelan menos dígitos que en el origen del rayo.",
                 exact(*start)
             );
         }
         Remark::TwicePrecision => {
-            "La doble precisión no basta para decidir, o perdería dígitos: se calcula con el doble de precisión y se muestra redondeado."
+            "La doble precisión no demuestra cuántas raíces hay, o perdería dígitos: se calcula con el doble de precisión."
         }
         Remark::Cancellation { digits } => {
             return format!("La fórmula del libro de texto pierde aquí {digits:.0} de unos 16 dígitos.");
@@ -234,11 +314,12 @@ fn remark(remark: &Remark) -> String {
         Remark::Descent => "La primera intersección se halló descendiendo por el polinomio.",
         Remark::Pieces => "Las intersecciones se hallaron entre los extremos del polinomio, tramo a tramo.",
         Remark::StartsInside { operand } => {
-            return format!("La recta empieza dentro del operando {operand}.");
+            return format!("La recta empieza dentro del operando {operand} ({}).", name(*operand));
         }
         Remark::NotLookedAt { operand } => {
             return format!(
-                "La búsqueda no examina el operando {operand}: el rayo no corta su caja, o no podría cambiar nada."
+                "La búsqueda no examina el operando {operand} ({}): la recta no corta su caja, o no podría cambiar nada.",
+                name(*operand)
             );
         }
     };
@@ -247,7 +328,7 @@ fn remark(remark: &Remark) -> String {
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-fn fate_of(fate: &Fate) -> String {
+fn fate_of(fate: &Fate, name: &OperandName<'_>) -> String {
     let text = match *fate {
         Fate::Hit => "intersección válida",
         Fate::Behind => "detrás del origen del rayo",
@@ -301,15 +382,92 @@ fn fate_of(fate: &Fate) -> String {
         Fate::Flat => "el triángulo no tiene área",
         Fate::Touch => "la recta solo es tangente al operando",
         Fate::InsideOperand { operand } => {
-            return format!("dentro del operando {operand}: ahí nada empieza ni acaba");
+            return format!("dentro del operando {operand} ({}): ahí nada empieza ni acaba", name(operand));
         }
         Fate::OutsideOperand { operand } => {
-            return format!("fuera del operando {operand}: ahí nada empieza ni acaba");
+            return format!("fuera del operando {operand} ({}): ahí nada empieza ni acaba", name(operand));
         }
-        Fate::Coincides { operand } => return format!("también sobre la superficie del operando {operand}"),
+        Fate::Coincides { operand } => {
+            return format!("también sobre la superficie del operando {operand} ({})", name(operand));
+        }
         Fate::NoChange { inside: true } => "dentro del resultado a ambos lados",
         Fate::NoChange { inside: false } => "fuera del resultado a ambos lados",
         Fate::NotReturned => "no devuelta por la búsqueda",
     };
     text.to_owned()
+}
+
+fn kind_of(kind: &'static str) -> &'static str {
+    match kind {
+        "sphere" => "esfera",
+        "disk" => "disco",
+        "cylinder" => "cilindro",
+        "cone" => "cono",
+        "paraboloid" => "paraboloide",
+        "hyperboloid" => "hiperboloide",
+        "torus" => "toro",
+        "plane" => "plano",
+        "box" => "caja",
+        "capsule" => "cápsula",
+        "quadric" => "cuádrica",
+        "triangle" => "triángulo",
+        "bilinear" => "parche bilineal",
+        "bilinearmesh" => "malla de parches bilineales",
+        "mesh" => "malla",
+        "csg" => "geometría constructiva (CSG)",
+        "curve" => "curva",
+        "custom" => "geometría propia",
+        "solid" => "sólido",
+        "ground" => "suelo",
+        "diffuse" => "difuso",
+        "conductor" => "conductor",
+        "dielectric" => "dieléctrico",
+        "thindielectric" => "lámina dieléctrica",
+        "coateddiffuse" => "difuso con capa",
+        "coatedconductor" => "conductor con capa",
+        "diffusetransmission" => "difuso translúcido",
+        "principled" => "«principled»",
+        "uber" => "«uber»",
+        "hair" => "pelo",
+        "measured" => "medido",
+        "subsurface" => "subsuperficial",
+        "pov" => "de POV-Ray",
+        "mix" => "mezcla",
+        "interface" => "interfaz",
+        "point" => "puntual",
+        "spot" => "foco",
+        "goniometric" => "goniométrica",
+        "projection" => "proyector",
+        "distant" => "lejana",
+        "infinite" => "infinita",
+        other => other,
+    }
+}
+
+fn symbol(topic: Topic, symbol: &str) -> &'static str {
+    match (topic, symbol) {
+        (Topic::Parameters, "C") => "centro",
+        (Topic::Parameters, "r") => "radio",
+        (Topic::Parameters, "R") => "radio del círculo en el centro del tubo",
+        (Topic::Parameters, "r₁") => "radio en el primer extremo",
+        (Topic::Parameters, "r₂") => "radio en el segundo extremo",
+        (Topic::Parameters, "k") => "lo que crece el radio según el eje",
+        (Topic::Parameters, "V") => "eje unitario",
+        (Topic::ScaledRay, "f") => "factor de la dirección",
+        (Topic::SetUp, "w") => "el origen del rayo visto desde la forma",
+        (Topic::SetUp, "t₀") => "dónde se plantea la ecuación",
+        (Topic::SetUp, "w₀") => "el punto en ese lugar",
+        (Topic::Quadratic, "S") => "eje de extremo a extremo, de longitud cercana a 1",
+        (Topic::Quadratic, "κ") => "lo que crece el radio según S, por su longitud",
+        (Topic::Quadratic, "ρ₀") => "radio donde empieza w, por S·S",
+        (Topic::Quadratic, "ε₂") => "cota del error de a, en unidades de 2⁻⁵³",
+        (Topic::Quadratic, "ε₁") => "lo mismo para h",
+        (Topic::Quadratic, "ε₀") => "lo mismo para c",
+        (Topic::Discriminant, "l") => "del centro al punto más cercano de la recta",
+        (Topic::Discriminant, "ε") => "cota del error de Δ",
+        (Topic::Nappe, "g") => "lo que crece el radio a lo largo del rayo",
+        (Topic::Nappe, "ρ") => "radio en el punto medio de las raíces; negativo en la otra hoja",
+        (Topic::TextbookQuartic, "τ") => "sus raíces reales",
+        _ => "",
+    }
 }

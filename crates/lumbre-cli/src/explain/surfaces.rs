@@ -1,23 +1,31 @@
 //! What a ray meets, and how that is found.
 
+use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
+use lumbre::description::Footprint;
 use lumbre::geometry::{Curves, Shape, Triangle};
 use lumbre::kernel::{Hit, Target, TargetShape};
-use lumbre::math::glam::{DMat3, DMat4, DQuat, EulerRot};
+use lumbre::math::Elementary;
+use lumbre::math::glam::{DMat3, DMat4};
 use lumbre::math::matrix::affine4;
 use lumbre::{DVec3, Ray, Scene, Transform};
 
 use super::document::{Section, Value, exact};
 use super::formula::{Scope, with_primes};
+use super::misses::{self, Missed, Nearest};
+use super::question::Asked;
 use super::shape;
 use super::sketch::Scenery;
 use super::texts::Texts;
-use super::things::Things;
+use super::things::{Face, Things};
+use crate::failure::Failure;
 use crate::language::filled;
 
 /// Hits that are told at most.
 const MOST_HITS: usize = 64;
+/// Shapes that are told of where the ray meets none.
+const MOST_MISSES: usize = 3;
 /// Columns of a matrix are at right angles where their cosines are less than this.
 const RIGHT_ANGLE: f64 = 1e-12;
 
@@ -29,21 +37,36 @@ pub(super) struct Told {
     pub(super) scenery: Scenery,
 }
 
-/// Everything on the way of a ray; with `nearest`, what the camera sees.
+/// What is to be told of the surfaces along a ray.
+pub(super) struct Wanted<'a> {
+    /// Whether only the surface that is seen is told.
+    pub(super) nearest: bool,
+    pub(super) is_from_camera: bool,
+    /// The shapes that are told, met or not; `None` for those that the ray meets, or else those that it passes nearest.
+    pub(super) shapes: Option<&'a Asked>,
+}
+
+/// Everything on the way of a ray, and what it passes where that is asked for or nothing is met.
+///
+/// # Errors
+/// [`Failure::Usage`] where no shape has the name that is asked for.
 pub(super) fn surfaces(
     scene: &Scene,
     ray: &Ray,
     things: &Things,
-    nearest: bool,
-    is_from_camera: bool,
-    texts: &Texts,
-) -> Told {
+    wanted: &Wanted<'_>,
+    texts: &'static Texts,
+) -> Result<Told, Failure> {
     let resolved = scene.resolved();
+    let is_wanted = |shape: u32| match wanted.shapes {
+        Some(Asked::Called(name)) => things.is_called(shape, name),
+        Some(Asked::All) | None => true,
+    };
     let mut section = Section::new("surfaces", texts.surfaces);
-    let first = if is_from_camera { resolved.closest_seen(ray) } else { resolved.closest(ray) };
+    let first = if wanted.is_from_camera { resolved.closest_seen(ray) } else { resolved.closest(ray) };
     let mut hits: Vec<Hit> = Vec::new();
     let mut are_more = false;
-    if nearest {
+    if wanted.nearest && wanted.shapes.is_none() {
         hits.extend(first.clone());
     } else {
         resolved.accel().all(ray, |hit| {
@@ -51,13 +74,28 @@ pub(super) fn surfaces(
             if are_more {
                 return ControlFlow::Break(());
             }
-            hits.push(hit.clone());
+            if is_wanted(resolved.shape_index(hit)) {
+                hits.push(hit.clone());
+            }
             ControlFlow::Continue(())
         });
     }
-    if hits.is_empty() {
+    let met: BTreeSet<u32> = hits.iter().map(|hit| resolved.shape_index(hit)).collect();
+    let most = match wanted.shapes {
+        Some(_) => MOST_HITS,
+        None if hits.is_empty() && wanted.is_from_camera => MOST_MISSES,
+        None => 0,
+    };
+    let missed = match most {
+        0 => Vec::new(),
+        _ => misses::nearest(scene, ray, most, |shape| is_wanted(shape) && !met.contains(&shape)),
+    };
+    if let (true, true, Some(Asked::Called(name))) = (hits.is_empty(), missed.is_empty(), wanted.shapes) {
+        let names = Vec::from_iter(things.names()).join(", ");
+        return Err(Failure::Usage(filled(texts.no_such_shape, &[name, &names])));
+    }
+    if first.is_none() {
         section.text(texts.nothing_met);
-        return Told { section, hits: Vec::new(), scenery: Scenery::default() };
     }
     // All crossings of one thing are found at once.
     let mut groups: Vec<Vec<&Hit>> = Vec::new();
@@ -78,37 +116,60 @@ pub(super) fn surfaces(
     let places = hits.iter().map(met).collect();
     let mut scenery = Scenery::default();
     for group in groups {
-        section.sections.push(thing(scene, ray, &group, first.as_ref(), things, &mut scenery, texts));
+        let thing = Thing { hit: group[0], hits: &group, nearest: None };
+        section.sections.push(tell(scene, ray, &thing, first.as_ref(), things, &mut scenery, texts));
     }
     if are_more {
         section.remark(filled(texts.more_hits, &[&MOST_HITS.to_string()]));
     }
-    Told { section, hits: places, scenery }
+    if !missed.is_empty() {
+        section.text(if wanted.shapes.is_none() { texts.missed_nearest } else { texts.missed });
+    }
+    for Missed { hit, nearest } in &missed {
+        let thing = Thing { hit, hits: &[], nearest: *nearest };
+        section.sections.push(tell(scene, ray, &thing, first.as_ref(), things, &mut scenery, texts));
+    }
+    Ok(Told { section, hits: places, scenery })
 }
 
-fn thing(
+/// A primitive, and where the ray meets it.
+struct Thing<'a> {
+    /// It, as one of the hits, or as one without a crossing.
+    hit: &'a Hit,
+    hits: &'a [&'a Hit],
+    /// Where the ray comes nearest to it, for one that it passes.
+    nearest: Option<Nearest>,
+}
+
+fn tell(
     scene: &Scene,
     ray: &Ray,
-    hits: &[&Hit],
+    &Thing { hit, hits, nearest }: &Thing<'_>,
     first: Option<&Hit>,
     things: &Things,
     scenery: &mut Scenery,
-    texts: &Texts,
+    texts: &'static Texts,
 ) -> Section {
     let resolved = scene.resolved();
-    let hit = hits[0];
     let index = resolved.shape_index(hit);
     let Target { placements, shape } = resolved.accel().target(ray, hit);
     // The leaf of a tree is what has a number and a material.
     let kind = match &shape {
         TargetShape::Exact(placed) if matches!(placed.shape(), Shape::Csg(_)) => {
-            format!("{} ({})", things.kind(index), placed.shape().name())
+            format!("{} ({})", (texts.kind_of)(things.kind(index)), (texts.kind_of)(placed.shape().name()))
         }
-        _ => things.kind(index).to_owned(),
+        _ => (texts.kind_of)(things.kind(index)).to_owned(),
     };
     let title = filled(texts.shape, &[&index.to_string(), &kind]);
     let mut section = Section::new(format!("shape {index}"), title);
-    section.fact(texts.material, things.material(index).map_or(texts.no_material, |material| &material.name));
+    section.fact(texts.material, material_of(things, index, texts));
+    if hits.is_empty() {
+        section.text(texts.is_missed);
+        if let Some(Nearest { distance, t, in_object }) = nearest {
+            let text = if in_object { texts.passes_in_object } else { texts.passes };
+            section.text(filled(text, &[&exact(distance), &exact(t)]));
+        }
+    }
     if let Some(&instance) = hit.instances.first() {
         section.fact(texts.instance, f64::from(instance));
     }
@@ -140,9 +201,20 @@ fn thing(
     let rename = |formula: &str| {
         if object.is_placed() { with_primes(formula, &["O", "D"]) } else { formula.to_owned() }
     };
+    let told = match &object.shape {
+        Some(Shape::Triangle(triangle)) => triangle.corners().to_vec(),
+        Some(Shape::BilinearPatch(patch)) => patch.corners().to_vec(),
+        _ => Vec::new(),
+    };
+    if !told.is_empty()
+        && let Some(face) = things.face(index, resolved.primitive_index(hit), &told)
+    {
+        section.sections.push(in_file(&face, told.len(), texts));
+    }
     match &object.shape {
         Some(exact) => {
-            scenery.add(exact, &object.whole, &resolved.accel().surface(ray, hit));
+            let surface = hits.first().map(|hit| resolved.accel().surface(ray, hit));
+            scenery.add(exact, &object.whole, surface.as_ref());
             let mut equation = Section::new("equation", texts.equation);
             let explanation = exact.explain(&object.ray);
             shape::tell(&mut equation, &explanation, &object.ray, &mut scope, &rename, texts);
@@ -158,6 +230,37 @@ fn thing(
         section.sections.push(at_hit(scene, ray, hit, is_first, &object, texts));
     }
     section
+}
+
+/// A face as it stands in its file, which is tested as a face with `told` corners under its map.
+fn in_file(face: &Face, told: usize, texts: &Texts) -> Section {
+    let mut section = Section::new("mesh", texts.in_file);
+    let mut scope = Scope::default();
+    let names = ["P₀", "P₁", "P₂", "P₃"];
+    for (name, corner) in names.into_iter().zip(&face.corners) {
+        section.quantity(&mut scope, name, "", "", *corner);
+    }
+    for (name, uv) in names.into_iter().zip(face.uvs.iter().flatten()) {
+        section.fact(format!("u, v ({name})"), Value::Numbers(vec![uv.x, uv.y]));
+    }
+    if !face.map.is_identity() {
+        section.fact("M", DMat4::from(*face.map.affine()));
+        section.text(texts.baked);
+        if face.map.is_mirror() {
+            section.text(texts.mirrored);
+        }
+    }
+    if told < face.corners.len() {
+        section.text(texts.split);
+    }
+    section
+}
+
+/// What a shape is made of: the name of its material and the kind.
+pub(super) fn material_of(things: &Things, shape: u32, texts: &Texts) -> String {
+    let Some(material) = things.material(shape) else { return texts.no_material.to_owned() };
+    let kind = (texts.kind_of)(material.kind);
+    material.name.as_ref().map_or_else(|| kind.to_owned(), |name| format!("{name} ({kind})"))
 }
 
 /// A segment of curves, and where a ray passes it nearest, both in the space of the curves.
@@ -220,10 +323,13 @@ fn transforms(object: &Object, ray: &Ray, scope: &mut Scope, texts: &Texts) -> S
         let mut one = Section::new(format!("transform {i}"), name);
         one.fact("M", DMat4::from(*map.affine()));
         match decomposed(map) {
-            Some(Parts { scale, angles, offset }) => {
+            Some(Parts { scale, angles, offset, is_at_pole }) => {
                 one.text(texts.decomposes);
                 one.fact(texts.scale, scale);
                 one.fact(texts.rotations, angles);
+                if is_at_pole {
+                    one.text(if angles.y > 0.0 { texts.north_pole } else { texts.south_pole });
+                }
                 one.fact(texts.translation, offset);
             }
             None => one.text(texts.sheared),
@@ -248,6 +354,8 @@ struct Parts {
     /// Degrees about x, y and z.
     angles: DVec3,
     offset: DVec3,
+    /// Whether the rotation about y is a right angle, so that those about x and z are about the same axis.
+    is_at_pole: bool,
 }
 
 /// The parts of a map `T · Rz · Ry · Rx · S`; `None` where it shears.
@@ -259,21 +367,47 @@ fn decomposed(map: &Transform) -> Option<Parts> {
     if !(is_right(0, 1) && is_right(1, 2) && is_right(2, 0)) {
         return None;
     }
-    // A mirror is told as a negative scale along z.
-    let sign = if map.is_mirror() { -1.0 } else { 1.0 };
-    let scale = DVec3::new(lengths[0], lengths[1], sign * lengths[2]);
-    let rotation = DMat3::from_cols(axes[0] / scale.x, axes[1] / scale.y, axes[2] / scale.z);
-    let (z, y, x) = DQuat::from_mat3(&rotation).to_euler(EulerRot::ZYX);
+    let with_signs = |signs: DVec3| {
+        let scale = DVec3::from_array(lengths) * signs;
+        let rotation = DMat3::from_cols(axes[0] / scale.x, axes[1] / scale.y, axes[2] / scale.z);
+        let (angles, is_at_pole) = turns(&rotation);
+        Parts { scale, angles, offset: map.affine().translation, is_at_pole }
+    };
+    if !map.is_mirror() {
+        return Some(with_signs(DVec3::ONE));
+    }
+    // A mirror is told along the axis that leaves the least to rotate: as it was most likely written.
+    let signs = [[-1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, -1.0], [-1.0, -1.0, -1.0]];
+    let all = signs.map(|signs| with_signs(DVec3::from_array(signs)));
+    let turn = |parts: &Parts| parts.angles.abs().dot(DVec3::ONE);
+    all.into_iter().min_by(|a, b| turn(a).total_cmp(&turn(b)))
+}
+
+/// The angles about x, y and z, in this order, of a rotation, in degrees, and whether it is at a pole: there the sum or the
+/// difference of the angles about x and z is all that counts, and the one about z is 0.
+fn turns(rotation: &DMat3) -> (DVec3, bool) {
+    let at = |row: usize, column: usize| rotation.col(column)[row];
+    let rest = at(0, 0).hypotenuse(at(1, 0));
+    let is_at_pole = rest <= 1e-12;
+    let y = (-at(2, 0)).angle_from(rest);
+    let (x, z) = if is_at_pole {
+        // Rz Ry Rx with y = ±90°: a rotation by x ∓ z.
+        let sign = y.signum();
+        ((sign * at(0, 1)).angle_from(at(1, 1)), 0.0)
+    } else {
+        (at(2, 1).angle_from(at(2, 2)), at(1, 0).angle_from(at(0, 0)))
+    };
     let tidy = |radians: f64| {
         let degrees = radians.to_degrees();
         // Rounding of a whole number of degrees says nothing.
         if (degrees - degrees.round()).abs() < 1e-9 { degrees.round() } else { degrees }
     };
-    Some(Parts { scale, angles: DVec3::new(tidy(x), tidy(y), tidy(z)), offset: map.affine().translation })
+    (DVec3::new(tidy(x), tidy(y), tidy(z)), is_at_pole)
 }
 
 /// The surface at one crossing.
 fn at_hit(scene: &Scene, ray: &Ray, hit: &Hit, is_first: bool, object: &Object, texts: &Texts) -> Section {
+    let is_triangle = matches!(object.shape, Some(Shape::Triangle(_)));
     let surface = scene.resolved().accel().surface(ray, hit);
     let mut scope = Scope::default();
     scope.set_ray(["O", "D"], ray);
@@ -307,6 +441,64 @@ fn at_hit(scene: &Scene, ray: &Ray, hit: &Hit, is_first: bool, object: &Object, 
     } else {
         texts.grazing
     });
-    section.fact("u, v", Value::Numbers(vec![surface.uv.x, surface.uv.y]));
+    let here = scene.resolved().interaction(ray, hit, &Footprint::Point);
+    if is_triangle {
+        section.fact(texts.barycentrics, Value::Numbers(vec![surface.uv.x, surface.uv.y]));
+    }
+    section.fact("u, v", Value::Numbers(vec![here.surface.uv.x, here.surface.uv.y]));
     section
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_is_told_as_it_was_written() {
+        let scale = |x: f64, y: f64, z: f64| Transform::scale(DVec3::new(x, y, z)).expect("not singular");
+        let turn = |axis: DVec3, degrees: f64| Transform::rotate(axis, degrees).expect("an axis");
+        for (map, sizes, angles) in [
+            (scale(-1.0, 2.0, 3.0), [-1.0, 2.0, 3.0], [0.0; 3]),
+            (scale(1.0, -2.0, 3.0), [1.0, -2.0, 3.0], [0.0; 3]),
+            (scale(1.0, 2.0, -3.0), [1.0, 2.0, -3.0], [0.0; 3]),
+            (scale(-1.0, -2.0, -3.0), [-1.0, -2.0, -3.0], [0.0; 3]),
+            (turn(DVec3::Z, 30.0) * scale(-1.0, 2.0, 3.0), [-1.0, 2.0, 3.0], [0.0, 0.0, 30.0]),
+            (turn(DVec3::Z, 180.0), [1.0; 3], [0.0, 0.0, 180.0]),
+            (
+                turn(DVec3::Z, 20.0) * turn(DVec3::Y, -40.0) * turn(DVec3::X, 70.0),
+                [1.0; 3],
+                [70.0, -40.0, 20.0],
+            ),
+            // At the poles x ∓ z is all that there is.
+            (turn(DVec3::Z, 20.0) * turn(DVec3::Y, 90.0) * turn(DVec3::X, 70.0), [1.0; 3], [50.0, 90.0, 0.0]),
+            (
+                turn(DVec3::Z, 20.0) * turn(DVec3::Y, -90.0) * turn(DVec3::X, 70.0),
+                [1.0; 3],
+                [90.0, -90.0, 0.0],
+            ),
+        ] {
+            let parts = decomposed(&map).expect("no shear");
+            assert!(
+                (parts.scale - DVec3::from_array(sizes)).length() < 1e-12,
+                "{} for {sizes:?}",
+                parts.scale
+            );
+            assert!(
+                (parts.angles - DVec3::from_array(angles)).length() < 1e-9,
+                "{} for {angles:?}",
+                parts.angles
+            );
+            assert_eq!(parts.is_at_pole, parts.angles.y.abs() == 90.0);
+            // The parts are the map.
+            let again = [(DVec3::X, parts.angles.x), (DVec3::Y, parts.angles.y), (DVec3::Z, parts.angles.z)]
+                .into_iter()
+                .fold(Transform::scale(parts.scale).expect("not singular"), |inner, (axis, angle)| {
+                    turn(axis, angle) * inner
+                });
+            let off = (again.linear() - map.linear()).to_cols_array();
+            assert!(off.iter().all(|entry| entry.abs() < 1e-12), "{off:?}");
+        }
+        let sheared = Transform::shear(0.5, 0.0, 0.0, 0.0, 0.0, 0.0).expect("not singular");
+        assert!(decomposed(&sheared).is_none());
+    }
 }

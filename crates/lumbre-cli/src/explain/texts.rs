@@ -2,6 +2,9 @@
 
 use lumbre::geometry::{Fate, Remark, Topic};
 
+/// What an operand of a CSG tree is called, by its place.
+pub(super) type OperandName<'a> = dyn Fn(usize) -> &'static str + 'a;
+
 /// The sentences of one language; `{0}` and `{1}` stand for what is filled in.
 #[derive(Debug)]
 pub(super) struct Texts {
@@ -12,9 +15,13 @@ pub(super) struct Texts {
     /// What a step of a search computes.
     pub(super) topic: fn(Topic) -> &'static str,
     /// What is worth saying of a step.
-    pub(super) remark: fn(&Remark) -> String,
+    pub(super) remark: fn(&Remark, &OperandName<'_>) -> String,
     /// What became of a crossing.
-    pub(super) fate_of: fn(&Fate) -> String,
+    pub(super) fate_of: fn(&Fate, &OperandName<'_>) -> String,
+    /// What a kind of shape, material or light is called, given its name in the scene language.
+    pub(super) kind_of: fn(&'static str) -> &'static str,
+    /// What a symbol of a step stands for; empty where the title says it.
+    pub(super) symbol: fn(Topic, &str) -> &'static str,
     pub(super) camera: &'static str,
     pub(super) kind: &'static str,
     pub(super) name: &'static str,
@@ -23,7 +30,6 @@ pub(super) struct Texts {
     pub(super) right: &'static str,
     pub(super) up: &'static str,
     pub(super) forward: &'static str,
-    pub(super) frame: &'static str,
     pub(super) look_at: &'static str,
     pub(super) projection: &'static str,
     pub(super) perspective: &'static str,
@@ -158,6 +164,62 @@ pub(super) struct Texts {
     pub(super) schoolbook: &'static str,
     pub(super) title: &'static str,
     pub(super) sketch: &'static str,
+    pub(super) is_missed: &'static str,
+    pub(super) passes: &'static str,
+    pub(super) passes_in_object: &'static str,
+    pub(super) missed: &'static str,
+    pub(super) missed_nearest: &'static str,
+    pub(super) no_such_shape: &'static str,
+    pub(super) no_such_key: &'static str,
+    pub(super) no_sections: &'static str,
+    pub(super) outside_picture: &'static str,
+    pub(super) in_file: &'static str,
+    pub(super) baked: &'static str,
+    pub(super) mirrored: &'static str,
+    pub(super) split: &'static str,
+    pub(super) no_turntable: &'static str,
+    pub(super) nothing_asked: &'static str,
+    pub(super) frame_of_same_hand: &'static str,
+    pub(super) frame_of_other_hand: &'static str,
+    pub(super) projected: &'static str,
+    pub(super) in_focus: &'static str,
+    pub(super) point_of_ray: &'static str,
+    pub(super) by_look_at: &'static str,
+    pub(super) by_projection: &'static str,
+    pub(super) by_division: &'static str,
+    pub(super) back_on_film: &'static str,
+    pub(super) north_pole: &'static str,
+    pub(super) south_pole: &'static str,
+    pub(super) barycentrics: &'static str,
+    pub(super) shown_feature: &'static str,
+    pub(super) openness: &'static str,
+    pub(super) normal_as_colour: &'static str,
+    pub(super) depth_along_axis: &'static str,
+    pub(super) reflectance: &'static str,
+    pub(super) uv_as_colour: &'static str,
+    pub(super) is_open: &'static str,
+    pub(super) tree: &'static str,
+    pub(super) roulette_factor: &'static str,
+    pub(super) radiance_along_ray: &'static str,
+    pub(super) radiance_before_film: &'static str,
+    pub(super) exposure: &'static str,
+    pub(super) exposed: &'static str,
+    pub(super) max_component: &'static str,
+    pub(super) held: &'static str,
+    pub(super) sensor: &'static str,
+    pub(super) filter_weight: &'static str,
+    pub(super) weighted: &'static str,
+    pub(super) cos_refracted: &'static str,
+    pub(super) perpendicular: &'static str,
+    pub(super) parallel: &'static str,
+    pub(super) fresnel: &'static str,
+    pub(super) intensity: &'static str,
+    pub(super) cos_light: &'static str,
+    pub(super) bsdf_alone: &'static str,
+    pub(super) phase: &'static str,
+    pub(super) phase_weight: &'static str,
+    pub(super) is_scattered: &'static str,
+    pub(super) eta_entered: &'static str,
     pub(super) sample: &'static str,
     pub(super) weight: &'static str,
 }

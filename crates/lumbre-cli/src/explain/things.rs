@@ -1,9 +1,10 @@
 //! What the shapes of a file are called, and what they are made of.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
+use std::sync::Arc;
 
-use lumbre::SceneDesc;
-use lumbre::description::{GeometryDesc, ShapeDesc};
+use lumbre::description::{GeometryDesc, MeshDesc, ShapeDesc};
+use lumbre::{DVec2, DVec3, SceneDesc, Transform};
 
 /// The shapes of a file by their number, and the materials.
 #[derive(Debug, Default)]
@@ -13,10 +14,22 @@ pub struct Things {
 }
 
 /// A shape of a file.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Thing {
     kind: &'static str,
     material: Option<usize>,
+    mesh: Option<(Arc<MeshDesc>, Transform)>,
+}
+
+/// A face of a mesh as it stands in its file: a triangle, or a quad or patch.
+#[derive(Clone, Debug)]
+pub(super) struct Face {
+    /// The corners in the mesh's own space, three or four.
+    pub(super) corners: Vec<DVec3>,
+    /// The texture coordinates of the corners, if the file has them.
+    pub(super) uvs: Option<Vec<DVec2>>,
+    /// From there to the space of its instance, or of the world.
+    pub(super) map: Transform,
 }
 
 /// A parameter's name and its numbers; without these where a texture stands.
@@ -25,8 +38,9 @@ type Parameter = (String, Option<Vec<f64>>);
 /// A material of a file.
 #[derive(Clone, Debug)]
 pub(super) struct Substance {
-    /// Its name and kind.
-    pub(super) name: String,
+    /// Its name, if it has one, and its kind.
+    pub(super) name: Option<String>,
+    pub(super) kind: &'static str,
     /// Its parameters.
     pub(super) parameters: Vec<Parameter>,
 }
@@ -42,7 +56,7 @@ impl Things {
         let materials = desc.materials.iter().enumerate().map(|(index, named)| {
             let called = named.name.clone().unwrap_or_else(|| index.to_string());
             let parameters = by_owner.remove(&format!("material.{called}.")).unwrap_or_default();
-            Substance { name: named.label(), parameters }
+            Substance { name: named.name.clone(), kind: named.material.kind.name(), parameters }
         });
         let materials = materials.collect();
         let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);
@@ -54,7 +68,14 @@ impl Things {
                 open.extend(csg.operands.iter().flat_map(|operand| &**operand));
             }
             let material = shape.material.map(|id| id.0 as usize);
-            shapes.insert(shape.index, Thing { kind: shape.geometry.name(), material });
+            let mesh = match &shape.geometry {
+                // The vertices of a mesh that changes its form are those of one moment.
+                GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) if mesh.motion.is_none() => {
+                    Some((mesh.clone(), shape.world_from_object))
+                }
+                _ => None,
+            };
+            shapes.insert(shape.index, Thing { kind: shape.geometry.name(), material, mesh });
         }
         Self { shapes, materials }
     }
@@ -62,6 +83,44 @@ impl Things {
     /// What kind of shape has this number, in the words of the scene language; the ground is of no file.
     pub(super) fn kind(&self, shape: u32) -> &'static str {
         self.shapes.get(&shape).map_or("ground", |thing| thing.kind)
+    }
+
+    /// Whether a shape is asked for by this name: its number, its kind, or the name of its material.
+    pub(super) fn is_called(&self, shape: u32, name: &str) -> bool {
+        let material = self.material(shape).and_then(|material| material.name.as_deref());
+        name.parse() == Ok(shape) || self.kind(shape) == name || material == Some(name)
+    }
+
+    /// The names by which the shapes of the file can be asked for, beside their numbers.
+    pub(super) fn names(&self) -> BTreeSet<&str> {
+        let kinds = self.shapes.values().map(|thing| thing.kind);
+        let materials = self.shapes.keys().filter_map(|shape| self.material(*shape)?.name.as_deref());
+        kinds.chain(materials).collect()
+    }
+
+    /// The face of a mesh's file that has these corners under its map. Quads that are flat are split into triangles, so that it is
+    /// found by its corners: of those that the number of the primitive may mean, the one that has them all.
+    pub(super) fn face(&self, shape: u32, primitive: u32, told: &[DVec3]) -> Option<Face> {
+        let (mesh, map) = self.shapes.get(&shape)?.mesh.as_ref()?;
+        let (primitive, triangles) = (primitive as usize, mesh.triangles.len());
+        let of_pair = primitive.checked_sub(triangles).map(|rest| rest / 2);
+        let quads = [of_pair, primitive.checked_sub(triangles), Some(primitive), Some(primitive / 2)];
+        let quads = quads.into_iter().flatten().filter_map(|i| mesh.quads.get(i)).map(|quad| quad.to_vec());
+        let faces = mesh.triangles.get(primitive).map(|triangle| triangle.to_vec()).into_iter().chain(quads);
+        let position = |vertex: u32| match &mesh.precise_positions {
+            Some(precise) => precise.get(vertex as usize).copied(),
+            None => mesh.positions.get(vertex as usize).map(|p| p.as_dvec3()),
+        };
+        for vertices in faces {
+            let corners: Vec<DVec3> = vertices.iter().filter_map(|vertex| position(*vertex)).collect();
+            let size = told.iter().fold(0.0_f64, |most, p| most.max(p.abs().max_element()));
+            let is_there = |p: &DVec3| corners.iter().any(|q| (map.point(*q) - *p).length() <= 1e-5 * size);
+            if corners.len() == vertices.len() && told.iter().all(is_there) {
+                let uv = |vertex: &u32| mesh.uvs.as_ref()?.get(*vertex as usize).map(|uv| uv.as_dvec2());
+                return Some(Face { corners, uvs: vertices.iter().map(uv).collect(), map: *map });
+            }
+        }
+        None
     }
 
     /// What a shape is made of.

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use serde_json::{Map, Value as Json, json};
 
 use super::document::{Item, Quantity, Section, Value};
-use super::formula::latex;
+use super::formula::{latex, sign_after};
 
 /// As text, indented by two spaces a level. The titles of a whole explanation's chapters are in capitals; those of single sections
 /// may have formulas.
@@ -57,19 +57,11 @@ fn write_text(section: &Section, title: &str, level: usize, schoolbook: &str, ou
 
 /// `symbol = formula = numbers = value`, as far as there are such.
 fn chain(quantity: &Quantity, value: &str) -> String {
-    let Quantity { symbol, formula, numbers, .. } = quantity;
-    let between = [
-        Some(formula.as_str()).filter(|formula| !formula.is_empty() && formula != symbol),
-        numbers.as_deref(),
-    ];
-    let mut chain = symbol.clone();
-    for part in between.into_iter().flatten().chain([value]) {
-        if !chain.is_empty() {
-            chain.push_str(" = ");
-        }
-        chain.push_str(part);
+    let mut chain = String::new();
+    for (part, sign) in quantity.chain() {
+        let _ = write!(chain, "{part} {sign} ");
     }
-    chain
+    chain + value
 }
 
 fn write_quantity(quantity: &Quantity, indent: &str, schoolbook: &str, out: &mut String) {
@@ -96,7 +88,8 @@ fn write_quantity(quantity: &Quantity, indent: &str, schoolbook: &str, out: &mut
         }
     }
     if let Some((formula, value)) = &quantity.schoolbook {
-        let _ = writeln!(out, "{indent}  {schoolbook}: {formula} = {}", value.in_full());
+        let sign = sign_after(formula);
+        let _ = writeln!(out, "{indent}  {schoolbook}: {formula} {sign} {}", value.in_full());
     }
 }
 
@@ -197,7 +190,11 @@ fn markdown_of(quantity: &Quantity, schoolbook: &str) -> String {
         (None, false) => format!("- ${}${label_after}", latex(&chain(quantity, &value.in_full()))),
     };
     if let Some((formula, value)) = &quantity.schoolbook {
-        let _ = write!(line, "\n  - {schoolbook}: ${}$", latex(&format!("{formula} = {}", value.in_full())));
+        let _ = write!(
+            line,
+            "\n  - {schoolbook}: ${}$",
+            latex(&format!("{formula} {} {}", sign_after(formula), value.in_full()))
+        );
     }
     line
 }

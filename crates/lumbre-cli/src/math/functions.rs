@@ -195,8 +195,8 @@ impl<'a> Call<'a> {
     /// [`Call::quaternion`] that is a rotation: not zero.
     pub(super) fn rotation(&self, i: usize) -> Result<DQuat, Wrong> {
         let q = self.quaternion(i)?;
-        let has_inverse = lumbre::math::quaternion::inverse(q).is_some();
-        if has_inverse { Ok(q) } else { Err(self.wrong(i, self.work.texts.not_zero)) }
+        let has_direction = lumbre::math::quaternion::unit(q).is_some();
+        if has_direction { Ok(q) } else { Err(self.wrong(i, self.work.texts.not_zero)) }
     }
 
     /// A matrix, also that of a transform.

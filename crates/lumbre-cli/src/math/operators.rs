@@ -1,14 +1,13 @@
 //! Sums, products, quotients and powers of values.
 
 use lumbre::formats::diagnostic::Diagnostic;
-use lumbre::math::glam::{DMat3, DMat4};
 use lumbre::math::{DVec3, Elementary, Transform, matrix, quaternion};
 
 use crate::language::filled;
 
-use super::quaternions;
-use super::steps::{Work, sum_of_products};
+use super::steps::{Work, factor, sum_of_products};
 use super::value::{Matrix, Value, list, number};
+use super::{matrices, quaternions};
 
 /// That these two do not go together.
 fn mismatch(sign: &str, a: &Value, b: &Value, expected: &str, work: &Work) -> Box<Diagnostic> {
@@ -68,6 +67,17 @@ pub(super) fn add(a: &Value, b: &Value, is_sum: bool, work: &mut Work) -> Result
     };
     work.begin(format!("a {sign} b"));
     work.line(format!("{} {sign} {} = {}", a.line(), b.line(), result.line()));
+    if let Value::Quaternion(sum) = &result {
+        let parts = |value: &Value| match value {
+            Value::Quaternion(q) => quaternion::to_wxyz(*q),
+            Value::Number(x) => [*x, 0.0, 0.0, 0.0],
+            _ => [0.0; 4],
+        };
+        let (a, b, sum) = (parts(a), parts(b), quaternion::to_wxyz(*sum));
+        for (i, name) in ["1:", "i:", "j:", "k:"].into_iter().enumerate() {
+            work.line(format!("{name}  {} {sign} {} = {}", factor(a[i]), factor(b[i]), number(sum[i])));
+        }
+    }
     Ok(result)
 }
 
@@ -197,6 +207,13 @@ fn row_product(v: &[f64], b: &Value, work: &mut Work) -> Option<Value> {
 
 /// The quotient by a number, or of quaternions.
 pub(super) fn divide(a: &Value, b: &Value, work: &mut Work) -> Result<Value, Box<Diagnostic>> {
+    if let Value::Number(0.0) = b {
+        let found = format!("{} / 0", a.line());
+        return Err(Diagnostic::error(work.texts.division_by_0)
+            .found(found)
+            .expected(work.texts.divisor_not_zero)
+            .into());
+    }
     let p = match (a, b) {
         (Value::Number(x), Value::Number(y)) => return Ok(Value::Number(x / y)),
         (_, Value::Number(divisor)) => {
@@ -226,19 +243,104 @@ pub(super) fn divide(a: &Value, b: &Value, work: &mut Work) -> Result<Value, Box
     };
     work.begin("p / q");
     let line = |q| Value::Quaternion(q).line();
-    work.line(format!("p / q = p q⁻¹,  q⁻¹ = conj q / |q|² = {}", line(inverse)));
-    work.line(format!("= {}", line(quotient)));
+    let (conjugate, length) = (line(q.conjugate()), number(quaternion::length(*q)));
+    work.line(format!("p / q = p q⁻¹,  q⁻¹ = conj q / |q|² = {conjugate} / {length}² = {}", line(inverse)));
+    quaternions::show_product(p, inverse, quotient, work);
     Ok(Value::Quaternion(quotient))
 }
 
-/// A power of a number; the inverse of a matrix, transform or quaternion by the exponent -1.
+/// A power of a number, or a whole power of a matrix, transform or quaternion.
 pub(super) fn power(base: &Value, exponent: &Value, work: &mut Work) -> Result<Value, Box<Diagnostic>> {
+    let is_square = base.as_matrix().is_none_or(|m| m.rows == m.columns);
     match (base, exponent) {
-        (Value::Number(x), Value::Number(y)) => Ok(Value::Number(x.power(*y))),
+        (Value::Number(x), Value::Number(y)) => power_of_number(*x, *y, work),
         (Value::Matrix(_) | Value::Transform(_) | Value::Quaternion(_), Value::Number(-1.0)) => {
             inverse(base, work)
         }
+        (Value::Matrix(_) | Value::Transform(_) | Value::Quaternion(_), Value::Number(n))
+            if is_square && n.fract() == 0.0 && n.abs() <= LARGEST_POWER =>
+        {
+            whole_power(base, *n as i32, work)
+        }
         _ => Err(mismatch("^", base, exponent, work.texts.powers, work)),
+    }
+}
+
+/// The largest exponent of a matrix, transform or quaternion.
+const LARGEST_POWER: f64 = 1000.0;
+
+fn power_of_number(x: f64, y: f64, work: &Work) -> Result<Value, Box<Diagnostic>> {
+    let texts = work.texts;
+    let (message, expected) = if x == 0.0 && y == 0.0 {
+        (texts.zero_to_0, texts.power_not_of_zero)
+    } else if x == 0.0 && y < 0.0 {
+        (texts.zero_to_negative, texts.power_not_of_zero)
+    } else if x < 0.0 && y.fract() != 0.0 {
+        (texts.negative_base, texts.whole_exponent)
+    } else {
+        return Ok(Value::Number(x.power(y)));
+    };
+    let found = format!("{}^{}", factor(x), factor(y));
+    Err(Diagnostic::error(message).found(found).expected(expected).into())
+}
+
+/// By repeated squares: the power 5 is that of 4 times that of 1.
+fn whole_power(base: &Value, n: i32, work: &mut Work) -> Result<Value, Box<Diagnostic>> {
+    let base = if n < 0 { inverse(base, work)? } else { base.clone() };
+    let name = if n < 0 { "(M⁻¹)" } else { "M" };
+    let mut rest = n.unsigned_abs();
+    let (mut square, mut of_square) = (base.clone(), 1_u32);
+    let mut result: Option<Value> = None;
+    let mut factors = vec![];
+    let mut squares = vec![];
+    loop {
+        if rest & 1 == 1 {
+            factors.push(format!("{name}^{of_square}"));
+            result = Some(match result {
+                Some(found) => times(&found, &square),
+                None => square.clone(),
+            });
+        }
+        rest >>= 1;
+        if rest == 0 {
+            break;
+        }
+        square = times(&square, &square);
+        of_square *= 2;
+        squares.push((of_square, square.clone()));
+    }
+    work.begin(format!("M^{n}"));
+    if squares.len() + factors.len() > 1 {
+        work.line(format!("{} {name}^{} = {}", work.texts.by_squares, n.unsigned_abs(), factors.join(" ")));
+    }
+    for (exponent, value) in squares.iter().take(4) {
+        match value.as_matrix() {
+            Some(m) => work.beside(&[format!("{name}^{exponent} =").into(), (&m).into()]),
+            None => work.line(format!("{name}^{exponent} = {}", value.line())),
+        }
+    }
+    Ok(result.unwrap_or_else(|| unit_like(&base)))
+}
+
+/// The product of two values of one kind.
+fn times(a: &Value, b: &Value) -> Value {
+    match (a, b) {
+        (Value::Transform(a), Value::Transform(b)) => (**a * **b).into(),
+        (Value::Quaternion(a), Value::Quaternion(b)) => Value::Quaternion(*a * *b),
+        (Value::Matrix(a), Value::Matrix(b)) => a.times(b).map_or_else(|| Value::Matrix(*a), Value::Matrix),
+        _ => a.clone(),
+    }
+}
+
+/// What changes nothing by a product.
+fn unit_like(value: &Value) -> Value {
+    match value {
+        Value::Transform(_) => Transform::IDENTITY.into(),
+        Value::Quaternion(_) => Value::Quaternion(quaternion::from_wxyz([1.0, 0.0, 0.0, 0.0])),
+        _ => {
+            let size = value.as_matrix().map_or(1, |m| m.rows);
+            Value::Matrix(Matrix::from_fn(size, size, |i, j| f64::from(u8::from(i == j))))
+        }
     }
 }
 
@@ -247,7 +349,8 @@ pub(super) fn inverse(value: &Value, work: &mut Work) -> Result<Value, Box<Diagn
     let result = match value {
         Value::Quaternion(q) => quaternion::inverse(*q).map(Value::Quaternion),
         Value::Transform(map) => Some(map.inverse().into()),
-        Value::Matrix(m) => inverse_matrix(m),
+        Value::Matrix(m) if m.rows == m.columns => matrices::inverted(m).map(Value::Matrix),
+        Value::Matrix(_) => None,
         _ => {
             let what = Diagnostic::error(work.texts.no_inverse).found(value.described(work.texts));
             return Err(what.expected(work.texts.inverted_kinds).into());
@@ -257,46 +360,23 @@ pub(super) fn inverse(value: &Value, work: &mut Work) -> Result<Value, Box<Diagn
         let what = Diagnostic::error(work.texts.no_inverse).found(value.line());
         return Err(what.expected(work.texts.invertible).into());
     };
-    match (value, value.as_matrix(), result.as_matrix()) {
-        (Value::Quaternion(q), ..) => {
+    match (value, &result) {
+        (Value::Quaternion(q), _) => {
             work.begin("q⁻¹");
             let conjugate = Value::Quaternion(q.conjugate()).line();
-            let square = number(q.length_squared());
-            work.line(format!("conj q / |q|² = {conjugate} / {square} = {}", result.line()));
+            let length = number(quaternion::length(*q));
+            work.line(format!("conj q / |q|² = {conjugate} / {length}² = {}", result.line()));
         }
-        (_, Some(m), Some(n)) => {
+        (Value::Matrix(m), Value::Matrix(inverse)) => {
             work.begin("M⁻¹");
-            if let Some(product) = m.times(&n) {
-                work.line("M M⁻¹ = I");
-                work.beside(&[(&m).into(), (&n).into(), "=".into(), (&product).into()]);
-            }
+            matrices::show_inverse(m, inverse, work);
+        }
+        (Value::Transform(map), Value::Transform(inverse)) => {
+            work.begin("M⁻¹");
+            work.line(work.texts.affine_inverse);
+            matrices::show_unit_product(&(&**map).into(), &(&**inverse).into(), work);
         }
         _ => {}
     }
     Ok(result)
-}
-
-fn inverse_matrix(m: &Matrix) -> Option<Value> {
-    let from =
-        |linear: DMat3| Some(Transform::from_matrix(DMat4::from_mat3(linear)).ok()?.inverse().linear());
-    match (m.rows, m.columns) {
-        (2, 2) => {
-            let c = &m.cells;
-            let padded = matrix::rows3([c[0][0], c[0][1], 0.0, c[1][0], c[1][1], 0.0, 0.0, 0.0, 1.0]);
-            let inverse = from(padded)?;
-            Some(Value::Matrix(Matrix::from_fn(2, 2, |i, j| inverse.col(j)[i])))
-        }
-        (3, 3) => Some(Value::Matrix(from(m.mat3())?.into())),
-        (4, 4) => match Transform::from_matrix(m.mat4()) {
-            Ok(map) => Some(Value::Matrix((&map.inverse()).into())),
-            // A projection: not affine, so that it is solved as four equations.
-            Err(_) => {
-                let (whole, inverse) = (m.mat4(), m.mat4().inverse());
-                let rest = (whole * inverse - DMat4::IDENTITY).to_cols_array();
-                let is_inverse = rest.iter().all(|entry| entry.abs() < 1e-9);
-                is_inverse.then(|| Value::Matrix(inverse.into()))
-            }
-        },
-        _ => None,
-    }
 }

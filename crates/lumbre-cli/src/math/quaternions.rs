@@ -12,16 +12,23 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function::new("quat", &["w, x, y, z", "w, v", "R"], quat),
     Function::new("quat_about", &["axis, degrees"], quat_about),
     Function::new("conjugate", &["q"], conjugate),
+    Function::new("slerp", &["p, q, s"], slerp),
     Function::new("euler", &["heading, attitude, bank", "angles"], euler),
     Function::new("angles", &["q"], angles),
 ];
 
 /// The product, part by part.
 pub(super) fn product(p: DQuat, q: DQuat, work: &mut Work) -> DQuat {
-    let ([a1, b1, c1, d1], [a2, b2, c2, d2]) = (quaternion::to_wxyz(p), quaternion::to_wxyz(q));
     let result = p * q;
-    let [a, b, c, d] = quaternion::to_wxyz(result);
     work.begin("p q");
+    show_product(p, q, result, work);
+    result
+}
+
+/// The parts of a product.
+pub(super) fn show_product(p: DQuat, q: DQuat, result: DQuat, work: &mut Work) {
+    let ([a1, b1, c1, d1], [a2, b2, c2, d2]) = (quaternion::to_wxyz(p), quaternion::to_wxyz(q));
+    let [a, b, c, d] = quaternion::to_wxyz(result);
     let line = |name: &str, formula: &str, terms: [(&str, f64, f64); 4], part: f64| {
         let written = terms.map(|(sign, x, y)| format!("{sign}{}·{}", factor(x), factor(y)));
         format!("{name}  {formula} = {} = {}", written.concat(), number(part))
@@ -51,7 +58,6 @@ pub(super) fn product(p: DQuat, q: DQuat, work: &mut Work) -> DQuat {
         [("", a1, d2), (p, b1, c2), (m, c1, b2), (p, d1, a2)],
         d,
     ));
-    result
 }
 
 fn quat(call: &mut Call) -> Result<Value, Wrong> {
@@ -93,11 +99,41 @@ fn conjugate(call: &mut Call) -> Result<Value, Wrong> {
     Ok(Value::Quaternion(q.conjugate()))
 }
 
+fn slerp(call: &mut Call) -> Result<Value, Wrong> {
+    let (p, q, s) = (call.rotation(0)?, call.rotation(1)?, call.number(2)?);
+    let Some(result) = quaternion::slerp(p, q, s) else {
+        return Err(call.wrong(2, call.work.texts.finite));
+    };
+    let Some((p, mut q)) = quaternion::unit(p).zip(quaternion::unit(q)) else {
+        return Err(call.wrong(0, call.work.texts.not_zero));
+    };
+    let line = |q: DQuat| Value::Quaternion(q).line();
+    call.work.line("(sin((1-s)θ) p + sin(sθ) q) / sin θ,  |p| = |q| = 1,  cos θ = p·q");
+    call.work.line(format!("p = {},  q = {}", line(p), line(q)));
+    if p.dot(q) < 0.0 {
+        call.work.line(call.work.texts.shorter_way);
+        q = -q;
+    }
+    let angle = 2.0 * (p - q).length().angle_from((p + q).length());
+    call.work.line(format!("p·q = {},  θ = {}°", number(p.dot(q)), number(angle.to_degrees())));
+    if angle > 0.0 {
+        let [from, to] = [1.0 - s, s].map(|share| number((share * angle).sine() / angle.sine()));
+        call.work.line(format!("= {from} p + {} q", factor_of(&to)));
+    }
+    Ok(Value::Quaternion(result))
+}
+
+/// A number that is written already, in parentheses where it has a sign.
+fn factor_of(written: &str) -> String {
+    if written.starts_with('-') { format!("({written})") } else { written.to_owned() }
+}
+
 fn euler(call: &mut Call) -> Result<Value, Wrong> {
     let [heading, attitude, bank] =
         if call.count() == 1 { call.vec3(0)?.to_array() } else { call.numbers(0)? };
     let q = Euler { heading, attitude, bank }.to_quaternion();
-    call.work.line("R = Ry(heading) Rz(attitude) Rx(bank)");
+    let texts = call.work.texts;
+    call.work.line(format!("R = Ry({}) Rz({}) Rx({})", texts.heading, texts.attitude, texts.bank));
     call.work.line("a = c1c2c3 - s1s2s3,  b = s1s2c3 + c1c2s3,  c = s1c2c3 + c1s2s3,  d = c1s2c3 - s1c2s3");
     for (i, angle) in [heading, attitude, bank].into_iter().enumerate() {
         let (sin, cos) = lumbre::math::transform::sin_cos_degrees(0.5 * angle);
@@ -117,16 +153,19 @@ fn angles(call: &mut Call) -> Result<Value, Wrong> {
     let Euler { heading, attitude, bank } = Euler::from_quaternion(q);
     let [a, b, c, d] = quaternion::to_wxyz(q);
     let texts = call.work.texts;
-    call.work.line("S = |(a+d, b+c)|,  M = |(a-d, c-b)|,  attitude = 2 atan2(S, M) - 90°");
+    let names = [texts.heading, texts.attitude, texts.bank];
+    let [of_heading, of_attitude, of_bank] = names;
+    call.work.line(format!("S = |(a+d, b+c)|,  M = |(a-d, c-b)|,  {of_attitude} = 2 atan2(S, M) - 90°"));
     let pair = |x: f64, y: f64| format!("({}, {})", number(x), number(y));
     call.work.line(format!("(a+d, b+c) = {},  (a-d, c-b) = {}", pair(a + d, b + c), pair(a - d, c - b)));
     let (sum, difference) = ((a + d).hypotenuse(b + c), (a - d).hypotenuse(c - b));
     call.work.line(match () {
-        () if difference <= 1e-15 * sum => texts.north,
-        () if sum <= 1e-15 * difference => texts.south,
-        () => "σ = atan2(b+c, a+d),  δ = atan2(c-b, a-d),  heading = σ + δ,  bank = σ - δ",
+        () if difference <= 1e-15 * sum => texts.north.to_owned(),
+        () if sum <= 1e-15 * difference => texts.south.to_owned(),
+        () => format!("σ = atan2(b+c, a+d),  δ = atan2(c-b, a-d),  {of_heading} = σ + δ,  {of_bank} = σ - δ"),
     });
-    let [heading_text, attitude_text, bank_text] = [heading, attitude, bank].map(number);
-    call.work.line(format!("heading = {heading_text}°,  attitude = {attitude_text}°,  bank = {bank_text}°"));
+    let told =
+        names.iter().zip([heading, attitude, bank]).map(|(name, x)| format!("{name} = {}°", number(x)));
+    call.work.line(told.collect::<Vec<_>>().join(",  "));
     Ok(Value::Vector(vec![heading, attitude, bank]))
 }

@@ -149,7 +149,31 @@ fn mistakes_say_where_what_and_what_would_do() {
         ),
         (
             "1 / 0",
-            "expression:1:3: the result is not finite (found inf; expected numbers that stay finite)\n  1 / 0\n    ^",
+            "expression:1:3: division by 0 (found 1 / 0; expected a divisor that is not 0)\n  1 / 0\n    ^",
+        ),
+        (
+            "1e200 * 1e200",
+            "expression:1:7: the result is not finite (found inf; expected numbers that stay finite)\n  1e200 * 1e200\n        ^",
+        ),
+        (
+            "0^0",
+            "expression:1:2: 0^0 has no value: x^0 is 1 and 0^y is 0, so that no value suits both (found 0^0; expected a base or an exponent above 0)\n  0^0\n   ^",
+        ),
+        (
+            "sqrt(-1)",
+            "expression:1:6: wrong argument 1 of sqrt (found -1; expected 0 or more: the square of a real number is not negative)\n  sqrt(-1)\n       ^",
+        ),
+        (
+            "asin(2)",
+            "expression:1:6: wrong argument 1 of asin (found 2; expected a number from -1 to 1, as sines and cosines are)\n  asin(2)\n       ^",
+        ),
+        (
+            "solve(cross_matrix([0.1, 0.2, 0.3]), [1, 2, 3])",
+            "expression:1:1: M x = b has no solution: its equations contradict one another (found det M = 0; expected equations whose determinant is not 0)\n  solve(cross_matrix([0.1, 0.2, 0.3]), [1, 2, 3])\n  ^",
+        ),
+        (
+            "solve([[1, 2], [2, 4]], [3, 6])",
+            "expression:1:1: M x = b has more than one solution: its equations are not independent (found det M = 0; expected equations whose determinant is not 0)\n  solve([[1, 2], [2, 4]], [3, 6])\n  ^",
         ),
         (
             "[1, 2",

@@ -1,6 +1,6 @@
 //! Functions of vectors and frames.
 
-use lumbre::math::{DVec3, Frame, orthonormal_basis, quaternion, vector};
+use lumbre::math::{DVec3, Elementary, Frame, exact, orthonormal_basis, quaternion, vector};
 
 use crate::language::filled;
 
@@ -78,7 +78,7 @@ fn cross_matrix(call: &mut Call) -> Result<Value, Wrong> {
 fn mixed(call: &mut Call) -> Result<Value, Wrong> {
     let (a, b, c) = (call.vec3(0)?, call.vec3(1)?, call.vec3(2)?);
     let across = vector::cross(b, c);
-    let result = vector::mixed_product(a, b, c);
+    let result = exact::determinant(&[a.to_array(), b.to_array(), c.to_array()]);
     call.work.line(format!("b×c = {}", line(across, 3)));
     let products = sum_of_products(&a.to_array(), &across.to_array());
     call.work.line(format!("a·(b×c) = det[a b c] = {products} = {}", number(result)));
@@ -87,7 +87,7 @@ fn mixed(call: &mut Call) -> Result<Value, Wrong> {
 
 fn length(call: &mut Call) -> Result<Value, Wrong> {
     let (squares, result) = match call.value(0) {
-        Value::Quaternion(q) => (quaternion::to_wxyz(*q).to_vec(), q.length()),
+        Value::Quaternion(q) => (quaternion::to_wxyz(*q).to_vec(), quaternion::length(*q)),
         Value::Vector(v) if v.len() < 4 => (v.clone(), vector::length(call.flat_or_space(0)?.0)),
         _ => return Err(call.wrong(0, call.work.texts.vector_or_quaternion)),
     };
@@ -99,8 +99,9 @@ fn length(call: &mut Call) -> Result<Value, Wrong> {
 fn unit(call: &mut Call) -> Result<Value, Wrong> {
     if let Value::Quaternion(_) = call.value(0) {
         let q = call.rotation(0)?;
-        call.work.line(format!("q/|q|,  |q| = {}", number(q.length())));
-        return Ok(Value::Quaternion(q.normalize()));
+        let Some(result) = quaternion::unit(q) else { return Err(call.wrong(0, call.work.texts.not_zero)) };
+        call.work.line(format!("q/|q|,  |q| = {}", number(quaternion::length(q))));
+        return Ok(Value::Quaternion(result));
     }
     let (a, size) = call.flat_or_space(0)?;
     let Some(result) = vector::unit(a) else { return Err(call.wrong(0, call.work.texts.not_zero)) };
@@ -123,22 +124,42 @@ fn angle(call: &mut Call) -> Result<Value, Wrong> {
     let (sine, cosine) = (vector::length(vector::cross(a, b)), vector::dot(a, b));
     let radians = vector::angle(a, b);
     let degrees = radians.to_degrees();
-    call.work.line(format!(
-        "|a×b| = |a| |b| sin θ = {},  a·b = |a| |b| cos θ = {}",
-        number(sine),
-        number(cosine)
-    ));
-    call.work.line(format!("θ = atan2(|a×b|, a·b) = {} rad = {}°", number(radians), number(degrees)));
+    if are_ordinary(&[sine.hypotenuse(cosine)]) {
+        call.work.line(format!(
+            "|a×b| = |a| |b| sin θ = {},  a·b = |a| |b| cos θ = {}",
+            number(sine),
+            number(cosine)
+        ));
+        call.work.line(format!("θ = atan2(|a×b|, a·b) = {} rad = {}°", number(radians), number(degrees)));
+    } else if let (Some(a), Some(b)) = (vector::unit(a), vector::unit(b)) {
+        // The products of the vectors as they are have no place among doubles.
+        let (sine, cosine) = (vector::length(vector::cross(a, b)), vector::dot(a, b));
+        call.work.line(format!("a' = a/|a| = {},  b' = b/|b| = {}", line(a, 3), line(b, 3)));
+        call.work.line(format!("|a'×b'| = sin θ = {},  a'·b' = cos θ = {}", number(sine), number(cosine)));
+        call.work.line(format!("θ = atan2(|a'×b'|, a'·b') = {} rad = {}°", number(radians), number(degrees)));
+    }
     Ok(Value::Number(degrees))
 }
 
 fn project(call: &mut Call) -> Result<Value, Wrong> {
     let (a, b, size) = along(call)?;
     let result = vector::project(a, b);
-    call.work.line("(a·b / |a|²) a");
-    let (dot, square) = (number(vector::dot(a, b)), number(a.length_squared()));
-    call.work.line(format!("= ({dot} / {square}) {} = {}", line(a, size), line(result, size)));
+    let (dot, square) = (vector::dot(a, b), a.length_squared());
+    if are_ordinary(&[dot, square]) || dot == 0.0 && are_ordinary(&[square]) {
+        call.work.line("(a·b / |a|²) a");
+        let (dot, square) = (number(dot), number(square));
+        call.work.line(format!("= ({dot} / {square}) {} = {}", line(a, size), line(result, size)));
+    } else if let Some(unit) = vector::unit(a) {
+        call.work.line("(a'·b) a',  a' = a/|a|");
+        let along = number(vector::projected_length(a, b));
+        call.work.line(format!("= {along} {} = {}", line(unit, size), line(result, size)));
+    }
     Ok(sized(result, size))
+}
+
+/// Whether these products have all their digits: none is beyond the doubles, or near their least.
+fn are_ordinary(products: &[f64]) -> bool {
+    products.iter().all(|product| (1e-280..1e280).contains(&product.abs()))
 }
 
 /// As [`pair`], with the first one not zero.
@@ -150,8 +171,12 @@ fn along(call: &Call) -> Result<(DVec3, DVec3, usize), Wrong> {
 fn projected_length(call: &mut Call) -> Result<Value, Wrong> {
     let (a, b, _) = along(call)?;
     let result = vector::projected_length(a, b);
-    let (dot, length) = (number(vector::dot(a, b)), number(vector::length(a)));
-    call.work.line(format!("a·b / |a| = {dot} / {length} = {}", number(result)));
+    let (dot, length) = (vector::dot(a, b), vector::length(a));
+    if are_ordinary(&[dot]) || dot == 0.0 && result == 0.0 {
+        call.work.line(format!("a·b / |a| = {} / {} = {}", number(dot), number(length), number(result)));
+    } else if let Some(unit) = vector::unit(a) {
+        call.work.line(format!("a'·b = {},  a' = a/|a| = {}", number(result), line(unit, 3)));
+    }
     call.work.line(call.work.texts.signed_length);
     Ok(Value::Number(result))
 }

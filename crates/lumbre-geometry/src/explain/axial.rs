@@ -50,13 +50,6 @@ impl Axial {
             } else {
                 self.tell_doubles(notes, ray, start, p, &doubles, exact.pair);
             }
-            if exact.a == 0.0 && exact.h == 0.0 {
-                notes.remark_last(match exact.g == 0.0 {
-                    false => Remark::AlongGenerator,
-                    true if exact.c <= 0.0 => Remark::InsideThroughout,
-                    true => Remark::Misses,
-                });
-            }
             exact.pair
         };
         if self.r1 == 0.0 {
@@ -65,6 +58,26 @@ impl Axial {
             tell_plane(notes, Topic::Tip, ray, ("P₂", self.p2), ("V", self.axis));
         }
         pair
+    }
+
+    /// The textbook's formulas, where `w` comes from the first end, or from the second.
+    fn textbook(&self, is_from_first: bool) -> [&'static str; 3] {
+        if self.k == 0.0 {
+            ["|D×V|²", "(D×V)·(w×V)", "|w×V|² − r₁²"]
+        } else if is_from_first {
+            ["|D×V|² − (k·(D·V))²", "(D×V)·(w×V) − (r₁ + k·(w·V))·(k·(D·V))", "|w×V|² − (r₁ + k·(w·V))²"]
+        } else {
+            ["|D×V|² − (k·(D·V))²", "(D×V)·(w×V) − (r₂ + k·(w·V))·(k·(D·V))", "|w×V|² − (r₂ + k·(w·V))²"]
+        }
+    }
+
+    /// What the search makes of a line that lies in the lateral surface.
+    fn in_surface(&self) -> Remark {
+        match (self.caps, self.k == 0.0) {
+            (false, _) => Remark::InSurface,
+            (true, true) => Remark::InCappedSide,
+            (true, false) => Remark::AlongGenerator,
+        }
     }
 
     fn tell_doubles(
@@ -79,16 +92,15 @@ impl Axial {
         let w = ray.origin - self.p1;
         let Equation { a, h, c, g, .. } = doubles.equation;
         let at_origin = self.equation(w, ray.direction);
-        let formulas = if self.k == 0.0 {
-            ["|D×V|²", "(D×V)·(w×V)", "|w×V|² − r₁²"]
-        } else {
-            ["|D×V|² − (k·(D·V))²", "(D×V)·(w×V) − (r₁ + k·(w·V))·(k·(D·V))", "|w×V|² − (r₁ + k·(w·V))²"]
-        };
+        let formulas = self.textbook(true);
         let solved = Solved {
             start,
             coefficients: [a, h, c],
             at_origin: [at_origin.a, at_origin.h, at_origin.c],
             formulas,
+            textbook: formulas,
+            in_surface: self.in_surface(),
+            touches: Remark::Touches,
             nearest: None,
             delta: doubles.delta,
             delta_formula: "h² − a·c",
@@ -111,15 +123,18 @@ impl Axial {
         let ExactSide { spine, solution, .. } = exact;
         let w = ray.origin - spine.base;
         let axis = DVec3::from_array(spine.axis.map(|x| x.high));
-        let [square, rise, radius] = [spine.square, spine.rise, spine.radius].map(|x| x.high);
+        let [rise, radius] = [spine.rise, spine.radius].map(|x| x.high);
+        // The textbook's axis is a unit vector, and its radius that of the end which `w` comes from.
+        let is_from_first = spine.base == self.p1;
         let at_origin = {
-            let (across, offset) = (ray.direction.cross(axis), w.cross(axis));
-            let (e, g) = (radius + rise * w.dot(axis), rise * ray.direction.dot(axis));
-            [
-                square * across.length_squared() - g * g,
-                square * across.dot(offset) - e * g,
-                square * offset.length_squared() - e * e,
-            ]
+            let (across, offset) = (ray.direction.cross(self.axis), w.cross(self.axis));
+            let first = if is_from_first { self.r1 } else { self.r2 };
+            let (e, g) = (first + self.k * w.dot(self.axis), self.k * ray.direction.dot(self.axis));
+            [across.length_squared() - g * g, across.dot(offset) - e * g, offset.length_squared() - e * e]
+        };
+        let is_at_tip = {
+            let terms = exact.e.abs() + (exact.g * (exact.h / exact.a)).abs();
+            self.k != 0.0 && exact.middle.abs() <= 1e-20 * terms
         };
         let solved = Solved {
             start: 0.0,
@@ -130,6 +145,9 @@ impl Axial {
                 "(S·S)·((D×S)·(w×S)) − (ρ₀ + κ·(w·S))·(κ·(D·S))",
                 "(S·S)·|w×S|² − (ρ₀ + κ·(w·S))²",
             ],
+            textbook: self.textbook(is_from_first),
+            in_surface: self.in_surface(),
+            touches: if is_at_tip { Remark::ThroughTip } else { Remark::Touches },
             nearest: None,
             delta: 0.0,
             delta_formula: "h² − a·c",
@@ -141,7 +159,7 @@ impl Axial {
         };
         let solved = solved.in_twice_the_precision(solution);
         let (place, start) = (DVec3::from_array(solution.place.map(|x| x.high)), solution.start);
-        let from = if spine.base == self.p1 { "O − P₁" } else { "O − P₂" };
+        let from = if is_from_first { "O − P₁" } else { "O − P₂" };
         tell_place(notes, from, w, start, place);
         solved.tell(notes, |step| {
             // Along the axis from end to end where there are ends, with a length near 1.

@@ -8,9 +8,11 @@ use crate::{Csg, Leaf, Ray, Root};
 impl Csg {
     pub(crate) fn explained(&self, ray: &Ray, notes: &mut Notes) {
         let (mut membership, mut events) = (Membership::new(self), Events::new());
+        // The intervals are those of the whole line; the range decides only which of their ends are hits.
+        let line = ray.with_range(f64::NEG_INFINITY, f64::INFINITY);
         let mut is_looked_at = vec![false; self.leaves().len()];
         let gathered =
-            self.gather(ray, &mut membership, &mut events, |leaf| is_looked_at[leaf as usize] = true);
+            self.gather(&line, &mut membership, &mut events, |leaf| is_looked_at[leaf as usize] = true);
         let operands: Vec<Operand> =
             self.leaves().iter().zip(&is_looked_at).map(|(leaf, &is)| operand(leaf, is, ray)).collect();
         for (leaf, operand) in operands.iter().enumerate() {
@@ -42,7 +44,7 @@ impl Csg {
         let mut ends = vec![];
         let mut candidates = vec![];
         let mut rest = &events[..];
-        while let Some((group, later)) = coincident(ray, rest) {
+        while let Some((group, later)) = coincident(&line, rest) {
             rest = later;
             let reasons: Vec<Option<Fate>> =
                 group.iter().map(|event| obstacle(&mut membership, event, is_looked_at.len())).collect();

@@ -73,9 +73,18 @@ impl BilinearPatch {
                     }
                 }
             }
+            None if [a, h, c] == [0.0; 3] => {
+                step.remark(Remark::EveryRuling);
+            }
             None => {
                 step.remark(Remark::Misses);
             }
+        }
+        let is_along = rulings.is_some_and(|(first, second)| {
+            [first, second].into_iter().any(|u| u.is_finite() && patch.runs_along_ruling(u))
+        });
+        if is_along {
+            step.remark(Remark::AlongRuling);
         }
         let hits = &crossings.of_line;
         let step = notes.step(Topic::Roots);

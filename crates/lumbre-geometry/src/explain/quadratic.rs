@@ -17,6 +17,12 @@ pub(super) struct Solved {
     pub(super) at_origin: [f64; 3],
     /// Their formulas, with `w` for the place.
     pub(super) formulas: [&'static str; 3],
+    /// The textbook's formulas, with `w` for the ray's origin.
+    pub(super) textbook: [&'static str; 3],
+    /// What to say of a line that lies in the surface.
+    pub(super) in_surface: Remark,
+    /// What to say where both roots are one.
+    pub(super) touches: Remark,
     /// A point, with its symbol and formula, that the discriminant is computed from.
     pub(super) nearest: Option<(&'static str, &'static str, DVec3)>,
     pub(super) delta: f64,
@@ -98,15 +104,16 @@ impl Solved {
         let [a, h, c] = self.coefficients;
         let [a_origin, h_origin, c_origin] = self.at_origin;
         let [a_formula, h_formula, c_formula] = self.formulas;
+        let [a_textbook, h_textbook, c_textbook] = self.textbook;
         step.number("a", a_formula, a);
         if self.textbook_a() == "a₀" {
-            step.beside(format!("a₀ = {a_formula}"), a_origin);
+            step.beside(format!("a₀ = {a_textbook}"), a_origin);
         }
         step.number("h", at_place(h_formula, self.start), h);
-        step.beside(format!("b = 2·({h_formula})"), 2.0 * h_origin);
+        step.beside(format!("b = 2·({h_textbook})"), 2.0 * h_origin);
         step.number("c", at_place(c_formula, self.start), c);
         if self.textbook_c() == "c₀" {
-            step.beside(format!("c₀ = {c_formula}"), c_origin);
+            step.beside(format!("c₀ = {c_textbook}"), c_origin);
         }
         if let Some([a_error, h_error, c_error]) = self.errors {
             step.number("ε₂", "", a_error).number("ε₁", "", h_error).number("ε₀", "", c_error);
@@ -122,7 +129,7 @@ impl Solved {
 
     /// What its last coefficient is called.
     fn textbook_c(&self) -> &'static str {
-        if self.start == 0.0 && !self.is_twofold { "c" } else { "c₀" }
+        if self.coefficients[2] == self.at_origin[2] { "c" } else { "c₀" }
     }
 
     fn textbook_discriminant(&self) -> String {
@@ -148,7 +155,8 @@ impl Solved {
         }
         let is_schoolbook_hit = schoolbook >= 0.0;
         match self.crossings {
-            None if is_schoolbook_hit => step.remark(Remark::SchoolbookHits),
+            // Without a negative discriminant nothing is rounded: the line lies in or inside of the surface.
+            None if is_schoolbook_hit && self.delta < 0.0 => step.remark(Remark::SchoolbookHits),
             Some(_) if !is_schoolbook_hit => step.remark(Remark::SchoolbookMisses),
             _ => step,
         };
@@ -156,17 +164,21 @@ impl Solved {
 
     fn tell_roots(&self, notes: &mut Notes) {
         let step = notes.step(Topic::Roots);
+        let [a, h, c] = self.coefficients;
         let Some((first, second)) = self.crossings else {
-            step.remark(Remark::Misses);
+            step.remark(match () {
+                () if a != 0.0 || h != 0.0 || c > 0.0 => Remark::Misses,
+                () if c < 0.0 => Remark::InsideThroughout,
+                () => self.in_surface,
+            });
             return;
         };
-        let [a, ..] = self.coefficients;
         let from_start = |formula: &'static str| {
             if self.start == 0.0 { formula.to_owned() } else { format!("t₀ + {formula}") }
         };
         if first == second {
             step.number("t₁", if self.start == 0.0 { "−h/a" } else { "t₀ − h/a" }, first)
-                .remark(Remark::Touches);
+                .remark(self.touches);
             return;
         }
         // With the sign of h, or of zero, as the search takes it.

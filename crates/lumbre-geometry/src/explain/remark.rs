@@ -15,16 +15,23 @@ pub enum Remark {
     Between,
     /// `a` is zero: the equation is linear, and one root has gone to infinity.
     AtInfinity,
-    /// The line is inside from end to end, and crosses nothing.
+    /// `a = h = 0` and `c < 0`: the line is inside the surface all the way, and does not cross it.
     InsideThroughout,
-    /// The line is along a generator of a cone, and is inside it from the tip on.
+    /// `a = h = c = 0`: the line lies in the surface, and crosses it nowhere.
+    InSurface,
+    /// `a = h = c = 0`: the line lies in the side of a cylinder with caps, and counts as inside.
+    InCappedSide,
+    /// `a = h = c = 0`: the line is a generator of a cone with caps, and counts as inside from the tip on.
     AlongGenerator,
-    /// The ray begins so far away that the equation is set up nearer to the shape, where it keeps its digits.
+    /// The line passes the tip of a cone: both roots are one.
+    ThroughTip,
+    /// The equation is set up elsewhere than at the ray's origin, where fewer of its digits cancel: in the middle of the roots, or
+    /// where the line is nearest to the shape.
     SetUpNearby {
         /// The ray parameter there, `t₀`.
         start: f64,
     },
-    /// Doubles could not decide, or not keep their digits, and it was computed in twice the precision. The numbers told are rounded.
+    /// Doubles do not prove how many roots there are, or would not keep their digits: it was computed in twice the precision.
     TwicePrecision,
     /// The textbook's formula loses digits here.
     Cancellation {
@@ -35,6 +42,17 @@ pub enum Remark {
     SchoolbookMisses,
     /// The textbook's discriminant is not negative, by rounding: it hits what the search misses.
     SchoolbookHits,
+    /// The textbook's equation with its coefficients rounded has another number of roots than the shape has crossings.
+    SchoolbookCount {
+        /// How many crossings there are, a touch counted twice.
+        crossings: usize,
+        /// How many roots the textbook's equation has.
+        roots: usize,
+    },
+    /// The line runs along a ruling of a bilinear patch: it is in the patch between the places where it enters and leaves it.
+    AlongRuling,
+    /// Every ruling of one family meets the line: it is a ruling of the other family.
+    EveryRuling,
     /// Products rounded to the same number, so that their rounding errors decided about an edge.
     EdgeByRoundingErrors,
     /// This test says otherwise than the search.

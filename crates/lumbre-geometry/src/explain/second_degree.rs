@@ -4,7 +4,7 @@ use lumbre_math::DVec3;
 
 use super::notes::Notes;
 use super::quadratic::{Solved, stable_q, tell_pair, tell_place};
-use super::{Fate, Topic};
+use super::{Fate, Remark, Topic};
 use crate::line::{Doubles, SecondDegree, Solution, crossings, set_up};
 use crate::support::azimuth;
 use crate::twofold::point;
@@ -29,6 +29,9 @@ fn tell(
         coefficients: [a, h, c],
         at_origin: surface.along(w.to_array(), d.to_array()),
         formulas,
+        textbook: formulas,
+        in_surface: Remark::InSurface,
+        touches: Remark::Touches,
         nearest: None,
         delta,
         delta_formula: "h² − a·c",

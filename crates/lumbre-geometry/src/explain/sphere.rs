@@ -4,7 +4,7 @@ use lumbre_math::DVec3;
 
 use super::notes::Notes;
 use super::quadratic::{Solved, stable_q, tell_pair, tell_place};
-use super::{Fate, Topic};
+use super::{Fate, Remark, Topic};
 use crate::sphere::{Equation, Nearby, crossings, solution};
 use crate::support::azimuth;
 use crate::{Ray, Sphere};
@@ -23,6 +23,9 @@ pub(super) fn tell_sphere(notes: &mut Notes, center: DVec3, radius: f64, ray: &R
         coefficients: [a, h, c],
         at_origin: [a, h, c],
         formulas: FORMULAS,
+        textbook: FORMULAS,
+        in_surface: Remark::InSurface,
+        touches: Remark::Touches,
         nearest: Some(("l", "w − (h/a)·D", equation.nearest)),
         delta,
         delta_formula: "a·(r² − l·l)",

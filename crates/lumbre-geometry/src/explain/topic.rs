@@ -54,6 +54,9 @@ pub enum Topic {
     QuarticExtrema,
     /// The roots of the quartic, and the crossings that they are.
     QuarticRoots,
+    /// The textbook's quartic in doubles, `c₄·t²·t² + c₃·t²·t + c₂·t² + c₁·t + c₀ = 0`, and its real roots `τ`, each without a further
+    /// rounding error to speak of: what the rounded coefficients leave of the crossings.
+    TextbookQuartic,
     /// The shear that makes the ray the third axis: `e₁`, `e₂`, `e₃` are the coordinate axes, the one that the direction is longest
     /// along last. Each corner gets the place `x`, `y` as seen along the ray, and `z` along the third axis.
     Shear,

@@ -1,15 +1,15 @@
 //! Tori, by the quartic along the line.
 
 use lumbre_math::DVec3;
-use lumbre_math::roots::DepressedCubic;
+use lumbre_math::roots::{DepressedCubic, quartic_roots_between};
 
 use super::notes::{Notes, out_of_range};
 use super::quadratic::digits_lost;
 use super::{Fate, Remark, Topic};
+use crate::twofold::{self, Twofold, components, cross, dot};
 use crate::{Ray, Torus};
 
 /// The textbook's quartic along the line from the ray's origin, the constant first.
-#[derive(Clone, Copy)]
 struct Schoolbook([f64; 5]);
 
 impl Schoolbook {
@@ -26,13 +26,32 @@ impl Schoolbook {
         ])
     }
 
-    /// How far from `t` its root is, by a step of Newton's method, relative to `t`.
-    fn relative_error(self, t: f64) -> f64 {
-        let [c0, c1, c2, c3, c4] = self.0;
-        let value = (((c4 * t + c3) * t + c2) * t + c1) * t + c0;
-        let slope = ((4.0 * c4 * t + 3.0 * c3) * t + 2.0 * c2) * t + c1;
-        (value / slope / t).abs()
+    /// Its real roots in ascending order.
+    fn roots(&self) -> Vec<f64> {
+        let Self(coefficients) = self;
+        let fits = coefficients.iter().all(|c| c.is_finite());
+        if fits {
+            quartic_roots_between(coefficients, f64::NEG_INFINITY, f64::INFINITY).to_vec()
+        } else {
+            vec![]
+        }
     }
+}
+
+/// The crossing that a crossing in doubles stands for: a step of Newton's method on the torus' own equation
+/// `(p·p + R² − r²)² = 4·R²·|p×V|²`, in twice the precision at the point itself. `None` where that does not settle it.
+fn settled(torus: &Torus, ray: &Ray, t: f64) -> Option<f64> {
+    let p = twofold::place(ray.origin, torus.center(), t, ray.direction);
+    let (d, v) = (components::<Twofold>(ray.direction), components::<Twofold>(torus.axis()));
+    let (big, small) =
+        (Twofold::product(torus.major(), torus.major()), Twofold::product(torus.minor(), torus.minor()));
+    let four = big * Twofold::from(4.0) / dot(v, v);
+    let (offset, across) = (cross(p, v), cross(d, v));
+    let k = dot(p, p) + big - small;
+    let value = k * k - four * dot(offset, offset);
+    let half_slope = k * dot(p, d) * Twofold::from(2.0) - four * dot(offset, across);
+    let step = value.high / (2.0 * half_slope.high);
+    (step.abs() <= 1e-9 * t.abs()).then_some(t - step)
 }
 
 /// The names of the roots.
@@ -67,7 +86,7 @@ impl Torus {
         };
 
         let schoolbook = Schoolbook::new(self, w, ray.direction);
-        let Schoolbook([c0, c1, c2, ..]) = schoolbook;
+        let Schoolbook([c0, c1, c2, c3, c4]) = schoolbook;
         let quartic = self.quartic(&line);
         let step = notes.step(Topic::Quartic);
         step.number("a₂", "2·(|p|² − r² − R² + 2·R²·z₁²)", quartic.p);
@@ -97,13 +116,9 @@ impl Torus {
             true
         });
         let step = notes.step(Topic::QuarticRoots);
-        let mut lost: f64 = 0.0;
         for ([s_name, t_name], &(s, t, multiplicity)) in ROOTS.into_iter().zip(&roots) {
             step.number(s_name, "", s).number(t_name, format!("t₀ + (s₀ + {s_name})/v"), t);
-            if multiplicity == 1 {
-                let off = schoolbook.relative_error(t);
-                lost = lost.max(if off.is_finite() { off } else { 0.0 });
-            } else {
+            if multiplicity > 1 {
                 step.remark(Remark::Touches);
             }
         }
@@ -112,8 +127,27 @@ impl Torus {
             Some(_) => Remark::Descent,
             None => Remark::Pieces,
         });
-        if lost > 1e-12 {
-            step.remark(Remark::Cancellation { digits: digits_lost(lost) });
+
+        let theirs = schoolbook.roots();
+        let step = notes.step(Topic::TextbookQuartic);
+        step.number("c₄", "(D·D)·(D·D)", c4).number("c₃", "4·(D·D)·(w·D)", c3);
+        step.numbers("τ", "", theirs.clone());
+        let crossings = roots.iter().map(|root| usize::from(root.2)).sum();
+        if theirs.len() == roots.len() {
+            let mut lost: f64 = 0.0;
+            for (theirs, &(_, t, multiplicity)) in theirs.iter().zip(&roots) {
+                // Half of the digits of a double root are lost by any rounding.
+                let is_simple = multiplicity == 1;
+                if let Some(t) = settled(self, ray, t).filter(|_| is_simple) {
+                    let off = ((theirs - t) / t).abs();
+                    lost = lost.max(if off.is_finite() { off } else { 0.0 });
+                }
+            }
+            if lost > 1e-12 {
+                step.remark(Remark::Cancellation { digits: digits_lost(lost) });
+            }
+        } else if theirs.len() != crossings {
+            step.remark(Remark::SchoolbookCount { crossings, roots: theirs.len() });
         }
         for (_, t, _) in roots {
             notes.candidate(t, 0, out_of_range(ray, t).unwrap_or(Fate::Hit));
