@@ -17,7 +17,7 @@ pub(crate) fn is_asked_for(words: &[OsString]) -> bool {
 }
 
 /// The headings of options.
-const HEADINGS: [(&str, &str); 7] = [
+static HEADINGS: [(&str, &str); 7] = [
     ("View", "Vista"),
     ("Showing a model", "Presentación de un modelo"),
     ("Reading", "Lectura"),
@@ -221,7 +221,7 @@ fn translated_argument(argument: Arg) -> Arg {
         Some(heading) => HEADINGS
             .iter()
             .find(|(english, _)| *english == heading)
-            .map_or("Opciones", |(_, spanish)| spanish),
+            .map_or("Opciones", |(_, spanish)| *spanish),
         None if argument.is_positional() => "Argumentos",
         None => "Opciones",
     };
