@@ -16,6 +16,7 @@ use page::Preparer;
 mod console;
 mod formula;
 mod include;
+mod languages;
 mod links;
 mod page;
 mod picture;
@@ -107,6 +108,7 @@ fn build(mdbook: &Path, quick: bool) -> Result<()> {
         fs::remove_dir_all(&html).with_context(|| format!("cannot remove {}", html.display()))?;
     }
     run_mdbook(mdbook, &pages, &html)?;
+    languages::mark(&html)?;
     refuse(&links::check(&html, &pages)?)?;
     eprintln!("The book is {}", html.join("index.html").display());
     Ok(())

@@ -6,7 +6,7 @@ use std::process::Command;
 use anyhow::{Context, Result, bail};
 
 /// What is said of a block in the line that opens it: `console`, `console,head=20`, `console,result` or `console,varies`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Example {
     /// How many lines of each output are shown, if not all.
     head: Option<usize>,

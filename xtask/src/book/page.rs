@@ -3,7 +3,7 @@
 
 use std::borrow::Cow;
 use std::cell::RefCell;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
 use std::fs;
 use std::ops::Range;
@@ -47,6 +47,8 @@ pub(crate) struct Preparer<'a> {
     pictures: Pictures<'a>,
     /// The small pictures of the repository.
     kept: RefCell<Kept>,
+    /// What examples showed: pages in two languages share those whose commands are the same, and each is run once.
+    shown: RefCell<BTreeMap<(Example, String), String>>,
     /// Whether the repository is brought up to date, and nothing else.
     update: bool,
 }
@@ -62,7 +64,8 @@ impl<'a> Preparer<'a> {
     ) -> Result<Self> {
         let pictures = Pictures { program, kept: rendered, quick };
         let kept = RefCell::new(Kept::read(&root.join(PAGES))?);
-        Ok(Self { root, copy, program, pictures, kept, update })
+        let shown = RefCell::default();
+        Ok(Self { root, copy, program, pictures, kept, shown, update })
     }
 
     /// Prepares every page, and says all that is wrong in them: also where the page of the repository is not up to date, unless it is brought up
@@ -136,28 +139,25 @@ impl<'a> Preparer<'a> {
                     Ok(None)
                 }
                 Event::End(pulldown_cmark::TagEnd::CodeBlock) => match example.take() {
-                    Some((example, place, commands)) => {
-                        let folder = self.copy.join(PAGES);
-                        match example.run(&commands, &folder, self.program) {
-                            Ok(shown) => {
-                                let commands = commands.trim_end();
-                                let is_same = example.is_same(commands, shown.trim_end());
-                                let shown = if is_same { commands } else { &shown };
-                                let info = text[place.clone()].lines().next().unwrap_or_default();
-                                let info = info.trim_start_matches('`');
-                                shown_there.push(Change {
-                                    place: place.clone(),
-                                    text: fenced(shown, info, text, &place),
-                                });
-                                Ok(Some(fenced(shown, "console", text, &place)))
-                            }
-                            Err((number, error)) => {
-                                let lines = text[place.clone()].split_inclusive('\n').take(number + 1);
-                                say(place.start + lines.map(str::len).sum::<usize>(), &error);
-                                Ok(None)
-                            }
+                    Some((example, place, commands)) => match self.run(example, &commands) {
+                        Ok(shown) => {
+                            let commands = commands.trim_end();
+                            let is_same = example.is_same(commands, shown.trim_end());
+                            let shown = if is_same { commands } else { &shown };
+                            let info = text[place.clone()].lines().next().unwrap_or_default();
+                            let info = info.trim_start_matches('`');
+                            shown_there.push(Change {
+                                place: place.clone(),
+                                text: fenced(shown, info, text, &place),
+                            });
+                            Ok(Some(fenced(shown, "console", text, &place)))
                         }
-                    }
+                        Err((number, error)) => {
+                            let lines = text[place.clone()].split_inclusive('\n').take(number + 1);
+                            say(place.start + lines.map(str::len).sum::<usize>(), &error);
+                            Ok(None)
+                        }
+                    },
                     None => Ok(None),
                 },
                 Event::Start(Tag::Image { dest_url, .. }) => {
@@ -178,6 +178,18 @@ impl<'a> Preparer<'a> {
             say(at, &anyhow::anyhow!("an include that stands in no block of code by itself"));
         }
         Ok(Prepared { kept: changed(text, &shown_there), book: changed(text, &changes) })
+    }
+
+    /// Runs an example, unless one with the same commands was run.
+    fn run(&self, example: Example, text: &str) -> Result<String, (usize, anyhow::Error)> {
+        let commands = text.lines().filter(|line| line.starts_with("$ ")).collect::<Vec<_>>().join("\n");
+        let key = (example, commands);
+        if let Some(shown) = self.shown.borrow().get(&key) {
+            return Ok(shown.clone());
+        }
+        let shown = example.run(text, &self.copy.join(PAGES), self.program)?;
+        self.shown.borrow_mut().insert(key, shown.clone());
+        Ok(shown)
     }
 
     /// Renders a picture that has its scene beside it, and takes in one from outside the pages. Where it is then, if not where it was.
@@ -326,6 +338,14 @@ mod tests {
         assert!(page.contains("1. one\n   ```console\n   $ lumbre `echo hi`\n   hi\n   ```\n"), "{page}");
         assert!(page.contains("/blob/main/seen.png)"), "{page}");
         assert!(page.contains("![b](../outside/seen.png) [c](../d.md#e)\n"), "{page}");
+    }
+
+    #[test]
+    fn an_example_that_stands_in_two_places_is_run_once() {
+        let page = "```console\n$ echo more >> file; wc -l < file\n```\n\n```console\n$ echo more >> file; wc -l < file\nold\n```\n\n```console\n$ wc -l < file\n```\n";
+        let (Prepared { kept, .. }, faults) = prepared(page);
+        assert_eq!(faults, [""; 0]);
+        assert_eq!(kept.matches("wc -l < file\n1\n").count(), 3, "{kept}");
     }
 
     #[test]
