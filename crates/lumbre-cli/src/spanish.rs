@@ -124,6 +124,18 @@ const ARGUMENTS: &[(&str, &str, &str)] = &[
         "Una carpeta de archivos que incluye una escena de POV-Ray, además de la suya y de la que POV-Ray tiene en Debian; varias veces para varias, la primera primero",
         "CARPETA",
     ),
+    (
+        "pov_clock",
+        "El reloj de una escena de POV-Ray; dos, como 0..2, son los de la primera y la última imagen de --frames",
+        "K|A..B",
+    ),
+    (
+        "pov_frames",
+        "Las imágenes que recorre el reloj de una escena de POV-Ray, si --frames son solo algunas de ellas",
+        "A..B",
+    ),
+    ("pov_cyclic", "La imagen que sigue a la última de una escena de POV-Ray es otra vez la primera", ""),
+    ("pov_declare", "Declara un número o un texto antes de leer una escena de POV-Ray", "NOMBRE=VALOR"),
     ("frame", "El tiempo en segundos en que se evalúan las animaciones de un glTF", ""),
     (
         "shutter",

@@ -530,7 +530,7 @@ fn the_matrices_of_the_camera_lead_back_to_the_pixel() {
         let forth = place("point of the film, in pixels from the upper left corner");
         let back = place("point of the film, in pixels from the upper left corner, y downwards");
         assert!(forth.iter().zip(&back).all(|(x, y)| (x - y).abs() < 1e-5), "{forth:?} {back:?}");
-        let [u, v, w] = ["u", "v", "w"].map(|symbol| place(symbol));
+        let [u, v, w] = ["u", "v", "w"].map(place);
         let turn = (u[1] * v[2] - u[2] * v[1]) * w[0]
             + (u[2] * v[0] - u[0] * v[2]) * w[1]
             + (u[0] * v[1] - u[1] * v[0]) * w[2];

@@ -1397,7 +1397,7 @@ fn the_dispersion_of_a_glass_is_kept() {
     };
     for material in ["\"dielectric\"", "\"thindielectric\""] {
         let scene = read(&text(material));
-        let index = scene.materials[0].material.dispersion.as_ref().unwrap();
+        let index = scene.materials.iter().find_map(|named| named.material.dispersion.as_ref()).unwrap();
         // At the d line and in the blue, by the catalogue of SF11.
         for (nm, expected) in [(587.6, 1.78472), (435.8, 1.82518)] {
             let found = index.at(nm).unwrap();

@@ -202,7 +202,7 @@ fn without(m: &Rows, row: usize, column: usize) -> Rows {
 
 fn cofactor(m: &Rows, row: usize, column: usize) -> Exact {
     let minor = expanded(&without(m, row, column));
-    if (row + column) % 2 == 0 { minor } else { minor.negated() }
+    if (row + column).is_multiple_of(2) { minor } else { minor.negated() }
 }
 
 /// The determinant of a matrix given by its rows: exact, rounded once. It is 0 only if the matrix is singular, or if

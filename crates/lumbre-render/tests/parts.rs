@@ -19,7 +19,7 @@ use lumbre_scene::{IntegratorKind, SamplerKind, Scene};
 fn scenes() -> [Scene; 2] {
     let mut glass = lit_by_a_large_lamp();
     glass.integrator.kind = IntegratorKind::Caustics;
-    [still_life(DVec3::ZERO), glass].map(|desc| Scene::build(desc).unwrap())
+    [still_life(DVec3::ZERO), glass].map(|desc| Scene::build(desc).expect("a scene"))
 }
 
 fn all_options(scene: &Scene) -> [RenderOptions; 4] {

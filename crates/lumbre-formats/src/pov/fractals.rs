@@ -29,8 +29,7 @@ impl Parser<'_, '_> {
             slice: (DVec4::W, 0.0),
         };
         let mut is_known = true;
-        loop {
-            let Some(word) = self.word()? else { break };
+        while let Some(word) = self.word()? {
             match &*word {
                 "quaternion" => julia.algebra = Algebra::Quaternion,
                 "hypercomplex" => julia.algebra = Algebra::Hypercomplex,

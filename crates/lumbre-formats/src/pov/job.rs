@@ -267,11 +267,11 @@ fn number(value: &str) -> Result<f64, String> {
         .parse()
         .ok()
         .filter(|x: &f64| x.is_finite())
-        .ok_or_else(|| format!("expected a number (found {value:?})"))
+        .ok_or_else(|| format!("expected a number (found \"{value}\")"))
 }
 
 fn count(value: &str) -> Result<u32, String> {
-    value.parse().map_err(|_| format!("expected a whole number (found {value:?})"))
+    value.parse().map_err(|_| format!("expected a whole number (found \"{value}\")"))
 }
 
 fn size(value: &str) -> Result<u32, String> {
@@ -287,7 +287,7 @@ fn truth(value: &str) -> Result<bool, String> {
     match &*value.to_ascii_lowercase() {
         "on" | "true" | "yes" | "1" => Ok(true),
         "off" | "false" | "no" | "0" => Ok(false),
-        _ => Err(format!("expected on or off (found {value:?})")),
+        _ => Err(format!("expected on or off (found \"{value}\")")),
     }
 }
 

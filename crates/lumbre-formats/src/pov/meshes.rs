@@ -23,6 +23,9 @@ struct Triangles {
     has_uvs: bool,
 }
 
+/// Faces by the numbers of their corners, and the texture of each.
+type FaceList = (Vec<[u32; 3]>, Vec<Option<usize>>);
+
 impl Triangles {
     fn mesh(self) -> MeshDesc {
         let count = self.positions.len() as u32 / 3;
@@ -239,7 +242,7 @@ impl Parser<'_, '_> {
     }
 
     /// Faces by the numbers of their corners, with the texture of the first corner where textures follow.
-    fn face_list(&mut self) -> Result<(Vec<[u32; 3]>, Vec<Option<usize>>)> {
+    fn face_list(&mut self) -> Result<FaceList> {
         self.expect(b'{')?;
         self.float()?;
         self.comma()?;

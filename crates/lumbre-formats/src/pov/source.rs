@@ -319,7 +319,7 @@ impl Parser<'_, '_> {
                 return Ok(false);
             };
             let closes = matches!(&**word, "else" | "elseif" | "end" | "break" | "case" | "range");
-            if !is_deeper && !(closes && frame.blocks.len() > blocks) {
+            if !(is_deeper || closes && frame.blocks.len() > blocks) {
                 return Ok(true);
             }
             self.raw()?;
