@@ -111,7 +111,7 @@ impl ShapeBuilder {
     /// use lumbre::{DVec3, SceneBuilder, ShapeBuilder};
     ///
     /// let haze = HomogeneousMedium { extinction: Spectrum::splat(0.2), albedo: Spectrum::splat(0.9), asymmetry: 0.3 };
-    /// let haze = Medium::Homogeneous { medium: haze, glow: Spectrum::BLACK };
+    /// let haze = Medium::Homogeneous { medium: haze, glow: Spectrum::BLACK, spectra: None };
     /// let cloud = ShapeBuilder::exact(Sphere::new(DVec3::ZERO, 3.0)?).medium(haze);
     /// assert!(SceneBuilder::new().shape(cloud).build()?.resolved().has_media());
     /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -194,6 +194,13 @@ fn single(x: f32) -> String {
 }
 
 impl Scope {
+    /// Gives a symbol a value from here on.
+    pub(super) fn set(&mut self, symbol: &str, value: &Value) {
+        let written = value.in_short();
+        let is_rounded = written != value.in_full();
+        self.put(symbol, written, is_rounded);
+    }
+
     /// Gives the symbols of a ray's origin and direction their values.
     pub(super) fn set_ray(&mut self, [origin, direction]: [&str; 2], ray: &Ray) {
         self.set(origin, &Value::from(ray.origin));

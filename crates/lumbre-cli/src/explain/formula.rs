@@ -3,8 +3,6 @@
 use std::collections::HashMap;
 use std::fmt::Write;
 
-use super::document::Value;
-
 /// A piece of a formula.
 #[derive(Clone, Debug, PartialEq)]
 enum Token {
@@ -172,10 +170,8 @@ pub(super) struct PutIn {
 }
 
 impl Scope {
-    /// Gives a symbol a value from here on.
-    pub(super) fn set(&mut self, symbol: &str, value: &Value) {
-        let written = value.in_short();
-        let is_rounded = written != value.in_full();
+    /// Gives a symbol what is written for it from here on, and whether digits are left out there.
+    pub(super) fn put(&mut self, symbol: &str, written: String, is_rounded: bool) {
         self.0.insert(symbol.to_owned(), Entry { written, is_rounded });
     }
 
@@ -480,9 +476,9 @@ mod tests {
     fn numbers_take_the_place_of_symbols() {
         let mut scope = Scope::default();
         for (symbol, number) in [("h", -5.0), ("a", 1.0), ("c", 24.0), ("t₁", 4.0)] {
-            scope.set(symbol, &Value::from(number));
+            scope.put(symbol, f64::to_string(&number), false);
         }
-        scope.set("x₀", &Value::from(1.0 / 3.0));
+        scope.put("x₀", "0.333333".to_owned(), true);
         let put_in = |formula: &str| scope.put_in(formula).map(|it| (it.written, it.is_rounded));
         let exactly = |written: &str| Some((written.to_owned(), false));
         assert_eq!(put_in("h² − a·c"), exactly("(-5)² − 1·24"));

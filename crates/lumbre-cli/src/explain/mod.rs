@@ -40,8 +40,9 @@ mod writing;
 use document::Section;
 use english::ENGLISH;
 pub use explainer::Explainer;
-use question::{Asked, Question};
+use question::Question;
 use spanish::SPANISH;
+use surfaces::Chosen;
 use texts::Texts;
 pub use things::Things;
 
@@ -249,8 +250,8 @@ fn told(
 ) -> Result<Vec<Section>, Failure> {
     let &Request { sample, depth, nearest, .. } = request;
     let shapes = match &request.shape {
-        Some(name) => Some(Asked::Called(name.clone())),
-        None => request.all_shapes.then_some(Asked::All),
+        Some(name) => Some(Chosen::Called(name.clone())),
+        None => request.all_shapes.then_some(Chosen::All),
     };
     let texts = texts(request.lang);
     let question = Question { things, texts, sample, depth, nearest, shapes };

@@ -6,6 +6,7 @@ use lumbre::shading::Spectrum;
 use lumbre::{DVec3, Ray, RenderOptions, Scene};
 
 use super::document::{Item, Section};
+use super::surfaces::Chosen;
 use super::texts::Texts;
 use super::things::Things;
 use super::{camera, light, sketch, surfaces};
@@ -22,15 +23,7 @@ pub(super) struct Question<'a> {
     /// Whether only the surface that is seen is told.
     pub(super) nearest: bool,
     /// The shapes that are told, met or not; `None` for those that the ray meets.
-    pub(super) shapes: Option<Asked>,
-}
-
-/// Which shapes are asked for.
-#[derive(Clone, Debug)]
-pub(super) enum Asked {
-    All,
-    /// By number, kind, or the name of the material.
-    Called(String),
+    pub(super) shapes: Option<Chosen>,
 }
 
 impl Question<'_> {

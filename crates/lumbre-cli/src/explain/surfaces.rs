@@ -14,7 +14,6 @@ use lumbre::{DVec3, Ray, Scene, Transform};
 use super::document::{Section, Value, exact};
 use super::formula::{Scope, with_primes};
 use super::misses::{self, Missed, Nearest};
-use super::question::Asked;
 use super::shape;
 use super::sketch::Scenery;
 use super::texts::Texts;
@@ -37,13 +36,21 @@ pub(super) struct Told {
     pub(super) scenery: Scenery,
 }
 
+/// Which shapes are told of.
+#[derive(Clone, Debug)]
+pub(super) enum Chosen {
+    All,
+    /// By number, kind, or the name of the material.
+    Called(String),
+}
+
 /// What is to be told of the surfaces along a ray.
 pub(super) struct Wanted<'a> {
     /// Whether only the surface that is seen is told.
     pub(super) nearest: bool,
     pub(super) is_from_camera: bool,
     /// The shapes that are told, met or not; `None` for those that the ray meets, or else those that it passes nearest.
-    pub(super) shapes: Option<&'a Asked>,
+    pub(super) shapes: Option<&'a Chosen>,
 }
 
 /// Everything on the way of a ray, and what it passes where that is asked for or nothing is met.
@@ -59,8 +66,8 @@ pub(super) fn surfaces(
 ) -> Result<Told, Failure> {
     let resolved = scene.resolved();
     let is_wanted = |shape: u32| match wanted.shapes {
-        Some(Asked::Called(name)) => things.is_called(shape, name),
-        Some(Asked::All) | None => true,
+        Some(Chosen::Called(name)) => things.is_called(shape, name),
+        Some(Chosen::All) | None => true,
     };
     let mut section = Section::new("surfaces", texts.surfaces);
     let first = if wanted.is_from_camera { resolved.closest_seen(ray) } else { resolved.closest(ray) };
@@ -90,7 +97,7 @@ pub(super) fn surfaces(
         0 => Vec::new(),
         _ => misses::nearest(scene, ray, most, |shape| is_wanted(shape) && !met.contains(&shape)),
     };
-    if let (true, true, Some(Asked::Called(name))) = (hits.is_empty(), missed.is_empty(), wanted.shapes) {
+    if let (true, true, Some(Chosen::Called(name))) = (hits.is_empty(), missed.is_empty(), wanted.shapes) {
         let names = Vec::from_iter(things.names()).join(", ");
         return Err(Failure::Usage(filled(texts.no_such_shape, &[name, &names])));
     }
