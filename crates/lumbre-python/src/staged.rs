@@ -216,16 +216,14 @@ impl Wish {
             Around::Own => add("env", "none".to_owned()),
             Around::Studio => add("env", "studio".to_owned()),
             Around::Map(map) => add("env", format!("map {}", hash(&map.image))),
-            Around::Light(light) => {
-                let image = match &**light {
-                    LightDesc::Infinite { image: Some(map), .. } => hash(&map.image),
-                    _ => String::new(),
-                };
-                let LightDesc::Infinite { world_from_light, radiance, .. } = &**light else {
-                    return settings;
-                };
-                add("env", format!("light {world_from_light:?} {radiance:?} {image}"));
-            }
+            Around::Light(light) => match light.bare() {
+                LightDesc::Infinite { world_from_light, radiance, image } => {
+                    let image = image.as_ref().map_or_else(String::new, |map| hash(&map.image));
+                    let light = [lumbre::in_words(world_from_light), lumbre::in_words(radiance), image];
+                    add("env", format!("light {}", light.join(" ")));
+                }
+                other => add("env", lumbre::in_words(other)),
+            },
         }
         if !self.overrides.is_empty() {
             add("overrides", self.overrides.join("; "));
