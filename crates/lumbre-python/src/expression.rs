@@ -166,7 +166,7 @@ impl<'a> Parser<'a> {
             Some(c) => format!("\"{c}\" at position {}", self.text[..self.at].chars().count() + 1),
             None => "its end".to_owned(),
         };
-        invalid(format!("expression {:?}: found {found}; expected {expected}", self.text))
+        invalid(format!("expression \"{}\": found {found}; expected {expected}", self.text))
     }
 
     fn expect(&mut self, mark: &str) -> PyResult<()> {
@@ -335,7 +335,7 @@ impl<'a> Parser<'a> {
         if takes_many != (count > 1) {
             let expected = if takes_many { "two or more" } else { "one" };
             return Err(invalid(format!(
-                "expression {:?}: {name} has {count} arguments (expected {expected})",
+                "expression \"{}\": {name} has {count} arguments (expected {expected})",
                 self.text
             )));
         }

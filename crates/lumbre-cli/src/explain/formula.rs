@@ -450,12 +450,15 @@ fn closing(tokens: &[Token], open: usize) -> Option<usize> {
     None
 }
 
-/// The element without the parentheses about all of it: the line of a quotient says as much.
+/// The element without the parentheses about all of it: the line of a quotient says as much. A vector keeps its own.
 fn without_parentheses(element: &str) -> String {
     let inner = element
         .strip_prefix("<mrow><mo stretchy=\"false\">(</mo>")
         .and_then(|rest| rest.strip_suffix("<mo stretchy=\"false\">)</mo></mrow>"));
-    inner.map_or_else(|| element.to_owned(), |inner| format!("<mrow>{inner}</mrow>"))
+    match inner {
+        Some(inner) if !inner.contains(",</mo>") => format!("<mrow>{inner}</mrow>"),
+        _ => element.to_owned(),
+    }
 }
 
 #[cfg(test)]
@@ -512,6 +515,8 @@ mod tests {
         assert_eq!(ml.matches("</msqrt>").count(), 1);
         assert!(ml.contains("<msup><mi>h</mi><mn>2</mn></msup>") && ml.contains("&lt;"), "{ml}");
         assert!(ml.contains("<msub><mi>t</mi><mi>1</mi></msub>"), "{ml}");
+        let ml = mathml("(1, 2, 3)/|R|");
+        assert!(ml.contains("(</mo><mn>1</mn>"), "{ml}");
         let ml = mathml("t₀ + (−b − √(b² − 4·a·c))/(2·a) − |D×V|²/q");
         assert_eq!(ml.matches("<mfrac>").count(), 2, "{ml}");
         assert!(ml.contains("<mfrac><mrow><mo>−</mo><mi>b</mi>"), "{ml}");

@@ -10,7 +10,7 @@ const STYLE: &str = "
 body { background: Canvas; color: CanvasText; font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 1rem auto; padding: 0 1rem; }
 h1 { font-size: 1.5rem; } h2 { font-size: 1.25rem; margin-top: 2rem; border-bottom: 1px solid var(--line); }
 h3 { font-size: 1.1rem; } h4, h5, h6 { font-size: 1rem; margin-bottom: .2rem; }
-summary { cursor: pointer; } summary > * { display: inline-block; margin: .6rem 0 .2rem; } body { overflow-wrap: anywhere; }
+summary { cursor: pointer; } summary > * { display: inline; margin: .6rem 0 .2rem; } body { overflow-wrap: anywhere; }
 section section { margin-left: .8rem; padding-left: .8rem; border-left: 2px solid var(--line); }
 @media (max-width: 40rem) { section section { margin-left: .2rem; padding-left: .4rem; } body { padding: 0 .5rem; } }
 p { margin: .25rem 0; overflow: auto hidden; }
