@@ -213,7 +213,7 @@ pub fn transform_normal(linear: &DMat3, n: DVec3) -> Option<DVec3> {
 /// The `x` with `m x = b`, by Cramer's rule: each component is the determinant of `m` with that column replaced
 /// by `b`, over that of `m`. `None` for a singular matrix, and where a quotient is not finite.
 ///
-/// The determinants are exact (see [`exact`](crate::exact)), so that each component is within 1.5 units in its last place.
+/// The determinants are exact (see [`exact`]), so that each component is within 1.5 units in its last place.
 pub fn solve(m: &DMat3, b: DVec3) -> Option<DVec3> {
     let rows = std::array::from_fn(|i| std::array::from_fn(|j| m.col(j)[i]));
     match exact::solve(&rows, &b.to_array()) {
