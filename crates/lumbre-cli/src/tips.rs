@@ -98,24 +98,14 @@ const COMMANDS: &[(&str, &[&str])] = &[
 /// # Errors
 /// The exit status: 0 for help, 2 for wrong usage.
 pub(crate) fn parse<P: Parser + CommandFactory>(arguments: &[OsString]) -> Result<P, u8> {
-    if spanish::is_asked_for(arguments) {
-        let matches = shorten(spanish::translated(P::command()), "Todas las opciones y más ejemplos")
-            .try_get_matches_from(arguments);
-        return matches.and_then(|mut matches| P::from_arg_matches_mut(&mut matches)).map_err(|mut error| {
-            let mut program = P::command();
-            program.build();
-            let command = arguments.get(1).and_then(|name| program.find_subcommand(name)).unwrap_or(&program);
-            give_tip(&mut error, command);
-            if error.use_stderr() {
-                let _ = io::stderr().lock().write_all(spanish::said(&error).as_bytes());
-                return 2;
-            }
-            show(&error)
-        });
-    }
+    let is_spanish = spanish::is_asked_for(arguments);
     let read = |words: &[OsString]| {
-        let matches = shorten(P::command(), "All options, and more examples").try_get_matches_from(words)?;
-        P::from_arg_matches(&matches)
+        let program = if is_spanish {
+            shorten(spanish::translated(P::command()), "Todas las opciones y más ejemplos")
+        } else {
+            shorten(P::command(), "All options, and more examples")
+        };
+        P::from_arg_matches(&program.try_get_matches_from(words)?)
     };
     read(arguments).map_err(|mut error| {
         // What the user wrote is in the message, where it must not drive the terminal; in a styled message it can no
@@ -133,6 +123,10 @@ pub(crate) fn parse<P: Parser + CommandFactory>(arguments: &[OsString]) -> Resul
         program.build();
         let command = arguments.get(1).and_then(|name| program.find_subcommand(name)).unwrap_or(&program);
         give_tip(&mut error, command);
+        if is_spanish && error.use_stderr() {
+            let _ = io::stderr().lock().write_all(spanish::said(&error).as_bytes());
+            return 2;
+        }
         show(&error)
     })
 }
