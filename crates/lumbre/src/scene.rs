@@ -311,7 +311,7 @@ impl Scene {
     /// # Errors
     /// As for [`Scene::render`].
     pub fn seconds_per_sample(&self, options: &RenderOptions) -> Result<f64, Error> {
-        const LONGER_SIDE: f64 = 160.0;
+        const LONGER_SIDE: f64 = 96.0;
         const TIME: Duration = Duration::from_millis(500);
         let mut small = options.smaller(LONGER_SIDE);
         small.stop = Stop::at(u32::MAX);
