@@ -153,16 +153,16 @@ impl<'s> Shadows<'s> {
             }
         }
         let mut panes = std::mem::take(&mut self.panes);
-        let mut next_pane = panes.drain(..).peekable();
+        let mut next_panes = panes.iter_mut().peekable();
         for i in 0..self.len {
             let mut passes = if self.blocked[i] { Spectrum::BLACK } else { Spectrum::WHITE };
-            if let Some(pane) = next_pane.next_if(|pane| pane.segment as usize == i) {
+            if let Some(pane) = next_panes.next_if(|pane| pane.segment as usize == i) {
                 let ray = self.ray(i, slots.time[self.slot[i] as usize]);
                 passes = straight_on(
                     scene,
                     ray,
                     &pane.sample,
-                    pane.around,
+                    std::mem::take(&mut pane.around),
                     setting.regularize,
                     slots.is_alone.get(self.slot[i] as usize).is_some_and(|&alone| alone),
                     record,
@@ -171,7 +171,7 @@ impl<'s> Shadows<'s> {
             if setting.has_media && !passes.is_black() {
                 let slot = self.slot[i] as usize;
                 let ray = self.ray(i, slots.time[slot]);
-                let seed = slots.draws[slot].along(&ray);
+                let seed = slots.draw(slot).along(&ray);
                 let wavelengths = slots.wavelengths.get(slot);
                 passes *= scene.transmittance(of_column(self.medium[i]), &ray, seed, wavelengths);
             }
@@ -180,7 +180,6 @@ impl<'s> Shadows<'s> {
             }
             resolved(i, passes);
         }
-        drop(next_pane);
         self.panes = panes;
     }
 
