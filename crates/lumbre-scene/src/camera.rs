@@ -546,6 +546,26 @@ mod tests {
     }
 
     #[test]
+    fn a_pinhole_has_the_rays_of_its_view_to_the_bit() {
+        let place = Transform::translate(DVec3::new(0.3, -7.1, 2.9))
+            * Transform::rotate(DVec3::new(1.0, 2.0, -0.5), 0.7).unwrap();
+        let view = View::new(&Camera::new(perspective(37.0, 0.0, 1.0), place), 300, 170);
+        let pinhole = view.pinhole().unwrap();
+        for i in 0..1000 {
+            let film = DVec2::new(f64::from(i % 40) * 7.3, f64::from(i / 40) * 6.9);
+            let V3 { x, y, z } = pinhole.directions::<f32>([film.x, film.y]);
+            let ray = view.bare_ray(film, MIDDLE, 0.0).ray;
+            assert_eq!((pinhole.origin(), DVec3::new(x, y, z)), (ray.origin, ray.direction), "{film}");
+        }
+        assert!(View::new(&camera(perspective(37.0, 0.1, 1.0)), 30, 20).pinhole().is_none());
+        assert!(
+            View::new(&camera(CameraKind::Spherical { mapping: Default::default() }), 30, 20)
+                .pinhole()
+                .is_none()
+        );
+    }
+
+    #[test]
     fn the_field_of_view_spans_the_shorter_side() {
         let direction = |width, height, x, y| {
             let view = View::new(&camera(perspective(60.0, 0.0, 1.0)), width, height);

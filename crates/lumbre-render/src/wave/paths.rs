@@ -7,8 +7,8 @@ use lumbre_shading::Spectrum;
 use lumbre_shading::spectrum::{SpectralLookup, Wavelengths};
 use lumbre_simd::{Double, Mask, Real, UInt, V3};
 
-use crate::transport::{Draw, Sampler};
 use crate::transport::interior::Interiors;
+use crate::transport::{Draw, Sampler};
 
 /// Lanes beyond the last that a column has room for: a store writes whole vectors.
 pub(crate) const PAD: usize = 16;
@@ -270,7 +270,13 @@ impl Paths {
     }
 
     /// Sets the ray of a path, and the cone around it.
-    pub(crate) fn set_ray(&mut self, path: usize, origin: DVec3, direction: Vec3, (width, spread): (f32, f32)) {
+    pub(crate) fn set_ray(
+        &mut self,
+        path: usize,
+        origin: DVec3,
+        direction: Vec3,
+        (width, spread): (f32, f32),
+    ) {
         self.origin.iter_mut().zip(origin.to_array()).for_each(|(column, x)| column[path] = x);
         self.direction.iter_mut().zip(direction.to_array()).for_each(|(column, x)| column[path] = x);
         (self.width[path], self.spread[path]) = (width, spread);

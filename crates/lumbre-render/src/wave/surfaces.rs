@@ -66,6 +66,8 @@ impl<'s> Wave<'s> {
                 self.tell_triangle(setting, path, record);
             }
         }
+        self.flat.load(scene.tables());
+        self.smooth.load(scene.tables());
         setting.instruction_set.run(FlatVertices {
             setting,
             hits: &self.flat,
@@ -129,7 +131,7 @@ impl<'s> Wave<'s> {
             }
             let footprint = self.footprint(path);
             let point = self.smooth.point(at, &self.vertices, vertex, self.paths.direction(path));
-            let surface = self.smooth.base.surface(setting, at);
+            let surface = self.smooth.base.surface(setting.scene.tables(), at);
             let slot = self.paths.slot[path] as usize;
             let spectral = self.slots.spectral(slot);
             let scattering = surface.and_then(|surface| {
