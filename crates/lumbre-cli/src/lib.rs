@@ -49,7 +49,7 @@ mod view;
 mod viewing;
 
 pub use defaults::Defaults;
-pub use explain::{Explainer, Format, Request, Things, explain};
+pub use explain::{Explainer, Format, Request, SceneNames, explain};
 pub use failure::Failure;
 pub use language::Language;
 pub use memory::{check_picture, memory_left};

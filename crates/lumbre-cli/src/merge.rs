@@ -60,7 +60,7 @@ pub(crate) struct Arguments {
 }
 
 /// Gaps that are named.
-const MOST_NAMED: usize = 4;
+const MAX_NAMED: usize = 4;
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -113,8 +113,8 @@ fn merge(arguments: &Arguments, parts: &[PathBuf], output: &Path, spp: u32) -> R
     }
     if !gaps.is_empty() {
         let missing: u64 = gaps.iter().map(Piece::count).sum();
-        let named: Vec<String> = gaps.iter().take(MOST_NAMED).map(Piece::to_string).collect();
-        let more = if gaps.len() > MOST_NAMED { " and more" } else { "" };
+        let named: Vec<String> = gaps.iter().take(MAX_NAMED).map(Piece::to_string).collect();
+        let more = if gaps.len() > MAX_NAMED { " and more" } else { "" };
         let what = format!("{} missing: {}{more}", counted(missing, "sample"), named.join(", "));
         // Which of several pictures.
         let what =

@@ -16,8 +16,8 @@ use lumbre::image::{Image, ToneMap};
 use lumbre::math::Elementary;
 use lumbre::shading::ShadingNormals;
 use lumbre::{
-    CancelToken, DVec3, Feature, Job, Keeper, Picture, PixelBounds, RenderOptions, SaveOptions, Scene,
-    SceneDesc, Stage, Staged, Stop, in_words,
+    CancelToken, CheckpointSink, DVec3, Feature, Job, Picture, PixelBounds, RenderOptions, SaveOptions,
+    Scene, SceneDesc, Stage, Staged, Stop, in_words,
 };
 use serde_json::json;
 
@@ -32,7 +32,7 @@ use crate::progress::{Display, PictureViewer, Series, Style, Watched};
 use crate::reading::{Frames, ReadingArguments, print_warnings};
 use crate::report::{caustics_line, caustics_not_found, statistics, summary, warn_of_losses};
 use crate::signals::{Deadline, Phase, Signals};
-use crate::staging::{self, Behind, StagingArguments};
+use crate::staging::{self, Backdrop, StagingArguments};
 use crate::tev::Tev;
 use crate::units::{self, Crop, spoken};
 use crate::view::ViewArguments;
@@ -251,7 +251,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut from_first = First { pattern: None, exposure: arguments.exposure };
     if let Some(Frames(frames)) = &arguments.frames {
         let (first, last) = (*frames.start(), *frames.end());
-        let mut held = Held::default();
+        let mut held = FirstStage::default();
         for number in frames.clone() {
             let start = Instant::now();
             signals.end_at(arguments.deadline(start));
@@ -287,7 +287,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                     let series = Series { number: turn + 1, done: turn, count: frames, start: began };
                     let frame = Frame { number: turn + 1, is_first: turn == 0, series };
                     // Each rotation has its own camera.
-                    let frame = Some((frame, &mut Held::default()));
+                    let frame = Some((frame, &mut FirstStage::default()));
                     let desc = desc.clone();
                     let context = Context {
                         arguments,
@@ -312,7 +312,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// How long a picture is rendered even if reading took all of its time.
-const LEAST_TIME: Duration = Duration::from_millis(400);
+const MIN_TIME: Duration = Duration::from_millis(400);
 
 const READING: Phase = Phase::Preparing("reading the scene");
 
@@ -381,7 +381,7 @@ impl Arguments {
     /// How a picture is shown, by name, for whoever saves it later: see [`crate::merge`].
     fn shown(
         &self,
-        behind: &Behind,
+        behind: &Backdrop,
         tone_map: ToneMap,
         exposure: f32,
         precision: ExrPrecision,
@@ -396,7 +396,7 @@ impl Arguments {
             ),
             ("layers".to_owned(), layers.join(",")),
         ]);
-        if let (Behind::Background(_), Some(background)) = (behind, self.staging.background_name()) {
+        if let (Backdrop::Background(_), Some(background)) = (behind, self.staging.background_name()) {
             shown.insert("background".to_owned(), background);
         }
         shown
@@ -497,12 +497,12 @@ impl Arguments {
 
 /// What the stage set in the first frame: camera and ground are the same in all others.
 #[derive(Default)]
-struct Held {
+struct FirstStage {
     cameras: Option<Vec<Camera>>,
     ground: Option<GroundDesc>,
 }
 
-impl Held {
+impl FirstStage {
     fn hold(&mut self, staged: &Staged, desc: &mut SceneDesc) {
         if staged.framed {
             desc.cameras.clone_from(self.cameras.get_or_insert_with(|| desc.cameras.clone()));
@@ -545,7 +545,7 @@ fn picture(
     context: Context<'_>,
     mut desc: SceneDesc,
     diagnostics: &mut Diagnostics,
-    frame: Option<(Frame, &mut Held)>,
+    frame: Option<(Frame, &mut FirstStage)>,
     first: &mut First,
 ) -> Result<(), Failure> {
     let Context { arguments, stage, start, cancel, signals, denoiser } = context;
@@ -667,7 +667,7 @@ fn picture(
     if let Some(deadline) = arguments.deadline(start) {
         // What reading and building left of it.
         let left = deadline.at.saturating_duration_since(render_start);
-        options.stop.time = Some(left.max(LEAST_TIME));
+        options.stop.time = Some(left.max(MIN_TIME));
     }
     let memory = arguments.reading.memory();
     let files: Vec<PathBuf> =
@@ -705,7 +705,7 @@ fn picture(
         job,
     )?;
     let keep = |state| checkpoint.keep(state);
-    let keeper = checkpoint.every().map(|every| Keeper { every, keep: &keep });
+    let keeper = checkpoint.every().map(|every| CheckpointSink { every, keep: &keep });
     signals.enter(Phase::Rendering);
     let (mut picture, state) = scene.render_from(&options, &progress, cancel, state, keeper.as_ref())?;
     let render_time = render_start.elapsed();
@@ -749,8 +749,8 @@ fn picture(
         save.metadata.push(("lumbreSeconds".to_owned(), format!("{:.2}", render_time.as_secs_f64())));
     }
     let picture = match behind {
-        Behind::Background(background) => picture.over(background),
-        Behind::Lights | Behind::Nothing => picture,
+        Backdrop::Background(background) => picture.over(background),
+        Backdrop::Lights | Backdrop::Nothing => picture,
     };
     let saved = if is_bare_part(&output) {
         checkpoint.part(&state)?.save(&output).map_err(Failure::from)
@@ -860,9 +860,9 @@ fn is_nearly_black(image: &Image, exposure: f32) -> bool {
             lit += f64::from(alpha);
         }
     }
-    const LEAST_COVERED: f64 = 0.005;
-    const LEAST_LIT: f64 = 0.01;
-    covered > LEAST_COVERED * image.pixels().len() as f64 && lit < LEAST_LIT * covered
+    const MIN_COVERED: f64 = 0.005;
+    const MIN_LIT: f64 = 0.01;
+    covered > MIN_COVERED * image.pixels().len() as f64 && lit < MIN_LIT * covered
 }
 
 /// Whether exposure applies to the format of this name.

@@ -19,8 +19,8 @@ use crate::intersect::Isa;
 use crate::io::bytes::LoadError;
 use crate::io::mapped::MapError;
 use crate::io::{bytes, mapped};
-use crate::point::closest_point::{ClosestPoint, NoClosestPoint};
-use crate::point::winding::{self, NoWindingNumber};
+use crate::point::closest_point::{ClosestPoint, ClosestPointError};
+use crate::point::winding::{self, WindingNumberError};
 use crate::point::{closest_point, inside};
 use crate::query::Query;
 use crate::ray32::{Hit32, Ray32};
@@ -403,13 +403,13 @@ impl Accel {
     /// [`Shape::closest_point`](lumbre_geometry::Shape::closest_point) has a method.
     ///
     /// # Errors
-    /// [`NoClosestPoint`] where something may be nearer that has no answer: a shape without a method, or custom geometry
+    /// [`ClosestPointError`] where something may be nearer that has no answer: a shape without a method, or custom geometry
     /// that offers none. What is farther away than the nearest point does no harm.
     pub fn closest_point(
         &self,
         point: DVec3,
         max_distance: f64,
-    ) -> Result<Option<ClosestPoint>, NoClosestPoint> {
+    ) -> Result<Option<ClosestPoint>, ClosestPointError> {
         closest_point::closest_point(&self.tree, point, max_distance, 0.0)
     }
 
@@ -422,7 +422,7 @@ impl Accel {
         point: DVec3,
         max_distance: f64,
         time: f64,
-    ) -> Result<Option<ClosestPoint>, NoClosestPoint> {
+    ) -> Result<Option<ClosestPoint>, ClosestPointError> {
         closest_point::closest_point(&self.tree, point, max_distance, time)
     }
 
@@ -453,8 +453,8 @@ impl Accel {
     /// not keep angles, every triangle is looked at.
     ///
     /// # Errors
-    /// [`NoWindingNumber`] where there are open shapes (other than triangles), or custom geometry that offers none.
-    pub fn winding_number(&self, point: DVec3) -> Result<f64, NoWindingNumber> {
+    /// [`WindingNumberError`] where there are open shapes (other than triangles), or custom geometry that offers none.
+    pub fn winding_number(&self, point: DVec3) -> Result<f64, WindingNumberError> {
         winding::winding_number(&self.tree, point, 0.0, Some(winding::FAR))
     }
 
@@ -462,7 +462,7 @@ impl Accel {
     ///
     /// # Errors
     /// As there.
-    pub fn winding_number_at(&self, point: DVec3, time: f64) -> Result<f64, NoWindingNumber> {
+    pub fn winding_number_at(&self, point: DVec3, time: f64) -> Result<f64, WindingNumberError> {
         winding::winding_number(&self.tree, point, time, Some(winding::FAR))
     }
 
@@ -470,7 +470,7 @@ impl Accel {
     ///
     /// # Errors
     /// As there.
-    pub fn winding_number_exact(&self, point: DVec3) -> Result<f64, NoWindingNumber> {
+    pub fn winding_number_exact(&self, point: DVec3) -> Result<f64, WindingNumberError> {
         winding::winding_number(&self.tree, point, 0.0, None)
     }
 
@@ -536,7 +536,7 @@ impl Accel {
             + self.tree.packed.names.own_bytes()
             + self.tree.packed.entries.own_bytes()
             + self.tree.packed.sphere_blocks.own_bytes()
-            + self.tree.packed.sphere_names.own_bytes()
+            + self.tree.packed.sphere_ids.own_bytes()
             + self.tree.bounding_volumes.memory_bytes()
             + bytes(&self.tree.infinite)
             + bytes(&self.tree.masks)

@@ -13,7 +13,7 @@ use crate::clock::Clock;
 use crate::film::{Addition, Extras, Tile};
 use crate::integrators::{Integrator, integrator};
 use crate::noise::noise;
-use crate::one_sample::Taker;
+use crate::one_sample::PixelSampler;
 use crate::rendered::{picture, rendered_of};
 use crate::state::{Piece, REMEMBERED, RenderState};
 use crate::transport::{RayCounts, Record};
@@ -68,14 +68,14 @@ pub fn render_with(
 }
 
 /// Who is handed the state of a render now and then.
-pub struct Keeper<'a> {
+pub struct CheckpointSink<'a> {
     /// The time between two hand-overs.
     pub every: Duration,
     /// Told from one thread, while the others wait: it should not take long.
     pub keep: &'a dyn Fn(RenderState),
 }
 
-impl std::fmt::Debug for Keeper<'_> {
+impl std::fmt::Debug for CheckpointSink<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Keeper").field("every", &self.every).finish_non_exhaustive()
     }
@@ -93,11 +93,11 @@ pub fn render_from(
     progress: &dyn Progress,
     cancel: &CancelToken,
     state: Option<RenderState>,
-    keeper: Option<&Keeper<'_>>,
+    keeper: Option<&CheckpointSink<'_>>,
 ) -> Result<(Rendered, RenderState), RenderError> {
     let start = Instant::now();
     let bounds = options.bounds()?;
-    let taker = Taker::new(scene, options, integrator)?;
+    let taker = PixelSampler::new(scene, options, integrator)?;
     let spp = options.stop.spp.max(1);
     let catches_shadows = scene.ground().is_some_and(|ground| ground.catcher);
     let extras = Extras {
@@ -108,7 +108,7 @@ pub fn render_from(
     };
     let mut owners = match state {
         Some(state) => owners_of(state, bounds, extras, options.first_sample)?,
-        None => bounds.tiles(TILE).into_iter().map(|tile| Owner::new(Tile::new(tile, extras))).collect(),
+        None => bounds.tiles(TILE).into_iter().map(|tile| TileState::new(Tile::new(tile, extras))).collect(),
     };
     let before =
         owners.iter().flat_map(|owner| owner.tile.pixels()).map(|pixel| u64::from(pixel.taken)).sum();
@@ -132,24 +132,24 @@ pub fn render_from(
         clock: Clock::new(start, start.elapsed(), bounds.area(), options.stop, before, progress),
         waves: Mutex::default(),
     };
-    let expect_quiet = |owners: &[Owner]| {
+    let expect_quiet = |owners: &[TileState]| {
         let Some(adaptive) = &job.adaptive else { return };
         let pixels = owners.iter().flat_map(|owner| owner.tile.bounds().pixels().zip(owner.tile.pixels()));
         let expected: f64 = pixels.map(|((x, y), pixel)| adaptive.expected(x, y, pixel, spp)).sum();
         job.clock.expect_quiet_at(expected / bounds.area() as f64);
     };
     expect_quiet(&owners);
-    let hand_over = |owners: &[Owner]| {
+    let hand_over = |owners: &[TileState]| {
         if let (Some(keeper), Some(pause)) = (keeper, &job.pause) {
             (keeper.keep)(state_of(owners.to_vec(), bounds, options));
             pause.start_again();
         }
     };
-    let least_wanted = |owners: &[Owner]| {
+    let least_wanted = |owners: &[TileState]| {
         owners.iter().filter_map(|owner| adaptive::least_wanted(&owner.tile, job.adaptive.as_ref())).min()
     };
     // Of pixels that need more.
-    let has = |owners: &[Owner], samples| least_wanted(owners).is_none_or(|least| least >= samples);
+    let has = |owners: &[TileState], samples| least_wanted(owners).is_none_or(|least| least >= samples);
 
     let mut stride = None;
     let mut last = None;
@@ -235,7 +235,7 @@ pub fn render_from(
 }
 
 /// The samples of the pixel with the fewest.
-fn least_taken(owners: &[Owner]) -> u32 {
+fn least_taken(owners: &[TileState]) -> u32 {
     owners.iter().map(|owner| owner.tile.least_taken()).min().unwrap_or(0)
 }
 
@@ -269,7 +269,7 @@ fn owners_of(
     bounds: PixelBounds,
     extras: Extras,
     first_sample: u32,
-) -> Result<Vec<Owner>, RenderError> {
+) -> Result<Vec<TileState>, RenderError> {
     let is_same = state.bounds() == bounds
         && state.extras() == extras
         && state.pieces.iter().all(|piece| piece.bounds == bounds)
@@ -282,7 +282,7 @@ fn owners_of(
     // Those of a render that goes on in the same program are not copied: there may be gigabytes.
     let are_in_place = state.tiles.iter().map(Tile::bounds).eq(places.iter().copied());
     let tiles = if are_in_place { state.tiles } else { placed(state.tiles, &places, extras) };
-    let mut owners: Vec<Owner> = tiles.into_iter().map(Owner::new).collect();
+    let mut owners: Vec<TileState> = tiles.into_iter().map(TileState::new).collect();
     if let Some(owner) = owners.first_mut() {
         (owner.record.counts, owner.dropped, owner.clamped) = (state.rays, state.dropped, state.clamped);
         owner.first_dropped = state.first_dropped;
@@ -307,7 +307,7 @@ fn placed(tiles: Vec<Tile>, places: &[PixelBounds], extras: Extras) -> Vec<Tile>
 }
 
 /// What the owners gathered.
-fn state_of(owners: Vec<Owner>, bounds: PixelBounds, options: &RenderOptions) -> RenderState {
+fn state_of(owners: Vec<TileState>, bounds: PixelBounds, options: &RenderOptions) -> RenderState {
     let mut rays = RayCounts::default();
     let mut first_dropped: Vec<DroppedSample> = Vec::new();
     for owner in &owners {
@@ -330,7 +330,7 @@ fn state_of(owners: Vec<Owner>, bounds: PixelBounds, options: &RenderOptions) ->
 }
 
 /// The tiles, in each of which every pixel that has no sample has that of its square of `side` by `side` pixels.
-fn spread(owners: &[Owner], bounds: PixelBounds, side: u32) -> Vec<Tile> {
+fn spread(owners: &[TileState], bounds: PixelBounds, side: u32) -> Vec<Tile> {
     let columns = bounds.width().div_ceil(TILE) as usize;
     let mut tiles: Vec<Tile> = owners.iter().map(|owner| owner.tile.clone()).collect();
     if side > TILE {
@@ -348,7 +348,7 @@ fn spread(owners: &[Owner], bounds: PixelBounds, side: u32) -> Vec<Tile> {
 /// What every tile needs and none changes.
 struct Job<'a> {
     options: &'a RenderOptions,
-    taker: Taker<'a>,
+    taker: PixelSampler<'a>,
     pixels: u64,
     /// When pixels have enough, if not at the number of samples alone.
     adaptive: Option<Adaptive>,
@@ -387,7 +387,7 @@ impl Pause {
 
 /// A tile and what its one owner counts.
 #[derive(Clone)]
-struct Owner {
+struct TileState {
     tile: Tile,
     /// The side of the smallest squares that the first pass has done.
     next_side: u32,
@@ -399,7 +399,7 @@ struct Owner {
     first_dropped: Vec<DroppedSample>,
 }
 
-impl Owner {
+impl TileState {
     fn new(tile: Tile) -> Self {
         Self {
             tile,
@@ -430,7 +430,7 @@ impl Job<'_> {
 
     /// Takes the first sample of the first pixel of each square of `side` by `side` pixels, counted from the corner of the picture,
     /// that is in the tile, unless it was taken for the squares of the last side.
-    fn run_coarsely(&self, owner: &mut Owner, corner: (u32, u32), side: u32, last: Option<u32>) {
+    fn run_coarsely(&self, owner: &mut TileState, corner: (u32, u32), side: u32, last: Option<u32>) {
         let starts = |x: u32, y: u32, side: u32| {
             (x - corner.0).is_multiple_of(side) && (y - corner.1).is_multiple_of(side)
         };
@@ -442,7 +442,7 @@ impl Job<'_> {
 
     /// Takes the samples of every pixel of a tile up to this number, in waves of some samples of all pixels, so that a tile which is stopped
     /// has all of one sample before it has any of the next.
-    fn run(&self, owner: &mut Owner, end: u32) {
+    fn run(&self, owner: &mut TileState, end: u32) {
         let may_stop = self.deadline.is_some() || self.pause.is_some();
         let most = if may_stop { WAVE_BY_THE_CLOCK } else { WAVE };
         let Some(mut first) = adaptive::least_wanted(&owner.tile, self.adaptive.as_ref()) else { return };
@@ -463,7 +463,7 @@ impl Job<'_> {
     /// Takes samples of those pixels of a tile that have none of these numbers yet and need them; false where it had to stop before.
     fn take(
         &self,
-        owner: &mut Owner,
+        owner: &mut TileState,
         numbers: Range<u32>,
         is_wanted: impl Fn(u32, u32) -> bool,
         must_stop: impl Fn() -> bool,
@@ -490,7 +490,7 @@ impl Job<'_> {
         owner.has_worked = true;
         let rays = owner.record.counts.total();
         let mut wave = self.waves.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default();
-        let Owner { tile, record, dropped, clamped, first_dropped, .. } = owner;
+        let TileState { tile, record, dropped, clamped, first_dropped, .. } = owner;
         let exposure = self.options.sample_exposure();
         self.taker.take(&mut wave, &ids, record, |SampleId { x, y, index }, sample| {
             match tile.add(x, y, &sample, &exposure) {

@@ -10,9 +10,9 @@ use lumbre_shading::spectrum::SensorCurves;
 
 use crate::film::{FeatureSample, Filter, Sample};
 use crate::integrators::{Integrator, integrator};
-use crate::transport::{Draw, Event, Features, Record, Sampler, Seen, Sight, caught};
+use crate::transport::{Event, Features, PrimaryHit, Record, SampleNumbers, Sampler, Seen, caught};
 use crate::wave::catcher::{Catcher, Places};
-use crate::wave::{Precision, SampleId, Sights, Wave, cone};
+use crate::wave::{Precision, PrimaryHits, SampleId, Wave, cone};
 use crate::{RenderError, RenderOptions};
 
 /// Between the rays that textures are looked up for, in pixels: samples average what is finer. The same for any number of samples, so
@@ -20,7 +20,7 @@ use crate::{RenderError, RenderOptions};
 const SPACING: f64 = 0.25;
 
 /// Takes samples of pixels, each of which depends on its place and its number alone.
-pub(crate) struct Taker<'a> {
+pub(crate) struct PixelSampler<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) view: View,
     /// The rays of the view, where lanes make them.
@@ -66,7 +66,7 @@ struct Aim {
     weight: f64,
 }
 
-impl<'a> Taker<'a> {
+impl<'a> PixelSampler<'a> {
     pub(crate) fn new(
         scene: &'a Scene,
         options: &RenderOptions,
@@ -153,7 +153,7 @@ impl<'a> Taker<'a> {
 
     /// Has the integrator find the light of all sights but those that see something else, and gives what these see and all features;
     /// nothing where no sample has any of both.
-    fn see(&self, sights: &mut Sights<'_, 'a>, record: &mut Record) -> Vec<SeenSample> {
+    fn see(&self, sights: &mut PrimaryHits<'_, 'a>, record: &mut Record) -> Vec<SeenSample> {
         sights.show_background(self.lights_are_seen);
         let has_catcher = self.scene.ground().is_some_and(|ground| ground.catcher);
         let mut seen = Vec::new();
@@ -205,7 +205,7 @@ impl<'a> Taker<'a> {
     }
 
     /// An estimate of what media leave of the light of what a camera sees.
-    fn left_by_media(&self, sight: &Sight<'_>, draw: &Draw) -> Spectrum {
+    fn left_by_media(&self, sight: &PrimaryHit<'_>, draw: &SampleNumbers) -> Spectrum {
         if !self.scene.has_media() {
             return Spectrum::WHITE;
         }
@@ -215,16 +215,16 @@ impl<'a> Taker<'a> {
     }
 
     /// Takes up samples.
-    fn start<'w>(&'w self, wave: &'w mut Wave<'a>, ids: &[SampleId]) -> Sights<'w, 'a> {
-        Sights::start(self.scene, &self.view, wave, self.precision, &self.sampler, ids, self.is_spectral)
+    fn start<'w>(&'w self, wave: &'w mut Wave<'a>, ids: &[SampleId]) -> PrimaryHits<'w, 'a> {
+        PrimaryHits::start(self.scene, &self.view, wave, self.precision, &self.sampler, ids, self.is_spectral)
     }
 
-    /// Where a sample looks, by the numbers of [`Draw::aim`]. A lens without width has no point but its middle.
-    fn aim(&self, id: SampleId, [u, v, part, _]: [f32; 4], draw: Option<&Draw>) -> Aim {
+    /// Where a sample looks, by the numbers of [`SampleNumbers::aim`]. A lens without width has no point but its middle.
+    fn aim(&self, id: SampleId, [u, v, part, _]: [f32; 4], draw: Option<&SampleNumbers>) -> Aim {
         let place = self.filter.sample(DVec2::new(u.into(), v.into()));
         let pixel = DVec2::new(f64::from(id.x) + 0.5, f64::from(id.y) + 0.5);
         let offset = if self.is_centred { DVec2::ZERO } else { place.offset };
-        let lens = draw.filter(|_| self.view.has_lens()).map_or(DVec2::splat(0.5), Draw::lens);
+        let lens = draw.filter(|_| self.view.has_lens()).map_or(DVec2::splat(0.5), SampleNumbers::lens);
         let time = self.view.time(if self.moves { part.into() } else { 0.0 });
         Aim { film: pixel + offset, lens, time, weight: place.weight }
     }
@@ -329,7 +329,7 @@ pub fn explain_sample(
     index: u32,
 ) -> Result<ExplainedSample, RenderError> {
     let integrator = integrator(&options.integrator);
-    let taker = Taker::new(scene, options, &*integrator)?;
+    let taker = PixelSampler::new(scene, options, &*integrator)?;
     Ok(taker.explain(SampleId { x, y, index }))
 }
 
@@ -345,7 +345,7 @@ pub fn explain_ray(
     index: u32,
 ) -> Result<(Spectrum, Vec<Event>), RenderError> {
     let integrator = integrator(&options.integrator);
-    let taker = Taker::new(scene, options, &*integrator)?;
+    let taker = PixelSampler::new(scene, options, &*integrator)?;
     let camera = CameraRay { ray: *ray, footprint: Footprint::Point, weight: 1.0 };
     // With the random numbers of a pixel.
     let (_, radiance, events) = taker.explain_sight(SampleId { x: 0, y: 0, index }, &camera);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lumbre_geometry::{Aabb, NearestPoint, NoNearestPoint, Ray, Root, Roots, Surface, similarity_factor};
+use lumbre_geometry::{Aabb, NearestPoint, NearestPointError, Ray, Root, Roots, Surface, similarity_factor};
 use lumbre_kernel::CustomGeometry;
 use lumbre_math::{DVec3, Transform};
 
@@ -53,8 +53,8 @@ impl CustomGeometry for Placed {
         surface.placed(&self.world_from_object)
     }
 
-    fn closest_point(&self, primitive: u32, point: DVec3) -> Result<NearestPoint, NoNearestPoint> {
-        let factor = similarity_factor(&self.world_from_object).ok_or(NoNearestPoint::Map)?;
+    fn closest_point(&self, primitive: u32, point: DVec3) -> Result<NearestPoint, NearestPointError> {
+        let factor = similarity_factor(&self.world_from_object).ok_or(NearestPointError::Map)?;
         let found = self.geometry.closest_point(primitive, self.world_from_object.inverse_point(point))?;
         let point = self.world_from_object.point(found.point);
         Ok(NearestPoint { point, distance: factor * found.distance, ..found })

@@ -10,7 +10,7 @@ use lumbre_math::{DVec2, DVec3, Transform};
 use lumbre_shading::{FloatTexture, Spectrum};
 
 use crate::build::check_cameras;
-use crate::footprint::Spot;
+use crate::footprint::SurfaceFootprint;
 use crate::light::choice::LightChoice;
 use crate::light::lanes::LaneLights;
 use crate::light::{Light, LightId, LightSample, Place, Sampling};
@@ -394,7 +394,7 @@ impl Scene {
         } else if self.looks_up {
             footprint.across(surface.point, surface.normal, direction, hit.root.t * length)
         } else {
-            Spot::default()
+            SurfaceFootprint::default()
         };
         let incident_origin = surface.offset_origin(-direction);
         let is_smooth = shaded.shading.normal.dot(shaded.shading.geometric) < SMOOTH;

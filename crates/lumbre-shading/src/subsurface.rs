@@ -54,7 +54,7 @@ pub struct SubsurfaceParams {
 }
 
 /// The least mean free path, against divisions by 0.
-const LEAST_PATH: f32 = 1e-9;
+const MIN_PATH: f32 = 1e-9;
 
 impl SubsurfaceParams {
     /// The medium that light enters at a position. What is out of range is clamped.
@@ -71,7 +71,7 @@ impl SubsurfaceParams {
             }
             Inside::Reflectance { reflectance, mean_free_path } => {
                 let path = mean_free_path.evaluate_unbounded(at) * self.scale;
-                let extinction = path.map(|path| 1.0 / path.max(LEAST_PATH));
+                let extinction = path.map(|path| 1.0 / path.max(MIN_PATH));
                 // The share of even light from inside that the boundary reflects back.
                 let back = 1.0 - transmitted_from_outside(index(self.eta)) / index(self.eta).powi(2);
                 let albedo =

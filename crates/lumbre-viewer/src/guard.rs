@@ -46,7 +46,7 @@ pub(crate) struct Guard {
 }
 
 /// Tickets that are not used yet; more push out the oldest.
-const MOST_TICKETS: usize = 64;
+const MAX_TICKETS: usize = 64;
 const FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 
 impl Guard {
@@ -124,7 +124,7 @@ impl Guard {
         let ticket = Secret::new().ok()?;
         let address = format!("/ticket/{}", ticket.digits());
         let mut tickets = self.tickets.lock().unwrap_or_else(PoisonError::into_inner);
-        if tickets.len() >= MOST_TICKETS {
+        if tickets.len() >= MAX_TICKETS {
             tickets.pop_front();
         }
         tickets.push_back((ticket, errand));
@@ -288,7 +288,7 @@ mod tests {
         assert_eq!(guard.redeem(ticket), Some(errand));
         assert_eq!(guard.redeem(ticket), None);
         let first = guard.ticket(Errand::Scene {}).unwrap();
-        for _ in 0..MOST_TICKETS {
+        for _ in 0..MAX_TICKETS {
             guard.ticket(Errand::Scene {}).unwrap();
         }
         assert_eq!(guard.redeem(first.strip_prefix("/ticket/").unwrap()), None, "they are not kept for ever");

@@ -16,7 +16,7 @@ pub(crate) enum Message {
     /// One of the file's cameras, as it is.
     Reset { sequence: u32, camera: usize },
     /// What is rendered, and how it is shown.
-    Set(Box<Wishes>),
+    Set(Box<SetOptions>),
     /// A parameter of the scene; without a value that of the file.
     Edit { path: String, value: Option<String> },
     /// A moment of an animation, a variant.
@@ -60,7 +60,7 @@ pub(crate) enum FileFormat {
 /// What a page asks for; what is not in it stays.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq)]
 #[serde(default, deny_unknown_fields)]
-pub(crate) struct Wishes {
+pub(crate) struct SetOptions {
     pub exposure: Option<f32>,
     pub tone_map: Option<String>,
     pub false_colour: Option<bool>,

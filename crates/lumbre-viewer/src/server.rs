@@ -33,9 +33,9 @@ const HEADERS_WITHIN: Duration = Duration::from_secs(5);
 /// How long a connection lasts that was never let in.
 const STRANGER_AT_MOST: Duration = Duration::from_secs(20);
 /// Bytes of a request's headers.
-const MOST_HEADER_BYTES: usize = 16 << 10;
+const MAX_HEADER_BYTES: usize = 16 << 10;
 /// Bytes of a scene that is dropped on the page.
-const MOST_SCENE_BYTES: u64 = 256 << 20;
+const MAX_SCENE_BYTES: u64 = 256 << 20;
 /// Until it is there.
 const SCENE_WITHIN: Duration = Duration::from_secs(120);
 /// What a binary glTF begins with.
@@ -82,7 +82,7 @@ pub(crate) async fn serve(server: Arc<Server>, listener: TcpListener) -> std::io
                 async move { Ok::<_, Infallible>(server.answer(request, visit).await) }
             });
             let mut http = hyper::server::conn::http1::Builder::new();
-            http.timer(TokioTimer::new()).header_read_timeout(HEADERS_WITHIN).max_buf_size(MOST_HEADER_BYTES);
+            http.timer(TokioTimer::new()).header_read_timeout(HEADERS_WITHIN).max_buf_size(MAX_HEADER_BYTES);
             let served = http.serve_connection(TokioIo::new(stream), service).with_upgrades();
             // What goes wrong with one connection is told to no one else.
             tokio::select! {
@@ -222,11 +222,11 @@ impl Server {
             .get(CONTENT_LENGTH)
             .and_then(|length| length.to_str().ok()?.parse::<u64>().ok());
         match length {
-            Some(length) if length <= MOST_SCENE_BYTES => {}
+            Some(length) if length <= MAX_SCENE_BYTES => {}
             Some(_) => return Err(StatusCode::PAYLOAD_TOO_LARGE),
             None => return Err(StatusCode::LENGTH_REQUIRED),
         }
-        let body = Limited::new(request.into_body(), MOST_SCENE_BYTES as usize).collect();
+        let body = Limited::new(request.into_body(), MAX_SCENE_BYTES as usize).collect();
         let body = tokio::time::timeout(SCENE_WITHIN, body).await.map_err(|_| StatusCode::REQUEST_TIMEOUT)?;
         let bytes = body.map_err(|_| StatusCode::BAD_REQUEST)?.to_bytes();
         if !bytes.starts_with(GLB) {

@@ -11,7 +11,7 @@ use tokio::sync::watch;
 
 use crate::camera::Placement;
 use crate::frame::{Channel, Frame, Look, Pixels, Shot};
-use crate::message::{Message, Wishes};
+use crate::message::{Message, SetOptions};
 use crate::source::{Moment, Source};
 use crate::stage::Stage;
 use crate::watching::Watched;
@@ -62,13 +62,13 @@ pub(crate) struct Moved {
 }
 
 /// Parameters that may be set.
-const MOST_SETTINGS: usize = 500;
+const MAX_SETTINGS: usize = 500;
 /// Characters of a parameter's name and of its value.
 const LONGEST_SETTING: usize = 1000;
 /// Between two looks at the files.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 /// The side of a rectangle of pixels whose values are asked for.
-const MOST_VALUES: u32 = 64;
+const MAX_VALUES: u32 = 64;
 
 struct Inner {
     wanted: Wanted,
@@ -359,7 +359,7 @@ impl Session {
         }
     }
 
-    fn wish(&self, wishes: &Wishes) -> Option<Value> {
+    fn wish(&self, wishes: &SetOptions) -> Option<Value> {
         let tone_map = match wishes.tone_map.as_deref().map(|name| ToneMap::from_name(name).ok_or(name)) {
             Some(Err(_)) => return Some(json!({ "type": "wrong", "what": "there is no such tone mapping" })),
             Some(Ok(map)) => Some(map),
@@ -394,7 +394,7 @@ impl Session {
         let mut is_full = false;
         self.change(|inner| {
             let settings = &mut inner.wanted.settings;
-            is_full = settings.len() >= MOST_SETTINGS && !settings.iter().any(|(known, _)| *known == path);
+            is_full = settings.len() >= MAX_SETTINGS && !settings.iter().any(|(known, _)| *known == path);
             if is_long || is_full {
                 return;
             }
@@ -437,7 +437,7 @@ impl Session {
         let (shot, _) = self.shot()?;
         let image = shot.image();
         let is_whole = (image.width(), image.height()) == shot.full;
-        if !is_whole || width > MOST_VALUES || height > MOST_VALUES {
+        if !is_whole || width > MAX_VALUES || height > MAX_VALUES {
             return None;
         }
         let (x1, y1) =

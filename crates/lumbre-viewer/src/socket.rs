@@ -20,7 +20,7 @@ use crate::server::{Server, has_to_go};
 use crate::visitors::Visit;
 
 /// Bytes of a message of a page, whose longest names a parameter and its value.
-const MOST_MESSAGE_BYTES: usize = 16 << 10;
+const MAX_MESSAGE_BYTES: usize = 16 << 10;
 /// Until a page has taken what was sent to it.
 const TAKEN_WITHIN: Duration = Duration::from_secs(10);
 /// Between two questions whether it is still there.
@@ -38,8 +38,8 @@ type Stream = WebSocketStream<TokioIo<Upgraded>>;
 /// Talks with a page until one of both ends it.
 pub(crate) async fn talk(stream: TokioIo<Upgraded>, server: Arc<Server>, visit: Arc<Visit>) {
     let config = WebSocketConfig::default()
-        .max_message_size(Some(MOST_MESSAGE_BYTES))
-        .max_frame_size(Some(MOST_MESSAGE_BYTES))
+        .max_message_size(Some(MAX_MESSAGE_BYTES))
+        .max_frame_size(Some(MAX_MESSAGE_BYTES))
         .read_buffer_size(8 << 10);
     let mut stream = WebSocketStream::from_raw_socket(stream, Role::Server, Some(config)).await;
     let ended = tokio::select! {

@@ -51,9 +51,9 @@ impl Default for Thing {
 }
 
 /// Hits that are listed of one ray.
-const MOST_HITS: usize = 64;
+const MAX_HITS: usize = 64;
 /// Parameters that a page can list.
-const MOST_PARAMETERS: usize = 2000;
+const MAX_PARAMETERS: usize = 2000;
 
 impl Stage {
     /// What was built of a description.
@@ -99,7 +99,7 @@ impl Stage {
                 "primitive": hit.primitive,
                 "instance": hit.instance,
             }));
-            if hits.len() < MOST_HITS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+            if hits.len() < MAX_HITS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
         json!({ "origin": ray.origin.to_array(), "direction": ray.direction.to_array(), "hits": hits })
     }
@@ -214,7 +214,7 @@ fn facts(
         "build_seconds": scene.build_time().as_secs_f64(),
         "animations": animations.map(|a| json!({ "name": a.name, "end": a.end })).collect::<Vec<_>>(),
         "variants": info.listing.variants,
-        "parameters": parameters.iter().take(MOST_PARAMETERS).map(parameter).collect::<Vec<_>>(),
+        "parameters": parameters.iter().take(MAX_PARAMETERS).map(parameter).collect::<Vec<_>>(),
         "languages": languages,
         "warnings": warnings,
     })

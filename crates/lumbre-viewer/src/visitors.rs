@@ -7,9 +7,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::Notify;
 
 /// Connections that have not shown yet that they may come in. One more ends the oldest of them.
-const MOST_STRANGERS: usize = 192;
+const MAX_STRANGERS: usize = 192;
 /// Connections that were let in.
-const MOST_GUESTS: usize = 256;
+const MAX_GUESTS: usize = 256;
 
 /// All connections.
 #[derive(Debug, Default)]
@@ -37,7 +37,7 @@ impl Visitors {
     pub(crate) fn come(self: &Arc<Self>) -> Visit {
         let gives_way = Arc::new(Notify::new());
         let mut inner = self.lock();
-        if inner.strangers.len() >= MOST_STRANGERS
+        if inner.strangers.len() >= MAX_STRANGERS
             && let Some((_, oldest)) = inner.strangers.pop_front()
         {
             // Kept for who is not waiting for it yet.
@@ -63,7 +63,7 @@ impl Visit {
             return true;
         }
         match inner.place(self.number) {
-            Some(place) if inner.guests < MOST_GUESTS => {
+            Some(place) if inner.guests < MAX_GUESTS => {
                 inner.strangers.remove(place);
                 inner.guests += 1;
                 self.is_guest.store(true, Ordering::Relaxed);
@@ -116,7 +116,7 @@ mod tests {
         let guest = visitors.come();
         assert!(guest.let_in() && guest.let_in());
         let first = visitors.come();
-        let many: Vec<Visit> = (1..MOST_STRANGERS).map(|_| visitors.come()).collect();
+        let many: Vec<Visit> = (1..MAX_STRANGERS).map(|_| visitors.come()).collect();
         assert!(!has_to_go(&first));
         let late = visitors.come();
         assert!(has_to_go(&first) && !first.let_in(), "the oldest has to go");
@@ -133,7 +133,7 @@ mod tests {
             assert!(visit.let_in());
             visit
         };
-        let guests: Vec<Visit> = (2..MOST_GUESTS).map(comes_in).collect();
+        let guests: Vec<Visit> = (2..MAX_GUESTS).map(comes_in).collect();
         assert!(!visitors.come().let_in(), "there are so many places");
         drop((guest, late, guests));
         assert_eq!(counted(), (0, 0));

@@ -293,7 +293,7 @@ impl Worker {
         let scene = stage.scene();
         let state = self.state.take();
         let before = state.as_ref().map_or(0, RenderState::taken);
-        let asked = Asked { session: &self.session, known: self.known };
+        let asked = StillWanted { session: &self.session, known: self.known };
         let rendered = scene.render_from(&options, &asked, &cancel, state, None);
         drop(scene);
         let (mut picture, state) = match rendered {
@@ -392,12 +392,12 @@ impl Worker {
 }
 
 /// Knows whether the picture is still wanted: a large one takes longer to put together than one may wait for the next.
-struct Asked<'s> {
+struct StillWanted<'s> {
     session: &'s Session,
     known: Changes,
 }
 
-impl Progress for Asked<'_> {
+impl Progress for StillWanted<'_> {
     fn is_wanted(&self) -> bool {
         self.session.is_wanted(self.known)
     }

@@ -5,7 +5,7 @@ use lumbre::{RenderOptions, Scene, SceneDesc};
 use lumbre_viewer::Explain;
 
 use super::question::Question;
-use super::things::Things;
+use super::things::SceneNames;
 use super::{html, texts, title};
 use crate::language::Language;
 
@@ -13,13 +13,13 @@ use crate::language::Language;
 #[derive(Debug)]
 pub struct Explainer {
     name: String,
-    things: Things,
+    things: SceneNames,
 }
 
 impl Explainer {
     /// Of a scene with its name, as it is described before it is set on its stage.
     pub fn new(desc: &SceneDesc, name: String) -> Self {
-        Self { name, things: Things::of(desc) }
+        Self { name, things: SceneNames::of(desc) }
     }
 }
 

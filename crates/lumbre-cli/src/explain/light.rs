@@ -10,16 +10,16 @@ use super::document::{Column, Item, Section, Value};
 use super::formula::Scope;
 use super::surfaces::{Wanted, material_of, surfaces};
 use super::texts::Texts;
-use super::things::Things;
+use super::things::SceneNames;
 use crate::language::filled;
 
 /// Lights that are told of one by one at most.
-const MOST_LIGHTS: usize = 16;
+const MAX_LIGHTS: usize = 16;
 
 /// What is told of the light of one path.
 pub(super) struct Path<'a> {
     pub(super) scene: &'a Scene,
-    pub(super) things: &'a Things,
+    pub(super) things: &'a SceneNames,
     pub(super) texts: &'static Texts,
     /// Rays after the first whose crossings are told as well.
     pub(super) depth: u32,
@@ -332,7 +332,7 @@ impl Path<'_> {
             column("contribution", texts.contribution),
         ];
         let mut rows = Vec::new();
-        for (id, light) in (0..).zip(scene.lights()).take(MOST_LIGHTS) {
+        for (id, light) in (0..).zip(scene.lights()).take(MAX_LIGHTS) {
             let sample =
                 scene.sample_one_light(LightId(id), here.shadow_origin(), here.time, DVec2::splat(0.5));
             let Some(sample) = sample else { continue };
@@ -359,7 +359,7 @@ impl Path<'_> {
             ]);
         }
         section.items.push(Item::Table { key: "lights", columns, rows });
-        if scene.lights().len() > MOST_LIGHTS {
+        if scene.lights().len() > MAX_LIGHTS {
             section.remark(filled(texts.more_lights, &[&scene.lights().len().to_string()]));
         }
         Some(section)

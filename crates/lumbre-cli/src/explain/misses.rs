@@ -9,7 +9,7 @@ use lumbre::math::DVec3;
 use lumbre::{Ray, Scene, Transform};
 
 /// Primitives that are looked at at most.
-const MOST_PRIMITIVES: usize = 1 << 20;
+const MAX_PRIMITIVES: usize = 1 << 20;
 /// Places along the ray where the distance is looked at first, and steps that then narrow it down.
 const PLACES: u32 = 48;
 const STEPS: u32 = 80;
@@ -42,7 +42,7 @@ pub(super) fn nearest(scene: &Scene, ray: &Ray, most: usize, wanted: impl Fn(u32
         {
             all.push((least_distance(&shape, &map, ray), index, hit.clone()));
         }
-        if all.len() < MOST_PRIMITIVES { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        if all.len() < MAX_PRIMITIVES { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     });
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let distance = |missed: &Missed| missed.nearest.map_or(f64::INFINITY, |nearest| nearest.distance);

@@ -15,7 +15,7 @@ use crate::language::{Language, filled};
 use crate::names::one_of;
 use crate::output::Inputs;
 use crate::reading::{ReadingArguments, print_warnings};
-use crate::shown::{Shown, Wish, shown};
+use crate::shown::{PreparedScene, SceneRequest, shown};
 use crate::staging::StagingArguments;
 use crate::units;
 use crate::view::ViewArguments;
@@ -44,7 +44,7 @@ use question::Question;
 use spanish::SPANISH;
 use surfaces::Chosen;
 use texts::Texts;
-pub use things::Things;
+pub use things::SceneNames;
 
 /// Tells how the colour of a pixel, or the light along a ray, comes about: the camera and its ray, every surface on the way with the
 /// equation of its crossings, normals, lights and shadows, and the path of one sample, with all numbers as the render computes them.
@@ -192,10 +192,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(output) = &arguments.output {
         Inputs::of(diagnostics.files_read().iter().map(PathBuf::as_path)).refuse(output)?;
     }
-    let things = Things::of(&desc);
+    let things = SceneNames::of(&desc);
     let Arguments { size, camera, integrator, view, staging, reading, .. } = arguments;
     let name = arguments.scene.first().map_or(Path::new(""), PathBuf::as_path);
-    let wish = Wish {
+    let wish = SceneRequest {
         name,
         size: *size,
         camera: camera.as_deref(),
@@ -209,7 +209,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         print_warnings(&diagnostics);
         print_warnings(&shown.diagnostics);
     }
-    let Shown { scene, mut options, .. } = shown;
+    let PreparedScene { scene, mut options, .. } = shown;
     if options.spectral && !arguments.quiet {
         say!("warning: its picture carries wavelengths; what is explained is a path of red, green and blue");
     }
@@ -231,7 +231,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 pub fn explain(
     scene: &Scene,
     options: &RenderOptions,
-    things: &Things,
+    things: &SceneNames,
     name: &Path,
     request: &Request,
 ) -> Result<String, Failure> {
@@ -246,7 +246,7 @@ fn told(
     request: &Request,
     scene: &Scene,
     options: &RenderOptions,
-    things: &Things,
+    things: &SceneNames,
 ) -> Result<Vec<Section>, Failure> {
     let &Request { sample, depth, nearest, .. } = request;
     let shapes = match &request.shape {

@@ -8,13 +8,13 @@ use lumbre::{DVec3, Ray, RenderOptions, Scene};
 use super::document::{Item, Section};
 use super::surfaces::Chosen;
 use super::texts::Texts;
-use super::things::Things;
+use super::things::SceneNames;
 use super::{camera, light, sketch, surfaces};
 use crate::failure::Failure;
 
 /// Of which sample is told, how much of it, and in which language.
 pub(super) struct Question<'a> {
-    pub(super) things: &'a Things,
+    pub(super) things: &'a SceneNames,
     pub(super) texts: &'static Texts,
     /// The number of the sample.
     pub(super) sample: u32,

@@ -17,19 +17,19 @@ use super::misses::{self, Missed, Nearest};
 use super::shape;
 use super::sketch::Scenery;
 use super::texts::Texts;
-use super::things::{Face, Things};
+use super::things::{Face, SceneNames};
 use crate::failure::Failure;
 use crate::language::filled;
 
 /// Hits that are told at most.
-const MOST_HITS: usize = 64;
+const MAX_HITS: usize = 64;
 /// Shapes that are told of where the ray meets none.
-const MOST_MISSES: usize = 3;
+const MAX_MISSES: usize = 3;
 /// Columns of a matrix are at right angles where their cosines are less than this.
 const RIGHT_ANGLE: f64 = 1e-12;
 
 /// What is told of the things that a ray meets.
-pub(super) struct Told {
+pub(super) struct MetSurfaces {
     pub(super) section: Section,
     /// Where the ray meets them, with the normals: for the sketch.
     pub(super) hits: Vec<(DVec3, DVec3)>,
@@ -60,10 +60,10 @@ pub(super) struct Wanted<'a> {
 pub(super) fn surfaces(
     scene: &Scene,
     ray: &Ray,
-    things: &Things,
+    things: &SceneNames,
     wanted: &Wanted<'_>,
     texts: &'static Texts,
-) -> Result<Told, Failure> {
+) -> Result<MetSurfaces, Failure> {
     let resolved = scene.resolved();
     let is_wanted = |shape: u32| match wanted.shapes {
         Some(Chosen::Called(name)) => things.is_called(shape, name),
@@ -77,7 +77,7 @@ pub(super) fn surfaces(
         hits.extend(first.clone());
     } else {
         resolved.accel().all(ray, |hit| {
-            are_more = hits.len() == MOST_HITS;
+            are_more = hits.len() == MAX_HITS;
             if are_more {
                 return ControlFlow::Break(());
             }
@@ -89,8 +89,8 @@ pub(super) fn surfaces(
     }
     let met: BTreeSet<u32> = hits.iter().map(|hit| resolved.shape_index(hit)).collect();
     let most = match wanted.shapes {
-        Some(_) => MOST_HITS,
-        None if hits.is_empty() && wanted.is_from_camera => MOST_MISSES,
+        Some(_) => MAX_HITS,
+        None if hits.is_empty() && wanted.is_from_camera => MAX_MISSES,
         None => 0,
     };
     let missed = match most {
@@ -127,7 +127,7 @@ pub(super) fn surfaces(
         section.sections.push(tell(scene, ray, &thing, first.as_ref(), things, &mut scenery, texts));
     }
     if are_more {
-        section.remark(filled(texts.more_hits, &[&MOST_HITS.to_string()]));
+        section.remark(filled(texts.more_hits, &[&MAX_HITS.to_string()]));
     }
     if !missed.is_empty() {
         section.text(if wanted.shapes.is_none() { texts.missed_nearest } else { texts.missed });
@@ -136,7 +136,7 @@ pub(super) fn surfaces(
         let thing = Thing { hit, hits: &[], nearest: *nearest };
         section.sections.push(tell(scene, ray, &thing, first.as_ref(), things, &mut scenery, texts));
     }
-    Ok(Told { section, hits: places, scenery })
+    Ok(MetSurfaces { section, hits: places, scenery })
 }
 
 /// A primitive, and where the ray meets it.
@@ -153,7 +153,7 @@ fn tell(
     ray: &Ray,
     &Thing { hit, hits, nearest }: &Thing<'_>,
     first: Option<&Hit>,
-    things: &Things,
+    things: &SceneNames,
     scenery: &mut Scenery,
     texts: &'static Texts,
 ) -> Section {
@@ -265,7 +265,7 @@ fn in_file(face: &Face, told: usize, texts: &Texts) -> Section {
 }
 
 /// What a shape is made of: the name of its material and the kind.
-pub(super) fn material_of(things: &Things, shape: u32, texts: &Texts) -> String {
+pub(super) fn material_of(things: &SceneNames, shape: u32, texts: &Texts) -> String {
     let Some(material) = things.material(shape) else { return texts.no_material.to_owned() };
     let kind = (texts.kind_of)(material.kind);
     material.name.as_ref().map_or_else(|| kind.to_owned(), |name| format!("{name} ({kind})"))

@@ -8,9 +8,9 @@ use lumbre::{DVec2, DVec3, SceneDesc, Transform};
 
 /// The shapes of a file by their number, and the materials.
 #[derive(Debug, Default)]
-pub struct Things {
+pub struct SceneNames {
     shapes: HashMap<u32, Thing>,
-    materials: Vec<Substance>,
+    materials: Vec<MaterialInfo>,
 }
 
 /// A shape of a file.
@@ -37,7 +37,7 @@ type Parameter = (String, Option<Vec<f64>>);
 
 /// A material of a file.
 #[derive(Clone, Debug)]
-pub(super) struct Substance {
+pub(super) struct MaterialInfo {
     /// Its name, if it has one, and its kind.
     pub(super) name: Option<String>,
     pub(super) kind: &'static str,
@@ -45,7 +45,7 @@ pub(super) struct Substance {
     pub(super) parameters: Vec<Parameter>,
 }
 
-impl Things {
+impl SceneNames {
     /// Of a description.
     pub fn of(desc: &SceneDesc) -> Self {
         let mut by_owner: HashMap<String, Vec<Parameter>> = HashMap::new();
@@ -56,7 +56,7 @@ impl Things {
         let materials = desc.materials.iter().enumerate().map(|(index, named)| {
             let called = named.name.clone().unwrap_or_else(|| index.to_string());
             let parameters = by_owner.remove(&format!("material.{called}.")).unwrap_or_default();
-            Substance { name: named.name.clone(), kind: named.material.kind.name(), parameters }
+            MaterialInfo { name: named.name.clone(), kind: named.material.kind.name(), parameters }
         });
         let materials = materials.collect();
         let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);
@@ -124,7 +124,7 @@ impl Things {
     }
 
     /// What a shape is made of.
-    pub(super) fn material(&self, shape: u32) -> Option<&Substance> {
+    pub(super) fn material(&self, shape: u32) -> Option<&MaterialInfo> {
         self.materials.get(self.shapes.get(&shape)?.material?)
     }
 }

@@ -9,7 +9,7 @@ use std::marker::PhantomData;
 
 use lumbre_geometry::Ray;
 
-use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, Start, State};
+use super::packet::{ALL, Bundle, Cull, CullBounds, PACKET, Signs, Start, State, WorkBudget};
 use super::sink::Sink;
 use crate::intersect::box_ray::SlabRows;
 use crate::intersect::f32_ray::{F32Ray, within};
@@ -199,7 +199,7 @@ impl<'a, 'd, G: Goal, R: PacketRay> Bundle<'a, 'd> for F32Bundle<'a, 'd, G, R> {
     type Answer = R::Answer;
     const GENERAL: bool = R::GENERAL;
     const NEEDS_BOUNDS: bool = false;
-    const MOST_SPREAD: f32 = 0.3;
+    const MAX_SPREAD: f32 = 0.3;
 
     #[inline(always)]
     fn new(decider: &'d Decider<'a>) -> Self {
@@ -224,13 +224,13 @@ impl<'a, 'd, G: Goal, R: PacketRay> Bundle<'a, 'd> for F32Bundle<'a, 'd, G, R> {
 
     // Less than in double precision, since single rays are faster; as much where there is anything but triangles.
     #[inline(always)]
-    fn effort(has_one_origin: bool) -> Effort {
+    fn effort(has_one_origin: bool) -> WorkBudget {
         match (R::GENERAL, has_one_origin, G::IS_ANY) {
-            (false, true, true) => Effort { most: 112, paying: 70 },
-            (false, true, false) => Effort { most: 210, paying: 84 },
-            (false, false, _) => Effort { most: 50, paying: 40 },
-            (true, _, true) => Effort { most: 600, paying: 400 },
-            (true, _, false) => Effort { most: 800, paying: 400 },
+            (false, true, true) => WorkBudget { most: 112, paying: 70 },
+            (false, true, false) => WorkBudget { most: 210, paying: 84 },
+            (false, false, _) => WorkBudget { most: 50, paying: 40 },
+            (true, _, true) => WorkBudget { most: 600, paying: 400 },
+            (true, _, false) => WorkBudget { most: 800, paying: 400 },
         }
     }
 

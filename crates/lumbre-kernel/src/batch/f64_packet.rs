@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 use lumbre_geometry::Ray;
 use lumbre_math::DVec2;
 
-use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, Start, State, record};
+use super::packet::{ALL, Bundle, Cull, CullBounds, PACKET, Signs, Start, State, WorkBudget, record};
 use super::sink::Sink;
 use crate::intersect::box_ray::SlabRows;
 use crate::intersect::box_ray::Slabs;
@@ -235,7 +235,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
     type Answer = G::Found;
     const GENERAL: bool = GENERAL;
     const NEEDS_BOUNDS: bool = true;
-    const MOST_SPREAD: f32 = 0.125;
+    const MAX_SPREAD: f32 = 0.125;
 
     #[inline(always)]
     fn new(decider: &'d Decider<'a>) -> Self {
@@ -265,13 +265,13 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
     // Less for any hit, which a single ray has sooner, and for rays that start at different places, which soon part; more where
     // there is anything but triangles, which costs a single ray more.
     #[inline(always)]
-    fn effort(has_one_origin: bool) -> Effort {
+    fn effort(has_one_origin: bool) -> WorkBudget {
         match (GENERAL, has_one_origin, G::IS_ANY) {
-            (false, true, true) => Effort { most: 160, paying: 100 },
-            (false, true, false) => Effort { most: 300, paying: 120 },
-            (false, false, _) => Effort { most: 70, paying: 50 },
-            (true, _, true) => Effort { most: 600, paying: 400 },
-            (true, _, false) => Effort { most: 800, paying: 400 },
+            (false, true, true) => WorkBudget { most: 160, paying: 100 },
+            (false, true, false) => WorkBudget { most: 300, paying: 120 },
+            (false, false, _) => WorkBudget { most: 70, paying: 50 },
+            (true, _, true) => WorkBudget { most: 600, paying: 400 },
+            (true, _, false) => WorkBudget { most: 800, paying: 400 },
         }
     }
 

@@ -48,7 +48,7 @@ const NEAR: usize = 1 << 20;
 /// Trees of fewer bytes, some two thousand triangles, are so shallow that single rays in single precision are faster than interleaved ones.
 const SMALL: usize = 1 << 17;
 /// Packets in a row that may be skipped without a try.
-const MOST_SKIPPED: usize = 16;
+const MAX_SKIPPED: usize = 16;
 /// Rays among which packets are sought before the others are interleaved.
 const CHUNK: usize = 4096;
 /// How many packets ahead rays are prefetched.
@@ -393,7 +393,7 @@ struct Trials {
 }
 
 impl Trials {
-    const NEW: Self = Self { to_skip: 0, patience: MOST_SKIPPED };
+    const NEW: Self = Self { to_skip: 0, patience: MAX_SKIPPED };
 
     /// Whether the next packet is to be tried.
     #[inline(always)]
@@ -407,7 +407,7 @@ impl Trials {
     #[inline(always)]
     fn record(&mut self, pays: bool) {
         (self.to_skip, self.patience) =
-            if pays { (0, 0) } else { (self.patience, (2 * self.patience).clamp(1, MOST_SKIPPED)) };
+            if pays { (0, 0) } else { (self.patience, (2 * self.patience).clamp(1, MAX_SKIPPED)) };
     }
 }
 

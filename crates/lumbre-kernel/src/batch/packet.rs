@@ -29,7 +29,7 @@ use super::sink::Sink;
 use crate::intersect::box_ray::{END_FACTOR, LITTLE, START_FACTOR};
 use crate::intersect::box_ray::{Frustum, SlabRows};
 use crate::intersect::watertight::TINY;
-use crate::intersect::{self, Axes, CornersRoom, Sides, Simd};
+use crate::intersect::{self, Axes, CornerScratch, Sides, Simd};
 use crate::simd::{self, F32x8, F32x16, Vector};
 use crate::trace::Stop;
 use crate::trace::decide::Decider;
@@ -41,7 +41,7 @@ use crate::tree::triangle_block::TriangleBlock;
 /// A mask of all of them.
 pub(crate) const ALL: u32 = (1 << PACKET) - 1;
 /// How far from their middle rays may start on an axis, in tree units: see above.
-const MOST_DISTANCE: f32 = 0.125;
+const MAX_DISTANCE: f32 = 0.125;
 /// How many there have to be.
 const LEAST: u32 = 4;
 /// Children whose boxes are tested against each ray cost, together, as much as a node.
@@ -51,14 +51,14 @@ const CULL_ERROR: f32 = 32.0 / (1 << 24) as f32;
 
 /// How much a packet may do, in nodes; a block of triangles costs as much as two, and so does a triangle.
 #[derive(Clone, Copy)]
-pub(super) struct Effort {
+pub(super) struct WorkBudget {
     /// Before its rays go on alone.
     pub(super) most: u32,
     /// And have it pay, for all sixteen; for fewer rays proportionately less.
     pub(super) paying: u32,
 }
 
-impl Effort {
+impl WorkBudget {
     #[inline(always)]
     fn pays(self, work: u32, rays: u32) -> bool {
         work * ALL.count_ones() <= self.paying * rays.count_ones()
@@ -75,13 +75,13 @@ pub(super) trait Bundle<'a, 'd>: Sized {
     /// Whether triangles are tested with the bounds of [`CullBounds`].
     const NEEDS_BOUNDS: bool;
     /// How far from their middle directions may be, by the largest component.
-    const MOST_SPREAD: f32;
+    const MAX_SPREAD: f32;
 
     /// Without rays.
     fn new(decider: &'d Decider<'a>) -> Self;
 
     /// How much they may do, where they have one origin or not.
-    fn effort(has_one_origin: bool) -> Effort;
+    fn effort(has_one_origin: bool) -> WorkBudget;
 
     /// Takes the rays in.
     fn load<L: Simd>(&mut self, rays: &[Self::Ray; PACKET]);
@@ -423,7 +423,7 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
             state.frustum.most_inverse[axis] = most_inverse;
             state.frustum.least_inverse[axis] = -minus_least;
             state.frustum.width[axis] = largest * (off + margin);
-            is_near &= off <= MOST_DISTANCE;
+            is_near &= off <= MAX_DISTANCE;
         }
         (state.frustum.s_max, state.frustum.s_min, state.frustum.sides) =
             (most[3], -most[7], Sides::new(signs));
@@ -496,14 +496,14 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
         let Self { decider, state, cull, bundle, .. } = self;
         bundle.start_triangles::<L>(decider, cull.axes, &state.slabs, cull);
         state.is_among_triangles = true;
-        cull.spread[0] <= B::MOST_SPREAD && cull.spread[1] <= B::MOST_SPREAD
+        cull.spread[0] <= B::MAX_SPREAD && cull.spread[1] <= B::MAX_SPREAD
     }
 
     /// Tests a leaf of triangles.
     #[inline(always)]
     fn test_triangles<L: Simd>(&mut self, leaf: u32, rays: &[B::Ray; PACKET]) {
         let mut following = Some(leaf & tag::PLACE);
-        let mut room = CornersRoom::new();
+        let mut room = CornerScratch::new();
         while let Some(place) = following {
             let block = self.decider.block(place);
             following = block.next(place);

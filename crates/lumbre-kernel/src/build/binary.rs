@@ -9,7 +9,7 @@ use std::borrow::Cow;
 use rayon::prelude::*;
 
 use crate::build::binary_node::{BinaryNode, Costs, Known, choose};
-use crate::build::binary_tree::{Binary, Fork, SAH_DEPTH, Twig};
+use crate::build::binary_tree::{Binary, InnerNode, SAH_DEPTH, Subtree};
 use crate::build::boxes::{Boxes, fill};
 use crate::build::morton::{self, Code};
 use crate::build::options::Preset;
@@ -17,7 +17,7 @@ use crate::build::partition::part;
 use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::build::reinsert::reinsert;
 use crate::build::sah::{BestSplit, Binning, Bins, Centers, Fill, FindCenters, Part, Split};
-use crate::build::small::{Decide, FEW, Few, group_of};
+use crate::build::small::{FEW, SmallSplit, SplitSmall, group_of};
 use crate::build::treelet;
 use crate::intersect::Isa;
 use crate::tree::Name;
@@ -27,12 +27,12 @@ const FAST_FEW: usize = 48;
 /// From how many primitives on threads share the work.
 pub(crate) const PARALLEL: usize = 4096;
 /// How few they leave to one of them, where there are not many more.
-const LEAST_ALONE: usize = 1024;
+const MIN_ALONE: usize = 1024;
 /// How many primitives a thread takes at a time in a node that is shared.
 const CHUNK: usize = 1 << 12;
 
 /// A binary tree, and what is in its leaves.
-pub(crate) struct Grown<'p> {
+pub(crate) struct GrownTree<'p> {
     pub(crate) tree: Binary<'p>,
     /// In the order of leaves.
     pub(crate) names: Vec<Name>,
@@ -52,12 +52,12 @@ pub(crate) fn binary_tree<'p>(
     mut others: Vec<Primitive>,
     packed: &'p mut Boxes,
     traits: &[Traits],
-) -> Grown<'p> {
+) -> GrownTree<'p> {
     // Below, there is a node for every thread.
     let shared = (2 * rayon::current_num_threads()).ilog2();
     let shared = if shared > 1 { shared + 1 } else { 0 };
     let all = others.len() + packed.len();
-    let alone = if all <= PARALLEL { PARALLEL } else { (all / 8).clamp(LEAST_ALONE, PARALLEL) };
+    let alone = if all <= PARALLEL { PARALLEL } else { (all / 8).clamp(MIN_ALONE, PARALLEL) };
     let builder = &Builder { isa, traits, shared, alone };
     let counts = sort_by_rank(&mut others, traits);
     let first_packed = others.len();
@@ -75,9 +75,11 @@ pub(crate) fn binary_tree<'p>(
         trees.push(tree);
     }
     let better = |tree| if preset == Preset::Best { reinsert(tree) } else { tree };
-    let join = |low, high| Binary::Fork(Box::new(Fork { is_ranked: true, ..Fork::over([low, high]) }));
+    let join = |low, high| {
+        Binary::InnerNode(Box::new(InnerNode { is_ranked: true, ..InnerNode::over([low, high]) }))
+    };
     let tree = trees.into_iter().map(better).reduce(join).expect("there are primitives");
-    Grown { tree, names, instances: others }
+    GrownTree { tree, names, instances: others }
 }
 
 /// Names, and others behind them.
@@ -111,8 +113,8 @@ fn sort_by_rank(primitives: &mut [Primitive], traits: &[Traits]) -> [usize; Kind
 
 /// Which twigs there are to be, and what stands over them.
 enum Sketch {
-    Fork(Box<[Sketch; 2]>),
-    Twig(Seed),
+    InnerNode(Box<[Sketch; 2]>),
+    Subtree(Seed),
 }
 
 /// A twig to be.
@@ -129,20 +131,20 @@ impl Sketch {
     /// From the first to the last. The depth of its recursion, and of that of [`Self::over`], is that of the tree.
     fn seeds<'a>(&'a self, seeds: &mut Vec<&'a Seed>) {
         match self {
-            Self::Fork(sides) => sides.iter().for_each(|side| side.seeds(seeds)),
-            Self::Twig(seed) => seeds.push(seed),
+            Self::InnerNode(sides) => sides.iter().for_each(|side| side.seeds(seeds)),
+            Self::Subtree(seed) => seeds.push(seed),
         }
     }
 
     /// The tree of its twigs, which come in their order.
     fn over<'p>(&self, twigs: &mut impl Iterator<Item = Binary<'p>>) -> Binary<'p> {
         match self {
-            Self::Fork(sides) => {
+            Self::InnerNode(sides) => {
                 let [left, right] = &**sides;
                 let left = left.over(twigs);
                 Binary::over([left, right.over(twigs)])
             }
-            Self::Twig(_) => twigs.next().expect("there is one for each seed"),
+            Self::Subtree(_) => twigs.next().expect("there is one for each seed"),
         }
     }
 }
@@ -336,7 +338,7 @@ impl Builder<'_> {
                 Ok(_) => Cow::Borrowed(bytemuck::cast_slice(nodes)),
                 Err(nodes) => Cow::Owned(nodes),
             };
-            binaries.push(Binary::Twig(Twig { nodes, costs: twig.costs, known: twig.known }));
+            binaries.push(Binary::Subtree(Subtree { nodes, costs: twig.costs, known: twig.known }));
         }
         let tree = sketch.over(&mut binaries.into_iter());
         PackedTree { tree: if moves { treelet::reinsert_upper(tree, count) } else { tree }, names }
@@ -358,7 +360,7 @@ impl Builder<'_> {
     ) -> Sketch {
         let count = primitives.len();
         if count <= self.alone {
-            return Sketch::Twig(Seed { count, depth, binning: None, is_sorted: true });
+            return Sketch::Subtree(Seed { count, depth, binning: None, is_sorted: true });
         }
         let Some(middle) = morton::cut(codes) else { return self.sketch::<COSTS>(primitives, depth, None) };
         let (left, right) = primitives.split_at_mut(middle);
@@ -367,7 +369,7 @@ impl Builder<'_> {
             || self.sketch_sorted::<COSTS>(left, depth + 1, left_codes),
             || self.sketch_sorted::<COSTS>(right, depth + 1, right_codes),
         );
-        Sketch::Fork(Box::new([left, right]))
+        Sketch::InnerNode(Box::new([left, right]))
     }
 
     /// `binning` is how the primitives are to be binned, where that is known.
@@ -379,14 +381,14 @@ impl Builder<'_> {
     ) -> Sketch {
         let count = primitives.len();
         if count <= self.alone {
-            return Sketch::Twig(Seed { count, depth, binning, is_sorted: false });
+            return Sketch::Subtree(Seed { count, depth, binning, is_sorted: false });
         }
         let ([left, right], [left_binning, right_binning]) = self.divide::<COSTS>(primitives, depth, binning);
         let (left, right) = rayon::join(
             || self.sketch::<COSTS>(left, depth + 1, left_binning),
             || self.sketch::<COSTS>(right, depth + 1, right_binning),
         );
-        Sketch::Fork(Box::new([left, right]))
+        Sketch::InnerNode(Box::new([left, right]))
     }
 
     /// One level of a node that threads share. Apart, so that its bins are not on the stack of what is below.
@@ -414,7 +416,7 @@ impl Builder<'_> {
         let twigs = self.twigs::<COSTS>(sketch, codes, plot);
         let mut apart = twigs.into_iter().map(|GrownTwig { nodes, costs, known, .. }| {
             let nodes = Cow::Owned(nodes.expect_err("names have places of their own"));
-            Binary::Twig(Twig { nodes, costs, known })
+            Binary::Subtree(Subtree { nodes, costs, known })
         });
         sketch.over(&mut apart)
     }
@@ -613,8 +615,8 @@ impl Builder<'_> {
     fn few<const COSTS: bool>(&self, range: Range, work: &mut Tools) -> Bounds {
         let traits = self.traits;
         let place = work.nodes.len();
-        match self.isa.run(Decide::<COSTS> { primitives: range.here, traits }) {
-            Few::Leaf => {
+        match self.isa.run(SplitSmall::<COSTS> { primitives: range.here, traits }) {
+            SmallSplit::Leaf => {
                 let mut bounds = Bounds::EMPTY;
                 for (name, primitive) in range.names.iter_mut().zip(&*range.here) {
                     *name = [primitive.first(), primitive.second()];
@@ -626,7 +628,7 @@ impl Builder<'_> {
                 work.nodes.push(BinaryNode::leaf(&bounds, range.first, range.names.len()));
                 bounds
             }
-            Few::Split(left) => {
+            SmallSplit::Split(left) => {
                 work.nodes.push(BinaryNode(Bounds::EMPTY));
                 let [left, right] = range.cut(left);
                 let mut bounds = self.few::<COSTS>(left, work);

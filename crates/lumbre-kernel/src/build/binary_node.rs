@@ -76,10 +76,10 @@ const LEFT_AT: [u32; FREELY + 2] = [0, 0, 0, 0, 1, 3, 5, 8, 11, 14];
 /// From here on, a bit each says whether the next goes to the left.
 const NEXT_AT: u32 = LEFT_AT[FREELY + 1];
 const LEFT_OF_ALL_AT: u32 = NEXT_AT + (WIDTH - FREELY - 1) as u32;
-const MOST_AS_ONE_AT: u32 = LEFT_OF_ALL_AT + 4;
+const MAX_AS_ONE_AT: u32 = LEFT_OF_ALL_AT + 4;
 
 // The last bit of the word says that a node is a leaf; four bits hold what is below sixteen.
-const _: () = assert!(MOST_AS_ONE_AT + 4 < u32::BITS && WIDTH == 16);
+const _: () = assert!(MAX_AS_ONE_AT + 4 < u32::BITS && WIDTH == 16);
 
 /// The choices where there is a leaf at the left, or at the right.
 const ALL_BUT_ONE_RIGHT: u32 = 0;
@@ -99,7 +99,7 @@ impl Choices {
     #[inline(always)]
     pub(super) fn left(self, children: usize) -> usize {
         let bits = |from: u32, to: u32| (self.0 >> from & ((1 << (to - from)) - 1)) as usize;
-        if children <= bits(MOST_AS_ONE_AT, MOST_AS_ONE_AT + 4) {
+        if children <= bits(MAX_AS_ONE_AT, MAX_AS_ONE_AT + 4) {
             0
         } else if children <= FREELY {
             1 + bits(LEFT_AT[children], LEFT_AT[children + 1])
@@ -107,7 +107,7 @@ impl Choices {
             let next = bits(NEXT_AT, NEXT_AT + (children - FREELY) as u32).count_ones() as usize;
             1 + bits(LEFT_AT[FREELY], LEFT_AT[FREELY + 1]) + next
         } else {
-            1 + bits(LEFT_OF_ALL_AT, MOST_AS_ONE_AT)
+            1 + bits(LEFT_OF_ALL_AT, MAX_AS_ONE_AT)
         }
     }
 }
@@ -171,7 +171,7 @@ fn one_if_no_worse(mut costs: Costs, as_one: f32, choices: u32) -> (Costs, Choic
             most_as_one = children as u32;
         }
     }
-    (costs, Choices(choices | most_as_one << MOST_AS_ONE_AT))
+    (costs, Choices(choices | most_as_one << MAX_AS_ONE_AT))
 }
 
 /// The costs of putting leaves of so many instances: beside others where there is room for all, or else into a node of their own.

@@ -14,13 +14,13 @@ pub(crate) const DEEPEST: u32 = SAH_DEPTH + 32 + FEW as u32;
 /// The binary tree, or a part of it.
 pub(crate) enum Binary<'p> {
     /// Over many primitives.
-    Fork(Box<Fork<'p>>),
+    InnerNode(Box<InnerNode<'p>>),
     /// Over fewer, with their nodes in a row.
-    Twig(Twig<'p>),
+    Subtree(Subtree<'p>),
 }
 
 /// A node with two children of their own.
-pub(crate) struct Fork<'p> {
+pub(crate) struct InnerNode<'p> {
     pub(crate) bounds: Bounds,
     pub(crate) costs: Costs,
     pub(crate) choices: Choices,
@@ -34,18 +34,18 @@ pub(crate) struct Fork<'p> {
 impl Binary<'_> {
     /// The node over two.
     pub(crate) fn over(children: [Self; 2]) -> Self {
-        Self::Fork(Box::new(Fork::over(children)))
+        Self::InnerNode(Box::new(InnerNode::over(children)))
     }
 
     /// A twig of such nodes.
     pub(crate) fn twig(mut nodes: Vec<BinaryNode>) -> Self {
         let costs = choose(&mut nodes, false);
-        Self::Twig(Twig { nodes: Cow::Owned(nodes), costs, known: Known::default() })
+        Self::Subtree(Subtree { nodes: Cow::Owned(nodes), costs, known: Known::default() })
     }
 }
 
 /// Nodes in depth-first order, the root first, each left child right after its parent.
-pub(crate) struct Twig<'p> {
+pub(crate) struct Subtree<'p> {
     /// As a rule where the primitives stood that they are over.
     pub(crate) nodes: Cow<'p, [BinaryNode]>,
     /// The costs of the root, for those above it.
@@ -54,7 +54,7 @@ pub(crate) struct Twig<'p> {
     pub(super) known: Known,
 }
 
-impl<'p> Twig<'p> {
+impl<'p> Subtree<'p> {
     /// The subtree of these nodes. Unless they stand where the primitives stood, they are copied.
     pub(crate) fn part(&self, nodes: std::ops::Range<usize>) -> Self {
         let costs = self.known.costs(nodes.start, &self.nodes[nodes.clone()]);
@@ -69,28 +69,28 @@ impl<'p> Twig<'p> {
 impl Binary<'_> {
     pub(crate) fn bounds(&self) -> &Bounds {
         match self {
-            Self::Fork(fork) => &fork.bounds,
-            Self::Twig(twig) => twig.nodes[0].bounds(),
+            Self::InnerNode(fork) => &fork.bounds,
+            Self::Subtree(twig) => twig.nodes[0].bounds(),
         }
     }
 
     pub(crate) fn costs(&self) -> &Costs {
         match self {
-            Self::Fork(fork) => &fork.costs,
-            Self::Twig(twig) => &twig.costs,
+            Self::InnerNode(fork) => &fork.costs,
+            Self::Subtree(twig) => &twig.costs,
         }
     }
 
     /// How many nodes it has.
     fn nodes(&self) -> usize {
         match self {
-            Self::Fork(fork) => fork.nodes,
-            Self::Twig(twig) => twig.nodes.len(),
+            Self::InnerNode(fork) => fork.nodes,
+            Self::Subtree(twig) => twig.nodes.len(),
         }
     }
 }
 
-impl<'p> Fork<'p> {
+impl<'p> InnerNode<'p> {
     /// The one over two.
     pub(crate) fn over(children: [Binary<'p>; 2]) -> Self {
         let mut bounds = *children[0].bounds();

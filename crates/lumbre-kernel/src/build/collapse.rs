@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use crate::build::binary_node::{BinaryNode, Choices};
-use crate::build::binary_tree::{Binary, Fork};
+use crate::build::binary_tree::{Binary, InnerNode};
 use crate::build::boxes::fill;
 use crate::build::error::BuildError;
 use crate::build::occlusion_order;
@@ -21,7 +21,7 @@ use crate::tree::node::{Node, TreeSpace, WIDTH, tag};
 use crate::tree::packed::{Entry, Packed};
 use crate::tree::sphere_block::SphereBlock;
 use crate::tree::storage::Store;
-use crate::tree::triangle_block::{BlockNames, Blocks};
+use crate::tree::triangle_block::{BlockIds, Blocks};
 use crate::tree::{Geometry, GeometryKind};
 
 impl Packed {
@@ -85,9 +85,9 @@ impl Packed {
 /// A node of the binary tree, wherever it is.
 #[derive(Clone, Copy)]
 enum Cursor<'a> {
-    Fork(&'a Fork<'a>),
+    InnerNode(&'a InnerNode<'a>),
     /// From it on.
-    Twig(&'a [BinaryNode]),
+    Subtree(&'a [BinaryNode]),
     /// One of the instances of a leaf, and the place of its name.
     Instance(&'a Primitive, usize),
 }
@@ -95,16 +95,16 @@ enum Cursor<'a> {
 impl<'a> Cursor<'a> {
     fn new(tree: &'a Binary<'a>) -> Self {
         match tree {
-            Binary::Fork(fork) => Self::Fork(fork),
-            Binary::Twig(twig) => Self::Twig(&twig.nodes),
+            Binary::InnerNode(fork) => Self::InnerNode(fork),
+            Binary::Subtree(twig) => Self::Subtree(&twig.nodes),
         }
     }
 
     #[inline(always)]
     fn bounds(&self) -> &'a Bounds {
         match self {
-            Self::Fork(fork) => &fork.bounds,
-            Self::Twig(nodes) => nodes[0].bounds(),
+            Self::InnerNode(fork) => &fork.bounds,
+            Self::Subtree(nodes) => nodes[0].bounds(),
             Self::Instance(bounds, _) => bounds,
         }
     }
@@ -112,8 +112,8 @@ impl<'a> Cursor<'a> {
     #[inline(always)]
     fn names(&self) -> Option<std::ops::Range<usize>> {
         match self {
-            Self::Fork(_) => None,
-            Self::Twig(nodes) => nodes[0].names(),
+            Self::InnerNode(_) => None,
+            Self::Subtree(nodes) => nodes[0].names(),
             Self::Instance(_, name) => Some(*name..*name + 1),
         }
     }
@@ -121,8 +121,8 @@ impl<'a> Cursor<'a> {
     #[inline(always)]
     fn choices(&self) -> Choices {
         match self {
-            Self::Fork(fork) => fork.choices,
-            Self::Twig(nodes) => nodes[0].choices(),
+            Self::InnerNode(fork) => fork.choices,
+            Self::Subtree(nodes) => nodes[0].choices(),
             Self::Instance(..) => unreachable!("a leaf"),
         }
     }
@@ -130,8 +130,8 @@ impl<'a> Cursor<'a> {
     #[inline(always)]
     fn children(&self) -> [Self; 2] {
         match self {
-            Self::Fork(fork) => [Self::new(&fork.children[0]), Self::new(&fork.children[1])],
-            Self::Twig(nodes) => [Self::Twig(&nodes[1..]), Self::Twig(&nodes[nodes[0].right()..])],
+            Self::InnerNode(fork) => [Self::new(&fork.children[0]), Self::new(&fork.children[1])],
+            Self::Subtree(nodes) => [Self::Subtree(&nodes[1..]), Self::Subtree(&nodes[nodes[0].right()..])],
             Self::Instance(..) => unreachable!("a leaf"),
         }
     }
@@ -139,7 +139,7 @@ impl<'a> Cursor<'a> {
     /// Whether the right child is of a higher rank than the left.
     #[inline(always)]
     fn is_ranked(&self) -> bool {
-        matches!(self, Self::Fork(fork) if fork.is_ranked)
+        matches!(self, Self::InnerNode(fork) if fork.is_ranked)
     }
 }
 
@@ -244,7 +244,7 @@ pub(crate) fn lay_out(
     let mut spans = vec![Span { first: 0, count: 0 }; total.blocks];
     let mut sphere_spans = vec![Span { first: 0, count: 0 }; total.sphere_blocks];
     let mut entries = vec![Entry::new(0, 0, true); total.entries];
-    let mut room = Room {
+    let mut room = OutputSlices {
         nodes: &mut nodes,
         spans: &mut spans,
         sphere_spans: &mut sphere_spans,
@@ -269,21 +269,21 @@ impl Layout {
         names: Vec<Name>,
     ) -> Packed {
         let Self { nodes, entries, spans, sphere_spans, root } = self;
-        let named = |spans: Vec<Span>| -> Vec<BlockNames> {
-            let name = |span: &Span| BlockNames::of(&names[span.first as usize..][..span.count as usize]);
+        let named = |spans: Vec<Span>| -> Vec<BlockIds> {
+            let name = |span: &Span| BlockIds::of(&names[span.first as usize..][..span.count as usize]);
             spans.par_iter().with_min_len(pack::share_of(spans.len())).map(name).collect()
         };
-        let (block_names, sphere_names) = (named(spans), named(sphere_spans));
+        let (block_names, sphere_ids) = (named(spans), named(sphere_spans));
         drop(names);
-        let block = |names: &BlockNames| fill_sphere_block(cloud(geometries, names.geometry), names);
-        let sphere_blocks: Vec<_> = sphere_names.par_iter().with_min_len(256).map(block).collect();
+        let block = |names: &BlockIds| fill_sphere_block(cloud(geometries, names.geometry), names);
+        let sphere_blocks: Vec<_> = sphere_ids.par_iter().with_min_len(256).map(block).collect();
         let mut packed = Packed {
             nodes: nodes.into(),
             blocks: Store::default(),
             names: block_names.into(),
             entries: entries.into(),
             sphere_blocks: sphere_blocks.into(),
-            sphere_names: sphere_names.into(),
+            sphere_ids: sphere_ids.into(),
             root: Some(root),
         };
         packed.pack_triangles(isa, geometries, false);
@@ -324,7 +324,7 @@ fn cloud(geometries: &[Geometry], geometry: u32) -> &SphereCloud {
 }
 
 #[inline(always)]
-fn fill_sphere_block(cloud: &SphereCloud, names: &BlockNames) -> SphereBlock {
+fn fill_sphere_block(cloud: &SphereCloud, names: &BlockIds) -> SphereBlock {
     let mut block = SphereBlock::EMPTY;
     for (lane, primitive) in names.primitives().enumerate() {
         block.put(lane, cloud.spheres[primitive as usize]);
@@ -340,7 +340,7 @@ struct Span {
 }
 
 /// Where a part of the tree goes; it takes up what it is given from the front.
-struct Room<'a> {
+struct OutputSlices<'a> {
     nodes: &'a mut [Node],
     spans: &'a mut [Span],
     sphere_spans: &'a mut [Span],
@@ -349,7 +349,7 @@ struct Room<'a> {
     start: Counts,
 }
 
-impl<'a> Room<'a> {
+impl<'a> OutputSlices<'a> {
     /// The first part.
     fn take(&mut self, counts: Counts) -> Self {
         let nodes = self.nodes.split_off_mut(..counts.nodes).unwrap_or_default();
@@ -358,7 +358,7 @@ impl<'a> Room<'a> {
         let entries = self.entries.split_off_mut(..counts.entries).unwrap_or_default();
         let start = self.start;
         self.start += counts;
-        Room { nodes, spans, sphere_spans, entries, start }
+        OutputSlices { nodes, spans, sphere_spans, entries, start }
     }
 }
 
@@ -425,7 +425,7 @@ impl<'a> Packer<'a> {
 
     /// `None` for a leaf, or a node over few primitives.
     fn plan(&self, root: Cursor<'a>) -> Option<Box<Plan<'a>>> {
-        let Cursor::Fork(Fork { nodes: MANY.., .. }) = root else { return None };
+        let Cursor::InnerNode(InnerNode { nodes: MANY.., .. }) = root else { return None };
         let (children, len) = self.gather(root, self.order);
         let mut plans: [Option<Box<Plan>>; WIDTH] = Default::default();
         let mut counts = [Counts::default(); WIDTH];
@@ -457,10 +457,11 @@ impl<'a> Packer<'a> {
         total
     }
 
-    fn put_many(&self, plan: &Plan<'a>, mut room: Room) -> u32 {
+    fn put_many(&self, plan: &Plan<'a>, mut room: OutputSlices) -> u32 {
         let place = room.start.nodes;
         let own = room.take(Counts { nodes: 1, ..Counts::default() });
-        let rooms: Vec<Room> = plan.counts[..plan.len].iter().map(|&counts| room.take(counts)).collect();
+        let rooms: Vec<OutputSlices> =
+            plan.counts[..plan.len].iter().map(|&counts| room.take(counts)).collect();
         let mut references = [Node::ABSENT; WIDTH];
         references[..plan.len]
             .par_iter_mut()
@@ -477,7 +478,7 @@ impl<'a> Packer<'a> {
         tag::reference(tag::INNER, place as u32)
     }
 
-    fn put(&self, root: Cursor<'a>, room: &mut Room) -> u32 {
+    fn put(&self, root: Cursor<'a>, room: &mut OutputSlices) -> u32 {
         if let Some(names) = self.leaf(root) {
             return self.put_leaf(names, room);
         }
@@ -492,7 +493,7 @@ impl<'a> Packer<'a> {
         tag::reference(tag::INNER, place as u32)
     }
 
-    fn put_leaf(&self, names: std::ops::Range<usize>, room: &mut Room) -> u32 {
+    fn put_leaf(&self, names: std::ops::Range<usize>, room: &mut OutputSlices) -> u32 {
         let (first, count) = (names.start as u32, names.len() as u32);
         let names = &self.names[names];
         let tag = match self.traits[names[0][0] as usize].kind {

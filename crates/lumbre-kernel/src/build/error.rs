@@ -5,7 +5,7 @@ use std::fmt;
 use crate::tree::node::tag;
 
 /// Leaf entries and nodes are to have a place in a reference.
-pub(crate) const MOST_PRIMITIVES: usize = tag::PLACE as usize;
+pub(crate) const MAX_PRIMITIVES: usize = tag::PLACE as usize;
 
 /// Why a tree cannot be built.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,7 +42,7 @@ impl fmt::Display for BuildError {
             Self::TooMany => write!(
                 f,
                 "too many primitives for one tree: at most {}, in {} blocks of eight triangles or spheres",
-                MOST_PRIMITIVES,
+                MAX_PRIMITIVES,
                 tag::BLOCK_PLACES
             ),
         }

@@ -7,11 +7,11 @@ use lumbre_math::{DMat3, DVec3, Elementary, Transform, Vec3};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use crate::build::binary::{Grown, PARALLEL, binary_tree};
+use crate::build::binary::{GrownTree, PARALLEL, binary_tree};
 use crate::build::boxes::Boxes;
 use crate::build::clouds::CloudSurvey;
 use crate::build::collapse::lay_out;
-use crate::build::error::{BuildError, MOST_PRIMITIVES};
+use crate::build::error::{BuildError, MAX_PRIMITIVES};
 use crate::build::open_instances;
 use crate::build::options::{BuildOptions, Preset};
 use crate::build::outline::Outline;
@@ -30,7 +30,7 @@ use crate::tree::{Geometry, GeometryKind, Tree};
 
 /// See [`Accel::build`].
 pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result<Tree, BuildError> {
-    if geometries.len() > MOST_PRIMITIVES {
+    if geometries.len() > MAX_PRIMITIVES {
         return Err(BuildError::TooMany);
     }
     // Handed to a pool of threads once, not with every piece of work; what one thread does alone is not handed over at all.
@@ -89,7 +89,7 @@ fn build_here(geometries: Vec<Geometry>, preset: Preset) -> Result<Tree, BuildEr
                 survey.put_boxes(cloud, &tree_space, own);
             }
         }
-        let Grown { tree, names, instances } = binary_tree(isa, preset, others, &mut primitives, &traits);
+        let GrownTree { tree, names, instances } = binary_tree(isa, preset, others, &mut primitives, &traits);
         let layout = lay_out(&traits, &tree, &names, &instances)?;
         drop((tree, instances));
         drop(primitives);
@@ -251,7 +251,7 @@ impl Parts {
 
     /// How many more primitives a tree takes.
     fn room(&self) -> usize {
-        MOST_PRIMITIVES - self.count()
+        MAX_PRIMITIVES - self.count()
     }
 
     /// The triangles of a mesh in double precision that have an area.

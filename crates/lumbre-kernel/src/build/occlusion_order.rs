@@ -14,7 +14,7 @@
 
 use rayon::prelude::*;
 
-use crate::intersect::{CornersRoom, Dispatch, Isa, Simd};
+use crate::intersect::{CornerScratch, Dispatch, Isa, Simd};
 use crate::simd::{F32x8, F32x16, Vector};
 use crate::tree::node::{Node, TreeSpace, WIDTH, tag};
 use crate::tree::triangle_block::{Blocks, TriangleBlock};
@@ -76,7 +76,7 @@ impl Sorter<'_> {
         &self,
         node: &mut Node,
         inner: &[Option<Odds>; WIDTH],
-        room: &mut CornersRoom,
+        room: &mut CornerScratch,
     ) -> Option<Odds> {
         let areas = Areas::of::<L>(node);
         let (mut stops, mut costs) = ([0.0; WIDTH], [1.0; WIDTH]);
@@ -132,7 +132,7 @@ impl Dispatch for SortFew<'_> {
     #[inline(always)]
     fn run<L: Simd>(self) -> Option<Odds> {
         let Self { sorter, nodes, place } = self;
-        let mut room = CornersRoom::new();
+        let mut room = CornerScratch::new();
         let mut odds = [None; FEW];
         for at in (0..nodes.len()).rev() {
             let node = &mut nodes[at];
@@ -160,7 +160,7 @@ impl Dispatch for SortOne<'_> {
 
     #[inline(always)]
     fn run<L: Simd>(self) -> Option<Odds> {
-        self.sorter.sort_one::<L>(self.node, &self.odds, &mut CornersRoom::new())
+        self.sorter.sort_one::<L>(self.node, &self.odds, &mut CornerScratch::new())
     }
 }
 
@@ -205,7 +205,7 @@ impl Areas {
 
 /// The area of the triangles of a block, in tree units.
 #[inline(always)]
-fn area_of<L: Simd>(block: &TriangleBlock, scale: f32, room: &mut CornersRoom) -> f32 {
+fn area_of<L: Simd>(block: &TriangleBlock, scale: f32, room: &mut CornerScratch) -> f32 {
     let corners = L::corners(block, room);
     let scale = L::F32x8::splat(scale);
     let (mut a, mut b) = ([scale; 3], [scale; 3]);

@@ -10,7 +10,7 @@ use crate::tree::geometry::TriangleMesh;
 use crate::tree::geometry::has_area;
 use crate::tree::node::{Node, tag};
 use crate::tree::triangle_block::{
-    BlockNames, Blocks, Head, Line, MARGIN, MOST_IN_HALF, QUAD, lines_of, row, shared_number, vertex_at,
+    BlockIds, Blocks, Head, Line, MARGIN, MAX_IN_HALF, QUAD, lines_of, row, shared_number, vertex_at,
 };
 use crate::tree::{Geometry, GeometryKind};
 
@@ -53,7 +53,7 @@ impl LaneOrder {
     }
 
     /// Puts the names of a block in this order.
-    pub(crate) fn put(self, names: &mut BlockNames) {
+    pub(crate) fn put(self, names: &mut BlockIds) {
         let before = names.primitives;
         for (lane, primitive) in names.primitives.iter_mut().enumerate() {
             *primitive = before[self.lane_before(lane)];
@@ -70,8 +70,8 @@ pub(crate) fn share_of(blocks: usize) -> usize {
 /// Whether so many blocks share their vertices. A block that does not is faster, but five megabytes of them no longer stay in a cache.
 /// Tests have both.
 pub(crate) fn is_worth_sharing(blocks: usize) -> bool {
-    const MOST_UNSHARED: usize = if cfg!(test) { 24 } else { 1 << 14 };
-    blocks > MOST_UNSHARED
+    const MAX_UNSHARED: usize = if cfg!(test) { 24 } else { 1 << 14 };
+    blocks > MAX_UNSHARED
 }
 
 /// Packs the triangles with these names; each block is followed by so many of its leaf. Leaves out those without an area, and does
@@ -80,7 +80,7 @@ pub(crate) fn pack(
     isa: Isa,
     may_share: bool,
     geometries: &[Geometry],
-    names: &[BlockNames],
+    names: &[BlockIds],
     followers: &[u8],
     may_lack_area: bool,
 ) -> Filled {
@@ -122,7 +122,7 @@ pub(crate) fn pack(
 /// Plans blocks with these names.
 struct MakePlans<'a> {
     geometries: &'a [Geometry],
-    names: &'a [BlockNames],
+    names: &'a [BlockIds],
     plans: &'a mut [Plan],
 }
 
@@ -142,7 +142,7 @@ impl Dispatch for MakePlans<'_> {
 struct PackShare<'a> {
     geometries: &'a [Geometry],
     /// From its first block on.
-    names: &'a [BlockNames],
+    names: &'a [BlockIds],
     followers: &'a [u8],
     /// Of its own blocks.
     plans: &'a [Plan],
@@ -177,7 +177,7 @@ impl PackShare<'_> {
 pub(crate) fn move_triangles(
     isa: Isa,
     geometries: &[Geometry],
-    names: &[BlockNames],
+    names: &[BlockIds],
     may_lack_area: bool,
     lines: &mut [Line],
 ) -> bool {
@@ -195,7 +195,7 @@ pub(crate) fn move_triangles(
 /// Some of the triangles that [`move_triangles`] moves.
 struct MoveShare<'a> {
     geometries: &'a [Geometry],
-    names: &'a [BlockNames],
+    names: &'a [BlockIds],
     may_lack_area: bool,
     lines: &'a mut [Line],
 }
@@ -331,7 +331,7 @@ impl Halves {
     /// Of the triangles with these names. Compares every corner with all before it, almost without branches; where too few share a
     /// vertex by name, compares their positions.
     #[inline(always)]
-    fn of<L: Simd>(mesh: &TriangleMesh, names: &BlockNames) -> Self {
+    fn of<L: Simd>(mesh: &TriangleMesh, names: &BlockIds) -> Self {
         let mut all = [0; 3 * BLOCK];
         let (triangles, _) = all.as_chunks_mut::<3>();
         let mut len = 0;
@@ -368,7 +368,7 @@ impl Halves {
         }
         let halves = Self::of_corners(corners, len, LaneOrder::SAME);
         let vertex_count = (halves.vertices[0] | halves.vertices[1]).count_ones() as usize;
-        if halves.do_fit() || vertex_count > 2 * MOST_IN_HALF || len <= QUAD {
+        if halves.do_fit() || vertex_count > 2 * MAX_IN_HALF || len <= QUAD {
             return halves;
         }
         halves.divided_better()
@@ -436,7 +436,7 @@ impl Halves {
     /// Whether a block can share them.
     #[inline(always)]
     fn do_fit(&self) -> bool {
-        self.most_in_half() as usize <= MOST_IN_HALF
+        self.most_in_half() as usize <= MAX_IN_HALF
     }
 
     #[inline(always)]

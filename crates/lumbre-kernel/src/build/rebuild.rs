@@ -7,7 +7,7 @@
 
 use lumbre_geometry::Aabb;
 
-use crate::build::binary::{Grown, PARALLEL, binary_tree};
+use crate::build::binary::{GrownTree, PARALLEL, binary_tree};
 use crate::build::boxes::Boxes;
 use crate::build::collapse::{Relaid, lay_out};
 use crate::build::input::{self, take_apart};
@@ -66,7 +66,7 @@ fn over_leaves(tree: &Tree, preset: Preset) -> Option<Relaid> {
         }
     }
     let nothing = &mut Boxes::empty(0);
-    let Grown { tree, names, instances } = binary_tree(Isa::best(), preset, primitives, nothing, &traits);
+    let GrownTree { tree, names, instances } = binary_tree(Isa::best(), preset, primitives, nothing, &traits);
     let layout = lay_out(&traits, &tree, &names, &instances).ok()?;
     Some(layout.over_leaves(&names, |geometry| leaves[geometry as usize - first]))
 }

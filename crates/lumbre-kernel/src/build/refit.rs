@@ -19,7 +19,7 @@ use crate::tree::node::{Node, TreeSpace, tag};
 use crate::tree::packed::Entry;
 use crate::tree::packed::Start;
 use crate::tree::sphere_block::{SphereBlock, has_radius};
-use crate::tree::triangle_block::{BlockNames, Blocks};
+use crate::tree::triangle_block::{BlockIds, Blocks};
 use crate::tree::{Geometry, GeometryKind, Tree};
 
 /// Why a tree cannot be refitted. It is as it was before.
@@ -142,7 +142,7 @@ pub(crate) fn fit(tree: &mut Tree, parts: Parts, places: Places) {
         .sphere_blocks
         .to_mut()
         .par_iter_mut()
-        .zip(packed.sphere_names.par_iter())
+        .zip(packed.sphere_ids.par_iter())
         .with_min_len(256)
         .map(|(block, names)| match &geometries[names.geometry as usize].kind {
             GeometryKind::Spheres(cloud) => fill_sphere_block(block, names, cloud, &tree_space),
@@ -286,7 +286,7 @@ fn check_spheres(tree: &Tree, geometries: &[Geometry]) -> Result<(), RefitError>
             _ => Vec::new(),
         })
         .collect();
-    for names in &tree.packed.sphere_names {
+    for names in &tree.packed.sphere_ids {
         for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX) {
             has_place[names.geometry as usize][primitive as usize] = true;
         }
@@ -342,7 +342,7 @@ fn entry_boxes(tree: &Tree, parts: &Parts) -> Result<Places, RefitError> {
 /// Takes the spheres over; one without a radius becomes one that is never hit.
 fn fill_sphere_block(
     block: &mut SphereBlock,
-    names: &BlockNames,
+    names: &BlockIds,
     cloud: &SphereCloud,
     tree_space: &TreeSpace,
 ) -> Bounds {

@@ -17,14 +17,14 @@ const ROUNDS: usize = 8;
 /// No more where a round gains less than this share of all areas. As upper nodes have been moved before (see `treelet`), most trees
 /// come to that in one round or two. With a thousandth, whole builds took up to 1.25 times as long, and rays gained nothing that could
 /// be measured.
-const LEAST_GAIN: f64 = 0.015;
+const MIN_GAIN: f64 = 0.015;
 /// Of how many nodes one is considered in a round, by area. With one of two, whole builds took up to 1.7 times as long, and rays
 /// gained nothing that could be measured.
 const SHARE: usize = 8;
 /// Trees that become deeper are given up: recursions below rely on it.
 pub(crate) const DEEPEST: u32 = 200;
 /// How many places are looked at for one subtree at most.
-const MOST_PLACES: usize = 4096;
+const MAX_PLACES: usize = 4096;
 
 pub(crate) const NONE: u32 = u32::MAX;
 
@@ -65,7 +65,7 @@ pub(crate) fn reinsert(tree: Binary<'_>) -> Binary<'_> {
         return tree;
     }
     let all = linked.inner_area();
-    linked.rounds(ROUNDS, SHARE, LEAST_GAIN * all);
+    linked.rounds(ROUNDS, SHARE, MIN_GAIN * all);
     linked.to_binary().unwrap_or(tree)
 }
 
@@ -91,13 +91,13 @@ impl Tree {
         let mut pending = vec![(tree, NONE)];
         while let Some((tree, parent)) = pending.pop() {
             match tree {
-                Binary::Fork(fork) => {
+                Binary::InnerNode(fork) => {
                     let place = nodes.len() as u32;
                     nodes.push(Node::closed(&fork.bounds, parent));
                     Self::link(&mut nodes, parent, place);
                     pending.extend(fork.children.iter().rev().map(|child| (child, place)));
                 }
-                Binary::Twig(twig) => {
+                Binary::Subtree(twig) => {
                     let start = nodes.len() as u32;
                     nodes.extend(twig.nodes.iter().map(|node| Node::closed(node.bounds(), NONE)));
                     nodes[start as usize].parent = parent;
@@ -214,7 +214,7 @@ impl Tree {
             stack.clear();
             stack.push((freed, beside));
             while let Some((gain, place)) = stack.pop() {
-                if gain - own.area <= best.gain || places > MOST_PLACES {
+                if gain - own.area <= best.gain || places > MAX_PLACES {
                     continue;
                 }
                 places += 1;

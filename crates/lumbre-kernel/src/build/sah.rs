@@ -9,7 +9,7 @@ use crate::intersect::{Dispatch, Simd};
 use crate::tree::BLOCK;
 
 /// Bins on an axis: a power of two.
-const MOST_BINS: usize = 16;
+const MAX_BINS: usize = 16;
 /// Of nodes with fewer primitives, for which looking at all bins takes longer than filling them.
 const FEWER_BINS: usize = 8;
 const FEWER_BELOW: usize = 64;
@@ -69,7 +69,7 @@ pub(crate) struct Binning {
 
 impl Binning {
     pub(crate) fn new(centers: &Centers, count: usize) -> Self {
-        let bins = if count < FEWER_BELOW { FEWER_BINS } else { MOST_BINS };
+        let bins = if count < FEWER_BELOW { FEWER_BINS } else { MAX_BINS };
         let mut binning = Self { start: centers.low, factor: [0.0; 4], bins };
         for axis in 0..3 {
             let size = centers.high[axis].wrapping_sub(centers.low[axis]);
@@ -85,7 +85,7 @@ impl Binning {
     #[inline(always)]
     fn bin_of(center2: i32, start: i32, factor: f32) -> usize {
         let place = center2.wrapping_sub(start) as f32 * factor;
-        (place + 8_388_608.0).to_bits() as usize % MOST_BINS
+        (place + 8_388_608.0).to_bits() as usize % MAX_BINS
     }
 
     // The last lane comes along only so that there are four.
@@ -131,16 +131,16 @@ pub(crate) struct Bins {
 /// What some of the primitives of a node put into its bins.
 #[derive(Clone)]
 struct Tally {
-    bounds: [[Bounds; MOST_BINS]; 3],
-    counts: [[u32; MOST_BINS]; 3],
-    costs: [[u32; MOST_BINS]; 3],
+    bounds: [[Bounds; MAX_BINS]; 3],
+    counts: [[u32; MAX_BINS]; 3],
+    costs: [[u32; MAX_BINS]; 3],
 }
 
 impl Tally {
     const EMPTY: Self = Self {
-        bounds: [[Bounds::EMPTY; MOST_BINS]; 3],
-        counts: [[0; MOST_BINS]; 3],
-        costs: [[0; MOST_BINS]; 3],
+        bounds: [[Bounds::EMPTY; MAX_BINS]; 3],
+        counts: [[0; MAX_BINS]; 3],
+        costs: [[0; MAX_BINS]; 3],
     };
 
     #[inline(always)]
@@ -156,7 +156,7 @@ impl Tally {
     fn add<const COSTS: bool>(&mut self, bins: &[u32; 4], primitive: &Primitive, traits: &[Traits]) {
         let cost = if COSTS { traits[primitive.first() as usize].cost } else { 0 };
         for (axis, &bin) in bins[..3].iter().enumerate() {
-            let bin = bin as usize % MOST_BINS;
+            let bin = bin as usize % MAX_BINS;
             self.bounds[axis][bin].grow(primitive);
             self.counts[axis][bin] += 1;
             if COSTS {
@@ -181,7 +181,7 @@ impl Bins {
     pub(crate) const EMPTY: Self = Self { tallies: [Tally::EMPTY, Tally::EMPTY] };
 
     pub(crate) fn join(&mut self, other: &Self) {
-        self.tallies[0].join(&other.tallies[0], MOST_BINS);
+        self.tallies[0].join(&other.tallies[0], MAX_BINS);
     }
 
     /// Tallies primitives in so many rows.
@@ -268,20 +268,20 @@ impl<const COSTS: bool> Dispatch for BestSplit<'_, COSTS> {
             *occupied = (low, high);
             spread = spread.max(high - low + 1);
 
-            let mut right_costs = [0.0; MOST_BINS];
+            let mut right_costs = [0.0; MAX_BINS];
             let (mut right, mut count, mut cost) = (Bounds::EMPTY, 0, 0);
             for bin in (low + 1..=high).rev() {
                 right.grow(&bounds[bin]);
                 count += counts[bin];
                 cost += costs[bin];
-                right_costs[bin % MOST_BINS] = right.half_area() * cost_of::<COSTS>(count, cost);
+                right_costs[bin % MAX_BINS] = right.half_area() * cost_of::<COSTS>(count, cost);
             }
             let (mut left, mut count, mut cost) = (Bounds::EMPTY, 0, 0);
             for bin in low + 1..=high {
                 left.grow(&bounds[bin - 1]);
                 count += counts[bin - 1];
                 cost += costs[bin - 1];
-                let both = left.half_area() * cost_of::<COSTS>(count, cost) + right_costs[bin % MOST_BINS];
+                let both = left.half_area() * cost_of::<COSTS>(count, cost) + right_costs[bin % MAX_BINS];
                 if both < best.0 {
                     best = (both, axis, bin);
                 }

@@ -11,7 +11,7 @@ pub(crate) const FEW: usize = 2 * BLOCK;
 const NODE_COST: f32 = 16.0;
 
 /// What becomes of few primitives.
-pub(crate) enum Few {
+pub(crate) enum SmallSplit {
     Leaf,
     /// They were brought into order: so many go to the left.
     Split(usize),
@@ -38,21 +38,21 @@ pub(crate) fn group_of(primitive: &Primitive, traits: &[Traits]) -> (Kind, u32) 
 }
 
 /// Decides about few primitives. With `COSTS`, they may be of any kind; without, a test of each costs the same.
-pub(crate) struct Decide<'a, const COSTS: bool> {
+pub(crate) struct SplitSmall<'a, const COSTS: bool> {
     pub(crate) primitives: &'a mut [Primitive],
     pub(crate) traits: &'a [Traits],
 }
 
-impl<const COSTS: bool> Dispatch for Decide<'_, COSTS> {
-    type Output = Few;
+impl<const COSTS: bool> Dispatch for SplitSmall<'_, COSTS> {
+    type Output = SmallSplit;
 
     #[inline(always)]
-    fn run<L: Simd>(self) -> Few {
+    fn run<L: Simd>(self) -> SmallSplit {
         let Self { primitives, traits } = self;
         let count = primitives.len();
         let could_be_leaf = is_uniform::<COSTS>(primitives, traits);
         if could_be_leaf && (count == 1 || !COSTS) {
-            return Few::Leaf;
+            return SmallSplit::Leaf;
         }
 
         if could_be_leaf && count == 2 {
@@ -63,7 +63,7 @@ impl<const COSTS: bool> Dispatch for Decide<'_, COSTS> {
             whole.grow(b);
             let apart = a.half_area() * cost(a) + b.half_area() * cost(b) + NODE_COST * whole.half_area();
             let is_leaf = (cost(a) + cost(b)) * whole.half_area() <= apart;
-            return if is_leaf { Few::Leaf } else { Few::Split(1) };
+            return if is_leaf { SmallSplit::Leaf } else { SmallSplit::Split(1) };
         }
 
         // Without costs, two leaves if at all possible.
@@ -111,18 +111,18 @@ impl<const COSTS: bool> Dispatch for Decide<'_, COSTS> {
             let area = whole.half_area();
             let all: u32 = primitives.iter().map(|p| traits[p.first() as usize].cost).sum();
             if all as f32 * area <= best.0 + NODE_COST * area {
-                return Few::Leaf;
+                return SmallSplit::Leaf;
             }
         }
         if !are_apart {
-            return Few::Split(by_group(primitives, traits));
+            return SmallSplit::Split(by_group(primitives, traits));
         }
         let mut copy = [Bounds::EMPTY; FEW];
         copy[..count].copy_from_slice(primitives);
         for (place, &from) in primitives.iter_mut().zip(&best_order) {
             *place = copy[from as usize % FEW];
         }
-        Few::Split(best.1)
+        SmallSplit::Split(best.1)
     }
 }
 

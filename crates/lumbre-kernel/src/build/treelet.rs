@@ -10,7 +10,7 @@ use std::collections::BinaryHeap;
 use std::ops::Range;
 
 use crate::build::binary_node::BinaryNode;
-use crate::build::binary_tree::{self, Binary, Twig};
+use crate::build::binary_tree::{self, Binary, Subtree};
 use crate::build::primitive::Bounds;
 use crate::build::reinsert::{self, NONE, Node, Tree};
 
@@ -18,13 +18,13 @@ use crate::build::reinsert::{self, NONE, Node, Tree};
 const OPENED: usize = 128;
 /// There are trees of so many primitives for one of them, or fewer of them; for too few primitives it is not tried.
 const PER_OPENED: usize = 128;
-const LEAST_OPENED: usize = 64;
+const MIN_OPENED: usize = 64;
 /// How often places are sought at most.
 const ROUNDS: usize = 10;
 /// No more where a round gains less than this share of the areas of opened nodes. The first gains a hundredth of them or nothing
 /// in statues and landscapes, and 5 to 10 in rooms.
 const FIRST_GAIN: f64 = 0.03;
-const LEAST_GAIN: f64 = 0.005;
+const MIN_GAIN: f64 = 0.005;
 /// Treelets that become deeper are given up: with what is below they are no deeper than other trees that were changed.
 const DEEPEST: u32 = reinsert::DEEPEST - binary_tree::DEEPEST;
 
@@ -46,8 +46,8 @@ impl<'a> Piece<'a> {
 
     fn children(self) -> Option<[Self; 2]> {
         match self {
-            Self::Tree(Binary::Fork(fork)) => Some(fork.children.each_ref().map(Self::Tree)),
-            Self::Tree(Binary::Twig(twig)) => Self::Part(&twig.nodes).children(),
+            Self::Tree(Binary::InnerNode(fork)) => Some(fork.children.each_ref().map(Self::Tree)),
+            Self::Tree(Binary::Subtree(twig)) => Self::Part(&twig.nodes).children(),
             Self::Part(nodes) => sides(nodes).map(|sides| sides.map(|side| Self::Part(&nodes[side]))),
         }
     }
@@ -61,7 +61,7 @@ fn sides(nodes: &[BinaryNode]) -> Option<[Range<usize>; 2]> {
 
 /// Whether it is tried for so many primitives.
 pub(crate) fn is_tried(primitives: usize) -> bool {
-    primitives >= LEAST_OPENED * PER_OPENED
+    primitives >= MIN_OPENED * PER_OPENED
 }
 
 /// Reinserts the upper nodes of a tree over so many primitives, where that makes it much better.
@@ -105,7 +105,7 @@ fn improve(upper: &mut Tree) -> bool {
     if upper.round(1) <= FIRST_GAIN * all {
         return false;
     }
-    upper.rounds(ROUNDS - 1, 1, LEAST_GAIN * all);
+    upper.rounds(ROUNDS - 1, 1, MIN_GAIN * all);
     upper.order(DEEPEST).is_some()
 }
 
@@ -115,8 +115,8 @@ fn cut<'p>(tree: Binary<'p>, children: &[Option<[u32; 2]>]) -> Vec<Option<Binary
     let mut pending = vec![(tree, 0)];
     while let Some((tree, place)) = pending.pop() {
         match (tree, children[place as usize]) {
-            (Binary::Fork(fork), Some(own)) => pending.extend(fork.children.into_iter().zip(own)),
-            (Binary::Twig(twig), Some(_)) => cut_twig(&twig, place, children, &mut pieces),
+            (Binary::InnerNode(fork), Some(own)) => pending.extend(fork.children.into_iter().zip(own)),
+            (Binary::Subtree(twig), Some(_)) => cut_twig(&twig, place, children, &mut pieces),
             (tree, None) => pieces[place as usize] = Some(tree),
         }
     }
@@ -125,7 +125,7 @@ fn cut<'p>(tree: Binary<'p>, children: &[Option<[u32; 2]>]) -> Vec<Option<Binary
 
 /// The same below a twig, whose root has this place.
 fn cut_twig<'p>(
-    twig: &Twig<'p>,
+    twig: &Subtree<'p>,
     place: u32,
     children: &[Option<[u32; 2]>],
     pieces: &mut [Option<Binary<'p>>],
@@ -137,7 +137,7 @@ fn cut_twig<'p>(
                 let sides = sides.map(|side| part.start + side.start..part.start + side.end);
                 pending.extend(sides.into_iter().zip(own));
             }
-            _ => pieces[place as usize] = Some(Binary::Twig(twig.part(part))),
+            _ => pieces[place as usize] = Some(Binary::Subtree(twig.part(part))),
         }
     }
 }
@@ -153,7 +153,7 @@ fn over<'p>(tree: &Tree, place: u32, pieces: &mut [Option<Binary<'p>>]) -> Binar
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::build::binary::{Grown, binary_tree};
+    use crate::build::binary::{GrownTree, binary_tree};
     use crate::build::binary_node::choose;
     use crate::build::boxes::Boxes;
     use crate::build::options::Preset;
@@ -186,7 +186,7 @@ mod tests {
         boxes
     }
 
-    fn grow<'p>(preset: Preset, boxes: &'p mut Boxes) -> Grown<'p> {
+    fn grow<'p>(preset: Preset, boxes: &'p mut Boxes) -> GrownTree<'p> {
         let traits = [Traits { kind: Kind::Triangle, cost: 4, most: 8 }];
         binary_tree(Isa::best(), preset, Vec::new(), boxes, &traits)
     }
@@ -210,9 +210,9 @@ mod tests {
             }
             None => {
                 let node = match tree {
-                    Piece::Tree(Binary::Twig(twig)) => &twig.nodes[0],
+                    Piece::Tree(Binary::Subtree(twig)) => &twig.nodes[0],
                     Piece::Part(nodes) => &nodes[0],
-                    Piece::Tree(Binary::Fork(_)) => unreachable!("it has children"),
+                    Piece::Tree(Binary::InnerNode(_)) => unreachable!("it has children"),
                 };
                 leaf(node);
                 nodes.push(*node);
@@ -221,7 +221,7 @@ mod tests {
     }
 
     /// Every name is in one leaf, every box holds those below it, and costs are those of the tree as it is.
-    fn check(grown: &Grown, count: usize) {
+    fn check(grown: &GrownTree, count: usize) {
         let mut names: Vec<Name> = Vec::new();
         let mut nodes = Vec::new();
         let root = Piece::Tree(&grown.tree);
@@ -290,6 +290,6 @@ mod tests {
         let before = area(&tree);
         let tree = reinsert_upper(tree, 1_000_000);
         assert!(area(&tree) < 0.7 * before, "{} of {before}", area(&tree));
-        check(&Grown { tree, names: (0..200).map(|i| [0, i]).collect(), instances: vec![] }, 200);
+        check(&GrownTree { tree, names: (0..200).map(|i| [0, i]).collect(), instances: vec![] }, 200);
     }
 }

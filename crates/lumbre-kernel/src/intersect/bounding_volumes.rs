@@ -5,8 +5,8 @@ use crate::intersect::watertight::HeightRange;
 use crate::simd::{F32x8, F32x16, Row, Vector, WIDE};
 use crate::tree::BLOCK;
 use crate::tree::bounding_block::{
-    BoundingBlock, BoundingVolumeRay, LEAST_COMPONENT, LEAST_TOLERANCE, LEAST_TUBE_ERROR,
-    TOLERANCE_PER_MARGIN, TUBE_ERROR_PER_MARGIN,
+    BoundingBlock, BoundingVolumeRay, MIN_COMPONENT, MIN_TOLERANCE, MIN_TUBE_ERROR, TOLERANCE_PER_MARGIN,
+    TUBE_ERROR_PER_MARGIN,
 };
 
 /// What came of eight bounding volumes.
@@ -53,7 +53,7 @@ fn pass<V: F32x8>(block: &BoundingBlock, ray: &BoundingVolumeRay, range: &Height
     let distance = w[0].abs().max(w[1].abs().max(w[2].abs()));
     let (per_distance, least_margin) = (load(&block.margins), load(&block.least_margins));
     let margin = per_distance.mul_add(distance, least_margin);
-    let least = per_distance * V::splat(LEAST_COMPONENT);
+    let least = per_distance * V::splat(MIN_COMPONENT);
     let half = [one + margin, load(&block.heights) + margin, one + margin];
     let (mut p, mut d) = ([zero; 3], [zero; 3]);
     let (mut near, mut far) = ([zero; 3], [zero; 3]);
@@ -104,8 +104,7 @@ fn look_into<V: F32x8, const SURE: bool>(
     let [dx, dy, dz] = [reach * d[0], reach * d[1], reach * d[2]];
     let [c, linear, e] = &block.profiles;
     let (c, linear, e) = (V::load(c), V::load(linear), V::load(e));
-    let tolerance =
-        (V::splat(TOLERANCE_PER_MARGIN) * margin).mul_add(one + margin, V::splat(LEAST_TOLERANCE));
+    let tolerance = (V::splat(TOLERANCE_PER_MARGIN) * margin).mul_add(one + margin, V::splat(MIN_TOLERANCE));
     let a = dx.mul_add(dx, dy.mul_add(dy, c * dz * dz));
     let slope = c.mul_add(pz, half * linear);
     let b = px.mul_add(dx, py.mul_add(dy, slope * dz));
@@ -175,7 +174,7 @@ impl Chord {
     #[inline(always)]
     fn intersect_tube<W: F32x16>(&self, tube: f32, [start, end]: [f32; 2]) -> SeenTube {
         let Self { p: [px, py, pz], d: [dx, dy, dz], .. } = *self;
-        let error = TUBE_ERROR_PER_MARGIN * self.margin + LEAST_TUBE_ERROR;
+        let error = TUBE_ERROR_PER_MARGIN * self.margin + MIN_TUBE_ERROR;
         // In the space of x, y and r z.
         let (pz, dz) = (tube * pz, tube * dz);
         let half_piece = (dx * dx + dy * dy + dz * dz).sqrt() * ((1.0 + 1e-6) / WIDE as f32);

@@ -4,7 +4,7 @@ use std::hint::select_unpredictable;
 use std::mem::MaybeUninit;
 
 use super::axes::Sides;
-use super::slots::{Room, Slots};
+use super::slots::{PushSlots, Slots};
 use crate::intersect::box_ray::Slabs;
 use crate::intersect::box_ray::{Frustum, SlabRows};
 use crate::simd::vector::stack_entry;
@@ -114,7 +114,7 @@ pub(crate) fn only_child(node: &Node, mask: u32) -> u32 {
 /// Puts the children in `mask`, two or more, onto the stack, the nearest last, but for the nearest, which it answers: by where the
 /// ray enters them.
 #[inline(always)]
-pub(crate) fn push_by_distance<W: F32x16>(node: &Node, mask: u32, enter: W, room: Room<i64>) -> u32 {
+pub(crate) fn push_by_distance<W: F32x16>(node: &Node, mask: u32, enter: W, room: PushSlots<i64>) -> u32 {
     let but_one = mask & mask.wrapping_sub(1);
     let but_two = but_one & but_one.wrapping_sub(1);
     let but_three = but_two & but_two.wrapping_sub(1);
@@ -150,7 +150,7 @@ pub(crate) fn push_by_distance<W: F32x16>(node: &Node, mask: u32, enter: W, room
 
 /// The same of any two or more.
 #[inline(always)]
-fn push_many<W: F32x16>(node: &Node, mask: u32, enter: W, room: Room<i64>) -> u32 {
+fn push_many<W: F32x16>(node: &Node, mask: u32, enter: W, room: PushSlots<i64>) -> u32 {
     put_in_order(node, mask, enter, room.window);
     let count = mask.count_ones() as usize - 1;
     // SAFETY: as many were written, and one more.
@@ -202,7 +202,7 @@ pub(crate) fn put_and_take_by_distance<W: F32x16>(
 /// Puts the children in `mask`, one or more, onto the stack in the order in which they stand in the node, but for the last, which it
 /// answers.
 #[inline(always)]
-pub(crate) fn push_as_built<W: F32x16>(node: &Node, mask: u32, room: Room<u32>) -> u32 {
+pub(crate) fn push_as_built<W: F32x16>(node: &Node, mask: u32, room: PushSlots<u32>) -> u32 {
     W::put_chosen(mask, &node.children, room.window);
     // SAFETY: as many were written, and one more.
     unsafe { room.add(mask.count_ones() as usize - 1) };

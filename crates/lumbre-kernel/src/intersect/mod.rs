@@ -35,11 +35,11 @@ pub(crate) use boxes::{
 };
 pub(crate) use dispatch::{Dispatch, DispatchedQuery, RayQuery};
 pub(crate) use isa::Isa;
-pub(crate) use operations::{CornersRoom, Simd};
+pub(crate) use operations::{CornerScratch, Simd};
 pub(crate) use portable::Portable;
 #[cfg(test)]
 pub(crate) use shims::*;
-pub(crate) use slots::{Room, STACK, Slots};
+pub(crate) use slots::{PushSlots, STACK, Slots};
 pub(crate) use spheres::intersect_spheres;
 #[cfg(test)]
 pub(crate) use spheres::intersect_spheres_at;

@@ -122,7 +122,7 @@ pub(crate) trait Simd {
     fn truncated(numbers: &[f32; BLOCK]) -> [i32; BLOCK];
 
     /// The corners of the triangles of a block: where they stand there, or in this room.
-    fn corners<'a>(block: &'a TriangleBlock, room: &'a mut CornersRoom) -> &'a Corners;
+    fn corners<'a>(block: &'a TriangleBlock, room: &'a mut CornerScratch) -> &'a Corners;
 
     /// [`Shear::new`] and [`Shear::local_origin`] of a ray that has these axes, for a mesh.
     fn shear(ray: &Ray, axes: &'static Axes, mesh_origin: &[f64; 4]) -> (Shear, [f64; 3]);
@@ -134,9 +134,9 @@ pub(crate) trait Simd {
 
 /// Room for corners.
 #[repr(align(32))]
-pub(crate) struct CornersRoom(pub(super) Corners);
+pub(crate) struct CornerScratch(pub(super) Corners);
 
-impl CornersRoom {
+impl CornerScratch {
     #[inline(always)]
     pub(crate) fn new() -> Self {
         Self([[[0.0; BLOCK]; 3]; 3])

@@ -11,7 +11,7 @@ use super::boxes::{
 use super::dispatch::Dispatch;
 use super::f32_ray::F32Ray;
 use super::isa::Isa;
-use super::operations::{CornersRoom, Simd};
+use super::operations::{CornerScratch, Simd};
 use super::slots::Slots;
 use super::triangles::Edges;
 use super::watertight::BlockRay;
@@ -179,13 +179,13 @@ pub(crate) fn intersect_triangles_at(
 /// What a ray is told of a block, bit by bit, of lanes with a triangle: which it may meet, those in its range, those that it surely meets,
 /// where, and the corners as single precision has them.
 #[derive(Debug, PartialEq)]
-pub(crate) struct Told {
+pub(crate) struct TestedBlock {
     masks: [u32; 3],
     heights: [[u32; BLOCK]; 2],
     corners: [[[u32; BLOCK]; 3]; 3],
 }
 
-impl Told {
+impl TestedBlock {
     #[inline(always)]
     fn of<L: Simd>(
         (block, ray): (&TriangleBlock, &BlockRay),
@@ -218,10 +218,10 @@ pub(crate) fn told_at(
     blocks: [&TriangleBlock; 2],
     rays: [&BlockRay; 2],
     f32_ray: [&F32Ray; 2],
-) -> [[Told; 2]; 2] {
+) -> [[TestedBlock; 2]; 2] {
     struct Telling<'a>([&'a TriangleBlock; 2], [&'a BlockRay; 2], [&'a F32Ray; 2]);
     impl Dispatch for Telling<'_> {
-        type Output = [[Told; 2]; 2];
+        type Output = [[TestedBlock; 2]; 2];
         #[inline(always)]
         fn run<L: Simd>(self) -> Self::Output {
             let Self(blocks, rays, f32_ray) = self;
@@ -232,12 +232,12 @@ pub(crate) fn told_at(
             let together = |which: usize| {
                 let of_one = (mask >> (BLOCK * which) & L::F32x8::ALL, edges.half(which));
                 let corners = [one(&x, which), one(&y, which), one(&z, which)];
-                Told::of::<L>((blocks[which], rays[which]), of_one, corners)
+                TestedBlock::of::<L>((blocks[which], rays[which]), of_one, corners)
             };
             let alone = |which: usize| {
                 let (block, ray) = (blocks[which], rays[which]);
                 let corners = L::sheared_corners(block, f32_ray[which]);
-                Told::of::<L>((block, ray), L::intersect_triangles(block, ray), corners)
+                TestedBlock::of::<L>((block, ray), L::intersect_triangles(block, ray), corners)
             };
             [[together(0), together(1)], [alone(0), alone(1)]]
         }
@@ -252,7 +252,7 @@ pub(crate) fn corners_at(isa: Isa, block: &TriangleBlock) -> Corners {
         type Output = Corners;
         #[inline(always)]
         fn run<L: Simd>(self) -> Self::Output {
-            *L::corners(self.0, &mut CornersRoom::new())
+            *L::corners(self.0, &mut CornerScratch::new())
         }
     }
     isa.run(Taking(block))

@@ -55,10 +55,10 @@ impl<E: Copy> Slots<E> {
     /// # Panics
     /// When there is not.
     #[inline(always)]
-    pub(crate) fn room(&mut self) -> Room<'_, E> {
+    pub(crate) fn room(&mut self) -> PushSlots<'_, E> {
         let len = self.len;
         let window = (&mut self.entries[len..len + WIDTH]).try_into().expect("as many");
-        Room { window, end: &mut self.len, len }
+        PushSlots { window, end: &mut self.len, len }
     }
 
     #[inline(always)]
@@ -78,14 +78,14 @@ impl<E: Copy> Slots<E> {
 }
 
 /// The next ones of an array that entries are added to.
-pub(crate) struct Room<'s, E> {
+pub(crate) struct PushSlots<'s, E> {
     pub(super) window: &'s mut [MaybeUninit<E>; WIDTH],
     end: &'s mut usize,
     // Where that stood.
     len: usize,
 }
 
-impl<E> Room<'_, E> {
+impl<E> PushSlots<'_, E> {
     /// Adds the first of them.
     ///
     /// # Safety

@@ -13,7 +13,7 @@ use lumbre_math::{DVec2, DVec3};
 
 use super::axes::Axes;
 use crate::simd::{Row, WIDE};
-use crate::tree::filter_start::LEAST_SIZE;
+use crate::tree::filter_start::MIN_SIZE;
 
 /// The shear that turns a ray's direction into the last axis: once a ray.
 #[derive(Clone, Copy, Debug)]
@@ -210,7 +210,7 @@ impl BlockRay {
             origin: [rounded[0], rounded[1], rounded[2], 0.0],
             rest: [rest[0] - shear_x_y[0] * rest[2], rest[1] - shear_x_y[1] * rest[2], rest[2], 0.0],
             shear: [shear_x_y[0], shear_x_y[1], 1.0, 0.0],
-            least_size: reach * LEAST_SIZE,
+            least_size: reach * MIN_SIZE,
             range,
             turn: if shear.direction_z < 0.0 { 0.0 } else { -0.0 },
         })

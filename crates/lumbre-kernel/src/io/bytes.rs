@@ -26,7 +26,7 @@ use crate::tree::Tree;
 use crate::tree::node::{Node, WIDTH, tag};
 use crate::tree::packed::{Entry, Packed};
 use crate::tree::sphere_block::SphereBlock;
-use crate::tree::triangle_block::BlockNames;
+use crate::tree::triangle_block::BlockIds;
 use crate::tree::{Geometry, GeometryKind};
 
 const MAGIC: [u8; 8] = *b"LumbTree";
@@ -122,7 +122,7 @@ pub(crate) fn to_bytes(tree: &Tree) -> Vec<u8> {
     put(tree.geometries.len() as u32);
     put(packed.nodes.len() as u32);
     put(packed.names.len() as u32);
-    put(packed.sphere_names.len() as u32);
+    put(packed.sphere_ids.len() as u32);
     put(packed.entries.len() as u32);
     put(tree.masks.len() as u32);
     // References to triangles number blocks: where these begin is found again.
@@ -140,7 +140,7 @@ pub(crate) fn to_bytes(tree: &Tree) -> Vec<u8> {
         put(node.len() as u32);
         node.children[..node.len()].iter().map(|&child| numbered(child)).for_each(&mut put);
     }
-    for names in packed.names.iter().chain(&packed.sphere_names) {
+    for names in packed.names.iter().chain(&packed.sphere_ids) {
         put(names.geometry);
         names.primitives.iter().copied().for_each(&mut put);
     }
@@ -241,15 +241,15 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Tree
     let mut names = Vec::with_capacity(block_count as usize);
     for _ in 0..block_count {
         let geometry = words.next().ok_or_else(ends)?;
-        names.push(BlockNames { geometry, primitives: words.array().ok_or_else(ends)? });
+        names.push(BlockIds { geometry, primitives: words.array().ok_or_else(ends)? });
     }
     packed.names = names.into();
     let mut names = Vec::with_capacity(sphere_block_count as usize);
     for _ in 0..sphere_block_count {
         let geometry = words.next().ok_or_else(ends)?;
-        names.push(BlockNames { geometry, primitives: words.array().ok_or_else(ends)? });
+        names.push(BlockIds { geometry, primitives: words.array().ok_or_else(ends)? });
     }
-    packed.sphere_names = names.into();
+    packed.sphere_ids = names.into();
     let mut entries = Vec::with_capacity(entry_count as usize);
     for _ in 0..entry_count {
         entries.push(Entry::from_words(words.array().ok_or_else(ends)?));
@@ -270,7 +270,7 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Tree
     check_structure(&packed, &geometries, |leaf| Some(tag::blocks(leaf)))?;
     check_names(&packed, &geometries)?;
     packed.pack_triangles(Isa::best(), &geometries, parts.has_flat);
-    packed.sphere_blocks = vec![SphereBlock::EMPTY; packed.sphere_names.len()].into();
+    packed.sphere_blocks = vec![SphereBlock::EMPTY; packed.sphere_ids.len()].into();
 
     let mut tree = empty_over(geometries);
     tree.packed = packed;
@@ -293,7 +293,7 @@ pub(crate) fn check_structure(
 ) -> Result<(), LoadError> {
     let mut nodes = vec![false; packed.nodes.len()];
     let mut blocks = vec![false; packed.names.len()];
-    let mut sphere_blocks = vec![false; packed.sphere_names.len()];
+    let mut sphere_blocks = vec![false; packed.sphere_ids.len()];
     let mut entries = vec![false; packed.entries.len()];
     let mut take = |reference: u32, parent: Option<usize>| -> Option<()> {
         let once = |taken: &mut [bool], place: usize| {
@@ -312,7 +312,7 @@ pub(crate) fn check_structure(
                 numbers.into_iter().try_for_each(|block| once(&mut blocks, block))
             }
             tag::SPHERES => {
-                are_of_one(packed.sphere_names.get(tag::blocks(reference))?)?;
+                are_of_one(packed.sphere_ids.get(tag::blocks(reference))?)?;
                 tag::blocks(reference).try_for_each(|block| once(&mut sphere_blocks, block))
             }
             kind @ (tag::SHAPES | tag::INSTANCE | tag::CUSTOM | tag::PRECISE) => {
@@ -358,7 +358,7 @@ pub(crate) fn check_structure(
 }
 
 /// The blocks of a leaf are to be of one geometry: it has one origin.
-fn are_of_one(names: &[BlockNames]) -> Option<()> {
+fn are_of_one(names: &[BlockIds]) -> Option<()> {
     names.iter().all(|block| block.geometry == names[0].geometry).then_some(())
 }
 
@@ -383,7 +383,7 @@ pub(crate) fn check_names(packed: &Packed, geometries: &[Geometry]) -> Result<()
         (!std::mem::replace(&mut named[place], true)).then_some(())
     };
     let of_triangles = (&packed.names, tag::TRIANGLES, ["block", "triangle", "mesh"]);
-    let of_spheres = (&packed.sphere_names, tag::SPHERES, ["block of spheres", "sphere", "cloud"]);
+    let of_spheres = (&packed.sphere_ids, tag::SPHERES, ["block of spheres", "sphere", "cloud"]);
     for (list, kind, [what, one, all]) in [of_triangles, of_spheres] {
         for (block, names) in list.iter().enumerate() {
             let geometry = names.geometry;

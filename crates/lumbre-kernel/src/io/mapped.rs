@@ -36,7 +36,7 @@ use crate::tree::packed::Start;
 use crate::tree::packed::{Entry, Packed};
 use crate::tree::sphere_block::SphereBlock;
 use crate::tree::storage::Store;
-use crate::tree::triangle_block::{BlockNames, Line};
+use crate::tree::triangle_block::{BlockIds, Line};
 use crate::tree::{Geometry, GeometryKind, Tree};
 
 const MAGIC: [u8; 8] = *b"LumbMap\0";
@@ -181,7 +181,7 @@ fn arrays(tree: &Tree) -> [&[u8]; ARRAYS] {
         bytemuck::cast_slice(&packed.blocks),
         bytemuck::cast_slice(&packed.names),
         bytemuck::cast_slice(&packed.sphere_blocks),
-        bytemuck::cast_slice(&packed.sphere_names),
+        bytemuck::cast_slice(&packed.sphere_ids),
         bytemuck::cast_slice(&packed.entries),
         bytemuck::cast_slice(&tree.masks),
     ]
@@ -190,9 +190,9 @@ fn arrays(tree: &Tree) -> [&[u8]; ARRAYS] {
 const SIZES: [usize; ARRAYS] = [
     size_of::<Node>(),
     size_of::<Line>(),
-    size_of::<BlockNames>(),
+    size_of::<BlockIds>(),
     size_of::<SphereBlock>(),
-    size_of::<BlockNames>(),
+    size_of::<BlockIds>(),
     size_of::<Entry>(),
     size_of::<u32>(),
 ];
@@ -379,7 +379,7 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Tree, LoadE
         blocks: array(&file, &header, 1)?,
         names: array(&file, &header, 2)?,
         sphere_blocks: array(&file, &header, 3)?,
-        sphere_names: array(&file, &header, 4)?,
+        sphere_ids: array(&file, &header, 4)?,
         entries: array(&file, &header, 5)?,
         root: (header.root != NONE).then_some(header.root),
     };
@@ -409,7 +409,7 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Tree, LoadE
 
 /// Lanes that hold nothing are to be such that no ray meets them, so that nobody follows what stands there.
 fn check_lanes(packed: &Packed) -> Result<(), LoadError> {
-    if packed.sphere_blocks.len() != packed.sphere_names.len() {
+    if packed.sphere_blocks.len() != packed.sphere_ids.len() {
         return Err(LoadError::Inconsistent {
             what: "there are not as many names as blocks of spheres".to_owned(),
         });
@@ -429,8 +429,8 @@ fn check_lanes(packed: &Packed) -> Result<(), LoadError> {
             return Err(LoadError::Inconsistent { what });
         }
     }
-    let unnamed = |names: &BlockNames| names.primitives.map(|primitive| primitive == NONE);
-    for (place, (block, names)) in packed.sphere_blocks.iter().zip(&packed.sphere_names).enumerate() {
+    let unnamed = |names: &BlockIds| names.primitives.map(|primitive| primitive == NONE);
+    for (place, (block, names)) in packed.sphere_blocks.iter().zip(&packed.sphere_ids).enumerate() {
         let is_nothing =
             |lane: usize| block.radii[lane].is_nan() && block.centers.iter().all(|axis| axis[lane].is_nan());
         if unnamed(names).into_iter().enumerate().any(|(lane, is_unnamed)| is_unnamed && !is_nothing(lane)) {

@@ -8,7 +8,7 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::fmt;
 
-use lumbre_geometry::{Aabb, NearestPoint, NoNearestPoint, nearest_on_triangle, similarity_factor};
+use lumbre_geometry::{Aabb, NearestPoint, NearestPointError, nearest_on_triangle, similarity_factor};
 use lumbre_math::{DVec2, DVec3, Transform};
 
 use super::flats::flats;
@@ -46,9 +46,9 @@ pub struct ClosestPoint {
 
 /// Why there is no answer: something that may be nearer than all that has one.
 #[derive(Clone, Debug, PartialEq)]
-pub struct NoClosestPoint {
+pub struct ClosestPointError {
     /// What its geometry says.
-    pub why: NoNearestPoint,
+    pub why: NearestPointError,
     /// The id of the geometry.
     pub id: u32,
     /// The position of the geometry in the list that its tree was built from.
@@ -57,7 +57,7 @@ pub struct NoClosestPoint {
     pub instances: InstancePath,
 }
 
-impl fmt::Display for NoClosestPoint {
+impl fmt::Display for ClosestPointError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "no nearest point: geometry {} (id {})", self.geometry, self.id)?;
         if !self.instances.is_empty() {
@@ -67,7 +67,7 @@ impl fmt::Display for NoClosestPoint {
     }
 }
 
-impl std::error::Error for NoClosestPoint {
+impl std::error::Error for ClosestPointError {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         Some(&self.why)
     }
@@ -79,7 +79,7 @@ pub(crate) fn closest_point(
     point: DVec3,
     max_distance: f64,
     time: f64,
-) -> Result<Option<ClosestPoint>, NoClosestPoint> {
+) -> Result<Option<ClosestPoint>, ClosestPointError> {
     let mut search = Search::new(point, max_distance);
     if !point.is_finite() || max_distance.is_nan() || max_distance < 0.0 {
         return Ok(None);
@@ -115,7 +115,7 @@ pub(crate) fn closest_point(
                 }
             }
             Waiting::Reference(reference) if tag::of(reference) == tag::SPHERES => {
-                for names in &frame.tree.packed.sphere_names[tag::blocks(reference)] {
+                for names in &frame.tree.packed.sphere_ids[tag::blocks(reference)] {
                     for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX) {
                         search.meet(frame, names.geometry, primitive, next.distance);
                     }
@@ -317,7 +317,7 @@ pub(crate) struct Search {
     limit: f64,
     best: Option<ClosestPoint>,
     /// What has no answer, and how far away it is at least.
-    refused: Vec<(f64, NoClosestPoint)>,
+    refused: Vec<(f64, ClosestPointError)>,
 }
 
 impl Search {
@@ -326,11 +326,11 @@ impl Search {
     }
 
     /// The nearest point, unless something without an answer may be nearer.
-    pub(crate) fn into_answer(self) -> Result<Option<ClosestPoint>, NoClosestPoint> {
+    pub(crate) fn into_answer(self) -> Result<Option<ClosestPoint>, ClosestPointError> {
         let limit = self.limit;
         let nearest = self.refused.into_iter().filter(|(distance, _)| *distance <= limit);
-        let rank = |(distance, no): &(f64, NoClosestPoint)| (*distance, no.instances.clone(), no.geometry);
-        let compare = |a: &(f64, NoClosestPoint), b: &(f64, NoClosestPoint)| {
+        let rank = |(distance, no): &(f64, ClosestPointError)| (*distance, no.instances.clone(), no.geometry);
+        let compare = |a: &(f64, ClosestPointError), b: &(f64, ClosestPointError)| {
             rank(a).partial_cmp(&rank(b)).unwrap_or(Ordering::Equal)
         };
         match nearest.min_by(compare) {
@@ -418,7 +418,7 @@ impl Search {
                     distance: factor * found.distance,
                     ..found
                 }),
-                None => Err(NoNearestPoint::Map),
+                None => Err(NearestPointError::Map),
             },
             GeometryKind::PreciseMesh(mesh) => {
                 let corners = mesh.corners(primitive).map(|p| p - frame.local);
@@ -439,7 +439,7 @@ impl Search {
                 let distance =
                     bounds.map_or(distance, |bounds| distance.max(distance_to(&bounds, self.point)));
                 let instances = frame.context.ids.clone();
-                let no = NoClosestPoint { why, id: standing.id, geometry, instances };
+                let no = ClosestPointError { why, id: standing.id, geometry, instances };
                 if distance <= self.limit {
                     self.refused.push((distance, no));
                 }

@@ -95,7 +95,7 @@ fn solids_around(tree: &Tree, point: DVec3, time: f64) -> usize {
                 }
                 tag::TRIANGLES => {}
                 tag::SPHERES => {
-                    for names in &tree.packed.sphere_names[tag::blocks(reference)] {
+                    for names in &tree.packed.sphere_ids[tag::blocks(reference)] {
                         let there = names.primitives.iter().filter(|&&primitive| primitive != u32::MAX);
                         there.for_each(|&primitive| meet(names.geometry, primitive));
                     }

@@ -21,12 +21,12 @@ use crate::tree::moments::{Moment, Moments};
 use crate::tree::node::{Node, WIDTH, tag};
 use crate::tree::precise_mesh::PreciseMesh;
 use crate::tree::sphere_block::ExactSphere;
-use crate::tree::triangle_block::BlockNames;
+use crate::tree::triangle_block::BlockIds;
 use crate::tree::{GeometryKind, Tree, precise_mesh};
 
 /// Why there is no winding number: an open shape, or custom geometry that offers none.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct NoWindingNumber {
+pub struct WindingNumberError {
     /// The id of the geometry.
     pub id: u32,
     /// The position of the geometry in the list that its tree was built from.
@@ -35,7 +35,7 @@ pub struct NoWindingNumber {
     pub instances: InstancePath,
 }
 
-impl fmt::Display for NoWindingNumber {
+impl fmt::Display for WindingNumberError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "no winding number: geometry {} (id {})", self.geometry, self.id)?;
         if !self.instances.is_empty() {
@@ -45,7 +45,7 @@ impl fmt::Display for NoWindingNumber {
     }
 }
 
-impl std::error::Error for NoWindingNumber {}
+impl std::error::Error for WindingNumberError {}
 
 /// A node counts as far away from this many of its radii on. Of 2, 2.5, 3 and 4, on a spiky rock of 81 920 triangles seen from
 /// within to ten radii away, the largest errors were 8.0e-3, 1.9e-3, 4.2e-4 and 4.5e-5, in 0.07, 0.11, 0.22 and 0.41 of the
@@ -58,7 +58,7 @@ pub(crate) fn winding_number(
     point: DVec3,
     time: f64,
     far: Option<f64>,
-) -> Result<f64, NoWindingNumber> {
+) -> Result<f64, WindingNumberError> {
     if !point.is_finite() {
         return Ok(0.0);
     }
@@ -76,7 +76,8 @@ pub(crate) fn winding_number(
         }
         for (geometry, standing) in frame.tree.geometries.iter().enumerate() {
             let geometry = geometry as u32;
-            let no = || NoWindingNumber { id: standing.id, geometry, instances: frame.context.ids.clone() };
+            let no =
+                || WindingNumberError { id: standing.id, geometry, instances: frame.context.ids.clone() };
             match &standing.kind {
                 GeometryKind::Mesh(_) | GeometryKind::PreciseMesh(_) => {}
                 GeometryKind::Instance(instance) => {
@@ -171,7 +172,7 @@ fn meshes_around(tree: &Tree, point: DVec3, linear: Option<DMat3>) -> f64 {
 fn moments_of(tree: &Tree) -> Moments {
     let packed = &tree.packed;
     // Of every block, then of the nodes from below: children stand behind their parents.
-    let block = |names: &BlockNames| {
+    let block = |names: &BlockIds| {
         let GeometryKind::Mesh(mesh) = &tree.geometries[names.geometry as usize].kind else {
             return Moment::NOTHING;
         };
@@ -246,7 +247,7 @@ fn around(moments: &Moments, tree: &Tree, point: DVec3, far: f64) -> f64 {
 }
 
 /// The corners of the triangles of a block that have an area.
-fn triangles_of(names: &BlockNames, mesh: &TriangleMesh, shift: DVec3) -> impl Iterator<Item = [DVec3; 3]> {
+fn triangles_of(names: &BlockIds, mesh: &TriangleMesh, shift: DVec3) -> impl Iterator<Item = [DVec3; 3]> {
     let there = names.primitives.into_iter().filter(|&primitive| primitive != u32::MAX);
     there.filter_map(move |primitive| corners(mesh, shift, primitive as usize))
 }

@@ -16,7 +16,7 @@ use crate::intersect::f32_ray::F32Ray;
 use crate::intersect::watertight::{BlockRay, Meeting, Shear, intersect};
 use crate::intersect::{Isa, corners_at, equals_before_at, intersect_triangles_at, told_at, truncated_at};
 use crate::tree::BLOCK;
-use crate::tree::triangle_block::{BlockNames, Blocks, Line, TriangleBlock};
+use crate::tree::triangle_block::{BlockIds, Blocks, Line, TriangleBlock};
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Preset, TriangleMesh};
 
 struct Tally {
@@ -46,7 +46,7 @@ fn block(random: &mut Random, shares: f64, center: DVec3, spread: f64, size: f64
     }
     let names: Vec<_> = (0..mesh.indices.len() as u32).map(|triangle| [0, triangle]).collect();
     let geometry = Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(mesh)) };
-    pack::pack(Isa::best(), true, &[geometry], &[BlockNames::of(&names)], &[0], true).lines
+    pack::pack(Isa::best(), true, &[geometry], &[BlockIds::of(&names)], &[0], true).lines
 }
 
 /// One ray at one block at every instruction set.
@@ -210,7 +210,7 @@ fn a_ray_that_leaves_a_wall_is_seen_to_leave_it() {
         let positions = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
         let wall = TriangleMesh { origin: DVec3::ZERO, positions, indices: vec![[0, 1, 2], [0, 2, 3]] };
         let geometry = Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(wall)) };
-        let names = [BlockNames::of(&[[0, 0], [0, 1]])];
+        let names = [BlockIds::of(&[[0, 0], [0, 1]])];
         let lines = pack::pack(Isa::best(), true, &[geometry], &names, &[0], true).lines;
         let block = Blocks::new(&lines).at(0).unwrap();
         for _ in 0..50 {
@@ -337,7 +337,7 @@ fn triangles_are_put_in_an_order_in_which_they_share_their_vertices() {
                 triangles.swap(last, random.below(last + 1));
             }
             let names: Vec<_> = triangles.iter().map(|&triangle| [0, triangle]).collect();
-            let names = [BlockNames::of(&names)];
+            let names = [BlockIds::of(&names)];
             let geometries = [Geometry { id: 0, kind: GeometryKind::Mesh(Arc::clone(&mesh)) }];
             let filled = pack::pack(Isa::best(), true, &geometries, &names, &[0], true);
             let block = Blocks::new(&filled.lines).at(0).unwrap();

@@ -243,7 +243,7 @@ fn boxes_hold_their_children_and_every_primitive_has_one_place() {
         .packed
         .names
         .iter()
-        .chain(&accel.tree.packed.sphere_names)
+        .chain(&accel.tree.packed.sphere_ids)
         .map(|names| names.primitives.iter().filter(|&&primitive| primitive != u32::MAX).count())
         .sum();
     assert_eq!(in_blocks, packed);

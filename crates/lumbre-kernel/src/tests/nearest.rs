@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lumbre_geometry::{NoNearestPoint, PlacedShape, Plane, Shape, Sphere, Torus};
+use lumbre_geometry::{NearestPointError, PlacedShape, Plane, Shape, Sphere, Torus};
 use lumbre_math::{DVec3, Transform};
 
 use super::scenes::{
@@ -259,7 +259,7 @@ fn without_an_answer_of_everything_there_may_be_one_all_the_same() {
     let far = accel.closest_point(DVec3::new(-1.0, 0.0, 4.0), f64::INFINITY).unwrap().unwrap();
     assert_eq!((far.distance, far.geometry), (1.5, 0));
     let near = accel.closest_point(DVec3::new(9.5, 0.0, 4.0), f64::INFINITY).unwrap_err();
-    assert_eq!((near.why, near.geometry, near.id), (NoNearestPoint::Map, 1, 1007));
+    assert_eq!((near.why, near.geometry, near.id), (NearestPointError::Map, 1, 1007));
     assert_eq!(accel.closest_point(DVec3::new(9.5, 0.0, 4.0), 1.0), Ok(None));
 }
 

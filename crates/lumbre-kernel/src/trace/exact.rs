@@ -420,7 +420,7 @@ impl<'a, L: Simd> Frame<'a, L> {
     fn test_spheres(&mut self, leaf: u32, context: &Context, visitor: &mut dyn Visitor) -> bool {
         let packed = &self.tree.packed;
         let places = tag::blocks(leaf);
-        for (ids, block) in packed.sphere_names[places.clone()].iter().zip(&packed.sphere_blocks[places]) {
+        for (ids, block) in packed.sphere_ids[places.clone()].iter().zip(&packed.sphere_blocks[places]) {
             let cloud = CloudRay::turn(&mut self.cloud, self.tree, &self.ray, ids.geometry);
             let mut mask = match cloud.within(self.range) {
                 Some(ray) => intersect::intersect_spheres::<L>(block, ray).0,

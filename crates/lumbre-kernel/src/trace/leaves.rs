@@ -417,7 +417,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         let places = tag::blocks(leaf);
         let range = [ray.t_min, if G::IS_ANY { ray.t_max } else { self.best.limit(ray) }];
         for (ids, block) in
-            tree.packed.sphere_names[places.clone()].iter().zip(&tree.packed.sphere_blocks[places])
+            tree.packed.sphere_ids[places.clone()].iter().zip(&tree.packed.sphere_blocks[places])
         {
             let cloud = CloudRay::turn(&mut self.cloud, tree, ray, ids.geometry);
             let origin = cloud.origin();

@@ -431,7 +431,7 @@ impl<'a> Others<'a> {
         let (tree, places) = (self.tree, tag::blocks(leaf));
         let range = [ray.t_min, self.limit];
         for (ids, block) in
-            tree.packed.sphere_names[places.clone()].iter().zip(&tree.packed.sphere_blocks[places])
+            tree.packed.sphere_ids[places.clone()].iter().zip(&tree.packed.sphere_blocks[places])
         {
             let cloud = CloudRay::turn(&mut self.cloud, tree, ray, ids.geometry);
             let origin = cloud.origin();

@@ -1,6 +1,6 @@
 //! The stack of a traversal, and the two goals that decide in which order it is filled: the closest hit and any hit.
 
-use crate::intersect::{self, Room, STACK, Simd, Slots};
+use crate::intersect::{self, PushSlots, STACK, Simd, Slots};
 use crate::simd::LANE_BITS;
 use crate::simd::vector::stack_entry;
 use crate::tree::node::{Node, WIDTH};
@@ -18,7 +18,7 @@ pub(crate) trait Goal {
     /// Whether its bounding box lies beyond the end of the ray.
     fn is_beyond(entry: Self::Entry, s_max: f32) -> bool;
     /// Pushes the children in `mask` (two or more; for any hit one or more) but for the first to be visited, which is returned.
-    fn push_children<L: Simd>(node: &Node, mask: u32, enter: L::F32x16, room: Room<Self::Entry>) -> u32;
+    fn push_children<L: Simd>(node: &Node, mask: u32, enter: L::F32x16, room: PushSlots<Self::Entry>) -> u32;
     /// The same with hardly a branch: pushes all, then pops one. For any hit `mask` may be empty.
     fn push_and_pop<L: Simd>(node: &Node, mask: u32, enter: L::F32x16, slots: &mut Slots<Self::Entry>)
     -> u32;
@@ -47,7 +47,7 @@ impl Goal for ClosestHit {
     }
 
     #[inline(always)]
-    fn push_children<L: Simd>(node: &Node, mask: u32, enter: L::F32x16, room: Room<i64>) -> u32 {
+    fn push_children<L: Simd>(node: &Node, mask: u32, enter: L::F32x16, room: PushSlots<i64>) -> u32 {
         intersect::push_by_distance(node, mask, enter, room)
     }
 
@@ -80,7 +80,7 @@ impl Goal for AnyHit {
     }
 
     #[inline(always)]
-    fn push_children<L: Simd>(node: &Node, mask: u32, _: L::F32x16, room: Room<u32>) -> u32 {
+    fn push_children<L: Simd>(node: &Node, mask: u32, _: L::F32x16, room: PushSlots<u32>) -> u32 {
         intersect::push_as_built::<L::F32x16>(node, mask, room)
     }
 
@@ -110,7 +110,7 @@ impl<E: Copy> Stack<E> {
 
     /// Pushes the children of a node. The array spills afterwards, when fewer registers are live.
     #[inline(always)]
-    pub(crate) fn put<T>(&mut self, put: impl FnOnce(Room<'_, E>) -> T) -> T {
+    pub(crate) fn put<T>(&mut self, put: impl FnOnce(PushSlots<'_, E>) -> T) -> T {
         let result = put(self.slots.room());
         if self.slots.len() > STACK - WIDTH {
             self.spill();

@@ -248,12 +248,12 @@ pub(crate) struct BoundingVolumeRay {
 
 /// Of the tolerance, by m (1 + m), and its last summand.
 pub(crate) const TOLERANCE_PER_MARGIN: f32 = 12.0;
-pub(crate) const LEAST_TOLERANCE: f32 = 1.0 / (1 << 15) as f32;
+pub(crate) const MIN_TOLERANCE: f32 = 1.0 / (1 << 15) as f32;
 /// What a distance from a tube may be wrong by, by m, and apart from that.
 pub(crate) const TUBE_ERROR_PER_MARGIN: f32 = 2.0;
-pub(crate) const LEAST_TUBE_ERROR: f32 = 1.0 / (1 << 16) as f32;
+pub(crate) const MIN_TUBE_ERROR: f32 = 1.0 / (1 << 16) as f32;
 /// No component of a direction in the cube is taken to be less, by 64uN.
-pub(crate) const LEAST_COMPONENT: f32 = 1.0 / (1u64 << 22) as f32;
+pub(crate) const MIN_COMPONENT: f32 = 1.0 / (1u64 << 22) as f32;
 
 impl BoundingVolumeRay {
     /// For a ray from nearby, whose direction's largest component has the size `length`.

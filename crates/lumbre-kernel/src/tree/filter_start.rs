@@ -10,7 +10,7 @@ use crate::simd::Vector;
 const DEEPEST: u32 = 8;
 
 /// The smallest size L of `intersect::watertight`, by how far the tree and its triangles reach.
-pub(crate) const LEAST_SIZE: f32 = 4.0 * ROUNDOFF as f32;
+pub(crate) const MIN_SIZE: f32 = 4.0 * ROUNDOFF as f32;
 
 /// What a ray from nearby needs to start in single precision, in a tree where the corners of all triangles in single precision are
 /// relative to one origin.
@@ -91,7 +91,7 @@ impl FilterStart {
             units_per_space: tree_space.scale as f32,
             space_per_unit,
             precise: Precise::new(space_per_unit, summary.sizes.longest_side),
-            least_size: round_up(reach * f64::from(LEAST_SIZE)),
+            least_size: round_up(reach * f64::from(MIN_SIZE)),
             shortest: (SMALLEST_NEAR / tree_space.scale) as f32,
             longest: [(LARGEST_NEAR / tree_space.scale) as f32; 4],
             tiny: (TINY_NEAR / tree_space.scale) as f32,

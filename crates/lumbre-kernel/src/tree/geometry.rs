@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use lumbre_geometry::{Aabb, NearestPoint, NoNearestPoint, Ray, Root, Roots, Surface};
+use lumbre_geometry::{Aabb, NearestPoint, NearestPointError, Ray, Root, Roots, Surface};
 use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec3};
 
 /// Where an instance stands.
@@ -90,10 +90,10 @@ pub trait CustomGeometry: Debug + Send + Sync {
     /// The point of one of them that is nearest to `point`; unless overridden, there is no answer.
     ///
     /// # Errors
-    /// [`NoNearestPoint::NotOffered`], or another reason.
-    fn closest_point(&self, primitive: u32, point: DVec3) -> Result<NearestPoint, NoNearestPoint> {
+    /// [`NearestPointError::NotOffered`], or another reason.
+    fn closest_point(&self, primitive: u32, point: DVec3) -> Result<NearestPoint, NearestPointError> {
         let _ = (primitive, point);
-        Err(NoNearestPoint::NotOffered)
+        Err(NearestPointError::NotOffered)
     }
     /// How often all of them together wind around a point: 1 within a body, 0 without. `None`, unless overridden.
     fn winding_number(&self, point: DVec3) -> Option<f64> {

@@ -83,7 +83,7 @@ pub(crate) mod tag {
     }
 
     /// Blocks that a leaf of triangles, or of spheres, may have.
-    pub(crate) const MOST_BLOCKS: u32 = 1 << COUNT_BITS;
+    pub(crate) const MAX_BLOCKS: u32 = 1 << COUNT_BITS;
     /// Places that blocks may have.
     pub(crate) const BLOCK_PLACES: u32 = 1 << (SHIFT - COUNT_BITS);
     const COUNT_BITS: u32 = 3;
@@ -103,7 +103,7 @@ pub(crate) mod tag {
     #[inline(always)]
     pub(crate) const fn blocks(reference: u32) -> std::ops::Range<usize> {
         let first = place(reference) >> COUNT_BITS;
-        first..first + (reference & (MOST_BLOCKS - 1)) as usize + 1
+        first..first + (reference & (MAX_BLOCKS - 1)) as usize + 1
     }
 }
 

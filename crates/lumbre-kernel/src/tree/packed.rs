@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use super::node::{Node, tag};
 use super::sphere_block::SphereBlock;
 use super::storage::Store;
-use super::triangle_block::{BlockNames, Blocks, Line};
+use super::triangle_block::{BlockIds, Blocks, Line};
 
 /// A primitive in a leaf that is no triangle, or outside the tree.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -52,11 +52,11 @@ pub(crate) struct Packed {
     /// The blocks of triangles: see [`triangle_block`](super::triangle_block).
     pub(crate) blocks: Store<Line>,
     /// As many as there are blocks.
-    pub(crate) names: Store<BlockNames>,
+    pub(crate) names: Store<BlockIds>,
     pub(crate) entries: Store<Entry>,
     pub(crate) sphere_blocks: Store<SphereBlock>,
     /// As many as there are blocks of spheres.
-    pub(crate) sphere_names: Store<BlockNames>,
+    pub(crate) sphere_ids: Store<BlockIds>,
     /// The reference to the root; `None` when there is nothing finite.
     pub(crate) root: Option<u32>,
 }

@@ -51,7 +51,7 @@ impl PictureStart {
         };
         let room = within * start.scale;
         // Also where that is no number.
-        (room <= MOST_ROOM).then(|| Self {
+        (room <= MAX_ROOM).then(|| Self {
             start: start.relative_to_mesh(round_up(room)),
             rounding,
             deviation: own.max(within),
@@ -64,4 +64,4 @@ impl PictureStart {
 const RELATIVE: f64 = 2.0;
 const ABSOLUTE: f64 = 20.0;
 /// By no more than this, in tree units, boxes may be moved for what is in instances.
-const MOST_ROOM: f64 = 1.0 / 1024.0;
+const MAX_ROOM: f64 = 1.0 / 1024.0;

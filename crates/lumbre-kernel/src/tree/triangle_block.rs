@@ -25,14 +25,14 @@ use crate::tree::{BLOCK, Corners, Name};
 /// The primitives of a block.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct BlockNames {
+pub(crate) struct BlockIds {
     /// Positions in the mesh's list.
     pub(crate) primitives: [u32; BLOCK],
     /// Position of the mesh in the tree's list.
     pub(crate) geometry: u32,
 }
 
-impl BlockNames {
+impl BlockIds {
     /// A bit for each lane that is taken.
     pub(crate) fn lanes(&self) -> u32 {
         let lane = |(lane, &primitive): (usize, &u32)| u32::from(primitive != u32::MAX) << lane;
@@ -105,7 +105,7 @@ impl Head {
             number: words[number_at(is_unshared)] & !NORMAL,
             taken: flags & ((1 << BLOCK) - 1),
             is_unshared,
-            followers: flags >> FOLLOWERS_AT & (tag::MOST_BLOCKS - 1),
+            followers: flags >> FOLLOWERS_AT & (tag::MAX_BLOCKS - 1),
             corners: if is_unshared { [0; 3] } else { CORNERS.map(|at| words[at]) },
         }
     }
@@ -127,7 +127,7 @@ impl Head {
 /// Half of a block's lanes, and as many numbers as 128 bits hold.
 pub(crate) const QUAD: usize = BLOCK / 2;
 /// The most vertices that either half of a block shares.
-pub(crate) const MOST_IN_HALF: usize = 7;
+pub(crate) const MAX_IN_HALF: usize = 7;
 /// The numbers that a vertex may have in a row of a block that shares them.
 pub(crate) const SHARED_NUMBERS: usize = 16;
 const SHARED_LINES: usize = 3;
@@ -148,10 +148,9 @@ pub(crate) const fn unshared_row(axis: usize) -> usize {
 
 const _: () = assert!(SHARED_NUMBERS == LINE_WORDS && shared_row(3) == SHARED_LINES * LINE_WORDS);
 const _: () = assert!(unshared_row(0) > number_at(true) && unshared_row(3) == BLOCK_WORDS);
-const _: () = assert!(tag::BLOCK_PLACES + tag::MOST_BLOCKS < NORMAL);
+const _: () = assert!(tag::BLOCK_PLACES + tag::MAX_BLOCKS < NORMAL);
 // Lines are numbered by `u32`, and by the place of a reference.
-const _: () =
-    assert!((tag::BLOCK_PLACES + tag::MOST_BLOCKS) as usize * UNSHARED_LINES <= tag::PLACE as usize);
+const _: () = assert!((tag::BLOCK_PLACES + tag::MAX_BLOCKS) as usize * UNSHARED_LINES <= tag::PLACE as usize);
 
 /// Up to eight triangles of one mesh: its head, and coordinates relative to the mesh's origin. Where vertices are shared, the last
 /// lines belong to the next block.
@@ -217,7 +216,7 @@ impl TriangleBlock {
     /// How many blocks of the same leaf follow.
     #[inline(always)]
     fn followers(&self) -> u32 {
-        self.0[FLAGS] >> FOLLOWERS_AT & (tag::MOST_BLOCKS - 1)
+        self.0[FLAGS] >> FOLLOWERS_AT & (tag::MAX_BLOCKS - 1)
     }
 
     /// The vertex of each corner, four bits for each lane, where vertices are shared.
@@ -348,7 +347,7 @@ impl<'a> Blocks<'a> {
     }
 
     /// Where every block begins, if they are such as [`pack`] makes of so many names.
-    pub(crate) fn places(self, names: &[BlockNames]) -> Option<Vec<u32>> {
+    pub(crate) fn places(self, names: &[BlockIds]) -> Option<Vec<u32>> {
         let mut places = Vec::with_capacity(names.len());
         let (mut place, mut followers) = (0, 0);
         for (number, names) in names.iter().enumerate() {

@@ -17,8 +17,8 @@ use smallvec::SmallVec;
 
 use super::photons::Photon;
 use crate::transport::direct::{Bounce, Vertex};
-use crate::transport::interior::Interiors;
-use crate::transport::{Draw, Sampler};
+use crate::transport::interior::MediumStack;
+use crate::transport::{SampleNumbers, Sampler};
 use crate::wave::paths::{of_column, sides, to_column};
 
 /// Random numbers of a vertex of the first light path of a line; those of each further one follow after so many vertices.
@@ -56,7 +56,7 @@ impl<'s> ChordSampler<'s> {
     }
 
     /// The line of a draw: the chord of a sphere. The probability of a sphere is that of its share of [`ChordSampler::whole`].
-    fn line(&self, draw: &Draw) -> Ray {
+    fn line(&self, draw: &SampleNumbers) -> Ray {
         let mut left = f64::from(draw.survival(0)) * self.whole / TAU;
         let is_chosen = |sphere: &&BoundingSphere| {
             left -= sphere.radius * sphere.radius;
@@ -100,7 +100,7 @@ struct Lit<'s> {
 
 /// A light path on its way.
 struct LightPath<'s> {
-    interiors: Interiors<'s>,
+    interiors: MediumStack<'s>,
     medium: Option<MediumId>,
     /// The power that it carries, of one line; and the greatest of its channels where it began.
     flux: Spectrum,
@@ -146,7 +146,7 @@ impl<'s> LightTracer<'s> {
         pass: u32,
         line: u32,
         are_specular: bool,
-        mut visit: impl FnMut(DVec3, &Draw, u32, f64),
+        mut visit: impl FnMut(DVec3, &SampleNumbers, u32, f64),
     ) {
         // No pixel is there.
         let draw = self.sampler.draw(u32::MAX, pass, line);
@@ -163,13 +163,13 @@ impl<'s> LightTracer<'s> {
     }
 
     /// Follows light that arrives at a point of a surface.
-    fn begin(&self, point: DVec3, time: f64, draw: &Draw, vertex: u32, photons: &mut Vec<Photon>) {
+    fn begin(&self, point: DVec3, time: f64, draw: &SampleNumbers, vertex: u32, photons: &mut Vec<Photon>) {
         let Some(Lit { sample, ray, here, pdf, flux }) = self.light(point, time, draw, vertex) else {
             return;
         };
         let length = point.distance(ray.origin);
         let mut path = LightPath {
-            interiors: Interiors::default(),
+            interiors: MediumStack::default(),
             medium: None,
             flux,
             flux_at_start: flux.max_component(),
@@ -185,7 +185,7 @@ impl<'s> LightTracer<'s> {
     }
 
     /// The light of one sample that arrives at a point of a surface on a line.
-    fn light(&self, point: DVec3, time: f64, draw: &Draw, vertex: u32) -> Option<Lit<'s>> {
+    fn light(&self, point: DVec3, time: f64, draw: &SampleNumbers, vertex: u32) -> Option<Lit<'s>> {
         let (choose, u) = (draw.light_choice(vertex), draw.light_point(vertex));
         let sample = self.scene.sample_light(point, DVec3::ZERO, time, choose, u)?;
         let ray = self.ray_to(point, &sample).at_time(time);
@@ -223,7 +223,13 @@ impl<'s> LightTracer<'s> {
     }
 
     /// What is left of the light on its way to the first surface, and the medium there.
-    fn arrive(&self, path: &mut LightPath<'s>, sample: &LightSample, here: &Interaction<'s>, draw: &Draw) {
+    fn arrive(
+        &self,
+        path: &mut LightPath<'s>,
+        sample: &LightSample,
+        here: &Interaction<'s>,
+        draw: &SampleNumbers,
+    ) {
         path.interiors.arrive(here, here.resolved());
         // Light from infinitely far away was not inside anything.
         if let Some(end) = sample.end {
@@ -247,7 +253,7 @@ impl<'s> LightTracer<'s> {
         mut path: LightPath<'s>,
         mut ray: Ray,
         mut here: Interaction<'s>,
-        draw: &Draw,
+        draw: &SampleNumbers,
         first: u32,
         photons: &mut Vec<Photon>,
     ) {
@@ -332,7 +338,7 @@ impl<'s> LightTracer<'s> {
         &self,
         path: &LightPath<'s>,
         segment: &Ray,
-        draw: &Draw,
+        draw: &SampleNumbers,
         vertex: u32,
     ) -> Option<Photon> {
         if path.interiors.attenuates() {
@@ -364,7 +370,7 @@ impl<'s> LightTracer<'s> {
     }
 
     /// Takes a light path through media along its next segment.
-    fn cross_media(&self, path: &mut LightPath<'s>, segment: &Ray, draw: &Draw) {
+    fn cross_media(&self, path: &mut LightPath<'s>, segment: &Ray, draw: &SampleNumbers) {
         path.flux *= self.scene.transmittance(path.medium, segment, draw.along(segment), None);
         let mut crossings = Vec::new();
         self.scene.crossings(segment, &mut crossings);

@@ -18,9 +18,9 @@ use crate::workers::Workers;
 use crate::{CancelToken, PixelBounds, Rendered};
 
 /// Reflectance below which light is not divided by it.
-const LEAST_REFLECTANCE: f32 = 0.01;
+const MIN_REFLECTANCE: f32 = 0.01;
 /// Ground in a pixel below which its share of shadow is not known.
-const LEAST_GROUND: f32 = 1e-3;
+const MIN_GROUND: f32 = 1e-3;
 
 /// Columns and rows of the blocks that a picture is filtered in.
 const BLOCK: (usize, usize) = (256, 64);
@@ -192,18 +192,18 @@ impl Noisy<'_> {
 
         // Where a picture is transparent, there is no light of what lets one through.
         let is_everywhere = self.image.alpha().is_none();
-        let kind = Kind { least: LEAST_REFLECTANCE, is_everywhere, is_single };
+        let kind = Kind { least: MIN_REFLECTANCE, is_everywhere, is_single };
         let layer = planes::layer(&guides, size, |guide| &guide.light, kind);
         let light = means::filter(&layer, &surfaces, columns.clone(), rows.clone(), cancel);
         for (i, (guide, place)) in places().enumerate() {
-            let colour = |c: usize| light[c][i] * share(guide.count, &guide.light, c, LEAST_REFLECTANCE);
+            let colour = |c: usize| light[c][i] * share(guide.count, &guide.light, c, MIN_REFLECTANCE);
             band.pixels[place] = Rgb::new(colour(0), colour(1), colour(2));
         }
         if band.coverage.is_empty() {
             return;
         }
 
-        let kind = Kind { least: LEAST_GROUND, is_everywhere: false, is_single };
+        let kind = Kind { least: MIN_GROUND, is_everywhere: false, is_single };
         let layer = planes::layer(&guides, size, |guide| &guide.shadow, kind);
         let shadow = means::filter(&layer, &surfaces, columns, rows, cancel);
         let first = (band.y0 - self.bounds.y0) as usize * self.bounds.width() as usize;
@@ -215,8 +215,8 @@ impl Noisy<'_> {
             };
             // What is not ground, and covers as it did, and what is.
             let channel = |c: usize, before: f32| {
-                let ground = share(guide.count, &guide.shadow, c, LEAST_GROUND);
-                let rest = before - guide.shadow.value(c, guide.count, LEAST_GROUND) * ground;
+                let ground = share(guide.count, &guide.shadow, c, MIN_GROUND);
+                let rest = before - guide.shadow.value(c, guide.count, MIN_GROUND) * ground;
                 let now = if guide.count.samples > 0 { rest + shadow[c][i] * ground } else { before };
                 now.clamp(0.0, 1.0)
             };

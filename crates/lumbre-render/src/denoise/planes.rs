@@ -148,20 +148,20 @@ pub(super) fn surfaces(guides: &[GuideSums], size: (usize, usize)) -> Vec<Group>
         Group { planes, variance, sharpness }
     };
     vec![
-        group(0, &|_| LEAST_ALBEDO),
-        group(1, &|_| LEAST_NORMAL),
-        group(2, &|i| (LEAST_DEPTH * guides[i].feature(6)).powi(2).max(f32::MIN_POSITIVE)),
+        group(0, &|_| MIN_ALBEDO),
+        group(1, &|_| MIN_NORMAL),
+        group(2, &|i| (MIN_DEPTH * guides[i].feature(6)).powi(2).max(f32::MIN_POSITIVE)),
     ]
 }
 
 /// Differences of features are compared with this many standard deviations, or slopes.
 const STRENGTH: f32 = 1.0;
 /// The square of a difference of albedo, over three channels, that says little: textures are divided out.
-const LEAST_ALBEDO: f32 = 0.01;
+const MIN_ALBEDO: f32 = 0.01;
 /// The square of a difference of normals.
-const LEAST_NORMAL: f32 = 0.01;
+const MIN_NORMAL: f32 = 0.01;
 /// A difference of depth, as a share of it.
-const LEAST_DEPTH: f32 = 0.01;
+const MIN_DEPTH: f32 = 0.01;
 
 /// Pixels over which a slope goes on, so that it is none of the narrow ramp that the film's filter makes of an edge.
 const SLOPE: usize = 3;

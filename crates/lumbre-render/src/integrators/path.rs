@@ -6,7 +6,7 @@ use lumbre_simd::InstructionSet;
 
 use crate::integrators::Integrator;
 use crate::transport::{Record, Sampler, Strategy};
-use crate::wave::Sights;
+use crate::wave::PrimaryHits;
 use crate::wave::setting::Setting;
 
 /// Kajiya's path tracing: at each surface one sample of a light and one of the BSDF, combined by the power heuristic,
@@ -70,7 +70,7 @@ impl Path {
 }
 
 impl Integrator for Path {
-    fn estimate(&self, sights: &mut Sights<'_, '_>, sampler: &Sampler, record: &mut Record) {
+    fn estimate(&self, sights: &mut PrimaryHits<'_, '_>, sampler: &Sampler, record: &mut Record) {
         let is_spectral = sights.are_spectral();
         let setting = Setting { is_spectral, ..self.setting(sights.scene(), sampler) };
         sights.follow(&setting, record);

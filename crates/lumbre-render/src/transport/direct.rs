@@ -8,7 +8,7 @@ use lumbre_scene::{Interaction, LightSample, Scene};
 use lumbre_shading::{Bsdf, LocalDir, Material, Scatter, ShadingFrame, ShadingNormals, Spectrum};
 
 use crate::transport::Record;
-use crate::transport::interior::Interiors;
+use crate::transport::interior::MediumStack;
 use crate::transport::through::straight_on;
 
 /// A surface as seen along a path, ready to scatter.
@@ -64,7 +64,7 @@ impl<'a, 's> Vertex<'a, 's> {
     pub(crate) fn new(
         scene: &'s Scene,
         met: &'a Interaction<'s>,
-        interiors: &Interiors<'s>,
+        interiors: &MediumStack<'s>,
         normals: ShadingNormals,
     ) -> Option<Self> {
         Self::of(scene, met, met.resolved()?, interiors, normals)
@@ -75,7 +75,7 @@ impl<'a, 's> Vertex<'a, 's> {
         scene: &'s Scene,
         met: &'a Interaction<'s>,
         least: f32,
-        interiors: &'a Interiors<'s>,
+        interiors: &'a MediumStack<'s>,
         normals: ShadingNormals,
     ) -> impl Iterator<Item = (f32, Self)> {
         let parts = met.parts(least);
@@ -88,7 +88,7 @@ impl<'a, 's> Vertex<'a, 's> {
         scene: &'s Scene,
         met: &'a Interaction<'s>,
         material: &'s Material,
-        interiors: &Interiors<'s>,
+        interiors: &MediumStack<'s>,
         normals: ShadingNormals,
     ) -> Option<Self> {
         let towards = met.towards_origin.as_vec3();
@@ -242,7 +242,7 @@ impl<'a, 's> Vertex<'a, 's> {
     }
 
     /// What the solids around leave of a light's sample that nothing stands in the way of.
-    pub(crate) fn passes(&self, sample: &LightSample, interiors: &Interiors<'s>) -> Spectrum {
+    pub(crate) fn passes(&self, sample: &LightSample, interiors: &MediumStack<'s>) -> Spectrum {
         // Light from infinitely far away was not inside anything.
         let Some(end) = sample.end else { return Spectrum::WHITE };
         let crosses = self.crosses(sample);
@@ -257,7 +257,7 @@ impl<'a, 's> Vertex<'a, 's> {
     pub(crate) fn passes_straight_on(
         &self,
         sample: &LightSample,
-        interiors: &Interiors<'s>,
+        interiors: &MediumStack<'s>,
         regularize: bool,
         record: &mut Record,
     ) -> Spectrum {
@@ -273,7 +273,7 @@ impl<'a, 's> Vertex<'a, 's> {
     }
 
     /// The solids around the place, on one side of its surface or the other.
-    fn around(&self, crosses: bool, interiors: &Interiors<'s>) -> Interiors<'s> {
+    fn around(&self, crosses: bool, interiors: &MediumStack<'s>) -> MediumStack<'s> {
         let mut interiors = interiors.clone();
         if crosses {
             interiors.cross(self.material, self.met.front);

@@ -5,7 +5,7 @@ use lumbre_math::{Vec2, Vec3};
 use lumbre_scene::{GroundPlane, View};
 use lumbre_shading::Spectrum;
 
-use crate::transport::Sight;
+use crate::transport::PrimaryHit;
 
 /// One of the features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -72,7 +72,7 @@ impl Features {
     }
 
     /// The features of what is met, if anything is.
-    pub fn of(view: &View, sight: &Sight) -> Option<Self> {
+    pub fn of(view: &View, sight: &PrimaryHit) -> Option<Self> {
         let met = sight.met.as_ref()?;
         let scattering = met.scattering();
         let (normal, albedo) = match &scattering {

@@ -13,7 +13,7 @@ use smallvec::SmallVec;
 /// index of refraction counts against that of the solid around it. Where solids overlap without one holding the other,
 /// the one that was entered last counts.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Interiors<'s> {
+pub(crate) struct MediumStack<'s> {
     around: SmallVec<[Solid<'s>; 2]>,
     /// What the channels of light are, where that is not linear Rec. 709.
     wavelengths: Option<Wavelengths>,
@@ -39,7 +39,7 @@ impl<'s> Solid<'s> {
     }
 }
 
-impl<'s> Interiors<'s> {
+impl<'s> MediumStack<'s> {
     /// None, for light of some wavelengths or in RGB.
     pub(crate) fn of(wavelengths: Option<Wavelengths>) -> Self {
         Self { around: SmallVec::new(), wavelengths }

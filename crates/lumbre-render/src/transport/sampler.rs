@@ -36,8 +36,8 @@ impl Sampler {
 
     /// The numbers of one sample of the pixel in column `x` and row `y`.
     #[inline]
-    pub fn draw(&self, x: u32, y: u32, index: u32) -> Draw {
-        Draw { kind: self.kind, pixel: self.pixel(x, y), index }
+    pub fn draw(&self, x: u32, y: u32, index: u32) -> SampleNumbers {
+        SampleNumbers { kind: self.kind, pixel: self.pixel(x, y), index }
     }
 
     /// The words of the samples of a pixel that all their numbers are made of.
@@ -55,16 +55,16 @@ impl Sampler {
 
 /// The random numbers of one sample. Asking one of them changes none of the others.
 #[derive(Clone, Copy, Debug)]
-pub struct Draw {
+pub struct SampleNumbers {
     kind: SamplerKind,
     /// A hash of the seed and the pixel.
     pixel: [u32; 2],
     index: u32,
 }
 
-/// The random numbers of a sample in each lane: those of [`Draw`], to the bit.
+/// The random numbers of a sample in each lane: those of [`SampleNumbers`], to the bit.
 #[derive(Clone, Copy)]
-pub(crate) struct LaneDraw<R: Real> {
+pub(crate) struct LaneNumbers<R: Real> {
     /// Of all lanes.
     pub(crate) kind: SamplerKind,
     /// A hash of the seed and the pixel.
@@ -73,7 +73,7 @@ pub(crate) struct LaneDraw<R: Real> {
     pub(crate) index: R::UInt,
 }
 
-impl<R: Real> LaneDraw<R> {
+impl<R: Real> LaneNumbers<R> {
     /// Where in the pixel filter, which part of the exposure is over, and which wavelengths.
     #[inline(always)]
     pub(crate) fn aim(&self) -> [R; 4] {
@@ -155,7 +155,7 @@ fn sobol_one<U: UInt>(reversed_index: U, keys: [U; 2]) -> U {
     reversed(reversed_scramble(shuffled, keys[1]))
 }
 
-impl Draw {
+impl SampleNumbers {
     /// The numbers of a sample by the words of its pixel: see [`Sampler::pixel`].
     pub(crate) fn new(kind: SamplerKind, pixel: [u32; 2], index: u32) -> Self {
         Self { kind, pixel, index }
@@ -163,7 +163,7 @@ impl Draw {
 
     fn four(&self, label: u32) -> [f32; 4] {
         let pixel = self.pixel.map(UInt::splat);
-        LaneDraw::<f32> { kind: self.kind, pixel, index: UInt::splat(self.index) }.four(UInt::splat(label))
+        LaneNumbers::<f32> { kind: self.kind, pixel, index: UInt::splat(self.index) }.four(UInt::splat(label))
     }
 
     fn two(&self, label: u32) -> DVec2 {

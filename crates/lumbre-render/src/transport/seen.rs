@@ -6,15 +6,15 @@ use lumbre_math::{DVec3, Frame, warp64};
 use lumbre_scene::{GroundPlane, Interaction, LightSample, Scene};
 use lumbre_shading::{Scatter, Spectrum};
 
-use crate::transport::interior::Interiors;
+use crate::transport::interior::MediumStack;
 use crate::transport::journal::{Event, Source};
 use crate::transport::through::{goes_straight_on, light_through, straight_on};
-use crate::transport::{Draw, Record, Sight};
+use crate::transport::{PrimaryHit, Record, SampleNumbers};
 
 /// Samples of each light that each sample of a shadow takes: few rays, where a whole path would be many.
 pub(crate) const SAMPLES: u32 = 2;
 /// Lights that each such sample asks: of more, as many by chance.
-pub(crate) const MOST_LIGHTS: usize = 4;
+pub(crate) const MAX_LIGHTS: usize = 4;
 
 /// Each way of light through clear things has as many vertices of a draw as two to the power of this.
 const WAY_BITS: u32 = 6;
@@ -41,8 +41,8 @@ pub(crate) struct Seen {
 /// two renderings; here only what is blocked is estimated, so that ground in the open has no noise.)
 pub(crate) fn caught(
     scene: &Scene,
-    sight: &Sight<'_>,
-    draw: &Draw,
+    sight: &PrimaryHit<'_>,
+    draw: &SampleNumbers,
     lights_are_seen: bool,
     record: &mut Record,
 ) -> Option<Seen> {
@@ -85,17 +85,17 @@ fn lost(
     scene: &Scene,
     ground: &GroundPlane,
     at: &Interaction<'_>,
-    draw: &Draw,
+    draw: &SampleNumbers,
     record: &mut Record,
 ) -> Spectrum {
     let from = at.shadow_origin();
     let mut lost = Spectrum::BLACK;
     let lights = ground.lights();
     // Every light, where there are few.
-    let asked = lights.len().min(MOST_LIGHTS);
+    let asked = lights.len().min(MAX_LIGHTS);
     let share = lights.len() as f32 / asked.max(1) as f32;
     for i in 0..SAMPLES * asked as u32 {
-        let chosen = match lights.len() <= MOST_LIGHTS {
+        let chosen = match lights.len() <= MAX_LIGHTS {
             true => i as usize % asked,
             false => (draw.light_choice(i) * lights.len() as f64) as usize,
         };
@@ -113,7 +113,7 @@ fn lost(
         }
         let shadow_ray = at.shadow_ray(&sample);
         let mut left = if goes_straight_on(scene, &sample) {
-            straight_on(scene, shadow_ray, &sample, Interiors::default(), false, false, record)
+            straight_on(scene, shadow_ray, &sample, MediumStack::default(), false, false, record)
         } else {
             record.counts.shadow += 1;
             if scene.is_occluded(&shadow_ray) { Spectrum::BLACK } else { Spectrum::WHITE }
@@ -140,7 +140,7 @@ fn passed(
     scene: &Scene,
     ground: &GroundPlane,
     at: &Interaction<'_>,
-    draw: &Draw,
+    draw: &SampleNumbers,
     record: &mut Record,
 ) -> Spectrum {
     let frame = Frame::from_z(ground.normal);

@@ -4,7 +4,7 @@ use lumbre_scene::{CameraRay, Interaction};
 
 /// A ray from the camera, and what it meets first.
 #[derive(Clone, Debug)]
-pub struct Sight<'s> {
+pub struct PrimaryHit<'s> {
     /// The ray.
     pub ray: CameraRay,
     /// What it meets; `None` when it leaves the scene.

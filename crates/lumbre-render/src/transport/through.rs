@@ -6,15 +6,15 @@ use lumbre_shading::spectrum::Wavelengths;
 use lumbre_shading::{Material, Scatter, ShadingNormals, Spectrum};
 
 use crate::transport::direct::Vertex;
-use crate::transport::interior::Interiors;
-use crate::transport::{Draw, Record};
+use crate::transport::interior::MediumStack;
+use crate::transport::{Record, SampleNumbers};
 
 /// Surfaces at most that light goes through or is reflected by inside a solid.
-const MOST_SURFACES: u32 = 16;
+const MAX_SURFACES: u32 = 16;
 /// Surfaces at most that light goes straight on through.
-const MOST_PANES: u32 = 256;
+const MAX_PANES: u32 = 256;
 /// A part of a pane's mixture that has less of it than this is not taken apart.
-const LEAST_PART: f32 = 1.0 / 256.0;
+const MIN_PART: f32 = 1.0 / 256.0;
 /// How far the product of the indices along a path may be from 1 by rounding.
 const INDEX_ERROR: f32 = 1e-4;
 
@@ -35,15 +35,15 @@ pub(crate) fn hero_alone(throughput: Spectrum) -> Spectrum {
 pub(crate) fn light_through(
     scene: &Scene,
     mut ray: Ray,
-    draw: &Draw,
+    draw: &SampleNumbers,
     first: u32,
     record: &mut Record,
 ) -> Spectrum {
     let mut throughput = Spectrum::WHITE;
-    let mut interiors = Interiors::default();
+    let mut interiors = MediumStack::default();
     // Index of refraction where the path is, over that where it began.
     let mut index = 1.0_f32;
-    for surface in 0..MOST_SURFACES {
+    for surface in 0..MAX_SURFACES {
         record.counts.bounce += 1;
         let Some(hit) = scene.closest(&ray) else {
             let is_open = surface == 0;
@@ -90,7 +90,7 @@ pub(crate) fn goes_straight_on(scene: &Scene, sample: &LightSample) -> bool {
 
 /// What is left of a light's sample where `shadow_ray` starts, inside of `interiors`: the product of what all that it goes
 /// straight on through leaves of it ([`lumbre_shading::Bsdf::straight_on`], that of regularized BSDFs where the path's are), and
-/// of what solids on the way take. Black behind anything else, and behind more than [`MOST_PANES`] surfaces.
+/// of what solids on the way take. Black behind anything else, and behind more than [`MAX_PANES`] surfaces.
 ///
 /// Only for light that is not also found by rays which go through the pane themselves, or it would count twice: of paths, see
 /// [`goes_straight_on`]. What bends or spreads light stands in its way here: what is rough is lit itself, and paths find it; what
@@ -99,14 +99,14 @@ pub(crate) fn straight_on<'s>(
     scene: &'s Scene,
     shadow_ray: Ray,
     sample: &LightSample,
-    mut interiors: Interiors<'s>,
+    mut interiors: MediumStack<'s>,
     regularize: bool,
     mut is_alone: bool,
     record: &mut Record,
 ) -> Spectrum {
     let mut left = Spectrum::WHITE;
     let mut ray = shadow_ray;
-    for _ in 0..MOST_PANES {
+    for _ in 0..MAX_PANES {
         record.counts.shadow += 1;
         let Some(hit) = scene.closest(&ray) else {
             // Light from infinitely far away was not inside anything.
@@ -121,7 +121,7 @@ pub(crate) fn straight_on<'s>(
         let material = pane.resolved();
         interiors.arrive(&pane, material);
         left *= interiors.transmittance(ray_length(&ray, &pane));
-        left *= Vertex::parts(scene, &pane, LEAST_PART, &interiors, ShadingNormals::Lumbre)
+        left *= Vertex::parts(scene, &pane, MIN_PART, &interiors, ShadingNormals::Lumbre)
             .map(|(share, mut vertex)| {
                 if regularize {
                     vertex.bsdf = vertex.bsdf.regularized();

@@ -3,7 +3,7 @@
 use lumbre_scene::{Pinhole, SamplerKind};
 use lumbre_simd::{Double, Job, Real, UInt, V3};
 
-use crate::transport::sampler::LaneDraw;
+use crate::transport::sampler::LaneNumbers;
 use crate::wave::flat::{put3, put64};
 use crate::wave::paths::{Paths, Slots, grow};
 
@@ -48,7 +48,7 @@ impl Job for AimNumbers<'_, '_> {
             let [p, q] = &slots.pixel;
             let pixel = [R::UInt::from_slice(&p[done..]), R::UInt::from_slice(&q[done..])];
             let numbers =
-                LaneDraw::<R> { kind, pixel, index: R::UInt::from_slice(&slots.index[done..]) }.aim();
+                LaneNumbers::<R> { kind, pixel, index: R::UInt::from_slice(&slots.index[done..]) }.aim();
             numbers[0].copy_to_slice(&mut aims.numbers[0][done..]);
             numbers[1].copy_to_slice(&mut aims.numbers[1][done..]);
             numbers[2].copy_to_slice(&mut aims.numbers[2][done..]);

@@ -6,8 +6,8 @@ use lumbre_scene::{GroundPlane, SamplerKind, Scene};
 use lumbre_shading::Spectrum;
 use lumbre_simd::{Double, InstructionSet, Job, Mask, Real, UInt, V3};
 
-use crate::transport::sampler::LaneDraw;
-use crate::transport::seen::{MOST_LIGHTS, SAMPLES};
+use crate::transport::sampler::LaneNumbers;
+use crate::transport::seen::{MAX_LIGHTS, SAMPLES};
 use crate::transport::{Record, Seen};
 use crate::wave::paths::{PAD, Paths, Slots, grow};
 use crate::wave::shadows::{Segment, Shadows};
@@ -51,7 +51,7 @@ impl<'s> Catcher<'s> {
         let ground = scene.ground().filter(|ground| ground.catcher && is_simple)?;
         let lights: Option<Vec<usize>> =
             ground.lights().iter().map(|&light| scene.lane_lights().position(light)).collect();
-        let lights = lights.filter(|lights| lights.len() <= MOST_LIGHTS)?;
+        let lights = lights.filter(|lights| lights.len() <= MAX_LIGHTS)?;
         Some(Self { scene, ground, lights, instruction_set: InstructionSet::detect() })
     }
 
@@ -147,7 +147,7 @@ impl Job for Light<'_, '_> {
         while done < count {
             let lanes = R::Mask::first(count - done);
             let slot = R::UInt::from_slice(&places.slots[done..]);
-            let draw = LaneDraw::<R> {
+            let draw = LaneNumbers::<R> {
                 kind: sampler,
                 pixel: [R::UInt::gather(&slots.pixel[0], slot), R::UInt::gather(&slots.pixel[1], slot)],
                 index: R::UInt::gather(&slots.index, slot),

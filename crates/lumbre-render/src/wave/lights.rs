@@ -7,7 +7,7 @@ use lumbre_scene::light::lanes::LaneLightSample;
 use lumbre_shading::{Scatter, Spectrum};
 use lumbre_simd::{Double, Mask, Real, UInt, V3};
 
-use crate::transport::interior::Interiors;
+use crate::transport::interior::MediumStack;
 use crate::wave::shade::Shade;
 use crate::wave::shadows::Pane;
 
@@ -101,7 +101,7 @@ pub(crate) fn first_sample<R: Real>(light: &LaneLightSample<R>) -> LightSample {
 }
 
 /// The solids around a path on one side of the surface that it is at, or the other.
-fn around<'s>(shade: &Shade<'_, 's>, vertex: usize, slot: u32, crosses: bool) -> Interiors<'s> {
+fn around<'s>(shade: &Shade<'_, 's>, vertex: usize, slot: u32, crosses: bool) -> MediumStack<'s> {
     let mut around = shade.slots.interiors.get(slot as usize).cloned().unwrap_or_default();
     if let (true, Some((solid, front))) = (crosses, shade.vertices.solid(vertex)) {
         around.cross(solid, front);

@@ -39,7 +39,7 @@ use lumbre_simd::{InstructionSet, Real};
 
 pub(crate) use paths::SampleId;
 pub(crate) use search::Precision;
-pub use sights::Sights;
+pub use sights::PrimaryHits;
 pub(crate) use sights::cone;
 
 use crate::transport::Record;

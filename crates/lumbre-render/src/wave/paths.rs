@@ -7,8 +7,8 @@ use lumbre_shading::Spectrum;
 use lumbre_shading::spectrum::{SpectralLookup, Wavelengths};
 use lumbre_simd::{Double, Mask, Real, UInt, V3};
 
-use crate::transport::interior::Interiors;
-use crate::transport::{Draw, Sampler};
+use crate::transport::interior::MediumStack;
+use crate::transport::{SampleNumbers, Sampler};
 
 /// Lanes beyond the last that a column has room for: a store writes whole vectors.
 pub(crate) const PAD: usize = 16;
@@ -70,7 +70,7 @@ pub(crate) struct Slots<'s> {
     /// The light that the path has found.
     pub(crate) radiance: Vec<Spectrum>,
     /// The solids that it is inside of; empty in a scene without solids.
-    pub(crate) interiors: Vec<Interiors<'s>>,
+    pub(crate) interiors: Vec<MediumStack<'s>>,
     /// The medium around, as [`of_column`] reads it; empty in a scene without media.
     pub(crate) medium: Vec<u32>,
     /// The wavelengths that channels are; none in RGB.
@@ -115,7 +115,7 @@ impl Slots<'_> {
     /// Starts all paths outside of solids.
     pub(crate) fn start_outside(&mut self) {
         let wavelengths = (0..self.len).map(|slot| self.wavelengths.get(slot).copied());
-        self.interiors.extend(wavelengths.map(Interiors::of));
+        self.interiors.extend(wavelengths.map(MediumStack::of));
         self.collisions.resize(self.len, 0);
         self.distance_samples.resize(self.len, 0);
     }
@@ -128,8 +128,8 @@ impl Slots<'_> {
 
     /// The random numbers of a sample, for code that takes one path at a time.
     #[inline]
-    pub(crate) fn draw(&self, slot: usize) -> Draw {
-        Draw::new(self.kind, [self.pixel[0][slot], self.pixel[1][slot]], self.index[slot])
+    pub(crate) fn draw(&self, slot: usize) -> SampleNumbers {
+        SampleNumbers::new(self.kind, [self.pixel[0][slot], self.pixel[1][slot]], self.index[slot])
     }
 
     /// The footprint of the ray from the camera of a sample, which starts at `origin`.

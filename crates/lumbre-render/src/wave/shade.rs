@@ -10,7 +10,7 @@ use lumbre_simd::{Double, Job, Mask, Real, UInt, V3};
 
 use crate::caustics::radius;
 use crate::transport::Strategy;
-use crate::transport::sampler::LaneDraw;
+use crate::transport::sampler::LaneNumbers;
 use crate::wave::lights::{at_wavelengths, pass_solids, push_panes};
 use crate::wave::paths::{Departure, Paths, SCATTERED, Slots};
 use crate::wave::setting::{Leg, Setting, power_heuristic};
@@ -260,7 +260,7 @@ impl<'s> Shade<'_, 's> {
                 throughput: gather3(&paths.throughput, at),
                 vertex: Vertex::new(self.vertices, vertex_at, towards),
             };
-            let draw = LaneDraw::<R> {
+            let draw = LaneNumbers::<R> {
                 kind: self.setting.sampler,
                 pixel: [
                     R::UInt::gather(&self.slots.pixel[0], slot),

@@ -8,7 +8,7 @@ use lumbre_shading::Spectrum;
 use lumbre_simd::{Double, Mask, Real, UInt, V3};
 
 use crate::transport::Record;
-use crate::transport::interior::Interiors;
+use crate::transport::interior::MediumStack;
 use crate::transport::through::straight_on;
 use crate::wave::paths::{Slots, grow, of_column};
 use crate::wave::setting::{Leg, Setting};
@@ -46,7 +46,7 @@ pub(crate) struct Pane<'s> {
     pub(crate) segment: u32,
     pub(crate) sample: LightSample,
     /// The solids around its start.
-    pub(crate) around: Interiors<'s>,
+    pub(crate) around: MediumStack<'s>,
 }
 
 /// A segment in each lane.

@@ -8,7 +8,7 @@ use lumbre_shading::spectrum::Wavelengths;
 use lumbre_simd::InstructionSet;
 
 use crate::caustics::Merging;
-use crate::transport::{Draw, Record, Sampler, Seen, Sight};
+use crate::transport::{PrimaryHit, Record, SampleNumbers, Sampler, Seen};
 use crate::wave::camera::{AimNumbers, PinholeRays};
 use crate::wave::catcher::{Catcher, Places};
 use crate::wave::paths::{Paths, SampleId, Slots};
@@ -17,7 +17,7 @@ use crate::wave::{Precision, Wave};
 
 /// Samples whose rays from the camera have met what they meet first. An integrator gives each its radiance.
 #[derive(Debug)]
-pub struct Sights<'a, 's> {
+pub struct PrimaryHits<'a, 's> {
     scene: &'s Scene,
     view: &'a View,
     wave: &'a mut Wave<'s>,
@@ -26,7 +26,7 @@ pub struct Sights<'a, 's> {
     wanted: Vec<u32>,
 }
 
-impl<'a, 's> Sights<'a, 's> {
+impl<'a, 's> PrimaryHits<'a, 's> {
     /// Takes up some samples, whose rays from the camera are still to be given.
     pub(crate) fn start(
         scene: &'s Scene,
@@ -54,7 +54,7 @@ impl<'a, 's> Sights<'a, 's> {
         Self { scene, view, wave, precision, wanted: (0..ids.len() as u32).collect() }
     }
 
-    /// The numbers that aim a sample: see [`Draw::aim`].
+    /// The numbers that aim a sample: see [`SampleNumbers::aim`].
     pub(crate) fn aim(&self, slot: usize) -> [f32; 4] {
         self.wave.aims.numbers(slot)
     }
@@ -116,11 +116,11 @@ impl<'a, 's> Sights<'a, 's> {
     }
 
     /// The ray from the camera of a sample, and what it meets.
-    pub(crate) fn sight(&self, slot: usize) -> Sight<'s> {
+    pub(crate) fn sight(&self, slot: usize) -> PrimaryHit<'s> {
         let ray = self.ray(slot);
         let footprint = self.wave.slots.footprint(slot, ray.origin);
         let met = self.wave.hits.interaction(self.scene, slot, &ray, &footprint);
-        Sight { ray: CameraRay { ray, footprint, weight: 1.0 }, met }
+        PrimaryHit { ray: CameraRay { ray, footprint, weight: 1.0 }, met }
     }
 
     /// Whether a ray meets the ground.
@@ -153,7 +153,7 @@ impl<'a, 's> Sights<'a, 's> {
     }
 
     /// The random numbers of a sample.
-    pub(crate) fn draw(&self, slot: usize) -> Draw {
+    pub(crate) fn draw(&self, slot: usize) -> SampleNumbers {
         self.wave.slots.draw(slot)
     }
 
@@ -180,7 +180,7 @@ impl<'a, 's> Sights<'a, 's> {
     }
 
     /// Gives each sample the radiance that a function finds along its ray, one after the other.
-    pub fn each(&mut self, mut radiance: impl FnMut(Sight<'s>, &Draw) -> Spectrum) {
+    pub fn each(&mut self, mut radiance: impl FnMut(PrimaryHit<'s>, &SampleNumbers) -> Spectrum) {
         for at in 0..self.wanted.len() {
             let slot = self.wanted[at] as usize;
             let found = radiance(self.sight(slot), &self.draw(slot));

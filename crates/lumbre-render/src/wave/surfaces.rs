@@ -10,7 +10,7 @@ use lumbre_shading::{HomogeneousMedium, Material, Spectrum};
 use lumbre_simd::{UInt, V3};
 
 use crate::transport::Record;
-use crate::transport::interior::Interiors;
+use crate::transport::interior::MediumStack;
 use crate::transport::journal::{End, Event, Met, Source};
 use crate::transport::through::hero_alone;
 use crate::wave::Wave;
@@ -42,7 +42,7 @@ impl<'s> Wave<'s> {
                 continue;
             }
             let in_the_open =
-                self.slots.interiors.get(self.paths.slot[path] as usize).is_none_or(Interiors::is_empty);
+                self.slots.interiors.get(self.paths.slot[path] as usize).is_none_or(MediumStack::is_empty);
             let met = if takes_triangles && in_the_open { self.hits.triangle(path) } else { None };
             let surface = met.and_then(|met| Some((scene.tables().surface(met.id)?, met)));
             let Some((surface, met)) = surface else {

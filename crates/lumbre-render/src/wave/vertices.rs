@@ -66,11 +66,11 @@ pub(crate) struct Place<R: Real> {
 /// What normals lose by single precision.
 const MORE: f64 = 1.0 + 1e-6;
 /// At the origin, where all errors may be 0, the offset is so large that no map makes it 0.
-const LEAST_OFFSET: f64 = 1e-250;
+const MIN_OFFSET: f64 = 1e-250;
 
 /// The distance from a point with an error to where rays start, along its normal: see [`lumbre_math::rounding::offset_point`].
 pub(crate) fn offset_of(normal: DVec3, error: DVec3) -> f64 {
-    ((normal.abs().dot(error) + 4.0 * error.max_element()) * MORE).max(LEAST_OFFSET)
+    ((normal.abs().dot(error) + 4.0 * error.max_element()) * MORE).max(MIN_OFFSET)
 }
 
 impl<R: Real> Place<R> {
@@ -81,7 +81,7 @@ impl<R: Real> Place<R> {
         let most = error.x.simd_max(error.y).simd_max(error.z);
         let offset = n.x.abs() * error.x + n.y.abs() * error.y + n.z.abs() * error.z;
         let offset = (offset + R::Double::splat(4.0) * most) * R::Double::splat(MORE);
-        Self { point, normal, offset: offset.simd_max(R::Double::splat(LEAST_OFFSET)) }
+        Self { point, normal, offset: offset.simd_max(R::Double::splat(MIN_OFFSET)) }
     }
 
     /// Where a ray starts on the side of a direction; the point itself where there is no normal.

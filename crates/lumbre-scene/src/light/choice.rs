@@ -39,7 +39,7 @@ pub(super) struct Elsewhere {
 
 /// The least probability of lights that stand somewhere, and of others, where there are both: their powers are no good measure of what
 /// they give to a place.
-const LEAST_SHARE: f64 = 0.25;
+const MIN_SHARE: f64 = 0.25;
 
 impl LightChoice {
     /// For a scene of this radius.
@@ -64,7 +64,7 @@ impl LightChoice {
         let elsewhere: f64 = choice.elsewhere.iter().map(|light| light.power).sum();
         let share = elsewhere / (elsewhere + power);
         // Beyond all numbers, both alike.
-        let share = if share.is_nan() { 0.5 } else { share.clamp(LEAST_SHARE, 1.0 - LEAST_SHARE) };
+        let share = if share.is_nan() { 0.5 } else { share.clamp(MIN_SHARE, 1.0 - MIN_SHARE) };
         let has_elsewhere = choice.elsewhere.iter().any(|light| light.power > 0.0);
         choice.share_elsewhere = match (&choice.tree, has_elsewhere) {
             (Some(_), true) => share,

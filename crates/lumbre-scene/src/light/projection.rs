@@ -31,7 +31,7 @@ pub struct ProjectionLight {
 }
 
 /// The least cosine from the axis of what is lit, as in pbrt.
-const LEAST_COSINE: f64 = 1e-3;
+const MIN_COSINE: f64 = 1e-3;
 
 impl ProjectionLight {
     /// A picture whose shorter side is seen from the light under so many degrees. `None` for one that is black or empty.
@@ -71,7 +71,7 @@ impl ProjectionLight {
     /// The radiant intensity in a direction from the light.
     fn intensity(&self, direction: DVec3) -> Spectrum {
         let local = self.world_from_light.inverse_vector(direction).normalize_or_zero();
-        if local.z < LEAST_COSINE {
+        if local.z < MIN_COSINE {
             return Spectrum::BLACK;
         }
         let [x, y] = [local.x / local.z / self.half[0], local.y / local.z / self.half[1]];

@@ -31,7 +31,7 @@ pub(super) struct RectangleView {
 /// greater.
 const SQUARE: f64 = 1e-5;
 /// Solid angles below this are sampled by area: they lose the digits of the angles that they are the difference of.
-const LEAST_SOLID_ANGLE: f64 = 1e-5;
+const MIN_SOLID_ANGLE: f64 = 1e-5;
 
 impl Rectangle {
     /// `None` for sides that are not at right angles.
@@ -61,7 +61,7 @@ impl Rectangle {
         let angle = angle.y.angle_from(angle.x);
         // A sum of angles, from 0 to a full turn.
         let solid_angle = if angle < 0.0 { angle + std::f64::consts::TAU } else { angle };
-        let range = LEAST_SOLID_ANGLE..std::f64::consts::TAU - LEAST_SOLID_ANGLE;
+        let range = MIN_SOLID_ANGLE..std::f64::consts::TAU - MIN_SOLID_ANGLE;
         let view = RectangleView { least, greatest, height, angles_of_least_x: [low, high], solid_angle };
         range.contains(&solid_angle).then_some(view)
     }

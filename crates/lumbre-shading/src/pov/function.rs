@@ -298,7 +298,7 @@ fn truth(is: bool) -> f64 {
 }
 
 /// A sum or a product has at most so many terms.
-const MOST_TERMS: f64 = 1e5;
+const MAX_TERMS: f64 = 1e5;
 
 impl Code {
     /// An expression that is a number.
@@ -349,7 +349,7 @@ impl Operation {
                 let mut inner: SmallVec<[f64; 12]> = arguments.iter().copied().collect();
                 inner.push(from);
                 let mut total = if *is_product { 1.0 } else { 0.0 };
-                let to = to.min(from + MOST_TERMS);
+                let to = to.min(from + MAX_TERMS);
                 let mut i = from;
                 while i <= to + EPSILON {
                     if let Some(last) = inner.last_mut() {

@@ -14,7 +14,7 @@ use crate::intersect::axes::{Axes, Sides};
 use crate::intersect::box_ray::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs};
 use crate::intersect::f32_ray::F32Ray;
 use crate::intersect::isa::{Isa, Set};
-use crate::intersect::operations::{CornersRoom, Simd};
+use crate::intersect::operations::{CornerScratch, Simd};
 use crate::intersect::triangles::Shears;
 use crate::intersect::watertight::{BlockRay, EdgeTest, FAR, HeightRange, Inside, ROUNDINGS, Shear};
 use crate::ray32::Ray32;
@@ -471,11 +471,11 @@ where
     }
 
     #[inline(always)]
-    fn corners<'a>(block: &'a TriangleBlock, room: &'a mut CornersRoom) -> &'a Corners {
+    fn corners<'a>(block: &'a TriangleBlock, room: &'a mut CornerScratch) -> &'a Corners {
         if block.is_unshared() {
             return block.own_corners();
         }
-        let CornersRoom(corners) = room;
+        let CornerScratch(corners) = room;
         let words = block.words().as_ptr();
         // No `map`: it does not take on the instruction set of its caller.
         let [a, b, c] = block.corners();
