@@ -1450,11 +1450,11 @@ fn what_is_invisible_everywhere_does_not_shine() {
     let unlit = r#","extensions":{"KHR_materials_unlit":{}}"#;
     for more in ["", unlit] {
         // Without a mode, alpha is not used.
-        assert!(shines(0.0, more) && shines(0.75, &format!(r#","alphaMode":"BLEND"{more}"#)));
-        assert!(!shines(0.0, &format!(r#","alphaMode":"BLEND"{more}"#)));
-        assert!(!shines(0.0, &format!(r#","alphaMode":"MASK"{more}"#)));
-        assert!(!shines(0.75, &format!(r#","alphaMode":"MASK","alphaCutoff":0.8{more}"#)));
-        assert!(shines(0.75, &format!(r#","alphaMode":"MASK","alphaCutoff":0.7{more}"#)));
+        assert!(is_emissive(0.0, more) && is_emissive(0.75, &format!(r#","alphaMode":"BLEND"{more}"#)));
+        assert!(!is_emissive(0.0, &format!(r#","alphaMode":"BLEND"{more}"#)));
+        assert!(!is_emissive(0.0, &format!(r#","alphaMode":"MASK"{more}"#)));
+        assert!(!is_emissive(0.75, &format!(r#","alphaMode":"MASK","alphaCutoff":0.8{more}"#)));
+        assert!(is_emissive(0.75, &format!(r#","alphaMode":"MASK","alphaCutoff":0.7{more}"#)));
     }
     let textured = r#""pbrMetallicRoughness":{"baseColorFactor":[1,1,1,0],"baseColorTexture":{"index":0}}"#;
     for mode in ["MASK", "BLEND"] {

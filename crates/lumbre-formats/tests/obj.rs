@@ -422,10 +422,10 @@ fn a_material_that_is_invisible_does_not_shine() {
         let staged = Stage::default().set(&mut scene.clone()).light;
         (scene.shapes[0].area_light.is_some(), staged)
     };
-    assert_eq!(shines("d 1"), (true, StageLight::Own));
-    assert_eq!(shines("d 0.25"), (true, StageLight::Own));
-    assert_eq!(shines("d 0"), (false, StageLight::Studio));
-    assert_eq!(shines("d -1"), (false, StageLight::Studio));
+    assert_eq!(is_emissive("d 1"), (true, StageLight::Own));
+    assert_eq!(is_emissive("d 0.25"), (true, StageLight::Own));
+    assert_eq!(is_emissive("d 0"), (false, StageLight::Studio));
+    assert_eq!(is_emissive("d -1"), (false, StageLight::Studio));
 }
 
 #[test]

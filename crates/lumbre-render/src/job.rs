@@ -77,7 +77,7 @@ pub struct CheckpointSink<'a> {
 
 impl std::fmt::Debug for CheckpointSink<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Keeper").field("every", &self.every).finish_non_exhaustive()
+        f.debug_struct("CheckpointSink").field("every", &self.every).finish_non_exhaustive()
     }
 }
 

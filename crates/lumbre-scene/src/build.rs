@@ -92,7 +92,7 @@ impl Scene {
         } else {
             cameras
         };
-        if lights.is_empty() && !builder.entries.iter().any(SurfaceEntry::shines) {
+        if lights.is_empty() && !builder.entries.iter().any(SurfaceEntry::is_emissive) {
             builder.warnings.push(BuildWarning::NoLight);
         }
         builder.place_lights(lights)?;
@@ -102,12 +102,12 @@ impl Scene {
             &builder.entries,
             &bounds,
         );
-        let has_holes = builder.entries.iter().any(SurfaceEntry::has_holes);
-        let lets_light_through = builder.entries.iter().any(SurfaceEntry::lets_light_through);
-        let lets_light_straight_on = builder.entries.iter().any(SurfaceEntry::lets_light_straight_on);
+        let has_cutouts = builder.entries.iter().any(SurfaceEntry::has_cutouts);
+        let is_transmissive = builder.entries.iter().any(SurfaceEntry::is_transmissive);
+        let has_delta_transmission = builder.entries.iter().any(SurfaceEntry::has_delta_transmission);
         let has_solids = builder.entries.iter().any(SurfaceEntry::may_be_solid);
         let has_one_sided = builder.entries.iter().any(SurfaceEntry::is_one_sided_anywhere);
-        let looks_up = builder.entries.iter().any(SurfaceEntry::looks_up_anywhere);
+        let is_textured = builder.entries.iter().any(SurfaceEntry::looks_up_anywhere);
         Ok(Self {
             accel,
             cameras,
@@ -117,14 +117,14 @@ impl Scene {
             integrator,
             pov,
             bounds,
-            has_holes,
-            lets_light_through,
-            lets_light_straight_on,
+            has_cutouts,
+            is_transmissive,
+            has_delta_transmission,
             has_solids,
             has_one_sided,
             has_instances: !objects.is_empty(),
             moves,
-            looks_up,
+            is_textured,
             specular_spheres: specular.spheres(&bounds),
             ground: ground.map(|desc| GroundPlane::new(desc, &lighting.lights)),
             lane_lights: lighting.lane_lights,
@@ -162,7 +162,7 @@ impl Scene {
         let surfaces = self.lights.iter().take_while(|light| light.is_surface()).cloned().collect();
         let warnings = self.warnings.iter().filter(|warning| !warning.is_of_lights()).cloned().collect();
         let mut builder = Builder { lights: surfaces, warnings, ..Builder::default() };
-        if lights.is_empty() && !self.entries.iter().any(SurfaceEntry::shines) {
+        if lights.is_empty() && !self.entries.iter().any(SurfaceEntry::is_emissive) {
             builder.warnings.push(BuildWarning::NoLight);
         }
         let moves = self.moves || lights.iter().any(|light| matches!(light.bare(), LightDesc::Moving { .. }));
@@ -190,14 +190,14 @@ impl Scene {
             ground,
             specular_spheres: self.specular_spheres.clone(),
             warnings: builder.warnings,
-            has_holes: self.has_holes,
-            lets_light_through: self.lets_light_through,
-            lets_light_straight_on: self.lets_light_straight_on,
+            has_cutouts: self.has_cutouts,
+            is_transmissive: self.is_transmissive,
+            has_delta_transmission: self.has_delta_transmission,
             has_solids: self.has_solids,
             has_one_sided: self.has_one_sided,
             has_instances: self.has_instances,
             moves,
-            looks_up: self.looks_up,
+            is_textured: self.is_textured,
         })
     }
 
@@ -415,7 +415,7 @@ impl Builder {
             GeometryDesc::Csg(csg) => {
                 let placement = desc.world_from_object;
                 let form = csg::build(self, desc.index, csg, &placement, desc.reverse_orientation)?;
-                if form.leaves.iter().any(SurfaceEntry::shines) {
+                if form.leaves.iter().any(SurfaceEntry::is_emissive) {
                     self.warnings.push(BuildWarning::UnsampledLight { shape: desc.index });
                 }
                 let placed = csg::shape_of(&form);
@@ -544,7 +544,7 @@ impl Builder {
         };
         Ok(SurfaceEntry {
             shape: desc.index,
-            looks_up: material.as_ref().is_some_and(|material| !material.is_uniform())
+            is_textured: material.as_ref().is_some_and(|material| !material.is_uniform())
                 || desc.alpha.as_ref().is_some_and(|alpha| !alpha.is_constant()),
             material,
             emission: None,

@@ -122,7 +122,7 @@ impl<'s> Interaction<'s> {
     }
 
     /// Whether there may be a terminator offset.
-    pub fn may_rise(&self) -> bool {
+    pub fn has_terminator_offset(&self) -> bool {
         self.terminator_offset.is_some()
     }
 

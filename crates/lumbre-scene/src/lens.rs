@@ -36,8 +36,8 @@ impl ApertureImage {
     pub fn new(width: usize, height: usize, mut values: Vec<f32>) -> Option<Self> {
         let mean = values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len() as f64;
         let fits = width > 0 && height > 0 && width.checked_mul(height) == Some(values.len());
-        let lets_light_through = mean > 0.0 && mean.is_finite() && values.iter().all(|&v| v >= 0.0);
-        if !fits || !lets_light_through {
+        let is_transmissive = mean > 0.0 && mean.is_finite() && values.iter().all(|&v| v >= 0.0);
+        if !fits || !is_transmissive {
             return None;
         }
         let scale = (FRAC_PI_4 / mean) as f32;

@@ -47,11 +47,11 @@ pub struct Scene {
     pub(crate) specular_spheres: Vec<BoundingSphere>,
     pub(crate) warnings: Vec<BuildWarning>,
     // Whether shadow rays must check every hit: there are cut-outs or interfaces.
-    pub(crate) has_holes: bool,
+    pub(crate) has_cutouts: bool,
     /// Whether any material transmits light.
-    pub(crate) lets_light_through: bool,
+    pub(crate) is_transmissive: bool,
     /// Whether any material transmits light straight on.
-    pub(crate) lets_light_straight_on: bool,
+    pub(crate) has_delta_transmission: bool,
     /// Whether any material encloses a solid that light passes through.
     pub(crate) has_solids: bool,
     // Whether any material is one-sided.
@@ -59,7 +59,7 @@ pub struct Scene {
     pub(crate) has_instances: bool,
     pub(crate) moves: bool,
     // Whether any material has textures, so that rays need footprints.
-    pub(crate) looks_up: bool,
+    pub(crate) is_textured: bool,
 }
 
 impl BuildWarning {
@@ -228,8 +228,8 @@ impl Scene {
     }
 
     /// Whether any material transmits light: glass, panes, leaves. Cut-outs do not count.
-    pub fn lets_light_through(&self) -> bool {
-        self.lets_light_through
+    pub fn is_transmissive(&self) -> bool {
+        self.is_transmissive
     }
 
     /// Whether any material encloses a solid that light passes through.
@@ -239,13 +239,13 @@ impl Scene {
 
     /// Whether any material transmits light straight on ([`lumbre_shading::Bsdf::straight_on`]), such as a thin
     /// smooth pane.
-    pub fn lets_light_straight_on(&self) -> bool {
-        self.lets_light_straight_on
+    pub fn has_delta_transmission(&self) -> bool {
+        self.has_delta_transmission
     }
 
     /// Whether the hit surface may transmit light straight on.
     pub fn is_pane(&self, hit: &Hit) -> bool {
-        self.leaf(hit).0.lets_light_straight_on()
+        self.leaf(hit).0.has_delta_transmission()
     }
 
     /// Whether the hit surface may reflect or refract without blur: see [`lumbre_shading::Material::may_be_specular`].
@@ -255,7 +255,7 @@ impl Scene {
 
     /// The closest hit, skipping cut-outs and interfaces.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
-        if self.has_holes {
+        if self.has_cutouts {
             let is_solid = |hit: &Hit| self.is_solid(ray, hit);
             self.accel.closest_with(ray, &Query::new().filter(&is_solid))
         } else {
@@ -279,7 +279,7 @@ impl Scene {
     /// # Panics
     /// When there are not as many places for hits as rays.
     pub fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        if self.has_holes {
+        if self.has_cutouts {
             assert_eq!(rays.len(), hits.len(), "a place for each hit");
             hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = self.closest(ray));
         } else {
@@ -305,7 +305,7 @@ impl Scene {
     /// # Panics
     /// When there are not as many answers as rays.
     pub fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
-        if self.has_holes {
+        if self.has_cutouts {
             assert_eq!(rays.len(), occluded.len(), "an answer for each ray");
             occluded.iter_mut().zip(rays).for_each(|(occluded, ray)| *occluded = self.is_occluded(ray));
         } else {
@@ -315,7 +315,7 @@ impl Scene {
 
     /// Whether a shadow ray is occluded.
     pub fn is_occluded(&self, ray: &Ray) -> bool {
-        if self.has_holes {
+        if self.has_cutouts {
             let is_solid = |hit: &Hit| self.is_solid(ray, hit);
             self.accel.any_with(ray, &Query::new().filter(&is_solid))
         } else {
@@ -350,8 +350,8 @@ impl Scene {
     }
 
     /// Whether shadow rays and paths go through some surfaces: cut-outs and interfaces.
-    pub fn has_holes(&self) -> bool {
-        self.has_holes
+    pub fn has_cutouts(&self) -> bool {
+        self.has_cutouts
     }
 
     /// Whether cameras look through the backs of some surfaces.
@@ -361,7 +361,7 @@ impl Scene {
 
     /// Whether any material has textures, so that rays need footprints.
     pub fn is_textured(&self) -> bool {
-        self.looks_up
+        self.is_textured
     }
 
     /// The interaction at a hit.
@@ -388,10 +388,10 @@ impl Scene {
         let direction = ray.direction / length;
         let front = shaded.surface.normal.dot(direction) < 0.0;
         let surface = shaded.surface;
-        let spot = if entry.looks_up {
+        let spot = if entry.is_textured {
             let (dpdu, dpdv) = (surface.dpdu, surface.dpdv);
             footprint.on_plane(surface.point, surface.normal, dpdu, dpdv, direction, hit.root.t * length)
-        } else if self.looks_up {
+        } else if self.is_textured {
             footprint.across(surface.point, surface.normal, direction, hit.root.t * length)
         } else {
             SurfaceFootprint::default()

@@ -243,12 +243,12 @@ pub(crate) fn wants_studio(desc: &SceneDesc) -> bool {
     match desc.without_light {
         WithoutLight::Dark => false,
         WithoutLight::StudioUnlessStaged => desc.lights.is_empty() || desc.cameras.is_empty(),
-        WithoutLight::Studio => desc.lights.is_empty() && !shines(desc),
+        WithoutLight::Studio => desc.lights.is_empty() && !is_emissive(desc),
     }
 }
 
 /// Whether any shape emits light.
-fn shines(desc: &SceneDesc) -> bool {
+fn is_emissive(desc: &SceneDesc) -> bool {
     let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);
     let mut open: Vec<&ShapeDesc> = desc.shapes.iter().chain(in_objects).collect();
     while let Some(shape) = open.pop() {

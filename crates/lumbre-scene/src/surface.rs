@@ -26,7 +26,7 @@ pub(crate) struct SurfaceEntry {
     pub boundary: Option<Boundary>,
     pub reverse: bool,
     /// Whether the material has textures, and needs footprints.
-    pub looks_up: bool,
+    pub is_textured: bool,
     pub form: Form,
 }
 
@@ -168,9 +168,9 @@ impl SurfaceEntry {
     }
 
     /// Whether it emits light.
-    pub(crate) fn shines(&self) -> bool {
+    pub(crate) fn is_emissive(&self) -> bool {
         match &self.form {
-            Form::Csg(csg) => csg.leaves.iter().any(Self::shines),
+            Form::Csg(csg) => csg.leaves.iter().any(Self::is_emissive),
             _ => self.emission.is_some(),
         }
     }
@@ -194,8 +194,8 @@ impl SurfaceEntry {
     /// Whether any part of it has textures.
     pub(crate) fn looks_up_anywhere(&self) -> bool {
         match &self.form {
-            Form::Csg(csg) => self.looks_up || csg.leaves.iter().any(Self::looks_up_anywhere),
-            _ => self.looks_up,
+            Form::Csg(csg) => self.is_textured || csg.leaves.iter().any(Self::looks_up_anywhere),
+            _ => self.is_textured,
         }
     }
 
@@ -213,18 +213,18 @@ impl SurfaceEntry {
     }
 
     /// Whether any part of it transmits light.
-    pub(crate) fn lets_light_through(&self) -> bool {
+    pub(crate) fn is_transmissive(&self) -> bool {
         match &self.form {
-            Form::Csg(csg) => csg.leaves.iter().any(Self::lets_light_through),
-            _ => self.material.as_ref().is_some_and(|material| material.lets_light_through()),
+            Form::Csg(csg) => csg.leaves.iter().any(Self::is_transmissive),
+            _ => self.material.as_ref().is_some_and(|material| material.is_transmissive()),
         }
     }
 
     /// Whether any part of it transmits light straight on.
-    pub(crate) fn lets_light_straight_on(&self) -> bool {
+    pub(crate) fn has_delta_transmission(&self) -> bool {
         match &self.form {
-            Form::Csg(csg) => csg.leaves.iter().any(Self::lets_light_straight_on),
-            _ => self.material.as_ref().is_some_and(|material| material.lets_light_straight_on()),
+            Form::Csg(csg) => csg.leaves.iter().any(Self::has_delta_transmission),
+            _ => self.material.as_ref().is_some_and(|material| material.has_delta_transmission()),
         }
     }
 
@@ -245,9 +245,9 @@ impl SurfaceEntry {
     }
 
     /// Whether any part of it may be passed by light.
-    pub(crate) fn has_holes(&self) -> bool {
+    pub(crate) fn has_cutouts(&self) -> bool {
         match &self.form {
-            Form::Csg(csg) => csg.leaves.iter().any(Self::has_holes),
+            Form::Csg(csg) => csg.leaves.iter().any(Self::has_cutouts),
             _ => self.alpha.is_some() || !self.is_visible(),
         }
     }

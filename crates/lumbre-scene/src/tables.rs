@@ -92,7 +92,7 @@ impl SurfaceTable {
             mesh: attributes.mesh.clone(),
             outward: if entry.reverse { -1.0 } else { 1.0 },
             bsdf: self.uniform(material),
-            transmits: material.lets_light_through(),
+            transmits: material.is_transmissive(),
             emission: entry.emission.as_ref().map(|e| (e.radiance.to_array(), e.two_sided)),
             attributes: attributes.clone(),
             material: material.clone(),

@@ -60,7 +60,7 @@ impl Path {
             shading_normals: self.shading_normals,
             has_solids: scene.has_solids(),
             has_media: scene.has_media(),
-            has_panes: scene.lets_light_straight_on(),
+            has_panes: scene.has_delta_transmission(),
             moves: scene.moves(),
             is_spectral: false,
             instruction_set: InstructionSet::detect(),

@@ -206,7 +206,7 @@ fn scattered<'s>(
     let mut sum = Spectrum::BLACK;
     let mut shadow_ray = None;
     // Light of any kind, for nothing else brings it from behind a pane to what scatters.
-    let goes_straight_on = scene.lets_light_straight_on();
+    let goes_straight_on = scene.has_delta_transmission();
     for (share, vertex) in scatterers {
         let scattered = vertex.eval(sample.towards) * *share;
         if scattered.is_black() {

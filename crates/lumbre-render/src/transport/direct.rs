@@ -121,7 +121,9 @@ impl<'a, 's> Vertex<'a, 's> {
 
     /// Whether a direction under the plane of the face is one that the smooth surface over it reflects to.
     fn stays(&self, wi: Vec3) -> bool {
-        let Some(geometric) = self.geometric.filter(|_| self.met.may_rise()) else { return false };
+        let Some(geometric) = self.geometric.filter(|_| self.met.has_terminator_offset()) else {
+            return false;
+        };
         let smooth = self.met.shading.normal;
         let smooth = if smooth.dot(geometric) < 0.0 { -smooth } else { smooth };
         geometric.dot(wi) <= 0.0

@@ -126,7 +126,7 @@ fn lost(
         }
         lost += sample.radiance * (Spectrum::WHITE - left) * (cosine * share / (density * SAMPLES as f32));
     }
-    if scene.lets_light_through() {
+    if scene.is_transmissive() {
         lost = lost - passed(scene, ground, at, draw, record);
     }
     lost

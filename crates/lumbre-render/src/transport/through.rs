@@ -85,7 +85,7 @@ pub(crate) fn light_through(
 /// Whether a light's sample is to be followed through panes by [`straight_on`], where paths find all other light behind them: that of
 /// points and in one direction, which no path finds by chance, so that nothing counts twice.
 pub(crate) fn goes_straight_on(scene: &Scene, sample: &LightSample) -> bool {
-    sample.scatter == Scatter::Delta && scene.lets_light_straight_on()
+    sample.scatter == Scatter::Delta && scene.has_delta_transmission()
 }
 
 /// What is left of a light's sample where `shadow_ray` starts, inside of `interiors`: the product of what all that it goes

@@ -47,7 +47,7 @@ impl<'s> Catcher<'s> {
     /// The catcher of a scene; `None` without one, and where light is to be followed one way at a time: of lamps, and through what is
     /// clear.
     pub(crate) fn of(scene: &'s Scene) -> Option<Self> {
-        let is_simple = !scene.lets_light_through() && !scene.has_media();
+        let is_simple = !scene.is_transmissive() && !scene.has_media();
         let ground = scene.ground().filter(|ground| ground.catcher && is_simple)?;
         let lights: Option<Vec<usize>> =
             ground.lights().iter().map(|&light| scene.lane_lights().position(light)).collect();

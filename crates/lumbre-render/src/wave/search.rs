@@ -46,7 +46,8 @@ impl Precision {
     /// What a scene allows: rays in single precision unless double is asked for, or the scene has no tree for them.
     pub(crate) fn of(scene: &Scene, asks_for_double: bool) -> Self {
         // Cut-outs are decided by hits in double precision.
-        let is_single = !asks_for_double && !scene.has_holes() && scene.accel().picture_rounding().is_some();
+        let is_single =
+            !asks_for_double && !scene.has_cutouts() && scene.accel().picture_rounding().is_some();
         if is_single { Self::Single } else { Self::Double }
     }
 }

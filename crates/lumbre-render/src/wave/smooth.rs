@@ -23,7 +23,7 @@ pub(crate) struct SmoothHits {
     /// The kind of the BSDF; `None` where the material is to be looked up.
     pub(crate) kinds: Vec<Option<BsdfKind>>,
     /// The same for lanes: 1 where the material is to be looked up.
-    looks_up: Vec<u32>,
+    is_textured: Vec<u32>,
     /// What is found of each: the geometric and the shading normal, which point outside.
     pub(crate) geometric: [Vec<f32>; 3],
     pub(crate) shading: [Vec<f32>; 3],
@@ -34,7 +34,7 @@ impl SmoothHits {
     pub(crate) fn reset(&mut self, len: usize) {
         self.base.reset(len);
         self.kinds.clear();
-        grow(&mut self.looks_up, len);
+        grow(&mut self.is_textured, len);
         let columns = self.normals.iter_mut().chain(&mut self.geometric).chain(&mut self.shading);
         columns.for_each(|column| grow(column, len));
     }
@@ -52,7 +52,7 @@ impl SmoothHits {
         let at = self.base.len();
         self.base.push(surface, path, met, distance);
         self.kinds.push(bsdf.map(|bsdf| bsdf.kind));
-        self.looks_up[at] = u32::from(bsdf.is_none());
+        self.is_textured[at] = u32::from(bsdf.is_none());
     }
 
     /// Reads the corners of all triangles, and the normals there: see [`FlatHits::load`].
@@ -147,16 +147,17 @@ impl Job for SmoothVertices<'_, '_> {
             let mut flags = R::UInt::from_slice(&hits.base.flags[done..]);
             flags = flags | flag_where::<R>(folds, FOLDS);
             flags = flags | flag_where::<R>(differs & is_pbrt, SIDED | LIT_FROM_BELOW);
-            let looks_up = R::UInt::from_slice(&hits.looks_up[done..]).simd_eq(R::UInt::splat(1));
+            let is_textured = R::UInt::from_slice(&hits.is_textured[done..]).simd_eq(R::UInt::splat(1));
             // Where the frame is still to be tilted, the texture look-up decides.
-            let may_rise = lanes & differ::<R>(shading, geometric) & (folds | (looks_up & !is_pbrt));
+            let has_terminator_offset =
+                lanes & differ::<R>(shading, geometric) & (folds | (is_textured & !is_pbrt));
             let to = vertices.len + done;
-            if may_rise.any() {
+            if has_terminator_offset.any() {
                 let start = place.start(above);
                 let (offset, rises) = rise::<R>(hits, done, above);
                 // A smaller offset is within the error of the point.
                 let least = (start - point).to_single().length();
-                let rises = may_rise & rises & least.simd_lt(offset.dot(geometric).abs());
+                let rises = has_terminator_offset & rises & least.simd_lt(offset.dot(geometric).abs());
                 let is_below = shading.dot(above).simd_lt(R::zero());
                 put3::<R>(&mut vertices.smooth, to, V3::select(is_below, -shading, shading));
                 put64::<R>(&mut vertices.risen, to, start + offset.to_double());

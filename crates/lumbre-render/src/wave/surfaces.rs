@@ -144,7 +144,7 @@ impl<'s> Wave<'s> {
                     }
                     let frame = frame_for(&bsdf, frame);
                     let mut flags = flags_of(setting.shading_normals, &frame, point.geometric);
-                    if material.lets_light_through() {
+                    if material.is_transmissive() {
                         flags |= LIT_FROM_BELOW;
                     }
                     self.vertices.put_looked_up(vertex, &frame, &bsdf, flags);
@@ -245,7 +245,7 @@ impl<'s> Wave<'s> {
         }
         let frame = frame_for(&bsdf, frame);
         let mut flags = flags_of(setting.shading_normals, &frame, here.shading.geometric);
-        if material.lets_light_through() {
+        if material.is_transmissive() {
             flags |= LIT_FROM_BELOW;
         }
         self.vertices.push_place(path, &here.surface, here.surface.point_error, here.towards_origin);
