@@ -1442,7 +1442,7 @@ fn coverage_is_by_mode_and_light_by_strength() {
 
 #[test]
 fn what_is_invisible_everywhere_does_not_shine() {
-    let shines = |alpha: f32, rest: &str| {
+    let is_emissive = |alpha: f32, rest: &str| {
         let colour = format!(r#""pbrMetallicRoughness":{{"baseColorFactor":[1,1,1,{alpha}]}}"#);
         let (scene, _) = dressed(&format!(r#"{{{colour},"emissiveFactor":[1,1,1]{rest}}}"#));
         scene.shapes[0].area_light.is_some()
