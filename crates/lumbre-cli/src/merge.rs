@@ -100,7 +100,7 @@ fn frame_of(part: &Part) -> Option<u32> {
     part.job.identity.get("picture")?.parse().ok()
 }
 
-/// Joins parts of one picture, of at least so many samples.
+/// Joins parts of one picture, of at least this many samples.
 fn merge(arguments: &Arguments, parts: &[PathBuf], output: &Path, spp: u32) -> Result<(), Failure> {
     Inputs::of(arguments.parts.iter().chain(&arguments.background).map(PathBuf::as_path)).refuse(output)?;
     probe_writable(output).map_err(|e| Failure::from(lumbre::Error::from(e)))?;

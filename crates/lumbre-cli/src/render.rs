@@ -378,7 +378,7 @@ impl Arguments {
         settings
     }
 
-    /// How a picture is shown, by name, for whoever saves it later: see [`crate::merge`].
+    /// How a picture is shown, by name, for the command that saves it later: see [`crate::merge`].
     fn shown(
         &self,
         behind: &Backdrop,

@@ -57,7 +57,7 @@ const SIGNALS: [(i32, u8, bool); 6] = [
 #[cfg(not(unix))]
 const SIGNALS: [(i32, u8, bool); 2] = [(SIGINT, 130, true), (SIGTERM, 143, true)];
 
-/// The signals of [`SIGNALS`] that are listened for: all but those that whoever started the program had it ignore, as nohup does with
+/// The signals of [`SIGNALS`] that are listened for: all but those that its parent process had it ignore, as nohup does with
 /// SIGHUP. SIGINT and SIGTERM are always, as they were ever: shells ignore SIGINT for what runs in the background.
 fn wanted() -> impl Iterator<Item = (i32, u8, bool)> {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

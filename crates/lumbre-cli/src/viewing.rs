@@ -42,7 +42,7 @@ pub(crate) struct Arguments {
     /// The port; by default one that is free.
     #[arg(long, value_name = "N", default_value_t = 0)]
     port: u16,
-    /// The address to listen at. Others than this machine's own let whoever reaches them ask for the page, and what is sent is not
+    /// The address to listen at. Others than this machine's own let anyone who reaches them ask for the page, and what is sent is not
     /// encrypted: a tunnel by ssh is better.
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     host: IpAddr,

@@ -1135,7 +1135,7 @@ fn principled(material: &str) -> PrincipledParams {
     *params
 }
 
-/// A scene of one square with so many sets of texture coordinates, all different, and a material whose textures go by some:
+/// A scene of one square with this many sets of texture coordinates, all different, and a material whose textures go by some:
 /// base colour, roughness, normals, transmission and clearcoat.
 fn with_sets(count: usize, named: [usize; 5]) -> (SceneDesc, Vec<String>) {
     let mut parts = Parts::default();
@@ -1815,7 +1815,7 @@ fn grid() -> Vec<([f32; 3], [f32; 2], [u8; 4])> {
     (0..3).flat_map(|j| (0..4).map(move |i| at(i, j))).collect()
 }
 
-/// A file with a primitive in compressed data, which say so many indices.
+/// A file with a primitive in compressed data, which claims this many indices.
 fn compressed_by_draco(data: &[u8], indices: usize) -> (String, Vec<u8>) {
     let json = format!(
         r#"{{"asset":{{"version":"2.0"}},"extensionsUsed":["KHR_draco_mesh_compression"],

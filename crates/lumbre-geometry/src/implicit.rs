@@ -167,7 +167,7 @@ impl ImplicitSurface {
                 let size = |t: f64| self.along(ray, Interval::point(t)).value.middle().abs();
                 return if size(from) <= size(to) { from } else { to };
             }
-            // Newton's step from the middle converges sooner, where it stays in the piece.
+            // Newton's step from the middle converges faster where it stays in the piece.
             let here = self.along(ray, Interval::point(middle));
             let value = here.value.middle();
             if (value < 0.0) == begins_inside {

@@ -168,7 +168,7 @@ impl HitColumns {
         Some(hit(Winner { root, geometry, primitive: self.primitive[i] }, id, None))
     }
 
-    /// Makes room for the hits of so many rays, which are all misses until they are put.
+    /// Makes room for the hits of this many rays, which are misses until they are set.
     pub(crate) fn clear(&mut self, len: usize) {
         let Self { id, primitive, local: [u, v], t, geometry, whole } = self;
         whole.clear();

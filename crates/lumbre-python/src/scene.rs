@@ -472,7 +472,7 @@ fn transforms(places: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Transform>> {
 /// Between two looks at a render.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// How far a render is, for whoever looks.
+/// How far a render is, for observers.
 #[derive(Default)]
 struct Watch(Mutex<Option<State>>);
 

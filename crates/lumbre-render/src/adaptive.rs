@@ -52,7 +52,7 @@ impl Adaptive {
         self.trial.at(x, y)
     }
 
-    /// Whether a pixel is looked at with so many samples.
+    /// Whether a pixel is looked at with this many samples.
     fn is_looked_at(&self, taken: u32) -> bool {
         taken >= self.min_spp && (taken == self.min_spp || is_step(taken))
     }

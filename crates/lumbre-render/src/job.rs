@@ -26,15 +26,15 @@ use crate::{
 
 /// Pixels along the side of a tile.
 const TILE: u32 = 16;
-/// Samples of the longest pass, unless they are less than one part in so many of those that are done.
+/// Samples of the longest pass, unless they are less than this fraction of those that are done: one part in this many.
 const MAX_STEP: u32 = 16;
 const LONG: u32 = 64;
-/// The first pass goes over the picture in squares of so many pixels a side, one sample in each, and then in smaller ones, so that a
+/// The first pass goes over the picture in squares of this many pixels a side, one sample in each, and then in smaller ones, so that a
 /// render which is stopped in it is a whole picture, if a coarse one.
 const STRIDES: [u32; 7] = [256, 64, TILE, 8, 4, 2, 1];
 /// The clock does not stop a coarse picture of so few samples: a small picture in place of none.
 const UNSTOPPED: u64 = 8192;
-/// Samples of a wave, at most, where a clock or a pause may stop the render: so many take a few milliseconds.
+/// Samples of a wave, at most, where a clock or a pause may stop the render: they take a few milliseconds.
 const WAVE_BY_THE_CLOCK: usize = 1024;
 
 /// Renders a picture: stops when the options say so, or when `cancel` asks, and returns what there is.

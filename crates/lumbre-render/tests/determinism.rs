@@ -402,7 +402,7 @@ fn an_instanced_light_is_as_bright_as_a_plain_one_and_found_by_chance_where_it_i
     assert_close(light(&nested), light(&plain), 0.02, "nested");
 }
 
-/// White, of which the render is cancelled after so many samples.
+/// White, of which the render is cancelled after this many samples.
 #[derive(Debug)]
 struct Interrupting {
     cancel: CancelToken,

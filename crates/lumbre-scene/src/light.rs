@@ -97,7 +97,7 @@ pub struct LightPoint {
 }
 
 impl LightSample {
-    /// The same where directions are so many times as likely: the density grows by that, or the radiance of a delta light, which
+    /// The same where directions are more likely by this factor: the density grows by it, or the radiance of a delta light, which
     /// stands for its own division by it, shrinks.
     fn of_density(mut self, factor: f64) -> Self {
         match &mut self.scatter {

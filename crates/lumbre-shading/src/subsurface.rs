@@ -1,6 +1,6 @@
 //! Skin, wax, milk: a dielectric boundary around a dense medium, through which light wanders.
 //!
-//! Light enters as into glass. Inside, whoever follows it takes steps through the medium ([`SubsurfaceParams::medium`]); at the boundary it is
+//! Light enters as into glass. Inside, a path takes steps through the medium ([`SubsurfaceParams::medium`]); at the boundary it is
 //! reflected back as Fresnel has it ([`SubsurfaceParams::reflected_inside`]), or leaves. What leaves is spread as even light from below the
 //! boundary would be, whatever way it came: after many collisions it has forgotten that, and so lights of any size can be sampled from the
 //! boundary. H. W. Jensen, S. Marschner, M. Levoy, P. Hanrahan ("A Practical Model for Subsurface Light Transport", SIGGRAPH 2001) spread it

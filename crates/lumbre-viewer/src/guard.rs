@@ -2,7 +2,7 @@
 //!
 //! A browser sends cookies to every port of a host, so that there are none. The address that opens the viewer has a token behind its `#`,
 //! which browsers do not send; the page keeps what it becomes in the storage of its own origin, a port included. Over the socket neither
-//! is sent: each side proves to know it, by a keyed hash (BLAKE3) of random numbers of both. Whoever takes the port when the
+//! is sent: each side proves to know it, by a keyed hash (BLAKE3) of random numbers of both. Another program that takes the port when the
 //! viewer has ended learns nothing of use from a page that comes back.
 
 use std::collections::VecDeque;

@@ -1,4 +1,4 @@
-//! Where a viewer gets its scene from: whoever starts it says how files are read and pictures are set up.
+//! Where a viewer gets its scene from: its starter says how files are read and pictures are set up.
 
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};

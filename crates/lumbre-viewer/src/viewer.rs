@@ -16,7 +16,7 @@ use crate::worker::Worker;
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Options {
-    /// Where it listens; port 0 for any that is free. Whoever reaches another address than that of this machine itself can ask for its
+    /// Where it listens; port 0 for any that is free. Anyone who reaches an address other than the local one can ask for its
     /// page, though not see it without the token.
     pub address: SocketAddr,
     /// Other names under which browsers reach it, as `name:port`: those of a tunnel whose ends have different ports.

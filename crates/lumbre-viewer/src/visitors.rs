@@ -134,7 +134,7 @@ mod tests {
             visit
         };
         let guests: Vec<Visit> = (2..MAX_GUESTS).map(comes_in).collect();
-        assert!(!visitors.come().let_in(), "there are so many places");
+        assert!(!visitors.come().let_in(), "all places are taken");
         drop((guest, late, guests));
         assert_eq!(counted(), (0, 0));
     }

@@ -31,12 +31,12 @@ const FEATURE_SPP: u32 = 16;
 /// What is rendered next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Step {
-    /// A picture of pixels so many times as large, which is finished whatever comes, so that one sees something while the camera moves
+    /// A picture of larger pixels by this factor, which is always finished, so that there is a picture while the camera moves
     /// on and on.
     First(u32),
     /// The same, until something else is wanted.
     Coarse(u32),
-    /// The picture, until so many samples a pixel.
+    /// The picture, up to this many samples a pixel.
     Full(u32),
     /// Nothing.
     Done,

@@ -305,8 +305,7 @@ impl Scene {
     }
 
     /// Seconds that a sample of each pixel takes with these options, by rendering a small picture of the same view for a fraction of
-    /// a second. The first samples of all bring what is read for the first time into the processor's caches, so a long render is
-    /// rather sooner done than later.
+    /// a second. The first samples fill the processor's caches, so a long render takes a little less.
     ///
     /// # Errors
     /// As for [`Scene::render`].

@@ -12,7 +12,7 @@ use super::curve::{Point, geometric_mean, time_to_error};
 use super::plot::{Line, svg};
 use super::program::Kind;
 
-/// All programs on one scene with so many threads.
+/// All programs on one scene with this many threads.
 #[derive(Debug)]
 pub(crate) struct Heat {
     pub(crate) scene: &'static str,

@@ -105,7 +105,7 @@ pub struct Request {
     /// The language: English or Spanish.
     #[arg(long, value_enum, value_name = "LANGUAGE", default_value_t = Language::En)]
     pub lang: Language,
-    /// Tell the crossings of so many of the rays that follow, too.
+    /// Tell the crossings of this many of the rays that follow, too.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub depth: u32,
     /// The number of the sample: the radiance is that which a render adds to the pixel for it.

@@ -13,7 +13,7 @@ use crate::diagnostic::quoted;
 
 /// Texts are no longer than this.
 const LONGEST_TEXT: usize = 1 << 20;
-/// Numbers are printed with at most so many digits.
+/// Numbers are printed with at most this many digits.
 const MAX_DIGITS: f64 = 300.0;
 
 impl Parser<'_, '_> {

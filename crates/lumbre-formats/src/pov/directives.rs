@@ -162,7 +162,7 @@ impl Parser<'_, '_> {
         }
     }
 
-    /// Skips past so many `#end`s.
+    /// Skips past this many `#end`s.
     fn skip_to_end(&mut self, count: usize) -> Result<()> {
         for _ in 0..count {
             while &*self.skip(false)? != "end" {}

@@ -8,7 +8,7 @@ use lumbre_shading::pov::{Media, Phase, Pigment, Scattering};
 use super::value::Value;
 use super::{Parser, Result};
 
-/// A density is asked for at so many places along a ray at most.
+/// Places along a ray at which a density is evaluated, at most.
 const MAX_SAMPLES: f64 = 200.0;
 
 impl Parser<'_, '_> {

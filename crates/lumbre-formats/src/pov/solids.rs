@@ -328,7 +328,7 @@ impl Region {
     }
 }
 
-/// Of so many parts of an intersection the boxes are looked at.
+/// The boxes of at most this many parts of an intersection are considered.
 const MAX_BOUNDED: usize = 64;
 
 /// Whether the surfaces of a group are inside of its part of a number, or outside.

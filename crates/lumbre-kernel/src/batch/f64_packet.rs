@@ -262,7 +262,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
         }
     }
 
-    // Less for any hit, which a single ray has sooner, and for rays that start at different places, which soon part; more where
+    // Less for any hit, which a single ray finds faster, and for rays that start at different places, which soon part; more where
     // there is anything but triangles, which costs a single ray more.
     #[inline(always)]
     fn effort(has_one_origin: bool) -> WorkBudget {

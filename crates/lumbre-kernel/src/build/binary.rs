@@ -22,7 +22,7 @@ use crate::build::treelet;
 use crate::intersect::Isa;
 use crate::tree::Name;
 
-/// So many a fast build splits by SAH: leaves then are a tenth fuller, and nodes fewer, for a twentieth of its time.
+/// A fast build splits up to this many primitives by SAH: leaves are a tenth fuller, and nodes fewer, for a twentieth of its time.
 const FAST_FEW: usize = 48;
 /// From how many primitives on threads share the work.
 pub(crate) const PARALLEL: usize = 4096;
@@ -183,7 +183,7 @@ impl GrownTwig {
     }
 }
 
-/// The primitives in whose place so many names have room.
+/// Primitive slots needed to store this many ids.
 fn units_of_names(count: usize) -> usize {
     (count * size_of::<Name>()).div_ceil(size_of::<Primitive>())
 }
@@ -194,8 +194,7 @@ struct PackedTree<'p> {
     names: Vec<&'p [Name]>,
 }
 
-/// From how many packed primitives on the room that they leave is given back before more is asked for. In tests there are many
-/// sooner.
+/// From this many packed primitives on, the memory that they leave is freed before more is allocated. Lower in tests.
 const MANY: usize = if cfg!(test) { 1 << 13 } else { 1 << 20 };
 
 /// The primitives of a node of a twig, and as much room for those of its children.
@@ -239,7 +238,7 @@ struct Builder<'a> {
     traits: &'a [Traits],
     /// Levels of the tree whose nodes threads share. What comes out does not depend on it.
     shared: u32,
-    /// So many primitives, and fewer, are left to one thread.
+    /// Up to this many primitives are left to one thread.
     alone: usize,
 }
 
@@ -260,7 +259,7 @@ struct Tools<'w> {
 }
 
 impl Workplace {
-    /// For twigs of no more than so many primitives.
+    /// For subtrees of at most this many primitives.
     fn new(most: usize) -> Self {
         let names = vec![[0; 2]; most];
         // Packed primitives have somewhat fewer nodes as a rule; what grows takes twice its room for a moment.
@@ -270,8 +269,8 @@ impl Workplace {
 }
 
 impl Builder<'_> {
-    /// A tree of each rank of which there are primitives, none of which is packed: they come in the order of their ranks, so many of
-    /// each.
+    /// A tree of each rank that has primitives, none of which is packed. Primitives are in the order of their ranks; `counts` has the
+    /// number of each.
     fn trees_by_rank(
         &self,
         preset: Preset,

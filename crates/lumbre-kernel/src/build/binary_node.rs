@@ -112,7 +112,7 @@ impl Choices {
     }
 }
 
-/// The least cost of sharing so many children, and how many go to the left.
+/// The least cost of sharing this many children, and how many go to the left.
 #[inline(always)]
 fn share_freely(children: usize, left: &Costs, right: &Costs) -> (f32, usize) {
     let mut best = (f32::INFINITY, 1);
@@ -174,7 +174,7 @@ fn one_if_no_worse(mut costs: Costs, as_one: f32, choices: u32) -> (Costs, Choic
     (costs, Choices(choices | most_as_one << MAX_AS_ONE_AT))
 }
 
-/// The costs of putting leaves of so many instances: beside others where there is room for all, or else into a node of their own.
+/// The costs of leaves of this many instances: next to others where there is room for all, else in a node of their own.
 pub(super) fn costs_of_instances(count: usize, area: f32) -> Costs {
     std::array::from_fn(|children| if children < count { area } else { 0.0 })
 }

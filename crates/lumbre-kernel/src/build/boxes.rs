@@ -20,7 +20,7 @@ pub(crate) struct Boxes {
 }
 
 impl Boxes {
-    /// So many that are empty.
+    /// This many empty boxes.
     pub(crate) fn empty(count: usize) -> Self {
         Self { halves: fill(2 * count + 1, Half([Bounds::EMPTY_LANE; 4])), count }
     }
@@ -42,7 +42,7 @@ impl Boxes {
     }
 }
 
-/// Like `vec![value; count]`, by all threads where that is much: so many for each at least.
+/// Like `vec![value; count]`, by all threads where there are many: at least this many for each thread.
 pub(crate) fn fill<T: Clone + Send + Sync>(count: usize, value: T) -> Vec<T> {
     const LEAST: usize = 1 << 14;
     (0..count).into_par_iter().with_min_len(LEAST).map(|_| value.clone()).collect()

@@ -52,7 +52,7 @@ impl Packed {
         self.pack(isa, geometries, &followers, may_lack_area, |leaf| tag::blocks(leaf).start);
     }
 
-    /// Packs triangles behind each block of which so many follow, and turns the references in nodes to them. `number_of` tells the
+    /// Packs the triangles of each leaf into consecutive blocks, and turns the references in nodes to them. `number_of` tells the
     /// number of a leaf's first block.
     fn pack(
         &mut self,
@@ -575,7 +575,7 @@ mod tests {
         bounds
     }
 
-    /// The areas of the wide nodes that a subtree becomes by its choices, where it has room for so many children.
+    /// The areas of the wide nodes that a subtree becomes by its choices, where it has room for this many children.
     fn cost_by_choices(nodes: &[BinaryNode], room: usize) -> f64 {
         if nodes[0].names().is_some() {
             return 0.0;

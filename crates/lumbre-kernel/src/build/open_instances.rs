@@ -28,7 +28,7 @@ use crate::tree::packed::Entry;
 use crate::tree::packed::Start;
 use crate::tree::{Geometry, GeometryKind, Instance, Tree};
 
-/// How many leaves there may be more for each instance that stands still, and how many more for all: so many that a mean one may be opened once.
+/// Extra leaves allowed for each static instance, and for all: enough to open an average one once.
 const MORE: usize = 15;
 const MORE_FOR_ALL: usize = 64;
 /// Parts are to have no more of the area of the whole than this. Sixteen of a ball have some 0.8 of it.

@@ -61,20 +61,20 @@ impl LaneOrder {
     }
 }
 
-/// Of so many blocks, how many one thread takes at a time: all of a few hundred, which one thread built alone.
+/// Blocks per task, of this many; one task for a few hundred, which one thread builds alone.
 pub(crate) fn share_of(blocks: usize) -> usize {
     const FEW: usize = 640;
     if blocks > FEW { 64 } else { FEW }
 }
 
-/// Whether so many blocks share their vertices. A block that does not is faster, but five megabytes of them no longer stay in a cache.
+/// Whether this many blocks share their vertices. A block that does not is faster, but five megabytes of them no longer fit a cache.
 /// Tests have both.
 pub(crate) fn is_worth_sharing(blocks: usize) -> bool {
     const MAX_UNSHARED: usize = if cfg!(test) { 24 } else { 1 << 14 };
     blocks > MAX_UNSHARED
 }
 
-/// Packs the triangles with these names; each block is followed by so many of its leaf. Leaves out those without an area, and does
+/// Packs the triangles with these ids; `followers` says how many blocks of the same leaf follow each. Leaves out those without an area, and does
 /// not ask where there may be none.
 pub(crate) fn pack(
     isa: Isa,

@@ -151,7 +151,7 @@ impl Tree {
         self.nodes.iter().filter(|node| node.children[0] != NONE).map(|node| f64::from(node.area)).sum()
     }
 
-    /// So many rounds at most, up to the first that gains no more than `least`.
+    /// At most this many rounds, up to the first that gains no more than `least`.
     pub(crate) fn rounds(&mut self, most: usize, share: usize, least: f64) {
         for _ in 0..most {
             if self.round(share) <= least {
@@ -160,7 +160,7 @@ impl Tree {
         }
     }
 
-    /// Seeks places for one of so many nodes and moves; returns how much area was gained.
+    /// Seeks a better place for one in this many nodes and moves it; returns how much area was gained.
     pub(crate) fn round(&mut self, share: usize) -> f64 {
         self.moves(share).into_iter().map(f64::from).sum()
     }

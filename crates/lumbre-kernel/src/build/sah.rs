@@ -184,7 +184,7 @@ impl Bins {
         self.tallies[0].join(&other.tallies[0], MAX_BINS);
     }
 
-    /// Tallies primitives in so many rows.
+    /// Tallies primitives in this many rows.
     #[inline(always)]
     fn fill<const ROWS: usize, const COSTS: bool>(
         &mut self,

@@ -13,7 +13,7 @@ const NODE_COST: f32 = 16.0;
 /// What becomes of few primitives.
 pub(crate) enum SmallSplit {
     Leaf,
-    /// They were brought into order: so many go to the left.
+    /// They are in order: this many go to the left.
     Split(usize),
 }
 

@@ -16,7 +16,7 @@ use crate::build::reinsert::{self, NONE, Node, Tree};
 
 /// How many are opened. With a thousand, rays gain no more, and seeking takes four times as long.
 const OPENED: usize = 128;
-/// There are trees of so many primitives for one of them, or fewer of them; for too few primitives it is not tried.
+/// One upper node per this many primitives, or fewer; not tried for too few primitives.
 const PER_OPENED: usize = 128;
 const MIN_OPENED: usize = 64;
 /// How often places are sought at most.
@@ -59,12 +59,12 @@ fn sides(nodes: &[BinaryNode]) -> Option<[Range<usize>; 2]> {
     Some([1..right, right..nodes.len()])
 }
 
-/// Whether it is tried for so many primitives.
+/// Whether it is tried for this many primitives.
 pub(crate) fn is_tried(primitives: usize) -> bool {
     primitives >= MIN_OPENED * PER_OPENED
 }
 
-/// Reinserts the upper nodes of a tree over so many primitives, where that makes it much better.
+/// Reinserts the upper nodes of a tree over this many primitives, where that makes it much better.
 pub(crate) fn reinsert_upper(tree: Binary<'_>, primitives: usize) -> Binary<'_> {
     let mut upper = open(&tree, (primitives / PER_OPENED).min(OPENED));
     let children: Vec<_> = (0..upper.nodes.len() as u32).map(|place| upper.children(place)).collect();
@@ -74,7 +74,7 @@ pub(crate) fn reinsert_upper(tree: Binary<'_>, primitives: usize) -> Binary<'_> 
     over(&upper, 0, &mut cut(tree, &children))
 }
 
-/// The nodes of a tree of which so many are opened, if there are, the largest first and the earlier of equals.
+/// The nodes of a tree after opening this many, if there are, the largest first and the earlier of equals.
 fn open(tree: &Binary, count: usize) -> Tree {
     let mut pieces = vec![Piece::Tree(tree)];
     let mut upper = Tree { nodes: vec![Node::closed(tree.bounds(), NONE)] };

@@ -92,7 +92,7 @@ pub(crate) trait Simd {
         [three_of_two(&x, &other_x), three_of_two(&y, &other_y), three_of_two(&z, &other_z)]
     }
 
-    /// A bit for each triangle that the line of the ray may meet, among them all that it does, and what [`Edges::place`] wants to know.
+    /// A bit for each triangle that the line of the ray may meet, among them all that it does, and what [`Edges::place`] needs.
     #[inline(always)]
     fn intersect_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Edges<Self::F32x8>) {
         let (mask, edges) = Edges::of(Self::sheared_corners(block, ray), Self::F32x8::splat(ray.least_size));

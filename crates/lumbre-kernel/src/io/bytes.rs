@@ -51,7 +51,7 @@ pub enum LoadError {
     WrongLength {
         /// How many bytes there are.
         found: usize,
-        /// How many were expected; at least so many where they end within the header.
+        /// How many were expected; a lower bound where they end within the header.
         expected: usize,
     },
     /// The checksum is another: some bytes were changed.

@@ -25,7 +25,7 @@ struct Tally {
     sure: u32,
 }
 
-/// A block of triangles of about `size`, within `spread` of each other, at `center`, of whose corners about so many are
+/// A block of triangles of about `size`, within `spread` of each other, at `center`, of whose corners about this many are
 /// those of others; the last lane stays empty.
 fn block(random: &mut Random, shares: f64, center: DVec3, spread: f64, size: f64) -> Vec<Line> {
     let mut mesh = TriangleMesh { origin: DVec3::ZERO, positions: Vec::new(), indices: Vec::new() };

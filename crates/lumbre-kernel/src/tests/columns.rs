@@ -33,7 +33,7 @@ impl Rays {
         self.t_max.push(t_max);
     }
 
-    /// So many of them, from this one on.
+    /// `count` of them, from `first` on.
     fn columns(&self, first: usize, len: usize) -> RayColumns<'_> {
         RayColumns {
             origin: [0, 1, 2].map(|axis| &self.origin[axis][first..first + len]),

@@ -206,7 +206,7 @@ impl SphereRay {
         (spheres, length)
     }
 
-    /// Leaves out what is wholly outside the range of `t`, where there are so many units of space for each.
+    /// Leaves out what is wholly outside the range of `t`, at this many units of space for each.
     #[inline(always)]
     pub(crate) fn set_range(&mut self, length: f64, t_min: f64, t_max: f64) {
         let margin = f64::from(self.range_margin);

@@ -346,7 +346,7 @@ impl<'a> Blocks<'a> {
         followers
     }
 
-    /// Where every block begins, if they are such as [`pack`] makes of so many names.
+    /// Where every block begins, for blocks as [`pack`] makes them of this many ids.
     pub(crate) fn places(self, names: &[BlockIds]) -> Option<Vec<u32>> {
         let mut places = Vec::with_capacity(names.len());
         let (mut place, mut followers) = (0, 0);

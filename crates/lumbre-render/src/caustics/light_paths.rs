@@ -21,7 +21,7 @@ use crate::transport::interior::MediumStack;
 use crate::transport::{SampleNumbers, Sampler};
 use crate::wave::paths::{of_column, sides, to_column};
 
-/// Random numbers of a vertex of the first light path of a line; those of each further one follow after so many vertices.
+/// Random numbers of a vertex of the first light path of a line; those of each further one follow after this many vertices.
 const VERTICES_A_PATH: u32 = 1 << 10;
 /// Points on a line that light paths begin in, at most.
 const MAX_POINTS: u32 = 64;

@@ -16,7 +16,7 @@ use super::{ChordSampler, Photons, SAMPLES_A_PASS};
 /// The radius in which a vertex that the camera sees collects photons of the first pass, in widths of the footprint of a sample, which is
 /// a quarter of a pixel wide.
 const WIDTHS: f64 = 6.0;
-/// Vertices further along a path collect from so many times as far: they are not seen sharply.
+/// The factor on the radius for vertices further along a path, which are not seen sharply.
 const WIDER: f32 = 3.0;
 /// The least width in media, in typical ways: photons are first collected within an eightieth of one.
 const MIN_WIDTH_IN_MEDIUM: f64 = 1.0 / 512.0;

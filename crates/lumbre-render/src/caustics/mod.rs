@@ -1,6 +1,6 @@
 //! Photons for caustics: light that comes from lamps over mirrors and smooth glass, which paths from the camera hardly ever find.
 //!
-//! A pass of light paths belongs to a few samples of every pixel, and is a function of scene, options, seed and its number. Whoever needs a
+//! A pass of light paths belongs to a few samples of every pixel, and is a function of scene, options, seed and its number. Any thread that needs a
 //! pass first traces it; all who need it meanwhile help.
 
 mod light_paths;

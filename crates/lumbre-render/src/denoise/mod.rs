@@ -25,7 +25,7 @@ const MIN_GROUND: f32 = 1e-3;
 /// Columns and rows of the blocks that a picture is filtered in.
 const BLOCK: (usize, usize) = (256, 64);
 
-/// Bytes that the filter needs for a picture of so many pixels, on so many threads: the denoised picture, and for each thread the planes of
+/// Bytes that the filter needs for a picture of this many pixels, on this many threads: the denoised picture, and for each thread the planes of
 /// a block.
 pub(crate) fn memory_bytes(pixels: u64, threads: usize) -> u64 {
     // Colours, coverage by colour, alpha.
@@ -46,7 +46,7 @@ pub struct Denoised {
     pub coverage: Option<Image>,
 }
 
-/// Takes the noise out of a picture that was rendered with [`crate::RenderOptions::guides`], on so many threads, 0 for one a core; the
+/// Takes the noise out of a picture that was rendered with [`crate::RenderOptions::guides`], on this many threads, 0 for one a core; the
 /// pixels do not depend on it. `None` where there are no guides, and where there is no whole picture.
 ///
 /// Pixels whose samples all agree, and that look like no other, stay as they are. Coverage is filtered only where the ground catches

@@ -81,7 +81,7 @@ pub(super) fn layer<const UNDER: usize>(
 
 /// Pixels around one in which the other half says how bright it may be.
 const OUTLIER_RADIUS: usize = 5;
-/// A pixel of one half that is brighter than so many pixels of that neighbourhood in the other half is an outlier: a fifth of its
+/// A pixel of one half that is brighter than this many pixels of that neighbourhood in the other half is an outlier: a fifth of its
 /// 121 pixels.
 const OUTLIER: f32 = 24.0;
 /// Unless the other half has nearly as much beside it.
@@ -170,7 +170,7 @@ const SLOPE: usize = 3;
 /// that edges are none.
 fn slope_squared(plane: &[f32], (width, height): (usize, usize), i: usize) -> f32 {
     let (x, y) = (i % width, i / width);
-    // To one side, on which there are so many pixels, `step` apart.
+    // The slope to one side, which has `count` pixels, `step` apart.
     let to = |count: usize, step: isize| {
         let at = |k: usize| plane[i.wrapping_add_signed(step * k as isize)];
         let steps = (1..=SLOPE.min(count)).map(|k| (at(k) - at(k - 1)).abs());

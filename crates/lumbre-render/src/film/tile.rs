@@ -89,7 +89,7 @@ pub struct Extras {
     pub features: bool,
     /// By how much the coverage of each colour is another.
     pub tints: bool,
-    /// What a denoiser wants to know.
+    /// What the denoiser needs.
     pub guides: bool,
     /// What depths are measured in: a power of two above all of them.
     pub depth_unit: f64,
@@ -134,7 +134,7 @@ impl Tile {
         &self.sums.features
     }
 
-    /// What a denoiser wants to know of every pixel, row by row; empty where it is not wanted.
+    /// What the denoiser needs of every pixel, row by row; empty unless it was asked for.
     pub fn guides(&self) -> &[GuideSums] {
         &self.sums.guides
     }

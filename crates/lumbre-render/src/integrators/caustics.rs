@@ -20,7 +20,7 @@ pub struct Caustics {
 }
 
 impl Caustics {
-    /// An integrator of so many bounces.
+    /// An integrator with this many bounces at most.
     pub fn new(max_depth: u32, shading_normals: ShadingNormals) -> Self {
         Self { path: Path { shading_normals, ..Path::new(max_depth) }, passes: Passes::default() }
     }

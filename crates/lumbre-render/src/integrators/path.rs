@@ -35,7 +35,7 @@ pub struct Path {
 const ROULETTE_START: u32 = 5;
 
 impl Path {
-    /// A path tracer of so many bounces.
+    /// A path tracer with this many bounces at most.
     pub fn new(max_depth: u32) -> Self {
         Self {
             max_depth,

@@ -20,7 +20,7 @@ use crate::transport::{PrimaryHit, Record, SampleNumbers};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pov;
 
-/// Shadow rays look through at most so many surfaces.
+/// Surfaces that a shadow ray passes, at most.
 const MAX_SURFACES: u32 = 256;
 /// Hits nearer than this are no hits.
 const NEAR: f64 = 1e-4;
@@ -574,7 +574,7 @@ fn mean_of_grid(
     sum * 0.25
 }
 
-/// Where one of so many stands between 0 and 1; one alone in the middle.
+/// The position of one of several points between 0 and 1; a single one is in the middle.
 fn step(i: u32, count: u32) -> f64 {
     if count <= 1 { 0.5 } else { f64::from(i) / f64::from(count - 1) }
 }

@@ -48,7 +48,7 @@ struct Branch<'s> {
 type Scatterers<'a, 's> = SmallVec<[(f32, Vertex<'a, 's>); 2]>;
 
 impl Whitted {
-    /// A Whitted tracer that follows so many reflections, with one point on each light.
+    /// A Whitted tracer that follows this many reflections, with one point on each light.
     pub fn new(max_depth: u32) -> Self {
         Self { max_depth, light_samples: 1, sky: false, shading_normals: ShadingNormals::default() }
     }

@@ -34,7 +34,7 @@ pub struct ProjectionLight {
 const MIN_COSINE: f64 = 1e-3;
 
 impl ProjectionLight {
-    /// A picture whose shorter side is seen from the light under so many degrees. `None` for one that is black or empty.
+    /// A picture whose shorter side is seen from the light under this many degrees. `None` for one that is black or empty.
     pub(crate) fn new(
         world_from_light: Transform,
         intensity: Spectrum,

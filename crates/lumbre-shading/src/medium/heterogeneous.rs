@@ -528,7 +528,7 @@ impl Tentative<'_> {
         self.origin + t * self.direction
     }
 
-    /// Whether collisions were so many that the others are left out.
+    /// Whether the limit of collisions was reached.
     fn is_lost(&self) -> bool {
         self.count >= MAX_COLLISIONS
     }

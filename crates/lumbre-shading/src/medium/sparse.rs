@@ -90,14 +90,14 @@ impl SparseGrid {
         Ok(Self { index_from_medium, bounds, background, first, count, blocks, split, bricks })
     }
 
-    /// Bytes that a grid takes, of so many blocks within its bounds, of which some are split, and so many bricks of values.
+    /// Bytes that a grid takes, of this many blocks within its bounds, of which some are split, and this many bricks of values.
     pub fn memory_of(blocks: u64, split: u64, bricks: u64) -> u64 {
         let cells = blocks.saturating_add(split.saturating_mul((BLOCK * BLOCK * BLOCK) as u64));
         let bricks = bricks.saturating_mul(size_of::<[f32; 512]>() as u64);
         cells.saturating_mul(size_of::<Cell>() as u64).saturating_add(bricks)
     }
 
-    /// Makes room for so many blocks that are split, and bricks of values, so that the grid takes no more than
+    /// Makes room for this many blocks that are split, and bricks of values, so that the grid takes no more than
     /// [`SparseGrid::memory_of`] them.
     ///
     /// # Errors

@@ -297,7 +297,7 @@ fn truth(is: bool) -> f64 {
     if is { 1.0 } else { 0.0 }
 }
 
-/// A sum or a product has at most so many terms.
+/// A sum or a product has at most this many terms.
 const MAX_TERMS: f64 = 1e5;
 
 impl Code {

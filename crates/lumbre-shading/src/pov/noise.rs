@@ -61,7 +61,7 @@ impl Tables {
     }
 }
 
-/// Waves come from at most so many sources.
+/// Waves come from at most this many sources.
 const MAX_WAVES: usize = 256;
 
 fn hash_table() -> Vec<u16> {

@@ -12,7 +12,7 @@ use crate::transport::Record;
 
 /// Media are followed so far.
 const FAR: f64 = 1e7;
-/// Where a medium is not the same everywhere, it is asked for at so many places at least.
+/// Places at which a medium that varies is evaluated, at least.
 const MIN_SAMPLES: u32 = 30;
 /// Less light than this is not followed further.
 const FAINT: f32 = 1e-3;
