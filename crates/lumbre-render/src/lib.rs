@@ -1,14 +1,14 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![doc = include_str!("../README.md")]
 //!
-//! [`render()`] takes samples in waves of some thousand paths. An [`integrators::Integrator`] finds the light of each path;
-//! [`film`] turns samples into pixels and knows nothing of light transport.
+//! [`render()`] takes samples in waves of some thousand paths. An [`integrators::Integrator`] finds the light of each
+//! path; [`film`] turns samples into pixels and knows nothing of light transport.
 //!
 //! # Where a path travels
 //!
-//! A path is a row of numbers in columns (`wave/paths.rs`): its sample, where its ray starts (f64), direction, throughput,
-//! η², the density of its last choice, its bounces, its footprint (f32). Each bounce takes all paths of the wave through
-//! these stages:
+//! A path is a row of numbers in columns (`wave/paths.rs`): its sample, where its ray starts (f64), direction,
+//! throughput, η², the density of its last choice, its bounces, its footprint (f32). Each bounce takes all paths of the
+//! wave through these stages:
 //!
 //! | stage | file | what it does |
 //! |---|---|---|
@@ -23,13 +23,13 @@
 //! | shadows | `wave/shadows.rs` | how much of each light sample arrives: any hit, media, panes |
 //!
 //! All stages share `wave/setting.rs`. Triangles with uniform materials run in lanes, from the plain rows of
-//! `Scene::tables`. Textured materials are looked up one by one. Exact shapes, instances, solids and bump maps go one by
-//! one through `Scene::interaction`. Shading is written once over `R: Real` (`lumbre-simd`): one number, eight (AVX2) or
-//! sixteen (AVX-512), with the same bits. `InstructionSet::detect` chooses when a render begins; the environment variable
-//! `LUMBRE_SIMD` limits it.
+//! `Scene::tables`. Textured materials are looked up one by one. Exact shapes, instances, solids and bump maps go one
+//! by one through `Scene::interaction`. Shading is written once over `R: Real` (`lumbre-simd`): one number, eight
+//! (AVX2) or sixteen (AVX-512), with the same bits. `InstructionSet::detect` chooses when a render begins; the
+//! environment variable `LUMBRE_SIMD` limits it.
 //!
-//! Light paths of `caustics` begin on specular surfaces (`caustics/light_paths.rs`). Their photons are in a k-d tree for
-//! four samples of each pixel and are weighed against what camera paths find (`caustics/merging.rs`).
+//! Light paths of `caustics` begin on specular surfaces (`caustics/light_paths.rs`). Their photons are in a k-d tree
+//! for four samples of each pixel and are weighed against what camera paths find (`caustics/merging.rs`).
 //!
 //! `explain` runs the same stages on a wave of one path and reads the events off its columns (`wave/traced.rs`).
 //!
@@ -43,8 +43,8 @@
 //!   exact, so it is associative and commutative, and tiles, threads, ranges of samples, crops and the order of merges
 //!   cannot change a pixel. This costs under 2 % of the time (`docs/measurements/costs.md`). The denoiser's guides are
 //!   the exception: they are f32, in sample order, and cannot be merged.
-//! - [`RenderState`] is those sums and which samples they are of. `lumbre::Part` adds a hash of every file and option that
-//!   a sample depends on. A checkpoint, a part and a picture with its sums are the same thing.
+//! - [`RenderState`] is those sums and which samples they are of. `lumbre::Part` adds a hash of every file and option
+//!   that a sample depends on. A checkpoint, a part and a picture with its sums are the same thing.
 //! - A noise target looks at a pixel after fixed numbers of its own samples, together with a trial picture of the whole
 //!   film (`adaptive.rs`, `trial.rs`), so that a pixel stops at the same sample in every run.
 
