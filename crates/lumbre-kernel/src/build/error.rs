@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::tree::node::tag;
 
-/// Leaf entries and nodes are to have a place in a reference.
+/// Leaf entries and nodes must fit the index bits of a reference.
 pub(crate) const MAX_PRIMITIVES: usize = tag::PLACE as usize;
 
 /// Why a tree cannot be built.
@@ -25,8 +25,8 @@ pub enum BuildError {
         /// The vertex, sphere or primitive.
         element: usize,
     },
-    /// More primitives than a tree can name (2^28 - 1), or so many small leaves of triangles or of spheres that they fill
-    /// more than 2^25 blocks of eight.
+    /// More primitives than a tree can index (2^28 - 1), or more than 2^25 blocks of eight because of many small leaves
+    /// of triangles or of spheres.
     TooMany,
 }
 

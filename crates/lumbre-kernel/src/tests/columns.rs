@@ -271,7 +271,7 @@ fn check_leaving(random: &mut Random, accel: &Accel, rays: &Rays) -> usize {
 }
 
 #[test]
-fn columns_have_the_same_bits_for_any_cut_and_at_every_instruction_set() {
+fn columns_have_the_same_bits_for_any_cut_and_instructions() {
     let mut random = Random(71);
     let mut hits = 0;
     with_every_preset(|| {

@@ -182,7 +182,7 @@ fn masks_are_saved_and_stay_through_a_refit() {
 fn a_leaf_with_blocks_of_two_meshes_is_refused() {
     let accel = two_meshes();
     let mut tree = Packed { root: Some(0), ..Packed::default() };
-    tree.names = vec![BlockIds::empty(0), BlockIds::empty(1)].into();
+    tree.ids = vec![BlockIds::empty(0), BlockIds::empty(1)].into();
     let mut apart = Node::EMPTY;
     (apart.children[0], apart.children[1]) = (tag::triangles(0, 1), tag::triangles(1, 1));
     let mut together = Node::EMPTY;
