@@ -1,4 +1,4 @@
-//! The render itself: passes over samples, tiles over threads.
+//! The render loop: passes over samples, tiles over threads.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -26,24 +26,24 @@ use crate::{
 
 /// Pixels along the side of a tile.
 const TILE: u32 = 16;
-/// Samples of the longest pass, unless they are less than this fraction of those that are done: one part in this many.
+/// The longest pass has one sample in this many of those already taken, if that is more.
 const MAX_STEP: u32 = 16;
 const LONG: u32 = 64;
-/// The first pass goes over the picture in squares of this many pixels a side, one sample in each, and then in smaller ones, so that a
-/// render which is stopped in it is a whole picture, if a coarse one.
+/// The first pass takes one sample in each square of this many pixels a side, and then of smaller ones, so that an
+/// interrupted render is still a whole, coarse picture.
 const STRIDES: [u32; 7] = [256, 64, TILE, 8, 4, 2, 1];
-/// The clock does not stop a coarse picture of so few samples: a small picture in place of none.
+/// The clock never stops a coarse picture with fewer samples: a small picture is better than none.
 const UNSTOPPED: u64 = 8192;
-/// Samples of a wave, at most, where a clock or a pause may stop the render: they take a few milliseconds.
+/// Maximum samples of a wave if a clock or a pause may stop the render: a few milliseconds.
 const WAVE_BY_THE_CLOCK: usize = 1024;
 
-/// Renders a picture: stops when the options say so, or when `cancel` asks, and returns what there is.
+/// Renders a picture. It stops when the options say so or `cancel` is set, and returns the result so far.
 ///
-/// The pixels depend on the scene and the options alone; but which samples are taken before the clock or `cancel` stops
+/// The pixels depend only on the scene and the options; but which samples are taken before the clock or `cancel` stops
 /// a render depends on the machine.
 ///
 /// # Errors
-/// [`RenderError`] for options that make no picture, and where `progress` does not want it.
+/// [`RenderError`] for options that make no picture, and if `progress` rejects it.
 pub fn render(
     scene: &Scene,
     options: &RenderOptions,
@@ -53,7 +53,7 @@ pub fn render(
     render_with(scene, options, &*integrator(&options.integrator), progress, cancel)
 }
 
-/// [`render`] with an integrator of one's own; that of the options is not looked at.
+/// [`render`] with a custom integrator; that of the options is ignored.
 ///
 /// # Errors
 /// As [`render`].
@@ -67,11 +67,11 @@ pub fn render_with(
     Ok(render_from(scene, options, integrator, progress, cancel, None, None)?.0)
 }
 
-/// Who is handed the state of a render now and then.
+/// Receives the state of a render at intervals.
 pub struct CheckpointSink<'a> {
-    /// The time between two hand-overs.
+    /// The interval.
     pub every: Duration,
-    /// Told from one thread, while the others wait: it should not take long.
+    /// Called on one thread while the others wait: it should be quick.
     pub keep: &'a dyn Fn(RenderState),
 }
 
@@ -81,11 +81,11 @@ impl std::fmt::Debug for CheckpointSink<'_> {
     }
 }
 
-/// [`render_with`], going on from the state of the same render, and with the state that it comes to. The picture is that of a render
-/// without a break.
+/// [`render_with`], resumed from the state of the same render; also returns the final state. The picture is that of an
+/// uninterrupted render.
 ///
 /// # Errors
-/// As [`render`], and [`RenderError::OtherState`] where the state is of other pixels or samples, or has other sums.
+/// As [`render`], and [`RenderError::OtherState`] if the state has other pixels, samples or sums.
 pub fn render_from(
     scene: &Scene,
     options: &RenderOptions,
@@ -148,7 +148,7 @@ pub fn render_from(
     let least_wanted = |owners: &[TileState]| {
         owners.iter().filter_map(|owner| adaptive::least_wanted(&owner.tile, job.adaptive.as_ref())).min()
     };
-    // Of pixels that need more.
+    // Considers pixels that need more.
     let has = |owners: &[TileState], samples| least_wanted(owners).is_none_or(|least| least >= samples);
 
     let mut stride = None;
@@ -173,7 +173,7 @@ pub fn render_from(
             stride = Some(side);
         }
     }
-    // What an earlier run took was told by it.
+    // The earlier run has reported its own samples.
     let mut done = if before > 0 { least_wanted(&owners).unwrap_or(spp).min(spp) } else { 0 };
     while done < spp && stride == Some(1) {
         let end = next_count(done).min(spp);
@@ -189,7 +189,7 @@ pub fn render_from(
         }
         done = end;
         if job.must_stop() {
-            // What follows takes its time for a large picture.
+            // The rest takes time for a large picture.
             break;
         }
         let tiles = || owners.iter().map(|owner| &owner.tile);
@@ -239,7 +239,7 @@ fn least_taken(owners: &[TileState]) -> u32 {
     owners.iter().map(|owner| owner.tile.least_taken()).min().unwrap_or(0)
 }
 
-/// The number of samples at which a render next looks at its noise, and shows what there is: always the same, whatever came between.
+/// The sample count at which a render next checks its noise and shows its progress: the same after any interruptions.
 fn next_count(done: u32) -> u32 {
     if done < MAX_STEP {
         return (done + 1).next_power_of_two();
@@ -263,7 +263,7 @@ fn depth_unit(scene: &Scene, view: &View) -> f64 {
     if unit.is_normal() { unit } else { 1.0 }
 }
 
-/// The owners of the tiles of a state.
+/// The owners of a state's tiles.
 fn owners_of(
     state: RenderState,
     bounds: PixelBounds,
@@ -279,7 +279,7 @@ fn owners_of(
         return Err(RenderError::OtherState);
     }
     let places = bounds.tiles(TILE);
-    // Those of a render that goes on in the same program are not copied: there may be gigabytes.
+    // Tiles of a render that continues in the same process are moved, not copied: they may take gigabytes.
     let are_in_place = state.tiles.iter().map(Tile::bounds).eq(places.iter().copied());
     let tiles = if are_in_place { state.tiles } else { placed(state.tiles, &places, extras) };
     let mut owners: Vec<TileState> = tiles.into_iter().map(TileState::new).collect();
@@ -290,7 +290,8 @@ fn owners_of(
     Ok(owners)
 }
 
-/// The sums of some tiles in others, which are in rows from above. The first are dropped as soon as all is taken from them.
+/// Moves the sums of tiles into others, which are in rows from above. Each source is dropped as soon as everything is
+/// taken from it.
 fn placed(tiles: Vec<Tile>, places: &[PixelBounds], extras: Extras) -> Vec<Tile> {
     let mut rest = tiles;
     let mut above = 0;
@@ -306,7 +307,7 @@ fn placed(tiles: Vec<Tile>, places: &[PixelBounds], extras: Extras) -> Vec<Tile>
     places.iter().map(take).collect()
 }
 
-/// What the owners gathered.
+/// The state of all tiles.
 fn state_of(owners: Vec<TileState>, bounds: PixelBounds, options: &RenderOptions) -> RenderState {
     let mut rays = RayCounts::default();
     let mut first_dropped: Vec<DroppedSample> = Vec::new();
@@ -329,7 +330,7 @@ fn state_of(owners: Vec<TileState>, bounds: PixelBounds, options: &RenderOptions
     }
 }
 
-/// The tiles, in each of which every pixel that has no sample has that of its square of `side` by `side` pixels.
+/// The tiles; each pixel without a sample has that of its square of `side` by `side` pixels.
 fn spread(owners: &[TileState], bounds: PixelBounds, side: u32) -> Vec<Tile> {
     let columns = bounds.width().div_ceil(TILE) as usize;
     let mut tiles: Vec<Tile> = owners.iter().map(|owner| owner.tile.clone()).collect();
@@ -345,22 +346,22 @@ fn spread(owners: &[TileState], bounds: PixelBounds, side: u32) -> Vec<Tile> {
     tiles
 }
 
-/// What every tile needs and none changes.
+/// Shared, constant data of all tiles.
 struct Job<'a> {
     options: &'a RenderOptions,
     taker: PixelSampler<'a>,
     pixels: u64,
-    /// When pixels have enough, if not at the number of samples alone.
+    /// When a pixel has enough samples; `None` to take the same number everywhere.
     adaptive: Option<Adaptive>,
     deadline: Option<Instant>,
     cancel: &'a CancelToken,
     pause: Option<Pause>,
     clock: Clock<'a>,
-    /// Columns for those who take samples, one for each thread.
+    /// Columns for sampling threads, one for each.
     waves: Mutex<Vec<Wave<'a>>>,
 }
 
-/// When all threads pause next, to hand over what they have.
+/// The next pause of all threads, to save the state.
 struct Pause {
     start: Instant,
     every: Duration,
@@ -385,13 +386,13 @@ impl Pause {
     }
 }
 
-/// A tile and what its one owner counts.
+/// A tile and its owner's counters.
 #[derive(Clone)]
 struct TileState {
     tile: Tile,
     /// The side of the smallest squares that the first pass has done.
     next_side: u32,
-    /// Whether it has taken a sample since it last stopped.
+    /// Whether it has taken a sample since the last pause.
     has_worked: bool,
     record: Record,
     dropped: u64,
@@ -414,7 +415,8 @@ impl TileState {
 }
 
 impl Job<'_> {
-    /// Whether the squares of this side must stop. The clock does not stop the first, and no few: see [`UNSTOPPED`].
+    /// Whether the squares of this side must stop. The clock stops neither the first squares nor few samples: see
+    /// [`UNSTOPPED`].
     fn must_stop_at(&self, side: u32) -> bool {
         let count = self.pixels.div_ceil(u64::from(side) * u64::from(side));
         if side == STRIDES[0] || count <= UNSTOPPED { self.cancel.is_cancelled() } else { self.must_stop() }
@@ -428,8 +430,8 @@ impl Job<'_> {
         self.pause.as_ref().is_some_and(Pause::is_due)
     }
 
-    /// Takes the first sample of the first pixel of each square of `side` by `side` pixels, counted from the corner of the picture,
-    /// that is in the tile, unless it was taken for the squares of the last side.
+    /// Takes the first sample of the first pixel of each square of `side` by `side` pixels in the tile, counted from
+    /// the corner of the picture, unless the last side's squares have it.
     fn run_coarsely(&self, owner: &mut TileState, corner: (u32, u32), side: u32, last: Option<u32>) {
         let starts = |x: u32, y: u32, side: u32| {
             (x - corner.0).is_multiple_of(side) && (y - corner.1).is_multiple_of(side)
@@ -440,8 +442,8 @@ impl Job<'_> {
         }
     }
 
-    /// Takes the samples of every pixel of a tile up to this number, in waves of some samples of all pixels, so that a tile which is stopped
-    /// has all of one sample before it has any of the next.
+    /// Takes the samples of every pixel of a tile up to this number. A wave takes the same sample numbers of all
+    /// pixels, so that an interrupted tile has all of one sample before any of the next.
     fn run(&self, owner: &mut TileState, end: u32) {
         let may_stop = self.deadline.is_some() || self.pause.is_some();
         let most = if may_stop { WAVE_BY_THE_CLOCK } else { WAVE };
@@ -460,7 +462,7 @@ impl Job<'_> {
         }
     }
 
-    /// Takes samples of those pixels of a tile that have none of these numbers yet and need them; false where it had to stop before.
+    /// Takes these sample numbers in the pixels of a tile that lack and need them; false if it had to stop first.
     fn take(
         &self,
         owner: &mut TileState,
@@ -482,7 +484,7 @@ impl Job<'_> {
         if ids.is_empty() {
             return true;
         }
-        // However short the time between two pauses, some work is done.
+        // Makes progress even if pauses are frequent.
         if must_stop() || (owner.has_worked && self.is_paused()) {
             owner.has_worked = false;
             return false;

@@ -54,11 +54,11 @@ pub struct Sample {
     pub radiance: Rgb,
     /// How much of what is behind it covers, of each colour; the radiance is multiplied by it.
     pub coverage: Rgb,
-    /// What it counts: the weight of the filter.
+    /// The filter weight.
     pub weight: f64,
-    /// What it met first, if features are wanted and it met anything.
+    /// The first hit, if features are requested and there is one.
     pub features: Option<FeatureSample>,
-    /// Whether it is of ground that catches shadows.
+    /// Whether it is of a shadow catcher.
     pub on_catcher: bool,
 }
 
@@ -82,16 +82,16 @@ struct TileSums {
     guides: Vec<GuideSums>,
 }
 
-/// What is wanted of samples besides the colour of pixels and their coverage.
+/// What to record of samples in addition to colour and coverage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extras {
-    /// What the samples met first.
+    /// The first hits of the samples.
     pub features: bool,
-    /// By how much the coverage of each colour is another.
+    /// Per-channel coverage minus that of green.
     pub tints: bool,
     /// What the denoiser needs.
     pub guides: bool,
-    /// What depths are measured in: a power of two above all of them.
+    /// The unit of depths: a power of two above all of them.
     pub depth_unit: f64,
 }
 
@@ -139,7 +139,7 @@ impl Tile {
         &self.sums.guides
     }
 
-    /// By how much the coverage of each colour is another, row by row; empty where it is not wanted.
+    /// Per-channel coverage minus that of green, row by row; empty unless requested.
     pub fn tints(&self) -> &[Tint] {
         &self.sums.tints
     }

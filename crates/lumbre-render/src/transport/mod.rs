@@ -1,4 +1,4 @@
-//! What light transport is made of: random numbers, the solids around a path, what happens along one. No threads, no files, no clock.
+//! The parts of light transport: random numbers, the solids around a path, the journal. No threads, no files, no clock.
 
 mod counts;
 pub(crate) mod direct;

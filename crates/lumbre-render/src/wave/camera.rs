@@ -1,4 +1,4 @@
-//! The first stage: where samples are on the film, and their rays from the camera.
+//! The first stage: sample positions on the film, and camera rays.
 
 use lumbre_scene::{Pinhole, SamplerKind};
 use lumbre_simd::{Double, Job, Real, UInt, V3};
@@ -7,10 +7,10 @@ use crate::transport::sampler::LaneNumbers;
 use crate::wave::flat::{put3, put64};
 use crate::wave::paths::{Paths, Slots, grow};
 
-/// The numbers that aim samples, and the points of the film that they aim at, in columns.
+/// The random numbers that aim samples, and the resulting film points, in columns.
 #[derive(Debug, Default)]
 pub(crate) struct Aims {
-    /// See [`crate::transport::Draw::aim`].
+    /// See [`crate::transport::SampleNumbers::aim`].
     numbers: [Vec<f32>; 4],
     /// In pixels.
     pub(crate) film: [Vec<f64>; 2],
@@ -28,7 +28,7 @@ impl Aims {
     }
 }
 
-/// Makes the numbers that aim samples.
+/// Computes the numbers that aim samples.
 pub(crate) struct AimNumbers<'a, 's> {
     pub(crate) kind: SamplerKind,
     pub(crate) slots: &'a Slots<'s>,
@@ -58,10 +58,10 @@ impl Job for AimNumbers<'_, '_> {
     }
 }
 
-/// Sends rays through the points of the film.
+/// Computes rays through the film points.
 pub(crate) struct PinholeRays<'a, 's> {
     pub(crate) pinhole: &'a Pinhole,
-    /// How far away the neighbours are that give footprints, in pixels; `None` for rays without.
+    /// Distance of the neighbours that define footprints, in pixels; `None` for rays without.
     pub(crate) spacing: Option<f64>,
     pub(crate) film: &'a [Vec<f64>; 2],
     pub(crate) slots: &'a mut Slots<'s>,

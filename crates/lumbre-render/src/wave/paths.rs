@@ -10,17 +10,17 @@ use lumbre_simd::{Double, Mask, Real, UInt, V3};
 use crate::transport::interior::MediumStack;
 use crate::transport::{SampleNumbers, Sampler};
 
-/// Lanes beyond the last that a column has room for: a store writes whole vectors.
+/// Padding of columns: a store writes whole vectors.
 pub(crate) const PAD: usize = 16;
 
-/// Makes a column hold `len` numbers, and a vector more.
+/// Resizes a column to `len` numbers plus one vector.
 pub(crate) fn grow<T: Default + Clone>(column: &mut Vec<T>, len: usize) {
     if column.len() < len + PAD {
         column.resize(len + PAD, T::default());
     }
 }
 
-/// A medium in a column: its index, or this for a vacuum.
+/// The medium index that means vacuum.
 const VACUUM: u32 = u32::MAX;
 
 pub(crate) fn to_column(medium: Option<MediumId>) -> u32 {
@@ -31,7 +31,8 @@ pub(crate) fn of_column(medium: u32) -> Option<MediumId> {
     (medium != VACUUM).then_some(MediumId(medium))
 }
 
-/// The media where a path comes from and behind the surface that it met, as columns keep them, inside of `around` before.
+/// The media on both sides of a surface, as columns store them: where the path comes from and behind. `around` is the
+/// medium before.
 pub(crate) fn sides(boundary: Option<Boundary>, front: bool, around: u32) -> [u32; 2] {
     match boundary {
         None => [around; 2],
@@ -51,41 +52,41 @@ pub(crate) struct SampleId {
     pub(crate) index: u32,
 }
 
-/// What belongs to a sample for as long as its path goes on.
+/// The data of a sample that lasts as long as its path.
 #[derive(Debug, Default)]
 pub(crate) struct Slots<'s> {
     /// How many samples there are.
     pub(crate) len: usize,
-    /// What random numbers are made of: the sampler's kind, words of the pixel, and the number of the sample.
+    /// The inputs of its random numbers: the sampler's kind, words of the pixel, and the number of the sample.
     kind: SamplerKind,
     pub(crate) pixel: [Vec<u32>; 2],
     pub(crate) index: Vec<u32>,
-    /// When its rays look.
+    /// The time of its rays.
     pub(crate) time: Vec<f64>,
-    /// The footprints of rays from the camera; none in a scene without textures.
+    /// The footprints of camera rays; empty in a scene without textures.
     pub(crate) footprints: Vec<Footprint>,
-    /// Whether they are those of rays from one point, with these directions to the right and below.
+    /// Whether these are footprints of rays from one point, with these directions to the right and below.
     pub(crate) has_neighbours: bool,
     pub(crate) neighbours: [[Vec<f64>; 3]; 2],
     /// The light that the path has found.
     pub(crate) radiance: Vec<Spectrum>,
-    /// The solids that it is inside of; empty in a scene without solids.
+    /// The solids around the path; empty in a scene without solids.
     pub(crate) interiors: Vec<MediumStack<'s>>,
-    /// The medium around, as [`of_column`] reads it; empty in a scene without media.
+    /// The medium around the path, as [`of_column`] reads it; empty in a scene without media.
     pub(crate) medium: Vec<u32>,
-    /// The wavelengths that channels are; none in RGB.
+    /// The wavelengths of the channels; empty in RGB.
     pub(crate) wavelengths: Vec<Wavelengths>,
-    /// Whether the hero wavelength goes on alone, once it was bent by an index of its own; none in RGB.
+    /// Whether only the hero wavelength continues, after a refraction by its own index; empty in RGB.
     pub(crate) is_alone: Vec<bool>,
-    /// Distances sampled in media, and collisions inside solids.
+    /// Number of distances sampled in media, and of collisions inside solids.
     pub(crate) distance_samples: Vec<u32>,
     pub(crate) collisions: Vec<u32>,
-    /// The radius in which photons are collected, per width of a footprint; only where there are photons.
+    /// The radius in which photons are collected, per width of a footprint; empty without photons.
     pub(crate) widths: Vec<f32>,
 }
 
 impl Slots<'_> {
-    /// Forgets all samples, and takes up others.
+    /// Replaces all samples.
     pub(crate) fn start(&mut self, sampler: &Sampler, ids: &[SampleId]) {
         (self.len, self.kind) = (ids.len(), sampler.kind());
         self.pixel.iter_mut().chain([&mut self.index]).for_each(|column| grow(column, ids.len()));
@@ -106,7 +107,7 @@ impl Slots<'_> {
         self.widths.clear();
     }
 
-    /// Gives all samples wavelengths, by a number of each.
+    /// Chooses the wavelengths of all samples by a number each.
     pub(crate) fn choose_wavelengths(&mut self, numbers: &[f32]) {
         self.wavelengths.extend(numbers[..self.len].iter().map(|&u| Wavelengths::visible(u)));
         self.is_alone.resize(self.len, false);
@@ -126,13 +127,13 @@ impl Slots<'_> {
         self.distance_samples.resize(self.len, 0);
     }
 
-    /// The random numbers of a sample, for code that takes one path at a time.
+    /// The random numbers of a sample, for code that handles one path at a time.
     #[inline]
     pub(crate) fn draw(&self, slot: usize) -> SampleNumbers {
         SampleNumbers::new(self.kind, [self.pixel[0][slot], self.pixel[1][slot]], self.index[slot])
     }
 
-    /// The footprint of the ray from the camera of a sample, which starts at `origin`.
+    /// The footprint of a sample's camera ray, which starts at `origin`.
     pub(crate) fn footprint(&self, slot: usize, origin: DVec3) -> Footprint {
         if !self.has_neighbours {
             return self.footprints.get(slot).copied().unwrap_or_default();
@@ -141,7 +142,7 @@ impl Slots<'_> {
         Footprint::Neighbours { x_origin: origin, x_direction, y_origin: origin, y_direction }
     }
 
-    /// What colours are to a sample; `None` in RGB.
+    /// How a sample looks up spectra; `None` in RGB.
     pub(crate) fn spectral(&self, slot: usize) -> Option<SpectralLookup> {
         let wavelengths = *self.wavelengths.get(slot)?;
         Some(SpectralLookup { wavelengths, is_unbounded: false })
@@ -153,44 +154,44 @@ fn at(columns: &[Vec<f64>; 3], at: usize) -> DVec3 {
     DVec3::new(columns[0][at], columns[1][at], columns[2][at])
 }
 
-/// Gives a list this many equal entries.
+/// Fills a list with `len` copies of a value.
 fn fill<T: Clone>(column: &mut Vec<T>, len: usize, value: T) {
     column.clear();
     column.resize(len, value);
 }
 
-/// Paths on their way, each with the ray that it follows next.
+/// The active paths, each with its next ray.
 #[derive(Debug, Default)]
 pub(crate) struct Paths {
     pub(crate) len: usize,
-    /// Whose path it is: a position in [`Slots`].
+    /// The sample of the path: an index into [`Slots`].
     pub(crate) slot: Vec<u32>,
-    /// Where the ray starts; lights were sampled from there, too.
+    /// The origin of the ray, from which lights were sampled too.
     pub(crate) origin: [Vec<f64>; 3],
-    /// The normal there that lights were sampled for: see [`lumbre_scene::light::lanes::Receiver`].
+    /// The normal at the origin for which lights were sampled: see [`lumbre_scene::light::lanes::Receiver`].
     pub(crate) receiver: [Vec<f32>; 3],
     /// Unit.
     pub(crate) direction: [Vec<f32>; 3],
     pub(crate) throughput: [Vec<f32>; 3],
-    /// What refraction did to the throughput alone: it comes back when the path leaves again.
+    /// The factor of refraction in the throughput, which is undone when the path leaves again.
     pub(crate) eta_scale: Vec<f32>,
-    /// The density with which the direction was chosen; infinite where it was the only one.
+    /// The density of the chosen direction; infinite if it was the only one.
     pub(crate) pdf: Vec<f32>,
-    /// For light that is found behind specular surfaces: the density with which the direction before them was chosen, over the number of
-    /// lines of a pass and the area in which photons are collected there (the volume, per length, in a medium). Infinite where photons do not
-    /// bring that light.
+    /// For light found behind specular surfaces: the density of the direction before them, divided by the number of
+    /// lines of a pass and by the area (in a medium: volume, per length) in which photons are collected there. Infinite
+    /// if photons do not find that light.
     pub(crate) merging: Vec<f32>,
     /// Bounces off surfaces, and [`SCATTERED`].
     pub(crate) depth: Vec<u32>,
-    /// The width of the footprint where the ray starts, and its growth with distance: see [`lumbre_scene::Footprint::Cone`].
+    /// The width of the footprint at the origin, and its growth with distance: see [`lumbre_scene::Footprint::Cone`].
     pub(crate) width: Vec<f32>,
     pub(crate) spread: Vec<f32>,
 }
 
-/// The bit of [`Paths::depth`] that says that the path has scattered otherwise than by mirrors and smooth glass.
+/// The bit of [`Paths::depth`] set once the path has had a non-specular bounce.
 pub(crate) const SCATTERED: u32 = 1 << 31;
 
-/// What a path takes along from a vertex.
+/// What a path keeps from a vertex.
 #[derive(Clone, Copy)]
 pub(crate) struct Departure<R: Real> {
     pub(crate) slot: R::UInt,
@@ -222,10 +223,10 @@ pub(crate) struct OnePath {
     pub(crate) spread: f32,
 }
 
-/// Where a medium scatters a path.
+/// A collision of a path in a medium.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Collision {
-    /// The position of the path.
+    /// The index of the path.
     pub(crate) path: u32,
     pub(crate) point: DVec3,
     pub(crate) medium: MediumId,
@@ -234,7 +235,7 @@ pub(crate) struct Collision {
 }
 
 impl Paths {
-    /// Drops all paths, and starts one from each of `len` samples, whose rays are still to be given.
+    /// Replaces all paths by one from each of `len` samples, whose rays the caller sets.
     pub(crate) fn start(&mut self, len: usize) {
         self.reserve(len);
         self.len = len;
@@ -249,13 +250,13 @@ impl Paths {
         self.spread[..len].fill(0.0);
     }
 
-    /// Appends a path, for which there is room.
+    /// Appends a path; the columns must have been reserved.
     pub(crate) fn push_one(&mut self, path: &OnePath) {
         self.put(self.len, path);
         self.len += 1;
     }
 
-    /// Drops the paths at some positions, which ascend.
+    /// Removes the paths at these ascending indices.
     pub(crate) fn remove(&mut self, positions: &[u32]) {
         let mut positions = positions.iter().peekable();
         let mut kept = 0;
@@ -319,7 +320,7 @@ impl Paths {
         self.spread[at] = path.spread;
     }
 
-    /// Makes room for `len` paths.
+    /// Reserves `len` paths.
     pub(crate) fn reserve(&mut self, len: usize) {
         grow(&mut self.slot, len);
         self.origin.iter_mut().for_each(|column| grow(column, len));
@@ -359,7 +360,7 @@ impl Paths {
         self.len += mask.count();
     }
 
-    /// The ray that a path follows next.
+    /// The next ray of a path.
     pub(crate) fn ray(&self, path: usize, time: f64) -> Ray {
         Ray::new(self.origin(path), self.direction(path).as_dvec3()).at_time(time)
     }

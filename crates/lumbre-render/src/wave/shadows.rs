@@ -1,4 +1,4 @@
-//! Segments between vertices and lights: what light would come, unless something is in its way.
+//! Shadow segments between vertices and lights, with the light that they bring if unoccluded.
 
 use lumbre_geometry::Ray;
 use lumbre_kernel::RayColumns;
@@ -21,26 +21,26 @@ pub(crate) struct Shadows<'s> {
     pub(crate) origin: [Vec<f64>; 3],
     /// To the light, or, where [`Shadows::end`] is infinite, the unit direction of one that is infinitely far away.
     pub(crate) way: [Vec<f64>; 3],
-    /// Where along the way a segment ends.
+    /// The end of a segment along its way.
     pub(crate) end: Vec<f64>,
-    /// What the path receives where nothing is in the way.
+    /// What the path receives if the segment is unoccluded.
     pub(crate) light: [Vec<f32>; 3],
-    /// The medium that a segment begins in, as [`of_column`] reads it; only in a scene with media.
+    /// The medium at the start of a segment, as [`of_column`] reads it; empty in a scene without media.
     pub(crate) medium: Vec<u32>,
-    /// First parts of segments.
+    /// First legs of segments.
     pub(crate) legs: Vec<Leg>,
-    /// Segments that panes let through.
+    /// Segments that pass through panes.
     pub(crate) panes: Vec<Pane<'s>>,
     rays: Vec<Ray>,
-    /// The way and the end, rounded, for rays in single precision.
+    /// The way and the end, rounded for rays in single precision.
     direction: [Vec<f32>; 3],
     t_max: Vec<f32>,
     times: Vec<f64>,
-    /// Whether something is in the way of each, once it was searched for.
+    /// Whether each segment is occluded, after the search.
     pub(crate) blocked: Vec<bool>,
 }
 
-/// A segment that goes straight on through panes.
+/// A segment straight through panes.
 #[derive(Clone, Debug)]
 pub(crate) struct Pane<'s> {
     pub(crate) segment: u32,
@@ -70,11 +70,11 @@ pub(crate) struct OneSegment {
     pub(crate) medium: u32,
 }
 
-/// The part of a way to a point that a segment goes: allows for the rounding of its direction and of `t`.
+/// The fraction of the way to a point that a segment covers: allows for rounding of its direction and of `t`.
 pub(crate) const NEARLY_WHOLE: f64 = 1.0 - 1.0 / (1_u64 << 40) as f64;
 
 impl<'s> Shadows<'s> {
-    /// Forgets all, with room for `len` segments.
+    /// Clears the columns and reserves `len` segments.
     pub(crate) fn reset(&mut self, len: usize) {
         self.len = 0;
         self.legs.clear();
@@ -87,7 +87,7 @@ impl<'s> Shadows<'s> {
         grow(&mut self.medium, len);
     }
 
-    /// Appends a segment, for which there is room.
+    /// Appends a segment; the columns must have been reserved.
     pub(crate) fn push_one(&mut self, segment: &OneSegment) {
         let at = self.len;
         self.len += 1;
@@ -125,7 +125,7 @@ impl<'s> Shadows<'s> {
         self.len += mask.count();
     }
 
-    /// What a segment brings where nothing is in its way.
+    /// What a segment brings if unoccluded.
     pub(crate) fn light(&self, segment: usize) -> Spectrum {
         Spectrum::new(self.light[0][segment], self.light[1][segment], self.light[2][segment])
     }
@@ -138,7 +138,7 @@ impl<'s> Shadows<'s> {
         Ray::new(at(&self.origin), at(&self.way)).with_range(0.0, self.end[segment]).at_time(time)
     }
 
-    /// Gives each path the light that comes through, and tells of each segment what share that is.
+    /// Adds to each path the light that arrives, and reports the unoccluded share of each segment.
     pub(crate) fn resolve(
         &mut self,
         setting: &Setting<'s>,
@@ -190,7 +190,7 @@ impl<'s> Shadows<'s> {
         self.panes = panes;
     }
 
-    /// Finds whether something is in the way of each segment.
+    /// Tests whether each segment is occluded.
     pub(crate) fn search(&mut self, scene: &Scene, is_single: bool, slots: &Slots<'_>) {
         let len = self.len;
         let time = |slot: &u32| slots.time[*slot as usize];

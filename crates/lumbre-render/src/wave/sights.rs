@@ -15,19 +15,19 @@ use crate::wave::paths::{Paths, SampleId, Slots};
 use crate::wave::setting::Setting;
 use crate::wave::{Precision, Wave};
 
-/// Samples whose rays from the camera have met what they meet first. An integrator gives each its radiance.
+/// Samples whose camera rays have found their first hits. An integrator gives each its radiance.
 #[derive(Debug)]
 pub struct PrimaryHits<'a, 's> {
     scene: &'s Scene,
     view: &'a View,
     wave: &'a mut Wave<'s>,
     precision: Precision,
-    /// What the integrator is asked for, as slots.
+    /// The slots that the integrator has to compute.
     wanted: Vec<u32>,
 }
 
 impl<'a, 's> PrimaryHits<'a, 's> {
-    /// Takes up some samples, whose rays from the camera are still to be given.
+    /// Starts samples, whose camera rays the caller sets.
     pub(crate) fn start(
         scene: &'s Scene,
         view: &'a View,
@@ -59,22 +59,22 @@ impl<'a, 's> PrimaryHits<'a, 's> {
         self.wave.aims.numbers(slot)
     }
 
-    /// Sets the point of the film that a sample aims at, and when it looks.
+    /// Sets the film point and the time of a sample.
     pub(crate) fn set_film(&mut self, slot: usize, film: DVec2, time: f64) {
         [self.wave.aims.film[0][slot], self.wave.aims.film[1][slot]] = film.to_array();
         self.wave.slots.time[slot] = time;
     }
 
-    /// Sends a ray through the point of the film of every sample, with footprints to neighbours so far away, in pixels.
+    /// Sets the camera rays through all film points, with footprints from neighbours at this distance, in pixels.
     pub(crate) fn look_through(&mut self, pinhole: &Pinhole, spacing: Option<f64>) {
         let Wave { aims, slots, paths, .. } = &mut *self.wave;
         InstructionSet::detect().run(PinholeRays { pinhole, spacing, film: &aims.film, slots, paths });
     }
 
-    /// Sets the ray from the camera of a sample. All samples before it have theirs.
+    /// Sets the camera ray of a sample. Earlier samples must have theirs.
     pub(crate) fn set_ray(&mut self, slot: usize, camera: &CameraRay) {
         let CameraRay { mut ray, footprint, .. } = *camera;
-        // Paths keep directions in single precision: all that is told of the ray is told of that one.
+        // Paths store directions in single precision, so all facts of the ray use the rounded direction.
         let direction = ray.direction.as_vec3();
         ray.direction = direction.as_dvec3();
         let Wave { slots, paths, .. } = &mut *self.wave;
@@ -83,7 +83,7 @@ impl<'a, 's> PrimaryHits<'a, 's> {
         slots.footprints.push(footprint);
     }
 
-    /// Finds what all rays meet.
+    /// Finds the first hits of all rays.
     pub(crate) fn search(&mut self, record: &mut Record) {
         let Wave { hits, slots, paths, .. } = &mut *self.wave;
         record.counts.camera += paths.len as u64;
@@ -100,22 +100,22 @@ impl<'a, 's> PrimaryHits<'a, 's> {
         self.view
     }
 
-    /// Whether light at infinity is seen by the rays from the camera, too, and not only by those that scattered.
+    /// Sets whether camera rays see light at infinity; scattered rays always do.
     pub(crate) fn show_background(&mut self, is_shown: bool) {
         self.wave.hides_background = !is_shown;
     }
 
-    /// How many samples there are.
+    /// Number of samples.
     pub(crate) fn len(&self) -> usize {
         self.wave.slots.len
     }
 
-    /// The ray from the camera of a sample, before its path is followed.
+    /// The camera ray of a sample, before its path is followed.
     pub(crate) fn ray(&self, slot: usize) -> Ray {
         self.wave.paths.ray(slot, self.wave.slots.time[slot])
     }
 
-    /// The ray from the camera of a sample, and what it meets.
+    /// The camera ray of a sample, and its first hit.
     pub(crate) fn sight(&self, slot: usize) -> PrimaryHit<'s> {
         let ray = self.ray(slot);
         let footprint = self.wave.slots.footprint(slot, ray.origin);
@@ -133,12 +133,12 @@ impl<'a, 's> PrimaryHits<'a, 's> {
         self.wave.hits.is_miss(slot)
     }
 
-    /// The surface that a ray meets, as its geometry is.
+    /// The geometric surface that a ray meets.
     pub(crate) fn surface(&self, slot: usize) -> Option<Surface> {
         self.wave.hits.surface(self.scene, slot, &self.ray(slot))
     }
 
-    /// What samples see that meet ground which catches shadows, in the order of the places.
+    /// What samples see that meet a shadow catcher, in the order of the points.
     pub(crate) fn catch(
         &mut self,
         catcher: &Catcher<'s>,
@@ -157,14 +157,14 @@ impl<'a, 's> PrimaryHits<'a, 's> {
         self.wave.slots.draw(slot)
     }
 
-    /// Leaves out the samples that a predicate does not want of the integrator.
+    /// Removes samples from the integrator's list unless the predicate holds.
     pub(crate) fn retain(&mut self, mut is_wanted: impl FnMut(&Self, usize) -> bool) {
         let mut wanted = std::mem::take(&mut self.wanted);
         wanted.retain(|&slot| is_wanted(self, slot as usize));
         self.wanted = wanted;
     }
 
-    /// The radiance of every sample; black where an integrator gave none.
+    /// The radiance of every sample; black if the integrator set none.
     pub(crate) fn radiance(&self) -> &[Spectrum] {
         &self.wave.slots.radiance
     }
@@ -179,7 +179,7 @@ impl<'a, 's> PrimaryHits<'a, 's> {
         self.wave.slots.wavelengths.get(slot)
     }
 
-    /// Gives each sample the radiance that a function finds along its ray, one after the other.
+    /// Sets the radiance of each sample by a function of its ray, one by one.
     pub fn each(&mut self, mut radiance: impl FnMut(PrimaryHit<'s>, &SampleNumbers) -> Spectrum) {
         for at in 0..self.wanted.len() {
             let slot = self.wanted[at] as usize;
@@ -188,7 +188,7 @@ impl<'a, 's> PrimaryHits<'a, 's> {
         }
     }
 
-    /// The numbers of the samples that an integrator is asked for.
+    /// The indices of the samples that the integrator has to compute.
     pub(crate) fn indices(&self) -> impl Iterator<Item = u32> {
         self.wanted.iter().map(|&slot| self.wave.slots.index[slot as usize])
     }
@@ -196,7 +196,7 @@ impl<'a, 's> PrimaryHits<'a, 's> {
     /// Follows a path from each ray.
     pub(crate) fn follow(&mut self, setting: &Setting<'s>, record: &mut Record) {
         if self.wanted.len() < self.wave.paths.len {
-            // What others see is known.
+            // The other samples are already known.
             let mut kept = Paths::default();
             kept.reserve(self.wanted.len());
             for &slot in &self.wanted {
@@ -213,7 +213,7 @@ impl<'a, 's> PrimaryHits<'a, 's> {
     }
 }
 
-/// The cone of a ray from the camera: the width of its footprint at its origin, and its growth.
+/// The cone of a camera ray: the width of its footprint at its origin, and its growth.
 pub(crate) fn cone(camera: &CameraRay) -> (f32, f32) {
     let Footprint::Neighbours { x_origin, x_direction, y_origin, y_direction } = camera.footprint else {
         return (0.0, 0.0);

@@ -1,4 +1,4 @@
-//! Vertices on triangles with normals of vertices, or whose materials are looked up, in lanes.
+//! Vertices on triangles with vertex normals or textured materials, in lanes.
 
 use lumbre_math::Vec3;
 use lumbre_scene::{SurfaceTable, TrianglePoint, TriangleSurface, UniformBsdf};
@@ -16,21 +16,21 @@ use crate::wave::vertices::{FOLDS, LIT_FROM_BELOW, Place, RISES, SIDED, Vertices
 /// Triangles that paths met and that need more than [`FlatHits`], in columns.
 #[derive(Debug, Default)]
 pub(crate) struct SmoothHits {
-    /// What they have in common with flat ones.
+    /// The data that they share with flat ones.
     pub(crate) base: FlatHits,
-    /// The normals of the corners, corner by corner; zero where there are none.
+    /// The normals of the corners, corner by corner; zero if there are none.
     normals: [Vec<f32>; 9],
-    /// The kind of the BSDF; `None` where the material is to be looked up.
+    /// The kind of the BSDF; `None` if the material is textured.
     pub(crate) kinds: Vec<Option<BsdfKind>>,
-    /// The same for lanes: 1 where the material is to be looked up.
+    /// The same for lanes: 1 if the material is textured.
     is_textured: Vec<u32>,
-    /// What is found of each: the geometric and the shading normal, which point outside.
+    /// The computed outward geometric and shading normals.
     pub(crate) geometric: [Vec<f32>; 3],
     pub(crate) shading: [Vec<f32>; 3],
 }
 
 impl SmoothHits {
-    /// Forgets all, with room for `len` hits.
+    /// Clears the columns and reserves `len` hits.
     pub(crate) fn reset(&mut self, len: usize) {
         self.base.reset(len);
         self.kinds.clear();
@@ -39,7 +39,7 @@ impl SmoothHits {
         columns.for_each(|column| grow(column, len));
     }
 
-    /// Notes what a path met, whose BSDF is this, or else is to be looked up.
+    /// Appends what a path met, with its BSDF, or `None` for a textured material.
     #[inline]
     pub(crate) fn push(
         &mut self,
@@ -55,7 +55,7 @@ impl SmoothHits {
         self.is_textured[at] = u32::from(bsdf.is_none());
     }
 
-    /// Reads the corners of all triangles, and the normals there: see [`FlatHits::load`].
+    /// Reads the corners of all triangles and the normals there: see [`FlatHits::load`].
     pub(crate) fn load(&mut self, surfaces: &SurfaceTable) {
         self.base.load(surfaces);
         for (at, &corners) in self.base.indices.iter().enumerate() {
@@ -64,7 +64,7 @@ impl SmoothHits {
         }
     }
 
-    /// What was found of a hit, for the look-up of its material.
+    /// The surface point of a hit, for its material's textures.
     pub(crate) fn point(
         &self,
         at: usize,
@@ -88,7 +88,7 @@ fn vector(columns: &[Vec<f32>; 3], at: usize) -> Vec3 {
     Vec3::new(columns[0][at], columns[1][at], columns[2][at])
 }
 
-/// What a shading normal that differs from the geometric one is for the directions of a vertex.
+/// The flags of a vertex whose shading normal differs from the geometric one.
 pub(crate) fn flags_of(normals: ShadingNormals, frame: &ShadingFrame, geometric: Vec3) -> u32 {
     match normals {
         _ if !ShadingNormals::differ(frame.n, geometric) => 0,
@@ -97,7 +97,8 @@ pub(crate) fn flags_of(normals: ShadingNormals, frame: &ShadingFrame, geometric:
     }
 }
 
-/// The frame of a BSDF: where that is isotropic, the one of flat surfaces, so that their random numbers mean the same directions.
+/// The frame of a BSDF: if that is isotropic, the frame of flat surfaces, so that random numbers give the same
+/// directions.
 pub(crate) fn frame_for(bsdf: &Bsdf, frame: ShadingFrame) -> ShadingFrame {
     if !bsdf.is_isotropic() {
         return frame;
@@ -106,7 +107,7 @@ pub(crate) fn frame_for(bsdf: &Bsdf, frame: ShadingFrame) -> ShadingFrame {
     ShadingFrame { s: Vec3::new(s.x, s.y, s.z), t: Vec3::new(t.x, t.y, t.z), n: frame.n }
 }
 
-/// Makes vertices of hits, in their order, and finds the light that they emit.
+/// Makes vertices of hits, in their order, and adds the light that they emit.
 pub(crate) struct SmoothVertices<'a, 's> {
     pub(crate) setting: &'a Setting<'s>,
     pub(crate) hits: &'a mut SmoothHits,
@@ -129,7 +130,7 @@ impl Job for SmoothVertices<'_, '_> {
         while done < hits.base.len() {
             let lanes = R::Mask::first(hits.base.len() - done);
             let at = R::UInt::from_slice(&hits.base.path[done..]);
-            // Lanes beyond the last have a path, too.
+            // Padding lanes need a valid path too.
             let at = R::UInt::select(lanes, at, R::UInt::splat(0));
             let (point, error, face) = triangle::<R>(&hits.base, done, R::one());
             let error = rounding.grow::<R>(point, error);
@@ -148,7 +149,7 @@ impl Job for SmoothVertices<'_, '_> {
             flags = flags | flag_where::<R>(folds, FOLDS);
             flags = flags | flag_where::<R>(differs & is_pbrt, SIDED | LIT_FROM_BELOW);
             let is_textured = R::UInt::from_slice(&hits.is_textured[done..]).simd_eq(R::UInt::splat(1));
-            // Where the frame is still to be tilted, the texture look-up decides.
+            // If the frame may still be tilted, the texture look-up decides.
             let has_terminator_offset =
                 lanes & differ::<R>(shading, geometric) & (folds | (is_textured & !is_pbrt));
             let to = vertices.len + done;
@@ -224,8 +225,8 @@ fn unit<R: Real>(v: V3<R>) -> (V3<R>, R::Mask) {
     (v * scale, scale.is_finite())
 }
 
-/// The geometric normal that points outside, and the shading normal on its side: interpolated between those of the vertices, which say
-/// where the outside is; the geometric one where there are none.
+/// The outward geometric normal, and the shading normal on its side, which is interpolated from the vertices. Vertex
+/// normals decide which side is outside. Without them, the shading normal is the geometric one.
 #[inline(always)]
 fn normals_at<R: Real>(hits: &SmoothHits, at: usize, face: V3<R>, outward: R) -> (V3<R>, V3<R>) {
     let [b0, b1, b2] = weights::<R>(hits, at);
@@ -238,14 +239,14 @@ fn normals_at<R: Real>(hits: &SmoothHits, at: usize, face: V3<R>, outward: R) ->
     (geometric, V3::select(is_smooth, normal * outward, geometric))
 }
 
-/// The offset from a triangle to the smooth surface that the normals of its vertices imply on the side of `above`, and where that lies over
-/// the triangle: as the terminator offset of [`lumbre_scene::Interaction`].
+/// The offset from a triangle to the smooth surface that its vertex normals imply on the side of `above`, and where
+/// that is above the triangle: as the terminator offset of [`lumbre_scene::Interaction`].
 #[inline(always)]
 fn rise<R: Real>(hits: &SmoothHits, at: usize, above: V3<R>) -> (V3<R>, R::Mask) {
     let [b0, b1, b2] = weights::<R>(hits, at);
     let (p0, p1, p2) =
         (corner::<R>(&hits.base, at, 0), corner::<R>(&hits.base, at, 3), corner::<R>(&hits.base, at, 6));
-    // The difference in double precision: the corners may be far from the origin.
+    // Subtracted in double precision: the corners may be far from the origin.
     let (along_a, along_b) = ((p1 - p0).to_single(), (p2 - p0).to_single());
     let (n0, is0) = unit(corner_normal::<R>(hits, at, 0));
     let (n1, is1) = unit(corner_normal::<R>(hits, at, 3));
@@ -262,7 +263,8 @@ fn rise<R: Real>(hits: &SmoothHits, at: usize, above: V3<R>) -> (V3<R>, R::Mask)
     (offset, rises & R::zero().simd_lt(height) & height.is_finite())
 }
 
-/// How far the tangent plane of a vertex lifts a point that is `way` from it, by its weight, and whether the vertex faces this side.
+/// How far the tangent plane of a vertex lifts a point at distance `way`, times its weight, and whether the vertex
+/// faces this side.
 #[inline(always)]
 fn lift<R: Real>(normal: V3<R>, way: V3<R>, weight: R, above: V3<R>) -> (V3<R>, R::Mask) {
     let below = way.dot(normal).simd_min(R::zero());
