@@ -35,7 +35,7 @@ pub(crate) struct SurfaceFootprint {
     pub dpdy: Vec3,
     pub duv_dx: Vec2,
     pub duv_dy: Vec2,
-    /// The width across the ray, and its growth with distance, for the rays that leave.
+    /// The width across the ray, and its growth with distance, for rays that leave.
     pub width: f64,
     pub spread: f64,
 }

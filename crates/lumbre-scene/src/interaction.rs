@@ -111,12 +111,12 @@ impl<'s> Interaction<'s> {
         (!scene.is_occluded(&way)).then(|| self.incident_origin + terminator_offset)
     }
 
-    /// [`Interaction::risen`] without a look at what lies between.
+    /// [`Interaction::risen`] without the test for objects in between.
     pub fn terminator_origin(&self) -> Option<DVec3> {
         Some(self.incident_origin + self.terminator_offset?)
     }
 
-    /// The width of the footprint across the ray, and its growth with distance: of the rays that leave, too.
+    /// The width of the footprint across the ray, and its growth with distance, also for rays that leave.
     pub fn cone(&self) -> (f64, f64) {
         (self.width, self.spread)
     }

@@ -69,7 +69,7 @@ impl BuildWarning {
     }
 }
 
-/// Below this cosine between shading and geometric normal, the mesh stands for a smooth surface.
+/// Below this cosine between shading and geometric normal, the mesh approximates a smooth surface.
 const SMOOTH: f32 = 1.0 - 1e-6;
 
 /// A part of a description that was dropped, or makes rendering slower or noisier.
@@ -129,10 +129,10 @@ impl Scene {
         &self.cameras
     }
 
-    /// Puts a camera in the place of another one: a viewer that moves builds nothing anew.
+    /// Replaces a camera: a viewer that moves rebuilds nothing.
     ///
     /// # Errors
-    /// [`BuildError`] for a camera that [`Scene::build`] would refuse, and for a position at which there is none.
+    /// [`BuildError`] for a camera that [`Scene::build`] would refuse, and for a position without a camera.
     pub fn replace_camera(&mut self, position: usize, camera: Camera) -> Result<(), BuildError> {
         let mut cameras = self.cameras.clone();
         let count = cameras.len();
@@ -142,7 +142,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Whether a camera makes pictures of this scene.
+    /// Whether a camera is valid for this scene.
     ///
     /// # Errors
     /// [`BuildError`] for a camera that [`Scene::build`] would refuse.
@@ -177,7 +177,7 @@ impl Scene {
         self.integrator
     }
 
-    /// What is around the objects of a POV-Ray scene.
+    /// The surroundings of a POV-Ray scene.
     pub fn pov(&self) -> Option<&crate::pov::PovWorld> {
         self.pov.as_deref()
     }
@@ -212,13 +212,13 @@ impl Scene {
         self.leaf(hit).0.shape
     }
 
-    /// The triangle of a mesh that was hit, without all else that [`Scene::interaction`] finds out; 0 for what is no mesh.
+    /// The triangle of a mesh that was hit, without the other data of [`Scene::interaction`]; 0 for other shapes.
     pub fn primitive_index(&self, hit: &Hit) -> u32 {
         let (entry, part, _) = self.leaf(hit);
         entry.primitive(part)
     }
 
-    /// The curves that a hit is on, in their own space, and the map from there to the innermost instance around; `None` for other
+    /// The curves of a hit, in their own space, and the map from there to the innermost instance; `None` for other
     /// shapes.
     pub fn curves_at(&self, hit: &Hit) -> Option<(&Curves, &Transform)> {
         match &self.leaf(hit).0.form {
@@ -323,33 +323,33 @@ impl Scene {
         }
     }
 
-    /// The [`crate::ShapeDesc::index`] of what has an id in the tree.
+    /// The [`crate::ShapeDesc::index`] of the shape with an id in the tree.
     ///
     /// # Panics
-    /// When there is no such id.
+    /// If there is no such id.
     pub fn shape_of(&self, id: u32) -> u32 {
         self.entries[id as usize].shape
     }
 
-    /// Whether what has an id in the tree is the ground.
+    /// Whether the surface with an id in the tree is the ground.
     ///
     /// # Panics
-    /// When there is no such id.
+    /// If there is no such id.
     pub fn is_ground(&self, id: u32) -> bool {
         self.entries[id as usize].shape == crate::ground::SHAPE
     }
 
-    /// Surfaces as plain rows.
+    /// Surfaces as rows of numbers.
     pub fn tables(&self) -> &SurfaceTable {
         &self.tables
     }
 
-    /// Whether anything has an index of refraction by wavelength, which only a spectral render shows.
+    /// Whether any index of refraction depends on the wavelength, which only a spectral render shows.
     pub fn disperses(&self) -> bool {
         self.entries.iter().any(SurfaceEntry::disperses)
     }
 
-    /// Whether shadow rays and paths go through some surfaces: cut-outs and interfaces.
+    /// Whether shadow rays and paths pass through some surfaces: cut-outs and interfaces.
     pub fn has_cutouts(&self) -> bool {
         self.has_cutouts
     }
@@ -369,7 +369,7 @@ impl Scene {
         self.interaction_at(ray, hit, footprint, self.accel.surface(ray, hit))
     }
 
-    /// [`Scene::interaction`] at a hit of [`Accel::closest_columns`]: rays of pictures that leave it do not hit it again.
+    /// [`Scene::interaction`] at a hit of [`Accel::closest_columns`]: picture rays that leave it do not hit it again.
     pub fn picture_interaction(&self, ray: &Ray, hit: &Hit, footprint: &Footprint) -> Interaction<'_> {
         self.interaction_at(ray, hit, footprint, self.accel.picture_surface(ray, hit))
     }
@@ -441,11 +441,12 @@ impl Scene {
     /// A light sample for `from` at a time: a light chosen by `choose`, and a direction by `u`. Its density, or
     /// the radiance of a delta light, includes the probability of the light.
     ///
-    /// `normal` is the unit geometric normal of an opaque surface, on the side that is seen: lights below its horizon are not chosen, and
-    /// others by the cosine. It is zero where light from every side counts: where the surface transmits, and in a medium.
+    /// `normal` is the unit geometric normal of an opaque surface, on the viewer's side: lights below its horizon are
+    /// not chosen, and others by the cosine. It is zero if light from every side counts: for a transmissive surface,
+    /// and in a medium.
     ///
-    /// It is for those who also find light along rays of their own and weigh both by [`Scene::light_pdf`] and [`Scene::escaped`]: of an
-    /// environment map it rarely samples what is dim. [`Scene::sample_light_alone`] is for those who do not.
+    /// Use it if other rays find light too, and both are weighted by [`Scene::light_pdf`] and [`Scene::escaped`]: it
+    /// rarely samples the dim parts of an environment map. Otherwise use [`Scene::sample_light_alone`].
     pub fn sample_light(
         &self,
         from: DVec3,
@@ -457,7 +458,7 @@ impl Scene {
         Some(self.sample_light_for(Sampling::Mis, from, normal, time, choose, u)?.1)
     }
 
-    /// [`Scene::sample_light`] for those who find light in no other way.
+    /// [`Scene::sample_light`] for code that finds light in no other way.
     pub fn sample_light_alone(
         &self,
         from: DVec3,
@@ -469,7 +470,7 @@ impl Scene {
         Some(self.sample_light_for(Sampling::LightsOnly, from, normal, time, choose, u)?.1)
     }
 
-    /// [`Scene::sample_light`] or [`Scene::sample_light_alone`], and which light the sample is of.
+    /// [`Scene::sample_light`] or [`Scene::sample_light_alone`], with the sampled light.
     pub fn sample_light_for(
         &self,
         sampling: Sampling,
@@ -568,10 +569,10 @@ impl Scene {
         shaded
     }
 
-    /// Whether cameras may look through the back of what has an id in the tree.
+    /// Whether cameras may look through the back of the surface with an id in the tree.
     ///
     /// # Panics
-    /// When there is no such id.
+    /// If there is no such id.
     pub fn may_be_one_sided(&self, id: u32) -> bool {
         self.has_one_sided && self.entries[id as usize].is_one_sided_anywhere()
     }

@@ -100,7 +100,7 @@ pub(crate) trait Simd {
         (mask & block.taken(), edges)
     }
 
-    /// As [`Self::edges`] for two rays, each with its own block.
+    /// As [`Self::intersect_triangles`] for two rays, each with its own block.
     #[inline(always)]
     fn intersect_triangles_by_two(
         blocks: [&TriangleBlock; 2],

@@ -170,7 +170,7 @@ impl HeightRange {
         }
     }
 
-    /// As [`Self::between`], if no end is negative.
+    /// As [`Self::new`], if no end is negative.
     #[inline(always)]
     pub(crate) fn ahead(start: f32, end: f32) -> Self {
         let within = |height: f32| if height < FAR { height } else { FAR };

@@ -213,7 +213,7 @@ impl<'a> Decider<'a> {
         Outcome::Certain(is_closer.then_some(t))
     }
 
-    /// [`Self::closer`] if the quick test of one of the two is uncertain.
+    /// [`Self::compare`] if the quick test of one of the two is uncertain.
     #[inline(never)]
     fn compare_closely(
         &self,
