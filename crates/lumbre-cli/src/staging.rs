@@ -122,7 +122,7 @@ impl StagingArguments {
         self.turntable
     }
 
-    /// The stage of a picture of this size after a rotation.
+    /// The stage of a picture of this size, rotated.
     ///
     /// # Errors
     /// Unreadable files, and [`Failure::Usage`] for an image that is not an environment map.
@@ -157,7 +157,7 @@ impl StagingArguments {
         })
     }
 
-    /// The background that pictures are put over, as its argument; that of the studio where none was given.
+    /// The background argument of pictures; the studio's by default.
     pub(crate) fn background_name(&self) -> Option<String> {
         match &self.background {
             Some(BackgroundArgument::Lights | BackgroundArgument::Transparent) => None,
@@ -178,7 +178,7 @@ impl StagingArguments {
         }
     }
 
-    /// The files that the stage is made of.
+    /// The files of the stage.
     pub(crate) fn inputs(&self) -> impl Iterator<Item = &Path> {
         self.env.as_deref().into_iter().chain(self.background_file())
     }

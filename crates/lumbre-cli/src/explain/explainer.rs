@@ -1,4 +1,4 @@
-//! Explanations of pixels on the viewer's page: what `lumbre explain` tells of the first sample.
+//! Explanations of pixels on the viewer's page: `lumbre explain` for the first sample.
 
 use clap::ValueEnum;
 use lumbre::{RenderOptions, Scene, SceneDesc};
@@ -9,7 +9,7 @@ use super::things::SceneNames;
 use super::{html, texts, title};
 use crate::language::Language;
 
-/// Tells of the pixels of one scene.
+/// Explains the pixels of one scene.
 #[derive(Debug)]
 pub struct Explainer {
     name: String,
@@ -17,7 +17,7 @@ pub struct Explainer {
 }
 
 impl Explainer {
-    /// Of a scene with its name, as it is described before it is set on its stage.
+    /// For a named scene, as described before it is staged.
     pub fn new(desc: &SceneDesc, name: String) -> Self {
         Self { name, things: SceneNames::of(desc) }
     }

@@ -125,7 +125,7 @@ pub struct Request {
     pub only: Vec<String>,
 }
 
-/// What an explanation is written as.
+/// The format of an explanation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Format {
     /// Plain text.
@@ -148,7 +148,7 @@ impl Format {
     }
 }
 
-/// The sentences of a language.
+/// The texts of a language.
 fn texts(language: Language) -> &'static Texts {
     language.choose(&ENGLISH, &SPANISH)
 }
@@ -267,7 +267,7 @@ fn told(
     question.of_pixel(scene, options, (x, y))
 }
 
-/// The keys of sections that an explanation may have, beside those with numbers: `shape 2`, `operand 0`, `transform 1`, `vertex 0`.
+/// The keys of an explanation's sections, without numbered ones: `shape 2`, `operand 0`, `transform 1`, `vertex 0`.
 const KEYS: [&str; 50] = [
     "Parameters",
     "ScaledRay",
@@ -321,7 +321,7 @@ const KEYS: [&str; 50] = [
     "mesh",
 ];
 
-/// Whether some explanation has a section with this key, if not this one.
+/// Whether any explanation may have a section with this key.
 fn is_key(key: &str) -> bool {
     let is_number = |text: &str| text.parse::<u32>().is_ok();
     KEYS.contains(&key)
@@ -330,8 +330,8 @@ fn is_key(key: &str) -> bool {
         })
 }
 
-/// The sections with these keys, each with all below it. A kind of section that this ray has none of, such as the hit of a ray
-/// that meets nothing, is no mistake.
+/// The sections with these keys, each with its subsections. A valid key without a section is no error, such as the hit
+/// of a ray that meets nothing.
 fn only(sections: Vec<Section>, keys: &[String], texts: &Texts) -> Result<Vec<Section>, Failure> {
     let mut known = BTreeSet::new();
     sections.iter().for_each(|section| section.collect_keys(&mut known));
