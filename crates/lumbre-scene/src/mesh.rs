@@ -29,14 +29,6 @@ pub(crate) enum QuadOrder {
 /// What is left of meshes without attributes: files have many small ones, and their descriptions are larger than they are.
 static BARE: LazyLock<Arc<MeshDesc>> = LazyLock::new(Arc::default);
 
-/// The items of a list, which is left empty. Few of them are copied: what is left of the description can then be used for what is made of
-/// the next one, where files have many small ones.
-fn taken<T: Copy>(list: &mut Vec<T>) -> Vec<T> {
-    const FEW_BYTES: usize = 1024;
-    let items = take(list);
-    if size_of_val(&items[..]) > FEW_BYTES { items } else { items.as_slice().to_vec() }
-}
-
 /// Transforms a mesh into the space of its tree. Where it may be split, triangles are that have vertices of others on their edges: see
 /// [`seams`].
 ///
@@ -54,7 +46,7 @@ pub(crate) fn bake(
     // A shared description is copied only where the transform changes it; an unshared one gives up its lists.
     let mut shared = desc;
     let (mut positions, mut triangles, quads) = match Arc::get_mut(&mut shared) {
-        Some(own) => (taken(&mut own.positions), taken(&mut own.triangles), taken(&mut own.quads)),
+        Some(own) => (take(&mut own.positions), take(&mut own.triangles), take(&mut own.quads)),
         None => (shared.positions.clone(), shared.triangles.clone(), shared.quads.clone()),
     };
 
