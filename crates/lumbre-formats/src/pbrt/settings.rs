@@ -1,12 +1,13 @@
 //! Camera, film, filter, sampler, integrator and options.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use lumbre_image::ColourSpace;
 use lumbre_math::{DMat3, Transform, Vec2};
 use lumbre_scene::{
-    Camera, CameraKind, FilterDesc, IntegratorDesc, IntegratorKind, MediumId, SamplerDesc, SamplerKind,
-    SphericalMapping,
+    Buckets, Camera, CameraKind, FilmKind, FilmSpace, FilterDesc, IntegratorDesc, IntegratorKind, MediumId,
+    SamplerDesc, SamplerKind, SphericalMapping,
 };
 use lumbre_shading::ShadingNormals;
 use lumbre_shading::spectrum::SensorCurves;
@@ -18,9 +19,13 @@ use super::source::{Result, Spot};
 use super::{colour, sensors};
 use crate::Diagnostic;
 use crate::diagnostic::{number, quoted};
+use crate::image::ImageFormat;
 
 /// The types of cameras.
 pub(super) const CAMERAS: [&str; 4] = ["perspective", "orthographic", "spherical", "realistic"];
+
+/// The types of films.
+pub(super) const FILMS: [&str; 3] = ["rgb", "gbuffer", "spectral"];
 
 /// The types of integrators.
 pub(super) const INTEGRATORS: [&str; 16] = [
@@ -133,24 +138,22 @@ impl Converter<'_, '_> {
 
     pub fn film(&mut self, ty: &str, params: Params, space: ColourSpace) -> Result<()> {
         let spot = params.spot;
-        let mut spectral = false;
-        match ty {
-            "rgb" => {}
-            "image" => self.upgraded(spot),
-            "spectral" => {
-                check_spectral_film(&params)?;
-                spectral = true;
-                self.note(spot, "the buckets of film \"spectral\" are not written yet: the picture is made of wavelengths, and has their colours");
+        let kind = match ty {
+            "rgb" => FilmKind::Rgb,
+            "image" => {
+                self.upgraded(spot);
+                FilmKind::Rgb
             }
+            "spectral" => FilmKind::Spectral(buckets(&params)?),
             "gbuffer" => {
-                params.ignore(&["coordinatesystem"]);
-                let message = format!("film {} is not rendered yet: an rgb one takes its place", quoted(ty));
-                self.note(spot, message);
+                let spaces = [("camera", FilmSpace::Camera), ("world", FilmSpace::World)];
+                FilmKind::GBuffer(params.choice("coordinatesystem", &spaces, FilmSpace::Camera)?)
             }
             _ => {
-                self.unknown(spot, "film", ty, &["rgb", "gbuffer", "spectral"], "an rgb one takes its place")
+                self.unknown(spot, "film", ty, &FILMS, "an rgb one takes its place");
+                FilmKind::Rgb
             }
-        }
+        };
         let width = params.count("xresolution", 1280, 1)?;
         let height = params.count("yresolution", 720, 1)?;
         let pixel_bounds = match params.integers("pixelbounds")? {
@@ -204,15 +207,23 @@ impl Converter<'_, '_> {
             self.note(spot, "a film in another colour space is not made yet: the picture is in that of sRGB");
         }
         let filename = params.string("filename")?.map(str::to_owned);
+        if let (Some(name), true) = (&filename, kind != FilmKind::Rgb)
+            && ImageFormat::from_path(Path::new(name)) != Some(ImageFormat::Exr)
+        {
+            let wrong = Diagnostic::error(format!("the channels of film {} need an EXR file", quoted(ty)));
+            let wrong = wrong.found(quoted(name)).expected("a name that ends in .exr");
+            return Err(params.spot_of("filename").wrong(wrong));
+        }
         self.done(&params);
         let film = &mut self.scene.film;
+        film.kind = kind;
         film.filename = filename;
         (film.width, film.height) = (Some(width), Some(height));
         (film.pixel_bounds, film.crop_window) = (pixel_bounds, crop_window);
         film.max_component = max_component as f32;
         film.sensor = sensor;
         film.camera = camera.map(Arc::new);
-        film.spectral |= spectral;
+        film.spectral |= matches!(kind, FilmKind::Spectral(_));
         film.single_precision = single_precision;
         Ok(())
     }
@@ -505,13 +516,13 @@ impl Converter<'_, '_> {
     }
 }
 
-/// Refuses a film that keeps light by wavelength whose wavelengths cannot be.
-fn check_spectral_film(params: &Params) -> Result<()> {
+/// The buckets of a film that keeps light by wavelength.
+fn buckets(params: &Params) -> Result<Buckets> {
     const LEAST: f64 = 360.0;
     const GREATEST: f64 = 830.0;
-    let buckets = params.count("nbuckets", 16, 1)?;
-    if buckets > MAX_BUCKETS {
-        return params.out_of_range("nbuckets", f64::from(buckets), &format!("1 to {MAX_BUCKETS}"));
+    let count = params.count("nbuckets", 16, 1)?;
+    if count > Buckets::MAX {
+        return params.out_of_range("nbuckets", f64::from(count), &format!("1 to {}", Buckets::MAX));
     }
     let (low, high) = (params.float("lambdamin", LEAST)?, params.float("lambdamax", GREATEST)?);
     for (name, nm) in [("lambdamin", low), ("lambdamax", high)] {
@@ -519,14 +530,12 @@ fn check_spectral_film(params: &Params) -> Result<()> {
             return params.out_of_range(name, nm, "360 to 830 nm");
         }
     }
-    if low >= high {
+    let buckets = Buckets { count, low: low as f32, high: high as f32 };
+    if buckets.low >= buckets.high {
         return params.out_of_range("lambdamin", low, "less than lambdamax");
     }
-    Ok(())
+    Ok(buckets)
 }
-
-/// Parts of the range of a film that keeps light by wavelength: one a nanometre.
-const MAX_BUCKETS: u32 = 471;
 
 /// The value under its pbrt-v3 name, else the default.
 fn params_v3(params: &Params, name: &'static str, default: f64) -> Result<f64> {

@@ -40,7 +40,7 @@ impl Guides {
     pub(crate) fn smaller(&self, bounds: PixelBounds, side: u32) -> Self {
         let small = PixelBounds::whole(bounds.width().div_ceil(side), bounds.height().div_ceil(side));
         let mut film = Tile::new(small, Extras { guides: true, ..Extras::default() });
-        let (_, _, _, guides) = film.sums_mut();
+        let guides = film.sums_mut().guides;
         for tile in &self.tiles {
             for ((x, y), guide) in tile.bounds().pixels().zip(tile.guides()) {
                 let (x, y) = (x - bounds.x0, y - bounds.y0);

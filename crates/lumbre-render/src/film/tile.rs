@@ -3,9 +3,13 @@
 use std::sync::Arc;
 
 use lumbre_image::Rgb;
+use lumbre_scene::Buckets;
 
 use crate::film::pixel::{MAX_SAMPLE, Sums};
-use crate::film::{FeatureSample, FeatureSums, GuideSums, Pixel, PixelBounds, Tint};
+use crate::film::{
+    BucketSums, FeatureSample, FeatureSums, GuideSums, Pixel, PixelBounds, SpectralSample, SurfaceSample,
+    SurfaceSums, Tint,
+};
 
 /// How radiance becomes the colour of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,11 +35,15 @@ impl Exposure {
         f64::from(self.colour(radiance).max_component()) > MAX_SAMPLE
     }
 
+    /// The factor that dims a sample which is brighter than any may be.
+    fn hold(&self, radiance: Rgb) -> f32 {
+        let most = (radiance * self.factor).max_component();
+        if most > self.max_component { self.max_component / most } else { 1.0 }
+    }
+
     /// The colour that a sample of this radiance adds.
     pub fn colour(&self, radiance: Rgb) -> Rgb {
-        let colour = radiance * self.factor;
-        let most = colour.max_component();
-        let held = if most > self.max_component { colour * (self.max_component / most) } else { colour };
+        let held = radiance * self.factor * self.hold(radiance);
         let [red, green, blue] = self.sensor.map(|[r, g, b]| r * held.r + g * held.g + b * held.b);
         Rgb::new(red, green, blue)
     }
@@ -52,8 +60,27 @@ pub struct Sample {
     pub weight: f64,
     /// What it met first, if features are wanted and it met anything.
     pub features: Option<FeatureSample>,
+    /// The surface that it sees, if the film keeps that and it sees any.
+    pub surface: Option<SurfaceSample>,
+    /// Its radiance at its wavelengths, if the film keeps that.
+    pub spectrum: Option<SpectralSample>,
     /// Whether it is of ground that catches shadows.
     pub on_catcher: bool,
+}
+
+impl Default for Sample {
+    /// Black, of all that is behind it, of weight 1.
+    fn default() -> Self {
+        Self {
+            radiance: Rgb::BLACK,
+            coverage: Rgb::WHITE,
+            weight: 1.0,
+            features: None,
+            surface: None,
+            spectrum: None,
+            on_catcher: false,
+        }
+    }
 }
 
 /// The pixels of a rectangle. A clone shares its sums with the original until one of them gets another sample, so that it is cheap.
@@ -61,6 +88,7 @@ pub struct Sample {
 pub struct Tile {
     bounds: PixelBounds,
     sums: Arc<TileSums>,
+    buckets: Option<Buckets>,
     depth_unit: f64,
 }
 
@@ -74,6 +102,10 @@ struct TileSums {
     tints: Vec<Tint>,
     // Empty unless guides are wanted; else as many as pixels.
     guides: Vec<GuideSums>,
+    // Empty unless the film keeps surfaces; else as many as pixels.
+    surfaces: Vec<SurfaceSums>,
+    // Empty unless the film keeps wavelengths; else those of each pixel, one pixel after the other.
+    buckets: Vec<BucketSums>,
 }
 
 /// What is wanted of samples besides the colour of pixels and their coverage.
@@ -85,13 +117,24 @@ pub struct Extras {
     pub tints: bool,
     /// What a denoiser wants to know.
     pub guides: bool,
+    /// What the film `gbuffer` keeps.
+    pub surfaces: bool,
+    /// The buckets of the film `spectral`.
+    pub buckets: Option<Buckets>,
     /// What depths are measured in: a power of two above all of them.
     pub depth_unit: f64,
 }
 
 impl Default for Extras {
     fn default() -> Self {
-        Self { features: false, tints: false, guides: false, depth_unit: 1.0 }
+        Self { features: false, tints: false, guides: false, surfaces: false, buckets: None, depth_unit: 1.0 }
+    }
+}
+
+impl Extras {
+    /// Buckets of a pixel.
+    pub(crate) fn bucket_count(&self) -> usize {
+        self.buckets.map_or(0, |buckets| buckets.count as usize)
     }
 }
 
@@ -104,8 +147,10 @@ impl Tile {
             features: vec![FeatureSums::default(); if extras.features { count } else { 0 }],
             tints: vec![Tint::default(); if extras.tints { count } else { 0 }],
             guides: vec![GuideSums::default(); if extras.guides { count } else { 0 }],
+            surfaces: vec![SurfaceSums::default(); if extras.surfaces { count } else { 0 }],
+            buckets: vec![BucketSums::default(); count * extras.bucket_count()],
         };
-        Self { bounds, sums: Arc::new(sums), depth_unit: extras.depth_unit }
+        Self { bounds, sums: Arc::new(sums), buckets: extras.buckets, depth_unit: extras.depth_unit }
     }
 
     /// Which pixels.
@@ -131,6 +176,16 @@ impl Tile {
     /// What a denoiser wants to know of every pixel, row by row; empty where it is not wanted.
     pub fn guides(&self) -> &[GuideSums] {
         &self.sums.guides
+    }
+
+    /// What the film `gbuffer` keeps of every pixel, row by row; empty where it is not wanted.
+    pub fn surfaces(&self) -> &[SurfaceSums] {
+        &self.sums.surfaces
+    }
+
+    /// The buckets of every pixel, row by row; none where they are not wanted.
+    pub fn buckets(&self) -> impl Iterator<Item = &[BucketSums]> {
+        self.sums.buckets.chunks(self.extras().bucket_count().max(1))
     }
 
     /// By how much the coverage of each colour is another, row by row; empty where it is not wanted.
@@ -170,6 +225,14 @@ impl Tile {
         if let Some(features) = sums.features.get_mut(position) {
             features.add(sample.features.as_ref(), sample.weight, self.depth_unit);
         }
+        if let Some(surfaces) = sums.surfaces.get_mut(position) {
+            surfaces.add(colour, sample.surface.as_ref(), sample.weight, self.depth_unit);
+        }
+        if let (Some(buckets), Some(spectrum)) = (&self.buckets, &sample.spectrum) {
+            let factor = exposure.factor * exposure.hold(sample.radiance);
+            let own = of_pixel(&mut sums.buckets, position, buckets.count as usize);
+            BucketSums::add(own, buckets, spectrum, sample.weight, factor);
+        }
         let catches_shadows = !sums.tints.is_empty();
         if let Some(guide) = sums.guides.get_mut(position) {
             let is_shadow = sample.on_catcher && catches_shadows;
@@ -207,13 +270,18 @@ impl Tile {
         }
         let places = || both.pixels().map(move |(x, y)| (from.position(x, y), to.position(x, y)));
         let count = bounds.area();
+        let each = self.extras().bucket_count();
+        let of_buckets =
+            places().flat_map(|(from, to)| (0..each).map(move |b| (from * each + b, to * each + b)));
         let sums = TileSums {
             pixels: taken(&self.sums.pixels, count, places()),
             features: taken(&self.sums.features, count, places()),
             tints: taken(&self.sums.tints, count, places()),
             guides: taken(&self.sums.guides, count, places()),
+            surfaces: taken(&self.sums.surfaces, count, places()),
+            buckets: taken(&self.sums.buckets, count * each as u64, of_buckets),
         };
-        Self { bounds, sums: Arc::new(sums), depth_unit: self.depth_unit }
+        Self { bounds, sums: Arc::new(sums), ..*self }
     }
 
     /// Adds what another tile of the same kind gathered, all of whose pixels this one has.
@@ -223,12 +291,15 @@ impl Tile {
                 to.merge(other);
             }
         }
+        let each = self.extras().bucket_count();
         let (sums, others) = (Arc::make_mut(&mut self.sums), &other.sums);
         for (from, (x, y)) in other.bounds.pixels().enumerate() {
             let at = self.bounds.position(x, y);
             add(&mut sums.pixels, at, &others.pixels, from);
             add(&mut sums.features, at, &others.features, from);
             add(&mut sums.tints, at, &others.tints, from);
+            add(&mut sums.surfaces, at, &others.surfaces, from);
+            (0..each).for_each(|b| add(&mut sums.buckets, at * each + b, &others.buckets, from * each + b));
         }
     }
 
@@ -239,6 +310,7 @@ impl Tile {
                 *to = other;
             }
         }
+        let each = self.extras().bucket_count();
         let (sums, others) = (Arc::make_mut(&mut self.sums), &other.sums);
         for (x, y) in self.bounds.intersection(&other.bounds).pixels() {
             let (at, from) = (self.bounds.position(x, y), other.bounds.position(x, y));
@@ -246,6 +318,8 @@ impl Tile {
             copy(&mut sums.features, at, &others.features, from);
             copy(&mut sums.tints, at, &others.tints, from);
             copy(&mut sums.guides, at, &others.guides, from);
+            copy(&mut sums.surfaces, at, &others.surfaces, from);
+            (0..each).for_each(|b| copy(&mut sums.buckets, at * each + b, &others.buckets, from * each + b));
         }
     }
 
@@ -256,15 +330,17 @@ impl Tile {
             (extras.features, size_of::<FeatureSums>()),
             (extras.tints, size_of::<Tint>()),
             (extras.guides, size_of::<GuideSums>()),
+            (extras.surfaces, size_of::<SurfaceSums>()),
+            (true, extras.bucket_count() * size_of::<BucketSums>()),
         ];
         let each: usize = sizes.into_iter().filter(|(has, _)| *has).map(|(_, size)| size).sum();
         bounds.area().saturating_mul(each as u64)
     }
 
     /// All sums, to be set.
-    pub(crate) fn sums_mut(&mut self) -> (&mut [Pixel], &mut [Tint], &mut [FeatureSums], &mut [GuideSums]) {
-        let TileSums { pixels, features, tints, guides } = Arc::make_mut(&mut self.sums);
-        (pixels, tints, features, guides)
+    pub(crate) fn sums_mut(&mut self) -> TileSumsMut<'_> {
+        let TileSums { pixels, features, tints, guides, surfaces, buckets } = Arc::make_mut(&mut self.sums);
+        TileSumsMut { pixels, features, tints, guides, surfaces, buckets }
     }
 
     /// What is gathered besides colours.
@@ -273,6 +349,8 @@ impl Tile {
             features: !self.sums.features.is_empty(),
             tints: !self.sums.tints.is_empty(),
             guides: !self.sums.guides.is_empty(),
+            surfaces: !self.sums.surfaces.is_empty(),
+            buckets: self.buckets,
             depth_unit: self.depth_unit,
         }
     }
@@ -302,13 +380,19 @@ impl Tile {
             return;
         }
         fn copy<T: Copy>(to: &mut [T], from: &[T]) {
-            to.iter_mut().zip(from).take(1).for_each(|(to, from)| *to = *from);
+            copy_some(to, from, 1);
         }
+        fn copy_some<T: Copy>(to: &mut [T], from: &[T], count: usize) {
+            to.iter_mut().zip(from).take(count).for_each(|(to, from)| *to = *from);
+        }
+        let each = self.extras().bucket_count();
         let (sums, others) = (Arc::make_mut(&mut self.sums), &other.sums);
         copy(&mut sums.pixels, &others.pixels);
         copy(&mut sums.features, &others.features);
         copy(&mut sums.tints, &others.tints);
         copy(&mut sums.guides, &others.guides);
+        copy(&mut sums.surfaces, &others.surfaces);
+        copy_some(&mut sums.buckets, &others.buckets, each);
     }
 
     /// Gives every pixel that has no sample the sums of the first pixel of its square of `side` by `side` pixels, counted from
@@ -316,7 +400,8 @@ impl Tile {
     pub fn spread(&mut self, side: u32) {
         let width = self.bounds.width() as usize;
         let side = side.max(1) as usize;
-        let TileSums { pixels, features, tints, guides } = Arc::make_mut(&mut self.sums);
+        let each = self.extras().bucket_count();
+        let TileSums { pixels, features, tints, guides, surfaces, buckets } = Arc::make_mut(&mut self.sums);
         for at in 0..pixels.len() {
             if pixels[at].samples > 0 {
                 continue;
@@ -333,8 +418,27 @@ impl Tile {
             if let Some(&guide) = guides.get(from) {
                 guides[at] = guide;
             }
+            if let Some(&surface) = surfaces.get(from) {
+                surfaces[at] = surface;
+            }
+            buckets.copy_within(from * each..(from + 1) * each, at * each);
         }
     }
+}
+
+/// All sums of a tile, to be set.
+pub(crate) struct TileSumsMut<'a> {
+    pub(crate) pixels: &'a mut [Pixel],
+    pub(crate) features: &'a mut [FeatureSums],
+    pub(crate) tints: &'a mut [Tint],
+    pub(crate) guides: &'a mut [GuideSums],
+    pub(crate) surfaces: &'a mut [SurfaceSums],
+    pub(crate) buckets: &'a mut [BucketSums],
+}
+
+/// The sums of a pixel, of which each has so many.
+fn of_pixel<T>(sums: &mut [T], position: usize, each: usize) -> &mut [T] {
+    sums.chunks_mut(each.max(1)).nth(position).unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -346,7 +450,7 @@ mod tests {
         let extras = Extras { features: true, tints: true, ..Extras::default() };
         let mut tile = Tile::new(PixelBounds { x0: 5, y0: 7, x1: 9, y1: 10 }, extras);
         let coverage = Rgb::splat(0.25);
-        let sample = |radiance| Sample { radiance, coverage, weight: 1.0, features: None, on_catcher: false };
+        let sample = |radiance| Sample { radiance, coverage, ..Sample::default() };
         let exposure = Exposure { factor: 2.0, max_component: 6.0, ..Exposure::default() };
         assert!(tile.add(6, 9, &sample(Rgb::new(1.0, 2.0, 3.0)), &exposure));
         assert!(!tile.add(9, 9, &sample(Rgb::WHITE), &exposure));
@@ -365,13 +469,7 @@ mod tests {
     #[test]
     fn a_sample_spreads_over_the_pixels_of_its_square_that_have_none() {
         let mut tile = Tile::new(PixelBounds { x0: 5, y0: 7, x1: 10, y1: 10 }, Extras::default());
-        let sample = |value| Sample {
-            radiance: Rgb::splat(value),
-            coverage: Rgb::WHITE,
-            weight: 1.0,
-            features: None,
-            on_catcher: false,
-        };
+        let sample = |value| Sample { radiance: Rgb::splat(value), ..Sample::default() };
         for (x, y, value) in [(5, 7, 1.0), (7, 7, 2.0), (9, 7, 3.0), (5, 9, 4.0), (6, 8, 9.0)] {
             assert!(tile.add(x, y, &sample(value), &Exposure::default()));
         }
@@ -389,8 +487,7 @@ mod tests {
         let mut tiles = [true, false].map(|tints| Tile::new(bounds, Extras { tints, ..Extras::default() }));
         for tile in &mut tiles {
             for (coverage, weight) in covered.into_iter().zip([1.0, 3.0]) {
-                let sample =
-                    Sample { radiance: Rgb::BLACK, coverage, weight, features: None, on_catcher: false };
+                let sample = Sample { coverage, weight, ..Sample::default() };
                 assert!(tile.add(7, 8, &sample, &Exposure::default()));
             }
         }

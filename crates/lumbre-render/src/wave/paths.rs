@@ -129,6 +129,8 @@ impl Slots<'_> {
         self.time.push(camera.ray.time);
         self.rays.push(camera.ray);
         if camera.footprint != Footprint::Point {
+            // The rays before that have none, such as those that a lens stops, keep their places.
+            self.footprints.resize(self.rays.len() - 1, Footprint::Point);
             self.footprints.push(camera.footprint);
         }
         self.radiance.push(Spectrum::BLACK);

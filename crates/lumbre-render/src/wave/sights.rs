@@ -4,7 +4,7 @@ use lumbre_geometry::{Ray, Surface};
 use lumbre_math::{DVec3, Vec3};
 use lumbre_scene::{CameraRay, Footprint, SamplerKind, Scene, View};
 use lumbre_shading::Spectrum;
-use lumbre_shading::spectrum::Wavelengths;
+use lumbre_shading::spectrum::{WavelengthDensity, Wavelengths};
 
 use crate::caustics::Merging;
 use crate::transport::{Draw, Record, Seen, Sight};
@@ -32,7 +32,7 @@ impl<'a, 's> Sights<'a, 's> {
         wave: &'a mut Wave<'s>,
         precision: Precision,
         samples: impl ExactSizeIterator<Item = (Draw, CameraRay)>,
-        is_spectral: bool,
+        density: Option<WavelengthDensity>,
         record: &mut Record,
     ) -> Self {
         let has_solids = scene.has_solids();
@@ -61,7 +61,7 @@ impl<'a, 's> Sights<'a, 's> {
                 width,
                 spread,
             });
-            let wavelengths = is_spectral.then(|| Wavelengths::visible(draw.wavelength()));
+            let wavelengths = density.map(|density| density.sample(draw.wavelength()));
             wave.slots.push(draw, &camera, has_solids, medium, wavelengths);
         }
         record.counts.camera += wave.paths.len as u64;
@@ -93,6 +93,11 @@ impl<'a, 's> Sights<'a, 's> {
     /// The ray from the camera of a sample.
     pub(crate) fn ray(&self, slot: usize) -> Ray {
         self.wave.slots.rays[slot]
+    }
+
+    /// The ray from the camera of a sample, with its footprint.
+    pub(crate) fn camera(&self, slot: usize) -> CameraRay {
+        self.wave.slots.camera(slot)
     }
 
     /// The ray from the camera of a sample, and what it meets.

@@ -144,7 +144,7 @@ fn first_vertices<'s>(
         .collect();
     let mut wave = Wave::default();
     let mut record = Record::default();
-    Sights::new(scene, &view, &mut wave, Precision::Single, samples.into_iter(), false, &mut record);
+    Sights::new(scene, &view, &mut wave, Precision::Single, samples.into_iter(), None, &mut record);
     wave.surfaces(&setting, &mut record);
     wave
 }
