@@ -27,6 +27,31 @@ pub(super) const CAMERAS: [&str; 4] = ["perspective", "orthographic", "spherical
 /// The types of films.
 pub(super) const FILMS: [&str; 3] = ["rgb", "gbuffer", "spectral"];
 
+/// The names of options.
+pub(super) const OPTIONS: [&str; 11] = [
+    "seed",
+    "wavefront",
+    "rendercoordsys",
+    "displacementedgescale",
+    "pixelstats",
+    "msereferenceimage",
+    "msereferenceout",
+    "disablepixeljitter",
+    "disabletexturefiltering",
+    "disablewavelengthjitter",
+    "forcediffuse",
+];
+
+/// The types of samplers.
+pub(super) const SAMPLERS: [&str; 7] =
+    ["zsobol", "paddedsobol", "sobol", "halton", "pmj02bn", "independent", "stratified"];
+
+/// The types of pixel filters.
+pub(super) const FILTERS: [&str; 5] = ["gaussian", "box", "mitchell", "sinc", "triangle"];
+
+/// The types of acceleration structures.
+pub(super) const ACCELERATORS: [&str; 2] = ["bvh", "kdtree"];
+
 /// The types of integrators.
 pub(super) const INTEGRATORS: [&str; 16] = [
     "path",
@@ -204,7 +229,7 @@ impl Converter<'_, '_> {
         self.film_diagonal = params.float_above("diagonal", 35.0, 0.0)?;
         let single_precision = !params.boolean("savefp16", true)?;
         if space != ColourSpace::REC709 {
-            self.note(spot, "a film in another colour space is not made yet: the picture is in that of sRGB");
+            self.note(spot, "the film is in the colour space of sRGB: the picture has the colours of the scene, in other numbers");
         }
         let filename = params.string("filename")?.map(str::to_owned);
         if let (Some(name), true) = (&filename, kind != FilmKind::Rgb)
@@ -262,7 +287,6 @@ impl Converter<'_, '_> {
 
     pub fn sampler(&mut self, ty: &str, params: Params) -> Result<()> {
         let spot = params.spot;
-        let known = ["zsobol", "paddedsobol", "sobol", "halton", "pmj02bn", "independent", "stratified"];
         let kind = match ty {
             "independent" => SamplerKind::Independent,
             "random" => {
@@ -273,9 +297,9 @@ impl Converter<'_, '_> {
                 self.upgraded(spot);
                 SamplerKind::Sobol
             }
-            _ if known.contains(&ty) => SamplerKind::Sobol,
+            _ if SAMPLERS.contains(&ty) => SamplerKind::Sobol,
             _ => {
-                self.unknown(spot, "sampler", ty, &known, "zsobol takes its place");
+                self.unknown(spot, "sampler", ty, &SAMPLERS, "zsobol takes its place");
                 SamplerKind::Sobol
             }
         };
@@ -338,8 +362,7 @@ impl Converter<'_, '_> {
             "triangle" => FilterDesc::Triangle { radius: radius(2.0)? },
             _ => {
                 params.ignore_all();
-                let known = ["gaussian", "box", "mitchell", "sinc", "triangle"];
-                self.unknown(spot, "filter", ty, &known, "gaussian takes its place");
+                self.unknown(spot, "filter", ty, &FILTERS, "gaussian takes its place");
                 FilterDesc::default()
             }
         };
@@ -396,12 +419,17 @@ impl Converter<'_, '_> {
                 self.warn(spot, Diagnostic::note(message));
                 IntegratorKind::Caustics
             }
-            "randomwalk" | "function" => {
+            "randomwalk" => {
                 let kind = path(&params)?;
-                params.ignore_all();
-                let message = format!("integrator {} is not rendered: path takes its place", quoted(ty));
-                self.note(spot, message);
+                let message = "integrator \"randomwalk\" is rendered by path, which samples lights, too: those without size are not black";
+                self.warn(spot, Diagnostic::note(message));
                 kind
+            }
+            "function" => {
+                let wrong = Diagnostic::error(
+                    "integrator \"function\" measures samplers, and makes no picture of a scene",
+                );
+                return Err(spot.wrong(wrong.expected(INTEGRATORS.join(", "))));
             }
             _ => {
                 let kind = path(&params)?;
@@ -429,9 +457,8 @@ impl Converter<'_, '_> {
     pub fn accelerator(&mut self, ty: &str, params: Params) -> Result<()> {
         // Lumbre builds its own tree, which does not affect the image.
         params.ignore_all();
-        let known = ["bvh", "kdtree"];
-        if !known.contains(&ty) {
-            self.unknown(params.spot, "accelerator", ty, &known, "none is needed");
+        if !ACCELERATORS.contains(&ty) {
+            self.unknown(params.spot, "accelerator", ty, &ACCELERATORS, "none is needed");
         }
         Ok(())
     }
@@ -462,7 +489,10 @@ impl Converter<'_, '_> {
             "disablepixeljitter" | "disabletexturefiltering" | "disablewavelengthjitter" | "forcediffuse" => {
                 match value {
                     "false" => {}
-                    "true" => self.note(at, format!("the option {} is not rendered yet", quoted(name))),
+                    "true" => self.note(
+                        at,
+                        format!("the option {} is left out: it is for tests of pbrt", quoted(name)),
+                    ),
                     _ => {
                         let wrong = Diagnostic::error(format!("wrong value of the option {}", quoted(name)));
                         return Err(at.wrong(wrong.found(quoted(value)).expected("true or false")));
@@ -470,21 +500,8 @@ impl Converter<'_, '_> {
                 }
             }
             other => {
-                let known = [
-                    "seed",
-                    "wavefront",
-                    "rendercoordsys",
-                    "displacementedgescale",
-                    "pixelstats",
-                    "msereferenceimage",
-                    "msereferenceout",
-                    "disablepixeljitter",
-                    "disabletexturefiltering",
-                    "disablewavelengthjitter",
-                    "forcediffuse",
-                ];
                 let unknown = Diagnostic::warning(format!("unknown option {}", quoted(name)));
-                self.warn(at, unknown.suggest(other, known));
+                self.warn(at, unknown.suggest(other, OPTIONS));
             }
         }
         Ok(())
