@@ -10,7 +10,7 @@ use lumbre_scene::{FilmKind, Scene, View};
 
 use crate::adaptive::{self, Adaptive};
 use crate::clock::Clock;
-use crate::film::{Extras, Tile};
+use crate::film::{Addition, Extras, Tile};
 use crate::integrators::{Integrator, integrator};
 use crate::noise::noise;
 use crate::one_sample::Taker;
@@ -498,13 +498,15 @@ impl Job<'_> {
         let Owner { tile, record, dropped, clamped, first_dropped, .. } = owner;
         let exposure = self.options.sample_exposure();
         self.taker.take(&mut wave, &ids, record, |SampleId { x, y, index }, sample| {
-            if !tile.add(x, y, &sample, &exposure) {
-                *dropped += 1;
-                if first_dropped.len() < REMEMBERED {
-                    first_dropped.push(DroppedSample { x, y, sample: index });
+            match tile.add(x, y, &sample, &exposure) {
+                Addition::Whole => {}
+                Addition::Clamped => *clamped += 1,
+                Addition::Dropped => {
+                    *dropped += 1;
+                    if first_dropped.len() < REMEMBERED {
+                        first_dropped.push(DroppedSample { x, y, sample: index });
+                    }
                 }
-            } else if exposure.clamps(sample.radiance) {
-                *clamped += 1;
             }
         });
         self.waves.lock().unwrap_or_else(PoisonError::into_inner).push(wave);

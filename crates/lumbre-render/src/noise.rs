@@ -77,7 +77,7 @@ mod tests {
     use lumbre_math::random::RandomStream;
 
     use super::*;
-    use crate::film::{Exposure, Extras, Sample};
+    use crate::film::{Addition, Exposure, Extras, Sample};
 
     /// A tile of 64 by 48 pixels of n samples, of which a share has this luminance and the rest 0.1, and its noise.
     fn found(n: u32, share: f64, bright: f64) -> f64 {
@@ -89,7 +89,7 @@ mod tests {
                 let value = if random.next_f64() < share { bright } else { 0.1 };
                 let radiance = Rgb::splat(value as f32);
                 let sample = Sample { radiance, ..Sample::default() };
-                assert!(tile.add(x, y, &sample, &Exposure::default()));
+                assert_eq!(tile.add(x, y, &sample, &Exposure::default()), Addition::Whole);
             }
         }
         noise([&tile].into_iter(), bounds, None).unwrap()
@@ -120,7 +120,7 @@ mod tests {
             for k in 0..256 {
                 let radiance = Rgb::splat(if x == 0 && k % 2 == 0 { 30.0 } else { 0.1 });
                 let sample = Sample { radiance, ..Sample::default() };
-                assert!(tile.add(x, y, &sample, &Exposure::default()));
+                assert_eq!(tile.add(x, y, &sample, &Exposure::default()), Addition::Whole);
             }
         }
         // An error of 15 / 16 beside a mean of 15, in one pixel of 64.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use lumbre_geometry::Ray;
 use lumbre_math::DVec2;
-use lumbre_scene::{CameraRay, FilmKind, Footprint, Interaction, Scene, View};
+use lumbre_scene::{CameraRay, FilmKind, Footprint, Interaction, Pinhole, Scene, View};
 use lumbre_shading::Spectrum;
 use lumbre_shading::spectrum::{SensorCurves, WavelengthDensity, Wavelengths};
 
@@ -23,11 +23,15 @@ const SPACING: f64 = 0.25;
 pub(crate) struct Taker<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) view: View,
+    /// The rays of the view, where lanes make them.
+    pinhole: Option<Pinhole>,
     integrator: &'a dyn Integrator,
     sampler: Sampler,
     filter: Filter,
     /// Whether it matters when a ray looks.
     moves: bool,
+    /// Whether rays from the camera have footprints.
+    has_footprints: bool,
     wants_features: bool,
     /// Whether the one sample of a pixel is in its middle.
     is_centred: bool,
@@ -60,6 +64,8 @@ struct Aim {
     /// The point of the film, in pixels.
     film: DVec2,
     lens: DVec2,
+    /// When it looks.
+    time: f64,
     weight: f64,
 }
 
@@ -80,7 +86,11 @@ impl<'a> Taker<'a> {
         Ok(Self {
             scene,
             moves: scene.moves() || view.moves(),
+            has_footprints: scene.is_textured()
+                || integrator.needs_footprints()
+                || matches!(options.film, FilmKind::GBuffer(_)),
             precision: precision(scene, &view, options),
+            pinhole: view.pinhole(),
             view,
             integrator,
             sampler: Sampler::new(&options.sampler),
@@ -103,16 +113,28 @@ impl<'a> Taker<'a> {
         record: &mut Record,
         mut put: impl FnMut(SampleId, Sample),
     ) {
+        let mut sights = self.start(wave, ids);
+        // Of the filter and of the lens.
         let mut weights = Vec::with_capacity(ids.len());
-        let aimed = ids.iter().map(|&id| {
-            let draw = self.sampler.draw(id.x, id.y, id.index);
-            let aim = self.aim(id, &draw);
-            let camera = self.camera_ray(&draw, &aim);
-            weights.push((aim.weight, camera.weight));
-            (draw, camera)
-        });
-        let mut sights =
-            Sights::new(self.scene, &self.view, wave, self.precision, aimed, self.wavelengths, record);
+        match &self.pinhole {
+            Some(pinhole) => {
+                for (slot, &id) in ids.iter().enumerate() {
+                    let aim = self.aim(id, sights.aim(slot), None);
+                    weights.push((aim.weight, 1.0));
+                    sights.set_film(slot, aim.film, aim.time);
+                }
+                sights.look_through(pinhole, self.has_footprints.then_some(SPACING));
+            }
+            None => {
+                for (slot, &id) in ids.iter().enumerate() {
+                    let aim = self.aim(id, sights.aim(slot), Some(&sights.draw(slot)));
+                    let camera = self.camera_ray(&aim);
+                    weights.push((aim.weight, camera.weight));
+                    sights.set_ray(slot, &camera);
+                }
+            }
+        }
+        sights.search(record);
         let seen = self.see(&mut sights, record);
         for (slot, ((&id, &(weight, passes)), &radiance)) in
             ids.iter().zip(&weights).zip(sights.radiance()).enumerate()
@@ -204,7 +226,7 @@ impl<'a> Taker<'a> {
                     let at = surface_point(met);
                     SurfaceSample::of(&self.view, space, &sight.ray, &at, SPACING)
                 });
-                let left = self.left_by_media(&sight, draw);
+                let left = self.left_by_media(&sight, &draw);
                 let features = features.map(|features| feature_sample(features.behind(left)));
                 if sight.met.is_none() && left != Spectrum::WHITE && !self.lights_are_seen {
                     // What is seen is the medium alone.
@@ -212,7 +234,7 @@ impl<'a> Taker<'a> {
                         SeenSample { caught: None, features, surface, covered: Some(Spectrum::WHITE - left) };
                     return true;
                 }
-                let caught = caught(self.scene, &sight, draw, self.lights_are_seen, record);
+                let caught = caught(self.scene, &sight, &draw, self.lights_are_seen, record);
                 seen[slot] = SeenSample { caught, features, surface, covered: None };
                 caught.is_none()
             });
@@ -238,46 +260,49 @@ impl<'a> Taker<'a> {
         self.scene.transmittance(self.view.medium(), &ray.with_range(0.0, end), draw.along(&ray), None)
     }
 
-    fn aim(&self, id: SampleId, draw: &Draw) -> Aim {
-        let place = self.filter.sample(draw.filter());
-        let pixel = DVec2::new(f64::from(id.x) + 0.5, f64::from(id.y) + 0.5);
-        // A lens without width has no place but its middle.
-        let lens = if self.view.has_lens() { draw.lens() } else { DVec2::splat(0.5) };
-        let offset = if self.is_centred { DVec2::ZERO } else { place.offset };
-        Aim { film: pixel + offset, lens, weight: place.weight }
+    /// Takes up samples.
+    fn start<'w>(&'w self, wave: &'w mut Wave<'a>, ids: &[SampleId]) -> Sights<'w, 'a> {
+        Sights::start(self.scene, &self.view, wave, self.precision, &self.sampler, ids, self.wavelengths)
     }
 
-    fn camera_ray(&self, draw: &Draw, aim: &Aim) -> CameraRay {
-        let part = if self.moves { draw.time() } else { 0.0 };
-        let time = self.view.time(part);
-        let wants_slopes = matches!(self.film, FilmKind::GBuffer(_));
-        if self.scene.is_textured() || self.integrator.needs_footprints() || wants_slopes {
-            self.view.ray(aim.film, aim.lens, time, SPACING)
+    /// Where a sample looks, by the numbers of [`Draw::aim`]. A lens without width has no point but its middle.
+    fn aim(&self, id: SampleId, [u, v, part, _]: [f32; 4], draw: Option<&Draw>) -> Aim {
+        let place = self.filter.sample(DVec2::new(u.into(), v.into()));
+        let pixel = DVec2::new(f64::from(id.x) + 0.5, f64::from(id.y) + 0.5);
+        let offset = if self.is_centred { DVec2::ZERO } else { place.offset };
+        let lens = draw.filter(|_| self.view.has_lens()).map_or(DVec2::splat(0.5), Draw::lens);
+        let time = self.view.time(if self.moves { part.into() } else { 0.0 });
+        Aim { film: pixel + offset, lens, time, weight: place.weight }
+    }
+
+    fn camera_ray(&self, aim: &Aim) -> CameraRay {
+        if self.has_footprints {
+            self.view.ray(aim.film, aim.lens, aim.time, SPACING)
         } else {
-            self.view.bare_ray(aim.film, aim.lens, time)
+            self.view.bare_ray(aim.film, aim.lens, aim.time)
         }
     }
 
     /// A sample with all that leads to it.
     fn explain(&self, id: SampleId) -> ExplainedSample {
         let draw = self.sampler.draw(id.x, id.y, id.index);
-        let Aim { film, lens, weight } = self.aim(id, &draw);
-        let camera = self.camera_ray(&draw, &Aim { film, lens, weight });
-        let (ray, radiance, events) = self.explain_sight(draw, camera);
+        let aim = self.aim(id, draw.aim(), Some(&draw));
+        let camera = self.camera_ray(&aim);
+        let (ray, radiance, events) = self.explain_sight(id, &camera);
         let radiance = through_lens(radiance, camera.weight);
-        ExplainedSample { film, lens, ray, radiance, weight, events }
+        ExplainedSample { film: aim.film, lens: aim.lens, ray, radiance, weight: aim.weight, events }
     }
 
-    /// The light along a ray, and what happens along its path.
-    fn explain_sight(&self, draw: Draw, camera: CameraRay) -> (Ray, Spectrum, Vec<Event>) {
+    /// The light along a ray with the numbers of a sample, and what happens along its path.
+    fn explain_sight(&self, id: SampleId, camera: &CameraRay) -> (Ray, Spectrum, Vec<Event>) {
         let (mut wave, mut record) = (Wave::default(), Record::with_journal());
-        let one = std::iter::once((draw, camera));
-        // What is told of a path is told in colours.
-        let mut sights =
-            Sights::new(self.scene, &self.view, &mut wave, self.precision, one, None, &mut record);
+        let mut sights = self.start(&mut wave, &[id]);
+        sights.set_ray(0, camera);
+        sights.search(&mut record);
+        let ray = sights.ray(0);
         let seen = self.see(&mut sights, &mut record).first().and_then(|seen| seen.caught);
         let radiance = seen.map_or(sights.radiance()[0], |seen| seen.radiance);
-        (sights.ray(0), radiance, record.journal.unwrap_or_default())
+        (ray, radiance, record.journal.unwrap_or_default())
     }
 }
 
@@ -382,9 +407,8 @@ pub fn explain_ray(
 ) -> Result<(Spectrum, Vec<Event>), RenderError> {
     let integrator = integrator(&options.integrator);
     let taker = Taker::new(scene, options, &*integrator)?;
-    // With the random numbers of a pixel.
-    let draw = taker.sampler.draw(0, 0, index);
     let camera = CameraRay { ray: *ray, footprint: Footprint::Point, weight: 1.0 };
-    let (_, radiance, events) = taker.explain_sight(draw, camera);
+    // With the random numbers of a pixel.
+    let (_, radiance, events) = taker.explain_sight(SampleId { x: 0, y: 0, index }, &camera);
     Ok((radiance, events))
 }

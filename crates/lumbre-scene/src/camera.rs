@@ -8,6 +8,7 @@ use lumbre_math::warp64::{equal_area_square_to_sphere, equal_area_wrap, square_t
 use lumbre_math::{
     AnimatedTransform, DAffine3, DMat3, DVec2, DVec3, Elementary, SingularTransformError, Transform,
 };
+use lumbre_simd::{Double, Real, V3};
 
 use crate::viewpoint::half_window;
 use crate::{Footprint, Lens, MediumId};
@@ -406,6 +407,17 @@ impl View {
         }
     }
 
+    /// The rays of a perspective camera with a point for a lens that stands still; `None` for others.
+    pub fn pinhole(&self) -> Option<Pinhole> {
+        let CameraKind::Perspective { lens_radius, .. } = self.kind else { return None };
+        (lens_radius <= 0.0 && self.motion.is_none()).then(|| Pinhole {
+            origin: self.world_from_camera.point(DVec3::ZERO),
+            axes: self.world_from_camera.linear(),
+            corner: self.corner,
+            step: self.step,
+        })
+    }
+
     /// The world-space origin, the unit direction, and the weight.
     fn line(&self, placement: &Transform, film: DVec2, lens: DVec2) -> (DVec3, DVec3, f64) {
         let on_screen = self.on_screen(film);
@@ -442,6 +454,34 @@ impl View {
             }
         };
         (placement.point(origin), placement.vector(direction).normalize(), weight)
+    }
+}
+
+/// The rays of a perspective camera all of which start at one point: those of [`View::bare_ray`], to the bit, for lanes.
+#[derive(Clone, Copy, Debug)]
+pub struct Pinhole {
+    origin: DVec3,
+    /// From camera space to the world.
+    axes: DMat3,
+    corner: DVec2,
+    step: DVec2,
+}
+
+impl Pinhole {
+    /// Where all rays start.
+    pub fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    /// The unit directions of the rays through points of the film, in pixels.
+    #[inline(always)]
+    pub fn directions<R: Real>(&self, [x, y]: [R::Double; 2]) -> V3<R::Double> {
+        let splat = R::Double::splat;
+        let x = splat(self.corner.x) + splat(self.step.x) * x;
+        let y = splat(self.corner.y) + splat(self.step.y) * y;
+        let DMat3 { x_axis, y_axis, z_axis } = self.axes;
+        let (right, up) = (V3::constant_f64(x_axis.to_array()), V3::constant_f64(y_axis.to_array()));
+        (right * x + up * y + V3::constant_f64(z_axis.to_array())).normalize_f64()
     }
 }
 
@@ -503,6 +543,26 @@ mod tests {
         assert!((top - eye - 3.0 * up).length() < 1e-12, "{top}");
         assert!(Camera::perspective(eye, eye, up, 40.0).is_err());
         assert!(Camera::perspective(eye, eye + up, up, 40.0).is_err());
+    }
+
+    #[test]
+    fn a_pinhole_has_the_rays_of_its_view_to_the_bit() {
+        let place = Transform::translate(DVec3::new(0.3, -7.1, 2.9))
+            * Transform::rotate(DVec3::new(1.0, 2.0, -0.5), 0.7).unwrap();
+        let view = View::new(&Camera::new(perspective(37.0, 0.0, 1.0), place), 300, 170);
+        let pinhole = view.pinhole().unwrap();
+        for i in 0..1000 {
+            let film = DVec2::new(f64::from(i % 40) * 7.3, f64::from(i / 40) * 6.9);
+            let V3 { x, y, z } = pinhole.directions::<f32>([film.x, film.y]);
+            let ray = view.bare_ray(film, MIDDLE, 0.0).ray;
+            assert_eq!((pinhole.origin(), DVec3::new(x, y, z)), (ray.origin, ray.direction), "{film}");
+        }
+        assert!(View::new(&camera(perspective(37.0, 0.1, 1.0)), 30, 20).pinhole().is_none());
+        assert!(
+            View::new(&camera(CameraKind::Spherical { mapping: Default::default() }), 30, 20)
+                .pinhole()
+                .is_none()
+        );
     }
 
     #[test]

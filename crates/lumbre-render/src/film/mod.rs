@@ -23,7 +23,7 @@ pub use guide::{Count, FEATURES, GROUPS, GuideSums, RatioSums};
 pub use guides::Guides;
 pub use pixel::{FeatureSample, FeatureSums, Pixel, Tint};
 pub use surface::{SurfaceSample, SurfaceSums};
-pub use tile::{Exposure, Extras, Sample, Tile};
+pub use tile::{Addition, Exposure, Extras, Sample, Tile};
 
 pub(crate) use buckets::{ATTRIBUTES, channel_name};
 pub(crate) use pixel::{MAX_LUMINANCE, MAX_SAMPLE};

@@ -30,11 +30,6 @@ impl Default for Exposure {
 }
 
 impl Exposure {
-    /// Whether a sample of this radiance is brighter than any counts for: it is added as bright as that.
-    pub fn clamps(&self, radiance: Rgb) -> bool {
-        f64::from(self.colour(radiance).max_component()) > MAX_SAMPLE
-    }
-
     /// The factor that dims a sample which is brighter than any may be.
     fn hold(&self, radiance: Rgb) -> f32 {
         let most = (radiance * self.factor).max_component();
@@ -47,6 +42,17 @@ impl Exposure {
         let [red, green, blue] = self.sensor.map(|[r, g, b]| r * held.r + g * held.g + b * held.b);
         Rgb::new(red, green, blue)
     }
+}
+
+/// What became of a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Addition {
+    /// It was added.
+    Whole,
+    /// It was added less bright than it is: brighter ones do not fit.
+    Clamped,
+    /// It was not: it is not finite, or its pixel is elsewhere.
+    Dropped,
 }
 
 /// What one sample adds to its pixel.
@@ -204,12 +210,11 @@ impl Tile {
         self.sums.tints.iter().any(|tint| *tint != Tint::default())
     }
 
-    /// Adds a sample to the pixel in column `x` and row `y` of the picture. False, and nothing is added, when the sample
-    /// is not finite or the pixel is elsewhere.
-    pub fn add(&mut self, x: u32, y: u32, sample: &Sample, exposure: &Exposure) -> bool {
+    /// Adds a sample to the pixel in column `x` and row `y` of the picture.
+    pub fn add(&mut self, x: u32, y: u32, sample: &Sample, exposure: &Exposure) -> Addition {
         let b = &self.bounds;
         if !(b.x0 <= x && x < b.x1 && b.y0 <= y && y < b.y1) {
-            return false;
+            return Addition::Dropped;
         }
         let colour = exposure.colour(sample.radiance);
         let position = b.position(x, y);
@@ -217,7 +222,7 @@ impl Tile {
         let pixel = &mut sums.pixels[position];
         pixel.taken += 1;
         if !sample.coverage.is_finite() || !pixel.add(colour, sample.coverage.average(), sample.weight) {
-            return false;
+            return Addition::Dropped;
         }
         if let Some(tint) = sums.tints.get_mut(position) {
             tint.add(sample.coverage, sample.weight);
@@ -250,7 +255,8 @@ impl Tile {
             guide.shadow.add(weighted(shadow), ground, is_odd);
             guide.add_features(sample.features.as_ref(), sample.weight as f32);
         }
-        true
+        let is_clamped = f64::from(colour.max_component()) > MAX_SAMPLE;
+        if is_clamped { Addition::Clamped } else { Addition::Whole }
     }
 
     /// The part of it in these bounds, and nothing where it has none.
@@ -452,11 +458,11 @@ mod tests {
         let coverage = Rgb::splat(0.25);
         let sample = |radiance| Sample { radiance, coverage, ..Sample::default() };
         let exposure = Exposure { factor: 2.0, max_component: 6.0, ..Exposure::default() };
-        assert!(tile.add(6, 9, &sample(Rgb::new(1.0, 2.0, 3.0)), &exposure));
-        assert!(!tile.add(9, 9, &sample(Rgb::WHITE), &exposure));
-        assert!(!tile.add(6, 6, &sample(Rgb::WHITE), &exposure));
-        assert!(!tile.add(6, 9, &sample(Rgb::new(1.0, f32::NAN, 1.0)), &exposure));
-        assert!(!tile.add(6, 9, &sample(Rgb::new(f32::INFINITY, 1.0, 1.0)), &exposure));
+        assert_eq!(tile.add(6, 9, &sample(Rgb::new(1.0, 2.0, 3.0)), &exposure), Addition::Whole);
+        assert_eq!(tile.add(9, 9, &sample(Rgb::WHITE), &exposure), Addition::Dropped);
+        assert_eq!(tile.add(6, 6, &sample(Rgb::WHITE), &exposure), Addition::Dropped);
+        assert_eq!(tile.add(6, 9, &sample(Rgb::new(1.0, f32::NAN, 1.0)), &exposure), Addition::Dropped);
+        assert_eq!(tile.add(6, 9, &sample(Rgb::new(f32::INFINITY, 1.0, 1.0)), &exposure), Addition::Dropped);
         let lit: Vec<_> = tile.pixels().iter().map(Pixel::colour).collect();
         for (i, colour) in lit.into_iter().enumerate() {
             let expected = if i == 2 * 4 + 1 { Rgb::new(2.0, 4.0, 6.0) } else { Rgb::BLACK };
@@ -471,7 +477,7 @@ mod tests {
         let mut tile = Tile::new(PixelBounds { x0: 5, y0: 7, x1: 10, y1: 10 }, Extras::default());
         let sample = |value| Sample { radiance: Rgb::splat(value), ..Sample::default() };
         for (x, y, value) in [(5, 7, 1.0), (7, 7, 2.0), (9, 7, 3.0), (5, 9, 4.0), (6, 8, 9.0)] {
-            assert!(tile.add(x, y, &sample(value), &Exposure::default()));
+            assert_eq!(tile.add(x, y, &sample(value), &Exposure::default()), Addition::Whole);
         }
         tile.spread(2);
         let shown: Vec<f32> = tile.pixels().iter().map(|pixel| pixel.colour().g).collect();
@@ -488,7 +494,7 @@ mod tests {
         for tile in &mut tiles {
             for (coverage, weight) in covered.into_iter().zip([1.0, 3.0]) {
                 let sample = Sample { coverage, weight, ..Sample::default() };
-                assert!(tile.add(7, 8, &sample, &Exposure::default()));
+                assert_eq!(tile.add(7, 8, &sample, &Exposure::default()), Addition::Whole);
             }
         }
         let [by_colour, alike] = tiles.each_ref().map(|tile| tile.coverages().collect::<Vec<_>>());

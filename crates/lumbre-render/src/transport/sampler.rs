@@ -15,7 +15,7 @@ pub struct Sampler {
     seed: u64,
 }
 
-/// Where in the pixel, and when a ray looks.
+/// Where in the pixel, when a ray looks, and at which wavelengths.
 const FILTER: u32 = 0;
 /// Where on the lens.
 const LENS: u32 = 1;
@@ -37,8 +37,14 @@ impl Sampler {
     /// The numbers of one sample of the pixel in column `x` and row `y`.
     #[inline]
     pub fn draw(&self, x: u32, y: u32, index: u32) -> Draw {
+        Draw { kind: self.kind, pixel: self.pixel(x, y), index }
+    }
+
+    /// The words of the samples of a pixel that all their numbers are made of.
+    #[inline]
+    pub(crate) fn pixel(&self, x: u32, y: u32) -> [u32; 2] {
         let key = PixelRandom::new(self.seed, x, y).key();
-        Draw { kind: self.kind, pixel: [key as u32, (key >> 32) as u32], index }
+        [key as u32, (key >> 32) as u32]
     }
 
     /// The kind of all numbers.
@@ -68,6 +74,12 @@ pub(crate) struct LaneDraw<R: Real> {
 }
 
 impl<R: Real> LaneDraw<R> {
+    /// Where in the pixel filter, which part of the exposure is over, and which wavelengths.
+    #[inline(always)]
+    pub(crate) fn aim(&self) -> [R; 4] {
+        self.four(R::UInt::splat(FILTER))
+    }
+
     /// Where on a light, which light, and further digits of that.
     #[inline(always)]
     pub(crate) fn light(&self, vertex: R::UInt) -> [R; 4] {
@@ -144,9 +156,9 @@ fn sobol_one<U: UInt>(reversed_index: U, keys: [U; 2]) -> U {
 }
 
 impl Draw {
-    /// The words that all numbers are made of: of the pixel, and the index of the sample.
-    pub(crate) fn words(&self) -> ([u32; 2], u32) {
-        (self.pixel, self.index)
+    /// The numbers of a sample by the words of its pixel: see [`Sampler::pixel`].
+    pub(crate) fn new(kind: SamplerKind, pixel: [u32; 2], index: u32) -> Self {
+        Self { kind, pixel, index }
     }
 
     fn four(&self, label: u32) -> [f32; 4] {
@@ -159,24 +171,25 @@ impl Draw {
         DVec2::new(x.into(), y.into())
     }
 
+    /// Where in the pixel filter (two numbers); which part of the exposure is over when the ray looks, and which wavelengths: even over
+    /// the samples of a pixel.
+    pub fn aim(&self) -> [f32; 4] {
+        self.four(FILTER)
+    }
+
     /// Where in the pixel filter.
     pub fn filter(&self) -> DVec2 {
         self.two(FILTER)
     }
 
+    /// Which part of the exposure is over when the ray looks.
+    pub fn time(&self) -> f64 {
+        self.aim()[2].into()
+    }
+
     /// Where on the lens.
     pub fn lens(&self) -> DVec2 {
         self.two(LENS)
-    }
-
-    /// Which part of the exposure is over when the ray looks: even over the samples of a pixel.
-    pub fn time(&self) -> f64 {
-        self.four(FILTER)[2].into()
-    }
-
-    /// Which wavelengths: even over the samples of a pixel.
-    pub fn wavelength(&self) -> f32 {
-        self.four(FILTER)[3]
     }
 
     /// Which light, at a vertex: a multiple of 2⁻⁴⁸.
@@ -277,7 +290,7 @@ mod tests {
                 sampler(3).draw(5, 7, 12),
             ];
             for other in others {
-                assert_ne!(base.filter(), other.filter());
+                assert_ne!(base.aim(), other.aim());
                 assert_ne!(base.light_choice(2), other.light_choice(2));
             }
             assert_ne!(base.direction(2), base.direction(3));
@@ -322,7 +335,7 @@ mod tests {
         let sampler = Sampler::new(&SamplerDesc { kind: SamplerKind::Sobol, spp: None, seed: 9 });
         let mut cells = [0; 64];
         for index in 64..128 {
-            cells[(sampler.draw(13, 2, index).time() * 64.0) as usize] += 1;
+            cells[(sampler.draw(13, 2, index).aim()[2] * 64.0) as usize] += 1;
         }
         assert_eq!(cells, [1; 64]);
     }

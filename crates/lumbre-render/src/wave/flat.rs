@@ -1,7 +1,8 @@
 //! Vertices on flat triangles, in lanes: points with their errors, normals, and the light that such surfaces emit.
 
-use lumbre_scene::TriangleSurface;
+use lumbre_math::Vec3;
 use lumbre_scene::light::lanes::Receiver;
+use lumbre_scene::{SurfaceTable, TriangleSurface};
 use lumbre_shading::Spectrum;
 use lumbre_simd::math::orthonormal_basis;
 use lumbre_simd::{Double, Job, Mask, Real, UInt, V3};
@@ -22,6 +23,8 @@ pub(crate) struct FlatHits {
     pub(crate) row: Vec<u32>,
     /// [`LIT_FROM_BELOW`] or 0.
     pub(crate) flags: Vec<u32>,
+    /// The corners of each triangle in its mesh.
+    pub(crate) indices: Vec<[u32; 3]>,
     /// The corners relative to the origin, corner by corner.
     corners: [Vec<f32>; 9],
     origin: [Vec<f64>; 3],
@@ -36,6 +39,7 @@ impl FlatHits {
     /// Forgets all, with room for `len` hits.
     pub(crate) fn reset(&mut self, len: usize) {
         self.len = 0;
+        self.indices.clear();
         for column in [&mut self.path, &mut self.id, &mut self.triangle, &mut self.row, &mut self.flags] {
             grow(column, len);
         }
@@ -49,8 +53,8 @@ impl FlatHits {
     }
 
     /// The surface of a hit.
-    pub(crate) fn surface<'s>(&self, setting: &Setting<'s>, at: usize) -> Option<&'s TriangleSurface> {
-        setting.scene.tables().surface(self.id[at])
+    pub(crate) fn surface<'s>(&self, surfaces: &'s SurfaceTable, at: usize) -> Option<&'s TriangleSurface> {
+        surfaces.surface(self.id[at])
     }
 
     /// Notes what a path met.
@@ -63,13 +67,6 @@ impl FlatHits {
         self.triangle[at] = met.triangle;
         self.row[at] = surface.bsdf.map_or(0, |bsdf| bsdf.row);
         self.flags[at] = if surface.transmits { LIT_FROM_BELOW } else { 0 };
-        let corners = surface.mesh.indices[met.triangle as usize];
-        for (corner, columns) in corners.into_iter().zip(self.corners.chunks_exact_mut(3)) {
-            let position = surface.mesh.positions[corner as usize];
-            columns[0][at] = position.x;
-            columns[1][at] = position.y;
-            columns[2][at] = position.z;
-        }
         for (column, x) in self.origin.iter_mut().zip(surface.mesh.origin.to_array()) {
             column[at] = x;
         }
@@ -83,6 +80,29 @@ impl FlatHits {
         for (column, x) in self.emission.iter_mut().zip([radiance[0], radiance[1], radiance[2], sides]) {
             column[at] = x;
         }
+    }
+
+    /// Reads the corners of all triangles. In loops of their own, which are so short that the processor waits for the memory of many
+    /// triangles at once.
+    pub(crate) fn load(&mut self, surfaces: &SurfaceTable) {
+        let met = self.id.iter().zip(&self.triangle).take(self.len);
+        self.indices.extend(met.map(|(&id, &triangle)| {
+            surfaces.surface(id).map_or([0; 3], |surface| surface.mesh.indices[triangle as usize])
+        }));
+        for (at, (&id, corners)) in self.id.iter().zip(&self.indices).enumerate() {
+            let Some(surface) = surfaces.surface(id) else { continue };
+            put_corners(&mut self.corners, at, corners.map(|corner| surface.mesh.positions[corner as usize]));
+        }
+    }
+}
+
+/// Writes the vectors of three corners, corner by corner.
+#[inline]
+pub(crate) fn put_corners(columns: &mut [Vec<f32>; 9], at: usize, corners: [Vec3; 3]) {
+    for (corner, columns) in corners.into_iter().zip(columns.chunks_exact_mut(3)) {
+        columns[0][at] = corner.x;
+        columns[1][at] = corner.y;
+        columns[2][at] = corner.z;
     }
 }
 

@@ -81,7 +81,7 @@ impl<'s> Wave<'s> {
     ) -> bool {
         let way = Way { origin: ray.at(start), direction: ray.direction, length: end - start };
         let throughput = self.paths.throughput(path);
-        let numbers = self.slots.draws[slot].passage(self.slots.distance_samples[slot]);
+        let numbers = self.slots.draw(slot).passage(self.slots.distance_samples[slot]);
         self.slots.distance_samples[slot] += 1;
         let wavelengths = self.slots.wavelengths.get(slot);
         let passage = setting.scene.medium(medium).sample(&way, throughput, numbers, wavelengths);
@@ -132,7 +132,7 @@ impl<'s> Wave<'s> {
         let (scene, from) = (setting.scene, collision.point);
         let path = collision.path as usize;
         let slot = self.paths.slot[path] as usize;
-        let (draw, time) = (&self.slots.draws[slot], self.slots.time[slot]);
+        let (draw, time) = (self.slots.draw(slot), self.slots.time[slot]);
         let depth = self.paths.depth[path] & !SCATTERED;
         let (choose, u) = (draw.light_choice(depth), draw.light_point(depth));
         let sampling = match setting.strategy {
@@ -187,7 +187,7 @@ impl<'s> Wave<'s> {
     ) {
         let path = collision.path as usize;
         let slot = self.paths.slot[path] as usize;
-        let draw = &self.slots.draws[slot];
+        let draw = self.slots.draw(slot);
         let vertex = self.paths.depth[path] & !SCATTERED;
         let asymmetry = setting.scene.medium(collision.medium).asymmetry();
         let incoming = self.paths.direction(path);

@@ -1,11 +1,12 @@
 //! Many paths side by side: plain data in columns, and stages that take them all one step further.
 //!
-//! A wave holds some thousand samples ([`Slots`]), each with its path ([`Paths`]). A bounce goes through the stages: the closest hits
+//! A wave holds some thousand samples ([`Slots`]), each with its path ([`Paths`]), which starts at the camera ([`camera`]). A bounce goes through the stages: the closest hits
 //! of all rays ([`search`]); what media do on the way there ([`media`]); what they met, written down as plain numbers, with emission
 //! and materials ([`surfaces`]); a light
 //! and a direction to go on in, for all of them ([`shade`]); what comes through of the lights ([`shadows`]). What a path does depends on
 //! nothing but its sample: neither the size of the wave nor the other paths in it show in the picture.
 
+mod camera;
 pub(crate) mod catcher;
 mod escape;
 mod flat;
@@ -43,6 +44,7 @@ pub(crate) use sights::cone;
 
 use crate::transport::Record;
 use crate::transport::journal::{End, Event, Source};
+use crate::wave::camera::Aims;
 use crate::wave::escape::Escape;
 use crate::wave::flat::FlatHits;
 use crate::wave::pairs::{Merge, MergeKind, Merges};
@@ -61,6 +63,7 @@ pub(crate) const WAVE: usize = 4096;
 /// A wave's columns, kept from one wave to the next.
 #[derive(Debug, Default)]
 pub(crate) struct Wave<'s> {
+    aims: Aims,
     slots: Slots<'s>,
     paths: Paths,
     /// The same paths after the bounce.

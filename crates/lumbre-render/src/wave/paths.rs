@@ -2,13 +2,13 @@
 
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Vec3};
-use lumbre_scene::{Boundary, CameraRay, Footprint, MediumId};
+use lumbre_scene::{Boundary, Footprint, MediumId, SamplerKind};
 use lumbre_shading::Spectrum;
-use lumbre_shading::spectrum::{SpectralLookup, Wavelengths};
+use lumbre_shading::spectrum::{SpectralLookup, WavelengthDensity, Wavelengths};
 use lumbre_simd::{Double, Mask, Real, UInt, V3};
 
-use crate::transport::Draw;
 use crate::transport::interior::Interiors;
+use crate::transport::{Draw, Sampler};
 
 /// Lanes beyond the last that a column has room for: a store writes whole vectors.
 pub(crate) const PAD: usize = 16;
@@ -54,16 +54,19 @@ pub(crate) struct SampleId {
 /// What belongs to a sample for as long as its path goes on.
 #[derive(Debug, Default)]
 pub(crate) struct Slots<'s> {
-    /// Its random numbers, for code that takes one path at a time.
-    pub(crate) draws: Vec<Draw>,
-    /// The words of [`Draw`], for lanes: those of the pixel, and the number of the sample.
+    /// How many samples there are.
+    pub(crate) len: usize,
+    /// What random numbers are made of: the sampler's kind, words of the pixel, and the number of the sample.
+    kind: SamplerKind,
     pub(crate) pixel: [Vec<u32>; 2],
     pub(crate) index: Vec<u32>,
     /// When its rays look.
     pub(crate) time: Vec<f64>,
-    /// The ray from the camera, and its footprint; none in a scene without textures.
-    pub(crate) rays: Vec<Ray>,
+    /// The footprints of rays from the camera; none in a scene without textures.
     pub(crate) footprints: Vec<Footprint>,
+    /// Whether they are those of rays from one point, with these directions to the right and below.
+    pub(crate) has_neighbours: bool,
+    pub(crate) neighbours: [[Vec<f64>; 3]; 2],
     /// The light that the path has found.
     pub(crate) radiance: Vec<Spectrum>,
     /// The solids that it is inside of; empty in a scene without solids.
@@ -82,15 +85,18 @@ pub(crate) struct Slots<'s> {
 }
 
 impl Slots<'_> {
-    /// Forgets all samples.
-    pub(crate) fn clear(&mut self) {
-        self.draws.clear();
-        self.pixel.iter_mut().for_each(Vec::clear);
-        self.index.clear();
-        self.time.clear();
-        self.rays.clear();
+    /// Forgets all samples, and takes up others.
+    pub(crate) fn start(&mut self, sampler: &Sampler, ids: &[SampleId]) {
+        (self.len, self.kind) = (ids.len(), sampler.kind());
+        self.pixel.iter_mut().chain([&mut self.index]).for_each(|column| grow(column, ids.len()));
+        for (slot, id) in ids.iter().enumerate() {
+            [self.pixel[0][slot], self.pixel[1][slot]] = sampler.pixel(id.x, id.y);
+            self.index[slot] = id.index;
+        }
+        fill(&mut self.time, ids.len(), 0.0);
+        fill(&mut self.radiance, ids.len(), Spectrum::BLACK);
         self.footprints.clear();
-        self.radiance.clear();
+        self.has_neighbours = false;
         self.interiors.clear();
         self.medium.clear();
         self.wavelengths.clear();
@@ -100,10 +106,39 @@ impl Slots<'_> {
         self.widths.clear();
     }
 
-    /// The ray from the camera of a sample.
-    pub(crate) fn camera(&self, slot: usize) -> CameraRay {
-        let footprint = self.footprints.get(slot).copied().unwrap_or_default();
-        CameraRay { ray: self.rays[slot], footprint, weight: 1.0 }
+    /// Gives all samples wavelengths, by a number of each.
+    pub(crate) fn choose_wavelengths(&mut self, density: WavelengthDensity, numbers: &[f32]) {
+        self.wavelengths.extend(numbers[..self.len].iter().map(|&u| density.sample(u)));
+        self.is_alone.resize(self.len, false);
+    }
+
+    /// Starts all paths outside of solids.
+    pub(crate) fn start_outside(&mut self) {
+        let wavelengths = (0..self.len).map(|slot| self.wavelengths.get(slot).copied());
+        self.interiors.extend(wavelengths.map(Interiors::of));
+        self.collisions.resize(self.len, 0);
+        self.distance_samples.resize(self.len, 0);
+    }
+
+    /// Starts all paths in a medium.
+    pub(crate) fn start_in(&mut self, medium: Option<MediumId>) {
+        self.medium.resize(self.len, to_column(medium));
+        self.distance_samples.resize(self.len, 0);
+    }
+
+    /// The random numbers of a sample, for code that takes one path at a time.
+    #[inline]
+    pub(crate) fn draw(&self, slot: usize) -> Draw {
+        Draw::new(self.kind, [self.pixel[0][slot], self.pixel[1][slot]], self.index[slot])
+    }
+
+    /// The footprint of the ray from the camera of a sample, which starts at `origin`.
+    pub(crate) fn footprint(&self, slot: usize, origin: DVec3) -> Footprint {
+        if !self.has_neighbours {
+            return self.footprints.get(slot).copied().unwrap_or_default();
+        }
+        let [x_direction, y_direction] = self.neighbours.each_ref().map(|columns| at(columns, slot));
+        Footprint::Neighbours { x_origin: origin, x_direction, y_origin: origin, y_direction }
     }
 
     /// What colours are to a sample; `None` in RGB.
@@ -111,40 +146,17 @@ impl Slots<'_> {
         let wavelengths = *self.wavelengths.get(slot)?;
         Some(SpectralLookup { wavelengths, is_unbounded: false })
     }
+}
 
-    /// Adds a sample. In a scene with media, `medium` is what the camera stands in; in a spectral render it has wavelengths.
-    pub(crate) fn push(
-        &mut self,
-        draw: Draw,
-        camera: &CameraRay,
-        has_solids: bool,
-        medium: Option<u32>,
-        wavelengths: Option<Wavelengths>,
-    ) {
-        let (pixel, index) = draw.words();
-        self.draws.push(draw);
-        self.pixel[0].push(pixel[0]);
-        self.pixel[1].push(pixel[1]);
-        self.index.push(index);
-        self.time.push(camera.ray.time);
-        self.rays.push(camera.ray);
-        if camera.footprint != Footprint::Point {
-            // The rays before that have none, such as those that a lens stops, keep their places.
-            self.footprints.resize(self.rays.len() - 1, Footprint::Point);
-            self.footprints.push(camera.footprint);
-        }
-        self.radiance.push(Spectrum::BLACK);
-        if has_solids {
-            self.interiors.push(Interiors::of(wavelengths));
-            self.collisions.push(0);
-        }
-        self.medium.extend(medium);
-        self.wavelengths.extend(wavelengths);
-        self.is_alone.extend(wavelengths.map(|_| false));
-        if has_solids || medium.is_some() {
-            self.distance_samples.push(0);
-        }
-    }
+/// A vector of columns.
+fn at(columns: &[Vec<f64>; 3], at: usize) -> DVec3 {
+    DVec3::new(columns[0][at], columns[1][at], columns[2][at])
+}
+
+/// Gives a list this many equal entries.
+fn fill<T: Clone>(column: &mut Vec<T>, len: usize, value: T) {
+    column.clear();
+    column.resize(len, value);
 }
 
 /// Paths on their way, each with the ray that it follows next.
@@ -222,6 +234,21 @@ pub(crate) struct Collision {
 }
 
 impl Paths {
+    /// Drops all paths, and starts one from each of `len` samples, whose rays are still to be given.
+    pub(crate) fn start(&mut self, len: usize) {
+        self.reserve(len);
+        self.len = len;
+        self.slot[..len].iter_mut().zip(0..).for_each(|(to, slot)| *to = slot);
+        self.receiver.iter_mut().for_each(|column| column[..len].fill(0.0));
+        self.throughput.iter_mut().for_each(|column| column[..len].fill(1.0));
+        self.eta_scale[..len].fill(1.0);
+        self.pdf[..len].fill(f32::INFINITY);
+        self.merging[..len].fill(f32::INFINITY);
+        self.depth[..len].fill(0);
+        self.width[..len].fill(0.0);
+        self.spread[..len].fill(0.0);
+    }
+
     /// Appends a path, for which there is room.
     pub(crate) fn push_one(&mut self, path: &OnePath) {
         self.put(self.len, path);
@@ -240,6 +267,19 @@ impl Paths {
             }
         }
         self.len = kept;
+    }
+
+    /// Sets the ray of a path, and the cone around it.
+    pub(crate) fn set_ray(
+        &mut self,
+        path: usize,
+        origin: DVec3,
+        direction: Vec3,
+        (width, spread): (f32, f32),
+    ) {
+        self.origin.iter_mut().zip(origin.to_array()).for_each(|(column, x)| column[path] = x);
+        self.direction.iter_mut().zip(direction.to_array()).for_each(|(column, x)| column[path] = x);
+        (self.width[path], self.spread[path]) = (width, spread);
     }
 
     /// The path at a position.
@@ -325,7 +365,7 @@ impl Paths {
     }
 
     pub(crate) fn origin(&self, path: usize) -> DVec3 {
-        DVec3::new(self.origin[0][path], self.origin[1][path], self.origin[2][path])
+        at(&self.origin, path)
     }
 
     pub(crate) fn receiver(&self, path: usize) -> Vec3 {

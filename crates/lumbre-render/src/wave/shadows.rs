@@ -32,7 +32,7 @@ pub(crate) struct Shadows<'s> {
     /// Segments that panes let through.
     pub(crate) panes: Vec<Pane<'s>>,
     rays: Vec<Ray>,
-    /// For rays in single precision: their directions and ends.
+    /// The way and the end, rounded, for rays in single precision.
     direction: [Vec<f32>; 3],
     t_max: Vec<f32>,
     times: Vec<f64>,
@@ -82,7 +82,8 @@ impl<'s> Shadows<'s> {
         grow(&mut self.slot, len);
         let f64s = self.origin.iter_mut().chain(&mut self.way).chain([&mut self.end]);
         f64s.for_each(|column| grow(column, len));
-        self.light.iter_mut().for_each(|column| grow(column, len));
+        let f32s = self.light.iter_mut().chain(&mut self.direction).chain([&mut self.t_max]);
+        f32s.for_each(|column| grow(column, len));
         grow(&mut self.medium, len);
     }
 
@@ -94,9 +95,10 @@ impl<'s> Shadows<'s> {
         for axis in 0..3 {
             self.origin[axis][at] = segment.origin[axis];
             self.way[axis][at] = segment.way[axis];
+            self.direction[axis][at] = segment.way[axis] as f32;
             self.light[axis][at] = segment.light[axis];
         }
-        self.end[at] = segment.end;
+        (self.end[at], self.t_max[at]) = (segment.end, segment.end as f32);
         self.medium[at] = segment.medium;
     }
 
@@ -112,6 +114,11 @@ impl<'s> Shadows<'s> {
         segment.way.y.compress_store(mask, &mut self.way[1][to..]);
         segment.way.z.compress_store(mask, &mut self.way[2][to..]);
         segment.end.compress_store(mask, &mut self.end[to..]);
+        let direction: V3<R> = segment.way.to_single();
+        direction.x.compress_store(mask, &mut self.direction[0][to..]);
+        direction.y.compress_store(mask, &mut self.direction[1][to..]);
+        direction.z.compress_store(mask, &mut self.direction[2][to..]);
+        segment.end.to_single().compress_store(mask, &mut self.t_max[to..]);
         segment.light.x.compress_store(mask, &mut self.light[0][to..]);
         segment.light.y.compress_store(mask, &mut self.light[1][to..]);
         segment.light.z.compress_store(mask, &mut self.light[2][to..]);
@@ -153,16 +160,16 @@ impl<'s> Shadows<'s> {
             }
         }
         let mut panes = std::mem::take(&mut self.panes);
-        let mut next_pane = panes.drain(..).peekable();
+        let mut next_panes = panes.iter_mut().peekable();
         for i in 0..self.len {
             let mut passes = if self.blocked[i] { Spectrum::BLACK } else { Spectrum::WHITE };
-            if let Some(pane) = next_pane.next_if(|pane| pane.segment as usize == i) {
+            if let Some(pane) = next_panes.next_if(|pane| pane.segment as usize == i) {
                 let ray = self.ray(i, slots.time[self.slot[i] as usize]);
                 passes = straight_on(
                     scene,
                     ray,
                     &pane.sample,
-                    pane.around,
+                    std::mem::take(&mut pane.around),
                     setting.regularize,
                     slots.is_alone.get(self.slot[i] as usize).is_some_and(|&alone| alone),
                     record,
@@ -171,7 +178,7 @@ impl<'s> Shadows<'s> {
             if setting.has_media && !passes.is_black() {
                 let slot = self.slot[i] as usize;
                 let ray = self.ray(i, slots.time[slot]);
-                let seed = slots.draws[slot].along(&ray);
+                let seed = slots.draw(slot).along(&ray);
                 let wavelengths = slots.wavelengths.get(slot);
                 passes *= scene.transmittance(of_column(self.medium[i]), &ray, seed, wavelengths);
             }
@@ -180,7 +187,6 @@ impl<'s> Shadows<'s> {
             }
             resolved(i, passes);
         }
-        drop(next_pane);
         self.panes = panes;
     }
 
@@ -198,20 +204,14 @@ impl<'s> Shadows<'s> {
             self.rays = rays;
             return;
         }
-        for (single, double) in self.direction.iter_mut().zip(&self.way) {
-            single.clear();
-            single.extend(double[..len].iter().map(|&x| x as f32));
-        }
-        self.t_max.clear();
-        self.t_max.extend(self.end[..len].iter().map(|&end| end as f32));
         self.times.clear();
         if scene.moves() {
             self.times.extend(self.slot[..len].iter().map(time));
         }
         let rays = RayColumns {
             origin: self.origin.each_ref().map(|column| &column[..len]),
-            direction: self.direction.each_ref().map(|column| &column[..]),
-            t_max: Some(&self.t_max),
+            direction: self.direction.each_ref().map(|column| &column[..len]),
+            t_max: Some(&self.t_max[..len]),
             time: scene.moves().then_some(&self.times),
         };
         scene.accel().any_columns(&rays, false, &mut self.blocked);

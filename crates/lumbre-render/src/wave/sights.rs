@@ -1,15 +1,17 @@
 //! A wave as integrators see it: samples of pixels, and what their rays from the camera meet.
 
 use lumbre_geometry::{Ray, Surface};
-use lumbre_math::{DVec3, Vec3};
-use lumbre_scene::{CameraRay, Footprint, SamplerKind, Scene, View};
+use lumbre_math::{DVec2, DVec3};
+use lumbre_scene::{CameraRay, Footprint, Pinhole, SamplerKind, Scene, View};
 use lumbre_shading::Spectrum;
 use lumbre_shading::spectrum::{WavelengthDensity, Wavelengths};
+use lumbre_simd::InstructionSet;
 
 use crate::caustics::Merging;
-use crate::transport::{Draw, Record, Seen, Sight};
+use crate::transport::{Draw, Record, Sampler, Seen, Sight};
+use crate::wave::camera::{AimNumbers, PinholeRays};
 use crate::wave::catcher::{Catcher, Places};
-use crate::wave::paths::{OnePath, Paths, Slots, to_column};
+use crate::wave::paths::{Paths, SampleId, Slots};
 use crate::wave::setting::Setting;
 use crate::wave::{Precision, Wave};
 
@@ -25,49 +27,67 @@ pub struct Sights<'a, 's> {
 }
 
 impl<'a, 's> Sights<'a, 's> {
-    /// Looks along the rays of some samples.
-    pub(crate) fn new(
+    /// Takes up some samples, whose rays from the camera are still to be given.
+    pub(crate) fn start(
         scene: &'s Scene,
         view: &'a View,
         wave: &'a mut Wave<'s>,
         precision: Precision,
-        samples: impl ExactSizeIterator<Item = (Draw, CameraRay)>,
+        sampler: &Sampler,
+        ids: &[SampleId],
         density: Option<WavelengthDensity>,
-        record: &mut Record,
     ) -> Self {
-        let has_solids = scene.has_solids();
-        let medium = scene.has_media().then(|| to_column(view.medium()));
-        wave.slots.clear();
-        wave.paths.len = 0;
-        wave.is_first = true;
-        wave.paths.reserve(samples.len());
-        for (slot, (draw, mut camera)) in samples.enumerate() {
-            let ray = &mut camera.ray;
-            // Paths keep directions in single precision: all that is told of the ray is told of that one.
-            let direction = ray.direction.as_vec3();
-            ray.direction = direction.as_dvec3();
-            let (width, spread) = cone(&camera);
-            let ray = &camera.ray;
-            wave.paths.push_one(&OnePath {
-                slot: slot as u32,
-                origin: ray.origin,
-                receiver: Vec3::ZERO,
-                direction,
-                throughput: Spectrum::WHITE,
-                eta_scale: 1.0,
-                pdf: f32::INFINITY,
-                merging: f32::INFINITY,
-                depth: 0,
-                width,
-                spread,
-            });
-            let wavelengths = density.map(|density| density.sample(draw.wavelength()));
-            wave.slots.push(draw, &camera, has_solids, medium, wavelengths);
+        let Wave { aims, slots, paths, .. } = wave;
+        slots.start(sampler, ids);
+        paths.start(ids.len());
+        InstructionSet::detect().run(AimNumbers { kind: sampler.kind(), slots, aims });
+        if let Some(density) = density {
+            slots.choose_wavelengths(density, aims.wavelengths());
         }
-        record.counts.camera += wave.paths.len as u64;
-        wave.hits.search(scene, &wave.paths, &wave.slots, precision, true);
-        let wanted = (0..wave.paths.len as u32).collect();
-        Self { scene, view, wave, precision, wanted }
+        if scene.has_solids() {
+            slots.start_outside();
+        }
+        if scene.has_media() {
+            slots.start_in(view.medium());
+        }
+        wave.is_first = true;
+        Self { scene, view, wave, precision, wanted: (0..ids.len() as u32).collect() }
+    }
+
+    /// The numbers that aim a sample: see [`Draw::aim`].
+    pub(crate) fn aim(&self, slot: usize) -> [f32; 4] {
+        self.wave.aims.numbers(slot)
+    }
+
+    /// Sets the point of the film that a sample aims at, and when it looks.
+    pub(crate) fn set_film(&mut self, slot: usize, film: DVec2, time: f64) {
+        [self.wave.aims.film[0][slot], self.wave.aims.film[1][slot]] = film.to_array();
+        self.wave.slots.time[slot] = time;
+    }
+
+    /// Sends a ray through the point of the film of every sample, with footprints to neighbours so far away, in pixels.
+    pub(crate) fn look_through(&mut self, pinhole: &Pinhole, spacing: Option<f64>) {
+        let Wave { aims, slots, paths, .. } = &mut *self.wave;
+        InstructionSet::detect().run(PinholeRays { pinhole, spacing, film: &aims.film, slots, paths });
+    }
+
+    /// Sets the ray from the camera of a sample. All samples before it have theirs.
+    pub(crate) fn set_ray(&mut self, slot: usize, camera: &CameraRay) {
+        let CameraRay { mut ray, footprint, .. } = *camera;
+        // Paths keep directions in single precision: all that is told of the ray is told of that one.
+        let direction = ray.direction.as_vec3();
+        ray.direction = direction.as_dvec3();
+        let Wave { slots, paths, .. } = &mut *self.wave;
+        paths.set_ray(slot, ray.origin, direction, cone(&CameraRay { ray, ..*camera }));
+        slots.time[slot] = ray.time;
+        slots.footprints.push(footprint);
+    }
+
+    /// Finds what all rays meet.
+    pub(crate) fn search(&mut self, record: &mut Record) {
+        let Wave { hits, slots, paths, .. } = &mut *self.wave;
+        record.counts.camera += paths.len as u64;
+        hits.search(self.scene, paths, slots, self.precision, true);
     }
 
     /// The scene.
@@ -87,23 +107,25 @@ impl<'a, 's> Sights<'a, 's> {
 
     /// How many samples there are.
     pub(crate) fn len(&self) -> usize {
-        self.wave.slots.draws.len()
+        self.wave.slots.len
     }
 
-    /// The ray from the camera of a sample.
+    /// The ray from the camera of a sample, before its path is followed.
     pub(crate) fn ray(&self, slot: usize) -> Ray {
-        self.wave.slots.rays[slot]
+        self.wave.paths.ray(slot, self.wave.slots.time[slot])
     }
 
     /// The ray from the camera of a sample, with its footprint.
     pub(crate) fn camera(&self, slot: usize) -> CameraRay {
-        self.wave.slots.camera(slot)
+        let ray = self.ray(slot);
+        CameraRay { ray, footprint: self.wave.slots.footprint(slot, ray.origin), weight: 1.0 }
     }
 
     /// The ray from the camera of a sample, and what it meets.
     pub(crate) fn sight(&self, slot: usize) -> Sight<'s> {
-        let ray = self.wave.slots.camera(slot);
-        Sight { ray, met: self.wave.hits.interaction(self.scene, slot, &ray.ray, &ray.footprint) }
+        let ray = self.camera(slot);
+        let met = self.wave.hits.interaction(self.scene, slot, &ray.ray, &ray.footprint);
+        Sight { ray, met }
     }
 
     /// Whether a ray meets the ground.
@@ -118,7 +140,7 @@ impl<'a, 's> Sights<'a, 's> {
 
     /// The surface that a ray meets, as its geometry is.
     pub(crate) fn surface(&self, slot: usize) -> Option<Surface> {
-        self.wave.hits.surface(self.scene, slot, &self.wave.slots.rays[slot])
+        self.wave.hits.surface(self.scene, slot, &self.ray(slot))
     }
 
     /// What samples see that meet ground which catches shadows, in the order of the places.
@@ -136,8 +158,8 @@ impl<'a, 's> Sights<'a, 's> {
     }
 
     /// The random numbers of a sample.
-    pub(crate) fn draw(&self, slot: usize) -> &Draw {
-        &self.wave.slots.draws[slot]
+    pub(crate) fn draw(&self, slot: usize) -> Draw {
+        self.wave.slots.draw(slot)
     }
 
     /// Leaves out the samples that a predicate does not want of the integrator.
@@ -166,7 +188,7 @@ impl<'a, 's> Sights<'a, 's> {
     pub fn each(&mut self, mut radiance: impl FnMut(Sight<'s>, &Draw) -> Spectrum) {
         for at in 0..self.wanted.len() {
             let slot = self.wanted[at] as usize;
-            let found = radiance(self.sight(slot), self.draw(slot));
+            let found = radiance(self.sight(slot), &self.draw(slot));
             self.wave.slots.radiance[slot] = found;
         }
     }

@@ -1,13 +1,13 @@
 //! Vertices on triangles with normals of vertices, or whose materials are looked up, in lanes.
 
 use lumbre_math::Vec3;
-use lumbre_scene::{TrianglePoint, TriangleSurface, UniformBsdf};
+use lumbre_scene::{SurfaceTable, TrianglePoint, TriangleSurface, UniformBsdf};
 use lumbre_shading::lanes::{BsdfKind, facing};
 use lumbre_shading::{Bsdf, ShadingFrame, ShadingNormals};
 use lumbre_simd::math::orthonormal_basis;
 use lumbre_simd::{Double, Job, Mask, Real, UInt, V3};
 
-use crate::wave::flat::{FlatHits, corner, find_light, put3, put64, triangle};
+use crate::wave::flat::{FlatHits, corner, find_light, put_corners, put3, put64, triangle};
 use crate::wave::paths::{Paths, grow};
 use crate::wave::search::MetTriangle;
 use crate::wave::setting::{Found, Setting};
@@ -51,15 +51,17 @@ impl SmoothHits {
     ) {
         let at = self.base.len();
         self.base.push(surface, path, met, distance);
-        let corners = surface.mesh.indices[met.triangle as usize];
-        let normals = surface.normals(corners).unwrap_or_default();
-        for (normal, columns) in normals.into_iter().zip(self.normals.chunks_exact_mut(3)) {
-            columns[0][at] = normal.x;
-            columns[1][at] = normal.y;
-            columns[2][at] = normal.z;
-        }
         self.kinds.push(bsdf.map(|bsdf| bsdf.kind));
         self.looks_up[at] = u32::from(bsdf.is_none());
+    }
+
+    /// Reads the corners of all triangles, and the normals there: see [`FlatHits::load`].
+    pub(crate) fn load(&mut self, surfaces: &SurfaceTable) {
+        self.base.load(surfaces);
+        for (at, &corners) in self.base.indices.iter().enumerate() {
+            let normals = self.base.surface(surfaces, at).and_then(|surface| surface.normals(corners));
+            put_corners(&mut self.normals, at, normals.unwrap_or_default());
+        }
     }
 
     /// What was found of a hit, for the look-up of its material.

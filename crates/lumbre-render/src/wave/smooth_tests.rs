@@ -19,7 +19,7 @@ use lumbre_simd::InstructionSet;
 use crate::transport::{Record, Sampler, Strategy};
 use crate::wave::setting::Setting;
 use crate::wave::vertices::{FOLDS, RISES, SIDED};
-use crate::wave::{Precision, Sights, Wave};
+use crate::wave::{Precision, SampleId, Sights, Wave};
 
 const SIDE: u32 = 48;
 const CENTRE: DVec3 = DVec3::new(3.0, -2.0, 5.0);
@@ -135,16 +135,14 @@ fn first_vertices<'s>(
     };
     let view = View::new(&scene.cameras()[0], SIDE, SIDE);
     let sampler = Sampler::new(&SamplerDesc { kind: SamplerKind::Sobol, spp: None, seed: 3 });
-    let samples: Vec<_> = (0..SIDE * SIDE)
-        .map(|i| {
-            let (x, y) = (i % SIDE, i / SIDE);
-            let film = DVec2::new(f64::from(x) + 0.37, f64::from(y) + 0.61);
-            (sampler.draw(x, y, 0), view.ray(film, DVec2::splat(0.5), 0.0, 0.25))
-        })
-        .collect();
-    let mut wave = Wave::default();
-    let mut record = Record::default();
-    Sights::new(scene, &view, &mut wave, Precision::Single, samples.into_iter(), None, &mut record);
+    let ids: Vec<_> = (0..SIDE * SIDE).map(|i| SampleId { x: i % SIDE, y: i / SIDE, index: 0 }).collect();
+    let (mut wave, mut record) = (Wave::default(), Record::default());
+    let mut sights = Sights::start(scene, &view, &mut wave, Precision::Single, &sampler, &ids, None);
+    for (slot, id) in ids.iter().enumerate() {
+        let film = DVec2::new(f64::from(id.x) + 0.37, f64::from(id.y) + 0.61);
+        sights.set_ray(slot, &view.ray(film, DVec2::splat(0.5), 0.0, 0.25));
+    }
+    sights.search(&mut record);
     wave.surfaces(&setting, &mut record);
     wave
 }

@@ -66,6 +66,8 @@ impl<'s> Wave<'s> {
                 self.tell_triangle(setting, path, record);
             }
         }
+        self.flat.load(scene.tables());
+        self.smooth.load(scene.tables());
         setting.instruction_set.run(FlatVertices {
             setting,
             hits: &self.flat,
@@ -129,7 +131,7 @@ impl<'s> Wave<'s> {
             }
             let footprint = self.footprint(path);
             let point = self.smooth.point(at, &self.vertices, vertex, self.paths.direction(path));
-            let surface = self.smooth.base.surface(setting, at);
+            let surface = self.smooth.base.surface(setting.scene.tables(), at);
             let slot = self.paths.slot[path] as usize;
             let spectral = self.slots.spectral(slot);
             let scattering = surface.and_then(|surface| {
@@ -164,7 +166,7 @@ impl<'s> Wave<'s> {
     fn footprint(&self, path: usize) -> Footprint {
         if self.is_first {
             let slot = self.paths.slot[path] as usize;
-            return self.slots.footprints.get(slot).copied().unwrap_or_default();
+            return self.slots.footprint(slot, self.paths.origin(path));
         }
         match self.paths.width[path] {
             width if width > 0.0 => {
@@ -288,7 +290,7 @@ impl<'s> Wave<'s> {
     ) -> bool {
         let normal = here.surface.normal;
         let cos = here.towards_origin.dot(normal);
-        let u = self.slots.draws[slot].scattered(self.slots.distance_samples[slot]);
+        let u = self.slots.draw(slot).scattered(self.slots.distance_samples[slot]);
         self.slots.distance_samples[slot] += 1;
         if u.x >= body.reflected_inside(cos as f32) {
             return false;
@@ -376,7 +378,7 @@ impl<'s> Wave<'s> {
             }
             return true;
         };
-        let u = self.slots.draws[slot].distance(self.slots.distance_samples[slot]);
+        let u = self.slots.draw(slot).distance(self.slots.distance_samples[slot]);
         match medium.sample_distance(throughput, way, u) {
             DistanceSample::Through(weight) => {
                 let throughput = throughput * weight;
@@ -409,7 +411,7 @@ impl<'s> Wave<'s> {
     ) {
         let eta_scale = self.paths.eta_scale[path];
         let likely = (throughput * eta_scale).max_component();
-        let (draw, sample) = (self.slots.draws[slot], self.slots.distance_samples[slot]);
+        let (draw, sample) = (self.slots.draw(slot), self.slots.distance_samples[slot]);
         if self.slots.collisions[slot] >= MAX_COLLISIONS || likely <= 0.0 {
             return record.note(|| Event::Ended(End::Medium));
         }
