@@ -16,7 +16,7 @@ const UPDATE: &str = "LUMBRE_UPDATE_PAGES";
 
 /// Kinds of things: their folder in the book, the noun of the reader for their owner, their directive, and types besides those of
 /// [`KINDS`].
-const ALL: [(&str, &str, &str, &[&str]); 11] = [
+const ALL: [(&str, &str, &str, &[&str]); 12] = [
     ("cameras", "camera", "Camera", &["environment"]),
     ("films", "film", "Film", &["rgb", "gbuffer", "spectral", "image"]),
     (
@@ -61,6 +61,7 @@ const ALL: [(&str, &str, &str, &[&str]); 11] = [
     ),
     ("textures", "texture", "Texture", &[]),
     ("lights", "light", "LightSource", &[]),
+    ("arealights", "light", "AreaLightSource", &["diffuse", "area"]),
     ("media", "medium", "MakeNamedMedium", &["heterogeneous"]),
 ];
 
@@ -104,6 +105,8 @@ enum Fate {
     Rendered,
     /// Read without a word, and of no effect.
     Ignored,
+    /// Rendered, with something to say.
+    Noted(String),
     Warned(String),
     Refused(String),
 }
@@ -126,12 +129,14 @@ fn read(text: &str) -> (Fate, Vec<asked::Asked>) {
     let folder = docs().join("pictures");
     let read = read_bytes("scene.pbrt", text.as_bytes(), Some(&folder), &Budget::default(), &mut said);
     let lines = said.lines();
-    let warnings: Vec<&String> =
-        lines.iter().filter(|line| !line.contains("the scene is upgraded")).collect();
-    let fate = match (read, warnings.first()) {
-        (Err(error), _) => Fate::Refused(message(&error.to_string())),
-        (Ok(_), Some(line)) => Fate::Warned(message(line)),
-        (Ok(_), None) => Fate::Rendered,
+    let is_new = |line: &&String| !line.contains("the scene is upgraded");
+    let lines: Vec<&String> = lines.iter().filter(is_new).collect();
+    let warning = lines.iter().find(|line| line.starts_with("warning"));
+    let fate = match (read, warning, lines.first()) {
+        (Err(error), ..) => Fate::Refused(message(&error.to_string())),
+        (Ok(_), Some(line), _) => Fate::Warned(message(line)),
+        (Ok(_), None, Some(line)) => Fate::Noted(message(line)),
+        (Ok(_), None, None) => Fate::Rendered,
     };
     (fate, asked::take())
 }
@@ -185,8 +190,16 @@ struct Known {
 
 /// What becomes of the parameters of a thing, and of single values of them.
 fn parameters(kind: &str, noun: &str, ty: &str) -> (Fate, BTreeMap<String, Fate>) {
-    let base = required(kind, ty);
-    let owner = format!("{noun} \"{ty}\"");
+    let base = match ty {
+        "heightfield" => " \"integer nu\" 2 \"integer nv\" 2 \"float Pz\" [0 0 0 1]".to_owned(),
+        "nurbs" => " \"integer nu\" 2 \"integer nv\" 2 \"integer uorder\" 2 \"integer vorder\" 2 \"float uknots\" [0 0 1 1] \
+                     \"float vknots\" [0 0 1 1] \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 1]"
+            .to_owned(),
+        "heterogeneous" => " \"float density\" 0.5".to_owned(),
+        _ => required(kind, ty),
+    };
+    // Media are known by their own name.
+    let owner = format!("{noun} \"{}\"", if kind == "media" { "m" } else { ty });
     let (fate, first) = read(&scene(kind, ty, &base));
     let mut known: BTreeMap<&'static str, Known> = BTreeMap::new();
     let mut queue: Vec<&'static str> = Vec::new();
@@ -240,9 +253,10 @@ fn parameters(kind: &str, noun: &str, ty: &str) -> (Fate, BTreeMap<String, Fate>
             }
             let rank = |fate: &Fate| match fate {
                 Fate::Rendered => 0,
-                Fate::Ignored => 1,
-                Fate::Warned(_) => 2,
-                Fate::Refused(_) => 3,
+                Fate::Noted(_) => 1,
+                Fate::Ignored => 2,
+                Fate::Warned(_) => 3,
+                Fate::Refused(_) => 4,
             };
             if best.as_ref().is_none_or(|best| rank(&found) < rank(best)) {
                 best = Some(found);
@@ -265,6 +279,7 @@ fn told(fate: &Fate) -> Option<(&'static str, &str)> {
     match fate {
         Fate::Rendered => None,
         Fate::Ignored => Some(("no effect", "")),
+        Fate::Noted(what) => Some(("rendered", what)),
         Fate::Warned(why) => Some(("warned", why)),
         Fate::Refused(why) => Some(("refused", why)),
     }
@@ -279,22 +294,23 @@ fn page() -> (String, Vec<String>) {
         text += &format!("\n## {directive}\n\n| type | parameters that are rendered |\n|---|---|\n");
         let mut rest = String::new();
         for ty in names.iter().chain(others) {
-            let (fate, parameters) = parameters(kind, noun, ty);
+            let (of_type, parameters) = parameters(kind, noun, ty);
             let rendered: Vec<String> = parameters
                 .iter()
-                .filter(|(_, fate)| **fate == Fate::Rendered)
+                .filter(|(_, fate)| **fate == Fate::Rendered || **fate == of_type)
                 .map(|(name, _)| format!("`{name}`"))
                 .collect();
-            if fate == Fate::Rendered {
-                count += rendered.len();
-                text += &format!("| `{ty}` | {} |\n", rendered.join(", "));
-            } else if let Some((what, why)) = told(&fate) {
+            if let Some((what, why)) = told(&of_type) {
                 rest += &format!("| `{ty}` | | {what} | {why} |\n");
+            }
+            if let Fate::Warned(_) | Fate::Refused(_) = of_type {
                 // Nothing of it is rendered.
                 continue;
             }
+            count += rendered.len();
+            text += &format!("| `{ty}` | {} |\n", rendered.join(", "));
             for (name, fate) in &parameters {
-                let Some((what, why)) = told(fate) else { continue };
+                let (Some((what, why)), false) = (told(fate), *fate == of_type) else { continue };
                 let why = if *fate == Fate::Ignored { reason(name).unwrap_or("") } else { why };
                 if why.is_empty() {
                     without_reason.push(format!("{kind} {ty} {name}"));

@@ -148,6 +148,7 @@ pub(super) fn scene(kind: &str, name: &str, params: &str) -> String {
         "lights" if name == "diffuse" => {
             format!("WorldBegin AreaLightSource \"{name}\" {params} Shape \"sphere\"")
         }
+        "arealights" => format!("WorldBegin AreaLightSource \"{name}\" {params} Shape \"sphere\""),
         "media" => format!("MakeNamedMedium \"m\" \"string type\" \"{name}\" {params}\nWorldBegin"),
         "lights" => format!("WorldBegin LightSource \"{name}\" {params}"),
         other => panic!("{other}"),
