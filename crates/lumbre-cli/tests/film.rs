@@ -42,7 +42,7 @@ fn bytes(folder: &Folder, name: &str) -> Vec<u8> {
 }
 
 fn channels(bytes: &[u8]) -> Vec<String> {
-    let budget = Budget::new(&Limits::default());
+    let budget = Budget::new(Limits::default());
     let layers = read_layers(bytes, &Arc::from("picture.exr"), &budget, &mut Diagnostics::default());
     layers.expect("a picture").iter().map(|layer| layer.name.clone()).collect()
 }

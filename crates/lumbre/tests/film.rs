@@ -8,7 +8,7 @@ fn scene(text: &str) -> Scene {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.pbrt");
     std::fs::write(&path, text).unwrap();
-    Scene::open(&path).unwrap()
+    lumbre::open(&path).unwrap()
 }
 
 fn render(scene: &Scene, spp: u32, threads: usize) -> Picture {
@@ -88,7 +88,7 @@ fn the_channels_of_a_plane_are_those_of_its_equation() {
         let (variance, relative) = (values("Variance.R"), values("RelativeVariance.R"));
         assert!(variance >= 0.0 && (relative * mean - variance).abs() < 0.02 * variance + 1e-7, "{variance}");
     }
-    assert!(covered > 200 && empty > 40, "{covered} {empty}");
+    assert!(covered > 150 && empty > 40, "{covered} {empty}");
 }
 
 #[test]
