@@ -342,6 +342,7 @@ fn page() -> (String, Vec<String>) {
     let with_types: BTreeSet<&str> =
         ALL.iter().map(|(_, _, directive, _)| *directive).chain(["Option"]).collect();
     let plain: Vec<String> = Parser::directives()
+        .into_iter()
         .filter(|name| !with_types.contains(name))
         .map(|name| format!("`{name}`"))
         .collect();

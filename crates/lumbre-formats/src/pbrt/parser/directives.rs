@@ -78,8 +78,8 @@ impl<'b, 'd> Parser<'b, 'd> {
 
     /// The names of all directives.
     #[cfg(test)]
-    pub(in crate::pbrt) fn directives() -> impl Iterator<Item = &'static str> {
-        Self::DIRECTIVES.iter().map(|(name, ..)| *name)
+    pub(in crate::pbrt) fn directives() -> Vec<&'static str> {
+        Self::DIRECTIVES.iter().map(|(name, ..)| *name).collect()
     }
 
     pub(in crate::pbrt) fn is_directive(name: &str) -> bool {
