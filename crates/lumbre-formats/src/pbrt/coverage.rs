@@ -66,7 +66,7 @@ const ALL: [(&str, &str, &str, &[&str]); 12] = [
 ];
 
 /// Why parameters that are read without a word have no effect.
-const REASONS: [(&str, &str); 27] = [
+const REASONS: [(&str, &str); 37] = [
     ("lightsampler", "lights are chosen by a tree: it changes the noise alone"),
     ("samplelights", "lights are always sampled: it changes the noise alone"),
     ("samplebsdf", "surfaces are always sampled: it changes the noise alone"),
@@ -97,6 +97,16 @@ const REASONS: [(&str, &str); 27] = [
     ("wavefront", "there is one way to render, by the processor"),
     ("rendercoordsys", "points have double precision in any space"),
     ("mfp", "the default of another parameter stands in its place"),
+    ("subsurface_color", "light does not scatter inside this material: see subsurface_weight"),
+    ("subsurface_radius", "light does not scatter inside this material: see subsurface_weight"),
+    ("subsurface_radius_scale", "light does not scatter inside this material: see subsurface_weight"),
+    ("subsurface_scatter_anisotropy", "light does not scatter inside this material: see subsurface_weight"),
+    ("emission_color", "an AreaLightSource shines: see emission_luminance"),
+    ("coat_ior", "it is rendered by the layers of principled, whose coat has an index of its own"),
+    ("coat_darkening", "it is rendered by the layers of principled, whose coat has no such number"),
+    ("temperaturecutoff", "of use with a grid of temperatures alone"),
+    ("temperatureoffset", "of use with a grid of temperatures alone"),
+    ("temperaturescale", "of use with a grid of temperatures alone"),
 ];
 
 /// What becomes of something.
@@ -260,6 +270,10 @@ fn parameters(kind: &str, noun: &str, ty: &str) -> (Fate, BTreeMap<String, Fate>
             };
             if best.as_ref().is_none_or(|best| rank(&found) < rank(best)) {
                 best = Some(found);
+            }
+            // The first value that is taken says it, but for words, each of which is another matter.
+            if best == Some(Fate::Rendered) && choices.is_empty() && !text.contains("\"bool ") {
+                break;
             }
         }
         if let Some(best) = best {
