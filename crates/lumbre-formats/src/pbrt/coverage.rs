@@ -311,7 +311,11 @@ fn page() -> (String, Vec<String>) {
             let (of_type, parameters) = parameters(kind, noun, ty);
             let rendered: Vec<String> = parameters
                 .iter()
-                .filter(|(_, fate)| **fate == Fate::Rendered || **fate == of_type)
+                .filter(|(name, fate)| {
+                    // Refused is the value that was tried, or that it was tried alone.
+                    let is_other = matches!(fate, Fate::Refused(_)) && !name.contains('=');
+                    **fate == Fate::Rendered || **fate == of_type || is_other
+                })
                 .map(|(name, _)| format!("`{name}`"))
                 .collect();
             if let Some((what, why)) = told(&of_type) {
@@ -323,7 +327,7 @@ fn page() -> (String, Vec<String>) {
             }
             count += rendered.len();
             text += &format!("| `{ty}` | {} |\n", rendered.join(", "));
-            for (name, fate) in &parameters {
+            for (name, fate) in parameters.iter().filter(|(_, fate)| !matches!(fate, Fate::Refused(_))) {
                 let (Some((what, why)), false) = (told(fate), *fate == of_type) else { continue };
                 let why = if *fate == Fate::Ignored { reason(name).unwrap_or("") } else { why };
                 if why.is_empty() {
@@ -380,7 +384,7 @@ Every directive of pbrt-v4, with its types and parameters, and what becomes of e
 - *Warned*: it is left out or replaced, with a warning that has its place. `--strict` makes an error of it.
 - *Refused*: it is an error.
 
-What is of no known name is a warning with the nearest one that is. Values out of their range are errors.
+What is of no known name is a warning with the nearest one that is. Values out of their range, and parameters without those that they need, are errors.
 ";
 
 const TAIL: &str = "\n\
