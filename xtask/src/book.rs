@@ -28,6 +28,9 @@ const PAGES: &str = "docs";
 /// What pages include and examples read besides, laid out as in the repository.
 const BESIDE: [&str; 2] = ["scenes", "crates/lumbre/examples"];
 
+/// The page that a test of the reader of scenes writes, of what the reader accepts.
+const COVERAGE: &str = "docs/coverage.md";
+
 /// How the book is built.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct Book {
@@ -46,10 +49,24 @@ pub(crate) struct Book {
     install_only: bool,
 }
 
+/// Writes the page of what is rendered.
+fn write_coverage() -> Result<()> {
+    let mut cargo = Command::new("cargo");
+    cargo.current_dir(root()).env("LUMBRE_UPDATE_PAGES", "1");
+    cargo.args(["test", "--quiet", "--package", "lumbre-formats", "--lib", "pbrt::coverage"]);
+    if !cargo.status().context("cargo cannot be started")?.success() {
+        bail!("{COVERAGE} cannot be written");
+    }
+    Ok(())
+}
+
 impl Book {
     /// Builds the book into `target/book/html`, where mdbook is found or can be had.
     pub(crate) fn run(self) -> Result<()> {
         if self.update {
+            if self.pages.is_empty() || self.pages.iter().any(|page| COVERAGE.contains(page.as_str())) {
+                write_coverage()?;
+            }
             return prepare(false, true, &self.pages).map(drop);
         }
         let mdbook = match find_mdbook() {

@@ -31,7 +31,7 @@ pub(crate) struct Race {
     /// Small pictures and few samples: two to three minutes.
     #[arg(long)]
     quick: bool,
-    /// Only these scenes, separated by commas: cornell, interior, lights, terrain, glass, coats, models, tumbler, pool.
+    /// Only these scenes, separated by commas: cornell, interior, lights, terrain, glass, coats, models, tumbler, pool, cloud, smoke.
     #[arg(long, value_delimiter = ',')]
     scenes: Vec<String>,
     /// Only these programs; by default all that are found. Lumbre always takes part.

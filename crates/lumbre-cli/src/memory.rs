@@ -137,8 +137,11 @@ pub(crate) fn picture_bytes(options: &RenderOptions) -> Result<u64, lumbre::Erro
     const SAVED: u64 = 100;
     const LAYERS: u64 = 170;
     let each = if options.features { SAVED + LAYERS } else { SAVED };
+    // Each channel of the film as numbers and as their encoding, while its sums are held.
+    const CHANNEL: u64 = 16;
     let pixels = options.bounds()?.area();
-    Ok(options.memory_bytes()?.max(pixels.saturating_mul(each)))
+    let channels = pixels.saturating_mul(CHANNEL * options.film_channels() as u64);
+    Ok(options.memory_bytes()?.max(pixels.saturating_mul(each)).saturating_add(channels))
 }
 
 /// Bytes that are left for what is asked for next: in the machine, in its control groups, and by what the system grants

@@ -144,14 +144,14 @@ pub(crate) fn refuse_inputs(
 }
 
 /// The name of pictures for which none is given, or with `#` for their number the pattern of their names: that of the scene's
-/// film, or else of the scene's file. Where that is the name of a file that was read, or of one that Lumbre did not write, it is
+/// film, or else of the scene's file, with the ending beside it. Where that is the name of a file that was read, or of one that Lumbre did not write, it is
 /// `STEM.render.png`; the format is the same, but for PFM, which cannot say who wrote it: EXR holds the same numbers.
 ///
 /// # Errors
 /// [`Failure::Usage`] when that name is not free either.
 pub(crate) fn default_name(
     film: Option<&Path>,
-    scene: &Path,
+    (scene, ending): (&Path, &str),
     pictures: &Pictures,
     statistics: Option<&Path>,
     inputs: &Inputs,
@@ -164,7 +164,7 @@ pub(crate) fn default_name(
     let infix = pictures.infix();
     let wanted = match film {
         Some(film) if *pictures == Pictures::One => film.to_owned(),
-        _ => PathBuf::from(format!("{stem}{infix}.png")),
+        _ => PathBuf::from(format!("{stem}{infix}.{ending}")),
     };
     // Why a name is not free.
     let obstacle = |pattern: &Path| {

@@ -9,7 +9,7 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use lumbre::description::{Camera, CameraKind, GroundDesc, IntegratorKind};
+use lumbre::description::{Camera, CameraKind, FilmKind, GroundDesc, IntegratorKind};
 use lumbre::formats::image::{ExrPrecision, ImageFormat};
 use lumbre::formats::{Diagnostics, SceneFormat, probe_writable};
 use lumbre::image::{Image, ToneMap};
@@ -447,7 +447,12 @@ impl Arguments {
         }
         let film = scene.resolved().film().filename.as_deref().map(Path::new);
         let film = film.filter(|name| check_format(name, false).is_ok());
-        output::default_name(film, &self.scene[0], &pictures, statistics, inputs, self.quiet)
+        let ending = match scene.resolved().film().kind {
+            FilmKind::GBuffer(_) | FilmKind::Spectral(_) => "exr",
+            FilmKind::Rgb => "png",
+        };
+        let scene = (&*self.scene[0], ending);
+        output::default_name(film, scene, &pictures, statistics, inputs, self.quiet)
     }
 
     /// An output with the format as its extension, even for standard output.
@@ -583,6 +588,8 @@ fn picture(
     };
     let named = arguments.named(&output);
     check_format(&named, !arguments.aov.is_empty())?;
+    let film = if kind.is_feature() { FilmKind::Rgb } else { scene.resolved().film().kind };
+    check_film(&named, film)?;
     arguments.staging.check(Some(&named))?;
     arguments.parts.check(&arguments.scene, &named, arguments.spp)?;
     let is_piped = is_standard_stream(&output);
@@ -592,6 +599,7 @@ fn picture(
         probe_writable(path).map_err(|e| Failure::from(lumbre::Error::from(e)))?;
     }
     let mut options = options(arguments, &scene)?;
+    options.film = film;
     options.transparent = behind.is_transparent();
     options.spectral &= matches!(kind, IntegratorKind::Path { .. });
     options.spectral |= arguments.spectral;
@@ -884,6 +892,22 @@ fn check_format(path: &Path, layers: bool) -> Result<(), Failure> {
         }
         Some(_) => Ok(()),
     }
+}
+
+/// Checks that the format of the path's extension has the channels of a film.
+fn check_film(path: &Path, film: FilmKind) -> Result<(), Failure> {
+    let name = match film {
+        FilmKind::Rgb => return Ok(()),
+        FilmKind::GBuffer(_) => "gbuffer",
+        FilmKind::Spectral(_) => "spectral",
+    };
+    if is_bare_part(path) || ImageFormat::from_path(path) == Some(ImageFormat::Exr) {
+        return Ok(());
+    }
+    Err(Failure::Usage(format!(
+        "{}: the channels of film \"{name}\" need an .exr file (expected a name that ends in .exr)",
+        path.display()
+    )))
 }
 
 /// Never saves an incomplete picture: a signal may come before every pixel has a sample. After a timeout there is a

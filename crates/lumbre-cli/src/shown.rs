@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lumbre::description::IntegratorKind;
+use lumbre::description::{FilmKind, IntegratorKind};
 use lumbre::formats::Diagnostics;
 use lumbre::{RenderOptions, Scene, SceneDesc};
 
@@ -56,6 +56,8 @@ pub(crate) fn shown(mut desc: SceneDesc, wish: &SceneRequest<'_>) -> Result<Prep
     let scene = Scene::of_file(desc, name, &mut diagnostics)?;
     let mut options = scene.options();
     options.integrator.kind = kind;
+    // What is looked at has no channels besides its colours.
+    options.film = FilmKind::Rgb;
     options.spectral &= matches!(kind, IntegratorKind::Path { .. });
     if let Some((width, height)) = size {
         options.resize(scene.resolved().film(), width, height);

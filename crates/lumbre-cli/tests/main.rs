@@ -8,6 +8,7 @@ mod explain;
 mod farm;
 mod faults;
 mod files;
+mod film;
 mod habits;
 mod limits;
 mod malformed;

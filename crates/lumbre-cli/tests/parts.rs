@@ -241,8 +241,8 @@ fn forged(folder: &Folder, (width, height): (u32, u32)) -> Vec<u8> {
     part.job.size = (width, height);
     let whole = part.to_bytes();
     let start = 14 + 8 + u64::from_le_bytes(whole[14..22].try_into().unwrap()) as usize;
-    // Corners, flags, one piece, no dropped samples, counts of rays and the rest: then the planes.
-    let head = &whole[start..start + 16 + 12 + 4 + 24 + 4 + 48];
+    // Corners, flags and buckets, one piece, no dropped samples, counts of rays and the rest: then the planes.
+    let head = &whole[start..start + 16 + 28 + 4 + 24 + 4 + 48];
     assert_eq!(head[..16], [0u32, 0, 20, 14].map(u32::to_le_bytes).concat());
     let sealed = |head: &[u8], planes: usize| {
         let mut bytes = [&whole[..start], head, &vec![0; planes]].concat();

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 use lumbre::formats::image::{ExrPrecision, ImageFormat, PngDepth};
-use lumbre::image::{Image, Rgb, ToneMap};
-use lumbre::{Background, Feature, Part as PartDesc, PixelBounds, RenderOptions, SaveOptions};
+use lumbre::image::{Image, Layer, Rgb, ToneMap};
+use lumbre::{Background, Feature, FilmLayers, Part as PartDesc, PixelBounds, RenderOptions, SaveOptions};
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
 };
@@ -226,6 +226,13 @@ impl Picture {
             }
         }
         kept.set_item("features", features)?;
+        let film = picture.film();
+        let layers = film.layers.iter().map(|layer| {
+            let samples = PyArray1::from_slice(py, &layer.samples).reshape(shape)?;
+            Ok((layer.name.clone(), layer.full_precision, samples))
+        });
+        kept.set_item("film", layers.collect::<PyResult<Vec<_>>>()?)?;
+        kept.set_item("film_attributes", film.attributes.clone())?;
         let PixelBounds { x0, y0, x1, y1 } = picture.bounds();
         kept.set_item("bounds", (x0, y0, x1, y1))?;
         kept.set_item("whole", picture.whole())?;
@@ -264,7 +271,20 @@ impl Picture {
         let (x0, y0, x1, y1) = given("bounds")?.extract()?;
         let bounds = PixelBounds { x0, y0, x1, y1 };
         let whole = given("whole")?.extract()?;
+        let layers: Vec<(String, bool, PyReadonlyArray2<'_, f32>)> = given("film")?.extract()?;
+        let layers = layers.into_iter().map(|(name, full_precision, samples)| {
+            let samples: Vec<f32> = samples.as_array().iter().copied().collect();
+            match samples.len() == pixels.pixels().len() {
+                true => Ok(Layer { name, samples, full_precision }),
+                false => Err(invalid(format!("the channel {name} is of another size"))),
+            }
+        });
+        let film = FilmLayers {
+            layers: layers.collect::<PyResult<_>>()?,
+            attributes: given("film_attributes")?.extract()?,
+        };
         let picture = lumbre::Picture::restored(pixels, image("coverage")?, bounds, whole, features);
+        let picture = picture.with_film(film);
         let mut look = Look::from_names(&given("look")?.extract()?);
         if let Some(background) = image("background")? {
             look.background = Some(Background::Picture(background));

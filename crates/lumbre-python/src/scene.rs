@@ -6,7 +6,7 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
-use lumbre::description::{IntegratorKind, LightDesc};
+use lumbre::description::{FilmKind, IntegratorKind, LightDesc};
 use lumbre::formats::{Diagnostics, Strictness};
 use lumbre::{
     Background, CancelToken, DVec3, Ground, Job, Part as PartDesc, PixelBounds, Progress, Ray, ReadOptions,
@@ -569,6 +569,9 @@ impl Scene {
         let mut options = shown.scene.options();
         options.view = view;
         options.integrator.kind = integrator.unwrap_or(options.integrator.kind);
+        if options.integrator.kind.is_feature() {
+            options.film = FilmKind::Rgb;
+        }
         options.spectral &= matches!(options.integrator.kind, IntegratorKind::Path { .. });
         if let Some((width, height)) = size {
             options.resize(shown.scene.resolved().film(), width, height);

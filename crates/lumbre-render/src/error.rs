@@ -35,6 +35,11 @@ pub enum RenderError {
     /// The integrator follows colours only.
     #[error("this integrator does not carry wavelengths: a spectral render needs the path integrator")]
     NoWavelengths,
+    /// The film keeps wavelengths, and the paths carry none.
+    #[error(
+        "film \"spectral\" keeps wavelengths, which these paths do not carry: it needs a spectral render by the path integrator"
+    )]
+    NoBuckets,
     /// Nobody wants the picture any longer: [`crate::Progress::is_wanted`].
     #[error("the picture is not wanted any longer")]
     Unwanted,

@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use lumbre_math::{DVec3, Elementary};
-use lumbre_scene::{Scene, View};
+use lumbre_scene::{FilmKind, Scene, View};
 
 use crate::adaptive::{self, Adaptive};
 use crate::clock::Clock;
@@ -104,6 +104,11 @@ pub fn render_from(
         features: options.features,
         tints: options.transparent && catches_shadows,
         guides: options.guides,
+        surfaces: matches!(options.film, FilmKind::GBuffer(_)),
+        buckets: match options.film {
+            FilmKind::Spectral(buckets) => Some(buckets),
+            FilmKind::Rgb | FilmKind::GBuffer(_) => None,
+        },
         depth_unit: depth_unit(scene, &taker.view),
     };
     let mut owners = match state {

@@ -77,7 +77,7 @@ pub use job::{CheckpointSink, render, render_from, render_with};
 pub use one_sample::{ExplainedSample, explain_ray, explain_sample};
 pub use options::{RenderOptions, Stop};
 pub use progress::{NoProgress, Progress, Snapshot, State};
-pub use rendered::{DroppedSample, Rendered, Stats};
+pub use rendered::{DroppedSample, FilmLayers, Rendered, Stats};
 pub use state::{MergeError, Piece, RenderState, StateError};
 
 pub use crate::film::PixelBounds;

@@ -99,19 +99,16 @@ mod tests {
     use super::*;
     use crate::film::{Addition, Exposure, Extras, Sample};
 
-    const EXTRAS: Extras = Extras { features: false, tints: false, guides: false, depth_unit: 1.0 };
-
     /// A tile of 64 by 48 pixels of n samples, of which a share has this luminance and the rest 0.1, and its noise.
     fn found(n: u32, share: f64, bright: f64) -> f64 {
         let bounds = PixelBounds::whole(64, 48);
-        let mut tile = Tile::new(bounds, EXTRAS);
+        let mut tile = Tile::new(bounds, Extras::default());
         let mut random = RandomStream::new(9);
         for (x, y) in bounds.pixels() {
             for _ in 0..n {
                 let value = if random.next_f64() < share { bright } else { 0.1 };
                 let radiance = Rgb::splat(value as f32);
-                let sample =
-                    Sample { radiance, coverage: Rgb::WHITE, weight: 1.0, features: None, on_catcher: false };
+                let sample = Sample { radiance, ..Sample::default() };
                 assert_eq!(tile.add(x, y, &sample, &Exposure::default()), Addition::Whole);
             }
         }
@@ -138,12 +135,11 @@ mod tests {
     fn the_edge_of_a_lamp_beside_the_dark_is_not_taken_for_rare_light() {
         // The left column is half covered by a lamp of 30; all else is 0.1, without noise.
         let bounds = PixelBounds::whole(64, 48);
-        let mut tile = Tile::new(bounds, EXTRAS);
+        let mut tile = Tile::new(bounds, Extras::default());
         for (x, y) in bounds.pixels() {
             for k in 0..256 {
                 let radiance = Rgb::splat(if x == 0 && k % 2 == 0 { 30.0 } else { 0.1 });
-                let sample =
-                    Sample { radiance, coverage: Rgb::WHITE, weight: 1.0, features: None, on_catcher: false };
+                let sample = Sample { radiance, ..Sample::default() };
                 assert_eq!(tile.add(x, y, &sample, &Exposure::default()), Addition::Whole);
             }
         }

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use lumbre_geometry::Ray;
 use lumbre_math::DVec2;
-use lumbre_scene::{CameraRay, Footprint, Pinhole, Scene, View};
+use lumbre_scene::{CameraRay, FilmKind, Footprint, Interaction, Pinhole, Scene, View};
 use lumbre_shading::Spectrum;
-use lumbre_shading::spectrum::SensorCurves;
+use lumbre_shading::spectrum::{SensorCurves, WavelengthDensity, Wavelengths};
 
-use crate::film::{FeatureSample, Filter, Sample};
+use crate::film::{FeatureSample, Filter, Sample, SpectralSample, SurfacePoint, SurfaceSample};
 use crate::integrators::{Integrator, integrator};
 use crate::transport::{Event, Features, PrimaryHit, Record, SampleNumbers, Sampler, Seen, caught};
 use crate::wave::catcher::{Catcher, Places};
@@ -39,8 +39,9 @@ pub(crate) struct PixelSampler<'a> {
     /// Ground that catches shadows, for many samples at once where that can be.
     catcher: Option<Catcher<'a>>,
     precision: Precision,
-    /// Whether samples carry wavelengths.
-    is_spectral: bool,
+    /// The wavelengths that samples carry, if they do.
+    wavelengths: Option<WavelengthDensity>,
+    film: FilmKind,
     /// The camera that records them, if it is not the eye.
     sensor_curves: Option<Arc<SensorCurves>>,
 }
@@ -51,6 +52,8 @@ struct SeenSample {
     /// In place of that.
     caught: Option<Seen>,
     features: Option<FeatureSample>,
+    /// What the film keeps of the surface.
+    surface: Option<SurfaceSample>,
     /// How much of what is behind it covers, where that is neither all nor said by what it caught.
     covered: Option<Spectrum>,
 }
@@ -77,10 +80,15 @@ impl<'a> PixelSampler<'a> {
         if options.spectral && !integrator.carries_wavelengths() {
             return Err(RenderError::NoWavelengths);
         }
+        if matches!(options.film, FilmKind::Spectral(_)) && !options.spectral {
+            return Err(RenderError::NoBuckets);
+        }
         Ok(Self {
             scene,
             moves: scene.moves() || view.moves(),
-            has_footprints: scene.is_textured() || integrator.needs_footprints(),
+            has_footprints: scene.is_textured()
+                || integrator.needs_footprints()
+                || matches!(options.film, FilmKind::GBuffer(_)),
             precision: precision(scene, &view, options),
             pinhole: view.pinhole(),
             view,
@@ -91,7 +99,8 @@ impl<'a> PixelSampler<'a> {
             is_centred: options.integrator.kind == lumbre_scene::IntegratorKind::Pov && options.stop.spp == 1,
             lights_are_seen: !options.transparent,
             catcher: Catcher::of(scene),
-            is_spectral: options.spectral,
+            wavelengths: options.wavelengths(),
+            film: options.film,
             sensor_curves: options.sensor_curves.clone(),
         })
     }
@@ -130,11 +139,12 @@ impl<'a> PixelSampler<'a> {
         for (slot, ((&id, &(weight, passes)), &radiance)) in
             ids.iter().zip(&weights).zip(sights.radiance()).enumerate()
         {
-            let SeenSample { mut caught, mut features, covered } =
+            let SeenSample { mut caught, mut features, mut surface, covered } =
                 seen.get(slot).copied().unwrap_or_default();
             if passes == 0.0 {
-                (caught, features) = (None, None);
+                (caught, features, surface) = (None, None, None);
             }
+            let spectrum = self.spectrum(sights.wavelengths(slot), radiance, caught.as_ref(), passes);
             let radiance = match (sights.wavelengths(slot), &self.sensor_curves) {
                 (None, _) => radiance,
                 (Some(wavelengths), None) => wavelengths.rec709(radiance),
@@ -147,8 +157,21 @@ impl<'a> PixelSampler<'a> {
             let coverage = covered.unwrap_or(Spectrum::WHITE);
             let Seen { radiance, coverage, on_catcher } =
                 caught.unwrap_or(Seen { radiance, coverage, on_catcher: false });
-            put(id, Sample { radiance, coverage, weight, features, on_catcher });
+            put(id, Sample { radiance, coverage, weight, features, surface, spectrum, on_catcher });
         }
+    }
+
+    /// What a film with buckets keeps of a sample. What ground shows that catches shadows is a colour, which a smooth spectrum stands for.
+    fn spectrum(
+        &self,
+        wavelengths: Option<&Wavelengths>,
+        radiance: Spectrum,
+        caught: Option<&Seen>,
+        passes: f64,
+    ) -> Option<SpectralSample> {
+        let (FilmKind::Spectral(_), Some(wavelengths)) = (self.film, wavelengths) else { return None };
+        let radiance = caught.map_or(radiance, |caught| wavelengths.varied_light(caught.radiance));
+        Some(SpectralSample { nm: wavelengths.nm(), radiance: through_lens(radiance, passes).to_array() })
     }
 
     /// Has the integrator find the light of all sights but those that see something else, and gives what these see and all features;
@@ -157,7 +180,12 @@ impl<'a> PixelSampler<'a> {
         sights.show_background(self.lights_are_seen);
         let has_catcher = self.scene.ground().is_some_and(|ground| ground.catcher);
         let mut seen = Vec::new();
-        if self.wants_features || has_catcher || !self.lights_are_seen {
+        let space = match self.film {
+            FilmKind::GBuffer(space) => Some(space),
+            FilmKind::Rgb | FilmKind::Spectral(_) => None,
+        };
+        let wants_surfaces = self.wants_features || space.is_some();
+        if wants_surfaces || has_catcher || !self.lights_are_seen {
             seen.resize(sights.len(), SeenSample::default());
             let mut places = Places::default();
             sights.retain(|sights, slot| {
@@ -172,24 +200,42 @@ impl<'a> PixelSampler<'a> {
                         let features = Features::of_ground(&self.view, catcher.ground(), &ray, &surface);
                         seen[slot].features = Some(feature_sample(features));
                     }
+                    if let Some(space) = space {
+                        let ground = catcher.ground();
+                        let at = SurfacePoint {
+                            point: surface.point,
+                            normal: surface.normal,
+                            shading_normal: surface.normal.as_vec3(),
+                            uv: surface.uv.as_vec2(),
+                            albedo: ground.albedo,
+                        };
+                        let camera = sights.camera(slot);
+                        seen[slot].surface =
+                            Some(SurfaceSample::of(&self.view, space, &camera, &at, SPACING));
+                    }
                     return false;
                 }
-                let is_plain = if sights.is_miss(slot) { self.lights_are_seen } else { !self.wants_features };
+                let is_plain = if sights.is_miss(slot) { self.lights_are_seen } else { !wants_surfaces };
                 if is_plain && !is_caught {
                     return true;
                 }
                 let sight = sights.sight(slot);
                 let draw = sights.draw(slot);
                 let features = if self.wants_features { Features::of(&self.view, &sight) } else { None };
+                let surface = space.zip(sight.met.as_ref()).map(|(space, met)| {
+                    let at = surface_point(met);
+                    SurfaceSample::of(&self.view, space, &sight.ray, &at, SPACING)
+                });
                 let left = self.left_by_media(&sight, &draw);
                 let features = features.map(|features| feature_sample(features.behind(left)));
                 if sight.met.is_none() && left != Spectrum::WHITE && !self.lights_are_seen {
                     // What is seen is the medium alone.
-                    seen[slot] = SeenSample { caught: None, features, covered: Some(Spectrum::WHITE - left) };
+                    seen[slot] =
+                        SeenSample { caught: None, features, surface, covered: Some(Spectrum::WHITE - left) };
                     return true;
                 }
                 let caught = caught(self.scene, &sight, &draw, self.lights_are_seen, record);
-                seen[slot] = SeenSample { caught, features, covered: None };
+                seen[slot] = SeenSample { caught, features, surface, covered: None };
                 caught.is_none()
             });
             if let Some(catcher) = &self.catcher {
@@ -216,7 +262,7 @@ impl<'a> PixelSampler<'a> {
 
     /// Takes up samples.
     fn start<'w>(&'w self, wave: &'w mut Wave<'a>, ids: &[SampleId]) -> PrimaryHits<'w, 'a> {
-        PrimaryHits::start(self.scene, &self.view, wave, self.precision, &self.sampler, ids, self.is_spectral)
+        PrimaryHits::start(self.scene, &self.view, wave, self.precision, &self.sampler, ids, self.wavelengths)
     }
 
     /// Where a sample looks, by the numbers of [`SampleNumbers::aim`]. A lens without width has no point but its middle.
@@ -289,6 +335,21 @@ fn precision(scene: &Scene, view: &View, options: &RenderOptions) -> Precision {
         rounding.error(camera.ray.at(distance)).length() > f64::from(width) + f64::from(spread) * distance
     };
     Precision::of(scene, (0..RAYS * RAYS).any(is_coarse))
+}
+
+/// What a film keeps of a surface.
+fn surface_point(met: &Interaction<'_>) -> SurfacePoint {
+    let (shading_normal, albedo) = match met.scattering() {
+        Some((frame, bsdf)) => (frame.n, bsdf.albedo()),
+        None => (met.shading.normal, Spectrum::BLACK),
+    };
+    SurfacePoint {
+        point: met.surface.point,
+        normal: met.surface.normal,
+        shading_normal,
+        uv: met.uv(),
+        albedo,
+    }
 }
 
 fn feature_sample(features: Features) -> FeatureSample {

@@ -5,13 +5,16 @@ use std::time::Duration;
 
 use lumbre_image::Rgb;
 use lumbre_math::DVec2;
-use lumbre_scene::{Camera, FilmDesc, FilterDesc, IntegratorDesc, IntegratorKind, SamplerDesc, Scene};
-use lumbre_shading::spectrum::SensorCurves;
+use lumbre_scene::{
+    Buckets, Camera, FilmDesc, FilmKind, FilterDesc, IntegratorDesc, IntegratorKind, SamplerDesc, Scene,
+};
+use lumbre_shading::spectrum::{SensorCurves, WavelengthDensity};
 
 use crate::RenderError;
 use crate::denoise;
 use crate::film::{
-    Exposure, FeatureSums, Filter, FilterShape, GuideSums, MAX_PIXELS, Pixel, PixelBounds, RatioSums,
+    BucketSums, Exposure, FeatureSums, Filter, FilterShape, GuideSums, MAX_PIXELS, Pixel, PixelBounds,
+    RatioSums, SurfaceSums,
 };
 use crate::workers::Workers;
 
@@ -38,6 +41,8 @@ pub struct RenderOptions {
     pub sampler: SamplerDesc,
     /// The pixel filter.
     pub filter: FilterDesc,
+    /// What is kept of samples. Films that keep wavelengths need [`Self::spectral`].
+    pub film: FilmKind,
     /// Factor from radiance to pixel values, and the limit of a sample.
     pub exposure: Exposure,
     /// Whether what the camera sees where there is nothing is left out: the picture then says how much each pixel covers.
@@ -113,6 +118,7 @@ impl Default for RenderOptions {
             integrator: IntegratorDesc::default(),
             sampler: SamplerDesc::default(),
             filter: FilterDesc::default(),
+            film: film.kind,
             exposure: exposure_of(&film),
             transparent: false,
             spectral: false,
@@ -137,6 +143,7 @@ impl RenderOptions {
             integrator: scene.integrator(),
             sampler: scene.sampler(),
             filter: scene.filter(),
+            film: film.kind,
             exposure: exposure_of(film),
             spectral: film.spectral && matches!(scene.integrator().kind, IntegratorKind::Path { .. }),
             sensor_curves: film.camera.clone(),
@@ -240,6 +247,12 @@ impl RenderOptions {
         if self.features {
             each += size_of::<FeatureSums>() + 4 * size_of::<Rgb>();
         }
+        each += match self.film {
+            FilmKind::Rgb => 0,
+            FilmKind::GBuffer(_) => size_of::<SurfaceSums>(),
+            FilmKind::Spectral(buckets) => buckets.count as usize * size_of::<BucketSums>(),
+        };
+        each += self.film_channels() * size_of::<f32>();
         let pixels = self.bounds()?.area();
         let mut all = pixels.saturating_mul(each as u64);
         if self.guides {
@@ -252,6 +265,24 @@ impl RenderOptions {
             _ => 0,
         };
         Ok(all.saturating_add(photons))
+    }
+
+    /// How many channels the film has besides red, green and blue.
+    pub fn film_channels(&self) -> usize {
+        match self.film {
+            FilmKind::Rgb => 0,
+            FilmKind::GBuffer(_) => SurfaceSums::CHANNELS.len(),
+            FilmKind::Spectral(buckets) => buckets.count as usize,
+        }
+    }
+
+    /// The wavelengths of samples; `None` in RGB.
+    pub(crate) fn wavelengths(&self) -> Option<WavelengthDensity> {
+        let density = match self.film {
+            FilmKind::Spectral(Buckets { low, high, .. }) => WavelengthDensity::Even { low, high },
+            FilmKind::Rgb | FilmKind::GBuffer(_) => WavelengthDensity::Visible,
+        };
+        self.spectral.then_some(density)
     }
 
     /// How samples become the colours of pixels.

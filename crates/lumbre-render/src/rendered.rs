@@ -2,9 +2,12 @@
 
 use std::time::Duration;
 
-use crate::film::{Extras, FeatureSums, Guides, MAX_SAMPLE, Pixel, PixelBounds, Tile};
+use lumbre_image::{Image, Layer, Rgb};
+
+use crate::film::{
+    ATTRIBUTES, Extras, FeatureSums, Guides, MAX_SAMPLE, Pixel, PixelBounds, SurfaceSums, Tile, channel_name,
+};
 use crate::transport::{Feature, RayCounts};
-use lumbre_image::{Image, Rgb};
 
 /// What [`crate::render`] returns: all that was asked for, or what there was when it was stopped.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,8 +25,19 @@ pub struct Rendered {
     pub features: Vec<(Feature, Image)>,
     /// What the denoiser needs of every pixel, if it was asked for.
     pub guides: Option<Guides>,
+    /// What the film has besides colours.
+    pub film: FilmLayers,
     /// What it took.
     pub stats: Stats,
+}
+
+/// What a film keeps besides colours, as an EXR file has it; nothing for a film `rgb`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FilmLayers {
+    /// Channels by the names that pbrt-v4 gives them.
+    pub layers: Vec<Layer>,
+    /// What the file says of them, by name.
+    pub attributes: Vec<(String, String)>,
 }
 
 /// What a render took.
@@ -71,7 +85,8 @@ impl Rendered {
         bounds: PixelBounds,
         features: Vec<(Feature, Image)>,
     ) -> Self {
-        Self { image, coverage, bounds, features, guides: None, stats: Stats::default() }
+        let film = FilmLayers::default();
+        Self { image, coverage, bounds, features, guides: None, film, stats: Stats::default() }
     }
 }
 
@@ -116,6 +131,7 @@ pub(crate) fn rendered_of<'t>(
         coverage: coverage_picture(tiles.clone(), bounds),
         bounds,
         features: wanted.iter().map(|&f| (f, feature_picture(tiles.clone(), bounds, f))).collect(),
+        film: film_layers(tiles.clone(), bounds, extras),
         guides: extras.guides.then(|| Guides::new(tiles)),
         stats: Stats::default(),
     }
@@ -163,6 +179,39 @@ pub(crate) fn feature_picture<'t>(
     };
     let colours = |tile: &'t Tile| tile.features().iter().map(move |sums| colour(sums, tile.depth_unit()));
     image_of(bounds, put_together(tiles, bounds, Rgb::BLACK, colours))
+}
+
+/// What a film of this kind has besides colours.
+fn film_layers<'t>(
+    tiles: impl Iterator<Item = &'t Tile> + Clone,
+    bounds: PixelBounds,
+    extras: Extras,
+) -> FilmLayers {
+    let mut layers: Vec<Layer> = Vec::new();
+    let mut attributes = Vec::new();
+    if extras.surfaces {
+        layers.extend(SurfaceSums::CHANNELS.map(|name| {
+            let samples = vec![0.0; bounds.area() as usize];
+            Layer { name: name.to_owned(), samples, full_precision: true }
+        }));
+        for tile in tiles.clone() {
+            let pixels = tile.bounds().pixels().zip(tile.surfaces()).zip(tile.pixels());
+            for (((x, y), sums), pixel) in pixels {
+                let at = bounds.position(x, y);
+                let values = sums.channels(pixel.samples, tile.depth_unit());
+                layers.iter_mut().zip(values).for_each(|(layer, value)| layer.samples[at] = value);
+            }
+        }
+    }
+    if let Some(buckets) = extras.buckets {
+        layers.extend((0..buckets.count as usize).map(|bucket| {
+            let values = |tile: &'t Tile| tile.buckets().map(move |sums| sums[bucket].mean());
+            let samples = put_together(tiles.clone(), bounds, 0.0, values);
+            Layer { name: channel_name(&buckets, bucket), samples, full_precision: false }
+        }));
+        attributes.extend(ATTRIBUTES.map(|(name, value)| (name.to_owned(), value.to_owned())));
+    }
+    FilmLayers { layers, attributes }
 }
 
 /// The variance of the luminance of every pixel, as it is estimated from its samples: that of their mean. 0 for fewer than two.

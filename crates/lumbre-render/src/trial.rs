@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use lumbre_scene::Scene;
+use lumbre_scene::{FilmKind, Scene};
 
 use crate::film::MAX_LUMINANCE;
 use crate::integrators::Integrator;
@@ -56,7 +56,12 @@ impl Trial {
         workers: &Workers,
     ) -> Result<Self, RenderError> {
         let longer_side = SIDE.min(f64::from(options.width.max(options.height)));
-        let small = RenderOptions { features: false, guides: false, ..options.smaller(longer_side) };
+        let film = match options.film {
+            // Its noise is that of its wavelengths.
+            FilmKind::Spectral(_) => options.film,
+            FilmKind::Rgb | FilmKind::GBuffer(_) => FilmKind::Rgb,
+        };
+        let small = RenderOptions { features: false, guides: false, film, ..options.smaller(longer_side) };
         let taker = PixelSampler::new(scene, &small, integrator)?;
         let row = |y| Row { y, pixels: vec![Moments::default(); small.width as usize] };
         let mut rows: Vec<Row> = (0..small.height).map(row).collect();

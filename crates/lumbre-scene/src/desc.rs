@@ -409,9 +409,63 @@ pub enum EnvironmentMapping {
     LatitudeLongitude,
 }
 
+/// What a film keeps of samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum FilmKind {
+    /// Red, green and blue.
+    #[default]
+    Rgb,
+    /// Besides, what samples see of surfaces, and the variance of their colours: pbrt's film `gbuffer`.
+    GBuffer(FilmSpace),
+    /// Besides, radiance by wavelength: pbrt's film `spectral`.
+    Spectral(Buckets),
+}
+
+/// The space in which a film keeps points and directions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FilmSpace {
+    /// That of the camera: x to the right, y up, z ahead.
+    #[default]
+    Camera,
+    /// That of the scene.
+    World,
+}
+
+/// A range of wavelengths, and into how many equal parts it is cut. A film with buckets samples all wavelengths of the range alike, and none
+/// outside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Buckets {
+    /// The parts: at least one.
+    pub count: u32,
+    /// The first wavelength, in nm.
+    pub low: f32,
+    /// The last one, above the first.
+    pub high: f32,
+}
+
+impl Buckets {
+    /// The most parts: one a nanometre of the visible range.
+    pub const MAX: u32 = 471;
+
+    /// The part that a wavelength falls into; the first or the last one for those outside.
+    pub fn of(&self, nm: f32) -> usize {
+        let part = f64::from(nm - self.low) / f64::from(self.high - self.low);
+        // A cast from a float saturates.
+        ((part * f64::from(self.count)) as usize).min(self.count as usize - 1)
+    }
+
+    /// The wavelength in the middle of a part.
+    pub fn middle(&self, part: usize) -> f64 {
+        let width = f64::from(self.high - self.low) / f64::from(self.count);
+        f64::from(self.low) + (part as f64 + 0.5) * width
+    }
+}
+
 /// The film settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmDesc {
+    /// What it keeps.
+    pub kind: FilmKind,
     /// The output name, if the file gives one.
     pub filename: Option<String>,
     /// Width in pixels; `None` leaves the choice to the program.
@@ -442,6 +496,7 @@ pub struct FilmDesc {
 impl Default for FilmDesc {
     fn default() -> Self {
         Self {
+            kind: FilmKind::Rgb,
             filename: None,
             width: None,
             height: None,

@@ -5,7 +5,7 @@ use std::str::FromStr;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use lumbre::description::IntegratorKind;
+use lumbre::description::{FilmKind, IntegratorKind};
 use lumbre::image::{Image, Rgb};
 use lumbre::{CancelToken, ErrorKind, NoProgress, Progress, RenderOptions, RenderState, SceneDesc, Setting};
 use rayon::prelude::*;
@@ -183,6 +183,7 @@ impl Worker {
             Channel::Uv => IntegratorKind::Uv,
             Channel::Variance | Channel::Ids => options.integrator.kind,
         };
+        options.film = FilmKind::Rgb;
         options.spectral &= matches!(options.integrator.kind, IntegratorKind::Path { .. });
         if !matches!(wanted.channel, Channel::Beauty | Channel::Variance) {
             options.transparent = false;

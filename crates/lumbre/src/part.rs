@@ -8,12 +8,13 @@ use std::path::Path;
 use lumbre_formats::image::ImageFormat;
 use lumbre_formats::{FormatError, atomic_write, open_regular};
 use lumbre_render::{MergeError, RenderOptions, RenderState, StateError};
+use lumbre_scene::FilmKind;
 use serde::{Deserialize, Serialize};
 
 use crate::{Error, Picture, SaveOptions, in_words};
 
 /// What a part file begins with.
-const MAGIC: &[u8] = b"LUMBRE PART 3\n";
+const MAGIC: &[u8] = b"LUMBRE PART 4\n";
 /// What an .exr ends with that holds a part, after the length of the part as eight bytes.
 const TRAILER: &[u8] = b"LUMBREPT";
 /// Bytes of a checksum.
@@ -73,6 +74,9 @@ impl Job {
         identity.extend(options.view.as_ref().map(|view| ("view".to_owned(), in_words(view))));
         if options.spectral {
             identity.insert("spectral".to_owned(), "true".to_owned());
+        }
+        if options.film != FilmKind::Rgb {
+            identity.insert("film".to_owned(), in_words(&options.film));
         }
         let mut folder = None;
         for file in files {

@@ -5,7 +5,9 @@ use std::path::Path;
 
 use lumbre_formats::image::{ImageFormat, encode_image, encode_layers, write_image, write_layers};
 use lumbre_image::{Image, Layer, Layers, ToneMap};
-use lumbre_render::{CancelToken, Denoised, Feature, PixelBounds, Rendered, Stats, denoise_unless};
+use lumbre_render::{
+    CancelToken, Denoised, Feature, FilmLayers, PixelBounds, Rendered, Stats, denoise_unless,
+};
 
 use crate::{Background, Error, SaveOptions};
 
@@ -115,6 +117,18 @@ impl Picture {
         self.rendered.features.iter().find(|(kind, _)| *kind == feature).map(|(_, image)| image)
     }
 
+    /// What the film has besides colours: the channels that pbrt's films `gbuffer` and `spectral` have. An .exr file holds them too.
+    pub fn film(&self) -> &FilmLayers {
+        &self.rendered.film
+    }
+
+    /// The same picture with other channels of the film.
+    #[must_use]
+    pub fn with_film(mut self, film: FilmLayers) -> Self {
+        self.rendered.film = film;
+        self
+    }
+
     /// The rendered part of the whole picture.
     pub fn bounds(&self) -> PixelBounds {
         self.rendered.bounds
@@ -144,7 +158,7 @@ impl Picture {
             return Err(Error::Options(format!("{}: only .exr files hold feature layers", path.display())));
         }
         let (image, options) = self.shown(ImageFormat::from_path(path), options);
-        if layers.is_empty() && !self.keeps_noisy(ImageFormat::from_path(path)) {
+        if layers.is_empty() && !self.has_more_than_colours(ImageFormat::from_path(path)) {
             return Ok(write_image(path, &image, &options)?);
         }
         Ok(write_layers(path, &self.layers(&image, layers)?, &options)?)
@@ -164,7 +178,7 @@ impl Picture {
             return Err(Error::Options(format!("{} does not hold feature layers", format.name())));
         }
         let (image, options) = self.shown(Some(format), options);
-        let encoded = if layers.is_empty() && !self.keeps_noisy(Some(format)) {
+        let encoded = if layers.is_empty() && !self.has_more_than_colours(Some(format)) {
             encode_image(&image, format, &options)
         } else {
             encode_layers(&self.layers(&image, layers)?, &options)
@@ -185,6 +199,7 @@ impl Picture {
         let mut options = options.clone();
         options.exr_window = part.then_some((x0 as i32, y0 as i32, self.whole.0, self.whole.1));
         let is_for_displays = matches!(format, Some(ImageFormat::Png | ImageFormat::Jpeg));
+        options.exr_attributes.clone_from(&self.rendered.film.attributes);
         options.denoiser = self.noisy.as_ref().map(|noisy| noisy.denoiser);
         let coverage = self.rendered.coverage.as_ref();
         let Some(background) = &self.background else { return (Cow::Borrowed(self.image()), options) };
@@ -198,20 +213,21 @@ impl Picture {
         (Cow::Owned(image), options)
     }
 
-    /// Whether a file of this format has the noisy picture too.
-    fn keeps_noisy(&self, format: Option<ImageFormat>) -> bool {
-        self.noisy.is_some() && format == Some(ImageFormat::Exr)
+    /// Whether a file of this format has the noisy picture too, or channels of the film.
+    fn has_more_than_colours(&self, format: Option<ImageFormat>) -> bool {
+        let has_more = self.noisy.is_some() || !self.rendered.film.layers.is_empty();
+        has_more && format == Some(ImageFormat::Exr)
     }
 
     fn layers(&self, image: &Image, features: &[Feature]) -> Result<Layers, Error> {
+        let stands_twice = |layer: Layer| Error::Options(format!("layer {} stands twice", layer.name));
         let mut all = Layers::from_image(image);
         if let Some(Noisy { image, coverage, .. }) = &self.noisy {
             let behind = |background: &Background| {
                 Cow::Owned(background.under_light(image, coverage.as_ref(), self.bounds(), self.whole))
             };
             let shown = self.background.as_ref().map_or(Cow::Borrowed(image), behind);
-            all.push_image("noisy", &shown)
-                .map_err(|layer| Error::Options(format!("layer {} stands twice", layer.name)))?;
+            all.push_image("noisy", &shown).map_err(stands_twice)?;
         }
         for feature in features {
             let image = self
@@ -223,9 +239,11 @@ impl Picture {
                     samples: image.channel(channel).collect(),
                     full_precision: true,
                 };
-                all.push(layer)
-                    .map_err(|layer| Error::Options(format!("layer {} stands twice", layer.name)))?;
+                all.push(layer).map_err(stands_twice)?;
             }
+        }
+        for layer in &self.rendered.film.layers {
+            all.push(layer.clone()).map_err(stands_twice)?;
         }
         Ok(all)
     }

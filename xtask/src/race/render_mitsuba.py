@@ -50,11 +50,33 @@ def material(m):
     return {"type": "twosided", "bsdf": bsdf}
 
 
-def describe():
-    scene = {
-        "type": "scene",
-        "integrator": {"type": "path", "max_depth": SCENE["bounces"] + 1},
+def medium(volume):
+    nx, ny, nz = volume["cells"]
+    density = np.fromfile(path(volume["density"]), dtype="<f4").reshape(nz, ny, nx, 1)
+    low, high = np.array(volume["low"]), np.array(volume["high"])
+    box = To().translate(low.tolist()).scale((high - low).tolist())
+    grid = {"type": "gridvolume", "grid": mi.VolumeGrid(density), "to_world": box, "raw": True}
+    return {
+        "type": "heterogeneous",
+        "sigma_t": grid,
+        "scale": volume["extinction"],
+        "albedo": {"type": "constvolume", "value": rgb(volume["albedo"])},
+        "phase": {"type": "hg", "g": volume["g"]},
     }
+
+
+def describe():
+    volume = SCENE["volume"]
+    kind = "volpath" if volume else "path"
+    scene = {"type": "scene", "integrator": {"type": kind, "max_depth": SCENE["bounces"] + 1}}
+    if volume:
+        scene["volume"] = {
+            "type": "ply",
+            "filename": path(volume["hull"]),
+            "face_normals": True,
+            "bsdf": {"type": "null"},
+            "interior": medium(volume),
+        }
     for i, m in enumerate(SCENE["materials"]):
         scene[f"material{i}"] = material(m)
     for i, o in enumerate(SCENE["objects"]):

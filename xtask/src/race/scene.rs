@@ -19,6 +19,7 @@ pub(crate) struct Scene {
     pub(crate) materials: Vec<Material>,
     pub(crate) objects: Vec<Object>,
     pub(crate) sky: Option<Sky>,
+    pub(crate) volume: Option<Volume>,
     /// Whether most of what is interesting is light that comes through glass from a small lamp: programs that have an integrator for it use it.
     pub(crate) has_caustics: bool,
 }
@@ -73,6 +74,33 @@ pub(crate) struct Sky {
     pub(crate) height: usize,
     /// Row by row from the zenith down; the middle of a row lies towards -z, and +x is a quarter to its right.
     pub(crate) pixels: Vec<Rgb>,
+}
+
+/// A medium in a box, whose density is a grid.
+#[derive(Debug)]
+pub(crate) struct Volume {
+    /// The corners of the box.
+    pub(crate) low: Point,
+    pub(crate) high: Point,
+    /// Voxels along x, y and z.
+    pub(crate) cells: [usize; 3],
+    /// In their middles, x fastest, then y; 0 at the sides, so that programs need not agree on what is between the outermost voxels and the box.
+    pub(crate) density: Vec<f32>,
+    /// Extinction per length where the density is 1.
+    pub(crate) extinction: f64,
+    /// How much of it scatters.
+    pub(crate) albedo: Rgb,
+    /// The mean cosine of Henyey's and Greenstein's phase function.
+    pub(crate) g: f64,
+}
+
+impl Volume {
+    /// The box, facing outwards.
+    pub(crate) fn hull(&self) -> Mesh {
+        let middle = [0, 1, 2].map(|k| f64::midpoint(self.low[k], self.high[k]));
+        let half = [0, 1, 2].map(|k| 0.5 * (self.high[k] - self.low[k]));
+        Mesh::block(middle, half, 0.0)
+    }
 }
 
 impl Mesh {

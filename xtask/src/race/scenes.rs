@@ -1,10 +1,22 @@
 //! The scenes of the race, each drawn by a few lines.
 
-use super::scene::{Camera, Material, Mesh, Object, Point, Random, Rgb, Scene, Sky, dot, normalized};
+use super::scene::{Camera, Material, Mesh, Object, Point, Random, Rgb, Scene, Sky, Volume, dot, normalized};
 
 /// All of them.
 pub(crate) fn all() -> Vec<Scene> {
-    vec![cornell(), interior(), lights(), terrain(1000, 500), glass(), coats(), models(), tumbler(), pool()]
+    vec![
+        cornell(),
+        interior(),
+        lights(),
+        terrain(1000, 500),
+        glass(),
+        coats(),
+        models(),
+        tumbler(),
+        pool(),
+        cloud(),
+        smoke(),
+    ]
 }
 
 const WHITE: Material = Material::Diffuse { reflectance: [0.75, 0.75, 0.75] };
@@ -50,6 +62,7 @@ impl Parts {
             materials: self.materials,
             objects: self.objects,
             sky: None,
+            volume: None,
             has_caustics: false,
         }
     }
@@ -319,4 +332,94 @@ fn pool() -> Scene {
     let camera = Camera { eye: [0.0, 4.8, 2.4], target: [0.0, -0.9, 0.0], fov: 36.0 };
     let about = "A basin of water with waves under a small lamp: its floor is lit by caustics alone.";
     Scene { has_caustics: true, ..parts.scene("pool", about, 12, camera) }
+}
+
+/// A density by the place in the box, from 0 to 1 along each axis, in this many voxels.
+fn voxels(cells: [usize; 3], density: impl Fn(Point) -> f64) -> Vec<f32> {
+    let [nx, ny, nz] = cells;
+    let place = |i: usize, n: usize| (i as f64 + 0.5) / n as f64;
+    let is_side = |i: usize, n: usize| i == 0 || i + 1 == n;
+    let mut all = Vec::with_capacity(nx * ny * nz);
+    for z in 0..nz {
+        for y in 0..ny {
+            for x in 0..nx {
+                let is_outermost = is_side(x, nx) || is_side(y, ny) || is_side(z, nz);
+                let at = [place(x, nx), place(y, ny), place(z, nz)];
+                all.push(if is_outermost { 0.0 } else { density(at).clamp(0.0, 1.0) as f32 });
+            }
+        }
+    }
+    all
+}
+
+/// Waves in three directions, each half as long as the last: from about -1 to 1.
+fn ripples(at: Point, mut length: f64, octaves: u32) -> f64 {
+    let (mut sum, mut size, mut at) = (0.0, 0.5, at);
+    for _ in 0..octaves {
+        let [x, y, z] = at.map(|c| std::f64::consts::TAU * c / length);
+        sum += size * (x.sin() * y.cos() + y.sin() * z.cos() + z.sin() * x.cos()) / 1.5;
+        at = [0.8 * at[0] + 0.6 * at[2] + 0.31, at[1] + 0.17, 0.8 * at[2] - 0.6 * at[0] + 0.53];
+        (length, size) = (0.5 * length, 0.5 * size);
+    }
+    sum
+}
+
+fn cloud() -> Scene {
+    let mut parts = Parts::default();
+    parts.add(floor([-30.0, 30.0], -2.0, [-30.0, 30.0]), diffuse([0.25, 0.3, 0.2]));
+    let density = |at: Point| {
+        // Three balls, whose sides are frayed.
+        let balls = [([0.35, 0.45, 0.5], 0.27), ([0.62, 0.5, 0.45], 0.3), ([0.5, 0.4, 0.62], 0.25)];
+        let inside = balls.iter().map(|&(middle, radius)| {
+            let away = [0, 1, 2].map(|k| at[k] - middle[k]);
+            1.0 - dot(away, away).sqrt() / radius
+        });
+        let depth = inside.fold(f64::MIN, f64::max) + 0.45 * ripples(at, 0.4, 4);
+        (6.0 * depth).clamp(0.0, 1.0)
+    };
+    let cells = [56, 40, 56];
+    let volume = Volume {
+        low: [-1.8, -0.6, -1.8],
+        high: [1.8, 1.6, 1.8],
+        cells,
+        density: voxels(cells, density),
+        extinction: 9.0,
+        albedo: [0.999, 0.998, 0.996],
+        g: 0.6,
+    };
+    let camera = Camera { eye: [0.0, 0.4, 6.0], target: [0.0, 0.4, 0.0], fov: 38.0 };
+    let about = "A dense white cloud under a sky with a low, soft sun.";
+    let scene = parts.scene("cloud", about, 100, camera);
+    Scene { sky: Some(evening()), volume: Some(volume), ..scene }
+}
+
+fn smoke() -> Scene {
+    let mut parts = Parts::default();
+    parts.add(floor([-5.0, 5.0], 0.0, [-5.0, 5.0]), diffuse([0.5, 0.5, 0.5]));
+    parts.add(back([-5.0, 5.0], [0.0, 6.0], -3.0), diffuse([0.45, 0.5, 0.6]));
+    parts.add(Mesh::block([0.0, 0.1, 0.0], [0.3, 0.099, 0.3], 20.0), diffuse([0.3, 0.25, 0.2]));
+    parts.add_light(ceiling([-2.6, -1.8], 4.0, [0.6, 1.4]), [60.0, 56.0, 50.0]);
+    parts.add_light(ceiling([1.6, 2.0], 3.5, [-1.6, -1.2]), [40.0, 60.0, 90.0]);
+    let density = |at: Point| {
+        // A column that winds and widens upwards.
+        let [x, y, z] = at;
+        let middle = [0.5 + 0.12 * (7.0 * y).sin(), 0.5 + 0.1 * (5.0 * y + 1.0).cos()];
+        let away = ((x - middle[0]).powi(2) + (z - middle[1]).powi(2)).sqrt();
+        let width = 0.07 + 0.2 * y;
+        let thin = (1.0 - away / width).max(0.0) * (1.3 - y);
+        thin * (1.0 + 1.4 * ripples(at, 0.3, 4)).max(0.0)
+    };
+    let cells = [40, 64, 40];
+    let volume = Volume {
+        low: [-1.1, 0.2, -1.1],
+        high: [1.1, 3.4, 1.1],
+        cells,
+        density: voxels(cells, density),
+        extinction: 7.0,
+        albedo: [0.7, 0.68, 0.65],
+        g: 0.3,
+    };
+    let camera = Camera { eye: [0.0, 2.0, 6.5], target: [0.0, 1.6, 0.0], fov: 40.0 };
+    let about = "A column of grey smoke between two lamps.";
+    Scene { volume: Some(volume), ..parts.scene("smoke", about, 32, camera) }
 }

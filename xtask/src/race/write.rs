@@ -18,12 +18,19 @@ pub(crate) fn write_scene(scene: &Scene, size: u32, folder: &Path) -> Result<()>
     if let Some(sky) = &scene.sky {
         fs::write(folder.join(SKY_NAME), hdr(sky))?;
     }
+    if let Some(volume) = &scene.volume {
+        fs::write(folder.join(HULL_NAME), ply(&volume.hull()))?;
+        let bytes: Vec<u8> = volume.density.iter().flat_map(|density| density.to_le_bytes()).collect();
+        fs::write(folder.join(DENSITY_NAME), bytes)?;
+    }
     fs::write(folder.join("scene.pbrt"), pbrt(scene, size))?;
     fs::write(folder.join("scene.json"), serde_json::to_string_pretty(&description(scene, size))?)?;
     Ok(())
 }
 
 const SKY_NAME: &str = "sky.hdr";
+const HULL_NAME: &str = "volume.ply";
+const DENSITY_NAME: &str = "volume.f32";
 
 fn mesh_name(object: usize) -> String {
     format!("mesh-{object}.ply")
@@ -57,6 +64,26 @@ pub(crate) fn pbrt(scene: &Scene, size: u32) -> String {
             out,
             "AttributeBegin\n  ConcatTransform [0 0 1 0  -1 0 0 0  0 1 0 0  0 0 0 1]\n  \
              LightSource \"infinite\" \"string filename\" \"{SKY_NAME}\"\nAttributeEnd"
+        );
+    }
+    if let Some(volume) = &scene.volume {
+        let [nx, ny, nz] = volume.cells;
+        let scattering = volume.albedo.map(|albedo| volume.extinction * albedo);
+        let absorption = volume.albedo.map(|albedo| volume.extinction * (1.0 - albedo));
+        let density: Vec<String> = volume.density.iter().map(f32::to_string).collect();
+        let _ = writeln!(
+            out,
+            "MakeNamedMedium \"volume\" \"string type\" \"uniformgrid\" \"integer nx\" {nx} \"integer ny\" {ny} \"integer nz\" {nz}\n  \
+             \"point3 p0\" [{}] \"point3 p1\" [{}] \"rgb sigma_s\" [{}] \"rgb sigma_a\" [{}] \"float g\" {}\n  \
+             \"float density\" [{}]\n\
+             AttributeBegin\n  Material \"interface\"\n  MediumInterface \"volume\" \"\"\n  \
+             Shape \"plymesh\" \"string filename\" \"{HULL_NAME}\"\nAttributeEnd",
+            numbers(&volume.low),
+            numbers(&volume.high),
+            numbers(&scattering),
+            numbers(&absorption),
+            volume.g,
+            density.join(" ")
         );
     }
     for (i, material) in scene.materials.iter().enumerate() {
@@ -119,6 +146,18 @@ fn description(scene: &Scene, size: u32) -> Value {
             })
             .collect::<Vec<_>>(),
         "sky": scene.sky.as_ref().map(|_| SKY_NAME),
+        "volume": scene.volume.as_ref().map(|volume| {
+            json!({
+                "hull": HULL_NAME,
+                "density": DENSITY_NAME,
+                "cells": volume.cells,
+                "low": volume.low,
+                "high": volume.high,
+                "extinction": volume.extinction,
+                "albedo": volume.albedo,
+                "g": volume.g,
+            })
+        }),
     })
 }
 

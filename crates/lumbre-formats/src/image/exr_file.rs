@@ -286,7 +286,11 @@ pub(super) fn encode(layers: &Layers, options: &WriteOptions) -> std::io::Result
     if let Some(denoiser) = options.denoiser {
         attributes.other.insert(Text::from("denoiser"), AttributeValue::Text(Text::from(denoiser)));
     }
-    // As one attribute: the crate writes several of one's own in any order, another each time.
+    for (name, text) in &options.exr_attributes {
+        attributes.other.insert(Text::from(name.as_str()), AttributeValue::Text(Text::from(text.as_str())));
+    }
+    let has_several = attributes.other.len() > 1;
+    // As one attribute: texts of any length.
     let lines: Vec<String> = options.metadata.iter().map(|(name, text)| format!("{name}: {text}")).collect();
     attributes.comments = Text::new_or_none(lines.join("\n")).filter(|_| !lines.is_empty());
     let layer = ExrLayer::new(size, attributes, encoding, AnyChannels::sort(channels));
@@ -304,5 +308,36 @@ pub(super) fn encode(layers: &Layers, options: &WriteOptions) -> std::io::Result
     let picture = ExrImage { attributes: picture_attributes, layer_data: layer };
     let mut out = Cursor::new(Vec::new());
     picture.write().to_buffered(&mut out).map_err(invalid)?;
-    Ok(out.into_inner())
+    let mut bytes = out.into_inner();
+    if has_several {
+        // The crate writes several of one's own in any order, another each time.
+        sort_attributes(&mut bytes);
+    }
+    Ok(bytes)
+}
+
+/// Sorts the attributes of the one header of a file by name. Each is a name and a type, both ended by a zero, a length of four bytes, and a
+/// value; a zero ends the list.
+fn sort_attributes(file: &mut [u8]) {
+    const START: usize = 8;
+    let end_of = |at: usize| -> Option<usize> {
+        let text = |at: usize| Some(at + file.get(at..)?.iter().position(|&byte| byte == 0)? + 1);
+        let value = text(text(at)?)?;
+        let length = u32::from_le_bytes(file.get(value..value + 4)?.try_into().ok()?);
+        Some(value + 4 + length as usize)
+    };
+    let mut ends = vec![START];
+    while let Some(&at) = ends.last()
+        && file.get(at).is_some_and(|&byte| byte != 0)
+        && let Some(end) = end_of(at)
+    {
+        ends.push(end);
+    }
+    let mut attributes: Vec<Vec<u8>> =
+        ends.windows(2).filter_map(|ends| file.get(ends[0]..ends[1])).map(<[u8]>::to_vec).collect();
+    attributes.sort();
+    let sorted = attributes.concat();
+    if let Some(list) = file.get_mut(START..START + sorted.len()) {
+        list.copy_from_slice(&sorted);
+    }
 }

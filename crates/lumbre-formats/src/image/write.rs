@@ -32,6 +32,8 @@ pub struct WriteOptions {
     pub exr_window: Option<(i32, i32, u32, u32)>,
     /// The denoiser that the image went through, for the metadata of EXR (attribute `denoiser`) and PNG (text `Denoiser`).
     pub denoiser: Option<&'static str>,
+    /// Attributes of EXR's own: texts by name.
+    pub exr_attributes: Vec<(String, String)>,
     /// Further metadata by name, for EXR (lines of the attribute `comments`) and PNG (texts). Names are of letters and digits.
     pub metadata: Vec<(String, String)>,
 }
@@ -48,6 +50,7 @@ impl Default for WriteOptions {
             exr_compression: ExrCompression::Zip,
             exr_window: None,
             denoiser: None,
+            exr_attributes: Vec::new(),
             metadata: Vec::new(),
         }
     }

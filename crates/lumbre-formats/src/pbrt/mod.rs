@@ -12,6 +12,8 @@
 
 mod colour;
 mod convert;
+#[cfg(test)]
+mod coverage;
 mod curves;
 mod displacement;
 mod exact_shapes;

@@ -19,7 +19,7 @@ struct Row {
     is_required: bool,
 }
 
-fn docs() -> PathBuf {
+pub(super) fn docs() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../docs")
 }
 
@@ -52,9 +52,9 @@ fn tables(page: &str) -> Vec<Vec<Row>> {
     tables
 }
 
-/// A value of a parameter that has no default, or not one that could be written.
-fn sample(page: &str, row: &Row) -> &'static str {
-    match (page, &*row.name) {
+/// A value of a parameter that cannot be told by its type.
+pub(super) fn special(page: &str, name: &str) -> Option<&'static str> {
+    Some(match (page, name) {
         ("triangle", "p1") => "1 0 0",
         ("triangle", "p2") => "0 1 0",
         ("quadric", "coefficients") => "1 2 3 0 0 0 0 0 0 -1",
@@ -86,13 +86,27 @@ fn sample(page: &str, row: &Row) -> &'static str {
         (_, "encoding") => r#""linear""#,
         (_, "screenwindow") => "-1 1 -2 2",
         (_, "p1") => "3 4 5",
-        _ => match &*row.ty {
-            "float" => "0.3",
-            "rgb" => "0.2 0.3 0.4",
-            "point3" => "0 0 0",
-            other => panic!("{page}: no value is known for a {other} {}", row.name),
-        },
-    }
+        _ => return None,
+    })
+}
+
+/// A value of a parameter that has no default, or not one that could be written.
+fn sample(page: &str, row: &Row) -> &'static str {
+    special(page, &row.name).unwrap_or_else(|| match &*row.ty {
+        "float" => "0.3",
+        "rgb" => "0.2 0.3 0.4",
+        "point3" => "0 0 0",
+        other => panic!("{page}: no value is known for a {other} {}", row.name),
+    })
+}
+
+/// The parameters that things of this name need, as they are given.
+pub(super) fn required(kind: &str, name: &str) -> String {
+    let Ok(page) = fs::read_to_string(docs().join(kind).join(format!("{name}.md"))) else {
+        return String::new();
+    };
+    let rows = tables(&page).into_iter().next().unwrap_or_default();
+    rows.iter().filter(|row| row.is_required).map(|row| given(row, sample(name, row))).collect()
 }
 
 /// What a parameter is of no use without.
@@ -111,8 +125,12 @@ fn given(row: &Row, value: &str) -> String {
 }
 
 /// A scene with one thing of this kind and type.
-fn scene(kind: &str, name: &str, params: &str) -> String {
+pub(super) fn scene(kind: &str, name: &str, params: &str) -> String {
     match kind {
+        "films" => format!("Film \"{name}\" {params}\nWorldBegin"),
+        "samplers" => format!("Sampler \"{name}\" {params}\nWorldBegin"),
+        "filters" => format!("PixelFilter \"{name}\" {params}\nWorldBegin"),
+        "accelerators" => format!("Accelerator \"{name}\" {params}\nWorldBegin"),
         "cameras" => format!("Camera \"{name}\" {params}\nWorldBegin"),
         "integrators" => format!("Integrator \"{name}\" {params}\nWorldBegin"),
         "shapes" => format!(
@@ -130,6 +148,7 @@ fn scene(kind: &str, name: &str, params: &str) -> String {
         "lights" if name == "diffuse" => {
             format!("WorldBegin AreaLightSource \"{name}\" {params} Shape \"sphere\"")
         }
+        "arealights" => format!("WorldBegin AreaLightSource \"{name}\" {params} Shape \"sphere\""),
         "media" => format!("MakeNamedMedium \"m\" \"string type\" \"{name}\" {params}\nWorldBegin"),
         "lights" => format!("WorldBegin LightSource \"{name}\" {params}"),
         other => panic!("{other}"),
@@ -146,7 +165,7 @@ fn described(text: &str) -> (String, Vec<String>) {
     (format!("{desc:?}"), warnings)
 }
 
-const KINDS: [(&str, &[&str]); 7] = [
+pub(super) const KINDS: [(&str, &[&str]); 7] = [
     ("shapes", shapes::KNOWN),
     ("materials", &materials::KNOWN),
     ("textures", &textures::KNOWN_KINDS),

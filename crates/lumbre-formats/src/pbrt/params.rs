@@ -267,6 +267,8 @@ impl Params {
     /// The effective parameter of this name: the last one given, else the default of the scope.
     pub fn find(&self, name: &'static str) -> Option<&Param> {
         self.asked.borrow_mut().push(name);
+        #[cfg(test)]
+        asked::note(&self.owner, name, &[], &[], false);
         let mut found = None;
         for param in self.own.iter().filter(|p| *p.name == *name) {
             param.used.set(true);
@@ -287,6 +289,8 @@ impl Params {
 
     /// The parameter of this name, which must be of one of these types.
     pub fn typed(&self, name: &'static str, types: &[Type]) -> Result<Option<&Param>> {
+        #[cfg(test)]
+        asked::note(&self.owner, name, types, &[], false);
         self.find(name).map(|p| p.of_type(types)).transpose()
     }
 
@@ -303,7 +307,10 @@ impl Params {
     /// Marks known names without effect as used.
     pub fn ignore(&self, names: &[&'static str]) {
         for name in names {
-            self.find(name);
+            self.asked.borrow_mut().push(name);
+            self.own.iter().filter(|p| *p.name == **name).for_each(|param| param.used.set(true));
+            #[cfg(test)]
+            asked::note(&self.owner, name, &[], &[], true);
         }
     }
 
@@ -389,6 +396,14 @@ impl Params {
         choices: &[(&'static str, T)],
         default: T,
     ) -> Result<T> {
+        #[cfg(test)]
+        asked::note(
+            &self.owner,
+            name,
+            &[],
+            &choices.iter().map(|(name, _)| *name).collect::<Vec<_>>(),
+            false,
+        );
         let Some(param) = self.typed(name, &[Type::String])? else { return Ok(default) };
         let word = param.one_string()?;
         match choices.iter().find(|(choice, _)| *choice == word) {
@@ -424,5 +439,46 @@ impl Params {
     /// Unused parameters, and the names that were asked for.
     pub fn unused(&self) -> (impl Iterator<Item = &Param>, Vec<&'static str>) {
         (self.own.iter().filter(|p| !p.used.get()), self.asked.borrow().clone())
+    }
+}
+
+/// What parameter lists were asked for, for the table of what is rendered.
+#[cfg(test)]
+pub(super) mod asked {
+    use std::cell::RefCell;
+
+    use super::Type;
+
+    /// A parameter that was asked for.
+    #[derive(Clone, Debug)]
+    pub(in crate::pbrt) struct Asked {
+        pub owner: String,
+        pub name: &'static str,
+        /// The types that it may have, where that was said.
+        pub types: Vec<Type>,
+        /// The words that it may be.
+        pub choices: Vec<&'static str>,
+        /// Whether it was asked for only to be left out.
+        pub is_ignored: bool,
+    }
+
+    thread_local! {
+        static ALL: RefCell<Vec<Asked>> = const { RefCell::new(Vec::new()) };
+    }
+
+    pub(super) fn note(
+        owner: &str,
+        name: &'static str,
+        types: &[Type],
+        choices: &[&'static str],
+        is_ignored: bool,
+    ) {
+        let (owner, types, choices) = (owner.to_owned(), types.to_vec(), choices.to_vec());
+        ALL.with_borrow_mut(|all| all.push(Asked { owner, name, types, choices, is_ignored }));
+    }
+
+    /// What was asked for since the last call.
+    pub(in crate::pbrt) fn take() -> Vec<Asked> {
+        ALL.take()
     }
 }

@@ -1,12 +1,13 @@
 //! Camera, film, filter, sampler, integrator and options.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use lumbre_image::ColourSpace;
 use lumbre_math::{DMat3, Transform, Vec2};
 use lumbre_scene::{
-    Camera, CameraKind, FilterDesc, IntegratorDesc, IntegratorKind, MediumId, SamplerDesc, SamplerKind,
-    SphericalMapping,
+    Buckets, Camera, CameraKind, FilmKind, FilmSpace, FilterDesc, IntegratorDesc, IntegratorKind, MediumId,
+    SamplerDesc, SamplerKind, SphericalMapping,
 };
 use lumbre_shading::ShadingNormals;
 use lumbre_shading::spectrum::SensorCurves;
@@ -18,9 +19,38 @@ use super::source::{Result, SourcePosition};
 use super::{colour, sensors};
 use crate::Diagnostic;
 use crate::diagnostic::{number, quoted};
+use crate::image::ImageFormat;
 
 /// The types of cameras.
 pub(super) const CAMERAS: [&str; 4] = ["perspective", "orthographic", "spherical", "realistic"];
+
+/// The types of films.
+pub(super) const FILMS: [&str; 3] = ["rgb", "gbuffer", "spectral"];
+
+/// The names of options.
+pub(super) const OPTIONS: [&str; 11] = [
+    "seed",
+    "wavefront",
+    "rendercoordsys",
+    "displacementedgescale",
+    "pixelstats",
+    "msereferenceimage",
+    "msereferenceout",
+    "disablepixeljitter",
+    "disabletexturefiltering",
+    "disablewavelengthjitter",
+    "forcediffuse",
+];
+
+/// The types of samplers.
+pub(super) const SAMPLERS: [&str; 7] =
+    ["zsobol", "paddedsobol", "sobol", "halton", "pmj02bn", "independent", "stratified"];
+
+/// The types of pixel filters.
+pub(super) const FILTERS: [&str; 5] = ["gaussian", "box", "mitchell", "sinc", "triangle"];
+
+/// The types of acceleration structures.
+pub(super) const ACCELERATORS: [&str; 2] = ["bvh", "kdtree"];
 
 /// The types of integrators.
 pub(super) const INTEGRATORS: [&str; 16] = [
@@ -133,24 +163,22 @@ impl Converter<'_, '_> {
 
     pub fn film(&mut self, ty: &str, params: Params, space: ColourSpace) -> Result<()> {
         let spot = params.spot;
-        let mut spectral = false;
-        match ty {
-            "rgb" => {}
-            "image" => self.upgraded(spot),
-            "spectral" => {
-                check_spectral_film(&params)?;
-                spectral = true;
-                self.note(spot, "the buckets of film \"spectral\" are not written yet: the picture is made of wavelengths, and has their colours");
+        let kind = match ty {
+            "rgb" => FilmKind::Rgb,
+            "image" => {
+                self.upgraded(spot);
+                FilmKind::Rgb
             }
+            "spectral" => FilmKind::Spectral(buckets(&params)?),
             "gbuffer" => {
-                params.ignore(&["coordinatesystem"]);
-                let message = format!("film {} is not rendered yet: an rgb one takes its place", quoted(ty));
-                self.note(spot, message);
+                let spaces = [("camera", FilmSpace::Camera), ("world", FilmSpace::World)];
+                FilmKind::GBuffer(params.choice("coordinatesystem", &spaces, FilmSpace::Camera)?)
             }
             _ => {
-                self.unknown(spot, "film", ty, &["rgb", "gbuffer", "spectral"], "an rgb one takes its place")
+                self.unknown(spot, "film", ty, &FILMS, "an rgb one takes its place");
+                FilmKind::Rgb
             }
-        }
+        };
         let width = params.count("xresolution", 1280, 1)?;
         let height = params.count("yresolution", 720, 1)?;
         let pixel_bounds = match params.integers("pixelbounds")? {
@@ -201,18 +229,26 @@ impl Converter<'_, '_> {
         self.film_diagonal = params.float_above("diagonal", 35.0, 0.0)?;
         let single_precision = !params.boolean("savefp16", true)?;
         if space != ColourSpace::REC709 {
-            self.note(spot, "a film in another colour space is not made yet: the picture is in that of sRGB");
+            self.note(spot, "the film is in the colour space of sRGB: the picture has the colours of the scene, in other numbers");
         }
         let filename = params.string("filename")?.map(str::to_owned);
+        if let (Some(name), true) = (&filename, kind != FilmKind::Rgb)
+            && ImageFormat::from_path(Path::new(name)) != Some(ImageFormat::Exr)
+        {
+            let wrong = Diagnostic::error(format!("the channels of film {} need an EXR file", quoted(ty)));
+            let wrong = wrong.found(quoted(name)).expected("a name that ends in .exr");
+            return Err(params.spot_of("filename").wrong(wrong));
+        }
         self.done(&params);
         let film = &mut self.scene.film;
+        film.kind = kind;
         film.filename = filename;
         (film.width, film.height) = (Some(width), Some(height));
         (film.pixel_bounds, film.crop_window) = (pixel_bounds, crop_window);
         film.max_component = max_component as f32;
         film.sensor = sensor;
         film.camera = camera.map(Arc::new);
-        film.spectral |= spectral;
+        film.spectral |= matches!(kind, FilmKind::Spectral(_));
         film.single_precision = single_precision;
         Ok(())
     }
@@ -251,7 +287,6 @@ impl Converter<'_, '_> {
 
     pub fn sampler(&mut self, ty: &str, params: Params) -> Result<()> {
         let spot = params.spot;
-        let known = ["zsobol", "paddedsobol", "sobol", "halton", "pmj02bn", "independent", "stratified"];
         let kind = match ty {
             "independent" => SamplerKind::Independent,
             "random" => {
@@ -262,9 +297,9 @@ impl Converter<'_, '_> {
                 self.upgraded(spot);
                 SamplerKind::Sobol
             }
-            _ if known.contains(&ty) => SamplerKind::Sobol,
+            _ if SAMPLERS.contains(&ty) => SamplerKind::Sobol,
             _ => {
-                self.unknown(spot, "sampler", ty, &known, "zsobol takes its place");
+                self.unknown(spot, "sampler", ty, &SAMPLERS, "zsobol takes its place");
                 SamplerKind::Sobol
             }
         };
@@ -327,8 +362,7 @@ impl Converter<'_, '_> {
             "triangle" => FilterDesc::Triangle { radius: radius(2.0)? },
             _ => {
                 params.ignore_all();
-                let known = ["gaussian", "box", "mitchell", "sinc", "triangle"];
-                self.unknown(spot, "filter", ty, &known, "gaussian takes its place");
+                self.unknown(spot, "filter", ty, &FILTERS, "gaussian takes its place");
                 FilterDesc::default()
             }
         };
@@ -385,12 +419,17 @@ impl Converter<'_, '_> {
                 self.warn(spot, Diagnostic::note(message));
                 IntegratorKind::Caustics
             }
-            "randomwalk" | "function" => {
+            "randomwalk" => {
                 let kind = path(&params)?;
-                params.ignore_all();
-                let message = format!("integrator {} is not rendered: path takes its place", quoted(ty));
-                self.note(spot, message);
+                let message = "integrator \"randomwalk\" is rendered by path, which samples lights, too: those without size are not black";
+                self.warn(spot, Diagnostic::note(message));
                 kind
+            }
+            "function" => {
+                let wrong = Diagnostic::error(
+                    "integrator \"function\" measures samplers, and makes no picture of a scene",
+                );
+                return Err(spot.wrong(wrong.expected(INTEGRATORS.join(", "))));
             }
             _ => {
                 let kind = path(&params)?;
@@ -418,9 +457,8 @@ impl Converter<'_, '_> {
     pub fn accelerator(&mut self, ty: &str, params: Params) -> Result<()> {
         // Lumbre builds its own tree, which does not affect the image.
         params.ignore_all();
-        let known = ["bvh", "kdtree"];
-        if !known.contains(&ty) {
-            self.unknown(params.spot, "accelerator", ty, &known, "none is needed");
+        if !ACCELERATORS.contains(&ty) {
+            self.unknown(params.spot, "accelerator", ty, &ACCELERATORS, "none is needed");
         }
         Ok(())
     }
@@ -451,7 +489,10 @@ impl Converter<'_, '_> {
             "disablepixeljitter" | "disabletexturefiltering" | "disablewavelengthjitter" | "forcediffuse" => {
                 match value {
                     "false" => {}
-                    "true" => self.note(at, format!("the option {} is not rendered yet", quoted(name))),
+                    "true" => self.note(
+                        at,
+                        format!("the option {} is left out: it is for tests of pbrt", quoted(name)),
+                    ),
                     _ => {
                         let wrong = Diagnostic::error(format!("wrong value of the option {}", quoted(name)));
                         return Err(at.wrong(wrong.found(quoted(value)).expected("true or false")));
@@ -459,21 +500,8 @@ impl Converter<'_, '_> {
                 }
             }
             other => {
-                let known = [
-                    "seed",
-                    "wavefront",
-                    "rendercoordsys",
-                    "displacementedgescale",
-                    "pixelstats",
-                    "msereferenceimage",
-                    "msereferenceout",
-                    "disablepixeljitter",
-                    "disabletexturefiltering",
-                    "disablewavelengthjitter",
-                    "forcediffuse",
-                ];
                 let unknown = Diagnostic::warning(format!("unknown option {}", quoted(name)));
-                self.warn(at, unknown.suggest(other, known));
+                self.warn(at, unknown.suggest(other, OPTIONS));
             }
         }
         Ok(())
@@ -505,13 +533,13 @@ impl Converter<'_, '_> {
     }
 }
 
-/// Refuses a film that keeps light by wavelength whose wavelengths cannot be.
-fn check_spectral_film(params: &Params) -> Result<()> {
+/// The buckets of a film that keeps light by wavelength.
+fn buckets(params: &Params) -> Result<Buckets> {
     const LEAST: f64 = 360.0;
     const GREATEST: f64 = 830.0;
-    let buckets = params.count("nbuckets", 16, 1)?;
-    if buckets > MAX_BUCKETS {
-        return params.out_of_range("nbuckets", f64::from(buckets), &format!("1 to {MAX_BUCKETS}"));
+    let count = params.count("nbuckets", 16, 1)?;
+    if count > Buckets::MAX {
+        return params.out_of_range("nbuckets", f64::from(count), &format!("1 to {}", Buckets::MAX));
     }
     let (low, high) = (params.float("lambdamin", LEAST)?, params.float("lambdamax", GREATEST)?);
     for (name, nm) in [("lambdamin", low), ("lambdamax", high)] {
@@ -519,14 +547,12 @@ fn check_spectral_film(params: &Params) -> Result<()> {
             return params.out_of_range(name, nm, "360 to 830 nm");
         }
     }
-    if low >= high {
+    let buckets = Buckets { count, low: low as f32, high: high as f32 };
+    if buckets.low >= buckets.high {
         return params.out_of_range("lambdamin", low, "less than lambdamax");
     }
-    Ok(())
+    Ok(buckets)
 }
-
-/// Parts of the range of a film that keeps light by wavelength: one a nanometre.
-const MAX_BUCKETS: u32 = 471;
 
 /// The value under its pbrt-v3 name, else the default.
 fn params_v3(params: &Params, name: &'static str, default: f64) -> Result<f64> {

@@ -7,7 +7,7 @@ use super::{denoise, denoise_unless};
 use crate::film::Guides;
 use crate::film::{Exposure, Extras, FeatureSample, PixelBounds, Sample, Tile};
 use crate::rendered::picture;
-use crate::{Rendered, Stats};
+use crate::{FilmLayers, Rendered, Stats};
 
 const WIDTH: u32 = 40;
 const HEIGHT: u32 = 32;
@@ -22,13 +22,7 @@ fn rendered(samples: u32, scene: &Scene) -> Rendered {
         for i in 0..samples {
             let (light, albedo, normal) = scene(x - bounds.x0, y - bounds.y0, i);
             let features = FeatureSample { albedo, normal, depth: 7.0, uv: [0.0; 2] };
-            let sample = Sample {
-                radiance: light * albedo,
-                coverage: Rgb::WHITE,
-                weight: 1.0,
-                features: Some(features),
-                on_catcher: false,
-            };
+            let sample = Sample { radiance: light * albedo, features: Some(features), ..Sample::default() };
             tile.add(x, y, &sample, &Exposure::default());
         }
     }
@@ -39,6 +33,7 @@ fn rendered(samples: u32, scene: &Scene) -> Rendered {
         bounds,
         features: vec![],
         guides: Some(Guides::new(tiles())),
+        film: FilmLayers::default(),
         stats: Stats { spp: samples, stride: Some(1), threads: 1, ..Stats::default() },
     }
 }

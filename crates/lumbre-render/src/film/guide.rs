@@ -149,20 +149,20 @@ pub struct GuideSums {
     /// How much of the ground is in shadow, over how much of the pixel is ground: where shadows are caught in a transparent picture.
     pub shadow: RatioSums<1>,
     /// What the samples met.
-    pub surfaces: SurfaceSums,
+    pub surfaces: GuideSurfaceSums,
     /// How many samples.
     pub count: Count,
 }
 
 /// Sums over what the samples of one pixel met.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SurfaceSums {
+pub struct GuideSurfaceSums {
     features: [f32; FEATURES],
     /// Σ of the squares of the features of each group.
     group_squares: [f32; GROUPS.len()],
 }
 
-impl SurfaceSums {
+impl GuideSurfaceSums {
     /// Adds what a sample met; `None` met nothing.
     pub fn add(&mut self, sample: Option<&FeatureSample>) {
         let Some(FeatureSample { albedo, normal, depth, .. }) = sample else { return };
@@ -196,7 +196,7 @@ impl<const UNDER: usize> RatioSums<UNDER> {
 impl GuideSums {
     fn numbers(&mut self) -> impl Iterator<Item = &mut f32> {
         let ratios = self.light.numbers().chain(self.shadow.numbers());
-        let SurfaceSums { features, group_squares } = &mut self.surfaces;
+        let GuideSurfaceSums { features, group_squares } = &mut self.surfaces;
         let features = features.iter_mut().chain(group_squares);
         ratios.chain(features).chain(std::iter::once(&mut self.count.weight))
     }
@@ -228,7 +228,7 @@ impl GuideSums {
             return 0.0;
         }
         let n = self.count.samples as f32;
-        let SurfaceSums { features, group_squares } = &self.surfaces;
+        let GuideSurfaceSums { features, group_squares } = &self.surfaces;
         let means: f32 = GROUPS[group].clone().map(|i| (features[i] / n) * (features[i] / n)).sum();
         (group_squares[group] / n - means).max(0.0) / (n - 1.0)
     }

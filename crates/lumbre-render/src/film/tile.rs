@@ -3,11 +3,13 @@
 use std::sync::Arc;
 
 use lumbre_image::Rgb;
+use lumbre_scene::Buckets;
 
 use crate::film::pixel::{MAX_SAMPLE, Sums};
 use crate::film::sparse::Sparse;
 use crate::film::{
-    Count, FeatureSample, FeatureSums, GuideSums, Pixel, PixelBounds, RatioSums, SurfaceSums, Tint,
+    BucketSums, Count, FeatureSample, FeatureSums, GuideSums, GuideSurfaceSums, Pixel, PixelBounds,
+    RatioSums, SpectralSample, SurfaceSample, SurfaceSums, Tint,
 };
 
 /// How radiance becomes the colour of a pixel.
@@ -29,11 +31,15 @@ impl Default for Exposure {
 }
 
 impl Exposure {
+    /// The factor that dims a sample which is brighter than any may be.
+    fn hold(&self, radiance: Rgb) -> f32 {
+        let most = (radiance * self.factor).max_component();
+        if most > self.max_component { self.max_component / most } else { 1.0 }
+    }
+
     /// The colour that a sample of this radiance adds.
     pub fn colour(&self, radiance: Rgb) -> Rgb {
-        let colour = radiance * self.factor;
-        let most = colour.max_component();
-        let held = if most > self.max_component { colour * (self.max_component / most) } else { colour };
+        let held = radiance * self.factor * self.hold(radiance);
         let [red, green, blue] = self.sensor.map(|[r, g, b]| r * held.r + g * held.g + b * held.b);
         Rgb::new(red, green, blue)
     }
@@ -61,8 +67,27 @@ pub struct Sample {
     pub weight: f64,
     /// The first hit, if features are requested and there is one.
     pub features: Option<FeatureSample>,
+    /// The surface that it sees, if the film keeps that and it sees any.
+    pub surface: Option<SurfaceSample>,
+    /// Its radiance at its wavelengths, if the film keeps that.
+    pub spectrum: Option<SpectralSample>,
     /// Whether it is of a shadow catcher.
     pub on_catcher: bool,
+}
+
+impl Default for Sample {
+    /// Black, of all that is behind it, of weight 1.
+    fn default() -> Self {
+        Self {
+            radiance: Rgb::BLACK,
+            coverage: Rgb::WHITE,
+            weight: 1.0,
+            features: None,
+            surface: None,
+            spectrum: None,
+            on_catcher: false,
+        }
+    }
 }
 
 /// The pixels of a rectangle. A clone shares its sums with the original until one of them gets another sample, so that it is cheap.
@@ -70,6 +95,7 @@ pub struct Sample {
 pub struct Tile {
     bounds: PixelBounds,
     sums: Arc<TileSums>,
+    buckets: Option<Buckets>,
     depth_unit: f64,
 }
 
@@ -82,6 +108,10 @@ struct TileSums {
     // None unless coverage is wanted by colour; else as many as pixels.
     tints: Sparse<Tint>,
     guides: TileGuides,
+    // Empty unless the film keeps surfaces; else as many as pixels.
+    surfaces: Vec<SurfaceSums>,
+    // Empty unless the film keeps wavelengths; else those of each pixel, one pixel after the other.
+    buckets: Vec<BucketSums>,
 }
 
 /// The [`GuideSums`] of a tile; none unless they are wanted. Most tiles are of light alone, or of ground alone.
@@ -90,7 +120,7 @@ struct TileGuides {
     light: Sparse<RatioSums<3>>,
     shadow: Sparse<RatioSums<1>>,
     // As many as pixels, or none.
-    surfaces: Vec<(SurfaceSums, Count)>,
+    surfaces: Vec<(GuideSurfaceSums, Count)>,
 }
 
 impl TileGuides {
@@ -126,13 +156,24 @@ pub struct Extras {
     pub tints: bool,
     /// What the denoiser needs.
     pub guides: bool,
+    /// What the film `gbuffer` keeps.
+    pub surfaces: bool,
+    /// The buckets of the film `spectral`.
+    pub buckets: Option<Buckets>,
     /// The unit of depths: a power of two above all of them.
     pub depth_unit: f64,
 }
 
 impl Default for Extras {
     fn default() -> Self {
-        Self { features: false, tints: false, guides: false, depth_unit: 1.0 }
+        Self { features: false, tints: false, guides: false, surfaces: false, buckets: None, depth_unit: 1.0 }
+    }
+}
+
+impl Extras {
+    /// Buckets of a pixel.
+    pub(crate) fn bucket_count(&self) -> usize {
+        self.buckets.map_or(0, |buckets| buckets.count as usize)
     }
 }
 
@@ -145,8 +186,10 @@ impl Tile {
             features: vec![FeatureSums::default(); if extras.features { count } else { 0 }],
             tints: Sparse::new(if extras.tints { count } else { 0 }),
             guides: TileGuides::new(if extras.guides { count } else { 0 }),
+            surfaces: vec![SurfaceSums::default(); if extras.surfaces { count } else { 0 }],
+            buckets: vec![BucketSums::default(); count * extras.bucket_count()],
         };
-        Self { bounds, sums: Arc::new(sums), depth_unit: extras.depth_unit }
+        Self { bounds, sums: Arc::new(sums), buckets: extras.buckets, depth_unit: extras.depth_unit }
     }
 
     /// Which pixels.
@@ -174,10 +217,20 @@ impl Tile {
         (0..self.sums.guides.surfaces.len()).map(|at| self.sums.guides.get(at))
     }
 
-    /// What a denoiser wants to know of the pixel in column `x` and row `y` of the picture.
+    /// What the film `gbuffer` keeps of every pixel, row by row; empty where it is not wanted.
+    pub fn surfaces(&self) -> &[SurfaceSums] {
+        &self.sums.surfaces
+    }
+
+    /// The buckets of every pixel, row by row; none where they are not wanted.
+    pub fn buckets(&self) -> impl Iterator<Item = &[BucketSums]> {
+        self.sums.buckets.chunks(self.extras().bucket_count().max(1))
+    }
+
+    /// What the denoiser needs of the pixel in column `x` and row `y` of the picture.
     ///
     /// # Panics
-    /// Where that is not in the tile, and where it is not wanted.
+    /// Where that is not in the tile, and where it was not asked for.
     pub fn guide(&self, x: u32, y: u32) -> GuideSums {
         self.sums.guides.get(self.bounds.position(x, y))
     }
@@ -220,6 +273,14 @@ impl Tile {
         if let Some(features) = sums.features.get_mut(position) {
             features.add(sample.features.as_ref(), sample.weight, self.depth_unit);
         }
+        if let Some(surfaces) = sums.surfaces.get_mut(position) {
+            surfaces.add(colour, sample.surface.as_ref(), sample.weight, self.depth_unit);
+        }
+        if let (Some(buckets), Some(spectrum)) = (&self.buckets, &sample.spectrum) {
+            let factor = exposure.factor * exposure.hold(sample.radiance);
+            let own = of_pixel(&mut sums.buckets, position, buckets.count as usize);
+            BucketSums::add(own, buckets, spectrum, sample.weight, factor);
+        }
         let TileGuides { light, shadow, surfaces } = &mut sums.guides;
         if let Some((surfaces, count)) = surfaces.get_mut(position) {
             let is_shadow = sample.on_catcher && catches_shadows;
@@ -261,6 +322,7 @@ impl Tile {
                 to.merge(other);
             }
         }
+        let each = self.extras().bucket_count();
         let (sums, others) = (Arc::make_mut(&mut self.sums), &other.sums);
         for (from, (x, y)) in other.bounds.pixels().enumerate() {
             let at = self.bounds.position(x, y);
@@ -270,14 +332,17 @@ impl Tile {
             if theirs != Tint::default() {
                 sums.tints.get_mut(at).merge(&theirs);
             }
+            add(&mut sums.surfaces, at, &others.surfaces, from);
+            (0..each).for_each(|b| add(&mut sums.buckets, at * each + b, &others.buckets, from * each + b));
         }
     }
 
     /// Takes the sums of those pixels of a tile of the same kind that this one has, too.
     pub(crate) fn take(&mut self, other: &Self) {
+        let each = self.extras().bucket_count();
         let sums = Arc::make_mut(&mut self.sums);
         for (x, y) in self.bounds.intersection(&other.bounds).pixels() {
-            sums.copy(self.bounds.position(x, y), &other.sums, other.bounds.position(x, y));
+            sums.copy(self.bounds.position(x, y), &other.sums, other.bounds.position(x, y), each);
         }
     }
 
@@ -288,15 +353,17 @@ impl Tile {
             (extras.features, size_of::<FeatureSums>()),
             (extras.tints, size_of::<Tint>()),
             (extras.guides, size_of::<GuideSums>()),
+            (extras.surfaces, size_of::<SurfaceSums>()),
+            (true, extras.bucket_count() * size_of::<BucketSums>()),
         ];
         let each: usize = sizes.into_iter().filter(|(has, _)| *has).map(|(_, size)| size).sum();
         bounds.area().saturating_mul(each as u64)
     }
 
-    /// The sums of pixels and features, to be set.
-    pub(crate) fn sums_mut(&mut self) -> (&mut [Pixel], &mut [FeatureSums]) {
-        let TileSums { pixels, features, .. } = Arc::make_mut(&mut self.sums);
-        (pixels, features)
+    /// All sums but those that most tiles lack, to be set.
+    pub(crate) fn sums_mut(&mut self) -> TileSumsMut<'_> {
+        let TileSums { pixels, features, surfaces, buckets, .. } = Arc::make_mut(&mut self.sums);
+        TileSumsMut { pixels, features, surfaces, buckets }
     }
 
     /// Sets the tint of a pixel, by its position, where it is wanted.
@@ -315,6 +382,8 @@ impl Tile {
             features: !self.sums.features.is_empty(),
             tints: self.sums.tints.len() > 0,
             guides: !self.sums.guides.surfaces.is_empty(),
+            surfaces: !self.sums.surfaces.is_empty(),
+            buckets: self.buckets,
             depth_unit: self.depth_unit,
         }
     }
@@ -343,8 +412,9 @@ impl Tile {
         if self.sums.pixels.first().is_none_or(|pixel| pixel.samples > 0) {
             return;
         }
+        let each = self.extras().bucket_count();
         if !other.sums.pixels.is_empty() {
-            Arc::make_mut(&mut self.sums).copy(0, &other.sums, 0);
+            Arc::make_mut(&mut self.sums).copy(0, &other.sums, 0, each);
         }
     }
 
@@ -353,6 +423,7 @@ impl Tile {
     pub fn spread(&mut self, side: u32) {
         let width = self.bounds.width() as usize;
         let side = side.max(1) as usize;
+        let each = self.extras().bucket_count();
         // A tile that is whole is not copied.
         if self.sums.pixels.iter().all(|pixel| pixel.samples > 0) {
             return;
@@ -361,7 +432,7 @@ impl Tile {
         for at in 0..sums.pixels.len() {
             if sums.pixels[at].samples == 0 {
                 let (x, y) = (at % width, at / width);
-                sums.copy_within((y - y % side) * width + (x - x % side), at);
+                sums.copy_within((y - y % side) * width + (x - x % side), at, each);
             }
         }
     }
@@ -369,7 +440,7 @@ impl Tile {
 
 impl TileSums {
     /// Takes the sums of a pixel of another tile of the same kind.
-    fn copy(&mut self, at: usize, other: &Self, from: usize) {
+    fn copy(&mut self, at: usize, other: &Self, from: usize, each: usize) {
         self.pixels[at] = other.pixels[from];
         if let (Some(features), Some(theirs)) = (self.features.get_mut(at), other.features.get(from)) {
             *features = *theirs;
@@ -378,10 +449,16 @@ impl TileSums {
         if from < other.guides.surfaces.len() {
             self.guides.set(at, other.guides.get(from));
         }
+        if let (Some(surface), Some(theirs)) = (self.surfaces.get_mut(at), other.surfaces.get(from)) {
+            *surface = *theirs;
+        }
+        if each > 0 {
+            of_pixel(&mut self.buckets, at, each).copy_from_slice(&other.buckets[from * each..][..each]);
+        }
     }
 
     /// Gives a pixel the sums of another.
-    fn copy_within(&mut self, from: usize, to: usize) {
+    fn copy_within(&mut self, from: usize, to: usize, each: usize) {
         self.pixels[to] = self.pixels[from];
         if !self.features.is_empty() {
             self.features[to] = self.features[from];
@@ -390,7 +467,24 @@ impl TileSums {
         if !self.guides.surfaces.is_empty() {
             self.guides.set(to, self.guides.get(from));
         }
+        if !self.surfaces.is_empty() {
+            self.surfaces[to] = self.surfaces[from];
+        }
+        self.buckets.copy_within(from * each..(from + 1) * each, to * each);
     }
+}
+
+/// The sums of a tile but those that most tiles lack, to be set.
+pub(crate) struct TileSumsMut<'a> {
+    pub(crate) pixels: &'a mut [Pixel],
+    pub(crate) features: &'a mut [FeatureSums],
+    pub(crate) surfaces: &'a mut [SurfaceSums],
+    pub(crate) buckets: &'a mut [BucketSums],
+}
+
+/// The sums of a pixel, of which each has this many.
+fn of_pixel<T>(sums: &mut [T], position: usize, each: usize) -> &mut [T] {
+    sums.chunks_mut(each.max(1)).nth(position).unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -402,7 +496,7 @@ mod tests {
         let extras = Extras { features: true, tints: true, ..Extras::default() };
         let mut tile = Tile::new(PixelBounds { x0: 5, y0: 7, x1: 9, y1: 10 }, extras);
         let coverage = Rgb::splat(0.25);
-        let sample = |radiance| Sample { radiance, coverage, weight: 1.0, features: None, on_catcher: false };
+        let sample = |radiance| Sample { radiance, coverage, ..Sample::default() };
         let exposure = Exposure { factor: 2.0, max_component: 6.0, ..Exposure::default() };
         assert_eq!(tile.add(6, 9, &sample(Rgb::new(1.0, 2.0, 3.0)), &exposure), Addition::Whole);
         assert_eq!(tile.add(9, 9, &sample(Rgb::WHITE), &exposure), Addition::Dropped);
@@ -421,13 +515,7 @@ mod tests {
     #[test]
     fn a_sample_spreads_over_the_pixels_of_its_square_that_have_none() {
         let mut tile = Tile::new(PixelBounds { x0: 5, y0: 7, x1: 10, y1: 10 }, Extras::default());
-        let sample = |value| Sample {
-            radiance: Rgb::splat(value),
-            coverage: Rgb::WHITE,
-            weight: 1.0,
-            features: None,
-            on_catcher: false,
-        };
+        let sample = |value| Sample { radiance: Rgb::splat(value), ..Sample::default() };
         for (x, y, value) in [(5, 7, 1.0), (7, 7, 2.0), (9, 7, 3.0), (5, 9, 4.0), (6, 8, 9.0)] {
             assert_eq!(tile.add(x, y, &sample(value), &Exposure::default()), Addition::Whole);
         }
@@ -445,8 +533,7 @@ mod tests {
         let mut tiles = [true, false].map(|tints| Tile::new(bounds, Extras { tints, ..Extras::default() }));
         for tile in &mut tiles {
             for (coverage, weight) in covered.into_iter().zip([1.0, 3.0]) {
-                let sample =
-                    Sample { radiance: Rgb::BLACK, coverage, weight, features: None, on_catcher: false };
+                let sample = Sample { coverage, weight, ..Sample::default() };
                 assert_eq!(tile.add(7, 8, &sample, &Exposure::default()), Addition::Whole);
             }
         }
@@ -464,9 +551,8 @@ mod tests {
         let sample = |radiance, on_catcher| Sample {
             radiance,
             coverage: Rgb::splat(if on_catcher { 0.5 } else { 0.0 }),
-            weight: 1.0,
-            features: None,
             on_catcher,
+            ..Sample::default()
         };
         let light = Rgb::new(2.0, 0.5, 0.0);
         for (samples, has) in [

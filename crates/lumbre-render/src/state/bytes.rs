@@ -6,7 +6,12 @@
 
 use std::io::{self, Read, Write};
 
-use crate::film::{ExactSum, Extras, FeatureSums, GuideSums, MAX_PIXELS, Pixel, Tile, Tint};
+use lumbre_scene::Buckets;
+
+use crate::film::{
+    BucketSums, ExactSum, Extras, FeatureSums, GuideSums, MAX_PIXELS, NUMBERS, Pixel, SurfaceSums, Tile,
+    TileSumsMut, Tint,
+};
 use crate::state::{Piece, REMEMBERED, RenderState};
 use crate::{DroppedSample, PixelBounds, RayCounts};
 
@@ -62,6 +67,11 @@ impl RenderState {
             planes(out, &mut bytes, strip.features(), feature_numbers)?;
             let guides: Vec<GuideSums> = strip.guides().collect();
             planes(out, &mut bytes, &guides, |guide| guide.words().map(|word| i128::from(word as i32)))?;
+            planes(out, &mut bytes, strip.surfaces(), surface_numbers)?;
+            for bucket in 0..extras.bucket_count() {
+                let sums: Vec<BucketSums> = strip.buckets().map(|buckets| buckets[bucket]).collect();
+                planes(out, &mut bytes, &sums, |sums| [sums.radiance, sums.weight].map(ExactSum::units))?;
+            }
         }
         Ok(())
     }
@@ -71,7 +81,9 @@ impl RenderState {
         let mut words = |words: &[u32]| words.iter().for_each(|word| out.extend(word.to_le_bytes()));
         words(&corners(self.bounds()));
         let extras = self.extras();
-        words(&[u32::from(extras.features), u32::from(extras.tints), u32::from(extras.guides)]);
+        words(&[extras.features, extras.tints, extras.guides, extras.surfaces].map(u32::from));
+        let Buckets { count, low, high } = extras.buckets.unwrap_or(NO_BUCKETS);
+        words(&[count, low.to_bits(), high.to_bits()]);
         let mut pieces: Vec<&Piece> = self.pieces.iter().collect();
         pieces.sort_by_key(|piece| (piece.samples.start, piece.bounds.y0, piece.bounds.x0));
         words(&[pieces.len() as u32]);
@@ -96,7 +108,15 @@ impl RenderState {
         if bounds.is_empty() || bounds.area() > MAX_PIXELS {
             return Err(StateError::Invalid("bounds"));
         }
-        let [features, tints, guides] = input.words()?.map(|flag| flag == 1);
+        let [features, tints, guides, surfaces] = input.words()?.map(|flag| flag == 1);
+        let [count, low, high] = input.words()?;
+        let buckets = Buckets { count, low: f32::from_bits(low), high: f32::from_bits(high) };
+        let is_range = 0.0 < buckets.low && buckets.low < buckets.high && buckets.high.is_finite();
+        let buckets = match buckets {
+            NO_BUCKETS => None,
+            Buckets { count: 1..=Buckets::MAX, .. } if is_range => Some(buckets),
+            _ => return Err(StateError::Invalid("buckets")),
+        };
         let count = input.word()?;
         if count > MAX_PIECES {
             return Err(StateError::Invalid("pieces"));
@@ -123,7 +143,7 @@ impl RenderState {
         if !(depth_unit.is_normal() && depth_unit > 0.0) {
             return Err(StateError::Invalid("depths"));
         }
-        let extras = Extras { features, tints, guides, depth_unit };
+        let extras = Extras { features, tints, guides, surfaces, buckets, depth_unit };
         let needed = Tile::memory_bytes(bounds, extras);
         if needed > most_memory {
             return Err(StateError::TooLarge { needed });
@@ -131,27 +151,40 @@ impl RenderState {
         let mut tiles = Vec::new();
         for place in strips(bounds) {
             let mut strip = Tile::new(place, extras);
-            let (pixels, _) = strip.sums_mut();
+            let TileSumsMut { pixels, features, surfaces, buckets } = strip.sums_mut();
             let count = pixels.len();
             input.planes(pixels, pixel_of)?;
-            let mut read = vec![Tint::default(); if tints { count } else { 0 }];
-            input.planes(&mut read, |[red, blue]| {
+            let mut all_tints = vec![Tint::default(); if tints { count } else { 0 }];
+            input.planes(&mut all_tints, |[red, blue]| {
                 Some(Tint { red: ExactSum::from_units(red), blue: ExactSum::from_units(blue) })
             })?;
-            read.into_iter().enumerate().for_each(|(at, tint)| strip.set_tint(at, tint));
-            let (_, features) = strip.sums_mut();
             input.planes(features, |numbers| Some(features_of(numbers)))?;
-            let mut read = vec![GuideSums::default(); if guides { count } else { 0 }];
-            input.planes(&mut read, |numbers| {
+            let mut all_guides = vec![GuideSums::default(); if guides { count } else { 0 }];
+            input.planes(&mut all_guides, |numbers| {
                 Some(GuideSums::of_words(numbers.map(|number| number as u32)))
             })?;
-            read.into_iter().enumerate().for_each(|(at, guide)| strip.set_guide(at, guide));
+            input.planes(surfaces, |numbers| Some(surface_of(numbers)))?;
+            let each = extras.bucket_count();
+            let mut sums = vec![BucketSums::default(); count];
+            for bucket in 0..each {
+                input.planes(&mut sums, |numbers| {
+                    let [radiance, weight] = numbers.map(ExactSum::from_units);
+                    Some(BucketSums { radiance, weight })
+                })?;
+                let own = buckets.iter_mut().skip(bucket).step_by(each);
+                own.zip(&sums).for_each(|(own, sums)| *own = *sums);
+            }
+            all_tints.into_iter().enumerate().for_each(|(at, tint)| strip.set_tint(at, tint));
+            all_guides.into_iter().enumerate().for_each(|(at, guide)| strip.set_guide(at, guide));
             tiles.push(strip);
         }
         let rays = RayCounts { camera, bounce, shadow };
         Ok(Self { bounds, tiles, pieces, rays, dropped, clamped, first_dropped })
     }
 }
+
+/// What stands in the head where there are no buckets.
+const NO_BUCKETS: Buckets = Buckets { count: 0, low: 0.0, high: 0.0 };
 
 /// The strips of a picture, from above.
 fn strips(bounds: PixelBounds) -> impl Iterator<Item = PixelBounds> {
@@ -194,6 +227,19 @@ fn feature_numbers(sums: &FeatureSums) -> [i128; 11] {
 fn features_of(numbers: [i128; 11]) -> FeatureSums {
     let [r, g, b, x, y, z, depth, u, v, met, weight] = numbers.map(ExactSum::from_units);
     FeatureSums { albedo: [r, g, b], normal: [x, y, z], depth, uv: [u, v], met, weight }
+}
+
+fn surface_numbers(sums: &SurfaceSums) -> [i128; NUMBERS] {
+    let mut numbers = [0; NUMBERS];
+    let mut own = *sums;
+    numbers.iter_mut().zip(own.numbers_mut()).for_each(|(number, sum)| *number = sum.units());
+    numbers
+}
+
+fn surface_of(numbers: [i128; NUMBERS]) -> SurfaceSums {
+    let mut own = SurfaceSums::default();
+    own.numbers_mut().zip(numbers).for_each(|(sum, number)| *sum = ExactSum::from_units(number));
+    own
 }
 
 /// Writes a plane for each number of the sums, each put together in `bytes`.
@@ -312,11 +358,13 @@ mod tests {
     use lumbre_math::random::RandomStream;
 
     use super::*;
-    use crate::film::{Exposure, FeatureSample, Sample};
+    use crate::film::{Exposure, FeatureSample, Sample, SpectralSample, SurfaceSample};
 
     fn state() -> RenderState {
         let bounds = PixelBounds { x0: 5, y0: 2, x1: 9, y1: 21 };
-        let extras = Extras { features: true, tints: true, guides: true, depth_unit: 0.25 };
+        let buckets = Some(Buckets { count: 3, low: 420.0, high: 690.5 });
+        let extras =
+            Extras { features: true, tints: true, guides: true, surfaces: true, buckets, depth_unit: 0.25 };
         let mut film = Tile::new(bounds, extras);
         let mut random = RandomStream::new(1);
         for (x, y) in bounds.pixels().chain(bounds.pixels().take(3)) {
@@ -331,6 +379,15 @@ mod tests {
                     depth: 0.1,
                     uv: [0.2, -7.0],
                 }),
+                surface: (x != 6).then_some(SurfaceSample {
+                    point: [1.5, -2.5, f64::from(y)],
+                    slope: [0.25, 8.0],
+                    normal: [0.0, 0.0, -1.0],
+                    shading_normal: [0.6, 0.0, -0.8],
+                    uv: [0.75, 3.0],
+                    albedo: Rgb::new(0.1, 0.2, 0.9),
+                }),
+                spectrum: Some(SpectralSample { nm: [450.0, 510.0, 640.0], radiance: [1.0, x as f32, -0.5] }),
                 on_catcher: x == 5,
             };
             film.add(x, y, &sample, &Exposure::default());

@@ -261,12 +261,21 @@ fn without(piece: &Piece, other: &Piece) -> Vec<Piece> {
 mod tests {
     use lumbre_image::Rgb;
     use lumbre_math::random::RandomStream;
+    use lumbre_scene::Buckets;
 
     use super::*;
-    use crate::film::{Exposure, FeatureSample, Sample};
+    use crate::film::{Exposure, FeatureSample, Sample, SpectralSample, SurfaceSample};
 
     fn state(bounds: PixelBounds, samples: Range<u32>) -> RenderState {
-        let extras = Extras { features: true, tints: true, depth_unit: 8.0, ..Extras::default() };
+        let buckets = Some(Buckets { count: 5, low: 400.0, high: 700.0 });
+        let extras = Extras {
+            features: true,
+            tints: true,
+            surfaces: true,
+            buckets,
+            depth_unit: 8.0,
+            ..Extras::default()
+        };
         let mut film = Tile::new(bounds, extras);
         for (x, y) in bounds.pixels() {
             for index in samples.clone() {
@@ -281,6 +290,18 @@ mod tests {
                     coverage: colour(),
                     weight: 0.3 + f64::from(index) / 7.0,
                     features: (index % 3 > 0).then_some(features),
+                    surface: (index % 4 > 0).then_some(SurfaceSample {
+                        point: colour().to_array().map(f64::from),
+                        slope: [random.next_f32(), 2.0],
+                        normal: [0.0, 0.6, -0.8],
+                        shading_normal: [0.0, 0.0, -1.0],
+                        uv: [random.next_f32(); 2],
+                        albedo: Rgb::splat(random.next_f32()),
+                    }),
+                    spectrum: Some(SpectralSample {
+                        nm: [400.0, 500.0, 600.0].map(|nm| nm + 99.0 * random.next_f32()),
+                        radiance: [random.next_f32(), 2.0, random.next_f32()],
+                    }),
                     on_catcher: false,
                 };
                 film.add(x, y, &sample, &Exposure::default());

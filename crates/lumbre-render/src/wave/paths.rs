@@ -4,7 +4,7 @@ use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Vec3};
 use lumbre_scene::{Boundary, Footprint, MediumId, SamplerKind};
 use lumbre_shading::Spectrum;
-use lumbre_shading::spectrum::{SpectralLookup, Wavelengths};
+use lumbre_shading::spectrum::{SpectralLookup, WavelengthDensity, Wavelengths};
 use lumbre_simd::{Double, Mask, Real, UInt, V3};
 
 use crate::transport::interior::MediumStack;
@@ -108,8 +108,8 @@ impl Slots<'_> {
     }
 
     /// Chooses the wavelengths of all samples by a number each.
-    pub(crate) fn choose_wavelengths(&mut self, numbers: &[f32]) {
-        self.wavelengths.extend(numbers[..self.len].iter().map(|&u| Wavelengths::visible(u)));
+    pub(crate) fn choose_wavelengths(&mut self, density: WavelengthDensity, numbers: &[f32]) {
+        self.wavelengths.extend(numbers[..self.len].iter().map(|&u| density.sample(u)));
         self.is_alone.resize(self.len, false);
     }
 

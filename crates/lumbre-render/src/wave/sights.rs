@@ -4,7 +4,7 @@ use lumbre_geometry::{Ray, Surface};
 use lumbre_math::{DVec2, DVec3};
 use lumbre_scene::{CameraRay, Footprint, Pinhole, SamplerKind, Scene, View};
 use lumbre_shading::Spectrum;
-use lumbre_shading::spectrum::Wavelengths;
+use lumbre_shading::spectrum::{WavelengthDensity, Wavelengths};
 use lumbre_simd::InstructionSet;
 
 use crate::caustics::Merging;
@@ -35,14 +35,14 @@ impl<'a, 's> PrimaryHits<'a, 's> {
         precision: Precision,
         sampler: &Sampler,
         ids: &[SampleId],
-        is_spectral: bool,
+        density: Option<WavelengthDensity>,
     ) -> Self {
         let Wave { aims, slots, paths, .. } = wave;
         slots.start(sampler, ids);
         paths.start(ids.len());
         InstructionSet::detect().run(AimNumbers { kind: sampler.kind(), slots, aims });
-        if is_spectral {
-            slots.choose_wavelengths(aims.wavelengths());
+        if let Some(density) = density {
+            slots.choose_wavelengths(density, aims.wavelengths());
         }
         if scene.has_solids() {
             slots.start_outside();
@@ -115,12 +115,17 @@ impl<'a, 's> PrimaryHits<'a, 's> {
         self.wave.paths.ray(slot, self.wave.slots.time[slot])
     }
 
+    /// The camera ray of a sample, with its footprint.
+    pub(crate) fn camera(&self, slot: usize) -> CameraRay {
+        let ray = self.ray(slot);
+        CameraRay { ray, footprint: self.wave.slots.footprint(slot, ray.origin), weight: 1.0 }
+    }
+
     /// The camera ray of a sample, and its first hit.
     pub(crate) fn sight(&self, slot: usize) -> PrimaryHit<'s> {
-        let ray = self.ray(slot);
-        let footprint = self.wave.slots.footprint(slot, ray.origin);
-        let met = self.wave.hits.interaction(self.scene, slot, &ray, &footprint);
-        PrimaryHit { ray: CameraRay { ray, footprint, weight: 1.0 }, met }
+        let ray = self.camera(slot);
+        let met = self.wave.hits.interaction(self.scene, slot, &ray.ray, &ray.footprint);
+        PrimaryHit { ray, met }
     }
 
     /// Whether a ray meets the ground.

@@ -138,7 +138,7 @@ fn first_vertices<'s>(
     let sampler = Sampler::new(&SamplerDesc { kind: SamplerKind::Sobol, spp: None, seed: 3 });
     let ids: Vec<_> = (0..SIDE * SIDE).map(|i| SampleId { x: i % SIDE, y: i / SIDE, index: 0 }).collect();
     let (mut wave, mut record) = (Wave::default(), Record::default());
-    let mut sights = PrimaryHits::start(scene, &view, &mut wave, Precision::Single, &sampler, &ids, false);
+    let mut sights = PrimaryHits::start(scene, &view, &mut wave, Precision::Single, &sampler, &ids, None);
     for (slot, id) in ids.iter().enumerate() {
         let film = DVec2::new(f64::from(id.x) + 0.37, f64::from(id.y) + 0.61);
         sights.set_ray(slot, &view.ray(film, DVec2::splat(0.5), 0.0, 0.25));

@@ -20,7 +20,7 @@ pub use named::NamedSpectrum;
 use observer::{FIRST_NM, LAST_NM, MATCHING, STEP_NM};
 pub use sensor::SensorCurves;
 pub use sigmoid::Sigmoid;
-pub use wavelengths::{SpectralLookup, Wavelengths};
+pub use wavelengths::{SpectralLookup, WavelengthDensity, Wavelengths};
 pub use white_point::white_point;
 
 use crate::Spectrum;

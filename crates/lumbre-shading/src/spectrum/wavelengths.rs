@@ -24,6 +24,30 @@ pub struct Wavelengths {
     white: [f32; 3],
 }
 
+/// How the wavelengths of samples are chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum WavelengthDensity {
+    /// [`Wavelengths::visible`].
+    Visible,
+    /// [`Wavelengths::even`].
+    Even {
+        /// The first wavelength in nm.
+        low: f32,
+        /// The last one.
+        high: f32,
+    },
+}
+
+impl WavelengthDensity {
+    /// Wavelengths by one number in [0, 1).
+    pub fn sample(self, u: f32) -> Wavelengths {
+        match self {
+            Self::Visible => Wavelengths::visible(u),
+            Self::Even { low, high } => Wavelengths::even(u, low, high),
+        }
+    }
+}
+
 /// What colours and spectra are at the wavelengths of a sample: for the look-up of textures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpectralLookup {
@@ -51,6 +75,12 @@ impl Wavelengths {
         let nm = tangents.map(|t| 538.0 - 0.5 / 0.0072 * ((1.0 + t) / (1.0 - t)).logarithm());
         let pdf = tangents.map(|t| 0.003_939_804_2 * (1.0 - t * t));
         Self::new(nm, pdf)
+    }
+
+    /// Wavelengths by one number in [0, 1), equally dense between two of them in nm.
+    pub fn even(u: f32, low: f32, high: f32) -> Self {
+        let width = f64::from(high - low);
+        Self::new(thirds(u).map(|u| f64::from(low) + u * width), [1.0 / width; 3])
     }
 
     fn new(nm: [f64; 3], pdf: [f64; 3]) -> Self {

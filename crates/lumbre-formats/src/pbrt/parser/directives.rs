@@ -76,6 +76,12 @@ impl<'b, 'd> Parser<'b, 'd> {
         ("WorldEnd", World, Self::world_end),
     ];
 
+    /// The names of all directives.
+    #[cfg(test)]
+    pub(in crate::pbrt) fn directives() -> Vec<&'static str> {
+        Self::DIRECTIVES.iter().map(|(name, ..)| *name).collect()
+    }
+
     pub(in crate::pbrt) fn is_directive(name: &str) -> bool {
         Self::DIRECTIVES.iter().any(|(directive, ..)| *directive == name)
     }
