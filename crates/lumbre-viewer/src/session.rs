@@ -13,7 +13,7 @@ use crate::camera::Placement;
 use crate::frame::{Channel, Frame, Look, Pixels, Shot};
 use crate::message::{Message, Wishes};
 use crate::source::{Moment, Source};
-use crate::stage::Stage;
+use crate::stage::{Explained, Stage};
 use crate::watching::Watched;
 
 /// How often something was changed, by what has to be done again.
@@ -427,7 +427,7 @@ impl Session {
     }
 
     /// How the colour of a pixel of the picture comes about, as a page in a language; `None` where nobody tells that.
-    pub(crate) fn explain(&self, pixel: (u32, u32), language: &str) -> Option<Result<String, String>> {
+    pub(crate) fn explain(&self, pixel: (u32, u32), language: &str) -> Option<Result<Explained, String>> {
         let (stage, camera, full) = self.shown()?;
         stage.explain(camera, full, pixel, language)
     }

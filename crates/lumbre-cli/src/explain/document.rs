@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use lumbre::math::glam::DMat4;
 use lumbre::{DVec3, Ray};
 
+use super::figure::{Figure, Marked};
 use super::formula::{PutIn, Scope};
 use crate::units::number;
 
@@ -17,6 +18,8 @@ pub(super) struct Section {
     pub(super) title: String,
     pub(super) items: Vec<Item>,
     pub(super) sections: Vec<Section>,
+    /// Which symbols here and below are marked in the figure.
+    pub(super) marked: Marked,
 }
 
 /// One thing that is told.
@@ -33,8 +36,8 @@ pub(super) enum Item {
         columns: Vec<Column>,
         rows: Vec<Vec<Value>>,
     },
-    /// A drawing.
-    Sketch(String),
+    /// Drawings.
+    Figure(Box<Figure>),
 }
 
 /// A column of a table.
@@ -234,7 +237,13 @@ impl Quantity {
 
 impl Section {
     pub(super) fn new(key: impl Into<String>, title: impl Into<String>) -> Self {
-        Self { key: key.into(), title: title.into(), items: Vec::new(), sections: Vec::new() }
+        Self {
+            key: key.into(),
+            title: title.into(),
+            items: Vec::new(),
+            sections: Vec::new(),
+            marked: Vec::new(),
+        }
     }
 
     /// Adds the keys of this section and of those below it.

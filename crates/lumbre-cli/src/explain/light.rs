@@ -25,6 +25,8 @@ pub(super) struct Path<'a> {
     pub(super) depth: u32,
     /// What is computed for each pixel.
     pub(super) kind: &'a IntegratorKind,
+    /// What is up in the world.
+    pub(super) up: DVec3,
 }
 
 /// How the radiance of a sample becomes what a render adds to its pixel.
@@ -241,9 +243,10 @@ impl Path<'_> {
             }
         }
         if met.depth > 0 && met.depth <= self.depth {
-            let wanted = Wanted { nearest: true, is_from_camera: false, shapes: None };
+            let wanted =
+                Wanted { nearest: true, is_from_camera: false, shapes: None, up: self.up, path: &[] };
             let told = surfaces(self.scene, &met.ray, self.things, &wanted, texts);
-            section.sections.extend(told.ok().map(|told| told.section));
+            section.sections.extend(told.ok());
         }
         if let Some(here) = self.interaction(met) {
             section.sections.push(self.mirrors(met, &here));

@@ -11,11 +11,11 @@ use lumbre::math::glam::{DMat3, DMat4};
 use lumbre::math::matrix::affine4;
 use lumbre::{DVec3, Ray, Scene, Transform};
 
-use super::document::{Section, Value, exact};
+use super::document::{Item, Section, Value, exact};
+use super::figure::{Met, Subject};
 use super::formula::{Scope, with_primes};
 use super::misses::{self, Missed, Nearest};
 use super::shape;
-use super::sketch::Scenery;
 use super::texts::Texts;
 use super::things::{Face, Things};
 use crate::failure::Failure;
@@ -27,14 +27,6 @@ const MOST_HITS: usize = 64;
 const MOST_MISSES: usize = 3;
 /// Columns of a matrix are at right angles where their cosines are less than this.
 const RIGHT_ANGLE: f64 = 1e-12;
-
-/// What is told of the things that a ray meets.
-pub(super) struct Told {
-    pub(super) section: Section,
-    /// Where the ray meets them, with the normals: for the sketch.
-    pub(super) hits: Vec<(DVec3, DVec3)>,
-    pub(super) scenery: Scenery,
-}
 
 /// Which shapes are told of.
 #[derive(Clone, Debug)]
@@ -51,6 +43,10 @@ pub(super) struct Wanted<'a> {
     pub(super) is_from_camera: bool,
     /// The shapes that are told, met or not; `None` for those that the ray meets, or else those that it passes nearest.
     pub(super) shapes: Option<&'a Chosen>,
+    /// What is up in the world.
+    pub(super) up: DVec3,
+    /// The vertices of the path, for the figure of what is seen.
+    pub(super) path: &'a [DVec3],
 }
 
 /// Everything on the way of a ray, and what it passes where that is asked for or nothing is met.
@@ -63,7 +59,7 @@ pub(super) fn surfaces(
     things: &Things,
     wanted: &Wanted<'_>,
     texts: &'static Texts,
-) -> Result<Told, Failure> {
+) -> Result<Section, Failure> {
     let resolved = scene.resolved();
     let is_wanted = |shape: u32| match wanted.shapes {
         Some(Chosen::Called(name)) => things.is_called(shape, name),
@@ -116,15 +112,9 @@ pub(super) fn surfaces(
             None => groups.push(vec![hit]),
         }
     }
-    let met = |hit: &Hit| {
-        let surface = resolved.accel().surface(ray, hit);
-        (surface.point, surface.normal)
-    };
-    let places = hits.iter().map(met).collect();
-    let mut scenery = Scenery::default();
     for group in groups {
         let thing = Thing { hit: group[0], hits: &group, nearest: None };
-        section.sections.push(tell(scene, ray, &thing, first.as_ref(), things, &mut scenery, texts));
+        section.sections.push(tell(scene, ray, &thing, first.as_ref(), things, wanted, texts));
     }
     if are_more {
         section.remark(filled(texts.more_hits, &[&MOST_HITS.to_string()]));
@@ -134,9 +124,9 @@ pub(super) fn surfaces(
     }
     for Missed { hit, nearest } in &missed {
         let thing = Thing { hit, hits: &[], nearest: *nearest };
-        section.sections.push(tell(scene, ray, &thing, first.as_ref(), things, &mut scenery, texts));
+        section.sections.push(tell(scene, ray, &thing, first.as_ref(), things, wanted, texts));
     }
-    Ok(Told { section, hits: places, scenery })
+    Ok(section)
 }
 
 /// A primitive, and where the ray meets it.
@@ -154,7 +144,7 @@ fn tell(
     &Thing { hit, hits, nearest }: &Thing<'_>,
     first: Option<&Hit>,
     things: &Things,
-    scenery: &mut Scenery,
+    wanted: &Wanted<'_>,
     texts: &'static Texts,
 ) -> Section {
     let resolved = scene.resolved();
@@ -219,12 +209,33 @@ fn tell(
     {
         section.sections.push(in_file(&face, told.len(), texts));
     }
+    let mut figure = None;
     match &object.shape {
         Some(exact) => {
-            let surface = hits.first().map(|hit| resolved.accel().surface(ray, hit));
-            scenery.add(exact, &object.whole, surface.as_ref());
             let mut equation = Section::new("equation", texts.equation);
             let explanation = exact.explain(&object.ray);
+            let met = hits.iter().map(|hit| Met {
+                t: hit.root.t,
+                normal: resolved.accel().surface(ray, hit).normal,
+                local_normal: exact.surface(&object.ray, &hit.root).normal,
+            });
+            let is_seen = first.is_some_and(|first| hits.contains(&first));
+            let subject = Subject {
+                shape: exact,
+                map: &object.whole,
+                is_placed: object.is_placed(),
+                explanation: &explanation,
+                ray,
+                object_ray: &object.ray,
+                hits: &met.collect::<Vec<_>>(),
+                nearest,
+                up: wanted.up,
+                path: if is_seen { wanted.path } else { &[] },
+            };
+            let (drawn, marked) = subject.figure(texts);
+            section.marked = marked;
+            section.items.push(Item::Figure(Box::new(drawn.clone())));
+            figure = Some(drawn);
             shape::tell(&mut equation, &explanation, &object.ray, &mut scope, &rename, texts);
             section.sections.push(equation);
         }
@@ -233,9 +244,16 @@ fn tell(
             None => section.text(texts.custom),
         },
     }
+    let normal = if object.is_placed() { "N′" } else { "N" };
     for &hit in hits {
         let is_first = first.is_some_and(|first| first == hit);
-        section.sections.push(at_hit(scene, ray, hit, is_first, &object, texts));
+        let mut told = at_hit(scene, ray, hit, is_first, &object, texts);
+        if let Some(figure) = &figure {
+            told.marked = figure.marked_at(hit.root.t, normal);
+            // The normal in the world is drawn there, too.
+            told.marked.extend(figure.marked_at(hit.root.t, "N"));
+        }
+        section.sections.push(told);
     }
     section
 }
