@@ -7,7 +7,7 @@ use lumbre::{DVec3, Ray};
 
 use super::figure::{Figure, Marked};
 use super::formula::{PutIn, Scope};
-use crate::units::number;
+use super::numbers::{exact, short};
 
 /// A part of what is told.
 #[derive(Clone, Debug, Default)]
@@ -119,23 +119,6 @@ impl From<DMat4> for Value {
     fn from(m: DMat4) -> Self {
         Self::Matrix(Box::new(m))
     }
-}
-
-/// The shortest text that is read back as the same number; infinity has its sign.
-pub(super) fn exact(x: f64) -> String {
-    if x.is_finite() || x.is_nan() {
-        return number(x);
-    }
-    if x > 0.0 { "∞".to_owned() } else { "-∞".to_owned() }
-}
-
-/// With six digits, for what stands in formulas.
-fn short(x: f64) -> String {
-    if x == 0.0 || !x.is_finite() {
-        return exact(x);
-    }
-    let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
-    exact(rounded)
 }
 
 impl Value {

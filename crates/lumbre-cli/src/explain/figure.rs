@@ -8,8 +8,9 @@ use lumbre::{DVec3, Ray, Transform};
 
 use super::along::{along, number, vector};
 use super::misses::Nearest;
+use super::numbers::label;
 use super::plot::{Plot, plot};
-use super::sketch::{Crossing, Name, Radius, Space, lines, svg};
+use super::sketch::{Crossing, Name, Place, Radius, Space, lines, svg};
 use super::texts::Texts;
 
 /// Pictures that stand beside each other.
@@ -26,6 +27,19 @@ pub(super) struct Figure {
 }
 
 impl Figure {
+    fn new(
+        panels: Vec<Panel>,
+        plot: Option<Plot>,
+        ray: Ray,
+        places: Vec<(Name, f64)>,
+        marked: &Marked,
+    ) -> Self {
+        let keys = marked.iter().map(|(_, key)| key.clone());
+        let there = places.iter().flat_map(|(name, _)| [name.key.clone(), normal_at(&name.key)]);
+        let keys = keys.chain(there).collect();
+        Self { panels, plot, ray, places, keys }
+    }
+
     /// All pictures, as SVG.
     pub(super) fn pictures(&self) -> impl Iterator<Item = &str> {
         self.panels.iter().map(|panel| &*panel.svg).chain(self.plot.iter().map(|plot| &*plot.svg))
@@ -77,6 +91,45 @@ pub(super) struct Subject<'a> {
     pub(super) path: &'a [DVec3],
 }
 
+/// The figure of what has no equation of its own, such as a curve: lines, the ray, and where they meet.
+pub(super) fn of_hits(
+    lines: Vec<Vec<Place>>,
+    ray: &Ray,
+    hits: &[Met],
+    up: DVec3,
+    path: &[DVec3],
+    texts: &Texts,
+) -> (Figure, Marked) {
+    let named = hits.iter().enumerate().map(|(i, met)| {
+        let name = Name { key: format!("crossing {i}"), label: Some(format!("t = {}", label(met.t))) };
+        let label = (i == 0).then(|| "N".to_owned());
+        let normal = Some((met.normal, Name { key: normal_at(&name.key), label }));
+        Crossing { name, t: met.t, is_hit: true, normal }
+    });
+    let space = Space {
+        lines,
+        is_solid: false,
+        ray: *ray,
+        up,
+        names: of_ray(""),
+        crossings: named.collect(),
+        points: Vec::new(),
+        radii: Vec::new(),
+        nearest: None,
+        path: path.to_vec(),
+    };
+    let panel = Panel { title: texts.world_space, svg: svg(&space, texts.world_space) };
+    let places = space.crossings.iter().map(|it| (it.name.clone(), it.t)).collect();
+    let marked: Marked = ["O", "D"].map(|symbol| (symbol.to_owned(), symbol.to_owned())).to_vec();
+    (Figure::new(vec![panel], None, *ray, places, &marked), marked)
+}
+
+/// What the origin of a ray and the ray are called.
+fn of_ray(prime: &str) -> [Name; 2] {
+    let line = format!("O{prime} + t·D{prime}");
+    [Name::new(&format!("O{prime}")), Name { key: format!("D{prime}"), label: Some(line) }]
+}
+
 /// The points among the parameters of shapes.
 const POINTS: [&str; 11] = ["C", "P", "P₀", "P₁", "P₂", "P₀₀", "P₁₀", "P₀₁", "P₁₁", "L", "H"];
 /// The roots of an equation, and the one of a plane.
@@ -117,10 +170,7 @@ impl Subject<'_> {
         if let Some((first, _)) = places.iter().find(|(_, t)| self.hits.iter().any(|met| met.t == *t)) {
             marked.extend([(format!("N{prime}"), normal_at(&first.key))]);
         }
-        let normals = places.iter().map(|(name, _)| normal_at(&name.key));
-        let keys = marked.iter().map(|(_, key)| key.clone());
-        let keys = keys.chain(places.iter().map(|(name, _)| name.key.clone())).chain(normals).collect();
-        (Figure { panels, plot, ray: *self.ray, places, keys }, marked)
+        (Figure::new(panels, plot, *self.ray, places, &marked), marked)
     }
 
     /// The crossings of the whole line, by the symbols of the roots that they are.
@@ -148,7 +198,7 @@ impl Subject<'_> {
                 Some((symbol, _)) => Name::new(symbol),
                 None => Name {
                     key: format!("crossing {}", found.len()),
-                    label: is_hit.then(|| format!("t = {}", rounded(t))),
+                    label: is_hit.then(|| format!("t = {}", label(t))),
                 },
             };
             found.push(Crossing { name, t, is_hit, normal: None });
@@ -209,7 +259,7 @@ impl Subject<'_> {
             is_solid: self.shape.is_solid(),
             ray: *self.ray,
             up: self.up,
-            names: [Name::new("O"), Name { key: "D".to_owned(), label: Some("O + t·D".to_owned()) }],
+            names: of_ray(""),
             crossings: self.with_normals(crossings, "N", |met| met.normal),
             points,
             radii: if self.is_placed { Vec::new() } else { self.radii() },
@@ -236,7 +286,7 @@ impl Subject<'_> {
             is_solid: self.shape.is_solid(),
             ray: *self.object_ray,
             up: self.map.inverse_vector(self.up),
-            names: [Name::new("O′"), Name { key: "D′".to_owned(), label: Some("O′ + t·D′".to_owned()) }],
+            names: of_ray("′"),
             crossings: self.with_normals(crossings, "N′", |met| met.local_normal),
             points: self.points().into_iter().map(|(symbol, point)| (Name::new(symbol), point)).collect(),
             radii: self.radii(),
@@ -278,10 +328,4 @@ impl Subject<'_> {
         };
         radii.into_iter().flatten().collect()
     }
-}
-
-/// With four digits, for a label.
-fn rounded(t: f64) -> String {
-    let rounded: f64 = format!("{t:.3e}").parse().unwrap_or(t);
-    super::document::exact(rounded)
 }

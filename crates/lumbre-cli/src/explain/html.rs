@@ -4,16 +4,17 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use super::document::{Item, Quantity, Section, Value, exact};
+use super::document::{Item, Quantity, Section, Value};
 use super::figure::{Figure, Marked};
-use super::formula::{escaped, mathml, sign_after};
+use super::formula::{UNMARKED, escaped, mathml, sign_after};
+use super::numbers::exact;
 use super::texts::Texts;
 
 const STYLE: &str = include_str!("page.css");
 /// The script of the page, which is the same on every page.
 const SCRIPT: &str = include_str!("page.js");
 /// Its hash, as a Content Security Policy names it.
-pub(super) const SCRIPT_HASH: &str = "sha256-jxXt/+xGbF9+i7NL0keDDKfAZoKPH4afsCZUXEUR/mk=";
+pub(super) const SCRIPT_HASH: &str = "sha256-Kk3AsavFjAUviXrV1KSLmEHHYEIhjyGEY2Hn9NC8G2I=";
 
 /// The page.
 pub(super) fn html(title: &str, sections: &[Section], texts: &'static Texts) -> String {
@@ -141,7 +142,7 @@ impl Page {
                 Some(key) if part == symbol => format!(
                     "<span data-mark={} tabindex=\"0\">{}</span>",
                     quoted(key),
-                    mathml(part, super::formula::UNMARKED)
+                    mathml(part, UNMARKED)
                 ),
                 _ => self.formula(part),
             };
@@ -229,7 +230,7 @@ fn shown(value: &Value) -> String {
         }
         None => match value {
             Value::Text(text) => escaped(text),
-            _ => mathml(&value.in_full(), super::formula::UNMARKED),
+            _ => mathml(&value.in_full(), UNMARKED),
         },
     }
 }

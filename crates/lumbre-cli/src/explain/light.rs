@@ -437,8 +437,7 @@ impl Path<'_> {
             && let Some(hit) = self.scene.resolved().closest(ray)
         {
             let shape = self.scene.resolved().shape_index(&hit);
-            section
-                .text(filled(texts.blocked_by, &[&self.shape(shape), &super::document::exact(hit.root.t)]));
+            section.text(filled(texts.blocked_by, &[&self.shape(shape), &super::numbers::exact(hit.root.t)]));
         }
     }
 

@@ -31,6 +31,7 @@ mod html;
 mod labels;
 mod light;
 mod misses;
+mod numbers;
 mod plot;
 mod question;
 mod shape;

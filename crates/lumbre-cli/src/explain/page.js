@@ -23,7 +23,7 @@
         const { width, height } = point.ownerSVGElement.viewBox.baseVal;
         point.setAttribute("cx", x);
         point.setAttribute("cy", y);
-        point.setAttribute("visibility", x >= 0 && x <= width && y >= 0 && y <= height ? "visible" : "hidden");
+        point.setAttribute("visibility", t >= Number(point.dataset.first) && x >= 0 && x <= width && y >= 0 && y <= height ? "visible" : "hidden");
       }
       const value = at(t);
       const moving = plot.querySelector(".moving");

@@ -5,9 +5,9 @@ use std::fmt::Write;
 use lumbre::DVec2;
 
 use super::along::Along;
-use super::document::{Value, exact};
 use super::formula::escaped;
 use super::labels::{FONT_SIZE, Labels, Rect};
+use super::numbers::{exact, short};
 use super::sketch::{Crossing, HEIGHT, WIDTH, circle, clipped, polyline, written};
 
 /// Where the picture has its axes.
@@ -36,12 +36,11 @@ pub(super) struct Plot {
 
 /// The `t` that are shown: all crossings, and where a line that has none comes nearest, with some room.
 fn range(crossings: &[Crossing], nearest: Option<f64>) -> [f64; 2] {
-    let places = crossings.iter().map(|crossing| crossing.t).chain(nearest);
-    let (first, last) =
-        places.fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), t| (first.min(t), last.max(t)));
-    if first > last {
-        return [0.0, 1.0];
-    }
+    let [first, last] = match (ends(crossings), nearest) {
+        ([first, last], _) if first <= last => [first, last],
+        (_, Some(t)) => [t, t],
+        _ => return [0.0, 1.0],
+    };
     // One place alone has as much beside it as it is away from the origin.
     let size = last - first;
     let is_one = size <= 1e-9 * first.abs().max(last.abs());
@@ -56,6 +55,12 @@ fn range(crossings: &[Crossing], nearest: Option<f64>) -> [f64; 2] {
         if first > 0.0 && first <= reach { from.min(0.0) } else { from },
         if last < 0.0 && last >= -reach { to.max(0.0) } else { to },
     ]
+}
+
+/// The first and the last crossing.
+fn ends(crossings: &[Crossing]) -> [f64; 2] {
+    let places = crossings.iter().map(|crossing| crossing.t);
+    places.fold([f64::INFINITY, f64::NEG_INFINITY], |[first, last], t| [first.min(t), last.max(t)])
 }
 
 /// The picture of a shape along a line, `nearest` the place where a line that misses it comes nearest.
@@ -99,14 +104,11 @@ fn function(
     // The line of zero is in the picture.
     let low = samples.iter().fold(0.0_f64, |low, (_, f)| low.min(*f));
     let high = samples.iter().fold(0.0_f64, |high, (_, f)| high.max(*f));
-    // A steep side does not hide what is between the roots.
-    let inner: Vec<f64> = samples
-        .iter()
-        .filter(|(t, _)| crossings.iter().any(|it| it.t <= *t) && crossings.iter().any(|it| *t <= it.t))
-        .map(|(_, f)| f.abs())
-        .collect();
-    let depth = inner.iter().fold(0.0_f64, |most, f| most.max(*f));
-    let most = if depth > 0.0 { 4.0 * depth } else { f64::INFINITY };
+    // Steep sides do not hide what is between the roots.
+    let [first, last] = ends(crossings);
+    let inner = samples.iter().filter(|(t, _)| first <= *t && *t <= last);
+    let depth = inner.fold(0.0_f64, |most, (_, f)| most.max(f.abs()));
+    let most = if first < last && depth > 0.0 { 4.0 * depth } else { f64::INFINITY };
     let (low, high) = (low.max(-most), high.min(most));
     let (low, high) = if low < high { (low, high) } else { (-1.0, 1.0) };
     let upward = |f: f64| BOTTOM - (f - low) / (high - low) * (BOTTOM - TOP);
@@ -210,7 +212,7 @@ fn marks(
     for crossing in crossings {
         let at = DVec2::new(across(crossing.t), zero);
         let style = if crossing.is_hit { "" } else { " fill-opacity=\"0\"" };
-        let number = Value::from(crossing.t).in_short();
+        let number = short(crossing.t);
         let text = match &crossing.name.label {
             Some(label) if label.contains('=') => label.clone(),
             Some(label) => format!("{label} = {number}"),

@@ -24,10 +24,13 @@ const HUGE: f64 = 40.0;
 /// Of such a shape the square about the crossing whose half side is this part of the ray's way, with so many lines.
 const LOCAL_PART: f64 = 0.45;
 const LOCAL_LINES: u32 = 6;
+/// The part of a ray that is dotted where its origin is farther away than drawn.
+const DOTTED: f64 = 0.16;
 /// Vertices of a path that are drawn.
 const MOST_CORNERS: usize = 5;
 /// The corner with the axes.
 const TRIAD: f64 = 58.0;
+const AXIS: f64 = 15.0;
 
 /// A point of a surface, with the normal.
 #[derive(Clone, Copy, Debug)]
@@ -154,6 +157,11 @@ fn lines_of_part(shape: &Shape, part: u32, map: &Transform) -> Vec<Vec<Place>> {
     lines.flatten().collect()
 }
 
+/// A line without a surface.
+pub(super) fn bare_line(points: impl Iterator<Item = DVec3>) -> Vec<Place> {
+    points.map(|point| Place { point, normal: DVec3::ZERO }).collect()
+}
+
 /// The edges of a shape's box.
 fn boxed(shape: &Shape, map: &Transform) -> Vec<Vec<Place>> {
     let Some(bounds) = shape.bounds(map) else { return Vec::new() };
@@ -250,6 +258,13 @@ pub(super) fn svg(space: &Space, title: &str) -> String {
     let ray = &space.ray;
     let speed = ray.direction.length();
     let eye = Eye::new(ray.direction / speed, space.up);
+    // What is explained fills the picture.
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for place in space.lines.iter().flatten() {
+        (low, high) = (low.min(place.point), high.max(place.point));
+    }
+    let (middle, size) = (0.5 * (low + high), (high - low).length());
+    let is_near = |p: DVec3| !size.is_finite() || (p - middle).length() <= 1.5 * size;
     let radii: Vec<(&Name, [DVec3; 2])> = space
         .radii
         .iter()
@@ -258,20 +273,14 @@ pub(super) fn svg(space: &Space, title: &str) -> String {
             let from = radius.center + radius.from * towards;
             (&radius.name, [from, from + radius.length * towards])
         })
+        // Of a shape of which only a part is drawn, the radius is not.
+        .filter(|(_, ends)| ends.iter().all(|p| is_near(*p)))
         .collect();
-
-    // What is explained fills the picture.
-    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for place in space.lines.iter().flatten() {
-        (low, high) = (low.min(place.point), high.max(place.point));
-    }
-    let (middle, size) = (0.5 * (low + high), (high - low).length());
-    let is_near = |p: DVec3| !size.is_finite() || (p - middle).length() <= 1.5 * size;
     let near: Vec<&Crossing> =
         space.crossings.iter().filter(|crossing| is_near(ray.at(crossing.t))).collect();
     let mut shown = Extent::default();
     space.lines.iter().flatten().for_each(|place| shown.add(eye.flat(place.point)));
-    radii.iter().flat_map(|(_, ends)| ends).filter(|p| is_near(**p)).for_each(|p| shown.add(eye.flat(*p)));
+    radii.iter().flat_map(|(_, ends)| ends).for_each(|p| shown.add(eye.flat(*p)));
     near.iter().for_each(|crossing| shown.add(eye.flat(ray.at(crossing.t))));
     if let Some((t, _)) = space.nearest {
         shown.add(eye.flat(ray.at(t)));
@@ -312,7 +321,9 @@ pub(super) fn svg(space: &Space, title: &str) -> String {
     drawing.triad(&eye);
     // The point at t, for the slider: it is on a straight line.
     let (start, step) = (place(ray.origin), place(ray.origin + ray.direction) - place(ray.origin));
-    drawing.finish(title, [start, step])
+    // What is dotted is not to scale.
+    let first = if has_origin { f64::NEG_INFINITY } else { from + DOTTED * (to - from) };
+    drawing.finish(title, [start, step], first)
 }
 
 /// Grows by what is shown.
@@ -468,7 +479,7 @@ impl Drawing {
         let is_forward = begin < end;
         if is_forward {
             // From where it begins farther away than it is drawn, it is dotted.
-            let broken = if has_origin { b } else { b + 0.16 * (c - b) };
+            let broken = if has_origin { b } else { b + DOTTED * (c - b) };
             if !has_origin {
                 polyline(
                     &[b, broken],
@@ -553,8 +564,8 @@ impl Drawing {
         let Some(rect) = rects.into_iter().min_by_key(crowd) else { return };
         let middle = 0.5 * (rect.low + rect.high);
         for (axis, name) in DVec3::AXES.into_iter().zip(["x", "y", "z"]) {
-            let tip = middle + 19.0 * eye.flat(axis);
-            let at = middle + 19.0 * eye.flat(axis) + 8.0 * eye.flat(axis).normalize_or(DVec2::X);
+            let tip = middle + AXIS * eye.flat(axis);
+            let at = tip + 8.0 * eye.flat(axis).normalize_or(DVec2::X);
             let _ = write!(
                 self.triad,
                 "<line data-axis=\"{name}\" x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\"/>\
@@ -570,7 +581,7 @@ impl Drawing {
         self.labels.keep_off(rect);
     }
 
-    fn finish(mut self, title: &str, [start, step]: [DVec2; 2]) -> String {
+    fn finish(mut self, title: &str, [start, step]: [DVec2; 2], first: f64) -> String {
         self.wanted.sort_by_key(|wanted| wanted.rank);
         let mut placed: Vec<Option<Label>> = vec![None; self.marks.len()];
         for Wanted { mark, text, anchor, .. } in &self.wanted {
@@ -609,8 +620,12 @@ impl Drawing {
         // Without a script it is not seen.
         let _ = write!(
             out,
-            "<circle class=\"moving\" data-start=\"{} {}\" data-step=\"{} {}\" r=\"4.5\" visibility=\"hidden\"/></svg>",
-            start.x, start.y, step.x, step.y
+            "<circle class=\"moving\" data-start=\"{} {}\" data-step=\"{} {}\" data-first=\"{}\" r=\"4.5\" visibility=\"hidden\"/></svg>",
+            start.x,
+            start.y,
+            step.x,
+            step.y,
+            first.max(f64::MIN)
         );
         out
     }

@@ -2,7 +2,7 @@
 
 use lumbre::geometry::{Fate, Remark, Topic};
 
-use super::document::exact;
+use super::numbers::exact;
 use super::texts::{OperandName, Texts};
 
 pub(super) static SPANISH: Texts = Texts {

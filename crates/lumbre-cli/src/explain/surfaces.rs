@@ -4,18 +4,20 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
 use lumbre::description::Footprint;
-use lumbre::geometry::{Curves, Shape, Triangle};
+use lumbre::geometry::{Curves, Shape, Surface, Triangle};
 use lumbre::kernel::{Hit, Target, TargetShape};
 use lumbre::math::Elementary;
 use lumbre::math::glam::{DMat3, DMat4};
 use lumbre::math::matrix::affine4;
 use lumbre::{DVec3, Ray, Scene, Transform};
 
-use super::document::{Item, Section, Value, exact};
-use super::figure::{Met, Subject};
+use super::document::{Item, Section, Value};
+use super::figure::{self, Met, Subject};
 use super::formula::{Scope, with_primes};
 use super::misses::{self, Missed, Nearest};
+use super::numbers::exact;
 use super::shape;
+use super::sketch::bare_line;
 use super::texts::Texts;
 use super::things::{Face, Things};
 use crate::failure::Failure;
@@ -25,6 +27,8 @@ use crate::language::filled;
 const MOST_HITS: usize = 64;
 /// Shapes that are told of where the ray meets none.
 const MOST_MISSES: usize = 3;
+/// Parts that the axis of a curve is drawn in.
+const AXIS_PARTS: u32 = 24;
 /// Columns of a matrix are at right angles where their cosines are less than this.
 const RIGHT_ANGLE: f64 = 1e-12;
 
@@ -209,7 +213,9 @@ fn tell(
     {
         section.sections.push(in_file(&face, told.len(), texts));
     }
-    let mut figure = None;
+    let is_seen = first.is_some_and(|first| hits.contains(&first));
+    let path = if is_seen { wanted.path } else { &[] };
+    let (drawn, marked);
     match &object.shape {
         Some(exact) => {
             let mut equation = Section::new("equation", texts.equation);
@@ -219,7 +225,6 @@ fn tell(
                 normal: resolved.accel().surface(ray, hit).normal,
                 local_normal: exact.surface(&object.ray, &hit.root).normal,
             });
-            let is_seen = first.is_some_and(|first| hits.contains(&first));
             let subject = Subject {
                 shape: exact,
                 map: &object.whole,
@@ -230,31 +235,42 @@ fn tell(
                 hits: &met.collect::<Vec<_>>(),
                 nearest,
                 up: wanted.up,
-                path: if is_seen { wanted.path } else { &[] },
+                path,
             };
-            let (drawn, marked) = subject.figure(texts);
-            section.marked = marked;
-            section.items.push(Item::Figure(Box::new(drawn.clone())));
-            figure = Some(drawn);
+            (drawn, marked) = subject.figure(texts);
             shape::tell(&mut equation, &explanation, &object.ray, &mut scope, &rename, texts);
             section.sections.push(equation);
         }
-        None => match resolved.curves_at(hit) {
-            Some((curves, _)) => section.sections.push(curve(curves, hits, &object.ray, texts)),
-            None => section.text(texts.custom),
-        },
+        None => {
+            let mut axis = Vec::new();
+            match resolved.curves_at(hit) {
+                Some((curves, _)) => {
+                    let points = curves.control_points(hit.primitive);
+                    let places =
+                        (0..=AXIS_PARTS).map(|i| cubic(&points, f64::from(i) / f64::from(AXIS_PARTS)));
+                    axis.push(bare_line(places.map(|p| object.whole.point(p))));
+                    section.sections.push(curve(curves, hits, &object.ray, texts));
+                }
+                None => section.text(texts.custom),
+            }
+            let met = hits.iter().map(|hit| {
+                let Surface { normal, .. } = resolved.accel().surface(ray, hit);
+                Met { t: hit.root.t, normal, local_normal: normal }
+            });
+            (drawn, marked) = figure::of_hits(axis, ray, &met.collect::<Vec<_>>(), wanted.up, path, texts);
+        }
     }
+    section.marked = marked;
     let normal = if object.is_placed() { "N′" } else { "N" };
     for &hit in hits {
         let is_first = first.is_some_and(|first| first == hit);
         let mut told = at_hit(scene, ray, hit, is_first, &object, texts);
-        if let Some(figure) = &figure {
-            told.marked = figure.marked_at(hit.root.t, normal);
-            // The normal in the world is drawn there, too.
-            told.marked.extend(figure.marked_at(hit.root.t, "N"));
-        }
+        told.marked = drawn.marked_at(hit.root.t, normal);
+        // The normal in the world is drawn there, too.
+        told.marked.extend(drawn.marked_at(hit.root.t, "N"));
         section.sections.push(told);
     }
+    section.items.push(Item::Figure(Box::new(drawn)));
     section
 }
 
@@ -306,13 +322,18 @@ fn curve(curves: &Curves, hits: &[&Hit], ray: &Ray, texts: &Texts) -> Section {
         section.quantity(&mut scope, "u", "", "", u);
         section.quantity(&mut scope, "w", texts.curve_width, "", curves.width(hit.primitive, u));
         let formula = "(1−u)³·P₀ + 3u(1−u)²·P₁ + 3u²(1−u)·P₂ + u³·P₃";
-        let v = 1.0 - u;
-        let weights = [v * v * v, 3.0 * u * v * v, 3.0 * u * u * v, u * u * u];
-        let axis: DVec3 = weights.into_iter().zip(points).map(|(weight, point)| weight * point).sum();
+        let axis = cubic(&points, u);
         section.fact(format!("C = {formula}: {}", texts.curve_axis), axis);
         section.fact(texts.curve_distance, (axis - ray.at(hit.root.t)).length());
     }
     section
+}
+
+/// The point at a parameter of the cubic with these control points.
+fn cubic(points: &[DVec3; 4], u: f64) -> DVec3 {
+    let v = 1.0 - u;
+    let weights = [v * v * v, 3.0 * u * v * v, 3.0 * u * u * v, u * u * u];
+    weights.into_iter().zip(points).map(|(weight, point)| weight * *point).sum()
 }
 
 /// A thing in its own space.
