@@ -380,9 +380,14 @@ const tests = {
       const colour = (where) => first.locator(where).first().evaluate((it) => getComputedStyle(it).color);
       const [mark, symbol] = ['.sketch .mark[data-mark="C"]', 'span[data-mark="C"]'];
       const plain = [await colour(mark), await colour(symbol)];
-      for (const act of [(it) => it.focus(), (it) => it.hover()]) {
-        for (const where of [symbol, `${mark} text`]) {
-          await act(first.locator(where === symbol || act.toString().includes("hover") ? where : mark).first());
+      const focus = (it) => it.focus();
+      const hover = (it) => it.hover();
+      for (const [act, places] of [[focus, [symbol, mark]], [hover, [symbol, `${mark} text`]]]) {
+        for (const where of places) {
+          const target = first.locator(where).first();
+          // Clear of what stands at the edges of the window.
+          await target.evaluate((it) => it.scrollIntoView({ block: "end" }));
+          await act(target);
           const lit = [await colour(mark), await colour(symbol)];
           assert.ok(lit[0] !== plain[0] && lit[1] !== plain[1] && lit[0] === lit[1], `${where}: ${plain} and ${lit}`);
           await page.evaluate(() => document.activeElement.blur());
