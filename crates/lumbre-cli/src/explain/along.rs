@@ -16,7 +16,8 @@ pub(super) enum Along {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Piece {
     pub(super) from: f64,
-    /// Where its variable is 0.
+    /// Its variable is `scale·t − start`.
+    pub(super) scale: f64,
     pub(super) start: f64,
     /// The constant first.
     pub(super) coefficients: Vec<f64>,
@@ -27,25 +28,27 @@ impl Along {
     pub(super) fn at(&self, t: f64) -> Option<f64> {
         let Self::Function { pieces, .. } = self else { return None };
         let piece = pieces.iter().rev().find(|piece| piece.from <= t).or(pieces.first())?;
-        let x = t - piece.start;
+        let x = piece.scale * t - piece.start;
         Some(piece.coefficients.iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient))
     }
 }
 
 fn everywhere(start: f64, coefficients: impl Into<Vec<f64>>) -> Vec<Piece> {
-    vec![Piece { from: f64::NEG_INFINITY, start, coefficients: coefficients.into() }]
+    vec![Piece { from: f64::NEG_INFINITY, scale: 1.0, start, coefficients: coefficients.into() }]
 }
 
 /// The shape along the line of a ray, both in the shape's own space, as it is explained; `None` where no function is at hand.
 pub(super) fn along(shape: &Shape, explanation: &Explanation, ray: &Ray) -> Option<Along> {
     let number = |topic: Topic, symbol: &str| number(explanation, topic, symbol);
-    // The steps of a ray whose direction was scaled have other t.
+    // The steps of a ray whose direction was scaled are of that, and have other t.
     let factor = number(Topic::ScaledRay, "f").unwrap_or(1.0);
+    let direction = vector(explanation, Topic::ScaledRay, "D").unwrap_or(ray.direction);
+    let ray = &Ray { direction, ..*ray };
     let function = |formula: &'static str, pieces: Vec<Piece>| Along::Function { formula, pieces };
-    let found = match shape {
+    let mut found = match shape {
         Shape::Plane(_) | Shape::Disk(_) => {
             let (along, away) = (number(Topic::Plane, "μ")?, number(Topic::Plane, "δ")?);
-            function("t·μ − δ", everywhere(0.0, [-away, along * factor]))
+            function("t·μ − δ", everywhere(0.0, [-away, along]))
         }
         Shape::Triangle(triangle) => {
             let [a, b, c] = triangle.corners();
@@ -70,10 +73,15 @@ pub(super) fn along(shape: &Shape, explanation: &Explanation, ray: &Ray) -> Opti
             } else {
                 "a·t² + 2·h·t + c"
             };
-            let coefficients = [c, 2.0 * h * factor, a * factor * factor];
-            function(formula, everywhere(start.unwrap_or(0.0) / factor, coefficients))
+            let coefficients = [c, 2.0 * h, a];
+            function(formula, everywhere(start.unwrap_or(0.0), coefficients))
         }
     };
+    if let Along::Function { pieces, .. } = &mut found {
+        for piece in pieces {
+            (piece.from, piece.scale) = (piece.from / factor, factor);
+        }
+    }
     let is_finite = match &found {
         Along::Function { pieces, .. } => pieces
             .iter()
@@ -175,7 +183,7 @@ fn by_parts(capsule: &Capsule, explanation: &Explanation, ray: &Ray) -> Option<V
     let (offset, across) = ((o - first).cross(axis), d.cross(axis));
     let of_side = vec![offset.dot(offset) - small, 2.0 * offset.dot(across), across.dot(across)];
     let (height, rise) = ((o - first).dot(axis), d.dot(axis));
-    let piece = |from: f64, coefficients: Vec<f64>| Piece { from, start: 0.0, coefficients };
+    let piece = |from: f64, coefficients: Vec<f64>| Piece { from, scale: 1.0, start: 0.0, coefficients };
     if rise == 0.0 {
         let coefficients = match () {
             () if height < 0.0 => of_ball(first),

@@ -14,7 +14,7 @@ const STYLE: &str = include_str!("page.css");
 /// The script of the page, which is the same on every page.
 const SCRIPT: &str = include_str!("page.js");
 /// Its hash, as a Content Security Policy names it.
-pub(super) const SCRIPT_HASH: &str = "sha256-Kk3AsavFjAUviXrV1KSLmEHHYEIhjyGEY2Hn9NC8G2I=";
+pub(super) const SCRIPT_HASH: &str = "sha256-4CcvE4dkaCxdppEduiLZuItqR5GQR3vMcHoFHWbXGsc=";
 
 /// The page.
 pub(super) fn html(title: &str, sections: &[Section], texts: &'static Texts) -> String {

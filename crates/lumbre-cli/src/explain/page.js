@@ -14,7 +14,7 @@
     const { from, to, left, right, zero, one } = Object.fromEntries(Object.entries(plot.dataset).map(([name, x]) => [name, Number(x)]));
     const at = (t) => {
       const piece = pieces.findLast(([first]) => first <= t) ?? pieces[0];
-      return piece?.slice(2).reduceRight((sum, coefficient) => sum * (t - piece[1]) + coefficient, 0);
+      return piece?.slice(3).reduceRight((sum, coefficient) => sum * (t * piece[1] - piece[2]) + coefficient, 0);
     };
     const show = (t) => {
       for (const point of figure.querySelectorAll(".sketch > .moving")) {

@@ -30,7 +30,7 @@ pub(super) struct Plot {
     pub(super) range: [f64; 2],
     /// The formula of `F`, where it has one.
     pub(super) formula: Option<&'static str>,
-    /// The pieces of the function: from where on, where its variable is 0, and the coefficients, the constant first.
+    /// The pieces of the function: from where on, the scale and the start of its variable, and the coefficients, the constant first.
     pub(super) pieces: Vec<Vec<f64>>,
 }
 
@@ -81,7 +81,10 @@ pub(super) fn plot(along: &Along, crossings: &[Crossing], nearest: Option<f64>, 
             function(&mut out, along, crossings, [from, to], &across);
             let pieces = pieces.iter().map(|piece| {
                 let first = if piece.from.is_finite() { piece.from } else { from };
-                [first, piece.start].into_iter().chain(piece.coefficients.iter().copied()).collect()
+                [first, piece.scale, piece.start]
+                    .into_iter()
+                    .chain(piece.coefficients.iter().copied())
+                    .collect()
             });
             Plot { svg: out, range: [from, to], formula: Some(formula), pieces: pieces.collect() }
         }
