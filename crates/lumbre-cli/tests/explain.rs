@@ -228,9 +228,11 @@ fn every_form_is_whole() {
     }
     assert!(markdown.contains("w\\cdot w - r^{2}"), "{markdown}");
     let html = tell("html");
-    for tag in ["math", "section", "svg", "table", "msqrt", "msup", "p", "td", "polyline"] {
+    for tag in
+        ["math", "section", "svg", "table", "msqrt", "msup", "p", "td", "figure", "g", "span", "button"]
+    {
         let opened = html.matches(&format!("<{tag}>")).count() + html.matches(&format!("<{tag} ")).count();
-        let closed = html.matches(&format!("</{tag}>")).count() + if tag == "polyline" { opened } else { 0 };
+        let closed = html.matches(&format!("</{tag}>")).count();
         assert!(opened > 0 && opened == closed, "{tag}: {opened} and {closed}");
     }
     assert!(!html.contains("<b>") && html.contains("a &lt;b&gt; &amp; c.pbrt"));
@@ -614,4 +616,263 @@ fn kinds_and_mistakes_are_told_in_spanish() {
     );
     let out = desk.lumbre(&["explain", "a.pbrt", "--pixel", "1,0", "--only", "colour", "--lang", "es"]);
     assert!(stderr(&out).contains("--only colour: ninguna sección tiene esta clave"), "{}", stderr(&out));
+}
+
+/// The page of an explanation.
+fn page(desk: &Desk, arguments: &[&str]) -> String {
+    let out = desk.lumbre(&[&["explain", "a.pbrt", "--format", "html"], arguments].concat());
+    assert_eq!(code(&out), 0, "{}", stderr(&out));
+    stdout(&out)
+}
+
+/// The pictures of a kind on a page, each from its beginning to its end.
+fn pictures<'p>(page: &'p str, class: &str) -> Vec<&'p str> {
+    let begin = format!("<svg class=\"{class}\"");
+    page.split(&begin).skip(1).map(|rest| rest.split("</svg>").next().unwrap()).collect()
+}
+
+/// The number of an attribute in an element.
+fn number(element: &str, name: &str) -> f64 {
+    attribute(element, name).parse().unwrap_or_else(|_| panic!("{name} in {element}"))
+}
+
+fn attribute<'e>(element: &'e str, name: &str) -> &'e str {
+    let begin = format!(" {name}=\"");
+    let rest = element.split_once(&begin).unwrap_or_else(|| panic!("no {name} in {element}")).1;
+    rest.split('"').next().unwrap()
+}
+
+/// Shapes, a ray, and the labels that its sketches have; every shape that has an F, and others.
+const DRAWN: [(&str, &str, &[&str], &[&str]); 14] = [
+    (
+        r#"Shape "sphere" "float radius" 1.5"#,
+        "0.5,0.3,-5,0,0,1",
+        &["O", "O + t·D", "C", "r", "t₁", "t₂", "N"],
+        &[],
+    ),
+    (
+        r#"Translate 0.5 0 0 Scale 2 1 1 Shape "sphere""#,
+        "-6,0.3,0.2,1,0,0",
+        &["O", "O + t·D", "M C", "t₁", "t₂", "N"],
+        &["O′", "O′ + t·D′", "C", "r", "t₁", "t₂", "N′"],
+    ),
+    (
+        r#"Shape "cylinder" "float radius" 1"#,
+        "-4,0.3,0.2,1,0,0.1",
+        &["O", "P₁", "P₂", "r₁", "t₁", "t₂", "N"],
+        &[],
+    ),
+    (
+        r#"Shape "cone" "float radius" 1.5 "float height" 2"#,
+        "-4,0.3,0.5,1,0,0.05",
+        &["O", "P₁", "P₂", "r₁", "t₁", "t₂", "N"],
+        &[],
+    ),
+    (r#"Shape "paraboloid" "float radius" 1"#, "-4,0.2,0.5,1,0,0", &["O", "r", "t₁", "t₂", "N"], &[]),
+    (
+        r#"Shape "hyperboloid" "point3 p1" [1 0 0] "point3 p2" [1 1 1.5]"#,
+        "-4,0.2,0.5,1,0,0",
+        &["O", "P₁", "P₂", "t₁", "t₂", "N"],
+        &[],
+    ),
+    (
+        r#"Shape "torus" "float majorradius" 2 "float minorradius" 0.5"#,
+        "-5,0.3,0.1,1,0,0",
+        &["O", "C", "R", "r", "t₁", "t₂", "t₃", "t₄", "N"],
+        &[],
+    ),
+    (
+        r#"Shape "box" "point3 p0" [-1 -1 -1] "point3 p1" [1 1 1]"#,
+        "-5,0.3,0.1,1,0.1,0",
+        &["O", "L", "H", "t₁", "t₂", "N"],
+        &[],
+    ),
+    (
+        r#"Shape "capsule" "point3 p0" [0 0 -1] "point3 p1" [0 0.5 1]"#,
+        "-5,0.3,0.1,1,0.05,0.1",
+        &["O", "P₁", "P₂", "r₁", "t₁", "t₂", "N"],
+        &[],
+    ),
+    (r#"Shape "plane""#, "-5,0.3,2,1,0.1,-0.5", &["O", "P", "t", "N"], &[]),
+    (r#"Shape "disk" "float radius" 900"#, "-5,0.3,2,1,0.1,-0.5", &["O", "t", "N"], &[]),
+    (
+        r#"Shape "bilinearmesh" "point3 P" [-1 -1 0  1 -1 1  -1 1 1  1 1 -0.5]"#,
+        "0.2,0.3,5,0,0.1,-1",
+        &["O", "P₀₀", "P₁₀", "P₀₁", "P₁₁", "t₁", "N"],
+        &[],
+    ),
+    (
+        r#"Shape "trianglemesh" "point3 P" [-1 -1 0  1 -1 1  -1 1 1]"#,
+        "-0.2,-0.3,5,0,0.1,-1",
+        &["O", "P₀", "P₁", "P₂", "t", "N"],
+        &[],
+    ),
+    (
+        r#"ObjectBegin "a" Shape "sphere" ObjectEnd ObjectBegin "b" Translate 0.8 0 0 Shape "sphere" ObjectEnd
+           Shape "csg" "string operation" "difference" "string operands" ["a" "b"]"#,
+        "-5,0.1,0.3,1,0,0",
+        &["O", "O + t·D", "t = 4.051", "N"],
+        &[],
+    ),
+];
+
+/// The labels of a picture with the boxes that they are in, by the width that a letter has at most.
+fn labels(picture: &str) -> Vec<(String, [f64; 4])> {
+    let texts = picture.split("<text ").skip(1);
+    let labels = texts.filter(|text| !text.starts_with("class=\"name\""));
+    labels
+        .map(|text| {
+            let text = format!(" {text}");
+            let content = text.split_once('>').unwrap().1.split('<').next().unwrap().to_owned();
+            let (x, y) = (number(&text, "x"), number(&text, "y"));
+            let half = 4.3 * content.chars().count() as f64;
+            (content, [x - half, y - 11.0, x + half, y + 3.9])
+        })
+        .collect()
+}
+
+/// All points of the lines of a picture.
+fn points(picture: &str) -> Vec<[f64; 2]> {
+    let lines = picture.split("<polyline points=\"").skip(1).map(|rest| rest.split('"').next().unwrap());
+    let pairs = lines.flat_map(|line| line.split(' '));
+    let point = |pair: &str| {
+        let (x, y) = pair.split_once(',').unwrap();
+        [x.parse().unwrap(), y.parse().unwrap()]
+    };
+    pairs.map(point).collect()
+}
+
+#[test]
+fn sketches_have_their_labels_clear_of_each_other_and_inside() {
+    let desk = Desk::new();
+    for (shape, ray, world, object) in DRAWN {
+        desk.write("a.pbrt", &bare(&format!("AttributeBegin {shape} AttributeEnd"), "", ""));
+        let page = page(&desk, &["--ray", ray]);
+        let sketches = pictures(&page, "sketch");
+        assert_eq!(sketches.len(), if object.is_empty() { 1 } else { 2 }, "{shape}");
+        for (sketch, expected) in sketches.iter().zip([world, object]) {
+            let [width, height] = [number(sketch, "width"), number(sketch, "height")];
+            let found = labels(sketch);
+            for label in expected {
+                assert_eq!(
+                    found.iter().filter(|(text, _)| text == label).count(),
+                    1,
+                    "{label} of {shape}: {found:?}"
+                );
+            }
+            for (i, (text, [left, top, right, bottom])) in found.iter().enumerate() {
+                let is_inside = *left >= 0.0 && *top >= 0.0 && *right <= width && *bottom <= height;
+                assert!(is_inside, "{text} of {shape} is at {left}, {top}");
+                for (other, [l, t, r, b]) in &found[..i] {
+                    let overlaps = l < right && left < r && t < bottom && top < b;
+                    // The letters of the axes are in a corner of their own.
+                    let are_axes =
+                        [text, other].iter().all(|label| ["x", "y", "z"].contains(&label.as_str()));
+                    assert!(!overlaps || are_axes, "{text} and {other} of {shape}");
+                }
+            }
+            let points = points(sketch);
+            assert!(points.len() > 8, "{shape}");
+            for [x, y] in points {
+                assert!((0.0..=width).contains(&x) && (0.0..=height).contains(&y), "{x}, {y} of {shape}");
+            }
+        }
+    }
+}
+
+#[test]
+fn roots_are_marked_at_the_numbers_that_are_told() {
+    let desk = Desk::new();
+    for (shape, ray, _, _) in DRAWN {
+        desk.write("a.pbrt", &bare(&format!("AttributeBegin {shape} AttributeEnd"), "", ""));
+        let page = page(&desk, &["--ray", ray]);
+        let plots = pictures(&page, "plot");
+        assert_eq!(plots.len(), 1, "{shape}");
+        let [from, to, left, right] =
+            ["data-from", "data-to", "data-left", "data-right"].map(|name| number(plots[0], name));
+        let marks = plots[0].split("<g class=\"mark").skip(1);
+        let marks: Vec<f64> = marks
+            .map(|mark| {
+                let t = number(mark, "data-t");
+                let (x, y) = (number(mark, "cx"), number(mark, "cy"));
+                assert!(
+                    (x - (left + (t - from) / (to - from) * (right - left))).abs() < 0.01,
+                    "{shape}: {t} at {x}"
+                );
+                assert!((y - number(plots[0], "data-zero")).abs() < 0.01, "{shape}: {t} at {y}");
+                t
+            })
+            .collect();
+        let told = explained(&desk, &["--ray", ray]);
+        let crossings = list(&section(&told, "crossings").unwrap()["tables"]["crossings"]);
+        // Of an operand come the crossings of that first.
+        let mut expected: Vec<f64> = crossings.iter().map(|row| row["t"].as_f64().unwrap()).collect();
+        expected.dedup();
+        if !shape.contains("csg") {
+            assert_eq!(marks, expected, "{shape}");
+        }
+        let hits =
+            list(&told["sections"][1]["sections"][0]["sections"]).iter().filter(|it| it["key"] == "hit");
+        let hits: Vec<f64> = hits.map(|hit| quantity(hit, "t").as_f64().unwrap()).collect();
+        assert!(!hits.is_empty() && hits.iter().all(|t| marks.contains(t)), "{shape}: {hits:?} in {marks:?}");
+        // The slider goes over the same t.
+        let slider = page.split_once("type=\"range\"").unwrap().1;
+        assert_eq!([number(slider, "min"), number(slider, "max")], [from, to], "{shape}");
+    }
+}
+
+#[test]
+fn what_is_up_is_up_in_the_sketch_and_a_floor_does_not_fill_it() {
+    let desk = Desk::new();
+    for (look, up) in [("0 -5 1 0 0 1 0 0 1", "z"), ("0 1 -5 0 1 0 0 1 0", "y")] {
+        // The last ray goes straight down.
+        for ray in ["-5,0.3,2,1,0.1,-0.5", "0.5,-4,3,0.2,1,-0.6", "0.5,0.2,8,0,0,-1"] {
+            let shapes = r#"Shape "disk" "float radius" 5000"#;
+            desk.write("a.pbrt", &bare(shapes, "", "").replace("0 0 -5 0 0 0 0 1 0", look));
+            let page = page(&desk, &["--ray", ray]);
+            let sketch = pictures(&page, "sketch")[0];
+            let axis =
+                sketch.split("<line ").find(|line| line.starts_with(&format!("data-axis=\"{up}\""))).unwrap();
+            let axis = format!(" {axis}");
+            let rise = number(&axis, "y1") - number(&axis, "y2");
+            assert!(
+                rise > 10.0 && (number(&axis, "x1") - number(&axis, "x2")).abs() < 0.5 * rise,
+                "{up}: {axis}"
+            );
+            // The crossing is in the middle of the picture, and the ray is as long as half of it.
+            let mark = |class: &str| sketch.split(&format!("<g class=\"mark {class}\"")).nth(1).unwrap();
+            let ([x, y], [ox, oy]) = (
+                ["cx", "cy"].map(|name| number(mark("crossing"), name)),
+                ["cx", "cy"].map(|name| number(mark("origin"), name)),
+            );
+            assert!((100.0..320.0).contains(&x) && (60.0..250.0).contains(&y), "{x}, {y} along {ray}");
+            assert!((x - ox).hypot(y - oy) > 100.0, "from {ox}, {oy} to {x}, {y} along {ray}");
+        }
+    }
+}
+
+#[test]
+fn what_is_marked_lights_up_and_steps_and_sliders_wait_for_the_script() {
+    let desk = Desk::new();
+    desk.write("a.pbrt", SCENE);
+    let page = page(&desk, &["--pixel", "12,8"]);
+    for key in ["O", "D", "O′", "C", "r", "t₁", "t₂"] {
+        let marked = page.matches(&format!("data-mark=\"{key}\"")).count();
+        // In a sketch, in a rule, and in a formula at least.
+        assert!(marked >= 4, "{key}: {marked}");
+        assert!(
+            page.contains(&format!(
+                ".figured:has([data-mark=\"{key}\"]:is(:hover, :focus)) [data-mark=\"{key}\"]"
+            )),
+            "{key}"
+        );
+    }
+    assert!(page.contains("<span data-mark=\"t₁\" tabindex=\"0\"><math>"));
+    assert!(page.contains("<nav id=\"steps\" aria-label=\"Step by step\" hidden>"));
+    for part in page.split("<div class=\"slider\"").skip(1) {
+        assert!(part.split('>').next().unwrap().ends_with(" hidden"), "{part}");
+    }
+    assert!(page.matches("<div class=\"slider\"").count() >= 1);
+    // Without it, everything is open.
+    assert_eq!(page.matches("<details>").count(), 0);
 }

@@ -23,9 +23,10 @@ use tokio_tungstenite::tungstenite::handshake::derive_accept_key;
 
 use crate::guard::{Guard, Refusal};
 use crate::message::{Errand, FileFormat};
-use crate::page::{EXPLANATION_POLICY, FILES, POLICY};
+use crate::page::{FILES, POLICY, explanation_policy};
 use crate::session::Session;
 use crate::socket;
+use crate::stage::Explained;
 use crate::visitors::{Visit, Visitors};
 
 /// Timeout for the headers of a request, and for the next request.
@@ -195,19 +196,17 @@ impl Server {
         let session = self.session.clone();
         let told = tokio::task::spawn_blocking(move || session.explain(pixel, &language)).await;
         let told = told.map_err(|_| StatusCode::INTERNAL_SERVER_ERROR)?.ok_or(StatusCode::NOT_FOUND)?;
-        let (status, kind, text) = match told {
-            Ok(page) => (StatusCode::OK, "text/html; charset=utf-8", page),
-            Err(why) => (StatusCode::UNPROCESSABLE_ENTITY, "text/plain; charset=utf-8", why),
+        let (status, kind, text, script) = match told {
+            Ok(Explained { page, script }) => (StatusCode::OK, "text/html; charset=utf-8", page, script),
+            Err(why) => (StatusCode::UNPROCESSABLE_ENTITY, "text/plain; charset=utf-8", why, None),
         };
+        let policy = HeaderValue::from_str(&explanation_policy(script));
+        let policy = policy.map_err(|_| StatusCode::INTERNAL_SERVER_ERROR)?;
         let mut answer = Response::new(Full::new(text.into()));
         *answer.status_mut() = status;
-        for (name, value) in [
-            (CONTENT_TYPE, kind),
-            (CONTENT_SECURITY_POLICY, EXPLANATION_POLICY),
-            (X_FRAME_OPTIONS, "SAMEORIGIN"),
-        ] {
-            answer.headers_mut().insert(name, HeaderValue::from_static(value));
-        }
+        answer.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static(kind));
+        answer.headers_mut().insert(CONTENT_SECURITY_POLICY, policy);
+        answer.headers_mut().insert(X_FRAME_OPTIONS, HeaderValue::from_static("SAMEORIGIN"));
         Ok(answer)
     }
 

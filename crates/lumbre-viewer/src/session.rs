@@ -13,7 +13,7 @@ use crate::camera::Placement;
 use crate::frame::{Channel, Frame, Look, Pixels, Shot};
 use crate::message::{Message, SetOptions};
 use crate::source::{Moment, Source};
-use crate::stage::Stage;
+use crate::stage::{Explained, Stage};
 use crate::watching::Watched;
 
 /// Versions of the requested state, by the work that a change needs.
@@ -426,8 +426,8 @@ impl Session {
         Some(json!({ "type": "picked", "request": request, "x": x, "y": y, "ray": met }))
     }
 
-    /// An explanation of a pixel's colour, as a page in a language; `None` if there is no explainer.
-    pub(crate) fn explain(&self, pixel: (u32, u32), language: &str) -> Option<Result<String, String>> {
+    /// How the colour of a pixel of the picture comes about, as a page in a language; `None` where nobody tells that.
+    pub(crate) fn explain(&self, pixel: (u32, u32), language: &str) -> Option<Result<Explained, String>> {
         let (stage, camera, full) = self.shown()?;
         stage.explain(camera, full, pixel, language)
     }

@@ -74,7 +74,10 @@ pub trait Explain: Debug + Send + Sync {
     /// The available languages, as their codes and their own names.
     fn languages(&self) -> Vec<(&'static str, &'static str)>;
 
-    /// An HTML page, which may have styles, and neither runs nor loads anything.
+    /// The hash of the one script that its pages may run, as a Content Security Policy names it (`sha256-…`).
+    fn script(&self) -> Option<&'static str>;
+
+    /// A page of HTML, which may have styles and that script inline, and loads nothing.
     ///
     /// # Errors
     /// Why there is none, for people.

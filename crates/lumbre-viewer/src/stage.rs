@@ -55,6 +55,14 @@ const MAX_HITS: usize = 64;
 /// Maximum parameters that are listed.
 const MAX_PARAMETERS: usize = 2000;
 
+/// How the colour of a pixel comes about.
+pub(crate) struct Explained {
+    /// A page of HTML.
+    pub page: String,
+    /// The hash of the script that it may run.
+    pub script: Option<&'static str>,
+}
+
 impl Stage {
     /// From a built description.
     pub(crate) fn new(built: Built, desc: &SceneDesc, mut warnings: Vec<String>) -> Self {
@@ -116,7 +124,7 @@ impl Stage {
         (width, height): (u32, u32),
         pixel: (u32, u32),
         language: &str,
-    ) -> Option<Result<String, String>> {
+    ) -> Option<Result<Explained, String>> {
         let explain = self.explain.as_ref()?;
         if pixel.0 >= width || pixel.1 >= height {
             let (x, y) = pixel;
@@ -128,7 +136,8 @@ impl Stage {
         if (width, height) != (options.width, options.height) {
             options.resize(scene.resolved().film(), width, height);
         }
-        Some(explain.page(&scene, &options, pixel, language))
+        let page = explain.page(&scene, &options, pixel, language);
+        Some(page.map(|page| Explained { page, script: explain.script() }))
     }
 }
 

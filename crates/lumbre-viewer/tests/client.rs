@@ -67,6 +67,10 @@ impl Explain for Words {
         vec![("la", "Latina")]
     }
 
+    fn script(&self) -> Option<&'static str> {
+        Some("sha256-AbCd")
+    }
+
     fn page(
         &self,
         scene: &Scene,

@@ -101,7 +101,7 @@ fn kinds_of_shapes_are_called_what_the_scene_language_calls_them() {
 }
 
 #[test]
-fn a_pixel_of_the_picture_that_is_shown_is_explained_in_a_frame_that_runs_nothing() {
+fn a_pixel_of_the_picture_that_is_shown_is_explained_in_a_frame_that_runs_one_script() {
     let viewer = Running::new();
     let session = viewer.session();
     let mut socket = viewer.socket(&session);
@@ -126,7 +126,7 @@ fn a_pixel_of_the_picture_that_is_shown_is_explained_in_a_frame_that_runs_nothin
         "http/1.1 200",
         "content-type: text/html; charset=utf-8",
         "x-frame-options: sameorigin",
-        "content-security-policy: default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'",
+        "content-security-policy: default-src 'none'; script-src 'sha256-abcd'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'; sandbox allow-scripts",
     ] {
         assert!(head.contains(line), "{line}: {head}");
     }
@@ -145,6 +145,7 @@ fn a_pixel_of_the_picture_that_is_shown_is_explained_in_a_frame_that_runs_nothin
     assert_eq!(body, "The picture of 24 by 16 pixels has no pixel 24, 15.");
     let (head, body) = explained("xx", 3, 2);
     assert!(head.starts_with("http/1.1 422") && head.contains("text/plain"), "{head}");
+    assert!(!head.contains("script-src"), "{head}");
     assert_eq!(body, "<b>xx</b> is not spoken here", "as text");
     assert!(asked("/ticket/la").0.starts_with("http/1.1 403"));
 }

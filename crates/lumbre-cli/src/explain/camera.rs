@@ -43,7 +43,7 @@ pub(super) fn camera(
     section.fact(texts.look_at, DMat4::from(*place.inverse_affine()));
     let projection = projection(&camera.kind, &view, (width, height));
     if let Some(matrix) = projection {
-        let ends = [NEAR, FAR].map(super::document::exact);
+        let ends = [NEAR, FAR].map(super::numbers::exact);
         section.fact(filled(texts.projection, &[&ends[0], &ends[1]]), matrix);
     }
     film(&mut section, &view, &place, (x, y), sample, texts);
@@ -114,10 +114,10 @@ fn back(projection: &DMat4, place: &Transform, (width, height): (u32, u32), poin
 fn kind(kind: &CameraKind, texts: &Texts) -> String {
     match kind {
         CameraKind::Perspective { fov, lens_radius, focal_distance } => {
-            let fov = super::document::exact(*fov);
+            let fov = super::numbers::exact(*fov);
             let pinhole = filled(texts.perspective, &[&fov]);
             if *lens_radius > 0.0 {
-                let lens = [lens_radius, focal_distance].map(|x| super::document::exact(*x));
+                let lens = [lens_radius, focal_distance].map(|x| super::numbers::exact(*x));
                 format!("{pinhole}, {}", filled(texts.lens, &[&lens[0], &lens[1]]))
             } else {
                 pinhole
@@ -127,7 +127,7 @@ fn kind(kind: &CameraKind, texts: &Texts) -> String {
         CameraKind::Spherical { .. } => texts.spherical.to_owned(),
         CameraKind::Realistic(lens) => {
             let mm = [lens.focal_length(), lens.film_distance(), lens.diagonal()];
-            let mm = mm.map(|metres| super::document::exact((1e6 * metres).round() / 1e3));
+            let mm = mm.map(|metres| super::numbers::exact((1e6 * metres).round() / 1e3));
             filled(texts.realistic, &[&mm[0], &mm[1], &mm[2]])
         }
     }

@@ -5,8 +5,9 @@ use std::collections::BTreeSet;
 use lumbre::math::glam::DMat4;
 use lumbre::{DVec3, Ray};
 
+use super::figure::{Figure, Marked};
 use super::formula::{PutIn, Scope};
-use crate::units::number;
+use super::numbers::{exact, short};
 
 /// A section of an explanation.
 #[derive(Clone, Debug, Default)]
@@ -17,6 +18,8 @@ pub(super) struct Section {
     pub(super) title: String,
     pub(super) items: Vec<Item>,
     pub(super) sections: Vec<Section>,
+    /// Which symbols here and below are marked in the figure.
+    pub(super) marked: Marked,
 }
 
 /// One item of a section.
@@ -33,8 +36,8 @@ pub(super) enum Item {
         columns: Vec<Column>,
         rows: Vec<Vec<Value>>,
     },
-    /// A drawing.
-    Sketch(String),
+    /// Drawings.
+    Figure(Box<Figure>),
 }
 
 /// A column of a table.
@@ -116,23 +119,6 @@ impl From<DMat4> for Value {
     fn from(m: DMat4) -> Self {
         Self::Matrix(Box::new(m))
     }
-}
-
-/// The shortest text that reads back as the same number; infinity has its sign.
-pub(super) fn exact(x: f64) -> String {
-    if x.is_finite() || x.is_nan() {
-        return number(x);
-    }
-    if x > 0.0 { "∞".to_owned() } else { "-∞".to_owned() }
-}
-
-/// With six digits, for formulas.
-fn short(x: f64) -> String {
-    if x == 0.0 || !x.is_finite() {
-        return exact(x);
-    }
-    let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
-    exact(rounded)
 }
 
 impl Value {
@@ -234,7 +220,13 @@ impl Quantity {
 
 impl Section {
     pub(super) fn new(key: impl Into<String>, title: impl Into<String>) -> Self {
-        Self { key: key.into(), title: title.into(), items: Vec::new(), sections: Vec::new() }
+        Self {
+            key: key.into(),
+            title: title.into(),
+            items: Vec::new(),
+            sections: Vec::new(),
+            marked: Vec::new(),
+        }
     }
 
     /// Adds the keys of this section and of those below it.

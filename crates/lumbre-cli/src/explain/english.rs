@@ -2,7 +2,7 @@
 
 use lumbre::geometry::{Fate, Remark, Topic};
 
-use super::document::exact;
+use super::numbers::exact;
 use super::texts::{OperandName, Texts};
 
 pub(super) static ENGLISH: Texts = Texts {
@@ -160,7 +160,17 @@ pub(super) static ENGLISH: Texts = Texts {
     end_medium: "It ends in the medium.",
     schoolbook: "by the textbook",
     title: "How Lumbre computes it",
-    sketch: "The ray, what it meets, and the normals there",
+    sketch: "Filled points are hits, hollow ones crossings of the line that are none. Where the ray is dotted at its beginning, its origin is farther away than drawn.",
+    world_space: "In the world",
+    object_space: "In the shape's own space",
+    plot: "Along the ray",
+    plot_of_intervals: "The intervals of t along the ray",
+    slider: "t along the ray",
+    step_by_step: "Step by step",
+    previous: "Previous",
+    next: "Next",
+    show_all: "Show all",
+    step_of: "Step {0} of {1}: {2}",
     is_missed: "The ray misses it.",
     passes: "It passes it at a distance of {0}, nearest at t = {1}.",
     passes_in_object: "In the object's own space it passes it at a distance of {0}, nearest at t = {1}.",

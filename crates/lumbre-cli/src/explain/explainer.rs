@@ -29,6 +29,10 @@ impl Explain for Explainer {
         languages.map(|texts| (texts.code, texts.language)).collect()
     }
 
+    fn script(&self) -> Option<&'static str> {
+        Some(html::SCRIPT_HASH)
+    }
+
     fn page(
         &self,
         scene: &Scene,
@@ -40,6 +44,6 @@ impl Explain for Explainer {
         let question =
             Question { things: &self.things, texts, sample: 0, depth: 0, nearest: false, shapes: None };
         let sections = question.of_pixel(scene, options, pixel).map_err(|failure| failure.to_string())?;
-        Ok(html::html(&title(&self.name, Some(pixel), texts), texts.code, &sections, texts.schoolbook))
+        Ok(html::html(&title(&self.name, Some(pixel), texts), &sections, texts))
     }
 }

@@ -353,86 +353,284 @@ pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// The formula as MathML, which browsers support; quotients are stacked.
-pub(super) fn mathml(formula: &str) -> String {
-    let tokens = tokens(formula);
-    format!("<math>{}</math>", row(&tokens).concat())
+/// Which of the symbols of formulas are marked, as in a drawing: the key of a symbol's mark.
+pub(super) type Marks<'a> = dyn Fn(&str) -> Option<&'a str> + 'a;
+
+/// No symbols are marked.
+pub(super) const UNMARKED: &Marks<'static> = &|_| None;
+
+/// Characters that a quotient or a root may be wide on a narrow screen.
+const NARROW: usize = 26;
+/// Characters in parentheses that always stand on one line.
+const SHORT: usize = 14;
+
+/// A part of a formula.
+#[derive(Clone, Debug)]
+enum Part {
+    /// A symbol or a number, as MathML, with about how many characters it is wide.
+    Element {
+        markup: String,
+        width: usize,
+    },
+    /// A sign, and whether it is between two parts, so that a line may end after it.
+    Sign {
+        sign: char,
+        is_between: bool,
+    },
+    /// In parentheses, in bars or in angle brackets.
+    Group {
+        brackets: [char; 2],
+        inner: Vec<Part>,
+    },
+    Quotient {
+        over: Box<Part>,
+        under: Box<Part>,
+    },
+    Root(Vec<Part>),
+    Power {
+        base: Box<Part>,
+        raised: String,
+    },
 }
 
-/// The elements of a row: one for each factor and each sign.
-fn row(tokens: &[Token]) -> Vec<String> {
-    let mut out: Vec<String> = Vec::new();
+/// The formula as MathML, which browsers set without help; quotients are stacked. It is several elements, between which a line may
+/// end. What is too wide for a narrow screen is there twice: stacked (`class="stacked"`) and in lines (`class="flat"`).
+pub(super) fn mathml(formula: &str, marks: &Marks<'_>) -> String {
+    let mut lines = Lines::default();
+    row(&tokens(formula), marks).iter().for_each(|part| lines.add(part));
+    lines.finish()
+}
+
+/// Elements of MathML, between which a line may end.
+#[derive(Debug, Default)]
+struct Lines {
+    done: String,
+    /// The element that is open.
+    open: String,
+}
+
+impl Lines {
+    fn end(&mut self) {
+        if !self.open.is_empty() {
+            let _ = write!(self.done, "<math>{}</math><wbr>", self.open);
+            self.open.clear();
+        }
+    }
+
+    fn finish(mut self) -> String {
+        self.end();
+        self.done
+    }
+
+    fn add(&mut self, part: &Part) {
+        match part {
+            Part::Sign { is_between, .. } => {
+                self.open.push_str(&part.element());
+                if *is_between {
+                    self.end();
+                }
+            }
+            Part::Group { brackets: [begin, end], inner } if width(inner) > SHORT => {
+                self.open.push_str(&operator(*begin));
+                inner.iter().for_each(|part| self.add(part));
+                self.open.push_str(&operator(*end));
+            }
+            Part::Power { base, raised } => match &**base {
+                Part::Group { brackets: [begin, end], inner } if width(inner) > SHORT => {
+                    self.open.push_str(&operator(*begin));
+                    inner.iter().for_each(|part| self.add(part));
+                    let _ = write!(self.open, "<msup>{}<mn>{raised}</mn></msup>", operator(*end));
+                }
+                _ => self.open.push_str(&part.element()),
+            },
+            Part::Quotient { over, under } if part.width() > NARROW => {
+                let line = Part::Sign { sign: '/', is_between: true };
+                self.twice(part, &[&**over, &line, &**under]);
+            }
+            Part::Root(inner) if part.width() > NARROW => {
+                let root = Part::Sign { sign: '√', is_between: false };
+                self.twice(part, &[&root, &Part::Group { brackets: ['(', ')'], inner: inner.clone() }]);
+            }
+            _ => self.open.push_str(&part.element()),
+        }
+    }
+
+    /// Both as it is set where there is room, and in lines where there is none.
+    fn twice(&mut self, whole: &Part, parts: &[&Part]) {
+        self.end();
+        let mut flat = Self::default();
+        parts.iter().for_each(|part| flat.add(part));
+        let (stacked, flat) = (whole.element(), flat.finish());
+        let _ = write!(
+            self.done,
+            "<span class=\"stacked\"><math>{stacked}</math></span><span class=\"flat\">{flat}</span><wbr>"
+        );
+    }
+}
+
+fn width(parts: &[Part]) -> usize {
+    parts.iter().map(Part::width).sum()
+}
+
+fn in_row(parts: &[Part]) -> String {
+    parts.iter().map(Part::element).collect()
+}
+
+impl Part {
+    fn width(&self) -> usize {
+        match self {
+            Self::Element { width, .. } => *width,
+            Self::Sign { .. } => 2,
+            Self::Group { inner, .. } => width(inner) + 2,
+            Self::Quotient { over, under } => over.width().max(under.width()),
+            Self::Root(inner) => width(inner) + 1,
+            Self::Power { base, raised } => base.width() + raised.len(),
+        }
+    }
+
+    /// As one element.
+    fn element(&self) -> String {
+        match self {
+            Self::Element { markup, .. } => markup.clone(),
+            // At the end of a line it stays what it is between two parts.
+            Self::Sign { sign, is_between: true } => {
+                format!("<mo form=\"infix\">{}</mo>", escaped(&sign.to_string()))
+            }
+            Self::Sign { sign, .. } => operator(*sign),
+            Self::Group { brackets: [begin, end], inner } => {
+                format!("<mrow>{}{}{}</mrow>", operator(*begin), in_row(inner), operator(*end))
+            }
+            Self::Quotient { over, under } => {
+                format!("<mfrac>{}{}</mfrac>", over.without_parentheses(), under.without_parentheses())
+            }
+            Self::Root(inner) => format!("<msqrt>{}</msqrt>", in_row(inner)),
+            Self::Power { base, raised } => match &**base {
+                // At the height of the parenthesis, not at that of what is inside.
+                Self::Group { brackets: [begin, end], inner } => format!(
+                    "<mrow>{}{}<msup>{}<mn>{raised}</mn></msup></mrow>",
+                    operator(*begin),
+                    in_row(inner),
+                    operator(*end)
+                ),
+                _ => format!("<msup>{}<mn>{raised}</mn></msup>", base.element()),
+            },
+        }
+    }
+
+    /// As one element without the parentheses about all of it: the line of a quotient says as much. A vector keeps its own.
+    fn without_parentheses(&self) -> String {
+        match self {
+            Self::Group { brackets: ['(', _], inner }
+                if !inner.iter().any(|part| matches!(part, Self::Sign { sign: ',', .. })) =>
+            {
+                format!("<mrow>{}</mrow>", in_row(inner))
+            }
+            _ => self.element(),
+        }
+    }
+}
+
+/// A sign as an element.
+fn operator(sign: char) -> String {
+    let how = if matches!(sign, '(' | ')' | '|') { " stretchy=\"false\"" } else { "" };
+    format!("<mo{how}>{}</mo>", escaped(&sign.to_string()))
+}
+
+/// The parts of a row: each factor is one, and each sign between.
+fn row(tokens: &[Token], marks: &Marks<'_>) -> Vec<Part> {
+    let mut out: Vec<Part> = Vec::new();
     let mut at = 0;
     while at < tokens.len() {
         match &tokens[at] {
             Token::Sign(c) if c.is_whitespace() => at += 1,
             // The preceding factor is divided by the following one.
             Token::Sign('/') if !out.is_empty() && at + 1 < tokens.len() => {
-                let over = out.pop().unwrap_or_default();
+                let over = Box::new(out.pop().unwrap_or(Part::Root(Vec::new())));
                 let mut rest = at + 1;
-                let under = factor(tokens, &mut rest);
-                let [over, under] = [over, under].map(|part| without_parentheses(&part));
-                out.push(format!("<mfrac>{over}{under}</mfrac>"));
+                let under = Box::new(factor(tokens, &mut rest, marks));
+                out.push(Part::Quotient { over, under });
                 at = rest;
             }
-            _ => out.push(factor(tokens, &mut at)),
+            Token::Sign(sign) if !matches!(sign, '(' | '|' | '⟨') => {
+                // The sign of a number alone stays with it.
+                let is_after_factor = out.last().is_some_and(|last| !matches!(last, Part::Sign { .. }));
+                let is_between = is_after_factor && BETWEEN.contains(*sign);
+                out.push(Part::Sign { sign: *sign, is_between });
+                at += 1;
+            }
+            _ => out.push(factor(tokens, &mut at, marks)),
         }
     }
     out
 }
 
-/// A factor with its powers, or a sign; moves `at` behind it.
-fn factor(tokens: &[Token], at: &mut usize) -> String {
-    let mut element = match &tokens[*at] {
-        Token::Symbol { base, primes, subscript } => {
+/// Signs between two parts.
+const BETWEEN: &str = "+−·×=≈≠,<>≤≥±∪∩∖";
+
+/// A factor with its powers, or a sign; `at` is moved behind it.
+fn factor(tokens: &[Token], at: &mut usize, marks: &Marks<'_>) -> Part {
+    let mut part = match &tokens[*at] {
+        token @ Token::Symbol { base, primes, subscript } => {
             let name = format!("<mi>{}</mi>", escaped(base));
             let low = format!("<mi>{subscript}</mi>");
-            let marks = format!("<mo>{}</mo>", "′".repeat(*primes));
-            match (*primes > 0, subscript.is_empty()) {
+            let primed = format!("<mo>{}</mo>", "′".repeat(*primes));
+            let element = match (*primes > 0, subscript.is_empty()) {
                 (false, true) => name,
-                (true, true) => format!("<msup>{name}{marks}</msup>"),
+                (true, true) => format!("<msup>{name}{primed}</msup>"),
                 (false, false) => format!("<msub>{name}{low}</msub>"),
-                (true, false) => format!("<msubsup>{name}{low}{marks}</msubsup>"),
-            }
+                (true, false) => format!("<msubsup>{name}{low}{primed}</msubsup>"),
+            };
+            let mut symbol = String::new();
+            plain(token, &mut symbol);
+            let markup = match marks(&symbol) {
+                Some(key) => format!("<mrow data-mark=\"{}\">{element}</mrow>", escaped(key)),
+                None => element,
+            };
+            Part::Element { markup, width: symbol.chars().count() }
         }
-        Token::Number { digits, exponent } if exponent.is_empty() => format!("<mn>{digits}</mn>"),
-        Token::Number { digits, exponent } => {
-            format!("<mrow><mn>{digits}</mn><mo>·</mo><msup><mn>10</mn><mn>{exponent}</mn></msup></mrow>")
+        Token::Number { digits, exponent } if exponent.is_empty() => {
+            Part::Element { markup: format!("<mn>{digits}</mn>"), width: digits.len() }
         }
-        // A power without a base.
-        Token::Power(digits) => format!("<msup><mrow></mrow><mn>{digits}</mn></msup>"),
+        Token::Number { digits, exponent } => Part::Element {
+            markup: format!(
+                "<mrow><mn>{digits}</mn><mo>·</mo><msup><mn>10</mn><mn>{exponent}</mn></msup></mrow>"
+            ),
+            width: digits.len() + exponent.len() + 3,
+        },
+        // Without anything below, a power stands by itself.
+        Token::Power(digits) => Part::Element {
+            markup: format!("<msup><mrow></mrow><mn>{digits}</mn></msup>"),
+            width: digits.len(),
+        },
         Token::Root => match closing(tokens, *at + 1) {
             Some(end) => {
-                let inner = row(&tokens[*at + 2..end]).concat();
+                let inner = row(&tokens[*at + 2..end], marks);
                 *at = end;
-                format!("<msqrt>{inner}</msqrt>")
+                Part::Root(inner)
             }
-            None => "<mo>√</mo>".to_owned(),
+            None => Part::Sign { sign: '√', is_between: false },
         },
-        Token::Sign('(' | '|' | '⟨') => match closing(tokens, *at) {
+        Token::Sign(begin @ ('(' | '|' | '⟨')) => match closing(tokens, *at) {
             Some(end) => {
-                let [open, close] = [*at, end].map(|place| sign(&tokens[place]));
-                let inner = row(&tokens[*at + 1..end]).concat();
+                let inner = row(&tokens[*at + 1..end], marks);
                 *at = end;
-                format!("<mrow>{open}{inner}{close}</mrow>")
+                let close = match begin {
+                    '(' => ')',
+                    '⟨' => '⟩',
+                    other => *other,
+                };
+                Part::Group { brackets: [*begin, close], inner }
             }
-            None => sign(&tokens[*at]),
+            None => Part::Sign { sign: *begin, is_between: false },
         },
-        other => sign(other),
+        Token::Sign(sign) => Part::Sign { sign: *sign, is_between: false },
     };
     *at += 1;
     while let Some(Token::Power(digits)) = tokens.get(*at) {
-        element = format!("<msup>{element}<mn>{digits}</mn></msup>");
+        part = Part::Power { base: Box::new(part), raised: digits.clone() };
         *at += 1;
     }
-    element
-}
-
-/// A sign as an element.
-fn sign(token: &Token) -> String {
-    let Token::Sign(c) = token else { return String::new() };
-    let stretches = if matches!(c, '(' | ')' | '|') { " stretchy=\"false\"" } else { "" };
-    format!("<mo{stretches}>{}</mo>", escaped(&c.to_string()))
+    part
 }
 
 /// The position of the closing bracket.
@@ -451,20 +649,13 @@ fn closing(tokens: &[Token], open: usize) -> Option<usize> {
     None
 }
 
-/// The element without its outer parentheses: the fraction bar already groups it. A vector keeps its own.
-fn without_parentheses(element: &str) -> String {
-    let inner = element
-        .strip_prefix("<mrow><mo stretchy=\"false\">(</mo>")
-        .and_then(|rest| rest.strip_suffix("<mo stretchy=\"false\">)</mo></mrow>"));
-    match inner {
-        Some(inner) if !inner.contains(",</mo>") => format!("<mrow>{inner}</mrow>"),
-        _ => element.to_owned(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn plainly(formula: &str) -> String {
+        mathml(formula, UNMARKED)
+    }
 
     #[test]
     fn formulas_are_read_back_as_they_are_written() {
@@ -499,7 +690,7 @@ mod tests {
     #[test]
     fn powers_of_ten_are_part_of_their_number() {
         assert_eq!(latex("1.5e-7 + 2e10"), "1.5\\cdot 10^{-7} + 2\\cdot 10^{10}");
-        assert_eq!(mathml("2e-3").matches("<msup>").count(), 1);
+        assert_eq!(plainly("2e-3").matches("<msup>").count(), 1);
         let mut written = String::new();
         tokens("-1.25e-8·2").iter().for_each(|token| plain(token, &mut written));
         assert_eq!(written, "-1.25e-8·2");
@@ -511,24 +702,24 @@ mod tests {
         assert_eq!(latex("√(h² − (a + b)·c)"), "\\sqrt{h^{2} - (a + b)\\cdot c}");
         assert_eq!(latex("O′ = M⁻¹ O, t₁₂"), "O' = M^{-1} O, t_{12}");
         assert_eq!(latex("min(tₓ, ρ₁)"), "\\operatorname{min}(t_{x}, \\rho_{1})");
-        let ml = mathml("√(h² − (a + b)·c) < t₁");
+        let ml = plainly("√(h² − (a + b)·c) < t₁");
         assert_eq!(ml.matches("<msqrt>").count(), 1);
         assert_eq!(ml.matches("</msqrt>").count(), 1);
         assert!(ml.contains("<msup><mi>h</mi><mn>2</mn></msup>") && ml.contains("&lt;"), "{ml}");
         assert!(ml.contains("<msub><mi>t</mi><mi>1</mi></msub>"), "{ml}");
-        let ml = mathml("(1, 2, 3)/|R|");
+        let ml = plainly("(1, 2, 3)/|R|");
         assert!(ml.contains("(</mo><mn>1</mn>"), "{ml}");
-        let ml = mathml("t₀ + (−b − √(b² − 4·a·c))/(2·a) − |D×V|²/q");
+        let ml = plainly("t₀ + (−b − √(b² − 4·a·c))/(2·a) − |D×V|²/q");
         assert_eq!(ml.matches("<mfrac>").count(), 2, "{ml}");
         assert!(ml.contains("<mfrac><mrow><mo>−</mo><mi>b</mi>"), "{ml}");
-        assert!(ml.contains("<mrow><mn>2</mn><mo>·</mo><mi>a</mi></mrow></mfrac>"), "{ml}");
+        assert!(ml.contains("<mrow><mn>2</mn><mo form=\"infix\">·</mo><mi>a</mi></mrow></mfrac>"), "{ml}");
         for tag in ["math", "mrow", "msup", "mfrac", "msqrt", "mo", "mi", "mn"] {
             let opened = ml.matches(&format!("<{tag}>")).count() + ml.matches(&format!("<{tag} ")).count();
             assert_eq!(opened, ml.matches(&format!("</{tag}>")).count(), "{tag}: {ml}");
         }
         // Unclosed brackets, and fractions without a part, stay as they are.
         for odd in ["(a", "|a", "/a", "a/", "√a", "⟨1, 2⟩", "²", "[0, 1] ∪ (2)"] {
-            assert!(mathml(odd).ends_with("</math>"), "{odd}");
+            assert!(plainly(odd).ends_with("</math><wbr>"), "{odd}");
         }
     }
 }

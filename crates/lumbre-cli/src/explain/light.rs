@@ -25,6 +25,8 @@ pub(super) struct Path<'a> {
     pub(super) depth: u32,
     /// The integrator.
     pub(super) kind: &'a IntegratorKind,
+    /// What is up in the world.
+    pub(super) up: DVec3,
 }
 
 /// How the radiance of a sample is exposed and added to its pixel.
@@ -242,9 +244,10 @@ impl Path<'_> {
             }
         }
         if met.depth > 0 && met.depth <= self.depth {
-            let wanted = Wanted { nearest: true, is_from_camera: false, shapes: None };
+            let wanted =
+                Wanted { nearest: true, is_from_camera: false, shapes: None, up: self.up, path: &[] };
             let told = surfaces(self.scene, &met.ray, self.things, &wanted, texts);
-            section.sections.extend(told.ok().map(|told| told.section));
+            section.sections.extend(told.ok());
         }
         if let Some(here) = self.interaction(met) {
             section.sections.push(self.mirrors(met, &here));
@@ -435,8 +438,7 @@ impl Path<'_> {
             && let Some(hit) = self.scene.resolved().closest(ray)
         {
             let shape = self.scene.resolved().shape_index(&hit);
-            section
-                .text(filled(texts.blocked_by, &[&self.shape(shape), &super::document::exact(hit.root.t)]));
+            section.text(filled(texts.blocked_by, &[&self.shape(shape), &super::numbers::exact(hit.root.t)]));
         }
     }
 

@@ -20,14 +20,19 @@ use crate::staging::StagingArguments;
 use crate::units;
 use crate::view::ViewArguments;
 
+mod along;
 mod camera;
 mod document;
 mod english;
 mod explainer;
+mod figure;
 mod formula;
 mod html;
+mod labels;
 mod light;
 mod misses;
+mod numbers;
+mod plot;
 mod question;
 mod shape;
 mod sketch;
@@ -354,7 +359,7 @@ fn written(request: &Request, name: &Path, sections: &[Section]) -> String {
         Format::Markdown => {
             format!("# {}\n\n{}", writing::literal(&title), writing::markdown(sections, texts.schoolbook))
         }
-        Format::Html => html::html(&title, texts.code, sections, texts.schoolbook),
+        Format::Html => html::html(&title, sections, texts),
         Format::Json => {
             let sections: Vec<_> = sections.iter().map(writing::json).collect();
             let report = json!({ "title": title, "sections": sections });

@@ -5,11 +5,11 @@ use lumbre::journal::Event;
 use lumbre::shading::Spectrum;
 use lumbre::{DVec3, Ray, RenderOptions, Scene};
 
-use super::document::{Item, Section};
+use super::document::Section;
 use super::surfaces::Chosen;
 use super::texts::Texts;
 use super::things::SceneNames;
-use super::{camera, light, sketch, surfaces};
+use super::{camera, light, surfaces};
 use crate::failure::Failure;
 
 /// Which sample, how much detail, and in which language.
@@ -87,15 +87,11 @@ impl Question<'_> {
         events: &[Event],
     ) -> Result<Vec<Section>, Failure> {
         let &Self { things, texts, depth, nearest, .. } = self;
-        let asked = surfaces::Wanted { nearest, is_from_camera: true, shapes: self.shapes.as_ref() };
-        let mut met = surfaces::surfaces(scene, ray, things, &asked, texts)?;
-        if !met.hits.is_empty() || met.scenery.is_anything() {
-            let corners = light::corners(events);
-            let drawing =
-                sketch::svg(&met.scenery, ray, &met.hits, &corners, self.up(scene, options), texts.sketch);
-            met.section.items.insert(0, Item::Sketch(drawing));
-        }
-        let path = light::Path { scene, things, texts, depth, kind: &options.integrator.kind };
-        Ok(vec![from, met.section, path.tell(exposed, radiance, events)])
+        let (up, path) = (self.up(scene, options), light::corners(events));
+        let shapes = self.shapes.as_ref();
+        let asked = surfaces::Wanted { nearest, is_from_camera: true, shapes, up, path: &path };
+        let met = surfaces::surfaces(scene, ray, things, &asked, texts)?;
+        let path = light::Path { scene, things, texts, depth, kind: &options.integrator.kind, up };
+        Ok(vec![from, met, path.tell(exposed, radiance, events)])
     }
 }

@@ -2,7 +2,7 @@
 
 use lumbre::geometry::{Fate, Remark, Topic};
 
-use super::document::exact;
+use super::numbers::exact;
 use super::texts::{OperandName, Texts};
 
 pub(super) static SPANISH: Texts = Texts {
@@ -160,7 +160,17 @@ pub(super) static SPANISH: Texts = Texts {
     end_medium: "Termina en el medio.",
     schoolbook: "según el libro de texto",
     title: "Cómo lo calcula Lumbre",
-    sketch: "El rayo, lo que encuentra y las normales allí",
+    sketch: "Los puntos llenos son intersecciones válidas; los huecos, intersecciones de la recta que no lo son. Donde el rayo empieza punteado, su origen está más lejos de lo que se dibuja.",
+    world_space: "En el mundo",
+    object_space: "En el espacio propio de la forma",
+    plot: "A lo largo del rayo",
+    plot_of_intervals: "Los intervalos de t a lo largo del rayo",
+    slider: "t a lo largo del rayo",
+    step_by_step: "Paso a paso",
+    previous: "Anterior",
+    next: "Siguiente",
+    show_all: "Mostrar todo",
+    step_of: "Paso {0} de {1}: {2}",
     is_missed: "El rayo no la corta.",
     passes: "Pasa a una distancia de {0}; el punto más cercano está en t = {1}.",
     passes_in_object: "En el espacio del objeto pasa a una distancia de {0}; el punto más cercano está en t = {1}.",

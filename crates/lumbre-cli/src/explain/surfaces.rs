@@ -4,18 +4,20 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
 use lumbre::description::Footprint;
-use lumbre::geometry::{Curves, Shape, Triangle};
+use lumbre::geometry::{Curves, Shape, Surface, Triangle};
 use lumbre::kernel::{Hit, Target, TargetShape};
 use lumbre::math::Elementary;
 use lumbre::math::glam::{DMat3, DMat4};
 use lumbre::math::matrix::affine4;
 use lumbre::{DVec3, Ray, Scene, Transform};
 
-use super::document::{Section, Value, exact};
+use super::document::{Item, Section, Value};
+use super::figure::{self, Met, Subject};
 use super::formula::{Scope, with_primes};
 use super::misses::{self, Missed, Nearest};
+use super::numbers::exact;
 use super::shape;
-use super::sketch::Scenery;
+use super::sketch::bare_line;
 use super::texts::Texts;
 use super::things::{Face, SceneNames};
 use crate::failure::Failure;
@@ -25,18 +27,12 @@ use crate::language::filled;
 const MAX_HITS: usize = 64;
 /// Maximum missed shapes that are shown if the ray hits nothing.
 const MAX_MISSES: usize = 3;
-/// Columns of a matrix count as orthogonal if their cosines are below this.
+/// Parts that the axis of a curve is drawn in.
+const AXIS_PARTS: u32 = 24;
+/// Columns of a matrix are at right angles where their cosines are less than this.
 const RIGHT_ANGLE: f64 = 1e-12;
 
-/// The section for the surfaces along a ray.
-pub(super) struct MetSurfaces {
-    pub(super) section: Section,
-    /// The hits with their normals, for the sketch.
-    pub(super) hits: Vec<(DVec3, DVec3)>,
-    pub(super) scenery: Scenery,
-}
-
-/// Which shapes to show.
+/// Which shapes are told of.
 #[derive(Clone, Debug)]
 pub(super) enum Chosen {
     All,
@@ -51,6 +47,10 @@ pub(super) struct Wanted<'a> {
     pub(super) is_from_camera: bool,
     /// The shapes to show, hit or not; `None` for those that the ray hits, or else those that it passes nearest.
     pub(super) shapes: Option<&'a Chosen>,
+    /// What is up in the world.
+    pub(super) up: DVec3,
+    /// The vertices of the path, for the figure of what is seen.
+    pub(super) path: &'a [DVec3],
 }
 
 /// Writes the sections on everything along a ray, and on missed shapes if requested or if nothing is hit.
@@ -63,7 +63,7 @@ pub(super) fn surfaces(
     things: &SceneNames,
     wanted: &Wanted<'_>,
     texts: &'static Texts,
-) -> Result<MetSurfaces, Failure> {
+) -> Result<Section, Failure> {
     let resolved = scene.resolved();
     let is_wanted = |shape: u32| match wanted.shapes {
         Some(Chosen::Called(name)) => things.is_called(shape, name),
@@ -116,15 +116,9 @@ pub(super) fn surfaces(
             None => groups.push(vec![hit]),
         }
     }
-    let met = |hit: &Hit| {
-        let surface = resolved.accel().surface(ray, hit);
-        (surface.point, surface.normal)
-    };
-    let places = hits.iter().map(met).collect();
-    let mut scenery = Scenery::default();
     for group in groups {
         let thing = Thing { hit: group[0], hits: &group, nearest: None };
-        section.sections.push(tell(scene, ray, &thing, first.as_ref(), things, &mut scenery, texts));
+        section.sections.push(tell(scene, ray, &thing, first.as_ref(), things, wanted, texts));
     }
     if are_more {
         section.remark(filled(texts.more_hits, &[&MAX_HITS.to_string()]));
@@ -134,9 +128,9 @@ pub(super) fn surfaces(
     }
     for Missed { hit, nearest } in &missed {
         let thing = Thing { hit, hits: &[], nearest: *nearest };
-        section.sections.push(tell(scene, ray, &thing, first.as_ref(), things, &mut scenery, texts));
+        section.sections.push(tell(scene, ray, &thing, first.as_ref(), things, wanted, texts));
     }
-    Ok(MetSurfaces { section, hits: places, scenery })
+    Ok(section)
 }
 
 /// A primitive, and its hits.
@@ -154,7 +148,7 @@ fn tell(
     &Thing { hit, hits, nearest }: &Thing<'_>,
     first: Option<&Hit>,
     things: &SceneNames,
-    scenery: &mut Scenery,
+    wanted: &Wanted<'_>,
     texts: &'static Texts,
 ) -> Section {
     let resolved = scene.resolved();
@@ -219,24 +213,64 @@ fn tell(
     {
         section.sections.push(in_file(&face, told.len(), texts));
     }
+    let is_seen = first.is_some_and(|first| hits.contains(&first));
+    let path = if is_seen { wanted.path } else { &[] };
+    let (drawn, marked);
     match &object.shape {
         Some(exact) => {
-            let surface = hits.first().map(|hit| resolved.accel().surface(ray, hit));
-            scenery.add(exact, &object.whole, surface.as_ref());
             let mut equation = Section::new("equation", texts.equation);
             let explanation = exact.explain(&object.ray);
+            let met = hits.iter().map(|hit| Met {
+                t: hit.root.t,
+                normal: resolved.accel().surface(ray, hit).normal,
+                local_normal: exact.surface(&object.ray, &hit.root).normal,
+            });
+            let subject = Subject {
+                shape: exact,
+                map: &object.whole,
+                is_placed: object.is_placed(),
+                explanation: &explanation,
+                ray,
+                object_ray: &object.ray,
+                hits: &met.collect::<Vec<_>>(),
+                nearest,
+                up: wanted.up,
+                path,
+            };
+            (drawn, marked) = subject.figure(texts);
             shape::tell(&mut equation, &explanation, &object.ray, &mut scope, &rename, texts);
             section.sections.push(equation);
         }
-        None => match resolved.curves_at(hit) {
-            Some((curves, _)) => section.sections.push(curve(curves, hits, &object.ray, texts)),
-            None => section.text(texts.custom),
-        },
+        None => {
+            let mut axis = Vec::new();
+            match resolved.curves_at(hit) {
+                Some((curves, _)) => {
+                    let points = curves.control_points(hit.primitive);
+                    let places =
+                        (0..=AXIS_PARTS).map(|i| cubic(&points, f64::from(i) / f64::from(AXIS_PARTS)));
+                    axis.push(bare_line(places.map(|p| object.whole.point(p))));
+                    section.sections.push(curve(curves, hits, &object.ray, texts));
+                }
+                None => section.text(texts.custom),
+            }
+            let met = hits.iter().map(|hit| {
+                let Surface { normal, .. } = resolved.accel().surface(ray, hit);
+                Met { t: hit.root.t, normal, local_normal: normal }
+            });
+            (drawn, marked) = figure::of_hits(axis, ray, &met.collect::<Vec<_>>(), wanted.up, path, texts);
+        }
     }
+    section.marked = marked;
+    let normal = if object.is_placed() { "N′" } else { "N" };
     for &hit in hits {
         let is_first = first.is_some_and(|first| first == hit);
-        section.sections.push(at_hit(scene, ray, hit, is_first, &object, texts));
+        let mut told = at_hit(scene, ray, hit, is_first, &object, texts);
+        told.marked = drawn.marked_at(hit.root.t, normal);
+        // The normal in the world is drawn there, too.
+        told.marked.extend(drawn.marked_at(hit.root.t, "N"));
+        section.sections.push(told);
     }
+    section.items.push(Item::Figure(Box::new(drawn)));
     section
 }
 
@@ -288,16 +322,21 @@ fn curve(curves: &Curves, hits: &[&Hit], ray: &Ray, texts: &Texts) -> Section {
         section.quantity(&mut scope, "u", "", "", u);
         section.quantity(&mut scope, "w", texts.curve_width, "", curves.width(hit.primitive, u));
         let formula = "(1−u)³·P₀ + 3u(1−u)²·P₁ + 3u²(1−u)·P₂ + u³·P₃";
-        let v = 1.0 - u;
-        let weights = [v * v * v, 3.0 * u * v * v, 3.0 * u * u * v, u * u * u];
-        let axis: DVec3 = weights.into_iter().zip(points).map(|(weight, point)| weight * point).sum();
+        let axis = cubic(&points, u);
         section.fact(format!("C = {formula}: {}", texts.curve_axis), axis);
         section.fact(texts.curve_distance, (axis - ray.at(hit.root.t)).length());
     }
     section
 }
 
-/// A primitive in its own space.
+/// The point at a parameter of the cubic with these control points.
+fn cubic(points: &[DVec3; 4], u: f64) -> DVec3 {
+    let v = 1.0 - u;
+    let weights = [v * v * v, 3.0 * u * v * v, 3.0 * u * u * v, u * u * u];
+    weights.into_iter().zip(points).map(|(weight, point)| weight * *point).sum()
+}
+
+/// A thing in its own space.
 struct Object {
     /// The ray there.
     ray: Ray,

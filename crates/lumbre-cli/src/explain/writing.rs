@@ -47,7 +47,7 @@ fn write_text(section: &Section, title: &str, level: usize, schoolbook: &str, ou
                     let _ = writeln!(out, "{indent}{}", line.trim_end());
                 }
             }
-            Item::Sketch(_) => {}
+            Item::Figure(_) => {}
         }
     }
     for section in &section.sections {
@@ -134,8 +134,13 @@ fn write_markdown(section: &Section, level: usize, schoolbook: &str, out: &mut S
                 is_list = false;
                 continue;
             }
-            Item::Sketch(svg) => {
-                let _ = writeln!(out, "{}{svg}\n", if is_list { "\n" } else { "" });
+            Item::Figure(figure) => {
+                if is_list {
+                    out.push('\n');
+                }
+                for svg in figure.pictures() {
+                    let _ = writeln!(out, "{svg}\n");
+                }
                 is_list = false;
                 continue;
             }
@@ -224,7 +229,7 @@ pub(super) fn json(section: &Section) -> Json {
                 };
                 tables.insert((*key).to_owned(), rows.iter().map(row).collect());
             }
-            Item::Quantity(_) | Item::Sketch(_) => {}
+            Item::Quantity(_) | Item::Figure(_) => {}
         }
     }
     let sections: Vec<Json> = section.sections.iter().map(json).collect();

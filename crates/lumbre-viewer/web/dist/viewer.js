@@ -590,7 +590,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       try {
         const address = await this.ticket(this.errand);
         const frame = element("iframe", "", { title });
-        frame.setAttribute("sandbox", "");
+        frame.setAttribute("sandbox", "allow-scripts");
         frame.src = address;
         byId("explanation-text").replaceChildren(frame);
         await this.offerAlone();

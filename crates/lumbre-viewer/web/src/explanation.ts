@@ -1,4 +1,4 @@
-// How the colour of a pixel comes about, as the viewer tells it: a page in a frame that can run nothing.
+// How the colour of a pixel comes about, as the viewer tells it: a page in a frame of no origin, which runs its own script alone.
 import type { Errand } from "./connection";
 import { byId, element, options } from "./elements";
 
@@ -63,7 +63,7 @@ export class Explanation {
       const address = await this.ticket(this.errand);
       // A new frame: one that goes to another address would be a step in the history of the page.
       const frame = element("iframe", "", { title });
-      frame.setAttribute("sandbox", "");
+      frame.setAttribute("sandbox", "allow-scripts");
       frame.src = address;
       byId("explanation-text").replaceChildren(frame);
       await this.offerAlone();

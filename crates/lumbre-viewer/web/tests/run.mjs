@@ -297,6 +297,16 @@ const tests = {
     assert.ok(flat.includes(`(${radiance.value.join(",")})`), `${radiance.value} in ${flat.slice(-2000)}`);
     assert.ok(seen.includes("<img src=x onerror=evil()> (diffuse)"));
     assert.equal(await told.locator("img").count(), 0);
+    // Its own script runs, and nothing else can.
+    const frame = page.frames().find((it) => it.parentFrame());
+    await told.locator(".slider").first().waitFor();
+    assert.equal(await frame.evaluate(() => origin), "null");
+    const ran = await frame.evaluate(() => {
+      document.body.append(Object.assign(document.createElement("script"), { textContent: "window.evil = true" }));
+      return "evil" in window;
+    });
+    assert.equal(ran, false);
+    assert.match(wrong.pop(), /Content Security Policy/);
 
     assert.equal(await served(() => page.selectOption("#language", "es")), explain("--format", "html", "--lang", "es"));
     await page.frameLocator("#explanation iframe").locator("html[lang=es]").waitFor();
@@ -329,6 +339,84 @@ const tests = {
     await page.waitForFunction(() => lumbreMeasured.latencies.length > 0);
     assert.notEqual(await served(pressX), explain("--format", "html", "--lang", "es", "--overlay", overlay));
     await viewer.stop();
+  },
+
+  async "the page of an explanation has a slider, marks and steps, and is whole without its script"() {
+    const scene = join(folder, "shapes.pbrt");
+    writeFileSync(scene, `${SCENE}AttributeBegin Translate 3 0 0 Scale 1 2 1 Shape "sphere" AttributeEnd
+      Translate 6 0 0 Shape "torus" "float majorradius" 1 "float minorradius" 0.25\n`);
+    for (const [language, ray, width] of [["en", "-5,0.2,0.1,1,0,0", 1280], ["es", "-5,0.2,0.1,1,0,0", 390], ["es", "-5,0.2,9,1,0,0", 390]]) {
+      const out = join(folder, "explained.html");
+      execFileSync(program, ["explain", scene, "--ray", ray, "-q", "--format", "html", "--lang", language, "-o", out]);
+      const page = await open(`file://${out}`, { viewport: { width, height: 800 } });
+      const wide = await page.evaluate(() => [...document.querySelectorAll("body *")]
+        .filter((it) => !it.closest("svg") && it.getBoundingClientRect().right > innerWidth + 0.5).map((it) => it.outerHTML.slice(0, 200)));
+      assert.deepEqual(wide, [], `${language} ${width}: nothing is wider than the screen`);
+      const scrolls = await page.evaluate(() => [...document.querySelectorAll("*")]
+        .filter((it) => it.scrollWidth > it.clientWidth && /auto|scroll/.test(getComputedStyle(it).overflowX)).length);
+      assert.equal(scrolls, 0, "nothing scrolls sideways");
+      await finds(page, `the page of an explanation, ${language} ${width}`);
+
+      // The slider moves a point in all pictures.
+      const figure = page.locator("figure").last();
+      const place = () => figure.locator(".plot .moving circle").getAttribute("cx").then(Number);
+      const before = await place();
+      await figure.locator("input[type=range]").press("ArrowRight");
+      assert.ok(await place() > before);
+      for (const button of await figure.locator(".slider button").all()) {
+        await button.click();
+        const mark = await button.getAttribute("data-mark");
+        const root = Number(await figure.locator(`.plot .mark[data-mark="${mark}"] circle`).getAttribute("cx"));
+        assert.ok(Math.abs(await place() - root) < 0.02, mark);
+        const [x, y] = await Promise.all(["cx", "cy"].map((name) => figure.locator(".sketch .moving").first().getAttribute(name).then(Number)));
+        const [left, top] = await Promise.all(["cx", "cy"].map((name) => figure.locator(`.sketch .mark[data-mark="${mark}"] circle`).first().getAttribute(name).then(Number)));
+        assert.ok(Math.hypot(x - left, y - top) < 0.02, `${mark}: ${x}, ${y} at ${left}, ${top}`);
+        const f = /F\(t\) = (\S+)$/.exec(await figure.locator("output").textContent())[1];
+        assert.ok(Math.abs(Number(f)) < 1e-9, `F is 0 at ${mark}: ${f}`);
+      }
+
+      // What is pointed at lights up on both sides.
+      const first = page.locator("section.figured").first();
+      const colour = (where) => first.locator(where).first().evaluate((it) => getComputedStyle(it).color);
+      const [mark, symbol] = ['.sketch .mark[data-mark="C"]', 'span[data-mark="C"]'];
+      const plain = [await colour(mark), await colour(symbol)];
+      const focus = (it) => it.focus();
+      const hover = (it) => it.hover();
+      for (const [act, places] of [[focus, [symbol, mark]], [hover, [symbol, `${mark} text`]]]) {
+        for (const where of places) {
+          const target = first.locator(where).first();
+          // Clear of what stands at the edges of the window.
+          await target.evaluate((it) => it.scrollIntoView({ block: "end" }));
+          await act(target);
+          const lit = [await colour(mark), await colour(symbol)];
+          assert.ok(lit[0] !== plain[0] && lit[1] !== plain[1] && lit[0] === lit[1], `${where}: ${plain} and ${lit}`);
+          await page.evaluate(() => document.activeElement.blur());
+          await page.mouse.move(1, 1);
+        }
+      }
+
+      // One section after the other, by buttons and by keys.
+      const count = await page.locator("main section").count();
+      await page.click("#begin");
+      const current = () => page.evaluate(() => [...document.querySelectorAll("main section")].findIndex((it) => it.matches(".current")));
+      assert.equal(await current(), 0);
+      await page.click("#next");
+      await page.keyboard.press("ArrowRight");
+      await page.keyboard.press("ArrowLeft");
+      assert.equal(await current(), 1);
+      const isOpen = await page.evaluate(() => [...document.querySelectorAll("main section")].map((it) => it.firstElementChild.open === it.contains(document.querySelector(".current"))));
+      assert.deepEqual(isOpen, Array(count).fill(true));
+      await page.click("#all");
+      assert.equal(await page.locator("main details[open]").count(), count);
+      await page.context().close();
+
+      // Without the script there is nothing that does nothing, and all is seen.
+      const still = await open(`file://${out}`, { javaScriptEnabled: false, viewport: { width, height: 800 } });
+      assert.equal(await still.locator("#steps, .slider").locator("visible=true").count(), 0);
+      assert.equal(await still.locator("main details[open]").count(), count);
+      assert.ok(await still.locator(".plot .curve").first().isVisible());
+      await still.context().close();
+    }
   },
 
   async "it edits, and the edits render the same from their file"() {

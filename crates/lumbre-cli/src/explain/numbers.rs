@@ -1,0 +1,26 @@
+//! Numbers as they are written: in full, or short.
+
+use crate::units::number;
+
+/// The shortest text that is read back as the same number; infinity has its sign.
+pub(super) fn exact(x: f64) -> String {
+    if x.is_finite() || x.is_nan() {
+        return number(x);
+    }
+    if x > 0.0 { "∞".to_owned() } else { "-∞".to_owned() }
+}
+
+/// With six digits, for what stands in formulas.
+pub(super) fn short(x: f64) -> String {
+    if x == 0.0 || !x.is_finite() {
+        return exact(x);
+    }
+    let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
+    exact(rounded)
+}
+
+/// With four digits, for a label.
+pub(super) fn label(x: f64) -> String {
+    let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
+    exact(rounded)
+}
