@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use clap::Args;
 use lumbre::image::ToneMap;
-use lumbre::{CancelToken, ErrorKind, RenderOptions, SaveOptions, SceneDesc};
+use lumbre::{CancelToken, ErrorKind, RenderOptions, SaveOptions, SceneDesc, Stop};
 use lumbre_viewer::{Built, Explain, Moment, Options, Read, Source, SourceError, Viewer, export};
 
 use crate::explain::Explainer;
@@ -16,7 +16,7 @@ use crate::failure::{Failure, print};
 use crate::names::one_of;
 use crate::output::is_standard_stream;
 use crate::reading::ReadingArguments;
-use crate::render::exposure;
+use crate::render::{exposure, noise};
 use crate::shown::{Shown, Wish, shown};
 use crate::signals::{Phase, Signals};
 use crate::staging::{Behind, StagingArguments};
@@ -59,6 +59,12 @@ pub(crate) struct Arguments {
     /// Samples per pixel. By default as many as the scene says, else 64; 16 for a model whose noise is taken out.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
+    /// Stop sampling a pixel when its noise is below this share of its luminance, such as 0.02, as render does. The page can change it.
+    #[arg(long, value_name = "R", value_parser = noise)]
+    noise: Option<f64>,
+    /// With --noise, the samples that every pixel has before its noise may end it.
+    #[arg(long, value_name = "N", requires = "noise", value_parser = clap::value_parser!(u32).range(1..))]
+    min_spp: Option<u32>,
     /// Width and height in pixels.
     #[arg(long, value_name = "WxH", value_parser = units::size)]
     size: Option<(u32, u32)>,
@@ -253,7 +259,9 @@ impl Files {
         let mut warnings = diagnostics.lines();
         options.threads = rayon::current_num_threads();
         let own = defaults.spp(&scene).unwrap_or(options.stop.spp);
-        options.stop.spp = self.arguments.spp.unwrap_or(own);
+        let Arguments { spp, noise, min_spp, .. } = &*self.arguments;
+        (options.stop.noise, options.stop.min_spp) = (*noise, *min_spp);
+        options.stop.spp = spp.unwrap_or(if noise.is_some() { Stop::MAX_FOR_NOISE } else { own });
         let held = diagnostics.memory_held().saturating_add(scene.resolved().accel().memory_bytes() as u64);
         reading.memory().check_picture(&options, held)?;
         if scene.is_dark() && is_of_light {

@@ -72,7 +72,8 @@ pub fn export(source: &dyn Source, folder: &Path, cancel: &CancelToken) -> Resul
         let values =
             if channel == Channel::Depth { base64(&packed(picture.image())?) } else { String::new() };
         let pixels = Pixels::Rendered(Box::new(picture));
-        let shot = Shot { pixels, channel, full, sequence: 0, is_full: true, is_done: true };
+        let shot =
+            Shot { pixels, channel, full, sequence: 0, is_full: true, is_done: true, is_denoised: false };
         channels.push(json!({ "name": channel, "png": base64(&shown(&shot, &look)?), "values": values }));
     }
     let rays = stats.rays.camera + stats.rays.bounce + stats.rays.shadow;

@@ -49,6 +49,8 @@ pub(crate) struct Shot {
     pub is_full: bool,
     /// Whether it is what `lumbre render` makes.
     pub is_done: bool,
+    /// Whether its noise was taken out.
+    pub is_denoised: bool,
 }
 
 /// Where the pixels of a shot are.
@@ -97,7 +99,7 @@ impl Frame {
             shot.full.1,
             shot.picture().map_or(1, |picture| picture.stats().spp),
             shot.sequence,
-            u32::from(shot.is_full) | u32::from(shot.is_done) << 1,
+            u32::from(shot.is_full) | u32::from(shot.is_done) << 1 | u32::from(shot.is_denoised) << 2,
         ];
         let mut bytes = Vec::with_capacity(HEADER + 4 * image.pixels().len());
         bytes.extend(numbers.into_iter().flat_map(u32::to_le_bytes));

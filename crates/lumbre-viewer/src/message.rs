@@ -69,6 +69,8 @@ pub(crate) struct Wishes {
     pub paused: Option<bool>,
     pub scale: Option<f64>,
     pub spp: Option<u32>,
+    /// 0 for none.
+    pub noise: Option<f64>,
 }
 
 #[cfg(test)]

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use lumbre::CancelToken;
 use lumbre::image::ToneMap;
+use lumbre::{CancelToken, Stop};
 use serde_json::{Value, json};
 use tokio::sync::watch;
 
@@ -43,6 +43,8 @@ pub(crate) struct Wanted {
     pub channel: Channel,
     pub scale: f64,
     pub spp: Option<u32>,
+    /// The noise at which the picture is done; 0 for none.
+    pub noise: Option<f64>,
     pub denoise: Option<bool>,
     pub paused: bool,
     pub exposure: Option<f32>,
@@ -110,6 +112,7 @@ impl Session {
             channel: Channel::Beauty,
             scale: 1.0,
             spp: None,
+            noise: None,
             denoise: None,
             paused: false,
             exposure: None,
@@ -308,6 +311,7 @@ impl Session {
             "channel": wanted.channel,
             "scale": wanted.scale,
             "spp": wanted.spp.or(stage.as_ref().map(|stage| stage.options.stop.spp)),
+            "noise": wanted.noise.or(stage.as_ref().and_then(|stage| stage.options.stop.noise)),
             "denoise": wanted.denoise.or(stage.as_ref().map(|stage| stage.denoise)),
             "paused": wanted.paused,
             "exposure": wanted.exposure.or(stage.as_ref().map(|stage| stage.save.exposure)),
@@ -376,10 +380,17 @@ impl Session {
             wanted.paused = wishes.paused.unwrap_or(wanted.paused);
             wanted.scale = wishes.scale.filter(|s| s.is_finite()).map_or(wanted.scale, |s| s.clamp(0.1, 2.0));
             wanted.spp = wishes.spp.map(|spp| spp.clamp(1, 1 << 20)).or(wanted.spp);
+            if let Some(noise) = wishes.noise.filter(|noise| noise.is_finite() && *noise >= 0.0) {
+                wanted.noise = Some(noise);
+                // As many samples as it takes, where nobody says how many.
+                let most = Some(Stop::MAX_FOR_NOISE);
+                wanted.spp =
+                    if noise > 0.0 { wanted.spp.or(most) } else { wanted.spp.filter(|_| wanted.spp != most) };
+            }
             let is_same_look = (before.exposure, before.tone_map, before.false_colour)
                 == (wanted.exposure, wanted.tone_map, wanted.false_colour);
-            let is_same_picture = (before.channel, before.denoise, before.scale)
-                == (wanted.channel, wanted.denoise, wanted.scale);
+            let is_same_picture = (before.channel, before.denoise, before.scale, before.noise)
+                == (wanted.channel, wanted.denoise, wanted.scale, wanted.noise);
             wanted.changes.look += u64::from(!is_same_look);
             wanted.changes.render += u64::from(!is_same_picture);
             // More samples go on from those that there are.

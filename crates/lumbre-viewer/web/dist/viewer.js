@@ -1,285 +1,5 @@
 "use strict";
 (() => {
-  // src/vectors.ts
-  var add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
-  var sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-  var scale = (a, s) => [a[0] * s, a[1] * s, a[2] * s];
-  var dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-  var cross = (a, b) => [
-    a[1] * b[2] - a[2] * b[1],
-    a[2] * b[0] - a[0] * b[2],
-    a[0] * b[1] - a[1] * b[0]
-  ];
-  var length = (a) => Math.hypot(...a);
-  var unit = (a) => scale(a, 1 / (length(a) || 1));
-  function turned(v, axis, angle) {
-    const [c, s] = [Math.cos(angle), Math.sin(angle)];
-    return add(add(scale(v, c), scale(cross(axis, v), s)), scale(axis, dot(axis, v) * (1 - c)));
-  }
-
-  // src/camera.ts
-  var POLE = 0.02;
-  var Camera = class {
-    placement = { eye: [0, 0, 1], target: [0, 0, 0], up: [0, 1, 0] };
-    fov = null;
-    zoom = 1;
-    mirrored = false;
-    /** What stays upwards while the camera turns. */
-    axis = [0, 1, 0];
-    /** That of a state; what stays upwards is found anew. */
-    take(state2, scene2) {
-      if (!state2.placement) return;
-      const own = scene2.cameras[state2.camera];
-      this.placement = state2.placement;
-      this.mirrored = own?.mirrored ?? false;
-      this.fov = state2.fov ?? own?.fov ?? null;
-      this.zoom = state2.zoom;
-      this.axis = this.upright(scene2, state2.name.endsWith(".pbrt"));
-    }
-    forward() {
-      return unit(sub(this.placement.target, this.placement.eye));
-    }
-    right() {
-      const right = unit(cross(this.placement.up, this.forward()));
-      return this.mirrored ? scale(right, -1) : right;
-    }
-    upward() {
-      const forward = this.forward();
-      return unit(sub(this.placement.up, scale(forward, dot(this.placement.up, forward))));
-    }
-    distance() {
-      return length(sub(this.placement.target, this.placement.eye));
-    }
-    /** An axis that the picture does not lean to the side of; pbrt files do not say which is up. */
-    upright(scene2, unsaid) {
-      const [right, up] = [this.right(), this.upward()];
-      const axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
-      const candidates = [...axes, ...axes.map((axis) => scale(axis, -1)), scene2.up];
-      let [best, most] = [up, 0];
-      for (const axis of candidates) {
-        const bonus = axis === scene2.up && !unsaid ? 0.5 : 0;
-        const standing = dot(axis, up) + bonus;
-        if (Math.abs(dot(axis, right)) < 1e-3 && dot(axis, up) > 1e-3 && standing > most) [best, most] = [axis, standing];
-      }
-      return best;
-    }
-    /** Turns around the target by angles in radians: to the right, and up. */
-    orbit(right, up) {
-      let { eye, target } = this.placement;
-      let offset = sub(eye, target);
-      const sideways = Math.sign(dot(cross(this.axis, offset), this.right())) || 1;
-      offset = turned(offset, this.axis, right * sideways);
-      const polar = Math.acos(Math.max(-1, Math.min(1, dot(unit(offset), this.axis))));
-      const wanted = Math.max(POLE, Math.min(Math.PI - POLE, polar - up));
-      const across = cross(this.axis, offset);
-      if (length(across) > 0) offset = turned(offset, unit(across), wanted - polar);
-      eye = add(target, offset);
-      this.placement = { eye, target, up: this.axis };
-    }
-    /** Moves eye and target: to the right, up and forward, in shares of the distance between them. */
-    move(right, up, forward) {
-      const by = this.distance();
-      const step = add(add(scale(this.right(), right * by), scale(this.upward(), up * by)), scale(this.forward(), forward * by));
-      const { eye, target } = this.placement;
-      this.placement = { eye: add(eye, step), target: add(target, step), up: this.axis };
-    }
-    /** Comes nearer to the target by a factor, or shows more of it. */
-    dolly(factor) {
-      const { eye, target } = this.placement;
-      this.placement = { eye: add(target, scale(sub(eye, target), factor)), target, up: this.axis };
-      this.zoom = Math.max(1e-4, Math.min(1e4, this.zoom / factor));
-    }
-    /** Turns around this point from now on. */
-    lookAt(point2) {
-      const { eye } = this.placement;
-      this.placement = { eye, target: point2, up: this.axis };
-    }
-    /** As pbrt writes it. */
-    toPbrt() {
-      const { eye, target } = this.placement;
-      const numbers = (v) => v.map((x) => +x.toPrecision(9)).join(" ");
-      const mirror = this.mirrored ? "Scale -1 1 1\n" : "";
-      const lens = this.fov === null ? "" : `
-Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
-      return `${mirror}LookAt ${numbers(eye)}  ${numbers(target)}  ${numbers(this.upward())}${lens}`;
-    }
-    /** As glTF writes it: a node, whose camera looks along -z. */
-    toGltf(aspect) {
-      const columns = [
-        [this.right(), 0],
-        [this.upward(), 0],
-        [scale(this.forward(), -1), 0],
-        [this.placement.eye, 1]
-      ];
-      const matrix = columns.flatMap(([v, w]) => [...v.map((x) => +x.toPrecision(9)), w]);
-      const shorter = (this.fov ?? 45) * Math.PI / 180;
-      const yfov = aspect >= 1 ? shorter : 2 * Math.atan(Math.tan(shorter / 2) / aspect);
-      const perspective = { aspectRatio: +aspect.toPrecision(9), yfov: +yfov.toPrecision(9), znear: 0.01 };
-      return JSON.stringify({ cameras: [{ type: "perspective", perspective }], nodes: [{ camera: 0, matrix }] });
-    }
-  };
-
-  // src/elements.ts
-  function byId(id) {
-    const found = document.getElementById(id);
-    if (!found) throw new Error(`the page has no ${id}`);
-    return found;
-  }
-  function element(name, text = "", properties = {}) {
-    const made = Object.assign(document.createElement(name), properties);
-    if (text) made.textContent = text;
-    return made;
-  }
-  function short(value) {
-    return Number.isFinite(value) ? String(+value.toPrecision(6)) : String(value);
-  }
-  function large(value) {
-    const units = [[1e9, " G"], [1e6, " M"], [1e3, " k"]];
-    for (const [unit2, name] of units) if (value >= unit2) return `${(value / unit2).toFixed(2)}${name}`;
-    return `${Math.round(value)}`;
-  }
-  function spoken(seconds) {
-    if (seconds < 1) return `${Math.round(seconds * 1e3)} ms`;
-    if (seconds < 90) return `${seconds.toFixed(seconds < 10 ? 1 : 0)} s`;
-    return `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
-  }
-  function options(select, entries, chosen) {
-    const same = select.options.length === entries.length && entries.every(([value, text], i) => select.options[i]?.value === value && select.options[i]?.textContent === text);
-    if (!same) select.replaceChildren(...entries.map(([value, text]) => element("option", text, { value })));
-    select.value = chosen;
-  }
-  function save(name, text) {
-    const url = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
-    element("a", "", { href: url, download: name }).click();
-    setTimeout(() => URL.revokeObjectURL(url), 1e4);
-  }
-
-  // src/at-rest.ts
-  function bytes(base64) {
-    return Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
-  }
-  async function unpacked(base64) {
-    const stream = new Blob([bytes(base64)]).stream().pipeThrough(new DecompressionStream("deflate"));
-    return new DataView(await new Response(stream).arrayBuffer());
-  }
-  function half(bits) {
-    const sign = bits & 32768 ? -1 : 1;
-    const [exponent, fraction] = [bits >> 10 & 31, bits & 1023];
-    if (exponent === 31) return fraction ? NaN : sign * Infinity;
-    return exponent === 0 ? sign * fraction * 2 ** -24 : sign * (1 + fraction / 1024) * 2 ** (exponent - 15);
-  }
-  var AtRest = class {
-    constructor(listener2, data2) {
-      this.listener = listener2;
-      this.data = data2;
-      setTimeout(() => void this.start());
-    }
-    listener;
-    data;
-    shown;
-    values;
-    picks;
-    async start() {
-      this.listener.stood("open");
-      this.listener.told({ type: "scene", scene: this.data.scene });
-      this.listener.told({ type: "progress", doing: "done", ...this.data.progress });
-      await this.show("beauty");
-      this.picks = await unpacked(this.data.picks.values);
-    }
-    state(channel) {
-      return {
-        name: this.data.name,
-        has_scene: true,
-        error: null,
-        edit_error: null,
-        camera: this.data.camera,
-        sequence: 0,
-        moved: false,
-        placement: this.data.placement,
-        fov: null,
-        zoom: 1,
-        size: null,
-        channel,
-        scale: 1,
-        spp: this.data.progress.spp ?? null,
-        denoise: null,
-        paused: false,
-        exposure: 0,
-        tone_map: null,
-        false_colour: false,
-        time: null,
-        variant: null,
-        settings: []
-      };
-    }
-    async show(name) {
-      const channel = this.data.channels.find((known) => known.name === name);
-      if (!channel) return;
-      this.listener.told({ type: "state", ...this.state(name) });
-      const bitmap = await createImageBitmap(new Blob([bytes(channel.png)], { type: "image/png" }));
-      const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
-      const drawing = canvas.getContext("2d");
-      if (!drawing) return;
-      drawing.drawImage(bitmap, 0, 0);
-      const { width, height } = bitmap;
-      const pixels = drawing.getImageData(0, 0, width, height);
-      [this.shown, this.values] = [pixels, void 0];
-      if (channel.values) this.values = await unpacked(channel.values);
-      const spp = this.data.progress.spp ?? 0;
-      this.listener.framed({ width, height, fullWidth: width, fullHeight: height, spp, sequence: 0, isFull: true, isDone: true, pixels });
-    }
-    pick(x, y, request2) {
-      if (!this.picks || !this.shown) return;
-      const at = 8 * (y * this.shown.width + x);
-      const thing = this.data.picks.shapes[this.picks.getUint32(at, true) - 1];
-      const hits = thing ? [{ ...thing, distance: this.picks.getFloat32(at + 4, true) }] : [];
-      this.listener.told({ type: "picked", request: request2, x, y, ray: { hits } });
-    }
-    /** There is nobody to give one. */
-    ticket() {
-      return Promise.reject(new Error("at rest"));
-    }
-    send(message) {
-      const { type, channel, x, y, width, height, request: request2 } = message;
-      if (type === "set" && channel) void this.show(String(channel));
-      if (type === "pick") this.pick(Math.floor(x ?? 0), Math.floor(y ?? 0), request2 ?? 0);
-      if (type !== "values" || !this.shown) return;
-      const whole = this.shown.width;
-      const [x0, y0] = [x ?? 0, y ?? 0];
-      const [columns, rows] = [Math.min(width ?? 0, whole - x0), Math.min(height ?? 0, this.shown.height - y0)];
-      const found = [];
-      for (let row = y0; row < y0 + rows; row++) {
-        for (let column = x0; column < x0 + columns; column++) {
-          const pixel = row * whole + column;
-          const value = (c) => this.values ? half(this.values.getUint16(2 * (3 * pixel + c), true)) : +((this.shown?.data[4 * pixel + c] ?? 0) / 255).toFixed(3);
-          found.push([value(0), value(1), value(2)]);
-        }
-      }
-      this.listener.told({ type: "values", request: request2 ?? 0, x: x0, y: y0, width: columns, height: rows, values: found });
-    }
-  };
-  function hideWhatNeedsAViewer() {
-    const live = [
-      "pause",
-      "reset",
-      "exposure",
-      "tone-map",
-      "false-colour",
-      "denoise",
-      "spp",
-      "scale",
-      "edit-details",
-      "camera-details",
-      "save-details",
-      "help-open"
-    ];
-    for (const id of live) {
-      byId(id).hidden = true;
-      for (const label of document.querySelectorAll(`label[for="${id}"]`)) label.hidden = true;
-    }
-    for (const option of document.querySelectorAll("option[value=ids], option[value=variance]")) option.remove();
-  }
-
   // src/proof.ts
   var IV = [1779033703, 3144134277, 1013904242, 2773480762, 1359893119, 2600822924, 528734635, 1541459225];
   var ORDER = [2, 6, 3, 10, 7, 0, 4, 13, 1, 11, 12, 5, 9, 14, 15, 8];
@@ -332,10 +52,10 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
   var MAGIC = 827151692;
   function decoded(packet) {
     const numbers = new Uint32Array(packet, 0, HEADER / 4);
-    const [magic = 0, width = 0, height = 0, fullWidth = 0, fullHeight = 0, spp = 0, sequence2 = 0, flags = 0] = numbers;
+    const [magic = 0, width = 0, height = 0, fullWidth = 0, fullHeight = 0, spp = 0, sequence = 0, flags = 0] = numbers;
     if (magic !== MAGIC || packet.byteLength !== HEADER + 4 * width * height) throw new Error("no frame");
     const pixels = new ImageData(new Uint8ClampedArray(packet, HEADER), width, height);
-    return { width, height, fullWidth, fullHeight, spp, sequence: sequence2, isFull: (flags & 1) !== 0, isDone: (flags & 2) !== 0, pixels };
+    return { width, height, fullWidth, fullHeight, spp, sequence, isFull: (flags & 1) !== 0, isDone: (flags & 2) !== 0, isDenoised: (flags & 4) !== 0, pixels };
   }
 
   // src/connection.ts
@@ -374,17 +94,17 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     /** An address for an errand, which works once. */
     ticket(errand) {
       if (!this.isIn) return Promise.reject(new Error("not connected"));
-      const request2 = ++this.requests;
+      const request = ++this.requests;
       return new Promise((found) => {
-        this.waiting.set(request2, found);
-        this.send({ type: "ticket", request: request2, errand });
+        this.waiting.set(request, found);
+        this.send({ type: "ticket", request, errand });
       });
     }
     connect() {
       this.isIn = false;
       const known = secret();
       if (!known) {
-        this.listener.stood("refused");
+        this.listener.onStatus("refused");
         return;
       }
       const socket = new WebSocket(`ws://${location.host}/socket`);
@@ -401,14 +121,14 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
         if (message.type !== "welcome" || !challenge || message.proof !== proof(known, "viewer", challenge, nonce)) return false;
         if (message.session) sessionStorage.setItem(SECRET, message.session);
         [this.isIn, this.wait] = [true, 500];
-        this.listener.stood("open");
+        this.listener.onStatus("open");
         return true;
       };
       const lost = (how) => {
         if (this.socket !== socket) return;
         [this.socket, this.isIn] = [void 0, false];
         this.waiting.clear();
-        this.listener.stood(how);
+        this.listener.onStatus(how);
         this.again = setTimeout(() => this.connect(), this.wait);
         this.wait = Math.min(this.wait * 1.5, 5e3);
       };
@@ -432,15 +152,50 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
             this.waiting.get(message.request)?.(message.address);
             this.waiting.delete(message.request);
           } else {
-            this.listener.told(message);
+            this.listener.onMessage(message);
           }
           return;
         }
-        this.listener.framed(decoded(event.data));
+        this.listener.onFrame(decoded(event.data));
         this.send({ type: "shown" });
       };
     }
   };
+
+  // src/elements.ts
+  function byId(id) {
+    const found = document.getElementById(id);
+    if (!found) throw new Error(`the page has no ${id}`);
+    return found;
+  }
+  function element(name, text = "", properties = {}) {
+    const made = Object.assign(document.createElement(name), properties);
+    if (text) made.textContent = text;
+    return made;
+  }
+  function short(value) {
+    return Number.isFinite(value) ? String(+value.toPrecision(6)) : String(value);
+  }
+  function large(value) {
+    const units = [[1e9, " G"], [1e6, " M"], [1e3, " k"]];
+    for (const [unit2, name] of units) if (value >= unit2) return `${(value / unit2).toFixed(2)}${name}`;
+    return `${Math.round(value)}`;
+  }
+  function spoken(seconds) {
+    if (seconds < 1) return `${Math.round(seconds * 1e3)} ms`;
+    if (seconds < 90) return `${seconds.toFixed(seconds < 10 ? 1 : 0)} s`;
+    return `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
+  }
+  function options(select, entries, chosen) {
+    const same = select.options.length === entries.length && entries.every(([value, text], i) => select.options[i]?.value === value && select.options[i]?.textContent === text);
+    if (!same) select.replaceChildren(...entries.map(([value, text]) => element("option", text, { value })));
+    select.value = chosen;
+  }
+  function save(name, text) {
+    const url = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
+    element("a", "", { href: url, download: name }).click();
+    setTimeout(() => URL.revokeObjectURL(url), 1e4);
+  }
 
   // src/edit.ts
   var MOST = 60;
@@ -495,21 +250,21 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       const input = element("input", "", { id });
       const label = element("label", parameter.name, { htmlFor: id });
       const start = () => {
-        const set2 = this.settings.get(parameter.path);
+        const set = this.settings.get(parameter.path);
         if (parameter.kind === "colour") {
           input.type = "color";
-          input.value = set2?.startsWith("#") ? set2 : hex(parameter.value ?? [0.5, 0.5, 0.5]);
+          input.value = set?.startsWith("#") ? set : hex(parameter.value ?? [0.5, 0.5, 0.5]);
         } else if (parameter.kind === "number" || parameter.kind === "factor") {
           input.type = "number";
           input.step = "any";
           if (parameter.low !== null) input.min = String(parameter.low);
           if (parameter.high !== null) input.max = String(parameter.high);
-          input.value = set2 ?? (parameter.value ? short(parameter.value[0] ?? 0) : "");
+          input.value = set ?? (parameter.value ? short(parameter.value[0] ?? 0) : "");
         } else {
           input.type = "text";
-          input.value = set2 ?? (parameter.value ?? []).map(short).join(",");
+          input.value = set ?? (parameter.value ?? []).map(short).join(",");
         }
-        if (!parameter.value && !set2) input.placeholder = "texture";
+        if (!parameter.value && !set) input.placeholder = "texture";
       };
       start();
       const event = parameter.kind === "colour" ? "input" : "change";
@@ -538,8 +293,8 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
 
   // src/explanation.ts
   var Explanation = class {
-    constructor(ticket) {
-      this.ticket = ticket;
+    constructor(ticket2) {
+      this.ticket = ticket2;
       this.button.addEventListener("click", () => this.show());
       this.language.addEventListener("change", () => void this.load());
       this.alone.addEventListener("click", () => setTimeout(() => void this.offerAlone()));
@@ -602,23 +357,23 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
 
   // src/facts.ts
   var point = (v) => v.map(short).join(", ");
-  function showFacts(list, warnings, scene2) {
+  function showFacts(list, warnings, scene) {
     const counted = (kinds) => Object.entries(kinds).map(([name, count]) => `${count} ${name}`).join(", ") || "none";
     const rows = [
-      ["Shapes", counted(scene2.shapes)],
-      ["Triangles", large(scene2.triangles)],
-      ["Instances", large(scene2.instances)],
-      ["Materials", counted(scene2.materials)],
-      ["Lights", counted(scene2.lights)],
-      ["Bounds", scene2.bounds ? `${point(scene2.bounds[0])} to ${point(scene2.bounds[1])}` : "none"],
-      ["Memory", `${large(scene2.memory)}B`],
-      ["Built in", spoken(scene2.build_seconds)]
+      ["Shapes", counted(scene.shapes)],
+      ["Triangles", large(scene.triangles)],
+      ["Instances", large(scene.instances)],
+      ["Materials", counted(scene.materials)],
+      ["Lights", counted(scene.lights)],
+      ["Bounds", scene.bounds ? `${point(scene.bounds[0])} to ${point(scene.bounds[1])}` : "none"],
+      ["Memory", `${large(scene.memory)}B`],
+      ["Built in", spoken(scene.build_seconds)]
     ];
     list.replaceChildren(...rows.flatMap(([name, text]) => [element("dt", name), element("dd", text)]));
     warnings.replaceChildren();
-    if (scene2.warnings.length > 0) {
-      warnings.append(element("p", `${scene2.warnings.length} warnings`, { className: "quiet" }));
-      warnings.append(element("pre", scene2.warnings.join("\n"), { tabIndex: 0 }));
+    if (scene.warnings.length > 0) {
+      warnings.append(element("p", `${scene.warnings.length} warnings`, { className: "quiet" }));
+      warnings.append(element("pre", scene.warnings.join("\n"), { tabIndex: 0 }));
     }
   }
   var named = ({ shape, kind }) => kind === "ground" ? kind : `${shape} (${kind})`;
@@ -660,7 +415,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
 
   // src/hands.ts
   var STILL = 4;
-  function attach(canvas, sheet2, camera2, wishes) {
+  function attach(canvas, sheet2, camera2, handlers) {
     const pointers = /* @__PURE__ */ new Map();
     let travelled = 0;
     const spread = () => {
@@ -676,7 +431,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     canvas.addEventListener("pointermove", (event) => {
       const before = pointers.get(event.pointerId);
       if (!before) {
-        wishes.hover(sheet2.at(event.clientX, event.clientY));
+        handlers.hover(sheet2.at(event.clientX, event.clientY));
         return;
       }
       const wide = spread();
@@ -700,22 +455,22 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       } else {
         camera2.orbit(-dx / height * Math.PI, dy / height * Math.PI);
       }
-      wishes.moved();
+      handlers.moved();
     });
     const up = (event) => {
       const was = pointers.delete(event.pointerId);
       if (was && pointers.size === 0 && travelled < STILL && event.type === "pointerup" && event.button === 0) {
         const at = sheet2.at(event.clientX, event.clientY);
-        if (at) wishes.pick(at[0], at[1], false);
+        if (at) handlers.pick(at[0], at[1], false);
       }
     };
     canvas.addEventListener("pointerup", up);
     canvas.addEventListener("pointercancel", up);
-    canvas.addEventListener("pointerleave", () => wishes.hover(null));
+    canvas.addEventListener("pointerleave", () => handlers.hover(null));
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("dblclick", (event) => {
       const at = sheet2.at(event.clientX, event.clientY);
-      if (at) wishes.pick(at[0], at[1], true);
+      if (at) handlers.pick(at[0], at[1], true);
     });
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
@@ -726,7 +481,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
         return;
       }
       camera2.dolly(factor);
-      wishes.moved();
+      handlers.moved();
     }, { passive: false });
     const held = /* @__PURE__ */ new Set();
     let last = 0;
@@ -758,7 +513,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
         if (key2 === "pageup" || key2 === "pagedown") camera2.dolly(Math.exp(key2 === "pageup" ? -by : by));
         any ||= key2 !== "shift";
       }
-      if (any) wishes.moved();
+      if (any) handlers.moved();
       requestAnimationFrame(fly);
     };
     canvas.addEventListener("keydown", (event) => {
@@ -772,14 +527,133 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
         }
         held.add(key2);
       } else if (key2 === "enter") {
-        wishes.pick(sheet2.width / 2, sheet2.height / 2, false);
-      } else if (wishes.key(key2)) {
+        handlers.pick(sheet2.width / 2, sheet2.height / 2, false);
+      } else if (handlers.key(key2)) {
         event.preventDefault();
       }
     });
     canvas.addEventListener("keyup", (event) => held.delete(event.key.toLowerCase()));
     canvas.addEventListener("blur", () => held.clear());
   }
+
+  // src/vectors.ts
+  var add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+  var sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+  var scale = (a, s) => [a[0] * s, a[1] * s, a[2] * s];
+  var dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  var cross = (a, b) => [
+    a[1] * b[2] - a[2] * b[1],
+    a[2] * b[0] - a[0] * b[2],
+    a[0] * b[1] - a[1] * b[0]
+  ];
+  var length = (a) => Math.hypot(...a);
+  var unit = (a) => scale(a, 1 / (length(a) || 1));
+  function turned(v, axis, angle) {
+    const [c, s] = [Math.cos(angle), Math.sin(angle)];
+    return add(add(scale(v, c), scale(cross(axis, v), s)), scale(axis, dot(axis, v) * (1 - c)));
+  }
+
+  // src/camera.ts
+  var POLE = 0.02;
+  var Camera = class {
+    placement = { eye: [0, 0, 1], target: [0, 0, 0], up: [0, 1, 0] };
+    fov = null;
+    zoom = 1;
+    mirrored = false;
+    /** What stays upwards while the camera turns. */
+    axis = [0, 1, 0];
+    /** That of a state; what stays upwards is found anew. */
+    take(state, scene) {
+      if (!state.placement) return;
+      const own = scene.cameras[state.camera];
+      this.placement = state.placement;
+      this.mirrored = own?.mirrored ?? false;
+      this.fov = state.fov ?? own?.fov ?? null;
+      this.zoom = state.zoom;
+      this.axis = this.upright(scene, state.name.endsWith(".pbrt"));
+    }
+    forward() {
+      return unit(sub(this.placement.target, this.placement.eye));
+    }
+    right() {
+      const right = unit(cross(this.placement.up, this.forward()));
+      return this.mirrored ? scale(right, -1) : right;
+    }
+    upward() {
+      const forward = this.forward();
+      return unit(sub(this.placement.up, scale(forward, dot(this.placement.up, forward))));
+    }
+    distance() {
+      return length(sub(this.placement.target, this.placement.eye));
+    }
+    /** An axis that the picture does not lean to the side of; pbrt files do not say which is up. */
+    upright(scene, unsaid) {
+      const [right, up] = [this.right(), this.upward()];
+      const axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+      const candidates = [...axes, ...axes.map((axis) => scale(axis, -1)), scene.up];
+      let [best, most] = [up, 0];
+      for (const axis of candidates) {
+        const bonus = axis === scene.up && !unsaid ? 0.5 : 0;
+        const standing = dot(axis, up) + bonus;
+        if (Math.abs(dot(axis, right)) < 1e-3 && dot(axis, up) > 1e-3 && standing > most) [best, most] = [axis, standing];
+      }
+      return best;
+    }
+    /** Turns around the target by angles in radians: to the right, and up. */
+    orbit(right, up) {
+      let { eye, target } = this.placement;
+      let offset = sub(eye, target);
+      const sideways = Math.sign(dot(cross(this.axis, offset), this.right())) || 1;
+      offset = turned(offset, this.axis, right * sideways);
+      const polar = Math.acos(Math.max(-1, Math.min(1, dot(unit(offset), this.axis))));
+      const wanted = Math.max(POLE, Math.min(Math.PI - POLE, polar - up));
+      const across = cross(this.axis, offset);
+      if (length(across) > 0) offset = turned(offset, unit(across), wanted - polar);
+      eye = add(target, offset);
+      this.placement = { eye, target, up: this.axis };
+    }
+    /** Moves eye and target: to the right, up and forward, in shares of the distance between them. */
+    move(right, up, forward) {
+      const by = this.distance();
+      const step = add(add(scale(this.right(), right * by), scale(this.upward(), up * by)), scale(this.forward(), forward * by));
+      const { eye, target } = this.placement;
+      this.placement = { eye: add(eye, step), target: add(target, step), up: this.axis };
+    }
+    /** Comes nearer to the target by a factor, or shows more of it. */
+    dolly(factor) {
+      const { eye, target } = this.placement;
+      this.placement = { eye: add(target, scale(sub(eye, target), factor)), target, up: this.axis };
+      this.zoom = Math.max(1e-4, Math.min(1e4, this.zoom / factor));
+    }
+    /** Turns around this point from now on. */
+    lookAt(point2) {
+      const { eye } = this.placement;
+      this.placement = { eye, target: point2, up: this.axis };
+    }
+    /** As pbrt writes it. */
+    toPbrt() {
+      const { eye, target } = this.placement;
+      const numbers = (v) => v.map((x) => +x.toPrecision(9)).join(" ");
+      const mirror = this.mirrored ? "Scale -1 1 1\n" : "";
+      const lens = this.fov === null ? "" : `
+Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
+      return `${mirror}LookAt ${numbers(eye)}  ${numbers(target)}  ${numbers(this.upward())}${lens}`;
+    }
+    /** As glTF writes it: a node, whose camera looks along -z. */
+    toGltf(aspect) {
+      const columns = [
+        [this.right(), 0],
+        [this.upward(), 0],
+        [scale(this.forward(), -1), 0],
+        [this.placement.eye, 1]
+      ];
+      const matrix = columns.flatMap(([v, w]) => [...v.map((x) => +x.toPrecision(9)), w]);
+      const shorter = (this.fov ?? 45) * Math.PI / 180;
+      const yfov = aspect >= 1 ? shorter : 2 * Math.atan(Math.tan(shorter / 2) / aspect);
+      const perspective = { aspectRatio: +aspect.toPrecision(9), yfov: +yfov.toPrecision(9), znear: 0.01 };
+      return JSON.stringify({ cameras: [{ type: "perspective", perspective }], nodes: [{ camera: 0, matrix }] });
+    }
+  };
 
   // src/sheet.ts
   var MOST_ZOOM = 256;
@@ -932,72 +806,284 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     }
   };
 
+  // src/page.ts
+  var MOST_TIMES = 2e3;
+  var measured = {
+    latencies: [],
+    frames: [],
+    changes: /* @__PURE__ */ new Map(),
+    spp: 0,
+    done: false,
+    sequence: 0,
+    /** When the first frame came, and the first without noise, by the clock of the page. */
+    first: 0,
+    firstDenoised: 0,
+    /** Frames with noise, since this was last set to 0. */
+    noisy: 0
+  };
+  Object.assign(globalThis, { lumbreMeasured: measured });
+  var Page = class {
+    sheet = new Sheet(
+      byId("stage"),
+      byId("sheet"),
+      byId("picture"),
+      byId("reference"),
+      byId("numbers")
+    );
+    camera = new Camera();
+    scene;
+    state;
+    connection;
+    connected = false;
+    /** Called when the camera was moved by hand. */
+    onCamera = () => {
+    };
+    requests = 0;
+    isMoving = false;
+    // What the camera is at is counted, so that one knows which frame shows it. Others count from elsewhere.
+    sequence = Math.floor(Math.random() * 2147418112);
+    mine = -1;
+    send(message) {
+      this.connection?.send(message);
+    }
+    /** Sends a question, and returns the number by which its answer is known. */
+    ask(message) {
+      this.requests += 1;
+      this.send({ ...message, request: this.requests });
+      return this.requests;
+    }
+    set(options2) {
+      this.send({ type: "set", ...options2 });
+    }
+    /** The camera was moved: it is sent once a frame of the screen. */
+    moved() {
+      this.onCamera();
+      if (this.isMoving) return;
+      this.isMoving = true;
+      requestAnimationFrame(() => {
+        this.isMoving = false;
+        this.sequence = this.sequence + 1 >>> 0;
+        this.mine = this.sequence;
+        measured.changes.set(this.sequence, performance.now());
+        const { placement, fov, zoom } = this.camera;
+        this.send({ type: "camera", sequence: this.sequence, placement, fov, zoom });
+      });
+    }
+    /** One of the file's cameras, as it is. */
+    reset(index) {
+      this.sequence = this.sequence + 1 >>> 0;
+      this.mine = -1;
+      this.onCamera();
+      this.send({ type: "reset", sequence: this.sequence, camera: index });
+    }
+    /** Takes the camera of the state, unless it was moved here: what comes back is older than what the hand does. */
+    takeCamera(state, scene) {
+      const isOwn = state.moved && state.sequence === this.mine;
+      if (!isOwn && !this.isMoving) this.camera.take(state, scene);
+    }
+    show(frame) {
+      this.sheet.show(frame);
+      const now = performance.now();
+      measured.frames.push(now);
+      if (measured.frames.length > MOST_TIMES) measured.frames.splice(0, MOST_TIMES / 2);
+      measured.first ||= now;
+      if (frame.isDenoised) measured.firstDenoised ||= now;
+      else measured.noisy += 1;
+      [measured.spp, measured.done, measured.sequence] = [frame.isFull ? frame.spp : 0, frame.isDone, frame.sequence];
+      for (const [change, since] of measured.changes) {
+        if (change > frame.sequence) continue;
+        if (change === frame.sequence) measured.latencies.push(now - since);
+        measured.changes.delete(change);
+      }
+    }
+  };
+
+  // src/progress.ts
+  var DOING = {
+    reading: "Reading the scene",
+    building: "Building the scene",
+    rendering: "",
+    done: "",
+    waiting: "Waiting for the file to be mended",
+    nothing: "No scene"
+  };
+  function reached({ spp = 0, target = 0, noise, noise_target }) {
+    if (target === 0) return ["done"];
+    if (noise_target) {
+      const now = noise == null ? [] : [`noise ${noise.toFixed(4)} of ${noise_target}`];
+      return [`${spp} samples`, ...now];
+    }
+    return [`${spp} of ${target} samples`, ...noise != null && spp > 1 ? [`noise ${noise.toFixed(4)}`] : []];
+  }
+  function showProgress(progress) {
+    const { doing, target = 0, share = doing === "done" ? 1 : 0 } = progress;
+    let text = DOING[doing];
+    if (doing === "rendering" || doing === "done") {
+      const parts = reached(progress);
+      if (doing === "rendering" && share > 0) parts.push(`${Math.floor(100 * share)} %`);
+      if (doing === "rendering" && progress.left != null) parts.push(`${spoken(progress.left)} left`);
+      if (doing === "done" && progress.seconds) parts.push(`done in ${spoken(progress.seconds)}`);
+      if (progress.rays_per_second) parts.push(`${large(progress.rays_per_second)} rays/s`);
+      if (progress.dropped) parts.push(`${progress.dropped} samples dropped`);
+      text = parts.join(" \xB7 ");
+    }
+    byId("progress").textContent = text;
+    byId("bar").value = target > 0 || doing === "done" ? share : 0;
+  }
+
+  // src/static-connection.ts
+  function bytes(base64) {
+    return Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+  }
+  async function unpacked(base64) {
+    const stream = new Blob([bytes(base64)]).stream().pipeThrough(new DecompressionStream("deflate"));
+    return new DataView(await new Response(stream).arrayBuffer());
+  }
+  function half(bits) {
+    const sign = bits & 32768 ? -1 : 1;
+    const [exponent, fraction] = [bits >> 10 & 31, bits & 1023];
+    if (exponent === 31) return fraction ? NaN : sign * Infinity;
+    return exponent === 0 ? sign * fraction * 2 ** -24 : sign * (1 + fraction / 1024) * 2 ** (exponent - 15);
+  }
+  var StaticConnection = class {
+    constructor(listener2, data2) {
+      this.listener = listener2;
+      this.data = data2;
+      setTimeout(() => void this.start());
+    }
+    listener;
+    data;
+    shown;
+    values;
+    picks;
+    async start() {
+      this.listener.onStatus("open");
+      this.listener.onMessage({ type: "scene", scene: this.data.scene });
+      this.listener.onMessage({ type: "progress", doing: "done", ...this.data.progress });
+      await this.show("beauty");
+      this.picks = await unpacked(this.data.picks.values);
+    }
+    state(channel) {
+      return {
+        name: this.data.name,
+        has_scene: true,
+        error: null,
+        edit_error: null,
+        camera: this.data.camera,
+        sequence: 0,
+        moved: false,
+        placement: this.data.placement,
+        fov: null,
+        zoom: 1,
+        size: null,
+        channel,
+        scale: 1,
+        spp: this.data.progress.spp ?? null,
+        noise: null,
+        denoise: null,
+        paused: false,
+        exposure: 0,
+        tone_map: null,
+        false_colour: false,
+        time: null,
+        variant: null,
+        settings: []
+      };
+    }
+    async show(name) {
+      const channel = this.data.channels.find((known) => known.name === name);
+      if (!channel) return;
+      this.listener.onMessage({ type: "state", ...this.state(name) });
+      const bitmap = await createImageBitmap(new Blob([bytes(channel.png)], { type: "image/png" }));
+      const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
+      const drawing = canvas.getContext("2d");
+      if (!drawing) return;
+      drawing.drawImage(bitmap, 0, 0);
+      const { width, height } = bitmap;
+      const pixels = drawing.getImageData(0, 0, width, height);
+      [this.shown, this.values] = [pixels, void 0];
+      if (channel.values) this.values = await unpacked(channel.values);
+      const spp = this.data.progress.spp ?? 0;
+      this.listener.onFrame({ width, height, fullWidth: width, fullHeight: height, spp, sequence: 0, isFull: true, isDone: true, isDenoised: false, pixels });
+    }
+    pick(x, y, request) {
+      if (!this.picks || !this.shown) return;
+      const at = 8 * (y * this.shown.width + x);
+      const thing = this.data.picks.shapes[this.picks.getUint32(at, true) - 1];
+      const hits = thing ? [{ ...thing, distance: this.picks.getFloat32(at + 4, true) }] : [];
+      this.listener.onMessage({ type: "picked", request, x, y, ray: { hits } });
+    }
+    /** There is nobody to give one. */
+    ticket() {
+      return Promise.reject(new Error("at rest"));
+    }
+    send(message) {
+      const { type, channel, x, y, width, height, request } = message;
+      if (type === "set" && channel) void this.show(String(channel));
+      if (type === "pick") this.pick(Math.floor(x ?? 0), Math.floor(y ?? 0), request ?? 0);
+      if (type !== "values" || !this.shown) return;
+      const whole = this.shown.width;
+      const [x0, y0] = [x ?? 0, y ?? 0];
+      const [columns, rows] = [Math.min(width ?? 0, whole - x0), Math.min(height ?? 0, this.shown.height - y0)];
+      const found = [];
+      for (let row = y0; row < y0 + rows; row++) {
+        for (let column = x0; column < x0 + columns; column++) {
+          const pixel = row * whole + column;
+          const value = (c) => this.values ? half(this.values.getUint16(2 * (3 * pixel + c), true)) : +((this.shown?.data[4 * pixel + c] ?? 0) / 255).toFixed(3);
+          found.push([value(0), value(1), value(2)]);
+        }
+      }
+      this.listener.onMessage({ type: "values", request: request ?? 0, x: x0, y: y0, width: columns, height: rows, values: found });
+    }
+  };
+  function hideWhatNeedsAViewer() {
+    const live = [
+      "pause",
+      "reset",
+      "exposure",
+      "tone-map",
+      "false-colour",
+      "denoise",
+      "spp",
+      "noise-target",
+      "scale",
+      "edit-details",
+      "camera-details",
+      "save-details",
+      "help-open"
+    ];
+    for (const id of live) {
+      byId(id).hidden = true;
+      for (const label of document.querySelectorAll(`label[for="${id}"]`)) label.hidden = true;
+    }
+    for (const option of document.querySelectorAll("option[value=ids], option[value=variance]")) option.remove();
+  }
+
   // src/main.ts
-  var stage = byId("stage");
-  var sheet = new Sheet(
-    stage,
-    byId("sheet"),
-    byId("picture"),
-    byId("reference"),
-    byId("numbers")
-  );
-  var camera = new Camera();
-  var scene;
-  var state;
-  var request = 0;
+  var page = new Page();
+  var { sheet, camera } = page;
+  var listener = { onMessage, onFrame, onStatus };
+  var data = globalThis.lumbreAtRest;
+  page.connection = data ? new StaticConnection(listener, data) : new Connection(listener);
   var turnAround = 0;
   var hovered = null;
   var asked = 0;
-  var sequence = Math.floor(Math.random() * 2147418112);
-  var mine = -1;
-  var measured = { latencies: [], frames: [], changes: /* @__PURE__ */ new Map(), spp: 0, done: false, sequence: 0 };
-  Object.assign(globalThis, { lumbreMeasured: measured });
-  var listener = { told: (message) => told(message), framed: (frame) => framed(frame), stood: (how) => stood(how) };
-  var data = globalThis.lumbreAtRest;
-  var connection = data ? new AtRest(listener, data) : new Connection(listener);
-  var isMoving = false;
-  function moved() {
-    if (isMoving) return;
-    isMoving = true;
-    requestAnimationFrame(() => {
-      isMoving = false;
-      sequence = sequence + 1 >>> 0;
-      mine = sequence;
-      measured.changes.set(sequence, performance.now());
-      connection.send({ type: "camera", sequence, placement: camera.placement, fov: camera.fov, zoom: camera.zoom });
-    });
-  }
-  function reset(index) {
-    sequence = sequence + 1 >>> 0;
-    mine = -1;
-    connection.send({ type: "reset", sequence, camera: index });
-  }
-  var set = (wishes) => connection.send({ type: "set", ...wishes });
-  function framed(frame) {
-    sheet.show(frame);
-    const now = performance.now();
-    measured.frames.push(now);
-    if (measured.frames.length > 2e3) measured.frames.splice(0, 1e3);
-    [measured.spp, measured.done, measured.sequence] = [frame.isFull ? frame.spp : 0, frame.isDone, frame.sequence];
-    for (const [change, since] of measured.changes) {
-      if (change > frame.sequence) continue;
-      if (change === frame.sequence) measured.latencies.push(now - since);
-      measured.changes.delete(change);
-    }
+  function onFrame(frame) {
+    page.show(frame);
     if (frame.isFull) askNumbers();
     if (hovered && frame.isFull) askPixel();
   }
-  function told(message) {
+  function onMessage(message) {
     switch (message.type) {
       case "scene":
-        scene = message.scene;
-        showFacts(byId("facts"), byId("warnings"), scene);
-        editor.list(scene.parameters);
-        explanation.offer(scene.languages);
-        if (state) showState(state);
+        page.scene = message.scene;
+        showFacts(byId("facts"), byId("warnings"), message.scene);
+        editor.list(message.scene.parameters);
+        explanation.offer(message.scene.languages);
+        if (page.state) showState(page.state);
         break;
       case "state":
-        state = message;
+        page.state = message;
         showState(message);
         break;
       case "progress":
@@ -1008,7 +1094,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
         explanation.of(Math.floor(message.x), Math.floor(message.y));
         if (message.request === turnAround && message.ray.hits[0]?.point) {
           camera.lookAt(message.ray.hits[0].point);
-          moved();
+          page.moved();
         }
         break;
       case "values":
@@ -1030,42 +1116,18 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     byId("alert-text").textContent = text;
     byId("alert").hidden = title === "";
   }
-  var connected = false;
-  function stood(how) {
-    connected = how === "open";
+  function onStatus(how) {
+    page.connected = how === "open";
     if (how === "open") alertOf("", "");
     if (how === "gone") alertOf("The viewer does not answer.", "It has ended, or the tunnel to it has. This page goes on when it is back.");
     if (how === "refused") alertOf("The viewer does not know this page.", "Open the address that lumbre view printed. It works once, in one tab: to have another one, start the viewer again.");
     if (how === "foreign") alertOf("Another program answers in place of the viewer.", "It cannot prove to be the viewer, and was told nothing.");
-    if (!connected) byId("progress").textContent = "Not connected";
-  }
-  function showProgress(progress) {
-    const { doing, spp = 0, target = 0 } = progress;
-    const words = {
-      reading: "Reading the scene",
-      building: "Building the scene",
-      rendering: "",
-      done: "",
-      waiting: "Waiting for the file to be mended",
-      nothing: "No scene"
-    };
-    let text = words[doing];
-    if (doing === "rendering" || doing === "done") {
-      const parts = [target > 0 ? `${spp} of ${target} samples` : "done"];
-      if (progress.noise != null && spp > 1) parts.push(`noise ${progress.noise.toFixed(4)}`);
-      if (progress.rays_per_second) parts.push(`${large(progress.rays_per_second)} rays/s`);
-      if (doing === "rendering" && progress.left) parts.push(`${spoken(progress.left)} left`);
-      if (doing === "done" && progress.seconds) parts.push(`done in ${spoken(progress.seconds)}`);
-      if (progress.dropped) parts.push(`${progress.dropped} samples dropped`);
-      text = parts.join(" \xB7 ");
-    }
-    byId("progress").textContent = text;
-    byId("bar").value = target > 0 ? spp / target : doing === "done" ? 1 : 0;
+    if (!page.connected) byId("progress").textContent = "Not connected";
   }
   function showState(now) {
     document.title = now.name ? `${now.name} \u2013 Lumbre` : "Lumbre";
     byId("name").textContent = now.name || "Lumbre";
-    if (connected) alertOf(now.error ? now.has_scene ? "The file has an error; this is the last good picture." : "The file has an error." : "", now.error ?? "");
+    if (page.connected) alertOf(now.error ? now.has_scene ? "The file has an error; this is the last good picture." : "The file has an error." : "", now.error ?? "");
     byId("empty").hidden = now.name !== "";
     byId("sheet").hidden = now.name === "";
     const error = byId("edit-error");
@@ -1084,15 +1146,16 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     value("exposure", String(now.exposure ?? 0));
     byId("exposure-value").textContent = (now.exposure ?? 0).toFixed(1);
     value("spp", String(now.spp ?? 64));
+    value("noise-target", now.noise ? String(now.noise) : "");
     byId("false-colour").checked = now.false_colour;
     byId("denoise").checked = now.denoise ?? false;
     editor.take(now.settings);
     byId("save-overlay").disabled = now.settings.length === 0;
     byId("drop-edits").disabled = now.settings.length === 0;
+    const { scene } = page;
     if (!scene) return;
     options(byId("camera"), scene.cameras.map(({ name }, i) => [String(i), name]), String(now.camera));
-    const isOld = now.moved && now.sequence === mine;
-    if (!isOld && !isMoving) camera.take(now, scene);
+    page.takeCamera(now, scene);
     const fov = byId("fov");
     fov.disabled = camera.fov === null;
     value("fov", camera.fov === null ? "" : short(camera.fov));
@@ -1110,7 +1173,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     if (!hovered || now - asked < 40) return;
     asked = now;
     const [x, y] = hovered;
-    connection.send({ type: "values", x: Math.floor(x), y: Math.floor(y), width: 1, height: 1, request: ++request });
+    page.ask({ type: "values", x: Math.floor(x), y: Math.floor(y), width: 1, height: 1 });
   }
   var numbersWait = 0;
   function askNumbers() {
@@ -1118,32 +1181,31 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     if (!rectangle) return;
     clearTimeout(numbersWait);
     const [x, y, width, height] = rectangle;
-    numbersWait = setTimeout(() => connection.send({ type: "values", x, y, width, height, request: ++request }), 60);
+    numbersWait = setTimeout(() => page.ask({ type: "values", x, y, width, height }), 60);
   }
   sheet.changed = askNumbers;
   function key(pressed) {
     const channels = ["beauty", "albedo", "normal", "depth", "uv", "variance", "ids"];
     const channel = channels[Number(pressed) - 1];
-    if (channel) set({ channel });
-    else if (pressed === "r") reset(state?.camera ?? 0);
+    if (channel) page.set({ channel });
+    else if (pressed === "r") page.reset(page.state?.camera ?? 0);
     else if (pressed === "x") explanation.show();
-    else if (pressed === "p") set({ paused: !state?.paused });
+    else if (pressed === "p") page.set({ paused: !page.state?.paused });
     else if (pressed === "0") sheet.zoomOut();
     else if (pressed === "+" || pressed === "=") sheet.zoomBy(1.5);
     else if (pressed === "-") sheet.zoomBy(1 / 1.5);
-    else if (pressed === "[") set({ exposure: (state?.exposure ?? 0) - 0.5 });
-    else if (pressed === "]") set({ exposure: (state?.exposure ?? 0) + 0.5 });
+    else if (pressed === "[") page.set({ exposure: (page.state?.exposure ?? 0) - 0.5 });
+    else if (pressed === "]") page.set({ exposure: (page.state?.exposure ?? 0) + 0.5 });
     else if (pressed === "?") byId("help").showModal();
     else return false;
     return true;
   }
   attach(sheet.picture, sheet, camera, {
-    moved,
+    moved: () => page.moved(),
     key,
     pick(x, y, turns) {
-      request += 1;
+      const request = page.ask({ type: "pick", x, y });
       if (turns) turnAround = request;
-      connection.send({ type: "pick", x, y, request });
     },
     hover(at) {
       hovered = at;
@@ -1151,37 +1213,39 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       else byId("pixel").textContent = "";
     }
   });
-  var explanation = new Explanation((errand) => connection.ticket(errand));
-  var editor = new Editor(byId("parameters"), byId("filter"), (path, value) => connection.send({ type: "edit", path, value }));
+  var ticket = (errand) => page.connection?.ticket(errand) ?? Promise.reject(new Error("not connected"));
+  var explanation = new Explanation(ticket);
+  var editor = new Editor(byId("parameters"), byId("filter"), (path, value) => page.send({ type: "edit", path, value }));
   function on(id, event, act) {
     const input = byId(id);
     input.addEventListener(event, () => act(input));
   }
-  on("pause", "click", () => set({ paused: !state?.paused }));
-  on("reset", "click", () => reset(state?.camera ?? 0));
+  on("pause", "click", () => page.set({ paused: !page.state?.paused }));
+  on("reset", "click", () => page.reset(page.state?.camera ?? 0));
   on("help-open", "click", () => byId("help").showModal());
   on("help-close", "click", () => byId("help").close());
-  on("channel", "change", ({ value }) => set({ channel: value }));
-  on("exposure", "input", ({ value }) => set({ exposure: Number(value) }));
-  on("tone-map", "change", ({ value }) => set({ tone_map: value }));
-  on("false-colour", "change", ({ checked }) => set({ false_colour: checked }));
-  on("denoise", "change", ({ checked }) => set({ denoise: checked }));
-  on("scale", "change", ({ value }) => set({ scale: Number(value) }));
-  on("spp", "change", (input) => input.checkValidity() && set({ spp: Number(input.value) }));
-  on("camera", "change", ({ value }) => reset(Number(value)));
+  on("channel", "change", ({ value }) => page.set({ channel: value }));
+  on("exposure", "input", ({ value }) => page.set({ exposure: Number(value) }));
+  on("tone-map", "change", ({ value }) => page.set({ tone_map: value }));
+  on("false-colour", "change", ({ checked }) => page.set({ false_colour: checked }));
+  on("denoise", "change", ({ checked }) => page.set({ denoise: checked }));
+  on("scale", "change", ({ value }) => page.set({ scale: Number(value) }));
+  on("noise-target", "change", (input) => input.checkValidity() && page.set({ noise: Number(input.value) }));
+  on("spp", "change", (input) => input.checkValidity() && page.set({ spp: Number(input.value) }));
+  on("camera", "change", ({ value }) => page.reset(Number(value)));
   on("fov", "change", (input) => {
     if (!input.checkValidity()) return;
     camera.fov = Number(input.value);
-    moved();
+    page.moved();
   });
-  var moment = (wishes) => connection.send({ type: "moment", time: state?.time ?? null, variant: state?.variant ?? null, ...wishes });
+  var moment = (wishes) => page.send({ type: "moment", time: page.state?.time ?? null, variant: page.state?.variant ?? null, ...wishes });
   on("animation-time", "input", ({ value }) => moment({ time: Number(value) }));
   on("variant", "change", ({ value }) => moment({ variant: value || null }));
-  on("save-overlay", "click", () => save(`${state?.name ?? "scene"}.overlay.txt`, editor.overlay()));
+  on("save-overlay", "click", () => save(`${page.state?.name ?? "scene"}.overlay.txt`, editor.overlay()));
   on("drop-edits", "click", () => editor.dropAll());
   async function savePicture(format) {
     try {
-      const link = element("a", "", { href: await connection.ticket({ for: "picture", format }), download: `picture.${format}` });
+      const link = element("a", "", { href: await ticket({ for: "picture", format }), download: `picture.${format}` });
       link.click();
     } catch {
       alertOf("The picture was not saved.", "The viewer does not answer.");
@@ -1221,11 +1285,12 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     }
   });
   if (data) hideWhatNeedsAViewer();
+  var stage = byId("stage");
   async function drop(file) {
     if (!file) return;
     try {
       const headers = { "Content-Type": "application/octet-stream" };
-      const answer = await fetch(await connection.ticket({ for: "scene" }), { method: "POST", headers, body: file });
+      const answer = await fetch(await ticket({ for: "scene" }), { method: "POST", headers, body: file });
       if (!answer.ok) alertOf("The file was not opened.", await answer.text());
     } catch {
       alertOf("The file was not opened.", "The viewer does not answer.");

@@ -2,7 +2,7 @@
 import type { Camera } from "./camera";
 import type { Sheet } from "./sheet";
 
-export interface Wishes {
+export interface InputHandlers {
   /** The camera has moved. */
   moved(): void;
   /** What is at this place of the picture? Whether to turn around it from now on. */
@@ -15,7 +15,7 @@ export interface Wishes {
 /** How far a pointer goes before it is a drag, in screen pixels. */
 const STILL = 4;
 
-export function attach(canvas: HTMLCanvasElement, sheet: Sheet, camera: Camera, wishes: Wishes): void {
+export function attach(canvas: HTMLCanvasElement, sheet: Sheet, camera: Camera, handlers: InputHandlers): void {
   const pointers = new Map<number, PointerEvent>();
   let travelled = 0;
   const spread = () => {
@@ -32,7 +32,7 @@ export function attach(canvas: HTMLCanvasElement, sheet: Sheet, camera: Camera, 
   canvas.addEventListener("pointermove", (event) => {
     const before = pointers.get(event.pointerId);
     if (!before) {
-      wishes.hover(sheet.at(event.clientX, event.clientY));
+      handlers.hover(sheet.at(event.clientX, event.clientY));
       return;
     }
     const wide = spread();
@@ -56,22 +56,22 @@ export function attach(canvas: HTMLCanvasElement, sheet: Sheet, camera: Camera, 
     } else {
       camera.orbit((-dx / height) * Math.PI, (dy / height) * Math.PI);
     }
-    wishes.moved();
+    handlers.moved();
   });
   const up = (event: PointerEvent) => {
     const was = pointers.delete(event.pointerId);
     if (was && pointers.size === 0 && travelled < STILL && event.type === "pointerup" && event.button === 0) {
       const at = sheet.at(event.clientX, event.clientY);
-      if (at) wishes.pick(at[0], at[1], false);
+      if (at) handlers.pick(at[0], at[1], false);
     }
   };
   canvas.addEventListener("pointerup", up);
   canvas.addEventListener("pointercancel", up);
-  canvas.addEventListener("pointerleave", () => wishes.hover(null));
+  canvas.addEventListener("pointerleave", () => handlers.hover(null));
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   canvas.addEventListener("dblclick", (event) => {
     const at = sheet.at(event.clientX, event.clientY);
-    if (at) wishes.pick(at[0], at[1], true);
+    if (at) handlers.pick(at[0], at[1], true);
   });
   canvas.addEventListener("wheel", (event) => {
     event.preventDefault();
@@ -82,7 +82,7 @@ export function attach(canvas: HTMLCanvasElement, sheet: Sheet, camera: Camera, 
       return;
     }
     camera.dolly(factor);
-    wishes.moved();
+    handlers.moved();
   }, { passive: false });
 
   const held = new Set<string>();
@@ -107,7 +107,7 @@ export function attach(canvas: HTMLCanvasElement, sheet: Sheet, camera: Camera, 
       if (key === "pageup" || key === "pagedown") camera.dolly(Math.exp(key === "pageup" ? -by : by));
       any ||= key !== "shift";
     }
-    if (any) wishes.moved();
+    if (any) handlers.moved();
     requestAnimationFrame(fly);
   };
   canvas.addEventListener("keydown", (event) => {
@@ -121,8 +121,8 @@ export function attach(canvas: HTMLCanvasElement, sheet: Sheet, camera: Camera, 
       }
       held.add(key);
     } else if (key === "enter") {
-      wishes.pick(sheet.width / 2, sheet.height / 2, false);
-    } else if (wishes.key(key)) {
+      handlers.pick(sheet.width / 2, sheet.height / 2, false);
+    } else if (handlers.key(key)) {
       event.preventDefault();
     }
   });

@@ -28,14 +28,17 @@ export interface State {
   name: string; has_scene: boolean; error: string | null; edit_error: string | null;
   camera: number; sequence: number; moved: boolean; placement: Placement | null; fov: number | null; zoom: number;
   size: [number, number] | null;
-  channel: string; scale: number; spp: number | null; denoise: boolean | null; paused: boolean;
+  channel: string; scale: number; spp: number | null; noise: number | null; denoise: boolean | null; paused: boolean;
   exposure: number | null; tone_map: string | null; false_colour: boolean;
   time: number | null; variant: string | null; settings: [string, string][];
 }
 
 export interface Progress {
   doing: "reading" | "building" | "rendering" | "done" | "waiting" | "nothing";
-  spp?: number; target?: number; noise?: number | null; rays_per_second?: number; seconds?: number; left?: number; dropped?: number;
+  spp?: number; target?: number; noise?: number | null; rays_per_second?: number; seconds?: number; dropped?: number;
+  /** How much of the way to the end is gone, in [0, 1], and the seconds that are left; `null` where it is not known yet. */
+  share?: number; left?: number | null;
+  noise_target?: number | null;
 }
 
 /** A shape of the file, or the ground. */
@@ -49,7 +52,7 @@ export interface Hit extends Thing {
 
 export type Value = number | string;
 
-export type Told =
+export type Message =
   | ({ type: "state" } & State)
   | { type: "scene"; scene: Scene }
   | ({ type: "progress" } & Progress)
@@ -61,7 +64,7 @@ export type Told =
 /** A picture with its size, that of the whole one, and what it shows. */
 export interface Frame {
   width: number; height: number; fullWidth: number; fullHeight: number;
-  spp: number; sequence: number; isFull: boolean; isDone: boolean; pixels: ImageData;
+  spp: number; sequence: number; isFull: boolean; isDone: boolean; isDenoised: boolean; pixels: ImageData;
 }
 
 const HEADER = 32;
@@ -73,5 +76,5 @@ export function decoded(packet: ArrayBuffer): Frame {
   const [magic = 0, width = 0, height = 0, fullWidth = 0, fullHeight = 0, spp = 0, sequence = 0, flags = 0] = numbers;
   if (magic !== MAGIC || packet.byteLength !== HEADER + 4 * width * height) throw new Error("no frame");
   const pixels = new ImageData(new Uint8ClampedArray(packet, HEADER), width, height);
-  return { width, height, fullWidth, fullHeight, spp, sequence, isFull: (flags & 1) !== 0, isDone: (flags & 2) !== 0, pixels };
+  return { width, height, fullWidth, fullHeight, spp, sequence, isFull: (flags & 1) !== 0, isDone: (flags & 2) !== 0, isDenoised: (flags & 4) !== 0, pixels };
 }

@@ -116,6 +116,14 @@ async function view(...words) {
   return { url, stop: () => (child.kill("SIGINT"), ended) };
 }
 
+/** The picture that is rendered of these words, as the pixels of a page. */
+function rendered(...words) {
+  const out = join(folder, "wanted.png");
+  execFileSync(program, ["render", ...words, "-o", out, "-q"]);
+  const png = PNG.sync.read(readFileSync(out));
+  return [png.width, png.height, ...png.data];
+}
+
 const browser = await chromium.launch({ executablePath, args: ["--no-sandbox"] });
 const wrong = [];
 async function open(url, settings = {}) {
@@ -183,6 +191,57 @@ const tests = {
       await other.waitForFunction(() => /does not know this page/.test(document.getElementById("alert").textContent));
       assert.equal(await other.isVisible("#picked table"), false);
     }
+    await viewer.stop();
+  },
+
+  async "a model is without noise from the first picture on, and ends as it is rendered"() {
+    const path = join(folder, "clean.glb");
+    writeFileSync(path, model());
+    const words = ["--size", "320x240", "--spp", "8", path];
+    const viewer = await view(...words);
+    const page = await open(viewer.url);
+    await done(page);
+    const { noisy, firstDenoised, first } = await page.evaluate(() => lumbreMeasured);
+    assert.equal(noisy, 0, "every frame is denoised, coarse ones too");
+    assert.ok(first > 0 && firstDenoised === first);
+    assert.deepEqual(await pixels(page), rendered(...words));
+    const clean = await pixels(page);
+    await page.click("#denoise");
+    await becomes(page, clean, false);
+    assert.ok(await page.evaluate(() => lumbreMeasured.noisy) > 1);
+    assert.deepEqual(await pixels(page), rendered("--denoise", "none", ...words));
+    await page.click("#denoise");
+    await becomes(page, clean, true);
+    await viewer.stop();
+  },
+
+  async "it renders to a noise target as render does, and tells how far it is within a pass"() {
+    const path = join(folder, "noise.pbrt");
+    writeFileSync(path, SCENE.replace("[0.5 0.6 0.7]", "[0.5 0.6 0.7] LightSource \"point\" \"point3 from\" [3 -4 2] \"rgb I\" [9 9 9]"));
+    const viewer = await view("--noise", "0.05", path);
+    const page = await open(viewer.url);
+    await done(page);
+    const wanted = rendered("--noise", "0.05", path);
+    assert.deepEqual(await pixels(page), wanted);
+    assert.equal(await page.inputValue("#noise-target"), "0.05");
+    assert.match(await page.textContent("#progress"), /noise 0\.0\d+ of 0\.05/);
+    // The page has its own target.
+    await page.fill("#noise-target", "0.1");
+    await page.keyboard.press("Tab");
+    await becomes(page, rendered("--noise", "0.1", path), true);
+    await page.fill("#noise-target", "0");
+    await page.keyboard.press("Tab");
+    // A long pass tells how far it is: many shares of one number of samples.
+    await page.fill("#spp", "100000");
+    await page.evaluate(() => {
+      globalThis.bars = new Set();
+      new MutationObserver(() => bars.add(document.getElementById("bar").value)).observe(document.getElementById("progress"), { childList: true, characterData: true, subtree: true });
+    });
+    await page.keyboard.press("Tab");
+    await page.waitForFunction(() => bars.size > 12);
+    const bars = await page.evaluate(() => [...globalThis.bars]);
+    assert.ok(bars.every((value) => value >= 0 && value < 1), String(bars));
+    assert.match(await page.textContent("#progress"), /\d+ % · .* left/);
     await viewer.stop();
   },
 
