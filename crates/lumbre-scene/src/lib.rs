@@ -31,7 +31,7 @@ mod surface;
 mod tables;
 mod viewpoint;
 
-pub use camera::{Camera, CameraKind, CameraRay, SphericalMapping, View, WideProjection};
+pub use camera::{Camera, CameraKind, CameraRay, ClipPlane, SphericalMapping, View, WideProjection};
 pub use desc::*;
 pub use emission::Emission;
 pub use error::BuildError;

@@ -6,7 +6,7 @@
 pub use lumbre_scene::light;
 pub use lumbre_scene::{
     AreaLightDesc, Boundary, BuildError as DescriptionError, BuildWarning, Camera, CameraKind, CameraRay,
-    ColouredShape, CsgDesc, CsgOperation, Emission, EnvironmentDesc, EnvironmentMapping, FilmDesc,
+    ClipPlane, ColouredShape, CsgDesc, CsgOperation, Emission, EnvironmentDesc, EnvironmentMapping, FilmDesc,
     FilterDesc, Footprint, GeometryDesc, Ground, GroundDesc, GroundPlane, InstanceDesc, IntegratorDesc,
     IntegratorKind, Interaction, Light, LightDesc, LightId, LightSample, MaterialId, MediumId, MeshDesc,
     MeshMoment, MeshMotion, NamedMaterial, ObjectDesc, ObjectId, Placement, SamplerDesc, SamplerKind,
