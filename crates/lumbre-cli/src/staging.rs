@@ -15,7 +15,7 @@ use crate::failure::Failure;
 use crate::names::one_of;
 
 /// How a model is shown.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Showing a model")]
 pub(crate) struct StagingArguments {
     /// What the model stands on: none, shadow (ground of which only the shadow is seen) or plane (matte grey). By default a
@@ -176,6 +176,11 @@ impl StagingArguments {
             Some(BackgroundArgument::File(path)) => Some(path.as_path()),
             _ => None,
         }
+    }
+
+    /// The same in the light of a picture from all around.
+    pub(crate) fn in_light_of(&self, picture: &Path) -> Self {
+        Self { env: Some(picture.to_owned()), ..self.clone() }
     }
 
     /// The files that the stage is made of.

@@ -2,6 +2,7 @@
 #![doc = include_str!("../README.md")]
 
 mod base64;
+mod bundle;
 mod camera;
 mod export;
 mod frame;
@@ -14,6 +15,7 @@ mod session;
 mod socket;
 mod source;
 mod stage;
+mod tree;
 mod viewer;
 mod visitors;
 mod watching;
@@ -22,4 +24,5 @@ mod worker;
 pub use base64::base64;
 pub use export::export;
 pub use source::{Built, Explain, Moment, Read, Source, SourceError};
+pub use tree::Hidden;
 pub use viewer::{Closer, Options, Viewer};

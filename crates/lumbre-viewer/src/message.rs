@@ -1,9 +1,9 @@
 //! What a page says.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::camera::Placement;
-use crate::frame::Channel;
+use crate::frame::{Channel, Map};
 
 /// A message of a page. Whatever else one holds is an error: a page is of the same program.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
@@ -19,6 +19,10 @@ pub(crate) enum Message {
     Set(Box<Wishes>),
     /// A parameter of the scene; without a value that of the file.
     Edit { path: String, value: Option<String> },
+    /// Shapes that are hidden, or with `others` all but these; none shows everything.
+    Hide { shapes: Vec<u32>, others: bool },
+    /// What is in front of a plane, where its normal points, is not seen by the camera; without a plane, everything is.
+    Section { plane: Option<Plane> },
     /// A moment of an animation, a variant.
     Moment { time: Option<f64>, variant: Option<String> },
     /// What is there at a pixel of the full picture.
@@ -27,6 +31,31 @@ pub(crate) enum Message {
     Ticket { request: u32, errand: Errand },
     /// The values of a rectangle of pixels.
     Values { x: u32, y: u32, width: u32, height: u32, request: u32 },
+}
+
+/// A plane by a point and a normal of any length but 0.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Plane {
+    pub point: [f64; 3],
+    pub normal: [f64; 3],
+}
+
+impl Message {
+    /// Whether who only watches may say it: it asks, and changes nothing.
+    pub(crate) fn only_asks(&self) -> bool {
+        match self {
+            Self::Shown {} | Self::Pick { .. } | Self::Values { .. } => true,
+            Self::Ticket { errand, .. } => !matches!(errand, Errand::Scene {}),
+            Self::Camera { .. }
+            | Self::Reset { .. }
+            | Self::Set(_)
+            | Self::Edit { .. }
+            | Self::Hide { .. }
+            | Self::Section { .. }
+            | Self::Moment { .. } => false,
+        }
+    }
 }
 
 /// The first message of a page.
@@ -45,7 +74,7 @@ pub(crate) enum Errand {
     Picture { format: FileFormat },
     /// It takes a page on how the colour of a pixel comes about.
     Explanation { language: String, pixel: (u32, u32) },
-    /// It sends a scene.
+    /// It sends a scene, or a picture for its light.
     Scene {},
 }
 
@@ -71,6 +100,10 @@ pub(crate) struct Wishes {
     pub spp: Option<u32>,
     /// 0 for none.
     pub noise: Option<f64>,
+    /// The colours of numbers.
+    pub map: Option<Map>,
+    /// The numbers at both ends of these colours; none to find them.
+    pub range: Option<Vec<f32>>,
 }
 
 #[cfg(test)]

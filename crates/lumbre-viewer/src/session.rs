@@ -10,10 +10,11 @@ use serde_json::{Value, json};
 use tokio::sync::watch;
 
 use crate::camera::Placement;
-use crate::frame::{Channel, Frame, Look, Pixels, Shot};
-use crate::message::{Message, Wishes};
+use crate::frame::{Channel, Frame, Look, Map, Pixels, Shot};
+use crate::message::{Message, Plane, Wishes};
 use crate::source::{Moment, Source};
 use crate::stage::Stage;
+use crate::tree::{Hidden, MAX_NAMED};
 use crate::watching::Watched;
 
 /// How often something was changed, by what has to be done again.
@@ -50,6 +51,10 @@ pub(crate) struct Wanted {
     pub exposure: Option<f32>,
     pub tone_map: Option<ToneMap>,
     pub false_colour: bool,
+    pub map: Map,
+    pub range: Option<[f32; 2]>,
+    pub hidden: Hidden,
+    pub section: Option<Plane>,
     pub moment: Moment,
     /// Parameters with their values, in the order in which they were first set.
     pub settings: Vec<(String, String)>,
@@ -118,6 +123,10 @@ impl Session {
             exposure: None,
             tone_map: None,
             false_colour: false,
+            map: Map::default(),
+            range: None,
+            hidden: Hidden::default(),
+            section: None,
             moment: Moment::default(),
             settings: Vec::new(),
         };
@@ -200,6 +209,14 @@ impl Session {
         self.change(|inner| inner.wanted.changes.read += 1);
     }
 
+    /// Shows the scene in other light.
+    pub(crate) fn relight(&self, source: Arc<dyn Source>) {
+        self.change(|inner| {
+            inner.source = source;
+            inner.wanted.changes.read += 1;
+        });
+    }
+
     /// Shows another scene.
     pub(crate) fn open(&self, source: Arc<dyn Source>) {
         self.change(|inner| {
@@ -207,6 +224,7 @@ impl Session {
             inner.source = source;
             let wanted = &mut inner.wanted;
             (wanted.camera, wanted.moved, wanted.moment) = (0, None, Moment::default());
+            (wanted.hidden, wanted.section) = (Hidden::default(), None);
             wanted.settings.clear();
             wanted.changes.read += 1;
         });
@@ -317,6 +335,10 @@ impl Session {
             "exposure": wanted.exposure.or(stage.as_ref().map(|stage| stage.save.exposure)),
             "tone_map": wanted.tone_map.or(stage.as_ref().map(|stage| stage.save.tone_map)).map(tone_map_name),
             "false_colour": wanted.false_colour,
+            "map": wanted.map,
+            "range": wanted.range,
+            "hidden": wanted.hidden.told(),
+            "section": wanted.section,
             "time": wanted.moment.time,
             "variant": wanted.moment.variant,
             "settings": wanted.settings,
@@ -348,6 +370,23 @@ impl Session {
             }
             Message::Set(wishes) => self.wish(&wishes),
             Message::Edit { path, value } => self.edit(path, value),
+            Message::Hide { shapes, .. } if shapes.len() > MAX_NAMED => {
+                Some(json!({ "type": "wrong", "what": format!("more than {MAX_NAMED} shapes are named") }))
+            }
+            Message::Hide { shapes, others } => {
+                self.change(|inner| {
+                    inner.wanted.hidden = Hidden::new(shapes, others);
+                    inner.wanted.changes.build += 1;
+                });
+                None
+            }
+            Message::Section { plane } => {
+                self.change(|inner| {
+                    inner.wanted.section = plane;
+                    inner.wanted.changes.render += 1;
+                });
+                None
+            }
             Message::Moment { time, variant } => {
                 let is_fine = time.is_none_or(|time| time.is_finite() && time.abs() < 1e9);
                 if is_fine && variant.as_ref().is_none_or(|name| name.len() <= LONGEST_SETTING) {
@@ -375,6 +414,13 @@ impl Session {
             wanted.exposure = wishes.exposure.map(|stops| stops.clamp(-100.0, 100.0)).or(wanted.exposure);
             wanted.tone_map = tone_map.or(wanted.tone_map);
             wanted.false_colour = wishes.false_colour.unwrap_or(wanted.false_colour);
+            wanted.map = wishes.map.unwrap_or(wanted.map);
+            if let Some(range) = &wishes.range {
+                wanted.range = match range[..] {
+                    [low, high] if low < high && low.is_finite() && high.is_finite() => Some([low, high]),
+                    _ => None,
+                };
+            }
             wanted.channel = wishes.channel.unwrap_or(wanted.channel);
             wanted.denoise = wishes.denoise.or(wanted.denoise);
             wanted.paused = wishes.paused.unwrap_or(wanted.paused);
@@ -387,8 +433,10 @@ impl Session {
                 wanted.spp =
                     if noise > 0.0 { wanted.spp.or(most) } else { wanted.spp.filter(|_| wanted.spp != most) };
             }
-            let is_same_look = (before.exposure, before.tone_map, before.false_colour)
-                == (wanted.exposure, wanted.tone_map, wanted.false_colour);
+            let look = |wanted: &Wanted| {
+                (wanted.exposure, wanted.tone_map, wanted.false_colour, wanted.map, wanted.range)
+            };
+            let is_same_look = look(&before) == look(wanted);
             let is_same_picture = (before.channel, before.denoise, before.scale, before.noise)
                 == (wanted.channel, wanted.denoise, wanted.scale, wanted.noise);
             wanted.changes.look += u64::from(!is_same_look);

@@ -5,17 +5,18 @@ use std::str::FromStr;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use lumbre::description::IntegratorKind;
+use lumbre::description::{Camera, ClipPlane, IntegratorKind};
 use lumbre::image::{Image, Rgb};
 use lumbre::{
-    CancelToken, ErrorKind, NoProgress, Picture, Progress, RenderOptions, RenderState, SceneDesc, Setting,
-    State, Stats, Stop,
+    CancelToken, DVec3, ErrorKind, NoProgress, Picture, Progress, RenderOptions, RenderState, SceneDesc,
+    Setting, State, Stats, Stop,
 };
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use crate::camera::moved;
 use crate::frame::{Channel, Look, Pixels, Shot, id_colour};
+use crate::message::Plane;
 use crate::session::{Changes, Session, Wanted};
 use crate::source::{Read, SourceError};
 use crate::stage::{Stage, ray};
@@ -162,8 +163,13 @@ impl Worker {
             }
         }
         self.session.edited(wrong);
-        let built = source.build(desc)?;
-        Ok(Arc::new(Stage::new(built, &read.desc, read.warnings.clone())))
+        let built = source.build(desc, &wanted.hidden)?;
+        let mut stage = Stage::new(built, &read.desc, read.warnings.clone());
+        // A shape that is hidden does not change what the camera turns around.
+        if let Some(before) = self.stage.as_ref().filter(|before| !again && before.cameras == stage.cameras) {
+            stage.placements.clone_from(&before.placements);
+        }
+        Ok(Arc::new(stage))
     }
 
     /// Begins a picture anew.
@@ -182,6 +188,7 @@ impl Worker {
                 }
             }
         };
+        let camera = Camera { clip: wanted.section.as_ref().and_then(clip), ..camera };
         let replaced = stage.scene_mut().replace_camera(options.camera, camera);
         if let Err(error) = replaced {
             return self.fail(&error);
@@ -214,17 +221,18 @@ impl Worker {
         self.options.stop.noise = noise(wanted, &stage);
         (self.state, self.noise) = (None, None);
         (self.spent, self.shown) = (Duration::ZERO, Duration::ZERO);
-        let target = self.options.stop.spp;
-        let pixels = self.pixels();
-        // To a noise target there is no telling yet.
-        let left = self.options.stop.noise.is_none().then_some(pixels * f64::from(target) / self.speed);
-        self.session.tell_progress(&json!({
-            "type": "progress", "doing": "rendering", "spp": 0, "target": target, "share": 0, "left": left,
-            "noise_target": self.options.stop.noise,
-        }));
+        self.tell_start(None);
         self.sequence = wanted.sequence;
         self.step =
             if wanted.channel == Channel::Ids { Step::Full(1) } else { Step::First(self.coarseness()) };
+    }
+
+    /// Says that no sample of the full picture is taken yet, and how long it will take, as far as that is known.
+    fn tell_start(&self, left: Option<f64>) {
+        self.session.tell_progress(&json!({
+            "type": "progress", "doing": "rendering", "spp": 0, "target": self.options.stop.spp, "share": 0, "left": left,
+            "noise_target": self.options.stop.noise,
+        }));
     }
 
     fn target(&self, wanted: &Wanted, stage: &Stage) -> u32 {
@@ -272,7 +280,7 @@ impl Worker {
         let mut save = self.stage.as_ref().map(|stage| stage.save.clone()).unwrap_or_default();
         save.exposure = wanted.exposure.unwrap_or(save.exposure);
         save.tone_map = wanted.tone_map.unwrap_or(save.tone_map);
-        Look { save, false_colour: wanted.false_colour }
+        Look { save, false_colour: wanted.false_colour, map: wanted.map, range: wanted.range }
     }
 
     /// Takes the next step.
@@ -314,6 +322,9 @@ impl Worker {
         };
         let pixels = Pixels::Rendered(Box::new(picture));
         self.show(wanted, Shown { pixels, is_full: false, is_done: false, is_denoised });
+        // To a noise target there is no telling yet.
+        let samples = self.pixels() * f64::from(self.options.stop.spp);
+        self.tell_start(self.options.stop.noise.is_none().then_some(samples / self.speed));
         self.step = if side > 5 { Step::Coarse(side / 3) } else { Step::Full(1) };
     }
 
@@ -429,8 +440,9 @@ impl Worker {
         if self.options.stop.noise.is_some() { by_noise.max(by_spp) } else { by_spp }
     }
 
+    /// Pixels that are rendered: those of the film's crop.
     fn pixels(&self) -> f64 {
-        f64::from(self.options.width) * f64::from(self.options.height)
+        self.options.bounds().map_or(1.0, |bounds| bounds.area() as f64)
     }
 
     fn tell_of(&mut self, stats: &Stats, is_done: bool) {
@@ -544,6 +556,14 @@ impl Progress for Telling<'_> {
     fn is_wanted(&self) -> bool {
         self.session.is_wanted(self.known)
     }
+}
+
+/// The plane of a section; `None` for one without a direction.
+fn clip(plane: &Plane) -> Option<ClipPlane> {
+    let [point, normal] = [plane.point, plane.normal].map(DVec3::from_array);
+    let is_fine = point.is_finite() && point.length() < 1e12;
+    let normal = normal.try_normalize().filter(|_| is_fine)?;
+    Some(ClipPlane { point, normal })
 }
 
 /// The noise at which a picture of light ends, if it is to end at one.

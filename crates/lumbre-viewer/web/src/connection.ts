@@ -6,8 +6,10 @@ import { decoded, type Frame, type Message } from "./protocol";
 export interface Listener {
   onMessage(message: Message): void;
   onFrame(frame: Frame): void;
-  /** The viewer is there, gone, does not know this page, or is another program. */
-  onStatus(how: "open" | "gone" | "refused" | "foreign"): void;
+  /** The viewer lets this page in. */
+  onOpen(access: Access): void;
+  /** The viewer is gone, does not know this page, or is another program. */
+  onStatus(how: "gone" | "refused" | "foreign"): void;
 }
 
 /** What a page asks an address for, which works once. */
@@ -19,7 +21,10 @@ export type Errand =
 /** What is said before a page is let in. */
 type Greeting =
   | { type: "challenge"; nonce: string }
-  | { type: "welcome"; proof: string; session: string | null };
+  | { type: "welcome"; proof: string; session: string | null; access: Access };
+
+/** What this page may do: all, or look on. */
+export type Access = "edit" | "watch";
 
 /** The code with which a page is sent away. */
 const UNKNOWN = 4403;
@@ -92,7 +97,7 @@ export class Connection {
       if (message.type !== "welcome" || !challenge || message.proof !== proof(known, "viewer", challenge, nonce)) return false;
       if (message.session) sessionStorage.setItem(SECRET, message.session);
       [this.isIn, this.wait] = [true, 500];
-      this.listener.onStatus("open");
+      this.listener.onOpen(message.access);
       return true;
     };
     const lost = (how: "gone" | "refused" | "foreign"): void => {

@@ -1,27 +1,37 @@
 // The page: what comes from the viewer is shown, what is wished goes to it.
-import { Connection, type Errand, type Listener } from "./connection";
+import { Connection, type Access, type Errand, type Listener } from "./connection";
+import { Display } from "./display";
+import { Drop } from "./drop";
 import { Editor } from "./edit";
-import { byId, element, options, save, short } from "./elements";
+import { byId, element, options, save, saveBlob, short } from "./elements";
 import { Explanation } from "./explanation";
 import { showFacts, showHits } from "./facts";
 import { attach } from "./hands";
+import { LightList } from "./lights";
+import { Measure } from "./measure";
 import { Page } from "./page";
 import { showProgress } from "./progress";
-import type { Frame, Message, State } from "./protocol";
+import type { Frame, Message, State, Thing } from "./protocol";
+import { Section } from "./section";
 import { StaticConnection, hideWhatNeedsAViewer, type Data } from "./static-connection";
+import { SceneTree } from "./tree";
+import { Views, type Standard } from "./views";
 
 const page = new Page();
 const { sheet, camera } = page;
-const listener: Listener = { onMessage, onFrame, onStatus };
+const listener: Listener = { onMessage, onFrame, onOpen, onStatus };
 const data = (globalThis as { lumbreAtRest?: Data }).lumbreAtRest;
 page.connection = data ? new StaticConnection(listener, data) : new Connection(listener);
 let turnAround = 0;
+/** What was clicked last. */
+let picked: Thing | undefined;
 let hovered: [number, number] | null = null;
 let asked = 0;
 
 // ---- what comes
 function onFrame(frame: Frame): void {
-  page.show(frame);
+  page.show(display.shown(frame));
+  display.draw();
   if (frame.isFull) askNumbers();
   if (hovered && frame.isFull) askPixel();
 }
@@ -32,6 +42,8 @@ function onMessage(message: Message): void {
       page.scene = message.scene;
       showFacts(byId("facts"), byId("warnings"), message.scene);
       editor.list(message.scene.parameters);
+      lights.list(message.scene.parameters);
+      tree.list(message.scene);
       explanation.offer(message.scene.languages);
       if (page.state) showState(page.state);
       break;
@@ -44,6 +56,8 @@ function onMessage(message: Message): void {
       break;
     case "picked":
       showHits(byId("picked"), message.ray.hits);
+      select(message.ray.hits[0]);
+      measure.take(message.x, message.y, message.ray.hits[0]);
       explanation.of(Math.floor(message.x), Math.floor(message.y));
       if (message.request === turnAround && message.ray.hits[0]?.point) {
         camera.lookAt(message.ray.hits[0].point);
@@ -65,19 +79,37 @@ function onMessage(message: Message): void {
   }
 }
 
+/** A shape was clicked, in the picture or in the tree: it is marked everywhere. */
+function select(thing: Thing | undefined): void {
+  picked = thing;
+  tree.select(thing?.shape ?? -1);
+  editor.mark(thing?.owner ?? null);
+  const isShape = thing !== undefined && thing.kind !== "ground";
+  byId("picked-buttons").hidden = !isShape || data !== undefined || page.watches;
+  byId("edit-picked").hidden = !thing?.owner;
+  byId("light-picked").hidden = !thing?.shines;
+}
+
 function alertOf(title: string, text: string): void {
   byId("alert-title").textContent = title;
   byId("alert-text").textContent = text;
   byId("alert").hidden = title === "";
 }
 
-function onStatus(how: "open" | "gone" | "refused" | "foreign"): void {
-  page.connected = how === "open";
-  if (how === "open") alertOf("", "");
+function onOpen(access: Access): void {
+  page.connected = true;
+  page.watches = access === "watch";
+  byId("watching").hidden = !page.watches;
+  if (page.watches) hideWhatNeedsAViewer(true);
+  alertOf("", "");
+}
+
+function onStatus(how: "gone" | "refused" | "foreign"): void {
+  page.connected = false;
   if (how === "gone") alertOf("The viewer does not answer.", "It has ended, or the tunnel to it has. This page goes on when it is back.");
   if (how === "refused") alertOf("The viewer does not know this page.", "Open the address that lumbre view printed. It works once, in one tab: to have another one, start the viewer again.");
   if (how === "foreign") alertOf("Another program answers in place of the viewer.", "It cannot prove to be the viewer, and was told nothing.");
-  if (!page.connected) byId("progress").textContent = "Not connected";
+  byId("progress").textContent = "Not connected";
 }
 
 function showState(now: State): void {
@@ -106,12 +138,19 @@ function showState(now: State): void {
   byId<HTMLInputElement>("false-colour").checked = now.false_colour;
   byId<HTMLInputElement>("denoise").checked = now.denoise ?? false;
   editor.take(now.settings);
+  lights.take(now.settings);
+  tree.take(now.hidden);
+  display.take(now);
+  section.take(now);
+  views.open(now.name);
   byId<HTMLButtonElement>("save-overlay").disabled = now.settings.length === 0;
   byId<HTMLButtonElement>("drop-edits").disabled = now.settings.length === 0;
   const { scene } = page;
   if (!scene) return;
   options(byId("camera"), scene.cameras.map(({ name }, i) => [String(i), name]), String(now.camera));
   page.takeCamera(now, scene);
+  byId("ground-details").hidden = scene.ground === null;
+  byId<HTMLInputElement>("below-ground").checked = camera.mayGoBelow;
   const fov = byId<HTMLInputElement>("fov");
   fov.disabled = camera.fov === null;
   value("fov", camera.fov === null ? "" : short(camera.fov));
@@ -145,14 +184,26 @@ function askNumbers(): void {
 sheet.changed = askNumbers;
 
 // ---- what the hand does
-function key(pressed: string): boolean {
-  const channels = ["beauty", "albedo", "normal", "depth", "uv", "variance", "ids"];
-  const channel = channels[Number(pressed) - 1];
+const CHANNELS = ["beauty", "albedo", "normal", "depth", "uv", "variance", "ids"];
+const VIEWS: Record<string, Standard> = { 1: "front", 3: "right", 7: "top" };
+
+function key(event: KeyboardEvent): boolean {
+  const pressed = event.key.toLowerCase();
+  // With Shift, the key of a digit has another sign on each keyboard.
+  const digit = /^(?:Digit|Numpad)([0-9])$/.exec(event.code)?.[1] ?? pressed;
+  const channel = event.shiftKey ? CHANNELS[Number(digit) - 1] : undefined;
+  const view = VIEWS[digit];
   if (channel) page.set({ channel });
+  else if (view) views.show(event.ctrlKey ? Views.opposite(view) : view);
+  else if (event.ctrlKey) return false;
+  else if (digit === "9") views.turn();
   else if (pressed === "r") page.reset(page.state?.camera ?? 0);
   else if (pressed === "x") explanation.show();
+  else if (pressed === "m") measure.toggle();
+  else if (pressed === "h" && picked) tree.hide(picked.shape);
+  else if (pressed === "i" && picked) tree.isolate(picked.shape);
   else if (pressed === "p") page.set({ paused: !page.state?.paused });
-  else if (pressed === "0") sheet.zoomOut();
+  else if (digit === "0") sheet.zoomOut();
   else if (pressed === "+" || pressed === "=") sheet.zoomBy(1.5);
   else if (pressed === "-") sheet.zoomBy(1 / 1.5);
   else if (pressed === "[") page.set({ exposure: (page.state?.exposure ?? 0) - 0.5 });
@@ -179,7 +230,18 @@ attach(sheet.picture, sheet, camera, {
 /** An address for an errand, which works once. */
 const ticket = (errand: Errand): Promise<string> => page.connection?.ticket(errand) ?? Promise.reject(new Error("not connected"));
 const explanation = new Explanation(ticket);
-const editor = new Editor(byId("parameters"), byId("filter"), (path, value) => page.send({ type: "edit", path, value }));
+const edit = (path: string, value: string | null) => page.send({ type: "edit", path, value });
+const editor = new Editor(byId("parameters"), byId("filter"), edit);
+const lights = new LightList(edit);
+const tree = new SceneTree(page, select);
+const views = new Views(page, camera);
+const measure = new Measure(sheet);
+const section = new Section(page);
+const display = new Display(page);
+page.onCamera = () => {
+  measure.moved();
+  section.moved();
+};
 
 function on(id: string, event: string, act: (input: HTMLInputElement) => void): void {
   const input = byId<HTMLInputElement>(id);
@@ -195,6 +257,14 @@ on("tone-map", "change", ({ value }) => page.set({ tone_map: value }));
 on("false-colour", "change", ({ checked }) => page.set({ false_colour: checked }));
 on("denoise", "change", ({ checked }) => page.set({ denoise: checked }));
 on("scale", "change", ({ value }) => page.set({ scale: Number(value) }));
+on("edit-picked", "click", () => picked?.owner && editor.reveal(picked.owner));
+on("light-picked", "click", () => lights.reveal(picked?.owner ?? null));
+on("find-picked", "click", () => picked && tree.reveal(picked.shape));
+on("hide-picked", "click", () => picked && tree.hide(picked.shape));
+on("isolate-picked", "click", () => picked && tree.isolate(picked.shape));
+on("below-ground", "change", ({ checked }) => {
+  camera.mayGoBelow = checked;
+});
 on("noise-target", "change", (input) => input.checkValidity() && page.set({ noise: Number(input.value) }));
 on("spp", "change", (input) => input.checkValidity() && page.set({ spp: Number(input.value) }));
 on("camera", "change", ({ value }) => page.reset(Number(value)));
@@ -210,10 +280,17 @@ on("variant", "change", ({ value }) => moment({ variant: value || null }));
 on("save-overlay", "click", () => save(`${page.state?.name ?? "scene"}.overlay.txt`, editor.overlay()));
 on("drop-edits", "click", () => editor.dropAll());
 
+/** The name of the scene without its ending, for files. */
+const stem = () => (page.state?.name || "picture").replace(/\.(pbrt|pov|gltf|glb|obj|ply|stl)(\.gz)?$/i, "");
+on("snapshot", "click", async () => {
+  const picture = await sheet.snapshot();
+  if (picture) saveBlob(`${stem()}.png`, picture);
+});
+
 /** Takes the picture as a file, which the browser saves. */
 async function savePicture(format: "png" | "exr"): Promise<void> {
   try {
-    const link = element("a", "", { href: await ticket({ for: "picture", format }), download: `picture.${format}` });
+    const link = element("a", "", { href: await ticket({ for: "picture", format }), download: `${stem()}.${format}` });
     link.click();
   } catch {
     alertOf("The picture was not saved.", "The viewer does not answer.");
@@ -257,29 +334,4 @@ on("reference-file", "change", async ({ files }) => {
 });
 
 if (data) hideWhatNeedsAViewer();
-
-// ---- a model that is dropped
-const stage = byId("stage");
-async function drop(file: File | undefined): Promise<void> {
-  if (!file) return;
-  try {
-    const headers = { "Content-Type": "application/octet-stream" };
-    const answer = await fetch(await ticket({ for: "scene" }), { method: "POST", headers, body: file });
-    if (!answer.ok) alertOf("The file was not opened.", await answer.text());
-  } catch {
-    alertOf("The file was not opened.", "The viewer does not answer.");
-  }
-}
-on("open", "change", ({ files }) => void drop(files?.[0]));
-stage.addEventListener("dragover", (event) => {
-  event.preventDefault();
-  stage.classList.add("over");
-});
-stage.addEventListener("dragleave", () => stage.classList.remove("over"));
-stage.addEventListener("drop", (event) => {
-  event.preventDefault();
-  if (data) return;
-  stage.classList.remove("over");
-  void drop(event.dataTransfer?.files[0]);
-});
-
+else new Drop(ticket, alertOf);

@@ -22,13 +22,15 @@ Object.assign(globalThis, { lumbreMeasured: measured });
 export class Page {
   readonly sheet = new Sheet(
     byId("stage"), byId("sheet"), byId<HTMLCanvasElement>("picture"), byId<HTMLCanvasElement>("reference"),
-    byId<HTMLCanvasElement>("numbers"),
+    byId<HTMLCanvasElement>("numbers"), document.querySelector("#marks") as SVGElement,
   );
   readonly camera = new Camera();
   scene: Scene | undefined;
   state: State | undefined;
   connection: Connection | StaticConnection | undefined;
   connected = false;
+  /** Whether it only looks on. */
+  watches = false;
   /** Called when the camera was moved by hand. */
   onCamera: () => void = () => {};
   private requests = 0;
@@ -54,6 +56,11 @@ export class Page {
 
   /** The camera was moved: it is sent once a frame of the screen. */
   moved(): void {
+    if (this.watches) {
+      // The camera is another's.
+      if (this.state && this.scene) this.camera.take(this.state, this.scene);
+      return;
+    }
     this.onCamera();
     if (this.isMoving) return;
     this.isMoving = true;

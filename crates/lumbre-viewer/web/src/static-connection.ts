@@ -41,7 +41,7 @@ export class StaticConnection {
   }
 
   private async start(): Promise<void> {
-    this.listener.onStatus("open");
+    this.listener.onOpen("edit");
     this.listener.onMessage({ type: "scene", scene: this.data.scene });
     this.listener.onMessage({ type: "progress", doing: "done", ...this.data.progress });
     await this.show("beauty");
@@ -52,7 +52,8 @@ export class StaticConnection {
     return {
       name: this.data.name, has_scene: true, error: null, edit_error: null, camera: this.data.camera, sequence: 0, moved: false,
       placement: this.data.placement, fov: null, zoom: 1, size: null, channel, scale: 1, spp: this.data.progress.spp ?? null,
-      noise: null, denoise: null, paused: false, exposure: 0, tone_map: null, false_colour: false, time: null, variant: null, settings: [],
+      noise: null, denoise: null, paused: false, exposure: 0, tone_map: null, false_colour: false,
+      map: "automatic", range: null, hidden: { shapes: [], others: false }, section: null, time: null, variant: null, settings: [],
     };
   }
 
@@ -70,7 +71,7 @@ export class StaticConnection {
     [this.shown, this.values] = [pixels, undefined];
     if (channel.values) this.values = await unpacked(channel.values);
     const spp = this.data.progress.spp ?? 0;
-    this.listener.onFrame({ width, height, fullWidth: width, fullHeight: height, spp, sequence: 0, isFull: true, isDone: true, isDenoised: false, pixels });
+    this.listener.onFrame({ width, height, fullWidth: width, fullHeight: height, spp, sequence: 0, isFull: true, isDone: true, isDenoised: false, low: 0, high: 0, pixels });
   }
 
   private pick(x: number, y: number, request: number): void {
@@ -107,15 +108,20 @@ export class StaticConnection {
   }
 }
 
-/** What only a viewer can do is not offered. */
-export function hideWhatNeedsAViewer(): void {
-  const live = [
-    "pause", "reset", "exposure", "tone-map", "false-colour", "denoise", "spp", "noise-target", "scale", "edit-details", "camera-details",
-    "save-details", "help-open",
-  ];
-  for (const id of live) {
-    byId(id).hidden = true;
-    for (const label of document.querySelectorAll<HTMLElement>(`label[for="${id}"]`)) label.hidden = true;
+/** What changes something. */
+const CHANGES = [
+  "pause", "reset", "exposure", "tone-map", "false-colour", "map", "range-low", "range-high", "range-found", "denoise", "spp", "noise-target",
+  "scale", "edit-details", "camera-details", "tree-details", "light-details", "section-details", "open-more",
+];
+/** What else only a viewer can do. */
+const ASKS = ["save-details", "help-open", "measure-details"];
+
+/** What only a viewer can do is not offered; to who looks on, what changes something. */
+export function hideWhatNeedsAViewer(watches = false): void {
+  for (const id of watches ? [...CHANGES, "channel"] : [...CHANGES, ...ASKS]) {
+    byId(id).classList.add("gone");
+    for (const label of document.querySelectorAll<HTMLElement>(`label[for="${id}"]`)) label.classList.add("gone");
   }
+  if (watches) return;
   for (const option of document.querySelectorAll("option[value=ids], option[value=variance]")) option.remove();
 }
