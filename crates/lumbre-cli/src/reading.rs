@@ -242,6 +242,16 @@ impl ReadingArguments {
         self.memory().check("building the scene", needed, diagnostics.memory_held())
     }
 
+    /// Refuses what is no file of a scene, as reading it would, before anything is read.
+    ///
+    /// # Errors
+    /// As for [`ReadingArguments::open`].
+    pub(crate) fn check_file(&self, path: &Path) -> Result<(), Failure> {
+        let mut options = lumbre::ReadOptions::default();
+        (options.limits, options.format) = (self.limits(), self.input_format);
+        lumbre::formats::check_scene_file(path, &options).map_err(|error| Error::from(error).into())
+    }
+
     /// Reads one or more files as one description.
     ///
     /// # Errors
@@ -262,8 +272,8 @@ impl ReadingArguments {
         self.describe_at(paths, Some(f64::from(number) / self.fps), Some(number))
     }
 
-    /// [`Self::describe`] at another moment, and with another variant, where they are given. A scene that is alone may use no files but
-    /// those that are named: see [`lumbre::ReadOptions::is_alone`].
+    /// [`Self::describe`] at another moment, and with another variant, where they are given. A scene that came with a folder may use no files
+    /// but those in it: see [`lumbre::ReadOptions::folder`].
     ///
     /// # Errors
     /// As for [`ReadingArguments::open`].
@@ -272,9 +282,9 @@ impl ReadingArguments {
         paths: &[PathBuf],
         time: Option<f64>,
         variant: Option<&str>,
-        is_alone: bool,
+        folder: Option<&Path>,
     ) -> Result<(SceneDesc, Diagnostics), Failure> {
-        self.describe_as(paths, time.or(self.frame), None, variant.or(self.variant.as_deref()), is_alone)
+        self.describe_as(paths, time.or(self.frame), None, variant.or(self.variant.as_deref()), folder)
     }
 
     fn describe_at(
@@ -283,7 +293,7 @@ impl ReadingArguments {
         time: Option<f64>,
         number: Option<u32>,
     ) -> Result<(SceneDesc, Diagnostics), Failure> {
-        self.describe_as(paths, time, number, self.variant.as_deref(), false)
+        self.describe_as(paths, time, number, self.variant.as_deref(), None)
     }
 
     fn describe_as(
@@ -292,14 +302,14 @@ impl ReadingArguments {
         time: Option<f64>,
         number: Option<u32>,
         variant: Option<&str>,
-        is_alone: bool,
+        folder: Option<&Path>,
     ) -> Result<(SceneDesc, Diagnostics), Failure> {
         let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
         let memory = self.memory();
         let mut options = self.options(time)?;
         self.pov_options(number, &mut options.pov);
         options.variant = variant.map(str::to_owned);
-        options.is_alone = is_alone;
+        (options.is_alone, options.folder) = (folder.is_some(), folder.map(Path::to_owned));
         let read = lumbre::describe(&paths, &options);
         let (mut desc, diagnostics) = read.map_err(|error| memory.explain(error))?;
         for path in &self.overlay {

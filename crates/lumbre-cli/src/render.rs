@@ -186,7 +186,8 @@ enum Metadata {
     Full,
 }
 
-fn noise(text: &str) -> Result<f64, String> {
+/// A noise target.
+pub(crate) fn noise(text: &str) -> Result<f64, String> {
     text.parse()
         .ok()
         .filter(|x: &f64| *x > 0.0 && x.is_finite())

@@ -5,6 +5,7 @@ use std::path::Path;
 use lumbre::description::{FilmKind, IntegratorKind};
 use lumbre::formats::Diagnostics;
 use lumbre::{RenderOptions, Scene, SceneDesc};
+use lumbre_viewer::Hidden;
 
 use crate::defaults::Defaults;
 use crate::failure::Failure;
@@ -25,6 +26,8 @@ pub(crate) struct SceneRequest<'a> {
     pub(crate) view: &'a ViewArguments,
     pub(crate) staging: &'a StagingArguments,
     pub(crate) reading: &'a ReadingArguments,
+    /// What is not shown, but stands on the stage.
+    pub(crate) hidden: Option<&'a Hidden>,
 }
 
 /// A staged scene.
@@ -43,13 +46,16 @@ pub(crate) struct PreparedScene {
 /// # Errors
 /// [`Failure`] by kind of error.
 pub(crate) fn shown(mut desc: SceneDesc, wish: &SceneRequest<'_>) -> Result<PreparedScene, Failure> {
-    let SceneRequest { name, size, camera: wanted, integrator, view, staging, reading } = *wish;
+    let SceneRequest { name, size, camera: wanted, integrator, view, staging, reading, hidden } = *wish;
     let mut stage = staging.stage(size, reading.limits())?;
     view.set(&mut stage)?;
     let kind = integrator.unwrap_or(desc.integrator.kind);
     let is_of_light = kind.needs_light();
     stage.ground = Defaults::ground(stage.ground, is_of_light);
     let defaults = Defaults::new(stage.set(&mut desc), is_of_light);
+    if let Some(hidden) = hidden {
+        hidden.apply(&mut desc);
+    }
     let behind = staging.behind(&defaults, reading.limits())?;
     let mut diagnostics = Diagnostics::with_strictness(reading.strictness());
     reading.check_build(&desc, &diagnostics)?;

@@ -15,7 +15,7 @@ use crate::failure::Failure;
 use crate::names::one_of;
 
 /// How a model is shown.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Showing a model")]
 pub(crate) struct StagingArguments {
     /// What the model stands on: none, shadow (ground of which only the shadow is seen) or plane (matte grey). By default a
@@ -178,7 +178,12 @@ impl StagingArguments {
         }
     }
 
-    /// The files of the stage.
+    /// The same in the light of a picture from all around.
+    pub(crate) fn in_light_of(&self, picture: &Path) -> Self {
+        Self { env: Some(picture.to_owned()), ..self.clone() }
+    }
+
+    /// The files that the stage is made of.
     pub(crate) fn inputs(&self) -> impl Iterator<Item = &Path> {
         self.env.as_deref().into_iter().chain(self.background_file())
     }

@@ -8,15 +8,15 @@ use std::time::Duration;
 
 use clap::Args;
 use lumbre::image::ToneMap;
-use lumbre::{CancelToken, ErrorKind, RenderOptions, SaveOptions, SceneDesc};
-use lumbre_viewer::{Built, Explain, Moment, Options, Read, Source, SourceError, Viewer, export};
+use lumbre::{CancelToken, ErrorKind, RenderOptions, SaveOptions, SceneDesc, Stop};
+use lumbre_viewer::{Built, Explain, Hidden, Moment, Options, Read, Source, SourceError, Viewer, export};
 
 use crate::explain::Explainer;
 use crate::failure::{Failure, print};
 use crate::names::one_of;
 use crate::output::is_standard_stream;
 use crate::reading::ReadingArguments;
-use crate::render::exposure;
+use crate::render::{exposure, noise};
 use crate::shown::{PreparedScene, SceneRequest, shown};
 use crate::signals::{Phase, Signals};
 use crate::staging::{Backdrop, StagingArguments};
@@ -31,7 +31,8 @@ use crate::view::ViewArguments;
   lumbre view chair.glb --size 1280x720
   lumbre view scene.pbrt --overlay evening.txt  with edits that the page has saved
   lumbre view scene.pbrt --export page          a page of the finished picture, in a folder
-  lumbre view                                   an empty page, on which a .glb can be dropped
+  lumbre view                                   an empty page, on which files and folders can be dropped
+  lumbre view scene.pbrt --share=2              two more addresses, for browsers that may look and not edit
 
 On another machine: with the same port at both ends, then open the address that is printed.
   ssh -L 8765:127.0.0.1:8765 HOST lumbre view --no-open --port 8765 scene.pbrt")]
@@ -49,16 +50,26 @@ pub(crate) struct Arguments {
     /// Another name under which browsers reach it, as localhost:9000 for a tunnel that begins at another port.
     #[arg(long, value_name = "NAME:PORT")]
     allow_host: Vec<String>,
+    /// Print N more addresses (1 without a number), each of which opens one more browser: it shows what the first one does, and edits nothing.
+    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "1", require_equals = true,
+          value_parser = clap::value_parser!(u8).range(1..=32))]
+    share: Option<u8>,
     /// Only print the address.
     #[arg(long)]
     no_open: bool,
     /// Write a page of the finished picture into this folder instead: with its channels, the values of its pixels and the facts of the
     /// scene. It opens from a file, and can be sent or put on a web server.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["port", "host", "allow_host", "no_open"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["port", "host", "allow_host", "no_open", "share"])]
     export: Option<PathBuf>,
     /// Samples per pixel. By default as many as the scene says, else 64; 16 for a model whose noise is taken out.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
+    /// Stop sampling a pixel when its noise is below this share of its luminance, such as 0.02, as render does. The page can change it.
+    #[arg(long, value_name = "R", value_parser = noise)]
+    noise: Option<f64>,
+    /// With --noise, the samples that every pixel has before its noise may end it.
+    #[arg(long, value_name = "N", requires = "noise", value_parser = clap::value_parser!(u32).range(1..))]
+    min_spp: Option<u32>,
     /// Width and height in pixels.
     #[arg(long, value_name = "WxH", value_parser = units::size)]
     size: Option<(u32, u32)>,
@@ -89,10 +100,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         let why = "is no address that a browser can open (expected one of this machine's, or --allow-host NAME:PORT too)";
         return Err(Failure::Usage(format!("--host {} {why}", arguments.host)));
     }
-    // A file that is not there is said here; what an edit mends is shown in the page.
+    // What is no scene is said here; what an edit mends is shown in the page.
     for path in arguments.scene.iter().filter(|path| !is_standard_stream(path)) {
-        let opened = std::fs::File::open(path);
-        opened.map_err(|e| Failure::Io(format!("{}: cannot open: {e}", path.display())))?;
+        arguments.reading.check_file(path)?;
     }
     let cancel = CancelToken::new();
     let signals = Signals::listen(&cancel)?;
@@ -101,7 +111,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
             return Err(Failure::Usage("--export needs a scene".to_owned()));
         }
         signals.enter(Phase::Rendering);
-        let files = Files { arguments: Arc::new(arguments), dropped: None };
+        let files = Files::new(arguments);
         export(&files, &folder, &cancel).map_err(Failure::from)?;
         say!("{}: open it in a browser", folder.join("index.html").display());
         return signals.received().map_or(Ok(()), |status| Err(Failure::Interrupted(status)));
@@ -110,8 +120,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
     options.address = (arguments.host, arguments.port).into();
     options.hosts.clone_from(&arguments.allow_host);
     options.session_file = session_file(arguments.port);
+    options.watchers = arguments.share.map_or(0, usize::from);
     let opens = !arguments.no_open;
-    let source = Arc::new(Files { arguments: Arc::new(arguments), dropped: None });
+    let source = Arc::new(Files::new(arguments));
     let viewer = Viewer::new(source, &options).map_err(Failure::Io)?;
     if !options.address.ip().is_loopback() {
         say!(
@@ -119,11 +130,18 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
             viewer.address()
         );
     }
-    let url = match options.hosts.first().filter(|_| options.address.ip().is_unspecified()) {
-        Some(name) => viewer.url().replacen(&viewer.address().to_string(), name, 1),
-        None => viewer.url(),
+    let reached = |url: String| match options.hosts.first().filter(|_| options.address.ip().is_unspecified())
+    {
+        Some(name) => url.replacen(&viewer.address().to_string(), name, 1),
+        None => url,
     };
-    print(&format!("{url}\n"))?;
+    let url = reached(viewer.url());
+    let watchers = viewer.watcher_urls().into_iter().map(reached);
+    let lines: String = std::iter::once(url.clone()).chain(watchers).map(|url| url + "\n").collect();
+    print(&lines)?;
+    if options.watchers > 0 {
+        say!("the first address is yours; each of the others lets one browser look on, which edits nothing");
+    }
     if opens && !open(&url) {
         say!("open this address in a browser; Ctrl-C ends the viewer");
     }
@@ -186,15 +204,30 @@ impl From<SourceError> for Failure {
     }
 }
 
-/// The files of the command line, or one that came later.
+/// The files of the command line, or those that came later.
 struct Files {
     arguments: Arc<Arguments>,
-    dropped: Option<PathBuf>,
+    dropped: Option<Dropped>,
+    /// A picture of light from all around that came later.
+    environment: Option<PathBuf>,
+}
+
+/// What came through the page.
+#[derive(Clone)]
+struct Dropped {
+    folder: PathBuf,
+    scene: PathBuf,
 }
 
 impl Files {
+    fn new(arguments: Arguments) -> Self {
+        Self { arguments: Arc::new(arguments), dropped: None, environment: None }
+    }
+
     fn paths(&self) -> Vec<PathBuf> {
-        self.dropped.as_ref().map_or_else(|| self.arguments.scene.clone(), |path| vec![path.clone()])
+        self.dropped
+            .as_ref()
+            .map_or_else(|| self.arguments.scene.clone(), |dropped| vec![dropped.scene.clone()])
     }
 }
 
@@ -211,28 +244,34 @@ impl Source for Files {
 
     fn read(&self, moment: &Moment) -> Result<Read, SourceError> {
         // What came through the page may be a stranger's, and has no files beside it.
-        let is_alone = self.dropped.is_some();
+        let folder = self.dropped.as_ref().map(|dropped| &*dropped.folder);
         let (desc, diagnostics) = self.arguments.reading.describe_moment(
             &self.paths(),
             moment.time,
             moment.variant.as_deref(),
-            is_alone,
+            folder,
         )?;
         let files = diagnostics.files_read().to_vec();
         let warnings = diagnostics.lines();
         Ok(Read { desc, files, warnings })
     }
 
-    fn build(&self, desc: SceneDesc) -> Result<Built, SourceError> {
-        Ok(self.built(desc)?)
+    fn build(&self, desc: SceneDesc, hidden: &Hidden) -> Result<Built, SourceError> {
+        Ok(self.built(desc, hidden)?)
     }
 
     fn check(&self, options: &RenderOptions) -> Result<(), SourceError> {
         Ok(self.arguments.reading.memory().check_picture(options, 0)?)
     }
 
-    fn of_file(&self, file: &Path) -> Arc<dyn Source> {
-        Arc::new(Self { arguments: self.arguments.clone(), dropped: Some(file.to_owned()) })
+    fn of_folder(&self, folder: &Path, scene: &Path) -> Arc<dyn Source> {
+        let dropped = Some(Dropped { folder: folder.to_owned(), scene: scene.to_owned() });
+        Arc::new(Self { arguments: self.arguments.clone(), dropped, environment: self.environment.clone() })
+    }
+
+    fn in_light_of(&self, picture: &Path) -> Arc<dyn Source> {
+        let (arguments, dropped) = (self.arguments.clone(), self.dropped.clone());
+        Arc::new(Self { arguments, dropped, environment: Some(picture.to_owned()) })
     }
 
     fn is_empty(&self) -> bool {
@@ -242,20 +281,33 @@ impl Source for Files {
 
 impl Files {
     /// As `lumbre render` would make its picture.
-    fn built(&self, desc: SceneDesc) -> Result<Built, Failure> {
+    fn built(&self, desc: SceneDesc, hidden: &Hidden) -> Result<Built, Failure> {
         let Arguments { view, staging, reading, size, .. } = &*self.arguments;
+        let other_light = self.environment.as_deref().map(|picture| staging.in_light_of(picture));
+        let staging = other_light.as_ref().unwrap_or(staging);
         let name = self.paths().into_iter().next().unwrap_or_default();
         // The camera that was asked for is of the command line's file.
         let camera = self.arguments.camera.as_deref().filter(|_| self.dropped.is_none());
-        let wish =
-            SceneRequest { name: &name, size: *size, camera, integrator: None, view, staging, reading };
+        let hidden = Some(hidden);
+        let wish = SceneRequest {
+            name: &name,
+            size: *size,
+            camera,
+            integrator: None,
+            view,
+            staging,
+            reading,
+            hidden,
+        };
         let explain = Some(Box::new(Explainer::new(&desc, self.name())) as Box<dyn Explain>);
         let PreparedScene { scene, defaults, behind, mut options, is_of_light, diagnostics } =
             shown(desc, &wish)?;
         let mut warnings = diagnostics.lines();
         options.threads = rayon::current_num_threads();
         let own = defaults.spp(&scene).unwrap_or(options.stop.spp);
-        options.stop.spp = self.arguments.spp.unwrap_or(own);
+        let Arguments { spp, noise, min_spp, .. } = &*self.arguments;
+        (options.stop.noise, options.stop.min_spp) = (*noise, *min_spp);
+        options.stop.spp = spp.unwrap_or(if noise.is_some() { Stop::MAX_FOR_NOISE } else { own });
         let held = diagnostics.memory_held().saturating_add(scene.resolved().accel().memory_bytes() as u64);
         reading.memory().check_picture(&options, held)?;
         if scene.is_dark() && is_of_light {

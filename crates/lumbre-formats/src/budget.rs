@@ -3,7 +3,7 @@
 //! Every limit names the program flag that raises it, and so does its error.
 
 use std::mem::size_of;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -106,6 +106,8 @@ pub struct Budget {
     paths: Mutex<Vec<PathBuf>>,
     /// The files that may be opened; `None` for any.
     only: Option<Vec<PathBuf>>,
+    /// The folder in which any file may be opened besides these.
+    folder: Option<PathBuf>,
 }
 
 impl Budget {
@@ -121,9 +123,38 @@ impl Budget {
         Self { only: Some(files.into_iter().collect()), ..self }
     }
 
+    /// Lets files in this folder be opened besides those of [`Budget::only`]. Names are compared as they are written, so that a link in the
+    /// folder leads to where it points: it has to be a folder in which there are none.
+    #[must_use]
+    pub fn and_in(self, folder: PathBuf) -> Self {
+        Self { folder: Some(folder), ..self }
+    }
+
     /// Whether the file of this name may be opened.
     pub fn allows(&self, path: &Path) -> bool {
-        self.only.as_ref().is_none_or(|only| only.iter().any(|known| known == path))
+        let Some(only) = &self.only else { return true };
+        let is_inside = self.folder.as_ref().is_some_and(|folder| {
+            let Ok(rest) = path.strip_prefix(folder) else { return false };
+            let mut depth = 0_i64;
+            for part in rest.components() {
+                match part {
+                    Component::Normal(_) => depth += 1,
+                    Component::ParentDir => depth -= 1,
+                    Component::CurDir => {}
+                    Component::RootDir | Component::Prefix(_) => return false,
+                }
+                if depth < 0 {
+                    return false;
+                }
+            }
+            true
+        });
+        is_inside || only.iter().any(|known| known == path)
+    }
+
+    /// Whether there is a file of this name that may be opened: of others nothing is said, not even whether they are there.
+    pub fn has(&self, path: &Path) -> bool {
+        self.allows(path) && path.exists()
     }
 
     /// Its limits.

@@ -424,6 +424,31 @@ pub(crate) mod tests {
         assert_eq!(budget.paths(), [own]);
     }
 
+    #[test]
+    fn a_budget_of_a_folder_lets_files_in_it_be_opened_and_no_way_lead_out() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("dropped");
+        std::fs::create_dir_all(folder.join("parts")).unwrap();
+        std::fs::write(folder.join("parts/own.bin"), b"bytes").unwrap();
+        std::fs::write(dir.path().join("other.bin"), b"secret").unwrap();
+        let budget = Budget::default().only([]).and_in(folder.clone());
+        assert_eq!(&*Input::open(&folder.join("parts/own.bin"), &budget).unwrap(), b"bytes");
+        assert!(
+            budget.has(&folder.join("parts/own.bin")) && budget.has(&folder.join("parts/../parts/./own.bin"))
+        );
+        let absent = Input::open(&folder.join("absent.bin"), &budget).unwrap_err();
+        assert!(absent.to_string().contains("cannot open"), "{absent}");
+        for way in ["../other.bin", "parts/../../other.bin", "../dropped/parts/own.bin", "../absent.bin"] {
+            let path = folder.join(way);
+            let error = Input::open(&path, &budget).unwrap_err();
+            assert!(error.to_string().contains("no files but its own"), "{way}: {error}");
+            assert!(!budget.has(&path), "{way}");
+        }
+        for path in [dir.path().join("other.bin"), "/etc/passwd".into(), "parts/own.bin".into()] {
+            assert!(!budget.allows(&path), "{}", path.display());
+        }
+    }
+
     #[cfg(unix)]
     #[test]
     fn a_pipe_is_refused_rather_than_waited_for() {

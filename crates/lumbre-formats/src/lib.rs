@@ -34,5 +34,5 @@ pub use budget::{Budget, BudgetVec, Hold, LimitError, LimitKind, Limits};
 pub use diagnostic::{Diagnostic, Diagnostics, FormatError, Place, Position, Severity, Strictness};
 pub use input::{Input, open_regular};
 pub use input_stream::InputStream;
-pub use open::{ReadOptions, SceneFormat, open_scene, open_scenes};
+pub use open::{ReadOptions, SceneFormat, check_scene_file, open_scene, open_scenes};
 pub use thin::Thin;

@@ -1,6 +1,6 @@
 //! Opening any scene, by its file extension or its bytes.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use lumbre_scene::SceneDesc;
@@ -10,7 +10,9 @@ use crate::gltf::{GltfOptions, read_gltf};
 use crate::obj::obj_scene;
 use crate::ply::ply_scene;
 use crate::stl::stl_scene;
-use crate::{Budget, Diagnostic, Diagnostics, FormatError, Input, Limits, Place, Strictness, pbrt};
+use crate::{
+    Budget, Diagnostic, Diagnostics, FormatError, Input, Limits, Place, Strictness, open_regular, pbrt,
+};
 
 /// Options of reading a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,6 +36,8 @@ pub struct ReadOptions {
     pub pov: crate::pov::PovOptions,
     /// Whether the scene may use no other files than those that are named: for a scene from a stranger.
     pub is_alone: bool,
+    /// A folder, besides, whose files it may use all the same: one that holds no links.
+    pub folder: Option<PathBuf>,
 }
 
 /// The supported scene formats.
@@ -144,6 +148,9 @@ pub fn open_scenes(
     let mut budget = Budget::new(options.limits);
     if options.is_alone {
         budget = budget.only(paths.iter().map(|path| path.as_ref().to_owned()));
+        if let Some(folder) = &options.folder {
+            budget = budget.and_in(folder.clone());
+        }
     }
     let mut diagnostics = Diagnostics::with_strictness(options.strictness);
     let mut groups: Vec<Vec<Source>> = Vec::with_capacity(paths.len());
@@ -167,6 +174,18 @@ pub fn open_scenes(
     diagnostics.check()?;
     diagnostics.set_read(&budget);
     Ok((scene, diagnostics))
+}
+
+/// Whether there is a file of this name that can be read as a scene, as far as its name tells, or else its bytes: it is not parsed.
+///
+/// # Errors
+/// As for [`open_scene`].
+pub fn check_scene_file(path: &Path, options: &ReadOptions) -> Result<(), FormatError> {
+    let budget = Budget::new(options.limits);
+    if Source::new(path, options, &budget)?.input.is_none() {
+        open_regular(path)?;
+    }
+    Ok(())
 }
 
 /// A file to read, or what was read already to tell its format.
@@ -283,7 +302,7 @@ fn read_group<'b>(
         SceneFormat::Stl => stl_scene(input, budget, diagnostics),
         SceneFormat::Pov => {
             let mut pov = options.pov.clone();
-            pov.library.extend(crate::pov::SYSTEM_LIBRARY.iter().map(std::path::PathBuf::from));
+            pov.library.extend(crate::pov::SYSTEM_LIBRARY.iter().map(PathBuf::from));
             crate::pov::pov_scene(&input, folder, &pov, budget, diagnostics)
         }
         SceneFormat::Gltf | SceneFormat::Pbrt => {
@@ -360,7 +379,7 @@ mod tests {
     #[test]
     fn a_name_that_is_not_utf8_is_told_by_its_ending_or_its_bytes() {
         use std::os::unix::ffi::OsStrExt;
-        let name = |bytes: &'static [u8]| std::path::PathBuf::from(std::ffi::OsStr::from_bytes(bytes));
+        let name = |bytes: &'static [u8]| PathBuf::from(std::ffi::OsStr::from_bytes(bytes));
         assert_eq!(SceneFormat::from_path(&name(b"caf\xE9.obj")), Some(SceneFormat::Obj));
         assert_eq!(SceneFormat::from_path(&name(b"caf\xE9.ply.gz")), Some(SceneFormat::Ply));
         let folder = tempfile::tempdir().unwrap();

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-use lumbre::{ReadOptions, SaveOptions, SceneDesc};
+use lumbre::{EnvironmentDesc, ReadOptions, SaveOptions, SceneDesc, Stage, Surroundings};
 use lumbre_cli::{Defaults, Explainer};
-use lumbre_viewer::{Built, Closer, Moment, Options, Read, Source, SourceError};
+use lumbre_viewer::{Built, Closer, Hidden, Moment, Options, Read, Source, SourceError};
 use pyo3::exceptions::{PyOSError, PyRuntimeError};
 use pyo3::prelude::*;
 
@@ -20,8 +20,11 @@ pub(crate) enum Origin {
 }
 
 /// A scene for the viewer.
+#[derive(Clone)]
 struct Live {
     origin: Origin,
+    /// A picture of light from all around that was dropped on the page.
+    environment: Option<PathBuf>,
     size: Option<(u32, u32)>,
     spp: Option<u32>,
 }
@@ -55,9 +58,15 @@ impl Source for Live {
         }
     }
 
-    fn build(&self, mut desc: SceneDesc) -> Result<Built, SourceError> {
+    fn build(&self, mut desc: SceneDesc, hidden: &Hidden) -> Result<Built, SourceError> {
         let explain = Explainer::new(&desc, self.name());
-        let defaults = Defaults::stage(&mut desc, self.size, None);
+        let mut stage = Stage::default();
+        stage.size = self.size;
+        if let Some(path) = &self.environment {
+            stage.surroundings = Surroundings::Map(environment(path)?);
+        }
+        let defaults = Defaults::on(&stage, &mut desc, None);
+        hidden.apply(&mut desc);
         let scene = lumbre::Scene::from_description(desc)?;
         let mut options = scene.options();
         if let Some((width, height)) = self.size {
@@ -86,12 +95,23 @@ impl Source for Live {
         Ok(lumbre_cli::check_picture(options, 0)?)
     }
 
-    fn of_file(&self, file: &Path) -> Arc<dyn Source> {
+    fn of_folder(&self, folder: &Path, scene: &Path) -> Arc<dyn Source> {
         let mut options = ReadOptions::default();
-        options.is_alone = true;
-        let origin = Origin::Files(vec![file.to_owned()], Box::new(options));
-        Arc::new(Self { origin, size: self.size, spp: self.spp })
+        (options.is_alone, options.folder) = (true, Some(folder.to_owned()));
+        let origin = Origin::Files(vec![scene.to_owned()], Box::new(options));
+        Arc::new(Self { origin, ..self.clone() })
     }
+
+    fn in_light_of(&self, picture: &Path) -> Arc<dyn Source> {
+        Arc::new(Self { environment: Some(picture.to_owned()), ..self.clone() })
+    }
+}
+
+/// Light from all around, from a picture.
+fn environment(path: &Path) -> Result<EnvironmentDesc, SourceError> {
+    let image = Arc::new(lumbre::read_image(path)?);
+    let what = format!("{}: no environment map (expected twice as wide as high, or square)", path.display());
+    EnvironmentDesc::of_image(image).ok_or(SourceError { kind: lumbre::ErrorKind::Input, message: what })
 }
 
 /// A viewer that listens on this machine alone, until it is closed.
@@ -104,7 +124,7 @@ pub(crate) struct Viewer {
 
 impl Viewer {
     pub(crate) fn start(origin: Origin, size: Option<(u32, u32)>, spp: Option<u32>) -> PyResult<Self> {
-        let source = Arc::new(Live { origin, size, spp });
+        let source = Arc::new(Live { origin, environment: None, size, spp });
         let viewer = lumbre_viewer::Viewer::new(source, &Options::default()).map_err(PyOSError::new_err)?;
         let (url, closer) = (viewer.url(), viewer.closer());
         let thread = std::thread::Builder::new().name("viewer".to_owned());

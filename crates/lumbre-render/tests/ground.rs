@@ -34,6 +34,7 @@ fn hovering(lights: Vec<LightDesc>, catcher: bool) -> SceneDesc {
         shutter_open: 0.0,
         shutter_close: 1.0,
         medium: None,
+        clip: None,
     };
     let mut desc = SceneDesc {
         cameras: vec![camera],

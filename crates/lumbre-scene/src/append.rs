@@ -34,7 +34,6 @@ impl SceneDesc {
             pov,
             listing,
         } = other;
-        self.listing.append(listing);
         if self.cameras.is_empty() && !cameras.is_empty() {
             (self.film, self.filter, self.sampler, self.integrator) = (film, filter, sampler, integrator);
             (self.up, self.up_is_guessed) = (up, up_is_guessed);
@@ -50,6 +49,7 @@ impl SceneDesc {
             medium: self.media.len() as u32,
             object: self.objects.len() as u32,
         };
+        self.listing.append(listing, after.index);
         let cameras = cameras.into_iter();
         self.cameras.extend(cameras.map(|camera| Camera { medium: after.medium(camera.medium), ..camera }));
         self.materials.extend(materials);

@@ -185,6 +185,32 @@ pub struct Camera {
     pub shutter_close: f64,
     /// The medium around it; `None` is a vacuum.
     pub medium: Option<MediumId>,
+    /// What is in front of this plane the camera does not see.
+    pub clip: Option<ClipPlane>,
+}
+
+/// A plane that cuts what is in front of it out of the camera's sight. Rays from the camera begin behind it; light and shadows know nothing of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClipPlane {
+    /// A point of it.
+    pub point: DVec3,
+    /// The unit normal: what is on its side is not seen.
+    pub normal: DVec3,
+}
+
+impl ClipPlane {
+    /// Where a ray from `origin` begins to see.
+    fn start(&self, origin: DVec3, direction: DVec3) -> DVec3 {
+        // Of a ray that stays in front, only what is infinitely far away is left.
+        const FAR: f64 = 1e9;
+        let height = (origin - self.point).dot(self.normal);
+        if height <= 0.0 {
+            return origin;
+        }
+        let distance = -height / direction.dot(self.normal);
+        let is_reached = 0.0 < distance && distance < FAR * (1.0 + height);
+        origin + direction * if is_reached { distance } else { FAR * (1.0 + height) }
+    }
 }
 
 impl Camera {
@@ -201,6 +227,7 @@ impl Camera {
             shutter_open: 0.0,
             shutter_close: 1.0,
             medium: None,
+            clip: None,
         }
     }
 
@@ -290,6 +317,7 @@ pub struct View {
     shutter_open: f64,
     shutter_close: f64,
     medium: Option<MediumId>,
+    clip: Option<ClipPlane>,
     // The screen position of the film's (0, 0), and the size of a pixel on the screen. The screen of a
     // perspective camera is at z = 1, that of a spherical one is the unit square, that of a lens its film.
     corner: DVec2,
@@ -324,6 +352,7 @@ impl View {
             shutter_open: camera.shutter_open,
             shutter_close: camera.shutter_close,
             medium: camera.medium,
+            clip: camera.clip,
             corner,
             step: (opposite - corner) / pixels,
             size: [width.max(1), height.max(1)],
@@ -412,7 +441,8 @@ impl View {
     /// The rays of a static perspective camera with a pinhole; `None` for others.
     pub fn pinhole(&self) -> Option<Pinhole> {
         let CameraKind::Perspective { lens_radius, .. } = self.kind else { return None };
-        (lens_radius <= 0.0 && self.motion.is_none()).then(|| Pinhole {
+        let has_one_origin = lens_radius <= 0.0 && self.motion.is_none() && self.clip.is_none();
+        has_one_origin.then(|| Pinhole {
             origin: self.world_from_camera.point(DVec3::ZERO),
             axes: self.world_from_camera.linear(),
             corner: self.corner,
@@ -455,7 +485,9 @@ impl View {
                 (origin, direction)
             }
         };
-        (placement.point(origin), placement.vector(direction).normalize(), weight)
+        let (origin, direction) = (placement.point(origin), placement.vector(direction).normalize());
+        let origin = self.clip.map_or(origin, |clip| clip.start(origin, direction));
+        (origin, direction, weight)
     }
 }
 
@@ -560,11 +592,36 @@ mod tests {
             assert_eq!((pinhole.origin(), DVec3::new(x, y, z)), (ray.origin, ray.direction), "{film}");
         }
         assert!(View::new(&camera(perspective(37.0, 0.1, 1.0)), 30, 20).pinhole().is_none());
+        let clip = Some(ClipPlane { point: DVec3::ZERO, normal: DVec3::Y });
+        let clipped = Camera { clip, ..camera(perspective(37.0, 0.0, 1.0)) };
+        assert!(View::new(&clipped, 30, 20).pinhole().is_none());
         assert!(
             View::new(&camera(CameraKind::Spherical { mapping: Default::default() }), 30, 20)
                 .pinhole()
                 .is_none()
         );
+    }
+
+    #[test]
+    fn rays_begin_where_the_clip_plane_is_and_only_in_front_of_it() {
+        let camera =
+            Camera::perspective(DVec3::new(0.0, -9.0, 2.0), DVec3::new(0.0, 0.0, 2.0), DVec3::Z, 60.0);
+        let ray = |clip: ClipPlane, x: f64| {
+            let camera = Camera { clip: Some(clip), ..camera.clone().unwrap() };
+            View::new(&camera, 100, 100).ray(DVec2::new(x, 50.0), MIDDLE, 0.0, 1.0).ray
+        };
+        let plane = |y: f64, normal: DVec3| ClipPlane { point: DVec3::new(7.0, y, -3.0), normal };
+        for x in [50.0, 80.0] {
+            let free =
+                View::new(camera.as_ref().unwrap(), 100, 100).ray(DVec2::new(x, 50.0), MIDDLE, 0.0, 1.0).ray;
+            let cut = ray(plane(1.5, -DVec3::Y), x);
+            assert!((cut.origin.y - 1.5).abs() < 1e-12 && cut.direction == free.direction, "{cut:?}");
+            let along = (cut.origin - free.origin).normalize();
+            assert!((along - free.direction).length() < 1e-12, "on the same line");
+            // Behind the plane, nothing changes; and what never comes behind it sees nothing near.
+            assert_eq!(ray(plane(-12.0, -DVec3::Y), x).origin, free.origin);
+            assert!(ray(plane(-12.0, DVec3::Y), x).origin.length() > 1e9);
+        }
     }
 
     #[test]

@@ -47,7 +47,7 @@ mod surface;
 mod tables;
 mod viewpoint;
 
-pub use camera::{Camera, CameraKind, CameraRay, Pinhole, SphericalMapping, View, WideProjection};
+pub use camera::{Camera, CameraKind, CameraRay, ClipPlane, Pinhole, SphericalMapping, View, WideProjection};
 pub use desc::*;
 pub use emission::Emission;
 pub use error::BuildError;

@@ -1,6 +1,7 @@
 //! The named items of a description's files, for choosing among them.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
+use std::sync::Arc;
 
 /// The names that were read. They change no picture.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -12,6 +13,8 @@ pub struct Listing {
     pub variants: Vec<String>,
     /// The images that textures and environment maps are made of, in the order in which they were read.
     pub textures: Vec<TextureListing>,
+    /// Names of shapes by their index ([`crate::ShapeDesc::index`]), where the file gives them.
+    pub shapes: BTreeMap<u32, Arc<str>>,
     /// The names of these.
     names: HashSet<String>,
 }
@@ -44,8 +47,10 @@ impl Listing {
         }
     }
 
-    /// Adds all of another listing.
-    pub fn append(&mut self, other: Self) {
+    /// Adds all of another listing, whose shapes have indices from this one on.
+    pub fn append(&mut self, other: Self, first_shape: u32) {
+        let shapes = other.shapes.into_iter();
+        self.shapes.extend(shapes.map(|(index, name)| (index.saturating_add(first_shape), name)));
         self.animations.extend(other.animations);
         self.variants.extend(other.variants);
         self.textures.extend(other.textures);

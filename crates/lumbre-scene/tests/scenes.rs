@@ -560,6 +560,7 @@ fn what_cannot_be_built_is_named() {
         screen_window: None,
         shutter_open: 0.0,
         shutter_close: 1.0,
+        clip: None,
         medium: None,
     };
     let camera = SceneDesc { cameras: vec![camera], ..of_shapes(vec![]) };

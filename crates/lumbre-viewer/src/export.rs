@@ -20,6 +20,7 @@ use crate::frame::{Channel, Frame, HEADER, Look, Pixels, Shot};
 use crate::page::FILES;
 use crate::source::{Built, Moment, Source, SourceError};
 use crate::stage::{Stage, ray};
+use crate::tree::Hidden;
 
 /// Samples per pixel of channels other than the picture.
 const FEATURE_SPP: u32 = 16;
@@ -34,11 +35,11 @@ const FEATURE_SPP: u32 = 16;
 pub fn export(source: &dyn Source, folder: &Path, cancel: &CancelToken) -> Result<(), SourceError> {
     refuse_foreign(folder)?;
     let read = source.read(&Moment::default())?;
-    // A static page cannot ask for explanations.
-    let built = Built { explain: None, ..source.build(read.desc.clone())? };
+    // Nobody is there to tell more than what is in the page.
+    let built = Built { explain: None, ..source.build(read.desc.clone(), &Hidden::default())? };
     let stage = Stage::new(built, &read.desc, read.warnings);
     let scene = stage.scene();
-    let look = Look { save: stage.save.clone(), false_colour: false };
+    let look = Look::of(stage.save.clone());
     let mut options = stage.options.clone();
     options.guides = stage.denoise;
     let full = (options.width, options.height);
@@ -74,7 +75,8 @@ pub fn export(source: &dyn Source, folder: &Path, cancel: &CancelToken) -> Resul
         let values =
             if channel == Channel::Depth { base64(&packed(picture.image())?) } else { String::new() };
         let pixels = Pixels::Rendered(Box::new(picture));
-        let shot = Shot { pixels, channel, full, sequence: 0, is_full: true, is_done: true };
+        let shot =
+            Shot { pixels, channel, full, sequence: 0, is_full: true, is_done: true, is_denoised: false };
         channels.push(json!({ "name": channel, "png": base64(&shown(&shot, &look)?), "values": values }));
     }
     let rays = stats.rays.camera + stats.rays.bounce + stats.rays.shadow;
@@ -188,10 +190,7 @@ fn picks(stage: &Stage, camera: usize, (width, height): (u32, u32)) -> Result<Va
         Some((shape, distance)) => [places[shape].to_le_bytes(), distance.to_le_bytes()],
         None => [[0; 4]; 2],
     });
-    let shapes = shapes.iter().map(|shape| {
-        let thing = stage.thing(*shape);
-        json!({ "shape": shape, "kind": thing.kind, "material": thing.material })
-    });
+    let shapes = shapes.iter().map(|shape| stage.thing(*shape).told(*shape));
     Ok(json!({ "shapes": shapes.collect::<Vec<_>>(), "values": base64(&compressed(numbers)?) }))
 }
 

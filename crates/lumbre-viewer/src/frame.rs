@@ -34,6 +34,32 @@ pub(crate) struct Look {
     pub save: SaveOptions,
     /// Luminance as colours, by stops.
     pub false_colour: bool,
+    /// The colours of numbers.
+    pub map: Map,
+    /// The numbers at both ends of the colours; found where `None`.
+    pub range: Option<[f32; 2]>,
+}
+
+impl Look {
+    /// That of a picture, with the colours and the range of numbers that are found.
+    pub(crate) fn of(save: SaveOptions) -> Self {
+        Self { save, false_colour: false, map: Map::default(), range: None }
+    }
+}
+
+/// The colours of numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Map {
+    /// Grey for depth, the rainbow for light.
+    #[default]
+    Automatic,
+    /// Near is bright; of light, bright is bright.
+    Grey,
+    /// Dark blue, blue, green, yellow, red.
+    Rainbow,
+    /// Dark blue, green, yellow, at steps that look even (S. van der Walt and N. Smith, matplotlib's default of 2015).
+    Viridis,
 }
 
 /// A picture, with the data that a page needs.
@@ -49,6 +75,8 @@ pub(crate) struct Shot {
     pub is_full: bool,
     /// Whether it equals the picture of `lumbre render`.
     pub is_done: bool,
+    /// Whether its noise was taken out.
+    pub is_denoised: bool,
 }
 
 /// The pixels of a shot.
@@ -82,13 +110,14 @@ impl Shot {
 #[derive(Clone, Debug)]
 pub(crate) struct Frame(pub Bytes);
 
-/// Bytes before the pixels: eight little-endian numbers of four bytes.
-pub(crate) const HEADER: usize = 32;
-const MAGIC: u32 = u32::from_le_bytes(*b"LUM1");
+/// Bytes before the pixels: ten numbers of four bytes, the least significant first.
+pub(crate) const HEADER: usize = 40;
+const MAGIC: u32 = u32::from_le_bytes(*b"LUM2");
 
 impl Frame {
     pub(crate) fn new(shot: &Shot, look: &Look) -> Self {
         let image = shot.image();
+        let [low, high] = range(shot, look).unwrap_or_default();
         let numbers = [
             MAGIC,
             image.width(),
@@ -97,7 +126,9 @@ impl Frame {
             shot.full.1,
             shot.picture().map_or(1, |picture| picture.stats().spp),
             shot.sequence,
-            u32::from(shot.is_full) | u32::from(shot.is_done) << 1,
+            u32::from(shot.is_full) | u32::from(shot.is_done) << 1 | u32::from(shot.is_denoised) << 2,
+            low.to_bits(),
+            high.to_bits(),
         ];
         let mut bytes = Vec::with_capacity(HEADER + 4 * image.pixels().len());
         bytes.extend(numbers.into_iter().flat_map(u32::to_le_bytes));
@@ -105,6 +136,20 @@ impl Frame {
         pixels(shot, look, &mut bytes[HEADER..]);
         Self(bytes.into())
     }
+}
+
+/// The numbers at both ends of the colours; `None` where colours stand for no numbers.
+fn range(shot: &Shot, look: &Look) -> Option<[f32; 2]> {
+    let found = match shot.channel {
+        Channel::Depth => {
+            let depths = shot.image().pixels().iter().map(|pixel| pixel.r);
+            [0.0, depths.fold(f32::MIN_POSITIVE, f32::max)]
+        }
+        Channel::Beauty if look.false_colour => STOPS.map(|stops| MIDDLE_GREY * exp2(stops)),
+        Channel::Variance => STOPS.map(|stops| MIDDLE_GREY * exp2(stops)),
+        Channel::Beauty | Channel::Albedo | Channel::Normal | Channel::Uv | Channel::Ids => return None,
+    };
+    Some(look.range.unwrap_or(found))
 }
 
 fn pixels(shot: &Shot, look: &Look, out: &mut [u8]) {
@@ -123,18 +168,13 @@ fn pixels(shot: &Shot, look: &Look, out: &mut [u8]) {
     }
     let image = shot.image();
     let factor = exp2(look.save.exposure);
-    let farthest = match shot.channel {
-        Channel::Depth => image.pixels().iter().map(|pixel| pixel.r).fold(f32::MIN_POSITIVE, f32::max),
-        _ => 1.0,
-    };
+    let range = range(shot, look).unwrap_or([0.0, 1.0]);
     rows(image, width, out, |_, value| {
         let [r, g, b] = match shot.channel {
-            Channel::Beauty => return opaque(stops_colour((value * factor).luminance())),
-            Channel::Variance => return opaque(stops_colour(value.r.max(0.0).sqrt() * factor)),
-            Channel::Depth if value.r > 0.0 => {
-                Encoded::srgb(Rgb::splat(1.0 - 0.9 * value.r / farthest)).to_u8()
-            }
-            // The numbers themselves, as other programs show them.
+            Channel::Beauty => light_colour((value * factor).luminance(), range, look.map),
+            Channel::Variance => light_colour(value.r.max(0.0).sqrt() * factor, range, look.map),
+            Channel::Depth if value.r > 0.0 => depth_colour(value.r, range, look.map),
+            // The numbers themselves, as they are known from other programs.
             Channel::Normal | Channel::Uv => Encoded::new(value.r, value.g, value.b).to_u8(),
             Channel::Albedo | Channel::Depth | Channel::Ids => ToneMap::None.encode(value, 0.0).to_u8(),
         };
@@ -146,8 +186,8 @@ fn exp2(stops: f32) -> f32 {
     lumbre::math::Elementary::exponential_2(stops)
 }
 
-fn opaque([r, g, b]: [u8; 3]) -> [u8; 4] {
-    [r, g, b, 255]
+fn log2(value: f32) -> f32 {
+    lumbre::math::Elementary::logarithm_2(value)
 }
 
 /// Fills pixels row by row, over threads.
@@ -160,10 +200,11 @@ fn rows(image: &Image, width: usize, out: &mut [u8], pixel: impl Fn(usize, Rgb) 
     });
 }
 
-/// The stops of [`stops_colour`], from middle grey: below them is black, above white.
+const MIDDLE_GREY: f32 = 0.18;
+/// The range of light that is found, in stops from middle grey.
 const STOPS: [f32; 2] = [-6.0, 6.0];
-/// Colours at even steps over the stops: dark blue, blue, green at middle grey, yellow, red.
-const SCALE: [[f32; 3]; 7] = [
+/// Colours at even steps: dark blue, blue, green at middle grey, yellow, red.
+const RAINBOW: [[f32; 3]; 7] = [
     [0.10, 0.05, 0.30],
     [0.15, 0.25, 0.75],
     [0.10, 0.60, 0.80],
@@ -172,21 +213,56 @@ const SCALE: [[f32; 3]; 7] = [
     [0.95, 0.45, 0.10],
     [0.80, 0.05, 0.10],
 ];
+/// Nine of the 256 colours of viridis, at even steps.
+const VIRIDIS: [[f32; 3]; 9] = [
+    [0.267, 0.005, 0.329],
+    [0.279, 0.175, 0.483],
+    [0.230, 0.322, 0.546],
+    [0.173, 0.449, 0.558],
+    [0.128, 0.567, 0.551],
+    [0.158, 0.684, 0.502],
+    [0.369, 0.789, 0.383],
+    [0.678, 0.864, 0.190],
+    [0.993, 0.906, 0.144],
+];
 
-/// A colour for a luminance, by how many stops it is from middle grey (0.18).
-fn stops_colour(luminance: f32) -> [u8; 3] {
-    let stops = lumbre::math::Elementary::logarithm_2(luminance.max(1e-30) / 0.18);
-    let [low, high] = STOPS;
-    if stops < low {
+/// The colour at a place in [0, 1] of a scale.
+fn scale_colour(scale: &[[f32; 3]], place: f32) -> [u8; 3] {
+    let at = place.clamp(0.0, 1.0) * (scale.len() - 1) as f32;
+    let i = (at as usize).min(scale.len() - 2);
+    let mix = |c: usize| scale[i][c] + (scale[i + 1][c] - scale[i][c]) * (at - i as f32);
+    Encoded::new(mix(0), mix(1), mix(2)).to_u8()
+}
+
+/// A colour for light, by stops: below the range is black, above it white. A range that begins at 0 or below is even.
+fn light_colour(light: f32, [low, high]: [f32; 2], map: Map) -> [u8; 3] {
+    let place = if low > 0.0 {
+        (log2(light.max(1e-30)) - log2(low)) / (log2(high) - log2(low))
+    } else {
+        (light - low) / (high - low)
+    };
+    // What is no number is below.
+    if place.is_nan() || place < 0.0 {
         return [0; 3];
     }
-    if stops > high {
+    if place > 1.0 {
         return [255; 3];
     }
-    let at = (stops - low) / (high - low) * (SCALE.len() - 1) as f32;
-    let i = (at as usize).min(SCALE.len() - 2);
-    let mix = |c: usize| SCALE[i][c] + (SCALE[i + 1][c] - SCALE[i][c]) * (at - i as f32);
-    Encoded::new(mix(0), mix(1), mix(2)).to_u8()
+    match map {
+        Map::Grey => Encoded::new(place, place, place).to_u8(),
+        Map::Viridis => scale_colour(&VIRIDIS, place),
+        Map::Automatic | Map::Rainbow => scale_colour(&RAINBOW, place),
+    }
+}
+
+/// A colour for a depth: what is beyond the range has the colour of its end.
+fn depth_colour(depth: f32, [near, far]: [f32; 2], map: Map) -> [u8; 3] {
+    let place = ((depth - near) / (far - near)).clamp(0.0, 1.0);
+    match map {
+        Map::Automatic | Map::Grey => Encoded::srgb(Rgb::splat(1.0 - 0.9 * place)).to_u8(),
+        Map::Rainbow => scale_colour(&RAINBOW, place),
+        Map::Viridis => scale_colour(&VIRIDIS, place),
+    }
 }
 
 /// A colour for a number, far from those of its neighbours.
@@ -206,11 +282,20 @@ mod tests {
 
     #[test]
     fn false_colours_go_by_stops_and_mark_what_is_beyond() {
-        assert_eq!(stops_colour(0.0), [0; 3]);
-        assert_eq!(stops_colour(100.0), [255; 3]);
-        assert_eq!(stops_colour(f32::NAN), [0; 3]);
-        assert_eq!(stops_colour(0.18), Encoded::new(0.25, 0.70, 0.30).to_u8());
-        assert_ne!(stops_colour(0.36), stops_colour(0.18));
+        let range = STOPS.map(|stops| MIDDLE_GREY * exp2(stops));
+        let colour = |light| light_colour(light, range, Map::Automatic);
+        assert_eq!(colour(0.0), [0; 3]);
+        assert_eq!(colour(100.0), [255; 3]);
+        assert_eq!(colour(f32::NAN), [0; 3]);
+        assert_eq!(colour(0.18), Encoded::new(0.25, 0.70, 0.30).to_u8());
+        assert_ne!(colour(0.36), colour(0.18));
+        // A range that begins at 0 is even, one above it by stops; the ends have the first and the last colour.
+        assert_eq!(light_colour(1.0, [0.0, 2.0], Map::Grey), [128; 3]);
+        assert_eq!(light_colour(1.0, [0.25, 4.0], Map::Grey), [128; 3]);
+        assert_eq!(light_colour(2.0, [0.0, 2.0], Map::Viridis), Encoded::new(0.993, 0.906, 0.144).to_u8());
+        assert_eq!(depth_colour(7.0, [3.0, 5.0], Map::Rainbow), Encoded::new(0.80, 0.05, 0.10).to_u8());
+        assert_eq!(depth_colour(3.0, [3.0, 5.0], Map::Viridis), Encoded::new(0.267, 0.005, 0.329).to_u8());
+        assert_eq!(depth_colour(3.0, [3.0, 5.0], Map::Automatic), [255; 3]);
     }
 
     #[test]

@@ -16,6 +16,8 @@ use std::sync::{Mutex, PoisonError};
 use hyper::HeaderMap;
 use hyper::header::{HOST, HeaderName, ORIGIN};
 
+use serde::Serialize;
+
 use crate::message::Errand;
 
 /// Why a request is refused.
@@ -34,14 +36,45 @@ pub(crate) struct Welcome {
     pub proof: String,
     /// The secret of the session, for a page that came with the token.
     pub session: Option<String>,
+    /// What the page may do.
+    pub access: Access,
+}
+
+/// What a page may do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Access {
+    /// All.
+    Edit,
+    /// Ask, and change nothing: see [`crate::message::Message::only_asks`].
+    Watch,
+}
+
+/// The secrets that let in one browser.
+struct Key {
+    session: Secret,
+    /// The token, until it was used.
+    token: Mutex<Option<Secret>>,
+    access: Access,
+}
+
+impl Key {
+    fn new(session: Secret, access: Access) -> Result<Self, String> {
+        Ok(Self { session, token: Mutex::new(Some(Secret::new()?)), access })
+    }
+
+    /// The path that opens the viewer, once.
+    fn path(&self) -> String {
+        let token = self.token.lock().unwrap_or_else(PoisonError::into_inner);
+        token.as_ref().map_or_else(|| "/".to_owned(), |token| format!("/#{}", token.digits()))
+    }
 }
 
 /// The secrets and the host names of a viewer.
 pub(crate) struct Guard {
     hosts: Vec<String>,
-    session: Secret,
-    /// The token, until it was used.
-    token: Mutex<Option<Secret>>,
+    /// That of the user first, then those of watchers.
+    keys: Vec<Key>,
     /// The oldest first.
     tickets: Mutex<VecDeque<(Secret, Errand)>>,
 }
@@ -51,8 +84,8 @@ const MAX_TICKETS: usize = 64;
 const FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 
 impl Guard {
-    /// For a viewer at an address, with other names for it, as `name:port`, and the file that keeps the secret of the
-    /// session across restarts.
+    /// That of a viewer at an address, with other names under which it may be reached, as `name:port`, and the file in which the secret
+    /// of the session outlives it. So many more browsers may watch.
     ///
     /// # Errors
     /// If the system gives no random bytes.
@@ -61,6 +94,7 @@ impl Guard {
         address: SocketAddr,
         more_hosts: &[String],
         session_file: Option<&Path>,
+        watchers: usize,
     ) -> Result<Self, String> {
         let port = address.port();
         let mut hosts = vec![address.to_string()];
@@ -72,14 +106,16 @@ impl Guard {
             Some(path) => kept_secret(path)?,
             None => Secret::new()?,
         };
-        let token = Mutex::new(Some(Secret::new()?));
-        Ok(Self { hosts, session, token, tickets: Mutex::default() })
+        let mut keys = vec![Key::new(session, Access::Edit)?];
+        for _ in 0..watchers {
+            keys.push(Key::new(Secret::new()?, Access::Watch)?);
+        }
+        Ok(Self { hosts, keys, tickets: Mutex::default() })
     }
 
-    /// The path that opens the viewer, once.
-    pub(crate) fn path(&self) -> String {
-        let token = self.token.lock().unwrap_or_else(PoisonError::into_inner);
-        token.as_ref().map_or_else(|| "/".to_owned(), |token| format!("/#{}", token.digits()))
+    /// The paths that open the viewer, each once: that of the user, then those of watchers.
+    pub(crate) fn paths(&self) -> impl Iterator<Item = String> + '_ {
+        self.keys.iter().map(Key::path)
     }
 
     /// Whether a request is for this host: protects against DNS rebinding.
@@ -111,15 +147,18 @@ impl Guard {
         let page: Secret = nonce.parse().ok()?;
         let asked = |key: &Secret| key.proof(b"page", challenge, &page);
         let answered = |key: &Secret| key.proof(b"viewer", challenge, &page).digits();
-        if is_same(proof, &asked(&self.session).digits()) {
-            return Some(Welcome { proof: answered(&self.session), session: None });
-        }
-        let mut token = self.token.lock().unwrap_or_else(PoisonError::into_inner);
-        if !token.as_ref().is_some_and(|token| is_same(proof, &asked(token).digits())) {
-            return None;
-        }
-        let token = token.take()?;
-        Some(Welcome { proof: answered(&token), session: Some(self.session.digits()) })
+        let admitted = |Key { session, token, access }: &Key| {
+            if is_same(proof, &asked(session).digits()) {
+                return Some(Welcome { proof: answered(session), session: None, access: *access });
+            }
+            let mut token = token.lock().unwrap_or_else(PoisonError::into_inner);
+            if !token.as_ref().is_some_and(|token| is_same(proof, &asked(token).digits())) {
+                return None;
+            }
+            let token = token.take()?;
+            Some(Welcome { proof: answered(&token), session: Some(session.digits()), access: *access })
+        };
+        self.keys.iter().find_map(admitted)
     }
 
     /// A single-use address for an errand.
@@ -243,7 +282,7 @@ mod tests {
     use super::*;
 
     fn guard() -> Guard {
-        Guard::new("127.0.0.1:7777".parse().unwrap(), &[], None).unwrap()
+        Guard::new("127.0.0.1:7777".parse().unwrap(), &[], None, 2).unwrap()
     }
 
     /// A page's answer to a challenge, from this secret: its random number, and its proof.
@@ -256,7 +295,7 @@ mod tests {
     #[test]
     fn a_token_works_once_the_session_always_and_anything_else_never() {
         let guard = guard();
-        let token: Secret = guard.path().strip_prefix("/#").unwrap().parse().unwrap();
+        let token: Secret = guard.paths().next().unwrap().strip_prefix("/#").unwrap().parse().unwrap();
         let challenge = Secret::new().unwrap();
         for wrong in [Secret([0; 32]), challenge.clone(), Secret::new().unwrap()] {
             let (page, proof) = hello(&wrong, &challenge);
@@ -270,7 +309,8 @@ mod tests {
         let welcome = guard.admit(&challenge, &page.digits(), &proof).expect("it is the token");
         assert_eq!(welcome.proof, token.proof(b"viewer", &challenge, &page).digits());
         assert!(guard.admit(&challenge, &page.digits(), &proof).is_none(), "a second time");
-        assert_eq!(guard.path(), "/");
+        assert_eq!(guard.paths().next().unwrap(), "/");
+        assert_eq!(welcome.access, Access::Edit);
         let session: Secret = welcome.session.expect("the session").parse().unwrap();
         for _ in 0..3 {
             let challenge = Secret::new().unwrap();
@@ -280,6 +320,30 @@ mod tests {
             assert!(welcome.session.is_none(), "it is said once");
             // An overheard proof answers no other challenge.
             assert!(guard.admit(&Secret::new().unwrap(), &page.digits(), &proof).is_none());
+        }
+    }
+
+    #[test]
+    fn each_watcher_has_a_token_and_a_session_of_its_own() {
+        let guard = guard();
+        let tokens: Vec<Secret> =
+            guard.paths().map(|path| path.strip_prefix("/#").unwrap().parse().unwrap()).collect();
+        assert_eq!(tokens.len(), 3);
+        let admit = |key: &Secret| {
+            let challenge = Secret::new().unwrap();
+            let (page, proof) = hello(key, &challenge);
+            guard.admit(&challenge, &page.digits(), &proof)
+        };
+        let mut sessions = Vec::new();
+        for (token, access) in tokens.iter().zip([Access::Edit, Access::Watch, Access::Watch]) {
+            let welcome = admit(token).unwrap();
+            assert_eq!(welcome.access, access);
+            assert!(admit(token).is_none(), "a second time");
+            let session: Secret = welcome.session.unwrap().parse().unwrap();
+            let again = admit(&session).unwrap();
+            assert_eq!((again.access, again.session), (access, None), "the session keeps its access");
+            assert!(!sessions.contains(&session.digits()));
+            sessions.push(session.digits());
         }
     }
 

@@ -9,6 +9,7 @@
 //! has shown the one before; frames in between are never sent (`socket.rs`).
 
 mod base64;
+mod bundle;
 mod camera;
 mod export;
 mod frame;
@@ -21,6 +22,7 @@ mod session;
 mod socket;
 mod source;
 mod stage;
+mod tree;
 mod viewer;
 mod visitors;
 mod watching;
@@ -29,4 +31,5 @@ mod worker;
 pub use base64::base64;
 pub use export::export;
 pub use source::{Built, Explain, Moment, Read, Source, SourceError};
+pub use tree::Hidden;
 pub use viewer::{Closer, Options, Viewer};

@@ -1,9 +1,9 @@
 //! The messages of a page.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::camera::Placement;
-use crate::frame::Channel;
+use crate::frame::{Channel, Map};
 
 /// A message of a page. Unknown fields are an error: the page is part of the same program.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
@@ -19,6 +19,10 @@ pub(crate) enum Message {
     Set(Box<SetOptions>),
     /// A parameter of the scene; `None` resets it to the file's value.
     Edit { path: String, value: Option<String> },
+    /// Shapes that are hidden, or with `others` all but these; none shows everything.
+    Hide { shapes: Vec<u32>, others: bool },
+    /// What is in front of a plane, where its normal points, is not seen by the camera; without a plane, everything is.
+    Section { plane: Option<Plane> },
     /// A moment of an animation, a variant.
     Moment { time: Option<f64>, variant: Option<String> },
     /// Asks for the shapes at a pixel of the full picture.
@@ -27,6 +31,31 @@ pub(crate) enum Message {
     Ticket { request: u32, errand: Errand },
     /// The values of a rectangle of pixels.
     Values { x: u32, y: u32, width: u32, height: u32, request: u32 },
+}
+
+/// A plane by a point and a normal of any length but 0.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Plane {
+    pub point: [f64; 3],
+    pub normal: [f64; 3],
+}
+
+impl Message {
+    /// Whether who only watches may say it: it asks, and changes nothing.
+    pub(crate) fn only_asks(&self) -> bool {
+        match self {
+            Self::Shown {} | Self::Pick { .. } | Self::Values { .. } => true,
+            Self::Ticket { errand, .. } => !matches!(errand, Errand::Scene {}),
+            Self::Camera { .. }
+            | Self::Reset { .. }
+            | Self::Set(_)
+            | Self::Edit { .. }
+            | Self::Hide { .. }
+            | Self::Section { .. }
+            | Self::Moment { .. } => false,
+        }
+    }
 }
 
 /// The first message of a page.
@@ -45,7 +74,7 @@ pub(crate) enum Errand {
     Picture { format: FileFormat },
     /// It loads an explanation of a pixel's colour.
     Explanation { language: String, pixel: (u32, u32) },
-    /// It sends a scene.
+    /// It sends a scene, or a picture for its light.
     Scene {},
 }
 
@@ -69,6 +98,12 @@ pub(crate) struct SetOptions {
     pub paused: Option<bool>,
     pub scale: Option<f64>,
     pub spp: Option<u32>,
+    /// 0 for none.
+    pub noise: Option<f64>,
+    /// The colours of numbers.
+    pub map: Option<Map>,
+    /// The numbers at both ends of these colours; none to find them.
+    pub range: Option<Vec<f32>>,
 }
 
 #[cfg(test)]

@@ -1,9 +1,10 @@
 //! HTTP on this machine: the page, the picture as a file, and the way to the socket. No path of a request reaches the file system.
 
 use std::convert::Infallible;
-use std::io::Write;
 use std::net::{SocketAddr, TcpListener};
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use http_body_util::{BodyExt, Full, Limited};
@@ -16,11 +17,11 @@ use hyper::header::{
 use hyper::service::service_fn;
 use hyper::{Method, Request, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
-use lumbre::formats::atomic_write;
 use lumbre::formats::image::ImageFormat;
 use tokio::sync::Notify;
 use tokio_tungstenite::tungstenite::handshake::derive_accept_key;
 
+use crate::bundle::{Dropped, Refused, unpack};
 use crate::guard::{Guard, Refusal};
 use crate::message::{Errand, FileFormat};
 use crate::page::{FILES, POLICY, explanation_policy};
@@ -39,19 +40,45 @@ const MAX_HEADER_BYTES: usize = 16 << 10;
 const MAX_SCENE_BYTES: u64 = 256 << 20;
 /// Timeout for it.
 const SCENE_WITHIN: Duration = Duration::from_secs(120);
-/// The magic bytes of a binary glTF.
-const GLB: &[u8] = b"glTF";
 
 /// The data that all answers share.
 pub(crate) struct Server {
     pub session: Arc<Session>,
     pub guard: Guard,
-    /// The folder of scenes that are dropped on the page, under our own names.
+    /// Where files go that are dropped on the page, each time into a new folder.
     pub dropped: tempfile::TempDir,
-    /// All connections.
+    /// How often files were dropped.
+    pub drops: AtomicU64,
+    /// Which of these folders are in use.
+    pub places: Places,
+    /// Who is connected.
     pub visitors: Arc<Visitors>,
     /// Signals that the viewer closes.
     pub closed: Arc<Notify>,
+}
+
+/// The folders of the scene and of the light that were dropped last; those before are removed.
+#[derive(Default)]
+pub(crate) struct Places {
+    scene: Mutex<Option<PathBuf>>,
+    light: Mutex<Option<PathBuf>>,
+}
+
+impl Places {
+    fn replace_scene(&self, folder: &Path) {
+        replace(&self.scene, folder);
+    }
+
+    fn replace_light(&self, folder: &Path) {
+        replace(&self.light, folder);
+    }
+}
+
+fn replace(place: &Mutex<Option<PathBuf>>, folder: &Path) {
+    let before = place.lock().unwrap_or_else(PoisonError::into_inner).replace(folder.to_owned());
+    if let Some(before) = before {
+        let _ = std::fs::remove_dir_all(before);
+    }
 }
 
 type Answer = Response<Full<Bytes>>;
@@ -210,7 +237,7 @@ impl Server {
         Ok(answer)
     }
 
-    /// A .glb that was dropped on the page.
+    /// Files that were dropped on the page: a scene, or light for the one that is there.
     async fn dropped(&self, request: Request<Incoming>) -> Result<Answer, StatusCode> {
         // A type that no form of another site can send.
         if request.headers().get(CONTENT_TYPE).is_none_or(|kind| kind != "application/octet-stream") {
@@ -228,15 +255,39 @@ impl Server {
         let body = Limited::new(request.into_body(), MAX_SCENE_BYTES as usize).collect();
         let body = tokio::time::timeout(SCENE_WITHIN, body).await.map_err(|_| StatusCode::REQUEST_TIMEOUT)?;
         let bytes = body.map_err(|_| StatusCode::BAD_REQUEST)?.to_bytes();
-        if !bytes.starts_with(GLB) {
-            return Err(StatusCode::UNSUPPORTED_MEDIA_TYPE);
+        let number = self.drops.fetch_add(1, Ordering::Relaxed);
+        let folder = self.dropped.path().join(number.to_string());
+        std::fs::create_dir(&folder).map_err(|_| StatusCode::INSUFFICIENT_STORAGE)?;
+        let unpacked = tokio::task::spawn_blocking({
+            let folder = folder.clone();
+            move || unpack(&bytes, &folder)
+        });
+        let unpacked = unpacked.await.map_err(|_| StatusCode::INTERNAL_SERVER_ERROR)?;
+        if unpacked.is_err() {
+            let _ = std::fs::remove_dir_all(&folder);
         }
-        let path = self.dropped.path().join("dropped.glb");
-        let written = atomic_write(&path, |file: &mut dyn Write| file.write_all(&bytes));
-        written.map_err(|_| StatusCode::INSUFFICIENT_STORAGE)?;
-        let source = self.session.source().of_file(&path);
-        self.session.open(source);
-        Ok(text(StatusCode::OK, "opened"))
+        match unpacked {
+            Ok(Dropped::Scene(scene)) => {
+                self.places.replace_scene(&folder);
+                self.session.open(self.session.source().of_folder(&folder, &scene));
+                Ok(text(StatusCode::OK, "opened"))
+            }
+            Ok(Dropped::Environment(_)) if self.session.source().is_empty() => Ok(text(
+                StatusCode::UNPROCESSABLE_ENTITY,
+                "A picture is light for a scene: drop a scene first.",
+            )),
+            Ok(Dropped::Environment(picture)) => {
+                self.places.replace_light(&folder);
+                self.session.relight(self.session.source().in_light_of(&picture));
+                Ok(text(StatusCode::OK, "opened"))
+            }
+            Err(Refused::Name) => Ok(text(
+                StatusCode::UNPROCESSABLE_ENTITY,
+                "A name of a file leads out of its folder, or stands twice.",
+            )),
+            Err(Refused::Storage) => Err(StatusCode::INSUFFICIENT_STORAGE),
+            Err(Refused::Malformed | Refused::Kind) => Err(StatusCode::UNSUPPORTED_MEDIA_TYPE),
+        }
     }
 
     /// Upgrades from HTTP to the socket.
@@ -294,7 +345,10 @@ fn explained(status: StatusCode) -> &'static str {
         StatusCode::MISDIRECTED_REQUEST => {
             "This viewer has another address. Through a tunnel, use the same port at both ends: ssh -L PORT:127.0.0.1:PORT HOST"
         }
-        StatusCode::UNSUPPORTED_MEDIA_TYPE => "A .glb is expected.",
+        StatusCode::UNSUPPORTED_MEDIA_TYPE => {
+            "None of the files is a scene (.pbrt, .pov, .gltf, .glb, .obj, .ply, .stl), and they are no single picture of light (.hdr, .exr)."
+        }
+        StatusCode::INSUFFICIENT_STORAGE => "There is no room for the files.",
         StatusCode::PAYLOAD_TOO_LARGE => {
             "The file is too large to be dropped here: open it from the command line."
         }

@@ -4,16 +4,17 @@ use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use lumbre::CancelToken;
 use lumbre::image::ToneMap;
+use lumbre::{CancelToken, Stop};
 use serde_json::{Value, json};
 use tokio::sync::watch;
 
 use crate::camera::Placement;
-use crate::frame::{Channel, Frame, Look, Pixels, Shot};
-use crate::message::{Message, SetOptions};
+use crate::frame::{Channel, Frame, Look, Map, Pixels, Shot};
+use crate::message::{Message, Plane, SetOptions};
 use crate::source::{Moment, Source};
 use crate::stage::{Explained, Stage};
+use crate::tree::{Hidden, MAX_NAMED};
 use crate::watching::Watched;
 
 /// Versions of the requested state, by the work that a change needs.
@@ -43,11 +44,17 @@ pub(crate) struct Wanted {
     pub channel: Channel,
     pub scale: f64,
     pub spp: Option<u32>,
+    /// The noise at which the picture is done; 0 for none.
+    pub noise: Option<f64>,
     pub denoise: Option<bool>,
     pub paused: bool,
     pub exposure: Option<f32>,
     pub tone_map: Option<ToneMap>,
     pub false_colour: bool,
+    pub map: Map,
+    pub range: Option<[f32; 2]>,
+    pub hidden: Hidden,
+    pub section: Option<Plane>,
     pub moment: Moment,
     /// Parameters with their values, in the order in which they were first set.
     pub settings: Vec<(String, String)>,
@@ -110,11 +117,16 @@ impl Session {
             channel: Channel::Beauty,
             scale: 1.0,
             spp: None,
+            noise: None,
             denoise: None,
             paused: false,
             exposure: None,
             tone_map: None,
             false_colour: false,
+            map: Map::default(),
+            range: None,
+            hidden: Hidden::default(),
+            section: None,
             moment: Moment::default(),
             settings: Vec::new(),
         };
@@ -197,6 +209,14 @@ impl Session {
         self.change(|inner| inner.wanted.changes.read += 1);
     }
 
+    /// Shows the scene in other light.
+    pub(crate) fn relight(&self, source: Arc<dyn Source>) {
+        self.change(|inner| {
+            inner.source = source;
+            inner.wanted.changes.read += 1;
+        });
+    }
+
     /// Shows another scene.
     pub(crate) fn open(&self, source: Arc<dyn Source>) {
         self.change(|inner| {
@@ -204,6 +224,7 @@ impl Session {
             inner.source = source;
             let wanted = &mut inner.wanted;
             (wanted.camera, wanted.moved, wanted.moment) = (0, None, Moment::default());
+            (wanted.hidden, wanted.section) = (Hidden::default(), None);
             wanted.settings.clear();
             wanted.changes.read += 1;
         });
@@ -308,11 +329,16 @@ impl Session {
             "channel": wanted.channel,
             "scale": wanted.scale,
             "spp": wanted.spp.or(stage.as_ref().map(|stage| stage.options.stop.spp)),
+            "noise": wanted.noise.or(stage.as_ref().and_then(|stage| stage.options.stop.noise)),
             "denoise": wanted.denoise.or(stage.as_ref().map(|stage| stage.denoise)),
             "paused": wanted.paused,
             "exposure": wanted.exposure.or(stage.as_ref().map(|stage| stage.save.exposure)),
             "tone_map": wanted.tone_map.or(stage.as_ref().map(|stage| stage.save.tone_map)).map(tone_map_name),
             "false_colour": wanted.false_colour,
+            "map": wanted.map,
+            "range": wanted.range,
+            "hidden": wanted.hidden.told(),
+            "section": wanted.section,
             "time": wanted.moment.time,
             "variant": wanted.moment.variant,
             "settings": wanted.settings,
@@ -344,6 +370,23 @@ impl Session {
             }
             Message::Set(wishes) => self.wish(&wishes),
             Message::Edit { path, value } => self.edit(path, value),
+            Message::Hide { shapes, .. } if shapes.len() > MAX_NAMED => {
+                Some(json!({ "type": "wrong", "what": format!("more than {MAX_NAMED} shapes are named") }))
+            }
+            Message::Hide { shapes, others } => {
+                self.change(|inner| {
+                    inner.wanted.hidden = Hidden::new(shapes, others);
+                    inner.wanted.changes.build += 1;
+                });
+                None
+            }
+            Message::Section { plane } => {
+                self.change(|inner| {
+                    inner.wanted.section = plane;
+                    inner.wanted.changes.render += 1;
+                });
+                None
+            }
             Message::Moment { time, variant } => {
                 let is_fine = time.is_none_or(|time| time.is_finite() && time.abs() < 1e9);
                 if is_fine && variant.as_ref().is_none_or(|name| name.len() <= LONGEST_SETTING) {
@@ -371,15 +414,31 @@ impl Session {
             wanted.exposure = wishes.exposure.map(|stops| stops.clamp(-100.0, 100.0)).or(wanted.exposure);
             wanted.tone_map = tone_map.or(wanted.tone_map);
             wanted.false_colour = wishes.false_colour.unwrap_or(wanted.false_colour);
+            wanted.map = wishes.map.unwrap_or(wanted.map);
+            if let Some(range) = &wishes.range {
+                wanted.range = match range[..] {
+                    [low, high] if low < high && low.is_finite() && high.is_finite() => Some([low, high]),
+                    _ => None,
+                };
+            }
             wanted.channel = wishes.channel.unwrap_or(wanted.channel);
             wanted.denoise = wishes.denoise.or(wanted.denoise);
             wanted.paused = wishes.paused.unwrap_or(wanted.paused);
             wanted.scale = wishes.scale.filter(|s| s.is_finite()).map_or(wanted.scale, |s| s.clamp(0.1, 2.0));
             wanted.spp = wishes.spp.map(|spp| spp.clamp(1, 1 << 20)).or(wanted.spp);
-            let is_same_look = (before.exposure, before.tone_map, before.false_colour)
-                == (wanted.exposure, wanted.tone_map, wanted.false_colour);
-            let is_same_picture = (before.channel, before.denoise, before.scale)
-                == (wanted.channel, wanted.denoise, wanted.scale);
+            if let Some(noise) = wishes.noise.filter(|noise| noise.is_finite() && *noise >= 0.0) {
+                wanted.noise = Some(noise);
+                // As many samples as it takes, where nobody says how many.
+                let most = Some(Stop::MAX_FOR_NOISE);
+                wanted.spp =
+                    if noise > 0.0 { wanted.spp.or(most) } else { wanted.spp.filter(|_| wanted.spp != most) };
+            }
+            let look = |wanted: &Wanted| {
+                (wanted.exposure, wanted.tone_map, wanted.false_colour, wanted.map, wanted.range)
+            };
+            let is_same_look = look(&before) == look(wanted);
+            let is_same_picture = (before.channel, before.denoise, before.scale, before.noise)
+                == (wanted.channel, wanted.denoise, wanted.scale, wanted.noise);
             wanted.changes.look += u64::from(!is_same_look);
             wanted.changes.render += u64::from(!is_same_picture);
             // More samples continue the present ones.

@@ -14,7 +14,7 @@ use tokio_tungstenite::tungstenite::Message as Packet;
 use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 use tokio_tungstenite::tungstenite::protocol::{CloseFrame, Role, WebSocketConfig};
 
-use crate::guard::{Guard, Secret};
+use crate::guard::{Access, Guard, Secret};
 use crate::message::{Greeting, Message};
 use crate::rate::Allowance;
 use crate::server::{Server, has_to_go};
@@ -45,8 +45,8 @@ pub(crate) async fn talk(stream: TokioIo<Upgraded>, server: Arc<Server>, visit: 
     let mut stream = WebSocketStream::from_raw_socket(stream, Role::Server, Some(config)).await;
     let ended = tokio::select! {
         ended = async {
-            greet(&mut stream, &server.guard, &visit).await?;
-            converse(&mut stream, &server).await
+            let access = greet(&mut stream, &server.guard, &visit).await?;
+            converse(&mut stream, &server, access).await
         } => ended,
         () = has_to_go(&visit) => return,
     };
@@ -56,8 +56,8 @@ pub(crate) async fn talk(stream: TokioIo<Upgraded>, server: Arc<Server>, visit: 
     }
 }
 
-/// Admits a page that knows our secret, and proves to it that we know it too. Nothing is sent before.
-async fn greet(stream: &mut Stream, guard: &Guard, visit: &Visit) -> Result<(), Ended> {
+/// Lets in a page that knows our secret, and proves to it that we know it, too. Nothing is said before.
+async fn greet(stream: &mut Stream, guard: &Guard, visit: &Visit) -> Result<Access, Ended> {
     let challenge = Secret::new().map_err(|_| None)?;
     let asked = json!({ "type": "challenge", "nonce": challenge.digits() });
     send(stream, Packet::text(asked.to_string())).await?;
@@ -66,14 +66,17 @@ async fn greet(stream: &mut Stream, guard: &Guard, visit: &Visit) -> Result<(), 
     let Ok(Some(Ok(Packet::Text(text)))) = answer else { return Err(unknown()) };
     let Greeting::Hello { nonce, proof } = serde_json::from_str(&text).map_err(|_| unknown())?;
     let welcome = guard.admit(&challenge, &nonce, &proof).filter(|_| visit.let_in()).ok_or_else(unknown)?;
-    let welcome = json!({ "type": "welcome", "proof": welcome.proof, "session": welcome.session });
-    send(stream, Packet::text(welcome.to_string())).await
+    let access = welcome.access;
+    let welcome =
+        json!({ "type": "welcome", "proof": welcome.proof, "session": welcome.session, "access": access });
+    send(stream, Packet::text(welcome.to_string())).await?;
+    Ok(access)
 }
 
 /// Why we close the socket; `None` if the other side closed it, or is gone.
 type Ended = Option<(CloseCode, &'static str)>;
 
-async fn converse(stream: &mut Stream, server: &Server) -> Result<(), Ended> {
+async fn converse(stream: &mut Stream, server: &Server, access: Access) -> Result<(), Ended> {
     let session = &*server.session;
     let mut scene = subscribe(&session.scene);
     let mut state = subscribe(&session.state);
@@ -98,6 +101,9 @@ async fn converse(stream: &mut Stream, server: &Server) -> Result<(), Ended> {
                             .map_err(|_| Some((CloseCode::Policy, "the message is not understood")))?;
                         may_send |= message == Message::Shown {};
                         let answer = match message {
+                            message if access == Access::Watch && !message.only_asks() => {
+                                Some(json!({ "type": "wrong", "what": "this page looks on: it changes nothing" }))
+                            }
                             Message::Ticket { request, errand } => {
                                 let address = server.guard.ticket(errand);
                                 Some(json!({ "type": "ticket", "request": request, "address": address }))

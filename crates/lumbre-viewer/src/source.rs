@@ -7,6 +7,8 @@ use std::sync::Arc;
 
 use lumbre::{Background, ErrorKind, RenderOptions, SaveOptions, Scene, SceneDesc};
 
+use crate::tree::Hidden;
+
 /// Which moment and which variant of a scene to read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Moment {
@@ -104,11 +106,11 @@ pub trait Source: Send + Sync {
     /// The fault and its place.
     fn read(&self, moment: &Moment) -> Result<Read, SourceError>;
 
-    /// Stages a description and builds it.
+    /// Sets a description on its stage, takes the hidden shapes out of it ([`Hidden::apply`]), and builds it.
     ///
     /// # Errors
-    /// The fault.
-    fn build(&self, desc: SceneDesc) -> Result<Built, SourceError>;
+    /// What is wrong.
+    fn build(&self, desc: SceneDesc, hidden: &Hidden) -> Result<Built, SourceError>;
 
     /// Whether there is memory for a picture with these options.
     ///
@@ -116,9 +118,12 @@ pub trait Source: Send + Sync {
     /// The needed and the available memory.
     fn check(&self, options: &RenderOptions) -> Result<(), SourceError>;
 
-    /// The source of a file that came through the page. The file may be a stranger's, so it must not use other files of
-    /// this machine.
-    fn of_file(&self, file: &Path) -> Arc<dyn Source>;
+    /// The same for a scene that came through the page, with the files beside it, in a folder of its own. It may be a stranger's, so that it
+    /// may use no file outside that folder.
+    fn of_folder(&self, folder: &Path, scene: &Path) -> Arc<dyn Source>;
+
+    /// The same scene in the light of a picture from all around.
+    fn in_light_of(&self, picture: &Path) -> Arc<dyn Source>;
 
     /// Whether there is a scene at all.
     fn is_empty(&self) -> bool {

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::sync::{RwLock, RwLockReadGuard, RwLockWriteGuard};
 
-use lumbre::description::{Camera, CameraView, NamedMaterial, UpAxis};
+use lumbre::description::{Camera, CameraView, UpAxis};
 use lumbre::{
     Background, DVec2, DVec3, Parameter, ParameterKind, Ray, RenderOptions, SaveOptions, Scene, SceneDesc,
 };
@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 
 use crate::camera::{Placement, field_of_view};
 use crate::source::{Built, Explain};
+use crate::tree::{Thing, things, tree};
 
 /// A scene with its descriptions by name.
 pub(crate) struct Stage {
@@ -34,23 +35,7 @@ pub(crate) struct Stage {
     pub facts: Value,
 }
 
-/// A shape of the file.
-#[derive(Clone, Debug)]
-pub(crate) struct Thing {
-    /// The name of its kind.
-    pub kind: &'static str,
-    /// That of its material.
-    pub material: Option<String>,
-}
-
-impl Default for Thing {
-    /// For surfaces that are in no file.
-    fn default() -> Self {
-        Self { kind: "ground", material: None }
-    }
-}
-
-/// Maximum hits that are listed for one ray.
+/// Hits that are listed of one ray.
 const MAX_HITS: usize = 64;
 /// Maximum parameters that are listed.
 const MAX_PARAMETERS: usize = 2000;
@@ -94,19 +79,15 @@ impl Stage {
         let Some(ray) = ray(&scene, camera, size, x, y) else { return json!({ "hits": [] }) };
         let mut hits = Vec::new();
         scene.all(&ray, |hit| {
-            let thing = self.thing(hit.shape);
-            hits.push(json!({
-                "distance": hit.t,
-                "point": hit.point.to_array(),
-                "normal": hit.normal.to_array(),
-                "uv": hit.uv.to_array(),
-                "front": hit.front,
-                "shape": hit.shape,
-                "kind": thing.kind,
-                "material": thing.material,
-                "primitive": hit.primitive,
-                "instance": hit.instance,
-            }));
+            let mut told = self.thing(hit.shape).told(hit.shape);
+            told["distance"] = json!(hit.t);
+            told["point"] = json!(hit.point.to_array());
+            told["normal"] = json!(hit.normal.to_array());
+            told["uv"] = json!(hit.uv.to_array());
+            told["front"] = json!(hit.front);
+            told["primitive"] = json!(hit.primitive);
+            told["instance"] = json!(hit.instance);
+            hits.push(told);
             if hits.len() < MAX_HITS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
         json!({ "origin": ray.origin.to_array(), "direction": ray.direction.to_array(), "hits": hits })
@@ -158,23 +139,6 @@ fn distance(scene: &Scene, camera: &Camera) -> f64 {
     hit.filter(near).or(middle.filter(near)).unwrap_or(1.0)
 }
 
-fn things(desc: &SceneDesc) -> Vec<Thing> {
-    let mut things = Vec::new();
-    let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);
-    for shape in desc.shapes.iter().chain(in_objects) {
-        let index = shape.index as usize;
-        // Indices count the shapes of a file: a larger number must come from another program.
-        if index >= things.len() && index < 50_000_000 {
-            things.resize_with(index + 1, Thing::default);
-        }
-        let Some(thing) = things.get_mut(index) else { continue };
-        thing.kind = shape.geometry.name();
-        let material = shape.material.and_then(|id| desc.materials.get(id.0 as usize));
-        thing.material = material.map(NamedMaterial::label);
-    }
-    things
-}
-
 fn facts(
     scene: &Scene,
     desc: &SceneDesc,
@@ -213,6 +177,10 @@ fn facts(
     json!({
         "cameras": cameras.iter().enumerate().map(camera).collect::<Vec<_>>(),
         "up": up.to_array(),
+        "ground": scene.resolved().ground().map(|ground| {
+            json!({ "point": ground.point.to_array(), "normal": ground.normal.to_array() })
+        }),
+        "tree": tree(desc),
         "bounds": info.bounds.map(|bounds| [bounds.min.to_array(), bounds.max.to_array()]),
         "shapes": info.shapes,
         "materials": info.materials,

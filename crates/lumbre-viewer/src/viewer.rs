@@ -3,11 +3,12 @@
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
 
 use tokio::sync::Notify;
 
 use crate::guard::Guard;
-use crate::server::{self, Server, listen};
+use crate::server::{self, Places, Server, listen};
 use crate::session::Session;
 use crate::source::Source;
 use crate::worker::Worker;
@@ -24,12 +25,14 @@ pub struct Options {
     /// A file, in a folder of the user's own, that keeps the session: open pages continue when another viewer starts at
     /// the same address. Without it, the new viewer's address must be opened.
     pub session_file: Option<PathBuf>,
+    /// Browsers that may look on, each by an address of its own, and edit nothing.
+    pub watchers: usize,
 }
 
 impl Default for Options {
     /// This machine only, at any port.
     fn default() -> Self {
-        Self { address: (Ipv4Addr::LOCALHOST, 0).into(), hosts: Vec::new(), session_file: None }
+        Self { address: (Ipv4Addr::LOCALHOST, 0).into(), hosts: Vec::new(), session_file: None, watchers: 0 }
     }
 }
 
@@ -74,13 +77,15 @@ impl Viewer {
     pub fn new(source: Arc<dyn Source>, options: &Options) -> Result<Self, String> {
         let listener = listen(options.address)?;
         let address = listener.local_addr().map_err(|e| e.to_string())?;
-        let guard = Guard::new(address, &options.hosts, options.session_file.as_deref())?;
+        let guard = Guard::new(address, &options.hosts, options.session_file.as_deref(), options.watchers)?;
         let dropped = tempfile::tempdir().map_err(|e| format!("cannot make a temporary folder: {e}"))?;
         let session = Arc::new(Session::new(source));
         let server = Arc::new(Server {
             session,
             guard,
             dropped,
+            drops: AtomicU64::new(0),
+            places: Places::default(),
             visitors: Arc::default(),
             closed: Arc::new(Notify::new()),
         });
@@ -94,7 +99,16 @@ impl Viewer {
 
     /// The address to open in a browser. It works once.
     pub fn url(&self) -> String {
-        format!("http://{}{}", self.address, self.server.guard.path())
+        self.urls().next().unwrap_or_default()
+    }
+
+    /// The addresses of browsers that may look on. Each works once.
+    pub fn watcher_urls(&self) -> Vec<String> {
+        self.urls().skip(1).collect()
+    }
+
+    fn urls(&self) -> impl Iterator<Item = String> + '_ {
+        self.server.guard.paths().map(|path| format!("http://{}{path}", self.address))
     }
 
     /// A handle that closes it.

@@ -5,14 +5,18 @@ use std::str::FromStr;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use lumbre::description::{FilmKind, IntegratorKind};
+use lumbre::description::{Camera, ClipPlane, FilmKind, IntegratorKind};
 use lumbre::image::{Image, Rgb};
-use lumbre::{CancelToken, ErrorKind, NoProgress, Progress, RenderOptions, RenderState, SceneDesc, Setting};
+use lumbre::{
+    CancelToken, DVec3, ErrorKind, NoProgress, Picture, Progress, RenderOptions, RenderState, SceneDesc,
+    Setting, State, Stats, Stop,
+};
 use rayon::prelude::*;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::camera::moved;
 use crate::frame::{Channel, Look, Pixels, Shot, id_colour};
+use crate::message::Plane;
 use crate::session::{Changes, Session, Wanted};
 use crate::source::{Read, SourceError};
 use crate::stage::{Stage, ray};
@@ -25,7 +29,9 @@ const FIRST_AT_MOST: Duration = Duration::from_millis(110);
 const PASS: f64 = 0.6;
 /// Maximum pixels of the full picture along the side of one of the first picture's.
 const COARSEST: u32 = 16;
-/// Samples per pixel of a feature, whose only noise is at edges.
+/// Samples that every pixel has before its noise may end it, where nobody says how many: see [`Stop::min_spp`].
+const MIN_SPP_FOR_NOISE: u32 = 16;
+/// Samples a pixel of a feature, which has no noise but that of edges.
 const FEATURE_SPP: u32 = 16;
 
 /// The next render.
@@ -52,8 +58,16 @@ pub(crate) struct Worker {
     state: Option<RenderState>,
     /// Paths a second, as last measured.
     speed: f64,
+    /// Pixels a second that the denoiser takes, as last measured.
+    denoising: f64,
     /// Time spent on the full picture.
     spent: Duration,
+    /// [`Worker::spent`] when it was last shown.
+    shown: Duration,
+    /// How long it last took to denoise it.
+    last_denoise: Duration,
+    /// Its noise after the last pass.
+    noise: Option<f64>,
     sequence: u32,
 }
 
@@ -61,7 +75,6 @@ impl Worker {
     pub(crate) fn new(session: Arc<Session>) -> Self {
         let options = RenderOptions::default();
         let (known, step) = (Changes::default(), Step::Done);
-        let (spent, speed) = (Duration::ZERO, 1e6);
         Self {
             session,
             known,
@@ -70,8 +83,12 @@ impl Worker {
             step,
             options,
             state: None,
-            speed,
-            spent,
+            speed: 1e6,
+            denoising: 1e6,
+            spent: Duration::ZERO,
+            shown: Duration::ZERO,
+            last_denoise: Duration::ZERO,
+            noise: None,
             sequence: 0,
         }
     }
@@ -146,8 +163,13 @@ impl Worker {
             }
         }
         self.session.edited(wrong);
-        let built = source.build(desc)?;
-        Ok(Arc::new(Stage::new(built, &read.desc, read.warnings.clone())))
+        let built = source.build(desc, &wanted.hidden)?;
+        let mut stage = Stage::new(built, &read.desc, read.warnings.clone());
+        // A shape that is hidden does not change what the camera turns around.
+        if let Some(before) = self.stage.as_ref().filter(|before| !again && before.cameras == stage.cameras) {
+            stage.placements.clone_from(&before.placements);
+        }
+        Ok(Arc::new(stage))
     }
 
     /// Starts a new picture.
@@ -166,6 +188,7 @@ impl Worker {
                 }
             }
         };
+        let camera = Camera { clip: wanted.section.as_ref().and_then(clip), ..camera };
         let replaced = stage.scene_mut().replace_camera(options.camera, camera);
         if let Err(error) = replaced {
             return self.fail(&error);
@@ -196,19 +219,28 @@ impl Worker {
         self.session.pictured(Ok(()));
         self.options = options;
         self.options.stop.spp = self.target(wanted, &stage);
-        (self.state, self.spent) = (None, Duration::ZERO);
-        let target = self.options.stop.spp;
-        self.session
-            .tell_progress(&json!({ "type": "progress", "doing": "rendering", "spp": 0, "target": target }));
+        self.options.stop.noise = noise(wanted, &stage);
+        (self.state, self.noise) = (None, None);
+        (self.spent, self.shown) = (Duration::ZERO, Duration::ZERO);
+        self.tell_start(None);
         self.sequence = wanted.sequence;
         self.step =
             if wanted.channel == Channel::Ids { Step::Full(1) } else { Step::First(self.coarseness()) };
     }
 
+    /// Says that no sample of the full picture is taken yet, and how long it will take, as far as that is known.
+    fn tell_start(&self, left: Option<f64>) {
+        self.session.tell_progress(&json!({
+            "type": "progress", "doing": "rendering", "spp": 0, "target": self.options.stop.spp, "share": 0, "left": left,
+            "noise_target": self.options.stop.noise,
+        }));
+    }
+
     fn target(&self, wanted: &Wanted, stage: &Stage) -> u32 {
+        let spp = wanted.spp.unwrap_or(stage.options.stop.spp);
         match wanted.channel {
-            Channel::Beauty => wanted.spp.unwrap_or(stage.options.stop.spp).max(1),
-            Channel::Variance => wanted.spp.unwrap_or(stage.options.stop.spp).max(2),
+            Channel::Beauty => spp.max(1),
+            Channel::Variance => spp.max(2),
             Channel::Ids => 1,
             _ => FEATURE_SPP,
         }
@@ -216,8 +248,9 @@ impl Worker {
 
     /// Pixels of the full picture along the side of one that can be had in the time of the first.
     fn coarseness(&self) -> u32 {
-        let all = f64::from(self.options.width) * f64::from(self.options.height);
-        let at_once = (self.speed * FIRST.as_secs_f64()).max(1.0);
+        let all = self.pixels();
+        let of_denoising = if self.options.guides { self.denoising.recip() } else { 0.0 };
+        let at_once = (FIRST.as_secs_f64() / (self.speed.recip() + of_denoising)).max(1.0);
         ((all / at_once).sqrt().ceil() as u32).clamp(1, COARSEST)
     }
 
@@ -234,7 +267,11 @@ impl Worker {
 
     /// The number of samples after the next pass.
     fn next(&self, done: u32, target: u32) -> u32 {
-        let all = f64::from(self.options.width) * f64::from(self.options.height);
+        if self.options.stop.noise.is_some() {
+            // Each pass towards a noise begins with a small picture, the same each time.
+            return done.saturating_mul(2).max(1).min(target);
+        }
+        let all = self.pixels();
         let in_a_pass = ((self.speed * PASS / all.max(1.0)) as u32).max(1);
         // What little a pass changes of many samples is not worth sending a picture to everyone.
         (done + done.min(in_a_pass.max(done / 8)).max(1)).min(target)
@@ -244,7 +281,7 @@ impl Worker {
         let mut save = self.stage.as_ref().map(|stage| stage.save.clone()).unwrap_or_default();
         save.exposure = wanted.exposure.unwrap_or(save.exposure);
         save.tone_map = wanted.tone_map.unwrap_or(save.tone_map);
-        Look { save, false_colour: wanted.false_colour }
+        Look { save, false_colour: wanted.false_colour, map: wanted.map, range: wanted.range }
     }
 
     /// Takes the next step.
@@ -261,15 +298,14 @@ impl Worker {
 
     fn coarse(&mut self, stage: &Stage, wanted: &Wanted, side: u32, cancel: CancelToken) {
         let mut options = self.options.clone();
-        options.guides = false;
-        options.stop = lumbre::Stop::at(1);
+        options.stop = Stop::at(1);
         options.stop.time = matches!(self.step, Step::First(_)).then_some(FIRST_AT_MOST);
         let scene = stage.scene();
         let (width, height) = (options.width.div_ceil(side), options.height.div_ceil(side));
         options.resize(scene.resolved().film(), width, height);
         let rendered = scene.render_from(&options, &NoProgress, &cancel, None, None);
         drop(scene);
-        let picture = match rendered {
+        let mut picture = match rendered {
             Ok((picture, _)) => picture,
             Err(error) => return self.fail(&error),
         };
@@ -277,12 +313,38 @@ impl Worker {
             return;
         }
         self.measure(picture.stats().paths_per_second());
+        let is_denoised = self.denoise(&mut picture, &cancel);
+        if cancel.is_cancelled() {
+            return;
+        }
         let picture = match &stage.background {
             Some(background) if wanted.channel == Channel::Beauty => picture.over(background.clone()),
             _ => picture,
         };
-        self.show(wanted, Pixels::Rendered(Box::new(picture)), false, false);
+        let pixels = Pixels::Rendered(Box::new(picture));
+        self.show(wanted, Shown { pixels, is_full: false, is_done: false, is_denoised });
+        // To a noise target there is no telling yet.
+        let samples = self.pixels() * f64::from(self.options.stop.spp);
+        self.tell_start(self.options.stop.noise.is_none().then_some(samples / self.speed));
         self.step = if side > 5 { Step::Coarse(side / 3) } else { Step::Full(1) };
+    }
+
+    /// Takes the noise out of a picture that has guides; whether it could.
+    fn denoise(&mut self, picture: &mut Picture, cancel: &CancelToken) -> bool {
+        if !self.options.guides {
+            return false;
+        }
+        let start = Instant::now();
+        // It fails where there is no sample in some pixel: the picture stays as it is then.
+        let is_denoised = picture.denoise_unless(self.options.threads, cancel).is_ok();
+        self.last_denoise = start.elapsed();
+        let side = f64::from(picture.stats().stride.unwrap_or(1));
+        let pixels = picture.image().pixels().len() as f64 / (side * side);
+        if !cancel.is_cancelled() {
+            let speed = pixels / self.last_denoise.as_secs_f64().max(1e-6);
+            self.denoising = 0.5 * (self.denoising + speed);
+        }
+        is_denoised
     }
 
     fn full(&mut self, stage: &Stage, wanted: &Wanted, spp: u32) {
@@ -290,14 +352,25 @@ impl Worker {
         let target = self.options.stop.spp;
         let mut options = self.options.clone();
         options.stop.spp = spp.min(target);
+        // No pixel ends before it has these.
+        let sure = options.stop.min_spp.unwrap_or(MIN_SPP_FOR_NOISE);
+        options.stop.noise = options.stop.noise.filter(|_| options.stop.spp > sure);
         let start = Instant::now();
         let scene = stage.scene();
         let state = self.state.take();
         let before = state.as_ref().map_or(0, RenderState::taken);
-        let asked = StillWanted { session: &self.session, known: self.known };
-        let rendered = scene.render_from(&options, &asked, &cancel, state, None);
+        let telling = Telling {
+            session: &self.session,
+            known: self.known,
+            pixels: self.pixels(),
+            spent: self.spent,
+            way: self.way(state.as_ref()),
+            words: json!({ "type": "progress", "doing": "rendering", "target": target,
+                           "noise_target": self.options.stop.noise }),
+        };
+        let rendered = scene.render_from(&options, &telling, &cancel, state, None);
         drop(scene);
-        let (mut picture, state) = match rendered {
+        let (picture, state) = match rendered {
             Ok(rendered) => rendered,
             // What is wanted instead comes next.
             Err(lumbre::Error::Render(lumbre::RenderError::Unwanted)) => return,
@@ -307,18 +380,40 @@ impl Worker {
         let took = start.elapsed();
         self.spent += took;
         let stats = picture.stats().clone();
-        if stats.spp < options.stop.spp {
+        if stats.cancelled || stats.most_spp < options.stop.spp && options.stop.noise.is_none() {
             // Stopped: what was rendered is gone on with, if it is still wanted.
             return;
         }
-        self.measure(stats.samples.saturating_sub(before) as f64 / took.as_secs_f64().max(1e-6));
-        let is_done = stats.spp >= target;
-        if options.guides && (is_done || stats.spp.is_power_of_two()) && stats.spp >= 4.min(target) {
-            // It fails where there is no sample in some pixel, and there is one in each.
-            let _ = picture.denoise_unless(options.threads, &cancel);
-            if cancel.is_cancelled() {
-                return;
-            }
+        if options.stop.noise.is_none() {
+            self.measure(stats.samples.saturating_sub(before) as f64 / took.as_secs_f64().max(1e-6));
+        }
+        // With a noise target, pixels end before; when all have, the picture is done.
+        let is_done = stats.most_spp >= target || stats.most_spp < options.stop.spp;
+        if self.shows(is_done) && !self.show_full(stage, wanted, picture, is_done, &cancel) {
+            return;
+        }
+        self.step = if is_done { Step::Done } else { Step::Full(self.next(options.stop.spp, target)) };
+        self.tell_of(&stats, is_done);
+    }
+
+    /// Whether the picture is shown after this pass: not where the denoiser would take too much of the time.
+    fn shows(&self, is_done: bool) -> bool {
+        let is_first = self.shown == Duration::ZERO;
+        is_done || is_first || !self.options.guides || self.spent - self.shown >= 3 * self.last_denoise
+    }
+
+    /// Shows the picture; whether it is still wanted.
+    fn show_full(
+        &mut self,
+        stage: &Stage,
+        wanted: &Wanted,
+        mut picture: Picture,
+        is_done: bool,
+        cancel: &CancelToken,
+    ) -> bool {
+        let is_denoised = self.denoise(&mut picture, cancel);
+        if cancel.is_cancelled() {
+            return false;
         }
         if let Some(background) = stage.background.as_ref().filter(|_| wanted.channel == Channel::Beauty) {
             picture = picture.over(background.clone());
@@ -327,17 +422,45 @@ impl Worker {
             (Channel::Variance, Some(state)) => Pixels::Plain(state.variance()),
             _ => Pixels::Rendered(Box::new(picture)),
         };
-        self.show(wanted, pixels, true, is_done);
-        self.step = if is_done { Step::Done } else { Step::Full(self.next(stats.spp, target)) };
+        self.show(wanted, Shown { pixels, is_full: true, is_done, is_denoised });
+        self.shown = self.spent;
+        true
+    }
+
+    /// How much of the way to the end of the picture a sample of each pixel is: 0 where that is not known.
+    fn way(&self, state: Option<&RenderState>) -> f64 {
+        let by_spp = f64::from(self.options.stop.spp).recip();
+        let by_noise = self.options.stop.noise.zip(state).map_or(0.0, |(limit, state)| {
+            let spp = state.taken() as f64 / self.pixels();
+            match self.noise {
+                // The noise falls with the square root of the number of samples.
+                Some(noise) if noise > limit && spp > 0.0 => (limit / noise).powi(2) / spp,
+                _ => 0.0,
+            }
+        });
+        if self.options.stop.noise.is_some() { by_noise.max(by_spp) } else { by_spp }
+    }
+
+    /// Pixels that are rendered: those of the film's crop.
+    fn pixels(&self) -> f64 {
+        self.options.bounds().map_or(1.0, |bounds| bounds.area() as f64)
+    }
+
+    fn tell_of(&mut self, stats: &Stats, is_done: bool) {
+        self.noise = stats.noise;
         let rays = stats.rays.camera + stats.rays.bounce + stats.rays.shadow;
         let spent = self.spent.as_secs_f64().max(1e-6);
-        let left = spent * f64::from(target - stats.spp.min(target)) / f64::from(stats.spp.max(1));
+        let spp = stats.samples as f64 / self.pixels();
+        let share = if is_done { 1.0 } else { (spp * self.way(self.state.as_ref())).min(1.0) };
+        let left = (share > 0.0).then(|| spent * (1.0 - share) / share);
         self.session.tell_progress(&json!({
             "type": "progress",
             "doing": if is_done { "done" } else { "rendering" },
-            "spp": stats.spp,
-            "target": target,
+            "spp": if stats.noise_target.is_some() { spp.round() as u32 } else { stats.spp },
+            "target": self.options.stop.spp,
+            "share": share,
             "noise": stats.noise,
+            "noise_target": self.options.stop.noise,
             "rays_per_second": rays as f64 / spent,
             "seconds": spent,
             "left": left,
@@ -367,7 +490,8 @@ impl Worker {
         if cancel.is_cancelled() {
             return;
         }
-        self.show(wanted, Pixels::Plain(image), true, true);
+        let pixels = Pixels::Plain(image);
+        self.show(wanted, Shown { pixels, is_full: true, is_done: true, is_denoised: false });
         self.step = Step::Done;
         self.session.tell_progress(&json!({ "type": "progress", "doing": "done" }));
     }
@@ -385,23 +509,68 @@ impl Worker {
         }
     }
 
-    fn show(&self, wanted: &Wanted, pixels: Pixels, is_full: bool, is_done: bool) {
+    fn show(&self, wanted: &Wanted, shown: Shown) {
         let full = (self.options.width, self.options.height);
-        let shot = Shot { pixels, channel: wanted.channel, full, sequence: self.sequence, is_full, is_done };
+        let Shown { pixels, is_full, is_done, is_denoised } = shown;
+        let (channel, sequence) = (wanted.channel, self.sequence);
+        let shot = Shot { pixels, channel, full, sequence, is_full, is_done, is_denoised };
         self.session.show(shot, &self.look(wanted));
     }
 }
 
-/// Knows whether the picture is still wanted: a large one takes longer to put together than one may wait for the next.
-struct StillWanted<'s> {
-    session: &'s Session,
-    known: Changes,
+/// What is shown of a step.
+struct Shown {
+    pixels: Pixels,
+    is_full: bool,
+    is_done: bool,
+    is_denoised: bool,
 }
 
-impl Progress for StillWanted<'_> {
+/// What a page is to hear while a pass goes on. It knows whether the picture is still wanted: a large one takes longer to put together
+/// than one may wait for the next.
+struct Telling<'s> {
+    session: &'s Session,
+    known: Changes,
+    pixels: f64,
+    /// The time that the passes before took.
+    spent: Duration,
+    /// See [`Worker::way`].
+    way: f64,
+    /// What is said at any time.
+    words: Value,
+}
+
+impl Progress for Telling<'_> {
+    fn state(&self, state: &State) {
+        let spp = state.samples as f64 / self.pixels;
+        let share = (spp * self.way).clamp(0.0, 1.0);
+        let spent = (self.spent + state.elapsed).as_secs_f64();
+        let mut words = self.words.clone();
+        words["spp"] = json!(spp as u32);
+        words["share"] = json!(share);
+        if share > 0.0 {
+            words["left"] = json!(spent * (1.0 - share) / share);
+        }
+        self.session.tell_progress(&words);
+    }
+
     fn is_wanted(&self) -> bool {
         self.session.is_wanted(self.known)
     }
+}
+
+/// The plane of a section; `None` for one without a direction.
+fn clip(plane: &Plane) -> Option<ClipPlane> {
+    let [point, normal] = [plane.point, plane.normal].map(DVec3::from_array);
+    let is_fine = point.is_finite() && point.length() < 1e12;
+    let normal = normal.try_normalize().filter(|_| is_fine)?;
+    Some(ClipPlane { point, normal })
+}
+
+/// The noise at which a picture of light ends, if it is to end at one.
+fn noise(wanted: &Wanted, stage: &Stage) -> Option<f64> {
+    let is_light = matches!(wanted.channel, Channel::Beauty | Channel::Variance);
+    wanted.noise.or(stage.options.stop.noise).filter(|noise| is_light && *noise > 0.0)
 }
 
 fn set(desc: &mut SceneDesc, path: &str, value: &str) -> Result<(), String> {

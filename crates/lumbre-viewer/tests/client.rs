@@ -8,7 +8,9 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use lumbre::{DVec3, RenderOptions, SaveOptions, Scene, SceneDesc};
-use lumbre_viewer::{Built, Closer, Explain, Moment, Options, Read as WasRead, Source, SourceError, Viewer};
+use lumbre_viewer::{
+    Built, Closer, Explain, Hidden, Moment, Options, Read as WasRead, Source, SourceError, Viewer,
+};
 
 /// The widest picture that there is memory for.
 pub(crate) const MAX_PIXELS: u32 = 90;
@@ -30,7 +32,8 @@ impl Source for OneFile {
         Ok(WasRead { desc, files: diagnostics.files_read().to_vec(), warnings: diagnostics.lines() })
     }
 
-    fn build(&self, desc: SceneDesc) -> Result<Built, SourceError> {
+    fn build(&self, mut desc: SceneDesc, hidden: &Hidden) -> Result<Built, SourceError> {
+        hidden.apply(&mut desc);
         let scene = Scene::from_description(desc)?;
         let options = scene.options();
         let save = SaveOptions::default();
@@ -53,8 +56,12 @@ impl Source for OneFile {
         Err(SourceError { kind: lumbre::ErrorKind::Limit, message })
     }
 
-    fn of_file(&self, file: &Path) -> Arc<dyn Source> {
-        Arc::new(Self(file.to_owned()))
+    fn of_folder(&self, _: &Path, scene: &Path) -> Arc<dyn Source> {
+        Arc::new(Self(scene.to_owned()))
+    }
+
+    fn in_light_of(&self, _: &Path) -> Arc<dyn Source> {
+        Arc::new(Self(self.0.clone()))
     }
 }
 
@@ -98,6 +105,8 @@ pub(crate) struct Running {
     pub address: SocketAddr,
     pub path: PathBuf,
     token: String,
+    /// Those of browsers that look on.
+    pub watchers: Vec<String>,
     closer: Closer,
     thread: Option<JoinHandle<Result<(), String>>>,
     _folder: tempfile::TempDir,
@@ -105,16 +114,25 @@ pub(crate) struct Running {
 
 impl Running {
     pub(crate) fn new() -> Self {
+        Self::shared(0)
+    }
+
+    /// One that this many more browsers may look at.
+    pub(crate) fn shared(watchers: usize) -> Self {
+        let mut options = Options::default();
+        options.watchers = watchers;
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scene.pbrt");
         std::fs::write(&path, SCENE).unwrap();
-        let viewer = Viewer::new(Arc::new(OneFile(path.clone())), &Options::default()).unwrap();
+        let viewer = Viewer::new(Arc::new(OneFile(path.clone())), &options).unwrap();
         let address = viewer.address();
         let url = viewer.url();
-        let token = url.rsplit('#').next().unwrap().to_owned();
+        let token_of = |url: &String| url.rsplit('#').next().unwrap().to_owned();
+        let token = token_of(&url);
+        let watchers = viewer.watcher_urls().iter().map(token_of).collect();
         let closer = viewer.closer();
         let thread = Some(std::thread::spawn(move || viewer.run()));
-        Self { address, path, token, closer, thread, _folder: folder }
+        Self { address, path, token, watchers, closer, thread, _folder: folder }
     }
 
     pub(crate) fn host(&self) -> String {

@@ -265,7 +265,7 @@ fn broken_requests_are_refused_and_slow_ones_given_up() {
 }
 
 #[test]
-fn scenes_that_are_dropped_are_models_of_a_bounded_size() {
+fn files_that_are_dropped_are_of_a_bounded_size_and_come_by_tickets() {
     let viewer = Running::new();
     let session = viewer.session();
     let own = [format!("Host: {}", viewer.host()), format!("Origin: http://{}", viewer.host())];
@@ -289,6 +289,55 @@ fn scenes_that_are_dropped_are_models_of_a_bounded_size() {
     let address = socket.ticket(r#"{"for":"picture","format":"png"}"#);
     assert_eq!(viewer.status("POST", &address, &own), 405);
     goes_on(&viewer, &session);
+}
+
+#[test]
+fn who_looks_on_asks_and_changes_nothing_whatever_it_says() {
+    let viewer = Running::shared(2);
+    let own = viewer.session();
+    let mut editor = viewer.socket(&own);
+    let mut sessions = Vec::new();
+    for token in &viewer.watchers {
+        let welcome = viewer.connect().greet(token).expect("it is let in");
+        assert_eq!(welcome["access"], "watch");
+        assert!(viewer.connect().greet(token).is_none(), "a second time");
+        sessions.push(welcome["session"].as_str().unwrap().to_owned());
+    }
+    assert!(sessions[0] != sessions[1] && !sessions.contains(&own));
+    editor.wait_for("progress", |told| told["doing"] == "done");
+    let mut watcher = viewer.connect();
+    assert_eq!(watcher.greet(&sessions[1]).unwrap()["access"], "watch");
+    let before = watcher.wait_for("state", |_| true);
+    let placement = r#"{"eye":[5,-5,4],"target":[0,0,0],"up":[0,0,1]}"#;
+    for said in [
+        &format!(r#"{{"type":"camera","sequence":7,"placement":{placement},"fov":null,"zoom":1}}"#),
+        r#"{"type":"reset","sequence":7,"camera":0}"#,
+        r#"{"type":"set","exposure":3,"channel":"normal","spp":9}"#,
+        r#"{"type":"set"}"#,
+        r#"{"type":"edit","path":"light.0.radiance","value":"9"}"#,
+        r#"{"type":"hide","shapes":[0],"others":false}"#,
+        r#"{"type":"section","plane":{"point":[0,0,0],"normal":[0,1,0]}}"#,
+        r#"{"type":"moment","time":2,"variant":null}"#,
+        r#"{"type":"ticket","request":5,"errand":{"for":"scene"}}"#,
+    ] {
+        watcher.say(said);
+        let answer = watcher.wait_for("wrong", |_| true);
+        assert_eq!(answer["what"], "this page looks on: it changes nothing", "{said}");
+    }
+    // What it may: ask, and take pictures and explanations.
+    watcher.say(r#"{"type":"pick","x":24,"y":16,"request":5}"#);
+    assert!(!watcher.wait_for("picked", |_| true)["ray"]["hits"].as_array().unwrap().is_empty());
+    let lines = [format!("Host: {}", viewer.host())];
+    for errand in
+        [r#"{"for":"picture","format":"png"}"#, r#"{"for":"explanation","language":"la","pixel":[3,2]}"#]
+    {
+        let address = watcher.ticket(errand);
+        assert_eq!(viewer.status("GET", &address, &lines), 200, "{errand}");
+    }
+    // Nobody was told of a change: a page that comes now hears what was said before.
+    let now = viewer.socket(&own).wait_for("state", |_| true);
+    assert_eq!(now, before);
+    goes_on(&viewer, &own);
 }
 
 #[test]

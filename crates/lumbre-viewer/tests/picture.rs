@@ -2,8 +2,11 @@
 
 use crate::client::{Packet, Running, SCENE};
 
+/// Bytes of a frame before its pixels.
+const HEADER: usize = 40;
+
 fn numbers(frame: &[u8]) -> Vec<u32> {
-    frame[..32].chunks(4).map(|bytes| u32::from_le_bytes(bytes.try_into().unwrap())).collect()
+    frame[..HEADER].chunks(4).map(|bytes| u32::from_le_bytes(bytes.try_into().unwrap())).collect()
 }
 
 /// Reads frames until one is the whole picture with all samples, of the change of this number.
@@ -40,18 +43,18 @@ fn the_last_frame_has_the_pixels_of_the_picture_that_is_rendered() {
         })
         .collect();
     assert_eq!(numbers(&frame)[1..6], [48, 32, 48, 32, 4]);
-    assert!(frame[32..] == expected[..]);
+    assert!(frame[HEADER..] == expected[..]);
     // Another camera makes another picture, and the file's own the same again.
     let placement = r#"{"eye":[5,-5,4],"target":[0,0,0],"up":[0,0,1]}"#;
     socket.say(&format!(r#"{{"type":"camera","sequence":7,"placement":{placement},"fov":null,"zoom":1}}"#));
-    assert!(finished(&mut socket, 7)[32..] != expected[..]);
+    assert!(finished(&mut socket, 7)[HEADER..] != expected[..]);
     socket.say(r#"{"type":"reset","sequence":8,"camera":0}"#);
-    assert!(finished(&mut socket, 8)[32..] == expected[..]);
+    assert!(finished(&mut socket, 8)[HEADER..] == expected[..]);
     // What makes no camera leaves the picture.
     let nowhere = r#"{"eye":[0,0,0],"target":[0,0,0],"up":[0,0,1]}"#;
     socket.say(&format!(r#"{{"type":"camera","sequence":9,"placement":{nowhere},"fov":null,"zoom":1}}"#));
     socket.say(r#"{"type":"reset","sequence":10,"camera":0}"#);
-    assert!(finished(&mut socket, 10)[32..] == expected[..]);
+    assert!(finished(&mut socket, 10)[HEADER..] == expected[..]);
 }
 
 #[test]
@@ -159,11 +162,11 @@ fn parameters_are_edited_and_wrong_ones_named() {
     socket.say(&format!(r##"{{"type":"edit","path":"{path}","value":"#00ff00"}}"##));
     let state = socket.wait_for("state", |state| !state["settings"].as_array().unwrap().is_empty());
     assert_eq!(state["settings"][0][0], path);
-    assert!(finished(&mut socket, 0)[32..] != before[32..]);
+    assert!(finished(&mut socket, 0)[HEADER..] != before[HEADER..]);
     socket.say(&format!(r##"{{"type":"edit","path":"{path}","value":"nonsense"}}"##));
     let state = socket.wait_for("state", |state| !state["edit_error"].is_null());
     assert!(state["edit_error"].as_str().unwrap().contains("expected"), "{state}");
     socket.say(&format!(r#"{{"type":"edit","path":"{path}","value":null}}"#));
-    assert!(finished(&mut socket, 0)[32..] == before[32..]);
+    assert!(finished(&mut socket, 0)[HEADER..] == before[HEADER..]);
     assert_eq!(std::fs::read_to_string(&viewer.path).unwrap(), SCENE, "the file is never written");
 }

@@ -208,6 +208,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         view,
         staging,
         reading,
+        hidden: None,
     };
     let shown = shown(desc, &wish)?;
     if !arguments.quiet {

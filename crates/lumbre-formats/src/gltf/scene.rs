@@ -330,6 +330,7 @@ impl Builder<'_> {
         if uses <= 1 {
             for (copy, world) in place.worlds.iter().enumerate() {
                 let shapes = self.shapes(place)?;
+                self.name_shapes(scene, &shapes, place)?;
                 match place.motion(copy) {
                     Some(motion) => move_about(scene, shapes, motion),
                     None => self.stand(scene, shapes, world, place)?,
@@ -396,6 +397,21 @@ impl Builder<'_> {
         self.file.budget.bytes((made.len() * size_of::<DMat4>()) as u64, "joints of skins")?;
         self.skins.insert(skin, made.clone());
         Ok(made)
+    }
+
+    /// Names shapes as their node is called, or else as their mesh.
+    fn name_shapes(&self, scene: &mut SceneDesc, shapes: &[ShapeDesc], place: &Placed) -> Read<()> {
+        let of = |list: List, index: usize| self.file.list(list)[index].string_at("name");
+        let name = match of(List::Nodes, place.node)? {
+            Some(name) => Some(name),
+            None => of(List::Meshes, place.key.mesh)?,
+        };
+        let Some(name) = name.filter(|name| !name.is_empty()) else { return Ok(()) };
+        let each = size_of::<(u32, Arc<str>)>();
+        self.file.budget.bytes((name.len() + shapes.len() * each) as u64, "names of shapes")?;
+        let name: Arc<str> = name.into();
+        scene.listing.shapes.extend(shapes.iter().map(|shape| (shape.index, name.clone())));
+        Ok(())
     }
 
     fn next_index(&mut self) -> u32 {
@@ -705,6 +721,7 @@ pub(super) fn camera(camera: Value<'_>, node: Value<'_>, world: &DAffine3) -> Re
         shutter_open: 0.0,
         shutter_close: 1.0,
         medium: None,
+        clip: None,
     })
 }
 

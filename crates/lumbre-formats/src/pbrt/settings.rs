@@ -157,6 +157,7 @@ impl Converter<'_, '_> {
             shutter_open,
             shutter_close,
             medium,
+            clip: None,
         }];
         Ok(())
     }
@@ -527,6 +528,7 @@ impl Converter<'_, '_> {
                 shutter_open: 0.0,
                 shutter_close: 1.0,
                 medium: None,
+                clip: None,
             });
         }
         Ok(())

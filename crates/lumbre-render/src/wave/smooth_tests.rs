@@ -90,6 +90,7 @@ fn scene(material: Material, reverse: bool) -> Scene {
         shutter_open: 0.0,
         shutter_close: 1.0,
         medium: None,
+        clip: None,
     };
     let shape = ShapeDesc {
         index: 0,

@@ -84,6 +84,7 @@ pub(crate) fn look(from: DVec3, at: DVec3, fov: f64) -> Camera {
         shutter_open: 0.0,
         shutter_close: 1.0,
         medium: None,
+        clip: None,
     }
 }
 

@@ -1,285 +1,5 @@
 "use strict";
 (() => {
-  // src/vectors.ts
-  var add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
-  var sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-  var scale = (a, s) => [a[0] * s, a[1] * s, a[2] * s];
-  var dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-  var cross = (a, b) => [
-    a[1] * b[2] - a[2] * b[1],
-    a[2] * b[0] - a[0] * b[2],
-    a[0] * b[1] - a[1] * b[0]
-  ];
-  var length = (a) => Math.hypot(...a);
-  var unit = (a) => scale(a, 1 / (length(a) || 1));
-  function turned(v, axis, angle) {
-    const [c, s] = [Math.cos(angle), Math.sin(angle)];
-    return add(add(scale(v, c), scale(cross(axis, v), s)), scale(axis, dot(axis, v) * (1 - c)));
-  }
-
-  // src/camera.ts
-  var POLE = 0.02;
-  var Camera = class {
-    placement = { eye: [0, 0, 1], target: [0, 0, 0], up: [0, 1, 0] };
-    fov = null;
-    zoom = 1;
-    mirrored = false;
-    /** What stays upwards while the camera turns. */
-    axis = [0, 1, 0];
-    /** That of a state; what stays upwards is found anew. */
-    take(state2, scene2) {
-      if (!state2.placement) return;
-      const own = scene2.cameras[state2.camera];
-      this.placement = state2.placement;
-      this.mirrored = own?.mirrored ?? false;
-      this.fov = state2.fov ?? own?.fov ?? null;
-      this.zoom = state2.zoom;
-      this.axis = this.upright(scene2, state2.name.endsWith(".pbrt"));
-    }
-    forward() {
-      return unit(sub(this.placement.target, this.placement.eye));
-    }
-    right() {
-      const right = unit(cross(this.placement.up, this.forward()));
-      return this.mirrored ? scale(right, -1) : right;
-    }
-    upward() {
-      const forward = this.forward();
-      return unit(sub(this.placement.up, scale(forward, dot(this.placement.up, forward))));
-    }
-    distance() {
-      return length(sub(this.placement.target, this.placement.eye));
-    }
-    /** An axis that the picture does not lean to the side of; pbrt files do not say which is up. */
-    upright(scene2, unsaid) {
-      const [right, up] = [this.right(), this.upward()];
-      const axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
-      const candidates = [...axes, ...axes.map((axis) => scale(axis, -1)), scene2.up];
-      let [best, most] = [up, 0];
-      for (const axis of candidates) {
-        const bonus = axis === scene2.up && !unsaid ? 0.5 : 0;
-        const standing = dot(axis, up) + bonus;
-        if (Math.abs(dot(axis, right)) < 1e-3 && dot(axis, up) > 1e-3 && standing > most) [best, most] = [axis, standing];
-      }
-      return best;
-    }
-    /** Turns around the target by angles in radians: to the right, and up. */
-    orbit(right, up) {
-      let { eye, target } = this.placement;
-      let offset = sub(eye, target);
-      const sideways = Math.sign(dot(cross(this.axis, offset), this.right())) || 1;
-      offset = turned(offset, this.axis, right * sideways);
-      const polar = Math.acos(Math.max(-1, Math.min(1, dot(unit(offset), this.axis))));
-      const wanted = Math.max(POLE, Math.min(Math.PI - POLE, polar - up));
-      const across = cross(this.axis, offset);
-      if (length(across) > 0) offset = turned(offset, unit(across), wanted - polar);
-      eye = add(target, offset);
-      this.placement = { eye, target, up: this.axis };
-    }
-    /** Moves eye and target: to the right, up and forward, in shares of the distance between them. */
-    move(right, up, forward) {
-      const by = this.distance();
-      const step = add(add(scale(this.right(), right * by), scale(this.upward(), up * by)), scale(this.forward(), forward * by));
-      const { eye, target } = this.placement;
-      this.placement = { eye: add(eye, step), target: add(target, step), up: this.axis };
-    }
-    /** Comes nearer to the target by a factor, or shows more of it. */
-    dolly(factor) {
-      const { eye, target } = this.placement;
-      this.placement = { eye: add(target, scale(sub(eye, target), factor)), target, up: this.axis };
-      this.zoom = Math.max(1e-4, Math.min(1e4, this.zoom / factor));
-    }
-    /** Turns around this point from now on. */
-    lookAt(point2) {
-      const { eye } = this.placement;
-      this.placement = { eye, target: point2, up: this.axis };
-    }
-    /** As pbrt writes it. */
-    toPbrt() {
-      const { eye, target } = this.placement;
-      const numbers = (v) => v.map((x) => +x.toPrecision(9)).join(" ");
-      const mirror = this.mirrored ? "Scale -1 1 1\n" : "";
-      const lens = this.fov === null ? "" : `
-Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
-      return `${mirror}LookAt ${numbers(eye)}  ${numbers(target)}  ${numbers(this.upward())}${lens}`;
-    }
-    /** As glTF writes it: a node, whose camera looks along -z. */
-    toGltf(aspect) {
-      const columns = [
-        [this.right(), 0],
-        [this.upward(), 0],
-        [scale(this.forward(), -1), 0],
-        [this.placement.eye, 1]
-      ];
-      const matrix = columns.flatMap(([v, w]) => [...v.map((x) => +x.toPrecision(9)), w]);
-      const shorter = (this.fov ?? 45) * Math.PI / 180;
-      const yfov = aspect >= 1 ? shorter : 2 * Math.atan(Math.tan(shorter / 2) / aspect);
-      const perspective = { aspectRatio: +aspect.toPrecision(9), yfov: +yfov.toPrecision(9), znear: 0.01 };
-      return JSON.stringify({ cameras: [{ type: "perspective", perspective }], nodes: [{ camera: 0, matrix }] });
-    }
-  };
-
-  // src/elements.ts
-  function byId(id) {
-    const found = document.getElementById(id);
-    if (!found) throw new Error(`the page has no ${id}`);
-    return found;
-  }
-  function element(name, text = "", properties = {}) {
-    const made = Object.assign(document.createElement(name), properties);
-    if (text) made.textContent = text;
-    return made;
-  }
-  function short(value) {
-    return Number.isFinite(value) ? String(+value.toPrecision(6)) : String(value);
-  }
-  function large(value) {
-    const units = [[1e9, " G"], [1e6, " M"], [1e3, " k"]];
-    for (const [unit2, name] of units) if (value >= unit2) return `${(value / unit2).toFixed(2)}${name}`;
-    return `${Math.round(value)}`;
-  }
-  function spoken(seconds) {
-    if (seconds < 1) return `${Math.round(seconds * 1e3)} ms`;
-    if (seconds < 90) return `${seconds.toFixed(seconds < 10 ? 1 : 0)} s`;
-    return `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
-  }
-  function options(select, entries, chosen) {
-    const same = select.options.length === entries.length && entries.every(([value, text], i) => select.options[i]?.value === value && select.options[i]?.textContent === text);
-    if (!same) select.replaceChildren(...entries.map(([value, text]) => element("option", text, { value })));
-    select.value = chosen;
-  }
-  function save(name, text) {
-    const url = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
-    element("a", "", { href: url, download: name }).click();
-    setTimeout(() => URL.revokeObjectURL(url), 1e4);
-  }
-
-  // src/at-rest.ts
-  function bytes(base64) {
-    return Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
-  }
-  async function unpacked(base64) {
-    const stream = new Blob([bytes(base64)]).stream().pipeThrough(new DecompressionStream("deflate"));
-    return new DataView(await new Response(stream).arrayBuffer());
-  }
-  function half(bits) {
-    const sign = bits & 32768 ? -1 : 1;
-    const [exponent, fraction] = [bits >> 10 & 31, bits & 1023];
-    if (exponent === 31) return fraction ? NaN : sign * Infinity;
-    return exponent === 0 ? sign * fraction * 2 ** -24 : sign * (1 + fraction / 1024) * 2 ** (exponent - 15);
-  }
-  var AtRest = class {
-    constructor(listener2, data2) {
-      this.listener = listener2;
-      this.data = data2;
-      setTimeout(() => void this.start());
-    }
-    listener;
-    data;
-    shown;
-    values;
-    picks;
-    async start() {
-      this.listener.stood("open");
-      this.listener.told({ type: "scene", scene: this.data.scene });
-      this.listener.told({ type: "progress", doing: "done", ...this.data.progress });
-      await this.show("beauty");
-      this.picks = await unpacked(this.data.picks.values);
-    }
-    state(channel) {
-      return {
-        name: this.data.name,
-        has_scene: true,
-        error: null,
-        edit_error: null,
-        camera: this.data.camera,
-        sequence: 0,
-        moved: false,
-        placement: this.data.placement,
-        fov: null,
-        zoom: 1,
-        size: null,
-        channel,
-        scale: 1,
-        spp: this.data.progress.spp ?? null,
-        denoise: null,
-        paused: false,
-        exposure: 0,
-        tone_map: null,
-        false_colour: false,
-        time: null,
-        variant: null,
-        settings: []
-      };
-    }
-    async show(name) {
-      const channel = this.data.channels.find((known) => known.name === name);
-      if (!channel) return;
-      this.listener.told({ type: "state", ...this.state(name) });
-      const bitmap = await createImageBitmap(new Blob([bytes(channel.png)], { type: "image/png" }));
-      const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
-      const drawing = canvas.getContext("2d");
-      if (!drawing) return;
-      drawing.drawImage(bitmap, 0, 0);
-      const { width, height } = bitmap;
-      const pixels = drawing.getImageData(0, 0, width, height);
-      [this.shown, this.values] = [pixels, void 0];
-      if (channel.values) this.values = await unpacked(channel.values);
-      const spp = this.data.progress.spp ?? 0;
-      this.listener.framed({ width, height, fullWidth: width, fullHeight: height, spp, sequence: 0, isFull: true, isDone: true, pixels });
-    }
-    pick(x, y, request2) {
-      if (!this.picks || !this.shown) return;
-      const at = 8 * (y * this.shown.width + x);
-      const thing = this.data.picks.shapes[this.picks.getUint32(at, true) - 1];
-      const hits = thing ? [{ ...thing, distance: this.picks.getFloat32(at + 4, true) }] : [];
-      this.listener.told({ type: "picked", request: request2, x, y, ray: { hits } });
-    }
-    /** There is nobody to give one. */
-    ticket() {
-      return Promise.reject(new Error("at rest"));
-    }
-    send(message) {
-      const { type, channel, x, y, width, height, request: request2 } = message;
-      if (type === "set" && channel) void this.show(String(channel));
-      if (type === "pick") this.pick(Math.floor(x ?? 0), Math.floor(y ?? 0), request2 ?? 0);
-      if (type !== "values" || !this.shown) return;
-      const whole = this.shown.width;
-      const [x0, y0] = [x ?? 0, y ?? 0];
-      const [columns, rows] = [Math.min(width ?? 0, whole - x0), Math.min(height ?? 0, this.shown.height - y0)];
-      const found = [];
-      for (let row = y0; row < y0 + rows; row++) {
-        for (let column = x0; column < x0 + columns; column++) {
-          const pixel = row * whole + column;
-          const value = (c) => this.values ? half(this.values.getUint16(2 * (3 * pixel + c), true)) : +((this.shown?.data[4 * pixel + c] ?? 0) / 255).toFixed(3);
-          found.push([value(0), value(1), value(2)]);
-        }
-      }
-      this.listener.told({ type: "values", request: request2 ?? 0, x: x0, y: y0, width: columns, height: rows, values: found });
-    }
-  };
-  function hideWhatNeedsAViewer() {
-    const live = [
-      "pause",
-      "reset",
-      "exposure",
-      "tone-map",
-      "false-colour",
-      "denoise",
-      "spp",
-      "scale",
-      "edit-details",
-      "camera-details",
-      "save-details",
-      "help-open"
-    ];
-    for (const id of live) {
-      byId(id).hidden = true;
-      for (const label of document.querySelectorAll(`label[for="${id}"]`)) label.hidden = true;
-    }
-    for (const option of document.querySelectorAll("option[value=ids], option[value=variance]")) option.remove();
-  }
-
   // src/proof.ts
   var IV = [1779033703, 3144134277, 1013904242, 2773480762, 1359893119, 2600822924, 528734635, 1541459225];
   var ORDER = [2, 6, 3, 10, 7, 0, 4, 13, 1, 11, 12, 5, 9, 14, 15, 8];
@@ -328,14 +48,16 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
   }
 
   // src/protocol.ts
-  var HEADER = 32;
-  var MAGIC = 827151692;
+  var HEADER = 40;
+  var MAGIC = 843928908;
   function decoded(packet) {
-    const numbers = new Uint32Array(packet, 0, HEADER / 4);
-    const [magic = 0, width = 0, height = 0, fullWidth = 0, fullHeight = 0, spp = 0, sequence2 = 0, flags = 0] = numbers;
+    const numbers2 = new Uint32Array(packet, 0, HEADER / 4);
+    const [magic = 0, width = 0, height = 0, fullWidth = 0, fullHeight = 0, spp = 0, sequence = 0, flags = 0] = numbers2;
     if (magic !== MAGIC || packet.byteLength !== HEADER + 4 * width * height) throw new Error("no frame");
     const pixels = new ImageData(new Uint8ClampedArray(packet, HEADER), width, height);
-    return { width, height, fullWidth, fullHeight, spp, sequence: sequence2, isFull: (flags & 1) !== 0, isDone: (flags & 2) !== 0, pixels };
+    const [low = 0, high = 0] = new Float32Array(packet, 32, 2);
+    const [isFull, isDone, isDenoised] = [1, 2, 4].map((bit) => (flags & bit) !== 0);
+    return { width, height, fullWidth, fullHeight, spp, sequence, isFull, isDone, isDenoised, low, high, pixels };
   }
 
   // src/connection.ts
@@ -374,17 +96,17 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     /** An address for an errand, which works once. */
     ticket(errand) {
       if (!this.isIn) return Promise.reject(new Error("not connected"));
-      const request2 = ++this.requests;
+      const request = ++this.requests;
       return new Promise((found) => {
-        this.waiting.set(request2, found);
-        this.send({ type: "ticket", request: request2, errand });
+        this.waiting.set(request, found);
+        this.send({ type: "ticket", request, errand });
       });
     }
     connect() {
       this.isIn = false;
       const known = secret();
       if (!known) {
-        this.listener.stood("refused");
+        this.listener.onStatus("refused");
         return;
       }
       const socket = new WebSocket(`ws://${location.host}/socket`);
@@ -401,14 +123,14 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
         if (message.type !== "welcome" || !challenge || message.proof !== proof(known, "viewer", challenge, nonce)) return false;
         if (message.session) sessionStorage.setItem(SECRET, message.session);
         [this.isIn, this.wait] = [true, 500];
-        this.listener.stood("open");
+        this.listener.onOpen(message.access);
         return true;
       };
       const lost = (how) => {
         if (this.socket !== socket) return;
         [this.socket, this.isIn] = [void 0, false];
         this.waiting.clear();
-        this.listener.stood(how);
+        this.listener.onStatus(how);
         this.again = setTimeout(() => this.connect(), this.wait);
         this.wait = Math.min(this.wait * 1.5, 5e3);
       };
@@ -432,25 +154,310 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
             this.waiting.get(message.request)?.(message.address);
             this.waiting.delete(message.request);
           } else {
-            this.listener.told(message);
+            this.listener.onMessage(message);
           }
           return;
         }
-        this.listener.framed(decoded(event.data));
+        this.listener.onFrame(decoded(event.data));
         this.send({ type: "shown" });
       };
     }
   };
 
+  // src/elements.ts
+  function byId(id) {
+    const found = document.getElementById(id);
+    if (!found) throw new Error(`the page has no ${id}`);
+    return found;
+  }
+  function element(name, text = "", properties = {}) {
+    const made = Object.assign(document.createElement(name), properties);
+    if (text) made.textContent = text;
+    return made;
+  }
+  function short(value) {
+    return Number.isFinite(value) ? String(+value.toPrecision(6)) : String(value);
+  }
+  function large(value) {
+    const units = [[1e9, " G"], [1e6, " M"], [1e3, " k"]];
+    for (const [unit2, name] of units) if (value >= unit2) return `${(value / unit2).toFixed(2)}${name}`;
+    return `${Math.round(value)}`;
+  }
+  function spoken(seconds) {
+    if (seconds < 1) return `${Math.round(seconds * 1e3)} ms`;
+    if (seconds < 90) return `${seconds.toFixed(seconds < 10 ? 1 : 0)} s`;
+    return `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
+  }
+  function options(select2, entries, chosen) {
+    const same = select2.options.length === entries.length && entries.every(([value, text], i) => select2.options[i]?.value === value && select2.options[i]?.textContent === text);
+    if (!same) select2.replaceChildren(...entries.map(([value, text]) => element("option", text, { value })));
+    select2.value = chosen;
+  }
+  function saveBlob(name, blob) {
+    const url = URL.createObjectURL(blob);
+    element("a", "", { href: url, download: name }).click();
+    setTimeout(() => URL.revokeObjectURL(url), 1e4);
+  }
+  var save = (name, text) => saveBlob(name, new Blob([text], { type: "text/plain" }));
+
+  // src/display.ts
+  var LEVELS = 256;
+  var hasScale = (state) => state.channel === "depth" || state.channel === "variance" || state.channel === "beauty" && state.false_colour;
+  function histogram({ data: data2 }) {
+    const counts = [0, 1, 2].map(() => new Uint32Array(LEVELS));
+    for (let at = 0; at < data2.length; at += 4) {
+      for (let channel = 0; channel < 3; channel++) {
+        const count = counts[channel];
+        const level = data2[at + channel] ?? 0;
+        if (count) count[level] = (count[level] ?? 0) + 1;
+      }
+    }
+    return counts;
+  }
+  function marked(pixels) {
+    const copy2 = new ImageData(new Uint8ClampedArray(pixels.data), pixels.width, pixels.height);
+    const { data: data2 } = copy2;
+    for (let at = 0; at < data2.length; at += 4) {
+      const levels = [data2[at] ?? 0, data2[at + 1] ?? 0, data2[at + 2] ?? 0];
+      if (Math.max(...levels) === 255) data2.set([255, 0, 60, 255], at);
+      else if (Math.max(...levels) === 0) data2.set([0, 90, 255, 255], at);
+    }
+    return copy2;
+  }
+  var Display = class {
+    constructor(page2) {
+      this.page = page2;
+      const range = () => {
+        const [low, high] = ["range-low", "range-high"].map((id) => byId(id).value);
+        if (low !== "" && high !== "" && Number(low) < Number(high)) page2.set({ range: [Number(low), Number(high)] });
+      };
+      for (const id of ["range-low", "range-high"]) byId(id).addEventListener("change", range);
+      byId("range-found").addEventListener("click", () => page2.set({ range: [] }));
+      byId("map").addEventListener("change", () => page2.set({ map: byId("map").value }));
+      byId("mark-clipped").addEventListener("change", () => this.redraw());
+      byId("histogram-details").addEventListener("toggle", () => this.draw());
+    }
+    page;
+    canvas = byId("histogram");
+    last;
+    /** The frame as it is shown. */
+    shown(frame) {
+      this.last = frame;
+      return byId("mark-clipped").checked ? { ...frame, pixels: marked(frame.pixels) } : frame;
+    }
+    take(state) {
+      for (const part of document.querySelectorAll(".scaled")) part.hidden = !hasScale(state);
+      byId("map").value = state.map;
+      byId("legend").className = `scaled map-${state.map === "automatic" ? state.channel === "depth" ? "near" : "rainbow" : state.map === "grey" && state.channel === "depth" ? "near" : state.map}`;
+    }
+    /** What a frame says of itself. */
+    draw() {
+      const frame = this.last;
+      if (!frame) return;
+      for (const [id, value] of [["range-low", frame.low], ["range-high", frame.high]]) {
+        const input = byId(id);
+        if (document.activeElement !== input) input.value = short(value);
+      }
+      if (byId("histogram-details").open) this.drawHistogram(frame);
+    }
+    redraw() {
+      if (this.last) this.page.sheet.show(this.shown(this.last));
+    }
+    drawHistogram(frame) {
+      const counts = histogram(frame.pixels);
+      const drawing = this.canvas.getContext("2d");
+      if (!drawing) return;
+      const { width, height } = this.canvas;
+      drawing.clearRect(0, 0, width, height);
+      drawing.globalCompositeOperation = "lighter";
+      const most = Math.max(1, ...counts.flatMap((count) => [...count.subarray(1, LEVELS - 1)]));
+      counts.forEach((count, channel) => {
+        drawing.fillStyle = ["#d03030", "#30a040", "#3060e0"][channel] ?? "#888";
+        count.forEach((number, level) => {
+          const tall = height * Math.min(1, number / most);
+          drawing.fillRect(level * width / LEVELS, height - tall, width / LEVELS, tall);
+        });
+      });
+      const pixels = frame.width * frame.height;
+      let [white, black] = [0, 0];
+      const { data: data2 } = frame.pixels;
+      for (let at = 0; at < data2.length; at += 4) {
+        const top = Math.max(data2[at] ?? 0, data2[at + 1] ?? 0, data2[at + 2] ?? 0);
+        if (top === 255) white += 1;
+        if (top === 0) black += 1;
+      }
+      const share = (count) => `${(100 * count / pixels).toFixed(1)} %`;
+      byId("clipped").textContent = `${share(white)} at white, ${share(black)} black`;
+    }
+  };
+
+  // src/drop.ts
+  var MOST_BYTES = 256 * 2 ** 20;
+  async function filesOf(entry) {
+    const name = entry.fullPath.slice(1);
+    if (entry.isFile) {
+      const file = await new Promise((found, failed) => entry.file(found, failed));
+      return [{ name, file }];
+    }
+    const reader = entry.createReader();
+    const all = [];
+    for (; ; ) {
+      const some = await new Promise((found, failed) => reader.readEntries(found, failed));
+      if (some.length === 0) return all;
+      for (const inner of some) all.push(...await filesOf(inner));
+    }
+  }
+  async function dropped(data2) {
+    const entries = [...data2.items].map((item) => item.webkitGetAsEntry?.() ?? null);
+    const plain = [...data2.files].map((file) => ({ name: file.name, file }));
+    if (entries.length === 0 || entries.some((entry) => entry === null)) return plain;
+    return (await Promise.all(entries.map((entry) => entry ? filesOf(entry) : []))).flat();
+  }
+  function bundled(files) {
+    const list = new TextEncoder().encode(JSON.stringify(files.map(({ name, file }) => ({ name, size: file.size }))));
+    const length2 = new DataView(new ArrayBuffer(4));
+    length2.setUint32(0, list.length, true);
+    return new Blob(["LUMF", length2, list, ...files.map(({ file }) => file)], { type: "application/octet-stream" });
+  }
+  var Drop = class {
+    constructor(ticket2, alert) {
+      this.ticket = ticket2;
+      this.alert = alert;
+      const stage = byId("stage");
+      stage.addEventListener("dragover", (event) => {
+        event.preventDefault();
+        stage.classList.add("over");
+      });
+      stage.addEventListener("dragleave", () => stage.classList.remove("over"));
+      stage.addEventListener("drop", (event) => {
+        event.preventDefault();
+        stage.classList.remove("over");
+        if (event.dataTransfer) void dropped(event.dataTransfer).then((files) => this.send(files));
+      });
+      for (const input of document.querySelectorAll("input.opens")) {
+        input.addEventListener("change", () => {
+          const files = [...input.files ?? []].map((file) => ({ name: file.webkitRelativePath || file.name, file }));
+          void this.send(files).then(() => input.value = "");
+        });
+      }
+    }
+    ticket;
+    alert;
+    async send(files) {
+      if (files.length === 0) return;
+      if (files.reduce((sum, { file }) => sum + file.size, 0) > MOST_BYTES) {
+        this.alert("The files were not opened.", "They are more than 256 MiB: open them from the command line.");
+        return;
+      }
+      try {
+        const headers = { "Content-Type": "application/octet-stream" };
+        const answer = await fetch(await this.ticket({ for: "scene" }), { method: "POST", headers, body: bundled(files) });
+        if (!answer.ok) this.alert("The files were not opened.", await answer.text());
+      } catch {
+        this.alert("The files were not opened.", "The viewer does not answer.");
+      }
+    }
+  };
+
+  // src/colour.ts
+  var toSrgb = (c) => c <= 31308e-7 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055;
+  var toLinear = (c) => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
+  var toHex = (linear) => "#" + linear.map((c) => Math.round(255 * Math.max(0, Math.min(1, toSrgb(c)))).toString(16).padStart(2, "0")).join("");
+  var fromHex = (hex) => [1, 3, 5].map((at) => toLinear(parseInt(hex.slice(at, at + 2), 16) / 255));
+
+  // src/lights.ts
+  function parted(light) {
+    const power = Math.max(0, ...light);
+    return { power, colour: power > 0 ? light.map((c) => c / power) : [1, 1, 1] };
+  }
+  function asOptions(settings) {
+    const quoted = (text) => /^[\w.,=+-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`;
+    return settings.map(([path, value]) => `-D ${quoted(`${path}=${value}`)}`).join(" \\\n");
+  }
+  function numbers(text) {
+    const all = text.split(",").map(Number);
+    return all.length === 1 ? [all[0] ?? 0, all[0] ?? 0, all[0] ?? 0] : all;
+  }
+  var LightList = class {
+    constructor(edit2) {
+      this.edit = edit2;
+    }
+    edit;
+    panel = byId("lights");
+    lights = [];
+    settings = /* @__PURE__ */ new Map();
+    list(parameters) {
+      const lights2 = parameters.filter(({ path, kind }) => kind === "light" || path === "light.area.scale");
+      if (JSON.stringify(lights2) === JSON.stringify(this.lights)) return;
+      this.lights = lights2;
+      const none = element("p", "The scene has no light that can be set: the stage brings it.", { className: "quiet" });
+      this.panel.replaceChildren(...lights2.length > 0 ? lights2.map((light) => this.row(light)) : [none]);
+    }
+    take(settings) {
+      this.settings = new Map(settings);
+      const own = settings.filter(([path]) => this.lights.some((light) => light.path === path));
+      const text = byId("light-options");
+      text.value = asOptions(own);
+      text.hidden = own.length === 0;
+      for (const row of this.panel.querySelectorAll("[data-path]")) {
+        row.classList.toggle("changed", this.settings.has(row.dataset["path"] ?? ""));
+      }
+    }
+    /** Opens the list, and marks what makes shapes of this material shine. */
+    reveal(owner) {
+      byId("light-details").open = true;
+      const rows = [...this.panel.querySelectorAll("[data-path]")];
+      const found = rows.find((row) => row.dataset["owner"] === owner) ?? rows.find((row) => row.dataset["path"] === "light.area.scale");
+      for (const row of rows) row.classList.toggle("marked", row === found);
+      found?.scrollIntoView({ block: "nearest" });
+    }
+    value(light) {
+      const set = this.settings.get(light.path);
+      return set === void 0 ? light.value ?? [1, 1, 1] : numbers(set);
+    }
+    row(light) {
+      const row = element("fieldset");
+      [row.dataset["path"], row.dataset["owner"]] = [light.path, light.owner];
+      row.append(element("legend", light.kind === "light" && light.path.startsWith("material.") ? `${light.owner}: ${light.name}` : light.owner));
+      const fields = element("div", "", { className: "parameter" });
+      const power = element("input", "", { type: "number", min: "0", step: "any", id: `power-${light.path}` });
+      const colour = element("input", "", { type: "color" });
+      colour.setAttribute("aria-label", `Colour of ${light.owner}`);
+      const start = () => {
+        const now = parted(this.value(light));
+        power.value = short(light.kind === "factor" ? this.value(light)[0] ?? 1 : now.power);
+        colour.value = toHex(now.colour);
+      };
+      const send = () => {
+        const factor = Number(power.value);
+        if (power.value === "" || !(factor >= 0)) return;
+        const all = fromHex(colour.value).map((c) => short(c * factor));
+        this.edit(light.path, light.kind === "factor" ? short(factor) : all.join(","));
+      };
+      start();
+      power.addEventListener("change", send);
+      colour.addEventListener("input", send);
+      const back = element("button", "\u21BA", { title: `Undo ${light.owner}` });
+      back.setAttribute("aria-label", `Undo ${light.owner}`);
+      back.addEventListener("click", () => {
+        this.settings.delete(light.path);
+        this.edit(light.path, null);
+        start();
+      });
+      fields.append(element("label", light.kind === "factor" ? "Power, as a factor" : "Power", { htmlFor: power.id }), power, back);
+      row.append(fields);
+      if (light.kind !== "factor") row.append(colour);
+      return row;
+    }
+  };
+
   // src/edit.ts
   var MOST = 60;
-  var toSrgb = (c) => c <= 31308e-7 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055;
-  var hex = (value) => "#" + value.map((c) => Math.round(255 * Math.max(0, Math.min(1, toSrgb(c)))).toString(16).padStart(2, "0")).join("");
   var Editor = class {
-    constructor(panel, filter, edit) {
+    constructor(panel, filter, edit2) {
       this.panel = panel;
       this.filter = filter;
-      this.edit = edit;
+      this.edit = edit2;
       filter.addEventListener("input", () => this.draw());
     }
     panel;
@@ -468,6 +475,23 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       for (const row of this.panel.querySelectorAll(".parameter")) {
         row.classList.toggle("changed", this.settings.has(row.dataset["path"] ?? ""));
       }
+      const text = byId("edit-options");
+      text.value = asOptions(settings);
+      text.hidden = settings.length === 0;
+    }
+    /** Marks the parameters of a material, where they are listed. */
+    mark(owner) {
+      for (const group of this.panel.querySelectorAll("fieldset")) {
+        group.classList.toggle("marked", group.dataset["owner"] === owner);
+      }
+    }
+    /** Opens the list at the parameters of a material. */
+    reveal(owner) {
+      byId("edit-details").open = true;
+      this.filter.value = owner;
+      this.draw();
+      this.mark(owner);
+      this.panel.querySelector(".marked")?.scrollIntoView({ block: "nearest" });
     }
     draw() {
       const wanted = this.filter.value.toLowerCase();
@@ -477,6 +501,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
         let group = groups.get(parameter.owner);
         if (!group) {
           group = element("fieldset");
+          group.dataset["owner"] = parameter.owner;
           group.append(element("legend", parameter.owner));
           groups.set(parameter.owner, group);
         }
@@ -495,21 +520,21 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       const input = element("input", "", { id });
       const label = element("label", parameter.name, { htmlFor: id });
       const start = () => {
-        const set2 = this.settings.get(parameter.path);
+        const set = this.settings.get(parameter.path);
         if (parameter.kind === "colour") {
           input.type = "color";
-          input.value = set2?.startsWith("#") ? set2 : hex(parameter.value ?? [0.5, 0.5, 0.5]);
+          input.value = set?.startsWith("#") ? set : toHex(parameter.value ?? [0.5, 0.5, 0.5]);
         } else if (parameter.kind === "number" || parameter.kind === "factor") {
           input.type = "number";
           input.step = "any";
           if (parameter.low !== null) input.min = String(parameter.low);
           if (parameter.high !== null) input.max = String(parameter.high);
-          input.value = set2 ?? (parameter.value ? short(parameter.value[0] ?? 0) : "");
+          input.value = set ?? (parameter.value ? short(parameter.value[0] ?? 0) : "");
         } else {
           input.type = "text";
-          input.value = set2 ?? (parameter.value ?? []).map(short).join(",");
+          input.value = set ?? (parameter.value ?? []).map(short).join(",");
         }
-        if (!parameter.value && !set2) input.placeholder = "texture";
+        if (!parameter.value && !set) input.placeholder = "texture";
       };
       start();
       const event = parameter.kind === "colour" ? "input" : "change";
@@ -538,8 +563,8 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
 
   // src/explanation.ts
   var Explanation = class {
-    constructor(ticket) {
-      this.ticket = ticket;
+    constructor(ticket2) {
+      this.ticket = ticket2;
       this.button.addEventListener("click", () => this.show());
       this.language.addEventListener("change", () => void this.load());
       this.alone.addEventListener("click", () => setTimeout(() => void this.offerAlone()));
@@ -600,28 +625,149 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     }
   };
 
+  // src/tree.ts
+  var MOST2 = 200;
+  function called({ shape, kind, name }) {
+    if (kind === "ground") return kind;
+    return name ? `${name} (${kind})` : `${kind} ${shape}`;
+  }
+  var SceneTree = class {
+    constructor(page2, onSelect) {
+      this.page = page2;
+      this.onSelect = onSelect;
+      this.filter.addEventListener("input", () => this.draw());
+      this.all.addEventListener("click", () => this.send([], false));
+    }
+    page;
+    onSelect;
+    panel = byId("tree");
+    filter = byId("tree-filter");
+    all = byId("show-all");
+    scene;
+    hidden = { shapes: [], others: false };
+    selected = -1;
+    list(scene) {
+      const isSame = JSON.stringify(scene.tree) === JSON.stringify(this.scene?.tree);
+      this.scene = scene;
+      if (!isSame) this.draw();
+    }
+    take(hidden) {
+      this.hidden = hidden;
+      this.all.disabled = hidden.shapes.length === 0;
+      for (const row of this.panel.querySelectorAll("li")) this.mark(row);
+    }
+    /** Marks a shape, and brings it into sight where the tree is open. */
+    select(shape) {
+      this.selected = shape;
+      for (const row2 of this.panel.querySelectorAll("li")) this.mark(row2);
+      const row = this.panel.querySelector(`li[data-shape="${shape}"]`);
+      if (row && byId("tree-details").open) row.scrollIntoView({ block: "nearest" });
+    }
+    /** Opens the tree at a shape. */
+    reveal(shape) {
+      byId("tree-details").open = true;
+      if (this.filter.value !== "") {
+        this.filter.value = "";
+        this.draw();
+      }
+      this.select(shape);
+    }
+    isHidden(shape) {
+      return this.hidden.shapes.includes(shape) !== this.hidden.others;
+    }
+    hide(shape) {
+      const { shapes, others } = this.hidden;
+      const rest = shapes.filter((known) => known !== shape);
+      this.send(rest.length < shapes.length ? rest : [...rest, shape], others);
+    }
+    /** Shows this shape alone, or everything again. */
+    isolate(shape) {
+      const { shapes, others } = this.hidden;
+      const isAlone = others && shapes.length === 1 && shapes[0] === shape;
+      this.send(isAlone ? [] : [shape], !isAlone);
+    }
+    send(shapes, others) {
+      this.page.send({ type: "hide", shapes, others });
+    }
+    draw() {
+      const wanted = this.filter.value.toLowerCase();
+      const { groups = [], left_out = 0 } = this.scene?.tree ?? {};
+      const isWanted = (thing, group) => `${group ?? ""} ${called(thing)} ${thing.material ?? ""}`.toLowerCase().includes(wanted);
+      let left = MOST2;
+      let rest = left_out;
+      const parts = groups.flatMap(({ name, shapes }) => {
+        const found = shapes.filter((thing) => isWanted(thing, name));
+        const listed = found.slice(0, left);
+        left -= listed.length;
+        rest += found.length - listed.length;
+        if (listed.length === 0) return [];
+        const list = element("ul");
+        list.append(...listed.map((thing) => this.row(thing)));
+        if (name === null) return [list];
+        const part = element("details", "", { open: true });
+        part.append(element("summary", name || "moving"), list);
+        return [part];
+      });
+      const more = rest > 0 ? [element("p", `${rest} more: find them by name.`, { className: "quiet" })] : [];
+      const none = parts.length === 0 ? [element("p", "No shape has this name.", { className: "quiet" })] : [];
+      this.panel.replaceChildren(...parts, ...more, ...none);
+    }
+    row(thing) {
+      const row = element("li");
+      row.dataset["shape"] = String(thing.shape);
+      const name = called(thing);
+      const select2 = element("button", name, { className: "select" });
+      select2.append(element("span", thing.material ?? "no material", { className: "quiet" }));
+      select2.addEventListener("click", () => {
+        this.select(thing.shape);
+        this.onSelect(thing);
+      });
+      const hide = element("button", "", { className: "hide" });
+      hide.setAttribute("aria-label", `Hide ${name}`);
+      hide.addEventListener("click", () => this.hide(thing.shape));
+      const isolate = element("button", "Only", { className: "isolate" });
+      isolate.setAttribute("aria-label", `Only ${name}`);
+      isolate.addEventListener("click", () => this.isolate(thing.shape));
+      row.append(select2, hide, isolate);
+      this.mark(row);
+      return row;
+    }
+    mark(row) {
+      const shape = Number(row.dataset["shape"]);
+      const isHidden = this.isHidden(shape);
+      row.classList.toggle("hidden-shape", isHidden);
+      row.querySelector(".select")?.setAttribute("aria-pressed", String(shape === this.selected));
+      const hide = row.querySelector(".hide");
+      if (!hide) return;
+      hide.textContent = isHidden ? "Show" : "Hide";
+      hide.setAttribute("aria-pressed", String(isHidden));
+      const { shapes, others } = this.hidden;
+      const isAlone = others && shapes.length === 1 && shapes[0] === shape;
+      row.querySelector(".isolate")?.setAttribute("aria-pressed", String(isAlone));
+    }
+  };
+
   // src/facts.ts
   var point = (v) => v.map(short).join(", ");
-  function showFacts(list, warnings, scene2) {
+  function showFacts(list, warnings, scene) {
     const counted = (kinds) => Object.entries(kinds).map(([name, count]) => `${count} ${name}`).join(", ") || "none";
     const rows = [
-      ["Shapes", counted(scene2.shapes)],
-      ["Triangles", large(scene2.triangles)],
-      ["Instances", large(scene2.instances)],
-      ["Materials", counted(scene2.materials)],
-      ["Lights", counted(scene2.lights)],
-      ["Bounds", scene2.bounds ? `${point(scene2.bounds[0])} to ${point(scene2.bounds[1])}` : "none"],
-      ["Memory", `${large(scene2.memory)}B`],
-      ["Built in", spoken(scene2.build_seconds)]
+      ["Shapes", counted(scene.shapes)],
+      ["Triangles", large(scene.triangles)],
+      ["Instances", large(scene.instances)],
+      ["Materials", counted(scene.materials)],
+      ["Lights", counted(scene.lights)],
+      ["Bounds", scene.bounds ? `${point(scene.bounds[0])} to ${point(scene.bounds[1])}` : "none"],
+      ["Memory", `${large(scene.memory)}B`],
+      ["Built in", spoken(scene.build_seconds)]
     ];
     list.replaceChildren(...rows.flatMap(([name, text]) => [element("dt", name), element("dd", text)]));
     warnings.replaceChildren();
-    if (scene2.warnings.length > 0) {
-      warnings.append(element("p", `${scene2.warnings.length} warnings`, { className: "quiet" }));
-      warnings.append(element("pre", scene2.warnings.join("\n"), { tabIndex: 0 }));
+    if (scene.warnings.length > 0) {
+      warnings.append(element("p", `${scene.warnings.length} warnings`, { className: "quiet" }));
+      warnings.append(element("pre", scene.warnings.join("\n"), { tabIndex: 0 }));
     }
   }
-  var named = ({ shape, kind }) => kind === "ground" ? kind : `${shape} (${kind})`;
   function showHits(panel, hits) {
     const first = hits[0];
     if (!first) {
@@ -629,7 +775,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       return;
     }
     const rows = [
-      ["Shape", named(first)],
+      ["Shape", called(first)],
       ["Material", first.material ?? "none"],
       ["Position", first.point && point(first.point)],
       ["Normal", first.normal && point(first.normal)],
@@ -652,7 +798,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     all.append(element("summary", `All ${hits.length} hits of this ray`));
     const list = element("ol");
     for (const hit of hits) {
-      list.append(element("li", `${short(hit.distance)}: shape ${named(hit)}, ${hit.material ?? "no material"}, ${hit.front ? "in" : "out"}`));
+      list.append(element("li", `${short(hit.distance)}: shape ${called(hit)}, ${hit.material ?? "no material"}, ${hit.front ? "in" : "out"}`));
     }
     all.append(list);
     panel.append(all);
@@ -660,9 +806,10 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
 
   // src/hands.ts
   var STILL = 4;
-  function attach(canvas, sheet2, camera2, wishes) {
+  function attach(canvas, sheet2, camera2, handlers) {
     const pointers = /* @__PURE__ */ new Map();
     let travelled = 0;
+    let wasPair = false;
     const spread = () => {
       const [a, b] = [...pointers.values()];
       return a && b ? Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY) : 0;
@@ -671,12 +818,13 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       canvas.setPointerCapture(event.pointerId);
       canvas.focus();
       pointers.set(event.pointerId, event);
-      if (pointers.size === 1) travelled = 0;
+      if (pointers.size === 1) [travelled, wasPair] = [0, false];
+      if (pointers.size > 1) wasPair = true;
     });
     canvas.addEventListener("pointermove", (event) => {
       const before = pointers.get(event.pointerId);
       if (!before) {
-        wishes.hover(sheet2.at(event.clientX, event.clientY));
+        handlers.hover(sheet2.at(event.clientX, event.clientY));
         return;
       }
       const wide = spread();
@@ -685,13 +833,15 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       travelled += Math.hypot(dx, dy);
       if (travelled < STILL) return;
       const height = Math.max(1, sheet2.height * sheet2.scale());
-      const pan = () => {
+      const pan = (share = 1) => {
         const span = camera2.fov === null ? 1 : 2 * Math.tan(camera2.fov * Math.PI / 360);
-        camera2.move(-dx / height * span, dy / height * span, 0);
+        camera2.move(-dx / height * span * share, dy / height * span * share, 0);
       };
       if (pointers.size >= 2) {
         if (wide > 0) camera2.dolly(wide / Math.max(1, spread()));
-        pan();
+        pan(1 / pointers.size);
+      } else if (wasPair) {
+        return;
       } else if (sheet2.isZoomed() && event.ctrlKey) {
         sheet2.slide(dx, dy);
         return;
@@ -700,22 +850,22 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       } else {
         camera2.orbit(-dx / height * Math.PI, dy / height * Math.PI);
       }
-      wishes.moved();
+      handlers.moved();
     });
     const up = (event) => {
       const was = pointers.delete(event.pointerId);
-      if (was && pointers.size === 0 && travelled < STILL && event.type === "pointerup" && event.button === 0) {
+      if (was && pointers.size === 0 && travelled < STILL && !wasPair && event.type === "pointerup" && event.button === 0) {
         const at = sheet2.at(event.clientX, event.clientY);
-        if (at) wishes.pick(at[0], at[1], false);
+        if (at) handlers.pick(at[0], at[1], false);
       }
     };
     canvas.addEventListener("pointerup", up);
     canvas.addEventListener("pointercancel", up);
-    canvas.addEventListener("pointerleave", () => wishes.hover(null));
+    canvas.addEventListener("pointerleave", () => handlers.hover(null));
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("dblclick", (event) => {
       const at = sheet2.at(event.clientX, event.clientY);
-      if (at) wishes.pick(at[0], at[1], true);
+      if (at) handlers.pick(at[0], at[1], true);
     });
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
@@ -726,7 +876,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
         return;
       }
       camera2.dolly(factor);
-      wishes.moved();
+      handlers.moved();
     }, { passive: false });
     const held = /* @__PURE__ */ new Set();
     let last = 0;
@@ -758,11 +908,15 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
         if (key2 === "pageup" || key2 === "pagedown") camera2.dolly(Math.exp(key2 === "pageup" ? -by : by));
         any ||= key2 !== "shift";
       }
-      if (any) wishes.moved();
+      if (any) handlers.moved();
       requestAnimationFrame(fly);
     };
     canvas.addEventListener("keydown", (event) => {
-      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      if (event.metaKey || event.altKey) return;
+      if (event.ctrlKey) {
+        if (handlers.key(event)) event.preventDefault();
+        return;
+      }
       const key2 = event.key.toLowerCase();
       if (key2 in FLY || key2 in TURN || key2 === "pageup" || key2 === "pagedown" || key2 === "shift") {
         event.preventDefault();
@@ -772,14 +926,216 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
         }
         held.add(key2);
       } else if (key2 === "enter") {
-        wishes.pick(sheet2.width / 2, sheet2.height / 2, false);
-      } else if (wishes.key(key2)) {
+        handlers.pick(sheet2.width / 2, sheet2.height / 2, false);
+      } else if (handlers.key(event)) {
         event.preventDefault();
       }
     });
     canvas.addEventListener("keyup", (event) => held.delete(event.key.toLowerCase()));
     canvas.addEventListener("blur", () => held.clear());
   }
+
+  // src/vectors.ts
+  var add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+  var sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+  var scale = (a, s) => [a[0] * s, a[1] * s, a[2] * s];
+  var dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  var cross = (a, b) => [
+    a[1] * b[2] - a[2] * b[1],
+    a[2] * b[0] - a[0] * b[2],
+    a[0] * b[1] - a[1] * b[0]
+  ];
+  var length = (a) => Math.hypot(...a);
+  var unit = (a) => scale(a, 1 / (length(a) || 1));
+  function turned(v, axis, angle) {
+    const [c, s] = [Math.cos(angle), Math.sin(angle)];
+    return add(add(scale(v, c), scale(cross(axis, v), s)), scale(axis, dot(axis, v) * (1 - c)));
+  }
+
+  // src/measure.ts
+  var Measure = class {
+    constructor(sheet2) {
+      this.sheet = sheet2;
+      this.button.addEventListener("click", () => this.toggle());
+    }
+    sheet;
+    button = byId("measure");
+    points = [];
+    isOn = false;
+    toggle() {
+      this.isOn = !this.isOn;
+      this.points = [];
+      this.button.setAttribute("aria-pressed", String(this.isOn));
+      if (this.isOn) byId("measure-details").open = true;
+      this.draw();
+    }
+    /** Another point; a third one begins anew. */
+    take(x, y, hit) {
+      if (!this.isOn || !hit?.point) return;
+      if (this.points.length >= 2) this.points = [];
+      this.points.push({ at: [x, y], point: hit.point });
+      this.draw();
+    }
+    /** The picture shows the points elsewhere now. */
+    moved() {
+      this.sheet.mark([]);
+    }
+    draw() {
+      this.sheet.mark(this.points.map(({ at }) => at));
+      const [a, b] = this.points;
+      const rows = [];
+      if (a && b) {
+        const by = sub(b.point, a.point);
+        rows.push(["Distance", short(length(by))]);
+        rows.push(...by.map((value, i) => [`Along ${"xyz"[i]}`, short(value)]));
+      } else if (this.isOn) {
+        rows.push(["", a ? "Click on the second point." : "Click on the first point."]);
+      }
+      byId("measured").replaceChildren(...rows.flatMap(([name, text]) => [element("dt", name), element("dd", text)]));
+    }
+  };
+
+  // src/camera.ts
+  var POLE = 0.02;
+  var LEAST_HEIGHT = 0.01;
+  var Camera = class {
+    placement = { eye: [0, 0, 1], target: [0, 0, 0], up: [0, 1, 0] };
+    fov = null;
+    zoom = 1;
+    mirrored = false;
+    /** Whether it may go below the ground. */
+    mayGoBelow = false;
+    ground = null;
+    /** What stays upwards while the camera turns. */
+    axis = [0, 1, 0];
+    /** That of a state; what stays upwards is found anew. */
+    take(state, scene) {
+      if (!state.placement) return;
+      const own = scene.cameras[state.camera];
+      this.placement = state.placement;
+      this.mirrored = own?.mirrored ?? false;
+      this.fov = state.fov ?? own?.fov ?? null;
+      this.zoom = state.zoom;
+      this.axis = this.upright(scene, state.name.endsWith(".pbrt"));
+      this.ground = scene.ground;
+      if (this.height(this.placement.eye) < 0) this.mayGoBelow = true;
+    }
+    /** Stands there from now on. */
+    place(placement) {
+      this.placement = placement;
+      this.rise(false);
+    }
+    /** How far a point is above the ground; infinitely far without one. */
+    height(point2) {
+      return this.ground ? dot(sub(point2, this.ground.point), this.ground.normal) : Infinity;
+    }
+    /** Comes out of the ground, the target with the eye or alone. */
+    rise(withTarget) {
+      if (this.mayGoBelow || !this.ground) return;
+      const least = LEAST_HEIGHT * this.distance();
+      const missing = least - this.height(this.placement.eye);
+      if (missing <= 0) return;
+      const step = scale(unit(this.ground.normal), missing);
+      const { eye, target, up } = this.placement;
+      this.placement = { eye: add(eye, step), target: withTarget ? add(target, step) : target, up };
+    }
+    /** What stays upwards while the camera turns. */
+    get upwards() {
+      return this.axis;
+    }
+    forward() {
+      return unit(sub(this.placement.target, this.placement.eye));
+    }
+    right() {
+      const right = unit(cross(this.placement.up, this.forward()));
+      return this.mirrored ? scale(right, -1) : right;
+    }
+    upward() {
+      const forward = this.forward();
+      return unit(sub(this.placement.up, scale(forward, dot(this.placement.up, forward))));
+    }
+    distance() {
+      return length(sub(this.placement.target, this.placement.eye));
+    }
+    /** An axis that the picture does not lean to the side of; pbrt files do not say which is up. */
+    upright(scene, unsaid) {
+      const [right, up] = [this.right(), this.upward()];
+      const axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+      const candidates = [...axes, ...axes.map((axis) => scale(axis, -1)), scene.up];
+      let [best, most] = [up, 0];
+      for (const axis of candidates) {
+        const bonus = axis === scene.up && !unsaid ? 0.5 : 0;
+        const standing = dot(axis, up) + bonus;
+        if (Math.abs(dot(axis, right)) < 1e-3 && dot(axis, up) > 1e-3 && standing > most) [best, most] = [axis, standing];
+      }
+      return best;
+    }
+    /** Turns around the target by angles in radians: to the right, and up. */
+    orbit(right, up) {
+      let { eye, target } = this.placement;
+      let offset = sub(eye, target);
+      const sideways = Math.sign(dot(cross(this.axis, offset), this.right())) || 1;
+      offset = turned(offset, this.axis, right * sideways);
+      const polar = Math.acos(Math.max(-1, Math.min(1, dot(unit(offset), this.axis))));
+      const wanted = Math.max(POLE, Math.min(Math.PI - POLE, this.lowest(), polar - up));
+      const across = cross(this.axis, offset);
+      if (length(across) > 0) offset = turned(offset, unit(across), wanted - polar);
+      eye = add(target, offset);
+      this.placement = { eye, target, up: this.axis };
+      this.rise(false);
+    }
+    /** The largest angle from straight above at which the camera is above the ground, as far from its target as it is. */
+    lowest() {
+      const { ground } = this;
+      if (this.mayGoBelow || !ground || dot(unit(ground.normal), this.axis) < 0.999) return Math.PI;
+      const reach = this.distance();
+      const drop = (LEAST_HEIGHT * reach - this.height(this.placement.target)) / reach;
+      return Math.acos(Math.max(-1, Math.min(1, drop)));
+    }
+    /** Moves eye and target: to the right, up and forward, in shares of the distance between them. */
+    move(right, up, forward) {
+      const by = this.distance();
+      const step = add(add(scale(this.right(), right * by), scale(this.upward(), up * by)), scale(this.forward(), forward * by));
+      const { eye, target } = this.placement;
+      this.placement = { eye: add(eye, step), target: add(target, step), up: this.axis };
+      this.rise(true);
+    }
+    /** Comes nearer to the target by a factor, or shows more of it. */
+    dolly(factor) {
+      const { eye, target } = this.placement;
+      this.placement = { eye: add(target, scale(sub(eye, target), factor)), target, up: this.axis };
+      this.rise(false);
+      this.zoom = Math.max(1e-4, Math.min(1e4, this.zoom / factor));
+    }
+    /** Turns around this point from now on. */
+    lookAt(point2) {
+      const { eye } = this.placement;
+      this.placement = { eye, target: point2, up: this.axis };
+    }
+    /** As pbrt writes it. */
+    toPbrt() {
+      const { eye, target } = this.placement;
+      const numbers2 = (v) => v.map((x) => +x.toPrecision(9)).join(" ");
+      const mirror = this.mirrored ? "Scale -1 1 1\n" : "";
+      const lens = this.fov === null ? "" : `
+Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
+      return `${mirror}LookAt ${numbers2(eye)}  ${numbers2(target)}  ${numbers2(this.upward())}${lens}`;
+    }
+    /** As glTF writes it: a node, whose camera looks along -z. */
+    toGltf(aspect) {
+      const columns = [
+        [this.right(), 0],
+        [this.upward(), 0],
+        [scale(this.forward(), -1), 0],
+        [this.placement.eye, 1]
+      ];
+      const matrix = columns.flatMap(([v, w]) => [...v.map((x) => +x.toPrecision(9)), w]);
+      const shorter = (this.fov ?? 45) * Math.PI / 180;
+      const yfov = aspect >= 1 ? shorter : 2 * Math.atan(Math.tan(shorter / 2) / aspect);
+      const perspective = { aspectRatio: +aspect.toPrecision(9), yfov: +yfov.toPrecision(9), znear: 0.01 };
+      return JSON.stringify({ cameras: [{ type: "perspective", perspective }], nodes: [{ camera: 0, matrix }] });
+    }
+  };
 
   // src/sheet.ts
   var MOST_ZOOM = 256;
@@ -790,25 +1146,29 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     return found;
   }
   var Sheet = class {
-    constructor(stage2, sheet2, picture, reference, numbers) {
-      this.stage = stage2;
+    constructor(stage, sheet2, picture, reference, numbers2, marks) {
+      this.stage = stage;
       this.sheet = sheet2;
       this.picture = picture;
       this.reference = reference;
-      this.numbers = numbers;
-      new ResizeObserver(() => this.place()).observe(stage2);
+      this.numbers = numbers2;
+      this.marks = marks;
+      new ResizeObserver(() => this.place()).observe(stage);
     }
     stage;
     sheet;
     picture;
     reference;
     numbers;
+    marks;
     width = 16;
     height = 9;
     /** Screen pixels a pixel; 0 fits the picture. */
     zoom = 0;
     left = 0;
     top = 0;
+    /** Where the reference begins, in percent of the width. */
+    part = 50;
     small = document.createElement("canvas");
     changed = () => {
     };
@@ -921,6 +1281,33 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
         });
       });
     }
+    /** Marks places of the picture, and the line between two of them; none takes the marks away. */
+    mark(places) {
+      const svg = (name, attributes) => {
+        const made = document.createElementNS("http://www.w3.org/2000/svg", name);
+        for (const [key2, value] of Object.entries(attributes)) made.setAttribute(key2, String(value));
+        return made;
+      };
+      this.marks.setAttribute("viewBox", `0 0 ${this.width} ${this.height}`);
+      const radius = 5 / this.scale();
+      const dots = places.map(([cx, cy]) => svg("circle", { cx, cy, r: radius }));
+      const [a, b] = places;
+      const line = a && b ? [svg("line", { x1: a[0], y1: a[1], x2: b[0], y2: b[1] })] : [];
+      this.marks.replaceChildren(...line, ...dots);
+    }
+    /** What is shown, the reference too where it covers the picture, as a PNG. */
+    async snapshot() {
+      const canvas = document.createElement("canvas");
+      [canvas.width, canvas.height] = [this.width, this.height];
+      const drawing = context(canvas);
+      drawing.drawImage(this.picture, 0, 0);
+      if (!this.reference.hidden) {
+        const from = Math.round(this.width * this.part / 100);
+        const wide = this.width - from;
+        if (wide > 0) drawing.drawImage(this.reference, from, 0, wide, this.height, from, 0, wide, this.height);
+      }
+      return new Promise((found) => canvas.toBlob(found, "image/png"));
+    }
     /** Keeps a picture to compare with; without one, what is shown. */
     keep(source = this.picture) {
       [this.reference.width, this.reference.height] = [this.width, this.height];
@@ -928,76 +1315,454 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       this.reference.hidden = false;
     }
     split(percent) {
+      this.part = percent;
       this.reference.style.clipPath = `inset(0 0 0 ${percent}%)`;
     }
   };
 
+  // src/page.ts
+  var MOST_TIMES = 2e3;
+  var measured = {
+    latencies: [],
+    frames: [],
+    changes: /* @__PURE__ */ new Map(),
+    spp: 0,
+    done: false,
+    sequence: 0,
+    /** When the first frame came, and the first without noise, by the clock of the page. */
+    first: 0,
+    firstDenoised: 0,
+    /** Frames with noise, since this was last set to 0. */
+    noisy: 0
+  };
+  Object.assign(globalThis, { lumbreMeasured: measured });
+  var Page = class {
+    sheet = new Sheet(
+      byId("stage"),
+      byId("sheet"),
+      byId("picture"),
+      byId("reference"),
+      byId("numbers"),
+      document.querySelector("#marks")
+    );
+    camera = new Camera();
+    scene;
+    state;
+    connection;
+    connected = false;
+    /** Whether it only looks on. */
+    watches = false;
+    /** Called when the camera was moved by hand. */
+    onCamera = () => {
+    };
+    requests = 0;
+    isMoving = false;
+    // What the camera is at is counted, so that one knows which frame shows it. Others count from elsewhere.
+    sequence = Math.floor(Math.random() * 2147418112);
+    mine = -1;
+    send(message) {
+      this.connection?.send(message);
+    }
+    /** Sends a question, and returns the number by which its answer is known. */
+    ask(message) {
+      this.requests += 1;
+      this.send({ ...message, request: this.requests });
+      return this.requests;
+    }
+    set(options2) {
+      this.send({ type: "set", ...options2 });
+    }
+    /** The camera was moved: it is sent once a frame of the screen. */
+    moved() {
+      if (this.watches) {
+        if (this.state && this.scene) this.camera.take(this.state, this.scene);
+        return;
+      }
+      this.onCamera();
+      if (this.isMoving) return;
+      this.isMoving = true;
+      requestAnimationFrame(() => {
+        this.isMoving = false;
+        this.sequence = this.sequence + 1 >>> 0;
+        this.mine = this.sequence;
+        measured.changes.set(this.sequence, performance.now());
+        const { placement, fov, zoom } = this.camera;
+        this.send({ type: "camera", sequence: this.sequence, placement, fov, zoom });
+      });
+    }
+    /** One of the file's cameras, as it is. */
+    reset(index) {
+      this.sequence = this.sequence + 1 >>> 0;
+      this.mine = -1;
+      this.onCamera();
+      this.send({ type: "reset", sequence: this.sequence, camera: index });
+    }
+    /** Takes the camera of the state, unless it was moved here: what comes back is older than what the hand does. */
+    takeCamera(state, scene) {
+      const isOwn = state.moved && state.sequence === this.mine;
+      if (!isOwn && !this.isMoving) this.camera.take(state, scene);
+    }
+    show(frame) {
+      this.sheet.show(frame);
+      const now = performance.now();
+      measured.frames.push(now);
+      if (measured.frames.length > MOST_TIMES) measured.frames.splice(0, MOST_TIMES / 2);
+      measured.first ||= now;
+      if (frame.isDenoised) measured.firstDenoised ||= now;
+      else measured.noisy += 1;
+      [measured.spp, measured.done, measured.sequence] = [frame.isFull ? frame.spp : 0, frame.isDone, frame.sequence];
+      for (const [change, since] of measured.changes) {
+        if (change > frame.sequence) continue;
+        if (change === frame.sequence) measured.latencies.push(now - since);
+        measured.changes.delete(change);
+      }
+    }
+  };
+
+  // src/progress.ts
+  var DOING = {
+    reading: "Reading the scene",
+    building: "Building the scene",
+    rendering: "",
+    done: "",
+    waiting: "Waiting for the file to be mended",
+    nothing: "No scene"
+  };
+  function reached({ spp = 0, target = 0, noise, noise_target }) {
+    if (target === 0) return ["done"];
+    if (noise_target) {
+      const now = noise == null ? [] : [`noise ${noise.toFixed(4)} of ${noise_target}`];
+      return [`${spp} samples`, ...now];
+    }
+    return [`${spp} of ${target} samples`, ...noise != null && spp > 1 ? [`noise ${noise.toFixed(4)}`] : []];
+  }
+  function showProgress(progress) {
+    const { doing, target = 0, share = doing === "done" ? 1 : 0 } = progress;
+    let text = DOING[doing];
+    if (doing === "rendering" || doing === "done") {
+      const parts = reached(progress);
+      if (doing === "rendering" && share > 0) parts.push(`${Math.floor(100 * share)} %`);
+      if (doing === "rendering" && progress.left != null) parts.push(`${spoken(progress.left)} left`);
+      if (doing === "done" && progress.seconds) parts.push(`done in ${spoken(progress.seconds)}`);
+      if (progress.rays_per_second) parts.push(`${large(progress.rays_per_second)} rays/s`);
+      if (progress.dropped) parts.push(`${progress.dropped} samples dropped`);
+      text = parts.join(" \xB7 ");
+    }
+    byId("progress").textContent = text;
+    byId("bar").value = target > 0 || doing === "done" ? share : 0;
+  }
+
+  // src/section.ts
+  var AXES = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
+  var Section = class {
+    constructor(page2) {
+      this.page = page2;
+      this.axis.addEventListener("change", () => this.send());
+      this.place.addEventListener("input", () => this.send());
+      this.draw();
+    }
+    page;
+    axis = byId("section-axis");
+    place = byId("section-place");
+    shown = null;
+    take({ section: section2 }) {
+      this.shown = section2;
+      if (!section2 && document.activeElement !== this.axis) this.axis.value = "none";
+      this.draw();
+    }
+    /** The camera was moved: what is on its side of the plane is cut away. */
+    moved() {
+      const plane = this.plane();
+      if (plane && this.shown && this.axis.value !== "view" && dot(plane.normal, this.shown.normal) < 0) this.send();
+    }
+    plane() {
+      const { camera: camera2, scene } = this.page;
+      const share = Number(this.place.value) / 100;
+      if (this.axis.value === "view") {
+        const point3 = add(camera2.placement.eye, scale(camera2.forward(), 2 * share * camera2.distance()));
+        return { point: point3, normal: scale(camera2.forward(), -1) };
+      }
+      const axis = AXES[this.axis.value];
+      if (!axis || !scene?.bounds) return null;
+      const [low, high] = scene.bounds;
+      const point2 = add(low, scale(sub(high, low), share));
+      const side = dot(sub(camera2.placement.eye, point2), axis) < 0 ? -1 : 1;
+      return { point: point2, normal: scale(axis, side) };
+    }
+    send() {
+      this.shown = this.plane();
+      this.page.send({ type: "section", plane: this.shown });
+      this.draw();
+    }
+    draw() {
+      this.place.disabled = this.axis.value === "none";
+    }
+  };
+
+  // src/static-connection.ts
+  function bytes(base64) {
+    return Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+  }
+  async function unpacked(base64) {
+    const stream = new Blob([bytes(base64)]).stream().pipeThrough(new DecompressionStream("deflate"));
+    return new DataView(await new Response(stream).arrayBuffer());
+  }
+  function half(bits) {
+    const sign = bits & 32768 ? -1 : 1;
+    const [exponent, fraction] = [bits >> 10 & 31, bits & 1023];
+    if (exponent === 31) return fraction ? NaN : sign * Infinity;
+    return exponent === 0 ? sign * fraction * 2 ** -24 : sign * (1 + fraction / 1024) * 2 ** (exponent - 15);
+  }
+  var StaticConnection = class {
+    constructor(listener2, data2) {
+      this.listener = listener2;
+      this.data = data2;
+      setTimeout(() => void this.start());
+    }
+    listener;
+    data;
+    shown;
+    values;
+    picks;
+    async start() {
+      this.listener.onOpen("edit");
+      this.listener.onMessage({ type: "scene", scene: this.data.scene });
+      this.listener.onMessage({ type: "progress", doing: "done", ...this.data.progress });
+      await this.show("beauty");
+      this.picks = await unpacked(this.data.picks.values);
+    }
+    state(channel) {
+      return {
+        name: this.data.name,
+        has_scene: true,
+        error: null,
+        edit_error: null,
+        camera: this.data.camera,
+        sequence: 0,
+        moved: false,
+        placement: this.data.placement,
+        fov: null,
+        zoom: 1,
+        size: null,
+        channel,
+        scale: 1,
+        spp: this.data.progress.spp ?? null,
+        noise: null,
+        denoise: null,
+        paused: false,
+        exposure: 0,
+        tone_map: null,
+        false_colour: false,
+        map: "automatic",
+        range: null,
+        hidden: { shapes: [], others: false },
+        section: null,
+        time: null,
+        variant: null,
+        settings: []
+      };
+    }
+    async show(name) {
+      const channel = this.data.channels.find((known) => known.name === name);
+      if (!channel) return;
+      this.listener.onMessage({ type: "state", ...this.state(name) });
+      const bitmap = await createImageBitmap(new Blob([bytes(channel.png)], { type: "image/png" }));
+      const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
+      const drawing = canvas.getContext("2d");
+      if (!drawing) return;
+      drawing.drawImage(bitmap, 0, 0);
+      const { width, height } = bitmap;
+      const pixels = drawing.getImageData(0, 0, width, height);
+      [this.shown, this.values] = [pixels, void 0];
+      if (channel.values) this.values = await unpacked(channel.values);
+      const spp = this.data.progress.spp ?? 0;
+      this.listener.onFrame({ width, height, fullWidth: width, fullHeight: height, spp, sequence: 0, isFull: true, isDone: true, isDenoised: false, low: 0, high: 0, pixels });
+    }
+    pick(x, y, request) {
+      if (!this.picks || !this.shown) return;
+      const at = 8 * (y * this.shown.width + x);
+      const thing = this.data.picks.shapes[this.picks.getUint32(at, true) - 1];
+      const hits = thing ? [{ ...thing, distance: this.picks.getFloat32(at + 4, true) }] : [];
+      this.listener.onMessage({ type: "picked", request, x, y, ray: { hits } });
+    }
+    /** There is nobody to give one. */
+    ticket() {
+      return Promise.reject(new Error("at rest"));
+    }
+    send(message) {
+      const { type, channel, x, y, width, height, request } = message;
+      if (type === "set" && channel) void this.show(String(channel));
+      if (type === "pick") this.pick(Math.floor(x ?? 0), Math.floor(y ?? 0), request ?? 0);
+      if (type !== "values" || !this.shown) return;
+      const whole = this.shown.width;
+      const [x0, y0] = [x ?? 0, y ?? 0];
+      const [columns, rows] = [Math.min(width ?? 0, whole - x0), Math.min(height ?? 0, this.shown.height - y0)];
+      const found = [];
+      for (let row = y0; row < y0 + rows; row++) {
+        for (let column = x0; column < x0 + columns; column++) {
+          const pixel = row * whole + column;
+          const value = (c) => this.values ? half(this.values.getUint16(2 * (3 * pixel + c), true)) : +((this.shown?.data[4 * pixel + c] ?? 0) / 255).toFixed(3);
+          found.push([value(0), value(1), value(2)]);
+        }
+      }
+      this.listener.onMessage({ type: "values", request: request ?? 0, x: x0, y: y0, width: columns, height: rows, values: found });
+    }
+  };
+  var CHANGES = [
+    "pause",
+    "reset",
+    "exposure",
+    "tone-map",
+    "false-colour",
+    "map",
+    "range-low",
+    "range-high",
+    "range-found",
+    "denoise",
+    "spp",
+    "noise-target",
+    "scale",
+    "edit-details",
+    "camera-details",
+    "tree-details",
+    "light-details",
+    "section-details",
+    "open-more"
+  ];
+  var ASKS = ["save-details", "help-open", "measure-details"];
+  function hideWhatNeedsAViewer(watches = false) {
+    for (const id of watches ? [...CHANGES, "channel"] : [...CHANGES, ...ASKS]) {
+      byId(id).classList.add("gone");
+      for (const label of document.querySelectorAll(`label[for="${id}"]`)) label.classList.add("gone");
+    }
+    if (watches) return;
+    for (const option of document.querySelectorAll("option[value=ids], option[value=variance]")) option.remove();
+  }
+
+  // src/views.ts
+  var OPPOSITE = { front: "back", back: "front", right: "left", left: "right", top: "bottom", bottom: "top" };
+  var TILT = 2e-3;
+  function sides(up) {
+    const y = [0, 1, 0];
+    const z = [0, 0, 1];
+    const n = unit(up);
+    const c = dot(y, n);
+    const axis = cross(y, n);
+    const front = c < -1 + 1e-9 ? [0, 0, -1] : add(add(scale(z, c), cross(axis, z)), scale(axis, dot(axis, z) / (1 + c)));
+    return { front: unit(front), right: unit(cross(n, front)) };
+  }
+  var Views = class {
+    constructor(page2, camera2) {
+      this.page = page2;
+      this.camera = camera2;
+      for (const button of document.querySelectorAll("button[data-view]")) {
+        button.addEventListener("click", () => this.show(button.dataset["view"]));
+      }
+      byId("keep-view").addEventListener("click", () => this.keep());
+    }
+    page;
+    camera;
+    kept = [];
+    sceneName = "";
+    /** The views that were kept of a scene. */
+    open(name) {
+      if (name === this.sceneName) return;
+      this.sceneName = name;
+      this.kept = JSON.parse(sessionStorage.getItem(this.key) ?? "[]");
+      this.draw();
+    }
+    /** All of the scene from one of its sides. */
+    show(side) {
+      const { scene } = this.page;
+      if (!scene?.bounds) return;
+      const [low, high] = scene.bounds;
+      const up = unit(this.camera.upwards);
+      const { front, right } = sides(up);
+      const above = unit(add(up, scale(front, TILT)));
+      const below = unit(add(scale(up, -1), scale(front, TILT)));
+      const from = { front, back: scale(front, -1), right, left: scale(right, -1), top: above, bottom: below };
+      const target = scale(add(low, high), 0.5);
+      const radius = 0.5 * length(sub(high, low)) || 1;
+      const half2 = (this.camera.fov ?? 45) * Math.PI / 360;
+      const eye = add(target, scale(from[side], 1.05 * radius / Math.sin(half2)));
+      if (side === "bottom") this.camera.mayGoBelow = true;
+      this.camera.place({ eye, target, up });
+      this.page.moved();
+    }
+    /** From the other side. */
+    turn() {
+      const { eye, target, up } = this.camera.placement;
+      this.camera.place({ eye: sub(scale(target, 2), eye), target, up });
+      this.page.moved();
+    }
+    static opposite(side) {
+      return OPPOSITE[side];
+    }
+    get key() {
+      return `lumbre-views:${this.sceneName}`;
+    }
+    keep() {
+      const input = byId("view-name");
+      const { placement, fov, zoom } = this.camera;
+      this.kept.push({ name: input.value.trim() || `View ${this.kept.length + 1}`, placement, fov, zoom });
+      input.value = "";
+      this.store();
+    }
+    store() {
+      sessionStorage.setItem(this.key, JSON.stringify(this.kept));
+      this.draw();
+    }
+    draw() {
+      const rows = this.kept.map((view, i) => {
+        const row = element("li");
+        const show = element("button", view.name, { className: "select" });
+        show.addEventListener("click", () => {
+          [this.camera.fov, this.camera.zoom] = [view.fov, view.zoom];
+          this.camera.place(view.placement);
+          this.page.moved();
+        });
+        const drop = element("button", "Remove");
+        drop.setAttribute("aria-label", `Remove ${view.name}`);
+        drop.addEventListener("click", () => {
+          this.kept.splice(i, 1);
+          this.store();
+        });
+        row.append(show, drop);
+        return row;
+      });
+      byId("kept-views").replaceChildren(...rows);
+    }
+  };
+
   // src/main.ts
-  var stage = byId("stage");
-  var sheet = new Sheet(
-    stage,
-    byId("sheet"),
-    byId("picture"),
-    byId("reference"),
-    byId("numbers")
-  );
-  var camera = new Camera();
-  var scene;
-  var state;
-  var request = 0;
+  var page = new Page();
+  var { sheet, camera } = page;
+  var listener = { onMessage, onFrame, onOpen, onStatus };
+  var data = globalThis.lumbreAtRest;
+  page.connection = data ? new StaticConnection(listener, data) : new Connection(listener);
   var turnAround = 0;
+  var picked;
   var hovered = null;
   var asked = 0;
-  var sequence = Math.floor(Math.random() * 2147418112);
-  var mine = -1;
-  var measured = { latencies: [], frames: [], changes: /* @__PURE__ */ new Map(), spp: 0, done: false, sequence: 0 };
-  Object.assign(globalThis, { lumbreMeasured: measured });
-  var listener = { told: (message) => told(message), framed: (frame) => framed(frame), stood: (how) => stood(how) };
-  var data = globalThis.lumbreAtRest;
-  var connection = data ? new AtRest(listener, data) : new Connection(listener);
-  var isMoving = false;
-  function moved() {
-    if (isMoving) return;
-    isMoving = true;
-    requestAnimationFrame(() => {
-      isMoving = false;
-      sequence = sequence + 1 >>> 0;
-      mine = sequence;
-      measured.changes.set(sequence, performance.now());
-      connection.send({ type: "camera", sequence, placement: camera.placement, fov: camera.fov, zoom: camera.zoom });
-    });
-  }
-  function reset(index) {
-    sequence = sequence + 1 >>> 0;
-    mine = -1;
-    connection.send({ type: "reset", sequence, camera: index });
-  }
-  var set = (wishes) => connection.send({ type: "set", ...wishes });
-  function framed(frame) {
-    sheet.show(frame);
-    const now = performance.now();
-    measured.frames.push(now);
-    if (measured.frames.length > 2e3) measured.frames.splice(0, 1e3);
-    [measured.spp, measured.done, measured.sequence] = [frame.isFull ? frame.spp : 0, frame.isDone, frame.sequence];
-    for (const [change, since] of measured.changes) {
-      if (change > frame.sequence) continue;
-      if (change === frame.sequence) measured.latencies.push(now - since);
-      measured.changes.delete(change);
-    }
+  function onFrame(frame) {
+    page.show(display.shown(frame));
+    display.draw();
     if (frame.isFull) askNumbers();
     if (hovered && frame.isFull) askPixel();
   }
-  function told(message) {
+  function onMessage(message) {
     switch (message.type) {
       case "scene":
-        scene = message.scene;
-        showFacts(byId("facts"), byId("warnings"), scene);
-        editor.list(scene.parameters);
-        explanation.offer(scene.languages);
-        if (state) showState(state);
+        page.scene = message.scene;
+        showFacts(byId("facts"), byId("warnings"), message.scene);
+        editor.list(message.scene.parameters);
+        lights.list(message.scene.parameters);
+        tree.list(message.scene);
+        explanation.offer(message.scene.languages);
+        if (page.state) showState(page.state);
         break;
       case "state":
-        state = message;
+        page.state = message;
         showState(message);
         break;
       case "progress":
@@ -1005,10 +1770,12 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
         break;
       case "picked":
         showHits(byId("picked"), message.ray.hits);
+        select(message.ray.hits[0]);
+        measure.take(message.x, message.y, message.ray.hits[0]);
         explanation.of(Math.floor(message.x), Math.floor(message.y));
         if (message.request === turnAround && message.ray.hits[0]?.point) {
           camera.lookAt(message.ray.hits[0].point);
-          moved();
+          page.moved();
         }
         break;
       case "values":
@@ -1025,47 +1792,38 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
         break;
     }
   }
+  function select(thing) {
+    picked = thing;
+    tree.select(thing?.shape ?? -1);
+    editor.mark(thing?.owner ?? null);
+    const isShape = thing !== void 0 && thing.kind !== "ground";
+    byId("picked-buttons").hidden = !isShape || data !== void 0 || page.watches;
+    byId("edit-picked").hidden = !thing?.owner;
+    byId("light-picked").hidden = !thing?.shines;
+  }
   function alertOf(title, text) {
     byId("alert-title").textContent = title;
     byId("alert-text").textContent = text;
     byId("alert").hidden = title === "";
   }
-  var connected = false;
-  function stood(how) {
-    connected = how === "open";
-    if (how === "open") alertOf("", "");
+  function onOpen(access) {
+    page.connected = true;
+    page.watches = access === "watch";
+    byId("watching").hidden = !page.watches;
+    if (page.watches) hideWhatNeedsAViewer(true);
+    alertOf("", "");
+  }
+  function onStatus(how) {
+    page.connected = false;
     if (how === "gone") alertOf("The viewer does not answer.", "It has ended, or the tunnel to it has. This page goes on when it is back.");
     if (how === "refused") alertOf("The viewer does not know this page.", "Open the address that lumbre view printed. It works once, in one tab: to have another one, start the viewer again.");
     if (how === "foreign") alertOf("Another program answers in place of the viewer.", "It cannot prove to be the viewer, and was told nothing.");
-    if (!connected) byId("progress").textContent = "Not connected";
-  }
-  function showProgress(progress) {
-    const { doing, spp = 0, target = 0 } = progress;
-    const words = {
-      reading: "Reading the scene",
-      building: "Building the scene",
-      rendering: "",
-      done: "",
-      waiting: "Waiting for the file to be mended",
-      nothing: "No scene"
-    };
-    let text = words[doing];
-    if (doing === "rendering" || doing === "done") {
-      const parts = [target > 0 ? `${spp} of ${target} samples` : "done"];
-      if (progress.noise != null && spp > 1) parts.push(`noise ${progress.noise.toFixed(4)}`);
-      if (progress.rays_per_second) parts.push(`${large(progress.rays_per_second)} rays/s`);
-      if (doing === "rendering" && progress.left) parts.push(`${spoken(progress.left)} left`);
-      if (doing === "done" && progress.seconds) parts.push(`done in ${spoken(progress.seconds)}`);
-      if (progress.dropped) parts.push(`${progress.dropped} samples dropped`);
-      text = parts.join(" \xB7 ");
-    }
-    byId("progress").textContent = text;
-    byId("bar").value = target > 0 ? spp / target : doing === "done" ? 1 : 0;
+    byId("progress").textContent = "Not connected";
   }
   function showState(now) {
     document.title = now.name ? `${now.name} \u2013 Lumbre` : "Lumbre";
     byId("name").textContent = now.name || "Lumbre";
-    if (connected) alertOf(now.error ? now.has_scene ? "The file has an error; this is the last good picture." : "The file has an error." : "", now.error ?? "");
+    if (page.connected) alertOf(now.error ? now.has_scene ? "The file has an error; this is the last good picture." : "The file has an error." : "", now.error ?? "");
     byId("empty").hidden = now.name !== "";
     byId("sheet").hidden = now.name === "";
     const error = byId("edit-error");
@@ -1084,15 +1842,23 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     value("exposure", String(now.exposure ?? 0));
     byId("exposure-value").textContent = (now.exposure ?? 0).toFixed(1);
     value("spp", String(now.spp ?? 64));
+    value("noise-target", now.noise ? String(now.noise) : "");
     byId("false-colour").checked = now.false_colour;
     byId("denoise").checked = now.denoise ?? false;
     editor.take(now.settings);
+    lights.take(now.settings);
+    tree.take(now.hidden);
+    display.take(now);
+    section.take(now);
+    views.open(now.name);
     byId("save-overlay").disabled = now.settings.length === 0;
     byId("drop-edits").disabled = now.settings.length === 0;
+    const { scene } = page;
     if (!scene) return;
     options(byId("camera"), scene.cameras.map(({ name }, i) => [String(i), name]), String(now.camera));
-    const isOld = now.moved && now.sequence === mine;
-    if (!isOld && !isMoving) camera.take(now, scene);
+    page.takeCamera(now, scene);
+    byId("ground-details").hidden = scene.ground === null;
+    byId("below-ground").checked = camera.mayGoBelow;
     const fov = byId("fov");
     fov.disabled = camera.fov === null;
     value("fov", camera.fov === null ? "" : short(camera.fov));
@@ -1110,7 +1876,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     if (!hovered || now - asked < 40) return;
     asked = now;
     const [x, y] = hovered;
-    connection.send({ type: "values", x: Math.floor(x), y: Math.floor(y), width: 1, height: 1, request: ++request });
+    page.ask({ type: "values", x: Math.floor(x), y: Math.floor(y), width: 1, height: 1 });
   }
   var numbersWait = 0;
   function askNumbers() {
@@ -1118,32 +1884,41 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     if (!rectangle) return;
     clearTimeout(numbersWait);
     const [x, y, width, height] = rectangle;
-    numbersWait = setTimeout(() => connection.send({ type: "values", x, y, width, height, request: ++request }), 60);
+    numbersWait = setTimeout(() => page.ask({ type: "values", x, y, width, height }), 60);
   }
   sheet.changed = askNumbers;
-  function key(pressed) {
-    const channels = ["beauty", "albedo", "normal", "depth", "uv", "variance", "ids"];
-    const channel = channels[Number(pressed) - 1];
-    if (channel) set({ channel });
-    else if (pressed === "r") reset(state?.camera ?? 0);
+  var CHANNELS = ["beauty", "albedo", "normal", "depth", "uv", "variance", "ids"];
+  var VIEWS = { 1: "front", 3: "right", 7: "top" };
+  function key(event) {
+    const pressed = event.key.toLowerCase();
+    const digit = /^(?:Digit|Numpad)([0-9])$/.exec(event.code)?.[1] ?? pressed;
+    const channel = event.shiftKey ? CHANNELS[Number(digit) - 1] : void 0;
+    const view = VIEWS[digit];
+    if (channel) page.set({ channel });
+    else if (view) views.show(event.ctrlKey ? Views.opposite(view) : view);
+    else if (event.ctrlKey) return false;
+    else if (digit === "9") views.turn();
+    else if (pressed === "r") page.reset(page.state?.camera ?? 0);
     else if (pressed === "x") explanation.show();
-    else if (pressed === "p") set({ paused: !state?.paused });
-    else if (pressed === "0") sheet.zoomOut();
+    else if (pressed === "m") measure.toggle();
+    else if (pressed === "h" && picked) tree.hide(picked.shape);
+    else if (pressed === "i" && picked) tree.isolate(picked.shape);
+    else if (pressed === "p") page.set({ paused: !page.state?.paused });
+    else if (digit === "0") sheet.zoomOut();
     else if (pressed === "+" || pressed === "=") sheet.zoomBy(1.5);
     else if (pressed === "-") sheet.zoomBy(1 / 1.5);
-    else if (pressed === "[") set({ exposure: (state?.exposure ?? 0) - 0.5 });
-    else if (pressed === "]") set({ exposure: (state?.exposure ?? 0) + 0.5 });
+    else if (pressed === "[") page.set({ exposure: (page.state?.exposure ?? 0) - 0.5 });
+    else if (pressed === "]") page.set({ exposure: (page.state?.exposure ?? 0) + 0.5 });
     else if (pressed === "?") byId("help").showModal();
     else return false;
     return true;
   }
   attach(sheet.picture, sheet, camera, {
-    moved,
+    moved: () => page.moved(),
     key,
     pick(x, y, turns) {
-      request += 1;
+      const request = page.ask({ type: "pick", x, y });
       if (turns) turnAround = request;
-      connection.send({ type: "pick", x, y, request });
     },
     hover(at) {
       hovered = at;
@@ -1151,37 +1926,63 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       else byId("pixel").textContent = "";
     }
   });
-  var explanation = new Explanation((errand) => connection.ticket(errand));
-  var editor = new Editor(byId("parameters"), byId("filter"), (path, value) => connection.send({ type: "edit", path, value }));
+  var ticket = (errand) => page.connection?.ticket(errand) ?? Promise.reject(new Error("not connected"));
+  var explanation = new Explanation(ticket);
+  var edit = (path, value) => page.send({ type: "edit", path, value });
+  var editor = new Editor(byId("parameters"), byId("filter"), edit);
+  var lights = new LightList(edit);
+  var tree = new SceneTree(page, select);
+  var views = new Views(page, camera);
+  var measure = new Measure(sheet);
+  var section = new Section(page);
+  var display = new Display(page);
+  page.onCamera = () => {
+    measure.moved();
+    section.moved();
+  };
   function on(id, event, act) {
     const input = byId(id);
     input.addEventListener(event, () => act(input));
   }
-  on("pause", "click", () => set({ paused: !state?.paused }));
-  on("reset", "click", () => reset(state?.camera ?? 0));
+  on("pause", "click", () => page.set({ paused: !page.state?.paused }));
+  on("reset", "click", () => page.reset(page.state?.camera ?? 0));
   on("help-open", "click", () => byId("help").showModal());
   on("help-close", "click", () => byId("help").close());
-  on("channel", "change", ({ value }) => set({ channel: value }));
-  on("exposure", "input", ({ value }) => set({ exposure: Number(value) }));
-  on("tone-map", "change", ({ value }) => set({ tone_map: value }));
-  on("false-colour", "change", ({ checked }) => set({ false_colour: checked }));
-  on("denoise", "change", ({ checked }) => set({ denoise: checked }));
-  on("scale", "change", ({ value }) => set({ scale: Number(value) }));
-  on("spp", "change", (input) => input.checkValidity() && set({ spp: Number(input.value) }));
-  on("camera", "change", ({ value }) => reset(Number(value)));
+  on("channel", "change", ({ value }) => page.set({ channel: value }));
+  on("exposure", "input", ({ value }) => page.set({ exposure: Number(value) }));
+  on("tone-map", "change", ({ value }) => page.set({ tone_map: value }));
+  on("false-colour", "change", ({ checked }) => page.set({ false_colour: checked }));
+  on("denoise", "change", ({ checked }) => page.set({ denoise: checked }));
+  on("scale", "change", ({ value }) => page.set({ scale: Number(value) }));
+  on("edit-picked", "click", () => picked?.owner && editor.reveal(picked.owner));
+  on("light-picked", "click", () => lights.reveal(picked?.owner ?? null));
+  on("find-picked", "click", () => picked && tree.reveal(picked.shape));
+  on("hide-picked", "click", () => picked && tree.hide(picked.shape));
+  on("isolate-picked", "click", () => picked && tree.isolate(picked.shape));
+  on("below-ground", "change", ({ checked }) => {
+    camera.mayGoBelow = checked;
+  });
+  on("noise-target", "change", (input) => input.checkValidity() && page.set({ noise: Number(input.value) }));
+  on("spp", "change", (input) => input.checkValidity() && page.set({ spp: Number(input.value) }));
+  on("camera", "change", ({ value }) => page.reset(Number(value)));
   on("fov", "change", (input) => {
     if (!input.checkValidity()) return;
     camera.fov = Number(input.value);
-    moved();
+    page.moved();
   });
-  var moment = (wishes) => connection.send({ type: "moment", time: state?.time ?? null, variant: state?.variant ?? null, ...wishes });
+  var moment = (wishes) => page.send({ type: "moment", time: page.state?.time ?? null, variant: page.state?.variant ?? null, ...wishes });
   on("animation-time", "input", ({ value }) => moment({ time: Number(value) }));
   on("variant", "change", ({ value }) => moment({ variant: value || null }));
-  on("save-overlay", "click", () => save(`${state?.name ?? "scene"}.overlay.txt`, editor.overlay()));
+  on("save-overlay", "click", () => save(`${page.state?.name ?? "scene"}.overlay.txt`, editor.overlay()));
   on("drop-edits", "click", () => editor.dropAll());
+  var stem = () => (page.state?.name || "picture").replace(/\.(pbrt|pov|gltf|glb|obj|ply|stl)(\.gz)?$/i, "");
+  on("snapshot", "click", async () => {
+    const picture = await sheet.snapshot();
+    if (picture) saveBlob(`${stem()}.png`, picture);
+  });
   async function savePicture(format) {
     try {
-      const link = element("a", "", { href: await connection.ticket({ for: "picture", format }), download: `picture.${format}` });
+      const link = element("a", "", { href: await ticket({ for: "picture", format }), download: `${stem()}.${format}` });
       link.click();
     } catch {
       alertOf("The picture was not saved.", "The viewer does not answer.");
@@ -1221,26 +2022,5 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     }
   });
   if (data) hideWhatNeedsAViewer();
-  async function drop(file) {
-    if (!file) return;
-    try {
-      const headers = { "Content-Type": "application/octet-stream" };
-      const answer = await fetch(await connection.ticket({ for: "scene" }), { method: "POST", headers, body: file });
-      if (!answer.ok) alertOf("The file was not opened.", await answer.text());
-    } catch {
-      alertOf("The file was not opened.", "The viewer does not answer.");
-    }
-  }
-  on("open", "change", ({ files }) => void drop(files?.[0]));
-  stage.addEventListener("dragover", (event) => {
-    event.preventDefault();
-    stage.classList.add("over");
-  });
-  stage.addEventListener("dragleave", () => stage.classList.remove("over"));
-  stage.addEventListener("drop", (event) => {
-    event.preventDefault();
-    if (data) return;
-    stage.classList.remove("over");
-    void drop(event.dataTransfer?.files[0]);
-  });
+  else new Drop(ticket, alertOf);
 })();

@@ -4,12 +4,17 @@ import { add, cross, dot, length, scale, sub, turned, unit, type Vector } from "
 
 /** How near the camera comes to straight above and below, in radians. */
 const POLE = 0.02;
+/** How near it comes to the ground, as a share of the distance to what it looks at. */
+const LEAST_HEIGHT = 0.01;
 
 export class Camera {
   placement: Placement = { eye: [0, 0, 1], target: [0, 0, 0], up: [0, 1, 0] };
   fov: number | null = null;
   zoom = 1;
   mirrored = false;
+  /** Whether it may go below the ground. */
+  mayGoBelow = false;
+  private ground: Scene["ground"] = null;
   /** What stays upwards while the camera turns. */
   private axis: Vector = [0, 1, 0];
 
@@ -22,6 +27,36 @@ export class Camera {
     this.fov = state.fov ?? own?.fov ?? null;
     this.zoom = state.zoom;
     this.axis = this.upright(scene, state.name.endsWith(".pbrt"));
+    this.ground = scene.ground;
+    // A camera of the file that is below it stays there.
+    if (this.height(this.placement.eye) < 0) this.mayGoBelow = true;
+  }
+
+  /** Stands there from now on. */
+  place(placement: Placement): void {
+    this.placement = placement;
+    this.rise(false);
+  }
+
+  /** How far a point is above the ground; infinitely far without one. */
+  private height(point: Vector): number {
+    return this.ground ? dot(sub(point, this.ground.point), this.ground.normal) : Infinity;
+  }
+
+  /** Comes out of the ground, the target with the eye or alone. */
+  private rise(withTarget: boolean): void {
+    if (this.mayGoBelow || !this.ground) return;
+    const least = LEAST_HEIGHT * this.distance();
+    const missing = least - this.height(this.placement.eye);
+    if (missing <= 0) return;
+    const step = scale(unit(this.ground.normal), missing);
+    const { eye, target, up } = this.placement;
+    this.placement = { eye: add(eye, step), target: withTarget ? add(target, step) : target, up };
+  }
+
+  /** What stays upwards while the camera turns. */
+  get upwards(): Vector {
+    return this.axis;
   }
 
   forward(): Vector {
@@ -63,11 +98,21 @@ export class Camera {
     const sideways = Math.sign(dot(cross(this.axis, offset), this.right())) || 1;
     offset = turned(offset, this.axis, right * sideways);
     const polar = Math.acos(Math.max(-1, Math.min(1, dot(unit(offset), this.axis))));
-    const wanted = Math.max(POLE, Math.min(Math.PI - POLE, polar - up));
+    const wanted = Math.max(POLE, Math.min(Math.PI - POLE, this.lowest(), polar - up));
     const across = cross(this.axis, offset);
     if (length(across) > 0) offset = turned(offset, unit(across), wanted - polar);
     eye = add(target, offset);
     this.placement = { eye, target, up: this.axis };
+    this.rise(false);
+  }
+
+  /** The largest angle from straight above at which the camera is above the ground, as far from its target as it is. */
+  private lowest(): number {
+    const { ground } = this;
+    if (this.mayGoBelow || !ground || dot(unit(ground.normal), this.axis) < 0.999) return Math.PI;
+    const reach = this.distance();
+    const drop = (LEAST_HEIGHT * reach - this.height(this.placement.target)) / reach;
+    return Math.acos(Math.max(-1, Math.min(1, drop)));
   }
 
   /** Moves eye and target: to the right, up and forward, in shares of the distance between them. */
@@ -76,12 +121,14 @@ export class Camera {
     const step = add(add(scale(this.right(), right * by), scale(this.upward(), up * by)), scale(this.forward(), forward * by));
     const { eye, target } = this.placement;
     this.placement = { eye: add(eye, step), target: add(target, step), up: this.axis };
+    this.rise(true);
   }
 
   /** Comes nearer to the target by a factor, or shows more of it. */
   dolly(factor: number): void {
     const { eye, target } = this.placement;
     this.placement = { eye: add(target, scale(sub(eye, target), factor)), target, up: this.axis };
+    this.rise(false);
     this.zoom = Math.max(1e-4, Math.min(1e4, this.zoom / factor));
   }
 

@@ -1,13 +1,15 @@
 // The socket, which comes back by itself. Page and viewer prove to each other that they know a secret, which is never sent: who takes the
 // port when the viewer has ended learns nothing.
 import { digits, proof } from "./proof";
-import { decoded, type Frame, type Told } from "./protocol";
+import { decoded, type Frame, type Message } from "./protocol";
 
 export interface Listener {
-  told(message: Told): void;
-  framed(frame: Frame): void;
-  /** The viewer is there, gone, does not know this page, or is another program. */
-  stood(how: "open" | "gone" | "refused" | "foreign"): void;
+  onMessage(message: Message): void;
+  onFrame(frame: Frame): void;
+  /** The viewer lets this page in. */
+  onOpen(access: Access): void;
+  /** The viewer is gone, does not know this page, or is another program. */
+  onStatus(how: "gone" | "refused" | "foreign"): void;
 }
 
 /** What a page asks an address for, which works once. */
@@ -19,7 +21,10 @@ export type Errand =
 /** What is said before a page is let in. */
 type Greeting =
   | { type: "challenge"; nonce: string }
-  | { type: "welcome"; proof: string; session: string | null };
+  | { type: "welcome"; proof: string; session: string | null; access: Access };
+
+/** What this page may do: all, or look on. */
+export type Access = "edit" | "watch";
 
 /** The code with which a page is sent away. */
 const UNKNOWN = 4403;
@@ -75,7 +80,7 @@ export class Connection {
     this.isIn = false;
     const known = secret();
     if (!known) {
-      this.listener.stood("refused");
+      this.listener.onStatus("refused");
       return;
     }
     const socket = new WebSocket(`ws://${location.host}/socket`);
@@ -92,14 +97,14 @@ export class Connection {
       if (message.type !== "welcome" || !challenge || message.proof !== proof(known, "viewer", challenge, nonce)) return false;
       if (message.session) sessionStorage.setItem(SECRET, message.session);
       [this.isIn, this.wait] = [true, 500];
-      this.listener.stood("open");
+      this.listener.onOpen(message.access);
       return true;
     };
     const lost = (how: "gone" | "refused" | "foreign"): void => {
       if (this.socket !== socket) return;
       [this.socket, this.isIn] = [undefined, false];
       this.waiting.clear();
-      this.listener.stood(how);
+      this.listener.onStatus(how);
       this.again = setTimeout(() => this.connect(), this.wait);
       this.wait = Math.min(this.wait * 1.5, 5000);
     };
@@ -120,16 +125,16 @@ export class Connection {
         return;
       }
       if (typeof event.data === "string") {
-        const message = JSON.parse(event.data) as Told;
+        const message = JSON.parse(event.data) as Message;
         if (message.type === "ticket") {
           this.waiting.get(message.request)?.(message.address);
           this.waiting.delete(message.request);
         } else {
-          this.listener.told(message);
+          this.listener.onMessage(message);
         }
         return;
       }
-      this.listener.framed(decoded(event.data));
+      this.listener.onFrame(decoded(event.data));
       // The next one comes when this one is shown: what comes between is never sent.
       this.send({ type: "shown" });
     };

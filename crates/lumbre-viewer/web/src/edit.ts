@@ -1,13 +1,11 @@
 // Parameters of materials and lights.
-import { element, short } from "./elements";
+import { toHex } from "./colour";
+import { byId, element, short } from "./elements";
+import { asOptions } from "./lights";
 import type { Parameter } from "./protocol";
 
 /** Parameters that are shown at a time. */
 const MOST = 60;
-
-const toSrgb = (c: number) => (c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055);
-const hex = (value: number[]) =>
-  "#" + value.map((c) => Math.round(255 * Math.max(0, Math.min(1, toSrgb(c)))).toString(16).padStart(2, "0")).join("");
 
 export class Editor {
   private parameters: Parameter[] = [];
@@ -32,6 +30,25 @@ export class Editor {
     for (const row of this.panel.querySelectorAll<HTMLElement>(".parameter")) {
       row.classList.toggle("changed", this.settings.has(row.dataset["path"] ?? ""));
     }
+    const text = byId<HTMLTextAreaElement>("edit-options");
+    text.value = asOptions(settings);
+    text.hidden = settings.length === 0;
+  }
+
+  /** Marks the parameters of a material, where they are listed. */
+  mark(owner: string | null): void {
+    for (const group of this.panel.querySelectorAll<HTMLElement>("fieldset")) {
+      group.classList.toggle("marked", group.dataset["owner"] === owner);
+    }
+  }
+
+  /** Opens the list at the parameters of a material. */
+  reveal(owner: string): void {
+    byId<HTMLDetailsElement>("edit-details").open = true;
+    this.filter.value = owner;
+    this.draw();
+    this.mark(owner);
+    this.panel.querySelector(".marked")?.scrollIntoView({ block: "nearest" });
   }
 
   private draw(): void {
@@ -42,6 +59,7 @@ export class Editor {
       let group = groups.get(parameter.owner);
       if (!group) {
         group = element("fieldset");
+        group.dataset["owner"] = parameter.owner;
         group.append(element("legend", parameter.owner));
         groups.set(parameter.owner, group);
       }
@@ -64,7 +82,7 @@ export class Editor {
       const set = this.settings.get(parameter.path);
       if (parameter.kind === "colour") {
         input.type = "color";
-        input.value = set?.startsWith("#") ? set : hex(parameter.value ?? [0.5, 0.5, 0.5]);
+        input.value = set?.startsWith("#") ? set : toHex(parameter.value ?? [0.5, 0.5, 0.5]);
       } else if (parameter.kind === "number" || parameter.kind === "factor") {
         input.type = "number";
         input.step = "any";

@@ -40,9 +40,12 @@ export function options(select: HTMLSelectElement, entries: [string, string][], 
   select.value = chosen;
 }
 
-/** Hands a text to the user as a file. */
-export function save(name: string, text: string): void {
-  const url = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
+/** Hands bytes to the user as a file. */
+export function saveBlob(name: string, blob: Blob): void {
+  const url = URL.createObjectURL(blob);
   element("a", "", { href: url, download: name }).click();
   setTimeout(() => URL.revokeObjectURL(url), 10_000);
 }
+
+/** Hands a text to the user as a file. */
+export const save = (name: string, text: string): void => saveBlob(name, new Blob([text], { type: "text/plain" }));

@@ -1,6 +1,7 @@
 // What is in the scene, and what a ray meets.
 import { element, large, short, spoken } from "./elements";
 import type { Hit, Scene } from "./protocol";
+import { called } from "./tree";
 
 const point = (v: readonly number[]) => v.map(short).join(", ");
 
@@ -25,9 +26,6 @@ export function showFacts(list: HTMLElement, warnings: HTMLElement, scene: Scene
   }
 }
 
-/** The ground has a number that says nothing. */
-const named = ({ shape, kind }: Hit) => (kind === "ground" ? kind : `${shape} (${kind})`);
-
 export function showHits(panel: HTMLElement, hits: Hit[]): void {
   const first = hits[0];
   if (!first) {
@@ -35,7 +33,7 @@ export function showHits(panel: HTMLElement, hits: Hit[]): void {
     return;
   }
   const rows: [string, string | undefined][] = [
-    ["Shape", named(first)],
+    ["Shape", called(first)],
     ["Material", first.material ?? "none"],
     ["Position", first.point && point(first.point)],
     ["Normal", first.normal && point(first.normal)],
@@ -58,7 +56,7 @@ export function showHits(panel: HTMLElement, hits: Hit[]): void {
   all.append(element("summary", `All ${hits.length} hits of this ray`));
   const list = element("ol");
   for (const hit of hits) {
-    list.append(element("li", `${short(hit.distance)}: shape ${named(hit)}, ${hit.material ?? "no material"}, ${hit.front ? "in" : "out"}`));
+    list.append(element("li", `${short(hit.distance)}: shape ${called(hit)}, ${hit.material ?? "no material"}, ${hit.front ? "in" : "out"}`));
   }
   all.append(list);
   panel.append(all);

@@ -2,22 +2,25 @@
 import type { Camera } from "./camera";
 import type { Sheet } from "./sheet";
 
-export interface Wishes {
+export interface InputHandlers {
   /** The camera has moved. */
   moved(): void;
   /** What is at this place of the picture? Whether to turn around it from now on. */
   pick(x: number, y: number, turnAround: boolean): void;
   /** The pointer is there, or nowhere. */
   hover(at: [number, number] | null): void;
-  key(key: string): boolean;
+  /** A key that neither moves nor picks; whether it does something. */
+  key(event: KeyboardEvent): boolean;
 }
 
 /** How far a pointer goes before it is a drag, in screen pixels. */
 const STILL = 4;
 
-export function attach(canvas: HTMLCanvasElement, sheet: Sheet, camera: Camera, wishes: Wishes): void {
+export function attach(canvas: HTMLCanvasElement, sheet: Sheet, camera: Camera, handlers: InputHandlers): void {
   const pointers = new Map<number, PointerEvent>();
   let travelled = 0;
+  /** Whether there were two fingers since the last time that there was none. */
+  let wasPair = false;
   const spread = () => {
     const [a, b] = [...pointers.values()];
     return a && b ? Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY) : 0;
@@ -27,12 +30,13 @@ export function attach(canvas: HTMLCanvasElement, sheet: Sheet, camera: Camera, 
     canvas.setPointerCapture(event.pointerId);
     canvas.focus();
     pointers.set(event.pointerId, event);
-    if (pointers.size === 1) travelled = 0;
+    if (pointers.size === 1) [travelled, wasPair] = [0, false];
+    if (pointers.size > 1) wasPair = true;
   });
   canvas.addEventListener("pointermove", (event) => {
     const before = pointers.get(event.pointerId);
     if (!before) {
-      wishes.hover(sheet.at(event.clientX, event.clientY));
+      handlers.hover(sheet.at(event.clientX, event.clientY));
       return;
     }
     const wide = spread();
@@ -41,13 +45,17 @@ export function attach(canvas: HTMLCanvasElement, sheet: Sheet, camera: Camera, 
     travelled += Math.hypot(dx, dy);
     if (travelled < STILL) return;
     const height = Math.max(1, sheet.height * sheet.scale());
-    const pan = () => {
+    const pan = (share = 1) => {
       const span = camera.fov === null ? 1 : 2 * Math.tan((camera.fov * Math.PI) / 360);
-      camera.move((-dx / height) * span, (dy / height) * span, 0);
+      camera.move((-dx / height) * span * share, (dy / height) * span * share, 0);
     };
     if (pointers.size >= 2) {
       if (wide > 0) camera.dolly(wide / Math.max(1, spread()));
-      pan();
+      // Both fingers say how far they went: the point between them goes the mean of it.
+      pan(1 / pointers.size);
+    } else if (wasPair) {
+      // The finger that is left of a pair turns nothing.
+      return;
     } else if (sheet.isZoomed() && event.ctrlKey) {
       sheet.slide(dx, dy);
       return;
@@ -56,22 +64,22 @@ export function attach(canvas: HTMLCanvasElement, sheet: Sheet, camera: Camera, 
     } else {
       camera.orbit((-dx / height) * Math.PI, (dy / height) * Math.PI);
     }
-    wishes.moved();
+    handlers.moved();
   });
   const up = (event: PointerEvent) => {
     const was = pointers.delete(event.pointerId);
-    if (was && pointers.size === 0 && travelled < STILL && event.type === "pointerup" && event.button === 0) {
+    if (was && pointers.size === 0 && travelled < STILL && !wasPair && event.type === "pointerup" && event.button === 0) {
       const at = sheet.at(event.clientX, event.clientY);
-      if (at) wishes.pick(at[0], at[1], false);
+      if (at) handlers.pick(at[0], at[1], false);
     }
   };
   canvas.addEventListener("pointerup", up);
   canvas.addEventListener("pointercancel", up);
-  canvas.addEventListener("pointerleave", () => wishes.hover(null));
+  canvas.addEventListener("pointerleave", () => handlers.hover(null));
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   canvas.addEventListener("dblclick", (event) => {
     const at = sheet.at(event.clientX, event.clientY);
-    if (at) wishes.pick(at[0], at[1], true);
+    if (at) handlers.pick(at[0], at[1], true);
   });
   canvas.addEventListener("wheel", (event) => {
     event.preventDefault();
@@ -82,7 +90,7 @@ export function attach(canvas: HTMLCanvasElement, sheet: Sheet, camera: Camera, 
       return;
     }
     camera.dolly(factor);
-    wishes.moved();
+    handlers.moved();
   }, { passive: false });
 
   const held = new Set<string>();
@@ -107,11 +115,15 @@ export function attach(canvas: HTMLCanvasElement, sheet: Sheet, camera: Camera, 
       if (key === "pageup" || key === "pagedown") camera.dolly(Math.exp(key === "pageup" ? -by : by));
       any ||= key !== "shift";
     }
-    if (any) wishes.moved();
+    if (any) handlers.moved();
     requestAnimationFrame(fly);
   };
   canvas.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.metaKey || event.altKey) return;
+    if (event.ctrlKey) {
+      if (handlers.key(event)) event.preventDefault();
+      return;
+    }
     const key = event.key.toLowerCase();
     if (key in FLY || key in TURN || key === "pageup" || key === "pagedown" || key === "shift") {
       event.preventDefault();
@@ -121,8 +133,8 @@ export function attach(canvas: HTMLCanvasElement, sheet: Sheet, camera: Camera, 
       }
       held.add(key);
     } else if (key === "enter") {
-      wishes.pick(sheet.width / 2, sheet.height / 2, false);
-    } else if (wishes.key(key)) {
+      handlers.pick(sheet.width / 2, sheet.height / 2, false);
+    } else if (handlers.key(event)) {
       event.preventDefault();
     }
   });

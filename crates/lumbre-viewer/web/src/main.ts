@@ -1,89 +1,54 @@
 // The page: what comes from the viewer is shown, what is wished goes to it.
-import { Camera } from "./camera";
-import { AtRest, hideWhatNeedsAViewer, type Data } from "./at-rest";
-import { Connection, type Listener } from "./connection";
+import { Connection, type Access, type Errand, type Listener } from "./connection";
+import { Display } from "./display";
+import { Drop } from "./drop";
 import { Editor } from "./edit";
-import { byId, element, large, options, save, short, spoken } from "./elements";
+import { byId, element, options, save, saveBlob, short } from "./elements";
 import { Explanation } from "./explanation";
 import { showFacts, showHits } from "./facts";
 import { attach } from "./hands";
-import type { Frame, Progress, Scene, State, Told } from "./protocol";
-import { Sheet } from "./sheet";
+import { LightList } from "./lights";
+import { Measure } from "./measure";
+import { Page } from "./page";
+import { showProgress } from "./progress";
+import type { Frame, Message, State, Thing } from "./protocol";
+import { Section } from "./section";
+import { StaticConnection, hideWhatNeedsAViewer, type Data } from "./static-connection";
+import { SceneTree } from "./tree";
+import { Views, type Standard } from "./views";
 
-const stage = byId("stage");
-const sheet = new Sheet(
-  stage, byId("sheet"), byId<HTMLCanvasElement>("picture"), byId<HTMLCanvasElement>("reference"),
-  byId<HTMLCanvasElement>("numbers"),
-);
-const camera = new Camera();
-let scene: Scene | undefined;
-let state: State | undefined;
-let request = 0;
+const page = new Page();
+const { sheet, camera } = page;
+const listener: Listener = { onMessage, onFrame, onOpen, onStatus };
+const data = (globalThis as { lumbreAtRest?: Data }).lumbreAtRest;
+page.connection = data ? new StaticConnection(listener, data) : new Connection(listener);
 let turnAround = 0;
+/** What was clicked last. */
+let picked: Thing | undefined;
 let hovered: [number, number] | null = null;
 let asked = 0;
-// What the camera is at is counted, so that one knows which frame shows it. Others count from elsewhere.
-let sequence = Math.floor(Math.random() * 0x7fff_0000);
-let mine = -1;
-
-/** What the page measures of itself: milliseconds from a change to the first picture of it, and when frames came. */
-const measured = { latencies: [] as number[], frames: [] as number[], changes: new Map<number, number>(), spp: 0, done: false, sequence: 0 };
-Object.assign(globalThis, { lumbreMeasured: measured });
-
-const listener: Listener = { told: (message) => told(message), framed: (frame) => framed(frame), stood: (how) => stood(how) };
-const data = (globalThis as { lumbreAtRest?: Data }).lumbreAtRest;
-const connection = data ? new AtRest(listener, data) : new Connection(listener);
-
-// ---- the camera goes out once a picture of the screen
-let isMoving = false;
-function moved(): void {
-  if (isMoving) return;
-  isMoving = true;
-  requestAnimationFrame(() => {
-    isMoving = false;
-    sequence = (sequence + 1) >>> 0;
-    mine = sequence;
-    measured.changes.set(sequence, performance.now());
-    connection.send({ type: "camera", sequence, placement: camera.placement, fov: camera.fov, zoom: camera.zoom });
-  });
-}
-
-function reset(index: number): void {
-  sequence = (sequence + 1) >>> 0;
-  mine = -1;
-  connection.send({ type: "reset", sequence, camera: index });
-}
-
-const set = (wishes: object) => connection.send({ type: "set", ...wishes });
 
 // ---- what comes
-function framed(frame: Frame): void {
-  sheet.show(frame);
-  const now = performance.now();
-  measured.frames.push(now);
-  if (measured.frames.length > 2000) measured.frames.splice(0, 1000);
-  [measured.spp, measured.done, measured.sequence] = [frame.isFull ? frame.spp : 0, frame.isDone, frame.sequence];
-  for (const [change, since] of measured.changes) {
-    if (change > frame.sequence) continue;
-    // Earlier changes that no frame was made of are shown by this one.
-    if (change === frame.sequence) measured.latencies.push(now - since);
-    measured.changes.delete(change);
-  }
+function onFrame(frame: Frame): void {
+  page.show(display.shown(frame));
+  display.draw();
   if (frame.isFull) askNumbers();
   if (hovered && frame.isFull) askPixel();
 }
 
-function told(message: Told): void {
+function onMessage(message: Message): void {
   switch (message.type) {
     case "scene":
-      scene = message.scene;
-      showFacts(byId("facts"), byId("warnings"), scene);
-      editor.list(scene.parameters);
-      explanation.offer(scene.languages);
-      if (state) showState(state);
+      page.scene = message.scene;
+      showFacts(byId("facts"), byId("warnings"), message.scene);
+      editor.list(message.scene.parameters);
+      lights.list(message.scene.parameters);
+      tree.list(message.scene);
+      explanation.offer(message.scene.languages);
+      if (page.state) showState(page.state);
       break;
     case "state":
-      state = message;
+      page.state = message;
       showState(message);
       break;
     case "progress":
@@ -91,10 +56,12 @@ function told(message: Told): void {
       break;
     case "picked":
       showHits(byId("picked"), message.ray.hits);
+      select(message.ray.hits[0]);
+      measure.take(message.x, message.y, message.ray.hits[0]);
       explanation.of(Math.floor(message.x), Math.floor(message.y));
       if (message.request === turnAround && message.ray.hits[0]?.point) {
         camera.lookAt(message.ray.hits[0].point);
-        moved();
+        page.moved();
       }
       break;
     case "values":
@@ -112,45 +79,43 @@ function told(message: Told): void {
   }
 }
 
+/** A shape was clicked, in the picture or in the tree: it is marked everywhere. */
+function select(thing: Thing | undefined): void {
+  picked = thing;
+  tree.select(thing?.shape ?? -1);
+  editor.mark(thing?.owner ?? null);
+  const isShape = thing !== undefined && thing.kind !== "ground";
+  byId("picked-buttons").hidden = !isShape || data !== undefined || page.watches;
+  byId("edit-picked").hidden = !thing?.owner;
+  byId("light-picked").hidden = !thing?.shines;
+}
+
 function alertOf(title: string, text: string): void {
   byId("alert-title").textContent = title;
   byId("alert-text").textContent = text;
   byId("alert").hidden = title === "";
 }
 
-let connected = false;
-function stood(how: "open" | "gone" | "refused" | "foreign"): void {
-  connected = how === "open";
-  if (how === "open") alertOf("", "");
+function onOpen(access: Access): void {
+  page.connected = true;
+  page.watches = access === "watch";
+  byId("watching").hidden = !page.watches;
+  if (page.watches) hideWhatNeedsAViewer(true);
+  alertOf("", "");
+}
+
+function onStatus(how: "gone" | "refused" | "foreign"): void {
+  page.connected = false;
   if (how === "gone") alertOf("The viewer does not answer.", "It has ended, or the tunnel to it has. This page goes on when it is back.");
   if (how === "refused") alertOf("The viewer does not know this page.", "Open the address that lumbre view printed. It works once, in one tab: to have another one, start the viewer again.");
   if (how === "foreign") alertOf("Another program answers in place of the viewer.", "It cannot prove to be the viewer, and was told nothing.");
-  if (!connected) byId("progress").textContent = "Not connected";
-}
-
-function showProgress(progress: Progress): void {
-  const { doing, spp = 0, target = 0 } = progress;
-  const words: Record<Progress["doing"], string> = {
-    reading: "Reading the scene", building: "Building the scene", rendering: "", done: "", waiting: "Waiting for the file to be mended", nothing: "No scene",
-  };
-  let text = words[doing];
-  if (doing === "rendering" || doing === "done") {
-    const parts = [target > 0 ? `${spp} of ${target} samples` : "done"];
-    if (progress.noise != null && spp > 1) parts.push(`noise ${progress.noise.toFixed(4)}`);
-    if (progress.rays_per_second) parts.push(`${large(progress.rays_per_second)} rays/s`);
-    if (doing === "rendering" && progress.left) parts.push(`${spoken(progress.left)} left`);
-    if (doing === "done" && progress.seconds) parts.push(`done in ${spoken(progress.seconds)}`);
-    if (progress.dropped) parts.push(`${progress.dropped} samples dropped`);
-    text = parts.join(" · ");
-  }
-  byId("progress").textContent = text;
-  byId<HTMLProgressElement>("bar").value = target > 0 ? spp / target : doing === "done" ? 1 : 0;
+  byId("progress").textContent = "Not connected";
 }
 
 function showState(now: State): void {
   document.title = now.name ? `${now.name} – Lumbre` : "Lumbre";
   byId("name").textContent = now.name || "Lumbre";
-  if (connected) alertOf(now.error ? (now.has_scene ? "The file has an error; this is the last good picture." : "The file has an error.") : "", now.error ?? "");
+  if (page.connected) alertOf(now.error ? (now.has_scene ? "The file has an error; this is the last good picture." : "The file has an error.") : "", now.error ?? "");
   byId("empty").hidden = now.name !== "";
   byId("sheet").hidden = now.name === "";
   const error = byId("edit-error");
@@ -169,16 +134,23 @@ function showState(now: State): void {
   value("exposure", String(now.exposure ?? 0));
   byId("exposure-value").textContent = (now.exposure ?? 0).toFixed(1);
   value("spp", String(now.spp ?? 64));
+  value("noise-target", now.noise ? String(now.noise) : "");
   byId<HTMLInputElement>("false-colour").checked = now.false_colour;
   byId<HTMLInputElement>("denoise").checked = now.denoise ?? false;
   editor.take(now.settings);
+  lights.take(now.settings);
+  tree.take(now.hidden);
+  display.take(now);
+  section.take(now);
+  views.open(now.name);
   byId<HTMLButtonElement>("save-overlay").disabled = now.settings.length === 0;
   byId<HTMLButtonElement>("drop-edits").disabled = now.settings.length === 0;
+  const { scene } = page;
   if (!scene) return;
   options(byId("camera"), scene.cameras.map(({ name }, i) => [String(i), name]), String(now.camera));
-  const isOld = now.moved && now.sequence === mine;
-  // What was said from here and comes back is older than what the hand does.
-  if (!isOld && !isMoving) camera.take(now, scene);
+  page.takeCamera(now, scene);
+  byId("ground-details").hidden = scene.ground === null;
+  byId<HTMLInputElement>("below-ground").checked = camera.mayGoBelow;
   const fov = byId<HTMLInputElement>("fov");
   fov.disabled = camera.fov === null;
   value("fov", camera.fov === null ? "" : short(camera.fov));
@@ -198,7 +170,7 @@ function askPixel(): void {
   if (!hovered || now - asked < 40) return;
   asked = now;
   const [x, y] = hovered;
-  connection.send({ type: "values", x: Math.floor(x), y: Math.floor(y), width: 1, height: 1, request: ++request });
+  page.ask({ type: "values", x: Math.floor(x), y: Math.floor(y), width: 1, height: 1 });
 }
 
 let numbersWait = 0;
@@ -207,35 +179,46 @@ function askNumbers(): void {
   if (!rectangle) return;
   clearTimeout(numbersWait);
   const [x, y, width, height] = rectangle;
-  numbersWait = setTimeout(() => connection.send({ type: "values", x, y, width, height, request: ++request }), 60);
+  numbersWait = setTimeout(() => page.ask({ type: "values", x, y, width, height }), 60);
 }
 sheet.changed = askNumbers;
 
 // ---- what the hand does
-function key(pressed: string): boolean {
-  const channels = ["beauty", "albedo", "normal", "depth", "uv", "variance", "ids"];
-  const channel = channels[Number(pressed) - 1];
-  if (channel) set({ channel });
-  else if (pressed === "r") reset(state?.camera ?? 0);
+const CHANNELS = ["beauty", "albedo", "normal", "depth", "uv", "variance", "ids"];
+const VIEWS: Record<string, Standard> = { 1: "front", 3: "right", 7: "top" };
+
+function key(event: KeyboardEvent): boolean {
+  const pressed = event.key.toLowerCase();
+  // With Shift, the key of a digit has another sign on each keyboard.
+  const digit = /^(?:Digit|Numpad)([0-9])$/.exec(event.code)?.[1] ?? pressed;
+  const channel = event.shiftKey ? CHANNELS[Number(digit) - 1] : undefined;
+  const view = VIEWS[digit];
+  if (channel) page.set({ channel });
+  else if (view) views.show(event.ctrlKey ? Views.opposite(view) : view);
+  else if (event.ctrlKey) return false;
+  else if (digit === "9") views.turn();
+  else if (pressed === "r") page.reset(page.state?.camera ?? 0);
   else if (pressed === "x") explanation.show();
-  else if (pressed === "p") set({ paused: !state?.paused });
-  else if (pressed === "0") sheet.zoomOut();
+  else if (pressed === "m") measure.toggle();
+  else if (pressed === "h" && picked) tree.hide(picked.shape);
+  else if (pressed === "i" && picked) tree.isolate(picked.shape);
+  else if (pressed === "p") page.set({ paused: !page.state?.paused });
+  else if (digit === "0") sheet.zoomOut();
   else if (pressed === "+" || pressed === "=") sheet.zoomBy(1.5);
   else if (pressed === "-") sheet.zoomBy(1 / 1.5);
-  else if (pressed === "[") set({ exposure: (state?.exposure ?? 0) - 0.5 });
-  else if (pressed === "]") set({ exposure: (state?.exposure ?? 0) + 0.5 });
+  else if (pressed === "[") page.set({ exposure: (page.state?.exposure ?? 0) - 0.5 });
+  else if (pressed === "]") page.set({ exposure: (page.state?.exposure ?? 0) + 0.5 });
   else if (pressed === "?") byId<HTMLDialogElement>("help").showModal();
   else return false;
   return true;
 }
 
 attach(sheet.picture, sheet, camera, {
-  moved,
+  moved: () => page.moved(),
   key,
   pick(x, y, turns) {
-    request += 1;
+    const request = page.ask({ type: "pick", x, y });
     if (turns) turnAround = request;
-    connection.send({ type: "pick", x, y, request });
   },
   hover(at) {
     hovered = at;
@@ -244,41 +227,70 @@ attach(sheet.picture, sheet, camera, {
   },
 });
 
-const explanation = new Explanation((errand) => connection.ticket(errand));
-const editor = new Editor(byId("parameters"), byId("filter"), (path, value) => connection.send({ type: "edit", path, value }));
+/** An address for an errand, which works once. */
+const ticket = (errand: Errand): Promise<string> => page.connection?.ticket(errand) ?? Promise.reject(new Error("not connected"));
+const explanation = new Explanation(ticket);
+const edit = (path: string, value: string | null) => page.send({ type: "edit", path, value });
+const editor = new Editor(byId("parameters"), byId("filter"), edit);
+const lights = new LightList(edit);
+const tree = new SceneTree(page, select);
+const views = new Views(page, camera);
+const measure = new Measure(sheet);
+const section = new Section(page);
+const display = new Display(page);
+page.onCamera = () => {
+  measure.moved();
+  section.moved();
+};
 
 function on(id: string, event: string, act: (input: HTMLInputElement) => void): void {
   const input = byId<HTMLInputElement>(id);
   input.addEventListener(event, () => act(input));
 }
-on("pause", "click", () => set({ paused: !state?.paused }));
-on("reset", "click", () => reset(state?.camera ?? 0));
+on("pause", "click", () => page.set({ paused: !page.state?.paused }));
+on("reset", "click", () => page.reset(page.state?.camera ?? 0));
 on("help-open", "click", () => byId<HTMLDialogElement>("help").showModal());
 on("help-close", "click", () => byId<HTMLDialogElement>("help").close());
-on("channel", "change", ({ value }) => set({ channel: value }));
-on("exposure", "input", ({ value }) => set({ exposure: Number(value) }));
-on("tone-map", "change", ({ value }) => set({ tone_map: value }));
-on("false-colour", "change", ({ checked }) => set({ false_colour: checked }));
-on("denoise", "change", ({ checked }) => set({ denoise: checked }));
-on("scale", "change", ({ value }) => set({ scale: Number(value) }));
-on("spp", "change", (input) => input.checkValidity() && set({ spp: Number(input.value) }));
-on("camera", "change", ({ value }) => reset(Number(value)));
+on("channel", "change", ({ value }) => page.set({ channel: value }));
+on("exposure", "input", ({ value }) => page.set({ exposure: Number(value) }));
+on("tone-map", "change", ({ value }) => page.set({ tone_map: value }));
+on("false-colour", "change", ({ checked }) => page.set({ false_colour: checked }));
+on("denoise", "change", ({ checked }) => page.set({ denoise: checked }));
+on("scale", "change", ({ value }) => page.set({ scale: Number(value) }));
+on("edit-picked", "click", () => picked?.owner && editor.reveal(picked.owner));
+on("light-picked", "click", () => lights.reveal(picked?.owner ?? null));
+on("find-picked", "click", () => picked && tree.reveal(picked.shape));
+on("hide-picked", "click", () => picked && tree.hide(picked.shape));
+on("isolate-picked", "click", () => picked && tree.isolate(picked.shape));
+on("below-ground", "change", ({ checked }) => {
+  camera.mayGoBelow = checked;
+});
+on("noise-target", "change", (input) => input.checkValidity() && page.set({ noise: Number(input.value) }));
+on("spp", "change", (input) => input.checkValidity() && page.set({ spp: Number(input.value) }));
+on("camera", "change", ({ value }) => page.reset(Number(value)));
 on("fov", "change", (input) => {
   if (!input.checkValidity()) return;
   camera.fov = Number(input.value);
-  moved();
+  page.moved();
 });
 const moment = (wishes: object) =>
-  connection.send({ type: "moment", time: state?.time ?? null, variant: state?.variant ?? null, ...wishes });
+  page.send({ type: "moment", time: page.state?.time ?? null, variant: page.state?.variant ?? null, ...wishes });
 on("animation-time", "input", ({ value }) => moment({ time: Number(value) }));
 on("variant", "change", ({ value }) => moment({ variant: value || null }));
-on("save-overlay", "click", () => save(`${state?.name ?? "scene"}.overlay.txt`, editor.overlay()));
+on("save-overlay", "click", () => save(`${page.state?.name ?? "scene"}.overlay.txt`, editor.overlay()));
 on("drop-edits", "click", () => editor.dropAll());
+
+/** The name of the scene without its ending, for files. */
+const stem = () => (page.state?.name || "picture").replace(/\.(pbrt|pov|gltf|glb|obj|ply|stl)(\.gz)?$/i, "");
+on("snapshot", "click", async () => {
+  const picture = await sheet.snapshot();
+  if (picture) saveBlob(`${stem()}.png`, picture);
+});
 
 /** Takes the picture as a file, which the browser saves. */
 async function savePicture(format: "png" | "exr"): Promise<void> {
   try {
-    const link = element("a", "", { href: await connection.ticket({ for: "picture", format }), download: `picture.${format}` });
+    const link = element("a", "", { href: await ticket({ for: "picture", format }), download: `${stem()}.${format}` });
     link.click();
   } catch {
     alertOf("The picture was not saved.", "The viewer does not answer.");
@@ -322,28 +334,4 @@ on("reference-file", "change", async ({ files }) => {
 });
 
 if (data) hideWhatNeedsAViewer();
-
-// ---- a model that is dropped
-async function drop(file: File | undefined): Promise<void> {
-  if (!file) return;
-  try {
-    const headers = { "Content-Type": "application/octet-stream" };
-    const answer = await fetch(await connection.ticket({ for: "scene" }), { method: "POST", headers, body: file });
-    if (!answer.ok) alertOf("The file was not opened.", await answer.text());
-  } catch {
-    alertOf("The file was not opened.", "The viewer does not answer.");
-  }
-}
-on("open", "change", ({ files }) => void drop(files?.[0]));
-stage.addEventListener("dragover", (event) => {
-  event.preventDefault();
-  stage.classList.add("over");
-});
-stage.addEventListener("dragleave", () => stage.classList.remove("over"));
-stage.addEventListener("drop", (event) => {
-  event.preventDefault();
-  if (data) return;
-  stage.classList.remove("over");
-  void drop(event.dataTransfer?.files[0]);
-});
-
+else new Drop(ticket, alertOf);

@@ -18,12 +18,14 @@ export class Sheet {
   private zoom = 0;
   private left = 0;
   private top = 0;
+  /** Where the reference begins, in percent of the width. */
+  private part = 50;
   private readonly small = document.createElement("canvas");
   changed: () => void = () => {};
 
   constructor(
     private readonly stage: HTMLElement, private readonly sheet: HTMLElement, readonly picture: HTMLCanvasElement,
-    readonly reference: HTMLCanvasElement, private readonly numbers: HTMLCanvasElement,
+    readonly reference: HTMLCanvasElement, private readonly numbers: HTMLCanvasElement, private readonly marks: SVGElement,
   ) {
     new ResizeObserver(() => this.place()).observe(stage);
   }
@@ -152,6 +154,35 @@ export class Sheet {
     });
   }
 
+  /** Marks places of the picture, and the line between two of them; none takes the marks away. */
+  mark(places: [number, number][]): void {
+    const svg = (name: string, attributes: Record<string, number>) => {
+      const made = document.createElementNS("http://www.w3.org/2000/svg", name);
+      for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, String(value));
+      return made;
+    };
+    this.marks.setAttribute("viewBox", `0 0 ${this.width} ${this.height}`);
+    const radius = 5 / this.scale();
+    const dots = places.map(([cx, cy]) => svg("circle", { cx, cy, r: radius }));
+    const [a, b] = places;
+    const line = a && b ? [svg("line", { x1: a[0], y1: a[1], x2: b[0], y2: b[1] })] : [];
+    this.marks.replaceChildren(...line, ...dots);
+  }
+
+  /** What is shown, the reference too where it covers the picture, as a PNG. */
+  async snapshot(): Promise<Blob | null> {
+    const canvas = document.createElement("canvas");
+    [canvas.width, canvas.height] = [this.width, this.height];
+    const drawing = context(canvas);
+    drawing.drawImage(this.picture, 0, 0);
+    if (!this.reference.hidden) {
+      const from = Math.round((this.width * this.part) / 100);
+      const wide = this.width - from;
+      if (wide > 0) drawing.drawImage(this.reference, from, 0, wide, this.height, from, 0, wide, this.height);
+    }
+    return new Promise((found) => canvas.toBlob(found, "image/png"));
+  }
+
   /** Keeps a picture to compare with; without one, what is shown. */
   keep(source: CanvasImageSource = this.picture): void {
     [this.reference.width, this.reference.height] = [this.width, this.height];
@@ -160,6 +191,7 @@ export class Sheet {
   }
 
   split(percent: number): void {
+    this.part = percent;
     this.reference.style.clipPath = `inset(0 0 0 ${percent}%)`;
   }
 }

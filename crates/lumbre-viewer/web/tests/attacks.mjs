@@ -225,11 +225,13 @@ export const attacks = ({ view, open, done, pixels, freePort, folder }) => ({
     const drop = (bytes) => page.setInputFiles("#open", { name: "a.glb", mimeType: "model/gltf-binary", buffer: bytes });
     let count = 0;
     for (const uri of [...ways(text), ...ways("/etc/passwd"), ...ways(join(folder, "not-there")), "scene.pbrt", "/dev/zero", "/proc/self/environ"]) {
-      await page.evaluate(() => (document.getElementById("alert-text").textContent = ""));
       await drop(naming(uri, "buffer"));
-      await page.waitForFunction(() => document.getElementById("alert-text").textContent !== "", undefined, { timeout: 20_000 });
+      // Each is in a folder of its own, by its number.
+      await page.waitForFunction((wanted) => document.getElementById("alert-text").textContent.includes(wanted), `/${count}/a.glb`, { timeout: 20_000 });
       const told = await page.textContent("#alert");
-      assert.match(told, /the scene may use no files but its own/, `${uri}: ${told}`);
+      // Its folder is its own, and has nothing but what was dropped.
+      const refused = uri === "scene.pbrt" ? /cannot open: .*\/\d+\/scene\.pbrt/s : /the scene may use no files but its own/;
+      assert.match(told, refused, `${uri}: ${told}`);
       assert.ok(!told.includes("root:x"), told);
       assert.deepEqual(await pixels(page), before, "the last good picture stays");
       count += 1;
@@ -248,6 +250,57 @@ export const attacks = ({ view, open, done, pixels, freePort, folder }) => ({
     }
     rmSync(text);
     rmSync(picture);
+    await viewer.stop();
+  },
+
+  async "a scene of any format that is dropped reads nothing outside its folder, and does not learn what is there"() {
+    const secret = join(folder, "outside-a.txt");
+    writeFileSync(secret, "400 0.5 700 0.5\n".repeat(3));
+    const scene = (rest) => `LookAt 0 -7 3  0 0 0  0 0 1 Camera "perspective" WorldBegin LightSource "infinite" ${rest} Shape "sphere"`;
+    // Each names a file: by its whole name, or by a way out of the folder.
+    const ways = {
+      "include.pbrt": (uri) => scene(`Include "${uri}"`),
+      "mesh.pbrt": (uri) => scene(`Shape "plymesh" "string filename" "${uri}"`),
+      "image.pbrt": (uri) => scene(`Texture "t" "spectrum" "imagemap" "string filename" "${uri}" Material "diffuse" "texture reflectance" "t"`),
+      "spectrum.pbrt": (uri) => scene(`Material "diffuse" "spectrum reflectance" "${uri}"`),
+      "sky.pbrt": (uri) => scene(`LightSource "infinite" "string filename" "${uri}"`),
+      "library.obj": (uri) => `mtllib ${uri}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n`,
+      "buffer.gltf": (uri) => JSON.stringify({
+        asset: { version: "2.0" }, scene: 0, scenes: [{ nodes: [0] }], nodes: [{ mesh: 0 }],
+        meshes: [{ primitives: [{ attributes: { POSITION: 0 } }] }], buffers: [{ byteLength: 36, uri }], bufferViews: [{ buffer: 0, byteLength: 36 }],
+        accessors: [{ bufferView: 0, componentType: 5126, count: 3, type: "VEC3", min: [0, 0, 0], max: [1, 1, 1] }],
+      }),
+      "include.pov": (uri) => `#include "${uri}"\nsphere { 0, 1 }\n`,
+      "image.pov": (uri) => `sphere { 0, 1 pigment { image_map { png "${uri}" } } }\n`,
+    };
+    const viewer = await view("--size", "32x24", "--spp", "1");
+    const page = await open(viewer.url);
+    await page.waitForSelector("#empty:not([hidden])");
+    const said = async (name, text) => {
+      await page.evaluate(() => {
+        document.getElementById("progress").textContent = "";
+        document.getElementById("warnings").replaceChildren();
+      });
+      await page.setInputFiles("#open", { name, mimeType: "text/plain", buffer: Buffer.from(text) });
+      await page.waitForFunction((wanted) => document.getElementById("name").textContent === wanted && /Waiting|done in/.test(document.getElementById("progress").textContent), name);
+      return page.evaluate(() => ["alert", "warnings"].map((id) => document.getElementById(id)).map((part) => (part.hidden ? "" : part.textContent)).join("\n"));
+    };
+    const up = (path) => `${"../".repeat(12)}${path.slice(1)}`;
+    const tried = [];
+    for (const [name, text] of Object.entries(ways)) {
+      for (const way of [(path) => path, up]) {
+        const told = [];
+        for (const file of [secret, join(folder, "outside-b.txt")]) {
+          told.push((await said(name, text(way(file)))).replaceAll(file.slice(1), "FILE").replaceAll(/dropped-?\w*|\/\d+\//g, "/N/"));
+        }
+        assert.equal(told[0], told[1], `${name}: whether there is such a file`);
+        assert.ok(!told[0].includes("0.5"), told[0]);
+        tried.push(`${name}: ${told[0]}`);
+      }
+    }
+    assert.equal(tried.length, 18);
+    assert.ok(tried.filter((text) => /no files but its own|unknown|cannot|not found|no such/i.test(text)).length >= 14, tried.join("\n\n"));
+    rmSync(secret);
     await viewer.stop();
   },
 });

@@ -1,4 +1,4 @@
-// How soon a page shows a change, and how many frames a second while the camera turns: node tests/measure.mjs SCENE…
+// How soon a page shows a picture and one without noise, from the start of the program; how soon it shows a change, and how many frames a second while the camera turns: node tests/measure.mjs SCENE…
 // The word "million" stands for a ball with waves, of a million triangles.
 import { spawn } from "node:child_process";
 import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
@@ -44,12 +44,15 @@ const folder = mkdtempSync(join(tmpdir(), "lumbre-measure-"));
 const scenes = process.argv.slice(2).map((word) => (word === "million" ? join(folder, "million.ply") : word));
 if (process.argv.includes("million")) million(join(folder, "million.ply"));
 for (const scene of scenes) {
+  const started = Date.now();
   const child = spawn(program, ["view", "--no-open", "--size", "1280x720", scene], { stdio: ["ignore", "pipe", "inherit"] });
   const url = await new Promise((done) => child.stdout.once("data", (bytes) => done(String(bytes).trim())));
   const page = await browser.newPage({ viewport: { width: 1600, height: 900 } });
   page.setDefaultTimeout(300_000);
   await page.goto(url);
   await page.waitForFunction(() => lumbreMeasured.spp > 0);
+  const [first, denoised] = await page.evaluate(() => [lumbreMeasured.first, lumbreMeasured.firstDenoised].map((at) => at && at + performance.timeOrigin));
+  const since = (at) => (at ? `${(at - started).toFixed(0)} ms` : "never");
   const box = await page.locator("#picture").boundingBox();
   const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
   // One change at a time, while the picture is being refined.
@@ -74,6 +77,7 @@ for (const scene of scenes) {
   ], from);
   await page.mouse.up();
   const ms = (numbers) => `${share(numbers, 0.5).toFixed(0)} ms (95 %: ${share(numbers, 0.95).toFixed(0)} ms, of ${numbers.length})`;
+  console.log(`${scene}: first picture after ${since(first)}, first without noise after ${since(denoised)}`);
   console.log(`${scene}, with a load of ${loadavg()[0].toFixed(1)}: first pixels after ${ms(single)}; while turning ${((1000 * frames) / (to - from)).toFixed(1)} frames/s, ${ms(dragged)}`);
   await page.close();
   child.kill("SIGINT");

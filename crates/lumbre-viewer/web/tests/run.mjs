@@ -9,6 +9,7 @@ import { fileURLToPath } from "node:url";
 import { chromium } from "playwright-core";
 import { PNG } from "pngjs";
 import { attacks } from "./attacks.mjs";
+import { habits } from "./habits.mjs";
 
 const here = dirname(fileURLToPath(import.meta.url));
 const root = join(here, "../../../..");
@@ -48,7 +49,7 @@ function model() {
     extensions: { KHR_materials_variants: { variants: [{ name: "day" }, { name: "night" }] } },
     scene: 0,
     scenes: [{ nodes: [0, 1] }],
-    nodes: [{ mesh: 0 }, { camera: 0, translation: [0, 0, 7] }],
+    nodes: [{ mesh: 0, name: "square" }, { camera: 0, translation: [0, 0, 7] }],
     cameras: [{ type: "perspective", perspective: { yfov: 0.8, znear: 0.1 } }],
     meshes: [{ primitives: [{ attributes: { POSITION: 0 }, indices: 1, material: 0, extensions: { KHR_materials_variants: { mappings } } }] }],
     materials: [colour(0.8, 0.3, 0.1), colour(0.1, 0.2, 0.7)],
@@ -116,6 +117,14 @@ async function view(...words) {
   return { url, stop: () => (child.kill("SIGINT"), ended) };
 }
 
+/** The picture that is rendered of these words, as the pixels of a page. */
+function rendered(...words) {
+  const out = join(folder, "wanted.png");
+  execFileSync(program, ["render", ...words, "-o", out, "-q"]);
+  const png = PNG.sync.read(readFileSync(out));
+  return [png.width, png.height, ...png.data];
+}
+
 const browser = await chromium.launch({ executablePath, args: ["--no-sandbox"] });
 const wrong = [];
 async function open(url, settings = {}) {
@@ -158,6 +167,7 @@ async function finds(page, what, rules = {}) {
 
 const tests = {
   ...attacks({ view, open, done, pixels, freePort, folder }),
+  ...habits({ view, open, done, pixels, becomes, click, rendered, program, folder, model }),
 
   async "it opens once and converges to the pixels that are rendered"() {
     const path = join(folder, "scene.pbrt");
@@ -171,7 +181,7 @@ const tests = {
     assert.deepEqual(await pixels(page), [rendered.width, rendered.height, ...rendered.data]);
     await page.click("#save-details > summary");
     const [download] = await Promise.all([page.waitForEvent("download"), page.click("#save-png")]);
-    assert.equal(download.suggestedFilename(), "picture.png");
+    assert.equal(download.suggestedFilename(), "scene.png");
     const saved = PNG.sync.read(readFileSync(await download.path()));
     assert.ok(saved.data.equals(rendered.data), "the picture that is saved is the same");
     // The same tab comes back; another one does not come in, by the address that was used or without.
@@ -183,6 +193,57 @@ const tests = {
       await other.waitForFunction(() => /does not know this page/.test(document.getElementById("alert").textContent));
       assert.equal(await other.isVisible("#picked table"), false);
     }
+    await viewer.stop();
+  },
+
+  async "a model is without noise from the first picture on, and ends as it is rendered"() {
+    const path = join(folder, "clean.glb");
+    writeFileSync(path, model());
+    const words = ["--size", "320x240", "--spp", "8", path];
+    const viewer = await view(...words);
+    const page = await open(viewer.url);
+    await done(page);
+    const { noisy, firstDenoised, first } = await page.evaluate(() => lumbreMeasured);
+    assert.equal(noisy, 0, "every frame is denoised, coarse ones too");
+    assert.ok(first > 0 && firstDenoised === first);
+    assert.deepEqual(await pixels(page), rendered(...words));
+    const clean = await pixels(page);
+    await page.click("#denoise");
+    await becomes(page, clean, false);
+    assert.ok(await page.evaluate(() => lumbreMeasured.noisy) > 1);
+    assert.deepEqual(await pixels(page), rendered("--denoise", "none", ...words));
+    await page.click("#denoise");
+    await becomes(page, clean, true);
+    await viewer.stop();
+  },
+
+  async "it renders to a noise target as render does, and tells how far it is within a pass"() {
+    const path = join(folder, "noise.pbrt");
+    writeFileSync(path, SCENE.replace("[0.5 0.6 0.7]", "[0.5 0.6 0.7] LightSource \"point\" \"point3 from\" [3 -4 2] \"rgb I\" [9 9 9]"));
+    const viewer = await view("--noise", "0.05", path);
+    const page = await open(viewer.url);
+    await done(page);
+    const wanted = rendered("--noise", "0.05", path);
+    assert.deepEqual(await pixels(page), wanted);
+    assert.equal(await page.inputValue("#noise-target"), "0.05");
+    assert.match(await page.textContent("#progress"), /noise 0\.0\d+ of 0\.05/);
+    // The page has its own target.
+    await page.fill("#noise-target", "0.1");
+    await page.keyboard.press("Tab");
+    await becomes(page, rendered("--noise", "0.1", path), true);
+    await page.fill("#noise-target", "0");
+    await page.keyboard.press("Tab");
+    // A long pass tells how far it is: many shares of one number of samples.
+    await page.fill("#spp", "100000");
+    await page.evaluate(() => {
+      globalThis.bars = new Set();
+      new MutationObserver(() => bars.add(document.getElementById("bar").value)).observe(document.getElementById("progress"), { childList: true, characterData: true, subtree: true });
+    });
+    await page.keyboard.press("Tab");
+    await page.waitForFunction(() => bars.size > 12);
+    const bars = await page.evaluate(() => [...globalThis.bars]);
+    assert.ok(bars.every((value) => value >= 0 && value < 1), String(bars));
+    assert.match(await page.textContent("#progress"), /\d+ % · .* left/);
     await viewer.stop();
   },
 
@@ -474,12 +535,12 @@ const tests = {
     const viewer = await view();
     const page = await open(viewer.url);
     await page.waitForSelector("#empty:not([hidden])");
-    assert.match(await page.textContent("#empty"), /Drop a \.glb here/);
+    assert.match(await page.textContent("#empty"), /Drop a file or a folder here/);
     const head = Buffer.alloc(12);
     head.write("glTF");
     await page.setInputFiles("#open", { name: "broken.glb", mimeType: "model/gltf-binary", buffer: head });
     await page.waitForFunction(() => !document.getElementById("alert").hidden);
-    assert.match(await page.textContent("#alert"), /dropped\.glb/);
+    assert.match(await page.textContent("#alert"), /broken\.glb/);
     await viewer.stop();
     const missing = spawnSync(program, ["view", "--no-open", join(folder, "missing.pbrt")], { encoding: "utf8" });
     assert.equal(missing.status, 4);
@@ -502,7 +563,7 @@ const tests = {
     const pictures = [rendered(), rendered("--frame", "1"), rendered("--frame", "1", "--variant", "night")];
     assert.equal(new Set(pictures.map(String)).size, 3, "they are different pictures");
     await becomes(page, pictures[0], true);
-    for (const [x, y, shape] of [[48, 32, "0 (mesh)"], [48, 60, "ground"]]) {
+    for (const [x, y, shape] of [[48, 32, "square (mesh)"], [48, 60, "ground"]]) {
       await click(page, x, y);
       await page.waitForFunction((wanted) => document.querySelector("#picked td")?.textContent === wanted, shape);
     }
@@ -542,7 +603,7 @@ const tests = {
           stage.dispatchEvent(new DragEvent(type, { dataTransfer: dropped, bubbles: true, cancelable: true }));
         }
       }, [...model()]);
-      await page.waitForFunction(() => document.getElementById("empty").hidden && document.getElementById("name").textContent === "dropped.glb");
+      await page.waitForFunction(() => document.getElementById("empty").hidden && document.getElementById("name").textContent === "chair.glb");
       await becomes(page, [png.width, png.height, ...png.data], true);
       assert.equal(await page.isHidden("#alert"), true);
       await viewer.stop();
@@ -566,7 +627,7 @@ const tests = {
       await click(page, x, y);
       await page.waitForFunction((distance) => {
         const rows = new Map([...document.querySelectorAll("#picked tr")].map((row) => [...row.children].map((cell) => cell.textContent)));
-        return rows.size === 3 && rows.get("Shape") === "0 (sphere)" && rows.get("Material") === "<img src=x onerror=evil()> (diffuse)"
+        return rows.size === 3 && rows.get("Shape") === "sphere 0" && rows.get("Material") === "<img src=x onerror=evil()> (diffuse)"
           && Math.abs(Number(rows.get("Distance")) / distance - 1) < 1e-5;
       }, toTheBall(x + 0.5, y + 0.5));
     }

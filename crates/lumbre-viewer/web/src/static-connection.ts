@@ -30,7 +30,7 @@ export function half(bits: number): number {
   return exponent === 0 ? sign * fraction * 2 ** -24 : sign * (1 + fraction / 1024) * 2 ** (exponent - 15);
 }
 
-export class AtRest {
+export class StaticConnection {
   private shown: ImageData | undefined;
   private values: DataView | undefined;
   private picks: DataView | undefined;
@@ -41,9 +41,9 @@ export class AtRest {
   }
 
   private async start(): Promise<void> {
-    this.listener.stood("open");
-    this.listener.told({ type: "scene", scene: this.data.scene });
-    this.listener.told({ type: "progress", doing: "done", ...this.data.progress });
+    this.listener.onOpen("edit");
+    this.listener.onMessage({ type: "scene", scene: this.data.scene });
+    this.listener.onMessage({ type: "progress", doing: "done", ...this.data.progress });
     await this.show("beauty");
     this.picks = await unpacked(this.data.picks.values);
   }
@@ -52,14 +52,15 @@ export class AtRest {
     return {
       name: this.data.name, has_scene: true, error: null, edit_error: null, camera: this.data.camera, sequence: 0, moved: false,
       placement: this.data.placement, fov: null, zoom: 1, size: null, channel, scale: 1, spp: this.data.progress.spp ?? null,
-      denoise: null, paused: false, exposure: 0, tone_map: null, false_colour: false, time: null, variant: null, settings: [],
+      noise: null, denoise: null, paused: false, exposure: 0, tone_map: null, false_colour: false,
+      map: "automatic", range: null, hidden: { shapes: [], others: false }, section: null, time: null, variant: null, settings: [],
     };
   }
 
   private async show(name: string): Promise<void> {
     const channel = this.data.channels.find((known) => known.name === name);
     if (!channel) return;
-    this.listener.told({ type: "state", ...this.state(name) });
+    this.listener.onMessage({ type: "state", ...this.state(name) });
     const bitmap = await createImageBitmap(new Blob([bytes(channel.png)], { type: "image/png" }));
     const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
     const drawing = canvas.getContext("2d");
@@ -70,7 +71,7 @@ export class AtRest {
     [this.shown, this.values] = [pixels, undefined];
     if (channel.values) this.values = await unpacked(channel.values);
     const spp = this.data.progress.spp ?? 0;
-    this.listener.framed({ width, height, fullWidth: width, fullHeight: height, spp, sequence: 0, isFull: true, isDone: true, pixels });
+    this.listener.onFrame({ width, height, fullWidth: width, fullHeight: height, spp, sequence: 0, isFull: true, isDone: true, isDenoised: false, low: 0, high: 0, pixels });
   }
 
   private pick(x: number, y: number, request: number): void {
@@ -78,7 +79,7 @@ export class AtRest {
     const at = 8 * (y * this.shown.width + x);
     const thing = this.data.picks.shapes[this.picks.getUint32(at, true) - 1];
     const hits = thing ? [{ ...thing, distance: this.picks.getFloat32(at + 4, true) }] : [];
-    this.listener.told({ type: "picked", request, x, y, ray: { hits } });
+    this.listener.onMessage({ type: "picked", request, x, y, ray: { hits } });
   }
 
   /** There is nobody to give one. */
@@ -103,19 +104,24 @@ export class AtRest {
         found.push([value(0), value(1), value(2)]);
       }
     }
-    this.listener.told({ type: "values", request: request ?? 0, x: x0, y: y0, width: columns, height: rows, values: found });
+    this.listener.onMessage({ type: "values", request: request ?? 0, x: x0, y: y0, width: columns, height: rows, values: found });
   }
 }
 
-/** What only a viewer can do is not offered. */
-export function hideWhatNeedsAViewer(): void {
-  const live = [
-    "pause", "reset", "exposure", "tone-map", "false-colour", "denoise", "spp", "scale", "edit-details", "camera-details",
-    "save-details", "help-open",
-  ];
-  for (const id of live) {
-    byId(id).hidden = true;
-    for (const label of document.querySelectorAll<HTMLElement>(`label[for="${id}"]`)) label.hidden = true;
+/** What changes something. */
+const CHANGES = [
+  "pause", "reset", "exposure", "tone-map", "false-colour", "map", "range-low", "range-high", "range-found", "denoise", "spp", "noise-target",
+  "scale", "edit-details", "camera-details", "tree-details", "light-details", "section-details", "open-more",
+];
+/** What else only a viewer can do. */
+const ASKS = ["save-details", "help-open", "measure-details"];
+
+/** What only a viewer can do is not offered; to who looks on, what changes something. */
+export function hideWhatNeedsAViewer(watches = false): void {
+  for (const id of watches ? [...CHANGES, "channel"] : [...CHANGES, ...ASKS]) {
+    byId(id).classList.add("gone");
+    for (const label of document.querySelectorAll<HTMLElement>(`label[for="${id}"]`)) label.classList.add("gone");
   }
+  if (watches) return;
   for (const option of document.querySelectorAll("option[value=ids], option[value=variance]")) option.remove();
 }
