@@ -3,7 +3,7 @@
 use anyhow::Result;
 use xtask::command::{self, root, run_with, succeeds};
 
-use crate::{book, page, proof, python};
+use crate::{book, bytes, page, proof, python};
 
 /// The version of cargo-deny that the gate was written for.
 const CARGO_DENY: &str = "0.20.2";
@@ -21,6 +21,7 @@ pub(crate) fn run() -> Result<()> {
     command::run("cargo", &["test", "--workspace", "--all-targets"])?;
     page::run()?;
     book::test()?;
+    bytes::test()?;
     command::run("cargo", &["test", "--workspace", "--doc"])?;
     python::test()?;
     run_with("cargo", &["doc", "--workspace", "--no-deps"], &[("RUSTDOCFLAGS", "--deny warnings")])?;
