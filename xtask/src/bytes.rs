@@ -51,10 +51,10 @@ impl Bytes {
     }
 }
 
-/// What is kept is what this machine makes.
-pub(crate) fn test() -> Result<()> {
+/// What is kept is what this machine makes, and what others do.
+pub(crate) fn test(others: &[String]) -> Result<()> {
     eprintln!("\n$ cargo xtask bytes");
-    Bytes { with: Vec::new(), update: false }.run()
+    Bytes { with: others.to_vec(), update: false }.run()
 }
 
 /// The tested program with every instruction set that this machine has, the best first.

@@ -6,6 +6,7 @@ use anyhow::Result;
 use clap::{Args, Parser, Subcommand};
 use xtask::command::{self, Profile};
 
+mod arm;
 mod bench;
 mod book;
 mod bytes;

@@ -13,7 +13,7 @@ pub(super) const WHOLE: &str = "`scenes/glass/glass.pbrt`, 6 samples in one run"
 pub(super) const RESUMED: &str = "the same, resumed from the checkpoint of the next program";
 pub(super) const MERGED: &str = "the same, merged of parts of all programs";
 /// The scene of both, small.
-const SHARED: &str = "scenes/glass/glass.pbrt --size 48x36 --spp 6";
+const SHARED: &str = "scenes/glass/glass.pbrt --size 48x36";
 const QUERIES: [&str; 4] = ["closest", "any", "all", "count"];
 const QUERIES_OF_POINTS: [&str; 3] = ["closest-point", "inside", "winding"];
 /// The middle of the pictures in the book.
@@ -98,14 +98,23 @@ impl Runs {
         ));
 
         let Some(shapes) = kinds.get("shape") else { bail!("no pictures of shapes") };
-        std::fs::write(root().join(FOLDER).join("rays.csv"), table_of(&["ox", "oy", "oz", "dx", "dy", "dz"], ray))?;
-        std::fs::write(root().join(FOLDER).join("points.csv"), table_of(&["x", "y", "z"], |next| point(next).into()))?;
+        std::fs::write(
+            root().join(FOLDER).join("rays.csv"),
+            table_of(&["ox", "oy", "oz", "dx", "dy", "dz"], ray),
+        )?;
+        std::fs::write(
+            root().join(FOLDER).join("points.csv"),
+            table_of(&["x", "y", "z"], |next| point(next).into()),
+        )?;
         for (list, queries) in [("rays", &QUERIES[..]), ("points", &QUERIES_OF_POINTS[..])] {
             for query in queries {
                 let run = |shape: &String| {
-                    Run::printing(&format!("cast {shape} --{list} {FOLDER}/{list}.csv --query {query} --quiet"))
+                    Run::printing(&format!(
+                        "cast {shape} --{list} {FOLDER}/{list}.csv --query {query} --quiet"
+                    ))
                 };
-                alone.push((format!("`cast --query {query}`, every shape"), shapes.iter().map(run).collect()));
+                alone
+                    .push((format!("`cast --query {query}`, every shape"), shapes.iter().map(run).collect()));
             }
         }
         let explain = |scene: &String| {
@@ -115,7 +124,7 @@ impl Runs {
         alone.push(("`explain --format json`, the book's scenes".to_owned(), explained));
         let math = examples()?.iter().map(|example| Run::printing("math --json").and(example)).collect();
         alone.push(("`math --json`, the book's examples".to_owned(), math));
-        alone.push((WHOLE.to_owned(), vec![picture(SHARED, "", "whole.exr")]));
+        alone.push((WHOLE.to_owned(), vec![picture(SHARED, "--spp 6", "whole.exr")]));
 
         let checkpoint = format!("--checkpoint {FOLDER}/picture.checkpoint");
         let mut begun = picture(SHARED, &format!("--spp 2 {checkpoint}"), "begun.exr");
@@ -123,11 +132,13 @@ impl Runs {
         Ok(Self {
             alone,
             begun,
-            resumed: picture(SHARED, &format!("{checkpoint} --resume"), "whole.exr"),
+            resumed: picture(SHARED, &format!("--spp 6 {checkpoint} --resume"), "whole.exr"),
             parts: ["0..1", "1..3", "3..5", "5..6"]
                 .iter()
                 .enumerate()
-                .map(|(i, samples)| picture(SHARED, &format!("--samples {samples}"), &format!("{i}.part")))
+                .map(|(i, samples)| {
+                    picture(SHARED, &format!("--spp 6 --samples {samples}"), &format!("{i}.part"))
+                })
                 .collect(),
             merged: (0..4)
                 .fold(Run::printing("merge --quiet"), |run, i| run.and(&format!("{FOLDER}/{i}.part")))
@@ -162,7 +173,8 @@ fn examples() -> Result<Vec<String>> {
     for page in files::with_ending(&root().join("docs"), "md")? {
         let text = std::fs::read_to_string(&page)?;
         let quoted = text.lines().filter_map(|line| line.strip_prefix("$ lumbre math '")?.split_once('\''));
-        examples.extend(quoted.filter(|(_, rest)| rest.is_empty()).map(|(expression, _)| expression.to_owned()));
+        examples
+            .extend(quoted.filter(|(_, rest)| rest.is_empty()).map(|(expression, _)| expression.to_owned()));
     }
     if examples.len() < 20 {
         bail!("{} examples of lumbre math in docs/", examples.len());

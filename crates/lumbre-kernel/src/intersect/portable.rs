@@ -32,21 +32,29 @@ pub(crate) type Neon = Plain<Neon16>;
 
 /// Vectors that the whole program may use.
 pub(crate) trait EverywhereThere: F32x16 {
-    /// What they are of.
-    const SET: Set;
     /// See [`Simd::GOES_ON_TOGETHER`].
     const GOES_ON_TOGETHER: bool = true;
+
+    /// What they are of.
+    fn isa() -> Isa;
 }
 
 impl EverywhereThere for Portable16 {
-    const SET: Set = Set::Portable;
+    #[inline]
+    fn isa() -> Isa {
+        Isa(Set::Portable)
+    }
 }
 
 #[cfg(target_arch = "aarch64")]
 impl EverywhereThere for Neon16 {
-    const SET: Set = Set::Neon;
     // As with AVX2, sixteen numbers take several registers.
     const GOES_ON_TOGETHER: bool = false;
+
+    #[inline]
+    fn isa() -> Isa {
+        Isa(Set::Neon)
+    }
 }
 
 // As the processor's instruction does it, which f32::max does not.
@@ -76,7 +84,7 @@ impl<W: EverywhereThere> Simd for Plain<W> {
 
     #[inline]
     fn isa() -> Isa {
-        Isa(W::SET)
+        W::isa()
     }
 
     #[inline]
