@@ -177,6 +177,7 @@ pub(crate) trait F32x16: Vector<Array = [f32; WIDE]> + Zeroable {
 /// The last eight of sixteen, as a mask of which the compiler knows nothing: where it does know, it shuffles numbers instead of reading each
 /// to where it belongs.
 #[derive(Clone, Copy)]
+#[cfg_attr(not(target_arch = "x86_64"), allow(dead_code, reason = "for AVX alone"))]
 pub(crate) struct LastEight(u32);
 
 impl LastEight {

@@ -26,6 +26,7 @@ pub(crate) struct FilterStart {
     pub(crate) mesh_origin: [f64; 4],
     /// The latter in single precision, if nothing is lost by that: numbers in single precision then differ from it by the same, to the
     /// bit, in either precision.
+    #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code, reason = "for AVX alone"))]
     pub(crate) single_mesh_origin: Option<[f32; 4]>,
     /// Tree units per unit of space.
     pub(crate) scale: f64,

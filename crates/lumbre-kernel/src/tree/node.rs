@@ -161,6 +161,7 @@ pub(crate) struct TreeSpace {
     /// How far from zero a ray may start on each axis to be one from nearby; negative where none may.
     pub(crate) near: f64,
     /// The origin, and a zero.
+    #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code, reason = "for AVX alone"))]
     pub(crate) padded_origin: [f64; 4],
     /// Of rays from nearby: by how much planes are moved, and by how much more for each unit of the ray's start.
     pub(crate) near_margin: f64,
