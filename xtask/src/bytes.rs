@@ -11,15 +11,13 @@ use clap::Args;
 use lumbre_simd::InstructionSet;
 use xtask::command::root;
 
-use runs::{Run, Runs};
+use runs::{FOLDER, Run, Runs};
 use table::Table;
 
 use crate::book;
 
 /// The page that has the table.
 const PAGE: &str = "docs/promises.md";
-/// Where programs write, from the root; all to the same names, which may stand in what they write.
-const FOLDER: &str = "target/bytes";
 
 /// Pictures of all scenes, answers to rays, results and explanations, as hashes: by this machine's instruction sets, and by other programs.
 #[derive(Args)]

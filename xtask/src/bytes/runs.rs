@@ -6,8 +6,10 @@ use std::path::Path;
 use anyhow::{Result, bail};
 use xtask::command::root;
 
-use super::FOLDER;
 use crate::files;
+
+/// Where programs write, from the root; all to the same names, which may stand in what they write.
+pub(super) const FOLDER: &str = "target/bytes";
 
 pub(super) const WHOLE: &str = "`scenes/glass/glass.pbrt`, 6 samples in one run";
 pub(super) const RESUMED: &str = "the same, resumed from the checkpoint of the next program";
