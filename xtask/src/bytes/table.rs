@@ -157,6 +157,7 @@ mod tests {
         }
         for row in [WHOLE, RESUMED, MERGED] {
             table.put(row, blake3::hash(b"picture"));
+            table.put(row, blake3::hash(b"picture"));
         }
         table
     }
