@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 
 use crate::Real;
 #[cfg(target_arch = "aarch64")]
-use crate::neon::OnNeon;
+use crate::neon::F32x4;
 #[cfg(target_arch = "x86_64")]
 use crate::x86::OnX86;
 
@@ -173,6 +173,12 @@ trait CompilationUnit: Job + Sized {
     #[inline(never)]
     fn run_scalar(self) -> Self::Output {
         self.run::<f32>()
+    }
+
+    #[cfg(target_arch = "aarch64")]
+    #[inline(never)]
+    fn run_neon(self) -> Self::Output {
+        self.run::<F32x4>()
     }
 }
 

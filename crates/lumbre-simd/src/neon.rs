@@ -6,19 +6,9 @@ use std::arch::aarch64::*;
 use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Neg, Not, Sub};
 
 use crate::indices::check_indices;
-use crate::{Double, Job, Mask, Real, Task, UInt};
+use crate::{Double, Mask, Real, Task, UInt};
 
-/// Jobs on NEON; a trait, so that each is compiled beside its own type.
-pub(crate) trait OnNeon: Job + Sized {
-    #[inline(never)]
-    fn run_neon(self) -> Self::Output {
-        self.run::<F32x4>()
-    }
-}
-
-impl<J: Job> OnNeon for J {}
-
-/// Tasks, alike.
+/// A trait, so that each task is compiled beside its own type.
 trait Called: Task<F32x4> {
     #[inline(never)]
     fn call_neon(self) -> Self::Output {
