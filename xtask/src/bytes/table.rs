@@ -199,6 +199,6 @@ mod tests {
         let kept = Kept::read(&std::fs::read_to_string(&file).unwrap()).unwrap();
         assert_eq!(kept.programs, ["three", "one", "two"]);
         assert_eq!(kept.rows[0].2, [true, false, false]);
-        assert_eq!(kept.rows[1].2, [true, true, false]);
+        assert_eq!(kept.rows[1].2, [true, true, true]);
     }
 }
