@@ -158,7 +158,7 @@ fn refuse(faults: &[String]) -> Result<()> {
 }
 
 /// The program that renders the pictures and runs the examples.
-fn program(quick: bool) -> Result<PathBuf> {
+pub(crate) fn program(quick: bool) -> Result<PathBuf> {
     if let Some(named) = std::env::var_os("LUMBRE_PROGRAM") {
         let named = PathBuf::from(named);
         return named.canonicalize().with_context(|| format!("cannot find {}", named.display()));

@@ -6,8 +6,10 @@ use anyhow::Result;
 use clap::{Args, Parser, Subcommand};
 use xtask::command::{self, Profile};
 
+mod arm;
 mod bench;
 mod book;
+mod bytes;
 mod check;
 mod field;
 mod files;
@@ -46,6 +48,8 @@ enum Task {
     Python,
     /// Builds the book of docs/ into target/book/html: renders its pictures, runs its examples, and tries its links.
     Book(book::Book),
+    /// The same bytes anywhere: hashes of pictures, answers, results and explanations, by instruction sets and programs.
+    Bytes(bytes::Bytes),
     /// Renders every scene under scenes/ to the picture beside it.
     Scenes {
         /// Only scenes whose path contains this.
@@ -109,6 +113,7 @@ fn main() -> Result<()> {
         Task::Check { since } => check::run(since.as_deref()),
         Task::Python => python::test(),
         Task::Book(book) => book.run(),
+        Task::Bytes(bytes) => bytes.run(),
         Task::Scenes { filter } => pictures::render_all(filter.as_deref()),
         Task::Assets(passed) => passed.hand_to_pictures("assets"),
         Task::Contact(passed) => passed.hand_to_pictures("contact"),

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use xtask::command::{self, root, run_with, succeeds};
 
-use crate::{book, page, proof, python};
+use crate::{arm, book, bytes, page, proof, python};
 
 /// The version of cargo-deny that the gate was written for.
 const CARGO_DENY: &str = "0.20.2";
@@ -21,6 +21,8 @@ pub(crate) fn run() -> Result<()> {
     command::run("cargo", &["test", "--workspace", "--all-targets"])?;
     page::run()?;
     book::test()?;
+    bytes::test(&[])?;
+    arm::test()?;
     command::run("cargo", &["test", "--workspace", "--doc"])?;
     python::test()?;
     run_with("cargo", &["doc", "--workspace", "--no-deps"], &[("RUSTDOCFLAGS", "--deny warnings")])?;
@@ -40,6 +42,7 @@ pub(crate) fn run_all() -> Result<()> {
     // What `run` does a part of.
     run_with("cargo", &["test", "--workspace", "--release"], &[("LUMBRE_LONG_TESTS", "1")])?;
     command::run("cargo", &["publish", "--workspace", "--dry-run"])?;
+    arm::test_all()?;
     if succeeds("cargo", &["+nightly", "miri", "--version"]) {
         proof::miri()?;
         proof::asan()

@@ -10,11 +10,11 @@ use crate::files::{Folder, answer};
 fn an_instruction_set_that_there_is_not_is_a_usage_error() {
     let folder = Folder::new();
     folder.write("scene.pbrt", "WorldBegin\nShape \"sphere\"\n");
-    for (value, status) in [("neon", 2), ("AVX2", 2), ("scalar", 0), ("avx2", 0), ("", 0)] {
+    for (value, status) in [("sse2", 2), ("AVX2", 2), ("neon", 0), ("scalar", 0), ("avx2", 0), ("", 0)] {
         let mut command = folder.command(&["info", "scene.pbrt"]);
         let (found, said) = answer(command.env("LUMBRE_SIMD", value).output().unwrap());
         assert_eq!(found, status, "{value}: {said}");
-        let is_said = said.contains(&format!("(found \"{value}\"; expected scalar, avx2 or avx512)"));
+        let is_said = said.contains(&format!("(found \"{value}\"; expected scalar, neon, avx2 or avx512)"));
         assert_eq!(is_said, status == 2, "{said}");
     }
 }

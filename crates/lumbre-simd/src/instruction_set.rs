@@ -6,6 +6,8 @@ use std::fmt;
 use std::sync::OnceLock;
 
 use crate::Real;
+#[cfg(target_arch = "aarch64")]
+use crate::neon::F32x4;
 #[cfg(target_arch = "x86_64")]
 use crate::x86::OnX86;
 
@@ -25,6 +27,8 @@ pub struct InstructionSet(Set);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 enum Set {
     Scalar,
+    #[cfg(target_arch = "aarch64")]
+    Neon,
     #[cfg(target_arch = "x86_64")]
     Avx2,
     #[cfg(target_arch = "x86_64")]
@@ -39,7 +43,7 @@ impl fmt::Display for UnknownInstructionSet {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "LUMBRE_SIMD names no instruction set (found \"{}\"; expected scalar, avx2 or avx512)",
+            "LUMBRE_SIMD names no instruction set (found \"{}\"; expected scalar, neon, avx2 or avx512)",
             self.0
         )
     }
@@ -53,8 +57,8 @@ impl InstructionSet {
 
     /// The best that this machine has and the environment allows. The first call looks, all others remember.
     ///
-    /// The environment variable `LUMBRE_SIMD` limits it: `scalar`, `avx2` or `avx512` is the best that may be chosen. A value that names none
-    /// of these limits nothing; a program reports it by [`InstructionSet::from_environment`].
+    /// The environment variable `LUMBRE_SIMD` limits it: `scalar`, `neon`, `avx2` or `avx512` is the best that may be chosen. A value that
+    /// names none of these limits nothing; a program reports it by [`InstructionSet::from_environment`].
     pub fn detect() -> Self {
         static BEST: OnceLock<InstructionSet> = OnceLock::new();
         *BEST.get_or_init(|| Self::from_environment().unwrap_or_else(|_| best_up_to(usize::MAX)))
@@ -71,13 +75,14 @@ impl InstructionSet {
         }
     }
 
-    /// The best that this machine has up to the one with this name.
+    /// The best that this machine has with no more lanes than the one with this name.
     ///
     /// # Errors
     /// If no instruction set has the name.
     pub fn limited_to(name: &str) -> Result<Self, UnknownInstructionSet> {
         match name {
             "scalar" => Ok(Self::SCALAR),
+            "neon" => Ok(best_up_to(4)),
             "avx2" => Ok(best_up_to(8)),
             "avx512" => Ok(best_up_to(16)),
             _ => Err(UnknownInstructionSet(name.to_owned())),
@@ -87,6 +92,9 @@ impl InstructionSet {
     /// All that this machine has, the best last, whatever the environment says.
     pub fn available() -> Vec<Self> {
         let mut all = vec![Self::SCALAR];
+        // Every processor of this architecture has it.
+        #[cfg(target_arch = "aarch64")]
+        all.push(Self(Set::Neon));
         #[cfg(target_arch = "x86_64")]
         {
             let has_avx2 = std::arch::is_x86_feature_detected!("avx2")
@@ -114,6 +122,8 @@ impl InstructionSet {
     pub fn name(self) -> &'static str {
         match self.0 {
             Set::Scalar => "scalar",
+            #[cfg(target_arch = "aarch64")]
+            Set::Neon => "neon",
             #[cfg(target_arch = "x86_64")]
             Set::Avx2 => "avx2",
             #[cfg(target_arch = "x86_64")]
@@ -125,6 +135,8 @@ impl InstructionSet {
     pub fn lanes(self) -> usize {
         match self.0 {
             Set::Scalar => 1,
+            #[cfg(target_arch = "aarch64")]
+            Set::Neon => 4,
             #[cfg(target_arch = "x86_64")]
             Set::Avx2 => 8,
             #[cfg(target_arch = "x86_64")]
@@ -137,6 +149,8 @@ impl InstructionSet {
     pub fn run<J: Job>(self, job: J) -> J::Output {
         match self.0 {
             Set::Scalar => job.run_scalar(),
+            #[cfg(target_arch = "aarch64")]
+            Set::Neon => job.run_neon(),
             // SAFETY: `available` alone makes this value, after finding on this machine all the features of `run_avx2`.
             #[cfg(target_arch = "x86_64")]
             Set::Avx2 => unsafe { job.run_avx2() },
@@ -159,6 +173,12 @@ trait CompilationUnit: Job + Sized {
     #[inline(never)]
     fn run_scalar(self) -> Self::Output {
         self.run::<f32>()
+    }
+
+    #[cfg(target_arch = "aarch64")]
+    #[inline(never)]
+    fn run_neon(self) -> Self::Output {
+        self.run::<F32x4>()
     }
 }
 

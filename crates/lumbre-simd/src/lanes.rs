@@ -262,7 +262,7 @@ pub trait Real:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
-    /// The number of lanes: 1, 8 or 16.
+    /// The number of lanes: 1, 4, 8 or 16.
     const LANES: usize;
     /// A truth value in each lane.
     type Mask: Mask;

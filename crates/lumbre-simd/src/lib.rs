@@ -14,9 +14,13 @@
 //! Every operation gives the same bits in each lane at every instruction set, NaN aside: it is NaN everywhere, but its sign and payload are
 //! unspecified. Comparisons with NaN are false (`simd_ne` is true), and `simd_min(a, b)` is `if a < b { a } else { b }`.
 
+#[cfg(any(target_arch = "aarch64", target_arch = "x86_64"))]
+mod indices;
 mod instruction_set;
 mod lanes;
 pub mod math;
+#[cfg(target_arch = "aarch64")]
+mod neon;
 pub mod random;
 mod scalar;
 mod v3;

@@ -7,6 +7,8 @@ use lumbre_geometry::Ray;
 
 use super::isa::{Isa, Set};
 use super::operations::Simd;
+#[cfg(target_arch = "aarch64")]
+use super::portable::Neon;
 use super::portable::Portable;
 #[cfg(target_arch = "x86_64")]
 use super::x86::X86;
@@ -29,6 +31,12 @@ trait CompilationUnit {
     #[inline(never)]
     fn run_portable<T: Dispatch>(task: T) -> T::Output {
         task.run::<Portable>()
+    }
+
+    #[cfg(target_arch = "aarch64")]
+    #[inline(never)]
+    fn run_neon<T: Dispatch>(task: T) -> T::Output {
+        task.run::<Neon>()
     }
 }
 
@@ -61,6 +69,8 @@ impl Isa {
     pub(crate) fn run_with_vectors<T: Dispatch>(self, task: T) -> T::Output {
         match self.0 {
             Set::Portable => unreachable!("who calls it asks `has_vectors`"),
+            #[cfg(target_arch = "aarch64")]
+            Set::Neon => T::run_neon(task),
             #[cfg(target_arch = "x86_64")]
             // SAFETY: `all` alone makes this value, after finding on this machine all the features of `run_avx2`.
             Set::Avx2 => unsafe { T::run_avx2(task) },
@@ -81,6 +91,8 @@ impl Isa {
     pub(crate) fn run_beside<H, T: Dispatch>(self, task: T) -> T::Output {
         match self.0 {
             Set::Portable => H::run_portable(task),
+            #[cfg(target_arch = "aarch64")]
+            Set::Neon => H::run_neon(task),
             #[cfg(target_arch = "x86_64")]
             // SAFETY: `all` alone makes this value, after finding on this machine all the features of `run_avx2`.
             Set::Avx2 => unsafe { H::run_avx2(task) },
@@ -152,6 +164,8 @@ impl Isa {
     pub(crate) fn dispatched<Q: RayQuery>(self) -> DispatchedQuery<Q::Answer, Q::Ray> {
         DispatchedQuery(match self.0 {
             Set::Portable => Q::ask::<Portable>,
+            #[cfg(target_arch = "aarch64")]
+            Set::Neon => Q::ask::<Neon>,
             #[cfg(target_arch = "x86_64")]
             Set::Avx2 => Q::ask_avx2,
             #[cfg(target_arch = "x86_64")]

@@ -2,6 +2,8 @@
 
 use std::sync::OnceLock;
 
+use lumbre_simd::InstructionSet;
+
 /// An instruction set that this machine has: there is no other way to one than asking it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Isa(pub(super) Set);
@@ -9,6 +11,8 @@ pub(crate) struct Isa(pub(super) Set);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Set {
     Portable,
+    #[cfg(target_arch = "aarch64")]
+    Neon,
     #[cfg(target_arch = "x86_64")]
     Avx2,
     #[cfg(target_arch = "x86_64")]
@@ -16,15 +20,21 @@ pub(super) enum Set {
 }
 
 impl Isa {
-    /// The best that this machine has.
+    /// The best that this machine has and the environment variable `LUMBRE_SIMD` allows: see [`InstructionSet::detect`].
     pub(crate) fn best() -> Self {
         static BEST: OnceLock<Isa> = OnceLock::new();
-        *BEST.get_or_init(|| Self::all().pop().expect("one at least"))
+        *BEST.get_or_init(|| {
+            let most = InstructionSet::detect().lanes();
+            Self::all().into_iter().rfind(|isa| isa.lanes() <= most).expect("the portable one at least")
+        })
     }
 
     /// All that this machine has, the best last.
     pub(crate) fn all() -> Vec<Self> {
         let mut all = vec![Self(Set::Portable)];
+        // Every processor of this architecture has it.
+        #[cfg(target_arch = "aarch64")]
+        all.push(Self(Set::Neon));
         #[cfg(target_arch = "x86_64")]
         {
             let has_avx2 = std::arch::is_x86_feature_detected!("avx2")
@@ -46,6 +56,19 @@ impl Isa {
             }
         }
         all
+    }
+
+    /// How many numbers a register holds: for whoever orders them, as [`InstructionSet::lanes`].
+    fn lanes(self) -> usize {
+        match self.0 {
+            Set::Portable => 1,
+            #[cfg(target_arch = "aarch64")]
+            Set::Neon => 4,
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx2 => 8,
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx512 => 16,
+        }
     }
 
     /// Whether there are vectors of eight numbers.

@@ -1,4 +1,7 @@
-//! Plain loops over arrays, for any machine.
+//! Rays one number after the other, and what is many at a time by vectors that need no features beyond those of the architecture: those
+//! for any machine, and those of NEON.
+
+use std::marker::PhantomData;
 
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
@@ -11,15 +14,48 @@ use crate::intersect::box_ray::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs}
 use crate::intersect::f32_ray::F32Ray;
 use crate::intersect::watertight::{BlockRay, EdgeTest, HeightRange, Inside, Shear, edge_test};
 use crate::ray32::Ray32;
-use crate::simd::portable::{Portable8, Portable16};
-use crate::simd::{F32x8, Row, Vector, WIDE};
+#[cfg(target_arch = "aarch64")]
+use crate::simd::neon::Neon16;
+use crate::simd::portable::Portable16;
+use crate::simd::{F32x8, F32x16, Row, Vector, WIDE};
 use crate::tree::BLOCK;
 use crate::tree::Corners;
 use crate::tree::filter_start::FilterStart;
 use crate::tree::node::TreeSpace;
 use crate::tree::triangle_block::{TriangleBlock, shared_row};
 
-pub(crate) struct Portable;
+/// With these vectors.
+pub(crate) struct Plain<W>(PhantomData<W>);
+pub(crate) type Portable = Plain<Portable16>;
+#[cfg(target_arch = "aarch64")]
+pub(crate) type Neon = Plain<Neon16>;
+
+/// Vectors that the whole program may use.
+pub(crate) trait EverywhereThere: F32x16 {
+    /// See [`Simd::GOES_ON_TOGETHER`].
+    const GOES_ON_TOGETHER: bool = true;
+
+    /// What they are of.
+    fn isa() -> Isa;
+}
+
+impl EverywhereThere for Portable16 {
+    #[inline]
+    fn isa() -> Isa {
+        Isa(Set::Portable)
+    }
+}
+
+#[cfg(target_arch = "aarch64")]
+impl EverywhereThere for Neon16 {
+    // As with AVX2, sixteen numbers take several registers.
+    const GOES_ON_TOGETHER: bool = false;
+
+    #[inline]
+    fn isa() -> Isa {
+        Isa(Set::Neon)
+    }
+}
 
 // As the processor's instruction does it, which f32::max does not.
 #[inline(always)]
@@ -41,13 +77,14 @@ fn local(start: &FilterStart, ray: &Ray32) -> [f32; 4] {
 }
 
 // There is no instruction set to be taken on: these are ordinary functions, and the compiler chooses where they go.
-impl Simd for Portable {
-    type F32x8 = Portable8;
-    type F32x16 = Portable16;
+impl<W: EverywhereThere> Simd for Plain<W> {
+    type F32x8 = W::Half;
+    type F32x16 = W;
+    const GOES_ON_TOGETHER: bool = W::GOES_ON_TOGETHER;
 
     #[inline]
     fn isa() -> Isa {
-        Isa(Set::Portable)
+        W::isa()
     }
 
     #[inline]
@@ -151,15 +188,25 @@ impl Simd for Portable {
     }
 
     #[inline]
-    fn sheared_corners<S: Shears>(block: &TriangleBlock, ray: &S) -> [[Portable8; 3]; 3] {
+    fn sheared_corners<S: Shears>(block: &TriangleBlock, ray: &S) -> [[W::Half; 3]; 3] {
+        let mut sheared = [[W::Half::splat(0.0); 3]; 3];
         let [kx, ky, kz] = ray.axes().order();
-        let mut room = CornerScratch::new();
-        let corners = Self::corners(block, &mut room);
-        let mut sheared = [[Portable8::splat(0.0); 3]; 3];
-        for corner in 0..3 {
-            let own = [kx, ky, kz].map(|axis| Portable8::load(&corners[axis][corner]));
-            let [x, y, z] = ray.apply(own);
-            (sheared[0][corner], sheared[1][corner], sheared[2][corner]) = (x, y, z);
+        if block.is_unshared() {
+            let own = block.own_corners();
+            for corner in 0..3 {
+                let vertices = [kx, ky, kz].map(|axis| W::Half::load(&own[axis][corner]));
+                let [x, y, z] = ray.apply(vertices);
+                (sheared[0][corner], sheared[1][corner], sheared[2][corner]) = (x, y, z);
+            }
+            return sheared;
+        }
+        let words = block.words();
+        let rows = [kx, ky, kz].map(|axis| words[shared_row(axis)..].first_chunk().expect("sixteen"));
+        let [x, y, z] = ray.apply(rows.map(W::load));
+        for (corner, places) in block.corners().into_iter().enumerate() {
+            sheared[0][corner] = x.at_places(places);
+            sheared[1][corner] = y.at_places(places);
+            sheared[2][corner] = z.at_places(places);
         }
         sheared
     }

@@ -2,6 +2,8 @@
 
 #![allow(unsafe_code)]
 
+#[cfg(target_arch = "aarch64")]
+pub(crate) mod neon;
 pub(crate) mod portable;
 pub(crate) mod vector;
 #[cfg(target_arch = "x86_64")]
@@ -61,6 +63,15 @@ pub(crate) fn fetch<T>(value: &T) {
             _mm_prefetch::<_MM_HINT_T0>(start.cast::<i8>().wrapping_add(64 * line));
         }
     }
-    #[cfg(not(all(target_arch = "x86_64", not(miri))))]
+    #[cfg(all(target_arch = "aarch64", not(miri)))]
+    for line in 0..size_of::<T>().div_ceil(64) {
+        let start: *const T = value;
+        let start = start.cast::<i8>().wrapping_add(64 * line);
+        // SAFETY: a prefetch reads nothing that the program could notice.
+        unsafe {
+            std::arch::asm!("prfm pldl1keep, [{0}]", in(reg) start, options(readonly, nostack, preserves_flags));
+        }
+    }
+    #[cfg(not(all(any(target_arch = "aarch64", target_arch = "x86_64"), not(miri))))]
     let _ = value;
 }

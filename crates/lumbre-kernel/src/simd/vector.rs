@@ -129,6 +129,17 @@ pub(crate) trait F32x16: Vector<Array = [f32; WIDE]> + Zeroable {
     fn lanes_in_bits(self) -> Self;
     fn bits(self) -> [i32; WIDE];
 
+    /// Eight of them, each by its place, of four bits; the first in the lowest.
+    #[inline(always)]
+    fn at_places(self, places: u32) -> Self::Half {
+        let all = self.to_array();
+        let mut eight = [0.0; 8];
+        for (lane, one) in eight.iter_mut().enumerate() {
+            *one = all[(places >> (4 * lane)) as usize % WIDE];
+        }
+        Self::Half::load(&eight)
+    }
+
     /// Of the first four that the mask chooses, if there are as many, the bits above and the word in the same place below.
     #[inline(always)]
     fn first_four(self, mask: u32, words: &[u32; WIDE]) -> [i64; 4] {
@@ -166,6 +177,7 @@ pub(crate) trait F32x16: Vector<Array = [f32; WIDE]> + Zeroable {
 /// The last eight of sixteen, as a mask of which the compiler knows nothing: where it does know, it shuffles numbers instead of reading each
 /// to where it belongs.
 #[derive(Clone, Copy)]
+#[cfg_attr(not(target_arch = "x86_64"), allow(dead_code, reason = "for AVX alone"))]
 pub(crate) struct LastEight(u32);
 
 impl LastEight {

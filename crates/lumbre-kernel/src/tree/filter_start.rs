@@ -27,6 +27,7 @@ pub(crate) struct FilterStart {
     pub(crate) mesh_origin: [f64; 4],
     /// The latter in single precision, if that is exact: then the difference to a single-precision number has the same
     /// bits in either precision.
+    #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code, reason = "for AVX alone"))]
     pub(crate) single_mesh_origin: Option<[f32; 4]>,
     /// Tree units per unit of space.
     pub(crate) scale: f64,

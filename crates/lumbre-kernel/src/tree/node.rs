@@ -163,6 +163,7 @@ pub(crate) struct TreeSpace {
     /// How far from zero a ray may start on each axis to count as nearby; negative if no ray does.
     pub(crate) near: f64,
     /// The origin, padded with a zero.
+    #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code, reason = "for AVX alone"))]
     pub(crate) padded_origin: [f64; 4],
     /// For rays from nearby, by how much planes are moved: a constant, and a factor of the ray's start.
     pub(crate) near_margin: f64,

@@ -3,7 +3,8 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Neg, Not, Sub};
 
-use super::{Called, check_indices, operators, operators_by_two, registers};
+use super::{Called, operators, operators_by_two, registers};
+use crate::indices::check_indices;
 use crate::{Double, Mask, Real, Task, UInt};
 
 /// All bits of a lane are set, or none.

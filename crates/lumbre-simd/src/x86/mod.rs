@@ -1,4 +1,4 @@
-//! Eight lanes of AVX2 and sixteen of AVX-512: with `instruction_set`, the fence around this crate's `unsafe`.
+//! Eight lanes of AVX2 and sixteen of AVX-512: with `instruction_set` and `neon`, the fence around this crate's `unsafe`.
 //!
 //! The types of lanes are private. Code reaches them as the `R` of a [`Job`] alone, below [`OnX86::run_avx2`] and [`OnX86::run_avx512`], so
 //! that wherever a method of theirs runs, the machine has the instructions.
@@ -91,17 +91,3 @@ macro_rules! operators_by_two {
 }
 
 use {operators, operators_by_two, registers};
-
-/// Checks the largest index of a gather. Instructions take indices as signed numbers, hence the second bound.
-#[inline(always)]
-fn check_indices(largest: u32, len: usize) {
-    if largest as usize >= len.min(1 << 31) {
-        refuse_index(largest, len);
-    }
-}
-
-#[cold]
-#[inline(never)]
-fn refuse_index(index: u32, len: usize) -> ! {
-    panic!("index {index} of a table of {len}");
-}
