@@ -35,6 +35,20 @@ pub fn succeeds(program: &str, arguments: &[&str]) -> bool {
     Command::new(program).args(arguments).current_dir(root()).output().is_ok_and(|out| out.status.success())
 }
 
+/// What a program prints, which runs at the root; an error when it fails, with what it says then.
+pub fn output(program: &str, arguments: &[&str]) -> Result<String> {
+    let output = Command::new(program)
+        .args(arguments)
+        .current_dir(root())
+        .output()
+        .with_context(|| format!("cannot start {program}"))?;
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr);
+        bail!("{program} {} failed: {}", arguments.join(" "), said.trim());
+    }
+    String::from_utf8(output.stdout).with_context(|| format!("{program} prints no text"))
+}
+
 /// How cargo builds what is run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Profile {

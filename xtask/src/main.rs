@@ -9,6 +9,7 @@ use xtask::command::{self, Profile};
 mod bench;
 mod book;
 mod check;
+mod dist;
 mod field;
 mod files;
 mod fuzz;
@@ -46,6 +47,9 @@ enum Task {
     Python,
     /// Builds the book of docs/ into target/book/html: renders its pictures, runs its examples, and tries its links.
     Book(book::Book),
+    /// Makes what is handed out into target/dist: the program for each platform, wheels, a Debian package, the book, a list of what they are
+    /// made of, and sums. What cannot be made on this machine is named, with what it lacks.
+    Dist(dist::Dist),
     /// Renders every scene under scenes/ to the picture beside it.
     Scenes {
         /// Only scenes whose path contains this.
@@ -109,6 +113,7 @@ fn main() -> Result<()> {
         Task::Check { since } => check::run(since.as_deref()),
         Task::Python => python::test(),
         Task::Book(book) => book.run(),
+        Task::Dist(dist) => dist.run(),
         Task::Scenes { filter } => pictures::render_all(filter.as_deref()),
         Task::Assets(passed) => passed.hand_to_pictures("assets"),
         Task::Contact(passed) => passed.hand_to_pictures("contact"),

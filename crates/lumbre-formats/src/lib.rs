@@ -8,6 +8,7 @@ pub mod atomic;
 pub mod budget;
 mod bytes;
 mod contained;
+mod devices;
 pub mod diagnostic;
 pub mod gltf;
 pub mod ies;
