@@ -30,6 +30,16 @@ pub fn run_with(program: &str, arguments: &[&str], environment: &[(&str, &str)])
     Ok(())
 }
 
+/// Runs a command as it is, and fails when it does.
+pub fn run_command(command: &mut Command) -> Result<()> {
+    eprintln!("\n$ {command:?}");
+    let status = command.status().with_context(|| format!("cannot start {command:?}"))?;
+    if !status.success() {
+        bail!("{command:?} failed: {status}");
+    }
+    Ok(())
+}
+
 /// Whether a program starts and ends well, without showing what it says.
 pub fn succeeds(program: &str, arguments: &[&str]) -> bool {
     Command::new(program).args(arguments).current_dir(root()).output().is_ok_and(|out| out.status.success())

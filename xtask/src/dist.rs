@@ -13,7 +13,8 @@ use crate::book::Book;
 use crate::files;
 
 use notices::Dependencies;
-use target::{TARGETS, Target};
+use target::TARGETS;
+pub(crate) use target::Target;
 use tools::Tools;
 
 mod debian;

@@ -19,6 +19,7 @@ mod proof;
 mod python;
 mod race;
 mod suite;
+mod wine;
 
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", about = "What the project runs on itself")]
@@ -33,7 +34,7 @@ enum Task {
     /// Installs what it needs.
     Test {
         /// Also what takes hours, and is due before a release: the longest tests, the proofs, Miri, the address sanitizer, and every
-        /// package compiled by itself. The nightly toolchain is needed for some, which are named where it is missing.
+        /// package compiled by itself, and the program's as on Windows, under Wine. What some need is named where it is missing.
         #[arg(long)]
         all: bool,
     },

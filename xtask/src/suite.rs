@@ -3,7 +3,7 @@
 use anyhow::Result;
 use xtask::command::{self, root, run_with, succeeds};
 
-use crate::{book, page, proof, python};
+use crate::{book, page, proof, python, wine};
 
 /// The version of cargo-deny that the gate was written for.
 const CARGO_DENY: &str = "0.20.2";
@@ -40,6 +40,7 @@ pub(crate) fn run_all() -> Result<()> {
     // What `run` does a part of.
     run_with("cargo", &["test", "--workspace", "--release"], &[("LUMBRE_LONG_TESTS", "1")])?;
     command::run("cargo", &["publish", "--workspace", "--dry-run"])?;
+    wine::test()?;
     if succeeds("cargo", &["+nightly", "miri", "--version"]) {
         proof::miri()?;
         proof::asan()

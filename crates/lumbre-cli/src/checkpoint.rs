@@ -10,6 +10,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use lumbre::formats::is_device_name;
 use lumbre::{Job, Part, PartError, RenderState};
 
 use crate::failure::Failure;
@@ -305,12 +306,10 @@ fn real_path(path: &Path) -> PathBuf {
 
 /// Refuses what is there and is no regular file: a folder, a pipe, a device.
 fn refuse_special(path: &Path, what: &str) -> Result<(), Failure> {
-    match fs::metadata(path) {
-        Ok(meta) if !meta.is_file() => {
-            Err(Failure::Io(format!("{}: it is not a regular file, as {what} is", path.display())))
-        }
-        _ => Ok(()),
+    if is_device_name(path) || fs::metadata(path).is_ok_and(|meta| !meta.is_file()) {
+        return Err(Failure::Io(format!("{}: it is not a regular file, as {what} is", path.display())));
     }
+    Ok(())
 }
 
 /// Reads a part, within this memory.

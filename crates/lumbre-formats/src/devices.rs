@@ -26,6 +26,11 @@ pub(crate) fn device(path: &Path) -> Option<Device> {
     device_of_name(&path.file_name()?.to_string_lossy())
 }
 
+/// Whether Windows opens a device by this path, in place of a file; elsewhere no name is that of a device.
+pub fn is_device_name(path: &Path) -> bool {
+    device(path).is_some()
+}
+
 /// The device of a name without folders, by the rules of Microsoft, "Naming Files, Paths, and Namespaces": endings, and spaces before
 /// them, make no difference.
 fn device_of_name(name: &str) -> Option<Device> {

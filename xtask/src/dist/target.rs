@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::Result;
 use xtask::command::{self, root, succeeds};
 
 use super::tools::Tools;
@@ -14,7 +14,7 @@ pub(super) const GLIBC: &str = "2.28";
 
 /// A platform.
 #[derive(Debug)]
-pub(super) struct Target {
+pub(crate) struct Target {
     /// What files are named after.
     pub name: &'static str,
     /// Rust's name.
@@ -60,6 +60,11 @@ pub(super) const TARGETS: &[Target] = &[
 ];
 
 impl Target {
+    /// Windows.
+    pub(crate) fn windows() -> &'static Self {
+        TARGETS.iter().find(|target| target.is_windows()).expect("it is in the table")
+    }
+
     /// Whether it is Windows.
     pub(super) fn is_windows(&self) -> bool {
         self.triple.contains("windows")
@@ -78,33 +83,42 @@ impl Target {
         linked.iter().map(|&(name, path)| Ok((name, tools.licence(path)?))).collect()
     }
 
-    /// Builds the program and says where it lies, or what that needs.
-    pub(super) fn program(&self, tools: &Tools, profile: &str) -> Result<Result<PathBuf, String>> {
-        let toolchain = match self.toolchain() {
-            Ok(toolchain) => toolchain,
-            Err(lacks) => return Ok(Err(lacks)),
-        };
-        let mut command = match self.linker {
-            Linker::Zig => {
+    /// A command of cargo for it, by Zig's linker where tools have it, or what is to be installed.
+    ///
+    /// # Errors
+    /// What is to be installed.
+    pub(crate) fn cargo(&self, subcommand: &str, tools: Option<&Tools>) -> Result<Command, String> {
+        let toolchain = self.toolchain()?;
+        let mut command = match tools {
+            Some(tools) if self.linker == Linker::Zig => {
                 let mut command = tools.command("cargo-zigbuild");
                 command.arg("zigbuild");
                 command
             }
-            Linker::MinGw | Linker::Own => {
+            _ => {
                 let mut command = Command::new(&toolchain.cargo);
-                command.arg("build");
+                command.arg(subcommand);
                 command
             }
         };
         toolchain.prepare(&mut command, tools);
-        command.args(["--package", "lumbre-cli", "--bin", "lumbre", "--profile", profile]);
         let versioned = format!("{}.{GLIBC}", self.triple);
         let has_glibc = self.linker == Linker::Zig && self.triple.ends_with("gnu");
         command.args(["--target", if has_glibc { &versioned } else { self.triple }]);
         if toolchain.builds_std {
             command.arg("-Zbuild-std");
         }
-        run(&mut command)?;
+        Ok(command)
+    }
+
+    /// Builds the program and says where it lies, or what that needs.
+    pub(super) fn program(&self, tools: &Tools, profile: &str) -> Result<Result<PathBuf, String>> {
+        let mut command = match self.cargo("build", Some(tools)) {
+            Ok(command) => command,
+            Err(lacks) => return Ok(Err(lacks)),
+        };
+        command.args(["--package", "lumbre-cli", "--bin", "lumbre", "--profile", profile]);
+        command::run_command(&mut command)?;
         let folder = if profile == "dev" { "debug" } else { profile };
         let name = if self.is_windows() { "lumbre.exe" } else { "lumbre" };
         Ok(Ok(command::target().join(self.triple).join(folder).join(name)))
@@ -117,7 +131,7 @@ impl Target {
             Err(lacks) => return Ok(Err(lacks)),
         };
         let mut command = tools.command("maturin");
-        toolchain.prepare(&mut command, tools);
+        toolchain.prepare(&mut command, Some(tools));
         command.args(["build", "--manifest-path", "crates/lumbre-python/Cargo.toml", "--profile", profile]);
         command.args(["--target", self.triple, "--out"]).arg(folder);
         if self.linker == Linker::Zig {
@@ -126,7 +140,7 @@ impl Target {
         if toolchain.builds_std {
             command.args(["-Z", "build-std"]);
         }
-        run(&mut command)?;
+        command::run_command(&mut command)?;
         Ok(Ok(()))
     }
 
@@ -168,13 +182,13 @@ impl Toolchain {
     }
 
     /// Has cargo, or what calls it, take this tool chain.
-    fn prepare(&self, command: &mut Command, tools: &Tools) {
+    fn prepare(&self, command: &mut Command, tools: Option<&Tools>) {
         // `cargo run`, which started this program, has these lead to its own.
         for variable in ["LD_LIBRARY_PATH", "CARGO", "RUSTC"] {
             command.env_remove(variable);
         }
         command.current_dir(root()).env("CARGO_TARGET_DIR", command::target());
-        let mut folders = vec![tools.folder()];
+        let mut folders: Vec<PathBuf> = tools.map(Tools::folder).into_iter().collect();
         if Path::new(&self.cargo).is_absolute() {
             command.env("CARGO", &self.cargo).env("RUSTC", &self.rustc);
             folders.extend(Path::new(&self.cargo).parent().map(Path::to_owned));
@@ -203,11 +217,4 @@ fn has_library(rustc: &str, triple: &str) -> bool {
 fn has_sources(rustc: &str) -> bool {
     let root = command::output(rustc, &["--print", "sysroot"]);
     root.is_ok_and(|root| Path::new(root.trim()).join("lib/rustlib/src/rust/library/std").is_dir())
-}
-
-fn run(command: &mut Command) -> Result<()> {
-    eprintln!("\n$ {command:?}");
-    let status = command.status().with_context(|| format!("cannot start {command:?}"))?;
-    ensure!(status.success(), "{command:?} failed: {status}");
-    Ok(())
 }

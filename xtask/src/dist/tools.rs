@@ -21,7 +21,7 @@ for path in sorted(pathlib.Path(sys.argv[1]).iterdir()):
 
 /// The environment.
 #[derive(Debug)]
-pub(super) struct Tools {
+pub(crate) struct Tools {
     environment: PathBuf,
 }
 
