@@ -44,7 +44,12 @@ impl Identity {
                 // A link to nothing is written through.
                 let folder = folder_of(path);
                 let to = fs::read_link(path).map_or_else(|_| path.to_owned(), |to| folder.join(to));
-                Some(Self::Path(folder_of(&to).canonicalize().ok()?.join(to.file_name()?)))
+                let name = to.file_name()?;
+                // There, names that differ by case alone are one.
+                let is_any_case = cfg!(any(windows, target_os = "macos"));
+                let name =
+                    if is_any_case { name.to_string_lossy().to_lowercase().into() } else { name.to_owned() };
+                Some(Self::Path(folder_of(&to).canonicalize().ok()?.join(name)))
             }
         }
     }

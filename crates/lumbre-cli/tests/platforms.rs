@@ -210,6 +210,9 @@ mod windows {
             assert_eq!((code, said.contains("it is an input")), (2, true), "{output}: {said}");
         }
         assert_eq!(fs::read(folder.path("images\\skin.png")).unwrap(), before);
+        // Nor are two outputs one file by their case.
+        let (code, said) = folder.lumbre(&["render", "a.pbrt", "-o", "x.png", "--stats", "X.PNG"]);
+        assert_eq!((code, said.contains("both the picture and its statistics")), (2, true), "{said}");
     }
 
     #[test]
