@@ -126,9 +126,12 @@ impl Dist {
     }
 }
 
-/// The manual pages and completions of the program, in folders of these names.
+/// The manual pages and completions of the program, in folders of these names; by the program that `LUMBRE_PROGRAM` names, if any.
 fn pages() -> Result<PathBuf> {
-    let program = command::tested_program()?;
+    let program = match std::env::var_os("LUMBRE_PROGRAM") {
+        Some(named) => PathBuf::from(named),
+        None => command::tested_program()?,
+    };
     let program = program.to_string_lossy();
     let pages = command::target().join("dist-pages");
     if pages.exists() {
