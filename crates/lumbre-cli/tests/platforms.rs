@@ -154,6 +154,7 @@ mod windows {
         assert_eq!(folder.names(), ["a.pbrt", "a.png", "images", "meshes"]);
     }
 
+    /// From Windows 10 on; Wine cannot.
     #[test]
     fn a_picture_is_replaced_while_a_program_that_allows_it_has_it_open() {
         let folder = Folder::new();
@@ -161,6 +162,10 @@ mod windows {
         let expected = picture(&folder, "a.pbrt", "a.png");
         fs::write(folder.path("b.png"), "the old picture").unwrap();
         let held = fs::File::open(folder.path("b.png")).unwrap();
+        fs::write(folder.path("c.png"), "another").unwrap();
+        if fs::rename(folder.path("c.png"), folder.path("b.png")).is_err() {
+            return eprintln!("left out: this system replaces no open file");
+        }
         assert!(picture_over(&folder) == expected);
         assert_eq!(std::io::read_to_string(&held).unwrap(), "the old picture");
     }
