@@ -74,3 +74,53 @@ fn zip(bytes: &[u8], path: &Path) -> Result<()> {
     encoder.finish()?;
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn everything_lies_where_debian_has_it() {
+        if !command::succeeds("dpkg-deb", &["--version"]) {
+            return eprintln!("left out: there is no dpkg-deb");
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let (pages, staged) = (folder.path().join("pages"), folder.path().join("staged"));
+        for (name, text) in [
+            ("man/lumbre.1", ".TH lumbre 1"),
+            ("man/lumbre-render.1", ".TH lumbre-render 1"),
+            ("completions/lumbre.bash", "complete"),
+            ("completions/_lumbre", "#compdef lumbre"),
+            ("completions/lumbre.fish", "complete"),
+            ("completions/_lumbre.ps1", "Register"),
+        ] {
+            let path = pages.join(name);
+            fs::create_dir_all(path.parent().expect("a folder")).expect("it is made");
+            fs::write(path, text).expect("it is written");
+        }
+        // Any program: this one.
+        let program = std::env::current_exe().expect("a program");
+        let package = package(&staged, &program, &pages, "licences", folder.path()).expect("a package");
+        let package = package.to_string_lossy();
+        let listed = command::output("dpkg-deb", &["--contents", &package]).expect("it is one");
+        for name in [
+            "usr/bin/lumbre",
+            "usr/share/man/man1/lumbre.1.gz",
+            "usr/share/man/man1/lumbre-render.1.gz",
+            "usr/share/bash-completion/completions/lumbre",
+            "usr/share/zsh/vendor-completions/_lumbre",
+            "usr/share/fish/vendor_completions.d/lumbre.fish",
+            "usr/share/doc/lumbre/copyright",
+            "usr/share/doc/lumbre/THIRD-PARTY.md.gz",
+            "usr/share/doc/lumbre/changelog.gz",
+        ] {
+            let line = listed.lines().find(|line| line.ends_with(&format!("./{name}")));
+            let line = line.unwrap_or_else(|| panic!("{name}: {listed}"));
+            assert!(line.contains("root/root"), "{line}");
+            assert_eq!(line.starts_with("-rwxr-xr-x"), name == "usr/bin/lumbre", "{line}");
+        }
+        let field = |name: &str| command::output("dpkg-deb", &["--field", &package, name]).expect("a field");
+        assert_eq!((field("Package").trim(), field("Version").trim()), ("lumbre", VERSION));
+        assert_eq!(field("Depends").trim(), format!("libc6 (>= {GLIBC})"));
+    }
+}
