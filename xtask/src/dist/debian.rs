@@ -51,7 +51,7 @@ pub(super) fn package(
     let size: u64 =
         files::below(staged)?.iter().map(|file| fs::metadata(file).map_or(0, |meta| meta.len())).sum();
     let control = format!(
-        "Package: lumbre\nVersion: {VERSION}\nArchitecture: amd64\nMaintainer: The Lumbre authors <lumbre@localhost>\n\
+        "Package: lumbre\nVersion: {VERSION}\nArchitecture: amd64\nMaintainer: The Lumbre authors <lumbre@lumbre.invalid>\n\
          Section: graphics\nPriority: optional\nInstalled-Size: {}\nDepends: libc6 (>= {GLIBC})\n\
          Homepage: {}\nDescription: exact, reproducible ray tracer\n \
          Renders scenes of pbrt-v4 and POV-Ray and models in glTF, OBJ, PLY and STL,\n \
