@@ -37,7 +37,7 @@ enum Form {
     Box,
     Cylinder,
     Cone,
-    /// Turned about the x axis by so many degrees.
+    /// Turned about the x axis by this many degrees.
     Torus(f64),
     Triangle,
 }

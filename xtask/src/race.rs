@@ -43,7 +43,8 @@ pub(crate) struct Race {
     /// How often each picture is rendered: the least time and the mean error count.
     #[arg(long, default_value_t = 1)]
     runs: u32,
-    /// The folder for race.md, between its markers where it exists, and for the plots; by default target/bench/race.
+    /// The folder for race.md, between its markers where it exists, and for the plots, such as docs/measurements; by default
+    /// target/bench/race.
     #[arg(long)]
     out: Option<PathBuf>,
     /// The figures as JSON, too.

@@ -59,7 +59,7 @@ fn samples(text: &str) -> Result<Range<u32>, String> {
     if range.is_empty() { Err(wrong()) } else { Ok(range) }
 }
 
-/// Renders that are done sooner keep no checkpoint unless asked.
+/// Shorter renders keep no checkpoint unless asked.
 const LONG: Duration = Duration::from_secs(120);
 
 impl PartArguments {

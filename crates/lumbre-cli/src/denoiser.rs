@@ -65,7 +65,7 @@ impl Denoiser {
         }
     }
 
-    /// Whether it takes a picture with one sample for squares of so many pixels a side: [`lumbre::Stats::stride`].
+    /// Whether it takes a picture with one sample per square of this many pixels a side: [`lumbre::Stats::stride`].
     pub(crate) fn takes(&self, stride: Option<u32>) -> bool {
         match self {
             Self::Own => stride.is_some(),

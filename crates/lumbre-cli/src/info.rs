@@ -211,11 +211,11 @@ fn about_part(part: &Part, as_json: bool) -> String {
 }
 
 /// How many names of a kind are printed: `--json` has all.
-const MOST_NAMES: usize = 20;
+const MAX_NAMES: usize = 20;
 
 fn shortened(names: impl ExactSizeIterator<Item = String>) -> String {
-    let more = names.len().saturating_sub(MOST_NAMES);
-    let mut text = names.take(MOST_NAMES).collect::<Vec<_>>().join(", ");
+    let more = names.len().saturating_sub(MAX_NAMES);
+    let mut text = names.take(MAX_NAMES).collect::<Vec<_>>().join(", ");
     if more > 0 {
         text += &format!(" and {more} more");
     }

@@ -1,5 +1,23 @@
-//! The `lumbre` program: render, view, cast, info, diff, merge, explain, math. It is a library so that other front ends, such as the Python package, bring
-//! the same program.
+//! The `lumbre` program: render, view, cast, info, diff, merge, explain, math. It is a library so that other front
+//! ends, such as the Python package, bring the same program.
+//!
+//! # Streams of rays
+//!
+//! `lumbre cast` never holds its list of rays, so memory does not grow with it (`cast/`). A reader takes some thousand
+//! rays off the input as bytes; a thread of the pool decodes them, asks the scene and encodes the answers;
+//! `cast/pipeline.rs` passes the blocks on in the order of the rays; `cast/output.rs` appends them. What an output must
+//! state first is written last: the header of a .npy again at the end, and the columns of a .npz from a temporary file
+//! each. Arrays in Fortran order are read by position, from a temporary file if they come through a pipe. The size of a
+//! block and the number of threads change no byte.
+//!
+//! # Explanations
+//!
+//! `lumbre explain` computes nothing that a render does not. `Shape::explain` (`lumbre-geometry`) is built from the
+//! pieces of the ray tests and ends with what the ray test returns; a contract test compares both to the bit. The light
+//! comes from the integrators themselves, which log events to an optional journal (`lumbre-render`,
+//! `transport/journal.rs`). `Accel::target` says which shape was hit, and under which transforms. `explain/document.rs`
+//! holds sections of quantities; `english.rs` and `spanish.rs` have the words, `formula.rs` puts numbers into formulas,
+//! `writing.rs` and `html.rs` write them.
 
 use std::ffi::OsString;
 
@@ -49,7 +67,7 @@ mod view;
 mod viewing;
 
 pub use defaults::Defaults;
-pub use explain::{Explainer, Format, Request, Things, explain};
+pub use explain::{Explainer, Format, Request, SceneNames, explain};
 pub use failure::Failure;
 pub use language::Language;
 pub use memory::{check_picture, memory_left};

@@ -60,7 +60,7 @@ pub(crate) struct Arguments {
 }
 
 /// Gaps that are named.
-const MOST_NAMED: usize = 4;
+const MAX_NAMED: usize = 4;
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -100,7 +100,7 @@ fn frame_of(part: &Part) -> Option<u32> {
     part.job.identity.get("picture")?.parse().ok()
 }
 
-/// Joins parts of one picture, of at least so many samples.
+/// Joins parts of one picture, of at least this many samples.
 fn merge(arguments: &Arguments, parts: &[PathBuf], output: &Path, spp: u32) -> Result<(), Failure> {
     Inputs::of(arguments.parts.iter().chain(&arguments.background).map(PathBuf::as_path)).refuse(output)?;
     probe_writable(output).map_err(|e| Failure::from(lumbre::Error::from(e)))?;
@@ -113,8 +113,8 @@ fn merge(arguments: &Arguments, parts: &[PathBuf], output: &Path, spp: u32) -> R
     }
     if !gaps.is_empty() {
         let missing: u64 = gaps.iter().map(Piece::count).sum();
-        let named: Vec<String> = gaps.iter().take(MOST_NAMED).map(Piece::to_string).collect();
-        let more = if gaps.len() > MOST_NAMED { " and more" } else { "" };
+        let named: Vec<String> = gaps.iter().take(MAX_NAMED).map(Piece::to_string).collect();
+        let more = if gaps.len() > MAX_NAMED { " and more" } else { "" };
         let what = format!("{} missing: {}{more}", counted(missing, "sample"), named.join(", "));
         // Which of several pictures.
         let what =

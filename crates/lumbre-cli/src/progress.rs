@@ -251,7 +251,7 @@ impl RayProgress {
         Self { display: Display::new(if is_shown { Style::Bar } else { Style::None }), start: Instant::now() }
     }
 
-    /// Shows that so many rays are done, which are this share of all, if that is known.
+    /// Shows how many rays are done, and which share of all that is, if known.
     pub(crate) fn show(&self, rays: u64, share: Option<f64>) {
         let elapsed = self.start.elapsed();
         self.display.show(share, ray_words(rays, share, elapsed), || serde_json::json!({ "rays": rays }));

@@ -107,15 +107,15 @@ fn rate(text: &str) -> Result<f64, String> {
 pub(crate) struct Frames(pub std::ops::RangeInclusive<u32>);
 
 /// The maximal number of frames in a run, and the largest frame number.
-const MOST_FRAMES: u32 = 1_000_000;
+const MAX_FRAMES: u32 = 1_000_000;
 
 impl FromStr for Frames {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("expected the first and the last frame, such as 0..47, up to {MOST_FRAMES}");
+        let wrong = || format!("expected the first and the last frame, such as 0..47, up to {MAX_FRAMES}");
         let (first, last) = text.split_once("..").ok_or_else(wrong)?;
-        let number = |text: &str| text.parse().ok().filter(|&n: &u32| n <= MOST_FRAMES);
+        let number = |text: &str| text.parse().ok().filter(|&n: &u32| n <= MAX_FRAMES);
         let (first, last) = (number(first).ok_or_else(wrong)?, number(last).ok_or_else(wrong)?);
         if last < first { Err(wrong()) } else { Ok(Self(first..=last)) }
     }

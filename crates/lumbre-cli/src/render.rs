@@ -16,8 +16,8 @@ use lumbre::image::{Image, ToneMap};
 use lumbre::math::Elementary;
 use lumbre::shading::ShadingNormals;
 use lumbre::{
-    CancelToken, DVec3, Feature, Job, Keeper, Picture, PixelBounds, RenderOptions, SaveOptions, Scene,
-    SceneDesc, Stage, Staged, Stop, in_words,
+    CancelToken, CheckpointSink, DVec3, Feature, Job, Picture, PixelBounds, RenderOptions, SaveOptions,
+    Scene, SceneDesc, Stage, Staged, Stop, in_words,
 };
 use serde_json::json;
 
@@ -32,7 +32,7 @@ use crate::progress::{Display, PictureViewer, Series, Style, Watched};
 use crate::reading::{Frames, ReadingArguments, print_warnings};
 use crate::report::{caustics_line, caustics_not_found, statistics, summary, warn_of_losses};
 use crate::signals::{Deadline, Phase, Signals};
-use crate::staging::{self, Behind, StagingArguments};
+use crate::staging::{self, Backdrop, StagingArguments};
 use crate::tev::Tev;
 use crate::units::{self, Crop, spoken};
 use crate::view::ViewArguments;
@@ -177,7 +177,7 @@ pub(crate) struct Arguments {
     reading: ReadingArguments,
 }
 
-/// What pictures say of themselves.
+/// The amount of metadata in pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum Metadata {
     /// The same for every run.
@@ -206,7 +206,7 @@ pub(crate) fn tone_map_name(map: ToneMap) -> &'static str {
     ToneMap::NAMES.into_iter().find(|name| ToneMap::from_name(name) == Some(map)).unwrap_or("none")
 }
 
-/// What can be made of shading normals.
+/// The treatments of shading normals.
 pub(crate) const SHADING_NORMALS: [&str; 2] = ["lumbre", "pbrt"];
 /// The names of formats that are written.
 const WRITTEN: [&str; 5] = ["png", "exr", "hdr", "pfm", "jpg"];
@@ -234,7 +234,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     output::refuse_inputs(arguments.file(), &arguments.pictures(), arguments.stats.as_deref(), &inputs)?;
     let start = Instant::now();
     if let (Some((width, height)), None) = (arguments.size, &arguments.crop) {
-        // What cannot fit is known before anything is read.
+        // Reports impossible options before anything is read.
         let mut asked = RenderOptions::default();
         (asked.width, asked.height) = (width, height);
         asked.guides = denoiser.is_some();
@@ -251,7 +251,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut from_first = First { pattern: None, exposure: arguments.exposure };
     if let Some(Frames(frames)) = &arguments.frames {
         let (first, last) = (*frames.start(), *frames.end());
-        let mut held = Held::default();
+        let mut held = FirstStage::default();
         for number in frames.clone() {
             let start = Instant::now();
             signals.end_at(arguments.deadline(start));
@@ -281,13 +281,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             Some(frames) => {
                 for turn in 0..frames {
                     stage.turns = Some(f64::from(turn) / f64::from(frames));
-                    // The first one's time is also that of reading.
+                    // The time of the first one includes reading.
                     let start = if turn == 0 { start } else { Instant::now() };
                     signals.end_at(arguments.deadline(start));
                     let series = Series { number: turn + 1, done: turn, count: frames, start: began };
                     let frame = Frame { number: turn + 1, is_first: turn == 0, series };
                     // Each rotation has its own camera.
-                    let frame = Some((frame, &mut Held::default()));
+                    let frame = Some((frame, &mut FirstStage::default()));
                     let desc = desc.clone();
                     let context = Context {
                         arguments,
@@ -311,20 +311,20 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// How long a picture is rendered even if reading took all of its time.
-const LEAST_TIME: Duration = Duration::from_millis(400);
+/// Minimum render time, even if reading took all of the time.
+const MIN_TIME: Duration = Duration::from_millis(400);
 
 const READING: Phase = Phase::Preparing("reading the scene");
 
 impl Arguments {
-    /// Tells what reads POV-Ray scenes about the pictures.
+    /// Passes the picture options to the POV-Ray reader.
     pub(crate) fn tell_reader(&mut self) {
         if self.scene.iter().any(|path| SceneFormat::from_path(path) == Some(SceneFormat::Pov)) {
             self.reading.tell_pov(self.size, self.frames.as_ref());
         }
     }
 
-    /// The samples per pixel that are asked for.
+    /// The requested samples per pixel.
     pub(crate) fn spp(&self) -> Option<u32> {
         self.spp
     }
@@ -342,7 +342,7 @@ impl Arguments {
         self.reading.open(&self.scene).map(|(scene, _)| scene)
     }
 
-    /// Refuses what a task of a farm cannot do, before it is sent off.
+    /// Refuses options that a task of a farm cannot handle, before it is sent.
     ///
     /// # Errors
     /// [`Failure::Usage`].
@@ -370,7 +370,7 @@ impl Arguments {
         files.chain(self.reading.overlays())
     }
 
-    /// What else than files and options of rendering the scene depends on, by name.
+    /// Everything else that the scene depends on, by name.
     fn settings(&self) -> Vec<(String, String)> {
         let mut settings = self.reading.scene_settings();
         settings.push(("view".to_owned(), in_words(&self.view)));
@@ -378,10 +378,10 @@ impl Arguments {
         settings
     }
 
-    /// How a picture is shown, by name, for whoever saves it later: see [`crate::merge`].
+    /// How a picture is shown, by name, for the command that saves it later: see [`crate::merge`].
     fn shown(
         &self,
-        behind: &Behind,
+        behind: &Backdrop,
         tone_map: ToneMap,
         exposure: f32,
         precision: ExrPrecision,
@@ -396,13 +396,13 @@ impl Arguments {
             ),
             ("layers".to_owned(), layers.join(",")),
         ]);
-        if let (Behind::Background(_), Some(background)) = (behind, self.staging.background_name()) {
+        if let (Backdrop::Background(_), Some(background)) = (behind, self.staging.background_name()) {
             shown.insert("background".to_owned(), background);
         }
         shown
     }
 
-    /// Who else is shown the picture while it is rendered.
+    /// Other viewers of the picture while it is rendered.
     fn viewers(
         &self,
         output: &Path,
@@ -424,7 +424,7 @@ impl Arguments {
         self.output.as_deref().filter(|output| !is_standard_stream(output))
     }
 
-    /// What there will be of pictures.
+    /// The memory-relevant properties of the pictures.
     fn pictures(&self) -> Pictures {
         match (&self.frames, self.staging.turntable()) {
             (Some(Frames(numbers)), _) => Pictures::Frames(numbers.clone()),
@@ -433,7 +433,7 @@ impl Arguments {
         }
     }
 
-    /// The end of a picture that was begun at this time.
+    /// The deadline of a picture that was started at this time.
     fn deadline(&self, start: Instant) -> Option<Deadline> {
         self.time.and_then(|time| Some(Deadline { at: start.checked_add(time)?, time }))
     }
@@ -450,7 +450,7 @@ impl Arguments {
         output::default_name(film, &self.scene[0], &pictures, statistics, inputs, self.quiet)
     }
 
-    /// An output by a name whose ending is its format, also if it is standard output.
+    /// An output with the format as its extension, even for standard output.
     fn named<'p>(&self, output: &'p Path) -> Cow<'p, Path> {
         if !is_standard_stream(output) {
             return Cow::Borrowed(output);
@@ -459,7 +459,7 @@ impl Arguments {
         Cow::Owned(format!("standard output.{format}").into())
     }
 
-    /// Refuses to fill a terminal with the bytes of a picture, and a format for what has an ending.
+    /// Refuses to write a picture to a terminal, and a format for an output with an extension.
     fn check_standard_output(&self) -> Result<(), Failure> {
         let is_asked = self.output.as_deref().is_some_and(is_standard_stream);
         if is_asked && std::io::stdout().is_terminal() {
@@ -495,14 +495,14 @@ impl Arguments {
     }
 }
 
-/// What the stage set in the first frame: camera and ground are the same in all others.
+/// The stage of the first frame: camera and ground are the same in all others.
 #[derive(Default)]
-struct Held {
+struct FirstStage {
     cameras: Option<Vec<Camera>>,
     ground: Option<GroundDesc>,
 }
 
-impl Held {
+impl FirstStage {
     fn hold(&mut self, staged: &Staged, desc: &mut SceneDesc) {
         if staged.framed {
             desc.cameras.clone_from(self.cameras.get_or_insert_with(|| desc.cameras.clone()));
@@ -521,19 +521,19 @@ struct Frame {
     series: Series,
 }
 
-/// What all pictures of a run have from the first.
+/// The data of the first picture that all others share.
 struct First {
-    /// The name, with `#` for the number of several.
+    /// The name, with `#` for the number of each picture.
     pattern: Option<PathBuf>,
     exposure: Option<f32>,
 }
 
-/// What a picture is rendered with.
+/// The inputs of a picture.
 #[derive(Clone, Copy)]
 struct Context<'a> {
     arguments: &'a Arguments,
     stage: &'a Stage,
-    /// When its reading began.
+    /// The start of its reading.
     start: Instant,
     cancel: &'a CancelToken,
     signals: &'a Signals,
@@ -545,7 +545,7 @@ fn picture(
     context: Context<'_>,
     mut desc: SceneDesc,
     diagnostics: &mut Diagnostics,
-    frame: Option<(Frame, &mut Held)>,
+    frame: Option<(Frame, &mut FirstStage)>,
     first: &mut First,
 ) -> Result<(), Failure> {
     let Context { arguments, stage, start, cancel, signals, denoiser } = context;
@@ -599,13 +599,13 @@ fn picture(
         || arguments.time.is_some()
         || arguments.noise.is_some()
         || arguments.parts.keeps_sums();
-    // Parts hold samples alone.
+    // Parts store samples, not denoised pictures.
     let denoises = arguments.denoise.is_none() && !arguments.parts.keeps_sums() && defaults.denoises();
     let denoiser = denoiser.or(denoises.then_some(&Denoiser::Own));
     if let (Some(spp), Some(_), false) = (defaults.spp(&scene), denoiser, samples_are_asked) {
         options.stop.spp = spp;
     }
-    // Open Image Denoise asks for albedo and normals.
+    // Open Image Denoise needs albedo and normals.
     options.features |= matches!(denoiser, Some(Denoiser::Oidn(_)));
     options.guides = denoiser.is_some();
     let held = diagnostics.memory_held().saturating_add(scene.resolved().accel().memory_bytes() as u64);
@@ -665,19 +665,19 @@ fn picture(
     let progress = Watched { display: Display::new(style), signals, viewers, series, pass: Mutex::default() };
     let render_start = Instant::now();
     if let Some(deadline) = arguments.deadline(start) {
-        // What reading and building left of it.
+        // The time left after reading and building.
         let left = deadline.at.saturating_duration_since(render_start);
-        options.stop.time = Some(left.max(LEAST_TIME));
+        options.stop.time = Some(left.max(MIN_TIME));
     }
     let memory = arguments.reading.memory();
     let files: Vec<PathBuf> =
         diagnostics.files_read().iter().cloned().chain(arguments.inputs().map(Path::to_owned)).collect();
     let mut settings = arguments.settings();
     settings.push(("picture".to_owned(), in_words(&number)));
-    // Camera and ground are those of the first.
+    // The first picture determines camera and ground.
     settings.push(("first picture".to_owned(), in_words(&series.map(|series| series.number - series.done))));
     let (job_options, shown) = (options.clone(), arguments.shown(&behind, tone_map, exposure, precision));
-    // Files that cannot be read again, such as standard input, leave the render without an identity.
+    // If files cannot be read again, such as standard input, the render has no identity.
     let job = move || {
         let files = files.iter().map(PathBuf::as_path);
         Ok(Job { shown, ..Job::new(files, settings, &job_options)? })
@@ -705,7 +705,7 @@ fn picture(
         job,
     )?;
     let keep = |state| checkpoint.keep(state);
-    let keeper = checkpoint.every().map(|every| Keeper { every, keep: &keep });
+    let keeper = checkpoint.every().map(|every| CheckpointSink { every, keep: &keep });
     signals.enter(Phase::Rendering);
     let (mut picture, state) = scene.render_from(&options, &progress, cancel, state, keeper.as_ref())?;
     let render_time = render_start.elapsed();
@@ -722,7 +722,7 @@ fn picture(
             );
         }
         Ok(_) => {}
-        // The picture may be saved all the same.
+        // The picture may still be saved.
         Err(why) => say!("warning: the checkpoint cannot be written: {why}"),
     }
     check_whole(arguments, &picture, signals.received())?;
@@ -749,8 +749,8 @@ fn picture(
         save.metadata.push(("lumbreSeconds".to_owned(), format!("{:.2}", render_time.as_secs_f64())));
     }
     let picture = match behind {
-        Behind::Background(background) => picture.over(background),
-        Behind::Lights | Behind::Nothing => picture,
+        Backdrop::Background(background) => picture.over(background),
+        Backdrop::Lights | Backdrop::Nothing => picture,
     };
     let saved = if is_bare_part(&output) {
         checkpoint.part(&state)?.save(&output).map_err(Failure::from)
@@ -813,7 +813,7 @@ fn picture(
     Ok(())
 }
 
-/// Whether a file is the picture of this render with all its samples, by what it says of itself.
+/// Whether a file is this render's picture with all samples, according to its metadata.
 fn is_done_before(path: &Path, job: &Job, options: &RenderOptions) -> bool {
     const NEAR: u64 = 64 << 10;
     let mut start = Vec::new();
@@ -829,43 +829,43 @@ fn is_done_before(path: &Path, job: &Job, options: &RenderOptions) -> bool {
     read.is_ok() && says("lumbreScene") && (!is_fixed || says("lumbreSamples"))
 }
 
-/// The text of a name at this place in a file: that of a chunk iTXt of a PNG, or a line of an .exr.
+/// The text of a name at this position in a file: an iTXt chunk of a PNG, or a header line of an .exr.
 fn text_of(file: &[u8], at: usize, length: usize) -> Option<&[u8]> {
     if let Some(chunk) = file.get(at.checked_sub(8)?..at)
         && chunk.ends_with(b"iTXt")
     {
         let bytes = u32::from_be_bytes([chunk[0], chunk[1], chunk[2], chunk[3]]) as usize;
-        // Between them are the end of the name, two bytes of compression, and no language.
+        // In between: the end of the name, two bytes of compression, and an empty language.
         return file.get(at + length + 5..at + bytes);
     }
     let text = file.get(at + length..)?.strip_prefix(b": ")?;
     text.split(|&byte| byte == b'\n' || byte == 0).next()
 }
 
-/// What may help where next to nothing is lit.
+/// A hint for nearly black pictures.
 const DARK_HINT: &str = "hint: next to nothing in the picture is lit: --fit shows what is closed from outside, where its light does not come in
   (--eye and --target put a camera inside, where its lights may be), --env FILE lights it from all around, --exposure EV
   brightens what light there is";
 
-/// Whether almost all of what covers a picture would be shown black.
+/// Whether almost all covered pixels would be shown black.
 fn is_nearly_black(image: &Image, exposure: f32) -> bool {
-    // Two steps of a byte above black, by the curve of sRGB.
+    // Two 8-bit steps above black, in sRGB.
     let seen = 6e-4 * (-exposure).exponential_2();
     let (mut covered, mut lit) = (0.0, 0.0);
     for (i, pixel) in image.pixels().iter().enumerate() {
         let alpha = image.alpha().map_or(1.0, |alpha| alpha[i]);
         covered += f64::from(alpha);
-        // Colours are multiplied by coverage.
+        // Colours are premultiplied by coverage.
         if pixel.max_component() > seen {
             lit += f64::from(alpha);
         }
     }
-    const LEAST_COVERED: f64 = 0.005;
-    const LEAST_LIT: f64 = 0.01;
-    covered > LEAST_COVERED * image.pixels().len() as f64 && lit < LEAST_LIT * covered
+    const MIN_COVERED: f64 = 0.005;
+    const MIN_LIT: f64 = 0.01;
+    covered > MIN_COVERED * image.pixels().len() as f64 && lit < MIN_LIT * covered
 }
 
-/// Whether exposure applies to the format of this name.
+/// Whether exposure applies to this file's format.
 fn is_for_displays(path: &Path) -> bool {
     matches!(ImageFormat::from_path(path), Some(ImageFormat::Png | ImageFormat::Jpeg))
 }
@@ -886,8 +886,8 @@ fn check_format(path: &Path, layers: bool) -> Result<(), Failure> {
     }
 }
 
-/// Refuses to save what is no whole picture: where a signal came before every pixel had a sample. When the time was over, there is a coarser
-/// one.
+/// Never saves an incomplete picture: a signal may come before every pixel has a sample. After a timeout there is a
+/// coarse picture.
 fn check_whole(arguments: &Arguments, picture: &Picture, signal: Option<u8>) -> Result<(), Failure> {
     if picture.stats().spp > 0 {
         return Ok(());
@@ -931,7 +931,7 @@ fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failur
     options.stop.spp = match arguments.spp {
         Some(spp) => spp,
         None if arguments.noise.is_some() => Stop::MAX_FOR_NOISE,
-        // With a time, samples are not limited.
+        // A time limit alone leaves samples unlimited.
         None if arguments.time.is_some() => u32::MAX,
         None => options.stop.spp,
     };

@@ -1,4 +1,4 @@
-//! A scene as `lumbre render` would show it: on its stage, with its camera and its options.
+//! A scene as `lumbre render` would show it: staged, with its camera and its options.
 
 use std::path::Path;
 
@@ -10,40 +10,40 @@ use crate::defaults::Defaults;
 use crate::failure::Failure;
 use crate::reading::ReadingArguments;
 use crate::render::camera;
-use crate::staging::{Behind, StagingArguments};
+use crate::staging::{Backdrop, StagingArguments};
 use crate::view::ViewArguments;
 
-/// How a scene is to be shown.
-pub(crate) struct Wish<'a> {
+/// How to show a scene.
+pub(crate) struct SceneRequest<'a> {
     /// The name of the file, for messages.
     pub(crate) name: &'a Path,
     pub(crate) size: Option<(u32, u32)>,
     /// A camera by name or position.
     pub(crate) camera: Option<&'a str>,
-    /// In place of the scene's own.
+    /// Overrides the scene's integrator.
     pub(crate) integrator: Option<IntegratorKind>,
     pub(crate) view: &'a ViewArguments,
     pub(crate) staging: &'a StagingArguments,
     pub(crate) reading: &'a ReadingArguments,
 }
 
-/// A scene on its stage.
-pub(crate) struct Shown {
+/// A staged scene.
+pub(crate) struct PreparedScene {
     pub(crate) scene: Scene,
     pub(crate) defaults: Defaults,
-    pub(crate) behind: Behind,
+    pub(crate) behind: Backdrop,
     pub(crate) options: RenderOptions,
-    /// Whether its pictures are of light, and not of normals or the like.
+    /// Whether its pictures show light, and not features such as normals.
     pub(crate) is_of_light: bool,
     pub(crate) diagnostics: Diagnostics,
 }
 
-/// Puts a description on its stage and builds it.
+/// Stages and builds a description.
 ///
 /// # Errors
 /// [`Failure`] by kind of error.
-pub(crate) fn shown(mut desc: SceneDesc, wish: &Wish<'_>) -> Result<Shown, Failure> {
-    let Wish { name, size, camera: wanted, integrator, view, staging, reading } = *wish;
+pub(crate) fn shown(mut desc: SceneDesc, wish: &SceneRequest<'_>) -> Result<PreparedScene, Failure> {
+    let SceneRequest { name, size, camera: wanted, integrator, view, staging, reading } = *wish;
     let mut stage = staging.stage(size, reading.limits())?;
     view.set(&mut stage)?;
     let kind = integrator.unwrap_or(desc.integrator.kind);
@@ -65,5 +65,5 @@ pub(crate) fn shown(mut desc: SceneDesc, wish: &Wish<'_>) -> Result<Shown, Failu
     }
     view.check_camera(&scene, options.camera)?;
     options.transparent = behind.is_transparent();
-    Ok(Shown { scene, defaults, behind, options, is_of_light, diagnostics })
+    Ok(PreparedScene { scene, defaults, behind, options, is_of_light, diagnostics })
 }

@@ -54,7 +54,7 @@ const SIGNALS: [(i32, u8, bool); 6] = [
     (SIGXCPU, 152, false),
 ];
 
-/// The signals of [`SIGNALS`] that are listened for: all but those that whoever started the program had it ignore, as nohup does with
+/// The signals of [`SIGNALS`] that are listened for: all but those that its parent process had it ignore, as nohup does with
 /// SIGHUP. SIGINT and SIGTERM are always, as they were ever: shells ignore SIGINT for what runs in the background.
 #[cfg(unix)]
 fn wanted() -> impl Iterator<Item = (i32, u8, bool)> {

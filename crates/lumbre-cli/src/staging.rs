@@ -76,7 +76,7 @@ fn background(text: &str) -> Result<BackgroundArgument, String> {
 }
 
 /// The background of a picture.
-pub(crate) enum Behind {
+pub(crate) enum Backdrop {
     /// The infinite lights.
     Lights,
     /// Transparent: the picture has alpha.
@@ -85,7 +85,7 @@ pub(crate) enum Behind {
     Background(Background),
 }
 
-impl Behind {
+impl Backdrop {
     /// Whether the picture is rendered without its background.
     pub(crate) fn is_transparent(&self) -> bool {
         !matches!(self, Self::Lights)
@@ -122,7 +122,7 @@ impl StagingArguments {
         self.turntable
     }
 
-    /// The stage of a picture of this size after a rotation.
+    /// The stage of a picture of this size, rotated.
     ///
     /// # Errors
     /// Unreadable files, and [`Failure::Usage`] for an image that is not an environment map.
@@ -144,20 +144,20 @@ impl StagingArguments {
     ///
     /// # Errors
     /// Unreadable files.
-    pub(crate) fn behind(&self, defaults: &Defaults, limits: Limits) -> Result<Behind, Failure> {
+    pub(crate) fn behind(&self, defaults: &Defaults, limits: Limits) -> Result<Backdrop, Failure> {
         Ok(match &self.background {
-            None => defaults.background().map_or(Behind::Lights, Behind::Background),
-            Some(BackgroundArgument::Lights) => Behind::Lights,
-            Some(BackgroundArgument::Transparent) => Behind::Nothing,
-            Some(BackgroundArgument::Studio) => Behind::Background(Background::studio()),
-            Some(BackgroundArgument::Colour(colour)) => Behind::Background(Background::Colour(*colour)),
+            None => defaults.background().map_or(Backdrop::Lights, Backdrop::Background),
+            Some(BackgroundArgument::Lights) => Backdrop::Lights,
+            Some(BackgroundArgument::Transparent) => Backdrop::Nothing,
+            Some(BackgroundArgument::Studio) => Backdrop::Background(Background::studio()),
+            Some(BackgroundArgument::Colour(colour)) => Backdrop::Background(Background::Colour(*colour)),
             Some(BackgroundArgument::File(path)) => {
-                Behind::Background(Background::Picture(opaque(lumbre::read_image_within(path, limits)?)))
+                Backdrop::Background(Background::Picture(opaque(lumbre::read_image_within(path, limits)?)))
             }
         })
     }
 
-    /// The background that pictures are put over, as its argument; that of the studio where none was given.
+    /// The background argument of pictures; the studio's by default.
     pub(crate) fn background_name(&self) -> Option<String> {
         match &self.background {
             Some(BackgroundArgument::Lights | BackgroundArgument::Transparent) => None,
@@ -178,7 +178,7 @@ impl StagingArguments {
         }
     }
 
-    /// The files that the stage is made of.
+    /// The files of the stage.
     pub(crate) fn inputs(&self) -> impl Iterator<Item = &Path> {
         self.env.as_deref().into_iter().chain(self.background_file())
     }

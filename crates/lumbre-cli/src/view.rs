@@ -12,13 +12,13 @@ use crate::failure::Failure;
 #[derive(Args, Debug)]
 #[command(next_help_heading = "View")]
 pub(crate) struct ViewArguments {
-    /// Go around the model to the right by so many degrees, from the view that would be chosen or from --eye.
+    /// Go around the model to the right by this angle in degrees, from the view that would be chosen or from --eye.
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, value_parser = angle, conflicts_with = "camera")]
     azimuth: Option<f64>,
-    /// Go up by so many degrees, at most to straight above.
+    /// Go up by this angle in degrees, at most to straight above.
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, value_parser = angle, conflicts_with = "camera")]
     elevation: Option<f64>,
-    /// Show everything so many times as large.
+    /// Enlarge everything by this factor.
     #[arg(long, value_name = "FACTOR", value_parser = factor)]
     zoom: Option<f64>,
     /// Field of view in degrees along the shorter side of the picture.

@@ -17,9 +17,9 @@ use crate::names::one_of;
 use crate::output::is_standard_stream;
 use crate::reading::ReadingArguments;
 use crate::render::exposure;
-use crate::shown::{Shown, Wish, shown};
+use crate::shown::{PreparedScene, SceneRequest, shown};
 use crate::signals::{Phase, Signals};
-use crate::staging::{Behind, StagingArguments};
+use crate::staging::{Backdrop, StagingArguments};
 use crate::units;
 use crate::view::ViewArguments;
 
@@ -42,7 +42,7 @@ pub(crate) struct Arguments {
     /// The port; by default one that is free.
     #[arg(long, value_name = "N", default_value_t = 0)]
     port: u16,
-    /// The address to listen at. Others than this machine's own let whoever reaches them ask for the page, and what is sent is not
+    /// The address to listen at. Others than this machine's own let anyone who reaches them ask for the page, and what is sent is not
     /// encrypted: a tunnel by ssh is better.
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     host: IpAddr,
@@ -247,9 +247,11 @@ impl Files {
         let name = self.paths().into_iter().next().unwrap_or_default();
         // The camera that was asked for is of the command line's file.
         let camera = self.arguments.camera.as_deref().filter(|_| self.dropped.is_none());
-        let wish = Wish { name: &name, size: *size, camera, integrator: None, view, staging, reading };
+        let wish =
+            SceneRequest { name: &name, size: *size, camera, integrator: None, view, staging, reading };
         let explain = Some(Box::new(Explainer::new(&desc, self.name())) as Box<dyn Explain>);
-        let Shown { scene, defaults, behind, mut options, is_of_light, diagnostics } = shown(desc, &wish)?;
+        let PreparedScene { scene, defaults, behind, mut options, is_of_light, diagnostics } =
+            shown(desc, &wish)?;
         let mut warnings = diagnostics.lines();
         options.threads = rayon::current_num_threads();
         let own = defaults.spp(&scene).unwrap_or(options.stop.spp);
@@ -270,8 +272,8 @@ impl Files {
             save.exr_precision = lumbre::formats::image::ExrPrecision::Float;
         }
         let background = match behind {
-            Behind::Background(background) => Some(background),
-            Behind::Lights | Behind::Nothing => None,
+            Backdrop::Background(background) => Some(background),
+            Backdrop::Lights | Backdrop::Nothing => None,
         };
         Ok(Built { scene, options, save, background, denoise: defaults.denoises(), warnings, explain })
     }

@@ -703,7 +703,7 @@ fn light_from_a_picture_is_seen_and_lights() {
     assert!(stderr(&out).contains("15 by 8 pixels"), "{}", stderr(&out));
 }
 
-/// A white square of side 2 before a camera, lit by a sun of so many lux, over a black background.
+/// A white square of side 2 before a camera, lit by a sun of this many lux, over a black background.
 fn sunlit(lux: f32) -> String {
     // 4 vertices and 6 indices.
     let data = "AACAvwAAgL8AAAAAAACAPwAAgL8AAAAAAACAPwAAgD8AAAAAAACAvwAAgD8AAAAAAAABAAIAAAACAAMA";

@@ -185,7 +185,7 @@ fn progress_goes_by_whichever_limit_comes_first() {
     }
 }
 
-/// Whether whoever started the tests has them ignore a signal. The program leaves it so.
+/// Whether the parent process has the tests ignore a signal. The program leaves it so.
 fn is_ignored(signal: i32) -> bool {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));

@@ -59,7 +59,7 @@ pub fn abandon_writes() {
         for part in writes.parts.drain(..) {
             let _ = fs::remove_file(part);
         }
-        // Whoever would create or rename a file waits until the process is gone.
+        // A thread that would create or rename a file waits until the process has ended.
         std::mem::forget(writes);
         return;
     }

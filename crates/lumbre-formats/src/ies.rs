@@ -285,7 +285,7 @@ mod tests {
 
     const HEAD: &str = "IES:LM-63-2019\n[TEST] ours\nTILT=NONE\n";
 
-    /// Towards so many degrees from the aim, and around it.
+    /// The intensity at an angle from the aim and an angle around it, in degrees.
     fn towards(vertical: f64, horizontal: f64) -> DVec3 {
         let (v, h) = (vertical.to_radians(), horizontal.to_radians());
         DVec3::new(v.sin() * h.cos(), v.sin() * h.sin(), -v.cos())

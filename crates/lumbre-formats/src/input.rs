@@ -62,7 +62,7 @@ impl<'b> Input<'b> {
         if input.bytes.starts_with(&[0x1F, 0x8B]) { input.unpacked(path, budget) } else { Ok(input) }
     }
 
-    /// [`Input::from_reader`] of a stream, which may never end: `is_text` says of its first bytes, as far as there are so many,
+    /// [`Input::from_reader`] of a stream, which may never end: `is_text` says of its first bytes, as far as there are that many,
     /// whether they begin a text. The first byte of a text that no text has, a zero, ends the reading.
     ///
     /// # Errors

@@ -115,7 +115,7 @@ fn may_begin_a_text(bytes: &[u8]) -> bool {
     !bytes.contains(&0) && lines.all(|line| line.is_empty() || line.starts_with(b"#"))
 }
 
-/// Whether a binary STL of at most so many bytes may begin with these.
+/// Whether a binary STL of at most this many bytes may begin with these.
 fn may_begin_an_stl(bytes: &[u8], most: u64) -> bool {
     let count = bytes.get(80..84).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     count.is_none_or(|n| (bytes.len() as u64..=most).contains(&(84 + 50 * u64::from(n))))

@@ -3,7 +3,7 @@
 use lumbre_math::{DVec2, DVec3, Vec3};
 
 /// The number of point-in-triangle tests after which a polygon is given up, less than a second's worth.
-const MOST_TESTS: u64 = 100_000_000;
+const MAX_TESTS: u64 = 100_000_000;
 
 /// Whether the corners, which need not be coplanar, turn the same way throughout as seen along their mean
 /// normal.
@@ -158,7 +158,7 @@ fn cut_ears(flat: &[DVec2]) -> Option<Vec<[usize; 3]>> {
             _ => {
                 tried += 1;
                 at = next[at];
-                if tests > MOST_TESTS {
+                if tests > MAX_TESTS {
                     return None;
                 }
                 continue;
@@ -176,7 +176,7 @@ fn cut_ears(flat: &[DVec2]) -> Option<Vec<[usize; 3]>> {
             reflex.is_reflex[neighbour] &= turn(&before, &next, neighbour) <= 0.0;
         }
         tests += 1;
-        if tests > MOST_TESTS {
+        if tests > MAX_TESTS {
             return None;
         }
         // Continuing past the cut avoids a fan of slivers in long polygons.

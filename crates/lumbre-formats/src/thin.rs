@@ -11,7 +11,7 @@ use crate::budget::{Budget, LimitError};
 /// radius, relative to the diagonal over the square root of their number, so that clouds stay clouds.
 const POINT_RADIUS: f64 = 0.004;
 const LINE_RADIUS: f64 = 0.002;
-const MOST_RADIUS_OF_MANY: f64 = 0.5;
+const MAX_RADIUS_OF_MANY: f64 = 0.5;
 
 /// The colour of points and lines without material and colours: visible on white and on black.
 pub(crate) const INK: Rgb = Rgb::new(0.02, 0.08, 0.3);
@@ -87,5 +87,5 @@ pub(crate) fn segments(
 
 fn radius(share: f64, count: usize, size: f64) -> f64 {
     let size = if size > 0.0 && size.is_finite() { size } else { 1.0 };
-    share.min(MOST_RADIUS_OF_MANY / (count.max(1) as f64).sqrt()) * size
+    share.min(MAX_RADIUS_OF_MANY / (count.max(1) as f64).sqrt()) * size
 }

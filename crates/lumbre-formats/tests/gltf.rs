@@ -1135,7 +1135,7 @@ fn principled(material: &str) -> PrincipledParams {
     *params
 }
 
-/// A scene of one square with so many sets of texture coordinates, all different, and a material whose textures go by some:
+/// A scene of one square with this many sets of texture coordinates, all different, and a material whose textures go by some:
 /// base colour, roughness, normals, transmission and clearcoat.
 fn with_sets(count: usize, named: [usize; 5]) -> (SceneDesc, Vec<String>) {
     let mut parts = Parts::default();
@@ -1442,7 +1442,7 @@ fn coverage_is_by_mode_and_light_by_strength() {
 
 #[test]
 fn what_is_invisible_everywhere_does_not_shine() {
-    let shines = |alpha: f32, rest: &str| {
+    let is_emissive = |alpha: f32, rest: &str| {
         let colour = format!(r#""pbrMetallicRoughness":{{"baseColorFactor":[1,1,1,{alpha}]}}"#);
         let (scene, _) = dressed(&format!(r#"{{{colour},"emissiveFactor":[1,1,1]{rest}}}"#));
         scene.shapes[0].area_light.is_some()
@@ -1450,11 +1450,11 @@ fn what_is_invisible_everywhere_does_not_shine() {
     let unlit = r#","extensions":{"KHR_materials_unlit":{}}"#;
     for more in ["", unlit] {
         // Without a mode, alpha is not used.
-        assert!(shines(0.0, more) && shines(0.75, &format!(r#","alphaMode":"BLEND"{more}"#)));
-        assert!(!shines(0.0, &format!(r#","alphaMode":"BLEND"{more}"#)));
-        assert!(!shines(0.0, &format!(r#","alphaMode":"MASK"{more}"#)));
-        assert!(!shines(0.75, &format!(r#","alphaMode":"MASK","alphaCutoff":0.8{more}"#)));
-        assert!(shines(0.75, &format!(r#","alphaMode":"MASK","alphaCutoff":0.7{more}"#)));
+        assert!(is_emissive(0.0, more) && is_emissive(0.75, &format!(r#","alphaMode":"BLEND"{more}"#)));
+        assert!(!is_emissive(0.0, &format!(r#","alphaMode":"BLEND"{more}"#)));
+        assert!(!is_emissive(0.0, &format!(r#","alphaMode":"MASK"{more}"#)));
+        assert!(!is_emissive(0.75, &format!(r#","alphaMode":"MASK","alphaCutoff":0.8{more}"#)));
+        assert!(is_emissive(0.75, &format!(r#","alphaMode":"MASK","alphaCutoff":0.7{more}"#)));
     }
     let textured = r#""pbrMetallicRoughness":{"baseColorFactor":[1,1,1,0],"baseColorTexture":{"index":0}}"#;
     for mode in ["MASK", "BLEND"] {
@@ -1815,7 +1815,7 @@ fn grid() -> Vec<([f32; 3], [f32; 2], [u8; 4])> {
     (0..3).flat_map(|j| (0..4).map(move |i| at(i, j))).collect()
 }
 
-/// A file with a primitive in compressed data, which say so many indices.
+/// A file with a primitive in compressed data, which claims this many indices.
 fn compressed_by_draco(data: &[u8], indices: usize) -> (String, Vec<u8>) {
     let json = format!(
         r#"{{"asset":{{"version":"2.0"}},"extensionsUsed":["KHR_draco_mesh_compression"],

@@ -415,17 +415,17 @@ fn a_library_is_read_once_and_what_shines_faintly_leaves_the_studio() {
 fn a_material_that_is_invisible_does_not_shine() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("m.obj");
-    let shines = |keys: &str| {
+    let is_emissive = |keys: &str| {
         std::fs::write(dir.path().join("m.mtl"), format!("newmtl m\nKe 9 9 9\n{keys}\n")).unwrap();
         std::fs::write(&path, format!("mtllib m.mtl\n{SQUARE}usemtl m\nf 1 2 3\n")).unwrap();
         let scene = open_obj(&path, &Budget::default(), &mut Diagnostics::new()).unwrap();
         let staged = Stage::default().set(&mut scene.clone()).light;
         (scene.shapes[0].area_light.is_some(), staged)
     };
-    assert_eq!(shines("d 1"), (true, StageLight::Own));
-    assert_eq!(shines("d 0.25"), (true, StageLight::Own));
-    assert_eq!(shines("d 0"), (false, StageLight::Studio));
-    assert_eq!(shines("d -1"), (false, StageLight::Studio));
+    assert_eq!(is_emissive("d 1"), (true, StageLight::Own));
+    assert_eq!(is_emissive("d 0.25"), (true, StageLight::Own));
+    assert_eq!(is_emissive("d 0"), (false, StageLight::Studio));
+    assert_eq!(is_emissive("d -1"), (false, StageLight::Studio));
 }
 
 #[test]

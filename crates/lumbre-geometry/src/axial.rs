@@ -13,7 +13,8 @@ use crate::sphere::sided;
 use crate::support::{arc_support, azimuth, bounds_from_support, cross_size, dot_size, length, unit};
 use crate::twofold::{Number, Twofold, components, cross, dot, place_near, point};
 use crate::{
-    Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Surface, SurfaceSample, density, measure,
+    Aabb, BoundingVolume, NearestPoint, NearestPointError, Ray, Root, Surface, SurfaceSample, density,
+    measure,
 };
 
 /// The points at distance ρ(z) = r1 + k z from an axis, where z is the distance along it, between two planes
@@ -607,7 +608,7 @@ impl Axial {
         &self,
         world_from_object: &Transform,
         p: DVec3,
-    ) -> Result<NearestPoint, NoNearestPoint> {
+    ) -> Result<NearestPoint, NearestPointError> {
         under_similarity(world_from_object, p, |p| {
             let (e1, e2) = orthonormal_basis(self.axis);
             let w = p - self.p1;
@@ -737,12 +738,12 @@ macro_rules! axial_shape {
             /// The nearest point to `p` under a similarity.
             ///
             /// # Errors
-            /// [`NoNearestPoint::Map`] for other maps.
+            /// [`NearestPointError::Map`] for other maps.
             pub fn closest_point(
                 &self,
                 world_from_object: &Transform,
                 p: DVec3,
-            ) -> Result<NearestPoint, NoNearestPoint> {
+            ) -> Result<NearestPoint, NearestPointError> {
                 self.body.closest_point(world_from_object, p)
             }
 

@@ -10,7 +10,7 @@ use crate::nearest::under_similarity;
 use crate::shape::{check, sampled_by_area, two_crossings};
 use crate::support::{bounds_from_support, length, unit};
 use crate::{
-    Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, ShapeError, Surface, SurfaceSample,
+    Aabb, BoundingVolume, NearestPoint, NearestPointError, Ray, Root, ShapeError, Surface, SurfaceSample,
 };
 use crate::{measure, sphere};
 
@@ -259,12 +259,12 @@ impl Capsule {
     /// The nearest point to `p` under a similarity.
     ///
     /// # Errors
-    /// [`NoNearestPoint::Map`] for other maps.
+    /// [`NearestPointError::Map`] for other maps.
     pub fn closest_point(
         &self,
         world_from_object: &Transform,
         p: DVec3,
-    ) -> Result<NearestPoint, NoNearestPoint> {
+    ) -> Result<NearestPoint, NearestPointError> {
         under_similarity(world_from_object, p, |p| {
             let (axis, length, radius) = (self.tube.axis, self.tube.length, self.radius());
             let w = p - self.tube.p1;

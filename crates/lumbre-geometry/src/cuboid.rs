@@ -7,7 +7,7 @@ use crate::nearest::{on_triangle, similarity_factor, under_similarity};
 use crate::shape::{check, sampled_by_area, two_crossings};
 use crate::support::bounds_from_support;
 use crate::{
-    Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, ShapeError, Surface, SurfaceSample,
+    Aabb, BoundingVolume, NearestPoint, NearestPointError, Ray, Root, ShapeError, Surface, SurfaceSample,
     density, measure,
 };
 
@@ -178,7 +178,7 @@ impl Cuboid {
         &self,
         world_from_object: &Transform,
         p: DVec3,
-    ) -> Result<NearestPoint, NoNearestPoint> {
+    ) -> Result<NearestPoint, NearestPointError> {
         if similarity_factor(world_from_object).is_none() {
             let face = |part: u32| {
                 let corner = |u: f64, v: f64| {

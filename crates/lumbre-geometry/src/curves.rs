@@ -132,7 +132,7 @@ impl Curves {
         Ok(())
     }
 
-    /// Where so many more control points begin.
+    /// The index at which this many more control points begin.
     fn first_of_more(&self, count: usize) -> Result<u32, ShapeError> {
         match u32::try_from(self.points.len() + count) {
             Ok(_) => Ok(self.points.len() as u32),

@@ -7,7 +7,7 @@ use lumbre_math::{DVec2, DVec3, Transform};
 use crate::axial::{Axial, axial_shape};
 use crate::shape::check;
 use crate::{
-    Aabb, BoundingVolume, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError,
+    Aabb, BoundingVolume, DirectionSample, NearestPoint, NearestPointError, Ray, Root, Roots, ShapeError,
     Surface, SurfaceSample,
 };
 

@@ -11,8 +11,8 @@ use crate::shape::{check, open_surface, sampled_by_area};
 use crate::support::{arc_support, azimuth, bounds_from_support, dot_size};
 use crate::twofold::point;
 use crate::{
-    Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface, SurfaceSample,
-    measure,
+    Aabb, BoundingVolume, NearestPoint, NearestPointError, Ray, Root, Roots, ShapeError, Surface,
+    SurfaceSample, measure,
 };
 
 /// The points of a plane between two distances from a centre, both included.
@@ -163,12 +163,12 @@ impl Disk {
     /// The nearest point to `p` under a similarity.
     ///
     /// # Errors
-    /// [`NoNearestPoint::Map`] for other maps.
+    /// [`NearestPointError::Map`] for other maps.
     pub fn closest_point(
         &self,
         world_from_object: &Transform,
         p: DVec3,
-    ) -> Result<NearestPoint, NoNearestPoint> {
+    ) -> Result<NearestPoint, NearestPointError> {
         under_similarity(world_from_object, p, |p| {
             let axis = self.normal();
             let (e1, e2) = orthonormal_basis(axis);

@@ -12,8 +12,8 @@ use crate::shape::{check, open_surface, sampled_by_area};
 use crate::support::{arc_support, azimuth, bounds_from_support, length};
 use crate::twofold::Number;
 use crate::{
-    Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface, SurfaceSample,
-    measure,
+    Aabb, BoundingVolume, NearestPoint, NearestPointError, Ray, Root, Roots, ShapeError, Surface,
+    SurfaceSample, measure,
 };
 
 /// The surface that the segment from `p1` to `p2` sweeps about the z axis.
@@ -265,12 +265,12 @@ impl Hyperboloid {
     /// The nearest point to `p` under a similarity.
     ///
     /// # Errors
-    /// [`NoNearestPoint::Map`] for other maps.
+    /// [`NearestPointError::Map`] for other maps.
     pub fn closest_point(
         &self,
         world_from_object: &Transform,
         p: DVec3,
-    ) -> Result<NearestPoint, NoNearestPoint> {
+    ) -> Result<NearestPoint, NearestPointError> {
         under_similarity(world_from_object, p, |p| {
             let mut best = self.nearest_at(p, 0.0);
             let mut take = |v: f64| best = best.or_nearer(self.nearest_at(p, v));

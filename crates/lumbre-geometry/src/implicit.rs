@@ -41,7 +41,7 @@ pub struct ImplicitSurface {
 
 /// Evaluations after which what is left of a ray is decided by the signs at its ends alone: more are needed only along a ray that
 /// lies in the surface, or nearly.
-const MOST_EVALUATIONS: u32 = 1 << 14;
+const MAX_EVALUATIONS: u32 = 1 << 14;
 
 impl ImplicitSurface {
     /// The surface of a function within a box.
@@ -140,7 +140,7 @@ impl ImplicitSurface {
             let piece = self.along(ray, Interval { low: from, high: to });
             evaluations += 1;
             let middle = 0.5 * from + 0.5 * to;
-            let can_be_halved = from < middle && middle < to && evaluations < MOST_EVALUATIONS;
+            let can_be_halved = from < middle && middle < to && evaluations < MAX_EVALUATIONS;
             if !piece.value.contains(0.0) && begins_inside == ends_inside {
                 continue;
             }
@@ -167,7 +167,7 @@ impl ImplicitSurface {
                 let size = |t: f64| self.along(ray, Interval::point(t)).value.middle().abs();
                 return if size(from) <= size(to) { from } else { to };
             }
-            // Newton's step from the middle converges sooner, where it stays in the piece.
+            // Newton's step from the middle converges faster where it stays in the piece.
             let here = self.along(ray, Interval::point(middle));
             let value = here.value.middle();
             if (value < 0.0) == begins_inside {

@@ -33,7 +33,7 @@ pub use curves::{CurveKind, Curves};
 pub use explain::{Candidate, Explanation, Fate, Operand, Quantity, Remark, Step, Topic, Value};
 pub use hit::{DirectionSample, Root, Roots, Surface, SurfaceSample};
 pub use implicit::ImplicitSurface;
-pub use nearest::{NearestPoint, NoNearestPoint, nearest_on_triangle, similarity_factor};
+pub use nearest::{NearestPoint, NearestPointError, nearest_on_triangle, similarity_factor};
 pub use patch::{PatchCrossing, PatchCrossings, PatchPlace};
 pub use placed::PlacedShape;
 pub use ray::Ray;

@@ -22,7 +22,7 @@ pub struct NearestPoint {
 /// Why there is no nearest point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum NoNearestPoint {
+pub enum NearestPointError {
     /// The given point is not finite.
     NotFinite,
     /// The shape is curved, its map is not a similarity (to within 1e-13), and there is no method for its
@@ -36,7 +36,7 @@ pub enum NoNearestPoint {
     Csg,
 }
 
-impl std::fmt::Display for NoNearestPoint {
+impl std::fmt::Display for NearestPointError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::NotFinite => "the point is not finite",
@@ -48,9 +48,9 @@ impl std::fmt::Display for NoNearestPoint {
     }
 }
 
-impl std::error::Error for NoNearestPoint {}
+impl std::error::Error for NearestPointError {}
 
-pub(crate) type Nearest = Result<NearestPoint, NoNearestPoint>;
+pub(crate) type Nearest = Result<NearestPoint, NearestPointError>;
 
 impl NearestPoint {
     /// The nearer of the two; the first when they are equally near.
@@ -68,7 +68,7 @@ pub(crate) fn under_similarity(
     if world_from_object.is_identity() {
         return Ok(nearest(p));
     }
-    let factor = similarity_factor(world_from_object).ok_or(NoNearestPoint::Map)?;
+    let factor = similarity_factor(world_from_object).ok_or(NearestPointError::Map)?;
     let found = nearest(world_from_object.inverse_point(p));
     let point = world_from_object.point(found.point);
     Ok(NearestPoint { point, distance: factor * found.distance, ..found })

@@ -12,8 +12,8 @@ use crate::shape::{check, open_surface, sampled_by_area};
 use crate::support::{arc_support, azimuth, bounds_from_support, length};
 use crate::twofold::Number;
 use crate::{
-    Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface, SurfaceSample,
-    measure,
+    Aabb, BoundingVolume, NearestPoint, NearestPointError, Ray, Root, Roots, ShapeError, Surface,
+    SurfaceSample, measure,
 };
 
 /// The surface `z = zmax (x² + y²)/radius²` between two heights: a bowl, open upwards, with the given radius at
@@ -190,12 +190,12 @@ impl Paraboloid {
     /// The nearest point to `p` under a similarity.
     ///
     /// # Errors
-    /// [`NoNearestPoint::Map`] for other maps.
+    /// [`NearestPointError::Map`] for other maps.
     pub fn closest_point(
         &self,
         world_from_object: &Transform,
         p: DVec3,
-    ) -> Result<NearestPoint, NoNearestPoint> {
+    ) -> Result<NearestPoint, NearestPointError> {
         under_similarity(world_from_object, p, |p| {
             let meridian = Meridian::new(p, self.phi_max);
             let (inner, rim) = (self.radius_at(self.bottom()), self.radius_at(self.z_max));

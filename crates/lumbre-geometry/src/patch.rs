@@ -12,7 +12,7 @@ use crate::shape::{check, open_surface};
 use crate::support::bounds_from_support;
 use crate::triangle::{Side, WatertightRay, solid_angle_of};
 use crate::{
-    Aabb, BoundingVolume, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError,
+    Aabb, BoundingVolume, DirectionSample, NearestPoint, NearestPointError, Ray, Root, Roots, ShapeError,
     Surface, SurfaceSample, density, measure,
 };
 
@@ -298,7 +298,7 @@ impl BilinearPatch {
         &self,
         world_from_object: &Transform,
         p: DVec3,
-    ) -> Result<NearestPoint, NoNearestPoint> {
+    ) -> Result<NearestPoint, NearestPointError> {
         let [q00, q10, q01, q11] = self.corners().map(|corner| world_from_object.point(corner) - p);
         let at = |u: f64, v: f64| (1.0 - v) * ((1.0 - u) * q00 + u * q10) + v * ((1.0 - u) * q01 + u * q11);
         let mut best = (DVec2::ZERO, q00);

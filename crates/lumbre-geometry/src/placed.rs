@@ -5,7 +5,7 @@ use lumbre_math::{DMat3, DVec2, DVec3, Transform};
 
 use crate::support::length;
 use crate::{
-    Aabb, BoundingVolume, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, Shape, Surface,
+    Aabb, BoundingVolume, DirectionSample, NearestPoint, NearestPointError, Ray, Root, Roots, Shape, Surface,
     SurfaceSample, measure, scaled,
 };
 
@@ -82,8 +82,8 @@ impl PlacedShape {
     /// The point of the surface that is nearest to `p`, both in world space: see [`Shape::closest_point`].
     ///
     /// # Errors
-    /// [`NoNearestPoint`] where there is no method for the shape, or none under its map.
-    pub fn closest_point(&self, p: DVec3) -> Result<NearestPoint, NoNearestPoint> {
+    /// [`NearestPointError`] where there is no method for the shape, or none under its map.
+    pub fn closest_point(&self, p: DVec3) -> Result<NearestPoint, NearestPointError> {
         self.shape.closest_point(&self.world_from_object(), p)
     }
 
@@ -91,7 +91,11 @@ impl PlacedShape {
     ///
     /// # Errors
     /// As for [`PlacedShape::closest_point`].
-    pub fn closest_point_under(&self, outer: &Transform, p: DVec3) -> Result<NearestPoint, NoNearestPoint> {
+    pub fn closest_point_under(
+        &self,
+        outer: &Transform,
+        p: DVec3,
+    ) -> Result<NearestPoint, NearestPointError> {
         match &self.world_from_object {
             None => self.shape.closest_point(outer, p),
             Some(m) => self.shape.closest_point(&(*outer * **m), p),

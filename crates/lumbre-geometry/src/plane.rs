@@ -7,7 +7,7 @@ use crate::line::plane_crossing;
 use crate::shape::{check, unsampled};
 use crate::support::dot_size;
 use crate::twofold::point;
-use crate::{Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface};
+use crate::{Aabb, BoundingVolume, NearestPoint, NearestPointError, Ray, Root, Roots, ShapeError, Surface};
 
 /// The plane through a point; as a solid, the half-space below it, opposite to the normal.
 ///
@@ -110,7 +110,7 @@ impl Plane {
         &self,
         world_from_object: &Transform,
         p: DVec3,
-    ) -> Result<NearestPoint, NoNearestPoint> {
+    ) -> Result<NearestPoint, NearestPointError> {
         let point = world_from_object.point(self.point);
         let normal = world_from_object.normal(self.normal);
         let normal = normal / normal.abs().max_element();

@@ -15,7 +15,7 @@ use crate::shape::check;
 use crate::support::{bounds_from_support, length};
 use crate::twofold::{Number, components, dot};
 use crate::{
-    Aabb, BoundingVolume, DirectionSample, NearestPoint, NoNearestPoint, PlacedShape, Ray, Root, Roots,
+    Aabb, BoundingVolume, DirectionSample, NearestPoint, NearestPointError, PlacedShape, Ray, Root, Roots,
     Shape, ShapeError, Sphere, Surface, SurfaceSample, density, measure,
 };
 
@@ -410,13 +410,13 @@ impl Quadric {
     /// The nearest point of a closed quadric to `p`, under any map.
     ///
     /// # Errors
-    /// [`NoNearestPoint::OpenQuadric`] for others.
+    /// [`NearestPointError::OpenQuadric`] for others.
     pub fn closest_point(
         &self,
         world_from_object: &Transform,
         p: DVec3,
-    ) -> Result<NearestPoint, NoNearestPoint> {
-        let ellipsoid = self.ellipsoid.as_ref().ok_or(NoNearestPoint::OpenQuadric)?;
+    ) -> Result<NearestPoint, NearestPointError> {
+        let ellipsoid = self.ellipsoid.as_ref().ok_or(NearestPointError::OpenQuadric)?;
         ellipsoid.shape().closest_point(&(*world_from_object * ellipsoid.world_from_object()), p)
     }
 

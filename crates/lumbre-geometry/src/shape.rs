@@ -122,14 +122,14 @@ macro_rules! shapes {
             /// nearest point up to rounding.
             ///
             /// # Errors
-            /// [`NoNearestPoint`] where there is no method; the result is never merely approximate.
+            /// [`NearestPointError`] where there is no method; the result is never merely approximate.
             pub fn closest_point(
                 &self,
                 world_from_object: &Transform,
                 p: DVec3,
-            ) -> Result<NearestPoint, NoNearestPoint> {
+            ) -> Result<NearestPoint, NearestPointError> {
                 if !p.is_finite() {
-                    return Err(NoNearestPoint::NotFinite);
+                    return Err(NearestPointError::NotFinite);
                 }
                 match self { $(Self::$shape(shape) => shape.closest_point(world_from_object, p),)+ }
             }

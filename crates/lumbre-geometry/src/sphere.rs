@@ -12,7 +12,7 @@ use crate::shape::check;
 use crate::support::{arc_support, azimuth, bounds_from_support, length, on_side_of, unit};
 use crate::twofold::{Twofold, dot, place_near, point};
 use crate::{
-    Aabb, BoundingVolume, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError,
+    Aabb, BoundingVolume, DirectionSample, NearestPoint, NearestPointError, Ray, Root, Roots, ShapeError,
     Surface, SurfaceSample, density, measure,
 };
 
@@ -252,12 +252,12 @@ impl Sphere {
     /// The nearest point to `p` under any map; of a part of a sphere, under a similarity.
     ///
     /// # Errors
-    /// [`NoNearestPoint::Map`] for a part of a sphere under another map.
+    /// [`NearestPointError::Map`] for a part of a sphere under another map.
     pub fn closest_point(
         &self,
         world_from_object: &Transform,
         p: DVec3,
-    ) -> Result<NearestPoint, NoNearestPoint> {
+    ) -> Result<NearestPoint, NearestPointError> {
         if self.is_whole() && !world_from_object.is_identity() {
             // An ellipsoid, or a sphere again.
             let center = world_from_object.point(self.center);

@@ -10,7 +10,7 @@ use crate::nearest::on_triangle;
 use crate::shape::{check, open_surface};
 use crate::support::bounds_from_support;
 use crate::{
-    Aabb, BoundingVolume, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError,
+    Aabb, BoundingVolume, DirectionSample, NearestPoint, NearestPointError, Ray, Root, Roots, ShapeError,
     Surface, SurfaceSample, density, measure,
 };
 
@@ -364,7 +364,7 @@ impl Triangle {
         &self,
         world_from_object: &Transform,
         p: DVec3,
-    ) -> Result<NearestPoint, NoNearestPoint> {
+    ) -> Result<NearestPoint, NearestPointError> {
         let corners = self.corners().map(|corner| world_from_object.point(corner));
         Ok(on_triangle(p, corners, 0))
     }

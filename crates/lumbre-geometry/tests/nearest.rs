@@ -4,7 +4,7 @@
 
 use lumbre_geometry::{
     Aabb, BilinearPatch, Capsule, Cone, Csg, Cuboid, Cylinder, Disk, Hyperboloid, NearestPoint,
-    NoNearestPoint, Paraboloid, PlacedShape, Plane, Quadric, Shape, ShapeError, Sphere, Torus, Triangle,
+    NearestPointError, Paraboloid, PlacedShape, Plane, Quadric, Shape, ShapeError, Sphere, Torus, Triangle,
     nearest_on_triangle,
 };
 use lumbre_math::random::RandomStream;
@@ -191,7 +191,7 @@ fn no_point_of_any_shape_is_nearer() {
             let middle = map.point(DVec3::new(0.4, 0.6, 0.9));
             let reach = map.vector(DVec3::ONE).length() * 2.0;
             if !keeps_angles && !under_any {
-                assert_eq!(shape.closest_point(&map, middle), Err(NoNearestPoint::Map), "{name}");
+                assert_eq!(shape.closest_point(&map, middle), Err(NearestPointError::Map), "{name}");
                 refused += 1;
                 continue;
             }
@@ -325,7 +325,7 @@ fn a_composed_solid_answers_where_it_can_and_is_never_wrong() {
             let p = DVec3::new(1.0, 0.0, 0.0) + 3.0 * random.vector();
             match shape.closest_point(&Transform::IDENTITY, p) {
                 Err(error) => {
-                    assert_eq!(error, NoNearestPoint::Csg);
+                    assert_eq!(error, NearestPointError::Csg);
                     refused += 1;
                 }
                 Ok(found) => {
@@ -358,8 +358,8 @@ fn what_has_no_method_says_so() {
     let clip = Aabb { min: DVec3::splat(-1.0), max: DVec3::splat(1.5) };
     let saddle = Quadric::new([1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0], Some(clip)).unwrap();
     let shape = Shape::from(saddle);
-    assert_eq!(shape.closest_point(&Transform::IDENTITY, DVec3::ONE), Err(NoNearestPoint::OpenQuadric));
+    assert_eq!(shape.closest_point(&Transform::IDENTITY, DVec3::ONE), Err(NearestPointError::OpenQuadric));
     let ball = Shape::from(Sphere::new(DVec3::ONE, 2.5).unwrap());
     let nowhere = DVec3::new(0.5, f64::NAN, 0.0);
-    assert_eq!(ball.closest_point(&Transform::IDENTITY, nowhere), Err(NoNearestPoint::NotFinite));
+    assert_eq!(ball.closest_point(&Transform::IDENTITY, nowhere), Err(NearestPointError::NotFinite));
 }

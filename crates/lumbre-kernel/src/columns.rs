@@ -1,4 +1,4 @@
-//! Rays of a picture and their hits, in columns.
+//! Picture rays and their hits, in columns.
 
 use std::ops::Range;
 
@@ -13,36 +13,36 @@ use crate::trace::picture::Crossing;
 use crate::tree::picture_start::PictureStart;
 use crate::tree::{GeometryKind, Tree};
 
-/// Rays of a picture, in columns of equal length: `t` starts at 0.
+/// Picture rays, in columns of equal length: `t` starts at 0.
 #[derive(Clone, Copy, Debug)]
 pub struct RayColumns<'a> {
-    /// Where `t` is 0: x, y and z.
+    /// The point at `t` = 0: x, y and z.
     pub origin: [&'a [f64]; 3],
-    /// Where `t` grows to, of any length but zero.
+    /// The direction of increasing `t`, of any length but zero.
     pub direction: [&'a [f32]; 3],
-    /// The largest `t` that counts, itself included; `None` where all are infinite.
+    /// The largest `t`, inclusive; `None` if all are infinite.
     pub t_max: Option<&'a [f32]>,
-    /// The time of each, in the unit of the keys of what moves; `None` where all are 0.
+    /// The time of each ray, in the unit of motion keys; `None` if all are 0.
     pub time: Option<&'a [f64]>,
 }
 
 impl RayColumns<'_> {
-    /// How many rays there are.
+    /// Number of rays.
     #[inline]
     pub fn len(&self) -> usize {
         self.origin[0].len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no rays.
     #[inline]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// One of them, in double precision.
+    /// A ray, in double precision.
     ///
     /// # Panics
-    /// When `i` is out of range.
+    /// If `i` is out of range.
     #[inline]
     pub fn ray(&self, i: usize) -> Ray {
         let [x, y, z] = self.direction.map(|column| f64::from(column[i]));
@@ -55,7 +55,7 @@ impl RayColumns<'_> {
         }
     }
 
-    /// Some of them.
+    /// A range of the rays.
     pub(crate) fn slice(&self, range: Range<usize>) -> Self {
         let RayColumns { origin, direction, t_max, time } = *self;
         Self {
@@ -66,7 +66,7 @@ impl RayColumns<'_> {
         }
     }
 
-    /// Where a ray starts, as single precision knows it.
+    /// The start of a ray in single precision.
     #[inline(always)]
     pub(crate) fn local(&self, picture: &PictureStart, i: usize) -> Ray32 {
         let origin = DVec3::from_array(self.origin.map(|column| column[i])) - picture.rounding.origin;
@@ -78,13 +78,13 @@ impl RayColumns<'_> {
         }
     }
 
-    /// Adds some of them, rounded, relative to the mesh.
+    /// Appends a range of the rays, rounded, relative to the mesh.
     pub(crate) fn push_local(&self, picture: &PictureStart, range: Range<usize>, rays: &mut Vec<Ray32>) {
         rays.extend(range.map(|i| self.local(picture, i)));
     }
 
     /// # Panics
-    /// When the columns differ in length.
+    /// If the columns differ in length.
     pub(crate) fn check(&self) {
         let len = self.len();
         let are_equal = self.origin.iter().all(|column| column.len() == len)
@@ -98,21 +98,21 @@ impl RayColumns<'_> {
 /// The closest hits of rays, in columns. The vectors keep their memory from one search to the next.
 #[derive(Clone, Debug, Default)]
 pub struct HitColumns {
-    /// The id of the geometry; [`HitColumns::MISS`] where nothing is hit, and the other columns mean nothing.
+    /// The id of the geometry; [`HitColumns::MISS`] if nothing is hit, and then the other columns are undefined.
     pub id: Vec<u32>,
-    /// The triangle of a mesh, the sphere of a cloud, the primitive of a custom geometry, else 0.
+    /// The triangle of a mesh, the sphere of a cloud, the primitive of a custom geometry, otherwise 0.
     pub primitive: Vec<u32>,
-    /// Of a triangle, the barycentrics of its second and third corner.
+    /// For a triangle, the barycentrics of its second and third corner.
     pub local: [Vec<f32>; 2],
-    /// Where along the ray.
+    /// The position along the ray.
     pub t: Vec<f32>,
-    /// The position of the geometry in the list of the tree; with the bit [`WHOLE`], that of the hit among `whole`.
+    /// The position of the geometry in the list of the tree; with the bit [`WHOLE`], the index of the hit in `whole`.
     geometry: Vec<u32>,
-    /// Hits that the columns do not hold whole.
+    /// Hits that do not fit the columns.
     whole: Vec<WholeHit>,
 }
 
-/// A hit in an instance of an instance, or any other.
+/// A hit in a nested instance, or any other hit.
 #[derive(Clone, Debug)]
 enum WholeHit {
     /// With the position and the id of the instance.
@@ -124,34 +124,34 @@ enum WholeHit {
     Nested(Box<Hit>),
 }
 
-/// Marks a place among whole hits; with the other, one of a triangle of a mesh in the tree itself.
+/// Marks an index into `whole`; without it, the hit is on a triangle of a mesh in the tree itself.
 const WHOLE: u32 = 1 << 31;
 const PLAIN: u32 = 1 << 30;
 
 impl HitColumns {
-    /// The id where nothing is hit: no geometry may have it.
+    /// The id if nothing is hit: no geometry may have it.
     pub const MISS: u32 = u32::MAX;
 
-    /// How many rays they answer.
+    /// Number of rays that they answer.
     #[inline]
     pub fn len(&self) -> usize {
         self.id.len()
     }
 
-    /// Whether they answer none.
+    /// Whether they answer no rays.
     #[inline]
     pub fn is_empty(&self) -> bool {
         self.id.is_empty()
     }
 
-    /// Whether a ray hits a triangle of a [`TriangleMesh`](crate::TriangleMesh) that stands in the tree itself, in no instance: the
-    /// columns then say all.
+    /// Whether a ray hits a triangle of a [`TriangleMesh`](crate::TriangleMesh) in the tree itself, outside of
+    /// instances: the columns then hold the complete hit.
     #[inline]
     pub fn is_plain(&self, i: usize) -> bool {
         self.id[i] != Self::MISS && (self.geometry[i] & WHOLE == 0 || self.geometry[i] & PLAIN != 0)
     }
 
-    /// The whole hit of a ray, as [`Accel::surface`](crate::Accel::surface) and its like take it.
+    /// The complete hit of a ray, for [`Accel::surface`](crate::Accel::surface) and similar methods.
     pub fn to_hit(&self, i: usize) -> Option<Hit> {
         let (id, geometry) = (self.id[i], self.geometry[i]);
         if id == Self::MISS {
@@ -168,13 +168,13 @@ impl HitColumns {
         Some(hit(Winner { root, geometry, primitive: self.primitive[i] }, id, None))
     }
 
-    /// Makes room for the hits of so many rays, which are all misses until they are put.
+    /// Resizes the columns for this many rays, which are misses until they are set.
     pub(crate) fn clear(&mut self, len: usize) {
         let Self { id, primitive, local: [u, v], t, geometry, whole } = self;
         whole.clear();
         id.clear();
         id.resize(len, Self::MISS);
-        // What stands there means nothing.
+        // Existing values are overwritten.
         primitive.resize(len, 0);
         geometry.resize(len, 0);
         for column in [u, v, t] {
@@ -198,7 +198,7 @@ impl HitColumns {
         self.t[i] = t;
     }
 
-    /// A hit of a triangle in single precision, or of anything.
+    /// A hit on a triangle in single precision, or on any primitive.
     #[inline(always)]
     pub(crate) fn put_crossing(&mut self, i: usize, tree: &Tree, crossing: Crossing) {
         let Winner { root, geometry, primitive } = crossing.winner;
@@ -237,7 +237,7 @@ impl HitColumns {
         self.whole.push(WholeHit::Near { winner, id, instance });
     }
 
-    /// What the columns hold of the whole hit that is pushed next.
+    /// The column values of the hit that is pushed to `whole` next.
     #[inline(always)]
     fn put_rounded(&mut self, i: usize, (id, primitive): (u32, u32), root: &Root, mark: u32) {
         let place = self.whole.len() as u32 | WHOLE | mark;

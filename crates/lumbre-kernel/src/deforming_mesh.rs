@@ -1,4 +1,4 @@
-//! Triangles whose vertices move while rays look: skins and morph targets.
+//! Meshes whose vertices move during a render: skins and morph targets.
 
 use lumbre_geometry::{Aabb, Ray, Root, Roots, Surface};
 use lumbre_math::{DVec3, Vec3};
@@ -9,14 +9,15 @@ use crate::surface;
 use crate::tree::geometry::has_area;
 use crate::tree::geometry::{CustomGeometry, TriangleMesh};
 
-/// Triangles by index, each of whose vertices goes straight from where it is at one moment to where it is at the next.
+/// An indexed mesh whose vertices move on straight lines between the positions of successive moments.
 ///
-/// A tree holds it as [`crate::GeometryKind::Custom`]. A ray meets it as it would meet the [`TriangleMesh`] of its own time
-/// ([`DeformingMesh::at`]), to the bit, and as watertight: a vertex is interpolated once for all triangles around it, and rounded
-/// to single precision. But of a mesh that is not closed, rays that go exactly through an edge of its border may miss it.
+/// A tree contains it as [`crate::GeometryKind::Custom`]. A ray meets it as it would meet the [`TriangleMesh`] at its
+/// time ([`DeformingMesh::at`]), to the bit, and as watertight: a vertex is interpolated once for all triangles around
+/// it, and rounded to single precision. If the mesh is not closed, rays exactly through an edge of its border may miss
+/// it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeformingMesh {
-    // One moment at least; as many positions in each as any triangle asks for, all finite; a start before the end.
+    // At least one moment; each has as many finite positions as the triangles need; the start is before the end.
     origin: DVec3,
     start: f64,
     end: f64,
@@ -24,7 +25,7 @@ pub struct DeformingMesh {
     indices: Vec<[u32; 3]>,
 }
 
-/// A time of a deforming mesh: from one moment, so much of the way to the next.
+/// A time of a deforming mesh: a moment, and the fraction of the way to the next.
 #[derive(Clone, Copy)]
 struct Moment {
     from: usize,
@@ -32,12 +33,12 @@ struct Moment {
 }
 
 impl DeformingMesh {
-    /// `moments` are the positions of all vertices, relative to `origin`, at times evenly spaced from `start` to `end`; before
-    /// and after, the mesh is as then.
+    /// `moments` are the positions of all vertices, relative to `origin`, at times evenly spaced from `start` to `end`.
+    /// Before and after, the mesh does not move.
     ///
     /// # Errors
-    /// [`BuildError::VertexOutOfRange`] where a triangle names a vertex that some moment does not have, and
-    /// [`BuildError::NotFinite`], both as of geometry 0, the latter also for times that are not finite or do not ascend.
+    /// [`BuildError::VertexOutOfRange`] if a triangle refers to a vertex that some moment lacks, and
+    /// [`BuildError::NotFinite`], both for geometry 0, the latter also for times that are not finite or do not ascend.
     pub fn new(
         origin: DVec3,
         [start, end]: [f64; 2],
@@ -65,7 +66,7 @@ impl DeformingMesh {
         &self.indices
     }
 
-    /// The mesh as it is at a time.
+    /// The mesh at a time.
     pub fn at(&self, time: f64) -> TriangleMesh {
         let moment = self.moment(time);
         let vertices = self.moments.iter().map(Vec::len).min().unwrap_or(0);
@@ -73,8 +74,8 @@ impl DeformingMesh {
         TriangleMesh { origin: self.origin, positions, indices: self.indices.clone() }
     }
 
-    /// From which moment how much of the way to the next a time is: what else stands at the vertices goes with them. The
-    /// moment has a next one wherever the part is not 0.
+    /// The moment of a time, and the fraction of the way to the next, for interpolating other vertex attributes. If the
+    /// fraction is not 0, the moment has a next one.
     pub fn part(&self, time: f64) -> (usize, f64) {
         let Moment { from, part } = self.moment(time);
         (from, part)
@@ -83,7 +84,7 @@ impl DeformingMesh {
     fn moment(&self, time: f64) -> Moment {
         let last = self.moments.len() - 1;
         let along = (time - self.start) / (self.end - self.start) * last as f64;
-        // A NaN is no time after the start.
+        // NaN counts as before the start.
         if along > 0.0 {
             let from = (along as usize).min(last);
             Moment { from, part: if from == last { 0.0 } else { along - from as f64 } }
@@ -92,7 +93,7 @@ impl DeformingMesh {
         }
     }
 
-    /// It lies between the two places, in every coordinate.
+    /// Lies between the two positions in every coordinate.
     fn vertex(&self, vertex: u32, Moment { from, part }: Moment) -> Vec3 {
         let here = self.moments[from][vertex as usize];
         if part == 0.0 {
@@ -100,7 +101,7 @@ impl DeformingMesh {
         }
         let next = self.moments[from + 1][vertex as usize];
         let (start, way) = (here.as_dvec3(), next.as_dvec3() - here.as_dvec3());
-        // Where one place is far and the other near the origin, rounding might lead beyond.
+        // Rounding might overshoot if one position is far from the origin and the other near it.
         (start + part * way).as_vec3().clamp(here.min(next), here.max(next))
     }
 
@@ -115,8 +116,8 @@ impl CustomGeometry for DeformingMesh {
         self.indices.len() as u32
     }
 
-    /// Between two moments, each vertex stays between its two places; so the box around the places at all moments holds
-    /// the triangle at every time.
+    /// Between two moments, each vertex stays between its two positions, so the box around the positions at all moments
+    /// bounds the triangle at every time.
     fn bounds(&self, triangle: u32) -> Option<Aabb> {
         let corners = self.indices[triangle as usize];
         let places = self.moments.iter().flat_map(|list| corners.map(|vertex| list[vertex as usize]));
@@ -127,7 +128,7 @@ impl CustomGeometry for DeformingMesh {
 
     fn closest(&self, triangle: u32, ray: &Ray) -> Option<Root> {
         let corners = self.corners(triangle, ray.time);
-        // Else it may be hit from the side where it is no more than a line.
+        // Without an area it could be hit from the side.
         if !has_area(&corners) {
             return None;
         }

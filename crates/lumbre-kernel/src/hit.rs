@@ -6,15 +6,15 @@ use lumbre_geometry::{PlacedShape, Root};
 use lumbre_math::{DVec3, Transform};
 use smallvec::SmallVec;
 
-/// The ids of the instances that a ray went through, outermost first; empty for what stands in the tree itself.
+/// The ids of the instances that a ray went through, outermost first; empty outside of instances.
 pub type InstancePath = SmallVec<[u32; 4]>;
 
-/// What a hit is on, and where it stands.
+/// What a hit is on, and where it is.
 #[derive(Clone, Debug)]
 pub struct Target<'a> {
-    /// The maps of the instances around it, outermost first: their product leads from the space of the shape to the world.
+    /// The maps of the instances around it, outermost first: their product maps the space of the shape to the world.
     pub placements: Vec<Transform>,
-    /// What it is, in the space of the innermost instance.
+    /// The shape, in the space of the innermost instance.
     pub shape: TargetShape<'a>,
 }
 
@@ -25,18 +25,18 @@ pub enum TargetShape<'a> {
     Exact(Cow<'a, PlacedShape>),
     /// A triangle of a mesh, by its corners.
     Triangle([DVec3; 3]),
-    /// Geometry that the kernel does not know.
+    /// Custom geometry.
     Custom,
 }
 
 /// A crossing, and what was crossed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hit {
-    /// Where along the ray, which part, and the barycentrics of a triangle.
+    /// The position along the ray, which part of a shape, and the barycentrics of a triangle.
     pub root: Root,
     /// The id of the geometry.
     pub id: u32,
-    /// The triangle of a mesh, the sphere of a cloud, the primitive of a custom geometry, else 0.
+    /// The triangle of a mesh, the sphere of a cloud, the primitive of a custom geometry, otherwise 0.
     pub primitive: u32,
     /// The position of the geometry in the list that its tree was built from.
     pub geometry: u32,

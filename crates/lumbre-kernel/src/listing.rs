@@ -1,4 +1,4 @@
-//! Every primitive of a tree, for those who look at what a ray did not meet.
+//! Enumerates every primitive of a tree, including those that no ray meets.
 
 use std::ops::ControlFlow;
 
@@ -7,7 +7,7 @@ use lumbre_geometry::Root;
 use crate::hit::{Hit, InstancePath};
 use crate::tree::{GeometryKind, Tree};
 
-/// Visits every primitive as a hit without a crossing, those of instances once for each instance.
+/// Visits every primitive as a hit without a crossing; those of instances once for each instance.
 pub(crate) fn each(tree: &Tree, visit: &mut impl FnMut(&Hit) -> ControlFlow<()>) -> ControlFlow<()> {
     let mut hit = Hit {
         root: Root::at(f64::NAN),

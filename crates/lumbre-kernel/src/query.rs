@@ -1,4 +1,4 @@
-//! What a query takes into account.
+//! The part of a tree that a query includes.
 
 use std::fmt;
 
@@ -22,16 +22,16 @@ pub struct Query<'q> {
     pub(crate) filter: Option<&'q dyn Fn(&Hit) -> bool>,
 }
 
-/// Which sides of surfaces count: of a triangle by its winding, of anything else by its normal.
+/// Which sides of surfaces count: for a triangle by its winding, for other primitives by their normals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Faces {
     /// Both sides.
     #[default]
     Both,
-    /// Where the ray comes from the side of the normal: back faces are culled.
+    /// Only the side of the normal: back faces are culled.
     Front,
-    /// Where it does not.
+    /// Only the other side.
     Back,
 }
 
@@ -42,20 +42,20 @@ impl Default for Query<'_> {
 }
 
 impl<'q> Query<'q> {
-    /// Takes everything into account.
+    /// Includes everything.
     pub fn new() -> Self {
         Self { mask: u32::MAX, exclude: None, faces: Faces::Both, filter: None }
     }
 
-    /// Only geometry whose mask shares a bit with `mask`, and in instances only where theirs does, too: see
-    /// [`Accel::with_masks`](crate::Accel::with_masks). `u32::MAX` takes all geometry, even that with a mask of zero.
+    /// Only geometry whose mask shares a bit with `mask`; in an instance, the instance's mask must too: see
+    /// [`Accel::with_masks`](crate::Accel::with_masks). `u32::MAX` includes all geometry, even with a mask of zero.
     #[must_use]
     pub fn mask(self, mask: u32) -> Self {
         Self { mask, ..self }
     }
 
-    /// Leaves out one primitive, as the one on which the ray starts: that of a hit in the same tree. All crossings of a curved
-    /// shape, such as the far side of a sphere, are left out with it.
+    /// Excludes one primitive, such as the one on which the ray starts, by a hit in the same tree. All crossings of a
+    /// curved shape, such as the far side of a sphere, are excluded with it.
     #[must_use]
     pub fn exclude(self, hit: &'q Hit) -> Self {
         Self { exclude: Some(hit), ..self }
@@ -67,14 +67,14 @@ impl<'q> Query<'q> {
         Self { faces, ..self }
     }
 
-    /// Only hits for which `filter` returns true, such as the opaque ones of a leaf's texture. It is called in any order of `t`, may be
-    /// called more than once for a hit, and must answer by the hit alone.
+    /// Only hits for which `filter` returns true, such as the opaque ones of a leaf's texture. It is called in any
+    /// order of `t`, may be called more than once for a hit, and must depend on the hit only.
     #[must_use]
     pub fn filter(self, filter: &'q dyn Fn(&Hit) -> bool) -> Self {
         Self { filter: Some(filter), ..self }
     }
 
-    /// Whether it certainly takes everything of a tree and of its instances.
+    /// Whether it certainly includes everything of a tree and of its instances.
     #[inline(always)]
     pub(crate) fn takes_all(&self, tree: &Tree) -> bool {
         let has_masks = !tree.masks.is_empty() || tree.summary.masks_within;

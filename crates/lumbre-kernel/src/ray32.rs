@@ -3,20 +3,20 @@
 use lumbre_geometry::Ray;
 use lumbre_math::Vec3;
 
-/// The points `origin + t * direction` with `t_min <= t <= t_max`, in single precision, at time 0: what [`Accel::closest_f32`] and its
-/// like are asked with. What is said of [`Ray`] holds of it.
+/// The points `origin + t * direction` with `t_min <= t <= t_max`, in single precision, at time 0: the rays of
+/// [`Accel::closest_f32`] and similar methods. The rules of [`Ray`] apply.
 ///
 /// [`Accel::closest_f32`]: crate::Accel::closest_f32
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Ray32 {
-    /// Where `t` is 0.
+    /// The point at `t` = 0.
     pub origin: Vec3,
-    /// The smallest `t` that counts, itself included.
+    /// The smallest `t`, inclusive.
     pub t_min: f32,
-    /// Where `t` grows to; any length but zero.
+    /// The direction of increasing `t`, of any length but zero.
     pub direction: Vec3,
-    /// The largest `t` that counts, itself included; may be infinite.
+    /// The largest `t`, inclusive; may be infinite.
     pub t_max: f32,
 }
 
@@ -50,21 +50,21 @@ impl Ray32 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Hit32 {
-    /// Where along the ray.
+    /// The position along the ray.
     pub t: f32,
-    /// Of a triangle, the barycentrics of its second and third corner.
+    /// For a triangle, the barycentrics of its second and third corner.
     pub local: [f32; 2],
     /// The id of the geometry.
     pub id: u32,
-    /// The triangle of a mesh, the sphere of a cloud, the primitive of a custom geometry, else 0.
+    /// The triangle of a mesh, the sphere of a cloud, the primitive of a custom geometry, otherwise 0.
     pub primitive: u32,
     /// The position of the geometry in the list that its tree was built from.
     pub geometry: u32,
-    /// The id of the outermost instance around it; [`Hit32::NO_INSTANCE`] for what stands in the tree itself.
+    /// The id of the outermost instance around it; [`Hit32::NO_INSTANCE`] outside of instances.
     pub instance: u32,
 }
 
 impl Hit32 {
-    /// Stands for no instance.
+    /// The id outside of instances.
     pub const NO_INSTANCE: u32 = u32::MAX;
 }

@@ -1,4 +1,4 @@
-//! What is computed once, for the hit that was chosen.
+//! Computes the surface at the chosen hit.
 
 use std::borrow::Cow;
 
@@ -12,7 +12,7 @@ use crate::hit::{Hit, Target, TargetShape};
 use crate::tree::sphere_block::ExactSphere;
 use crate::tree::{GeometryKind, Instance, Tree};
 
-/// The instances along a hit's route, outermost first, and the tree within the last.
+/// The instances along a hit's route, outermost first, and the innermost tree.
 fn along<'a>(tree: &'a Tree, hit: &Hit) -> (SmallVec<[&'a Instance; 4]>, &'a Tree) {
     let mut inner = tree;
     let mut instances = SmallVec::with_capacity(hit.route.len());
@@ -39,10 +39,10 @@ pub(crate) fn surface(tree: &Tree, ray: &Ray, hit: &Hit) -> Surface {
     placed_surface::<false>(tree, ray, hit)
 }
 
-/// The same for rays of pictures that leave it.
+/// The surface at a hit for picture rays that leave it.
 #[inline]
 pub(crate) fn picture_surface(tree: &Tree, ray: &Ray, hit: &Hit) -> Surface {
-    // Without one, all rays are in double precision, in instances, too.
+    // Without a picture start, all rays are in double precision, in instances too.
     if tree.picture_start().is_some() {
         placed_surface::<true>(tree, ray, hit)
     } else {
@@ -50,21 +50,21 @@ pub(crate) fn picture_surface(tree: &Tree, ray: &Ray, hit: &Hit) -> Surface {
     }
 }
 
-/// The surface at a hit; `ROUNDED`: with the error of rays that are rounded where its triangle stands. Maps take that with them.
+/// The surface at a hit; `ROUNDED`: with the error of picture rays at its triangle, which maps transform too.
 #[inline]
 fn placed_surface<const ROUNDED: bool>(tree: &Tree, ray: &Ray, hit: &Hit) -> Surface {
     if hit.route.is_empty() {
         return rounded::<ROUNDED>(tree, hit, bare_surface(tree, ray, hit));
     }
     let (instances, inner) = along(tree, hit);
-    // The same steps as the search took, for the same bits.
+    // The same steps as in the search, for the same bits.
     let ray = instances.iter().fold(*ray, |ray, instance| instance.world_from_object.object_ray(&ray));
     let surface = rounded::<ROUNDED>(inner, hit, bare_surface(inner, &ray, hit));
     let placed = |surface, instance: &&Instance| place(&surface, &instance.world_from_object.at(ray.time));
     instances.iter().rev().fold(surface, placed)
 }
 
-/// What was hit, and where it stands.
+/// What was hit, and where it is.
 pub(crate) fn target<'a>(tree: &'a Tree, ray: &Ray, hit: &Hit) -> Target<'a> {
     let (instances, inner) = along(tree, hit);
     let shape = match &inner.geometries[hit.geometry as usize].kind {
@@ -92,7 +92,7 @@ pub(crate) fn surface_in_object(tree: &Tree, ray: &Ray, hit: &Hit) -> Surface {
     bare_surface(inner, &ray, hit)
 }
 
-/// A surface of a tree, with the error of rays that are rounded there.
+/// A surface of a tree, with the error of picture rays there.
 #[inline]
 fn rounded<const ROUNDED: bool>(tree: &Tree, hit: &Hit, mut surface: Surface) -> Surface {
     if ROUNDED
@@ -104,7 +104,7 @@ fn rounded<const ROUNDED: bool>(tree: &Tree, hit: &Hit, mut surface: Surface) ->
     surface
 }
 
-/// The surface at a hit in the tree that its geometry stands in.
+/// The surface at a hit in the tree that contains its geometry.
 #[inline]
 fn bare_surface(tree: &Tree, ray: &Ray, hit: &Hit) -> Surface {
     match &tree.geometries[hit.geometry as usize].kind {
@@ -122,7 +122,7 @@ fn bare_surface(tree: &Tree, ray: &Ray, hit: &Hit) -> Surface {
 
 /// A point of a triangle from its barycentrics (b1, b2).
 ///
-/// The error is that of the combination, γ₇ Σ|bᵢ pᵢ| (M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering",
+/// Its error is that of the combination, γ₇ Σ|bᵢ pᵢ| (M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering",
 /// 3rd edition, 2016, section 3.9), and one rounding for the mesh's origin.
 pub(crate) fn triangle_surface(origin: DVec3, corners: [Vec3; 3], uv: DVec2) -> Surface {
     let [p0, p1, p2] = corners.map(|corner| corner.as_dvec3());
@@ -143,13 +143,13 @@ pub(crate) fn triangle_surface(origin: DVec3, corners: [Vec3; 3], uv: DVec2) -> 
     }
 }
 
-/// The same in double precision: from the first corner, so that the error is that of what lies between, and one rounding of
-/// the place.
+/// As [`triangle_surface`], in double precision: from the first corner, so that the error is that of the differences
+/// plus one rounding of the position.
 fn precise_surface(&[p0, p1, p2]: &[DVec3; 3], uv: DVec2) -> Surface {
     let (dpdu, dpdv) = (p1 - p0, p2 - p0);
     let terms = [uv.x * dpdu, uv.y * dpdv];
     let point = p0 + (terms[0] + terms[1]);
-    // Where the sides are nearly parallel, their products are taken with an error each.
+    // If the sides are nearly parallel, their cross product is computed with compensated differences.
     let normal = |x: usize, y: usize| dop(dpdu[x], dpdv[y], dpdu[y], dpdv[x]);
     Surface {
         point,
@@ -170,7 +170,7 @@ fn place(surface: &Surface, world_from_object: &Transform) -> Surface {
     let sizes = DMat3::from_cols(linear.x_axis.abs(), linear.y_axis.abs(), linear.z_axis.abs());
     let point_error = (1.0 + gamma(3)) * (sizes * surface.point_error)
         + gamma(4) * (sizes * surface.point.abs() + affine.translation.abs());
-    // The normal is N/|N| with N = L⁻ᵀ n, and its change is what N's has across it.
+    // The normal is N/|N| with N = L⁻ᵀ n; its derivative is the component of N's derivative across it.
     let scaled = world_from_object.normal(surface.normal);
     let length = scaled.length();
     let normal = unit(scaled);
@@ -190,7 +190,7 @@ fn place(surface: &Surface, world_from_object: &Transform) -> Surface {
     }
 }
 
-/// The direction of `v`, also where its square would leave the range of f64.
+/// The direction of `v`, even if its square would leave the range of f64.
 fn unit(v: DVec3) -> DVec3 {
     let v = v / v.abs().max_element();
     v / v.length()

@@ -60,7 +60,7 @@ impl std::fmt::Display for AnimationError {
 impl std::error::Error for AnimationError {}
 
 /// The largest condition number of a map.
-const MOST_CONDITION: f64 = 1e8;
+const MAX_CONDITION: f64 = 1e8;
 
 /// A linear map as a stretch followed by a rotation. The stretch is symmetric and definite.
 #[derive(Clone, Copy)]
@@ -91,7 +91,7 @@ impl Polar {
         }
         // The Frobenius norm bounds the spectral norm.
         let condition = frobenius(&stretch) * frobenius(&inverse_linear(&stretch)?);
-        (turn.is_finite() && condition <= MOST_CONDITION).then_some(Self { turn, stretch, condition })
+        (turn.is_finite() && condition <= MAX_CONDITION).then_some(Self { turn, stretch, condition })
     }
 }
 

@@ -50,7 +50,7 @@ macro_rules! warps {
             (angle * sin, cos)
         }
 
-        /// The sine and cosine of so many turns, which are exact at quarters.
+        /// The sine and cosine of this many turns, which are exact at quarters.
         #[inline]
         pub fn circle(turns: $scalar) -> ($scalar, $scalar) {
             let quarter = (4.0 * turns).round();

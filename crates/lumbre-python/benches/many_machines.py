@@ -1,9 +1,9 @@
 """How long a render takes on 1 to 10,000 workers: a formula, and a simulation that it is compared with.
 
-    python many_machines.py [folder of the plot, by default docs]
+    python many_machines.py [folder of the plot, by default docs/measurements]
 
 The costs are those of many_machines.json, which many_machines_costs.py measures. What the formula is made of is explained in
-docs/distributed-scale.md.
+docs/measurements/distributed-scale.md.
 """
 
 from __future__ import annotations
@@ -494,4 +494,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "docs"))
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "docs/measurements"))

@@ -26,7 +26,7 @@ const LEAST: usize = 256;
 /// So few are not worth waking threads for.
 const FEW: usize = 256;
 /// The answers of more rays are arrays that Python makes, which knows how much memory there is.
-const MOST_FRESH: usize = 1 << 16;
+const MAX_FRESH: usize = 1 << 16;
 
 /// Into how large pieces to cut a list, so that all threads have work to its end.
 pub(crate) fn piece_size(count: usize) -> PyResult<usize> {
@@ -77,7 +77,7 @@ pub(crate) fn closest_fresh<'py, T: Real>(
 ) -> PyResult<Option<Bound<'py, PyDict>>> {
     let rays = rays.view();
     let count = rays.len();
-    if count > MOST_FRESH {
+    if count > MAX_FRESH {
         return Ok(None);
     }
     let Some(mut fresh) = Fresh::<T>::new(fields, count)? else { return Ok(None) };
@@ -146,7 +146,7 @@ pub(crate) fn any_fresh<'py, T: Real>(
     rays: &Rays<'_, T>,
 ) -> PyResult<Option<Bound<'py, PyArray1<bool>>>> {
     let count = rays.view().len();
-    if count > MOST_FRESH {
+    if count > MAX_FRESH {
         return Ok(None);
     }
     let mut out = filled(false, count)?;

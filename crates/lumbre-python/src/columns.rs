@@ -12,7 +12,7 @@ use pyo3::types::{PyDict, PyString, PyTuple};
 use crate::errors::{filled, invalid, list, tuple};
 use crate::rays::Real;
 
-/// So many numbers are sooner copied than handed over.
+/// Up to this many numbers are copied faster than shared.
 const FEW: usize = 256;
 
 /// What stands for no shape, primitive or instance.
@@ -43,7 +43,7 @@ pub(crate) struct Fresh<T> {
 }
 
 impl<T: Real> Fresh<T> {
-    /// Rows for so many rays. Names that are no fields are for Python to refuse: `None`.
+    /// Rows for this many rays. Names that are no fields are for Python to refuse: `None`.
     pub(crate) fn new(fields: &Bound<'_, PyTuple>, count: usize) -> PyResult<Option<Self>> {
         let mut fresh = Self {
             t: None,
@@ -249,7 +249,7 @@ fn slice<'a, T: Element, D: numpy::ndarray::Dimension>(
 }
 
 impl<'a, T: Real> Columns<'a, T> {
-    /// The same rows in pieces of so many rays.
+    /// The same rows in pieces of this many rays.
     pub(crate) fn pieces(mut self, size: usize) -> PyResult<Vec<Self>> {
         let mut pieces = list(self.count.div_ceil(size).max(1))?;
         while self.count > size {

@@ -34,10 +34,10 @@ pub(crate) struct Expression {
 }
 
 /// Numbers that wait on the stack, at most.
-const MOST_WAITING: usize = 48;
-const MOST_STEPS: usize = 4096;
+const MAX_WAITING: usize = 48;
+const MAX_STEPS: usize = 4096;
 /// Parentheses in parentheses, at most.
-const MOST_NESTED: usize = 100;
+const MAX_NESTED: usize = 100;
 const FUNCTIONS: [&str; 9] = ["sqrt", "abs", "sin", "cos", "tan", "exp", "min", "max", "length"];
 const NAMES: [&str; 5] = ["x", "y", "z", "pi", "e"];
 
@@ -53,7 +53,7 @@ impl Expression {
             return Err(parser.wrong("an operator"));
         }
         let expression = Self { steps: parser.steps };
-        if expression.waiting() > MOST_WAITING {
+        if expression.waiting() > MAX_WAITING {
             return Err(too_long());
         }
         Ok(expression)
@@ -77,7 +77,7 @@ impl Expression {
 
     /// Bounds of the value and of the slope.
     pub(crate) fn at(&self, p: [Dual; 3]) -> Dual {
-        let mut stack = [Dual::from(0.0); MOST_WAITING];
+        let mut stack = [Dual::from(0.0); MAX_WAITING];
         let mut count = 0;
         for step in &self.steps {
             match *step {
@@ -134,7 +134,7 @@ fn least(a: Dual, b: Dual) -> Dual {
 
 fn too_long() -> PyErr {
     invalid(format!(
-        "the expression is too long (expected at most {MOST_STEPS} steps, and {MOST_WAITING} open at a time)"
+        "the expression is too long (expected at most {MAX_STEPS} steps, and {MAX_WAITING} open at a time)"
     ))
 }
 
@@ -175,8 +175,8 @@ impl<'a> Parser<'a> {
 
     fn sum(&mut self) -> PyResult<()> {
         self.nested += 1;
-        if self.nested > MOST_NESTED {
-            return Err(self.wrong(&format!("no more than {MOST_NESTED} parentheses in each other")));
+        if self.nested > MAX_NESTED {
+            return Err(self.wrong(&format!("no more than {MAX_NESTED} parentheses in each other")));
         }
         self.product()?;
         loop {
@@ -273,7 +273,7 @@ impl<'a> Parser<'a> {
     }
 
     fn atom(&mut self) -> PyResult<()> {
-        if self.steps.len() > MOST_STEPS {
+        if self.steps.len() > MAX_STEPS {
             return Err(too_long());
         }
         if self.takes("(") {
@@ -340,7 +340,7 @@ impl<'a> Parser<'a> {
             )));
         }
         // A tangent has its argument twice, so that those in each other grow fast.
-        if self.steps.len() > MOST_STEPS {
+        if self.steps.len() > MAX_STEPS {
             return Err(too_long());
         }
         match name {

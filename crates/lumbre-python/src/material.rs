@@ -161,7 +161,7 @@ pub(crate) struct Material {
 }
 
 /// As deep as in a scene file: dropping and drawing them takes steps of each.
-const MOST_MIXTURES: usize = 64;
+const MAX_MIXTURES: usize = 64;
 
 fn made(kind: MaterialKind) -> PyResult<Material> {
     Ok(Material { desc: MaterialDesc::new(kind).into(), depth: 0 })
@@ -251,8 +251,8 @@ impl Material {
     #[staticmethod]
     fn mix(first: &Bound<'_, Self>, second: &Bound<'_, Self>, amount: Number<'_>) -> PyResult<Self> {
         let depth = 1 + first.get().depth.max(second.get().depth);
-        if depth > MOST_MIXTURES {
-            return Err(invalid(format!("mixtures stand in each other more than {MOST_MIXTURES} deep")));
+        if depth > MAX_MIXTURES {
+            return Err(invalid(format!("mixtures stand in each other more than {MAX_MIXTURES} deep")));
         }
         let materials = [first, second].map(|material| Arc::clone(&material.get().desc));
         let mixture = made(MaterialKind::Mix { materials, amount: amount.share("amount")? })?;

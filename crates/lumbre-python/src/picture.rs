@@ -14,7 +14,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
 use crate::errors::{invalid, list, raised, tuple, unknown};
-use crate::staged::Shown;
+use crate::staged::PreparedScene;
 
 /// A rendered picture, with the sums of its samples.
 #[pyclass(frozen, module = "lumbre._lumbre")]
@@ -45,7 +45,7 @@ pub(crate) struct Look {
 }
 
 /// What is behind everything in a picture.
-pub(crate) enum Behind {
+pub(crate) enum Backdrop {
     /// The lights at infinity.
     Lights,
     /// Nothing: the picture has coverage.
@@ -55,8 +55,12 @@ pub(crate) enum Behind {
 
 impl Look {
     /// As the program saves it.
-    pub(crate) fn of(shown: &Shown, options: &RenderOptions, behind: Behind) -> Result<Self, lumbre::Error> {
-        let Shown { scene, defaults } = shown;
+    pub(crate) fn of(
+        shown: &PreparedScene,
+        options: &RenderOptions,
+        behind: Backdrop,
+    ) -> Result<Self, lumbre::Error> {
+        let PreparedScene { scene, defaults } = shown;
         Ok(Self {
             tone_map: defaults.tone_map(),
             exposure: defaults.exposure(scene, options)?,
@@ -65,8 +69,8 @@ impl Look {
                 false => ExrPrecision::Half,
             },
             background: match behind {
-                Behind::Background(background) => Some(background),
-                Behind::Lights | Behind::Nothing => None,
+                Backdrop::Background(background) => Some(background),
+                Backdrop::Lights | Backdrop::Nothing => None,
             },
         })
     }

@@ -12,7 +12,7 @@ use lumbre::{
     Background, CancelToken, DVec3, Ground, Job, Part as PartDesc, PixelBounds, Progress, Ray, ReadOptions,
     RenderOptions, SceneBuilder, SceneDesc, State, Transform, UpAxis,
 };
-use lumbre_cli::{Format, Language, Request, Things, memory_left};
+use lumbre_cli::{Format, Language, Request, SceneNames, memory_left};
 use numpy::{PyArray1, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
@@ -22,10 +22,10 @@ use pyo3::types::{PyDict, PyList, PyTuple};
 use crate::errors::{check_environment, failed, invalid, raised, too_large, tuple, unknown};
 use crate::material::colour;
 use crate::meshes::{self, PlacedMesh};
-use crate::picture::{Behind, Look, Picture, image_of};
+use crate::picture::{Backdrop, Look, Picture, image_of};
 use crate::rays::{Rays, Triples, is_single};
 use crate::shape::{Camera, Environment, Light, Placed, placed, transform};
-use crate::staged::{Around, Shown, Stages, Wish};
+use crate::staged::{Around, PreparedScene, SceneRequest, Stages};
 use crate::viewer::{Origin, Viewer};
 use crate::work::interruptible;
 use crate::{cast, points, rays};
@@ -49,7 +49,7 @@ pub(crate) struct Scene {
     /// As its pictures show it.
     stages: Stages,
     /// What is called how, once someone has asked for an explanation.
-    things: OnceLock<Things>,
+    things: OnceLock<SceneNames>,
 }
 
 /// Does the same in the precision of an array, which goes by the name given.
@@ -313,7 +313,8 @@ impl Scene {
         options: &Bound<'_, PyDict>,
         progress: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Picture> {
-        let Asked { shown, options, behind, denoises, keeps_part, settings } = self.asked(py, options)?;
+        let RenderRequest { shown, options, behind, denoises, keeps_part, settings } =
+            self.asked(py, options)?;
         check_memory(&options)?;
         let look = py.detach(|| Look::of(&shown, &options, behind)).map_err(raised)?;
         let tells = progress.map(Bound::unbind);
@@ -424,11 +425,11 @@ impl Scene {
         let ray = ray.map(|(origin, direction, from, to)| {
             Ray::new(origin.into(), direction.into()).with_range(from, to)
         });
-        let Asked { shown, options, .. } = self.asked(py, options)?;
+        let RenderRequest { shown, options, .. } = self.asked(py, options)?;
         let only = Vec::new();
         let request = Request { pixel, ray, format, lang, depth, sample, nearest, shape, all_shapes, only };
         let explain = || {
-            let things = self.things.get_or_init(|| Things::of(&self.desc));
+            let things = self.things.get_or_init(|| SceneNames::of(&self.desc));
             lumbre_cli::explain(&shown.scene, &options, things, &self.name, &request)
         };
         py.detach(explain).map_err(failed)
@@ -441,7 +442,7 @@ impl Scene {
 
     /// The size of its picture, where none is asked for.
     fn size(&self, py: Python<'_>) -> PyResult<(u32, u32)> {
-        let options = self.shown(py, Wish::default())?.scene.options();
+        let options = self.shown(py, SceneRequest::default())?.scene.options();
         Ok((options.width, options.height))
     }
 }
@@ -471,7 +472,7 @@ fn transforms(places: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Transform>> {
 /// Between two looks at a render.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// How far a render is, for whoever looks.
+/// How far a render is, for observers.
 #[derive(Default)]
 struct Watch(Mutex<Option<State>>);
 
@@ -491,11 +492,11 @@ impl Watch {
 }
 
 /// What is asked of a render.
-struct Asked {
-    shown: Arc<Shown>,
+struct RenderRequest {
+    shown: Arc<PreparedScene>,
     options: RenderOptions,
     /// What is behind everything.
-    behind: Behind,
+    behind: Backdrop,
     denoises: bool,
     /// Whether its sums are to be kept, for merging.
     keeps_part: bool,
@@ -527,7 +528,7 @@ impl Scene {
     }
 
     /// On the stage of a picture. Pictures from elsewhere and in other light share its tree.
-    fn shown(&self, py: Python<'_>, wish: Wish) -> PyResult<Arc<Shown>> {
+    fn shown(&self, py: Python<'_>, wish: SceneRequest) -> PyResult<Arc<PreparedScene>> {
         let building = self.stages.building.lock_py_attached(py);
         let shown = interruptible(py, |_| self.stages.shown(&wish), |_| Ok(()));
         drop(building);
@@ -549,7 +550,7 @@ impl Scene {
     }
 
     /// The options of a render by their names.
-    fn asked(&self, py: Python<'_>, given: &Bound<'_, PyDict>) -> PyResult<Asked> {
+    fn asked(&self, py: Python<'_>, given: &Bound<'_, PyDict>) -> PyResult<RenderRequest> {
         let size: Option<(u32, u32)> = named(given, "size")?;
         let integrator = match named::<String>(given, "integrator")? {
             None => None,
@@ -582,15 +583,15 @@ impl Scene {
         if let (Some(spp), true, false) = (shown.defaults.spp(&shown.scene), denoises, samples_are_asked) {
             options.stop.spp = spp;
         }
-        let behind = shown.defaults.background().map_or(Behind::Lights, Behind::Background);
-        let mut asked = Asked { shown, options, behind, denoises, keeps_part: false, settings };
+        let behind = shown.defaults.background().map_or(Backdrop::Lights, Backdrop::Background);
+        let mut asked = RenderRequest { shown, options, behind, denoises, keeps_part: false, settings };
         for (name, value) in given {
             let name: String = name.extract()?;
             ask(&mut asked, &name, &value).map_err(|error| of_value(&name, &value, error))?;
         }
         asked.options.guides = asked.denoises;
         asked.options.features |= asked.denoises;
-        asked.options.transparent = !matches!(asked.behind, Behind::Lights);
+        asked.options.transparent = !matches!(asked.behind, Backdrop::Lights);
         Ok(asked)
     }
 }
@@ -628,7 +629,7 @@ fn of_value(name: &str, value: &Bound<'_, PyAny>, error: PyErr) -> PyErr {
     error
 }
 
-fn ask(asked: &mut Asked, name: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
+fn ask(asked: &mut RenderRequest, name: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
     let options = &mut asked.options;
     match name {
         "size" | "integrator" | "denoise" | "view" | "azimuth" | "elevation" | "zoom" | "fit" | "ground"
@@ -653,7 +654,7 @@ fn ask(asked: &mut Asked, name: &str, value: &Bound<'_, PyAny>) -> PyResult<()> 
         "first_sample" => options.first_sample = value.extract()?,
         "transparent" => {
             if value.extract()? {
-                asked.behind = Behind::Nothing;
+                asked.behind = Backdrop::Nothing;
             }
         }
         "background" => asked.behind = behind(value)?,
@@ -671,8 +672,8 @@ fn wish(
     size: Option<(u32, u32)>,
     integrator: Option<IntegratorKind>,
     camera: Option<&lumbre::description::Camera>,
-) -> PyResult<Wish> {
-    let mut wish = Wish { size, integrator, ..Wish::default() };
+) -> PyResult<SceneRequest> {
+    let mut wish = SceneRequest { size, integrator, ..SceneRequest::default() };
     wish.eye = camera.map(|camera| camera.world_from_camera.point(DVec3::ZERO));
     let view = &mut wish.view;
     view.azimuth = named(given, "azimuth")?.unwrap_or(view.azimuth);
@@ -707,18 +708,18 @@ fn around(env: &Bound<'_, PyAny>) -> PyResult<Around> {
     }
 }
 
-fn behind(value: &Bound<'_, PyAny>) -> PyResult<Behind> {
+fn behind(value: &Bound<'_, PyAny>) -> PyResult<Backdrop> {
     if let Ok(image) = value.extract::<PyReadonlyArray3<'_, f32>>() {
-        return Ok(Behind::Background(Background::Picture(image_of("background", &image)?)));
+        return Ok(Backdrop::Background(Background::Picture(image_of("background", &image)?)));
     }
     if let Ok(rgb) = value.extract::<[f32; 3]>() {
-        return Ok(Behind::Background(Background::Colour(colour("background", rgb)?)));
+        return Ok(Backdrop::Background(Background::Colour(colour("background", rgb)?)));
     }
     let name = value.extract::<String>()?;
     match &*name {
-        "env" => Ok(Behind::Lights),
-        "transparent" => Ok(Behind::Nothing),
-        "studio" => Ok(Behind::Background(Background::studio())),
+        "env" => Ok(Backdrop::Lights),
+        "transparent" => Ok(Backdrop::Nothing),
+        "studio" => Ok(Backdrop::Background(Background::studio())),
         _ => Err(unknown("background", &name, &["env", "studio", "transparent"])),
     }
 }

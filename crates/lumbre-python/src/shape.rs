@@ -37,9 +37,9 @@ pub(crate) struct Geometry {
 }
 
 /// As deep as scenes have CSG.
-const MOST_NESTED: usize = Csg::MAX_DEPTH / 2;
+const MAX_NESTED: usize = Csg::MAX_DEPTH / 2;
 /// A scene has a description of each, of some 500 bytes.
-const MOST_LEAVES: u64 = 1 << 22;
+const MAX_LEAVES: u64 = 1 << 22;
 
 impl From<ShapeBuilder> for Geometry {
     fn from(shape: ShapeBuilder) -> Self {
@@ -234,14 +234,14 @@ impl Geometry {
         let parts = || operands.iter().flatten().map(|(geometry, ..)| geometry.get());
         let leaves = parts().fold(0, |leaves: u64, part| leaves.saturating_add(part.leaves));
         let depth = 1 + parts().map(|part| part.depth).max().unwrap_or(0);
-        if leaves > MOST_LEAVES {
+        if leaves > MAX_LEAVES {
             return Err(invalid(format!(
-                "CSG of too many shapes (found {leaves}; expected at most {MOST_LEAVES})"
+                "CSG of too many shapes (found {leaves}; expected at most {MAX_LEAVES})"
             )));
         }
-        if depth > MOST_NESTED {
+        if depth > MAX_NESTED {
             return Err(invalid(format!(
-                "CSG stands in CSG more than {MOST_NESTED} deep (Union(*shapes) makes one of many)"
+                "CSG stands in CSG more than {MAX_NESTED} deep (Union(*shapes) makes one of many)"
             )));
         }
         let operands = operands.iter().map(operand).collect::<PyResult<_>>()?;

@@ -9,7 +9,7 @@ use lumbre_cli::Defaults;
 
 /// How a scene is to be shown.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Wish {
+pub(crate) struct SceneRequest {
     /// For which pictures; only the camera that frames everything depends on it.
     pub(crate) size: Option<(u32, u32)>,
     pub(crate) integrator: Option<IntegratorKind>,
@@ -50,7 +50,7 @@ impl Around {
 }
 
 /// A scene on its stage, as the program shows it.
-pub(crate) struct Shown {
+pub(crate) struct PreparedScene {
     pub(crate) scene: Arc<lumbre::Scene>,
     pub(crate) defaults: Defaults,
 }
@@ -69,7 +69,7 @@ struct Base {
 pub(crate) struct Stages {
     own: Arc<Base>,
     others: Mutex<Vec<Arc<Base>>>,
-    shown: Mutex<Vec<(Wish, Arc<Shown>)>>,
+    shown: Mutex<Vec<(SceneRequest, Arc<PreparedScene>)>>,
     /// Trees that were built so far.
     trees: AtomicUsize,
     /// Held by the thread of Python that builds, so that threads which ask for the same build it once.
@@ -97,7 +97,7 @@ impl Stages {
     }
 
     /// The stage of a picture: that of an earlier one where it shows the same.
-    pub(crate) fn shown(&self, wish: &Wish) -> Result<Arc<Shown>, lumbre::Error> {
+    pub(crate) fn shown(&self, wish: &SceneRequest) -> Result<Arc<PreparedScene>, lumbre::Error> {
         let mut wish = wish.clone();
         if wish.eye.is_some() {
             // The camera that frames everything is not looked through.
@@ -111,12 +111,12 @@ impl Stages {
             && shown.defaults.is_grounded()
             && shown.scene.resolved().ground().is_some_and(is_hidden)
         {
-            return self.kept_or_staged(&Wish { ground: Ground::None, ..wish });
+            return self.kept_or_staged(&SceneRequest { ground: Ground::None, ..wish });
         }
         Ok(shown)
     }
 
-    fn kept_or_staged(&self, wish: &Wish) -> Result<Arc<Shown>, lumbre::Error> {
+    fn kept_or_staged(&self, wish: &SceneRequest) -> Result<Arc<PreparedScene>, lumbre::Error> {
         if let Some((_, shown)) = found(&self.shown, |(other, _)| wish.shows_the_same(other)) {
             return Ok(shown);
         }
@@ -125,7 +125,7 @@ impl Stages {
         Ok(shown)
     }
 
-    fn staged(&self, wish: &Wish) -> Result<Shown, lumbre::Error> {
+    fn staged(&self, wish: &SceneRequest) -> Result<PreparedScene, lumbre::Error> {
         let base = self.base(&wish.overrides)?;
         let mut desc = SceneDesc::clone(&base.desc);
         let mut stage = Stage::default();
@@ -140,10 +140,10 @@ impl Stages {
         };
         let defaults = Defaults::on(&stage, &mut desc, wish.integrator);
         if defaults.is_bare() && !wish.view.changes_lens() {
-            return Ok(Shown { scene: Arc::clone(&base.scene), defaults });
+            return Ok(PreparedScene { scene: Arc::clone(&base.scene), defaults });
         }
         if !defaults.is_grounded() {
-            return Ok(Shown { scene: Arc::new(base.scene.relit(&desc)?), defaults });
+            return Ok(PreparedScene { scene: Arc::new(base.scene.relit(&desc)?), defaults });
         }
         let wanted = desc.ground;
         let stands_on = |scene: &Arc<lumbre::Scene>| {
@@ -153,11 +153,11 @@ impl Stages {
             })
         };
         if let Some(tree) = found(&base.grounded, stands_on) {
-            return Ok(Shown { scene: Arc::new(tree.relit(&desc)?), defaults });
+            return Ok(PreparedScene { scene: Arc::new(tree.relit(&desc)?), defaults });
         }
         let scene = Arc::new(self.built(desc)?);
         keep(&base.grounded, Arc::clone(&scene));
-        Ok(Shown { scene, defaults })
+        Ok(PreparedScene { scene, defaults })
     }
 
     fn built(&self, desc: SceneDesc) -> Result<lumbre::Scene, lumbre::Error> {
@@ -186,7 +186,7 @@ impl Stages {
     }
 }
 
-impl Wish {
+impl SceneRequest {
     /// Whether pictures of both are of one stage, wherever their cameras stand.
     fn shows_the_same(&self, other: &Self) -> bool {
         let needs_light = |wish: &Self| wish.integrator.map(|kind| kind.needs_light());

@@ -1,4 +1,4 @@
-//! Adaptive sampling: when a pixel has samples enough.
+//! Adaptive sampling: when a pixel has enough samples.
 
 use crate::film::{Pixel, Tile};
 use crate::neighbourhoods::{Expectation, FLOOR, needed};
@@ -6,25 +6,27 @@ use crate::trial::Trial;
 
 /// Ends the sampling of each pixel where its noise is low enough.
 ///
-/// The error of a pixel is estimated from its own samples and from what a trial of the whole picture says of its neighbourhood
-/// ([`Trial`]): a pixel that has not met rare light yet knows nothing of it. It looks at fixed numbers of samples, and the trial is
-/// the same for every crop, so that the picture does not depend on crops, threads and interruptions. Pixels that end early are, in the
-/// mean, those whose samples happen to be alike, so the estimate of their error is raised by what it may be wrong.
+/// A pixel's error is estimated from its own samples and from a trial of the whole picture in its neighbourhood
+/// ([`Trial`]): a pixel that has not met rare light yet knows nothing of it. Noise is checked at fixed numbers of
+/// samples, and the trial is the same for every crop, so that the picture does not depend on crops, threads and
+/// interruptions. Pixels that stop early are on average those whose samples happen to agree, so the estimate of their
+/// error is raised by its own uncertainty.
 #[derive(Clone, Debug)]
 pub(crate) struct Adaptive {
     /// [`crate::Stop::noise`].
     limit: f64,
-    /// Samples of a pixel before its noise is looked at.
+    /// Samples of a pixel before its noise is checked.
     min_spp: u32,
     /// Added to the luminance of a pixel.
     floor: f64,
     trial: Trial,
 }
 
-/// How much an estimate of n samples is raised, times √n.
+/// By how much an estimate from n samples is raised, times √n.
 const CAUTION: f64 = 2.0;
 impl Adaptive {
-    /// For a limit of noise, and a trial of the whole picture. Every pixel gets `min_spp` samples, or as many as the trial asks for.
+    /// For a noise limit and a trial of the whole picture. Every pixel gets at least `min_spp` samples, or as many as
+    /// the trial requires.
     pub(crate) fn new(limit: f64, min_spp: Option<u32>, trial: Trial) -> Self {
         let min_spp = min_spp.unwrap_or_else(|| trial.min_spp());
         Self { limit, min_spp, floor: FLOOR * trial.mean.max(0.0), trial }
@@ -35,7 +37,7 @@ impl Adaptive {
         self.is_looked_at(pixel.taken) && self.share_of_limit(x, y, pixel).is_some_and(|share| share <= 1.0)
     }
 
-    /// The error of a pixel, of its limit; `None` where too few samples say.
+    /// The error of a pixel relative to its limit; `None` with too few samples.
     fn share_of_limit(&self, x: u32, y: u32, pixel: &Pixel) -> Option<f64> {
         let (luminance, error) = pixel.luminance_with_error()?;
         let n = f64::from(pixel.samples);
@@ -47,22 +49,22 @@ impl Adaptive {
         Some(if cautious == 0.0 { 0.0 } else { cautious / allowed })
     }
 
-    /// What is expected of the samples of a pixel.
+    /// The expectation for the samples of a pixel.
     pub(crate) fn expectation(&self, x: u32, y: u32) -> Expectation {
         self.trial.at(x, y)
     }
 
-    /// Whether a pixel is looked at with so many samples.
+    /// Whether a pixel is checked at this number of samples.
     fn is_looked_at(&self, taken: u32) -> bool {
         taken >= self.min_spp && (taken == self.min_spp || is_step(taken))
     }
 
-    /// The next number of samples at which a pixel with `taken` samples is looked at.
+    /// The next number of samples at which a pixel with `taken` samples is checked.
     pub(crate) fn next_look(&self, taken: u32) -> u32 {
         if taken < self.min_spp { self.min_spp } else { next_step(taken) }
     }
 
-    /// How many pixels of some tiles have more noise than they are to have.
+    /// The number of pixels above the noise limit.
     pub(crate) fn noisy_pixels(&self, tiles: &[Tile]) -> u64 {
         let pixels = tiles.iter().flat_map(|tile| tile.bounds().pixels().zip(tile.pixels()));
         let is_noisy = |&((x, y), pixel): &((u32, u32), &Pixel)| {
@@ -71,14 +73,14 @@ impl Adaptive {
         pixels.filter(is_noisy).count() as u64
     }
 
-    /// How many samples a pixel will have in the end, as far as one can tell, but no more than `most`.
+    /// The expected final number of samples of a pixel, at most `most`.
     pub(crate) fn expected(&self, x: u32, y: u32, pixel: &Pixel, most: u32) -> f64 {
         let taken = f64::from(pixel.taken);
         if self.is_done(x, y, pixel) {
             return taken;
         }
         if pixel.taken < self.min_spp {
-            // Its own samples say too little.
+            // Its own samples are too few for an estimate.
             let Expectation { mean, variance, .. } = self.trial.at(x, y);
             let needed = needed(variance, self.limit * (mean.max(0.0) + self.floor));
             return needed.max(f64::from(self.min_spp)).min(f64::from(most));
@@ -89,12 +91,12 @@ impl Adaptive {
     }
 }
 
-/// 1, 2, 3, 4, 6, 8, 12, 16, 24 and so on: numbers of samples after which a Sobol sequence is even.
+/// 1, 2, 3, 4, 6, 8, 12, 16, 24 and so on: numbers of samples after which a Sobol sequence is stratified.
 fn is_step(taken: u32) -> bool {
     taken.is_power_of_two() || (taken.is_multiple_of(3) && (taken / 3).is_power_of_two())
 }
 
-/// The next such number; the last one is none.
+/// The next such number, if any.
 fn next_step(taken: u32) -> u32 {
     let Some(power) = taken.checked_add(1).and_then(u32::checked_next_power_of_two) else { return u32::MAX };
     let before = power / 4 * 3;
@@ -109,7 +111,7 @@ pub(crate) fn wanting<'t>(tile: &'t Tile, adaptive: Option<&Adaptive>) -> impl I
     tile.bounds().pixels().zip(tile.pixels()).filter(wants).map(|(_, pixel)| pixel)
 }
 
-/// The fewest samples of the pixels of a tile that need more; `None` where none does.
+/// The fewest samples among the pixels of a tile that need more; `None` if none does.
 pub(crate) fn least_wanted(tile: &Tile, adaptive: Option<&Adaptive>) -> Option<u32> {
     wanting(tile, adaptive).map(|pixel| pixel.taken).min()
 }
@@ -130,7 +132,7 @@ mod tests {
         pixel
     }
 
-    /// Nothing is expected, in a picture of this mean.
+    /// Without an expectation, in a picture of this mean.
     fn blank(limit: f64, mean: f64) -> Adaptive {
         let mut moments = Moments::default();
         moments.add(mean);
@@ -141,8 +143,8 @@ mod tests {
     fn a_pixel_is_done_where_its_own_error_is_small_and_only_at_a_look() {
         let alternating =
             |count: usize| pixel(&(0..count).map(|i| if i % 2 == 0 { 0.9 } else { 1.1 }).collect::<Vec<_>>());
-        // 16 samples that are 0.1 off: an error of 0.1 / sqrt(15), half as much again for caution; nothing that is expected counts for
-        // one sample.
+        // 16 samples that are 0.1 off: an error of 0.1 / sqrt(15), raised by half for caution; the empty expectation
+        // counts as one sample.
         let error = 0.1 / 15f64.sqrt() * 1.5 * (16.0 / 17.0_f64).sqrt();
         for (limit, is_done) in [(0.99 * error, false), (1.01 * error, true)] {
             assert_eq!(blank(limit, 0.0).is_done(3, 2, &alternating(16)), is_done, "{limit}");

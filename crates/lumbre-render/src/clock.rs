@@ -28,7 +28,7 @@ pub(crate) struct Clock<'a> {
 }
 
 impl<'a> Clock<'a> {
-    /// A clock of a render of so many pixels, of which an earlier run took so many samples, and which took so long to be prepared.
+    /// A clock of a render: its pixels, the samples of an earlier run, and the time that its preparation took.
     pub(crate) fn new(
         start: Instant,
         prepared: Duration,
@@ -61,7 +61,7 @@ impl<'a> Clock<'a> {
     pub(crate) fn add(&self, samples: u64, rays: u64) {
         self.rays.fetch_add(rays, Ordering::Relaxed);
         let done = self.done.fetch_add(samples, Ordering::Relaxed) + samples;
-        // Whoever finds someone else telling goes on with its work.
+        // A thread that finds another one reporting goes on with its work.
         let Ok(mut last) = self.last.try_lock() else { return };
         let now = Instant::now();
         if now.duration_since(*last) < REPORT_EVERY {

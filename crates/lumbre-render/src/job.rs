@@ -1,4 +1,4 @@
-//! The render itself: passes over samples, tiles over threads.
+//! The render loop: passes over samples, tiles over threads.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -10,10 +10,10 @@ use lumbre_scene::{Scene, View};
 
 use crate::adaptive::{self, Adaptive};
 use crate::clock::Clock;
-use crate::film::{Extras, Tile};
+use crate::film::{Addition, Extras, Tile};
 use crate::integrators::{Integrator, integrator};
 use crate::noise::noise;
-use crate::one_sample::Taker;
+use crate::one_sample::PixelSampler;
 use crate::rendered::{picture, rendered_of};
 use crate::state::{Piece, REMEMBERED, RenderState};
 use crate::transport::{RayCounts, Record};
@@ -26,24 +26,24 @@ use crate::{
 
 /// Pixels along the side of a tile.
 const TILE: u32 = 16;
-/// Samples of the longest pass, unless they are less than one part in so many of those that are done.
+/// The longest pass has one sample in this many of those already taken, if that is more.
 const MAX_STEP: u32 = 16;
 const LONG: u32 = 64;
-/// The first pass goes over the picture in squares of so many pixels a side, one sample in each, and then in smaller ones, so that a
-/// render which is stopped in it is a whole picture, if a coarse one.
+/// The first pass takes one sample in each square of this many pixels a side, and then of smaller ones, so that an
+/// interrupted render is still a whole, coarse picture.
 const STRIDES: [u32; 7] = [256, 64, TILE, 8, 4, 2, 1];
-/// The clock does not stop a coarse picture of so few samples: a small picture in place of none.
+/// The clock never stops a coarse picture with fewer samples: a small picture is better than none.
 const UNSTOPPED: u64 = 8192;
-/// Samples of a wave, at most, where a clock or a pause may stop the render: so many take a few milliseconds.
+/// Maximum samples of a wave if a clock or a pause may stop the render: a few milliseconds.
 const WAVE_BY_THE_CLOCK: usize = 1024;
 
-/// Renders a picture: stops when the options say so, or when `cancel` asks, and returns what there is.
+/// Renders a picture. It stops when the options say so or `cancel` is set, and returns the result so far.
 ///
-/// The pixels depend on the scene and the options alone; but which samples are taken before the clock or `cancel` stops
+/// The pixels depend only on the scene and the options; but which samples are taken before the clock or `cancel` stops
 /// a render depends on the machine.
 ///
 /// # Errors
-/// [`RenderError`] for options that make no picture, and where `progress` does not want it.
+/// [`RenderError`] for options that make no picture, and if `progress` rejects it.
 pub fn render(
     scene: &Scene,
     options: &RenderOptions,
@@ -53,7 +53,7 @@ pub fn render(
     render_with(scene, options, &*integrator(&options.integrator), progress, cancel)
 }
 
-/// [`render`] with an integrator of one's own; that of the options is not looked at.
+/// [`render`] with a custom integrator; that of the options is ignored.
 ///
 /// # Errors
 /// As [`render`].
@@ -67,25 +67,25 @@ pub fn render_with(
     Ok(render_from(scene, options, integrator, progress, cancel, None, None)?.0)
 }
 
-/// Who is handed the state of a render now and then.
-pub struct Keeper<'a> {
-    /// The time between two hand-overs.
+/// Receives the state of a render at intervals.
+pub struct CheckpointSink<'a> {
+    /// The interval.
     pub every: Duration,
-    /// Told from one thread, while the others wait: it should not take long.
+    /// Called on one thread while the others wait: it should be quick.
     pub keep: &'a dyn Fn(RenderState),
 }
 
-impl std::fmt::Debug for Keeper<'_> {
+impl std::fmt::Debug for CheckpointSink<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Keeper").field("every", &self.every).finish_non_exhaustive()
+        f.debug_struct("CheckpointSink").field("every", &self.every).finish_non_exhaustive()
     }
 }
 
-/// [`render_with`], going on from the state of the same render, and with the state that it comes to. The picture is that of a render
-/// without a break.
+/// [`render_with`], resumed from the state of the same render; also returns the final state. The picture is that of an
+/// uninterrupted render.
 ///
 /// # Errors
-/// As [`render`], and [`RenderError::OtherState`] where the state is of other pixels or samples, or has other sums.
+/// As [`render`], and [`RenderError::OtherState`] if the state has other pixels, samples or sums.
 pub fn render_from(
     scene: &Scene,
     options: &RenderOptions,
@@ -93,11 +93,11 @@ pub fn render_from(
     progress: &dyn Progress,
     cancel: &CancelToken,
     state: Option<RenderState>,
-    keeper: Option<&Keeper<'_>>,
+    keeper: Option<&CheckpointSink<'_>>,
 ) -> Result<(Rendered, RenderState), RenderError> {
     let start = Instant::now();
     let bounds = options.bounds()?;
-    let taker = Taker::new(scene, options, integrator)?;
+    let taker = PixelSampler::new(scene, options, integrator)?;
     let spp = options.stop.spp.max(1);
     let catches_shadows = scene.ground().is_some_and(|ground| ground.catcher);
     let extras = Extras {
@@ -108,7 +108,7 @@ pub fn render_from(
     };
     let mut owners = match state {
         Some(state) => owners_of(state, bounds, extras, options.first_sample)?,
-        None => bounds.tiles(TILE).into_iter().map(|tile| Owner::new(Tile::new(tile, extras))).collect(),
+        None => bounds.tiles(TILE).into_iter().map(|tile| TileState::new(Tile::new(tile, extras))).collect(),
     };
     let before =
         owners.iter().flat_map(|owner| owner.tile.pixels()).map(|pixel| u64::from(pixel.taken)).sum();
@@ -132,24 +132,24 @@ pub fn render_from(
         clock: Clock::new(start, start.elapsed(), bounds.area(), options.stop, before, progress),
         waves: Mutex::default(),
     };
-    let expect_quiet = |owners: &[Owner]| {
+    let expect_quiet = |owners: &[TileState]| {
         let Some(adaptive) = &job.adaptive else { return };
         let pixels = owners.iter().flat_map(|owner| owner.tile.bounds().pixels().zip(owner.tile.pixels()));
         let expected: f64 = pixels.map(|((x, y), pixel)| adaptive.expected(x, y, pixel, spp)).sum();
         job.clock.expect_quiet_at(expected / bounds.area() as f64);
     };
     expect_quiet(&owners);
-    let hand_over = |owners: &[Owner]| {
+    let hand_over = |owners: &[TileState]| {
         if let (Some(keeper), Some(pause)) = (keeper, &job.pause) {
             (keeper.keep)(state_of(owners.to_vec(), bounds, options));
             pause.start_again();
         }
     };
-    let least_wanted = |owners: &[Owner]| {
+    let least_wanted = |owners: &[TileState]| {
         owners.iter().filter_map(|owner| adaptive::least_wanted(&owner.tile, job.adaptive.as_ref())).min()
     };
-    // Of pixels that need more.
-    let has = |owners: &[Owner], samples| least_wanted(owners).is_none_or(|least| least >= samples);
+    // Considers pixels that need more.
+    let has = |owners: &[TileState], samples| least_wanted(owners).is_none_or(|least| least >= samples);
 
     let mut stride = None;
     let mut last = None;
@@ -173,7 +173,7 @@ pub fn render_from(
             stride = Some(side);
         }
     }
-    // What an earlier run took was told by it.
+    // The earlier run has reported its own samples.
     let mut done = if before > 0 { least_wanted(&owners).unwrap_or(spp).min(spp) } else { 0 };
     while done < spp && stride == Some(1) {
         let end = next_count(done).min(spp);
@@ -189,7 +189,7 @@ pub fn render_from(
         }
         done = end;
         if job.must_stop() {
-            // What follows takes its time for a large picture.
+            // The rest takes time for a large picture.
             break;
         }
         let tiles = || owners.iter().map(|owner| &owner.tile);
@@ -235,11 +235,11 @@ pub fn render_from(
 }
 
 /// The samples of the pixel with the fewest.
-fn least_taken(owners: &[Owner]) -> u32 {
+fn least_taken(owners: &[TileState]) -> u32 {
     owners.iter().map(|owner| owner.tile.least_taken()).min().unwrap_or(0)
 }
 
-/// The number of samples at which a render next looks at its noise, and shows what there is: always the same, whatever came between.
+/// The sample count at which a render next checks its noise and shows its progress: the same after any interruptions.
 fn next_count(done: u32) -> u32 {
     if done < MAX_STEP {
         return (done + 1).next_power_of_two();
@@ -263,13 +263,13 @@ fn depth_unit(scene: &Scene, view: &View) -> f64 {
     if unit.is_normal() { unit } else { 1.0 }
 }
 
-/// The owners of the tiles of a state.
+/// The owners of a state's tiles.
 fn owners_of(
     state: RenderState,
     bounds: PixelBounds,
     extras: Extras,
     first_sample: u32,
-) -> Result<Vec<Owner>, RenderError> {
+) -> Result<Vec<TileState>, RenderError> {
     let is_same = state.bounds() == bounds
         && state.extras() == extras
         && state.pieces.iter().all(|piece| piece.bounds == bounds)
@@ -279,10 +279,10 @@ fn owners_of(
         return Err(RenderError::OtherState);
     }
     let places = bounds.tiles(TILE);
-    // Those of a render that goes on in the same program are not copied: there may be gigabytes.
+    // Tiles of a render that continues in the same process are moved, not copied: they may take gigabytes.
     let are_in_place = state.tiles.iter().map(Tile::bounds).eq(places.iter().copied());
     let tiles = if are_in_place { state.tiles } else { placed(state.tiles, &places, extras) };
-    let mut owners: Vec<Owner> = tiles.into_iter().map(Owner::new).collect();
+    let mut owners: Vec<TileState> = tiles.into_iter().map(TileState::new).collect();
     if let Some(owner) = owners.first_mut() {
         (owner.record.counts, owner.dropped, owner.clamped) = (state.rays, state.dropped, state.clamped);
         owner.first_dropped = state.first_dropped;
@@ -290,7 +290,8 @@ fn owners_of(
     Ok(owners)
 }
 
-/// The sums of some tiles in others, which are in rows from above. The first are dropped as soon as all is taken from them.
+/// Moves the sums of tiles into others, which are in rows from above. Each source is dropped as soon as everything is
+/// taken from it.
 fn placed(tiles: Vec<Tile>, places: &[PixelBounds], extras: Extras) -> Vec<Tile> {
     let mut rest = tiles;
     let mut above = 0;
@@ -306,8 +307,8 @@ fn placed(tiles: Vec<Tile>, places: &[PixelBounds], extras: Extras) -> Vec<Tile>
     places.iter().map(take).collect()
 }
 
-/// What the owners gathered.
-fn state_of(owners: Vec<Owner>, bounds: PixelBounds, options: &RenderOptions) -> RenderState {
+/// The state of all tiles.
+fn state_of(owners: Vec<TileState>, bounds: PixelBounds, options: &RenderOptions) -> RenderState {
     let mut rays = RayCounts::default();
     let mut first_dropped: Vec<DroppedSample> = Vec::new();
     for owner in &owners {
@@ -329,8 +330,8 @@ fn state_of(owners: Vec<Owner>, bounds: PixelBounds, options: &RenderOptions) ->
     }
 }
 
-/// The tiles, in each of which every pixel that has no sample has that of its square of `side` by `side` pixels.
-fn spread(owners: &[Owner], bounds: PixelBounds, side: u32) -> Vec<Tile> {
+/// The tiles; each pixel without a sample has that of its square of `side` by `side` pixels.
+fn spread(owners: &[TileState], bounds: PixelBounds, side: u32) -> Vec<Tile> {
     let columns = bounds.width().div_ceil(TILE) as usize;
     let mut tiles: Vec<Tile> = owners.iter().map(|owner| owner.tile.clone()).collect();
     if side > TILE {
@@ -345,22 +346,22 @@ fn spread(owners: &[Owner], bounds: PixelBounds, side: u32) -> Vec<Tile> {
     tiles
 }
 
-/// What every tile needs and none changes.
+/// Shared, constant data of all tiles.
 struct Job<'a> {
     options: &'a RenderOptions,
-    taker: Taker<'a>,
+    taker: PixelSampler<'a>,
     pixels: u64,
-    /// When pixels have enough, if not at the number of samples alone.
+    /// When a pixel has enough samples; `None` to take the same number everywhere.
     adaptive: Option<Adaptive>,
     deadline: Option<Instant>,
     cancel: &'a CancelToken,
     pause: Option<Pause>,
     clock: Clock<'a>,
-    /// Columns for those who take samples, one for each thread.
+    /// Columns for sampling threads, one for each.
     waves: Mutex<Vec<Wave<'a>>>,
 }
 
-/// When all threads pause next, to hand over what they have.
+/// The next pause of all threads, to save the state.
 struct Pause {
     start: Instant,
     every: Duration,
@@ -385,13 +386,13 @@ impl Pause {
     }
 }
 
-/// A tile and what its one owner counts.
+/// A tile and its owner's counters.
 #[derive(Clone)]
-struct Owner {
+struct TileState {
     tile: Tile,
     /// The side of the smallest squares that the first pass has done.
     next_side: u32,
-    /// Whether it has taken a sample since it last stopped.
+    /// Whether it has taken a sample since the last pause.
     has_worked: bool,
     record: Record,
     dropped: u64,
@@ -399,7 +400,7 @@ struct Owner {
     first_dropped: Vec<DroppedSample>,
 }
 
-impl Owner {
+impl TileState {
     fn new(tile: Tile) -> Self {
         Self {
             tile,
@@ -414,7 +415,8 @@ impl Owner {
 }
 
 impl Job<'_> {
-    /// Whether the squares of this side must stop. The clock does not stop the first, and no few: see [`UNSTOPPED`].
+    /// Whether the squares of this side must stop. The clock stops neither the first squares nor few samples: see
+    /// [`UNSTOPPED`].
     fn must_stop_at(&self, side: u32) -> bool {
         let count = self.pixels.div_ceil(u64::from(side) * u64::from(side));
         if side == STRIDES[0] || count <= UNSTOPPED { self.cancel.is_cancelled() } else { self.must_stop() }
@@ -428,9 +430,9 @@ impl Job<'_> {
         self.pause.as_ref().is_some_and(Pause::is_due)
     }
 
-    /// Takes the first sample of the first pixel of each square of `side` by `side` pixels, counted from the corner of the picture,
-    /// that is in the tile, unless it was taken for the squares of the last side.
-    fn run_coarsely(&self, owner: &mut Owner, corner: (u32, u32), side: u32, last: Option<u32>) {
+    /// Takes the first sample of the first pixel of each square of `side` by `side` pixels in the tile, counted from
+    /// the corner of the picture, unless the last side's squares have it.
+    fn run_coarsely(&self, owner: &mut TileState, corner: (u32, u32), side: u32, last: Option<u32>) {
         let starts = |x: u32, y: u32, side: u32| {
             (x - corner.0).is_multiple_of(side) && (y - corner.1).is_multiple_of(side)
         };
@@ -440,9 +442,9 @@ impl Job<'_> {
         }
     }
 
-    /// Takes the samples of every pixel of a tile up to this number, in waves of some samples of all pixels, so that a tile which is stopped
-    /// has all of one sample before it has any of the next.
-    fn run(&self, owner: &mut Owner, end: u32) {
+    /// Takes the samples of every pixel of a tile up to this number. A wave takes the same sample numbers of all
+    /// pixels, so that an interrupted tile has all of one sample before any of the next.
+    fn run(&self, owner: &mut TileState, end: u32) {
         let may_stop = self.deadline.is_some() || self.pause.is_some();
         let most = if may_stop { WAVE_BY_THE_CLOCK } else { WAVE };
         let Some(mut first) = adaptive::least_wanted(&owner.tile, self.adaptive.as_ref()) else { return };
@@ -460,10 +462,10 @@ impl Job<'_> {
         }
     }
 
-    /// Takes samples of those pixels of a tile that have none of these numbers yet and need them; false where it had to stop before.
+    /// Takes these sample numbers in the pixels of a tile that lack and need them; false if it had to stop first.
     fn take(
         &self,
-        owner: &mut Owner,
+        owner: &mut TileState,
         numbers: Range<u32>,
         is_wanted: impl Fn(u32, u32) -> bool,
         must_stop: impl Fn() -> bool,
@@ -482,7 +484,7 @@ impl Job<'_> {
         if ids.is_empty() {
             return true;
         }
-        // However short the time between two pauses, some work is done.
+        // Makes progress even if pauses are frequent.
         if must_stop() || (owner.has_worked && self.is_paused()) {
             owner.has_worked = false;
             return false;
@@ -490,16 +492,18 @@ impl Job<'_> {
         owner.has_worked = true;
         let rays = owner.record.counts.total();
         let mut wave = self.waves.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default();
-        let Owner { tile, record, dropped, clamped, first_dropped, .. } = owner;
+        let TileState { tile, record, dropped, clamped, first_dropped, .. } = owner;
         let exposure = self.options.sample_exposure();
         self.taker.take(&mut wave, &ids, record, |SampleId { x, y, index }, sample| {
-            if !tile.add(x, y, &sample, &exposure) {
-                *dropped += 1;
-                if first_dropped.len() < REMEMBERED {
-                    first_dropped.push(DroppedSample { x, y, sample: index });
+            match tile.add(x, y, &sample, &exposure) {
+                Addition::Whole => {}
+                Addition::Clamped => *clamped += 1,
+                Addition::Dropped => {
+                    *dropped += 1;
+                    if first_dropped.len() < REMEMBERED {
+                        first_dropped.push(DroppedSample { x, y, sample: index });
+                    }
                 }
-            } else if exposure.clamps(sample.radiance) {
-                *clamped += 1;
             }
         });
         self.waves.lock().unwrap_or_else(PoisonError::into_inner).push(wave);

@@ -69,7 +69,7 @@ impl Moments {
     }
 }
 
-/// Times the kurtosis: so many samples tell a mean.
+/// Times the kurtosis: samples that a mean needs.
 const KNOWN: f64 = 8.0;
 
 impl Known {

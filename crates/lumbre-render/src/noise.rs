@@ -77,7 +77,7 @@ mod tests {
     use lumbre_math::random::RandomStream;
 
     use super::*;
-    use crate::film::{Exposure, Extras, Sample};
+    use crate::film::{Addition, Exposure, Extras, Sample};
 
     const EXTRAS: Extras = Extras { features: false, tints: false, guides: false, depth_unit: 1.0 };
 
@@ -92,7 +92,7 @@ mod tests {
                 let radiance = Rgb::splat(value as f32);
                 let sample =
                     Sample { radiance, coverage: Rgb::WHITE, weight: 1.0, features: None, on_catcher: false };
-                assert!(tile.add(x, y, &sample, &Exposure::default()));
+                assert_eq!(tile.add(x, y, &sample, &Exposure::default()), Addition::Whole);
             }
         }
         noise([&tile].into_iter(), bounds, None).unwrap()
@@ -124,7 +124,7 @@ mod tests {
                 let radiance = Rgb::splat(if x == 0 && k % 2 == 0 { 30.0 } else { 0.1 });
                 let sample =
                     Sample { radiance, coverage: Rgb::WHITE, weight: 1.0, features: None, on_catcher: false };
-                assert!(tile.add(x, y, &sample, &Exposure::default()));
+                assert_eq!(tile.add(x, y, &sample, &Exposure::default()), Addition::Whole);
             }
         }
         // An error of 15 / 16 beside a mean of 15, in one pixel of 64.

@@ -4,15 +4,15 @@ use std::sync::Arc;
 
 use lumbre_geometry::Ray;
 use lumbre_math::DVec2;
-use lumbre_scene::{CameraRay, Footprint, Scene, View};
+use lumbre_scene::{CameraRay, Footprint, Pinhole, Scene, View};
 use lumbre_shading::Spectrum;
 use lumbre_shading::spectrum::SensorCurves;
 
 use crate::film::{FeatureSample, Filter, Sample};
 use crate::integrators::{Integrator, integrator};
-use crate::transport::{Draw, Event, Features, Record, Sampler, Seen, Sight, caught};
+use crate::transport::{Event, Features, PrimaryHit, Record, SampleNumbers, Sampler, Seen, caught};
 use crate::wave::catcher::{Catcher, Places};
-use crate::wave::{Precision, SampleId, Sights, Wave, cone};
+use crate::wave::{Precision, PrimaryHits, SampleId, Wave, cone};
 use crate::{RenderError, RenderOptions};
 
 /// Between the rays that textures are looked up for, in pixels: samples average what is finer. The same for any number of samples, so
@@ -20,14 +20,18 @@ use crate::{RenderError, RenderOptions};
 const SPACING: f64 = 0.25;
 
 /// Takes samples of pixels, each of which depends on its place and its number alone.
-pub(crate) struct Taker<'a> {
+pub(crate) struct PixelSampler<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) view: View,
+    /// The rays of the view, where lanes make them.
+    pinhole: Option<Pinhole>,
     integrator: &'a dyn Integrator,
     sampler: Sampler,
     filter: Filter,
     /// Whether it matters when a ray looks.
     moves: bool,
+    /// Whether rays from the camera have footprints.
+    has_footprints: bool,
     wants_features: bool,
     /// Whether the one sample of a pixel is in its middle.
     is_centred: bool,
@@ -57,10 +61,12 @@ struct Aim {
     /// The point of the film, in pixels.
     film: DVec2,
     lens: DVec2,
+    /// When it looks.
+    time: f64,
     weight: f64,
 }
 
-impl<'a> Taker<'a> {
+impl<'a> PixelSampler<'a> {
     pub(crate) fn new(
         scene: &'a Scene,
         options: &RenderOptions,
@@ -74,7 +80,9 @@ impl<'a> Taker<'a> {
         Ok(Self {
             scene,
             moves: scene.moves() || view.moves(),
+            has_footprints: scene.is_textured() || integrator.needs_footprints(),
             precision: precision(scene, &view, options),
+            pinhole: view.pinhole(),
             view,
             integrator,
             sampler: Sampler::new(&options.sampler),
@@ -96,16 +104,28 @@ impl<'a> Taker<'a> {
         record: &mut Record,
         mut put: impl FnMut(SampleId, Sample),
     ) {
+        let mut sights = self.start(wave, ids);
+        // Of the filter and of the lens.
         let mut weights = Vec::with_capacity(ids.len());
-        let aimed = ids.iter().map(|&id| {
-            let draw = self.sampler.draw(id.x, id.y, id.index);
-            let aim = self.aim(id, &draw);
-            let camera = self.camera_ray(&draw, &aim);
-            weights.push((aim.weight, camera.weight));
-            (draw, camera)
-        });
-        let mut sights =
-            Sights::new(self.scene, &self.view, wave, self.precision, aimed, self.is_spectral, record);
+        match &self.pinhole {
+            Some(pinhole) => {
+                for (slot, &id) in ids.iter().enumerate() {
+                    let aim = self.aim(id, sights.aim(slot), None);
+                    weights.push((aim.weight, 1.0));
+                    sights.set_film(slot, aim.film, aim.time);
+                }
+                sights.look_through(pinhole, self.has_footprints.then_some(SPACING));
+            }
+            None => {
+                for (slot, &id) in ids.iter().enumerate() {
+                    let aim = self.aim(id, sights.aim(slot), Some(&sights.draw(slot)));
+                    let camera = self.camera_ray(&aim);
+                    weights.push((aim.weight, camera.weight));
+                    sights.set_ray(slot, &camera);
+                }
+            }
+        }
+        sights.search(record);
         let seen = self.see(&mut sights, record);
         for (slot, ((&id, &(weight, passes)), &radiance)) in
             ids.iter().zip(&weights).zip(sights.radiance()).enumerate()
@@ -133,7 +153,7 @@ impl<'a> Taker<'a> {
 
     /// Has the integrator find the light of all sights but those that see something else, and gives what these see and all features;
     /// nothing where no sample has any of both.
-    fn see(&self, sights: &mut Sights<'_, 'a>, record: &mut Record) -> Vec<SeenSample> {
+    fn see(&self, sights: &mut PrimaryHits<'_, 'a>, record: &mut Record) -> Vec<SeenSample> {
         sights.show_background(self.lights_are_seen);
         let has_catcher = self.scene.ground().is_some_and(|ground| ground.catcher);
         let mut seen = Vec::new();
@@ -161,14 +181,14 @@ impl<'a> Taker<'a> {
                 let sight = sights.sight(slot);
                 let draw = sights.draw(slot);
                 let features = if self.wants_features { Features::of(&self.view, &sight) } else { None };
-                let left = self.left_by_media(&sight, draw);
+                let left = self.left_by_media(&sight, &draw);
                 let features = features.map(|features| feature_sample(features.behind(left)));
                 if sight.met.is_none() && left != Spectrum::WHITE && !self.lights_are_seen {
                     // What is seen is the medium alone.
                     seen[slot] = SeenSample { caught: None, features, covered: Some(Spectrum::WHITE - left) };
                     return true;
                 }
-                let caught = caught(self.scene, &sight, draw, self.lights_are_seen, record);
+                let caught = caught(self.scene, &sight, &draw, self.lights_are_seen, record);
                 seen[slot] = SeenSample { caught, features, covered: None };
                 caught.is_none()
             });
@@ -185,7 +205,7 @@ impl<'a> Taker<'a> {
     }
 
     /// An estimate of what media leave of the light of what a camera sees.
-    fn left_by_media(&self, sight: &Sight<'_>, draw: &Draw) -> Spectrum {
+    fn left_by_media(&self, sight: &PrimaryHit<'_>, draw: &SampleNumbers) -> Spectrum {
         if !self.scene.has_media() {
             return Spectrum::WHITE;
         }
@@ -194,45 +214,49 @@ impl<'a> Taker<'a> {
         self.scene.transmittance(self.view.medium(), &ray.with_range(0.0, end), draw.along(&ray), None)
     }
 
-    fn aim(&self, id: SampleId, draw: &Draw) -> Aim {
-        let place = self.filter.sample(draw.filter());
-        let pixel = DVec2::new(f64::from(id.x) + 0.5, f64::from(id.y) + 0.5);
-        // A lens without width has no place but its middle.
-        let lens = if self.view.has_lens() { draw.lens() } else { DVec2::splat(0.5) };
-        let offset = if self.is_centred { DVec2::ZERO } else { place.offset };
-        Aim { film: pixel + offset, lens, weight: place.weight }
+    /// Takes up samples.
+    fn start<'w>(&'w self, wave: &'w mut Wave<'a>, ids: &[SampleId]) -> PrimaryHits<'w, 'a> {
+        PrimaryHits::start(self.scene, &self.view, wave, self.precision, &self.sampler, ids, self.is_spectral)
     }
 
-    fn camera_ray(&self, draw: &Draw, aim: &Aim) -> CameraRay {
-        let part = if self.moves { draw.time() } else { 0.0 };
-        let time = self.view.time(part);
-        if self.scene.is_textured() || self.integrator.needs_footprints() {
-            self.view.ray(aim.film, aim.lens, time, SPACING)
+    /// Where a sample looks, by the numbers of [`SampleNumbers::aim`]. A lens without width has no point but its middle.
+    fn aim(&self, id: SampleId, [u, v, part, _]: [f32; 4], draw: Option<&SampleNumbers>) -> Aim {
+        let place = self.filter.sample(DVec2::new(u.into(), v.into()));
+        let pixel = DVec2::new(f64::from(id.x) + 0.5, f64::from(id.y) + 0.5);
+        let offset = if self.is_centred { DVec2::ZERO } else { place.offset };
+        let lens = draw.filter(|_| self.view.has_lens()).map_or(DVec2::splat(0.5), SampleNumbers::lens);
+        let time = self.view.time(if self.moves { part.into() } else { 0.0 });
+        Aim { film: pixel + offset, lens, time, weight: place.weight }
+    }
+
+    fn camera_ray(&self, aim: &Aim) -> CameraRay {
+        if self.has_footprints {
+            self.view.ray(aim.film, aim.lens, aim.time, SPACING)
         } else {
-            self.view.bare_ray(aim.film, aim.lens, time)
+            self.view.bare_ray(aim.film, aim.lens, aim.time)
         }
     }
 
     /// A sample with all that leads to it.
     fn explain(&self, id: SampleId) -> ExplainedSample {
         let draw = self.sampler.draw(id.x, id.y, id.index);
-        let Aim { film, lens, weight } = self.aim(id, &draw);
-        let camera = self.camera_ray(&draw, &Aim { film, lens, weight });
-        let (ray, radiance, events) = self.explain_sight(draw, camera);
+        let aim = self.aim(id, draw.aim(), Some(&draw));
+        let camera = self.camera_ray(&aim);
+        let (ray, radiance, events) = self.explain_sight(id, &camera);
         let radiance = through_lens(radiance, camera.weight);
-        ExplainedSample { film, lens, ray, radiance, weight, events }
+        ExplainedSample { film: aim.film, lens: aim.lens, ray, radiance, weight: aim.weight, events }
     }
 
-    /// The light along a ray, and what happens along its path.
-    fn explain_sight(&self, draw: Draw, camera: CameraRay) -> (Ray, Spectrum, Vec<Event>) {
+    /// The light along a ray with the numbers of a sample, and what happens along its path.
+    fn explain_sight(&self, id: SampleId, camera: &CameraRay) -> (Ray, Spectrum, Vec<Event>) {
         let (mut wave, mut record) = (Wave::default(), Record::with_journal());
-        let one = std::iter::once((draw, camera));
-        // What is told of a path is told in colours.
-        let mut sights =
-            Sights::new(self.scene, &self.view, &mut wave, self.precision, one, false, &mut record);
+        let mut sights = self.start(&mut wave, &[id]);
+        sights.set_ray(0, camera);
+        sights.search(&mut record);
+        let ray = sights.ray(0);
         let seen = self.see(&mut sights, &mut record).first().and_then(|seen| seen.caught);
         let radiance = seen.map_or(sights.radiance()[0], |seen| seen.radiance);
-        (sights.ray(0), radiance, record.journal.unwrap_or_default())
+        (ray, radiance, record.journal.unwrap_or_default())
     }
 }
 
@@ -305,7 +329,7 @@ pub fn explain_sample(
     index: u32,
 ) -> Result<ExplainedSample, RenderError> {
     let integrator = integrator(&options.integrator);
-    let taker = Taker::new(scene, options, &*integrator)?;
+    let taker = PixelSampler::new(scene, options, &*integrator)?;
     Ok(taker.explain(SampleId { x, y, index }))
 }
 
@@ -321,10 +345,9 @@ pub fn explain_ray(
     index: u32,
 ) -> Result<(Spectrum, Vec<Event>), RenderError> {
     let integrator = integrator(&options.integrator);
-    let taker = Taker::new(scene, options, &*integrator)?;
-    // With the random numbers of a pixel.
-    let draw = taker.sampler.draw(0, 0, index);
+    let taker = PixelSampler::new(scene, options, &*integrator)?;
     let camera = CameraRay { ray: *ray, footprint: Footprint::Point, weight: 1.0 };
-    let (_, radiance, events) = taker.explain_sight(draw, camera);
+    // With the random numbers of a pixel.
+    let (_, radiance, events) = taker.explain_sight(SampleId { x: 0, y: 0, index }, &camera);
     Ok((radiance, events))
 }

@@ -55,7 +55,7 @@ pub struct RenderOptions {
     pub first_sample: u32,
     /// Whether to gather albedo, normals, depth and uv too.
     pub features: bool,
-    /// Whether to gather what [`crate::denoise`] wants to know. The picture is the same.
+    /// Whether to gather what [`crate::denoise`] needs. The picture is the same.
     pub guides: bool,
     /// Threads; 0 for one a core.
     pub threads: usize,
@@ -192,7 +192,7 @@ impl RenderOptions {
         self.crop = windows.map(|window| self.pixels_of(window)).reduce(|a, b| a.intersection(&b));
     }
 
-    /// The options of the whole picture in a size whose longer side has so many pixels.
+    /// The options of the whole picture in a size whose longer side has this many pixels.
     #[must_use]
     pub fn smaller(&self, longer_side: f64) -> Self {
         let longer = f64::from(self.width.max(self.height).max(1));

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use lumbre_image::Image;
 
-/// Someone who wants to know how far a render is. Nothing that it does changes the picture.
+/// Observes how far a render is. It never changes the picture.
 pub trait Progress: Sync {
     /// Told now and then, from whichever thread, never from two at once.
     fn state(&self, _state: &State) {}

@@ -20,7 +20,7 @@ pub struct Rendered {
     pub bounds: PixelBounds,
     /// Feature images, if they were asked for: albedo, normal (with signs), depth, uv (in red and green).
     pub features: Vec<(Feature, Image)>,
-    /// What a denoiser wants to know of every pixel, if it was asked for.
+    /// What the denoiser needs of every pixel, if it was asked for.
     pub guides: Option<Guides>,
     /// What it took.
     pub stats: Stats,

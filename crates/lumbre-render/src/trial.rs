@@ -7,7 +7,7 @@ use lumbre_scene::Scene;
 use crate::film::MAX_LUMINANCE;
 use crate::integrators::Integrator;
 use crate::neighbourhoods::{Expectation, FLOOR, Moments, Neighbourhoods, Spread, needed};
-use crate::one_sample::Taker;
+use crate::one_sample::PixelSampler;
 use crate::transport::Record;
 use crate::wave::{SampleId, Wave};
 use crate::workers::Workers;
@@ -57,7 +57,7 @@ impl Trial {
     ) -> Result<Self, RenderError> {
         let longer_side = SIDE.min(f64::from(options.width.max(options.height)));
         let small = RenderOptions { features: false, guides: false, ..options.smaller(longer_side) };
-        let taker = Taker::new(scene, &small, integrator)?;
+        let taker = PixelSampler::new(scene, &small, integrator)?;
         let row = |y| Row { y, pixels: vec![Moments::default(); small.width as usize] };
         let mut rows: Vec<Row> = (0..small.height).map(row).collect();
         let start = Instant::now();

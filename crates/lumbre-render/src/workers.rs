@@ -10,7 +10,7 @@ pub(crate) struct Workers {
 }
 
 impl Workers {
-    /// So many threads; 0 for one a core.
+    /// This many threads; 0 for one a core.
     pub(crate) fn start(threads: usize) -> Self {
         let wanted = Self::wanted(threads);
         // The first try lets rayon look at its environment, too.

@@ -11,7 +11,7 @@ use lumbre_geometry::{Cuboid, Sphere, Torus};
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{DVec3, Transform, Vec2, Vec3};
 use lumbre_render::integrators::{Path, RayIntegrator};
-use lumbre_render::transport::{Draw, Sight};
+use lumbre_render::transport::{PrimaryHit, SampleNumbers};
 use lumbre_render::{
     CancelToken, Feature, NoProgress, PixelBounds, Progress, Record, RenderError, RenderOptions, Snapshot,
     State, denoise, render, render_with,
@@ -163,7 +163,14 @@ fn a_scene_far_from_the_origin_looks_the_same() {
 struct Broken(AtomicU32);
 
 impl RayIntegrator for Broken {
-    fn radiance(&self, _: &Scene, _: &View, _: Sight<'_>, draw: &Draw, _: &mut Record) -> Spectrum {
+    fn radiance(
+        &self,
+        _: &Scene,
+        _: &View,
+        _: PrimaryHit<'_>,
+        draw: &SampleNumbers,
+        _: &mut Record,
+    ) -> Spectrum {
         if draw.lobe(7) < 1.0 / 97.0 {
             let count = self.0.fetch_add(1, Ordering::Relaxed);
             Spectrum::new(1.0, if count.is_multiple_of(2) { f32::NAN } else { f32::INFINITY }, 1.0)
@@ -194,7 +201,14 @@ fn samples_that_are_no_numbers_are_dropped_counted_and_named() {
 struct Blinding;
 
 impl RayIntegrator for Blinding {
-    fn radiance(&self, _: &Scene, _: &View, _: Sight<'_>, _: &Draw, _: &mut Record) -> Spectrum {
+    fn radiance(
+        &self,
+        _: &Scene,
+        _: &View,
+        _: PrimaryHit<'_>,
+        _: &SampleNumbers,
+        _: &mut Record,
+    ) -> Spectrum {
         Spectrum::splat(1e19)
     }
 }
@@ -388,7 +402,7 @@ fn an_instanced_light_is_as_bright_as_a_plain_one_and_found_by_chance_where_it_i
     assert_close(light(&nested), light(&plain), 0.02, "nested");
 }
 
-/// White, of which the render is cancelled after so many samples.
+/// White, of which the render is cancelled after this many samples.
 #[derive(Debug)]
 struct Interrupting {
     cancel: CancelToken,
@@ -396,7 +410,14 @@ struct Interrupting {
 }
 
 impl RayIntegrator for Interrupting {
-    fn radiance(&self, _: &Scene, _: &View, _: Sight<'_>, _: &Draw, _: &mut Record) -> Spectrum {
+    fn radiance(
+        &self,
+        _: &Scene,
+        _: &View,
+        _: PrimaryHit<'_>,
+        _: &SampleNumbers,
+        _: &mut Record,
+    ) -> Spectrum {
         if self.left.fetch_sub(1, Ordering::Relaxed) == 1 {
             self.cancel.cancel();
         }

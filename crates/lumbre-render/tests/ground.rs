@@ -163,7 +163,7 @@ fn glass_that_bends_light_takes_as_much_as_geometric_optics_says() {
     let ball = exact(Sphere::new(DVec3::new(3.0, 4.0 + middle, -2.0), RADIUS).unwrap());
     let kind = MaterialKind::Dielectric { eta: 1.5, roughness: Roughness::smooth() };
     let most = (RADIUS / middle).asin();
-    // Looked at from the ground, after so many reflections inside; what comes from below the horizon is dark.
+    // Looked at from the ground, after this many reflections inside; what comes from below the horizon is dark.
     let passed = share(most, |angle| {
         let outside = (angle.sin() * middle / RADIUS).min(1.0).asin();
         let (reflected, inside) = fresnel(outside);

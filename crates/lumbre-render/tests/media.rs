@@ -72,7 +72,7 @@ fn over(half: f64) -> Camera {
     }
 }
 
-/// The mean of the picture by paths of at most so many bounces, without roulette.
+/// The mean of the picture by paths of at most this many bounces, without roulette.
 fn seen(desc: &SceneDesc, camera: Camera, depth: u32, side: u32, spp: u32) -> [f64; 3] {
     let scene = Scene::build(SceneDesc { cameras: vec![camera], ..desc.clone() }).unwrap();
     let path = Path { roulette_start: 1000, ..Path::new(depth) };

@@ -10,7 +10,7 @@ use lumbre_math::DVec3;
 use lumbre_math::random::RandomStream;
 use lumbre_render::integrators::integrator;
 use lumbre_render::{
-    CancelToken, Keeper, NoProgress, PixelBounds, RenderError, RenderOptions, RenderState, Rendered,
+    CancelToken, CheckpointSink, NoProgress, PixelBounds, RenderError, RenderOptions, RenderState, Rendered,
     render_from,
 };
 use lumbre_scene::{IntegratorKind, SamplerKind, Scene};
@@ -38,7 +38,7 @@ fn run(
     scene: &Scene,
     options: &RenderOptions,
     state: Option<RenderState>,
-    keeper: Option<&Keeper<'_>>,
+    keeper: Option<&CheckpointSink<'_>>,
 ) -> Result<(Rendered, RenderState), RenderError> {
     let integrator = integrator(&options.integrator);
     render_from(scene, options, &*integrator, &NoProgress, &CancelToken::new(), state, keeper)
@@ -68,7 +68,7 @@ fn a_render_goes_on_from_any_state_to_the_same_picture() {
         let states = RefCell::new(Vec::new());
         // Without a pause between two looks: a state of every wave, also from the first, coarse pass.
         let keep = |state: RenderState| states.borrow_mut().push(bytes_of(&state));
-        let keeper = Keeper { every: Duration::ZERO, keep: &keep };
+        let keeper = CheckpointSink { every: Duration::ZERO, keep: &keep };
         let mut slow = options.clone();
         slow.threads = 1;
         (slow.width, slow.height, slow.stop.spp) = (12, 9, 200);

@@ -33,7 +33,7 @@ fn at_angle(degrees: f64) -> DVec3 {
     DVec3::new(sin, 0.0, cos)
 }
 
-/// A Lambert triangle that lies flat, whose normals lean by so many degrees, with one point light and one camera close by.
+/// A Lambert triangle that lies flat, whose normals lean by this many degrees, with one point light and one camera close by.
 fn leaning(normal: f64, light: f64, distance: f64, viewer: f64) -> SceneDesc {
     let mut desc = empty();
     let grey = add_material(&mut desc, diffuse(REFLECTANCE as f32));

@@ -135,7 +135,7 @@ fn only_what_stands_for_something_that_bulges_out_rises() {
             let ray = Ray::new(from, along);
             let hit = scene.closest(&ray).unwrap();
             let met = scene.interaction(&ray, &hit, &Footprint::Point);
-            assert_eq!(met.may_rise(), met.risen(&scene).is_some(), "{name}");
+            assert_eq!(met.has_terminator_offset(), met.risen(&scene).is_some(), "{name}");
             heights.extend(met.risen(&scene).map(|risen| (risen - CENTER).length() / RADIUS - 1.0));
         }
         // A little above the sphere itself, by no more than the face is below it.

@@ -1,4 +1,4 @@
-//! Joining descriptions, as of several files.
+//! Joins descriptions, such as those of several files.
 
 use std::sync::Arc;
 
@@ -8,11 +8,12 @@ use crate::{
 };
 
 impl SceneDesc {
-    /// Adds all that another description has, in the same world.
+    /// Adds everything of another description, in the same world.
     ///
-    /// The settings of the picture (film, filter, sampler, integrator) stay those of the description that brings the
-    /// first camera, else of the first; so does what is up. Where nothing emits light, it is added as for the first that asks
-    /// for it. Indices of shapes ([`ShapeDesc::index`]) go on after those that are there.
+    /// The settings of the picture (film, filter, sampler, integrator) and the up axis are those of the first
+    /// description with a camera, or else of the first. Without any light, [`SceneDesc::without_light`] of the first
+    /// description that asks for light applies. Indices of shapes ([`ShapeDesc::index`]) continue after the existing
+    /// ones.
     pub fn append(&mut self, other: Self) {
         let Self {
             cameras,
@@ -79,7 +80,7 @@ fn next_index(desc: &SceneDesc) -> u32 {
     next
 }
 
-/// What stands before the description that is added.
+/// The lengths of the lists before the description is added.
 struct After {
     index: u32,
     material: u32,

@@ -92,7 +92,7 @@ impl Scene {
         } else {
             cameras
         };
-        if lights.is_empty() && !builder.entries.iter().any(SurfaceEntry::shines) {
+        if lights.is_empty() && !builder.entries.iter().any(SurfaceEntry::is_emissive) {
             builder.warnings.push(BuildWarning::NoLight);
         }
         builder.place_lights(lights)?;
@@ -102,12 +102,12 @@ impl Scene {
             &builder.entries,
             &bounds,
         );
-        let has_holes = builder.entries.iter().any(SurfaceEntry::has_holes);
-        let lets_light_through = builder.entries.iter().any(SurfaceEntry::lets_light_through);
-        let lets_light_straight_on = builder.entries.iter().any(SurfaceEntry::lets_light_straight_on);
+        let has_cutouts = builder.entries.iter().any(SurfaceEntry::has_cutouts);
+        let is_transmissive = builder.entries.iter().any(SurfaceEntry::is_transmissive);
+        let has_delta_transmission = builder.entries.iter().any(SurfaceEntry::has_delta_transmission);
         let has_solids = builder.entries.iter().any(SurfaceEntry::may_be_solid);
         let has_one_sided = builder.entries.iter().any(SurfaceEntry::is_one_sided_anywhere);
-        let looks_up = builder.entries.iter().any(SurfaceEntry::looks_up_anywhere);
+        let is_textured = builder.entries.iter().any(SurfaceEntry::looks_up_anywhere);
         Ok(Self {
             accel,
             cameras,
@@ -117,14 +117,14 @@ impl Scene {
             integrator,
             pov,
             bounds,
-            has_holes,
-            lets_light_through,
-            lets_light_straight_on,
+            has_cutouts,
+            is_transmissive,
+            has_delta_transmission,
             has_solids,
             has_one_sided,
             has_instances: !objects.is_empty(),
             moves,
-            looks_up,
+            is_textured,
             specular_spheres: specular.spheres(&bounds),
             ground: ground.map(|desc| GroundPlane::new(desc, &lighting.lights)),
             lane_lights: lighting.lane_lights,
@@ -143,10 +143,11 @@ impl Scene {
         })
     }
 
-    /// The same surfaces under other lights, on the film of other cameras. The tree and all that belongs to surfaces are shared, and
-    /// lights that are surfaces stay.
+    /// The same surfaces under other lights, on the film of other cameras. The tree and all surface data are shared,
+    /// and lights that are surfaces stay.
     ///
     /// # Errors
+    /// [`BuildError`], naming the camera or light at fault, or if there is no camera.
     /// [`BuildError`], naming the camera or light at fault, and where there is no camera.
     pub fn relit(
         &self,
@@ -158,11 +159,11 @@ impl Scene {
             return Err(BuildError::NoSuchCamera { position: 0, count: 0 });
         }
         cameras.iter().try_for_each(|camera| self.check_camera(camera))?;
-        // Surfaces know their lights by their position.
+        // Surfaces refer to their lights by index.
         let surfaces = self.lights.iter().take_while(|light| light.is_surface()).cloned().collect();
         let warnings = self.warnings.iter().filter(|warning| !warning.is_of_lights()).cloned().collect();
         let mut builder = Builder { lights: surfaces, warnings, ..Builder::default() };
-        if lights.is_empty() && !self.entries.iter().any(SurfaceEntry::shines) {
+        if lights.is_empty() && !self.entries.iter().any(SurfaceEntry::is_emissive) {
             builder.warnings.push(BuildWarning::NoLight);
         }
         let moves = self.moves || lights.iter().any(|light| matches!(light.bare(), LightDesc::Moving { .. }));
@@ -190,24 +191,24 @@ impl Scene {
             ground,
             specular_spheres: self.specular_spheres.clone(),
             warnings: builder.warnings,
-            has_holes: self.has_holes,
-            lets_light_through: self.lets_light_through,
-            lets_light_straight_on: self.lets_light_straight_on,
+            has_cutouts: self.has_cutouts,
+            is_transmissive: self.is_transmissive,
+            has_delta_transmission: self.has_delta_transmission,
             has_solids: self.has_solids,
             has_one_sided: self.has_one_sided,
             has_instances: self.has_instances,
             moves,
-            looks_up: self.looks_up,
+            is_textured: self.is_textured,
         })
     }
 
-    /// Whether another scene stands on the same tree: one is [`Scene::relit`] from the other, or both are from a third.
+    /// Whether both scenes share one tree: one is [`Scene::relit`] from the other, or both are from a third.
     pub fn shares_tree(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.accel, &other.accel)
     }
 }
 
-/// All lights of a scene, and how they are chosen.
+/// All lights of a scene, and the data for choosing among them.
 struct Lighting {
     lights: Vec<Light>,
     light_colours: Vec<LightColour>,
@@ -262,7 +263,7 @@ pub(crate) struct Builder {
     pub materials: Vec<Arc<Material>>,
     pub entries: Vec<SurfaceEntry>,
     lights: Vec<Light>,
-    /// Of each light.
+    /// One for each light.
     light_colours: Vec<LightColour>,
     pub warnings: Vec<BuildWarning>,
 }
@@ -317,7 +318,7 @@ impl Builder {
         Ok(trees.into_iter().flatten().collect())
     }
 
-    /// The tree of shapes that do nothing but separate media, and of the objects that have such.
+    /// The tree of shapes that only separate media, and of the objects that contain such shapes.
     fn boundaries(
         &mut self,
         (shapes, objects): (Vec<ShapeDesc>, Vec<ObjectDesc>),
@@ -415,7 +416,7 @@ impl Builder {
             GeometryDesc::Csg(csg) => {
                 let placement = desc.world_from_object;
                 let form = csg::build(self, desc.index, csg, &placement, desc.reverse_orientation)?;
-                if form.leaves.iter().any(SurfaceEntry::shines) {
+                if form.leaves.iter().any(SurfaceEntry::is_emissive) {
                     self.warnings.push(BuildWarning::UnsampledLight { shape: desc.index });
                 }
                 let placed = csg::shape_of(&form);
@@ -482,7 +483,8 @@ impl Builder {
         let baked = mesh::bake(shape, desc, placement, origin, order)?;
         let attributes = baked.attributes;
         let mesh = attributes.mesh.clone();
-        // Relative to the origin of the mesh, so that corners are rounded as those of the triangles beside are: no ray passes between.
+        // Relative to the origin of the mesh, so that corners are rounded as those of neighbouring triangles: no ray
+        // passes between them.
         let place = Transform::translate(mesh.origin);
         let patches = baked.patches.iter().map(|corners| {
             let [p00, p10, p01, p11] = corners.map(|i| mesh.positions[i as usize].as_dvec3());
@@ -492,7 +494,7 @@ impl Builder {
         });
         let patches = patches.collect::<Result<Vec<_>, _>>()?;
 
-        // The entry of the triangles comes first, if there are any; its light has the area of all of them.
+        // The entry of the triangles comes first, if there are any; its light has their total area.
         let first = self.entries.len() as u32;
         let light = area_light.as_ref().and_then(|_| MeshLight::new(first, &mesh));
         let emission = area_light.map(|light_desc| {
@@ -544,7 +546,7 @@ impl Builder {
         };
         Ok(SurfaceEntry {
             shape: desc.index,
-            looks_up: material.as_ref().is_some_and(|material| !material.is_uniform())
+            is_textured: material.as_ref().is_some_and(|material| !material.is_uniform())
                 || desc.alpha.as_ref().is_some_and(|alpha| !alpha.is_constant()),
             material,
             emission: None,
@@ -636,13 +638,13 @@ impl Builder {
         self.lights.push(light);
     }
 
-    /// The lights other than shapes, after those.
+    /// Adds the lights other than shapes, after those that are shapes.
     fn place_lights(&mut self, lights: Vec<LightDesc>) -> Result<(), BuildError> {
         self.light_colours = vec![LightColour::Surface; self.lights.len()];
         for (position, light) in lights.into_iter().enumerate() {
             let colour = colour_of(&light);
             self.light(position, light)?;
-            // One that does not shine was dropped.
+            // A light that does not emit was dropped.
             self.light_colours.resize(self.lights.len(), colour);
         }
         Ok(())
@@ -760,7 +762,7 @@ impl Builder {
     }
 }
 
-/// What the colours of a light are made of.
+/// The colours of a light.
 fn colour_of(desc: &LightDesc) -> LightColour {
     let one = |colour: &Spectrum| LightColour::Constant { colour: *colour, spectrum: None };
     match desc {
@@ -787,7 +789,7 @@ fn colour_of(desc: &LightDesc) -> LightColour {
     }
 }
 
-/// The items of a list, whose memory is freed as they are taken: descriptions are as large as what is made of them.
+/// The items of a list, which is freed while they are taken: descriptions are as large as the scene that they become.
 fn freeing<T>(mut items: Vec<T>) -> impl Iterator<Item = T> {
     const PIECE: usize = 1 << 14;
     items.reverse();

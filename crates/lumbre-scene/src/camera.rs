@@ -8,6 +8,7 @@ use lumbre_math::warp64::{equal_area_square_to_sphere, equal_area_wrap, square_t
 use lumbre_math::{
     AnimatedTransform, DAffine3, DMat3, DVec2, DVec3, Elementary, SingularTransformError, Transform,
 };
+use lumbre_simd::{Double, Real, V3};
 
 use crate::viewpoint::half_window;
 use crate::{Footprint, Lens, MediumId};
@@ -24,11 +25,11 @@ pub enum SphericalMapping {
     Wide(WideProjection),
 }
 
-/// POV-Ray's projections of wide views. The picture is about +z, with y up; angles are in degrees.
+/// POV-Ray's projections of wide views. The picture is around +z, with y up; angles are in degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum WideProjection {
-    /// The distance from the middle of the picture is the angle from the axis: `angle` across the unit circle, outside of which nothing
-    /// is seen. The picture is so wide and high.
+    /// The distance from the middle of the picture is the angle from the axis: `angle` across the unit circle, outside
+    /// of which the picture is black. `size` is the size of the picture.
     Fisheye {
         /// Across the circle.
         angle: f64,
@@ -71,8 +72,8 @@ pub enum WideProjection {
 }
 
 impl WideProjection {
-    /// The origin and the direction of the ray at a place of the picture, both coordinates from -1/2 to 1/2; `None` where nothing is
-    /// seen.
+    /// The origin and the direction of the ray at a point of the picture, both coordinates from -1/2 to 1/2; `None`
+    /// outside of the visible part.
     fn line(&self, at: DVec2) -> Option<(DVec3, DVec3)> {
         let center = DVec3::ZERO;
         Some(match *self {
@@ -182,12 +183,13 @@ pub struct Camera {
     pub shutter_open: f64,
     /// The time when it closes; not before it opens.
     pub shutter_close: f64,
-    /// The medium that it stands in; `None` is a vacuum.
+    /// The medium around it; `None` is a vacuum.
     pub medium: Option<MediumId>,
 }
 
 impl Camera {
-    /// A camera of a kind in a place, without a name, still, of the frame of its picture, with the shutter open from time 0 to 1.
+    /// A static camera without a name, with the aspect ratio of its picture, and with the shutter open from time 0 to
+    /// 1.
     pub fn new(kind: CameraKind, world_from_camera: Transform) -> Self {
         Self {
             name: None,
@@ -202,11 +204,12 @@ impl Camera {
         }
     }
 
-    /// A pinhole camera at `eye` that looks at `target`, with `up` upwards in the picture, in a right-handed world: what stands to
-    /// the right is to the right in the picture. `fov` is the full field of view in degrees along the shorter side.
+    /// A pinhole camera at `eye` that looks at `target`, with `up` upwards in the picture, in a right-handed world:
+    /// objects on the right are on the right of the picture. `fov` is the full field of view in degrees along the
+    /// shorter side.
     ///
     /// # Errors
-    /// [`SingularTransformError`] where eye and target coincide, the view is along `up`, or something is not finite.
+    /// [`SingularTransformError`] if eye and target coincide, the view is along `up`, or something is not finite.
     pub fn perspective(
         eye: DVec3,
         target: DVec3,
@@ -218,7 +221,7 @@ impl Camera {
         Ok(Self::new(kind, Self::looking(eye, target, up)?))
     }
 
-    /// The same without perspective: the shorter side of the picture is `height` long in the world.
+    /// The same camera without perspective: the shorter side of the picture is `height` long in the world.
     ///
     /// # Errors
     /// As for [`Camera::perspective`].
@@ -240,12 +243,12 @@ impl Camera {
     /// As for [`Camera::perspective`].
     pub fn panorama(eye: DVec3, target: DVec3, up: DVec3) -> Result<Self, SingularTransformError> {
         let kind = CameraKind::Spherical { mapping: SphericalMapping::Equirectangular };
-        // In the middle of the picture is -x, and to the right of it -z.
+        // -x is in the middle of the picture, and -z to the right of it.
         let turn = DAffine3::from_mat3(DMat3::from_cols(-DVec3::Z, DVec3::Y, -DVec3::X));
         Ok(Self::new(kind, Self::looking(eye, target, up)? * Transform::from_affine(turn)?))
     }
 
-    /// The same with a thin lens of this radius, sharp at the distance of `target`; a panorama has none.
+    /// Adds a thin lens of this radius, focused at the distance of `target`; a panorama has no lens.
     #[must_use]
     pub fn with_lens(mut self, radius: f64) -> Self {
         if let CameraKind::Perspective { lens_radius, .. } | CameraKind::Orthographic { lens_radius, .. } =
@@ -270,8 +273,8 @@ pub struct CameraRay {
     pub ray: Ray,
     /// The rays through neighbouring points of the film.
     pub footprint: Footprint,
-    /// What the picture has of the radiance that comes along it: 1, but for real lenses. 0 where the lens stops it, or where a wide
-    /// camera sees nothing.
+    /// The factor from the radiance of the ray to the picture: 1, except for real lenses. 0 if the lens stops the ray,
+    /// or outside of the visible part of a wide camera.
     pub weight: f64,
 }
 
@@ -308,7 +311,7 @@ impl View {
             }
             CameraKind::Orthographic { .. } => (DVec2::new(x0, y1), DVec2::new(x1, y0)),
             CameraKind::Spherical { .. } => (DVec2::ZERO, DVec2::ONE),
-            // A lens turns its picture upside down.
+            // A lens inverts its picture.
             CameraKind::Realistic(ref lens) => {
                 let half = lens.half_film(pixels.x / pixels.y);
                 (DVec2::new(half.x, -half.y), DVec2::new(-half.x, half.y))
@@ -337,7 +340,7 @@ impl View {
         self.shutter_open + part * (self.shutter_close - self.shutter_open)
     }
 
-    /// The medium that the camera stands in.
+    /// The medium around the camera.
     pub fn medium(&self) -> Option<MediumId> {
         self.medium
     }
@@ -388,14 +391,14 @@ impl View {
         }
     }
 
-    /// Where a point of the film is on the screen: that of a perspective camera is at z = 1 of camera space, with x to the right and y
-    /// up; that of an orthographic one at z = 0; that of a spherical one is the unit square; that of a real lens is its film at z = 0, in
-    /// metres, with the picture upside down.
+    /// The screen position of a film point: for a perspective camera at z = 1 of camera space, with x to the right and
+    /// y up; for an orthographic one at z = 0; for a spherical one in the unit square; for a real lens on its film at z
+    /// = 0, in metres, with the picture inverted.
     pub fn on_screen(&self, film: DVec2) -> DVec2 {
         self.corner + self.step * film
     }
 
-    /// Whether rays begin at points of a lens.
+    /// Whether rays start at points of a lens.
     pub fn has_lens(&self) -> bool {
         match self.kind {
             CameraKind::Perspective { lens_radius, .. } | CameraKind::Orthographic { lens_radius, .. } => {
@@ -404,6 +407,17 @@ impl View {
             CameraKind::Spherical { .. } => false,
             CameraKind::Realistic(_) => true,
         }
+    }
+
+    /// The rays of a static perspective camera with a pinhole; `None` for others.
+    pub fn pinhole(&self) -> Option<Pinhole> {
+        let CameraKind::Perspective { lens_radius, .. } = self.kind else { return None };
+        (lens_radius <= 0.0 && self.motion.is_none()).then(|| Pinhole {
+            origin: self.world_from_camera.point(DVec3::ZERO),
+            axes: self.world_from_camera.linear(),
+            corner: self.corner,
+            step: self.step,
+        })
     }
 
     /// The world-space origin, the unit direction, and the weight.
@@ -442,6 +456,34 @@ impl View {
             }
         };
         (placement.point(origin), placement.vector(direction).normalize(), weight)
+    }
+}
+
+/// The rays of a perspective camera that start at one point: the same bits as [`View::bare_ray`], for lanes.
+#[derive(Clone, Copy, Debug)]
+pub struct Pinhole {
+    origin: DVec3,
+    /// From camera space to the world.
+    axes: DMat3,
+    corner: DVec2,
+    step: DVec2,
+}
+
+impl Pinhole {
+    /// The origin of all rays.
+    pub fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    /// The unit directions of the rays through points of the film, in pixels.
+    #[inline(always)]
+    pub fn directions<R: Real>(&self, [x, y]: [R::Double; 2]) -> V3<R::Double> {
+        let splat = R::Double::splat;
+        let x = splat(self.corner.x) + splat(self.step.x) * x;
+        let y = splat(self.corner.y) + splat(self.step.y) * y;
+        let DMat3 { x_axis, y_axis, z_axis } = self.axes;
+        let (right, up) = (V3::constant_f64(x_axis.to_array()), V3::constant_f64(y_axis.to_array()));
+        (right * x + up * y + V3::constant_f64(z_axis.to_array())).normalize_f64()
     }
 }
 
@@ -486,7 +528,7 @@ mod tests {
         ];
         for camera in cameras {
             let view = View::new(&camera, 400, 200);
-            // Where the middle, and what is right of and above it, lead to at the distance of the target.
+            // The points at the distance of the target that are in the middle, to the right and above.
             let at = |x: f64, y: f64| {
                 let ray = view.ray(DVec2::new(x, y), DVec2::splat(0.5), 0.0, 1.0).ray;
                 ray.at((target.y - ray.origin.y) / ray.direction.y)
@@ -503,6 +545,26 @@ mod tests {
         assert!((top - eye - 3.0 * up).length() < 1e-12, "{top}");
         assert!(Camera::perspective(eye, eye, up, 40.0).is_err());
         assert!(Camera::perspective(eye, eye + up, up, 40.0).is_err());
+    }
+
+    #[test]
+    fn a_pinhole_has_the_rays_of_its_view_to_the_bit() {
+        let place = Transform::translate(DVec3::new(0.3, -7.1, 2.9))
+            * Transform::rotate(DVec3::new(1.0, 2.0, -0.5), 0.7).unwrap();
+        let view = View::new(&Camera::new(perspective(37.0, 0.0, 1.0), place), 300, 170);
+        let pinhole = view.pinhole().unwrap();
+        for i in 0..1000 {
+            let film = DVec2::new(f64::from(i % 40) * 7.3, f64::from(i / 40) * 6.9);
+            let V3 { x, y, z } = pinhole.directions::<f32>([film.x, film.y]);
+            let ray = view.bare_ray(film, MIDDLE, 0.0).ray;
+            assert_eq!((pinhole.origin(), DVec3::new(x, y, z)), (ray.origin, ray.direction), "{film}");
+        }
+        assert!(View::new(&camera(perspective(37.0, 0.1, 1.0)), 30, 20).pinhole().is_none());
+        assert!(
+            View::new(&camera(CameraKind::Spherical { mapping: Default::default() }), 30, 20)
+                .pinhole()
+                .is_none()
+        );
     }
 
     #[test]

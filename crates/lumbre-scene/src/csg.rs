@@ -54,7 +54,7 @@ fn combine(
     depth: usize,
 ) -> Result<Csg, BuildError> {
     let wrong = |reason: String| BuildError::Csg { shape, reason };
-    // With its solids, and unions of them as operands.
+    // Including its solids, and unions of them as operands.
     if depth + 2 > Csg::MAX_DEPTH {
         return Err(wrong(format!("csg shapes hold csg shapes to a depth of more than {}", Csg::MAX_DEPTH)));
     }

@@ -1,8 +1,8 @@
-//! Geometry that programs bring, in its place.
+//! Custom geometry under a map.
 
 use std::sync::Arc;
 
-use lumbre_geometry::{Aabb, NearestPoint, NoNearestPoint, Ray, Root, Roots, Surface, similarity_factor};
+use lumbre_geometry::{Aabb, NearestPoint, NearestPointError, Ray, Root, Roots, Surface, similarity_factor};
 use lumbre_kernel::CustomGeometry;
 use lumbre_math::{DVec3, Transform};
 
@@ -23,7 +23,7 @@ pub(crate) fn placed(
     if world_from_object.is_identity() { geometry } else { Arc::new(Placed { geometry, world_from_object }) }
 }
 
-/// The box around bounded geometry under a map; `None` where a part of it is infinite.
+/// The box around bounded geometry under a map; `None` if a part of it is infinite.
 pub(crate) fn bounds(geometry: &dyn CustomGeometry, world_from_object: &Transform) -> Option<Aabb> {
     (0..geometry.primitive_count()).try_fold(Aabb::EMPTY, |bounds, primitive| {
         Some(bounds.union(moved(&geometry.bounds(primitive)?, world_from_object)))
@@ -36,7 +36,7 @@ impl CustomGeometry for Placed {
     }
 
     fn bounds(&self, primitive: u32) -> Option<Aabb> {
-        // The corners are rounded on their way.
+        // The corners were rounded by the map.
         Some(moved(&self.geometry.bounds(primitive)?, &self.world_from_object).outward(4))
     }
 
@@ -53,8 +53,8 @@ impl CustomGeometry for Placed {
         surface.placed(&self.world_from_object)
     }
 
-    fn closest_point(&self, primitive: u32, point: DVec3) -> Result<NearestPoint, NoNearestPoint> {
-        let factor = similarity_factor(&self.world_from_object).ok_or(NoNearestPoint::Map)?;
+    fn closest_point(&self, primitive: u32, point: DVec3) -> Result<NearestPoint, NearestPointError> {
+        let factor = similarity_factor(&self.world_from_object).ok_or(NearestPointError::Map)?;
         let found = self.geometry.closest_point(primitive, self.world_from_object.inverse_point(point))?;
         let point = self.world_from_object.point(found.point);
         Ok(NearestPoint { point, distance: factor * found.distance, ..found })

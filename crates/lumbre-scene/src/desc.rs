@@ -41,13 +41,13 @@ pub struct SceneDesc {
     pub without_light: WithoutLight,
     /// The up axis of the automatic camera and light.
     pub up: UpAxis,
-    /// Whether that is a guess, by how the model stands.
+    /// Whether the up axis is a guess from the pose of the model.
     pub up_is_guessed: bool,
     /// The ground plane.
     pub ground: Option<GroundDesc>,
-    /// What is around the objects of a POV-Ray scene.
+    /// The surroundings of a POV-Ray scene.
     pub pov: Option<Arc<crate::pov::PovWorld>>,
-    /// What its files hold by name.
+    /// The named items of its files.
     pub listing: Listing,
 }
 
@@ -85,7 +85,7 @@ pub enum UpAxis {
     Y,
     /// z, as in most of engineering (STL); the front is towards -y.
     Z,
-    /// Any direction, of any non-zero length; the front is where the shortest turn takes that of y up.
+    /// Any direction, of any non-zero length; the front is that of y up, moved by the shortest rotation.
     Towards(DVec3),
 }
 
@@ -99,7 +99,7 @@ pub struct NamedMaterial {
 }
 
 impl NamedMaterial {
-    /// What people call it: its name and its kind, or the kind alone.
+    /// Its label for people: its name and its kind, or the kind alone.
     pub fn label(&self) -> String {
         let kind = self.material.kind.name();
         self.name.as_ref().map_or_else(|| kind.to_owned(), |name| format!("{name} ({kind})"))
@@ -119,7 +119,7 @@ pub struct ShapeDesc {
     pub reverse_orientation: bool,
     /// The material; `None` for an interface, which does not scatter.
     pub material: Option<MaterialId>,
-    /// The media on its sides, where it separates two; `None` where light stays in the medium that it is in.
+    /// The media on its sides, if they differ; `None` if light stays in its medium.
     pub boundary: Option<Boundary>,
     /// The light it emits.
     pub area_light: Option<AreaLightDesc>,
@@ -130,7 +130,7 @@ pub struct ShapeDesc {
 /// The media on both sides of a surface; `None` is a vacuum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Boundary {
-    /// Behind the surface, where its normal does not point.
+    /// Behind the surface: the side that its normal points away from.
     pub inside: Option<MediumId>,
     /// In front of it.
     pub outside: Option<MediumId>,
@@ -151,12 +151,12 @@ pub enum GeometryDesc {
     Csg(CsgDesc),
     /// Curves with a width: hair, fur, grass. Many of them are one shape.
     Curves(Arc<Curves>),
-    /// Geometry that a program brings, such as a [`lumbre_geometry::ImplicitSurface`].
+    /// Custom geometry of a program, such as a [`lumbre_geometry::ImplicitSurface`].
     Custom(Arc<dyn CustomGeometry>),
 }
 
 impl GeometryDesc {
-    /// The name of its kind, in the words of the scene language where that has one; for several ways to write a mesh, `mesh`.
+    /// The name of its kind, in the scene language if that has one; `mesh` for the several ways to write a mesh.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Exact(exact) => exact.name(),
@@ -210,8 +210,8 @@ pub enum CsgOperation {
 pub struct MeshDesc {
     /// Vertices.
     pub positions: Vec<Vec3>,
-    /// The same vertices in double precision, where rays are to meet the triangles there: see [`lumbre_kernel::PreciseMesh`]. Only
-    /// for meshes of triangles that do not deform.
+    /// The same vertices in double precision, if rays are to meet the triangles there: see
+    /// [`lumbre_kernel::PreciseMesh`]. Only for meshes of triangles that do not deform.
     pub precise_positions: Option<Vec<DVec3>>,
     /// Triangles, counter-clockwise from the front.
     pub triangles: Vec<[u32; 3]>,
@@ -290,7 +290,7 @@ pub struct AreaLightDesc {
     pub two_sided: bool,
     /// Total power in lumens that a `radiance` of 1 stands for, as in pbrt-v4; if given, `radiance` is a factor on it.
     pub power: Option<f32>,
-    /// The spectrum of the radiance, with luminance 1, where it is more than a colour: for renders that carry wavelengths.
+    /// The spectrum of the radiance, with luminance 1, if it is more than a colour: for spectral renders.
     pub spectrum: Option<Arc<LightCurve>>,
 }
 
@@ -324,7 +324,7 @@ pub enum LightDesc {
         /// Radiant intensity by direction.
         image: EnvironmentDesc,
     },
-    /// A point that throws a picture.
+    /// A projected picture.
     Projection {
         /// The placement; the picture is along +z, its top towards +y, and its right towards +x.
         world_from_light: Transform,
@@ -332,7 +332,7 @@ pub enum LightDesc {
         intensity: Rgb,
         /// Radiant intensity by direction.
         image: Arc<lumbre_image::Image>,
-        /// The angle between the sides of the picture that are nearer to each other, in degrees.
+        /// The angle in degrees between the nearer pair of the picture's sides.
         fov: f32,
     },
     /// A directional light.
@@ -351,7 +351,7 @@ pub enum LightDesc {
         /// Radiance by direction; `None` for uniform.
         image: Option<EnvironmentDesc>,
     },
-    /// An environment light that is seen through a rectangle alone.
+    /// An environment light through a rectangle only.
     Portal {
         /// The placement of the environment: z is up.
         world_from_light: Transform,
@@ -359,13 +359,13 @@ pub enum LightDesc {
         radiance: Rgb,
         /// Radiance by direction; `None` for uniform.
         image: Option<EnvironmentDesc>,
-        /// The corners of the rectangle in the world, one after the other around it. The vector product of the sides from the first to the
-        /// fourth and to the second points to the sky.
+        /// The corners of the rectangle in the world, in order around it. The cross product of the sides from the first
+        /// to the fourth corner and from the first to the second points to the sky.
         corners: [DVec3; 4],
     },
     /// A light by POV-Ray's laws.
     Pov(Arc<crate::pov::PovLight>),
-    /// A light of one spectrum, whose colours are this one's but for a factor.
+    /// A light with a spectrum, whose colours are multiples of one colour.
     Spectral {
         /// The light. Its image, if it has one, is grey.
         light: Box<LightDesc>,
@@ -428,14 +428,14 @@ pub struct FilmDesc {
     pub iso: f32,
     /// The largest component of one sample; infinite by default.
     pub max_component: f32,
-    /// What a sensor makes of colours: the red, the green and the blue of the picture, each of the red, green and blue of light in linear
-    /// Rec. 709, after `max_component`. By default no other.
+    /// The sensor's colour matrix: from linear Rec. 709, after `max_component`, to the red, green and blue of the
+    /// picture. The identity by default.
     pub sensor: [[f32; 3]; 3],
-    /// The sensitivities of the camera whose sensor it is: for renders that carry wavelengths, in place of `sensor`.
+    /// The sensitivities of the camera with this sensor: for spectral renders, instead of `sensor`.
     pub camera: Option<Arc<SensorCurves>>,
-    /// Whether paths are to carry wavelengths, where the integrator is `path`.
+    /// Whether paths carry wavelengths, with the integrator `path`.
     pub spectral: bool,
-    /// Whether files of light keep single precision; half precision by default.
+    /// Whether image files of light have single precision; half precision by default.
     pub single_precision: bool,
 }
 
@@ -536,7 +536,7 @@ pub struct IntegratorDesc {
     pub kind: IntegratorKind,
     /// The maximal number of bounces.
     pub max_depth: u32,
-    /// How light is scattered where shading normals are not those of the surface.
+    /// The treatment of shading normals that differ from the surface's.
     pub shading_normals: ShadingNormals,
 }
 
@@ -555,7 +555,7 @@ pub enum IntegratorKind {
         /// Whether to roughen surfaces after the first diffuse bounce.
         regularize: bool,
     },
-    /// Path tracing with photons for the light that comes over mirrors and smooth glass.
+    /// Path tracing with photons for caustics over mirrors and smooth glass.
     Caustics,
     /// Whitted 1980: direct light, perfect reflection and refraction.
     Whitted {
@@ -564,7 +564,7 @@ pub enum IntegratorKind {
         /// Whether infinite lights illuminate surfaces, beyond being visible as background.
         sky: bool,
     },
-    /// The local illumination of POV-Ray, with its mirrors, refractions and shadows, of POV-Ray's scenes.
+    /// POV-Ray's local illumination, with mirrors, refractions and shadows, for POV-Ray scenes.
     Pov,
     /// Ambient occlusion.
     AmbientOcclusion {
@@ -592,7 +592,7 @@ impl IntegratorKind {
         }
     }
 
-    /// Whether its picture is of what is there, and not an estimate of light, with the noise of one.
+    /// Whether its picture shows the geometry, and not a noisy estimate of light.
     pub fn is_feature(&self) -> bool {
         match self {
             Self::Path { .. } | Self::Caustics | Self::Whitted { .. } | Self::Pov => false,
@@ -601,7 +601,7 @@ impl IntegratorKind {
         }
     }
 
-    /// The names of all.
+    /// The names of all integrators.
     pub const NAMES: [&'static str; 9] =
         ["path", "caustics", "whitted", "pov", "ambientocclusion", "normals", "depth", "albedo", "uv"];
 

@@ -19,7 +19,7 @@ pub struct Emission {
     pub by_vertices: bool,
     /// Whether the back emits, too.
     pub two_sided: bool,
-    /// The spectrum of the radiance, with luminance 1, where it is more than a colour.
+    /// The spectrum of the radiance, with luminance 1, if it is more than a colour.
     pub spectrum: Option<Arc<LightCurve>>,
 }
 
@@ -47,7 +47,7 @@ impl Emission {
         points.map(|uv| self.at(true, uv, Spectrum::WHITE)).sum::<Spectrum>() / (SIDE * SIDE) as f32
     }
 
-    /// Emitted radiance at some wavelengths, of which this is the colour.
+    /// Emitted radiance at some wavelengths; `radiance` is its colour.
     pub fn at_wavelengths(&self, radiance: Spectrum, wavelengths: &Wavelengths) -> Spectrum {
         let is_varied = self.image.is_some() || self.by_vertices;
         if is_varied {

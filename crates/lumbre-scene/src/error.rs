@@ -94,7 +94,7 @@ pub enum BuildError {
         /// The kind of shape.
         name: &'static str,
     },
-    /// The area of a shape that is to shine by power is not known.
+    /// A shape without a known area has a light defined by power.
     #[error("shape {shape}: custom geometry cannot shine by power, for its area is not known")]
     LightWithoutArea {
         /// The shape.

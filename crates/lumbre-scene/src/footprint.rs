@@ -30,12 +30,12 @@ pub enum Footprint {
 
 /// A footprint on a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Spot {
+pub(crate) struct SurfaceFootprint {
     pub dpdx: Vec3,
     pub dpdy: Vec3,
     pub duv_dx: Vec2,
     pub duv_dy: Vec2,
-    /// The width across the ray, and its growth with distance, for the rays that leave.
+    /// The width across the ray, and its growth with distance, for rays that leave.
     pub width: f64,
     pub spread: f64,
 }
@@ -75,17 +75,25 @@ impl Footprint {
 
     /// The footprint for untextured surfaces: only the width and spread for the rays that leave.
     #[inline]
-    pub(crate) fn across(&self, point: DVec3, normal: DVec3, direction: DVec3, distance: f64) -> Spot {
+    pub(crate) fn across(
+        &self,
+        point: DVec3,
+        normal: DVec3,
+        direction: DVec3,
+        distance: f64,
+    ) -> SurfaceFootprint {
         if let Self::Cone { width, spread } = *self {
             let width = width + spread * distance;
             return if width.is_finite() {
-                Spot { width, spread, ..Spot::default() }
+                SurfaceFootprint { width, spread, ..SurfaceFootprint::default() }
             } else {
-                Spot::default()
+                SurfaceFootprint::default()
             };
         }
-        self.sides(point, normal, direction, distance)
-            .map_or_else(Spot::default, |(_, _, width, spread)| Spot { width, spread, ..Spot::default() })
+        self.sides(point, normal, direction, distance).map_or_else(
+            SurfaceFootprint::default,
+            |(_, _, width, spread)| SurfaceFootprint { width, spread, ..SurfaceFootprint::default() },
+        )
     }
 
     /// The footprint at `point` at a distance along the unit `direction`, on the plane with this normal, in
@@ -98,9 +106,9 @@ impl Footprint {
         dpdv: DVec3,
         direction: DVec3,
         distance: f64,
-    ) -> Spot {
+    ) -> SurfaceFootprint {
         let Some((dpdx, dpdy, width, spread)) = self.sides(point, normal, direction, distance) else {
-            return Spot::default();
+            return SurfaceFootprint::default();
         };
         // Least squares for the change of (u, v) that corresponds to each offset.
         let (uu, uv, vv) = (dpdu.dot(dpdu), dpdu.dot(dpdv), dpdv.dot(dpdv));
@@ -110,7 +118,7 @@ impl Footprint {
             let uv = Vec2::new(((vv * a - uv * b) * inverse) as f32, ((uu * b - uv * a) * inverse) as f32);
             if uv.is_finite() { uv.clamp(Vec2::splat(-1e8), Vec2::splat(1e8)) } else { Vec2::ZERO }
         };
-        Spot {
+        SurfaceFootprint {
             dpdx: dpdx.as_vec3(),
             dpdy: dpdy.as_vec3(),
             duv_dx: parameters(dpdx),

@@ -1,4 +1,4 @@
-//! The automatic camera: a three-quarter view that frames everything, or what is asked of it.
+//! The automatic camera: a three-quarter view that frames everything, or a view of the given options.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -41,21 +41,21 @@ pub(crate) fn axes(up: UpAxis, turns: f64) -> [DVec3; 3] {
 /// A visitor of points.
 pub(crate) type Points<'p> = dyn Fn(&mut dyn FnMut(DVec3)) + 'p;
 
-/// What a camera is framed for.
+/// The requirements of a camera.
 pub(crate) struct Framing<'a> {
-    /// What is up in the world.
+    /// The up axis of the world.
     pub up: UpAxis,
-    /// Whether x goes to the left in pictures of the world where y goes up and z to the viewer.
+    /// Whether x points left in pictures of the world with y up and z towards the viewer.
     pub is_left_handed: bool,
     /// Width over height of the picture.
     pub aspect: f64,
-    /// What is asked for.
+    /// The requested view.
     pub viewpoint: &'a Viewpoint,
     /// The fraction of a turn around the model; `None` for a still view.
     pub turns: Option<f64>,
 }
 
-/// A camera, and the fraction of a turn about the up axis, as [`axes`] takes it, by which it went from its usual place.
+/// A camera, and its rotation about the up axis from the usual place, as a fraction of a turn, as [`axes`] takes it.
 pub(crate) struct Framed {
     pub camera: Camera,
     pub turns: f64,
@@ -68,9 +68,9 @@ pub(crate) fn still(points: &Points, up: UpAxis, aspect: f64) -> Camera {
 }
 
 impl Framing<'_> {
-    /// A camera that sees `points` as the viewpoint asks. Without a place of its own, it is the nearest one that has all
-    /// of them in its picture: from the front, the right and above, turned by azimuth, elevation and turns. All fractions
-    /// of a turn share one distance. If there are no points, it frames the cube [-1, 1]³.
+    /// A camera that sees `points` as requested. Without a given position, it is the nearest one that has all points in
+    /// its picture: from the front, the right and above, rotated by azimuth, elevation and turns. All fractions of a
+    /// turn share one distance. Without points, it frames the cube [-1, 1]³.
     pub(crate) fn camera(&self, points: &Points) -> Framed {
         let asked = self.viewpoint;
         let bounds = usable_bounds(points);
@@ -103,7 +103,7 @@ impl Framing<'_> {
             }
             None if asked.orthographic => {
                 let reach = eye.reach(visible, target);
-                // As far before the nearest point as everything is large.
+                // As far in front of the nearest point as the size of everything.
                 let middle = if asked.target.is_some() { DVec2::ZERO } else { reach.middle() };
                 let size = bounds.size().length();
                 let distance = if size > 0.0 { size } else { 1.0 } - reach.nearest;
@@ -133,7 +133,7 @@ impl Framing<'_> {
         Framed { camera, turns: if self.is_left_handed { -turned } else { turned } }
     }
 
-    /// What is to the right in the picture, up, and to the front.
+    /// The right, up and front directions of the picture.
     fn axes(&self) -> [DVec3; 3] {
         let [right, upward, front] = axes(self.up, 0.0);
         [if self.is_left_handed { -right } else { right }, upward, front]
@@ -152,7 +152,7 @@ struct Direction {
 }
 
 impl Direction {
-    /// Of a vector to the right, up and to the front.
+    /// From a vector to the right, up and to the front.
     fn of(v: DVec3) -> Self {
         Self { azimuth: v.x.angle_from(v.z), elevation: v.y.angle_from(v.x.hypotenuse(v.z)) }
     }
@@ -210,7 +210,7 @@ struct Place {
     distance: f64,
 }
 
-/// How far points reach to the left, right, bottom and top of an axis, and the least depth along it.
+/// The extent of points to the left, right, bottom and top of an axis, and their least depth along it.
 struct Reach {
     low: DVec2,
     high: DVec2,
@@ -222,7 +222,7 @@ impl Reach {
         0.5 * (self.low + self.high)
     }
 
-    /// Half the sides of the window that is centred on the axis and holds all.
+    /// Half the sides of the window that is centred on the axis and contains all points.
     fn half(&self) -> DVec2 {
         self.high.max(-self.low)
     }
@@ -251,7 +251,7 @@ impl Eye {
         Self { x, y, forward: -towards, slopes: slope * half_window(aspect) }
     }
 
-    /// How far points reach around the axis through `origin`.
+    /// The extent of points around the axis through `origin`.
     fn reach(&self, points: &Points, origin: DVec3) -> Reach {
         let mut reach = Reach { low: DVec2::INFINITY, high: DVec2::NEG_INFINITY, nearest: f64::INFINITY };
         points(&mut |p| {

@@ -92,7 +92,7 @@ pub(crate) fn lay(desc: &mut SceneDesc) -> Result<Option<GroundDesc>, BuildError
         .map_err(|source| BuildError::Shape { shape: SHAPE, source })?;
     let reflectance = Arc::new(Texture::Constant(ground.reflectance));
     let material = Material::new(MaterialKind::Diffuse { reflectance });
-    // A list that is full would double.
+    // Growing a full list would double its memory.
     desc.shapes.reserve_exact(1);
     desc.shapes.push(ShapeDesc {
         index: SHAPE,

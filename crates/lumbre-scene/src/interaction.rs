@@ -111,18 +111,18 @@ impl<'s> Interaction<'s> {
         (!scene.is_occluded(&way)).then(|| self.incident_origin + terminator_offset)
     }
 
-    /// [`Interaction::risen`] without a look at what lies between.
+    /// [`Interaction::risen`] without the test for objects in between.
     pub fn terminator_origin(&self) -> Option<DVec3> {
         Some(self.incident_origin + self.terminator_offset?)
     }
 
-    /// The width of the footprint across the ray, and its growth with distance: of the rays that leave, too.
+    /// The width of the footprint across the ray, and its growth with distance, also for rays that leave.
     pub fn cone(&self) -> (f64, f64) {
         (self.width, self.spread)
     }
 
     /// Whether there may be a terminator offset.
-    pub fn may_rise(&self) -> bool {
+    pub fn has_terminator_offset(&self) -> bool {
         self.terminator_offset.is_some()
     }
 

@@ -1,7 +1,7 @@
 //! Lenses of several spherical surfaces, traced ray by ray from the film to the scene.
 //!
-//! Kolb, Mitchell, Hanrahan, "A Realistic Camera Model for Computer Graphics", SIGGRAPH 1995. Rays are neither dispersed nor reflected at
-//! the surfaces.
+//! Kolb, Mitchell, Hanrahan, "A Realistic Camera Model for Computer Graphics", SIGGRAPH 1995. Without dispersion and
+//! without reflections at the surfaces.
 
 use std::f64::consts::FRAC_PI_4;
 
@@ -11,33 +11,33 @@ use thiserror::Error;
 /// A surface of a lens. Lengths are in metres, which are the units of the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LensSurface {
-    /// The radius of curvature, positive where its centre is on the side of the film; 0 is the plane of the stop.
+    /// The radius of curvature, positive if its centre is on the side of the film; 0 is the plane of the stop.
     pub curvature: f64,
     /// The distance along the axis to the next surface towards the film, and from the last one to the film.
     pub thickness: f64,
     /// The index of refraction behind it, on the side of the film; 0 counts as 1.
     pub eta: f64,
-    /// The radius of what of it lets light through.
+    /// The radius of the transparent part.
     pub aperture: f64,
 }
 
-/// How much of the light each place of the square about the stop lets through; beyond it nothing passes.
+/// The transmittance at each point of the square around the stop; nothing passes outside.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ApertureImage {
     width: usize,
     height: usize,
-    /// Rows from below to above.
+    /// Rows from bottom to top.
     values: Vec<f32>,
 }
 
 impl ApertureImage {
-    /// Of rows from below to above, which are scaled so that as much light passes as through a round stop. `None` where there are not as
-    /// many numbers as pixels, some are negative or not finite, or all are 0.
+    /// From rows from bottom to top, scaled to transmit as much light as a round stop. `None` if there are not as many
+    /// numbers as pixels, some are negative or not finite, or all are 0.
     pub fn new(width: usize, height: usize, mut values: Vec<f32>) -> Option<Self> {
         let mean = values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len() as f64;
         let fits = width > 0 && height > 0 && width.checked_mul(height) == Some(values.len());
-        let lets_light_through = mean > 0.0 && mean.is_finite() && values.iter().all(|&v| v >= 0.0);
-        if !fits || !lets_light_through {
+        let is_transmissive = mean > 0.0 && mean.is_finite() && values.iter().all(|&v| v >= 0.0);
+        if !fits || !is_transmissive {
             return None;
         }
         let scale = (FRAC_PI_4 / mean) as f32;
@@ -45,7 +45,7 @@ impl ApertureImage {
         Some(Self { width, height, values })
     }
 
-    /// The stops that pbrt has by name: "gaussian", "square", "pentagon" and "star".
+    /// pbrt's named stops: "gaussian", "square", "pentagon" and "star".
     pub fn named(name: &str) -> Option<Self> {
         const SIDE: usize = 256;
         let turn = std::f64::consts::TAU / 5.0;
@@ -77,7 +77,7 @@ impl ApertureImage {
     /// The names that [`ApertureImage::named`] knows.
     pub const NAMES: [&str; 4] = ["gaussian", "square", "pentagon", "star"];
 
-    /// The share at a point of the stop, whose square is [-1, 1]²: linear between the middles of pixels.
+    /// The transmittance at a point of the stop, whose square is [-1, 1]²: linear between the middles of pixels.
     fn at(&self, point: DVec2) -> f64 {
         let is_inside = point.abs().max_element() <= 1.0;
         if !is_inside {
@@ -117,19 +117,20 @@ pub enum LensError {
     /// There are none, or a number is not finite, a thickness or an index negative, or an aperture not positive.
     #[error("a surface of the lens is not one")]
     Surface,
-    /// Rays near the axis do not come through, or stay parallel.
+    /// Rays near the axis are blocked, or stay parallel.
     #[error("the lens makes no picture: rays along its axis do not meet behind it")]
     NoFocus,
-    /// There is no place of the film for this distance.
+    /// No film position focuses at this distance.
     #[error("the lens cannot be focused at this distance")]
     TooNear,
 }
 
-/// Intervals of the distance from the middle of the film, each with bounds of its own on the exit pupil.
+/// Intervals of the distance from the middle of the film, each with its own bounds of the exit pupil.
 const PUPILS: usize = 64;
-/// Places of the rear surface that are tried in each direction, to find the exit pupil; and where none of them lets light through.
+/// Points of the rear surface along each axis that are tried to find the exit pupil; the second number applies if the
+/// first finds no light.
 const PUPIL_STEPS: [usize; 2] = [256, 1024];
-/// A larger part of the plane of the rear surface than light can come through, as a multiple of its radius.
+/// The searched part of the plane of the rear surface, larger than light can pass through, as a multiple of its radius.
 const PUPIL_REACH: f64 = 1.5;
 
 /// A lens in focus, and the film behind it. The axis is z, from the film at 0 to the scene.
@@ -140,12 +141,12 @@ pub struct Lens {
     stop: Option<ApertureImage>,
     diagonal: f64,
     focal_length: f64,
-    /// The exit pupil as seen from the film at growing distances along x: its least and greatest x and y on the plane of the rear
-    /// surface; none where no light comes from.
+    /// The exit pupil as seen from the film at growing distances along x: its least and greatest x and y on the plane
+    /// of the rear surface; `None` if no light arrives.
     pupils: Vec<Option<[DVec2; 2]>>,
 }
 
-/// A ray inside a lens, or out of it.
+/// A ray inside or outside a lens.
 #[derive(Clone, Copy)]
 struct Line {
     origin: DVec3,
@@ -159,8 +160,8 @@ impl Line {
 }
 
 impl Lens {
-    /// A lens of surfaces from the scene to the film, moved so that what is `focus_distance` away from the film is sharp, before a film
-    /// of this diagonal; all in metres. `stop` is what lets light through in place of a round stop.
+    /// A lens of surfaces from the scene to the film, moved to focus at `focus_distance` from the film, for a film of
+    /// this diagonal; all in metres. `stop` replaces a round stop.
     ///
     /// # Errors
     /// [`LensError`].
@@ -206,8 +207,8 @@ impl Lens {
         0.5 * DVec2::new(aspect * height, height)
     }
 
-    /// The ray that leaves the lens from a point of the film through a point of the exit pupil (two uniform numbers): its origin, its
-    /// direction, and its weight, by which radiance becomes irradiance of the film. `None` where no light comes from.
+    /// The ray that leaves the lens from a film point through a point of the exit pupil (two uniform numbers): its
+    /// origin, its direction, and the factor from radiance to the film's irradiance. `None` if no light arrives.
     pub(crate) fn ray(&self, film: DVec2, u: DVec2) -> Option<(DVec3, DVec3, f64)> {
         let r = film.length();
         let place = (r / (0.5 * self.diagonal) * PUPILS as f64) as usize;
@@ -223,7 +224,7 @@ impl Lens {
         (weight > 0.0).then(|| (line.origin, line.direction.normalize(), weight))
     }
 
-    /// Follows a ray from the film; `None` where it is stopped. The share is what the stop lets through.
+    /// Traces a ray from the film, with the transmittance of the stop; `None` if it is blocked.
     fn to_scene(&self, mut line: Line) -> Option<(Line, f64)> {
         let (mut z, mut share) = (0.0, 1.0);
         for (i, surface) in self.surfaces.iter().enumerate().rev() {
@@ -234,7 +235,7 @@ impl Lens {
         Some((line, share))
     }
 
-    /// Follows a ray from the scene; `None` where it is stopped.
+    /// Traces a ray from the scene; `None` if it is blocked.
     fn to_film(&self, mut line: Line) -> Option<Line> {
         let mut z: f64 = self.surfaces.iter().map(|surface| surface.thickness).sum();
         let mut before = 1.0;
@@ -247,8 +248,8 @@ impl Lens {
         Some(line)
     }
 
-    /// Takes a ray through the surface whose vertex is at z, from one index of refraction to the other; the share is what it lets
-    /// through. `None` where the ray misses it, or is stopped or wholly reflected.
+    /// Traces a ray through the surface whose vertex is at z, from one index of refraction to the other, and returns
+    /// the transmittance. `None` if the ray misses the surface, is blocked or totally reflected.
     fn cross(&self, line: &mut Line, surface: &LensSurface, z: f64, from: f64, to: f64) -> Option<f64> {
         let forward = line.direction.z > 0.0;
         let is_stop = surface.curvature == 0.0;
@@ -265,7 +266,7 @@ impl Lens {
             if !meets {
                 return None;
             }
-            // The half of the sphere that holds the vertex.
+            // The hemisphere that contains the vertex.
             let is_nearer = forward == (surface.curvature < 0.0);
             let root = root.sqrt();
             (-half + if is_nearer { -root } else { root }) / a
@@ -302,7 +303,8 @@ impl Lens {
             Line { origin: DVec3::new(height, 0.0, front + FAR), direction: DVec3::new(0.0, 0.0, -1.0) };
         let from_film =
             Line { origin: DVec3::new(height, 0.0, self.film_distance() - FAR), direction: DVec3::Z };
-        // Where a ray that comes parallel to the axis meets it, and where the ray that leaves is as far from it as the one that came.
+        // Where a ray that arrives parallel to the axis crosses it, and where the ray that leaves is as far from it as
+        // the one that arrived.
         let cardinal = |line: Line| {
             let focus = line.at(-line.origin.x / line.direction.x).z;
             let principal = line.at((height - line.origin.x) / line.direction.x).z;
@@ -314,7 +316,8 @@ impl Lens {
         if !(focal_length.is_finite() && film_side.is_finite() && scene_side.is_finite()) {
             return Err(LensError::NoFocus);
         }
-        // From the object to the film without what is between the principal planes: object and image distance together.
+        // The distance from the object to the film, without the part between the principal planes: object and image
+        // distance together.
         let between = distance - scene_side + film_side;
         let under = between * (between - 4.0 * focal_length);
         let can = under > 0.0 && between > 0.0;
@@ -333,7 +336,7 @@ impl Lens {
         Ok(())
     }
 
-    /// Bounds on the exit pupil from the places of an interval along x.
+    /// Bounds of the exit pupil, from the points of an interval along x.
     fn pupil(&self, interval: usize, steps: usize) -> Option<[DVec2; 2]> {
         let at = |t: f64| 0.5 * self.diagonal * (interval as f64 + t) / PUPILS as f64;
         let rear = self.film_distance();
@@ -345,7 +348,7 @@ impl Lens {
             self.to_scene(Line { origin, direction: point.extend(rear) - origin }).is_some()
         };
         let mut bounds: Option<[DVec2; 2]> = None;
-        // What is below the axis is a mirror image of what is above, but for the stop.
+        // The lens is symmetric about the axis, except for the stop.
         let first = if self.stop.is_some() { 0 } else { steps / 2 };
         for y in first..steps {
             for x in 0..steps {
@@ -367,7 +370,7 @@ impl Lens {
     }
 }
 
-/// An index of refraction as files give it.
+/// An index of refraction as given in files.
 fn index(eta: f64) -> f64 {
     if eta == 0.0 { 1.0 } else { eta }
 }

@@ -1,5 +1,19 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![doc = include_str!("../README.md")]
+//!
+//! # Motion
+//!
+//! A camera has a shutter. Where anything moves, a sample has a time, evenly distributed over the exposure, and every
+//! ray of its path keeps it. Only what moves reads it: an instance (`Placement::Moving`) interpolates its transform at
+//! the ray's time, and its box in the tree holds it at every time. A single shape that moves is put in an object of its
+//! own. If it emits, `light/moving.rs` samples it where it is at that time. A mesh that changes its form
+//! (`MeshDesc::motion`: skins and morph targets) is custom geometry, `DeformingMesh`, and is hit as the mesh that it is
+//! at the ray's time, to the bit.
+//!
+//! # The stage
+//!
+//! [`Stage`] turns a description without a camera or light into one that has them: framing, studio light, ground. What
+//! is behind the picture (`lumbre::Background`) is added after tone mapping, by the coverage that the film keeps.
 
 mod append;
 mod build;
@@ -31,7 +45,7 @@ mod surface;
 mod tables;
 mod viewpoint;
 
-pub use camera::{Camera, CameraKind, CameraRay, SphericalMapping, View, WideProjection};
+pub use camera::{Camera, CameraKind, CameraRay, Pinhole, SphericalMapping, View, WideProjection};
 pub use desc::*;
 pub use emission::Emission;
 pub use error::BuildError;

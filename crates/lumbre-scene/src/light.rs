@@ -1,4 +1,4 @@
-//! The closed set of lights: sampled from a point, and asked for the density of what a ray found.
+//! The closed set of lights: sampling from a point, and densities of rays that hit a light.
 
 mod area;
 mod brightness;
@@ -43,62 +43,62 @@ pub struct LightId(pub u32);
 /// The kinds of light.
 #[derive(Clone, Debug)]
 pub enum Light {
-    /// The same in all directions from a point.
+    /// The same intensity in all directions from a point.
     Point(PointLight),
     /// A cone from a point.
     Spot(SpotLight),
-    /// From a point, by direction as a picture says.
+    /// From a point, with an image of intensity by direction.
     Goniometric(GoniometricLight),
-    /// From a point, a picture.
+    /// A picture projected from a point.
     Projection(ProjectionLight),
     /// Parallel light.
     Distant(DistantLight),
-    /// The same from all around.
+    /// Uniform radiance from all directions.
     Uniform(UniformLight),
-    /// A picture all around.
+    /// An image over all directions.
     Environment(Environment),
-    /// Light from all around, through a rectangle.
+    /// Light from all directions, through a rectangle.
     Portal(PortalLight),
     /// One exact shape.
     Shape(ShapeLight),
     /// Triangles.
     Mesh(MeshLight),
-    /// One of the two in an object that stands in the world once, moving or not.
+    /// A shape or mesh light in an object with one placement, moving or not.
     Placed(PlacedLight),
     /// A light by POV-Ray's laws.
     Pov(std::sync::Arc<crate::pov::PovLight>),
-    /// A light from a point or in one direction that moves.
+    /// A moving point light, or a moving light in one direction.
     Moving(MovingLight),
 }
 
-/// Light that arrives at a point, from a direction that a light chose.
+/// Light that arrives at a point from a sampled direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightSample {
     /// Unit, towards the light.
     pub towards: DVec3,
-    /// Where it comes from; `None` for what is infinitely far away.
+    /// Its source; `None` for a light at infinity.
     pub end: Option<LightPoint>,
-    /// The radiance that arrives, if nothing stands in its way; for [`Scatter::Delta`], the irradiance on a surface that
-    /// faces it.
+    /// The radiance that arrives if unoccluded; for [`Scatter::Delta`], the irradiance on a surface perpendicular to
+    /// it.
     pub radiance: Spectrum,
     /// How the direction was chosen, per unit solid angle.
     pub scatter: Scatter,
 }
 
-/// Where a shadow ray ends.
+/// The end of a shadow ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightPoint {
     /// The point.
     pub point: DVec3,
-    /// A bound on the error of each component of it; zero for points given exactly.
+    /// An error bound of each component; zero for exact points.
     pub error: DVec3,
-    /// The normal there; zero where there is no surface.
+    /// The normal there; zero without a surface.
     pub normal: DVec3,
 }
 
 impl LightSample {
-    /// The same where directions are so many times as likely: the density grows by that, or the radiance of a delta light, which
-    /// stands for its own division by it, shrinks.
+    /// The sample with directions more likely by this factor: the density grows by it; the radiance of a delta light,
+    /// which includes the division by the density, shrinks.
     fn of_density(mut self, factor: f64) -> Self {
         match &mut self.scatter {
             Scatter::Density(pdf) => *pdf *= factor as f32,
@@ -119,8 +119,8 @@ impl LightPoint {
 }
 
 impl Light {
-    /// Light that arrives at `from` at a time, by two uniform numbers. `None` where the light chose a direction from which nothing
-    /// comes.
+    /// Light that arrives at `from` at a time, from two uniform numbers. `None` if no light arrives from the chosen
+    /// direction.
     pub(crate) fn sample(
         &self,
         entries: &[SurfaceEntry],
@@ -145,7 +145,7 @@ impl Light {
         }
     }
 
-    /// What a tree knows of it, piece by piece; nothing for lights that are everywhere.
+    /// The light's entries in a light tree, piece by piece; empty for lights that are everywhere.
     pub(crate) fn emitters(&self, entries: &[SurfaceEntry]) -> Vec<Emitter> {
         let mean = |colour: Spectrum| f64::from(colour.average());
         let at =
@@ -171,7 +171,7 @@ impl Light {
         }
     }
 
-    /// The direction of parallel light at a time; `None` for all other.
+    /// The direction of parallel light at a time; `None` for other lights.
     fn towards(&self, time: f64) -> Option<DVec3> {
         match self {
             Self::Distant(light) => Some(light.towards),
@@ -188,9 +188,8 @@ impl Light {
         }
     }
 
-    /// The density per unit solid angle with which the light chooses what `ray` hit: a surface, in the space of its tree,
-    /// for lights that have one.
-    /// 0 for lights that no ray can hit.
+    /// The density per unit solid angle with which the light samples what `ray` hit. `surface` is the surface in the
+    /// space of its tree, for lights that have one. 0 for lights that no ray can hit.
     pub(crate) fn pdf(&self, ray: &Ray, surface: Option<(&Surface, u32)>) -> f64 {
         match (self, surface) {
             (Self::Uniform(_), None) => UniformLight::pdf(),
@@ -206,8 +205,9 @@ impl Light {
         }
     }
 
-    /// The surface, in the space of its tree, of which a ray from `from` met this point, both in the world; of a mesh, as far as densities
-    /// depend on it. `None` for what is no surface, and for a point that is not on it.
+    /// The light's surface, in the space of its tree, at this point of a ray from `from`; both points are in the world.
+    /// For a mesh, only the data that densities need. `None` for lights without a surface, and for a point off the
+    /// surface.
     fn surface_at(&self, from: DVec3, point: DVec3, time: f64) -> Option<Surface> {
         match self {
             Self::Shape(light) => light.surface_at(from, point),
@@ -224,7 +224,7 @@ impl Light {
         }
     }
 
-    /// The radiance that arrives at `from` along the unit `direction` from infinitely far away.
+    /// The radiance that arrives at `from` along the unit `direction` from infinity.
     pub fn escaped(&self, from: DVec3, direction: DVec3) -> Spectrum {
         match self {
             Self::Uniform(light) => light.radiance,
@@ -241,8 +241,8 @@ impl Light {
         }
     }
 
-    /// The irradiance at a time of a surface at `at` that faces `normal` (unit), if nothing stands in the way; `None` for lights
-    /// that are surfaces.
+    /// The unoccluded irradiance at a time on a surface at `at` with the unit `normal`; `None` for lights that are
+    /// surfaces.
     pub fn irradiance(&self, at: DVec3, time: f64, normal: DVec3) -> Option<Spectrum> {
         let of = |sample: Option<LightSample>| {
             sample.map_or(Spectrum::BLACK, |s| s.radiance * normal.dot(s.towards).max(0.0) as f32)
@@ -262,7 +262,7 @@ impl Light {
         }
     }
 
-    /// Whether rays that leave the scene meet it.
+    /// Whether rays that leave the scene hit it.
     pub fn is_infinite(&self) -> bool {
         match self {
             Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => true,
@@ -277,7 +277,7 @@ impl Light {
         }
     }
 
-    /// Whether its light comes from one direction alone at each place.
+    /// Whether its light arrives at each point from a single direction.
     pub fn is_delta(&self) -> bool {
         match self {
             Self::Point(_)
@@ -292,7 +292,7 @@ impl Light {
         }
     }
 
-    /// Whether it is a surface, which rays meet.
+    /// Whether it is a surface, which rays can hit.
     pub(crate) fn is_surface(&self) -> bool {
         match self {
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => true,
@@ -307,7 +307,7 @@ impl Light {
         }
     }
 
-    /// An estimate of the power that it sends into a scene of this radius, by which it is chosen.
+    /// An estimate of its power in a scene of this radius, for choosing among lights.
     pub fn power(&self, scene_radius: f64) -> f64 {
         use std::f64::consts::PI;
         let disk = PI * scene_radius * scene_radius;

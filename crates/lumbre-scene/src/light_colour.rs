@@ -1,28 +1,28 @@
-//! What spectra lights have, where a render carries wavelengths.
+//! The spectra of lights in spectral renders.
 
 use std::sync::Arc;
 
 use lumbre_shading::Spectrum;
 use lumbre_shading::spectrum::{LightCurve, Wavelengths};
 
-/// What a light's colours are made of.
+/// The colours of a light.
 #[derive(Clone, Debug)]
 pub(crate) enum LightColour {
-    /// One colour, times a factor by direction and place.
+    /// One colour, times a factor by direction and position.
     Constant {
         /// The colour.
         colour: Spectrum,
-        /// Its spectrum with luminance 1, where it has one of its own.
+        /// Its spectrum with luminance 1, if it has one.
         spectrum: Option<Arc<LightCurve>>,
     },
-    /// Colours that vary from place to place.
+    /// Colours that vary.
     Varied,
-    /// What a surface emits, which says so itself.
+    /// The emission of a surface, which has its own spectrum.
     Surface,
 }
 
 impl LightColour {
-    /// Light at some wavelengths, of which `radiance` is the colour.
+    /// Light at some wavelengths; `radiance` is its colour.
     pub(crate) fn at_wavelengths(&self, radiance: Spectrum, wavelengths: &Wavelengths) -> Spectrum {
         match self {
             Self::Constant { colour, spectrum } => {
@@ -33,8 +33,8 @@ impl LightColour {
     }
 }
 
-/// Light at some wavelengths, of which `radiance` is the colour: that of a light of one colour, which may have a spectrum of luminance 1,
-/// times a factor.
+/// Light at some wavelengths; `radiance` is its colour: that of a light of one colour, times a factor. The light may
+/// have a spectrum of luminance 1.
 pub(crate) fn constant(
     colour: Spectrum,
     spectrum: Option<&LightCurve>,
@@ -43,7 +43,7 @@ pub(crate) fn constant(
 ) -> Spectrum {
     let factor = radiance.average() / colour.average();
     if !factor.is_finite() {
-        // It is for the film to find.
+        // The film reports it.
         return if radiance.is_black() { Spectrum::BLACK } else { radiance };
     }
     match spectrum {

@@ -1,8 +1,8 @@
-//! What a description's files hold by name, for those who choose from it.
+//! The named items of a description's files, for choosing among them.
 
 use std::collections::HashSet;
 
-/// What was read by name. It changes no picture.
+/// The names that were read. They change no picture.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Listing {

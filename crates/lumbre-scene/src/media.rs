@@ -1,7 +1,8 @@
 //! Participating media in a scene, and the surfaces between them.
 //!
-//! Surfaces without material that separate two media stand in a tree of their own: light goes straight on through them, so that no other
-//! ray need know of them. Surfaces with a material stand among all others, and say by their [`Boundary`] what is on their sides.
+//! Surfaces without material that separate two media are in a tree of their own: light passes straight through them, so
+//! other rays need not test them. Surfaces with a material are among all others; their [`Boundary`] has the media on
+//! both sides.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -21,21 +22,21 @@ use crate::{
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Media {
     pub media: Vec<Arc<Medium>>,
-    /// The surfaces without material between them; `None` where there are none.
+    /// The surfaces without material between them; `None` if there are none.
     pub boundaries: Option<Arc<Boundaries>>,
 }
 
-/// A tree of surfaces that do nothing but separate media.
+/// A tree of surfaces that only separate media.
 #[derive(Debug)]
 pub(crate) struct Boundaries {
     pub accel: Arc<Accel>,
     pub entries: Vec<SurfaceEntry>,
 }
 
-/// Where a ray goes through a surface without material, from one medium to another.
+/// A ray's crossing of a surface without material, from one medium to another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
-    /// How far along the ray, in units of its direction.
+    /// The position along the ray, in units of its direction.
     pub t: f64,
     /// The medium beyond; `None` is a vacuum.
     pub beyond: Option<MediumId>,
@@ -43,7 +44,7 @@ pub struct Crossing {
     leaves: bool,
 }
 
-/// Takes the shapes that do nothing but separate media out of a description, and gives them as shapes and objects of their own.
+/// Removes the shapes that only separate media from a description, and returns them as shapes and objects of their own.
 pub(crate) fn split(desc: &mut SceneDesc) -> Option<(Vec<ShapeDesc>, Vec<ObjectDesc>)> {
     let materials = &desc.materials;
     let mut found = false;
@@ -83,7 +84,7 @@ fn is_interface(shape: &ShapeDesc, materials: &[NamedMaterial]) -> bool {
     }
 }
 
-/// Whether anything is in a medium. Checks that every medium that is named is there.
+/// Whether anything is in a medium. Checks that every referenced medium exists.
 pub(crate) fn check(desc: &SceneDesc) -> Result<bool, BuildError> {
     let count = desc.media.len();
     let shapes = desc.objects.iter().flat_map(|object| &object.shapes).chain(&desc.shapes);
@@ -100,14 +101,14 @@ pub(crate) fn check(desc: &SceneDesc) -> Result<bool, BuildError> {
 }
 
 impl Boundaries {
-    /// Adds the places where a ray goes through, in their order.
+    /// Appends the crossings of a ray, in order.
     fn crossings(&self, ray: &Ray, crossings: &mut Vec<Crossing>) {
         let before = crossings.len();
         self.accel.all(ray, |hit| {
             crossings.extend(self.crossing(ray, hit));
             ControlFlow::Continue(())
         });
-        // Where two surfaces touch, one solid is left before the other is entered.
+        // Where two surfaces touch, a ray leaves one solid before it enters the other.
         crossings[before..].sort_by(|a, b| a.t.total_cmp(&b.t).then(b.leaves.cmp(&a.leaves)));
     }
 
@@ -119,7 +120,7 @@ impl Boundaries {
         Some(Crossing { t: hit.root.t, beyond: if leaves { outside } else { inside }, leaves })
     }
 
-    /// The surface with its normal to the side that counts as outside.
+    /// The surface with its normal on the outside.
     fn outward(&self, entry: &SurfaceEntry, ray: &Ray, hit: &Hit, geometric: Surface) -> Surface {
         let part = match entry.form {
             Form::Csg(_) => 0,
@@ -131,7 +132,7 @@ impl Boundaries {
 }
 
 impl Scene {
-    /// Whether any medium stands between its surfaces. (What scatters inside solids belongs to their materials.)
+    /// Whether there is any medium between its surfaces. (Scattering inside solids belongs to their materials.)
     pub fn has_media(&self) -> bool {
         !self.media.media.is_empty()
     }
@@ -139,25 +140,26 @@ impl Scene {
     /// The medium of an index.
     ///
     /// # Panics
-    /// When the scene has none of this index.
+    /// If the scene has no medium of this index.
     pub fn medium(&self, id: MediumId) -> &Medium {
         &self.media.media[id.0 as usize]
     }
 
-    /// Bytes that the grids of all media take.
+    /// Memory of the grids of all media, in bytes.
     pub fn media_memory(&self) -> usize {
         self.media.media.iter().map(|medium| medium.memory()).sum()
     }
 
-    /// Adds the places where a ray goes through surfaces without material from one medium to another, in their order.
+    /// Appends the crossings of a ray with surfaces without material between media, in order.
     pub fn crossings(&self, ray: &Ray, crossings: &mut Vec<Crossing>) {
         if let Some(boundaries) = &self.media.boundaries {
             boundaries.crossings(ray, crossings);
         }
     }
 
-    /// An estimate of what media leave of light along a ray with a range, which begins in a medium. What else is in its way does not
-    /// count. `seed` chooses among such estimates. Channels are those of linear Rec. 709, or the wavelengths that are given.
+    /// An estimate of the transmittance of media along a ray with a range, which starts in a medium. Other objects on
+    /// the way do not count. `seed` selects one of the possible estimates. Channels are those of linear Rec. 709, or
+    /// the given wavelengths.
     pub fn transmittance(
         &self,
         medium: Option<MediumId>,

@@ -1,4 +1,4 @@
-//! What POV-Ray's scenes have besides objects: lights by its laws, and what is around everything.
+//! POV-Ray's lights, and the surroundings of its scenes.
 
 use std::sync::Arc;
 
@@ -8,22 +8,22 @@ use lumbre_shading::{Scatter, Spectrum};
 
 use crate::light::{LightPoint, LightSample};
 
-/// A light by POV-Ray's laws: its light does not fall off with distance, unless it fades.
+/// A light by POV-Ray's laws: no falloff with distance, unless it fades.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PovLight {
     /// The position.
     pub from: DVec3,
-    /// What it is pointed at.
+    /// The point that it is aimed at.
     pub point_at: DVec3,
     /// Its colour in the working space; it may be negative.
     pub colour: Spectrum,
-    /// The cone or the cylinder that it shines in.
+    /// The cone or the cylinder of its light.
     pub cone: Option<PovCone>,
     /// Whether its rays are parallel.
     pub is_parallel: bool,
     /// Whether it casts no shadows and has no highlights.
     pub shadowless: bool,
-    /// The distance at which it has faded to what it is; 0 for none.
+    /// The distance at which its fading factor is 1; 0 for no fading.
     pub fade_distance: f64,
     /// The exponent of its fading.
     pub fade_power: f64,
@@ -35,18 +35,18 @@ pub struct PovLight {
     pub gamma: f32,
     /// Whether media scatter its light.
     pub media_interaction: bool,
-    /// Whether media in the air take from its light.
+    /// Whether media in the air attenuate its light.
     pub media_attenuation: bool,
 }
 
-/// Where a light shines.
+/// The cone or cylinder of a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PovCone {
-    /// Whether it is a cylinder, with lengths in place of angles.
+    /// Whether it is a cylinder, with lengths instead of angles.
     pub is_cylinder: bool,
-    /// The angle in degrees, or the length, from the axis up to which it is full.
+    /// The angle in degrees, or the length, from the axis within which it is full.
     pub radius: f64,
-    /// That beyond which there is nothing.
+    /// The angle or length beyond which there is no light.
     pub falloff: f64,
     /// The exponent of the decrease from the axis.
     pub tightness: f64,
@@ -57,17 +57,17 @@ pub struct PovCone {
 pub struct PovArea {
     /// Its sides.
     pub sides: [DVec3; 2],
-    /// How many lights along each.
+    /// The number of lights along each.
     pub counts: [u32; 2],
-    /// How often it is divided where its corners agree.
+    /// Number of subdivisions even where its corners agree.
     pub adaptive: u32,
     /// Whether lights are moved at random.
     pub jitter: bool,
     /// Whether it is round.
     pub circular: bool,
-    /// Whether it turns to what it lights.
+    /// Whether it turns to the point that it lights.
     pub orient: bool,
-    /// Whether each light shades by itself; else all shade from the middle.
+    /// Whether each light shades separately; otherwise all shade from the middle.
     pub illumination: bool,
 }
 
@@ -95,7 +95,7 @@ impl PovLight {
         (self.point_at - self.from).normalize_or(DVec3::Z)
     }
 
-    /// The unit direction to the light from a point, and how far that is; by another place of it, as areas have.
+    /// The unit direction from a point to the light, and the distance; `from` is the point of an area light.
     pub fn towards(&self, p: DVec3, from: DVec3) -> Option<(DVec3, f64)> {
         // In a cylinder of light all rays are parallel to its axis, too.
         if self.is_parallel || self.cone.is_some_and(|cone| cone.is_cylinder) {
@@ -106,7 +106,7 @@ impl PovLight {
         Some((way.try_normalize()?, way.length()))
     }
 
-    /// The colour that arrives at a point, if nothing stands in the way.
+    /// The colour that arrives at a point if unoccluded.
     pub fn arriving(&self, p: DVec3, from: DVec3) -> Spectrum {
         let Some((_, distance)) = self.towards(p, from) else { return Spectrum::BLACK };
         if self.is_parallel && distance <= 0.0 {
@@ -147,13 +147,13 @@ impl PovLight {
         cosine.power(cone.tightness) * smooth_step(cosine, at(cone.falloff), at(cone.radius))
     }
 
-    /// Where a place of its area is, by two numbers in [0, 1], as seen from a point.
+    /// A point of its area, from two numbers in [0, 1], as seen from a point.
     pub fn place(&self, u: DVec2, seen_from: DVec3) -> DVec3 {
         let Some(area) = &self.area else { return self.from };
         let mut sides = area.sides;
         let mut at = u - DVec2::splat(0.5);
         if area.orient {
-            // Turned so that its normal points to what it lights.
+            // Turned so that its normal points to the lit point.
             let lengths = sides.map(DVec3::length);
             let normal = (seen_from - self.from).normalize_or(DVec3::Y);
             let side = sides[0] - normal * normal.dot(sides[0]);
@@ -161,7 +161,7 @@ impl PovLight {
             sides = [side * lengths[0], normal.cross(side) * lengths[1]];
         }
         if area.circular {
-            // The square is pressed into a disk.
+            // Maps the square to a disk.
             let extent = at.abs().max_element();
             let length = at.length();
             if length > 0.0 {
@@ -171,7 +171,7 @@ impl PovLight {
         self.from + sides[0] * at.x + sides[1] * at.y
     }
 
-    /// Light that arrives at a point, for path tracers: from a place on its area by two uniform numbers.
+    /// Light that arrives at a point, for path tracers: from a point on its area, by two uniform numbers.
     pub(crate) fn sample(&self, at: DVec3, u: DVec2) -> Option<LightSample> {
         let from = self.place(u, at);
         let (towards, distance) = self.towards(at, from)?;
@@ -205,14 +205,14 @@ fn smooth_step(x: f64, low: f64, high: f64) -> f64 {
     x * x * (3.0 - 2.0 * x)
 }
 
-/// What is around the objects of a POV-Ray scene, and what holds for all of it.
+/// The surroundings of a POV-Ray scene, and its global settings.
 #[derive(Clone, Debug)]
 pub struct PovWorld {
     /// A factor on the ambient light of finishes.
     pub ambient_light: Spectrum,
-    /// Rays that follow each other at most.
+    /// Maximum depth of rays.
     pub max_trace_level: u32,
-    /// What carries less than this is not followed.
+    /// Rays that carry less than this are not traced.
     pub adc_bailout: f32,
     /// The exponent from the working space to linear light.
     pub gamma: f32,
@@ -224,36 +224,36 @@ pub struct PovWorld {
     pub fogs: Vec<PovFog>,
     /// The wavelengths of red, green and blue for thin films.
     pub irid_wavelength: Spectrum,
-    /// What fills the air.
+    /// The media of the air.
     pub air: Vec<Media>,
-    /// Where the scene's camera is.
+    /// The position of the scene's camera.
     pub eye: DVec3,
-    /// What the scene's camera is inside of.
+    /// The solids around the scene's camera.
     pub around_eye: Vec<Arc<PovMaterial>>,
 }
 
-/// Fog over an infinite way is that over this length.
+/// Fog over an infinite distance is that over this length.
 const FAR: f64 = 1e7;
 
 /// A fog.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PovFog {
-    /// The distance at which e⁻¹ of light is left.
+    /// The distance at which e⁻¹ of light remains.
     pub distance: f64,
     /// Its colour in the working space.
     pub rgb: Spectrum,
-    /// How far it tints what is behind it.
+    /// By how much it tints objects behind it.
     pub filter: f32,
-    /// The least of what is left of light.
+    /// Minimum transmittance.
     pub transmit: f32,
-    /// Where it lies on the ground: the height up to which it is full, and that over which it thins out.
+    /// For ground fog: the height up to which it is full, and the height over which it thins out.
     pub ground: Option<[f64; 2]>,
     /// The unit direction of height.
     pub up: DVec3,
 }
 
 impl PovFog {
-    /// What is left of light over a distance from a point; infinite ones too.
+    /// The transmittance over a distance from a point, which may be infinite.
     pub fn transmittance(&self, origin: DVec3, direction: DVec3, length: f64) -> f32 {
         if self.distance <= 0.0 {
             return 1.0;
@@ -267,7 +267,7 @@ impl PovFog {
         ((-depth).exponential() as f32).max(self.transmit)
     }
 
-    /// The mean of the density over a way: 1 below the offset, 1 / (1 + (h / altitude)²) above it.
+    /// The mean of the density along a segment: 1 below the offset, 1 / (1 + (h / altitude)²) above it.
     fn mean_density(&self, origin: DVec3, direction: DVec3, length: f64, offset: f64, altitude: f64) -> f64 {
         let at = |t: f64| (origin + direction * t).dot(self.up) - offset;
         let (from, to) = (at(0.0), at(length));

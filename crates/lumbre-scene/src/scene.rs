@@ -10,7 +10,7 @@ use lumbre_math::{DVec2, DVec3, Transform};
 use lumbre_shading::{FloatTexture, Spectrum};
 
 use crate::build::check_cameras;
-use crate::footprint::Spot;
+use crate::footprint::SurfaceFootprint;
 use crate::light::choice::LightChoice;
 use crate::light::lanes::LaneLights;
 use crate::light::{Light, LightId, LightSample, Place, Sampling};
@@ -47,11 +47,11 @@ pub struct Scene {
     pub(crate) specular_spheres: Vec<BoundingSphere>,
     pub(crate) warnings: Vec<BuildWarning>,
     // Whether shadow rays must check every hit: there are cut-outs or interfaces.
-    pub(crate) has_holes: bool,
+    pub(crate) has_cutouts: bool,
     /// Whether any material transmits light.
-    pub(crate) lets_light_through: bool,
+    pub(crate) is_transmissive: bool,
     /// Whether any material transmits light straight on.
-    pub(crate) lets_light_straight_on: bool,
+    pub(crate) has_delta_transmission: bool,
     /// Whether any material encloses a solid that light passes through.
     pub(crate) has_solids: bool,
     // Whether any material is one-sided.
@@ -59,7 +59,7 @@ pub struct Scene {
     pub(crate) has_instances: bool,
     pub(crate) moves: bool,
     // Whether any material has textures, so that rays need footprints.
-    pub(crate) looks_up: bool,
+    pub(crate) is_textured: bool,
 }
 
 impl BuildWarning {
@@ -69,7 +69,7 @@ impl BuildWarning {
     }
 }
 
-/// Below this cosine between shading and geometric normal, the mesh stands for a smooth surface.
+/// Below this cosine between shading and geometric normal, the mesh approximates a smooth surface.
 const SMOOTH: f32 = 1.0 - 1e-6;
 
 /// A part of a description that was dropped, or makes rendering slower or noisier.
@@ -129,10 +129,10 @@ impl Scene {
         &self.cameras
     }
 
-    /// Puts a camera in the place of another one: a viewer that moves builds nothing anew.
+    /// Replaces a camera: a viewer that moves rebuilds nothing.
     ///
     /// # Errors
-    /// [`BuildError`] for a camera that [`Scene::build`] would refuse, and for a position at which there is none.
+    /// [`BuildError`] for a camera that [`Scene::build`] would refuse, and for a position without a camera.
     pub fn replace_camera(&mut self, position: usize, camera: Camera) -> Result<(), BuildError> {
         let mut cameras = self.cameras.clone();
         let count = cameras.len();
@@ -142,7 +142,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Whether a camera makes pictures of this scene.
+    /// Whether a camera is valid for this scene.
     ///
     /// # Errors
     /// [`BuildError`] for a camera that [`Scene::build`] would refuse.
@@ -177,7 +177,7 @@ impl Scene {
         self.integrator
     }
 
-    /// What is around the objects of a POV-Ray scene.
+    /// The surroundings of a POV-Ray scene.
     pub fn pov(&self) -> Option<&crate::pov::PovWorld> {
         self.pov.as_deref()
     }
@@ -212,13 +212,13 @@ impl Scene {
         self.leaf(hit).0.shape
     }
 
-    /// The triangle of a mesh that was hit, without all else that [`Scene::interaction`] finds out; 0 for what is no mesh.
+    /// The triangle of a mesh that was hit, without the other data of [`Scene::interaction`]; 0 for other shapes.
     pub fn primitive_index(&self, hit: &Hit) -> u32 {
         let (entry, part, _) = self.leaf(hit);
         entry.primitive(part)
     }
 
-    /// The curves that a hit is on, in their own space, and the map from there to the innermost instance around; `None` for other
+    /// The curves of a hit, in their own space, and the map from there to the innermost instance; `None` for other
     /// shapes.
     pub fn curves_at(&self, hit: &Hit) -> Option<(&Curves, &Transform)> {
         match &self.leaf(hit).0.form {
@@ -228,8 +228,8 @@ impl Scene {
     }
 
     /// Whether any material transmits light: glass, panes, leaves. Cut-outs do not count.
-    pub fn lets_light_through(&self) -> bool {
-        self.lets_light_through
+    pub fn is_transmissive(&self) -> bool {
+        self.is_transmissive
     }
 
     /// Whether any material encloses a solid that light passes through.
@@ -239,13 +239,13 @@ impl Scene {
 
     /// Whether any material transmits light straight on ([`lumbre_shading::Bsdf::straight_on`]), such as a thin
     /// smooth pane.
-    pub fn lets_light_straight_on(&self) -> bool {
-        self.lets_light_straight_on
+    pub fn has_delta_transmission(&self) -> bool {
+        self.has_delta_transmission
     }
 
     /// Whether the hit surface may transmit light straight on.
     pub fn is_pane(&self, hit: &Hit) -> bool {
-        self.leaf(hit).0.lets_light_straight_on()
+        self.leaf(hit).0.has_delta_transmission()
     }
 
     /// Whether the hit surface may reflect or refract without blur: see [`lumbre_shading::Material::may_be_specular`].
@@ -255,7 +255,7 @@ impl Scene {
 
     /// The closest hit, skipping cut-outs and interfaces.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
-        if self.has_holes {
+        if self.has_cutouts {
             let is_solid = |hit: &Hit| self.is_solid(ray, hit);
             self.accel.closest_with(ray, &Query::new().filter(&is_solid))
         } else {
@@ -279,7 +279,7 @@ impl Scene {
     /// # Panics
     /// When there are not as many places for hits as rays.
     pub fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        if self.has_holes {
+        if self.has_cutouts {
             assert_eq!(rays.len(), hits.len(), "a place for each hit");
             hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = self.closest(ray));
         } else {
@@ -305,7 +305,7 @@ impl Scene {
     /// # Panics
     /// When there are not as many answers as rays.
     pub fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
-        if self.has_holes {
+        if self.has_cutouts {
             assert_eq!(rays.len(), occluded.len(), "an answer for each ray");
             occluded.iter_mut().zip(rays).for_each(|(occluded, ray)| *occluded = self.is_occluded(ray));
         } else {
@@ -315,7 +315,7 @@ impl Scene {
 
     /// Whether a shadow ray is occluded.
     pub fn is_occluded(&self, ray: &Ray) -> bool {
-        if self.has_holes {
+        if self.has_cutouts {
             let is_solid = |hit: &Hit| self.is_solid(ray, hit);
             self.accel.any_with(ray, &Query::new().filter(&is_solid))
         } else {
@@ -323,35 +323,35 @@ impl Scene {
         }
     }
 
-    /// The [`crate::ShapeDesc::index`] of what has an id in the tree.
+    /// The [`crate::ShapeDesc::index`] of the shape with an id in the tree.
     ///
     /// # Panics
-    /// When there is no such id.
+    /// If there is no such id.
     pub fn shape_of(&self, id: u32) -> u32 {
         self.entries[id as usize].shape
     }
 
-    /// Whether what has an id in the tree is the ground.
+    /// Whether the surface with an id in the tree is the ground.
     ///
     /// # Panics
-    /// When there is no such id.
+    /// If there is no such id.
     pub fn is_ground(&self, id: u32) -> bool {
         self.entries[id as usize].shape == crate::ground::SHAPE
     }
 
-    /// Surfaces as plain rows.
+    /// Surfaces as rows of numbers.
     pub fn tables(&self) -> &SurfaceTable {
         &self.tables
     }
 
-    /// Whether anything has an index of refraction by wavelength, which only a spectral render shows.
+    /// Whether any index of refraction depends on the wavelength, which only a spectral render shows.
     pub fn disperses(&self) -> bool {
         self.entries.iter().any(SurfaceEntry::disperses)
     }
 
-    /// Whether shadow rays and paths go through some surfaces: cut-outs and interfaces.
-    pub fn has_holes(&self) -> bool {
-        self.has_holes
+    /// Whether shadow rays and paths pass through some surfaces: cut-outs and interfaces.
+    pub fn has_cutouts(&self) -> bool {
+        self.has_cutouts
     }
 
     /// Whether cameras look through the backs of some surfaces.
@@ -361,7 +361,7 @@ impl Scene {
 
     /// Whether any material has textures, so that rays need footprints.
     pub fn is_textured(&self) -> bool {
-        self.looks_up
+        self.is_textured
     }
 
     /// The interaction at a hit.
@@ -369,7 +369,7 @@ impl Scene {
         self.interaction_at(ray, hit, footprint, self.accel.surface(ray, hit))
     }
 
-    /// [`Scene::interaction`] at a hit of [`Accel::closest_columns`]: rays of pictures that leave it do not hit it again.
+    /// [`Scene::interaction`] at a hit of [`Accel::closest_columns`]: picture rays that leave it do not hit it again.
     pub fn picture_interaction(&self, ray: &Ray, hit: &Hit, footprint: &Footprint) -> Interaction<'_> {
         self.interaction_at(ray, hit, footprint, self.accel.picture_surface(ray, hit))
     }
@@ -388,13 +388,13 @@ impl Scene {
         let direction = ray.direction / length;
         let front = shaded.surface.normal.dot(direction) < 0.0;
         let surface = shaded.surface;
-        let spot = if entry.looks_up {
+        let spot = if entry.is_textured {
             let (dpdu, dpdv) = (surface.dpdu, surface.dpdv);
             footprint.on_plane(surface.point, surface.normal, dpdu, dpdv, direction, hit.root.t * length)
-        } else if self.looks_up {
+        } else if self.is_textured {
             footprint.across(surface.point, surface.normal, direction, hit.root.t * length)
         } else {
-            Spot::default()
+            SurfaceFootprint::default()
         };
         let incident_origin = surface.offset_origin(-direction);
         let is_smooth = shaded.shading.normal.dot(shaded.shading.geometric) < SMOOTH;
@@ -441,11 +441,12 @@ impl Scene {
     /// A light sample for `from` at a time: a light chosen by `choose`, and a direction by `u`. Its density, or
     /// the radiance of a delta light, includes the probability of the light.
     ///
-    /// `normal` is the unit geometric normal of an opaque surface, on the side that is seen: lights below its horizon are not chosen, and
-    /// others by the cosine. It is zero where light from every side counts: where the surface transmits, and in a medium.
+    /// `normal` is the unit geometric normal of an opaque surface, on the viewer's side: lights below its horizon are
+    /// not chosen, and others by the cosine. It is zero if light from every side counts: for a transmissive surface,
+    /// and in a medium.
     ///
-    /// It is for those who also find light along rays of their own and weigh both by [`Scene::light_pdf`] and [`Scene::escaped`]: of an
-    /// environment map it rarely samples what is dim. [`Scene::sample_light_alone`] is for those who do not.
+    /// Use it if other rays find light too, and both are weighted by [`Scene::light_pdf`] and [`Scene::escaped`]: it
+    /// rarely samples the dim parts of an environment map. Otherwise use [`Scene::sample_light_alone`].
     pub fn sample_light(
         &self,
         from: DVec3,
@@ -457,7 +458,7 @@ impl Scene {
         Some(self.sample_light_for(Sampling::Mis, from, normal, time, choose, u)?.1)
     }
 
-    /// [`Scene::sample_light`] for those who find light in no other way.
+    /// [`Scene::sample_light`] for code that finds light in no other way.
     pub fn sample_light_alone(
         &self,
         from: DVec3,
@@ -469,7 +470,7 @@ impl Scene {
         Some(self.sample_light_for(Sampling::LightsOnly, from, normal, time, choose, u)?.1)
     }
 
-    /// [`Scene::sample_light`] or [`Scene::sample_light_alone`], and which light the sample is of.
+    /// [`Scene::sample_light`] or [`Scene::sample_light_alone`], with the sampled light.
     pub fn sample_light_for(
         &self,
         sampling: Sampling,
@@ -568,10 +569,10 @@ impl Scene {
         shaded
     }
 
-    /// Whether cameras may look through the back of what has an id in the tree.
+    /// Whether cameras may look through the back of the surface with an id in the tree.
     ///
     /// # Panics
-    /// When there is no such id.
+    /// If there is no such id.
     pub fn may_be_one_sided(&self, id: u32) -> bool {
         self.has_one_sided && self.entries[id as usize].is_one_sided_anywhere()
     }

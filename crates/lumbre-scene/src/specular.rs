@@ -1,4 +1,4 @@
-//! Where a scene has mirrors, smooth glass and smooth coats: what throws caustics.
+//! The mirrors, smooth glass and smooth coats of a scene, which cast caustics.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::extent::Extent;
 use crate::light::swept;
 use crate::{GeometryDesc, Scene, SceneDesc, ShapeDesc};
 
-/// The most spheres that [`Scene::specular_spheres`] gives.
+/// Maximum number of spheres of [`Scene::specular_spheres`].
 const MAX_SPHERES: usize = 16;
 
 /// A ball of space.
@@ -38,8 +38,9 @@ impl BoundingSphere {
 }
 
 impl Scene {
-    /// Spheres that together hold every surface that may reflect or refract without blur (see [`Material::may_be_specular`]); of an
-    /// unbounded one, the part within the reach of the rest of the scene. They may overlap; there are none where nothing is specular.
+    /// Spheres that together contain every surface that may reflect or refract without blur (see
+    /// [`Material::may_be_specular`]); for an unbounded one, its part within the reach of the rest of the scene. They
+    /// may overlap; without specular surfaces there are none.
     pub fn specular_spheres(&self) -> &[BoundingSphere] {
         &self.specular_spheres
     }
@@ -53,7 +54,7 @@ pub(crate) struct Specular {
 }
 
 impl Specular {
-    /// What a description has.
+    /// The specular shapes of a description.
     pub(crate) fn of(desc: &SceneDesc) -> Self {
         let is_specular: Vec<bool> =
             desc.materials.iter().map(|named| Material::may_be_specular(&named.material)).collect();
@@ -108,7 +109,7 @@ impl Specular {
     /// The spheres, in a scene with these bounds.
     pub(crate) fn spheres(mut self, scene: &Aabb) -> Vec<BoundingSphere> {
         let mut groups = vec![std::mem::take(&mut self.boxes)];
-        // The largest group is cut in two at the median of its longest side.
+        // The largest group is split at the median of its longest side.
         while groups.len() < MAX_SPHERES
             && let Some(position) =
                 (0..groups.len()).filter(|&i| groups[i].len() > 1).max_by_key(|&i| groups[i].len())
@@ -130,14 +131,14 @@ impl Specular {
     }
 }
 
-/// Whether a shape, or an operand of it, is specular.
+/// Whether a shape or one of its operands is specular.
 fn has_specular(shape: &ShapeDesc, is_specular: &[bool]) -> bool {
     let own = shape.material.and_then(|id| is_specular.get(id.0 as usize)).is_some_and(|&is| is);
     let mut operands: Vec<&Arc<Vec<ShapeDesc>>> = match &shape.geometry {
         GeometryDesc::Csg(csg) => csg.operands.iter().collect(),
         _ => return own,
     };
-    // Operands may be shared many times over.
+    // Operands may be shared many times.
     let mut seen = HashSet::new();
     while let Some(operand) = operands.pop() {
         if !seen.insert(Arc::as_ptr(operand)) {

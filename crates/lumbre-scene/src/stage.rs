@@ -13,7 +13,7 @@ use crate::{
     Viewpoint, WithoutLight, studio,
 };
 
-/// How a description is staged. What it has itself is kept, unless stated otherwise here.
+/// How a description is staged. Its own parts are kept, unless stated otherwise here.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Stage {
@@ -26,10 +26,10 @@ pub struct Stage {
     /// for all rotations. The studio rotates with the camera, as if the model turned in front of both. `None`
     /// for the still view.
     pub turns: Option<f64>,
-    /// What is asked of the camera. Unless it only changes the lens, it replaces the description's cameras; the
-    /// studio goes around with it.
+    /// The requested view. Unless it only changes the lens, it replaces the description's cameras; the studio moves
+    /// with it.
     pub view: Viewpoint,
-    /// What is up, if it is not what the description says.
+    /// The up axis, if it differs from the description's.
     pub up: Option<UpAxis>,
     /// The environment light.
     pub surroundings: Surroundings,
@@ -51,7 +51,7 @@ pub enum Surroundings {
     /// An image in place of the description's infinite lights. The centre of a latitude-longitude image is
     /// behind the model as seen from the unrotated automatic camera.
     Map(EnvironmentDesc),
-    /// A light at infinity, as it stands, in place of the description's infinite lights.
+    /// A light at infinity, unrotated, instead of the description's infinite lights.
     Light(Box<LightDesc>),
 }
 
@@ -93,7 +93,7 @@ pub struct Staged {
     pub grounded: bool,
     /// Whether the description has lights in candelas or lux but no exposure, as in glTF.
     pub photometric: bool,
-    /// Whether the automatic camera stands by a guess of what is up: [`SceneDesc::up_is_guessed`].
+    /// Whether the automatic camera uses a guessed up axis: [`SceneDesc::up_is_guessed`].
     pub guessed_up: bool,
 }
 
@@ -109,10 +109,10 @@ pub enum StageLight {
     Map,
 }
 
-/// The reflectance of the ground: as light wood or concrete.
+/// The reflectance of the ground: that of light wood or concrete.
 const GROUND: f32 = 0.5;
-/// The distance of the ground below the lowest point, relative to the model's size, so that flat things on it
-/// are visible.
+/// The distance of the ground below the lowest point, relative to the model's size, so that flat objects on it are
+/// visible.
 const GAP: f64 = 1e-4;
 /// The size of a picture if neither the description nor its camera specifies one.
 const SIZE: (u32, u32) = (1200, 900);
@@ -133,7 +133,7 @@ impl EnvironmentDesc {
 }
 
 impl Stage {
-    /// Adds to a description what it lacks.
+    /// Adds the missing parts of a description.
     pub fn set(&self, desc: &mut SceneDesc) -> Staged {
         let is_model = desc.without_light != WithoutLight::Dark;
         let framed =
@@ -168,7 +168,7 @@ impl Stage {
         if light == StageLight::Studio {
             desc.lights.push(studio::light(desc.up, turns));
         }
-        // Nothing more is added when it is built.
+        // The build must add nothing more.
         desc.without_light = WithoutLight::Dark;
 
         let is_shown_by_default = is_model && framed && light != StageLight::Own;
@@ -179,7 +179,7 @@ impl Stage {
         };
         let catcher = kind == Ground::Shadow;
         let ground = (kind != Ground::None).then(|| ground(&bounds, desc, catcher)).flatten();
-        // From below, ground that nobody asked for would hide everything.
+        // Seen from below, automatic ground would hide everything.
         let is_seen_from_below = |ground: &GroundDesc| {
             let eye = camera.as_ref().map(|framed| framed.camera.world_from_camera.point(DVec3::ZERO));
             eye.is_some_and(|eye| (eye - ground.point).dot(ground.normal) < 0.0)
@@ -201,13 +201,13 @@ impl Stage {
         Staged { framed, light, grounded, photometric, guessed_up }
     }
 
-    /// The camera that stands for those of the description, with the shutter of the first and the same side to the left.
+    /// The camera that replaces those of the description, with the shutter and the handedness of the first.
     fn framed(&self, extent: &Extent, desc: &SceneDesc) -> framing::Framed {
         let points = |visit: &mut dyn FnMut(DVec3)| extent.each_point(visit);
         let own = desc.cameras.first();
         let mut framed = framing::Framing {
             up: desc.up,
-            // Camera space is left-handed: only a mirror takes it to a right-handed world.
+            // Camera space is left-handed: only a mirror maps it to a right-handed world.
             is_left_handed: own.is_some_and(|own| !own.world_from_camera.is_mirror()),
             aspect: self.aspect(desc),
             viewpoint: &self.view,
@@ -243,12 +243,12 @@ pub(crate) fn wants_studio(desc: &SceneDesc) -> bool {
     match desc.without_light {
         WithoutLight::Dark => false,
         WithoutLight::StudioUnlessStaged => desc.lights.is_empty() || desc.cameras.is_empty(),
-        WithoutLight::Studio => desc.lights.is_empty() && !shines(desc),
+        WithoutLight::Studio => desc.lights.is_empty() && !is_emissive(desc),
     }
 }
 
 /// Whether any shape emits light.
-fn shines(desc: &SceneDesc) -> bool {
+fn is_emissive(desc: &SceneDesc) -> bool {
     let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);
     let mut open: Vec<&ShapeDesc> = desc.shapes.iter().chain(in_objects).collect();
     while let Some(shape) = open.pop() {

@@ -11,8 +11,8 @@ use crate::{EnvironmentDesc, EnvironmentMapping, LightDesc, UpAxis};
 
 const WIDTH: u32 = 512;
 const HEIGHT: u32 = 256;
-/// The radiance of a white horizontal surface in the open. What faces the key light is brighter, what faces the
-/// camera darker.
+/// The radiance of a white, unoccluded horizontal surface. Surfaces that face the key light are brighter, and those
+/// that face the camera darker.
 const LEVEL: f64 = 1.0;
 
 /// A soft rectangular lamp.

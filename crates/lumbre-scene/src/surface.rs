@@ -22,16 +22,16 @@ pub(crate) struct SurfaceEntry {
     /// The light that samples it; `None` if only rays that hit it find its light.
     pub light: Option<LightId>,
     pub alpha: Option<Arc<FloatTexture>>,
-    /// The media on its sides, where these differ.
+    /// The media on its sides, if they differ.
     pub boundary: Option<Boundary>,
     pub reverse: bool,
     /// Whether the material has textures, and needs footprints.
-    pub looks_up: bool,
+    pub is_textured: bool,
     pub form: Form,
 }
 
 impl SurfaceEntry {
-    /// The number of a part of it as results give it: the triangle of a mesh, else 0.
+    /// The index of a part of it in results: the triangle of a mesh, otherwise 0.
     pub(crate) fn primitive(&self, part: u32) -> u32 {
         match self.form {
             Form::Patch { primitive, .. } => primitive,
@@ -53,9 +53,9 @@ pub(crate) enum Form {
     Mesh(Arc<MeshAttributes>),
     /// A patch of a mesh, from a quad that is not flat.
     Patch { attributes: Arc<MeshAttributes>, corners: [u32; 4], primitive: u32 },
-    /// None, of a segment of curves, which are placed by a map.
+    /// None; a segment of curves, which are placed by a map.
     Curves(Arc<Curves>, Box<Transform>),
-    /// None, of one of many primitives.
+    /// None; one of many primitives.
     Custom,
     /// A CSG: the surface data of each leaf.
     Csg(Arc<CsgForm>),
@@ -83,9 +83,9 @@ pub(crate) struct MeshAttributes {
     pub turned: Turned,
     /// Its deformation, if any.
     pub moving: Option<Deforming>,
-    /// What rays meet in place of `mesh`, if vertices are given in double precision.
+    /// The mesh that rays meet instead of `mesh`, if vertices are given in double precision.
     pub precise: Option<Arc<PreciseMesh>>,
-    /// The description, which may be shared, without what has been moved into the mesh.
+    /// The description, which may be shared, without the parts that were moved into the mesh.
     pub rest: Arc<MeshDesc>,
 }
 
@@ -162,26 +162,26 @@ fn patch_blend(uv: DVec2) -> Blend<4> {
 }
 
 impl SurfaceEntry {
-    /// Whether shadow rays see it: an interface only separates media.
+    /// Whether shadow rays meet it: an interface only separates media.
     pub(crate) fn is_visible(&self) -> bool {
         self.material.is_some()
     }
 
     /// Whether it emits light.
-    pub(crate) fn shines(&self) -> bool {
+    pub(crate) fn is_emissive(&self) -> bool {
         match &self.form {
-            Form::Csg(csg) => csg.leaves.iter().any(Self::shines),
+            Form::Csg(csg) => csg.leaves.iter().any(Self::is_emissive),
             _ => self.emission.is_some(),
         }
     }
 
-    /// Its emission, if that is the same everywhere: without textures and cut-outs.
+    /// Its emission, if that is uniform: without textures and cut-outs.
     pub(crate) fn uniform_emission(&self) -> Option<&Emission> {
         let emission = self.emission.as_ref()?;
         (self.alpha.is_none() && emission.image.is_none() && !emission.by_vertices).then_some(emission)
     }
 
-    /// 1 if it faces as its geometry does, or −1 if flipped; `None` where vertex normals flip a part of a triangle.
+    /// 1 if it faces as its geometry does, or −1 if flipped; `None` if vertex normals flip a part of a triangle.
     pub(crate) fn outward(&self, triangle: u32) -> Option<f64> {
         let outward = match &self.form {
             Form::Exact | Form::Coloured(_) | Form::Curves(..) | Form::Custom => 1.0,
@@ -194,8 +194,8 @@ impl SurfaceEntry {
     /// Whether any part of it has textures.
     pub(crate) fn looks_up_anywhere(&self) -> bool {
         match &self.form {
-            Form::Csg(csg) => self.looks_up || csg.leaves.iter().any(Self::looks_up_anywhere),
-            _ => self.looks_up,
+            Form::Csg(csg) => self.is_textured || csg.leaves.iter().any(Self::looks_up_anywhere),
+            _ => self.is_textured,
         }
     }
 
@@ -213,18 +213,18 @@ impl SurfaceEntry {
     }
 
     /// Whether any part of it transmits light.
-    pub(crate) fn lets_light_through(&self) -> bool {
+    pub(crate) fn is_transmissive(&self) -> bool {
         match &self.form {
-            Form::Csg(csg) => csg.leaves.iter().any(Self::lets_light_through),
-            _ => self.material.as_ref().is_some_and(|material| material.lets_light_through()),
+            Form::Csg(csg) => csg.leaves.iter().any(Self::is_transmissive),
+            _ => self.material.as_ref().is_some_and(|material| material.is_transmissive()),
         }
     }
 
     /// Whether any part of it transmits light straight on.
-    pub(crate) fn lets_light_straight_on(&self) -> bool {
+    pub(crate) fn has_delta_transmission(&self) -> bool {
         match &self.form {
-            Form::Csg(csg) => csg.leaves.iter().any(Self::lets_light_straight_on),
-            _ => self.material.as_ref().is_some_and(|material| material.lets_light_straight_on()),
+            Form::Csg(csg) => csg.leaves.iter().any(Self::has_delta_transmission),
+            _ => self.material.as_ref().is_some_and(|material| material.has_delta_transmission()),
         }
     }
 
@@ -236,7 +236,7 @@ impl SurfaceEntry {
         }
     }
 
-    /// Whether its material, or a part of it, has an index of refraction by wavelength.
+    /// Whether its material, or a part of it, has an index of refraction that depends on the wavelength.
     pub(crate) fn disperses(&self) -> bool {
         match &self.form {
             Form::Csg(csg) => csg.leaves.iter().any(Self::disperses),
@@ -244,10 +244,10 @@ impl SurfaceEntry {
         }
     }
 
-    /// Whether any part of it may be passed by light.
-    pub(crate) fn has_holes(&self) -> bool {
+    /// Whether light may pass any part of it.
+    pub(crate) fn has_cutouts(&self) -> bool {
         match &self.form {
-            Form::Csg(csg) => csg.leaves.iter().any(Self::has_holes),
+            Form::Csg(csg) => csg.leaves.iter().any(Self::has_cutouts),
             _ => self.alpha.is_some() || !self.is_visible(),
         }
     }
@@ -391,7 +391,7 @@ fn plain(surface: &Surface) -> ShadingGeometry {
     }
 }
 
-/// What lanes found of a triangle that a ray met.
+/// A triangle hit, as computed in lanes.
 #[derive(Clone, Copy, Debug)]
 pub struct TrianglePoint {
     /// The triangle of its mesh.
@@ -406,12 +406,12 @@ pub struct TrianglePoint {
     pub normal: Vec3,
     /// The unit direction of the ray.
     pub direction: Vec3,
-    /// How far it went.
+    /// The distance.
     pub distance: f32,
 }
 
 impl MeshAttributes {
-    /// What materials read at a point of a triangle of a mesh that stands still in the world itself, but the change of its normal.
+    /// The texture context at a point of a static top-level mesh triangle, without the derivatives of its normal.
     pub(crate) fn texture_context(
         &self,
         met: &TrianglePoint,
@@ -564,7 +564,7 @@ impl MeshAttributes {
         ShadingGeometry { vertex, ..self.shape(geometric, corners, uvs, blend, placement, time) }
     }
 
-    /// Interpolates what textures read of vertices besides the first uv.
+    /// Interpolates the vertex data that textures read, except the first uv.
     fn vertex_data<const N: usize>(&self, corners: [u32; N], uvs: [Vec2; N], blend: &Blend<N>) -> VertexData {
         let mut vertex = VertexData::NONE;
         if let Some(colours) = &self.rest.colours {

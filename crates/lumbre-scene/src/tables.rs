@@ -1,4 +1,4 @@
-//! Surfaces as plain rows: what lanes read of triangles, and the numbers of BSDFs that are the same everywhere.
+//! Surfaces as rows of numbers: triangle data for lanes, and the parameters of uniform BSDFs.
 
 use std::sync::Arc;
 
@@ -11,40 +11,40 @@ use lumbre_shading::{Bsdf, Material, ShadingFrame, ShadingNormals, TextureContex
 use crate::Footprint;
 use crate::surface::{Form, MeshAttributes, SurfaceEntry, TrianglePoint};
 
-/// Surfaces by the id of a hit, and the numbers of their BSDFs.
+/// Surfaces by the id of a hit, and the parameters of their BSDFs.
 #[derive(Debug, Default)]
 pub struct SurfaceTable {
     surfaces: Vec<Option<TriangleSurface>>,
     rows: Rows,
 }
 
-/// A mesh in the world itself, still, of faces that emit the same everywhere.
+/// A static top-level mesh whose faces emit uniformly.
 #[derive(Clone, Debug)]
 pub struct TriangleSurface {
     /// Its triangles.
     pub mesh: Arc<TriangleMesh>,
-    /// 1 where the normals of its triangles, or else of its vertices, point outside, −1 where they point inside.
+    /// 1 if the normals of its triangles, or else of its vertices, point outside, −1 if they point inside.
     pub outward: f32,
-    /// Its BSDF, which looks the same from everywhere around the normal; `None` where the material is to be looked up.
+    /// Its uniform, isotropic BSDF; `None` if the material is textured.
     pub bsdf: Option<UniformBsdf>,
     /// Whether light from below its horizon counts.
     pub transmits: bool,
-    /// The radiance that it emits, and whether its back does, too.
+    /// The radiance that it emits, and whether its back emits too.
     pub emission: Option<([f32; 3], bool)>,
     attributes: Arc<MeshAttributes>,
     material: Arc<Material>,
 }
 
-/// A BSDF that is the same everywhere.
+/// A uniform BSDF.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UniformBsdf {
     /// Its kind.
     pub kind: BsdfKind,
-    /// Where its row begins in [`SurfaceTable::rows`].
+    /// Start of its row in [`SurfaceTable::rows`].
     pub row: u32,
 }
 
-/// A uniform material is the same everywhere.
+/// Any point will do for a uniform material.
 const ANYWHERE: TextureContext = TextureContext {
     point: DVec3::ZERO,
     normal: Vec3::Z,
@@ -92,14 +92,14 @@ impl SurfaceTable {
             mesh: attributes.mesh.clone(),
             outward: if entry.reverse { -1.0 } else { 1.0 },
             bsdf: self.uniform(material),
-            transmits: material.lets_light_through(),
+            transmits: material.is_transmissive(),
             emission: entry.emission.as_ref().map(|e| (e.radiance.to_array(), e.two_sided)),
             attributes: attributes.clone(),
             material: material.clone(),
         })
     }
 
-    /// The BSDF of a material, if that is the same everywhere.
+    /// The BSDF of a material, if that is uniform.
     fn uniform(&mut self, material: &Material) -> Option<UniformBsdf> {
         let bsdf = material.is_uniform().then(|| material.bsdf(&ANYWHERE))??;
         if !bsdf.is_isotropic() {
@@ -111,7 +111,7 @@ impl SurfaceTable {
 }
 
 impl TriangleSurface {
-    /// Whether there are normals of vertices.
+    /// Whether there are vertex normals.
     #[inline]
     pub fn is_smooth(&self) -> bool {
         self.attributes.normals().is_some()
@@ -124,8 +124,9 @@ impl TriangleSurface {
         Some(corners.map(|corner| normals[corner as usize]))
     }
 
-    /// The material at a point, with mixtures resolved, the shading frame and the BSDF: as [`crate::Interaction::resolved`] and
-    /// [`Material::shading`]; `None` for what does not scatter. Colours are linear Rec. 709, or at the wavelengths that are given.
+    /// The material at a point, with mixtures resolved, the shading frame and the BSDF: as
+    /// [`crate::Interaction::resolved`] and [`Material::shading`]; `None` if nothing scatters. Colours are linear Rec.
+    /// 709, or at the given wavelengths.
     pub fn scattering(
         &self,
         met: &TrianglePoint,

@@ -1,24 +1,24 @@
-//! Where a picture is taken from: what is asked of the camera; the rest is framing.
+//! The requested view of a picture; framing chooses the rest.
 
 use lumbre_math::{DVec2, DVec3, Elementary};
 
 use crate::{Camera, CameraKind};
 
-/// What is asked of a camera. What is not asked for is chosen such that everything is in the picture: see [`crate::Stage`].
+/// The requested view of a camera. The rest is chosen so that everything is in the picture: see [`crate::Stage`].
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Viewpoint {
-    /// Degrees by which the camera goes to the right, around the up axis through what it looks at.
+    /// Degrees by which the camera moves to the right, around the up axis through its target.
     pub azimuth: f64,
     /// Degrees by which it rises, at most to straight above and at least to straight below.
     pub elevation: f64,
-    /// How many times as large everything is in the picture, by a longer lens from the same place; above 0.
+    /// The magnification of everything in the picture, by a longer lens from the same position; above 0.
     pub zoom: f64,
     /// Full field of view in degrees along the shorter side of the picture, above 0 and below 180.
     pub fov: Option<f64>,
     /// Whether the projection is orthographic.
     pub orthographic: bool,
-    /// The camera's position, before it goes by `azimuth` and `elevation`.
+    /// The camera's position, before it moves by `azimuth` and `elevation`.
     pub eye: Option<DVec3>,
     /// The point in the middle of the picture.
     pub target: Option<DVec3>,
@@ -39,7 +39,7 @@ impl Default for Viewpoint {
 }
 
 impl Viewpoint {
-    /// Whether a camera of a file cannot be kept. `zoom` and `fov` only change its lens.
+    /// Whether it replaces a file's camera. `zoom` and `fov` only change its lens.
     pub fn replaces_cameras(&self) -> bool {
         self.azimuth != 0.0
             || self.elevation != 0.0
@@ -53,7 +53,8 @@ impl Viewpoint {
         self.zoom != 1.0 || self.fov.is_some()
     }
 
-    /// Changes the lens of a camera for a picture of this aspect ratio; a spherical one has none, and a real one stays what it is.
+    /// Changes the lens of a camera for a picture of this aspect ratio; a spherical camera has none, and a real lens
+    /// stays unchanged.
     pub(crate) fn set_lens(&self, camera: &mut Camera, aspect: f64) {
         if let (CameraKind::Perspective { fov, .. }, Some(asked)) = (&mut camera.kind, self.fov) {
             *fov = asked;
@@ -61,7 +62,7 @@ impl Viewpoint {
         self.magnify(camera, aspect);
     }
 
-    /// Makes everything `zoom` times as large, about the middle of the picture.
+    /// Magnifies everything by `zoom`, about the middle of the picture.
     pub(crate) fn magnify(&self, camera: &mut Camera, aspect: f64) {
         if self.zoom == 1.0 {
             return;
@@ -83,7 +84,7 @@ impl Viewpoint {
     }
 }
 
-/// Half the width and height of the window of a picture of this aspect ratio, whose shorter side is from -1 to 1.
+/// Half the width and height of the window for a picture of this aspect ratio, whose shorter side is from -1 to 1.
 pub(crate) fn half_window(aspect: f64) -> DVec2 {
     if aspect > 1.0 { DVec2::new(aspect, 1.0) } else { DVec2::new(1.0, 1.0 / aspect) }
 }

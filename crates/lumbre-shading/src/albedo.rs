@@ -16,7 +16,7 @@ const MAX_ROOT: f32 = 0.6;
 /// The largest index of refraction in the tables; larger ones count as this.
 pub(crate) const MAX_ETA: f32 = 4.0;
 /// Values are stored as integers up to 65535 and scaled by this for sheen, whose albedo may exceed 1.
-const MOST_SHEEN: f32 = 8.0;
+const MAX_SHEEN: f32 = 8.0;
 
 const PAGE: usize = COSINES * ROUGHNESSES;
 const MIRROR: usize = 0;
@@ -129,7 +129,7 @@ impl Albedo {
         assert_eq!(bytes.len(), 2 * PAGES * PAGE);
         let pairs =
             bytes.chunks_exact(2).map(|pair| f32::from(u16::from_le_bytes([pair[0], pair[1]])) / 65535.0);
-        let scale = |i: usize| if i / PAGE == SHEEN { MOST_SHEEN } else { 1.0 };
+        let scale = |i: usize| if i / PAGE == SHEEN { MAX_SHEEN } else { 1.0 };
         let values: Vec<f32> = pairs.enumerate().map(|(i, v)| v * scale(i)).collect();
         let weights = mean_weights::<COSINES>();
         let mean = |row: &[f32]| row.iter().zip(weights).map(|(v, w)| v * w).sum();
@@ -344,7 +344,7 @@ mod tests {
                 let wi = LocalDir(Vec3::new(r * cos, r * sin, z));
                 sheen::unbounded(roughness, wo.lane(), wi.lane()) * std::f32::consts::TAU * 3.0 * u.y * u.y
             });
-            return value / MOST_SHEEN;
+            return value / MAX_SHEEN;
         }
         let index = (page - FACES) % INDICES;
         let x = (index as f32 / (INDICES - 1) as f32).powi(2) * MAX_ROOT;
@@ -382,8 +382,7 @@ mod tests {
             for _ in 0..4 {
                 let one_of = |n: usize, x: f32| (x * n as f32) as usize;
                 let (r, c) = (one_of(ROUGHNESSES, random.next_f32()), one_of(COSINES, random.next_f32()));
-                let expected =
-                    node(page, r, c, [28657, 17711]) * if page == SHEEN { MOST_SHEEN } else { 1.0 };
+                let expected = node(page, r, c, [28657, 17711]) * if page == SHEEN { MAX_SHEEN } else { 1.0 };
                 let ours = ALBEDO.values[(page * ROUGHNESSES + r) * COSINES + c];
                 assert!(
                     (ours - expected).abs() < 1e-3 * expected.max(1.0),

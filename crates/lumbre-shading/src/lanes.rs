@@ -26,7 +26,7 @@ pub use crate::uber_lanes::UberLanes;
 use crate::{Bsdf, BsdfSample, LocalDir, Scatter, Spectrum};
 
 /// The smallest cosine between a shading normal and the viewing direction.
-const LEAST_SEEN: f32 = 1e-3;
+const MIN_SEEN: f32 = 1e-3;
 
 /// A shading normal, turned just far enough to be on the side of `towards` that the geometric normal is on; the geometric normal where that
 /// gives no direction.
@@ -34,7 +34,7 @@ const LEAST_SEEN: f32 = 1e-3;
 pub fn facing<R: Real>(normal: V3<R>, geometric: V3<R>, towards: V3<R>) -> V3<R> {
     let is_below = geometric.dot(towards).simd_lt(R::zero());
     let side = V3::select(is_below, -towards, towards);
-    let missing = R::splat(LEAST_SEEN) - normal.dot(side);
+    let missing = R::splat(MIN_SEEN) - normal.dot(side);
     let turned = normal + side * missing;
     let scale = turned.length().recip();
     let has_direction = scale.is_finite() & R::zero().simd_lt(scale);

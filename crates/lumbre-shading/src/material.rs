@@ -329,28 +329,28 @@ impl Material {
     }
 
     /// Whether light may pass to the other side; of a mixture, through any part.
-    pub fn lets_light_through(&self) -> bool {
+    pub fn is_transmissive(&self) -> bool {
         self.has_part(|kind| match kind {
             MaterialKind::Dielectric { .. }
             | MaterialKind::ThinDielectric { .. }
             | MaterialKind::DiffuseTransmission { .. }
             | MaterialKind::Hair(_)
             | MaterialKind::Subsurface(_) => true,
-            MaterialKind::Principled(params) => params.lets_light_through(),
-            MaterialKind::Uber(params) => params.lets_light_through(),
-            MaterialKind::Pov(material) => material.lets_light_through(),
+            MaterialKind::Principled(params) => params.is_transmissive(),
+            MaterialKind::Uber(params) => params.is_transmissive(),
+            MaterialKind::Pov(material) => material.is_transmissive(),
             _ => false,
         })
     }
 
     /// Whether [`Bsdf::straight_on`] may be other than black anywhere on it; of a mixture, on any part.
-    pub fn lets_light_straight_on(&self) -> bool {
+    pub fn has_delta_transmission(&self) -> bool {
         self.has_part(|kind| match kind {
             MaterialKind::ThinDielectric { .. } => true,
             MaterialKind::Dielectric { eta, .. } => index(*eta) == 1.0,
-            MaterialKind::Principled(params) => params.lets_light_straight_on(),
-            MaterialKind::Uber(params) => params.lets_light_straight_on(),
-            MaterialKind::Pov(material) => material.lets_light_straight_on(),
+            MaterialKind::Principled(params) => params.has_delta_transmission(),
+            MaterialKind::Uber(params) => params.has_delta_transmission(),
+            MaterialKind::Pov(material) => material.has_delta_transmission(),
             _ => false,
         })
     }
@@ -1011,11 +1011,11 @@ mod tests {
         ];
         let wo = crate::LocalDir(Vec3::new(0.6, -0.2, 0.4).normalize());
         for (material, expected) in cases {
-            assert_eq!(material.lets_light_straight_on(), expected, "{material:?}");
+            assert_eq!(material.has_delta_transmission(), expected, "{material:?}");
             let left = material.bsdf(&here).unwrap().straight_on(wo);
             assert_eq!(!left.is_black(), expected, "{material:?}");
             let mixture = mix(&Arc::new(material), &diffuse(0.5), 0.5);
-            assert_eq!(mixture.lets_light_straight_on(), expected);
+            assert_eq!(mixture.has_delta_transmission(), expected);
         }
     }
 

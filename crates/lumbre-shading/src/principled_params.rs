@@ -215,12 +215,12 @@ impl PrincipledParams {
 
     /// The index of refraction inside; see [`crate::Material::interior_index`].
     pub(crate) fn interior_index(&self) -> Option<f32> {
-        (self.volume.is_some() && self.lets_light_through())
+        (self.volume.is_some() && self.is_transmissive())
             .then(|| if self.ior > 0.0 && self.ior.is_finite() { self.ior } else { 1.5 })
     }
 
     /// Whether light is transmitted anywhere.
-    pub fn lets_light_through(&self) -> bool {
+    pub fn is_transmissive(&self) -> bool {
         let opens = |texture: &FloatTexture| !matches!(texture, Texture::Constant(v) if *v <= 0.0);
         opens(&self.transmission) || opens(&self.diffuse_transmission)
     }
@@ -232,8 +232,8 @@ impl PrincipledParams {
             || !(is_rough(&self.clearcoat_roughness) || is_constantly(&self.clearcoat, |v| v <= 0.0))
     }
 
-    /// Whether any light may be transmitted straight on; see [`crate::Material::lets_light_straight_on`].
-    pub(crate) fn lets_light_straight_on(&self) -> bool {
+    /// Whether any light may be transmitted straight on; see [`crate::Material::has_delta_transmission`].
+    pub(crate) fn has_delta_transmission(&self) -> bool {
         if is_constantly(&self.transmission, |v| v <= 0.0) || is_constantly(&self.metallic, |v| v >= 1.0) {
             return false;
         }

@@ -1,6 +1,6 @@
 //! Skin, wax, milk: a dielectric boundary around a dense medium, through which light wanders.
 //!
-//! Light enters as into glass. Inside, whoever follows it takes steps through the medium ([`SubsurfaceParams::medium`]); at the boundary it is
+//! Light enters as into glass. Inside, a path takes steps through the medium ([`SubsurfaceParams::medium`]); at the boundary it is
 //! reflected back as Fresnel has it ([`SubsurfaceParams::reflected_inside`]), or leaves. What leaves is spread as even light from below the
 //! boundary would be, whatever way it came: after many collisions it has forgotten that, and so lights of any size can be sampled from the
 //! boundary. H. W. Jensen, S. Marschner, M. Levoy, P. Hanrahan ("A Practical Model for Subsurface Light Transport", SIGGRAPH 2001) spread it
@@ -54,7 +54,7 @@ pub struct SubsurfaceParams {
 }
 
 /// The least mean free path, against divisions by 0.
-const LEAST_PATH: f32 = 1e-9;
+const MIN_PATH: f32 = 1e-9;
 
 impl SubsurfaceParams {
     /// The medium that light enters at a position. What is out of range is clamped.
@@ -71,7 +71,7 @@ impl SubsurfaceParams {
             }
             Inside::Reflectance { reflectance, mean_free_path } => {
                 let path = mean_free_path.evaluate_unbounded(at) * self.scale;
-                let extinction = path.map(|path| 1.0 / path.max(LEAST_PATH));
+                let extinction = path.map(|path| 1.0 / path.max(MIN_PATH));
                 // The share of even light from inside that the boundary reflects back.
                 let back = 1.0 - transmitted_from_outside(index(self.eta)) / index(self.eta).powi(2);
                 let albedo =

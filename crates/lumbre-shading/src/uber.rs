@@ -41,17 +41,17 @@ impl UberParams {
     }
 
     /// Whether light may pass to the other side.
-    pub(crate) fn lets_light_through(&self) -> bool {
-        !is_everywhere(&self.kt, Spectrum::BLACK) || self.lets_light_straight_on()
+    pub(crate) fn is_transmissive(&self) -> bool {
+        !is_everywhere(&self.kt, Spectrum::BLACK) || self.has_delta_transmission()
     }
 
     /// Whether it may have a mirror or smooth refraction anywhere.
     pub(crate) fn may_be_specular(&self) -> bool {
-        !is_everywhere(&self.kr, Spectrum::BLACK) || self.lets_light_through()
+        !is_everywhere(&self.kr, Spectrum::BLACK) || self.is_transmissive()
     }
 
     /// Whether light may pass to the other side unbent.
-    pub(crate) fn lets_light_straight_on(&self) -> bool {
+    pub(crate) fn has_delta_transmission(&self) -> bool {
         let may_be_one = match *self.eta {
             FloatTexture::Constant(eta) => index(eta) == 1.0,
             _ => true,

@@ -38,7 +38,7 @@ pub(crate) const REFRACTED: usize = 3;
 pub(crate) const PASSED: usize = 4;
 
 /// The least Fresnel reflectance by which facets are sampled: some of them are met at grazing angles.
-const LEAST_GLOSSY: f32 = 0.1;
+const MIN_GLOSSY: f32 = 0.1;
 
 impl<R: Real> UberLanes<R> {
     /// The probability of each lobe, about in proportion to its power; all 0 where nothing scatters.
@@ -47,7 +47,7 @@ impl<R: Real> UberLanes<R> {
         let reflected = fresnel::dielectric(wo.z, self.eta);
         let powers = [
             self.diffuse.max_component(),
-            self.glossy.max_component() * reflected.simd_max(R::splat(LEAST_GLOSSY)),
+            self.glossy.max_component() * reflected.simd_max(R::splat(MIN_GLOSSY)),
             self.mirror.max_component() * reflected,
             self.refracted.max_component() * (R::one() - reflected),
             self.passed.max_component(),

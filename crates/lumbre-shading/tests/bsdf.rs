@@ -330,7 +330,7 @@ fn all() -> Vec<(String, Bsdf)> {
     list
 }
 
-/// The same with so many walks an evaluation; `None` for a BSDF without walks.
+/// The same with this many walks an evaluation; `None` for a BSDF without walks.
 fn with_walks(bsdf: Bsdf, samples: u32) -> Option<Bsdf> {
     match bsdf {
         Bsdf::CoatedDiffuse(b) => {
@@ -432,7 +432,7 @@ fn ln_gamma(x: f64) -> f64 {
     0.5 * TAU.ln() + (x + 0.5) * t.ln() - t + sum.ln()
 }
 
-/// The probability that χ² with so many degrees of freedom is at least this: Q(k/2, x/2).
+/// The probability that χ² with this many degrees of freedom is at least this: Q(k/2, x/2).
 fn chi_square_tail(chi: f64, freedom: f64) -> f64 {
     let (a, x) = (0.5 * freedom, 0.5 * chi);
     if x <= 0.0 {

@@ -1,11 +1,11 @@
-//! Cameras that were moved: the file's own camera, carried along by a rigid motion, so that all else of it stays.
+//! Moved cameras: the file's own camera under a rigid motion, so that its other properties stay.
 
 use lumbre::description::{Camera, CameraKind, SphericalMapping};
 use lumbre::math::DAffine3;
 use lumbre::{DVec3, Transform};
 use serde::{Deserialize, Serialize};
 
-/// Where a camera stands and looks.
+/// A camera's position and orientation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Placement {
     /// The camera's position.
@@ -16,11 +16,11 @@ pub(crate) struct Placement {
     pub up: [f64; 3],
 }
 
-/// Coordinates beyond this make no picture.
+/// Larger coordinates make no picture.
 const FARTHEST: f64 = 1e12;
 
 impl Placement {
-    /// That of a camera, whose target is at a distance.
+    /// The placement of a camera whose target is at this distance.
     pub(crate) fn of(camera: &Camera, distance: f64) -> Self {
         let place = camera.world_from_camera;
         let eye = place.point(DVec3::ZERO);
@@ -33,7 +33,7 @@ impl Placement {
         Self { eye: eye.to_array(), target: target.to_array(), up: up.to_array() }
     }
 
-    /// Its axes and origin; `None` where it has no direction.
+    /// Its axes and origin; `None` without a direction.
     fn frame(&self) -> Option<DAffine3> {
         let [eye, target, up] = [self.eye, self.target, self.up].map(DVec3::from_array);
         if ![eye, target, up].iter().all(|v| v.is_finite() && v.length() < FARTHEST) {
@@ -41,15 +41,15 @@ impl Placement {
         }
         let forward = (target - eye).try_normalize()?;
         let right = up.try_normalize()?.cross(forward);
-        // Where up is along the view, there is no telling what is to the right.
+        // If up is along the view, right is undefined.
         let right = (right.length() > 1e-9).then(|| right.normalize())?;
         let upward = forward.cross(right);
         Some(DAffine3::from_cols(right, upward, forward, eye))
     }
 }
 
-/// A camera that is carried from one placement to another; `fov` is the full field of view in degrees of a perspective camera, `zoom` how
-/// many times as large an orthographic one shows everything. `None` where the placement makes no camera.
+/// A camera moved to a placement; `fov` is the full field of view in degrees of a perspective camera, `zoom` the
+/// magnification of an orthographic one. `None` if the placement makes no camera.
 pub(crate) fn moved(
     base: &Camera,
     from: &Placement,

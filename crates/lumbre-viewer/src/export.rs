@@ -1,4 +1,5 @@
-//! The page at rest: the picture with its channels, what is at its pixels, and the facts of the scene, as files that need no viewer.
+//! The static page: the picture with its channels, the shapes at its pixels, and the facts of the scene, as files that
+//! need no viewer.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Read, Write};
@@ -20,19 +21,20 @@ use crate::page::FILES;
 use crate::source::{Built, Moment, Source, SourceError};
 use crate::stage::{Stage, ray};
 
-/// Samples a pixel of channels other than the picture.
+/// Samples per pixel of channels other than the picture.
 const FEATURE_SPP: u32 = 16;
 
-/// Renders a scene and writes a page of it into a folder, which is made where it is not there: `index.html` opens from a file, and the
-/// folder can be sent or put on a web server. `cancel` ends the render early, and the page has what was rendered. Files of an earlier page
-/// are replaced, and no others.
+/// Renders a scene and writes a page of it into a folder, which is created if needed: `index.html` opens from a file,
+/// and the folder can be sent or put on a web server. `cancel` ends the render early, and the page has the picture so
+/// far. Files of an earlier page are replaced, and no others.
 ///
 /// # Errors
-/// What is wrong with the scene, what cannot be written, and which file stands in the way: before anything is read.
+/// Faults of the scene, files that cannot be written, and a foreign file in the way, which is reported before anything
+/// is read.
 pub fn export(source: &dyn Source, folder: &Path, cancel: &CancelToken) -> Result<(), SourceError> {
     refuse_foreign(folder)?;
     let read = source.read(&Moment::default())?;
-    // Nobody is there to tell more than what is in the page.
+    // A static page cannot ask for explanations.
     let built = Built { explain: None, ..source.build(read.desc.clone())? };
     let stage = Stage::new(built, &read.desc, read.warnings);
     let scene = stage.scene();
@@ -94,7 +96,7 @@ fn wrong(kind: ErrorKind, message: impl Into<String>) -> SourceError {
     SourceError { kind, message: message.into() }
 }
 
-/// What every file of the page has near its beginning, by which it is known again.
+/// The mark near the start of every file of the page, which identifies it.
 const MARK: &str = "Written by lumbre view --export, which replaces it.";
 const DATA: &str = "data.js";
 const INDEX: &str = "index.html";
@@ -106,7 +108,7 @@ fn names() -> impl Iterator<Item = &'static str> {
     std::iter::once(DATA).chain(pages)
 }
 
-/// Refuses a folder in which something else stands in the place of a file of the page.
+/// Refuses a folder in which another file has the name of one of the page's.
 fn refuse_foreign(folder: &Path) -> Result<(), SourceError> {
     for path in names().map(|name| folder.join(name)) {
         if std::fs::symlink_metadata(&path).is_err() {
@@ -126,7 +128,7 @@ fn refuse_foreign(folder: &Path) -> Result<(), SourceError> {
 fn write(folder: &Path, data: &Value) -> Result<(), SourceError> {
     std::fs::create_dir_all(folder)
         .map_err(|e| wrong(ErrorKind::Io, format!("{}: {e}", folder.display())))?;
-    // Something may have come meanwhile.
+    // Something may have appeared meanwhile.
     refuse_foreign(folder)?;
     let save = |name: &str, text: &str| {
         let text = match name.rsplit_once('.') {
@@ -150,7 +152,7 @@ fn write(folder: &Path, data: &Value) -> Result<(), SourceError> {
     Ok(())
 }
 
-/// A shot as a PNG that shows what its frame shows.
+/// A shot as a PNG of what its frame shows.
 fn shown(shot: &Shot, look: &Look) -> Result<Vec<u8>, SourceError> {
     let Frame(bytes) = Frame::new(shot, look);
     let unit = |byte: u8| f32::from(byte) / 255.0;
@@ -169,8 +171,8 @@ fn packed(image: &Image) -> Result<Vec<u8>, SourceError> {
     compressed(numbers.map(|value| f32_to_half(value).to_le_bytes()))
 }
 
-/// What the rays through the middles of the pixels meet: for each pixel the place of the shape in a list, from 1, or 0 for nothing,
-/// and its distance.
+/// The hits of the rays through the pixels' middles: for each pixel the position of the shape in a list, counted from
+/// 1, or 0 for nothing, and its distance.
 fn picks(stage: &Stage, camera: usize, (width, height): (u32, u32)) -> Result<Value, SourceError> {
     let scene = stage.scene();
     let pixels = (0..height).into_par_iter().flat_map_iter(|y| (0..width).map(move |x| (x, y)));
@@ -193,7 +195,7 @@ fn picks(stage: &Stage, camera: usize, (width, height): (u32, u32)) -> Result<Va
     Ok(json!({ "shapes": shapes.collect::<Vec<_>>(), "values": base64(&compressed(numbers)?) }))
 }
 
-/// Numbers whose bytes begin with the least significant one, compressed.
+/// Little-endian numbers, compressed.
 fn compressed<const N: usize>(numbers: impl Iterator<Item = [u8; N]>) -> Result<Vec<u8>, SourceError> {
     let mut packed = ZlibEncoder::new(Vec::new(), Compression::default());
     for bytes in numbers {

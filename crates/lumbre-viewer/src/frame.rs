@@ -1,4 +1,4 @@
-//! Pictures as browsers take them: the bytes of pixels, so that nothing is to be decoded.
+//! Pictures for browsers: raw pixels, so that nothing must be decoded.
 
 use hyper::body::Bytes;
 use lumbre::image::{Encoded, Image, Rgb, ToneMap, srgb_to_linear};
@@ -6,7 +6,7 @@ use lumbre::{Picture, SaveOptions};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// What is shown of a scene.
+/// The channel that is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Channel {
@@ -21,7 +21,7 @@ pub(crate) enum Channel {
     Depth,
     /// Texture coordinates.
     Uv,
-    /// The variance of the picture's luminance; its square root, the standard error, is shown by colours.
+    /// The variance of the picture's luminance; its square root, the standard error, is shown in false colours.
     Variance,
     /// A colour for each shape.
     Ids,
@@ -36,22 +36,22 @@ pub(crate) struct Look {
     pub false_colour: bool,
 }
 
-/// A picture, with what a page has to know of it.
+/// A picture, with the data that a page needs.
 #[derive(Clone, Debug)]
 pub(crate) struct Shot {
     pub pixels: Pixels,
     pub channel: Channel,
-    /// Of the whole picture at full resolution.
+    /// The size of the whole picture at full resolution.
     pub full: (u32, u32),
     /// The last change that it shows.
     pub sequence: u32,
-    /// Whether it has all pixels, of the scene as it is wanted.
+    /// Whether it is complete, and of the requested scene.
     pub is_full: bool,
-    /// Whether it is what `lumbre render` makes.
+    /// Whether it equals the picture of `lumbre render`.
     pub is_done: bool,
 }
 
-/// Where the pixels of a shot are.
+/// The pixels of a shot.
 #[derive(Clone, Debug)]
 pub(crate) enum Pixels {
     /// In a picture that was rendered.
@@ -78,11 +78,11 @@ impl Shot {
     }
 }
 
-/// A frame, encoded once for all who look.
+/// A frame, encoded once for all pages.
 #[derive(Clone, Debug)]
 pub(crate) struct Frame(pub Bytes);
 
-/// Bytes before the pixels: eight numbers of four bytes, the least significant first.
+/// Bytes before the pixels: eight little-endian numbers of four bytes.
 pub(crate) const HEADER: usize = 32;
 const MAGIC: u32 = u32::from_le_bytes(*b"LUM1");
 
@@ -134,7 +134,7 @@ fn pixels(shot: &Shot, look: &Look, out: &mut [u8]) {
             Channel::Depth if value.r > 0.0 => {
                 Encoded::srgb(Rgb::splat(1.0 - 0.9 * value.r / farthest)).to_u8()
             }
-            // The numbers themselves, as they are known from other programs.
+            // The numbers themselves, as other programs show them.
             Channel::Normal | Channel::Uv => Encoded::new(value.r, value.g, value.b).to_u8(),
             Channel::Albedo | Channel::Depth | Channel::Ids => ToneMap::None.encode(value, 0.0).to_u8(),
         };

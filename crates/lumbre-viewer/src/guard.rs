@@ -1,9 +1,10 @@
-//! Who may talk to the viewer: exact lists of hosts and origins, and secrets that only the page and the viewer know.
+//! Access to the viewer: exact lists of hosts and origins, and secrets that only the page and the viewer know.
 //!
-//! A browser sends cookies to every port of a host, so that there are none. The address that opens the viewer has a token behind its `#`,
-//! which browsers do not send; the page keeps what it becomes in the storage of its own origin, a port included. Over the socket neither
-//! is sent: each side proves to know it, by a keyed hash (BLAKE3) of random numbers of both. Whoever takes the port when the
-//! viewer has ended learns nothing of use from a page that comes back.
+//! Browsers send cookies to every port of a host, so there are none. The address that opens the viewer has a token
+//! after its `#`, which browsers do not send; the page keeps the secret derived from it in the storage of its own
+//! origin, port included. Neither is sent over the socket: each side proves to know it, by a keyed hash (BLAKE3) of
+//! random numbers of both. Another program that takes the port after the viewer has ended learns nothing of use from a
+//! page that reconnects.
 
 use std::collections::VecDeque;
 use std::fs;
@@ -22,20 +23,20 @@ use crate::message::Errand;
 pub(crate) enum Refusal {
     /// The `Host` is not one of ours.
     Host,
-    /// The `Origin`, or what the browser says of where the request comes from.
+    /// The `Origin`, or the browser's statement of the request's source.
     Origin,
 }
 
-/// What a page that was let in hears.
+/// The reply to a page that was admitted.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Welcome {
-    /// The keyed hash of "viewer" and the numbers of both sides, by the secret that the page has proved to know.
+    /// The keyed hash of "viewer" and the numbers of both sides, by the secret that the page has proved.
     pub proof: String,
-    /// The secret of the session, for who came with the token.
+    /// The secret of the session, for a page that came with the token.
     pub session: Option<String>,
 }
 
-/// The secrets and the names of a viewer.
+/// The secrets and the host names of a viewer.
 pub(crate) struct Guard {
     hosts: Vec<String>,
     session: Secret,
@@ -45,15 +46,16 @@ pub(crate) struct Guard {
     tickets: Mutex<VecDeque<(Secret, Errand)>>,
 }
 
-/// Tickets that are not used yet; more push out the oldest.
-const MOST_TICKETS: usize = 64;
+/// Maximum unused tickets; more push out the oldest.
+const MAX_TICKETS: usize = 64;
 const FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 
 impl Guard {
-    /// That of a viewer at an address, with other names under which it may be reached, as `name:port`, and the file in which the secret
-    /// of the session outlives it.
+    /// For a viewer at an address, with other names for it, as `name:port`, and the file that keeps the secret of the
+    /// session across restarts.
     ///
     /// # Errors
+    /// If the system gives no random bytes.
     /// Where the system gives no random bytes.
     pub(crate) fn new(
         address: SocketAddr,
@@ -80,7 +82,7 @@ impl Guard {
         token.as_ref().map_or_else(|| "/".to_owned(), |token| format!("/#{}", token.digits()))
     }
 
-    /// Whether a request is for this host: against names that are made to point here.
+    /// Whether a request is for this host: protects against DNS rebinding.
     pub(crate) fn check_host(&self, headers: &HeaderMap) -> Result<(), Refusal> {
         match single(headers, &HOST) {
             Some(host) if self.hosts.iter().any(|known| known == host) => Ok(()),
@@ -88,7 +90,8 @@ impl Guard {
         }
     }
 
-    /// Whether a request comes from our page, or from no page at all. What changes something, or opens a socket, must say so.
+    /// Whether a request comes from our page, or from no page at all. Requests that change something or open a socket
+    /// must state their origin.
     pub(crate) fn check_origin(&self, headers: &HeaderMap, must_say: bool) -> Result<(), Refusal> {
         let host = single(headers, &HOST).ok_or(Refusal::Host)?;
         match single(headers, &ORIGIN) {
@@ -102,8 +105,8 @@ impl Guard {
         }
     }
 
-    /// Lets in who proves to know the token, which works once, or the secret of the session: by the keyed hash of "page", of our challenge
-    /// and of 32 random bytes of the page's, both as hexadecimal digits.
+    /// Admits a page that proves to know the token, which works once, or the secret of the session: by the keyed hash
+    /// of "page", of our challenge and of 32 random bytes of the page's, both as hexadecimal digits.
     pub(crate) fn admit(&self, challenge: &Secret, nonce: &str, proof: &str) -> Option<Welcome> {
         let page: Secret = nonce.parse().ok()?;
         let asked = |key: &Secret| key.proof(b"page", challenge, &page);
@@ -119,19 +122,19 @@ impl Guard {
         Some(Welcome { proof: answered(&token), session: Some(self.session.digits()) })
     }
 
-    /// An address for an errand, which works once.
+    /// A single-use address for an errand.
     pub(crate) fn ticket(&self, errand: Errand) -> Option<String> {
         let ticket = Secret::new().ok()?;
         let address = format!("/ticket/{}", ticket.digits());
         let mut tickets = self.tickets.lock().unwrap_or_else(PoisonError::into_inner);
-        if tickets.len() >= MOST_TICKETS {
+        if tickets.len() >= MAX_TICKETS {
             tickets.pop_front();
         }
         tickets.push_back((ticket, errand));
         Some(address)
     }
 
-    /// What a ticket is for, which is used by that.
+    /// The errand of a ticket, which is used up.
     pub(crate) fn redeem(&self, ticket: &str) -> Option<Errand> {
         let mut tickets = self.tickets.lock().unwrap_or_else(PoisonError::into_inner);
         let place = tickets.iter().position(|(known, _)| is_same(ticket, &known.digits()))?;
@@ -156,7 +159,8 @@ impl Secret {
         self.0.iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
-    /// That `whose` side knows this secret. Of each random number its first 24 bytes are taken, so that all is one block of BLAKE3.
+    /// The proof that `whose` side knows this secret. It takes the first 24 bytes of each random number, so that all
+    /// fits one block of BLAKE3.
     fn proof(&self, whose: &[u8], challenge: &Self, page: &Self) -> Self {
         let text = [whose, &challenge.0[..24], &page.0[..24]].concat();
         Self(*blake3::keyed_hash(&self.0, &text).as_bytes())
@@ -178,25 +182,26 @@ impl std::str::FromStr for Secret {
     }
 }
 
-/// The value of a header that stands once.
+/// The value of a header that occurs exactly once.
 fn single<'h>(headers: &'h HeaderMap, name: &HeaderName) -> Option<&'h str> {
     let mut values = headers.get_all(name).iter();
     let value = values.next()?.to_str().ok()?;
     if values.next().is_some() { None } else { Some(value) }
 }
 
-/// Compares in a time that does not tell how much of a guess is right.
+/// Compares in constant time.
 fn is_same(guess: &str, secret: &str) -> bool {
     let differences = guess.bytes().zip(secret.bytes()).fold(0, |all, (a, b)| all | (a ^ b));
     guess.len() == secret.len() && differences == 0
 }
 
-/// The secret that a file keeps, or a new one that it keeps from now on, where its folder is the user's own and nobody else's. A file that
-/// another could have written or read, a link, or one that holds something else is replaced.
+/// The secret in a file, or a new one that is written to it, if the folder is the user's own and private. A file that
+/// others could have written or read, a link, or a file with other contents is replaced.
 fn kept_secret(path: &Path) -> Result<Secret, String> {
     let new = Secret::new()?;
     let Some(folder) = path.parent() else { return Ok(new) };
-    // A file of our own, mode 0600: it says which user we are, and takes the place of what is there without following it.
+    // Our own file, mode 0600: its owner is the current user, and it replaces the existing file without following
+    // links.
     let Ok(mut file) = tempfile::Builder::new().prefix(".lumbre-view").tempfile_in(folder) else {
         return Ok(new);
     };
@@ -204,7 +209,7 @@ fn kept_secret(path: &Path) -> Result<Secret, String> {
     if !fs::symlink_metadata(folder).is_ok_and(|meta| meta.is_dir() && is_private(&meta, &own)) {
         return Ok(new);
     }
-    // Nobody else can change what is in the folder, so that it is still the same when it is opened.
+    // Nobody else can change the folder's contents, so the file is still the same when it is opened.
     let is_ours = |meta: fs::Metadata| meta.is_file() && is_private(&meta, &own);
     if fs::symlink_metadata(path).is_ok_and(is_ours) {
         let mut text = String::new();
@@ -213,21 +218,21 @@ fn kept_secret(path: &Path) -> Result<Secret, String> {
             return Ok(kept);
         }
     }
-    // Where it cannot be kept, the page is opened anew after a restart.
+    // If it cannot be kept, the page must be opened again after a restart.
     if file.write_all(new.digits().as_bytes()).is_ok() {
         let _ = file.persist(path);
     }
     Ok(new)
 }
 
-/// Whether this belongs to the user that `own` belongs to, and no one else may read or write it.
+/// Whether this belongs to the same user as `own`, and no one else may read or write it.
 #[cfg(unix)]
 fn is_private(meta: &fs::Metadata, own: &fs::Metadata) -> bool {
     use std::os::unix::fs::MetadataExt;
     meta.uid() == own.uid() && meta.mode() & 0o077 == 0
 }
 
-/// Other systems say it in other ways, which are not asked.
+/// Not supported on other systems.
 #[cfg(not(unix))]
 fn is_private(_: &fs::Metadata, _: &fs::Metadata) -> bool {
     false
@@ -241,7 +246,7 @@ mod tests {
         Guard::new("127.0.0.1:7777".parse().unwrap(), &[], None).unwrap()
     }
 
-    /// What a page that knows this secret says to a challenge: its random number, and its proof.
+    /// A page's answer to a challenge, from this secret: its random number, and its proof.
     fn hello(key: &Secret, challenge: &Secret) -> (Secret, String) {
         let page = Secret::new().unwrap();
         let proof = key.proof(b"page", challenge, &page).digits();
@@ -273,7 +278,7 @@ mod tests {
             let welcome = guard.admit(&challenge, &page.digits(), &proof).expect("it is the session");
             assert_eq!(welcome.proof, session.proof(b"viewer", &challenge, &page).digits());
             assert!(welcome.session.is_none(), "it is said once");
-            // What was overheard answers no other challenge.
+            // An overheard proof answers no other challenge.
             assert!(guard.admit(&Secret::new().unwrap(), &page.digits(), &proof).is_none());
         }
     }
@@ -288,7 +293,7 @@ mod tests {
         assert_eq!(guard.redeem(ticket), Some(errand));
         assert_eq!(guard.redeem(ticket), None);
         let first = guard.ticket(Errand::Scene {}).unwrap();
-        for _ in 0..MOST_TICKETS {
+        for _ in 0..MAX_TICKETS {
             guard.ticket(Errand::Scene {}).unwrap();
         }
         assert_eq!(guard.redeem(first.strip_prefix("/ticket/").unwrap()), None, "they are not kept for ever");
@@ -320,7 +325,7 @@ mod tests {
             fs::write(&path, broken).unwrap();
             assert!(kept_secret(&path).unwrap() == fs::read_to_string(&path).unwrap().parse().unwrap());
         }
-        // Where others can come into the folder, or it is a link, nothing is kept.
+        // In a folder that others can write, or through a link, nothing is kept.
         let kept = kept_secret(&path).unwrap();
         let link = folder.path().join("link");
         symlink(folder.path(), &link).unwrap();

@@ -1,5 +1,12 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![doc = include_str!("../README.md")]
+//!
+//! # Where a frame travels
+//!
+//! A page sends what it wants (`message.rs`). The session bumps a version and cancels stale work (`session.rs`). One
+//! worker thread, helped by all cores, moves the camera, rebuilds or reads again, and renders from coarse to fine
+//! (`worker.rs`). A frame is encoded once for all pages (`frame.rs`). Each socket sends the latest frame when its page
+//! has shown the one before; frames in between are never sent (`socket.rs`).
 
 mod base64;
 mod camera;

@@ -1,29 +1,29 @@
-//! What a page says.
+//! The messages of a page.
 
 use serde::Deserialize;
 
 use crate::camera::Placement;
 use crate::frame::Channel;
 
-/// A message of a page. Whatever else one holds is an error: a page is of the same program.
+/// A message of a page. Unknown fields are an error: the page is part of the same program.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(tag = "type", rename_all = "lowercase", deny_unknown_fields)]
 pub(crate) enum Message {
-    /// It has shown the last frame, and can take another.
+    /// It has shown the last frame, and is ready for another.
     Shown {},
-    /// The camera is there now.
+    /// The camera has moved.
     Camera { sequence: u32, placement: Placement, fov: Option<f64>, zoom: f64 },
-    /// One of the file's cameras, as it is.
+    /// Back to one of the file's cameras.
     Reset { sequence: u32, camera: usize },
     /// What is rendered, and how it is shown.
-    Set(Box<Wishes>),
-    /// A parameter of the scene; without a value that of the file.
+    Set(Box<SetOptions>),
+    /// A parameter of the scene; `None` resets it to the file's value.
     Edit { path: String, value: Option<String> },
     /// A moment of an animation, a variant.
     Moment { time: Option<f64>, variant: Option<String> },
-    /// What is there at a pixel of the full picture.
+    /// Asks for the shapes at a pixel of the full picture.
     Pick { x: f64, y: f64, request: u32 },
-    /// An address for what goes beside the socket.
+    /// Asks for an address of an HTTP request.
     Ticket { request: u32, errand: Errand },
     /// The values of a rectangle of pixels.
     Values { x: u32, y: u32, width: u32, height: u32, request: u32 },
@@ -33,17 +33,17 @@ pub(crate) enum Message {
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(tag = "type", rename_all = "lowercase", deny_unknown_fields)]
 pub(crate) enum Greeting {
-    /// It proves to be one that may come in: see [`crate::guard::Guard::admit`].
+    /// The proof that it may come in: see [`crate::guard::Guard::admit`].
     Hello { nonce: String, proof: String },
 }
 
-/// What a page does by a request of its own, for which it has a ticket that works once.
+/// The purpose of a page's HTTP request, which needs a single-use ticket.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(tag = "for", rename_all = "lowercase", deny_unknown_fields)]
 pub(crate) enum Errand {
     /// It takes the picture as a file.
     Picture { format: FileFormat },
-    /// It takes a page on how the colour of a pixel comes about.
+    /// It loads an explanation of a pixel's colour.
     Explanation { language: String, pixel: (u32, u32) },
     /// It sends a scene.
     Scene {},
@@ -57,10 +57,10 @@ pub(crate) enum FileFormat {
     Exr,
 }
 
-/// What a page asks for; what is not in it stays.
+/// A page's options; missing ones stay unchanged.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq)]
 #[serde(default, deny_unknown_fields)]
-pub(crate) struct Wishes {
+pub(crate) struct SetOptions {
     pub exposure: Option<f32>,
     pub tone_map: Option<String>,
     pub false_colour: Option<bool>,

@@ -11,7 +11,7 @@ pub(crate) struct File {
     pub bytes: &'static [u8],
 }
 
-/// All of them.
+/// All files.
 pub(crate) const FILES: [File; 4] = [
     File { path: "/", kind: "text/html; charset=utf-8", bytes: include_bytes!("../web/dist/index.html") },
     File {
@@ -27,9 +27,9 @@ pub(crate) const FILES: [File; 4] = [
     File { path: "/icon.svg", kind: "image/svg+xml", bytes: include_bytes!("../web/dist/icon.svg") },
 ];
 
-/// What may be loaded by the page: what this server has, and pictures that it makes itself.
+/// What the page may load: files of this server, and pictures that it makes itself.
 pub(crate) const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; \
      frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// What an explanation may: be in a frame of ours, have styles, and nothing else.
+/// What an explanation may do: be in our frame, have styles, and nothing else.
 pub(crate) const EXPLANATION_POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'";

@@ -2,12 +2,12 @@
 
 use std::time::Instant;
 
-/// Messages that may come at once.
+/// Maximum burst of messages.
 const BURST: f64 = 400.0;
-/// Messages a second, over a longer time: a mouse that reports a thousand times a second is gathered by the page, once a frame.
+/// Sustained messages a second. The page merges the events of fast mice, once per frame.
 const PER_SECOND: f64 = 200.0;
 
-/// What is left to a client.
+/// A client's remaining budget.
 #[derive(Debug)]
 pub(crate) struct Allowance {
     left: f64,
@@ -15,12 +15,12 @@ pub(crate) struct Allowance {
 }
 
 impl Allowance {
-    /// All of it.
+    /// The full budget.
     pub(crate) fn new(now: Instant) -> Self {
         Self { left: BURST, last: now }
     }
 
-    /// Takes one message; whether it may be answered.
+    /// Counts one message; returns whether it may be answered.
     pub(crate) fn take(&mut self, now: Instant) -> bool {
         let earned = now.saturating_duration_since(self.last).as_secs_f64() * PER_SECOND;
         self.left = (self.left + earned).min(BURST) - 1.0;

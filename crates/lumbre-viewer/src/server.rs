@@ -28,28 +28,28 @@ use crate::session::Session;
 use crate::socket;
 use crate::visitors::{Visit, Visitors};
 
-/// Until a request is there with all of its headers, and until the next one comes.
+/// Timeout for the headers of a request, and for the next request.
 const HEADERS_WITHIN: Duration = Duration::from_secs(5);
-/// How long a connection lasts that was never let in.
+/// Maximum duration of a connection that is not admitted.
 const STRANGER_AT_MOST: Duration = Duration::from_secs(20);
 /// Bytes of a request's headers.
-const MOST_HEADER_BYTES: usize = 16 << 10;
+const MAX_HEADER_BYTES: usize = 16 << 10;
 /// Bytes of a scene that is dropped on the page.
-const MOST_SCENE_BYTES: u64 = 256 << 20;
-/// Until it is there.
+const MAX_SCENE_BYTES: u64 = 256 << 20;
+/// Timeout for it.
 const SCENE_WITHIN: Duration = Duration::from_secs(120);
-/// What a binary glTF begins with.
+/// The magic bytes of a binary glTF.
 const GLB: &[u8] = b"glTF";
 
-/// What answers have in common.
+/// The data that all answers share.
 pub(crate) struct Server {
     pub session: Arc<Session>,
     pub guard: Guard,
-    /// Where scenes go that are dropped on the page, under names of our own.
+    /// The folder of scenes that are dropped on the page, under our own names.
     pub dropped: tempfile::TempDir,
-    /// Who is connected.
+    /// All connections.
     pub visitors: Arc<Visitors>,
-    /// Tells that the viewer closes.
+    /// Signals that the viewer closes.
     pub closed: Arc<Notify>,
 }
 
@@ -58,7 +58,7 @@ type Answer = Response<Full<Bytes>>;
 /// Answers until the viewer closes.
 ///
 /// # Errors
-/// Where the listener cannot be used.
+/// If the listener cannot be used.
 pub(crate) async fn serve(server: Arc<Server>, listener: TcpListener) -> std::io::Result<()> {
     listener.set_nonblocking(true)?;
     let listener = tokio::net::TcpListener::from_std(listener)?;
@@ -68,11 +68,11 @@ pub(crate) async fn serve(server: Arc<Server>, listener: TcpListener) -> std::io
             () = server.closed.notified() => return Ok(()),
         };
         let Ok((stream, _)) = accepted else {
-            // No more files.
+            // Too many open files.
             tokio::time::sleep(Duration::from_millis(5)).await;
             continue;
         };
-        // A frame is many packets, and an answer few: none should wait for another.
+        // Frames take many packets, and answers few: none should wait for another.
         let _ = stream.set_nodelay(true);
         let server = server.clone();
         let visit = Arc::new(server.visitors.come());
@@ -82,9 +82,9 @@ pub(crate) async fn serve(server: Arc<Server>, listener: TcpListener) -> std::io
                 async move { Ok::<_, Infallible>(server.answer(request, visit).await) }
             });
             let mut http = hyper::server::conn::http1::Builder::new();
-            http.timer(TokioTimer::new()).header_read_timeout(HEADERS_WITHIN).max_buf_size(MOST_HEADER_BYTES);
+            http.timer(TokioTimer::new()).header_read_timeout(HEADERS_WITHIN).max_buf_size(MAX_HEADER_BYTES);
             let served = http.serve_connection(TokioIo::new(stream), service).with_upgrades();
-            // What goes wrong with one connection is told to no one else.
+            // A fault of one connection does not affect others.
             tokio::select! {
                 _ = served => {}
                 () = has_to_go(&visit) => {}
@@ -93,7 +93,7 @@ pub(crate) async fn serve(server: Arc<Server>, listener: TcpListener) -> std::io
     }
 }
 
-/// Waits until a connection has to go: to make room for another, or as it was not let in for too long.
+/// Waits until a connection must close: to make room for another, or because it was not admitted in time.
 pub(crate) async fn has_to_go(visit: &Visit) {
     let is_late = async {
         tokio::time::sleep(STRANGER_AT_MOST).await;
@@ -161,7 +161,7 @@ impl Server {
         if (is_get, path) == (true, "/socket") {
             return self.upgraded(request, visit);
         }
-        // The page itself is no secret: it is part of the program.
+        // The page itself is not secret: it is part of the program.
         let file = FILES.iter().find(|file| file.path == path).ok_or(StatusCode::NOT_FOUND)?;
         if !is_get {
             return Err(StatusCode::METHOD_NOT_ALLOWED);
@@ -178,7 +178,7 @@ impl Server {
         name: &str,
     ) -> Result<Answer, StatusCode> {
         let session = self.session.clone();
-        // It takes its time, which the others should not wait for.
+        // It takes a while; other requests should not wait for it.
         let encoded = tokio::task::spawn_blocking(move || session.file(format)).await;
         let bytes = encoded.ok().and_then(Result::ok).ok_or(StatusCode::NOT_FOUND)?;
         let mut answer = Response::new(Full::new(bytes.into()));
@@ -190,7 +190,7 @@ impl Server {
         Ok(answer)
     }
 
-    /// How the colour of a pixel comes about: a page for a frame of ours or a tab of its own.
+    /// An explanation of a pixel's colour: a page for our frame or a tab of its own.
     async fn explanation(&self, language: String, pixel: (u32, u32)) -> Result<Answer, StatusCode> {
         let session = self.session.clone();
         let told = tokio::task::spawn_blocking(move || session.explain(pixel, &language)).await;
@@ -213,7 +213,7 @@ impl Server {
 
     /// A .glb that was dropped on the page.
     async fn dropped(&self, request: Request<Incoming>) -> Result<Answer, StatusCode> {
-        // A type that no form of another site can have.
+        // A type that no form of another site can send.
         if request.headers().get(CONTENT_TYPE).is_none_or(|kind| kind != "application/octet-stream") {
             return Err(StatusCode::UNSUPPORTED_MEDIA_TYPE);
         }
@@ -222,11 +222,11 @@ impl Server {
             .get(CONTENT_LENGTH)
             .and_then(|length| length.to_str().ok()?.parse::<u64>().ok());
         match length {
-            Some(length) if length <= MOST_SCENE_BYTES => {}
+            Some(length) if length <= MAX_SCENE_BYTES => {}
             Some(_) => return Err(StatusCode::PAYLOAD_TOO_LARGE),
             None => return Err(StatusCode::LENGTH_REQUIRED),
         }
-        let body = Limited::new(request.into_body(), MOST_SCENE_BYTES as usize).collect();
+        let body = Limited::new(request.into_body(), MAX_SCENE_BYTES as usize).collect();
         let body = tokio::time::timeout(SCENE_WITHIN, body).await.map_err(|_| StatusCode::REQUEST_TIMEOUT)?;
         let bytes = body.map_err(|_| StatusCode::BAD_REQUEST)?.to_bytes();
         if !bytes.starts_with(GLB) {
@@ -240,7 +240,7 @@ impl Server {
         Ok(text(StatusCode::OK, "opened"))
     }
 
-    /// From HTTP to the socket.
+    /// Upgrades from HTTP to the socket.
     fn upgraded(
         self: &Arc<Self>,
         request: Request<Incoming>,

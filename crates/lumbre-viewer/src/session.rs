@@ -1,4 +1,4 @@
-//! What is wanted of a viewer, what it has, and how both reach those who work on it.
+//! The requested and the present state of a viewer, shared by the server and the worker.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -11,12 +11,12 @@ use tokio::sync::watch;
 
 use crate::camera::Placement;
 use crate::frame::{Channel, Frame, Look, Pixels, Shot};
-use crate::message::{Message, Wishes};
+use crate::message::{Message, SetOptions};
 use crate::source::{Moment, Source};
 use crate::stage::Stage;
 use crate::watching::Watched;
 
-/// How often something was changed, by what has to be done again.
+/// Versions of the requested state, by the work that a change needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Changes {
     /// The files are read.
@@ -27,18 +27,18 @@ pub(crate) struct Changes {
     pub render: u64,
     /// The picture is shown.
     pub look: u64,
-    /// It begins or ends to wait.
+    /// Pausing starts or ends.
     pub pause: u64,
 }
 
-/// What is wanted.
+/// The requested state.
 #[derive(Clone, Debug)]
 pub(crate) struct Wanted {
     pub changes: Changes,
-    /// The last change of the camera, by the page's own count.
+    /// The last change of the camera, as counted by the page.
     pub sequence: u32,
     pub camera: usize,
-    /// Where it was moved; `None` for the file's own camera.
+    /// Its moved placement; `None` for the file's own camera.
     pub moved: Option<Moved>,
     pub channel: Channel,
     pub scale: f64,
@@ -61,14 +61,14 @@ pub(crate) struct Moved {
     pub zoom: f64,
 }
 
-/// Parameters that may be set.
-const MOST_SETTINGS: usize = 500;
-/// Characters of a parameter's name and of its value.
+/// Maximum number of set parameters.
+const MAX_SETTINGS: usize = 500;
+/// Maximum characters of a parameter's name and of its value.
 const LONGEST_SETTING: usize = 1000;
-/// Between two looks at the files.
+/// Interval between checks of the files.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
-/// The side of a rectangle of pixels whose values are asked for.
-const MOST_VALUES: u32 = 64;
+/// Maximum side of a rectangle of requested pixel values.
+const MAX_VALUES: u32 = 64;
 
 struct Inner {
     wanted: Wanted,
@@ -91,11 +91,11 @@ pub(crate) struct Session {
     watched: Mutex<Watched>,
     /// The last frame.
     pub frames: watch::Sender<Option<Frame>>,
-    /// What there is, as JSON.
+    /// The scene's facts, as JSON.
     pub scene: watch::Sender<Arc<str>>,
-    /// What is wanted, as JSON.
+    /// The requested state, as JSON.
     pub state: watch::Sender<Arc<str>>,
-    /// How far the picture is, as JSON.
+    /// The progress of the picture, as JSON.
     pub progress: watch::Sender<Arc<str>>,
 }
 
@@ -148,7 +148,7 @@ impl Session {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Changes what is wanted, stops what is not any longer, and tells everyone.
+    /// Changes the requested state, cancels stale work, and publishes the state.
     fn change(&self, change: impl FnOnce(&mut Inner)) {
         let mut inner = self.lock();
         change(&mut inner);
@@ -157,7 +157,7 @@ impl Session {
         self.tell(&inner);
     }
 
-    /// Waits until something else is wanted than this, or until there is work to go on with; `None` when the viewer closes.
+    /// Waits for a change of the requested state, or for work to continue; `None` when the viewer closes.
     pub(crate) fn wait(&self, known: Changes, has_work: bool) -> Option<Wanted> {
         let mut inner = self.lock();
         loop {
@@ -171,7 +171,7 @@ impl Session {
         }
     }
 
-    /// A token that is pulled when something else is wanted than this, at once if it is already.
+    /// A token that is cancelled when the requested state differs from this version, perhaps at once.
     pub(crate) fn token(&self, known: Changes) -> CancelToken {
         let mut inner = self.lock();
         inner.cancel = CancelToken::new();
@@ -181,7 +181,7 @@ impl Session {
         inner.cancel.clone()
     }
 
-    /// Whether a picture that was begun for this is still wanted, however it is shown.
+    /// Whether a picture that was started for this version is still wanted, for any display options.
     pub(crate) fn is_wanted(&self, known: Changes) -> bool {
         let inner = self.lock();
         let now = inner.wanted.changes;
@@ -213,7 +213,7 @@ impl Session {
         self.lock().source.clone()
     }
 
-    /// A stage is there, or none that can be shown: then the last one stays.
+    /// Publishes a stage, or why there is none; then the last one stays.
     pub(crate) fn staged(&self, staged: Result<Arc<Stage>, String>) {
         let mut inner = self.lock();
         match staged {
@@ -227,7 +227,7 @@ impl Session {
         self.tell(&inner);
     }
 
-    /// Whether there can be a picture of the stage as it is wanted.
+    /// Publishes whether the requested picture can be rendered.
     pub(crate) fn pictured(&self, pictured: Result<(), String>) {
         let mut inner = self.lock();
         let error = pictured.err();
@@ -237,14 +237,14 @@ impl Session {
         }
     }
 
-    /// Watches these files from now on: those that were read, or else those that were watched before, and those of the source.
+    /// Sets the files to watch: those that were read, or otherwise those watched before, and those of the source.
     pub(crate) fn watch_files(&self, read: Option<Vec<PathBuf>>, named: Vec<PathBuf>) {
         let mut watched = self.watched.lock().unwrap_or_else(PoisonError::into_inner);
         let before = read.unwrap_or_else(|| watched.files().collect());
         *watched = Watched::new(before.into_iter().chain(named));
     }
 
-    /// Looks at the files until the viewer closes, and has them read again when one has changed.
+    /// Checks the files until the viewer closes, and reloads when one has changed.
     pub(crate) fn watch(&self) {
         while !self.lock().closing {
             std::thread::sleep(LOOK_EVERY);
@@ -254,19 +254,19 @@ impl Session {
         }
     }
 
-    /// Whether the last parameter that was set could be.
+    /// Publishes whether the last parameter could be set.
     pub(crate) fn edited(&self, wrong: Option<String>) {
         let mut inner = self.lock();
         inner.edit_error = wrong;
         self.tell(&inner);
     }
 
-    /// Takes back a parameter that cannot be set.
+    /// Reverts a parameter that cannot be set.
     pub(crate) fn drop_setting(&self, path: &str) {
         self.lock().wanted.settings.retain(|(known, _)| known != path);
     }
 
-    /// There is a picture: it is encoded once, for all.
+    /// Publishes a picture: it is encoded once, for all pages.
     pub(crate) fn show(&self, shot: Shot, look: &Look) {
         let frame = Frame::new(&shot, look);
         let mut inner = self.lock();
@@ -285,7 +285,7 @@ impl Session {
         self.progress.send_replace(progress.to_string().into());
     }
 
-    /// Says what is wanted and what there is.
+    /// Publishes the requested state and the scene.
     fn tell(&self, inner: &Inner) {
         let Inner { wanted, stage, error, picture_error, edit_error, name, .. } = inner;
         let index =
@@ -320,10 +320,10 @@ impl Session {
         self.state.send_replace(state.to_string().into());
     }
 
-    /// Does what a page says; what it is answered, if anything.
+    /// Handles a page's message; returns the answer, if any.
     pub(crate) fn obey(&self, message: Message) -> Option<Value> {
         match message {
-            // The socket's own affairs.
+            // The socket handles these.
             Message::Shown {} | Message::Ticket { .. } => None,
             Message::Camera { sequence, placement, fov, zoom } => {
                 self.change(|inner| {
@@ -359,7 +359,7 @@ impl Session {
         }
     }
 
-    fn wish(&self, wishes: &Wishes) -> Option<Value> {
+    fn wish(&self, wishes: &SetOptions) -> Option<Value> {
         let tone_map = match wishes.tone_map.as_deref().map(|name| ToneMap::from_name(name).ok_or(name)) {
             Some(Err(_)) => return Some(json!({ "type": "wrong", "what": "there is no such tone mapping" })),
             Some(Ok(map)) => Some(map),
@@ -382,7 +382,7 @@ impl Session {
                 == (wanted.channel, wanted.denoise, wanted.scale);
             wanted.changes.look += u64::from(!is_same_look);
             wanted.changes.render += u64::from(!is_same_picture);
-            // More samples go on from those that there are.
+            // More samples continue the present ones.
             wanted.changes.pause += u64::from(before.paused != wanted.paused || before.spp != wanted.spp);
         });
         None
@@ -394,7 +394,7 @@ impl Session {
         let mut is_full = false;
         self.change(|inner| {
             let settings = &mut inner.wanted.settings;
-            is_full = settings.len() >= MOST_SETTINGS && !settings.iter().any(|(known, _)| *known == path);
+            is_full = settings.len() >= MAX_SETTINGS && !settings.iter().any(|(known, _)| *known == path);
             if is_long || is_full {
                 return;
             }
@@ -426,24 +426,24 @@ impl Session {
         Some(json!({ "type": "picked", "request": request, "x": x, "y": y, "ray": met }))
     }
 
-    /// How the colour of a pixel of the picture comes about, as a page in a language; `None` where nobody tells that.
+    /// An explanation of a pixel's colour, as a page in a language; `None` if there is no explainer.
     pub(crate) fn explain(&self, pixel: (u32, u32), language: &str) -> Option<Result<String, String>> {
         let (stage, camera, full) = self.shown()?;
         stage.explain(camera, full, pixel, language)
     }
 
-    /// The numbers of pixels of the last whole picture, row by row.
+    /// The values of pixels of the last complete picture, row by row.
     fn values(&self, [x0, y0, width, height]: [u32; 4], request: u32) -> Option<Value> {
         let (shot, _) = self.shot()?;
         let image = shot.image();
         let is_whole = (image.width(), image.height()) == shot.full;
-        if !is_whole || width > MOST_VALUES || height > MOST_VALUES {
+        if !is_whole || width > MAX_VALUES || height > MAX_VALUES {
             return None;
         }
         let (x1, y1) =
             (x0.saturating_add(width).min(image.width()), y0.saturating_add(height).min(image.height()));
         let pixels = (y0..y1).flat_map(|y| (x0..x1).map(move |x| image.pixel(x, y).to_array()));
-        // JSON has no infinity: what is not finite is said in words.
+        // JSON has no infinity: such numbers become text.
         let said = |value: f32| if value.is_finite() { json!(value) } else { json!(value.to_string()) };
         let values: Vec<Value> = pixels.map(|rgb| json!(rgb.map(said))).collect();
         let (width, height) = (x1.saturating_sub(x0), y1.saturating_sub(y0));

@@ -1,4 +1,5 @@
-//! One page's socket: it is let in, then frames and facts go out and wishes come in. Who reads slowly misses frames; who reads nothing is dropped.
+//! One page's socket: after a greeting, frames and facts go out and messages come in. Slow pages skip frames; silent
+//! ones are dropped.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -19,27 +20,27 @@ use crate::rate::Allowance;
 use crate::server::{Server, has_to_go};
 use crate::visitors::Visit;
 
-/// Bytes of a message of a page, whose longest names a parameter and its value.
-const MOST_MESSAGE_BYTES: usize = 16 << 10;
-/// Until a page has taken what was sent to it.
+/// Maximum bytes of a page's message; the longest has a parameter's name and value.
+const MAX_MESSAGE_BYTES: usize = 16 << 10;
+/// Timeout for a page to take what was sent.
 const TAKEN_WITHIN: Duration = Duration::from_secs(10);
-/// Between two questions whether it is still there.
+/// Interval between pings.
 const ASK_EVERY: Duration = Duration::from_secs(20);
-/// How long it may be silent.
+/// Maximum silence.
 const SILENT_AT_MOST: Duration = Duration::from_secs(65);
 
-/// Until a page has said who it is.
+/// Timeout for a page's greeting.
 const HELLO_WITHIN: Duration = Duration::from_secs(5);
-/// The code of a page that is not known: it knows no secret of this viewer, or there is no place for it.
+/// The close code for unknown pages: the page knows no secret of this viewer, or there are too many pages.
 const UNKNOWN: CloseCode = CloseCode::Library(4403);
 
 type Stream = WebSocketStream<TokioIo<Upgraded>>;
 
-/// Talks with a page until one of both ends it.
+/// Serves a page until either side ends.
 pub(crate) async fn talk(stream: TokioIo<Upgraded>, server: Arc<Server>, visit: Arc<Visit>) {
     let config = WebSocketConfig::default()
-        .max_message_size(Some(MOST_MESSAGE_BYTES))
-        .max_frame_size(Some(MOST_MESSAGE_BYTES))
+        .max_message_size(Some(MAX_MESSAGE_BYTES))
+        .max_frame_size(Some(MAX_MESSAGE_BYTES))
         .read_buffer_size(8 << 10);
     let mut stream = WebSocketStream::from_raw_socket(stream, Role::Server, Some(config)).await;
     let ended = tokio::select! {
@@ -55,7 +56,7 @@ pub(crate) async fn talk(stream: TokioIo<Upgraded>, server: Arc<Server>, visit: 
     }
 }
 
-/// Lets in a page that knows our secret, and proves to it that we know it, too. Nothing is said before.
+/// Admits a page that knows our secret, and proves to it that we know it too. Nothing is sent before.
 async fn greet(stream: &mut Stream, guard: &Guard, visit: &Visit) -> Result<(), Ended> {
     let challenge = Secret::new().map_err(|_| None)?;
     let asked = json!({ "type": "challenge", "nonce": challenge.digits() });
@@ -69,7 +70,7 @@ async fn greet(stream: &mut Stream, guard: &Guard, visit: &Visit) -> Result<(), 
     send(stream, Packet::text(welcome.to_string())).await
 }
 
-/// Why we end it; `None` where the other side did, or is gone.
+/// Why we close the socket; `None` if the other side closed it, or is gone.
 type Ended = Option<(CloseCode, &'static str)>;
 
 async fn converse(stream: &mut Stream, server: &Server) -> Result<(), Ended> {
@@ -135,7 +136,7 @@ async fn converse(stream: &mut Stream, server: &Server) -> Result<(), Ended> {
 
 fn subscribe<T>(of: &watch::Sender<T>) -> watch::Receiver<T> {
     let mut receiver = of.subscribe();
-    // What there is already is news to a page that has just come.
+    // The present state is new to a page that has just connected.
     receiver.mark_changed();
     receiver
 }

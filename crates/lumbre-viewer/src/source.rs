@@ -1,4 +1,5 @@
-//! Where a viewer gets its scene from: whoever starts it says how files are read and pictures are set up.
+//! The source of a viewer's scene: the program that starts the viewer decides how files are read and pictures are set
+//! up.
 
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
@@ -15,10 +16,10 @@ pub struct Moment {
     pub variant: Option<String>,
 }
 
-/// What was read.
+/// The result of reading.
 #[derive(Debug)]
 pub struct Read {
-    /// The scene, before it is set on a stage.
+    /// The scene, before it is staged.
     pub desc: SceneDesc,
     /// Every file that was read.
     pub files: Vec<PathBuf>,
@@ -26,7 +27,7 @@ pub struct Read {
     pub warnings: Vec<String>,
 }
 
-/// A scene that is ready, and how `lumbre render` would make and save its picture.
+/// A built scene, and how `lumbre render` would make and save its picture.
 #[derive(Debug)]
 pub struct Built {
     /// The scene.
@@ -35,22 +36,22 @@ pub struct Built {
     pub options: RenderOptions,
     /// How the picture is shown: exposure and tone mapping.
     pub save: SaveOptions,
-    /// What is laid behind the picture.
+    /// The background of the picture.
     pub background: Option<Background>,
-    /// Whether the noise is taken out of the picture.
+    /// Whether the picture is denoised.
     pub denoise: bool,
     /// Warnings.
     pub warnings: Vec<String>,
-    /// What tells how the colours of its pixels come about.
+    /// Explains the colours of its pixels.
     pub explain: Option<Box<dyn Explain>>,
 }
 
 /// Why there is no scene, or no picture of it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SourceError {
-    /// What kind of error it is.
+    /// The kind of error.
     pub kind: ErrorKind,
-    /// What is wrong, for people, with the place in the file where there is one.
+    /// The fault, for people, with its place in the file if known.
     pub message: String,
 }
 
@@ -68,12 +69,12 @@ impl From<lumbre::Error> for SourceError {
     }
 }
 
-/// Tells how the colour of a pixel comes about.
+/// Explains the colour of a pixel.
 pub trait Explain: Debug + Send + Sync {
-    /// The languages in which it does, as their codes and their own names.
+    /// The available languages, as their codes and their own names.
     fn languages(&self) -> Vec<(&'static str, &'static str)>;
 
-    /// A page of HTML, which may have styles, and neither runs nor loads anything.
+    /// An HTML page, which may have styles, and neither runs nor loads anything.
     ///
     /// # Errors
     /// Why there is none, for people.
@@ -88,7 +89,7 @@ pub trait Explain: Debug + Send + Sync {
 
 /// How a scene is read and built.
 pub trait Source: Send + Sync {
-    /// What to call the scene.
+    /// The name of the scene.
     fn name(&self) -> String;
 
     /// The files to watch even if none can be read.
@@ -97,22 +98,23 @@ pub trait Source: Send + Sync {
     /// Reads the files.
     ///
     /// # Errors
-    /// What is wrong, and where.
+    /// The fault and its place.
     fn read(&self, moment: &Moment) -> Result<Read, SourceError>;
 
-    /// Sets a description on its stage and builds it.
+    /// Stages a description and builds it.
     ///
     /// # Errors
-    /// What is wrong.
+    /// The fault.
     fn build(&self, desc: SceneDesc) -> Result<Built, SourceError>;
 
     /// Whether there is memory for a picture with these options.
     ///
     /// # Errors
-    /// How much it takes and how much there is.
+    /// The needed and the available memory.
     fn check(&self, options: &RenderOptions) -> Result<(), SourceError>;
 
-    /// The same for a file that came through the page. It may be a stranger's, so that it may use no other file of this machine.
+    /// The source of a file that came through the page. The file may be a stranger's, so it must not use other files of
+    /// this machine.
     fn of_file(&self, file: &Path) -> Arc<dyn Source>;
 
     /// Whether there is a scene at all.

@@ -1,4 +1,4 @@
-//! The scene that is shown, and what can be asked of it while it is rendered.
+//! The scene that is shown, and queries of it during a render.
 
 use std::ops::ControlFlow;
 use std::sync::{RwLock, RwLockReadGuard, RwLockWriteGuard};
@@ -18,19 +18,19 @@ pub(crate) struct Stage {
     pub options: RenderOptions,
     /// How that is shown.
     pub save: SaveOptions,
-    /// What is behind it.
+    /// Its background.
     pub background: Option<Background>,
-    /// Whether its noise is taken out.
+    /// Whether it is denoised.
     pub denoise: bool,
     scene: RwLock<Scene>,
     /// The cameras of the file.
     pub cameras: Vec<Camera>,
-    /// Where they stand.
+    /// Their placements.
     pub placements: Vec<Placement>,
     /// By the index of the shape in its file.
     things: Vec<Thing>,
     explain: Option<Box<dyn Explain>>,
-    /// What is said of it to every page.
+    /// The facts of the scene for every page.
     pub facts: Value,
 }
 
@@ -44,19 +44,19 @@ pub(crate) struct Thing {
 }
 
 impl Default for Thing {
-    /// What is of no file.
+    /// For surfaces that are in no file.
     fn default() -> Self {
         Self { kind: "ground", material: None }
     }
 }
 
-/// Hits that are listed of one ray.
-const MOST_HITS: usize = 64;
-/// Parameters that a page can list.
-const MOST_PARAMETERS: usize = 2000;
+/// Maximum hits that are listed for one ray.
+const MAX_HITS: usize = 64;
+/// Maximum parameters that are listed.
+const MAX_PARAMETERS: usize = 2000;
 
 impl Stage {
-    /// What was built of a description.
+    /// From a built description.
     pub(crate) fn new(built: Built, desc: &SceneDesc, mut warnings: Vec<String>) -> Self {
         let Built { scene, options, save, background, denoise, warnings: more, explain } = built;
         warnings.extend(more);
@@ -70,7 +70,7 @@ impl Stage {
         Self { options, save, background, denoise, scene, cameras, placements, things, explain, facts }
     }
 
-    /// The scene, to render or to ask.
+    /// The scene, to render or to query.
     pub(crate) fn scene(&self) -> RwLockReadGuard<'_, Scene> {
         self.scene.read().unwrap_or_else(std::sync::PoisonError::into_inner)
     }
@@ -80,7 +80,7 @@ impl Stage {
         self.scene.write().unwrap_or_else(std::sync::PoisonError::into_inner)
     }
 
-    /// What the ray through a place of the picture meets, all of it by distance.
+    /// All hits of the ray through a point of the picture, by distance.
     pub(crate) fn pick(&self, camera: usize, size: (u32, u32), x: f64, y: f64) -> Value {
         let scene = self.scene();
         let Some(ray) = ray(&scene, camera, size, x, y) else { return json!({ "hits": [] }) };
@@ -99,7 +99,7 @@ impl Stage {
                 "primitive": hit.primitive,
                 "instance": hit.instance,
             }));
-            if hits.len() < MOST_HITS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+            if hits.len() < MAX_HITS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
         json!({ "origin": ray.origin.to_array(), "direction": ray.direction.to_array(), "hits": hits })
     }
@@ -109,7 +109,7 @@ impl Stage {
         self.things.get(shape as usize).cloned().unwrap_or_default()
     }
 
-    /// How the colour of a pixel of the picture comes about, as a page; `None` where nobody tells that.
+    /// An explanation of a pixel's colour, as a page; `None` if there is no explainer.
     pub(crate) fn explain(
         &self,
         camera: usize,
@@ -132,14 +132,14 @@ impl Stage {
     }
 }
 
-/// The ray through a place of the picture, through the middle of the lens in the middle of the exposure.
+/// The ray through a point of the picture, through the middle of the lens in the middle of the exposure.
 pub(crate) fn ray(scene: &Scene, camera: usize, (width, height): (u32, u32), x: f64, y: f64) -> Option<Ray> {
     let camera = scene.resolved().cameras().get(camera)?;
     let view = CameraView::new(camera, width, height);
     Some(view.ray(DVec2::new(x, y), DVec2::splat(0.5), view.time(0.5), 0.25).ray)
 }
 
-/// How far what a camera looks at is away: what it hits in its middle, else the middle of the scene.
+/// The distance of a camera's target: of the hit in its middle, otherwise of the middle of the scene.
 fn distance(scene: &Scene, camera: &Camera) -> f64 {
     let place = camera.world_from_camera;
     let (eye, forward) = (place.point(DVec3::ZERO), place.vector(DVec3::Z).normalize_or(DVec3::Z));
@@ -154,7 +154,7 @@ fn things(desc: &SceneDesc) -> Vec<Thing> {
     let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);
     for shape in desc.shapes.iter().chain(in_objects) {
         let index = shape.index as usize;
-        // Indices count the shapes of a file: a number that does not would be some other program's.
+        // Indices count the shapes of a file: a larger number must come from another program.
         if index >= things.len() && index < 50_000_000 {
             things.resize_with(index + 1, Thing::default);
         }
@@ -195,7 +195,7 @@ fn facts(
         };
         let (path, owner, name, value) =
             (&parameter.path, &parameter.owner, &parameter.name, &parameter.value);
-        // JSON has no infinity: there is no end then.
+        // JSON has no infinity: such a range has no end.
         json!({ "path": path, "owner": owner, "name": name, "kind": kind, "value": value,
                 "low": low.is_finite().then_some(low), "high": high.is_finite().then_some(high) })
     };
@@ -214,7 +214,7 @@ fn facts(
         "build_seconds": scene.build_time().as_secs_f64(),
         "animations": animations.map(|a| json!({ "name": a.name, "end": a.end })).collect::<Vec<_>>(),
         "variants": info.listing.variants,
-        "parameters": parameters.iter().take(MOST_PARAMETERS).map(parameter).collect::<Vec<_>>(),
+        "parameters": parameters.iter().take(MAX_PARAMETERS).map(parameter).collect::<Vec<_>>(),
         "languages": languages,
         "warnings": warnings,
     })

@@ -1,4 +1,4 @@
-//! A viewer: a scene, those who work on it, and the server that shows it.
+//! A viewer: a scene, the threads that render it, and the server that shows it.
 
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::path::PathBuf;
@@ -12,17 +12,17 @@ use crate::session::Session;
 use crate::source::Source;
 use crate::worker::Worker;
 
-/// Where a viewer is reached.
+/// The address of a viewer.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Options {
-    /// Where it listens; port 0 for any that is free. Whoever reaches another address than that of this machine itself can ask for its
-    /// page, though not see it without the token.
+    /// Where it listens; port 0 for any free port. Anyone who reaches an address other than the local one can load its
+    /// page, but sees nothing without the token.
     pub address: SocketAddr,
     /// Other names under which browsers reach it, as `name:port`: those of a tunnel whose ends have different ports.
     pub hosts: Vec<String>,
-    /// A file, in a folder of the user's own, in which the session is kept: pages that are open go on when a viewer ends and another one
-    /// begins at the same address. Without it, the new one's address is to be opened.
+    /// A file, in a folder of the user's own, that keeps the session: open pages continue when another viewer starts at
+    /// the same address. Without it, the new viewer's address must be opened.
     pub session_file: Option<PathBuf>,
 }
 
@@ -70,7 +70,7 @@ impl Viewer {
     /// Takes the address.
     ///
     /// # Errors
-    /// Why it cannot be had.
+    /// Why it is not available.
     pub fn new(source: Arc<dyn Source>, options: &Options) -> Result<Self, String> {
         let listener = listen(options.address)?;
         let address = listener.local_addr().map_err(|e| e.to_string())?;
@@ -97,7 +97,7 @@ impl Viewer {
         format!("http://{}{}", self.address, self.server.guard.path())
     }
 
-    /// What closes it.
+    /// A handle that closes it.
     pub fn closer(&self) -> Closer {
         Closer { server: self.server.clone() }
     }
@@ -105,7 +105,7 @@ impl Viewer {
     /// Renders and answers until it is closed.
     ///
     /// # Errors
-    /// What the system refuses.
+    /// Failures of the system.
     pub fn run(self) -> Result<(), String> {
         let Self { server, listener, .. } = self;
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
@@ -118,7 +118,7 @@ impl Viewer {
         let watcher = named("watcher").spawn(move || watched.watch()).map_err(|e| e.to_string())?;
         let served = runtime.block_on(server::serve(server, listener)).map_err(|e| e.to_string());
         session.close();
-        // What still runs of the others ends with the runtime.
+        // Remaining tasks end with the runtime.
         runtime.shutdown_background();
         let ended = [worker.join(), watcher.join()];
         served?;

@@ -1,4 +1,4 @@
-//! Who is connected: pages that were let in, and strangers, who give way to each other and never to a page.
+//! Connections: admitted pages, and strangers, who displace each other but never a page.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -6,10 +6,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::Notify;
 
-/// Connections that have not shown yet that they may come in. One more ends the oldest of them.
-const MOST_STRANGERS: usize = 192;
-/// Connections that were let in.
-const MOST_GUESTS: usize = 256;
+/// Maximum connections that are not admitted. One more ends the oldest.
+const MAX_STRANGERS: usize = 192;
+/// Maximum admitted connections.
+const MAX_GUESTS: usize = 256;
 
 /// All connections.
 #[derive(Debug, Default)]
@@ -33,14 +33,14 @@ pub(crate) struct Visit {
 }
 
 impl Visitors {
-    /// A stranger comes.
+    /// A new connection.
     pub(crate) fn come(self: &Arc<Self>) -> Visit {
         let gives_way = Arc::new(Notify::new());
         let mut inner = self.lock();
-        if inner.strangers.len() >= MOST_STRANGERS
+        if inner.strangers.len() >= MAX_STRANGERS
             && let Some((_, oldest)) = inner.strangers.pop_front()
         {
-            // Kept for who is not waiting for it yet.
+            // Stored for a connection that is not waiting yet.
             oldest.notify_one();
         }
         let number = inner.count;
@@ -56,14 +56,14 @@ impl Visitors {
 }
 
 impl Visit {
-    /// It is let in; whether there is a place. One that had to give way has none any longer.
+    /// Admits the connection; returns whether there was a place. A displaced connection has none.
     pub(crate) fn let_in(&self) -> bool {
         let mut inner = self.visitors.lock();
         if self.is_guest.load(Ordering::Relaxed) {
             return true;
         }
         match inner.place(self.number) {
-            Some(place) if inner.guests < MOST_GUESTS => {
+            Some(place) if inner.guests < MAX_GUESTS => {
                 inner.strangers.remove(place);
                 inner.guests += 1;
                 self.is_guest.store(true, Ordering::Relaxed);
@@ -73,12 +73,12 @@ impl Visit {
         }
     }
 
-    /// Whether it was let in.
+    /// Whether it was admitted.
     pub(crate) fn is_guest(&self) -> bool {
         self.is_guest.load(Ordering::Relaxed)
     }
 
-    /// Waits until it has to give way.
+    /// Waits until it is displaced.
     pub(crate) async fn gives_way(&self) {
         self.gives_way.notified().await;
     }
@@ -116,7 +116,7 @@ mod tests {
         let guest = visitors.come();
         assert!(guest.let_in() && guest.let_in());
         let first = visitors.come();
-        let many: Vec<Visit> = (1..MOST_STRANGERS).map(|_| visitors.come()).collect();
+        let many: Vec<Visit> = (1..MAX_STRANGERS).map(|_| visitors.come()).collect();
         assert!(!has_to_go(&first));
         let late = visitors.come();
         assert!(has_to_go(&first) && !first.let_in(), "the oldest has to go");
@@ -133,8 +133,8 @@ mod tests {
             assert!(visit.let_in());
             visit
         };
-        let guests: Vec<Visit> = (2..MOST_GUESTS).map(comes_in).collect();
-        assert!(!visitors.come().let_in(), "there are so many places");
+        let guests: Vec<Visit> = (2..MAX_GUESTS).map(comes_in).collect();
+        assert!(!visitors.come().let_in(), "all places are taken");
         drop((guest, late, guests));
         assert_eq!(counted(), (0, 0));
     }

@@ -1,18 +1,18 @@
-//! Which files have changed, by their times and sizes. Looking a few times a second costs next to nothing, works on every file
-//! system, and does not lose an editor that renames.
+//! Detects changed files by their times and sizes. Polling a few times a second costs next to nothing, works on every
+//! file system, and handles editors that rename.
 
 use std::path::PathBuf;
 use std::time::SystemTime;
 
-/// What is known of a file: when it was changed, and how long it is; `None` where it cannot be read.
+/// A file's modification time and length; `None` if it cannot be read.
 type Stamp = Option<(SystemTime, u64)>;
 
-/// Files, as they were when they were last looked at.
+/// Files in the state of the last check.
 #[derive(Debug, Default)]
 pub(crate) struct Watched(Vec<(PathBuf, Stamp)>);
 
 impl Watched {
-    /// Files, as they are now.
+    /// Files in their present state.
     pub(crate) fn new(files: impl IntoIterator<Item = PathBuf>) -> Self {
         let mut files: Vec<PathBuf> = files.into_iter().collect();
         files.sort_unstable();
@@ -20,7 +20,7 @@ impl Watched {
         Self(files.into_iter().map(|path| (path.clone(), stamp(&path))).collect())
     }
 
-    /// Whether any has changed since, and takes note of how they are now.
+    /// Whether any has changed since; records the present state.
     pub(crate) fn changed(&mut self) -> bool {
         let mut changed = false;
         for (path, known) in &mut self.0 {

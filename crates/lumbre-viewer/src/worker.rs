@@ -1,5 +1,5 @@
-//! The work of a viewer, on one thread that others help: it reads, builds, and renders from coarse to fine, and drops what is no
-//! longer wanted.
+//! The worker of a viewer, on one thread that uses all cores: it reads, builds, and renders from coarse to fine, and
+//! drops stale work.
 
 use std::str::FromStr;
 use std::sync::Arc;
@@ -17,26 +17,26 @@ use crate::session::{Changes, Session, Wanted};
 use crate::source::{Read, SourceError};
 use crate::stage::{Stage, ray};
 
-/// What the first picture after a change may take.
+/// Target time of the first picture after a change.
 const FIRST: Duration = Duration::from_millis(35);
-/// When it is stopped, with what it has.
+/// The first picture is stopped after this time, with what it has.
 const FIRST_AT_MOST: Duration = Duration::from_millis(110);
-/// About how long a pass may take until it is shown.
+/// Approximate time of a pass until it is shown.
 const PASS: f64 = 0.6;
-/// Pixels of the full picture along the side of one of the first, at most.
+/// Maximum pixels of the full picture along the side of one of the first picture's.
 const COARSEST: u32 = 16;
-/// Samples a pixel of a feature, which has no noise but that of edges.
+/// Samples per pixel of a feature, whose only noise is at edges.
 const FEATURE_SPP: u32 = 16;
 
-/// What is rendered next.
+/// The next render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Step {
-    /// A picture of pixels so many times as large, which is finished whatever comes, so that one sees something while the camera moves
-    /// on and on.
+    /// A picture of larger pixels by this factor, which is always finished, so that there is a picture even while the
+    /// camera keeps moving.
     First(u32),
-    /// The same, until something else is wanted.
+    /// The same, until the requested state changes.
     Coarse(u32),
-    /// The picture, until so many samples a pixel.
+    /// The picture, up to this many samples per pixel.
     Full(u32),
     /// Nothing.
     Done,
@@ -101,7 +101,7 @@ impl Worker {
         }
     }
 
-    /// Reads and builds; whether there is a new stage.
+    /// Reads and builds; returns whether there is a new stage.
     fn load(&mut self, wanted: &Wanted, read: bool) -> bool {
         self.session.tell_progress(
             &json!({ "type": "progress", "doing": if read { "reading" } else { "building" } }),
@@ -150,7 +150,7 @@ impl Worker {
         Ok(Arc::new(Stage::new(built, &read.desc, read.warnings.clone())))
     }
 
-    /// Begins a picture anew.
+    /// Starts a new picture.
     fn begin(&mut self, wanted: &Wanted) {
         let Some(stage) = self.stage.clone() else { return };
         let mut options = stage.options.clone();
@@ -293,7 +293,7 @@ impl Worker {
         let scene = stage.scene();
         let state = self.state.take();
         let before = state.as_ref().map_or(0, RenderState::taken);
-        let asked = Asked { session: &self.session, known: self.known };
+        let asked = StillWanted { session: &self.session, known: self.known };
         let rendered = scene.render_from(&options, &asked, &cancel, state, None);
         drop(scene);
         let (mut picture, state) = match rendered {
@@ -392,12 +392,12 @@ impl Worker {
 }
 
 /// Knows whether the picture is still wanted: a large one takes longer to put together than one may wait for the next.
-struct Asked<'s> {
+struct StillWanted<'s> {
     session: &'s Session,
     known: Changes,
 }
 
-impl Progress for Asked<'_> {
+impl Progress for StillWanted<'_> {
     fn is_wanted(&self) -> bool {
         self.session.is_wanted(self.known)
     }

@@ -11,7 +11,7 @@ use lumbre::{DVec3, RenderOptions, SaveOptions, Scene, SceneDesc};
 use lumbre_viewer::{Built, Closer, Explain, Moment, Options, Read as WasRead, Source, SourceError, Viewer};
 
 /// The widest picture that there is memory for.
-pub(crate) const MOST_PIXELS: u32 = 90;
+pub(crate) const MAX_PIXELS: u32 = 90;
 
 /// A scene file in a folder of its own.
 pub(crate) struct OneFile(pub PathBuf);
@@ -46,7 +46,7 @@ impl Source for OneFile {
     }
 
     fn check(&self, options: &RenderOptions) -> Result<(), SourceError> {
-        if options.width <= MOST_PIXELS {
+        if options.width <= MAX_PIXELS {
             return Ok(());
         }
         let message = format!("a picture of {} pixels does not fit", options.width);

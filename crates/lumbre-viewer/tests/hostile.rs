@@ -419,7 +419,7 @@ fn strangers_who_connect_and_say_nothing_lock_no_one_out() {
         }
     };
     add(400);
-    // The user opens the address while they are there, and stays in whoever comes.
+    // The user opens the address while they are there, and stays in when others come.
     let session = viewer.session();
     let mut socket = viewer.socket(&session);
     add(400);

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use lumbre_formats::FormatError;
-use lumbre_kernel::{NoClosestPoint, NoWindingNumber};
+use lumbre_kernel::{ClosestPointError, WindingNumberError};
 use lumbre_render::RenderError;
 use lumbre_scene::BuildError;
 use thiserror::Error;
@@ -31,10 +31,10 @@ pub enum Error {
     Render(#[from] RenderError),
     /// A shape that may be nearer than all others has no method for nearest points.
     #[error(transparent)]
-    NoClosestPoint(#[from] NoClosestPoint),
+    ClosestPointError(#[from] ClosestPointError),
     /// A shape has no inside.
     #[error(transparent)]
-    NoWindingNumber(#[from] NoWindingNumber),
+    WindingNumberError(#[from] WindingNumberError),
     /// The options for saving are invalid.
     #[error("{0}")]
     Options(String),
@@ -59,7 +59,7 @@ impl Error {
         match self {
             Self::Format(FormatError::Io { .. }) | Self::Write { .. } => ErrorKind::Io,
             Self::Format(FormatError::Limit { .. }) => ErrorKind::Limit,
-            Self::Format(_) | Self::Build(_) | Self::NoClosestPoint(_) | Self::NoWindingNumber(_) => {
+            Self::Format(_) | Self::Build(_) | Self::ClosestPointError(_) | Self::WindingNumberError(_) => {
                 ErrorKind::Input
             }
             Self::Render(_) | Self::Options(_) => ErrorKind::Options,

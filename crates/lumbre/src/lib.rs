@@ -59,8 +59,8 @@ pub use lumbre_geometry::Ray;
 pub use lumbre_math::{DVec2, DVec3, Transform};
 pub use lumbre_render::film::Exposure;
 pub use lumbre_render::{
-    CancelToken, Denoised, ExplainedSample, Feature, Keeper, MergeError, NoProgress, Piece, PixelBounds,
-    Progress, RayCounts, RenderError, RenderOptions, RenderState, Snapshot, State, Stats, Stop,
+    CancelToken, CheckpointSink, Denoised, ExplainedSample, Feature, MergeError, NoProgress, Piece,
+    PixelBounds, Progress, RayCounts, RenderError, RenderOptions, RenderState, Snapshot, State, Stats, Stop,
 };
 pub use lumbre_scene::{
     EnvironmentDesc, Ground, SceneDesc, Stage, StageLight, Staged, Surroundings, UpAxis, Viewpoint,

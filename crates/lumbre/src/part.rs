@@ -36,7 +36,7 @@ pub struct Part {
 pub struct Job {
     /// All that a sample depends on, by name: the version of Lumbre, options, and a hash of every file that was read.
     pub identity: BTreeMap<String, String>,
-    /// How its picture is shown, by name, as whoever saves it understands it.
+    /// How its picture is shown, by name, as the writer of the file understands it.
     pub shown: BTreeMap<String, String>,
     /// Width and height of the whole picture.
     pub size: (u32, u32),
@@ -230,7 +230,7 @@ impl Part {
         bytes
     }
 
-    /// The part of bytes, which may take so many bytes of memory.
+    /// Reads a part from bytes, which may take this many bytes of memory.
     ///
     /// # Errors
     /// [`PartError`].
@@ -238,7 +238,7 @@ impl Part {
         Self::read_from(&mut &bytes[..], bytes.len() as u64, most_memory)
     }
 
-    /// Reads so many bytes, which may take so many bytes of memory. What is damaged is called that, and not what it seems to say.
+    /// Reads `length` bytes, which may take `memory` bytes once unpacked. What is damaged is called that, and not what it seems to say.
     fn read_from(input: &mut dyn Read, length: u64, most_memory: u64) -> Result<Self, PartError> {
         let Some(body) = length.checked_sub(CHECKSUM as u64) else {
             let mut begin = vec![0; length as usize];

@@ -64,7 +64,7 @@ impl Picture {
         self.shown(None, &SaveOptions::default()).0
     }
 
-    /// Takes the noise out of the picture by Lumbre's own filter ([`lumbre_render::denoise`()]) on so many threads, 0 for one a core; the
+    /// Takes the noise out of the picture by Lumbre's own filter ([`lumbre_render::denoise`()]) on this many threads, 0 for one a core; the
     /// same for any number. It keeps the noisy picture, which an .exr shows in channels of its own: `noisy.R` and so on.
     ///
     /// # Errors

@@ -11,8 +11,8 @@ use lumbre_math::DVec3;
 use lumbre_render::integrators::integrator;
 use lumbre_render::transport::Event;
 use lumbre_render::{
-    CancelToken, ExplainedSample, Feature, Keeper, NoProgress, Progress, RenderOptions, RenderState, Stop,
-    render_from,
+    CancelToken, CheckpointSink, ExplainedSample, Feature, NoProgress, Progress, RenderOptions, RenderState,
+    Stop, render_from,
 };
 use lumbre_scene::{BuildWarning, Footprint, IntegratorKind, SceneDesc};
 use lumbre_shading::Spectrum;
@@ -28,7 +28,7 @@ pub struct Scene {
 }
 
 /// Darker surfaces tell little about the light on them.
-const LEAST_ALBEDO: f32 = 0.02;
+const MIN_ALBEDO: f32 = 0.02;
 
 /// Opens a scene file: .pbrt (also .gz), .gltf, .glb, .obj, .ply or .stl. Warnings are dropped; [`open_with`]
 /// returns them.
@@ -157,7 +157,7 @@ impl Scene {
     /// ```
     ///
     /// # Errors
-    /// [`Error::NoClosestPoint`] where something may be nearer that has no answer: CSG, custom geometry without a method, or some
+    /// [`Error::ClosestPointError`] where something may be nearer that has no answer: CSG, custom geometry without a method, or some
     /// shapes under maps that do not keep angles.
     pub fn closest_point(&self, point: DVec3, max_distance: f64) -> Result<Option<CastPoint>, Error> {
         let nearest = self.resolved.accel().closest_point(point, max_distance)?;
@@ -180,7 +180,7 @@ impl Scene {
     /// between where a mesh is open. More than 0.5 is a good rule for "inside" where meshes have gaps.
     ///
     /// # Errors
-    /// [`Error::NoWindingNumber`] where there are open shapes other than meshes.
+    /// [`Error::WindingNumberError`] where there are open shapes other than meshes.
     pub fn winding_number(&self, point: DVec3) -> Result<f64, Error> {
         Ok(self.resolved.accel().winding_number(point)?)
     }
@@ -236,7 +236,7 @@ impl Scene {
         progress: &dyn Progress,
         cancel: &CancelToken,
         state: Option<RenderState>,
-        keeper: Option<&Keeper<'_>>,
+        keeper: Option<&CheckpointSink<'_>>,
     ) -> Result<(Picture, RenderState), Error> {
         let integrator = integrator(&options.integrator);
         let (rendered, state) =
@@ -296,7 +296,7 @@ impl Scene {
             .zip(albedo.pixels())
             .zip(coverage)
             .filter(|((light, albedo), coverage)| {
-                **coverage > 0.99 && light.luminance() > 0.0 && albedo.luminance() > LEAST_ALBEDO
+                **coverage > 0.99 && light.luminance() > 0.0 && albedo.luminance() > MIN_ALBEDO
             })
             .map(|((light, albedo), _)| light.luminance() / albedo.luminance())
             .collect();
@@ -305,8 +305,7 @@ impl Scene {
     }
 
     /// Seconds that a sample of each pixel takes with these options, by rendering a small picture of the same view for a fraction of
-    /// a second. The first samples of all bring what is read for the first time into the processor's caches, so a long render is
-    /// rather sooner done than later.
+    /// a second. The first samples fill the processor's caches, so a long render takes a little less.
     ///
     /// # Errors
     /// As for [`Scene::render`].

@@ -337,7 +337,7 @@ impl Setting {
         Err(self.refused(&format!("{}, three of them or a colour such as red or #e8e0d8", range.said())))
     }
 
-    /// So many numbers in the range, if the value is these.
+    /// `N` numbers in the range, if the value is a list of them.
     fn numbers<const N: usize>(&self, Range(low, high): Range) -> Option<[f64; N]> {
         let numbers: Vec<f64> =
             self.value.split(',').map(|part| part.trim().parse().ok()).collect::<Option<_>>()?;

@@ -133,8 +133,8 @@ fn points_are_asked_for_what_is_nearest_and_whether_they_are_inside() {
         .shape(ShapeBuilder::custom(equation(0.25)).at(Transform::translate(CENTER)))
         .build()
         .unwrap();
-    assert!(matches!(open.closest_point(CENTER, f64::INFINITY), Err(Error::NoClosestPoint(_))));
-    assert!(matches!(open.winding_number(CENTER), Err(Error::NoWindingNumber(_))));
+    assert!(matches!(open.closest_point(CENTER, f64::INFINITY), Err(Error::ClosestPointError(_))));
+    assert!(matches!(open.winding_number(CENTER), Err(Error::WindingNumberError(_))));
     assert!(open.closest_point(0.5 * DVec3::Z, f64::INFINITY).unwrap().is_some_and(|near| near.shape == 0));
 }
 

@@ -36,7 +36,7 @@ fn seen(folder: Option<&Path>, integrator: &str, from: [f64; 3], to: [f64; 3], w
     seen_by(256, folder, integrator, from, to, world)
 }
 
-/// The same by so many samples of each pixel.
+/// The same with this many samples a pixel.
 fn seen_by(
     samples: u32,
     folder: Option<&Path>,

@@ -12,7 +12,7 @@ use super::curve::{Point, geometric_mean, time_to_error};
 use super::plot::{Line, svg};
 use super::program::Kind;
 
-/// All programs on one scene with so many threads.
+/// All programs on one scene with this many threads.
 #[derive(Debug)]
 pub(crate) struct Heat {
     pub(crate) scene: &'static str,
@@ -264,7 +264,7 @@ pub(crate) fn json(heats: &[Heat]) -> Value {
 }
 
 /// The processor and its threads.
-fn machine() -> String {
+pub(super) fn machine() -> String {
     let info = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model =
         info.lines().find_map(|line| line.strip_prefix("model name")).and_then(|rest| rest.split_once(':'));
@@ -274,7 +274,7 @@ fn machine() -> String {
 }
 
 /// The day as year-month-day, by Hinnant, "chrono-compatible low-level date algorithms", 2021.
-fn date(time: SystemTime) -> String {
+pub(super) fn date(time: SystemTime) -> String {
     let days = time.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs() / 86_400) as i64 + 719_468;
     let (era, of_era) = (days / 146_097, days % 146_097);
     let year_of_era = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;

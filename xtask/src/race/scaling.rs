@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::SystemTime;
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
@@ -12,6 +13,7 @@ use xtask::command::release_program;
 
 use super::plot::{Line, svg};
 use super::program::folder;
+use super::report::{date, machine};
 use super::scene::{Camera, Material, Mesh, Object, Scene};
 use super::scenes::{Parts, ceiling, diffuse, floor, terrain};
 use super::write::write_scene;
@@ -28,7 +30,7 @@ pub(crate) struct Scaling {
     /// How often each scene is rendered: the least time counts.
     #[arg(long, default_value_t = 3)]
     runs: u32,
-    /// The folder for scaling.md and its plot; by default target/bench/scaling.
+    /// The folder for scaling.md and its plot, such as docs/measurements; by default target/bench/scaling.
     #[arg(long)]
     out: Option<PathBuf>,
     /// Lumbre's program; by default the release build of this workspace.
@@ -96,8 +98,10 @@ impl Scaling {
         fs::write(out.join("scaling.svg"), plot)?;
         let threads = self.threads;
         let head = format!(
-            "# Growth\n\nThe time of a path of {SIZE} x {SIZE} pixels and {SPP} samples, least of {} runs, with {threads} threads: \
-             `cargo xtask bench scaling --threads {threads}`.\n\n![The plot](scaling.svg)\n\n",
+            "# Growth\n\n{}, {}: the time of a path of {SIZE} x {SIZE} pixels and {SPP} samples, least of {} runs, with {threads} threads. \
+             `cargo xtask bench scaling --threads {threads}`\n\n![The plot](scaling.svg)\n\n",
+            date(SystemTime::now()),
+            machine(),
             self.runs
         );
         fs::write(out.join("scaling.md"), head + &table)?;

@@ -66,7 +66,7 @@ impl Bytes {
         self.stream().fraction()
     }
 
-    /// So many bytes, or all that are left.
+    /// This many bytes, or all that are left.
     ///
     /// # Errors
     /// [`Failure`] when they cannot be read.

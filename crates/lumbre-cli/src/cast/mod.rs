@@ -192,7 +192,7 @@ impl Cast<'_> {
             .and_then(|output| self.write(rays, output, &mut failure));
         match (failure, written) {
             (Some(failure), _) => Err(failure),
-            // Whoever reads may stop reading: `lumbre cast … | head`.
+            // The reader may stop early: `lumbre cast … | head`.
             (None, Err(e)) if e.kind() != ErrorKind::BrokenPipe => {
                 Err(Failure::Io(format!("standard output: {e}")))
             }

@@ -10,7 +10,7 @@ use super::formula::Scope;
 use super::texts::Texts;
 use crate::language::filled;
 
-/// Where the projection matrix that is told begins and ends; rays need neither.
+/// The near and far planes of the projection matrix that is shown; rays have none.
 const NEAR: f64 = 0.01;
 const FAR: f64 = 1000.0;
 
@@ -53,7 +53,8 @@ pub(super) fn camera(
     section
 }
 
-/// How far from the eye, along the camera's axis, the rays of a pixel come together; 1 for a pinhole, where any distance does.
+/// The distance from the eye along the camera's axis at which the rays of a pixel converge; 1 for a pinhole, where any
+/// distance will do.
 fn focus(kind: &CameraKind) -> f64 {
     match kind {
         CameraKind::Perspective { lens_radius, focal_distance, .. }
@@ -66,7 +67,7 @@ fn focus(kind: &CameraKind) -> f64 {
     }
 }
 
-/// Takes a point of the ray back to its place in the picture.
+/// Projects a point of the ray back to the picture.
 fn projected(
     section: &mut Section,
     projection: &DMat4,
@@ -94,7 +95,7 @@ fn projected(
     section.fact(texts.back_on_film, Value::Numbers(vec![on_film.x, on_film.y]));
 }
 
-/// A point on its way to the picture.
+/// The stages of a point's projection to the picture.
 struct Back {
     in_camera: DVec3,
     clip: DVec4,
@@ -132,15 +133,15 @@ fn kind(kind: &CameraKind, texts: &Texts) -> String {
     }
 }
 
-/// The projection matrix from camera space, z into the picture, to the cube [-1, 1]³ with y upwards; `None` for cameras that no
-/// matrix describes.
+/// The projection matrix from camera space, z into the picture, to the cube [-1, 1]³ with y upwards; `None` for cameras
+/// without such a matrix.
 fn projection(kind: &CameraKind, view: &CameraView, (width, height): (u32, u32)) -> Option<DMat4> {
-    // The screen is at a distance of 1, and off the axis where the file shifts it.
+    // The screen is at a distance of 1; a file may shift it off the axis.
     let first = view.on_screen(DVec2::ZERO);
     let last = view.on_screen(DVec2::new(f64::from(width), f64::from(height)));
     let (left, top, right, bottom) = (first.x, first.y, last.x, last.y);
     let (x, y) = (2.0 / (right - left), 2.0 / (top - bottom));
-    // 0 has no sign.
+    // Avoids -0.
     let (dx, dy) = (0.0 - (right + left) / (right - left), 0.0 - (top + bottom) / (top - bottom));
     let depth = FAR - NEAR;
     match kind {
@@ -170,7 +171,7 @@ fn projection(kind: &CameraKind, view: &CameraView, (width, height): (u32, u32))
     }
 }
 
-/// From the point of the film to the ray.
+/// From the film point to the ray.
 fn film(
     section: &mut Section,
     view: &CameraView,
@@ -188,7 +189,7 @@ fn film(
         section.fact(texts.lens_point, Value::Numbers(vec![sample.lens.x, sample.lens.y]));
     }
     let direction = place.inverse_vector(sample.ray.direction);
-    // As far as the screen, which is at a distance of 1.
+    // Up to the screen, which is at a distance of 1.
     let towards = if direction.z > 0.0 { direction / direction.z } else { direction };
     section.quantity(&mut scope, "d", texts.direction_in_camera, "", towards);
     section.quantity(&mut scope, "R", texts.direction_turned, "M d", place.vector(towards));
@@ -274,7 +275,7 @@ mod tests {
                 // Between near and far it is in the cube.
                 let depth = found.clip.z / found.clip.w;
                 assert!((-1.0..=1.0).contains(&depth), "{depth}");
-                // Without a lens any other point of the ray is as good.
+                // Without a lens, any other point of the ray will do.
                 if !view.has_lens() {
                     let farther = back(&projection, &place, (width, height), ray.at(s + 11.0));
                     assert!((farther.on_film - film).length() < 1e-9, "{} for {film}", farther.on_film);

@@ -1,4 +1,4 @@
-//! What is told, whatever it is written as: sections of quantities, tables and sentences.
+//! An explanation in any format: sections of quantities, tables and sentences.
 
 use std::collections::BTreeSet;
 
@@ -8,10 +8,10 @@ use lumbre::{DVec3, Ray};
 use super::formula::{PutIn, Scope};
 use crate::units::number;
 
-/// A part of what is told.
+/// A section of an explanation.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Section {
-    /// What it is, for programs.
+    /// Its key for programs.
     pub(super) key: String,
     /// Its heading.
     pub(super) title: String,
@@ -19,13 +19,13 @@ pub(super) struct Section {
     pub(super) sections: Vec<Section>,
 }
 
-/// One thing that is told.
+/// One item of a section.
 #[derive(Clone, Debug)]
 pub(super) enum Item {
     Quantity(Quantity),
     /// A sentence.
     Text(String),
-    /// A sentence that one should not miss.
+    /// An important remark.
     Remark(String),
     /// Rows of one kind, with a key for programs.
     Table {
@@ -44,33 +44,33 @@ pub(super) struct Column {
     pub(super) title: String,
 }
 
-/// A number with its name and where it comes from.
+/// A number with its name and its derivation.
 #[derive(Clone, Debug)]
 pub(super) struct Quantity {
-    /// The name in formulas; empty where `label` says what it is.
+    /// The name in formulas; empty if `label` is enough.
     pub(super) symbol: String,
-    /// What it is, in words; may be empty.
+    /// The description in words; may be empty.
     pub(super) label: String,
     /// The formula; may be empty.
     pub(super) formula: String,
-    /// The formula with its numbers, where it has one.
+    /// The formula with its numbers, if any.
     pub(super) numbers: Option<PutIn>,
     pub(super) value: Value,
-    /// The textbook's formula and what it gives.
+    /// The textbook's formula and its result.
     pub(super) schoolbook: Option<(String, Value)>,
 }
 
-/// What a quantity is.
+/// The value of a quantity.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Value {
     Number(f64),
-    /// In single precision, as light is computed.
+    /// In single precision, like light.
     Single(f32),
     Vector(DVec3),
     /// Red, green and blue.
     Colour([f32; 3]),
     Numbers(Vec<f64>),
-    /// From a first to a last number, each.
+    /// Intervals, each with its first and last number.
     Intervals(Vec<[f64; 2]>),
     Matrix(Box<DMat4>),
     Text(String),
@@ -118,7 +118,7 @@ impl From<DMat4> for Value {
     }
 }
 
-/// The shortest text that is read back as the same number; infinity has its sign.
+/// The shortest text that reads back as the same number; infinity has its sign.
 pub(super) fn exact(x: f64) -> String {
     if x.is_finite() || x.is_nan() {
         return number(x);
@@ -126,7 +126,7 @@ pub(super) fn exact(x: f64) -> String {
     if x > 0.0 { "∞".to_owned() } else { "-∞".to_owned() }
 }
 
-/// With six digits, for what stands in formulas.
+/// With six digits, for formulas.
 fn short(x: f64) -> String {
     if x == 0.0 || !x.is_finite() {
         return exact(x);
@@ -166,7 +166,7 @@ impl Value {
         self.written(exact)
     }
 
-    /// With six digits, to stand in a formula.
+    /// With six digits, for formulas.
     pub(super) fn in_short(&self) -> String {
         self.written(short)
     }
@@ -194,14 +194,14 @@ fn single(x: f32) -> String {
 }
 
 impl Scope {
-    /// Gives a symbol a value from here on.
+    /// Sets the value of a symbol for the following formulas.
     pub(super) fn set(&mut self, symbol: &str, value: &Value) {
         let written = value.in_short();
         let is_rounded = written != value.in_full();
         self.put(symbol, written, is_rounded);
     }
 
-    /// Gives the symbols of a ray's origin and direction their values.
+    /// Sets the symbols of a ray's origin and direction.
     pub(super) fn set_ray(&mut self, [origin, direction]: [&str; 2], ray: &Ray) {
         self.set(origin, &Value::from(ray.origin));
         self.set(direction, &Value::from(ray.direction));
@@ -209,8 +209,8 @@ impl Scope {
 }
 
 impl Quantity {
-    /// The parts of `symbol = formula = numbers = value` but the last, each with the sign after it, as far as there are such:
-    /// numbers that are rounded are nearly equal to what is beside them.
+    /// The parts of `symbol = formula = numbers = value` except the last, each with the sign that follows it; parts may
+    /// be missing. Rounded numbers are only nearly equal to their neighbours.
     pub(super) fn chain(&self) -> Vec<(&str, &'static str)> {
         let Self { symbol, formula, numbers, .. } = self;
         let is_rounded = numbers.as_ref().is_some_and(|numbers| numbers.is_rounded);
@@ -243,7 +243,7 @@ impl Section {
         self.sections.iter().for_each(|section| section.collect_keys(keys));
     }
 
-    /// This section if it has one of these keys, else those below it that do.
+    /// This section if it has one of these keys, otherwise its subsections that do.
     pub(super) fn with_keys(self, keys: &[String]) -> Vec<Self> {
         if keys.contains(&self.key) {
             return vec![self];
@@ -251,7 +251,7 @@ impl Section {
         self.sections.into_iter().flat_map(|section| section.with_keys(keys)).collect()
     }
 
-    /// Tells what something is.
+    /// Adds a fact.
     pub(super) fn fact(&mut self, label: impl Into<String>, value: impl Into<Value>) {
         self.items.push(Item::Quantity(Quantity {
             symbol: String::new(),
@@ -263,7 +263,7 @@ impl Section {
         }));
     }
 
-    /// Tells a quantity, with its formula and the numbers in it, and keeps it for the formulas that follow.
+    /// Adds a quantity with its formula and the numbers in it, and sets its symbol for the following formulas.
     pub(super) fn quantity(
         &mut self,
         scope: &mut Scope,
@@ -293,7 +293,7 @@ impl Section {
     }
 }
 
-/// The numbers in a formula, where they say more than its result.
+/// The numbers in a formula, if they say more than its result.
 pub(super) fn numbers(scope: &Scope, formula: &str, value: &Value) -> Option<PutIn> {
     scope.put_in(formula).filter(|numbers| numbers.written != value.in_full())
 }

@@ -1,25 +1,25 @@
-//! Explanations of pixels on the viewer's page: what `lumbre explain` tells of the first sample.
+//! Explanations of pixels on the viewer's page: `lumbre explain` for the first sample.
 
 use clap::ValueEnum;
 use lumbre::{RenderOptions, Scene, SceneDesc};
 use lumbre_viewer::Explain;
 
 use super::question::Question;
-use super::things::Things;
+use super::things::SceneNames;
 use super::{html, texts, title};
 use crate::language::Language;
 
-/// Tells of the pixels of one scene.
+/// Explains the pixels of one scene.
 #[derive(Debug)]
 pub struct Explainer {
     name: String,
-    things: Things,
+    things: SceneNames,
 }
 
 impl Explainer {
-    /// Of a scene with its name, as it is described before it is set on its stage.
+    /// For a named scene, as described before it is staged.
     pub fn new(desc: &SceneDesc, name: String) -> Self {
-        Self { name, things: Things::of(desc) }
+        Self { name, things: SceneNames::of(desc) }
     }
 }
 

@@ -1,4 +1,5 @@
-//! Formulas: written as plain text in Unicode, and from there with numbers for their symbols, as LaTeX and as MathML.
+//! Formulas: written as plain Unicode text, and converted from there to LaTeX and MathML, also with numbers instead of
+//! symbols.
 
 use std::collections::HashMap;
 use std::fmt::Write;
@@ -8,20 +9,20 @@ use std::fmt::Write;
 enum Token {
     /// A letter or word with its primes and its subscript: `O′`, `t₁`, `det`.
     Symbol { base: String, primes: usize, subscript: String },
-    /// A numeral, with a power of ten where it has one.
+    /// A numeral, with a power of ten if it has one.
     Number { digits: String, exponent: String },
-    /// Raised digits and signs, as `²` or `⁻¹`.
+    /// Superscript digits and signs, such as `²` or `⁻¹`.
     Power(String),
-    /// √, whose argument stands in the parentheses that follow.
+    /// √; its argument is in the parentheses that follow.
     Root,
-    /// Anything else, a character each.
+    /// Any other character.
     Sign(char),
 }
 
 /// Words that are functions, and so never symbols.
 const FUNCTIONS: [&str; 8] = ["min", "max", "sin", "cos", "tan", "atan2", "det", "sign"];
 
-/// Subscripts with the characters that they stand for.
+/// Subscript characters and what they stand for.
 const SUBSCRIPTS: [(char, char); 25] = [
     ('₀', '0'),
     ('₁', '1'),
@@ -49,7 +50,7 @@ const SUBSCRIPTS: [(char, char); 25] = [
     ('ₓ', 'x'),
     ('ₜ', 't'),
 ];
-/// Raised characters with those that they stand for.
+/// Superscript characters and what they stand for.
 const POWERS: [(char, char); 14] = [
     ('⁰', '0'),
     ('¹', '1'),
@@ -128,7 +129,7 @@ fn tokens(formula: &str) -> Vec<Token> {
             let subscript = low.chars().filter_map(|c| stands_for(&SUBSCRIPTS, c)).collect();
             tokens.push(Token::Symbol { base, primes, subscript });
         } else if is_numeral(&rest) {
-            // A hyphen is the sign of a number: what subtracts is the sign for minus.
+            // A hyphen is the sign of a number; subtraction uses the minus sign.
             let sign = rest.next_if_eq(&'-').map_or_else(String::new, String::from);
             let digits = sign + &take_while(&mut rest, &|c| c.is_ascii_digit() || c == '.');
             let mut after = rest.clone();
@@ -150,11 +151,11 @@ fn tokens(formula: &str) -> Vec<Token> {
     tokens
 }
 
-/// What the symbols of a formula stand for, each written as it is put in its place.
+/// The values of a formula's symbols, as text.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scope(HashMap<String, Entry>);
 
-/// What a symbol stands for, and whether a digit of it is left out.
+/// The value of a symbol, and whether digits are left out.
 #[derive(Clone, Debug)]
 struct Entry {
     written: String,
@@ -165,17 +166,17 @@ struct Entry {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct PutIn {
     pub(super) written: String,
-    /// Whether digits of the numbers are left out, so that it is nearly equal.
+    /// Whether digits of the numbers are left out, so that the formula is only nearly equal.
     pub(super) is_rounded: bool,
 }
 
 impl Scope {
-    /// Gives a symbol what is written for it from here on, and whether digits are left out there.
+    /// Sets the text of a symbol for the following formulas, and whether digits are left out of it.
     pub(super) fn put(&mut self, symbol: &str, written: String, is_rounded: bool) {
         self.0.insert(symbol.to_owned(), Entry { written, is_rounded });
     }
 
-    /// The formula with the numbers in it; `None` where that says nothing new.
+    /// The formula with the numbers in it; `None` if that adds nothing.
     pub(super) fn put_in(&self, formula: &str) -> Option<PutIn> {
         let tokens = tokens(formula);
         let mut written = String::new();
@@ -250,7 +251,7 @@ fn plain(token: &Token, out: &mut String) {
     }
 }
 
-/// The formula as LaTeX, without its dollars.
+/// The formula as LaTeX, without dollar signs.
 pub(super) fn latex(formula: &str) -> String {
     let tokens = tokens(formula);
     let mut out = String::new();
@@ -317,7 +318,7 @@ pub(super) fn latex(formula: &str) -> String {
     out
 }
 
-/// The parentheses of roots: of their beginnings and of their ends.
+/// The parentheses of roots: the positions of their starts and ends.
 struct Closings {
     roots: Vec<usize>,
     ends: Vec<usize>,
@@ -342,7 +343,7 @@ fn closings(tokens: &[Token]) -> Closings {
     found
 }
 
-/// The sign between what stands before and its result: numbers that were rounded are nearly equal to it.
+/// The sign between a text and its result: rounded numbers are nearly equal to it.
 pub(super) fn sign_after(written: &str) -> &'static str {
     if written.contains('≈') { "≈" } else { "=" }
 }
@@ -352,20 +353,20 @@ pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// The formula as MathML, which browsers set without help; quotients are stacked.
+/// The formula as MathML, which browsers support; quotients are stacked.
 pub(super) fn mathml(formula: &str) -> String {
     let tokens = tokens(formula);
     format!("<math>{}</math>", row(&tokens).concat())
 }
 
-/// The elements of a row: each factor is one, and each sign between.
+/// The elements of a row: one for each factor and each sign.
 fn row(tokens: &[Token]) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     let mut at = 0;
     while at < tokens.len() {
         match &tokens[at] {
             Token::Sign(c) if c.is_whitespace() => at += 1,
-            // What stands before is over the factor that follows.
+            // The preceding factor is divided by the following one.
             Token::Sign('/') if !out.is_empty() && at + 1 < tokens.len() => {
                 let over = out.pop().unwrap_or_default();
                 let mut rest = at + 1;
@@ -380,7 +381,7 @@ fn row(tokens: &[Token]) -> Vec<String> {
     out
 }
 
-/// A factor with its powers, or a sign; `at` is moved behind it.
+/// A factor with its powers, or a sign; moves `at` behind it.
 fn factor(tokens: &[Token], at: &mut usize) -> String {
     let mut element = match &tokens[*at] {
         Token::Symbol { base, primes, subscript } => {
@@ -398,7 +399,7 @@ fn factor(tokens: &[Token], at: &mut usize) -> String {
         Token::Number { digits, exponent } => {
             format!("<mrow><mn>{digits}</mn><mo>·</mo><msup><mn>10</mn><mn>{exponent}</mn></msup></mrow>")
         }
-        // Without anything below, a power stands by itself.
+        // A power without a base.
         Token::Power(digits) => format!("<msup><mrow></mrow><mn>{digits}</mn></msup>"),
         Token::Root => match closing(tokens, *at + 1) {
             Some(end) => {
@@ -434,7 +435,7 @@ fn sign(token: &Token) -> String {
     format!("<mo{stretches}>{}</mo>", escaped(&c.to_string()))
 }
 
-/// Where the bracket that opens at this place closes.
+/// The position of the closing bracket.
 fn closing(tokens: &[Token], open: usize) -> Option<usize> {
     let Some(Token::Sign(sign @ ('(' | '|' | '⟨'))) = tokens.get(open) else { return None };
     let mut depth = 0;
@@ -450,7 +451,7 @@ fn closing(tokens: &[Token], open: usize) -> Option<usize> {
     None
 }
 
-/// The element without the parentheses about all of it: the line of a quotient says as much. A vector keeps its own.
+/// The element without its outer parentheses: the fraction bar already groups it. A vector keeps its own.
 fn without_parentheses(element: &str) -> String {
     let inner = element
         .strip_prefix("<mrow><mo stretchy=\"false\">(</mo>")
@@ -490,7 +491,7 @@ mod tests {
         assert_eq!(put_in("max(a, t₁)"), exactly("max(1, 4)"));
         // Six digits of a third are not all of them.
         assert_eq!(put_in("a + x₀"), Some(("1 + 0.333333".to_owned(), true)));
-        // What is only partly known says nothing.
+        // Partly known formulas have no numbers.
         assert_eq!(put_in("a + x"), None);
         assert_eq!(put_in("2·3"), None);
     }
@@ -525,7 +526,7 @@ mod tests {
             let opened = ml.matches(&format!("<{tag}>")).count() + ml.matches(&format!("<{tag} ")).count();
             assert_eq!(opened, ml.matches(&format!("</{tag}>")).count(), "{tag}: {ml}");
         }
-        // What is not closed, or has nothing to divide, stays as it is.
+        // Unclosed brackets, and fractions without a part, stay as they are.
         for odd in ["(a", "|a", "/a", "a/", "√a", "⟨1, 2⟩", "²", "[0, 1] ∪ (2)"] {
             assert!(mathml(odd).ends_with("</math>"), "{odd}");
         }

@@ -1,4 +1,4 @@
-//! What is told, as one page of HTML: formulas as MathML, the sketch as SVG, nothing from a network.
+//! An explanation as one HTML page: formulas as MathML, the sketch as SVG, nothing from a network.
 
 use std::fmt::Write;
 
@@ -41,7 +41,7 @@ pub(super) fn html(title: &str, language: &str, sections: &[Section], schoolbook
 fn write_section(section: &Section, level: usize, schoolbook: &str, out: &mut String) {
     let heading = level.min(6);
     let title = escaped(&section.title);
-    // Each folds, and is open at first.
+    // Each can be folded, and is open at first.
     let _ = writeln!(out, "<section>\n<details open><summary><h{heading}>{title}</h{heading}></summary>");
     for item in &section.items {
         match item {
@@ -88,7 +88,7 @@ fn write_quantity(quantity: &Quantity, schoolbook: &str, out: &mut String) {
     let before = if symbol.is_empty() { format!("{}: ", escaped(label)) } else { String::new() };
     let chain = quantity.chain();
     let parts = chain.iter().map(|(part, sign)| format!("{} {sign} ", mathml(part)));
-    // A table cannot stand in a paragraph.
+    // A table cannot be inside a paragraph.
     let (open, close) =
         if value.rows().is_some() { ("<div class=\"wide\">", "</div>") } else { ("<p>", "</p>") };
     let _ = writeln!(out, "{open}{before}{}{}{label_after}{close}", parts.collect::<String>(), shown(value));

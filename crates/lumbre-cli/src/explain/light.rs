@@ -1,4 +1,4 @@
-//! The light that comes along a ray: what happens along its path, and what each light gives.
+//! The light along a ray: the events of its path, and the contribution of each light.
 
 use lumbre::description::{Footprint, IntegratorKind, Interaction, LightId};
 use lumbre::journal::{End, Event, MergedPhoton, Met, SampledLight, Scattered, Source};
@@ -10,24 +10,24 @@ use super::document::{Column, Item, Section, Value};
 use super::formula::Scope;
 use super::surfaces::{Wanted, material_of, surfaces};
 use super::texts::Texts;
-use super::things::Things;
+use super::things::SceneNames;
 use crate::language::filled;
 
-/// Lights that are told of one by one at most.
-const MOST_LIGHTS: usize = 16;
+/// Maximum lights that are listed one by one.
+const MAX_LIGHTS: usize = 16;
 
-/// What is told of the light of one path.
+/// Writes the section on the light of one path.
 pub(super) struct Path<'a> {
     pub(super) scene: &'a Scene,
-    pub(super) things: &'a Things,
+    pub(super) things: &'a SceneNames,
     pub(super) texts: &'static Texts,
-    /// Rays after the first whose crossings are told as well.
+    /// Number of rays after the first whose crossings are shown too.
     pub(super) depth: u32,
-    /// What is computed for each pixel.
+    /// The integrator.
     pub(super) kind: &'a IntegratorKind,
 }
 
-/// How the radiance of a sample becomes what a render adds to its pixel.
+/// How the radiance of a sample is exposed and added to its pixel.
 #[derive(Clone, Copy)]
 pub(super) struct Exposed {
     pub(super) radiance: Spectrum,
@@ -36,12 +36,12 @@ pub(super) struct Exposed {
     pub(super) weight: f64,
 }
 
-/// A vertex of a tree of rays, or where a ray of it leaves the scene.
+/// A vertex of a ray tree, or the end of a ray that leaves the scene.
 struct Place {
     section: Section,
-    /// The place that its ray comes from.
+    /// The vertex that its ray comes from.
     parent: Option<usize>,
-    /// The rays that go on from it.
+    /// The rays that leave it.
     rays: Vec<Ray>,
 }
 
@@ -52,7 +52,7 @@ impl Place {
 }
 
 impl Path<'_> {
-    /// What happens along a path, and the light that it comes to.
+    /// Writes the section on the events along a path, and their total light.
     pub(super) fn tell(&self, exposed: Option<Exposed>, radiance: Spectrum, events: &[Event]) -> Section {
         let texts = self.texts;
         let mut section = Section::new("light", self.title());
@@ -119,7 +119,7 @@ impl Path<'_> {
                     }
                 }
                 Event::Medium { distance, scattered, throughput } => {
-                    // What is sampled from here on is no surface's.
+                    // Samples from here on belong to no surface.
                     met = met.filter(|_| !*scattered);
                     let mut told = Section::new("medium", texts.medium);
                     told.fact(texts.distance, *distance);
@@ -137,7 +137,8 @@ impl Path<'_> {
         }
         if matches!(self.kind, IntegratorKind::Whitted { .. } | IntegratorKind::Pov) {
             section.text(texts.tree);
-            // Those that come from a place are after it in the list: from the last on, each goes before the later ones of its place.
+            // Children follow their parent in the list: from the last on, each goes in front of its parent's later
+            // children.
             let own: Vec<usize> = places.iter().map(|place| place.section.sections.len()).collect();
             for i in (0..places.len()).rev() {
                 if let Some(parent) = places[i].parent {
@@ -152,7 +153,7 @@ impl Path<'_> {
         section
     }
 
-    /// What the section of all this is called.
+    /// The title of the section.
     fn title(&self) -> &'static str {
         match self.kind {
             IntegratorKind::Normals | IntegratorKind::Depth | IntegratorKind::Albedo | IntegratorKind::Uv => {
@@ -163,7 +164,7 @@ impl Path<'_> {
         }
     }
 
-    /// What the number is that light is for other integrators.
+    /// The label of the light's number, for other integrators.
     fn arriving(&self) -> &'static str {
         let texts = self.texts;
         match self.kind {
@@ -265,7 +266,7 @@ impl Path<'_> {
         Some(scene.interaction(&met.ray, &hit, &Footprint::Point))
     }
 
-    /// Where a mirror and a smooth boundary of the material would send the ray.
+    /// The mirrored and refracted rays of the material.
     fn mirrors(&self, met: &Met, here: &Interaction<'_>) -> Section {
         let texts = self.texts;
         let mut section = Section::new("mirror", texts.mirror);
@@ -278,7 +279,7 @@ impl Path<'_> {
         let Some(index) = here.resolved().and_then(index) else {
             return section;
         };
-        // From outside to inside, or back.
+        // From outside to inside, or the reverse.
         let eta = if met.front { 1.0 / index } else { index };
         section.quantity(&mut scope, "i", texts.index, "", index);
         let formula = if met.front { "1/i" } else { "i" };
@@ -310,7 +311,7 @@ impl Path<'_> {
         section
     }
 
-    /// What each light gives here, where one looks at its middle.
+    /// The contribution of each light here, at its middle.
     fn every_light(&self, here: &Interaction<'_>) -> Option<Section> {
         let texts = self.texts;
         let scene = self.scene.resolved();
@@ -332,7 +333,7 @@ impl Path<'_> {
             column("contribution", texts.contribution),
         ];
         let mut rows = Vec::new();
-        for (id, light) in (0..).zip(scene.lights()).take(MOST_LIGHTS) {
+        for (id, light) in (0..).zip(scene.lights()).take(MAX_LIGHTS) {
             let sample =
                 scene.sample_one_light(LightId(id), here.shadow_origin(), here.time, DVec2::splat(0.5));
             let Some(sample) = sample else { continue };
@@ -359,7 +360,7 @@ impl Path<'_> {
             ]);
         }
         section.items.push(Item::Table { key: "lights", columns, rows });
-        if scene.lights().len() > MOST_LIGHTS {
+        if scene.lights().len() > MAX_LIGHTS {
             section.remark(filled(texts.more_lights, &[&scene.lights().len().to_string()]));
         }
         Some(section)
@@ -376,7 +377,7 @@ impl Path<'_> {
         let distance = sample.end.zip(met).map(|(end, met)| (end.point - met.point).length());
         match distance {
             Some(distance) if is_point => {
-                // The light of a point thins out with the square of the distance.
+                // The light of a point falls off with the square of the distance.
                 section.quantity(&mut scope, "d", texts.distance, "", distance);
                 let intensity = sample.radiance * (distance * distance) as f32;
                 section.quantity(&mut scope, "I", texts.intensity, "", intensity);
@@ -495,7 +496,7 @@ impl Path<'_> {
     }
 }
 
-/// What the film makes of the radiance of a sample, step by step.
+/// Shows how the film exposes the radiance of a sample, step by step.
 fn expose(section: &mut Section, &Exposed { radiance, exposure, weight }: &Exposed, texts: &Texts) {
     let Exposure { factor, max_component, sensor } = exposure;
     let colour = exposure.colour(radiance);
@@ -525,7 +526,7 @@ fn expose(section: &mut Section, &Exposed { radiance, exposure, weight }: &Expos
     }
 }
 
-/// The index of refraction of a material that light gets into.
+/// The index of refraction of a transmissive material.
 fn index(material: &Material) -> Option<f64> {
     let index = match &material.kind {
         MaterialKind::Dielectric { eta, .. } => Some(*eta),
@@ -534,7 +535,7 @@ fn index(material: &Material) -> Option<f64> {
     index.map(f64::from)
 }
 
-/// A parameter with the digits that it was given with: most are kept in single precision.
+/// A parameter with the digits of its file: most are stored in single precision.
 fn as_written(x: f64) -> f64 {
     let single = x as f32;
     if f64::from(single) == x { single.to_string().parse().unwrap_or(x) } else { x }
@@ -561,7 +562,7 @@ fn end_of(end: End, texts: &Texts) -> &'static str {
     }
 }
 
-/// The points of a path, from vertex to vertex: for the sketch.
+/// The vertices of a path, for the sketch.
 pub(super) fn corners(events: &[Event]) -> Vec<DVec3> {
     events
         .iter()

@@ -1,4 +1,4 @@
-//! What a ray passes without meeting it, and how near it comes.
+//! Shapes that a ray misses, and how near it passes them.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -8,30 +8,30 @@ use lumbre::kernel::{Hit, Target, TargetShape};
 use lumbre::math::DVec3;
 use lumbre::{Ray, Scene, Transform};
 
-/// Primitives that are looked at at most.
-const MOST_PRIMITIVES: usize = 1 << 20;
-/// Places along the ray where the distance is looked at first, and steps that then narrow it down.
+/// Maximum primitives that are tested.
+const MAX_PRIMITIVES: usize = 1 << 20;
+/// Points along the ray where the distance is computed first, and steps that refine it.
 const PLACES: u32 = 48;
 const STEPS: u32 = 80;
 
-/// A primitive that a ray passes.
+/// A primitive that a ray misses.
 pub(super) struct Missed {
     /// The primitive, as a hit without a crossing.
     pub(super) hit: Hit,
-    /// Where the ray comes nearest to it, if there is a way to say.
+    /// The nearest point of the ray to it, if it can be computed.
     pub(super) nearest: Option<Nearest>,
 }
 
-/// Where a ray comes nearest to a primitive.
+/// The nearest point of a ray to a primitive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Nearest {
     pub(super) distance: f64,
     pub(super) t: f64,
-    /// Whether the distance is that in the object's own space.
+    /// Whether the distance is in the object's own space.
     pub(super) in_object: bool,
 }
 
-/// The shapes among the `wanted` that the ray passes nearest, the nearest first: of each its nearest primitive.
+/// The missed shapes among the `wanted` that the ray passes nearest, in that order: for each its nearest primitive.
 pub(super) fn nearest(scene: &Scene, ray: &Ray, most: usize, wanted: impl Fn(u32) -> bool) -> Vec<Missed> {
     let resolved = scene.resolved();
     let mut all: Vec<(f64, u32, Hit)> = Vec::new();
@@ -42,13 +42,13 @@ pub(super) fn nearest(scene: &Scene, ray: &Ray, most: usize, wanted: impl Fn(u32
         {
             all.push((least_distance(&shape, &map, ray), index, hit.clone()));
         }
-        if all.len() < MOST_PRIMITIVES { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        if all.len() < MAX_PRIMITIVES { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     });
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let distance = |missed: &Missed| missed.nearest.map_or(f64::INFINITY, |nearest| nearest.distance);
     let mut found: BTreeMap<u32, Missed> = BTreeMap::new();
     for (least, index, hit) in all {
-        // What cannot be nearer than those that are found is not looked at.
+        // Skips what cannot be nearer than the shapes found so far.
         let mut so_far: Vec<f64> = found.values().map(distance).collect();
         so_far.sort_by(f64::total_cmp);
         let is_full = so_far.get(most.wrapping_sub(1)).is_some_and(|farthest| least > *farthest);
@@ -90,7 +90,7 @@ fn ball(shape: &Shape, map: &Transform) -> Option<(DVec3, f64)> {
     Some((0.5 * (bounds.min + bounds.max), 0.5 * (bounds.max - bounds.min).length()))
 }
 
-/// A distance that the ray keeps from the shape at least.
+/// A lower bound on the distance between the ray and the shape.
 fn least_distance(shape: &Shape, map: &Transform, ray: &Ray) -> f64 {
     let Some((middle, radius)) = ball(shape, map) else { return 0.0 };
     let t = ((middle - ray.origin).dot(ray.direction) / ray.direction.length_squared())
@@ -98,7 +98,7 @@ fn least_distance(shape: &Shape, map: &Transform, ray: &Ray) -> f64 {
     ((ray.at(t) - middle).length() - radius).max(0.0)
 }
 
-/// Where a ray comes nearest to a shape: the least of the distances at many places, narrowed down.
+/// The nearest point of a ray to a shape: the minimum of the distances at many points, refined.
 pub(super) fn approach(shape: &Shape, map: &Transform, ray: &Ray) -> Option<Nearest> {
     let object = ray.into_object(map);
     let in_object = shape.closest_point(map, ray.origin).is_err();
@@ -108,7 +108,7 @@ pub(super) fn approach(shape: &Shape, map: &Transform, ray: &Ray) -> Option<Near
     };
     let speed = ray.direction.length();
     let (low, high) = match ball(shape, map) {
-        // The nearest point is in the ball, and so is its place along the ray.
+        // The nearest point is in the ball, and so is its position along the ray.
         Some((middle, radius)) => {
             let t = (middle - ray.origin).dot(ray.direction) / (speed * speed);
             (t - radius / speed, t + radius / speed)
@@ -119,7 +119,7 @@ pub(super) fn approach(shape: &Shape, map: &Transform, ray: &Ray) -> Option<Near
         }
     };
     let (low, high) = (low.max(ray.t_min), high.min(ray.t_max));
-    // All of it is before the ray's range, or beyond: the nearest place is the end of that.
+    // All of it is in front of the ray's range, or beyond it: the nearest point is an end of the range.
     let (low, high) = if low <= high { (low, high) } else { (low.min(ray.t_max), low.min(ray.t_max)) };
     let at = |i: u32| low + (high - low) * f64::from(i) / f64::from(PLACES);
     let mut best = (f64::INFINITY, 0);
@@ -129,7 +129,7 @@ pub(super) fn approach(shape: &Shape, map: &Transform, ray: &Ray) -> Option<Near
             best = (found, i);
         }
     }
-    // The interval that holds the least of these, in thirds.
+    // The interval around the minimum, refined by ternary search.
     let (mut from, mut to) = (at(best.1.saturating_sub(1)), at((best.1 + 1).min(PLACES)));
     for _ in 0..STEPS {
         let (a, b) = (from + (to - from) / 3.0, to - (to - from) / 3.0);
@@ -165,11 +165,11 @@ mod tests {
         ] {
             let found = approach(shape, &Transform::IDENTITY, &Ray::new(origin, direction)).expect("found");
             assert!((found.distance - distance).abs() < 1e-12, "{found:?} for {distance}");
-            // Along the edge all places are as near.
+            // Along the edge, all points are equally near.
             assert!((found.t - t).abs() < 0.51, "{found:?} for {t}");
             assert!(!found.in_object);
         }
-        // A map by which nothing has a nearest point in the world.
+        // Under this map, nothing has a nearest point in the world.
         let tube = lumbre::geometry::Cylinder::new(DVec3::ZERO, DVec3::Z, 1.0, true).expect("a tube");
         let squeezed = Transform::scale(DVec3::new(1.0, 0.5, 1.0)).expect("it is");
         let ray = Ray::new(DVec3::new(-5.0, 2.0, 0.5), DVec3::X);

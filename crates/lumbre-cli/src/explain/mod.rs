@@ -15,7 +15,7 @@ use crate::language::{Language, filled};
 use crate::names::one_of;
 use crate::output::Inputs;
 use crate::reading::{ReadingArguments, print_warnings};
-use crate::shown::{Shown, Wish, shown};
+use crate::shown::{PreparedScene, SceneRequest, shown};
 use crate::staging::StagingArguments;
 use crate::units;
 use crate::view::ViewArguments;
@@ -44,7 +44,7 @@ use question::Question;
 use spanish::SPANISH;
 use surfaces::Chosen;
 use texts::Texts;
-pub use things::Things;
+pub use things::SceneNames;
 
 /// Tells how the colour of a pixel, or the light along a ray, comes about: the camera and its ray, every surface on the way with the
 /// equation of its crossings, normals, lights and shadows, and the path of one sample, with all numbers as the render computes them.
@@ -105,7 +105,7 @@ pub struct Request {
     /// The language: English or Spanish.
     #[arg(long, value_enum, value_name = "LANGUAGE", default_value_t = Language::En)]
     pub lang: Language,
-    /// Tell the crossings of so many of the rays that follow, too.
+    /// Tell the crossings of this many of the rays that follow, too.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub depth: u32,
     /// The number of the sample: the radiance is that which a render adds to the pixel for it.
@@ -125,7 +125,7 @@ pub struct Request {
     pub only: Vec<String>,
 }
 
-/// What an explanation is written as.
+/// The format of an explanation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Format {
     /// Plain text.
@@ -148,7 +148,7 @@ impl Format {
     }
 }
 
-/// The sentences of a language.
+/// The texts of a language.
 fn texts(language: Language) -> &'static Texts {
     language.choose(&ENGLISH, &SPANISH)
 }
@@ -192,10 +192,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(output) = &arguments.output {
         Inputs::of(diagnostics.files_read().iter().map(PathBuf::as_path)).refuse(output)?;
     }
-    let things = Things::of(&desc);
+    let things = SceneNames::of(&desc);
     let Arguments { size, camera, integrator, view, staging, reading, .. } = arguments;
     let name = arguments.scene.first().map_or(Path::new(""), PathBuf::as_path);
-    let wish = Wish {
+    let wish = SceneRequest {
         name,
         size: *size,
         camera: camera.as_deref(),
@@ -209,7 +209,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         print_warnings(&diagnostics);
         print_warnings(&shown.diagnostics);
     }
-    let Shown { scene, mut options, .. } = shown;
+    let PreparedScene { scene, mut options, .. } = shown;
     if options.spectral && !arguments.quiet {
         say!("warning: its picture carries wavelengths; what is explained is a path of red, green and blue");
     }
@@ -231,7 +231,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 pub fn explain(
     scene: &Scene,
     options: &RenderOptions,
-    things: &Things,
+    things: &SceneNames,
     name: &Path,
     request: &Request,
 ) -> Result<String, Failure> {
@@ -246,7 +246,7 @@ fn told(
     request: &Request,
     scene: &Scene,
     options: &RenderOptions,
-    things: &Things,
+    things: &SceneNames,
 ) -> Result<Vec<Section>, Failure> {
     let &Request { sample, depth, nearest, .. } = request;
     let shapes = match &request.shape {
@@ -267,7 +267,7 @@ fn told(
     question.of_pixel(scene, options, (x, y))
 }
 
-/// The keys of sections that an explanation may have, beside those with numbers: `shape 2`, `operand 0`, `transform 1`, `vertex 0`.
+/// The keys of an explanation's sections, without numbered ones: `shape 2`, `operand 0`, `transform 1`, `vertex 0`.
 const KEYS: [&str; 50] = [
     "Parameters",
     "ScaledRay",
@@ -321,7 +321,7 @@ const KEYS: [&str; 50] = [
     "mesh",
 ];
 
-/// Whether some explanation has a section with this key, if not this one.
+/// Whether any explanation may have a section with this key.
 fn is_key(key: &str) -> bool {
     let is_number = |text: &str| text.parse::<u32>().is_ok();
     KEYS.contains(&key)
@@ -330,8 +330,8 @@ fn is_key(key: &str) -> bool {
         })
 }
 
-/// The sections with these keys, each with all below it. A kind of section that this ray has none of, such as the hit of a ray
-/// that meets nothing, is no mistake.
+/// The sections with these keys, each with its subsections. A valid key without a section is no error, such as the hit
+/// of a ray that meets nothing.
 fn only(sections: Vec<Section>, keys: &[String], texts: &Texts) -> Result<Vec<Section>, Failure> {
     let mut known = BTreeSet::new();
     sections.iter().for_each(|section| section.collect_keys(&mut known));

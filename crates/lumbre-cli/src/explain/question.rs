@@ -1,4 +1,4 @@
-//! What is told of a pixel or of a ray.
+//! The subject of an explanation: a pixel or a ray.
 
 use lumbre::description::CameraView;
 use lumbre::journal::Event;
@@ -8,26 +8,26 @@ use lumbre::{DVec3, Ray, RenderOptions, Scene};
 use super::document::{Item, Section};
 use super::surfaces::Chosen;
 use super::texts::Texts;
-use super::things::Things;
+use super::things::SceneNames;
 use super::{camera, light, sketch, surfaces};
 use crate::failure::Failure;
 
-/// Of which sample is told, how much of it, and in which language.
+/// Which sample, how much detail, and in which language.
 pub(super) struct Question<'a> {
-    pub(super) things: &'a Things,
+    pub(super) things: &'a SceneNames,
     pub(super) texts: &'static Texts,
     /// The number of the sample.
     pub(super) sample: u32,
-    /// Rays after the first whose crossings are told as well.
+    /// Number of rays after the first whose crossings are shown too.
     pub(super) depth: u32,
-    /// Whether only the surface that is seen is told.
+    /// Whether to show only the visible surface.
     pub(super) nearest: bool,
-    /// The shapes that are told, met or not; `None` for those that the ray meets.
+    /// The shapes to show, hit or not; `None` for those that the ray hits.
     pub(super) shapes: Option<Chosen>,
 }
 
 impl Question<'_> {
-    /// Of a pixel of the picture.
+    /// For a pixel of the picture.
     ///
     /// # Errors
     /// As for a render.
@@ -48,7 +48,7 @@ impl Question<'_> {
         self.along(section, scene, options, &sample.ray, Some(exposed), sample.radiance, &sample.events)
     }
 
-    /// Of a ray, whose direction is of any length but 0.
+    /// For a ray, whose direction has any length but 0.
     ///
     /// # Errors
     /// As for a render.
@@ -65,7 +65,7 @@ impl Question<'_> {
         self.along(camera::given(ray, self.texts), scene, options, ray, None, radiance, &events)
     }
 
-    /// The axis of the world that is most upwards in the picture.
+    /// The world axis that is most upwards in the picture.
     fn up(&self, scene: &Scene, options: &RenderOptions) -> DVec3 {
         let Some(camera) = scene.resolved().cameras().get(options.camera) else { return DVec3::Y };
         let view = CameraView::new(camera, options.width, options.height);
@@ -74,7 +74,7 @@ impl Question<'_> {
         DVec3::AXES[axis] * up[axis].signum()
     }
 
-    /// Where the ray comes from, what it meets, and the light along it.
+    /// Writes the sections on the ray's origin, its hits, and the light along it.
     #[allow(clippy::too_many_arguments, reason = "the parts of one explanation")]
     fn along(
         &self,

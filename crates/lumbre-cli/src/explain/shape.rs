@@ -1,4 +1,4 @@
-//! How a shape's crossings are found, told in a language.
+//! The computation of a shape's crossings, in a language.
 
 use lumbre::Ray;
 use lumbre::geometry::{Candidate, Explanation, Operand, Step, Value as Found};
@@ -20,8 +20,8 @@ impl From<&Found> for Value {
     }
 }
 
-/// Adds the steps of a search, and what became of the crossings. The scope holds the ray; `rename` gives the symbols of the ray
-/// their names here.
+/// Adds the steps of a search, and the results of the crossings. The scope contains the ray; `rename` maps the symbols
+/// of the ray to the names used here.
 pub(super) fn tell(
     section: &mut Section,
     explanation: &Explanation,
@@ -32,7 +32,7 @@ pub(super) fn tell(
 ) {
     let operands = explanation.operands.iter().enumerate();
     section.sections.extend(operands.map(|(i, operand)| tell_operand(i, operand, ray, texts)));
-    // The textbook's symbols are its own.
+    // The textbook has its own symbols.
     let mut schoolbook = scope.clone();
     for step in &explanation.steps {
         section.sections.push(tell_step(step, explanation, scope, &mut schoolbook, rename, texts));

@@ -1,4 +1,4 @@
-//! A drawing of a ray, of what it meets, and of the normals there.
+//! A drawing of a ray, its hits, and the normals there.
 
 use std::fmt::Write;
 
@@ -10,25 +10,25 @@ use lumbre::{DVec2, DVec3, Ray, Transform};
 const WIDTH: f64 = 480.0;
 const HEIGHT: f64 = 320.0;
 const MARGIN: f64 = 24.0;
-/// Lines across each surface, in either direction, and points of each line.
+/// Lines across each surface in each direction, and points per line.
 const LINES: u32 = 8;
 const POINTS: u32 = 48;
-/// Parts that a shape has at most: the faces of a box.
+/// Maximum parts of a shape: the faces of a box.
 const PARTS: u32 = 6;
 
-/// What is drawn.
+/// The contents of the drawing.
 #[derive(Debug, Default)]
 pub(super) struct Scenery {
     /// Lines on the surfaces, in the world.
     lines: Vec<Vec<DVec3>>,
-    /// How many of them are of the first shape, which the picture is about.
+    /// The number of lines of the first shape, which fills the drawing.
     of_first: usize,
-    /// The middle of the first shape, where it has one.
+    /// The middle of the first shape, if it has one.
     middle: Option<DVec3>,
 }
 
 impl Scenery {
-    /// Adds the lines of constant u and v of a shape under a map to the world, which is met at a surface there.
+    /// Adds the lines of constant u and v of a shape, mapped to the world, which has a hit at this surface.
     pub(super) fn add(&mut self, shape: &Shape, map: &Transform, met: Option<&Surface>) {
         let before = self.lines.len();
         if shape.bounds(&Transform::IDENTITY).is_some() {
@@ -57,7 +57,7 @@ impl Scenery {
 
 fn lines_of(shape: &Shape, part: u32, map: &Transform) -> Vec<Vec<DVec3>> {
     if let Shape::Triangle(_) = shape {
-        // Its parameters are weights: its outline says more.
+        // Its parameters are barycentric weights: the outline shows more.
         let corners = [DVec2::ZERO, DVec2::X, DVec2::Y, DVec2::ZERO];
         let points: Option<Vec<DVec3>> =
             corners.iter().map(|uv| Some(map.point(shape.surface_at(part, *uv)?.point))).collect();
@@ -79,7 +79,7 @@ fn lines_of(shape: &Shape, part: u32, map: &Transform) -> Vec<Vec<DVec3>> {
     lines.flatten().collect()
 }
 
-/// The edges of a shape's box; of an infinite shape, a square about where it was met.
+/// The edges of a shape's box; for an infinite shape, a square around its hit.
 fn boxed(shape: &Shape, map: &Transform, met: Option<&Surface>) -> Vec<Vec<DVec3>> {
     if let Some(bounds) = shape.bounds(map) {
         let corner = |i: usize| {
@@ -98,7 +98,7 @@ fn boxed(shape: &Shape, map: &Transform, met: Option<&Surface>) -> Vec<Vec<DVec3
     vec![vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0), corner(-1.0, -1.0)]]
 }
 
-/// The drawing as SVG: the surfaces, the ray, and the points where it meets them, with their normals. `path` goes on from there.
+/// The drawing as SVG: the surfaces, the ray, and its hits with their normals. `path` continues from there.
 pub(super) fn svg(
     scenery: &Scenery,
     ray: &Ray,
@@ -108,14 +108,14 @@ pub(super) fn svg(
     title: &str,
 ) -> String {
     let along = ray.direction.normalize_or(DVec3::Z);
-    // From the side, and a little from above and behind; along what is up, from anywhere.
+    // From the side, and slightly from above and behind; for a vertical ray, from any side.
     let up = if along.dot(up).abs() < 0.95 { up } else { up.any_orthonormal_vector() };
     let side = along.cross(up).normalize_or(DVec3::X);
     let frame = Frame::from_two_or_any(0.8 * side + 0.35 * up - 0.3 * along, up)
         .unwrap_or_else(|| Frame::from_z(DVec3::Z));
     let flat = |p: DVec3| DVec2::new(p.dot(frame.x), -p.dot(frame.y));
 
-    // What is explained fills the picture; what is behind it, such as the ground, may stick out.
+    // The explained shape fills the drawing; shapes behind it, such as the ground, may extend beyond.
     let first_lines = &scenery.lines[..scenery.of_first];
     let first_hits = hits.iter().take(2).map(|(point, _)| *point);
     let things = first_lines.iter().flatten().copied().chain(first_hits);
@@ -128,9 +128,9 @@ pub(super) fn svg(
         (low, high) = (flat(ray.origin), flat(ray.at(1.0)));
         (low, high) = (low.min(high), low.max(high));
     }
-    // The ray begins in the picture, if need be nearer than it does.
+    // The ray starts in the drawing, if necessary nearer than in the scene.
     let extent = (high - low).length().max(1e-9);
-    // Past what it misses, the ray is drawn where it is nearest to the middle of that.
+    // For a miss, the ray is drawn where it is nearest to the middle of the shape.
     let things = first_lines.iter().flatten().copied();
     let (sum, count) = things.fold((DVec3::ZERO, 0.0), |(sum, count), p| (sum + p, count + 1.0));
     let nearest = if count > 0.0 { (sum / count - ray.origin).dot(along).max(0.0) } else { 1.0 };
@@ -165,7 +165,7 @@ pub(super) fn svg(
         line(&way, "stroke=\"#d9822b\" stroke-width=\"1.2\" stroke-dasharray=\"4 3\"", &mut out);
     }
     let label = |text: &str, at: DVec2, colour: &str, out: &mut String| {
-        // Labels stay in the picture.
+        // Labels stay inside the drawing.
         let at = at.clamp(DVec2::new(2.0, 12.0), DVec2::new(WIDTH - 34.0, HEIGHT - 4.0));
         let _ = write!(
             out,

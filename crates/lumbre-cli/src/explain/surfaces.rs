@@ -1,4 +1,4 @@
-//! What a ray meets, and how that is found.
+//! The surfaces along a ray, and how their hits are found.
 
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
@@ -17,26 +17,26 @@ use super::misses::{self, Missed, Nearest};
 use super::shape;
 use super::sketch::Scenery;
 use super::texts::Texts;
-use super::things::{Face, Things};
+use super::things::{Face, SceneNames};
 use crate::failure::Failure;
 use crate::language::filled;
 
-/// Hits that are told at most.
-const MOST_HITS: usize = 64;
-/// Shapes that are told of where the ray meets none.
-const MOST_MISSES: usize = 3;
-/// Columns of a matrix are at right angles where their cosines are less than this.
+/// Maximum hits that are shown.
+const MAX_HITS: usize = 64;
+/// Maximum missed shapes that are shown if the ray hits nothing.
+const MAX_MISSES: usize = 3;
+/// Columns of a matrix count as orthogonal if their cosines are below this.
 const RIGHT_ANGLE: f64 = 1e-12;
 
-/// What is told of the things that a ray meets.
-pub(super) struct Told {
+/// The section for the surfaces along a ray.
+pub(super) struct MetSurfaces {
     pub(super) section: Section,
-    /// Where the ray meets them, with the normals: for the sketch.
+    /// The hits with their normals, for the sketch.
     pub(super) hits: Vec<(DVec3, DVec3)>,
     pub(super) scenery: Scenery,
 }
 
-/// Which shapes are told of.
+/// Which shapes to show.
 #[derive(Clone, Debug)]
 pub(super) enum Chosen {
     All,
@@ -44,26 +44,26 @@ pub(super) enum Chosen {
     Called(String),
 }
 
-/// What is to be told of the surfaces along a ray.
+/// What to show of the surfaces along a ray.
 pub(super) struct Wanted<'a> {
-    /// Whether only the surface that is seen is told.
+    /// Whether to show only the visible surface.
     pub(super) nearest: bool,
     pub(super) is_from_camera: bool,
-    /// The shapes that are told, met or not; `None` for those that the ray meets, or else those that it passes nearest.
+    /// The shapes to show, hit or not; `None` for those that the ray hits, or else those that it passes nearest.
     pub(super) shapes: Option<&'a Chosen>,
 }
 
-/// Everything on the way of a ray, and what it passes where that is asked for or nothing is met.
+/// Writes the sections on everything along a ray, and on missed shapes if requested or if nothing is hit.
 ///
 /// # Errors
-/// [`Failure::Usage`] where no shape has the name that is asked for.
+/// [`Failure::Usage`] if no shape has the requested name.
 pub(super) fn surfaces(
     scene: &Scene,
     ray: &Ray,
-    things: &Things,
+    things: &SceneNames,
     wanted: &Wanted<'_>,
     texts: &'static Texts,
-) -> Result<Told, Failure> {
+) -> Result<MetSurfaces, Failure> {
     let resolved = scene.resolved();
     let is_wanted = |shape: u32| match wanted.shapes {
         Some(Chosen::Called(name)) => things.is_called(shape, name),
@@ -77,7 +77,7 @@ pub(super) fn surfaces(
         hits.extend(first.clone());
     } else {
         resolved.accel().all(ray, |hit| {
-            are_more = hits.len() == MOST_HITS;
+            are_more = hits.len() == MAX_HITS;
             if are_more {
                 return ControlFlow::Break(());
             }
@@ -89,8 +89,8 @@ pub(super) fn surfaces(
     }
     let met: BTreeSet<u32> = hits.iter().map(|hit| resolved.shape_index(hit)).collect();
     let most = match wanted.shapes {
-        Some(_) => MOST_HITS,
-        None if hits.is_empty() && wanted.is_from_camera => MOST_MISSES,
+        Some(_) => MAX_HITS,
+        None if hits.is_empty() && wanted.is_from_camera => MAX_MISSES,
         None => 0,
     };
     let missed = match most {
@@ -104,7 +104,7 @@ pub(super) fn surfaces(
     if first.is_none() {
         section.text(texts.nothing_met);
     }
-    // All crossings of one thing are found at once.
+    // All crossings of one primitive are found together.
     let mut groups: Vec<Vec<&Hit>> = Vec::new();
     for hit in &hits {
         let is_same = |group: &&mut Vec<&Hit>| {
@@ -127,7 +127,7 @@ pub(super) fn surfaces(
         section.sections.push(tell(scene, ray, &thing, first.as_ref(), things, &mut scenery, texts));
     }
     if are_more {
-        section.remark(filled(texts.more_hits, &[&MOST_HITS.to_string()]));
+        section.remark(filled(texts.more_hits, &[&MAX_HITS.to_string()]));
     }
     if !missed.is_empty() {
         section.text(if wanted.shapes.is_none() { texts.missed_nearest } else { texts.missed });
@@ -136,15 +136,15 @@ pub(super) fn surfaces(
         let thing = Thing { hit, hits: &[], nearest: *nearest };
         section.sections.push(tell(scene, ray, &thing, first.as_ref(), things, &mut scenery, texts));
     }
-    Ok(Told { section, hits: places, scenery })
+    Ok(MetSurfaces { section, hits: places, scenery })
 }
 
-/// A primitive, and where the ray meets it.
+/// A primitive, and its hits.
 struct Thing<'a> {
-    /// It, as one of the hits, or as one without a crossing.
+    /// One of its hits, or a hit without a crossing.
     hit: &'a Hit,
     hits: &'a [&'a Hit],
-    /// Where the ray comes nearest to it, for one that it passes.
+    /// The nearest point of the ray, if it misses the primitive.
     nearest: Option<Nearest>,
 }
 
@@ -153,14 +153,14 @@ fn tell(
     ray: &Ray,
     &Thing { hit, hits, nearest }: &Thing<'_>,
     first: Option<&Hit>,
-    things: &Things,
+    things: &SceneNames,
     scenery: &mut Scenery,
     texts: &'static Texts,
 ) -> Section {
     let resolved = scene.resolved();
     let index = resolved.shape_index(hit);
     let Target { placements, shape } = resolved.accel().target(ray, hit);
-    // The leaf of a tree is what has a number and a material.
+    // Numbers and materials belong to the leaves of a CSG tree.
     let kind = match &shape {
         TargetShape::Exact(placed) if matches!(placed.shape(), Shape::Csg(_)) => {
             format!("{} ({})", (texts.kind_of)(things.kind(index)), (texts.kind_of)(placed.shape().name()))
@@ -240,7 +240,7 @@ fn tell(
     section
 }
 
-/// A face as it stands in its file, which is tested as a face with `told` corners under its map.
+/// A face as in its file; it is tested as a face with `told` corners under its map.
 fn in_file(face: &Face, told: usize, texts: &Texts) -> Section {
     let mut section = Section::new("mesh", texts.in_file);
     let mut scope = Scope::default();
@@ -264,14 +264,14 @@ fn in_file(face: &Face, told: usize, texts: &Texts) -> Section {
     section
 }
 
-/// What a shape is made of: the name of its material and the kind.
-pub(super) fn material_of(things: &Things, shape: u32, texts: &Texts) -> String {
+/// The material of a shape: its name and its kind.
+pub(super) fn material_of(things: &SceneNames, shape: u32, texts: &Texts) -> String {
     let Some(material) = things.material(shape) else { return texts.no_material.to_owned() };
     let kind = (texts.kind_of)(material.kind);
     material.name.as_ref().map_or_else(|| kind.to_owned(), |name| format!("{name} ({kind})"))
 }
 
-/// A segment of curves, and where a ray passes it nearest, both in the space of the curves.
+/// A segment of curves, and the nearest point of a ray, both in the space of the curves.
 fn curve(curves: &Curves, hits: &[&Hit], ray: &Ray, texts: &Texts) -> Section {
     let primitive = hits[0].primitive;
     let mut section = Section::new("equation", texts.equation);
@@ -297,11 +297,11 @@ fn curve(curves: &Curves, hits: &[&Hit], ray: &Ray, texts: &Texts) -> Section {
     section
 }
 
-/// A thing in its own space.
+/// A primitive in its own space.
 struct Object {
     /// The ray there.
     ray: Ray,
-    /// What it is; `None` for geometry of a program's own.
+    /// The shape; `None` for custom geometry.
     shape: Option<Shape>,
     /// The maps from there to the world, the outermost first.
     chain: Vec<Transform>,
@@ -310,7 +310,7 @@ struct Object {
 }
 
 impl Object {
-    /// Whether its own space is another than the world.
+    /// Whether its own space differs from the world.
     fn is_placed(&self) -> bool {
         !self.chain.is_empty()
     }
@@ -366,7 +366,7 @@ struct Parts {
     is_at_pole: bool,
 }
 
-/// The parts of a map `T · Rz · Ry · Rx · S`; `None` where it shears.
+/// The parts of a map `T · Rz · Ry · Rx · S`; `None` if it shears.
 fn decomposed(map: &Transform) -> Option<Parts> {
     let linear = map.linear();
     let axes = [linear.x_axis, linear.y_axis, linear.z_axis];
@@ -384,15 +384,15 @@ fn decomposed(map: &Transform) -> Option<Parts> {
     if !map.is_mirror() {
         return Some(with_signs(DVec3::ONE));
     }
-    // A mirror is told along the axis that leaves the least to rotate: as it was most likely written.
+    // A mirror is described along the axis that leaves the smallest rotation, as it was most likely written.
     let signs = [[-1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, -1.0], [-1.0, -1.0, -1.0]];
     let all = signs.map(|signs| with_signs(DVec3::from_array(signs)));
     let turn = |parts: &Parts| parts.angles.abs().dot(DVec3::ONE);
     all.into_iter().min_by(|a, b| turn(a).total_cmp(&turn(b)))
 }
 
-/// The angles about x, y and z, in this order, of a rotation, in degrees, and whether it is at a pole: there the sum or the
-/// difference of the angles about x and z is all that counts, and the one about z is 0.
+/// The angles of a rotation about x, y and z, in this order, in degrees, and whether it is at a pole: only the sum or
+/// the difference of the angles about x and z matters there, and the one about z is 0.
 fn turns(rotation: &DMat3) -> (DVec3, bool) {
     let at = |row: usize, column: usize| rotation.col(column)[row];
     let rest = at(0, 0).hypotenuse(at(1, 0));
@@ -407,7 +407,7 @@ fn turns(rotation: &DMat3) -> (DVec3, bool) {
     };
     let tidy = |radians: f64| {
         let degrees = radians.to_degrees();
-        // Rounding of a whole number of degrees says nothing.
+        // Hides rounding errors of whole degrees.
         if (degrees - degrees.round()).abs() < 1e-9 { degrees.round() } else { degrees }
     };
     (DVec3::new(tidy(x), tidy(y), tidy(z)), is_at_pole)
@@ -477,7 +477,7 @@ mod tests {
                 [1.0; 3],
                 [70.0, -40.0, 20.0],
             ),
-            // At the poles x ∓ z is all that there is.
+            // At the poles only x ∓ z matters.
             (turn(DVec3::Z, 20.0) * turn(DVec3::Y, 90.0) * turn(DVec3::X, 70.0), [1.0; 3], [50.0, 90.0, 0.0]),
             (
                 turn(DVec3::Z, 20.0) * turn(DVec3::Y, -90.0) * turn(DVec3::X, 70.0),
@@ -497,7 +497,7 @@ mod tests {
                 parts.angles
             );
             assert_eq!(parts.is_at_pole, parts.angles.y.abs() == 90.0);
-            // The parts are the map.
+            // The parts make up the map.
             let again = [(DVec3::X, parts.angles.x), (DVec3::Y, parts.angles.y), (DVec3::Z, parts.angles.z)]
                 .into_iter()
                 .fold(Transform::scale(parts.scale).expect("not singular"), |inner, (axis, angle)| {

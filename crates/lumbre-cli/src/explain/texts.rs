@@ -1,26 +1,26 @@
-//! All sentences of explanations, as one table a language: another language is another file beside `english.rs`.
+//! All sentences of explanations, as one table per language: add a file like `english.rs` for another language.
 
 use lumbre::geometry::{Fate, Remark, Topic};
 
-/// What an operand of a CSG tree is called, by its place.
+/// The name of a CSG tree's operand, by its position.
 pub(super) type OperandName<'a> = dyn Fn(usize) -> &'static str + 'a;
 
-/// The sentences of one language; `{0}` and `{1}` stand for what is filled in.
+/// The sentences of one language; `{0}` and `{1}` are placeholders.
 #[derive(Debug)]
 pub(super) struct Texts {
     /// The language's code, as in HTML.
     pub(super) code: &'static str,
-    /// What the language calls itself.
+    /// The language's own name.
     pub(super) language: &'static str,
-    /// What a step of a search computes.
+    /// The title of a search step.
     pub(super) topic: fn(Topic) -> &'static str,
-    /// What is worth saying of a step.
+    /// A remark on a step.
     pub(super) remark: fn(&Remark, &OperandName<'_>) -> String,
-    /// What became of a crossing.
+    /// The outcome of a crossing.
     pub(super) fate_of: fn(&Fate, &OperandName<'_>) -> String,
-    /// What a kind of shape, material or light is called, given its name in the scene language.
+    /// The name of a kind of shape, material or light, from its name in the scene language.
     pub(super) kind_of: fn(&'static str) -> &'static str,
-    /// What a symbol of a step stands for; empty where the title says it.
+    /// The meaning of a step's symbol; empty if the title is enough.
     pub(super) symbol: fn(Topic, &str) -> &'static str,
     pub(super) camera: &'static str,
     pub(super) kind: &'static str,
@@ -160,7 +160,7 @@ pub(super) struct Texts {
     pub(super) photon_from: &'static str,
     pub(super) photon_irradiance: &'static str,
     pub(super) photon_scattered: &'static str,
-    /// How many, and what they bring together.
+    /// Their number, and their total light.
     pub(super) more_photons: &'static str,
     pub(super) end_depth: &'static str,
     pub(super) end_nothing: &'static str,

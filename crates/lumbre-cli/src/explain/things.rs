@@ -1,4 +1,4 @@
-//! What the shapes of a file are called, and what they are made of.
+//! The names of a file's shapes, and their materials.
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
@@ -6,11 +6,11 @@ use std::sync::Arc;
 use lumbre::description::{GeometryDesc, MeshDesc, ShapeDesc};
 use lumbre::{DVec2, DVec3, SceneDesc, Transform};
 
-/// The shapes of a file by their number, and the materials.
+/// The shapes of a file by their index, and the materials.
 #[derive(Debug, Default)]
-pub struct Things {
+pub struct SceneNames {
     shapes: HashMap<u32, Thing>,
-    materials: Vec<Substance>,
+    materials: Vec<MaterialInfo>,
 }
 
 /// A shape of a file.
@@ -21,23 +21,23 @@ struct Thing {
     mesh: Option<(Arc<MeshDesc>, Transform)>,
 }
 
-/// A face of a mesh as it stands in its file: a triangle, or a quad or patch.
+/// A face of a mesh as in its file: a triangle, or a quad or patch.
 #[derive(Clone, Debug)]
 pub(super) struct Face {
     /// The corners in the mesh's own space, three or four.
     pub(super) corners: Vec<DVec3>,
     /// The texture coordinates of the corners, if the file has them.
     pub(super) uvs: Option<Vec<DVec2>>,
-    /// From there to the space of its instance, or of the world.
+    /// The map from there to the space of its instance, or of the world.
     pub(super) map: Transform,
 }
 
-/// A parameter's name and its numbers; without these where a texture stands.
+/// A parameter's name and its numbers; `None` for a texture.
 type Parameter = (String, Option<Vec<f64>>);
 
 /// A material of a file.
 #[derive(Clone, Debug)]
-pub(super) struct Substance {
+pub(super) struct MaterialInfo {
     /// Its name, if it has one, and its kind.
     pub(super) name: Option<String>,
     pub(super) kind: &'static str,
@@ -45,8 +45,8 @@ pub(super) struct Substance {
     pub(super) parameters: Vec<Parameter>,
 }
 
-impl Things {
-    /// Of a description.
+impl SceneNames {
+    /// From a description.
     pub fn of(desc: &SceneDesc) -> Self {
         let mut by_owner: HashMap<String, Vec<Parameter>> = HashMap::new();
         for parameter in lumbre::parameters(desc) {
@@ -56,7 +56,7 @@ impl Things {
         let materials = desc.materials.iter().enumerate().map(|(index, named)| {
             let called = named.name.clone().unwrap_or_else(|| index.to_string());
             let parameters = by_owner.remove(&format!("material.{called}.")).unwrap_or_default();
-            Substance { name: named.name.clone(), kind: named.material.kind.name(), parameters }
+            MaterialInfo { name: named.name.clone(), kind: named.material.kind.name(), parameters }
         });
         let materials = materials.collect();
         let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);
@@ -64,12 +64,12 @@ impl Things {
         let mut shapes = HashMap::new();
         while let Some(shape) = open.pop() {
             if let GeometryDesc::Csg(csg) = &shape.geometry {
-                // A hit is on a shape of an operand, which comes later: the number may be that of the first of them.
+                // A hit is on a shape of an operand, which comes later: the first of them may have the same number.
                 open.extend(csg.operands.iter().flat_map(|operand| &**operand));
             }
             let material = shape.material.map(|id| id.0 as usize);
             let mesh = match &shape.geometry {
-                // The vertices of a mesh that changes its form are those of one moment.
+                // The vertices of a deforming mesh are those of one moment.
                 GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) if mesh.motion.is_none() => {
                     Some((mesh.clone(), shape.world_from_object))
                 }
@@ -80,26 +80,26 @@ impl Things {
         Self { shapes, materials }
     }
 
-    /// What kind of shape has this number, in the words of the scene language; the ground is of no file.
+    /// The kind of the shape with this index, in the words of the scene language; the ground is in no file.
     pub(super) fn kind(&self, shape: u32) -> &'static str {
         self.shapes.get(&shape).map_or("ground", |thing| thing.kind)
     }
 
-    /// Whether a shape is asked for by this name: its number, its kind, or the name of its material.
+    /// Whether a name selects a shape: its index, its kind, or the name of its material.
     pub(super) fn is_called(&self, shape: u32, name: &str) -> bool {
         let material = self.material(shape).and_then(|material| material.name.as_deref());
         name.parse() == Ok(shape) || self.kind(shape) == name || material == Some(name)
     }
 
-    /// The names by which the shapes of the file can be asked for, beside their numbers.
+    /// The names that select shapes of the file, without their indices.
     pub(super) fn names(&self) -> BTreeSet<&str> {
         let kinds = self.shapes.values().map(|thing| thing.kind);
         let materials = self.shapes.keys().filter_map(|shape| self.material(*shape)?.name.as_deref());
         kinds.chain(materials).collect()
     }
 
-    /// The face of a mesh's file that has these corners under its map. Quads that are flat are split into triangles, so that it is
-    /// found by its corners: of those that the number of the primitive may mean, the one that has them all.
+    /// The face of a mesh's file with these corners under its map. Flat quads are split into triangles, so the corners
+    /// decide among the faces that the index of the primitive may mean.
     pub(super) fn face(&self, shape: u32, primitive: u32, told: &[DVec3]) -> Option<Face> {
         let (mesh, map) = self.shapes.get(&shape)?.mesh.as_ref()?;
         let (primitive, triangles) = (primitive as usize, mesh.triangles.len());
@@ -123,8 +123,8 @@ impl Things {
         None
     }
 
-    /// What a shape is made of.
-    pub(super) fn material(&self, shape: u32) -> Option<&Substance> {
+    /// The material of a shape.
+    pub(super) fn material(&self, shape: u32) -> Option<&MaterialInfo> {
         self.materials.get(self.shapes.get(&shape)?.material?)
     }
 }

@@ -1,4 +1,4 @@
-//! What is told, as text for a terminal, as Markdown and as JSON.
+//! Explanations as text for a terminal, as Markdown and as JSON.
 
 use std::fmt::Write;
 
@@ -7,8 +7,8 @@ use serde_json::{Map, Value as Json, json};
 use super::document::{Item, Quantity, Section, Value};
 use super::formula::{latex, sign_after};
 
-/// As text, indented by two spaces a level. The titles of a whole explanation's chapters are in capitals; those of single sections
-/// may have formulas.
+/// As text, indented by two spaces a level. Chapter titles of a whole explanation are in capitals; titles of single
+/// sections may contain formulas.
 pub(super) fn text(sections: &[Section], has_chapters: bool, schoolbook: &str) -> String {
     let mut out = String::new();
     for section in sections {
@@ -55,7 +55,7 @@ fn write_text(section: &Section, title: &str, level: usize, schoolbook: &str, ou
     }
 }
 
-/// `symbol = formula = numbers = value`, as far as there are such.
+/// `symbol = formula = numbers = value`; parts may be missing.
 fn chain(quantity: &Quantity, value: &str) -> String {
     let mut chain = String::new();
     for (part, sign) in quantity.chain() {
@@ -151,7 +151,7 @@ fn write_markdown(section: &Section, level: usize, schoolbook: &str, out: &mut S
     }
 }
 
-/// Text that Markdown shows as it is, on one line: names of a scene bring no HTML, no links, images or formulas.
+/// Text that Markdown shows literally, on one line: names in a scene add no HTML, links, images or formulas.
 pub(super) fn literal(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -262,7 +262,7 @@ fn json_of(quantity: &Quantity) -> Json {
 }
 
 impl Value {
-    /// As JSON. It has no infinities: they are the texts "inf" and "-inf", and what is no number is "nan".
+    /// As JSON. JSON has no infinities: they are the texts "inf" and "-inf", and NaN is "nan".
     fn json(&self) -> Json {
         let number = |x: f64| {
             if x.is_finite() {
@@ -273,7 +273,7 @@ impl Value {
                 json!(if x > 0.0 { "inf" } else { "-inf" })
             }
         };
-        // The fewest digits that say which number in single precision it is.
+        // The fewest digits that identify the single-precision number.
         let single = |x: &f32| number(x.to_string().parse().unwrap_or(f64::NAN));
         let list = |numbers: &[f64]| numbers.iter().map(|x| number(*x)).collect::<Json>();
         match self {

@@ -52,7 +52,7 @@ impl Start {
         self.seconds(thread_ran)
     }
 
-    /// The seconds that the work of so many threads took since [`Start::of_program`]: of one thread, what all ran together, but no
+    /// The seconds that the work of this many threads took since [`Start::of_program`]: of one thread, what all ran together, but no
     /// more than the clock says, for threads that are done may wait busily for a while; of more, what the clock says, for one
     /// may wait for another.
     pub(crate) fn program_seconds(&self, threads: usize) -> f64 {

@@ -24,7 +24,7 @@ impl<'a> Job<'a> {
         Self { passes, rays: rays.len() }
     }
 
-    /// Traces every ray once on so many threads; answers the seconds that a thread ran, in the mean.
+    /// Traces every ray once on this many threads; answers the seconds that a thread ran, in the mean.
     pub(crate) fn run(&mut self, threads: usize) -> f64 {
         for pass in &mut self.passes {
             pass.get_mut().expect("no pass panics").reset();

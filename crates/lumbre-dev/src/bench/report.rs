@@ -147,7 +147,7 @@ pub(crate) fn today() -> String {
     date_of((seconds / 86_400) as i64)
 }
 
-/// The day so many days after the first of January 1970, in the Gregorian calendar.
+/// The day this many days after the first of January 1970, in the Gregorian calendar.
 fn date_of(days: i64) -> String {
     let is_leap = |year: i64| (year % 4 == 0 && year % 100 != 0) || year % 400 == 0;
     let mut year = 1970;

@@ -9,7 +9,7 @@ use crate::program::Bytes;
 #[global_allocator]
 static HEAP: PeakAlloc = PeakAlloc;
 
-/// Runs what asks for builds on a thread that is one of so many, as with Embree: it takes part in the work, and waits for none to wake
+/// Runs builds from a thread of the pool, as Embree does: it takes part in the work, and waits for none to wake
 /// up before that begins. So it is the same for every program, whose code and data then are where it last ran.
 pub(crate) fn asking<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T> {
     if rayon::current_thread_index().is_some() && rayon::current_num_threads() == threads {
@@ -27,7 +27,7 @@ pub(crate) fn asking<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -
     })
 }
 
-/// Runs a build on so many threads, with the seconds and the bytes that it took.
+/// Runs a build on this many threads, with the seconds and the bytes that it took.
 pub(crate) fn measure<T: Send>(threads: usize, build: impl FnOnce() -> T + Send) -> Result<(T, f64, Bytes)> {
     asking(threads, || measure_here(threads, build))
 }

@@ -165,7 +165,7 @@ pub(super) struct Primitive<'a> {
 }
 
 /// Attribute sets from this one on are ignored.
-const MOST_SETS: usize = 16;
+const MAX_SETS: usize = 16;
 
 /// Checks the alignment and the strides of a vertex attribute. `views` are the buffer views of the ones before.
 fn check_layout(
@@ -227,7 +227,7 @@ impl<'a> Attributes<'a> {
                 None => count = Some((accessor.count, name.clone().into_owned())),
             }
             let put = |list: &mut Vec<Option<Accessor<'a>>>, set: usize| {
-                if set >= MOST_SETS {
+                if set >= MAX_SETS {
                     file.warn(index, "attribute beyond the sixteenth set was left out");
                     return;
                 }

@@ -34,7 +34,7 @@ const MAX_DEPTH: u32 = 16;
 
 /// Emissive shapes are not instanced, unless there are more copies than this: lights inside objects are not
 /// sampled.
-const MOST_COPIES_OF_LIGHTS: usize = 64;
+const MAX_COPIES_OF_LIGHTS: usize = 64;
 
 /// Reads the whole glTF.
 pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
@@ -341,7 +341,7 @@ impl Builder<'_> {
             let (shining, mut plain): (Vec<_>, Vec<_>) = self
                 .shapes(place)?
                 .into_iter()
-                .partition(|shape| shape.area_light.is_some() && uses <= MOST_COPIES_OF_LIGHTS);
+                .partition(|shape| shape.area_light.is_some() && uses <= MAX_COPIES_OF_LIGHTS);
             let object = if plain.is_empty() {
                 None
             } else {

@@ -154,7 +154,7 @@ fn check_size(
     Err(wrong.found(format!("{width} by {height} pixels in {} bytes", bytes.len())).into())
 }
 
-/// The limit that holds for whatever else an image of so many bytes unpacks, such as a colour profile.
+/// The limit that holds for whatever else an image of this many bytes unpacks, such as a colour profile.
 fn limits(bytes: &[u8], budget: &Budget) -> Limits {
     let most =
         (bytes.len() as u64).saturating_mul(budget.limits().expansion).max(crate::Limits::FREE_EXPANSION);

@@ -24,7 +24,7 @@ const LOWER_SIZE: u64 = 33_856;
 enum Kind {
     Single,
     Double,
-    /// So many bits for each voxel of a leaf, between the leaf's least value and its most.
+    /// This many bits a voxel of a leaf, which interpolate between the leaf's least and largest value.
     Quantised(u32),
     /// The same, and each leaf says how many bits.
     QuantisedByLeaf,

@@ -24,7 +24,7 @@ use super::lens::LensLater;
 use super::params::{Param, Params};
 use super::parser;
 use super::shapes::ReadMeshes;
-use super::source::{AtSpot, Fault, Files, Result, Spot};
+use super::source::{AtSpot, Fault, Files, Result, SourcePosition};
 use crate::diagnostic::quoted;
 use crate::origin::placed;
 use crate::{Budget, Diagnostic, Diagnostics, FormatError, Severity};
@@ -47,7 +47,7 @@ pub(super) struct Converter<'b, 'd> {
     /// Alphas whose textures are defined after them, by the index of the shape.
     pub alphas_later: HashMap<u32, Param>,
     /// Textures by kind and name whose file cannot be read: an error where they are used.
-    pub broken_textures: HashMap<(&'static str, String), (Spot, Diagnostic)>,
+    pub broken_textures: HashMap<(&'static str, String), (SourcePosition, Diagnostic)>,
     pub objects: Vec<ObjectSlot>,
     pub object_names: HashMap<Arc<str>, ObjectId>,
     pub open_object: Option<ObjectId>,
@@ -72,11 +72,11 @@ pub(super) struct Converter<'b, 'd> {
     pub mesh_files: Vec<MeshFile>,
     pub mesh_paths: HashMap<PathBuf, usize>,
     /// What moves the vertices of mesh files, by their indices, and where that is asked for.
-    pub displaced: HashMap<usize, (Displaced, Spot)>,
+    pub displaced: HashMap<usize, (Displaced, SourcePosition)>,
     /// Emissive shapes whose material is not yet known to be a surface.
-    pub lights_to_check: Vec<(MaterialId, Spot)>,
+    pub lights_to_check: Vec<(MaterialId, SourcePosition)>,
     /// Meshes in CSG shapes, which can be checked only after they are read.
-    pub meshes_to_close: Vec<(Arc<MeshDesc>, Spot)>,
+    pub meshes_to_close: Vec<(Arc<MeshDesc>, SourcePosition)>,
     pub sampler_seed: Option<u64>,
     /// The times of the two current transforms.
     pub transform_times: [f64; 2],
@@ -87,14 +87,14 @@ pub(super) struct Converter<'b, 'd> {
     pub displaced_edge_scale: f64,
     /// The diagonal of the film, in millimetres.
     pub film_diagonal: f64,
-    upgraded: Option<Spot>,
+    upgraded: Option<SourcePosition>,
 }
 
 /// A material, by its index in the table.
 pub(super) struct MaterialSlot {
     pub name: Option<Arc<str>>,
     pub material: Option<Arc<Material>>,
-    pub first_use: Spot,
+    pub first_use: SourcePosition,
     /// Its depth of nested mixtures.
     pub depth: usize,
 }
@@ -103,7 +103,7 @@ pub(super) struct MaterialSlot {
 pub(super) struct MediumSlot {
     pub name: Arc<str>,
     pub medium: Option<Arc<Medium>>,
-    pub first_use: Spot,
+    pub first_use: SourcePosition,
 }
 
 /// An object, by its index in the table.
@@ -113,7 +113,7 @@ pub(super) struct ObjectSlot {
     pub name: Arc<str>,
     /// Its shapes as an operand of CSG, once it is one.
     pub operand: Option<Arc<Vec<ShapeDesc>>>,
-    pub first_use: Spot,
+    pub first_use: SourcePosition,
     /// The number of its shapes with every CSG expanded, and their nesting depth.
     pub leaves: u64,
     pub depth: usize,
@@ -122,7 +122,7 @@ pub(super) struct ObjectSlot {
 /// A mesh file to be read at the end: shapes hold `placeholder` until then.
 pub(super) struct MeshFile {
     pub path: PathBuf,
-    pub spot: Spot,
+    pub spot: SourcePosition,
     pub placeholder: Arc<MeshDesc>,
 }
 
@@ -225,17 +225,17 @@ impl<'b, 'd> Converter<'b, 'd> {
     }
 
     /// Adds a diagnostic that does not stop the reading.
-    pub fn warn(&mut self, spot: Spot, diagnostic: Diagnostic) {
+    pub fn warn(&mut self, spot: SourcePosition, diagnostic: Diagnostic) {
         self.diagnostics.push(self.files.locate(spot, diagnostic));
     }
 
     /// Warns that something is ignored or replaced.
-    pub fn note(&mut self, spot: Spot, message: impl Into<String>) {
+    pub fn note(&mut self, spot: SourcePosition, message: impl Into<String>) {
         self.warn(spot, Diagnostic::warning(message));
     }
 
     /// Warns of an unknown type, with the nearest known one.
-    pub fn unknown(&mut self, spot: Spot, noun: &str, ty: &str, known: &[&str], instead: &str) {
+    pub fn unknown(&mut self, spot: SourcePosition, noun: &str, ty: &str, known: &[&str], instead: &str) {
         let message = format!("unknown {noun} {}: {instead}", quoted(ty));
         let files = &self.files;
         self.diagnostics
@@ -255,7 +255,7 @@ impl<'b, 'd> Converter<'b, 'd> {
     }
 
     /// Notes a use of pbrt-v3 syntax; reported once.
-    pub fn upgraded(&mut self, spot: Spot) {
+    pub fn upgraded(&mut self, spot: SourcePosition) {
         if self.upgraded.is_none() {
             self.upgraded = Some(spot);
             self.note(spot, "this is of pbrt-v3: the scene is upgraded to pbrt-v4 while it is read");
@@ -267,7 +267,7 @@ impl<'b, 'd> Converter<'b, 'd> {
     }
 
     /// The path of a file that the scene names.
-    pub fn resolve(&self, name: &str, at: Spot) -> Result<PathBuf> {
+    pub fn resolve(&self, name: &str, at: SourcePosition) -> Result<PathBuf> {
         match &self.directory {
             Some(directory) => Ok(parser::resolve(directory, name)),
             None => {
@@ -295,7 +295,7 @@ impl<'b, 'd> Converter<'b, 'd> {
         name: Option<Arc<str>>,
         material: Option<Material>,
         depth: usize,
-        spot: Spot,
+        spot: SourcePosition,
     ) -> Result<MaterialId> {
         // What is in a material besides its textures, and textures of its own.
         const EACH: usize = size_of::<MaterialSlot>()
@@ -311,13 +311,13 @@ impl<'b, 'd> Converter<'b, 'd> {
 
     /// The material of shapes before the first `Material`.
     pub fn default_material(&mut self) -> MaterialId {
-        let first_use = Spot { file: 0, line: 1, column: 1 };
+        let first_use = SourcePosition { file: 0, line: 1, column: 1 };
         let material = Some(Arc::new(Material::default_diffuse()));
         self.materials.push(MaterialSlot { name: None, material, first_use, depth: 1 });
         MaterialId(self.materials.len() as u32 - 1)
     }
 
-    pub fn material_named(&mut self, name: &str, at: Spot) -> Result<MaterialId> {
+    pub fn material_named(&mut self, name: &str, at: SourcePosition) -> Result<MaterialId> {
         if let Some(id) = self.material_names.get(name) {
             return Ok(*id);
         }
@@ -328,18 +328,18 @@ impl<'b, 'd> Converter<'b, 'd> {
     }
 
     /// Charges `bytes` that are kept to the end.
-    pub fn keep(&self, bytes: usize, what: &str, spot: Spot) -> Result<()> {
+    pub fn keep(&self, bytes: usize, what: &str, spot: SourcePosition) -> Result<()> {
         self.budget.bytes(bytes as u64, what).at(spot)
     }
 
     /// A name that a table keeps, charged with what a table has beside a name, and its copy in the scene.
-    pub fn kept_name(&self, name: &str, spot: Spot) -> Result<Arc<str>> {
+    pub fn kept_name(&self, name: &str, spot: SourcePosition) -> Result<Arc<str>> {
         const BESIDE: usize = 96;
         self.keep(2 * name.len() + BESIDE, "names", spot)?;
         Ok(name.into())
     }
 
-    fn object_named(&mut self, name: &str, at: Spot) -> Result<ObjectId> {
+    fn object_named(&mut self, name: &str, at: SourcePosition) -> Result<ObjectId> {
         if let Some(id) = self.object_names.get(name) {
             return Ok(*id);
         }
@@ -355,7 +355,7 @@ impl<'b, 'd> Converter<'b, 'd> {
         object: Option<ObjectDesc>,
         leaves: u64,
         depth: usize,
-        first_use: Spot,
+        first_use: SourcePosition,
     ) -> Result<ObjectId> {
         self.keep(size_of::<ObjectSlot>() + size_of::<ObjectDesc>(), "objects", first_use)?;
         let id = ObjectId(self.objects.len() as u32);
@@ -363,7 +363,7 @@ impl<'b, 'd> Converter<'b, 'd> {
         Ok(id)
     }
 
-    pub fn begin_object(&mut self, name: &str, spot: Spot, at: Spot) -> Result<()> {
+    pub fn begin_object(&mut self, name: &str, spot: SourcePosition, at: SourcePosition) -> Result<()> {
         if let Some(open) = self.open_object {
             let open = &self.objects[open.0 as usize].name;
             return Err(spot.error(format!("ObjectBegin inside the object {}", quoted(open))));
@@ -386,7 +386,13 @@ impl<'b, 'd> Converter<'b, 'd> {
         }
     }
 
-    pub fn instance(&mut self, name: &str, spot: Spot, at: Spot, ctm: &[Transform; 2]) -> Result<()> {
+    pub fn instance(
+        &mut self,
+        name: &str,
+        spot: SourcePosition,
+        at: SourcePosition,
+        ctm: &[Transform; 2],
+    ) -> Result<()> {
         if let Some(open) = self.open_object {
             let open = &self.objects[open.0 as usize].name;
             return Err(spot.error(format!("ObjectInstance inside the object {}", quoted(open))));
@@ -402,7 +408,7 @@ impl<'b, 'd> Converter<'b, 'd> {
     /// The motion between the two current transforms, if they differ.
     pub fn motion(
         &mut self,
-        spot: Spot,
+        spot: SourcePosition,
         ctm: &[Transform; 2],
         what: &str,
     ) -> Result<Option<Arc<AnimatedTransform>>> {
@@ -430,7 +436,7 @@ impl<'b, 'd> Converter<'b, 'd> {
         leaves: u64,
         depth: usize,
         motion: Arc<AnimatedTransform>,
-        spot: Spot,
+        spot: SourcePosition,
     ) -> Result<()> {
         let object = ObjectDesc { shapes: vec![shape], ..ObjectDesc::default() };
         let id = self.add_object("".into(), Some(object), leaves, depth, spot)?;
@@ -674,7 +680,7 @@ fn shared<K: Hash + Eq, T: TextureValue>(
 }
 
 /// An error about a file that the scene names, at the place that names it.
-pub(super) fn file_fault(at: Spot, error: FormatError) -> Fault {
+pub(super) fn file_fault(at: SourcePosition, error: FormatError) -> Fault {
     match error {
         FormatError::Io { path, action, source } => {
             at.error(format!("{action} {}: {source}", quoted(&path.display().to_string())))

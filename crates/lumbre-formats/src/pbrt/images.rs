@@ -7,7 +7,7 @@ use lumbre_image::Encoding;
 use lumbre_shading::{ImageFilter, MipMap, MipMapOptions, Wrap};
 
 use super::convert::{Converter, file_fault};
-use super::source::{Result, Spot};
+use super::source::{Result, SourcePosition};
 use super::textures::unreadable;
 use crate::image::{ImageFile, open_scene_image};
 use crate::{Diagnostic, FormatError};
@@ -25,7 +25,7 @@ impl Converter<'_, '_> {
     pub fn mip_map(
         &mut self,
         name: &str,
-        at: Spot,
+        at: SourcePosition,
         encoding: Option<Encoding>,
         wrap: Wrap,
         filter: ImageFilter,
@@ -56,7 +56,7 @@ impl Converter<'_, '_> {
     }
 
     /// The image of this name as stored in its file.
-    pub fn image_file(&mut self, name: &str, at: Spot) -> Result<ImageFile> {
+    pub fn image_file(&mut self, name: &str, at: SourcePosition) -> Result<ImageFile> {
         let path = self.resolve(name, at)?;
         match open_scene_image(&path, self.budget, self.diagnostics) {
             Ok(image) => {

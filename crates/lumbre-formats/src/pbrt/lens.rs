@@ -6,7 +6,7 @@ use lumbre_scene::{ApertureImage, CameraKind, Lens, LensError, LensSurface};
 
 use super::convert::Converter;
 use super::params::{Params, Type};
-use super::source::{Result, Spot};
+use super::source::{Result, SourcePosition};
 use crate::Diagnostic;
 use crate::diagnostic::{number, quoted};
 
@@ -15,7 +15,7 @@ pub(super) struct LensLater {
     surfaces: Vec<LensSurface>,
     stop: Option<ApertureImage>,
     focus_distance: f64,
-    spot: Spot,
+    spot: SourcePosition,
 }
 
 /// Numbers of a surface in a file.

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::ops::Deref;
 
-use super::source::{Result, Spot};
+use super::source::{Result, SourcePosition};
 use crate::Diagnostic;
 use crate::diagnostic::{quoted, quoted_bytes};
 
@@ -70,7 +70,7 @@ impl<B: Deref<Target = [u8]>> Lexer<B> {
         };
         if let Some(found) = foreign {
             let wrong = Diagnostic::error("unsupported text encoding").found(found).expected("UTF-8");
-            return Err(Spot { file, line: 1, column: 1 }.wrong(wrong));
+            return Err(SourcePosition { file, line: 1, column: 1 }.wrong(wrong));
         }
         let walked = Walked { offset: start, line: 1, column: 1 };
         Ok(Self { bytes, file, at: start, walked })
@@ -169,12 +169,12 @@ impl<B: Deref<Target = [u8]>> Lexer<B> {
     }
 
     /// The place of a token. Cheap for tokens in order.
-    pub fn spot(&mut self, token: Token) -> Spot {
+    pub fn spot(&mut self, token: Token) -> SourcePosition {
         self.spot_at(token.start)
     }
 
     /// The place of the end of the file.
-    pub fn end_spot(&mut self) -> Spot {
+    pub fn end_spot(&mut self) -> SourcePosition {
         self.spot_at(self.bytes.len())
     }
 
@@ -212,7 +212,7 @@ impl<B: Deref<Target = [u8]>> Lexer<B> {
         Ok(unescape(&self.bytes[start..end]).unwrap_or_default())
     }
 
-    fn spot_at(&mut self, offset: usize) -> Spot {
+    fn spot_at(&mut self, offset: usize) -> SourcePosition {
         let bytes = &*self.bytes;
         let mut w = self.walked;
         if offset < w.offset {
@@ -232,7 +232,7 @@ impl<B: Deref<Target = [u8]>> Lexer<B> {
             }
         }
         self.walked = w;
-        Spot { file: self.file, line: w.line, column: w.column }
+        SourcePosition { file: self.file, line: w.line, column: w.column }
     }
 }
 

@@ -13,7 +13,7 @@ use lumbre_shading::{ImageFilter, Spectrum, SpectrumValue, Wrap};
 use super::colour;
 use super::convert::{Converter, file_fault};
 use super::params::{Params, Type};
-use super::source::{AtSpot, Result, Spot};
+use super::source::{AtSpot, Result, SourcePosition};
 use super::state::{AreaLight, State};
 use super::textures::{LightSpectrum, SpectrumUse, single};
 use crate::Diagnostic;
@@ -373,7 +373,7 @@ fn half_turn() -> Transform {
 }
 
 /// The mapping of an image to the sphere, by its aspect ratio.
-fn environment_mapping(image: &Image, filename: &str, at: Spot) -> Result<EnvironmentMapping> {
+fn environment_mapping(image: &Image, filename: &str, at: SourcePosition) -> Result<EnvironmentMapping> {
     let (width, height) = (image.width(), image.height());
     if width == height {
         return Ok(EnvironmentMapping::EqualArea);

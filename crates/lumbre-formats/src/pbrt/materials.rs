@@ -17,7 +17,7 @@ use lumbre_shading::{
 
 use super::convert::{Converter, FloatArc, Known, SpectrumArc, file_fault};
 use super::params::{Params, Type, Values};
-use super::source::{Result, Spot};
+use super::source::{Result, SourcePosition};
 use super::textures::{SpectrumUse, single};
 use crate::diagnostic::quoted;
 use crate::{Diagnostic, Input, measured};
@@ -61,7 +61,7 @@ impl Converter<'_, '_> {
         Ok(Some(self.add_material(None, Some(material), depth, params.spot)?))
     }
 
-    pub fn named_material(&mut self, name: &str, at: Spot, params: Params) -> Result<()> {
+    pub fn named_material(&mut self, name: &str, at: SourcePosition, params: Params) -> Result<()> {
         let id = self.material_named(name, at)?;
         if self.materials[id.0 as usize].material.is_some() {
             return Err(at.error(format!("material {} is defined twice", quoted(name))));

@@ -14,7 +14,7 @@ use lumbre_shading::{Spectrum, SpectrumValue};
 use super::colour;
 use super::convert::{Converter, MediumSlot, file_fault};
 use super::params::{Param, Params, Type};
-use super::source::{AtSpot, Result, Spot};
+use super::source::{AtSpot, Result, SourcePosition};
 use super::textures::{LightSpectrum, SpectrumUse};
 use crate::diagnostic::{number, quoted};
 use crate::nanovdb::{self, NanoGrid, Values};
@@ -27,11 +27,17 @@ pub(super) const MEDIA: [&str; 5] = ["homogeneous", "uniformgrid", "rgbgrid", "c
 const OF_HEAT: [&str; 3] = ["temperatureoffset", "temperaturecutoff", "temperaturescale"];
 
 /// Beyond this, light goes all but straight on or back.
-const MOST_ASYMMETRY: f64 = 0.99;
+const MAX_ASYMMETRY: f64 = 0.99;
 
 impl Converter<'_, '_> {
     /// `MakeNamedMedium`: its space is the one in which it is made.
-    pub fn medium(&mut self, name: &str, at: Spot, params: Params, ctm: &[Transform; 2]) -> Result<()> {
+    pub fn medium(
+        &mut self,
+        name: &str,
+        at: SourcePosition,
+        params: Params,
+        ctm: &[Transform; 2],
+    ) -> Result<()> {
         let id = self.medium_named(name, at)?;
         if self.media[id.0 as usize].medium.is_some() {
             return Err(at.error(format!("medium {} is defined twice", quoted(name))));
@@ -46,11 +52,11 @@ impl Converter<'_, '_> {
     }
 
     /// A medium by its name, which may be defined later; none for the empty name.
-    pub fn medium_of_side(&mut self, name: &str, at: Spot) -> Result<Option<MediumId>> {
+    pub fn medium_of_side(&mut self, name: &str, at: SourcePosition) -> Result<Option<MediumId>> {
         if name.is_empty() { Ok(None) } else { self.medium_named(name, at).map(Some) }
     }
 
-    fn medium_named(&mut self, name: &str, at: Spot) -> Result<MediumId> {
+    fn medium_named(&mut self, name: &str, at: SourcePosition) -> Result<MediumId> {
         if let Some(id) = self.medium_names.get(name) {
             return Ok(*id);
         }
@@ -331,11 +337,11 @@ impl Converter<'_, '_> {
 
     fn asymmetry(&mut self, params: &Params) -> Result<f32> {
         let g = params.float("g", 0.0)?;
-        if g.abs() > MOST_ASYMMETRY {
+        if g.abs() > MAX_ASYMMETRY {
             let wrong = Diagnostic::warning("the asymmetry of this medium is held to 0.99 either way");
             self.warn(params.spot_of("g"), wrong.found(number(g)).expected("more than -1 and less than 1"));
         }
-        Ok(g.clamp(-MOST_ASYMMETRY, MOST_ASYMMETRY) as f32)
+        Ok(g.clamp(-MAX_ASYMMETRY, MAX_ASYMMETRY) as f32)
     }
 
     /// A number that is not negative for each voxel.

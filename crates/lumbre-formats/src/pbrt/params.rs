@@ -6,7 +6,7 @@ use std::rc::Rc;
 use lumbre_image::ColourSpace;
 use lumbre_math::DVec3;
 
-use super::source::{Result, Spot};
+use super::source::{Result, SourcePosition};
 use crate::Diagnostic;
 use crate::diagnostic::{number, quoted};
 
@@ -128,7 +128,7 @@ impl Values {
 pub(super) struct Param {
     pub ty: Type,
     pub name: Box<str>,
-    pub spot: Spot,
+    pub spot: SourcePosition,
     pub values: Values,
     /// The colour space of its scope, for `rgb`.
     pub space: ColourSpace,
@@ -247,14 +247,14 @@ pub(super) struct Params {
     /// The entity, such as `shape "sphere"`.
     pub owner: String,
     /// Its place.
-    pub spot: Spot,
+    pub spot: SourcePosition,
     pub own: Vec<Param>,
     pub defaults: Defaults,
     asked: RefCell<Vec<&'static str>>,
 }
 
 impl Params {
-    pub fn new(owner: String, spot: Spot, own: Vec<Param>, defaults: Defaults) -> Self {
+    pub fn new(owner: String, spot: SourcePosition, own: Vec<Param>, defaults: Defaults) -> Self {
         Self { owner, spot, own, defaults, asked: RefCell::default() }
     }
 
@@ -296,7 +296,7 @@ impl Params {
     }
 
     /// The place of this parameter, else of the entity.
-    pub fn spot_of(&self, name: &str) -> Spot {
+    pub fn spot_of(&self, name: &str) -> SourcePosition {
         self.own.iter().rev().find(|p| *p.name == *name).map_or(self.spot, |p| p.spot)
     }
 

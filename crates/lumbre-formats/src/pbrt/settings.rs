@@ -14,7 +14,7 @@ use lumbre_shading::spectrum::SensorCurves;
 use super::convert::Converter;
 use super::lexer::{parse_number, whole};
 use super::params::{Params, Type};
-use super::source::{Result, Spot};
+use super::source::{Result, SourcePosition};
 use super::{colour, sensors};
 use crate::Diagnostic;
 use crate::diagnostic::{number, quoted};
@@ -425,7 +425,7 @@ impl Converter<'_, '_> {
         Ok(())
     }
 
-    pub fn option(&mut self, name: &str, at: Spot, value: &str) -> Result<()> {
+    pub fn option(&mut self, name: &str, at: SourcePosition, value: &str) -> Result<()> {
         let plain: String = name.chars().filter(|c| !matches!(c, '-' | '_')).collect();
         match plain.to_ascii_lowercase().as_str() {
             "seed" => match parse_number(value.as_bytes()).and_then(whole) {

@@ -13,7 +13,7 @@ use super::curves::joined;
 use super::displacement::{Displacement, Refused};
 use super::exact_shapes::exact_shape;
 use super::params::{Param, Params, Type};
-use super::source::{AtSpot, Fault, Result, Spot};
+use super::source::{AtSpot, Fault, Result, SourcePosition};
 use super::state::State;
 use super::subdivision;
 use super::textures::vec3;
@@ -151,7 +151,7 @@ impl Converter<'_, '_> {
     fn area_light_of(
         &mut self,
         geometry: &GeometryDesc,
-        spot: Spot,
+        spot: SourcePosition,
         state: &State,
     ) -> Result<Option<lumbre_scene::AreaLightDesc>> {
         let Some(light) = &state.area_light else { return Ok(None) };
@@ -180,7 +180,7 @@ impl Converter<'_, '_> {
                     .as_ref()
                     .is_some_and(|m| matches!(m.kind, lumbre_shading::MaterialKind::Interface));
                 if !is_known || is_interface {
-                    self.keep(size_of::<(MaterialId, Spot)>(), "area lights", spot)?;
+                    self.keep(size_of::<(MaterialId, SourcePosition)>(), "area lights", spot)?;
                     self.lights_to_check.push((id, spot));
                 }
             }
@@ -267,7 +267,7 @@ impl Converter<'_, '_> {
                     GeometryDesc::Exact(exact) if !exact.is_solid() => exact.name(),
                     GeometryDesc::BilinearMesh(_) => "bilinearmesh",
                     GeometryDesc::Mesh(mesh) => {
-                        self.keep(size_of::<(Arc<MeshDesc>, Spot)>(), "operands of a csg", at)?;
+                        self.keep(size_of::<(Arc<MeshDesc>, SourcePosition)>(), "operands of a csg", at)?;
                         self.meshes_to_close.push((mesh.clone(), at));
                         continue;
                     }
@@ -623,7 +623,7 @@ impl Converter<'_, '_> {
 
 impl Converter<'_, '_> {
     /// The mesh of a file with its vertices moved.
-    fn displaced(&mut self, displaced: &Displaced, at: Spot, file: &PlyFile) -> Result<MeshDesc> {
+    fn displaced(&mut self, displaced: &Displaced, at: SourcePosition, file: &PlyFile) -> Result<MeshDesc> {
         let texture = match &displaced.texture {
             Ok(texture) => texture.clone(),
             Err(param) => self.texture_named(param)?.texture,

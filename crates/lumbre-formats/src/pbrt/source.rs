@@ -6,7 +6,7 @@ use crate::{Diagnostic, FormatError, LimitError, Place};
 
 /// A line and a column of one of the [`Files`], both counted from 1, the column in characters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Spot {
+pub(super) struct SourcePosition {
     pub file: u32,
     pub line: u32,
     pub column: u32,
@@ -15,11 +15,11 @@ pub(super) struct Spot {
 /// The files read so far, with the place that included each.
 #[derive(Debug, Default)]
 pub(super) struct Files {
-    list: Vec<(Arc<str>, Option<Spot>)>,
+    list: Vec<(Arc<str>, Option<SourcePosition>)>,
 }
 
 impl Files {
-    pub fn add(&mut self, name: Arc<str>, from: Option<Spot>) -> u32 {
+    pub fn add(&mut self, name: Arc<str>, from: Option<SourcePosition>) -> u32 {
         self.list.push((name, from));
         self.list.len() as u32 - 1
     }
@@ -28,17 +28,17 @@ impl Files {
         &self.list[file as usize].0
     }
 
-    pub fn place(&self, spot: Spot) -> Place {
+    pub fn place(&self, spot: SourcePosition) -> Place {
         Place::text(self.name(spot.file).clone(), u64::from(spot.line), u64::from(spot.column))
     }
 
     /// `diagnostic` at `spot`, with the chain of includes that led there.
-    pub fn locate(&self, spot: Spot, diagnostic: Diagnostic) -> Diagnostic {
+    pub fn locate(&self, spot: SourcePosition, diagnostic: Diagnostic) -> Diagnostic {
         self.chain(spot).skip(1).fold(diagnostic.at(self.place(spot)), Diagnostic::included_from)
     }
 
     /// The place, that of the include that led to it, and so on outwards.
-    fn chain(&self, spot: Spot) -> impl Iterator<Item = Place> {
+    fn chain(&self, spot: SourcePosition) -> impl Iterator<Item = Place> {
         std::iter::successors(Some(spot), |spot| self.list[spot.file as usize].1).map(|spot| self.place(spot))
     }
 }
@@ -47,13 +47,13 @@ impl Files {
 #[derive(Debug)]
 pub(super) enum Fault {
     /// The scene is invalid here.
-    Input(Spot, Box<Diagnostic>),
+    Input(SourcePosition, Box<Diagnostic>),
     /// A limit is exceeded here.
-    Limit(Spot, Box<LimitError>),
+    Limit(SourcePosition, Box<LimitError>),
     /// Another reader has already reported what and where.
     Other(Box<FormatError>),
     /// As [`Fault::Other`], of a file that is named here.
-    Named(Spot, Box<FormatError>),
+    Named(SourcePosition, Box<FormatError>),
 }
 
 pub(super) type Result<T, E = Fault> = std::result::Result<T, E>;
@@ -77,7 +77,7 @@ impl From<FormatError> for Fault {
     }
 }
 
-impl Spot {
+impl SourcePosition {
     /// An error here.
     pub fn wrong(self, diagnostic: Diagnostic) -> Fault {
         Fault::Input(self, Box::new(diagnostic))
@@ -91,11 +91,11 @@ impl Spot {
 
 /// Adds the place to the error of a limit.
 pub(super) trait AtSpot<T> {
-    fn at(self, spot: Spot) -> Result<T>;
+    fn at(self, spot: SourcePosition) -> Result<T>;
 }
 
 impl<T> AtSpot<T> for std::result::Result<T, LimitError> {
-    fn at(self, spot: Spot) -> Result<T> {
+    fn at(self, spot: SourcePosition) -> Result<T> {
         self.map_err(|limit| Fault::Limit(spot, Box::new(limit)))
     }
 }

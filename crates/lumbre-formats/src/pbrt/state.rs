@@ -7,7 +7,7 @@ use lumbre_math::Transform;
 use lumbre_scene::{AreaLightDesc, Boundary, MaterialId, MediumId};
 
 use super::params::Defaults;
-use super::source::Spot;
+use super::source::SourcePosition;
 
 /// The kinds of entity that `Attribute` can set defaults for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,7 +33,7 @@ impl EntityKind {
 #[derive(Clone, Debug)]
 pub(super) struct AreaLight {
     pub desc: AreaLightDesc,
-    pub spot: Spot,
+    pub spot: SourcePosition,
 }
 
 /// The graphics state.
@@ -110,6 +110,6 @@ impl ScopeKind {
 #[derive(Debug)]
 pub(super) struct Scope {
     pub kind: ScopeKind,
-    pub spot: Spot,
+    pub spot: SourcePosition,
     pub saved: State,
 }

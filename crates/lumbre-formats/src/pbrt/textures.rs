@@ -17,7 +17,7 @@ use super::colour;
 use super::convert::{Converter, FloatArc, Known, MAX_TEXTURE_LEAVES, SpectrumArc, file_fault};
 use super::lexer::{Lexer, TokenKind, parse_number};
 use super::params::{Param, Params, Type, Values};
-use super::source::{AtSpot, Fault, Result, Spot};
+use super::source::{AtSpot, Fault, Result, SourcePosition};
 use crate::diagnostic::quoted;
 use crate::{Diagnostic, FormatError, Input};
 
@@ -121,7 +121,7 @@ pub(super) struct LightSpectrum {
 }
 
 /// Why an image cannot be had, and where it is named.
-type Missing = (Spot, Box<Diagnostic>);
+type Missing = (SourcePosition, Box<Diagnostic>);
 
 /// The kinds of texture.
 pub(super) const KNOWN_KINDS: [&str; 13] = [
@@ -193,7 +193,7 @@ impl Converter<'_, '_> {
     }
 
     /// A built-in spectrum, else a file of pairs.
-    fn spectrum_named(&mut self, name: &str, at: Spot) -> Result<SpectrumValue> {
+    fn spectrum_named(&mut self, name: &str, at: SourcePosition) -> Result<SpectrumValue> {
         if let Some(named) = NamedSpectrum::from_name(name) {
             return Ok(SpectrumValue::Named(named));
         }
@@ -214,7 +214,7 @@ impl Converter<'_, '_> {
     }
 
     /// The numbers of a text file, which `what` names.
-    pub fn numbers_in_file(&mut self, path: &Path, what: &str, at: Spot) -> Result<Vec<f64>> {
+    pub fn numbers_in_file(&mut self, path: &Path, what: &str, at: SourcePosition) -> Result<Vec<f64>> {
         let input = Input::open(path, self.budget).map_err(|e| file_fault(at, e))?;
         let file = self.files.add(input.name().clone(), Some(at));
         let numbers_at_most = input.len() as u64 / 2 + 1;
@@ -256,7 +256,11 @@ impl Converter<'_, '_> {
     }
 
     /// The curve of a light's spectrum, shared with the light before where that has the same.
-    fn light_curve(&mut self, spectrum: SpectrumValue, spot: Spot) -> Result<Option<Arc<LightCurve>>> {
+    fn light_curve(
+        &mut self,
+        spectrum: SpectrumValue,
+        spot: SourcePosition,
+    ) -> Result<Option<Arc<LightCurve>>> {
         if let Some((last, curve)) = &self.last_light
             && *last == spectrum
         {
@@ -274,7 +278,7 @@ impl Converter<'_, '_> {
         &mut self,
         colour: Spectrum,
         spectrum: SpectrumValue,
-        spot: Spot,
+        spot: SourcePosition,
     ) -> Result<SpectrumArc> {
         let pairs = match &spectrum {
             SpectrumValue::Rgb(_) => return Ok(self.colour(colour)),
@@ -380,7 +384,7 @@ impl Converter<'_, '_> {
     pub fn texture(
         &mut self,
         name: &str,
-        (value, value_at): (&str, Spot),
+        (value, value_at): (&str, SourcePosition),
         ty: &str,
         params: Params,
         ctm: Transform,
@@ -661,7 +665,11 @@ fn size<T: TextureValue>(known: &Known<T>) -> (usize, u64) {
 }
 
 /// A composite texture, checked against the limits on depth and evaluations.
-fn whole<T: TextureValue>(texture: Texture<T>, parts: &[(usize, u64)], spot: Spot) -> Result<Known<T>> {
+fn whole<T: TextureValue>(
+    texture: Texture<T>,
+    parts: &[(usize, u64)],
+    spot: SourcePosition,
+) -> Result<Known<T>> {
     let depth = 1 + parts.iter().map(|(depth, _)| *depth).max().unwrap_or(0);
     let leaves = parts.iter().fold(1u64, |sum, (_, leaves)| sum.saturating_add(*leaves));
     if depth > Texture::<T>::MAX_DEPTH {

@@ -7,10 +7,10 @@ use lumbre_math::DVec3;
 use lumbre_math::roots::roots_between;
 
 /// The highest degree.
-pub(super) const MOST_DEGREE: u32 = 15;
+pub(super) const MAX_DEGREE: u32 = 15;
 
 /// A polynomial of one variable by its powers.
-type Powers = [f64; MOST_DEGREE as usize + 1];
+type Powers = [f64; MAX_DEGREE as usize + 1];
 
 /// Where a polynomial is not above 0.
 #[derive(Clone, Debug)]
@@ -31,7 +31,7 @@ fn grown(c: &mut Powers, [o, d]: [f64; 2], plus: &Powers) {
 }
 
 impl Algebraic {
-    /// A polynomial of a degree up to [`MOST_DEGREE`], with all its terms.
+    /// A polynomial of a degree up to [`MAX_DEGREE`], with all its terms.
     pub(super) fn new(degree: u32, terms: Arc<[f64]>) -> Self {
         Self { degree, terms }
     }
@@ -39,7 +39,7 @@ impl Algebraic {
     /// The polynomial along a line, by Horner's rule.
     fn along(&self, o: DVec3, d: DVec3) -> Powers {
         let constant = |x: f64| {
-            let mut c: Powers = [0.0; MOST_DEGREE as usize + 1];
+            let mut c: Powers = [0.0; MAX_DEGREE as usize + 1];
             c[0] = x;
             c
         };

@@ -13,8 +13,8 @@ use crate::diagnostic::quoted;
 
 /// Texts are no longer than this.
 const LONGEST_TEXT: usize = 1 << 20;
-/// Numbers are printed with at most so many digits.
-const MOST_DIGITS: f64 = 300.0;
+/// Numbers are printed with at most this many digits.
+const MAX_DIGITS: f64 = 300.0;
 
 impl Parser<'_, '_> {
     /// A constant by its name.
@@ -310,7 +310,7 @@ impl Parser<'_, '_> {
         let width = self.float()?;
         self.comma()?;
         let digits = self.float()?;
-        Ok((width.clamp(-MOST_DIGITS, MOST_DIGITS), digits.clamp(-1.0, MOST_DIGITS)))
+        Ok((width.clamp(-MAX_DIGITS, MAX_DIGITS), digits.clamp(-1.0, MAX_DIGITS)))
     }
 }
 

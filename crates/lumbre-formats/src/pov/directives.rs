@@ -16,7 +16,7 @@ use crate::diagnostic::quoted;
 const EPSILON: f64 = 1e-10;
 
 /// Messages of a scene are cut off after this.
-const MOST_SHOWN: usize = 500;
+const MAX_SHOWN: usize = 500;
 
 impl Parser<'_, '_> {
     /// What follows a `#`.
@@ -162,7 +162,7 @@ impl Parser<'_, '_> {
         }
     }
 
-    /// Skips past so many `#end`s.
+    /// Skips past this many `#end`s.
     fn skip_to_end(&mut self, count: usize) -> Result<()> {
         for _ in 0..count {
             while &*self.skip(false)? != "end" {}
@@ -558,7 +558,7 @@ impl Parser<'_, '_> {
 
     fn show(&mut self, word: &str) -> Result<()> {
         let text = self.string()?;
-        let shown: String = text.trim().chars().take(MOST_SHOWN).collect();
+        let shown: String = text.trim().chars().take(MAX_SHOWN).collect();
         if !shown.is_empty() {
             let message = format!("the scene says: {}", quoted(&shown));
             let made =

@@ -9,7 +9,7 @@ use super::objects::Form;
 use super::{Parser, Result};
 
 /// More steps than this tell no more points apart.
-const MOST_ITERATIONS: f64 = 200.0;
+const MAX_ITERATIONS: f64 = 200.0;
 
 impl Parser<'_, '_> {
     fn four(&mut self) -> Result<DVec4> {
@@ -49,7 +49,7 @@ impl Parser<'_, '_> {
                 }
                 "max_iteration" => {
                     self.peeked = None;
-                    julia.iterations = self.whole(1.0, MOST_ITERATIONS)?;
+                    julia.iterations = self.whole(1.0, MAX_ITERATIONS)?;
                     continue;
                 }
                 "precision" => {

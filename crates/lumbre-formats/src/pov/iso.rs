@@ -77,7 +77,7 @@ impl Container {
 /// The part of roots on the container.
 const ON_CONTAINER: u32 = 1;
 /// A ray looks at the function at most so often.
-const MOST_EVALUATIONS: u32 = 50_000;
+const MAX_EVALUATIONS: u32 = 50_000;
 
 impl Iso {
     fn value(&self, p: DVec3) -> f64 {
@@ -131,7 +131,7 @@ impl Iso {
                 if !changes && fa.abs() + fb.abs() > slope * (b - a) {
                     continue;
                 }
-                if b - a < least || evaluations > MOST_EVALUATIONS {
+                if b - a < least || evaluations > MAX_EVALUATIONS {
                     if changes {
                         out.push(Root::at(refined(&at, a, b, fa < 0.0)));
                     }

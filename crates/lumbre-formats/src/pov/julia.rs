@@ -6,7 +6,7 @@ use lumbre_math::{DVec3, DVec4, Elementary};
 /// Beyond this length a point has escaped.
 const ESCAPED: f64 = 4.0;
 /// A ray looks at the set at most so often.
-const MOST_STEPS: u32 = 4000;
+const MAX_STEPS: u32 = 4000;
 
 /// How four numbers are multiplied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,7 +110,7 @@ impl Julia {
         let least = 0.1 / self.precision;
         let (mut s, mut was_inside) = (low, None);
         let mut before = low;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             if s >= high {
                 break;
             }

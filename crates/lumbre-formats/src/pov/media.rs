@@ -8,8 +8,8 @@ use lumbre_shading::pov::{Media, Phase, Pigment, Scattering};
 use super::value::Value;
 use super::{Parser, Result};
 
-/// A density is asked for at so many places along a ray at most.
-const MOST_SAMPLES: f64 = 200.0;
+/// Places along a ray at which a density is evaluated, at most.
+const MAX_SAMPLES: f64 = 200.0;
 
 impl Parser<'_, '_> {
     /// A medium in braces, whose word was taken.
@@ -35,9 +35,9 @@ impl Parser<'_, '_> {
                     self.budget.bytes(size_of::<Pigment>() as u64, "densities")?;
                     media.densities.push(self.density_block()?);
                 }
-                "intervals" => intervals = self.whole(1.0, MOST_SAMPLES)?,
+                "intervals" => intervals = self.whole(1.0, MAX_SAMPLES)?,
                 "samples" => {
-                    media.samples = self.whole(1.0, MOST_SAMPLES)?;
+                    media.samples = self.whole(1.0, MAX_SAMPLES)?;
                     if self.take(b',')? {
                         self.float()?;
                     }
@@ -56,7 +56,7 @@ impl Parser<'_, '_> {
                 },
             }
         }
-        media.samples = (media.samples * intervals).min(MOST_SAMPLES as u32);
+        media.samples = (media.samples * intervals).min(MAX_SAMPLES as u32);
         Ok(media)
     }
 

@@ -7,7 +7,7 @@ use lumbre_geometry::{Aabb, Ray, Triangle};
 use lumbre_math::{DVec2, DVec3, Transform};
 use lumbre_scene::MeshDesc;
 
-/// So many triangles, or fewer, are looked at one after another.
+/// Up to this many triangles are tested one after another.
 const LEAF: usize = 8;
 
 /// Trees by the addresses of their meshes, which stay as long as that.

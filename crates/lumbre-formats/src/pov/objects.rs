@@ -7,7 +7,7 @@ use lumbre_math::{DVec3, Transform};
 use lumbre_scene::MeshDesc;
 use lumbre_shading::pov::{InsideTest, Interior, PatternKind, Texture, Visibility};
 
-use super::algebraic::{Algebraic, MOST_DEGREE};
+use super::algebraic::{Algebraic, MAX_DEGREE};
 use super::lights::LightStatement;
 use super::textures::{layered, moved_interior};
 use super::value::{Num, Value};
@@ -113,7 +113,7 @@ impl Object {
 }
 
 /// Superellipsoids of smaller exponents have this one: their edges are as sharp as can be told.
-const LEAST_EXPONENT: f64 = 1e-3;
+const MIN_EXPONENT: f64 = 1e-3;
 
 impl Parser<'_, '_> {
     /// The object of a word, which comes next; `None` if it is the word of none.
@@ -276,7 +276,7 @@ impl Parser<'_, '_> {
                 if !(e >= 0.0 && n >= 0.0) {
                     return Err(self.error("a superellipsoid has two exponents that are not negative"));
                 }
-                Form::Superellipsoid(e.max(LEAST_EXPONENT), n.max(LEAST_EXPONENT))
+                Form::Superellipsoid(e.max(MIN_EXPONENT), n.max(MIN_EXPONENT))
             }
             "quadric" => self.quadric()?,
             "cubic" => self.poly(3)?,
@@ -284,7 +284,7 @@ impl Parser<'_, '_> {
             "poly" => {
                 let degree = self.whole(0.0, 99.0)?;
                 self.comma()?;
-                if !(2..=MOST_DEGREE).contains(&degree) {
+                if !(2..=MAX_DEGREE).contains(&degree) {
                     return Err(self.error("the degree of a poly is from 2 to 15"));
                 }
                 self.poly(degree)?

@@ -9,7 +9,7 @@ use super::objects::Form;
 use super::{Parser, Result};
 
 /// A patch is divided at most so often in each direction.
-const MOST_STEPS: f64 = 7.0;
+const MAX_STEPS: f64 = 7.0;
 
 impl Parser<'_, '_> {
     /// A Bézier patch, divided as often as it says, with its own normals; up to what modifies it.
@@ -19,9 +19,9 @@ impl Parser<'_, '_> {
             if self.take_word("type")? || self.take_word("flatness")? || self.take_word("accuracy")? {
                 self.float()?;
             } else if self.take_word("u_steps")? {
-                u_steps = self.whole(0.0, MOST_STEPS)?;
+                u_steps = self.whole(0.0, MAX_STEPS)?;
             } else if self.take_word("v_steps")? {
-                v_steps = self.whole(0.0, MOST_STEPS)?;
+                v_steps = self.whole(0.0, MAX_STEPS)?;
             } else if self.take_word("uv_vectors")? {
                 for _ in 0..4 {
                     self.vector()?;

@@ -320,7 +320,7 @@ impl Region {
             }
             Self::Others { operation, parts, except } => {
                 // Of very many parts a box would take longer than it saves.
-                let others = parts.iter().enumerate().take(MOST_BOUNDED).filter(|(j, _)| j != except);
+                let others = parts.iter().enumerate().take(MAX_BOUNDED).filter(|(j, _)| j != except);
                 let around = others.filter(|(j, _)| is_inside_of(*operation, *j));
                 around.filter_map(|(_, part)| part.bounds()).reduce(|a, b| common(&a, &b))
             }
@@ -328,8 +328,8 @@ impl Region {
     }
 }
 
-/// Of so many parts of an intersection the boxes are looked at.
-const MOST_BOUNDED: usize = 64;
+/// The boxes of at most this many parts of an intersection are considered.
+const MAX_BOUNDED: usize = 64;
 
 /// Whether the surfaces of a group are inside of its part of a number, or outside.
 fn is_inside_of(operation: Operation, part: usize) -> bool {

@@ -145,7 +145,7 @@ impl Parser<'_, '_> {
         Ok(Some(token))
     }
 
-    /// The token that comes so many after the next one, as it stands, in the same frame.
+    /// The token this far behind the next one, unexpanded, in the same frame.
     pub(super) fn raw_ahead(&self, ahead: usize) -> Option<&Kind> {
         let frame = self.frames.last()?;
         let at = frame.at + ahead;

@@ -3,11 +3,11 @@
 use lumbre_geometry::{Aabb, Ray, Root, Roots};
 use lumbre_math::{DVec2, DVec3, DVec4};
 
-/// A segment of a curve that is no line is taken for so many round cones; the error is below the square of its inverse.
+/// A segment of a curve that is no line is approximated by this many round cones; the error is below the square of its inverse.
 const PIECES: u32 = 512;
 /// As near as it begins, few steps are exact.
 const NEWTON_STEPS: u32 = 3;
-/// So many round cones have a box together.
+/// Round cones that share one box.
 const GROUP: usize = 16;
 
 /// Center and radius as a cubic in u from 0 to 1, by powers.

@@ -40,7 +40,7 @@ impl Num {
         Self { v: v.map(|c| f64::from(c as f32)), n: 5, is_colour: true }
     }
 
-    /// The components as a vector of so many: a number is all of them.
+    /// The value as a vector of `N` components: a number fills all of them.
     pub(super) fn promoted(&self, n: usize) -> [f64; 5] {
         if self.n > 1 {
             return self.v;

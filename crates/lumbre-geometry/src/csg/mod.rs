@@ -8,7 +8,7 @@ use lumbre_math::{DVec2, DVec3, Transform};
 
 use crate::placed::into_world;
 use crate::shape::unsampled;
-use crate::{Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Roots, Surface};
+use crate::{Aabb, BoundingVolume, NearestPoint, NearestPointError, Ray, Root, Roots, Surface};
 
 pub use leaf::{Crossing, Crossings, Leaf, LeafPart, Solid};
 pub(crate) use spans::{Event, Events, Membership, coincident};
@@ -127,17 +127,17 @@ impl Csg {
     /// doubt.
     ///
     /// # Errors
-    /// [`NoNearestPoint`] where it does not, and where a leaf has no answer.
+    /// [`NearestPointError`] where it does not, and where a leaf has no answer.
     pub fn closest_point(
         &self,
         world_from_object: &Transform,
         p: DVec3,
-    ) -> Result<NearestPoint, NoNearestPoint> {
+    ) -> Result<NearestPoint, NearestPointError> {
         let leaf_point = |leaf: &Leaf, p: DVec3| match leaf {
             Leaf::Shape(shape) => {
                 shape.shape().closest_point(&(*world_from_object * shape.world_from_object()), p)
             }
-            Leaf::Solid { .. } => Err(NoNearestPoint::Csg),
+            Leaf::Solid { .. } => Err(NearestPointError::Csg),
         };
         let mut best: Option<(usize, NearestPoint)> = None;
         for (i, leaf) in self.leaves.iter().enumerate() {
@@ -146,7 +146,7 @@ impl Csg {
                 best = Some((i, found));
             }
         }
-        let (nearest, found) = best.ok_or(NoNearestPoint::Csg)?;
+        let (nearest, found) = best.ok_or(NearestPointError::Csg)?;
         // Every point of the result lies on a leaf, so none is nearer. It remains to check that this point is
         // on the result.
         let mut membership = Membership::new(self);
@@ -155,7 +155,7 @@ impl Csg {
             let size = found.point.abs().max_element().max(p.abs().max_element());
             let is_clear = leaf_point(leaf, found.point)?.distance > CLEAR * (size + found.distance);
             if !is_clear {
-                return Err(NoNearestPoint::Csg);
+                return Err(NearestPointError::Csg);
             }
             if leaf.contains(object_point) {
                 membership.cross(i as u32, true);
@@ -164,7 +164,7 @@ impl Csg {
         let contains_outside = membership.contains(0);
         membership.cross(nearest as u32, true);
         if membership.contains(0) == contains_outside {
-            return Err(NoNearestPoint::Csg);
+            return Err(NearestPointError::Csg);
         }
         let part = (self.first_part[nearest] + found.part) << 1 | u32::from(self.leaf_nodes[nearest].1);
         Ok(NearestPoint { part, ..found })

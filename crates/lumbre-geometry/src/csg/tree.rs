@@ -31,7 +31,7 @@ pub(super) enum NodeKind {
 }
 
 /// Operands of a union that are not grouped: a ray looks at the box of each.
-const MOST_TOGETHER: usize = 8;
+const MAX_TOGETHER: usize = 8;
 
 /// An operand on its way into a tree.
 struct Operand {
@@ -43,7 +43,7 @@ struct Operand {
 /// Many operands in two halves, by the middles of their boxes along the axis on which these are farthest apart, and a group of those
 /// that are unbounded; `None` for few.
 fn halves(operands: &mut [Operand]) -> Option<[&mut [Operand]; 3]> {
-    if operands.len() <= MOST_TOGETHER {
+    if operands.len() <= MAX_TOGETHER {
         return None;
     }
     let bounds = |operand: &Operand| operand.nodes.first().and_then(|node| node.bounds);
@@ -158,7 +158,7 @@ impl Csg {
         if depth > Self::MAX_DEPTH {
             return Err(ShapeError::Degenerate("csg shapes are nested deeper than 1024"));
         }
-        if kind == NodeKind::Difference && operands.len() > MOST_TOGETHER {
+        if kind == NodeKind::Difference && operands.len() > MAX_TOGETHER {
             // What is taken away together is grouped as a union is.
             let taken = Self::combine(NodeKind::Union, operands.split_off(1))?;
             operands.push(taken);

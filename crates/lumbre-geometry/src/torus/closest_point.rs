@@ -4,18 +4,18 @@ use lumbre_math::{DVec2, DVec3, Elementary, Transform};
 
 use super::Torus;
 use crate::nearest::under_similarity;
-use crate::{NearestPoint, NoNearestPoint};
+use crate::{NearestPoint, NearestPointError};
 
 impl Torus {
     /// The nearest point to `p` under a similarity.
     ///
     /// # Errors
-    /// [`NoNearestPoint::Map`] for other maps.
+    /// [`NearestPointError::Map`] for other maps.
     pub fn closest_point(
         &self,
         world_from_object: &Transform,
         p: DVec3,
-    ) -> Result<NearestPoint, NoNearestPoint> {
+    ) -> Result<NearestPoint, NearestPointError> {
         under_similarity(world_from_object, p, |p| {
             let local = self.framed(p - self.center);
             let rho = local.x.hypotenuse(local.y);

@@ -1,8 +1,8 @@
-//! Rays of a picture: columns in, columns out.
+//! Picture rays: columns in, columns out.
 //!
-//! Where single precision traverses the tree, rays are rounded once, relative to the mesh's origin, and take the ways of
-//! [`Ray32`]: coherent ones in packets, the others one by one in small trees and interleaved in large ones. All others
-//! take those of double precision. What is answered depends on the ray alone.
+//! If single precision can traverse the tree, rays are rounded once, relative to the mesh's origin, and traversed like
+//! [`Ray32`]: coherent rays in packets, the others one by one in small trees and interleaved in large ones. All other
+//! rays are traversed in double precision. Each answer depends only on its ray.
 
 use std::marker::PhantomData;
 
@@ -25,7 +25,7 @@ use crate::tree::filter_start::FilterStart;
 use crate::tree::packed::Start;
 use crate::tree::picture_start::PictureStart;
 
-/// How many rays are put side by side at a time.
+/// Rays that are transposed at a time.
 const PIECE: usize = 4096;
 
 /// [`Accel::closest_columns`].
@@ -67,7 +67,7 @@ pub(crate) fn any(isa: Isa, tree: &Tree, rays: &RayColumns, exact: bool, occlude
     }
 }
 
-/// Rays in double precision, piece by piece, each with the position of its first.
+/// Calls `answer` with pieces of the rays in double precision, each with the position of its first.
 fn traverse_f64(columns: &RayColumns, mut answer: impl FnMut(&[Ray], usize)) {
     let mut rays = Vec::with_capacity(columns.len().min(PIECE));
     for first in (0..columns.len()).step_by(PIECE) {
@@ -77,7 +77,7 @@ fn traverse_f64(columns: &RayColumns, mut answer: impl FnMut(&[Ray], usize)) {
     }
 }
 
-/// Rays in single precision, piece by piece.
+/// Traverses rays in single precision, piece by piece.
 fn traverse_f32<G: Goal, A: Answer>(
     isa: Isa,
     tree: &Tree,
@@ -108,7 +108,7 @@ fn traverse_f32<G: Goal, A: Answer>(
     }
 }
 
-/// Rays in packets, or one after the other where there are none.
+/// Traverses rays in packets, or one by one if packets are not used.
 fn batch<P: Precision, S: Sink<P::Answer>>(
     isa: Isa,
     tree: &Tree,
@@ -124,7 +124,7 @@ fn batch<P: Precision, S: Sink<P::Answer>>(
     }
 }
 
-/// Rays one after the other, where there are no packets.
+/// Rays one by one, if packets are not used.
 struct OneByOne<'a, P: Precision, S> {
     tree: &'a Tree,
     start: &'a FilterStart,
@@ -144,7 +144,7 @@ impl<P: Precision, S: Sink<P::Answer>> Dispatch for OneByOne<'_, P, S> {
     }
 }
 
-/// Single precision in trees of anything.
+/// Single precision in trees of any primitives.
 struct Picture<G>(PhantomData<G>);
 
 impl<G: Goal> Precision for Picture<G> {
@@ -166,7 +166,7 @@ impl<G: Goal> Precision for Picture<G> {
         Search { tree, picture, from: Start::WHOLE, ray, local, limit }.run::<G, L, true>()
     }
 
-    // Leaves of anything but triangles keep single rays busy.
+    // Leaves of other primitives keep single rays busy.
     #[inline(always)]
     fn interleave<L: Simd>(
         decider: &Decider,
@@ -181,7 +181,7 @@ impl<G: Goal> Precision for Picture<G> {
     }
 }
 
-/// The answers of a piece in a tree of anything.
+/// The answers of a piece, in a tree of any primitives.
 struct PictureSink<'a, A> {
     first: usize,
     answer: &'a mut A,
@@ -198,7 +198,7 @@ impl<A: Answer> Sink<Option<Crossing>> for PictureSink<'_, A> {
     }
 }
 
-/// One ray, where a batch has given it up.
+/// A single ray that a batch gave up.
 struct Alone<'a, G> {
     tree: &'a Tree,
     picture: &'a PictureStart,
@@ -215,14 +215,14 @@ impl<G: Goal> Dispatch for Alone<'_, G> {
     }
 }
 
-/// Takes the answers of rays in single precision.
+/// Receives the answers of rays in single precision.
 trait Answer {
     type Goal: Goal;
-    /// The answer to a ray, by its position among all.
+    /// The answer for a ray, by its position among all.
     fn put(&mut self, position: usize, hit: Option<Hit32>);
-    /// The same in a tree of anything.
+    /// The answer in a tree of any primitives.
     fn put_crossing(&mut self, position: usize, crossing: Crossing);
-    /// The same by double precision.
+    /// The answer by double precision.
     fn put_exactly(&mut self, position: usize);
 }
 

@@ -1,15 +1,15 @@
 //! Packets in single precision: triangles are tested by the operations of [`F32Ray`].
 //!
-//! What [`packet`](super::packet) says of boxes and triangles holds here. A ray's margin among boxes is that of its triangles and of the
-//! arithmetic; of the latter, which a frustum does in another order, twice as much is added. Triangles are culled by the same bounds,
-//! which allow 32u of their size for the roundings of a ray's sheared corners and of the middle's, where these are off by
-//! 8.1u and a little more.
+//! The error bounds of [`packet`](super::packet) for boxes and triangles hold here. A ray's margin among boxes is that
+//! of its triangles plus that of the arithmetic; a frustum uses another order of operations, so twice the latter is
+//! added. Triangles are culled by the same bounds, which allow 32u of their size for the rounding of the sheared
+//! corners of the rays and of the middle; these have errors of slightly more than 8.1u.
 
 use std::marker::PhantomData;
 
 use lumbre_geometry::Ray;
 
-use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, Start, State};
+use super::packet::{ALL, Bundle, Cull, CullBounds, PACKET, Signs, Start, State, WorkBudget};
 use super::sink::Sink;
 use crate::intersect::box_ray::SlabRows;
 use crate::intersect::f32_ray::{F32Ray, within};
@@ -26,16 +26,17 @@ use crate::tree::Corners;
 use crate::tree::node::TreeSpace;
 use crate::tree::triangle_block::TriangleBlock;
 
-/// A ray of a packet: alone, in trees of triangles, or with the same ray in double precision, in trees of anything.
+/// A ray of a packet: alone, in trees of triangles, or with the same ray in double precision, in trees of any
+/// primitives.
 pub(super) trait PacketRay: Sized + 'static {
     type Answer;
-    /// Whether the tree has leaves of anything but triangles.
+    /// Whether the tree has other leaves than triangles.
     const GENERAL: bool;
 
     /// In single precision.
     fn local(&self) -> &Ray32;
 
-    /// In double precision, for leaves of anything but triangles.
+    /// In double precision, for other leaves than triangles.
     fn in_f64(&self) -> Option<&Ray>;
 
     /// Hands out the answers of a packet's rays: see [`Bundle::put`].
@@ -48,34 +49,34 @@ pub(super) trait PacketRay: Sized + 'static {
     );
 }
 
-/// A ray of a picture in a tree of anything.
+/// A picture ray in a tree of any primitives.
 #[derive(Clone, Copy)]
 pub(super) struct PictureRay {
     /// Relative to the mesh, and rounded.
     pub(super) local: Ray32,
-    /// As it is.
+    /// The original ray.
     pub(super) ray: Ray,
 }
 
 /// The rays of a packet.
 pub(super) struct F32Bundle<'a, 'd, G, R> {
     decider: &'d Decider<'a>,
-    /// The rays, number by number: origin (relative to the mesh once they have started), first `t`, direction, last `t`.
+    /// The rays, transposed: origin (relative to the mesh after the start), first `t`, direction, last `t`.
     rows: [Row<f32>; 8],
     axes: &'static Axes,
-    /// Each among triangles, as a [`F32Ray`].
+    /// Each ray among triangles, as a [`F32Ray`].
     origin: [Row<f32>; 3],
     shear: [Row<f32>; 2],
     minus_inverse: Row<f32>,
     t_min: Row<f32>,
     /// Ends at the closest hit.
     t_max: Row<f32>,
-    /// The triangle of the closest hit: eight times the place of its block, and the lane.
+    /// The triangle of the closest hit: eight times the line of its block, plus the lane.
     triangle: Row<f32>,
     /// Its weights: of the second and the third corner, and of all.
     weights: [Row<f32>; 3],
     has_one_origin: bool,
-    /// What each meets of anything but triangles, once they have come to something else.
+    /// The crossings of each ray with other primitives, once the rays have come to some.
     others: Vec<Others<'a>>,
     others_started: bool,
     goal: PhantomData<(G, R)>,
@@ -85,8 +86,8 @@ pub(super) struct F32Bundle<'a, 'd, G, R> {
 const NONE: u32 = u32::MAX;
 
 impl<G: Goal, R: PacketRay> F32Bundle<'_, '_, G, R> {
-    /// Those of some rays for which a triangle that they hit at the same `t` as the best comes before it. `enters` has a bit for each
-    /// ray that enters through it.
+    /// The rays for which a triangle hit at the same `t` as the best comes first. `enters` has a bit for each ray that
+    /// enters through it.
     #[cold]
     #[inline(never)]
     fn those_before(&self, mut mask: u32, place: u32, lane: u32, enters: u32) -> u32 {
@@ -104,7 +105,7 @@ impl<G: Goal, R: PacketRay> F32Bundle<'_, '_, G, R> {
         first
     }
 
-    /// Tests a leaf of anything but triangles, or what has no bounds, ray by ray.
+    /// Tests other leaves than triangles, or unbounded geometry, ray by ray.
     #[inline(always)]
     fn test_others<L: Simd>(&mut self, state: &mut State, leaf: Option<u32>, rays: &[R; PACKET]) {
         if !self.others_started {
@@ -176,7 +177,7 @@ impl<G: Goal, R: PacketRay> F32Bundle<'_, '_, G, R> {
     }
 }
 
-/// [`F32Bundle::test_others`] out of line: it is long, and its calls are few.
+/// [`F32Bundle::test_others`] out of line: it is long and rarely called.
 struct TestOthers<'s, 'a, 'd, G, R> {
     bundle: &'s mut F32Bundle<'a, 'd, G, R>,
     state: &'s mut State,
@@ -199,7 +200,7 @@ impl<'a, 'd, G: Goal, R: PacketRay> Bundle<'a, 'd> for F32Bundle<'a, 'd, G, R> {
     type Answer = R::Answer;
     const GENERAL: bool = R::GENERAL;
     const NEEDS_BOUNDS: bool = false;
-    const MOST_SPREAD: f32 = 0.3;
+    const MAX_SPREAD: f32 = 0.3;
 
     #[inline(always)]
     fn new(decider: &'d Decider<'a>) -> Self {
@@ -222,15 +223,16 @@ impl<'a, 'd, G: Goal, R: PacketRay> Bundle<'a, 'd> for F32Bundle<'a, 'd, G, R> {
         }
     }
 
-    // Less than in double precision, since single rays are faster; as much where there is anything but triangles.
+    // Less than in double precision, since single rays are faster; as much if there are other primitives than
+    // triangles.
     #[inline(always)]
-    fn effort(has_one_origin: bool) -> Effort {
+    fn effort(has_one_origin: bool) -> WorkBudget {
         match (R::GENERAL, has_one_origin, G::IS_ANY) {
-            (false, true, true) => Effort { most: 112, paying: 70 },
-            (false, true, false) => Effort { most: 210, paying: 84 },
-            (false, false, _) => Effort { most: 50, paying: 40 },
-            (true, _, true) => Effort { most: 600, paying: 400 },
-            (true, _, false) => Effort { most: 800, paying: 400 },
+            (false, true, true) => WorkBudget { most: 112, paying: 70 },
+            (false, true, false) => WorkBudget { most: 210, paying: 84 },
+            (false, false, _) => WorkBudget { most: 50, paying: 40 },
+            (true, _, true) => WorkBudget { most: 600, paying: 400 },
+            (true, _, false) => WorkBudget { most: 800, paying: 400 },
         }
     }
 
@@ -275,7 +277,7 @@ impl<'a, 'd, G: Goal, R: PacketRay> Bundle<'a, 'd> for F32Bundle<'a, 'd, G, R> {
         let (rows, start, splat) = (&mut self.rows, decider.start, L::F32x16::splat);
         let zero = splat(0.0);
         let (t_min, t_max) = (L::F32x16::load(&rows[3].0), L::F32x16::load(&rows[7].0));
-        // As of a single ray: minus zero is negative.
+        // As for a single ray: minus zero is negative.
         let is_before = splat(1.0).xor_sign(t_min).simd_lt(zero);
         let mut fits = zero.simd_le(t_min) & t_min.simd_le(t_max) & !is_before;
         let (mut is_long, mut is_near) = (0, true);
@@ -313,7 +315,7 @@ impl<'a, 'd, G: Goal, R: PacketRay> Bundle<'a, 'd> for F32Bundle<'a, 'd, G, R> {
             range: [t_min, t_max],
             center,
             off,
-            // That of a single ray, and twice that of its arithmetic among boxes.
+            // The margin of a single ray, and twice that of its arithmetic among boxes.
             margin_per_distance: TreeSpace::F32_MARGIN_PER_DISTANCE + 2.0 * start.margin_per_distance,
             margin: start.f32_margin + 2.0 * start.margin,
             has_one_origin,
@@ -373,7 +375,7 @@ impl<'a, 'd, G: Goal, R: PacketRay> Bundle<'a, 'd> for F32Bundle<'a, 'd, G, R> {
         let (ox, oy, oz) = (load(&own.origin[0].0), load(&own.origin[1].0), load(&own.origin[2].0));
         let (sx, sy) = (load(&own.shear[0].0), load(&own.shear[1].0));
         let at = |axis: usize, corner: usize| splat(corners[axis][corner][lane]);
-        // As `F32Ray::pass`, with the signs turned.
+        // As `F32Ray::pass`, with signs flipped.
         let (az, bz, cz) = (oz - at(kz, 0), oz - at(kz, 1), oz - at(kz, 2));
         let ax = (ox - at(kx, 0)) - sx * az;
         let bx = (ox - at(kx, 1)) - sx * bz;
@@ -385,7 +387,7 @@ impl<'a, 'd, G: Goal, R: PacketRay> Bundle<'a, 'd> for F32Bundle<'a, 'd, G, R> {
         let (u, v, w) = (bc - cy * bx, ca - ay * cx, ab - by * ax);
         let within = within([u, v, w]);
         let mask = splat(0.0).simd_le(within) & state.alive;
-        // Where any hit will do, to go on costs less than a branch that is often mispredicted.
+        // For any hit, continuing costs less than a branch that is often mispredicted.
         if mask == 0 && !G::IS_ANY {
             return;
         }
@@ -486,7 +488,7 @@ impl PacketRay for Ray32 {
             let mut ids = [L::F32x16::splat(0.0); 3];
             let mut rest = hits;
             while rest != 0 {
-                // Many may have hit the same.
+                // Many rays may have hit the same triangle.
                 let own = bundle.triangle.0[rest.trailing_zeros() as usize % PACKET].to_bits();
                 let with_this = triangle.with_bits(own);
                 rest &= !with_this;
@@ -565,7 +567,7 @@ impl PacketRay for PictureRay {
     }
 }
 
-/// Hands out the answers of those in the mask.
+/// Hands out the answers of the rays in the mask.
 #[inline(always)]
 fn put_chosen(
     mut mask: u32,

@@ -16,9 +16,9 @@ use crate::trace::{LaneHits, Outcome};
 use crate::tree::BLOCK;
 use crate::tree::triangle_block::TriangleBlock;
 
-/// A ray among triangles, and the nearest that it has hit: a cache line.
+/// A ray among triangles and its nearest hit: one cache line.
 pub(super) struct F32Slot<'a, 'd, G> {
-    /// Ends at the nearest.
+    /// Ends at the nearest hit.
     ray: F32Ray,
     nearest: Nearest,
     goal: PhantomData<(G, &'d Decider<'a>)>,

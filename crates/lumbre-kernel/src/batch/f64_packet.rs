@@ -1,11 +1,11 @@
-//! Packets in double precision: triangles are tested as by a single ray, with the bounds of [`BlockRay`].
+//! Packets in double precision: triangles are tested like single rays, with the bounds of [`BlockRay`].
 
 use std::marker::PhantomData;
 
 use lumbre_geometry::Ray;
 use lumbre_math::DVec2;
 
-use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, Start, State, record};
+use super::packet::{ALL, Bundle, Cull, CullBounds, PACKET, Signs, Start, State, WorkBudget, record};
 use super::sink::Sink;
 use crate::intersect::box_ray::SlabRows;
 use crate::intersect::box_ray::Slabs;
@@ -26,10 +26,10 @@ use crate::tree::triangle_block::TriangleBlock;
 /// The rays of a packet.
 pub(super) struct F64Bundle<'a, 'd, G, const GENERAL: bool> {
     decider: &'d Decider<'a>,
-    /// The rays, number by number: origin, direction, range.
+    /// The rays, transposed: origin, direction, range.
     columns: [Row<f64>; 8],
     axes: &'static Axes,
-    /// Each among triangles, as a [`BlockRay`](watertight::BlockRay).
+    /// Each ray among triangles, as a [`BlockRay`](watertight::BlockRay).
     origin: [Row<f32>; 3],
     rest: [Row<f32>; 3],
     shear: [Row<f32>; 2],
@@ -38,23 +38,23 @@ pub(super) struct F64Bundle<'a, 'd, G, const GENERAL: bool> {
     surely_first: Row<f32>,
     surely_last: Row<f32>,
     s_per_height: Row<f32>,
-    /// A zero, negative where the last components of the directions are positive.
+    /// A zero, negative if the last components of the directions are positive.
     turn: f32,
-    /// The closest hits, by heights; a triangle is eight times the place of its block, and the lane.
+    /// The intervals of heights of the closest hits; a triangle is eight times the line of its block, plus the lane.
     from: Row<f32>,
     to: Row<f32>,
     triangle: Row<f32>,
-    /// Each in leaves of anything else, once they have come to some.
+    /// Each ray in other leaves, once the rays have come to some.
     others: Vec<Option<FilteredRay<'a, 'd, GENERAL, false>>>,
     others_started: bool,
     goal: PhantomData<G>,
 }
 
-/// No triangle: no hit, or one of something else.
+/// No triangle: no hit, or a hit of another primitive.
 const NONE: u32 = u32::MAX;
 const OTHER: u32 = u32::MAX - 1;
 
-/// What a direction is to planes, as for a single ray.
+/// The inverse of a direction in tree units, as for a single ray.
 #[inline(always)]
 fn inverse_of<W: F32x16>(start: &FilterStart, direction: W) -> W {
     let size = W::splat(start.space_per_unit) / direction.abs().max(W::splat(start.tiny));
@@ -77,7 +77,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> F64Bundle<'a, 'd, G, GENERAL>
         no_shorter
     }
 
-    /// Decides about a triangle that these rays may hit, where any hit will do.
+    /// Decides about a triangle that these rays may hit, for any hit.
     #[cold]
     #[inline(never)]
     fn decide_any(&self, state: &mut State, mut mask: u32, place: u32, lane: u32, rays: &[Ray; PACKET]) {
@@ -92,7 +92,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> F64Bundle<'a, 'd, G, GENERAL>
         }
     }
 
-    /// The same for the closest hit.
+    /// Decides about a triangle that these rays may hit, for the closest hit.
     #[cold]
     #[inline(never)]
     fn decide_closest(
@@ -119,7 +119,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> F64Bundle<'a, 'd, G, GENERAL>
         state.end_frustum();
     }
 
-    /// Takes a closer hit of one.
+    /// Takes a closer hit of a ray.
     #[inline(always)]
     fn keep(&mut self, state: &mut State, i: usize, (from, to): (f32, f32), triangle: u32) {
         (self.from.0[i], self.to.0[i]) = (from, to);
@@ -128,7 +128,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> F64Bundle<'a, 'd, G, GENERAL>
         state.slabs.s_max.0[i] = beyond(to * self.s_per_height.0[i]);
     }
 
-    /// The closest hit of one so far.
+    /// The closest hit of a ray so far.
     #[inline(always)]
     fn best(&self, i: usize) -> Candidate {
         let (triangle, heights) = (self.triangle.0[i].to_bits(), (self.from.0[i], self.to.0[i]));
@@ -139,14 +139,14 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> F64Bundle<'a, 'd, G, GENERAL>
         }
     }
 
-    /// The same, where that is of no triangle.
+    /// The closest hit of a ray so far, if it is not a triangle.
     #[inline(always)]
     fn exact(&self, i: usize) -> Option<Winner> {
         let is_other = GENERAL && self.triangle.0[i].to_bits() == OTHER;
         if is_other { self.others[i].as_ref().and_then(FilteredRay::exact) } else { None }
     }
 
-    /// Tests a leaf of anything but triangles, or what has no bounds, with those that go on, by the code of single rays.
+    /// Tests other leaves than triangles, or unbounded geometry, for the live rays, by the code of single rays.
     #[inline(always)]
     fn test_others<L: Simd>(&mut self, state: &mut State, leaf: Option<u32>, rays: &[Ray; PACKET]) {
         if !self.others_started {
@@ -173,7 +173,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> F64Bundle<'a, 'd, G, GENERAL>
         state.end_frustum();
     }
 
-    /// Starts those that go on among leaves of anything.
+    /// Starts the live rays among leaves of any kind.
     #[inline(always)]
     fn start_others<L: Simd>(&mut self, state: &mut State, rays: &[Ray; PACKET]) {
         let (decider, alive) = (self.decider, state.alive);
@@ -212,7 +212,7 @@ impl Dispatch for Comparison<'_, '_> {
     }
 }
 
-/// [`F64Bundle::test_others`] out of line: it is long, and its calls are few.
+/// [`F64Bundle::test_others`] out of line: it is long and rarely called.
 struct TestOthers<'s, 'a, 'd, G, const GENERAL: bool> {
     bundle: &'s mut F64Bundle<'a, 'd, G, GENERAL>,
     state: &'s mut State,
@@ -235,7 +235,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
     type Answer = G::Found;
     const GENERAL: bool = GENERAL;
     const NEEDS_BOUNDS: bool = true;
-    const MOST_SPREAD: f32 = 0.125;
+    const MAX_SPREAD: f32 = 0.125;
 
     #[inline(always)]
     fn new(decider: &'d Decider<'a>) -> Self {
@@ -262,16 +262,16 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
         }
     }
 
-    // Less for any hit, which a single ray has sooner, and for rays that start at different places, which soon part; more where
-    // there is anything but triangles, which costs a single ray more.
+    // Less for any hit, which a single ray finds faster, and for rays from different places, which soon diverge; more
+    // if there are other primitives than triangles, which cost a single ray more.
     #[inline(always)]
-    fn effort(has_one_origin: bool) -> Effort {
+    fn effort(has_one_origin: bool) -> WorkBudget {
         match (GENERAL, has_one_origin, G::IS_ANY) {
-            (false, true, true) => Effort { most: 160, paying: 100 },
-            (false, true, false) => Effort { most: 300, paying: 120 },
-            (false, false, _) => Effort { most: 70, paying: 50 },
-            (true, _, true) => Effort { most: 600, paying: 400 },
-            (true, _, false) => Effort { most: 800, paying: 400 },
+            (false, true, true) => WorkBudget { most: 160, paying: 100 },
+            (false, true, false) => WorkBudget { most: 300, paying: 120 },
+            (false, false, _) => WorkBudget { most: 70, paying: 50 },
+            (true, _, true) => WorkBudget { most: 600, paying: 400 },
+            (true, _, false) => WorkBudget { most: 800, paying: 400 },
         }
     }
 
@@ -289,7 +289,8 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
             length[axis] = direction.abs();
             negative[axis] = L::F32x16::splat(1.0).xor_sign(direction).simd_lt(zero);
         }
-        // For each pair, where the first is longer and where the second is: rounding keeps their order, or makes them equal.
+        // For each pair of components, where the first is longer and where the second is: rounding keeps their order,
+        // or makes them equal.
         let [x, y, z] = length;
         let mut longer = [y.simd_lt(x), z.simd_lt(y), z.simd_lt(x)];
         let shorter = [x.simd_lt(y), y.simd_lt(z), x.simd_lt(z)];
@@ -399,7 +400,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
             cull.middle_shear[place] = middle.first();
             cull.spread[place] = (shear - middle).abs().reduce_max();
             cull.apart[place] = if has_one_origin {
-                // Of the rest alone, with a shear of no more than one and few roundings.
+                // The error of the rest alone, with a shear of at most one and few roundings.
                 1.5 * (cull.apart[place] + cull.apart[2])
             } else {
                 off[2].neg_mul_add(shear, off[place] + sheared).abs().reduce_max()
@@ -438,7 +439,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
         let (rx, ry) = (load(&own.rest[0].0), load(&own.rest[1].0));
         let (sx, sy) = (load(&own.shear[0].0), load(&own.shear[1].0));
         let at = |axis: usize, corner: usize| splat(corners[axis][corner][lane]);
-        // As `Simd::intersect_triangles`, with the signs turned.
+        // As `Simd::intersect_triangles`, with signs flipped.
         let (az, bz, cz) = (oz - at(kz, 0), oz - at(kz, 1), oz - at(kz, 2));
         let ax = sx.neg_mul_add(az, ox - at(kx, 0) + rx);
         let bx = sx.neg_mul_add(bz, ox - at(kx, 1) + rx);
@@ -465,7 +466,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
         let least_spread = error * (ERRORS_OF_EXTENT * extent + ERRORS_OF_EDGES * height_error) + TINY;
         let spread = weight.mul_add(splat(height_error), splat(least_spread));
         let (from, to) = (ahead - spread, ahead + spread);
-        // A NaN may be in range.
+        // NaN may be in range.
         let is_out = to.simd_lt(weight * load(&own.first.0)) | (weight * load(&own.last.0)).simd_lt(from);
         let in_range = mask & !is_out;
         if in_range == 0 {
@@ -559,11 +560,11 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
 }
 
 impl<G: FilteredGoal, const GENERAL: bool> F64Bundle<'_, '_, G, GENERAL> {
-    /// Intersects the triangles of these closest hits in double precision, all at once.
+    /// Intersects the triangles of these closest hits in double precision, all in one call.
     #[inline(always)]
     fn intersect_all<L: Simd>(&self, decider: &Decider, hits: u32) -> Met {
         let (axes, triangle) = (self.axes, L::F32x16::load(&self.triangle.0));
-        // Many may have hit the same.
+        // Many rays may have hit the same triangle.
         let mut corners = [[Row::of(0.0); 3]; 3];
         let mut rest = hits;
         while rest != 0 {
@@ -590,12 +591,12 @@ impl<G: FilteredGoal, const GENERAL: bool> F64Bundle<'_, '_, G, GENERAL> {
         pairs.meet()
     }
 
-    /// The closest hit of one, on a triangle; `None` should double precision deny it.
+    /// The closest hit of a ray, on a triangle; `None` if double precision denies it.
     #[inline(always)]
     fn winner<L: Simd>(&self, decider: &Decider, met: &Met, i: usize, ray: &Ray) -> Option<Winner> {
         let (best, t) = (self.best(i), met.t.0[i]);
         if t.is_nan() {
-            // Uncertain: by itself, and exactly.
+            // Uncertain: decided exactly, for this ray alone.
             return decider.winner::<L>(ray, self.axes, &best);
         }
         let (geometry, primitive) = decider.ids(best.block, best.lane);

@@ -29,7 +29,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> F64Slot<'a, 'd, G, GENERAL> {
         }
     }
 
-    /// The closest of the triangles of a block, decided one after another.
+    /// The closest of a block's triangles, decided one after another.
     #[cold]
     #[inline(never)]
     fn compare_all(
@@ -70,7 +70,7 @@ impl Dispatch for ComparisonOfAll<'_, '_> {
             rest &= rest - 1;
             let (best, exact) = closer.map_or((best, exact), |closer| (closer, None));
             let (from, to) = (froms[lane as usize % BLOCK], tos[lane as usize % BLOCK]);
-            // A NaN is not farther.
+            // False for NaN.
             if from > best.to {
                 continue;
             }
@@ -136,7 +136,7 @@ impl<'a, 'd, G: FilteredGoal, L: Simd, const GENERAL: bool> RaySlot<'a, 'd, L>
     const GENERAL: bool = GENERAL;
     type Pass = Edges<L::F32x8>;
     type Passes = Edges<L::F32x16>;
-    /// The interval of heights that holds the crossing.
+    /// The interval of heights that contains the crossing.
     type At = [L::F32x8; 2];
 
     #[inline(always)]

@@ -1,8 +1,8 @@
-//! Many rays interleaved, so that the arithmetic of some fills the memory and branch latency of others.
+//! Interleaved rays: the arithmetic of some fills the memory and branch latency of others.
 //!
-//! Up to 64 rays stand in slots. In each turn, those that are at nodes, or those that are at leaves, take a step in short loops with
-//! few branches: which slots a loop is for is told by a mask that the loop before it made. Triangles are tested for two rays at a time,
-//! each at a block of its own: eight of the one and eight of the other fill a vector of sixteen.
+//! Up to 64 rays are in slots. In each turn, either the rays at nodes or those at leaves take a step, in short loops
+//! with few branches: each loop takes a mask of slots from the loop before it. Triangles are tested for two rays at a
+//! time, each with its own block: eight triangles of each fill a vector of sixteen.
 
 use bytemuck::Zeroable;
 
@@ -23,9 +23,9 @@ pub(super) trait RaySlot<'a, 'd, L: Simd>: Sized {
     type Goal: Goal;
     type Ray;
     type Answer;
-    /// Whether the tree has leaves of anything but triangles.
+    /// Whether the tree has other leaves than triangles.
     const GENERAL: bool;
-    /// How its line passes the triangles of a block, and how two lines do, each those of its block.
+    /// How a line passes the triangles of a block, and how two lines pass those of a block each.
     type Pass;
     type Passes: Copy + Zeroable;
     /// Where it hits each triangle.
@@ -33,21 +33,21 @@ pub(super) trait RaySlot<'a, 'd, L: Simd>: Sized {
 
     /// An empty slot.
     fn new(decider: &'d Decider<'a>) -> Self;
-    /// Starts with a ray; `None` where it is not sound, or starts too far away for single precision.
+    /// Starts with a ray; `None` if it is invalid, or starts too far away for single precision.
     fn start(&mut self, decider: &'d Decider<'a>, ray: &Self::Ray) -> Option<Slabs>;
-    /// How the lines of two pass the triangles of two blocks, each those of its own.
+    /// How two lines pass the triangles of their two blocks.
     fn pass_by_two(
         decider: &Decider,
         slots: [&Self; 2],
         blocks: [&TriangleBlock; 2],
     ) -> (PassedLanes, Self::Passes);
-    /// That of one of the two: `which` is 0 or 1.
+    /// The pass of one of the two lines: `which` is 0 or 1.
     fn one_of(passes: &Self::Passes, which: usize) -> Self::Pass;
     /// Which triangles in the mask it hits, and where.
     fn intersect(&self, mask: u32, pass: &Self::Pass) -> LaneHits<Self::At>;
-    /// Whether it hits any of these, which are to be decided exactly.
+    /// Whether it hits any of these triangles, decided exactly.
     fn hits_any(&self, decider: &Decider, ray: &Self::Ray, block: u32, uncertain: u32) -> Outcome<bool>;
-    /// Takes the closest hit in a block, if it is closer than the best; false where that is uncertain.
+    /// Takes the closest hit in a block, if it is closer than the best; false if that is uncertain.
     fn take_nearest(
         &mut self,
         decider: &Decider,
@@ -57,43 +57,43 @@ pub(super) trait RaySlot<'a, 'd, L: Simd>: Sized {
         pass: &Self::Pass,
         slabs: &mut Slabs,
     ) -> bool;
-    /// Tests what has no bounds.
+    /// Tests unbounded geometry.
     #[inline(always)]
     fn test_infinite(&mut self, _ray: &Self::Ray, _slabs: &mut Slabs) -> Option<Stop> {
         None
     }
-    /// Tests a leaf of anything but triangles, as a single ray does.
+    /// Tests a leaf of other primitives than triangles, as a single ray does.
     #[inline(always)]
     fn test_leaf(&mut self, _leaf: u32, _ray: &Self::Ray, _slabs: &mut Slabs) -> Option<Stop> {
         None
     }
-    /// What was found; `is_hit` where any hit will do.
+    /// The answer; for an any-hit search, `is_hit`.
     fn answer(&mut self, decider: &Decider, ray: &Self::Ray, is_hit: bool) -> Outcome<Self::Answer>;
 }
 
-/// The triangles of two blocks that two lines pass: eight bits for the first, and eight for the second.
+/// The triangles of two blocks that two lines pass: eight bits for each.
 pub(super) struct PassedLanes {
     /// Those that the rays may hit.
     pub(super) mask: u32,
-    /// Those that are to be decided exactly.
+    /// Those that need an exact decision.
     pub(super) uncertain: u32,
 }
 
-/// A bit for each in a word.
+/// One bit of a word for each.
 const SLOTS: usize = 64;
-/// How many have to be done, or all, before others start.
+/// New rays start when this many slots, or all, are done.
 const ENOUGH: u32 = 8;
-/// How many rays ahead one is prefetched.
+/// Rays are prefetched this far ahead.
 const AHEAD: usize = 2 * ENOUGH as usize;
 /// The position of a ray that was answered already.
 const ANSWERED: usize = usize::MAX;
-/// The reference of a ray that is done, and of one that is done because it has a hit and any will do.
+/// The reference of a finished ray, and of a ray that finished with a hit in an any-hit search.
 const DONE: u32 = tag::reference(tag::RETURN, 0);
 const HIT: u32 = tag::reference(tag::RETURN, 1);
 
 type Entry<'a, 'd, R, L> = <<R as RaySlot<'a, 'd, L>>::Goal as Goal>::Entry;
 
-/// A ray: what nodes are tested with is a cache line, and what triangles are, the next.
+/// A ray: its data for nodes is one cache line, and that for triangles the next.
 #[repr(C, align(64))]
 struct Slot<R> {
     slabs: Slabs,
@@ -101,7 +101,7 @@ struct Slot<R> {
     ray: R,
 }
 
-/// The positions of the bits that are set, the lowest first.
+/// The positions of the set bits, the lowest first.
 #[derive(Clone, Copy)]
 struct Bits(u64);
 
@@ -117,7 +117,7 @@ impl Iterator for Bits {
 }
 
 impl Bits {
-    /// Two at a time; the last of an odd number comes with itself.
+    /// Two at a time; the last of an odd number is paired with itself.
     #[inline(always)]
     fn by_two(self) -> ByTwo {
         ByTwo(self)
@@ -140,13 +140,13 @@ impl Iterator for ByTwo {
     }
 }
 
-/// The bit of a slot, if that is so.
+/// The bit of a slot, if `is_set`.
 #[inline(always)]
 fn bit(is: bool, slot: usize) -> u64 {
     u64::from(is) << slot
 }
 
-/// The rank of a slot among those of a mask: where arrays that are written in their order hold what belongs to it.
+/// The rank of a slot in a mask: its index in arrays that have one element for each slot of the mask.
 #[inline(always)]
 fn rank(slots: u64, slot: usize) -> usize {
     (slots & !(u64::MAX << slot)).count_ones() as usize % SLOTS
@@ -194,13 +194,13 @@ impl References {
         if !GENERAL {
             return Stations { nodes, triangles: leaves, others: 0, done: negative };
         }
-        // Of the negative ones, those that are done come last.
+        // Finished rays have the largest of the negative references.
         done &= negative;
         Stations { nodes, triangles: leaves & !others, others: others | negative & !done, done }
     }
 }
 
-/// All rays in slots, and what one loop hands on to another.
+/// All rays in slots, and the data that one loop passes to the next.
 struct Interleaved<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Simd> {
     decider: &'d Decider<'a>,
     nodes: &'a [Node],
@@ -211,13 +211,13 @@ struct Interleaved<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Simd> {
     references: References,
     /// The nodes that they come from.
     parents: References,
-    /// Which children of its node, or triangles of its block, each may hit.
+    /// The children of its node, or triangles of its block, that each ray may hit.
     masks: [u32; SLOTS],
-    /// Where each enters the bounding boxes of the children.
+    /// Where each ray enters the bounding boxes of the children.
     enters: [L::F32x16; SLOTS],
     passes: [R::Passes; SLOTS / 2],
     hits: [LaneHits<R::At>; SLOTS],
-    /// Which triangles are to be decided exactly.
+    /// The triangles that need an exact decision.
     uncertain: [u32; SLOTS],
 }
 
@@ -244,13 +244,13 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Simd> Interleaved<'a, 'd, 'r, R, L> {
         }
     }
 
-    /// What is at the bottom of every stack.
+    /// The bottom entry of every stack.
     #[inline(always)]
     fn bottom() -> Entry<'a, 'd, R, L> {
         R::Goal::entry(DONE)
     }
 
-    /// Starts with a ray at the root; false where the exact traversal has to answer.
+    /// Starts with a ray at the root; false if the exact traversal has to answer.
     #[inline(always)]
     fn start(&mut self, slot: usize, position: usize) -> bool {
         let ray = simd::opaque(&self.rays[position]);
@@ -271,20 +271,21 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Simd> Interleaved<'a, 'd, 'r, R, L> {
         true
     }
 
-    /// The ray of a slot, as it was asked.
+    /// The original ray of a slot.
     #[inline(always)]
     fn ray(&self, slot: usize) -> &'r R::Ray {
         &self.rays[self.slots[slot].position]
     }
 
-    /// Those that are at nodes go on to the child that comes first, or to the top of their stacks.
+    /// Moves rays at nodes to their first child, or to the top of their stacks.
     #[inline(always)]
     fn step_nodes(&mut self, at_nodes: u64, sink: &mut impl Sink<R::Answer>) {
         let too_deep = if R::Goal::IS_ANY { self.step_any(at_nodes) } else { self.step_closest(at_nodes) };
         self.give_up(too_deep, sink);
     }
 
-    /// For any hit: pushes the children, and pops one. A bit for each whose stack may not hold the children of another node.
+    /// For any hit: pushes the children, and pops one. Returns a bit for each stack that may be too full for another
+    /// node's children.
     #[inline(always)]
     fn step_any(&mut self, at_nodes: u64) -> u64 {
         let mut too_deep = 0;
@@ -300,7 +301,7 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Simd> Interleaved<'a, 'd, 'r, R, L> {
         too_deep
     }
 
-    /// For the closest hit, where it pays to take care first of those that hit one child or none.
+    /// For the closest hit, where it pays to handle rays first that hit one child or none.
     #[inline(always)]
     fn step_closest(&mut self, at_nodes: u64) -> u64 {
         let nodes = self.nodes;
@@ -313,7 +314,7 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Simd> Interleaved<'a, 'd, 'r, R, L> {
             self.masks[slot] = mask;
             *self.parents.of(slot) = *reference;
             self.enters[at % SLOTS] = enter;
-            // Anything, where there is not just one.
+            // Arbitrary unless there is exactly one.
             *reference = intersect::only_child(node, mask);
             none |= bit(mask == 0, slot);
             many |= bit(mask & mask.wrapping_sub(1) != 0, slot);
@@ -330,7 +331,7 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Simd> Interleaved<'a, 'd, 'r, R, L> {
         too_deep
     }
 
-    /// Those that are at leaves of triangles go on to the next block, or to the top of their stacks.
+    /// Moves rays at triangle leaves to the next block, or to the top of their stacks.
     #[inline(always)]
     fn step_triangles(&mut self, at_leaves: u64, sink: &mut impl Sink<R::Answer>) {
         let (mut passing, mut last) = (0, 0);
@@ -395,7 +396,7 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Simd> Interleaved<'a, 'd, 'r, R, L> {
         self.pop(going_on & last);
     }
 
-    /// Those that are at other leaves test them one by one, and go on to the top of their stacks.
+    /// Tests other leaves one by one, and moves their rays to the top of their stacks.
     #[inline(always)]
     fn step_others(&mut self, at_others: u64, sink: &mut impl Sink<R::Answer>) {
         let (mut met, mut uncertain) = (0, 0);
@@ -411,7 +412,7 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Simd> Interleaved<'a, 'd, 'r, R, L> {
         self.pop(at_others & !met & !uncertain);
     }
 
-    /// Those are done: they have a hit, and any will do.
+    /// Marks rays that have a hit as finished, in an any-hit search.
     #[inline(always)]
     fn stop_at_hits(&mut self, slots: u64) {
         for slot in Bits(slots) {
@@ -419,7 +420,7 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Simd> Interleaved<'a, 'd, 'r, R, L> {
         }
     }
 
-    /// Leaves those to the exact traversal.
+    /// Leaves these rays to the exact traversal.
     #[inline(always)]
     fn give_up(&mut self, slots: u64, sink: &mut impl Sink<R::Answer>) {
         for slot in Bits(slots) {
@@ -430,7 +431,7 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Simd> Interleaved<'a, 'd, 'r, R, L> {
         }
     }
 
-    /// Those take the top of their stacks that is not beyond the end of the ray.
+    /// Pops the first entry that is not beyond the end of the ray.
     #[inline(always)]
     fn pop(&mut self, mut slots: u64) {
         while slots != 0 {
@@ -444,7 +445,7 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Simd> Interleaved<'a, 'd, 'r, R, L> {
         }
     }
 
-    /// Prefetches what those read next.
+    /// Prefetches what these rays read next.
     #[inline(always)]
     fn prefetch(&mut self, slots: u64) {
         let Stations { nodes, triangles, .. } = self.stations();
@@ -465,7 +466,7 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Simd> Interleaved<'a, 'd, 'r, R, L> {
         }
     }
 
-    /// Hands out the answers of those that are done.
+    /// Hands out the answers of finished rays.
     #[inline(always)]
     fn answer(&mut self, done: u64, sink: &mut impl Sink<R::Answer>) {
         for slot in Bits(done) {
@@ -479,7 +480,7 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Simd> Interleaved<'a, 'd, 'r, R, L> {
     }
 }
 
-/// Traverses the tree with those of the rays that have these positions; with `prefetches`, a ray prefetches what it reads next.
+/// Traverses the tree with the rays at these positions; with `prefetches`, a ray prefetches what it reads next.
 #[inline(always)]
 pub(super) fn traverse<'a, 'd, R: RaySlot<'a, 'd, L>, L: Simd>(
     decider: &'d Decider<'a>,
@@ -490,7 +491,7 @@ pub(super) fn traverse<'a, 'd, R: RaySlot<'a, 'd, L>, L: Simd>(
 ) {
     let mut waiting = positions.iter();
     let mut all = Interleaved::<R, L>::new(decider, rays);
-    // All are done at first.
+    // All slots are done at first.
     let mut taken = u64::MAX;
     while taken != 0 {
         let at = all.stations();
@@ -501,7 +502,7 @@ pub(super) fn traverse<'a, 'd, R: RaySlot<'a, 'd, L>, L: Simd>(
             taken |= start_others(&mut all, done, &mut waiting, sink);
             continue;
         }
-        // Where most of them are.
+        // The group with the most rays goes first.
         let [nodes, triangles, others] = [at.nodes, at.triangles, at.others].map(u64::count_ones);
         let moving = if R::GENERAL && others > nodes.max(triangles) {
             all.step_others(at.others, sink);
@@ -519,7 +520,7 @@ pub(super) fn traverse<'a, 'd, R: RaySlot<'a, 'd, L>, L: Simd>(
     }
 }
 
-/// Starts rays that wait in free slots: the slots that were taken.
+/// Starts waiting rays in free slots, and returns the slots.
 #[inline(always)]
 fn start_others<'a, 'd, R: RaySlot<'a, 'd, L>, L: Simd>(
     all: &mut Interleaved<'a, 'd, '_, R, L>,

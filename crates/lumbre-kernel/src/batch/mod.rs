@@ -1,7 +1,7 @@
-//! Many rays at once, in trees that have triangles: each answer has the bits that it has alone.
+//! Many rays at once, in trees that have triangles: each answer has the same bits as for a single ray.
 //!
-//! Rays that are coherent are traversed as packets of sixteen (see [`packet`]), the others interleaved (see [`interleaved`]). Triangles
-//! are tested so in either precision; leaves of anything else ray by ray, by the code of single rays.
+//! Coherent rays are traversed as packets of sixteen (see [`packet`]), the others interleaved (see [`interleaved`]).
+//! Both test triangles in either precision; other leaves are tested ray by ray, by the code of single rays.
 
 pub(crate) mod columns;
 mod f32_packet;
@@ -41,19 +41,20 @@ use crate::tree::filter_start::FilterStart;
 use crate::tree::node::Node;
 use crate::tree::triangle_block::Line;
 
-/// Trees of more bytes than this are hardly in the caches; interleaved rays prefetch what they read next.
+/// Larger trees, in bytes, hardly fit the caches; interleaved rays then prefetch what they read next.
 const FAR: usize = 1 << 24;
-/// Trees of fewer bytes are in the nearest caches; interleaving pays for many rays only.
+/// Smaller trees, in bytes, are in the nearest caches; interleaving then pays only for many rays.
 const NEAR: usize = 1 << 20;
-/// Trees of fewer bytes, some two thousand triangles, are so shallow that single rays in single precision are faster than interleaved ones.
+/// Smaller trees, of about two thousand triangles, are so shallow that single rays in single precision beat interleaved
+/// ones.
 const SMALL: usize = 1 << 17;
-/// Packets in a row that may be skipped without a try.
-const MOST_SKIPPED: usize = 16;
-/// Rays among which packets are sought before the others are interleaved.
+/// Consecutive packets that may be skipped without a try.
+const MAX_SKIPPED: usize = 16;
+/// Packets are sought among this many rays before the others are interleaved.
 const CHUNK: usize = 4096;
-/// How many packets ahead rays are prefetched.
+/// Rays are prefetched this many packets ahead.
 const AHEAD: usize = 3;
-/// Rays in single precision that are asked in double at a time.
+/// Rays in single precision that are converted to double at a time.
 const WIDENED: usize = 1024;
 
 /// [`Accel::closest`] for every ray.
@@ -70,7 +71,7 @@ pub(crate) fn any(isa: Isa, tree: &Tree, rays: &[Ray], hits: &mut [bool]) {
     any_by(isa, tree, rays, hits, Plan::of(tree));
 }
 
-/// The same by a plan.
+/// As [`any`], with a given plan.
 fn any_by(isa: Isa, tree: &Tree, rays: &[Ray], hits: &mut [bool], plan: Plan) {
     let sink = &mut AnySink { tree, isa, rays, hits };
     if !batch_f64::<AnyHit, _>(isa, tree, rays, sink, plan) {
@@ -124,13 +125,13 @@ pub(crate) fn any_f32(isa: Isa, tree: &Tree, rays: &[Ray32], hits: &mut [bool]) 
     }
 }
 
-/// Whether a tree is traversed by batches: one of triangles, among others, on a machine with vectors.
+/// The start, if batches can traverse the tree: it must have triangles and the machine vectors.
 fn batched(isa: Isa, tree: &Tree) -> Option<&FilterStart> {
     let has_triangles = !tree.packed.blocks.is_empty();
     tree.single.as_ref().filter(|_| has_triangles && isa.has_vectors())
 }
 
-/// False where the tree is not traversed by batches.
+/// Returns false if batches cannot traverse the tree.
 fn batch_f64<G: FilteredGoal, S: Sink<G::Found>>(
     isa: Isa,
     tree: &Tree,
@@ -147,7 +148,7 @@ fn batch_f64<G: FilteredGoal, S: Sink<G::Found>>(
     true
 }
 
-/// The same in a tree of triangles.
+/// The batch in a tree of triangles, in single precision.
 fn batch_f32<G: Goal, S: Sink<Option<Hit32>>>(
     isa: Isa,
     tree: &Tree,
@@ -213,7 +214,7 @@ impl Sink<bool> for AnySink<'_> {
 /// See [`closest_f32`].
 struct F32ClosestSink<'a> {
     tree: &'a Tree,
-    /// A batch may give up a ray that single precision answers alone.
+    /// For rays that a batch gives up: single precision answers them one by one.
     queries: F32Queries,
     rays: &'a [Ray32],
     hits: &'a mut [Option<Hit32>],
@@ -254,10 +255,10 @@ impl Sink<Option<Hit32>> for F32AnySink<'_> {
     }
 }
 
-/// When rays are interleaved, and how.
+/// When and how rays are interleaved.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plan {
-    /// Fewer rays go one after another: to start many, and to wait for the last, takes its time.
+    /// Fewer rays are traversed one by one: filling and draining the slots takes time.
     least: usize,
     /// Whether a ray prefetches what it reads next.
     prefetches: bool,
@@ -268,10 +269,10 @@ impl Plan {
     pub(crate) const NEAR: Self = Self { least: 128, prefetches: false, has_packets: true };
     pub(crate) const MIDDLE: Self = Self { least: 32, prefetches: false, has_packets: true };
     pub(crate) const FAR: Self = Self { least: 32, prefetches: true, has_packets: true };
-    /// What goes in no packet goes alone.
+    /// Rays outside of packets are traversed one by one.
     const SINGLES: Self = Self { least: usize::MAX, prefetches: false, has_packets: true };
 
-    /// The fastest for rays of a picture, incoherent ones of which are faster alone where the tree is small.
+    /// The fastest plan for picture rays. Incoherent ones are faster one by one in a small tree.
     fn of_picture(tree: &Tree) -> Self {
         let bytes = Self::bytes(tree);
         if bytes >= FAR {
@@ -283,12 +284,12 @@ impl Plan {
         }
     }
 
-    /// Those of a tree that rays read.
+    /// Bytes of a tree that rays read.
     fn bytes(tree: &Tree) -> usize {
         size_of_val::<[Line]>(&tree.packed.blocks) + size_of_val::<[Node]>(&tree.packed.nodes)
     }
 
-    /// The fastest for a tree.
+    /// The fastest plan for a tree.
     fn of(tree: &Tree) -> Self {
         let bytes = Self::bytes(tree);
         if bytes >= FAR {
@@ -301,7 +302,7 @@ impl Plan {
     }
 }
 
-/// In which precision rays are traversed, for which goal, and in which trees.
+/// The precision, goal and kind of tree of a batch.
 trait Precision {
     type Goal: Goal;
     type Ray: 'static;
@@ -315,7 +316,7 @@ trait Precision {
     /// Traverses the tree with one ray.
     fn traverse_alone<L: Simd>(decider: &Decider, ray: &Self::Ray) -> Outcome<Self::Answer>;
 
-    /// Traverses the tree with those of the rays that have these positions, interleaved.
+    /// Traverses the tree with the rays at these positions, interleaved.
     fn interleave<L: Simd>(
         decider: &Decider,
         prefetches: bool,
@@ -325,7 +326,7 @@ trait Precision {
     );
 }
 
-/// Double precision; `GENERAL` in trees of anything among triangles.
+/// Double precision; `GENERAL` in trees with other primitives than triangles.
 struct F64<G, const GENERAL: bool>(PhantomData<G>);
 
 impl<G: FilteredGoal, const GENERAL: bool> Precision for F64<G, GENERAL> {
@@ -336,7 +337,7 @@ impl<G: FilteredGoal, const GENERAL: bool> Precision for F64<G, GENERAL> {
         = F64Bundle<'a, 'd, G, GENERAL>
     where
         'a: 'd;
-    // Where any hit will do, nothing else keeps the memory busy, and the caches foresee it.
+    // For any hit, nothing else keeps the memory busy, and hardware prefetching suffices.
     const PREFETCHES_RAYS: bool = !G::IS_ANY;
 
     #[inline(always)]
@@ -386,16 +387,16 @@ impl<G: Goal> Precision for F32<G> {
     }
 }
 
-/// When to try a packet. After one that did not pay, others are skipped before the next try: ever more while none pays.
+/// When to try a packet. After one that did not pay, more and more are skipped before the next try.
 struct Trials {
     to_skip: usize,
     patience: usize,
 }
 
 impl Trials {
-    const NEW: Self = Self { to_skip: 0, patience: MOST_SKIPPED };
+    const NEW: Self = Self { to_skip: 0, patience: MAX_SKIPPED };
 
-    /// Whether the next packet is to be tried.
+    /// Whether to try the next packet.
     #[inline(always)]
     fn is_next(&mut self) -> bool {
         let is_next = self.to_skip == 0;
@@ -403,15 +404,15 @@ impl Trials {
         is_next
     }
 
-    /// What came of it.
+    /// Records the result of a try.
     #[inline(always)]
     fn record(&mut self, pays: bool) {
         (self.to_skip, self.patience) =
-            if pays { (0, 0) } else { (self.patience, (2 * self.patience).clamp(1, MOST_SKIPPED)) };
+            if pays { (0, 0) } else { (self.patience, (2 * self.patience).clamp(1, MAX_SKIPPED)) };
     }
 }
 
-/// Prefetches the rays of packets, which are read faster than caches foresee.
+/// Prefetches the rays of packets, which are read faster than hardware prefetching follows.
 struct RaysAhead<'r, R> {
     packets: Chunks<'r, R>,
 }
@@ -434,7 +435,7 @@ impl<'r, R> RaysAhead<'r, R> {
     }
 }
 
-/// Rays through a tree: packets first, and the others interleaved, or one after another where they are few.
+/// Traverses rays: packets first; the others interleaved, or one by one if they are few.
 struct Batch<'a, 'r, P: Precision, S> {
     tree: &'a Tree,
     start: &'a FilterStart,
@@ -474,7 +475,7 @@ impl<P: Precision, S: Sink<P::Answer>> Dispatch for Batch<'_, '_, P, S> {
             }
             others.extend(first + PACKET * packets.len()..first + chunk.len());
             if others.len() < plan.least {
-                // Neither a call nor a closure: neither takes on the instruction set of the code around it.
+                // No calls and no closures: neither inherits target features.
                 for &i in &others {
                     sink.put(i, P::traverse_alone::<L>(decider, simd::opaque(&rays[i])));
                 }

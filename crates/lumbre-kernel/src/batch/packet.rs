@@ -1,35 +1,36 @@
-//! Sixteen coherent rays together: rays of a camera, or shadow rays of neighbours.
+//! Packets of sixteen coherent rays, such as camera rays or shadow rays of neighbouring points.
 //!
-//! They go from box to box as one frustum, for which a node costs little more than for one ray. Where they start at different places,
-//! much in a frustum is hit by none of them: then those of a node's boxes that it hits are tested once more, each against all sixteen
-//! rays. At a leaf, triangles that none of them can hit are culled eight at a time; each of the others is tested against all
-//! sixteen, by the operations and with the bounds of a single ray, so that an answer has the bits that it has alone. Where that turns
-//! out to be more work than it is worth, they go on as single rays.
+//! A packet goes from box to box as one frustum, which makes a node hardly more expensive than for one ray. If the rays
+//! start at different places, the frustum contains much that no ray hits: then the child boxes that it hits are tested
+//! again, each against all sixteen rays. At a leaf, triangles that no ray can hit are culled eight at a time. Each of
+//! the others is tested against all sixteen rays, by the operations and with the bounds of a single ray, so that
+//! answers have the same bits. If a packet turns out to be more work than it is worth, its rays continue as single
+//! rays.
 //!
 //! # Error bound: the frustum loses no box
 //!
-//! On each axis the directions have one sign. A single ray meets a plane p at `p r + c`, with a margin in c; see `node`. Here it
-//! is `(p - q) r + (q - o) r`, where q is a place among the starts o, which are all within an eighth of it. That is another order
-//! of the same operations, with one more subtraction and one more sum: together wrong by less than 4u|r| (1.3 + |q|), where a
-//! ray's margin is at least 8u|r| (1.01 + |o|). Twice that margin is added. The frustum takes the least of `(p - q) r` over all
-//! rays, as it is computed, and from it the largest |r| times the sum of the largest |q - o| and thrice the largest margin by |r|:
-//! with three roundings of something below |r|/2, for which those margins have room. So it is no later than any ray with its
-//! margin, and likewise no earlier where it leaves.
+//! On each axis the directions have one sign. A single ray meets a plane p at `p r + c`, with a margin in c; see
+//! `node`. Here it is `(p - q) r + (q - o) r`, where q is a point among the starts o, which are all within an eighth of
+//! it. That is another order of the same operations, with one more subtraction and one more sum. Their error is less
+//! than 4u|r| (1.3 + |q|), where a ray's margin is at least 8u|r| (1.01 + |o|). Twice that margin is added. The frustum
+//! takes the least computed `(p - q) r` over all rays, and subtracts the largest |r| times the sum of the largest |q -
+//! o| and three times the largest margin divided by |r|; its three rounding errors, of numbers below |r|/2, are covered
+//! by those margins. So it enters no later than any ray with its margin, and likewise leaves no earlier.
 //!
 //! # Error bound: none of its rays loses a triangle
 //!
-//! Let (X, Y, Z) be a corner as seen from the middle of the rays' starts, sheared by the middle of their shears. For a ray whose
-//! start and shear are off by a and b, the corner is at X + (a_x - s_x a_z) - b_x Z, and within |a_z| of Z. So |x| is below
-//! |X| + `apart` + `spread` |Z|, the largest of these over all rays; the roundings of both are below 32us with s as there, taken of
-//! these larger bounds. A triangle all of whose corners are beyond that on one side is hit by no ray; and with the larger m, h
-//! and s the errors are no smaller than those of every ray.
+//! Let (X, Y, Z) be a corner as seen from the middle of the rays' starts, sheared by the middle of their shears. For a
+//! ray whose start and shear are off by a and b, the corner is at X + (a_x - s_x a_z) - b_x Z, and within |a_z| of Z.
+//! So |x| is below |X| + `apart` + `spread` |Z|, the largest of these over all rays. The rounding errors of both are
+//! below 32us with s as there, from these larger bounds. No ray hits a triangle all of whose corners are beyond that on
+//! one side; and with the larger m, h and s the error bounds are no smaller than those of every ray.
 
 pub(crate) use super::sink::PACKET;
 use super::sink::Sink;
 use crate::intersect::box_ray::{END_FACTOR, LITTLE, START_FACTOR};
 use crate::intersect::box_ray::{Frustum, SlabRows};
 use crate::intersect::watertight::TINY;
-use crate::intersect::{self, Axes, CornersRoom, Sides, Simd};
+use crate::intersect::{self, Axes, CornerScratch, Sides, Simd};
 use crate::simd::{self, F32x8, F32x16, Vector};
 use crate::trace::Stop;
 use crate::trace::decide::Decider;
@@ -40,59 +41,59 @@ use crate::tree::triangle_block::TriangleBlock;
 
 /// A mask of all of them.
 pub(crate) const ALL: u32 = (1 << PACKET) - 1;
-/// How far from their middle rays may start on an axis, in tree units: see above.
-const MOST_DISTANCE: f32 = 0.125;
-/// How many there have to be.
+/// Maximum distance of a ray's start from the middle on an axis, in tree units: see above.
+const MAX_DISTANCE: f32 = 0.125;
+/// Minimum rays of a packet.
 const LEAST: u32 = 4;
-/// Children whose boxes are tested against each ray cost, together, as much as a node.
+/// Testing this many child boxes against each ray costs as much as a node.
 const CHILDREN_AS_A_NODE: u32 = 4;
-/// What the corners of triangles may be wrong by, by their size: 32u, see above.
+/// Error bound of triangle corners, relative to their size: 32u, see above.
 const CULL_ERROR: f32 = 32.0 / (1 << 24) as f32;
 
-/// How much a packet may do, in nodes; a block of triangles costs as much as two, and so does a triangle.
+/// The work limits of a packet, in nodes; a block of triangles costs as much as two nodes, and so does a triangle.
 #[derive(Clone, Copy)]
-pub(super) struct Effort {
-    /// Before its rays go on alone.
+pub(super) struct WorkBudget {
+    /// At this much work, its rays continue one by one.
     pub(super) most: u32,
-    /// And have it pay, for all sixteen; for fewer rays proportionately less.
+    /// Up to this much work, a packet of sixteen rays pays; fewer rays have proportionately less.
     pub(super) paying: u32,
 }
 
-impl Effort {
+impl WorkBudget {
     #[inline(always)]
     fn pays(self, work: u32, rays: u32) -> bool {
         work * ALL.count_ones() <= self.paying * rays.count_ones()
     }
 }
 
-/// The rays of a packet in one precision: how they start, and what they are among triangles.
+/// The rays of a packet in one precision: how they start, and their data for triangles.
 pub(super) trait Bundle<'a, 'd>: Sized {
     type Goal: Goal;
     type Ray;
     type Answer;
-    /// Whether the tree has leaves of anything but triangles.
+    /// Whether the tree has other leaves than triangles.
     const GENERAL: bool;
     /// Whether triangles are tested with the bounds of [`CullBounds`].
     const NEEDS_BOUNDS: bool;
-    /// How far from their middle directions may be, by the largest component.
-    const MOST_SPREAD: f32;
+    /// Maximum distance of directions from their middle, relative to the largest component.
+    const MAX_SPREAD: f32;
 
     /// Without rays.
     fn new(decider: &'d Decider<'a>) -> Self;
 
-    /// How much they may do, where they have one origin or not.
-    fn effort(has_one_origin: bool) -> Effort;
+    /// The work limits, for rays with or without a common origin.
+    fn effort(has_one_origin: bool) -> WorkBudget;
 
-    /// Takes the rays in.
+    /// Loads the rays.
     fn load<L: Simd>(&mut self, rays: &[Self::Ray; PACKET]);
 
-    /// Which rays go the way of one, with its signs and its largest axis; and these.
+    /// The rays that are coherent with one ray: those with its signs and its largest axis. Also returns these.
     fn alike<L: Simd>(&self, one: u32) -> (u32, Signs);
 
-    /// Makes those that are not in the mask like one that is.
+    /// Replaces the rays outside the mask by one of the mask.
     fn fill_up<L: Simd>(&mut self, mask: u32);
 
-    /// Starts among bounding boxes; `None` where one of the rays is not sound, or starts too far away for single precision.
+    /// Starts among bounding boxes; `None` if a ray is invalid, or starts too far away for single precision.
     fn start<L: Simd>(&mut self, decider: &Decider, slabs: &mut SlabRows) -> Option<Start<L::F32x16>>;
 
     /// Starts among triangles.
@@ -115,11 +116,11 @@ pub(super) trait Bundle<'a, 'd>: Sized {
         rays: &[Self::Ray; PACKET],
     );
 
-    /// Tests what has no bounds, ray by ray.
+    /// Tests unbounded geometry, ray by ray.
     #[inline(always)]
     fn test_infinite<L: Simd>(&mut self, _state: &mut State, _rays: &[Self::Ray; PACKET]) {}
 
-    /// Tests a leaf of anything but triangles, ray by ray.
+    /// Tests other leaves than triangles, ray by ray.
     #[inline(always)]
     fn test_leaf<L: Simd>(&mut self, _state: &mut State, _leaf: u32, _rays: &[Self::Ray; PACKET]) {}
 
@@ -142,7 +143,8 @@ pub(super) struct Signs {
 }
 
 impl Signs {
-    /// Those of one ray of a packet, and which others share them: by where each component is negative, and where x and y are the largest.
+    /// The signs of one ray of a packet, and the rays that share them: by where each component is negative, and where x
+    /// and y are the largest.
     #[inline(always)]
     pub(super) fn of(one: u32, negative: [u32; 3], x_is_last: u32, y_is_last: u32) -> (u32, Self) {
         let (mut alike, mut signs) = (ALL, 0);
@@ -165,21 +167,21 @@ impl Signs {
     }
 }
 
-/// What bounds a frustum.
+/// The bounds of a frustum.
 pub(super) struct Start<W> {
     pub(super) inverse: [W; 3],
     pub(super) range: [W; 2],
     /// The middle of the starts, in tree units, and the largest distance from it.
     pub(super) center: [f32; 3],
     pub(super) off: [f32; 3],
-    /// A factor of distances, and what is added: by how much planes are moved for all rays.
+    /// By how much planes are moved for all rays: a factor of distances, and a constant.
     pub(super) margin_per_distance: f32,
     pub(super) margin: f32,
     pub(super) has_one_origin: bool,
 }
 
-/// The children of a node whose boxes rays that are alive may hit, where they enter each at the earliest, and the work in nodes. With
-/// rows for `each` ray, only children that one of them hits, and, if `is_ordered`, where the first of them does.
+/// The children of a node whose boxes live rays may hit, where the first ray may enter each, and the work in nodes.
+/// With rows for `each` ray, only children that a ray does hit, and, if `is_ordered`, where the first ray enters.
 #[inline(always)]
 fn test_children<W: F32x16>(
     node: &Node,
@@ -196,7 +198,7 @@ fn test_children<W: F32x16>(
     (mask, enters, work)
 }
 
-/// What holds all the rays among triangles: see above.
+/// A bound on all rays among triangles: see above.
 pub(super) struct Cull {
     pub(super) axes: &'static Axes,
     pub(super) middle: [f32; 3],
@@ -206,7 +208,7 @@ pub(super) struct Cull {
     pub(super) least_size: f32,
 }
 
-/// What is known of the triangles of a block for all the rays.
+/// The bounds of a block's triangles for all rays.
 pub(super) struct CullBounds {
     /// Those that a ray may hit.
     pub(super) mask: u32,
@@ -217,7 +219,7 @@ pub(super) struct CullBounds {
 }
 
 impl Cull {
-    /// Which triangles of a block are left; lanes without one mean nothing.
+    /// Which triangles of a block remain; lanes without one are undefined.
     #[inline(always)]
     fn bounds<E: F32x8>(&self, corners: &Corners, needs_bounds: bool) -> CullBounds {
         let own = simd::opaque(self);
@@ -268,23 +270,23 @@ impl Cull {
     }
 }
 
-/// What a packet keeps of its rays in either precision.
+/// The state of a packet's rays in either precision.
 pub(super) struct State {
-    /// Those that are asked for; the others go along with one of them.
+    /// The requested rays; the others are copies of one of them.
     pub(super) chosen: u32,
-    /// Those that go on, those with a hit where any will do, and those that the exact traversal has to answer.
+    /// Live rays, rays that have a hit in an any-hit search, and rays that the exact traversal has to answer.
     pub(super) alive: u32,
     pub(super) met: u32,
     pub(super) uncertain: u32,
     pub(super) is_among_triangles: bool,
-    /// What it has done, in nodes.
+    /// The work done, in nodes.
     work: u32,
     pub(super) slabs: SlabRows,
     pub(super) frustum: Frustum,
 }
 
 impl State {
-    /// Leaves one to the exact traversal.
+    /// Leaves a ray to the exact traversal.
     #[inline(always)]
     pub(super) fn give_up(&mut self, i: usize) {
         self.uncertain |= 1 << i;
@@ -292,14 +294,14 @@ impl State {
         self.slabs.s_max.0[i] = -1.0;
     }
 
-    /// Those have a hit, and any will do.
+    /// Records rays with a hit in an any-hit search.
     #[inline(always)]
     pub(super) fn stop_at_hits(&mut self, mask: u32) {
         self.met |= mask;
         self.alive &= !mask;
     }
 
-    /// Ends the frustum where none of the rays goes on.
+    /// Ends the frustum if no ray is alive.
     #[inline(always)]
     pub(super) fn end_frustum(&mut self) {
         let greater = |a: f32, b: f32| if a > b { a } else { b };
@@ -307,7 +309,7 @@ impl State {
     }
 }
 
-/// A packet under way, and then others.
+/// The traversal of one packet after another.
 pub(super) struct Packet<'a, 'd, B> {
     decider: &'d Decider<'a>,
     state: State,
@@ -316,11 +318,11 @@ pub(super) struct Packet<'a, 'd, B> {
     bundle: B,
 }
 
-/// What came of a packet.
+/// The result of a packet.
 pub(super) struct PacketResult {
     /// A bit for each ray that was answered.
     pub(super) answered: u32,
-    /// Whether that is faster than each alone.
+    /// Whether the packet was faster than single rays.
     pub(super) pays: bool,
 }
 
@@ -358,7 +360,8 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
         Self { decider, state, cull, has_one_origin: false, bundle: B::new(decider) }
     }
 
-    /// Traverses the tree with rays, the first of which has this position. Those with other signs than the first go together, too.
+    /// Traverses the tree with rays, the first of which has this position. Rays whose signs differ from the first ray's
+    /// form packets of their own.
     #[inline(always)]
     pub(super) fn traverse<L: Simd>(
         &mut self,
@@ -372,7 +375,7 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
             let (alike, signs) = self.bundle.alike::<L>((!result.answered).trailing_zeros());
             self.state.chosen = alike & !result.answered;
             if !self.start::<L>(signs) {
-                // A few are left, or all.
+                // Either a few are left, or all.
                 result.pays &= result.answered.count_ones() >= ALL.count_ones() / 2;
                 break;
             }
@@ -380,7 +383,7 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
             let most = if L::GOES_ON_TOGETHER || B::GENERAL { effort.most } else { effort.paying };
             let is_done = self.run::<L>(most, rays);
             if !is_done {
-                // Where any hit will do, those that have one are done.
+                // In an any-hit search, rays with a hit are done.
                 self.state.chosen &= if B::Goal::IS_ANY { !self.state.alive } else { 0 };
             }
             self.bundle.put::<L>(self.decider, &self.state, rays, first, sink);
@@ -393,7 +396,7 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
         result
     }
 
-    /// Starts among boxes with those that are chosen; false where they are few or too far apart, or single precision cannot tell.
+    /// Starts the chosen rays among boxes; false if they are too few, too far apart, or single precision is too coarse.
     #[inline(always)]
     fn start<L: Simd>(&mut self, Signs { signs, axes }: Signs) -> bool {
         let Self { decider, state, cull, bundle, has_one_origin } = self;
@@ -423,7 +426,7 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
             state.frustum.most_inverse[axis] = most_inverse;
             state.frustum.least_inverse[axis] = -minus_least;
             state.frustum.width[axis] = largest * (off + margin);
-            is_near &= off <= MOST_DISTANCE;
+            is_near &= off <= MAX_DISTANCE;
         }
         (state.frustum.s_max, state.frustum.s_min, state.frustum.sides) =
             (most[3], -most[7], Sides::new(signs));
@@ -431,7 +434,7 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
         is_near
     }
 
-    /// Traverses the tree; false where it gave up.
+    /// Traverses the tree; false if the packet gave up.
     #[inline(always)]
     fn run<L: Simd>(&mut self, most_work: u32, rays: &[B::Ray; PACKET]) -> bool {
         let nodes = self.decider.nodes();
@@ -490,20 +493,20 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
         }
     }
 
-    /// Starts among triangles; false where directions are too far apart.
+    /// Starts among triangles; false if directions are too far apart.
     #[inline(always)]
     fn start_triangles<L: Simd>(&mut self) -> bool {
         let Self { decider, state, cull, bundle, .. } = self;
         bundle.start_triangles::<L>(decider, cull.axes, &state.slabs, cull);
         state.is_among_triangles = true;
-        cull.spread[0] <= B::MOST_SPREAD && cull.spread[1] <= B::MOST_SPREAD
+        cull.spread[0] <= B::MAX_SPREAD && cull.spread[1] <= B::MAX_SPREAD
     }
 
     /// Tests a leaf of triangles.
     #[inline(always)]
     fn test_triangles<L: Simd>(&mut self, leaf: u32, rays: &[B::Ray; PACKET]) {
         let mut following = Some(leaf & tag::PLACE);
-        let mut room = CornersRoom::new();
+        let mut room = CornerScratch::new();
         while let Some(place) = following {
             let block = self.decider.block(place);
             following = block.next(place);
@@ -532,7 +535,7 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
     }
 }
 
-/// What a ray of a packet comes to at a leaf that is tested ray by ray.
+/// Records how a ray of a packet ended at a leaf that is tested ray by ray.
 pub(super) fn record(state: &mut State, i: usize, stop: Option<Stop>) {
     match stop {
         None => {}

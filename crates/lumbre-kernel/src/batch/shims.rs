@@ -1,4 +1,4 @@
-//! Batches as tests want them: with a plan, at an instruction set, and with a look at what the exact traversal had to answer.
+//! Batches for tests: with a given plan and instruction set, and a count of rays that the exact traversal answered.
 
 use std::cell::Cell;
 
@@ -23,7 +23,7 @@ pub(crate) const INTERLEAVED: [Plan; 2] =
     [Plan { has_packets: false, ..Plan::NEAR }, Plan { has_packets: false, ..Plan::FAR }];
 
 thread_local! {
-    /// How many rays were answered, and how many of them by the exact traversal.
+    /// Rays answered in total, and by the exact traversal.
     static ANSWERED: Cell<[usize; 2]> = const { Cell::new([0; 2]) };
 }
 
@@ -32,7 +32,7 @@ pub(super) fn count<A>(outcome: &Outcome<A>) {
     ANSWERED.set([all + 1, exactly + usize::from(matches!(outcome, Outcome::Uncertain))]);
 }
 
-/// Closest hits by a plan, each answered once; how many the exact traversal had to find.
+/// Closest hits by a plan, each answered once; returns how many the exact traversal found.
 pub(crate) fn closest(isa: Isa, tree: &Tree, rays: &[Ray], hits: &mut [Option<Hit>], plan: Plan) -> usize {
     ANSWERED.set([0; 2]);
     if !batch_f64::<ClosestHit, _>(isa, tree, rays, &mut ClosestSink { tree, isa, rays, hits }, plan) {
@@ -44,7 +44,7 @@ pub(crate) fn closest(isa: Isa, tree: &Tree, rays: &[Ray], hits: &mut [Option<Hi
     exactly
 }
 
-/// The same of any hits.
+/// As [`closest`], for any hits.
 pub(crate) fn any(isa: Isa, tree: &Tree, rays: &[Ray], hits: &mut [bool], plan: Plan) -> usize {
     ANSWERED.set([0; 2]);
     if !batch_f64::<AnyHit, _>(isa, tree, rays, &mut AnySink { tree, isa, rays, hits }, plan) {
@@ -56,7 +56,7 @@ pub(crate) fn any(isa: Isa, tree: &Tree, rays: &[Ray], hits: &mut [bool], plan: 
     exactly
 }
 
-/// Closest and any hits in single precision by a plan that interleaves rays soon.
+/// Closest and any hits in single precision, by a plan that interleaves even few rays.
 pub(crate) fn f32(isa: Isa, tree: &Tree, rays: &[Ray32], hits: &mut [Option<Hit32>], are_hit: &mut [bool]) {
     let plan = Plan::MIDDLE;
     let Some(queries) = F32Queries::of(isa, tree).filter(|_| batched(isa, tree).is_some()) else {
@@ -68,7 +68,7 @@ pub(crate) fn f32(isa: Isa, tree: &Tree, rays: &[Ray32], hits: &mut [Option<Hit3
     batch_f32::<AnyHit, _>(isa, tree, rays, &mut F32AnySink { tree, queries, rays, hits: are_hit }, plan);
 }
 
-/// Those of some rays that a packet answers; none without vectors.
+/// The rays that a packet answers; none without vectors.
 pub(crate) fn answered_by_packet(isa: Isa, tree: &Tree, rays: &[Ray; PACKET]) -> u32 {
     struct Traversing<'a, const GENERAL: bool>(Decider<'a>, &'a [Ray; PACKET]);
     struct Nowhere;

@@ -1,4 +1,4 @@
-//! Where the answers of many rays go.
+//! Receives the answers of many rays.
 
 use crate::simd::WIDE;
 use crate::trace::Outcome;
@@ -6,12 +6,12 @@ use crate::trace::Outcome;
 /// Rays in a packet.
 pub(crate) const PACKET: usize = WIDE;
 
-/// Takes the answers, in any order. Methods are to be `#[inline(always)]`: an answer that goes through memory is waited for.
+/// Takes the answers, in any order. Methods must be `#[inline(always)]`: an answer passed through memory would stall.
 pub(crate) trait Sink<A> {
-    /// The answer to the ray at a position.
+    /// The answer for the ray at a position.
     fn put(&mut self, position: usize, outcome: Outcome<A>);
 
-    /// The answers to a packet, the first ray of which has this position.
+    /// The answers of a packet; `position` is that of its first ray.
     #[inline(always)]
     fn put_row(&mut self, first: usize, answer: impl Fn(usize) -> A) {
         for i in 0..PACKET {
@@ -19,7 +19,7 @@ pub(crate) trait Sink<A> {
         }
     }
 
-    /// Prefetches where an answer will be written.
+    /// Prefetches the slot of an answer.
     #[inline(always)]
     fn prefetch(&self, _position: usize) {}
 }

@@ -1,15 +1,16 @@
-//! From primitives to a binary tree: the same from any number of threads.
+//! Builds the binary tree. The result is the same for any number of threads.
 //!
-//! Subtrees over few thousand primitives are made by one thread each; above them, threads share the work on a node. What is
-//! done does not depend on how it is shared: boxes grow in any order, costs are whole numbers, and primitives are parted in
-//! pieces of one length. The depth is bounded: past [`SAH_DEPTH`] levels every split is in the middle.
+//! One thread builds each subtree of a few thousand primitives. Above them, threads share the work on a node. How the
+//! work is shared does not change the result: boxes grow in any order, costs are whole numbers, and primitives are
+//! partitioned in pieces of fixed length. The depth is bounded: below [`SAH_DEPTH`] levels every split is in the
+//! middle.
 
 use std::borrow::Cow;
 
 use rayon::prelude::*;
 
 use crate::build::binary_node::{BinaryNode, Costs, Known, choose};
-use crate::build::binary_tree::{Binary, Fork, SAH_DEPTH, Twig};
+use crate::build::binary_tree::{Binary, InnerNode, SAH_DEPTH, Subtree};
 use crate::build::boxes::{Boxes, fill};
 use crate::build::morton::{self, Code};
 use crate::build::options::Preset;
@@ -17,88 +18,91 @@ use crate::build::partition::part;
 use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::build::reinsert::reinsert;
 use crate::build::sah::{BestSplit, Binning, Bins, Centers, Fill, FindCenters, Part, Split};
-use crate::build::small::{Decide, FEW, Few, group_of};
+use crate::build::small::{SMALL_BUILD_MAX, SmallSplit, SplitSmall, group_of};
 use crate::build::treelet;
 use crate::intersect::Isa;
-use crate::tree::Name;
+use crate::tree::PrimitiveId;
 
-/// So many a fast build splits by SAH: leaves then are a tenth fuller, and nodes fewer, for a twentieth of its time.
+/// `Fast` uses SAH at or below this many primitives. That makes leaves a tenth fuller and nodes fewer, for a twentieth
+/// of the build time.
 const FAST_FEW: usize = 48;
-/// From how many primitives on threads share the work.
+/// Threads share the work above this many primitives.
 pub(crate) const PARALLEL: usize = 4096;
-/// How few they leave to one of them, where there are not many more.
-const LEAST_ALONE: usize = 1024;
-/// How many primitives a thread takes at a time in a node that is shared.
+/// Minimum primitives per thread in a small build.
+const MIN_ALONE: usize = 1024;
+/// Primitives per task in a shared node.
 const CHUNK: usize = 1 << 12;
 
-/// A binary tree, and what is in its leaves.
-pub(crate) struct Grown<'p> {
+/// A binary tree and the contents of its leaves.
+pub(crate) struct GrownTree<'p> {
     pub(crate) tree: Binary<'p>,
-    /// In the order of leaves.
-    pub(crate) names: Vec<Name>,
-    /// Instances with their boxes; their names are the first.
+    /// In the order of the leaves.
+    pub(crate) ids: Vec<PrimitiveId>,
+    /// Instances with their boxes; their ids come first.
     pub(crate) instances: Vec<Primitive>,
 }
 
-/// The binary tree over primitives (not none) of geometries: packed ones, and all others.
+/// Builds the binary tree over packed primitives and all others. There must be at least one primitive.
 ///
-/// First they are parted where they stand until one thread takes what is left together; then twigs grow, which need but a
-/// little room each. They take the place of their primitives with their names, as long as those are packed: half of the room, and
-/// where there are many of them the other half is given back. Of others, there are more nodes than primitives as a rule: these
-/// are given back here, before the tree is laid out, but for instances.
+/// Primitives are first partitioned in place until one thread can build each remaining subtree. The nodes and ids of a
+/// packed subtree overwrite its primitives: they take about half of that memory, and large builds free the other half.
+/// Other subtrees usually have more nodes than primitives; their primitives are freed here, before the layout, except
+/// those of instances.
 pub(crate) fn binary_tree<'p>(
     isa: Isa,
     preset: Preset,
     mut others: Vec<Primitive>,
     packed: &'p mut Boxes,
     traits: &[Traits],
-) -> Grown<'p> {
-    // Below, there is a node for every thread.
+) -> GrownTree<'p> {
+    // Enough shared levels for one node per thread.
     let shared = (2 * rayon::current_num_threads()).ilog2();
     let shared = if shared > 1 { shared + 1 } else { 0 };
     let all = others.len() + packed.len();
-    let alone = if all <= PARALLEL { PARALLEL } else { (all / 8).clamp(LEAST_ALONE, PARALLEL) };
+    let alone = if all <= PARALLEL { PARALLEL } else { (all / 8).clamp(MIN_ALONE, PARALLEL) };
     let builder = &Builder { isa, traits, shared, alone };
     let counts = sort_by_rank(&mut others, traits);
     let first_packed = others.len();
-    let mut names: Vec<Name> = vec![[0; 2]; first_packed];
+    let mut ids: Vec<PrimitiveId> = vec![[0; 2]; first_packed];
     let packed = (!packed.is_empty()).then_some(packed);
-    let of_others = || builder.trees_by_rank(preset, &mut others, &counts, &mut names);
+    let of_others = || builder.trees_by_rank(preset, &mut others, &counts, &mut ids);
     let of_packed = || packed.map(|packed| builder.tree_of_packed(preset, packed, first_packed));
-    // Work for one is not handed over.
+    // Skips the thread pool when there is only one task.
     let (mut trees, packed_tree) =
         if first_packed > 0 { rayon::join(of_others, of_packed) } else { (Vec::new(), of_packed()) };
     others.truncate(counts[Kind::Instance.rank()]);
     others.shrink_to_fit();
-    if let Some(PackedTree { tree, names: packed_names }) = packed_tree {
-        names = with_all(names, &packed_names);
+    if let Some(PackedTree { tree, ids: packed_ids }) = packed_tree {
+        ids = with_all(ids, &packed_ids);
         trees.push(tree);
     }
     let better = |tree| if preset == Preset::Best { reinsert(tree) } else { tree };
-    let join = |low, high| Binary::Fork(Box::new(Fork { is_ranked: true, ..Fork::over([low, high]) }));
+    let join = |low, high| {
+        Binary::InnerNode(Box::new(InnerNode { is_ranked: true, ..InnerNode::over([low, high]) }))
+    };
     let tree = trees.into_iter().map(better).reduce(join).expect("there are primitives");
-    Grown { tree, names, instances: others }
+    GrownTree { tree, ids, instances: others }
 }
 
-/// Names, and others behind them.
-fn with_all(first: Vec<Name>, others: &[&[Name]]) -> Vec<Name> {
-    let mut names = fill(first.len() + others.iter().map(|others| others.len()).sum::<usize>(), [0; 2]);
-    let (place, mut rest) = names.split_at_mut(first.len());
+/// Joins the ids of both lists.
+fn with_all(first: Vec<PrimitiveId>, others: &[&[PrimitiveId]]) -> Vec<PrimitiveId> {
+    let mut ids = fill(first.len() + others.iter().map(|others| others.len()).sum::<usize>(), [0; 2]);
+    let (place, mut rest) = ids.split_at_mut(first.len());
     place.copy_from_slice(&first);
-    let places: Vec<&mut [Name]> = others.iter().map(|others| take(&mut rest, others.len())).collect();
+    let places: Vec<&mut [PrimitiveId]> = others.iter().map(|others| take(&mut rest, others.len())).collect();
     places.into_par_iter().zip(others).for_each(|(place, others)| place.copy_from_slice(others));
-    names
+    ids
 }
 
-/// The first `count` of some, which then are no longer among them.
+/// Splits off the first `count` elements.
 fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
     rest.split_off_mut(..count).unwrap_or_default()
 }
 
-/// Brings primitives, none of which is packed, into the order of their ranks; how many there are of each.
+/// Sorts unpacked primitives by rank and returns the number of each rank.
 ///
-/// Apart, because boxes of one kind do not grow around what is of another and everywhere among them, as trees on a ground
-/// are; and so that a search for any hit asks first what is quickly asked.
+/// Each rank has a tree of its own. Otherwise boxes of one kind would grow around scattered primitives of another, such
+/// as trees on a ground. A separate tree also lets an any-hit search test cheap primitives first.
 fn sort_by_rank(primitives: &mut [Primitive], traits: &[Traits]) -> [usize; Kind::RANKS] {
     let rank = |primitive: &Primitive| traits[primitive.first() as usize].kind.rank();
     let mut counts = [0; Kind::RANKS];
@@ -109,71 +113,71 @@ fn sort_by_rank(primitives: &mut [Primitive], traits: &[Traits]) -> [usize; Kind
     counts
 }
 
-/// Which twigs there are to be, and what stands over them.
-enum Sketch {
-    Fork(Box<[Sketch; 2]>),
-    Twig(Seed),
+/// The top of the tree, above the subtrees that are still to be built.
+enum SplitPlan {
+    InnerNode(Box<[SplitPlan; 2]>),
+    Subtree(PendingSubtree),
 }
 
-/// A twig to be.
-struct Seed {
+/// A subtree that is still to be built.
+struct PendingSubtree {
     count: usize,
     depth: u32,
-    /// How it is to be binned, where that is known.
+    /// The binning, if the parent's split determines it.
     binning: Option<Binning>,
-    /// Whether it is to be split by the order along a curve instead.
+    /// Whether to split by the order along the Morton curve instead.
     is_sorted: bool,
 }
 
-impl Sketch {
-    /// From the first to the last. The depth of its recursion, and of that of [`Self::over`], is that of the tree.
-    fn seeds<'a>(&'a self, seeds: &mut Vec<&'a Seed>) {
+impl SplitPlan {
+    /// Collects the subtrees in order. The recursion of this and of [`Self::over`] is as deep as the tree.
+    fn pending_subtrees<'a>(&'a self, pending_subtrees: &mut Vec<&'a PendingSubtree>) {
         match self {
-            Self::Fork(sides) => sides.iter().for_each(|side| side.seeds(seeds)),
-            Self::Twig(seed) => seeds.push(seed),
+            Self::InnerNode(sides) => sides.iter().for_each(|side| side.pending_subtrees(pending_subtrees)),
+            Self::Subtree(pending) => pending_subtrees.push(pending),
         }
     }
 
-    /// The tree of its twigs, which come in their order.
-    fn over<'p>(&self, twigs: &mut impl Iterator<Item = Binary<'p>>) -> Binary<'p> {
+    /// Joins the finished subtrees, given in order.
+    fn over<'p>(&self, subtrees: &mut impl Iterator<Item = Binary<'p>>) -> Binary<'p> {
         match self {
-            Self::Fork(sides) => {
+            Self::InnerNode(sides) => {
                 let [left, right] = &**sides;
-                let left = left.over(twigs);
-                Binary::over([left, right.over(twigs)])
+                let left = left.over(subtrees);
+                Binary::over([left, right.over(subtrees)])
             }
-            Self::Twig(_) => twigs.next().expect("there is one for each seed"),
+            Self::Subtree(_) => subtrees.next().expect("there is one for each seed"),
         }
     }
 }
 
-/// Primitives of which a tree is to grow, and places for what is in its leaves.
-struct Plot<'a> {
+/// Primitives to build a tree over, and slots for the ids in its leaves.
+struct TreeInput<'a> {
     primitives: &'a mut [Primitive],
-    /// Without, names and nodes take the place of the primitives.
-    names: Option<&'a mut [Name]>,
-    /// The place of the first name.
+    /// `None` when ids and nodes overwrite the primitives.
+    ids: Option<&'a mut [PrimitiveId]>,
+    /// Index of the first id.
     first: usize,
-    /// Whether the primitives are to stay, in the order of names.
+    /// Whether to keep the primitives, in the order of the ids.
     keeps: bool,
-    /// Whether subtrees of twigs may be put elsewhere.
+    /// Whether reinsertion may move parts of these subtrees.
     moves: bool,
 }
 
-/// A twig that has grown where its primitives stood, or apart.
-struct GrownTwig {
-    /// Of how many primitives.
+/// A finished subtree, either in the slots of its primitives or in memory of its own.
+struct GrownSubtree {
+    /// Number of primitives.
     count: usize,
-    /// How many there are in the place of the primitives, before their names; or the nodes themselves, which stand apart.
+    /// `Ok` has the number of nodes in the primitives' slots, in front of the ids. `Err` has the nodes themselves.
     nodes: Result<usize, Vec<BinaryNode>>,
     costs: Costs,
     known: Known,
 }
 
-impl GrownTwig {
-    /// How much of the place of the primitives its nodes and names take: never more than there is.
+impl GrownSubtree {
+    /// Primitive slots that the nodes and ids take: never more than there are.
     fn len(&self) -> usize {
-        self.nodes_there() + units_of_names(self.count)
+        self.nodes_there() + slots_for_ids(self.count)
     }
 
     fn nodes_there(&self) -> usize {
@@ -181,30 +185,29 @@ impl GrownTwig {
     }
 }
 
-/// The primitives in whose place so many names have room.
-fn units_of_names(count: usize) -> usize {
-    (count * size_of::<Name>()).div_ceil(size_of::<Primitive>())
+/// Primitive slots needed to store this many ids.
+fn slots_for_ids(count: usize) -> usize {
+    (count * size_of::<PrimitiveId>()).div_ceil(size_of::<Primitive>())
 }
 
-/// The tree over packed primitives, and what is in its leaves, piece by piece.
+/// The tree over packed primitives, and the ids in its leaves by subtree.
 struct PackedTree<'p> {
     tree: Binary<'p>,
-    names: Vec<&'p [Name]>,
+    ids: Vec<&'p [PrimitiveId]>,
 }
 
-/// From how many packed primitives on the room that they leave is given back before more is asked for. In tests there are many
-/// sooner.
+/// At or above this many packed primitives, unused slots are freed before more memory is allocated. Lower in tests.
 const MANY: usize = if cfg!(test) { 1 << 13 } else { 1 << 20 };
 
-/// The primitives of a node of a twig, and as much room for those of its children.
+/// The primitives of a node, and a buffer of the same length for its children's.
 struct Range<'a> {
     here: &'a mut [Primitive],
     there: &'a mut [Primitive],
-    names: &'a mut [Name],
-    /// The place of the first name.
+    ids: &'a mut [PrimitiveId],
+    /// Index of the first id.
     first: usize,
     depth: u32,
-    /// Whether `there` is where they stood in the beginning.
+    /// Whether `there` is the primitives' original place.
     is_away: bool,
 }
 
@@ -213,21 +216,21 @@ impl<'a> Range<'a> {
         self.here.len()
     }
 
-    /// The two sides, where the primitives were moved over.
+    /// The two sides of a split that moved the primitives into the buffer.
     fn moved(self, left: usize) -> [Self; 2] {
         Self { here: self.there, there: self.here, is_away: !self.is_away, ..self }.cut(left)
     }
 
-    /// The two sides, where the primitives are as they were.
+    /// The two sides of a split in place.
     fn cut(self, left: usize) -> [Self; 2] {
         let (here, here_right) = self.here.split_at_mut(left);
         let (there, there_right) = self.there.split_at_mut(left);
-        let (names, names_right) = self.names.split_at_mut(left);
+        let (ids, ids_right) = self.ids.split_at_mut(left);
         let (first, depth, is_away) = (self.first, self.depth + 1, self.is_away);
         let (right, place) = (here_right, first + left);
         [
-            Self { here, there, names, first, depth, is_away },
-            Self { here: right, there: there_right, names: names_right, first: place, depth, is_away },
+            Self { here, there, ids, first, depth, is_away },
+            Self { here: right, there: there_right, ids: ids_right, first: place, depth, is_away },
         ]
     }
 }
@@ -235,52 +238,53 @@ impl<'a> Range<'a> {
 struct Builder<'a> {
     isa: Isa,
     traits: &'a [Traits],
-    /// Levels of the tree whose nodes threads share. What comes out does not depend on it.
+    /// Levels of the tree whose nodes threads share. The result does not depend on it.
     shared: u32,
-    /// So many primitives, and fewer, are left to one thread.
+    /// Up to this many primitives, one thread builds the subtree.
     alone: usize,
 }
 
-/// What one thread needs for twigs.
-struct Workplace {
+/// The memory of one thread for building subtrees.
+struct ThreadScratch {
     nodes: Vec<BinaryNode>,
     bins: Box<Bins>,
-    /// Room for the primitives of one.
+    /// Buffer for the primitives of one subtree.
     there: Vec<Primitive>,
-    /// And for their names.
-    names: Vec<Name>,
+    /// Buffer for their ids.
+    ids: Vec<PrimitiveId>,
 }
 
-/// What a twig needs but for that room.
-struct Tools<'w> {
+/// The rest of a thread's memory, without those two buffers.
+struct SubtreeScratch<'w> {
     nodes: &'w mut Vec<BinaryNode>,
     bins: &'w mut Bins,
 }
 
-impl Workplace {
-    /// For twigs of no more than so many primitives.
+impl ThreadScratch {
+    /// For subtrees of at most `most` primitives.
     fn new(most: usize) -> Self {
-        let names = vec![[0; 2]; most];
-        // Packed primitives have somewhat fewer nodes as a rule; what grows takes twice its room for a moment.
+        let ids = vec![[0; 2]; most];
+        // Packed primitives usually need somewhat fewer nodes. A growing vector would need twice its memory for a
+        // moment.
         let nodes = Vec::with_capacity(most / 3);
-        Self { nodes, bins: Box::new(Bins::EMPTY), there: vec![Bounds::EMPTY; most], names }
+        Self { nodes, bins: Box::new(Bins::EMPTY), there: vec![Bounds::EMPTY; most], ids }
     }
 }
 
 impl Builder<'_> {
-    /// A tree of each rank of which there are primitives, none of which is packed: they come in the order of their ranks, so many of
-    /// each.
+    /// Builds a tree for each rank that has unpacked primitives. The primitives are sorted by rank; `counts` has the
+    /// number of each.
     fn trees_by_rank(
         &self,
         preset: Preset,
         mut primitives: &mut [Primitive],
         counts: &[usize],
-        mut names: &mut [Name],
+        mut ids: &mut [PrimitiveId],
     ) -> Vec<Binary<'static>> {
         let mut trees = Vec::with_capacity(Kind::RANKS);
         let mut first = 0;
         for (rank, &count) in counts.iter().enumerate().filter(|&(_, &count)| count > 0) {
-            let (primitives, names) = (take(&mut primitives, count), take(&mut names, count));
+            let (primitives, ids) = (take(&mut primitives, count), take(&mut ids, count));
             let mut codes = Vec::new();
             if preset == Preset::Fast {
                 let mut sorted = vec![Bounds::EMPTY; primitives.len()];
@@ -288,21 +292,21 @@ impl Builder<'_> {
                 primitives.copy_from_slice(&sorted);
             }
             let keeps = rank == Kind::Instance.rank();
-            let names = Some(names);
-            // Subtrees that are put elsewhere later are those of single instances.
+            let ids = Some(ids);
+            // Only single-instance leaves can be reinserted later.
             trees.push(if keeps && preset != Preset::Best {
-                let sketch = self.sketch_sorted::<false>(primitives, 0, &codes);
-                self.grow::<false>(&sketch, &codes, Plot { primitives, names, first, keeps, moves: false })
+                let plan = self.plan_sorted::<false>(primitives, 0, &codes);
+                self.grow::<false>(&plan, &codes, TreeInput { primitives, ids, first, keeps, moves: false })
             } else {
-                let sketch = self.sketch_sorted::<true>(primitives, 0, &codes);
-                self.grow::<true>(&sketch, &codes, Plot { primitives, names, first, keeps, moves: false })
+                let plan = self.plan_sorted::<true>(primitives, 0, &codes);
+                self.grow::<true>(&plan, &codes, TreeInput { primitives, ids, first, keeps, moves: false })
             });
             first += count;
         }
         trees
     }
 
-    /// A tree of packed primitives, whose first name has this place.
+    /// Builds the tree of packed primitives. `first` is the index of its first id.
     fn tree_of_packed<'p>(&self, preset: Preset, primitives: &'p mut Boxes, first: usize) -> PackedTree<'p> {
         let mut codes = Vec::new();
         if preset == Preset::Fast {
@@ -310,86 +314,87 @@ impl Builder<'_> {
             codes = self.sort(primitives, &mut sorted);
             *primitives = sorted;
         }
-        let sketch = self.sketch_sorted::<false>(primitives, 0, &codes);
+        let plan = self.plan_sorted::<false>(primitives, 0, &codes);
         let moves = preset != Preset::Fast && treelet::is_tried(primitives.len());
-        let plot = Plot { primitives, names: None, first, keeps: false, moves };
-        let twigs = self.twigs::<false>(&sketch, &codes, plot);
+        let input = TreeInput { primitives, ids: None, first, keeps: false, moves };
+        let subtrees = self.subtrees::<false>(&plan, &codes, input);
         drop(codes);
         let count = primitives.len();
         let is_compact = count >= MANY;
         if is_compact {
             let (mut from, mut to) = (0, 0);
-            for twig in &twigs {
-                primitives.copy_within(from..from + twig.len(), to);
-                (from, to) = (from + twig.count, to + twig.len());
+            for subtree in &subtrees {
+                primitives.copy_within(from..from + subtree.len(), to);
+                (from, to) = (from + subtree.count, to + subtree.len());
             }
             primitives.shorten(to);
         }
         let mut rest = &primitives[..];
-        let mut names = Vec::with_capacity(twigs.len());
-        let mut binaries = Vec::with_capacity(twigs.len());
-        for twig in twigs {
-            let own = rest.split_off(..if is_compact { twig.len() } else { twig.count }).unwrap_or_default();
-            let (nodes, behind) = own.split_at(twig.nodes_there());
-            names.push(&bytemuck::cast_slice(behind)[..twig.count]);
-            let nodes = match twig.nodes {
+        let mut ids = Vec::with_capacity(subtrees.len());
+        let mut binaries = Vec::with_capacity(subtrees.len());
+        for subtree in subtrees {
+            let own =
+                rest.split_off(..if is_compact { subtree.len() } else { subtree.count }).unwrap_or_default();
+            let (nodes, behind) = own.split_at(subtree.nodes_there());
+            ids.push(&bytemuck::cast_slice(behind)[..subtree.count]);
+            let nodes = match subtree.nodes {
                 Ok(_) => Cow::Borrowed(bytemuck::cast_slice(nodes)),
                 Err(nodes) => Cow::Owned(nodes),
             };
-            binaries.push(Binary::Twig(Twig { nodes, costs: twig.costs, known: twig.known }));
+            binaries.push(Binary::Subtree(Subtree { nodes, costs: subtree.costs, known: subtree.known }));
         }
-        let tree = sketch.over(&mut binaries.into_iter());
-        PackedTree { tree: if moves { treelet::reinsert_upper(tree, count) } else { tree }, names }
+        let tree = plan.over(&mut binaries.into_iter());
+        PackedTree { tree: if moves { treelet::reinsert_upper(tree, count) } else { tree }, ids }
     }
 
-    /// Puts as many primitives in the order along a curve there; their codes.
+    /// Sorts the primitives along the Morton curve into `sorted`, and returns their codes.
     fn sort(&self, primitives: &[Primitive], sorted: &mut [Primitive]) -> Vec<Code> {
         let centers = self.centers(primitives);
         morton::sort(primitives, sorted, &centers)
     }
 
-    /// Splits by the order along a curve as long as there are codes that differ. The depth of this recursion is at most that
-    /// of the bits of a code, and then of [`Builder::sketch`].
-    fn sketch_sorted<const COSTS: bool>(
+    /// Splits along the Morton curve while codes differ. The recursion is at most as deep as a code has bits, plus that
+    /// of [`Builder::plan`].
+    fn plan_sorted<const COSTS: bool>(
         &self,
         primitives: &mut [Primitive],
         depth: u32,
         codes: &[Code],
-    ) -> Sketch {
+    ) -> SplitPlan {
         let count = primitives.len();
         if count <= self.alone {
-            return Sketch::Twig(Seed { count, depth, binning: None, is_sorted: true });
+            return SplitPlan::Subtree(PendingSubtree { count, depth, binning: None, is_sorted: true });
         }
-        let Some(middle) = morton::cut(codes) else { return self.sketch::<COSTS>(primitives, depth, None) };
+        let Some(middle) = morton::cut(codes) else { return self.plan::<COSTS>(primitives, depth, None) };
         let (left, right) = primitives.split_at_mut(middle);
         let (left_codes, right_codes) = codes.split_at(middle);
         let (left, right) = rayon::join(
-            || self.sketch_sorted::<COSTS>(left, depth + 1, left_codes),
-            || self.sketch_sorted::<COSTS>(right, depth + 1, right_codes),
+            || self.plan_sorted::<COSTS>(left, depth + 1, left_codes),
+            || self.plan_sorted::<COSTS>(right, depth + 1, right_codes),
         );
-        Sketch::Fork(Box::new([left, right]))
+        SplitPlan::InnerNode(Box::new([left, right]))
     }
 
-    /// `binning` is how the primitives are to be binned, where that is known.
-    fn sketch<const COSTS: bool>(
+    /// `binning` is the binning of the primitives, if the parent's split determines it.
+    fn plan<const COSTS: bool>(
         &self,
         primitives: &mut [Primitive],
         depth: u32,
         binning: Option<Binning>,
-    ) -> Sketch {
+    ) -> SplitPlan {
         let count = primitives.len();
         if count <= self.alone {
-            return Sketch::Twig(Seed { count, depth, binning, is_sorted: false });
+            return SplitPlan::Subtree(PendingSubtree { count, depth, binning, is_sorted: false });
         }
         let ([left, right], [left_binning, right_binning]) = self.divide::<COSTS>(primitives, depth, binning);
         let (left, right) = rayon::join(
-            || self.sketch::<COSTS>(left, depth + 1, left_binning),
-            || self.sketch::<COSTS>(right, depth + 1, right_binning),
+            || self.plan::<COSTS>(left, depth + 1, left_binning),
+            || self.plan::<COSTS>(right, depth + 1, right_binning),
         );
-        Sketch::Fork(Box::new([left, right]))
+        SplitPlan::InnerNode(Box::new([left, right]))
     }
 
-    /// One level of a node that threads share. Apart, so that its bins are not on the stack of what is below.
+    /// Splits one shared node. Not inlined: the bins would stay on the stack during the recursion.
     #[inline(never)]
     fn divide<'p, const COSTS: bool>(
         &self,
@@ -409,90 +414,101 @@ impl Builder<'_> {
         ([left, right], binnings.map(Some))
     }
 
-    /// The tree that was sketched. `codes` are those of the primitives, if they were sorted, and there are places for names.
-    fn grow<const COSTS: bool>(&self, sketch: &Sketch, codes: &[Code], plot: Plot) -> Binary<'static> {
-        let twigs = self.twigs::<COSTS>(sketch, codes, plot);
-        let mut apart = twigs.into_iter().map(|GrownTwig { nodes, costs, known, .. }| {
+    /// Builds the planned tree. `codes` are those of the primitives if they were sorted; the input has slots for ids.
+    fn grow<const COSTS: bool>(&self, plan: &SplitPlan, codes: &[Code], input: TreeInput) -> Binary<'static> {
+        let subtrees = self.subtrees::<COSTS>(plan, codes, input);
+        let mut apart = subtrees.into_iter().map(|GrownSubtree { nodes, costs, known, .. }| {
             let nodes = Cow::Owned(nodes.expect_err("names have places of their own"));
-            Binary::Twig(Twig { nodes, costs, known })
+            Binary::Subtree(Subtree { nodes, costs, known })
         });
-        sketch.over(&mut apart)
+        plan.over(&mut apart)
     }
 
-    /// The twigs that were sketched.
-    fn twigs<const COSTS: bool>(&self, sketch: &Sketch, mut codes: &[Code], plot: Plot) -> Vec<GrownTwig> {
-        let Plot { mut primitives, mut names, mut first, keeps, moves } = plot;
-        let mut seeds = Vec::new();
-        sketch.seeds(&mut seeds);
-        let most = seeds.iter().map(|seed| seed.count).max().unwrap_or_default();
-        let mut plots = Vec::with_capacity(seeds.len());
-        for seed in seeds {
-            let codes = codes.split_off(..seed.count).unwrap_or_default();
-            let own = take(&mut primitives, seed.count);
-            let names = names.as_mut().map(|names| take(names, seed.count));
-            plots.push((seed, codes, Plot { primitives: own, names, first, keeps, moves }));
-            first += seed.count;
+    /// Builds the planned subtrees.
+    fn subtrees<const COSTS: bool>(
+        &self,
+        plan: &SplitPlan,
+        mut codes: &[Code],
+        input: TreeInput,
+    ) -> Vec<GrownSubtree> {
+        let TreeInput { mut primitives, mut ids, mut first, keeps, moves } = input;
+        let mut pending_subtrees = Vec::new();
+        plan.pending_subtrees(&mut pending_subtrees);
+        let most = pending_subtrees.iter().map(|pending| pending.count).max().unwrap_or_default();
+        let mut inputs = Vec::with_capacity(pending_subtrees.len());
+        for pending in pending_subtrees {
+            let codes = codes.split_off(..pending.count).unwrap_or_default();
+            let own = take(&mut primitives, pending.count);
+            let ids = ids.as_mut().map(|ids| take(ids, pending.count));
+            inputs.push((pending, codes, TreeInput { primitives: own, ids, first, keeps, moves }));
+            first += pending.count;
         }
-        plots
+        inputs
             .into_par_iter()
             .map_init(
-                || Workplace::new(most),
-                |work, (seed, codes, plot)| {
-                    let Workplace { nodes, bins, there, names: own_names } = work;
+                || ThreadScratch::new(most),
+                |scratch, (pending, codes, input)| {
+                    let ThreadScratch { nodes, bins, there, ids: own_ids } = scratch;
                     nodes.clear();
-                    let there = &mut there[..seed.count];
-                    let Plot { primitives: own, names, first, keeps, moves } = plot;
-                    let is_there = names.is_none();
-                    let names = names.unwrap_or(&mut own_names[..seed.count]);
+                    let there = &mut there[..pending.count];
+                    let TreeInput { primitives: own, ids, first, keeps, moves } = input;
+                    let is_there = ids.is_none();
+                    let ids = ids.unwrap_or(&mut own_ids[..pending.count]);
                     let range = Range {
                         here: &mut *own,
                         there,
-                        names: &mut *names,
+                        ids: &mut *ids,
                         first,
-                        depth: seed.depth,
+                        depth: pending.depth,
                         is_away: false,
                     };
-                    if seed.is_sorted {
-                        self.twig_sorted::<COSTS>(range, codes, &mut Tools { nodes, bins });
+                    if pending.is_sorted {
+                        self.subtree_sorted::<COSTS>(range, codes, &mut SubtreeScratch { nodes, bins });
                     } else {
-                        let tools = &mut Tools { nodes, bins };
-                        let split = seed.binning.and_then(|binning| {
-                            self.binned::<COSTS>(range.here, binning, tools.bins, range.depth)
+                        let scratch = &mut SubtreeScratch { nodes, bins };
+                        let split = pending.binning.and_then(|binning| {
+                            self.binned::<COSTS>(range.here, binning, scratch.bins, range.depth)
                         });
-                        self.twig::<COSTS>(range, split, tools);
+                        self.subtree::<COSTS>(range, split, scratch);
                     }
                     let (costs, known) =
                         if moves { Known::choose(nodes) } else { (choose(nodes, keeps), Known::default()) };
-                    let mut twig = GrownTwig { count: seed.count, nodes: Ok(nodes.len()), costs, known };
-                    // There is no room for both only where hardly any share a leaf.
-                    if !is_there || twig.len() > own.len() {
-                        twig.nodes = Err(nodes.to_vec());
+                    let mut subtree =
+                        GrownSubtree { count: pending.count, nodes: Ok(nodes.len()), costs, known };
+                    // Both fit unless hardly any primitives share a leaf.
+                    if !is_there || subtree.len() > own.len() {
+                        subtree.nodes = Err(nodes.to_vec());
                     }
                     if is_there {
-                        let (nodes_there, behind) = own.split_at_mut(twig.nodes_there());
+                        let (nodes_there, behind) = own.split_at_mut(subtree.nodes_there());
                         nodes_there.copy_from_slice(bytemuck::cast_slice(&nodes[..nodes_there.len()]));
-                        bytemuck::cast_slice_mut(behind)[..names.len()].copy_from_slice(names);
+                        bytemuck::cast_slice_mut(behind)[..ids.len()].copy_from_slice(ids);
                     }
-                    twig
+                    subtree
                 },
             )
             .collect()
     }
 
-    fn twig_sorted<const COSTS: bool>(&self, range: Range, codes: &[Code], work: &mut Tools) -> Bounds {
+    fn subtree_sorted<const COSTS: bool>(
+        &self,
+        range: Range,
+        codes: &[Code],
+        scratch: &mut SubtreeScratch,
+    ) -> Bounds {
         let count = range.len();
         if count <= FAST_FEW {
-            return self.twig::<COSTS>(range, None, work);
+            return self.subtree::<COSTS>(range, None, scratch);
         }
-        let Some(middle) = morton::cut(codes) else { return self.twig::<COSTS>(range, None, work) };
-        let place = work.nodes.len();
-        work.nodes.push(BinaryNode(Bounds::EMPTY));
+        let Some(middle) = morton::cut(codes) else { return self.subtree::<COSTS>(range, None, scratch) };
+        let place = scratch.nodes.len();
+        scratch.nodes.push(BinaryNode(Bounds::EMPTY));
         let [left, right] = range.cut(middle);
         let (left_codes, right_codes) = codes.split_at(middle);
-        let mut bounds = self.twig_sorted::<COSTS>(left, left_codes, work);
-        let right_place = work.nodes.len() - place;
-        bounds.grow(&self.twig_sorted::<COSTS>(right, right_codes, work));
-        work.nodes[place] = BinaryNode::inner(&bounds, right_place);
+        let mut bounds = self.subtree_sorted::<COSTS>(left, left_codes, scratch);
+        let right_place = scratch.nodes.len() - place;
+        bounds.grow(&self.subtree_sorted::<COSTS>(right, right_codes, scratch));
+        scratch.nodes[place] = BinaryNode::inner(&bounds, right_place);
         bounds
     }
 
@@ -508,7 +524,7 @@ impl Builder<'_> {
         self.isa.run(BestSplit::<COSTS> { bins, binning })
     }
 
-    /// The split of a node; `None` where it is to be split by order.
+    /// The split of a node, or `None` to split it by order.
     fn split<const COSTS: bool>(
         &self,
         primitives: &[Primitive],
@@ -520,7 +536,7 @@ impl Builder<'_> {
         self.known::<COSTS>(primitives, depth, split, bins)
     }
 
-    /// The same where a split has been found, if any was.
+    /// As [`Self::split`], after a first attempt that may have found a split.
     #[inline]
     fn known<const COSTS: bool>(
         &self,
@@ -532,7 +548,7 @@ impl Builder<'_> {
         if depth >= SAH_DEPTH {
             return None;
         }
-        // Where the range was much too wide, it is measured.
+        // A small spread means that the estimated range was much too wide: measure it instead.
         if split.is_some_and(|split| split.spread > 4) {
             return split;
         }
@@ -574,15 +590,20 @@ impl Builder<'_> {
         bins.join(&other);
     }
 
-    /// Makes a subtree by one thread; returns its box. Its depth is bounded, and so is this recursion.
-    fn twig<const COSTS: bool>(&self, range: Range, split: Option<Split>, work: &mut Tools) -> Bounds {
+    /// Builds a subtree on one thread and returns its box. The depth is bounded, and so is this recursion.
+    fn subtree<const COSTS: bool>(
+        &self,
+        range: Range,
+        split: Option<Split>,
+        scratch: &mut SubtreeScratch,
+    ) -> Bounds {
         let count = range.len();
-        if count <= FEW {
-            return self.few::<COSTS>(range, work);
+        if count <= SMALL_BUILD_MAX {
+            return self.small::<COSTS>(range, scratch);
         }
-        let place = work.nodes.len();
-        work.nodes.push(BinaryNode(Bounds::EMPTY));
-        let split = self.known::<COSTS>(range.here, range.depth, split, work.bins);
+        let place = scratch.nodes.len();
+        scratch.nodes.push(BinaryNode(Bounds::EMPTY));
+        let split = self.known::<COSTS>(range.here, range.depth, split, scratch.bins);
         let ([left, right], splits) = match &split {
             Some(split) => {
                 let (left, right) = range.there.split_at_mut(split.left);
@@ -590,11 +611,11 @@ impl Builder<'_> {
                 let cut = range.moved(split.left);
                 let splits = [0, 1].map(|side| {
                     let primitives = &*cut[side].here;
-                    if primitives.len() <= FEW {
+                    if primitives.len() <= SMALL_BUILD_MAX {
                         return None;
                     }
                     let binning = split.next(side, primitives.len());
-                    self.binned::<COSTS>(primitives, binning, work.bins, cut[side].depth)
+                    self.binned::<COSTS>(primitives, binning, scratch.bins, cut[side].depth)
                 });
                 (cut, splits)
             }
@@ -603,43 +624,43 @@ impl Builder<'_> {
                 (range.cut(middle), [None; 2])
             }
         };
-        let mut bounds = self.twig::<COSTS>(left, splits[0], work);
-        let right_place = work.nodes.len() - place;
-        bounds.grow(&self.twig::<COSTS>(right, splits[1], work));
-        work.nodes[place] = BinaryNode::inner(&bounds, right_place);
+        let mut bounds = self.subtree::<COSTS>(left, splits[0], scratch);
+        let right_place = scratch.nodes.len() - place;
+        bounds.grow(&self.subtree::<COSTS>(right, splits[1], scratch));
+        scratch.nodes[place] = BinaryNode::inner(&bounds, right_place);
         bounds
     }
 
-    fn few<const COSTS: bool>(&self, range: Range, work: &mut Tools) -> Bounds {
+    fn small<const COSTS: bool>(&self, range: Range, scratch: &mut SubtreeScratch) -> Bounds {
         let traits = self.traits;
-        let place = work.nodes.len();
-        match self.isa.run(Decide::<COSTS> { primitives: range.here, traits }) {
-            Few::Leaf => {
+        let place = scratch.nodes.len();
+        match self.isa.run(SplitSmall::<COSTS> { primitives: range.here, traits }) {
+            SmallSplit::Leaf => {
                 let mut bounds = Bounds::EMPTY;
-                for (name, primitive) in range.names.iter_mut().zip(&*range.here) {
+                for (name, primitive) in range.ids.iter_mut().zip(&*range.here) {
                     *name = [primitive.first(), primitive.second()];
                     bounds.grow(primitive);
                 }
                 if range.is_away {
                     range.there.copy_from_slice(range.here);
                 }
-                work.nodes.push(BinaryNode::leaf(&bounds, range.first, range.names.len()));
+                scratch.nodes.push(BinaryNode::leaf(&bounds, range.first, range.ids.len()));
                 bounds
             }
-            Few::Split(left) => {
-                work.nodes.push(BinaryNode(Bounds::EMPTY));
+            SmallSplit::Split(left) => {
+                scratch.nodes.push(BinaryNode(Bounds::EMPTY));
                 let [left, right] = range.cut(left);
-                let mut bounds = self.few::<COSTS>(left, work);
-                let right_place = work.nodes.len() - place;
-                bounds.grow(&self.few::<COSTS>(right, work));
-                work.nodes[place] = BinaryNode::inner(&bounds, right_place);
+                let mut bounds = self.small::<COSTS>(left, scratch);
+                let right_place = scratch.nodes.len() - place;
+                bounds.grow(&self.small::<COSTS>(right, scratch));
+                scratch.nodes[place] = BinaryNode::inner(&bounds, right_place);
                 bounds
             }
         }
     }
 
-    /// Without a SAH split: in the middle by kind, then geometry, then along the longest axis, so that leaves of one kind
-    /// come about even where everything stands in one place.
+    /// Splits in the middle by kind, then geometry, then along the longest axis. So leaves hold one kind even where all
+    /// primitives coincide.
     fn by_order(&self, primitives: &mut [Primitive]) -> usize {
         let axis = self.centers(primitives).longest_axis();
         let group = |p: &Primitive| group_of(p, self.traits);

@@ -1,4 +1,4 @@
-//! Nodes of the binary tree, and how each shares the children of a wide node among its own two: see [`collapse`](super::collapse).
+//! Nodes of the binary tree, and the choices that turn them into wide nodes: see [`collapse`](super::collapse).
 
 use std::cmp::Reverse;
 
@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 use super::primitive::Bounds;
 use crate::tree::node::WIDTH;
 
-/// A node of a twig: its box, named by two words.
+/// A node of a subtree: its box and two words.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(transparent)]
 pub(crate) struct BinaryNode(pub(super) Bounds);
@@ -16,32 +16,32 @@ const LEAF: u32 = 1 << 31;
 
 impl BinaryNode {
     pub(crate) fn leaf(bounds: &Bounds, first: usize, count: usize) -> Self {
-        Self(bounds.with_names(first as u32, LEAF | count as u32))
+        Self(bounds.with_ids(first as u32, LEAF | count as u32))
     }
 
-    /// A leaf from the box of one.
+    /// A leaf that has the box and words of another.
     pub(crate) fn again(leaf: &Bounds) -> Self {
         Self(*leaf)
     }
 
-    /// An inner node, its right child so far behind it.
+    /// An inner node whose right child is `right` places behind it.
     pub(crate) fn inner(bounds: &Bounds, right: usize) -> Self {
-        Self(bounds.with_names(right as u32, 0))
+        Self(bounds.with_ids(right as u32, 0))
     }
 
     pub(crate) fn bounds(&self) -> &Bounds {
         &self.0
     }
 
-    /// The names of a leaf's primitives; `None` of an inner node.
+    /// The ids in a leaf; `None` for an inner node.
     #[inline(always)]
-    pub(crate) fn names(&self) -> Option<std::ops::Range<usize>> {
+    pub(crate) fn ids(&self) -> Option<std::ops::Range<usize>> {
         let first = self.0.first() as usize;
         let count = (self.0.second() & !LEAF) as usize;
         (self.0.second() & LEAF != 0).then(|| first..first + count)
     }
 
-    /// How far behind an inner node its right child stands.
+    /// Distance from an inner node to its right child.
     #[inline(always)]
     pub(crate) fn right(&self) -> usize {
         self.0.first() as usize
@@ -54,34 +54,35 @@ impl BinaryNode {
 
     #[inline(always)]
     pub(crate) fn choose(&mut self, choices: Choices) {
-        self.0 = self.0.with_names(self.0.first(), choices.0);
+        self.0 = self.0.with_ids(self.0.first(), choices.0);
     }
 }
 
-/// The least costs of putting a subtree into 1 to 15 children of a node; the first of the sixteen means nothing.
+/// The least costs of putting a subtree into 1 to 15 children of a node. Entry 0 is unused.
 pub(crate) type Costs = [f32; WIDTH];
 
 pub(super) const LEAF_COSTS: Costs = [0.0; WIDTH];
 
-/// How a node of the binary tree shares the children that it is given, 2 to 16, among its own two, and how many are still too few for
-/// that. How many go to the left is chosen freely for up to eight and for sixteen; from the ninth to the fifteenth, one more goes to
-/// the side that it serves better. So all of it takes 29 bits, and trees are hardly worse for it.
+/// How a node of the binary tree divides its 2 to 16 slots for wide children between its two children, and up to how
+/// many slots it is better to be one child itself. The left share is free for up to eight slots and for sixteen; from
+/// nine to fifteen, each further slot goes to the side that gains more. So all choices fit in 29 bits, and trees are
+/// hardly worse.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Choices(pub(crate) u32);
 
-/// The most children that are shared freely but for all.
+/// Up to this many slots, the left share is chosen freely.
 const FREELY: usize = WIDTH / 2;
-/// Where it stands how many go to the left, less one, of up to [`FREELY`].
+/// Bit offsets of the left share minus one, for up to [`FREELY`] slots.
 const LEFT_AT: [u32; FREELY + 2] = [0, 0, 0, 0, 1, 3, 5, 8, 11, 14];
-/// From here on, a bit each says whether the next goes to the left.
+/// From this bit on, one bit per slot says whether it goes to the left.
 const NEXT_AT: u32 = LEFT_AT[FREELY + 1];
 const LEFT_OF_ALL_AT: u32 = NEXT_AT + (WIDTH - FREELY - 1) as u32;
-const MOST_AS_ONE_AT: u32 = LEFT_OF_ALL_AT + 4;
+const MAX_AS_ONE_AT: u32 = LEFT_OF_ALL_AT + 4;
 
-// The last bit of the word says that a node is a leaf; four bits hold what is below sixteen.
-const _: () = assert!(MOST_AS_ONE_AT + 4 < u32::BITS && WIDTH == 16);
+// The top bit of the word marks a leaf. Four bits hold a number below sixteen.
+const _: () = assert!(MAX_AS_ONE_AT + 4 < u32::BITS && WIDTH == 16);
 
-/// The choices where there is a leaf at the left, or at the right.
+/// The choices of a node whose left or right child is a leaf.
 const ALL_BUT_ONE_RIGHT: u32 = 0;
 const ALL_BUT_ONE_LEFT: u32 = {
     let next = (1 << (LEFT_OF_ALL_AT - NEXT_AT)) - 1;
@@ -95,11 +96,11 @@ const ALL_BUT_ONE_LEFT: u32 = {
 };
 
 impl Choices {
-    /// How many go to the left of two or more; 0 where it is better to be one child.
+    /// Slots for the left child; 0 if the node is better as one child.
     #[inline(always)]
     pub(super) fn left(self, children: usize) -> usize {
         let bits = |from: u32, to: u32| (self.0 >> from & ((1 << (to - from)) - 1)) as usize;
-        if children <= bits(MOST_AS_ONE_AT, MOST_AS_ONE_AT + 4) {
+        if children <= bits(MAX_AS_ONE_AT, MAX_AS_ONE_AT + 4) {
             0
         } else if children <= FREELY {
             1 + bits(LEFT_AT[children], LEFT_AT[children + 1])
@@ -107,12 +108,12 @@ impl Choices {
             let next = bits(NEXT_AT, NEXT_AT + (children - FREELY) as u32).count_ones() as usize;
             1 + bits(LEFT_AT[FREELY], LEFT_AT[FREELY + 1]) + next
         } else {
-            1 + bits(LEFT_OF_ALL_AT, MOST_AS_ONE_AT)
+            1 + bits(LEFT_OF_ALL_AT, MAX_AS_ONE_AT)
         }
     }
 }
 
-/// The least cost of sharing so many children, and how many go to the left.
+/// The least cost of sharing `children` slots, and the left child's share.
 #[inline(always)]
 fn share_freely(children: usize, left: &Costs, right: &Costs) -> (f32, usize) {
     let mut best = (f32::INFINITY, 1);
@@ -125,7 +126,7 @@ fn share_freely(children: usize, left: &Costs, right: &Costs) -> (f32, usize) {
     best
 }
 
-/// Chooses for a node over two children.
+/// Makes the choices of a node over two children.
 #[inline(always)]
 pub(super) fn share(area: f32, left: &Costs, right: &Costs) -> (Costs, Choices) {
     let mut costs = LEAF_COSTS;
@@ -137,7 +138,7 @@ pub(super) fn share(area: f32, left: &Costs, right: &Costs) -> (Costs, Choices) 
         None
     };
     if let Some((other, choices)) = beside_leaf {
-        // All but one are of use to the other alone.
+        // A leaf uses one slot; the other child gets the rest.
         costs[2..].copy_from_slice(&other[1..WIDTH - 1]);
         return one_if_no_worse(costs, area + other[WIDTH - 1], choices);
     }
@@ -159,11 +160,11 @@ pub(super) fn share(area: f32, left: &Costs, right: &Costs) -> (Costs, Choices) 
     one_if_no_worse(costs, area + cost, choices)
 }
 
-/// The costs of a node by those of sharing two children or more, where it may be one child instead.
+/// Adds the alternative of one wide child to the costs of sharing two slots or more.
 #[inline(always)]
 fn one_if_no_worse(mut costs: Costs, as_one: f32, choices: u32) -> (Costs, Choices) {
     costs[1] = as_one;
-    // More children never cost more, so that those that do not help stand in a row.
+    // Costs never increase with more slots, so the useless ones are consecutive.
     let mut most_as_one = 1;
     for (children, cost) in costs.iter_mut().enumerate().skip(2) {
         if *cost >= as_one {
@@ -171,26 +172,26 @@ fn one_if_no_worse(mut costs: Costs, as_one: f32, choices: u32) -> (Costs, Choic
             most_as_one = children as u32;
         }
     }
-    (costs, Choices(choices | most_as_one << MOST_AS_ONE_AT))
+    (costs, Choices(choices | most_as_one << MAX_AS_ONE_AT))
 }
 
-/// The costs of putting leaves of so many instances: beside others where there is room for all, or else into a node of their own.
+/// The costs of instances: one slot each if all fit, otherwise one wide node for them.
 pub(super) fn costs_of_instances(count: usize, area: f32) -> Costs {
     std::array::from_fn(|children| if children < count { area } else { 0.0 })
 }
 
-/// The costs of the larger subtrees of a twig, so that these can be put elsewhere without choosing again.
+/// The costs of the larger subtrees, so that moving them needs no new choices.
 #[derive(Default)]
 pub(crate) struct Known {
-    /// With their places, from the last to the first.
+    /// With the indices of their roots, in descending order.
     costs: Vec<(u32, Costs)>,
 }
 
 impl Known {
-    /// From how many nodes on a subtree is a larger one.
+    /// Minimum nodes of a subtree that is kept.
     const LEAST: usize = 32;
 
-    /// Chooses for all nodes of a twig; returns the costs of its root, too.
+    /// Makes the choices of all nodes, and returns the root's costs too.
     pub(crate) fn choose(nodes: &mut [BinaryNode]) -> (Costs, Self) {
         let mut known = Self { costs: Vec::with_capacity(nodes.len() / 16) };
         let costs = choose_and(
@@ -206,14 +207,14 @@ impl Known {
         (costs, known)
     }
 
-    /// The costs of the subtree of these nodes, the first of which has that place in the twig.
+    /// The costs of the subtree of these nodes, whose root has index `place`.
     pub(crate) fn costs(&self, place: usize, nodes: &[BinaryNode]) -> Costs {
         let found = self.costs.binary_search_by_key(&Reverse(place as u32), |&(place, _)| Reverse(place));
         found.map_or_else(|_| choose(&mut nodes.to_vec(), false), |found| self.costs[found].1)
     }
 }
 
-/// Chooses for all nodes of a twig; returns the costs of its root.
+/// Makes the choices of all nodes, and returns the root's costs.
 pub(crate) fn choose(nodes: &mut [BinaryNode], are_instances: bool) -> Costs {
     choose_and(
         nodes,
@@ -223,22 +224,22 @@ pub(crate) fn choose(nodes: &mut [BinaryNode], are_instances: bool) -> Costs {
     )
 }
 
-/// The same; tells the place of each inner node, how many nodes its subtree has, and the costs of that.
+/// As [`choose`]; calls `tell` with each inner node's index, subtree size and costs.
 #[inline(always)]
 fn choose_and(
     nodes: &mut [BinaryNode],
     are_instances: bool,
     mut tell: impl FnMut(usize, usize, &Costs),
 ) -> Costs {
-    // Of the subtrees behind a node that have no parent there, from the last to the first: its children's are the last two.
+    // A stack of the subtrees behind the node that have no parent yet. The top two are the node's children.
     let mut behind = Vec::new();
     let mut ends = Vec::new();
     for (place, node) in nodes.iter_mut().enumerate().rev() {
         let mut costs = LEAF_COSTS;
         let mut end = place + 1;
-        if let Some(names) = node.names() {
+        if let Some(ids) = node.ids() {
             if are_instances {
-                costs = costs_of_instances(names.len(), node.bounds().half_area());
+                costs = costs_of_instances(ids.len(), node.bounds().half_area());
             }
         } else if let (Some(left), Some(right)) = (behind.pop(), behind.pop()) {
             let choices;

@@ -4,58 +4,58 @@ use std::borrow::Cow;
 
 use super::binary_node::{BinaryNode, Choices, Costs, Known, choose, share};
 use super::primitive::Bounds;
-use super::small::FEW;
+use super::small::SMALL_BUILD_MAX;
 
-/// Levels that may be split by SAH; then come at most 32 more, each halving.
+/// Levels that SAH may split; at most 32 levels of halving follow.
 pub(super) const SAH_DEPTH: u32 = 64;
-/// No tree that has grown so is deeper: the last few are split in any way.
-pub(crate) const DEEPEST: u32 = SAH_DEPTH + 32 + FEW as u32;
+/// Bound on the depth of every tree built here; the last few primitives may be split in any way.
+pub(crate) const DEEPEST: u32 = SAH_DEPTH + 32 + SMALL_BUILD_MAX as u32;
 
 /// The binary tree, or a part of it.
 pub(crate) enum Binary<'p> {
-    /// Over many primitives.
-    Fork(Box<Fork<'p>>),
-    /// Over fewer, with their nodes in a row.
-    Twig(Twig<'p>),
+    /// Above the subtrees that one thread builds.
+    InnerNode(Box<InnerNode<'p>>),
+    /// A subtree that one thread built, in one array.
+    Subtree(Subtree<'p>),
 }
 
-/// A node with two children of their own.
-pub(crate) struct Fork<'p> {
+/// A node that owns its two children.
+pub(crate) struct InnerNode<'p> {
     pub(crate) bounds: Bounds,
     pub(crate) costs: Costs,
     pub(crate) choices: Choices,
     pub(crate) children: [Binary<'p>; 2],
-    /// How many there are below it, with itself.
+    /// Number of nodes in its tree, including itself.
     pub(crate) nodes: usize,
-    /// Whether the right child is of a higher rank than the left.
+    /// Whether the right child has a higher rank than the left.
     pub(crate) is_ranked: bool,
 }
 
 impl Binary<'_> {
-    /// The node over two.
+    /// The node over two trees.
     pub(crate) fn over(children: [Self; 2]) -> Self {
-        Self::Fork(Box::new(Fork::over(children)))
+        Self::InnerNode(Box::new(InnerNode::over(children)))
     }
 
-    /// A twig of such nodes.
-    pub(crate) fn twig(mut nodes: Vec<BinaryNode>) -> Self {
+    /// A subtree of these nodes.
+    pub(crate) fn subtree(mut nodes: Vec<BinaryNode>) -> Self {
         let costs = choose(&mut nodes, false);
-        Self::Twig(Twig { nodes: Cow::Owned(nodes), costs, known: Known::default() })
+        Self::Subtree(Subtree { nodes: Cow::Owned(nodes), costs, known: Known::default() })
     }
 }
 
 /// Nodes in depth-first order, the root first, each left child right after its parent.
-pub(crate) struct Twig<'p> {
-    /// As a rule where the primitives stood that they are over.
+pub(crate) struct Subtree<'p> {
+    /// Usually borrowed from the slots of the subtree's primitives.
     pub(crate) nodes: Cow<'p, [BinaryNode]>,
-    /// The costs of the root, for those above it.
+    /// The costs of the root, for its ancestors.
     pub(crate) costs: Costs,
-    /// Those of others, where they may come to stand elsewhere.
+    /// The costs of other nodes, if reinsertion may move them.
     pub(super) known: Known,
 }
 
-impl<'p> Twig<'p> {
-    /// The subtree of these nodes. Unless they stand where the primitives stood, they are copied.
+impl<'p> Subtree<'p> {
+    /// The subtree in this range of nodes. Owned nodes are copied.
     pub(crate) fn part(&self, nodes: std::ops::Range<usize>) -> Self {
         let costs = self.known.costs(nodes.start, &self.nodes[nodes.clone()]);
         let nodes = match &self.nodes {
@@ -69,29 +69,29 @@ impl<'p> Twig<'p> {
 impl Binary<'_> {
     pub(crate) fn bounds(&self) -> &Bounds {
         match self {
-            Self::Fork(fork) => &fork.bounds,
-            Self::Twig(twig) => twig.nodes[0].bounds(),
+            Self::InnerNode(inner) => &inner.bounds,
+            Self::Subtree(subtree) => subtree.nodes[0].bounds(),
         }
     }
 
     pub(crate) fn costs(&self) -> &Costs {
         match self {
-            Self::Fork(fork) => &fork.costs,
-            Self::Twig(twig) => &twig.costs,
+            Self::InnerNode(inner) => &inner.costs,
+            Self::Subtree(subtree) => &subtree.costs,
         }
     }
 
-    /// How many nodes it has.
+    /// Number of nodes.
     fn nodes(&self) -> usize {
         match self {
-            Self::Fork(fork) => fork.nodes,
-            Self::Twig(twig) => twig.nodes.len(),
+            Self::InnerNode(inner) => inner.nodes,
+            Self::Subtree(subtree) => subtree.nodes.len(),
         }
     }
 }
 
-impl<'p> Fork<'p> {
-    /// The one over two.
+impl<'p> InnerNode<'p> {
+    /// The node over two trees.
     pub(crate) fn over(children: [Binary<'p>; 2]) -> Self {
         let mut bounds = *children[0].bounds();
         bounds.grow(children[1].bounds());

@@ -1,4 +1,4 @@
-//! A list of boxes that can be made shorter where it stands.
+//! A list of boxes that can be shortened in place.
 
 use std::ops::{Deref, DerefMut};
 
@@ -7,42 +7,42 @@ use rayon::prelude::*;
 
 use crate::build::primitive::Bounds;
 
-/// Half of a box. Of what is aligned to more than 16 bytes, the standard library gives nothing back but by making a copy.
+/// Half of a box. For an alignment above 16 bytes, the standard library shrinks an allocation by copying it.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C, align(16))]
 struct Half([i32; 4]);
 
-/// Boxes, as a vector of them would be.
+/// Boxes, as a vector would hold them.
 pub(crate) struct Boxes {
-    // One more than they are, so that they can be aligned.
+    // One more half than needed, so that boxes can be aligned.
     halves: Vec<Half>,
     count: usize,
 }
 
 impl Boxes {
-    /// So many that are empty.
+    /// `count` empty boxes.
     pub(crate) fn empty(count: usize) -> Self {
         Self { halves: fill(2 * count + 1, Half([Bounds::EMPTY_LANE; 4])), count }
     }
 
-    /// The halves before the first box.
+    /// Halves before the first box.
     fn start(&self) -> usize {
         self.halves.as_ptr().addr() % align_of::<Bounds>() / size_of::<Half>()
     }
 
-    /// Keeps the first ones, and gives back the room of the others.
+    /// Keeps the first `count` boxes and frees the memory of the others.
     pub(crate) fn shorten(&mut self, count: usize) {
         let before = self.start();
         self.count = self.count.min(count);
         self.halves.truncate(2 * self.count + 1);
         self.halves.shrink_to_fit();
-        // They stand where they stood, unless the allocator had reasons.
+        // The allocator may have moved them.
         let now = self.start();
         self.halves.copy_within(before..before + 2 * self.count, now);
     }
 }
 
-/// Like `vec![value; count]`, by all threads where that is much: so many for each at least.
+/// Like `vec![value; count]`, filled by several threads if each gets enough elements.
 pub(crate) fn fill<T: Clone + Send + Sync>(count: usize, value: T) -> Vec<T> {
     const LEAST: usize = 1 << 14;
     (0..count).into_par_iter().with_min_len(LEAST).map(|_| value.clone()).collect()

@@ -1,4 +1,4 @@
-//! Clouds of spheres on their way into a tree: checked, measured and boxed.
+//! Checks, measures and boxes clouds of spheres for the build.
 
 use lumbre_geometry::Aabb;
 use lumbre_math::DVec3;
@@ -10,22 +10,22 @@ use crate::tree::geometry::SphereCloud;
 use crate::tree::node::TreeSpace;
 use crate::tree::sphere_block::{ExactSphere, has_radius};
 
-/// Spheres that a thread looks at together.
+/// Spheres per task.
 const CHUNK: usize = 1 << 13;
 
-/// What was seen of a cloud.
+/// What the build knows of a cloud.
 pub(crate) struct CloudSurvey {
     pub(crate) geometry: u32,
-    /// Spheres that have a radius.
+    /// Number of spheres with a radius.
     pub(crate) spheres: usize,
     pub(crate) bounds: Aabb,
     /// The largest coordinate of a centre, relative to the cloud's origin, plus the largest radius.
     pub(crate) reach: f64,
-    // Spheres that have a radius of every `CHUNK`.
+    // Spheres with a radius in each `CHUNK`.
     chunks: Vec<u32>,
 }
 
-/// The largest numbers of some spheres, and the box around their centres.
+/// The largest values of some spheres, and the box around their centres.
 #[derive(Clone, Copy)]
 struct Seen {
     low: DVec3,
@@ -56,7 +56,7 @@ impl CloudSurvey {
         }
         let is_broken = |sphere: &[f32; 4]| !sphere.iter().all(|x| x.is_finite());
         let survey_chunk = |chunk: &[[f32; 4]]| {
-            // All of them are finite where their sum with zeros is.
+            // The sum of x * 0 is zero only if every x is finite.
             let sum = chunk.iter().flatten().fold(0.0, |sum: f32, x| sum + x * 0.0);
             sum.is_finite().then(|| {
                 chunk.iter().filter(|sphere| has_radius(sphere)).fold(Seen::NOTHING, |seen, sphere| {
@@ -74,14 +74,14 @@ impl CloudSurvey {
         let all = seen.into_iter().fold(Seen::NOTHING, Seen::join);
         let (mut bounds, mut reach) = (Aabb::EMPTY, 0.0);
         if all.count > 0 {
-            // Rounded once more, here and where a sphere gets its centre.
+            // Rounded once more here and when a sphere gets its centre.
             bounds = Aabb { min: cloud.origin + all.low, max: cloud.origin + all.high }.outward(3);
             reach = all.low.abs().max(all.high.abs()).max_element() + all.radius;
         }
         Ok(Self { geometry: position as u32, spheres: all.count as usize, bounds, reach, chunks })
     }
 
-    /// Writes down the boxes of the spheres that have a radius.
+    /// Writes the boxes of the spheres that have a radius.
     pub(crate) fn put_boxes(
         &self,
         cloud: &SphereCloud,
@@ -102,13 +102,13 @@ impl CloudSurvey {
             let there = spheres.filter(|(_, sphere)| has_radius(sphere));
             for (place, (i, _)) in places.iter_mut().zip(there) {
                 let primitive = (first + i) as u32;
-                *place = box_of(cloud, primitive, tree_space).with_names(self.geometry, primitive);
+                *place = box_of(cloud, primitive, tree_space).with_ids(self.geometry, primitive);
             }
         });
     }
 }
 
-/// The box around a sphere, in tree units, without names.
+/// The box around a sphere in tree units, without ids.
 #[inline(always)]
 pub(crate) fn box_of(cloud: &SphereCloud, primitive: u32, tree_space: &TreeSpace) -> Bounds {
     let ExactSphere { center, radius } = ExactSphere::of(cloud, primitive);

@@ -1,13 +1,13 @@
-//! From the binary tree to sixteen-wide nodes and packed leaves.
+//! Turns the binary tree into sixteen-wide nodes and packed leaves.
 //!
-//! Which nodes of the binary tree become nodes of the wide one is chosen so that the sum of their areas is least, by
-//! dynamic programming: H. Ylitie, T. Karras, S. Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide
-//! BVHs", High Performance Graphics, 2017. Leaves are those of the binary tree.
+//! Dynamic programming chooses the nodes of the wide tree so that the sum of their areas is least: H. Ylitie, T.
+//! Karras, S. Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", High Performance
+//! Graphics, 2017. The leaves are those of the binary tree.
 
 use rayon::prelude::*;
 
 use crate::build::binary_node::{BinaryNode, Choices};
-use crate::build::binary_tree::{Binary, Fork};
+use crate::build::binary_tree::{Binary, InnerNode};
 use crate::build::boxes::fill;
 use crate::build::error::BuildError;
 use crate::build::occlusion_order;
@@ -15,18 +15,18 @@ use crate::build::pack::{self, Filled, LaneOrder};
 use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::intersect::Isa;
 use crate::tree::BLOCK;
-use crate::tree::Name;
+use crate::tree::PrimitiveId;
 use crate::tree::geometry::SphereCloud;
 use crate::tree::node::{Node, TreeSpace, WIDTH, tag};
 use crate::tree::packed::{Entry, Packed};
 use crate::tree::sphere_block::SphereBlock;
 use crate::tree::storage::Store;
-use crate::tree::triangle_block::{BlockNames, Blocks};
+use crate::tree::triangle_block::{BlockIds, Blocks};
 use crate::tree::{Geometry, GeometryKind};
 
 impl Packed {
-    /// Puts the triangles of a packed tree where its geometries, which stood elsewhere before, have them now. Where there may be none
-    /// without an area, it is not asked.
+    /// Moves the triangles of a packed tree from the geometries `before` to the new ones. `may_lack_area` is false if
+    /// no triangle can have zero area; that skips the test.
     pub(crate) fn move_triangles(
         &mut self,
         isa: Isa,
@@ -35,25 +35,25 @@ impl Packed {
         may_lack_area: bool,
     ) {
         if pack::name_same_vertices(before, geometries)
-            && pack::move_triangles(isa, geometries, &self.names, may_lack_area, self.blocks.to_mut())
+            && pack::move_triangles(isa, geometries, &self.ids, may_lack_area, self.blocks.to_mut())
         {
             return;
         }
-        let followers = self.blocks().followers(self.names.len());
+        let followers = self.blocks().followers(self.ids.len());
         let old = std::mem::take(&mut self.blocks);
         let number_of = |leaf| Blocks::new(&old).numbers(leaf).map_or(0, |numbers| numbers.start);
         self.pack(isa, geometries, &followers, may_lack_area, number_of);
     }
 
-    /// Packs the triangles, as the names and the nodes say, whose references number blocks. Without an area they are left out;
-    /// where there may be none, it is not asked.
+    /// Packs the triangles by their ids; references in nodes still number blocks. Leaves out triangles without an area;
+    /// `may_lack_area` as above.
     pub(crate) fn pack_triangles(&mut self, isa: Isa, geometries: &[Geometry], may_lack_area: bool) {
-        let followers = pack::followers_of(&self.nodes, self.root, self.names.len());
+        let followers = pack::followers_of(&self.nodes, self.root, self.ids.len());
         self.pack(isa, geometries, &followers, may_lack_area, |leaf| tag::blocks(leaf).start);
     }
 
-    /// Packs triangles behind each block of which so many follow, and turns the references in nodes to them. `number_of` tells the
-    /// number of a leaf's first block.
+    /// Packs the triangles of each leaf into consecutive blocks and updates the references in nodes. `number_of`
+    /// returns the number of a leaf's first block.
     fn pack(
         &mut self,
         isa: Isa,
@@ -62,58 +62,58 @@ impl Packed {
         may_lack_area: bool,
         number_of: impl Fn(u32) -> usize + Sync,
     ) {
-        // In a mixed tree, rays meet too few triangles to gain anything by larger blocks.
+        // In a mixed tree, rays meet too few triangles to gain from larger blocks.
         let is_mixed = !self.entries.is_empty() || !self.sphere_blocks.is_empty();
-        let may_share = is_mixed || pack::is_worth_sharing(self.names.len());
+        let may_share = is_mixed || pack::is_worth_sharing(self.ids.len());
         let Filled { lines, places, orders } =
-            pack::pack(isa, may_share, geometries, &self.names, followers, may_lack_area);
+            pack::pack(isa, may_share, geometries, &self.ids, followers, may_lack_area);
         pack::refer(self.nodes.to_mut(), &mut self.root, &places, number_of);
         self.blocks = lines.into();
         self.put_in_order(&orders);
     }
 
-    /// Moves names to where triangles were packed.
+    /// Reorders ids as their triangles were packed.
     fn put_in_order(&mut self, orders: &[LaneOrder]) {
         if orders.iter().all(|order| order.is_same()) {
             return;
         }
-        let names = self.names.to_mut();
-        names.par_iter_mut().zip(orders).with_min_len(1 << 10).for_each(|(names, order)| order.put(names));
+        let ids = self.ids.to_mut();
+        ids.par_iter_mut().zip(orders).with_min_len(1 << 10).for_each(|(ids, order)| order.put(ids));
     }
 }
 
-/// A node of the binary tree, wherever it is.
+/// A node of the binary tree in any representation.
 #[derive(Clone, Copy)]
 enum Cursor<'a> {
-    Fork(&'a Fork<'a>),
-    /// From it on.
-    Twig(&'a [BinaryNode]),
-    /// One of the instances of a leaf, and the place of its name.
+    InnerNode(&'a InnerNode<'a>),
+    /// The nodes from this one on.
+    Subtree(&'a [BinaryNode]),
+    /// One instance of a leaf, and the index of its id.
     Instance(&'a Primitive, usize),
 }
 
 impl<'a> Cursor<'a> {
     fn new(tree: &'a Binary<'a>) -> Self {
         match tree {
-            Binary::Fork(fork) => Self::Fork(fork),
-            Binary::Twig(twig) => Self::Twig(&twig.nodes),
+            Binary::InnerNode(inner) => Self::InnerNode(inner),
+            Binary::Subtree(subtree) => Self::Subtree(&subtree.nodes),
         }
     }
 
     #[inline(always)]
     fn bounds(&self) -> &'a Bounds {
         match self {
-            Self::Fork(fork) => &fork.bounds,
-            Self::Twig(nodes) => nodes[0].bounds(),
+            Self::InnerNode(inner) => &inner.bounds,
+            Self::Subtree(nodes) => nodes[0].bounds(),
             Self::Instance(bounds, _) => bounds,
         }
     }
 
     #[inline(always)]
-    fn names(&self) -> Option<std::ops::Range<usize>> {
+    fn ids(&self) -> Option<std::ops::Range<usize>> {
         match self {
-            Self::Fork(_) => None,
-            Self::Twig(nodes) => nodes[0].names(),
+            Self::InnerNode(_) => None,
+            Self::Subtree(nodes) => nodes[0].ids(),
             Self::Instance(_, name) => Some(*name..*name + 1),
         }
     }
@@ -121,8 +121,8 @@ impl<'a> Cursor<'a> {
     #[inline(always)]
     fn choices(&self) -> Choices {
         match self {
-            Self::Fork(fork) => fork.choices,
-            Self::Twig(nodes) => nodes[0].choices(),
+            Self::InnerNode(inner) => inner.choices,
+            Self::Subtree(nodes) => nodes[0].choices(),
             Self::Instance(..) => unreachable!("a leaf"),
         }
     }
@@ -130,20 +130,20 @@ impl<'a> Cursor<'a> {
     #[inline(always)]
     fn children(&self) -> [Self; 2] {
         match self {
-            Self::Fork(fork) => [Self::new(&fork.children[0]), Self::new(&fork.children[1])],
-            Self::Twig(nodes) => [Self::Twig(&nodes[1..]), Self::Twig(&nodes[nodes[0].right()..])],
+            Self::InnerNode(inner) => [Self::new(&inner.children[0]), Self::new(&inner.children[1])],
+            Self::Subtree(nodes) => [Self::Subtree(&nodes[1..]), Self::Subtree(&nodes[nodes[0].right()..])],
             Self::Instance(..) => unreachable!("a leaf"),
         }
     }
 
-    /// Whether the right child is of a higher rank than the left.
+    /// Whether the right child has a higher rank than the left.
     #[inline(always)]
     fn is_ranked(&self) -> bool {
-        matches!(self, Self::Fork(fork) if fork.is_ranked)
+        matches!(self, Self::InnerNode(inner) if inner.is_ranked)
     }
 }
 
-/// Children of a wide node.
+/// The children of a wide node.
 struct Gathered<'a> {
     order: ChildOrder,
     children: [Cursor<'a>; WIDTH],
@@ -151,12 +151,14 @@ struct Gathered<'a> {
     len: usize,
 }
 
-/// In which order they are gathered.
+/// The order of the children.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum ChildOrder {
-    /// By rank, and of one rank the largest last: where any hit will do, it is asked first, for it is the likeliest to have one.
+    /// By rank, and within a rank by size with the largest last. An any-hit search tests the last child first, because
+    /// it is the likeliest hit.
     BySize,
-    /// Whichever: they are only counted, or sorted later, as those are below which there is nothing but triangles (see `occlusion_order`).
+    /// Any order: the children are only counted, or `occlusion_order` sorts them later because there are only triangles
+    /// below.
     Any,
 }
 
@@ -179,7 +181,7 @@ impl<'a> Gathered<'a> {
     }
 }
 
-/// How much a part of the tree takes.
+/// The size of a part of the tree.
 #[derive(Clone, Copy, Default)]
 struct Counts {
     nodes: usize,
@@ -197,43 +199,42 @@ impl std::ops::AddAssign for Counts {
     }
 }
 
-/// From how many nodes of the binary tree on a part of it is shared among threads.
+/// Minimum nodes of the binary tree to share the work among threads.
 const MANY: usize = 1024;
 
-/// A wide node over many primitives, with what its children take.
+/// A wide node over many primitives, with the sizes of its children.
 struct Plan<'a> {
     children: [Cursor<'a>; WIDTH],
     len: usize,
     counts: [Counts; WIDTH],
-    /// Of those children that are over many in turn.
+    /// The plans of those children that have many nodes too.
     plans: [Option<Box<Self>>; WIDTH],
     total: Counts,
 }
 
-/// A tree whose blocks are still to be filled.
+/// A tree whose blocks are not filled yet.
 pub(crate) struct Layout {
     nodes: Vec<Node>,
     entries: Vec<Entry>,
-    /// What goes into the blocks.
+    /// The ids of each block.
     spans: Vec<Span>,
     sphere_spans: Vec<Span>,
     root: u32,
 }
 
-/// Lays a binary tree out, with the names in its leaves, the first of which are those of the instances. The depth of its recursions
-/// is that of the tree, which is bounded.
+/// Lays out a binary tree. The ids of instances come first. The recursion is as deep as the tree, which is bounded.
 ///
 /// # Errors
 /// [`BuildError::TooMany`] when there are more blocks than references can name.
 pub(crate) fn lay_out(
     traits: &[Traits],
     binary: &Binary,
-    names: &[Name],
+    ids: &[PrimitiveId],
     instances: &[Primitive],
 ) -> Result<Layout, BuildError> {
     let is_triangle = |traits: &Traits| traits.kind == Kind::Triangle;
     let order = if traits.iter().all(is_triangle) { ChildOrder::Any } else { ChildOrder::BySize };
-    let packer = Packer { traits, names, instances, order };
+    let packer = Packer { traits, ids, instances, order };
     let root = Cursor::new(binary);
     let plan = packer.plan(root);
     let total = plan.as_ref().map_or_else(|| packer.count(root), |plan| plan.total);
@@ -244,7 +245,7 @@ pub(crate) fn lay_out(
     let mut spans = vec![Span { first: 0, count: 0 }; total.blocks];
     let mut sphere_spans = vec![Span { first: 0, count: 0 }; total.sphere_blocks];
     let mut entries = vec![Entry::new(0, 0, true); total.entries];
-    let mut room = Room {
+    let mut room = OutputSlices {
         nodes: &mut nodes,
         spans: &mut spans,
         sphere_spans: &mut sphere_spans,
@@ -259,31 +260,31 @@ pub(crate) fn lay_out(
 }
 
 impl Layout {
-    /// Fills the blocks, and sorts the children of nodes by what is in them. Blocks are most of the tree: nothing of its making but names
-    /// is to be left by now, and these are given back before.
+    /// Fills the blocks, and sorts the children of nodes by their contents. Blocks are most of the tree's memory: only
+    /// the ids are left of the build's data by now, and they are freed before the triangles are packed.
     pub(crate) fn pack(
         self,
         isa: Isa,
         tree_space: &TreeSpace,
         geometries: &[Geometry],
-        names: Vec<Name>,
+        ids: Vec<PrimitiveId>,
     ) -> Packed {
         let Self { nodes, entries, spans, sphere_spans, root } = self;
-        let named = |spans: Vec<Span>| -> Vec<BlockNames> {
-            let name = |span: &Span| BlockNames::of(&names[span.first as usize..][..span.count as usize]);
+        let named = |spans: Vec<Span>| -> Vec<BlockIds> {
+            let name = |span: &Span| BlockIds::of(&ids[span.first as usize..][..span.count as usize]);
             spans.par_iter().with_min_len(pack::share_of(spans.len())).map(name).collect()
         };
-        let (block_names, sphere_names) = (named(spans), named(sphere_spans));
-        drop(names);
-        let block = |names: &BlockNames| fill_sphere_block(cloud(geometries, names.geometry), names);
-        let sphere_blocks: Vec<_> = sphere_names.par_iter().with_min_len(256).map(block).collect();
+        let (block_ids, sphere_ids) = (named(spans), named(sphere_spans));
+        drop(ids);
+        let block = |ids: &BlockIds| fill_sphere_block(cloud(geometries, ids.geometry), ids);
+        let sphere_blocks: Vec<_> = sphere_ids.par_iter().with_min_len(256).map(block).collect();
         let mut packed = Packed {
             nodes: nodes.into(),
             blocks: Store::default(),
-            names: block_names.into(),
+            ids: block_ids.into(),
             entries: entries.into(),
             sphere_blocks: sphere_blocks.into(),
-            sphere_names: sphere_names.into(),
+            sphere_ids: sphere_ids.into(),
             root: Some(root),
         };
         packed.pack_triangles(isa, geometries, false);
@@ -293,7 +294,7 @@ impl Layout {
     }
 }
 
-/// A tree of leaves that there were before.
+/// A new tree over existing leaves.
 pub(crate) struct Relaid {
     pub(crate) nodes: Vec<Node>,
     pub(crate) entries: Vec<Entry>,
@@ -301,13 +302,13 @@ pub(crate) struct Relaid {
 }
 
 impl Layout {
-    /// The tree where each sphere stands for a leaf of another, which is found by the sphere's geometry.
-    pub(crate) fn over_leaves(self, names: &[Name], leaf_of: impl Fn(u32) -> u32) -> Relaid {
+    /// Replaces each sphere by a leaf of another tree. `leaf_of` maps the sphere's geometry to that leaf.
+    pub(crate) fn over_leaves(self, ids: &[PrimitiveId], leaf_of: impl Fn(u32) -> u32) -> Relaid {
         let Self { mut nodes, entries, sphere_spans, mut root, .. } = self;
         let stands_for = |reference: &mut u32| {
             if *reference != Node::ABSENT && tag::of(*reference) == tag::SPHERES {
                 let span = sphere_spans[tag::blocks(*reference).start];
-                *reference = leaf_of(names[span.first as usize][0]);
+                *reference = leaf_of(ids[span.first as usize][0]);
             }
         };
         nodes.iter_mut().flat_map(|node| &mut node.children).for_each(stands_for);
@@ -324,33 +325,33 @@ fn cloud(geometries: &[Geometry], geometry: u32) -> &SphereCloud {
 }
 
 #[inline(always)]
-fn fill_sphere_block(cloud: &SphereCloud, names: &BlockNames) -> SphereBlock {
+fn fill_sphere_block(cloud: &SphereCloud, ids: &BlockIds) -> SphereBlock {
     let mut block = SphereBlock::EMPTY;
-    for (lane, primitive) in names.primitives().enumerate() {
+    for (lane, primitive) in ids.primitives().enumerate() {
         block.put(lane, cloud.spheres[primitive as usize]);
     }
     block
 }
 
-/// Those among the names that go into a block.
+/// The ids of a block, as a range.
 #[derive(Clone, Copy)]
 struct Span {
     first: u32,
     count: u32,
 }
 
-/// Where a part of the tree goes; it takes up what it is given from the front.
-struct Room<'a> {
+/// The output of a part of the tree; parts are taken from the front.
+struct OutputSlices<'a> {
     nodes: &'a mut [Node],
     spans: &'a mut [Span],
     sphere_spans: &'a mut [Span],
     entries: &'a mut [Entry],
-    /// The places of the first ones in the whole tree.
+    /// Positions of the first elements in the whole tree.
     start: Counts,
 }
 
-impl<'a> Room<'a> {
-    /// The first part.
+impl<'a> OutputSlices<'a> {
+    /// Splits off the first part.
     fn take(&mut self, counts: Counts) -> Self {
         let nodes = self.nodes.split_off_mut(..counts.nodes).unwrap_or_default();
         let spans = self.spans.split_off_mut(..counts.blocks).unwrap_or_default();
@@ -358,33 +359,33 @@ impl<'a> Room<'a> {
         let entries = self.entries.split_off_mut(..counts.entries).unwrap_or_default();
         let start = self.start;
         self.start += counts;
-        Room { nodes, spans, sphere_spans, entries, start }
+        OutputSlices { nodes, spans, sphere_spans, entries, start }
     }
 }
 
 struct Packer<'a> {
     traits: &'a [Traits],
-    names: &'a [Name],
+    ids: &'a [PrimitiveId],
     instances: &'a [Primitive],
-    /// Of what is put.
+    /// The order of the children that are written.
     order: ChildOrder,
 }
 
 impl<'a> Packer<'a> {
-    /// The instances of a leaf that holds several: each will have a leaf of its own.
+    /// The instances of a leaf with several: each gets a leaf of its own.
     #[inline(always)]
     fn instances_of(&self, leaf: Cursor<'a>) -> Option<(usize, &'a [Primitive])> {
-        let names = leaf.names().filter(|names| names.len() > 1)?;
-        Some((names.start, self.instances.get(names)?))
+        let ids = leaf.ids().filter(|ids| ids.len() > 1)?;
+        Some((ids.start, self.instances.get(ids)?))
     }
 
-    /// What becomes a leaf of the wide tree.
+    /// The ids, if this becomes a leaf of the wide tree.
     #[inline(always)]
     fn leaf(&self, cursor: Cursor<'a>) -> Option<std::ops::Range<usize>> {
-        if self.instances_of(cursor).is_some() { None } else { cursor.names() }
+        if self.instances_of(cursor).is_some() { None } else { cursor.ids() }
     }
 
-    /// The children in the wide tree of what is no leaf there.
+    /// The wide children of a node that is no leaf of the wide tree.
     #[inline(always)]
     fn gather(&self, root: Cursor<'a>, order: ChildOrder) -> ([Cursor<'a>; WIDTH], usize) {
         let mut found = Gathered { order, children: [root; WIDTH], keys: [(0, 0.0); WIDTH], len: 0 };
@@ -393,7 +394,7 @@ impl<'a> Packer<'a> {
         while waiting > 0 {
             waiting -= 1;
             let (cursor, room, rank) = pending[waiting];
-            if cursor.names().is_some() {
+            if cursor.ids().is_some() {
                 match self.instances_of(cursor) {
                     Some((first, instances)) if instances.len() <= room => {
                         for (name, instance) in (first..).zip(instances) {
@@ -410,7 +411,7 @@ impl<'a> Packer<'a> {
                 continue;
             }
             let [left, right] = cursor.children();
-            // Ranks fork at the left, where the lower ones are, and first at the root, which has the most room.
+            // Rank splits at the root have the most slots. Lower ranks are on the left.
             let above = match cursor.is_ranked() {
                 true if room == WIDTH => 2,
                 true => 1,
@@ -425,7 +426,7 @@ impl<'a> Packer<'a> {
 
     /// `None` for a leaf, or a node over few primitives.
     fn plan(&self, root: Cursor<'a>) -> Option<Box<Plan<'a>>> {
-        let Cursor::Fork(Fork { nodes: MANY.., .. }) = root else { return None };
+        let Cursor::InnerNode(InnerNode { nodes: MANY.., .. }) = root else { return None };
         let (children, len) = self.gather(root, self.order);
         let mut plans: [Option<Box<Plan>>; WIDTH] = Default::default();
         let mut counts = [Counts::default(); WIDTH];
@@ -441,13 +442,13 @@ impl<'a> Packer<'a> {
     }
 
     fn count(&self, root: Cursor<'a>) -> Counts {
-        if let Some(names) = self.leaf(root) {
-            let kind = self.traits[self.names[names.start][0] as usize].kind;
+        if let Some(ids) = self.leaf(root) {
+            let kind = self.traits[self.ids[ids.start][0] as usize].kind;
             return match kind {
-                Kind::Triangle => Counts { blocks: names.len().div_ceil(BLOCK), ..Counts::default() },
-                Kind::Sphere => Counts { sphere_blocks: names.len().div_ceil(BLOCK), ..Counts::default() },
+                Kind::Triangle => Counts { blocks: ids.len().div_ceil(BLOCK), ..Counts::default() },
+                Kind::Sphere => Counts { sphere_blocks: ids.len().div_ceil(BLOCK), ..Counts::default() },
                 Kind::Shape | Kind::Instance | Kind::Custom | Kind::Precise => {
-                    Counts { entries: names.len(), ..Counts::default() }
+                    Counts { entries: ids.len(), ..Counts::default() }
                 }
             };
         }
@@ -457,10 +458,11 @@ impl<'a> Packer<'a> {
         total
     }
 
-    fn put_many(&self, plan: &Plan<'a>, mut room: Room) -> u32 {
+    fn put_many(&self, plan: &Plan<'a>, mut room: OutputSlices) -> u32 {
         let place = room.start.nodes;
         let own = room.take(Counts { nodes: 1, ..Counts::default() });
-        let rooms: Vec<Room> = plan.counts[..plan.len].iter().map(|&counts| room.take(counts)).collect();
+        let rooms: Vec<OutputSlices> =
+            plan.counts[..plan.len].iter().map(|&counts| room.take(counts)).collect();
         let mut references = [Node::ABSENT; WIDTH];
         references[..plan.len]
             .par_iter_mut()
@@ -477,9 +479,9 @@ impl<'a> Packer<'a> {
         tag::reference(tag::INNER, place as u32)
     }
 
-    fn put(&self, root: Cursor<'a>, room: &mut Room) -> u32 {
-        if let Some(names) = self.leaf(root) {
-            return self.put_leaf(names, room);
+    fn put(&self, root: Cursor<'a>, room: &mut OutputSlices) -> u32 {
+        if let Some(ids) = self.leaf(root) {
+            return self.put_leaf(ids, room);
         }
         let (children, len) = self.gather(root, self.order);
         let place = room.start.nodes;
@@ -492,20 +494,20 @@ impl<'a> Packer<'a> {
         tag::reference(tag::INNER, place as u32)
     }
 
-    fn put_leaf(&self, names: std::ops::Range<usize>, room: &mut Room) -> u32 {
-        let (first, count) = (names.start as u32, names.len() as u32);
-        let names = &self.names[names];
-        let tag = match self.traits[names[0][0] as usize].kind {
+    fn put_leaf(&self, ids: std::ops::Range<usize>, room: &mut OutputSlices) -> u32 {
+        let (first, count) = (ids.start as u32, ids.len() as u32);
+        let ids = &self.ids[ids];
+        let tag = match self.traits[ids[0][0] as usize].kind {
             Kind::Triangle => {
                 let block = room.start.blocks as u32;
-                let blocks = names.len().div_ceil(BLOCK);
+                let blocks = ids.len().div_ceil(BLOCK);
                 let own = room.take(Counts { blocks, ..Counts::default() });
                 cut(own.spans, first, count);
                 return tag::triangles(block, blocks as u32);
             }
             Kind::Sphere => {
                 let block = room.start.sphere_blocks as u32;
-                let sphere_blocks = names.len().div_ceil(BLOCK);
+                let sphere_blocks = ids.len().div_ceil(BLOCK);
                 let own = room.take(Counts { sphere_blocks, ..Counts::default() });
                 cut(own.sphere_spans, first, count);
                 return tag::spheres(block, sphere_blocks as u32);
@@ -516,15 +518,15 @@ impl<'a> Packer<'a> {
             Kind::Precise => tag::PRECISE,
         };
         let place = room.start.entries as u32;
-        let own = room.take(Counts { entries: names.len(), ..Counts::default() });
-        for (i, (entry, name)) in own.entries.iter_mut().zip(names).enumerate() {
-            *entry = Entry::new(name[0], name[1], i + 1 == names.len());
+        let own = room.take(Counts { entries: ids.len(), ..Counts::default() });
+        for (i, (entry, name)) in own.entries.iter_mut().zip(ids).enumerate() {
+            *entry = Entry::new(name[0], name[1], i + 1 == ids.len());
         }
         tag::reference(tag, place)
     }
 }
 
-/// Shares names among blocks.
+/// Divides ids among blocks.
 #[inline(always)]
 fn cut(spans: &mut [Span], first: u32, count: u32) {
     for (i, span) in spans.iter_mut().enumerate() {
@@ -574,9 +576,9 @@ mod tests {
         bounds
     }
 
-    /// The areas of the wide nodes that a subtree becomes by its choices, where it has room for so many children.
+    /// The summed areas of the wide nodes of a subtree that follows its choices with `room` slots.
     fn cost_by_choices(nodes: &[BinaryNode], room: usize) -> f64 {
-        if nodes[0].names().is_some() {
+        if nodes[0].ids().is_some() {
             return 0.0;
         }
         let first = if room > 1 { nodes[0].choices().left(room) } else { 0 };
@@ -587,9 +589,9 @@ mod tests {
         cost_by_choices(&nodes[1..], first) + cost_by_choices(&nodes[nodes[0].right()..], room - first)
     }
 
-    /// The least areas there are, for each number of children.
+    /// The least possible areas for each number of slots.
     fn least_costs(nodes: &[BinaryNode]) -> [f64; WIDTH] {
-        if nodes[0].names().is_some() {
+        if nodes[0].ids().is_some() {
             return [0.0; WIDTH];
         }
         let (left, right) = (least_costs(&nodes[1..]), least_costs(&nodes[nodes[0].right()..]));
@@ -601,7 +603,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_chosen_costs_what_is_said_and_hardly_more_than_the_least() {
+    fn choices_cost_as_computed_and_hardly_more_than_optimal() {
         let mut random = Random(401);
         let (mut sum, mut least) = (0.0, 0.0);
         for round in 0..200 {

@@ -4,8 +4,8 @@ use std::fmt;
 
 use crate::tree::node::tag;
 
-/// Leaf entries and nodes are to have a place in a reference.
-pub(crate) const MOST_PRIMITIVES: usize = tag::PLACE as usize;
+/// Leaf entries and nodes must fit the index bits of a reference.
+pub(crate) const MAX_PRIMITIVES: usize = tag::PLACE as usize;
 
 /// Why a tree cannot be built.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,8 +25,8 @@ pub enum BuildError {
         /// The vertex, sphere or primitive.
         element: usize,
     },
-    /// More primitives than a tree can name (2^28 - 1), or so many small leaves of triangles or of spheres that they fill
-    /// more than 2^25 blocks of eight.
+    /// More primitives than a tree can index (2^28 - 1), or more than 2^25 blocks of eight because of many small leaves
+    /// of triangles or of spheres.
     TooMany,
 }
 
@@ -42,7 +42,7 @@ impl fmt::Display for BuildError {
             Self::TooMany => write!(
                 f,
                 "too many primitives for one tree: at most {}, in {} blocks of eight triangles or spheres",
-                MOST_PRIMITIVES,
+                MAX_PRIMITIVES,
                 tag::BLOCK_PLACES
             ),
         }

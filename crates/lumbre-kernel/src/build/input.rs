@@ -1,4 +1,4 @@
-//! What comes before the tree: geometries are checked, bounded and taken apart into primitives.
+//! Checks geometries, measures them and splits them into primitives.
 
 use std::sync::Arc;
 
@@ -7,11 +7,11 @@ use lumbre_math::{DMat3, DVec3, Elementary, Transform, Vec3};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use crate::build::binary::{Grown, PARALLEL, binary_tree};
+use crate::build::binary::{GrownTree, PARALLEL, binary_tree};
 use crate::build::boxes::Boxes;
 use crate::build::clouds::CloudSurvey;
 use crate::build::collapse::lay_out;
-use crate::build::error::{BuildError, MOST_PRIMITIVES};
+use crate::build::error::{BuildError, MAX_PRIMITIVES};
 use crate::build::open_instances;
 use crate::build::options::{BuildOptions, Preset};
 use crate::build::outline::Outline;
@@ -30,10 +30,10 @@ use crate::tree::{Geometry, GeometryKind, Tree};
 
 /// See [`Accel::build`].
 pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result<Tree, BuildError> {
-    if geometries.len() > MOST_PRIMITIVES {
+    if geometries.len() > MAX_PRIMITIVES {
         return Err(BuildError::TooMany);
     }
-    // Handed to a pool of threads once, not with every piece of work; what one thread does alone is not handed over at all.
+    // Enters the pool once for the whole build. A build for one thread does not enter it.
     let preset = options.preset;
     let mut work = 0;
     let is_much = geometries.iter().any(|geometry| {
@@ -43,7 +43,7 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
     if is_much { rayon::scope(|_| build_here(geometries, preset)) } else { build_here(geometries, preset) }
 }
 
-/// About how many primitives it has.
+/// Approximate number of primitives.
 fn size_of_geometry(geometry: &Geometry) -> usize {
     match &geometry.kind {
         GeometryKind::Mesh(mesh) => mesh.indices.len(),
@@ -51,12 +51,12 @@ fn size_of_geometry(geometry: &Geometry) -> usize {
         GeometryKind::Spheres(cloud) => cloud.spheres.len(),
         GeometryKind::Custom(custom) => custom.primitive_count() as usize,
         GeometryKind::Shape(_) => 1,
-        // It may be opened.
+        // It may be opened into parts.
         GeometryKind::Instance(_) => 8,
     }
 }
 
-/// The same on the calling thread and those of its pool.
+/// Builds on the calling thread and its pool.
 fn build_here(geometries: Vec<Geometry>, preset: Preset) -> Result<Tree, BuildError> {
     let mut parts = take_apart(&geometries)?;
     let tree_space = units_of(&geometries, &parts);
@@ -89,11 +89,11 @@ fn build_here(geometries: Vec<Geometry>, preset: Preset) -> Result<Tree, BuildEr
                 survey.put_boxes(cloud, &tree_space, own);
             }
         }
-        let Grown { tree, names, instances } = binary_tree(isa, preset, others, &mut primitives, &traits);
-        let layout = lay_out(&traits, &tree, &names, &instances)?;
+        let GrownTree { tree, ids, instances } = binary_tree(isa, preset, others, &mut primitives, &traits);
+        let layout = lay_out(&traits, &tree, &ids, &instances)?;
         drop((tree, instances));
         drop(primitives);
-        layout.pack(isa, &tree_space, &geometries, names)
+        layout.pack(isa, &tree_space, &geometries, ids)
     };
     let (sizes, bounds, infinite) = (parts.sizes, parts.bounds, parts.infinite);
     Ok(Tree::assemble(
@@ -102,7 +102,7 @@ fn build_here(geometries: Vec<Geometry>, preset: Preset) -> Result<Tree, BuildEr
     ))
 }
 
-/// A tree in which nothing stands yet.
+/// A tree over these geometries without nodes.
 pub(crate) fn empty_over(geometries: Vec<Geometry>) -> Tree {
     let parts = TreeParts {
         tree_space: TreeSpace::new(DVec3::ZERO, 1.0, 0.0, 1.0),
@@ -115,45 +115,45 @@ pub(crate) fn empty_over(geometries: Vec<Geometry>) -> Tree {
     Tree::assemble(geometries, parts)
 }
 
-/// What geometries consist of, triangles apart.
+/// The contents of the geometries, without the triangles.
 pub(crate) struct Parts {
-    /// Everything finite together, what is finite within infinite instances included.
+    /// Bounds of all finite geometry, including the finite geometry in infinite instances.
     pub(crate) bounds: Aabb,
-    /// Everything finite that goes into the tree.
+    /// Bounds of the finite geometry in the tree.
     pub(crate) tree_bounds: Aabb,
     pub(crate) boxed: Vec<Boxed>,
     pub(crate) infinite: Vec<Entry>,
-    /// Of every mesh.
+    /// One for each mesh.
     pub(crate) surveys: Vec<Survey>,
-    /// Of all meshes.
+    /// Triangles of all meshes.
     pub(crate) triangles: usize,
-    /// Whether there are others, which have no area.
+    /// Whether any primitive has no area.
     pub(crate) has_flat: bool,
-    /// Of every cloud of spheres.
+    /// One for each cloud of spheres.
     pub(crate) clouds: Vec<CloudSurvey>,
-    /// Of all clouds.
+    /// Spheres of all clouds.
     pub(crate) spheres: usize,
     /// The sizes of all meshes and clouds.
     pub(crate) sizes: Sizes,
 }
 
-/// What was seen of a mesh.
+/// What the build knows of a mesh.
 pub(crate) struct Survey {
     pub(crate) geometry: u32,
     /// Triangles that have an area.
     pub(crate) triangles: usize,
-    /// The same of every [`CHUNK`] triangles.
+    /// Those in each [`CHUNK`] triangles.
     pub(crate) chunks: Vec<u32>,
 }
 
-/// A primitive that is no triangle, with its box. They are in the order of their names.
+/// A primitive other than a triangle, with its box. A list of them is sorted by id.
 pub(crate) struct Boxed {
     pub(crate) bounds: Aabb,
     pub(crate) geometry: u32,
     pub(crate) primitive: u32,
 }
 
-/// Checks geometries, and finds out what they consist of.
+/// Checks geometries, and measures their contents.
 pub(crate) fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
     let mut parts = Parts {
         bounds: Aabb::EMPTY,
@@ -216,13 +216,13 @@ pub(crate) fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
     Ok(parts)
 }
 
-/// The boxes of all shapes and instances, by position; `None` of what is infinite or of another kind.
+/// The boxes of all shapes and instances, by position; `None` for infinite geometry and other kinds.
 fn boxes_of(geometries: &[Geometry]) -> Vec<Option<Aabb>> {
     let is_packed = |kind: &GeometryKind| matches!(kind, GeometryKind::Mesh(_) | GeometryKind::Spheres(_));
     if geometries.iter().all(|geometry| is_packed(&geometry.kind)) {
         return vec![None; geometries.len()];
     }
-    // Instances of one tree are many.
+    // A tree is often placed by many instances.
     let mut outlines: FxHashMap<usize, Outline> = FxHashMap::default();
     for geometry in geometries {
         if let GeometryKind::Instance(instance) = &geometry.kind {
@@ -244,17 +244,17 @@ fn boxes_of(geometries: &[Geometry]) -> Vec<Option<Aabb>> {
 }
 
 impl Parts {
-    /// How many primitives there are.
+    /// Number of primitives.
     pub(crate) fn count(&self) -> usize {
         self.boxed.len() + self.infinite.len() + self.triangles + self.spheres
     }
 
-    /// How many more primitives a tree takes.
+    /// How many more primitives a tree can index.
     fn room(&self) -> usize {
-        MOST_PRIMITIVES - self.count()
+        MAX_PRIMITIVES - self.count()
     }
 
-    /// The triangles of a mesh in double precision that have an area.
+    /// Adds the triangles of a double-precision mesh that have an area.
     fn add_precise(&mut self, position: usize, mesh: &PreciseMesh, room: usize) -> Result<(), BuildError> {
         if mesh.indices.len() > room {
             return Err(BuildError::TooMany);
@@ -303,15 +303,15 @@ impl Parts {
     }
 }
 
-/// Triangles that a thread looks at together.
+/// Triangles per task.
 const CHUNK: usize = 1 << 11;
 
-/// How many such chunks of a mesh are left to one thread, at least.
+/// Minimum chunks of a mesh per thread.
 fn least_chunks(mesh: &TriangleMesh) -> usize {
     if mesh.indices.len() > PARALLEL { 1 } else { usize::MAX }
 }
 
-/// Checks a mesh, and finds the box around its triangles that have an area, and their sizes.
+/// Checks a mesh, and finds the box around its triangles with an area, and their sizes.
 fn survey_mesh(position: usize, mesh: &TriangleMesh) -> Result<(Survey, Aabb, Sizes), BuildError> {
     if !mesh.origin.is_finite() {
         return Err(BuildError::NotFinite { geometry: position, element: 0 });
@@ -350,8 +350,8 @@ fn survey_mesh(position: usize, mesh: &TriangleMesh) -> Result<(Survey, Aabb, Si
     Ok((survey, bounds, Sizes { largest_corner, longest_side, ..Sizes::default() }))
 }
 
-/// Looks at some triangles: the box around those that have an area, the longest side of a box around one of them, and how many they are;
-/// or the place of one that lacks a vertex.
+/// Surveys some triangles: the box around those with an area, the longest side of a triangle's box, and their number;
+/// or the first triangle that lacks a vertex.
 struct SurveyChunk<'a> {
     mesh: &'a TriangleMesh,
     triangles: &'a [[u32; 3]],
@@ -379,14 +379,14 @@ impl Dispatch for SurveyChunk<'_> {
     }
 }
 
-/// `None` where the mesh lacks a vertex.
+/// `None` if the mesh lacks a vertex.
 #[inline(always)]
 fn corners(mesh: &TriangleMesh, triangle: &[u32; 3]) -> Option<[Vec3; 3]> {
     let [a, b, c] = triangle.map(|vertex| mesh.positions.get(vertex as usize).copied());
     Some([a?, b?, c?])
 }
 
-/// A box in the space of a mesh: the lower corner, and the upper one negated, each with a lane behind it that means nothing.
+/// A box in mesh space: the lower corner and the negated upper corner. The fourth and eighth lanes are unused.
 #[derive(Clone, Copy)]
 struct MeshBox([f32; 8]);
 
@@ -409,28 +409,28 @@ impl MeshBox {
     #[inline(always)]
     fn grow(&mut self, other: &Self) {
         for (own, &other) in self.0.iter_mut().zip(&other.0) {
-            // One instruction, which f32::min is not.
+            // One instruction, unlike `f32::min`.
             *own = if *own < other { *own } else { other };
         }
     }
 
-    /// How long it is on each axis; the last means nothing, and is none.
+    /// The extent on each axis; the last lane is unused.
     #[inline(always)]
     fn sides(&self) -> [f32; 4] {
         let [x, y, z, last, minus_x, minus_y, minus_z, minus_last] = self.0;
         [-(x + minus_x), -(y + minus_y), -(z + minus_z), -(last + minus_last)]
     }
 
-    /// The lower and the upper one.
+    /// The lower and the upper corner.
     fn corners(&self) -> [Vec3; 2] {
         let [x, y, z, _, minus_x, minus_y, minus_z, _] = self.0;
         [Vec3::new(x, y, z), -Vec3::new(minus_x, minus_y, minus_z)]
     }
 }
 
-/// What makes boxes of a mesh's triangles, in tree units.
+/// Makes boxes of a mesh's triangles, in tree units.
 pub(crate) struct Boxer {
-    /// As in a [`MeshBox`].
+    /// In the layout of a [`MeshBox`].
     shift: [f64; 8],
     scale: f64,
     shift_single: [f32; 8],
@@ -439,8 +439,8 @@ pub(crate) struct Boxer {
 
 impl Boxer {
     pub(crate) fn new(mesh: &TriangleMesh, tree_space: &TreeSpace) -> Self {
-        // Where the mesh is moved by a number that single precision has, one subtraction is rounded once, as in double
-        // precision; and the scale is a power of two.
+        // If the shift is exact in single precision, the one subtraction rounds once, as in double precision, and the
+        // scale is a power of two.
         let shift = tree_space.origin - mesh.origin;
         let shift_single = shift.as_vec3();
         let is_single = shift_single.as_dvec3() == shift
@@ -456,10 +456,10 @@ impl Boxer {
 
     #[inline(always)]
     pub(crate) fn around<L: Simd>(&self, corners: &[Vec3; 3], first: u32, second: u32) -> Bounds {
-        self.of_box::<L>(&MeshBox::around(corners)).with_names(first, second)
+        self.of_box::<L>(&MeshBox::around(corners)).with_ids(first, second)
     }
 
-    /// The box around all of these: the same as around their boxes.
+    /// The box around all of these: the same as the union of their boxes.
     #[inline(always)]
     pub(crate) fn around_all<L: Simd>(&self, triangles: impl Iterator<Item = [[f32; 3]; 3]>) -> Bounds {
         let (mut around, mut is_any) = (MeshBox::EMPTY, false);
@@ -487,7 +487,7 @@ impl Boxer {
     }
 }
 
-/// Writes down the boxes of the triangles that have an area.
+/// Writes the boxes of the triangles that have an area.
 fn box_triangles(mesh: &TriangleMesh, survey: &Survey, tree_space: &TreeSpace, mut places: &mut [Primitive]) {
     let chunks: Vec<(usize, &mut [Primitive])> = survey
         .chunks
@@ -501,7 +501,7 @@ fn box_triangles(mesh: &TriangleMesh, survey: &Survey, tree_space: &TreeSpace, m
     });
 }
 
-/// The same of some triangles, from the first on.
+/// Writes the boxes of some triangles.
 struct BoxChunk<'a> {
     mesh: &'a TriangleMesh,
     boxer: &'a Boxer,
@@ -518,7 +518,7 @@ impl Dispatch for BoxChunk<'_> {
         let Self { mesh, boxer, geometry, first, places } = self;
         let rest = &mesh.indices[first..];
         let triangles = &rest[..rest.len().min(CHUNK)];
-        // Where all have an area, none has to be asked again.
+        // Skips the test for an area when all triangles have one.
         let all_have_area = places.len() == triangles.len();
         let mut places = places.iter_mut();
         for (primitive, triangle) in (first as u32..).zip(triangles) {
@@ -532,7 +532,7 @@ impl Dispatch for BoxChunk<'_> {
     }
 }
 
-/// The units that make the tree's boxes about 1 in size.
+/// The units in which the tree's boxes are about 1 in size.
 pub(crate) fn units_of(geometries: &[Geometry], parts: &Parts) -> TreeSpace {
     let bounds = if parts.tree_bounds.is_empty() {
         Aabb { min: DVec3::ZERO, max: DVec3::ZERO }
@@ -565,8 +565,8 @@ pub(crate) fn units_of(geometries: &[Geometry], parts: &Parts) -> TreeSpace {
     TreeSpace::new(origin, scale, (half * scale).length(), condition)
 }
 
-/// About the middle of the box: where that is near enough, what is as far from the first mesh's origin as a single precision
-/// number says, so that boxes of triangles can be made in single precision.
+/// Roughly the middle of the box. If it is near enough, its offset from the first mesh's origin is exact in single
+/// precision, so that boxes of triangles can be made in single precision.
 fn rounded_center(geometries: &[Geometry], bounds: &Aabb) -> DVec3 {
     let center = bounds.center();
     let mesh = geometries.iter().find_map(|geometry| match &geometry.kind {
@@ -579,8 +579,8 @@ fn rounded_center(geometries: &[Geometry], bounds: &Aabb) -> DVec3 {
     if is_near { rounded } else { center }
 }
 
-/// By how much a map and its inverse together may enlarge rounding errors: the lesser of two bounds, of which one is 1
-/// for every rotation with a uniform scale, the other for every scale along the axes.
+/// By how much a map and its inverse together may enlarge rounding errors: the lesser of two bounds. One is 1 for every
+/// rotation with a uniform scale, the other for every scale along the axes.
 fn condition_of(map: &Transform) -> f64 {
     let (there, back) = (map.linear(), map.inverse_affine().matrix3);
     let size = |m: DMat3| m.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -590,12 +590,13 @@ fn condition_of(map: &Transform) -> f64 {
     by_norm.min(by_component).max(1.0)
 }
 
-/// What the build must know of a geometry.
+/// What the build needs to know of a geometry.
 pub(crate) fn traits_of(geometry: &Geometry) -> Traits {
     let (kind, cost, most) = match &geometry.kind {
         GeometryKind::Mesh(_) => (Kind::Triangle, Traits::COST_OF_PACKED, BLOCK),
         GeometryKind::Spheres(_) => (Kind::Sphere, Traits::COST_OF_PACKED, BLOCK),
-        // Its share in the first test of eight, which nearly always spares the others: its own cost is the same in any leaf.
+        // Its share of the bounding test of eight, which nearly always rejects the others. Its own cost is the same in
+        // any leaf.
         GeometryKind::Shape(_) => (Kind::Shape, 4, BLOCK),
         GeometryKind::Instance(_) => (Kind::Instance, 96, 1),
         GeometryKind::Custom(_) => (Kind::Custom, 48, 4),

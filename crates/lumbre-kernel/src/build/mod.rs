@@ -1,7 +1,7 @@
-//! From geometries to a tree, and what keeps it good when they move.
+//! Builds a tree from geometries, and keeps it good when they move.
 //!
-//! [`input`] checks geometries and makes primitives of them, [`binary`] a binary tree, and [`collapse`] the tree of sixteen children that
-//! rays traverse. [`refit`] and [`rebuild`] follow geometries that move.
+//! [`input`] checks geometries and splits them into primitives, [`binary`] builds a binary tree, and [`collapse`] turns
+//! it into the sixteen-wide tree that rays traverse. [`refit`] and [`rebuild`] follow geometries that move.
 
 pub(crate) mod binary;
 mod binary_node;

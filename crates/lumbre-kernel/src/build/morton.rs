@@ -1,8 +1,8 @@
-//! The order of primitives along a curve that fills space: what a fast build splits by.
+//! The Morton order of primitives, by which a fast build splits.
 //!
-//! C. Lauterbach, M. Garland, S. Sengupta, D. Luebke, D. Manocha, "Fast BVH Construction on GPUs", Computer Graphics Forum
-//! 28(2), 2009. Differing from it, a cell of the curve that holds many primitives is split by SAH, so that what is small in
-//! a large scene has a tree of its own quality.
+//! C. Lauterbach, M. Garland, S. Sengupta, D. Luebke, D. Manocha, "Fast BVH Construction on GPUs", Computer Graphics
+//! Forum 28(2), 2009. Unlike there, SAH splits a cell that holds many primitives, so that small details of a large
+//! scene get a good tree too.
 
 use rayon::prelude::*;
 
@@ -11,10 +11,10 @@ use crate::build::sah::Centers;
 
 /// Bits of a code on each axis.
 const BITS: u32 = 10;
-/// Bits that primitives are first dealt out by, at most.
+/// Maximum leading bits of the first, radix pass.
 const DEALT: u32 = 12;
 
-/// The place of a centre on the curve, and of its primitive in the list.
+/// The code of a centre, and the index of its primitive.
 pub(crate) type Code = [u32; 2];
 
 /// Sorts primitives along the curve into `sorted`; returns their codes in that order.
@@ -28,7 +28,7 @@ pub(crate) fn sort(primitives: &[Primitive], sorted: &mut [Primitive], centers: 
         .collect();
     let mut dealt = deal(&codes);
     drop(codes);
-    // The place makes every code differ from others, so that there is one order.
+    // The index makes every code unique, so that the order is unique.
     dealt.hands().into_par_iter().for_each(|hand| hand.sort_unstable());
     sorted.par_iter_mut().zip(&dealt.codes).with_min_len(4096).for_each(|(place, code)| {
         *place = primitives[code[1] as usize];
@@ -36,7 +36,7 @@ pub(crate) fn sort(primitives: &[Primitive], sorted: &mut [Primitive], centers: 
     dealt.codes
 }
 
-/// What turns a centre into a cell.
+/// Maps a centre to its cell.
 struct Cells {
     start: [i32; 3],
     factor: [f32; 3],
@@ -62,7 +62,7 @@ impl Cells {
     }
 }
 
-/// Ten bits, with two zeros before each.
+/// Spreads ten bits with two zeros before each.
 #[inline(always)]
 fn spread(x: u32) -> u32 {
     let x = (x | x << 16) & 0x0300_00ff;
@@ -71,7 +71,7 @@ fn spread(x: u32) -> u32 {
     (x | x << 2) & 0x0924_9249
 }
 
-/// Codes in the order of their first bits.
+/// Codes bucketed by their first bits.
 struct Dealt {
     codes: Vec<Code>,
     ends: Vec<usize>,
@@ -94,7 +94,7 @@ impl Dealt {
 }
 
 fn deal(codes: &[Code]) -> Dealt {
-    // About as many hands as codes, where these are few.
+    // About as many buckets as codes, if these are few.
     let bits = DEALT.min((codes.len() + 1).ilog2());
     let hand_of = |code: &Code| (code[0] >> (3 * BITS - bits)) as usize;
     let mut ends = vec![0; 1 << bits];
@@ -116,7 +116,7 @@ fn deal(codes: &[Code]) -> Dealt {
     Dealt { codes: dealt, ends }
 }
 
-/// Where codes that differ are cut in two: at the first bit in which the first and the last one differ.
+/// Where to cut a range of differing codes: at the first bit in which the first and the last code differ.
 pub(crate) fn cut(codes: &[Code]) -> Option<usize> {
     let (first, last) = (codes.first()?[0], codes.last()?[0]);
     let differing = first ^ last;

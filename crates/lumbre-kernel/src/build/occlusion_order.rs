@@ -1,38 +1,39 @@
-//! In which order the children of nodes stand: where any hit will do, the last that a ray meets is asked first.
+//! Orders the children of nodes for any-hit searches, which test the last child first.
 //!
-//! Of several things, each of which may stop a ray at a probability `p` and takes `c` to ask, the least is expected to be spent where
-//! they are asked by falling `p / c`: L. G. Mitten, "An Analytic Solution to the Least Cost Testing Sequence Problem", Journal of
-//! Industrial Engineering 11, 1960; of trees, T. Ize, C. Hansen, "RTSAH Traversal Order for Occlusion Rays", Computer Graphics Forum
-//! 30(2), 2011.
+//! Take several tests, each of which stops a ray with probability `p` at cost `c`. The expected cost is least in the
+//! order of falling `p / c`: L. G. Mitten, "An Analytic Solution to the Least Cost Testing Sequence Problem", Journal
+//! of Industrial Engineering 11, 1960; for trees, T. Ize, C. Hansen, "RTSAH Traversal Order for Occlusion Rays",
+//! Computer Graphics Forum 30(2), 2011.
 //!
-//! A line that meets a convex body of surface S meets surfaces in it 2A / S times in the mean, where A is their area: Crofton's formula,
-//! see L. A. Santaló, "Integral Geometry and Geometric Probability", 1976. With the box of a leaf for the body, that is `p` of its
-//! triangles, or 1 where it is more. What is below a node is taken to be met independently of one another, each with the share that
-//! its box has of the node's surface. So a wall comes before a bush, and both before what is small and of many parts.
+//! A line that meets a convex body of surface S meets the surfaces in it 2A / S times on average, where A is their
+//! area: Crofton's formula, see L. A. Santaló, "Integral Geometry and Geometric Probability", 1976. For the box of a
+//! leaf, that is the `p` of its triangles, at most 1. Hits below a node count as independent, each weighted by its
+//! box's share of the node's surface. So a wall comes before a bush, and both before small objects of many parts.
 //!
-//! Only where there are nothing but triangles below. Of other things `p` is not known: there the largest stay the last.
+//! Only for nodes with nothing but triangles below. The `p` of other primitives is unknown: there the largest child
+//! stays last.
 
 use rayon::prelude::*;
 
-use crate::intersect::{CornersRoom, Dispatch, Isa, Simd};
+use crate::intersect::{CornerScratch, Dispatch, Isa, Simd};
 use crate::simd::{F32x8, F32x16, Vector};
 use crate::tree::node::{Node, TreeSpace, WIDTH, tag};
 use crate::tree::triangle_block::{Blocks, TriangleBlock};
 
-/// What is to be expected of a ray that meets a box.
+/// The expectation for a ray that meets a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Odds {
-    /// How likely it is stopped by what is in there.
+    /// The probability that the contents stop it.
     stops: f32,
-    /// What that takes, in nodes and blocks.
+    /// The cost of the test, in nodes and blocks.
     cost: f32,
 }
 
-/// Nodes of which one thread sorts the children at once.
+/// One thread sorts the children of this many nodes in one call.
 const FEW: usize = if cfg!(test) { 8 } else { 256 };
 
-/// Sorts the children of every node below which there is nothing but triangles. Nodes stand depth first: behind each all those below it,
-/// and then others.
+/// Sorts the children of every node with only triangles below. Nodes are depth first: all nodes below a node follow it
+/// directly.
 pub(crate) fn sort_children(isa: Isa, tree_space: &TreeSpace, nodes: &mut [Node], blocks: Blocks) {
     Sorter { isa, blocks, scale: tree_space.scale as f32 }.sort(nodes, 0);
 }
@@ -46,8 +47,7 @@ struct Sorter<'a> {
 }
 
 impl Sorter<'_> {
-    /// Sorts the children of a node and of those below it, the first of which stands at this place; what is to be expected of it,
-    /// where that is known.
+    /// Sorts the children of the node at `place` and of all nodes below it. Returns its odds, if known.
     fn sort(&self, nodes: &mut [Node], place: usize) -> Option<Odds> {
         if nodes.len() <= FEW {
             return self.isa.run(SortFew { sorter: *self, nodes, place });
@@ -70,13 +70,13 @@ impl Sorter<'_> {
         self.isa.run(SortOne { sorter: *self, node, odds })
     }
 
-    /// Sorts the children of a node, where this is what is to be expected of those that are nodes.
+    /// Sorts the children of a node, given the odds of those that are nodes.
     #[inline(always)]
     fn sort_one<L: Simd>(
         &self,
         node: &mut Node,
         inner: &[Option<Odds>; WIDTH],
-        room: &mut CornersRoom,
+        room: &mut CornerScratch,
     ) -> Option<Odds> {
         let areas = Areas::of::<L>(node);
         let (mut stops, mut costs) = ([0.0; WIDTH], [1.0; WIDTH]);
@@ -90,7 +90,7 @@ impl Sorter<'_> {
                         triangles += area_of::<L>(block, self.scale, room);
                         cost += 1.0;
                     }
-                    // A number, whatever the box.
+                    // A finite number for every box.
                     Odds { stops: (triangles / areas.of_children[lane]).min(1.0), cost }
                 }
                 _ if child == Node::ABSENT => break,
@@ -99,7 +99,7 @@ impl Sorter<'_> {
             (stops[lane], costs[lane]) = (odds.stops, odds.cost);
             len += 1;
         }
-        // From the last to the first: by falling odds for their cost.
+        // From last to first: falling probability per cost.
         let keys = (L::F32x16::load(&stops) / L::F32x16::load(&costs)).lanes_in_bits();
         let by_lane = keys.bits();
         let mut order = [0; WIDTH];
@@ -119,7 +119,7 @@ impl Sorter<'_> {
     }
 }
 
-/// Sorts the children of these nodes, all that there are below the first, which stands at this place.
+/// Sorts the children of these nodes: the node at `place` and all below it.
 struct SortFew<'a> {
     sorter: Sorter<'a>,
     nodes: &'a mut [Node],
@@ -132,7 +132,7 @@ impl Dispatch for SortFew<'_> {
     #[inline(always)]
     fn run<L: Simd>(self) -> Option<Odds> {
         let Self { sorter, nodes, place } = self;
-        let mut room = CornersRoom::new();
+        let mut room = CornerScratch::new();
         let mut odds = [None; FEW];
         for at in (0..nodes.len()).rev() {
             let node = &mut nodes[at];
@@ -148,7 +148,7 @@ impl Dispatch for SortFew<'_> {
     }
 }
 
-/// Sorts the children of a node, where this is what is to be expected of those that are nodes.
+/// Sorts the children of a node, given the odds of those that are nodes.
 struct SortOne<'a> {
     sorter: Sorter<'a>,
     node: &'a mut Node,
@@ -160,11 +160,11 @@ impl Dispatch for SortOne<'_> {
 
     #[inline(always)]
     fn run<L: Simd>(self) -> Option<Odds> {
-        self.sorter.sort_one::<L>(self.node, &self.odds, &mut CornersRoom::new())
+        self.sorter.sort_one::<L>(self.node, &self.odds, &mut CornerScratch::new())
     }
 }
 
-/// Puts the children of a node in an order of their lanes.
+/// Reorders the children of a node by lanes.
 #[inline(always)]
 fn put_in_order(node: &mut Node, order: &[usize]) {
     let before = *node;
@@ -177,11 +177,12 @@ fn put_in_order(node: &mut Node, order: &[usize]) {
     }
 }
 
-/// Of the boxes of a node.
+/// The surface areas of a node's boxes.
 struct Areas {
-    /// Half the surfaces of those of its children; none of one that is inside out, as of leaves in which nothing has an area any more.
+    /// Half the areas of the children's boxes; zero for an inverted box, as of a leaf whose contents have no area any
+    /// more.
     of_children: [f32; WIDTH],
-    /// One by that of its own, or zero where it has none.
+    /// One over half the area of the node's own box, or zero if it has none.
     inverse: f32,
 }
 
@@ -205,7 +206,7 @@ impl Areas {
 
 /// The area of the triangles of a block, in tree units.
 #[inline(always)]
-fn area_of<L: Simd>(block: &TriangleBlock, scale: f32, room: &mut CornersRoom) -> f32 {
+fn area_of<L: Simd>(block: &TriangleBlock, scale: f32, room: &mut CornerScratch) -> f32 {
     let corners = L::corners(block, room);
     let scale = L::F32x8::splat(scale);
     let (mut a, mut b) = ([scale; 3], [scale; 3]);
@@ -216,7 +217,7 @@ fn area_of<L: Simd>(block: &TriangleBlock, scale: f32, room: &mut CornersRoom) -
     }
     let ([ax, ay, az], [bx, by, bz]) = (a, b);
     let (x, y, z) = (ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx);
-    // Lanes without a triangle have all corners in one place.
+    // All corners of an empty lane coincide.
     let [a, b, c, d, e, f, g, h] = (x * x + y * y + z * z).sqrt().to_array();
     0.5 * (((a + e) + (c + g)) + ((b + f) + (d + h)))
 }

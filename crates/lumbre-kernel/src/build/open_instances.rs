@@ -1,15 +1,17 @@
-//! Opening of instances: where boxes around parts of one are much smaller than the box around the whole, leaves of the outer
-//! tree enter the inner one at several of its nodes, and not at its root.
+//! Opens instances: if boxes around parts of an instance are much smaller than the box around the whole, leaves of the
+//! outer tree enter the inner tree at several nodes instead of at its root.
 //!
-//! C. Benthin, S. Woop, I. Wald, A. Áfra, "Improved Two-Level BVHs using Partial Re-Braiding", High Performance Graphics,
-//! 2017. There, what is large beside a node of the outer tree is opened while that is built. Here, an instance is opened
-//! before, where its parts have so much less area that rays enter it more seldom; those that gain most come first. Overlap
-//! alone is no reason: on two hundred scanned balls in a heap and ten thousand trees of a forest, all within the boxes of many
-//! others, opening by size lost 0.03 and 0.07 of the speed (with nodes of eight children) with twice as many leaves as instances,
-//! and more with more, since entering an instance costs as much as several nodes. (By area, it leaves these as they are.) A
-//! thousand long and slanted pipes came to 4.1 times the speed for closest hits and 2.8 for any with sixteen times as many leaves,
-//! the children of their roots; half of them opened, to 1.9 and 1.6. The scenes are `boulders`, `forest` and `pipes` of
-//! `cargo xtask bench kernel`.
+//! C. Benthin, S. Woop, I. Wald, A. Áfra, "Improved Two-Level BVHs using Partial Re-Braiding", High Performance
+//! Graphics, 2017.
+//!
+//! Unlike there, instances are opened before the build, and by area instead of size: an instance is opened if its parts
+//! have so much less area that rays enter it less often, starting with the largest gain. Overlap alone is no reason,
+//! because entering an instance costs as much as several nodes. For two hundred scanned balls in a heap and ten
+//! thousand trees of a forest, whose boxes overlap many others, opening by size lost 0.03 and 0.07 of the speed (with
+//! nodes of eight children) at twice as many leaves as instances, and lost more with more leaves. Opening by area
+//! leaves these scenes as they are. A thousand long, slanted pipes, opened into the sixteen children of their roots,
+//! reached 4.1 times the speed for closest hits and 2.8 times for any hits; half of them opened, 1.9 and 1.6 times. The
+//! scenes are `boulders`, `forest` and `pipes` of `cargo xtask bench kernel`.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -28,22 +30,23 @@ use crate::tree::packed::Entry;
 use crate::tree::packed::Start;
 use crate::tree::{Geometry, GeometryKind, Instance, Tree};
 
-/// How many leaves there may be more for each instance that stands still, and how many more for all: so many that a mean one may be opened once.
+/// Extra leaves allowed for each static instance, and for all: enough to open an average one once.
 const MORE: usize = 15;
 const MORE_FOR_ALL: usize = 64;
-/// Parts are to have no more of the area of the whole than this. Sixteen of a ball have some 0.8 of it.
+/// Open an instance only if its parts have at most this share of the whole's area. Sixteen parts of a ball have about
+/// 0.8.
 const LARGEST_SHARE: f32 = 0.65;
-/// Boxes of a part's outline, about; those of its children, where they are more.
+/// Approximate boxes in a part's outline; at least one for each child.
 const OUTLINE: usize = 8;
 
-/// A node of an instance's tree that is to be entered, or the root, with what is below it.
+/// A node of an instance's tree where rays may enter, with its children.
 struct Family {
-    /// None where one of them is a leaf, for leaves are not entered.
+    /// Empty if one of them is a leaf: rays cannot enter at a leaf.
     children: Vec<u32>,
     /// Around the children.
     boxes: Vec<EightSizes>,
     outline: Outline,
-    /// The children in turn, once they are known.
+    /// The families of the children, once they are known.
     families: Vec<u32>,
 }
 
@@ -52,7 +55,7 @@ impl Family {
         let node = &inner.packed.nodes[reference as usize];
         let lanes = 0..node.len();
         let children = lanes.map(|lane| (node.children[lane], box_in_space(&inner.tree_space, node, lane)));
-        // What became empty by a refit is met by no ray.
+        // No ray meets a child that a refit made empty.
         let (mut children, mut boxes): (Vec<_>, Vec<_>) =
             children.filter(|child| !child.1.is_empty()).unzip();
         if children.iter().any(|&child| !tag::is_inner(child)) {
@@ -64,16 +67,16 @@ impl Family {
     }
 }
 
-/// What is known of trees that instances place: many are of one.
+/// What is known of the trees that instances place. Many instances share a tree.
 #[derive(Default)]
 pub(crate) struct Families {
     known: Vec<Family>,
-    /// Of a tree and a node, the place among those that are known.
+    /// Index of the family of a tree and node.
     places: FxHashMap<(usize, u32), u32>,
 }
 
 impl Families {
-    /// The place of a node.
+    /// The index of a node's family.
     fn learn(&mut self, tree: &Arc<Tree>, node: u32) -> u32 {
         *self.places.entry((Arc::as_ptr(tree).addr(), node)).or_insert_with(|| {
             self.known.push(Family::of(tree, node));
@@ -85,7 +88,7 @@ impl Families {
         &self.known[place as usize]
     }
 
-    /// Gets to know the children of one.
+    /// Finds the families of the children.
     fn learn_children(&mut self, tree: &Arc<Tree>, place: u32) {
         let family = self.get(place);
         if family.families.len() < family.children.len() {
@@ -95,8 +98,8 @@ impl Families {
         }
     }
 
-    /// The boxes around those parts of a tree, whose nodes these are, in the space around the instance; `None` unless they
-    /// together are all of the tree.
+    /// The boxes around these nodes of an instance's tree, in the space around the instance; `None` unless the nodes
+    /// together are the whole tree.
     fn boxes_of(&mut self, instance: &Instance, whole: &Aabb, nodes: &[u32]) -> Option<Vec<Aabb>> {
         let Instance { tree, world_from_object } = instance;
         tree.packed.root.filter(|&root| tag::is_inner(root))?;
@@ -113,7 +116,7 @@ impl Families {
             for (node, &place) in family.children.iter().zip(&family.families) {
                 let mut bounds = around;
                 if let Some(own) = self.get(place).outline.part_at(world_from_object) {
-                    // Each bounds it, so that their common part does.
+                    // Both bound it, so their intersection does.
                     bounds = Aabb { min: own.min.max(around.min), max: own.max.min(around.max) };
                 }
                 match places.binary_search_by_key(node, |place| place.0) {
@@ -126,7 +129,7 @@ impl Families {
     }
 }
 
-/// The instance that this is, if it stands still.
+/// The instance, if this is a static one.
 fn still(geometry: &Geometry) -> Option<(&Instance, &Transform)> {
     match &geometry.kind {
         GeometryKind::Instance(instance) => match &instance.world_from_object {
@@ -137,15 +140,15 @@ fn still(geometry: &Geometry) -> Option<(&Instance, &Transform)> {
     }
 }
 
-/// Of what is no instance that can be opened.
+/// Marks a primitive that cannot be opened.
 const NO_FAMILY: u32 = u32::MAX;
-/// The second name of what was opened.
+/// The second id of an opened primitive.
 const OPENED: u32 = u32::MAX;
-/// Parts that a thread looks at together.
+/// Parts per task.
 const CHUNK: usize = 256;
 
-/// Opens the instances among some primitives where that pays, into no more than `room` parts more than there are primitives. The
-/// second name of a part is the node where it begins.
+/// Opens those instances among the primitives where it pays, into at most `room` additional parts. The second id of a
+/// part is the node where it is entered.
 pub(crate) fn open(
     primitives: &mut Vec<Primitive>,
     geometries: &[Geometry],
@@ -167,7 +170,7 @@ pub(crate) fn open(
     }
     let mut more = (MORE * instances + MORE_FOR_ALL).min(room);
     let mut first = 0;
-    // Level by level, so that threads share the work on one.
+    // Level by level, so that threads share the work of a level.
     while first < primitives.len() {
         let mut gains = vec![0.0; families.len()];
         let parts = primitives[first..].par_chunks_mut(CHUNK).zip(families.par_chunks(CHUNK));
@@ -184,7 +187,7 @@ pub(crate) fn open(
             });
         });
         let positive = gains.iter().enumerate().filter(|(_, gain)| **gain > 0.0);
-        // The largest first, and of equals the first.
+        // The largest gain first; ties by position.
         let mut order: Vec<u64> =
             positive.map(|(place, gain)| u64::from(!gain.to_bits()) << 32 | place as u64).collect();
         drop(gains);
@@ -208,15 +211,15 @@ pub(crate) fn open(
             known.learn_children(&instance.tree, families[place]);
             let family = known.get(families[place]);
             next.extend(&family.families);
-            primitives.extend(family.children.iter().map(|&child| part.with_names(part.first(), child)));
-            primitives[first + place] = part.with_names(part.first(), OPENED);
+            primitives.extend(family.children.iter().map(|&child| part.with_ids(part.first(), child)));
+            primitives[first + place] = part.with_ids(part.first(), OPENED);
         }
         (first, families) = (end, next);
     }
     primitives.retain(|primitive| primitive.second() != OPENED);
 }
 
-/// Finds the boxes around parts, which have those of what they are parts of, and what would be gained if they were opened.
+/// Finds the boxes of parts, cut to their parents' boxes, and the gain of opening each.
 struct Weigh<'a> {
     parts: &'a mut [Primitive],
     families: &'a [u32],
@@ -224,7 +227,7 @@ struct Weigh<'a> {
     known: &'a Families,
     geometries: &'a [Geometry],
     tree_space: &'a TreeSpace,
-    /// Whether they are no parts but whole, with boxes of their own.
+    /// Whether these are whole instances with boxes of their own.
     are_whole: bool,
 }
 
@@ -234,7 +237,7 @@ impl Dispatch for Weigh<'_> {
     #[inline(always)]
     fn run<L: Simd>(self) {
         let Self { parts, families, gains, known, geometries, tree_space, are_whole } = self;
-        // From areas in space to those of primitives.
+        // Converts areas in space to areas of primitives.
         let scale = (tree_space.scale * ONE).powi(2);
         for ((part, &family), gain) in parts.iter_mut().zip(families).zip(gains) {
             if family == NO_FAMILY {
@@ -257,7 +260,7 @@ impl Dispatch for Weigh<'_> {
     }
 }
 
-/// Where the entries of instances that were opened stand among all of a tree, by geometry.
+/// The indices of the entries of opened instances, by geometry.
 pub(crate) fn opened(entries: &[Entry], geometries: &[Geometry]) -> BTreeMap<u32, Vec<usize>> {
     let mut found: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (place, entry) in entries.iter().enumerate() {
@@ -268,14 +271,14 @@ pub(crate) fn opened(entries: &[Entry], geometries: &[Geometry]) -> BTreeMap<u32
     found
 }
 
-/// Whether an entry is of an instance that was opened.
+/// Whether an entry belongs to an opened instance.
 pub(crate) fn is_part(entry: &Entry, geometries: &[Geometry]) -> bool {
     let kind = |geometry: &Geometry| matches!(geometry.kind, GeometryKind::Instance(_));
     entry.primitive() != Start::WHOLE.0 && geometries.get(entry.geometry as usize).is_some_and(kind)
 }
 
-/// What the entries of an opened instance stand for now, each with its box: parts of it, or the first for the whole. `whole` is
-/// the box around it, if it is not empty.
+/// The starts of an opened instance's entries, each with its box: its parts, or the first entry for the whole. `whole`
+/// is the box around the instance, if it is not empty.
 pub(crate) fn starts_of(
     families: &mut Families,
     instance: &Instance,

@@ -1,31 +1,31 @@
 //! How a tree is built.
 
-/// How a tree is built. Answers do not depend on it; how soon they come does.
+/// How a tree is built. Answers never depend on it; the speed of queries does.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct BuildOptions {
-    /// How much care is taken.
+    /// The effort of the build.
     pub preset: Preset,
 }
 
-/// How much care is taken over a tree.
+/// The effort of a build.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Preset {
-    /// Built soonest, for what changes from picture to picture: primitives are sorted along a curve (C. Lauterbach and
-    /// others, "Fast BVH Construction on GPUs", 2009), and only the ends of the tree are chosen by the surface area
-    /// heuristic.
+    /// The fastest build, for scenes that change with every frame: primitives are sorted along the Morton curve (C.
+    /// Lauterbach and others, "Fast BVH Construction on GPUs", 2009), and only the bottom of the tree is chosen by the
+    /// surface area heuristic.
     Fast,
-    /// Binned by the surface area heuristic at every instruction set (I. Wald, "On fast Construction of SAH-based Bounding Volume
-    /// Hierarchies", 2007). Among the upper nodes of meshes, subtrees are put elsewhere where that makes the tree much better, as in
-    /// `Best`. Instances whose parts have much smaller boxes than the whole are entered part by part (after C. Benthin
-    /// and others, "Improved Two-Level BVHs using Partial Re-Braiding", 2017): at most eight parts for each on average, and 64.
+    /// Binned by the surface area heuristic (I. Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies",
+    /// 2007), with the same tree for every instruction set. Upper nodes of meshes are reinserted, as in `Best`, if that
+    /// makes the tree much better. Instances whose parts have much smaller boxes than the whole are entered part by
+    /// part (after C. Benthin and others, "Improved Two-Level BVHs using Partial Re-Braiding", 2017).
     #[default]
     Balanced,
-    /// The balanced tree, then made better by putting subtrees of any size elsewhere (D. Meister, J. Bittner, "Parallel Reinsertion for
-    /// Bounding Volume Hierarchy Optimization", 2018): for what is built once and asked often.
+    /// The balanced tree, improved by reinserting subtrees of any size (D. Meister, J. Bittner, "Parallel Reinsertion
+    /// for Bounding Volume Hierarchy Optimization", 2018): for trees that are built once and answer many queries.
     Best,
 }
 
 impl Preset {
-    /// All of them, from the soonest to the best.
+    /// All presets, from the fastest build to the fastest queries.
     pub const ALL: [Self; 3] = [Self::Fast, Self::Balanced, Self::Best];
 }

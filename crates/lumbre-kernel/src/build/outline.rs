@@ -1,4 +1,4 @@
-//! Boxes that together hold what is in a tree, and the box around them where the tree is placed.
+//! Boxes that together bound a tree's contents, and the box around them where the tree is placed.
 
 use lumbre_geometry::Aabb;
 use lumbre_math::{AnimatedTransform, DMat3, DVec3, Transform};
@@ -9,35 +9,37 @@ use crate::tree::Tree;
 use crate::tree::geometry::Placement;
 use crate::tree::node::{Node, TreeSpace, tag};
 
-/// Boxes of an outline, about.
+/// Approximate number of boxes in an outline.
 const OUTLINE: usize = 256;
 
-/// Boxes of a tree that together hold what is finite in it. The box around an instance is that of many boxes, each taken over
-/// by itself, which is tighter than the image of the whole.
+/// Boxes of a tree that together bound its finite contents. The box around an instance is the union of the images of
+/// these boxes, which is tighter than the image of the one box around the whole.
 ///
-/// # Why nothing sticks out
+/// # Error bound
 ///
-/// Boxes are kept in single precision, from the middle of all of them, in units of half their largest extent: |c| + h ≤ 1 + 2u for
-/// each number of a box's middle and half its size, with u = 2⁻²⁴, and each of these is wrong by u/2 at most. A row of a map is
-/// divided by its largest number, so that each is wrong by u at most. The sums of |m c| and of |m h| over a row are together below 3.1,
-/// and their roundings, those of the numbers and that of the last sum or difference less than 8u of that: 25u. What is taken back
+/// Boxes are kept in single precision, relative to the middle of all of them, in units of half their largest extent:
+/// |c| + h ≤ 1 + 2u for each coordinate of a box's middle and half size, with u = 2⁻²⁴, and each of these has an error
+/// of at most u/2. A row of a map is divided by its largest number, so that each number has an error of at most u. The
+/// sums of |m c| and of |m h| over a row are together below 3.1. The rounding errors of the products and of the last
+/// sum or difference are less than 8u of that: 25u in total. The conversion back to double precision adds 32u, and then
+/// the rounding errors of the image of the middle, which is computed in double precision.
 /// from these units in double precision has 32u of them added, and then what rounds in the image of the middle, which is found in
 /// double precision.
 pub(crate) struct Outline {
     whole: Aabb,
-    /// Its middle, and half its largest extent.
+    /// The middle, and half the largest extent.
     center: DVec3,
     unit: f64,
     boxes: Vec<SixteenBoxes>,
-    /// No coordinate is larger.
+    /// The largest coordinates.
     reach: DVec3,
 }
 
-/// What the image of an outline may be wrong by, in its units: 32u, see there.
+/// Error bound of an outline's image in its units: 32u, see there.
 const IMAGE_ERROR: f64 = 32.0 / (1 << 24) as f64;
 
 impl Outline {
-    /// Of a whole tree.
+    /// The outline of a whole tree.
     pub(crate) fn of(inner: &Tree) -> Self {
         let whole = inner.bounds;
         match inner.packed.root.filter(|_| inner.infinite.is_empty()) {
@@ -50,7 +52,8 @@ impl Outline {
         Self { whole, center: DVec3::ZERO, unit: 0.0, boxes: Vec::new(), reach: DVec3::ZERO }
     }
 
-    /// Of what is below a node, by one box more than this at most, or by those of its children where they are more; of a leaf, by none.
+    /// The outline of what is below a node: at most `count` + 1 boxes, or those of the node's children if they are
+    /// more. A leaf has none.
     pub(crate) fn below(inner: &Tree, reference: u32, count: usize) -> Self {
         let node = |reference: u32| tag::is_inner(reference).then(|| &inner.packed.nodes[reference as usize]);
         let Some(root) = node(reference) else { return Self::of_box(Aabb::EMPTY) };
@@ -76,7 +79,7 @@ impl Outline {
         Self::of_boxes(&boxes)
     }
 
-    /// Of these, of which none is empty.
+    /// The outline of these non-empty boxes.
     fn of_boxes(boxes: &[Aabb]) -> Self {
         let whole = boxes.iter().fold(Aabb::EMPTY, |whole, bounds| whole.union(*bounds));
         let boxes: Vec<_> = boxes.iter().map(center_and_half).collect();
@@ -90,7 +93,8 @@ impl Outline {
         Self { whole, center, unit, boxes, reach }
     }
 
-    /// A box around it at all times, whatever is the box around the whole tree; `None` where nothing is known but that.
+    /// A box around the placed outline at all times, without the box around the whole tree; `None` if only that is
+    /// known.
     pub(crate) fn part_at(&self, placement: &Placement) -> Option<Aabb> {
         match placement {
             Placement::Still(map) => Isa::best().run(Around { outline: self, placing: &Placing::of(map) }),
@@ -98,7 +102,7 @@ impl Outline {
         }
     }
 
-    /// A box around it at all times.
+    /// A box around the placed outline at all times.
     pub(crate) fn at(&self, placement: &Placement) -> Aabb {
         match placement {
             Placement::Still(map) => self.placed(map),
@@ -109,13 +113,13 @@ impl Outline {
     fn placed(&self, map: &Transform) -> Aabb {
         let (whole, placing) = (placed_bounds(&self.whole, map), Placing::of(map));
         match Isa::best().run(Around { outline: self, placing: &placing }) {
-            // Each bounds it, so that their common part does.
+            // Both bound it, so their intersection does.
             Some(parts) => Aabb { min: parts.min.max(whole.min), max: parts.max.min(whole.max) },
             None => whole,
         }
     }
 
-    /// The box around the images of its boxes; `None` where there are none.
+    /// The box around the images of its boxes; `None` without boxes.
     #[inline(always)]
     pub(crate) fn around<L: Simd>(&self, placing: &Placing) -> Option<Aabb> {
         if self.boxes.is_empty() {
@@ -140,7 +144,7 @@ impl Outline {
 /// A map, and what else the images of boxes need of it.
 pub(crate) struct Placing {
     linear: DMat3,
-    /// The sizes of its numbers.
+    /// The absolute values of its numbers.
     sizes: DMat3,
     translation: DVec3,
 }
@@ -151,7 +155,7 @@ impl Placing {
         Self { linear: map.linear(), sizes: sizes_of(map), translation: map.affine().translation }
     }
 
-    /// By how much the image of a box with no larger coordinates than `reach` may be wrong.
+    /// Error bound of the image of a box whose coordinates are at most `reach`.
     #[inline(always)]
     fn rounding(&self, reach: DVec3) -> DVec3 {
         8.0 * f64::EPSILON * (self.sizes * reach + self.translation.abs())
@@ -159,13 +163,15 @@ impl Placing {
 }
 
 impl Outline {
-    /// The same of what moves.
+    /// The box around the outline as it moves.
     ///
-    /// Every point of the outline goes, between two neighbours of a list of steps, along a curve that stays within a certain
-    /// distance of its chord. The ends of the chord lie in the boxes at the two steps, so that all of the chord lies in the
-    /// box around both: the curve lies in that box when it is widened by the distance. Before the first key and after the
-    /// last, everything is as at these. What rounds in a map between two keys is a few 2⁻⁵³ of what the maps at the keys make
-    /// of the outline, times their condition.
+    /// # Correctness
+    ///
+    /// Between two neighbouring steps of a list, every point of the outline follows a curve that stays within a known
+    /// distance of its chord. The ends of the chord lie in the boxes at the two steps, so the chord lies in the box
+    /// around both, and the curve lies in that box widened by the distance. Before the first key and after the last,
+    /// the map is constant. The rounding error of a map between two keys is a few 2⁻⁵³ of the outline's images at the
+    /// keys, times their condition.
     fn swept(&self, motion: &AnimatedTransform) -> Aabb {
         let mut swept = Aabb::EMPTY;
         for (_, map) in motion.keys() {
@@ -175,7 +181,7 @@ impl Outline {
             return swept;
         }
         let [center, half] = center_and_half(&self.whole);
-        // An instance grows by a fiftieth of its size.
+        // Widens an instance by a fiftieth of its size.
         let sizes = |map: &Transform| (sizes_of(map) * half).length();
         let smallest = motion.keys().iter().map(|(_, map)| sizes(map)).fold(f64::INFINITY, f64::min);
         for (maps, distance) in motion.steps(center, half, 0.02 * smallest) {
@@ -189,27 +195,27 @@ impl Outline {
     }
 }
 
-/// How many boxes are taken over at a time.
+/// Boxes per vector.
 const EIGHT: usize = 8;
 
-/// Half the sizes of eight boxes, by axes.
+/// Half the sizes of eight boxes, by axis.
 pub(crate) struct EightSizes {
     halves: [[f64; EIGHT]; 3],
 }
 
 impl EightSizes {
-    /// Of any number.
+    /// For any number of boxes.
     pub(crate) fn of(boxes: &[Aabb]) -> Vec<Self> {
         boxes.chunks(EIGHT).map(Self::new).collect()
     }
 
-    /// Of some; where there are fewer, the first comes again.
+    /// For up to eight boxes; repeats the first to fill up.
     fn new(boxes: &[Aabb]) -> Self {
         let half = |lane: usize| center_and_half(boxes.get(lane).unwrap_or(&boxes[0]))[1];
         Self { halves: [0, 1, 2].map(|axis| std::array::from_fn(|lane| half(lane)[axis])) }
     }
 
-    /// Half the areas of the boxes around the images of `count` boxes, together.
+    /// Half the summed areas of the boxes around the images of `count` boxes.
     #[inline(always)]
     pub(crate) fn placed_area(boxes: &[Self], count: usize, placing: &Placing) -> f64 {
         let mut area = 0.0;
@@ -247,14 +253,14 @@ impl Dispatch for Around<'_> {
     }
 }
 
-/// Boxes by sixteen, in an outline's units.
+/// Sixteen boxes in an outline's units.
 struct SixteenBoxes {
     centers: [Row<f32>; 3],
     halves: [Row<f32>; 3],
 }
 
 impl SixteenBoxes {
-    /// Of some; where there are fewer, the first comes again.
+    /// For up to sixteen boxes; repeats the first to fill up.
     fn new(boxes: &[[DVec3; 2]], middle: DVec3, unit: f64) -> Self {
         let rows = |number: &dyn Fn(&[DVec3; 2], usize) -> f64| {
             [0, 1, 2].map(|axis| {
@@ -270,12 +276,12 @@ impl SixteenBoxes {
     }
 }
 
-/// Where the images of boxes begin and end on an axis, for that row of a map. In the same operations on every instruction set, so
-/// that trees are the same.
+/// The range of the boxes' images on an axis, for that row of a map. Every instruction set performs the same
+/// operations, so that trees are the same.
 #[inline(always)]
 fn images<W: F32x16>(boxes: &[SixteenBoxes], row: [f32; 3]) -> [f32; 2] {
     let [x, y, z] = [W::splat(row[0]), W::splat(row[1]), W::splat(row[2])];
-    // The highest places, and the highest of their negatives.
+    // The largest coordinates, and the largest negated ones.
     let (mut high, mut low) = (W::splat(f32::NEG_INFINITY), W::splat(f32::NEG_INFINITY));
     for SixteenBoxes { centers, halves } in boxes {
         let [cx, cy, cz] = [W::load(&centers[0].0), W::load(&centers[1].0), W::load(&centers[2].0)];
@@ -288,7 +294,7 @@ fn images<W: F32x16>(boxes: &[SixteenBoxes], row: [f32; 3]) -> [f32; 2] {
     [-low.reduce_max(), high.reduce_max()]
 }
 
-/// A node's box, back from tree units.
+/// A node's box in space, from tree units.
 pub(crate) fn box_in_space(tree_space: &TreeSpace, node: &Node, lane: usize) -> Aabb {
     let plane = |side: usize| {
         let planes = [0, 2, 4].map(|axis| f64::from(node.planes[axis + side][lane]));
@@ -317,7 +323,7 @@ fn center_and_half(bounds: &Aabb) -> [DVec3; 2] {
     [center, (bounds.max - center).max(center - bounds.min)]
 }
 
-/// The sizes of the numbers of a map's linear part.
+/// The absolute values of a map's linear part.
 #[inline(always)]
 fn sizes_of(map: &Transform) -> DMat3 {
     let linear = map.linear();
@@ -357,7 +363,7 @@ mod tests {
                     }
                 }
                 let around = outline.part_at(&map.into()).expect("boxes");
-                // What rounds in `exact` is far less than what may round in the outline.
+                // The rounding errors of `exact` are far smaller than the outline's.
                 assert!(around.min.cmple(exact.min).all() && around.max.cmpge(exact.max).all());
                 let largest = factors.abs().max_element() * size;
                 let rounding = 1e-14 * (1.0 + offset + 10.0 / factors.abs().max_element()) * largest;

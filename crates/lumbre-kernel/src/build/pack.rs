@@ -10,26 +10,26 @@ use crate::tree::geometry::TriangleMesh;
 use crate::tree::geometry::has_area;
 use crate::tree::node::{Node, tag};
 use crate::tree::triangle_block::{
-    BlockNames, Blocks, Head, Line, MARGIN, MOST_IN_HALF, QUAD, lines_of, row, shared_number, vertex_at,
+    BlockIds, Blocks, Head, Line, MARGIN, MAX_IN_HALF, QUAD, lines_of, row, shared_number, vertex_at,
 };
 use crate::tree::{Geometry, GeometryKind};
 
-/// Blocks, and where each begins.
+/// Blocks, and the line where each begins.
 pub(crate) struct Filled {
     pub(crate) lines: Vec<Line>,
     pub(crate) places: Vec<u32>,
-    /// The order that the names of each block are to be put into.
+    /// The order of the ids of each block.
     pub(crate) orders: Vec<LaneOrder>,
 }
 
-/// For each lane of a block, the lane that it comes from: four bits each.
+/// For each lane of a block, the lane it comes from: four bits each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct LaneOrder(u32);
 
 impl LaneOrder {
     const SAME: Self = Self(0x7654_3210);
 
-    /// With the four lanes first that have a bit.
+    /// The order that puts the four lanes of this mask first.
     #[inline(always)]
     fn of_first(first: usize) -> Self {
         let (mut order, mut ends) = (0, [0, QUAD]);
@@ -41,7 +41,7 @@ impl LaneOrder {
         Self(order as u32)
     }
 
-    /// Whether every lane stays where it is.
+    /// Whether every lane stays in place.
     pub(crate) fn is_same(self) -> bool {
         self == Self::SAME
     }
@@ -52,61 +52,61 @@ impl LaneOrder {
         (self.0 >> (4 * lane)) as usize % BLOCK
     }
 
-    /// Puts the names of a block in this order.
-    pub(crate) fn put(self, names: &mut BlockNames) {
-        let before = names.primitives;
-        for (lane, primitive) in names.primitives.iter_mut().enumerate() {
+    /// Reorders the ids of a block.
+    pub(crate) fn put(self, ids: &mut BlockIds) {
+        let before = ids.primitives;
+        for (lane, primitive) in ids.primitives.iter_mut().enumerate() {
             *primitive = before[self.lane_before(lane)];
         }
     }
 }
 
-/// Of so many blocks, how many one thread takes at a time: all of a few hundred, which one thread built alone.
+/// Blocks per task; one task for up to 640 blocks.
 pub(crate) fn share_of(blocks: usize) -> usize {
     const FEW: usize = 640;
     if blocks > FEW { 64 } else { FEW }
 }
 
-/// Whether so many blocks share their vertices. A block that does not is faster, but five megabytes of them no longer stay in a cache.
-/// Tests have both.
+/// Whether a tree of this many blocks shares vertices. A block that does not is faster, but five megabytes of them no
+/// longer fit a cache. Tests use both.
 pub(crate) fn is_worth_sharing(blocks: usize) -> bool {
-    const MOST_UNSHARED: usize = if cfg!(test) { 24 } else { 1 << 14 };
-    blocks > MOST_UNSHARED
+    const MAX_UNSHARED: usize = if cfg!(test) { 24 } else { 1 << 14 };
+    blocks > MAX_UNSHARED
 }
 
-/// Packs the triangles with these names; each block is followed by so many of its leaf. Leaves out those without an area, and does
-/// not ask where there may be none.
+/// Packs the triangles with these ids; `followers` says how many blocks of the same leaf follow each. Leaves out
+/// triangles without an area; skips that test if all have one.
 pub(crate) fn pack(
     isa: Isa,
     may_share: bool,
     geometries: &[Geometry],
-    names: &[BlockNames],
+    ids: &[BlockIds],
     followers: &[u8],
     may_lack_area: bool,
 ) -> Filled {
-    let share = share_of(names.len());
-    let mut plans = vec![Plan::UNSHARED; names.len()];
+    let share = share_of(ids.len());
+    let mut plans = vec![Plan::UNSHARED; ids.len()];
     if may_share {
-        plans.par_chunks_mut(share).zip(names.par_chunks(share)).for_each(|(plans, names)| {
-            isa.run(MakePlans { geometries, names, plans });
+        plans.par_chunks_mut(share).zip(ids.par_chunks(share)).for_each(|(plans, ids)| {
+            isa.run(MakePlans { geometries, ids, plans });
         });
     }
-    let mut places = Vec::with_capacity(names.len());
+    let mut places = Vec::with_capacity(ids.len());
     let mut end = 0;
     for plan in &plans {
         places.push(end as u32);
         end += lines_of(plan.is_unshared);
     }
-    let all = if names.is_empty() { 0 } else { end + MARGIN };
+    let all = if ids.is_empty() { 0 } else { end + MARGIN };
     let mut lines = vec![Line::default(); all];
     let mut rest = &mut lines[..end];
-    let mut shares = Vec::with_capacity(names.len().div_ceil(share));
+    let mut shares = Vec::with_capacity(ids.len().div_ceil(share));
     for (i, plans) in plans.chunks(share).enumerate() {
         let first = i * share;
         let len = plans.iter().map(|plan| lines_of(plan.is_unshared)).sum();
         shares.push(PackShare {
             geometries,
-            names: &names[first..],
+            ids: &ids[first..],
             followers: &followers[first..],
             plans,
             first: first as u32,
@@ -119,10 +119,10 @@ pub(crate) fn pack(
     Filled { lines, places, orders }
 }
 
-/// Plans blocks with these names.
+/// Plans blocks with these ids.
 struct MakePlans<'a> {
     geometries: &'a [Geometry],
-    names: &'a [BlockNames],
+    ids: &'a [BlockIds],
     plans: &'a mut [Plan],
 }
 
@@ -131,9 +131,9 @@ impl Dispatch for MakePlans<'_> {
 
     #[inline(always)]
     fn run<L: Simd>(self) {
-        for (plan, names) in self.plans.iter_mut().zip(self.names) {
-            let mesh = mesh(self.geometries, names.geometry);
-            *plan = Halves::of::<L>(mesh, names).plan();
+        for (plan, ids) in self.plans.iter_mut().zip(self.ids) {
+            let mesh = mesh(self.geometries, ids.geometry);
+            *plan = Halves::of::<L>(mesh, ids).plan();
         }
     }
 }
@@ -142,9 +142,9 @@ impl Dispatch for MakePlans<'_> {
 struct PackShare<'a> {
     geometries: &'a [Geometry],
     /// From its first block on.
-    names: &'a [BlockNames],
+    ids: &'a [BlockIds],
     followers: &'a [u8],
-    /// Of its own blocks.
+    /// Only of its own blocks.
     plans: &'a [Plan],
     /// The number of the first block.
     first: u32,
@@ -154,15 +154,15 @@ struct PackShare<'a> {
 
 impl PackShare<'_> {
     fn run(self) {
-        let Self { geometries, names, followers, plans, first, may_lack_area, mut lines } = self;
-        for (((number, plan), names), &followers) in (first..).zip(plans).zip(names).zip(followers) {
+        let Self { geometries, ids, followers, plans, first, may_lack_area, mut lines } = self;
+        for (((number, plan), ids), &followers) in (first..).zip(plans).zip(ids).zip(followers) {
             let own = lines.split_off_mut(..lines_of(plan.is_unshared)).expect("there are as many lines");
-            let mesh = mesh(geometries, names.geometry);
+            let mesh = mesh(geometries, ids.geometry);
             let Plan { corners, is_unshared, order } = *plan;
             let mut head = Head { number, taken: 0, is_unshared, followers: followers.into(), corners };
             let words = bytemuck::cast_slice_mut(own);
-            for lane in 0..names.primitives().count() {
-                let primitive = names.primitives[order.lane_before(lane)];
+            for lane in 0..ids.primitives().count() {
+                let primitive = ids.primitives[order.lane_before(lane)];
                 let corners = mesh.indices[primitive as usize].map(|vertex| mesh.positions[vertex as usize]);
                 head.taken |= u32::from(!may_lack_area || has_area(&corners)) << lane;
                 put_corners(words, &head, lane, &corners);
@@ -172,22 +172,23 @@ impl PackShare<'_> {
     }
 }
 
-/// Moves the triangles of blocks that [`pack`] made to where their vertices are now. False where triangles come apart that shared a
-/// vertex: some blocks are changed then, and all are to be packed again. Leaves out triangles without an area, as `pack` does.
+/// Moves the triangles of packed blocks to the current vertices. Returns false if triangles no longer coincide in a
+/// vertex that they shared: some blocks are changed by then, and all must be packed again. Leaves out triangles without
+/// an area, as [`pack`] does.
 pub(crate) fn move_triangles(
     isa: Isa,
     geometries: &[Geometry],
-    names: &[BlockNames],
+    ids: &[BlockIds],
     may_lack_area: bool,
     lines: &mut [Line],
 ) -> bool {
     let mut lines = lines;
-    let share = share_of(names.len());
-    let mut shares = Vec::with_capacity(names.len().div_ceil(share));
-    for names in names.chunks(share) {
-        let len = names.iter().fold(0, |place, _| Blocks::new(lines).block(place).place_behind(place));
+    let share = share_of(ids.len());
+    let mut shares = Vec::with_capacity(ids.len().div_ceil(share));
+    for ids in ids.chunks(share) {
+        let len = ids.iter().fold(0, |place, _| Blocks::new(lines).block(place).place_behind(place));
         let lines = lines.split_off_mut(..len as usize).expect("their heads are there");
-        shares.push(MoveShare { geometries, names, may_lack_area, lines });
+        shares.push(MoveShare { geometries, ids, may_lack_area, lines });
     }
     shares.into_par_iter().all(|share| isa.run(share))
 }
@@ -195,7 +196,7 @@ pub(crate) fn move_triangles(
 /// Some of the triangles that [`move_triangles`] moves.
 struct MoveShare<'a> {
     geometries: &'a [Geometry],
-    names: &'a [BlockNames],
+    ids: &'a [BlockIds],
     may_lack_area: bool,
     lines: &'a mut [Line],
 }
@@ -205,10 +206,10 @@ impl Dispatch for MoveShare<'_> {
 
     #[inline(always)]
     fn run<L: Simd>(self) -> bool {
-        let Self { geometries, names: all, may_lack_area, mut lines } = self;
+        let Self { geometries, ids: all, may_lack_area, mut lines } = self;
         let mut do_fit = true;
-        for (place, names) in all.iter().enumerate() {
-            // Prefetches the vertices of the next block, and the indices of the one behind it.
+        for (place, ids) in all.iter().enumerate() {
+            // Prefetches the vertices of the next block, and the indices of the one after it.
             if let Some(next) = all.get(place + 1) {
                 let mesh = mesh(geometries, next.geometry);
                 for primitive in next.primitives() {
@@ -223,14 +224,14 @@ impl Dispatch for MoveShare<'_> {
                     simd::fetch(&mesh.indices[primitive as usize]);
                 }
             }
-            let mesh = mesh(geometries, names.geometry);
+            let mesh = mesh(geometries, ids.geometry);
             let mut head = Head::of(bytemuck::cast_slice(lines));
             let own = lines.split_off_mut(..lines_of(head.is_unshared)).expect("there are as many lines");
             let words: &mut [u32] = bytemuck::cast_slice_mut(own);
             let mut triangles = [[Vec3::ZERO; 3]; BLOCK];
             let mut len = 0;
             head.taken = 0;
-            for (lane, primitive) in names.primitives().enumerate() {
+            for (lane, primitive) in ids.primitives().enumerate() {
                 let corners = mesh.indices[primitive as usize].map(|vertex| mesh.positions[vertex as usize]);
                 head.taken |= u32::from(!may_lack_area || has_area(&corners)) << lane;
                 put_corners(words, &head, lane, &corners);
@@ -263,7 +264,7 @@ fn put_corners(words: &mut [u32], head: &Head, lane: usize, corners: &[Vec3; 3])
     }
 }
 
-/// Whether the triangles of meshes name the same vertices as those of the same geometries before. Else they may share more of them.
+/// Whether the triangles of meshes have the same vertex indices as before. Otherwise they may share more vertices.
 pub(crate) fn name_same_vertices(before: &[Geometry], geometries: &[Geometry]) -> bool {
     const CHUNK: usize = 1 << 14;
     before.iter().zip(geometries).all(|(old, new)| match (&old.kind, &new.kind) {
@@ -283,7 +284,7 @@ fn mesh(geometries: &[Geometry], geometry: u32) -> &TriangleMesh {
     }
 }
 
-/// How a block is to be packed.
+/// How to pack a block.
 #[derive(Clone, Copy)]
 struct Plan {
     /// As in the head of a block.
@@ -296,19 +297,20 @@ impl Plan {
     const UNSHARED: Self = Self { corners: [0; 3], is_unshared: true, order: LaneOrder::SAME };
 }
 
-/// The triangles of a block in two halves. Of corners that are the same vertex, a bit stands for the first.
+/// The triangles of a block in two halves. Each vertex is one bit: that of its first corner.
 #[derive(Clone, Copy)]
 struct Halves {
-    /// For each lane, the bits of its corners' vertices; none where it is empty.
+    /// For each lane, the bits of its corners' vertices; zero in an empty lane.
     corners: [[u32; 3]; BLOCK],
     /// The vertices of either half.
     vertices: [u32; 2],
     order: LaneOrder,
-    /// How many triangles there are.
+    /// Number of triangles.
     len: usize,
 }
 
-/// The ways to choose four of five, six, seven and eight triangles, a bit for each that is; of eight, those with the first triangle.
+/// The ways to choose four of five, six, seven and eight triangles, as masks; of eight, only those with the first
+/// triangle.
 static FOURS: [([u8; 35], usize); 4] = {
     let mut fours = [([0; 35], 0); 4];
     let mut len = QUAD + 1;
@@ -328,14 +330,14 @@ static FOURS: [([u8; 35], usize); 4] = {
 };
 
 impl Halves {
-    /// Of the triangles with these names. Compares every corner with all before it, almost without branches; where too few share a
-    /// vertex by name, compares their positions.
+    /// The halves for the triangles with these ids. Compares every corner with all before it, almost without branches.
+    /// If too few share a vertex index, compares positions.
     #[inline(always)]
-    fn of<L: Simd>(mesh: &TriangleMesh, names: &BlockNames) -> Self {
+    fn of<L: Simd>(mesh: &TriangleMesh, ids: &BlockIds) -> Self {
         let mut all = [0; 3 * BLOCK];
         let (triangles, _) = all.as_chunks_mut::<3>();
         let mut len = 0;
-        for (triangle, primitive) in triangles.iter_mut().zip(names.primitives()) {
+        for (triangle, primitive) in triangles.iter_mut().zip(ids.primitives()) {
             *triangle = mesh.indices[primitive as usize];
             len += 1;
         }
@@ -358,7 +360,7 @@ impl Halves {
         Self::by_equals(&equals, len)
     }
 
-    /// Where each corner has a bit for every equal one before it.
+    /// For each corner, a mask of the equal corners before it.
     #[inline(always)]
     fn by_equals(equals: &[u32; 3 * BLOCK], len: usize) -> Self {
         let mut corners = [[0u32; 3]; BLOCK];
@@ -368,13 +370,13 @@ impl Halves {
         }
         let halves = Self::of_corners(corners, len, LaneOrder::SAME);
         let vertex_count = (halves.vertices[0] | halves.vertices[1]).count_ones() as usize;
-        if halves.do_fit() || vertex_count > 2 * MOST_IN_HALF || len <= QUAD {
+        if halves.do_fit() || vertex_count > 2 * MAX_IN_HALF || len <= QUAD {
             return halves;
         }
         halves.divided_better()
     }
 
-    /// Of these corners, in this order.
+    /// The halves for these corners, in this order.
     #[inline(always)]
     fn of_corners(corners: [[u32; 3]; BLOCK], len: usize, order: LaneOrder) -> Self {
         let mut vertices = [0; 2];
@@ -384,10 +386,10 @@ impl Halves {
         Self { corners, vertices, order, len }
     }
 
-    /// With other triangles in the halves, so that neither has more vertices than it must.
+    /// Redistributes the triangles so that the larger half has as few vertices as possible.
     #[inline(always)]
     fn divided_better(self) -> Self {
-        // The vertices of some of the first four triangles, and of some of the last four.
+        // The vertices of each subset of the first four triangles, and of the last four.
         let mut some = [[0u32; 1 << QUAD]; 2];
         for (half, some) in some.iter_mut().enumerate() {
             for lane in 0..QUAD {
@@ -399,7 +401,7 @@ impl Halves {
         }
         let vertices = |of: usize| (some[0][of % (1 << QUAD)] | some[1][of >> QUAD]).count_ones();
         let all = (1 << self.len) - 1;
-        // How many there are above, and which they are below: of as few, the first.
+        // The vertex count in the upper bits, the mask below; the smallest mask wins a tie.
         let mut best = self.most_in_half() << BLOCK | 0b1111;
         let (fours, count) = &FOURS[(self.len - QUAD - 1) % FOURS.len()];
         for &first in &fours[..*count] {
@@ -411,7 +413,7 @@ impl Halves {
         if first == 0b1111 { self } else { self.in_order(LaneOrder::of_first(first)) }
     }
 
-    /// The same in another order, in which other corners are the first of their vertices.
+    /// The same halves in another order, which changes the first corner of a vertex.
     #[inline(always)]
     fn in_order(self, order: LaneOrder) -> Self {
         let mut first_of = [0u32; 3 * BLOCK];
@@ -427,16 +429,16 @@ impl Halves {
         Self::of_corners(corners, self.len, order)
     }
 
-    /// How many the half has that has more.
+    /// Vertices of the larger half.
     #[inline(always)]
     fn most_in_half(&self) -> u32 {
         self.vertices[0].count_ones().max(self.vertices[1].count_ones())
     }
 
-    /// Whether a block can share them.
+    /// Whether a block can share these vertices.
     #[inline(always)]
     fn do_fit(&self) -> bool {
-        self.most_in_half() as usize <= MOST_IN_HALF
+        self.most_in_half() as usize <= MAX_IN_HALF
     }
 
     #[inline(always)]
@@ -448,7 +450,7 @@ impl Halves {
         for (lane, corners) in self.corners.iter().enumerate() {
             let half = lane / QUAD;
             for (word, corner) in words.iter_mut().zip(corners) {
-                // None comes before that of an empty lane.
+                // An empty lane counts no vertices.
                 let before = self.vertices[half] & corner.saturating_sub(1);
                 *word |= shared_number(half, before.count_ones()) << (4 * lane);
             }
@@ -457,8 +459,8 @@ impl Halves {
     }
 }
 
-/// Turns references to leaves of triangles, of which `number_of` tells the number of the first block, into ones to where this
-/// begins.
+/// Rewrites references to leaves of triangles: from the number of the first block, as `number_of` returns it, to the
+/// line where that block begins.
 pub(crate) fn refer(
     nodes: &mut [Node],
     root: &mut Option<u32>,
@@ -477,7 +479,7 @@ pub(crate) fn refer(
     });
 }
 
-/// How many blocks of its leaf stand behind each, where the references in nodes number them.
+/// How many blocks of its leaf follow each block, for nodes whose references number blocks.
 pub(crate) fn followers_of(nodes: &[Node], root: Option<u32>, blocks: usize) -> Vec<u8> {
     let mut followers = vec![0; blocks];
     let children = nodes.iter().flat_map(|node| &node.children[..node.len()]);

@@ -1,7 +1,7 @@
-//! Parting many primitives to the two sides of a split, in place and by several threads.
+//! Partitions primitives by a split, in place and on several threads.
 //!
-//! Pieces of a fixed length are parted each by itself; then what stands on the wrong side of the middle changes places with what
-//! does on the other. What comes out is the same from any number of threads, but not in the order in which it stood.
+//! Pieces of a fixed length are partitioned independently; then elements on the wrong side of the middle are swapped.
+//! The result does not depend on the number of threads, but the order of the primitives changes.
 
 use rayon::prelude::*;
 
@@ -9,10 +9,10 @@ use crate::build::primitive::{Bounds, Primitive};
 use crate::build::sah::{PartPiece, Split};
 use crate::intersect::Isa;
 
-/// Primitives that are parted at a time: with room for as many, they fit into a cache of a core.
+/// Primitives per piece: with a buffer of the same length, they fit a core's cache.
 const PIECE: usize = 2048;
 
-/// Brings the primitives left of a split before those right of it. `is_shared` says whether other threads may help.
+/// Moves the primitives left of a split in front of the others. `is_shared` says whether other threads may help.
 pub(crate) fn part(isa: Isa, primitives: &mut [Primitive], split: &Split, is_shared: bool) {
     let count = primitives.len();
     let room = || vec![Bounds::EMPTY; PIECE.min(count)];
@@ -42,8 +42,8 @@ pub(crate) fn part(isa: Isa, primitives: &mut [Primitive], split: &Split, is_sha
     }
 }
 
-/// The parts of a list that begins at the place `first`, from one place to another each; those that end before they begin
-/// are none.
+/// The parts of a list between these positions; the list begins at position `first`. Parts that end before they begin
+/// are empty.
 fn runs(
     mut rest: &mut [Primitive],
     mut first: usize,
@@ -60,7 +60,7 @@ fn runs(
     runs
 }
 
-/// Two lists of as many primitives in pairs of parts that are as long.
+/// Cuts two lists of equal length into pairs of parts of equal length.
 fn pair<'a>(
     low: Vec<&'a mut [Primitive]>,
     high: Vec<&'a mut [Primitive]>,
@@ -87,12 +87,12 @@ mod tests {
     use crate::build::sah::{BestSplit, Binning, Bins, Fill, FindCenters};
 
     #[test]
-    fn what_is_left_of_a_split_comes_first_from_any_number_of_threads() {
+    fn the_left_side_of_a_split_comes_first_for_any_threads() {
         let isa = Isa::best();
         for (count, skew) in
             [(3, 1), (PIECE, 2), (3 * PIECE + 17, 1), (11 * PIECE - 5, 5), (40 * PIECE + 1, 3)]
         {
-            // All over, in an order that has nothing to do with where they are.
+            // Scattered, in an order unrelated to their positions.
             let boxed = |i: usize| {
                 let place = |factor: usize| ((i * factor + 7) % 1009) as f32 / 1009.0;
                 let low = [place(389).powi(skew), 0.3 * place(611), 0.2 * place(127)];
@@ -107,12 +107,12 @@ mod tests {
             let [mut alone, mut shared] = [primitives.clone(), primitives];
             part(isa, &mut alone, &split, false);
             part(isa, &mut shared, &split, true);
-            let names = |list: &[Primitive]| list.iter().map(Bounds::second).collect::<Vec<_>>();
-            assert_eq!(names(&alone), names(&shared));
+            let ids = |list: &[Primitive]| list.iter().map(Bounds::second).collect::<Vec<_>>();
+            assert_eq!(ids(&alone), ids(&shared));
             assert!(0 < split.left && split.left < count);
             assert!(alone[..split.left].iter().all(|primitive| split.is_left(primitive)));
             assert!(!alone[split.left..].iter().any(|primitive| split.is_left(primitive)));
-            let mut all = names(&alone);
+            let mut all = ids(&alone);
             all.sort_unstable();
             assert!(all.into_iter().eq(0..count as u32));
         }

@@ -1,4 +1,4 @@
-//! Primitives on their way into the tree: 32 bytes each.
+//! Primitives during the build: 32 bytes each.
 
 use bytemuck::{Pod, Zeroable};
 use lumbre_geometry::Aabb;
@@ -6,7 +6,7 @@ use lumbre_geometry::Aabb;
 use crate::intersect::Simd;
 use crate::tree::node::{Node, TreeSpace, round_up};
 
-/// The kind of a primitive. A leaf holds one kind, triangles of one mesh, and spheres of one cloud.
+/// The kind of a primitive. A leaf holds one kind: triangles of one mesh, spheres of one cloud.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub(crate) enum Kind {
@@ -24,8 +24,8 @@ impl Kind {
         matches!(self, Self::Triangle | Self::Sphere)
     }
 
-    /// Kinds of different ranks have trees of their own, joined at the root; those of the last rank, which are the packed ones, are
-    /// the soonest asked.
+    /// Kinds of different ranks have trees of their own, joined at the root. The last rank has the packed kinds, which
+    /// are tested first.
     pub(crate) fn rank(self) -> usize {
         match self {
             Self::Instance => 0,
@@ -34,40 +34,40 @@ impl Kind {
         }
     }
 
-    /// How many ranks there are.
+    /// Number of ranks.
     pub(crate) const RANKS: usize = 3;
 }
 
-/// What the build must know of a geometry: the kind of its primitives, and what a test of one costs.
+/// What the build needs to know of a geometry: the kind of its primitives and the cost of a test.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Traits {
     pub(crate) kind: Kind,
-    /// In sixteenths of what a node costs: whole numbers, so that sums do not depend on their order.
+    /// In sixteenths of a node's cost. Integers, so that sums do not depend on their order.
     pub(crate) cost: u32,
-    /// How many of its kind a leaf may hold.
+    /// Maximum primitives of this kind in a leaf.
     pub(crate) most: usize,
 }
 
 impl Traits {
-    /// What a test of a triangle or a sphere costs.
+    /// The cost of testing a triangle or a sphere.
     pub(crate) const COST_OF_PACKED: u32 = 4;
 }
 
-/// Numbers of the fixed-point coordinates in a tree unit. Twice a centre, less another such, still fits.
+/// Fixed-point steps per tree unit. Twice a centre minus another such number still fits an `i32`.
 pub(crate) const ONE: f64 = (1 << 28) as f64;
 
-/// A box in tree units with two names: of a primitive, those of its geometry and of itself in it.
+/// A box in tree units with two ids: for a primitive, its geometry and its index there.
 ///
-/// Eight whole numbers that grow by one vector operation: the lower corner and the first name, the upper corner negated and
-/// the second name. The corners' resolution of 2^-28 is well below what the test of boxes can tell (see `node`). They are
-/// rounded in any way by up to 2^-24 of themselves; they are widened when they become planes of a node.
+/// Eight integers that one vector operation can grow: the lower corner and the first id, the upper corner negated and
+/// the second id. The resolution of 2^-28 is well below that of the box test (see `node`). Coordinates have a relative
+/// rounding error of up to 2^-24 in either direction; the planes of a node are widened by that.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub(crate) struct Bounds {
     lanes: [i32; 8],
 }
 
-/// A box with the names of what is in it.
+/// A box with the ids of its contents.
 pub(crate) type Primitive = Bounds;
 
 const FIRST: usize = 3;
@@ -86,7 +86,7 @@ impl Bounds {
         Self { lanes: [low[0], low[1], low[2], first as i32, -high[0], -high[1], -high[2], second as i32] }
     }
 
-    /// From the lower corner and the upper one negated, in tree units; there are no names behind them yet.
+    /// From the lower corner and the negated upper corner in tree units; ids are zero.
     #[inline(always)]
     pub(crate) fn of_lanes<L: Simd>(mut numbers: [f32; 8]) -> Self {
         for number in &mut numbers {
@@ -95,13 +95,13 @@ impl Bounds {
         Self { lanes: L::truncated(&numbers) }
     }
 
-    /// What is in both; without a size where that is nothing.
+    /// The intersection; of negative size if it is empty.
     #[inline(always)]
     pub(crate) fn common(&self, other: &Self) -> Self {
         Self { lanes: std::array::from_fn(|lane| self.lanes[lane].max(other.lanes[lane])) }
     }
 
-    /// The nearest one to a box in space.
+    /// The box nearest to a box in space.
     #[inline]
     pub(crate) fn near(tree_space: &TreeSpace, bounds: &Aabb, first: u32, second: u32) -> Self {
         let low = (bounds.min - tree_space.origin) * tree_space.scale;
@@ -110,37 +110,37 @@ impl Bounds {
     }
 
     #[inline(always)]
-    pub(crate) fn with_names(mut self, first: u32, second: u32) -> Self {
+    pub(crate) fn with_ids(mut self, first: u32, second: u32) -> Self {
         self.lanes[FIRST] = first as i32;
         self.lanes[SECOND] = second as i32;
         self
     }
 
-    /// Of a primitive, its geometry.
+    /// The geometry of a primitive.
     #[inline(always)]
     pub(crate) fn first(&self) -> u32 {
         self.lanes[FIRST] as u32
     }
 
-    /// Of a primitive, which of its geometry.
+    /// The index of a primitive in its geometry.
     #[inline(always)]
     pub(crate) fn second(&self) -> u32 {
         self.lanes[SECOND] as u32
     }
 
-    /// The lower plane on an axis, moved outward by what rounding may have moved it inward.
+    /// The lower plane on an axis, moved outward by the possible rounding error.
     #[inline]
     pub(crate) fn low_plane(&self, axis: usize) -> f32 {
         -Self::outward(-self.lanes[axis])
     }
 
-    /// The upper plane on an axis.
+    /// The upper plane on an axis, likewise.
     #[inline]
     pub(crate) fn high_plane(&self, axis: usize) -> f32 {
         Self::outward(-self.lanes[axis + 4])
     }
 
-    /// Makes it the box of a node's child.
+    /// Writes the box as that of a node's child.
     #[inline]
     pub(crate) fn put(&self, node: &mut Node, lane: usize) {
         for axis in 0..3 {
@@ -149,8 +149,7 @@ impl Bounds {
         }
     }
 
-    /// One that has these planes, which are those of another; empty where they are inside out, or beyond all coordinates, as no box
-    /// has them.
+    /// The box with these planes, read back from a node; empty if they are inverted or beyond all coordinates.
     pub(crate) fn of_planes(low: [f32; 3], high: [f32; 3]) -> Self {
         const BEYOND: f32 = (Bounds::EMPTY_LANE as f64 / ONE) as f32;
         if !(0..3).all(|axis| -BEYOND < low[axis] && low[axis] <= high[axis] && high[axis] < BEYOND) {
@@ -165,7 +164,7 @@ impl Bounds {
         round_up((x + x.abs() * f64::from(f32::EPSILON) + 2.0) / ONE)
     }
 
-    /// One that comes to lie there.
+    /// The coordinate that becomes this plane.
     fn inward(plane: f32) -> i32 {
         let near = f64::from(plane.next_down()) * ONE;
         let mut x = (near - near.abs() * f64::from(f32::EPSILON) - 2.0).round() as i32;
@@ -178,13 +177,13 @@ impl Bounds {
         x
     }
 
-    /// Twice where it begins and ends on an axis; of an empty one, anywhere.
+    /// Twice the ends on an axis; arbitrary for an empty box.
     #[inline(always)]
     pub(crate) fn range2(&self, axis: usize) -> [i32; 2] {
         [self.lanes[axis].wrapping_mul(2), self.lanes[axis + 4].wrapping_mul(-2)]
     }
 
-    /// Takes another box in; the names are lost.
+    /// Grows to contain another box; loses the ids.
     #[inline(always)]
     pub(crate) fn grow(&mut self, other: &Self) {
         for lane in 0..8 {
@@ -192,7 +191,7 @@ impl Bounds {
         }
     }
 
-    /// Half the area, in squares of the fixed-point unit; 0 when empty.
+    /// Half the area, in squares of the fixed-point unit; 0 if empty.
     #[inline(always)]
     pub(crate) fn half_area(&self) -> f32 {
         let sizes: [f32; 4] = std::array::from_fn(|lane| {
@@ -203,7 +202,7 @@ impl Bounds {
         x * y + y * z + z * x
     }
 
-    /// Twice the middle, on each axis; the last lane means nothing.
+    /// Twice the middle on each axis; the last lane is unused.
     #[inline(always)]
     pub(crate) fn center2(&self) -> [i32; 4] {
         std::array::from_fn(|lane| self.lanes[lane].wrapping_sub(self.lanes[lane + 4]))

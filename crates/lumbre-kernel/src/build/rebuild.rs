@@ -1,13 +1,12 @@
-//! Putting what has moved together anew: a partial rebuild, which keeps the leaves of packed triangles and spheres.
+//! Partial rebuild after geometry has moved: keeps the leaves of packed triangles and spheres.
 //!
-//! What stands beside what in a block moves together as a rule, as neighbours on a surface do; what refits make worse is above:
-//! nodes over parts that went different ways. So the tree is built of leaves, where a build would take triangles, five to eight
-//! times as many, which it would have to pack as well. Shapes, instances and custom geometry go different ways one by one; their
-//! leaves are made anew.
+//! Neighbours in a block are usually neighbours on a surface and move together. Refits degrade the nodes above them,
+//! over parts that moved apart. So the rebuild takes whole leaves instead of triangles: five to eight times fewer, and
+//! without packing. Shapes, instances and custom geometry move independently; their leaves are made anew.
 
 use lumbre_geometry::Aabb;
 
-use crate::build::binary::{Grown, PARALLEL, binary_tree};
+use crate::build::binary::{GrownTree, PARALLEL, binary_tree};
 use crate::build::boxes::Boxes;
 use crate::build::collapse::{Relaid, lay_out};
 use crate::build::input::{self, take_apart};
@@ -26,7 +25,7 @@ pub(crate) fn rebuild_partially(tree: &mut Tree, options: &BuildOptions) -> f64 
     let mut best = cost(&tree.packed.nodes);
     let built_cost = *tree.built_cost.get_or_insert(best);
     let preset = options.preset;
-    let is_much = tree.packed.names.len() + tree.packed.entries.len() > PARALLEL;
+    let is_much = tree.packed.ids.len() + tree.packed.entries.len() > PARALLEL;
     let relaid =
         if is_much { rayon::scope(|_| over_leaves(tree, preset)) } else { over_leaves(tree, preset) };
     if let Some(Relaid { mut nodes, entries, root }) = relaid
@@ -42,12 +41,12 @@ pub(crate) fn rebuild_partially(tree: &mut Tree, options: &BuildOptions) -> f64 
     if built_cost > 0.0 { best / built_cost } else { 1.0 }
 }
 
-/// A tree of the leaves of another; `None` where there is nothing to put together, or more than a tree can name.
+/// A tree of another tree's leaves; `None` if there is nothing to rebuild, or if there are too many leaves.
 fn over_leaves(tree: &Tree, preset: Preset) -> Option<Relaid> {
     let Tree { geometries, packed, .. } = tree;
     packed.root.filter(|&root| tag::is_inner(root))?;
     let mut primitives = entries_of(tree)?;
-    // Every leaf is as a geometry of its own, behind the others, with one sphere in it.
+    // Each leaf becomes a geometry of one sphere, behind the other geometries.
     let mut traits: Vec<Traits> = geometries.iter().map(input::traits_of).collect();
     let first = traits.len();
     let mut leaves = Vec::new();
@@ -59,19 +58,19 @@ fn over_leaves(tree: &Tree, preset: Preset) -> Option<Relaid> {
                 _ => continue,
             };
             let plane = |side: usize| [0, 2, 4].map(|axis| node.planes[axis + side][lane]);
-            primitives.push(Bounds::of_planes(plane(0), plane(1)).with_names(traits.len() as u32, 0));
+            primitives.push(Bounds::of_planes(plane(0), plane(1)).with_ids(traits.len() as u32, 0));
             let cost = Traits::COST_OF_PACKED * (blocks * BLOCK) as u32;
             traits.push(Traits { kind: Kind::Sphere, cost, most: 1 });
             leaves.push(child);
         }
     }
     let nothing = &mut Boxes::empty(0);
-    let Grown { tree, names, instances } = binary_tree(Isa::best(), preset, primitives, nothing, &traits);
-    let layout = lay_out(&traits, &tree, &names, &instances).ok()?;
-    Some(layout.over_leaves(&names, |geometry| leaves[geometry as usize - first]))
+    let GrownTree { tree, ids, instances } = binary_tree(Isa::best(), preset, primitives, nothing, &traits);
+    let layout = lay_out(&traits, &tree, &ids, &instances).ok()?;
+    Some(layout.over_leaves(&ids, |geometry| leaves[geometry as usize - first]))
 }
 
-/// What stands in leaves of no packed kind, one by one; `None` where it does not fit the geometries.
+/// The contents of unpacked leaves as single primitives; `None` if they do not match the geometries.
 fn entries_of(tree: &Tree) -> Option<Vec<Primitive>> {
     let entries = &tree.packed.entries;
     if entries.is_empty() {
@@ -81,7 +80,7 @@ fn entries_of(tree: &Tree) -> Option<Vec<Primitive>> {
     let Places { boxes, .. } = check_places(tree, &parts).ok()?;
     let around = |(entry, bounds): (&Entry, Option<Aabb>)| {
         let bounds = bounds.map_or(Bounds::EMPTY, |bounds| Bounds::near(&tree.tree_space, &bounds, 0, 0));
-        bounds.with_names(entry.geometry, entry.primitive())
+        bounds.with_ids(entry.geometry, entry.primitive())
     };
     Some(entries.iter().zip(boxes).map(around).collect())
 }

@@ -1,4 +1,4 @@
-//! Moving what stands in a tree without building it again.
+//! Moves the contents of a tree without rebuilding it.
 
 use std::fmt;
 
@@ -19,29 +19,29 @@ use crate::tree::node::{Node, TreeSpace, tag};
 use crate::tree::packed::Entry;
 use crate::tree::packed::Start;
 use crate::tree::sphere_block::{SphereBlock, has_radius};
-use crate::tree::triangle_block::{BlockNames, Blocks};
+use crate::tree::triangle_block::{BlockIds, Blocks};
 use crate::tree::{Geometry, GeometryKind, Tree};
 
-/// Why a tree cannot be refitted. It is as it was before.
+/// Why a tree cannot be refitted. The tree stays unchanged.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum RefitError {
-    /// The geometries themselves are not sound.
+    /// The geometries themselves are invalid.
     Unsound(BuildError),
-    /// The list is not of the same length.
+    /// The list has another length.
     OtherLength {
-        /// How many geometries the tree has.
+        /// Number of the tree's geometries.
         expected: usize,
-        /// How many were given.
+        /// Number of geometries given.
         found: usize,
     },
-    /// A geometry is of another kind, or has another number of primitives.
+    /// A geometry has another kind, or another number of primitives.
     OtherTopology {
         /// Position of the geometry in the list.
         geometry: usize,
     },
-    /// Something that was left out of the tree when it was built (a triangle without area, a sphere without a radius, an empty
-    /// or an infinite primitive) would now stand in it, or something in it became infinite: the tree is to be built again.
+    /// Something that the build left out of the tree (a triangle without area, a sphere without a radius, an empty or
+    /// an infinite primitive) would now be in it, or something in it became infinite. The tree needs a new build.
     NeedsBuild {
         /// Position of the geometry in the list.
         geometry: usize,
@@ -105,23 +105,22 @@ pub(crate) fn refit(tree: &mut Tree, geometries: Vec<Geometry>) -> Result<f64, R
     Ok(if built_cost > 0.0 { cost / built_cost } else { 1.0 })
 }
 
-/// What the entries of a tree are now.
+/// The current places of a tree's entries.
 pub(crate) struct Places {
-    /// The box of each; `None` of what became empty.
+    /// The box of each; `None` if it became empty.
     pub(crate) boxes: Vec<Option<Aabb>>,
-    /// The entries of instances that were opened, and where these are entered.
+    /// The entries of opened instances, and where each enters.
     pub(crate) starts: Vec<(usize, Start)>,
 }
 
-/// Everything that can be hit is to have a place in the tree. Answers what the entries there are.
+/// Checks that everything that can be hit has an entry. Returns the places of the entries.
 pub(crate) fn check_places(tree: &Tree, parts: &Parts) -> Result<Places, RefitError> {
     check_triangles(tree, &tree.geometries)?;
     check_spheres(tree, &tree.geometries)?;
     entry_boxes(tree, parts)
 }
 
-/// Gives the nodes, spheres and entries of a tree what its geometries say, whose parts and places these are. Triangles are packed
-/// already.
+/// Updates the nodes, spheres and entries of a tree. Triangles are already packed.
 pub(crate) fn fit(tree: &mut Tree, parts: Parts, places: Places) {
     let Places { boxes, starts } = places;
     let geometries = &tree.geometries;
@@ -142,10 +141,10 @@ pub(crate) fn fit(tree: &mut Tree, parts: Parts, places: Places) {
         .sphere_blocks
         .to_mut()
         .par_iter_mut()
-        .zip(packed.sphere_names.par_iter())
+        .zip(packed.sphere_ids.par_iter())
         .with_min_len(256)
-        .map(|(block, names)| match &geometries[names.geometry as usize].kind {
-            GeometryKind::Spheres(cloud) => fill_sphere_block(block, names, cloud, &tree_space),
+        .map(|(block, ids)| match &geometries[ids.geometry as usize].kind {
+            GeometryKind::Spheres(cloud) => fill_sphere_block(block, ids, cloud, &tree_space),
             _ => Bounds::EMPTY,
         })
         .collect();
@@ -154,10 +153,10 @@ pub(crate) fn fit(tree: &mut Tree, parts: Parts, places: Places) {
         .map(|boxed| boxed.map_or(Bounds::EMPTY, |bounds| Bounds::near(&tree_space, &bounds, 0, 0)))
         .collect();
 
-    // What is in leaves, then what is above: children stand behind their parents.
+    // Leaves first, then the nodes above: children follow their parents.
     let mut node_boxes = vec![Bounds::EMPTY; packed.nodes.len()];
     let (nodes, blocks) = (packed.nodes.to_mut(), Blocks::new(&packed.blocks));
-    let (names, entries) = (&*packed.names, &*packed.entries);
+    let (ids, entries) = (&*packed.ids, &*packed.entries);
     nodes.par_iter_mut().zip(&mut node_boxes).with_min_len(64).for_each(|(node, whole)| {
         for lane in 0..node.len() {
             let child = node.children[lane];
@@ -167,8 +166,8 @@ pub(crate) fn fit(tree: &mut Tree, parts: Parts, places: Places) {
                 tag::INNER => continue,
                 tag::TRIANGLES => {
                     for block in blocks.leaf(child) {
-                        let names = &names[block.number() as usize];
-                        if let Some(boxer) = &boxers[names.geometry as usize] {
+                        let ids = &ids[block.number() as usize];
+                        if let Some(boxer) = &boxers[ids.geometry as usize] {
                             around.grow(&boxer.around_all::<Portable>(block.triangles()));
                         }
                     }
@@ -225,7 +224,7 @@ fn is_same_topology(old: &GeometryKind, new: &GeometryKind) -> bool {
     }
 }
 
-/// What is infinite is to be the same as before.
+/// Checks that the same geometries are infinite as before.
 fn check_infinite(tree: &Tree, parts: &Parts) -> Result<(), RefitError> {
     let name = |entry: &Entry| (entry.geometry, entry.primitive());
     let (mut old, mut new) = (tree.infinite.iter().map(name), parts.infinite.iter().map(name));
@@ -244,12 +243,12 @@ fn check_infinite(tree: &Tree, parts: &Parts) -> Result<(), RefitError> {
     }
 }
 
-/// Every triangle that has an area is to have a place in the tree.
+/// Checks that every triangle with an area is in the tree.
 fn check_triangles(tree: &Tree, geometries: &[Geometry]) -> Result<(), RefitError> {
     let mut named = vec![0; geometries.len()];
-    for names in &tree.packed.names {
-        let count = names.primitives.iter().filter(|&&primitive| primitive != u32::MAX).count();
-        named[names.geometry as usize] += count;
+    for ids in &tree.packed.ids {
+        let count = ids.primitives.iter().filter(|&&primitive| primitive != u32::MAX).count();
+        named[ids.geometry as usize] += count;
     }
     for (geometry, standing) in geometries.iter().enumerate() {
         let GeometryKind::Mesh(mesh) = &standing.kind else { continue };
@@ -257,8 +256,8 @@ fn check_triangles(tree: &Tree, geometries: &[Geometry]) -> Result<(), RefitErro
             continue;
         }
         let mut has_place = vec![false; mesh.indices.len()];
-        for names in tree.packed.names.iter().filter(|names| names.geometry as usize == geometry) {
-            for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX) {
+        for ids in tree.packed.ids.iter().filter(|ids| ids.geometry as usize == geometry) {
+            for &primitive in ids.primitives.iter().filter(|&&primitive| primitive != u32::MAX) {
                 has_place[primitive as usize] = true;
             }
         }
@@ -273,7 +272,7 @@ fn check_triangles(tree: &Tree, geometries: &[Geometry]) -> Result<(), RefitErro
     Ok(())
 }
 
-/// Every sphere that has a radius is to have a place in the tree.
+/// Checks that every sphere with a radius is in the tree.
 fn check_spheres(tree: &Tree, geometries: &[Geometry]) -> Result<(), RefitError> {
     let is_cloud = |geometry: &Geometry| matches!(geometry.kind, GeometryKind::Spheres(_));
     if !geometries.iter().any(is_cloud) {
@@ -286,9 +285,9 @@ fn check_spheres(tree: &Tree, geometries: &[Geometry]) -> Result<(), RefitError>
             _ => Vec::new(),
         })
         .collect();
-    for names in &tree.packed.sphere_names {
-        for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX) {
-            has_place[names.geometry as usize][primitive as usize] = true;
+    for ids in &tree.packed.sphere_ids {
+        for &primitive in ids.primitives.iter().filter(|&&primitive| primitive != u32::MAX) {
+            has_place[ids.geometry as usize][primitive as usize] = true;
         }
     }
     for (geometry, standing) in geometries.iter().enumerate() {
@@ -301,10 +300,10 @@ fn check_spheres(tree: &Tree, geometries: &[Geometry]) -> Result<(), RefitError>
     Ok(())
 }
 
-/// What the entries in the tree are now.
+/// The current places of the tree's entries.
 fn entry_boxes(tree: &Tree, parts: &Parts) -> Result<Places, RefitError> {
     let (entries, geometries) = (&*tree.packed.entries, &tree.geometries);
-    // In the order of their names, as they were taken apart.
+    // Sorted by id, as they were taken apart.
     let mut has_place = vec![false; parts.boxed.len()];
     let mut boxes: Vec<Option<Aabb>> = entries
         .iter()
@@ -339,15 +338,15 @@ fn entry_boxes(tree: &Tree, parts: &Parts) -> Result<Places, RefitError> {
     Ok(Places { boxes, starts })
 }
 
-/// Takes the spheres over; one without a radius becomes one that is never hit.
+/// Updates the spheres of a block; one without a radius becomes one that is never hit.
 fn fill_sphere_block(
     block: &mut SphereBlock,
-    names: &BlockNames,
+    ids: &BlockIds,
     cloud: &SphereCloud,
     tree_space: &TreeSpace,
 ) -> Bounds {
     let mut around = Bounds::EMPTY;
-    for (lane, &primitive) in names.primitives.iter().enumerate() {
+    for (lane, &primitive) in ids.primitives.iter().enumerate() {
         if primitive == u32::MAX {
             continue;
         }
@@ -362,7 +361,7 @@ fn fill_sphere_block(
     around
 }
 
-/// How many boxes a ray meets, about: the areas of all, as parts of the area of the whole.
+/// Approximate number of boxes that a ray meets: the sum of their areas over the area of the whole.
 pub(crate) fn cost(nodes: &[Node]) -> f64 {
     let area = |node: &Node, lane: usize| {
         let size =

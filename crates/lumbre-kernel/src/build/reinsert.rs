@@ -1,8 +1,8 @@
-//! Making a binary tree better: subtrees are taken out and put in where the sum of all areas becomes least.
+//! Improves a binary tree by moving subtrees to where the sum of all areas becomes least.
 //!
-//! D. Meister, J. Bittner, "Parallel Reinsertion for Bounding Volume Hierarchy Optimization", Computer Graphics Forum 37(2),
-//! 2018. Places are sought for many subtrees at once; of those that would touch the same nodes, the one that gains most
-//! moves, the earlier of equals, so that the result does not depend on threads.
+//! D. Meister, J. Bittner, "Parallel Reinsertion for Bounding Volume Hierarchy Optimization", Computer Graphics Forum
+//! 37(2), 2018. Places are searched for many subtrees at once. If several moves would touch the same nodes, the one
+//! with the largest gain wins, and the first of equals, so that the result does not depend on threads.
 
 use rayon::prelude::*;
 
@@ -12,23 +12,23 @@ use crate::build::primitive::Bounds;
 use crate::intersect::{Dispatch, Isa, Simd};
 use crate::simd;
 
-/// How often places are sought at most.
+/// Maximum rounds.
 const ROUNDS: usize = 8;
-/// No more where a round gains less than this share of all areas. As upper nodes have been moved before (see `treelet`), most trees
-/// come to that in one round or two. With a thousandth, whole builds took up to 1.25 times as long, and rays gained nothing that could
-/// be measured.
-const LEAST_GAIN: f64 = 0.015;
-/// Of how many nodes one is considered in a round, by area. With one of two, whole builds took up to 1.7 times as long, and rays
-/// gained nothing that could be measured.
+/// Stops after a round that gains less than this share of all areas. Upper nodes have been moved before (see
+/// `treelet`), so most trees stop after one or two rounds. With a thousandth, whole builds took up to 1.25 times as
+/// long, without a measurable gain for rays.
+const MIN_GAIN: f64 = 0.015;
+/// One node in this many is considered in each round, the largest first. With one in two, whole builds took up to 1.7
+/// times as long, without a measurable gain for rays.
 const SHARE: usize = 8;
-/// Trees that become deeper are given up: recursions below rely on it.
+/// Discards a result deeper than this: recursions below rely on the bound.
 pub(crate) const DEEPEST: u32 = 200;
-/// How many places are looked at for one subtree at most.
-const MOST_PLACES: usize = 4096;
+/// Maximum places searched for one subtree.
+const MAX_PLACES: usize = 4096;
 
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// A node with links both ways.
+/// A node with links to its parent and children.
 #[derive(Clone, Copy)]
 pub(crate) struct Node {
     bounds: Bounds,
@@ -39,7 +39,7 @@ pub(crate) struct Node {
 }
 
 impl Node {
-    /// Without children.
+    /// A node without children.
     pub(crate) fn closed(bounds: &Bounds, parent: u32) -> Self {
         Self { bounds: *bounds, area: bounds.half_area(), parent, children: [NONE; 2] }
     }
@@ -50,7 +50,7 @@ pub(crate) struct Tree {
     pub(crate) nodes: Vec<Node>,
 }
 
-/// A subtree that would be better elsewhere.
+/// A move that would improve the tree.
 #[derive(Clone, Copy)]
 struct Move {
     from: u32,
@@ -58,18 +58,18 @@ struct Move {
     gain: f32,
 }
 
-/// A better tree over the same leaves, or the same one.
+/// An improved tree over the same leaves, or the same tree.
 pub(crate) fn reinsert(tree: Binary<'_>) -> Binary<'_> {
     let mut linked = Tree::of(&tree);
     if linked.nodes.len() < 8 {
         return tree;
     }
     let all = linked.inner_area();
-    linked.rounds(ROUNDS, SHARE, LEAST_GAIN * all);
+    linked.rounds(ROUNDS, SHARE, MIN_GAIN * all);
     linked.to_binary().unwrap_or(tree)
 }
 
-/// Seeks where a subtree is best put.
+/// Searches the best place for a subtree.
 struct Seek<'a> {
     tree: &'a Tree,
     from: u32,
@@ -91,19 +91,19 @@ impl Tree {
         let mut pending = vec![(tree, NONE)];
         while let Some((tree, parent)) = pending.pop() {
             match tree {
-                Binary::Fork(fork) => {
+                Binary::InnerNode(inner) => {
                     let place = nodes.len() as u32;
-                    nodes.push(Node::closed(&fork.bounds, parent));
+                    nodes.push(Node::closed(&inner.bounds, parent));
                     Self::link(&mut nodes, parent, place);
-                    pending.extend(fork.children.iter().rev().map(|child| (child, place)));
+                    pending.extend(inner.children.iter().rev().map(|child| (child, place)));
                 }
-                Binary::Twig(twig) => {
+                Binary::Subtree(subtree) => {
                     let start = nodes.len() as u32;
-                    nodes.extend(twig.nodes.iter().map(|node| Node::closed(node.bounds(), NONE)));
+                    nodes.extend(subtree.nodes.iter().map(|node| Node::closed(node.bounds(), NONE)));
                     nodes[start as usize].parent = parent;
                     Self::link(&mut nodes, parent, start);
-                    for (i, node) in twig.nodes.iter().enumerate() {
-                        if node.names().is_none() {
+                    for (i, node) in subtree.nodes.iter().enumerate() {
+                        if node.ids().is_none() {
                             let place = start + i as u32;
                             let children = [place + 1, place + node.right() as u32];
                             nodes[place as usize].children = children;
@@ -118,7 +118,7 @@ impl Tree {
         Self { nodes }
     }
 
-    /// Left children come first, since they are taken first from the stack.
+    /// The left child comes first: the stack returns it first.
     fn link(nodes: &mut [Node], parent: u32, child: u32) {
         if parent != NONE {
             let children = &mut nodes[parent as usize].children;
@@ -141,17 +141,17 @@ impl Tree {
         if left == place { right } else { left }
     }
 
-    /// Those of an inner node.
+    /// The children of an inner node.
     pub(crate) fn children(&self, place: u32) -> Option<[u32; 2]> {
         (!self.is_leaf(place)).then(|| self.node(place).children)
     }
 
-    /// The areas of all inner nodes together.
+    /// The summed areas of all inner nodes.
     pub(crate) fn inner_area(&self) -> f64 {
         self.nodes.iter().filter(|node| node.children[0] != NONE).map(|node| f64::from(node.area)).sum()
     }
 
-    /// So many rounds at most, up to the first that gains no more than `least`.
+    /// Runs at most `most` rounds; stops after one that gains at most `least`.
     pub(crate) fn rounds(&mut self, most: usize, share: usize, least: f64) {
         for _ in 0..most {
             if self.round(share) <= least {
@@ -160,14 +160,14 @@ impl Tree {
         }
     }
 
-    /// Seeks places for one of so many nodes and moves; returns how much area was gained.
+    /// Searches a better place for one in `share` nodes and moves them; returns the gained area.
     pub(crate) fn round(&mut self, share: usize) -> f64 {
         self.moves(share).into_iter().map(f64::from).sum()
     }
 
-    /// The same; returns how much each move gained.
+    /// As [`Self::round`]; returns the gain of each move.
     fn moves(&mut self, share: usize) -> Vec<f32> {
-        // The largest ones, of those that have a grandparent.
+        // The largest nodes that have a grandparent.
         let mut candidates: Vec<u32> =
             (1..self.nodes.len() as u32).filter(|&place| self.node(place).parent != 0).collect();
         let count = (candidates.len() / share).max(candidates.len().min(64));
@@ -197,14 +197,14 @@ impl Tree {
         gains
     }
 
-    /// Where a subtree is best put: beside which node. Nodes are looked at from the near to the far, and not below where
-    /// even a place without cost would gain less than the best one so far.
+    /// The best new sibling for a subtree. Nodes are searched from near to far. The search skips a node if even a place
+    /// at no cost below it would gain less than the best place so far.
     #[inline(always)]
     fn best_move(&self, from: u32, stack: &mut Vec<(f32, u32)>) -> Option<Move> {
         let own = *self.node(from);
         let parent = own.parent;
         let mut best = Move { from, to: NONE, gain: 0.0 };
-        // What is gained by taking it out, as far up as the pivot.
+        // The area gained by removing it, up to the pivot.
         let mut freed = self.node(parent).area;
         let mut pivot = parent;
         let mut rest = self.node(self.sibling(from)).bounds;
@@ -214,7 +214,7 @@ impl Tree {
             stack.clear();
             stack.push((freed, beside));
             while let Some((gain, place)) = stack.pop() {
-                if gain - own.area <= best.gain || places > MOST_PLACES {
+                if gain - own.area <= best.gain || places > MAX_PLACES {
                     continue;
                 }
                 places += 1;
@@ -243,12 +243,11 @@ impl Tree {
             pivot = self.node(pivot).parent;
         }
         let stays = best.to == NONE || best.to == parent || best.to == self.sibling(from);
-        // Rounding must not make trees go round in circles.
+        // Rounding must not make trees cycle.
         (!stays && best.gain > 1e-5 * own.area).then_some(best)
     }
 
-    /// Takes a subtree out, whose parent's place goes to its sibling, and puts it beside `to` under the node that became
-    /// free.
+    /// Removes a subtree, replaces its parent by its sibling, and inserts it next to `to` under the freed node.
     fn reinsert(&mut self, from: u32, to: u32) {
         let free = self.node(from).parent;
         let sibling = self.sibling(from);
@@ -280,7 +279,7 @@ impl Tree {
         }
     }
 
-    /// The nodes in the order of a walk, children after parents; `None` where it is deeper than that.
+    /// The nodes in depth-first order, parents first; `None` if the tree is deeper than `deepest`.
     pub(crate) fn order(&self, deepest: u32) -> Option<Vec<u32>> {
         let mut order = Vec::with_capacity(self.nodes.len());
         let mut pending = vec![(0, 0)];
@@ -296,9 +295,9 @@ impl Tree {
         Some(order)
     }
 
-    /// Back; `None` where it became too deep.
+    /// Converts back; `None` if the tree became too deep.
     fn to_binary(&self) -> Option<Binary<'static>> {
-        // From the end, how many nodes are under each.
+        // From the end: the number of nodes below each.
         let order = self.order(DEEPEST)?;
         let mut sizes = vec![1_u32; self.nodes.len()];
         for &place in order.iter().rev() {
@@ -310,7 +309,7 @@ impl Tree {
         Some(self.part(0, &sizes))
     }
 
-    /// The depth of its recursion is that of the tree.
+    /// The recursion is as deep as the tree.
     fn part(&self, root: u32, sizes: &[u32]) -> Binary<'static> {
         if sizes[root as usize] > 1024 {
             let [left, right] = self.node(root).children;
@@ -329,7 +328,7 @@ impl Tree {
             nodes.push(BinaryNode::inner(&node.bounds, 1 + sizes[left as usize] as usize));
             pending.extend([right, left]);
         }
-        Binary::twig(nodes)
+        Binary::subtree(nodes)
     }
 }
 
@@ -343,7 +342,7 @@ mod tests {
 
     #[test]
     fn leaves_that_were_put_apart_come_together() {
-        // Eight pairs of near boxes, of which the halves were put into two trees.
+        // Eight pairs of near boxes, whose halves are in two different trees.
         let size = |i: usize| [0.05 * i as f32 - 0.3, 0.02 * (i % 3) as f32, 0.1];
         let nodes = |shift: f32| {
             // A comb: each inner node has a leaf on its left.
@@ -358,9 +357,9 @@ mod tests {
             }
             nodes
         };
-        let tree = Binary::over([Binary::twig(nodes(0.002)), Binary::twig(nodes(0.004))]);
+        let tree = Binary::over([Binary::subtree(nodes(0.002)), Binary::subtree(nodes(0.004))]);
         let mut before = Tree::of(&tree);
-        // The boxes of inner nodes as they are.
+        // Recomputes the boxes of inner nodes.
         for place in (0..before.nodes.len() as u32).rev() {
             if !before.is_leaf(place) {
                 before.refit_from(place);
@@ -374,7 +373,7 @@ mod tests {
         let gained: f64 = gains.into_iter().map(f64::from).sum();
         let rest = before.inner_area();
         assert!(rest < 0.6 * sum, "{rest} of {sum}");
-        // Gains are reckoned as if nothing else moved meanwhile.
+        // Gains are computed as if nothing else moved meanwhile.
         let lost = sum - rest;
         assert!((gained - lost).abs() < 0.1 * lost, "{gained}, and it is {lost}");
         let after = Tree::of(&before.to_binary().expect("not deep"));
@@ -382,7 +381,7 @@ mod tests {
         let leaves_after: f32 =
             after.nodes.iter().filter(|node| node.children[0] == NONE).map(|node| node.area).sum();
         assert!((leaves_after - leaves).abs() < 1e-3 * leaves);
-        // Every box holds its children's.
+        // Every box contains its children's.
         for node in after.nodes.iter().filter(|node| node.children[0] != NONE) {
             for child in node.children {
                 let mut joined = node.bounds;

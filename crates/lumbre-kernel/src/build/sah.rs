@@ -1,20 +1,20 @@
-//! Bins: which split of many primitives is cheapest, and doing it.
+//! SAH bins: finds the cheapest split and performs it.
 //!
 //! I. Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", IEEE Symposium on Interactive Ray Tracing,
-//! 2007. Differing from it, the range of a side's centres is not measured but taken to be what is left of the parent's
-//! range, within the side's box; only where bins show that this is much too wide, it is measured.
+//! 2007. Unlike there, the range of a side's centres is not measured: it is the rest of the parent's range, cut to the
+//! side's box. Only if the bins show that this is much too wide, it is measured.
 
 use crate::build::primitive::{Bounds, Primitive, Traits};
 use crate::intersect::{Dispatch, Simd};
 use crate::tree::BLOCK;
 
 /// Bins on an axis: a power of two.
-const MOST_BINS: usize = 16;
-/// Of nodes with fewer primitives, for which looking at all bins takes longer than filling them.
+const MAX_BINS: usize = 16;
+/// Bins for nodes with few primitives, where evaluating all bins takes longer than filling them.
 const FEWER_BINS: usize = 8;
 const FEWER_BELOW: usize = 64;
 
-/// Where twice the centres of primitives may lie.
+/// The range of twice the primitives' centres.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Centers {
     low: [i32; 4],
@@ -59,7 +59,7 @@ impl Centers {
     }
 }
 
-/// What turns a centre into a bin. A centre out of the range goes to some bin, always the same.
+/// Maps a centre to its bin. A centre outside the range goes to some bin, always the same.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Binning {
     start: [i32; 4],
@@ -69,7 +69,7 @@ pub(crate) struct Binning {
 
 impl Binning {
     pub(crate) fn new(centers: &Centers, count: usize) -> Self {
-        let bins = if count < FEWER_BELOW { FEWER_BINS } else { MOST_BINS };
+        let bins = if count < FEWER_BELOW { FEWER_BINS } else { MAX_BINS };
         let mut binning = Self { start: centers.low, factor: [0.0; 4], bins };
         for axis in 0..3 {
             let size = centers.high[axis].wrapping_sub(centers.low[axis]);
@@ -81,21 +81,21 @@ impl Binning {
         binning
     }
 
-    // Adding 2^23 leaves a whole number in the last bits, rounded to nearest.
+    // Adding 2^23 leaves an integer in the low bits, rounded to nearest.
     #[inline(always)]
     fn bin_of(center2: i32, start: i32, factor: f32) -> usize {
         let place = center2.wrapping_sub(start) as f32 * factor;
-        (place + 8_388_608.0).to_bits() as usize % MOST_BINS
+        (place + 8_388_608.0).to_bits() as usize % MAX_BINS
     }
 
-    // The last lane comes along only so that there are four.
+    // The last lane only fills the vector.
     #[inline(always)]
     fn bins(&self, primitive: &Primitive) -> [u32; 4] {
         let center2 = primitive.center2();
         std::array::from_fn(|lane| Self::bin_of(center2[lane], self.start[lane], self.factor[lane]) as u32)
     }
 
-    /// The same of eight, found by vectors.
+    /// [`Self::bins`] for eight centres in vectors.
     #[inline(always)]
     fn bins_of_eight(&self, eight: &[Primitive; 8]) -> [[u32; 4]; 8] {
         let mut places = [[0; 4]; 8];
@@ -110,37 +110,37 @@ impl Binning {
         Self::bin_of(primitive.center2_on(axis), self.start[axis], self.factor[axis]) < bin
     }
 
-    /// Where the range of a bin begins, give or take a hundredth of it.
+    /// The lower end of a bin's range, give or take a hundredth of it.
     fn edge(&self, axis: usize, bin: usize, margin: f64) -> i32 {
         let place = (bin as f64 - 0.5 + margin) / f64::from(self.factor[axis]);
         (f64::from(self.start[axis]) + place) as i32
     }
 }
 
-/// From how many primitives on they are tallied in two rows.
+/// Uses two rows at or above this many primitives.
 const TWO_ROWS_FROM: usize = 32;
 
-/// What the bins of a node hold.
+/// The contents of a node's bins.
 #[derive(Clone)]
 pub(crate) struct Bins {
-    /// The first has all once they are filled. Where there are two, primitives go to them by turns: neighbours mostly share bins, and
-    /// what grew just now would be waited for.
+    /// The first row has the total once the bins are filled. With two rows, primitives alternate between them:
+    /// neighbours mostly share a bin, and growing the same one again would wait for the last result.
     tallies: [Tally; 2],
 }
 
-/// What some of the primitives of a node put into its bins.
+/// The contents of one row of bins.
 #[derive(Clone)]
 struct Tally {
-    bounds: [[Bounds; MOST_BINS]; 3],
-    counts: [[u32; MOST_BINS]; 3],
-    costs: [[u32; MOST_BINS]; 3],
+    bounds: [[Bounds; MAX_BINS]; 3],
+    counts: [[u32; MAX_BINS]; 3],
+    costs: [[u32; MAX_BINS]; 3],
 }
 
 impl Tally {
     const EMPTY: Self = Self {
-        bounds: [[Bounds::EMPTY; MOST_BINS]; 3],
-        counts: [[0; MOST_BINS]; 3],
-        costs: [[0; MOST_BINS]; 3],
+        bounds: [[Bounds::EMPTY; MAX_BINS]; 3],
+        counts: [[0; MAX_BINS]; 3],
+        costs: [[0; MAX_BINS]; 3],
     };
 
     #[inline(always)]
@@ -156,7 +156,7 @@ impl Tally {
     fn add<const COSTS: bool>(&mut self, bins: &[u32; 4], primitive: &Primitive, traits: &[Traits]) {
         let cost = if COSTS { traits[primitive.first() as usize].cost } else { 0 };
         for (axis, &bin) in bins[..3].iter().enumerate() {
-            let bin = bin as usize % MOST_BINS;
+            let bin = bin as usize % MAX_BINS;
             self.bounds[axis][bin].grow(primitive);
             self.counts[axis][bin] += 1;
             if COSTS {
@@ -181,10 +181,10 @@ impl Bins {
     pub(crate) const EMPTY: Self = Self { tallies: [Tally::EMPTY, Tally::EMPTY] };
 
     pub(crate) fn join(&mut self, other: &Self) {
-        self.tallies[0].join(&other.tallies[0], MOST_BINS);
+        self.tallies[0].join(&other.tallies[0], MAX_BINS);
     }
 
-    /// Tallies primitives in so many rows.
+    /// Tallies primitives in this many rows.
     #[inline(always)]
     fn fill<const ROWS: usize, const COSTS: bool>(
         &mut self,
@@ -221,14 +221,14 @@ pub(crate) struct Split {
     pub(crate) bin: usize,
     /// Primitives on the left.
     pub(crate) left: usize,
-    /// Where the centres of both sides may lie.
+    /// The range of the centres on each side.
     centers: [Centers; 2],
-    /// How many bins the centres occupy, on the axis where they occupy most.
+    /// Bins that the centres occupy, on the axis where they occupy most.
     pub(crate) spread: usize,
 }
 
 impl Split {
-    /// How a side is binned next.
+    /// The binning of a side.
     pub(crate) fn next(&self, side: usize, count: usize) -> Binning {
         Binning::new(&self.centers[side], count)
     }
@@ -239,13 +239,13 @@ impl Split {
     }
 }
 
-/// Whether costs are of triangles alone, by blocks, or of anything, by what each says.
+/// Whether to sum the costs of single primitives; otherwise all are equal, and blocks count.
 #[inline(always)]
 fn cost_of<const COSTS: bool>(count: u32, cost: u32) -> f32 {
     if COSTS { cost as f32 } else { count.div_ceil(BLOCK as u32) as f32 }
 }
 
-/// The cheapest split; `None` where all centres are in one bin on each axis.
+/// Finds the cheapest split; `None` if all centres are in one bin on each axis.
 pub(crate) struct BestSplit<'a, const COSTS: bool> {
     pub(crate) bins: &'a Bins,
     pub(crate) binning: Binning,
@@ -268,20 +268,20 @@ impl<const COSTS: bool> Dispatch for BestSplit<'_, COSTS> {
             *occupied = (low, high);
             spread = spread.max(high - low + 1);
 
-            let mut right_costs = [0.0; MOST_BINS];
+            let mut right_costs = [0.0; MAX_BINS];
             let (mut right, mut count, mut cost) = (Bounds::EMPTY, 0, 0);
             for bin in (low + 1..=high).rev() {
                 right.grow(&bounds[bin]);
                 count += counts[bin];
                 cost += costs[bin];
-                right_costs[bin % MOST_BINS] = right.half_area() * cost_of::<COSTS>(count, cost);
+                right_costs[bin % MAX_BINS] = right.half_area() * cost_of::<COSTS>(count, cost);
             }
             let (mut left, mut count, mut cost) = (Bounds::EMPTY, 0, 0);
             for bin in low + 1..=high {
                 left.grow(&bounds[bin - 1]);
                 count += counts[bin - 1];
                 cost += costs[bin - 1];
-                let both = left.half_area() * cost_of::<COSTS>(count, cost) + right_costs[bin % MOST_BINS];
+                let both = left.half_area() * cost_of::<COSTS>(count, cost) + right_costs[bin % MAX_BINS];
                 if both < best.0 {
                     best = (both, axis, bin);
                 }
@@ -297,7 +297,7 @@ impl<const COSTS: bool> Dispatch for BestSplit<'_, COSTS> {
             sides[usize::from(other >= bin)].grow(&bins.bounds[axis][other]);
         }
         let left = bins.counts[axis][..bin].iter().sum::<u32>() as usize;
-        // What is left of the range.
+        // The rest of the range.
         let mut whole = Centers { low: binning.start, high: binning.start };
         for (axis, &(low, high)) in occupied.iter().enumerate() {
             if binning.factor[axis] > 0.0 {
@@ -313,7 +313,7 @@ impl<const COSTS: bool> Dispatch for BestSplit<'_, COSTS> {
     }
 }
 
-/// Measures where the centres of primitives are.
+/// Measures the range of the primitives' centres.
 pub(crate) struct FindCenters<'a> {
     pub(crate) primitives: &'a [Primitive],
 }
@@ -332,7 +332,7 @@ impl Dispatch for FindCenters<'_> {
     }
 }
 
-/// The bins of primitives whose centres were measured.
+/// Fills the bins with primitives.
 pub(crate) struct Fill<'a, const COSTS: bool> {
     pub(crate) primitives: &'a [Primitive],
     pub(crate) binning: Binning,
@@ -382,7 +382,7 @@ impl Dispatch for Part<'_> {
     }
 }
 
-/// The sides of a split, and how many primitives each has by now.
+/// The sides of a split, and the number of primitives in each so far.
 struct Sides<'a> {
     left: &'a mut [Primitive],
     right: &'a mut [Primitive],
@@ -393,7 +393,7 @@ impl Sides<'_> {
     #[inline(always)]
     fn put(&mut self, primitive: &Primitive, is_left: bool) {
         let [left, right] = &mut self.places;
-        // Without a branch, which would often be foretold wrong.
+        // Branch-free: the branch would often be mispredicted.
         let place = if is_left { &mut self.left[*left] } else { &mut self.right[*right] };
         *place = *primitive;
         *left += usize::from(is_left);
@@ -401,7 +401,7 @@ impl Sides<'_> {
     }
 }
 
-/// Brings the primitives left of a split to the front; how many they are. There is room for all of them in `there`.
+/// Moves the primitives left of a split to the front and returns their number. `there` is a buffer for all of them.
 pub(crate) struct PartPiece<'a> {
     pub(crate) primitives: &'a mut [Primitive],
     pub(crate) split: &'a Split,
@@ -418,7 +418,7 @@ impl Dispatch for PartPiece<'_> {
         for place in 0..primitives.len() {
             let primitive = primitives[place];
             let is_left = split.is_left(&primitive);
-            // Without a branch: what does not belong is soon written over.
+            // Branch-free: a wrong element is overwritten later.
             primitives[left] = primitive;
             there[right] = primitive;
             left += usize::from(is_left);

@@ -1,88 +1,88 @@
-//! The last splits: of sixteen primitives or fewer, every split along every axis is tried.
+//! The last splits: for sixteen primitives or fewer, tries every split along every axis.
 
 use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::intersect::{Dispatch, Simd};
 use crate::tree::BLOCK;
 use crate::tree::node::WIDTH;
 
-/// How many are few.
-pub(crate) const FEW: usize = 2 * BLOCK;
-/// What a node costs, in the units of costs.
+/// Up to this many primitives, every split is tried.
+pub(crate) const SMALL_BUILD_MAX: usize = 2 * BLOCK;
+/// The cost of a node, in the units of primitives' costs.
 const NODE_COST: f32 = 16.0;
 
-/// What becomes of few primitives.
-pub(crate) enum Few {
+/// The decision for a few primitives.
+pub(crate) enum SmallSplit {
     Leaf,
-    /// They were brought into order: so many go to the left.
+    /// They are sorted: this many go to the left.
     Split(usize),
 }
 
-/// Whether they can stand in one leaf.
+/// Whether they fit one leaf.
 #[inline(always)]
 fn is_uniform<const COSTS: bool>(primitives: &[Primitive], traits: &[Traits]) -> bool {
     let group = |p: &Primitive| group_of(p, traits);
     let first = group(&primitives[0]);
     let most = match first.0 {
-        // What looks like a leaf then becomes a node over leaves of one each.
+        // It becomes a node over single-instance leaves later.
         Kind::Instance if !COSTS => WIDTH,
         _ => traits[primitives[0].first() as usize].most,
     };
     primitives.len() <= most && primitives[1..].iter().all(|p| group(p) == first)
 }
 
-/// Leaves are of one kind, and their triangles of one mesh, their spheres of one cloud.
+/// Leaves hold one kind: triangles of one mesh, spheres of one cloud.
 #[inline(always)]
 pub(crate) fn group_of(primitive: &Primitive, traits: &[Traits]) -> (Kind, u32) {
     let kind = traits[primitive.first() as usize].kind;
     (kind, if kind.is_packed() { primitive.first() } else { 0 })
 }
 
-/// Decides about few primitives. With `COSTS`, they may be of any kind; without, a test of each costs the same.
-pub(crate) struct Decide<'a, const COSTS: bool> {
+/// Decides about a few primitives. With `COSTS` they may be of any kind; without, all tests cost the same.
+pub(crate) struct SplitSmall<'a, const COSTS: bool> {
     pub(crate) primitives: &'a mut [Primitive],
     pub(crate) traits: &'a [Traits],
 }
 
-impl<const COSTS: bool> Dispatch for Decide<'_, COSTS> {
-    type Output = Few;
+impl<const COSTS: bool> Dispatch for SplitSmall<'_, COSTS> {
+    type Output = SmallSplit;
 
     #[inline(always)]
-    fn run<L: Simd>(self) -> Few {
+    fn run<L: Simd>(self) -> SmallSplit {
         let Self { primitives, traits } = self;
         let count = primitives.len();
         let could_be_leaf = is_uniform::<COSTS>(primitives, traits);
         if could_be_leaf && (count == 1 || !COSTS) {
-            return Few::Leaf;
+            return SmallSplit::Leaf;
         }
 
         if could_be_leaf && count == 2 {
-            // There is one way to part them.
+            // Two primitives have only one split.
             let cost = |p: &Primitive| traits[p.first() as usize].cost as f32;
             let [a, b] = [&primitives[0], &primitives[1]];
             let mut whole = *a;
             whole.grow(b);
             let apart = a.half_area() * cost(a) + b.half_area() * cost(b) + NODE_COST * whole.half_area();
             let is_leaf = (cost(a) + cost(b)) * whole.half_area() <= apart;
-            return if is_leaf { Few::Leaf } else { Few::Split(1) };
+            return if is_leaf { SmallSplit::Leaf } else { SmallSplit::Split(1) };
         }
 
-        // Without costs, two leaves if at all possible.
+        // Without costs, prefers two leaves.
         let is_one_mesh = !COSTS && is_one_group(primitives, traits);
         let (least, most) =
             if is_one_mesh { (count - BLOCK.min(count - 1), BLOCK.min(count - 1)) } else { (1, count - 1) };
         let mut best = (f32::INFINITY, 0);
-        let mut best_order = [0; FEW];
+        let mut best_order = [0; SMALL_BUILD_MAX];
         let mut whole = Bounds::EMPTY;
         primitives.iter().for_each(|p| whole.grow(p));
         let mut are_apart = false;
         for axis in 0..3 {
             let order = order_on(axis, primitives);
-            let center2 = |at: usize| primitives[order[at] as usize % FEW].center2_on(axis);
+            let center2 = |at: usize| primitives[order[at] as usize % SMALL_BUILD_MAX].center2_on(axis);
             are_apart |= center2(0) < center2(count - 1);
-            let mut right_costs = [0.0; FEW + 1];
+            let mut right_costs = [0.0; SMALL_BUILD_MAX + 1];
             let (mut right, mut cost) = (Bounds::EMPTY, 0);
             for at in (least..count).rev() {
-                let primitive = &primitives[order[at] as usize % FEW];
+                let primitive = &primitives[order[at] as usize % SMALL_BUILD_MAX];
                 right.grow(primitive);
                 if COSTS {
                     cost += traits[primitive.first() as usize].cost;
@@ -93,7 +93,7 @@ impl<const COSTS: bool> Dispatch for Decide<'_, COSTS> {
             }
             let (mut left, mut cost) = (Bounds::EMPTY, 0);
             for at in 1..=most {
-                let primitive = &primitives[order[at - 1] as usize % FEW];
+                let primitive = &primitives[order[at - 1] as usize % SMALL_BUILD_MAX];
                 left.grow(primitive);
                 if COSTS {
                     cost += traits[primitive.first() as usize].cost;
@@ -111,18 +111,18 @@ impl<const COSTS: bool> Dispatch for Decide<'_, COSTS> {
             let area = whole.half_area();
             let all: u32 = primitives.iter().map(|p| traits[p.first() as usize].cost).sum();
             if all as f32 * area <= best.0 + NODE_COST * area {
-                return Few::Leaf;
+                return SmallSplit::Leaf;
             }
         }
         if !are_apart {
-            return Few::Split(by_group(primitives, traits));
+            return SmallSplit::Split(by_group(primitives, traits));
         }
-        let mut copy = [Bounds::EMPTY; FEW];
+        let mut copy = [Bounds::EMPTY; SMALL_BUILD_MAX];
         copy[..count].copy_from_slice(primitives);
         for (place, &from) in primitives.iter_mut().zip(&best_order) {
-            *place = copy[from as usize % FEW];
+            *place = copy[from as usize % SMALL_BUILD_MAX];
         }
-        Few::Split(best.1)
+        SmallSplit::Split(best.1)
     }
 }
 
@@ -132,38 +132,38 @@ fn is_one_group(primitives: &[Primitive], traits: &[Traits]) -> bool {
     primitives[1..].iter().all(|p| group_of(p, traits) == first)
 }
 
-/// The primitives in the order of their centres, ties in the order in which they stand: by counting, for each, those
-/// before it.
+/// The primitives in the order of their centres, ties by position. Computes each rank by counting the primitives before
+/// it.
 #[inline(always)]
-fn order_on(axis: usize, primitives: &[Primitive]) -> [u8; FEW] {
-    let mut centers = [i32::MAX; FEW];
+fn order_on(axis: usize, primitives: &[Primitive]) -> [u8; SMALL_BUILD_MAX] {
+    let mut centers = [i32::MAX; SMALL_BUILD_MAX];
     let mut start = i32::MAX;
     for (center, primitive) in centers.iter_mut().zip(primitives) {
         *center = primitive.center2_on(axis);
         start = start.min(*center);
     }
-    // As many bits as fit beside four for the place.
-    let end = centers[..primitives.len().min(FEW)].iter().copied().max().unwrap_or(start);
+    // As many bits of the centre as fit next to four bits for the position.
+    let end = centers[..primitives.len().min(SMALL_BUILD_MAX)].iter().copied().max().unwrap_or(start);
     let shift = 5_u32.saturating_sub(end.wrapping_sub(start).leading_zeros());
-    let mut keys = [i32::MAX; FEW];
-    for lane in 0..primitives.len().min(FEW) {
+    let mut keys = [i32::MAX; SMALL_BUILD_MAX];
+    for lane in 0..primitives.len().min(SMALL_BUILD_MAX) {
         let key = centers[lane].wrapping_sub(start) as u32 >> shift;
         keys[lane] = (key << 4) as i32 | lane as i32;
     }
-    let mut ranks = [0_i32; FEW];
+    let mut ranks = [0_i32; SMALL_BUILD_MAX];
     for key in keys {
-        for lane in 0..FEW {
+        for lane in 0..SMALL_BUILD_MAX {
             ranks[lane] += i32::from(key < keys[lane]);
         }
     }
-    let mut order = [0; FEW];
-    for lane in 0..FEW {
-        order[ranks[lane] as usize % FEW] = lane as u8;
+    let mut order = [0; SMALL_BUILD_MAX];
+    for lane in 0..SMALL_BUILD_MAX {
+        order[ranks[lane] as usize % SMALL_BUILD_MAX] = lane as u8;
     }
     order
 }
 
-/// Brings primitives of one kind together; returns where the kind changes, as near to the middle as can be, or the middle.
+/// Groups primitives by kind; returns the change of kind that is nearest to the middle, or the middle.
 #[cold]
 #[inline(never)]
 fn by_group(primitives: &mut [Primitive], traits: &[Traits]) -> usize {

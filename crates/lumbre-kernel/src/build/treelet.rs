@@ -1,38 +1,39 @@
-//! Reinsertion where it tells most for its time: among the upper nodes of a tree.
+//! Reinsertion where it gains most for its time: among the upper nodes of a tree.
 //!
-//! From the root down, the nodes with the largest areas are opened; what stands below the last of them moves as a whole (T. Karras,
-//! T. Aila, "Fast Parallel Construction of High-Quality Bounding Volume Hierarchies", High Performance Graphics, 2013, call such a
-//! part of a tree a treelet). Trees of statues and landscapes are as good as they can be there, which a first round over few nodes
-//! tells; those of rooms and of large things among small ones are not.
+//! From the root down, the nodes with the largest areas are opened; subtrees below them move as a whole (T. Karras, T.
+//! Aila, "Fast Parallel Construction of High-Quality Bounding Volume Hierarchies", High Performance Graphics, 2013,
+//! call such a part of a tree a treelet). A first round over few nodes shows whether it pays: the trees of statues and
+//! landscapes are already as good as they can be there, but those of rooms, and of large objects among small ones, are
+//! not.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
 use crate::build::binary_node::BinaryNode;
-use crate::build::binary_tree::{self, Binary, Twig};
+use crate::build::binary_tree::{self, Binary, Subtree};
 use crate::build::primitive::Bounds;
 use crate::build::reinsert::{self, NONE, Node, Tree};
 
-/// How many are opened. With a thousand, rays gain no more, and seeking takes four times as long.
+/// Number of opened nodes. A thousand gain rays nothing more, and the search takes four times as long.
 const OPENED: usize = 128;
-/// There are trees of so many primitives for one of them, or fewer of them; for too few primitives it is not tried.
+/// One opened node per this many primitives. Not tried for too few primitives.
 const PER_OPENED: usize = 128;
-const LEAST_OPENED: usize = 64;
-/// How often places are sought at most.
+const MIN_OPENED: usize = 64;
+/// Maximum rounds.
 const ROUNDS: usize = 10;
-/// No more where a round gains less than this share of the areas of opened nodes. The first gains a hundredth of them or nothing
-/// in statues and landscapes, and 5 to 10 in rooms.
+/// Stops after a round that gains less than this share of the opened nodes' areas. The first round gains at most a
+/// hundredth in statues and landscapes, and 5 to 10 hundredths in rooms.
 const FIRST_GAIN: f64 = 0.03;
-const LEAST_GAIN: f64 = 0.005;
-/// Treelets that become deeper are given up: with what is below they are no deeper than other trees that were changed.
+const MIN_GAIN: f64 = 0.005;
+/// Discards a deeper treelet, so that the whole tree is no deeper than other reinserted trees.
 const DEEPEST: u32 = reinsert::DEEPEST - binary_tree::DEEPEST;
 
-/// What stands at a node of a treelet.
+/// The content of a treelet's node.
 #[derive(Clone, Copy)]
 enum Piece<'a> {
     Tree(&'a Binary<'a>),
-    /// A part of a twig.
+    /// A part of a subtree.
     Part(&'a [BinaryNode]),
 }
 
@@ -46,25 +47,25 @@ impl<'a> Piece<'a> {
 
     fn children(self) -> Option<[Self; 2]> {
         match self {
-            Self::Tree(Binary::Fork(fork)) => Some(fork.children.each_ref().map(Self::Tree)),
-            Self::Tree(Binary::Twig(twig)) => Self::Part(&twig.nodes).children(),
+            Self::Tree(Binary::InnerNode(inner)) => Some(inner.children.each_ref().map(Self::Tree)),
+            Self::Tree(Binary::Subtree(subtree)) => Self::Part(&subtree.nodes).children(),
             Self::Part(nodes) => sides(nodes).map(|sides| sides.map(|side| Self::Part(&nodes[side]))),
         }
     }
 }
 
-/// Where the subtrees below the first of some nodes stand; `None` for a leaf.
+/// The ranges of the subtrees below the first node; `None` for a leaf.
 fn sides(nodes: &[BinaryNode]) -> Option<[Range<usize>; 2]> {
-    let right = nodes[0].names().is_none().then(|| nodes[0].right())?;
+    let right = nodes[0].ids().is_none().then(|| nodes[0].right())?;
     Some([1..right, right..nodes.len()])
 }
 
-/// Whether it is tried for so many primitives.
+/// Whether it is tried for this many primitives.
 pub(crate) fn is_tried(primitives: usize) -> bool {
-    primitives >= LEAST_OPENED * PER_OPENED
+    primitives >= MIN_OPENED * PER_OPENED
 }
 
-/// Reinserts the upper nodes of a tree over so many primitives, where that makes it much better.
+/// Reinserts the upper nodes of a tree over this many primitives, if that makes it much better.
 pub(crate) fn reinsert_upper(tree: Binary<'_>, primitives: usize) -> Binary<'_> {
     let mut upper = open(&tree, (primitives / PER_OPENED).min(OPENED));
     let children: Vec<_> = (0..upper.nodes.len() as u32).map(|place| upper.children(place)).collect();
@@ -74,11 +75,11 @@ pub(crate) fn reinsert_upper(tree: Binary<'_>, primitives: usize) -> Binary<'_> 
     over(&upper, 0, &mut cut(tree, &children))
 }
 
-/// The nodes of a tree of which so many are opened, if there are, the largest first and the earlier of equals.
+/// The tree's nodes after opening up to `count` of them, the largest first and ties by position.
 fn open(tree: &Binary, count: usize) -> Tree {
     let mut pieces = vec![Piece::Tree(tree)];
     let mut upper = Tree { nodes: vec![Node::closed(tree.bounds(), NONE)] };
-    // No area is less than nothing, so that their bits are in the same order.
+    // Areas are never negative, so their bits order like numbers.
     let key = |node: &Node, place: u32| (node.area.to_bits(), Reverse(place));
     let mut closed = BinaryHeap::from([key(&upper.nodes[0], 0)]);
     let mut opened = 0;
@@ -99,50 +100,50 @@ fn open(tree: &Binary, count: usize) -> Tree {
     upper
 }
 
-/// Reinserts; whether that made the tree much better, and not too deep.
+/// Reinserts; returns whether the tree became much better and not too deep.
 fn improve(upper: &mut Tree) -> bool {
     let all = upper.inner_area();
     if upper.round(1) <= FIRST_GAIN * all {
         return false;
     }
-    upper.rounds(ROUNDS - 1, 1, LEAST_GAIN * all);
+    upper.rounds(ROUNDS - 1, 1, MIN_GAIN * all);
     upper.order(DEEPEST).is_some()
 }
 
-/// The trees below the nodes of a tree that were opened, by their places; those had these children.
+/// The trees below the opened nodes, by position; `children` are the opened nodes' children.
 fn cut<'p>(tree: Binary<'p>, children: &[Option<[u32; 2]>]) -> Vec<Option<Binary<'p>>> {
     let mut pieces: Vec<_> = children.iter().map(|_| None).collect();
     let mut pending = vec![(tree, 0)];
     while let Some((tree, place)) = pending.pop() {
         match (tree, children[place as usize]) {
-            (Binary::Fork(fork), Some(own)) => pending.extend(fork.children.into_iter().zip(own)),
-            (Binary::Twig(twig), Some(_)) => cut_twig(&twig, place, children, &mut pieces),
+            (Binary::InnerNode(inner), Some(own)) => pending.extend(inner.children.into_iter().zip(own)),
+            (Binary::Subtree(subtree), Some(_)) => cut_subtree(&subtree, place, children, &mut pieces),
             (tree, None) => pieces[place as usize] = Some(tree),
         }
     }
     pieces
 }
 
-/// The same below a twig, whose root has this place.
-fn cut_twig<'p>(
-    twig: &Twig<'p>,
+/// [`cut`] below a subtree whose root has this position.
+fn cut_subtree<'p>(
+    subtree: &Subtree<'p>,
     place: u32,
     children: &[Option<[u32; 2]>],
     pieces: &mut [Option<Binary<'p>>],
 ) {
-    let mut pending = vec![(0..twig.nodes.len(), place)];
+    let mut pending = vec![(0..subtree.nodes.len(), place)];
     while let Some((part, place)) = pending.pop() {
-        match (sides(&twig.nodes[part.clone()]), children[place as usize]) {
+        match (sides(&subtree.nodes[part.clone()]), children[place as usize]) {
             (Some(sides), Some(own)) => {
                 let sides = sides.map(|side| part.start + side.start..part.start + side.end);
                 pending.extend(sides.into_iter().zip(own));
             }
-            _ => pieces[place as usize] = Some(Binary::Twig(twig.part(part))),
+            _ => pieces[place as usize] = Some(Binary::Subtree(subtree.part(part))),
         }
     }
 }
 
-/// The tree below a node of a list, over those pieces, each of which it takes. The depth of its recursion is that of the list.
+/// The tree below a node of a list; takes the pieces that it needs. The recursion is as deep as the list's tree.
 fn over<'p>(tree: &Tree, place: u32, pieces: &mut [Option<Binary<'p>>]) -> Binary<'p> {
     match tree.children(place) {
         Some([left, right]) => Binary::over([over(tree, left, pieces), over(tree, right, pieces)]),
@@ -153,16 +154,16 @@ fn over<'p>(tree: &Tree, place: u32, pieces: &mut [Option<Binary<'p>>]) -> Binar
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::build::binary::{Grown, binary_tree};
+    use crate::build::binary::{GrownTree, binary_tree};
     use crate::build::binary_node::choose;
     use crate::build::boxes::Boxes;
     use crate::build::options::Preset;
     use crate::build::primitive::{Kind, Traits};
     use crate::intersect::Isa;
     use crate::tests::scenes::Random;
-    use crate::tree::Name;
+    use crate::tree::PrimitiveId;
 
-    /// Boxes as of a room: things of many small ones, and among them walls and boards; or, without these, all as small anywhere.
+    /// Boxes of a room: objects of many small boxes among walls and boards. Otherwise only small boxes, scattered.
     fn boxes(count: usize, is_room: bool) -> Boxes {
         let mut random = Random(77);
         let mut boxes = Boxes::empty(count);
@@ -186,12 +187,13 @@ mod tests {
         boxes
     }
 
-    fn grow<'p>(preset: Preset, boxes: &'p mut Boxes) -> Grown<'p> {
+    fn grow<'p>(preset: Preset, boxes: &'p mut Boxes) -> GrownTree<'p> {
         let traits = [Traits { kind: Kind::Triangle, cost: 4, most: 8 }];
         binary_tree(Isa::best(), preset, Vec::new(), boxes, &traits)
     }
 
-    /// Lists the nodes of a tree, left before right, and tells of every leaf; sees that boxes hold those below them.
+    /// Lists the nodes of a tree, left before right; calls `leaf` for every leaf, and checks that boxes contain those
+    /// below.
     fn walk(tree: Piece, leaf: &mut impl FnMut(&BinaryNode), nodes: &mut Vec<BinaryNode>) {
         let place = nodes.len();
         match tree.children() {
@@ -210,9 +212,9 @@ mod tests {
             }
             None => {
                 let node = match tree {
-                    Piece::Tree(Binary::Twig(twig)) => &twig.nodes[0],
+                    Piece::Tree(Binary::Subtree(subtree)) => &subtree.nodes[0],
                     Piece::Part(nodes) => &nodes[0],
-                    Piece::Tree(Binary::Fork(_)) => unreachable!("it has children"),
+                    Piece::Tree(Binary::InnerNode(_)) => unreachable!("it has children"),
                 };
                 leaf(node);
                 nodes.push(*node);
@@ -220,20 +222,20 @@ mod tests {
         }
     }
 
-    /// Every name is in one leaf, every box holds those below it, and costs are those of the tree as it is.
-    fn check(grown: &Grown, count: usize) {
-        let mut names: Vec<Name> = Vec::new();
+    /// Every id is in one leaf, every box contains those below it, and the stored costs are right.
+    fn check(grown: &GrownTree, count: usize) {
+        let mut ids: Vec<PrimitiveId> = Vec::new();
         let mut nodes = Vec::new();
         let root = Piece::Tree(&grown.tree);
-        walk(root, &mut |leaf| names.extend(&grown.names[leaf.names().expect("a leaf")]), &mut nodes);
-        names.sort_unstable();
-        assert!(names.iter().map(|name| name[1]).eq(0..count as u32));
+        walk(root, &mut |leaf| ids.extend(&grown.ids[leaf.ids().expect("a leaf")]), &mut nodes);
+        ids.sort_unstable();
+        assert!(ids.iter().map(|name| name[1]).eq(0..count as u32));
         assert_eq!(&choose(&mut nodes, false), grown.tree.costs());
     }
 
     #[test]
     fn what_is_large_among_small_things_is_put_where_it_belongs() {
-        // In few twigs and in many.
+        // In few subtrees and in many.
         for count in [9_000, 15_000, 120_000] {
             let mut boxes = boxes(count, true);
             let grown = grow(Preset::Balanced, &mut boxes);
@@ -265,9 +267,9 @@ mod tests {
     }
 
     #[test]
-    fn parts_of_twigs_that_stand_apart_are_put_together() {
-        // Pairs of near boxes along a line, of which the halves were put into two twigs, each a comb.
-        let twig = |shift: f32, first: usize| {
+    fn parts_of_subtrees_that_stand_apart_are_put_together() {
+        // Pairs of near boxes along a line, whose halves are in two subtrees, each a comb.
+        let subtree = |shift: f32, first: usize| {
             let mut nodes = Vec::new();
             for i in 0..100 {
                 let low = [0.009 * i as f32 - 0.45, shift, 0.1];
@@ -279,17 +281,17 @@ mod tests {
                 whole.grow(nodes[i].bounds());
                 nodes.insert(i, BinaryNode::inner(&whole, 2));
             }
-            Binary::twig(nodes)
+            Binary::subtree(nodes)
         };
-        let tree = Binary::over([twig(0.0, 0), twig(0.002, 100)]);
+        let tree = Binary::over([subtree(0.0, 0), subtree(0.002, 100)]);
         let area = |tree: &Binary| {
             let nodes = list(tree);
-            let inner = nodes.iter().filter(|node| node.names().is_none());
+            let inner = nodes.iter().filter(|node| node.ids().is_none());
             inner.map(|node| f64::from(node.bounds().half_area())).sum::<f64>()
         };
         let before = area(&tree);
         let tree = reinsert_upper(tree, 1_000_000);
         assert!(area(&tree) < 0.7 * before, "{} of {before}", area(&tree));
-        check(&Grown { tree, names: (0..200).map(|i| [0, i]).collect(), instances: vec![] }, 200);
+        check(&GrownTree { tree, ids: (0..200).map(|i| [0, i]).collect(), instances: vec![] }, 200);
     }
 }

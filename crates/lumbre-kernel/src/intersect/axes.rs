@@ -1,4 +1,4 @@
-//! The order of a ray's axes, and the planes of boxes that it meets first.
+//! The order of a ray's axes, and which planes of a box it meets first.
 
 use lumbre_math::DVec3;
 
@@ -9,12 +9,12 @@ use crate::tree::triangle_block::{TriangleBlock, shared_row, unshared_row};
 #[derive(Debug, PartialEq)]
 #[repr(align(32))]
 pub(crate) struct Sides {
-    // On each axis, where the planes start in the flat array of a node's planes: `WIDTH` times 2 axis + side. The other planes are
-    // at that place with `WIDTH` flipped.
+    // For each axis, where the planes start in the flat array of a node's planes: `WIDTH` times 2 axis + side. Flipping
+    // `WIDTH` gives the start of the other planes.
     pub(super) near: [usize; 3],
 }
 
-// The fourth bit makes no difference.
+// The fourth bit is ignored.
 static SIDES: [Sides; 16] = {
     let mut sides = [const { Sides { near: [0; 3] } }; 16];
     let mut signs = 0;
@@ -30,27 +30,26 @@ static SIDES: [Sides; 16] = {
 };
 
 impl Sides {
-    /// Where no component is negative.
+    /// For directions without negative components.
     pub(crate) const OF_NONE_NEGATIVE: &'static Self = &SIDES[0];
 
-    /// For a direction that has these signs: a bit for each negative component, and one of any that follows.
+    /// For the signs of a direction: one bit per negative component. A fourth bit is ignored.
     #[inline(always)]
     pub(crate) fn new(signs: u32) -> &'static Self {
         &SIDES[signs as usize % 16]
     }
 }
 
-/// The axes in another order.
-// By lines: what every ray reads stands in the first, and one of a table is found by a shift.
+/// The axes in another order. One cache line each: hot fields come first, and a shift finds the table entry.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Axes {
-    // Each below three; the fourth only fills up.
+    // Each below three; the fourth is padding.
     pub(super) order: [u32; 4],
-    // The words where their rows begin in a block that shares its vertices, and in one that does not.
+    // The words where the axes' rows begin in a block that shares its vertices, and in one that does not.
     pub(super) shared_rows: [u32; 3],
     pub(super) unshared_rows: [u32; 3],
-    // The halves of each.
+    // Both halves of each.
     pub(super) halves: [u32; 8],
 }
 
@@ -69,7 +68,7 @@ impl Axes {
     }
 }
 
-// By which is the last and whether it is negative; eight, so that three bits name one.
+// By which axis is last and whether it is negative; eight entries, so that three bits select one.
 const AXES: [Axes; 8] = [
     Axes::of(1, 2, 0),
     Axes::of(2, 0, 1),
@@ -86,7 +85,7 @@ impl Axes {
     #[inline(always)]
     pub(crate) fn new(direction: &DVec3) -> &'static Self {
         let [x, y, z] = [direction.x.abs(), direction.y.abs(), direction.z.abs()];
-        // Without branches, for incoherent rays.
+        // Branch-free, for incoherent rays.
         let x_is_largest = usize::from((x >= y) & (x >= z));
         let z = (1 - x_is_largest) * (2 - usize::from(y >= z));
         let is_negative = usize::from(direction.as_ref()[z] < 0.0);
@@ -94,8 +93,8 @@ impl Axes {
         &ALL[(4 * is_negative + z) % 8]
     }
 
-    /// The axes for a direction whose components have these signs, a bit for each negative one, and these sizes: a bit each for
-    /// |x| ≥ |y|, |y| ≥ |z| and |x| ≥ |z|.
+    /// The axes for a direction, from one bit for each negative component, and one bit each for |x| ≥ |y|, |y| ≥ |z|
+    /// and |x| ≥ |z|.
     #[inline(always)]
     pub(crate) fn by_bits(signs: u32, sizes: u32) -> &'static Self {
         static ALL: [Axes; 64] = {
@@ -118,7 +117,7 @@ impl Axes {
         &ALL[(((sizes % 8) << 3) | (signs % 8)) as usize]
     }
 
-    /// What they are in it: each below three, as the compiler then knows.
+    /// The axes in this order. The compiler learns that each is below three.
     #[inline(always)]
     pub(crate) fn order(&self) -> [usize; 3] {
         let [x, y, z, _] = self.order;
@@ -140,14 +139,15 @@ impl Axes {
         [at(self.order[0]), at(self.order[1]), at(self.order[2])]
     }
 
-    /// The words where their rows begin in a block: each has all vertices that [`TriangleBlock::vertices_at`] names.
+    /// The first words of the axes' rows in a block; each row has all vertices that [`TriangleBlock::vertices_at`]
+    /// returns.
     #[inline(always)]
     pub(super) fn rows(&self, block: &TriangleBlock) -> [usize; 3] {
         let [x, y, z] = if block.is_unshared() { self.unshared_rows } else { self.shared_rows };
         [x as usize, y as usize, z as usize]
     }
 
-    /// The corners in one lane of a block, each in this order.
+    /// The corners in one lane of a block, in the order of these axes.
     #[inline(always)]
     pub(crate) fn gather(&self, block: &TriangleBlock, lane: usize) -> [[f32; 3]; 3] {
         let words = block.words();

@@ -5,18 +5,18 @@ use crate::intersect::watertight::HeightRange;
 use crate::simd::{F32x8, F32x16, Row, Vector, WIDE};
 use crate::tree::BLOCK;
 use crate::tree::bounding_block::{
-    BoundingBlock, BoundingVolumeRay, LEAST_COMPONENT, LEAST_TOLERANCE, LEAST_TUBE_ERROR,
-    TOLERANCE_PER_MARGIN, TUBE_ERROR_PER_MARGIN,
+    BoundingBlock, BoundingVolumeRay, MIN_COMPONENT, MIN_TOLERANCE, MIN_TUBE_ERROR, TOLERANCE_PER_MARGIN,
+    TUBE_ERROR_PER_MARGIN,
 };
 
-/// What came of eight bounding volumes.
+/// The result of testing eight bounding volumes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BoundingHits {
-    /// A bit for each that the ray may meet within the range: among them all whose shapes it does.
+    /// A bit for each that the ray may meet in its range, which includes every one whose shape it meets.
     pub(crate) mask: u32,
-    /// A bit for each whose shape it certainly does meet, where that was asked.
+    /// A bit for each whose shape the ray certainly meets, if that was requested.
     pub(crate) sure: u32,
-    /// No shape among them is met at a lesser height.
+    /// Lower bounds on the heights of the shapes' crossings.
     pub(crate) near: [f32; BLOCK],
 }
 
@@ -24,22 +24,22 @@ impl BoundingHits {
     pub(crate) const NONE: Self = Self { mask: 0, sure: 0, near: [0.0; BLOCK] };
 }
 
-/// What lines have between the planes of cubes.
+/// The parts of lines between the planes of cubes.
 struct Passages<V> {
-    /// Where they start in the cubes, and whither they go.
+    /// Starts and directions in the cubes.
     p: [V; 3],
     d: [V; 3],
     margin: V,
     enters: V,
     leaves: V,
-    /// The same within their ranges.
+    /// Clipped to the range.
     from: V,
     to: V,
-    /// A bit for each that is not there.
+    /// A bit for each line that misses.
     missed: u32,
 }
 
-/// Lines between the planes of cubes.
+/// Clips lines to the planes of cubes.
 #[inline(always)]
 fn pass<V: F32x8>(block: &BoundingBlock, ray: &BoundingVolumeRay, range: &HeightRange) -> Passages<V> {
     let (zero, one) = (V::splat(0.0), V::splat(1.0));
@@ -53,7 +53,7 @@ fn pass<V: F32x8>(block: &BoundingBlock, ray: &BoundingVolumeRay, range: &Height
     let distance = w[0].abs().max(w[1].abs().max(w[2].abs()));
     let (per_distance, least_margin) = (load(&block.margins), load(&block.least_margins));
     let margin = per_distance.mul_add(distance, least_margin);
-    let least = per_distance * V::splat(LEAST_COMPONENT);
+    let least = per_distance * V::splat(MIN_COMPONENT);
     let half = [one + margin, load(&block.heights) + margin, one + margin];
     let (mut p, mut d) = ([zero; 3], [zero; 3]);
     let (mut near, mut far) = ([zero; 3], [zero; 3]);
@@ -70,11 +70,11 @@ fn pass<V: F32x8>(block: &BoundingBlock, ray: &BoundingVolumeRay, range: &Height
     let enters = near[0].max(near[1]).max(near[2]);
     let leaves = far[0].min(far[1]).min(far[2]);
     let (from, to) = (enters.max(splat(range.first)), leaves.min(splat(range.last)));
-    // Every comparison with a NaN is false, so that what is none is met.
+    // Every comparison with a NaN is false, so NaN is met.
     Passages { p, d, margin, enters, leaves, from, to, missed: to.simd_lt(from) }
 }
 
-/// What lines have in bounding volumes: `p + k d` for k from -1 to 1, at the heights `middle + k reach`.
+/// The parts of lines in bounding volumes: `p + k d` for k from -1 to 1, at the heights `middle + k reach`.
 struct Chords<V> {
     p: [V; 3],
     d: [V; 3],
@@ -82,15 +82,16 @@ struct Chords<V> {
     reach: V,
     margin: V,
     from: V,
-    /// A bit for each that may be met, as far as is seen without a look at tubes: among them all that are.
+    /// A bit for each that may be met, before tubes are tested; includes all that are met.
     mask: u32,
-    /// A bit for each that certainly is met, tubes left aside, where that was asked.
+    /// A bit for each that certainly is met, without regard to tubes, if that was requested.
     sure: u32,
-    /// A bit for each whose line certainly is outside somewhere, alike.
+    /// A bit for each whose line certainly is outside somewhere, likewise.
     outside: u32,
 }
 
-/// Lines in bounding volumes, between the planes of whose cubes they pass; with `SURE`, also what is certain: see [`BoundingVolumeRay`].
+/// Lines in bounding volumes, from their passages through the cubes; with `SURE`, also what is certain: see
+/// [`BoundingVolumeRay`].
 #[inline(always)]
 fn look_into<V: F32x8, const SURE: bool>(
     block: &BoundingBlock,
@@ -104,8 +105,7 @@ fn look_into<V: F32x8, const SURE: bool>(
     let [dx, dy, dz] = [reach * d[0], reach * d[1], reach * d[2]];
     let [c, linear, e] = &block.profiles;
     let (c, linear, e) = (V::load(c), V::load(linear), V::load(e));
-    let tolerance =
-        (V::splat(TOLERANCE_PER_MARGIN) * margin).mul_add(one + margin, V::splat(LEAST_TOLERANCE));
+    let tolerance = (V::splat(TOLERANCE_PER_MARGIN) * margin).mul_add(one + margin, V::splat(MIN_TOLERANCE));
     let a = dx.mul_add(dx, dy.mul_add(dy, c * dz * dz));
     let slope = c.mul_add(pz, half * linear);
     let b = px.mul_add(dx, py.mul_add(dy, slope * dz));
@@ -123,7 +123,7 @@ fn look_into<V: F32x8, const SURE: bool>(
         let goes = leaves.simd_lt(end) | tolerance.simd_lt(last);
         chords.outside = comes | goes;
         let deep = one - margin;
-        // Some place between the ends, near to where the parabola is least.
+        // A point between the ends, near the minimum of the parabola.
         let least_at = ((zero - b) / a).max(zero - one).min(one);
         let least = least_at.mul_add(least_at.mul_add(a, twice), k);
         let x = least_at.mul_add(dx, px).abs();
@@ -140,17 +140,17 @@ fn look_into<V: F32x8, const SURE: bool>(
     chords
 }
 
-/// What is seen of a tube from sixteen places on a chord.
+/// What sixteen points on a chord say of a tube.
 struct SeenTube {
-    /// Whether none of it is met in between, either.
+    /// Whether the chord misses the tube, also between the points.
     misses: bool,
-    /// Whether a place that is surely in range is surely inside.
+    /// Whether a point certainly in range is certainly inside.
     is_inside: bool,
-    /// The same for outside.
+    /// Whether a point certainly in range is certainly outside.
     is_outside: bool,
 }
 
-/// k of places on a chord: the middles of pieces of equal lengths.
+/// The k of points on a chord: the middles of pieces of equal length.
 static MIDDLES: Row<f32> = {
     let mut middles = [0.0; WIDE];
     let mut i = 0;
@@ -171,11 +171,11 @@ struct Chord {
 }
 
 impl Chord {
-    /// Looks at a tube of this radius; `start` and `end` are between which the line surely is in its range.
+    /// Tests a tube of this radius; between `start` and `end`, the line certainly is in its range.
     #[inline(always)]
     fn intersect_tube<W: F32x16>(&self, tube: f32, [start, end]: [f32; 2]) -> SeenTube {
         let Self { p: [px, py, pz], d: [dx, dy, dz], .. } = *self;
-        let error = TUBE_ERROR_PER_MARGIN * self.margin + LEAST_TUBE_ERROR;
+        let error = TUBE_ERROR_PER_MARGIN * self.margin + MIN_TUBE_ERROR;
         // In the space of x, y and r z.
         let (pz, dz) = (tube * pz, tube * dz);
         let half_piece = (dx * dx + dy * dy + dz * dz).sqrt() * ((1.0 + 1e-6) / WIDE as f32);
@@ -197,7 +197,7 @@ impl Chord {
 }
 
 impl<V: F32x8> Chords<V> {
-    /// Looks closer at those that pass tubes: a bit for each that may be met, among them all that are, and for each that certainly is.
+    /// Tests tubes: a bit for each that may be met, which includes all that are, and a bit for each that certainly is.
     #[inline(always)]
     fn intersect_tubes<W: F32x16, const SURE: bool>(
         &self,
@@ -236,7 +236,7 @@ impl<V: F32x8> Chords<V> {
     }
 }
 
-/// Tries a ray against the bounding volumes of a block; with `SURE`, also what is certain: see [`BoundingVolumeRay`].
+/// Tests a ray against the bounding volumes of a block; with `SURE`, also what is certain: see [`BoundingVolumeRay`].
 #[inline(always)]
 pub(crate) fn intersect_bounding_volumes<L: Simd, const SURE: bool>(
     block: &BoundingBlock,
@@ -255,7 +255,7 @@ pub(crate) fn intersect_bounding_volumes<L: Simd, const SURE: bool>(
     BoundingHits { mask, sure, near: chords.from.to_array() }
 }
 
-/// What [`intersect_bounding_volumes`] gives at an instruction set, for tests.
+/// [`intersect_bounding_volumes`] at an instruction set, for tests.
 #[cfg(test)]
 pub(crate) fn intersect_bounding_volumes_at(
     isa: super::Isa,

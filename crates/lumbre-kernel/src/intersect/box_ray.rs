@@ -1,4 +1,4 @@
-//! Rays as they are tested against boxes, alone and by sixteen: see the proof in [`node`](crate::tree::node).
+//! Rays for box tests, single and by sixteen: see the proof in [`node`](crate::tree::node).
 
 use lumbre_geometry::Ray;
 
@@ -8,25 +8,25 @@ use crate::tree::node::{
     LARGEST_NEAR, LARGEST_PLANE, ROUNDOFF, SMALLEST_NEAR, TINY_DIRECTION, TINY_NEAR, TreeSpace, slop,
 };
 
-/// What moves the ends of a rounded range outwards, together with a little at the far one.
+/// Moves the ends of a rounded range outwards, together with [`LITTLE`] at the far end.
 pub(crate) const START_FACTOR: f32 = 1.0 - 4.0 * ROUNDOFF as f32;
 pub(crate) const END_FACTOR: f32 = 1.0 + 4.0 * ROUNDOFF as f32;
 
-/// A ray in tree units, ready for the boxes.
+/// A ray in tree units, ready for box tests.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Slabs {
-    /// The last of four means nothing.
+    /// The last of four is unused.
     pub(crate) inverse: [f32; 4],
-    /// The last is where the range starts: never negative.
+    /// The last is the start of the range: never negative.
     pub(crate) near_offset: [f32; 4],
-    /// The last is where it ends.
+    /// The last is the end of the range.
     pub(crate) far_offset: [f32; 4],
-    /// The planes that are met first.
+    /// The planes that the ray meets first.
     pub(crate) sides: &'static Sides,
 }
 
 impl Slabs {
-    /// Of no ray.
+    /// A ray that hits nothing.
     pub(crate) const ZERO: Self = Self {
         inverse: [0.0; 4],
         near_offset: [0.0; 4],
@@ -49,21 +49,21 @@ impl Slabs {
         self.near_offset[3] = s_min;
     }
 
-    /// Leaves out the boxes that the ray enters after this.
+    /// Excludes boxes that the ray enters after this.
     #[inline(always)]
     pub(crate) fn end_at(&mut self, s_max: f32) {
         self.far_offset[3] = s_max;
     }
 }
 
-/// The same, and how to go on with its range.
+/// The ray and the map of its range.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BoxRay {
     pub(crate) slabs: Slabs,
     pub(crate) progress: Progress,
 }
 
-/// From the `t` of a ray to the `s` in which it is tested against boxes.
+/// Maps the `t` of a ray to the `s` of box tests.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Progress {
     s_per_t: f64,
@@ -71,7 +71,7 @@ pub(crate) struct Progress {
 }
 
 impl Progress {
-    /// Whether the ray is tested as it is, because it comes from nearby.
+    /// Whether the ray keeps its start, because it starts nearby.
     #[inline(always)]
     pub(crate) fn is_nearby(&self) -> bool {
         self.s_per_t == 1.0 && self.s_at_zero == 0.0
@@ -79,8 +79,8 @@ impl Progress {
 }
 
 impl BoxRay {
-    /// Makes it the ray from `t_min` to `t_max` for a tree in these units, if that is one from nearby, which it answers; also
-    /// checks that the ray is sound.
+    /// Sets up the ray from `t_min` to `t_max` for a tree in these units, if it starts nearby; returns whether it does.
+    /// Also checks that the ray is valid.
     #[inline(always)]
     pub(crate) fn start_nearby(&mut self, tree_space: &TreeSpace, ray: &Ray, t_min: f64, t_max: f64) -> bool {
         let start = ((ray.origin - tree_space.origin) * tree_space.scale).to_array();
@@ -106,8 +106,8 @@ impl BoxRay {
         self.slabs.end_at(self.progress.up(t_max));
     }
 
-    /// Makes it the ray from `t_min` to `t_max` for a tree in these units, from wherever; false where it passes by the tree
-    /// altogether. The ray is finite, and its direction is not zero.
+    /// Sets up the ray from `t_min` to `t_max` for a tree in these units, from any start; returns false if it misses
+    /// the whole tree. The ray must be finite, and its direction not zero.
     #[cold]
     #[inline(never)]
     pub(crate) fn start_anywhere(
@@ -117,7 +117,7 @@ impl BoxRay {
         t_min: f64,
         t_max: f64,
     ) -> bool {
-        // Powers of two near the limits of the exponent go in two steps.
+        // Powers of two near the limits of the exponent take two steps.
         let largest = ray.direction.abs().max_element();
         let step = if largest < f64::from_bits(100 << 52) {
             f64::from_bits((1023 + 200) << 52)
@@ -158,9 +158,9 @@ impl BoxRay {
         true
     }
 
-    /// What meets every box, and ends nowhere.
+    /// A ray that enters every box and never ends.
     pub(crate) fn passing_all() -> Self {
-        // Less than f32::MAX times the inverse, so that missing children stay missed.
+        // Less than f32::MAX times the inverse, so that absent children stay missed.
         let far = f32::MAX * f32::EPSILON;
         let slabs = Slabs {
             inverse: [1.0; 4],
@@ -197,11 +197,11 @@ impl BoxRay {
     }
 }
 
-/// A little that is neither zero nor subnormal as an f32.
+/// A small number that is neither zero nor subnormal as an f32.
 pub(crate) const LITTLE: f64 = 1.0 / (1u128 << 100) as f64;
 
 impl Progress {
-    /// Where `t` is, or a little more; never negative. What rounding to single precision may take away was added before.
+    /// `t` or slightly more; never negative. The rounding to single precision was compensated before.
     #[inline(always)]
     pub(crate) fn up(&self, t: f64) -> f32 {
         let s = t * self.s_per_t + self.s_at_zero;
@@ -209,7 +209,7 @@ impl Progress {
         (if above > 0.0 { above } else { 0.0 }) as f32
     }
 
-    /// Where `t` is, or a little less; 0 where that is negative.
+    /// `t` or slightly less; 0 if that is negative.
     #[inline(always)]
     pub(crate) fn down(&self, t: f64) -> f32 {
         let s = t * self.s_per_t + self.s_at_zero;
@@ -218,25 +218,25 @@ impl Progress {
     }
 }
 
-/// What holds all the rays among boxes: see `packet`.
+/// A bound on all rays of a packet, for box tests: see `packet`.
 pub(crate) struct Frustum {
     pub(crate) center: [f32; 3],
     pub(crate) least_inverse: [f32; 3],
     pub(crate) most_inverse: [f32; 3],
-    /// What is taken from where they enter, and added to where they leave.
+    /// Subtracted from where they enter, and added to where they leave.
     pub(crate) width: [f32; 3],
     pub(crate) s_min: f32,
     pub(crate) s_max: f32,
     pub(crate) sides: &'static Sides,
 }
 
-/// The rays among boxes, each as [`Slabs`].
+/// The rays for box tests, each as [`Slabs`].
 pub(crate) struct SlabRows {
     pub(crate) inverse: [Row<f32>; 3],
     pub(crate) near_offset: [Row<f32>; 3],
     pub(crate) far_offset: [Row<f32>; 3],
     pub(crate) s_min: Row<f32>,
-    /// Where each ends.
+    /// The end of each.
     pub(crate) s_max: Row<f32>,
 }
 
@@ -246,7 +246,8 @@ impl SlabRows {
         Self { inverse: [row; 3], near_offset: [row; 3], far_offset: [row; 3], s_min: row, s_max: row }
     };
 
-    /// The offsets on an axis of rays that start there, where planes are moved by a margin and by more for each unit of distance.
+    /// The offsets on an axis for rays that start there; planes are moved by a constant margin plus one per unit of
+    /// distance.
     #[inline(always)]
     pub(crate) fn set_axis<W: F32x16>(
         &mut self,

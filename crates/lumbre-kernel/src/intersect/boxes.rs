@@ -1,10 +1,10 @@
-//! Boxes by sixteen: which children of a node a ray meets, and in what order it takes them.
+//! Boxes by sixteen: which children of a node a ray meets, and in what order it visits them.
 
 use std::hint::select_unpredictable;
 use std::mem::MaybeUninit;
 
 use super::axes::Sides;
-use super::slots::{Room, Slots};
+use super::slots::{PushSlots, Slots};
 use crate::intersect::box_ray::Slabs;
 use crate::intersect::box_ray::{Frustum, SlabRows};
 use crate::simd::vector::stack_entry;
@@ -13,7 +13,7 @@ use crate::tree::node::{Node, WIDTH};
 
 const _: () = assert!(WIDTH == WIDE);
 
-/// The planes of all children that are met first on an axis, and those that are met last.
+/// The near planes of all children on an axis, and the far planes.
 #[inline(always)]
 fn near_and_far<'a>(node: &'a Node, sides: &Sides, axis: usize) -> (&'a [f32; WIDTH], &'a [f32; WIDTH]) {
     let planes = node.planes.as_flattened().as_ptr();
@@ -36,13 +36,13 @@ pub(crate) fn intersect_boxes<W: F32x16>(node: &Node, ray: &Slabs) -> (u32, W) {
     let far_x = W::load(far_x).mul_add(W::splat(x), W::splat(far[0]));
     let far_y = W::load(far_y).mul_add(W::splat(y), W::splat(far[1]));
     let far_z = W::load(far_z).mul_add(W::splat(z), W::splat(far[2]));
-    // 0 <= s_min. What is negative gives way to it where the box is entered, and is a miss where it is left.
+    // Bit patterns order like floats since 0 <= s_min; a negative exit is a miss.
     let enter = near_x.max_nonneg(near_y).max_nonneg(near_z.max_nonneg(W::splat(ray.s_min())));
     let leave = far_x.min_nonneg(far_y).min_nonneg(far_z.min_nonneg(W::splat(ray.s_max())));
     (enter.le_nonneg(leave), enter)
 }
 
-/// The same of rays together: among them all that one of them meets, and no later than it enters.
+/// The boxes that a packet meets: all that any of its rays meets, entered no later than by that ray.
 #[inline(always)]
 pub(crate) fn intersect_frustum<W: F32x16>(node: &Node, frustum: &Frustum) -> (u32, W) {
     let mut enter = W::splat(frustum.s_min);
@@ -61,8 +61,7 @@ pub(crate) fn intersect_frustum<W: F32x16>(node: &Node, frustum: &Frustum) -> (u
     (enter.le_nonneg(leave), enter)
 }
 
-/// Of the children in the mask, those whose boxes any of the rays that are alive meets; and, if `is_ordered`, where the first of them
-/// enters each.
+/// The children in the mask whose boxes any live ray meets, and, if `is_ordered`, where the first ray enters each.
 #[inline(always)]
 pub(crate) fn intersect_each<W: F32x16>(
     node: &Node,
@@ -105,16 +104,16 @@ pub(crate) fn intersect_each<W: F32x16>(
     (met, enters)
 }
 
-/// The child of which `mask` has the bit: no more than one.
+/// The one child in `mask`; the mask has at most one bit.
 #[inline(always)]
 pub(crate) fn only_child(node: &Node, mask: u32) -> u32 {
     node.children[mask.trailing_zeros() as usize % WIDTH]
 }
 
-/// Puts the children in `mask`, two or more, onto the stack, the nearest last, but for the nearest, which it answers: by where the
-/// ray enters them.
+/// Pushes the children in `mask` (two or more) onto the stack, the nearest last, except the nearest itself, which is
+/// returned. `enter` has the distances.
 #[inline(always)]
-pub(crate) fn push_by_distance<W: F32x16>(node: &Node, mask: u32, enter: W, room: Room<i64>) -> u32 {
+pub(crate) fn push_by_distance<W: F32x16>(node: &Node, mask: u32, enter: W, room: PushSlots<i64>) -> u32 {
     let but_one = mask & mask.wrapping_sub(1);
     let but_two = but_one & but_one.wrapping_sub(1);
     let but_three = but_two & but_two.wrapping_sub(1);
@@ -148,9 +147,9 @@ pub(crate) fn push_by_distance<W: F32x16>(node: &Node, mask: u32, enter: W, room
     nearest as u32
 }
 
-/// The same of any two or more.
+/// As [`push_by_distance`], for any two or more.
 #[inline(always)]
-fn push_many<W: F32x16>(node: &Node, mask: u32, enter: W, room: Room<i64>) -> u32 {
+fn push_many<W: F32x16>(node: &Node, mask: u32, enter: W, room: PushSlots<i64>) -> u32 {
     put_in_order(node, mask, enter, room.window);
     let count = mask.count_ones() as usize - 1;
     // SAFETY: as many were written, and one more.
@@ -161,12 +160,12 @@ fn push_many<W: F32x16>(node: &Node, mask: u32, enter: W, room: Room<i64>) -> u3
     }
 }
 
-/// Puts the children in `mask` there, the nearest last.
+/// Writes the children in `mask`, the nearest last.
 #[inline(always)]
 fn put_in_order<W: F32x16>(node: &Node, mask: u32, enter: W, window: &mut [MaybeUninit<i64>; WIDTH]) {
     let keys = enter.lanes_in_bits();
     let by_lane = keys.bits();
-    // Where each goes is how many are farther: no two have one key, so that the first places are all written.
+    // Each goes to the index that counts the farther ones. All keys differ, so the first slots are all written.
     let mut rest = mask % (1 << WIDTH);
     while rest != 0 {
         let lane = rest.trailing_zeros() as usize % WIDTH;
@@ -176,7 +175,7 @@ fn put_in_order<W: F32x16>(node: &Node, mask: u32, enter: W, window: &mut [Maybe
     }
 }
 
-/// The same as [`push_by_distance`], hardly with a branch where there are instructions for it: only where there are more than four.
+/// As [`push_by_distance`], almost branch-free if there are instructions for it: only for more than four.
 #[inline(always)]
 pub(crate) fn put_and_take_by_distance<W: F32x16>(
     node: &Node,
@@ -199,18 +198,18 @@ pub(crate) fn put_and_take_by_distance<W: F32x16>(
     slots.pop().map_or(Node::ABSENT, |entry| entry as u32)
 }
 
-/// Puts the children in `mask`, one or more, onto the stack in the order in which they stand in the node, but for the last, which it
-/// answers.
+/// Pushes the children in `mask` (one or more) onto the stack in the order of the node, except the last, which is
+/// returned.
 #[inline(always)]
-pub(crate) fn push_as_built<W: F32x16>(node: &Node, mask: u32, room: Room<u32>) -> u32 {
+pub(crate) fn push_as_built<W: F32x16>(node: &Node, mask: u32, room: PushSlots<u32>) -> u32 {
     W::put_chosen(mask, &node.children, room.window);
     // SAFETY: as many were written, and one more.
     unsafe { room.add(mask.count_ones() as usize - 1) };
     node.children[(31 - mask.leading_zeros()) as usize % WIDTH]
 }
 
-/// Puts the children in `mask`, if there are any, onto the stack in the order in which they stand in the node, and takes what then is
-/// the last there: without a branch.
+/// Pushes the children in `mask`, if any, onto the stack in the order of the node, and pops the last entry,
+/// branch-free.
 #[inline(always)]
 pub(crate) fn put_and_take_as_built<W: F32x16>(node: &Node, mask: u32, slots: &mut Slots<u32>) -> u32 {
     let Some(last) = slots.len.checked_sub(1) else { return Node::ABSENT };

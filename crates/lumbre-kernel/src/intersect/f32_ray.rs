@@ -1,4 +1,4 @@
-//! Rays in single precision as they are tested against triangles: see the proof in `trace::f32_ray`.
+//! Rays in single precision for triangle tests: see the proof in `trace::f32_ray`.
 
 use super::axes::Axes;
 use crate::simd::Vector;
@@ -10,13 +10,14 @@ pub(crate) struct F32Ray {
     pub(crate) axes: &'static Axes,
     /// Relative to the mesh, in the order of the axes; the last of four is the smallest `t`.
     pub(crate) origin: [f32; 4],
-    /// The direction by its z, of which x and y count; the last of four is the largest `t`.
+    /// The direction divided by its z (only x and y are used); the last of four is the largest `t`.
     pub(crate) shear: [f32; 4],
-    /// From what is behind a corner, with the sign turned, to `t`.
+    /// Converts a negated height to `t`.
     pub(crate) minus_inverse: f32,
 }
 
-/// The least of the edge functions, or of their opposites, whichever is more: how far within the triangle the line is.
+/// The minimum of the edge functions or of their negations, whichever is larger: how far inside the triangle the line
+/// is.
 #[inline(always)]
 pub(crate) fn within<V: Vector>([u, v, w]: [V; 3]) -> V {
     let opposite = u.max(v).max(w).xor_sign(V::splat(-0.0));

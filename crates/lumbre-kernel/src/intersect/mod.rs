@@ -1,9 +1,10 @@
-//! Rays against what a tree is made of: boxes, blocks of triangles, spheres and bounding volumes, for each instruction set. With
-//! [`simd`](crate::simd), the fence around all `unsafe` but the call that maps a file: above it, a traversal is written once, over
-//! [`Simd`].
+//! Ray tests against the parts of a tree: boxes, blocks of triangles, spheres and bounding volumes, for each
+//! instruction set. This module and [`simd`](crate::simd) contain all `unsafe` code except the call that maps a file.
+//! The traversals above are written once, over [`Simd`].
 //!
-//! [`Isa::run`] chooses the instruction set once a search, and [`Isa::dispatched`] for all searches. The code between is generic and
-//! `#[inline(always)]` without a target feature of its own, so that it takes on the features of the root that it is inlined into.
+//! [`Isa::run`] chooses the instruction set once per search, and [`Isa::dispatched`] once for all searches. The code in
+//! between is generic and `#[inline(always)]` without a target feature of its own, so that it inherits the features of
+//! the function that it is inlined into.
 
 #![allow(unsafe_code)]
 
@@ -35,11 +36,11 @@ pub(crate) use boxes::{
 };
 pub(crate) use dispatch::{Dispatch, DispatchedQuery, RayQuery};
 pub(crate) use isa::Isa;
-pub(crate) use operations::{CornersRoom, Simd};
+pub(crate) use operations::{CornerScratch, Simd};
 pub(crate) use portable::Portable;
 #[cfg(test)]
 pub(crate) use shims::*;
-pub(crate) use slots::{Room, STACK, Slots};
+pub(crate) use slots::{PushSlots, STACK, Slots};
 pub(crate) use spheres::intersect_spheres;
 #[cfg(test)]
 pub(crate) use spheres::intersect_spheres_at;

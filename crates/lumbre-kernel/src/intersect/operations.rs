@@ -1,4 +1,4 @@
-//! What a search does many at a time, for each instruction set.
+//! The vector operations of a search, for each instruction set.
 
 use lumbre_geometry::Ray;
 use lumbre_math::Transform;
@@ -16,28 +16,28 @@ use crate::tree::node::TreeSpace;
 use crate::tree::triangle_block::TriangleBlock;
 use crate::tree::{BLOCK, Corners};
 
-/// What a search does many at a time: boxes by sixteen, and triangles by eight.
+/// The vector operations of a search: sixteen boxes or eight triangles at a time.
 pub(crate) trait Simd {
     /// Eight numbers.
     type F32x8: F32x8;
-    /// Sixteen numbers, alike.
+    /// Sixteen numbers.
     type F32x16: F32x16<Half = Self::F32x8>;
-    /// Whether two rays, each at a block of its own, are better met together than one after the other.
+    /// Whether testing two rays together, each with its own block, is faster than one after the other.
     const INTERSECTS_BY_TWO: bool = false;
-    /// Whether rays go on together for a while where that no longer pays, for what they have done: see `packet`.
+    /// Whether a packet continues for a while after it stopped paying, to make use of the work done: see `packet`.
     const GOES_ON_TOGETHER: bool = true;
 
-    /// The instruction set that these are of.
+    /// The instruction set of these operations.
     fn isa() -> Isa;
 
-    /// Makes `boxes` the ray from `t_min` to `t_max` for a tree in these units, if it is one from nearby, which it answers;
-    /// also checks that it is sound.
+    /// Sets up `boxes` for the ray from `t_min` to `t_max` and a tree in these units, if the ray starts nearby; returns
+    /// whether it does. Also checks that the ray is valid.
     fn start_nearby(tree_space: &TreeSpace, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool;
 
-    /// The ray for boxes in single precision; `None` where it does not come from nearby, or is not sound.
+    /// The ray for boxes in single precision; `None` if it does not start nearby, or is invalid.
     fn start_filter(start: &FilterStart, ray: &Ray) -> Option<Slabs>;
 
-    /// The ray in the space of what a map places, with another range, and for boxes there: see [`Ray::into_object`].
+    /// The ray in the space of a placed tree, with another range, and for the boxes there: see [`Ray::into_object`].
     #[inline(always)]
     fn start_placed(
         start: &FilterStart,
@@ -49,39 +49,39 @@ pub(crate) trait Simd {
         (ray, Self::start_filter(start, &ray))
     }
 
-    /// The same ray for triangles, and from heights along it to places in the range of boxes.
+    /// The same ray for triangles, and the factor from heights along it to positions in the range of boxes.
     fn start_blocks(start: &FilterStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32);
 
-    /// A ray as it can be read in wide pieces at once, though it may have been written number by number just now: what is read so would
-    /// wait until that is out of sight, and with it the rays one for another.
+    /// A ray for wide loads, though it may just have been written element by element. A wide load of recent narrow
+    /// stores would stall until they retire, which would serialise the rays.
     #[inline(always)]
     fn read(ray: &Ray) -> Ray {
         *ray
     }
 
-    /// The same in single precision.
+    /// As [`Self::read`], in single precision.
     #[inline(always)]
     fn read_f32(ray: &Ray32) -> Ray32 {
         *ray
     }
 
-    /// The ray in single precision for boxes; `None` where it does not come from nearby, or is not sound.
+    /// The ray in single precision for boxes; `None` if it does not start nearby, or is invalid.
     fn start_f32(start: &FilterStart, ray: &Ray32) -> Option<Slabs>;
 
     /// The same ray for triangles.
     fn start_f32_blocks(start: &FilterStart, ray: &Ray32, slabs: &Slabs) -> F32Ray;
 
-    /// The numbers of rays in single precision, side by side: origin, start, direction, end.
+    /// The numbers of rays in single precision, transposed: origin, start, direction, end.
     fn f32_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]);
 
-    /// The numbers of rays, side by side: origin, direction and range.
+    /// The numbers of rays, transposed: origin, direction and range.
     fn columns(rays: &[Ray; WIDE], columns: &mut [Row<f64>; 8]);
 
-    /// The corners of the triangles of a block in the ray's sheared space, `[x, y or z][corner]`: see [`Shears::apply`]. What lanes without
-    /// a triangle have means nothing.
+    /// The corners of a block's triangles in the ray's sheared space, `[x, y or z][corner]`: see [`Shears::apply`].
+    /// Lanes without a triangle are undefined.
     fn sheared_corners<S: Shears>(block: &TriangleBlock, ray: &S) -> [[Self::F32x8; 3]; 3];
 
-    /// The same of two blocks, each by its ray: those of the first, and those of the second.
+    /// As [`Self::sheared_corners`] for two rays, each with its own block.
     #[inline(always)]
     fn sheared_corners_by_two<S: Shears>(
         blocks: [&TriangleBlock; 2],
@@ -92,14 +92,15 @@ pub(crate) trait Simd {
         [three_of_two(&x, &other_x), three_of_two(&y, &other_y), three_of_two(&z, &other_z)]
     }
 
-    /// A bit for each triangle that the line of the ray may meet, among them all that it does, and what [`Edges::place`] wants to know.
+    /// A bit for each triangle that the line of the ray may meet, which includes all that it meets, and the input of
+    /// [`Edges::place`].
     #[inline(always)]
     fn intersect_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Edges<Self::F32x8>) {
         let (mask, edges) = Edges::of(Self::sheared_corners(block, ray), Self::F32x8::splat(ray.least_size));
         (mask & block.taken(), edges)
     }
 
-    /// The same of two blocks, each by its ray: those of the first, and those of the second.
+    /// As [`Self::intersect_triangles`] for two rays, each with its own block.
     #[inline(always)]
     fn intersect_triangles_by_two(
         blocks: [&TriangleBlock; 2],
@@ -115,28 +116,28 @@ pub(crate) trait Simd {
         (mask & (blocks[0].taken() | blocks[1].taken() << BLOCK), edges)
     }
 
-    /// For each number of a list, a bit for each place before it that has the same.
+    /// For each number of a list, a bit for each equal one before it.
     fn equals_before(list: &[u32; 3 * BLOCK]) -> [u32; 3 * BLOCK];
 
-    /// Whole numbers without what stands behind the point. None is to be 2^31 or more, or to be no number.
+    /// Integers, truncated towards zero. All numbers must be below 2^31, and none NaN.
     fn truncated(numbers: &[f32; BLOCK]) -> [i32; BLOCK];
 
-    /// The corners of the triangles of a block: where they stand there, or in this room.
-    fn corners<'a>(block: &'a TriangleBlock, room: &'a mut CornersRoom) -> &'a Corners;
+    /// The corners of a block's triangles: borrowed from the block, or computed into `room`.
+    fn corners<'a>(block: &'a TriangleBlock, room: &'a mut CornerScratch) -> &'a Corners;
 
     /// [`Shear::new`] and [`Shear::local_origin`] of a ray that has these axes, for a mesh.
     fn shear(ray: &Ray, axes: &'static Axes, mesh_origin: &[f64; 4]) -> (Shear, [f64; 3]);
 
-    /// How a ray passes the triangle in a lane, in double precision, and what its crossing inside is made of. `origin` has the order
-    /// of the shear's axes.
+    /// How a ray passes the triangle in a lane, in double precision, and the data of its crossing. `origin` has the
+    /// order of the shear's axes.
     fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (EdgeTest, Inside);
 }
 
-/// Room for corners.
+/// Scratch memory for corners.
 #[repr(align(32))]
-pub(crate) struct CornersRoom(pub(super) Corners);
+pub(crate) struct CornerScratch(pub(super) Corners);
 
-impl CornersRoom {
+impl CornerScratch {
     #[inline(always)]
     pub(crate) fn new() -> Self {
         Self([[[0.0; BLOCK]; 3]; 3])

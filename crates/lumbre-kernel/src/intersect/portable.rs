@@ -5,7 +5,7 @@ use lumbre_math::DVec3;
 
 use super::axes::{Axes, Sides};
 use super::isa::{Isa, Set};
-use super::operations::{CornersRoom, Simd};
+use super::operations::{CornerScratch, Simd};
 use super::triangles::Shears;
 use crate::intersect::box_ray::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs};
 use crate::intersect::f32_ray::F32Ray;
@@ -153,7 +153,7 @@ impl Simd for Portable {
     #[inline]
     fn sheared_corners<S: Shears>(block: &TriangleBlock, ray: &S) -> [[Portable8; 3]; 3] {
         let [kx, ky, kz] = ray.axes().order();
-        let mut room = CornersRoom::new();
+        let mut room = CornerScratch::new();
         let corners = Self::corners(block, &mut room);
         let mut sheared = [[Portable8::splat(0.0); 3]; 3];
         for corner in 0..3 {
@@ -200,11 +200,11 @@ impl Simd for Portable {
     }
 
     #[inline]
-    fn corners<'a>(block: &'a TriangleBlock, room: &'a mut CornersRoom) -> &'a Corners {
+    fn corners<'a>(block: &'a TriangleBlock, room: &'a mut CornerScratch) -> &'a Corners {
         if block.is_unshared() {
             return block.own_corners();
         }
-        let CornersRoom(corners) = room;
+        let CornerScratch(corners) = room;
         for lane in 0..BLOCK {
             let vertices = block.vertices_at(lane);
             for (axis, corners) in corners.iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! What each operation gives at an instruction set, for tests.
+//! Each operation at an instruction set, for tests.
 
 use lumbre_geometry::Ray;
 use lumbre_math::Transform;
@@ -11,7 +11,7 @@ use super::boxes::{
 use super::dispatch::Dispatch;
 use super::f32_ray::F32Ray;
 use super::isa::Isa;
-use super::operations::{CornersRoom, Simd};
+use super::operations::{CornerScratch, Simd};
 use super::slots::Slots;
 use super::triangles::Edges;
 use super::watertight::BlockRay;
@@ -22,7 +22,7 @@ use crate::tree::node::{Node, WIDTH};
 use crate::tree::triangle_block::TriangleBlock;
 use crate::tree::{BLOCK, Corners};
 
-/// What [`Simd::start_filter`] and [`Simd::start_blocks`] give at an instruction set, for tests.
+/// [`Simd::start_filter`] and [`Simd::start_blocks`] at an instruction set, for tests.
 pub(crate) fn start_filter_at(isa: Isa, start: &FilterStart, ray: &Ray) -> Option<(Slabs, BlockRay, f32)> {
     struct Starting<'a>(&'a FilterStart, &'a Ray);
     impl Dispatch for Starting<'_> {
@@ -37,7 +37,7 @@ pub(crate) fn start_filter_at(isa: Isa, start: &FilterStart, ray: &Ray) -> Optio
     isa.run(Starting(start, ray))
 }
 
-/// What [`Simd::read`] and [`Simd::read_f32`] give at an instruction set, for tests.
+/// [`Simd::read`] and [`Simd::read_f32`] at an instruction set, for tests.
 pub(crate) fn read_at(isa: Isa, ray: &Ray, f32_ray: &Ray32) -> (Ray, Ray32) {
     struct Reading<'a>(&'a Ray, &'a Ray32);
     impl Dispatch for Reading<'_> {
@@ -50,7 +50,7 @@ pub(crate) fn read_at(isa: Isa, ray: &Ray, f32_ray: &Ray32) -> (Ray, Ray32) {
     isa.run(Reading(ray, f32_ray))
 }
 
-/// What [`Simd::start_placed`] gives at an instruction set, for tests.
+/// [`Simd::start_placed`] at an instruction set, for tests.
 pub(crate) fn start_placed_at(
     isa: Isa,
     start: &FilterStart,
@@ -69,19 +69,19 @@ pub(crate) fn start_placed_at(
     isa.run(Starting(start, map, ray, range))
 }
 
-/// What [`Simd::intersect_boxes`] gives at an instruction set, and where the ray enters each box, for tests.
+/// [`Simd::intersect_boxes`] at an instruction set, with where the ray enters each box, for tests.
 pub(crate) fn intersect_boxes_at(isa: Isa, node: &Node, ray: &Slabs) -> (u32, [i32; WIDTH]) {
     struct Boxes<'a>(&'a Node, &'a Slabs);
     impl Dispatch for Boxes<'_> {
         type Output = (u32, [i32; WIDTH]);
         #[inline(always)]
         fn run<L: Simd>(self) -> Self::Output {
-            // A child's reference is its lane here. The nearest, which never stands on the stack, has no key.
+            // A child's reference is its lane here. The nearest child is never pushed, so it has no key.
             let mut node = *self.0;
             node.children = std::array::from_fn(|lane| lane as u32);
             let (mask, enter) = intersect_boxes::<L::F32x16>(&node, self.1);
             let mut by_lane = [i32::MAX; WIDTH];
-            // On what was there before: as they stand in the node.
+            // On top of earlier entries: in the order of the node.
             let mut slots = Slots::new();
             slots.push(99);
             let mut taken = vec![put_and_take_as_built::<L::F32x16>(&node, mask, &mut slots)];
@@ -113,11 +113,11 @@ pub(crate) fn intersect_boxes_at(isa: Isa, node: &Node, ray: &Slabs) -> (u32, [i
     isa.run(Boxes(node, ray))
 }
 
-/// A mask of children, and where they are entered.
+/// A mask of children, and where the ray enters them.
 type Entered = (u32, [f32; WIDTH]);
 
-/// What [`intersect_each`] gives of some children at an instruction set for those of the rays that are alive, and what [`intersect_boxes`] gives for each
-/// of them: a mask, and where children are entered; for tests. All have the sides of the first.
+/// For some children at an instruction set, [`intersect_each`] for the live rays and [`intersect_boxes`] for each ray:
+/// a mask, and where children are entered; for tests. All rays have the sides of the first.
 pub(crate) fn intersect_each_at(
     isa: Isa,
     node: &Node,
@@ -155,8 +155,8 @@ pub(crate) fn intersect_each_at(
     isa.run(Each(node, rays, alive, children))
 }
 
-/// The triangles of a block that the ray may meet in its range and those that it certainly does, at an instruction set, with the heights
-/// between which each is met, for tests.
+/// The triangles of a block that the ray may meet in its range and those that it certainly meets, at an instruction
+/// set, with the interval of heights of each, for tests.
 pub(crate) fn intersect_triangles_at(
     isa: Isa,
     block: &TriangleBlock,
@@ -176,16 +176,16 @@ pub(crate) fn intersect_triangles_at(
     isa.run(Triangles(block, ray))
 }
 
-/// What a ray is told of a block, bit by bit, of lanes with a triangle: which it may meet, those in its range, those that it surely meets,
-/// where, and the corners as single precision has them.
+/// The bits of a ray's test against a block, for lanes with a triangle: which triangles it may meet, which are in its
+/// range, which it certainly meets, where, and their corners in single precision.
 #[derive(Debug, PartialEq)]
-pub(crate) struct Told {
+pub(crate) struct TestedBlock {
     masks: [u32; 3],
     heights: [[u32; BLOCK]; 2],
     corners: [[[u32; BLOCK]; 3]; 3],
 }
 
-impl Told {
+impl TestedBlock {
     #[inline(always)]
     fn of<L: Simd>(
         (block, ray): (&TriangleBlock, &BlockRay),
@@ -212,16 +212,16 @@ impl Told {
     }
 }
 
-/// What two rays are told of two blocks at an instruction set, each of its own: by both together, and by each alone; for tests.
+/// The results of two rays, each with its own block, at an instruction set: tested together and one by one; for tests.
 pub(crate) fn told_at(
     isa: Isa,
     blocks: [&TriangleBlock; 2],
     rays: [&BlockRay; 2],
     f32_ray: [&F32Ray; 2],
-) -> [[Told; 2]; 2] {
+) -> [[TestedBlock; 2]; 2] {
     struct Telling<'a>([&'a TriangleBlock; 2], [&'a BlockRay; 2], [&'a F32Ray; 2]);
     impl Dispatch for Telling<'_> {
-        type Output = [[Told; 2]; 2];
+        type Output = [[TestedBlock; 2]; 2];
         #[inline(always)]
         fn run<L: Simd>(self) -> Self::Output {
             let Self(blocks, rays, f32_ray) = self;
@@ -232,12 +232,12 @@ pub(crate) fn told_at(
             let together = |which: usize| {
                 let of_one = (mask >> (BLOCK * which) & L::F32x8::ALL, edges.half(which));
                 let corners = [one(&x, which), one(&y, which), one(&z, which)];
-                Told::of::<L>((blocks[which], rays[which]), of_one, corners)
+                TestedBlock::of::<L>((blocks[which], rays[which]), of_one, corners)
             };
             let alone = |which: usize| {
                 let (block, ray) = (blocks[which], rays[which]);
                 let corners = L::sheared_corners(block, f32_ray[which]);
-                Told::of::<L>((block, ray), L::intersect_triangles(block, ray), corners)
+                TestedBlock::of::<L>((block, ray), L::intersect_triangles(block, ray), corners)
             };
             [[together(0), together(1)], [alone(0), alone(1)]]
         }
@@ -252,7 +252,7 @@ pub(crate) fn corners_at(isa: Isa, block: &TriangleBlock) -> Corners {
         type Output = Corners;
         #[inline(always)]
         fn run<L: Simd>(self) -> Self::Output {
-            *L::corners(self.0, &mut CornersRoom::new())
+            *L::corners(self.0, &mut CornerScratch::new())
         }
     }
     isa.run(Taking(block))

@@ -7,10 +7,10 @@ use crate::tree::node::WIDTH;
 /// Entries in the array of a stack. Few in tests, so that spilling is tested.
 pub(crate) const STACK: usize = if cfg!(test) { 3 * WIDTH } else { 256 };
 
-/// The array of a stack, which is not cleared for every ray.
+/// The array of a stack; not cleared for every ray.
 #[repr(C, align(64))]
 pub(crate) struct Slots<E> {
-    // Beside the first entries.
+    // In the cache line of the first entries.
     pub(super) len: usize,
     // The first `len` are initialised, and `len <= STACK`.
     pub(super) entries: [MaybeUninit<E>; STACK],
@@ -22,7 +22,7 @@ impl<E: Copy> Slots<E> {
         Self { entries: [const { MaybeUninit::uninit() }; STACK], len: 0 }
     }
 
-    /// Many: none is moved to where it is.
+    /// `N` arrays on the heap, initialised in place.
     pub(crate) fn many<const N: usize>() -> Box<[Self; N]> {
         let mut many = Box::<[Self; N]>::new_uninit();
         let first: *mut Self = many.as_mut_ptr().cast();
@@ -40,25 +40,25 @@ impl<E: Copy> Slots<E> {
         self.len
     }
 
-    /// Adds one.
+    /// Pushes an entry.
     ///
     /// # Panics
-    /// When it is full.
+    /// If the array is full.
     #[inline(always)]
     pub(crate) fn push(&mut self, entry: E) {
         self.entries[self.len] = MaybeUninit::new(entry);
         self.len += 1;
     }
 
-    /// Somewhere for all children of a node.
+    /// Slots for all children of a node.
     ///
     /// # Panics
-    /// When there is not.
+    /// If there are too few.
     #[inline(always)]
-    pub(crate) fn room(&mut self) -> Room<'_, E> {
+    pub(crate) fn room(&mut self) -> PushSlots<'_, E> {
         let len = self.len;
         let window = (&mut self.entries[len..len + WIDTH]).try_into().expect("as many");
-        Room { window, end: &mut self.len, len }
+        PushSlots { window, end: &mut self.len, len }
     }
 
     #[inline(always)]
@@ -77,16 +77,16 @@ impl<E: Copy> Slots<E> {
     }
 }
 
-/// The next ones of an array that entries are added to.
-pub(crate) struct Room<'s, E> {
+/// The next slots of an array.
+pub(crate) struct PushSlots<'s, E> {
     pub(super) window: &'s mut [MaybeUninit<E>; WIDTH],
     end: &'s mut usize,
-    // Where that stood.
+    // The length field of the array.
     len: usize,
 }
 
-impl<E> Room<'_, E> {
-    /// Adds the first of them.
+impl<E> PushSlots<'_, E> {
+    /// Adds the first `count` of them.
     ///
     /// # Safety
     /// They have been written.

@@ -4,8 +4,8 @@ use super::operations::Simd;
 use crate::simd::{F32x8, Vector};
 use crate::tree::sphere_block::{SphereBlock, SphereRay};
 
-/// A bit for each sphere of a block that the ray may hit within its range, among them all that it does; and for each that it certainly
-/// hits. Unused lanes are NaN, and no comparison with a NaN holds.
+/// A bit for each sphere of a block that the ray may hit in its range, which includes all that it hits; and a bit for
+/// each that it certainly hits. Unused lanes are NaN, and no comparison with a NaN holds.
 #[inline(always)]
 pub(crate) fn intersect_spheres<L: Simd>(block: &SphereBlock, ray: &SphereRay) -> (u32, u32) {
     let (load, splat) = (L::F32x8::load, L::F32x8::splat);
@@ -15,7 +15,7 @@ pub(crate) fn intersect_spheres<L: Simd>(block: &SphereBlock, ray: &SphereRay) -
     let y = load(&block.centers[1]) - splat(ray.origin[1]);
     let z = load(&block.centers[2]) - splat(ray.origin[2]);
     let (radii, margin) = (load(&block.radii), splat(ray.margin));
-    // How far along the line is what is nearest to the centre, and the square of the distance between them.
+    // Where the line is nearest to the centre, and the square of that distance.
     let along = x.mul_add(ex, y.mul_add(ey, z * ez));
     let px = along.neg_mul_add(ex, x);
     let py = along.neg_mul_add(ey, y);

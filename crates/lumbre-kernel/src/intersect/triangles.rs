@@ -1,4 +1,4 @@
-//! A ray against the triangles of a block, side by side: see [`BlockRay`] for the error bounds.
+//! A ray against the triangles of a block, in SIMD lanes: see [`BlockRay`] for the error bounds.
 
 use bytemuck::Zeroable;
 
@@ -9,16 +9,17 @@ use super::watertight::{
 };
 use crate::simd::{self, F32x8, F32x16, Vector};
 
-/// What shears the corners of triangles.
+/// A shear of triangle corners.
 pub(crate) trait Shears {
     fn axes(&self) -> &'static Axes;
     /// In the order of the axes, here and below.
     fn origin(&self) -> &[f32; 4];
     fn shear(&self) -> &[f32; 4];
-    /// What rounding took from the origin, where that counts.
+    /// The rounding error of the origin, if it matters.
     fn rest(&self) -> Option<&[f32; 4]>;
 
-    /// Corners in the sheared space, all with the sign turned, which their products do not have: so one operand can come from memory.
+    /// Corners in the sheared space, negated, which leaves their products unchanged. So one operand can come from
+    /// memory.
     #[inline(always)]
     fn apply<V: Vector>(&self, [x, y, z]: [V; 3]) -> [V; 3] {
         let (origin, shear) = (self.origin(), self.shear());
@@ -82,17 +83,17 @@ impl Shears for F32Ray {
 /// Where a ray may meet the triangles of a block.
 #[derive(Clone, Copy)]
 pub(crate) struct Crossings<V> {
-    /// A bit for each that may be met within the range, if its line meets it: among them all that are.
+    /// A bit for each that may be met in the range if its line meets it; includes all that are.
     pub(crate) in_range: u32,
-    /// A bit for each that certainly is met there.
+    /// A bit for each that is certainly met there.
     pub(crate) sure: u32,
-    /// Heights along the ray between which the crossing lies.
+    /// The interval of heights of each crossing.
     pub(crate) from: V,
     pub(crate) to: V,
 }
 
 impl<V: F32x8> Crossings<V> {
-    /// The heights between which the crossing in a lane lies.
+    /// The interval of heights of the crossing in a lane.
     #[inline(always)]
     pub(crate) fn between(&self, lane: usize) -> (f32, f32) {
         (self.from.lane(lane), self.to.lane(lane))
@@ -106,16 +107,17 @@ pub(crate) struct Edges<V> {
     values: [V; 3],
     /// Of the corners.
     heights: [V; 3],
-    /// The least of them or of their opposites, whichever is more: how far within the triangle the line is.
+    /// The minimum of the edge functions or of their negations, whichever is larger: how far inside the triangle the
+    /// line is.
     within: V,
-    /// By how much they may be wrong, below zero, and the heights.
+    /// The negated error bound of the edge functions, and the heights.
     minus_error: V,
     height_error: V,
 }
 
 impl<V: Vector> Edges<V> {
-    /// Of corners in the sheared spaces of the rays, which have these [`least_size`](BlockRay::least_size)s, and a bit for each triangle that is
-    /// perhaps met.
+    /// From corners in the sheared spaces of rays with these [`least_size`](BlockRay::least_size)s; also returns a bit
+    /// for each triangle that may be met.
     #[inline(always)]
     pub(super) fn of([x, y, z]: [[V; 3]; 3], least_size: V) -> (u32, Self) {
         let u = x[2].mul_sub(y[1], y[2] * x[1]);
@@ -134,7 +136,7 @@ impl<V: Vector> Edges<V> {
 }
 
 impl<W: F32x16> Edges<W> {
-    /// Those of one of the two lines: `which` is 0 or 1.
+    /// The edges of one of the two lines: `which` is 0 or 1.
     #[inline(always)]
     pub(crate) fn half(&self, which: usize) -> Edges<W::Half> {
         let Self { values: [u, v, w], heights: [a, b, c], within, minus_error, height_error } = self;
@@ -147,7 +149,7 @@ impl<W: F32x16> Edges<W> {
         }
     }
 
-    /// Those of two lines.
+    /// The edges of two lines.
     #[inline(always)]
     pub(super) fn of_two(first: &Edges<W::Half>, second: &Edges<W::Half>) -> Self {
         Self {
@@ -161,7 +163,7 @@ impl<W: F32x16> Edges<W> {
 }
 
 impl<V: F32x8> Edges<V> {
-    /// Where along the ray that is.
+    /// Where along the ray they are met.
     #[inline(always)]
     pub(crate) fn place(&self, ray: &BlockRay) -> Crossings<V> {
         let &Self { values: [u, v, w], heights: z, within, minus_error, height_error } = self;
@@ -178,7 +180,7 @@ impl<V: F32x8> Edges<V> {
         let spread = (minus_error * V::splat(-ERRORS_OF_EXTENT)).mul_add(high - low, along_edges);
         let (from, to) = (ahead - spread, ahead + spread);
         let range = &ray.range;
-        // What is no number may be in range.
+        // NaN may be in range.
         let is_out =
             to.simd_lt(weight * V::splat(range.first)) | (weight * V::splat(range.last)).simd_lt(from);
         let is_inside = minus_error.xor_sign(V::splat(-0.0)).simd_lt(within);

@@ -1,9 +1,9 @@
-//! The watertight test of triangles: alone, by eight, and by sixteen with a ray each.
+//! The watertight test of triangles: one by one, by eight, and by sixteen with a ray each.
 //!
-//! After S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013. It differs from theirs in
-//! three ways. Everything after the load is in f64. An edge function whose products are equal is redone exactly, so that
-//! its sign is always the sign of the exact edge function of the sheared corners. And where that is exactly zero, the ray
-//! is taken to be moved by (ε, ε²) in the sheared plane ("simulation of simplicity": H. Edelsbrunner, E. Mücke, ACM
+//! After S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, with three differences.
+//! Everything after the load is in f64. An edge function whose products are equal is computed again exactly, so that
+//! its sign is always the sign of the exact edge function of the sheared corners. If that is exactly zero, the ray
+//! counts as moved by (ε, ε²) in the sheared plane ("simulation of simplicity": H. Edelsbrunner, E. Mücke, ACM
 //! Transactions on Graphics 9(1), 1990). The signs are then those of one ray in general position, the same for every
 //! triangle: such a ray crosses a closed mesh an even number of times and meets no edge and no vertex, so that each
 //! crossing has exactly one owner.
@@ -13,9 +13,9 @@ use lumbre_math::{DVec2, DVec3};
 
 use super::axes::Axes;
 use crate::simd::{Row, WIDE};
-use crate::tree::filter_start::LEAST_SIZE;
+use crate::tree::filter_start::MIN_SIZE;
 
-/// The shear that turns a ray's direction into the last axis: once a ray.
+/// The shear that turns a ray's direction into the last axis; computed once per ray.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shear {
     /// The axes that become x, y and z; z is the direction's largest.
@@ -53,7 +53,8 @@ impl Shear {
     }
 }
 
-/// A corner, sheared by the first two components of a direction by the last. All have the order of the axes.
+/// A sheared corner. The shear is the first two components of the direction, divided by the last. All are in the order
+/// of the axes.
 #[inline(always)]
 fn sheared(shear: [f64; 2], origin: &[f64; 3], [x, y, z]: [f32; 3]) -> Corner {
     let height = f64::from(z) - origin[2];
@@ -64,56 +65,58 @@ fn sheared(shear: [f64; 2], origin: &[f64; 3], [x, y, z]: [f32; 3]) -> Corner {
     }
 }
 
-/// A ray in single precision, for a first test of eight triangles that is sharp, but never loses one.
+/// A ray in single precision, for a sharp but conservative first test of eight triangles.
 ///
-/// # Why none is lost
+/// # Error bound
 ///
-/// Let u = 2⁻²⁴, L the largest coordinate of a corner of the mesh plus the largest of the ray's origin, both relative to the
-/// mesh, and R the largest coordinate of a triangle's corners relative to the ray's origin. The origin is kept in two parts:
-/// rounded, and the rest, so that together they are wrong by u²L, and differences from it by a share of R. What follows is
-/// the sheared corner (x, y, z), z without the rest, compared with the one that the test in double precision has.
+/// Let u = 2⁻²⁴, L the largest coordinate of a corner of the mesh plus the largest of the ray's origin, both relative
+/// to the mesh, and R the largest coordinate of a triangle's corners relative to the ray's origin. The origin is kept
+/// in two parts: rounded, and the rest, so that together they have an error of u²L, and differences from it a relative
+/// error of R. What follows is the sheared corner (x, y, z), z without the rest, compared with that of the test in
+/// double precision.
 ///
-/// Let |x|, |y| ≤ m and |z| ≤ h be as computed, and s = m + h + 4uL. x is wrong by u(m + h) from the difference and as much from
-/// the sum with the rest, by uh from z, uh from the product where that is rounded apart, 4.1uh from the shear (no more than 1, and
-/// the quotient of rounded numbers by way of a rounded inverse), by um from the last subtraction, and by 12.3u²L from the rest of
-/// the origin and its shear, which with what the rest adds to the first two is 16.3u²L: by u(3m + 8.1h) + 16.3u²L. So δ = 8.5us is
-/// more than that, and covers what is rounded in double precision too.
+/// Let |x|, |y| ≤ m and |z| ≤ h be as computed, and s = m + h + 4uL. The error of x is u(m + h) from the difference and
+/// as much from the sum with the rest, uh from z, uh from the product if that is rounded separately, 4.1uh from the
+/// shear (at most 1, and the quotient of rounded numbers through a rounded inverse), um from the last subtraction, and
+/// 12.3u²L from the rest of the origin and its shear, which with what the rest adds to the first two is 16.3u²L. The
+/// sum is u(3m + 8.1h) + 16.3u²L. So δ = 8.5us is larger, and covers rounding in double precision too.
 ///
-/// An edge function xy' - yx' is off by 4δm + 2δ² from the corners, and by 4.1um² from its own roundings: by no more than
-/// 38.1usm + 145u²s². With `error = 40us (m + 4us)`, which leaves room for its own roundings, an edge function that is not negative
-/// in double precision is not below `-error` here. [`TINY`] is added for what may underflow.
+/// An edge function xy' - yx' has an error of 4δm + 2δ² from the corners, and of 4.1um² from its own rounding: at most
+/// 38.1usm + 145u²s². With `error = 40us (m + 4us)`, which covers its own rounding, an edge function that is not
+/// negative in double precision is at least `-error` here. [`TINY`] is added for underflow.
 ///
-/// Let D be the sum of the edge functions as computed. A crossing within the triangle is at the z for which Σ eᵢ (zᵢ - z) is zero in
-/// double precision, and between the least and the largest zᵢ. With edge functions wrong by `error` each, Σ eᵢ zᵢ is off z D by no
-/// more than 3 `error` of the triangle's extent in z: they are wrong by a twentieth less. Roundings of the three products and their
-/// sums are below 4uh Σ |eᵢ|, those of the corners' z below uh Σ |eᵢ|, those of D below 2uh Σ |eᵢ|, and what comes of the rest of
-/// the origin, of which D takes a part, below us Σ |eᵢ|; those of the ends of the interval, which are compared with products of the
-/// range's ends with |D|, or multiplied by its inverse, below 3uh Σ |eᵢ|. As no edge function is beyond `error` on the other side
-/// than D, Σ |eᵢ| ≤ |D| + 6 `error`. So
-/// `spread = 3 error extent + 12us (|D| + 6 error) + TINY` has room for all of it, whatever D.
+/// Let D be the sum of the computed edge functions. A crossing inside the triangle is at the z for which Σ eᵢ (zᵢ - z)
+/// is zero in double precision, and between the least and the largest zᵢ. With errors of `error` in each edge function,
+/// Σ eᵢ zᵢ differs from z D by at most 3 `error` times the triangle's extent in z: the actual errors are smaller by a
+/// twentieth. Rounding errors of the three products and their sums are below 4uh Σ |eᵢ|, those of the corners' z below
+/// uh Σ |eᵢ|, those of D below 2uh Σ |eᵢ|, and those from the rest of the origin, of which D takes a part, below us Σ
+/// |eᵢ|; those of the ends of the interval, which are compared with products of the range's ends with |D|, or
+/// multiplied by its inverse, below 3uh Σ |eᵢ|. No edge function is beyond `error` on the other side than D, so Σ |eᵢ|
+/// ≤ |D| + 6 `error`. So `spread = 3 error extent + 12us (|D| + 6 error) + TINY` covers all of it, for any D.
 ///
-/// Where all edge functions are beyond `error` on one side, those in double precision are beyond zero on the same, so that the
-/// line does meet the triangle, and at which face is certain, too; and where height ± spread lies between `surely_first` and
-/// `surely_last`, the hit is in range. The ends of the range are moved, outwards or inwards, by what their own rounding may be.
+/// If all edge functions are beyond `error` on one side, those in double precision are beyond zero on the same side:
+/// the line does meet the triangle, and the face is certain too. If height ± spread lies between `surely_first` and
+/// `surely_last`, the hit is in range. The ends of the range are moved, outwards or inwards, by their own possible
+/// rounding error.
 ///
-/// All this without overflow, as L ≤ 2³⁸ and so Σ |eᵢ zᵢ| < 2¹²³; else the test is left out. It is also below 2⁻⁵⁰, and below 2⁻⁴⁰
-/// nothing is certain.
+/// Nothing overflows, since L ≤ 2³⁸ and so Σ |eᵢ zᵢ| < 2¹²³; for a larger L the test is skipped. It is also skipped
+/// below 2⁻⁵⁰, and below 2⁻⁴⁰ nothing is certain.
 ///
-/// The last axis is the one that double precision takes, along which the rounded direction is no shorter than along the others.
+/// The last axis is that of double precision; along it, the rounded direction is no shorter than along the others.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BlockRay {
     pub(crate) axes: &'static Axes,
-    /// Relative to the mesh, rounded, in the order of the axes; the last of four means nothing, here and below.
+    /// Relative to the mesh, rounded, in the order of the axes; the last of four is unused, here and below.
     pub(crate) origin: [f32; 4],
-    /// What rounding took from it, sheared as corners are.
+    /// The rounding error of the origin, sheared like corners.
     pub(crate) rest: [f32; 4],
-    /// The direction by its last component, in the order of the axes.
+    /// The direction divided by its last component, in the order of the axes.
     pub(crate) shear: [f32; 4],
-    /// 4uL, of the largest L there may be.
+    /// 4uL, for the largest possible L.
     pub(crate) least_size: f32,
     pub(crate) range: HeightRange,
-    /// A zero, negative where the last component of the direction is positive: what is behind a corner, with the sign flipped by
-    /// it, grows along the ray.
+    /// A zero, negative if the last component of the direction is positive: its sign flips the sign of negated heights,
+    /// so that they grow along the ray.
     pub(crate) turn: f32,
 }
 
@@ -121,31 +124,31 @@ pub(crate) struct BlockRay {
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub(crate) struct HeightRange {
-    /// Heights along the ray before this, or after the other, are out of range.
+    /// Heights along the ray outside these two are out of range.
     pub(crate) first: f32,
     pub(crate) last: f32,
-    /// Those between these are in range.
+    /// Heights between these are in range.
     pub(crate) surely_first: f32,
     pub(crate) surely_last: f32,
 }
 
 /// u.
 const ROUNDOFF: f32 = 1.0 / (1 << 24) as f32;
-/// The factors of what edge functions and heights may be wrong by.
+/// The factors of the error bounds of edge functions and heights.
 pub(crate) const EDGE_ERROR: f32 = 40.0 * ROUNDOFF;
 pub(crate) const SIZE_ERROR: f32 = 4.0 * ROUNDOFF;
 pub(crate) const HEIGHT_ERROR: f32 = 12.0 * ROUNDOFF;
-/// How often the error of an edge function stands in that of a height by the extent in z, and in the bound on all edge functions.
+/// Factors of an edge function's error: in the error of a height by the extent in z, and in the bound on all edge
+/// functions.
 pub(crate) const ERRORS_OF_EXTENT: f32 = 3.0;
 pub(crate) const ERRORS_OF_EDGES: f32 = 6.0;
-/// Above all that underflow may do.
+/// Larger than any underflow.
 pub(crate) const TINY: f32 = 1.0 / (1u128 << 120) as f32;
-/// Above all that few roundings may do.
+/// Larger than a few rounding errors.
 pub(crate) const ROUNDINGS: f32 = 6.0 * ROUNDOFF;
-/// What takes a place in the range of boxes, a product of few rounded numbers that is not below zero, to beyond what it may be
-/// wrong by.
+/// Moves a position in the range of boxes, a nonnegative product of a few rounded numbers, beyond its possible error.
 pub(crate) const BEYOND: f32 = 1.0 + 2.0 * ROUNDINGS;
-/// No height that matters is larger, and a range may well end there.
+/// No relevant height is larger, and a range may end there.
 pub(crate) const FAR: f32 = (1u128 << 100) as f32;
 /// The bounds on L; below the third nothing is certain.
 const SMALLEST_REACH: f32 = 1.0 / (1u64 << 50) as f32;
@@ -153,7 +156,7 @@ const LARGEST_REACH: f32 = (1u64 << 38) as f32;
 const SMALLEST_SURE_REACH: f32 = 1.0 / (1u64 << 40) as f32;
 
 impl HeightRange {
-    /// Between heights that are products of few rounded numbers.
+    /// For ends that are products of a few rounded numbers.
     #[inline(always)]
     pub(crate) fn new(start: f32, end: f32) -> Self {
         let within = |height: f32| if height < FAR { if height > -FAR { height } else { -FAR } } else { FAR };
@@ -167,7 +170,7 @@ impl HeightRange {
         }
     }
 
-    /// The same where none is below zero.
+    /// As [`Self::new`], if no end is negative.
     #[inline(always)]
     pub(crate) fn ahead(start: f32, end: f32) -> Self {
         let within = |height: f32| if height < FAR { height } else { FAR };
@@ -182,8 +185,8 @@ impl HeightRange {
 }
 
 impl BlockRay {
-    /// For the exact test's ray in a mesh whose largest coordinate is `largest_corner`; `origin` has the order of the axes.
-    /// `None` where it would tell nothing.
+    /// For the exact test's ray in a mesh whose largest coordinate is `largest_corner`; `origin` has the order of the
+    /// axes. `None` if the test would be too coarse.
     #[inline(always)]
     pub(crate) fn new(
         shear: &Shear,
@@ -202,7 +205,7 @@ impl BlockRay {
         let length = shear.direction_z.abs();
         let mut range = HeightRange::new((t_min * length) as f32, (t_max * length) as f32);
         if reach < SMALLEST_SURE_REACH || length < 1e-200 {
-            // A place in range may be none, for it is infinite.
+            // An infinite height counts as out of range for certainty.
             (range.surely_first, range.surely_last) = (f32::INFINITY, f32::NEG_INFINITY);
         }
         Some(Self {
@@ -210,13 +213,13 @@ impl BlockRay {
             origin: [rounded[0], rounded[1], rounded[2], 0.0],
             rest: [rest[0] - shear_x_y[0] * rest[2], rest[1] - shear_x_y[1] * rest[2], rest[2], 0.0],
             shear: [shear_x_y[0], shear_x_y[1], 1.0, 0.0],
-            least_size: reach * LEAST_SIZE,
+            least_size: reach * MIN_SIZE,
             range,
             turn: if shear.direction_z < 0.0 { 0.0 } else { -0.0 },
         })
     }
 
-    /// Leaves out what lies beyond `t_max`.
+    /// Excludes what lies beyond `t_max`.
     #[inline(always)]
     pub(crate) fn end_at(&mut self, shear: &Shear, t_max: f64) {
         let end = (t_max * shear.direction_z.abs()) as f32;
@@ -224,13 +227,13 @@ impl BlockRay {
     }
 }
 
-// One instruction, which f32::max is not.
+// One instruction, unlike `f32::max`.
 #[inline(always)]
 fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// See [`BEYOND`]. Rays from nearby start at zero or later, and so no hit has a height below zero.
+/// See [`BEYOND`]. Rays from nearby start at zero or later, so no hit has a negative height.
 #[inline(always)]
 pub(crate) fn beyond(place: f32) -> f32 {
     place * BEYOND + f32::MIN_POSITIVE
@@ -244,22 +247,22 @@ struct Corner {
     z: f64,
 }
 
-/// Where a ray hits a triangle at its edge.
+/// Where a ray hits the outline of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Feature {
     /// The edge opposite this corner.
     Edge(usize),
     /// This corner.
     Vertex(usize),
-    /// Seen on edge: never hit, but a neighbour of others.
+    /// Seen on edge: never hit, but a neighbour of other triangles.
     EdgeOn,
 }
 
 /// How a ray meets a triangle.
 pub(crate) enum Meeting {
-    /// Not at all, or out of the range.
+    /// Not at all, or out of range.
     Miss,
-    /// Within the range, away from its edges.
+    /// In range, away from its edges.
     Hit {
         /// The crossing.
         root: Root,
@@ -272,30 +275,30 @@ pub(crate) enum Meeting {
         root: Root,
         /// Whether this triangle owns the crossing.
         is_owned: bool,
-        /// Where.
+        /// The edge or corner.
         feature: Feature,
         /// Whether the ray meets the front.
         is_front: bool,
     },
 }
 
-/// How a ray passes a triangle, its range aside.
+/// How a ray passes a triangle, regardless of its range.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum EdgeTest {
-    /// Beside it.
+    /// Outside of it.
     Outside,
     /// Through it, away from its edges.
     Inside,
-    /// So near to an edge, or so flat, that [`intersect`] has to look closer.
+    /// So near an edge, or through a triangle so flat, that [`intersect`] has to decide.
     Uncertain,
 }
 
-/// What the crossing of a triangle is made of.
+/// The data of a triangle's crossing.
 #[derive(Clone, Copy)]
 pub(crate) struct Inside {
     /// The heights of the corners, weighted.
     pub(crate) height: f64,
-    /// The sum of the weights: positive where the front is met.
+    /// The sum of the weights: positive if the front is met.
     pub(crate) det: f64,
     /// Two of the weights.
     pub(crate) v: f64,
@@ -303,7 +306,7 @@ pub(crate) struct Inside {
 }
 
 impl Inside {
-    /// Where there is no crossing.
+    /// No crossing.
     pub(crate) const NONE: Self = Self { height: f64::NAN, det: f64::NAN, v: f64::NAN, w: f64::NAN };
 
     #[inline(always)]
@@ -323,7 +326,7 @@ impl Inside {
         DVec2::new(self.v / self.det, self.w / self.det)
     }
 
-    /// The crossing at this `t`, which is its own.
+    /// The crossing, whose `t` this is.
     #[inline(always)]
     pub(crate) fn root(&self, t: f64) -> Root {
         root(t, self.local())
@@ -345,7 +348,7 @@ pub(crate) fn root(t: f64, local: DVec2) -> Root {
     Root { t, part: 0, multiplicity: 1, local }
 }
 
-/// Whether a triangle may be met there. A NaN is not in the range; an infinity is no place.
+/// Whether a triangle may be met there. NaN is out of range, and an infinite `t` is never met.
 #[inline(always)]
 pub(crate) fn is_in_range(ray: &Ray, t: f64) -> bool {
     ray.t_min <= t && t <= ray.t_max && t.abs() < f64::INFINITY
@@ -380,11 +383,11 @@ struct Weights {
     inside: Inside,
 }
 
-/// In terms of its sheared corners, without a branch.
+/// From sheared corners, branch-free.
 #[inline(always)]
 fn weigh([a, b, c]: [Corner; 3]) -> Weights {
-    // The edge functions px qy - py qx. The two products of each are rounded apart: the opposite edge of the neighbour then
-    // gives exactly the opposite value, and their difference has the right sign unless they are equal.
+    // The edge functions px qy - py qx. The two products of each are rounded separately: the opposite edge of the
+    // neighbour then gives exactly the opposite value, and their difference has the right sign unless they are equal.
     let (bc, ca, ab) = (c.x * b.y, a.x * c.y, b.x * a.y);
     let (u, v, w) = (bc - c.y * b.x, ca - a.y * c.x, ab - b.y * a.x);
     let inside = Inside { height: u * a.z + v * b.z + w * c.z, det: u + v + w, v, w };
@@ -392,14 +395,14 @@ fn weigh([a, b, c]: [Corner; 3]) -> Weights {
 }
 
 impl Weights {
-    /// Whether the line passes within the triangle, away from its edges.
+    /// Whether the line passes through the triangle, away from its edges.
     #[inline(always)]
     fn are_of_inside(&self) -> bool {
         let [u, v, w] = self.edges;
         ((u > 0.0) & (v > 0.0) & (w > 0.0)) | ((u < 0.0) & (v < 0.0) & (w < 0.0))
     }
 
-    /// Whether the triangle is seen on edge, so that its edge functions cancel: left so, t would be anywhere within it.
+    /// Whether the triangle is seen on edge, so that its edge functions cancel; `t` would be arbitrary.
     #[inline(always)]
     fn cancel(&self) -> bool {
         let det = self.inside.det.abs();
@@ -409,19 +412,19 @@ impl Weights {
     }
 }
 
-/// Sixteen triangles, each with a ray of its own, all of which have these axes.
+/// Sixteen triangles, each with its own ray; all rays have these axes.
 pub(crate) struct Pairs<'a> {
-    /// By the order of the axes.
+    /// In the order of the axes.
     pub(crate) origin: [&'a Row<f64>; 3],
     pub(crate) mesh_origin: [f64; 3],
     pub(crate) direction: [&'a Row<f64>; 3],
-    /// `[corner][axis]`, alike, relative to the mesh.
+    /// `[corner][axis]`, in the same order, relative to the mesh.
     pub(crate) corners: &'a [[Row<f32>; 3]; 3],
 }
 
 /// Where sixteen rays meet triangles.
 pub(crate) struct Met {
-    /// No number where [`EdgeTest::Inside`] is not how the ray passes.
+    /// NaN unless the ray passes [`EdgeTest::Inside`].
     pub(crate) t: Row<f64>,
     pub(crate) local: [Row<f64>; 2],
 }
@@ -431,7 +434,7 @@ impl Met {
 }
 
 impl Pairs<'_> {
-    /// Where each ray meets its triangle: [`edge_test`] of every pair, by the same operations side by side.
+    /// Where each ray meets its triangle: [`edge_test`] of every pair, by the same operations in lanes.
     #[inline(always)]
     pub(crate) fn meet(&self) -> Met {
         let mut met = Met::NONE;
@@ -471,7 +474,7 @@ pub(crate) fn intersect(ray: &Ray, shear: Shear, origin: [f64; 3], corners: [[f3
     }
 }
 
-/// The same for corners in double precision, in the space of the ray.
+/// As [`intersect`], for corners in double precision in the space of the ray.
 pub(crate) fn intersect_precise(ray: &Ray, shear: Shear, corners: &[DVec3; 3]) -> Meeting {
     let [x, y, z] = shear.axes.permute(&ray.origin);
     let corners = corners.map(|corner| {
@@ -486,8 +489,8 @@ pub(crate) fn intersect_precise(ray: &Ray, shear: Shear, corners: &[DVec3; 3]) -
     }
 }
 
-/// A triangle some of whose edge functions may have come out as zero, the others with one sign: now their rounding errors
-/// decide. Or one that is seen on edge.
+/// Decides about a triangle some of whose edge functions may have rounded to zero, while the others have one sign, or
+/// about one that is seen on edge.
 fn intersect_uncertain(ray: &Ray, shear: &Shear, corners: [Corner; 3]) -> Meeting {
     let [a, b, c] = corners;
     let [u, v, w] = [settled_edge(c, b), settled_edge(a, c), settled_edge(b, a)];
@@ -511,18 +514,18 @@ fn intersect_uncertain(ray: &Ray, shear: &Shear, corners: [Corner; 3]) -> Meetin
     }
 }
 
-/// The edge function px qy - py qx; where its rounded products are equal, the difference of their errors.
+/// The edge function px qy - py qx; if its rounded products are equal, the difference of their errors.
 fn settled_edge(p: Corner, q: Corner) -> f64 {
     let (first, second) = (p.x * q.y, p.y * q.x);
     if first != second { first - second } else { residue(p, q, first) }
 }
 
-/// px qy - py qx where both products round to `product`.
+/// px qy - py qx if both products round to `product`.
 fn residue(p: Corner, q: Corner, product: f64) -> f64 {
     p.x.mul_add(q.y, -product) - p.y.mul_add(q.x, -product)
 }
 
-/// A triangle whose edge functions have one sign but for those that are zero.
+/// A triangle whose nonzero edge functions have one sign.
 fn touch(shear: &Shear, corners: [Corner; 3]) -> Meeting {
     let [a, b, c] = corners;
     let values = [difference_of_products(c, b), difference_of_products(a, c), difference_of_products(b, a)];
@@ -549,7 +552,7 @@ fn touch(shear: &Shear, corners: [Corner; 3]) -> Meeting {
     Meeting::Touch { root, is_owned, feature, is_front }
 }
 
-/// Whether the edge function px qy - py qx is positive for the ray moved by (ε, ε²). `None` where the edge is a point.
+/// Whether the edge function px qy - py qx is positive for the ray moved by (ε, ε²). `None` if the edge is a point.
 fn side(p: Corner, q: Corner) -> Option<bool> {
     let (first, second) = (p.x * q.y, p.y * q.x);
     let difference = first - second;

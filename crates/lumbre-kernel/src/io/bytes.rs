@@ -1,17 +1,17 @@
 //! A tree as bytes, and back.
 //!
-//! What is written down is how the tree is put together: which nodes are in which, and which primitives in which leaf, some
-//! six bytes a triangle. Boxes and packed corners are not; they are computed again from the geometries when the bytes are
-//! read, in a fraction of the time of a build. So bytes that come from elsewhere cannot make a tree that answers wrongly: they
-//! are refused, or they say how to arrange what is there. To map a tree into memory as it is, see `mapped`.
+//! The bytes hold the structure of the tree: the nesting of nodes, and the primitives of each leaf, about six bytes per
+//! triangle. Boxes and packed corners are recomputed from the geometries when the bytes are read, in a fraction of the
+//! time of a build. So bytes from elsewhere cannot make a tree that answers wrongly: they are refused, or they only
+//! rearrange the given geometry. To map a tree into memory as it is, see `mapped`.
 //!
-//! All numbers are u32, the least byte first. The file: eight bytes of magic; the version; how many geometries, nodes, blocks,
-//! blocks of spheres, entries and masks there are; the reference to the root, or 2³² - 1; for each geometry its kind and how many
-//! primitives it has; for each node how many children it has, and references to them; for each block its geometry and eight
-//! triangles, 2³² - 1 for none; for each block of spheres the same; for each entry its geometry, and which primitive (of an
-//! instance that was opened, the node of its tree where that is entered: see `opening`), with the top bit set in the last of a
-//! leaf; the masks. Then a checksum of eight bytes of everything before it: FNV-1a of 64 bits (G. Fowler, L. Noll, K. Vo,
-//! D. Eastlake, "The FNV Non-Cryptographic Hash Algorithm").
+//! All numbers are little-endian u32. The file: eight bytes of magic; the version; the numbers of geometries, nodes,
+//! blocks, blocks of spheres, entries and masks; the reference to the root, or 2³² - 1; for each geometry its kind and
+//! number of primitives; for each node the number of its children, and references to them; for each block its geometry
+//! and eight triangles, 2³² - 1 for none; the same for each block of spheres; for each entry its geometry and primitive
+//! (for an opened instance, the node of its tree where it is entered: see `open_instances`), with the top bit set in
+//! the last of a leaf; the masks. Then an eight-byte checksum of everything before it: 64-bit FNV-1a (G. Fowler, L.
+//! Noll, K. Vo, D. Eastlake, "The FNV Non-Cryptographic Hash Algorithm").
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -26,11 +26,11 @@ use crate::tree::Tree;
 use crate::tree::node::{Node, WIDTH, tag};
 use crate::tree::packed::{Entry, Packed};
 use crate::tree::sphere_block::SphereBlock;
-use crate::tree::triangle_block::BlockNames;
+use crate::tree::triangle_block::BlockIds;
 use crate::tree::{Geometry, GeometryKind};
 
 const MAGIC: [u8; 8] = *b"LumbTree";
-/// Changes with the format, and with what the numbers mean.
+/// Changes with the format, and with the meaning of its numbers.
 const VERSION: u32 = 8;
 const NONE: u32 = u32::MAX;
 
@@ -38,31 +38,31 @@ const NONE: u32 = u32::MAX;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum LoadError {
-    /// They do not begin as a saved tree does.
+    /// They do not begin like a saved tree.
     NotATree,
     /// They are of another version of the format.
     OtherVersion {
-        /// Theirs.
+        /// The version of the bytes.
         found: u32,
-        /// The one that this version of the crate reads.
+        /// The version that this crate reads.
         expected: u32,
     },
-    /// They end too soon, or go on behind the end.
+    /// They are too short or too long.
     WrongLength {
-        /// How many bytes there are.
+        /// Number of bytes.
         found: usize,
-        /// How many were expected; at least so many where they end within the header.
+        /// Expected number of bytes; a lower bound if they end within the header.
         expected: usize,
     },
-    /// The checksum is another: some bytes were changed.
+    /// The checksum differs: some bytes were changed.
     Damaged,
-    /// A reference or a name is out of its range, or used twice: no version of this crate wrote that.
+    /// A reference or a primitive id is out of range, or used twice: no version of this crate wrote that.
     Inconsistent {
-        /// What it is, and where.
+        /// The fault and its place.
         what: String,
     },
-    /// The geometries are of the right kinds and sizes, but not those that a mapped tree was saved with: vertices, shapes
-    /// or transforms moved.
+    /// The geometries have the right kinds and sizes, but differ from those that a mapped tree was saved with:
+    /// vertices, shapes or transforms moved.
     Moved,
     /// The tree was built of other geometries, or these changed too much.
     OtherGeometries(RefitError),
@@ -101,7 +101,7 @@ fn checksum(bytes: &[u8]) -> u64 {
     })
 }
 
-/// The kind of a geometry in a file, and how many primitives it has.
+/// The kind of a geometry in a file, and its number of primitives.
 pub(crate) fn signature(geometry: &Geometry) -> [u32; 2] {
     match &geometry.kind {
         GeometryKind::Mesh(mesh) => [tag::TRIANGLES, mesh.indices.len() as u32],
@@ -121,11 +121,11 @@ pub(crate) fn to_bytes(tree: &Tree) -> Vec<u8> {
     put(VERSION);
     put(tree.geometries.len() as u32);
     put(packed.nodes.len() as u32);
-    put(packed.names.len() as u32);
-    put(packed.sphere_names.len() as u32);
+    put(packed.ids.len() as u32);
+    put(packed.sphere_ids.len() as u32);
     put(packed.entries.len() as u32);
     put(tree.masks.len() as u32);
-    // References to triangles number blocks: where these begin is found again.
+    // References to triangles hold block numbers; the lines of the blocks are recomputed.
     let numbered = |reference: u32| {
         if tag::of(reference) == tag::TRIANGLES {
             let numbers = packed.numbers(reference);
@@ -140,9 +140,9 @@ pub(crate) fn to_bytes(tree: &Tree) -> Vec<u8> {
         put(node.len() as u32);
         node.children[..node.len()].iter().map(|&child| numbered(child)).for_each(&mut put);
     }
-    for names in packed.names.iter().chain(&packed.sphere_names) {
-        put(names.geometry);
-        names.primitives.iter().copied().for_each(&mut put);
+    for ids in packed.ids.iter().chain(&packed.sphere_ids) {
+        put(ids.geometry);
+        ids.primitives.iter().copied().for_each(&mut put);
     }
     for entry in &packed.entries {
         entry.to_words().into_iter().for_each(&mut put);
@@ -153,13 +153,13 @@ pub(crate) fn to_bytes(tree: &Tree) -> Vec<u8> {
     bytes
 }
 
-/// Takes numbers from the front.
+/// Reads numbers from the front.
 struct Words<'a> {
     words: &'a [[u8; 4]],
 }
 
 impl Words<'_> {
-    /// A number; `None` behind the end.
+    /// A number; `None` at the end.
     fn next(&mut self) -> Option<u32> {
         self.words.split_off_first().map(|word| u32::from_le_bytes(*word))
     }
@@ -183,7 +183,7 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Tree
     if found < HEADER + CHECKSUM {
         return Err(LoadError::WrongLength { found, expected: HEADER + CHECKSUM });
     }
-    // The version first: of others, nothing else is known.
+    // The version first: nothing else is known of other versions.
     let (all, _) = rest.as_chunks::<4>();
     let mut words = Words { words: all };
     let version = words.next().unwrap_or_default();
@@ -193,7 +193,7 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Tree
     let [geometry_count, node_count, block_count, sphere_block_count, entry_count, mask_count, root] =
         words.array().unwrap_or_default();
     let counted = |count: u32, least: u64| u64::from(count) * least;
-    // A node has a length and one child at least.
+    // A node has at least a length and one child.
     let least = (HEADER + CHECKSUM) as u64
         + counted(geometry_count, 8)
         + counted(node_count, 8)
@@ -238,18 +238,18 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Tree
         nodes.push(node);
     }
     packed.nodes = nodes.into();
-    let mut names = Vec::with_capacity(block_count as usize);
+    let mut ids = Vec::with_capacity(block_count as usize);
     for _ in 0..block_count {
         let geometry = words.next().ok_or_else(ends)?;
-        names.push(BlockNames { geometry, primitives: words.array().ok_or_else(ends)? });
+        ids.push(BlockIds { geometry, primitives: words.array().ok_or_else(ends)? });
     }
-    packed.names = names.into();
-    let mut names = Vec::with_capacity(sphere_block_count as usize);
+    packed.ids = ids.into();
+    let mut ids = Vec::with_capacity(sphere_block_count as usize);
     for _ in 0..sphere_block_count {
         let geometry = words.next().ok_or_else(ends)?;
-        names.push(BlockNames { geometry, primitives: words.array().ok_or_else(ends)? });
+        ids.push(BlockIds { geometry, primitives: words.array().ok_or_else(ends)? });
     }
-    packed.sphere_names = names.into();
+    packed.sphere_ids = ids.into();
     let mut entries = Vec::with_capacity(entry_count as usize);
     for _ in 0..entry_count {
         entries.push(Entry::from_words(words.array().ok_or_else(ends)?));
@@ -268,9 +268,9 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Tree
     let unsound = |error: BuildError| LoadError::OtherGeometries(RefitError::Unsound(error));
     let parts = take_apart(&geometries).map_err(unsound)?;
     check_structure(&packed, &geometries, |leaf| Some(tag::blocks(leaf)))?;
-    check_names(&packed, &geometries)?;
+    check_ids(&packed, &geometries)?;
     packed.pack_triangles(Isa::best(), &geometries, parts.has_flat);
-    packed.sphere_blocks = vec![SphereBlock::EMPTY; packed.sphere_names.len()].into();
+    packed.sphere_blocks = vec![SphereBlock::EMPTY; packed.sphere_ids.len()].into();
 
     let mut tree = empty_over(geometries);
     tree.packed = packed;
@@ -284,16 +284,16 @@ fn inconsistent<T>(what: String) -> Result<T, LoadError> {
     Err(LoadError::Inconsistent { what })
 }
 
-/// Every node but the first, every block and every entry is to be named by one reference, from a node before it. `numbers` tells
-/// those of the blocks of a leaf of triangles.
+/// Checks that exactly one reference, from an earlier node, refers to every node but the first, to every block and to
+/// every entry. `numbers` returns the block numbers of a leaf of triangles.
 pub(crate) fn check_structure(
     packed: &Packed,
     geometries: &[Geometry],
     numbers: impl Fn(u32) -> Option<Range<usize>>,
 ) -> Result<(), LoadError> {
     let mut nodes = vec![false; packed.nodes.len()];
-    let mut blocks = vec![false; packed.names.len()];
-    let mut sphere_blocks = vec![false; packed.sphere_names.len()];
+    let mut blocks = vec![false; packed.ids.len()];
+    let mut sphere_blocks = vec![false; packed.sphere_ids.len()];
     let mut entries = vec![false; packed.entries.len()];
     let mut take = |reference: u32, parent: Option<usize>| -> Option<()> {
         let once = |taken: &mut [bool], place: usize| {
@@ -308,11 +308,11 @@ pub(crate) fn check_structure(
             }
             tag::TRIANGLES => {
                 let numbers = numbers(reference)?;
-                are_of_one(packed.names.get(numbers.clone())?)?;
+                are_of_one(packed.ids.get(numbers.clone())?)?;
                 numbers.into_iter().try_for_each(|block| once(&mut blocks, block))
             }
             tag::SPHERES => {
-                are_of_one(packed.sphere_names.get(tag::blocks(reference))?)?;
+                are_of_one(packed.sphere_ids.get(tag::blocks(reference))?)?;
                 tag::blocks(reference).try_for_each(|block| once(&mut sphere_blocks, block))
             }
             kind @ (tag::SHAPES | tag::INSTANCE | tag::CUSTOM | tag::PRECISE) => {
@@ -357,14 +357,14 @@ pub(crate) fn check_structure(
     }
 }
 
-/// The blocks of a leaf are to be of one geometry: it has one origin.
-fn are_of_one(names: &[BlockNames]) -> Option<()> {
-    names.iter().all(|block| block.geometry == names[0].geometry).then_some(())
+/// Checks that the blocks of a leaf are of one geometry: the leaf has one origin.
+fn are_of_one(ids: &[BlockIds]) -> Option<()> {
+    ids.iter().all(|block| block.geometry == ids[0].geometry).then_some(())
 }
 
-/// Every name is to be of a primitive, which is named once but for instances that were opened.
-pub(crate) fn check_names(packed: &Packed, geometries: &[Geometry]) -> Result<(), LoadError> {
-    // Where the primitives of each geometry begin, in one list.
+/// Checks that every id is of a primitive, and that no primitive appears twice, except opened instances.
+pub(crate) fn check_ids(packed: &Packed, geometries: &[Geometry]) -> Result<(), LoadError> {
+    // The index of each geometry's first primitive, in one list.
     let mut starts = Vec::with_capacity(geometries.len());
     let mut all = 0;
     for geometry in geometries {
@@ -382,14 +382,14 @@ pub(crate) fn check_names(packed: &Packed, geometries: &[Geometry]) -> Result<()
         let place = starts[geometry as usize] + primitive as usize;
         (!std::mem::replace(&mut named[place], true)).then_some(())
     };
-    let of_triangles = (&packed.names, tag::TRIANGLES, ["block", "triangle", "mesh"]);
-    let of_spheres = (&packed.sphere_names, tag::SPHERES, ["block of spheres", "sphere", "cloud"]);
+    let of_triangles = (&packed.ids, tag::TRIANGLES, ["block", "triangle", "mesh"]);
+    let of_spheres = (&packed.sphere_ids, tag::SPHERES, ["block of spheres", "sphere", "cloud"]);
     for (list, kind, [what, one, all]) in [of_triangles, of_spheres] {
-        for (block, names) in list.iter().enumerate() {
-            let geometry = names.geometry;
-            // Without anything in it, a block would be of no geometry of its kind.
+        for (block, ids) in list.iter().enumerate() {
+            let geometry = ids.geometry;
+            // An empty block must still belong to a geometry of its kind.
             let is_right = geometries.get(geometry as usize).is_some_and(|g| signature(g)[0] == kind);
-            for primitive in names.primitives.into_iter().filter(|&primitive| primitive != NONE) {
+            for primitive in ids.primitives.into_iter().filter(|&primitive| primitive != NONE) {
                 if name(Some(kind), geometry, primitive).is_none() {
                     return inconsistent(format!(
                         "{what} {block} names {one} {primitive} of geometry {geometry}, which is not there or was named"
@@ -403,7 +403,7 @@ pub(crate) fn check_names(packed: &Packed, geometries: &[Geometry]) -> Result<()
     }
     let mut opened = BTreeSet::new();
     for (place, entry) in packed.entries.iter().enumerate() {
-        // Whether the parts of an instance are all of it is seen later, where their boxes are made.
+        // A later check, with boxes, sees whether the parts of an instance are complete.
         let is_part = is_part(entry, geometries);
         if is_part && !opened.insert(entry.geometry) {
             continue;

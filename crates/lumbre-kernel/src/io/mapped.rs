@@ -1,19 +1,18 @@
-//! Trees in files that are mapped back and used in place.
+//! Trees in files that are mapped and used in place.
 //!
-//! The file holds the arrays of a tree as they are in memory, so that nothing is computed or copied when it is mapped, and
-//! processes share its pages. It is the machine's format: little-endian, and of the crate's own layout. [`Accel::to_bytes`]
-//! is for everything else.
+//! The file holds the arrays of a tree as they are in memory, so that mapping it computes and copies nothing, and
+//! processes share its pages. It is a machine format: little-endian, with the crate's own layout. For other uses, see
+//! [`Accel::to_bytes`].
 //!
-//! A header of 256 bytes: eight bytes of magic; as u32 the version, a mark of the byte order, how many geometries and masks
-//! there are, the reference to the root, and a zero; as u64 how many elements each array has; a fingerprint of the
-//! geometries; a checksum of everything behind the header; a fingerprint of the parts of instances that were opened; and a
-//! checksum of the header before itself. Then come the arrays, each at a multiple of 64 bytes: nodes, lines of blocks (see
-//! `blocks`) and names of triangles, those of spheres, entries, masks.
+//! A header of 256 bytes: eight bytes of magic; as u32 the version, a byte-order mark, the numbers of geometries and
+//! masks, the reference to the root, and a zero; as u64 the length of each array; a fingerprint of the geometries; a
+//! checksum of everything after the header; a fingerprint of the parts of opened instances; and a checksum of the
+//! header so far. Then the arrays, each at a multiple of 64 bytes: nodes, lines of blocks (see `triangle_block`),
+//! primitive ids of triangles, those of spheres, entries, masks.
 //!
-//! What a file says is checked when it is mapped: checksums, the length, every reference and every name, that all that has
-//! no place in an array is marked as such, and that the geometries are those that it was saved with. A file that somebody
-//! made with care may have boxes that hide what is in them, and so lose hits; it cannot make a query end in a panic, nor go on
-//! for ever.
+//! The file is checked when it is mapped: checksums, the length, every reference and every primitive id, that unused
+//! lanes are marked as such, and that the geometries are those that it was saved with. A carefully crafted file may
+//! have boxes that hide their contents, and so lose hits; it cannot make a query panic or loop forever.
 
 use std::fmt;
 use std::fs::File;
@@ -29,23 +28,23 @@ use crate::build::input::{Parts, take_apart, units_of};
 use crate::build::refit::RefitError;
 use crate::build::refit::{Places, check_places};
 use crate::io::bytes::LoadError;
-use crate::io::bytes::{check_names, check_structure, signature};
+use crate::io::bytes::{check_ids, check_structure, signature};
 use crate::tree::assemble::TreeParts;
 use crate::tree::node::{Node, WIDTH, tag};
 use crate::tree::packed::Start;
 use crate::tree::packed::{Entry, Packed};
 use crate::tree::sphere_block::SphereBlock;
 use crate::tree::storage::Store;
-use crate::tree::triangle_block::{BlockNames, Line};
+use crate::tree::triangle_block::{BlockIds, Line};
 use crate::tree::{Geometry, GeometryKind, Tree};
 
 const MAGIC: [u8; 8] = *b"LumbMap\0";
-/// Changes with the format, and with the layout of what is in it.
+/// Changes with the format, and with the layout of its contents.
 const VERSION: u32 = 9;
 const BYTE_ORDER: u32 = 0x0102_0304;
 const NONE: u32 = u32::MAX;
 const HEADER: usize = 256;
-/// Where the header's own checksum stands, behind all that it is of.
+/// Offset of the header's own checksum, after everything that it covers.
 const SEAL: usize = 128;
 const ARRAYS: usize = 7;
 const ALIGNMENT: usize = 64;
@@ -56,9 +55,9 @@ const ALIGNMENT: usize = 64;
 pub enum MapError {
     /// The file cannot be opened or mapped.
     Io(io::Error),
-    /// What is in it is no tree over these geometries.
+    /// Its contents are no tree over these geometries.
     Load(LoadError),
-    /// This machine has another byte order than the one that files are in.
+    /// This machine has another byte order than the files.
     ByteOrder,
 }
 
@@ -88,8 +87,8 @@ impl From<LoadError> for MapError {
     }
 }
 
-/// A sum of 64 bits over whole words, in four lanes for speed; it tells damage, not malice. Multiplication after exclusive
-/// or is that of FNV-1a (G. Fowler, L. Noll, K. Vo), here with words in place of bytes.
+/// A 64-bit checksum over whole words, in four lanes for speed. It detects damage, not malice. Xor, then multiply, is
+/// from FNV-1a (G. Fowler, L. Noll, K. Vo), here with words instead of bytes.
 struct Sum {
     lanes: [u64; 4],
     words: u64,
@@ -126,7 +125,7 @@ impl Sum {
     }
 }
 
-/// What the boxes and blocks of a tree depend on.
+/// A fingerprint of what the boxes and blocks of a tree depend on.
 fn fingerprint(geometries: &[Geometry], parts: &Parts) -> u64 {
     let mut sum = Sum::new();
     for geometry in geometries {
@@ -145,7 +144,7 @@ fn fingerprint(geometries: &[Geometry], parts: &Parts) -> u64 {
                 sum.add(bytemuck::cast_slice(&cloud.origin.to_array()));
                 sum.add(bytemuck::cast_slice(&cloud.spheres));
             }
-            // Of these, only the boxes are in a tree.
+            // Only the boxes of these are in a tree.
             GeometryKind::Shape(_) | GeometryKind::Instance(_) | GeometryKind::Custom(_) => {}
         }
     }
@@ -160,7 +159,7 @@ fn fingerprint(geometries: &[Geometry], parts: &Parts) -> u64 {
     sum.finish()
 }
 
-/// What the boxes of instances that were opened depend on, beside that.
+/// A fingerprint of what else the boxes of opened instances depend on.
 fn fingerprint_of_parts(packed: &Packed, places: &Places) -> u64 {
     let mut sum = Sum::new();
     for (place, start) in &places.starts {
@@ -179,9 +178,9 @@ fn arrays(tree: &Tree) -> [&[u8]; ARRAYS] {
     [
         bytemuck::cast_slice(&packed.nodes),
         bytemuck::cast_slice(&packed.blocks),
-        bytemuck::cast_slice(&packed.names),
+        bytemuck::cast_slice(&packed.ids),
         bytemuck::cast_slice(&packed.sphere_blocks),
-        bytemuck::cast_slice(&packed.sphere_names),
+        bytemuck::cast_slice(&packed.sphere_ids),
         bytemuck::cast_slice(&packed.entries),
         bytemuck::cast_slice(&tree.masks),
     ]
@@ -190,9 +189,9 @@ fn arrays(tree: &Tree) -> [&[u8]; ARRAYS] {
 const SIZES: [usize; ARRAYS] = [
     size_of::<Node>(),
     size_of::<Line>(),
-    size_of::<BlockNames>(),
+    size_of::<BlockIds>(),
     size_of::<SphereBlock>(),
-    size_of::<BlockNames>(),
+    size_of::<BlockIds>(),
     size_of::<Entry>(),
     size_of::<u32>(),
 ];
@@ -236,7 +235,7 @@ pub(crate) fn save(tree: &Tree, path: &Path) -> io::Result<()> {
     header.extend_from_slice(&seal.finish().to_le_bytes());
     header.resize(HEADER, 0);
 
-    // Beside it, then in its place: who has the old file mapped keeps it.
+    // Written next to the file, then renamed over it: processes that have the old file mapped keep it.
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(format!(".{}.part", std::process::id()));
     let beside = path.with_file_name(name);
@@ -251,12 +250,12 @@ pub(crate) fn save(tree: &Tree, path: &Path) -> io::Result<()> {
         std::fs::rename(&beside, path)
     };
     write().inspect_err(|_| {
-        // Whether or not there was any.
+        // It may not exist.
         let _ = std::fs::remove_file(&beside);
     })
 }
 
-/// What a header says.
+/// The contents of a header.
 struct Header {
     geometries: u32,
     root: u32,
@@ -320,7 +319,7 @@ fn read_header(bytes: &[u8]) -> Result<Header, LoadError> {
     })
 }
 
-/// Puts the right checksums into a file whose header says where its arrays are.
+/// Recomputes the checksums of a file whose header has the offsets of its arrays.
 #[cfg(test)]
 pub(crate) fn seal(bytes: &mut [u8]) {
     let long = |bytes: &[u8], at: usize| u64::from_le_bytes(std::array::from_fn(|i| bytes[at + i]));
@@ -351,11 +350,11 @@ pub(crate) fn map(path: &Path, geometries: Vec<Geometry>) -> Result<Tree, MapErr
     Ok(over_mapped(Arc::new(map_file(&file).map_err(MapError::Io)?), geometries)?)
 }
 
-/// The one call that the compiler cannot vouch for.
+/// The one call whose safety the compiler cannot check.
 #[allow(unsafe_code)]
 fn map_file(file: &File) -> io::Result<Mmap> {
-    // SAFETY: the bytes are to stay as they are while they are mapped, which no program can make sure of: `Accel::map` says
-    // so to its callers. Files that `save` writes are never changed in place, but replaced.
+    // SAFETY: the bytes must not change while they are mapped, which no program can ensure: `Accel::map` requires it of
+    // its callers. `save` never changes files in place, but replaces them.
     unsafe { Mmap::map(file) }
 }
 
@@ -377,21 +376,21 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Tree, LoadE
     let packed = Packed {
         nodes: array(&file, &header, 0)?,
         blocks: array(&file, &header, 1)?,
-        names: array(&file, &header, 2)?,
+        ids: array(&file, &header, 2)?,
         sphere_blocks: array(&file, &header, 3)?,
-        sphere_names: array(&file, &header, 4)?,
+        sphere_ids: array(&file, &header, 4)?,
         entries: array(&file, &header, 5)?,
         root: (header.root != NONE).then_some(header.root),
     };
     check_lanes(&packed)?;
-    let places = packed.blocks().places(&packed.names).ok_or_else(|| LoadError::Inconsistent {
+    let places = packed.blocks().places(&packed.ids).ok_or_else(|| LoadError::Inconsistent {
         what: "the blocks of triangles are not such as their names say".to_owned(),
     })?;
     check_structure(&packed, &geometries, |leaf| {
         let numbers = packed.blocks().numbers(leaf)?;
         (places.get(numbers.start) == Some(&(tag::place(leaf) as u32))).then_some(numbers)
     })?;
-    check_names(&packed, &geometries)?;
+    check_ids(&packed, &geometries)?;
     let masks: Store<u32> = array(&file, &header, 6)?;
     let tree_space = units_of(&geometries, &parts);
     let (sizes, bounds, primitives) = (parts.sizes, parts.bounds, parts.count());
@@ -407,9 +406,9 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Tree, LoadE
     Ok(Tree { infinite: parts.infinite, ..tree })
 }
 
-/// Lanes that hold nothing are to be such that no ray meets them, so that nobody follows what stands there.
+/// Checks that no ray can meet an unused lane, so that its reference is never followed.
 fn check_lanes(packed: &Packed) -> Result<(), LoadError> {
-    if packed.sphere_blocks.len() != packed.sphere_names.len() {
+    if packed.sphere_blocks.len() != packed.sphere_ids.len() {
         return Err(LoadError::Inconsistent {
             what: "there are not as many names as blocks of spheres".to_owned(),
         });
@@ -429,11 +428,11 @@ fn check_lanes(packed: &Packed) -> Result<(), LoadError> {
             return Err(LoadError::Inconsistent { what });
         }
     }
-    let unnamed = |names: &BlockNames| names.primitives.map(|primitive| primitive == NONE);
-    for (place, (block, names)) in packed.sphere_blocks.iter().zip(&packed.sphere_names).enumerate() {
+    let unnamed = |ids: &BlockIds| ids.primitives.map(|primitive| primitive == NONE);
+    for (place, (block, ids)) in packed.sphere_blocks.iter().zip(&packed.sphere_ids).enumerate() {
         let is_nothing =
             |lane: usize| block.radii[lane].is_nan() && block.centers.iter().all(|axis| axis[lane].is_nan());
-        if unnamed(names).into_iter().enumerate().any(|(lane, is_unnamed)| is_unnamed && !is_nothing(lane)) {
+        if unnamed(ids).into_iter().enumerate().any(|(lane, is_unnamed)| is_unnamed && !is_nothing(lane)) {
             let what = format!("block of spheres {place} has something without a name");
             return Err(LoadError::Inconsistent { what });
         }

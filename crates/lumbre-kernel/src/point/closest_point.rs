@@ -1,14 +1,15 @@
-//! The point of all surfaces that is nearest to a given one.
+//! The nearest point of all surfaces to a given point.
 //!
-//! Branch and bound, the nearest box first, in all trees at once: an instance that is entered adds a frame, with its map to
-//! the outermost space, in which all distances are. A tree's boxes are in single precision and hold their primitives up to a
-//! `slop` (see `node`), which is taken off every distance. What has no area is in no tree; it has its own (see `flats`).
+//! Branch and bound, the nearest box first, in all trees together: entering an instance adds a frame, with its map to
+//! the outermost space, in which all distances are measured. A tree's boxes are in single precision and contain their
+//! primitives up to a `slop` (see `node`), which is subtracted from every distance. Primitives without area are in no
+//! tree; they have a tree of their own (see `flats`).
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::fmt;
 
-use lumbre_geometry::{Aabb, NearestPoint, NoNearestPoint, nearest_on_triangle, similarity_factor};
+use lumbre_geometry::{Aabb, NearestPoint, NearestPointError, nearest_on_triangle, similarity_factor};
 use lumbre_math::{DVec2, DVec3, Transform};
 
 use super::flats::flats;
@@ -21,12 +22,12 @@ use crate::tree::packed::Start;
 use crate::tree::sphere_block::{ExactSphere, has_radius};
 use crate::tree::{GeometryKind, Instance, Tree};
 
-/// The point of all surfaces that is nearest to a given one.
+/// The nearest point of all surfaces to a given point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClosestPoint {
-    /// How far away it is, never negative.
+    /// Its distance, never negative.
     pub distance: f64,
-    /// Where it is, in the space of the tree that was asked.
+    /// Its position, in the space of the queried tree.
     pub point: DVec3,
     /// The part of a shape: see [`lumbre_geometry::Root::part`].
     pub part: u32,
@@ -34,7 +35,7 @@ pub struct ClosestPoint {
     pub uv: DVec2,
     /// The id of the geometry.
     pub id: u32,
-    /// The triangle of a mesh, the sphere of a cloud, the primitive of a custom geometry, else 0.
+    /// The triangle of a mesh, the sphere of a cloud, the primitive of a custom geometry, otherwise 0.
     pub primitive: u32,
     /// The position of the geometry in the list that its tree was built from.
     pub geometry: u32,
@@ -44,11 +45,11 @@ pub struct ClosestPoint {
     pub(crate) route: InstancePath,
 }
 
-/// Why there is no answer: something that may be nearer than all that has one.
+/// Why there is no answer: geometry without an answer may be nearer than all other geometry.
 #[derive(Clone, Debug, PartialEq)]
-pub struct NoClosestPoint {
-    /// What its geometry says.
-    pub why: NoNearestPoint,
+pub struct ClosestPointError {
+    /// The reason that the geometry gives.
+    pub why: NearestPointError,
     /// The id of the geometry.
     pub id: u32,
     /// The position of the geometry in the list that its tree was built from.
@@ -57,7 +58,7 @@ pub struct NoClosestPoint {
     pub instances: InstancePath,
 }
 
-impl fmt::Display for NoClosestPoint {
+impl fmt::Display for ClosestPointError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "no nearest point: geometry {} (id {})", self.geometry, self.id)?;
         if !self.instances.is_empty() {
@@ -67,7 +68,7 @@ impl fmt::Display for NoClosestPoint {
     }
 }
 
-impl std::error::Error for NoClosestPoint {
+impl std::error::Error for ClosestPointError {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         Some(&self.why)
     }
@@ -79,7 +80,7 @@ pub(crate) fn closest_point(
     point: DVec3,
     max_distance: f64,
     time: f64,
-) -> Result<Option<ClosestPoint>, NoClosestPoint> {
+) -> Result<Option<ClosestPoint>, ClosestPointError> {
     let mut search = Search::new(point, max_distance);
     if !point.is_finite() || max_distance.is_nan() || max_distance < 0.0 {
         return Ok(None);
@@ -105,19 +106,18 @@ pub(crate) fn closest_point(
                 }
             }
             Waiting::Reference(reference) if tag::of(reference) == tag::TRIANGLES => {
-                for names in &frame.tree.packed.names[frame.tree.packed.numbers(reference)] {
-                    if let GeometryKind::Mesh(mesh) = &frame.tree.geometries[names.geometry as usize].kind {
-                        for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX)
-                        {
-                            search.intersect_triangle(frame, mesh, names.geometry, primitive);
+                for ids in &frame.tree.packed.ids[frame.tree.packed.numbers(reference)] {
+                    if let GeometryKind::Mesh(mesh) = &frame.tree.geometries[ids.geometry as usize].kind {
+                        for &primitive in ids.primitives.iter().filter(|&&primitive| primitive != u32::MAX) {
+                            search.intersect_triangle(frame, mesh, ids.geometry, primitive);
                         }
                     }
                 }
             }
             Waiting::Reference(reference) if tag::of(reference) == tag::SPHERES => {
-                for names in &frame.tree.packed.sphere_names[tag::blocks(reference)] {
-                    for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX) {
-                        search.meet(frame, names.geometry, primitive, next.distance);
+                for ids in &frame.tree.packed.sphere_ids[tag::blocks(reference)] {
+                    for &primitive in ids.primitives.iter().filter(|&&primitive| primitive != u32::MAX) {
+                        search.meet(frame, ids.geometry, primitive, next.distance);
                     }
                 }
             }
@@ -182,7 +182,7 @@ pub(crate) fn closest_point(
     search.into_answer()
 }
 
-/// Puts the tree of the last frame onto the list, or a part of it.
+/// Adds the tree of the last frame, or a part of it, to the list.
 fn enter(frames: &[Frame], start: Start, distance: f64, pending: &mut BinaryHeap<Pending>) {
     let position = frames.len() - 1;
     let frame = position as u32;
@@ -192,7 +192,7 @@ fn enter(frames: &[Frame], start: Start, distance: f64, pending: &mut BinaryHeap
     pending.extend(root.into_iter().chain(infinite).map(|what| Pending { distance, frame, what }));
 }
 
-/// The same of what has no area below the last frame.
+/// Adds the primitives without area below the last frame.
 fn enter_flats(frames: &[Frame], distance: f64, pending: &mut BinaryHeap<Pending>) {
     let position = frames.len() - 1;
     if let Some(root) = flats(frames[position].tree).root() {
@@ -201,7 +201,7 @@ fn enter_flats(frames: &[Frame], distance: f64, pending: &mut BinaryHeap<Pending
     }
 }
 
-/// Something to be looked at, and how far away it is at least.
+/// An item to visit, and a lower bound on its distance.
 struct Pending {
     distance: f64,
     frame: u32,
@@ -212,9 +212,9 @@ struct Pending {
 enum Waiting {
     /// A node or a leaf.
     Reference(u32),
-    /// Geometry and primitive of what is no triangle of a mesh; of an instance, where it is entered.
+    /// Geometry and primitive, other than a triangle of a mesh; for an instance, where it is entered.
     Primitive(u32, u32),
-    /// A node of what has no area.
+    /// A node of primitives without area.
     Flat(u32),
 }
 
@@ -239,20 +239,20 @@ impl PartialEq for Pending {
 
 impl Eq for Pending {}
 
-/// A tree, and where it stands.
+/// A tree in its frame.
 pub(crate) struct Frame<'a> {
     pub(crate) tree: &'a Tree,
     /// From the tree's space to the outermost.
     pub(crate) map: Transform,
     is_identity: bool,
-    /// By how much distances may shrink on that way, at most.
+    /// Bound on the factor by which the map may shrink distances.
     shrink: f64,
-    /// The point that is asked about, in the tree's space.
+    /// The query point, in the tree's space.
     pub(crate) local: DVec3,
-    /// When what moves is looked at.
+    /// The time of the query.
     time: f64,
     pub(crate) context: Context,
-    /// The same in tree units, and what distances to boxes there may be wrong by.
+    /// The query point in tree units, and the error bound of distances to boxes there.
     in_units: DVec3,
     slop: f64,
 }
@@ -262,7 +262,7 @@ impl<'a> Frame<'a> {
         Self::new(tree, Transform::IDENTITY, point, time, Context::default())
     }
 
-    /// A tree placed in this one.
+    /// The frame of an instance in this tree.
     pub(crate) fn within(&self, geometry: u32, instance: &'a Instance) -> Self {
         let mut context = self.context.clone();
         context.route.push(geometry);
@@ -275,7 +275,7 @@ impl<'a> Frame<'a> {
     fn new(tree: &'a Tree, map: Transform, local: DVec3, time: f64, context: Context) -> Self {
         let tree_space = &tree.tree_space;
         let in_units = (local - tree_space.origin) * tree_space.scale;
-        // The largest singular value of the inverse is no more than the root of the sum of squares.
+        // The largest singular value of the inverse is at most the root of the sum of squares.
         let stretch = similarity_factor(&map).map_or_else(
             || map.inverse_affine().matrix3.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt(),
             |factor| 1.0 / factor,
@@ -285,7 +285,7 @@ impl<'a> Frame<'a> {
         Self { tree, map, is_identity: map.is_identity(), shrink, local, time, context, in_units, slop }
     }
 
-    /// How far a child of a node is away at least, in the outermost space.
+    /// A lower bound on the distance of a node's child, in the outermost space.
     fn distance_to_box(&self, node: &Node, lane: usize) -> f64 {
         let gap = |axis: usize| {
             let low = f64::from(node.planes[2 * axis][lane]) - self.in_units[axis];
@@ -294,30 +294,30 @@ impl<'a> Frame<'a> {
         };
         let distance = DVec3::new(gap(0), gap(1), gap(2)).length() * (1.0 - 1e-12) - self.slop;
         let distance = distance / self.tree.tree_space.scale * self.shrink;
-        // Also where it is no number.
+        // Also 0 for NaN.
         if distance > 0.0 { distance } else { 0.0 }
     }
 
-    /// How far a box of what has no area is away at least, in the outermost space.
+    /// A lower bound on the distance of a box of primitives without area, in the outermost space.
     fn distance_to_flats(&self, bounds: &Aabb) -> f64 {
         let tree_space = &self.tree.tree_space;
         let reach = self.local.abs() + flats(self.tree).reach;
         let slop = 4.0 * tree_space.slop_of(reach) / tree_space.scale;
         let gap = (bounds.min - self.local).max(self.local - bounds.max).max(DVec3::ZERO);
         let distance = (gap.length() * (1.0 - 1e-12) - slop) * self.shrink;
-        // Also where it is no number.
+        // Also 0 for NaN.
         if distance > 0.0 { distance } else { 0.0 }
     }
 }
 
-/// What was found so far.
+/// The result so far.
 pub(crate) struct Search {
     point: DVec3,
-    /// Nothing farther away is wanted.
+    /// Nothing farther away counts.
     limit: f64,
     best: Option<ClosestPoint>,
-    /// What has no answer, and how far away it is at least.
-    refused: Vec<(f64, NoClosestPoint)>,
+    /// Geometry without an answer, and lower bounds on its distance.
+    refused: Vec<(f64, ClosestPointError)>,
 }
 
 impl Search {
@@ -325,12 +325,12 @@ impl Search {
         Self { point, limit: max_distance, best: None, refused: Vec::new() }
     }
 
-    /// The nearest point, unless something without an answer may be nearer.
-    pub(crate) fn into_answer(self) -> Result<Option<ClosestPoint>, NoClosestPoint> {
+    /// The nearest point, unless geometry without an answer may be nearer.
+    pub(crate) fn into_answer(self) -> Result<Option<ClosestPoint>, ClosestPointError> {
         let limit = self.limit;
         let nearest = self.refused.into_iter().filter(|(distance, _)| *distance <= limit);
-        let rank = |(distance, no): &(f64, NoClosestPoint)| (*distance, no.instances.clone(), no.geometry);
-        let compare = |a: &(f64, NoClosestPoint), b: &(f64, NoClosestPoint)| {
+        let rank = |(distance, no): &(f64, ClosestPointError)| (*distance, no.instances.clone(), no.geometry);
+        let compare = |a: &(f64, ClosestPointError), b: &(f64, ClosestPointError)| {
             rank(a).partial_cmp(&rank(b)).unwrap_or(Ordering::Equal)
         };
         match nearest.min_by(compare) {
@@ -339,14 +339,14 @@ impl Search {
         }
     }
 
-    /// The nearest point of those that have an answer, and whether nothing without one may be nearer.
+    /// The nearest point of geometry with an answer, and whether no other geometry may be nearer.
     #[cfg(test)]
     pub(crate) fn into_parts(self) -> (Option<ClosestPoint>, bool) {
         let is_sure = self.refused.iter().all(|(distance, _)| *distance > self.limit);
         (self.best, is_sure)
     }
 
-    /// Takes what is nearer than the best, or as near and before it in the lists.
+    /// Takes a point that is nearer than the best, or equally near and before it in the lists.
     fn offer(&mut self, frame: &Frame, geometry: u32, primitive: u32, found: &NearestPoint) {
         let is_within = found.distance <= self.limit;
         let comes_first = self.best.as_ref().is_none_or(|best| {
@@ -384,7 +384,7 @@ impl Search {
         self.intersect_corners(frame, corners.map(|p| from_point + p.as_dvec3()), geometry, primitive);
     }
 
-    /// A triangle whose corners are given relative to the point, in the tree's space.
+    /// A triangle whose corners are relative to the point, in the tree's space.
     fn intersect_corners(&mut self, frame: &Frame, corners: [DVec3; 3], geometry: u32, primitive: u32) {
         let [a, b, c] =
             if frame.is_identity { corners } else { corners.map(|corner| frame.map.vector(corner)) };
@@ -396,7 +396,7 @@ impl Search {
         }
     }
 
-    /// A shape, a sphere of a cloud, or a primitive of custom geometry, that is at least `distance` away.
+    /// A shape, a sphere of a cloud, or a primitive of custom geometry, at a distance of at least `distance`.
     pub(crate) fn meet(&mut self, frame: &Frame, geometry: u32, primitive: u32, distance: f64) {
         let standing = &frame.tree.geometries[geometry as usize];
         let found = match &standing.kind {
@@ -418,7 +418,7 @@ impl Search {
                     distance: factor * found.distance,
                     ..found
                 }),
-                None => Err(NoNearestPoint::Map),
+                None => Err(NearestPointError::Map),
             },
             GeometryKind::PreciseMesh(mesh) => {
                 let corners = mesh.corners(primitive).map(|p| p - frame.local);
@@ -439,7 +439,7 @@ impl Search {
                 let distance =
                     bounds.map_or(distance, |bounds| distance.max(distance_to(&bounds, self.point)));
                 let instances = frame.context.ids.clone();
-                let no = NoClosestPoint { why, id: standing.id, geometry, instances };
+                let no = ClosestPointError { why, id: standing.id, geometry, instances };
                 if distance <= self.limit {
                     self.refused.push((distance, no));
                 }
@@ -448,7 +448,7 @@ impl Search {
     }
 }
 
-/// How far a box is away at least.
+/// A lower bound on the distance of a box.
 fn distance_to(bounds: &Aabb, p: DVec3) -> f64 {
     (bounds.min - p).max(p - bounds.max).max(DVec3::ZERO).length() * (1.0 - 1e-12)
 }

@@ -1,7 +1,7 @@
-//! What has no area: triangles that are lines or points, and spheres without a radius.
+//! Primitives without area: triangles that are lines or points, and spheres without a radius.
 //!
-//! No ray hits these, so trees leave them out. Distances count them: here they have a tree of their own, which is made when the first
-//! closest point is asked for.
+//! No ray hits them, so trees leave them out. But distances count them: they have a tree of their own, which is built
+//! at the first closest-point query.
 
 use lumbre_geometry::Aabb;
 use lumbre_math::{DMat3, DVec3, Transform};
@@ -11,7 +11,7 @@ use crate::tree::geometry::{Placement, has_area};
 use crate::tree::sphere_block::{ExactSphere, has_radius};
 use crate::tree::{GeometryKind, Tree, precise_mesh};
 
-/// What has no area among the geometries of a tree.
+/// The primitives without area among the geometries of a tree.
 pub(crate) fn flats(tree: &Tree) -> &Flats {
     tree.flats.get_or_init(|| Flats::new(flat_primitives(tree)))
 }
@@ -56,7 +56,7 @@ fn flat_primitives(tree: &Tree) -> Vec<(Aabb, FlatItem)> {
     boxed
 }
 
-/// A box that holds another one under a map, rounding included; infinite where that moves.
+/// A box around the image of another under a map, rounding included; infinite for a moving map.
 fn placed(bounds: &Aabb, placement: &Placement) -> Aabb {
     match placement {
         Placement::Still(map) if bounds.min.is_finite() && bounds.max.is_finite() => moved(bounds, map),

@@ -1,4 +1,4 @@
-//! Whether a point is inside: by the parity of crossings, and by the solids that hold it.
+//! Whether a point is inside: by the parity of crossings, and by the solids that contain it.
 
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
@@ -11,7 +11,7 @@ use crate::tree::packed::Start;
 use crate::tree::sphere_block::ExactSphere;
 use crate::tree::{GeometryKind, Tree};
 
-/// Which ways are looked: no axes of symmetry of anything likely, and no two near one line.
+/// The directions of the rays: no likely axes of symmetry, and no two nearly parallel.
 const DIRECTIONS: [DVec3; 5] = [
     DVec3::new(0.610_372_4, 0.353_853_7, 0.708_106_1),
     DVec3::new(-0.421_117_3, 0.801_921_9, -0.423_771_1),
@@ -36,7 +36,7 @@ pub(crate) fn is_inside(tree: &Tree, point: DVec3, time: f64) -> bool {
     in_solids != is_in_surfaces
 }
 
-/// Whether it is a shape, or a cloud of them, that says by itself what it holds.
+/// Whether it is a shape, or a cloud of shapes, that answers directly what it contains.
 fn is_solid(kind: &GeometryKind) -> bool {
     match kind {
         GeometryKind::Shape(shape) => shape.shape().is_solid(),
@@ -48,12 +48,12 @@ fn is_solid(kind: &GeometryKind) -> bool {
     }
 }
 
-/// Whether there is anything else than such shapes.
+/// Whether there is any other geometry than such shapes.
 fn has_surfaces(tree: &Tree) -> bool {
     !tree.geometries.iter().all(|geometry| is_solid(&geometry.kind))
 }
 
-/// How many solid shapes hold the point, in all instances.
+/// The number of solid shapes that contain the point, in all instances.
 fn solids_around(tree: &Tree, point: DVec3, time: f64) -> usize {
     let mut count = 0;
     let mut trees = vec![(tree, point, Start::WHOLE)];
@@ -83,7 +83,7 @@ fn solids_around(tree: &Tree, point: DVec3, time: f64) -> usize {
                 tag::INNER => {
                     let node = &tree.packed.nodes[reference as usize];
                     for lane in 0..node.len() {
-                        // In doubt it is within, also where the slop is no number.
+                        // In doubt the point is inside, also if the slop is NaN.
                         let is_beyond = (0..3).any(|axis| {
                             let (low, high) = (node.planes[2 * axis][lane], node.planes[2 * axis + 1][lane]);
                             local[axis] < f64::from(low) - slop || f64::from(high) + slop < local[axis]
@@ -95,9 +95,9 @@ fn solids_around(tree: &Tree, point: DVec3, time: f64) -> usize {
                 }
                 tag::TRIANGLES => {}
                 tag::SPHERES => {
-                    for names in &tree.packed.sphere_names[tag::blocks(reference)] {
-                        let there = names.primitives.iter().filter(|&&primitive| primitive != u32::MAX);
-                        there.for_each(|&primitive| meet(names.geometry, primitive));
+                    for ids in &tree.packed.sphere_ids[tag::blocks(reference)] {
+                        let there = ids.primitives.iter().filter(|&&primitive| primitive != u32::MAX);
+                        there.for_each(|&primitive| meet(ids.geometry, primitive));
                     }
                 }
                 _ => {
@@ -114,7 +114,7 @@ fn solids_around(tree: &Tree, point: DVec3, time: f64) -> usize {
     count
 }
 
-/// The parity of the crossings of what is no solid shape.
+/// The parity of the crossings with geometry other than solid shapes.
 struct Parity {
     odd: bool,
 }

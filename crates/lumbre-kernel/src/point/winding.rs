@@ -1,10 +1,11 @@
 //! Generalised winding numbers: how often the surfaces wind around a point.
 //!
-//! A. Jacobson, L. Kavan, O. Sorkine-Hornung, "Robust Inside-Outside Segmentation using Generalized Winding Numbers", ACM
-//! Transactions on Graphics 32(4), 2013. The solid angle of a triangle is that of A. van Oosterom, J. Strackee, "The Solid
-//! Angle of a Plane Triangle", IEEE Transactions on Biomedical Engineering 30(2), 1983. What is far away is taken together
-//! as in G. Barill, N. Dickson, R. Schmidt, D. Levin, A. Jacobson, "Fast Winding Numbers for Soups and Clouds", ACM
-//! Transactions on Graphics 37(4), 2018: a node's triangles become a dipole with its first and second moments.
+//! A. Jacobson, L. Kavan, O. Sorkine-Hornung, "Robust Inside-Outside Segmentation using Generalized Winding Numbers",
+//! ACM Transactions on Graphics 32(4), 2013. The solid angle of a triangle is that of A. van Oosterom, J. Strackee,
+//! "The Solid Angle of a Plane Triangle", IEEE Transactions on Biomedical Engineering 30(2), 1983. Distant triangles
+//! are approximated as in G. Barill, N. Dickson, R. Schmidt, D. Levin, A. Jacobson, "Fast Winding Numbers for Soups and
+//! Clouds", ACM Transactions on Graphics 37(4), 2018: a node's triangles become a dipole with its first and second
+//! moments.
 
 use std::f64::consts::PI;
 use std::fmt;
@@ -21,12 +22,12 @@ use crate::tree::moments::{Moment, Moments};
 use crate::tree::node::{Node, WIDTH, tag};
 use crate::tree::precise_mesh::PreciseMesh;
 use crate::tree::sphere_block::ExactSphere;
-use crate::tree::triangle_block::BlockNames;
+use crate::tree::triangle_block::BlockIds;
 use crate::tree::{GeometryKind, Tree, precise_mesh};
 
 /// Why there is no winding number: an open shape, or custom geometry that offers none.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct NoWindingNumber {
+pub struct WindingNumberError {
     /// The id of the geometry.
     pub id: u32,
     /// The position of the geometry in the list that its tree was built from.
@@ -35,7 +36,7 @@ pub struct NoWindingNumber {
     pub instances: InstancePath,
 }
 
-impl fmt::Display for NoWindingNumber {
+impl fmt::Display for WindingNumberError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "no winding number: geometry {} (id {})", self.geometry, self.id)?;
         if !self.instances.is_empty() {
@@ -45,27 +46,27 @@ impl fmt::Display for NoWindingNumber {
     }
 }
 
-impl std::error::Error for NoWindingNumber {}
+impl std::error::Error for WindingNumberError {}
 
-/// A node counts as far away from this many of its radii on. Of 2, 2.5, 3 and 4, on a spiky rock of 81 920 triangles seen from
-/// within to ten radii away, the largest errors were 8.0e-3, 1.9e-3, 4.2e-4 and 4.5e-5, in 0.07, 0.11, 0.22 and 0.41 of the
-/// time of the exact sum (the ignored test `errors_and_times_of_fast_sums`).
+/// A node counts as far away from this many of its radii on. For 2, 2.5, 3 and 4, the largest errors on a spiky rock of
+/// 81 920 triangles, seen from inside to ten radii away, were 8.0e-3, 1.9e-3, 4.2e-4 and 4.5e-5, in 0.07, 0.11, 0.22
+/// and 0.41 of the time of the exact sum (the ignored test `errors_and_times_of_fast_sums`).
 pub(crate) const FAR: f64 = 3.0;
 
-/// See [`Accel::winding_number`]; without `far`, everything is added up one by one.
+/// See [`Accel::winding_number`]; without `far`, sums every triangle.
 pub(crate) fn winding_number(
     tree: &Tree,
     point: DVec3,
     time: f64,
     far: Option<f64>,
-) -> Result<f64, NoWindingNumber> {
+) -> Result<f64, WindingNumberError> {
     if !point.is_finite() {
         return Ok(0.0);
     }
     let mut sum = 0.0;
     let mut frames = vec![Frame::outermost(tree, point, time)];
     while let Some(frame) = frames.pop() {
-        // Angles are the same in the space of the tree where the map keeps them, and its meshes keep their sides there.
+        // A map that preserves angles leaves solid angles unchanged, and its meshes keep their sides.
         let is_similar = similarity_factor(&frame.map).is_some();
         if let Some(far) = far.filter(|_| is_similar) {
             let moments = frame.tree.moments.get_or_init(|| moments_of(frame.tree));
@@ -76,7 +77,8 @@ pub(crate) fn winding_number(
         }
         for (geometry, standing) in frame.tree.geometries.iter().enumerate() {
             let geometry = geometry as u32;
-            let no = || NoWindingNumber { id: standing.id, geometry, instances: frame.context.ids.clone() };
+            let no =
+                || WindingNumberError { id: standing.id, geometry, instances: frame.context.ids.clone() };
             match &standing.kind {
                 GeometryKind::Mesh(_) | GeometryKind::PreciseMesh(_) => {}
                 GeometryKind::Instance(instance) => {
@@ -105,9 +107,9 @@ pub(crate) fn winding_number(
     Ok(sum)
 }
 
-/// The signed solid angle of a triangle, its corners given relative to the eye: positive where the back is seen.
+/// The signed solid angle of a triangle, with corners relative to the eye: positive if the back is seen.
 ///
-/// The mixed product is taken over the sides, so that a small triangle far away does not cancel.
+/// The triple product uses the sides, so that a small triangle far away does not suffer cancellation.
 fn solid_angle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     let (la, lb, lc) = (a.length(), b.length(), c.length());
     let volume = a.dot((b - a).cross(c - a));
@@ -115,19 +117,19 @@ fn solid_angle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     if volume == 0.0 { 0.0 } else { 2.0 * volume.angle_from(denominator) }
 }
 
-/// The corners of a triangle that has an area, relative to a point.
+/// The corners of a triangle with an area, relative to a point; `None` without an area.
 fn corners(mesh: &TriangleMesh, from_point: DVec3, triangle: usize) -> Option<[DVec3; 3]> {
     let corners = mesh.indices[triangle].map(|vertex| mesh.positions[vertex as usize]);
     has_area(&corners).then(|| corners.map(|p| from_point + p.as_dvec3()))
 }
 
-/// The same of a mesh in double precision.
+/// As [`corners`], for a mesh in double precision.
 fn precise_corners(mesh: &PreciseMesh, point: DVec3, triangle: u32) -> Option<[DVec3; 3]> {
     let corners = mesh.corners(triangle);
     precise_mesh::has_area(&corners).then(|| corners.map(|p| p - point))
 }
 
-/// Calls for every triangle in double precision of a leaf, relative to a point.
+/// Calls `f` for every double-precision triangle of a leaf, relative to a point.
 fn for_each_precise(tree: &Tree, reference: u32, point: DVec3, mut f: impl FnMut([DVec3; 3])) {
     for entry in &tree.packed.entries[tag::place(reference)..] {
         if let GeometryKind::PreciseMesh(mesh) = &tree.geometries[entry.geometry as usize].kind
@@ -141,7 +143,7 @@ fn for_each_precise(tree: &Tree, reference: u32, point: DVec3, mut f: impl FnMut
     }
 }
 
-/// The winding number of all meshes of a tree, where needed under a linear map.
+/// The winding number of all meshes of a tree, under a linear map if needed.
 fn meshes_around(tree: &Tree, point: DVec3, linear: Option<DMat3>) -> f64 {
     let side = linear.map_or(1.0, |linear| linear.determinant().signum());
     let mut sum = 0.0;
@@ -167,16 +169,16 @@ fn meshes_around(tree: &Tree, point: DVec3, linear: Option<DMat3>) -> f64 {
     sum / (4.0 * PI)
 }
 
-/// What the triangles below each node look like from far away.
+/// The far-field moments of the triangles below each node.
 fn moments_of(tree: &Tree) -> Moments {
     let packed = &tree.packed;
-    // Of every block, then of the nodes from below: children stand behind their parents.
-    let block = |names: &BlockNames| {
-        let GeometryKind::Mesh(mesh) = &tree.geometries[names.geometry as usize].kind else {
+    // First of every block, then of the nodes from the bottom: children follow their parents.
+    let block = |ids: &BlockIds| {
+        let GeometryKind::Mesh(mesh) = &tree.geometries[ids.geometry as usize].kind else {
             return Moment::NOTHING;
         };
         let from_origin = mesh.origin - tree.tree_space.origin;
-        let triangles = triangles_of(names, mesh, from_origin);
+        let triangles = triangles_of(ids, mesh, from_origin);
         let mut parts = [Moment::NOTHING; WIDTH];
         let mut count = 0;
         for (part, corners) in parts.iter_mut().zip(triangles) {
@@ -185,7 +187,7 @@ fn moments_of(tree: &Tree) -> Moments {
         }
         Moment::of_all(&parts[..count])
     };
-    let blocks: Vec<Moment> = packed.names.par_iter().with_min_len(256).map(block).collect();
+    let blocks: Vec<Moment> = packed.ids.par_iter().with_min_len(256).map(block).collect();
     let mut nodes = vec![Moment::NOTHING; packed.nodes.len()];
     let mut parts = Vec::new();
     for (place, node) in packed.nodes.iter().enumerate().rev() {
@@ -227,11 +229,11 @@ fn around(moments: &Moments, tree: &Tree, point: DVec3, far: f64) -> f64 {
                 stack.extend_from_slice(&node.children[..node.len()]);
             }
             tag::TRIANGLES => {
-                for names in &tree.packed.names[tree.packed.numbers(reference)] {
-                    let GeometryKind::Mesh(mesh) = &tree.geometries[names.geometry as usize].kind else {
+                for ids in &tree.packed.ids[tree.packed.numbers(reference)] {
+                    let GeometryKind::Mesh(mesh) = &tree.geometries[ids.geometry as usize].kind else {
                         continue;
                     };
-                    for [a, b, c] in triangles_of(names, mesh, mesh.origin - point) {
+                    for [a, b, c] in triangles_of(ids, mesh, mesh.origin - point) {
                         sum += solid_angle(a, b, c);
                     }
                 }
@@ -246,12 +248,12 @@ fn around(moments: &Moments, tree: &Tree, point: DVec3, far: f64) -> f64 {
 }
 
 /// The corners of the triangles of a block that have an area.
-fn triangles_of(names: &BlockNames, mesh: &TriangleMesh, shift: DVec3) -> impl Iterator<Item = [DVec3; 3]> {
-    let there = names.primitives.into_iter().filter(|&primitive| primitive != u32::MAX);
+fn triangles_of(ids: &BlockIds, mesh: &TriangleMesh, shift: DVec3) -> impl Iterator<Item = [DVec3; 3]> {
+    let there = ids.primitives.into_iter().filter(|&primitive| primitive != u32::MAX);
     there.filter_map(move |primitive| corners(mesh, shift, primitive as usize))
 }
 
-/// How far the boxes of a node reach from a place that is relative to the tree's origin.
+/// Largest distance of a node's boxes from a point that is relative to the tree's origin.
 fn reach(node: &Node, tree: &Tree, center: DVec3) -> f64 {
     let mut farthest: f64 = 0.0;
     for lane in 0..node.len() {

@@ -131,7 +131,7 @@ fn check(accel: &Accel, rays: &[Ray]) -> usize {
 }
 
 #[test]
-fn single_precision_answers_with_the_bits_of_double_precision_among_anything() {
+fn single_precision_has_the_bits_of_double_in_mixed_trees() {
     super::scenes::with_every_preset(|| {
         let mut random = Random(401);
         let accel = everything(&mut random);
@@ -234,7 +234,7 @@ fn company(random: &mut Random, is_endless: bool) -> Accel {
 }
 
 #[test]
-fn rays_that_go_together_through_instances_are_answered_as_each_alone() {
+fn packets_through_instances_answer_as_single_rays() {
     super::scenes::with_every_preset(|| {
         let mut random = Random(408);
         for is_endless in [false, true] {

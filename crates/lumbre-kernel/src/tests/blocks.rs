@@ -16,7 +16,7 @@ use crate::intersect::f32_ray::F32Ray;
 use crate::intersect::watertight::{BlockRay, Meeting, Shear, intersect};
 use crate::intersect::{Isa, corners_at, equals_before_at, intersect_triangles_at, told_at, truncated_at};
 use crate::tree::BLOCK;
-use crate::tree::triangle_block::{BlockNames, Blocks, Line, TriangleBlock};
+use crate::tree::triangle_block::{BlockIds, Blocks, Line, TriangleBlock};
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Preset, TriangleMesh};
 
 struct Tally {
@@ -25,7 +25,7 @@ struct Tally {
     sure: u32,
 }
 
-/// A block of triangles of about `size`, within `spread` of each other, at `center`, of whose corners about so many are
+/// A block of triangles of about `size`, within `spread` of each other, at `center`, of whose corners about this many are
 /// those of others; the last lane stays empty.
 fn block(random: &mut Random, shares: f64, center: DVec3, spread: f64, size: f64) -> Vec<Line> {
     let mut mesh = TriangleMesh { origin: DVec3::ZERO, positions: Vec::new(), indices: Vec::new() };
@@ -44,9 +44,9 @@ fn block(random: &mut Random, shares: f64, center: DVec3, spread: f64, size: f64
         });
         mesh.indices.push(triangle);
     }
-    let names: Vec<_> = (0..mesh.indices.len() as u32).map(|triangle| [0, triangle]).collect();
+    let ids: Vec<_> = (0..mesh.indices.len() as u32).map(|triangle| [0, triangle]).collect();
     let geometry = Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(mesh)) };
-    pack::pack(Isa::best(), true, &[geometry], &[BlockNames::of(&names)], &[0], true).lines
+    pack::pack(Isa::best(), true, &[geometry], &[BlockIds::of(&ids)], &[0], true).lines
 }
 
 /// One ray at one block at every instruction set.
@@ -152,7 +152,7 @@ fn the_test_of_a_block_loses_nothing_and_invents_nothing() {
 }
 
 #[test]
-fn what_two_rays_are_told_of_two_blocks_together_is_what_each_is_told_alone() {
+fn two_rays_at_two_blocks_answer_as_each_alone() {
     let mut random = Random(81);
     let mut sharing = [0; 3];
     for _ in 0..600 {
@@ -210,8 +210,8 @@ fn a_ray_that_leaves_a_wall_is_seen_to_leave_it() {
         let positions = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
         let wall = TriangleMesh { origin: DVec3::ZERO, positions, indices: vec![[0, 1, 2], [0, 2, 3]] };
         let geometry = Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(wall)) };
-        let names = [BlockNames::of(&[[0, 0], [0, 1]])];
-        let lines = pack::pack(Isa::best(), true, &[geometry], &names, &[0], true).lines;
+        let ids = [BlockIds::of(&[[0, 0], [0, 1]])];
+        let lines = pack::pack(Isa::best(), true, &[geometry], &ids, &[0], true).lines;
         let block = Blocks::new(&lines).at(0).unwrap();
         for _ in 0..50 {
             let at = center + random.between(-1.0, 1.0) * right + random.between(-1.0, 1.0) * up;
@@ -294,7 +294,7 @@ fn numbers_lose_what_stands_behind_the_point_at_every_level() {
 }
 
 #[test]
-fn a_block_has_the_corners_of_its_triangles_however_many_they_share() {
+fn a_block_has_its_triangles_corners_shared_or_not() {
     let mut random = Random(81);
     let mut kinds = BTreeSet::new();
     for own in [0.0, 0.15, 0.4, 1.0] {
@@ -302,14 +302,14 @@ fn a_block_has_the_corners_of_its_triangles_however_many_they_share() {
         let GeometryKind::Mesh(mesh) = geometry.kind.clone() else { unreachable!() };
         let accel = Accel::build(vec![geometry], &BuildOptions::default()).unwrap();
         let blocks = accel.tree.packed.blocks();
-        let places = blocks.places(&accel.tree.packed.names).unwrap();
-        assert_eq!(places.len(), accel.tree.packed.names.len());
-        for (number, (&place, names)) in places.iter().zip(&accel.tree.packed.names).enumerate() {
+        let places = blocks.places(&accel.tree.packed.ids).unwrap();
+        assert_eq!(places.len(), accel.tree.packed.ids.len());
+        for (number, (&place, ids)) in places.iter().zip(&accel.tree.packed.ids).enumerate() {
             let block = blocks.at(place).unwrap();
             assert_eq!(block.number() as usize, number);
-            assert_eq!(block.taken().count_ones() as usize, names.primitives().count());
+            assert_eq!(block.taken().count_ones() as usize, ids.primitives().count());
             kinds.insert(block.is_unshared());
-            for (lane, primitive) in names.primitives().enumerate() {
+            for (lane, primitive) in ids.primitives().enumerate() {
                 let corners = mesh.indices[primitive as usize].map(|v| mesh.positions[v as usize].to_array());
                 assert_eq!(block.triangle(lane), corners);
                 for isa in Isa::all() {
@@ -324,7 +324,7 @@ fn a_block_has_the_corners_of_its_triangles_however_many_they_share() {
 }
 
 #[test]
-fn triangles_are_put_in_an_order_in_which_they_share_their_vertices() {
+fn triangles_are_ordered_so_that_they_share_vertices() {
     // A strip of eight, in any order, has ten vertices: six of either half, two of which are those of both.
     let mut random = Random(87);
     let positions = (0..10).map(|i| Vec3::new(i as f32, (i % 2) as f32, 0.0)).collect();
@@ -336,24 +336,24 @@ fn triangles_are_put_in_an_order_in_which_they_share_their_vertices() {
             for last in (1..triangles.len()).rev() {
                 triangles.swap(last, random.below(last + 1));
             }
-            let names: Vec<_> = triangles.iter().map(|&triangle| [0, triangle]).collect();
-            let names = [BlockNames::of(&names)];
+            let ids: Vec<_> = triangles.iter().map(|&triangle| [0, triangle]).collect();
+            let ids = [BlockIds::of(&ids)];
             let geometries = [Geometry { id: 0, kind: GeometryKind::Mesh(Arc::clone(&mesh)) }];
-            let filled = pack::pack(Isa::best(), true, &geometries, &names, &[0], true);
+            let filled = pack::pack(Isa::best(), true, &geometries, &ids, &[0], true);
             let block = Blocks::new(&filled.lines).at(0).unwrap();
             assert!(!block.is_unshared(), "{triangles:?}");
-            let mut names = names;
-            filled.orders[0].put(&mut names[0]);
-            assert!(Blocks::new(&filled.lines).places(&names).is_some());
-            let mut stand: Vec<_> = names[0].primitives().collect();
+            let mut ids = ids;
+            filled.orders[0].put(&mut ids[0]);
+            assert!(Blocks::new(&filled.lines).places(&ids).is_some());
+            let mut stand: Vec<_> = ids[0].primitives().collect();
             stand.sort_unstable();
             assert_eq!(stand, (0..len).collect::<Vec<_>>(), "{triangles:?}");
-            for (lane, triangle) in names[0].primitives().enumerate() {
+            for (lane, triangle) in ids[0].primitives().enumerate() {
                 let corners = mesh.indices[triangle as usize].map(|v| mesh.positions[v as usize].to_array());
                 assert_eq!(block.triangle(lane), corners);
             }
             // What stands in that order stays in it.
-            let again = pack::pack(Isa::best(), true, &geometries, &names, &[0], true);
+            let again = pack::pack(Isa::best(), true, &geometries, &ids, &[0], true);
             assert_eq!(again.lines, filled.lines);
         }
     }
@@ -370,7 +370,7 @@ fn small_trees_of_triangles_alone_share_nothing() {
     let ball = Geometry { id: 1, kind: GeometryKind::Shape(ball) };
     let do_share = |geometries: Vec<Geometry>| {
         let accel = Accel::build(geometries, &BuildOptions::default()).unwrap();
-        let places = accel.tree.packed.blocks().places(&accel.tree.packed.names).unwrap();
+        let places = accel.tree.packed.blocks().places(&accel.tree.packed.ids).unwrap();
         let sharing =
             places.iter().filter(|&&place| !accel.tree.packed.blocks().block(place).is_unshared()).count();
         assert!(sharing == 0 || 2 * sharing > places.len(), "{sharing} of {}", places.len());
@@ -391,11 +391,11 @@ fn with_own_vertices(geometry: &Geometry) -> Geometry {
 }
 
 #[test]
-fn no_eight_coordinates_lie_in_two_cache_lines_where_corners_have_their_own() {
+fn unshared_rows_of_eight_stay_in_one_cache_line() {
     let mesh = Arc::new(soup(&mut Random(91), 100, DVec3::ZERO, 4.0));
     let geometry = Geometry { id: 0, kind: GeometryKind::Mesh(mesh) };
     let accel = Accel::build(vec![geometry], &BuildOptions::default()).unwrap();
-    let places = accel.tree.packed.blocks().places(&accel.tree.packed.names).unwrap();
+    let places = accel.tree.packed.blocks().places(&accel.tree.packed.ids).unwrap();
     assert!(places.len() > 8);
     for place in places {
         let block = accel.tree.packed.blocks().block(place);
@@ -443,7 +443,7 @@ fn triangles_that_move_stand_where_packing_puts_them() {
             for geometries in [&second, &third, &two.to_vec()] {
                 accel.refit(geometries.clone()).unwrap();
                 let again = Accel::from_bytes(&accel.to_bytes(), geometries.clone()).unwrap();
-                assert_eq!(accel.tree.packed.names.len(), again.tree.packed.names.len());
+                assert_eq!(accel.tree.packed.ids.len(), again.tree.packed.ids.len());
                 assert_eq!(
                     bytemuck::cast_slice::<_, u8>(&accel.tree.packed.nodes),
                     bytemuck::cast_slice::<_, u8>(&again.tree.packed.nodes)
@@ -469,7 +469,7 @@ fn triangles_that_come_apart_are_packed_again() {
         let mut tree_space = first.clone();
         let mut put = |geometry: &Geometry| {
             let geometries = std::slice::from_ref(geometry);
-            pack::move_triangles(accel.isa, geometries, &accel.tree.packed.names, true, &mut tree_space)
+            pack::move_triangles(accel.isa, geometries, &accel.tree.packed.ids, true, &mut tree_space)
         };
         assert!(!put(&apart));
         assert!(put(&together));
@@ -486,11 +486,11 @@ fn blocks_that_are_not_such_as_are_packed_are_told() {
     let mut random = Random(82);
     let accel = Accel::build(vec![grid(&mut random, 0.15)], &BuildOptions::default()).unwrap();
     let bytes: Vec<u8> = bytemuck::cast_slice(&accel.tree.packed.blocks).to_vec();
-    let places = accel.tree.packed.blocks().places(&accel.tree.packed.names).unwrap();
+    let places = accel.tree.packed.blocks().places(&accel.tree.packed.ids).unwrap();
     let is_sound = |bytes: &[u8]| {
         let mut lines = vec![Line::default(); bytes.len() / 64];
         bytemuck::cast_slice_mut(&mut lines).copy_from_slice(bytes);
-        Blocks::new(&lines).places(&accel.tree.packed.names).is_some()
+        Blocks::new(&lines).places(&accel.tree.packed.ids).is_some()
     };
     assert!(is_sound(&bytes));
     assert!(!is_sound(&bytes[..bytes.len() - 64]));
@@ -528,9 +528,9 @@ fn refitted_triangles_may_share_other_vertices() {
         let mut accel = Accel::build(vec![first.clone()], &BuildOptions::default()).unwrap();
         let fresh = Accel::build(vec![then.clone()], &BuildOptions::default()).unwrap();
         accel.refit(vec![then.clone()]).unwrap();
-        assert!(accel.tree.packed.blocks().places(&accel.tree.packed.names).is_some());
+        assert!(accel.tree.packed.blocks().places(&accel.tree.packed.ids).is_some());
         let unshared = |accel: &Accel| {
-            let places = accel.tree.packed.blocks().places(&accel.tree.packed.names).unwrap();
+            let places = accel.tree.packed.blocks().places(&accel.tree.packed.ids).unwrap();
             places.iter().filter(|&&place| accel.tree.packed.blocks().block(place).is_unshared()).count()
         };
         assert_eq!(unshared(&accel) > 0, unshared(&fresh) > 0);

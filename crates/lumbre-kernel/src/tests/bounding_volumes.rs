@@ -264,7 +264,7 @@ fn alike(random: &mut Random, shape: &PlacedShape, center: DVec3, size: f64) -> 
 }
 
 #[test]
-fn rays_that_go_together_among_shapes_are_answered_as_each_alone() {
+fn packets_among_shapes_answer_as_single_rays() {
     let mut random = Random(64);
     for (size, offset) in [(1.0, 0.0), (1e3, 50.0), (1e-6, 0.0), (0.4, 1e7)] {
         let center = size * offset * DVec3::new(1.0, 0.6, -0.8);

@@ -42,7 +42,7 @@ impl CustomGeometry for DispatchedQuery {
 }
 
 #[test]
-fn what_is_little_is_built_by_the_thread_that_asks_and_more_by_the_pool() {
+fn small_builds_run_on_the_caller_and_large_ones_on_the_pool() {
     let own = BTreeSet::from([format!("{:?}", std::thread::current().id())]);
     for (count, is_own) in [(100, true), (4096, true), (4097, false)] {
         let dispatched = Arc::new(DispatchedQuery { count, by: Mutex::default() });
@@ -151,7 +151,7 @@ fn check_that_threads_make_no_difference() {
 }
 
 #[test]
-fn a_room_whose_upper_nodes_were_moved_answers_as_one_whose_were_not() {
+fn reinserting_upper_nodes_keeps_answers() {
     let room = Arc::new(room(&mut Random(6), 60));
     let tree = |preset| {
         let geometries = vec![Geometry { id: 3, kind: GeometryKind::Mesh(Arc::clone(&room)) }];
@@ -241,10 +241,10 @@ fn boxes_hold_their_children_and_every_primitive_has_one_place() {
     let in_blocks: usize = accel
         .tree
         .packed
-        .names
+        .ids
         .iter()
-        .chain(&accel.tree.packed.sphere_names)
-        .map(|names| names.primitives.iter().filter(|&&primitive| primitive != u32::MAX).count())
+        .chain(&accel.tree.packed.sphere_ids)
+        .map(|ids| ids.primitives.iter().filter(|&&primitive| primitive != u32::MAX).count())
         .sum();
     assert_eq!(in_blocks, packed);
     assert_eq!(in_blocks + others, accel.primitive_count());

@@ -33,7 +33,7 @@ impl Rays {
         self.t_max.push(t_max);
     }
 
-    /// So many of them, from this one on.
+    /// `count` of them, from `first` on.
     fn columns(&self, first: usize, len: usize) -> RayColumns<'_> {
         RayColumns {
             origin: [0, 1, 2].map(|axis| &self.origin[axis][first..first + len]),
@@ -271,7 +271,7 @@ fn check_leaving(random: &mut Random, accel: &Accel, rays: &Rays) -> usize {
 }
 
 #[test]
-fn columns_have_the_same_bits_for_any_cut_and_at_every_instruction_set() {
+fn columns_have_the_same_bits_for_any_cut_and_instructions() {
     let mut random = Random(71);
     let mut hits = 0;
     with_every_preset(|| {

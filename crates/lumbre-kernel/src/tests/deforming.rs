@@ -31,7 +31,7 @@ fn some_time(random: &mut Random) -> f64 {
 }
 
 #[test]
-fn rays_meet_a_deforming_mesh_as_the_mesh_that_it_is_at_their_time() {
+fn rays_meet_a_deforming_mesh_as_the_mesh_at_their_time() {
     let mut random = Random(1);
     let mut ball = icosphere(2, DVec3::ZERO, 1.6);
     ball.origin = CENTER;
@@ -110,7 +110,7 @@ fn a_box_holds_a_triangle_at_every_time() {
 }
 
 #[test]
-fn it_deforms_in_instances_and_is_refitted_and_saved_as_others_are() {
+fn it_deforms_in_instances_and_is_refitted_and_saved() {
     let mut random = Random(4);
     let mut mesh = icosphere(2, DVec3::ZERO, 1.0);
     mesh.origin = DVec3::new(2.0, 1.0, -3.0);

@@ -542,7 +542,7 @@ fn a_batch_without_a_place_for_each_answer_is_refused() {
 }
 
 #[test]
-fn in_a_tree_that_caches_do_not_hold_batches_answer_as_single_rays_do() {
+fn batches_answer_as_single_rays_in_a_tree_beyond_caches() {
     let mut random = Random(705);
     let side = 640;
     let mut mesh = TriangleMesh { origin: DVec3::new(0.3, 0.2, -0.1), ..TriangleMesh::default() };
@@ -590,7 +590,7 @@ fn in_a_tree_that_caches_do_not_hold_batches_answer_as_single_rays_do() {
 }
 
 #[test]
-fn single_precision_hits_what_double_precision_does_but_for_what_passes_an_edge_closely() {
+fn single_precision_hits_as_double_except_close_to_edges() {
     let mut random = Random(707);
     let meshes = [
         icosphere(4, DVec3::new(0.1, -0.2, 0.05), 1.0),
@@ -639,7 +639,7 @@ fn rounded(ray: &Ray) -> Ray32 {
 }
 
 #[test]
-fn trees_of_more_than_meshes_answer_as_double_precision_does_rounded() {
+fn mixed_trees_answer_as_double_precision_rounded() {
     with_every_preset(|| {
         let mut random = Random(708);
         let ball = TriangleMesh { origin: CENTER, ..icosphere(2, DVec3::ZERO, 2.0) };
@@ -801,7 +801,7 @@ fn a_tree_that_was_moved_answers_as_one_that_is_built_anew() {
 }
 
 #[test]
-fn numbers_in_single_precision_differ_by_the_same_in_either_precision() {
+fn single_precision_differences_are_the_same_in_double() {
     // What `FilterStart::single_mesh_origin` relies on.
     let mut random = Random(131);
     let mut inexact = 0;

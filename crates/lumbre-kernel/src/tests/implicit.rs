@@ -21,7 +21,7 @@ fn rounded(center: DVec3, radius: f64) -> ImplicitSurface {
 }
 
 #[test]
-fn a_tree_of_implicit_surfaces_and_triangles_finds_what_a_loop_finds() {
+fn implicit_surfaces_and_triangles_are_found_as_by_a_loop() {
     with_every_preset(|| {
         let mut random = Random(931);
         let mut kinds: Vec<_> = (0..30)

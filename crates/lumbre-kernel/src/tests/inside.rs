@@ -101,7 +101,7 @@ fn shapes_say_what_they_hold_and_infinite_ones_too() {
 }
 
 #[test]
-fn points_in_the_planes_of_faces_and_on_the_lines_of_edges_are_told_apart() {
+fn points_in_face_planes_and_edge_lines_are_classified() {
     let accel = build(vec![mesh(cube())]);
     let low = DVec3::new(0.5, -1.0, 3.0);
     for (place, expected) in [

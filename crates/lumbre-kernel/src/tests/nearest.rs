@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lumbre_geometry::{NoNearestPoint, PlacedShape, Plane, Shape, Sphere, Torus};
+use lumbre_geometry::{NearestPointError, PlacedShape, Plane, Shape, Sphere, Torus};
 use lumbre_math::{DVec3, Transform};
 
 use super::scenes::{
@@ -239,7 +239,7 @@ fn a_tree_finds_the_nearest_point_that_a_loop_finds() {
 }
 
 #[test]
-fn without_an_answer_of_everything_there_may_be_one_all_the_same() {
+fn geometry_without_an_answer_may_leave_one_for_the_rest() {
     let mut random = Random(4);
     // Shapes under maps that do not keep angles, and a floor of a user's.
     let accel = mixture(&mut random, CENTER, 3.0, 1, true);
@@ -259,7 +259,7 @@ fn without_an_answer_of_everything_there_may_be_one_all_the_same() {
     let far = accel.closest_point(DVec3::new(-1.0, 0.0, 4.0), f64::INFINITY).unwrap().unwrap();
     assert_eq!((far.distance, far.geometry), (1.5, 0));
     let near = accel.closest_point(DVec3::new(9.5, 0.0, 4.0), f64::INFINITY).unwrap_err();
-    assert_eq!((near.why, near.geometry, near.id), (NoNearestPoint::Map, 1, 1007));
+    assert_eq!((near.why, near.geometry, near.id), (NearestPointError::Map, 1, 1007));
     assert_eq!(accel.closest_point(DVec3::new(9.5, 0.0, 4.0), 1.0), Ok(None));
 }
 
@@ -322,7 +322,7 @@ fn two_to_the_fortieth_cubes_have_a_nearest_one() {
 }
 
 #[test]
-fn after_a_refit_and_a_reading_the_nearest_point_is_that_of_what_stands_there_now() {
+fn the_nearest_point_is_current_after_a_refit_and_a_load() {
     let ball = icosphere(3, DVec3::ZERO, 2.5);
     let at = |origin: DVec3| {
         let mesh = TriangleMesh { origin, ..ball.clone() };

@@ -94,7 +94,7 @@ fn checked(accel: &Accel) -> (usize, usize) {
 }
 
 #[test]
-fn children_stand_by_how_likely_they_stop_a_ray_for_what_they_cost() {
+fn children_are_ordered_by_occlusion_per_cost() {
     with_every_preset(|| {
         let random = &mut Random(911);
         let meshes = [
@@ -142,8 +142,8 @@ fn a_wall_is_asked_before_a_larger_bush() {
         let root = &accel.tree.packed.nodes[accel.tree.packed.root.unwrap() as usize];
         let last = root.children[root.len() - 1];
         assert_eq!(tag::of(last), tag::TRIANGLES);
-        let names = &accel.tree.packed.names[accel.tree.packed.numbers(last).start];
-        assert!(names.primitives().any(|primitive| primitive >= count - 2), "{names:?}");
+        let ids = &accel.tree.packed.ids[accel.tree.packed.numbers(last).start];
+        assert!(ids.primitives().any(|primitive| primitive >= count - 2), "{ids:?}");
         let areas: Vec<f64> = (0..root.len())
             .map(|lane| {
                 let [low, high] = self::corners(root, lane);

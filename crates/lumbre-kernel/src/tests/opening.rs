@@ -103,12 +103,11 @@ fn scattered(random: &mut Random, trees: &[Arc<Accel>], count: usize) -> Accel {
 /// How many entries are parts, and how many instances they are of.
 fn parts(accel: &Accel) -> (usize, usize) {
     let of = |entry: &&Entry| is_part(entry, &accel.tree.geometries);
-    let mut names: Vec<u32> =
-        accel.tree.packed.entries.iter().filter(of).map(|entry| entry.geometry).collect();
-    let count = names.len();
-    names.sort_unstable();
-    names.dedup();
-    (count, names.len())
+    let mut ids: Vec<u32> = accel.tree.packed.entries.iter().filter(of).map(|entry| entry.geometry).collect();
+    let count = ids.len();
+    ids.sort_unstable();
+    ids.dedup();
+    (count, ids.len())
 }
 
 fn assert_opened(accel: &Accel) {
@@ -165,7 +164,7 @@ fn parts_of_trees_with_instances_in_them_are_found_as_by_a_loop() {
 }
 
 #[test]
-fn long_triangles_beside_short_ones_are_found_in_opened_instances_as_by_a_loop() {
+fn long_triangles_in_opened_instances_are_found_as_by_a_loop() {
     with_every_preset(|| {
         let mut random = Random(303);
         let mut mesh = bar(24);
@@ -179,7 +178,7 @@ fn long_triangles_beside_short_ones_are_found_in_opened_instances_as_by_a_loop()
 }
 
 #[test]
-fn lines_through_corners_of_opened_bars_cross_them_an_even_number_of_times() {
+fn lines_through_corners_of_opened_bars_cross_evenly() {
     with_every_preset(|| {
         let mut random = Random(304);
         let mesh = Arc::new(bar(300));
@@ -360,7 +359,7 @@ fn parts_follow_what_moves() {
 }
 
 #[test]
-fn parts_follow_the_tree_that_they_are_of_and_stand_for_the_whole_of_another() {
+fn parts_follow_their_tree_and_stand_for_another_as_a_whole() {
     with_every_preset(|| {
         let mut random = Random(309);
         let mesh = bar(400);

@@ -91,7 +91,7 @@ fn a_tree_finds_what_a_loop_finds_far_away() {
 }
 
 #[test]
-fn without_an_offset_it_answers_as_a_mesh_in_single_precision_does() {
+fn without_an_offset_it_answers_as_a_single_precision_mesh() {
     let mut random = Random(83);
     let center = DVec3::new(1.5, -2.25, 4.0);
     let mut ball = icosphere(3, center, 2.0);

@@ -10,7 +10,7 @@ use super::scenes::{Random, build, cube, icosphere, mixture, ray, with_every_pre
 use crate::io::bytes::check_structure;
 use crate::tree::node::{Node, tag};
 use crate::tree::packed::Packed;
-use crate::tree::triangle_block::BlockNames;
+use crate::tree::triangle_block::BlockIds;
 use crate::{Accel, BuildError, Geometry, GeometryKind, LoadError, Query, RefitError, TriangleMesh};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
@@ -182,7 +182,7 @@ fn masks_are_saved_and_stay_through_a_refit() {
 fn a_leaf_with_blocks_of_two_meshes_is_refused() {
     let accel = two_meshes();
     let mut tree = Packed { root: Some(0), ..Packed::default() };
-    tree.names = vec![BlockNames::empty(0), BlockNames::empty(1)].into();
+    tree.ids = vec![BlockIds::empty(0), BlockIds::empty(1)].into();
     let mut apart = Node::EMPTY;
     (apart.children[0], apart.children[1]) = (tag::triangles(0, 1), tag::triangles(1, 1));
     let mut together = Node::EMPTY;

@@ -4,8 +4,8 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use lumbre_geometry::{
-    Aabb, BilinearPatch, Cone, Cuboid, Cylinder, Disk, NearestPoint, NoNearestPoint, Paraboloid, PlacedShape,
-    Plane, Ray, Root, Roots, Shape, Sphere, Surface, Torus, Triangle,
+    Aabb, BilinearPatch, Cone, Cuboid, Cylinder, Disk, NearestPoint, NearestPointError, Paraboloid,
+    PlacedShape, Plane, Ray, Root, Roots, Shape, Sphere, Surface, Torus, Triangle,
 };
 use lumbre_math::{DVec2, DVec3, Transform, Vec3};
 
@@ -253,8 +253,8 @@ impl CustomGeometry for Balls {
         roots.first().copied()
     }
 
-    fn closest_point(&self, primitive: u32, point: DVec3) -> Result<NearestPoint, NoNearestPoint> {
-        let &(center, radius) = self.balls.get(primitive as usize).ok_or(NoNearestPoint::NotOffered)?;
+    fn closest_point(&self, primitive: u32, point: DVec3) -> Result<NearestPoint, NearestPointError> {
+        let &(center, radius) = self.balls.get(primitive as usize).ok_or(NearestPointError::NotOffered)?;
         let arm = (point - center).try_normalize().unwrap_or(DVec3::X);
         let distance = ((point - center).length() - radius).abs();
         Ok(NearestPoint { point: center + radius * arm, distance, part: 0, uv: DVec2::ZERO })

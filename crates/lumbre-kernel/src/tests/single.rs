@@ -274,7 +274,7 @@ fn rays_of_several_octants_go_together_by_octants() {
 }
 
 #[test]
-fn components_that_only_double_precision_tells_apart_are_told_apart_in_batches() {
+fn batches_distinguish_components_as_double_precision_does() {
     let mut random = Random(99);
     let mesh = mesh(&mut random, DVec3::ZERO, 1.0);
     let accel = scenes::build(vec![GeometryKind::Mesh(mesh.into())]);
@@ -437,7 +437,7 @@ fn they_do_so_beside_shapes_and_custom_geometry() {
 }
 
 #[test]
-fn a_ray_that_leaves_out_where_it_starts_goes_on_with_the_same_bits() {
+fn a_ray_that_excludes_its_start_has_the_same_bits() {
     let mut random = Random(96);
     let center = DVec3::new(1.5, -2.25, 4.0);
     scenes::with_every_preset(|| {

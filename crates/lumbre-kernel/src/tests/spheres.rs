@@ -101,7 +101,7 @@ fn ray_among(random: &mut Random, cloud: &SphereCloud, extent: f64) -> Ray {
 }
 
 #[test]
-fn single_precision_answers_with_the_bits_of_double_precision_among_spheres() {
+fn single_precision_has_the_bits_of_double_among_spheres() {
     let mut random = Random(18);
     for (extent, offset) in [(3.0, 0.0), (1e-6, 0.0), (3e7, 1.0), (0.02, 5e4)] {
         let cloud = crowd(&mut random, extent * offset * DVec3::new(1.0, -0.7, 0.4), extent);

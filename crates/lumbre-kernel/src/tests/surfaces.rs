@@ -16,7 +16,7 @@ fn innermost<'a>(accel: &'a Accel, hit: &Hit) -> &'a Tree {
 }
 
 #[test]
-fn surfaces_lie_on_the_ray_and_on_the_triangle_through_any_instances() {
+fn surfaces_lie_on_the_ray_and_triangle_in_any_instances() {
     let mut random = Random(31);
     let center = DVec3::new(1.5, -2.25, 4.0);
     let accel = mixture(&mut random, center, 3.0, 2, false);

@@ -51,7 +51,7 @@ fn around_closed_meshes_it_is_whole_and_agrees_with_the_parity() {
 }
 
 #[test]
-fn what_lies_within_adds_up_and_what_is_turned_inside_out_takes_away() {
+fn nested_bodies_add_and_inverted_ones_subtract() {
     let center = DVec3::new(2.0, -3.5, 1.25);
     let shell = |radius: f64| icosphere(3, center, radius);
     let ball = Sphere::new(center, 0.5).unwrap();
@@ -115,7 +115,7 @@ fn an_open_mesh_counts_by_the_sky_that_it_fills() {
 }
 
 #[test]
-fn points_in_the_planes_of_faces_and_far_away_have_sound_numbers() {
+fn points_in_face_planes_and_far_away_have_valid_numbers() {
     let accel = build(vec![kind(cube())]);
     let low = DVec3::new(0.5, -1.0, 3.0);
     for place in [

@@ -1,4 +1,4 @@
-//! A ray as the spheres of a cloud are tested against it.
+//! A ray prepared for the spheres of a cloud.
 
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
@@ -6,17 +6,17 @@ use lumbre_math::DVec3;
 use crate::tree::Tree;
 use crate::tree::sphere_block::SphereRay;
 
-/// The ray for the spheres of one cloud, or of some with one origin.
+/// The ray for the spheres of one cloud, or of several clouds with one origin.
 pub(crate) struct CloudRay {
     geometry: u32,
-    /// The cloud's.
+    /// The cloud's origin.
     origin: DVec3,
-    /// Where single precision tells anything; and how many units of space there are for each of `t`.
+    /// The ray in single precision and its units of space per `t`; `None` if single precision is too coarse.
     spheres: Option<(SphereRay, f64)>,
 }
 
 impl CloudRay {
-    /// Turns the ray to a cloud.
+    /// Prepares the ray for a cloud, unless it already is.
     #[inline(always)]
     pub(crate) fn turn<'s>(
         slot: &'s mut Option<Self>,
@@ -24,7 +24,7 @@ impl CloudRay {
         ray: &Ray,
         geometry: u32,
     ) -> &'s mut Self {
-        // Where all clouds have one origin, ids need not be read from memory.
+        // If all clouds have one origin, ids need not be read from memory.
         let is_turned = slot
             .as_ref()
             .is_some_and(|cloud| tree.summary.has_one_cloud_origin || cloud.geometry == geometry);
@@ -41,7 +41,7 @@ impl CloudRay {
         self.origin
     }
 
-    /// The ray in this range of `t`; `None` where single precision tells nothing.
+    /// The ray in this range of `t`; `None` if single precision is too coarse.
     #[inline(always)]
     pub(crate) fn within(&mut self, [t_min, t_max]: [f64; 2]) -> Option<&SphereRay> {
         let (spheres, length) = self.spheres.as_mut()?;

@@ -21,7 +21,7 @@ impl<'a, L: Simd> NodeCursor<'a, L> {
         Self { nodes, slabs, lanes: PhantomData }
     }
 
-    /// The next leaf at or below `reference`, else of the stack; `None` when the traversal is over.
+    /// The next leaf at or below `reference`, then from the stack; `None` at the end of the traversal.
     #[inline(always)]
     pub(crate) fn descend<G: Goal>(&self, mut reference: u32, stack: &mut Stack<G::Entry>) -> Option<u32> {
         while tag::is_inner(reference) {
@@ -41,7 +41,7 @@ impl<'a, L: Simd> NodeCursor<'a, L> {
         Some(reference)
     }
 
-    /// The next leaf of the stack.
+    /// The next leaf from the stack.
     #[inline(always)]
     pub(crate) fn next_leaf<G: Goal>(&self, stack: &mut Stack<G::Entry>) -> Option<u32> {
         let reference = self.pop::<G>(stack)?;

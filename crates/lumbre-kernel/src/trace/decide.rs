@@ -1,8 +1,9 @@
-//! What single precision leaves undecided, decided in double precision.
+//! Decides in double precision what single precision leaves uncertain.
 //!
-//! A hit that single precision is certain of (see [`BlockRay`]) is kept by its place in the tree and an interval of heights around it.
-//! Double precision is asked about a triangle whose edge or range the ray hardly misses, about which of two hits is nearer where
-//! their intervals overlap, and once a ray about the closest.
+//! A hit that is certain in single precision (see [`BlockRay`]) is kept as its position in the tree and an interval of
+//! heights around it. Double precision decides three questions: whether a ray near an edge or the end of its range hits
+//! a triangle, which of two hits is nearer if their intervals overlap, and, once per ray, what the closest hit is
+//! exactly.
 
 use lumbre_geometry::{Ray, Root};
 use lumbre_math::DVec3;
@@ -17,8 +18,8 @@ use crate::tree::node::Node;
 use crate::tree::triangle_block::{Blocks, TriangleBlock};
 use crate::tree::{GeometryKind, Tree};
 
-/// The closest hit so far, as far as single precision knows it: a triangle by its place in the tree, or what is none, and the interval
-/// of heights along the ray that holds the crossing.
+/// The closest hit so far in single precision: the position of a triangle in the tree, or a mark for other primitives,
+/// and the interval of heights along the ray that contains the crossing.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
     pub(crate) block: u32,
@@ -29,7 +30,7 @@ pub(crate) struct Candidate {
 
 impl Candidate {
     pub(crate) const NONE: Self = Self { block: u32::MAX, lane: 0, from: f32::INFINITY, to: f32::INFINITY };
-    /// Of what is known in double precision: no triangle, or one that a query was asked about.
+    /// Marks a hit known in double precision: no triangle, or one that a query was asked about.
     const EXACT: u32 = u32::MAX - 1;
 
     /// A crossing that is known in double precision.
@@ -48,20 +49,21 @@ impl Candidate {
         self.block == Self::EXACT
     }
 
-    /// The largest `t` of a hit that is as near.
+    /// The largest possible `t` of the hit.
     #[inline(always)]
     pub(crate) fn limit(&self, ray: &Ray) -> f64 {
         if !self.is_some() {
             return ray.t_max;
         }
-        // Rounded upwards as a whole.
+        // Rounds the whole computation upwards.
         const UP: f64 = 1.0 + 4.0 * f64::EPSILON;
         let limit = f64::from(self.to) / largest_component(ray) * UP;
         if limit < ray.t_max { limit } else { ray.t_max }
     }
 }
 
-/// The interval of heights that holds a crossing in double precision, for a direction whose largest component has this length.
+/// The interval of heights that contains a crossing in double precision, for a direction whose largest component has
+/// this length.
 #[inline(always)]
 pub(crate) fn heights(t: f64, length: f64) -> (f32, f32) {
     let height = (t * length) as f32;
@@ -69,8 +71,8 @@ pub(crate) fn heights(t: f64, length: f64) -> (f32, f32) {
     (height - error, height + error)
 }
 
-/// Whether the ray, in the space of a tree, meets the front of what it hits in the instance that the route leads to from there. `None`
-/// where the exact traversal has to tell.
+/// Whether the ray, in the space of a tree, meets the front of its hit in the instance that `route` leads to. `None` if
+/// only the exact traversal can tell.
 #[cold]
 #[inline(never)]
 pub(crate) fn enters(
@@ -107,7 +109,7 @@ pub(crate) fn enters(
     }
 }
 
-/// A tree whose triangles double precision decides about.
+/// A tree and the double-precision decisions about its triangles.
 #[derive(Clone, Copy)]
 pub(crate) struct Decider<'a> {
     tree: &'a Tree,
@@ -150,11 +152,11 @@ impl<'a> Decider<'a> {
 
     #[inline(always)]
     fn ids_in(&self, block: &TriangleBlock, lane: u32) -> (u32, u32) {
-        let ids = &self.tree.packed.names[block.number() as usize];
+        let ids = &self.tree.packed.ids[block.number() as usize];
         (ids.geometry, ids.primitives[lane as usize % BLOCK])
     }
 
-    /// Whether the ray certainly misses a triangle, or hits it out of its range; a quick reject.
+    /// A quick reject: whether the ray certainly misses a triangle, or hits it outside its range.
     #[inline(always)]
     pub(crate) fn misses<L: Simd>(
         &self,
@@ -172,7 +174,8 @@ impl<'a> Decider<'a> {
         }
     }
 
-    /// Where a triangle is hit, if it is and is closer than the best, which is `exact` if there is that.
+    /// The crossing of a triangle that is closer than the best so far; `exact` is the best, if it is known in double
+    /// precision.
     #[inline(always)]
     pub(crate) fn compare<L: Simd>(
         &self,
@@ -210,7 +213,7 @@ impl<'a> Decider<'a> {
         Outcome::Certain(is_closer.then_some(t))
     }
 
-    /// The same where the quick test of one of the two is not certain.
+    /// [`Self::compare`] if the quick test of one of the two is uncertain.
     #[inline(never)]
     fn compare_closely(
         &self,
@@ -229,7 +232,8 @@ impl<'a> Decider<'a> {
         }
     }
 
-    /// Whether a crossing at `t` of the primitive with these ids is closer than the best, or as close and comes before; uncertain if
+    /// Whether a crossing at `t` of the primitive with these ids is closer than the best, or equally close and first in
+    /// order; uncertain if that depends on unknown faces.
     /// that depends on faces that are not known.
     pub(crate) fn is_closer(
         &self,
@@ -263,12 +267,12 @@ impl<'a> Decider<'a> {
         }
     }
 
-    /// Whether a crossing of something in the tree meets the front, which its parts in instances are not: `None` there.
+    /// Whether a crossing in the tree meets the front; `None` for a crossing in an instance.
     fn meets_front(&self, ray: &Ray, winner: &Winner) -> Option<bool> {
         if winner.geometry == IN_INSTANCE { None } else { enters(self.tree, ray, &[], winner) }
     }
 
-    /// The interval of heights of a crossing that is known in double precision, if it is in range and closer than the best.
+    /// The interval of heights of a crossing known in double precision, if it is in range and closer than the best.
     #[inline(always)]
     pub(crate) fn compare_exact(
         &self,
@@ -279,7 +283,7 @@ impl<'a> Decider<'a> {
     ) -> Outcome<Option<(f32, f32)>> {
         let t = root.t;
         let heights @ (from, to) = heights(t, largest_component(ray));
-        // Also keeps out a NaN.
+        // Also rejects NaN.
         if !ray.contains(t) || from > best.to {
             return Outcome::Certain(None);
         }
@@ -311,7 +315,7 @@ impl<'a> Decider<'a> {
         watertight::intersect(ray, shear, origin, corners)
     }
 
-    /// The crossing of a triangle in the ray's range, if there is one, and whether it meets the front.
+    /// The crossing of a triangle in the ray's range, if any, and whether it meets the front.
     #[inline(always)]
     pub(crate) fn crossing<L: Simd>(
         &self,
@@ -338,7 +342,7 @@ impl<'a> Decider<'a> {
         Outcome::Certain(found.map(|(root, is_front)| (Winner { root, geometry, primitive }, is_front)))
     }
 
-    /// The closest hit in double precision: `exact` if there is that, else the triangle.
+    /// The closest hit in double precision: `exact` if known, otherwise the triangle's crossing.
     #[inline(always)]
     pub(crate) fn closest<L: Simd>(
         &self,
@@ -355,7 +359,7 @@ impl<'a> Decider<'a> {
         }
     }
 
-    /// The crossing of a triangle that is hit; `None` should double precision deny that.
+    /// The crossing of a triangle that is hit; `None` if double precision disagrees.
     #[inline(always)]
     pub(crate) fn winner<L: Simd>(
         &self,

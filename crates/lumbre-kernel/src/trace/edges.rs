@@ -1,11 +1,11 @@
 //! Rays exactly through edges and vertices.
 //!
-//! Inside a mesh the rule for zeros (see [`watertight`]) gives each such crossing one owner, but at the border of an open mesh it may give
-//! it none: the ray, moved by its ε, passes the mesh by. A triangle is closed, so such a crossing counts all the same, once. Which
-//! edges are borders is seen from the faces that the ray hits at that place, so that no mesh needs a table of its
-//! neighbours; corners are compared by position, so that a mesh whose corners are split for their normals or texture
-//! coordinates stays closed. A bilinear patch decides about its edges by the same rule, and is one surface with the patches and meshes
-//! beside it.
+//! The rule for zeros (see [`watertight`]) gives each crossing of an edge or vertex inside a mesh one owner. At the
+//! border of an open mesh it may give none: the ray, moved by its ε, misses the mesh. A triangle is closed, so such a
+//! crossing still counts, once. An edge is a border if the faces that the ray hits at that point say so; no mesh needs
+//! a table of its neighbours. Corners are compared by position, so that a mesh whose corners are split for their
+//! normals or texture coordinates stays closed. A bilinear patch decides about its edges by the same rule, and forms
+//! one surface with neighbouring patches and meshes.
 
 use std::collections::{HashMap, HashSet};
 
@@ -19,19 +19,19 @@ use crate::intersect::watertight::{self, Feature, Meeting, Shear};
 use crate::tree::precise_mesh::has_area;
 use crate::tree::{GeometryKind, Tree};
 
-/// A face, a triangle or a bilinear patch, whose edges or corners a ray hits exactly.
+/// A face (a triangle or a bilinear patch) whose edge or corner a ray hits exactly.
 #[derive(Clone, Debug)]
 pub(crate) struct EdgeHit<'a> {
-    /// The crossing; it may lie out of the ray's range.
+    /// The crossing; it may lie outside the ray's range.
     pub(super) root: Root,
     /// Whether the rule for zeros gives the crossing to this face, so that it was visited already.
     pub(super) is_owned: bool,
-    /// `None` for patches, which know it only once asked.
+    /// `None` for patches, which compute it on demand.
     is_front: Option<bool>,
     place: Place,
     /// The corners in order, in `space`.
     outline: Outline,
-    /// For patches, and meshes beside them: the map from the space of the corners.
+    /// For patches, and meshes next to them: the map from the space of the corners.
     space: Space,
     geometry: u32,
     primitive: u32,
@@ -43,12 +43,12 @@ pub(crate) struct EdgeHit<'a> {
 
 type Outline = SmallVec<[Position; 4]>;
 
-/// Where on a face's outline.
+/// A place on a face's outline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Place {
     Edge([Position; 2]),
     Corner(Position),
-    /// Seen on edge: never hit, but a neighbour of others.
+    /// Seen on edge: never hit, but a neighbour of other faces.
     EdgeOn,
 }
 
@@ -62,7 +62,7 @@ impl EdgeHit<'_> {
         matches!(self.tree.geometries[self.geometry as usize].kind, GeometryKind::Shape(_))
     }
 
-    /// The edges by their ends, but those that are points.
+    /// The edges by their ends, without edges of length zero.
     fn edges(&self) -> impl Iterator<Item = [Position; 2]> {
         let next = self.outline.iter().cycle().skip(1);
         self.outline.iter().zip(next).filter(|(a, b)| a != b).map(|(&a, &b)| key(a, b))
@@ -85,7 +85,7 @@ impl<'a> Patch<'a> {
         Some(Self { placed, patch })
     }
 
-    /// How the line of a ray crosses it.
+    /// How the line of a ray crosses the patch.
     #[inline(never)]
     pub(crate) fn line_crossings(self, ray: &Ray) -> PatchCrossings {
         self.patch.line_crossings(&self.placed.object_ray(ray))
@@ -160,7 +160,7 @@ pub(crate) struct Triangle<'a> {
 }
 
 impl<'a> Triangle<'a> {
-    /// Shows a visitor how a ray meets it, and collects an edge hit. True ends the traversal.
+    /// Shows a visitor the crossing, and collects an edge hit. True ends the traversal.
     pub(crate) fn visit(
         self,
         meeting: Meeting,
@@ -207,27 +207,27 @@ impl<'a> Triangle<'a> {
     }
 }
 
-/// How a ray meets a triangle in double precision.
+/// The meeting of a ray and a triangle in double precision.
 pub(crate) fn intersect_precise(tree: &Tree, ray: &Ray, geometry: u32, primitive: u32) -> Meeting {
     let corners = tree.precise_corners(geometry, primitive);
     let meeting = watertight::intersect_precise(ray, Shear::new(&ray.direction), &corners);
-    // After a refit, some in the tree may have lost their area.
+    // After a refit, a triangle in the tree may have lost its area.
     if matches!(meeting, Meeting::Miss) || has_area(&corners) { meeting } else { Meeting::Miss }
 }
 
-/// A corner by position; the two zeros are one.
+/// A corner by position; both zeros are the same.
 type Position = [u64; 3];
 
 fn position(corner: [f64; 3]) -> Position {
     corner.map(|x| (x + 0.0).to_bits())
 }
 
-/// The two ends of an edge, whichever way it is run along.
+/// The two ends of an edge in either direction.
 fn key(a: Position, b: Position) -> [Position; 2] {
     if a < b { [a, b] } else { [b, a] }
 }
 
-/// The map from where corners are compared to the space of their tree, by its bits.
+/// The map from the space where corners are compared to the space of their tree, as bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Space([Position; 4]);
 
@@ -247,24 +247,24 @@ impl Space {
     }
 }
 
-/// What is known of an edge from the faces around a place.
+/// What the faces around a point say of an edge.
 struct Shared {
     /// The corners of the first face, sorted.
     face: Outline,
     is_shared: bool,
 }
 
-/// What is known of a vertex.
+/// What the faces around a point say of a vertex.
 struct Fan {
     is_owned: bool,
     is_open: bool,
     first: usize,
 }
 
-/// Of the edge hits without an owner, those that count because they lie at a border. `hits` are to be all of the line, or those for
-/// which that makes no difference.
+/// The unowned edge hits that count because they lie at a border. `hits` must be all edge hits of the line, or a subset
+/// with the same result.
 pub(super) fn at_borders(hits: &[EdgeHit]) -> Vec<usize> {
-    // Each mesh is a surface of its own, but the patches in a tree are one, together with the meshes beside them.
+    // Each mesh is a surface of its own, but the patches in a tree and the meshes next to them form one surface.
     let with_patches: HashSet<&[u32]> =
         hits.iter().filter(|hit| hit.is_patch()).map(|hit| hit.context.route.as_slice()).collect();
     let surface = |i: usize| {
@@ -310,7 +310,7 @@ pub(super) fn at_borders(hits: &[EdgeHit]) -> Vec<usize> {
     result
 }
 
-/// Shows a visitor what lies at borders, for a loop over everything, which has found all edge hits.
+/// Shows a visitor the hits at borders, for a loop over everything that has found all edge hits.
 #[cfg(test)]
 pub(crate) fn visit_borders_of_all(ray: &Ray, edge_hits: &[EdgeHit], visitor: &mut dyn Visitor) {
     for i in at_borders(edge_hits) {

@@ -1,10 +1,11 @@
 //! The traversal in double precision: every crossing, for any visitor, in any tree.
 //!
-//! It answers where single precision cannot tell (see [`filtered`](super::filtered)), finds every hit, and is the oracle of the other
-//! traversals. What a visitor gets never depends on the order of the traversal: leaves are tested with the ray's own range and not the
-//! rest of it, so that a crossing has the same bits whenever it is found, and ties have an order.
+//! It answers when single precision is uncertain (see [`filtered`](super::filtered)), finds all hits, and is the oracle
+//! of the other traversals. A visitor's results never depend on the order of the traversal: leaves are tested with the
+//! ray's full range, so that a crossing has the same bits whenever it is found, and ties have a fixed order.
 //!
-//! There is no recursion, for the input chooses how deep instances stand in instances: an instance suspends the frame around it.
+//! There is no recursion, because the input decides how deeply instances nest: an instance suspends the frame around
+//! it.
 
 use lumbre_geometry::{Ray, Root};
 use lumbre_math::DVec3;
@@ -42,7 +43,7 @@ pub(crate) fn any(isa: Isa, tree: &Tree, ray: &Ray, query: Option<&Query>) -> bo
     any_from(isa, tree, Start::WHOLE, &Context::default(), ray, query)
 }
 
-/// The closest hit in a part of a tree that stands there.
+/// The closest hit in a part of a tree in this context.
 pub(crate) fn closest_from(
     isa: Isa,
     tree: &Tree,
@@ -56,7 +57,7 @@ pub(crate) fn closest_from(
     closest.into_hit()
 }
 
-/// Whether anything is hit in a part of a tree that stands there.
+/// Whether anything is hit in a part of a tree in this context.
 pub(crate) fn any_from(
     isa: Isa,
     tree: &Tree,
@@ -75,7 +76,7 @@ pub(crate) fn traverse(isa: Isa, tree: &Tree, ray: &Ray, visitor: &mut dyn Visit
     traverse_from(isa, tree, Start::WHOLE, &Context::default(), ray, visitor);
 }
 
-/// The same in a part of a tree that stands there. Of edge hits, it may show those of the whole tree.
+/// As [`traverse`], in a part of a tree in this context. It may show edge hits of the whole tree.
 fn traverse_from(
     isa: Isa,
     tree: &Tree,
@@ -93,7 +94,7 @@ fn traverse_from(
     }
 }
 
-/// Shows a visitor what lies at borders, once the traversal has found these edge hits.
+/// Shows a visitor the hits at borders, given the edge hits that the traversal found.
 #[cold]
 #[inline(never)]
 fn visit_borders(
@@ -108,11 +109,11 @@ fn visit_borders(
         let t = hit.root.t;
         !hit.is_owned && ray.contains(t) && first <= t && t <= last
     };
-    // More triangles can only make fewer borders: without any now, there are none.
+    // More triangles can only remove borders: without any now, there are none.
     if !edges::at_borders(edge_hits).iter().any(|&i| matters(&edge_hits[i], visitor.range())) {
         return;
     }
-    // Some of the neighbours may lie beyond what was traversed.
+    // Some neighbours may lie beyond the traversed range.
     let all = all_edge_hits(isa, tree, context, ray);
     for i in edges::at_borders(&all) {
         if matters(&all[i], visitor.range()) && visitor.visit(&all[i].crossing(ray)) {
@@ -121,9 +122,9 @@ fn visit_borders(
     }
 }
 
-/// The edge hits of the whole line, within a tree that stands there.
+/// The edge hits of the whole line, in a tree in this context.
 fn all_edge_hits<'a>(isa: Isa, tree: &'a Tree, context: &mut Context, ray: &Ray) -> Vec<EdgeHit<'a>> {
-    /// Looks along the whole line.
+    /// Searches the whole line.
     struct EdgeHitsOnly;
     impl Visitor for EdgeHitsOnly {
         fn wanted(&self) -> Wanted {
@@ -149,20 +150,20 @@ fn all_edge_hits<'a>(isa: Isa, tree: &'a Tree, context: &mut Context, ray: &Ray)
     edge_hits
 }
 
-/// A traversal with one ray.
+/// The traversal of one ray.
 struct Traversal<'a, 't> {
     tree: &'a Tree,
     from: Start,
-    /// As it was once the traversal is over, unless the visitor ended it.
+    /// Restored at the end of the traversal, unless the visitor ended it.
     context: &'t mut Context,
     ray: &'t Ray,
     visitor: &'t mut dyn Visitor,
-    /// The triangles that are met exactly at an edge or a corner.
+    /// Triangles that the ray meets exactly at an edge or a corner.
     edge_hits: &'t mut Vec<EdgeHit<'a>>,
 }
 
 impl Dispatch for Traversal<'_, '_> {
-    /// Whether the visitor ended it.
+    /// Whether the visitor ended the traversal.
     type Output = bool;
 
     #[inline(always)]
@@ -226,19 +227,19 @@ struct Frame<'a, L> {
     meets_tree: bool,
     wanted: Wanted,
     range: [f64; 2],
-    /// For the mesh, the cloud of spheres and the shapes that the ray came to last.
+    /// Prepared for the last mesh, sphere cloud and shapes that the ray came to.
     mesh: Option<MeshRay>,
     cloud: Option<CloudRay>,
     bounding_volumes: Option<BoundingVolumeRay>,
 }
 
-/// The ray for the triangles of one mesh, or of some with one origin.
+/// The ray for the triangles of one mesh, or of several meshes with one origin.
 #[derive(Clone, Copy)]
 struct MeshRay {
     shear: Shear,
-    /// Relative to the mesh's.
+    /// Relative to the mesh's origin.
     origin: [f64; 3],
-    /// Where single precision tells anything.
+    /// `None` if single precision is too coarse.
     blocks: Option<BlockRay>,
 }
 
@@ -265,7 +266,8 @@ impl<'a, L: Simd> Frame<'a, L> {
         }
     }
 
-    /// Starts on a part of the tree: what has no bounds is tested, the rest goes onto the stack. True ends the traversal.
+    /// Starts on a part of the tree: tests unbounded geometry and pushes the rest onto the stack. True ends the
+    /// traversal.
     fn enter(
         &mut self,
         from: Start,
@@ -288,7 +290,7 @@ impl<'a, L: Simd> Frame<'a, L> {
         false
     }
 
-    /// Ends the ray where the visitor does by now.
+    /// Shortens the ray to the visitor's range.
     #[inline(always)]
     fn shorten(&mut self, visitor: &dyn Visitor) {
         let [_, limit] = visitor.range();
@@ -301,7 +303,7 @@ impl<'a, L: Simd> Frame<'a, L> {
         }
     }
 
-    /// The frame inside an instance, and the part of its tree that is entered; `None` where there is nothing to find.
+    /// The frame inside an instance, and the part of its tree to enter; `None` if the visitor wants nothing there.
     #[inline(always)]
     fn inside(&self, entry: &Entry, visitor: &dyn Visitor) -> Option<(Self, Start)> {
         let (geometry, from) = (entry.geometry, Start::of(entry.primitive()));
@@ -333,7 +335,7 @@ impl<'a, L: Simd> Frame<'a, L> {
         visitor.visit(&Crossing { root, first, geometry, primitive, order, is_front, ray, tree, context })
     }
 
-    /// Turns to the mesh of a block: to the first that the ray comes to, and to each where meshes have different origins.
+    /// Prepares the ray for the mesh of a block: for the first one, and for each one if meshes have different origins.
     #[inline(always)]
     fn turn_to(&mut self, block: &TriangleBlock) -> MeshRay {
         let &Summary { has_one_origin, first_origin, sizes: Sizes { largest_corner, .. }, .. } =
@@ -345,7 +347,7 @@ impl<'a, L: Simd> Frame<'a, L> {
         let mesh_origin = if has_one_origin {
             first_origin
         } else {
-            self.tree.mesh_origin(self.tree.packed.names[block.number() as usize].geometry)
+            self.tree.mesh_origin(self.tree.packed.ids[block.number() as usize].geometry)
         };
         let origin = shear.local_origin(&self.ray.origin, &mesh_origin);
         let [t_min, t_max] = self.range;
@@ -362,7 +364,7 @@ impl<'a, L: Simd> Frame<'a, L> {
         visitor: &mut dyn Visitor,
         edge_hits: &mut Vec<EdgeHit<'a>>,
     ) -> bool {
-        // All of a leaf are of one mesh.
+        // A leaf has triangles of one mesh only.
         let MeshRay { shear, origin, blocks } = self.turn_to(self.blocks.block(leaf & tag::PLACE));
         let mut following = Some(leaf & tag::PLACE);
         while let Some(place) = following {
@@ -382,7 +384,7 @@ impl<'a, L: Simd> Frame<'a, L> {
                 let lane = mask.trailing_zeros() as usize % BLOCK;
                 mask &= mask - 1;
                 let ids = || {
-                    let ids = &self.tree.packed.names[block.number() as usize];
+                    let ids = &self.tree.packed.ids[block.number() as usize];
                     (ids.geometry, ids.primitives[lane])
                 };
                 match L::pass(block, lane, &shear, &origin) {
@@ -420,7 +422,7 @@ impl<'a, L: Simd> Frame<'a, L> {
     fn test_spheres(&mut self, leaf: u32, context: &Context, visitor: &mut dyn Visitor) -> bool {
         let packed = &self.tree.packed;
         let places = tag::blocks(leaf);
-        for (ids, block) in packed.sphere_names[places.clone()].iter().zip(&packed.sphere_blocks[places]) {
+        for (ids, block) in packed.sphere_ids[places.clone()].iter().zip(&packed.sphere_blocks[places]) {
             let cloud = CloudRay::turn(&mut self.cloud, self.tree, &self.ray, ids.geometry);
             let mut mask = match cloud.within(self.range) {
                 Some(ray) => intersect::intersect_spheres::<L>(block, ray).0,
@@ -437,7 +439,7 @@ impl<'a, L: Simd> Frame<'a, L> {
         false
     }
 
-    /// Tests a leaf of shapes: those whose bounding volumes are hit.
+    /// Tests the shapes of a leaf whose bounding volumes are hit.
     #[inline(always)]
     fn test_shapes(
         &mut self,
@@ -534,7 +536,7 @@ impl<'a, L: Simd> Frame<'a, L> {
         self.test_primitive(entry.geometry, entry.primitive(), context, visitor)
     }
 
-    /// Shows the visitor the crossings of a primitive that is no triangle, bilinear patch or instance.
+    /// Shows the visitor the crossings of a primitive other than a triangle, bilinear patch or instance.
     fn test_primitive(
         &self,
         geometry: u32,
@@ -546,7 +548,8 @@ impl<'a, L: Simd> Frame<'a, L> {
     }
 }
 
-/// Shows a visitor the crossings of a primitive that is no triangle, bilinear patch or instance. True ends the traversal.
+/// Shows a visitor the crossings of a primitive other than a triangle, bilinear patch or instance. True ends the
+/// traversal.
 pub(crate) fn visit_primitive(
     tree: &Tree,
     ray: &Ray,
@@ -562,7 +565,7 @@ pub(crate) fn visit_primitive(
         if root.t != first.t {
             first = root;
         }
-        // Also keeps out a NaN.
+        // Also rejects NaN.
         ray.contains(root.t)
             && visitor.visit(&Crossing {
                 root,

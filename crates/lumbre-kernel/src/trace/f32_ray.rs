@@ -1,39 +1,43 @@
-//! Rays in single precision, in trees of nothing but triangles: for those to whom speed counts more than the last digits.
+//! Rays in single precision, in trees of triangles only: for callers who prefer speed to the last digits.
 //!
-//! The test is that of S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, and simpler than the one
-//! in double precision (see [`watertight`](crate::intersect::watertight)): triangles are closed, so that a ray through an edge meets all that have it,
-//! which makes no difference to the nearest hit and to whether there is one. Where that would be imprecise, products are computed exactly.
-//! Nothing depends on the instruction set: no product is fused with a sum.
+//! The test is that of S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, and
+//! simpler than the one in double precision (see [`watertight`](crate::intersect::watertight)). Triangles are closed: a
+//! ray through an edge meets all triangles at that edge, which affects neither the nearest hit nor whether there is
+//! one. Products are computed exactly where rounding would be imprecise. Results do not depend on the instruction set:
+//! no product is fused with a sum.
 //!
-//! The ray is that from its start relative to the mesh, rounded once. All that follows is meant of it.
+//! The ray starts relative to the mesh, rounded once. Everything below refers to this rounded ray.
 //!
-//! # Why nothing leaks
+//! # Correctness: nothing leaks
 //!
-//! Where a corner comes to lie in the ray's sheared space is computed of the ray and the corner alone, so that it is the same for all
-//! triangles that share it. The line of the ray passes through a closed mesh of those corners: not through the rim of one of them only,
-//! but, if it is moved by ever so little into general position, through the inside of one that is not seen on edge; and as triangles are
-//! closed and finitely many, there is one that it passes through, and is not seen on edge, without being moved. Its edge functions have
-//! one sign, or are zero. An edge function is the difference of two rounded products. Rounding keeps their order or makes them equal, and
-//! so it has the exact sign or is zero: that triangle is not left out. Where one came out as zero it is computed again by exact products,
-//! which those of two numbers of single precision are in double precision, and so has the exact sign.
+//! A corner's position in the ray's sheared space depends on the ray and the corner only, so all triangles that share
+//! the corner agree on it. The line of the ray passes through a closed mesh of those corners. Moved slightly into
+//! general position, it passes through the inside of a triangle that is not seen on edge. Triangles are closed and
+//! finitely many, so the unmoved line also passes through such a triangle, whose edge functions have one sign or are
+//! zero. An edge function is the difference of two rounded products. Rounding keeps the order of the products or makes
+//! them equal, so the computed function has the exact sign or is zero, and the triangle is not rejected. A computed
+//! zero is evaluated again with exact products (products of single-precision numbers are exact in double precision),
+//! which gives the exact sign.
 //!
-//! # Why boxes lose nothing
+//! # Error bound: boxes lose nothing
 //!
-//! Let u = 2⁻²⁴, h the largest distance of the mesh from the ray's start along the last axis, and lengths be in tree units. The sheared
-//! corners are off by u(2m + 6.1h) from exact ones, where m ≤ 4.1 for a triangle around the ray: by two roundings of what they are, and
-//! of the height, the shear (which is off by 3u, and no more than 1), and their product. Where all edge functions e are strictly of one
-//! sign, their exact ones are too, and the ray does pass through the computed triangle, at the height Σ e z / Σ e of exact ones.
-//! Each is off by 2u(p + |e|), where p is the largest product, so that the height as computed is off by 6u(p / |Σ e| + 1) times the extent
-//! of the triangle along the ray, and by 7uh for the roundings of sums, products and heights. That is why p times the extent has to be
-//! below 2 |Σ e|, which leaves 24.2u; else, and where one is zero, weights come from exact products, and their height is off by 2uh.
+//! Let u = 2⁻²⁴, h the largest distance of the mesh from the ray's start along the last axis, and lengths be in tree
+//! units. The sheared corners have an error of u(2m + 6.1h), where m ≤ 4.1 for a triangle around the ray: from two
+//! roundings of the corner, and from the height, the shear (which has an error of 3u, and is at most 1), and their
+//! product. If all computed edge functions e have strictly one sign, the exact ones have it too, and the ray passes
+//! through the computed triangle at the height Σ e z / Σ e of exact values. Each e has an error of 2u(p + |e|), where p
+//! is the largest product. So the computed height has an error of 6u(p / |Σ e| + 1) times the extent of the triangle
+//! along the ray, and of 7uh from the rounding of sums, products and heights. Hence p times the extent must be below 2
+//! |Σ e|, which leaves 24.2u. Otherwise, and if an e is zero, weights come from exact products, and their height has an
+//! error of 2uh.
 //!
-//! So the hit lies within u(8.2 + 6.1h) + 24.2u + 7uh of the triangle on each axis, where h ≤ 1.01 + |o|: below
-//! u(47 + 14|o|). And as planes are relative to the tree's origin, which the ray knows rounded, by a little more than u times its
-//! distance from the mesh's: `TreeSpace::f32_margin` has room for all of it beside what is said in [`node`](crate::tree::node). `t` itself is
-//! off by three roundings, which the ends of the range among boxes have room for, too.
+//! So the hit lies within u(8.2 + 6.1h) + 24.2u + 7uh of the triangle on each axis, where h ≤ 1.01 + |o|: below u(47 +
+//! 14|o|). Planes are relative to the tree's origin, which the ray knows rounded, with an error of slightly more than u
+//! times its distance from the mesh's. `TreeSpace::f32_margin` covers all of this in addition to the errors in
+//! [`node`](crate::tree::node). `t` itself has an error of three roundings, which the ends of the box range cover too.
 //!
-//! So no box is passed by with a hit in it that is as near as the nearest: the answer is that of a loop over all triangles, whatever
-//! the tree.
+//! So no box with a hit as near as the nearest is skipped: the answer is that of a loop over all triangles, for any
+//! tree.
 
 use bytemuck::Zeroable;
 
@@ -56,9 +60,9 @@ use crate::tree::filter_start::Precise;
 use crate::tree::node::tag;
 use crate::tree::triangle_block::TriangleBlock;
 
-/// How a line passes the triangles of a block, as it is seen at first.
+/// How a line passes the triangles of a block, before the exact tests.
 pub(crate) struct Lines<E> {
-    /// The first of the two products that each edge function is the difference of.
+    /// The first of each edge function's two products.
     products: [E; 3],
     edges: [E; 3],
     within: E,
@@ -66,7 +70,7 @@ pub(crate) struct Lines<E> {
 }
 
 impl<E: Vector> Lines<E> {
-    /// By corners in the sheared space of the ray, and a bit for each triangle that it may pass through.
+    /// From corners in the sheared space of the ray; also returns a mask of the triangles that it may pass through.
     #[inline(always)]
     fn of([x, y, heights]: [[E; 3]; 3]) -> (u32, Self) {
         let products = [x[2] * y[1], x[0] * y[2], x[1] * y[0]];
@@ -75,7 +79,7 @@ impl<E: Vector> Lines<E> {
         (E::splat(0.0).simd_le(within), Self { products, edges, within, heights })
     }
 
-    /// What is needed of triangles that it may pass through, and a bit for each of the mask that has to be looked at closer.
+    /// The data of triangles that it may pass through, and a mask of those of `mask` that need exact products.
     #[inline(always)]
     pub(crate) fn pass(self, mask: u32, precise: &Precise) -> (u32, Pass<E>) {
         let Self { products: [bc, ca, ab], edges: [u, v, w], within, heights: z } = self;
@@ -89,24 +93,24 @@ impl<E: Vector> Lines<E> {
 /// How a line passes the triangles of a block.
 #[derive(Clone, Copy, Zeroable)]
 pub(crate) struct Pass<E> {
-    /// Where along it, times the sum of all weights.
+    /// The heights along the line, times the sum of all weights.
     height: E,
-    /// Those of the second and third corner, and the sum of all.
+    /// Weights of the second and third corner, and the sum of all.
     weights: [E; 3],
 }
 
-/// How a line passes the triangles of a block, and which of these its ray meets.
+/// How a line passes the triangles of a block, and which of them its ray meets.
 type Passed<E> = (LaneHits<E>, Pass<E>);
 
 impl<E: F32x8> Pass<E> {
-    /// The weights of one.
+    /// The weights of one lane.
     #[inline(always)]
     fn weights_of(&self, lane: usize) -> [f32; 3] {
         let [v, w, det] = self.weights;
         [v.lane(lane), w.lane(lane), det.lane(lane)]
     }
 
-    /// Those of all.
+    /// The weights of all lanes.
     #[inline(always)]
     fn all_weights(&self) -> [[f32; BLOCK]; 3] {
         let [v, w, det] = self.weights;
@@ -115,14 +119,14 @@ impl<E: F32x8> Pass<E> {
 }
 
 impl<W: F32x16> Pass<W> {
-    /// That of one of the two: `which` is 0 or 1.
+    /// The pass of one of the two rays: `which` is 0 or 1.
     #[inline(always)]
     pub(crate) fn half(&self, which: usize) -> Pass<W::Half> {
         let Self { height, weights: [v, w, det] } = self;
         Pass { height: height.half(which), weights: [v.half(which), w.half(which), det.half(which)] }
     }
 
-    /// Those of two.
+    /// The passes of two rays.
     #[inline(always)]
     pub(crate) fn of_two(first: &Pass<W::Half>, second: &Pass<W::Half>) -> Self {
         Self {
@@ -132,19 +136,19 @@ impl<W: F32x16> Pass<W> {
     }
 }
 
-/// The nearest crossing so far, if there is one. With a ray it takes a cache line, which interleaved rays are to find there.
+/// The nearest crossing so far, if any. Together with a ray it takes one cache line, which interleaved rays rely on.
 #[derive(Clone, Copy)]
 pub(crate) struct Nearest {
-    /// The place of its block, and the lane in the last three bits.
+    /// The line of its block, and the lane in the last three bits.
     place: u32,
-    /// The weights of the second and third corner, and the sum of all.
+    /// Weights of the second and third corner, and the sum of all.
     weights: [f32; 3],
 }
 
 const _: () = assert!(size_of::<F32Ray>() + size_of::<Nearest>() <= 64);
 
 impl Nearest {
-    /// There is no block there: it would reach beyond where blocks may begin.
+    /// No block begins at this line: it would end beyond the last index.
     pub(crate) const NONE: Self = Self { place: u32::MAX, weights: [0.0; 3] };
 
     #[inline(always)]
@@ -152,7 +156,7 @@ impl Nearest {
         Self { place: block * BLOCK as u32 + lane, weights }
     }
 
-    /// The place of its block, and the lane.
+    /// The line of its block, and the lane.
     #[inline(always)]
     fn triangle(&self) -> Option<(u32, u32)> {
         if self.place == u32::MAX {
@@ -162,7 +166,7 @@ impl Nearest {
         }
     }
 
-    /// Takes what is nearer of what a ray meets in a block, and ends the ray there; whether there was anything.
+    /// Takes the nearest crossing of a block if it is nearer, and shortens the ray. Returns whether it was.
     #[inline(always)]
     fn take<E: F32x8>(
         &mut self,
@@ -181,7 +185,7 @@ impl Nearest {
         self.take_nearest(decider, ray, place, crossing, pass, (lane, t[lane]))
     }
 
-    /// The same where it is known in which lane the ray meets the nearest, if it does meet any, and at which `t`.
+    /// As [`Self::take`], if the lane and the `t` of the block's nearest crossing are known.
     #[inline(always)]
     pub(crate) fn take_nearest<E: F32x8>(
         &mut self,
@@ -203,7 +207,7 @@ impl Nearest {
         self.take_closely(decider, ray, place, &LaneHits { met, uncertain, at }, &pass.all_weights())
     }
 
-    /// The same where a triangle has to be looked at closer, or two are met at the same place, of whatever block.
+    /// As [`Self::take`], if a triangle needs exact products, or two are met at the same `t`, in this block or another.
     #[cold]
     #[inline(never)]
     fn take_closely(
@@ -239,7 +243,7 @@ impl Nearest {
         is_nearer
     }
 
-    /// Whether a triangle that is met where this is comes before it.
+    /// Whether a triangle that is met at the same `t` comes before this one.
     fn comes_after(&self, decider: &Decider, block: u32, lane: u32, enters: bool) -> bool {
         match self.triangle() {
             Some((own_block, own_lane)) => precedes(
@@ -250,7 +254,7 @@ impl Nearest {
         }
     }
 
-    /// Geometry and primitive, the barycentrics, and whether the ray enters there, if there is one.
+    /// Geometry and primitive, the barycentrics, and whether the ray enters there; `None` without a hit.
     #[inline(always)]
     pub(super) fn crossing(&self, decider: &Decider) -> Option<((u32, u32), [f32; 2], bool)> {
         let (block, lane) = self.triangle()?;
@@ -258,7 +262,7 @@ impl Nearest {
         Some((decider.ids(block, lane), [v / det, w / det], det > 0.0))
     }
 
-    /// As a hit at this `t`, if there is one.
+    /// The hit at this `t`, if any.
     #[inline(always)]
     pub(crate) fn hit(&self, decider: &Decider, t: f32) -> Option<Hit32> {
         let (block, lane) = self.triangle()?;
@@ -276,7 +280,7 @@ impl Nearest {
 }
 
 impl F32Ray {
-    /// Of no ray.
+    /// A ray that hits nothing.
     pub(crate) fn of_none() -> Self {
         Self { axes: Axes::by_bits(0, 0), origin: [0.0; 4], shear: [0.0; 4], minus_inverse: 0.0 }
     }
@@ -296,14 +300,14 @@ impl F32Ray {
         self.shear[3] = t_max;
     }
 
-    /// How the line of the ray passes the triangles of a block, and a bit for each that it may pass through.
+    /// How the line of the ray passes the triangles of a block, and a mask of those that it may pass through.
     #[inline(always)]
     pub(crate) fn lines<L: Simd>(&self, block: &TriangleBlock) -> (u32, Lines<L::F32x8>) {
         let (mask, lines) = Lines::of(L::sheared_corners(block, simd::opaque(self)));
         (mask & block.taken(), lines)
     }
 
-    /// The same of two rays, each among the triangles of its block: those of the first, and those of the second.
+    /// As [`Self::lines`] for two rays, each with the triangles of its own block.
     #[inline(always)]
     pub(crate) fn lines_by_two<L: Simd>(
         rays: [&Self; 2],
@@ -313,16 +317,16 @@ impl F32Ray {
         (mask & (blocks[0].taken() | blocks[1].taken() << BLOCK), lines)
     }
 
-    /// Where the ray meets the triangles of a block that its line passes so, and which of those in the mask it does meet.
+    /// The crossings with the triangles of a block that the line passes, and which of those in the mask the ray meets.
     #[inline(always)]
     pub(crate) fn cross<E: F32x8>(&self, mask: u32, pass: &Pass<E>) -> (u32, E) {
-        // Read again: most lines pass through few blocks.
+        // Loads the ray again: most lines pass through few blocks.
         let ray = simd::opaque(self);
         let t = pass.height / pass.weights[2] * E::splat(ray.minus_inverse);
         (mask & E::splat(ray.t_min()).simd_le(t) & t.simd_le(E::splat(ray.t_max())), t)
     }
 
-    /// Which triangles of a block the ray meets; `None` where its line passes through none.
+    /// Which triangles of a block the ray meets; `None` if its line passes through none.
     #[inline(always)]
     fn pass<L: Simd>(&self, precise: &Precise, block: &TriangleBlock) -> Option<Passed<L::F32x8>> {
         let (mask, lines) = self.lines::<L>(block);
@@ -334,7 +338,8 @@ impl F32Ray {
         Some((LaneHits { met, uncertain, at }, pass))
     }
 
-    /// Where the ray meets a triangle, by exact products; the weights of the second and third corner, and the sum of all.
+    /// The crossing with a triangle by exact products: its `t`, the weights of the second and third corner, and the sum
+    /// of all.
     #[cold]
     #[inline(never)]
     pub(crate) fn cross_exactly(&self, block: &TriangleBlock, lane: u32) -> Option<(f32, [f32; 3])> {
@@ -354,13 +359,13 @@ impl F32Ray {
         }
         let t = ((u * a[2] + v * b[2] + w * c[2]) / det * f64::from(self.minus_inverse)) as f32;
         (self.t_min() <= t && t <= self.t_max()).then(|| {
-            // The sum of all has its sign, which tells the face.
+            // The sign of the sum tells the face.
             let size = det.abs();
             (t, [(v / size) as f32, (w / size) as f32, if det > 0.0 { 1.0 } else { -1.0 }])
         })
     }
 
-    /// Leaves out what is beyond this.
+    /// Shortens the ray to this `t`.
     #[inline(always)]
     pub(super) fn shorten(&mut self, t_max: f32) {
         if t_max < self.t_max() {
@@ -368,7 +373,8 @@ impl F32Ray {
         }
     }
 
-    /// Tests a leaf: takes the nearest, and ends the ray there; true where any hit will do, and there is one.
+    /// Tests a leaf: takes the nearest crossing and shortens the ray. Returns true if any hit suffices and there is
+    /// one.
     #[inline(always)]
     pub(super) fn test_leaf<G: Goal, L: Simd>(
         &mut self,
@@ -408,7 +414,7 @@ impl F32Ray {
         }
     }
 
-    /// Whether the ray meets one of these.
+    /// Whether the ray meets one of these triangles.
     #[cold]
     #[inline(never)]
     pub(crate) fn meets_exactly(&self, block: &TriangleBlock, mut mask: u32) -> bool {
@@ -423,7 +429,7 @@ impl F32Ray {
     }
 }
 
-/// Traverses a tree of triangles. Where any hit will do, there is no more to know of it.
+/// Traverses a tree of triangles. For an any-hit search, the hit itself is arbitrary.
 #[inline(always)]
 pub(crate) fn traverse<G: Goal, L: Simd>(decider: &Decider, ray: &Ray32) -> Outcome<Option<Hit32>> {
     let start = decider.start;
@@ -444,11 +450,11 @@ pub(crate) fn traverse<G: Goal, L: Simd>(decider: &Decider, ray: &Ray32) -> Outc
     }
 }
 
-/// Where any hit will do.
+/// The result of an any-hit search.
 pub(crate) const SOME_HIT: Hit32 =
     Hit32 { t: 0.0, local: [0.0; 2], id: 0, primitive: 0, geometry: 0, instance: Hit32::NO_INSTANCE };
 
-/// An answer in double precision, rounded.
+/// A double-precision hit, rounded.
 pub(crate) fn rounded(hit: &Hit) -> Hit32 {
     Hit32 {
         t: hit.root.t as f32,
@@ -480,7 +486,7 @@ pub(crate) struct F32Queries {
 }
 
 impl F32Queries {
-    /// `None` for a tree of anything else.
+    /// `None` for a tree with other primitives.
     pub(crate) fn of(isa: Isa, tree: &Tree) -> Option<Self> {
         let start = tree.single.as_ref()?;
         start

@@ -58,7 +58,7 @@ impl FilteredGoal for ClosestHit {
             return Found::NOTHING;
         };
         let winner = Winner { root: hit.root, geometry: IN_INSTANCE, primitive: 0 };
-        // The hit is whole already, wherever it is.
+        // The nested hit is complete, whatever its depth.
         let nested = Some(Box::new(hit));
         Found { winner: Some(winner), in_instance: Some(InInstance { instance: 0, winner, nested }) }
     }
@@ -136,7 +136,7 @@ impl FilteredGoal for AnyHit {
     }
 }
 
-/// A traversal with one ray.
+/// The traversal of one ray.
 pub(crate) struct Traversal<'a, 'r, G, const GENERAL: bool, const FILTERED: bool> {
     pub(super) tree: &'a Tree,
     pub(super) start: &'a FilterStart,
@@ -144,7 +144,7 @@ pub(crate) struct Traversal<'a, 'r, G, const GENERAL: bool, const FILTERED: bool
     pub(super) root: u32,
     pub(super) ray: &'r Ray,
     pub(super) query: Option<&'r TreeQuery<'r>>,
-    /// Where the tree stands.
+    /// The instances around the tree.
     pub(super) context: ContextRef<'r>,
     pub(super) goal: PhantomData<G>,
 }
@@ -164,7 +164,7 @@ impl<G: FilteredGoal, const GENERAL: bool, const FILTERED: bool> Dispatch
 }
 
 impl<G: FilteredGoal, const GENERAL: bool, const FILTERED: bool> Traversal<'_, '_, G, GENERAL, FILTERED> {
-    /// Traverses the tree with a ray that has started among its bounding boxes.
+    /// Traverses the tree with a ray that has already started among its bounding boxes.
     #[inline(always)]
     pub(super) fn run_from<L: Simd>(self, slabs: Slabs) -> Outcome<G::Found> {
         let Self { tree, start, root, ray, query, context, .. } = self;
@@ -172,11 +172,11 @@ impl<G: FilteredGoal, const GENERAL: bool, const FILTERED: bool> Traversal<'_, '
         let mut stack = Stack::new();
         let mut next = cursor.descend::<G>(root, &mut stack);
         if next.is_none() && (!GENERAL || tree.infinite.is_empty()) {
-            // Many rays come to no leaf, and need nothing else.
+            // Many rays reach no leaf and need no more.
             return Outcome::Certain(G::nothing());
         }
         let decider = &Decider::new(tree, start);
-        // Opaque: what was read at the start would else be stored, to be kept until here.
+        // Opaque: keeps the ray from being loaded at the start and spilled until here.
         let blocks = L::start_blocks(start, simd::opaque(ray), &cursor.slabs);
         let mut filtered = FilteredRay::<GENERAL, FILTERED>::new(decider, blocks, query, context);
         if GENERAL && let Some(stop) = filtered.test_infinite::<G, L>(ray, &mut cursor.slabs) {
@@ -193,7 +193,7 @@ impl<G: FilteredGoal, const GENERAL: bool, const FILTERED: bool> Traversal<'_, '
 }
 
 impl<'a, 'r, G: FilteredGoal, const GENERAL: bool> Traversal<'a, 'r, G, GENERAL, false> {
-    /// Of a whole tree that stands in no instance, with everything in it.
+    /// A traversal of a whole top-level tree.
     #[inline(always)]
     pub(crate) fn whole(tree: &'a Tree, start: &'a FilterStart, ray: &'r Ray) -> Self {
         Self {
@@ -216,7 +216,7 @@ fn stop_early<G: FilteredGoal>(stop: Stop) -> Outcome<G::Found> {
     }
 }
 
-/// The traversal with a query that leaves something out.
+/// The traversal with a query that excludes some hits.
 pub(crate) fn with_query<G: FilteredGoal>(
     isa: Isa,
     tree: &Tree,
@@ -233,7 +233,7 @@ pub(crate) fn with_query<G: FilteredGoal>(
     }
 }
 
-/// The same without a query, for tests.
+/// The traversal without a query, for tests.
 #[cfg(test)]
 pub(crate) fn without_query<G: FilteredGoal>(isa: Isa, tree: &Tree, ray: &Ray) -> Outcome<G::Found> {
     let Some(start) = &tree.single else { return Outcome::Uncertain };
@@ -252,7 +252,7 @@ pub(crate) struct Queries {
 }
 
 impl Queries {
-    /// Of a tree.
+    /// The functions for a tree.
     pub(crate) fn of(isa: Isa, tree: &Tree) -> Self {
         match tree.single.as_ref().map(|start| start.only_triangles) {
             Some(true) => Self {

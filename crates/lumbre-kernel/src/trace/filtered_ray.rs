@@ -16,26 +16,27 @@ use crate::tree::bounding_block::BoundingVolumeRay;
 use crate::tree::packed::Start;
 use crate::tree::{GeometryKind, Tree};
 
-/// A ray in the leaves of a tree. `GENERAL`: of anything, not of triangles alone; `FILTERED`: with a query that leaves something out.
+/// A ray in the leaves of a tree. `GENERAL`: for any primitives, not only triangles; `FILTERED`: with a query that
+/// excludes some hits.
 pub(crate) struct FilteredRay<'a, 'd, const GENERAL: bool, const FILTERED: bool> {
     pub(super) decider: &'d Decider<'a>,
-    /// For triangles; its range also ends what other leaves are tested for.
+    /// For triangles; its range also limits the tests of other leaves.
     pub(crate) blocks: BlockRay,
-    /// From heights along the ray to places in the range of bounding boxes.
+    /// Converts heights along the ray to positions in the range of bounding boxes.
     pub(super) s_per_height: f32,
     /// The closest hit so far.
     pub(crate) best: Candidate,
-    /// That hit, where it is known in double precision.
+    /// That hit, if it is known in double precision.
     exact: Option<Winner>,
-    /// What counts, where `FILTERED`.
+    /// The query, if `FILTERED`.
     pub(super) query: Option<&'d TreeQuery<'d>>,
-    /// Where the tree stands.
+    /// The instances around the tree.
     pub(super) context: ContextRef<'d>,
-    /// For shapes, once the ray has come to some.
+    /// For shapes; created at the first one.
     pub(super) bounding_volumes: Option<BoundingVolumeRay>,
-    /// For the cloud of spheres that the ray came to last.
+    /// For the last cloud of spheres that the ray came to.
     pub(super) cloud: Option<CloudRay>,
-    /// The closest hit, where that is in an instance: `exact` has the geometry [`IN_INSTANCE`] then.
+    /// The closest hit, if it is in an instance: `exact` has the geometry [`IN_INSTANCE`] then.
     pub(super) in_instance: Option<InInstance>,
 }
 
@@ -46,12 +47,12 @@ pub(crate) struct InInstance {
     pub(super) instance: u32,
     /// The hit in the instance's own tree.
     pub(super) winner: Winner,
-    /// The whole hit, where it is in an instance there.
+    /// The complete hit, if it is in a nested instance.
     pub(super) nested: Option<Box<Hit>>,
 }
 
 impl InInstance {
-    /// As a hit, where the tree that has the instance stands there.
+    /// Converts to a hit, given the context of the instance's tree.
     #[inline(always)]
     pub(super) fn into_hit(self, tree: &Tree, context: ContextRef) -> Hit {
         if let Some(hit) = self.nested {
@@ -87,7 +88,7 @@ impl<'a, 'd, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, 'd, GENE
         }
     }
 
-    /// Starts with another ray, where there are triangles alone.
+    /// Starts with another ray, in a tree of triangles only.
     #[inline(always)]
     pub(crate) fn restart(&mut self, (blocks, s_per_height): (BlockRay, f32)) {
         (self.blocks, self.s_per_height, self.best) = (blocks, s_per_height, Candidate::NONE);
@@ -100,7 +101,7 @@ impl<'a, 'd, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, 'd, GENE
         self.blocks.range.last = if best.is_some() { best.to } else { self.blocks.range.last };
     }
 
-    /// Takes a closer hit, and ends the ray there.
+    /// Takes a closer hit, and shortens the ray.
     #[inline(always)]
     pub(crate) fn keep(&mut self, closer: Candidate, slabs: &mut Slabs) {
         self.best = closer;
@@ -108,14 +109,14 @@ impl<'a, 'd, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, 'd, GENE
         slabs.end_at(watertight::beyond(closer.to * self.s_per_height));
     }
 
-    /// The same of a hit that is known in double precision, and lies in this interval of heights.
+    /// Takes a closer hit that is known in double precision and lies in this interval of heights.
     #[inline(always)]
     pub(super) fn keep_exact(&mut self, winner: Winner, heights: (f32, f32), slabs: &mut Slabs) {
         self.exact = Some(winner);
         self.keep(Candidate::exact(heights), slabs);
     }
 
-    /// The closest hit so far, where it is known in double precision.
+    /// The closest hit so far, if it is known in double precision.
     #[inline(always)]
     pub(crate) fn exact(&self) -> Option<Winner> {
         if (GENERAL || FILTERED) && self.best.is_exact() { self.exact } else { None }
@@ -143,14 +144,14 @@ impl<'a, 'd, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, 'd, GENE
 /// The closest hit.
 pub(crate) struct Found {
     pub(crate) winner: Option<Winner>,
-    /// The same, where it is in an instance.
+    /// The same hit, if it is in an instance.
     pub(crate) in_instance: Option<InInstance>,
 }
 
 impl Found {
     pub(crate) const NOTHING: Self = Self { winner: None, in_instance: None };
 
-    /// As a hit in a tree that stands there.
+    /// Converts to a hit in a tree in this context.
     #[inline(always)]
     pub(crate) fn into_hit(self, tree: &Tree, context: ContextRef) -> Option<Hit> {
         match self.in_instance {
@@ -162,25 +163,25 @@ impl Found {
 
 /// A goal of the filtered traversal, and how it ends.
 pub(crate) trait FilteredGoal: Goal {
-    /// What is found.
+    /// The result.
     type Found;
 
-    /// Where no leaf is on the way.
+    /// The result if the ray reaches no leaf.
     fn nothing() -> Self::Found;
 
-    /// Where the traversal stops at a hit.
+    /// The result if the traversal stops at a hit.
     fn hit() -> Self::Found;
 
-    /// Where a triangle is the closest hit of a packet's ray.
+    /// The result if a triangle is the closest hit of a packet's ray.
     fn closest(winner: Winner) -> Self::Found;
 
-    /// Where all leaves on the way were tested.
+    /// The result after all leaves on the way were tested.
     fn end<L: Simd, const GENERAL: bool, const FILTERED: bool>(
         filtered: &mut FilteredRay<GENERAL, FILTERED>,
         ray: &Ray,
     ) -> Outcome<Self::Found>;
 
-    /// By the exact traversal, in a part of a tree that stands there.
+    /// The result of the exact traversal, in a part of a tree in this context.
     fn exactly(
         isa: Isa,
         tree: &Tree,
@@ -190,10 +191,10 @@ pub(crate) trait FilteredGoal: Goal {
         query: Option<&Query>,
     ) -> Self::Found;
 
-    /// The same, told apart from what a tree around that one finds.
+    /// Moves the result into this context, so that it differs from results of the outer tree.
     fn in_context(found: Self::Found, tree: &Tree, context: ContextRef) -> Self::Found;
 
-    /// Takes what was found in the tree of an instance.
+    /// Takes the result of an instance's tree.
     fn test_found<const GENERAL: bool, const FILTERED: bool>(
         filtered: &mut FilteredRay<GENERAL, FILTERED>,
         found: Self::Found,

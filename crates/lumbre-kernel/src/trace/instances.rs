@@ -1,7 +1,8 @@
-//! A ray at an instance: the same traversal in the tree that it places.
+//! A ray at an instance: continues the traversal in the tree that it places.
 //!
-//! A tree of triangles is traversed at once, by the instruction set of the traversal around it; any other by a call, no deeper than
-//! [`FilterStart`](crate::tree::filter_start::FilterStart) allows. What is hit there comes back in double precision, as the crossing of a shape does.
+//! A tree of triangles is traversed inline, with the instruction set of the outer traversal. Any other tree takes a
+//! call, no deeper than [`FilterStart`](crate::tree::filter_start::FilterStart) allows. The hit comes back in double
+//! precision, like the crossing of a shape.
 
 use std::marker::PhantomData;
 
@@ -24,7 +25,7 @@ use crate::tree::{GeometryKind, Instance, Tree};
 /// An instance, or a part of one.
 pub(super) struct Placed<'a> {
     pub(super) instance: &'a Instance,
-    /// The subtree that is entered.
+    /// The subtree to enter.
     pub(super) from: Start,
     /// Its position and its id.
     pub(super) geometry: u32,
@@ -32,7 +33,7 @@ pub(super) struct Placed<'a> {
 }
 
 impl<'a> Placed<'a> {
-    /// `None` where an entry stands for nothing.
+    /// `None` for an entry without a part.
     #[inline(always)]
     pub(super) fn of(tree: &'a Tree, entry: &Entry) -> Option<Self> {
         let (geometry, from) = (entry.geometry, Start::of(entry.primitive()));
@@ -70,7 +71,7 @@ impl<const GENERAL: bool, const FILTERED: bool> FilteredRay<'_, '_, GENERAL, FIL
         G::test_found(self, found, placed.geometry, ray, slabs)
     }
 
-    /// Takes what was found in the tree of an instance, if it is the closest.
+    /// Takes the result of an instance's tree, if it is the closest.
     #[inline(always)]
     pub(super) fn test_found(
         &mut self,
@@ -99,7 +100,8 @@ impl<const GENERAL: bool, const FILTERED: bool> FilteredRay<'_, '_, GENERAL, FIL
         None
     }
 
-    /// Whether a hit in an instance is closer than the best; of two as close, the exact traversal knows which comes first.
+    /// Whether a hit in an instance is closer than the best; if both are equally close, only the exact traversal knows
+    /// their order.
     #[cold]
     #[inline(never)]
     fn is_closer(&self, hit: &InInstance, ray: &Ray) -> Outcome<bool> {
@@ -127,7 +129,7 @@ impl<const GENERAL: bool, const FILTERED: bool> FilteredRay<'_, '_, GENERAL, FIL
         }
     }
 
-    /// Whether the ray enters what it hits in an instance.
+    /// Whether the ray enters at its hit in an instance.
     fn enters(&self, hit: &InInstance, ray: &Ray) -> Option<bool> {
         let Hit { root, geometry, primitive, route, .. } =
             hit.clone().into_hit(self.decider.tree(), self.context);
@@ -135,7 +137,7 @@ impl<const GENERAL: bool, const FILTERED: bool> FilteredRay<'_, '_, GENERAL, FIL
         enters(self.decider.tree(), ray, &route[around..], &Winner { root, geometry, primitive })
     }
 
-    /// Whether a crossing that is as near as the closest hit, and that is in an instance, comes before it.
+    /// Whether a crossing at the same `t` as the closest hit, which is in an instance, comes before it.
     pub(super) fn precedes_instance(
         &self,
         ray: &Ray,
@@ -152,7 +154,7 @@ impl<const GENERAL: bool, const FILTERED: bool> FilteredRay<'_, '_, GENERAL, FIL
     }
 }
 
-/// Traverses a placed tree of triangles, with the instruction set of the traversal around it.
+/// Traverses a placed tree of triangles, with the instruction set of the outer traversal.
 #[inline(always)]
 fn test_triangles<G: FilteredGoal, L: Simd, const FILTERED: bool>(
     start: &FilterStart,
@@ -173,7 +175,7 @@ fn test_triangles<G: FilteredGoal, L: Simd, const FILTERED: bool>(
         .run_from::<L>(slabs)
 }
 
-/// Traverses any placed tree; where single precision cannot tell, exactly.
+/// Traverses any placed tree; exactly if single precision is uncertain.
 #[inline(never)]
 fn test_any_tree<G: FilteredGoal, const FILTERED: bool>(
     isa: Isa,

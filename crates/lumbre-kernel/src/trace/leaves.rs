@@ -1,6 +1,6 @@
 //! A ray in the leaves of a tree: one method for each kind.
 //!
-//! The main line is [`FilteredRay::test_leaf`]; where a ray meets a triangle is [`FilteredRay::closest_triangle`].
+//! Start reading at [`FilteredRay::test_leaf`]; [`FilteredRay::closest_triangle`] intersects triangles.
 
 use std::marker::PhantomData;
 
@@ -42,7 +42,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         if tag::of(leaf) == tag::SHAPES {
             return self.test_shapes::<G, L>(leaf, ray, slabs);
         }
-        // Opaque, so that nothing is computed of the ray before it comes to such a leaf.
+        // Opaque: keeps computations on the ray from being hoisted out of this leaf.
         let ray = simd::opaque(ray);
         match tag::of(leaf) {
             tag::SPHERES => {
@@ -58,7 +58,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         }
     }
 
-    /// Tests what has no bounds, and stands beside the tree.
+    /// Tests the unbounded geometry outside the tree.
     #[inline(always)]
     pub(crate) fn test_infinite<G: FilteredGoal, L: Simd>(
         &mut self,
@@ -86,7 +86,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
     /// Tests a leaf of triangles, eight at a time.
     #[inline(always)]
     fn test_triangles<G: Goal, L: Simd>(&mut self, leaf: u32, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
-        // One block at least, and mostly no more.
+        // At least one block, and mostly only one.
         let mut place = leaf & tag::PLACE;
         loop {
             let block = self.decider.block(place);
@@ -109,7 +109,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         }
     }
 
-    /// Takes the closest of the triangles of a block whose lines the ray may pass.
+    /// Takes the closest of a block's triangles whose lines the ray may pass.
     #[inline(always)]
     fn closest_triangle<L: Simd>(
         &mut self,
@@ -121,7 +121,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
     ) -> Option<Stop> {
         let mut rest = mask & crossings.in_range;
         if rest != 0 && mask & (mask - 1) == 0 {
-            // One alone, known before its range is: the winner need not wait for that.
+            // A single candidate is known before its range test ends: the winner need not wait for that.
             rest = simd::opaque_number(mask);
         }
         while rest != 0 {
@@ -143,7 +143,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
             } else if is_certain && to < self.best.from {
                 self.keep(Candidate { block: place, lane, from, to }, slabs);
             } else if from > self.best.to || self.decider.misses::<L>(ray, self.blocks.axes, block, lane) {
-                // Farther, which a NaN is not; or missed.
+                // Missed or farther; false for NaN.
                 continue;
             } else {
                 match self.compare(L::isa(), ray, place, lane) {
@@ -191,7 +191,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         None
     }
 
-    /// The crossing of a triangle, if it is the closest that the query takes.
+    /// The crossing of a triangle, if it is the closest that the query accepts.
     #[inline(always)]
     fn query_triangle<L: Simd>(&self, (place, lane): (u32, u32), ray: &Ray) -> Outcome<Option<Winner>> {
         let (geometry, primitive) = self.decider.ids(place, lane);
@@ -204,7 +204,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
             Outcome::Uncertain => return Outcome::Uncertain,
         };
         let is_closest = match self.exact() {
-            // Which of two at the same place comes first depends on their faces.
+            // The order of two hits at the same `t` depends on their faces.
             Some(best) if winner.root.t == best.root.t => return Outcome::Uncertain,
             best => best.is_none_or(|best| winner.root.t < best.root.t),
         };
@@ -212,8 +212,8 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         Outcome::Certain(is_taken.then_some(winner))
     }
 
-    /// Compares a triangle that may be hit with the best, in double precision.
-    // Out of line, and so out of the way of the loop around it.
+    /// Compares a triangle that may be hit with the best, in double precision. Out of line, to keep the surrounding
+    /// loop small.
     #[cold]
     #[inline(never)]
     fn compare(&self, isa: Isa, ray: &Ray, block: u32, lane: u32) -> Outcome<Option<Candidate>> {
@@ -240,7 +240,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         }
     }
 
-    /// Tests a leaf of shapes: those whose bounding volumes are hit, the nearest first.
+    /// Tests the shapes of a leaf whose bounding volumes are hit, the nearest first.
     #[inline(always)]
     fn test_shapes<G: Goal, L: Simd>(&mut self, leaf: u32, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
         let tree = self.tree();
@@ -374,7 +374,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         None
     }
 
-    /// Takes the closest crossing that the query takes, or ends at any.
+    /// Takes the closest crossing that the query accepts, or ends at any.
     #[inline(never)]
     fn query_crossings<G: Goal>(
         &mut self,
@@ -387,7 +387,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         for root in all_crossings(kind, primitive, ray) {
             let winner = Winner { root, geometry, primitive };
             let is_closest = match self.exact() {
-                // As above; its own crossings are in order.
+                // As above; the primitive's own crossings are in order.
                 Some(best) if root.t == best.root.t => {
                     if (best.geometry, best.primitive) != (geometry, primitive) {
                         return Some(Stop::Uncertain);
@@ -417,7 +417,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         let places = tag::blocks(leaf);
         let range = [ray.t_min, if G::IS_ANY { ray.t_max } else { self.best.limit(ray) }];
         for (ids, block) in
-            tree.packed.sphere_names[places.clone()].iter().zip(&tree.packed.sphere_blocks[places])
+            tree.packed.sphere_ids[places.clone()].iter().zip(&tree.packed.sphere_blocks[places])
         {
             let cloud = CloudRay::turn(&mut self.cloud, tree, ray, ids.geometry);
             let origin = cloud.origin();
@@ -523,7 +523,7 @@ impl Dispatch for Comparison<'_, '_> {
     }
 }
 
-/// Which lane of those in the mask is the nearest; any where there are none.
+/// The nearest lane of the mask; arbitrary for an empty mask.
 #[inline(always)]
 pub(crate) fn nearest_of(mask: u32, near: &[f32; BLOCK]) -> usize {
     let mut nearest = mask.trailing_zeros() as usize % BLOCK;

@@ -1,10 +1,10 @@
-//! How a ray goes through a tree.
+//! How a ray traverses a tree.
 //!
-//! [`filtered`] is the traversal that every query takes first: single precision decides what it is certain of, and double precision
-//! the rest (see [`decide`]), so that an answer has the bits that double precision alone gives. Where neither can tell, because the ray
-//! meets an edge exactly or starts far away, [`exact`] answers: the traversal in double precision, which finds every hit, and is the
-//! oracle of the other. Rays in single precision have a traversal of their own, [`f32_ray`], in trees of nothing but triangles, and
-//! [`picture`] takes it to trees of anything.
+//! [`filtered`] is the traversal that every query takes first: single precision decides what it is certain of, and
+//! double precision the rest (see [`decide`]), so that an answer has the same bits as with double precision alone. If
+//! neither can tell, because the ray meets an edge exactly or starts far away, [`exact`] answers: the traversal in
+//! double precision, which finds all hits, and is the oracle of the other traversals. Rays in single precision have a
+//! traversal of their own, [`f32_ray`], in trees of triangles; [`picture`] extends it to trees of any primitives.
 
 mod cloud_ray;
 pub(crate) mod cursor;
@@ -29,36 +29,36 @@ use crate::hit::{Hit, InstancePath};
 use crate::tree::sphere_block::ExactSphere;
 use crate::tree::{GeometryKind, Tree};
 
-/// What single precision, and the double precision that it asks, come to.
+/// The result of single precision, and of the double precision that it asks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Outcome<T> {
     /// The answer.
     Certain(T),
-    /// The exact traversal has to answer.
+    /// Only the exact traversal can answer.
     Uncertain,
 }
 
 /// How a traversal ends early.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stop {
-    /// Any hit will do, and there is one.
+    /// Any hit suffices, and there is one.
     Hit,
-    /// The exact traversal has to answer.
+    /// Only the exact traversal can answer.
     Uncertain,
 }
 
 /// The triangles of a block that a ray may hit.
 #[derive(Clone, Copy, Zeroable)]
 pub(crate) struct LaneHits<T> {
-    /// A bit for each that it certainly hits.
+    /// A bit for each certain hit.
     pub(crate) met: u32,
-    /// A bit for each that has to be decided exactly.
+    /// A bit for each triangle that needs an exact decision.
     pub(crate) uncertain: u32,
-    /// Where it hits each; anything for triangles in neither mask.
+    /// The crossing with each; arbitrary for triangles in neither mask.
     pub(crate) at: T,
 }
 
-/// Of two crossings at the same `t`, whether the first comes before: what enters before what leaves, then by geometry and primitive.
+/// The order of two crossings at the same `t`: entering before leaving, then by geometry and primitive.
 #[inline(always)]
 pub(crate) fn precedes(
     (enters, ids): (bool, (u32, u32)),
@@ -67,7 +67,7 @@ pub(crate) fn precedes(
     (!enters, ids) < (!other_enters, other_ids)
 }
 
-/// A crossing in a tree, without what a [`Hit`] says of instances.
+/// A crossing in a tree, without the instances of a [`Hit`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Winner {
     pub(crate) root: Root,
@@ -76,7 +76,7 @@ pub(crate) struct Winner {
 }
 
 impl Winner {
-    /// As a hit outside of instances.
+    /// Converts to a hit outside of instances.
     #[inline(always)]
     pub(crate) fn to_hit(self, tree: &Tree) -> Hit {
         let Self { root, geometry, primitive } = self;
@@ -90,13 +90,13 @@ impl Winner {
         }
     }
 
-    /// As a hit in a tree that stands there.
+    /// Converts to a hit in a tree in this context.
     pub(crate) fn to_hit_in(self, tree: &Tree, context: ContextRef) -> Hit {
         let Context { route, ids } = context.to_context();
         Hit { instances: ids, route, ..self.to_hit(tree) }
     }
 
-    /// Writes the hit into a slot, field by field: a whole that is put together elsewhere stalls the store.
+    /// Writes the hit into a slot, field by field: storing a temporary as a whole stalls.
     #[inline(always)]
     pub(crate) fn put(self, tree: &Tree, slot: &mut Option<Hit>) {
         let Some(hit) = slot else {
@@ -108,13 +108,13 @@ impl Winner {
         hit.id = tree.geometries[geometry as usize].id;
         hit.primitive = primitive;
         hit.geometry = geometry;
-        // Cheaper than clearing, which looks where a path is stored.
+        // Cheaper than clearing, which first looks where the path is stored.
         hit.instances = InstancePath::new();
         hit.route = InstancePath::new();
     }
 }
 
-/// No geometry of the tree, and behind all of them: of two hits at the same `t`, one outside of instances comes first.
+/// Larger than every geometry index: of two hits at the same `t`, one outside of instances comes first.
 pub(crate) const IN_INSTANCE: u32 = u32::MAX;
 
 /// The height along a ray per unit of `t`.
@@ -133,18 +133,18 @@ pub(crate) struct Context {
 }
 
 impl Clone for Context {
-    // Faster than the derived one, which copies number by number.
+    // Faster than the derived one, which copies element by element.
     #[inline]
     fn clone(&self) -> Self {
         Self { route: InstancePath::from_slice(&self.route), ids: InstancePath::from_slice(&self.ids) }
     }
 }
 
-/// The same, with one more instance that is only written down once something is hit in it.
+/// A context plus an innermost instance that is only appended once something is hit in it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ContextRef<'c> {
     around: Option<&'c Context>,
-    /// Position and id of the innermost instance, where that is not among those around.
+    /// Position and id of the innermost instance, if it is not part of `around`.
     innermost: Option<(u32, u32)>,
 }
 
@@ -157,7 +157,7 @@ impl<'c> ContextRef<'c> {
         Self { around: Some(around), innermost: None }
     }
 
-    /// In one more instance; of several that are not written down, this is to be the first.
+    /// In one more instance; only the first such instance may be pending.
     #[inline(always)]
     pub(crate) fn within(self, geometry: u32, id: u32) -> Self {
         debug_assert!(self.innermost.is_none(), "the last one is written down");
@@ -203,7 +203,7 @@ pub(crate) fn is_crossed(kind: &GeometryKind, primitive: u32, ray: &Ray) -> bool
     }
 }
 
-/// The first of its crossings. That of user geometry may lie out of the range.
+/// The first of its crossings. For user geometry it may lie outside the range.
 #[inline(always)]
 pub(crate) fn first_crossing(kind: &GeometryKind, primitive: u32, ray: &Ray) -> Option<Root> {
     match kind {
@@ -214,7 +214,7 @@ pub(crate) fn first_crossing(kind: &GeometryKind, primitive: u32, ray: &Ray) -> 
     }
 }
 
-/// All of its crossings. Those of user geometry may lie out of the range.
+/// All of its crossings. For user geometry they may lie outside the range.
 pub(crate) fn all_crossings(kind: &GeometryKind, primitive: u32, ray: &Ray) -> Roots {
     let mut roots = Roots::new();
     match kind {
@@ -226,7 +226,7 @@ pub(crate) fn all_crossings(kind: &GeometryKind, primitive: u32, ray: &Ray) -> R
     roots
 }
 
-/// Whether a ray meets the front of what is no triangle, at one of its crossings.
+/// Whether a ray meets the front at a crossing of a primitive other than a triangle.
 pub(crate) fn meets_front(kind: &GeometryKind, primitive: u32, ray: &Ray, root: &Root) -> bool {
     let surface = match kind {
         GeometryKind::Shape(shape) => shape.surface(ray, root),

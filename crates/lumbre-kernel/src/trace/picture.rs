@@ -1,26 +1,26 @@
-//! Rays of pictures in trees of anything: triangles in single precision, all else in double.
+//! Picture rays in trees of any primitives: triangles in single precision, everything else in double.
 //!
-//! A ray is there twice. Rounded, relative to the mesh, it goes among boxes and triangles, as [`f32_ray`](super::f32_ray) says;
-//! as it is, it meets shapes, spheres, custom geometry and triangles in double precision, and is taken into the space of an
-//! instance, where the same begins once more. What is met is compared by `t` in double precision, and by the order of
-//! [`precedes`] where that is equal. So the answer is that of a loop over everything: it depends neither on the order of the visit nor
-//! on what is visited in vain.
+//! Each ray exists twice. The rounded ray, relative to the mesh, goes through boxes and triangles, as
+//! [`f32_ray`](super::f32_ray) describes. The original ray meets shapes, spheres, custom geometry and triangles in
+//! double precision, and is transformed into the space of an instance, where the same starts again. Crossings are
+//! compared by `t` in double precision, and by the order of [`precedes`] if that is equal. So the answer is that of a
+//! loop over everything: it depends neither on the order of the visit nor on unnecessary visits.
 //!
-//! A crossing at an edge of a bilinear patch or of a triangle in double precision counts: they are closed, as triangles in single
-//! precision are.
+//! A crossing at an edge of a bilinear patch or of a double-precision triangle counts: they are closed, like
+//! single-precision triangles.
 //!
 //! # Error bound: a ray in an instance
 //!
-//! Let u = 2⁻²⁴, and lengths be in the units of the instance's tree. The ray is taken into its space in double precision; one that starts
-//! farther than [`NEARBY`] = 4 from the tree's origin on some axis is moved along its line, to a little before the tree. Then it is
-//! rounded: its start by u (4 + shift) on each axis, where shift is the distance between the origins of the tree and of its mesh, and
-//! its direction by u of each component, which makes 5.1u on the way through the tree. As `f32_ray` says, a hit lies within
-//! u (47 + 14·4) of its triangle. So it lies within u (113 + shift) of the triangle as seen from the ray that was not rounded:
-//! [`PictureStart::deviation`] is more, and what that is under the map of the instance, the boxes around it are met with more room
-//! for. No box is passed by with a hit in it.
+//! Let u = 2⁻²⁴, and lengths be in the units of the instance's tree. The ray is transformed into its space in double
+//! precision; one that starts farther than [`NEARBY`] = 4 from the tree's origin on some axis is moved along its line,
+//! to slightly before the tree. Then it is rounded: its start by u (4 + shift) on each axis, where shift is the
+//! distance between the origins of the tree and of its mesh, and its direction by u of each component, which makes 5.1u
+//! on the way through the tree. As `f32_ray` shows, a hit lies within u (47 + 14·4) of its triangle. So it lies within
+//! u (113 + shift) of the triangle as seen from the unrounded ray. [`PictureStart::deviation`] is larger, and the boxes
+//! around the instance are widened by its image under the instance's map. So no box with a hit is skipped.
 //!
-//! Among boxes around exact shapes, the margin of triangles has room for the rounding of the start, u (|o| + shift), and for the
-//! `slop` of double precision.
+//! Around exact shapes, the margin of triangles also covers the rounding of the start, u (|o| + shift), and the `slop`
+//! of double precision.
 
 use lumbre_geometry::{Ray, Root};
 use lumbre_math::{DVec2, DVec3};
@@ -49,27 +49,27 @@ use crate::tree::packed::{Entry, Start};
 use crate::tree::picture_start::PictureStart;
 use crate::tree::{GeometryKind, Tree};
 
-/// How far from a tree's origin a ray may start on each axis, in tree units, to enter an instance where it is.
+/// How far from a tree's origin a ray may start on each axis, in tree units, to enter an instance without being moved.
 const NEARBY: f64 = 4.0;
 /// A ray that starts farther away cannot be moved nearer.
 const MOVABLE: f64 = (1u64 << 30) as f64;
-/// No point of a tree is farther from its origin: its planes are within 1.01.
+/// Bound on the distance of a tree's points from its origin: its planes are within 1.01.
 const RADIUS: f64 = 1.8;
 
 /// A crossing in a tree.
 #[derive(Clone)]
 pub(crate) struct Crossing {
     pub(crate) winner: Winner,
-    /// Whether the ray enters there, where that is known.
+    /// Whether the ray enters there, if known.
     enters: Option<bool>,
-    /// The position of the instance that it is in.
+    /// The position of the instance that contains it.
     instance: Option<u32>,
-    /// The hit in the tree of that instance, where it is in an instance there.
+    /// The hit in the tree of that instance, if it is in a nested instance.
     nested: Option<Box<Hit>>,
 }
 
 impl Crossing {
-    /// On a triangle of the tree, by geometry and primitive.
+    /// A crossing with a triangle of the tree, by geometry and primitive.
     #[inline(always)]
     pub(crate) fn on_triangle(
         (geometry, primitive): (u32, u32),
@@ -78,13 +78,13 @@ impl Crossing {
         enters: bool,
         ray: &Ray,
     ) -> Self {
-        // What was rounded beyond the end is in range.
+        // A `t` that rounding moved beyond the end is in range.
         let t = if t < ray.t_max { t } else { ray.t_max };
         let root = watertight::root(t, DVec2::new(u.into(), v.into()));
         Self::of(Winner { root, geometry, primitive }, Some(enters))
     }
 
-    /// Which of two comes first.
+    /// The order of two crossings.
     #[inline(always)]
     pub(crate) fn nearer(one: Option<Self>, other: Option<Self>, tree: &Tree, ray: &Ray) -> Option<Self> {
         match (one, other) {
@@ -103,7 +103,7 @@ impl Crossing {
         Self::of(Winner { root: Root::at(0.0), geometry: 0, primitive: 0 }, None)
     }
 
-    /// In no instance.
+    /// Outside of instances.
     #[inline(always)]
     fn of(winner: Winner, enters: Option<bool>) -> Self {
         Self { winner, enters, instance: None, nested: None }
@@ -116,7 +116,7 @@ impl Crossing {
             && matches!(tree.geometries[self.winner.geometry as usize].kind, GeometryKind::Mesh(_))
     }
 
-    /// The id of the geometry, and position and id of the instance that it is in; `None` where it is in more than one.
+    /// The id of the geometry, and position and id of the instance that contains it; `None` in nested instances.
     #[inline(always)]
     pub(crate) fn placed(&self, tree: &Tree) -> Option<(u32, Option<(u32, u32)>)> {
         let geometry = self.winner.geometry as usize;
@@ -130,7 +130,7 @@ impl Crossing {
         }
     }
 
-    /// As a hit of the tree.
+    /// Converts to a hit of the tree.
     pub(crate) fn into_hit(self, tree: &Tree) -> Hit {
         let Some(position) = self.instance else { return self.winner.to_hit(tree) };
         let placed = &tree.geometries[position as usize];
@@ -148,7 +148,7 @@ impl Crossing {
         }
     }
 
-    /// Of two at the same `t`, whether it comes before the other.
+    /// The order of two crossings at the same `t`.
     #[cold]
     #[inline(never)]
     fn precedes(&self, other: &Self, tree: &Tree, ray: &Ray) -> bool {
@@ -162,7 +162,7 @@ impl Crossing {
     }
 }
 
-/// A ray in single precision for a tree, and what its `t` are in double: `zero + factor * t`.
+/// A ray in single precision for a tree. Its `t` in double precision are `zero + factor * t`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LocalRay {
     pub(crate) ray: Ray32,
@@ -173,7 +173,7 @@ pub(crate) struct LocalRay {
 }
 
 impl LocalRay {
-    /// Whose `t` are the same.
+    /// For a ray with the same `t`.
     #[inline(always)]
     pub(crate) fn new(ray: Ray32) -> Self {
         Self { ray, zero: 0.0, factor: 1.0, inverse: 1.0 }
@@ -184,10 +184,10 @@ impl LocalRay {
         self.zero + self.factor * f64::from(t)
     }
 
-    /// More than every `t` of it that is not beyond this one.
+    /// A bound above every single-precision `t` that is not beyond this one.
     #[inline(always)]
     pub(crate) fn end(&self, t: f64) -> f32 {
-        // What the difference may lose.
+        // The possible error of the difference.
         const LOST: f64 = 8.0 * f64::EPSILON;
         let t = (t - self.zero + LOST * self.zero) * self.inverse;
         beyond(if t > 0.0 { t as f32 } else { 0.0 })
@@ -202,7 +202,7 @@ enum Approach {
     Unknown,
 }
 
-/// The ray as single precision takes it in a tree; nothing beyond `limit` is wanted.
+/// The single-precision ray for a tree, without anything beyond `limit`.
 #[inline(always)]
 fn approach(tree: &Tree, picture: &PictureStart, ray: &Ray, limit: f64) -> Approach {
     let start = &picture.start;
@@ -210,7 +210,7 @@ fn approach(tree: &Tree, picture: &PictureStart, ray: &Ray, limit: f64) -> Appro
     if !(f64::MIN_POSITIVE..=f64::MAX).contains(&size) {
         return Approach::Unknown;
     }
-    // So that its largest component is about 1, in tree units.
+    // Makes its largest component about 1, in tree units.
     let factor = if (1.0 / 1024.0..=1024.0).contains(&size) { 1.0 } else { power_of_two_over(size) };
     let direction = ray.direction * factor;
     let from = (ray.origin - DVec3::from_slice(&start.tree_origin)) * start.scale;
@@ -239,28 +239,28 @@ fn approach(tree: &Tree, picture: &PictureStart, ray: &Ray, limit: f64) -> Appro
         return Approach::Ray(LocalRay::new(ray));
     }
     let (inverse, origin) = (1.0 / factor, ray.origin + zero * ray.direction - picture.rounding.origin);
-    // The same for all that ask, and no earlier than the ray's own.
+    // The same for all callers, and no earlier than the ray's own end.
     let t_max = (((ray.t_max - zero) * inverse) as f32).next_up();
     let ray = Ray32 { origin: origin.as_vec3(), t_min: 0.0, direction: direction.as_vec3(), t_max };
     Approach::Ray(LocalRay { ray, zero, factor, inverse })
 }
 
-/// The power of two that takes a number to between 1 and 2; no more than `f64` holds.
+/// The power of two that brings a number to between 1 and 2; within the range of `f64`.
 #[cold]
 fn power_of_two_over(size: f64) -> f64 {
     let exponent = (size.to_bits() >> 52) as i64 - 1023;
     2f64.powi((-exponent).clamp(-1000, 1000) as i32)
 }
 
-/// What a ray meets of anything but the tree's own triangles in single precision.
+/// The crossings of a ray other than those of the tree's own single-precision triangles.
 pub(crate) struct Others<'a> {
     tree: &'a Tree,
     pub(crate) nearest: Option<Crossing>,
-    /// What is beyond this is not wanted.
+    /// Nothing beyond this counts.
     limit: f64,
-    /// For shapes, once the ray has come to some.
+    /// For shapes; created at the first one.
     bounding_volumes: Option<BoundingVolumeRay>,
-    /// For the cloud of spheres that the ray came to last.
+    /// For the last cloud of spheres that the ray came to.
     cloud: Option<CloudRay>,
 }
 
@@ -270,14 +270,14 @@ impl<'a> Others<'a> {
         Self { tree, nearest: None, limit, bounding_volumes: None, cloud: None }
     }
 
-    /// Leaves out what is beyond this.
+    /// Shortens the ray to this `t`.
     #[inline(always)]
     pub(crate) fn shorten(&mut self, limit: f64) {
         self.limit = if limit < self.limit { limit } else { self.limit };
     }
 
-    /// Tests a leaf, or what has no bounds; whether any hit will do, and there is one. Else, where something nearer was met, the ray
-    /// ends there.
+    /// Tests a leaf, or unbounded geometry. Returns whether any hit suffices and there is one. Otherwise, a nearer
+    /// crossing shortens the ray.
     #[inline(always)]
     pub(crate) fn test<G: Goal, L: Simd>(&mut self, leaf: Option<u32>, ray: &Ray) -> (bool, Option<f64>) {
         let limit = self.limit;
@@ -288,7 +288,7 @@ impl<'a> Others<'a> {
         (is_met, (!G::IS_ANY && self.limit < limit).then_some(self.limit))
     }
 
-    /// Takes a crossing that is in range, if it is the nearest.
+    /// Takes a crossing in range, if it is the nearest.
     #[inline(always)]
     fn offer(&mut self, crossing: Crossing, ray: &Ray) {
         let t = crossing.winner.root.t;
@@ -306,7 +306,7 @@ impl<'a> Others<'a> {
         }
     }
 
-    /// Tests a leaf; whether any hit will do, and there is one.
+    /// Tests a leaf; returns whether any hit suffices and there is one.
     #[inline(always)]
     fn test_leaf<G: Goal, L: Simd>(&mut self, leaf: u32, ray: &Ray) -> bool {
         match tag::of(leaf) {
@@ -321,7 +321,7 @@ impl<'a> Others<'a> {
         }
     }
 
-    /// The same of what has no bounds.
+    /// As [`Self::test_leaf`], for unbounded geometry.
     #[inline(always)]
     fn test_infinite<G: Goal, L: Simd>(&mut self, ray: &Ray) -> bool {
         let tree = self.tree;
@@ -338,14 +338,14 @@ impl<'a> Others<'a> {
         false
     }
 
-    /// The heights along the ray at which anything is wanted.
+    /// The range of heights along the ray that counts.
     #[inline(always)]
     fn heights(&self, ray: &Ray) -> HeightRange {
         let length = largest_component(ray);
         HeightRange::ahead((ray.t_min * length) as f32, (self.limit * length) as f32)
     }
 
-    /// A leaf of shapes: those whose bounding volumes are hit, the nearest first.
+    /// Tests the shapes of a leaf whose bounding volumes are hit, the nearest first.
     #[inline(always)]
     fn test_shapes<G: Goal, L: Simd>(&mut self, leaf: u32, ray: &Ray) -> bool {
         let tree = self.tree;
@@ -431,7 +431,7 @@ impl<'a> Others<'a> {
         let (tree, places) = (self.tree, tag::blocks(leaf));
         let range = [ray.t_min, self.limit];
         for (ids, block) in
-            tree.packed.sphere_names[places.clone()].iter().zip(&tree.packed.sphere_blocks[places])
+            tree.packed.sphere_ids[places.clone()].iter().zip(&tree.packed.sphere_blocks[places])
         {
             let cloud = CloudRay::turn(&mut self.cloud, tree, ray, ids.geometry);
             let origin = cloud.origin();
@@ -482,7 +482,7 @@ impl<'a> Others<'a> {
         false
     }
 
-    /// An instance: one of triangles is entered at once, any other by a call.
+    /// An instance: a tree of triangles is entered inline, any other by a call.
     #[inline(always)]
     fn test_instance<G: Goal, L: Simd>(&mut self, entry: &Entry, ray: &Ray) -> bool {
         let Some(placed) = Placed::of(self.tree, entry) else { return false };
@@ -547,19 +547,19 @@ fn exactly<G: Goal>(isa: Isa, tree: &Tree, from: Start, ray: &Ray, limit: f64) -
     Some(Crossing { winner, enters: None, instance, nested: is_nested.then_some(nested) })
 }
 
-/// A ray on its way through a part of a tree.
+/// The search of a ray in a part of a tree.
 pub(crate) struct Search<'a, 'r> {
     pub(crate) tree: &'a Tree,
     pub(crate) picture: &'a PictureStart,
     pub(crate) from: Start,
     pub(crate) ray: &'r Ray,
     pub(crate) local: LocalRay,
-    /// What is beyond this is not wanted.
+    /// Nothing beyond this counts.
     pub(crate) limit: f64,
 }
 
 impl Search<'_, '_> {
-    /// The nearest crossing, or any. `GENERAL`: in a tree of anything, not of triangles alone.
+    /// The nearest crossing, or any. `GENERAL`: in a tree of any primitives, not only triangles.
     #[inline(always)]
     pub(crate) fn run<G: Goal, L: Simd, const GENERAL: bool>(self) -> Outcome<Option<Crossing>> {
         let Self { tree, picture, from, ray, local, limit } = self;
@@ -621,7 +621,7 @@ impl Search<'_, '_> {
     }
 }
 
-/// Ends the ray where something is met.
+/// Shortens the ray to a crossing.
 #[inline(always)]
 fn end_at(triangles: &mut F32Ray, slabs: &mut Slabs, end: f32) {
     triangles.shorten(end);
@@ -636,7 +636,7 @@ fn shorten(slabs: &mut Slabs, end: f32) {
     }
 }
 
-/// [`Search::run`] in a tree of anything, out of line.
+/// [`Search::run`] in a tree of any primitives, out of line.
 pub(crate) struct General<'a, 'r, G>(pub(crate) Search<'a, 'r>, pub(crate) std::marker::PhantomData<G>);
 
 impl<G: Goal> Dispatch for General<'_, '_, G> {

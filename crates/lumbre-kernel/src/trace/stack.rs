@@ -1,15 +1,15 @@
-//! The stack of a traversal, and the two goals that decide in which order it is filled: the closest hit and any hit.
+//! The stack of a traversal, and the two goals that decide its order: the closest hit and any hit.
 
-use crate::intersect::{self, Room, STACK, Simd, Slots};
+use crate::intersect::{self, PushSlots, STACK, Simd, Slots};
 use crate::simd::LANE_BITS;
 use crate::simd::vector::stack_entry;
 use crate::tree::node::{Node, WIDTH};
 
-/// What a traversal looks for, which decides the order of a node's children.
+/// The goal of a traversal, which decides the order of a node's children.
 pub(crate) trait Goal {
     /// Whether any hit ends the traversal.
     const IS_ANY: bool;
-    /// What the stack holds for a subtree.
+    /// The stack's entry for a subtree.
     type Entry: Copy;
     /// An entry that is never culled.
     fn entry(reference: u32) -> Self::Entry;
@@ -17,9 +17,10 @@ pub(crate) trait Goal {
     fn reference(entry: Self::Entry) -> u32;
     /// Whether its bounding box lies beyond the end of the ray.
     fn is_beyond(entry: Self::Entry, s_max: f32) -> bool;
-    /// Pushes the children in `mask` (two or more; for any hit one or more) but for the first to be visited, which is returned.
-    fn push_children<L: Simd>(node: &Node, mask: u32, enter: L::F32x16, room: Room<Self::Entry>) -> u32;
-    /// The same with hardly a branch: pushes all, then pops one. For any hit `mask` may be empty.
+    /// Pushes the children in `mask` (two or more; for any hit one or more) except the first to visit, which is
+    /// returned.
+    fn push_children<L: Simd>(node: &Node, mask: u32, enter: L::F32x16, room: PushSlots<Self::Entry>) -> u32;
+    /// Branch-free variant: pushes all, then pops one. For any hit `mask` may be empty.
     fn push_and_pop<L: Simd>(node: &Node, mask: u32, enter: L::F32x16, slots: &mut Slots<Self::Entry>)
     -> u32;
 }
@@ -47,7 +48,7 @@ impl Goal for ClosestHit {
     }
 
     #[inline(always)]
-    fn push_children<L: Simd>(node: &Node, mask: u32, enter: L::F32x16, room: Room<i64>) -> u32 {
+    fn push_children<L: Simd>(node: &Node, mask: u32, enter: L::F32x16, room: PushSlots<i64>) -> u32 {
         intersect::push_by_distance(node, mask, enter, room)
     }
 
@@ -57,7 +58,7 @@ impl Goal for ClosestHit {
     }
 }
 
-/// Any hit: children in the order that the build chose for that, the last first.
+/// Any hit: children in the order of the build, the last first.
 pub(crate) enum AnyHit {}
 
 impl Goal for AnyHit {
@@ -80,7 +81,7 @@ impl Goal for AnyHit {
     }
 
     #[inline(always)]
-    fn push_children<L: Simd>(node: &Node, mask: u32, _: L::F32x16, room: Room<u32>) -> u32 {
+    fn push_children<L: Simd>(node: &Node, mask: u32, _: L::F32x16, room: PushSlots<u32>) -> u32 {
         intersect::push_as_built::<L::F32x16>(node, mask, room)
     }
 
@@ -90,9 +91,9 @@ impl Goal for AnyHit {
     }
 }
 
-/// A stack that grows without bound: an array, and the heap for what no longer fits.
+/// A stack that grows without bound: an array, and the heap for the overflow.
 pub(crate) struct Stack<E> {
-    // Always has room for all children of a node.
+    // Always has slots for all children of a node.
     slots: Slots<E>,
     // The entries below those of the array; rarely used.
     spilled: Option<Box<Spilled<E>>>,
@@ -110,7 +111,7 @@ impl<E: Copy> Stack<E> {
 
     /// Pushes the children of a node. The array spills afterwards, when fewer registers are live.
     #[inline(always)]
-    pub(crate) fn put<T>(&mut self, put: impl FnOnce(Room<'_, E>) -> T) -> T {
+    pub(crate) fn put<T>(&mut self, put: impl FnOnce(PushSlots<'_, E>) -> T) -> T {
         let result = put(self.slots.room());
         if self.slots.len() > STACK - WIDTH {
             self.spill();
@@ -173,7 +174,7 @@ mod tests {
         let mut stack = Stack::new();
         let mut mirror = Vec::new();
         let mut deepest = 0;
-        // In an interpreter, fewer.
+        // Fewer in an interpreter.
         let rounds = if cfg!(miri) { 1_000 } else { 20_000i64 };
         for i in 0..rounds {
             for j in 0..(i * 7 % 9).min(8) {

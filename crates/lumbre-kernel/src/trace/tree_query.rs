@@ -1,10 +1,10 @@
-//! What of one tree a query takes into account.
+//! The parts of a tree that a query includes.
 
 use super::{ContextRef, Winner};
 use crate::query::{Faces, Query};
 use crate::tree::Tree;
 
-/// A query in a tree, which may stand in instances.
+/// A query in a tree, which may be inside instances.
 #[derive(Clone, Copy)]
 pub(crate) struct TreeQuery<'a> {
     query: &'a Query<'a>,
@@ -15,7 +15,7 @@ pub(crate) struct TreeQuery<'a> {
 }
 
 impl<'a> TreeQuery<'a> {
-    /// In a tree that stands there.
+    /// In a tree in this context.
     #[inline(always)]
     pub(crate) fn new(query: &'a Query<'a>, tree: &'a Tree, context: ContextRef<'a>) -> Self {
         let excluded = match query.exclude {
@@ -31,7 +31,7 @@ impl<'a> TreeQuery<'a> {
         self.query
     }
 
-    /// Whether the mask leaves a geometry.
+    /// Whether the mask includes a geometry.
     #[inline(always)]
     pub(crate) fn has_mask(&self, geometry: u32) -> bool {
         let mask = self.query.mask;
@@ -60,7 +60,7 @@ impl<'a> TreeQuery<'a> {
         }
     }
 
-    /// Whether the filter takes a hit.
+    /// Whether the filter accepts a hit.
     pub(crate) fn accepts(&self, winner: &Winner) -> bool {
         self.query.filter.is_none_or(|filter| filter(&winner.to_hit_in(self.tree, self.context)))
     }

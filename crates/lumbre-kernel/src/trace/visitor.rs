@@ -1,4 +1,4 @@
-//! Crossings of a ray, and what the exact traversal shows them to.
+//! Crossings of a ray, and the visitor that the exact traversal shows them to.
 
 use lumbre_geometry::{Ray, Root};
 
@@ -17,12 +17,12 @@ pub(crate) enum Wanted {
     Every,
 }
 
-/// What crossings are shown to.
+/// Receives crossings.
 pub(crate) trait Visitor {
     /// Which crossings it wants.
     fn wanted(&self) -> Wanted;
 
-    /// The `t` that it wants, from the first to the last; never grows.
+    /// The range of `t` that it wants; never grows.
     fn range(&self) -> [f64; 2];
 
     /// Whether it wants anything in an instance.
@@ -43,7 +43,7 @@ pub(crate) struct Crossing<'c> {
     pub(crate) primitive: u32,
     /// Which of the primitive's crossings.
     pub(crate) order: u32,
-    /// Whether the front is met, where that is known already.
+    /// Whether the front is met, if already known.
     pub(crate) is_front: Option<bool>,
     /// The ray in the space of the geometry's tree.
     pub(crate) ray: &'c Ray,
@@ -58,7 +58,8 @@ impl Crossing<'_> {
         self.is_front.unwrap_or_else(|| meets_front(kind, self.primitive, self.ray, &self.root))
     }
 
-    /// Whether it comes before those at the same `t` that leave. Crossings of one primitive at the same `t` stay together.
+    /// Whether it comes before crossings at the same `t` that leave. Crossings of one primitive at the same `t` stay
+    /// together.
     pub(crate) fn enters(&self) -> bool {
         let kind = &self.tree.geometries[self.geometry as usize].kind;
         self.is_front.unwrap_or_else(|| meets_front(kind, self.primitive, self.ray, &self.first))

@@ -1,4 +1,4 @@
-//! What is asked of the exact traversal: the closest hit, any, how many, and the next ones.
+//! The visitors of the exact traversal: the closest hit, any hit, the number of hits, and the next hits.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -13,12 +13,12 @@ use crate::tree::Tree;
 
 use super::ContextRef;
 
-// No NaN comes this far, and the two zeros are one place.
+// `t` is never NaN here, and both zeros are the same place.
 fn by_t(a: f64, b: f64) -> Ordering {
     a.partial_cmp(&b).unwrap_or(Ordering::Equal)
 }
 
-/// Whether a query takes a crossing.
+/// Whether a query accepts a crossing.
 fn takes(query: Option<&Query>, crossing: &Crossing) -> bool {
     let Some(query) = query else { return true };
     let &Crossing { root, geometry, primitive, tree, context, .. } = crossing;
@@ -28,7 +28,7 @@ fn takes(query: Option<&Query>, crossing: &Crossing) -> bool {
         && query.accepts(&super::Winner { root, geometry, primitive })
 }
 
-/// Whether a query takes anything in an instance.
+/// Whether a query wants anything in an instance.
 fn enters(query: Option<&Query>, tree: &Tree, geometry: u32) -> bool {
     query.is_none_or(|query| TreeQuery::new(query, tree, ContextRef::OUTSIDE).has_mask(geometry))
 }
@@ -41,7 +41,7 @@ fn wanted_for_one(query: Option<&Query>) -> Wanted {
 /// The closest hit.
 pub(crate) struct Closest<'q> {
     best: Option<Hit>,
-    /// Whether the best enters.
+    /// Whether the ray enters at the best hit.
     enters: bool,
     range: [f64; 2],
     query: Option<&'q Query<'q>>,
@@ -123,7 +123,7 @@ impl Visitor for Any<'_> {
     }
 }
 
-/// How many hits there are.
+/// The number of hits.
 pub(crate) struct Count {
     pub(crate) hits: usize,
     range: [f64; 2],
@@ -158,7 +158,7 @@ pub(crate) struct NextHits<'a> {
     range: [f64; 2],
 }
 
-/// A hit with all that its place in the order depends on.
+/// A hit and everything its order depends on.
 #[derive(Debug)]
 pub(crate) struct Ranked {
     pub(crate) hit: Hit,

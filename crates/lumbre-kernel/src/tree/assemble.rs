@@ -1,4 +1,4 @@
-//! Puts a tree together of what a build, or a file, makes.
+//! Assembles a tree from the parts that a build or a file provides.
 
 use std::sync::OnceLock;
 
@@ -13,7 +13,7 @@ use super::picture_start::PictureStart;
 use super::summary::{Sizes, Summary};
 use super::{Geometry, GeometryKind, Instance, Placement, Tree};
 
-/// What a build, or a file, makes.
+/// The parts that a build or a file provides.
 pub(crate) struct TreeParts {
     pub(crate) tree_space: TreeSpace,
     pub(crate) packed: Packed,
@@ -46,7 +46,7 @@ impl Tree {
         tree
     }
 
-    /// Makes anew what traversals keep of the tree, which has changed.
+    /// Recomputes the data derived from the tree after it has changed.
     pub(crate) fn follow(&mut self) {
         self.summary = summary(&self.geometries, self.summary.sizes);
         self.single = FilterStart::new(&self.summary, &self.tree_space, self.packed.root);
@@ -61,7 +61,7 @@ impl Tree {
     }
 }
 
-/// What is known of geometries of these sizes.
+/// The summary of geometries of these sizes.
 fn summary(geometries: &[Geometry], sizes: Sizes) -> Summary {
     let mut origins = geometries.iter().filter_map(|geometry| match &geometry.kind {
         GeometryKind::Mesh(mesh) => Some(mesh.origin),
@@ -93,7 +93,8 @@ fn summary(geometries: &[Geometry], sizes: Sizes) -> Summary {
     }
 }
 
-/// How pictures start in a tree that has this start; `None` where they take double precision: also where instances move.
+/// How picture rays start in a tree with this start; `None` if they need double precision, as they do if instances
+/// move.
 fn picture_start(geometries: &[Geometry], start: Option<&FilterStart>) -> Option<PictureStart> {
     let start = start?;
     let (mut within, mut has_triangles) = (0.0f64, false);

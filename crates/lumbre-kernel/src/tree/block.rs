@@ -1,10 +1,10 @@
-//! Blocks of eight: what a leaf packs side by side.
+//! Blocks of eight: the packed primitives of a leaf.
 
-/// Triangles, spheres or shapes that a leaf packs side by side.
+/// Primitives per block.
 pub(crate) const BLOCK: usize = 8;
 
-/// Geometry and primitive.
-pub(crate) type Name = [u32; 2];
+/// A primitive id: the index of a geometry, and of a primitive in it.
+pub(crate) type PrimitiveId = [u32; 2];
 
-/// Corners of triangles side by side, `[axis][corner][lane]`; those of lanes without a triangle mean nothing.
+/// Corners of eight triangles, `[axis][corner][lane]`; lanes without a triangle are undefined.
 pub(crate) type Corners = [[[f32; BLOCK]; 3]; 3];

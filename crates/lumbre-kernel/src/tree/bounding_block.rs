@@ -1,4 +1,4 @@
-//! Shapes by eight: a first test in single precision of the bodies around them, which loses none.
+//! Bounding volumes of shapes by eight: a conservative first test in single precision.
 
 use bytemuck::{Pod, Zeroable};
 use lumbre_geometry::{BoundingVolume, PlacedShape, Ray};
@@ -9,22 +9,23 @@ use crate::tree::BLOCK;
 use crate::tree::node::{TreeSpace, round_up};
 use crate::tree::packed::Entry;
 
-/// Up to eight bounding volumes (see [`BoundingVolume`]), each by its centre, relative to the tree's origin, and the map from there to its cube.
+/// Up to eight bounding volumes (see [`BoundingVolume`]), each with its centre, relative to the tree's origin, and the
+/// map from there to its cube.
 ///
-/// A lane whose numbers are NaN passes every test; one whose body has a height of -∞ none: it is unused.
+/// A lane of NaN passes every test. An unused lane has a height of -∞ and never passes.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub(crate) struct BoundingBlock {
     pub(crate) centers: [[f32; BLOCK]; 3],
     /// `rows[axis][column][lane]`.
     pub(crate) rows: [[[f32; BLOCK]; 3]; 3],
-    /// Half the extent along y: 1, or 0 of what is flat.
+    /// Half the extent along y: 1, or 0 for a flat shape.
     pub(crate) heights: [f32; BLOCK],
-    /// c, d and e.
+    /// The coefficients c, d and e.
     pub(crate) profiles: [[f32; BLOCK]; 3],
-    /// Of rings, the radius of the tube; of other solids -1, else 0.
+    /// The radius of a ring's tube; -1 for other solids, otherwise 0.
     pub(crate) tubes: [f32; BLOCK],
-    /// By how much cube coordinates may be wrong for each unit of distance from the centre, 64uN, and apart from that: see
+    /// Error bounds of cube coordinates: per unit of distance from the centre, 64uN, and absolute. See
     /// [`BoundingVolumeRay`].
     pub(crate) margins: [f32; BLOCK],
     pub(crate) least_margins: [f32; BLOCK],
@@ -34,12 +35,12 @@ const _: () = assert!(size_of::<BoundingBlock>() == 608);
 
 /// u.
 const ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
-/// A bounding volume that is smaller, by the size of the tree, tells nothing.
+/// Smaller bounding volumes, relative to the tree, are not tested in single precision.
 const LARGEST_NORM: f64 = (1u64 << 18) as f64;
-/// By how much a map and its inverse together may stretch.
+/// Largest supported condition of a map.
 const LARGEST_CONDITION: f64 = (1u64 << 16) as f64;
 
-/// What a block needs to know of a bounding volume.
+/// A bounding volume in a block's units.
 struct Mapped {
     bounding_volume: BoundingVolume,
     /// Relative to the tree's origin.
@@ -53,7 +54,7 @@ struct Mapped {
 }
 
 impl Mapped {
-    /// `None` where single precision tells nothing.
+    /// `None` if single precision is too coarse for it.
     fn new(bounding_volume: BoundingVolume, tree_space: &TreeSpace) -> Option<Self> {
         let back = bounding_volume.axes.inverse();
         let largest_row = |m: &DMat3| (0..3).map(|axis| m.row(axis).abs().element_sum()).fold(0.0, f64::max);
@@ -86,7 +87,8 @@ impl BoundingBlock {
         least_margins: [1.0; BLOCK],
     };
 
-    /// Puts the bounding volume of a shape into a lane; without one, or where single precision tells nothing of it, what passes always.
+    /// Puts the bounding volume of a shape into a lane. If there is none, or if single precision is too coarse for it,
+    /// the lane passes every test.
     pub(crate) fn put(
         &mut self,
         lane: usize,
@@ -128,15 +130,16 @@ impl BoundingBlock {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct BoundingVolumes {
     blocks: Vec<BoundingBlock>,
-    /// For each entry of the tree, the block that it is in, and the top bit if that is not the last of its leaf; of what is no
-    /// shape, any number.
+    /// For each entry of the tree, the index of its block. The top bit is set unless it is the last block of its leaf.
+    /// Undefined for other entries than shapes.
     of_entry: Vec<u32>,
 }
 
 const GOES_ON: u32 = 1 << 31;
 
 impl BoundingVolumes {
-    /// Of the entries of a tree, of which some are shapes; none where single precision would tell nothing.
+    /// The bounding volumes of a tree's entries, some of which are shapes; none if single precision is too coarse for
+    /// the tree.
     pub(crate) fn new<'g>(
         entries: &[Entry],
         tree_space: &TreeSpace,
@@ -169,13 +172,13 @@ impl BoundingVolumes {
             block
         };
         let mut blocks: Vec<_> = spans.par_iter().with_min_len(64).map(block).collect();
-        // Room is made for four at least, and many trees are of one shape.
+        // The vector reserves at least four elements, but many trees have one shape.
         blocks.shrink_to_fit();
         Self { blocks, of_entry }
     }
 
-    /// The block of the entry at a place and of up to seven that follow it in its leaf, and whether more follow these; `None`
-    /// where there are no bounding volumes.
+    /// The block of the entry at `place` and of up to seven that follow it in its leaf, and whether more follow; `None`
+    /// without bounding volumes.
     #[inline(always)]
     pub(crate) fn block(&self, entry: usize) -> Option<(&BoundingBlock, bool)> {
         let place = *self.of_entry.get(entry)?;
@@ -188,7 +191,7 @@ impl BoundingVolumes {
     }
 }
 
-/// Entries leaf by leaf, each with the place of its first.
+/// The entries leaf by leaf, each leaf with the index of its first.
 fn leaves(entries: &[Entry]) -> impl Iterator<Item = (&[Entry], usize)> {
     entries.split_inclusive(Entry::is_last).scan(0, |next, leaf| {
         let first = *next;
@@ -197,20 +200,22 @@ fn leaves(entries: &[Entry]) -> impl Iterator<Item = (&[Entry], usize)> {
     })
 }
 
-/// A ray in single precision, for a first test of eight bounding volumes that loses no shape.
+/// A ray in single precision, for a conservative first test of eight bounding volumes.
 ///
-/// # Why none is lost
+/// # Error bound
 ///
-/// Places on the ray are o + h e: o is its origin, e its direction by its largest component, which then is of size 1, and h a height
-/// as in [`HeightRange`](crate::intersect::watertight::HeightRange), t times that component. Of a bounding volume let W be the largest coordinate of w =
-/// o - center, S the largest of a point of it, N the largest of the sums of the sizes in a row of the map M to its cube, and
-/// u = 2⁻²⁴. At a hit, |h| ≤ W + S, for it is as far from o on the axis of that component.
+/// Points on the ray are o + h e. Here o is the origin; e is the direction divided by its largest component, which
+/// makes that component 1; h is a height as in [`HeightRange`](crate::intersect::watertight::HeightRange), t times that
+/// component. For a bounding volume, let W be the largest coordinate of w = o - center, S the largest of a point of the
+/// volume, N the largest row sum of absolute values in the map M to its cube, and u = 2⁻²⁴. At a hit |h| ≤ W + S, since
+/// |h| is its distance from o on the axis of that component.
 ///
-/// The point at h is p + h d in the cube, with p = M w and d = M e. As computed here, w is wrong by 2.1u W, for what rounding takes from o is kept
-/// apart, and p by that times N, by u N W for the rounding of M, and by 5u N W for its sums: 8.1u N W. For the same reasons d is wrong
-/// by 7u N; the least size that is kept up, 2⁻⁴⁰ N, is small beside it. So the point of a hit is wrong by less than 15.1u N (W + S). The
-/// centre is rounded, and the hit, as double precision finds it, is by `slop` beside the line or the shape: this is the `moved` by
-/// which the bounding volume seems to have been moved. Let the margin be m = 64u N (W + S) + N `moved` + 16u.
+/// In the cube, the point at h is p + h d, with p = M w and d = M e. As computed here, w has an error of 2.1u W, since
+/// the rounding error of o is kept separately. So p has an error of that times N, of u N W from rounding M, and of 5u N
+/// W from its sums: 8.1u N W. For the same reasons d has an error of 7u N; the least size of a component, 2⁻⁴⁰ N, is
+/// small compared with it. So the point of a hit has an error of less than 15.1u N (W + S). The centre is rounded, and
+/// the double-precision hit may be off by `slop` from the line or the shape: `moved` is the sum of both. Let the margin
+/// be m = 64u N (W + S) + N `moved` + 16u.
 ///
 /// *Slabs.* The planes of the cube, moved outwards by m, are met at near = -(a + w) / |d| and far = (w - a) / |d|, with the sign of
 /// d taken off p for a, and w = 1 + m (or m along y where the bounding volume is flat). Their roundings are worth less than 3u|h d| + 2u (|a| + w)
@@ -223,40 +228,43 @@ fn leaves(entries: &[Entry]) -> impl Iterator<Item = (&[Entry], usize)> {
 /// than `tolerance` = 12 m (1 + m) + 2⁻¹⁵ there, by 2⁻¹⁶ at least, and so is its least value, which is at an end, or C - B² / A
 /// where |B| < A; that this is greater is seen from (C - tolerance) A > B², with roundings below 4u B² < 4u A².
 ///
-/// *Tube.* In the space of x, y and r z, how far a point is outside of a ring's tube is √((ρ - (1 - r))² + r² z²) - r, and changes by
-/// no more than the way that the point goes. So there is no hit on a piece of the line whose middle is farther outside than half
-/// its length: sixteen pieces are looked at. A point is wrong by m on each axis, with its roundings, and in its distance
-/// by less than 2m + 2⁻¹⁶; half the length of a piece by 2⁻²⁰ of itself.
+/// *Tube.* In the space of x, y and r z, the distance of a point from a ring's tube is √((ρ - (1 - r))² + r² z²) - r,
+/// and a move of the point changes it by at most the length of the move. So a piece of the line has no hit if its
+/// middle is farther outside than half its length: sixteen pieces are tested. A point has an error of m on each axis,
+/// including its rounding errors, and an error of its distance of less than 2m + 2⁻¹⁶; half the length of a piece has a
+/// relative error of 2⁻²⁰.
 ///
-/// # What is certain
+/// # Certain hits
 ///
-/// Of a solid, a line that is inside of it somewhere within the range, and outside somewhere else in the range, crosses its border
-/// in between. A point that is inside by m in the cube, and by the tolerance of the profile, is inside, and within the range if its
-/// height surely is; one that is outside by as much is outside: also for double precision, which is wrong by far less. The ends of
-/// the range, 6u of themselves too far out here, are less than 12u N (W + S) off in the cube, for which m has room as well.
+/// A line that is inside a solid somewhere in the range, and outside it somewhere else in the range, crosses its border
+/// in between. A point that is inside by m in the cube, and by the tolerance of the profile, is inside, and it is in
+/// the range if its height certainly is; a point that is outside by as much is outside. This also holds for double
+/// precision, whose errors are far smaller. The ends of the range, 6u of themselves too far out here, have an error
+/// below 12u N (W + S) in the cube, which m covers too.
 ///
-/// A bounding volume that is smaller than 2⁻¹⁸ of the tree, or whose map stretches too much for single precision, is not tried: it passes.
-/// Else 2⁻⁴² ≤ N ≤ 2⁵⁸ and W ≤ 2⁴⁶, by the bounds on what is searched in single precision, and nothing over- or underflows.
+/// A bounding volume that is smaller than 2⁻¹⁸ of the tree, or whose map stretches too much for single precision,
+/// passes without a test. Otherwise 2⁻⁴² ≤ N ≤ 2⁵⁸ and W ≤ 2⁴⁶, by the bounds on single-precision searches, and nothing
+/// over- or underflows.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BoundingVolumeRay {
-    /// Relative to the tree's.
+    /// Relative to the tree's origin.
     pub(crate) origin: [f32; 3],
-    /// What rounding took from it.
+    /// The rounding error of the origin.
     pub(crate) rest: [f32; 3],
     pub(crate) direction: [f32; 3],
 }
 
-/// Of the tolerance, by m (1 + m), and its last summand.
+/// The tolerance: its factor of m (1 + m), and its constant.
 pub(crate) const TOLERANCE_PER_MARGIN: f32 = 12.0;
-pub(crate) const LEAST_TOLERANCE: f32 = 1.0 / (1 << 15) as f32;
-/// What a distance from a tube may be wrong by, by m, and apart from that.
+pub(crate) const MIN_TOLERANCE: f32 = 1.0 / (1 << 15) as f32;
+/// The error bound of a distance from a tube: its factor of m, and its constant.
 pub(crate) const TUBE_ERROR_PER_MARGIN: f32 = 2.0;
-pub(crate) const LEAST_TUBE_ERROR: f32 = 1.0 / (1 << 16) as f32;
-/// No component of a direction in the cube is taken to be less, by 64uN.
-pub(crate) const LEAST_COMPONENT: f32 = 1.0 / (1u64 << 22) as f32;
+pub(crate) const MIN_TUBE_ERROR: f32 = 1.0 / (1 << 16) as f32;
+/// Smallest component of a direction in the cube, in units of 64uN.
+pub(crate) const MIN_COMPONENT: f32 = 1.0 / (1u64 << 22) as f32;
 
 impl BoundingVolumeRay {
-    /// For a ray from nearby, whose direction's largest component has the size `length`.
+    /// For a ray from nearby; `length` is the size of its direction's largest component.
     #[inline(always)]
     pub(crate) fn new(tree_space: &TreeSpace, ray: &Ray, length: f64) -> Self {
         let exact = ray.origin - tree_space.origin;

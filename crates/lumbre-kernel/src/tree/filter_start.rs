@@ -6,58 +6,59 @@ use super::node::{LARGEST_NEAR, ROUNDOFF, SMALLEST_NEAR, TINY_NEAR, TreeSpace, r
 use super::summary::Summary;
 use crate::simd::Vector;
 
-/// Instances within one another are traversed in single precision no deeper: each takes a few kilobytes of the thread's stack.
+/// Deepest nesting of instances that is traversed in single precision: each level takes a few kilobytes of the thread's
+/// stack.
 const DEEPEST: u32 = 8;
 
-/// The smallest size L of `intersect::watertight`, by how far the tree and its triangles reach.
-pub(crate) const LEAST_SIZE: f32 = 4.0 * ROUNDOFF as f32;
+/// The least size L of `intersect::watertight`, as a factor of the reach of the tree and its triangles.
+pub(crate) const MIN_SIZE: f32 = 4.0 * ROUNDOFF as f32;
 
-/// What a ray from nearby needs to start in single precision, in a tree where the corners of all triangles in single precision are
+/// What a ray from nearby needs to start in single precision. The tree's triangles must be in single precision and
 /// relative to one origin.
 #[derive(Clone, Debug)]
 pub(crate) struct FilterStart {
-    /// Of the tree.
+    /// The root of the tree.
     pub(crate) root: u32,
-    /// Whether it holds nothing but triangles in single precision.
+    /// Whether the tree holds only triangles in single precision.
     pub(crate) only_triangles: bool,
-    /// What the tree's boxes are relative to, and a zero.
+    /// The origin of the tree's boxes, padded with a zero.
     pub(crate) tree_origin: [f64; 4],
-    /// What the corners are relative to, and a zero.
+    /// The origin of the corners, padded with a zero.
     pub(crate) mesh_origin: [f64; 4],
-    /// The latter in single precision, if nothing is lost by that: numbers in single precision then differ from it by the same, to the
-    /// bit, in either precision.
+    /// The latter in single precision, if that is exact: then the difference to a single-precision number has the same
+    /// bits in either precision.
     pub(crate) single_mesh_origin: Option<[f32; 4]>,
     /// Tree units per unit of space.
     pub(crate) scale: f64,
-    /// How far from zero a ray may start on each axis, in tree units.
+    /// Maximum distance of a ray's start from zero on each axis, in tree units.
     pub(crate) farthest: [f32; 4],
-    /// By how much planes are moved, and by how much more for each unit of the ray's start.
+    /// By how much planes are moved: a constant, and a factor of the ray's start.
     pub(crate) margin: f32,
     pub(crate) margin_per_distance: f32,
-    /// What the tree's boxes are relative to as seen from where the corners are, in tree units, and a zero.
+    /// The origin of the boxes minus that of the corners, in tree units, padded with a zero.
     pub(crate) shift: [f32; 4],
     /// By how much planes are moved for rays in single precision: see `trace::f32_ray`.
     pub(crate) f32_margin: f32,
     /// The scale, and its inverse.
     pub(crate) units_per_space: f32,
     pub(crate) space_per_unit: f32,
-    /// Where weights are precise enough.
+    /// When weights are precise enough.
     pub(crate) precise: Precise,
-    /// That of [`BlockRay`](crate::intersect::watertight::BlockRay) for every ray from nearby.
+    /// The least size of a [`BlockRay`](crate::intersect::watertight::BlockRay) for any ray from nearby.
     pub(crate) least_size: f32,
-    /// The bounds on the largest component of a direction, the upper one four times, to be compared with four at once; and that below which
-    /// one is replaced.
+    /// Bounds on the largest component of a direction (the upper one four times, to compare four components at once),
+    /// and the least component, below which one is replaced.
     pub(crate) shortest: f32,
     pub(crate) longest: [f32; 4],
     pub(crate) tiny: f32,
 }
 
 impl FilterStart {
-    /// `None` where the tree holds instances too deep within one another or meshes with different origins, or is so small, so large or so
-    /// far from its origin that single precision would overflow, underflow or tell nothing.
+    /// `None` if the tree nests instances too deeply, has meshes of different origins, or is so small, so large or so
+    /// far from its origin that single precision would overflow, underflow or be too coarse.
     pub(crate) fn new(summary: &Summary, tree_space: &TreeSpace, root: Option<u32>) -> Option<Self> {
         let two_to = |exponent: i32| 2.0f64.powi(exponent);
-        // Without a triangle, any place will do.
+        // Without triangles, any origin is right.
         let has_triangles = summary.first_origin.is_finite() && summary.sizes.largest_corner > 0.0;
         let (mesh_origin, largest_corner) = if has_triangles {
             (summary.first_origin, f64::from(summary.sizes.largest_corner))
@@ -91,43 +92,43 @@ impl FilterStart {
             units_per_space: tree_space.scale as f32,
             space_per_unit,
             precise: Precise::new(space_per_unit, summary.sizes.longest_side),
-            least_size: round_up(reach * f64::from(LEAST_SIZE)),
+            least_size: round_up(reach * f64::from(MIN_SIZE)),
             shortest: (SMALLEST_NEAR / tree_space.scale) as f32,
             longest: [(LARGEST_NEAR / tree_space.scale) as f32; 4],
             tiny: (TINY_NEAR / tree_space.scale) as f32,
         })
     }
 
-    /// The same for rays in single precision that start relative to the mesh already, with more room around boxes.
+    /// The start for single-precision rays that are relative to the mesh already, with wider boxes.
     pub(crate) fn relative_to_mesh(&self, room: f32) -> Self {
         let f32_margin = self.f32_margin + room;
         Self { mesh_origin: [0.0; 4], single_mesh_origin: Some([0.0; 4]), f32_margin, ..self.clone() }
     }
 }
 
-/// Where weights are precise enough: the largest product times the extent of the triangle and a little is no more than their sum times
-/// so much. See above.
+/// When weights are precise enough: when the largest product, times the triangle's extent plus `little`, is at most
+/// `most` times the sum of the edge functions. See above.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Precise {
-    /// The same by the longest side of all boxes in place of the extent: where the largest product is no more than the sum times this, one
-    /// need not look at heights. What these are wrong by, as rounded, is less than the little.
+    /// The same bound with the longest side of all boxes instead of the extent. If the largest product is at most this
+    /// many times the sum, the heights need no test; their rounding errors are below `little`.
     at_once: f32,
     most: f32,
     little: f32,
 }
 
 impl Precise {
-    /// For a tree in which no side of a triangle's box is longer, but for rounding.
+    /// For a tree whose longest triangle box side is this, up to rounding.
     pub(crate) fn new(space_per_unit: f32, longest_side: f32) -> Self {
         let most = 2.0 * space_per_unit;
         let little = most * (1.0 / 1024.0);
-        // More than what rounding may take away, here and of the side.
+        // More than rounding may remove, here and from the side.
         const MORE: f32 = 1.0 + 8.0 * f32::EPSILON;
         Self { at_once: most / (MORE * (longest_side + little)), most, little }
     }
 
-    /// A bit for each of the mask that is: by the largest product, how far within the triangle the line is, the sum of the edge functions, and the
-    /// heights of the corners. Other bits mean nothing.
+    /// A bit for each lane of the mask with precise weights, by its largest product, how far the line is inside the
+    /// triangle, the sum of the edge functions, and the heights of the corners. Other bits are undefined.
     #[inline(always)]
     pub(crate) fn of<V: Vector>(&self, mask: u32, largest: V, within: V, sum: V, z: [V; 3]) -> u32 {
         let is_strict = V::splat(0.0).simd_lt(within);
@@ -143,5 +144,5 @@ impl Precise {
     }
 }
 
-/// What products may lose by underflow is nothing beside this.
+/// Larger than what products may lose by underflow.
 const TINY: f32 = 1.0 / (1u128 << 80) as f32;

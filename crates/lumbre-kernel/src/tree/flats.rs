@@ -1,24 +1,25 @@
-//! A tree of nested boxes, halved at the median, of what has no area: see [`point::flats`](crate::point::flats).
+//! A tree of nested boxes, split at the median, over primitives without area: see
+//! [`point::flats`](crate::point::flats).
 
 use lumbre_geometry::Aabb;
 use lumbre_math::DVec3;
 
-/// The most items of a leaf.
+/// Maximum items of a leaf.
 const LEAF: usize = 4;
 
 /// The flat primitives of one tree's geometries.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Flats {
-    // The first is the root; none where there are no items.
+    // The first is the root; empty without items.
     nodes: Vec<FlatNode>,
     items: Vec<FlatItem>,
-    /// The greatest finite coordinates, without their signs.
+    /// The largest finite coordinates, as absolute values.
     pub(crate) reach: DVec3,
 }
 
 #[derive(Clone, Debug)]
 pub(crate) struct FlatNode {
-    /// Everything below it; infinite where something below moves.
+    /// Bounds of all items below it; infinite if one of them moves.
     pub(crate) bounds: Aabb,
     pub(crate) below: Below,
 }
@@ -50,8 +51,8 @@ impl Flats {
         flats
     }
 
-    /// Makes the node of these items, which start at a position in the list. Halves differ by one at most, so it nests no deeper
-    /// than the logarithm of their number.
+    /// Builds the node of these items, which start at index `first`. Halves differ by at most one, so the recursion is
+    /// as deep as the logarithm of their number.
     fn split(&mut self, boxed: &mut [(Aabb, FlatItem)], first: usize) {
         let bounds = boxed.iter().fold(Aabb::EMPTY, |all, (bounds, _)| all.union(*bounds));
         let node = self.nodes.len();
@@ -87,7 +88,7 @@ impl Flats {
         &self.items[first as usize..end as usize]
     }
 
-    /// Bytes that they take.
+    /// Bytes of memory.
     pub(crate) fn memory_bytes(&self) -> usize {
         self.nodes.capacity() * size_of::<FlatNode>() + self.items.capacity() * size_of::<FlatItem>()
     }

@@ -1,17 +1,18 @@
-//! What geometries are made of, but for trees themselves: meshes, spheres, user geometry, and where an instance stands.
+//! The data of geometries: meshes, spheres, user geometry, and the placement of instances. Trees themselves are
+//! elsewhere.
 
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use lumbre_geometry::{Aabb, NearestPoint, NoNearestPoint, Ray, Root, Roots, Surface};
+use lumbre_geometry::{Aabb, NearestPoint, NearestPointError, Ray, Root, Roots, Surface};
 use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec3};
 
-/// Where an instance stands.
+/// Where an instance is.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Placement {
     /// At one place at all times.
     Still(Transform),
-    /// At the place that the time of a ray says.
+    /// At a place that depends on the time of the ray.
     Moving(Arc<AnimatedTransform>),
 }
 
@@ -36,7 +37,7 @@ impl Placement {
         }
     }
 
-    /// The map at a time, which is made in `moving` where it changes.
+    /// The map at a time. If it changes, it is computed into `moving`.
     #[inline(always)]
     pub(crate) fn map_at<'m>(&'m self, time: f64, moving: &'m mut Option<Transform>) -> &'m Transform {
         match self {
@@ -45,57 +46,57 @@ impl Placement {
         }
     }
 
-    /// The same ray in the space of what is placed.
+    /// The ray in the space of the placed tree.
     #[inline(always)]
     pub(crate) fn object_ray(&self, ray: &Ray) -> Ray {
         ray.into_object(self.map_at(ray.time, &mut None))
     }
 }
 
-/// Triangles by index. Vertex `i` stands at `origin + positions[i]`, so that single precision holds what is small and
-/// far away.
+/// An indexed triangle mesh. Vertex `i` is at `origin + positions[i]`, so that single precision holds small objects far
+/// away.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
-    /// What the positions are relative to.
+    /// The origin of the positions.
     pub origin: DVec3,
     /// Vertices.
     pub positions: Vec<Vec3>,
-    /// Three vertices each; the front is where they run counter-clockwise.
+    /// Three vertices each; the front is the side from which they run counter-clockwise.
     pub indices: Vec<[u32; 3]>,
 }
 
-/// Many spheres. Number `i` stands about `origin + (x, y, z)` of `spheres[i]`, which is its centre and its radius, so that single
-/// precision holds what is small and far away. Each answers as a [`Sphere`](lumbre_geometry::Sphere) of these numbers in
-/// double precision does.
+/// Many spheres. Sphere `i` is around `origin + (x, y, z)` of `spheres[i]`, which is its centre and its radius, so that
+/// single precision holds small spheres far away. Each answers as a [`Sphere`](lumbre_geometry::Sphere) of these
+/// numbers in double precision does.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SphereCloud {
-    /// What the centres are relative to.
+    /// The origin of the centres.
     pub origin: DVec3,
-    /// Centre and radius of each. One whose radius is not greater than zero is never hit.
+    /// Centre and radius of each sphere. A sphere with a radius of zero or less is never hit.
     pub spheres: Vec<[f32; 4]>,
 }
 
-/// Geometry that the kernel does not know, at one indirect call a test.
+/// Geometry that the caller defines. Each test costs one indirect call.
 pub trait CustomGeometry: Debug + Send + Sync {
-    /// How many primitives it has.
+    /// Number of primitives.
     fn primitive_count(&self) -> u32;
-    /// A box around one of them; `None` when it is infinite.
+    /// A box around a primitive; `None` if it is infinite.
     fn bounds(&self, primitive: u32) -> Option<Aabb>;
     /// The first crossing in the ray's range.
     fn closest(&self, primitive: u32, ray: &Ray) -> Option<Root>;
-    /// Every crossing in the ray's range, appended in ascending order.
+    /// Appends every crossing in the ray's range, in ascending order.
     fn roots(&self, primitive: u32, ray: &Ray, out: &mut Roots);
     /// The surface at a crossing.
     fn surface(&self, primitive: u32, ray: &Ray, root: &Root) -> Surface;
-    /// The point of one of them that is nearest to `point`; unless overridden, there is no answer.
+    /// The point of a primitive that is nearest to `point`. The default returns an error.
     ///
     /// # Errors
-    /// [`NoNearestPoint::NotOffered`], or another reason.
-    fn closest_point(&self, primitive: u32, point: DVec3) -> Result<NearestPoint, NoNearestPoint> {
+    /// [`NearestPointError::NotOffered`], or another reason.
+    fn closest_point(&self, primitive: u32, point: DVec3) -> Result<NearestPoint, NearestPointError> {
         let _ = (primitive, point);
-        Err(NoNearestPoint::NotOffered)
+        Err(NearestPointError::NotOffered)
     }
-    /// How often all of them together wind around a point: 1 within a body, 0 without. `None`, unless overridden.
+    /// The winding number of all primitives together around a point: 1 inside a body, 0 outside. `None` by default.
     fn winding_number(&self, point: DVec3) -> Option<f64> {
         let _ = point;
         None
@@ -109,7 +110,7 @@ pub trait CustomGeometry: Debug + Send + Sync {
 /// Whether a triangle can be hit at all, as double precision sees it.
 #[inline(always)]
 pub(crate) fn has_area(&[a, b, c]: &[Vec3; 3]) -> bool {
-    // Single precision can tell of all but slivers: its errors are below 2^-20 of the products, and 1e-37.
+    // Single precision is certain for all but slivers: its errors are below 2^-20 of the products, and 1e-37.
     let (e, f) = ((b - a).to_array(), (c - a).to_array());
     let is_clear = |x: usize, y: usize| {
         let (p, q) = (e[x] * f[y], e[y] * f[x]);

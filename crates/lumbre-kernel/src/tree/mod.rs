@@ -1,5 +1,5 @@
-//! The tree as data: its geometries, nodes and leaves, and what is known of them. It is assembled in [`assemble`], built in
-//! [`build`](crate::build), and traversed by what is above.
+//! The tree as data: its geometries, nodes, leaves and summaries. [`assemble`] assembles it, [`build`](crate::build)
+//! builds it, and the modules above traverse it.
 
 pub(crate) mod assemble;
 pub(crate) mod block;
@@ -33,15 +33,15 @@ use self::picture_start::PictureStart;
 use self::precise_mesh::PreciseMesh;
 use self::summary::Summary;
 
-pub(crate) use self::block::{BLOCK, Corners, Name};
+pub(crate) use self::block::{BLOCK, Corners, PrimitiveId};
 
-/// Something that rays can hit, under a name of the caller's.
+/// Something that rays can hit, with an id of the caller's.
 #[derive(Clone, Debug)]
 pub struct Geometry {
-    /// Returned in every [`crate::Hit`] on it; the caller's own, not necessarily unique. For an instance it joins the hit's
-    /// path.
+    /// Returned in every [`crate::Hit`] on the geometry; chosen by the caller and not necessarily unique. The id of an
+    /// instance becomes part of the hit's path.
     pub id: u32,
-    /// What it is.
+    /// The geometry itself.
     pub kind: GeometryKind,
 }
 
@@ -52,9 +52,9 @@ pub enum GeometryKind {
     Shape(PlacedShape),
     /// Triangles, watertight.
     Mesh(Arc<TriangleMesh>),
-    /// Whole spheres in large numbers, tested in double precision: sixteen bytes each, where a shape takes some two hundred.
+    /// Many whole spheres, tested in double precision: sixteen bytes each, where a shape takes about two hundred.
     Spheres(Arc<SphereCloud>),
-    /// Triangles with vertices in double precision, watertight as well.
+    /// Watertight triangles with vertices in double precision.
     PreciseMesh(Arc<PreciseMesh>),
     /// A whole tree, placed.
     Instance(Instance),
@@ -62,51 +62,51 @@ pub enum GeometryKind {
     Custom(Arc<dyn CustomGeometry>),
 }
 
-/// A tree under an invertible affine map, which may change with time; trees may hold instances in turn. Made by
+/// A tree under an invertible affine map, which may change with time. Trees may contain instances in turn. Made by
 /// [`Accel::instance`](crate::Accel::instance).
 #[derive(Clone, Debug)]
 pub struct Instance {
-    /// What is placed.
+    /// The tree that is placed.
     pub(crate) tree: Arc<Tree>,
-    /// Where.
+    /// Its placement.
     pub world_from_object: Placement,
 }
 
-/// A built tree: its geometries, its nodes, and what is known of both. An instance is a tree in a tree.
+/// A built tree: geometries, nodes, and the data derived from them. An instance is a tree inside a tree.
 #[derive(Clone, Debug)]
 pub(crate) struct Tree {
     pub(crate) geometries: Vec<Geometry>,
     pub(crate) tree_space: TreeSpace,
     pub(crate) packed: Packed,
-    // Kept out of the nodes, and tested by every ray.
+    // Not in the nodes; every ray tests them.
     pub(crate) infinite: Vec<Entry>,
     pub(crate) bounds: Aabb,
     pub(crate) primitives: usize,
     pub(crate) summary: Summary,
-    /// Where single precision can traverse the tree.
+    /// How single-precision rays start; `None` if they cannot.
     pub(crate) single: Option<FilterStart>,
-    /// Where rays of pictures traverse it in single precision.
+    /// How picture rays start in single precision; `None` if they cannot.
     pub(crate) picture: Option<PictureStart>,
-    /// What shapes are tested by first.
+    /// The bounding volumes that are tested before shapes.
     pub(crate) bounding_volumes: BoundingVolumes,
-    /// What a ray cost after the build, once that was asked for.
+    /// The cost of a ray right after the build, once it was computed.
     pub(crate) built_cost: Option<f64>,
-    // One for each geometry, or none.
+    // Empty, or one for each geometry.
     pub(crate) masks: Vec<u32>,
-    /// For winding numbers, once one was asked for.
+    /// For winding numbers; computed at the first query.
     pub(crate) moments: OnceLock<Moments>,
-    /// For closest points, once one was asked for.
+    /// For closest points; computed at the first query.
     pub(crate) flats: OnceLock<Flats>,
 }
 
 impl Tree {
-    /// How it is traversed in single precision for rays of pictures; `None` where that is of no use.
+    /// How picture rays traverse the tree in single precision; `None` if that is of no use.
     #[inline]
     pub(crate) fn picture_start(&self) -> Option<&PictureStart> {
         self.picture.as_ref().filter(|picture| picture.has_triangles)
     }
 
-    /// What the corners of a mesh are relative to.
+    /// The origin of a mesh's corners.
     pub(crate) fn mesh_origin(&self, geometry: u32) -> DVec3 {
         match &self.geometries[geometry as usize].kind {
             GeometryKind::Mesh(mesh) => mesh.origin,
@@ -131,7 +131,7 @@ impl Tree {
         }
     }
 
-    /// The entry of an instance: those in the nodes count first, then those outside of them.
+    /// The entry of an instance: entries in nodes are numbered first, then those outside the tree.
     #[inline(always)]
     pub(crate) fn instance_entry(&self, index: usize) -> &Entry {
         let inside = &self.packed.entries;

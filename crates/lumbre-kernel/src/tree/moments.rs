@@ -2,17 +2,17 @@
 
 use lumbre_math::{DMat3, DVec3};
 
-/// What the triangles below each node of a tree look like from far away. Places are relative to the tree's origin.
+/// The far-field moments of the triangles below each node of a tree. Positions are relative to the tree's origin.
 #[derive(Clone, Debug)]
 pub(crate) struct Moments {
     pub(crate) nodes: Vec<Moment>,
 }
 
-/// Of some triangles with normals n of the length of their areas, at δ from the center.
+/// The moments of triangles with normals n, whose lengths are the triangles' areas, at δ from the center.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Moment {
     pub(crate) center: DVec3,
-    /// No corner is farther from the center.
+    /// Largest distance of a corner from the center.
     pub(crate) radius: f64,
     pub(crate) area: f64,
     /// Σ n.
@@ -52,7 +52,7 @@ impl Moment {
         }
     }
 
-    /// All together, about their common center of area.
+    /// The combined moments, about the common center of area.
     pub(crate) fn of_all(parts: &[Self]) -> Self {
         let area: f64 = parts.iter().map(|part| part.area).sum();
         if area <= 0.0 {
@@ -76,8 +76,8 @@ impl Moment {
         all
     }
 
-    /// Four π times the winding number around a far point: the integral of n·ρ/ρ³ with ρ from the point to the surface, up to
-    /// the second order in δ.
+    /// Four π times the winding number around a far point: the integral of n·ρ/ρ³ with ρ from the point to the surface,
+    /// up to the second order in δ.
     pub(crate) fn around(&self, point: DVec3) -> f64 {
         let r = self.center - point;
         let square = r.length_squared();
@@ -101,7 +101,7 @@ impl Moment {
 }
 
 impl Moments {
-    /// Bytes that they take.
+    /// Bytes of memory.
     pub(crate) fn memory_bytes(&self) -> usize {
         self.nodes.capacity() * size_of::<Moment>()
     }

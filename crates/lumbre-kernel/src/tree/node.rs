@@ -1,19 +1,19 @@
-//! Sixteen-wide nodes, and the single-precision ray that is tested against their boxes without ever losing a hit.
+//! Sixteen-wide nodes, and the single-precision ray that is tested against their boxes without losing a hit.
 //!
-//! # Why no hit is lost
+//! # Error bound
 //!
-//! Everything here happens in the tree's own units: positions relative to the tree's origin, times a power of two, so
-//! that every plane of a box is an f32 `p` with |p| ≤ 1.01. A ray is moved there in f64, as `o + s d`, where
-//! `s = t * s_per_t + s_at_zero` is never negative within its range.
+//! All coordinates are in tree units: relative to the tree's origin, times a power of two, so that every plane of a box
+//! is an f32 `p` with |p| ≤ 1.01. A ray is moved there in f64, as `o + s d`, where `s = t * s_per_t + s_at_zero` is
+//! never negative within its range.
 //!
-//! A ray from near the tree stays as it is: `o` is its start, |o| ≤ 16 on each axis, `d` its direction, whose largest
-//! component is between 2⁻²⁰ and 2²⁰, and `s = t`. Of any other ray, the direction is scaled by a power of two until its
-//! largest component lies in [1, 2), and `o` lies a little before the point of the line nearest to the tree's origin, so
-//! that a ray from far away is as precise as one from nearby.
+//! A ray that starts near the tree keeps its start: `o` is its start, |o| ≤ 16 on each axis, `d` its direction, whose
+//! largest component is between 2⁻²⁰ and 2²⁰, and `s = t`. For any other ray, the direction is scaled by a power of two
+//! until its largest component lies in [1, 2), and `o` lies slightly before the point of the line nearest to the tree's
+//! origin, so that a ray from far away is as precise as one from nearby.
 //!
-//! A hit's point, as the leaf computed it, lies within `slop` (tree units, on each axis) of its box and of the line
-//! `o + s d`, for the f64 arithmetic of leaves, instances and of this set-up is wrong by a few 2⁻⁵³ of the coordinates
-//! that take part; `slop` allows 2⁻⁴⁷ of them times the condition of the transforms, and at least 2⁻⁴⁰.
+//! A hit's point, as the leaf computed it, lies within `slop` (tree units, on each axis) of its box and of the line `o
+//! + s d`: the f64 arithmetic of leaves, instances and of this set-up has an error of a few 2⁻⁵³ of the coordinates
+//! involved. `slop` allows 2⁻⁴⁷ of them times the condition of the transforms, and at least 2⁻⁴⁰.
 //!
 //! On one axis let `R = 1/d > 0` and `p` be the lower plane; the hit has `s ≥ (p - o - slop) R` exactly. We compute
 //! `near = p r + c` with `r = f32(R)`, `|r - R| ≤ u|R|`, u = 2⁻²⁴, and `c = f32(-o R - e)`, wrong by `u|R||o|` and what is
@@ -25,76 +25,76 @@
 //! Then `p r` is off by `2.01u|R||p|`, `o r` by `3.1u|R||o|`, and three roundings (one of a separate product among them, for each of
 //! the two) add `2u|R||p| + 3u|R||o|` and what is small beside it: `e = |R| (8u (1.01 + |o|) + slop)` has room for all of it.
 //!
-//! A component below 2⁻⁶⁰ of the least that the largest may be (zeros of both signs among them) is replaced by that
-//! bound: a hit lies within |s d| ≤ 20 + 12 slop on the largest axis, where that moves the line by less than
-//! 2⁻⁵⁴ (1 + slop), which `slop` covers as well. So there is no division by zero, no 0·∞, and no NaN. Where the scaling
-//! itself overflows (coordinates beyond 1e±150 of the tree's size), the ray passes every box: slow, but right.
+//! A component below 2⁻⁶⁰ of the lower bound on the largest component, including zeros of both signs, is replaced by
+//! that bound: a hit lies within |s d| ≤ 20 + 12 slop on the largest axis, where that moves the line by less than 2⁻⁵⁴
+//! (1 + slop), which `slop` covers as well. So there is no division by zero, no 0·∞, and no NaN. If the scaling itself
+//! overflows (coordinates beyond 1e±150 of the tree's size), the ray passes every box: slow, but right.
 //!
-//! A child that is not there has planes of ±f32::MAX, inside out. Since |c| is far below f32::MAX |r|, every ray enters it
-//! at more than 2¹⁰⁶ and leaves it before zero: it is never met.
+//! An absent child has inverted planes of ±f32::MAX. Since |c| is far below f32::MAX |r|, every ray enters it at more
+//! than 2¹⁰⁶ and leaves it before zero: no ray meets it.
 
 use bytemuck::{Pod, Zeroable};
 use lumbre_math::DVec3;
 
-/// References to children: four bits for the kind, and 28 for the place.
+/// References to children: four bits for the kind, and 28 for the index.
 pub(crate) mod tag {
-    /// Where the kind begins.
+    /// Bit offset of the kind.
     pub(crate) const SHIFT: u32 = 28;
-    /// The bits of the place.
+    /// The bits of the index.
     pub(crate) const PLACE: u32 = (1 << SHIFT) - 1;
 
     /// A node.
     pub(crate) const INNER: u32 = 0;
-    /// Triangle blocks in a row: see `triangle_block`.
+    /// Consecutive triangle blocks: see `triangle_block`.
     pub(crate) const TRIANGLES: u32 = 1;
-    /// Leaf entries in a row that are shapes.
+    /// Consecutive leaf entries that are shapes.
     pub(crate) const SHAPES: u32 = 2;
     /// One leaf entry that is an instance.
     pub(crate) const INSTANCE: u32 = 3;
-    /// Leaf entries in a row that are primitives of custom geometry.
+    /// Consecutive leaf entries of custom geometry.
     pub(crate) const CUSTOM: u32 = 4;
-    /// Sphere blocks in a row: see `sphere_block`.
+    /// Consecutive sphere blocks: see `sphere_block`.
     pub(crate) const SPHERES: u32 = 5;
-    /// Leaf entries in a row that are triangles in double precision.
+    /// Consecutive leaf entries of triangles in double precision.
     pub(crate) const PRECISE: u32 = 6;
-    /// No child, but the mark on the stack where an instance was entered.
+    /// A mark on the stack where the ray entered an instance; not a child.
     pub(crate) const RETURN: u32 = 15;
 
     pub(crate) const fn reference(tag: u32, place: u32) -> u32 {
         tag << SHIFT | place
     }
 
-    /// The kind of what a reference names.
+    /// The kind of a reference.
     #[inline(always)]
     pub(crate) const fn of(reference: u32) -> u32 {
         reference >> SHIFT
     }
 
-    /// Where it stands.
+    /// The index of a reference.
     #[inline(always)]
     pub(crate) const fn place(reference: u32) -> usize {
         (reference & PLACE) as usize
     }
 
-    /// Whether a reference names a node.
+    /// Whether a reference is to a node.
     #[inline(always)]
     pub(crate) const fn is_inner(reference: u32) -> bool {
         of(reference) == INNER
     }
 
-    /// Blocks that a leaf of triangles, or of spheres, may have.
-    pub(crate) const MOST_BLOCKS: u32 = 1 << COUNT_BITS;
-    /// Places that blocks may have.
+    /// Maximum blocks in a leaf of triangles or spheres.
+    pub(crate) const MAX_BLOCKS: u32 = 1 << COUNT_BITS;
+    /// Number of indices that blocks may have.
     pub(crate) const BLOCK_PLACES: u32 = 1 << (SHIFT - COUNT_BITS);
     const COUNT_BITS: u32 = 3;
 
-    /// A leaf of triangles: 25 bits for its first block, three for how many there are, 1 to 8. In a packed tree, the place is the
-    /// line where the first block begins.
+    /// A leaf of triangles: 25 bits for its first block, three for the number of blocks, 1 to 8. In a packed tree, the
+    /// index is the line where the first block begins.
     pub(crate) const fn triangles(first: u32, count: u32) -> u32 {
         reference(TRIANGLES, first << COUNT_BITS | (count - 1))
     }
 
-    /// A leaf of spheres, alike.
+    /// A leaf of spheres, in the same encoding.
     pub(crate) const fn spheres(first: u32, count: u32) -> u32 {
         reference(SPHERES, first << COUNT_BITS | (count - 1))
     }
@@ -103,11 +103,12 @@ pub(crate) mod tag {
     #[inline(always)]
     pub(crate) const fn blocks(reference: u32) -> std::ops::Range<usize> {
         let first = place(reference) >> COUNT_BITS;
-        first..first + (reference & (MOST_BLOCKS - 1)) as usize + 1
+        first..first + (reference & (MAX_BLOCKS - 1)) as usize + 1
     }
 }
 
-/// Ends a search whose reference is not of its tree. The reference is not told: it would have to be kept for every step.
+/// Panics at a reference that is not of its tree. The message lacks the reference, because every step would have to
+/// keep it.
 #[cold]
 #[inline(never)]
 pub(crate) fn out_of_tree() -> ! {
@@ -117,52 +118,53 @@ pub(crate) fn out_of_tree() -> ! {
 /// Children of a node.
 pub(crate) const WIDTH: usize = 16;
 
-/// Up to sixteen boxes and what they hold.
+/// Up to sixteen boxes and references to their contents.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(crate) struct Node {
     /// Lower and upper x, y and z planes of the boxes: `planes[2 * axis + side]`.
     pub(crate) planes: [[f32; WIDTH]; 6],
-    /// Tagged references, in the first lanes; [`Node::ABSENT`] in the others. The last are asked first where any hit will do: they are the
-    /// likeliest to have one for what they cost, or the largest; see [`occlusion_order`](crate::build::occlusion_order).
+    /// Tagged references in the first lanes; [`Node::ABSENT`] in the others. An any-hit search tests the last child
+    /// first: it has the best odds of a hit for its cost, or the largest box; see
+    /// [`occlusion_order`](crate::build::occlusion_order).
     pub(crate) children: [u32; WIDTH],
 }
 
 const _: () = assert!(size_of::<Node>() == 7 * 64);
 
 impl Node {
-    /// A node without children: its boxes are inside out.
+    /// A node without children: its boxes are inverted.
     pub(crate) const EMPTY: Self = {
         let (low, high) = ([f32::MAX; WIDTH], [-f32::MAX; WIDTH]);
         Self { planes: [low, high, low, high, low, high], children: [Self::ABSENT; WIDTH] }
     };
 
-    /// What stands for a child that is not there.
+    /// The reference of an absent child.
     pub(crate) const ABSENT: u32 = u32::MAX;
 
-    /// How many children there are.
+    /// Number of children.
     #[inline]
     pub(crate) fn len(&self) -> usize {
         self.children.iter().position(|&child| child == Self::ABSENT).unwrap_or(WIDTH)
     }
 }
 
-/// The units in which a tree's boxes are kept.
+/// The units of a tree's boxes.
 #[derive(Clone, Debug)]
 pub(crate) struct TreeSpace {
-    /// What is at zero.
+    /// The point in space at zero.
     pub(crate) origin: DVec3,
     /// Tree units per unit of space; a power of two.
     pub(crate) scale: f64,
     /// Half the diagonal of the tree's bounds, in tree units.
     pub(crate) radius: f64,
-    /// How much the arithmetic of transforms in the leaves may enlarge rounding errors; 1 without any.
+    /// By how much the transforms in leaves may enlarge rounding errors; 1 without any.
     pub(crate) condition: f64,
-    /// How far from zero a ray may start on each axis to be one from nearby; negative where none may.
+    /// How far from zero a ray may start on each axis to count as nearby; negative if no ray does.
     pub(crate) near: f64,
-    /// The origin, and a zero.
+    /// The origin, padded with a zero.
     pub(crate) padded_origin: [f64; 4],
-    /// Of rays from nearby: by how much planes are moved, and by how much more for each unit of the ray's start.
+    /// For rays from nearby, by how much planes are moved: a constant, and a factor of the ray's start.
     pub(crate) near_margin: f64,
     pub(crate) margin_per_distance: f64,
 }
@@ -176,7 +178,7 @@ impl TreeSpace {
             scale,
             radius,
             condition,
-            // None where the slop is no number.
+            // Also negative if the slop is NaN.
             near: if slop < 1.0 / 65536.0 { NEAR } else { -1.0 },
             padded_origin: [origin.x, origin.y, origin.z, 0.0],
             near_margin: 4.0 * ROUNDOFF * LARGEST_PLANE + slop,
@@ -186,25 +188,25 @@ impl TreeSpace {
 }
 
 impl TreeSpace {
-    /// By how much a box and what is in it may be apart, in tree units, as seen from a point in space.
+    /// The maximum distance between a box and its contents, in tree units, seen from a point in space.
     pub(crate) fn slop_of(&self, point: DVec3) -> f64 {
         slop(self.condition, (point.abs() + self.origin.abs()).max_element() * self.scale + 1.0)
     }
 
-    /// The same as seen from where a ray from nearby may start.
+    /// That distance for any ray from nearby.
     pub(crate) fn nearby_slop(&self) -> f64 {
         self.near_margin - 4.0 * ROUNDOFF * LARGEST_PLANE
     }
 
-    /// Of rays that were rounded before: by how much planes are moved, and by how much more for each unit of the ray's start.
+    /// For rounded rays, by how much planes are moved: a constant, and a factor of the ray's start.
     pub(crate) fn single_margin(&self) -> f32 {
         round_up(8.0 * ROUNDOFF * LARGEST_PLANE + self.nearby_slop())
     }
 
     pub(crate) const SINGLE_MARGIN_PER_DISTANCE: f32 = (8.0 * ROUNDOFF) as f32;
 
-    /// Of rays in single precision, where zero is so far from the mesh's origin on each axis, in tree units: by how much planes are
-    /// moved, and by how much more for each unit of the ray's start. See `trace::f32_ray`.
+    /// For single-precision rays, by how much planes are moved: a constant, and a factor of the ray's start. `shift` is
+    /// the distance of zero from the mesh's origin on each axis, in tree units. See `trace::f32_ray`.
     pub(crate) fn f32_margin(&self, shift: f64) -> f32 {
         round_up(f64::from(self.single_margin()) + ROUNDOFF * (56.0 + 2.0 * shift))
     }
@@ -213,14 +215,14 @@ impl TreeSpace {
 }
 
 const NEAR: f64 = 16.0;
-/// Of rays from nearby: the bounds on the largest component of the direction, in tree units.
+/// Bounds on the largest component of a nearby ray's direction, in tree units.
 pub(crate) const SMALLEST_NEAR: f64 = 1.0 / (1u64 << 20) as f64;
 pub(crate) const LARGEST_NEAR: f64 = (1u64 << 20) as f64;
-/// Of rays from nearby: the bound below which a component is replaced.
+/// Components of a nearby ray's direction below this are replaced.
 pub(crate) const TINY_NEAR: f64 = TINY_DIRECTION * SMALLEST_NEAR;
 pub(crate) const ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
 pub(crate) const TINY_DIRECTION: f64 = 1.0 / (1u64 << 60) as f64;
-/// The bound on |p| that the proof uses.
+/// The bound on |p| in the proof.
 pub(crate) const LARGEST_PLANE: f64 = 1.01;
 
 pub(crate) fn slop(condition: f64, reach: f64) -> f64 {

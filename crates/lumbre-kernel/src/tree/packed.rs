@@ -5,15 +5,16 @@ use bytemuck::{Pod, Zeroable};
 use super::node::{Node, tag};
 use super::sphere_block::SphereBlock;
 use super::storage::Store;
-use super::triangle_block::{BlockNames, Blocks, Line};
+use super::triangle_block::{BlockIds, Blocks, Line};
 
-/// A primitive in a leaf that is no triangle, or outside the tree.
+/// A primitive in a leaf, other than a packed triangle or sphere, or an infinite primitive outside the tree.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Entry {
     /// Position in the tree's list.
     pub(crate) geometry: u32,
-    /// Which primitive of its geometry, or where an instance is entered; the top bit marks the last of its leaf.
+    /// Index of the primitive in its geometry, or the node where an instance is entered. The top bit marks the last of
+    /// its leaf.
     primitive_and_last: u32,
 }
 
@@ -24,7 +25,7 @@ impl Entry {
         Self { geometry, primitive_and_last: primitive | if is_last { LAST } else { 0 } }
     }
 
-    /// As it is saved.
+    /// The form in which it is saved.
     pub(crate) fn to_words(self) -> [u32; 2] {
         [self.geometry, self.primitive_and_last]
     }
@@ -47,17 +48,17 @@ impl Entry {
 /// The packed tree.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Packed {
-    /// Each before all that are below it.
+    /// Each node precedes all nodes below it.
     pub(crate) nodes: Store<Node>,
     /// The blocks of triangles: see [`triangle_block`](super::triangle_block).
     pub(crate) blocks: Store<Line>,
-    /// As many as there are blocks.
-    pub(crate) names: Store<BlockNames>,
+    /// The primitive ids of each triangle block.
+    pub(crate) ids: Store<BlockIds>,
     pub(crate) entries: Store<Entry>,
     pub(crate) sphere_blocks: Store<SphereBlock>,
-    /// As many as there are blocks of spheres.
-    pub(crate) sphere_names: Store<BlockNames>,
-    /// The reference to the root; `None` when there is nothing finite.
+    /// The primitive ids of each sphere block.
+    pub(crate) sphere_ids: Store<BlockIds>,
+    /// The reference to the root; `None` without finite geometry.
     pub(crate) root: Option<u32>,
 }
 
@@ -68,17 +69,17 @@ impl Packed {
         Blocks::new(&self.blocks)
     }
 
-    /// The numbers of the blocks of a leaf of triangles, by which their names stand.
+    /// The numbers of a triangle leaf's blocks, which index `ids`.
     pub(crate) fn numbers(&self, leaf: u32) -> std::ops::Range<usize> {
         self.blocks().numbers(leaf).expect("references lead to blocks")
     }
 }
 
-/// Where an entry of an instance enters the instance's tree: at the root, or at another node. The parts of an instance
-/// together are all of its tree, no two of them have a node in common, and none is a leaf.
+/// Where an entry enters an instance's tree: at the root, or at another node. The parts of an instance together are its
+/// whole tree; they have no node in common, and none is a leaf.
 ///
-/// After a refit with another tree in which these are no such nodes, one entry stands for the whole and the others for nothing,
-/// until a tree comes in which they are again.
+/// A refit may bring another tree in which these nodes do not qualify. Then one entry stands for the whole and the
+/// others for nothing, until a tree comes in which they qualify again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Start(pub(crate) u32);
 
@@ -88,7 +89,7 @@ impl Start {
     pub(crate) const AS_WHOLE: u32 = 1;
     pub(crate) const AS_NOTHING: u32 = 2;
 
-    /// As it stands in an entry.
+    /// The form in an entry.
     #[inline(always)]
     pub(crate) fn of(word: u32) -> Self {
         Self(word)
@@ -103,7 +104,7 @@ impl Start {
         tag::of(self.0) >= Self::AS_NOTHING
     }
 
-    /// What is entered of a tree with this root.
+    /// The reference to enter, in a tree with this root.
     #[inline(always)]
     pub(crate) fn below(self, root: u32) -> u32 {
         if self == Self::WHOLE || !tag::is_inner(self.0) { root } else { self.0 }

@@ -1,4 +1,4 @@
-//! Spheres packed by eight: a first test in single precision, and the exact one for what it leaves.
+//! Spheres packed by eight: a first test in single precision, and the exact test for the rest.
 
 use bytemuck::{Pod, Zeroable};
 use lumbre_geometry::{Ray, Root, Roots, Sphere, Surface, sphere_crossings};
@@ -45,7 +45,7 @@ pub(crate) fn has_radius(sphere: &[f32; 4]) -> bool {
     sphere[3] > 0.0
 }
 
-/// A sphere in double precision: the numbers, and so the answers, of a [`Sphere`] made of them.
+/// A sphere in double precision, with the answers of a [`Sphere`] of the same numbers.
 #[derive(Clone, Copy)]
 pub(crate) struct ExactSphere {
     pub(crate) center: DVec3,
@@ -58,14 +58,14 @@ impl ExactSphere {
         Self { center: *origin + DVec3::from_array(center.map(f64::from)), radius: radius.into() }
     }
 
-    /// One of a cloud.
+    /// A sphere of a cloud.
     #[inline(always)]
     pub(crate) fn of(cloud: &SphereCloud, primitive: u32) -> Self {
         let [x, y, z, radius] = cloud.spheres[primitive as usize];
         Self::new([x, y, z], radius, &cloud.origin)
     }
 
-    /// Where it is crossed in the ray's range for the first time, and whether it is only touched there. As
+    /// The first crossing in the ray's range, and whether the ray only touches the sphere there. As
     /// [`Sphere::closest`].
     #[inline(always)]
     pub(crate) fn closest(&self, ray: &Ray) -> Option<Root> {
@@ -94,10 +94,10 @@ impl ExactSphere {
         }
     }
 
-    /// The same as a shape.
+    /// The sphere as a shape.
     ///
     /// # Panics
-    /// When it has no radius, so that it stands in no tree.
+    /// If it has no radius; such a sphere is in no tree.
     pub(crate) fn to_shape(self) -> Sphere {
         Sphere::new(self.center, self.radius).expect("it has a radius")
     }
@@ -107,27 +107,29 @@ impl ExactSphere {
         self.to_shape().surface(ray, root)
     }
 
-    /// Whether the ball holds `p`.
+    /// Whether the ball contains `p`.
     pub(crate) fn contains(&self, p: DVec3) -> bool {
         self.radius > 0.0 && self.to_shape().contains(p)
     }
 }
 
-/// A ray in single precision, for a first test of eight spheres that is sharp, but never loses one.
+/// A ray in single precision, for a sharp but conservative first test of eight spheres.
 ///
-/// # Why none is lost
+/// # Error bound
 ///
-/// Lengths are in units of space, so that a place on the ray is `t |d|`. Let R be the largest coordinate of a centre, plus the
-/// largest radius, plus the largest coordinate of the ray's origin, all relative to the cloud, and u = 2⁻²⁴. The vector w from the
-/// ray's origin to a centre has a length of at most √3 R; as computed here it is wrong by 2u|R| on each axis, for the origin
-/// is rounded, and so is the difference: by 3.5uR all together. The direction e, of length 1, is wrong by u. So b = w·e is
-/// wrong by 3.5uR + 1.8uR, and by 3u√3R = 5.2uR of its own roundings: 10.5uR. The vector p = w - b e from the centre's foot on
-/// the ray is wrong by 3.5uR + 10.5uR + 1.8uR from these, and by 3.5uR of its own roundings: below δ = 20uR.
+/// Lengths are in units of space, so that a position on the ray is `t |d|`. Let R be the largest coordinate of a
+/// centre, plus the largest radius, plus the largest coordinate of the ray's origin, all relative to the cloud, and u =
+/// 2⁻²⁴. The vector w from the ray's origin to a centre has a length of at most √3 R. As computed here, it has an error
+/// of 2u|R| on each axis, since the origin is rounded and so is the difference: 3.5uR in total. The direction e, of
+/// length 1, has an error of u. So b = w·e has an error of 3.5uR + 1.8uR from these, and 3u√3R = 5.2uR from its own
+/// rounding: 10.5uR. The vector p = w - b e from the foot of the centre on the ray has an error of 3.5uR + 10.5uR +
+/// 1.8uR from these, and 3.5uR from its own rounding: below δ = 20uR.
 ///
-/// The test in double precision hits only where the true |p| is at most the radius r, give or take 2⁻⁴⁸R. So p², here wrong by
-/// 3u of itself, is at most (r + δ)² (1 + 3u), which is less than s² as computed here, for s = r + `margin` with
-/// `margin` = 32uR ≥ δ + 5uR + 2⁻⁴⁸R: that leaves 5u of s, which is at most R + δ, and twice as much of its square.
-/// For the same reason half the chord, √(r² - p²), is at most the computed √(s² - p²), but for u of itself.
+/// The test in double precision hits only if the true |p| is at most the radius r, give or take 2⁻⁴⁸R. So the computed
+/// p², with a relative error of 3u, is at most (r + δ)² (1 + 3u), which is less than the computed s² for s = r +
+/// `margin` with `margin` = 32uR ≥ δ + 5uR + 2⁻⁴⁸R: that leaves 5u of s, which is at most R + δ, and twice as much of
+/// its square. For the same reasons, half the chord, √(r² - p²), is at most the computed √(s² - p²), up to a relative
+/// error of u.
 ///
 /// In double precision, t |d| is off from b ± √(r² - p²) as it is there by no more than 2uR: where the line all but touches,
 /// r² - p² is 0 or at least 2⁻⁵⁴r², so that the divisor of the stable quadratic is at least 2⁻²⁷r |d|, and what it divides is
@@ -137,16 +139,17 @@ impl ExactSphere {
 /// Where |p| ≤ r - `margin` as computed here, the line does cross the sphere, for 32uR is more than δ and all roundings. The
 /// first crossing is then in range where b - √(s² - p²) is by `range_margin` after its start, and b by as much before its end.
 ///
-/// Centres are rounded once more in double precision, when the cloud's origin is added: 2⁻⁵³ of the largest coordinate of
-/// that origin, for which there is 2⁻⁴⁸ of it in both margins.
+/// In double precision, adding the cloud's origin rounds centres once more: by 2⁻⁵³ of the origin's largest coordinate.
+/// Both margins include 2⁻⁴⁸ of it.
 ///
-/// So far of what the line may do. Where |p| ≤ r - `margin` as computed here, it surely crosses the sphere for the first time not
-/// before b - √(s² - p²), as was seen, and not behind b - √((r - `margin`)² - p²), which for the same reason is no less, both as
-/// computed here and give or take (10.5 + 1 + 2 + 3)uR. Of two spheres whose lines are so, the one is nearer for certain where the
-/// latter of it is by `range_margin` before the former of the other: that is twice as much, and leaves 31uR for their roundings.
+/// If the computed |p| ≤ r - `margin`, the ray certainly crosses the sphere. The first crossing is at or after b - √(s²
+/// - p²), as shown above, and at or before b - √((r - `margin`)² - p²), which for the same reasons is no less, both as
+/// computed here and give or take (10.5 + 1 + 2 + 3)uR. Of two such spheres, one is certainly nearer if its latter
+/// value is by `range_margin` before the former value of the other: that is twice the error, and leaves 31uR for
+/// rounding.
 ///
-/// All this without overflow or underflow that matters, so for 2⁻⁴⁰ ≤ R ≤ 2⁶⁰ and a direction that is neither absurdly long
-/// nor short; else all eight are tested exactly.
+/// There is no relevant overflow or underflow if 2⁻⁴⁰ ≤ R ≤ 2⁶⁰ and the direction is neither absurdly long nor short;
+/// otherwise all eight spheres are tested exactly.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SphereRay {
     pub(crate) origin: [f32; 3],
@@ -154,15 +157,15 @@ pub(crate) struct SphereRay {
     pub(crate) direction: [f32; 3],
     pub(crate) margin: f32,
     pub(crate) range_margin: f32,
-    /// Crossings are of interest between these.
+    /// The range of relevant crossings.
     pub(crate) near: f32,
     pub(crate) far: f32,
-    /// Between these a place is certainly in range.
+    /// A position in this range is certainly in the ray's range.
     pub(crate) surely_in: [f32; 2],
 }
 
 impl SphereRay {
-    /// Of no ray.
+    /// A ray that hits nothing.
     pub(crate) const NONE: Self = Self {
         origin: [0.0; 3],
         direction: [0.0; 3],
@@ -173,8 +176,8 @@ impl SphereRay {
         surely_in: [f32::INFINITY, f32::NEG_INFINITY],
     };
 
-    /// `reach` is the largest coordinate of a centre plus the largest radius; `None` where the test would tell nothing. The range is to be
-    /// set: the units of space for each of `t` that it takes are answered, too.
+    /// `reach` is the largest coordinate of a centre plus the largest radius; `None` if the test is too coarse. Also
+    /// returns the units of space per `t`. The caller has to set the range.
     #[inline(always)]
     pub(crate) fn new(ray: &Ray, cloud_origin: &DVec3, reach: f64) -> Option<(Self, f64)> {
         let (spheres, length) = Self::sharp(ray, cloud_origin, reach);
@@ -182,12 +185,12 @@ impl SphereRay {
         (is_sharp && (1e-50..=1e50).contains(&length)).then_some((spheres, length))
     }
 
-    /// Whether the test tells anything where no coordinate is larger than this.
+    /// Whether the test is sharp enough if no coordinate is larger than this.
     pub(crate) fn is_sharp(reach: f64) -> bool {
         1.0 / (1u64 << 40) as f64 <= reach && reach <= (1u64 << 60) as f64
     }
 
-    /// The same where it does tell something.
+    /// As [`Self::new`], if the test is known to be sharp enough.
     #[inline(always)]
     pub(crate) fn sharp(ray: &Ray, cloud_origin: &DVec3, reach: f64) -> (Self, f64) {
         let u = 1.0 / (1u64 << 24) as f64;
@@ -206,7 +209,7 @@ impl SphereRay {
         (spheres, length)
     }
 
-    /// Leaves out what is wholly outside the range of `t`, where there are so many units of space for each.
+    /// Limits the test to a range of `t`, given the units of space per `t`.
     #[inline(always)]
     pub(crate) fn set_range(&mut self, length: f64, t_min: f64, t_max: f64) {
         let margin = f64::from(self.range_margin);

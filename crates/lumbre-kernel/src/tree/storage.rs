@@ -1,4 +1,4 @@
-//! Arrays of a tree: owned, or lying in a mapped file as they are.
+//! Arrays of a tree: owned, or borrowed from a mapped file.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -8,30 +8,30 @@ use std::sync::Arc;
 use bytemuck::Pod;
 use memmap2::Mmap;
 
-/// An array. To look into it often, the slice is to be taken once.
+/// An array. For many accesses, take the slice once.
 #[derive(Clone)]
 pub(crate) enum Store<T> {
     Owned(Vec<T>),
     Mapped(Part<T>),
 }
 
-/// Where an array lies in a mapped file.
+/// The location of an array in a mapped file.
 #[derive(Clone)]
 pub(crate) struct Part<T> {
     file: Arc<Mmap>,
-    // Of whole elements, and aligned for them.
+    // A whole number of aligned elements.
     bytes: Range<usize>,
     of: PhantomData<T>,
 }
 
 impl<T: Pod> Store<T> {
-    /// The elements that lie there; `None` where the file ends before, or the place is not aligned.
+    /// The elements at these bytes; `None` if the file is too short or the bytes are not aligned.
     pub(crate) fn mapped(file: &Arc<Mmap>, bytes: Range<usize>) -> Option<Self> {
         bytemuck::try_cast_slice::<u8, T>(file.get(bytes.clone())?).ok()?;
         Some(Self::Mapped(Part { file: Arc::clone(file), bytes, of: PhantomData }))
     }
 
-    /// The array to be changed, which then is owned.
+    /// The array for changes; becomes owned.
     pub(crate) fn to_mut(&mut self) -> &mut Vec<T> {
         if let Self::Mapped(_) = self {
             *self = Self::Owned(self.to_vec());
@@ -42,7 +42,7 @@ impl<T: Pod> Store<T> {
         }
     }
 
-    /// Bytes of memory of its own.
+    /// Bytes of owned memory.
     pub(crate) fn own_bytes(&self) -> usize {
         match self {
             Self::Owned(elements) => elements.capacity() * size_of::<T>(),

@@ -1,19 +1,19 @@
-//! What a tree holds, as far as it decides which search goes through it.
+//! The properties of a tree that decide how it is searched.
 
 use lumbre_math::DVec3;
 
-/// What is known of all the geometries of a tree.
+/// Properties of all the geometries of a tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Summary {
-    /// Whether it holds nothing but triangles.
+    /// Whether it holds only triangles.
     pub(crate) only_triangles: bool,
-    /// How many instances are around what is innermost.
+    /// Depth of nested instances.
     pub(crate) nesting: u32,
     /// Whether the corners of all triangles are relative to one origin.
     pub(crate) has_one_origin: bool,
-    /// That of the first mesh; a NaN where there is none.
+    /// The origin of the first mesh; NaN without a mesh.
     pub(crate) first_origin: DVec3,
-    /// The sizes of what was put into the tree.
+    /// The sizes of the tree's contents.
     pub(crate) sizes: Sizes,
     /// Whether the centres of all spheres are relative to one origin.
     pub(crate) has_one_cloud_origin: bool,
@@ -21,19 +21,19 @@ pub(crate) struct Summary {
     pub(crate) masks_within: bool,
 }
 
-/// The sizes of what is put into a tree.
+/// The sizes of a tree's contents.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Sizes {
-    /// No corner of a triangle has a larger coordinate, relative to its mesh's origin.
+    /// The largest coordinate of a triangle's corner, relative to its mesh's origin.
     pub(crate) largest_corner: f32,
-    /// No side of the box of a triangle is longer, but for rounding.
+    /// The longest side of a triangle's box, up to rounding.
     pub(crate) longest_side: f32,
-    /// No coordinate of a sphere's centre, relative to its cloud's origin, plus a radius is larger.
+    /// The largest coordinate of a sphere's centre, relative to its cloud's origin, plus a radius.
     pub(crate) sphere_reach: f64,
 }
 
 impl Sizes {
-    /// The larger ones.
+    /// Takes the larger sizes.
     pub(crate) fn grow(&mut self, other: &Self) {
         self.largest_corner = self.largest_corner.max(other.largest_corner);
         self.longest_side = self.longest_side.max(other.longest_side);

@@ -1,59 +1,60 @@
 //! Triangles packed by eight, in blocks of whole cache lines.
 //!
-//! A block that shares its vertices takes three cache lines, one that does not takes five. References in nodes name the line where
-//! the first block of a leaf begins; its other blocks follow. Primitive ids stand in an array of their own, because only the winner
-//! of a search needs them.
+//! A block that shares its vertices takes three cache lines, one that does not takes five. References in nodes hold the
+//! line where the first block of a leaf begins; its other blocks follow. Primitive ids are in an array of their own,
+//! because only the winner of a search needs them.
 //!
-//! Where vertices are shared, a line holds x, the next y and the third z: fourteen numbers between two words of the block's head.
-//! The first four triangles have seven of the vertices and the last four the other seven. AVX2 cannot look up across the middle of a
-//! 256-bit vector quickly, so a line is read as two vectors, and either half of the lanes finds its own in the same half of both:
+//! If vertices are shared, one line holds x, the next y and the third z: fourteen numbers between two words of the
+//! block's head. The first four triangles have seven of the vertices and the last four the other seven. AVX2 cannot
+//! look up across the middle of a 256-bit vector quickly. So a line is read as two vectors, and each half of the lanes
+//! finds its numbers in the same half of both:
 //!
 //! | | first vector | second vector |
 //! |---|---|---|
 //! | first four triangles | 1 to 3 | 8 to 11 |
 //! | last four triangles | 4 to 7 | 12 to 14 |
 //!
-//! Four neighbouring triangles have six vertices as a rule. Which four come first is chosen so that neither half needs more than
-//! seven; where that is not possible, nothing is shared.
+//! Four neighbouring triangles usually have six vertices. The triangles are divided so that neither half needs more
+//! than seven; if that is impossible, nothing is shared.
 
 use bytemuck::{Pod, Zeroable};
 
 use crate::simd;
 use crate::tree::node::{out_of_tree, tag};
-use crate::tree::{BLOCK, Corners, Name};
+use crate::tree::{BLOCK, Corners, PrimitiveId};
 
 /// The primitives of a block.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct BlockNames {
+pub(crate) struct BlockIds {
     /// Positions in the mesh's list.
     pub(crate) primitives: [u32; BLOCK],
     /// Position of the mesh in the tree's list.
     pub(crate) geometry: u32,
 }
 
-impl BlockNames {
-    /// A bit for each lane that is taken.
+impl BlockIds {
+    /// A bit for each used lane.
     pub(crate) fn lanes(&self) -> u32 {
         let lane = |(lane, &primitive): (usize, &u32)| u32::from(primitive != u32::MAX) << lane;
         self.primitives.iter().enumerate().map(lane).sum()
     }
 
-    /// The names in a block without triangles.
+    /// The ids of a block without triangles.
     pub(crate) fn empty(geometry: u32) -> Self {
         Self { primitives: [u32::MAX; BLOCK], geometry }
     }
 
-    /// Of one to eight primitives of one geometry.
-    pub(crate) fn of(names: &[Name]) -> Self {
-        let mut named = Self::empty(names[0][0]);
-        for (place, name) in named.primitives.iter_mut().zip(names) {
+    /// For one to eight primitives of one geometry.
+    pub(crate) fn of(ids: &[PrimitiveId]) -> Self {
+        let mut named = Self::empty(ids[0][0]);
+        for (place, name) in named.primitives.iter_mut().zip(ids) {
             *place = name[1];
         }
         named
     }
 
-    /// The positions of those that are there.
+    /// The positions in used lanes.
     #[inline(always)]
     pub(crate) fn primitives(&self) -> impl Iterator<Item = u32> {
         self.primitives.into_iter().take_while(|&primitive| primitive != u32::MAX)
@@ -65,28 +66,30 @@ impl BlockNames {
 #[repr(C, align(64))]
 pub(crate) struct Line([u32; 16]);
 
-/// What a block says of its triangles, in words between their coordinates.
+/// The head of a block, in words between the coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Head {
-    /// How many blocks there are before this one: the index of its names.
+    /// The number of blocks before this one, which is the index of its ids.
     pub(crate) number: u32,
     /// A bit for each lane that has a triangle.
     pub(crate) taken: u32,
     /// Whether each corner has a vertex of its own.
     pub(crate) is_unshared: bool,
-    /// How many blocks of the same leaf follow.
+    /// Number of blocks of the same leaf that follow.
     pub(crate) followers: u32,
-    /// The vertex of each corner, four bits for each lane. An empty lane has the first vertex of its half; an unshared block has zeros.
+    /// The vertex of each corner, four bits for each lane. An empty lane has the first vertex of its half; an unshared
+    /// block has zeros.
     pub(crate) corners: [u32; 3],
 }
 
-/// Set in words of the head that are read among coordinates: as an `f32` they are never subnormal, which would be slow.
+/// Set in words of the head that are read together with coordinates: as an `f32` they are never subnormal, which would
+/// be slow.
 const NORMAL: u32 = 1 << 30;
-/// The word of the flags: lanes that have a triangle, whether vertices are unshared, and how many blocks follow.
+/// The word of the flags: used lanes, whether vertices are unshared, and how many blocks follow.
 const FLAGS: usize = 0;
 const UNSHARED_AT: u32 = BLOCK as u32;
 const FOLLOWERS_AT: u32 = 16;
-/// The words of the corners, where vertices are shared.
+/// The words of the corners, if vertices are shared.
 const CORNERS: [usize; 3] = [LINE_WORDS, 2 * LINE_WORDS - 1, 2 * LINE_WORDS];
 
 /// The word of the number.
@@ -105,7 +108,7 @@ impl Head {
             number: words[number_at(is_unshared)] & !NORMAL,
             taken: flags & ((1 << BLOCK) - 1),
             is_unshared,
-            followers: flags >> FOLLOWERS_AT & (tag::MOST_BLOCKS - 1),
+            followers: flags >> FOLLOWERS_AT & (tag::MAX_BLOCKS - 1),
             corners: if is_unshared { [0; 3] } else { CORNERS.map(|at| words[at]) },
         }
     }
@@ -124,11 +127,11 @@ impl Head {
     }
 }
 
-/// Half of a block's lanes, and as many numbers as 128 bits hold.
+/// Lanes in half a block; 128 bits hold this many numbers.
 pub(crate) const QUAD: usize = BLOCK / 2;
-/// The most vertices that either half of a block shares.
-pub(crate) const MOST_IN_HALF: usize = 7;
-/// The numbers that a vertex may have in a row of a block that shares them.
+/// Maximum shared vertices of either half of a block.
+pub(crate) const MAX_IN_HALF: usize = 7;
+/// Vertex numbers in a row of a block that shares vertices.
 pub(crate) const SHARED_NUMBERS: usize = 16;
 const SHARED_LINES: usize = 3;
 const UNSHARED_LINES: usize = 5;
@@ -136,25 +139,24 @@ const LINE_WORDS: usize = size_of::<Line>() / size_of::<u32>();
 /// Words of the longer block.
 pub(crate) const BLOCK_WORDS: usize = UNSHARED_LINES * LINE_WORDS;
 
-/// The word where an axis's row begins in a block that shares its vertices: a cache line, of which 1 to 14 are vertices.
+/// The first word of an axis's row in a block that shares vertices: a cache line, of which 1 to 14 are vertices.
 pub(crate) const fn shared_row(axis: usize) -> usize {
     LINE_WORDS * axis
 }
 
-/// The word where an axis's row begins in a block that does not: eight aligned numbers for each corner.
+/// The first word of an axis's row in a block that does not: eight aligned numbers for each corner.
 pub(crate) const fn unshared_row(axis: usize) -> usize {
     BLOCK + 3 * BLOCK * axis
 }
 
 const _: () = assert!(SHARED_NUMBERS == LINE_WORDS && shared_row(3) == SHARED_LINES * LINE_WORDS);
 const _: () = assert!(unshared_row(0) > number_at(true) && unshared_row(3) == BLOCK_WORDS);
-const _: () = assert!(tag::BLOCK_PLACES + tag::MOST_BLOCKS < NORMAL);
-// Lines are numbered by `u32`, and by the place of a reference.
-const _: () =
-    assert!((tag::BLOCK_PLACES + tag::MOST_BLOCKS) as usize * UNSHARED_LINES <= tag::PLACE as usize);
+const _: () = assert!(tag::BLOCK_PLACES + tag::MAX_BLOCKS < NORMAL);
+// Lines are indexed by `u32` and by the index bits of a reference.
+const _: () = assert!((tag::BLOCK_PLACES + tag::MAX_BLOCKS) as usize * UNSHARED_LINES <= tag::PLACE as usize);
 
-/// Up to eight triangles of one mesh: its head, and coordinates relative to the mesh's origin. Where vertices are shared, the last
-/// lines belong to the next block.
+/// Up to eight triangles of one mesh: the head, and coordinates relative to the mesh's origin. If vertices are shared,
+/// the last lines belong to the next block.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(crate) struct TriangleBlock([u32; BLOCK_WORDS]);
@@ -165,17 +167,17 @@ pub(crate) fn vertex_at(head: &Head, corner: usize, lane: usize) -> usize {
     if head.is_unshared { BLOCK * corner + lane } else { shared_vertex(head.corners[corner], lane) }
 }
 
-/// The vertex in a lane, of four bits for each.
+/// The vertex in a lane, from four bits for each lane.
 #[inline(always)]
 fn shared_vertex(corners: u32, lane: usize) -> usize {
     (corners >> (4 * lane)) as usize % SHARED_NUMBERS
 }
 
-/// The number of a vertex of one half of a block that shares them, counted from 0 there.
+/// The number of a vertex of one half, counted from 0 there, in a block that shares vertices.
 #[inline(always)]
 pub(crate) fn shared_number(half: usize, index: u32) -> u32 {
     let number = [1, QUAD as u32][half] + index;
-    // Behind those in the first vector stand those of the other half.
+    // Vertices that do not fit the first vector follow those of the other half.
     let is_far = number >= (QUAD * (half + 1)) as u32;
     number + QUAD as u32 * u32::from(is_far)
 }
@@ -185,7 +187,7 @@ fn is_within_reach(lane: usize, number: usize) -> bool {
     number / QUAD % 2 == lane / QUAD && number != 0 && number != SHARED_NUMBERS - 1
 }
 
-/// Where an axis's row begins in a block.
+/// The start of an axis's row in a block.
 #[inline(always)]
 pub(crate) fn row(is_unshared: bool, axis: usize) -> usize {
     if is_unshared { unshared_row(axis) } else { shared_row(axis) }
@@ -196,7 +198,7 @@ pub(crate) const fn lines_of(is_unshared: bool) -> usize {
 }
 
 impl TriangleBlock {
-    /// The index of its names.
+    /// The index of its ids.
     #[inline(always)]
     pub(crate) fn number(&self) -> u32 {
         self.0[number_at(self.is_unshared())] & !NORMAL
@@ -214,16 +216,16 @@ impl TriangleBlock {
         self.0[FLAGS] >> UNSHARED_AT & 1 != 0
     }
 
-    /// How many blocks of the same leaf follow.
+    /// Number of blocks of the same leaf that follow.
     #[inline(always)]
     fn followers(&self) -> u32 {
-        self.0[FLAGS] >> FOLLOWERS_AT & (tag::MOST_BLOCKS - 1)
+        self.0[FLAGS] >> FOLLOWERS_AT & (tag::MAX_BLOCKS - 1)
     }
 
-    /// The vertex of each corner, four bits for each lane, where vertices are shared.
+    /// The vertex of each corner, four bits for each lane, if vertices are shared.
     #[inline(always)]
     pub(crate) fn corners(&self) -> [u32; 3] {
-        // No `map`: it would not take on the instruction set of its caller.
+        // No closures: they do not inherit target features.
         [self.0[CORNERS[0]], self.0[CORNERS[1]], self.0[CORNERS[2]]]
     }
 
@@ -233,7 +235,7 @@ impl TriangleBlock {
         bytemuck::cast_ref(self)
     }
 
-    /// The vertices of the corners in a lane, as their numbers in a row: below 16, or below 24 where they are not shared.
+    /// The vertices of the corners in a lane, as their numbers in a row: below 16, or below 24 if they are not shared.
     #[inline(always)]
     pub(crate) fn vertices_at(&self, lane: usize) -> [usize; 3] {
         let lane = lane % BLOCK;
@@ -255,14 +257,14 @@ impl TriangleBlock {
         (0..BLOCK).filter(|lane| self.taken() >> lane & 1 != 0).map(|lane| self.triangle(lane))
     }
 
-    /// The corners of its triangles, where each has a vertex of its own.
+    /// The corners of the triangles, if each has a vertex of its own.
     #[inline(always)]
     pub(crate) fn own_corners(&self) -> &Corners {
         let own = self.words()[unshared_row(0)..].first_chunk::<{ 9 * BLOCK }>();
         bytemuck::cast_ref(own.expect("a block is as long"))
     }
 
-    /// Prefetches it.
+    /// Prefetches the block.
     #[inline(always)]
     pub(crate) fn fetch(&self) {
         let lines: &[Line; UNSHARED_LINES] = bytemuck::cast_ref(self);
@@ -275,13 +277,13 @@ impl TriangleBlock {
         self.followers() == 0
     }
 
-    /// Where the block behind it begins, if this one begins at `place`.
+    /// The line after this block, if the block begins at `place`.
     #[inline(always)]
     pub(crate) fn place_behind(&self, place: u32) -> u32 {
         place + lines_of(self.is_unshared()) as u32
     }
 
-    /// Where the next block of its leaf begins, if this one begins at `place`.
+    /// The start of the next block of its leaf, if this one begins at `place`.
     #[inline(always)]
     pub(crate) fn next(&self, place: u32) -> Option<u32> {
         (!self.is_last()).then(|| self.place_behind(place))
@@ -305,10 +307,10 @@ impl<'a> Blocks<'a> {
         Some(bytemuck::cast_ref::<[Line; UNSHARED_LINES], TriangleBlock>(lines.try_into().ok()?))
     }
 
-    /// The same, for a reference in the tree.
+    /// The block of a reference in the tree.
     ///
     /// # Panics
-    /// When there is none.
+    /// If there is no such block.
     #[inline(always)]
     pub(crate) fn block(self, place: u32) -> &'a TriangleBlock {
         match self.at(place) {
@@ -334,7 +336,7 @@ impl<'a> Blocks<'a> {
         })
     }
 
-    /// How many blocks of its leaf follow each of the first `count`.
+    /// How many blocks of its leaf follow each of the first `count` blocks.
     pub(crate) fn followers(self, count: usize) -> Vec<u8> {
         let mut followers = Vec::with_capacity(count);
         let mut place = 0;
@@ -347,16 +349,16 @@ impl<'a> Blocks<'a> {
         followers
     }
 
-    /// Where every block begins, if they are such as [`pack`] makes of so many names.
-    pub(crate) fn places(self, names: &[BlockNames]) -> Option<Vec<u32>> {
-        let mut places = Vec::with_capacity(names.len());
+    /// The line where every block begins, for blocks that [`pack`] makes of these ids.
+    pub(crate) fn places(self, ids: &[BlockIds]) -> Option<Vec<u32>> {
+        let mut places = Vec::with_capacity(ids.len());
         let (mut place, mut followers) = (0, 0);
-        for (number, names) in names.iter().enumerate() {
+        for (number, ids) in ids.iter().enumerate() {
             let block = self.at(place)?;
             let head = Head::of(&block.0);
             let mut same = *block;
             head.put(&mut same.0);
-            let named = names.primitives.iter().enumerate();
+            let named = ids.primitives.iter().enumerate();
             let named = named.fold(0, |lanes, (lane, &name)| lanes | u32::from(name != u32::MAX) << lane);
             let are_there = |lane: usize| block.vertices_at(lane).iter().all(|&v| is_within_reach(lane, v));
             let is_sound = same.0 == block.0
@@ -371,10 +373,10 @@ impl<'a> Blocks<'a> {
             places.push(place);
             place = block.place_behind(place);
         }
-        let all = if names.is_empty() { 0 } else { place as usize + MARGIN };
+        let all = if ids.is_empty() { 0 } else { place as usize + MARGIN };
         (followers == 0 && self.0.len() == all).then_some(places)
     }
 }
 
-/// Lines behind the last block, so that it can be read as the longer one.
+/// Lines after the last block, so that it can be read as the longer one.
 pub(crate) const MARGIN: usize = UNSHARED_LINES - SHARED_LINES;

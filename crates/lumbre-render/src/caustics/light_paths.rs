@@ -1,9 +1,9 @@
-//! Paths of light over mirrors and smooth glass, to the first surfaces that scatter it otherwise.
+//! Light paths over mirrors and smooth glass to the first non-specular surfaces.
 //!
-//! They do not begin at lights, for most of what lights send out meets nothing specular. They begin on what is specular: lines that are
-//! even over all lines through a sphere around it meet its surfaces in points that are even over their area (M. W. Crofton, "On the Theory
-//! of Local Probability", 1868). From each such point a light is sampled, as from any other point that is shaded, and followed over the
-//! specular bounces that begin there.
+//! They do not start at lights, because most of a light's emission meets nothing specular. They start on specular
+//! objects: lines that are uniform over all lines through a sphere meet the surfaces in it in points that are uniform
+//! over their area (M. W. Crofton, "On the Theory of Local Probability", 1868). At each such point a light is sampled,
+//! as at any other shaded point, and followed over the specular bounces that start there.
 
 use std::f64::consts::TAU;
 use std::ops::{ControlFlow, Range};
@@ -17,46 +17,48 @@ use smallvec::SmallVec;
 
 use super::photons::Photon;
 use crate::transport::direct::{Bounce, Vertex};
-use crate::transport::interior::Interiors;
-use crate::transport::{Draw, Sampler};
+use crate::transport::interior::MediumStack;
+use crate::transport::{SampleNumbers, Sampler};
 use crate::wave::paths::{of_column, sides, to_column};
 
-/// Random numbers of a vertex of the first light path of a line; those of each further one follow after so many vertices.
+/// Number of random vertices per light path; the first path of a line starts at 0.
 const VERTICES_A_PATH: u32 = 1 << 10;
-/// Points on a line that light paths begin in, at most.
+/// Maximum starting points on a line.
 const MAX_POINTS: u32 = 64;
-/// A ray meets a point where it comes as near to it as this, relative to the size of its coordinates and to the length of the ray.
+/// A ray reaches a point if it comes this near to it, relative to the size of its coordinates and to the length of the
+/// ray.
 const NEARLY_THERE: f64 = 1e-7;
-/// Bounces that every light path may take before Russian roulette.
+/// Minimum bounces before Russian roulette.
 const ROULETTE_START: u32 = 6;
 
-/// Where light paths begin: on surfaces in spheres that may overlap.
+/// The starting points of light paths: on surfaces in spheres that may overlap.
 #[derive(Debug)]
 pub(crate) struct ChordSampler<'s> {
     spheres: &'s [BoundingSphere],
-    /// 2π times the sum of the squares of all radii: the inverse of the density of a point in one sphere, per line and area.
+    /// 2π times the sum of the squares of all radii: the inverse of the density of a point in one sphere, per line and
+    /// area.
     whole: f64,
 }
 
 impl<'s> ChordSampler<'s> {
-    /// On what is specular in a scene; `None` where nothing is.
+    /// For the specular objects of a scene; `None` without any.
     pub(crate) fn new(scene: &'s Scene) -> Option<Self> {
         Self::within(scene.specular_spheres())
     }
 
-    /// In some spheres; `None` where these have no volume.
+    /// For these spheres; `None` if they have no volume.
     pub(crate) fn within(spheres: &'s [BoundingSphere]) -> Option<Self> {
         let squares: f64 = spheres.iter().map(|sphere| sphere.radius * sphere.radius).sum();
         (squares > 0.0 && squares.is_finite()).then_some(Self { spheres, whole: TAU * squares })
     }
 
-    /// The number of points that a line begins light paths in, per unit of area of a surface there.
+    /// The number of light paths that a line starts per unit of surface area at this point.
     pub(crate) fn density(&self, point: DVec3) -> f64 {
         self.spheres.iter().filter(|sphere| sphere.contains(point)).count() as f64 / self.whole
     }
 
-    /// The line of a draw: the chord of a sphere. The probability of a sphere is that of its share of [`ChordSampler::whole`].
-    fn line(&self, draw: &Draw) -> Ray {
+    /// The line of a sample: the chord of a sphere, chosen by its share of [`ChordSampler::whole`].
+    fn line(&self, draw: &SampleNumbers) -> Ray {
         let mut left = f64::from(draw.survival(0)) * self.whole / TAU;
         let is_chosen = |sphere: &&BoundingSphere| {
             left -= sphere.radius * sphere.radius;
@@ -68,7 +70,7 @@ impl<'s> ChordSampler<'s> {
         let offset = sphere.radius * warp64::square_to_disk(draw.filter());
         let half = (sphere.radius * sphere.radius - offset.length_squared()).max(0.0).sqrt();
         let middle = sphere.center + offset.x * across + offset.y * up;
-        // No farther than the sphere, or points outside it would count more often than their density says.
+        // Clipped to the sphere: points outside would be counted more often than their density.
         Ray::new(middle - half * direction, direction).with_range(0.0, 2.0 * half)
     }
 }
@@ -82,37 +84,39 @@ pub(crate) struct LightTracer<'s> {
     pub(crate) normals: ShadingNormals,
     /// Specular bounces at most.
     pub(crate) max_bounces: u32,
-    /// Whether light that goes straight on through panes is found by other means, too: that of points and in one direction.
+    /// Whether light straight through panes is found by other strategies too: that of point lights and of lights in one
+    /// direction.
     pub(crate) goes_straight_on: bool,
 }
 
-/// Light that arrives at a surface straight from a lamp.
+/// Light that arrives at a surface directly from a lamp.
 struct Lit<'s> {
     sample: LightSample,
     /// From the lamp.
     ray: Ray,
     here: Interaction<'s>,
-    /// The density with which the lamp was sampled, per unit solid angle; infinite for light from points and in one direction.
+    /// The density with which the lamp was sampled, per unit solid angle; infinite for point lights and lights in one
+    /// direction.
     pdf: f64,
-    /// The power, of one line.
+    /// The power, per line.
     flux: Spectrum,
 }
 
-/// A light path on its way.
+/// An active light path.
 struct LightPath<'s> {
-    interiors: Interiors<'s>,
+    interiors: MediumStack<'s>,
     medium: Option<MediumId>,
-    /// The power that it carries, of one line; and the greatest of its channels where it began.
+    /// Its power, per line; and its greatest channel at the start.
     flux: Spectrum,
     flux_at_start: f32,
     density: f64,
-    /// The solid angle of the lamp where the path began; its area across the path, unless it is infinitely far away; and the length of the
-    /// path so far, from the lamp on.
+    /// The solid angle of the lamp at the start of the path; its area across the path, unless it is at infinity; and
+    /// the length of the path so far, including the segment from the lamp.
     lamp: f64,
     lamp_area: Option<f64>,
     length: f64,
     bounces: u32,
-    /// Whether it can be found by other means so far.
+    /// Whether other strategies can find it so far.
     is_straight: bool,
 }
 
@@ -126,7 +130,7 @@ impl<'s> LightTracer<'s> {
         }
     }
 
-    /// The power, of one line, that comes straight from lamps to surfaces that are not specular, by some lines.
+    /// The power, per line, of light directly from lamps on non-specular surfaces.
     pub(crate) fn direct_power(&self, pass: u32, lines: Range<u32>) -> f64 {
         let count = f64::from(lines.end - lines.start);
         let mut sum = 0.0;
@@ -139,16 +143,16 @@ impl<'s> LightTracer<'s> {
         sum / count
     }
 
-    /// Visits the points in which a line meets surfaces that may be specular, or those that surely are not, each with its random numbers,
-    /// the first vertex that they are of, and the time.
+    /// Visits the points in which a line meets surfaces that may be specular, or those that certainly are not. Each has
+    /// its random numbers, the first vertex of these, and the time.
     fn each_point(
         &self,
         pass: u32,
         line: u32,
         are_specular: bool,
-        mut visit: impl FnMut(DVec3, &Draw, u32, f64),
+        mut visit: impl FnMut(DVec3, &SampleNumbers, u32, f64),
     ) {
-        // No pixel is there.
+        // Not a pixel of any picture.
         let draw = self.sampler.draw(u32::MAX, pass, line);
         let time = self.view.time(draw.time());
         let chord = self.chords.line(&draw).at_time(time);
@@ -163,13 +167,13 @@ impl<'s> LightTracer<'s> {
     }
 
     /// Follows light that arrives at a point of a surface.
-    fn begin(&self, point: DVec3, time: f64, draw: &Draw, vertex: u32, photons: &mut Vec<Photon>) {
+    fn begin(&self, point: DVec3, time: f64, draw: &SampleNumbers, vertex: u32, photons: &mut Vec<Photon>) {
         let Some(Lit { sample, ray, here, pdf, flux }) = self.light(point, time, draw, vertex) else {
             return;
         };
         let length = point.distance(ray.origin);
         let mut path = LightPath {
-            interiors: Interiors::default(),
+            interiors: MediumStack::default(),
             medium: None,
             flux,
             flux_at_start: flux.max_component(),
@@ -185,7 +189,7 @@ impl<'s> LightTracer<'s> {
     }
 
     /// The light of one sample that arrives at a point of a surface on a line.
-    fn light(&self, point: DVec3, time: f64, draw: &Draw, vertex: u32) -> Option<Lit<'s>> {
+    fn light(&self, point: DVec3, time: f64, draw: &SampleNumbers, vertex: u32) -> Option<Lit<'s>> {
         let (choose, u) = (draw.light_choice(vertex), draw.light_point(vertex));
         let sample = self.scene.sample_light(point, DVec3::ZERO, time, choose, u)?;
         let ray = self.ray_to(point, &sample).at_time(time);
@@ -193,7 +197,7 @@ impl<'s> LightTracer<'s> {
         let here = self.scene.interaction(&ray, &hit, &Footprint::Point);
         let size = point.abs().max_element() + (point - ray.origin).length();
         if here.surface.point.distance(point) > NEARLY_THERE * size {
-            // Something is in the way.
+            // Occluded.
             return None;
         }
         let (pdf, share) = match sample.scatter {
@@ -222,10 +226,16 @@ impl<'s> LightTracer<'s> {
         Ray::new(origin, (point - origin).normalize_or_zero())
     }
 
-    /// What is left of the light on its way to the first surface, and the medium there.
-    fn arrive(&self, path: &mut LightPath<'s>, sample: &LightSample, here: &Interaction<'s>, draw: &Draw) {
+    /// The transmittance of the light's way to the first surface, and the medium there.
+    fn arrive(
+        &self,
+        path: &mut LightPath<'s>,
+        sample: &LightSample,
+        here: &Interaction<'s>,
+        draw: &SampleNumbers,
+    ) {
         path.interiors.arrive(here, here.resolved());
-        // Light from infinitely far away was not inside anything.
+        // Light from infinity was not inside any solid.
         if let Some(end) = sample.end {
             path.flux *= path.interiors.transmittance(end.point.distance(here.surface.point));
         }
@@ -247,7 +257,7 @@ impl<'s> LightTracer<'s> {
         mut path: LightPath<'s>,
         mut ray: Ray,
         mut here: Interaction<'s>,
-        draw: &Draw,
+        draw: &SampleNumbers,
         first: u32,
         photons: &mut Vec<Photon>,
     ) {
@@ -294,7 +304,7 @@ impl<'s> LightTracer<'s> {
         }
     }
 
-    /// The bounce that a light path takes at a vertex, chosen by the power of each; `None` where it ends.
+    /// The bounce of a light path at a vertex, chosen by power; `None` if the path ends.
     fn bounce(
         &self,
         path: &mut LightPath<'s>,
@@ -302,7 +312,7 @@ impl<'s> LightTracer<'s> {
         lobe: f32,
         survival: f32,
     ) -> Option<Bounce> {
-        // Weights are those of radiance, which refraction squeezes; power it does not.
+        // Weights are those of radiance, which refraction concentrates; power is unchanged.
         let power = |part: &Bounce| part.weight * if part.transmitted { part.eta * part.eta } else { 1.0 };
         let parts: SmallVec<[Bounce; 3]> = vertex.specular().collect();
         let sum: f32 = parts.iter().map(|part| power(part).max_component()).sum();
@@ -326,13 +336,13 @@ impl<'s> LightTracer<'s> {
         Some(part)
     }
 
-    /// A photon at a random point along a light path's next ray, where that is in a medium and before what the ray meets. As many are within
-    /// the [`typical_way`] as beyond it.
+    /// A photon at a random point on a light path's next segment, if that is in a medium. Half of the points are nearer
+    /// than the [`typical_way`].
     fn photon_in_medium(
         &self,
         path: &LightPath<'s>,
         segment: &Ray,
-        draw: &Draw,
+        draw: &SampleNumbers,
         vertex: u32,
     ) -> Option<Photon> {
         if path.interiors.attenuates() {
@@ -363,8 +373,8 @@ impl<'s> LightTracer<'s> {
         (!photon.flux.is_black() && photon.flux.is_finite()).then_some(photon)
     }
 
-    /// Takes a light path through media along its next segment.
-    fn cross_media(&self, path: &mut LightPath<'s>, segment: &Ray, draw: &Draw) {
+    /// Traces a light path through media along its next segment.
+    fn cross_media(&self, path: &mut LightPath<'s>, segment: &Ray, draw: &SampleNumbers) {
         path.flux *= self.scene.transmittance(path.medium, segment, draw.along(segment), None);
         let mut crossings = Vec::new();
         self.scene.crossings(segment, &mut crossings);
@@ -375,13 +385,13 @@ impl<'s> LightTracer<'s> {
 }
 
 impl LightPath<'_> {
-    /// About the solid angle of the lamp, seen over a way of a length.
+    /// Approximate solid angle of the lamp, from this distance.
     fn lamp_seen(&self, length: f64) -> f32 {
         self.lamp_area.map_or(self.lamp, |area| area / (length * length)) as f32
     }
 }
 
-/// A typical length of a way between two surfaces of a scene: a quarter of its diagonal.
+/// A typical distance between two surfaces of a scene: a quarter of its diagonal.
 pub(crate) fn typical_way(scene: &Scene) -> f64 {
     let bounds = scene.bounds();
     if bounds.is_empty() { 1.0 } else { bounds.size().length() / 4.0 }

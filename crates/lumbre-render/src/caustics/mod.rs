@@ -1,7 +1,7 @@
-//! Photons for caustics: light that comes from lamps over mirrors and smooth glass, which paths from the camera hardly ever find.
+//! Photons for caustics: light from lamps over mirrors and smooth glass, which camera paths hardly ever find.
 //!
-//! A pass of light paths belongs to a few samples of every pixel, and is a function of scene, options, seed and its number. Whoever needs a
-//! pass first traces it; all who need it meanwhile help.
+//! A pass of light paths serves a few samples of every pixel, and is a function of the scene, the options, the seed and
+//! its number. The first thread that needs a pass traces it; other threads that need it help.
 
 mod light_paths;
 mod merging;
@@ -17,14 +17,14 @@ pub(crate) use merging::{Merging, radius};
 pub(crate) use photons::{Photon, Photons};
 pub use share::caustic_share;
 
-/// Samples of a pixel that a pass of light paths is for.
+/// Samples per pixel that share a pass of light paths.
 pub(crate) const SAMPLES_A_PASS: u32 = 4;
-/// Lines that light paths of a pass begin on: one for each pixel, within these limits.
+/// Lines of a pass: one for each pixel, within these limits.
 const MIN_LINES: u32 = 1 << 12;
 const MAX_LINES: u32 = 1 << 18;
-/// Pieces of a pass that threads trace by themselves.
+/// Pieces of a pass, each traced by one thread.
 const PIECES: u32 = 32;
-/// Passes that are kept: those of the samples that a render takes between two looks at its noise.
+/// Passes that are kept: those of the samples between two noise checks.
 const KEPT: usize = 8;
 
 /// The lines of a pass for a picture of a size.
@@ -32,21 +32,21 @@ pub(crate) fn lines_of(width: u32, height: u32) -> u32 {
     width.saturating_mul(height).clamp(MIN_LINES, MAX_LINES)
 }
 
-/// Bytes that the passes of a picture of a size may take. A line may begin several light paths, and most begin none.
+/// Memory bound of the passes for a picture of a size. A line may start several light paths, but most start none.
 pub(crate) fn memory_bytes(width: u32, height: u32) -> u64 {
     KEPT as u64 * u64::from(lines_of(width, height)) * 2 * size_of::<Photon>() as u64
 }
 
-/// The passes of a render that are at hand.
+/// The cached passes of a render.
 #[derive(Debug, Default)]
 pub(crate) struct Passes {
     kept: Mutex<Vec<(Key, Arc<Pass>)>>,
 }
 
-/// What passes are told apart by: the size of the picture, and their number.
+/// The key of a pass: the size of the picture, and its number.
 type Key = ([u32; 2], u32);
 
-/// A pass, as threads trace it.
+/// A pass while threads trace it.
 #[derive(Debug, Default)]
 struct Pass {
     next_piece: AtomicU32,
@@ -62,7 +62,7 @@ struct State {
 }
 
 impl Passes {
-    /// The photons of a pass of a picture of a size, traced where they are not at hand.
+    /// The photons of a pass for a picture of a size; traced if they are not cached.
     pub(crate) fn get(&self, tracer: &LightTracer<'_>, size: [u32; 2], number: u32) -> Arc<Photons> {
         let pass = self.find((size, number));
         pass.help(tracer, lines_of(size[0], size[1]), number);
@@ -88,12 +88,12 @@ impl Pass {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Traces pieces until none is left to begin.
+    /// Traces pieces until all have been started.
     fn help(&self, tracer: &LightTracer<'_>, lines: u32, number: u32) {
         loop {
             let piece = self.next_piece.fetch_add(1, Ordering::Relaxed);
             if piece >= PIECES {
-                // Not so often that it begins anew.
+                // Keeps the counter from wrapping around.
                 self.next_piece.store(PIECES, Ordering::Relaxed);
                 return;
             }
@@ -105,7 +105,7 @@ impl Pass {
         }
     }
 
-    /// Hands in a piece; the last one completes the pass.
+    /// Completes a piece; the last one completes the pass.
     fn put(&self, piece: u32, photons: Vec<Photon>) {
         let mut state = self.state();
         state.pieces.resize(PIECES as usize, None);
@@ -129,7 +129,7 @@ impl Pass {
     }
 }
 
-/// A piece that is being traced. Where that panics, nobody waits for it in vain.
+/// A piece that is being traced. A panic releases the threads that wait for it.
 struct Attempt<'a> {
     pass: &'a Pass,
 }

@@ -1,9 +1,9 @@
-//! Photons in k-d trees: where light that came over mirrors and glass falls on something that scatters it.
+//! Photons in k-d trees: caustic light at its first non-specular surface.
 
 use lumbre_math::{DVec3, Vec3};
 use lumbre_shading::Spectrum;
 
-/// Light that falls on a surface, or that goes through a point of a medium.
+/// Light that falls on a surface, or passes a point of a medium.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Photon {
     /// The place.
@@ -12,14 +12,15 @@ pub(crate) struct Photon {
     pub(crate) towards: Vec3,
     /// The unit geometric normal on that side; zero in a medium.
     pub(crate) normal: Vec3,
-    /// The medium that it is in, as [`crate::wave::paths::to_column`] writes it; of no meaning on a surface.
+    /// The medium that contains it, as [`crate::wave::paths::to_column`] writes it; undefined on a surface.
     pub(crate) medium: u32,
-    /// The power that it stands for, on a surface; in a medium that power over the density of its place along the way.
+    /// Its power on a surface; in a medium, its power over the density of its position along the segment.
     pub(crate) flux: Spectrum,
-    /// The density with which light paths begin at the specular surface next to the light and choose that light: per unit of area and
-    /// solid angle, of one line. Infinite for light that no path from the camera finds.
+    /// The density with which light paths start at the specular surface next to the light and choose that light: per
+    /// unit of area and solid angle, per line. Infinite for light that no camera path finds.
     pub(crate) density: f32,
-    /// About the solid angle that the lamp has, seen from here over the specular surfaces; 0 for light from points and in one direction.
+    /// Approximate solid angle of the lamp, seen over the specular surfaces; 0 for point lights and lights in one
+    /// direction.
     pub(crate) lamp: f32,
     /// Specular bounces on its way.
     pub(crate) bounces: u32,
@@ -42,14 +43,14 @@ impl Photons {
     }
 }
 
-/// Photons laid out as a k-d tree: the middle of a range divides it, along the axis that its node names (J. L. Bentley,
+/// Photons in a k-d tree: the middle of a range splits it, along the axis stored for its node (J. L. Bentley,
 /// "Multidimensional Binary Search Trees Used for Associative Searching", 1975).
 ///
-/// The tree depends on the photons and their order alone, and so does the order in which a search finds them.
+/// The tree and the order of a search depend only on the photons and their order.
 #[derive(Debug, Default)]
 pub(crate) struct PhotonMap {
     photons: Vec<Photon>,
-    /// The axis at which each photon divides its range.
+    /// The split axis of each photon.
     axes: Vec<u8>,
 }
 
@@ -67,7 +68,7 @@ impl PhotonMap {
             let part = &mut numbered[range.clone()];
             let axis = longest_axis(part);
             let middle = part.len() / 2;
-            // Numbers make the order total, so that the halves are the same however they are found.
+            // Indices make the order total, so that the halves do not depend on the algorithm.
             part.select_nth_unstable_by(middle, |(i, a), (j, b)| {
                 a.point[axis].total_cmp(&b.point[axis]).then(i.cmp(j))
             });
@@ -80,7 +81,7 @@ impl PhotonMap {
 
     /// Visits all photons within `radius` of a point, always in the same order.
     pub(crate) fn within(&self, center: DVec3, radius: f64, mut visit: impl FnMut(&Photon)) {
-        // The tree of 2³² photons is 32 nodes high.
+        // A tree of 2³² photons has depth 32.
         let mut open = [(0, 0); 33];
         open[0] = (0, self.photons.len());
         let mut count = 1;
@@ -110,7 +111,7 @@ impl PhotonMap {
     }
 }
 
-/// The axis along which photons are spread most.
+/// The axis of the photons' largest extent.
 fn longest_axis(photons: &[(u32, Photon)]) -> usize {
     let first = photons[0].1.point;
     let (min, max) = photons

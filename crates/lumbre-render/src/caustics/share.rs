@@ -1,4 +1,4 @@
-//! How much of a scene's light paths hardly find.
+//! The share of a scene's light that paths hardly find.
 
 use lumbre_math::Vec3;
 use lumbre_scene::{BoundingSphere, Scene, View};
@@ -11,12 +11,12 @@ use crate::{RenderError, RenderOptions};
 const LINES: u32 = 1 << 12;
 /// A lamp of this solid angle is found by about one in a thousand diffuse bounces.
 const SMALL: f32 = 0.003;
-/// The pass of the trial: none of a picture.
+/// The pass of the trial; no picture uses it.
 const PASS: u32 = u32::MAX;
 
-/// An estimate of the share of all light from lamps on surfaces that comes over mirrors and smooth glass from lamps so small that paths
-/// hardly find them, or never: what [`crate::integrators::Caustics`] is for. In [0, 1], by a trial of a few thousand light paths; the same
-/// for the same scene, camera and seed.
+/// An estimate of the share of all light from lamps on surfaces that arrives over mirrors and smooth glass from lamps
+/// so small that paths hardly or never find them: the light that [`crate::integrators::Caustics`] is for. In [0, 1],
+/// from a trial of a few thousand light paths; the same for the same scene, camera and seed.
 ///
 /// # Errors
 /// As for [`RenderOptions::camera_of`].
@@ -35,7 +35,7 @@ pub fn caustic_share(scene: &Scene, options: &RenderOptions) -> Result<f64, Rend
         sampler: Sampler::new(&options.sampler),
         normals: options.integrator.shading_normals,
         max_bounces: options.integrator.max_depth.saturating_sub(1),
-        goes_straight_on: scene.lets_light_straight_on(),
+        goes_straight_on: scene.has_delta_transmission(),
     };
     let mut photons = Vec::new();
     tracer(&chords).trace(PASS, 0..LINES, &mut photons);

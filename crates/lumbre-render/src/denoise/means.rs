@@ -58,7 +58,7 @@ pub(super) const REACH: usize = RADIUS as usize + PATCH;
 const STRENGTH_SQUARED: f32 = 0.36;
 
 /// Added to variances, so that two pixels without noise that differ are different.
-const LEAST_VARIANCE: f32 = 1e-12;
+const MIN_VARIANCE: f32 = 1e-12;
 
 /// Nearly exp(-x), and exactly 0 from 4 on.
 #[inline(always)]
@@ -271,7 +271,7 @@ fn compare_light(half: &[Vec<f32>; 3], variance: &[f32], p: usize, q: usize, out
     for x in 0..span {
         let (r, g, b) = (pr[x] - qr[x], pg[x] - qg[x], pb[x] - qb[x]);
         let noise = vp[x] + smaller(vp[x], vq[x]);
-        out[x] = (r * r + g * g + b * b - noise) / (LEAST_VARIANCE + STRENGTH_SQUARED * (vp[x] + vq[x]));
+        out[x] = (r * r + g * g + b * b - noise) / (MIN_VARIANCE + STRENGTH_SQUARED * (vp[x] + vq[x]));
     }
 }
 

@@ -18,14 +18,14 @@ use crate::workers::Workers;
 use crate::{CancelToken, PixelBounds, Rendered};
 
 /// Reflectance below which light is not divided by it.
-const LEAST_REFLECTANCE: f32 = 0.01;
+const MIN_REFLECTANCE: f32 = 0.01;
 /// Ground in a pixel below which its share of shadow is not known.
-const LEAST_GROUND: f32 = 1e-3;
+const MIN_GROUND: f32 = 1e-3;
 
 /// Columns and rows of the blocks that a picture is filtered in.
 const BLOCK: (usize, usize) = (256, 64);
 
-/// Bytes that the filter needs for a picture of so many pixels, on so many threads: the denoised picture, and for each thread the planes of
+/// Bytes that the filter needs for a picture of this many pixels, on this many threads: the denoised picture, and for each thread the planes of
 /// a block.
 pub(crate) fn memory_bytes(pixels: u64, threads: usize) -> u64 {
     // Colours, coverage by colour, alpha.
@@ -46,7 +46,7 @@ pub struct Denoised {
     pub coverage: Option<Image>,
 }
 
-/// Takes the noise out of a picture that was rendered with [`crate::RenderOptions::guides`], on so many threads, 0 for one a core; the
+/// Takes the noise out of a picture that was rendered with [`crate::RenderOptions::guides`], on this many threads, 0 for one a core; the
 /// pixels do not depend on it. `None` where there are no guides, and where there is no whole picture.
 ///
 /// Pixels whose samples all agree, and that look like no other, stay as they are. Coverage is filtered only where the ground catches
@@ -192,18 +192,18 @@ impl Noisy<'_> {
 
         // Where a picture is transparent, there is no light of what lets one through.
         let is_everywhere = self.image.alpha().is_none();
-        let kind = Kind { least: LEAST_REFLECTANCE, is_everywhere, is_single };
+        let kind = Kind { least: MIN_REFLECTANCE, is_everywhere, is_single };
         let layer = planes::layer(&guides, size, |guide| &guide.light, kind);
         let light = means::filter(&layer, &surfaces, columns.clone(), rows.clone(), cancel);
         for (i, (guide, place)) in places().enumerate() {
-            let colour = |c: usize| light[c][i] * share(guide.count, &guide.light, c, LEAST_REFLECTANCE);
+            let colour = |c: usize| light[c][i] * share(guide.count, &guide.light, c, MIN_REFLECTANCE);
             band.pixels[place] = Rgb::new(colour(0), colour(1), colour(2));
         }
         if band.coverage.is_empty() {
             return;
         }
 
-        let kind = Kind { least: LEAST_GROUND, is_everywhere: false, is_single };
+        let kind = Kind { least: MIN_GROUND, is_everywhere: false, is_single };
         let layer = planes::layer(&guides, size, |guide| &guide.shadow, kind);
         let shadow = means::filter(&layer, &surfaces, columns, rows, cancel);
         let first = (band.y0 - self.bounds.y0) as usize * self.bounds.width() as usize;
@@ -215,8 +215,8 @@ impl Noisy<'_> {
             };
             // What is not ground, and covers as it did, and what is.
             let channel = |c: usize, before: f32| {
-                let ground = share(guide.count, &guide.shadow, c, LEAST_GROUND);
-                let rest = before - guide.shadow.value(c, guide.count, LEAST_GROUND) * ground;
+                let ground = share(guide.count, &guide.shadow, c, MIN_GROUND);
+                let rest = before - guide.shadow.value(c, guide.count, MIN_GROUND) * ground;
                 let now = if guide.count.samples > 0 { rest + shadow[c][i] * ground } else { before };
                 now.clamp(0.0, 1.0)
             };

@@ -81,7 +81,7 @@ pub(super) fn layer<const UNDER: usize>(
 
 /// Pixels around one in which the other half says how bright it may be.
 const OUTLIER_RADIUS: usize = 5;
-/// A pixel of one half that is brighter than so many pixels of that neighbourhood in the other half is an outlier: a fifth of its
+/// A pixel of one half that is brighter than this many pixels of that neighbourhood in the other half is an outlier: a fifth of its
 /// 121 pixels.
 const OUTLIER: f32 = 24.0;
 /// Unless the other half has nearly as much beside it.
@@ -148,20 +148,20 @@ pub(super) fn surfaces(guides: &[GuideSums], size: (usize, usize)) -> Vec<Group>
         Group { planes, variance, sharpness }
     };
     vec![
-        group(0, &|_| LEAST_ALBEDO),
-        group(1, &|_| LEAST_NORMAL),
-        group(2, &|i| (LEAST_DEPTH * guides[i].feature(6)).powi(2).max(f32::MIN_POSITIVE)),
+        group(0, &|_| MIN_ALBEDO),
+        group(1, &|_| MIN_NORMAL),
+        group(2, &|i| (MIN_DEPTH * guides[i].feature(6)).powi(2).max(f32::MIN_POSITIVE)),
     ]
 }
 
 /// Differences of features are compared with this many standard deviations, or slopes.
 const STRENGTH: f32 = 1.0;
 /// The square of a difference of albedo, over three channels, that says little: textures are divided out.
-const LEAST_ALBEDO: f32 = 0.01;
+const MIN_ALBEDO: f32 = 0.01;
 /// The square of a difference of normals.
-const LEAST_NORMAL: f32 = 0.01;
+const MIN_NORMAL: f32 = 0.01;
 /// A difference of depth, as a share of it.
-const LEAST_DEPTH: f32 = 0.01;
+const MIN_DEPTH: f32 = 0.01;
 
 /// Pixels over which a slope goes on, so that it is none of the narrow ramp that the film's filter makes of an edge.
 const SLOPE: usize = 3;
@@ -170,7 +170,7 @@ const SLOPE: usize = 3;
 /// that edges are none.
 fn slope_squared(plane: &[f32], (width, height): (usize, usize), i: usize) -> f32 {
     let (x, y) = (i % width, i / width);
-    // To one side, on which there are so many pixels, `step` apart.
+    // The slope to one side, which has `count` pixels, `step` apart.
     let to = |count: usize, step: isize| {
         let at = |k: usize| plane[i.wrapping_add_signed(step * k as isize)];
         let steps = (1..=SLOPE.min(count)).map(|k| (at(k) - at(k - 1)).abs());

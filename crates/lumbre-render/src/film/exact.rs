@@ -43,7 +43,7 @@ impl ExactSum {
         self.0
     }
 
-    /// A sum of so many units of 2⁻⁶³.
+    /// A sum of this many units of 2⁻⁶³.
     pub fn from_units(units: i128) -> Self {
         Self(units)
     }

@@ -8,12 +8,12 @@ use lumbre_math::{DVec2, Elementary};
 /// The closed set of filters: all are products of the same function along x and along y. Radii are in pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FilterShape {
-    /// A Gaussian of this standard deviation, less its value at the radius.
+    /// A Gaussian of this standard deviation, minus its value at the radius.
     Gaussian {
         /// Standard deviation.
         sigma: f64,
     },
-    /// The same everywhere.
+    /// Constant.
     Box,
     /// Mitchell, Netravali, "Reconstruction Filters in Computer Graphics", SIGGRAPH 1988.
     Mitchell {
@@ -66,16 +66,16 @@ fn sinc(x: f64) -> f64 {
     if x.abs() < 1e-5 { 1.0 } else { (PI * x).sine() / (PI * x) }
 }
 
-/// A place in the filter, and what a sample there counts.
+/// A position in the filter, and the sample's weight there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilterSample {
     /// From the middle of the pixel, in pixels.
     pub offset: DVec2,
-    /// Value over density: almost the same everywhere but for its sign.
+    /// Value over density: almost constant except for its sign.
     pub weight: f64,
 }
 
-/// A filter, ready to be sampled.
+/// A filter, ready for sampling.
 #[derive(Clone, Debug)]
 pub struct Filter {
     shape: FilterShape,
@@ -84,26 +84,26 @@ pub struct Filter {
     y: Axis,
 }
 
-/// The function along one axis, a parabola in each cell: nowhere further than 1e-6 of its greatest value from what it is.
+/// The function along one axis, a parabola in each cell: within 1e-6 of the maximum of the exact one.
 #[derive(Clone, Debug)]
 struct Axis {
     choice: PiecewiseConstant1D,
     /// For each of `CELLS` parts of [0, 1), the cell that a number at its start chooses.
     first: Vec<u16>,
-    /// The value at the start of each cell over the density of its choice, how much more that is at its end, and four times how much more
-    /// it is in the middle than on the line between both.
+    /// For each cell, the value at its start over the density of its choice, the increase to its end, and four times
+    /// the rise of its middle above the straight line.
     weights: Vec<[f64; 3]>,
     radius: f64,
 }
 
-/// Cells of the tables from which places are chosen.
+/// Cells of the sampling tables.
 const CELLS: usize = 512;
 
 impl Axis {
-    /// `None` where the function is zero.
+    /// `None` if the function is zero.
     fn new(shape: FilterShape, radius: f64) -> Option<Self> {
         let value = |i: f64| shape.value((i / CELLS as f64 * 2.0 - 1.0) * radius, radius);
-        // Not the middle alone: where the function changes sign it may be zero there and nowhere else.
+        // Not the middle alone: where the function changes sign, it may be zero only there.
         let cell = |i: f64| 0.25 * value(i).abs() + 0.5 * value(i + 0.5).abs() + 0.25 * value(i + 1.0).abs();
         let cells: Vec<f64> = (0..CELLS).map(|i| cell(i as f64)).collect();
         let choice = PiecewiseConstant1D::new(&cells)?;
@@ -117,7 +117,7 @@ impl Axis {
         Some(Self { choice, first, weights, radius })
     }
 
-    /// A place, and the value there over the density of its choice, from a uniform number.
+    /// A position and the value over the density there, from a uniform number.
     fn sample(&self, u: f64) -> (f64, f64) {
         let starts = self.choice.starts();
         let total = f64::from(PiecewiseConstant1D::TOTAL);
@@ -150,7 +150,7 @@ impl Filter {
         self.radius
     }
 
-    /// A place in the filter, from two uniform numbers.
+    /// A position in the filter, from two uniform numbers.
     pub fn sample(&self, u: DVec2) -> FilterSample {
         if let FilterShape::Box = self.shape {
             let area = 4.0 * self.radius.x * self.radius.y;
@@ -183,7 +183,7 @@ mod tests {
         let (mut sampled, mut weights, mut exact, mut whole) = (0.0, 0.0, 0.0, 0.0);
         for i in 0..SIDE * SIDE {
             let u = DVec2::new(grid(i % SIDE), grid(i / SIDE));
-            // Not the grid, which the steps at the edges of negative lobes would beat with.
+            // Not the grid, which would alias with the steps at the edges of negative lobes.
             let (x, y) = lumbre_math::sobol::sobol_2d(i as u64);
             let sample = filter.sample(DVec2::new(uniform_f64(x), uniform_f64(y)));
             sampled += sample.weight * g(sample.offset);

@@ -1,4 +1,4 @@
-//! What a denoiser wants to know of the samples of one pixel besides their mean.
+//! What the denoiser needs of the samples of one pixel besides their mean.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! What a denoiser wants to know of a picture.
+//! What the denoiser needs of a picture.
 
 use crate::film::{Extras, GuideSums, PixelBounds, Tile};
 

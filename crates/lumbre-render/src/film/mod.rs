@@ -19,6 +19,6 @@ pub use filter::{Filter, FilterSample, FilterShape};
 pub use guide::{Count, FEATURES, GROUPS, GuideSums, RatioSums};
 pub use guides::Guides;
 pub use pixel::{FeatureSample, FeatureSums, Pixel, Tint};
-pub use tile::{Exposure, Extras, Sample, Tile};
+pub use tile::{Addition, Exposure, Extras, Sample, Tile};
 
 pub(crate) use pixel::{MAX_LUMINANCE, MAX_SAMPLE};

@@ -4,7 +4,7 @@ use lumbre_image::Rgb;
 
 use crate::film::ExactSum;
 
-/// Weighted sums of the samples of one pixel, which do not depend on the order that they were added in.
+/// Weighted sums of the samples of one pixel, independent of their order.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pixel {
     /// Σ weight × colour.
@@ -19,19 +19,19 @@ pub struct Pixel {
     pub luminance_squares: ExactSum,
     /// How many samples were added.
     pub samples: u32,
-    /// How many samples were taken, with those that were dropped.
+    /// Number of samples taken, including dropped ones.
     pub taken: u32,
 }
 
-/// The largest component that a sample counts for: half of what a sum holds, for the weights of filters that are more than 1.
+/// The largest component of a sample: half of what a sum holds, for filter weights above 1.
 pub(crate) const MAX_SAMPLE: f64 = ExactSum::LIMIT / 2.0;
 
-/// Luminance up to which noise is told apart.
+/// Luminance above which noise is not distinguished.
 pub(crate) const MAX_LUMINANCE: f64 = 1e6;
 
 impl Pixel {
-    /// Adds a sample, whose colour is multiplied by its coverage. False, and nothing is added, where it is not finite. One that is brighter
-    /// than the film holds is added as bright as that, in its hue.
+    /// Adds a sample, whose colour is premultiplied by its coverage. Returns false and adds nothing if it is not
+    /// finite. A sample brighter than the film's maximum is scaled down to it, keeping its hue.
     pub fn add(&mut self, colour: Rgb, coverage: f32, weight: f64) -> bool {
         let most = colour.to_array().into_iter().map(|channel| f64::from(channel.abs())).fold(0.0, f64::max);
         let scale = if most > MAX_SAMPLE { weight * (MAX_SAMPLE / most) } else { weight };
@@ -63,19 +63,19 @@ impl Pixel {
         self.taken += other.taken;
     }
 
-    /// The mean of the samples; black where there is none.
+    /// The mean of the samples; black without any.
     pub fn colour(&self) -> Rgb {
         mean(self.sum, self.weight)
     }
 
-    /// The mean coverage, in [0, 1]; 0 where there is no sample.
+    /// The mean coverage, in [0, 1]; 0 without a sample.
     pub fn coverage(&self) -> f32 {
         let (covered, weight) = (self.covered.value(), self.weight.value());
         if weight == 0.0 { 0.0 } else { (covered / weight).clamp(0.0, 1.0) as f32 }
     }
 
-    /// The mean luminance, and its standard error as if samples were independent (those of a low-discrepancy sampler are
-    /// better than that). `None` for fewer than two samples.
+    /// The mean luminance, and its standard error as if samples were independent (those of a low-discrepancy sampler
+    /// are better). `None` for fewer than two samples.
     pub fn luminance_with_error(&self) -> Option<(f64, f64)> {
         let n = f64::from(self.samples);
         if self.samples < 2 {
@@ -87,8 +87,8 @@ impl Pixel {
     }
 }
 
-/// By how much the coverage of red and that of blue are more than that of green: weighted sums of the samples of one pixel. As a
-/// rule they are exactly zero.
+/// The coverage of red and of blue, minus that of green: weighted sums of the samples of one pixel. Usually exactly
+/// zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tint {
     /// Σ weight × (red − green).
@@ -110,7 +110,7 @@ impl Tint {
         self.blue.merge(other.blue);
     }
 
-    /// The mean coverage of each colour in the pixel that the same samples were added to, in [0, 1]; 0 where there is none.
+    /// The mean coverage of each channel in the pixel of the same samples, in [0, 1]; 0 without a sample.
     pub fn coverage(&self, of: &Pixel) -> Rgb {
         let weight = of.weight.value();
         if weight == 0.0 {
@@ -123,7 +123,7 @@ impl Tint {
     }
 }
 
-/// What a sample met first.
+/// The first hit of a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FeatureSample {
     /// Reflectance.
@@ -136,7 +136,7 @@ pub struct FeatureSample {
     pub uv: [f32; 2],
 }
 
-/// Weighted sums of the features of one pixel, which do not depend on the order that they were added in.
+/// Weighted sums of the features of one pixel, independent of their order.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FeatureSums {
     /// Σ weight × albedo.
@@ -154,7 +154,7 @@ pub struct FeatureSums {
 }
 
 impl FeatureSums {
-    /// Adds a sample, whose depth is measured in `depth_unit`; `None` met nothing.
+    /// Adds a sample, with depth in units of `depth_unit`; `None` met nothing.
     pub fn add(&mut self, sample: Option<&FeatureSample>, weight: f64, depth_unit: f64) {
         self.weight.add(weight);
         let Some(sample) = sample else { return };
@@ -183,12 +183,12 @@ impl FeatureSums {
         self.weight.merge(other.weight);
     }
 
-    /// The mean albedo, black where nothing was met.
+    /// The mean albedo, black without a hit.
     pub fn albedo(&self) -> Rgb {
         mean(self.albedo, self.weight)
     }
 
-    /// The mean normal: shorter than 1 where it varies or where nothing was met.
+    /// The mean normal: shorter than 1 if it varies, or if some samples met nothing.
     pub fn normal(&self) -> Rgb {
         mean(self.normal, self.weight)
     }

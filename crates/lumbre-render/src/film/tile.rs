@@ -26,11 +26,6 @@ impl Default for Exposure {
 }
 
 impl Exposure {
-    /// Whether a sample of this radiance is brighter than any counts for: it is added as bright as that.
-    pub fn clamps(&self, radiance: Rgb) -> bool {
-        f64::from(self.colour(radiance).max_component()) > MAX_SAMPLE
-    }
-
     /// The colour that a sample of this radiance adds.
     pub fn colour(&self, radiance: Rgb) -> Rgb {
         let colour = radiance * self.factor;
@@ -41,6 +36,17 @@ impl Exposure {
     }
 }
 
+/// What became of a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Addition {
+    /// It was added.
+    Whole,
+    /// It was added less bright than it is: brighter ones do not fit.
+    Clamped,
+    /// It was not: it is not finite, or its pixel is elsewhere.
+    Dropped,
+}
+
 /// What one sample adds to its pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
@@ -48,11 +54,11 @@ pub struct Sample {
     pub radiance: Rgb,
     /// How much of what is behind it covers, of each colour; the radiance is multiplied by it.
     pub coverage: Rgb,
-    /// What it counts: the weight of the filter.
+    /// The filter weight.
     pub weight: f64,
-    /// What it met first, if features are wanted and it met anything.
+    /// The first hit, if features are requested and there is one.
     pub features: Option<FeatureSample>,
-    /// Whether it is of ground that catches shadows.
+    /// Whether it is of a shadow catcher.
     pub on_catcher: bool,
 }
 
@@ -76,16 +82,16 @@ struct TileSums {
     guides: Vec<GuideSums>,
 }
 
-/// What is wanted of samples besides the colour of pixels and their coverage.
+/// What to record of samples in addition to colour and coverage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extras {
-    /// What the samples met first.
+    /// The first hits of the samples.
     pub features: bool,
-    /// By how much the coverage of each colour is another.
+    /// Per-channel coverage minus that of green.
     pub tints: bool,
-    /// What a denoiser wants to know.
+    /// What the denoiser needs.
     pub guides: bool,
-    /// What depths are measured in: a power of two above all of them.
+    /// The unit of depths: a power of two above all of them.
     pub depth_unit: f64,
 }
 
@@ -128,12 +134,12 @@ impl Tile {
         &self.sums.features
     }
 
-    /// What a denoiser wants to know of every pixel, row by row; empty where it is not wanted.
+    /// What the denoiser needs of every pixel, row by row; empty unless it was asked for.
     pub fn guides(&self) -> &[GuideSums] {
         &self.sums.guides
     }
 
-    /// By how much the coverage of each colour is another, row by row; empty where it is not wanted.
+    /// Per-channel coverage minus that of green, row by row; empty unless requested.
     pub fn tints(&self) -> &[Tint] {
         &self.sums.tints
     }
@@ -149,12 +155,11 @@ impl Tile {
         self.sums.tints.iter().any(|tint| *tint != Tint::default())
     }
 
-    /// Adds a sample to the pixel in column `x` and row `y` of the picture. False, and nothing is added, when the sample
-    /// is not finite or the pixel is elsewhere.
-    pub fn add(&mut self, x: u32, y: u32, sample: &Sample, exposure: &Exposure) -> bool {
+    /// Adds a sample to the pixel in column `x` and row `y` of the picture.
+    pub fn add(&mut self, x: u32, y: u32, sample: &Sample, exposure: &Exposure) -> Addition {
         let b = &self.bounds;
         if !(b.x0 <= x && x < b.x1 && b.y0 <= y && y < b.y1) {
-            return false;
+            return Addition::Dropped;
         }
         let colour = exposure.colour(sample.radiance);
         let position = b.position(x, y);
@@ -162,7 +167,7 @@ impl Tile {
         let pixel = &mut sums.pixels[position];
         pixel.taken += 1;
         if !sample.coverage.is_finite() || !pixel.add(colour, sample.coverage.average(), sample.weight) {
-            return false;
+            return Addition::Dropped;
         }
         if let Some(tint) = sums.tints.get_mut(position) {
             tint.add(sample.coverage, sample.weight);
@@ -187,7 +192,8 @@ impl Tile {
             guide.shadow.add(weighted(shadow), ground, is_odd);
             guide.add_features(sample.features.as_ref(), sample.weight as f32);
         }
-        true
+        let is_clamped = f64::from(colour.max_component()) > MAX_SAMPLE;
+        if is_clamped { Addition::Clamped } else { Addition::Whole }
     }
 
     /// The part of it in these bounds, and nothing where it has none.
@@ -348,11 +354,11 @@ mod tests {
         let coverage = Rgb::splat(0.25);
         let sample = |radiance| Sample { radiance, coverage, weight: 1.0, features: None, on_catcher: false };
         let exposure = Exposure { factor: 2.0, max_component: 6.0, ..Exposure::default() };
-        assert!(tile.add(6, 9, &sample(Rgb::new(1.0, 2.0, 3.0)), &exposure));
-        assert!(!tile.add(9, 9, &sample(Rgb::WHITE), &exposure));
-        assert!(!tile.add(6, 6, &sample(Rgb::WHITE), &exposure));
-        assert!(!tile.add(6, 9, &sample(Rgb::new(1.0, f32::NAN, 1.0)), &exposure));
-        assert!(!tile.add(6, 9, &sample(Rgb::new(f32::INFINITY, 1.0, 1.0)), &exposure));
+        assert_eq!(tile.add(6, 9, &sample(Rgb::new(1.0, 2.0, 3.0)), &exposure), Addition::Whole);
+        assert_eq!(tile.add(9, 9, &sample(Rgb::WHITE), &exposure), Addition::Dropped);
+        assert_eq!(tile.add(6, 6, &sample(Rgb::WHITE), &exposure), Addition::Dropped);
+        assert_eq!(tile.add(6, 9, &sample(Rgb::new(1.0, f32::NAN, 1.0)), &exposure), Addition::Dropped);
+        assert_eq!(tile.add(6, 9, &sample(Rgb::new(f32::INFINITY, 1.0, 1.0)), &exposure), Addition::Dropped);
         let lit: Vec<_> = tile.pixels().iter().map(Pixel::colour).collect();
         for (i, colour) in lit.into_iter().enumerate() {
             let expected = if i == 2 * 4 + 1 { Rgb::new(2.0, 4.0, 6.0) } else { Rgb::BLACK };
@@ -373,7 +379,7 @@ mod tests {
             on_catcher: false,
         };
         for (x, y, value) in [(5, 7, 1.0), (7, 7, 2.0), (9, 7, 3.0), (5, 9, 4.0), (6, 8, 9.0)] {
-            assert!(tile.add(x, y, &sample(value), &Exposure::default()));
+            assert_eq!(tile.add(x, y, &sample(value), &Exposure::default()), Addition::Whole);
         }
         tile.spread(2);
         let shown: Vec<f32> = tile.pixels().iter().map(|pixel| pixel.colour().g).collect();
@@ -391,7 +397,7 @@ mod tests {
             for (coverage, weight) in covered.into_iter().zip([1.0, 3.0]) {
                 let sample =
                     Sample { radiance: Rgb::BLACK, coverage, weight, features: None, on_catcher: false };
-                assert!(tile.add(7, 8, &sample, &Exposure::default()));
+                assert_eq!(tile.add(7, 8, &sample, &Exposure::default()), Addition::Whole);
             }
         }
         let [by_colour, alike] = tiles.each_ref().map(|tile| tile.coverages().collect::<Vec<_>>());

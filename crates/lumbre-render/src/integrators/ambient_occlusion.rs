@@ -6,7 +6,7 @@ use lumbre_shading::{ShadingFrame, ShadingNormals, Spectrum};
 
 use crate::integrators::RayIntegrator;
 use crate::transport::journal::{Event, Met, Source};
-use crate::transport::{Draw, Record, Sight};
+use crate::transport::{PrimaryHit, Record, SampleNumbers};
 
 /// The share of the sky over a surface that is open, weighed by the cosine: white where nothing is near.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,8 +24,8 @@ impl RayIntegrator for AmbientOcclusion {
         &self,
         scene: &Scene,
         _: &View,
-        sight: Sight<'_>,
-        draw: &Draw,
+        sight: PrimaryHit<'_>,
+        draw: &SampleNumbers,
         record: &mut Record,
     ) -> Spectrum {
         let Some(met) = &sight.met else {

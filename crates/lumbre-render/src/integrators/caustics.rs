@@ -5,7 +5,7 @@ use lumbre_shading::ShadingNormals;
 use crate::caustics::{ChordSampler, LightTracer, Merging, Passes, lines_of, typical_way};
 use crate::integrators::{Integrator, Path};
 use crate::transport::{Record, Sampler};
-use crate::wave::Sights;
+use crate::wave::PrimaryHits;
 
 /// [`Path`], and photons for the light that comes from lamps over mirrors and smooth glass to what scatters it: caustics, rooms behind
 /// panes, lamps in bulbs. Paths find such light by chance if the lamp is large, and never if it is a point; photons find it the better the
@@ -20,14 +20,14 @@ pub struct Caustics {
 }
 
 impl Caustics {
-    /// An integrator of so many bounces.
+    /// An integrator with this many bounces at most.
     pub fn new(max_depth: u32, shading_normals: ShadingNormals) -> Self {
         Self { path: Path { shading_normals, ..Path::new(max_depth) }, passes: Passes::default() }
     }
 }
 
 impl Integrator for Caustics {
-    fn estimate(&self, sights: &mut Sights<'_, '_>, sampler: &Sampler, record: &mut Record) {
+    fn estimate(&self, sights: &mut PrimaryHits<'_, '_>, sampler: &Sampler, record: &mut Record) {
         let (scene, view) = (sights.scene(), sights.view());
         let mut setting = self.path.setting(scene, sampler);
         if let Some(chords) = ChordSampler::new(scene).filter(|_| !scene.lights().is_empty()) {

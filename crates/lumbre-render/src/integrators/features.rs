@@ -5,14 +5,21 @@ use lumbre_shading::Spectrum;
 
 use crate::integrators::RayIntegrator;
 use crate::transport::journal::{Event, Met, Source};
-use crate::transport::{Draw, Feature, Features, Record, Sight};
+use crate::transport::{Feature, Features, PrimaryHit, Record, SampleNumbers};
 
 /// A picture of one feature; no light is needed. The normal is shown as (n + 1) / 2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FeatureIntegrator(pub Feature);
 
 impl RayIntegrator for FeatureIntegrator {
-    fn radiance(&self, _: &Scene, view: &View, sight: Sight<'_>, _: &Draw, record: &mut Record) -> Spectrum {
+    fn radiance(
+        &self,
+        _: &Scene,
+        view: &View,
+        sight: PrimaryHit<'_>,
+        _: &SampleNumbers,
+        record: &mut Record,
+    ) -> Spectrum {
         let ray = sight.ray.ray;
         match &sight.met {
             Some(met) => record.note(|| Event::Met(Met::of(&ray, met, 0, Spectrum::WHITE))),

@@ -5,13 +5,13 @@ use std::fmt::Debug;
 use lumbre_scene::{Scene, View};
 use lumbre_shading::Spectrum;
 
-use crate::transport::{Draw, Record, Sampler, Sight};
-use crate::wave::Sights;
+use crate::transport::{PrimaryHit, Record, SampleNumbers, Sampler};
+use crate::wave::PrimaryHits;
 
 /// An estimator of the radiance that arrives at the camera, of many samples at a time.
 pub trait Integrator: Debug + Send + Sync {
     /// Gives each of the samples an estimate of the radiance along its ray from the camera.
-    fn estimate(&self, sights: &mut Sights<'_, '_>, sampler: &Sampler, record: &mut Record);
+    fn estimate(&self, sights: &mut PrimaryHits<'_, '_>, sampler: &Sampler, record: &mut Record);
 
     /// Whether it takes samples that carry wavelengths in place of linear Rec. 709.
     fn carries_wavelengths(&self) -> bool {
@@ -31,14 +31,14 @@ pub trait RayIntegrator: Debug + Send + Sync {
         &self,
         scene: &Scene,
         view: &View,
-        sight: Sight<'_>,
-        draw: &Draw,
+        sight: PrimaryHit<'_>,
+        draw: &SampleNumbers,
         record: &mut Record,
     ) -> Spectrum;
 }
 
 impl<T: RayIntegrator> Integrator for T {
-    fn estimate(&self, sights: &mut Sights<'_, '_>, _: &Sampler, record: &mut Record) {
+    fn estimate(&self, sights: &mut PrimaryHits<'_, '_>, _: &Sampler, record: &mut Record) {
         let (scene, view) = (sights.scene(), sights.view());
         sights.each(|sight, draw| self.radiance(scene, view, sight, draw, record));
     }

@@ -6,7 +6,7 @@ use lumbre_simd::InstructionSet;
 
 use crate::integrators::Integrator;
 use crate::transport::{Record, Sampler, Strategy};
-use crate::wave::Sights;
+use crate::wave::PrimaryHits;
 use crate::wave::setting::Setting;
 
 /// Kajiya's path tracing: at each surface one sample of a light and one of the BSDF, combined by the power heuristic,
@@ -35,7 +35,7 @@ pub struct Path {
 const ROULETTE_START: u32 = 5;
 
 impl Path {
-    /// A path tracer of so many bounces.
+    /// A path tracer with this many bounces at most.
     pub fn new(max_depth: u32) -> Self {
         Self {
             max_depth,
@@ -60,7 +60,7 @@ impl Path {
             shading_normals: self.shading_normals,
             has_solids: scene.has_solids(),
             has_media: scene.has_media(),
-            has_panes: scene.lets_light_straight_on(),
+            has_panes: scene.has_delta_transmission(),
             moves: scene.moves(),
             is_spectral: false,
             instruction_set: InstructionSet::detect(),
@@ -70,7 +70,7 @@ impl Path {
 }
 
 impl Integrator for Path {
-    fn estimate(&self, sights: &mut Sights<'_, '_>, sampler: &Sampler, record: &mut Record) {
+    fn estimate(&self, sights: &mut PrimaryHits<'_, '_>, sampler: &Sampler, record: &mut Record) {
         let is_spectral = sights.are_spectral();
         let setting = Setting { is_spectral, ..self.setting(sights.scene(), sampler) };
         sights.follow(&setting, record);

@@ -13,15 +13,15 @@ use lumbre_shading::{MaterialKind, Spectrum};
 use smallvec::SmallVec;
 
 use crate::integrators::RayIntegrator;
-use crate::transport::{Draw, Record, Sight};
+use crate::transport::{PrimaryHit, Record, SampleNumbers};
 
 /// The light of POV-Ray's scenes as POV-Ray computes it, after its reference manual. Colours are in the scene's working space
 /// until they are summed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pov;
 
-/// Shadow rays look through at most so many surfaces.
-const MOST_SURFACES: u32 = 256;
+/// Surfaces that a shadow ray passes, at most.
+const MAX_SURFACES: u32 = 256;
 /// Hits nearer than this are no hits.
 const NEAR: f64 = 1e-4;
 /// Light that grazes a surface by less than this cosine does not reach it.
@@ -52,7 +52,14 @@ struct Tracer<'s> {
 }
 
 impl RayIntegrator for Pov {
-    fn radiance(&self, scene: &Scene, _: &View, sight: Sight<'_>, _: &Draw, record: &mut Record) -> Spectrum {
+    fn radiance(
+        &self,
+        scene: &Scene,
+        _: &View,
+        sight: PrimaryHit<'_>,
+        _: &SampleNumbers,
+        record: &mut Record,
+    ) -> Spectrum {
         let Some(world) = scene.pov() else { return Spectrum::BLACK };
         let lights = scene.lights().iter().filter_map(|light| match light {
             Light::Pov(light) => Some(&**light),
@@ -89,7 +96,7 @@ impl<'s> Tracer<'s> {
     /// The first surface along a ray that is not hidden from it.
     fn closest(&self, traced: &Traced<'s>) -> Option<(Interaction<'s>, &'s PovMaterial, f64)> {
         let mut ray = traced.ray;
-        for _ in 0..MOST_SURFACES {
+        for _ in 0..MAX_SURFACES {
             let hit = self.scene.closest(&ray)?;
             let here = self.scene.interaction(&ray, &hit, &Footprint::Point);
             let material = Self::material(&here)?;
@@ -447,7 +454,7 @@ impl<'s> Tracer<'s> {
     /// A ray that goes straight on counts as the same ray, but not without end.
     fn trace_straight(&self, mut next: Traced<'s>, is_straight: bool, record: &mut Record) -> Spectrum {
         if is_straight {
-            next.weight *= 1.0 - 1.0 / MOST_SURFACES as f32;
+            next.weight *= 1.0 - 1.0 / MAX_SURFACES as f32;
         }
         self.trace(&next, record)
     }
@@ -497,7 +504,7 @@ impl<'s> Tracer<'s> {
         let towards = ray.direction;
         let mut left = Spectrum::WHITE;
         let mut travelled = 0.0;
-        for _ in 0..MOST_SURFACES {
+        for _ in 0..MAX_SURFACES {
             let rest = (target - ray.origin).dot(towards);
             let Some(hit) = self.scene.closest(&ray.with_range(0.0, rest - NEAR)) else {
                 return left * self.media_passing(&inside, &ray, rest, light);
@@ -567,7 +574,7 @@ fn mean_of_grid(
     sum * 0.25
 }
 
-/// Where one of so many stands between 0 and 1; one alone in the middle.
+/// The position of one of several points between 0 and 1; a single one is in the middle.
 fn step(i: u32, count: u32) -> f64 {
     if count <= 1 { 0.5 } else { f64::from(i) / f64::from(count - 1) }
 }

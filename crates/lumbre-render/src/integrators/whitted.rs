@@ -7,10 +7,10 @@ use smallvec::SmallVec;
 
 use crate::integrators::RayIntegrator;
 use crate::transport::direct::Vertex;
-use crate::transport::interior::Interiors;
+use crate::transport::interior::MediumStack;
 use crate::transport::journal::{Event, Met, SampledLight, Scattered, Source};
 use crate::transport::through::ray_length;
-use crate::transport::{Draw, Record, Sight};
+use crate::transport::{PrimaryHit, Record, SampleNumbers};
 
 /// Follows every mirror image and every refraction, and gives each surface on the way direct light from every light.
 ///
@@ -38,7 +38,7 @@ const FAINT: f32 = 1.0 / 255.0;
 /// A ray that is still to be followed.
 struct Branch<'s> {
     ray: Ray,
-    interiors: Interiors<'s>,
+    interiors: MediumStack<'s>,
     footprint: Footprint,
     throughput: Spectrum,
     depth: u32,
@@ -48,7 +48,7 @@ struct Branch<'s> {
 type Scatterers<'a, 's> = SmallVec<[(f32, Vertex<'a, 's>); 2]>;
 
 impl Whitted {
-    /// A Whitted tracer that follows so many reflections, with one point on each light.
+    /// A Whitted tracer that follows this many reflections, with one point on each light.
     pub fn new(max_depth: u32) -> Self {
         Self { max_depth, light_samples: 1, sky: false, shading_normals: ShadingNormals::default() }
     }
@@ -59,7 +59,7 @@ impl Whitted {
         scene: &'s Scene,
         here: &'a Interaction<'s>,
         came: &'a Arrival<'s>,
-        draw: &Draw,
+        draw: &SampleNumbers,
         pending: &mut SmallVec<[Branch<'s>; 4]>,
         record: &mut Record,
     ) -> Scatterers<'a, 's> {
@@ -107,7 +107,7 @@ impl Whitted {
         here: &Interaction,
         scatterers: &Scatterers<'_, 's>,
         came: &Arrival<'s>,
-        draw: &Draw,
+        draw: &SampleNumbers,
         record: &mut Record,
     ) -> Spectrum {
         let from = here.shadow_origin();
@@ -142,7 +142,7 @@ impl Whitted {
 
 /// How a ray came to a vertex: what it carries, and which one in the tree of rays this is.
 struct Arrival<'s> {
-    interiors: Interiors<'s>,
+    interiors: MediumStack<'s>,
     throughput: Spectrum,
     depth: u32,
     vertex: u32,
@@ -153,15 +153,15 @@ impl RayIntegrator for Whitted {
         &self,
         scene: &Scene,
         _: &View,
-        sight: Sight<'_>,
-        draw: &Draw,
+        sight: PrimaryHit<'_>,
+        draw: &SampleNumbers,
         record: &mut Record,
     ) -> Spectrum {
         let mut radiance = Spectrum::BLACK;
         let mut pending: SmallVec<[Branch; 4]> = SmallVec::new();
         let (mut ray, mut met) = (sight.ray.ray, sight.met);
         let mut came =
-            Arrival { interiors: Interiors::default(), throughput: Spectrum::WHITE, depth: 0, vertex: 0 };
+            Arrival { interiors: MediumStack::default(), throughput: Spectrum::WHITE, depth: 0, vertex: 0 };
         loop {
             if let Some(here) = &met {
                 // Of a mixture the one material that stands for it says what the way was inside of.
@@ -199,14 +199,14 @@ impl RayIntegrator for Whitted {
 fn scattered<'s>(
     scene: &Scene,
     scatterers: &Scatterers<'_, 's>,
-    interiors: &Interiors<'s>,
+    interiors: &MediumStack<'s>,
     sample: &LightSample,
     record: &mut Record,
 ) -> Spectrum {
     let mut sum = Spectrum::BLACK;
     let mut shadow_ray = None;
     // Light of any kind, for nothing else brings it from behind a pane to what scatters.
-    let goes_straight_on = scene.lets_light_straight_on();
+    let goes_straight_on = scene.has_delta_transmission();
     for (share, vertex) in scatterers {
         let scattered = vertex.eval(sample.towards) * *share;
         if scattered.is_black() {

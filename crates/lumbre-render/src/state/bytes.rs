@@ -86,7 +86,7 @@ impl RenderState {
         out
     }
 
-    /// Reads a state that takes no more than so many bytes of memory.
+    /// Reads a state that takes no more than this many bytes of memory.
     ///
     /// # Errors
     /// [`StateError`].

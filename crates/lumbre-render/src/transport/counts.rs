@@ -1,20 +1,20 @@
-//! How many rays were traced.
+//! Counts of traced rays.
 
 use std::ops::AddAssign;
 
-/// How many rays were traced, by what for.
+/// Numbers of traced rays, by their purpose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RayCounts {
     /// From the camera.
     pub camera: u64,
-    /// On from a surface.
+    /// Continuing from a surface.
     pub bounce: u64,
-    /// Towards a light, or to see how open a place is.
+    /// Towards a light, or testing ambient occlusion.
     pub shadow: u64,
 }
 
 impl RayCounts {
-    /// All of them.
+    /// The sum of all.
     pub fn total(&self) -> u64 {
         self.camera + self.bounce + self.shadow
     }

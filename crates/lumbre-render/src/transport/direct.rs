@@ -1,4 +1,4 @@
-//! A surface as a path meets it, and light that arrives at it straight from a light.
+//! A surface as a path meets it, and direct light there.
 
 use std::cell::OnceCell;
 
@@ -8,63 +8,63 @@ use lumbre_scene::{Interaction, LightSample, Scene};
 use lumbre_shading::{Bsdf, LocalDir, Material, Scatter, ShadingFrame, ShadingNormals, Spectrum};
 
 use crate::transport::Record;
-use crate::transport::interior::Interiors;
+use crate::transport::interior::MediumStack;
 use crate::transport::through::straight_on;
 
 /// A surface as seen along a path, ready to scatter.
 ///
-/// A shading normal is a lie about the surface, and some directions that a BSDF scatters to on its side of it lie on
-/// the other side of the surface as it is. They are folded back: mirrored in the plane of the surface. What goes through
-/// likewise stays on the far side. So nothing is lost that the BSDF gives (a white surface stays white whatever its normals),
-/// and no light leaks. At grazing angles, where a reflection would point into the surface, it comes to point out of it as
-/// far. Others let it be (and have dark specks at silhouettes of coarse meshes), or turn the normal: A. Keller and others,
-/// "The Iray Light Transport Simulation and Rendering System", 2017, A.3.
+/// A shading normal differs from the surface's normal, so a sampled direction may lie below the true surface. It is
+/// folded back: mirrored in the plane of the surface. Transmitted directions likewise stay on the far side. So no
+/// energy of the BSDF is lost (a white surface stays white for any normals), and no light leaks. A reflection that
+/// would point into the surface at a grazing angle points out of it by as much. Others leave such directions as they
+/// are (and get dark specks at silhouettes of coarse meshes), or turn the normal: A. Keller and others, "The Iray Light
+/// Transport Simulation and Rendering System", 2017, A.3.
 ///
-/// Where the faces of a mesh stand for a smooth surface that bulges out over them, directions that go under a face but not under
-/// that surface are no lie: they stay as they are, and their rays start on it ([`Interaction::risen`]). So shadows end where
-/// the smooth surface turns away from the light, not at the edge of a face. J. Hanika ("Hacking the Shadow Terminator",
-/// 2021) starts all rays there; here those that leave a face upwards start on it, for they need no help, and nothing that stands
-/// on it comes to hover.
+/// If the faces of a mesh approximate a smooth surface that bulges out over them, directions below a face but above
+/// that surface are valid: they stay as they are, and their rays start on it ([`Interaction::risen`]). So shadows end
+/// where the smooth surface turns away from the light, not at the edge of a face. J. Hanika ("Hacking the Shadow
+/// Terminator", 2021) starts all rays there. Here only rays below the face do, so that objects on the surface do not
+/// seem to hover.
 ///
-/// With [`ShadingNormals::Pbrt`] nothing of that is done.
+/// [`ShadingNormals::Pbrt`] turns all of this off.
 pub(crate) struct Vertex<'a, 's> {
     pub met: &'a Interaction<'s>,
     pub bsdf: Bsdf,
     pub material: &'s Material,
     frame: ShadingFrame,
     wo: LocalDir,
-    /// The geometric normal, on the side of `wo`, in whose plane directions are folded; `None` where it is the shading
-    /// normal, and as in pbrt.
+    /// The geometric normal on the side of `wo`, in whose plane directions are folded; `None` if it equals the shading
+    /// normal, and in pbrt's mode.
     geometric: Option<Vec3>,
-    /// That normal where it only says which side a direction is on, as in pbrt.
+    /// That normal, if it only decides the side of a direction, as in pbrt.
     side: Option<Vec3>,
     scene: &'s Scene,
-    /// [`Interaction::risen`], once it was asked for.
+    /// [`Interaction::risen`], computed on demand.
     risen: OnceCell<Option<DVec3>>,
 }
 
-/// A direction in which a path goes on.
+/// The next direction of a path.
 pub(crate) struct Bounce {
     /// Unit.
     pub direction: DVec3,
     /// f · |cos θ| / pdf.
     pub weight: Spectrum,
-    /// How it was chosen; the density counts every way to the same direction.
+    /// How it was chosen; the density counts every strategy for the same direction.
     pub scatter: Scatter,
     /// Whether the BSDF transmits it.
     pub transmitted: bool,
     /// Whether it leads to the other side of the surface.
     pub crosses: bool,
-    /// η of the side that it enters over that of the side it leaves.
+    /// η of the side that it enters over that of the side that it leaves.
     pub eta: f32,
 }
 
 impl<'a, 's> Vertex<'a, 's> {
-    /// `None` where nothing scatters.
+    /// `None` if nothing scatters.
     pub(crate) fn new(
         scene: &'s Scene,
         met: &'a Interaction<'s>,
-        interiors: &Interiors<'s>,
+        interiors: &MediumStack<'s>,
         normals: ShadingNormals,
     ) -> Option<Self> {
         Self::of(scene, met, met.resolved()?, interiors, normals)
@@ -75,7 +75,7 @@ impl<'a, 's> Vertex<'a, 's> {
         scene: &'s Scene,
         met: &'a Interaction<'s>,
         least: f32,
-        interiors: &'a Interiors<'s>,
+        interiors: &'a MediumStack<'s>,
         normals: ShadingNormals,
     ) -> impl Iterator<Item = (f32, Self)> {
         let parts = met.parts(least);
@@ -88,7 +88,7 @@ impl<'a, 's> Vertex<'a, 's> {
         scene: &'s Scene,
         met: &'a Interaction<'s>,
         material: &'s Material,
-        interiors: &Interiors<'s>,
+        interiors: &MediumStack<'s>,
         normals: ShadingNormals,
     ) -> Option<Self> {
         let towards = met.towards_origin.as_vec3();
@@ -119,9 +119,11 @@ impl<'a, 's> Vertex<'a, 's> {
         }
     }
 
-    /// Whether a direction under the plane of the face is one that the smooth surface over it reflects to.
+    /// Whether the smooth surface reflects to a direction below the plane of the face.
     fn stays(&self, wi: Vec3) -> bool {
-        let Some(geometric) = self.geometric.filter(|_| self.met.may_rise()) else { return false };
+        let Some(geometric) = self.geometric.filter(|_| self.met.has_terminator_offset()) else {
+            return false;
+        };
         let smooth = self.met.shading.normal;
         let smooth = if smooth.dot(geometric) < 0.0 { -smooth } else { smooth };
         geometric.dot(wi) <= 0.0
@@ -134,7 +136,7 @@ impl<'a, 's> Vertex<'a, 's> {
         *self.risen.get_or_init(|| self.met.risen(self.scene))
     }
 
-    /// The directions of the BSDF that come to be this one: itself, and what is folded onto it.
+    /// The BSDF directions that map to this one: itself, and the one that is folded onto it.
     fn unfolded(&self, wi: Vec3) -> [Option<LocalDir>; 2] {
         let is_above = self.geometric.is_none_or(|normal| normal.dot(wi) > 0.0);
         let reflects = self.reflects(wi);
@@ -147,7 +149,7 @@ impl<'a, 's> Vertex<'a, 's> {
         [own, folded]
     }
 
-    /// f · |cos θ| towards a unit direction of the world.
+    /// f · |cos θ| for a unit direction of the world.
     pub(crate) fn eval(&self, wi: DVec3) -> Spectrum {
         self.eval_unfolded(self.unfolded(wi.as_vec3()))
     }
@@ -156,7 +158,7 @@ impl<'a, 's> Vertex<'a, 's> {
         unfolded.into_iter().flatten().map(|wi| self.bsdf.eval(self.wo, wi)).sum()
     }
 
-    /// The density with which [`Vertex::sample`] chooses a unit direction of the world, delta parts left out.
+    /// The density with which [`Vertex::sample`] chooses a unit direction of the world, without delta parts.
     pub(crate) fn pdf(&self, wi: DVec3) -> f32 {
         self.pdf_unfolded(self.unfolded(wi.as_vec3()))
     }
@@ -165,13 +167,13 @@ impl<'a, 's> Vertex<'a, 's> {
         unfolded.into_iter().flatten().map(|wi| self.bsdf.pdf(self.wo, wi)).sum()
     }
 
-    /// Chooses a direction to go on in.
+    /// Samples the next direction.
     pub(crate) fn sample(&self, lobe: f32, u: Vec2) -> Option<Bounce> {
         let sample = self.bsdf.sample(self.wo, lobe, u)?;
         let mut bounce = self.bounce(&sample);
         if let (Scatter::Density(_), Some(_)) = (sample.scatter, self.geometric) {
             let pdf = self.pdf(bounce.direction);
-            // On the very border between the sides rounding may find no way at all.
+            // On the border between the sides, rounding may leave no strategy at all.
             if pdf > 0.0 {
                 bounce.scatter = Scatter::Density(pdf);
             }
@@ -179,7 +181,7 @@ impl<'a, 's> Vertex<'a, 's> {
         Some(bounce)
     }
 
-    /// Its mirrors and its glass: every delta part.
+    /// All delta parts: mirrors and smooth glass.
     pub(crate) fn specular(&self) -> impl Iterator<Item = Bounce> {
         self.bsdf.specular(self.wo).map(|sample| self.bounce(&sample))
     }
@@ -202,8 +204,8 @@ impl<'a, 's> Vertex<'a, 's> {
         }
     }
 
-    /// By how much a specular bounce concentrates the power of light that comes from `wo`, for it is by the shading normal that light is
-    /// bent, and by the geometric one that it falls on the surface.
+    /// By how much a specular bounce concentrates the power of light from `wo`. Light is refracted by the shading
+    /// normal, but falls on the surface by the geometric normal.
     ///
     /// E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997, 5.3.2.
     pub(crate) fn concentration(&self, wi: DVec3) -> f32 {
@@ -217,12 +219,12 @@ impl<'a, 's> Vertex<'a, 's> {
         if concentration.is_finite() { concentration } else { 0.0 }
     }
 
-    /// What of the light that comes from straight behind goes straight on: see [`Bsdf::straight_on`].
+    /// The share of light from straight behind that passes without a change of direction: see [`Bsdf::straight_on`].
     pub(crate) fn straight_on(&self) -> Spectrum {
         self.bsdf.straight_on(self.wo)
     }
 
-    /// Where rays along a unit direction start, if that is off the face.
+    /// The origin of rays in a unit direction, if it is off the face.
     pub(crate) fn risen_towards(&self, direction: DVec3) -> Option<DVec3> {
         if self.stays(direction.as_vec3()) { self.risen() } else { None }
     }
@@ -231,7 +233,7 @@ impl<'a, 's> Vertex<'a, 's> {
         self.risen_towards(direction).unwrap_or_else(|| self.met.start(direction))
     }
 
-    /// The ray that goes on.
+    /// The ray of a bounce.
     pub(crate) fn leave(&self, bounce: &Bounce) -> Ray {
         self.met.leave_from(self.start(bounce.direction), bounce.direction)
     }
@@ -241,9 +243,9 @@ impl<'a, 's> Vertex<'a, 's> {
         self.met.shadow_ray_from(self.start(sample.towards), sample)
     }
 
-    /// What the solids around leave of a light's sample that nothing stands in the way of.
-    pub(crate) fn passes(&self, sample: &LightSample, interiors: &Interiors<'s>) -> Spectrum {
-        // Light from infinitely far away was not inside anything.
+    /// The share of an unoccluded light sample that the solids around transmit.
+    pub(crate) fn passes(&self, sample: &LightSample, interiors: &MediumStack<'s>) -> Spectrum {
+        // Light from infinity was not inside any solid.
         let Some(end) = sample.end else { return Spectrum::WHITE };
         let crosses = self.crosses(sample);
         if !crosses && !interiors.attenuates() {
@@ -253,11 +255,11 @@ impl<'a, 's> Vertex<'a, 's> {
         around.transmittance((end.point - self.met.surface.point).length())
     }
 
-    /// What all that stands in the way of a light's sample leaves of it: see [`straight_on`].
+    /// The share of a light sample that reaches the point: see [`straight_on`].
     pub(crate) fn passes_straight_on(
         &self,
         sample: &LightSample,
-        interiors: &Interiors<'s>,
+        interiors: &MediumStack<'s>,
         regularize: bool,
         record: &mut Record,
     ) -> Spectrum {
@@ -265,15 +267,15 @@ impl<'a, 's> Vertex<'a, 's> {
         straight_on(self.scene, self.shadow_ray(sample), sample, around, regularize, false, record)
     }
 
-    /// Whether a light's sample comes through the solid whose surface this is.
+    /// Whether a light sample arrives through the solid of this surface.
     fn crosses(&self, sample: &LightSample) -> bool {
         let wi = sample.towards.as_vec3();
         self.material.is_solid()
             && self.side.map_or_else(|| !self.reflects(wi), |normal| normal.dot(wi) < 0.0)
     }
 
-    /// The solids around the place, on one side of its surface or the other.
-    fn around(&self, crosses: bool, interiors: &Interiors<'s>) -> Interiors<'s> {
+    /// The solids around the point, on either side of its surface.
+    fn around(&self, crosses: bool, interiors: &MediumStack<'s>) -> MediumStack<'s> {
         let mut interiors = interiors.clone();
         if crosses {
             interiors.cross(self.material, self.met.front);

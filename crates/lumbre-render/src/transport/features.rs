@@ -1,11 +1,11 @@
-//! What a picture can show besides light: reflectance, normals, depth and surface parameters.
+//! What a picture can show other than light: reflectance, normals, depth and surface parameters.
 
 use lumbre_geometry::{Ray, Surface};
 use lumbre_math::{Vec2, Vec3};
 use lumbre_scene::{GroundPlane, View};
 use lumbre_shading::Spectrum;
 
-use crate::transport::Sight;
+use crate::transport::PrimaryHit;
 
 /// One of the features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -51,10 +51,10 @@ impl Feature {
     }
 }
 
-/// What a line of sight meets. All are zero where it meets nothing.
+/// The features of a first hit. All are zero without a hit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Features {
-    /// Reflectance; emission, cut off at 1, for what shines and is black.
+    /// Reflectance; for a black emitter its emission, clamped to 1.
     pub albedo: Spectrum,
     /// The shading normal in world space, on the side of the viewer.
     pub normal: Vec3,
@@ -65,14 +65,15 @@ pub struct Features {
 }
 
 impl Features {
-    /// What is left of them behind media that leave a part of the light; what media scatter counts as white, and faces no side.
+    /// The features behind media that transmit a part of the light; light that media scatter counts as white, without a
+    /// normal.
     pub(crate) fn behind(self, left: Spectrum) -> Self {
         let albedo = self.albedo * left + (Spectrum::WHITE - left);
         Self { albedo, normal: self.normal * left.average(), ..self }
     }
 
-    /// The features of what is met, if anything is.
-    pub fn of(view: &View, sight: &Sight) -> Option<Self> {
+    /// The features of a first hit, if any.
+    pub fn of(view: &View, sight: &PrimaryHit) -> Option<Self> {
         let met = sight.met.as_ref()?;
         let scattering = met.scattering();
         let (normal, albedo) = match &scattering {
@@ -88,7 +89,7 @@ impl Features {
         })
     }
 
-    /// The features of the ground, where a ray meets its surface.
+    /// The features of the ground, at a ray's hit of its surface.
     pub(crate) fn of_ground(view: &View, ground: &GroundPlane, ray: &Ray, surface: &Surface) -> Self {
         let normal = if ground.normal.dot(ray.direction) < 0.0 { ground.normal } else { -ground.normal };
         Self {
@@ -99,7 +100,7 @@ impl Features {
         }
     }
 
-    /// One of them as a colour: the normal as it is, with signs; uv in red and green.
+    /// One feature as a colour: the signed normal; uv in red and green.
     pub fn get(&self, feature: Feature) -> Spectrum {
         match feature {
             Feature::Albedo => self.albedo,

@@ -6,16 +6,16 @@ use lumbre_shading::spectrum::{SpectralLookup, Wavelengths};
 use lumbre_shading::{HomogeneousMedium, Material, Spectrum};
 use smallvec::SmallVec;
 
-/// The solids around a point of a path, the innermost last: what was entered and not left yet.
+/// The solids around a point of a path, the innermost last: those that were entered and not left yet.
 ///
-/// Solids are told apart by their materials, so that one made of several meshes may be entered by one and left by another. A
-/// solid that stands wholly inside another takes its place there: light inside it is its own affair, and at its surface its
-/// index of refraction counts against that of the solid around it. Where solids overlap without one holding the other,
+/// Solids are identified by their materials, so that one made of several meshes may be entered by one and left by
+/// another. Only the innermost medium applies. At its surface, its index of refraction is relative to that of the solid
+/// around it. If solids overlap without one containing the other, the one that was entered last counts.
 /// the one that was entered last counts.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Interiors<'s> {
+pub(crate) struct MediumStack<'s> {
     around: SmallVec<[Solid<'s>; 2]>,
-    /// What the channels of light are, where that is not linear Rec. 709.
+    /// The wavelengths of the channels, unless these are linear Rec. 709.
     wavelengths: Option<Wavelengths>,
 }
 
@@ -23,7 +23,7 @@ pub(crate) struct Interiors<'s> {
 #[derive(Clone, Copy, Debug)]
 struct Solid<'s> {
     material: &'s Material,
-    /// What scatters light in it, as where it was entered.
+    /// The scattering medium, as it was where the path entered.
     medium: Option<HomogeneousMedium>,
 }
 
@@ -39,19 +39,19 @@ impl<'s> Solid<'s> {
     }
 }
 
-impl<'s> Interiors<'s> {
-    /// None, for light of some wavelengths or in RGB.
+impl<'s> MediumStack<'s> {
+    /// An empty stack, for light of some wavelengths or in RGB.
     pub(crate) fn of(wavelengths: Option<Wavelengths>) -> Self {
         Self { around: SmallVec::new(), wavelengths }
     }
 
-    /// What colours are to light here.
+    /// How light looks up spectra here.
     pub(crate) fn spectral(&self) -> Option<SpectralLookup> {
         Some(SpectralLookup { wavelengths: self.wavelengths?, is_unbounded: false })
     }
 
-    /// Comes to a surface, whose material there is `material`. A solid that is met from inside without having been entered is
-    /// one that the path began in; until then nothing is known of it.
+    /// Arrives at a surface with this material. A solid that is met from inside but was never entered contains the
+    /// start of the path; before that, it is unknown.
     pub(crate) fn arrive(&mut self, here: &Interaction<'s>, material: Option<&'s Material>) {
         if let Some(material) = material.filter(|material| !here.front && material.is_solid())
             && !self.around.iter().any(|solid| solid.is_of(material))
@@ -60,12 +60,12 @@ impl<'s> Interiors<'s> {
         }
     }
 
-    /// What scatters light in the innermost solid.
+    /// The scattering medium of the innermost solid.
     pub(crate) fn medium(&self) -> Option<HomogeneousMedium> {
         self.around.last().and_then(|solid| solid.medium)
     }
 
-    /// What is left of light after a distance inside the innermost solid.
+    /// The transmittance of a distance inside the innermost solid.
     pub(crate) fn transmittance(&self, distance: f64) -> Spectrum {
         let sigma = self.around.last().and_then(|solid| solid.attenuation(self.wavelengths.as_ref()));
         sigma.map_or(Spectrum::WHITE, |sigma| {
@@ -73,17 +73,17 @@ impl<'s> Interiors<'s> {
         })
     }
 
-    /// Whether there is none.
+    /// Whether there is no solid.
     pub(crate) fn is_empty(&self) -> bool {
         self.around.is_empty()
     }
 
-    /// Whether light loses anything here.
+    /// Whether light is attenuated here.
     pub(crate) fn attenuates(&self) -> bool {
         self.around.last().is_some_and(|solid| solid.attenuation(self.wavelengths.as_ref()).is_some())
     }
 
-    /// Goes through a surface, into the solid behind it or out of it.
+    /// Crosses a surface, into the solid behind it or out of it.
     pub(crate) fn cross(&mut self, material: &'s Material, inwards: bool) {
         if !material.is_solid() {
             return;
@@ -95,13 +95,13 @@ impl<'s> Interiors<'s> {
         }
     }
 
-    /// Goes through a surface into a solid, in which this scatters light.
+    /// Crosses a surface into a solid with this scattering medium.
     pub(crate) fn enter(&mut self, material: &'s Material, medium: HomogeneousMedium) {
         self.push(material, Some(medium));
     }
 
     fn push(&mut self, material: &'s Material, medium: Option<HomogeneousMedium>) {
-        // Open meshes are entered time and again and never left.
+        // Open meshes may be entered repeatedly and never left.
         if self.around.len() < 64 {
             self.around.push(Solid { material, medium });
         }

@@ -1,4 +1,4 @@
-//! What an integrator does along one path, step by step, for those who want to see it.
+//! An optional journal of an integrator's steps along one path.
 
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec2, DVec3, Vec3};
@@ -8,16 +8,16 @@ use lumbre_shading::{Scatter, Spectrum};
 use crate::transport::RayCounts;
 use crate::transport::direct::Bounce;
 
-/// What is kept of the rays that an integrator casts: how many there were, and what became of them where that is asked for.
+/// Counts of an integrator's rays, and their journal if requested.
 #[derive(Clone, Debug, Default)]
 pub struct Record {
-    /// How many there were.
+    /// The counts.
     pub counts: RayCounts,
-    /// What became of them; `None` where nobody asks, which costs nothing.
+    /// The events; `None` costs nothing.
     pub journal: Option<Vec<Event>>,
 }
 
-/// What happens along a path, in order. The light of a path is the sum of what its [`Event::Added`] add, in their order.
+/// The events along a path, in order. The light of a path is the sum of its [`Event::Added`], in their order.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// A ray met a surface.
@@ -29,82 +29,82 @@ pub enum Event {
     },
     /// A light was sampled, or every light was.
     Sampled(Box<SampledLight>),
-    /// Light was added to that of the path.
+    /// Light was added to the path.
     Added {
-        /// Where it comes from.
+        /// Its source.
         source: Source,
         /// The light.
         radiance: Spectrum,
-        /// The weight against the other way to find it.
+        /// The weight against the other strategy.
         weight: f32,
-        /// What the path lets through of it.
+        /// The throughput of the path.
         throughput: Spectrum,
         /// The product.
         added: Spectrum,
     },
-    /// Photons were found near the point; the light that they bring is added next.
+    /// Photons were found near the point; their light is added next.
     Photons(Vec<MergedPhoton>),
-    /// A direction was chosen to go on in.
+    /// The next direction was sampled.
     Scattered(Box<Scattered>),
-    /// The path goes on by chance.
+    /// Russian roulette.
     Roulette {
-        /// The probability to go on; the throughput grows by its inverse.
+        /// The survival probability; the throughput is divided by it.
         probability: f32,
-        /// Whether it goes on.
+        /// Whether the path survives.
         survives: bool,
     },
-    /// The path came through a medium, or scattered in it.
+    /// The path crossed a medium, or scattered in it.
     Medium {
-        /// How far it came.
+        /// The distance.
         distance: f64,
         /// Whether it scattered there.
         scattered: bool,
-        /// What it carries after that.
+        /// The throughput after that.
         throughput: Spectrum,
     },
-    /// Ground that catches shadows: the share of the light on it that something blocks.
+    /// A shadow catcher: the share of its light that is blocked.
     Caught {
         /// The share.
         blocked: Spectrum,
     },
-    /// A ray looked whether a place is open.
+    /// A ray tested ambient occlusion.
     Looked {
         /// The ray.
         ray: Ray,
-        /// Whether something is in its way.
+        /// Whether it is occluded.
         is_occluded: bool,
     },
     /// The path ends.
     Ended(End),
 }
 
-/// Where light comes from.
+/// The source of light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// The surface that the ray met.
     Surface,
     /// A light at infinity.
     Infinity,
-    /// The medium that the path goes through.
+    /// The medium along the path.
     Medium,
-    /// What the surface scatters of a sampled light.
+    /// The surface's scattering of a sampled light.
     Sampled,
-    /// What the surface scatters of all lights.
+    /// The surface's scattering of all lights.
     Direct,
-    /// What the surface scatters of photons near the point.
+    /// The surface's scattering of photons near the point.
     Caustics,
 }
 
 /// Why a path ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// It has as many bounces as it may have.
+    /// It has the maximum number of bounces.
     Depth,
     /// Nothing scatters there.
     Nothing,
-    /// All is absorbed.
+    /// All light is absorbed.
     Absorbed,
-    /// By chance: see [`Event::Roulette`].
+    /// By Russian roulette: see [`Event::Roulette`].
     Roulette,
     /// In a medium.
     Medium,
@@ -129,9 +129,9 @@ pub struct Met {
     pub front: bool,
     /// [`lumbre_scene::ShapeDesc::index`] of the shape.
     pub shape: u32,
-    /// The triangle of a mesh, else 0.
+    /// The triangle of a mesh, otherwise 0.
     pub primitive: u32,
-    /// What the path carries there.
+    /// The throughput of the path there.
     pub throughput: Spectrum,
 }
 
@@ -142,31 +142,31 @@ pub struct SampledLight {
     pub sample: LightSample,
     /// f · |cos θ| of the surface towards the light.
     pub scattered: Spectrum,
-    /// The density with which the BSDF would have chosen the direction; 0 where it does not matter.
+    /// The density with which the BSDF would have chosen the direction; 0 if it does not matter.
     pub bsdf_pdf: f32,
     /// The weight against that, before the division by the light's density.
     pub weight: f32,
-    /// The ray towards the light; `None` where no light would come along it.
+    /// The ray towards the light; `None` if no light would come along it.
     pub shadow_ray: Option<Ray>,
-    /// What comes through between the light and the surface; black where something is in its way.
+    /// The transmittance between the light and the surface; black if occluded.
     pub passes: Spectrum,
 }
 
-/// A photon near a point, and what the path gets of it.
+/// A photon near a point, and its contribution to the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MergedPhoton {
     /// The unit direction that it came from.
     pub towards: Vec3,
-    /// Its irradiance on what it falls on straight: its power over the area in which photons are collected and the number of light paths.
-    /// In a medium it is the radiance from all directions, by the volume.
+    /// Its irradiance on a surface perpendicular to it: its power divided by the area in which photons are collected
+    /// and the number of light paths. In a medium, the radiance from all directions, per volume.
     pub irradiance: Spectrum,
-    /// The weight against the other way to find its light.
+    /// The weight against the other strategy for its light.
     pub weight: f32,
-    /// What is scattered of it towards the viewer, weighed.
+    /// The weighted light that is scattered towards the viewer.
     pub scattered: Spectrum,
 }
 
-/// A direction that was chosen to go on in.
+/// The next direction of a path.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scattered {
     /// The ray that goes on.
@@ -177,19 +177,19 @@ pub struct Scattered {
     pub scatter: Scatter,
     /// Whether it is transmitted.
     pub transmitted: bool,
-    /// η of the side that it enters over that of the side it leaves.
+    /// η of the side that it enters over that of the side that it leaves.
     pub eta: f32,
-    /// What the path carries after that.
+    /// The throughput after that.
     pub throughput: Spectrum,
 }
 
 impl Record {
-    /// A record that keeps what happens.
+    /// A record with a journal.
     pub fn with_journal() -> Self {
         Self { counts: RayCounts::default(), journal: Some(Vec::new()) }
     }
 
-    /// Notes what happens, where somebody asks.
+    /// Appends an event, if there is a journal.
     #[inline]
     pub(crate) fn note(&mut self, event: impl FnOnce() -> Event) {
         if let Some(journal) = &mut self.journal {
@@ -197,7 +197,7 @@ impl Record {
         }
     }
 
-    /// Light to be added to that of a path.
+    /// Light to add to a path.
     #[inline]
     pub(crate) fn added(
         &mut self,

@@ -1,4 +1,4 @@
-//! What light transport is made of: random numbers, the solids around a path, what happens along one. No threads, no files, no clock.
+//! The parts of light transport: random numbers, the solids around a path, the journal. No threads, no files, no clock.
 
 mod counts;
 pub(crate) mod direct;
@@ -14,7 +14,7 @@ pub(crate) mod through;
 pub use counts::RayCounts;
 pub use features::{Feature, Features};
 pub use journal::{End, Event, MergedPhoton, Met, Record, SampledLight, Scattered, Source};
-pub use sampler::{Draw, Sampler};
+pub use sampler::{SampleNumbers, Sampler};
 pub(crate) use seen::{Seen, caught};
-pub use sight::Sight;
+pub use sight::PrimaryHit;
 pub use strategy::Strategy;

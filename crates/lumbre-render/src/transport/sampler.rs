@@ -1,4 +1,4 @@
-//! Random numbers as a pure function of (seed, pixel, sample index, what they are for), for one sample or for lanes of them.
+//! Random numbers as a pure function of (seed, pixel, sample index, purpose), for one sample or in lanes.
 
 use lumbre_geometry::Ray;
 use lumbre_math::random::{PixelRandom, combine, hash_dvec3, hash_words};
@@ -8,20 +8,20 @@ use lumbre_shading::medium::PassageNumbers;
 use lumbre_simd::random::{pcg4d, uniform};
 use lumbre_simd::{Real, UInt};
 
-/// How the numbers of a pixel's samples are made.
+/// How the numbers of a pixel's samples are computed.
 #[derive(Clone, Copy, Debug)]
 pub struct Sampler {
     kind: SamplerKind,
     seed: u64,
 }
 
-/// Where in the pixel, and when a ray looks.
+/// The position in the pixel, the time of a ray, and its wavelengths.
 const FILTER: u32 = 0;
-/// Where on the lens.
+/// The position on the lens.
 const LENS: u32 = 1;
-/// Path vertex k has the labels `FIRST_VERTEX + 2 * k`, for its light, and the next one, for its BSDF.
+/// Path vertex k has the labels `FIRST_VERTEX + 2 * k` for its light, and the next one for its BSDF.
 const FIRST_VERTEX: u32 = 2;
-/// Labels of integrators that ask every light of a vertex for a point.
+/// Labels of integrators that sample every light at a vertex.
 const EVERY_LIGHT: u32 = 1 << 24;
 /// Labels of distance samples in media: two each.
 const EVERY_DISTANCE_SAMPLE: u32 = 1 << 27;
@@ -29,16 +29,22 @@ const EVERY_DISTANCE_SAMPLE: u32 = 1 << 27;
 const EVERY_BRANCH: u32 = 1 << 28;
 
 impl Sampler {
-    /// The sampler that a description asks for.
+    /// The sampler of a description.
     pub fn new(desc: &SamplerDesc) -> Self {
         Self { kind: desc.kind, seed: desc.seed }
     }
 
     /// The numbers of one sample of the pixel in column `x` and row `y`.
     #[inline]
-    pub fn draw(&self, x: u32, y: u32, index: u32) -> Draw {
+    pub fn draw(&self, x: u32, y: u32, index: u32) -> SampleNumbers {
+        SampleNumbers { kind: self.kind, pixel: self.pixel(x, y), index }
+    }
+
+    /// The words from which all numbers of a pixel's samples are derived.
+    #[inline]
+    pub(crate) fn pixel(&self, x: u32, y: u32) -> [u32; 2] {
         let key = PixelRandom::new(self.seed, x, y).key();
-        Draw { kind: self.kind, pixel: [key as u32, (key >> 32) as u32], index }
+        [key as u32, (key >> 32) as u32]
     }
 
     /// The kind of all numbers.
@@ -47,18 +53,18 @@ impl Sampler {
     }
 }
 
-/// The random numbers of one sample. Asking one of them changes none of the others.
+/// The random numbers of one sample. Taking one changes none of the others.
 #[derive(Clone, Copy, Debug)]
-pub struct Draw {
+pub struct SampleNumbers {
     kind: SamplerKind,
     /// A hash of the seed and the pixel.
     pixel: [u32; 2],
     index: u32,
 }
 
-/// The random numbers of a sample in each lane: those of [`Draw`], to the bit.
+/// The random numbers of a sample in each lane: the same bits as [`SampleNumbers`].
 #[derive(Clone, Copy)]
-pub(crate) struct LaneDraw<R: Real> {
+pub(crate) struct LaneNumbers<R: Real> {
     /// Of all lanes.
     pub(crate) kind: SamplerKind,
     /// A hash of the seed and the pixel.
@@ -67,21 +73,27 @@ pub(crate) struct LaneDraw<R: Real> {
     pub(crate) index: R::UInt,
 }
 
-impl<R: Real> LaneDraw<R> {
-    /// Where on a light, which light, and further digits of that.
+impl<R: Real> LaneNumbers<R> {
+    /// The position in the pixel filter, the fraction of the exposure, and the wavelengths.
+    #[inline(always)]
+    pub(crate) fn aim(&self) -> [R; 4] {
+        self.four(R::UInt::splat(FILTER))
+    }
+
+    /// The point on a light, the choice of the light, and its further digits.
     #[inline(always)]
     pub(crate) fn light(&self, vertex: R::UInt) -> [R; 4] {
         self.four(vertex.shl::<1>() + R::UInt::splat(FIRST_VERTEX))
     }
 
-    /// Which direction, which part of a BSDF, and whether the path goes on.
+    /// The direction, the lobe of a BSDF, and Russian roulette.
     #[inline(always)]
     pub(crate) fn scatter(&self, vertex: R::UInt) -> [R; 4] {
         self.four(vertex.shl::<1>() + R::UInt::splat(FIRST_VERTEX + 1))
     }
 
-    /// Four numbers of a label in [0, 1), multiples of 2⁻²⁴. Over the samples of a pixel, Sobol numbers are even: the first two
-    /// together, the others each by itself.
+    /// Four numbers of a label in [0, 1), multiples of 2⁻²⁴. Over the samples of a pixel, Sobol numbers are stratified:
+    /// the first two together, the others separately.
     #[inline(always)]
     pub(crate) fn four(&self, label: R::UInt) -> [R; 4] {
         let [p, q] = self.pixel;
@@ -99,7 +111,7 @@ impl<R: Real> LaneDraw<R> {
     }
 }
 
-/// The word with its bits in reversed order.
+/// The word with its bits in reverse order.
 #[inline(always)]
 fn reversed<U: UInt>(x: U) -> U {
     let s = U::splat;
@@ -110,7 +122,7 @@ fn reversed<U: UInt>(x: U) -> U {
     x.shr::<16>() | x.shl::<16>()
 }
 
-/// [`lumbre_math::sobol::owen_scramble`] of binary places in reversed order, to reversed order.
+/// [`lumbre_math::sobol::owen_scramble`] from and to reversed binary digits.
 #[inline(always)]
 fn reversed_scramble<U: UInt>(x: U, seed: U) -> U {
     let s = U::splat;
@@ -121,12 +133,12 @@ fn reversed_scramble<U: UInt>(x: U, seed: U) -> U {
     x ^ (x * s(0x53a2_2864))
 }
 
-/// A point of Owen-scrambled Sobol points, by the reversed index and keys of the shuffle and of both coordinates: see
+/// An Owen-scrambled Sobol point, from the reversed index and the keys of the shuffle and of both coordinates: see
 /// [`lumbre_math::sobol`].
 #[inline(always)]
 fn sobol_pair<U: UInt>(reversed_index: U, keys: [U; 3]) -> [U; 2] {
     let s = U::splat;
-    // In reversed order the radical inverse is the index itself.
+    // In reverse order, the radical inverse is the index itself.
     let x = reversed(reversed_scramble(reversed_index, keys[0]));
     let y = x ^ (x & s(0xaaaa_aaaa)).shr::<1>();
     let y = y ^ (y & s(0xcccc_cccc)).shr::<2>();
@@ -136,22 +148,22 @@ fn sobol_pair<U: UInt>(reversed_index: U, keys: [U; 3]) -> [U; 2] {
     [reversed(reversed_scramble(x, keys[1])), reversed(reversed_scramble(y, keys[2]))]
 }
 
-/// A number that is even over aligned ranges of indices, by keys of the shuffle and of the scramble.
+/// A number that is stratified over aligned ranges of indices, from the keys of the shuffle and of the scramble.
 #[inline(always)]
 fn sobol_one<U: UInt>(reversed_index: U, keys: [U; 2]) -> U {
     let shuffled = reversed(reversed_scramble(reversed_index, keys[0]));
     reversed(reversed_scramble(shuffled, keys[1]))
 }
 
-impl Draw {
-    /// The words that all numbers are made of: of the pixel, and the index of the sample.
-    pub(crate) fn words(&self) -> ([u32; 2], u32) {
-        (self.pixel, self.index)
+impl SampleNumbers {
+    /// The numbers of a sample by the words of its pixel: see [`Sampler::pixel`].
+    pub(crate) fn new(kind: SamplerKind, pixel: [u32; 2], index: u32) -> Self {
+        Self { kind, pixel, index }
     }
 
     fn four(&self, label: u32) -> [f32; 4] {
         let pixel = self.pixel.map(UInt::splat);
-        LaneDraw::<f32> { kind: self.kind, pixel, index: UInt::splat(self.index) }.four(UInt::splat(label))
+        LaneNumbers::<f32> { kind: self.kind, pixel, index: UInt::splat(self.index) }.four(UInt::splat(label))
     }
 
     fn two(&self, label: u32) -> DVec2 {
@@ -159,67 +171,68 @@ impl Draw {
         DVec2::new(x.into(), y.into())
     }
 
-    /// Where in the pixel filter.
+    /// The position in the pixel filter (two numbers), the fraction of the exposure, and the wavelengths: stratified
+    /// over the samples of a pixel.
+    pub fn aim(&self) -> [f32; 4] {
+        self.four(FILTER)
+    }
+
+    /// The position in the pixel filter.
     pub fn filter(&self) -> DVec2 {
         self.two(FILTER)
     }
 
-    /// Where on the lens.
+    /// The fraction of the exposure at the time of the ray.
+    pub fn time(&self) -> f64 {
+        self.aim()[2].into()
+    }
+
+    /// The position on the lens.
     pub fn lens(&self) -> DVec2 {
         self.two(LENS)
     }
 
-    /// Which part of the exposure is over when the ray looks: even over the samples of a pixel.
-    pub fn time(&self) -> f64 {
-        self.four(FILTER)[2].into()
-    }
-
-    /// Which wavelengths: even over the samples of a pixel.
-    pub fn wavelength(&self) -> f32 {
-        self.four(FILTER)[3]
-    }
-
-    /// Which light, at a vertex: a multiple of 2⁻⁴⁸.
+    /// The choice of the light at a vertex: a multiple of 2⁻⁴⁸.
     pub fn light_choice(&self, vertex: u32) -> f64 {
         let [.., choice, more] = self.four(of_light(vertex));
         f64::from(choice) + f64::from(more) * (1.0 / 16_777_216.0)
     }
 
-    /// Where on the light.
+    /// The point on the light.
     pub fn light_point(&self, vertex: u32) -> DVec2 {
         self.two(of_light(vertex))
     }
 
-    /// Where on the light of this number, for integrators that ask all of them for some `points` each: the points of all samples of
-    /// the pixel are even together.
+    /// The point on the light with this number, for integrators that sample all lights with `points` points each: the
+    /// points of all samples of the pixel are stratified together.
     pub fn point_on_each_light(&self, vertex: u32, light: u32, point: u32, points: u32) -> DVec2 {
         let label = EVERY_LIGHT.wrapping_add(vertex.wrapping_mul(1 << 12)).wrapping_add(light);
         let index = self.index.wrapping_mul(points).wrapping_add(point);
         Self { index, ..*self }.two(label)
     }
 
-    /// Whether a branch of a tree of rays goes on.
+    /// Russian roulette for a branch of a ray tree.
     pub fn branch(&self, vertex: u32, branch: u32) -> f32 {
         self.four(EVERY_BRANCH.wrapping_add(vertex.wrapping_mul(1 << 12)).wrapping_add(branch))[2]
     }
 
-    /// Which part of a BSDF.
+    /// The choice of a BSDF's lobe.
     pub fn lobe(&self, vertex: u32) -> f32 {
         self.four(of_bsdf(vertex))[2]
     }
 
-    /// Which direction of that part.
+    /// The direction within that lobe.
     pub fn direction(&self, vertex: u32) -> Vec2 {
         let [x, y, ..] = self.four(of_bsdf(vertex));
         Vec2::new(x, y)
     }
 
-    /// Whether the path goes on.
+    /// Russian roulette.
     pub fn survival(&self, vertex: u32) -> f32 {
         self.four(of_bsdf(vertex))[3]
     }
 
-    /// A distance sample in a medium: which channel of the spectrum, and how far.
+    /// A distance sample in a medium: the channel of the spectrum, and the distance.
     pub fn distance(&self, sample: u32) -> [f64; 2] {
         let [.., channel, distance] = self.four(in_medium(sample, 0));
         [channel.into(), distance.into()]
@@ -231,7 +244,7 @@ impl Draw {
         PassageNumbers::new(self.distance(sample), hash_words(&words.map(u64::from)))
     }
 
-    /// The seed of what is decided along a ray.
+    /// The seed of random decisions along a ray.
     pub fn along(&self, ray: &Ray) -> u64 {
         let line = combine(hash_dvec3(ray.origin), hash_dvec3(ray.direction));
         hash_words(&[self.pixel[0].into(), self.pixel[1].into(), self.index.into(), line])
@@ -243,7 +256,7 @@ impl Draw {
         Vec2::new(x, y)
     }
 
-    /// Whether the path goes on after that collision.
+    /// Russian roulette after that collision.
     pub fn survives_collision(&self, sample: u32) -> f32 {
         self.four(in_medium(sample, 1))[2]
     }
@@ -277,7 +290,7 @@ mod tests {
                 sampler(3).draw(5, 7, 12),
             ];
             for other in others {
-                assert_ne!(base.filter(), other.filter());
+                assert_ne!(base.aim(), other.aim());
                 assert_ne!(base.light_choice(2), other.light_choice(2));
             }
             assert_ne!(base.direction(2), base.direction(3));
@@ -322,7 +335,7 @@ mod tests {
         let sampler = Sampler::new(&SamplerDesc { kind: SamplerKind::Sobol, spp: None, seed: 9 });
         let mut cells = [0; 64];
         for index in 64..128 {
-            cells[(sampler.draw(13, 2, index).time() * 64.0) as usize] += 1;
+            cells[(sampler.draw(13, 2, index).aim()[2] * 64.0) as usize] += 1;
         }
         assert_eq!(cells, [1; 64]);
     }

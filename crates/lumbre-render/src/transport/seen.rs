@@ -1,4 +1,4 @@
-//! What a camera sees along a line of sight: light, and how much of what is behind it covers.
+//! What a camera ray sees: light, and how much it covers of the background.
 
 use std::f64::consts::FRAC_1_PI;
 
@@ -6,43 +6,43 @@ use lumbre_math::{DVec3, Frame, warp64};
 use lumbre_scene::{GroundPlane, Interaction, LightSample, Scene};
 use lumbre_shading::{Scatter, Spectrum};
 
-use crate::transport::interior::Interiors;
+use crate::transport::interior::MediumStack;
 use crate::transport::journal::{Event, Source};
 use crate::transport::through::{goes_straight_on, light_through, straight_on};
-use crate::transport::{Draw, Record, Sight};
+use crate::transport::{PrimaryHit, Record, SampleNumbers};
 
-/// Samples of each light that each sample of a shadow takes: few rays, where a whole path would be many.
+/// Light samples of each light per sample of a shadow: few rays, compared with a whole path.
 pub(crate) const SAMPLES: u32 = 2;
-/// Lights that each such sample asks: of more, as many by chance.
-pub(crate) const MOST_LIGHTS: usize = 4;
+/// Maximum lights per such sample: if there are more, this many are chosen at random.
+pub(crate) const MAX_LIGHTS: usize = 4;
 
-/// Each way of light through clear things has as many vertices of a draw as two to the power of this.
+/// Each light path through clear surfaces has two to the power of this vertices of random numbers.
 const WAY_BITS: u32 = 6;
 
-/// What is seen along a line of sight.
+/// What a camera ray sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Seen {
     /// Radiance, multiplied by the coverage.
     pub radiance: Spectrum,
-    /// How much of what is behind is covered, of each colour: shadows are coloured where lights are, or what they shine through.
-    /// Its mean over the samples of a pixel is in [0, 1]; that of one sample need not be.
+    /// The coverage of the background, per channel: shadows are coloured if lights or clear objects are. Its mean over
+    /// the samples of a pixel is in [0, 1]; that of one sample need not be.
     pub coverage: Spectrum,
-    /// Whether it is ground that catches shadows.
+    /// Whether it is a shadow catcher.
     pub on_catcher: bool,
 }
 
-/// What a sample sees where that is not for an integrator to find: nothing, or ground that catches shadows.
+/// What a sample sees without an integrator: nothing, or a shadow catcher.
 ///
-/// Where the camera meets nothing it sees the lights at infinity, or, if these are not to be seen, nothing at all. On ground
-/// that catches shadows ([`GroundPlane::catcher`]) it sees what it would see without the ground, darkened by the share of
-/// the light which something keeps from the ground: of light at infinity, from points and from spots. What comes through clear
-/// things is not kept from it: light at infinity through whatever bends or spreads it, the other light through smooth panes
-/// without thickness. (P. Debevec, "Rendering Synthetic Objects into Real Scenes", SIGGRAPH 1998, takes the difference of
-/// two renderings; here only what is blocked is estimated, so that ground in the open has no noise.)
+/// A camera ray that meets nothing sees the lights at infinity, or nothing at all if these are hidden. On a shadow
+/// catcher ([`GroundPlane::catcher`]) it sees what it would see without the ground, darkened by the blocked share of
+/// the ground's light: light at infinity, from points and from spots. Light through clear objects is not blocked: light
+/// at infinity even if it is refracted or spread, other light only through smooth panes without thickness. (P. Debevec,
+/// "Rendering Synthetic Objects into Real Scenes", SIGGRAPH 1998, takes the difference of two renderings; here only the
+/// blocked light is estimated, so that unshadowed ground has no noise.)
 pub(crate) fn caught(
     scene: &Scene,
-    sight: &Sight<'_>,
-    draw: &Draw,
+    sight: &PrimaryHit<'_>,
+    draw: &SampleNumbers,
     lights_are_seen: bool,
     record: &mut Record,
 ) -> Option<Seen> {
@@ -63,7 +63,7 @@ pub(crate) fn caught(
 }
 
 impl Seen {
-    /// Ground that catches shadows and has lost some of the irradiance that it has in the open, before a background.
+    /// A shadow catcher that has lost some of its unoccluded irradiance, in front of a background.
     pub(crate) fn of_catcher(
         lost: Spectrum,
         open: Spectrum,
@@ -80,22 +80,22 @@ impl Seen {
     }
 }
 
-/// An estimate of the irradiance on the ground that something blocks.
+/// An estimate of the blocked irradiance on the ground.
 fn lost(
     scene: &Scene,
     ground: &GroundPlane,
     at: &Interaction<'_>,
-    draw: &Draw,
+    draw: &SampleNumbers,
     record: &mut Record,
 ) -> Spectrum {
     let from = at.shadow_origin();
     let mut lost = Spectrum::BLACK;
     let lights = ground.lights();
-    // Every light, where there are few.
-    let asked = lights.len().min(MOST_LIGHTS);
+    // Every light, if there are few.
+    let asked = lights.len().min(MAX_LIGHTS);
     let share = lights.len() as f32 / asked.max(1) as f32;
     for i in 0..SAMPLES * asked as u32 {
-        let chosen = match lights.len() <= MOST_LIGHTS {
+        let chosen = match lights.len() <= MAX_LIGHTS {
             true => i as usize % asked,
             false => (draw.light_choice(i) * lights.len() as f64) as usize,
         };
@@ -113,7 +113,7 @@ fn lost(
         }
         let shadow_ray = at.shadow_ray(&sample);
         let mut left = if goes_straight_on(scene, &sample) {
-            straight_on(scene, shadow_ray, &sample, Interiors::default(), false, false, record)
+            straight_on(scene, shadow_ray, &sample, MediumStack::default(), false, false, record)
         } else {
             record.counts.shadow += 1;
             if scene.is_occluded(&shadow_ray) { Spectrum::BLACK } else { Spectrum::WHITE }
@@ -126,26 +126,26 @@ fn lost(
         }
         lost += sample.radiance * (Spectrum::WHITE - left) * (cosine * share / (density * SAMPLES as f32));
     }
-    if scene.lets_light_through() {
+    if scene.is_transmissive() {
         lost = lost - passed(scene, ground, at, draw, record);
     }
     lost
 }
 
-/// An estimate of the irradiance by light at infinity that comes through clear things.
+/// An estimate of the irradiance from light at infinity through clear objects.
 ///
-/// Light is looked for where lights are, and over the whole sky, for what is clear may bend it: both ways are
-/// combined by the balance heuristic (E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997).
+/// Directions are sampled from the lights and over the whole sky, since clear objects may refract: the balance
+/// heuristic combines both (E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997).
 fn passed(
     scene: &Scene,
     ground: &GroundPlane,
     at: &Interaction<'_>,
-    draw: &Draw,
+    draw: &SampleNumbers,
     record: &mut Record,
 ) -> Spectrum {
     let frame = Frame::from_z(ground.normal);
     let mut irradiance = Spectrum::BLACK;
-    // The vertices whose numbers choose the way of the light begin at a place of their own for each direction.
+    // Each direction has its own range of vertices, whose numbers choose the light's path.
     let along = |direction: DVec3, way: u32, record: &mut Record| {
         let cosine = ground.normal.dot(direction);
         if cosine <= 0.0 {

@@ -1,12 +1,12 @@
-//! A ray from the camera, and what it meets first.
+//! A camera ray and its first hit.
 
 use lumbre_scene::{CameraRay, Interaction};
 
-/// A ray from the camera, and what it meets first.
+/// A camera ray and its first hit.
 #[derive(Clone, Debug)]
-pub struct Sight<'s> {
+pub struct PrimaryHit<'s> {
     /// The ray.
     pub ray: CameraRay,
-    /// What it meets; `None` when it leaves the scene.
+    /// The first hit; `None` if the ray leaves the scene.
     pub met: Option<Interaction<'s>>,
 }

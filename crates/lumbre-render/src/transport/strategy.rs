@@ -1,13 +1,13 @@
 //! How paths find light.
 
-/// How a path finds light. All give the same picture in the mean, but [`Strategy::Bsdf`] does not find lights that no ray
-/// can hit by chance, for which it samples the lights all the same.
+/// How a path finds light. All strategies have the same mean, except for lights that no ray can hit by chance:
+/// [`Strategy::Bsdf`] samples those lights too.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Strategy {
-    /// Both ways, weighed.
+    /// Both strategies, weighted.
     #[default]
     Both,
-    /// By sampling lights, where they can be sampled.
+    /// By sampling lights, if they can be sampled.
     Lights,
     /// By sampling the BSDF.
     Bsdf,

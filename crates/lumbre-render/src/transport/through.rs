@@ -1,4 +1,4 @@
-//! Light that reaches a place through what is clear.
+//! Light that reaches a point through clear surfaces.
 
 use lumbre_geometry::Ray;
 use lumbre_scene::{Footprint, Interaction, LightSample, Scene};
@@ -6,44 +6,45 @@ use lumbre_shading::spectrum::Wavelengths;
 use lumbre_shading::{Material, Scatter, ShadingNormals, Spectrum};
 
 use crate::transport::direct::Vertex;
-use crate::transport::interior::Interiors;
-use crate::transport::{Draw, Record};
+use crate::transport::interior::MediumStack;
+use crate::transport::{Record, SampleNumbers};
 
-/// Surfaces at most that light goes through or is reflected by inside a solid.
-const MOST_SURFACES: u32 = 16;
-/// Surfaces at most that light goes straight on through.
-const MOST_PANES: u32 = 256;
-/// A part of a pane's mixture that has less of it than this is not taken apart.
-const LEAST_PART: f32 = 1.0 / 256.0;
-/// How far the product of the indices along a path may be from 1 by rounding.
+/// Maximum surfaces that refract or reflect light inside a solid.
+const MAX_SURFACES: u32 = 16;
+/// Maximum surfaces that light passes straight through.
+const MAX_PANES: u32 = 256;
+/// A smaller part of a pane's mixture is not followed separately.
+const MIN_PART: f32 = 1.0 / 256.0;
+/// Maximum rounding error of the product of the indices along a path.
 const INDEX_ERROR: f32 = 1e-4;
 
-/// The way from a ray's origin to what it met; its direction is unit.
+/// The distance from a ray's origin to its hit; its direction is unit.
 pub(crate) fn ray_length(ray: &Ray, here: &Interaction) -> f64 {
     (here.surface.point - ray.origin).length()
 }
 
-/// The throughput of the hero wavelength, which goes on in place of all of them.
+/// The throughput of the hero wavelength, which replaces all of them.
 pub(crate) fn hero_alone(throughput: Spectrum) -> Spectrum {
     Spectrum::new(Wavelengths::COUNT as f32 * throughput.r, 0.0, 0.0)
 }
 
-/// An estimate of the light at infinity that comes back along a ray which meets something first: refracted, spread by what is
-/// rough, and reflected inside solids, but not by their outer sides. Black where the ray meets nothing, or what is not clear.
+/// An estimate of the light at infinity that comes back along a ray which meets something first: refracted, spread by
+/// rough surfaces, and reflected inside solids, but not by their outer sides. Black if the ray meets nothing, or
+/// something that is not clear.
 ///
-/// What solids scatter inside is not followed. The draw's vertices from `first` on choose the way.
+/// Scattering inside solids is not followed. The random numbers of vertices from `first` on choose the light's path.
 pub(crate) fn light_through(
     scene: &Scene,
     mut ray: Ray,
-    draw: &Draw,
+    draw: &SampleNumbers,
     first: u32,
     record: &mut Record,
 ) -> Spectrum {
     let mut throughput = Spectrum::WHITE;
-    let mut interiors = Interiors::default();
-    // Index of refraction where the path is, over that where it began.
+    let mut interiors = MediumStack::default();
+    // Index of refraction at the path's point, relative to that at its start.
     let mut index = 1.0_f32;
-    for surface in 0..MOST_SURFACES {
+    for surface in 0..MAX_SURFACES {
         record.counts.bounce += 1;
         let Some(hit) = scene.closest(&ray) else {
             let is_open = surface == 0;
@@ -82,34 +83,35 @@ pub(crate) fn light_through(
     Spectrum::BLACK
 }
 
-/// Whether a light's sample is to be followed through panes by [`straight_on`], where paths find all other light behind them: that of
-/// points and in one direction, which no path finds by chance, so that nothing counts twice.
+/// Whether [`straight_on`] follows a light sample through panes although paths find all other light behind them: for
+/// point lights and lights in one direction, which no path finds by chance, so that nothing counts twice.
 pub(crate) fn goes_straight_on(scene: &Scene, sample: &LightSample) -> bool {
-    sample.scatter == Scatter::Delta && scene.lets_light_straight_on()
+    sample.scatter == Scatter::Delta && scene.has_delta_transmission()
 }
 
-/// What is left of a light's sample where `shadow_ray` starts, inside of `interiors`: the product of what all that it goes
-/// straight on through leaves of it ([`lumbre_shading::Bsdf::straight_on`], that of regularized BSDFs where the path's are), and
-/// of what solids on the way take. Black behind anything else, and behind more than [`MOST_PANES`] surfaces.
+/// The share of a light sample that arrives where `shadow_ray` starts, inside of `interiors`: the product of the
+/// straight transmission of all surfaces on the way ([`lumbre_shading::Bsdf::straight_on`], of regularized BSDFs if the
+/// path's are) and of the transmittance of solids. Black behind anything else, and behind more than [`MAX_PANES`]
+/// surfaces.
 ///
-/// Only for light that is not also found by rays which go through the pane themselves, or it would count twice: of paths, see
-/// [`goes_straight_on`]. What bends or spreads light stands in its way here: what is rough is lit itself, and paths find it; what
-/// is smooth and bends light would have to send a path to such a light by chance, and never does.
+/// Only for light that rays through the pane itself do not find too, or it would count twice: for paths, see
+/// [`goes_straight_on`]. Refracting or rough surfaces block this light. Paths find the light on rough ones. Smooth
+/// refracting ones would have to send a path to such a light by chance, which never happens.
 pub(crate) fn straight_on<'s>(
     scene: &'s Scene,
     shadow_ray: Ray,
     sample: &LightSample,
-    mut interiors: Interiors<'s>,
+    mut interiors: MediumStack<'s>,
     regularize: bool,
     mut is_alone: bool,
     record: &mut Record,
 ) -> Spectrum {
     let mut left = Spectrum::WHITE;
     let mut ray = shadow_ray;
-    for _ in 0..MOST_PANES {
+    for _ in 0..MAX_PANES {
         record.counts.shadow += 1;
         let Some(hit) = scene.closest(&ray) else {
-            // Light from infinitely far away was not inside anything.
+            // Light from infinity was not inside any solid.
             let last = sample.end.map(|end| interiors.transmittance((end.point - ray.origin).length()));
             return left * last.unwrap_or(Spectrum::WHITE);
         };
@@ -121,7 +123,7 @@ pub(crate) fn straight_on<'s>(
         let material = pane.resolved();
         interiors.arrive(&pane, material);
         left *= interiors.transmittance(ray_length(&ray, &pane));
-        left *= Vertex::parts(scene, &pane, LEAST_PART, &interiors, ShadingNormals::Lumbre)
+        left *= Vertex::parts(scene, &pane, MIN_PART, &interiors, ShadingNormals::Lumbre)
             .map(|(share, mut vertex)| {
                 if regularize {
                     vertex.bsdf = vertex.bsdf.regularized();

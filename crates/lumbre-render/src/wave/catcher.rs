@@ -1,4 +1,4 @@
-//! Ground that catches shadows, in lanes: the light that something keeps from the places that samples see.
+//! Ground that catches shadows, in lanes: the light that objects block from the points that samples see.
 
 use lumbre_math::DVec3;
 use lumbre_scene::light::lanes::Receiver;
@@ -6,30 +6,30 @@ use lumbre_scene::{GroundPlane, SamplerKind, Scene};
 use lumbre_shading::Spectrum;
 use lumbre_simd::{Double, InstructionSet, Job, Mask, Real, UInt, V3};
 
-use crate::transport::sampler::LaneDraw;
-use crate::transport::seen::{MOST_LIGHTS, SAMPLES};
+use crate::transport::sampler::LaneNumbers;
+use crate::transport::seen::{MAX_LIGHTS, SAMPLES};
 use crate::transport::{Record, Seen};
 use crate::wave::paths::{PAD, Paths, Slots, grow};
 use crate::wave::shadows::{Segment, Shadows};
 use crate::wave::vertices::{gather3, gather64};
 
-/// Ground that catches shadows of few lights, all of which are everywhere: what [`crate::transport::caught`] estimates, with the same
-/// random numbers, for many places at once.
+/// A shadow catcher for few lights, all of them distributed everywhere: the estimate of [`crate::transport::caught`],
+/// with the same random numbers, for many points together.
 #[derive(Debug)]
 pub(crate) struct Catcher<'s> {
     scene: &'s Scene,
     ground: &'s GroundPlane,
-    /// Positions for [`lumbre_scene::light::lanes::LaneLights::sample_one`].
+    /// Indices for [`lumbre_scene::light::lanes::LaneLights::sample_one`].
     lights: Vec<usize>,
     instruction_set: InstructionSet,
 }
 
-/// Places on the ground that samples see.
+/// Points on the ground that samples see.
 #[derive(Debug, Default)]
 pub(crate) struct Places {
     pub(crate) slots: Vec<u32>,
     points: Vec<DVec3>,
-    /// Where rays to lights start.
+    /// Origins of the shadow rays.
     origin: [Vec<f64>; 3],
 }
 
@@ -44,14 +44,14 @@ impl Places {
 }
 
 impl<'s> Catcher<'s> {
-    /// The catcher of a scene; `None` without one, and where light is to be followed one way at a time: of lamps, and through what is
-    /// clear.
+    /// The catcher of a scene; `None` without one, and if light must be followed one path at a time: from lamps, and
+    /// through clear surfaces.
     pub(crate) fn of(scene: &'s Scene) -> Option<Self> {
-        let is_simple = !scene.lets_light_through() && !scene.has_media();
+        let is_simple = !scene.is_transmissive() && !scene.has_media();
         let ground = scene.ground().filter(|ground| ground.catcher && is_simple)?;
         let lights: Option<Vec<usize>> =
             ground.lights().iter().map(|&light| scene.lane_lights().position(light)).collect();
-        let lights = lights.filter(|lights| lights.len() <= MOST_LIGHTS)?;
+        let lights = lights.filter(|lights| lights.len() <= MAX_LIGHTS)?;
         Some(Self { scene, ground, lights, instruction_set: InstructionSet::detect() })
     }
 
@@ -60,7 +60,7 @@ impl<'s> Catcher<'s> {
         self.ground
     }
 
-    /// What is seen at places, in their order.
+    /// What samples see at these points, in their order.
     #[expect(clippy::too_many_arguments, reason = "columns of a wave")]
     pub(crate) fn see(
         &self,
@@ -75,12 +75,12 @@ impl<'s> Catcher<'s> {
     ) -> Vec<Seen> {
         let count = places.slots.len();
         let Some(&last) = places.slots.last() else { return Vec::new() };
-        // A vector reads beyond the last.
+        // Vector loads read beyond the last element.
         places.slots.resize(count + PAD, last);
         places.origin.iter_mut().for_each(|column| grow(column, count));
         shadows.reset(count * self.lights.len() * SAMPLES as usize);
         for sample in 0..SAMPLES {
-            // The scalar code counts samples of all lights in one row.
+            // The scalar code numbers the samples of all lights consecutively.
             for (k, &light) in self.lights.iter().enumerate() {
                 let number = sample * self.lights.len() as u32 + k as u32;
                 self.instruction_set.run(Light {
@@ -122,7 +122,7 @@ impl<'s> Catcher<'s> {
     }
 }
 
-/// Sends a segment from each place to a sample of a light.
+/// Traces a segment from each point to a sample of a light.
 struct Light<'a, 's> {
     catcher: &'a Catcher<'s>,
     places: &'a Places,
@@ -130,7 +130,7 @@ struct Light<'a, 's> {
     count: usize,
     sampler: SamplerKind,
     light: usize,
-    /// Of the sample among those of a place.
+    /// The number of the sample among those of a point.
     number: u32,
     shadows: &'a mut Shadows<'s>,
 }
@@ -147,7 +147,7 @@ impl Job for Light<'_, '_> {
         while done < count {
             let lanes = R::Mask::first(count - done);
             let slot = R::UInt::from_slice(&places.slots[done..]);
-            let draw = LaneDraw::<R> {
+            let draw = LaneNumbers::<R> {
                 kind: sampler,
                 pixel: [R::UInt::gather(&slots.pixel[0], slot), R::UInt::gather(&slots.pixel[1], slot)],
                 index: R::UInt::gather(&slots.index, slot),
@@ -183,7 +183,7 @@ impl Job for Light<'_, '_> {
     }
 }
 
-/// The light at infinity along the rays from the camera.
+/// The light at infinity along the camera rays.
 struct Background<'a> {
     scene: &'a Scene,
     places: &'a Places,
@@ -202,7 +202,7 @@ impl Job for Background<'_> {
         let mut done = 0;
         while done < count {
             let lanes = R::Mask::first(count - done);
-            // Rays from the camera are in the order of their samples.
+            // Camera rays are in the order of their samples.
             let path = R::UInt::from_slice(&places.slots[done..]);
             let direction = gather3::<R>(&paths.direction, path);
             let from = gather64::<R>(&paths.origin, path);

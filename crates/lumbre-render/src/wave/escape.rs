@@ -1,4 +1,4 @@
-//! The light at infinity that rays find which leave the scene, in lanes.
+//! The light at infinity for rays that leave the scene, in lanes.
 
 use lumbre_scene::light::lanes::Receiver;
 use lumbre_shading::Spectrum;
@@ -8,15 +8,15 @@ use crate::wave::paths::{Paths, Slots};
 use crate::wave::setting::{Found, Setting};
 use crate::wave::vertices::{gather3, gather64};
 
-/// Finds the light of one infinite light for all paths of a queue.
+/// Adds the light of one infinite light to all paths of a queue.
 pub(crate) struct Escape<'a, 's> {
     pub(crate) setting: &'a Setting<'s>,
     pub(crate) slots: &'a Slots<'s>,
     pub(crate) paths: &'a Paths,
-    /// Paths that left the scene, and after the last ones enough others to fill a vector.
+    /// Paths that left the scene, padded to a full vector.
     pub(crate) queue: &'a [u32],
     pub(crate) count: usize,
-    /// Which of the infinite lights.
+    /// Index of the infinite light.
     pub(crate) light: usize,
     pub(crate) found: &'a mut Vec<Found>,
 }

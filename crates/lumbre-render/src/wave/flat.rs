@@ -1,7 +1,8 @@
 //! Vertices on flat triangles, in lanes: points with their errors, normals, and the light that such surfaces emit.
 
-use lumbre_scene::TriangleSurface;
+use lumbre_math::Vec3;
 use lumbre_scene::light::lanes::Receiver;
+use lumbre_scene::{SurfaceTable, TriangleSurface};
 use lumbre_shading::Spectrum;
 use lumbre_simd::math::orthonormal_basis;
 use lumbre_simd::{Double, Job, Mask, Real, UInt, V3};
@@ -18,24 +19,27 @@ pub(crate) struct FlatHits {
     pub(crate) path: Vec<u32>,
     id: Vec<u32>,
     pub(crate) triangle: Vec<u32>,
-    /// Where the row of the BSDF begins.
+    /// Start of the BSDF's row.
     pub(crate) row: Vec<u32>,
     /// [`LIT_FROM_BELOW`] or 0.
     pub(crate) flags: Vec<u32>,
+    /// The corners of each triangle in its mesh.
+    pub(crate) indices: Vec<[u32; 3]>,
     /// The corners relative to the origin, corner by corner.
     corners: [Vec<f32>; 9],
     origin: [Vec<f64>; 3],
     pub(crate) local: [Vec<f32>; 2],
     pub(crate) distance: Vec<f32>,
     pub(crate) outward: Vec<f32>,
-    /// The radiance that the surface emits, and 0, 1 or 2 for the number of its sides that do.
+    /// The radiance that the surface emits, and the number of its emissive sides (0, 1 or 2).
     emission: [Vec<f32>; 4],
 }
 
 impl FlatHits {
-    /// Forgets all, with room for `len` hits.
+    /// Clears the columns and reserves `len` hits.
     pub(crate) fn reset(&mut self, len: usize) {
         self.len = 0;
+        self.indices.clear();
         for column in [&mut self.path, &mut self.id, &mut self.triangle, &mut self.row, &mut self.flags] {
             grow(column, len);
         }
@@ -49,11 +53,11 @@ impl FlatHits {
     }
 
     /// The surface of a hit.
-    pub(crate) fn surface<'s>(&self, setting: &Setting<'s>, at: usize) -> Option<&'s TriangleSurface> {
-        setting.scene.tables().surface(self.id[at])
+    pub(crate) fn surface<'s>(&self, surfaces: &'s SurfaceTable, at: usize) -> Option<&'s TriangleSurface> {
+        surfaces.surface(self.id[at])
     }
 
-    /// Notes what a path met.
+    /// Appends what a path met.
     #[inline]
     pub(crate) fn push(&mut self, surface: &TriangleSurface, path: usize, met: MetTriangle, distance: f32) {
         let at = self.len;
@@ -63,13 +67,6 @@ impl FlatHits {
         self.triangle[at] = met.triangle;
         self.row[at] = surface.bsdf.map_or(0, |bsdf| bsdf.row);
         self.flags[at] = if surface.transmits { LIT_FROM_BELOW } else { 0 };
-        let corners = surface.mesh.indices[met.triangle as usize];
-        for (corner, columns) in corners.into_iter().zip(self.corners.chunks_exact_mut(3)) {
-            let position = surface.mesh.positions[corner as usize];
-            columns[0][at] = position.x;
-            columns[1][at] = position.y;
-            columns[2][at] = position.z;
-        }
         for (column, x) in self.origin.iter_mut().zip(surface.mesh.origin.to_array()) {
             column[at] = x;
         }
@@ -84,9 +81,31 @@ impl FlatHits {
             column[at] = x;
         }
     }
+
+    /// Reads the corners of all triangles, in loops so short that the loads of many triangles overlap.
+    pub(crate) fn load(&mut self, surfaces: &SurfaceTable) {
+        let met = self.id.iter().zip(&self.triangle).take(self.len);
+        self.indices.extend(met.map(|(&id, &triangle)| {
+            surfaces.surface(id).map_or([0; 3], |surface| surface.mesh.indices[triangle as usize])
+        }));
+        for (at, (&id, corners)) in self.id.iter().zip(&self.indices).enumerate() {
+            let Some(surface) = surfaces.surface(id) else { continue };
+            put_corners(&mut self.corners, at, corners.map(|corner| surface.mesh.positions[corner as usize]));
+        }
+    }
 }
 
-/// Makes vertices of flat hits, in their order, and finds the light that they emit.
+/// Writes the vectors of three corners, corner by corner.
+#[inline]
+pub(crate) fn put_corners(columns: &mut [Vec<f32>; 9], at: usize, corners: [Vec3; 3]) {
+    for (corner, columns) in corners.into_iter().zip(columns.chunks_exact_mut(3)) {
+        columns[0][at] = corner.x;
+        columns[1][at] = corner.y;
+        columns[2][at] = corner.z;
+    }
+}
+
+/// Makes vertices of flat hits, in their order, and adds the light that they emit.
 pub(crate) struct FlatVertices<'a, 's> {
     pub(crate) setting: &'a Setting<'s>,
     pub(crate) hits: &'a FlatHits,
@@ -108,7 +127,7 @@ impl Job for FlatVertices<'_, '_> {
         while done < hits.len {
             let lanes = R::Mask::first(hits.len - done);
             let at = R::UInt::from_slice(&hits.path[done..]);
-            // Lanes beyond the last have a path, too.
+            // Padding lanes need a valid path too.
             let at = R::UInt::select(lanes, at, R::UInt::splat(0));
             let outward = R::from_slice(&hits.outward[done..]);
             let (point, error, normal) = triangle::<R>(hits, done, outward);
@@ -139,7 +158,7 @@ impl Job for FlatVertices<'_, '_> {
     }
 }
 
-/// Adds the light of surfaces that shine on the side of the viewer.
+/// Adds the light of surfaces that emit on the side of the viewer.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "lanes, as they stand in registers")]
 pub(crate) fn find_light<R: Real>(
@@ -161,10 +180,10 @@ pub(crate) fn find_light<R: Real>(
     }
 }
 
-/// A point of each triangle with a bound on the error of its components, and the normal that points outside.
+/// A point of each triangle with an error bound of its components, and the outward normal.
 ///
-/// The error is that of the combination, γ₇ Σ|bᵢ pᵢ| (M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering", 3rd edition, 2016,
-/// section 3.9), and one rounding for the mesh's origin.
+/// The error is that of the combination, γ₇ Σ|bᵢ pᵢ| (M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering",
+/// 3rd edition, 2016, section 3.9), and one rounding for the mesh's origin.
 #[inline(always)]
 pub(crate) fn triangle<R: Real>(
     hits: &FlatHits,
@@ -186,7 +205,7 @@ pub(crate) fn triangle<R: Real>(
     let sizes = abs::<R>(t0) + abs::<R>(t1) + abs::<R>(t2);
     let error = sizes * R::Double::splat(gamma(7)) + abs::<R>(point) * R::Double::splat(UNIT_ROUNDOFF);
     let cross = (p1 - p0).cross(p2 - p0);
-    // In double precision: the cross product of small sides is beyond single precision.
+    // In double precision: the cross product of short sides underflows single precision.
     let length = cross.dot(cross).sqrt();
     let unit = V3 { x: cross.x / length, y: cross.y / length, z: cross.z / length };
     let normal = V3 { x: unit.x.to_single(), y: unit.y.to_single(), z: unit.z.to_single() };
@@ -240,7 +259,7 @@ fn light_pdf<R: Real>(
     let receiver = Receiver::<R> {
         from: gather64::<R>(&paths.origin, at),
         normal: gather3(&paths.receiver, at),
-        // What moves is not flat here.
+        // Moving surfaces are never flat hits.
         time: None,
     };
     let id = R::UInt::from_slice(&hits.id[done..]);
@@ -249,7 +268,7 @@ fn light_pdf<R: Real>(
     lights.pdf(setting.scene, chosen, &receiver, id, triangle, point).or_zero(chosen)
 }
 
-/// Notes the light that paths found.
+/// Records the light that paths found.
 #[inline(always)]
 fn push_found<R: Real>(
     found: &mut Vec<Found>,

@@ -1,4 +1,4 @@
-//! What solids and panes do to light samples.
+//! The effect of solids and panes on light samples.
 
 use lumbre_math::DVec3;
 use lumbre_scene::LightSample;
@@ -7,7 +7,7 @@ use lumbre_scene::light::lanes::LaneLightSample;
 use lumbre_shading::{Scatter, Spectrum};
 use lumbre_simd::{Double, Mask, Real, UInt, V3};
 
-use crate::transport::interior::Interiors;
+use crate::transport::interior::MediumStack;
 use crate::wave::shade::Shade;
 use crate::wave::shadows::Pane;
 
@@ -16,7 +16,7 @@ fn from_lanes<R: Real>(lanes: &[[f32; 16]; 3]) -> V3<R> {
     V3 { x: R::from_lanes(&lanes[0]), y: R::from_lanes(&lanes[1]), z: R::from_lanes(&lanes[2]) }
 }
 
-/// Light samples as one lane after the other sees them.
+/// Light samples, lane by lane.
 #[inline(always)]
 fn to_samples<R: Real>(light: &LaneLightSample<R>) -> Samples {
     Samples {
@@ -100,8 +100,8 @@ pub(crate) fn first_sample<R: Real>(light: &LaneLightSample<R>) -> LightSample {
     to_samples(light).get(0)
 }
 
-/// The solids around a path on one side of the surface that it is at, or the other.
-fn around<'s>(shade: &Shade<'_, 's>, vertex: usize, slot: u32, crosses: bool) -> Interiors<'s> {
+/// The solids around a path, on either side of the surface at its vertex.
+fn around<'s>(shade: &Shade<'_, 's>, vertex: usize, slot: u32, crosses: bool) -> MediumStack<'s> {
     let mut around = shade.slots.interiors.get(slot as usize).cloned().unwrap_or_default();
     if let (true, Some((solid, front))) = (crosses, shade.vertices.solid(vertex)) {
         around.cross(solid, front);
@@ -109,7 +109,7 @@ fn around<'s>(shade: &Shade<'_, 's>, vertex: usize, slot: u32, crosses: bool) ->
     around
 }
 
-/// What the solids around leave of the light that arrives from samples, in the lanes of a mask.
+/// Attenuates light samples by the solids around, in the lanes of a mask.
 #[inline(always)]
 pub(crate) fn pass_solids<R: Real>(
     shade: &Shade<'_, '_>,
@@ -140,7 +140,7 @@ fn passes(
     while lanes != 0 {
         let lane = lanes.trailing_zeros() as usize;
         lanes &= lanes - 1;
-        // Light from infinitely far away was not inside anything.
+        // Light from infinity was not inside any solid.
         let Some(end) = samples.get(lane).end else { continue };
         let around = around(shade, at[lane] as usize, slot[lane], crosses >> lane & 1 == 1);
         if around.attenuates() {
@@ -151,7 +151,7 @@ fn passes(
     }
 }
 
-/// Notes which segments go through panes: those of `some` among those of `all`, which were appended from `first` on.
+/// Records which segments go through panes: those of `some` among those of `all`, which were appended from `first` on.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "lanes, as they stand in registers")]
 pub(crate) fn push_panes<R: Real>(

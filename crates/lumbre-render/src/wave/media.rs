@@ -1,4 +1,4 @@
-//! Media between surfaces: what they take from paths, add to them, and where they scatter them.
+//! Media between surfaces: how they attenuate, add to and scatter paths.
 
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Vec3};
@@ -19,7 +19,7 @@ use crate::wave::traced::Traced;
 use crate::wave::vertices::Place;
 
 impl<'s> Wave<'s> {
-    /// Takes all paths through media to what they meet, and notes those that scatter or end before.
+    /// Traces all paths through media to their next surface; records those that scatter or end before it.
     pub(super) fn cross_media(&mut self, setting: &Setting<'s>, record: &mut Record) {
         self.collisions.clear();
         self.taken.clear();
@@ -28,19 +28,19 @@ impl<'s> Wave<'s> {
         }
         for path in 0..self.paths.len {
             let slot = self.paths.slot[path] as usize;
-            // The medium of a solid's material is all that there is inside of it.
+            // Inside a solid, only the medium of its material counts.
             let is_inside = self.slots.interiors.get(slot).is_some_and(|solids| solids.attenuates());
             let arrives = is_inside || self.cross(setting, path, slot, record);
             self.taken.push(!arrives);
         }
     }
 
-    /// Whether a path does not get to what its ray meets.
+    /// Whether a path scatters or ends before what its ray meets.
     pub(super) fn is_taken(&self, path: usize) -> bool {
         self.taken.get(path).is_some_and(|&taken| taken)
     }
 
-    /// Takes a path through media to what it meets; false where it scatters or ends before.
+    /// Traces a path through media to what it meets; false if it scatters or ends before.
     fn cross(&mut self, setting: &Setting<'s>, path: usize, slot: usize, record: &mut Record) -> bool {
         let scene = setting.scene;
         let end = self.hits.distance_f64(path);
@@ -67,7 +67,7 @@ impl<'s> Wave<'s> {
         arrives
     }
 
-    /// Takes a path through a medium along a part of its ray; false where it scatters or ends there.
+    /// Traces a path through one medium along a part of its ray; false if it scatters or ends there.
     #[expect(clippy::too_many_arguments, reason = "the path, and its way")]
     fn pass(
         &mut self,
@@ -81,7 +81,7 @@ impl<'s> Wave<'s> {
     ) -> bool {
         let way = Way { origin: ray.at(start), direction: ray.direction, length: end - start };
         let throughput = self.paths.throughput(path);
-        let numbers = self.slots.draws[slot].passage(self.slots.distance_samples[slot]);
+        let numbers = self.slots.draw(slot).passage(self.slots.distance_samples[slot]);
         self.slots.distance_samples[slot] += 1;
         let wavelengths = self.slots.wavelengths.get(slot);
         let passage = setting.scene.medium(medium).sample(&way, throughput, numbers, wavelengths);
@@ -108,7 +108,7 @@ impl<'s> Wave<'s> {
         !scattered && !throughput.is_black()
     }
 
-    /// A sample of the lights and a direction to go on in at each collision.
+    /// Samples the lights and a new direction at each collision.
     pub(super) fn shade_collisions(
         &mut self,
         setting: &Setting<'s>,
@@ -132,7 +132,7 @@ impl<'s> Wave<'s> {
         let (scene, from) = (setting.scene, collision.point);
         let path = collision.path as usize;
         let slot = self.paths.slot[path] as usize;
-        let (draw, time) = (&self.slots.draws[slot], self.slots.time[slot]);
+        let (draw, time) = (self.slots.draw(slot), self.slots.time[slot]);
         let depth = self.paths.depth[path] & !SCATTERED;
         let (choose, u) = (draw.light_choice(depth), draw.light_point(depth));
         let sampling = match setting.strategy {
@@ -187,7 +187,7 @@ impl<'s> Wave<'s> {
     ) {
         let path = collision.path as usize;
         let slot = self.paths.slot[path] as usize;
-        let draw = &self.slots.draws[slot];
+        let draw = self.slots.draw(slot);
         let vertex = self.paths.depth[path] & !SCATTERED;
         let asymmetry = setting.scene.medium(collision.medium).asymmetry();
         let incoming = self.paths.direction(path);
@@ -207,7 +207,7 @@ impl<'s> Wave<'s> {
         let next = OnePath {
             slot: slot as u32,
             origin: collision.point,
-            // Light comes from every side.
+            // Light arrives from every side.
             receiver: Vec3::ZERO,
             direction: along.normalize(),
             throughput,
@@ -227,7 +227,7 @@ impl<'s> Wave<'s> {
     }
 }
 
-/// Where a segment to a point of a light ends.
+/// The end of a segment to a point of a light.
 fn stop(setting: &Setting<'_>, is_single: bool, end: &LightPoint, towards: DVec3) -> DVec3 {
     let vector = |v: DVec3| V3::new(v.x, v.y, v.z);
     let single = |v: DVec3| V3::new(v.x as f32, v.y as f32, v.z as f32);

@@ -1,4 +1,4 @@
-//! Photons near vertices and near collisions in media: light from lamps that came over mirrors and smooth glass.
+//! Photons near vertices and near collisions in media: caustic light from lamps.
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
@@ -16,11 +16,11 @@ use crate::wave::setting::Setting;
 use crate::wave::vertices::Vertices;
 use crate::wave::{KINDS, Wave};
 
-/// Photons that are merged at a time, about.
+/// Approximate number of photons merged at a time.
 const BATCH: usize = 1 << 14;
 
 impl<'s> Wave<'s> {
-    /// Adds the light of photons near the vertices that are to be shaded.
+    /// Adds the light of photons near the vertices in the queues.
     pub(super) fn merge(&mut self, setting: &Setting<'s>, record: &mut Record) {
         let Some(merging) = &setting.merging else { return };
         let mut merges = std::mem::take(&mut self.merges);
@@ -94,7 +94,7 @@ impl<'s> Wave<'s> {
         let depth = self.paths.depth[path];
         let radius: f32 =
             radius::<f32>(self.slots.widths[slot], self.vertices.width[at], depth & SCATTERED != 0);
-        // The bounce of the vertex is one, too.
+        // The bounce at the vertex counts too.
         let bounces_left = setting.max_depth.saturating_sub((depth & !SCATTERED) + 1);
         let normal = Vec3::from_array(self.vertices.normal.each_ref().map(|column| column[at]));
         let spread = merging.spread(radius);
@@ -102,7 +102,7 @@ impl<'s> Wave<'s> {
             return;
         }
         photons.surfaces.within(self.vertices.point(at), radius.into(), |photon| {
-            // What lies around a corner is of another surface.
+            // A photon around a corner is on another surface.
             let is_level = photon.normal.dot(normal).abs() >= FRAC_1_SQRT_2;
             if is_level && photon.bounces <= bounces_left {
                 merges.push(vertex, photon, spread);
@@ -111,7 +111,7 @@ impl<'s> Wave<'s> {
     }
 }
 
-/// Finds what vertices scatter of the photons near them.
+/// Computes what vertices scatter of the photons near them.
 fn scatter(
     setting: &Setting<'_>,
     kind: BsdfKind,
@@ -122,7 +122,7 @@ fn scatter(
     if merges.len == 0 {
         return;
     }
-    // A vector reads beyond the last.
+    // Vector loads read beyond the last element.
     let last = merges.vertex[merges.len - 1];
     merges.vertex[merges.len..merges.len + PAD].fill(last);
     Merge { vertices, paths, merges }.of_kind(setting.instruction_set, kind);

@@ -1,11 +1,12 @@
-//! Many paths side by side: plain data in columns, and stages that take them all one step further.
+//! Waves of paths: data in columns, and stages that advance all paths by one step.
 //!
-//! A wave holds some thousand samples ([`Slots`]), each with its path ([`Paths`]). A bounce goes through the stages: the closest hits
-//! of all rays ([`search`]); what media do on the way there ([`media`]); what they met, written down as plain numbers, with emission
-//! and materials ([`surfaces`]); a light
-//! and a direction to go on in, for all of them ([`shade`]); what comes through of the lights ([`shadows`]). What a path does depends on
-//! nothing but its sample: neither the size of the wave nor the other paths in it show in the picture.
+//! A wave holds a few thousand samples ([`Slots`]), each with its path ([`Paths`]), which starts at the camera
+//! ([`camera`]). A bounce goes through these stages: the closest hits of all rays ([`search`]); the media on the way
+//! ([`media`]); the surfaces that were hit, as columns, with emission and materials ([`surfaces`]); a light sample and
+//! a new direction for each path ([`shade`]); and the visibility of the light samples ([`shadows`]). A path depends
+//! only on its sample: neither the size of the wave nor the other paths change the picture.
 
+mod camera;
 pub(crate) mod catcher;
 mod escape;
 mod flat;
@@ -38,11 +39,12 @@ use lumbre_simd::{InstructionSet, Real};
 
 pub(crate) use paths::SampleId;
 pub(crate) use search::Precision;
-pub use sights::Sights;
+pub use sights::PrimaryHits;
 pub(crate) use sights::cone;
 
 use crate::transport::Record;
 use crate::transport::journal::{End, Event, Source};
+use crate::wave::camera::Aims;
 use crate::wave::escape::Escape;
 use crate::wave::flat::FlatHits;
 use crate::wave::pairs::{Merge, MergeKind, Merges};
@@ -55,12 +57,13 @@ use crate::wave::smooth::SmoothHits;
 use crate::wave::traced::Traced;
 use crate::wave::vertices::Vertices;
 
-/// Samples of a wave, about: enough to fill lanes and to keep the kernel busy, few enough to stay in the caches.
+/// Approximate samples of a wave: enough to fill lanes and keep the kernel busy, few enough for the caches.
 pub(crate) const WAVE: usize = 4096;
 
-/// A wave's columns, kept from one wave to the next.
+/// A wave's columns, reused by the next wave.
 #[derive(Debug, Default)]
 pub(crate) struct Wave<'s> {
+    aims: Aims,
     slots: Slots<'s>,
     paths: Paths,
     /// The same paths after the bounce.
@@ -68,7 +71,7 @@ pub(crate) struct Wave<'s> {
     hits: Hits,
     flat: FlatHits,
     smooth: SmoothHits,
-    /// Paths that left the scene, or that met what is no such triangle.
+    /// Paths that left the scene or met something other than a triangle in columns.
     others: Vec<u32>,
     vertices: Vertices<'s>,
     found: Vec<Found>,
@@ -77,20 +80,20 @@ pub(crate) struct Wave<'s> {
     crossings: Vec<u32>,
     /// Paths that scattered inside solids before they reached a surface.
     collided: Vec<OnePath>,
-    /// Where paths scattered in media between surfaces, and, in a scene with such media, which paths do not get to what they meet.
+    /// Collisions in media between surfaces. In a scene with such media, also which paths do not reach what they meet.
     collisions: Vec<Collision>,
     taken: Vec<bool>,
     /// The boundaries of media along one ray.
     boundaries: Vec<Crossing>,
     merges: Merges,
-    /// Whether rays come from the camera.
+    /// Whether these are camera rays.
     is_first: bool,
-    /// Whether rays from the camera that leave the scene find nothing.
+    /// Whether camera rays that leave the scene find no light.
     hides_background: bool,
 }
 
 impl<'s> Wave<'s> {
-    /// Follows all paths, whose rays have met what is in `hits`, to their ends.
+    /// Follows all paths to their ends. `hits` has the first hits of their rays.
     fn follow(&mut self, setting: &Setting<'s>, precision: Precision, record: &mut Record) {
         let mut traced = record.journal.is_some().then(Traced::default);
         loop {
@@ -112,7 +115,7 @@ impl<'s> Wave<'s> {
         }
     }
 
-    /// Adds the light at infinity that rays found which left the scene.
+    /// Adds the light at infinity for rays that left the scene.
     fn escape(&mut self, setting: &Setting<'s>, record: &mut Record) {
         self.others.clear();
         for path in 0..self.paths.len {
@@ -124,7 +127,7 @@ impl<'s> Wave<'s> {
         let count = self.others.len();
         let Some(&last) = self.others.last() else { return };
         record.note(|| Event::Left { ray: self.paths.ray(0, self.slots.time[0]) });
-        // A vector reads beyond the last.
+        // Vector loads read beyond the last element.
         self.others.resize(count + paths::PAD, last);
         for light in 0..setting.scene.lane_lights().infinite_count() {
             self.found.clear();
@@ -149,7 +152,7 @@ impl<'s> Wave<'s> {
         }
     }
 
-    /// Adds the light that paths found by themselves.
+    /// Adds the light that paths hit without sampling it.
     fn add_found(&mut self, setting: &Setting<'s>, source: Source, record: &mut Record) {
         for &Found { path, radiance, light_pdf } in &self.found {
             let path = path as usize;
@@ -159,7 +162,7 @@ impl<'s> Wave<'s> {
         }
     }
 
-    /// The weight of light that a path found by itself: see [`Setting::weight_of_found`].
+    /// The weight of light that a path hit without sampling it: see [`Setting::weight_of_found`].
     fn weight_of_found(&self, setting: &Setting<'s>, path: usize, light_pdf: f32) -> f32 {
         let merged = self.paths.merging[path];
         match &setting.merging {
@@ -182,7 +185,7 @@ impl<'s> Wave<'s> {
         for (kind, queue) in KINDS.into_iter().zip(&mut queues) {
             let count = queue.len();
             let Some(&last) = queue.last() else { continue };
-            // A vector reads beyond the last.
+            // Vector loads read beyond the last element.
             queue.resize(count + paths::PAD, last);
             let mut shade = Shade {
                 setting,
@@ -207,7 +210,7 @@ impl<'s> Wave<'s> {
         self.shade_collisions(setting, precision == Precision::Single, traced);
     }
 
-    /// Takes paths into the solids and media behind the surfaces that they go through, or out of them.
+    /// Updates the solids and media of paths that cross a surface.
     fn cross_surfaces(&mut self, setting: &Setting<'s>) {
         for &vertex in &self.crossings {
             if setting.has_media {
@@ -225,7 +228,7 @@ impl<'s> Wave<'s> {
         }
     }
 
-    /// Adds the light of samples that nothing stands in the way of.
+    /// Adds the light of unoccluded light samples.
     fn light(
         &mut self,
         setting: &Setting<'s>,
@@ -242,7 +245,7 @@ impl<'s> Wave<'s> {
         }
     }
 
-    /// Ends the paths whose rays do not reach the smooth surface that they start on.
+    /// Ends the paths whose rays are blocked before the smooth surface that they start on.
     fn walk_legs(&mut self, scene: &Scene, record: &mut Record) {
         let mut ended = Vec::new();
         for &Leg { ray, from } in &self.legs {
@@ -287,7 +290,7 @@ macro_rules! kinds {
         })*
 
         impl<'s> Shade<'_, 's> {
-            /// Shades vertices whose BSDFs are of a kind.
+            /// Shades vertices with a kind of BSDF.
             fn of_kind(&mut self, kind: BsdfKind) {
                 let instruction_set = self.setting.instruction_set;
                 match kind {
@@ -299,7 +302,7 @@ macro_rules! kinds {
         }
 
         impl Merge<'_, '_> {
-            /// Evaluates BSDFs that are of a kind.
+            /// Evaluates a kind of BSDF.
             fn of_kind(self, instruction_set: InstructionSet, kind: BsdfKind) {
                 match kind {
                     $(BsdfKind::$kind => {

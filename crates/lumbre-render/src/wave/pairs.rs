@@ -1,4 +1,4 @@
-//! Pairs of vertices and photons near them, and what the vertices scatter of these, in lanes.
+//! Pairs of a vertex and a nearby photon, evaluated in lanes.
 
 use std::marker::PhantomData;
 
@@ -13,19 +13,19 @@ use crate::wave::paths::{PAD, Paths, grow};
 use crate::wave::shade::{Kind, Vertex};
 use crate::wave::vertices::{Vertices, gather3};
 
-/// Light that grazes a surface more than this is taken as if it did not.
+/// Light that grazes a surface more than this counts as if it arrived at this cosine.
 const MIN_COSINE: f32 = 1e-3;
 
-/// Pairs of a vertex and a photon near it, in columns.
+/// Pairs of a vertex and a nearby photon, in columns.
 #[derive(Debug, Default)]
 pub(crate) struct Merges {
     pub(super) len: usize,
     pub(super) vertex: Vec<u32>,
-    /// Where the photon came from.
+    /// The direction that the photon came from.
     towards: [Vec<f32>; 3],
-    /// Its irradiance over the disk around the vertex, by the area that the light is perpendicular to.
+    /// Its irradiance over the disk around the vertex, on an area perpendicular to the light.
     light: [Vec<f32>; 3],
-    /// What a density of directions of the vertex becomes one of pairs by, over the density of the photon's light path.
+    /// Converts the vertex's density of directions to one of pairs, relative to the density of the photon's light path.
     share: Vec<f32>,
     /// Its weight against paths that find its light, and what the vertex scatters of it.
     weight: Vec<f32>,
@@ -53,7 +53,7 @@ impl Merges {
         self.share[at] = spread / photon.density;
     }
 
-    /// A pair, for those who want to see it.
+    /// A pair as an event for the journal.
     pub(super) fn merged(&self, at: usize) -> MergedPhoton {
         let [x, y, z] = self.towards.each_ref().map(|column| column[at]);
         let [r, g, b] = self.light.each_ref().map(|column| column[at]);
@@ -77,7 +77,7 @@ pub(super) struct Merge<'a, 's> {
     pub(super) merges: &'a mut Merges,
 }
 
-/// [`Merge`] with BSDFs of one kind, at any instruction set.
+/// [`Merge`] with BSDFs of one kind, for any instruction set.
 pub(super) struct MergeKind<'a, 's, K> {
     pub(super) merge: Merge<'a, 's>,
     pub(super) kind: PhantomData<K>,

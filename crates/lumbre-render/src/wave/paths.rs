@@ -2,25 +2,25 @@
 
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Vec3};
-use lumbre_scene::{Boundary, CameraRay, Footprint, MediumId};
+use lumbre_scene::{Boundary, Footprint, MediumId, SamplerKind};
 use lumbre_shading::Spectrum;
 use lumbre_shading::spectrum::{SpectralLookup, Wavelengths};
 use lumbre_simd::{Double, Mask, Real, UInt, V3};
 
-use crate::transport::Draw;
-use crate::transport::interior::Interiors;
+use crate::transport::interior::MediumStack;
+use crate::transport::{SampleNumbers, Sampler};
 
-/// Lanes beyond the last that a column has room for: a store writes whole vectors.
+/// Padding of columns: a store writes whole vectors.
 pub(crate) const PAD: usize = 16;
 
-/// Makes a column hold `len` numbers, and a vector more.
+/// Resizes a column to `len` numbers plus one vector.
 pub(crate) fn grow<T: Default + Clone>(column: &mut Vec<T>, len: usize) {
     if column.len() < len + PAD {
         column.resize(len + PAD, T::default());
     }
 }
 
-/// A medium in a column: its index, or this for a vacuum.
+/// The medium index that means vacuum.
 const VACUUM: u32 = u32::MAX;
 
 pub(crate) fn to_column(medium: Option<MediumId>) -> u32 {
@@ -31,7 +31,8 @@ pub(crate) fn of_column(medium: u32) -> Option<MediumId> {
     (medium != VACUUM).then_some(MediumId(medium))
 }
 
-/// The media where a path comes from and behind the surface that it met, as columns keep them, inside of `around` before.
+/// The media on both sides of a surface, as columns store them: where the path comes from and behind. `around` is the
+/// medium before.
 pub(crate) fn sides(boundary: Option<Boundary>, front: bool, around: u32) -> [u32; 2] {
     match boundary {
         None => [around; 2],
@@ -51,46 +52,52 @@ pub(crate) struct SampleId {
     pub(crate) index: u32,
 }
 
-/// What belongs to a sample for as long as its path goes on.
+/// The data of a sample that lasts as long as its path.
 #[derive(Debug, Default)]
 pub(crate) struct Slots<'s> {
-    /// Its random numbers, for code that takes one path at a time.
-    pub(crate) draws: Vec<Draw>,
-    /// The words of [`Draw`], for lanes: those of the pixel, and the number of the sample.
+    /// How many samples there are.
+    pub(crate) len: usize,
+    /// The inputs of its random numbers: the sampler's kind, words of the pixel, and the number of the sample.
+    kind: SamplerKind,
     pub(crate) pixel: [Vec<u32>; 2],
     pub(crate) index: Vec<u32>,
-    /// When its rays look.
+    /// The time of its rays.
     pub(crate) time: Vec<f64>,
-    /// The ray from the camera, and its footprint; none in a scene without textures.
-    pub(crate) rays: Vec<Ray>,
+    /// The footprints of camera rays; empty in a scene without textures.
     pub(crate) footprints: Vec<Footprint>,
+    /// Whether these are footprints of rays from one point, with these directions to the right and below.
+    pub(crate) has_neighbours: bool,
+    pub(crate) neighbours: [[Vec<f64>; 3]; 2],
     /// The light that the path has found.
     pub(crate) radiance: Vec<Spectrum>,
-    /// The solids that it is inside of; empty in a scene without solids.
-    pub(crate) interiors: Vec<Interiors<'s>>,
-    /// The medium around, as [`of_column`] reads it; empty in a scene without media.
+    /// The solids around the path; empty in a scene without solids.
+    pub(crate) interiors: Vec<MediumStack<'s>>,
+    /// The medium around the path, as [`of_column`] reads it; empty in a scene without media.
     pub(crate) medium: Vec<u32>,
-    /// The wavelengths that channels are; none in RGB.
+    /// The wavelengths of the channels; empty in RGB.
     pub(crate) wavelengths: Vec<Wavelengths>,
-    /// Whether the hero wavelength goes on alone, once it was bent by an index of its own; none in RGB.
+    /// Whether only the hero wavelength continues, after a refraction by its own index; empty in RGB.
     pub(crate) is_alone: Vec<bool>,
-    /// Distances sampled in media, and collisions inside solids.
+    /// Number of distances sampled in media, and of collisions inside solids.
     pub(crate) distance_samples: Vec<u32>,
     pub(crate) collisions: Vec<u32>,
-    /// The radius in which photons are collected, per width of a footprint; only where there are photons.
+    /// The radius in which photons are collected, per width of a footprint; empty without photons.
     pub(crate) widths: Vec<f32>,
 }
 
 impl Slots<'_> {
-    /// Forgets all samples.
-    pub(crate) fn clear(&mut self) {
-        self.draws.clear();
-        self.pixel.iter_mut().for_each(Vec::clear);
-        self.index.clear();
-        self.time.clear();
-        self.rays.clear();
+    /// Replaces all samples.
+    pub(crate) fn start(&mut self, sampler: &Sampler, ids: &[SampleId]) {
+        (self.len, self.kind) = (ids.len(), sampler.kind());
+        self.pixel.iter_mut().chain([&mut self.index]).for_each(|column| grow(column, ids.len()));
+        for (slot, id) in ids.iter().enumerate() {
+            [self.pixel[0][slot], self.pixel[1][slot]] = sampler.pixel(id.x, id.y);
+            self.index[slot] = id.index;
+        }
+        fill(&mut self.time, ids.len(), 0.0);
+        fill(&mut self.radiance, ids.len(), Spectrum::BLACK);
         self.footprints.clear();
-        self.radiance.clear();
+        self.has_neighbours = false;
         self.interiors.clear();
         self.medium.clear();
         self.wavelengths.clear();
@@ -100,83 +107,91 @@ impl Slots<'_> {
         self.widths.clear();
     }
 
-    /// The ray from the camera of a sample.
-    pub(crate) fn camera(&self, slot: usize) -> CameraRay {
-        let footprint = self.footprints.get(slot).copied().unwrap_or_default();
-        CameraRay { ray: self.rays[slot], footprint, weight: 1.0 }
+    /// Chooses the wavelengths of all samples by a number each.
+    pub(crate) fn choose_wavelengths(&mut self, numbers: &[f32]) {
+        self.wavelengths.extend(numbers[..self.len].iter().map(|&u| Wavelengths::visible(u)));
+        self.is_alone.resize(self.len, false);
     }
 
-    /// What colours are to a sample; `None` in RGB.
+    /// Starts all paths outside of solids.
+    pub(crate) fn start_outside(&mut self) {
+        let wavelengths = (0..self.len).map(|slot| self.wavelengths.get(slot).copied());
+        self.interiors.extend(wavelengths.map(MediumStack::of));
+        self.collisions.resize(self.len, 0);
+        self.distance_samples.resize(self.len, 0);
+    }
+
+    /// Starts all paths in a medium.
+    pub(crate) fn start_in(&mut self, medium: Option<MediumId>) {
+        self.medium.resize(self.len, to_column(medium));
+        self.distance_samples.resize(self.len, 0);
+    }
+
+    /// The random numbers of a sample, for code that handles one path at a time.
+    #[inline]
+    pub(crate) fn draw(&self, slot: usize) -> SampleNumbers {
+        SampleNumbers::new(self.kind, [self.pixel[0][slot], self.pixel[1][slot]], self.index[slot])
+    }
+
+    /// The footprint of a sample's camera ray, which starts at `origin`.
+    pub(crate) fn footprint(&self, slot: usize, origin: DVec3) -> Footprint {
+        if !self.has_neighbours {
+            return self.footprints.get(slot).copied().unwrap_or_default();
+        }
+        let [x_direction, y_direction] = self.neighbours.each_ref().map(|columns| at(columns, slot));
+        Footprint::Neighbours { x_origin: origin, x_direction, y_origin: origin, y_direction }
+    }
+
+    /// How a sample looks up spectra; `None` in RGB.
     pub(crate) fn spectral(&self, slot: usize) -> Option<SpectralLookup> {
         let wavelengths = *self.wavelengths.get(slot)?;
         Some(SpectralLookup { wavelengths, is_unbounded: false })
     }
-
-    /// Adds a sample. In a scene with media, `medium` is what the camera stands in; in a spectral render it has wavelengths.
-    pub(crate) fn push(
-        &mut self,
-        draw: Draw,
-        camera: &CameraRay,
-        has_solids: bool,
-        medium: Option<u32>,
-        wavelengths: Option<Wavelengths>,
-    ) {
-        let (pixel, index) = draw.words();
-        self.draws.push(draw);
-        self.pixel[0].push(pixel[0]);
-        self.pixel[1].push(pixel[1]);
-        self.index.push(index);
-        self.time.push(camera.ray.time);
-        self.rays.push(camera.ray);
-        if camera.footprint != Footprint::Point {
-            self.footprints.push(camera.footprint);
-        }
-        self.radiance.push(Spectrum::BLACK);
-        if has_solids {
-            self.interiors.push(Interiors::of(wavelengths));
-            self.collisions.push(0);
-        }
-        self.medium.extend(medium);
-        self.wavelengths.extend(wavelengths);
-        self.is_alone.extend(wavelengths.map(|_| false));
-        if has_solids || medium.is_some() {
-            self.distance_samples.push(0);
-        }
-    }
 }
 
-/// Paths on their way, each with the ray that it follows next.
+/// A vector of columns.
+fn at(columns: &[Vec<f64>; 3], at: usize) -> DVec3 {
+    DVec3::new(columns[0][at], columns[1][at], columns[2][at])
+}
+
+/// Fills a list with `len` copies of a value.
+fn fill<T: Clone>(column: &mut Vec<T>, len: usize, value: T) {
+    column.clear();
+    column.resize(len, value);
+}
+
+/// The active paths, each with its next ray.
 #[derive(Debug, Default)]
 pub(crate) struct Paths {
     pub(crate) len: usize,
-    /// Whose path it is: a position in [`Slots`].
+    /// The sample of the path: an index into [`Slots`].
     pub(crate) slot: Vec<u32>,
-    /// Where the ray starts; lights were sampled from there, too.
+    /// The origin of the ray, from which lights were sampled too.
     pub(crate) origin: [Vec<f64>; 3],
-    /// The normal there that lights were sampled for: see [`lumbre_scene::light::lanes::Receiver`].
+    /// The normal at the origin for which lights were sampled: see [`lumbre_scene::light::lanes::Receiver`].
     pub(crate) receiver: [Vec<f32>; 3],
     /// Unit.
     pub(crate) direction: [Vec<f32>; 3],
     pub(crate) throughput: [Vec<f32>; 3],
-    /// What refraction did to the throughput alone: it comes back when the path leaves again.
+    /// The factor of refraction in the throughput, which is undone when the path leaves again.
     pub(crate) eta_scale: Vec<f32>,
-    /// The density with which the direction was chosen; infinite where it was the only one.
+    /// The density of the chosen direction; infinite if it was the only one.
     pub(crate) pdf: Vec<f32>,
-    /// For light that is found behind specular surfaces: the density with which the direction before them was chosen, over the number of
-    /// lines of a pass and the area in which photons are collected there (the volume, per length, in a medium). Infinite where photons do not
-    /// bring that light.
+    /// For light found behind specular surfaces: the density of the direction before them, divided by the number of
+    /// lines of a pass and by the area (in a medium: volume, per length) in which photons are collected there. Infinite
+    /// if photons do not find that light.
     pub(crate) merging: Vec<f32>,
     /// Bounces off surfaces, and [`SCATTERED`].
     pub(crate) depth: Vec<u32>,
-    /// The width of the footprint where the ray starts, and its growth with distance: see [`lumbre_scene::Footprint::Cone`].
+    /// The width of the footprint at the origin, and its growth with distance: see [`lumbre_scene::Footprint::Cone`].
     pub(crate) width: Vec<f32>,
     pub(crate) spread: Vec<f32>,
 }
 
-/// The bit of [`Paths::depth`] that says that the path has scattered otherwise than by mirrors and smooth glass.
+/// The bit of [`Paths::depth`] set once the path has had a non-specular bounce.
 pub(crate) const SCATTERED: u32 = 1 << 31;
 
-/// What a path takes along from a vertex.
+/// What a path keeps from a vertex.
 #[derive(Clone, Copy)]
 pub(crate) struct Departure<R: Real> {
     pub(crate) slot: R::UInt,
@@ -208,10 +223,10 @@ pub(crate) struct OnePath {
     pub(crate) spread: f32,
 }
 
-/// Where a medium scatters a path.
+/// A collision of a path in a medium.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Collision {
-    /// The position of the path.
+    /// The index of the path.
     pub(crate) path: u32,
     pub(crate) point: DVec3,
     pub(crate) medium: MediumId,
@@ -220,13 +235,28 @@ pub(crate) struct Collision {
 }
 
 impl Paths {
-    /// Appends a path, for which there is room.
+    /// Replaces all paths by one from each of `len` samples, whose rays the caller sets.
+    pub(crate) fn start(&mut self, len: usize) {
+        self.reserve(len);
+        self.len = len;
+        self.slot[..len].iter_mut().zip(0..).for_each(|(to, slot)| *to = slot);
+        self.receiver.iter_mut().for_each(|column| column[..len].fill(0.0));
+        self.throughput.iter_mut().for_each(|column| column[..len].fill(1.0));
+        self.eta_scale[..len].fill(1.0);
+        self.pdf[..len].fill(f32::INFINITY);
+        self.merging[..len].fill(f32::INFINITY);
+        self.depth[..len].fill(0);
+        self.width[..len].fill(0.0);
+        self.spread[..len].fill(0.0);
+    }
+
+    /// Appends a path; the columns must have been reserved.
     pub(crate) fn push_one(&mut self, path: &OnePath) {
         self.put(self.len, path);
         self.len += 1;
     }
 
-    /// Drops the paths at some positions, which ascend.
+    /// Removes the paths at these ascending indices.
     pub(crate) fn remove(&mut self, positions: &[u32]) {
         let mut positions = positions.iter().peekable();
         let mut kept = 0;
@@ -238,6 +268,19 @@ impl Paths {
             }
         }
         self.len = kept;
+    }
+
+    /// Sets the ray of a path, and the cone around it.
+    pub(crate) fn set_ray(
+        &mut self,
+        path: usize,
+        origin: DVec3,
+        direction: Vec3,
+        (width, spread): (f32, f32),
+    ) {
+        self.origin.iter_mut().zip(origin.to_array()).for_each(|(column, x)| column[path] = x);
+        self.direction.iter_mut().zip(direction.to_array()).for_each(|(column, x)| column[path] = x);
+        (self.width[path], self.spread[path]) = (width, spread);
     }
 
     /// The path at a position.
@@ -277,7 +320,7 @@ impl Paths {
         self.spread[at] = path.spread;
     }
 
-    /// Makes room for `len` paths.
+    /// Reserves `len` paths.
     pub(crate) fn reserve(&mut self, len: usize) {
         grow(&mut self.slot, len);
         self.origin.iter_mut().for_each(|column| grow(column, len));
@@ -317,13 +360,13 @@ impl Paths {
         self.len += mask.count();
     }
 
-    /// The ray that a path follows next.
+    /// The next ray of a path.
     pub(crate) fn ray(&self, path: usize, time: f64) -> Ray {
         Ray::new(self.origin(path), self.direction(path).as_dvec3()).at_time(time)
     }
 
     pub(crate) fn origin(&self, path: usize) -> DVec3 {
-        DVec3::new(self.origin[0][path], self.origin[1][path], self.origin[2][path])
+        at(&self.origin, path)
     }
 
     pub(crate) fn receiver(&self, path: usize) -> Vec3 {

@@ -8,22 +8,22 @@ use lumbre_scene::{Footprint, Interaction, Scene};
 
 use crate::wave::paths::{Paths, Slots};
 
-/// What the rays of a wave met.
+/// The hits of a wave's rays.
 #[derive(Debug, Default)]
 pub(crate) struct Hits {
     columns: HitColumns,
-    /// In double precision; used where `is_single` does not say otherwise.
+    /// Hits in double precision; used unless `is_single` says otherwise.
     double: Vec<Option<Hit>>,
     is_single: bool,
-    /// The position in the columns of what each ray met; empty where that is the ray's own.
+    /// The index in the columns of each ray's hit; empty if that is the ray's own index.
     kept: Vec<u32>,
-    /// What is seen through the backs of one-sided surfaces in their place, by ascending position in the columns.
+    /// The hits seen through the backs of one-sided surfaces, by ascending index in the columns.
     behind: Vec<(u32, Option<Hit>)>,
     rays: Vec<Ray>,
     times: Vec<f64>,
 }
 
-/// A triangle of a mesh in the world itself that a ray met.
+/// A triangle of a top-level mesh that a ray met.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MetTriangle {
     /// The id of its geometry.
@@ -33,26 +33,27 @@ pub(crate) struct MetTriangle {
     pub(crate) local: [f32; 2],
 }
 
-/// Which rays a wave sends through the scene.
+/// The precision of a wave's rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Precision {
-    /// Rounded once, relative to the origin of the meshes; exact shapes are met in double precision all the same.
+    /// Rounded once, relative to the origin of the meshes; exact shapes are met in double precision.
     Single,
     /// In double precision throughout.
     Double,
 }
 
 impl Precision {
-    /// What a scene allows: rays in single precision unless double is asked for, or the scene has no tree for them.
+    /// Single precision, unless double was requested or the scene has no tree for it.
     pub(crate) fn of(scene: &Scene, asks_for_double: bool) -> Self {
-        // Cut-outs are decided by hits in double precision.
-        let is_single = !asks_for_double && !scene.has_holes() && scene.accel().picture_rounding().is_some();
+        // Alpha cut-outs need hits in double precision.
+        let is_single =
+            !asks_for_double && !scene.has_cutouts() && scene.accel().picture_rounding().is_some();
         if is_single { Self::Single } else { Self::Double }
     }
 }
 
 impl Hits {
-    /// Finds what every ray meets; of rays from the camera, what it sees.
+    /// Finds the closest hits of all rays; for camera rays, what they see.
     pub(crate) fn search(
         &mut self,
         scene: &Scene,
@@ -93,7 +94,7 @@ impl Hits {
         }
     }
 
-    /// Notes what is seen through the backs of one-sided surfaces.
+    /// Records the hits seen through the backs of one-sided surfaces.
     fn look_through_backs(&mut self, scene: &Scene, paths: &Paths, slots: &Slots<'_>) {
         for path in 0..paths.len {
             let id = self.columns.id[path];
@@ -108,7 +109,7 @@ impl Hits {
         }
     }
 
-    /// Keeps what the rays at these positions met, which ascend.
+    /// Keeps the hits of the rays at these ascending indices.
     pub(crate) fn keep(&mut self, positions: &[u32]) {
         if self.is_single {
             self.kept.clear();
@@ -120,13 +121,13 @@ impl Hits {
         }
     }
 
-    /// The position in the columns of what a ray met.
+    /// The index in the columns of a ray's hit.
     #[inline]
     fn column(&self, path: usize) -> usize {
         self.kept.get(path).map_or(path, |&at| at as usize)
     }
 
-    /// What is seen through a back at a position in the columns; `None` where that is not the back of a one-sided surface.
+    /// The hit seen through a back, by its index in the columns; `None` if that is not the back of a one-sided surface.
     #[inline]
     fn seen_through(&self, column: usize) -> Option<&Option<Hit>> {
         if self.behind.is_empty() {
@@ -136,7 +137,7 @@ impl Hits {
         Some(&self.behind[at].1)
     }
 
-    /// What a ray met.
+    /// The hit of a ray.
     fn hit(&self, path: usize) -> Option<Cow<'_, Hit>> {
         if !self.is_single {
             return self.double[path].as_ref().map(Cow::Borrowed);
@@ -157,7 +158,7 @@ impl Hits {
         self.seen_through(column).map_or(self.columns.id[column] == HitColumns::MISS, Option::is_none)
     }
 
-    /// The triangle in the world itself that a ray met.
+    /// The top-level triangle that a ray met.
     #[inline]
     pub(crate) fn triangle(&self, path: usize) -> Option<MetTriangle> {
         let column = self.column(path);
@@ -174,7 +175,7 @@ impl Hits {
         Some(MetTriangle { id: hit.id, triangle: hit.primitive, local })
     }
 
-    /// How far a ray went.
+    /// The length of a ray up to its hit.
     #[inline]
     pub(crate) fn distance(&self, path: usize) -> f32 {
         let column = self.column(path);
@@ -184,12 +185,12 @@ impl Hits {
         self.hit(path).map_or(0.0, |hit| hit.root.t as f32)
     }
 
-    /// How far a ray went; infinite where it met nothing.
+    /// The length of a ray up to its hit; infinite without one.
     pub(crate) fn distance_f64(&self, path: usize) -> f64 {
         self.hit(path).map_or(f64::INFINITY, |hit| hit.root.t)
     }
 
-    /// What a ray met, with all that one may want to know of it.
+    /// The full interaction at a ray's hit.
     pub(crate) fn interaction<'s>(
         &self,
         scene: &'s Scene,
@@ -220,7 +221,7 @@ impl Hits {
         self.hit(path).is_some_and(|hit| scene.is_ground(hit.id))
     }
 
-    /// The surface that a ray met, as its geometry is.
+    /// The geometric surface that a ray met.
     pub(crate) fn surface(&self, scene: &Scene, path: usize, ray: &Ray) -> Option<Surface> {
         let hit = self.hit(path)?;
         let accel = scene.accel();

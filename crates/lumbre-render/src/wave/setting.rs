@@ -1,4 +1,4 @@
-//! What all stages of a wave share: the setting of a render, and the small things that they hand on to each other.
+//! Data shared by all stages of a wave.
 
 use lumbre_kernel::PictureRounding;
 use lumbre_math::DVec3;
@@ -16,42 +16,42 @@ pub(crate) struct Setting<'s> {
     pub(crate) sampler: SamplerKind,
     pub(crate) strategy: Strategy,
     pub(crate) max_depth: u32,
-    /// Bounces that every path may take before Russian roulette.
+    /// Minimum bounces before Russian roulette.
     pub(crate) roulette_start: u32,
     pub(crate) regularize: bool,
     pub(crate) shading_normals: ShadingNormals,
     pub(crate) has_solids: bool,
     pub(crate) has_media: bool,
-    /// Whether light from points is followed straight on through panes.
+    /// Whether light samples of points pass straight through panes.
     pub(crate) has_panes: bool,
     pub(crate) moves: bool,
     /// Whether channels are wavelengths.
     pub(crate) is_spectral: bool,
     pub(crate) instruction_set: InstructionSet,
-    /// Photons, where caustics are found by them.
+    /// The photons, if caustics use them.
     pub(crate) merging: Option<Merging<'s>>,
 }
 
-/// The first part of a ray: from a face to the smooth surface over it, where the ray itself starts.
+/// The first leg of a ray: from a face to the smooth surface over it, where the ray itself starts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Leg {
-    /// The position of the ray.
+    /// The index of the ray.
     pub(crate) ray: u32,
-    /// Where it comes from.
+    /// The origin of the leg.
     pub(crate) from: DVec3,
 }
 
-/// Light that a path found by itself.
+/// Light that a path hit without sampling it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Found {
-    /// The position of the path.
+    /// The index of the path.
     pub(crate) path: u32,
     pub(crate) radiance: Spectrum,
-    /// The density with which the last vertex would have sampled it; 0 where that does not matter.
+    /// The density with which the last vertex would have sampled it; 0 if that does not matter.
     pub(crate) light_pdf: f32,
 }
 
-/// By how much rays of pictures are rounded: see [`PictureRounding`]; by nothing in double precision.
+/// The rounding of picture rays: see [`PictureRounding`]; zero in double precision.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rounding {
     origin: DVec3,
@@ -60,7 +60,7 @@ pub(crate) struct Rounding {
 }
 
 impl Setting<'_> {
-    /// The weight of light that a ray found by itself, against a sample of the light with this density.
+    /// The weight of light that a ray hit, against a sample of the light with this density.
     pub(crate) fn weight_of_found(&self, chosen: f32, light_pdf: f32) -> f32 {
         match self.strategy {
             _ if chosen == f32::INFINITY => 1.0,
@@ -70,7 +70,7 @@ impl Setting<'_> {
         }
     }
 
-    /// By how much rays are rounded.
+    /// The rounding of rays.
     #[inline(always)]
     pub(crate) fn rounding(&self, is_single: bool) -> Rounding {
         match self.scene.accel().picture_rounding() {
@@ -83,7 +83,7 @@ impl Setting<'_> {
 }
 
 impl Rounding {
-    /// The error of points, grown so that rays which leave them do not meet their surfaces again.
+    /// The error of points, enlarged so that rays that leave them do not meet their surfaces again.
     #[inline(always)]
     pub(crate) fn grow<R: Real>(&self, point: V3<R::Double>, error: V3<R::Double>) -> V3<R::Double> {
         let [x, y, z] = self.origin.to_array();
@@ -101,8 +101,8 @@ impl Rounding {
     }
 }
 
-/// The power heuristic (Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997) for two ways, by their ratio, for a
-/// square may overflow.
+/// The power heuristic (Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997) for two strategies,
+/// from their ratio, because squares may overflow.
 #[inline(always)]
 pub(crate) fn power_heuristic<R: Real>(this: R, other: R) -> R {
     let ratio = other / this;

@@ -1,4 +1,4 @@
-//! Shading: a light and a direction to go on in, sampled at each vertex. Nothing is traced here.
+//! Shading: samples a light and a new direction at each vertex. Nothing is traced here.
 
 use std::marker::PhantomData;
 
@@ -10,7 +10,7 @@ use lumbre_simd::{Double, Job, Mask, Real, UInt, V3};
 
 use crate::caustics::radius;
 use crate::transport::Strategy;
-use crate::transport::sampler::LaneDraw;
+use crate::transport::sampler::LaneNumbers;
 use crate::wave::lights::{at_wavelengths, pass_solids, push_panes};
 use crate::wave::paths::{Departure, Paths, SCATTERED, Slots};
 use crate::wave::setting::{Leg, Setting, power_heuristic};
@@ -18,33 +18,33 @@ use crate::wave::shadows::{NEARLY_WHOLE, Segment, Shadows};
 use crate::wave::traced::Traced;
 use crate::wave::vertices::{FOLDS, LIT_FROM_BELOW, Place, RISES, SIDED, Vertices, gather3, gather64};
 
-/// BSDFs of one kind, whatever the lanes.
+/// BSDFs of one kind, for any number of lanes.
 pub(crate) trait Kind {
     type Bsdf<R: Real>: LaneBsdf<R>;
 }
 
-/// Shades the vertices of a queue. Paths that go on are appended to `next`, segments to lights to `shadows`.
+/// Shades the vertices of a queue. Appends continuing paths to `next`, and segments to lights to `shadows`.
 pub(crate) struct Shade<'a, 's> {
     pub(crate) setting: &'a Setting<'s>,
     pub(crate) slots: &'a Slots<'s>,
     pub(crate) paths: &'a Paths,
     pub(crate) vertices: &'a Vertices<'s>,
-    /// Positions of vertices, and after the last ones enough others to fill a vector.
+    /// Indices of vertices, padded to a full vector.
     pub(crate) queue: &'a [u32],
     pub(crate) count: usize,
     pub(crate) next: &'a mut Paths,
-    /// First parts of rays of `next`.
+    /// First legs of the rays of `next`.
     pub(crate) legs: &'a mut Vec<Leg>,
     pub(crate) shadows: &'a mut Shadows<'s>,
-    /// Vertices whose paths go through the surface, in scenes with solids or media.
+    /// Vertices whose paths cross the surface, in scenes with solids or media.
     pub(crate) crossings: &'a mut Vec<u32>,
     /// Whether rays are rounded to single precision.
     pub(crate) is_single: bool,
-    /// What happens, where somebody asks: of a wave of one path.
+    /// The journal of a wave of one path, if requested.
     pub(crate) traced: Option<&'a mut Traced>,
 }
 
-/// [`Shade`] with BSDFs of one kind, at any instruction set.
+/// [`Shade`] with BSDFs of one kind, for any instruction set.
 pub(crate) struct ShadeKind<'a, 'b, 's, K> {
     pub(crate) shade: &'b mut Shade<'a, 's>,
     pub(crate) kind: PhantomData<K>,
@@ -61,17 +61,18 @@ impl<K: Kind> Job for ShadeKind<'_, '_, '_, K> {
 
 /// A surface as seen along a path, ready to scatter.
 ///
-/// A shading normal is not the normal of the surface, and some directions that a BSDF scatters to on its side of it lie on the other
-/// side of the surface as it is. They are folded back: mirrored in the plane of the surface. What goes through likewise stays on the
-/// far side. So nothing is lost that the BSDF gives (a white surface stays white whatever its normals), and no light leaks. At grazing
-/// angles, where a reflection would point into the surface, it comes to point out of it as far. Others let it be (and have dark specks
-/// at silhouettes of coarse meshes), or turn the normal: A. Keller and others, "The Iray Light Transport Simulation and Rendering
-/// System", 2017, A.3.
+/// A shading normal differs from the surface's normal, so some directions that a BSDF reflects to are below the true
+/// surface. They are folded back: mirrored in the plane of the surface. Transmitted directions likewise stay on the far
+/// side. So no energy of the BSDF is lost (a white surface stays white for any normals), and no light leaks. A
+/// reflection that would point into the surface at a grazing angle points out of it by as much. Others leave such
+/// directions as they are (and get dark specks at silhouettes of coarse meshes), or turn the normal: A. Keller and
+/// others, "The Iray Light Transport Simulation and Rendering System", 2017, A.3.
 ///
-/// Where the faces of a mesh stand for a smooth surface that bulges out over them, directions that go under a face but not under that
-/// surface stay as they are, and their rays start on it. So shadows end where the smooth surface turns away from the light, not at the
-/// edge of a face. J. Hanika ("Hacking the Shadow Terminator", 2021) starts all rays there; here those that leave a face upwards start
-/// on it. What lies between the face and the smooth surface stands in the way of such rays: it is their first leg.
+/// If the faces of a mesh approximate a smooth surface that bulges out over them, directions below a face but above
+/// that surface stay as they are, and their rays start on it. So shadows end where the smooth surface turns away from
+/// the light, not at the edge of a face. J. Hanika ("Hacking the Shadow Terminator", 2021) starts all rays there; here
+/// only rays below the face do. Objects between the face and the smooth surface block such rays: that is their first
+/// leg.
 #[derive(Clone, Copy)]
 pub(super) struct Vertex<R: Real> {
     place: Place<R>,
@@ -90,7 +91,7 @@ pub(super) struct Vertex<R: Real> {
     risen: V3<R::Double>,
 }
 
-/// f · |cos θ| towards a direction, and the density of the BSDF's choice of it.
+/// f · |cos θ| for a direction, and the density with which the BSDF chooses it.
 #[derive(Clone, Copy)]
 pub(super) struct Scattered<R: Real> {
     pub(super) f: V3<R>,
@@ -147,14 +148,14 @@ impl<R: Real> Vertex<R> {
         R::zero().simd_lt(self.wo.z * local.z)
     }
 
-    /// Whether a direction below the face is one that the smooth surface over it reflects to.
+    /// Whether the smooth surface reflects to a direction below the face.
     #[inline(always)]
     fn stays(&self, wi: V3<R>, local: V3<R>) -> R::Mask {
         let below = self.place.normal.dot(wi).simd_le(R::zero());
         self.rises & below & R::zero().simd_lt(self.smooth.dot(wi)) & self.on_side(local)
     }
 
-    /// What the BSDF scatters to a direction of the world, by itself and by directions that are folded onto it.
+    /// What the BSDF scatters to a world direction, directly and by folded directions.
     #[inline(always)]
     pub(super) fn eval<B: LaneBsdf<R>>(&self, bsdf: &B, wi: V3<R>) -> Scattered<R> {
         let local = self.to_local(wi);
@@ -175,7 +176,7 @@ impl<R: Real> Vertex<R> {
         }
     }
 
-    /// The direction of the world that a sample leads to.
+    /// The world direction of a sample.
     #[inline(always)]
     fn leave(&self, sample: &LaneSample<R>) -> V3<R> {
         let direction = self.to_world(sample.wi);
@@ -188,7 +189,7 @@ impl<R: Real> Vertex<R> {
         V3::select(folds, mirrored(direction, self.place.normal), direction).normalize()
     }
 
-    /// Where a ray along a direction starts, and whether that is on the smooth surface over the face.
+    /// The origin of a ray in this direction, and whether it is on the smooth surface over the face.
     #[inline(always)]
     fn start(&self, wi: V3<R>) -> (V3<R::Double>, R::Mask) {
         let start = self.place.start(wi);
@@ -199,7 +200,7 @@ impl<R: Real> Vertex<R> {
         (select64::<R>(stays, self.risen, start), stays)
     }
 
-    /// Whether a direction leads to the other side of the surface, where the BSDF says so of it, or of none.
+    /// Whether a direction leads to the other side of the surface, and whether the BSDF transmits.
     #[inline(always)]
     fn crosses(&self, wi: V3<R>, transmitted: R::Mask) -> R::Mask {
         let below = self.place.normal.dot(wi).simd_lt(R::zero());
@@ -221,7 +222,7 @@ fn select64<R: Real>(mask: R::Mask, a: V3<R::Double>, b: V3<R::Double>) -> V3<R:
     }
 }
 
-/// Whether a colour is other than black; true for a NaN, which is for the film to find.
+/// Whether a colour is not black; true for NaN, which the film reports.
 #[inline(always)]
 fn is_light<R: Real>(colour: V3<R>) -> R::Mask {
     !(colour.x + colour.y + colour.z).simd_le(R::zero())
@@ -230,7 +231,7 @@ fn is_light<R: Real>(colour: V3<R>) -> R::Mask {
 /// The lanes of a chunk of the queue.
 #[derive(Clone, Copy)]
 struct Arrived<R: Real> {
-    /// The position of the vertex, and that of its path.
+    /// The index of the vertex, and that of its path.
     vertex_at: R::UInt,
     at: R::UInt,
     slot: R::UInt,
@@ -260,7 +261,7 @@ impl<'s> Shade<'_, 's> {
                 throughput: gather3(&paths.throughput, at),
                 vertex: Vertex::new(self.vertices, vertex_at, towards),
             };
-            let draw = LaneDraw::<R> {
+            let draw = LaneNumbers::<R> {
                 kind: self.setting.sampler,
                 pixel: [
                     R::UInt::gather(&self.slots.pixel[0], slot),
@@ -277,7 +278,7 @@ impl<'s> Shade<'_, 's> {
         }
     }
 
-    /// One sample of the lights.
+    /// Samples one light.
     #[inline(always)]
     fn light<R: Real, B: LaneBsdf<R>>(&mut self, useful: R::Mask, arrived: &Arrived<R>, bsdf: &B, u: [R; 4]) {
         let vertex = &arrived.vertex;
@@ -311,7 +312,7 @@ impl<'s> Shade<'_, 's> {
         let crosses = vertex.crosses(light.towards, !vertex.on_side(vertex.to_local(light.towards)));
         let through_panes = found & light.delta & R::Mask::splat(self.setting.has_panes);
         if self.setting.has_solids && found.any() {
-            // What comes through panes is told with them.
+            // Light through panes is recorded with the panes.
             let through_air = found & !through_panes;
             let at = arrived.vertex_at;
             arriving = pass_solids(self, through_air, at, arrived.slot, crosses, &light, arriving);
@@ -348,7 +349,7 @@ impl<'s> Shade<'_, 's> {
         }
     }
 
-    /// The direction to go on in.
+    /// Samples the next direction.
     #[inline(always)]
     fn scatter<R: Real, B: LaneBsdf<R>>(
         &mut self,
@@ -363,7 +364,7 @@ impl<'s> Shade<'_, 's> {
         let mut pdf = sample.pdf;
         if vertex.folds.any() {
             let folded = vertex.eval(bsdf, direction).pdf;
-            // On the very border between the sides rounding may find no way at all.
+            // On the border between the sides, rounding may leave no strategy at all.
             pdf = R::select(vertex.folds & R::zero().simd_lt(folded), folded, pdf);
         }
         let pdf = R::select(sample.delta, R::splat(f32::INFINITY), pdf);
@@ -418,8 +419,8 @@ impl<'s> Shade<'_, 's> {
 }
 
 impl Shade<'_, '_> {
-    /// What a path takes along to weigh light that it finds against photons: the receiver of that light, and
-    /// [`Paths::merging`]. Photons begin at specular surfaces with light from every side.
+    /// What a path keeps to weigh light that it finds against photons: the receiver of that light, and
+    /// [`Paths::merging`]. Photons start at specular surfaces with light from every side.
     #[inline(always)]
     fn merging<R: Real>(&self, arrived: &Arrived<R>, delta: R::Mask, pdf: R) -> (V3<R>, R) {
         let Some(merging) = &self.setting.merging else { return (arrived.vertex.receiver, pdf) };
@@ -433,7 +434,7 @@ impl Shade<'_, '_> {
     }
 }
 
-/// Notes for lanes of `some` where their rays come from first; those of `all` were appended from `first` on.
+/// Records the first legs of rays for the lanes of `some`; those of `all` were appended from `first` on.
 #[inline(always)]
 fn push_legs<R: Real>(legs: &mut Vec<Leg>, first: usize, all: R::Mask, some: R::Mask, from: V3<R::Double>) {
     let (all, mut some) = (all.to_bitmask(), some.to_bitmask());
@@ -447,7 +448,7 @@ fn push_legs<R: Real>(legs: &mut Vec<Leg>, first: usize, all: R::Mask, some: R::
     }
 }
 
-/// Notes whose paths go through a surface.
+/// Records which paths cross a surface.
 #[inline(always)]
 fn push_crossings<R: Real>(crossings: &mut Vec<u32>, mask: R::Mask, at: R::UInt) {
     let at = at.to_lanes();

@@ -1,4 +1,4 @@
-//! Segments between vertices and lights: what light would come, unless something is in its way.
+//! Shadow segments between vertices and lights, with the light that they bring if unoccluded.
 
 use lumbre_geometry::Ray;
 use lumbre_kernel::RayColumns;
@@ -8,7 +8,7 @@ use lumbre_shading::Spectrum;
 use lumbre_simd::{Double, Mask, Real, UInt, V3};
 
 use crate::transport::Record;
-use crate::transport::interior::Interiors;
+use crate::transport::interior::MediumStack;
 use crate::transport::through::straight_on;
 use crate::wave::paths::{Slots, grow, of_column};
 use crate::wave::setting::{Leg, Setting};
@@ -21,32 +21,32 @@ pub(crate) struct Shadows<'s> {
     pub(crate) origin: [Vec<f64>; 3],
     /// To the light, or, where [`Shadows::end`] is infinite, the unit direction of one that is infinitely far away.
     pub(crate) way: [Vec<f64>; 3],
-    /// Where along the way a segment ends.
+    /// The end of a segment along its way.
     pub(crate) end: Vec<f64>,
-    /// What the path receives where nothing is in the way.
+    /// What the path receives if the segment is unoccluded.
     pub(crate) light: [Vec<f32>; 3],
-    /// The medium that a segment begins in, as [`of_column`] reads it; only in a scene with media.
+    /// The medium at the start of a segment, as [`of_column`] reads it; empty in a scene without media.
     pub(crate) medium: Vec<u32>,
-    /// First parts of segments.
+    /// First legs of segments.
     pub(crate) legs: Vec<Leg>,
-    /// Segments that panes let through.
+    /// Segments that pass through panes.
     pub(crate) panes: Vec<Pane<'s>>,
     rays: Vec<Ray>,
-    /// For rays in single precision: their directions and ends.
+    /// The way and the end, rounded for rays in single precision.
     direction: [Vec<f32>; 3],
     t_max: Vec<f32>,
     times: Vec<f64>,
-    /// Whether something is in the way of each, once it was searched for.
+    /// Whether each segment is occluded, after the search.
     pub(crate) blocked: Vec<bool>,
 }
 
-/// A segment that goes straight on through panes.
+/// A segment straight through panes.
 #[derive(Clone, Debug)]
 pub(crate) struct Pane<'s> {
     pub(crate) segment: u32,
     pub(crate) sample: LightSample,
     /// The solids around its start.
-    pub(crate) around: Interiors<'s>,
+    pub(crate) around: MediumStack<'s>,
 }
 
 /// A segment in each lane.
@@ -70,11 +70,11 @@ pub(crate) struct OneSegment {
     pub(crate) medium: u32,
 }
 
-/// The part of a way to a point that a segment goes: allows for the rounding of its direction and of `t`.
+/// The fraction of the way to a point that a segment covers: allows for rounding of its direction and of `t`.
 pub(crate) const NEARLY_WHOLE: f64 = 1.0 - 1.0 / (1_u64 << 40) as f64;
 
 impl<'s> Shadows<'s> {
-    /// Forgets all, with room for `len` segments.
+    /// Clears the columns and reserves `len` segments.
     pub(crate) fn reset(&mut self, len: usize) {
         self.len = 0;
         self.legs.clear();
@@ -82,11 +82,12 @@ impl<'s> Shadows<'s> {
         grow(&mut self.slot, len);
         let f64s = self.origin.iter_mut().chain(&mut self.way).chain([&mut self.end]);
         f64s.for_each(|column| grow(column, len));
-        self.light.iter_mut().for_each(|column| grow(column, len));
+        let f32s = self.light.iter_mut().chain(&mut self.direction).chain([&mut self.t_max]);
+        f32s.for_each(|column| grow(column, len));
         grow(&mut self.medium, len);
     }
 
-    /// Appends a segment, for which there is room.
+    /// Appends a segment; the columns must have been reserved.
     pub(crate) fn push_one(&mut self, segment: &OneSegment) {
         let at = self.len;
         self.len += 1;
@@ -94,9 +95,10 @@ impl<'s> Shadows<'s> {
         for axis in 0..3 {
             self.origin[axis][at] = segment.origin[axis];
             self.way[axis][at] = segment.way[axis];
+            self.direction[axis][at] = segment.way[axis] as f32;
             self.light[axis][at] = segment.light[axis];
         }
-        self.end[at] = segment.end;
+        (self.end[at], self.t_max[at]) = (segment.end, segment.end as f32);
         self.medium[at] = segment.medium;
     }
 
@@ -112,13 +114,18 @@ impl<'s> Shadows<'s> {
         segment.way.y.compress_store(mask, &mut self.way[1][to..]);
         segment.way.z.compress_store(mask, &mut self.way[2][to..]);
         segment.end.compress_store(mask, &mut self.end[to..]);
+        let direction: V3<R> = segment.way.to_single();
+        direction.x.compress_store(mask, &mut self.direction[0][to..]);
+        direction.y.compress_store(mask, &mut self.direction[1][to..]);
+        direction.z.compress_store(mask, &mut self.direction[2][to..]);
+        segment.end.to_single().compress_store(mask, &mut self.t_max[to..]);
         segment.light.x.compress_store(mask, &mut self.light[0][to..]);
         segment.light.y.compress_store(mask, &mut self.light[1][to..]);
         segment.light.z.compress_store(mask, &mut self.light[2][to..]);
         self.len += mask.count();
     }
 
-    /// What a segment brings where nothing is in its way.
+    /// What a segment brings if unoccluded.
     pub(crate) fn light(&self, segment: usize) -> Spectrum {
         Spectrum::new(self.light[0][segment], self.light[1][segment], self.light[2][segment])
     }
@@ -131,7 +138,7 @@ impl<'s> Shadows<'s> {
         Ray::new(at(&self.origin), at(&self.way)).with_range(0.0, self.end[segment]).at_time(time)
     }
 
-    /// Gives each path the light that comes through, and tells of each segment what share that is.
+    /// Adds to each path the light that arrives, and reports the unoccluded share of each segment.
     pub(crate) fn resolve(
         &mut self,
         setting: &Setting<'s>,
@@ -153,16 +160,16 @@ impl<'s> Shadows<'s> {
             }
         }
         let mut panes = std::mem::take(&mut self.panes);
-        let mut next_pane = panes.drain(..).peekable();
+        let mut next_panes = panes.iter_mut().peekable();
         for i in 0..self.len {
             let mut passes = if self.blocked[i] { Spectrum::BLACK } else { Spectrum::WHITE };
-            if let Some(pane) = next_pane.next_if(|pane| pane.segment as usize == i) {
+            if let Some(pane) = next_panes.next_if(|pane| pane.segment as usize == i) {
                 let ray = self.ray(i, slots.time[self.slot[i] as usize]);
                 passes = straight_on(
                     scene,
                     ray,
                     &pane.sample,
-                    pane.around,
+                    std::mem::take(&mut pane.around),
                     setting.regularize,
                     slots.is_alone.get(self.slot[i] as usize).is_some_and(|&alone| alone),
                     record,
@@ -171,7 +178,7 @@ impl<'s> Shadows<'s> {
             if setting.has_media && !passes.is_black() {
                 let slot = self.slot[i] as usize;
                 let ray = self.ray(i, slots.time[slot]);
-                let seed = slots.draws[slot].along(&ray);
+                let seed = slots.draw(slot).along(&ray);
                 let wavelengths = slots.wavelengths.get(slot);
                 passes *= scene.transmittance(of_column(self.medium[i]), &ray, seed, wavelengths);
             }
@@ -180,11 +187,10 @@ impl<'s> Shadows<'s> {
             }
             resolved(i, passes);
         }
-        drop(next_pane);
         self.panes = panes;
     }
 
-    /// Finds whether something is in the way of each segment.
+    /// Tests whether each segment is occluded.
     pub(crate) fn search(&mut self, scene: &Scene, is_single: bool, slots: &Slots<'_>) {
         let len = self.len;
         let time = |slot: &u32| slots.time[*slot as usize];
@@ -198,20 +204,14 @@ impl<'s> Shadows<'s> {
             self.rays = rays;
             return;
         }
-        for (single, double) in self.direction.iter_mut().zip(&self.way) {
-            single.clear();
-            single.extend(double[..len].iter().map(|&x| x as f32));
-        }
-        self.t_max.clear();
-        self.t_max.extend(self.end[..len].iter().map(|&end| end as f32));
         self.times.clear();
         if scene.moves() {
             self.times.extend(self.slot[..len].iter().map(time));
         }
         let rays = RayColumns {
             origin: self.origin.each_ref().map(|column| &column[..len]),
-            direction: self.direction.each_ref().map(|column| &column[..]),
-            t_max: Some(&self.t_max),
+            direction: self.direction.each_ref().map(|column| &column[..len]),
+            t_max: Some(&self.t_max[..len]),
             time: scene.moves().then_some(&self.times),
         };
         scene.accel().any_columns(&rays, false, &mut self.blocked);

@@ -1,73 +1,93 @@
 //! A wave as integrators see it: samples of pixels, and what their rays from the camera meet.
 
 use lumbre_geometry::{Ray, Surface};
-use lumbre_math::{DVec3, Vec3};
-use lumbre_scene::{CameraRay, Footprint, SamplerKind, Scene, View};
+use lumbre_math::{DVec2, DVec3};
+use lumbre_scene::{CameraRay, Footprint, Pinhole, SamplerKind, Scene, View};
 use lumbre_shading::Spectrum;
 use lumbre_shading::spectrum::Wavelengths;
+use lumbre_simd::InstructionSet;
 
 use crate::caustics::Merging;
-use crate::transport::{Draw, Record, Seen, Sight};
+use crate::transport::{PrimaryHit, Record, SampleNumbers, Sampler, Seen};
+use crate::wave::camera::{AimNumbers, PinholeRays};
 use crate::wave::catcher::{Catcher, Places};
-use crate::wave::paths::{OnePath, Paths, Slots, to_column};
+use crate::wave::paths::{Paths, SampleId, Slots};
 use crate::wave::setting::Setting;
 use crate::wave::{Precision, Wave};
 
-/// Samples whose rays from the camera have met what they meet first. An integrator gives each its radiance.
+/// Samples whose camera rays have found their first hits. An integrator gives each its radiance.
 #[derive(Debug)]
-pub struct Sights<'a, 's> {
+pub struct PrimaryHits<'a, 's> {
     scene: &'s Scene,
     view: &'a View,
     wave: &'a mut Wave<'s>,
     precision: Precision,
-    /// What the integrator is asked for, as slots.
+    /// The slots that the integrator has to compute.
     wanted: Vec<u32>,
 }
 
-impl<'a, 's> Sights<'a, 's> {
-    /// Looks along the rays of some samples.
-    pub(crate) fn new(
+impl<'a, 's> PrimaryHits<'a, 's> {
+    /// Starts samples, whose camera rays the caller sets.
+    pub(crate) fn start(
         scene: &'s Scene,
         view: &'a View,
         wave: &'a mut Wave<'s>,
         precision: Precision,
-        samples: impl ExactSizeIterator<Item = (Draw, CameraRay)>,
+        sampler: &Sampler,
+        ids: &[SampleId],
         is_spectral: bool,
-        record: &mut Record,
     ) -> Self {
-        let has_solids = scene.has_solids();
-        let medium = scene.has_media().then(|| to_column(view.medium()));
-        wave.slots.clear();
-        wave.paths.len = 0;
-        wave.is_first = true;
-        wave.paths.reserve(samples.len());
-        for (slot, (draw, mut camera)) in samples.enumerate() {
-            let ray = &mut camera.ray;
-            // Paths keep directions in single precision: all that is told of the ray is told of that one.
-            let direction = ray.direction.as_vec3();
-            ray.direction = direction.as_dvec3();
-            let (width, spread) = cone(&camera);
-            let ray = &camera.ray;
-            wave.paths.push_one(&OnePath {
-                slot: slot as u32,
-                origin: ray.origin,
-                receiver: Vec3::ZERO,
-                direction,
-                throughput: Spectrum::WHITE,
-                eta_scale: 1.0,
-                pdf: f32::INFINITY,
-                merging: f32::INFINITY,
-                depth: 0,
-                width,
-                spread,
-            });
-            let wavelengths = is_spectral.then(|| Wavelengths::visible(draw.wavelength()));
-            wave.slots.push(draw, &camera, has_solids, medium, wavelengths);
+        let Wave { aims, slots, paths, .. } = wave;
+        slots.start(sampler, ids);
+        paths.start(ids.len());
+        InstructionSet::detect().run(AimNumbers { kind: sampler.kind(), slots, aims });
+        if is_spectral {
+            slots.choose_wavelengths(aims.wavelengths());
         }
-        record.counts.camera += wave.paths.len as u64;
-        wave.hits.search(scene, &wave.paths, &wave.slots, precision, true);
-        let wanted = (0..wave.paths.len as u32).collect();
-        Self { scene, view, wave, precision, wanted }
+        if scene.has_solids() {
+            slots.start_outside();
+        }
+        if scene.has_media() {
+            slots.start_in(view.medium());
+        }
+        wave.is_first = true;
+        Self { scene, view, wave, precision, wanted: (0..ids.len() as u32).collect() }
+    }
+
+    /// The numbers that aim a sample: see [`SampleNumbers::aim`].
+    pub(crate) fn aim(&self, slot: usize) -> [f32; 4] {
+        self.wave.aims.numbers(slot)
+    }
+
+    /// Sets the film point and the time of a sample.
+    pub(crate) fn set_film(&mut self, slot: usize, film: DVec2, time: f64) {
+        [self.wave.aims.film[0][slot], self.wave.aims.film[1][slot]] = film.to_array();
+        self.wave.slots.time[slot] = time;
+    }
+
+    /// Sets the camera rays through all film points, with footprints from neighbours at this distance, in pixels.
+    pub(crate) fn look_through(&mut self, pinhole: &Pinhole, spacing: Option<f64>) {
+        let Wave { aims, slots, paths, .. } = &mut *self.wave;
+        InstructionSet::detect().run(PinholeRays { pinhole, spacing, film: &aims.film, slots, paths });
+    }
+
+    /// Sets the camera ray of a sample. Earlier samples must have theirs.
+    pub(crate) fn set_ray(&mut self, slot: usize, camera: &CameraRay) {
+        let CameraRay { mut ray, footprint, .. } = *camera;
+        // Paths store directions in single precision, so all facts of the ray use the rounded direction.
+        let direction = ray.direction.as_vec3();
+        ray.direction = direction.as_dvec3();
+        let Wave { slots, paths, .. } = &mut *self.wave;
+        paths.set_ray(slot, ray.origin, direction, cone(&CameraRay { ray, ..*camera }));
+        slots.time[slot] = ray.time;
+        slots.footprints.push(footprint);
+    }
+
+    /// Finds the first hits of all rays.
+    pub(crate) fn search(&mut self, record: &mut Record) {
+        let Wave { hits, slots, paths, .. } = &mut *self.wave;
+        record.counts.camera += paths.len as u64;
+        hits.search(self.scene, paths, slots, self.precision, true);
     }
 
     /// The scene.
@@ -80,25 +100,27 @@ impl<'a, 's> Sights<'a, 's> {
         self.view
     }
 
-    /// Whether light at infinity is seen by the rays from the camera, too, and not only by those that scattered.
+    /// Sets whether camera rays see light at infinity; scattered rays always do.
     pub(crate) fn show_background(&mut self, is_shown: bool) {
         self.wave.hides_background = !is_shown;
     }
 
-    /// How many samples there are.
+    /// Number of samples.
     pub(crate) fn len(&self) -> usize {
-        self.wave.slots.draws.len()
+        self.wave.slots.len
     }
 
-    /// The ray from the camera of a sample.
+    /// The camera ray of a sample, before its path is followed.
     pub(crate) fn ray(&self, slot: usize) -> Ray {
-        self.wave.slots.rays[slot]
+        self.wave.paths.ray(slot, self.wave.slots.time[slot])
     }
 
-    /// The ray from the camera of a sample, and what it meets.
-    pub(crate) fn sight(&self, slot: usize) -> Sight<'s> {
-        let ray = self.wave.slots.camera(slot);
-        Sight { ray, met: self.wave.hits.interaction(self.scene, slot, &ray.ray, &ray.footprint) }
+    /// The camera ray of a sample, and its first hit.
+    pub(crate) fn sight(&self, slot: usize) -> PrimaryHit<'s> {
+        let ray = self.ray(slot);
+        let footprint = self.wave.slots.footprint(slot, ray.origin);
+        let met = self.wave.hits.interaction(self.scene, slot, &ray, &footprint);
+        PrimaryHit { ray: CameraRay { ray, footprint, weight: 1.0 }, met }
     }
 
     /// Whether a ray meets the ground.
@@ -111,12 +133,12 @@ impl<'a, 's> Sights<'a, 's> {
         self.wave.hits.is_miss(slot)
     }
 
-    /// The surface that a ray meets, as its geometry is.
+    /// The geometric surface that a ray meets.
     pub(crate) fn surface(&self, slot: usize) -> Option<Surface> {
-        self.wave.hits.surface(self.scene, slot, &self.wave.slots.rays[slot])
+        self.wave.hits.surface(self.scene, slot, &self.ray(slot))
     }
 
-    /// What samples see that meet ground which catches shadows, in the order of the places.
+    /// What samples see that meet a shadow catcher, in the order of the points.
     pub(crate) fn catch(
         &mut self,
         catcher: &Catcher<'s>,
@@ -131,18 +153,18 @@ impl<'a, 's> Sights<'a, 's> {
     }
 
     /// The random numbers of a sample.
-    pub(crate) fn draw(&self, slot: usize) -> &Draw {
-        &self.wave.slots.draws[slot]
+    pub(crate) fn draw(&self, slot: usize) -> SampleNumbers {
+        self.wave.slots.draw(slot)
     }
 
-    /// Leaves out the samples that a predicate does not want of the integrator.
+    /// Removes samples from the integrator's list unless the predicate holds.
     pub(crate) fn retain(&mut self, mut is_wanted: impl FnMut(&Self, usize) -> bool) {
         let mut wanted = std::mem::take(&mut self.wanted);
         wanted.retain(|&slot| is_wanted(self, slot as usize));
         self.wanted = wanted;
     }
 
-    /// The radiance of every sample; black where an integrator gave none.
+    /// The radiance of every sample; black if the integrator set none.
     pub(crate) fn radiance(&self) -> &[Spectrum] {
         &self.wave.slots.radiance
     }
@@ -157,16 +179,16 @@ impl<'a, 's> Sights<'a, 's> {
         self.wave.slots.wavelengths.get(slot)
     }
 
-    /// Gives each sample the radiance that a function finds along its ray, one after the other.
-    pub fn each(&mut self, mut radiance: impl FnMut(Sight<'s>, &Draw) -> Spectrum) {
+    /// Sets the radiance of each sample by a function of its ray, one by one.
+    pub fn each(&mut self, mut radiance: impl FnMut(PrimaryHit<'s>, &SampleNumbers) -> Spectrum) {
         for at in 0..self.wanted.len() {
             let slot = self.wanted[at] as usize;
-            let found = radiance(self.sight(slot), self.draw(slot));
+            let found = radiance(self.sight(slot), &self.draw(slot));
             self.wave.slots.radiance[slot] = found;
         }
     }
 
-    /// The numbers of the samples that an integrator is asked for.
+    /// The indices of the samples that the integrator has to compute.
     pub(crate) fn indices(&self) -> impl Iterator<Item = u32> {
         self.wanted.iter().map(|&slot| self.wave.slots.index[slot as usize])
     }
@@ -174,7 +196,7 @@ impl<'a, 's> Sights<'a, 's> {
     /// Follows a path from each ray.
     pub(crate) fn follow(&mut self, setting: &Setting<'s>, record: &mut Record) {
         if self.wanted.len() < self.wave.paths.len {
-            // What others see is known.
+            // The other samples are already known.
             let mut kept = Paths::default();
             kept.reserve(self.wanted.len());
             for &slot in &self.wanted {
@@ -191,7 +213,7 @@ impl<'a, 's> Sights<'a, 's> {
     }
 }
 
-/// The cone of a ray from the camera: the width of its footprint at its origin, and its growth.
+/// The cone of a camera ray: the width of its footprint at its origin, and its growth.
 pub(crate) fn cone(camera: &CameraRay) -> (f32, f32) {
     let Footprint::Neighbours { x_origin, x_direction, y_origin, y_direction } = camera.footprint else {
         return (0.0, 0.0);

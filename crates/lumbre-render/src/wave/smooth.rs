@@ -1,13 +1,13 @@
-//! Vertices on triangles with normals of vertices, or whose materials are looked up, in lanes.
+//! Vertices on triangles with vertex normals or textured materials, in lanes.
 
 use lumbre_math::Vec3;
-use lumbre_scene::{TrianglePoint, TriangleSurface, UniformBsdf};
+use lumbre_scene::{SurfaceTable, TrianglePoint, TriangleSurface, UniformBsdf};
 use lumbre_shading::lanes::{BsdfKind, facing};
 use lumbre_shading::{Bsdf, ShadingFrame, ShadingNormals};
 use lumbre_simd::math::orthonormal_basis;
 use lumbre_simd::{Double, Job, Mask, Real, UInt, V3};
 
-use crate::wave::flat::{FlatHits, corner, find_light, put3, put64, triangle};
+use crate::wave::flat::{FlatHits, corner, find_light, put_corners, put3, put64, triangle};
 use crate::wave::paths::{Paths, grow};
 use crate::wave::search::MetTriangle;
 use crate::wave::setting::{Found, Setting};
@@ -16,30 +16,30 @@ use crate::wave::vertices::{FOLDS, LIT_FROM_BELOW, Place, RISES, SIDED, Vertices
 /// Triangles that paths met and that need more than [`FlatHits`], in columns.
 #[derive(Debug, Default)]
 pub(crate) struct SmoothHits {
-    /// What they have in common with flat ones.
+    /// The data that they share with flat ones.
     pub(crate) base: FlatHits,
-    /// The normals of the corners, corner by corner; zero where there are none.
+    /// The normals of the corners, corner by corner; zero if there are none.
     normals: [Vec<f32>; 9],
-    /// The kind of the BSDF; `None` where the material is to be looked up.
+    /// The kind of the BSDF; `None` if the material is textured.
     pub(crate) kinds: Vec<Option<BsdfKind>>,
-    /// The same for lanes: 1 where the material is to be looked up.
-    looks_up: Vec<u32>,
-    /// What is found of each: the geometric and the shading normal, which point outside.
+    /// The same for lanes: 1 if the material is textured.
+    is_textured: Vec<u32>,
+    /// The computed outward geometric and shading normals.
     pub(crate) geometric: [Vec<f32>; 3],
     pub(crate) shading: [Vec<f32>; 3],
 }
 
 impl SmoothHits {
-    /// Forgets all, with room for `len` hits.
+    /// Clears the columns and reserves `len` hits.
     pub(crate) fn reset(&mut self, len: usize) {
         self.base.reset(len);
         self.kinds.clear();
-        grow(&mut self.looks_up, len);
+        grow(&mut self.is_textured, len);
         let columns = self.normals.iter_mut().chain(&mut self.geometric).chain(&mut self.shading);
         columns.for_each(|column| grow(column, len));
     }
 
-    /// Notes what a path met, whose BSDF is this, or else is to be looked up.
+    /// Appends what a path met, with its BSDF, or `None` for a textured material.
     #[inline]
     pub(crate) fn push(
         &mut self,
@@ -51,18 +51,20 @@ impl SmoothHits {
     ) {
         let at = self.base.len();
         self.base.push(surface, path, met, distance);
-        let corners = surface.mesh.indices[met.triangle as usize];
-        let normals = surface.normals(corners).unwrap_or_default();
-        for (normal, columns) in normals.into_iter().zip(self.normals.chunks_exact_mut(3)) {
-            columns[0][at] = normal.x;
-            columns[1][at] = normal.y;
-            columns[2][at] = normal.z;
-        }
         self.kinds.push(bsdf.map(|bsdf| bsdf.kind));
-        self.looks_up[at] = u32::from(bsdf.is_none());
+        self.is_textured[at] = u32::from(bsdf.is_none());
     }
 
-    /// What was found of a hit, for the look-up of its material.
+    /// Reads the corners of all triangles and the normals there: see [`FlatHits::load`].
+    pub(crate) fn load(&mut self, surfaces: &SurfaceTable) {
+        self.base.load(surfaces);
+        for (at, &corners) in self.base.indices.iter().enumerate() {
+            let normals = self.base.surface(surfaces, at).and_then(|surface| surface.normals(corners));
+            put_corners(&mut self.normals, at, normals.unwrap_or_default());
+        }
+    }
+
+    /// The surface point of a hit, for its material's textures.
     pub(crate) fn point(
         &self,
         at: usize,
@@ -86,7 +88,7 @@ fn vector(columns: &[Vec<f32>; 3], at: usize) -> Vec3 {
     Vec3::new(columns[0][at], columns[1][at], columns[2][at])
 }
 
-/// What a shading normal that differs from the geometric one is for the directions of a vertex.
+/// The flags of a vertex whose shading normal differs from the geometric one.
 pub(crate) fn flags_of(normals: ShadingNormals, frame: &ShadingFrame, geometric: Vec3) -> u32 {
     match normals {
         _ if !ShadingNormals::differ(frame.n, geometric) => 0,
@@ -95,7 +97,8 @@ pub(crate) fn flags_of(normals: ShadingNormals, frame: &ShadingFrame, geometric:
     }
 }
 
-/// The frame of a BSDF: where that is isotropic, the one of flat surfaces, so that their random numbers mean the same directions.
+/// The frame of a BSDF: if that is isotropic, the frame of flat surfaces, so that random numbers give the same
+/// directions.
 pub(crate) fn frame_for(bsdf: &Bsdf, frame: ShadingFrame) -> ShadingFrame {
     if !bsdf.is_isotropic() {
         return frame;
@@ -104,7 +107,7 @@ pub(crate) fn frame_for(bsdf: &Bsdf, frame: ShadingFrame) -> ShadingFrame {
     ShadingFrame { s: Vec3::new(s.x, s.y, s.z), t: Vec3::new(t.x, t.y, t.z), n: frame.n }
 }
 
-/// Makes vertices of hits, in their order, and finds the light that they emit.
+/// Makes vertices of hits, in their order, and adds the light that they emit.
 pub(crate) struct SmoothVertices<'a, 's> {
     pub(crate) setting: &'a Setting<'s>,
     pub(crate) hits: &'a mut SmoothHits,
@@ -127,7 +130,7 @@ impl Job for SmoothVertices<'_, '_> {
         while done < hits.base.len() {
             let lanes = R::Mask::first(hits.base.len() - done);
             let at = R::UInt::from_slice(&hits.base.path[done..]);
-            // Lanes beyond the last have a path, too.
+            // Padding lanes need a valid path too.
             let at = R::UInt::select(lanes, at, R::UInt::splat(0));
             let (point, error, face) = triangle::<R>(&hits.base, done, R::one());
             let error = rounding.grow::<R>(point, error);
@@ -145,16 +148,17 @@ impl Job for SmoothVertices<'_, '_> {
             let mut flags = R::UInt::from_slice(&hits.base.flags[done..]);
             flags = flags | flag_where::<R>(folds, FOLDS);
             flags = flags | flag_where::<R>(differs & is_pbrt, SIDED | LIT_FROM_BELOW);
-            let looks_up = R::UInt::from_slice(&hits.looks_up[done..]).simd_eq(R::UInt::splat(1));
-            // Where the frame is still to be tilted, the texture look-up decides.
-            let may_rise = lanes & differ::<R>(shading, geometric) & (folds | (looks_up & !is_pbrt));
+            let is_textured = R::UInt::from_slice(&hits.is_textured[done..]).simd_eq(R::UInt::splat(1));
+            // If the frame may still be tilted, the texture look-up decides.
+            let has_terminator_offset =
+                lanes & differ::<R>(shading, geometric) & (folds | (is_textured & !is_pbrt));
             let to = vertices.len + done;
-            if may_rise.any() {
+            if has_terminator_offset.any() {
                 let start = place.start(above);
                 let (offset, rises) = rise::<R>(hits, done, above);
                 // A smaller offset is within the error of the point.
                 let least = (start - point).to_single().length();
-                let rises = may_rise & rises & least.simd_lt(offset.dot(geometric).abs());
+                let rises = has_terminator_offset & rises & least.simd_lt(offset.dot(geometric).abs());
                 let is_below = shading.dot(above).simd_lt(R::zero());
                 put3::<R>(&mut vertices.smooth, to, V3::select(is_below, -shading, shading));
                 put64::<R>(&mut vertices.risen, to, start + offset.to_double());
@@ -221,8 +225,8 @@ fn unit<R: Real>(v: V3<R>) -> (V3<R>, R::Mask) {
     (v * scale, scale.is_finite())
 }
 
-/// The geometric normal that points outside, and the shading normal on its side: interpolated between those of the vertices, which say
-/// where the outside is; the geometric one where there are none.
+/// The outward geometric normal, and the shading normal on its side, which is interpolated from the vertices. Vertex
+/// normals decide which side is outside. Without them, the shading normal is the geometric one.
 #[inline(always)]
 fn normals_at<R: Real>(hits: &SmoothHits, at: usize, face: V3<R>, outward: R) -> (V3<R>, V3<R>) {
     let [b0, b1, b2] = weights::<R>(hits, at);
@@ -235,14 +239,14 @@ fn normals_at<R: Real>(hits: &SmoothHits, at: usize, face: V3<R>, outward: R) ->
     (geometric, V3::select(is_smooth, normal * outward, geometric))
 }
 
-/// The offset from a triangle to the smooth surface that the normals of its vertices imply on the side of `above`, and where that lies over
-/// the triangle: as the terminator offset of [`lumbre_scene::Interaction`].
+/// The offset from a triangle to the smooth surface that its vertex normals imply on the side of `above`, and where
+/// that is above the triangle: as the terminator offset of [`lumbre_scene::Interaction`].
 #[inline(always)]
 fn rise<R: Real>(hits: &SmoothHits, at: usize, above: V3<R>) -> (V3<R>, R::Mask) {
     let [b0, b1, b2] = weights::<R>(hits, at);
     let (p0, p1, p2) =
         (corner::<R>(&hits.base, at, 0), corner::<R>(&hits.base, at, 3), corner::<R>(&hits.base, at, 6));
-    // The difference in double precision: the corners may be far from the origin.
+    // Subtracted in double precision: the corners may be far from the origin.
     let (along_a, along_b) = ((p1 - p0).to_single(), (p2 - p0).to_single());
     let (n0, is0) = unit(corner_normal::<R>(hits, at, 0));
     let (n1, is1) = unit(corner_normal::<R>(hits, at, 3));
@@ -259,7 +263,8 @@ fn rise<R: Real>(hits: &SmoothHits, at: usize, above: V3<R>) -> (V3<R>, R::Mask)
     (offset, rises & R::zero().simd_lt(height) & height.is_finite())
 }
 
-/// How far the tangent plane of a vertex lifts a point that is `way` from it, by its weight, and whether the vertex faces this side.
+/// How far the tangent plane of a vertex lifts a point at distance `way`, times its weight, and whether the vertex
+/// faces this side.
 #[inline(always)]
 fn lift<R: Real>(normal: V3<R>, way: V3<R>, weight: R, above: V3<R>) -> (V3<R>, R::Mask) {
     let below = way.dot(normal).simd_min(R::zero());

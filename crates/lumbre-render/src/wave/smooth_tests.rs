@@ -1,4 +1,4 @@
-//! Vertices made in lanes against those made one by one.
+//! Vertices computed in lanes against vertices computed one by one.
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
@@ -19,12 +19,12 @@ use lumbre_simd::InstructionSet;
 use crate::transport::{Record, Sampler, Strategy};
 use crate::wave::setting::Setting;
 use crate::wave::vertices::{FOLDS, RISES, SIDED};
-use crate::wave::{Precision, Sights, Wave};
+use crate::wave::{Precision, PrimaryHits, SampleId, Wave};
 
 const SIDE: u32 = 48;
 const CENTRE: DVec3 = DVec3::new(3.0, -2.0, 5.0);
 
-/// A coarse ball of radius 1.7, whose lower half is without normals, and of which a band has faces that are turned against theirs.
+/// A coarse ball of radius 1.7. Its lower half has no normals, and a band has faces turned against theirs.
 fn ball() -> MeshDesc {
     let (columns, rows) = (13_u32, 7_u32);
     let (mut positions, mut normals, mut uvs) = (Vec::new(), Vec::new(), Vec::new());
@@ -110,7 +110,8 @@ fn scene(material: Material, reverse: bool) -> Scene {
     .unwrap()
 }
 
-/// The first vertices of paths through all pixels; all one by one where BSDFs are to be regularized, which those of first vertices are not.
+/// The first vertices of paths through all pixels; all one by one if BSDFs are to be regularized, which first vertices
+/// never are.
 fn first_vertices<'s>(
     scene: &'s Scene,
     shading_normals: ShadingNormals,
@@ -135,16 +136,14 @@ fn first_vertices<'s>(
     };
     let view = View::new(&scene.cameras()[0], SIDE, SIDE);
     let sampler = Sampler::new(&SamplerDesc { kind: SamplerKind::Sobol, spp: None, seed: 3 });
-    let samples: Vec<_> = (0..SIDE * SIDE)
-        .map(|i| {
-            let (x, y) = (i % SIDE, i / SIDE);
-            let film = DVec2::new(f64::from(x) + 0.37, f64::from(y) + 0.61);
-            (sampler.draw(x, y, 0), view.ray(film, DVec2::splat(0.5), 0.0, 0.25))
-        })
-        .collect();
-    let mut wave = Wave::default();
-    let mut record = Record::default();
-    Sights::new(scene, &view, &mut wave, Precision::Single, samples.into_iter(), false, &mut record);
+    let ids: Vec<_> = (0..SIDE * SIDE).map(|i| SampleId { x: i % SIDE, y: i / SIDE, index: 0 }).collect();
+    let (mut wave, mut record) = (Wave::default(), Record::default());
+    let mut sights = PrimaryHits::start(scene, &view, &mut wave, Precision::Single, &sampler, &ids, false);
+    for (slot, id) in ids.iter().enumerate() {
+        let film = DVec2::new(f64::from(id.x) + 0.37, f64::from(id.y) + 0.61);
+        sights.set_ray(slot, &view.ray(film, DVec2::splat(0.5), 0.0, 0.25));
+    }
+    sights.search(&mut record);
     wave.surfaces(&setting, &mut record);
     wave
 }
@@ -170,7 +169,7 @@ fn compare(material: Material, reverse: bool, shading_normals: ShadingNormals) -
         assert!((vector(&a.normal, i) - vector(&b.normal, i)).length() < 1e-6);
         let (n, other) = (vector(&a.frame_n, i), vector(&b.frame_n, i));
         assert!((n - other).length() < 1e-5, "{n} {other}");
-        // The basis of a normal jumps where its z is 0.
+        // The basis of a normal is discontinuous where its z is 0.
         if n.z.abs() > 1e-3 {
             assert!((vector(&a.frame_s, i) - vector(&b.frame_s, i)).length() < 1e-4);
         }
@@ -193,7 +192,7 @@ fn compare(material: Material, reverse: bool, shading_normals: ShadingNormals) -
             assert!((x - y).abs() < 1e-4, "{k}: {x} {y}");
         }
     }
-    // Rounding decides where a normal is all but the geometric one.
+    // Rounding decides if a normal is almost the geometric one.
     assert!(others * 400 < a.len, "{others} of {}", a.len);
     [folds, rises, a.len]
 }

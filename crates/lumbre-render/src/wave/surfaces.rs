@@ -1,4 +1,4 @@
-//! From hits to vertices: where paths are, what is in the way there, what shines, and how the surface scatters.
+//! From hits to vertices: points, media on the way, emission, and BSDFs.
 
 use lumbre_geometry::Ray;
 use lumbre_math::Vec3;
@@ -10,7 +10,7 @@ use lumbre_shading::{HomogeneousMedium, Material, Spectrum};
 use lumbre_simd::{UInt, V3};
 
 use crate::transport::Record;
-use crate::transport::interior::Interiors;
+use crate::transport::interior::MediumStack;
 use crate::transport::journal::{End, Event, Met, Source};
 use crate::transport::through::hero_alone;
 use crate::wave::Wave;
@@ -20,13 +20,13 @@ use crate::wave::setting::Setting;
 use crate::wave::smooth::{SmoothVertices, flags_of, frame_for};
 use crate::wave::vertices::{FOLDS, LIT_FROM_BELOW};
 
-/// Collisions inside media that every path may have before Russian roulette.
+/// Minimum collisions in media before Russian roulette.
 const ROULETTE_START_IN_MEDIA: u32 = 4;
-/// Collisions at most: they are not counted as bounces, and where nothing is absorbed a path might stay for ever.
+/// Maximum collisions: they are not bounces, and without absorption a path might never end.
 const MAX_COLLISIONS: u32 = 1 << 14;
 
 impl<'s> Wave<'s> {
-    /// Writes down the vertices of all paths that met something, queues those that scatter, and adds the light of those that shine.
+    /// Makes the vertices of all paths that hit something, queues those that scatter, and adds emission.
     pub(super) fn surfaces(&mut self, setting: &Setting<'s>, record: &mut Record) {
         let scene = setting.scene;
         self.vertices.reset(self.paths.len, scene.tables().rows());
@@ -42,7 +42,7 @@ impl<'s> Wave<'s> {
                 continue;
             }
             let in_the_open =
-                self.slots.interiors.get(self.paths.slot[path] as usize).is_none_or(Interiors::is_empty);
+                self.slots.interiors.get(self.paths.slot[path] as usize).is_none_or(MediumStack::is_empty);
             let met = if takes_triangles && in_the_open { self.hits.triangle(path) } else { None };
             let surface = met.and_then(|met| Some((scene.tables().surface(met.id)?, met)));
             let Some((surface, met)) = surface else {
@@ -50,7 +50,7 @@ impl<'s> Wave<'s> {
                 continue;
             };
             let distance = self.hits.distance(path);
-            // What a material is like at the wavelengths of a path is to be looked up.
+            // Spectral renders look up the material at the wavelengths of the path.
             let bsdf = surface.bsdf.filter(|_| !setting.is_spectral);
             match bsdf {
                 Some(bsdf) if !surface.is_smooth() => {
@@ -66,6 +66,8 @@ impl<'s> Wave<'s> {
                 self.tell_triangle(setting, path, record);
             }
         }
+        self.flat.load(scene.tables());
+        self.smooth.load(scene.tables());
         setting.instruction_set.run(FlatVertices {
             setting,
             hits: &self.flat,
@@ -114,7 +116,7 @@ impl<'s> Wave<'s> {
         self.others = others;
     }
 
-    /// Queues the vertices of smooth hits, which come after the flat ones, and looks up the materials that are not the same everywhere.
+    /// Queues the vertices of smooth hits, which follow the flat ones, and looks up textured materials.
     fn scatter_smooth(&mut self, setting: &Setting<'s>, record: &mut Record) {
         let first = self.flat.len();
         for at in 0..self.smooth.base.len() {
@@ -129,7 +131,7 @@ impl<'s> Wave<'s> {
             }
             let footprint = self.footprint(path);
             let point = self.smooth.point(at, &self.vertices, vertex, self.paths.direction(path));
-            let surface = self.smooth.base.surface(setting, at);
+            let surface = self.smooth.base.surface(setting.scene.tables(), at);
             let slot = self.paths.slot[path] as usize;
             let spectral = self.slots.spectral(slot);
             let scattering = surface.and_then(|surface| {
@@ -142,7 +144,7 @@ impl<'s> Wave<'s> {
                     }
                     let frame = frame_for(&bsdf, frame);
                     let mut flags = flags_of(setting.shading_normals, &frame, point.geometric);
-                    if material.lets_light_through() {
+                    if material.is_transmissive() {
                         flags |= LIT_FROM_BELOW;
                     }
                     self.vertices.put_looked_up(vertex, &frame, &bsdf, flags);
@@ -152,7 +154,7 @@ impl<'s> Wave<'s> {
         }
     }
 
-    /// Has the hero wavelength of a path go on in place of all of them, if it is not alone yet: each would be bent another way.
+    /// Continues with the hero wavelength only, since each wavelength would refract differently.
     fn follow_hero(&mut self, path: usize, slot: usize) {
         if !std::mem::replace(&mut self.slots.is_alone[slot], true) {
             let throughput = self.paths.throughput(path);
@@ -164,7 +166,7 @@ impl<'s> Wave<'s> {
     fn footprint(&self, path: usize) -> Footprint {
         if self.is_first {
             let slot = self.paths.slot[path] as usize;
-            return self.slots.footprints.get(slot).copied().unwrap_or_default();
+            return self.slots.footprint(slot, self.paths.origin(path));
         }
         match self.paths.width[path] {
             width if width > 0.0 => {
@@ -174,7 +176,7 @@ impl<'s> Wave<'s> {
         }
     }
 
-    /// Tells of a triangle that a path met.
+    /// Records the triangle that a path met in the journal.
     fn tell_triangle(&self, setting: &Setting<'s>, path: usize, record: &mut Record) {
         let ray = self.paths.ray(path, self.slots.time[self.paths.slot[path] as usize]);
         if let Some(here) = self.hits.interaction(setting.scene, path, &ray, &self.footprint(path)) {
@@ -209,7 +211,7 @@ impl<'s> Wave<'s> {
             if self.reflect_inside(path, slot, ray, here, body, record) {
                 return;
             }
-            // The way below the surface does not count.
+            // The path below the surface does not count.
             depth = depth.saturating_sub(1);
             self.paths.depth[path] = depth | SCATTERED;
         }
@@ -243,7 +245,7 @@ impl<'s> Wave<'s> {
         }
         let frame = frame_for(&bsdf, frame);
         let mut flags = flags_of(setting.shading_normals, &frame, here.shading.geometric);
-        if material.lets_light_through() {
+        if material.is_transmissive() {
             flags |= LIT_FROM_BELOW;
         }
         self.vertices.push_place(path, &here.surface, here.surface.point_error, here.towards_origin);
@@ -266,7 +268,7 @@ impl<'s> Wave<'s> {
         self.vertices.put_bsdf(&frame, &bsdf, flags, self.cone_at(path, here));
     }
 
-    /// The cone of a path where it met a surface: also in scenes whose surfaces do not look at it.
+    /// The cone of a path at its surface, also in scenes without textures.
     fn cone_at(&self, path: usize, here: &Interaction<'s>) -> (f64, f64) {
         let cone = here.cone();
         if cone.0 > 0.0 {
@@ -276,7 +278,7 @@ impl<'s> Wave<'s> {
         (f64::from(self.paths.width[path]) + spread * self.hits.distance_f64(path), spread)
     }
 
-    /// Reflects a path at the boundary of a body that it is inside of, or ends it; false where it leaves.
+    /// Reflects a path at the boundary of a body around it, or ends it; false if it leaves the body.
     fn reflect_inside(
         &mut self,
         path: usize,
@@ -288,7 +290,7 @@ impl<'s> Wave<'s> {
     ) -> bool {
         let normal = here.surface.normal;
         let cos = here.towards_origin.dot(normal);
-        let u = self.slots.draws[slot].scattered(self.slots.distance_samples[slot]);
+        let u = self.slots.draw(slot).scattered(self.slots.distance_samples[slot]);
         self.slots.distance_samples[slot] += 1;
         if u.x >= body.reflected_inside(cos as f32) {
             return false;
@@ -317,7 +319,7 @@ impl<'s> Wave<'s> {
         true
     }
 
-    /// Adds the light of the surface that was found.
+    /// Adds the emission of a surface that a path hit.
     fn emission(
         &mut self,
         setting: &Setting<'s>,
@@ -341,7 +343,8 @@ impl<'s> Wave<'s> {
         self.slots.radiance[slot] += record.added(Source::Surface, throughput, emitted, weight);
     }
 
-    /// The density with which the last vertex would have sampled what a path met: as lanes do, where that is a triangle.
+    /// The density with which the last vertex would have sampled what a path hit: as the lanes compute it for a
+    /// triangle.
     fn light_pdf(&self, setting: &Setting<'s>, path: usize, ray: &Ray, here: &Interaction<'s>) -> f32 {
         let (scene, normal) = (setting.scene, self.paths.receiver(path));
         let Some(met) = self.hits.triangle(path).filter(|_| here.light.is_some()) else {
@@ -358,7 +361,7 @@ impl<'s> Wave<'s> {
         scene.lane_lights().pdf(scene, true, &receiver, id, triangle, point)
     }
 
-    /// Goes through the medium before a surface; false where the path scatters or ends in it.
+    /// Traces a path through the medium before a surface; false if it scatters or ends in it.
     fn cross_medium(
         &mut self,
         path: usize,
@@ -376,7 +379,7 @@ impl<'s> Wave<'s> {
             }
             return true;
         };
-        let u = self.slots.draws[slot].distance(self.slots.distance_samples[slot]);
+        let u = self.slots.draw(slot).distance(self.slots.distance_samples[slot]);
         match medium.sample_distance(throughput, way, u) {
             DistanceSample::Through(weight) => {
                 let throughput = throughput * weight;
@@ -409,7 +412,7 @@ impl<'s> Wave<'s> {
     ) {
         let eta_scale = self.paths.eta_scale[path];
         let likely = (throughput * eta_scale).max_component();
-        let (draw, sample) = (self.slots.draws[slot], self.slots.distance_samples[slot]);
+        let (draw, sample) = (self.slots.draw(slot), self.slots.distance_samples[slot]);
         if self.slots.collisions[slot] >= MAX_COLLISIONS || likely <= 0.0 {
             return record.note(|| Event::Ended(End::Medium));
         }
@@ -433,7 +436,7 @@ impl<'s> Wave<'s> {
             direction: along.normalize(),
             throughput,
             eta_scale,
-            // Lights are behind a surface that bends what comes from them: paths find them.
+            // A refracting surface hides the lights: only paths find them.
             pdf: f32::INFINITY,
             merging: f32::INFINITY,
             depth: self.paths.depth[path] | SCATTERED,

@@ -1,4 +1,4 @@
-//! What happens at a vertex, for those who want to see it: read off the numbers that lanes compute with.
+//! Journal of a vertex, from the numbers that lanes compute with.
 
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Vec3};
@@ -14,7 +14,7 @@ use crate::wave::lights::first_sample;
 use crate::wave::paths::{Departure, OnePath};
 use crate::wave::shadows::Segment;
 
-/// What happens at the vertex of a wave of one path.
+/// The events at the vertex of a wave of one path.
 #[derive(Debug, Default)]
 pub(crate) struct Traced {
     light: Option<TracedLight>,
@@ -28,7 +28,7 @@ struct TracedLight {
     f: Spectrum,
     bsdf_pdf: f32,
     weight: f32,
-    /// Towards the light, where light would come along it.
+    /// Towards the light, if light would come along it.
     shadow_ray: Option<Ray>,
 }
 
@@ -36,7 +36,7 @@ struct TracedLight {
 struct TracedScatter {
     /// Whether the BSDF scatters it.
     goes_on: bool,
-    /// The probability to go on and whether the path does, where that is by chance.
+    /// The survival probability, and whether the path survives, if Russian roulette applies.
     roulette: Option<(f32, bool)>,
     event: Scattered,
 }
@@ -79,7 +79,7 @@ impl Traced {
         self.light = Some(TracedLight { sample, f, bsdf_pdf, weight, shadow_ray });
     }
 
-    /// A direction to go on in after a collision.
+    /// The next direction after a collision.
     pub(crate) fn collision_scattered(&mut self, next: &OnePath, roulette: Option<(f32, bool)>) {
         let event = Scattered {
             ray: Ray::new(next.origin, next.direction.as_dvec3()),
@@ -92,7 +92,7 @@ impl Traced {
         self.scattered = Some(TracedScatter { goes_on: true, roulette, event });
     }
 
-    /// A direction to go on in.
+    /// The next direction.
     #[inline(always)]
     pub(crate) fn scattered<R: Real>(
         &mut self,
@@ -119,7 +119,7 @@ impl Traced {
         });
     }
 
-    /// Writes the events of a vertex, once it is known what share comes through of the light that was sampled there.
+    /// Writes the events of a vertex, once the unoccluded share of its light sample is known.
     pub(crate) fn write(
         &mut self,
         throughput: Spectrum,

@@ -1,4 +1,4 @@
-//! The surfaces that paths met, in columns: all that shading reads of them.
+//! The surfaces that paths met, in columns: everything that shading reads.
 
 use lumbre_geometry::Surface;
 use lumbre_math::{DVec3, Vec3};
@@ -12,50 +12,50 @@ use crate::wave::paths::grow;
 #[derive(Debug, Default)]
 pub(crate) struct Vertices<'s> {
     pub(crate) len: usize,
-    /// The position of the path.
+    /// The index of the path.
     pub(crate) path: Vec<u32>,
     pub(crate) point: [Vec<f64>; 3],
-    /// How far off the surface rays start: beyond any place where the true surface can be.
+    /// The offset of ray origins from the point: beyond any possible true surface.
     pub(crate) offset: Vec<f64>,
     /// The geometric normal, unit, on the side of the viewer.
     pub(crate) normal: [Vec<f32>; 3],
     /// The shading frame: its x and its z axis.
     pub(crate) frame_s: [Vec<f32>; 3],
     pub(crate) frame_n: [Vec<f32>; 3],
-    /// Of [`FOLDS`], [`SIDED`], [`RISES`] and [`LIT_FROM_BELOW`].
+    /// A combination of [`FOLDS`], [`SIDED`], [`RISES`] and [`LIT_FROM_BELOW`].
     pub(crate) flags: Vec<u32>,
-    /// Only where [`RISES`] says so: the shading normal before bump maps, on the side of the viewer, and where rays start that leave
-    /// below the face but not below the smooth surface.
+    /// Only with [`RISES`]: the shading normal before bump maps, on the side of the viewer, and the origin of rays that
+    /// leave below the face but above the smooth surface.
     pub(crate) smooth: [Vec<f32>; 3],
     pub(crate) risen: [Vec<f64>; 3],
-    /// Where the row of the BSDF begins in [`Vertices::rows`].
+    /// Start of the BSDF's row in [`Vertices::rows`].
     pub(crate) bsdf: Vec<u32>,
     pub(crate) rows: Rows,
-    /// The vertices to be shaded by the kind of their BSDF.
+    /// The vertices to shade, by the kind of their BSDF.
     pub(crate) queues: [Vec<u32>; BsdfKind::COUNT],
-    /// The solids that surfaces belong to, and whether they were met from outside; none beyond the end.
+    /// The solids of the surfaces, and whether they were met from outside; shorter lists mean none.
     pub(crate) solids: Vec<Option<(&'s Material, bool)>>,
-    /// The media that light enters there, where a solid has one; none beyond the end.
+    /// The media that light enters there, if a solid has one; shorter lists mean none.
     inside: Vec<Option<HomogeneousMedium>>,
-    /// The media where the path comes from and behind the surface, as [`crate::wave::paths::of_column`] reads them; only in a scene with
-    /// media.
+    /// The media where the path comes from and behind the surface, as [`crate::wave::paths::of_column`] reads them;
+    /// only in a scene with media.
     pub(crate) media: [Vec<u32>; 2],
     /// The footprint of rays that leave: see [`lumbre_scene::Footprint::Cone`].
     pub(crate) width: Vec<f32>,
     pub(crate) spread: Vec<f32>,
 }
 
-/// The shading normal is not the geometric one: directions on the wrong side of the surface are folded back.
+/// The shading normal is not the geometric one: directions below the true surface are folded back.
 pub(crate) const FOLDS: u32 = 1;
-/// The shading normal is not the geometric one, which alone says what side a direction is on, as in pbrt.
+/// The shading normal is not the geometric one, which only decides the side of a direction, as in pbrt.
 pub(crate) const SIDED: u32 = 2;
-/// The mesh stands for a smooth surface above the face.
+/// The mesh approximates a smooth surface above the face.
 pub(crate) const RISES: u32 = 4;
 
-/// Light from below the horizon counts: the surface transmits, or stands for one that is not where it is.
+/// Light from below the horizon counts: the surface transmits, or approximates a smooth one.
 pub(crate) const LIT_FROM_BELOW: u32 = 8;
 
-/// A place off which rays start.
+/// A point and its ray offset.
 #[derive(Clone, Copy)]
 pub(crate) struct Place<R: Real> {
     pub(crate) point: V3<R::Double>,
@@ -63,28 +63,29 @@ pub(crate) struct Place<R: Real> {
     pub(crate) offset: R::Double,
 }
 
-/// What normals lose by single precision.
+/// The loss of normals by single precision.
 const MORE: f64 = 1.0 + 1e-6;
-/// At the origin, where all errors may be 0, the offset is so large that no map makes it 0.
-const LEAST_OFFSET: f64 = 1e-250;
+/// At the origin, where all errors may be 0, the offset is large enough to survive any map.
+const MIN_OFFSET: f64 = 1e-250;
 
-/// The distance from a point with an error to where rays start, along its normal: see [`lumbre_math::rounding::offset_point`].
+/// The distance of ray origins from a point with an error, along its normal: see
+/// [`lumbre_math::rounding::offset_point`].
 pub(crate) fn offset_of(normal: DVec3, error: DVec3) -> f64 {
-    ((normal.abs().dot(error) + 4.0 * error.max_element()) * MORE).max(LEAST_OFFSET)
+    ((normal.abs().dot(error) + 4.0 * error.max_element()) * MORE).max(MIN_OFFSET)
 }
 
 impl<R: Real> Place<R> {
-    /// A point with a bound on the error of each of its components, and its normal: see [`offset_of`].
+    /// A point with an error bound for each component, and its normal: see [`offset_of`].
     #[inline(always)]
     pub(crate) fn new(point: V3<R::Double>, error: V3<R::Double>, normal: V3<R>) -> Self {
         let n = normal.to_double();
         let most = error.x.simd_max(error.y).simd_max(error.z);
         let offset = n.x.abs() * error.x + n.y.abs() * error.y + n.z.abs() * error.z;
         let offset = (offset + R::Double::splat(4.0) * most) * R::Double::splat(MORE);
-        Self { point, normal, offset: offset.simd_max(R::Double::splat(LEAST_OFFSET)) }
+        Self { point, normal, offset: offset.simd_max(R::Double::splat(MIN_OFFSET)) }
     }
 
-    /// Where a ray starts on the side of a direction; the point itself where there is no normal.
+    /// The origin of a ray on the side of a direction; the point itself without a normal.
     #[inline(always)]
     pub(crate) fn start(&self, direction: V3<R>) -> V3<R::Double> {
         let side = R::one().copysign(self.normal.dot(direction));
@@ -100,7 +101,7 @@ impl<R: Real> Place<R> {
 }
 
 impl<'s> Vertices<'s> {
-    /// Forgets all, with room for `len` vertices; `rows` are those of uniform materials.
+    /// Clears the columns and reserves `len` vertices; `rows` are those of uniform materials.
     pub(crate) fn reset(&mut self, len: usize, rows: &Rows) {
         self.len = 0;
         let f64s = self.point.iter_mut().chain(&mut self.risen).chain([&mut self.offset]);
@@ -119,7 +120,7 @@ impl<'s> Vertices<'s> {
         self.queues.iter_mut().for_each(Vec::clear);
     }
 
-    /// Appends where a path is. The normal of the surface may face either side.
+    /// Appends the point of a path. The normal of the surface may face either side.
     pub(crate) fn push_place(&mut self, path: usize, surface: &Surface, error: DVec3, towards: DVec3) {
         let (at, normal) = (self.len, surface.normal);
         let facing = if normal.dot(towards) < 0.0 { -normal } else { normal };
@@ -131,7 +132,7 @@ impl<'s> Vertices<'s> {
         self.flags[at] = 0;
     }
 
-    /// Writes down how the surface of the last vertex scatters, and queues it.
+    /// Sets the BSDF of the last vertex, and queues it.
     pub(crate) fn put_bsdf(&mut self, frame: &ShadingFrame, bsdf: &Bsdf, flags: u32, cone: (f64, f64)) {
         let at = self.len - 1;
         put(&mut self.frame_s, at, frame.s);
@@ -142,7 +143,7 @@ impl<'s> Vertices<'s> {
         self.queue(at, bsdf.kind());
     }
 
-    /// Writes down how the surface of a vertex scatters that was made in lanes, and queues it.
+    /// Sets the BSDF of a vertex that was made in lanes, and queues it.
     pub(crate) fn put_looked_up(&mut self, at: usize, frame: &ShadingFrame, bsdf: &Bsdf, flags: u32) {
         put(&mut self.frame_s, at, frame.s);
         put(&mut self.frame_n, at, frame.n);
@@ -152,17 +153,17 @@ impl<'s> Vertices<'s> {
         self.queue(at, bsdf.kind());
     }
 
-    /// Has a vertex shaded.
+    /// Queues a vertex for shading.
     pub(crate) fn queue(&mut self, vertex: usize, kind: BsdfKind) {
         self.queues[kind as usize].push(vertex as u32);
     }
 
-    /// Whether no vertex is to be shaded.
+    /// Whether no vertex is queued.
     pub(crate) fn is_unqueued(&self) -> bool {
         self.queues.iter().all(Vec::is_empty)
     }
 
-    /// Writes down where rays start that leave the last vertex below the face.
+    /// Sets the origin of rays that leave the last vertex below the face.
     pub(crate) fn put_risen(&mut self, smooth: Vec3, risen: DVec3) {
         let at = self.len - 1;
         self.flags[at] |= RISES;
@@ -170,7 +171,7 @@ impl<'s> Vertices<'s> {
         put64(&mut self.risen, at, risen);
     }
 
-    /// The solid that a vertex belongs to, and whether it was met from outside.
+    /// The solid of a vertex, and whether it was met from outside.
     pub(crate) fn solid(&self, vertex: usize) -> Option<(&'s Material, bool)> {
         self.solids.get(vertex).copied().flatten()
     }
@@ -180,7 +181,7 @@ impl<'s> Vertices<'s> {
         self.inside.get(vertex).copied().flatten()
     }
 
-    /// Writes down the solid of the last vertex, and the medium inside.
+    /// Sets the solid of the last vertex, and the medium inside.
     pub(crate) fn put_solid(&mut self, solid: &'s Material, front: bool, inside: Option<HomogeneousMedium>) {
         self.solids.resize(self.len, None);
         self.solids[self.len - 1] = Some((solid, front));
@@ -190,19 +191,19 @@ impl<'s> Vertices<'s> {
         }
     }
 
-    /// Writes down the media on both sides of a vertex.
+    /// Sets the media on both sides of a vertex.
     pub(crate) fn put_media(&mut self, vertex: usize, sides: [u32; 2]) {
         for (column, medium) in self.media.iter_mut().zip(sides) {
             column[vertex] = medium;
         }
     }
 
-    /// Where a vertex is.
+    /// The point of a vertex.
     pub(crate) fn point(&self, vertex: usize) -> DVec3 {
         DVec3::new(self.point[0][vertex], self.point[1][vertex], self.point[2][vertex])
     }
 
-    /// Where vertices are.
+    /// The points of vertices.
     #[inline(always)]
     pub(crate) fn place<R: Real>(&self, at: R::UInt) -> Place<R> {
         Place {

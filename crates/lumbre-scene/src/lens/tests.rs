@@ -7,7 +7,7 @@ fn surface(curvature: f64, thickness: f64, eta: f64, diameter: f64) -> LensSurfa
     LensSurface { curvature, thickness, eta, aperture }
 }
 
-/// Two elements with a stop of so many millimetres between.
+/// Two elements with a stop of this many millimetres between.
 fn surfaces(stop: f64) -> Vec<LensSurface> {
     vec![
         surface(50.0, 6.0, 1.5, 30.0),

@@ -29,7 +29,7 @@ impl ShapeLight {
         self.shape.pdf_direction(ray, surface)
     }
 
-    /// The surface of which a ray from `from` met this point.
+    /// The surface at this point of a ray from `from`.
     pub(super) fn surface_at(&self, from: DVec3, point: DVec3) -> Option<Surface> {
         let ray = Ray::new(from, point - from);
         let mut roots = Roots::new();
@@ -38,7 +38,7 @@ impl ShapeLight {
         Some(self.shape.surface(&ray, root))
     }
 
-    /// What a tree knows of it; `None` if it has no bounds.
+    /// Its entry in a light tree; `None` if it has no bounds.
     pub(super) fn emitter(&self, entry: &SurfaceEntry) -> Option<Emitter> {
         let is_flat = matches!(self.shape.shape(), Shape::Disk(_) | Shape::Triangle(_));
         let normal =
@@ -85,7 +85,7 @@ pub(super) fn arriving(
     })
 }
 
-/// The factor that turns the normal of a geometry to the side that emits, if that is one alone and known.
+/// The factor that turns the normal of a geometry to the emissive side, if there is only one and it is known.
 fn side(entry: &SurfaceEntry) -> Option<f64> {
     let emission = entry.emission.as_ref()?;
     entry.outward(0).filter(|_| !emission.two_sided)

@@ -1,4 +1,4 @@
-//! How bright the triangles of a light with a picture or with vertex colours are, and where on them.
+//! The brightness of a textured light's triangles, and its distribution over them.
 
 use std::sync::Arc;
 
@@ -14,15 +14,15 @@ use crate::surface::MeshAttributes;
 pub(super) struct Brightness {
     /// The mean radiance, over the triangle and over colours.
     pub mean: f64,
-    /// Where it shines, if that is not about the same everywhere.
+    /// The distribution of its brightness, unless it is nearly uniform.
     pub cells: Option<Cells>,
 }
 
-/// A density over a triangle, by cells of the square that [`warp64::square_to_triangle`] makes it of.
+/// A density over a triangle, by cells of the square that [`warp64::square_to_triangle`] maps to it.
 #[derive(Clone, Debug)]
 pub(super) struct Cells(Arc<PiecewiseConstant2D>);
 
-/// Look-ups a texel along an edge: what is interpolated between texels is not missed.
+/// Look-ups per texel along an edge, so that interpolated texels are not missed.
 const LOOKUPS_PER_TEXEL: f32 = 2.0;
 /// Look-ups along an edge.
 const MAX_LOOKUPS: f32 = 1024.0;
@@ -32,14 +32,15 @@ const LOOKUPS_OF_ALL: f32 = 1.6e7;
 const MAX_CELLS: f32 = 128.0;
 /// Cells for all triangles of a mesh, of four bytes each.
 const CELLS_OF_ALL: f32 = 4e6;
-/// A triangle whose brightest cell is this many times its mean is sampled by cells.
+/// A triangle is sampled by cells if its brightest cell is this many times its mean.
 const VARIED: f32 = 4.0;
-/// What a cell gets of its neighbours on each side, and of the mean: look-ups may have missed the edge of what is bright.
+/// The share that a cell gets of its neighbours on each side, and of the mean: look-ups may have missed the edge of a
+/// bright area.
 const OF_NEIGHBOURS: f32 = 1.0 / 16.0;
 const OF_MEAN: f32 = 0.02;
 
 impl Brightness {
-    /// Of the triangles of a mesh, one after the other.
+    /// For the triangles of a mesh, one after the other.
     pub(super) fn all(emission: &Emission, attributes: &MeshAttributes) -> Vec<Self> {
         let count = attributes.mesh.indices.len();
         let limit = |most: f32, of_all: f32| (of_all / count as f32).sqrt().clamp(2.0, most);
@@ -67,12 +68,12 @@ impl Brightness {
         let size = Vec2::new(image.bitmap().width() as f32, image.bitmap().height() as f32);
         let texels = edges.map(|edge| (edge * size).abs().max_element()).into_iter().fold(0.0, f32::max);
         let wanted = (LOOKUPS_PER_TEXEL * texels).ceil();
-        // Where that is not finite, the least.
+        // The minimum if the number is not finite.
         let lookups = if wanted >= 2.0 { wanted.min(max_lookups) } else { 2.0 };
         let side = lookups.min(max_cells) as usize;
         let per_cell = (lookups / side as f32).ceil() as usize;
         let lookups = side * per_cell;
-        // Where there are fewer look-ups than texels, each is the mean over its surroundings.
+        // With fewer look-ups than texels, each is the mean of its surroundings.
         let is_coarse = (lookups as f32) < wanted;
         let step = 1.0 / lookups as f32;
         let (along_a, along_b) =

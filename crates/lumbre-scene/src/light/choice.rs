@@ -1,4 +1,4 @@
-//! The choice of a light, or of a piece of one, for a place.
+//! Chooses a light, or a piece of one, for a point.
 
 use lumbre_geometry::{Ray, Surface};
 use lumbre_math::{DVec2, DVec3};
@@ -7,16 +7,16 @@ use super::tree::{Emitter, HORIZON_SLACK, LightTree, Place};
 use super::{Light, LightId, LightSample};
 use crate::surface::SurfaceEntry;
 
-/// What the samples of light are for.
+/// The purpose of light samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sampling {
-    /// Light is found by them alone.
+    /// They alone find light.
     LightsOnly,
-    /// Light is found along other rays as well, and both are weighed: multiple importance sampling.
+    /// Other rays find light too, and both are weighted: multiple importance sampling.
     Mis,
 }
 
-/// Chooses among all lights: those that stand somewhere by a tree, the others by what they give to a place.
+/// Chooses among all lights: those with a position by a tree, the others by their irradiance at a point.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LightChoice {
     pub(super) tree: Option<LightTree>,
@@ -25,7 +25,7 @@ pub(crate) struct LightChoice {
     /// The first emitter of each light; `None` for those that are not in the tree.
     pub(super) firsts: Vec<Option<u32>>,
     pub(super) elsewhere: Vec<Elsewhere>,
-    /// The probability of one of those, where there are others that may shine.
+    /// The probability of lights that are everywhere, if others may contribute.
     pub(super) share_elsewhere: f64,
 }
 
@@ -37,9 +37,9 @@ pub(super) struct Elsewhere {
     pub power: f64,
 }
 
-/// The least probability of lights that stand somewhere, and of others, where there are both: their powers are no good measure of what
-/// they give to a place.
-const LEAST_SHARE: f64 = 0.25;
+/// Minimum probability of lights with a position, and of lights that are everywhere, if there are both: their powers
+/// are a poor measure of their contributions at a point.
+const MIN_SHARE: f64 = 0.25;
 
 impl LightChoice {
     /// For a scene of this radius.
@@ -63,8 +63,8 @@ impl LightChoice {
         choice.tree = LightTree::new(&all);
         let elsewhere: f64 = choice.elsewhere.iter().map(|light| light.power).sum();
         let share = elsewhere / (elsewhere + power);
-        // Beyond all numbers, both alike.
-        let share = if share.is_nan() { 0.5 } else { share.clamp(LEAST_SHARE, 1.0 - LEAST_SHARE) };
+        // Both infinite: equal shares.
+        let share = if share.is_nan() { 0.5 } else { share.clamp(MIN_SHARE, 1.0 - MIN_SHARE) };
         let has_elsewhere = choice.elsewhere.iter().any(|light| light.power > 0.0);
         choice.share_elsewhere = match (&choice.tree, has_elsewhere) {
             (Some(_), true) => share,
@@ -79,8 +79,8 @@ impl LightChoice {
         choice
     }
 
-    /// The light that `choose` chooses for a place, and a sample of it in a direction by `x` and `y`. Its density, or the radiance of a
-    /// delta light, includes the probability of the choice.
+    /// The light that `choose` selects for a point, and a sample of it in a direction by `x` and `y`. Its density, or
+    /// the radiance of a delta light, includes the probability of the choice.
     pub(crate) fn sample(
         &self,
         lights: &[Light],
@@ -132,9 +132,9 @@ impl LightChoice {
         }
     }
 
-    /// The probability of the lights that are everywhere at a place to which they give `sum`.
+    /// The probability of the lights that are everywhere at a point where their contributions add up to `sum`.
     fn share_elsewhere_at(&self, place: &Place, sum: f64) -> f64 {
-        // False for a NaN.
+        // False for NaN.
         let shines = sum > 0.0;
         if !shines {
             return 0.0;
@@ -144,12 +144,12 @@ impl LightChoice {
         if is_alone { 1.0 } else { self.share_elsewhere }
     }
 
-    /// What all lights that are everywhere give to a place with this normal, in arbitrary units.
+    /// The contribution of all lights that are everywhere at a point with this normal, in arbitrary units.
     fn sum_elsewhere(&self, lights: &[Light], normal: DVec3, time: f64) -> f64 {
         self.elsewhere.iter().map(|light| light.given(lights, normal, time)).sum()
     }
 
-    /// The light up to which they give this, and what it gives itself.
+    /// The light at which the running sum of contributions passes `up_to`, and its own contribution.
     fn choose_elsewhere(&self, lights: &[Light], normal: DVec3, time: f64, up_to: f64) -> Option<(u32, f64)> {
         let (mut sum, mut last) = (0.0, None);
         for light in &self.elsewhere {
@@ -165,8 +165,8 @@ impl LightChoice {
         last
     }
 
-    /// The density per unit solid angle with which [`LightChoice::sample`] with [`Sampling::Mis`] samples what a ray from a place with this
-    /// normal hit of a light: see [`Light::pdf`].
+    /// The density per unit solid angle with which [`LightChoice::sample`] with [`Sampling::Mis`] samples a ray's hit
+    /// on a light, from a point with this normal: see [`Light::pdf`].
     pub(crate) fn pdf(
         &self,
         lights: &[Light],
@@ -203,13 +203,13 @@ impl LightChoice {
 }
 
 impl Elsewhere {
-    /// What it gives to a place with this normal, or to one that faces it if that is zero; in arbitrary units.
+    /// Its contribution at a point with this normal, or at one that faces it if the normal is zero; in arbitrary units.
     fn given(&self, lights: &[Light], normal: DVec3, time: f64) -> f64 {
         if normal == DVec3::ZERO {
             return self.power;
         }
         let cosine = lights[self.light as usize].towards(time).map_or(1.0, |towards| normal.dot(towards));
-        // As for lights in the tree: what is in the plane itself may shine by rounding.
+        // As for lights in the tree: rounding may light a surface in the light's own plane.
         if cosine < -HORIZON_SLACK { 0.0 } else { self.power * cosine.max(HORIZON_SLACK) }
     }
 }

@@ -1,4 +1,4 @@
-//! The spectra of the lights of a scene, where a render carries wavelengths.
+//! The spectra of a scene's lights in spectral renders.
 
 use lumbre_shading::Spectrum;
 use lumbre_shading::spectrum::Wavelengths;
@@ -8,7 +8,7 @@ use crate::Scene;
 use crate::light_colour::LightColour;
 
 impl Scene {
-    /// The light of one of the scene's lights at some wavelengths, of which `radiance` is the colour, in linear Rec. 709.
+    /// The light of one of the scene's lights at some wavelengths; `radiance` is its colour, in linear Rec. 709.
     pub fn light_at_wavelengths(
         &self,
         light: LightId,
@@ -29,10 +29,11 @@ impl Scene {
         }
     }
 
-    /// What the surface with the id of a hit emits at some wavelengths, of which `radiance` is the colour, in linear Rec. 709.
+    /// The emission at some wavelengths of the surface with the id of a hit; `radiance` is its colour, in linear Rec.
+    /// 709.
     ///
     /// # Panics
-    /// When there is no such id.
+    /// If there is no such id.
     pub fn emission_at_wavelengths(
         &self,
         id: u32,

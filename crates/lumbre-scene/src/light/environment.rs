@@ -37,7 +37,8 @@ impl UniformLight {
 /// An image over the sphere, interpolated bilinearly. Texels that are not finite count as black.
 #[derive(Clone, Debug)]
 pub(super) struct Panorama {
-    /// Three numbers a texel, in rows of `width + 2`: with one texel more on each side, what is beyond the edge. None is negative.
+    /// Three numbers a texel, in rows of `width + 2`, padded by one texel on each side with the values beyond the edge.
+    /// None is negative.
     pub(super) texels: Arc<Vec<f32>>,
     pub(super) width: u32,
     pub(super) height: u32,
@@ -173,7 +174,8 @@ impl Panorama {
     }
 }
 
-/// What is left of the weight of a pixel that is darker than the mean. Less gains nothing more; 0.1 costs a twentieth of the gain.
+/// The remaining share of the weight of a pixel that is darker than the mean. A smaller share gains nothing more; 0.1
+/// costs a twentieth of the gain.
 const LEFT: f32 = 0.01;
 
 /// An environment map, interpolated bilinearly and sampled by brightness.
@@ -183,14 +185,15 @@ pub struct Environment {
     // One cell per pixel: the mean of the interpolated image over the pixel, times its solid angle. It is
     // positive wherever the interpolated image is.
     pub(super) by_brightness: PiecewiseConstant2D,
-    // The same less the mean, for those who find light along their own rays as well.
+    // The same minus the mean, for code that finds light along its own rays as well.
     //
-    // O. Karlik, M. Sik, P. Vevoda, T. Skrivan, J. Krivanek, "MIS Compensation: Optimizing Sampling Techniques in Multiple Importance
-    // Sampling", SIGGRAPH Asia 2019. Where the image is darker than its mean some is left, so that samples alone still find all light.
+    // O. Karlik, M. Sik, P. Vevoda, T. Skrivan, J. Krivanek, "MIS Compensation: Optimizing Sampling Techniques in
+    // Multiple Importance Sampling", SIGGRAPH Asia 2019. Where the image is darker than its mean, a share remains, so
+    // that samples alone still find all light.
     pub(super) beside_others: PiecewiseConstant2D,
     // The mean over the sphere and over the channels.
     mean: f64,
-    /// What lanes need of the map.
+    /// The maps for lanes.
     pub(super) maps: LaneMaps,
 }
 
@@ -258,7 +261,7 @@ impl Environment {
         self.pdf_by(&self.by_brightness, direction)
     }
 
-    /// A sample for those who find the light along their own rays as well, and weigh both: it leaves them more of what is dim.
+    /// A sample for MIS with rays that find the light too: it leaves them more of the dim parts.
     pub(super) fn sample_beside_others(&self, u: DVec2) -> Option<LightSample> {
         self.sample_by(&self.beside_others, u)
     }
@@ -298,7 +301,7 @@ fn light_of(texel: Spectrum) -> Spectrum {
     if texel.is_finite() { texel.map(|c| c.max(0.0)) } else { Spectrum::BLACK }
 }
 
-/// The mean of the channels, also where their sum overflows.
+/// The mean of the channels, also if their sum overflows.
 fn mean_of(colour: Spectrum) -> f64 {
     let mean = f64::from(colour.average());
     if mean.is_finite() { mean } else { colour.to_array().iter().map(|&c| f64::from(c) / 3.0).sum() }

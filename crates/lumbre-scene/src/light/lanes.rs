@@ -1,4 +1,4 @@
-//! The lights of a scene over lanes: samples, densities, and the light that rays find which leave the scene.
+//! The lights of a scene in lanes: samples, densities, and the light that escaping rays find.
 
 mod elsewhere;
 mod environment;
@@ -22,21 +22,21 @@ use super::{Light, LightId, Sampling};
 use crate::Scene;
 use crate::surface::SurfaceEntry;
 
-/// Light that arrives at a place in each lane, from a direction that a light chose. Where it is not `valid`, the rest is unspecified.
+/// Light that arrives at a point in each lane, from a sampled direction. Undefined unless `valid`.
 #[derive(Clone, Copy, Debug)]
 pub struct LaneLightSample<R: Real> {
     /// Unit, towards the light.
     pub towards: V3<R>,
-    /// Where the shadow segment ends, for what is not infinitely far away.
+    /// The end of the shadow segment, unless the light is at infinity.
     pub point: V3<R::Double>,
-    /// A bound on the error of each component of the point.
+    /// An error bound of each component of the point.
     pub error: V3<R::Double>,
-    /// The unit normal there, on the side that shines; zero where there is no surface.
+    /// The unit normal there, on the emissive side; zero without a surface.
     pub normal: V3<R>,
-    /// Whether it is infinitely far away.
+    /// Whether it is at infinity.
     pub infinite: R::Mask,
-    /// The radiance that arrives, if nothing stands in its way. Of a delta light, the irradiance on a surface that faces it, over the
-    /// probability of the choice.
+    /// The radiance that arrives if unoccluded. For a delta light, the irradiance on a surface that faces it, divided
+    /// by the probability of the choice.
     pub radiance: V3<R>,
     /// How the direction was chosen, per unit solid angle, with the probability of the choice.
     pub pdf: R,
@@ -44,33 +44,34 @@ pub struct LaneLightSample<R: Real> {
     pub delta: R::Mask,
     /// Whether any light arrives.
     pub valid: R::Mask,
-    /// Which light it is of: see [`LaneLights::light_of`].
+    /// The sampled light: see [`LaneLights::light_of`].
     pub source: R::UInt,
 }
 
-/// Who is lit, in each lane.
+/// The lit point in each lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Receiver<R: Real> {
-    /// The place.
+    /// The point.
     pub from: V3<R::Double>,
-    /// The unit geometric normal on the side of the viewer; zero where light from every side counts: where the surface transmits, and in a
-    /// medium.
+    /// The unit geometric normal on the viewer's side; zero if light from every side counts: for a transmissive
+    /// surface, and in a medium.
     pub normal: V3<R>,
-    /// The time; `None` where nothing moves.
+    /// The time; `None` if nothing moves.
     pub time: Option<R::Double>,
 }
 
 /// The lights of a scene, laid out for lanes.
 ///
-/// Triangles and rectangles that emit the same everywhere, point, spot and directional lights, uniform light and environment maps are
-/// sampled in lanes, and so is the choice among all lights. Others are sampled by the code of [`Scene::sample_light`], lane by lane.
+/// Uniformly emissive triangles and rectangles, point, spot and directional lights, uniform light and environment maps
+/// are sampled in lanes, and so is the choice among all lights. Other lights are sampled by the code of
+/// [`Scene::sample_light`], lane by lane.
 #[derive(Clone, Debug, Default)]
 pub struct LaneLights {
     table: Table,
     elsewhere: Vec<LaneElsewhere>,
-    /// The probability of those, where there are others that may shine.
+    /// The probability of lights that are everywhere, if others may contribute.
     share_elsewhere: f32,
-    /// The infinite lights, as positions in `elsewhere`.
+    /// The infinite lights, as indices in `elsewhere`.
     infinite: Vec<u32>,
 }
 
@@ -80,10 +81,10 @@ fn below_one<R: Real>() -> R {
     R::splat(1.0 - 0.5 * f32::EPSILON)
 }
 
-/// The bit of a source that says that the rest is a position among the lights that are everywhere; else it is an emitter.
+/// The bit of a source that marks an index among the lights that are everywhere; without it, the source is an emitter.
 const ELSEWHERE: u32 = 1 << 31;
 
-/// The steps of uniform numbers.
+/// The spacing of uniform numbers.
 const STEP: f32 = 1.0 / 16_777_216.0;
 
 impl<R: Real> LaneLightSample<R> {
@@ -105,7 +106,7 @@ impl<R: Real> LaneLightSample<R> {
         }
     }
 
-    /// `other` of a light in some lanes, where directions are this many times as likely.
+    /// A light's `other` in some lanes, with directions more likely by this factor.
     #[inline(always)]
     fn with(self, mask: R::Mask, other: Self, probability: R, source: R::UInt) -> Self {
         let radiance = V3::select(other.delta, other.radiance * probability.recip(), other.radiance);
@@ -138,8 +139,8 @@ impl LaneLights {
         Self { table, share_elsewhere: choice.share_elsewhere as f32, infinite, elsewhere }
     }
 
-    /// A sample of light for each lane of `active`. `u` are four uniform numbers: the choice of a light, a point of it, and further digits
-    /// of the choice, which one number of 24 bits has too few of for thousands of lights.
+    /// A sample of light for each lane of `active`. `u` are four uniform numbers: the choice of a light, a point of it,
+    /// and further digits of the choice, because 24 bits are too few for thousands of lights.
     #[inline(always)]
     pub fn sample<R: Real>(
         &self,
@@ -226,13 +227,13 @@ impl LaneLights {
         LightId(self.elsewhere[self.infinite[position] as usize].light)
     }
 
-    /// The position of a light that is everywhere, for [`LaneLights::sample_one`]; `None` for any other.
+    /// The index of a light that is everywhere, for [`LaneLights::sample_one`]; `None` for other lights.
     pub fn position(&self, light: LightId) -> Option<usize> {
         self.elsewhere.iter().position(|elsewhere| elsewhere.light == light.0)
     }
 
-    /// A sample of one light that is everywhere, for those who find light in no other way: as [`Scene::sample_one_light`]. `u` is a point of
-    /// it, and further digits of the first coordinate.
+    /// A sample of one light that is everywhere, for code that finds light in no other way: as
+    /// [`Scene::sample_one_light`]. `u` is a point of it, and further digits of the first coordinate.
     #[inline(always)]
     pub fn sample_one<R: Real>(
         &self,
@@ -245,8 +246,8 @@ impl LaneLights {
         self.elsewhere[position].sample(scene, active, receiver, u, Sampling::LightsOnly)
     }
 
-    /// The density per unit solid angle with which [`LaneLights::sample`] with [`Sampling::Mis`] would have chosen what a ray met: the point
-    /// of triangle `primitive` of the geometry with the id `entry`. 0 for what it never chooses.
+    /// The density per unit solid angle with which [`LaneLights::sample`] with [`Sampling::Mis`] would have sampled a
+    /// ray's hit: the point of triangle `primitive` of the geometry with the id `entry`. 0 if it never would.
     #[inline(always)]
     pub fn pdf<R: Real>(
         &self,
@@ -297,7 +298,7 @@ impl LaneLights {
         (probability * pdf).or_zero(listed)
     }
 
-    /// The number of lights that rays meet which leave the scene.
+    /// The number of lights that escaping rays hit.
     pub fn infinite_count(&self) -> usize {
         self.infinite.len()
     }
@@ -348,7 +349,7 @@ impl LaneLights {
         (radiance, probability * pdf)
     }
 
-    /// What all lights that are everywhere give to a place, in arbitrary units.
+    /// The contribution of all lights that are everywhere at a point, in arbitrary units.
     #[inline(always)]
     fn sum_elsewhere<R: Real>(
         &self,
@@ -364,7 +365,7 @@ impl LaneLights {
         sum
     }
 
-    /// The probability of the lights that are everywhere at a place to which they give `sum`.
+    /// The probability of the lights that are everywhere at a point where their contributions add up to `sum`.
     #[inline(always)]
     fn share_elsewhere_at<R: Real>(&self, active: R::Mask, place: &LanePlace<R>, sum: R) -> R {
         let share = R::splat(self.share_elsewhere).or_zero(sum.simd_gt(R::zero()));
@@ -375,7 +376,7 @@ impl LaneLights {
         R::select(others_shine | share.simd_eq(R::zero()), share, R::one())
     }
 
-    /// The position of the light up to which they give this, and what it gives itself.
+    /// The index of the light at which the running sum of contributions passes `up_to`, and its own contribution.
     #[inline(always)]
     fn choose_elsewhere<R: Real>(
         &self,
@@ -388,7 +389,7 @@ impl LaneLights {
         let (mut before, mut chosen, mut of_chosen) = (R::zero(), R::UInt::splat(0), R::zero());
         for (position, light) in self.elsewhere.iter().enumerate() {
             let given = light.given(scene, active, place, receiver);
-            // The last one that begins before it.
+            // The last one that starts before it.
             let is_later = given.simd_gt(R::zero()) & before.simd_le(up_to);
             chosen = R::UInt::select(is_later, R::UInt::splat(position as u32), chosen);
             of_chosen = R::select(is_later, given, of_chosen);

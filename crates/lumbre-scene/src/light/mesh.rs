@@ -23,11 +23,11 @@ pub struct MeshLight {
     /// By weight.
     by_power: AliasTable,
     pub(super) pieces: Vec<Piece>,
-    /// The piece of each triangle; nothing where each is one.
+    /// The piece of each triangle; empty if each triangle is its own piece.
     piece_of: Vec<u32>,
 }
 
-/// What is sampled at once, in the space of the mesh's tree, with data shared by its samples.
+/// A unit of sampling, in the space of the mesh's tree, with precomputed data.
 #[derive(Clone, Debug)]
 pub(super) struct Piece {
     pub form: Form,
@@ -39,7 +39,7 @@ pub(super) struct Piece {
     pub outward: Option<f64>,
     /// The area times the brightness, relative to other pieces.
     weight: f64,
-    /// Where it is bright, if that is not about the same everywhere.
+    /// The distribution of its brightness, unless it is nearly uniform.
     cells: Option<Cells>,
     pub center: DVec3,
     // The squared distance from the centre to the farthest corner.
@@ -52,17 +52,17 @@ pub(super) struct Piece {
 pub(super) enum Form {
     /// Without area.
     Nothing,
-    /// A triangle of this number.
+    /// The triangle with this index.
     Triangle(Triangle, u32),
-    /// Two triangles of a light that emits the same everywhere.
+    /// Two triangles of a uniformly emissive light.
     Rectangle(Rectangle),
 }
 
-/// What every triangle gets of the mean brightness of all: look-ups may have missed what is bright.
+/// The share of the mean brightness that every triangle gets: look-ups may have missed bright areas.
 const OF_MEAN: f64 = 1e-3;
-/// The share of samples by solid angle of a near triangle that is not about the same everywhere.
+/// The share of solid-angle samples of a near triangle that is not uniform.
 const BY_ANGLE: f64 = 0.5;
-/// From this many radii away, sampling by area is as good as by solid angle, and faster.
+/// At this many radii and beyond, sampling by area is as good as by solid angle, and faster.
 const FAR: f64 = 2.0;
 
 impl MeshLight {
@@ -78,8 +78,9 @@ impl MeshLight {
         Some(Self { entry, power: 0.0, by_power: AliasTable::new(&weights)?, pieces, piece_of })
     }
 
-    /// The same for a light with a picture or vertex colours: brighter triangles are chosen more often, and of those that are not about the
-    /// same everywhere what is brighter. Also returns the sum of the areas, each times its mean radiance; `None` for a light that is black.
+    /// As [`MeshLight::new`], for a light with a picture or vertex colours: brighter triangles are chosen more often,
+    /// and so are brighter parts of triangles that are not uniform. Also returns the sum of the areas, each times its
+    /// mean radiance; `None` for a black light.
     pub(crate) fn with_brightness(
         mut self,
         emission: &Emission,
@@ -95,7 +96,7 @@ impl MeshLight {
         Some((Self::of(self.entry, self.pieces, self.piece_of)?, whole))
     }
 
-    /// The same with what is known of the sides that the triangles face.
+    /// Adds the known sides of the triangles.
     pub(crate) fn with_sides(mut self, entry: &SurfaceEntry) -> Self {
         for (triangle, piece) in (0..).zip(&mut self.pieces) {
             piece.outward = entry.outward(triangle);
@@ -103,7 +104,7 @@ impl MeshLight {
         self
     }
 
-    /// The same with rectangles in place of the pairs of triangles that make one, for a light that emits the same everywhere.
+    /// Replaces pairs of triangles that form rectangles, for a uniformly emissive light.
     pub(crate) fn with_rectangles(self, mesh: &TriangleMesh) -> Self {
         let mut pairs = pairs(mesh);
         let outward = |triangle: u32| self.pieces[triangle as usize].outward;
@@ -190,12 +191,12 @@ impl MeshLight {
         }
     }
 
-    /// The surface at a point, as far as densities depend on it: on the point alone.
+    /// The surface at a point, with the data that densities need; it depends on the point only.
     pub(super) fn surface_at(&self, point: DVec3) -> Surface {
         self.pieces[0].surface_at(point)
     }
 
-    /// What a tree knows of every piece.
+    /// The entries of all pieces in a light tree.
     pub(super) fn emitters(&self, entry: &SurfaceEntry) -> Vec<Emitter> {
         let Some(emission) = &entry.emission else { return Vec::new() };
         let total: f64 = self.pieces.iter().map(|piece| piece.weight).sum();
@@ -269,7 +270,7 @@ impl Piece {
         (from - self.center).length_squared() > FAR * FAR * self.reach_squared
     }
 
-    /// A point of a triangle that does not emit the same everywhere, and its density per unit solid angle.
+    /// A point of a triangle that is not uniform, and its density per unit solid angle.
     fn sample_varied(&self, shape: &Triangle, from: DVec3, u: DVec2) -> Option<(Surface, f64)> {
         let is_far = self.is_far(from);
         let by_angle = |u: DVec2| shape.sample_direction(from, u).map(|sample| (sample.surface, sample.pdf));
@@ -292,7 +293,7 @@ impl Piece {
         (pdf > 0.0 && pdf.is_finite()).then_some((surface, pdf))
     }
 
-    /// The density of [`Piece::sample_varied`] where there are cells.
+    /// The density of [`Piece::sample_varied`] with cells.
     fn pdf_varied(&self, shape: &Triangle, from: DVec3, point: DVec3) -> f64 {
         let Some(cells) = &self.cells else { return 0.0 };
         let [a, b] = self.sides;
@@ -307,7 +308,7 @@ impl Piece {
         BY_ANGLE * by_angle + (1.0 - BY_ANGLE) * by_cells
     }
 
-    /// A sample of a piece that emits the same everywhere, on the side of its normal times `outward`.
+    /// A sample of a uniformly emissive piece, on the side of its normal times `outward`.
     #[inline]
     fn sample(&self, emission: &Emission, outward: f64, from: DVec3, u: DVec2) -> Option<LightSample> {
         let front = outward * self.normal.dot(self.corner - from) < 0.0;

@@ -43,18 +43,18 @@ impl MovingLight {
         sample.towards = map.vector(sample.towards).try_normalize()?;
         if let Some(end) = &mut sample.end {
             end.point = map.point(end.point);
-            // As seen from the point itself: the transform there and back may have rounded it.
+            // From the point itself: the transform there and back may have rounded the direction.
             sample.towards = (end.point - from).try_normalize()?;
         }
         Some(sample)
     }
 
-    /// The direction of parallel light at a time; `None` for a light that is somewhere.
+    /// The direction of parallel light at a time; `None` for a light with a position.
     pub(super) fn towards(&self, time: f64) -> Option<DVec3> {
         self.motion.at(time).vector(self.light.towards(time)?).try_normalize()
     }
 
-    /// What a tree knows of it at all times; `None` for parallel light.
+    /// Its entry in a light tree at all times; `None` for parallel light.
     pub(super) fn emitter(&self, entries: &[SurfaceEntry]) -> Option<Emitter> {
         let inner = self.light.emitters(entries);
         let [Emitter { bounds, strength, .. }] = inner[..] else { return None };
@@ -68,7 +68,7 @@ impl MovingLight {
     }
 }
 
-/// A box that holds another one at all times of its motion.
+/// A box that contains another one at all times of its motion.
 pub(crate) fn swept(bounds: &Aabb, motion: &AnimatedTransform) -> Aabb {
     if motion.is_still() {
         return moved(bounds, &motion.keys()[0].1).outward(8);
@@ -77,7 +77,7 @@ pub(crate) fn swept(bounds: &Aabb, motion: &AnimatedTransform) -> Aabb {
     let places = motion.keys().iter().fold(Aabb::EMPTY, |all, (_, map)| all.union(moved(bounds, map)));
     let reach = |bounds: &Aabb| bounds.min.abs().max(bounds.max.abs()).max_element();
     let rounding = 64.0 * f64::EPSILON * motion.condition() * reach(&places);
-    // As fine as is worth while: a hundredth of how far it goes.
+    // As fine as worthwhile: a hundredth of its path.
     let tolerance = (0.01 * places.size().max_element()).max(rounding).max(f64::MIN_POSITIVE);
     motion.steps(center, half, tolerance).fold(places, |all, (maps, beyond)| {
         let step = maps.iter().fold(Aabb::EMPTY, |step, map| step.union(moved(bounds, map)));

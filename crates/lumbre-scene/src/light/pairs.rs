@@ -1,4 +1,4 @@
-//! Pairs of triangles of a mesh that make rectangles.
+//! Pairs of mesh triangles that form rectangles.
 
 use std::collections::HashMap;
 
@@ -15,17 +15,17 @@ pub(super) struct Pair {
     /// The corner at the right angle of the first triangle, and the sides from there, in the space of the mesh's tree.
     pub corner: DVec3,
     pub sides: [DVec3; 2],
-    /// How far the corner of the second triangle is from where the sides say.
+    /// The distance of the second triangle's corner from the exact rectangle.
     pub gap: DVec3,
 }
 
-/// The greatest gap, relative to the shorter side: what rounding to single precision makes of a rectangle that is turned.
+/// Maximum gap, relative to the shorter side: the rounding of a rotated rectangle to single precision.
 const GAP: f64 = 1e-5;
 
-/// The pairs of a mesh, each triangle in one at most.
+/// The pairs of a mesh; each triangle is in at most one.
 pub(super) fn pairs(mesh: &TriangleMesh) -> Vec<Pair> {
     let mut pairs = Vec::new();
-    // By the directed diagonal: that of the other triangle runs the other way.
+    // By the directed diagonal: the other triangle has the opposite direction.
     let mut open: HashMap<[[u32; 3]; 2], (u32, DVec3)> = HashMap::new();
     for (triangle, indices) in (0..).zip(&mesh.indices) {
         let Some((vertices, rectangle)) = right_angled(mesh, indices) else { continue };

@@ -51,11 +51,11 @@ impl PlacedLight {
         Some(sample.of_density(growth(&map, sample.towards)))
     }
 
-    /// What a tree knows of it, at all times if it moves.
+    /// Its entry in a light tree, at all times if it moves.
     pub(super) fn emitter(&self, entries: &[SurfaceEntry]) -> Option<Emitter> {
         let inner = self.light.emitters(entries);
         let bounds = inner.iter().fold(Aabb::EMPTY, |bounds, emitter| bounds.union(emitter.bounds));
-        // By its power, which is that in the world.
+        // From its power, which is the power in the world.
         let strength = self.light.power(0.0) / std::f64::consts::TAU;
         let bounds = match &self.placement {
             Placement::Still(map) => moved(&bounds, map).outward(8),
@@ -64,7 +64,7 @@ impl PlacedLight {
         (!inner.is_empty()).then_some(Emitter { bounds, facing: Facing::ANY, strength })
     }
 
-    /// The surface, in the space of the object, of which a ray from `from` met this point.
+    /// The surface, in the space of the object, at this point of a ray from `from`.
     pub(super) fn surface_at(&self, from: DVec3, point: DVec3, time: f64) -> Option<Surface> {
         let map = self.placement.at(time);
         self.light.surface_at(map.inverse_point(from), map.inverse_point(point), time)

@@ -1,7 +1,8 @@
-//! Light from all around that comes through a rectangle alone, such as a window.
+//! Light from all directions through a rectangle only, such as a window.
 //!
-//! B. Bitterli, C. Wyman, M. Pharr, "Portal-Masked Environment Map Sampling", Computer Graphics Forum 34 (EGSR), 2015. In their map of
-//! directions a rectangle is a rectangle from wherever it is seen, so that a summed-area table samples what is seen through it.
+//! B. Bitterli, C. Wyman, M. Pharr, "Portal-Masked Environment Map Sampling", Computer Graphics Forum 34 (EGSR), 2015.
+//! In their map of directions, the rectangle is a rectangle from every viewpoint, so that a summed-area table can
+//! sample the visible part.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -12,37 +13,37 @@ use super::LightSample;
 use super::environment::Panorama;
 use crate::EnvironmentDesc;
 
-/// Light of infinitely far away that is seen through a rectangle alone: from another side, or beside it, none of it is seen.
+/// Light at infinity, visible only through the front of a rectangle.
 #[derive(Clone, Debug)]
 pub struct PortalLight {
-    // The unit axes of the rectangle: its sides, and what points to the sky.
+    // The unit axes of the rectangle: its sides, and the direction to the sky.
     axes: DMat3,
-    // Two of its corners, opposite to each other.
+    // Two opposite corners.
     corners: [DVec3; 2],
     width: usize,
     height: usize,
     texels: Vec<Spectrum>,
     // For each texel, the sum of the weights of those below and to the left: `width + 1` in a row.
     sums: Vec<f64>,
-    // The mean radiance of the side of the rectangle that light comes from, times its area.
+    // The mean radiance of the hemisphere in front of the rectangle, times its area.
     mean_by_area: f64,
 }
 
-/// How far the sides of a portal may be from a rectangle, relative to their length.
+/// Maximum deviation of the sides from a rectangle, relative to their length.
 const SLACK: f64 = 1e-3;
 
-/// Why a portal is none.
+/// Why a portal is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PortalError {
     /// The corners are not those of a rectangle.
     NoRectangle,
-    /// Nothing shines.
+    /// It is black.
     Dark,
 }
 
 impl PortalLight {
-    /// A sky that is seen through the rectangle of these corners, one after the other around it; the vector product of the sides from the
-    /// first corner to the fourth and to the second points to the sky.
+    /// A sky seen through the rectangle with these corners, in order around it. The cross product of the sides from the
+    /// first corner to the fourth and from the first to the second points to the sky.
     pub(crate) fn new(
         world_from_light: lumbre_math::Transform,
         radiance: Spectrum,
@@ -95,8 +96,8 @@ impl PortalLight {
         Err(PortalError::Dark)
     }
 
-    /// The part of the map that is seen from a point: its lower and its upper corner, in texels. `None` where the rectangle is seen from
-    /// the other side, or from its edge.
+    /// The part of the map that is visible from a point: its lower and its upper corner, in texels. `None` if the
+    /// rectangle is seen from behind or edge-on.
     fn window(&self, from: DVec3) -> Option<[DVec2; 2]> {
         let size = DVec2::new(self.width as f64, self.height as f64);
         let corner = |p: DVec3| Some(map(self.axes.transpose() * (p - from).try_normalize()?)? * size);
@@ -111,19 +112,19 @@ impl PortalLight {
         row * self.width + column
     }
 
-    /// The place in the map of a unit direction from a point, in texels, if it goes through the rectangle.
+    /// The position in the map of a unit direction from a point, in texels, if it passes through the rectangle.
     fn place(&self, from: DVec3, direction: DVec3) -> Option<DVec2> {
         let at = map(self.axes.transpose() * direction)? * DVec2::new(self.width as f64, self.height as f64);
         let [low, high] = self.window(from)?;
         (low.cmple(at).all() && at.cmple(high).all()).then_some(at)
     }
 
-    /// The radiance that arrives at a point along a unit direction from infinitely far away.
+    /// The radiance that arrives at a point along a unit direction from infinity.
     pub(super) fn radiance(&self, from: DVec3, direction: DVec3) -> Spectrum {
         self.place(from, direction).map_or(Spectrum::BLACK, |at| self.texels[self.texel(at)])
     }
 
-    /// The sum of the weights from the lower corner of the map to a place, in texels; linear within each.
+    /// The sum of the weights from the lower corner of the map to a position, in texels; linear within each.
     fn sum(&self, x: f64, y: f64) -> f64 {
         let (column, row) = ((x as usize).min(self.width - 1), (y as usize).min(self.height - 1));
         let (right, up) = (x - column as f64, y - row as f64);
@@ -143,7 +144,7 @@ impl PortalLight {
         let [low, high] = self.window(from)?;
         let all = self.part([low, high]);
         let x = bisect(low.x, high.x, u.x * all, |x| self.part([low, DVec2::new(x, high.y)]));
-        // All of a column of texels is alike along x.
+        // A column of texels is uniform along x.
         let column = x.floor().min(self.width as f64 - 1.0);
         let strip = |y: f64| self.part([DVec2::new(column, low.y), DVec2::new(column + 1.0, y)]);
         let y = bisect(low.y, high.y, u.y * strip(high.y), strip);
@@ -165,7 +166,7 @@ impl PortalLight {
         if pdf.is_finite() { pdf } else { 0.0 }
     }
 
-    /// The density of a direction per unit solid angle, where the window has these weights in all.
+    /// The density of a direction per unit solid angle, if the weights of the window add up to `all`.
     fn density(&self, at: DVec2, local: DVec3, all: f64) -> f64 {
         let texel = self.texel(at);
         let (column, row) = ((texel % self.width) as f64, (texel / self.width) as f64);
@@ -192,7 +193,7 @@ impl PortalLight {
         sum
     }
 
-    /// An estimate of the power that comes through it.
+    /// An estimate of the power through it.
     pub(super) fn power(&self) -> f64 {
         PI * self.mean_by_area
     }
@@ -204,7 +205,8 @@ fn direction_of(uv: DVec2) -> DVec3 {
     DVec3::new(tangent(uv.x), tangent(uv.y), 1.0).normalize()
 }
 
-/// The point of the unit square of a direction relative to the axes of the portal; `None` for one that does not go to the sky.
+/// The point of the unit square of a direction relative to the axes of the portal; `None` if it points away from the
+/// sky.
 fn map(local: DVec3) -> Option<DVec2> {
     let along = |x: f64| (x.angle_from(local.z) + FRAC_PI_2) / PI;
     (local.z > 0.0).then(|| DVec2::new(along(local.x), along(local.y)))
@@ -215,7 +217,7 @@ fn density_of_map(local: DVec3) -> f64 {
     local.z / (PI * PI * (1.0 - local.x * local.x) * (1.0 - local.y * local.y))
 }
 
-/// Where an ascending function is a value, between two places.
+/// Where an ascending function has a value, between two positions.
 fn bisect(low: f64, high: f64, value: f64, function: impl Fn(f64) -> f64) -> f64 {
     let (mut a, mut b) = (low, high);
     for _ in 0..48 {

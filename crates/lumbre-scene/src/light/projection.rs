@@ -1,4 +1,4 @@
-//! A picture that is thrown from a point.
+//! A picture projected from a point.
 
 use std::sync::Arc;
 
@@ -9,19 +9,20 @@ use lumbre_shading::Spectrum;
 use super::LightSample;
 use super::delta::from_point;
 
-/// A point that shines in the directions of a picture, along +z of its space; the picture's top is towards +y, and its right towards +x.
+/// A point light that projects a picture along +z of its space; the picture's top is towards +y, and its right towards
+/// +x.
 #[derive(Clone, Debug)]
 pub struct ProjectionLight {
     /// The position.
     pub from: DVec3,
-    // Of directions; where it is placed does not matter.
+    // For directions; the translation does not matter.
     world_from_light: Transform,
     image: Arc<Image>,
     // A factor on the texels, which are radiant intensities.
     intensity: Spectrum,
-    // Of the picture at a distance of 1: half its width and height.
+    // Half the width and height of the picture at a distance of 1.
     half: [f64; 2],
-    /// The unit middle of the picture.
+    /// The unit direction to the middle of the picture.
     pub(super) axis: DVec3,
     /// The cosine of the angle from the middle to the farthest corner.
     pub(super) cos_corner: f64,
@@ -30,11 +31,11 @@ pub struct ProjectionLight {
     mean: f64,
 }
 
-/// The least cosine from the axis of what is lit, as in pbrt.
-const LEAST_COSINE: f64 = 1e-3;
+/// Minimum cosine from the axis of lit directions, as in pbrt.
+const MIN_COSINE: f64 = 1e-3;
 
 impl ProjectionLight {
-    /// A picture whose shorter side is seen from the light under so many degrees. `None` for one that is black or empty.
+    /// A picture whose shorter side spans this many degrees. `None` if it is black or empty.
     pub(crate) fn new(
         world_from_light: Transform,
         intensity: Spectrum,
@@ -71,7 +72,7 @@ impl ProjectionLight {
     /// The radiant intensity in a direction from the light.
     fn intensity(&self, direction: DVec3) -> Spectrum {
         let local = self.world_from_light.inverse_vector(direction).normalize_or_zero();
-        if local.z < LEAST_COSINE {
+        if local.z < MIN_COSINE {
             return Spectrum::BLACK;
         }
         let [x, y] = [local.x / local.z / self.half[0], local.y / local.z / self.half[1]];
@@ -81,7 +82,7 @@ impl ProjectionLight {
         let (width, height) = (self.image.width(), self.image.height());
         let pixel = |along: f64, count: u32| ((0.5 * along * f64::from(count)) as u32).min(count - 1);
         let texel = self.image.pixel(pixel(1.0 + x, width), pixel(1.0 - y, height));
-        // Negative texels and such as are not finite are black.
+        // Negative and non-finite texels are black.
         if texel.is_finite() { (self.intensity * texel).map(|c| c.max(0.0)) } else { Spectrum::BLACK }
     }
 

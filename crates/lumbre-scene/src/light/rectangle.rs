@@ -2,19 +2,19 @@
 
 use lumbre_math::{DVec2, DVec3, Elementary, direction_at};
 
-/// A rectangle, or what is one up to rounding.
+/// A rectangle, up to rounding.
 ///
 /// C. Urena, M. Fajardo, A. King, "An Area-Preserving Parametrization for Spherical Rectangles", EGSR 2013. The four angles
 /// are kept as complex numbers here, whose product needs one arc tangent for the solid angle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rectangle {
     corner: DVec3,
-    /// Unit and at right angles: along the sides, and the normal.
+    /// Orthonormal: along the sides, and the normal.
     axes: [DVec3; 3],
     lengths: DVec2,
 }
 
-/// A rectangle from a viewpoint that it has a solid angle from.
+/// A rectangle as seen from a viewpoint, with a non-zero solid angle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RectangleView {
     /// The least and the greatest coordinates along the sides, relative to the viewpoint.
@@ -27,17 +27,17 @@ pub(super) struct RectangleView {
     pub solid_angle: f64,
 }
 
-/// Cosines between sides up to this are right angles: what rounding to single precision makes of one. The error of densities is no
-/// greater.
+/// Cosines between sides up to this count as right angles: the rounding of one to single precision. The error of
+/// densities is no greater.
 const SQUARE: f64 = 1e-5;
-/// Solid angles below this are sampled by area: they lose the digits of the angles that they are the difference of.
-const LEAST_SOLID_ANGLE: f64 = 1e-5;
+/// Smaller solid angles are sampled by area: as a difference of angles, they lose digits.
+const MIN_SOLID_ANGLE: f64 = 1e-5;
 
 impl Rectangle {
     /// `None` for sides that are not at right angles.
     pub(super) fn new(corner: DVec3, sides: [DVec3; 2]) -> Option<Self> {
         let [x, y] = sides.map(DVec3::normalize);
-        // False for a NaN.
+        // False for NaN.
         let is_square = x.dot(y).abs() <= SQUARE;
         is_square.then(|| {
             let normal = x.cross(y).normalize();
@@ -46,7 +46,7 @@ impl Rectangle {
         })
     }
 
-    /// `None` where it should be sampled by area.
+    /// `None` if it should be sampled by area.
     #[inline]
     pub(super) fn seen_from(&self, from: DVec3) -> Option<RectangleView> {
         let way = self.corner - from;
@@ -61,7 +61,7 @@ impl Rectangle {
         let angle = angle.y.angle_from(angle.x);
         // A sum of angles, from 0 to a full turn.
         let solid_angle = if angle < 0.0 { angle + std::f64::consts::TAU } else { angle };
-        let range = LEAST_SOLID_ANGLE..std::f64::consts::TAU - LEAST_SOLID_ANGLE;
+        let range = MIN_SOLID_ANGLE..std::f64::consts::TAU - MIN_SOLID_ANGLE;
         let view = RectangleView { least, greatest, height, angles_of_least_x: [low, high], solid_angle };
         range.contains(&solid_angle).then_some(view)
     }
@@ -77,7 +77,7 @@ impl Rectangle {
         let turned = product(direction_at(u.x * solid_angle), product(high, conjugate(low)).normalize());
         let f = (y1 / reach1 - turned.x * (y0 / reach0)) / turned.y;
         let over = (f * f - squared / (reach0 * reach0)).max(0.0).sqrt();
-        // Not `clamp`, which would keep a NaN.
+        // Not `clamp`, which would propagate NaN.
         let x = (height.copysign(f) / over).max(least.x).min(greatest.x);
         // Along y, uniform by the sine of the angle.
         let across = x * x + squared;
@@ -88,8 +88,8 @@ impl Rectangle {
     }
 }
 
-/// A complex number whose angle, from −π/2 to π/2, is the solid angle of the rectangle from the foot of the perpendicular to a corner,
-/// negative where one coordinate of the corner is.
+/// A complex number whose angle, from −π/2 to π/2, is the solid angle of the rectangle from the foot of the
+/// perpendicular to a corner, negative if one coordinate of the corner is.
 #[inline]
 fn corner_angle(corner: DVec2, height: f64) -> DVec2 {
     let distance = (corner.length_squared() + height * height).sqrt();
@@ -158,7 +158,7 @@ mod tests {
         let mut random = RandomStream::new(5);
         for case in 0..60 {
             let (rectangle, corner, [a, b]) = any_rectangle(&mut random);
-            // Some from so near that the solid angle is almost a hemisphere.
+            // Some so near that the solid angle is almost a hemisphere.
             let height = if case % 3 == 0 { 0.01 } else { 2.0 };
             let over = rectangle.axes[2] * height * (random.next_f64() - 0.5);
             let from =
@@ -173,7 +173,7 @@ mod tests {
                 let part = rectangle.sample(&view, u);
                 let cell = |x: f64| ((x * CELLS as f64) as usize).min(CELLS - 1);
                 counts[cell(part.y)][cell(part.x)] += 1.0 / (SIDE * SIDE) as f64;
-                // The part up to a sample has the share of the solid angle that was asked for.
+                // The part up to a sample has the requested share of the solid angle.
                 let up_to = Rectangle::new(corner, [a * part.x, b]).and_then(|part| part.seen_from(from));
                 if let Some(up_to) = up_to {
                     assert!((up_to.solid_angle / view.solid_angle - u.x).abs() < 1e-6, "{case}: {u}");

@@ -1,26 +1,26 @@
-//! A tree over lights, which chooses one for a place: near and bright ones that shine there are chosen more often.
+//! A tree over lights that chooses one for a point: near, bright lights that face it are chosen more often.
 //!
-//! After A. Conty Estevez, C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", Proceedings of the
-//! ACM on Computer Graphics and Interactive Techniques 1(2), 2018, without the splitting; cosines of bounding cones are
-//! found without angles, as in M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering", 4th edition, 2023, 12.6. The cosine at
-//! the place is bounded by the height of the node's box over the horizon, which for lights in the plane of the place is tighter than
-//! a cone.
+//! After A. Conty Estevez, C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", Proceedings of
+//! the ACM on Computer Graphics and Interactive Techniques 1(2), 2018, without the splitting; cosines of bounding cones
+//! are computed without angles, as in M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering", 4th edition,
+//! 2023, 12.6. The cosine at the point is bounded by the height of the node's box over the horizon, which is tighter
+//! than a cone for lights in the plane of the point.
 
 use lumbre_geometry::Aabb;
 use lumbre_math::DVec3;
 
-/// What the tree knows of a light, or of a piece of one.
+/// The tree's entry for a light, or for a piece of one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Emitter {
-    /// Where it is.
+    /// Its position.
     pub bounds: Aabb,
-    /// How it faces.
+    /// Its orientation.
     pub facing: Facing,
     /// Its greatest radiant intensity, averaged over colours.
     pub strength: f64,
 }
 
-/// A bound on the directions of light: normals or axes lie within a cone, and light goes out within an angle of them.
+/// A bound on the directions of light: normals or axes lie within a cone, and light leaves within an angle of them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Facing {
     /// Unit; zero where all directions are possible.
@@ -31,25 +31,25 @@ pub(crate) struct Facing {
     pub(super) cos_light: f64,
 }
 
-/// What is lost by rounding in cosines of bounding cones.
+/// Rounding error of cosines of bounding cones.
 const SLACK: f64 = 1e-9;
 
 impl Facing {
     /// Every direction.
     pub(crate) const ANY: Self = Self { axis: DVec3::ZERO, cos_normals: -1.0, cos_light: 0.0 };
 
-    /// Out of a plane with this unit normal, on its side alone.
+    /// From a plane with this unit normal, on its side only.
     pub(crate) fn side(normal: DVec3) -> Self {
         Self { axis: normal, cos_normals: 1.0, cos_light: 0.0 }
     }
 
-    /// A cone about a unit axis, in which light falls off from the angle with the first cosine to that with the second.
+    /// A cone around a unit axis, whose light falls off between the angles with these cosines.
     pub(crate) fn cone(axis: DVec3, cos_start: f64, cos_end: f64) -> Self {
         let (sin_start, sin_end) = (sine(cos_start), sine(cos_end));
         Self { axis, cos_normals: cos_start, cos_light: cos_start * cos_end + sin_start * sin_end - SLACK }
     }
 
-    /// The bound on all of these, about the mean of their axes.
+    /// The bound on all of these, around the mean of their axes.
     fn around(all: &[(Emitter, u32)]) -> Self {
         if let [(emitter, _)] = all {
             return emitter.facing;
@@ -59,7 +59,7 @@ impl Facing {
         let Some(axis) = sum.try_normalize() else { return Self { cos_light, ..Self::ANY } };
         let farthest = |facing: &Self| {
             let cosine = axis.dot(facing.axis);
-            // Beyond a half turn in all, every direction.
+            // More than a half turn in total: every direction.
             if facing.cos_normals <= -1.0 || cosine <= -facing.cos_normals {
                 return -1.0;
             }
@@ -99,15 +99,16 @@ pub(super) struct Node {
     pub next: u32,
 }
 
-/// A place that is lit.
+/// A lit point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub from: DVec3,
-    /// The unit normal of an opaque surface, on the side that is lit; zero where light from every side counts.
+    /// The unit normal of an opaque surface, on the lit side; zero if light from every side counts.
     pub normal: DVec3,
 }
 
-/// Sines of elevation down to minus this count as above the horizon: normals may have been rounded to single precision.
+/// Elevations with a sine above minus this count as above the horizon: normals may have been rounded to single
+/// precision.
 pub(super) const HORIZON_SLACK: f64 = 1e-6;
 
 pub(super) const LEAF: u32 = 1 << 31;
@@ -118,21 +119,21 @@ impl Node {
         (self.next & LEAF != 0).then_some(self.next & !LEAF)
     }
 
-    /// What the lights of the node may send to a place, roughly: zero only where they send nothing.
+    /// A rough estimate of the light from the node to a point: zero only if there is none.
     #[inline]
     fn importance(&self, place: &Place) -> f64 {
         self.cosine_at(place) * self.intensity(place.from)
     }
 
-    /// A bound on the cosine at the place between its normal and the way to any light of the node; 1 without a normal, 0 where all lights
-    /// are below the horizon.
+    /// A bound on the cosine between the normal at the point and the direction to any light of the node; 1 without a
+    /// normal, 0 if all lights are below the horizon.
     #[inline]
     fn cosine_at(&self, &Place { from, normal }: &Place) -> f64 {
         if normal == DVec3::ZERO {
             return 1.0;
         }
         let way = self.center - from;
-        // No point of the box is higher above the plane of the place, and none is nearer.
+        // Bounds the height of the box above the plane of the point, and its distance.
         let height = normal.dot(way) + normal.abs().dot(self.half);
         let distance = (way.abs() - self.half).max(DVec3::ZERO).length();
         if distance <= 0.0 {
@@ -142,20 +143,21 @@ impl Node {
         if sine < -HORIZON_SLACK { 0.0 } else { sine.clamp(HORIZON_SLACK, 1.0) }
     }
 
-    /// What the lights of the node may send to a place that faces them.
+    /// An estimate of the light from the node to a point that faces it.
     #[inline]
     fn intensity(&self, from: DVec3) -> f64 {
         let way = from - self.center;
         let squared = way.length_squared();
         if squared <= self.radius_squared {
-            // Within: it may face any way.
+            // Inside the bounding sphere, any orientation is possible.
             return self.strength / self.radius_squared.max(f64::MIN_POSITIVE);
         }
         let Facing { axis, cos_normals, cos_light } = self.facing;
         if cos_normals <= -1.0 {
             return self.strength / squared;
         }
-        // The angle between the axis and the way, less that of the cone of normals, less that which the sphere is seen in.
+        // The angle between the axis and the direction to the point, minus that of the cone of normals, minus the
+        // angular radius of the sphere.
         let cos_way = axis.dot(way) / squared.sqrt();
         let sin_seen = (self.radius_squared / squared).min(1.0).sqrt();
         let (cosine, sin) = angle_less([cos_way, sine(cos_way)], [cos_normals, sine(cos_normals)]);
@@ -164,13 +166,13 @@ impl Node {
     }
 }
 
-/// The cosine and sine of the difference of two angles, of 0 where it is negative.
+/// The cosine and sine of the difference of two angles, or of 0 if it is negative.
 #[inline]
 fn angle_less([cos_a, sin_a]: [f64; 2], [cos_b, sin_b]: [f64; 2]) -> (f64, f64) {
     if cos_a >= cos_b { (1.0, 0.0) } else { (cos_a * cos_b + sin_a * sin_b, sin_a * cos_b - cos_a * sin_b) }
 }
 
-/// An emitter that was chosen.
+/// A chosen emitter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Chosen {
     pub emitter: usize,
@@ -178,7 +180,7 @@ pub(crate) struct Chosen {
 }
 
 impl LightTree {
-    /// `None` when there is nothing that emits, or too much.
+    /// `None` if nothing emits, or if there are too many emitters.
     pub(crate) fn new(emitters: &[Emitter]) -> Option<Self> {
         let is_dark = !emitters.iter().any(|emitter| emitter.strength > 0.0);
         if is_dark || emitters.len() >= (LEAF / 2) as usize {
@@ -196,12 +198,12 @@ impl LightTree {
         Some(Self { nodes, leaves })
     }
 
-    /// Whether anything may shine on a place.
+    /// Whether any light may reach a point.
     pub(crate) fn shines_on(&self, place: &Place) -> bool {
         self.nodes[0].importance(place) > 0.0
     }
 
-    /// The emitter for a place and a uniform `u` of [0, 1); `None` where nothing shines.
+    /// The emitter for a point and a uniform `u` of [0, 1); `None` if no light reaches the point.
     pub(crate) fn choose(&self, place: &Place, mut u: f64) -> Option<Chosen> {
         let (mut at, mut probability) = (0, 1.0);
         loop {
@@ -245,14 +247,14 @@ impl LightTree {
         let second = self.nodes[self.nodes[at].next as usize].importance(place);
         let share = first / (first + second);
         if share.is_nan() {
-            // Neither shines there; or both are infinitely strong, for the place is on a light without an extent.
+            // No light from either; or both are infinitely strong, because the point is on a light without an extent.
             return (first > 0.0).then_some(0.5);
         }
         Some(share)
     }
 }
 
-/// Below this depth, halves by number: no tree is much deeper.
+/// Below this depth, splits by number: no tree is much deeper.
 const DEEP: u32 = 64;
 /// Bins along each axis.
 const BINS: usize = 12;
@@ -281,7 +283,7 @@ fn build(emitters: &mut [(Emitter, u32)], nodes: &mut Vec<Node>, depth: u32) {
     build(second, nodes, depth + 1);
 }
 
-/// What a bin or a side holds.
+/// The contents of a bin or a side.
 #[derive(Clone, Copy)]
 struct Group {
     bounds: Aabb,
@@ -306,7 +308,7 @@ impl Group {
         }
     }
 
-    /// Strength times the extent squared times a measure of the spread of directions, from 1 for one to 2 for all.
+    /// Strength times the squared extent times a measure of the spread of directions, from 1 for one to 2 for all.
     fn cost(&self) -> f64 {
         if self.count == 0 {
             return 0.0;
@@ -316,8 +318,8 @@ impl Group {
     }
 }
 
-/// Sorts the emitters into two sides, of the least cost among planes through the centres; the number of the first side, or `None`
-/// where no plane parts them.
+/// Partitions the emitters at the cheapest plane between centres; returns the size of the first side, or `None` if no
+/// plane separates them.
 fn split(emitters: &mut [(Emitter, u32)], bounds: &Aabb) -> Option<usize> {
     let centers = Aabb::around(emitters.iter().map(|(emitter, _)| emitter.bounds.center()));
     let (size, extent) = (centers.size(), bounds.size());
@@ -327,7 +329,7 @@ fn split(emitters: &mut [(Emitter, u32)], bounds: &Aabb) -> Option<usize> {
     };
     let mut best: Option<(f64, usize, usize)> = None;
     for axis in 0..3 {
-        // False for a NaN.
+        // False for NaN.
         let is_wide = size[axis] > 0.0;
         if !is_wide {
             continue;
@@ -342,7 +344,7 @@ fn split(emitters: &mut [(Emitter, u32)], bounds: &Aabb) -> Option<usize> {
             after[i] = after[i + 1].union(&bins[i]);
         }
         let mut before = Group::EMPTY;
-        // Thin sides are worse than their extent says.
+        // Thin sides are worse than their extent suggests.
         let shape = extent.max_element() / extent[axis].max(f64::MIN_POSITIVE);
         for i in 1..BINS {
             before = before.union(&bins[i - 1]);
@@ -405,7 +407,7 @@ mod tests {
                 let normal = if i % 3 == 0 { DVec3::ZERO } else { vector(&mut random).normalize() };
                 let place = Place { from: 14.0 * vector(&mut random), normal };
                 let sum: f64 = (0..count).map(|emitter| tree.probability(&place, emitter)).sum();
-                // A place that no light reaches has no choice.
+                // No choice at a point that no light reaches.
                 let Some(chosen) = tree.choose(&place, random.next_f64()) else {
                     assert!(sum < 1.0);
                     continue;

@@ -152,7 +152,7 @@ struct Majorants {
 }
 
 /// Tentative collisions at most on one way: beyond, nothing is left of the light.
-const MOST_COLLISIONS: u32 = 1 << 16;
+const MAX_COLLISIONS: u32 = 1 << 16;
 /// Below this part of what it was, light goes on by chance only.
 const FAINT: f32 = 0.1;
 /// Rounding may take an interpolated value this much beyond the values that it is between.
@@ -503,7 +503,7 @@ struct Tentative<'a> {
 impl Tentative<'_> {
     /// How far along the way the next one is, and the majorant there.
     fn next(&mut self, numbers: &mut PassageNumbers) -> Option<(f64, f32)> {
-        if self.count >= MOST_COLLISIONS {
+        if self.count >= MAX_COLLISIONS {
             return None;
         }
         let depth = self.depth.take();
@@ -528,9 +528,9 @@ impl Tentative<'_> {
         self.origin + t * self.direction
     }
 
-    /// Whether collisions were so many that the others are left out.
+    /// Whether the limit of collisions was reached.
     fn is_lost(&self) -> bool {
-        self.count >= MOST_COLLISIONS
+        self.count >= MAX_COLLISIONS
     }
 }
 

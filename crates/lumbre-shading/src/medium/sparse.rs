@@ -11,7 +11,7 @@ const BLOCK: i32 = 16;
 /// Voxels along a side of a block.
 const SPAN: i32 = BRICK * BLOCK;
 /// Blocks at most of a grid: in practice some thousand.
-const MOST_BLOCKS: usize = 1 << 24;
+const MAX_BLOCKS: usize = 1 << 24;
 
 /// Values at whole coordinates of index space, in bricks of 8³ voxels where they vary, interpolated linearly; a background value
 /// elsewhere. The layout that sparse volumes have in files (K. Museth, "VDB: High-Resolution Sparse Volumes with Dynamic Topology",
@@ -82,7 +82,7 @@ impl SparseGrid {
         let [first, last] = bounds.map(|voxel| voxel.map(|x| x.div_euclid(SPAN)));
         let count = last - first + 1;
         let blocks = count.to_array().into_iter().fold(1_u64, |blocks, n| blocks.saturating_mul(n as u64));
-        if blocks > MOST_BLOCKS as u64 {
+        if blocks > MAX_BLOCKS as u64 {
             return Err(SparseGridError::TooWide(blocks));
         }
         let blocks = vec![Cell::Constant(background); blocks as usize];
@@ -90,14 +90,14 @@ impl SparseGrid {
         Ok(Self { index_from_medium, bounds, background, first, count, blocks, split, bricks })
     }
 
-    /// Bytes that a grid takes, of so many blocks within its bounds, of which some are split, and so many bricks of values.
+    /// Bytes that a grid takes, of this many blocks within its bounds, of which some are split, and this many bricks of values.
     pub fn memory_of(blocks: u64, split: u64, bricks: u64) -> u64 {
         let cells = blocks.saturating_add(split.saturating_mul((BLOCK * BLOCK * BLOCK) as u64));
         let bricks = bricks.saturating_mul(size_of::<[f32; 512]>() as u64);
         cells.saturating_mul(size_of::<Cell>() as u64).saturating_add(bricks)
     }
 
-    /// Makes room for so many blocks that are split, and bricks of values, so that the grid takes no more than
+    /// Makes room for this many blocks that are split, and bricks of values, so that the grid takes no more than
     /// [`SparseGrid::memory_of`] them.
     ///
     /// # Errors

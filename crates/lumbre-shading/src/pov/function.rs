@@ -297,8 +297,8 @@ fn truth(is: bool) -> f64 {
     if is { 1.0 } else { 0.0 }
 }
 
-/// A sum or a product has at most so many terms.
-const MOST_TERMS: f64 = 1e5;
+/// A sum or a product has at most this many terms.
+const MAX_TERMS: f64 = 1e5;
 
 impl Code {
     /// An expression that is a number.
@@ -349,7 +349,7 @@ impl Operation {
                 let mut inner: SmallVec<[f64; 12]> = arguments.iter().copied().collect();
                 inner.push(from);
                 let mut total = if *is_product { 1.0 } else { 0.0 };
-                let to = to.min(from + MOST_TERMS);
+                let to = to.min(from + MAX_TERMS);
                 let mut i = from;
                 while i <= to + EPSILON {
                     if let Some(last) = inner.last_mut() {

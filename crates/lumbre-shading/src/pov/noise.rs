@@ -46,8 +46,8 @@ impl Tables {
     fn new() -> Self {
         let (permutation, gradients) = perlin_tables();
         let mut state = -560_851_967_i32;
-        let mut wave_frequencies = Vec::with_capacity(MOST_WAVES);
-        for _ in 0..MOST_WAVES {
+        let mut wave_frequencies = Vec::with_capacity(MAX_WAVES);
+        for _ in 0..MAX_WAVES {
             wave_frequencies.push(f64::from(draw(&mut state)) * 0.000_030_518_509_476 + 0.01);
         }
         Self {
@@ -61,8 +61,8 @@ impl Tables {
     }
 }
 
-/// Waves come from at most so many sources.
-const MOST_WAVES: usize = 256;
+/// Waves come from at most this many sources.
+const MAX_WAVES: usize = 256;
 
 fn hash_table() -> Vec<u16> {
     let mut hash: Vec<u16> = (0..4096).collect();
@@ -305,7 +305,7 @@ impl Octaves {
 pub(super) fn wave_sources(count: u32) -> impl Iterator<Item = (DVec3, f64)> {
     static SOURCES: LazyLock<Vec<DVec3>> = LazyLock::new(|| {
         let source = |i| vector_noise(DVec3::new(i as f64, 0.0, 0.0)).normalize_or_zero();
-        (0..MOST_WAVES).map(source).collect()
+        (0..MAX_WAVES).map(source).collect()
     });
     let frequencies = TABLES.wave_frequencies.iter().copied();
     SOURCES.iter().copied().zip(frequencies).take(count as usize)

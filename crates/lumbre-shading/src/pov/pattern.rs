@@ -110,7 +110,7 @@ pub enum PatternKind {
     },
     /// The angle about y.
     Radial,
-    /// Rings from random sources, so many.
+    /// Rings from this many random sources.
     Ripples(u32),
     /// The angle between the normal and a direction.
     Slope(Box<Slope>),
@@ -118,7 +118,7 @@ pub enum PatternKind {
     AngleOfIncidence,
     /// The distance from the origin.
     Spherical,
-    /// Arms about z, so many.
+    /// This many arms about z.
     Spiral1(f64),
     /// Arms both ways.
     Spiral2(f64),
@@ -126,7 +126,7 @@ pub enum PatternKind {
     Square,
     /// Six triangles.
     Triangular,
-    /// Waves of many lengths from random sources, so many.
+    /// Waves of many lengths from this many random sources.
     Waves(u32),
     /// Cylinders about z.
     Wood,

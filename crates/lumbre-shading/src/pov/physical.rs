@@ -64,7 +64,7 @@ impl PovMaterial {
     }
 
     /// Whether light may pass to the other side.
-    pub(crate) fn lets_light_through(&self) -> bool {
+    pub(crate) fn is_transmissive(&self) -> bool {
         may_pass(&self.texture)
     }
 
@@ -74,7 +74,7 @@ impl PovMaterial {
     }
 
     /// Whether light may pass to the other side unbent.
-    pub(crate) fn lets_light_straight_on(&self) -> bool {
+    pub(crate) fn has_delta_transmission(&self) -> bool {
         self.interior.ior == 1.0 && may_pass(&self.texture)
     }
 }

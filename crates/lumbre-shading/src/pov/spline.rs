@@ -31,7 +31,7 @@ fn combined(weights: &[(f64, &Values)]) -> Values {
 }
 
 impl Spline {
-    /// A spline through entries of so many components, in any order; of two with the same number the last counts.
+    /// A spline through entries of this many components, in any order; of two with the same number the last counts.
     pub fn new(kind: SplineKind, size: usize, mut entries: Vec<(f64, Values)>) -> Self {
         entries.reverse();
         entries.sort_by(|a, b| a.0.total_cmp(&b.0));

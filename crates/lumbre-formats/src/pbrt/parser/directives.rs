@@ -8,7 +8,7 @@ use lumbre_math::Transform;
 
 use super::super::lexer::{TokenKind, parse_number};
 use super::super::params::Params;
-use super::super::source::{Result, Spot};
+use super::super::source::{Result, SourcePosition};
 use super::super::state::EntityKind;
 use super::Parser;
 use crate::Diagnostic;
@@ -27,7 +27,7 @@ enum Where {
 }
 
 /// Reads the arguments of a directive, and executes it.
-type Handler<'b, 'd> = fn(&mut Parser<'b, 'd>, Spot) -> Result<()>;
+type Handler<'b, 'd> = fn(&mut Parser<'b, 'd>, SourcePosition) -> Result<()>;
 
 impl<'b, 'd> Parser<'b, 'd> {
     const DIRECTIVES: [(&'static str, Where, Handler<'b, 'd>); 42] = [
@@ -80,7 +80,7 @@ impl<'b, 'd> Parser<'b, 'd> {
         Self::DIRECTIVES.iter().any(|(directive, ..)| *directive == name)
     }
 
-    pub(super) fn directive(&mut self, name: &str, spot: Spot) -> Result<()> {
+    pub(super) fn directive(&mut self, name: &str, spot: SourcePosition) -> Result<()> {
         let Some((_, place, handler)) = Self::DIRECTIVES.iter().find(|(directive, ..)| *directive == name)
         else {
             let known = Self::DIRECTIVES.iter().map(|(directive, ..)| *directive);
@@ -120,7 +120,7 @@ impl<'b, 'd> Parser<'b, 'd> {
 
 // The settings before WorldBegin.
 impl Parser<'_, '_> {
-    fn option(&mut self, _spot: Spot) -> Result<()> {
+    fn option(&mut self, _spot: SourcePosition) -> Result<()> {
         let (name, at) = self.string("Option", "a name in quotes")?;
         let token = self.expect("a value")?;
         let value: Cow<'_, str> = match token.kind {
@@ -133,7 +133,7 @@ impl Parser<'_, '_> {
         self.converter.option(&name, at, &value)
     }
 
-    fn color_space(&mut self, _spot: Spot) -> Result<()> {
+    fn color_space(&mut self, _spot: SourcePosition) -> Result<()> {
         let (name, at) = self.string("ColorSpace", "a name in quotes")?;
         self.state.space = ColourSpace::from_name(&name).ok_or_else(|| {
             let names = ColourSpace::NAMES;
@@ -143,7 +143,7 @@ impl Parser<'_, '_> {
         Ok(())
     }
 
-    fn camera(&mut self, spot: Spot) -> Result<()> {
+    fn camera(&mut self, spot: SourcePosition) -> Result<()> {
         let (ty, params) = self.entity("Camera", "camera", None, spot)?;
         let camera_from_world = self.state.ctm;
         let world_from_camera = camera_from_world.map(|t| t.inverse());
@@ -151,38 +151,38 @@ impl Parser<'_, '_> {
         self.converter.camera(&ty, params, &world_from_camera, self.state.media[1])
     }
 
-    fn film(&mut self, spot: Spot) -> Result<()> {
+    fn film(&mut self, spot: SourcePosition) -> Result<()> {
         let (ty, params) = self.entity("Film", "film", None, spot)?;
         self.converter.film(&ty, params, self.state.space)
     }
 
-    fn sampler(&mut self, spot: Spot) -> Result<()> {
+    fn sampler(&mut self, spot: SourcePosition) -> Result<()> {
         let (ty, params) = self.entity("Sampler", "sampler", None, spot)?;
         self.converter.sampler(&ty, params)
     }
 
-    fn pixel_filter(&mut self, spot: Spot) -> Result<()> {
+    fn pixel_filter(&mut self, spot: SourcePosition) -> Result<()> {
         let (ty, params) = self.entity("PixelFilter", "filter", None, spot)?;
         self.converter.filter(&ty, params)
     }
 
-    fn integrator(&mut self, spot: Spot) -> Result<()> {
+    fn integrator(&mut self, spot: SourcePosition) -> Result<()> {
         let (ty, params) = self.entity("Integrator", "integrator", None, spot)?;
         self.converter.integrator(&ty, params)
     }
 
-    fn surface_integrator(&mut self, spot: Spot) -> Result<()> {
+    fn surface_integrator(&mut self, spot: SourcePosition) -> Result<()> {
         self.converter.upgraded(spot);
         let (ty, params) = self.entity("SurfaceIntegrator", "integrator", None, spot)?;
         self.converter.integrator(&ty, params)
     }
 
-    fn accelerator(&mut self, spot: Spot) -> Result<()> {
+    fn accelerator(&mut self, spot: SourcePosition) -> Result<()> {
         let (ty, params) = self.entity("Accelerator", "accelerator", None, spot)?;
         self.converter.accelerator(&ty, params)
     }
 
-    fn world_begin(&mut self, _spot: Spot) -> Result<()> {
+    fn world_begin(&mut self, _spot: SourcePosition) -> Result<()> {
         self.in_world = true;
         self.state.ctm = [Transform::IDENTITY; 2];
         self.state.active = [true; 2];
@@ -190,7 +190,7 @@ impl Parser<'_, '_> {
         Ok(())
     }
 
-    fn world_end(&mut self, spot: Spot) -> Result<()> {
+    fn world_end(&mut self, spot: SourcePosition) -> Result<()> {
         self.converter.upgraded(spot);
         Ok(())
     }
@@ -198,28 +198,28 @@ impl Parser<'_, '_> {
 
 // The contents of the world.
 impl Parser<'_, '_> {
-    fn reverse_orientation(&mut self, _spot: Spot) -> Result<()> {
+    fn reverse_orientation(&mut self, _spot: SourcePosition) -> Result<()> {
         self.state.reverse_orientation = !self.state.reverse_orientation;
         Ok(())
     }
 
-    fn shape(&mut self, spot: Spot) -> Result<()> {
+    fn shape(&mut self, spot: SourcePosition) -> Result<()> {
         let (ty, params) = self.entity("Shape", "shape", Some(EntityKind::Shape), spot)?;
         self.converter.shape(&ty, params, &self.state)
     }
 
-    fn object_instance(&mut self, spot: Spot) -> Result<()> {
+    fn object_instance(&mut self, spot: SourcePosition) -> Result<()> {
         let (name, at) = self.string("ObjectInstance", "a name in quotes")?;
         self.converter.instance(&name, spot, at, &self.state.ctm)
     }
 
-    fn material(&mut self, spot: Spot) -> Result<()> {
+    fn material(&mut self, spot: SourcePosition) -> Result<()> {
         let (ty, params) = self.entity("Material", "material", Some(EntityKind::Material), spot)?;
         self.state.material = self.converter.material(&ty, params)?;
         Ok(())
     }
 
-    fn make_named_material(&mut self, spot: Spot) -> Result<()> {
+    fn make_named_material(&mut self, spot: SourcePosition) -> Result<()> {
         let (name, at) = self.string("MakeNamedMaterial", "a name in quotes")?;
         let own = self.params()?;
         let defaults = self.state.defaults_for(EntityKind::Material);
@@ -227,40 +227,40 @@ impl Parser<'_, '_> {
         self.converter.named_material(&name, at, params)
     }
 
-    fn named_material(&mut self, _spot: Spot) -> Result<()> {
+    fn named_material(&mut self, _spot: SourcePosition) -> Result<()> {
         let (name, at) = self.string("NamedMaterial", "a name in quotes")?;
         self.state.material = Some(self.converter.material_named(&name, at)?);
         Ok(())
     }
 
-    fn texture(&mut self, spot: Spot) -> Result<()> {
+    fn texture(&mut self, spot: SourcePosition) -> Result<()> {
         let (name, _) = self.string("Texture", "a name in quotes")?;
         let (value, value_at) = self.string("Texture", "\"float\" or \"spectrum\"")?;
         let (ty, params) = self.entity("Texture", "texture", Some(EntityKind::Texture), spot)?;
         self.converter.texture(&name, (&value, value_at), &ty, params, self.state.ctm[0])
     }
 
-    fn light_source(&mut self, spot: Spot) -> Result<()> {
+    fn light_source(&mut self, spot: SourcePosition) -> Result<()> {
         let (ty, params) = self.entity("LightSource", "light", Some(EntityKind::Light), spot)?;
         self.light_stays(spot);
         self.converter.light(&ty, params, &self.state)
     }
 
-    fn area_light_source(&mut self, spot: Spot) -> Result<()> {
+    fn area_light_source(&mut self, spot: SourcePosition) -> Result<()> {
         let (ty, params) = self.entity("AreaLightSource", "light", Some(EntityKind::Light), spot)?;
         self.state.area_light = self.converter.area_light(&ty, params, &self.state)?.map(Arc::new);
         Ok(())
     }
 
     /// Warns that a light other than a shape does not move.
-    fn light_stays(&mut self, spot: Spot) {
+    fn light_stays(&mut self, spot: SourcePosition) {
         if self.state.ctm[0] != self.state.ctm[1] {
             let message = "the motion of this light is left out: it stays where it starts";
             self.converter.warn(spot, Diagnostic::warning(message));
         }
     }
 
-    fn make_named_medium(&mut self, spot: Spot) -> Result<()> {
+    fn make_named_medium(&mut self, spot: SourcePosition) -> Result<()> {
         let (name, at) = self.string("MakeNamedMedium", "a name in quotes")?;
         let own = self.params()?;
         let defaults = self.state.defaults_for(EntityKind::Medium);
@@ -268,7 +268,7 @@ impl Parser<'_, '_> {
         self.converter.medium(&name, at, params, &self.state.ctm)
     }
 
-    fn medium_interface(&mut self, _: Spot) -> Result<()> {
+    fn medium_interface(&mut self, _: SourcePosition) -> Result<()> {
         let (inside, at) = self.string("MediumInterface", "a name in quotes")?;
         let inside = self.converter.medium_of_side(&inside, at)?;
         let outside = match self.peek()? {

@@ -13,7 +13,7 @@ use lumbre_math::Transform;
 
 use super::convert::Converter;
 use super::lexer::{Lexer, Token, TokenKind};
-use super::source::{AtSpot, Fault, Result, Spot};
+use super::source::{AtSpot, Fault, Result, SourcePosition};
 use super::state::{Scope, State};
 use crate::diagnostic::quoted;
 use crate::{Diagnostic, FormatError, Hold, Input};
@@ -112,21 +112,21 @@ impl<'b, 'd> Parser<'b, 'd> {
             return Err(scope.spot.error(format!("{} without its {}", scope.kind.begin(), scope.kind.end())));
         }
         if !self.in_world {
-            let spot = Spot { file: 0, line: 1, column: 1 };
+            let spot = SourcePosition { file: 0, line: 1, column: 1 };
             return Err(spot.error("the scene has no WorldBegin"));
         }
         self.converter.finish()
     }
 
-    fn include(&mut self, spot: Spot) -> Result<()> {
+    fn include(&mut self, spot: SourcePosition) -> Result<()> {
         self.include_file("Include", spot)
     }
 
-    fn import(&mut self, spot: Spot) -> Result<()> {
+    fn import(&mut self, spot: SourcePosition) -> Result<()> {
         self.include_file("Import", spot)
     }
 
-    fn include_file(&mut self, directive: &str, spot: Spot) -> Result<()> {
+    fn include_file(&mut self, directive: &str, spot: SourcePosition) -> Result<()> {
         let (name, at) = self.string(directive, "a file name in quotes")?;
         let path = self.converter.resolve(&name, at)?;
         let canonical = path.canonicalize().ok();

@@ -7,7 +7,7 @@ use lumbre_image::ColourSpace;
 use super::super::colour::rgb_from_xyz;
 use super::super::lexer::{Token, TokenKind, parse_number, says_infinity, whole};
 use super::super::params::{Param, Params, Type, Values, Wants};
-use super::super::source::{AtSpot, Result, Spot};
+use super::super::source::{AtSpot, Result, SourcePosition};
 use super::super::state::EntityKind;
 use super::Parser;
 use crate::diagnostic::quoted;
@@ -35,7 +35,7 @@ impl Parser<'_, '_> {
         directive: &str,
         noun: &str,
         kind: Option<EntityKind>,
-        spot: Spot,
+        spot: SourcePosition,
     ) -> Result<(String, Params)> {
         let (ty, _) = self.string(directive, "a type in quotes")?;
         let own = self.params()?;

@@ -3,7 +3,7 @@
 use std::rc::Rc;
 
 use super::super::params::Param;
-use super::super::source::{AtSpot, Result, Spot};
+use super::super::source::{AtSpot, Result, SourcePosition};
 use super::super::state::{EntityKind, Scope, ScopeKind};
 use super::Parser;
 use crate::Diagnostic;
@@ -13,38 +13,38 @@ use crate::diagnostic::quoted;
 const MAX_DEFAULTS: usize = 1024;
 
 impl Parser<'_, '_> {
-    pub(super) fn attribute_begin(&mut self, spot: Spot) -> Result<()> {
+    pub(super) fn attribute_begin(&mut self, spot: SourcePosition) -> Result<()> {
         self.open(ScopeKind::Attribute, spot)
     }
 
-    pub(super) fn attribute_end(&mut self, spot: Spot) -> Result<()> {
+    pub(super) fn attribute_end(&mut self, spot: SourcePosition) -> Result<()> {
         self.close(ScopeKind::Attribute, spot)
     }
 
-    pub(super) fn transform_begin(&mut self, spot: Spot) -> Result<()> {
+    pub(super) fn transform_begin(&mut self, spot: SourcePosition) -> Result<()> {
         if !self.in_world {
             self.converter.upgraded(spot);
         }
         self.open(ScopeKind::Transform, spot)
     }
 
-    pub(super) fn transform_end(&mut self, spot: Spot) -> Result<()> {
+    pub(super) fn transform_end(&mut self, spot: SourcePosition) -> Result<()> {
         self.close(ScopeKind::Transform, spot)
     }
 
-    pub(super) fn object_begin(&mut self, spot: Spot) -> Result<()> {
+    pub(super) fn object_begin(&mut self, spot: SourcePosition) -> Result<()> {
         let (name, at) = self.string("ObjectBegin", "a name in quotes")?;
         self.converter.begin_object(&name, spot, at)?;
         self.open(ScopeKind::Object, spot)
     }
 
-    pub(super) fn object_end(&mut self, spot: Spot) -> Result<()> {
+    pub(super) fn object_end(&mut self, spot: SourcePosition) -> Result<()> {
         self.close(ScopeKind::Object, spot)?;
         self.converter.end_object();
         Ok(())
     }
 
-    pub(super) fn attribute(&mut self, spot: Spot) -> Result<()> {
+    pub(super) fn attribute(&mut self, spot: SourcePosition) -> Result<()> {
         let names = EntityKind::NAMES.map(|(name, _)| name);
         let (kind, at) = self.string("Attribute", "a kind in quotes")?;
         let params = self.params()?;
@@ -68,13 +68,13 @@ impl Parser<'_, '_> {
         Ok(())
     }
 
-    fn open(&mut self, kind: ScopeKind, spot: Spot) -> Result<()> {
+    fn open(&mut self, kind: ScopeKind, spot: SourcePosition) -> Result<()> {
         self.converter.budget.nesting(self.scopes.len() + 1, kind.begin()).at(spot)?;
         self.scopes.push(Scope { kind, spot, saved: self.state.clone() });
         Ok(())
     }
 
-    fn close(&mut self, kind: ScopeKind, spot: Spot) -> Result<()> {
+    fn close(&mut self, kind: ScopeKind, spot: SourcePosition) -> Result<()> {
         let base = self.frames.iter().rev().find_map(|f| f.import.as_ref()).map_or(0, |import| import.1);
         let Some(scope) = self.scopes.pop_if(|scope| scope.kind == kind) else {
             return Err(match self.scopes.last() {

@@ -1,7 +1,7 @@
 //! The token stream over included files, and the arguments of directives.
 
 use super::super::lexer::{Token, TokenKind, parse_number};
-use super::super::source::{Result, Spot};
+use super::super::source::{Result, SourcePosition};
 use super::{Frame, Parser};
 use crate::Diagnostic;
 
@@ -30,7 +30,7 @@ impl<'b> Parser<'b, '_> {
         Ok(self.peeked)
     }
 
-    pub(super) fn spot(&mut self, token: Token) -> Spot {
+    pub(super) fn spot(&mut self, token: Token) -> SourcePosition {
         self.top().lexer.spot(token)
     }
 
@@ -59,7 +59,7 @@ impl<'b> Parser<'b, '_> {
     }
 
     /// A string with its place.
-    pub(super) fn string(&mut self, directive: &str, expected: &str) -> Result<(String, Spot)> {
+    pub(super) fn string(&mut self, directive: &str, expected: &str) -> Result<(String, SourcePosition)> {
         let token = self.expect(expected)?;
         if token.kind != TokenKind::String {
             return self.unexpected(token, &format!("wrong argument of {directive}"), expected);

@@ -2,33 +2,33 @@
 
 use lumbre_math::{DAffine3, DMat3, DMat4, DVec3, SingularTransformError, Transform};
 
-use super::super::source::{Fault, Result, Spot};
+use super::super::source::{Fault, Result, SourcePosition};
 use super::Parser;
 use crate::Diagnostic;
 use crate::diagnostic::{number, quoted};
 
 impl Parser<'_, '_> {
-    pub(super) fn identity(&mut self, _spot: Spot) -> Result<()> {
+    pub(super) fn identity(&mut self, _spot: SourcePosition) -> Result<()> {
         self.replace_transform(Transform::IDENTITY);
         Ok(())
     }
 
-    pub(super) fn translate(&mut self, spot: Spot) -> Result<()> {
+    pub(super) fn translate(&mut self, spot: SourcePosition) -> Result<()> {
         let [x, y, z] = self.numbers("Translate")?;
         self.concat(spot, Ok(Transform::translate(DVec3::new(x, y, z))), "Translate")
     }
 
-    pub(super) fn scale(&mut self, spot: Spot) -> Result<()> {
+    pub(super) fn scale(&mut self, spot: SourcePosition) -> Result<()> {
         let [x, y, z] = self.numbers("Scale")?;
         self.concat(spot, Transform::scale(DVec3::new(x, y, z)), "Scale")
     }
 
-    pub(super) fn rotate(&mut self, spot: Spot) -> Result<()> {
+    pub(super) fn rotate(&mut self, spot: SourcePosition) -> Result<()> {
         let [degrees, x, y, z] = self.numbers("Rotate")?;
         self.concat(spot, Transform::rotate(DVec3::new(x, y, z), degrees), "Rotate")
     }
 
-    pub(super) fn look_at(&mut self, spot: Spot) -> Result<()> {
+    pub(super) fn look_at(&mut self, spot: SourcePosition) -> Result<()> {
         let [ex, ey, ez, lx, ly, lz, ux, uy, uz] = self.numbers("LookAt")?;
         let (eye, target, up) = (DVec3::new(ex, ey, ez), DVec3::new(lx, ly, lz), DVec3::new(ux, uy, uz));
         if eye == target {
@@ -51,7 +51,7 @@ impl Parser<'_, '_> {
         self.concat(spot, camera_from_world, "LookAt")
     }
 
-    pub(super) fn set_transform(&mut self, spot: Spot) -> Result<()> {
+    pub(super) fn set_transform(&mut self, spot: SourcePosition) -> Result<()> {
         let matrix = self.numbers::<16>("Transform")?;
         let new = Transform::from_matrix(DMat4::from_cols_array(&matrix));
         let new = new.map_err(|_| singular(spot, "Transform"))?;
@@ -59,12 +59,12 @@ impl Parser<'_, '_> {
         Ok(())
     }
 
-    pub(super) fn concat_transform(&mut self, spot: Spot) -> Result<()> {
+    pub(super) fn concat_transform(&mut self, spot: SourcePosition) -> Result<()> {
         let matrix = self.numbers::<16>("ConcatTransform")?;
         self.concat(spot, Transform::from_matrix(DMat4::from_cols_array(&matrix)), "ConcatTransform")
     }
 
-    pub(super) fn coordinate_system(&mut self, _spot: Spot) -> Result<()> {
+    pub(super) fn coordinate_system(&mut self, _spot: SourcePosition) -> Result<()> {
         let (name, at) = self.string("CoordinateSystem", "a name in quotes")?;
         if !self.coordinate_systems.contains_key(&name) {
             self.converter.kept_name(&name, at)?;
@@ -74,7 +74,7 @@ impl Parser<'_, '_> {
         Ok(())
     }
 
-    pub(super) fn coord_sys_transform(&mut self, _spot: Spot) -> Result<()> {
+    pub(super) fn coord_sys_transform(&mut self, _spot: SourcePosition) -> Result<()> {
         let (name, at) = self.string("CoordSysTransform", "a name in quotes")?;
         match self.coordinate_systems.get(&name) {
             Some(ctm) => self.state.ctm = *ctm,
@@ -87,7 +87,7 @@ impl Parser<'_, '_> {
         Ok(())
     }
 
-    pub(super) fn active_transform(&mut self, _spot: Spot) -> Result<()> {
+    pub(super) fn active_transform(&mut self, _spot: SourcePosition) -> Result<()> {
         let expected = "StartTime, EndTime or All";
         let token = self.expect(expected)?;
         self.state.active = match self.top().lexer.raw(token) {
@@ -99,7 +99,7 @@ impl Parser<'_, '_> {
         Ok(())
     }
 
-    pub(super) fn transform_times(&mut self, spot: Spot) -> Result<()> {
+    pub(super) fn transform_times(&mut self, spot: SourcePosition) -> Result<()> {
         let [start, end] = self.numbers::<2>("TransformTimes")?;
         if start >= end {
             let wrong = Diagnostic::error("the motion ends before it starts").found(number(end));
@@ -120,7 +120,7 @@ impl Parser<'_, '_> {
     /// Multiplies the active transforms by `by`.
     fn concat(
         &mut self,
-        spot: Spot,
+        spot: SourcePosition,
         by: std::result::Result<Transform, SingularTransformError>,
         directive: &str,
     ) -> Result<()> {
@@ -141,6 +141,6 @@ impl Parser<'_, '_> {
     }
 }
 
-fn singular(spot: Spot, directive: &str) -> Fault {
+fn singular(spot: SourcePosition, directive: &str) -> Fault {
     spot.error(format!("{directive} makes a transform that cannot be inverted"))
 }

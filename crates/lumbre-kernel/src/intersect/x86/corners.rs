@@ -13,20 +13,21 @@ use crate::tree::BLOCK;
 use crate::tree::triangle_block::{SHARED_NUMBERS, TriangleBlock};
 
 impl<const AVX512: bool> X86<AVX512> {
-    /// A component of three corners, the first of which is here.
+    /// A component of three corners, at these offsets from `row`.
     ///
     /// # Safety
-    /// They are so far behind `row`.
+    /// The offsets are in bounds.
     #[inline(always)]
     pub(super) unsafe fn component(row: *const f32, [a, b, c]: [usize; 3]) -> __m128 {
         // SAFETY: see `X86`, and above.
         unsafe { _mm_setr_ps(*row.add(a), *row.add(b), *row.add(c), 0.0) }
     }
 
-    /// The numbers of a row in three places below sixteen, of more bits than which what is above means nothing; nor does the last.
-    /// For AVX-512 alone.
+    /// The numbers of a row at three indices below sixteen; higher bits of the indices are ignored. The last lane is
+    /// unused. For AVX-512 only.
     ///
     /// # Safety
+    /// Sixteen numbers are readable.
     /// There are sixteen to be read.
     #[inline(always)]
     pub(super) unsafe fn three_of(row: *const f32, places: __m128i) -> __m128 {
@@ -37,7 +38,7 @@ impl<const AVX512: bool> X86<AVX512> {
         }
     }
 
-    /// The corners of the triangle in a lane, `[axis][corner]` by the order of the axes; the last of four means nothing.
+    /// The corners of the triangle in a lane, `[axis][corner]` in the order of the axes; the last of four is unused.
     #[inline(always)]
     pub(super) fn corners_in(block: &TriangleBlock, lane: usize, axes: &Axes) -> [__m128; 3] {
         let words = block.words().as_ptr();
@@ -63,7 +64,7 @@ impl<const AVX512: bool> X86<AVX512> {
         }
     }
 
-    /// Eight numbers of sixteen, each by its place in the same half of `near`, or of `far` from eight on: see
+    /// Eight of sixteen numbers, each by its index in the same half of `near`, or of `far` from eight on: see
     /// [`triangle_block`](crate::tree::triangle_block).
     #[inline(always)]
     pub(super) fn of_two(near: __m256, far: __m256, places: __m256i) -> __m256 {
@@ -75,7 +76,7 @@ impl<const AVX512: bool> X86<AVX512> {
         }
     }
 
-    /// The places of eight vertices, of four bits each: of more bits, what is above means nothing.
+    /// The indices of eight vertices, four bits each; higher bits are undefined.
     #[inline(always)]
     pub(super) fn places(vertices: u32) -> __m256i {
         // SAFETY: see `X86`.
@@ -105,7 +106,7 @@ impl<const AVX512: bool> X86<AVX512> {
         ray.apply(vertices)
     }
 
-    /// The vertices that a block shares, sheared. For AVX-512 alone.
+    /// The vertices that a block shares, sheared. For AVX-512 only.
     #[inline(always)]
     pub(super) fn sheared_sixteen<S: Shears>(block: &TriangleBlock, ray: &S) -> [Avx512; 3] {
         let words = block.words().as_ptr();
@@ -121,7 +122,7 @@ impl<const AVX512: bool> X86<AVX512> {
         ray.apply(vertices)
     }
 
-    /// Eight of sixteen numbers, each by its place. For AVX-512 alone.
+    /// Eight of sixteen numbers by index. For AVX-512 only.
     #[inline(always)]
     pub(super) fn of_sixteen(numbers: __m512, places: __m256i) -> __m256 {
         // SAFETY: see `X86`.
@@ -142,7 +143,7 @@ impl X86<true> {
         unsafe {
             let shifts = _mm512_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28, 0, 4, 8, 12, 16, 20, 24, 28);
             let places = _mm512_set1_epi32(SHARED_NUMBERS as i32 - 1);
-            // Of thirty-two numbers, the last sixteen.
+            // Selects the last sixteen of thirty-two numbers.
             let of_second = _mm512_maskz_set1_epi32(0xff00, SHARED_NUMBERS as i32);
             const OR_AND: i32 = 0b1111_1000;
             for (corner, (&of_a, of_b)) in first.corners().iter().zip(second.corners()).enumerate() {
@@ -157,7 +158,7 @@ impl X86<true> {
         corners
     }
 
-    /// The corners of two blocks that share none; `rests` are what rounding took from the origins of the rays.
+    /// The corners of two blocks that share none; `rests` are the rounding errors of the rays' origins.
     #[inline(always)]
     pub(super) fn unshared_by_two<S: Shears>(
         blocks: [&TriangleBlock; 2],

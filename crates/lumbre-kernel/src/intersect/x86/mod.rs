@@ -14,7 +14,7 @@ use crate::intersect::axes::{Axes, Sides};
 use crate::intersect::box_ray::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs};
 use crate::intersect::f32_ray::F32Ray;
 use crate::intersect::isa::{Isa, Set};
-use crate::intersect::operations::{CornersRoom, Simd};
+use crate::intersect::operations::{CornerScratch, Simd};
 use crate::intersect::triangles::Shears;
 use crate::intersect::watertight::{BlockRay, EdgeTest, FAR, HeightRange, Inside, ROUNDINGS, Shear};
 use crate::ray32::Ray32;
@@ -26,21 +26,21 @@ use crate::tree::filter_start::FilterStart;
 use crate::tree::node::{LARGEST_NEAR, SMALLEST_NEAR, TINY_NEAR, TreeSpace};
 use crate::tree::triangle_block::{TriangleBlock, shared_row};
 
-/// Of the two levels: only what is named after AVX-512 above instantiates `X86<true>`, and only what is named after AVX2 `X86<false>`.
-/// That is why the instructions below are there.
+/// The operations of both levels. Only roots that enable AVX-512 instantiate `X86<true>`, and only those that enable
+/// AVX2 `X86<false>`, so the instructions below are available.
 pub(crate) struct X86<const AVX512: bool>;
 
-// The numbers of a ray stand in a row: origin, direction, range.
+// The numbers of a ray are contiguous: origin, direction, range.
 const _: () = assert!(size_of::<Ray32>() == 32 && offset_of!(Ray32, direction) == 16);
 const _: () =
     assert!(offset_of!(Ray, direction) == 24 && offset_of!(Ray, t_min) == 48 && offset_of!(Ray, t_max) == 56);
 const _: () = assert!(size_of::<Ray>() == 72 && offset_of!(Ray, time) == 64);
 
-/// Which sixteen numbers go with which level, and what is different with them.
+/// The sixteen-lane vectors of each level, and the operations that differ.
 pub(crate) trait HasWide<const AVX512: bool> {
     type F32x16: F32x16<Half = Eight256<AVX512>>;
 
-    /// [`Simd::sheared_corners_by_two`] as AVX-512 does it better; `None` where it does not.
+    /// [`Simd::sheared_corners_by_two`] with AVX-512, if that is faster; otherwise `None`.
     #[inline(always)]
     fn corners_by_two<S: Shears>(
         _blocks: [&TriangleBlock; 2],
@@ -57,7 +57,7 @@ impl HasWide<true> for X86<true> {
     fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> Option<[[Avx512; 3]; 3]> {
         match [blocks[0].is_unshared(), blocks[1].is_unshared()] {
             [false, false] => Some(Self::shared_by_two(blocks, rays)),
-            // Where there are no rests, there is so little to do that it pays no more to put both side by side first.
+            // Without rests there is too little work to pay for joining both blocks.
             [true, true] => match (rays[0].rest(), rays[1].rest()) {
                 (Some(a), Some(b)) => Some(Self::unshared_by_two(blocks, rays, [a, b])),
                 _ => None,
@@ -78,7 +78,7 @@ where
     type F32x8 = Eight256<AVX512>;
     type F32x16 = <Self as HasWide<AVX512>>::F32x16;
     const INTERSECTS_BY_TWO: bool = AVX512;
-    // Packets take twice the instructions then, and a ray alone hardly more.
+    // Packets take twice the instructions on AVX2, and single rays hardly more.
     const GOES_ON_TOGETHER: bool = AVX512;
 
     #[inline(always)]
@@ -89,8 +89,8 @@ where
     #[inline(always)]
     fn start_nearby(tree_space: &TreeSpace, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool {
         // As the portable one, three axes at a time.
-        // SAFETY: see `X86`. The loads are of three f64 in arrays of three, and of four in arrays of four; the stores of
-        // four f32 into arrays of four.
+        // SAFETY: see `X86`. The loads are of three f64 in arrays of three, and of four in arrays of four; the stores
+        // of four f32 into arrays of four.
         unsafe {
             let origin = Self::three(&ray.origin);
             let direction = Self::three(&ray.direction);
@@ -112,7 +112,7 @@ where
             }
             let size = _mm256_max_pd(size, _mm256_set1_pd(TINY_NEAR));
             let signs = _mm256_and_pd(direction, sign);
-            // Always of 1 over something: the sign is put on again afterwards.
+            // Divides 1 by the magnitude; the sign is restored below.
             let size = _mm256_div_pd(_mm256_set1_pd(1.0), size);
             let inverse = _mm256_or_pd(size, signs);
             let per_distance = _mm256_set1_pd(tree_space.margin_per_distance);
@@ -143,8 +143,8 @@ where
     #[inline(always)]
     fn read(ray: &Ray) -> Ray {
         let from = Self::numbers(ray);
-        // SAFETY: see `X86`. Eight numbers of a ray are read. Volatile, for the compiler would else read in one what has to be read one by
-        // one.
+        // SAFETY: see `X86`. Eight numbers of a ray are read. Volatile: the compiler would otherwise merge the narrow
+        // loads.
         unsafe {
             let at = |i: usize| from.add(i).read_volatile();
             let (first, last) =
@@ -173,7 +173,7 @@ where
         // SAFETY: see `X86`. The loads are of arrays of four.
         unsafe {
             let (origin, direction) = Self::f32_numbers(ray);
-            // Fused or not: units are powers of two.
+            // Fused or not, the result is the same: units are powers of two.
             let from = _mm_fmsub_ps(
                 Self::local(start, origin),
                 _mm_set1_ps(start.units_per_space),
@@ -181,7 +181,7 @@ where
             );
             let sign = _mm_set1_ps(-0.0);
             let (distance, length) = (_mm_andnot_ps(sign, from), _mm_andnot_ps(sign, direction));
-            // Every comparison with a NaN is false. The last of four: t_min is not below zero, and t_min <= t_max.
+            // Every comparison with a NaN is false. The fourth lane: t_min is not negative, and t_min <= t_max.
             let farthest = _mm_loadu_ps(start.farthest.as_ptr());
             let size = _mm_blend_ps::<0b1000>(length, origin);
             let largest = _mm_blend_ps::<0b1000>(_mm_loadu_ps(start.longest.as_ptr()), direction);
@@ -208,7 +208,7 @@ where
             let margin =
                 _mm_mul_ps(size, _mm_fmadd_ps(distance, per_distance, _mm_set1_ps(start.f32_margin)));
             let (near, far) = (_mm_fnmsub_ps(from, inverse, margin), _mm_fnmadd_ps(from, inverse, margin));
-            // Of the fourth numbers. Not fused.
+            // Of the fourth lanes. Not fused.
             let first = _mm_mul_ps(origin, _mm_set1_ps(START_FACTOR));
             let last = _mm_mul_ps(direction, _mm_set1_ps(END_FACTOR));
             let last = _mm_add_ps(last, _mm_set1_ps(LITTLE as f32));
@@ -232,7 +232,7 @@ where
             let last = _mm_shuffle_epi32::<0b10_10_10_10>(order);
             let inverse = _mm_permutevar_ps(_mm_loadu_ps(slabs.inverse.as_ptr()), last);
             let inverse = _mm_mul_ps(inverse, _mm_set1_ps(start.units_per_space));
-            // The fourth stays where it is: the start and the end of the ray.
+            // The fourth lane keeps the start and the end of the ray.
             let shear = _mm_blend_ps::<0b1000>(_mm_mul_ps(direction, inverse), direction);
             let shear = _mm_permutevar_ps(shear, order);
             F32Ray {
@@ -252,8 +252,8 @@ where
         [t_min, t_max]: [f64; 2],
     ) -> (Ray, Option<Slabs>) {
         let DAffine3 { matrix3: linear, translation } = map.inverse_affine();
-        // The very operations of `Ray::into_object`, three axes at a time. The slabs are made of what is in registers still: to read
-        // the ray again, which was just written by parts, would have to wait.
+        // The same operations as `Ray::into_object`, three axes at a time. The slabs are computed from registers:
+        // loading the ray again, just written in parts, would stall.
         // SAFETY: see `X86`.
         unsafe {
             let (x, y, z) =
@@ -303,7 +303,7 @@ where
             let heights = _mm_mul_ps(heights, _mm_setr_ps(LESS, MORE, MORE, LESS));
             let shear = _mm_permutevar_ps(_mm_mul_ps(direction, inverse), order);
             let rest = _mm_permutevar_ps(rest, order);
-            // Only of the first two: the shear of the last would be one.
+            // Only the first two: the last would have a shear of one.
             let sheared = _mm_fnmadd_ps(shear, _mm_shuffle_ps::<0b10_10_10_10>(rest, rest), rest);
             let blocks = BlockRay {
                 axes,
@@ -330,7 +330,7 @@ where
             unsafe {
                 let row = row.0.as_mut_ptr();
                 if AVX512 {
-                    // As wide as it is read: what is put together of two writes is waited for.
+                    // As wide as it is read: a load that spans two stores would stall.
                     let both = _mm512_insertf64x4::<1>(
                         _mm512_castps_pd(_mm512_castps256_ps512(low)),
                         _mm256_castps_pd(high),
@@ -457,7 +457,7 @@ where
             for last in 0..3 {
                 for at in BLOCK * last..BLOCK * (last + 1) {
                     let number = _mm256_set1_epi32(list[at] as i32);
-                    // None of the eights behind its own comes before it.
+                    // Later groups of eight contain no earlier equals.
                     for (i, eight) in eights[..=last].iter().enumerate() {
                         let is_equal = _mm256_cmpeq_epi32(_mm256_loadu_si256(eight.as_ptr().cast()), number);
                         let mask = _mm256_movemask_ps(_mm256_castsi256_ps(is_equal)) as u32;
@@ -471,13 +471,13 @@ where
     }
 
     #[inline(always)]
-    fn corners<'a>(block: &'a TriangleBlock, room: &'a mut CornersRoom) -> &'a Corners {
+    fn corners<'a>(block: &'a TriangleBlock, room: &'a mut CornerScratch) -> &'a Corners {
         if block.is_unshared() {
             return block.own_corners();
         }
-        let CornersRoom(corners) = room;
+        let CornerScratch(corners) = room;
         let words = block.words().as_ptr();
-        // No `map`: it does not take on the instruction set of its caller.
+        // No closures: they do not inherit target features.
         let [a, b, c] = block.corners();
         let places = [Self::places(a), Self::places(b), Self::places(c)];
         // SAFETY: see `X86`. The first sixteen of a row are read.
@@ -523,7 +523,7 @@ where
 
     #[inline(always)]
     fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (EdgeTest, Inside) {
-        // The corners in the first three lanes, and the very operations of the portable one.
+        // The corners in the first three lanes, and the same operations as the portable version.
         let [across, up, z] = Self::corners_in(block, lane, shear.axes);
         // SAFETY: see `X86`.
         unsafe {

@@ -1,4 +1,4 @@
-//! The numbers of rays in registers, and where rays start.
+//! The numbers of rays in registers, and how rays start.
 
 use std::arch::x86_64::*;
 use std::mem::MaybeUninit;
@@ -14,14 +14,15 @@ use crate::simd::{Row, WIDE};
 use crate::tree::filter_start::FilterStart;
 
 impl<const AVX512: bool> X86<AVX512> {
-    /// The numbers of a ray, eight at least: see above.
+    /// The numbers of a ray, at least eight: see above.
     #[inline(always)]
     pub(super) fn numbers(ray: &Ray) -> *const f64 {
         let ray: *const Ray = ray;
         ray.cast()
     }
 
-    /// Rays by eight, whose columns are then written as wide as they are read: what is put together of two writes is waited for.
+    /// Eight rays, transposed. The columns are written as wide as they are read: a load that spans two stores would
+    /// stall.
     #[inline(always)]
     pub(super) fn columns_by_eight(rays: &[Ray; WIDE], columns: &mut [Row<f64>; 8]) {
         const EVEN: i32 = 0b10_00_10_00;
@@ -31,7 +32,7 @@ impl<const AVX512: bool> X86<AVX512> {
             // SAFETY: see `X86`; only called where `AVX512` is. The loads are of the eight numbers of a ray, see above; the stores of
             // eight f64 from the first or the ninth on, into arrays of sixteen.
             unsafe {
-                // One by one: what is handed to a closure may become a call.
+                // One by one: a closure may become a call.
                 let (a, b, c, d) = (
                     _mm512_loadu_pd(at(0)),
                     _mm512_loadu_pd(at(1)),
@@ -75,7 +76,7 @@ impl<const AVX512: bool> X86<AVX512> {
         }
     }
 
-    /// The first four numbers, and the last four of eight: other pieces would be read of two writes.
+    /// The first four numbers, and the last four of eight: other pieces would span two stores.
     #[inline(always)]
     pub(super) fn halves(ray: &Ray) -> (__m256d, __m256d) {
         let numbers = Self::numbers(ray);
@@ -97,7 +98,7 @@ impl<const AVX512: bool> X86<AVX512> {
         }
     }
 
-    /// The origin, the direction and the ends of the range of these halves; the last of four mean nothing.
+    /// The origin, the direction and the ends of the range of these halves; the last of four is unused.
     #[inline(always)]
     pub(super) fn parts((first, last): (__m256d, __m256d)) -> (__m256d, __m256d, __m128d) {
         // SAFETY: see `X86`.
@@ -108,7 +109,8 @@ impl<const AVX512: bool> X86<AVX512> {
         }
     }
 
-    /// [`Simd::start_filter`] of a ray by its numbers: the ends of the range are the first two; the last of the others mean nothing.
+    /// [`Simd::start_filter`] of a ray by its numbers: the ends of the range are the first two lanes; the last lanes of
+    /// the others are unused.
     #[inline(always)]
     pub(super) fn slabs(
         start: &FilterStart,
@@ -159,7 +161,7 @@ impl<const AVX512: bool> X86<AVX512> {
         }
     }
 
-    /// The numbers of eight rays in single precision, side by side.
+    /// The numbers of eight rays in single precision, transposed.
     #[inline(always)]
     pub(super) fn rows_of_eight(rays: &[Ray32; 8]) -> [__m256; 8] {
         const LOW: i32 = 0b01_00_01_00;
@@ -171,7 +173,7 @@ impl<const AVX512: bool> X86<AVX512> {
             let (c, d) = (_mm256_loadu_ps(at.add(16)), _mm256_loadu_ps(at.add(24)));
             let (e, f) = (_mm256_loadu_ps(at.add(32)), _mm256_loadu_ps(at.add(40)));
             let (g, h) = (_mm256_loadu_ps(at.add(48)), _mm256_loadu_ps(at.add(56)));
-            // One by one: what is handed to a closure may become a call.
+            // One by one: a closure may become a call.
             let (ab, ab2) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
             let (cd, cd2) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
             let (ef, ef2) = (_mm256_unpacklo_ps(e, f), _mm256_unpackhi_ps(e, f));
@@ -228,7 +230,7 @@ impl<const AVX512: bool> X86<AVX512> {
         }
     }
 
-    /// The numbers of a ray in single precision, eight in all: see above.
+    /// The numbers of a ray in single precision, eight in total: see above.
     #[inline(always)]
     pub(super) fn f32_start(ray: &Ray32) -> *const f32 {
         let ray: *const Ray32 = ray;
@@ -243,7 +245,7 @@ impl<const AVX512: bool> X86<AVX512> {
         unsafe { (_mm_loadu_ps(numbers), _mm_loadu_ps(numbers.add(4))) }
     }
 
-    /// Three coordinates relative to the mesh, rounded once; the fourth number stays what it is.
+    /// Three coordinates relative to the mesh, rounded once; the fourth number stays unchanged.
     #[inline(always)]
     pub(super) fn local(start: &FilterStart, origin: __m128) -> __m128 {
         // SAFETY: see `X86`. The loads are of arrays of four.
@@ -256,7 +258,7 @@ impl<const AVX512: bool> X86<AVX512> {
         }
     }
 
-    /// Three numbers, and a zero.
+    /// Three numbers and a zero.
     #[inline(always)]
     pub(super) fn three(v: &DVec3) -> __m256d {
         // SAFETY: see `X86`. Only the first three are loaded.

@@ -12,8 +12,8 @@ use crate::transport::Record;
 
 /// Media are followed so far.
 const FAR: f64 = 1e7;
-/// Where a medium is not the same everywhere, it is asked for at so many places at least.
-const LEAST_SAMPLES: u32 = 30;
+/// Places at which a medium that varies is evaluated, at least.
+const MIN_SAMPLES: u32 = 30;
 /// Less light than this is not followed further.
 const FAINT: f32 = 1e-3;
 
@@ -51,7 +51,7 @@ impl<'s> Tracer<'s> {
             return behind * left + emission * mean_transmittance(extinction, length as f32) * length as f32;
         }
         let asked = media.iter().map(|media| media.samples).max().unwrap_or(1);
-        let samples = asked.max(LEAST_SAMPLES);
+        let samples = asked.max(MIN_SAMPLES);
         let length = self.seen_length(&media, origin, length);
         let step = length / f64::from(samples);
         let (mut left, mut sum) = (Spectrum::WHITE, Spectrum::BLACK);

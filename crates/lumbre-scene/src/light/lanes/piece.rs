@@ -10,11 +10,11 @@ use super::table::{Rows, Table, piece};
 /// From this many radii away, sampling by area is as good as by solid angle, and faster.
 const FAR_SQUARED: f32 = 4.0;
 /// Solid angles of rectangles below this are sampled by area: they lose the digits of the angles that they are the difference of.
-const LEAST_OF_RECTANGLE: f32 = 2e-3;
+const MIN_OF_RECTANGLE: f32 = 2e-3;
 /// The same of triangles.
-const LEAST_OF_TRIANGLE: f32 = 5e-3;
+const MIN_OF_TRIANGLE: f32 = 5e-3;
 /// Corners whose sine is less are too thin for the formulas of spherical triangles.
-const LEAST_SINE: f32 = 1e-2;
+const MIN_SINE: f32 = 1e-2;
 
 type Complex<R> = [R; 2];
 
@@ -243,8 +243,8 @@ impl<R: Real> SeenRectangle<R> {
 
     #[inline(always)]
     fn fits(&self) -> R::Mask {
-        self.solid_angle.simd_gt(R::splat(LEAST_OF_RECTANGLE))
-            & self.solid_angle.simd_lt(R::splat(TAU - LEAST_OF_RECTANGLE))
+        self.solid_angle.simd_gt(R::splat(MIN_OF_RECTANGLE))
+            & self.solid_angle.simd_lt(R::splat(TAU - MIN_OF_RECTANGLE))
     }
 
     /// A point uniform by solid angle, as fractions of the sides.
@@ -316,9 +316,9 @@ impl<R: Real> SeenTriangle<R> {
 
     #[inline(always)]
     fn fits(&self) -> R::Mask {
-        self.solid_angle.simd_gt(R::splat(LEAST_OF_TRIANGLE))
-            & self.solid_angle.simd_lt(R::splat(TAU - LEAST_OF_TRIANGLE))
-            & self.sine.simd_gt(R::splat(LEAST_SINE))
+        self.solid_angle.simd_gt(R::splat(MIN_OF_TRIANGLE))
+            & self.solid_angle.simd_lt(R::splat(TAU - MIN_OF_TRIANGLE))
+            & self.sine.simd_gt(R::splat(MIN_SINE))
     }
 
     /// A point uniform by solid angle, as fractions of the sides.
