@@ -61,6 +61,11 @@ fn write_coverage() -> Result<()> {
 }
 
 impl Book {
+    /// All of it, as it is handed out.
+    pub(crate) fn whole() -> Self {
+        Self { quick: false, update: false, pages: Vec::new(), install_only: false }
+    }
+
     /// Builds the book into `target/book/html`, where mdbook is found or can be had.
     pub(crate) fn run(self) -> Result<()> {
         if self.update {

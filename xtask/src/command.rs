@@ -30,9 +30,33 @@ pub fn run_with(program: &str, arguments: &[&str], environment: &[(&str, &str)])
     Ok(())
 }
 
+/// Runs a command as it is, and fails when it does.
+pub fn run_command(command: &mut Command) -> Result<()> {
+    eprintln!("\n$ {command:?}");
+    let status = command.status().with_context(|| format!("cannot start {command:?}"))?;
+    if !status.success() {
+        bail!("{command:?} failed: {status}");
+    }
+    Ok(())
+}
+
 /// Whether a program starts and ends well, without showing what it says.
 pub fn succeeds(program: &str, arguments: &[&str]) -> bool {
     Command::new(program).args(arguments).current_dir(root()).output().is_ok_and(|out| out.status.success())
+}
+
+/// What a program prints, which runs at the root; an error when it fails, with what it says then.
+pub fn output(program: &str, arguments: &[&str]) -> Result<String> {
+    let output = Command::new(program)
+        .args(arguments)
+        .current_dir(root())
+        .output()
+        .with_context(|| format!("cannot start {program}"))?;
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr);
+        bail!("{program} {} failed: {}", arguments.join(" "), said.trim());
+    }
+    String::from_utf8(output.stdout).with_context(|| format!("{program} prints no text"))
 }
 
 /// How cargo builds what is run.

@@ -11,6 +11,7 @@ mod bench;
 mod book;
 mod bytes;
 mod check;
+mod dist;
 mod field;
 mod files;
 mod fuzz;
@@ -20,6 +21,7 @@ mod proof;
 mod python;
 mod race;
 mod suite;
+mod wine;
 
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", about = "What the project runs on itself")]
@@ -34,7 +36,7 @@ enum Task {
     /// Installs what it needs.
     Test {
         /// Also what takes hours, and is due before a release: the longest tests, the proofs, Miri, the address sanitizer, and every
-        /// package compiled by itself. The nightly toolchain is needed for some, which are named where it is missing.
+        /// package compiled by itself, and the program's as on Windows, under Wine. What some need is named where it is missing.
         #[arg(long)]
         all: bool,
     },
@@ -50,6 +52,9 @@ enum Task {
     Book(book::Book),
     /// The same bytes anywhere: hashes of pictures, answers, results and explanations, by instruction sets and programs.
     Bytes(bytes::Bytes),
+    /// Makes what is handed out into target/dist: the program for each platform, wheels, a Debian package, the book, a list of what they are
+    /// made of, and sums. What cannot be made on this machine is named, with what it lacks.
+    Dist(dist::Dist),
     /// Renders every scene under scenes/ to the picture beside it.
     Scenes {
         /// Only scenes whose path contains this.
@@ -114,6 +119,7 @@ fn main() -> Result<()> {
         Task::Python => python::test(),
         Task::Book(book) => book.run(),
         Task::Bytes(bytes) => bytes.run(),
+        Task::Dist(dist) => dist.run(),
         Task::Scenes { filter } => pictures::render_all(filter.as_deref()),
         Task::Assets(passed) => passed.hand_to_pictures("assets"),
         Task::Contact(passed) => passed.hand_to_pictures("contact"),

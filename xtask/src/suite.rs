@@ -3,7 +3,7 @@
 use anyhow::Result;
 use xtask::command::{self, root, run_with, succeeds};
 
-use crate::{arm, book, bytes, page, proof, python};
+use crate::{arm, book, bytes, page, proof, python, wine};
 
 /// The version of cargo-deny that the gate was written for.
 const CARGO_DENY: &str = "0.20.2";
@@ -43,6 +43,7 @@ pub(crate) fn run_all() -> Result<()> {
     run_with("cargo", &["test", "--workspace", "--release"], &[("LUMBRE_LONG_TESTS", "1")])?;
     command::run("cargo", &["publish", "--workspace", "--dry-run"])?;
     arm::test_all()?;
+    wine::test()?;
     if succeeds("cargo", &["+nightly", "miri", "--version"]) {
         proof::miri()?;
         proof::asan()

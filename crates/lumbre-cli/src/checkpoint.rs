@@ -1,6 +1,7 @@
 //! Parts of renders, and checkpoints: nothing that was rendered is lost.
 
 use std::fs::{self, File};
+use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,6 +10,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use lumbre::formats::is_device_name;
 use lumbre::{Job, Part, PartError, RenderState};
 
 use crate::failure::Failure;
@@ -207,34 +209,67 @@ pub(crate) struct Checkpoint {
 }
 
 /// A lock on a checkpoint, by the file that it is and not by its name: links to it lead to the same lock.
+#[cfg(unix)]
 struct Lock {
     path: PathBuf,
     file: File,
 }
 
+/// A lock on a checkpoint, held as long as the file is open.
+#[cfg(windows)]
+struct Lock {
+    _file: File,
+}
+
 impl Lock {
     fn take(checkpoint: &Path) -> Result<Self, Failure> {
         let path = with_ending(&real_path(checkpoint), "lock");
-        let wrong = |e| Failure::Io(format!("{}: {e}", path.display()));
+        refuse_special(&path, "the lock of a checkpoint")?;
+        match Self::held(&path) {
+            Ok(Some(lock)) => Ok(lock),
+            Ok(None) => Err(Failure::Usage(format!(
+                "{}: another run writes this checkpoint (expected another name, or its end)",
+                checkpoint.display()
+            ))),
+            Err(e) => Err(Failure::Io(format!("{}: {e}", path.display()))),
+        }
+    }
+
+    /// The lock of this name; `None` where another run holds it.
+    #[cfg(unix)]
+    fn held(path: &Path) -> io::Result<Option<Self>> {
         loop {
-            refuse_special(&path, "the lock of a checkpoint")?;
-            let file = File::options().create(true).truncate(false).write(true).open(&path).map_err(wrong)?;
+            let file = File::options().create(true).truncate(false).write(true).open(path)?;
             match file.try_lock() {
-                Err(fs::TryLockError::WouldBlock) => {
-                    return Err(Failure::Usage(format!(
-                        "{}: another run writes this checkpoint (expected another name, or its end)",
-                        checkpoint.display()
-                    )));
-                }
+                Err(fs::TryLockError::WouldBlock) => return Ok(None),
                 // A run that ended meanwhile has removed it: who comes next would lock another one.
-                Ok(()) if !is_same_file(&file, &path) => {}
+                Ok(()) if !is_same_file(&file, path) => {}
                 // Where the file system has no locks, there is none to be had.
-                Ok(()) | Err(fs::TryLockError::Error(_)) => return Ok(Self { path, file }),
+                Ok(()) | Err(fs::TryLockError::Error(_)) => {
+                    return Ok(Some(Self { path: path.to_owned(), file }));
+                }
             }
+        }
+    }
+
+    /// The lock of this name; `None` where another run holds it. Windows opens the file for one run alone, and removes it when that run ends,
+    /// however it does.
+    #[cfg(windows)]
+    fn held(path: &Path) -> io::Result<Option<Self>> {
+        use std::os::windows::fs::OpenOptionsExt;
+        const FILE_FLAG_DELETE_ON_CLOSE: u32 = 0x0400_0000;
+        const ERROR_SHARING_VIOLATION: i32 = 32;
+        let mut how = File::options();
+        how.create(true).truncate(false).write(true).share_mode(0).custom_flags(FILE_FLAG_DELETE_ON_CLOSE);
+        match how.open(path) {
+            Ok(file) => Ok(Some(Self { _file: file })),
+            Err(e) if e.raw_os_error() == Some(ERROR_SHARING_VIOLATION) => Ok(None),
+            Err(e) => Err(e),
         }
     }
 }
 
+#[cfg(unix)]
 impl Drop for Lock {
     fn drop(&mut self) {
         if is_same_file(&self.file, &self.path) {
@@ -244,19 +279,12 @@ impl Drop for Lock {
 }
 
 /// Whether an open file is the one of this name.
+#[cfg(unix)]
 fn is_same_file(file: &File, path: &Path) -> bool {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::MetadataExt;
-        let identity = |meta: fs::Metadata| (meta.dev(), meta.ino());
-        let (open, named) = (file.metadata().map(identity), fs::metadata(path).map(identity));
-        matches!((open, named), (Ok(open), Ok(named)) if open == named)
-    }
-    #[cfg(not(unix))]
-    {
-        let _ = file;
-        path.is_file()
-    }
+    use std::os::unix::fs::MetadataExt;
+    let identity = |meta: fs::Metadata| (meta.dev(), meta.ino());
+    let (open, named) = (file.metadata().map(identity), fs::metadata(path).map(identity));
+    matches!((open, named), (Ok(open), Ok(named)) if open == named)
 }
 
 /// The name without links, of a file that need not be there.
@@ -278,12 +306,10 @@ fn real_path(path: &Path) -> PathBuf {
 
 /// Refuses what is there and is no regular file: a folder, a pipe, a device.
 fn refuse_special(path: &Path, what: &str) -> Result<(), Failure> {
-    match fs::metadata(path) {
-        Ok(meta) if !meta.is_file() => {
-            Err(Failure::Io(format!("{}: it is not a regular file, as {what} is", path.display())))
-        }
-        _ => Ok(()),
+    if is_device_name(path) || fs::metadata(path).is_ok_and(|meta| !meta.is_file()) {
+        return Err(Failure::Io(format!("{}: it is not a regular file, as {what} is", path.display())));
     }
+    Ok(())
 }
 
 /// Reads a part, within this memory.

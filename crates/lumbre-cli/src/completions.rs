@@ -1,5 +1,7 @@
 //! `lumbre completions` and `lumbre man`: for shells and manuals.
 
+use std::path::PathBuf;
+
 use clap::{Args, Command, CommandFactory};
 use clap_complete::Shell;
 
@@ -21,11 +23,15 @@ pub(crate) struct CompletionsArguments {
 #[derive(Args)]
 #[command(after_help = "Examples:
   lumbre man | man -l -
-  lumbre man render > ~/.local/share/man/man1/lumbre-render.1")]
+  lumbre man render > ~/.local/share/man/man1/lumbre-render.1
+  lumbre man --into ~/.local/share/man/man1")]
 pub(crate) struct ManArguments {
     /// The command; by default the page of the whole program.
     #[arg(value_name = "COMMAND")]
     command: Option<String>,
+    /// Write the pages of the program and of all its commands into this folder.
+    #[arg(long, value_name = "DIR", conflicts_with = "command")]
+    into: Option<PathBuf>,
 }
 
 /// Prints completions.
@@ -38,12 +44,16 @@ pub(crate) fn completions<P: CommandFactory>(arguments: &CompletionsArguments) -
     print(&String::from_utf8_lossy(&text))
 }
 
-/// Prints a manual page.
+/// Prints a manual page, or writes all of them.
 ///
 /// # Errors
 /// [`Failure::Usage`] for an unknown command, and [`Failure::Io`].
 pub(crate) fn man<P: CommandFactory>(arguments: &ManArguments) -> Result<(), Failure> {
     let mut program = P::command();
+    if let Some(folder) = &arguments.into {
+        let written = clap_mangen::generate_to(program, folder);
+        return written.map_err(|e| Failure::Io(format!("{}: cannot write: {e}", folder.display())));
+    }
     // So that usage lines have the whole name.
     program.build();
     let page = match arguments.command.as_deref() {

@@ -14,7 +14,15 @@ const PLAIN: &str = "\x1b[0m";
 
 /// Whether text for this stream has colours.
 pub(crate) fn has_colours(stream: &impl IsTerminal) -> bool {
-    colours(|name| std::env::var_os(name), stream.is_terminal())
+    colours(|name| std::env::var_os(name), stream.is_terminal() && understands_ansi())
+}
+
+/// Whether the terminal takes escape sequences. Consoles of Windows do from Windows 10 on, once they are asked to; the terminals of
+/// MSYS, which are no consoles, set `TERM`.
+pub(crate) fn understands_ansi() -> bool {
+    !cfg!(windows)
+        || std::env::var_os("TERM").is_some_and(|name| !name.is_empty())
+        || anstyle_query::windows::enable_ansi_colors() != Some(false)
 }
 
 /// `NO_COLOR` (<https://no-color.org>) comes first, then `CLICOLOR_FORCE` and `CLICOLOR`

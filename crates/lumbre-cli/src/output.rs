@@ -19,7 +19,6 @@ pub(crate) fn is_standard_stream(path: &Path) -> bool {
 #[derive(Debug, PartialEq, Eq, Hash)]
 enum Identity {
     /// The device and the number of an existing file, by whatever name or link.
-    #[cfg(unix)]
     Node(u64, u64),
     /// The real path.
     Path(PathBuf),
@@ -35,13 +34,22 @@ impl Identity {
                 use std::os::unix::fs::MetadataExt;
                 Some(Self::Node(meta.dev(), meta.ino()))
             }
-            #[cfg(not(unix))]
-            Ok(_) => path.canonicalize().ok().map(Self::Path),
+            #[cfg(windows)]
+            Ok(_) => {
+                let file = winapi_util::Handle::from_path_any(path).ok()?;
+                let meta = winapi_util::file::information(file).ok()?;
+                Some(Self::Node(meta.volume_serial_number(), meta.file_index()))
+            }
             Err(_) => {
                 // A link to nothing is written through.
                 let folder = folder_of(path);
                 let to = fs::read_link(path).map_or_else(|_| path.to_owned(), |to| folder.join(to));
-                Some(Self::Path(folder_of(&to).canonicalize().ok()?.join(to.file_name()?)))
+                let name = to.file_name()?;
+                // There, names that differ by case alone are one.
+                let is_any_case = cfg!(any(windows, target_os = "macos"));
+                let name =
+                    if is_any_case { name.to_string_lossy().to_lowercase().into() } else { name.to_owned() };
+                Some(Self::Path(folder_of(&to).canonicalize().ok()?.join(name)))
             }
         }
     }

@@ -9,6 +9,7 @@ use lumbre::formats::image::{ImageFormat, encode_image};
 use lumbre::image::{Image, ToneMap};
 use lumbre_viewer::base64;
 
+use crate::console::understands_ansi;
 use crate::failure::Failure;
 use crate::progress::PictureViewer;
 
@@ -50,6 +51,10 @@ impl Preview {
     pub(crate) fn new(protocol: Protocol, tone_map: ToneMap, exposure: f32) -> Result<Self, Failure> {
         if protocol == Protocol::Auto && !std::io::stderr().is_terminal() {
             let why = "--preview: standard error is no terminal (expected one, or kitty, iterm, sixel or blocks after it)";
+            return Err(Failure::Usage(why.to_owned()));
+        }
+        if protocol == Protocol::Auto && !understands_ansi() {
+            let why = "--preview: this terminal shows no pictures (expected one that takes escape sequences, or kitty, iterm, sixel or blocks after it)";
             return Err(Failure::Usage(why.to_owned()));
         }
         let variable = |name: &str| std::env::var(name).unwrap_or_default();

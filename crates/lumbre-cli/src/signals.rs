@@ -9,8 +9,7 @@ use std::time::{Duration, Instant};
 use lumbre::CancelToken;
 use lumbre::formats::abandon_writes;
 #[cfg(unix)]
-use signal_hook::consts::{SIGHUP, SIGQUIT, SIGUSR1, SIGXCPU};
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGUSR1, SIGXCPU};
 
 use crate::failure::Failure;
 
@@ -54,11 +53,10 @@ const SIGNALS: [(i32, u8, bool); 6] = [
     (SIGUSR1, 138, false),
     (SIGXCPU, 152, false),
 ];
-#[cfg(not(unix))]
-const SIGNALS: [(i32, u8, bool); 2] = [(SIGINT, 130, true), (SIGTERM, 143, true)];
 
 /// The signals of [`SIGNALS`] that are listened for: all but those that its parent process had it ignore, as nohup does with
 /// SIGHUP. SIGINT and SIGTERM are always, as they were ever: shells ignore SIGINT for what runs in the background.
+#[cfg(unix)]
 fn wanted() -> impl Iterator<Item = (i32, u8, bool)> {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored =
@@ -113,19 +111,7 @@ impl Signals {
             state: signals.state.clone(),
         };
         let watches = std::thread::Builder::new().spawn(move || watcher.watch()).is_ok();
-        for (signal, status, may_hurry) in wanted() {
-            let status = i32::from(status);
-            if !watches {
-                // Without a thread nothing can be removed or saved: the next run removes what is left.
-                let at_once = Arc::new(AtomicBool::new(true));
-                signal_hook::flag::register_conditional_shutdown(signal, status, at_once)?;
-            }
-            signal_hook::flag::register_usize(signal, last.clone(), status as usize)?;
-            signal_hook::flag::register(signal, came.clone())?;
-            if may_hurry {
-                signal_hook::flag::register(signal, hurries.clone())?;
-            }
-        }
+        register(watches, &last, &came, &hurries)?;
         Ok(signals)
     }
 
@@ -169,6 +155,66 @@ impl Signals {
     pub(crate) fn end_at(&self, deadline: Option<Deadline>) {
         lock(&self.state).deadline = deadline;
     }
+}
+
+/// Has the signals of [`SIGNALS`] leave their exit status in `last`, set `came`, and `hurries` if a second one cannot wait.
+#[cfg(unix)]
+fn register(
+    watches: bool,
+    last: &Arc<AtomicUsize>,
+    came: &Arc<AtomicBool>,
+    hurries: &Arc<AtomicBool>,
+) -> std::io::Result<()> {
+    for (signal, status, may_hurry) in wanted() {
+        let status = i32::from(status);
+        if !watches {
+            // Without a thread nothing can be removed or saved: the next run removes what is left.
+            let at_once = Arc::new(AtomicBool::new(true));
+            signal_hook::flag::register_conditional_shutdown(signal, status, at_once)?;
+        }
+        signal_hook::flag::register_usize(signal, last.clone(), status as usize)?;
+        signal_hook::flag::register(signal, came.clone())?;
+        if may_hurry {
+            signal_hook::flag::register(signal, hurries.clone())?;
+        }
+    }
+    Ok(())
+}
+
+/// The same for the events of a console of Windows, with the exit statuses of their like elsewhere: Ctrl-C, Ctrl-Break, and the ends of
+/// the console, the session and the machine. After the latter three Windows ends the process within seconds (five for a console), done
+/// or not. Without a watching thread nothing is registered, and any of them ends the program at once.
+#[cfg(windows)]
+fn register(
+    watches: bool,
+    last: &Arc<AtomicUsize>,
+    came: &Arc<AtomicBool>,
+    hurries: &Arc<AtomicBool>,
+) -> std::io::Result<()> {
+    use tokio::signal::windows::{ctrl_break, ctrl_c, ctrl_close, ctrl_logoff, ctrl_shutdown};
+    if !watches {
+        return Ok(());
+    }
+    let runtime = tokio::runtime::Builder::new_current_thread().build()?;
+    let (mut interrupt, mut stop) = (ctrl_c()?, ctrl_break()?);
+    let (mut close, mut logoff, mut shutdown) = (ctrl_close()?, ctrl_logoff()?, ctrl_shutdown()?);
+    let (last, came, hurries) = (last.clone(), came.clone(), hurries.clone());
+    let listen = async move {
+        loop {
+            let (status, may_hurry) = tokio::select! {
+                _ = interrupt.recv() => (130, true),
+                _ = stop.recv() => (131, true),
+                _ = close.recv() => (129, false),
+                _ = logoff.recv() => (143, false),
+                _ = shutdown.recv() => (143, false),
+            };
+            last.store(status, Ordering::Relaxed);
+            hurries.store(may_hurry, Ordering::Relaxed);
+            came.store(true, Ordering::Relaxed);
+        }
+    };
+    std::thread::Builder::new().name("console".to_owned()).spawn(move || runtime.block_on(listen))?;
+    Ok(())
 }
 
 fn lock(state: &Mutex<State>) -> MutexGuard<'_, State> {

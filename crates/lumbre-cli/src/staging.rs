@@ -63,7 +63,7 @@ fn background(text: &str) -> Result<BackgroundArgument, String> {
     if lower.starts_with('#') {
         return Err("expected a colour of three or six hexadecimal digits, as #fa0 or #e8e0d8".to_owned());
     }
-    if Path::new(text).extension().is_some() || text.contains(std::path::MAIN_SEPARATOR) {
+    if Path::new(text).extension().is_some() || text.contains(std::path::is_separator) {
         return Ok(BackgroundArgument::File(text.into()));
     }
     let names: Vec<&str> = lumbre::colour_names().collect();

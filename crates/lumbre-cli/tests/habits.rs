@@ -110,6 +110,15 @@ fn shells_and_manuals_know_every_command_and_option() {
         let page = stdout(&out).replace("\\-", "-");
         assert!(page.contains(&format!("lumbre-{command}")) && page.contains("Examples"), "{page}");
     }
+    fs::create_dir(desk.path("man")).unwrap();
+    let out = desk.lumbre(&["man", "--into", "man"]);
+    assert_eq!((code(&out), &*stdout(&out)), (0, ""), "{}", stderr(&out));
+    assert!(fs::read_to_string(desk.path("man/lumbre.1")).unwrap().contains(".TH lumbre 1"));
+    for command in ["render", "cast", "info", "diff", "farm-slurm"] {
+        let page = fs::read_to_string(desk.path(&format!("man/lumbre-{command}.1"))).unwrap();
+        assert!(page.replace("\\-", "-").contains(&format!(".TH lumbre-{command} 1")), "{page}");
+    }
+    assert_eq!(code(&desk.lumbre(&["man", "--into", "none"])), 4);
     let out = desk.lumbre(&["man", "rendr"]);
     assert_eq!(code(&out), 2);
     assert!(stderr(&out).contains("render"), "{}", stderr(&out));

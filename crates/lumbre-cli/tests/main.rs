@@ -16,6 +16,7 @@ mod math;
 mod messages;
 mod pages;
 mod parts;
+mod platforms;
 mod program;
 mod slurm;
 mod spectral;

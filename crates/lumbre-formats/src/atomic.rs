@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::{Duration, Instant};
 
+use crate::devices::{Device, device};
 use crate::diagnostic::FormatError;
 
 /// Writes the file `path` through `write`: into a temporary file in the same folder, which is synced to disk
@@ -130,7 +131,7 @@ impl Disk for RealDisk {
     }
 
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        fs::rename(from, to)
+        if cfg!(windows) { rename_when_closed(from, to) } else { fs::rename(from, to) }
     }
 
     fn sync_folder(&self, folder: &Path) -> io::Result<()> {
@@ -140,6 +141,27 @@ impl Disk for RealDisk {
 
     fn remove(&self, path: &Path) -> io::Result<()> {
         fs::remove_file(path)
+    }
+}
+
+/// Windows replaces no file that another program has open, unless that program allows it. Scanners and indexers look into new files and
+/// are done in a moment, so it is tried again.
+fn rename_when_closed(from: &Path, to: &Path) -> io::Result<()> {
+    const PATIENCE: Duration = Duration::from_secs(2);
+    const ERROR_ACCESS_DENIED: i32 = 5;
+    const ERROR_SHARING_VIOLATION: i32 = 32;
+    let start = Instant::now();
+    loop {
+        match fs::rename(from, to) {
+            Err(e) if matches!(e.raw_os_error(), Some(ERROR_ACCESS_DENIED | ERROR_SHARING_VIOLATION)) => {
+                if start.elapsed() > PATIENCE {
+                    let why = format!("{e} Another program has it open (expected that it closes it)");
+                    return Err(io::Error::new(e.kind(), why));
+                }
+                std::thread::sleep(Duration::from_millis(20));
+            }
+            renamed => return renamed,
+        }
     }
 }
 
@@ -222,11 +244,13 @@ fn replace<D: Disk>(
             let _ = fs::set_permissions(&part, permissions);
         }
         let mut writes = writes();
+        // On Windows no one could read the file as long as it is locked.
+        let held = if cfg!(windows) { None } else { Some(file) };
         end(&part, real)?;
         writes.parts.retain(|other| *other != part);
+        drop(held);
         Ok(())
     })();
-    drop(file);
     if let Err(e) = written {
         // The first error is the one to report.
         let _ = disk.remove(&part);
@@ -272,6 +296,14 @@ enum Target {
 fn target_of(path: &Path) -> io::Result<Target> {
     if path.file_name().is_none() {
         return Err(io::Error::new(io::ErrorKind::IsADirectory, "it names no file"));
+    }
+    match device(path) {
+        Some(Device::Null) => return Ok(Target::Stream),
+        Some(Device::Other) => {
+            let why = "it is the name of a device (expected that of a file, or NUL)";
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, why));
+        }
+        None => {}
     }
     match fs::metadata(path) {
         Ok(meta) if meta.is_dir() => Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder")),

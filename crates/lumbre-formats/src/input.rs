@@ -10,6 +10,7 @@ use std::sync::Arc;
 use flate2::bufread::MultiGzDecoder;
 
 use crate::budget::{Budget, Hold};
+use crate::devices::device;
 use crate::diagnostic::{Diagnostic, FormatError, Place};
 
 /// The bytes of a file, charged to the budget as long as they live.
@@ -148,6 +149,10 @@ pub fn open_regular(path: &Path) -> Result<(File, u64), FormatError> {
         let what = if kind.is_dir() { "it is a folder" } else { "it is not a regular file" };
         refuse("cannot read", io::Error::new(io::ErrorKind::InvalidInput, what))
     };
+    if device(path).is_some() {
+        let what = "it is the name of a device";
+        return Err(refuse("cannot read", io::Error::new(io::ErrorKind::InvalidInput, what)));
+    }
     // Checked before opening, as opening a pipe would block; and again after, as it may have been replaced
     // in between.
     let before = std::fs::metadata(path).map_err(|e| refuse("cannot open", e))?;

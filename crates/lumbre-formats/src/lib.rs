@@ -8,6 +8,7 @@ pub mod atomic;
 pub mod budget;
 mod bytes;
 mod contained;
+mod devices;
 pub mod diagnostic;
 pub mod gltf;
 pub mod ies;
@@ -31,6 +32,7 @@ mod unseen;
 
 pub use atomic::{abandon_writes, atomic_write, atomic_write_seek, probe_writable};
 pub use budget::{Budget, BudgetVec, Hold, LimitError, LimitKind, Limits};
+pub use devices::is_device_name;
 pub use diagnostic::{Diagnostic, Diagnostics, FormatError, Place, Position, Severity, Strictness};
 pub use input::{Input, open_regular};
 pub use input_stream::InputStream;

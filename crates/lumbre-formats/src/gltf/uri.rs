@@ -46,6 +46,8 @@ pub(super) fn target(uri: &str) -> Target<'_> {
             && scheme.bytes().all(|b| b.is_ascii_alphanumeric() || matches!(b, b'+' | b'-' | b'.'));
         if is_scheme && scheme.eq_ignore_ascii_case("file") {
             let path = rest.strip_prefix("//").unwrap_or(rest);
+            // file:///C:/folder/name
+            let path = path.strip_prefix('/').filter(|path| cfg!(windows) && has_drive(path)).unwrap_or(path);
             return Target::File(percent_decoded(path).into());
         }
         if is_scheme {
@@ -53,6 +55,11 @@ pub(super) fn target(uri: &str) -> Target<'_> {
         }
     }
     Target::File(percent_decoded(uri).into())
+}
+
+/// Whether a path begins with the letter of a drive.
+fn has_drive(path: &str) -> bool {
+    matches!(path.as_bytes(), [letter, b':', ..] if letter.is_ascii_alphabetic())
 }
 
 fn strip_prefix_ignoring_case<'a>(text: &'a str, prefix: &str) -> Option<&'a str> {
@@ -125,6 +132,8 @@ mod tests {
         assert_eq!(target("%ff.bin"), file("%ff.bin"));
         assert_eq!(target("C:/a.bin"), file("C:/a.bin"));
         assert_eq!(target("file:///a/b.bin"), file("/a/b.bin"));
+        let of_drive = if cfg!(windows) { "C:/a/b.bin" } else { "/C:/a/b.bin" };
+        assert_eq!(target("file:///C:/a/b.bin"), file(of_drive));
         assert_eq!(target("https://example.org/a.bin"), Target::Scheme("https"));
         let data = DataUri { media_type: "image/png", is_base64: true, data: "AAEC" };
         assert_eq!(target("data:image/png;charset=utf-8;base64,AAEC"), Target::Data(data));
