@@ -5,9 +5,11 @@
 use std::mem::size_of;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use thiserror::Error;
+
+use crate::held::HeldFiles;
 
 /// The limits on reading, each with the flag that raises it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,6 +108,8 @@ pub struct Budget {
     paths: Mutex<Vec<PathBuf>>,
     /// The files that may be opened; `None` for any.
     only: Option<Vec<PathBuf>>,
+    /// The files that there are; `None` for those of the system.
+    held: Option<Arc<HeldFiles>>,
 }
 
 impl Budget {
@@ -124,6 +128,37 @@ impl Budget {
     /// Whether the file of this name may be opened.
     pub fn allows(&self, path: &Path) -> bool {
         self.only.as_ref().is_none_or(|only| only.iter().any(|known| known == path))
+    }
+
+    /// Takes these files in place of the system's, which then are neither opened nor looked for.
+    #[must_use]
+    pub fn of_held(self, files: Option<Arc<HeldFiles>>) -> Self {
+        Self { held: files, ..self }
+    }
+
+    /// The files that there are; `None` for those of the system.
+    pub(crate) fn held(&self) -> Option<&HeldFiles> {
+        self.held.as_deref()
+    }
+
+    /// Whether there is a file of this name, and no folder.
+    pub(crate) fn is_file(&self, path: &Path) -> bool {
+        self.held().map_or_else(|| path.is_file(), |files| files.get(path).is_some())
+    }
+
+    /// Whether there is anything of this name.
+    pub(crate) fn exists(&self, path: &Path) -> bool {
+        self.held().map_or_else(|| path.exists(), |files| files.get(path).is_some())
+    }
+
+    /// Whether there is a folder of this name.
+    pub(crate) fn is_folder(&self, path: &Path) -> bool {
+        self.held.is_none() && path.is_dir()
+    }
+
+    /// The one name of a file among all that lead to it; `None` where there is no such file.
+    pub(crate) fn canonical(&self, path: &Path) -> Option<PathBuf> {
+        self.held().map_or_else(|| path.canonicalize().ok(), |files| files.canonical(path))
     }
 
     /// Its limits.

@@ -36,11 +36,20 @@ impl<'b> Input<'b> {
             return Err(FormatError::io(path, "cannot read", alone));
         }
         budget.path(path)?;
-        let (file, size) = open_regular(path)?;
         let mut bytes = Vec::new();
         let mut hold = budget.hold(0, &name)?;
-        read_within(file, size, &mut bytes, &mut hold, &name, |_| Ok(()))
-            .map_err(|e| e.into_format_error(path, &name))?;
+        let read = match budget.held() {
+            Some(files) => {
+                let missing = || io::Error::new(io::ErrorKind::NotFound, "no such file among those that are held");
+                let file = files.get(path).ok_or_else(|| FormatError::io(path, "cannot open", missing()))?;
+                read_within(&file[..], file.len() as u64, &mut bytes, &mut hold, &name, |_| Ok(()))
+            }
+            None => {
+                let (file, size) = open_regular(path)?;
+                read_within(file, size, &mut bytes, &mut hold, &name, |_| Ok(()))
+            }
+        };
+        read.map_err(|e| e.into_format_error(path, &name))?;
         let input = Self { name, bytes, hold };
         if input.bytes.starts_with(&[0x1F, 0x8B]) { input.unpacked(path, budget) } else { Ok(input) }
     }

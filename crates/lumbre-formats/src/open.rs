@@ -10,7 +10,7 @@ use crate::gltf::{GltfOptions, read_gltf};
 use crate::obj::obj_scene;
 use crate::ply::ply_scene;
 use crate::stl::stl_scene;
-use crate::{Budget, Diagnostic, Diagnostics, FormatError, Input, Limits, Place, Strictness, pbrt};
+use crate::{Budget, Diagnostic, Diagnostics, FormatError, HeldFiles, Input, Limits, Place, Strictness, pbrt};
 
 /// Options of reading a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,6 +34,8 @@ pub struct ReadOptions {
     pub pov: crate::pov::PovOptions,
     /// Whether the scene may use no other files than those that are named: for a scene from a stranger.
     pub is_alone: bool,
+    /// The files in place of the system's; `None` for those of the system.
+    pub held: Option<Arc<HeldFiles>>,
 }
 
 /// The supported scene formats.
@@ -141,7 +143,7 @@ pub fn open_scenes(
     paths: &[impl AsRef<Path>],
     options: &ReadOptions,
 ) -> Result<(SceneDesc, Diagnostics), FormatError> {
-    let mut budget = Budget::new(options.limits);
+    let mut budget = Budget::new(options.limits).of_held(options.held.clone());
     if options.is_alone {
         budget = budget.only(paths.iter().map(|path| path.as_ref().to_owned()));
     }
@@ -183,14 +185,14 @@ impl<'p, 'b> Source<'p, 'b> {
         if let Some(format) = by_name {
             return Ok(Self { path, format, input: None });
         }
-        if !is_standard_input && path.is_dir() {
+        if !is_standard_input && budget.is_folder(path) {
             return Err(folder(path));
         }
         let is_elsewhere = OTHERS.iter().any(|(endings, _)| has_ending(path, endings));
         // Whether or not there is such a file, its name does not say what it is.
-        if !is_standard_input && options.format.is_none() && (!path.is_file() || is_elsewhere) {
+        if !is_standard_input && options.format.is_none() && (!budget.is_file(path) || is_elsewhere) {
             // A name that says enough, and there is no such file: that is said first.
-            if is_elsewhere && !path.exists() {
+            if is_elsewhere && !budget.exists(path) {
                 Input::open(path, budget)?;
             }
             return Err(unknown(path, path.display().to_string().into()));

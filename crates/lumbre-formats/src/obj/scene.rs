@@ -179,11 +179,11 @@ impl Builder<'_> {
         place: &Place,
         opened: &mut HashSet<PathBuf>,
     ) -> Result<Vec<(PathBuf, MtlMaterial)>, FormatError> {
-        let whole = existing(folder, names);
-        let paths = if whole.is_file() {
+        let whole = existing(folder, names, self.budget);
+        let paths = if self.budget.is_file(&whole) {
             vec![whole]
         } else {
-            names.split_ascii_whitespace().map(|name| existing(folder, name)).collect()
+            names.split_ascii_whitespace().map(|name| existing(folder, name, self.budget)).collect()
         };
         let mut materials = vec![];
         for path in paths {
@@ -359,7 +359,7 @@ impl Builder<'_> {
         if map.range[0] != 0.0 {
             self.diagnostics.warn("base of -mm of a texture is not used", |said| said.at(map.place.clone()));
         }
-        let path = existing(folder, &map.file);
+        let path = existing(folder, &map.file, self.budget);
         let key = (path, holds_numbers, map.clamp);
         let image = match self.images.get(&key) {
             Some(image) => image.clone(),
@@ -423,7 +423,7 @@ fn constant(value: f32) -> Arc<FloatTexture> {
 }
 
 /// The file of a name, where `\` may separate folders, as on Windows.
-fn existing(folder: &Path, name: &str) -> PathBuf {
+fn existing(folder: &Path, name: &str, budget: &Budget) -> PathBuf {
     let path = folder.join(name);
-    if !path.exists() && name.contains('\\') { folder.join(name.replace('\\', "/")) } else { path }
+    if !budget.exists(&path) && name.contains('\\') { folder.join(name.replace('\\', "/")) } else { path }
 }

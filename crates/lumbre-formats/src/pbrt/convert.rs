@@ -269,7 +269,7 @@ impl<'b, 'd> Converter<'b, 'd> {
     /// The path of a file that the scene names.
     pub fn resolve(&self, name: &str, at: Spot) -> Result<PathBuf> {
         match &self.directory {
-            Some(directory) => Ok(parser::resolve(directory, name)),
+            Some(directory) => Ok(parser::resolve(directory, name, self.budget)),
             None => {
                 Err(at
                     .error(format!("no file can be read from here, and the scene asks for {}", quoted(name))))
