@@ -18,6 +18,7 @@ mod proof;
 mod python;
 mod race;
 mod suite;
+mod web;
 
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", about = "What the project runs on itself")]
@@ -46,6 +47,9 @@ enum Task {
     Python,
     /// Builds the book of docs/ into target/book/html: renders its pictures, runs its examples, and tries its links.
     Book(book::Book),
+    /// Lumbre for the browser: makes the npm package and the playground in target/web, and tries both. Says what it needs where that is
+    /// missing.
+    Web(web::Web),
     /// Renders every scene under scenes/ to the picture beside it.
     Scenes {
         /// Only scenes whose path contains this.
@@ -109,6 +113,7 @@ fn main() -> Result<()> {
         Task::Check { since } => check::run(since.as_deref()),
         Task::Python => python::test(),
         Task::Book(book) => book.run(),
+        Task::Web(wanted) => web::make(&wanted),
         Task::Scenes { filter } => pictures::render_all(filter.as_deref()),
         Task::Assets(passed) => passed.hand_to_pictures("assets"),
         Task::Contact(passed) => passed.hand_to_pictures("contact"),

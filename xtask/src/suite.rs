@@ -3,7 +3,7 @@
 use anyhow::Result;
 use xtask::command::{self, root, run_with, succeeds};
 
-use crate::{book, page, proof, python};
+use crate::{book, page, proof, python, web};
 
 /// The version of cargo-deny that the gate was written for.
 const CARGO_DENY: &str = "0.20.2";
@@ -20,6 +20,7 @@ pub(crate) fn run() -> Result<()> {
     command::run("cargo", &["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"])?;
     command::run("cargo", &["test", "--workspace", "--all-targets"])?;
     page::run()?;
+    web::check()?;
     book::test()?;
     command::run("cargo", &["test", "--workspace", "--doc"])?;
     python::test()?;
@@ -73,6 +74,8 @@ fn package() -> Result<()> {
         "lumbre-dev",
         "--exclude",
         "lumbre-python",
+        "--exclude",
+        "lumbre-web",
     ];
     command::run("cargo", &[&arguments[..], &["--no-verify", "--allow-dirty", "--quiet"]].concat())
 }
