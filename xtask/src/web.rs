@@ -13,7 +13,8 @@ const TARGET: &str = "wasm32-unknown-unknown";
 /// Vectors of 128 bits, which all browsers have since 2023, and a stack as large as threads of the program have.
 const FLAGS: &str = "-C target-feature=+simd128,+bulk-memory -C link-arg=-zstack-size=8388608";
 /// Debian's own compiler, whose standard library for WebAssembly is compiled from its sources.
-const DEBIAN: [(&str, &str); 3] = [("RUSTC_BOOTSTRAP", "1"), ("RUSTC", "/usr/bin/rustc"), ("PATH", "/usr/bin:/bin")];
+const DEBIAN: [(&str, &str); 3] =
+    [("RUSTC_BOOTSTRAP", "1"), ("RUSTC", "/usr/bin/rustc"), ("PATH", "/usr/bin:/bin")];
 
 /// What of it is wanted.
 #[derive(Args)]
@@ -66,7 +67,7 @@ fn missing() -> Result<Vec<String>> {
     if bindgen(&version).is_none() {
         missing.push(format!("wasm-bindgen {version} (cargo install wasm-bindgen-cli --version {version})"));
     }
-    for (program, package) in [("wasm-opt", "binaryen"), ("node", "nodejs"), ("npm", "npm")] {
+    for (program, package) in [("node", "nodejs"), ("npm", "npm")] {
         if !succeeds(program, &["--version"]) {
             missing.push(format!("{program} (Debian: apt-get install {package})"));
         }
@@ -77,7 +78,8 @@ fn missing() -> Result<Vec<String>> {
 /// The version of wasm-bindgen that the code is compiled with: the program has to be of the same.
 fn bindgen_version() -> Result<String> {
     let lock = std::fs::read_to_string(root().join("Cargo.lock"))?;
-    let after = lock.split_once("name = \"wasm-bindgen\"\nversion = \"").context("Cargo.lock has no wasm-bindgen")?;
+    let after =
+        lock.split_once("name = \"wasm-bindgen\"\nversion = \"").context("Cargo.lock has no wasm-bindgen")?;
     Ok(after.1.chars().take_while(|c| *c != '"').collect())
 }
 
@@ -132,11 +134,16 @@ fn build() -> Result<()> {
     let compiled = folder.join(TARGET).join("release/lumbre_web.wasm");
     let compiled = compiled.to_string_lossy();
     let bindgen = bindgen(&bindgen_version()?).context("wasm-bindgen")?;
-    run(&bindgen, &["--target", "no-modules", "--no-typescript", "--out-dir", &generated, &compiled])?;
-    let module = format!("{generated}/lumbre_web_bg.wasm");
-    let features =
-        ["--enable-simd", "--enable-bulk-memory", "--enable-nontrapping-float-to-int", "--enable-sign-ext", "--enable-mutable-globals", "--enable-reference-types", "--enable-multivalue"];
-    run("wasm-opt", &[&["-O2"], &features[..], &[&module, "-o", &module]].concat())?;
+    let module = [
+        "--target",
+        "no-modules",
+        "--no-typescript",
+        "--remove-name-section",
+        "--out-dir",
+        &generated,
+        &compiled,
+    ];
+    run(&bindgen, &module)?;
     let install = ["ci", "--prefix", FOLDER, "--ignore-scripts", "--no-audit", "--no-fund"];
     run("npm", &install)?;
     run("npm", &["run", "--prefix", FOLDER, "check"])?;
@@ -155,7 +162,8 @@ fn test(pictures: Option<&Path>) -> Result<()> {
         None => command::tested_program()?,
     };
     let (package, playground) = (out().join("npm"), out().join("playground"));
-    let [program, package, playground] = [&program, &package, &playground].map(|path: &PathBuf| path.to_string_lossy());
+    let [program, package, playground] =
+        [&program, &package, &playground].map(|path: &PathBuf| path.to_string_lossy());
     run_with("node", &[&format!("{FOLDER}/tests/node.mjs")], &[("LUMBRE", &program), ("PACKAGE", &package)])?;
     let Some(browser) = crate::page::browser() else {
         eprintln!("\nThe playground is not tried: it needs Chromium (Debian: apt-get install chromium)");

@@ -1,7 +1,10 @@
 //! The `lumbre` program: render, view, cast, info, diff, merge, explain, math. It is a library so that other front ends, such as the Python package, bring
 //! the same program. For WebAssembly it has what needs no system: the answers of cast, explain and math.
 
-#![cfg_attr(target_family = "wasm", allow(dead_code, reason = "the arguments of commands are not parsed there"))]
+#![cfg_attr(
+    target_family = "wasm",
+    allow(dead_code, reason = "the arguments of commands are not parsed there")
+)]
 
 #[cfg(not(target_family = "wasm"))]
 use std::ffi::OsString;

@@ -103,7 +103,10 @@ mod tests {
         let error = open_scene(Path::new("a.pbrt"), &options(&[("a.pbrt", scene.as_bytes())])).unwrap_err();
         assert!(error.to_string().contains("no such file among those that are held"), "{error}");
         let error = open_scene(&secret, &options(&[])).unwrap_err();
-        assert!(matches!(&error, FormatError::Io { source, .. } if source.kind() == ErrorKind::NotFound), "{error}");
+        assert!(
+            matches!(&error, FormatError::Io { source, .. } if source.kind() == ErrorKind::NotFound),
+            "{error}"
+        );
         // Its folder is not listed, either.
         let error = open_scene(folder.path(), &options(&[])).unwrap_err();
         assert!(!error.to_string().contains("secret"), "{error}");

@@ -40,7 +40,8 @@ impl<'b> Input<'b> {
         let mut hold = budget.hold(0, &name)?;
         let read = match budget.held() {
             Some(files) => {
-                let missing = || io::Error::new(io::ErrorKind::NotFound, "no such file among those that are held");
+                let missing =
+                    || io::Error::new(io::ErrorKind::NotFound, "no such file among those that are held");
                 let file = files.get(path).ok_or_else(|| FormatError::io(path, "cannot open", missing()))?;
                 read_within(&file[..], file.len() as u64, &mut bytes, &mut hold, &name, |_| Ok(()))
             }

@@ -10,7 +10,9 @@ use crate::gltf::{GltfOptions, read_gltf};
 use crate::obj::obj_scene;
 use crate::ply::ply_scene;
 use crate::stl::stl_scene;
-use crate::{Budget, Diagnostic, Diagnostics, FormatError, HeldFiles, Input, Limits, Place, Strictness, pbrt};
+use crate::{
+    Budget, Diagnostic, Diagnostics, FormatError, HeldFiles, Input, Limits, Place, Strictness, pbrt,
+};
 
 /// Options of reading a scene.
 #[derive(Clone, Debug, Default, PartialEq)]

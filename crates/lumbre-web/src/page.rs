@@ -1,6 +1,10 @@
 //! What JavaScript calls: the core, with options as JSON and errors as the JSON of a [`Problem`].
 
-#![allow(missing_docs, unreachable_pub, reason = "what JavaScript sees of it; the types of the package document it")]
+#![allow(
+    missing_docs,
+    unreachable_pub,
+    reason = "what JavaScript sees of it; the types of the package document it"
+)]
 
 use std::cell::RefCell;
 use std::time::Duration;

@@ -47,7 +47,9 @@ impl Problem {
 
     fn at(self, place: &Place) -> Self {
         let (line, column) = match place.position {
-            Position::Text { line, column } | Position::Element { line, column, .. } => (Some(line), Some(column)),
+            Position::Text { line, column } | Position::Element { line, column, .. } => {
+                (Some(line), Some(column))
+            }
             Position::Whole | Position::Binary { .. } => (None, None),
         };
         Self { file: Some(place.file.to_string()), line, column, ..self }

@@ -110,7 +110,10 @@ impl Session {
             None => None,
             Some(name) => Some(IntegratorKind::from_name(name).ok_or_else(|| {
                 let known = IntegratorKind::NAMES.join(", ");
-                Problem::new(ProblemKind::Usage, format!("no integrator \"{name}\" (expected one of: {known})"))
+                Problem::new(
+                    ProblemKind::Usage,
+                    format!("no integrator \"{name}\" (expected one of: {known})"),
+                )
             })?),
         };
         let defaults = Defaults::stage(&mut desc, wanted.size, kind);
@@ -240,7 +243,9 @@ impl Session {
         let usage = |message: &str| Problem::new(ProblemKind::Usage, message);
         let format = match &wanted.format {
             None => Format::Text,
-            Some(name) => Format::from_name(name).ok_or_else(|| usage("expected text, markdown, html or json"))?,
+            Some(name) => {
+                Format::from_name(name).ok_or_else(|| usage("expected text, markdown, html or json"))?
+            }
         };
         let ray = wanted.ray.as_deref().map(ray).transpose()?;
         if wanted.pixel.is_some() == ray.is_some() {

@@ -73,7 +73,10 @@ fn every_malformed_file_is_refused_in_the_words_of_the_program() {
                 Err(problem) => format!("error: {}", problem.message.lines().next().unwrap_or_default()),
             };
             // A list of rays has no name of its own, and what is no error is a warning or nothing.
-            let said = said.replace(&format!("error: {name}:"), &format!("error: {}:", if found.starts_with("error: rays:") { "rays" } else { name }));
+            let said = said.replace(
+                &format!("error: {name}:"),
+                &format!("error: {}:", if found.starts_with("error: rays:") { "rays" } else { name }),
+            );
             if found.escape_debug().to_string() != said.escape_debug().to_string() && status != "0" {
                 wrong.push(format!("{name}\n  found    {found}\n  expected {status} {said}"));
             }

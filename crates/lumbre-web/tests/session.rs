@@ -53,7 +53,9 @@ fn a_picture_has_the_pixels_of_a_png_of_the_facade() {
     std::fs::write(&path, SCENE).unwrap();
     let scene = lumbre::open(&path).unwrap().0;
     let picture = scene.render(&scene.options()).unwrap();
-    let png = picture.encode(lumbre::formats::image::ImageFormat::Png, &lumbre::SaveOptions::default(), &[]).unwrap();
+    let png = picture
+        .encode(lumbre::formats::image::ImageFormat::Png, &lumbre::SaveOptions::default(), &[])
+        .unwrap();
     std::fs::remove_dir_all(&folder).unwrap();
     let limits = lumbre::formats::Limits::default();
     let image = lumbre::read_image_from("scene.png", &png[..], limits).unwrap();
@@ -69,12 +71,14 @@ fn a_picture_has_the_pixels_of_a_png_of_the_facade() {
 
 #[test]
 fn a_mistake_has_its_place_and_words() {
-    let text = SCENE.replace("Shape \"sphere\"", "Shape \"spere\"");
+    let text = SCENE.replace("1.25", "-1.25");
     let files = held(&[("scene.pbrt", text.as_bytes())]);
     let problem = Session::open(files, "scene.pbrt", &Wanted::default()).unwrap_err();
     assert_eq!(problem.kind, ProblemKind::Input);
     assert_eq!((problem.file.as_deref(), problem.line), (Some("scene.pbrt"), Some(8)));
-    assert!(problem.message.starts_with("scene.pbrt:8:") && problem.message.contains("sphere"), "{problem}");
+    assert!(problem.message.starts_with("scene.pbrt:8:16: parameter \"radius\""), "{problem}");
+    let text = SCENE.replace("\"sphere\"", "\"spere\"");
+    assert!(open(&text).warnings()[0].contains("scene.pbrt:8:1: unknown shape \"spere\""), "{text}");
     let missing = Session::open(held(&[]), "scene.pbrt", &Wanted::default()).unwrap_err();
     assert_eq!(missing.kind, ProblemKind::Files);
 }
@@ -115,7 +119,9 @@ fn rays_are_answered_as_the_program_prints_them() {
     assert_eq!(session.cast(b"x,y,z\n0,0,3.25\n".to_vec(), "distance").unwrap(), "point,distance\n0,2.0\n");
     let problem = session.cast(b"ox,oy\n1,2\n".to_vec(), "closest").unwrap_err();
     assert!(problem.message.starts_with("rays:1:"), "{problem}");
-    assert!(session.cast(Vec::new(), "closet").unwrap_err().message.contains("expected one of: closest, any"));
+    assert!(
+        session.cast(Vec::new(), "closet").unwrap_err().message.contains("expected one of: closest, any")
+    );
 }
 
 #[test]

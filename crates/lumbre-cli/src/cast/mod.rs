@@ -204,7 +204,9 @@ impl Cast<'_> {
             }
             Ok(piece)
         };
-        let work = |piece: rays::Piece| Ok(answer(self.scene, self.query, self.form, piece.first_ray, &decoder.rays(&piece)?)?);
+        let work = |piece: rays::Piece| {
+            Ok(answer(self.scene, self.query, self.form, piece.first_ray, &decoder.rays(&piece)?)?)
+        };
         let done = pipeline::in_order(self.pool, next, work, |block| Ok(output.append(&block)?));
         match done {
             Ok(()) => output.finish(),

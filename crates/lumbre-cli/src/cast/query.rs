@@ -116,9 +116,9 @@ pub(super) fn answer(
                 }
             }
         }
-        Query::Inside => (first..)
-            .zip(rays)
-            .for_each(|(i, point)| block.push_flag(i, scene.is_inside(point.origin))),
+        Query::Inside => {
+            (first..).zip(rays).for_each(|(i, point)| block.push_flag(i, scene.is_inside(point.origin)))
+        }
         Query::Winding => {
             for (i, point) in (first..).zip(rays) {
                 block.push_real(i, scene.winding_number(point.origin)?);

@@ -122,7 +122,11 @@ pub fn calculate(text: &str, language: Language, as_json: bool, limit: usize) ->
     let mut session = Session::new(texts);
     let run = session.run(text, |outcome| {
         printed += &shown(&outcome, form);
-        if printed.len() <= limit { Ok(()) } else { Err(Failure::Limit(format!("more than {limit} bytes of answers"))) }
+        if printed.len() <= limit {
+            Ok(())
+        } else {
+            Err(Failure::Limit(format!("more than {limit} bytes of answers")))
+        }
     });
     match run {
         Ok(outcome) => outcome.map(|()| printed),

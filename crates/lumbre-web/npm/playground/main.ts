@@ -421,9 +421,9 @@ text.addEventListener("scroll", () => (at("lines").scrollTop = text.scrollTop));
 at("wrong-go").addEventListener("click", () => {
   const where = place();
   if (where === undefined) return;
-  const end = text.value.slice(where).search(/[\s"\]]|$/);
+  const token = /^(?:"[^"\n]*"?|[^\s"[\]]+|.)/.exec(text.value.slice(where))?.[0] ?? "";
   text.focus();
-  text.setSelectionRange(where, where + Math.max(1, end));
+  text.setSelectionRange(where, where + token.length);
   text.scrollTop = Math.max(0, 20 * ((wrong?.line ?? 1) - 6));
 });
 at("question").addEventListener("submit", (event) => {
