@@ -135,7 +135,7 @@ fn pixels_and_rays_are_explained_in_every_format() {
                 lang: Some(lang.to_owned()),
                 ..Explained::default()
             };
-            assert!(session.explain(&asked).unwrap().contains("1.5625"), "{format} has r²");
+            assert!(session.explain(&asked).unwrap().contains("1.25"), "{format} has the radius");
         }
     }
     let ray = |ray: &[f64]| Explained { ray: Some(ray.to_vec()), ..Explained::default() };

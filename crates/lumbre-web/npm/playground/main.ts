@@ -195,7 +195,10 @@ function bound(): void {
 function show(pass: { size: [number, number]; spp: number; target: number; stride: number; done: boolean }, pixels: Uint8ClampedArray<ArrayBuffer>): void {
   const [width, height] = pass.size;
   if (pixels.length !== 4 * width * height) return;
-  if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+  if (canvas.width !== width || canvas.height !== height) {
+    [canvas.width, canvas.height] = [width, height];
+    fit();
+  }
   context.putImageData(new ImageData(pixels, width, height), 0, 0);
   state.passes++;
   state.done = pass.done;
@@ -204,6 +207,15 @@ function show(pass: { size: [number, number]; spp: number; target: number; strid
   if (pass.done) say("done", pass.spp, width, height, seconds);
   else if (pass.spp > 0) say("rendering", pass.spp, pass.target);
 }
+
+/** Shows each pixel of a small picture as a square of several, so that one can be met. */
+function fit(): void {
+  const room = at("picture-side").clientWidth;
+  const times = Math.floor(Math.min(room / canvas.width, (0.6 * innerHeight) / canvas.height));
+  canvas.classList.toggle("large", times > 1);
+  canvas.style.width = times > 1 ? `${times * canvas.width}px` : "";
+}
+window.addEventListener("resize", fit);
 
 // --- Explanations.
 
