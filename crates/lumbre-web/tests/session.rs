@@ -51,7 +51,7 @@ fn a_picture_has_the_pixels_of_a_png_of_the_facade() {
     std::fs::create_dir_all(&folder).unwrap();
     let path = folder.join("scene.pbrt");
     std::fs::write(&path, SCENE).unwrap();
-    let scene = lumbre::open(&path).unwrap().0;
+    let scene = lumbre::open(&path).unwrap();
     let picture = scene.render(&scene.options()).unwrap();
     let png = picture
         .encode(lumbre::formats::image::ImageFormat::Png, &lumbre::SaveOptions::default(), &[])

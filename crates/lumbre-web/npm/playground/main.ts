@@ -136,6 +136,8 @@ const toProblem = (error: unknown): Problem =>
 
 let busy = false;
 let again = false;
+/** How often an explanation was asked for. */
+let asked = 0;
 
 /** Opens the scene as it stands; while one is being opened, the last that is asked for waits. */
 async function open(): Promise<void> {
@@ -188,7 +190,8 @@ function bound(): void {
   for (const [id, size] of [["x", state.width], ["y", state.height]] as const) {
     const input = at<HTMLInputElement>(id);
     input.max = String(size - 1);
-    if (Number(input.value) >= size) input.value = String(size - 1);
+    // The middle, until a pixel is chosen that there is.
+    if (asked === 0 || Number(input.value) >= size) input.value = String(Math.floor(size / 2));
   }
 }
 
@@ -218,8 +221,6 @@ function fit(): void {
 window.addEventListener("resize", fit);
 
 // --- Explanations.
-
-let asked = 0;
 
 async function explain(x: number, y: number): Promise<void> {
   if (!renderer) return;

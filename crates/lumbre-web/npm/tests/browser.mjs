@@ -250,7 +250,7 @@ const tests = {
     await page.selectOption("#format", "text");
     await page.click("#explain");
     await page.waitForSelector("#answer pre");
-    assert.equal(await page.textContent("#answer pre"), native(SCENE, "--pixel", "0,0", "--lang", "es"));
+    assert.equal(await page.textContent("#answer pre"), native(SCENE, "--pixel", "48,32", "--lang", "es"));
     await shot(page, "spanish");
     await page.context().close();
   },
