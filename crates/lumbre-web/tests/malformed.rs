@@ -72,12 +72,13 @@ fn every_malformed_file_is_refused_in_the_words_of_the_program() {
                 Ok(warnings) => warnings.first().cloned().unwrap_or_default(),
                 Err(problem) => format!("error: {}", problem.message.lines().next().unwrap_or_default()),
             };
-            // A list of rays has no name of its own, and what is no error is a warning or nothing.
-            let said = said.replace(
-                &format!("error: {name}:"),
-                &format!("error: {}:", if found.starts_with("error: rays:") { "rays" } else { name }),
-            );
-            if found.escape_debug().to_string() != said.escape_debug().to_string() && status != "0" {
+            // A list of rays has no name of its own, and no system says of files in memory that they are missing.
+            let is_of_rays = name.ends_with(".csv") || name.ends_with(".npy");
+            let front = |name: &str| format!("error: {name}:");
+            let said = if is_of_rays { said.replace(&front(name), &front("rays")) } else { said.to_owned() };
+            let said = said
+                .replace("No such file or directory (os error 2)", "no such file among those that are held");
+            if found != said && status != "0" {
                 wrong.push(format!("{name}\n  found    {found}\n  expected {status} {said}"));
             }
         }
