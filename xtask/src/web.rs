@@ -125,7 +125,9 @@ fn build() -> Result<()> {
         Some(Compiler::Rustup) => run_with("cargo", &plain, &environment)?,
         _ => {
             let own = [&plain[..], &["-Zbuild-std=std,panic_abort"]].concat();
-            let environment = [&environment[..], &DEBIAN].concat();
+            // Debian has no rust-lld.
+            let linker = [("CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER", "wasm-ld")];
+            let environment = [&environment[..], &DEBIAN, &linker].concat();
             run_with("/usr/bin/cargo", &own, &environment)?;
         }
     }
