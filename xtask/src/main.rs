@@ -21,6 +21,7 @@ mod proof;
 mod python;
 mod race;
 mod suite;
+mod web;
 mod wine;
 
 #[derive(Parser)]
@@ -55,6 +56,9 @@ enum Task {
     /// Makes what is handed out into target/dist: the program for each platform, wheels, a Debian package, the book, a list of what they are
     /// made of, and sums. What cannot be made on this machine is named, with what it lacks.
     Dist(dist::Dist),
+    /// Lumbre for the browser: makes the npm package and the playground in target/web, and tries both. Says what it needs where that is
+    /// missing.
+    Web(web::Web),
     /// Renders every scene under scenes/ to the picture beside it.
     Scenes {
         /// Only scenes whose path contains this.
@@ -120,6 +124,7 @@ fn main() -> Result<()> {
         Task::Book(book) => book.run(),
         Task::Bytes(bytes) => bytes.run(),
         Task::Dist(dist) => dist.run(),
+        Task::Web(wanted) => web::make(&wanted),
         Task::Scenes { filter } => pictures::render_all(filter.as_deref()),
         Task::Assets(passed) => passed.hand_to_pictures("assets"),
         Task::Contact(passed) => passed.hand_to_pictures("contact"),

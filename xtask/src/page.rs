@@ -33,7 +33,7 @@ pub(crate) fn run() -> Result<()> {
 }
 
 /// Chromium, as `CHROMIUM` names it, or as it is found on the path.
-fn browser() -> Option<PathBuf> {
+pub(crate) fn browser() -> Option<PathBuf> {
     if let Some(named) = std::env::var_os("CHROMIUM") {
         return Some(named.into());
     }

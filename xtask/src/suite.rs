@@ -3,7 +3,7 @@
 use anyhow::Result;
 use xtask::command::{self, root, run_with, succeeds};
 
-use crate::{arm, book, bytes, page, proof, python, wine};
+use crate::{arm, book, bytes, page, proof, python, web, wine};
 
 /// The version of cargo-deny that the gate was written for.
 const CARGO_DENY: &str = "0.20.2";
@@ -20,6 +20,7 @@ pub(crate) fn run() -> Result<()> {
     command::run("cargo", &["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"])?;
     command::run("cargo", &["test", "--workspace", "--all-targets"])?;
     page::run()?;
+    web::check()?;
     book::test()?;
     bytes::test(&[])?;
     arm::test()?;
@@ -77,6 +78,8 @@ fn package() -> Result<()> {
         "lumbre-dev",
         "--exclude",
         "lumbre-python",
+        "--exclude",
+        "lumbre-web",
     ];
     command::run("cargo", &[&arguments[..], &["--no-verify", "--allow-dirty", "--quiet"]].concat())
 }

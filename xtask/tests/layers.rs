@@ -15,7 +15,7 @@ const LAYERS: &[(u32, &[&str])] = &[
     (6, &["lumbre"]),
     (7, &["lumbre-viewer", "xtask"]),
     (8, &["lumbre-cli"]),
-    (9, &["lumbre-dev", "lumbre-python"]),
+    (9, &["lumbre-dev", "lumbre-python", "lumbre-web"]),
 ];
 
 /// Layers whose crates do no input or output: no crate there may depend on these.

@@ -54,6 +54,12 @@ impl Failure {
     }
 }
 
+impl From<lumbre::Error> for Failure {
+    fn from(error: lumbre::Error) -> Self {
+        Self::of_kind(error.kind(), error.to_string())
+    }
+}
+
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -18,61 +18,108 @@
 //! `transport/journal.rs`). `Accel::target` says which shape was hit, and under which transforms. `explain/document.rs`
 //! holds sections of quantities; `english.rs` and `spanish.rs` have the words, `formula.rs` puts numbers into formulas,
 //! `writing.rs` and `html.rs` write them.
+//!
+//! # WebAssembly
+//!
+//! There the library has what needs no system: the answers of cast, explain and math.
 
+#![cfg_attr(
+    target_family = "wasm",
+    allow(dead_code, reason = "the arguments of commands are not parsed there")
+)]
+
+#[cfg(not(target_family = "wasm"))]
 use std::ffi::OsString;
 
+#[cfg(not(target_family = "wasm"))]
 use clap::{CommandFactory, Parser, Subcommand};
+#[cfg(not(target_family = "wasm"))]
 use lumbre_simd::InstructionSet;
 
 /// Prints a message to standard error, ignoring errors.
+#[cfg(not(target_family = "wasm"))]
 macro_rules! say {
     ($($what:tt)*) => { $crate::console::tell(&format!($($what)*)) };
 }
 
 mod cast;
+#[cfg(not(target_family = "wasm"))]
 mod checkpoint;
+#[cfg(not(target_family = "wasm"))]
 mod completions;
 mod console;
 mod defaults;
+#[cfg(not(target_family = "wasm"))]
 mod denoiser;
+#[cfg(not(target_family = "wasm"))]
 mod diff;
 mod explain;
 mod failure;
+#[cfg(not(target_family = "wasm"))]
 mod farm;
+#[cfg(not(target_family = "wasm"))]
 mod info;
 mod language;
 mod math;
+#[cfg(not(target_family = "wasm"))]
 mod memory;
+#[cfg(not(target_family = "wasm"))]
 mod merge;
+#[cfg(not(target_family = "wasm"))]
 mod names;
+#[cfg(not(target_family = "wasm"))]
 mod oidn;
+#[cfg(not(target_family = "wasm"))]
 mod output;
+#[cfg(not(target_family = "wasm"))]
 mod povray;
+#[cfg(not(target_family = "wasm"))]
 mod preview;
+#[cfg(not(target_family = "wasm"))]
 mod progress;
+#[cfg(not(target_family = "wasm"))]
 mod reading;
+#[cfg(not(target_family = "wasm"))]
 mod render;
+#[cfg(not(target_family = "wasm"))]
 mod report;
+#[cfg(not(target_family = "wasm"))]
 mod short_help;
+#[cfg(not(target_family = "wasm"))]
 mod shown;
+#[cfg(not(target_family = "wasm"))]
 mod signals;
+#[cfg(not(target_family = "wasm"))]
 mod spanish;
+#[cfg(not(target_family = "wasm"))]
 mod staging;
+#[cfg(not(target_family = "wasm"))]
 mod tev;
+#[cfg(not(target_family = "wasm"))]
 mod threads;
+#[cfg(not(target_family = "wasm"))]
 mod tips;
 mod units;
+#[cfg(not(target_family = "wasm"))]
 mod verb;
+#[cfg(not(target_family = "wasm"))]
 mod view;
+#[cfg(not(target_family = "wasm"))]
 mod viewing;
 
+pub use cast::{Query, cast};
 pub use defaults::Defaults;
-pub use explain::{Explainer, Format, Request, SceneNames, explain};
+#[cfg(not(target_family = "wasm"))]
+pub use explain::Explainer;
+pub use explain::{Format, Request, SceneNames, explain};
 pub use failure::Failure;
 pub use language::Language;
+pub use math::calculate;
+#[cfg(not(target_family = "wasm"))]
 pub use memory::{check_picture, memory_left};
 
 /// Renders scenes, casts rays into them, says what is in them, and compares and joins pictures.
+#[cfg(not(target_family = "wasm"))]
 #[derive(Parser)]
 #[command(name = "lumbre", version, about, max_term_width = 110)]
 #[command(
@@ -97,6 +144,7 @@ struct Arguments {
     command: Command,
 }
 
+#[cfg(not(target_family = "wasm"))]
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::Arguments>),
@@ -113,6 +161,7 @@ enum Command {
 }
 
 /// Runs the program with these words, the first of which is its own name, and returns its exit status. Signals end the process.
+#[cfg(not(target_family = "wasm"))]
 pub fn run(words: Vec<OsString>) -> u8 {
     let words = verb::with_render(words, &Arguments::command());
     let words = match povray::translated(words) {

@@ -414,12 +414,6 @@ pub(crate) fn print_warnings(diagnostics: &Diagnostics) {
     }
 }
 
-impl From<Error> for Failure {
-    fn from(error: Error) -> Self {
-        Self::of_kind(error.kind(), error.to_string())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::Frames;

@@ -5,9 +5,11 @@
 use std::mem::size_of;
 use std::path::{Component, Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use thiserror::Error;
+
+use crate::held::HeldFiles;
 
 /// The limits on reading, each with the flag that raises it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -108,6 +110,8 @@ pub struct Budget {
     only: Option<Vec<PathBuf>>,
     /// The folder in which any file may be opened besides these.
     folder: Option<PathBuf>,
+    /// The files that there are; `None` for those of the system.
+    held: Option<Arc<HeldFiles>>,
 }
 
 impl Budget {
@@ -152,9 +156,44 @@ impl Budget {
         is_inside || only.iter().any(|known| known == path)
     }
 
-    /// Whether there is a file of this name that may be opened: of others nothing is said, not even whether they are there.
-    pub fn has(&self, path: &Path) -> bool {
-        self.allows(path) && path.exists()
+    /// Takes these files in place of the system's, which then are neither opened nor looked for.
+    #[must_use]
+    pub fn of_held(self, files: Option<Arc<HeldFiles>>) -> Self {
+        Self { held: files, ..self }
+    }
+
+    /// The files that there are; `None` for those of the system.
+    pub(crate) fn held(&self) -> Option<&HeldFiles> {
+        self.held.as_deref()
+    }
+
+    /// Whether there is a file of this name that may be opened, and no folder. Of others nothing is said, not even whether they exist.
+    pub(crate) fn is_file(&self, path: &Path) -> bool {
+        match self.held() {
+            Some(files) => files.get(path).is_some(),
+            None => self.allows(path) && path.is_file(),
+        }
+    }
+
+    /// Whether there is anything of this name that may be opened.
+    pub(crate) fn exists(&self, path: &Path) -> bool {
+        match self.held() {
+            Some(files) => files.get(path).is_some(),
+            None => self.allows(path) && path.exists(),
+        }
+    }
+
+    /// Whether there is a folder of this name that may be opened.
+    pub(crate) fn is_folder(&self, path: &Path) -> bool {
+        self.held.is_none() && self.allows(path) && path.is_dir()
+    }
+
+    /// The one name of a file among all that lead to it; `None` where there is no such file that may be opened.
+    pub(crate) fn canonical(&self, path: &Path) -> Option<PathBuf> {
+        match self.held() {
+            Some(files) => files.canonical(path),
+            None => path.canonicalize().ok().filter(|_| self.allows(path)),
+        }
     }
 
     /// Its limits.

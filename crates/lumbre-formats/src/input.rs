@@ -37,11 +37,21 @@ impl<'b> Input<'b> {
             return Err(FormatError::io(path, "cannot read", alone));
         }
         budget.path(path)?;
-        let (file, size) = open_regular(path)?;
         let mut bytes = Vec::new();
         let mut hold = budget.hold(0, &name)?;
-        read_within(file, size, &mut bytes, &mut hold, &name, |_| Ok(()))
-            .map_err(|e| e.into_format_error(path, &name))?;
+        let read = match budget.held() {
+            Some(files) => {
+                let missing =
+                    || io::Error::new(io::ErrorKind::NotFound, "no such file among those that are held");
+                let file = files.get(path).ok_or_else(|| FormatError::io(path, "cannot open", missing()))?;
+                read_within(&file[..], file.len() as u64, &mut bytes, &mut hold, &name, |_| Ok(()))
+            }
+            None => {
+                let (file, size) = open_regular(path)?;
+                read_within(file, size, &mut bytes, &mut hold, &name, |_| Ok(()))
+            }
+        };
+        read.map_err(|e| e.into_format_error(path, &name))?;
         let input = Self { name, bytes, hold };
         if input.bytes.starts_with(&[0x1F, 0x8B]) { input.unpacked(path, budget) } else { Ok(input) }
     }
@@ -439,7 +449,8 @@ pub(crate) mod tests {
         let budget = Budget::default().only([]).and_in(folder.clone());
         assert_eq!(&*Input::open(&folder.join("parts/own.bin"), &budget).unwrap(), b"bytes");
         assert!(
-            budget.has(&folder.join("parts/own.bin")) && budget.has(&folder.join("parts/../parts/./own.bin"))
+            budget.exists(&folder.join("parts/own.bin"))
+                && budget.exists(&folder.join("parts/../parts/./own.bin"))
         );
         let absent = Input::open(&folder.join("absent.bin"), &budget).unwrap_err();
         assert!(absent.to_string().contains("cannot open"), "{absent}");
@@ -447,7 +458,7 @@ pub(crate) mod tests {
             let path = folder.join(way);
             let error = Input::open(&path, &budget).unwrap_err();
             assert!(error.to_string().contains("no files but its own"), "{way}: {error}");
-            assert!(!budget.has(&path), "{way}");
+            assert!(!budget.exists(&path), "{way}");
         }
         for path in [dir.path().join("other.bin"), "/etc/passwd".into(), "parts/own.bin".into()] {
             assert!(!budget.allows(&path), "{}", path.display());

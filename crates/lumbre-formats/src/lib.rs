@@ -11,6 +11,7 @@ mod contained;
 mod devices;
 pub mod diagnostic;
 pub mod gltf;
+mod held;
 pub mod ies;
 pub mod image;
 pub mod input;
@@ -34,6 +35,7 @@ pub use atomic::{abandon_writes, atomic_write, atomic_write_seek, probe_writable
 pub use budget::{Budget, BudgetVec, Hold, LimitError, LimitKind, Limits};
 pub use devices::is_device_name;
 pub use diagnostic::{Diagnostic, Diagnostics, FormatError, Place, Position, Severity, Strictness};
+pub use held::HeldFiles;
 pub use input::{Input, open_regular};
 pub use input_stream::InputStream;
 pub use open::{ReadOptions, SceneFormat, check_scene_file, open_scene, open_scenes};

@@ -11,7 +11,8 @@ use crate::obj::obj_scene;
 use crate::ply::ply_scene;
 use crate::stl::stl_scene;
 use crate::{
-    Budget, Diagnostic, Diagnostics, FormatError, Input, Limits, Place, Strictness, open_regular, pbrt,
+    Budget, Diagnostic, Diagnostics, FormatError, HeldFiles, Input, Limits, Place, Strictness, open_regular,
+    pbrt,
 };
 
 /// Options of reading a scene.
@@ -38,6 +39,8 @@ pub struct ReadOptions {
     pub is_alone: bool,
     /// A folder, besides, whose files it may use all the same: one that holds no links.
     pub folder: Option<PathBuf>,
+    /// The files in place of the system's; `None` for those of the system.
+    pub held: Option<Arc<HeldFiles>>,
 }
 
 /// The supported scene formats.
@@ -145,7 +148,7 @@ pub fn open_scenes(
     paths: &[impl AsRef<Path>],
     options: &ReadOptions,
 ) -> Result<(SceneDesc, Diagnostics), FormatError> {
-    let mut budget = Budget::new(options.limits);
+    let mut budget = Budget::new(options.limits).of_held(options.held.clone());
     if options.is_alone {
         budget = budget.only(paths.iter().map(|path| path.as_ref().to_owned()));
         if let Some(folder) = &options.folder {
@@ -202,14 +205,14 @@ impl<'p, 'b> Source<'p, 'b> {
         if let Some(format) = by_name {
             return Ok(Self { path, format, input: None });
         }
-        if !is_standard_input && path.is_dir() {
+        if !is_standard_input && budget.is_folder(path) {
             return Err(folder(path));
         }
         let is_elsewhere = OTHERS.iter().any(|(endings, _)| has_ending(path, endings));
         // Whether or not there is such a file, its name does not say what it is.
-        if !is_standard_input && options.format.is_none() && (!path.is_file() || is_elsewhere) {
+        if !is_standard_input && options.format.is_none() && (!budget.is_file(path) || is_elsewhere) {
             // A name that says enough, and there is no such file: that is said first.
-            if is_elsewhere && !path.exists() {
+            if is_elsewhere && !budget.exists(path) {
                 Input::open(path, budget)?;
             }
             return Err(unknown(path, path.display().to_string().into()));

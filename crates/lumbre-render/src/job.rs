@@ -3,10 +3,11 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use lumbre_math::{DVec3, Elementary};
 use lumbre_scene::{FilmKind, Scene, View};
+use web_time::Instant;
 
 use crate::adaptive::{self, Adaptive};
 use crate::clock::Clock;

@@ -1,8 +1,7 @@
 //! A small picture of the whole film, taken before a render to a noise target.
 
-use std::time::Instant;
-
 use lumbre_scene::{FilmKind, Scene};
+use web_time::Instant;
 
 use crate::film::MAX_LUMINANCE;
 use crate::integrators::Integrator;

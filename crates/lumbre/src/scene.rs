@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use lumbre_formats::{Diagnostic, Diagnostics, FormatError, Place, ReadOptions, open_scenes};
 use lumbre_geometry::Ray;
@@ -16,6 +16,7 @@ use lumbre_render::{
 };
 use lumbre_scene::{BuildWarning, Footprint, IntegratorKind, SceneDesc};
 use lumbre_shading::Spectrum;
+use web_time::Instant;
 
 use crate::{CastHit, CastPoint, Error, Picture, SceneInfo};
 

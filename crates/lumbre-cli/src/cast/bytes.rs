@@ -33,9 +33,12 @@ impl Bytes {
         Self { reader: BufReader::with_capacity(1 << 18, Cursor::new(Vec::new()).chain(stream)) }
     }
 
-    #[cfg(test)]
-    pub(super) fn from_reader(name: &str, reader: impl Read + 'static) -> Self {
-        Self::new(InputStream::from_reader(name, reader, Limits::default()).unwrap())
+    /// Bytes that come from elsewhere, under a name for messages.
+    ///
+    /// # Errors
+    /// [`Failure`] when they cannot be read.
+    pub(super) fn from_reader(name: &str, reader: impl Read + 'static) -> Result<Self, Failure> {
+        Ok(Self::new(InputStream::from_reader(name, reader, Limits::default()).map_err(failure)?))
     }
 
     /// Whether these come first; nothing may have been read before.

@@ -1,12 +1,17 @@
 //! `lumbre cast`: what rays hit.
 
+#[cfg(not(target_family = "wasm"))]
 use std::io::{self, ErrorKind, Write};
-use std::ops::ControlFlow;
+#[cfg(not(target_family = "wasm"))]
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+#[cfg(not(target_family = "wasm"))]
+use clap::Args;
+#[cfg(not(target_family = "wasm"))]
 use lumbre::formats::{atomic_write, atomic_write_seek};
-use lumbre::{CancelToken, Ray, Scene};
+#[cfg(not(target_family = "wasm"))]
+use lumbre::{CancelToken, Scene};
+#[cfg(not(target_family = "wasm"))]
 use rayon::ThreadPool;
 
 mod answers;
@@ -14,23 +19,38 @@ mod array;
 mod bytes;
 mod csv;
 mod npy;
+#[cfg(not(target_family = "wasm"))]
 mod output;
+#[cfg(not(target_family = "wasm"))]
 mod pipeline;
+mod query;
 mod rays;
 #[cfg(test)]
 mod tests;
 
-use answers::{Block, Form, Table};
+#[cfg(not(target_family = "wasm"))]
+use answers::Form;
+#[cfg(not(target_family = "wasm"))]
 use output::Output;
-use rays::{RayReader, Rows};
+#[cfg(not(target_family = "wasm"))]
+use query::answer;
+pub use query::{Query, cast};
+#[cfg(not(target_family = "wasm"))]
+use rays::RayReader;
 
+#[cfg(not(target_family = "wasm"))]
 use crate::failure::Failure;
+#[cfg(not(target_family = "wasm"))]
 use crate::output::{Inputs, Replaced};
+#[cfg(not(target_family = "wasm"))]
 use crate::progress::RayProgress;
+#[cfg(not(target_family = "wasm"))]
 use crate::reading::{ReadingArguments, print_warnings};
+#[cfg(not(target_family = "wasm"))]
 use crate::signals::Signals;
 
 /// Casts rays into a scene, or asks what is at points, in double precision.
+#[cfg(not(target_family = "wasm"))]
 #[derive(Args)]
 #[command(after_help = "Examples:
   lumbre cast scene.pbrt --rays rays.csv
@@ -66,27 +86,8 @@ pub(crate) struct Arguments {
     reading: ReadingArguments,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Query {
-    /// The first hit.
-    Closest,
-    /// Whether there is a hit.
-    Any,
-    /// Every hit, by t.
-    All,
-    /// How many hits there are.
-    Count,
-    /// Of a point: the nearest point of all surfaces.
-    ClosestPoint,
-    /// Of a point: how far away that is.
-    Distance,
-    /// Of a point: whether it is inside of what stands there.
-    Inside,
-    /// Of a point: how often surfaces wind around it, 1 within a closed body.
-    Winding,
-}
-
 /// Runs the command.
+#[cfg(not(target_family = "wasm"))]
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let form = match arguments.output.as_deref().map(Path::extension) {
         None => Form::Csv,
@@ -141,39 +142,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     done
 }
 
-impl Query {
-    /// What there is a line of for each answer.
-    fn table(self) -> Table {
-        match self {
-            Self::Closest | Self::All => Table::Hits,
-            Self::Any => Table::Numbers("hit"),
-            Self::Count => Table::Numbers("count"),
-            Self::ClosestPoint => Table::Nearest,
-            Self::Distance => Table::Reals("distance"),
-            Self::Inside => Table::Flags("inside"),
-            Self::Winding => Table::Reals("winding"),
-        }
-    }
-
-    /// What it is asked of.
-    fn rows(self) -> Rows {
-        match self {
-            Self::Closest | Self::Any | Self::All | Self::Count => Rows::Rays,
-            Self::ClosestPoint | Self::Distance | Self::Inside | Self::Winding => Rows::Points,
-        }
-    }
-
-    /// How many rays to work on at a time: enough for batches, and few where each may have many answers.
-    fn at_a_time(self) -> usize {
-        match self {
-            Self::Closest | Self::Any => 4096,
-            Self::Count => 1024,
-            Self::All | Self::ClosestPoint | Self::Distance | Self::Inside | Self::Winding => 256,
-        }
-    }
-}
-
 /// What is asked, and how.
+#[cfg(not(target_family = "wasm"))]
 struct Cast<'a> {
     scene: &'a Scene,
     query: Query,
@@ -184,6 +154,7 @@ struct Cast<'a> {
     at_a_time: usize,
 }
 
+#[cfg(not(target_family = "wasm"))]
 impl Cast<'_> {
     fn to_standard_output(&self, rays: RayReader) -> Result<(), Failure> {
         let mut failure = None;
@@ -233,7 +204,9 @@ impl Cast<'_> {
             }
             Ok(piece)
         };
-        let work = |piece: rays::Piece| Ok(self.answer(piece.first_ray, &decoder.rays(&piece)?)?);
+        let work = |piece: rays::Piece| {
+            Ok(answer(self.scene, self.query, self.form, piece.first_ray, &decoder.rays(&piece)?)?)
+        };
         let done = pipeline::in_order(self.pool, next, work, |block| Ok(output.append(&block)?));
         match done {
             Ok(()) => output.finish(),
@@ -244,65 +217,23 @@ impl Cast<'_> {
             }
         }
     }
-
-    /// # Errors
-    /// Where there is no answer for a point.
-    fn answer(&self, first: u64, rays: &[Ray]) -> Result<Block, Failure> {
-        let mut block = Block::new(self.form, self.query.table());
-        match self.query {
-            Query::Closest => {
-                let hits = self.scene.closest_batch(rays);
-                (first..).zip(&hits).for_each(|(ray, hit)| block.push_hit(ray, hit.as_ref()));
-            }
-            Query::Any => {
-                let hits = self.scene.any_batch(rays);
-                (first..).zip(hits).for_each(|(ray, hit)| block.push_number(ray, u64::from(hit)));
-            }
-            Query::All => (first..).zip(rays).for_each(|(i, ray)| {
-                self.scene.all(ray, |hit| {
-                    block.push_hit(i, Some(&hit));
-                    ControlFlow::Continue(())
-                });
-            }),
-            Query::Count => {
-                (first..).zip(rays).for_each(|(i, ray)| block.push_number(i, self.scene.count(ray) as u64))
-            }
-            Query::ClosestPoint | Query::Distance => {
-                for (i, point) in (first..).zip(rays) {
-                    let nearest = self.scene.closest_point(point.origin, f64::INFINITY)?;
-                    match self.query {
-                        Query::Distance => {
-                            block.push_real(i, nearest.map_or(f64::INFINITY, |nearest| nearest.distance));
-                        }
-                        _ => block.push_nearest(i, nearest.as_ref()),
-                    }
-                }
-            }
-            Query::Inside => (first..)
-                .zip(rays)
-                .for_each(|(i, point)| block.push_flag(i, self.scene.is_inside(point.origin))),
-            Query::Winding => {
-                for (i, point) in (first..).zip(rays) {
-                    block.push_real(i, self.scene.winding_number(point.origin)?);
-                }
-            }
-        }
-        Ok(block)
-    }
 }
 
 /// Why not all rays were answered.
+#[cfg(not(target_family = "wasm"))]
 enum Stop {
     Writing(io::Error),
     Failure(Failure),
 }
 
+#[cfg(not(target_family = "wasm"))]
 impl From<io::Error> for Stop {
     fn from(error: io::Error) -> Self {
         Self::Writing(error)
     }
 }
 
+#[cfg(not(target_family = "wasm"))]
 impl From<Failure> for Stop {
     fn from(failure: Failure) -> Self {
         Self::Failure(failure)

@@ -167,7 +167,7 @@ mod tests {
     }
 
     fn read_rows(rows: Rows, name: &str, bytes: &[u8], most: usize) -> Result<Vec<Ray>, String> {
-        let bytes = Bytes::from_reader(name, Pipe(Cursor::new(bytes.to_vec())));
+        let bytes = Bytes::from_reader(name, Pipe(Cursor::new(bytes.to_vec()))).unwrap();
         let all = || -> Result<Vec<Ray>, Failure> {
             let mut reader = RayReader::new(bytes, rows)?;
             let decoder = reader.decoder();

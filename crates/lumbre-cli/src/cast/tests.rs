@@ -5,6 +5,7 @@ use std::io::{Cursor, Read, Seek};
 
 use super::*;
 use crate::cast::bytes::Bytes;
+use crate::cast::rays::Rows;
 
 const QUERIES: [Query; 8] = [
     Query::Closest,
@@ -54,7 +55,7 @@ fn points() -> String {
 }
 
 fn reader(query: Query, text: String) -> RayReader {
-    let bytes = Bytes::from_reader("rays.csv", Cursor::new(text.into_bytes()));
+    let bytes = Bytes::from_reader("rays.csv", Cursor::new(text.into_bytes())).unwrap();
     RayReader::new(bytes, query.rows()).unwrap()
 }
 

@@ -1,29 +1,43 @@
 //! `lumbre explain`: every number between a pixel or a ray and its colour.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+#[cfg(not(target_family = "wasm"))]
+use std::path::PathBuf;
 
 use clap::Args;
+#[cfg(not(target_family = "wasm"))]
 use lumbre::description::IntegratorKind;
+#[cfg(not(target_family = "wasm"))]
 use lumbre::formats::atomic_write;
 use lumbre::{DVec3, Ray, RenderOptions, Scene};
 use serde_json::json;
 
 use crate::console::{escaped_json, escaped_lines};
-use crate::failure::{Failure, print};
+use crate::failure::Failure;
+#[cfg(not(target_family = "wasm"))]
+use crate::failure::print;
 use crate::language::{Language, filled};
+#[cfg(not(target_family = "wasm"))]
 use crate::names::one_of;
+#[cfg(not(target_family = "wasm"))]
 use crate::output::Inputs;
+#[cfg(not(target_family = "wasm"))]
 use crate::reading::{ReadingArguments, print_warnings};
+#[cfg(not(target_family = "wasm"))]
 use crate::shown::{PreparedScene, SceneRequest, shown};
+#[cfg(not(target_family = "wasm"))]
 use crate::staging::StagingArguments;
+#[cfg(not(target_family = "wasm"))]
 use crate::units;
+#[cfg(not(target_family = "wasm"))]
 use crate::view::ViewArguments;
 
 mod along;
 mod camera;
 mod document;
 mod english;
+#[cfg(not(target_family = "wasm"))]
 mod explainer;
 mod figure;
 mod formula;
@@ -44,6 +58,7 @@ mod writing;
 
 use document::Section;
 use english::ENGLISH;
+#[cfg(not(target_family = "wasm"))]
 pub use explainer::Explainer;
 use question::Question;
 use spanish::SPANISH;
@@ -53,6 +68,7 @@ pub use things::SceneNames;
 
 /// Tells how the colour of a pixel, or the light along a ray, comes about: the camera and its ray, every surface on the way with the
 /// equation of its crossings, normals, lights and shadows, and the path of one sample, with all numbers as the render computes them.
+#[cfg(not(target_family = "wasm"))]
 #[derive(Args)]
 #[command(after_help = "Examples:
   lumbre explain scene.pbrt --pixel 320,240
@@ -182,6 +198,7 @@ fn ray(text: &str) -> Result<Ray, String> {
 }
 
 /// Runs the command.
+#[cfg(not(target_family = "wasm"))]
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.staging.turntable().is_some() {
         return Err(Failure::Usage(texts(arguments.request.lang).no_turntable.to_owned()));

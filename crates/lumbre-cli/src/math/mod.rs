@@ -1,13 +1,18 @@
 //! `lumbre math`: vectors, matrices, transforms, cameras and quaternions, step by step.
 
+#[cfg(not(target_family = "wasm"))]
 use std::ffi::OsString;
+#[cfg(not(target_family = "wasm"))]
 use std::path::{Path, PathBuf};
 
+#[cfg(not(target_family = "wasm"))]
 use clap::Args;
 use lumbre::formats::diagnostic::{Diagnostic, Place, quoted};
 use serde_json::json;
 
-use crate::failure::{Failure, print};
+use crate::failure::Failure;
+#[cfg(not(target_family = "wasm"))]
+use crate::failure::print;
 use crate::language::{Language, filled};
 
 mod cameras;
@@ -17,6 +22,7 @@ mod lexer;
 mod matrices;
 mod numbers;
 mod operators;
+#[cfg(not(target_family = "wasm"))]
 mod prompt;
 mod quaternions;
 mod session;
@@ -36,6 +42,7 @@ use spanish::SPANISH;
 use texts::Texts;
 
 /// Evaluates vectors, matrices, transforms, cameras and quaternions, step by step.
+#[cfg(not(target_family = "wasm"))]
 #[derive(Args)]
 #[command(after_help = "Examples:
   lumbre math 'cross([1, 2, 2], [2, -1, 2])'
@@ -65,6 +72,7 @@ pub(crate) struct Arguments {
 }
 
 /// Puts a space before what begins with a single minus: it is part of an expression and no option.
+#[cfg(not(target_family = "wasm"))]
 pub(crate) fn with_negative_expressions(mut words: Vec<OsString>) -> Vec<OsString> {
     if words.get(1).is_some_and(|verb| verb == "math") {
         for word in &mut words[2..] {
@@ -80,6 +88,7 @@ pub(crate) fn with_negative_expressions(mut words: Vec<OsString>) -> Vec<OsStrin
 }
 
 /// Runs the command.
+#[cfg(not(target_family = "wasm"))]
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let texts = arguments.lang.choose(&ENGLISH, &SPANISH);
     let mut session = Session::new(texts);
@@ -101,6 +110,30 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .map_err(|wrong| Failure::Usage(message(texts.expression, text, &wrong, texts)))
 }
 
+/// Evaluates an expression and returns what `lumbre math` prints of it, as text or as JSON.
+///
+/// # Errors
+/// [`Failure::Usage`] with the place of a mistake, and [`Failure::Limit`] where more would be printed than `limit` bytes.
+pub fn calculate(text: &str, language: Language, as_json: bool, limit: usize) -> Result<String, Failure> {
+    let texts = language.choose(&ENGLISH, &SPANISH);
+    let form = if as_json { Form::Json } else { Form::Text };
+    let text = text.trim_start();
+    let mut printed = String::new();
+    let mut session = Session::new(texts);
+    let run = session.run(text, |outcome| {
+        printed += &shown(&outcome, form);
+        if printed.len() <= limit {
+            Ok(())
+        } else {
+            Err(Failure::Limit(format!("more than {limit} bytes of answers")))
+        }
+    });
+    match run {
+        Ok(outcome) => outcome.map(|()| printed),
+        Err(wrong) => Err(Failure::Usage(message(texts.expression, text, &wrong, texts))),
+    }
+}
+
 /// How results are printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Form {
@@ -108,6 +141,7 @@ enum Form {
     Json,
 }
 
+#[cfg(not(target_family = "wasm"))]
 fn read(path: &Path, texts: &Texts) -> Result<String, Failure> {
     let failed = |e: std::io::Error| match e.kind() {
         std::io::ErrorKind::InvalidData => Failure::Input(format!("{}: {}", path.display(), texts.not_utf8)),
@@ -127,6 +161,7 @@ fn read(path: &Path, texts: &Texts) -> Result<String, Failure> {
 ///
 /// # Errors
 /// The outer one where printing fails, the inner one for a mistake in the text.
+#[cfg(not(target_family = "wasm"))]
 fn evaluate(session: &mut Session, text: &str, form: Form) -> Result<Result<(), Wrong>, Failure> {
     match session.run(text, |outcome| print(&shown(&outcome, form))) {
         Ok(printed) => printed.map(Ok),

@@ -238,7 +238,7 @@ fn is_absent(file: &File<'_>, value: Value<'_>) -> Read<bool> {
         Target::File(path) => {
             let path = file.folder.join(path);
             // Nothing is said of files that may not be opened, not even whether they are there.
-            !file.budget.allows(&path) || !path.is_file()
+            !file.budget.allows(&path) || !file.budget.is_file(&path)
         }
         Target::Scheme(_) => true,
         Target::Data(_) | Target::Malformed => false,

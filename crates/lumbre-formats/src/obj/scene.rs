@@ -181,7 +181,7 @@ impl Builder<'_> {
         opened: &mut HashSet<PathBuf>,
     ) -> Result<Vec<(PathBuf, MtlMaterial)>, FormatError> {
         let whole = existing(folder, names, self.budget);
-        let paths = if self.budget.allows(&whole) && whole.is_file() {
+        let paths = if self.budget.is_file(&whole) {
             vec![whole]
         } else {
             names.split_ascii_whitespace().map(|name| existing(folder, name, self.budget)).collect()
@@ -426,5 +426,5 @@ fn constant(value: f32) -> Arc<FloatTexture> {
 /// The file of a name, where `\` may separate folders, as on Windows.
 fn existing(folder: &Path, name: &str, budget: &Budget) -> PathBuf {
     let path = folder.join(name);
-    if !budget.has(&path) && name.contains('\\') { folder.join(name.replace('\\', "/")) } else { path }
+    if !budget.exists(&path) && name.contains('\\') { folder.join(name.replace('\\', "/")) } else { path }
 }

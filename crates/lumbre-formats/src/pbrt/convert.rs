@@ -269,11 +269,7 @@ impl<'b, 'd> Converter<'b, 'd> {
     /// The path of a file that the scene names.
     pub fn resolve(&self, name: &str, at: SourcePosition) -> Result<PathBuf> {
         match &self.directory {
-            Some(directory) => {
-                let beside = directory.join(name);
-                // Of what may not be read nothing is said, not even whether it is there.
-                Ok(if self.budget.allows(&beside) { parser::resolve(directory, name) } else { beside })
-            }
+            Some(directory) => Ok(parser::resolve(directory, name, self.budget)),
             None => {
                 Err(at
                     .error(format!("no file can be read from here, and the scene asks for {}", quoted(name))))

@@ -79,7 +79,7 @@ impl Converter<'_, '_> {
             return Ok(Some(known));
         }
         let at = params.spot_of("aperture");
-        if !self.budget.has(&self.resolve(&name, at)?) {
+        if !self.budget.exists(&self.resolve(&name, at)?) {
             let wrong = Diagnostic::error(format!("unknown aperture {}", quoted(&name)));
             let wrong = wrong.suggest(&name, ApertureImage::NAMES);
             return Err(at.wrong(wrong.expected(format!("{} or an image", ApertureImage::NAMES.join(", ")))));

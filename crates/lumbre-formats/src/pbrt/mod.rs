@@ -79,7 +79,7 @@ pub(crate) fn read_sources<'b, 'p>(
                 }
                 None => Input::open(path, budget)?,
             };
-            parser.read(input, path.canonicalize().ok().filter(|_| !is_standard_input))?;
+            parser.read(input, budget.canonical(path).filter(|_| !is_standard_input))?;
         }
         Ok(())
     })

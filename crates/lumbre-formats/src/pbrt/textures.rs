@@ -198,7 +198,7 @@ impl Converter<'_, '_> {
             return Ok(SpectrumValue::Named(named));
         }
         let path = match self.resolve(name, at) {
-            Ok(path) if self.budget.has(&path) => path,
+            Ok(path) if self.budget.exists(&path) => path,
             _ => {
                 let wrong = Diagnostic::error(format!("unknown spectrum {}", quoted(name)));
                 let wrong = wrong.suggest(name, NamedSpectrum::names());

@@ -126,7 +126,7 @@ impl Parser<'_, '_> {
             return None;
         }
         let folders = std::iter::once(&self.folder).chain(self.library.iter());
-        folders.map(|folder| folder.join(name)).find(|path| self.budget.allows(path) && path.is_file())
+        folders.map(|folder| folder.join(name)).find(|path| self.budget.is_file(path))
     }
 
     /// The next token as it stands, without directives; `None` at the end of a frame.

@@ -16,7 +16,7 @@ use super::lexer::{Lexer, Token, TokenKind};
 use super::source::{AtSpot, Fault, Result, SourcePosition};
 use super::state::{Scope, State};
 use crate::diagnostic::quoted;
-use crate::{Diagnostic, FormatError, Hold, Input};
+use crate::{Budget, Diagnostic, FormatError, Hold, Input};
 
 /// A file that is being read.
 struct Frame<'b> {
@@ -129,7 +129,7 @@ impl<'b, 'd> Parser<'b, 'd> {
     fn include_file(&mut self, directive: &str, spot: SourcePosition) -> Result<()> {
         let (name, at) = self.string(directive, "a file name in quotes")?;
         let path = self.converter.resolve(&name, at)?;
-        let canonical = path.canonicalize().ok();
+        let canonical = self.converter.budget.canonical(&path);
         let cycle = self.frames.iter().any(|f| f.canonical.is_some() && f.canonical == canonical);
         if cycle {
             return Err(at.wrong(Diagnostic::error("a file includes itself").found(quoted(&name))));
@@ -174,7 +174,7 @@ impl<'b, 'd> Parser<'b, 'd> {
 
 /// The path of the file `name` of a scene in `directory`: relative to it if it exists there, else the name as
 /// given.
-pub(in crate::pbrt) fn resolve(directory: &Path, name: &str) -> PathBuf {
+pub(in crate::pbrt) fn resolve(directory: &Path, name: &str, budget: &Budget) -> PathBuf {
     let beside = directory.join(name);
-    if beside.exists() { beside } else { PathBuf::from(name) }
+    if budget.exists(&beside) { beside } else { PathBuf::from(name) }
 }

@@ -1,0 +1,302 @@
+//! A scene that is open: rendered pass after pass, asked and explained.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use lumbre::description::IntegratorKind;
+use lumbre::formats::{HeldFiles, Limits};
+use lumbre::image::unit_to_u8;
+use lumbre::{
+    CancelToken, DVec3, NoProgress, Picture, Ray, ReadOptions, RenderOptions, RenderState, SaveOptions, Scene,
+};
+use lumbre_cli::{Defaults, Format, Language, Query, Request, Things};
+use serde::{Deserialize, Serialize};
+
+use crate::problem::{Problem, ProblemKind};
+
+/// Bytes that reading and building may hold: a page has 4 GiB for all, and the browser may grant less.
+const MEMORY: u64 = 1 << 30;
+/// Pixels of a picture: its sums, and what is made of them, take some 200 bytes each.
+const PIXELS: u64 = 1 << 22;
+/// Bytes of text that one question may be answered with.
+const ANSWERS: usize = 64 << 20;
+
+/// What a picture is to be, where not all of it is as the scene says.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Wanted {
+    /// Width and height in pixels.
+    pub size: Option<(u32, u32)>,
+    /// Samples per pixel.
+    pub spp: Option<u32>,
+    /// The name of an integrator.
+    pub integrator: Option<String>,
+    /// The seed of the random numbers.
+    pub seed: Option<u64>,
+}
+
+/// How far a picture is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Pass {
+    /// Width and height in pixels.
+    pub size: (u32, u32),
+    /// Samples of each pixel.
+    pub spp: u32,
+    /// Those that there will be.
+    pub target: u32,
+    /// Every this many pixels along a side has a sample; the others show their neighbours' until 1 is reached.
+    pub stride: u32,
+    /// All samples taken so far.
+    pub samples: u64,
+    /// Whether it is the picture that the program makes, to the bit.
+    pub done: bool,
+}
+
+/// What is to be explained: the options of `lumbre explain` by their names.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Explained {
+    /// The pixel, from 0, 0 in the upper left corner.
+    pub pixel: Option<(u32, u32)>,
+    /// A ray instead: origin, direction, and then its range of t where that is not 0 to infinity.
+    pub ray: Option<Vec<f64>>,
+    /// `text`, `markdown`, `html` or `json`.
+    pub format: Option<String>,
+    /// `en` or `es`.
+    pub lang: Option<String>,
+    /// Of this many of the rays that follow the crossings, too.
+    pub depth: u32,
+    /// The number of the sample.
+    pub sample: u32,
+    /// Only the surface that is seen.
+    pub nearest: bool,
+    /// This shape, whether the ray meets it or not.
+    pub shape: Option<String>,
+    /// All shapes.
+    pub all_shapes: bool,
+    /// Only the sections with these keys.
+    pub only: Vec<String>,
+}
+
+/// A scene, and its picture as far as it is rendered.
+#[derive(Debug)]
+pub struct Session {
+    scene: Scene,
+    things: Things,
+    name: PathBuf,
+    options: RenderOptions,
+    defaults: Defaults,
+    save: SaveOptions,
+    warnings: Vec<String>,
+    state: Option<RenderState>,
+    picture: Option<Picture>,
+}
+
+impl Session {
+    /// Opens the scene of this name among the files, set on the stage that `lumbre render` sets it on.
+    ///
+    /// # Errors
+    /// With the place in the file; [`ProblemKind::Limit`] for a scene or a picture that is too large for a page.
+    pub fn open(files: HeldFiles, name: &str, wanted: &Wanted) -> Result<Self, Problem> {
+        let name = PathBuf::from(name);
+        let mut reading = ReadOptions::default();
+        reading.limits = Limits::default();
+        reading.limits.memory = MEMORY;
+        reading.held = Some(Arc::new(files));
+        let (mut desc, mut diagnostics) = lumbre::describe(&[&name], &reading)?;
+        let things = Things::of(&desc);
+        let kind = match &wanted.integrator {
+            None => None,
+            Some(name) => Some(IntegratorKind::from_name(name).ok_or_else(|| {
+                let known = IntegratorKind::NAMES.join(", ");
+                Problem::new(
+                    ProblemKind::Usage,
+                    format!("no integrator \"{name}\" (expected one of: {known})"),
+                )
+            })?),
+        };
+        let defaults = Defaults::stage(&mut desc, wanted.size, kind);
+        let needed = lumbre::predicted_build_bytes(&desc).saturating_add(diagnostics.memory_held());
+        if needed > MEMORY {
+            let what = format!("the scene needs {needed} bytes, a page has {MEMORY}");
+            return Err(Problem::new(ProblemKind::Limit, what));
+        }
+        let scene = Scene::of_file(desc, &name, &mut diagnostics)?;
+        let mut options = scene.options();
+        options.integrator.kind = kind.unwrap_or(options.integrator.kind);
+        options.spectral &= matches!(options.integrator.kind, IntegratorKind::Path { .. });
+        if let Some((width, height)) = wanted.size {
+            options.resize(scene.resolved().film(), width, height);
+        }
+        options.sampler.seed = wanted.seed.unwrap_or(options.sampler.seed);
+        options.transparent = defaults.background().is_some();
+        options.guides = defaults.denoises();
+        options.threads = 1;
+        if let Some(spp) = wanted.spp.or(defaults.spp(&scene)) {
+            options.stop.spp = spp;
+        }
+        let pixels = u64::from(options.width) * u64::from(options.height);
+        if pixels > PIXELS {
+            let what = format!("the picture has {pixels} pixels, a page shows up to {PIXELS}");
+            return Err(Problem::new(ProblemKind::Limit, what));
+        }
+        // Refused here, and not by the first pass.
+        options.bounds().map_err(lumbre::Error::from)?;
+        let mut save = SaveOptions::default();
+        save.tone_map = defaults.tone_map();
+        save.exposure = defaults.exposure(&scene, &options)?;
+        let mut warnings = diagnostics.lines();
+        if scene.is_dark() && options.integrator.kind.needs_light() {
+            let dark = "the scene has no light, its picture is black";
+            warnings.push(format!("warning: {}: {dark}", name.display()));
+        }
+        Ok(Self { scene, things, name, options, defaults, save, warnings, state: None, picture: None })
+    }
+
+    /// What reading and building warned of, a line each.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// Width and height of the picture in pixels.
+    pub fn size(&self) -> (u32, u32) {
+        (self.options.width, self.options.height)
+    }
+
+    /// Renders on for about so long, and says how far the picture is. What is rendered is the same however the time is cut into passes.
+    ///
+    /// # Errors
+    /// Where the options make no picture.
+    pub fn step(&mut self, time: Duration) -> Result<Pass, Problem> {
+        if let Some(pass) = self.pass().filter(|pass| pass.done) {
+            return Ok(pass);
+        }
+        let mut options = self.options.clone();
+        options.stop.time = Some(time);
+        let token = CancelToken::new();
+        let (mut picture, state) =
+            self.scene.render_from(&options, &NoProgress, &token, self.state.take(), None)?;
+        self.state = Some(state);
+        let is_done = self.is_done(&picture);
+        if is_done && self.options.guides {
+            picture.denoise(self.options.threads)?;
+        }
+        if let Some(background) = self.defaults.background() {
+            picture = picture.over(background);
+        }
+        self.picture = Some(picture);
+        self.pass().ok_or_else(|| Problem::new(ProblemKind::Usage, "there is no picture"))
+    }
+
+    fn is_done(&self, picture: &Picture) -> bool {
+        picture.stats().stride == Some(1) && picture.stats().spp >= self.options.stop.spp
+    }
+
+    /// How far the picture is; `None` before the first pass.
+    pub fn pass(&self) -> Option<Pass> {
+        let picture = self.picture.as_ref()?;
+        let stats = picture.stats();
+        Some(Pass {
+            size: self.size(),
+            spp: stats.spp,
+            target: self.options.stop.spp,
+            stride: stats.stride.unwrap_or(0),
+            samples: stats.samples,
+            done: self.is_done(picture),
+        })
+    }
+
+    /// The picture as displays show it: red, green, blue in sRGB and alpha of each pixel, row by row from the top, as a PNG of
+    /// the program has them. Empty before the first pass.
+    pub fn pixels(&self) -> Vec<u8> {
+        let Some(picture) = &self.picture else { return Vec::new() };
+        let (image, left) = picture.displayed(&self.save);
+        let alpha = image.alpha();
+        let mut bytes = Vec::with_capacity(4 * image.pixels().len());
+        for (i, &light) in image.pixels().iter().enumerate() {
+            let alpha = alpha.map_or(1.0, |alpha| alpha[i]);
+            let light = if 0.0 < alpha && alpha < 1.0 { light / alpha } else { light };
+            bytes.extend(left.tone_map.encode(light, left.exposure).to_u8());
+            bytes.push(unit_to_u8(alpha));
+        }
+        bytes
+    }
+
+    /// What rays hit, or what is at points: what `lumbre cast` prints. `query` is one of its names, `list` a CSV or a `.npy`.
+    ///
+    /// # Errors
+    /// With the place in the list.
+    pub fn cast(&self, list: Vec<u8>, query: &str) -> Result<String, Problem> {
+        let query = Query::from_name(query).ok_or_else(|| {
+            let known = Query::names().join(", ");
+            Problem::new(ProblemKind::Usage, format!("no query \"{query}\" (expected one of: {known})"))
+        })?;
+        Ok(lumbre_cli::cast(&self.scene, query, "rays", list, ANSWERS)?)
+    }
+
+    /// What `lumbre explain` says of a pixel or a ray.
+    ///
+    /// # Errors
+    /// For a pixel outside of the picture, and for a ray, a name or a key that there is not.
+    pub fn explain(&self, wanted: &Explained) -> Result<String, Problem> {
+        let usage = |message: &str| Problem::new(ProblemKind::Usage, message);
+        let format = match &wanted.format {
+            None => Format::Text,
+            Some(name) => {
+                Format::from_name(name).ok_or_else(|| usage("expected text, markdown, html or json"))?
+            }
+        };
+        let ray = wanted.ray.as_deref().map(ray).transpose()?;
+        if wanted.pixel.is_some() == ray.is_some() {
+            return Err(usage("expected a pixel or a ray"));
+        }
+        let request = Request {
+            pixel: wanted.pixel,
+            ray,
+            format,
+            lang: language(wanted.lang.as_deref())?,
+            depth: wanted.depth,
+            sample: wanted.sample,
+            nearest: wanted.nearest,
+            shape: wanted.shape.clone(),
+            all_shapes: wanted.all_shapes,
+            only: wanted.only.clone(),
+        };
+        // As the program: what is explained is a path of red, green and blue.
+        let mut options = self.options.clone();
+        options.spectral = false;
+        Ok(lumbre_cli::explain(&self.scene, &options, &self.things, Path::new(&self.name), &request)?)
+    }
+}
+
+/// What `lumbre math` prints for a text, in the language of this code.
+///
+/// # Errors
+/// With the place of what is wrong, and a mark below it.
+pub fn calculate(text: &str, lang: &str, as_json: bool) -> Result<String, Problem> {
+    Ok(lumbre_cli::calculate(text, language(Some(lang))?, as_json, ANSWERS)?)
+}
+
+fn language(code: Option<&str>) -> Result<Language, Problem> {
+    let wrong = || Problem::new(ProblemKind::Usage, "expected a language, en or es");
+    code.map_or(Ok(Language::En), |code| Language::from_name(code).ok_or_else(wrong))
+}
+
+/// A ray of six or eight numbers.
+fn ray(numbers: &[f64]) -> Result<Ray, Problem> {
+    let wrong = || {
+        let expected = "expected origin and direction in six finite numbers, the direction not 0, and its range of t in none or two";
+        Problem::new(ProblemKind::Usage, expected)
+    };
+    let (&[ox, oy, oz, dx, dy, dz], range) = numbers.split_first_chunk().ok_or_else(wrong)?;
+    let (origin, direction) = (DVec3::new(ox, oy, oz), DVec3::new(dx, dy, dz));
+    if !origin.is_finite() || !direction.is_finite() || direction == DVec3::ZERO {
+        return Err(wrong());
+    }
+    match *range {
+        [] => Ok(Ray::new(origin, direction)),
+        [from, to] if from <= to => Ok(Ray::new(origin, direction).with_range(from, to)),
+        _ => Err(wrong()),
+    }
+}
