@@ -286,7 +286,7 @@ pub(super) fn encode(layers: &Layers, options: &WriteOptions) -> std::io::Result
     if let Some(denoiser) = options.denoiser {
         attributes.other.insert(Text::from("denoiser"), AttributeValue::Text(Text::from(denoiser)));
     }
-    // As one attribute: the crate writes several of one's own in any order, another each time.
+    // As one attribute: the crate writes several custom ones in an order that changes every time.
     let lines: Vec<String> = options.metadata.iter().map(|(name, text)| format!("{name}: {text}")).collect();
     attributes.comments = Text::new_or_none(lines.join("\n")).filter(|_| !lines.is_empty());
     let layer = ExrLayer::new(size, attributes, encoding, AnyChannels::sort(channels));
