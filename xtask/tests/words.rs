@@ -109,7 +109,7 @@ fn faults(path: &str, text: &str) -> Vec<String> {
         if is_narrow && is_rust && comment(line).is_some() && line.chars().count() > MAX_COLUMNS {
             found.push(format!("{path}:{number}: a comment of more than {MAX_COLUMNS} columns"));
         }
-        let name = line.trim_start().strip_prefix("fn ").and_then(|rest| rest.split('(').next());
+        let name = line.trim_start().strip_prefix("fn ").and_then(|rest| rest.split(['(', '<']).next());
         if SHORT_TESTS.iter().any(|folder| path.starts_with(folder))
             && let Some(name) = name
             && name.len() > MAX_TEST_NAME
