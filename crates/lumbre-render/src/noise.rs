@@ -3,12 +3,24 @@
 use crate::adaptive::Adaptive;
 use crate::film::{PixelBounds, Tile};
 use crate::neighbourhoods::{FLOOR, Known, Neighbourhoods, Spread};
-use crate::rendered::put_together;
 
 /// So few bright samples tell no mean.
 const FEW: f64 = 2.0;
 /// Cells along the longer side of the grid of neighbourhoods.
 const SIDE: u32 = 256;
+/// Rows whose pixels are looked at at once.
+const STRIP: u32 = 16;
+
+/// What is known of the pixels of a strip, row by row.
+fn known_within<'t>(tiles: impl Iterator<Item = &'t Tile>, strip: PixelBounds) -> Vec<Option<Known>> {
+    let mut known = vec![None; strip.area() as usize];
+    for tile in tiles {
+        for (x, y) in tile.bounds().intersection(&strip).pixels() {
+            known[strip.position(x, y)] = Known::of(tile.pixel(x, y));
+        }
+    }
+    known
+}
 
 /// The noise of the tiles of a picture, as [`crate::Stop::noise`] defines it; `None` where no pixel has two samples.
 ///
@@ -16,19 +28,28 @@ const SIDE: u32 = 256;
 /// luminance that its error is measured against is that of its neighbourhood, as far as that is less and its own is in doubt. And light that the trial has met, and
 /// these pixels not yet, counts as far as they have too few samples for it.
 pub(crate) fn noise<'t>(
-    tiles: impl Iterator<Item = &'t Tile>,
+    tiles: impl Iterator<Item = &'t Tile> + Clone,
     bounds: PixelBounds,
     adaptive: Option<&Adaptive>,
 ) -> Option<f64> {
-    let pixels = put_together(tiles, bounds, None, |tile| tile.pixels().iter().map(Known::of));
     let (width, height) = (bounds.width(), bounds.height());
     let side = width.max(height).div_ceil(SIDE).max(1);
     let columns = width.div_ceil(side) as usize;
     let mut spreads = vec![Spread::default(); columns * height.div_ceil(side) as usize];
-    let places = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    // The pixels that are known, row by row, with their places in the picture. They are not kept: there may be many.
+    let known_pixels = || {
+        let strips = (bounds.y0..bounds.y1).step_by(STRIP as usize);
+        let tiles = tiles.clone();
+        strips.flat_map(move |y0| {
+            let y1 = y0.saturating_add(STRIP).min(bounds.y1);
+            let strip = PixelBounds { y0, y1, ..bounds };
+            let known = known_within(tiles.clone(), strip);
+            let place = move |(x, y): (u32, u32)| (x - bounds.x0, y - bounds.y0);
+            strip.pixels().map(place).zip(known).filter_map(|(place, known)| Some((place, known?)))
+        })
+    };
     let (mut count, mut sum) = (0.0, 0.0);
-    for ((x, y), known) in places().zip(&pixels) {
-        let Some(known) = *known else { continue };
+    for ((x, y), known) in known_pixels() {
         let spread = &mut spreads[(y / side) as usize * columns + (x / side) as usize];
         *spread = spread.and(&Spread::of_pixel(known));
         (count, sum) = (count + 1.0, sum + known.mean);
@@ -46,8 +67,7 @@ pub(crate) fn noise<'t>(
         // A black picture has no noise that would be seen.
         if scale > 0.0 { square / (scale * scale) } else { 0.0 }
     };
-    for ((x, y), known) in places().zip(&pixels) {
-        let Some(known) = *known else { continue };
+    for ((x, y), known) in known_pixels() {
         let Known { samples: n, mean: luminance, error } = known;
         let around = Spread::of_pixel(known).within(neighbourhoods.at(x, y)).mean;
         // Of one or two bright samples the mean says nothing; of twenty it does, as at the edge of a lamp.

@@ -11,9 +11,8 @@ use lumbre_shading::spectrum::SensorCurves;
 use crate::RenderError;
 use crate::denoise;
 use crate::film::{
-    Exposure, FeatureSums, Filter, FilterShape, GuideSums, MAX_PIXELS, Pixel, PixelBounds, Tint,
+    Exposure, FeatureSums, Filter, FilterShape, GuideSums, MAX_PIXELS, Pixel, PixelBounds, RatioSums,
 };
-use crate::neighbourhoods::Known;
 use crate::workers::Workers;
 
 /// Everything about a picture that is not in the scene.
@@ -227,15 +226,16 @@ impl RenderOptions {
         if bounds.is_empty() { Err(RenderError::EmptyCrop) } else { Ok(bounds) }
     }
 
-    /// Bytes that a render with these options holds besides the scene: the sums of every pixel, and the pictures made of them.
+    /// Bytes that a render with these options holds besides the scene: the sums of every pixel, and the pictures made of them. Not
+    /// counted is what most pictures have little of: coverage by colour, where shadows are coloured, and twofold sums of a denoiser,
+    /// where a tile shows both ground that catches shadows and other things.
     ///
     /// # Errors
     /// As for [`RenderOptions::bounds`].
     pub fn memory_bytes(&self) -> Result<u64, RenderError> {
-        let mut each = size_of::<Pixel>() + size_of::<Rgb>() + size_of::<Option<Known>>();
+        let mut each = size_of::<Pixel>() + size_of::<Rgb>();
         if self.transparent {
-            // Coverage by colour, and the alpha and the coverage of the picture.
-            each += size_of::<Tint>() + size_of::<f32>() + size_of::<Rgb>();
+            each += size_of::<f32>();
         }
         if self.features {
             each += size_of::<FeatureSums>() + 4 * size_of::<Rgb>();
@@ -243,7 +243,8 @@ impl RenderOptions {
         let pixels = self.bounds()?.area();
         let mut all = pixels.saturating_mul(each as u64);
         if self.guides {
-            all = all.saturating_add(pixels.saturating_mul(size_of::<GuideSums>() as u64));
+            const EACH: usize = size_of::<GuideSums>() - size_of::<RatioSums<1>>();
+            all = all.saturating_add(pixels.saturating_mul(EACH as u64));
             all = all.saturating_add(denoise::memory_bytes(pixels, Workers::wanted(self.threads)));
         }
         let photons = match self.integrator.kind {

@@ -8,6 +8,7 @@ use lumbre_math::distribution::AliasTable;
 use lumbre_math::{DVec3, Elementary, Transform};
 use lumbre_shading::{Material, MaterialKind, Spectrum};
 
+use crate::freeing::freeing;
 use crate::light::choice::LightChoice;
 use crate::light::environment::first_not_finite;
 use crate::light::lanes::LaneLights;
@@ -96,6 +97,7 @@ impl Scene {
             builder.warnings.push(BuildWarning::NoLight);
         }
         builder.place_lights(lights)?;
+        builder.entries.shrink_to_fit();
         let lighting = Lighting::new(
             std::mem::take(&mut builder.lights),
             builder.light_colours,
@@ -357,6 +359,7 @@ impl Builder {
     ) -> Result<Accel, BuildError> {
         let origin = origin(&shapes, instances, accels);
         let mut geometries = Vec::with_capacity(shapes.len() + instances.len());
+        self.entries.reserve(shapes.len());
         for shape in freeing(shapes) {
             self.shape(shape, origin, standing, &mut geometries)?;
         }
@@ -480,7 +483,9 @@ impl Builder {
         geometries: &mut Vec<Geometry>,
     ) -> Result<(), BuildError> {
         let shape = entry.shape;
-        let baked = mesh::bake(shape, desc, placement, origin, order)?;
+        // Light is sampled by the triangles that are there.
+        let may_split = area_light.is_none();
+        let baked = mesh::bake(shape, desc, placement, origin, order, may_split)?;
         let attributes = baked.attributes;
         let mesh = attributes.mesh.clone();
         // Relative to the origin of the mesh, so that corners are rounded as those of neighbouring triangles: no ray
@@ -506,7 +511,7 @@ impl Builder {
         if !mesh.indices.is_empty() {
             let form = Form::Mesh(attributes.clone());
             let entry = SurfaceEntry { emission: emission.clone(), form, ..entry.clone() };
-            match &attributes.moving {
+            match attributes.moving.as_deref() {
                 None => {
                     let kind = match &attributes.precise {
                         None => GeometryKind::Mesh(mesh.clone()),
@@ -787,19 +792,6 @@ fn colour_of(desc: &LightDesc) -> LightColour {
             }
         }
     }
-}
-
-/// The items of a list, which is freed while they are taken: descriptions are as large as the scene that they become.
-fn freeing<T>(mut items: Vec<T>) -> impl Iterator<Item = T> {
-    const PIECE: usize = 1 << 14;
-    items.reverse();
-    std::iter::from_fn(move || {
-        let item = items.pop();
-        if items.len().is_multiple_of(PIECE) {
-            items.shrink_to_fit();
-        }
-        item
-    })
 }
 
 /// The emission of an area light, with its power converted to radiance.

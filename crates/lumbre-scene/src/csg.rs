@@ -115,7 +115,8 @@ fn solid(
         }
         GeometryDesc::Mesh(mesh) => {
             let origin = crate::build::near(&crate::build::mesh_bounds(&mesh, &placement));
-            let baked = mesh::bake(shape, mesh, &placement, origin, QuadOrder::Around)?;
+            // It is closed as it is written, and would not be with parts.
+            let baked = mesh::bake(shape, mesh, &placement, origin, QuadOrder::Around, false)?;
             if !baked.patches.is_empty() {
                 return Err(wrong("a mesh in a csg must have flat faces".to_owned()));
             }

@@ -122,12 +122,12 @@ impl Boundaries {
 
     /// The surface with its normal on the outside.
     fn outward(&self, entry: &SurfaceEntry, ray: &Ray, hit: &Hit, geometric: Surface) -> Surface {
-        let part = match entry.form {
-            Form::Csg(_) => 0,
-            _ => hit.primitive,
+        let (part, local) = match entry.form {
+            Form::Csg(_) => (0, hit.root.local),
+            _ => entry.whole(hit.primitive, hit.root.local),
         };
         let placement = (!hit.instances.is_empty()).then(|| self.accel.world_from_object(ray, hit));
-        entry.shading_geometry(&geometric, part, hit.root.local, placement.as_ref(), ray.time).surface
+        entry.shading_geometry(&geometric, part, local, placement.as_ref(), ray.time).surface
     }
 }
 

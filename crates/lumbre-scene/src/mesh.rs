@@ -6,6 +6,7 @@ use std::sync::{Arc, LazyLock};
 use lumbre_kernel::{DeformingMesh, PreciseMesh, TriangleMesh};
 use lumbre_math::{DVec3, Transform, Vec3};
 
+use crate::seams;
 use crate::surface::{Deforming, MeshAttributes, Turned};
 use crate::{BuildError, MeshDesc, MeshMotion};
 
@@ -28,7 +29,8 @@ pub(crate) enum QuadOrder {
 /// What is left of meshes without attributes: files have many small ones, and their descriptions are larger than they are.
 static BARE: LazyLock<Arc<MeshDesc>> = LazyLock::new(Arc::default);
 
-/// Transforms a mesh into the space of its tree.
+/// Transforms a mesh into the space of its tree. Where it may be split, triangles are that have vertices of others on their edges: see
+/// [`seams`].
 ///
 /// # Errors
 /// Lists of the wrong length, faces with missing vertices, and vertices that are not finite.
@@ -38,6 +40,7 @@ pub(crate) fn bake(
     tree_from_object: &Transform,
     origin: DVec3,
     order: QuadOrder,
+    may_split: bool,
 ) -> Result<BakedMesh, BuildError> {
     check(shape, &desc)?;
     // A shared description is copied only where the transform changes it; an unshared one gives up its lists.
@@ -103,12 +106,18 @@ pub(crate) fn bake(
             triangle.swap(1, 2);
         }
     }
+    let is_still = motion.is_none() && precise.is_none();
+    let pieces = if may_split && is_still { seams::split(&positions, &mut triangles) } else { None };
+    let pieces = pieces.map(Box::new);
     let mesh = Arc::new(TriangleMesh { origin, positions, indices: triangles });
     let precise = precise.map(|positions| Arc::new(PreciseMesh { positions, indices: mesh.indices.clone() }));
-    let moving = motion.map(|motion| deforming(shape, motion, tree_from_object, &mesh)).transpose()?;
+    let moving =
+        motion.map(|motion| deforming(shape, motion, tree_from_object, &mesh).map(Box::new)).transpose()?;
+    let turned = (turned.normals.is_some() || turned.tangents.is_some()).then(|| Box::new(turned));
     let is_bare = Arc::get_mut(&mut shared).is_some_and(|own| *own == MeshDesc::default());
     let rest = if is_bare { BARE.clone() } else { shared };
-    let attributes = Arc::new(MeshAttributes { mesh, swapped, first_half, turned, moving, precise, rest });
+    let attributes =
+        Arc::new(MeshAttributes { mesh, swapped, first_half, turned, moving, precise, pieces, rest });
     Ok(BakedMesh { attributes, patches })
 }
 
@@ -226,21 +235,45 @@ mod tests {
 
     #[test]
     fn a_flat_quad_splits_and_a_bent_one_does_not() {
-        let flat =
-            bake(7, quad(Vec3::new(2.0, 7.0, 4.0)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around)
-                .unwrap();
+        let flat = bake(
+            7,
+            quad(Vec3::new(2.0, 7.0, 4.0)),
+            &Transform::IDENTITY,
+            DVec3::ZERO,
+            QuadOrder::Around,
+            true,
+        )
+        .unwrap();
         assert_eq!((flat.attributes.mesh.indices.len(), flat.patches.len()), (2, 0));
-        let trapezium =
-            bake(7, quad(Vec3::new(3.0, 7.0, 4.0)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around)
-                .unwrap();
+        let trapezium = bake(
+            7,
+            quad(Vec3::new(3.0, 7.0, 4.0)),
+            &Transform::IDENTITY,
+            DVec3::ZERO,
+            QuadOrder::Around,
+            true,
+        )
+        .unwrap();
         assert_eq!((trapezium.attributes.mesh.indices.len(), trapezium.patches.len()), (2, 0));
-        let bent =
-            bake(7, quad(Vec3::new(2.0, 7.0, 4.5)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around)
-                .unwrap();
+        let bent = bake(
+            7,
+            quad(Vec3::new(2.0, 7.0, 4.5)),
+            &Transform::IDENTITY,
+            DVec3::ZERO,
+            QuadOrder::Around,
+            true,
+        )
+        .unwrap();
         assert_eq!((bent.attributes.mesh.indices.len(), bent.patches), (0, vec![[0, 1, 3, 2]]));
-        let dented =
-            bake(7, quad(Vec3::new(4.5, 4.0, 4.0)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around)
-                .unwrap();
+        let dented = bake(
+            7,
+            quad(Vec3::new(4.5, 4.0, 4.0)),
+            &Transform::IDENTITY,
+            DVec3::ZERO,
+            QuadOrder::Around,
+            true,
+        )
+        .unwrap();
         assert_eq!((dented.attributes.mesh.indices.len(), dented.patches.len()), (0, 1));
     }
 
@@ -258,9 +291,9 @@ mod tests {
                 .map(|i| baked.attributes.mesh.positions[i as usize].as_dvec3());
             (b - a).cross(c - a).normalize()
         };
-        let plain = bake(0, desc(), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around).unwrap();
+        let plain = bake(0, desc(), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around, true).unwrap();
         let mirror = Transform::scale(DVec3::new(-2.0, 3.0, 0.5)).unwrap();
-        let mirrored = bake(0, desc(), &mirror, DVec3::ZERO, QuadOrder::Around).unwrap();
+        let mirrored = bake(0, desc(), &mirror, DVec3::ZERO, QuadOrder::Around, true).unwrap();
         let expected = mirror.normal(front(&plain)).normalize();
         assert!((front(&mirrored) - expected).length() < 1e-6);
     }
@@ -273,7 +306,7 @@ mod tests {
             ..(*quad(Vec3::new(2.0, 7.0, 4.0))).clone()
         });
         let bake_at =
-            |place: &Transform| bake(3, desc.clone(), place, DVec3::ZERO, QuadOrder::Around).unwrap();
+            |place: &Transform| bake(3, desc.clone(), place, DVec3::ZERO, QuadOrder::Around, true).unwrap();
         let turn = Transform::rotate(DVec3::X, 90.0).unwrap();
         let (here, there) = (bake_at(&Transform::IDENTITY), bake_at(&turn));
         assert!(Arc::ptr_eq(&here.attributes.rest, &there.attributes.rest));
@@ -281,14 +314,14 @@ mod tests {
         assert!((there.attributes.normals().unwrap()[2] - Vec3::NEG_Y).length() < 1e-6);
         assert_eq!(desc.positions.len(), 4);
         // The last one that holds it needs no copy.
-        let own = bake(3, desc, &turn, DVec3::ZERO, QuadOrder::Around).unwrap();
+        let own = bake(3, desc, &turn, DVec3::ZERO, QuadOrder::Around, true).unwrap();
         assert!(own.attributes.rest.uvs.is_some() && own.attributes.mesh.positions.len() == 4);
     }
 
     #[test]
     fn what_is_wrong_with_a_mesh_is_said() {
         let bake = |desc: MeshDesc| {
-            bake(9, Arc::new(desc), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around).err()
+            bake(9, Arc::new(desc), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around, true).err()
         };
         let whole = (*quad(Vec3::new(2.0, 7.0, 4.0))).clone();
         assert_eq!(

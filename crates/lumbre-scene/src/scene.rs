@@ -22,6 +22,19 @@ use crate::{
     Interaction, MediumId, SamplerDesc, SurfaceTable,
 };
 
+/// What a hit is on.
+#[derive(Clone, Copy)]
+struct Leaf<'s> {
+    /// The surface entry, that of a leaf for a CSG.
+    entry: &'s SurfaceEntry,
+    /// The primitive; of a triangle that was split, the whole.
+    part: u32,
+    /// The barycentrics of a triangle.
+    local: DVec2,
+    /// Whether it is flipped because the leaf is subtracted.
+    turned: bool,
+}
+
 /// An immutable scene, which any number of threads can render.
 #[derive(Debug)]
 pub struct Scene {
@@ -209,19 +222,28 @@ impl Scene {
 
     /// The index in its file of the shape that was hit.
     pub fn shape_index(&self, hit: &Hit) -> u32 {
-        self.leaf(hit).0.shape
+        self.leaf(hit).entry.shape
     }
 
     /// The triangle of a mesh that was hit, without the other data of [`Scene::interaction`]; 0 for other shapes.
     pub fn primitive_index(&self, hit: &Hit) -> u32 {
-        let (entry, part, _) = self.leaf(hit);
+        let Leaf { entry, part, .. } = self.leaf(hit);
         entry.primitive(part)
+    }
+
+    /// The part of what has an id in the tree that results give for one that queries of points find there: of a triangle that was
+    /// split, the whole.
+    ///
+    /// # Panics
+    /// When there is no such id.
+    pub fn whole_primitive(&self, id: u32, part: u32) -> u32 {
+        self.entries[id as usize].whole(part, DVec2::ZERO).0
     }
 
     /// The curves of a hit, in their own space, and the map from there to the innermost instance; `None` for other
     /// shapes.
     pub fn curves_at(&self, hit: &Hit) -> Option<(&Curves, &Transform)> {
-        match &self.leaf(hit).0.form {
+        match &self.leaf(hit).entry.form {
             Form::Curves(curves, place) => Some((curves, place)),
             _ => None,
         }
@@ -245,12 +267,12 @@ impl Scene {
 
     /// Whether the hit surface may transmit light straight on.
     pub fn is_pane(&self, hit: &Hit) -> bool {
-        self.leaf(hit).0.has_delta_transmission()
+        self.leaf(hit).entry.has_delta_transmission()
     }
 
     /// Whether the hit surface may reflect or refract without blur: see [`lumbre_shading::Material::may_be_specular`].
     pub fn may_be_specular(&self, hit: &Hit) -> bool {
-        self.leaf(hit).0.material.as_ref().is_some_and(|material| material.may_be_specular())
+        self.leaf(hit).entry.material.as_ref().is_some_and(|material| material.may_be_specular())
     }
 
     /// The closest hit, skipping cut-outs and interfaces.
@@ -381,8 +403,9 @@ impl Scene {
         footprint: &Footprint,
         geometric: Surface,
     ) -> Interaction<'_> {
-        let (entry, part, turned) = self.leaf(hit);
-        let shaded = self.shading_geometry(entry, &geometric, ray, hit, part, turned);
+        let leaf = self.leaf(hit);
+        let Leaf { entry, part, local, .. } = leaf;
+        let shaded = self.shading_geometry(&leaf, &geometric, ray, hit);
         let primitive = entry.primitive(part);
         let length = ray.direction.length();
         let direction = ray.direction / length;
@@ -400,14 +423,8 @@ impl Scene {
         let is_smooth = shaded.shading.normal.dot(shaded.shading.geometric) < SMOOTH;
         let terminator_offset = is_smooth.then(|| {
             let placement = self.placement(ray, hit);
-            let terminator_offset = entry.terminator_offset(
-                &geometric,
-                part,
-                hit.root.local,
-                placement.as_ref(),
-                ray.time,
-                -direction,
-            )?;
+            let terminator_offset =
+                entry.terminator_offset(&geometric, part, local, placement.as_ref(), ray.time, -direction)?;
             // A smaller offset is within the error of the point.
             (terminator_offset.dot(surface.normal).abs() > (incident_origin - surface.point).length())
                 .then_some(terminator_offset)
@@ -524,16 +541,21 @@ impl Scene {
         self.infinite.iter().map(move |&id| self.lights[id.0 as usize].escaped(ray.origin, ray.direction))
     }
 
-    /// The surface entry of a hit, that of a leaf for a CSG; the primitive; and whether it is flipped because
-    /// the leaf is subtracted.
-    fn leaf(&self, hit: &Hit) -> (&SurfaceEntry, u32, bool) {
+    fn leaf(&self, hit: &Hit) -> Leaf<'_> {
         let entry = &self.entries[hit.id as usize];
+        let local = hit.root.local;
         match &entry.form {
             Form::Csg(csg) => match csg.leaf(&hit.root) {
-                Some((leaf, part)) => (leaf, part.part, part.flipped),
-                None => (entry, 0, false),
+                Some((leaf, found)) => {
+                    let (part, local) = leaf.whole(found.part, local);
+                    Leaf { entry: leaf, part, local, turned: found.flipped }
+                }
+                None => Leaf { entry, part: 0, local, turned: false },
             },
-            _ => (entry, hit.primitive, false),
+            _ => {
+                let (part, local) = entry.whole(hit.primitive, local);
+                Leaf { entry, part, local, turned: false }
+            }
         }
     }
 
@@ -544,27 +566,19 @@ impl Scene {
 
     fn shading_geometry(
         &self,
-        entry: &SurfaceEntry,
+        leaf: &Leaf<'_>,
         geometric: &Surface,
         ray: &Ray,
         hit: &Hit,
-        primitive: u32,
-        turned: bool,
     ) -> ShadingGeometry {
+        let Leaf { entry, part, local, turned } = *leaf;
         let placement = self.placement(ray, hit);
         if !turned {
-            return entry.shading_geometry(
-                geometric,
-                primitive,
-                hit.root.local,
-                placement.as_ref(),
-                ray.time,
-            );
+            return entry.shading_geometry(geometric, part, local, placement.as_ref(), ray.time);
         }
         let outward =
             Surface { normal: -geometric.normal, dndu: -geometric.dndu, dndv: -geometric.dndv, ..*geometric };
-        let mut shaded =
-            entry.shading_geometry(&outward, primitive, hit.root.local, placement.as_ref(), ray.time);
+        let mut shaded = entry.shading_geometry(&outward, part, local, placement.as_ref(), ray.time);
         shaded.turn();
         shaded
     }
@@ -579,7 +593,7 @@ impl Scene {
 
     /// Whether a hit is on the back of a one-sided surface, which cameras look through.
     pub fn is_back_of_one_sided(&self, ray: &Ray, hit: &Hit) -> bool {
-        let (entry, _, turned) = self.leaf(hit);
+        let Leaf { entry, turned, .. } = self.leaf(hit);
         entry.is_one_sided() && {
             // By the orientation of its faces, not by vertex normals.
             let along = self.accel.surface(ray, hit).normal.dot(ray.direction) > 0.0;
@@ -590,7 +604,8 @@ impl Scene {
     /// Whether a hit blocks light. Partial alpha is decided by a hash of the ray and the position, so the
     /// result is deterministic.
     fn is_solid(&self, ray: &Ray, hit: &Hit) -> bool {
-        let (entry, part, turned) = self.leaf(hit);
+        let leaf = self.leaf(hit);
+        let entry = leaf.entry;
         if !entry.is_visible() {
             return false;
         }
@@ -599,7 +614,7 @@ impl Scene {
             FloatTexture::Constant(coverage) => coverage,
             _ => {
                 let geometric = self.accel.surface(ray, hit);
-                let shaded = self.shading_geometry(entry, &geometric, ray, hit, part, turned);
+                let shaded = self.shading_geometry(&leaf, &geometric, ray, hit);
                 alpha.evaluate(&shaded.point_context())
             }
         };

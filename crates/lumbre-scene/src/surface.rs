@@ -9,6 +9,7 @@ use lumbre_shading::{FloatTexture, LocalSurface, Material, Spectrum, TextureCont
 
 use crate::csg::CsgForm;
 use crate::light::LightId;
+use crate::seams::Pieces;
 use crate::{Boundary, ColouredShape, Emission, Footprint, MeshDesc};
 
 /// The surface data for one id of the tree.
@@ -38,6 +39,17 @@ impl SurfaceEntry {
             Form::Mesh(_) | Form::Custom => part,
             Form::Curves(ref curves, _) => curves.segment_of(part),
             Form::Exact | Form::Coloured(_) | Form::Csg(_) => 0,
+        }
+    }
+
+    /// The part that has a place in a part that rays meet, and where in it: of triangles that were split, the whole.
+    #[inline]
+    pub(crate) fn whole(&self, part: u32, local: DVec2) -> (u32, DVec2) {
+        match &self.form {
+            Form::Mesh(mesh) => {
+                mesh.pieces.as_ref().map_or((part, local), |pieces| pieces.whole(part, local))
+            }
+            _ => (part, local),
         }
     }
 }
@@ -79,12 +91,14 @@ pub(crate) struct MeshAttributes {
     pub swapped: bool,
     /// From this triangle on, pairs of triangles are halves of a quad.
     pub first_half: u32,
-    /// Attributes changed by the transform; the others are in `rest`.
-    pub turned: Turned,
+    /// Attributes changed by the transform, if any; the others are in `rest`.
+    pub turned: Option<Box<Turned>>,
     /// Its deformation, if any.
-    pub moving: Option<Deforming>,
+    pub moving: Option<Box<Deforming>>,
     /// The mesh that rays meet instead of `mesh`, if vertices are given in double precision.
     pub precise: Option<Arc<PreciseMesh>>,
+    /// The parts of triangles that were split, if any: the triangles of `mesh` are those that rays meet.
+    pub pieces: Option<Box<Pieces>>,
     /// The description, which may be shared, without the parts that were moved into the mesh.
     pub rest: Arc<MeshDesc>,
 }
@@ -268,7 +282,7 @@ impl SurfaceEntry {
                 ShadingGeometry { vertex: ramp.at(surface.point, placement), ..plain(surface) }
             }
             Form::Mesh(mesh) => {
-                let corners = mesh.mesh.indices[primitive as usize];
+                let corners = mesh.corners(primitive);
                 let uvs = mesh.corner_uvs(primitive);
                 mesh.shading_geometry(surface, corners, uvs, &triangle_blend(local), placement, time)
             }
@@ -306,7 +320,7 @@ impl SurfaceEntry {
         towards: DVec3,
     ) -> Option<DVec3> {
         let Form::Mesh(mesh) = &self.form else { return None };
-        let normals = mesh.corner_normals(mesh.mesh.indices[primitive as usize], time)?;
+        let normals = mesh.corner_normals(mesh.corners(primitive), time)?;
         let Blend { weights, .. } = triangle_blend(local);
         let unit = |n: DVec3| placement.map_or(n, |map| map.normal(n)).normalize_or_zero();
         let normals = normals.map(unit);
@@ -417,7 +431,7 @@ impl MeshAttributes {
         met: &TrianglePoint,
         footprint: &Footprint,
     ) -> (TextureContext, LocalSurface) {
-        let corners = self.mesh.indices[met.triangle as usize];
+        let corners = self.corners(met.triangle);
         let [p0, p1, p2] = at(&self.mesh.positions, corners).map(|p| p.as_dvec3());
         let uvs = self.corner_uvs(met.triangle);
         let blend = triangle_blend(Vec2::from(met.local).as_dvec2());
@@ -495,9 +509,17 @@ impl ColourRamp {
 }
 
 impl MeshAttributes {
+    /// The corners of a triangle, whole.
+    #[inline]
+    pub(crate) fn corners(&self, triangle: u32) -> [u32; 3] {
+        let split = self.pieces.as_ref().and_then(|pieces| pieces.corners(triangle));
+        split.unwrap_or_else(|| self.mesh.indices[triangle as usize])
+    }
+
     /// Vertex normals.
     pub(crate) fn normals(&self) -> Option<&[Vec3]> {
-        self.turned.normals.as_deref().or(self.rest.normals.as_deref())
+        let turned = self.turned.as_ref().and_then(|turned| turned.normals.as_deref());
+        turned.or(self.rest.normals.as_deref())
     }
 
     /// The normals of some vertices at a time.
@@ -516,7 +538,7 @@ impl MeshAttributes {
     /// 1 if vertex normals face as the triangle does, or −1 if all face the other way; `None` if they do not agree.
     fn outward(&self, triangle: u32) -> Option<f64> {
         let Some(normals) = self.normals() else { return Some(1.0) };
-        let corners = self.mesh.indices[triangle as usize];
+        let corners = self.corners(triangle);
         let [a, b, c] = at(&self.mesh.positions, corners).map(|p| p.as_dvec3());
         let face = (b - a).cross(c - a);
         let sides = at(normals, corners).map(|normal| normal.as_dvec3().dot(face));
@@ -527,19 +549,20 @@ impl MeshAttributes {
     /// The uv of a triangle's corners.
     pub(crate) fn corner_uvs(&self, triangle: u32) -> [Vec2; 3] {
         match &self.rest.uvs {
-            Some(uvs) => at(uvs, self.mesh.indices[triangle as usize]),
+            Some(uvs) => at(uvs, self.corners(triangle)),
             None => self.default_uvs(triangle),
         }
     }
 
     /// The vertex colours of a triangle, if it has any.
     pub(crate) fn corner_colours(&self, triangle: u32) -> Option<[Spectrum; 3]> {
-        self.rest.colours.as_ref().map(|colours| at(colours, self.mesh.indices[triangle as usize]))
+        self.rest.colours.as_ref().map(|colours| at(colours, self.corners(triangle)))
     }
 
     /// Vertex tangents, with the sides of the bitangents.
     fn tangents(&self) -> Option<&[Vec4]> {
-        self.turned.tangents.as_deref().or(self.rest.tangents.as_deref())
+        let turned = self.turned.as_ref().and_then(|turned| turned.tangents.as_deref());
+        turned.or(self.rest.tangents.as_deref())
     }
 
     /// pbrt's default uv of triangles: (0, 0), (1, 0), (1, 1); for halves of a quad, those of the quad.

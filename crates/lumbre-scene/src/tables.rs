@@ -59,12 +59,11 @@ const ANYWHERE: TextureContext = TextureContext {
 
 impl SurfaceTable {
     pub(crate) fn new(entries: &[SurfaceEntry]) -> Self {
-        let mut table = Self::default();
-        for entry in entries {
-            let surface = table.triangles(entry);
-            table.surfaces.push(surface);
-        }
-        table
+        let mut rows = Rows::default();
+        // Most neighbours have the same material.
+        let mut last = None;
+        let surfaces = entries.iter().map(|entry| triangles(entry, &mut rows, &mut last)).collect();
+        Self { surfaces, rows }
     }
 
     /// The surface with the id of a hit, if it is one of triangles.
@@ -77,37 +76,49 @@ impl SurfaceTable {
     pub fn rows(&self) -> &Rows {
         &self.rows
     }
+}
 
-    fn triangles(&mut self, entry: &SurfaceEntry) -> Option<TriangleSurface> {
-        let (Form::Mesh(attributes), Some(material)) = (&entry.form, &entry.material) else { return None };
-        let is_still = attributes.moving.is_none() && attributes.precise.is_none();
-        let shines_evenly = entry.emission.as_ref().is_none_or(|emission| {
-            emission.image.is_none() && !emission.by_vertices && entry.alpha.is_none()
-        });
-        let is_plain = !material.may_be_solid() && !material.has_displacement() && entry.boundary.is_none();
-        if !is_still || !shines_evenly || !is_plain {
-            return None;
-        }
-        Some(TriangleSurface {
-            mesh: attributes.mesh.clone(),
-            outward: if entry.reverse { -1.0 } else { 1.0 },
-            bsdf: self.uniform(material),
-            transmits: material.is_transmissive(),
-            emission: entry.emission.as_ref().map(|e| (e.radiance.to_array(), e.two_sided)),
-            attributes: attributes.clone(),
-            material: material.clone(),
-        })
-    }
+/// A material and its BSDF, if that is the same everywhere.
+type Known<'e> = Option<(&'e Arc<Material>, Option<UniformBsdf>)>;
 
-    /// The BSDF of a material, if that is uniform.
-    fn uniform(&mut self, material: &Material) -> Option<UniformBsdf> {
-        let bsdf = material.is_uniform().then(|| material.bsdf(&ANYWHERE))??;
-        if !bsdf.is_isotropic() {
-            return None;
-        }
-        let row = self.rows.push(&bsdf);
-        Some(UniformBsdf { kind: bsdf.kind(), row })
+fn triangles<'e>(entry: &'e SurfaceEntry, rows: &mut Rows, last: &mut Known<'e>) -> Option<TriangleSurface> {
+    let (Form::Mesh(attributes), Some(material)) = (&entry.form, &entry.material) else { return None };
+    let is_still = attributes.moving.is_none() && attributes.precise.is_none() && attributes.pieces.is_none();
+    let shines_evenly = entry
+        .emission
+        .as_ref()
+        .is_none_or(|emission| emission.image.is_none() && !emission.by_vertices && entry.alpha.is_none());
+    let is_plain = !material.may_be_solid() && !material.has_displacement() && entry.boundary.is_none();
+    if !is_still || !shines_evenly || !is_plain {
+        return None;
     }
+    let bsdf = match last {
+        Some((known, bsdf)) if Arc::ptr_eq(known, material) => *bsdf,
+        _ => {
+            let bsdf = uniform(material, rows);
+            *last = Some((material, bsdf));
+            bsdf
+        }
+    };
+    Some(TriangleSurface {
+        mesh: attributes.mesh.clone(),
+        outward: if entry.reverse { -1.0 } else { 1.0 },
+        bsdf,
+        transmits: material.is_transmissive(),
+        emission: entry.emission.as_ref().map(|e| (e.radiance.to_array(), e.two_sided)),
+        attributes: attributes.clone(),
+        material: material.clone(),
+    })
+}
+
+/// The BSDF of a material, if that is the same everywhere.
+fn uniform(material: &Material, rows: &mut Rows) -> Option<UniformBsdf> {
+    let bsdf = material.is_uniform().then(|| material.bsdf(&ANYWHERE))??;
+    if !bsdf.is_isotropic() {
+        return None;
+    }
+    let row = rows.push(&bsdf);
+    Some(UniformBsdf { kind: bsdf.kind(), row })
 }
 
 impl TriangleSurface {

@@ -12,7 +12,7 @@ use lumbre_render::integrators::integrator;
 use lumbre_render::transport::Event;
 use lumbre_render::{
     CancelToken, CheckpointSink, ExplainedSample, Feature, NoProgress, Progress, RenderOptions, RenderState,
-    Stop, render_from,
+    State, Stop, render_from,
 };
 use lumbre_scene::{BuildWarning, Footprint, IntegratorKind, SceneDesc};
 use lumbre_shading::Spectrum;
@@ -165,7 +165,7 @@ impl Scene {
             distance: nearest.distance,
             point: nearest.point,
             shape: self.resolved.shape_of(nearest.id),
-            primitive: nearest.primitive,
+            primitive: self.resolved.whole_primitive(nearest.id, nearest.primitive),
             instance: nearest.instances.first().copied(),
         }))
     }
@@ -315,7 +315,8 @@ impl Scene {
         let mut small = options.smaller(LONGER_SIDE);
         small.stop = Stop::at(u32::MAX);
         small.stop.time = Some(TIME);
-        let stats = self.render(&small)?.stats().clone();
+        let until = Until { time: TIME, cancel: CancelToken::new() };
+        let stats = self.render_with(&small, &until, &until.cancel)?.stats().clone();
         let pixels = options.bounds().map_err(Error::from)?.area();
         Ok(stats.elapsed.as_secs_f64() * pixels as f64 / stats.samples.max(1) as f64)
     }
@@ -386,5 +387,19 @@ impl Scene {
     /// The scene resolved for light transport.
     pub fn resolved(&self) -> &lumbre_scene::Scene {
         &self.resolved
+    }
+}
+
+/// Ends a render after a time, even in the first samples of a small picture, which [`Stop::time`] does not end.
+struct Until {
+    time: Duration,
+    cancel: CancelToken,
+}
+
+impl Progress for Until {
+    fn state(&self, state: &State) {
+        if state.elapsed >= self.time {
+            self.cancel.cancel();
+        }
     }
 }

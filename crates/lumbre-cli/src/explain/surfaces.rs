@@ -181,7 +181,7 @@ fn tell(
         section.fact(texts.instance, f64::from(instance));
     }
     if matches!(shape, TargetShape::Triangle(_)) {
-        section.fact(texts.triangle, f64::from(hit.primitive));
+        section.fact(texts.triangle, f64::from(resolved.primitive_index(hit)));
     }
     // The same steps as the search takes, for the same bits.
     let inner = placements.iter().fold(*ray, |ray, map| ray.into_object(map));

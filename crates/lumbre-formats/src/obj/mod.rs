@@ -701,7 +701,7 @@ impl<'a> Reader<'a> {
         let mut newest = vec![0u32; self.positions.len()];
         let parts = std::mem::take(&mut self.parts);
         let origin = origin_of(&self.positions);
-        let (mut meshes, mut thin) = (vec![], vec![]);
+        let (mut meshes, mut thin) = (Vec::with_capacity(parts.len()), vec![]);
         for part in parts {
             let key = part.key;
             let object = if self.has_objects { key.object } else { key.group };

@@ -8,6 +8,7 @@ use lumbre_image::{Encoding, Rgb};
 use lumbre_math::Vec2;
 use lumbre_scene::{
     AreaLightDesc, GeometryDesc, Listing, MaterialId, NamedMaterial, SceneDesc, ShapeDesc, WithoutLight,
+    freeing,
 };
 use lumbre_shading::{
     FloatTexture, ImageFilter, ImageTexture, Mapping2d, Material, MaterialKind, MipMap, MipMapOptions,
@@ -109,7 +110,7 @@ pub(crate) fn obj_scene(
     };
     let world_from_object = placed(obj.origin);
     (scene.up, scene.up_is_guessed) = up_of(obj.meshes.iter().map(|mesh| &*mesh.mesh), obj.origin);
-    for mesh in obj.meshes {
+    for mesh in freeing(obj.meshes) {
         let named = find(&mesh.material);
         let id = named.unwrap_or_else(|| {
             let has_colours = mesh.mesh.colours.is_some();

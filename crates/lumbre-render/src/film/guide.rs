@@ -148,11 +148,38 @@ pub struct GuideSums {
     pub light: RatioSums<3>,
     /// How much of the ground is in shadow, over how much of the pixel is ground: where shadows are caught in a transparent picture.
     pub shadow: RatioSums<1>,
+    /// What the samples met.
+    pub surfaces: SurfaceSums,
+    /// How many samples.
+    pub count: Count,
+}
+
+/// Sums over what the samples of one pixel met.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SurfaceSums {
     features: [f32; FEATURES],
     /// Σ of the squares of the features of each group.
     group_squares: [f32; GROUPS.len()],
-    /// How many samples.
-    pub count: Count,
+}
+
+impl SurfaceSums {
+    /// Adds what a sample met; `None` met nothing.
+    pub fn add(&mut self, sample: Option<&FeatureSample>) {
+        let Some(FeatureSample { albedo, normal, depth, .. }) = sample else { return };
+        let values = [albedo.r, albedo.g, albedo.b, normal[0], normal[1], normal[2], *depth];
+        self.features.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+        for (squares, group) in self.group_squares.iter_mut().zip(GROUPS) {
+            *squares += values[group].iter().map(|value| value * value).sum::<f32>();
+        }
+    }
+}
+
+impl Count {
+    /// Counts a sample of this weight.
+    pub fn add(&mut self, weight: f32) {
+        self.samples += 1;
+        self.weight += weight;
+    }
 }
 
 /// Numbers of [`GuideSums`].
@@ -169,7 +196,8 @@ impl<const UNDER: usize> RatioSums<UNDER> {
 impl GuideSums {
     fn numbers(&mut self) -> impl Iterator<Item = &mut f32> {
         let ratios = self.light.numbers().chain(self.shadow.numbers());
-        let features = self.features.iter_mut().chain(&mut self.group_squares);
+        let SurfaceSums { features, group_squares } = &mut self.surfaces;
+        let features = features.iter_mut().chain(group_squares);
         ratios.chain(features).chain(std::iter::once(&mut self.count.weight))
     }
 
@@ -189,21 +217,9 @@ impl GuideSums {
         own
     }
 
-    /// Counts a sample of this weight, and adds what it met; `None` met nothing.
-    pub fn add_features(&mut self, sample: Option<&FeatureSample>, weight: f32) {
-        self.count.samples += 1;
-        self.count.weight += weight;
-        let Some(FeatureSample { albedo, normal, depth, .. }) = sample else { return };
-        let values = [albedo.r, albedo.g, albedo.b, normal[0], normal[1], normal[2], *depth];
-        self.features.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
-        for (squares, group) in self.group_squares.iter_mut().zip(GROUPS) {
-            *squares += values[group].iter().map(|value| value * value).sum::<f32>();
-        }
-    }
-
     /// The mean of a feature.
     pub fn feature(&self, i: usize) -> f32 {
-        self.features[i] / self.count.samples.max(1) as f32
+        self.surfaces.features[i] / self.count.samples.max(1) as f32
     }
 
     /// The variance of the means of a group, summed over its features, as if samples were independent; 0 for fewer than two samples.
@@ -212,8 +228,9 @@ impl GuideSums {
             return 0.0;
         }
         let n = self.count.samples as f32;
-        let means: f32 = GROUPS[group].clone().map(|i| (self.features[i] / n) * (self.features[i] / n)).sum();
-        (self.group_squares[group] / n - means).max(0.0) / (n - 1.0)
+        let SurfaceSums { features, group_squares } = &self.surfaces;
+        let means: f32 = GROUPS[group].clone().map(|i| (features[i] / n) * (features[i] / n)).sum();
+        (group_squares[group] / n - means).max(0.0) / (n - 1.0)
     }
 }
 
@@ -247,13 +264,16 @@ mod tests {
         let mut sums = GuideSums::default();
         for depth in [3.0, 5.0] {
             let sample = FeatureSample { albedo: Rgb::WHITE, normal: [0.0, 1.0, 0.0], depth, uv: [0.0; 2] };
-            sums.add_features(Some(&sample), 1.0);
+            sums.surfaces.add(Some(&sample));
+            sums.count.add(1.0);
         }
         assert_eq!((sums.feature(6), sums.group_variance(2)), (4.0, 1.0));
         assert_eq!((sums.feature(4), sums.group_variance(1)), (1.0, 0.0));
         let tilted = FeatureSample { albedo: Rgb::WHITE, normal: [1.0, 0.0, 0.0], depth: 4.0, uv: [0.0; 2] };
-        sums.add_features(Some(&tilted), 1.0);
-        sums.add_features(Some(&tilted), 1.0);
+        for _ in 0..2 {
+            sums.surfaces.add(Some(&tilted));
+            sums.count.add(1.0);
+        }
         // Each of two components is 0 or 1 by halves: a variance of 1/4, and a third of that for the mean.
         assert!((sums.group_variance(1) - 2.0 / 12.0).abs() < 1e-6);
     }

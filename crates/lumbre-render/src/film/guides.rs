@@ -15,7 +15,7 @@ impl Guides {
     }
 
     /// The guides of all pixels, in no order.
-    pub fn iter(&self) -> impl Iterator<Item = &GuideSums> {
+    pub fn iter(&self) -> impl Iterator<Item = GuideSums> + '_ {
         self.tiles.iter().flat_map(Tile::guides)
     }
 
@@ -27,10 +27,8 @@ impl Guides {
             if both.is_empty() {
                 continue;
             }
-            for y in both.y0..both.y1 {
-                let (from, to) = (tile.bounds().position(both.x0, y), bounds.position(both.x0, y));
-                let count = both.width() as usize;
-                guides[to..to + count].copy_from_slice(&tile.guides()[from..from + count]);
+            for (x, y) in both.pixels() {
+                guides[bounds.position(x, y)] = tile.guide(x, y);
             }
         }
         guides
@@ -40,12 +38,11 @@ impl Guides {
     pub(crate) fn smaller(&self, bounds: PixelBounds, side: u32) -> Self {
         let small = PixelBounds::whole(bounds.width().div_ceil(side), bounds.height().div_ceil(side));
         let mut film = Tile::new(small, Extras { guides: true, ..Extras::default() });
-        let (_, _, _, guides) = film.sums_mut();
         for tile in &self.tiles {
             for ((x, y), guide) in tile.bounds().pixels().zip(tile.guides()) {
                 let (x, y) = (x - bounds.x0, y - bounds.y0);
                 if x.is_multiple_of(side) && y.is_multiple_of(side) {
-                    guides[small.position(x / side, y / side)] = *guide;
+                    film.set_guide(small.position(x / side, y / side), guide);
                 }
             }
         }

@@ -10,13 +10,14 @@ mod filter;
 mod guide;
 mod guides;
 mod pixel;
+mod sparse;
 mod tile;
 
 pub(crate) use bounds::MAX_PIXELS;
 pub use bounds::PixelBounds;
 pub use exact::ExactSum;
 pub use filter::{Filter, FilterSample, FilterShape};
-pub use guide::{Count, FEATURES, GROUPS, GuideSums, RatioSums};
+pub use guide::{Count, FEATURES, GROUPS, GuideSums, RatioSums, SurfaceSums};
 pub use guides::Guides;
 pub use pixel::{FeatureSample, FeatureSums, Pixel, Tint};
 pub use tile::{Addition, Exposure, Extras, Sample, Tile};

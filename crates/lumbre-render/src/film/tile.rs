@@ -5,7 +5,10 @@ use std::sync::Arc;
 use lumbre_image::Rgb;
 
 use crate::film::pixel::{MAX_SAMPLE, Sums};
-use crate::film::{FeatureSample, FeatureSums, GuideSums, Pixel, PixelBounds, Tint};
+use crate::film::sparse::Sparse;
+use crate::film::{
+    Count, FeatureSample, FeatureSums, GuideSums, Pixel, PixelBounds, RatioSums, SurfaceSums, Tint,
+};
 
 /// How radiance becomes the colour of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,10 +79,42 @@ struct TileSums {
     pixels: Vec<Pixel>,
     // Empty unless features are wanted; else as many as pixels.
     features: Vec<FeatureSums>,
-    // Empty unless coverage is wanted by colour; else as many as pixels.
-    tints: Vec<Tint>,
-    // Empty unless guides are wanted; else as many as pixels.
-    guides: Vec<GuideSums>,
+    // None unless coverage is wanted by colour; else as many as pixels.
+    tints: Sparse<Tint>,
+    guides: TileGuides,
+}
+
+/// The [`GuideSums`] of a tile; none unless they are wanted. Most tiles are of light alone, or of ground alone.
+#[derive(Clone, Debug, PartialEq)]
+struct TileGuides {
+    light: Sparse<RatioSums<3>>,
+    shadow: Sparse<RatioSums<1>>,
+    // As many as pixels, or none.
+    surfaces: Vec<(SurfaceSums, Count)>,
+}
+
+impl TileGuides {
+    fn new(count: usize) -> Self {
+        Self {
+            light: Sparse::new(count),
+            shadow: Sparse::new(count),
+            surfaces: vec![Default::default(); count],
+        }
+    }
+
+    fn get(&self, at: usize) -> GuideSums {
+        let (surfaces, count) = self.surfaces[at];
+        GuideSums { light: self.light.get(at), shadow: self.shadow.get(at), surfaces, count }
+    }
+
+    /// Sets those of a pixel, if they are wanted.
+    fn set(&mut self, at: usize, sums: GuideSums) {
+        if let Some(own) = self.surfaces.get_mut(at) {
+            *own = (sums.surfaces, sums.count);
+            self.light.set(at, sums.light);
+            self.shadow.set(at, sums.shadow);
+        }
+    }
 }
 
 /// What to record of samples in addition to colour and coverage.
@@ -108,8 +143,8 @@ impl Tile {
         let sums = TileSums {
             pixels: vec![Pixel::default(); count],
             features: vec![FeatureSums::default(); if extras.features { count } else { 0 }],
-            tints: vec![Tint::default(); if extras.tints { count } else { 0 }],
-            guides: vec![GuideSums::default(); if extras.guides { count } else { 0 }],
+            tints: Sparse::new(if extras.tints { count } else { 0 }),
+            guides: TileGuides::new(if extras.guides { count } else { 0 }),
         };
         Self { bounds, sums: Arc::new(sums), depth_unit: extras.depth_unit }
     }
@@ -135,24 +170,32 @@ impl Tile {
     }
 
     /// What the denoiser needs of every pixel, row by row; empty unless it was asked for.
-    pub fn guides(&self) -> &[GuideSums] {
-        &self.sums.guides
+    pub fn guides(&self) -> impl Iterator<Item = GuideSums> + '_ {
+        (0..self.sums.guides.surfaces.len()).map(|at| self.sums.guides.get(at))
+    }
+
+    /// What a denoiser wants to know of the pixel in column `x` and row `y` of the picture.
+    ///
+    /// # Panics
+    /// Where that is not in the tile, and where it is not wanted.
+    pub fn guide(&self, x: u32, y: u32) -> GuideSums {
+        self.sums.guides.get(self.bounds.position(x, y))
     }
 
     /// Per-channel coverage minus that of green, row by row; empty unless requested.
-    pub fn tints(&self) -> &[Tint] {
-        &self.sums.tints
+    pub fn tints(&self) -> impl Iterator<Item = Tint> + '_ {
+        self.sums.tints.iter()
     }
 
     /// The coverage of every pixel by colour, row by row; where that is not wanted, of all colours alike.
     pub fn coverages(&self) -> impl Iterator<Item = Rgb> + '_ {
-        let tints = self.sums.tints.iter().copied().chain(std::iter::repeat(Tint::default()));
-        self.sums.pixels.iter().zip(tints).map(|(pixel, tint)| tint.coverage(pixel))
+        let pixels = self.sums.pixels.iter().enumerate();
+        pixels.map(|(at, pixel)| self.sums.tints.get(at).coverage(pixel))
     }
 
     /// Whether the coverage of any pixel is not that of all colours alike.
     pub fn is_tinted(&self) -> bool {
-        self.sums.tints.iter().any(|tint| *tint != Tint::default())
+        self.sums.tints.is_used()
     }
 
     /// Adds a sample to the pixel in column `x` and row `y` of the picture.
@@ -169,14 +212,16 @@ impl Tile {
         if !sample.coverage.is_finite() || !pixel.add(colour, sample.coverage.average(), sample.weight) {
             return Addition::Dropped;
         }
-        if let Some(tint) = sums.tints.get_mut(position) {
-            tint.add(sample.coverage, sample.weight);
+        let catches_shadows = sums.tints.len() > 0;
+        let Rgb { r, g, b } = sample.coverage;
+        if catches_shadows && (r != g || b != g) {
+            sums.tints.get_mut(position).add(sample.coverage, sample.weight);
         }
         if let Some(features) = sums.features.get_mut(position) {
             features.add(sample.features.as_ref(), sample.weight, self.depth_unit);
         }
-        let catches_shadows = !sums.tints.is_empty();
-        if let Some(guide) = sums.guides.get_mut(position) {
+        let TileGuides { light, shadow, surfaces } = &mut sums.guides;
+        if let Some((surfaces, count)) = surfaces.get_mut(position) {
             let is_shadow = sample.on_catcher && catches_shadows;
             let reflectance = match &sample.features {
                 _ if is_shadow => Rgb::BLACK,
@@ -185,12 +230,18 @@ impl Tile {
                 _ => sample.coverage,
             };
             let weighted = |colour: Rgb| (colour * sample.weight as f32).to_array();
-            let is_odd = guide.count.samples % 2 == 1;
-            guide.light.add(weighted(colour), weighted(reflectance), is_odd);
-            let (shadow, ground) =
-                if is_shadow { (sample.coverage, [sample.weight as f32]) } else { (Rgb::BLACK, [0.0]) };
-            guide.shadow.add(weighted(shadow), ground, is_odd);
-            guide.add_features(sample.features.as_ref(), sample.weight as f32);
+            let is_odd = count.samples % 2 == 1;
+            let (over, under) = (weighted(colour), weighted(reflectance));
+            // Zeros change no sum.
+            if over != [0.0; 3] || under != [0.0; 3] {
+                light.get_mut(position).add(over, under, is_odd);
+            }
+            if is_shadow {
+                let ground = [sample.weight as f32];
+                shadow.get_mut(position).add(weighted(sample.coverage), ground, is_odd);
+            }
+            count.add(sample.weight as f32);
+            surfaces.add(sample.features.as_ref());
         }
         let is_clamped = f64::from(colour.max_component()) > MAX_SAMPLE;
         if is_clamped { Addition::Clamped } else { Addition::Whole }
@@ -198,28 +249,9 @@ impl Tile {
 
     /// The part of it in these bounds, and nothing where it has none.
     pub(crate) fn placed_in(&self, bounds: PixelBounds) -> Self {
-        let (both, from, to) = (self.bounds.intersection(&bounds), self.bounds, bounds);
-        fn taken<T: Copy + Default>(
-            list: &[T],
-            count: u64,
-            places: impl Iterator<Item = (usize, usize)>,
-        ) -> Vec<T> {
-            if list.is_empty() {
-                return Vec::new();
-            }
-            let mut taken = vec![T::default(); count as usize];
-            places.for_each(|(from, to)| taken[to] = list[from]);
-            taken
-        }
-        let places = || both.pixels().map(move |(x, y)| (from.position(x, y), to.position(x, y)));
-        let count = bounds.area();
-        let sums = TileSums {
-            pixels: taken(&self.sums.pixels, count, places()),
-            features: taken(&self.sums.features, count, places()),
-            tints: taken(&self.sums.tints, count, places()),
-            guides: taken(&self.sums.guides, count, places()),
-        };
-        Self { bounds, sums: Arc::new(sums), depth_unit: self.depth_unit }
+        let mut placed = Self::new(bounds, self.extras());
+        placed.take(self);
+        placed
     }
 
     /// Adds what another tile of the same kind gathered, all of whose pixels this one has.
@@ -234,28 +266,22 @@ impl Tile {
             let at = self.bounds.position(x, y);
             add(&mut sums.pixels, at, &others.pixels, from);
             add(&mut sums.features, at, &others.features, from);
-            add(&mut sums.tints, at, &others.tints, from);
+            let theirs = others.tints.get(from);
+            if theirs != Tint::default() {
+                sums.tints.get_mut(at).merge(&theirs);
+            }
         }
     }
 
     /// Takes the sums of those pixels of a tile of the same kind that this one has, too.
     pub(crate) fn take(&mut self, other: &Self) {
-        fn copy<T: Copy>(to: &mut [T], at: usize, other: &[T], from: usize) {
-            if let (Some(to), Some(&other)) = (to.get_mut(at), other.get(from)) {
-                *to = other;
-            }
-        }
-        let (sums, others) = (Arc::make_mut(&mut self.sums), &other.sums);
+        let sums = Arc::make_mut(&mut self.sums);
         for (x, y) in self.bounds.intersection(&other.bounds).pixels() {
-            let (at, from) = (self.bounds.position(x, y), other.bounds.position(x, y));
-            copy(&mut sums.pixels, at, &others.pixels, from);
-            copy(&mut sums.features, at, &others.features, from);
-            copy(&mut sums.tints, at, &others.tints, from);
-            copy(&mut sums.guides, at, &others.guides, from);
+            sums.copy(self.bounds.position(x, y), &other.sums, other.bounds.position(x, y));
         }
     }
 
-    /// The memory of a tile.
+    /// The memory of a tile, at most.
     pub(crate) fn memory_bytes(bounds: PixelBounds, extras: Extras) -> u64 {
         let sizes = [
             (true, size_of::<Pixel>()),
@@ -267,18 +293,28 @@ impl Tile {
         bounds.area().saturating_mul(each as u64)
     }
 
-    /// All sums, to be set.
-    pub(crate) fn sums_mut(&mut self) -> (&mut [Pixel], &mut [Tint], &mut [FeatureSums], &mut [GuideSums]) {
-        let TileSums { pixels, features, tints, guides } = Arc::make_mut(&mut self.sums);
-        (pixels, tints, features, guides)
+    /// The sums of pixels and features, to be set.
+    pub(crate) fn sums_mut(&mut self) -> (&mut [Pixel], &mut [FeatureSums]) {
+        let TileSums { pixels, features, .. } = Arc::make_mut(&mut self.sums);
+        (pixels, features)
+    }
+
+    /// Sets the tint of a pixel, by its position, where it is wanted.
+    pub(crate) fn set_tint(&mut self, at: usize, tint: Tint) {
+        Arc::make_mut(&mut self.sums).tints.set(at, tint);
+    }
+
+    /// Sets the guides of a pixel, by its position, where they are wanted.
+    pub(crate) fn set_guide(&mut self, at: usize, guide: GuideSums) {
+        Arc::make_mut(&mut self.sums).guides.set(at, guide);
     }
 
     /// What is gathered besides colours.
     pub fn extras(&self) -> Extras {
         Extras {
             features: !self.sums.features.is_empty(),
-            tints: !self.sums.tints.is_empty(),
-            guides: !self.sums.guides.is_empty(),
+            tints: self.sums.tints.len() > 0,
+            guides: !self.sums.guides.surfaces.is_empty(),
             depth_unit: self.depth_unit,
         }
     }
@@ -307,14 +343,9 @@ impl Tile {
         if self.sums.pixels.first().is_none_or(|pixel| pixel.samples > 0) {
             return;
         }
-        fn copy<T: Copy>(to: &mut [T], from: &[T]) {
-            to.iter_mut().zip(from).take(1).for_each(|(to, from)| *to = *from);
+        if !other.sums.pixels.is_empty() {
+            Arc::make_mut(&mut self.sums).copy(0, &other.sums, 0);
         }
-        let (sums, others) = (Arc::make_mut(&mut self.sums), &other.sums);
-        copy(&mut sums.pixels, &others.pixels);
-        copy(&mut sums.features, &others.features);
-        copy(&mut sums.tints, &others.tints);
-        copy(&mut sums.guides, &others.guides);
     }
 
     /// Gives every pixel that has no sample the sums of the first pixel of its square of `side` by `side` pixels, counted from
@@ -322,23 +353,42 @@ impl Tile {
     pub fn spread(&mut self, side: u32) {
         let width = self.bounds.width() as usize;
         let side = side.max(1) as usize;
-        let TileSums { pixels, features, tints, guides } = Arc::make_mut(&mut self.sums);
-        for at in 0..pixels.len() {
-            if pixels[at].samples > 0 {
-                continue;
+        // A tile that is whole is not copied.
+        if self.sums.pixels.iter().all(|pixel| pixel.samples > 0) {
+            return;
+        }
+        let sums = Arc::make_mut(&mut self.sums);
+        for at in 0..sums.pixels.len() {
+            if sums.pixels[at].samples == 0 {
+                let (x, y) = (at % width, at / width);
+                sums.copy_within((y - y % side) * width + (x - x % side), at);
             }
-            let (x, y) = (at % width, at / width);
-            let from = (y - y % side) * width + (x - x % side);
-            pixels[at] = pixels[from];
-            if let Some(&tint) = tints.get(from) {
-                tints[at] = tint;
-            }
-            if let Some(&sums) = features.get(from) {
-                features[at] = sums;
-            }
-            if let Some(&guide) = guides.get(from) {
-                guides[at] = guide;
-            }
+        }
+    }
+}
+
+impl TileSums {
+    /// Takes the sums of a pixel of another tile of the same kind.
+    fn copy(&mut self, at: usize, other: &Self, from: usize) {
+        self.pixels[at] = other.pixels[from];
+        if let (Some(features), Some(theirs)) = (self.features.get_mut(at), other.features.get(from)) {
+            *features = *theirs;
+        }
+        self.tints.set(at, other.tints.get(from));
+        if from < other.guides.surfaces.len() {
+            self.guides.set(at, other.guides.get(from));
+        }
+    }
+
+    /// Gives a pixel the sums of another.
+    fn copy_within(&mut self, from: usize, to: usize) {
+        self.pixels[to] = self.pixels[from];
+        if !self.features.is_empty() {
+            self.features[to] = self.features[from];
+        }
+        self.tints.set(to, self.tints.get(from));
+        if !self.guides.surfaces.is_empty() {
+            self.guides.set(to, self.guides.get(from));
         }
     }
 }
@@ -405,6 +455,43 @@ mod tests {
         assert!((by_colour[6] - mean).map(f32::abs).max_component() < 1e-6, "{:?} {mean:?}", by_colour[6]);
         assert!((alike[6] - Rgb::splat(mean.average())).map(f32::abs).max_component() < 1e-6);
         assert_eq!((by_colour[5], tiles[0].is_tinted(), tiles[1].is_tinted()), (Rgb::BLACK, true, false));
+    }
+
+    #[test]
+    fn a_tile_keeps_of_guides_what_its_pixels_have() {
+        let bounds = PixelBounds { x0: 5, y0: 7, x1: 9, y1: 10 };
+        let extras = Extras { tints: true, guides: true, ..Extras::default() };
+        let sample = |radiance, on_catcher| Sample {
+            radiance,
+            coverage: Rgb::splat(if on_catcher { 0.5 } else { 0.0 }),
+            weight: 1.0,
+            features: None,
+            on_catcher,
+        };
+        let light = Rgb::new(2.0, 0.5, 0.0);
+        for (samples, has) in [
+            (vec![sample(Rgb::BLACK, true), sample(Rgb::BLACK, false)], [false, true]),
+            (vec![sample(light, false), sample(Rgb::BLACK, false)], [true, false]),
+            (vec![sample(light, false), sample(Rgb::BLACK, true)], [true, true]),
+        ] {
+            let mut tile = Tile::new(bounds, extras);
+            let mut expected = GuideSums::default();
+            for (i, sample) in samples.iter().enumerate() {
+                assert_eq!(tile.add(6, 8, sample, &Exposure::default()), Addition::Whole);
+                let reflectance = if sample.on_catcher { [0.0; 3] } else { sample.coverage.to_array() };
+                expected.light.add(sample.radiance.to_array(), reflectance, i == 1);
+                if sample.on_catcher {
+                    expected.shadow.add(sample.coverage.to_array(), [1.0], i == 1);
+                }
+                expected.count.add(1.0);
+                expected.surfaces.add(None);
+            }
+            let guides = &tile.sums.guides;
+            assert_eq!([guides.light.is_used(), guides.shadow.is_used()], has);
+            assert_eq!((tile.guide(6, 8), tile.guide(5, 8)), (expected, GuideSums::default()));
+            assert!(tile.placed_in(PixelBounds { x0: 6, ..bounds }).guide(6, 8) == expected);
+            assert_eq!((tile.guides().count(), tile.tints().count(), tile.is_tinted()), (12, 12, false));
+        }
     }
 
     #[test]

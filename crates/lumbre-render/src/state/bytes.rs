@@ -57,11 +57,11 @@ impl RenderState {
             self.tiles.iter().for_each(|tile| strip.take(tile));
             self.tiles.retain(|tile| tile.bounds().y1 > place.y1);
             planes(out, &mut bytes, strip.pixels(), pixel_numbers)?;
-            planes(out, &mut bytes, strip.tints(), |tint| [tint.red, tint.blue].map(ExactSum::units))?;
+            let tints: Vec<Tint> = strip.tints().collect();
+            planes(out, &mut bytes, &tints, |tint| [tint.red, tint.blue].map(ExactSum::units))?;
             planes(out, &mut bytes, strip.features(), feature_numbers)?;
-            planes(out, &mut bytes, strip.guides(), |guide| {
-                guide.words().map(|word| i128::from(word as i32))
-            })?;
+            let guides: Vec<GuideSums> = strip.guides().collect();
+            planes(out, &mut bytes, &guides, |guide| guide.words().map(|word| i128::from(word as i32)))?;
         }
         Ok(())
     }
@@ -131,13 +131,21 @@ impl RenderState {
         let mut tiles = Vec::new();
         for place in strips(bounds) {
             let mut strip = Tile::new(place, extras);
-            let (pixels, tints, features, guides) = strip.sums_mut();
+            let (pixels, _) = strip.sums_mut();
+            let count = pixels.len();
             input.planes(pixels, pixel_of)?;
-            input.planes(tints, |[red, blue]| {
+            let mut read = vec![Tint::default(); if tints { count } else { 0 }];
+            input.planes(&mut read, |[red, blue]| {
                 Some(Tint { red: ExactSum::from_units(red), blue: ExactSum::from_units(blue) })
             })?;
+            read.into_iter().enumerate().for_each(|(at, tint)| strip.set_tint(at, tint));
+            let (_, features) = strip.sums_mut();
             input.planes(features, |numbers| Some(features_of(numbers)))?;
-            input.planes(guides, |numbers| Some(GuideSums::of_words(numbers.map(|number| number as u32))))?;
+            let mut read = vec![GuideSums::default(); if guides { count } else { 0 }];
+            input.planes(&mut read, |numbers| {
+                Some(GuideSums::of_words(numbers.map(|number| number as u32)))
+            })?;
+            read.into_iter().enumerate().for_each(|(at, guide)| strip.set_guide(at, guide));
             tiles.push(strip);
         }
         let rays = RayCounts { camera, bounce, shadow };
