@@ -174,7 +174,7 @@ impl Tile {
         (0..self.sums.guides.surfaces.len()).map(|at| self.sums.guides.get(at))
     }
 
-    /// What a denoiser wants to know of the pixel in column `x` and row `y` of the picture.
+    /// The denoiser's guides of the pixel in column `x` and row `y` of the picture.
     ///
     /// # Panics
     /// Where that is not in the tile, and where it is not wanted.
