@@ -187,7 +187,7 @@ impl Identified {
     }
 }
 
-/// The checkpoint of one picture, and whence it goes on.
+/// The checkpoint of one picture, and the state that it continues from.
 pub(crate) struct Checkpoint {
     /// `None` where none is kept.
     path: Option<PathBuf>,

@@ -356,7 +356,7 @@ impl ReadingArguments {
         Ok(())
     }
 
-    /// What a POV-Ray scene is told of the picture and of the frame.
+    /// Sets the values that a POV-Ray scene can read: declares, the picture and the frame.
     fn pov_options(&self, number: Option<u32>, pov: &mut PovOptions) {
         pov.library.clone_from(&self.pov_include);
         pov.declares.clone_from(&self.pov_declare);

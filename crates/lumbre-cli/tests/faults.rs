@@ -194,7 +194,7 @@ fn a_disk_that_takes_nothing_is_found_out_before_rendering() {
     fs::write(folder.path("fixed/a.exr"), "someone's").unwrap();
     mount.remount("ro");
     for output in ["fixed/a.exr", "fixed/b.png"] {
-        // So many samples take hours.
+        // This many samples take hours.
         let (status, said) = folder.lumbre(&["render", "scene.pbrt", "--spp", "1000000000", "-o", output]);
         assert!(status == 4 && said.contains(output) && said.contains("Read-only"), "{status} {said}");
     }

@@ -100,7 +100,7 @@ fn in_channels(
     channels
 }
 
-/// Azimuths have to go all the way round, unless there is but one or two, of an isotropic material.
+/// Azimuths have to go all the way round, unless there are only one or two, for an isotropic material.
 fn check_span(phi_i: &Array) -> Result<()> {
     let (first, last) = (phi_i.values[0], phi_i.values[phi_i.values.len() - 1]);
     let spans = (last - first - std::f32::consts::TAU).abs() < 0.01;

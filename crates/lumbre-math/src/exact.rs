@@ -1,7 +1,7 @@
 //! Determinants, inverses and linear equations in exact arithmetic: a matrix is singular where its determinant is 0, and nowhere else.
 //!
 //! Every double is a whole number times a power of two, and so are their sums and products. Such numbers are kept here in full;
-//! only a result is rounded. That costs microseconds, and is for those who ask for one matrix: what renders uses
+//! only a result is rounded. That costs microseconds, which is fine for a single matrix: what renders uses
 //! [`Transform`](crate::Transform).
 
 /// A whole number times a power of two.

@@ -440,7 +440,7 @@ impl Scene {
         self.stages.trees()
     }
 
-    /// The size of its picture, where none is asked for.
+    /// The default size of its picture.
     fn size(&self, py: Python<'_>) -> PyResult<(u32, u32)> {
         let options = self.shown(py, SceneRequest::default())?.scene.options();
         Ok((options.width, options.height))

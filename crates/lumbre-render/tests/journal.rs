@@ -1,4 +1,4 @@
-//! What is told of a sample is what the render does.
+//! The journal of a sample equals what the render does.
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 

@@ -626,7 +626,7 @@ struct Exit<R: Real> {
     /// Inside the coat; light leaves against it.
     wi: V3<R>,
     weight: V3<R>,
-    /// Means nothing for a smooth interface, which has no density.
+    /// Undefined for a smooth interface, which has no density.
     density: R,
     has_density: R::Mask,
     /// The reflectance of a mirror base towards the exit; black for other bases.

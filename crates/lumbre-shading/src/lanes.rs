@@ -51,7 +51,7 @@ pub struct LaneSample<R: Real> {
     pub weight: V3<R>,
     /// The density per unit solid angle; 1 for a delta.
     pub pdf: R,
-    /// Where there is a sample. Elsewhere the light is absorbed, and the other members mean nothing.
+    /// Whether there is a sample. Otherwise the light is absorbed, and the other members are undefined.
     pub valid: R::Mask,
     /// Where the direction is the only possible one.
     pub delta: R::Mask,

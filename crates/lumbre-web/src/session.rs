@@ -10,7 +10,7 @@ use lumbre::image::unit_to_u8;
 use lumbre::{
     CancelToken, DVec3, NoProgress, Picture, Ray, ReadOptions, RenderOptions, RenderState, SaveOptions, Scene,
 };
-use lumbre_cli::{Defaults, Format, Language, Query, Request, Things};
+use lumbre_cli::{Defaults, Format, Language, Query, Request, SceneNames};
 use serde::{Deserialize, Serialize};
 
 use crate::problem::{Problem, ProblemKind};
@@ -83,7 +83,7 @@ pub struct Explained {
 #[derive(Debug)]
 pub struct Session {
     scene: Scene,
-    things: Things,
+    things: SceneNames,
     name: PathBuf,
     options: RenderOptions,
     defaults: Defaults,
@@ -105,7 +105,7 @@ impl Session {
         reading.limits.memory = MEMORY;
         reading.held = Some(Arc::new(files));
         let (mut desc, mut diagnostics) = lumbre::describe(&[&name], &reading)?;
-        let things = Things::of(&desc);
+        let things = SceneNames::of(&desc);
         let kind = match &wanted.integrator {
             None => None,
             Some(name) => Some(IntegratorKind::from_name(name).ok_or_else(|| {

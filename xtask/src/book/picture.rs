@@ -1,5 +1,5 @@
 //! Pictures of the book: each is rendered of the scene beside it, and again only where that or the program has changed. The repository keeps
-//! them small, for those who read the pages there.
+//! them small, for readers of the pages there.
 
 use std::collections::BTreeMap;
 use std::fs;

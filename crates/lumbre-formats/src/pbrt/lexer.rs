@@ -44,7 +44,7 @@ pub(super) struct Lexer<B> {
     bytes: B,
     file: u32,
     at: usize,
-    // The last position whose place was computed: the next one continues from it, so that places in order take
+    // The last position with a computed line and column: the next one continues from it, so that places in order take
     // one pass over the file.
     walked: Walked,
 }

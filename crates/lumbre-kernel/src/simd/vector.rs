@@ -91,7 +91,7 @@ pub(crate) trait F32x16: Vector<Array = [f32; WIDE]> + Zeroable {
     fn rounded_from(row: &Row<f64>, place: f64, scale: f64) -> Self;
     /// The difference to a number in double precision, rounded once.
     fn rounded_less(self, place: f64) -> Self;
-    /// From a place, rounded, and what rounding took.
+    /// Relative to a place: rounded, and the rounding error.
     fn parted_from(row: &Row<f64>, place: f64) -> (Self, Self);
     /// The largest of all; any of them where one is a NaN.
     fn reduce_max(self) -> f32;
@@ -174,7 +174,8 @@ pub(crate) trait F32x16: Vector<Array = [f32; WIDE]> + Zeroable {
     }
 }
 
-/// The last eight of sixteen, as a mask of which the compiler knows nothing: where it does know, it shuffles numbers instead of reading each
+/// The last eight of sixteen, as a mask of which the compiler knows nothing: where it does know, it shuffles numbers
+/// instead of reading each
 /// to where it belongs.
 #[derive(Clone, Copy)]
 #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code, reason = "for AVX alone"))]

@@ -247,7 +247,7 @@ fn rays_together_meet_the_boxes_that_each_meets_alone() {
                 let first = those.clone().map(|(_, (_, enters))| enters[child]).reduce(f32::min);
                 assert_eq!(met >> child & 1 != 0, first.is_some(), "{isa:?}");
                 if let Some(first) = first {
-                    // What is negative gives way to where the ray starts, which is zero.
+                    // A negative entry is replaced by the start of the ray, which is zero.
                     assert_eq!(enters[child], first, "{isa:?}");
                     met_by_few += usize::from(those.count() < 4);
                 } else {

@@ -171,7 +171,7 @@ fn check(accel: &Accel, rays: &[Ray32], expected: &[Option<Hit32>], sizes: &[usi
     check_batches(accel, rays, expected, sizes)
 }
 
-/// What a batch meets, and whether; also where those that do not go together do not fly as a rule.
+/// The closest hits of a batch, and whether there are hits; also with incoherent rays interleaved where they usually are not.
 pub(super) fn in_batch(
     accel: &Accel,
     isa: Isa,

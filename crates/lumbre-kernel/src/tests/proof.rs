@@ -1,6 +1,7 @@
 //! Proof by numbers: rays aimed at edges and vertices that must not leak, and trees that must answer as loops do.
 //!
-//! The counts of the ignored tests are set by `LUMBRE_PROOF_RAYS`, which rays they are by `LUMBRE_PROOF_SEED`; `cargo xtask proof` runs them.
+//! The counts of the ignored tests are set by `LUMBRE_PROOF_RAYS`, which rays they are by `LUMBRE_PROOF_SEED`; `cargo
+//! xtask proof` runs them.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

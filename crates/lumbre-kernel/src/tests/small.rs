@@ -1,6 +1,7 @@
 //! A little of everything, small enough for an interpreter: what `cargo xtask miri` runs.
 //!
-//! All other tests are left out there, but for that of the stack. The instruction sets that it does not know are not found, so that this goes through the
+//! All other tests are left out there, but for that of the stack. The instruction sets that it does not know are not
+//! found, so that this goes through the
 //! portable path, with the stack that is not cleared and every look-up that is not checked.
 
 use std::sync::Arc;

@@ -218,7 +218,8 @@ fn leaves(entries: &[Entry]) -> impl Iterator<Item = (&[Entry], usize)> {
 /// be m = 64u N (W + S) + N `moved` + 16u.
 ///
 /// *Slabs.* The planes of the cube, moved outwards by m, are met at near = -(a + w) / |d| and far = (w - a) / |d|, with the sign of
-/// d taken off p for a, and w = 1 + m (or m along y where the bounding volume is flat). Their roundings are worth less than 3u|h d| + 2u (|a| + w)
+/// d taken off p for a, and w = 1 + m (or m along y where the bounding volume is flat). Their roundings are worth less
+/// than 3u|h d| + 2u (|a| + w)
 /// ≤ 7u N (W + S) + 4u on the axis, for which m has room: near ≤ h ≤ far at every hit.
 ///
 /// *Profile.* What is left of the line, between heights among which h is, is again p' + k d' with |k| ≤ 1: p' in its middle, and

@@ -11,8 +11,8 @@
 //! until its largest component lies in [1, 2), and `o` lies slightly before the point of the line nearest to the tree's
 //! origin, so that a ray from far away is as precise as one from nearby.
 //!
-//! A hit's point, as the leaf computed it, lies within `slop` (tree units, on each axis) of its box and of the line `o
-//! + s d`: the f64 arithmetic of leaves, instances and of this set-up has an error of a few 2⁻⁵³ of the coordinates
+//! A hit's point, as the leaf computed it, lies within `slop` (tree units, on each axis) of its box and of the line
+//! `o + s d`: the f64 arithmetic of leaves, instances and of this set-up has an error of a few 2⁻⁵³ of the coordinates
 //! involved. `slop` allows 2⁻⁴⁷ of them times the condition of the transforms, and at least 2⁻⁴⁰.
 //!
 //! On one axis let `R = 1/d > 0` and `p` be the lower plane; the hit has `s ≥ (p - o - slop) R` exactly. We compute

@@ -142,8 +142,8 @@ impl ExactSphere {
 /// In double precision, adding the cloud's origin rounds centres once more: by 2⁻⁵³ of the origin's largest coordinate.
 /// Both margins include 2⁻⁴⁸ of it.
 ///
-/// If the computed |p| ≤ r - `margin`, the ray certainly crosses the sphere. The first crossing is at or after b - √(s²
-/// - p²), as shown above, and at or before b - √((r - `margin`)² - p²), which for the same reasons is no less, both as
+/// If the computed |p| ≤ r - `margin`, the ray certainly crosses the sphere. The first crossing is at or after b -
+/// √(s² - p²), as shown above, and at or before b - √((r - `margin`)² - p²), which for the same reasons is no less, both as
 /// computed here and give or take (10.5 + 1 + 2 + 3)uR. Of two such spheres, one is certainly nearer if its latter
 /// value is by `range_margin` before the former value of the other: that is twice the error, and leaves 31uR for
 /// rounding.

@@ -227,7 +227,7 @@ impl Tile {
         self.sums.buckets.chunks(self.extras().bucket_count().max(1))
     }
 
-    /// What the denoiser needs of the pixel in column `x` and row `y` of the picture.
+    /// The denoiser's guides of the pixel in column `x` and row `y` of the picture.
     ///
     /// # Panics
     /// Where that is not in the tile, and where it was not asked for.

@@ -74,7 +74,7 @@ impl Avx2 {
         }
     }
 
-    /// Of eight words from here on, those that the mask chooses first; the others mean nothing.
+    /// Eight words from here on, those of the mask first; the others are undefined.
     ///
     /// # Safety
     /// There are as many.

@@ -18,7 +18,7 @@ impl Receivers {
     #[inline(always)]
     pub(super) fn new<R: Real>(receiver: &Receiver<R>) -> Self {
         let mut time = None;
-        // No `map`: closures do not take on the instruction set.
+        // No closures: they do not inherit target features.
         if let Some(at) = receiver.time {
             time = Some(at.to_lanes());
         }
