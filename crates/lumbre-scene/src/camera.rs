@@ -189,7 +189,7 @@ pub struct Camera {
     pub clip: Option<ClipPlane>,
 }
 
-/// A plane that cuts what is in front of it out of the camera's sight. Rays from the camera begin behind it; light and shadows know nothing of it.
+/// A plane that hides everything in front of it from the camera. Camera rays begin behind it; light and shadows ignore it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClipPlane {
     /// A point of it.

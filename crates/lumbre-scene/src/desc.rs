@@ -431,8 +431,7 @@ pub enum FilmSpace {
     World,
 }
 
-/// A range of wavelengths, and into how many equal parts it is cut. A film with buckets samples all wavelengths of the range alike, and none
-/// outside.
+/// A range of wavelengths, cut into equal parts. A film with buckets samples the wavelengths of the range evenly, and none outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Buckets {
     /// The parts: at least one.

@@ -1,6 +1,6 @@
 //! Files that were dropped on the page, in one request: a folder of ours gets them, and nothing outside it.
 //!
-//! `LUMF`, the length of a list as four bytes, the least significant first, the list as JSON (`[{"name": "a/b.obj", "size": 7}, …]`), and then the
+//! `LUMF`, the length of a list (four bytes, little-endian), the list as JSON (`[{"name": "a/b.obj", "size": 7}, …]`), and then the
 //! bytes of the files one after the other.
 
 use std::collections::BTreeSet;

@@ -84,8 +84,8 @@ const MAX_TICKETS: usize = 64;
 const FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 
 impl Guard {
-    /// That of a viewer at an address, with other names under which it may be reached, as `name:port`, and the file in which the secret
-    /// of the session outlives it. So many more browsers may watch.
+    /// For a viewer at an address, with other names for it, as `name:port`, and the file that keeps the secret of the
+    /// session across restarts. This many more browsers may watch.
     ///
     /// # Errors
     /// If the system gives no random bytes.

@@ -53,14 +53,14 @@ pub(crate) struct Thing {
     /// Its own name, if the file gives one.
     pub name: Option<Arc<str>>,
     /// That of its material.
-    pub material: Option<Substance>,
+    pub material: Option<MaterialInfo>,
     /// Whether it emits light.
     pub shines: bool,
 }
 
 /// What a material is called.
 #[derive(Clone, Debug)]
-pub(crate) struct Substance {
+pub(crate) struct MaterialInfo {
     /// Its name and its kind.
     label: Arc<str>,
     /// What its parameters belong to: [`lumbre::Parameter::owner`].
@@ -75,7 +75,7 @@ impl Default for Thing {
 }
 
 impl Thing {
-    fn new(shape: &ShapeDesc, desc: &SceneDesc, substances: &[Substance]) -> Self {
+    fn new(shape: &ShapeDesc, desc: &SceneDesc, substances: &[MaterialInfo]) -> Self {
         Self {
             kind: shape.geometry.name(),
             name: desc.listing.shapes.get(&shape.index).cloned(),
@@ -93,11 +93,11 @@ impl Thing {
     }
 }
 
-fn substances(desc: &SceneDesc) -> Vec<Substance> {
+fn substances(desc: &SceneDesc) -> Vec<MaterialInfo> {
     let all = desc.materials.iter().enumerate().map(|(index, material)| {
         let name = material.name.clone().unwrap_or_else(|| index.to_string());
         let owner = format!("material {name} ({})", material.material.kind.name());
-        Substance { label: material.label().into(), owner: owner.into() }
+        MaterialInfo { label: material.label().into(), owner: owner.into() }
     });
     all.collect()
 }

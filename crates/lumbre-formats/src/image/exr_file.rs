@@ -310,7 +310,7 @@ pub(super) fn encode(layers: &Layers, options: &WriteOptions) -> std::io::Result
     picture.write().to_buffered(&mut out).map_err(invalid)?;
     let mut bytes = out.into_inner();
     if has_several {
-        // The crate writes several of one's own in any order, another each time.
+        // The crate writes several custom ones in an order that changes every time.
         sort_attributes(&mut bytes);
     }
     Ok(bytes)

@@ -58,7 +58,7 @@ impl Isa {
         all
     }
 
-    /// How many numbers a register holds: for whoever orders them, as [`InstructionSet::lanes`].
+    /// How many numbers a register holds, as [`InstructionSet::lanes`].
     fn lanes(self) -> usize {
         match self.0 {
             Set::Portable => 1,
