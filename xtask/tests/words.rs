@@ -160,7 +160,7 @@ fn phrases_are_found_as_whole_words() {
     fn found(path: &str, text: &str) -> usize {
         faults(path, text).len()
     }
-    assert_eq!(found("crates/a/src/a.rs", "const MOST_RAYS: u32 = 3; // LEAST_RAYS, and this many"), 3);
+    assert_eq!(found("crates/a/src/a.rs", "const MOST_RAYS: u32 = 3; // LEAST_RAYS, and so many"), 3);
     assert_eq!(found("crates/a/src/a.rs", "let almost = \"so many\"; let UTMOST_ = MOST;"), 0);
     assert_eq!(found("docs/a.md", "Whoever reads: `const MOST_RAYS`.\nSo many."), 2);
     assert_eq!(found("crates/lumbre-kernel/src/a.rs", &format!("// {}", "ä".repeat(137))), 0);
