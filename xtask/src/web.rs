@@ -96,7 +96,7 @@ pub(crate) fn make(wanted: &Web) -> Result<()> {
     if !missing.is_empty() {
         bail!("cargo xtask web needs\n  {}", missing.join("\n  "));
     }
-    let pictures = wanted.pictures.as_ref().map(|folder| std::path::absolute(folder)).transpose()?;
+    let pictures = wanted.pictures.as_ref().map(std::path::absolute).transpose()?;
     build()?;
     if wanted.no_tests { Ok(()) } else { test(pictures.as_deref()) }
 }

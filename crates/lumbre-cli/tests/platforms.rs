@@ -42,7 +42,7 @@ fn scene_of(images: &str, meshes: &str, separator: char) -> String {
     scene.replace("/skin", &format!("{escaped}skin")).replace("/m.ply", &format!("{escaped}m.ply"))
 }
 
-/// The bytes of the picture of a scene.
+/// The bytes of the picture of a scene, in a format without a note of the scene's name.
 fn picture(folder: &Folder, scene: &str, name: &str) -> Vec<u8> {
     let (code, said) = folder.lumbre(&["render", scene, "-o", name, "-q", "--strict"]);
     assert_eq!((code, &*said), (0, ""), "{scene}");
@@ -53,10 +53,10 @@ fn picture(folder: &Folder, scene: &str, name: &str) -> Vec<u8> {
 fn lines_that_end_as_on_windows_make_the_same_picture() {
     let folder = Folder::new();
     write(&folder, "a.pbrt", "images", "meshes");
-    let expected = picture(&folder, "a.pbrt", "a.png");
+    let expected = picture(&folder, "a.pbrt", "a.pfm");
     folder.write("b.pbrt", &scene_of("images", "meshes", '/').replace('\n', "\r\n"));
     fs::write(folder.path("meshes/m.ply"), MESH.replace('\n', "\r\n")).unwrap();
-    assert!(picture(&folder, "b.pbrt", "b.png") == expected);
+    assert!(picture(&folder, "b.pbrt", "b.pfm") == expected);
     folder.write("rays.csv", "ox,oy,oz,dx,dy,dz\r\n0,-8,0.25,0,1,0\r\n0,-8,0,0,0,1\r\n");
     let output =
         folder.command(&["cast", "b.pbrt", "--rays", "rays.csv", "--query", "any"]).output().unwrap();
@@ -64,19 +64,19 @@ fn lines_that_end_as_on_windows_make_the_same_picture() {
     let model = "mtllib m.mtl\nv -2 -2 0\nv 2 -2 0\nv 2 2 0\nusemtl red\nf 1 2 3\n";
     folder.write("m.mtl", "newmtl red\nKd 0.8 0.1 0.1\n");
     folder.write("m.obj", model);
-    let expected = picture(&folder, "m.obj", "m.png");
+    let expected = picture(&folder, "m.obj", "m.pfm");
     folder.write("m.mtl", "newmtl red\r\nKd 0.8 0.1 0.1\r\n");
     folder.write("m.obj", &model.replace('\n', "\r\n"));
-    assert!(picture(&folder, "m.obj", "n.png") == expected);
+    assert!(picture(&folder, "m.obj", "n.pfm") == expected);
 }
 
 #[test]
 fn names_have_spaces_and_any_script() {
     let folder = Folder::new();
     write(&folder, "plain.pbrt", "images", "meshes");
-    let expected = picture(&folder, "plain.pbrt", "plain.png");
+    let expected = picture(&folder, "plain.pbrt", "plain.pfm");
     write(&folder, "Ñandú 雪 сцена.pbrt", "mis imágenes", "сетка 🙂");
-    assert!(picture(&folder, "Ñandú 雪 сцена.pbrt", "una imagen – 雪.png") == expected);
+    assert!(picture(&folder, "Ñandú 雪 сцена.pbrt", "una imagen – 雪.pfm") == expected);
     let (code, said) = folder.lumbre(&["render", "Ñandú 雪 сцена.pbrt", "--spp", "1"]);
     assert_eq!((code, folder.path("a.png").exists()), (0, true), "{said}");
     // A name that is not there is said as it is.
@@ -160,10 +160,10 @@ mod windows {
         let folder = Folder::new();
         write(&folder, "a.pbrt", "images", "meshes");
         let expected = picture(&folder, "a.pbrt", "a.png");
-        fs::write(folder.path("b.png"), "the old picture").unwrap();
-        let held = fs::File::open(folder.path("b.png")).unwrap();
+        fs::write(folder.path("b.pfm"), "the old picture").unwrap();
+        let held = fs::File::open(folder.path("b.pfm")).unwrap();
         fs::write(folder.path("c.png"), "another").unwrap();
-        if fs::rename(folder.path("c.png"), folder.path("b.png")).is_err() {
+        if fs::rename(folder.path("c.png"), folder.path("b.pfm")).is_err() {
             return eprintln!("left out: this system replaces no open file");
         }
         assert!(picture_over(&folder) == expected);
@@ -174,7 +174,7 @@ mod windows {
     fn picture_over(folder: &Folder) -> Vec<u8> {
         let (code, said) = folder.lumbre(&["render", "a.pbrt", "-o", "b.png"]);
         assert_eq!(code, 0, "{said}");
-        fs::read(folder.path("b.png")).unwrap()
+        fs::read(folder.path("b.pfm")).unwrap()
     }
 
     #[test]
@@ -183,9 +183,9 @@ mod windows {
         let folder = Folder::new();
         write(&folder, "a.pbrt", "images", "meshes");
         let expected = picture(&folder, "a.pbrt", "a.png");
-        fs::write(folder.path("b.png"), "the old picture").unwrap();
+        fs::write(folder.path("b.pfm"), "the old picture").unwrap();
         let hold =
-            || fs::File::options().read(true).share_mode(FILE_SHARE_READ).open(folder.path("b.png")).unwrap();
+            || fs::File::options().read(true).share_mode(FILE_SHARE_READ).open(folder.path("b.pfm")).unwrap();
         let held = hold();
         let (code, said) = folder.lumbre(&["render", "a.pbrt", "-o", "b.png"]);
         assert_eq!((code, said.contains("Another program has it open")), (4, true), "{said}");
@@ -193,7 +193,7 @@ mod windows {
         assert!(folder.names().iter().any(|name| name.starts_with("b.png.rescued.")), "{said}");
         assert!(!folder.names().iter().any(|name| name.ends_with(".lumbre.part")), "{:?}", folder.names());
         drop(held);
-        assert_eq!(fs::read(folder.path("b.png")).unwrap(), b"the old picture");
+        assert_eq!(fs::read(folder.path("b.pfm")).unwrap(), b"the old picture");
         // A scanner is done in a moment.
         let held = hold();
         let child = folder.command(&["render", "a.pbrt", "-o", "b.png", "-q"]).spawn().unwrap();
@@ -201,7 +201,7 @@ mod windows {
         drop(held);
         let output = child.wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(0));
-        assert!(fs::read(folder.path("b.png")).unwrap() == expected);
+        assert!(fs::read(folder.path("b.pfm")).unwrap() == expected);
     }
 
     #[test]
