@@ -174,10 +174,10 @@ impl Server {
             let errand = self.guard.redeem(ticket).filter(|_| visit.let_in()).ok_or(StatusCode::FORBIDDEN)?;
             return match (request.method(), errand) {
                 (&Method::GET, Errand::Picture { format: FileFormat::Png }) => {
-                    self.picture(ImageFormat::Png, "image/png", "picture.png").await
+                    self.picture(ImageFormat::Png, "image/png").await
                 }
                 (&Method::GET, Errand::Picture { format: FileFormat::Exr }) => {
-                    self.picture(ImageFormat::Exr, "image/x-exr", "picture.exr").await
+                    self.picture(ImageFormat::Exr, "image/x-exr").await
                 }
                 (&Method::GET, Errand::Explanation { language, pixel }) => {
                     self.explanation(language, pixel).await
@@ -199,22 +199,15 @@ impl Server {
         Ok(answer)
     }
 
-    async fn picture(
-        &self,
-        format: ImageFormat,
-        kind: &'static str,
-        name: &str,
-    ) -> Result<Answer, StatusCode> {
+    async fn picture(&self, format: ImageFormat, kind: &'static str) -> Result<Answer, StatusCode> {
         let session = self.session.clone();
         // It takes a while; other requests should not wait for it.
         let encoded = tokio::task::spawn_blocking(move || session.file(format)).await;
         let bytes = encoded.ok().and_then(Result::ok).ok_or(StatusCode::NOT_FOUND)?;
         let mut answer = Response::new(Full::new(bytes.into()));
         answer.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static(kind));
-        let name = HeaderValue::from_str(&format!("attachment; filename=\"{name}\""));
-        answer
-            .headers_mut()
-            .insert(CONTENT_DISPOSITION, name.map_err(|_| StatusCode::INTERNAL_SERVER_ERROR)?);
+        // The page names the file, after the scene.
+        answer.headers_mut().insert(CONTENT_DISPOSITION, HeaderValue::from_static("attachment"));
         Ok(answer)
     }
 
