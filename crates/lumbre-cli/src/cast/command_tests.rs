@@ -5,6 +5,7 @@ use std::io::{Cursor, Read, Seek};
 
 use super::*;
 use crate::cast::bytes::Bytes;
+use crate::cast::npy;
 use crate::cast::rays::Rows;
 
 const QUERIES: [Query; 8] = [
