@@ -10,6 +10,8 @@ mod faults;
 mod files;
 mod film;
 mod habits;
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+mod instruction_sets;
 mod limits;
 mod malformed;
 mod math;

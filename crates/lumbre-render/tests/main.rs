@@ -2,6 +2,7 @@
 
 mod caustics;
 mod common;
+mod cutouts;
 mod determinism;
 mod direct_light;
 mod furnace;

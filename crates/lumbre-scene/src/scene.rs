@@ -583,6 +583,14 @@ impl Scene {
         shaded
     }
 
+    /// Whether rays may pass through the surface with an id in the tree: a cut-out or an interface.
+    ///
+    /// # Panics
+    /// If there is no such id.
+    pub fn may_be_cutout(&self, id: u32) -> bool {
+        self.has_cutouts && self.entries[id as usize].has_cutouts()
+    }
+
     /// Whether cameras may look through the back of the surface with an id in the tree.
     ///
     /// # Panics
@@ -601,9 +609,9 @@ impl Scene {
         }
     }
 
-    /// Whether a hit blocks light. Partial alpha is decided by a hash of the ray and the position, so the
-    /// result is deterministic.
-    fn is_solid(&self, ray: &Ray, hit: &Hit) -> bool {
+    /// Whether a hit blocks light. Partial alpha is decided by a hash of the ray and what it hit, so the result is
+    /// deterministic.
+    pub fn is_solid(&self, ray: &Ray, hit: &Hit) -> bool {
         let leaf = self.leaf(hit);
         let entry = leaf.entry;
         if !entry.is_visible() {
@@ -622,7 +630,12 @@ impl Scene {
             return true;
         }
         let line = combine(hash_dvec3(ray.origin), hash_dvec3(ray.direction));
-        let place = combine(u64::from(hit.id) << 32 | u64::from(hit.primitive), hit.root.t.to_bits());
+        let mut place = u64::from(hit.id) << 32 | u64::from(hit.primitive);
+        place = hit.instances.iter().fold(place, |place, &instance| combine(place, instance.into()));
+        if !matches!(entry.form, Form::Mesh(_)) {
+            // A ray may hit it more than once. Of a triangle, `t` would depend on the precision.
+            place = combine(place, hit.root.t.to_bits());
+        }
         uniform_f32(combine(line, place)) < coverage
     }
 }

@@ -182,12 +182,12 @@ impl References {
         let (mut leaves, mut others, mut negative, mut done) = (0, 0, 0, 0);
         for (i, row) in rows.iter().enumerate() {
             let row = W::load(bytemuck::cast_ref(row));
-            let above = |last: i32| u64::from(row.bits_above(last)) << (WIDE * i);
-            negative |= !above(-1) & 0xffff << (WIDE * i);
-            leaves |= above(LAST_NODE);
+            let first = WIDE * i;
+            negative |= !u64::from(row.bits_above(-1)) << first & 0xffff << first;
+            leaves |= u64::from(row.bits_above(LAST_NODE)) << first;
             if GENERAL {
-                others |= above(LAST_TRIANGLES);
-                done |= above(BEFORE_DONE);
+                others |= u64::from(row.bits_above(LAST_TRIANGLES)) << first;
+                done |= u64::from(row.bits_above(BEFORE_DONE)) << first;
             }
         }
         let nodes = !(leaves | negative);

@@ -224,8 +224,9 @@ impl Cull {
     fn bounds<E: F32x8>(&self, corners: &Corners, needs_bounds: bool) -> CullBounds {
         let own = simd::opaque(self);
         let [kx, ky, kz] = own.axes.order();
-        let [ox, oy, oz] = own.middle.map(E::splat);
-        let [sx, sy] = own.middle_shear.map(E::splat);
+        let ([ox, oy, oz], [sx, sy]) = (own.middle, own.middle_shear);
+        let (ox, oy, oz) = (E::splat(ox), E::splat(oy), E::splat(oz));
+        let (sx, sy) = (E::splat(sx), E::splat(sy));
         let at = |axis: usize, corner: usize| E::load(&corners[axis][corner]);
         let (az, bz, cz) = (oz - at(kz, 0), oz - at(kz, 1), oz - at(kz, 2));
         let (ax, bx, cx) = (

@@ -1,12 +1,14 @@
 //! How open each place is.
 
 use lumbre_math::warp;
-use lumbre_scene::{Scene, View};
+use lumbre_scene::{Interaction, Scene};
 use lumbre_shading::{ShadingFrame, ShadingNormals, Spectrum};
 
-use crate::integrators::RayIntegrator;
+use crate::integrators::Integrator;
 use crate::transport::journal::{Event, Met, Source};
-use crate::transport::{PrimaryHit, Record, SampleNumbers};
+use crate::transport::{Record, SampleNumbers, Sampler};
+use crate::wave::PrimaryHits;
+use crate::wave::trees::{Branch, TreeIntegrator, TreeVertex};
 
 /// The share of the sky over a surface that is open, weighed by the cosine: white where nothing is near.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,20 +21,26 @@ pub struct AmbientOcclusion {
     pub shading_normals: ShadingNormals,
 }
 
-impl RayIntegrator for AmbientOcclusion {
-    fn radiance(
+impl Integrator for AmbientOcclusion {
+    fn estimate(&self, sights: &mut PrimaryHits<'_, '_>, _: &Sampler, record: &mut Record) {
+        sights.follow_trees(self, record);
+    }
+}
+
+impl TreeIntegrator for AmbientOcclusion {
+    fn shade<'s>(
         &self,
-        scene: &Scene,
-        _: &View,
-        sight: PrimaryHit<'_>,
-        draw: &SampleNumbers,
+        _: &'s Scene,
+        branch: Branch<'s>,
+        met: Option<&Interaction<'s>>,
+        numbers: &SampleNumbers,
+        vertex: &mut TreeVertex<'_, 's>,
         record: &mut Record,
-    ) -> Spectrum {
-        let Some(met) = &sight.met else {
-            record.note(|| Event::Left { ray: sight.ray.ray });
-            return Spectrum::BLACK;
+    ) {
+        let Some(met) = met else {
+            return record.note(|| Event::Left { ray: branch.ray });
         };
-        record.note(|| Event::Met(Met::of(&sight.ray.ray, met, 0, Spectrum::WHITE)));
+        record.note(|| Event::Met(Met::of(&branch.ray, met, 0, Spectrum::WHITE)));
         let smooth = met.shading.normal;
         let normal = match self.shading_normals {
             ShadingNormals::Pbrt if ShadingNormals::differ(smooth, met.shading.geometric) => {
@@ -42,7 +50,7 @@ impl RayIntegrator for AmbientOcclusion {
         };
         let facing = if normal.dot(met.towards_origin.as_vec3()) < 0.0 { -normal } else { normal };
         let frame = ShadingFrame::new(facing, met.shading.dpdu);
-        let u = draw.direction(0);
+        let u = numbers.direction(0);
         let (local, weight) = if self.cosine {
             (warp::square_to_cosine_hemisphere(u), 1.0)
         } else {
@@ -51,10 +59,8 @@ impl RayIntegrator for AmbientOcclusion {
         };
         let direction = (frame.s * local.x + frame.t * local.y + frame.n * local.z).as_dvec3().normalize();
         let ray = met.leave(direction).with_range(0.0, self.max_distance);
-        record.counts.shadow += 1;
-        let is_occluded = scene.is_occluded(&ray);
-        record.note(|| Event::Looked { ray, is_occluded });
-        let open = if is_occluded { Spectrum::BLACK } else { Spectrum::splat(weight) };
-        record.added(Source::Sampled, Spectrum::WHITE, open, 1.0)
+        vertex.begin_direct(Source::Sampled, Spectrum::WHITE);
+        let segment = vertex.add_along(&ray, Spectrum::splat(weight));
+        vertex.note(record, Some(segment), move |is_occluded| Event::Looked { ray, is_occluded });
     }
 }

@@ -1,16 +1,17 @@
 //! Direct light, perfect reflection and perfect refraction.
 
-use lumbre_geometry::Ray;
-use lumbre_scene::{Footprint, Interaction, Light, LightId, LightSample, Scene, View};
+use lumbre_scene::{Interaction, Light, LightId, LightSample, Scene};
 use lumbre_shading::{Scatter, ShadingNormals, Spectrum};
 use smallvec::SmallVec;
 
-use crate::integrators::RayIntegrator;
+use crate::integrators::Integrator;
 use crate::transport::direct::Vertex;
 use crate::transport::interior::MediumStack;
 use crate::transport::journal::{Event, Met, SampledLight, Scattered, Source};
 use crate::transport::through::ray_length;
-use crate::transport::{PrimaryHit, Record, SampleNumbers};
+use crate::transport::{Record, SampleNumbers, Sampler};
+use crate::wave::PrimaryHits;
+use crate::wave::trees::{Branch, TreeIntegrator, TreeVertex, rounded};
 
 /// Follows every mirror image and every refraction, and gives each surface on the way direct light from every light.
 ///
@@ -35,15 +36,6 @@ const EVERY_LIGHT_UP_TO: usize = 64;
 /// A branch that carries less than this goes on as often as it carries this.
 const FAINT: f32 = 1.0 / 255.0;
 
-/// A ray that is still to be followed.
-struct Branch<'s> {
-    ray: Ray,
-    interiors: MediumStack<'s>,
-    footprint: Footprint,
-    throughput: Spectrum,
-    depth: u32,
-}
-
 /// The materials at a place that scatter, with their shares.
 type Scatterers<'a, 's> = SmallVec<[(f32, Vertex<'a, 's>); 2]>;
 
@@ -53,14 +45,14 @@ impl Whitted {
         Self { max_depth, light_samples: 1, sky: false, shading_normals: ShadingNormals::default() }
     }
 
-    /// What scatters at a vertex of the tree of rays; its mirrors and its glass go to `pending`.
+    /// The materials that scatter at a vertex. Adds the rays of its mirrors and its glass to the tree.
     fn split<'a, 's>(
         &self,
         scene: &'s Scene,
         here: &'a Interaction<'s>,
-        came: &'a Arrival<'s>,
-        draw: &SampleNumbers,
-        pending: &mut SmallVec<[Branch<'s>; 4]>,
+        came: &'a Branch<'s>,
+        numbers: &SampleNumbers,
+        to: &mut TreeVertex<'_, 's>,
         record: &mut Record,
     ) -> Scatterers<'a, 's> {
         let mut scatterers = Scatterers::new();
@@ -74,7 +66,7 @@ impl Whitted {
                 let mut throughput = came.throughput * part.weight * share;
                 let carries = throughput.max_component();
                 if carries < FAINT {
-                    if draw.branch(came.vertex, branch) * FAINT >= carries {
+                    if numbers.branch(came.vertex, branch) * FAINT >= carries {
                         continue;
                     }
                     throughput *= FAINT / carries;
@@ -83,15 +75,10 @@ impl Whitted {
                 if part.crosses {
                     interiors.cross(vertex.material, here.front);
                 }
-                let ray = vertex.leave(&part);
+                let ray = rounded(vertex.leave(&part));
                 record.note(|| Event::Scattered(Scattered::of(&ray, &part, throughput)));
-                pending.push(Branch {
-                    ray,
-                    interiors,
-                    footprint: here.footprint(),
-                    throughput,
-                    depth: came.depth + 1,
-                });
+                let (footprint, depth) = (here.footprint(), came.depth + 1);
+                to.follow(Branch { ray, footprint, interiors, throughput, depth, vertex: 0 });
             }
             if !vertex.bsdf.is_delta() {
                 scatterers.push((share, vertex));
@@ -100,112 +87,95 @@ impl Whitted {
         scatterers
     }
 
-    /// Direct light on all that scatters at a place.
-    fn direct<'s>(
+    /// Samples the lights at a vertex: all of them, or one of many.
+    fn sample_lights<'s>(
         &self,
-        scene: &Scene,
-        here: &Interaction,
-        scatterers: &Scatterers<'_, 's>,
-        came: &Arrival<'s>,
-        draw: &SampleNumbers,
-        record: &mut Record,
-    ) -> Spectrum {
+        scene: &'s Scene,
+        here: &Interaction<'s>,
+        came: &Branch<'s>,
+        numbers: &SampleNumbers,
+        mut sampled: impl FnMut(LightSample, f32),
+    ) {
         let from = here.shadow_origin();
         let lights = scene.lights();
-        let by_light = |record: &mut Record, id: LightId, light: &Light, label: u32| {
+        let mut sample = |id: LightId, light: &Light, label: u32, weight: f32| {
             if light.is_infinite() && !self.sky {
-                return Spectrum::BLACK;
+                return;
             }
             let points = if light.is_delta() { 1 } else { self.light_samples.max(1) };
-            let mut sum = Spectrum::BLACK;
             for point in 0..points {
-                let u = draw.point_on_each_light(came.vertex, label, point, points);
+                let u = numbers.point_on_each_light(came.vertex, label, point, points);
                 if let Some(sample) = scene.sample_one_light(id, from, here.time, u) {
-                    sum += scattered(scene, scatterers, &came.interiors, &sample, record);
+                    sampled(sample, weight / points as f32);
                 }
             }
-            sum * (1.0 / points as f32)
         };
         if lights.len() > EVERY_LIGHT_UP_TO {
-            let choice = scene.choose_light(draw.light_choice(came.vertex));
-            return choice.map_or(Spectrum::BLACK, |(id, probability)| {
-                by_light(record, id, &lights[id.0 as usize], 0) * (1.0 / probability) as f32
-            });
-        }
-        let mut sum = Spectrum::BLACK;
-        for (i, light) in (0..).zip(lights) {
-            sum += by_light(record, LightId(i), light, i);
-        }
-        sum
-    }
-}
-
-/// How a ray came to a vertex: what it carries, and which one in the tree of rays this is.
-struct Arrival<'s> {
-    interiors: MediumStack<'s>,
-    throughput: Spectrum,
-    depth: u32,
-    vertex: u32,
-}
-
-impl RayIntegrator for Whitted {
-    fn radiance(
-        &self,
-        scene: &Scene,
-        _: &View,
-        sight: PrimaryHit<'_>,
-        draw: &SampleNumbers,
-        record: &mut Record,
-    ) -> Spectrum {
-        let mut radiance = Spectrum::BLACK;
-        let mut pending: SmallVec<[Branch; 4]> = SmallVec::new();
-        let (mut ray, mut met) = (sight.ray.ray, sight.met);
-        let mut came =
-            Arrival { interiors: MediumStack::default(), throughput: Spectrum::WHITE, depth: 0, vertex: 0 };
-        loop {
-            if let Some(here) = &met {
-                // Of a mixture the one material that stands for it says what the way was inside of.
-                came.interiors.arrive(here, here.resolved());
-                came.throughput *= came.interiors.transmittance(ray_length(&ray, here));
-                record.note(|| Event::Met(Met::of(&ray, here, came.depth, came.throughput)));
-                radiance += record.added(Source::Surface, came.throughput, here.emitted(), 1.0);
-                if came.depth < self.max_depth {
-                    let scatterers = self.split(scene, here, &came, draw, &mut pending, record);
-                    if !scatterers.is_empty() {
-                        let direct = self.direct(scene, here, &scatterers, &came, draw, record);
-                        radiance += record.added(Source::Direct, came.throughput, direct, 1.0);
-                    }
-                }
-            } else {
-                let arriving: Spectrum = scene.background(&ray).sum();
-                record.note(|| Event::Left { ray });
-                radiance += record.added(Source::Infinity, came.throughput, arriving, 1.0);
+            if let Some((id, probability)) = scene.choose_light(numbers.light_choice(came.vertex)) {
+                sample(id, &lights[id.0 as usize], 0, (1.0 / probability) as f32);
             }
-            let Some(next) = pending.pop() else { return radiance };
-            ray = next.ray;
-            came = Arrival {
-                interiors: next.interiors,
-                throughput: next.throughput,
-                depth: next.depth,
-                vertex: came.vertex + 1,
-            };
-            record.counts.bounce += 1;
-            met = scene.closest(&ray).map(|hit| scene.interaction(&ray, &hit, &next.footprint));
+            return;
+        }
+        for (i, light) in (0..).zip(lights) {
+            sample(LightId(i), light, i, 1.0);
         }
     }
 }
 
-/// What all materials of a place scatter of a light's sample.
-fn scattered<'s>(
+impl Integrator for Whitted {
+    fn estimate(&self, sights: &mut PrimaryHits<'_, '_>, _: &Sampler, record: &mut Record) {
+        sights.follow_trees(self, record);
+    }
+}
+
+impl TreeIntegrator for Whitted {
+    fn shade<'s>(
+        &self,
+        scene: &'s Scene,
+        mut came: Branch<'s>,
+        met: Option<&Interaction<'s>>,
+        numbers: &SampleNumbers,
+        vertex: &mut TreeVertex<'_, 's>,
+        record: &mut Record,
+    ) {
+        let Some(here) = met else {
+            let arriving: Spectrum = scene.background(&came.ray).sum();
+            record.note(|| Event::Left { ray: came.ray });
+            return vertex.add(record.added(Source::Infinity, came.throughput, arriving, 1.0));
+        };
+        // In a mixture, one material chosen at random says which solid the ray was inside of.
+        came.interiors.arrive(here, here.resolved());
+        came.throughput *= came.interiors.transmittance(ray_length(&came.ray, here));
+        record.note(|| Event::Met(Met::of(&came.ray, here, came.depth, came.throughput)));
+        vertex.add(record.added(Source::Surface, came.throughput, here.emitted(), 1.0));
+        if came.depth >= self.max_depth {
+            return;
+        }
+        let scatterers = self.split(scene, here, &came, numbers, vertex, record);
+        if scatterers.is_empty() {
+            return;
+        }
+        vertex.begin_direct(Source::Direct, came.throughput);
+        self.sample_lights(scene, here, &came, numbers, |sample, weight| {
+            add_light(scene, &scatterers, &came.interiors, sample, weight, vertex, record);
+        });
+    }
+}
+
+/// Adds the weighted light of a sample that all materials of a vertex scatter.
+fn add_light<'s>(
     scene: &Scene,
     scatterers: &Scatterers<'_, 's>,
     interiors: &MediumStack<'s>,
-    sample: &LightSample,
+    sample: LightSample,
+    weight: f32,
+    to: &mut TreeVertex<'_, 's>,
     record: &mut Record,
-) -> Spectrum {
+) {
+    let sample = to.reachable(sample);
     let mut sum = Spectrum::BLACK;
     let mut shadow_ray = None;
-    // Light of any kind, for nothing else brings it from behind a pane to what scatters.
+    // Through panes light goes straight on, which is known at once; else a shadow ray tells.
     let goes_straight_on = scene.has_delta_transmission();
     for (share, vertex) in scatterers {
         let scattered = vertex.eval(sample.towards) * *share;
@@ -213,34 +183,24 @@ fn scattered<'s>(
             continue;
         }
         if goes_straight_on {
-            sum += scattered * vertex.passes_straight_on(sample, interiors, false, record);
+            sum += scattered * vertex.passes_straight_on(&sample, interiors, false, record);
         } else {
-            sum += scattered * vertex.passes(sample, interiors);
-            shadow_ray.get_or_insert_with(|| vertex.shadow_ray(sample));
+            sum += scattered * vertex.passes(&sample, interiors);
+            shadow_ray.get_or_insert_with(|| vertex.shadow_ray(&sample));
         }
     }
-    let scattered = sum * sample.radiance;
-    let is_occluded = shadow_ray.filter(|_| !scattered.is_black()).is_some_and(|shadow_ray| {
-        record.counts.shadow += 1;
-        scene.is_occluded(&shadow_ray)
-    });
-    record.note(|| {
-        let passes = if is_occluded || scattered.is_black() { Spectrum::BLACK } else { Spectrum::WHITE };
-        let sample = *sample;
-        Event::Sampled(Box::new(SampledLight {
-            sample,
-            scattered: sum,
-            bsdf_pdf: 0.0,
-            weight: 1.0,
-            shadow_ray,
-            passes,
-        }))
-    });
-    if scattered.is_black() || is_occluded {
-        return Spectrum::BLACK;
+    let mut light = sum * sample.radiance * weight;
+    if let Scatter::Density(pdf) = sample.scatter {
+        light = light / pdf;
     }
-    match sample.scatter {
-        Scatter::Delta => scattered,
-        Scatter::Density(pdf) => scattered / pdf,
+    let is_black = light.is_black();
+    let segment = shadow_ray.filter(|_| !is_black).map(|ray| to.add_along(&ray, light));
+    if segment.is_none() {
+        to.add_unoccluded(light);
     }
+    to.note(record, segment, move |is_occluded| {
+        let passes = if is_occluded || is_black { Spectrum::BLACK } else { Spectrum::WHITE };
+        let (scattered, bsdf_pdf, weight) = (sum, 0.0, 1.0);
+        Event::Sampled(Box::new(SampledLight { sample, scattered, bsdf_pdf, weight, shadow_ray, passes }))
+    });
 }

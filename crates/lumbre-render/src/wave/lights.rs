@@ -96,6 +96,7 @@ fn colour(
 }
 
 /// A light sample of the first lane.
+#[inline(always)]
 pub(crate) fn first_sample<R: Real>(light: &LaneLightSample<R>) -> LightSample {
     to_samples(light).get(0)
 }

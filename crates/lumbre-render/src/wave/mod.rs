@@ -23,6 +23,7 @@ mod sights;
 mod smooth;
 mod surfaces;
 mod traced;
+pub(crate) mod trees;
 mod vertices;
 
 use std::marker::PhantomData;

@@ -17,7 +17,7 @@ pub(crate) struct Hits {
     is_single: bool,
     /// The index in the columns of each ray's hit; empty if that is the ray's own index.
     kept: Vec<u32>,
-    /// The hits seen through the backs of one-sided surfaces, by ascending index in the columns.
+    /// The hits behind what rays pass through, by ascending index in the columns.
     behind: Vec<(u32, Option<Hit>)>,
     rays: Vec<Ray>,
     times: Vec<f64>,
@@ -45,9 +45,7 @@ pub(crate) enum Precision {
 impl Precision {
     /// Single precision, unless double was requested or the scene has no tree for it.
     pub(crate) fn of(scene: &Scene, asks_for_double: bool) -> Self {
-        // Alpha cut-outs need hits in double precision.
-        let is_single =
-            !asks_for_double && !scene.has_cutouts() && scene.accel().picture_rounding().is_some();
+        let is_single = !asks_for_double && scene.accel().picture_rounding().is_some();
         if is_single { Self::Single } else { Self::Double }
     }
 }
@@ -89,22 +87,25 @@ impl Hits {
             time: scene.moves().then_some(&self.times),
         };
         scene.accel().closest_columns(&rays, false, &mut self.columns);
-        if is_seen && scene.has_one_sided() {
-            self.look_through_backs(scene, paths, slots);
+        if scene.has_cutouts() || is_seen && scene.has_one_sided() {
+            self.pass_through(scene, paths, slots, is_seen);
         }
     }
 
-    /// Records the hits seen through the backs of one-sided surfaces.
-    fn look_through_backs(&mut self, scene: &Scene, paths: &Paths, slots: &Slots<'_>) {
+    /// Records the hits behind cut-outs, and for camera rays those behind the backs of one-sided surfaces. Only the
+    /// rays that pass through something are traced again, in double precision.
+    fn pass_through(&mut self, scene: &Scene, paths: &Paths, slots: &Slots<'_>, is_seen: bool) {
         for path in 0..paths.len {
             let id = self.columns.id[path];
-            if id == HitColumns::MISS || !scene.may_be_one_sided(id) {
+            if id == HitColumns::MISS || !scene.may_be_cutout(id) && !(is_seen && scene.may_be_one_sided(id))
+            {
                 continue;
             }
             let ray = paths.ray(path, slots.time[paths.slot[path] as usize]);
-            let is_back = |hit: &Hit| scene.is_back_of_one_sided(&ray, hit);
-            if self.columns.to_hit(path).as_ref().is_some_and(is_back) {
-                self.behind.push((path as u32, scene.closest_seen(&ray)));
+            let Some(hit) = self.columns.to_hit(path) else { continue };
+            if !scene.is_solid(&ray, &hit) || is_seen && scene.is_back_of_one_sided(&ray, &hit) {
+                let behind = if is_seen { scene.closest_seen(&ray) } else { scene.closest(&ray) };
+                self.behind.push((path as u32, behind));
             }
         }
     }
@@ -127,9 +128,9 @@ impl Hits {
         self.kept.get(path).map_or(path, |&at| at as usize)
     }
 
-    /// The hit seen through a back, by its index in the columns; `None` if that is not the back of a one-sided surface.
+    /// The hit behind the one at this index in the columns; `None` if the ray does not pass through that.
     #[inline]
-    fn seen_through(&self, column: usize) -> Option<&Option<Hit>> {
+    fn hit_behind(&self, column: usize) -> Option<&Option<Hit>> {
         if self.behind.is_empty() {
             return None;
         }
@@ -143,7 +144,7 @@ impl Hits {
             return self.double[path].as_ref().map(Cow::Borrowed);
         }
         let column = self.column(path);
-        match self.seen_through(column) {
+        match self.hit_behind(column) {
             Some(hit) => hit.as_ref().map(Cow::Borrowed),
             None => self.columns.to_hit(column).map(Cow::Owned),
         }
@@ -155,14 +156,14 @@ impl Hits {
             return self.double[path].is_none();
         }
         let column = self.column(path);
-        self.seen_through(column).map_or(self.columns.id[column] == HitColumns::MISS, Option::is_none)
+        self.hit_behind(column).map_or(self.columns.id[column] == HitColumns::MISS, Option::is_none)
     }
 
     /// The top-level triangle that a ray met.
     #[inline]
     pub(crate) fn triangle(&self, path: usize) -> Option<MetTriangle> {
         let column = self.column(path);
-        if self.is_single && self.seen_through(column).is_none() {
+        if self.is_single && self.hit_behind(column).is_none() {
             let columns = &self.columns;
             return columns.is_plain(column).then(|| MetTriangle {
                 id: columns.id[column],
@@ -179,7 +180,7 @@ impl Hits {
     #[inline]
     pub(crate) fn distance(&self, path: usize) -> f32 {
         let column = self.column(path);
-        if self.is_single && self.seen_through(column).is_none() {
+        if self.is_single && self.hit_behind(column).is_none() {
             return self.columns.t[column];
         }
         self.hit(path).map_or(0.0, |hit| hit.root.t as f32)
@@ -214,7 +215,7 @@ impl Hits {
     /// Whether a ray met the ground.
     pub(crate) fn is_ground(&self, scene: &Scene, path: usize) -> bool {
         let column = self.column(path);
-        if self.is_single && self.seen_through(column).is_none() {
+        if self.is_single && self.hit_behind(column).is_none() {
             let id = self.columns.id[column];
             return id != HitColumns::MISS && scene.is_ground(id);
         }

@@ -73,16 +73,21 @@ impl Setting<'_> {
     /// The rounding of rays.
     #[inline(always)]
     pub(crate) fn rounding(&self, is_single: bool) -> Rounding {
-        match self.scene.accel().picture_rounding() {
-            Some(PictureRounding { origin, relative, absolute }) if is_single => {
-                Rounding { origin, relative, absolute }
-            }
-            _ => Rounding { origin: DVec3::ZERO, relative: 0.0, absolute: 0.0 },
-        }
+        Rounding::of(self.scene, is_single)
     }
 }
 
 impl Rounding {
+    #[inline(always)]
+    pub(crate) fn of(scene: &Scene, is_single: bool) -> Self {
+        match scene.accel().picture_rounding() {
+            Some(PictureRounding { origin, relative, absolute }) if is_single => {
+                Self { origin, relative, absolute }
+            }
+            _ => Self { origin: DVec3::ZERO, relative: 0.0, absolute: 0.0 },
+        }
+    }
+
     /// The error of points, enlarged so that rays that leave them do not meet their surfaces again.
     #[inline(always)]
     pub(crate) fn grow<R: Real>(&self, point: V3<R::Double>, error: V3<R::Double>) -> V3<R::Double> {

@@ -10,7 +10,7 @@ use lumbre_simd::{Double, Mask, Real, UInt, V3};
 use crate::transport::Record;
 use crate::transport::interior::MediumStack;
 use crate::transport::through::straight_on;
-use crate::wave::paths::{Slots, grow, of_column};
+use crate::wave::paths::{PAD, Slots, grow, of_column};
 use crate::wave::setting::{Leg, Setting};
 
 /// Shadow segments, in columns.
@@ -79,12 +79,22 @@ impl<'s> Shadows<'s> {
         self.len = 0;
         self.legs.clear();
         self.panes.clear();
+        self.reserve(len);
+    }
+
+    /// Reserves `len` segments.
+    pub(crate) fn reserve(&mut self, len: usize) {
         grow(&mut self.slot, len);
         let f64s = self.origin.iter_mut().chain(&mut self.way).chain([&mut self.end]);
         f64s.for_each(|column| grow(column, len));
         let f32s = self.light.iter_mut().chain(&mut self.direction).chain([&mut self.t_max]);
         f32s.for_each(|column| grow(column, len));
         grow(&mut self.medium, len);
+    }
+
+    /// Number of segments that are reserved.
+    pub(crate) fn capacity(&self) -> usize {
+        self.slot.len().saturating_sub(PAD)
     }
 
     /// Appends a segment; the columns must have been reserved.
@@ -215,5 +225,18 @@ impl<'s> Shadows<'s> {
             time: scene.moves().then_some(&self.times),
         };
         scene.accel().any_columns(&rays, false, &mut self.blocked);
+        if scene.has_cutouts() {
+            self.pass_through(scene, slots);
+        }
+    }
+
+    /// Tests segments again that are occluded, perhaps by cut-outs alone.
+    fn pass_through(&mut self, scene: &Scene, slots: &Slots<'_>) {
+        for segment in 0..self.len {
+            if self.blocked[segment] {
+                let ray = self.ray(segment, slots.time[self.slot[segment] as usize]);
+                self.blocked[segment] = scene.is_occluded(&ray);
+            }
+        }
     }
 }

@@ -13,6 +13,7 @@ use crate::wave::camera::{AimNumbers, PinholeRays};
 use crate::wave::catcher::{Catcher, Places};
 use crate::wave::paths::{Paths, SampleId, Slots};
 use crate::wave::setting::Setting;
+use crate::wave::trees::TreeIntegrator;
 use crate::wave::{Precision, Wave};
 
 /// Samples whose camera rays have found their first hits. An integrator gives each its radiance.
@@ -196,6 +197,11 @@ impl<'a, 's> PrimaryHits<'a, 's> {
     /// The indices of the samples that the integrator has to compute.
     pub(crate) fn indices(&self) -> impl Iterator<Item = u32> {
         self.wanted.iter().map(|&slot| self.wave.slots.index[slot as usize])
+    }
+
+    /// Follows a tree of rays from each ray: see [`TreeIntegrator`].
+    pub(crate) fn follow_trees(&mut self, integrator: &impl TreeIntegrator, record: &mut Record) {
+        self.wave.follow_trees(self.scene, self.precision, &self.wanted, integrator, record);
     }
 
     /// Follows a path from each ray.
