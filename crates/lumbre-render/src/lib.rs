@@ -14,13 +14,15 @@
 //! |---|---|---|
 //! | generate | `one_sample.rs`, `wave/sights.rs` | a camera ray for each sample, and what it hits |
 //! | catch | `wave/catcher.rs` | camera rays that hit a shadow catcher: samples of its lights, and whether they are blocked |
-//! | search | `wave/search.rs` | the closest hits of all rays, by the kernel |
+//! | search | `wave/search.rs` | the closest hits of all rays, by the kernel; rays that pass through cut-outs are traced again in f64 |
 //! | media | `wave/media.rs` | absorption, emission and scattering between surfaces |
 //! | escape | `wave/escape.rs` | light at infinity, for rays that leave the scene |
 //! | surfaces | `wave/surfaces.rs`, `wave/flat.rs`, `wave/smooth.rs` | vertices: point, error bound, normal, frame, BSDF row, emission |
 //! | merge | `wave/merge.rs`, `caustics/` | photons near the vertices, by the integrator `caustics` |
 //! | shade | `wave/shade.rs` | per kind of BSDF, in lanes: a light sample becomes a shadow segment, a BSDF sample the next ray |
 //! | shadows | `wave/shadows.rs` | how much of each light sample arrives: any hit, media, panes |
+//!
+//! `whitted` and `ambientocclusion` shade one vertex at a time and follow several rays from it (`wave/trees.rs`).
 //!
 //! All stages share `wave/setting.rs`. Triangles with uniform materials run in lanes, from the plain rows of
 //! `Scene::tables`. Textured materials are looked up one by one. Exact shapes, instances, solids and bump maps go one
