@@ -216,7 +216,9 @@ impl Noisy<'_> {
             // What is not ground, and covers as it did, and what is.
             let channel = |c: usize, before: f32| {
                 let ground = share(guide.count, &guide.shadow, c, MIN_GROUND);
+                // The noisy shadow was clamped in the picture, and is not here: where it is negative, light is focused.
                 let rest = before - guide.shadow.value(c, guide.count, MIN_GROUND) * ground;
+                let rest = rest.clamp(0.0, (1.0 - ground).max(0.0));
                 let now = if guide.count.samples > 0 { rest + shadow[c][i] * ground } else { before };
                 now.clamp(0.0, 1.0)
             };
