@@ -4,9 +4,9 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use super::document::{Item, Quantity, Section, Value};
+use super::document::{Item, Quantity, Section, Textbook, Value};
 use super::figure::{Figure, Marked};
-use super::formula::{UNMARKED, escaped, mathml, sign_after};
+use super::formula::{UNMARKED, escaped, mathml};
 use super::numbers::exact;
 use super::texts::Texts;
 
@@ -151,8 +151,8 @@ impl Page {
         // A table cannot stand in a paragraph.
         let (open, close) = if value.rows().is_some() { ("<div>", "</div>") } else { ("<p>", "</p>") };
         let _ = writeln!(self.out, "{open}{line}{}{label_after}{close}", shown(value));
-        if let Some((formula, value)) = &quantity.schoolbook {
-            let (schoolbook, sign) = (self.texts.schoolbook, sign_after(formula));
+        if let Some(Textbook { formula, sign, value }) = &quantity.schoolbook {
+            let schoolbook = self.texts.schoolbook;
             let formula = self.formula(formula);
             let _ =
                 writeln!(self.out, "<p class=\"book\">{schoolbook}: {formula} {sign} {}</p>", shown(value));

@@ -66,10 +66,10 @@ impl Torus {
         let nearest = self.nearest(ray);
         let (p, u) = self.turned(&nearest);
         let step = notes.step(Topic::TorusFrame);
-        step.vector("w", "O − C", w).number("v", "|D|", nearest.speed);
-        step.number("t₀", "−(w·D)/(D·D)", nearest.start).number("s₀", "", nearest.shift);
-        step.vector("p", "", p).vector("u", "", u);
-        step.number("z₀", "p·⟨0, 0, 1⟩", p.z).number("z₁", "u·⟨0, 0, 1⟩", u.z);
+        step.vector("W", "O − C", w).number("g", "|D|", nearest.speed);
+        step.number("t₀", "−(W·D)/(D·D)", nearest.start).number("s₀", "", nearest.shift);
+        step.vector("p", "", p).vector("U", "", u);
+        step.number("z₀", "p·⟨0, 0, 1⟩", p.z).number("z₁", "U·⟨0, 0, 1⟩", u.z);
         if !nearest.is_within {
             step.remark(Remark::Misses);
             return;
@@ -80,7 +80,7 @@ impl Torus {
             step.remark(Remark::Misses);
             return;
         };
-        step.number("s₁", "", low).number("s₂", "", high);
+        step.number("σ₁", "", low).number("σ₂", "", high);
         let Some(line) = self.line(&ray.with_range(f64::NEG_INFINITY, f64::INFINITY)) else {
             return;
         };
@@ -90,11 +90,11 @@ impl Torus {
         let quartic = self.quartic(&line);
         let step = notes.step(Topic::Quartic);
         step.number("a₂", "2·(|p|² − r² − R² + 2·R²·z₁²)", quartic.p);
-        step.beside("c₂ = 4·(w·D)² + 2·(D·D)·(w·w + R² − r²) − 4·R²·|D×V|²", c2);
+        step.beside("c₂ = 4·(W·D)² + 2·(D·D)·(W·W + R² − r²) − 4·R²·|D×V|²", c2);
         step.number("a₁", "8·R²·z₀·z₁", quartic.q);
-        step.beside("c₁ = 4·(w·D)·(w·w + R² − r²) − 8·R²·((w×V)·(D×V))", c1);
+        step.beside("c₁ = 4·(W·D)·(W·W + R² − r²) − 8·R²·((W×V)·(D×V))", c1);
         step.number("a₀", "(|p|² − r² + R²)² − 4·R²·(|p|² − z₀²)", quartic.w);
-        step.beside("c₀ = (w·w + R² − r²)² − 4·R²·|w×V|²", c0);
+        step.beside("c₀ = (W·W + R² − r²)² − 4·R²·|W×V|²", c0);
         if self.is_thin() {
             step.remark(Remark::Thin);
         }
@@ -108,7 +108,7 @@ impl Torus {
             }
         };
         let values = splits.iter().map(|&s| quartic.at(s).0).collect();
-        notes.step(Topic::QuarticExtrema).numbers("s", "", splits).numbers("f", "", values);
+        notes.step(Topic::QuarticExtrema).numbers("s", "", splits).numbers("y", "", values);
 
         let mut roots = vec![];
         self.crossings(&line, f64::NEG_INFINITY, |s, multiplicity| {
@@ -117,7 +117,7 @@ impl Torus {
         });
         let step = notes.step(Topic::QuarticRoots);
         for ([s_name, t_name], &(s, t, multiplicity)) in ROOTS.into_iter().zip(&roots) {
-            step.number(s_name, "", s).number(t_name, format!("t₀ + (s₀ + {s_name})/v"), t);
+            step.number(s_name, "", s).number(t_name, format!("t₀ + (s₀ + {s_name})/g"), t);
             if multiplicity > 1 {
                 step.remark(Remark::Touches);
             }
@@ -130,7 +130,7 @@ impl Torus {
 
         let theirs = schoolbook.roots();
         let step = notes.step(Topic::TextbookQuartic);
-        step.number("c₄", "(D·D)·(D·D)", c4).number("c₃", "4·(D·D)·(w·D)", c3);
+        step.number("c₄", "(D·D)·(D·D)", c4).number("c₃", "4·(D·D)·(W·D)", c3);
         step.numbers("τ", "", theirs.clone());
         let crossings = roots.iter().map(|root| usize::from(root.2)).sum();
         if theirs.len() == roots.len() {
