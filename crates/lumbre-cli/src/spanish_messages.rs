@@ -5,7 +5,7 @@
 /// Sentences in both languages. `{}` stands for what comes from the scene, in the same order in both.
 const SENTENCES: &[(&str, &str)] = &[
     ("unknown parameter {} of {}", "parámetro desconocido {} de {}"),
-    ("unknown {} {}: it is left out", "{} desconocido {}: se omite"),
+    ("unknown {} {}: it is left out", "{} {} no se conoce: se omite"),
     ("unknown directive {}", "directiva desconocida {}"),
     ("unknown type of parameter {}", "tipo desconocido del parámetro {}"),
     ("unknown spectrum {}", "espectro desconocido {}"),
@@ -277,7 +277,7 @@ fn line_in_spanish(line: &str) -> String {
     // The place comes first, and may hold a colon itself.
     let starts = std::iter::once(0).chain(sentence.match_indices(": ").map(|(at, _)| at + 2));
     let known = starts.into_iter().find_map(|at| {
-        let spanish = by_table(SENTENCES, &sentence[at..])?;
+        let spanish = by_table(SENTENCES, &sentence[at..]).or_else(|| of_system(&sentence[at..]))?;
         Some(format!("{}{spanish}", &sentence[..at]))
     });
     format!("{}{}{more}", known.unwrap_or_else(|| sentence.to_owned()), details_in_spanish(details))
@@ -359,16 +359,22 @@ fn fitted<'t>(pattern: &str, text: &'t str) -> Option<Vec<&'t str>> {
     rest.is_empty().then_some(parts)
 }
 
+/// What the system says, with the number of its error.
+fn of_system(text: &str) -> Option<String> {
+    SYSTEM.iter().find_map(|(english, spanish)| {
+        let rest = text.strip_prefix(english)?.trim();
+        let number = rest.strip_prefix("(os error ").and_then(|rest| rest.strip_suffix(')'));
+        Some(match number {
+            Some(number) => format!("{spanish} (error {number} del sistema)"),
+            None => (*spanish).to_owned(),
+        })
+    })
+}
+
 /// A part of a sentence: what the system says, a noun and its name, or what is the same in both languages.
 fn part_in_spanish(part: &str) -> String {
-    for (english, spanish) in SYSTEM {
-        if let Some(rest) = part.strip_prefix(english) {
-            let number = rest.trim().strip_prefix("(os error ").and_then(|rest| rest.strip_suffix(')'));
-            return number.map_or_else(
-                || (*spanish).to_owned(),
-                |number| format!("{spanish} (error {number} del sistema)"),
-            );
-        }
+    if let Some(said) = of_system(part) {
+        return said;
     }
     for (english, spanish) in NOUNS {
         if let Some(name) = part.strip_prefix(english).and_then(|rest| rest.strip_prefix(' ')) {
@@ -404,6 +410,7 @@ mod tests {
                 "a.pbrt:2:1: wrong value for parameter \"L\" (found string \"; expected x\"; expected 3 numbers)\n  included from b.pbrt:1:1",
                 "a.pbrt:2:1: valor incorrecto del parámetro \"L\" (se encontró el texto \"; expected x\"; se esperaban 3 números)\n  incluido desde b.pbrt:1:1",
             ),
+            ("a.txt: Permission denied (os error 13)", "a.txt: permiso denegado (error 13 del sistema)"),
             ("warning: unknown directive \"x\" (5 more)", "aviso: directiva desconocida \"x\" (y 5 más)"),
             ("what nobody foresaw", "what nobody foresaw"),
         ] {

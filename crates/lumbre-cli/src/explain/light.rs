@@ -125,7 +125,8 @@ impl Path<'_> {
                         scope.set(symbol, &Value::from(before));
                         place.quantity(&mut scope, "pᵣ", texts.going_on, "", *probability);
                         let after = before / *probability;
-                        place.quantity(&mut scope, "βᵣ", texts.after_roulette, "β/pᵣ", after);
+                        let formula = format!("{symbol}/pᵣ");
+                        place.quantity(&mut scope, "βᵣ", texts.after_roulette, &formula, after);
                         carried = Some(("βᵣ", after));
                     }
                 }
@@ -544,8 +545,8 @@ impl Path<'_> {
         section.quantity(&mut scope, "α", label, formula, *weight);
         // Of what a medium took on the way there is no step.
         let is_product = |before: Spectrum| {
-            let off = (before * *weight).to_array().into_iter().zip(throughput.to_array());
-            off.into_iter().all(|(a, b)| (a - b).abs() <= 1e-5 * b.abs())
+            let mut both = (before * *weight).to_array().into_iter().zip(throughput.to_array());
+            both.all(|(a, b)| (a - b).abs() <= 1e-5 * b.abs())
         };
         let formula = match carried {
             Some((symbol, before)) if is_product(before) => {
