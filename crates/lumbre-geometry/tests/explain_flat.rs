@@ -74,7 +74,7 @@ impl Said {
 
     fn has_each(&self, names: &[&str]) {
         for name in names {
-            assert!(self.0.get(name).is_some_and(|count| *count >= 20), "{name}: {:?}", self.0);
+            assert!(self.0.get(name).is_some_and(|count| *count >= 8), "{name}: {:?}", self.0);
         }
     }
 }

@@ -168,8 +168,17 @@ impl Value {
 
     /// The rows of a matrix, in full.
     pub(super) fn rows(&self) -> Option<[[String; 4]; 4]> {
+        self.rows_written(exact)
+    }
+
+    /// The rows of a matrix, with six digits.
+    pub(super) fn short_rows(&self) -> Option<[[String; 4]; 4]> {
+        self.rows_written(short)
+    }
+
+    fn rows_written(&self, write: impl Fn(f64) -> String + Copy) -> Option<[[String; 4]; 4]> {
         match self {
-            Self::Matrix(m) => Some(m.transpose().to_cols_array_2d().map(|row| row.map(exact))),
+            Self::Matrix(m) => Some(m.transpose().to_cols_array_2d().map(|row| row.map(write))),
             _ => None,
         }
     }

@@ -541,7 +541,7 @@ impl Part {
 
 /// A sign as an element.
 fn operator(sign: char) -> String {
-    let how = if matches!(sign, '(' | ')' | '|') { " stretchy=\"false\"" } else { "" };
+    let how = if matches!(sign, '(' | ')' | '[' | ']' | '|') { " stretchy=\"false\"" } else { "" };
     format!("<mo{how}>{}</mo>", escaped(&sign.to_string()))
 }
 

@@ -219,13 +219,21 @@ fn key<'m>(marks: &'m Marked, symbol: &str) -> Option<&'m str> {
 }
 
 fn shown(value: &Value) -> String {
-    match value.rows() {
-        Some(rows) => {
-            let row = |row: &[String; 4]| {
-                let cells = row.iter().map(|cell| format!("<td>{cell}</td>")).collect::<String>();
-                format!("<tr>{cells}</tr>")
+    match value.rows().zip(value.short_rows()) {
+        Some((rows, short)) => {
+            // A narrow screen has no room for all digits.
+            let cell = |(full, short): (&String, &String)| match full == short {
+                true => format!("<td>{full}</td>"),
+                false => {
+                    format!(
+                        "<td><span class=\"stacked\">{full}</span><span class=\"flat\">{short}</span></td>"
+                    )
+                }
             };
-            let rows = rows.iter().map(row).collect::<String>();
+            let row = |(full, short): (&[String; 4], &[String; 4])| {
+                format!("<tr>{}</tr>", full.iter().zip(short).map(cell).collect::<String>())
+            };
+            let rows = rows.iter().zip(&short).map(row).collect::<String>();
             format!("<table class=\"matrix\">{rows}</table>")
         }
         None => match value {

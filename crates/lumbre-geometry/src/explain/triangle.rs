@@ -35,12 +35,12 @@ pub(super) fn tell_shear(
 /// Says of edges between sheared points where two products are the same number: the rounding errors of both decide, or the line
 /// meets the edge.
 pub(super) fn tell_edges<const N: usize>(step: &mut Step, edges: [[DVec3; 2]; N]) {
-    let equal = edges.iter().filter(|[p, q]| p.x * q.y == p.y * q.x);
-    let (on, by_errors): (Vec<_>, Vec<_>) = equal.partition(|[p, q]| dop(p.x, q.y, p.y, q.x) == 0.0);
-    if !by_errors.is_empty() {
+    let mut equal = edges.iter().filter(|[p, q]| p.x * q.y == p.y * q.x);
+    let is_on = |[p, q]: &&[DVec3; 2]| dop(p.x, q.y, p.y, q.x) == 0.0;
+    if equal.clone().any(|edge| !is_on(&edge)) {
         step.remark(Remark::EdgeByRoundingErrors);
     }
-    if !on.is_empty() {
+    if equal.any(|edge| is_on(&edge)) {
         step.remark(Remark::OnEdge);
     }
 }
