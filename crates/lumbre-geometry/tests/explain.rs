@@ -382,7 +382,7 @@ fn a_sphere_is_explained_as_on_paper() {
     assert_eq!(schoolbook[2], ("(−b − √(b² − 4·a·c))/(2·a)".into(), Value::Number(4.0)));
     assert_eq!(explanation.candidates.len(), 2);
     assert!(explanation.candidates.iter().all(|candidate| candidate.fate == Fate::Hit));
-    assert_eq!(vector(steps, "n"), Some(DVec3::NEG_Z));
+    assert_eq!(vector(steps, "N"), Some(DVec3::NEG_Z));
 
     let behind = sphere.explain(&Ray::new(DVec3::new(0.0, 0.0, 0.5), DVec3::Z));
     let fates: Vec<_> = behind.candidates.iter().map(|candidate| (candidate.t, candidate.fate)).collect();
