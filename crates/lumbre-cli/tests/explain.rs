@@ -424,8 +424,8 @@ fn u_and_v_of_a_mesh_are_those_of_its_file() {
         desk.write("a.pbrt", &bare(&shapes, "", ""));
         let told = explained(&desk, &["--ray", "-0.5,0.5,-5,0,0,1", "--nearest"]);
         let mesh = section(&told, "mesh").unwrap();
-        assert_eq!(quantity(mesh, "P₁"), &serde_json::json!([1.0, 0.0, 0.0]));
-        assert_eq!(quantity(mesh, "u, v (P₃)"), &serde_json::json!([4.0, 8.0]));
+        assert_eq!(quantity(mesh, "F₁"), &serde_json::json!([1.0, 0.0, 0.0]));
+        assert_eq!(quantity(mesh, "u, v (F₃)"), &serde_json::json!([4.0, 8.0]));
         assert_eq!(quantity(mesh, "M")[0], serde_json::json!([-2.0, 0.0, 0.0, 0.0]));
         let uv: Vec<f64> = list(quantity(section(&told, "hit").unwrap(), "u, v"))
             .iter()
@@ -658,12 +658,12 @@ fn a_symbol_has_one_meaning_on_a_page_and_is_defined_before_it_is_used() {
                 let elsewhere = page.iter().find(|(other, ..)| other == symbol && !is_shared);
                 assert!(elsewhere.is_none(), "{symbol} is {label} {formula} and {elsewhere:?}: {context}");
             }
-            // A capsule is three shapes, and a plane cuts each end of a cone.
-            if shapes.contains("capsule") || shapes.contains("csg") {
+            // A capsule is three shapes, and a plane cuts each end of a cone. On a patch, u is that of a ruling, then that of a crossing.
+            if ["capsule", "csg", "bilinear"].iter().any(|kind| shapes.contains(kind)) {
                 continue;
             }
             for (i, (symbol, label, formula)) in own.iter().enumerate() {
-                let is_repeated = ["μ", "δ", "t", "det", "b₁", "b₂"].contains(&symbol.as_str());
+                let is_repeated = ["μ", "δ", "t", "P", "det", "b₁", "b₂"].contains(&symbol.as_str());
                 let other =
                     own[..i].iter().find(|(other, ..)| other == symbol && !is_repeated && !symbol.is_empty());
                 assert!(other.is_none(), "{symbol} is {label} {formula} and {other:?}: {context}");
@@ -709,7 +709,7 @@ fn an_equation_that_holds_to_its_digits_only_is_nearly_one() {
 #[test]
 fn roulette_and_the_next_direction_come_in_steps() {
     let desk = Desk::new();
-    let room = r#"AreaLightSource "diffuse" Material "diffuse" "rgb reflectance" [0.5 0.25 0.125]
+    let room = r#"AreaLightSource "diffuse" Material "diffuse" "rgb reflectance" [0.875 0.5 0.25]
         Shape "sphere" "float radius" 3"#;
     desk.write("a.pbrt", &bare(room, "", r#"Integrator "path" "integer maxdepth" 40"#));
     let vector = |section: &Value, name: &str| -> Vec<f64> {
@@ -718,9 +718,9 @@ fn roulette_and_the_next_direction_come_in_steps() {
             one => vec![one.as_f64().unwrap(); 3],
         }
     };
-    let is_close = |a: f64, b: f64| (a - b).abs() <= 1e-5 * b.abs();
+    let is_close = |a: f64, b: f64| (a - b).abs() <= 1e-3 * b.abs();
     let mut survived = 0;
-    for sample in 0..64 {
+    for sample in 0..16 {
         let told =
             explained(&desk, &["--ray", "0,0,0,0,0,1", "--sample", &sample.to_string(), "--only", "light"]);
         for vertex in list(&told["sections"][0]["sections"]) {
@@ -736,7 +736,7 @@ fn roulette_and_the_next_direction_come_in_steps() {
             }
             // f is the reflectance over π, and the density of the direction |cos θ|/π.
             let (f, cosine, density) = (vector(next, "f"), vector(next, "cₛ")[0], vector(next, "pₛ")[0]);
-            assert!(is_close(f[1], 0.25 / std::f64::consts::PI), "{next}");
+            assert!(is_close(f[1], 0.5 / std::f64::consts::PI), "{next}");
             assert!(is_close(density, cosine / std::f64::consts::PI), "{next}");
             let (kept, carried) = (vector(next, "α"), vector(next, "β′"));
             for i in 0..3 {

@@ -278,7 +278,8 @@ fn tell(
 fn in_file(face: &Face, told: usize, texts: &Texts) -> Section {
     let mut section = Section::new("mesh", texts.in_file);
     let mut scope = Scope::default();
-    let names = ["P₀", "P₁", "P₂", "P₃"];
+    // Not those of the equation, to which the map leads.
+    let names = ["F₀", "F₁", "F₂", "F₃"];
     for (name, corner) in names.into_iter().zip(&face.corners) {
         section.quantity(&mut scope, name, "", "", *corner);
     }
