@@ -40,7 +40,7 @@ fn colours(variable: impl Fn(&str) -> Option<OsString>, is_terminal: bool) -> bo
     is_terminal && !is_off
 }
 
-/// Prints a message to standard error, ignoring errors. `error:` and `warning:` in front have their colour.
+/// Prints a message to standard error, ignoring errors. `error:`, `warning:` and `aviso:` in front have their colour.
 pub(crate) fn tell(message: &str) {
     let stream = std::io::stderr();
     let text = message_text(message, has_colours(&stream));
@@ -49,7 +49,7 @@ pub(crate) fn tell(message: &str) {
 
 fn message_text(message: &str, has_colours: bool) -> String {
     let text = escaped(message);
-    for (word, colour) in [("error:", ERROR), ("warning:", WARNING)] {
+    for (word, colour) in [("error:", ERROR), ("warning:", WARNING), ("aviso:", WARNING)] {
         if let (true, Some(rest)) = (has_colours, text.strip_prefix(word)) {
             return format!("{colour}{word}{PLAIN}{rest}");
         }

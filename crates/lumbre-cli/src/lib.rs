@@ -92,6 +92,8 @@ mod signals;
 #[cfg(not(target_family = "wasm"))]
 mod spanish;
 #[cfg(not(target_family = "wasm"))]
+mod spanish_messages;
+#[cfg(not(target_family = "wasm"))]
 mod staging;
 #[cfg(not(target_family = "wasm"))]
 mod tev;
@@ -110,7 +112,7 @@ mod viewing;
 pub use cast::{Query, cast};
 pub use defaults::Defaults;
 #[cfg(not(target_family = "wasm"))]
-pub use explain::Explainer;
+pub use explain::program::Explainer;
 pub use explain::{Format, Request, SceneNames, explain};
 pub use failure::Failure;
 pub use language::Language;
@@ -153,7 +155,7 @@ enum Command {
     Info(info::Arguments),
     Diff(diff::Arguments),
     Merge(merge::Arguments),
-    Explain(Box<explain::Arguments>),
+    Explain(Box<explain::program::Arguments>),
     Math(math::Arguments),
     Farm(farm::Arguments),
     Completions(completions::CompletionsArguments),
@@ -172,6 +174,7 @@ pub fn run(words: Vec<OsString>) -> u8 {
         }
     };
     let words = math::with_negative_expressions(words);
+    let is_spanish = spanish::is_asked_for(&words);
     let arguments: Arguments = match tips::parse(&words) {
         Ok(arguments) => arguments,
         Err(status) => return status,
@@ -191,7 +194,7 @@ pub fn run(words: Vec<OsString>) -> u8 {
         Command::Info(arguments) => info::run(&arguments),
         Command::Diff(arguments) => diff::run(&arguments),
         Command::Merge(arguments) => merge::run(&arguments),
-        Command::Explain(arguments) => explain::run(&arguments),
+        Command::Explain(arguments) => explain::program::run(&arguments),
         Command::Math(arguments) => math::run(&arguments),
         Command::Farm(arguments) => farm::run(&arguments),
         Command::Completions(arguments) => completions::completions::<Arguments>(&arguments),
@@ -201,7 +204,9 @@ pub fn run(words: Vec<OsString>) -> u8 {
         Ok(()) => 0,
         Err(failure) => {
             if !failure.is_silent() {
-                say!("error: {failure}");
+                let message = failure.to_string();
+                let message = if is_spanish { spanish_messages::in_spanish(&message) } else { message };
+                say!("error: {message}");
             }
             failure.status()
         }

@@ -7,6 +7,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, ArgAction, Command, Error};
 
 use crate::console::escaped;
+use crate::spanish_messages::by_table;
 
 /// Whether these words ask for one of the commands that speak Spanish, in Spanish.
 pub(crate) fn is_asked_for(words: &[OsString]) -> bool {
@@ -249,7 +250,7 @@ fn translated_argument(argument: Arg) -> Arg {
     if value.is_empty() { argument } else { argument.value_name(*value) }
 }
 
-/// What readers of values say, in both languages.
+/// What readers of values say, in both languages; `{}` stands for what is the same in both.
 const EXPECTATIONS: &[(&str, &str)] = &[
     ("expected two whole numbers, such as 320,240", "se esperaban dos números enteros, como 320,240"),
     (
@@ -272,6 +273,46 @@ const EXPECTATIONS: &[(&str, &str)] = &[
         "expected x, y, z, -x, -y, -z or a direction such as 0,1,1",
         "se esperaba x, y, z, -x, -y, -z o una dirección como 0,1,1",
     ),
+    ("expected a number of seconds", "se esperaba un número de segundos"),
+    (
+        "expected a share of a frame, such as 0.5",
+        "se esperaba una fracción del intervalo entre imágenes, como 0.5",
+    ),
+    ("expected frames a second, such as 24", "se esperaban imágenes por segundo, como 24"),
+    (
+        "expected the first and the last frame, such as 0..47, up to {}",
+        "se esperaban la primera y la última imagen, como 0..47, hasta {}",
+    ),
+    ("expected a number, or two, such as 0..1", "se esperaba un número, o dos, como 0..1"),
+    ("expected NAME=VALUE, such as Turns=3", "se esperaba NOMBRE=VALOR, como Vueltas=3"),
+    (
+        "found {}; expected WIDTHxHEIGHT in pixels, each from 1 to 65536, as 640x480",
+        "se encontró {}; se esperaba ANCHOxALTO en píxeles, cada uno de 1 a 65536, como 640x480",
+    ),
+    (
+        "found {}; expected a size such as 8G, 512M or 100k",
+        "se encontró {}; se esperaba un tamaño como 8G, 512M o 100k",
+    ),
+    (
+        "found {}; expected material.NAME.PARAM=VALUE, light.INDEX.PARAM=VALUE, camera.PARAM=VALUE or film.PARAM=VALUE",
+        "se encontró {}; se esperaba material.NOMBRE.PARÁM=VALOR, light.ÍNDICE.PARÁM=VALOR, camera.PARÁM=VALOR o film.PARÁM=VALOR",
+    ),
+    (
+        "expected a colour of three or six hexadecimal digits, as #fa0 or #e8e0d8",
+        "se esperaba un color de tres o seis cifras hexadecimales, como #fa0 o #e8e0d8",
+    ),
+    (
+        "expected env, studio, transparent, a colour ({}, or as #e8e0d8) or an image file; did you mean {}?",
+        "se esperaba env, studio, transparent, un color ({}, o como #e8e0d8) o un archivo de imagen; ¿quería decir {}?",
+    ),
+    (
+        "expected env, studio, transparent, a colour ({}, or as #e8e0d8) or an image file",
+        "se esperaba env, studio, transparent, un color ({}, o como #e8e0d8) o un archivo de imagen",
+    ),
+    ("{} is not in {}..={}", "{} no está entre {} y {}: se esperaba un número entre ambos"),
+    ("{} is not in {}..{}", "{} no está entre {} y {}: se esperaba un número entre ambos"),
+    ("invalid float literal", "se esperaba un número"),
+    ("cannot parse float from empty string", "se esperaba un número"),
     ("invalid digit found in string", "se esperaba un número entero"),
     ("cannot parse integer from empty string", "se esperaba un número entero"),
     ("number too large to fit in target type", "el número es demasiado grande"),
@@ -293,8 +334,8 @@ pub(crate) fn said(error: &Error) -> String {
         }
         ErrorKind::ValueValidation => {
             let source = error.source().map(ToString::to_string).unwrap_or_default();
-            let expected = EXPECTATIONS.iter().find(|(english, _)| *english == source);
-            let expected = expected.map_or(String::new(), |(_, spanish)| format!(": {spanish}"));
+            let expected = by_table(EXPECTATIONS, &escaped(&source));
+            let expected = expected.map_or(String::new(), |spanish| format!(": {spanish}"));
             format!("valor no válido '{value}' para '{argument}'{expected}")
         }
         ErrorKind::UnknownArgument => format!("argumento desconocido '{argument}'"),
@@ -359,6 +400,28 @@ mod tests {
             }
             assert!(text.contains("Uso: lumbre") && text.contains("Muestra esta ayuda"), "{text}");
         }
+    }
+
+    #[test]
+    fn every_argument_says_in_spanish_what_it_expects() {
+        let mut count = 0;
+        for name in ["explain", "math"] {
+            let program = crate::Arguments::command();
+            let command = program.find_subcommand(name).expect("it is there");
+            for argument in command.get_arguments().filter(|argument| argument.get_action().takes_values()) {
+                let Some(long) = argument.get_long() else { continue };
+                let words = ["lumbre", name, &format!("--{long}=?!")];
+                let Err(error) = crate::Arguments::command().try_get_matches_from(words) else { continue };
+                // Any text is a name, or a file.
+                if !matches!(error.kind(), ErrorKind::InvalidValue | ErrorKind::ValueValidation) {
+                    continue;
+                }
+                let text = said(&error);
+                assert!(text.contains("se esperaba"), "--{long}: {text}");
+                count += 1;
+            }
+        }
+        assert!(count >= 20, "{count}");
     }
 
     #[test]

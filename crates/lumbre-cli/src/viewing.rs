@@ -11,7 +11,7 @@ use lumbre::image::ToneMap;
 use lumbre::{CancelToken, ErrorKind, RenderOptions, SaveOptions, SceneDesc, Stop};
 use lumbre_viewer::{Built, Explain, Hidden, Moment, Options, Read, Source, SourceError, Viewer, export};
 
-use crate::explain::Explainer;
+use crate::explain::program::Explainer;
 use crate::failure::{Failure, print};
 use crate::names::one_of;
 use crate::output::is_standard_stream;

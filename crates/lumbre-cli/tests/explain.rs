@@ -141,7 +141,7 @@ fn glass_tells_its_refraction_and_shadows_what_is_in_their_way() {
     let vector = |name: &str| -> Vec<f64> {
         list(quantity(mirror, name)).iter().map(|x| x.as_f64().unwrap()).collect()
     };
-    let (normal, refracted) = (vector("n"), vector("T"));
+    let (normal, refracted) = (vector("Nᵢ"), vector("Dₜ"));
     // Snell: the sines of both angles are as 1.5 to 1. The ball's normal is a quarter over a half off the axis: a sine of 1/2.
     let cosine: f64 = -normal.iter().zip(&refracted).map(|(n, t)| n * t).sum::<f64>();
     assert!(((1.0 - cosine * cosine).sqrt() - 0.5 / 1.5).abs() < 1e-6, "{cosine}");
@@ -197,7 +197,7 @@ fn only_the_sections_that_are_asked_for_are_told() {
     assert_eq!(Some(&sections[1]), section(&whole, "radiance"));
     let out = desk.lumbre(&["explain", "a.pbrt", "--pixel", "12,8", "--nearest", "--only", "Discriminant"]);
     let text = stdout(&out);
-    assert!(text.starts_with("The discriminant (a quarter of the textbook's)\n  l = w − "), "{text}");
+    assert!(text.starts_with("The discriminant (a quarter of the textbook's)\n  l = W − "), "{text}");
     assert_eq!(text.lines().count(), 4, "{text}");
 }
 
@@ -220,13 +220,13 @@ fn every_form_is_whole() {
         stdout(&out)
     };
     let text = tell("text");
-    assert!(text.contains("THE CAMERA") && text.contains("w·w − r²"), "{text}");
+    assert!(text.contains("THE CAMERA") && text.contains("W·W − r²"), "{text}");
     let markdown = tell("markdown");
     for line in markdown.lines() {
         assert!(line.matches('$').count() % 2 == 0, "{line}");
         assert_eq!(line.matches('{').count(), line.matches('}').count(), "{line}");
     }
-    assert!(markdown.contains("w\\cdot w - r^{2}"), "{markdown}");
+    assert!(markdown.contains("W\\cdot W - r^{2}"), "{markdown}");
     let html = tell("html");
     for tag in
         ["math", "section", "svg", "table", "msqrt", "msup", "p", "td", "figure", "g", "span", "button"]
@@ -424,8 +424,8 @@ fn u_and_v_of_a_mesh_are_those_of_its_file() {
         desk.write("a.pbrt", &bare(&shapes, "", ""));
         let told = explained(&desk, &["--ray", "-0.5,0.5,-5,0,0,1", "--nearest"]);
         let mesh = section(&told, "mesh").unwrap();
-        assert_eq!(quantity(mesh, "P₁"), &serde_json::json!([1.0, 0.0, 0.0]));
-        assert_eq!(quantity(mesh, "u, v (P₃)"), &serde_json::json!([4.0, 8.0]));
+        assert_eq!(quantity(mesh, "F₁"), &serde_json::json!([1.0, 0.0, 0.0]));
+        assert_eq!(quantity(mesh, "u, v (F₃)"), &serde_json::json!([4.0, 8.0]));
         assert_eq!(quantity(mesh, "M")[0], serde_json::json!([-2.0, 0.0, 0.0, 0.0]));
         let uv: Vec<f64> = list(quantity(section(&told, "hit").unwrap(), "u, v"))
             .iter()
@@ -532,7 +532,7 @@ fn the_matrices_of_the_camera_lead_back_to_the_pixel() {
         let forth = place("point of the film, in pixels from the upper left corner");
         let back = place("point of the film, in pixels from the upper left corner, y downwards");
         assert!(forth.iter().zip(&back).all(|(x, y)| (x - y).abs() < 1e-5), "{forth:?} {back:?}");
-        let [u, v, w] = ["u", "v", "w"].map(place);
+        let [u, v, w] = ["e₁", "e₂", "e₃"].map(place);
         let turn = (u[1] * v[2] - u[2] * v[1]) * w[0]
             + (u[2] * v[0] - u[0] * v[2]) * w[1]
             + (u[0] * v[1] - u[1] * v[0]) * w[2];
@@ -560,7 +560,7 @@ fn light_comes_in_steps_with_their_own_numbers() {
                 one => vec![one.as_f64().unwrap(); 3],
             }
         };
-        let (d, intensity, arriving) = (numbers("d"), numbers("I"), numbers("Lᵢ"));
+        let (d, intensity, arriving) = (numbers("d"), numbers("Iₗ"), numbers("Lᵢ"));
         for i in 0..3 {
             assert!((intensity[i] / (d[i] * d[i]) - arriving[i]).abs() < 1e-6 * arriving[i]);
             assert!(
@@ -569,17 +569,183 @@ fn light_comes_in_steps_with_their_own_numbers() {
             );
         }
         // A Lambertian surface scatters its reflectance over π.
-        let bsdf = numbers("f / |cos θ|: the BSDF alone");
+        let bsdf = numbers("f");
         for i in 0..3 {
             assert!((bsdf[i] - [0.6, 0.4, 0.3][i] / std::f64::consts::PI).abs() < 1e-6, "{bsdf:?}");
         }
         // The glass below has a Fresnel reflectance of (0.5 / 2.5)² where the ray is straight.
         let told = explained(&desk, &["--ray", "0,-1.6,-3,0,0,1", "--nearest"]);
-        let reflectance = quantity(section(&told, "mirror").unwrap(), "F").as_f64().unwrap();
+        let reflectance = quantity(section(&told, "mirror").unwrap(), "Fᵣ").as_f64().unwrap();
         assert!((reflectance - 0.04).abs() < 1e-7, "{reflectance}");
         return;
     }
     panic!("the lamp was never sampled");
+}
+
+/// The symbols of a formula: a letter or a word, with its primes and subscripts.
+fn symbols(formula: &str) -> Vec<String> {
+    let is_low = |c: char| ('₀'..='ₜ').contains(&c) || ['ᵢ', 'ᵣ', 'ᵤ', 'ᵥ', 'ⱼ', '′'].contains(&c);
+    let is_raised = |c: char| ['ᵀ', '⁻', 'ⁿ', '²', '³', '¹'].contains(&c);
+    let mut found = Vec::new();
+    let mut word = String::new();
+    for c in formula.chars().chain([' ']) {
+        if c.is_alphabetic() && !is_low(c) && !is_raised(c) && !word.ends_with(is_low)
+            || is_low(c) && !word.is_empty()
+        {
+            word.push(c);
+            continue;
+        }
+        found.extend(Some(std::mem::take(&mut word)).filter(|word| !word.is_empty()));
+        if c.is_alphabetic() && !is_low(c) && !is_raised(c) {
+            word.push(c);
+        }
+    }
+    found
+}
+
+/// A symbol with its meaning, and the formulas that it stands in, in the order of a page.
+fn meanings(section: &Value, out: &mut Vec<(String, String, String)>) {
+    for quantity in list(&section["quantities"]) {
+        let text = |name: &str| quantity[name].as_str().unwrap_or_default().to_owned();
+        out.push((text("symbol"), text("label"), text("formula")));
+    }
+    list(&section["sections"]).iter().for_each(|inner| meanings(inner, out));
+}
+
+/// The sections with a key, at any depth.
+fn sections_called<'v>(section: &'v Value, key: &str, out: &mut Vec<&'v Value>) {
+    for inner in list(&section["sections"]) {
+        if inner["key"] == key { out.push(inner) } else { sections_called(inner, key, out) }
+    }
+}
+
+/// The same explanation without the equations of shapes.
+fn without_equations(section: &Value) -> Value {
+    let mut copy = section.clone();
+    let inner = list(&section["sections"]).iter().filter(|inner| inner["key"] != "equation");
+    copy["sections"] = inner.map(without_equations).collect();
+    copy
+}
+
+#[test]
+fn a_symbol_has_one_meaning_on_a_page_and_is_defined_before_it_is_used() {
+    let desk = Desk::new();
+    let glass = r#"Material "dielectric""#;
+    let lamp = r#"LightSource "point" "point3 from" [0 3 -5] AttributeBegin AreaLightSource "diffuse" Translate 3 3 -4
+        Shape "sphere" AttributeEnd Material "diffuse" Translate 0 0 9 Shape "disk" "float radius" 30 Translate 0 0 -9"#;
+    let pages = DRAWN.iter().map(|(shape, ray, _, _)| {
+        let shapes = format!("{lamp} {glass} AttributeBegin {shape} AttributeEnd");
+        let near = format!("{lamp} AttributeBegin {shape} AttributeEnd");
+        [(shapes, vec!["--ray", *ray, "--depth", "2"]), (near, vec!["--pixel", "20,15", "--all-shapes"])]
+    });
+    for (shapes, arguments) in pages.flatten() {
+        desk.write("a.pbrt", &bare(&shapes, r#""float iso" 250"#, ""));
+        let told = explained(&desk, &arguments);
+        let context = format!("{shapes} {arguments:?}");
+        let mut page = Vec::new();
+        meanings(&without_equations(&told), &mut page);
+        // The ray, its t, the point and its normal are what they are elsewhere.
+        let shared = ["O", "D", "O′", "D′", "P", "N", "P′", "N′", "t", "u", "v"];
+        let mut equations = Vec::new();
+        sections_called(&told, "equation", &mut equations);
+        assert!(!equations.is_empty(), "{context}");
+        for equation in equations {
+            let mut own = Vec::new();
+            meanings(equation, &mut own);
+            for (symbol, label, formula) in own.iter().filter(|(symbol, ..)| !symbol.is_empty()) {
+                assert!(!label.is_empty() || !formula.is_empty(), "{symbol} is not defined: {context}");
+                let is_shared = shared.contains(&symbol.as_str());
+                let elsewhere = page.iter().find(|(other, ..)| other == symbol && !is_shared);
+                assert!(elsewhere.is_none(), "{symbol} is {label} {formula} and {elsewhere:?}: {context}");
+            }
+            // A capsule is three shapes, and a plane cuts each end of a cone. On a patch, u is that of a ruling, then that of a crossing.
+            if ["capsule", "csg", "bilinear"].iter().any(|kind| shapes.contains(kind)) {
+                continue;
+            }
+            for (i, (symbol, label, formula)) in own.iter().enumerate() {
+                let is_repeated = ["μ", "δ", "t", "P", "det", "b₁", "b₂"].contains(&symbol.as_str());
+                let other =
+                    own[..i].iter().find(|(other, ..)| other == symbol && !is_repeated && !symbol.is_empty());
+                assert!(other.is_none(), "{symbol} is {label} {formula} and {other:?}: {context}");
+            }
+        }
+        let mut all = Vec::new();
+        meanings(&told, &mut all);
+        let mut defined: Vec<String> = ["O", "D", "M", "min", "max"].map(str::to_owned).to_vec();
+        for (symbol, label, formula) in all {
+            let unknown = symbols(&formula).into_iter().find(|one| !defined.contains(one));
+            assert!(
+                unknown.is_none(),
+                "{unknown:?} of {symbol} = {formula} ({label}): {defined:?} {context}"
+            );
+            defined.push(symbol);
+        }
+    }
+}
+
+#[test]
+fn an_equation_that_holds_to_its_digits_only_is_nearly_one() {
+    let desk = Desk::new();
+    desk.write("a.pbrt", &bare(r#"Shape "sphere" "float radius" 1"#, "", ""));
+    let out = stdout(&desk.lumbre(&[
+        "explain",
+        "a.pbrt",
+        "--ray",
+        "-3,0.6,0,2,0,0",
+        "--only",
+        "Discriminant,Roots",
+    ]));
+    // 8.36/7.6 is 1.1, and the discriminant of the textbook 10.24.
+    for line in [
+        "Δ = a·(r² − l·l) = 4·(1² − (0, 0.6, 0)·(0, 0.6, 0)) = 2.56",
+        "b² − 4·a·c = (-12)² − 4·4·8.36 ≈ 10.24000000000000",
+        "t₁ = c/q = 8.36/7.6 ≈ 1.09999999999999",
+        "t₂ = q/a = 7.6/4 = 1.9",
+    ] {
+        assert!(out.contains(line), "{line}: {out}");
+    }
+}
+
+#[test]
+fn roulette_and_the_next_direction_come_in_steps() {
+    let desk = Desk::new();
+    let room = r#"AreaLightSource "diffuse" Material "diffuse" "rgb reflectance" [0.875 0.5 0.25]
+        Shape "sphere" "float radius" 3"#;
+    desk.write("a.pbrt", &bare(room, "", r#"Integrator "path" "integer maxdepth" 40"#));
+    let vector = |section: &Value, name: &str| -> Vec<f64> {
+        match quantity(section, name) {
+            Value::Array(all) => all.iter().map(|x| x.as_f64().unwrap()).collect(),
+            one => vec![one.as_f64().unwrap(); 3],
+        }
+    };
+    let is_close = |a: f64, b: f64| (a - b).abs() <= 1e-3 * b.abs();
+    let mut survived = 0;
+    for sample in 0..16 {
+        let told =
+            explained(&desk, &["--ray", "0,0,0,0,0,1", "--sample", &sample.to_string(), "--only", "light"]);
+        for vertex in list(&told["sections"][0]["sections"]) {
+            let Some(next) = section(vertex, "scattered") else { continue };
+            let symbols: Vec<&Value> = list(&vertex["quantities"]).iter().map(|one| &one["symbol"]).collect();
+            let is_after = symbols.contains(&&Value::from("βᵣ"));
+            let mut before = vector(vertex, "β");
+            if is_after {
+                let (probability, after) = (vector(vertex, "pᵣ")[0], vector(vertex, "βᵣ"));
+                assert!(before.iter().zip(&after).all(|(b, a)| is_close(*a, b / probability)), "{vertex}");
+                before = after;
+                survived += 1;
+            }
+            // f is the reflectance over π, and the density of the direction |cos θ|/π.
+            let (f, cosine, density) = (vector(next, "f"), vector(next, "cₛ")[0], vector(next, "pₛ")[0]);
+            assert!(is_close(f[1], 0.5 / std::f64::consts::PI), "{next}");
+            assert!(is_close(density, cosine / std::f64::consts::PI), "{next}");
+            let (kept, carried) = (vector(next, "α"), vector(next, "β′"));
+            for i in 0..3 {
+                assert!(is_close(kept[i], f[i] * cosine / density), "{next}");
+                assert!(is_close(carried[i], before[i] * kept[i]), "{next}");
+            }
+        }
+    }
+    assert!(survived >= 3, "{survived}");
 }
 
 #[test]
@@ -587,10 +753,10 @@ fn rounded_numbers_in_a_formula_are_nearly_equal() {
     let desk = Desk::new();
     desk.write("a.pbrt", &bare(r#"Shape "sphere" "float radius" 1"#, "", ""));
     let out = stdout(&desk.lumbre(&["explain", "a.pbrt", "--ray", "0,0,-5,0,0,1", "--only", "Quadratic"]));
-    assert!(out.contains("h = w·D = (0, 0, -5)·(0, 0, 1) = -5\n"), "{out}");
+    assert!(out.contains("h = W·D = (0, 0, -5)·(0, 0, 1) = -5\n"), "{out}");
     let out =
         stdout(&desk.lumbre(&["explain", "a.pbrt", "--ray", "0,0.1234567,-5,0,0,1", "--only", "Quadratic"]));
-    assert!(out.contains("c = w·w − r² ≈ (0, 0.123457, -5)·(0, 0.123457, -5) − 1² ≈ 24."), "{out}");
+    assert!(out.contains("c = W·W − r² ≈ (0, 0.123457, -5)·(0, 0.123457, -5) − 1² ≈ 24."), "{out}");
 }
 
 #[test]
@@ -616,6 +782,23 @@ fn kinds_and_mistakes_are_told_in_spanish() {
     );
     let out = desk.lumbre(&["explain", "a.pbrt", "--pixel", "1,0", "--only", "colour", "--lang", "es"]);
     assert!(stderr(&out).contains("--only colour: ninguna sección tiene esta clave"), "{}", stderr(&out));
+    // Parameters, and shapes by their names in Spanish.
+    assert!(told.contains("reflectancia (reflectance)"), "{told}");
+    let out = desk.lumbre(&["explain", "a.pbrt", "--ray", "0,9,0,0,0,1", "--shape", "disco", "--lang", "es"]);
+    assert!(stdout(&out).contains("forma 3, disco") || stdout(&out).contains(", disco"), "{}", stdout(&out));
+    let out = desk.lumbre(&["explain", "a.pbrt", "--ray", "0,9,0,0,0,1", "--shape", "cubo", "--lang", "es"]);
+    assert!(stderr(&out).contains("clay, disco, esfera"), "{}", stderr(&out));
+    // Files.
+    let out = desk.lumbre(&["explain", "b.pbrt", "--pixel", "1,0", "--lang", "es"]);
+    assert!(stderr(&out).contains("b.pbrt: no se puede abrir: no existe"), "{}", stderr(&out));
+    desk.write("b.pbrt", r#"WorldBegin Shape "sphere" "float radio" 2"#);
+    let out = desk.lumbre(&["explain", "b.pbrt", "--ray", "0,0,-5,0,0,1", "--lang", "es"]);
+    let warned = stderr(&out);
+    assert!(
+        warned.contains("aviso: b.pbrt:1:27: parámetro desconocido \"radio\" de la forma \"sphere\""),
+        "{warned}"
+    );
+    assert!(warned.ends_with("1 aviso\n"), "{warned}");
 }
 
 /// The page of an explanation.
@@ -684,7 +867,7 @@ const DRAWN: [(&str, &str, &[&str], &[&str]); 14] = [
     (
         r#"Shape "box" "point3 p0" [-1 -1 -1] "point3 p1" [1 1 1]"#,
         "-5,0.3,0.1,1,0.1,0",
-        &["O", "L", "H", "t₁", "t₂", "N"],
+        &["O", "P₀", "P₁", "t₁", "t₂", "N"],
         &[],
     ),
     (
@@ -693,7 +876,7 @@ const DRAWN: [(&str, &str, &[&str], &[&str]); 14] = [
         &["O", "P₁", "P₂", "r₁", "t₁", "t₂", "N"],
         &[],
     ),
-    (r#"Shape "plane""#, "-5,0.3,2,1,0.1,-0.5", &["O", "P", "t", "N"], &[]),
+    (r#"Shape "plane""#, "-5,0.3,2,1,0.1,-0.5", &["O", "P₀", "t", "N"], &[]),
     (r#"Shape "disk" "float radius" 900"#, "-5,0.3,2,1,0.1,-0.5", &["O", "t", "N"], &[]),
     (
         r#"Shape "bilinearmesh" "point3 P" [-1 -1 0  1 -1 1  -1 1 1  1 1 -0.5]"#,

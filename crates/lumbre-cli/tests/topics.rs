@@ -1,5 +1,5 @@
-//! The table of topics of the mathematics, `docs/mathematics/topics.md`, walked line by line: everything it names is there, and every
-//! command runs.
+//! The table of topics of the mathematics, `docs/mathematics/topics.md`, walked line by line, and the same table in Spanish: everything
+//! it names is there, and every command runs.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -60,8 +60,8 @@ fn anchor_of(heading: &str) -> String {
     heading.trim_start_matches('#').trim().to_lowercase().chars().filter_map(letter).collect()
 }
 
-fn check_chapter(topic: &Topic) -> Result<(), String> {
-    let text = read(&repository().join("docs/mathematics").join(&topic.chapter))?;
+fn check_chapter(topic: &Topic, folder: &str) -> Result<(), String> {
+    let text = read(&repository().join(folder).join(&topic.chapter))?;
     let has_heading = text.lines().any(|line| line.starts_with('#') && anchor_of(line) == topic.anchor);
     has_heading.then_some(()).ok_or_else(|| format!("{} has no heading {}", topic.chapter, topic.anchor))
 }
@@ -96,7 +96,7 @@ fn defines(text: &str, kinds: &[&str], name: &str) -> bool {
 const FUNCTIONS: &[&str] = &["fn", "const fn"];
 const TYPES: &[&str] = &["struct", "enum", "trait", "type"];
 
-fn check_function(topic: &Topic) -> Result<(), String> {
+fn check_function(topic: &Topic, _: &str) -> Result<(), String> {
     let path: Vec<&str> = topic.function.split("::").collect();
     let [krate, .., name] = path[..] else { return Err(format!("{} is no path", topic.function)) };
     let folder = repository().join("crates").join(krate.replace('_', "-")).join("src");
@@ -129,11 +129,15 @@ fn words(command: &str) -> Vec<String> {
     words.into_iter().chain(word).collect()
 }
 
-fn check_command(topic: &Topic) -> Result<(), String> {
+fn check_command(topic: &Topic, folder: &str) -> Result<(), String> {
     let Some(command) = &topic.command else { return Ok(()) };
     let words = words(command);
     if words.first().is_none_or(|program| program != "lumbre") {
         return Err(format!("{command:?} is no command of lumbre"));
+    }
+    let speaks = ["explain", "math"].contains(&words.get(1).map_or("", String::as_str));
+    if speaks && (folder == SPANISH) != command.contains(" --lang es ") {
+        return Err(format!("{command:?} is in the other language"));
     }
     let output = Command::new(env!("CARGO_BIN_EXE_lumbre"))
         .args(&words[1..])
@@ -145,7 +149,7 @@ fn check_command(topic: &Topic) -> Result<(), String> {
     is_right.then_some(()).ok_or_else(|| format!("{command}: {}: {complaint}", output.status))
 }
 
-fn check_test(topic: &Topic) -> Result<(), String> {
+fn check_test(topic: &Topic, _: &str) -> Result<(), String> {
     let (file, function) =
         topic.test.split_once(": ").ok_or_else(|| format!("{:?} is no test", topic.test))?;
     let text = read(&repository().join("crates").join(file))?;
@@ -158,7 +162,7 @@ fn check_test(topic: &Topic) -> Result<(), String> {
     is_marked.then_some(()).ok_or_else(|| format!("{function} is no test"))
 }
 
-fn complaints(line: &str) -> Vec<String> {
+fn complaints(line: &str, folder: &str) -> Vec<String> {
     let topic = match topic(line) {
         Ok(topic) => topic,
         Err(why) => return vec![format!("{line}: {why}")],
@@ -166,32 +170,54 @@ fn complaints(line: &str) -> Vec<String> {
     let checks = [check_chapter, check_function, check_command, check_test];
     checks
         .iter()
-        .filter_map(|check| check(&topic).err())
+        .filter_map(|check| check(&topic, folder).err())
         .map(|why| format!("{}: {why}", topic.name))
         .collect()
 }
 
 fn lines(text: &str) -> impl Iterator<Item = &str> {
-    let is_row =
-        |line: &&str| line.starts_with('|') && !line.starts_with("|---") && !line.starts_with("| topic |");
+    let is_row = |line: &&str| {
+        ["|---", "| topic |", "| tema |"].iter().all(|head| !line.starts_with(head)) && line.starts_with('|')
+    };
     text.lines().filter(is_row)
+}
+
+/// The folders of the tables, from that of the repository.
+const ENGLISH: &str = "docs/mathematics";
+const SPANISH: &str = "docs/es/mathematics";
+
+/// The pages of a folder.
+fn pages(folder: &Path) -> Result<Vec<String>, String> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder).map_err(|e| e.to_string())? {
+        let name = entry.map_err(|e| e.to_string())?.file_name().to_string_lossy().into_owned();
+        names.extend(Some(name).filter(|name| name.ends_with(".md") && name != "topics.md"));
+    }
+    Ok(names)
 }
 
 #[test]
 fn every_topic_has_its_chapter_function_command_and_test() -> Result<(), String> {
-    let folder = repository().join("docs/mathematics");
-    let text = read(&folder.join("topics.md"))?;
-    let complaints: Vec<String> = lines(&text).flat_map(complaints).collect();
-    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
-    let topics: Vec<Topic> = lines(&text).map(topic).collect::<Result<_, _>>()?;
-    assert!(topics.len() > 140, "{} topics", topics.len());
-    assert!(topics.iter().filter(|topic| topic.command.is_none()).count() <= 3);
-    let told: BTreeSet<&str> = topics.iter().map(|topic| topic.chapter.as_str()).collect();
-    for entry in fs::read_dir(&folder).map_err(|e| e.to_string())? {
-        let name = entry.map_err(|e| e.to_string())?.file_name().to_string_lossy().into_owned();
-        let is_chapter = name.ends_with(".md") && name != "topics.md";
-        assert!(!is_chapter || told.contains(name.as_str()), "no topic is told in {name}");
+    let mut counts = Vec::new();
+    for folder in [ENGLISH, SPANISH] {
+        let text = read(&repository().join(folder).join("topics.md"))?;
+        let complaints: Vec<String> = lines(&text).flat_map(|line| complaints(line, folder)).collect();
+        assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+        let topics: Vec<Topic> = lines(&text).map(topic).collect::<Result<_, _>>()?;
+        assert!(topics.len() > 140, "{} topics", topics.len());
+        assert!(topics.iter().filter(|topic| topic.command.is_none()).count() <= 3);
+        let told: BTreeSet<&str> = topics.iter().map(|topic| topic.chapter.as_str()).collect();
+        let of_mathematics = pages(&repository().join(folder))?;
+        let of_light = pages(&repository().join(folder).join("../light"))?;
+        let of_light = of_light.into_iter().map(|name| format!("../light/{name}"));
+        let mut chapters = 0;
+        for name in of_mathematics.into_iter().chain(of_light) {
+            assert!(told.contains(name.as_str()), "no topic is told in {name}");
+            chapters += 1;
+        }
+        counts.push((topics.len(), chapters));
     }
+    assert_eq!(counts[0], counts[1]);
     Ok(())
 }
 
@@ -199,7 +225,7 @@ fn every_topic_has_its_chapter_function_command_and_test() -> Result<(), String>
 fn a_line_that_is_wrong_anywhere_is_noticed() {
     let right = "| Dot product | [vectors](vectors.md#dot-product) | `lumbre_math::vector::dot` | `lumbre math 'dot([1, 2], [3, 4])'` | \
         `lumbre-math/tests/vectors.rs: products_angles_and_projections_of_vectors` |";
-    assert_eq!(complaints(right), Vec::<String>::new());
+    assert_eq!(complaints(right, ENGLISH), Vec::<String>::new());
     let wrong = [
         ("vectors.md#", "vector.md#"),
         ("#dot-product", "#dot-products"),
@@ -216,6 +242,7 @@ fn a_line_that_is_wrong_anywhere_is_noticed() {
     for (from, to) in wrong {
         let changed = right.replacen(from, to, 1);
         assert_ne!(changed, right);
-        assert_eq!(complaints(&changed).len(), 1, "{changed}: {:?}", complaints(&changed));
+        let found = complaints(&changed, ENGLISH);
+        assert_eq!(found.len(), 1, "{changed}: {found:?}");
     }
 }

@@ -158,12 +158,11 @@ impl WatertightRay {
         let mut u = cx * by - cy * bx;
         let mut v = ax * cy - ay * cx;
         let mut w = bx * ay - by * ax;
-        let by_errors = (u == 0.0) | (v == 0.0) | (w == 0.0);
-        if by_errors {
+        if (u == 0.0) | (v == 0.0) | (w == 0.0) {
             (u, v, w) = (dop(cx, by, cy, bx), dop(ax, cy, ay, cx), dop(bx, ay, by, ax));
         }
         let corners = [DVec3::new(ax, ay, a.z), DVec3::new(bx, by, b.z), DVec3::new(cx, cy, c.z)];
-        Edges { corners, u, v, w, by_errors }
+        Edges { corners, u, v, w }
     }
 
     /// The edge functions of a triangle.
@@ -191,8 +190,6 @@ pub(crate) struct Edges {
     pub(crate) u: f64,
     pub(crate) v: f64,
     pub(crate) w: f64,
-    /// Whether rounding errors were taken into account.
-    pub(crate) by_errors: bool,
 }
 
 impl Edges {

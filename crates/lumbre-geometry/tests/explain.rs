@@ -91,7 +91,7 @@ fn is_true(shape: &Shape, ray: &Ray, explanation: &Explanation, candidate: &Cand
             is_outside && (place - p).length() <= 1e3 * slack * (1.0 + u * u + v * v)
         }
         Fate::OutsideSlab { axis, enter, leave } => {
-            let (low, high) = (vector(steps, "L").unwrap(), vector(steps, "H").unwrap());
+            let (low, high) = (vector(steps, "P₀").unwrap(), vector(steps, "P₁").unwrap());
             (t < enter || leave < t) && (p[axis] < low[axis] + slack || p[axis] > high[axis] - slack)
         }
         Fate::OutsideBox { axis, value, min, max } => near(value, p[axis]) && (value < min || max < value),
@@ -177,8 +177,8 @@ fn hold(
     let surface_step = explanation.steps.iter().find(|step| step.topic == Topic::Surface);
     let surface = expected.first().map(|root| shape.surface(ray, root));
     let told = surface_step.map(std::slice::from_ref);
-    assert_eq!(told.and_then(|step| vector(step, "n")), surface.map(|surface| surface.normal), "{name}");
-    assert_eq!(told.and_then(|step| vector(step, "p")), surface.map(|surface| surface.point), "{name}");
+    assert_eq!(told.and_then(|step| vector(step, "N")), surface.map(|surface| surface.normal), "{name}");
+    assert_eq!(told.and_then(|step| vector(step, "P")), surface.map(|surface| surface.point), "{name}");
     assert_eq!(told.and_then(|step| number(step, "u")), surface.map(|surface| surface.uv.x), "{name}");
 
     // Of the whole line nothing is missing, whatever the range.
@@ -315,7 +315,7 @@ fn check_equation(
             [Some(a), Some(h), Some(c)] => [a, h, c],
             _ if is_twofold => [a, h, c].map(|x| 4.0 * x.abs()),
             _ => {
-                let symbol = if start == 0.0 { "w" } else { "w₀" };
+                let symbol = if start == 0.0 { "W" } else { "W₀" };
                 let w = vector(step(Topic::SetUp).unwrap(), symbol).unwrap().length();
                 let (d, r) = (ray.direction.length(), number(steps, "r").unwrap());
                 [d * d, w * d, w * w + r * r].map(|x| 16.0 * x)
@@ -377,12 +377,12 @@ fn a_sphere_is_explained_as_on_paper() {
         .flat_map(|step| &step.quantities)
         .filter_map(|quantity| quantity.schoolbook.clone())
         .collect();
-    assert_eq!(schoolbook[0], ("b = 2·(w·D)".into(), Value::Number(-10.0)));
+    assert_eq!(schoolbook[0], ("b = 2·(W·D)".into(), Value::Number(-10.0)));
     assert_eq!(schoolbook[1], ("b² − 4·a·c".into(), Value::Number(4.0)));
     assert_eq!(schoolbook[2], ("(−b − √(b² − 4·a·c))/(2·a)".into(), Value::Number(4.0)));
     assert_eq!(explanation.candidates.len(), 2);
     assert!(explanation.candidates.iter().all(|candidate| candidate.fate == Fate::Hit));
-    assert_eq!(vector(steps, "n"), Some(DVec3::NEG_Z));
+    assert_eq!(vector(steps, "N"), Some(DVec3::NEG_Z));
 
     let behind = sphere.explain(&Ray::new(DVec3::new(0.0, 0.0, 0.5), DVec3::Z));
     let fates: Vec<_> = behind.candidates.iter().map(|candidate| (candidate.t, candidate.fate)).collect();

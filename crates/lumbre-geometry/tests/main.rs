@@ -6,6 +6,7 @@ mod csg;
 mod curves;
 mod exactness;
 mod explain;
+mod explain_flat;
 mod explain_formulas;
 mod extremes;
 mod nearest;

@@ -41,7 +41,7 @@ fn everywhere(start: f64, coefficients: impl Into<Vec<f64>>) -> Vec<Piece> {
 pub(super) fn along(shape: &Shape, explanation: &Explanation, ray: &Ray) -> Option<Along> {
     let number = |topic: Topic, symbol: &str| number(explanation, topic, symbol);
     // The steps of a ray whose direction was scaled are of that, and have other t.
-    let factor = number(Topic::ScaledRay, "f").unwrap_or(1.0);
+    let factor = number(Topic::ScaledRay, "λ").unwrap_or(1.0);
     let direction = vector(explanation, Topic::ScaledRay, "D").unwrap_or(ray.direction);
     let ray = &Ray { direction, ..*ray };
     let function = |formula: &'static str, pieces: Vec<Piece>| Along::Function { formula, pieces };
@@ -114,7 +114,7 @@ pub(super) fn vector(explanation: &Explanation, topic: Topic, symbol: &str) -> O
 
 fn slabs(explanation: &Explanation, ray: &Ray, factor: f64) -> Option<Vec<(String, Vec<[f64; 2]>)>> {
     let corner = |symbol: &str| vector(explanation, Topic::Parameters, symbol);
-    let (low, high) = (corner("L")?, corner("H")?);
+    let (low, high) = (corner("P₀")?, corner("P₁")?);
     let mut within = [f64::NEG_INFINITY, f64::INFINITY];
     let mut rows = Vec::new();
     for (axis, [name, first, second]) in

@@ -34,7 +34,7 @@ pub(super) fn camera(
     let eye = place.point(DVec3::ZERO);
     section.quantity(&mut scope, "E", texts.eye, "", eye);
     for (symbol, label, axis) in
-        [("u", texts.right, DVec3::X), ("v", texts.up, DVec3::Y), ("w", texts.forward, DVec3::Z)]
+        [("e₁", texts.right, DVec3::X), ("e₂", texts.up, DVec3::Y), ("e₃", texts.forward, DVec3::Z)]
     {
         section.quantity(&mut scope, symbol, label, "", place.vector(axis).normalize_or_zero());
     }
@@ -78,17 +78,17 @@ fn projected(
     texts: &Texts,
 ) {
     let along = place.inverse_vector(ray.direction).z;
-    let s = (focus - place.inverse_point(ray.origin).z) / along;
-    if !(along > 0.0 && s.is_finite()) {
+    let t = (focus - place.inverse_point(ray.origin).z) / along;
+    if !(along > 0.0 && t.is_finite()) {
         return;
     }
-    let point = ray.at(s);
+    let point = ray.at(t);
     let Back { in_camera, clip, on_film } = back(projection, place, size, point);
     let mut scope = Scope::default();
     scope.set_ray(["O", "D"], ray);
     section.text(texts.projected);
-    section.quantity(&mut scope, "s", texts.in_focus, "", s);
-    section.quantity(&mut scope, "X", texts.point_of_ray, "O + s·D", point);
+    section.quantity(&mut scope, "tₑ", texts.in_focus, "", t);
+    section.quantity(&mut scope, "X", texts.point_of_ray, "O + tₑ·D", point);
     section.fact(texts.by_look_at, in_camera);
     section.fact(texts.by_projection, Value::Numbers(clip.to_array().to_vec()));
     section.fact(texts.by_division, clip.truncate() / clip.w);
@@ -191,10 +191,10 @@ fn film(
     let direction = place.inverse_vector(sample.ray.direction);
     // Up to the screen, which is at a distance of 1.
     let towards = if direction.z > 0.0 { direction / direction.z } else { direction };
-    section.quantity(&mut scope, "d", texts.direction_in_camera, "", towards);
-    section.quantity(&mut scope, "R", texts.direction_turned, "M d", place.vector(towards));
+    section.quantity(&mut scope, "Dₑ", texts.direction_in_camera, "", towards);
+    section.quantity(&mut scope, "D₀", texts.direction_turned, "", place.vector(towards));
     section.quantity(&mut scope, "O", texts.origin, "", sample.ray.origin);
-    section.quantity(&mut scope, "D", texts.direction, "R/|R|", sample.ray.direction);
+    section.quantity(&mut scope, "D", texts.direction, "D₀/|D₀|", sample.ray.direction);
     section.fact(texts.range, Value::Intervals(vec![[sample.ray.t_min, sample.ray.t_max]]));
     if sample.ray.time != 0.0 {
         section.fact(texts.time, sample.ray.time);

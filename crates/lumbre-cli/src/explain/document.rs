@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use lumbre::math::glam::DMat4;
 use lumbre::{DVec3, Ray};
 
+use super::equation;
 use super::figure::{Figure, Marked};
 use super::formula::{PutIn, Scope};
 use super::numbers::{exact, short};
@@ -59,8 +60,16 @@ pub(super) struct Quantity {
     /// The formula with its numbers, if any.
     pub(super) numbers: Option<PutIn>,
     pub(super) value: Value,
-    /// The textbook's formula and its result.
-    pub(super) schoolbook: Option<(String, Value)>,
+    pub(super) schoolbook: Option<Textbook>,
+}
+
+/// The textbook's formula, with its numbers if any, and its result.
+#[derive(Clone, Debug)]
+pub(super) struct Textbook {
+    pub(super) formula: String,
+    /// The sign before the result.
+    pub(super) sign: &'static str,
+    pub(super) value: Value,
 }
 
 /// The value of a quantity.
@@ -159,8 +168,17 @@ impl Value {
 
     /// The rows of a matrix, in full.
     pub(super) fn rows(&self) -> Option<[[String; 4]; 4]> {
+        self.rows_written(exact)
+    }
+
+    /// The rows of a matrix, with six digits.
+    pub(super) fn short_rows(&self) -> Option<[[String; 4]; 4]> {
+        self.rows_written(short)
+    }
+
+    fn rows_written(&self, write: impl Fn(f64) -> String + Copy) -> Option<[[String; 4]; 4]> {
         match self {
-            Self::Matrix(m) => Some(m.transpose().to_cols_array_2d().map(|row| row.map(exact))),
+            Self::Matrix(m) => Some(m.transpose().to_cols_array_2d().map(|row| row.map(write))),
             _ => None,
         }
     }
@@ -196,10 +214,9 @@ impl Scope {
 
 impl Quantity {
     /// The parts of `symbol = formula = numbers = value` except the last, each with the sign that follows it; parts may
-    /// be missing. Rounded numbers are only nearly equal to their neighbours.
+    /// be missing. What does not hold to the last digit is nearly equal.
     pub(super) fn chain(&self) -> Vec<(&str, &'static str)> {
         let Self { symbol, formula, numbers, .. } = self;
-        let is_rounded = numbers.as_ref().is_some_and(|numbers| numbers.is_rounded);
         let mut parts: Vec<(&str, &'static str)> = Vec::new();
         if !symbol.is_empty() {
             parts.push((symbol, "="));
@@ -208,11 +225,10 @@ impl Quantity {
             parts.push((formula, "="));
         }
         if let Some(numbers) = numbers {
-            let sign = if is_rounded { "≈" } else { "=" };
             if let Some(last) = parts.last_mut() {
-                last.1 = sign;
+                last.1 = numbers.sign_before();
             }
-            parts.push((&numbers.written, sign));
+            parts.push((&numbers.written, numbers.sign_after()));
         }
         parts
     }
@@ -287,5 +303,9 @@ impl Section {
 
 /// The numbers in a formula, if they say more than its result.
 pub(super) fn numbers(scope: &Scope, formula: &str, value: &Value) -> Option<PutIn> {
-    scope.put_in(formula).filter(|numbers| numbers.written != value.in_full())
+    let result = value.in_full();
+    let mut numbers = scope.put_in(formula).filter(|numbers| numbers.written != result)?;
+    let is_light = matches!(value, Value::Single(_) | Value::Colour(_));
+    numbers.is_exact = equation::holds(&numbers.written, &result, is_light).unwrap_or(true);
+    Some(numbers)
 }

@@ -12,6 +12,8 @@ pub(super) static ENGLISH: Texts = Texts {
     remark,
     fate_of,
     kind_of,
+    kind_of_light: kind_of,
+    parameter: |_| "",
     symbol,
     camera: "The camera",
     kind: "kind",
@@ -33,7 +35,7 @@ pub(super) static ENGLISH: Texts = Texts {
     screen_point: "point of the screen (at a distance of 1 for a perspective)",
     lens_point: "point of the lens, as two numbers in [0, 1)",
     direction_in_camera: "direction in camera space",
-    direction_turned: "turned into the world",
+    direction_turned: "turned into the world, by the inverse of the look-at matrix",
     origin: "the ray's origin",
     direction: "the ray's direction",
     range: "range of t",
@@ -111,12 +113,12 @@ pub(super) static ENGLISH: Texts = Texts {
     mirror: "A mirror, and a smooth boundary",
     facing: "the normal that faces the ray",
     reflected: "the mirrored direction",
-    index: "index of refraction",
-    eta: "index on this side over that beyond",
+    index_here: "index of refraction on this side",
+    index_beyond: "index of refraction beyond",
     cos_incident: "cosine of the angle of incidence",
     cos_squared: "square of the cosine of the angle of refraction",
     refracted: "the refracted direction",
-    total_reflection: "k < 0: all is reflected, nothing is refracted.",
+    total_reflection: "κ < 0: all is reflected, nothing is refracted.",
     each_light: "Each light, from here",
     each_light_is: "One point of each light, in its middle; the path below takes points by chance.",
     light_number: "light",
@@ -150,8 +152,8 @@ pub(super) static ENGLISH: Texts = Texts {
     from_caustics: "photons near the point",
     photons: "Photons near the point, the brightest first: light that came over mirrors or through glass",
     photon_from: "where it came from",
-    photon_irradiance: "E (irradiance, facing it)",
-    photon_scattered: "f·E·w (scattered to the viewer)",
+    photon_irradiance: "Eₚ (irradiance, facing it)",
+    photon_scattered: "f·Eₚ·wₚ (scattered to the viewer)",
     more_photons: "{0} more bring {1} together.",
     end_depth: "The path has as many bounces as it may have.",
     end_nothing: "Nothing scatters here.",
@@ -184,10 +186,11 @@ pub(super) static ENGLISH: Texts = Texts {
     baked: "M takes these corners to those of the equation.",
     mirrored: "M mirrors: the corners go round the other way.",
     split: "The face is flat, and is tested as two triangles.",
+    no_wavelengths: "warning: its picture carries wavelengths; what is explained is a path of red, green and blue",
     no_turntable: "--turntable makes many pictures (expected no --turntable)",
     nothing_asked: "nothing is asked for (expected --pixel X,Y, from 0,0 in the upper left corner, or --ray OX,OY,OZ,DX,DY,DZ)",
-    frame_of_same_hand: "Camera space has x along u, y along v and z along w. Here u×v points along w: it has the same hand as the scene's axes.",
-    frame_of_other_hand: "Camera space has x along u, y along v and z along w. Here u×v points against w: it has the other hand than the scene's axes, left-handed where these are right-handed.",
+    frame_of_same_hand: "Camera space has x along e₁, y along e₂ and z along e₃. Here e₁×e₂ points along e₃: it has the same hand as the scene's axes.",
+    frame_of_other_hand: "Camera space has x along e₁, y along e₂ and z along e₃. Here e₁×e₂ points against e₃: it has the other hand than the scene's axes, left-handed where these are right-handed.",
     projected: "Back to the picture: the look-at matrix and then the projection matrix take a point of the ray to its pixel.",
     in_focus: "where the ray is in focus; without a lens, at a distance of 1",
     point_of_ray: "a point of the ray",
@@ -206,7 +209,8 @@ pub(super) static ENGLISH: Texts = Texts {
     uv_as_colour: "u and v as red and green",
     is_open: "1 where nothing near is in that direction, else 0",
     tree: "The tree of rays: below each vertex stand those that its mirrored and refracted rays meet.",
-    roulette_factor: "factor for having gone on, the inverse of that probability",
+    going_on: "probability of going on",
+    after_roulette: "what the path carries, having gone on",
     radiance_along_ray: "radiance along the ray",
     radiance_before_film: "radiance of this sample",
     exposure: "exposure of the film: shutter time times ISO / 100",
@@ -222,7 +226,7 @@ pub(super) static ENGLISH: Texts = Texts {
     fresnel: "the Fresnel reflectance: the share that is reflected",
     intensity: "intensity of the light towards here, over the probability of choosing it",
     cos_light: "|cos θ|, by the shading normal",
-    bsdf_alone: "f / |cos θ|: the BSDF alone",
+    bsdf_alone: "the BSDF",
     phase: "phase function towards it",
     phase_weight: "phase function over the density",
     is_scattered: "The medium scatters it.",
@@ -275,7 +279,18 @@ fn remark(remark: &Remark, name: &OperandName<'_>) -> String {
         Remark::Misses => "The line misses it.",
         Remark::Touches => "The line touches it: both roots are one.",
         Remark::Parallel => "The line is parallel to it.",
-        Remark::Between => "The line lies in it, or between both planes all the way.",
+        Remark::Between { axis } => {
+            return format!(
+                "The line is parallel to both planes of {}, and lies between them or in one of them.",
+                AXES[*axis]
+            );
+        }
+        Remark::Beside { axis } => {
+            return format!(
+                "The line is parallel to both planes of {}, and does not lie between them.",
+                AXES[*axis]
+            );
+        }
         Remark::AtInfinity => "a = 0: the equation is linear, and one root has gone to infinity.",
         Remark::InsideThroughout => {
             "a = h = 0 and c < 0: the line is inside of it all the way, and does not cross it."
@@ -315,6 +330,8 @@ fn remark(remark: &Remark, name: &OperandName<'_>) -> String {
         Remark::SchoolbookHits => {
             "By rounding, the textbook's discriminant is not negative: it would hit what is missed."
         }
+        Remark::InPlane => "The line lies in the plane, and crosses it nowhere.",
+        Remark::OnEdge => "An edge function is 0: the line meets that edge, or its continuation.",
         Remark::EdgeByRoundingErrors => {
             "Two products rounded to the same number: their rounding errors decide about an edge."
         }
@@ -375,6 +392,9 @@ fn fate_of(fate: &Fate, name: &OperandName<'_>) -> String {
         Fate::OutsidePatch { u, v } => {
             return format!("outside the patch (u = {}, v = {})", exact(u), exact(v));
         }
+        Fate::OutsideSlab { axis, enter, leave } if enter.is_infinite() && enter == leave => {
+            return format!("outside the slab of {}, which the line never enters", AXES[axis]);
+        }
         Fate::OutsideSlab { axis, enter, leave } => {
             return format!(
                 "outside the slab of {}, which is from t = {} to {}",
@@ -416,30 +436,77 @@ fn kind_of(kind: &'static str) -> &'static str {
     kind
 }
 
-fn symbol(topic: Topic, symbol: &str) -> &'static str {
-    match (topic, symbol) {
-        (Topic::Parameters, "C") => "centre",
-        (Topic::Parameters, "r") => "radius",
-        (Topic::Parameters, "R") => "radius of the circle in the middle of the tube",
-        (Topic::Parameters, "r₁") => "radius at the first end",
-        (Topic::Parameters, "r₂") => "radius at the second end",
-        (Topic::Parameters, "k") => "what the radius grows by along the axis",
-        (Topic::Parameters, "V") => "unit axis",
-        (Topic::ScaledRay, "f") => "factor of the direction",
-        (Topic::SetUp, "w") => "the ray's origin as seen from the shape",
-        (Topic::SetUp, "t₀") => "where the equation is set up",
-        (Topic::SetUp, "w₀") => "the place there",
-        (Topic::Quadratic, "S") => "axis from end to end, with a length near 1",
-        (Topic::Quadratic, "κ") => "what the radius grows by along S, times its length",
-        (Topic::Quadratic, "ρ₀") => "radius where w begins, times S·S",
-        (Topic::Quadratic, "ε₂") => "bound on the error of a, in units of 2⁻⁵³",
-        (Topic::Quadratic, "ε₁") => "the same for h",
-        (Topic::Quadratic, "ε₀") => "the same for c",
-        (Topic::Discriminant, "l") => "from the centre to the nearest point of the line",
-        (Topic::Discriminant, "ε") => "bound on the error of Δ",
-        (Topic::Nappe, "g") => "what the radius grows by along the ray",
-        (Topic::Nappe, "ρ") => "radius in the middle of the roots; negative on the other nappe",
-        (Topic::TextbookQuartic, "τ") => "its real roots",
+fn symbol(topic: Topic, symbol: &str, kind: &str) -> &'static str {
+    match (topic, symbol, kind) {
+        (Topic::Parameters, "P₀", "plane") => "a point of it",
+        (Topic::Parameters, "P₀", "box") => "the corner with the lower coordinates",
+        (Topic::Parameters, "P₁", "box") => "the corner with the higher coordinates",
+        (Topic::Parameters, "P₀" | "P₁" | "P₂", "triangle") => "corner",
+        (Topic::Parameters, "P₀₀" | "P₁₀" | "P₀₁" | "P₁₁", _) => "corner at this u and v",
+        (Topic::Parameters, "P₁", "hyperboloid") => "first end of the segment that sweeps it",
+        (Topic::Parameters, "P₂", "hyperboloid") => "its second end",
+        (Topic::Parameters, "P₁", _) => "first end of the axis",
+        (Topic::Parameters, "P₂", _) => "second end of the axis",
+        (Topic::Parameters, "n", _) => "normal",
+        (Topic::Parameters, "r₀", _) => "radius of the hole",
+        (Topic::Parameters, "H", "paraboloid") => "height at which it has that radius",
+        (Topic::Parameters, "Z", _) => "direction of its axis",
+        (Topic::Parameters, "Q₁" | "Q₂" | "Q₃", _) => {
+            "row of the symmetric matrix of its squares and products"
+        }
+        (Topic::Parameters, "G", _) => "half of its coefficients of x, y and z",
+        (Topic::Parameters, "j", _) => "its constant",
+        (Topic::Parameters | Topic::FirstBall | Topic::SecondBall, "C", _) => "centre",
+        (Topic::Parameters, "r", "torus") => "radius of the tube",
+        (Topic::Parameters | Topic::FirstBall | Topic::SecondBall, "r", _) => "radius",
+        (Topic::Parameters, "R", _) => "radius of the circle in the middle of the tube",
+        (Topic::Parameters, "r₁", _) => "radius at the first end",
+        (Topic::Parameters, "r₂", _) => "radius at the second end",
+        (Topic::Parameters, "k", _) => "what the radius grows by along the axis",
+        (Topic::Parameters, "V", _) => "unit axis",
+        (Topic::ScaledRay, "λ", _) => "factor of the direction",
+        (Topic::ScaledRay, "D", _) => {
+            "the direction over λ, which the steps below use; their t are λ times as large"
+        }
+        (Topic::SetUp | Topic::TorusFrame, "W", _) => "the ray's origin as seen from the shape",
+        (Topic::SetUp, "t₀", _) => "where the equation is set up",
+        (Topic::SetUp, "W₀", _) => "the place there",
+        (Topic::Quadratic, "U", _) => "axis from end to end, with a length near 1",
+        (Topic::Quadratic, "K", _) => "what the radius grows by along U, times its length",
+        (Topic::Quadratic, "ρ₀", _) => "radius where W begins, times U·U",
+        (Topic::Quadratic, "ε₂", _) => "bound on the error of a, in units of 2⁻⁵³",
+        (Topic::Quadratic, "ε₁", _) => "the same for h",
+        (Topic::Quadratic, "ε₀", _) => "the same for c",
+        (Topic::Discriminant, "l", _) => "from the centre to the nearest point of the line",
+        (Topic::Discriminant, "ε", _) => "bound on the error of Δ",
+        (Topic::Nappe, "g", _) => "what the radius grows by along the ray",
+        (Topic::Nappe, "ρ", _) => "radius in the middle of the roots; negative on the other nappe",
+        (Topic::TorusFrame, "g", _) => "length of the direction",
+        (Topic::TorusFrame, "t₀", _) => "where the line is nearest to the centre",
+        (Topic::TorusFrame, "s₀", _) => "what rounding leaves between there and p",
+        (Topic::TorusFrame, "p", _) => "the point there, along the axes of the torus",
+        (Topic::TorusFrame, "U", _) => "unit direction along the same axes",
+        (Topic::TorusBounds, "σ₁", _) => "the part of the line from there …",
+        (Topic::TorusBounds, "σ₂", _) => "… to there, in lengths from p",
+        (Topic::QuarticExtrema, "s", _) => "where the derivative is 0, in lengths from p",
+        (Topic::QuarticExtrema, "y", _) => "the value of the quartic at each of them",
+        (Topic::QuarticRoots, "s₁" | "s₂" | "s₃" | "s₄", _) => "root, in lengths from p",
+        (Topic::TextbookQuartic, "τ", _) => "its real roots",
+        (Topic::Shear, "i₁" | "i₂", _) => "coordinate axis",
+        (Topic::Shear, "i₃", _) => "coordinate axis, the one that the direction is longest along",
+        (Topic::Winding, "σ", _) => "sign of each",
+        (Topic::Winding, "n", _) => "how often the outline winds about the ray",
+        (Topic::Roots, "u₁" | "u₂" | "v₁" | "v₂", "bilinear") => {
+            "place on the patch, after a step of Newton's method"
+        }
+        (Topic::Roots, "t₁" | "t₂", "bilinear") => "t there",
+        (Topic::Span, "t₁", "capsule") => "where the line enters",
+        (Topic::Span, "t₂", "capsule") => "where it leaves",
+        (Topic::Intervals, "I", _) => "within the result",
+        (Topic::Intervals, _, _) => "within the operand of this number",
+        (Topic::Surface, "P", _) => "the point",
+        (Topic::Surface, "N", _) => "outward unit normal",
+        (Topic::Surface, "u" | "v", _) => "surface parameter",
         _ => "",
     }
 }

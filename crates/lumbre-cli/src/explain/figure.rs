@@ -131,7 +131,7 @@ fn of_ray(prime: &str) -> [Name; 2] {
 }
 
 /// The points among the parameters of shapes.
-const POINTS: [&str; 11] = ["C", "P", "P₀", "P₁", "P₂", "P₀₀", "P₁₀", "P₀₁", "P₁₁", "L", "H"];
+const POINTS: [&str; 8] = ["C", "P₀", "P₁", "P₂", "P₀₀", "P₁₀", "P₀₁", "P₁₁"];
 /// The roots of an equation, and the one of a plane.
 const ROOTS: [&str; 5] = ["t₁", "t₂", "t₃", "t₄", "t"];
 
@@ -183,7 +183,7 @@ impl Subject<'_> {
                 _ => None,
             })
             .collect();
-        let factor = number(self.explanation, Topic::ScaledRay, "f").unwrap_or(1.0);
+        let factor = number(self.explanation, Topic::ScaledRay, "λ").unwrap_or(1.0);
         let mut found: Vec<Crossing> = Vec::new();
         for candidate in &self.explanation.candidates {
             let (t, is_hit) = (candidate.t, candidate.fate == Fate::Hit);

@@ -168,6 +168,20 @@ pub(super) struct PutIn {
     pub(super) written: String,
     /// Whether digits of the numbers are left out, so that the formula is only nearly equal.
     pub(super) is_rounded: bool,
+    /// Whether the result that follows is equal to the last digit.
+    pub(super) is_exact: bool,
+}
+
+impl PutIn {
+    /// The sign between the formula and its numbers.
+    pub(super) fn sign_before(&self) -> &'static str {
+        if self.is_rounded { "≈" } else { "=" }
+    }
+
+    /// The sign between the numbers and their result.
+    pub(super) fn sign_after(&self) -> &'static str {
+        if self.is_rounded || !self.is_exact { "≈" } else { "=" }
+    }
 }
 
 impl Scope {
@@ -209,7 +223,7 @@ impl Scope {
                 }
             }
         }
-        (is_changed && is_whole).then_some(PutIn { written, is_rounded: is_any_rounded })
+        (is_changed && is_whole).then_some(PutIn { written, is_rounded: is_any_rounded, is_exact: true })
     }
 }
 
@@ -341,11 +355,6 @@ fn closings(tokens: &[Token]) -> Closings {
         }
     }
     found
-}
-
-/// The sign between a text and its result: rounded numbers are nearly equal to it.
-pub(super) fn sign_after(written: &str) -> &'static str {
-    if written.contains('≈') { "≈" } else { "=" }
 }
 
 /// Text with the characters replaced that mean something in HTML.
@@ -532,7 +541,7 @@ impl Part {
 
 /// A sign as an element.
 fn operator(sign: char) -> String {
-    let how = if matches!(sign, '(' | ')' | '|') { " stretchy=\"false\"" } else { "" };
+    let how = if matches!(sign, '(' | ')' | '[' | ']' | '|') { " stretchy=\"false\"" } else { "" };
     format!("<mo{how}>{}</mo>", escaped(&sign.to_string()))
 }
 

@@ -4,9 +4,9 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use super::document::{Item, Quantity, Section, Value};
+use super::document::{Item, Quantity, Section, Textbook, Value};
 use super::figure::{Figure, Marked};
-use super::formula::{UNMARKED, escaped, mathml, sign_after};
+use super::formula::{UNMARKED, escaped, mathml};
 use super::numbers::exact;
 use super::texts::Texts;
 
@@ -151,8 +151,8 @@ impl Page {
         // A table cannot stand in a paragraph.
         let (open, close) = if value.rows().is_some() { ("<div>", "</div>") } else { ("<p>", "</p>") };
         let _ = writeln!(self.out, "{open}{line}{}{label_after}{close}", shown(value));
-        if let Some((formula, value)) = &quantity.schoolbook {
-            let (schoolbook, sign) = (self.texts.schoolbook, sign_after(formula));
+        if let Some(Textbook { formula, sign, value }) = &quantity.schoolbook {
+            let schoolbook = self.texts.schoolbook;
             let formula = self.formula(formula);
             let _ =
                 writeln!(self.out, "<p class=\"book\">{schoolbook}: {formula} {sign} {}</p>", shown(value));
@@ -219,13 +219,21 @@ fn key<'m>(marks: &'m Marked, symbol: &str) -> Option<&'m str> {
 }
 
 fn shown(value: &Value) -> String {
-    match value.rows() {
-        Some(rows) => {
-            let row = |row: &[String; 4]| {
-                let cells = row.iter().map(|cell| format!("<td>{cell}</td>")).collect::<String>();
-                format!("<tr>{cells}</tr>")
+    match value.rows().zip(value.short_rows()) {
+        Some((rows, short)) => {
+            // A narrow screen has no room for all digits.
+            let cell = |(full, short): (&String, &String)| match full == short {
+                true => format!("<td>{full}</td>"),
+                false => {
+                    format!(
+                        "<td><span class=\"stacked\">{full}</span><span class=\"flat\">{short}</span></td>"
+                    )
+                }
             };
-            let rows = rows.iter().map(row).collect::<String>();
+            let row = |(full, short): (&[String; 4], &[String; 4])| {
+                format!("<tr>{}</tr>", full.iter().zip(short).map(cell).collect::<String>())
+            };
+            let rows = rows.iter().zip(&short).map(row).collect::<String>();
             format!("<table class=\"matrix\">{rows}</table>")
         }
         None => match value {

@@ -61,16 +61,20 @@ impl Path<'_> {
         let mut rows = Vec::new();
         let mut places: Vec<Place> = Vec::new();
         let mut met: Option<&Met> = None;
+        // What the path carries, and its symbol.
+        let mut carried: Option<(&str, Spectrum)> = None;
         for event in events {
             let begun = match event {
                 Event::Met(here) => {
                     met = Some(here);
+                    carried = Some(("β", here.throughput));
                     Some((self.vertex(here), &here.ray))
                 }
                 Event::Left { ray } => {
                     let mut left = Section::new("left", texts.left);
-                    left.fact("O", ray.origin);
-                    left.fact("D", ray.direction);
+                    let mut scope = Scope::default();
+                    left.quantity(&mut scope, "O", texts.origin, "", ray.origin);
+                    left.quantity(&mut scope, "D", texts.direction, "", ray.direction);
                     Some((left, ray))
                 }
                 _ => None,
@@ -92,7 +96,7 @@ impl Path<'_> {
                     let source = self.source_of(*source);
                     let mut told = Section::new("added", source);
                     told.quantity(&mut scope, "β", texts.throughput, "", *throughput);
-                    told.quantity(&mut scope, "L", self.arriving(), "", *radiance);
+                    told.quantity(&mut scope, "L", self.label_of(event), "", *radiance);
                     if *weight != 1.0 {
                         told.quantity(&mut scope, "w", texts.mis_weight, "", *weight);
                         told.quantity(&mut scope, "A", texts.added, "β·L·w", *added);
@@ -111,13 +115,19 @@ impl Path<'_> {
                 Event::Photons(photons) => place.sections.push(self.photons(photons)),
                 Event::Scattered(scattered) => {
                     rays.push(scattered.ray);
-                    place.sections.push(self.scattered(scattered, met.is_some()));
+                    place.sections.push(self.scattered(scattered, met, carried));
                 }
                 Event::Roulette { probability, survives } => {
                     let text = if *survives { texts.survives } else { texts.does_not_survive };
                     place.text(filled(text, &[&Value::from(*probability).in_full()]));
-                    if *survives {
-                        place.fact(texts.roulette_factor, 1.0 / *probability);
+                    if let (true, Some((symbol, before))) = (*survives, carried) {
+                        let mut scope = Scope::default();
+                        scope.set(symbol, &Value::from(before));
+                        place.quantity(&mut scope, "pᵣ", texts.going_on, "", *probability);
+                        let after = before / *probability;
+                        let formula = format!("{symbol}/pᵣ");
+                        place.quantity(&mut scope, "βᵣ", texts.after_roulette, &formula, after);
+                        carried = Some(("βᵣ", after));
                     }
                 }
                 Event::Medium { distance, scattered, throughput } => {
@@ -126,12 +136,13 @@ impl Path<'_> {
                     let mut told = Section::new("medium", texts.medium);
                     told.fact(texts.distance, *distance);
                     told.text(if *scattered { texts.medium_scattered } else { texts.medium_passed });
-                    told.fact(texts.throughput, *throughput);
+                    told.quantity(&mut Scope::default(), "β", texts.throughput, "", *throughput);
+                    carried = Some(("β", *throughput));
                     place.sections.push(told);
                 }
                 Event::Caught { blocked } => place.fact(texts.blocked, *blocked),
                 Event::Looked { ray, is_occluded } => {
-                    place.fact("D", ray.direction);
+                    place.quantity(&mut Scope::default(), "D", texts.direction, "", ray.direction);
                     place.text(if *is_occluded { texts.occluded } else { texts.open });
                 }
                 Event::Ended(end) => place.text(end_of(*end, texts)),
@@ -179,16 +190,27 @@ impl Path<'_> {
         }
     }
 
-    fn source_of(&self, source: Source) -> &'static str {
-        let is_light = matches!(
+    /// The label of the light that an event adds: it arrives from somewhere, or it is scattered by the surface.
+    fn label_of(&self, added: &Event) -> &'static str {
+        let is_scattered =
+            matches!(added, Event::Added { source: Source::Sampled | Source::Direct | Source::Caustics, .. });
+        if is_scattered && self.is_of_light() { self.texts.contribution } else { self.arriving() }
+    }
+
+    /// Whether the integrator computes light, and not a feature of the surface.
+    fn is_of_light(&self) -> bool {
+        matches!(
             self.kind,
             IntegratorKind::Path { .. }
                 | IntegratorKind::Caustics
                 | IntegratorKind::Whitted { .. }
                 | IntegratorKind::Pov
-        );
+        )
+    }
+
+    fn source_of(&self, source: Source) -> &'static str {
         match source {
-            Source::Surface | Source::Sampled if !is_light => self.arriving(),
+            Source::Surface | Source::Sampled if !self.is_of_light() => self.arriving(),
             _ => source_of(source, self.texts),
         }
     }
@@ -228,9 +250,7 @@ impl Path<'_> {
         section.quantity(&mut scope, "P", texts.point, "", met.point);
         section.quantity(&mut scope, "N", texts.normal, "", met.normal);
         let shading = met.shading_normal.as_dvec3();
-        if (shading - met.normal).length() > 1e-6 {
-            section.quantity(&mut scope, "Nₛ", texts.shading_normal, "", shading);
-        }
+        section.quantity(&mut scope, "Nₛ", texts.shading_normal, "", shading);
         section.text(if met.front { texts.front } else { texts.back });
         section.quantity(&mut scope, "β", texts.throughput, "", met.throughput);
         if let Some(material) = self.things.material(met.shape) {
@@ -240,7 +260,11 @@ impl Path<'_> {
                     Some(numbers) => Value::Numbers(numbers.iter().map(|x| as_written(*x)).collect()),
                     None => Value::from(texts.texture),
                 };
-                section.fact(name.clone(), value);
+                let label = match (texts.parameter)(name) {
+                    "" => name.clone(),
+                    word => format!("{word} ({name})"),
+                };
+                section.fact(label, value);
             }
         }
         if met.depth > 0 && met.depth <= self.depth {
@@ -277,37 +301,36 @@ impl Path<'_> {
         let normal = facing(here.shading.normal.as_dvec3().normalize(), direction);
         let mut scope = Scope::default();
         section.quantity(&mut scope, "D", texts.direction, "", direction);
-        section.quantity(&mut scope, "n", texts.facing, "", normal);
-        section.quantity(&mut scope, "R", texts.reflected, "D − 2·(D·n)·n", reflect(direction, normal));
+        section.quantity(&mut scope, "Nᵢ", texts.facing, "", normal);
+        let reflected = reflect(direction, normal);
+        section.quantity(&mut scope, "Dᵣ", texts.reflected, "D − 2·(D·Nᵢ)·Nᵢ", reflected);
         let Some(index) = here.resolved().and_then(index) else {
             return section;
         };
         // From outside to inside, or the reverse.
-        let eta = if met.front { 1.0 / index } else { index };
-        section.quantity(&mut scope, "i", texts.index, "", index);
-        let formula = if met.front { "1/i" } else { "i" };
-        section.quantity(&mut scope, "η", texts.eta, formula, eta);
+        let [from, to] = if met.front { [1.0, index] } else { [index, 1.0] };
+        section.quantity(&mut scope, "n₁", texts.index_here, "", from);
+        section.quantity(&mut scope, "n₂", texts.index_beyond, "", to);
+        let eta = from / to;
+        section.quantity(&mut scope, "η", "", "n₁/n₂", eta);
         let cosine = -direction.dot(normal);
-        section.quantity(&mut scope, "c₁", texts.cos_incident, "−(D·n)", cosine);
-        let k = 1.0 - eta * eta * (1.0 - cosine * cosine);
-        section.quantity(&mut scope, "k", texts.cos_squared, "1 − η²·(1 − c₁²)", k);
+        section.quantity(&mut scope, "cᵢ", texts.cos_incident, "−(D·Nᵢ)", cosine);
+        let squared = 1.0 - eta * eta * (1.0 - cosine * cosine);
+        section.quantity(&mut scope, "κ", texts.cos_squared, "1 − η²·(1 − cᵢ²)", squared);
         match refract(direction, normal, eta) {
             Some(refracted) => {
-                section.quantity(&mut scope, "T", texts.refracted, "η·D + (η·c₁ − √(k))·n", refracted);
-                let across = k.sqrt();
-                section.quantity(&mut scope, "c₂", texts.cos_refracted, "√(k)", across);
-                let perpendicular = (eta * cosine - across) / (eta * cosine + across);
-                let parallel = (cosine - eta * across) / (cosine + eta * across);
-                section.quantity(
-                    &mut scope,
-                    "r₁",
-                    texts.perpendicular,
-                    "(η·c₁ − c₂)/(η·c₁ + c₂)",
-                    perpendicular,
-                );
-                section.quantity(&mut scope, "r₂", texts.parallel, "(c₁ − η·c₂)/(c₁ + η·c₂)", parallel);
-                let reflectance = 0.5 * (perpendicular * perpendicular + parallel * parallel);
-                section.quantity(&mut scope, "F", texts.fresnel, "(r₁² + r₂²)/2", reflectance);
+                let formula = "η·D + (η·cᵢ − √(κ))·Nᵢ";
+                section.quantity(&mut scope, "Dₜ", texts.refracted, formula, refracted);
+                let beyond = squared.sqrt();
+                section.quantity(&mut scope, "cₜ", texts.cos_refracted, "√(κ)", beyond);
+                let across = (eta * cosine - beyond) / (eta * cosine + beyond);
+                let formula = "(η·cᵢ − cₜ)/(η·cᵢ + cₜ)";
+                section.quantity(&mut scope, "rₛ", texts.perpendicular, formula, across);
+                let along = (cosine - eta * beyond) / (cosine + eta * beyond);
+                let formula = "(cᵢ − η·cₜ)/(cᵢ + η·cₜ)";
+                section.quantity(&mut scope, "rₚ", texts.parallel, formula, along);
+                let reflectance = 0.5 * (across * across + along * along);
+                section.quantity(&mut scope, "Fᵣ", texts.fresnel, "(rₛ² + rₚ²)/2", reflectance);
             }
             None => section.text(texts.total_reflection),
         }
@@ -350,7 +373,7 @@ impl Path<'_> {
             let contribution =
                 if is_visible { scattered * sample.radiance / divisor } else { Spectrum::BLACK };
             rows.push(vec![
-                Value::Text(format!("{id} ({})", (texts.kind_of)(light.name()))),
+                Value::Text(format!("{id} ({})", (texts.kind_of_light)(light.name()))),
                 sample.towards.into(),
                 sample.end.map_or(Value::from(f64::INFINITY), |end| {
                     (end.point - here.surface.point).length().into()
@@ -383,45 +406,57 @@ impl Path<'_> {
                 // The light of a point falls off with the square of the distance.
                 section.quantity(&mut scope, "d", texts.distance, "", distance);
                 let intensity = sample.radiance * (distance * distance) as f32;
-                section.quantity(&mut scope, "I", texts.intensity, "", intensity);
-                section.quantity(&mut scope, "Lᵢ", texts.arriving, "I/d²", sample.radiance);
+                section.quantity(&mut scope, "Iₗ", texts.intensity, "", intensity);
+                section.quantity(&mut scope, "Lᵢ", texts.arriving, "Iₗ/d²", sample.radiance);
             }
             _ => {
                 if let Some(distance) = distance {
-                    section.fact(texts.distance, distance);
+                    section.quantity(&mut scope, "d", texts.distance, "", distance);
                 }
                 section.quantity(&mut scope, "Lᵢ", texts.arriving, "", sample.radiance);
             }
         }
-        match met {
+        // What is scattered of it, as a formula.
+        let scatters = match met {
             Some(met) => {
                 scope.set("Nₛ", &Value::from(met.shading_normal.as_dvec3()));
                 let cosine = met.shading_normal.as_dvec3().dot(sample.towards).abs();
-                section.quantity(&mut scope, "c", texts.cos_light, "|Nₛ·ω|", cosine);
-                section.quantity(&mut scope, "f", texts.scattered, "", *scattered);
-                if cosine > 1e-6 {
-                    section.fact(texts.bsdf_alone, *scattered * (1.0 / cosine) as f32);
+                section.quantity(&mut scope, "cₗ", texts.cos_light, "|Nₛ·ω|", cosine);
+                match bsdf_alone(*scattered, cosine) {
+                    Some(bsdf) => {
+                        section.quantity(&mut scope, "f", texts.bsdf_alone, "", bsdf);
+                        "f·cₗ"
+                    }
+                    None => {
+                        section.quantity(&mut scope, "f", texts.scattered, "", *scattered);
+                        "f"
+                    }
                 }
             }
-            None => section.quantity(&mut scope, "f", texts.phase, "", *scattered),
-        }
+            None => {
+                section.quantity(&mut scope, "f", texts.phase, "", *scattered);
+                "f"
+            }
+        };
         let Some(shadow_ray) = shadow_ray else {
             section.text(texts.no_shadow_ray);
             return section;
         };
         self.shadow(&mut section, shadow_ray, *passes);
-        scope.set("V", &Value::from(*passes));
+        scope.set("Vₛ", &Value::from(*passes));
         match sample.scatter {
             Scatter::Density(pdf) => {
-                section.quantity(&mut scope, "p", texts.pdf, "", pdf);
-                section.quantity(&mut scope, "q", texts.bsdf_pdf, "", *bsdf_pdf);
-                section.quantity(&mut scope, "w", texts.mis_weight, "p²/(p² + q²)", *weight);
+                section.quantity(&mut scope, "pₗ", texts.pdf, "", pdf);
+                section.quantity(&mut scope, "pₛ", texts.bsdf_pdf, "", *bsdf_pdf);
+                section.quantity(&mut scope, "w", texts.mis_weight, "pₗ²/(pₗ² + pₛ²)", *weight);
                 let given = *scattered * sample.radiance * (weight / pdf) * *passes;
-                section.quantity(&mut scope, "L", texts.contribution, "f·Lᵢ·(w/p)·V", given);
+                let formula = format!("{scatters}·Lᵢ·(w/pₗ)·Vₛ");
+                section.quantity(&mut scope, "L", texts.contribution, &formula, given);
             }
             Scatter::Delta => {
                 let given = *scattered * sample.radiance * *passes;
-                section.quantity(&mut scope, "L", texts.contribution, "f·Lᵢ·V", given);
+                let formula = format!("{scatters}·Lᵢ·Vₛ");
+                section.quantity(&mut scope, "L", texts.contribution, &formula, given);
             }
         }
         section
@@ -433,7 +468,7 @@ impl Path<'_> {
         section.quantity(&mut scope, "Oₛ", texts.shadow_origin, "", ray.origin);
         section.quantity(&mut scope, "Dₛ", texts.shadow_direction, "", ray.direction);
         section.fact(texts.range, Value::Intervals(vec![[ray.t_min, ray.t_max]]));
-        section.quantity(&mut scope, "V", texts.visibility, "", passes);
+        section.quantity(&mut scope, "Vₛ", texts.visibility, "", passes);
         if passes.is_black()
             && let Some(hit) = self.scene.resolved().closest(ray)
         {
@@ -453,7 +488,7 @@ impl Path<'_> {
         let columns = vec![
             column("direction", texts.photon_from),
             column("irradiance", texts.photon_irradiance),
-            column("weight", "w"),
+            column("weight", "wₚ"),
             column("scattered", texts.photon_scattered),
         ];
         let (told, others) = sorted.split_at(sorted.len().min(MOST));
@@ -474,28 +509,60 @@ impl Path<'_> {
         section
     }
 
-    fn scattered(&self, scattered: &Scattered, by_surface: bool) -> Section {
+    /// The next direction, chosen at a surface that was `met` or in a medium, by a path that carries something, with its symbol.
+    fn scattered(&self, next: &Scattered, met: Option<&Met>, carried: Option<(&str, Spectrum)>) -> Section {
         let texts = self.texts;
-        let Scattered { ray, weight, scatter, transmitted, eta, throughput } = scattered;
+        let Scattered { ray, weight, scatter, transmitted, eta, throughput } = next;
         let mut section = Section::new("scattered", texts.goes_on);
-        section.text(match (by_surface, *transmitted) {
-            (false, _) => texts.is_scattered,
-            (true, true) => texts.transmitted,
-            (true, false) => texts.is_reflected,
+        section.text(match (met, *transmitted) {
+            (None, _) => texts.is_scattered,
+            (Some(_), true) => texts.transmitted,
+            (Some(_), false) => texts.is_reflected,
         });
-        section.fact("O", ray.origin);
-        section.fact("D", ray.direction);
+        let mut scope = Scope::default();
+        section.quantity(&mut scope, "O", texts.origin, "", ray.origin);
+        section.quantity(&mut scope, "D", texts.direction, "", ray.direction);
         if *transmitted && *eta != 1.0 {
             section.fact(format!("1/η: {}", texts.eta_entered), *eta);
         }
+        let label = if met.is_some() { texts.bsdf_weight } else { texts.phase_weight };
+        let mut formula = "";
         match scatter {
-            Scatter::Density(pdf) => section.fact(texts.pdf, *pdf),
+            Scatter::Density(pdf) => {
+                section.quantity(&mut scope, "pₛ", texts.pdf, "", *pdf);
+                if let Some(met) = met {
+                    scope.set("Nₛ", &Value::from(met.shading_normal.as_dvec3()));
+                    let cosine = met.shading_normal.as_dvec3().dot(ray.direction).abs();
+                    if let Some(bsdf) = bsdf_alone(*weight * *pdf, cosine) {
+                        section.quantity(&mut scope, "cₛ", texts.cos_light, "|Nₛ·D|", cosine);
+                        section.quantity(&mut scope, "f", texts.bsdf_alone, "", bsdf);
+                        formula = "f·cₛ/pₛ";
+                    }
+                }
+            }
             Scatter::Delta => section.text(texts.only_direction),
         }
-        section.fact(if by_surface { texts.bsdf_weight } else { texts.phase_weight }, *weight);
-        section.fact(texts.throughput_after, *throughput);
+        section.quantity(&mut scope, "α", label, formula, *weight);
+        // Of what a medium took on the way there is no step.
+        let is_product = |before: Spectrum| {
+            let mut both = (before * *weight).to_array().into_iter().zip(throughput.to_array());
+            both.all(|(a, b)| (a - b).abs() <= 1e-5 * b.abs())
+        };
+        let formula = match carried {
+            Some((symbol, before)) if is_product(before) => {
+                scope.set(symbol, &Value::from(before));
+                format!("{symbol}·α")
+            }
+            _ => String::new(),
+        };
+        section.quantity(&mut scope, "β′", texts.throughput_after, &formula, *throughput);
         section
     }
+}
+
+/// f, from f·|cos θ|; `None` where the cosine is too small to divide by.
+fn bsdf_alone(scattered: Spectrum, cosine: f64) -> Option<Spectrum> {
+    (cosine > 1e-6).then(|| scattered * (1.0 / cosine) as f32)
 }
 
 /// Shows how the film exposes the radiance of a sample, step by step.
@@ -509,7 +576,7 @@ fn expose(section: &mut Section, &Exposed { radiance, exposure, weight }: &Expos
         section.quantity(&mut scope, "Lₛ", texts.radiance_before_film, "", radiance);
         section.quantity(&mut scope, "e", texts.exposure, "", factor);
         let exposed = radiance * factor;
-        section.quantity(&mut scope, "C", texts.exposed, "e·Lₛ", exposed);
+        section.quantity(&mut scope, "Cₛ", texts.exposed, "e·Lₛ", exposed);
         let most = exposed.max_component();
         if most > max_component {
             section.quantity(&mut scope, "m", texts.max_component, "", max_component);

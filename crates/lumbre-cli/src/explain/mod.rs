@@ -2,43 +2,20 @@
 
 use std::collections::BTreeSet;
 use std::path::Path;
-#[cfg(not(target_family = "wasm"))]
-use std::path::PathBuf;
 
 use clap::Args;
-#[cfg(not(target_family = "wasm"))]
-use lumbre::description::IntegratorKind;
-#[cfg(not(target_family = "wasm"))]
-use lumbre::formats::atomic_write;
 use lumbre::{DVec3, Ray, RenderOptions, Scene};
 use serde_json::json;
 
 use crate::console::{escaped_json, escaped_lines};
 use crate::failure::Failure;
-#[cfg(not(target_family = "wasm"))]
-use crate::failure::print;
 use crate::language::{Language, filled};
-#[cfg(not(target_family = "wasm"))]
-use crate::names::one_of;
-#[cfg(not(target_family = "wasm"))]
-use crate::output::Inputs;
-#[cfg(not(target_family = "wasm"))]
-use crate::reading::{ReadingArguments, print_warnings};
-#[cfg(not(target_family = "wasm"))]
-use crate::shown::{PreparedScene, SceneRequest, shown};
-#[cfg(not(target_family = "wasm"))]
-use crate::staging::StagingArguments;
-#[cfg(not(target_family = "wasm"))]
-use crate::units;
-#[cfg(not(target_family = "wasm"))]
-use crate::view::ViewArguments;
 
 mod along;
 mod camera;
 mod document;
 mod english;
-#[cfg(not(target_family = "wasm"))]
-mod explainer;
+mod equation;
 mod figure;
 mod formula;
 mod html;
@@ -47,6 +24,9 @@ mod light;
 mod misses;
 mod numbers;
 mod plot;
+// What a browser leaves out.
+#[cfg(not(target_family = "wasm"))]
+pub(crate) mod program;
 mod question;
 mod shape;
 mod sketch;
@@ -58,58 +38,11 @@ mod writing;
 
 use document::Section;
 use english::ENGLISH;
-#[cfg(not(target_family = "wasm"))]
-pub use explainer::Explainer;
 use question::Question;
 use spanish::SPANISH;
 use surfaces::Chosen;
 use texts::Texts;
 pub use things::SceneNames;
-
-/// Tells how the colour of a pixel, or the light along a ray, comes about: the camera and its ray, every surface on the way with the
-/// equation of its crossings, normals, lights and shadows, and the path of one sample, with all numbers as the render computes them.
-#[cfg(not(target_family = "wasm"))]
-#[derive(Args)]
-#[command(after_help = "Examples:
-  lumbre explain scene.pbrt --pixel 320,240
-  lumbre explain scene.pbrt --ray 0,0,-5,0,0,1 --nearest
-  lumbre explain scene.pbrt --ray 0,2,-5,0,0,1 --shape sphere     why the ray misses it
-  lumbre explain scene.pbrt --pixel 320,240 --only equation,radiance
-  lumbre explain scene.pbrt --pixel 320,240 --format html -o pixel.html
-  lumbre explain scene.pbrt --pixel 320,240 --sample 7 --depth 2
-  lumbre explain scene.pbrt --pixel 320,240 --format markdown --lang es
-  lumbre explain model.glb --pixel 100,80 --size 200x160 --format json | jq .")]
-pub(crate) struct Arguments {
-    /// The scene: .pbrt, .gltf, .glb, .obj, .ply or .stl, also packed by gzip. Several are put into the same world.
-    #[arg(required = true, value_name = "SCENE")]
-    scene: Vec<PathBuf>,
-    #[command(flatten)]
-    request: Request,
-    /// Write to this file.
-    #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
-    /// Width and height of the picture in pixels.
-    #[arg(long, value_name = "WxH", value_parser = units::size)]
-    size: Option<(u32, u32)>,
-    /// A camera by name or 0-based position.
-    #[arg(long, value_name = "NAME|INDEX", help_heading = "View")]
-    camera: Option<String>,
-    /// What is computed for each pixel.
-    #[arg(long, value_name = "NAME", value_parser = one_of(&IntegratorKind::NAMES, IntegratorKind::from_name))]
-    integrator: Option<IntegratorKind>,
-    /// Seed of the random numbers.
-    #[arg(long, value_name = "N")]
-    seed: Option<u64>,
-    /// Print errors only.
-    #[arg(short, long)]
-    quiet: bool,
-    #[command(flatten)]
-    view: ViewArguments,
-    #[command(flatten)]
-    staging: StagingArguments,
-    #[command(flatten)]
-    reading: ReadingArguments,
-}
 
 /// What is to be explained, and how that is told.
 #[derive(Args, Clone, Debug)]
@@ -194,56 +127,6 @@ fn ray(text: &str) -> Result<Ray, String> {
         [from, to] if from <= to => Ok(Ray::new(origin, direction).with_range(from, to)),
         _ => Err("expected the least and the greatest t after the direction, such as 0,0,-5,0,0,1,0,100"
             .to_owned()),
-    }
-}
-
-/// Runs the command.
-#[cfg(not(target_family = "wasm"))]
-pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    if arguments.staging.turntable().is_some() {
-        return Err(Failure::Usage(texts(arguments.request.lang).no_turntable.to_owned()));
-    }
-    if arguments.request.pixel.is_none() && arguments.request.ray.is_none() {
-        return Err(Failure::Usage(texts(arguments.request.lang).nothing_asked.to_owned()));
-    }
-    let named = arguments.scene.iter().map(PathBuf::as_path).chain(arguments.staging.inputs());
-    if let Some(output) = &arguments.output {
-        Inputs::of(named.chain(arguments.reading.overlays())).refuse(output)?;
-    }
-    let (desc, diagnostics) = arguments.reading.describe(&arguments.scene)?;
-    if let Some(output) = &arguments.output {
-        Inputs::of(diagnostics.files_read().iter().map(PathBuf::as_path)).refuse(output)?;
-    }
-    let things = SceneNames::of(&desc);
-    let Arguments { size, camera, integrator, view, staging, reading, .. } = arguments;
-    let name = arguments.scene.first().map_or(Path::new(""), PathBuf::as_path);
-    let wish = SceneRequest {
-        name,
-        size: *size,
-        camera: camera.as_deref(),
-        integrator: *integrator,
-        view,
-        staging,
-        reading,
-        hidden: None,
-    };
-    let shown = shown(desc, &wish)?;
-    if !arguments.quiet {
-        print_warnings(&diagnostics);
-        print_warnings(&shown.diagnostics);
-    }
-    let PreparedScene { scene, mut options, .. } = shown;
-    if options.spectral && !arguments.quiet {
-        say!("warning: its picture carries wavelengths; what is explained is a path of red, green and blue");
-    }
-    options.spectral = false;
-    options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
-    let written = explain(&scene, &options, &things, name, &arguments.request)?;
-    match &arguments.output {
-        None => print(&written),
-        Some(path) => {
-            Ok(atomic_write(path, |out| out.write_all(written.as_bytes())).map_err(lumbre::Error::from)?)
-        }
     }
 }
 

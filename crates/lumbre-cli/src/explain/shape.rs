@@ -4,7 +4,7 @@ use lumbre::Ray;
 use lumbre::geometry::{Candidate, Explanation, Operand, Step, Value as Found};
 use lumbre::math::glam::DMat4;
 
-use super::document::{Column, Item, Quantity, Section, Value, numbers};
+use super::document::{Column, Item, Quantity, Section, Textbook, Value, numbers};
 use super::formula::Scope;
 use super::texts::Texts;
 use crate::language::filled;
@@ -20,11 +20,11 @@ impl From<&Found> for Value {
     }
 }
 
-/// Adds the steps of a search, and the results of the crossings. The scope contains the ray; `rename` maps the symbols
-/// of the ray to the names used here.
+/// Adds the steps of a search for a kind of shape, and the results of the crossings. The scope contains the ray; `rename`
+/// maps the symbols of the ray to the names used here.
 pub(super) fn tell(
     section: &mut Section,
-    explanation: &Explanation,
+    (kind, explanation): (&str, &Explanation),
     ray: &Ray,
     scope: &mut Scope,
     rename: &dyn Fn(&str) -> String,
@@ -35,7 +35,7 @@ pub(super) fn tell(
     // The textbook has its own symbols.
     let mut schoolbook = scope.clone();
     for step in &explanation.steps {
-        section.sections.push(tell_step(step, explanation, scope, &mut schoolbook, rename, texts));
+        section.sections.push(tell_step(step, (kind, explanation), scope, &mut schoolbook, rename, texts));
     }
     if !explanation.candidates.is_empty() {
         let mut crossings = Section::new("crossings", texts.fates);
@@ -48,7 +48,7 @@ pub(super) fn tell(
 
 fn tell_step(
     step: &Step,
-    explanation: &Explanation,
+    (kind, explanation): (&str, &Explanation),
     scope: &mut Scope,
     schoolbook: &mut Scope,
     rename: &dyn Fn(&str) -> String,
@@ -63,20 +63,19 @@ fn tell_step(
             if let Some((name, _)) = formula.split_once(" = ") {
                 schoolbook.set(name.trim(), &value);
             }
-            let put_in = schoolbook.put_in(formula.split_once(" = ").map_or(&*formula, |(_, right)| right));
-            let put_in = put_in.filter(|numbers| numbers.written != value.in_full());
-            let written = match put_in {
+            let right = formula.split_once(" = ").map_or(&*formula, |(_, right)| right);
+            let (written, sign) = match numbers(schoolbook, right, &value) {
                 Some(numbers) => {
-                    let sign = if numbers.is_rounded { "≈" } else { "=" };
-                    format!("{formula} {sign} {}", numbers.written)
+                    let written = format!("{formula} {} {}", numbers.sign_before(), numbers.written);
+                    (written, numbers.sign_after())
                 }
-                None => formula.clone(),
+                None => (formula.clone(), "="),
             };
-            (written, value)
+            Textbook { formula: written, sign, value }
         });
         section.items.push(Item::Quantity(Quantity {
             symbol: symbol.clone(),
-            label: (texts.symbol)(step.topic, &told.symbol).to_owned(),
+            label: (texts.symbol)(step.topic, &told.symbol, kind).to_owned(),
             numbers: numbers(scope, &formula, &value),
             formula,
             value: value.clone(),
@@ -126,7 +125,10 @@ fn tell_operand(index: usize, operand: &Operand, ray: &Ray, texts: &Texts) -> Se
     }
     scope.set_ray(["O", "D"], &own);
     match &operand.explanation {
-        Some(explanation) => tell(&mut section, explanation, &own, &mut scope, &str::to_owned, texts),
+        Some(explanation) => {
+            let explanation = (operand.name, explanation);
+            tell(&mut section, explanation, &own, &mut scope, &str::to_owned, texts);
+        }
         None => section.text(texts.not_looked_at),
     }
     section

@@ -12,6 +12,8 @@ pub(super) static SPANISH: Texts = Texts {
     remark,
     fate_of,
     kind_of,
+    kind_of_light,
+    parameter,
     symbol,
     camera: "La cámara",
     kind: "tipo",
@@ -33,7 +35,7 @@ pub(super) static SPANISH: Texts = Texts {
     screen_point: "punto de la pantalla (a distancia 1 en una perspectiva)",
     lens_point: "punto de la lente, como dos números en [0, 1)",
     direction_in_camera: "dirección en el espacio de la cámara",
-    direction_turned: "girada al mundo",
+    direction_turned: "girada al mundo, por la inversa de la matriz look-at",
     origin: "origen del rayo",
     direction: "dirección del rayo",
     range: "rango de t",
@@ -111,12 +113,12 @@ pub(super) static SPANISH: Texts = Texts {
     mirror: "Un espejo, y una superficie lisa de separación",
     facing: "la normal orientada hacia el rayo",
     reflected: "la dirección reflejada",
-    index: "índice de refracción",
-    eta: "índice de este lado entre el del otro",
+    index_here: "índice de refracción de este lado",
+    index_beyond: "índice de refracción del otro lado",
     cos_incident: "coseno del ángulo de incidencia",
     cos_squared: "cuadrado del coseno del ángulo de refracción",
     refracted: "la dirección refractada",
-    total_reflection: "k < 0: todo se refleja, nada se refracta.",
+    total_reflection: "κ < 0: todo se refleja, nada se refracta.",
     each_light: "Cada luz, desde aquí",
     each_light_is: "Un punto de cada luz, en su centro; el camino de abajo toma puntos al azar.",
     light_number: "luz",
@@ -150,8 +152,8 @@ pub(super) static SPANISH: Texts = Texts {
     from_caustics: "fotones cercanos al punto",
     photons: "Fotones cercanos al punto, primero los más brillantes: luz que llegó por espejos o a través de vidrio",
     photon_from: "de dónde viene",
-    photon_irradiance: "E (irradiancia, de frente)",
-    photon_scattered: "f·E·w (dispersado hacia el observador)",
+    photon_irradiance: "Eₚ (irradiancia, de frente)",
+    photon_scattered: "f·Eₚ·wₚ (dispersado hacia el observador)",
     more_photons: "{0} más aportan en total {1}.",
     end_depth: "El camino tiene tantos rebotes como puede tener.",
     end_nothing: "Aquí nada dispersa la luz.",
@@ -184,10 +186,11 @@ pub(super) static SPANISH: Texts = Texts {
     baked: "M lleva estos vértices a los de la ecuación.",
     mirrored: "M refleja: los vértices giran en el otro sentido.",
     split: "La cara es plana, y se examina como dos triángulos.",
+    no_wavelengths: "aviso: su imagen lleva longitudes de onda; lo que se explica es un camino de rojo, verde y azul",
     no_turntable: "--turntable hace muchas imágenes (no se esperaba --turntable)",
     nothing_asked: "no se pide nada (se esperaba --pixel X,Y, desde 0,0 en la esquina superior izquierda, o --ray OX,OY,OZ,DX,DY,DZ)",
-    frame_of_same_hand: "El espacio de la cámara tiene x según u, y según v y z según w. Aquí u×v apunta según w: tiene el mismo sentido que los ejes de la escena.",
-    frame_of_other_hand: "El espacio de la cámara tiene x según u, y según v y z según w. Aquí u×v apunta contra w: tiene el otro sentido que los ejes de la escena, a izquierdas si estos son a derechas.",
+    frame_of_same_hand: "El espacio de la cámara tiene x según e₁, y según e₂ y z según e₃. Aquí e₁×e₂ apunta según e₃: tiene el mismo sentido que los ejes de la escena.",
+    frame_of_other_hand: "El espacio de la cámara tiene x según e₁, y según e₂ y z según e₃. Aquí e₁×e₂ apunta contra e₃: tiene el otro sentido que los ejes de la escena, a izquierdas si estos son a derechas.",
     projected: "De vuelta a la imagen: la matriz look-at y después la de proyección llevan un punto del rayo a su píxel.",
     in_focus: "dónde está enfocado el rayo; sin lente, a distancia 1",
     point_of_ray: "un punto del rayo",
@@ -206,7 +209,8 @@ pub(super) static SPANISH: Texts = Texts {
     uv_as_colour: "u y v como rojo y verde",
     is_open: "1 si no hay nada cerca en esa dirección; si no, 0",
     tree: "El árbol de rayos: bajo cada vértice están los que encuentran sus rayos reflejados y refractados.",
-    roulette_factor: "factor por haber seguido, el inverso de esa probabilidad",
+    going_on: "probabilidad de seguir",
+    after_roulette: "lo que transporta el camino por haber seguido",
     radiance_along_ray: "radiancia a lo largo del rayo",
     radiance_before_film: "radiancia de esta muestra",
     exposure: "exposición de la película: tiempo de obturación por ISO / 100",
@@ -222,7 +226,7 @@ pub(super) static SPANISH: Texts = Texts {
     fresnel: "la reflectancia de Fresnel: la fracción que se refleja",
     intensity: "intensidad de la luz hacia aquí, entre la probabilidad de elegirla",
     cos_light: "|cos θ|, con la normal de sombreado",
-    bsdf_alone: "f / |cos θ|: la BSDF sola",
+    bsdf_alone: "la BSDF",
     phase: "función de fase hacia ella",
     phase_weight: "función de fase entre la densidad",
     is_scattered: "El medio la dispersa.",
@@ -275,7 +279,15 @@ fn remark(remark: &Remark, name: &OperandName<'_>) -> String {
         Remark::Misses => "La recta no lo corta.",
         Remark::Touches => "La recta es tangente: ambas raíces son una.",
         Remark::Parallel => "La recta es paralela.",
-        Remark::Between => "La recta está contenida en él, o todo el camino entre ambos planos.",
+        Remark::Between { axis } => {
+            return format!(
+                "La recta es paralela a ambos planos de {}, y está entre ellos o en uno de ellos.",
+                AXES[*axis]
+            );
+        }
+        Remark::Beside { axis } => {
+            return format!("La recta es paralela a ambos planos de {}, y no está entre ellos.", AXES[*axis]);
+        }
         Remark::AtInfinity => "a = 0: la ecuación es lineal, y una raíz se ha ido al infinito.",
         Remark::InsideThroughout => "a = h = 0 y c < 0: toda la recta está dentro, y no la corta.",
         Remark::InSurface => {
@@ -317,6 +329,8 @@ fn remark(remark: &Remark, name: &OperandName<'_>) -> String {
         Remark::SchoolbookHits => {
             "Por el redondeo, el discriminante del libro de texto no es negativo: hallaría lo que no se corta."
         }
+        Remark::InPlane => "La recta está contenida en el plano, y no lo corta en ningún punto.",
+        Remark::OnEdge => "Una función de arista es 0: la recta corta esa arista, o su prolongación.",
         Remark::EdgeByRoundingErrors => {
             "Dos productos se redondearon al mismo número: sus errores de redondeo deciden sobre una arista."
         }
@@ -374,6 +388,9 @@ fn fate_of(fate: &Fate, name: &OperandName<'_>) -> String {
         }
         Fate::OutsidePatch { u, v } => {
             return format!("fuera del parche (u = {}, v = {})", exact(u), exact(v));
+        }
+        Fate::OutsideSlab { axis, enter, leave } if enter.is_infinite() && enter == leave => {
+            return format!("fuera de la franja de {}, en la que la recta no entra nunca", AXES[axis]);
         }
         Fate::OutsideSlab { axis, enter, leave } => {
             return format!(
@@ -459,30 +476,120 @@ fn kind_of(kind: &'static str) -> &'static str {
     }
 }
 
-fn symbol(topic: Topic, symbol: &str) -> &'static str {
-    match (topic, symbol) {
-        (Topic::Parameters, "C") => "centro",
-        (Topic::Parameters, "r") => "radio",
-        (Topic::Parameters, "R") => "radio del círculo en el centro del tubo",
-        (Topic::Parameters, "r₁") => "radio en el primer extremo",
-        (Topic::Parameters, "r₂") => "radio en el segundo extremo",
-        (Topic::Parameters, "k") => "lo que crece el radio según el eje",
-        (Topic::Parameters, "V") => "eje unitario",
-        (Topic::ScaledRay, "f") => "factor de la dirección",
-        (Topic::SetUp, "w") => "el origen del rayo visto desde la forma",
-        (Topic::SetUp, "t₀") => "dónde se plantea la ecuación",
-        (Topic::SetUp, "w₀") => "el punto en ese lugar",
-        (Topic::Quadratic, "S") => "eje de extremo a extremo, de longitud cercana a 1",
-        (Topic::Quadratic, "κ") => "lo que crece el radio según S, por su longitud",
-        (Topic::Quadratic, "ρ₀") => "radio donde empieza w, por S·S",
-        (Topic::Quadratic, "ε₂") => "cota del error de a, en unidades de 2⁻⁵³",
-        (Topic::Quadratic, "ε₁") => "lo mismo para h",
-        (Topic::Quadratic, "ε₀") => "lo mismo para c",
-        (Topic::Discriminant, "l") => "del centro al punto más cercano de la recta",
-        (Topic::Discriminant, "ε") => "cota del error de Δ",
-        (Topic::Nappe, "g") => "lo que crece el radio a lo largo del rayo",
-        (Topic::Nappe, "ρ") => "radio en el punto medio de las raíces; negativo en la otra hoja",
-        (Topic::TextbookQuartic, "τ") => "sus raíces reales",
+fn kind_of_light(kind: &'static str) -> &'static str {
+    if kind == "diffuse" { "de área" } else { kind_of(kind) }
+}
+
+fn parameter(name: &str) -> &'static str {
+    match name {
+        "reflectance" => "reflectancia",
+        "transmittance" => "transmitancia",
+        "roughness" | "interface_roughness" => "rugosidad",
+        "uroughness" => "rugosidad en u",
+        "vroughness" => "rugosidad en v",
+        "eta" | "interface_eta" | "ior" | "index" => "índice de refracción",
+        "thickness" => "espesor",
+        "g" => "asimetría de la dispersión",
+        "scale" => "factor",
+        "amount" => "cantidad",
+        "opacity" => "opacidad",
+        "Kd" => "reflectancia difusa",
+        "Ks" => "reflectancia brillante",
+        "Kr" => "reflectancia de espejo",
+        "Kt" => "transmitancia",
+        "eumelanin" => "eumelanina",
+        "pheomelanin" => "feomelanina",
+        "beta_m" => "rugosidad a lo largo",
+        "beta_n" => "rugosidad alrededor",
+        "alpha" => "inclinación de las escamas",
+        "base_color" => "color de base",
+        "metallic" => "metalicidad",
+        "anisotropy" => "anisotropía",
+        "specular" => "brillo",
+        "transmission" => "transmisión",
+        "dispersion" => "dispersión",
+        "diffuse_transmission" => "transmisión difusa",
+        "diffuse_transmission_color" => "color de la transmisión difusa",
+        "clearcoat" => "barniz",
+        "clearcoat_roughness" => "rugosidad del barniz",
+        "sheen_color" => "color del terciopelo",
+        "sheen_roughness" => "rugosidad del terciopelo",
+        "emissive" => "emisión",
+        _ => "",
+    }
+}
+
+fn symbol(topic: Topic, symbol: &str, kind: &str) -> &'static str {
+    match (topic, symbol, kind) {
+        (Topic::Parameters, "P₀", "plane") => "un punto suyo",
+        (Topic::Parameters, "P₀", "box") => "el vértice de coordenadas menores",
+        (Topic::Parameters, "P₁", "box") => "el vértice de coordenadas mayores",
+        (Topic::Parameters, "P₀" | "P₁" | "P₂", "triangle") => "vértice",
+        (Topic::Parameters, "P₀₀" | "P₁₀" | "P₀₁" | "P₁₁", _) => "vértice en estos u y v",
+        (Topic::Parameters, "P₁", "hyperboloid") => "primer extremo del segmento que lo barre",
+        (Topic::Parameters, "P₂", "hyperboloid") => "su segundo extremo",
+        (Topic::Parameters, "P₁", _) => "primer extremo del eje",
+        (Topic::Parameters, "P₂", _) => "segundo extremo del eje",
+        (Topic::Parameters, "n", _) => "normal",
+        (Topic::Parameters, "r₀", _) => "radio del hueco",
+        (Topic::Parameters, "H", "paraboloid") => "altura a la que tiene ese radio",
+        (Topic::Parameters, "Z", _) => "dirección de su eje",
+        (Topic::Parameters, "Q₁" | "Q₂" | "Q₃", _) => {
+            "fila de la matriz simétrica de sus cuadrados y productos"
+        }
+        (Topic::Parameters, "G", _) => "la mitad de sus coeficientes de x, y y z",
+        (Topic::Parameters, "j", _) => "su constante",
+        (Topic::Parameters | Topic::FirstBall | Topic::SecondBall, "C", _) => "centro",
+        (Topic::Parameters, "r", "torus") => "radio del tubo",
+        (Topic::Parameters | Topic::FirstBall | Topic::SecondBall, "r", _) => "radio",
+        (Topic::Parameters, "R", _) => "radio del círculo en el centro del tubo",
+        (Topic::Parameters, "r₁", _) => "radio en el primer extremo",
+        (Topic::Parameters, "r₂", _) => "radio en el segundo extremo",
+        (Topic::Parameters, "k", _) => "lo que crece el radio según el eje",
+        (Topic::Parameters, "V", _) => "eje unitario",
+        (Topic::ScaledRay, "λ", _) => "factor de la dirección",
+        (Topic::ScaledRay, "D", _) => {
+            "la dirección entre λ, que usan los pasos siguientes; sus t son λ veces mayores"
+        }
+        (Topic::SetUp | Topic::TorusFrame, "W", _) => "el origen del rayo visto desde la forma",
+        (Topic::SetUp, "t₀", _) => "dónde se plantea la ecuación",
+        (Topic::SetUp, "W₀", _) => "el punto en ese lugar",
+        (Topic::Quadratic, "U", _) => "eje de extremo a extremo, de longitud cercana a 1",
+        (Topic::Quadratic, "K", _) => "lo que crece el radio según U, por su longitud",
+        (Topic::Quadratic, "ρ₀", _) => "radio donde empieza W, por U·U",
+        (Topic::Quadratic, "ε₂", _) => "cota del error de a, en unidades de 2⁻⁵³",
+        (Topic::Quadratic, "ε₁", _) => "lo mismo para h",
+        (Topic::Quadratic, "ε₀", _) => "lo mismo para c",
+        (Topic::Discriminant, "l", _) => "del centro al punto más cercano de la recta",
+        (Topic::Discriminant, "ε", _) => "cota del error de Δ",
+        (Topic::Nappe, "g", _) => "lo que crece el radio a lo largo del rayo",
+        (Topic::Nappe, "ρ", _) => "radio en el punto medio de las raíces; negativo en la otra hoja",
+        (Topic::TorusFrame, "g", _) => "longitud de la dirección",
+        (Topic::TorusFrame, "t₀", _) => "dónde la recta está más cerca del centro",
+        (Topic::TorusFrame, "s₀", _) => "lo que deja el redondeo entre ese lugar y p",
+        (Topic::TorusFrame, "p", _) => "el punto en ese lugar, según los ejes del toro",
+        (Topic::TorusFrame, "U", _) => "dirección unitaria según los mismos ejes",
+        (Topic::TorusBounds, "σ₁", _) => "la parte de la recta desde aquí …",
+        (Topic::TorusBounds, "σ₂", _) => "… hasta aquí, en longitudes desde p",
+        (Topic::QuarticExtrema, "s", _) => "dónde se anula la derivada, en longitudes desde p",
+        (Topic::QuarticExtrema, "y", _) => "el valor del polinomio en cada uno",
+        (Topic::QuarticRoots, "s₁" | "s₂" | "s₃" | "s₄", _) => "raíz, en longitudes desde p",
+        (Topic::TextbookQuartic, "τ", _) => "sus raíces reales",
+        (Topic::Shear, "i₁" | "i₂", _) => "eje de coordenadas",
+        (Topic::Shear, "i₃", _) => "eje de coordenadas, aquel en que la dirección es más larga",
+        (Topic::Winding, "σ", _) => "signo de cada una",
+        (Topic::Winding, "n", _) => "cuántas vueltas da el contorno alrededor del rayo",
+        (Topic::Roots, "u₁" | "u₂" | "v₁" | "v₂", "bilinear") => {
+            "lugar en el parche, tras un paso del método de Newton"
+        }
+        (Topic::Roots, "t₁" | "t₂", "bilinear") => "t en ese lugar",
+        (Topic::Span, "t₁", "capsule") => "dónde entra la recta",
+        (Topic::Span, "t₂", "capsule") => "dónde sale",
+        (Topic::Intervals, "I", _) => "dentro del resultado",
+        (Topic::Intervals, _, _) => "dentro del operando de este número",
+        (Topic::Surface, "P", _) => "el punto",
+        (Topic::Surface, "N", _) => "normal exterior unitaria",
+        (Topic::Surface, "u" | "v", _) => "parámetro de la superficie",
         _ => "",
     }
 }

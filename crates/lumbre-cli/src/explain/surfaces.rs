@@ -66,7 +66,7 @@ pub(super) fn surfaces(
 ) -> Result<Section, Failure> {
     let resolved = scene.resolved();
     let is_wanted = |shape: u32| match wanted.shapes {
-        Some(Chosen::Called(name)) => things.is_called(shape, name),
+        Some(Chosen::Called(name)) => things.is_called(shape, name, texts.kind_of),
         Some(Chosen::All) | None => true,
     };
     let mut section = Section::new("surfaces", texts.surfaces);
@@ -98,7 +98,7 @@ pub(super) fn surfaces(
         _ => misses::nearest(scene, ray, most, |shape| is_wanted(shape) && !met.contains(&shape)),
     };
     if let (true, true, Some(Chosen::Called(name))) = (hits.is_empty(), missed.is_empty(), wanted.shapes) {
-        let names = Vec::from_iter(things.names()).join(", ");
+        let names = Vec::from_iter(things.names(texts.kind_of)).join(", ");
         return Err(Failure::Usage(filled(texts.no_such_shape, &[name, &names])));
     }
     if first.is_none() {
@@ -200,7 +200,7 @@ fn tell(
         scope.set_ray(["O", "D"], &object.ray);
     }
     let rename = |formula: &str| {
-        if object.is_placed() { with_primes(formula, &["O", "D"]) } else { formula.to_owned() }
+        if object.is_placed() { with_primes(formula, &["O", "D", "P", "N"]) } else { formula.to_owned() }
     };
     let told = match &object.shape {
         Some(Shape::Triangle(triangle)) => triangle.corners().to_vec(),
@@ -238,7 +238,7 @@ fn tell(
                 path,
             };
             (drawn, marked) = subject.figure(texts);
-            shape::tell(&mut equation, &explanation, &object.ray, &mut scope, &rename, texts);
+            shape::tell(&mut equation, (exact.name(), &explanation), &object.ray, &mut scope, &rename, texts);
             section.sections.push(equation);
         }
         None => {
@@ -278,7 +278,8 @@ fn tell(
 fn in_file(face: &Face, told: usize, texts: &Texts) -> Section {
     let mut section = Section::new("mesh", texts.in_file);
     let mut scope = Scope::default();
-    let names = ["P₀", "P₁", "P₂", "P₃"];
+    // Not those of the equation, to which the map leads.
+    let names = ["F₀", "F₁", "F₂", "F₃"];
     for (name, corner) in names.into_iter().zip(&face.corners) {
         section.quantity(&mut scope, name, "", "", *corner);
     }
@@ -320,7 +321,7 @@ fn curve(curves: &Curves, hits: &[&Hit], ray: &Ray, texts: &Texts) -> Section {
         let mut scope = Scope::default();
         section.quantity(&mut scope, "t", texts.t_of_search, "", hit.root.t);
         section.quantity(&mut scope, "u", "", "", u);
-        section.quantity(&mut scope, "w", texts.curve_width, "", curves.width(hit.primitive, u));
+        section.quantity(&mut scope, "b", texts.curve_width, "", curves.width(hit.primitive, u));
         let formula = "(1−u)³·P₀ + 3u(1−u)²·P₁ + 3u²(1−u)·P₂ + u³·P₃";
         let axis = cubic(&points, u);
         section.fact(format!("C = {formula}: {}", texts.curve_axis), axis);
@@ -474,8 +475,8 @@ fn at_hit(scene: &Scene, ray: &Ray, hit: &Hit, is_first: bool, object: &Object, 
         let whole = &object.whole;
         section.quantity(&mut scope, "N′", texts.normal_in_object, "", local.normal);
         section.fact("M⁻ᵀ", affine4(whole.inverse_affine().matrix3.transpose(), DVec3::ZERO));
-        section.quantity(&mut scope, "G", texts.by_inverse_transpose, "M⁻ᵀ N′", whole.normal(local.normal));
-        section.quantity(&mut scope, "N", texts.normal, "G/|G|", surface.normal);
+        section.quantity(&mut scope, "N₀", texts.by_inverse_transpose, "M⁻ᵀ N′", whole.normal(local.normal));
+        section.quantity(&mut scope, "N", texts.normal, "N₀/|N₀|", surface.normal);
     } else {
         section.quantity(&mut scope, "N", texts.normal, "", surface.normal);
     }

@@ -20,8 +20,12 @@ pub(super) struct Texts {
     pub(super) fate_of: fn(&Fate, &OperandName<'_>) -> String,
     /// The name of a kind of shape, material or light, from its name in the scene language.
     pub(super) kind_of: fn(&'static str) -> &'static str,
-    /// The meaning of a step's symbol; empty if the title is enough.
-    pub(super) symbol: fn(Topic, &str) -> &'static str,
+    /// The name of a kind of light.
+    pub(super) kind_of_light: fn(&'static str) -> &'static str,
+    /// What a material's parameter is, beside its name in the scene language; empty if that is the word.
+    pub(super) parameter: fn(&str) -> &'static str,
+    /// The meaning of a step's symbol, for a kind of shape; empty if its formula is enough.
+    pub(super) symbol: fn(Topic, &str, &str) -> &'static str,
     pub(super) camera: &'static str,
     pub(super) kind: &'static str,
     pub(super) name: &'static str,
@@ -119,8 +123,8 @@ pub(super) struct Texts {
     pub(super) mirror: &'static str,
     pub(super) facing: &'static str,
     pub(super) reflected: &'static str,
-    pub(super) index: &'static str,
-    pub(super) eta: &'static str,
+    pub(super) index_here: &'static str,
+    pub(super) index_beyond: &'static str,
     pub(super) cos_incident: &'static str,
     pub(super) cos_squared: &'static str,
     pub(super) refracted: &'static str,
@@ -193,6 +197,7 @@ pub(super) struct Texts {
     pub(super) baked: &'static str,
     pub(super) mirrored: &'static str,
     pub(super) split: &'static str,
+    pub(super) no_wavelengths: &'static str,
     pub(super) no_turntable: &'static str,
     pub(super) nothing_asked: &'static str,
     pub(super) frame_of_same_hand: &'static str,
@@ -215,7 +220,8 @@ pub(super) struct Texts {
     pub(super) uv_as_colour: &'static str,
     pub(super) is_open: &'static str,
     pub(super) tree: &'static str,
-    pub(super) roulette_factor: &'static str,
+    pub(super) going_on: &'static str,
+    pub(super) after_roulette: &'static str,
     pub(super) radiance_along_ray: &'static str,
     pub(super) radiance_before_film: &'static str,
     pub(super) exposure: &'static str,

@@ -85,15 +85,22 @@ impl SceneNames {
         self.shapes.get(&shape).map_or("ground", |thing| thing.kind)
     }
 
-    /// Whether a name selects a shape: its index, its kind, or the name of its material.
-    pub(super) fn is_called(&self, shape: u32, name: &str) -> bool {
+    /// Whether a name selects a shape: its index, its kind, in the words of the scene language or in those of `kind_of`, or the name
+    /// of its material.
+    pub(super) fn is_called(
+        &self,
+        shape: u32,
+        name: &str,
+        kind_of: fn(&'static str) -> &'static str,
+    ) -> bool {
+        let kind = self.kind(shape);
         let material = self.material(shape).and_then(|material| material.name.as_deref());
-        name.parse() == Ok(shape) || self.kind(shape) == name || material == Some(name)
+        name.parse() == Ok(shape) || kind == name || kind_of(kind) == name || material == Some(name)
     }
 
     /// The names that select shapes of the file, without their indices.
-    pub(super) fn names(&self) -> BTreeSet<&str> {
-        let kinds = self.shapes.values().map(|thing| thing.kind);
+    pub(super) fn names(&self, kind_of: fn(&'static str) -> &'static str) -> BTreeSet<&str> {
+        let kinds = self.shapes.values().map(|thing| kind_of(thing.kind));
         let materials = self.shapes.keys().filter_map(|shape| self.material(*shape)?.name.as_deref());
         kinds.chain(materials).collect()
     }

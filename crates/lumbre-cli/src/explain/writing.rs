@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use serde_json::{Map, Value as Json, json};
 
-use super::document::{Item, Quantity, Section, Value};
-use super::formula::{latex, sign_after};
+use super::document::{Item, Quantity, Section, Textbook, Value};
+use super::formula::latex;
 
 /// As text, indented by two spaces a level. Chapter titles of a whole explanation are in capitals; titles of single
 /// sections may contain formulas.
@@ -87,8 +87,7 @@ fn write_quantity(quantity: &Quantity, indent: &str, schoolbook: &str, out: &mut
             let _ = writeln!(out, "{indent}{told}{label}");
         }
     }
-    if let Some((formula, value)) = &quantity.schoolbook {
-        let sign = sign_after(formula);
+    if let Some(Textbook { formula, sign, value }) = &quantity.schoolbook {
         let _ = writeln!(out, "{indent}  {schoolbook}: {formula} {sign} {}", value.in_full());
     }
 }
@@ -194,12 +193,9 @@ fn markdown_of(quantity: &Quantity, schoolbook: &str) -> String {
         (None, true) => format!("- {}: {}", literal(label), literal(&value.in_full())),
         (None, false) => format!("- ${}${label_after}", latex(&chain(quantity, &value.in_full()))),
     };
-    if let Some((formula, value)) = &quantity.schoolbook {
-        let _ = write!(
-            line,
-            "\n  - {schoolbook}: ${}$",
-            latex(&format!("{formula} {} {}", sign_after(formula), value.in_full()))
-        );
+    if let Some(Textbook { formula, sign, value }) = &quantity.schoolbook {
+        let _ =
+            write!(line, "\n  - {schoolbook}: ${}$", latex(&format!("{formula} {sign} {}", value.in_full())));
     }
     line
 }
@@ -260,7 +256,7 @@ fn json_of(quantity: &Quantity) -> Json {
         }
     }
     object.insert("value".to_owned(), value.json());
-    if let Some((formula, value)) = schoolbook {
+    if let Some(Textbook { formula, value, .. }) = schoolbook {
         object.insert("schoolbook".to_owned(), json!({ "formula": formula, "value": value.json() }));
     }
     Json::Object(object)

@@ -60,14 +60,14 @@ impl Axial {
         pair
     }
 
-    /// The textbook's formulas, where `w` comes from the first end, or from the second.
+    /// The textbook's formulas, where `W` comes from the first end, or from the second.
     fn textbook(&self, is_from_first: bool) -> [&'static str; 3] {
         if self.k == 0.0 {
-            ["|D×V|²", "(D×V)·(w×V)", "|w×V|² − r₁²"]
+            ["|D×V|²", "(D×V)·(W×V)", "|W×V|² − r₁²"]
         } else if is_from_first {
-            ["|D×V|² − (k·(D·V))²", "(D×V)·(w×V) − (r₁ + k·(w·V))·(k·(D·V))", "|w×V|² − (r₁ + k·(w·V))²"]
+            ["|D×V|² − (k·(D·V))²", "(D×V)·(W×V) − (r₁ + k·(W·V))·(k·(D·V))", "|W×V|² − (r₁ + k·(W·V))²"]
         } else {
-            ["|D×V|² − (k·(D·V))²", "(D×V)·(w×V) − (r₂ + k·(w·V))·(k·(D·V))", "|w×V|² − (r₂ + k·(w·V))²"]
+            ["|D×V|² − (k·(D·V))²", "(D×V)·(W×V) − (r₂ + k·(W·V))·(k·(D·V))", "|W×V|² − (r₂ + k·(W·V))²"]
         }
     }
 
@@ -115,7 +115,7 @@ impl Axial {
         if self.k != 0.0 {
             let step = notes.step(Topic::Nappe);
             step.number("g", "k·(D·V)", g);
-            step.number("ρ", at_place("r₁ + k·(w·V) − g·(h/a)", start), doubles.radius);
+            step.number("ρ", at_place("r₁ + k·(W·V) − g·(h/a)", start), doubles.radius);
         }
     }
 
@@ -124,7 +124,7 @@ impl Axial {
         let w = ray.origin - spine.base;
         let axis = DVec3::from_array(spine.axis.map(|x| x.high));
         let [rise, radius] = [spine.rise, spine.radius].map(|x| x.high);
-        // The textbook's axis is a unit vector, and its radius that of the end which `w` comes from.
+        // The textbook's axis is a unit vector, and its radius that of the end which `W` comes from.
         let is_from_first = spine.base == self.p1;
         let at_origin = {
             let (across, offset) = (ray.direction.cross(self.axis), w.cross(self.axis));
@@ -141,9 +141,9 @@ impl Axial {
             coefficients: at_origin,
             at_origin,
             formulas: [
-                "(S·S)·|D×S|² − (κ·(D·S))²",
-                "(S·S)·((D×S)·(w×S)) − (ρ₀ + κ·(w·S))·(κ·(D·S))",
-                "(S·S)·|w×S|² − (ρ₀ + κ·(w·S))²",
+                "(U·U)·|D×U|² − (K·(D·U))²",
+                "(U·U)·((D×U)·(W×U)) − (ρ₀ + K·(W·U))·(K·(D·U))",
+                "(U·U)·|W×U|² − (ρ₀ + K·(W·U))²",
             ],
             textbook: self.textbook(is_from_first),
             in_surface: self.in_surface(),
@@ -163,12 +163,12 @@ impl Axial {
         tell_place(notes, from, w, start, place);
         solved.tell(notes, |step| {
             // Along the axis from end to end where there are ends, with a length near 1.
-            step.vector("S", "", axis).number("κ", "", rise).number("ρ₀", "", radius);
+            step.vector("U", "", axis).number("K", "", rise).number("ρ₀", "", radius);
         });
         if self.k != 0.0 && exact.a != 0.0 {
             let step = notes.step(Topic::Nappe);
-            step.number("g", "κ·(D·S)", exact.g);
-            step.number("ρ", at_place("ρ₀ + κ·(w·S) − g·(h/a)", start), exact.middle);
+            step.number("g", "K·(D·U)", exact.g);
+            step.number("ρ", at_place("ρ₀ + K·(W·U) − g·(h/a)", start), exact.middle);
         }
     }
 

@@ -10,19 +10,19 @@ const NAMES: [[&str; 2]; 3] = [["x₀", "x₁"], ["y₀", "y₁"], ["z₀", "z�
 impl Cuboid {
     pub(crate) fn explained(&self, ray: &Ray, notes: &mut Notes) {
         let [low, high] = self.corners();
-        notes.step(Topic::Parameters).vector("L", "", low).vector("H", "", high);
+        notes.step(Topic::Parameters).vector("P₀", "", low).vector("P₁", "", high);
         let d = ray.direction;
         let (at_low, at_high) = ((low - ray.origin) / d, (high - ray.origin) / d);
         let step = notes.step(Topic::Slabs);
         for (axis, name) in ["⟨1, 0, 0⟩", "⟨0, 1, 0⟩", "⟨0, 0, 1⟩"].into_iter().enumerate() {
             if d[axis] == 0.0 {
                 let is_between = low[axis] <= ray.origin[axis] && ray.origin[axis] <= high[axis];
-                step.remark(if is_between { Remark::Between } else { Remark::Parallel });
+                step.remark(if is_between { Remark::Between { axis } } else { Remark::Beside { axis } });
                 continue;
             }
             let formula = |corner: &str| format!("(({corner} − O)·{name})/(D·{name})");
-            step.number(NAMES[axis][0], formula("L"), at_low[axis]);
-            step.number(NAMES[axis][1], formula("H"), at_high[axis]);
+            step.number(NAMES[axis][0], formula("P₀"), at_low[axis]);
+            step.number(NAMES[axis][1], formula("P₁"), at_high[axis]);
         }
         let span = self.span(ray);
         let (enter, leave) = (at_low.min(at_high), at_low.max(at_high));

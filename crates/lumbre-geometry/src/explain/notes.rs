@@ -28,7 +28,7 @@ impl Notes {
         match ray.with_direction_scaled() {
             Some((scaled, scale)) if is_a_ray => {
                 let step = notes.step(Topic::ScaledRay);
-                step.number("f", "", scale[0] * scale[1]).vector("D", "", scaled.direction);
+                step.number("λ", "", scale[0] * scale[1]).vector("D", "", scaled.direction);
                 notes.line = Some(scaled.with_range(f64::NEG_INFINITY, f64::INFINITY));
                 notes.scale = Some(scale);
             }
@@ -108,7 +108,7 @@ impl Notes {
         if let Some(nearest) = roots.first() {
             let surface = surface(nearest);
             let step = self.step(Topic::Surface);
-            step.vector("p", "", surface.point).vector("n", "", surface.normal);
+            step.vector("P", "", surface.point).vector("N", "", surface.normal);
             step.number("u", "", surface.uv.x).number("v", "", surface.uv.y);
         }
         Explanation { steps: self.steps, operands: self.operands, candidates: self.candidates }

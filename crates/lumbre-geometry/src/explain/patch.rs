@@ -4,7 +4,7 @@ use lumbre_math::DVec2;
 use lumbre_math::quadratic::quadratic;
 
 use super::notes::{Notes, out_of_range};
-use super::triangle::tell_shear;
+use super::triangle::{tell_edges, tell_shear};
 use super::{Fate, Remark, Topic};
 use crate::patch::Sheared;
 use crate::{BilinearPatch, Ray, WatertightRay};
@@ -40,30 +40,28 @@ impl BilinearPatch {
             step.number(["f₁", "f₂", "f₃", "f₄"][i], formula, from.x * to.y - from.y * to.x);
         }
         step.numbers("σ", "", signs.to_vec()).number("n", "", f64::from(winding));
-        if sides.iter().any(|side| side.is_exact) {
-            step.remark(Remark::EdgeByRoundingErrors);
-        }
+        tell_edges(step, std::array::from_fn::<_, 4, _>(|i| [outline[i], outline[(i + 1) % 4]]));
 
         let crossings = self.line_crossings(ray);
-        let [a, h, c, delta] = patch.rulings();
+        let [c, h, a, delta] = patch.rulings();
         let step = notes.step(Topic::Rulings);
-        step.number("a", "x₀·y₂ − y₀·x₂", a);
-        step.number("c", "(x₁ − x₀)·(y₃ − y₂) − (y₁ − y₀)·(x₃ − x₂)", c);
+        step.number("c", "x₀·y₂ − y₀·x₂", c);
+        step.number("a", "(x₁ − x₀)·(y₃ − y₂) − (y₁ − y₀)·(x₃ − x₂)", a);
         step.number("h", "(x₁·y₃ − y₁·x₃ − a − c)/2", h).beside("b = 2·h", 2.0 * h);
         step.number("Δ", "h² − a·c", delta).beside("b² − 4·a·c", 4.0 * h * h - 4.0 * a * c);
         if crossings.is_edge_on {
             step.remark(Remark::EdgeOn);
         }
-        let rulings = quadratic(c, h, a, delta);
+        let rulings = quadratic(a, h, c, delta);
         match rulings {
             Some((first, second)) if first == second => {
-                step.number("u₁", "−h/c", first).remark(Remark::Touches);
+                step.number("u₁", "−h/a", first).remark(Remark::Touches);
             }
             Some((first, second)) => {
                 let q = -(h + delta.sqrt().copysign(h));
                 step.number("q", if q < 0.0 { "−(h + √(Δ))" } else { "√(Δ) − h" }, q);
-                let is_ascending = if c == 0.0 { !first.is_finite() } else { (q < 0.0) == (c > 0.0) };
-                let formulas = if is_ascending { ["q/c", "a/q"] } else { ["a/q", "q/c"] };
+                let is_ascending = if a == 0.0 { !first.is_finite() } else { (q < 0.0) == (a > 0.0) };
+                let formulas = if is_ascending { ["q/a", "c/q"] } else { ["c/q", "q/a"] };
                 for ((symbol, formula), u) in ["u₁", "u₂"].into_iter().zip(formulas).zip([first, second])
                 {
                     if u.is_finite() {
@@ -94,7 +92,7 @@ impl BilinearPatch {
                 step.remark(Remark::Touches);
             }
         }
-        if hits.is_empty() {
+        if hits.is_empty() && !crossings.is_edge_on {
             step.remark(Remark::Misses);
         }
         for crossing in hits {

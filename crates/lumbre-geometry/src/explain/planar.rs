@@ -33,7 +33,7 @@ pub(super) fn tell_plane(
         step.remark(Remark::TwicePrecision);
     }
     if along == 0.0 {
-        step.remark(Remark::Parallel);
+        step.remark(if away == 0.0 { Remark::InPlane } else { Remark::Parallel });
         return None;
     }
     step.number("t", "δ/μ", t);
@@ -50,8 +50,8 @@ pub(super) fn tell_plane(
 
 impl Plane {
     pub(crate) fn explained(&self, ray: &Ray, notes: &mut Notes) {
-        notes.step(Topic::Parameters).vector("P", "", self.point).vector("n", "", self.normal);
-        if let Some(t) = tell_plane(notes, Topic::Plane, ray, ("P", self.point), ("n", self.normal)) {
+        notes.step(Topic::Parameters).vector("P₀", "", self.point).vector("n", "", self.normal);
+        if let Some(t) = tell_plane(notes, Topic::Plane, ray, ("P₀", self.point), ("n", self.normal)) {
             notes.candidate(t, 0, out_of_range(ray, t).unwrap_or(Fate::Hit));
         }
     }

@@ -15,9 +15,9 @@ pub(super) struct Solved {
     pub(super) coefficients: [f64; 3],
     /// The same at the ray's origin, in doubles.
     pub(super) at_origin: [f64; 3],
-    /// Their formulas, with `w` for the place.
+    /// Their formulas, with `W` for the place.
     pub(super) formulas: [&'static str; 3],
-    /// The textbook's formulas, with `w` for the ray's origin.
+    /// The textbook's formulas, with `W` for the ray's origin.
     pub(super) textbook: [&'static str; 3],
     /// What to say of a line that lies in the surface.
     pub(super) in_surface: Remark,
@@ -46,15 +46,15 @@ pub(super) fn stable_q(h: f64, delta: f64) -> f64 {
 
 /// A formula in the place where an equation is set up.
 pub(super) fn at_place(formula: &'static str, start: f64) -> String {
-    if start == 0.0 { formula.to_owned() } else { formula.replace('w', "w₀") }
+    if start == 0.0 { formula.to_owned() } else { formula.replace('W', "W₀") }
 }
 
 /// Tells where an equation is set up; `formula` and `w` are of the ray's origin, and `place` of the point at `start`.
 pub(super) fn tell_place(notes: &mut Notes, formula: &'static str, w: DVec3, start: f64, place: DVec3) {
     let step = notes.step(Topic::SetUp);
-    step.vector("w", formula, w);
+    step.vector("W", formula, w);
     if start != 0.0 {
-        step.number("t₀", "", start).vector("w₀", "w + t₀·D", place);
+        step.number("t₀", "", start).vector("W₀", "W + t₀·D", place);
         step.remark(Remark::SetUpNearby { start });
     }
 }

@@ -9,10 +9,18 @@ pub enum Remark {
     Misses,
     /// The line touches the surface: both roots are one.
     Touches,
-    /// The line is parallel to the plane or planes.
+    /// The line is parallel to the plane.
     Parallel,
-    /// The line is parallel to a plane in which it lies, or to two planes between which it lies.
-    Between,
+    /// The line is parallel to both planes of a slab, and lies between them or in one of them.
+    Between {
+        /// The axis of the slab: 0, 1 or 2.
+        axis: usize,
+    },
+    /// The line is parallel to both planes of a slab, and does not lie between them.
+    Beside {
+        /// The axis of the slab: 0, 1 or 2.
+        axis: usize,
+    },
     /// `a` is zero: the equation is linear, and one root has gone to infinity.
     AtInfinity,
     /// `a = h = 0` and `c < 0`: the line is inside the surface all the way, and does not cross it.
@@ -53,8 +61,12 @@ pub enum Remark {
     AlongRuling,
     /// Every ruling of one family meets the line: it is a ruling of the other family.
     EveryRuling,
+    /// The line is parallel to a plane, and lies in it.
+    InPlane,
     /// Products rounded to the same number, so that their rounding errors decided about an edge.
     EdgeByRoundingErrors,
+    /// An edge function is 0: the line meets that edge, or its continuation.
+    OnEdge,
     /// This test says otherwise than the search.
     Disagrees,
     /// The triangle has no area, and is never hit.

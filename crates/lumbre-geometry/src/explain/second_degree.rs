@@ -57,7 +57,7 @@ impl Paraboloid {
     pub(crate) fn explained(&self, ray: &Ray, notes: &mut Notes) {
         let step = notes.step(Topic::Parameters);
         step.number("r", "", self.radius).number("H", "", self.z_max).vector("Z", "", DVec3::Z);
-        let formulas = ["H·|D×Z|²", "H·((w×Z)·(D×Z)) − r²·(D·Z)/2", "H·|w×Z|² − r²·(w·Z)"];
+        let formulas = ["H·|D×Z|²", "H·((W×Z)·(D×Z)) − r²·(D·Z)/2", "H·|W×Z|² − r²·(W·Z)"];
         let pair = tell(notes, self, ray, "O", formulas);
         tell_pair(notes, ray, pair, |t| {
             let p = point(ray.origin, DVec3::ZERO, t, ray.direction);
@@ -81,14 +81,14 @@ impl Hyperboloid {
         let base = self.base();
         let step = notes.step(Topic::Parameters);
         step.vector("P₁", "", self.p1).vector("P₂", "", self.p2).vector("Z", "", DVec3::Z);
-        step.number("L", "(P₂ − P₁)·Z", along.z);
+        step.number("H", "(P₂ − P₁)·Z", along.z);
         step.vector("B", "(P₁·Z)·Z", base);
-        step.vector("Q", "L·(P₁ − B)", along.z * (self.p1 - base));
-        step.vector("A", "P₂ − P₁ − L·Z", along - along.z * DVec3::Z);
+        step.vector("Q", "H·(P₁ − B)", along.z * (self.p1 - base));
+        step.vector("K", "P₂ − P₁ − H·Z", along - along.z * DVec3::Z);
         let formulas = [
-            "L²·|D×Z|² − |(D·Z)·A|²",
-            "L²·((w×Z)·(D×Z)) − (Q + (w·Z)·A)·((D·Z)·A)",
-            "L²·|w×Z|² − |Q + (w·Z)·A|²",
+            "H²·|D×Z|² − |(D·Z)·K|²",
+            "H²·((W×Z)·(D×Z)) − (Q + (W·Z)·K)·((D·Z)·K)",
+            "H²·|W×Z|² − |Q + (W·Z)·K|²",
         ];
         let pair = tell(notes, self, ray, "O − B", formulas);
         tell_pair(notes, ray, pair, |t| {
@@ -111,10 +111,10 @@ impl Quadric {
     pub(crate) fn explained(&self, ray: &Ray, notes: &mut Notes) {
         let [x, y, z] = [self.matrix.x_axis, self.matrix.y_axis, self.matrix.z_axis];
         let step = notes.step(Topic::Parameters);
-        step.vector("M₁", "", x).vector("M₂", "", y).vector("M₃", "", z);
+        step.vector("Q₁", "", x).vector("Q₂", "", y).vector("Q₃", "", z);
         step.vector("G", "", 0.5 * self.linear).number("j", "", self.constant);
         let formulas =
-            ["D·⟨M₁·D, M₂·D, M₃·D⟩", "D·(⟨M₁·w, M₂·w, M₃·w⟩ + G)", "w·(⟨M₁·w, M₂·w, M₃·w⟩ + G) + w·G + j"];
+            ["D·⟨Q₁·D, Q₂·D, Q₃·D⟩", "D·(⟨Q₁·W, Q₂·W, Q₃·W⟩ + G)", "W·(⟨Q₁·W, Q₂·W, Q₃·W⟩ + G) + W·G + j"];
         let pair = tell(notes, self, ray, "O", formulas);
         tell_pair(notes, ray, pair, |t| {
             let p = point(ray.origin, DVec3::ZERO, t, ray.direction);

@@ -9,7 +9,7 @@ use crate::sphere::{Equation, Nearby, crossings, solution};
 use crate::support::azimuth;
 use crate::{Ray, Sphere};
 
-const FORMULAS: [&str; 3] = ["D·D", "w·D", "w·w − r²"];
+const FORMULAS: [&str; 3] = ["D·D", "W·D", "W·W − r²"];
 
 /// Tells how both crossings with a whole sphere are found, whose centre is called `C` and radius `r`.
 pub(super) fn tell_sphere(notes: &mut Notes, center: DVec3, radius: f64, ray: &Ray) -> Option<(f64, f64)> {
@@ -26,7 +26,7 @@ pub(super) fn tell_sphere(notes: &mut Notes, center: DVec3, radius: f64, ray: &R
         textbook: FORMULAS,
         in_surface: Remark::InSurface,
         touches: Remark::Touches,
-        nearest: Some(("l", "w − (h/a)·D", equation.nearest)),
+        nearest: Some(("l", "W − (h/a)·D", equation.nearest)),
         delta,
         delta_formula: "a·(r² − l·l)",
         delta_error: None,

@@ -4,13 +4,13 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Topic {
     /// The numbers that the shape is made of, as the search uses them: the normals of planes and disks and all coefficients of a
-    /// quadric times a power of two, which changes no digit. A quadric is `p·⟨M₁·p, M₂·p, M₃·p⟩ + 2·(G·p) + j = 0`.
+    /// quadric times a power of two, which changes no digit. A quadric is `p·⟨Q₁·p, Q₂·p, Q₃·p⟩ + 2·(G·p) + j = 0`.
     Parameters,
     /// A ray whose direction is so long or so short that its square is no number: `D` with about unit length, which all steps after
-    /// it use. `D` is the given direction over `f`, and the given ray's `t` are those of the steps over `f`. The candidates are of
+    /// it use. `D` is the given direction over `λ`, and the given ray's `t` are those of the steps over `λ`. The candidates are of
     /// the given ray.
     ScaledRay,
-    /// Where the equation along the line is set up: `w`, the ray's origin as seen from the shape; or, at `t₀` along the ray, `w₀`.
+    /// Where the equation along the line is set up: `W`, the ray's origin as seen from the shape; or, at `t₀` along the ray, `W₀`.
     SetUp,
     /// The equation `a·s² + 2·h·s + c = 0` of the surface along the line, where `s = t`, or `t − t₀`; with the bounds `ε₂`, `ε₁` and
     /// `ε₀` of the errors of `a`, `h` and `c`, in units of the unit roundoff 2⁻⁵³, where the search computes them. The textbook's is
@@ -41,23 +41,23 @@ pub enum Topic {
     Slabs,
     /// The interval of the line within a convex solid: from the last of what it enters to the first of what it leaves.
     Span,
-    /// The line in a torus' own frame, from the point that is nearest to the centre: `p + s·u`, with a unit `u`. `v` is the length of
-    /// the direction, and `s₀` what rounding leaves between `t₀` and that point. `z₀` and `z₁` are the components of `p` and `u`
+    /// The line in a torus' own frame, from the point that is nearest to the centre: `p + s·U`, with a unit `U`. `g` is the length of
+    /// the direction, and `s₀` what rounding leaves between `t₀` and that point. `z₀` and `z₁` are the components of `p` and `U`
     /// along the axis.
     TorusFrame,
-    /// The part of the line, in `s`, that is within the flat cylinder about a torus.
+    /// The part of the line, from `s = σ₁` to `σ₂`, that is within the flat cylinder about a torus.
     TorusBounds,
     /// The equation of a torus along the line, a quartic without a cubic term: `s²·s² + a₂·s² + a₁·s + a₀ = 0`. The textbook's is
     /// `c₄·t²·t² + c₃·t²·t + c₂·t² + c₁·t + c₀ = 0`, from the ray's origin.
     Quartic,
-    /// The roots `s` of the quartic's derivative, between which it rises or falls throughout, and its values `f` there.
+    /// The roots `s` of the quartic's derivative, between which it rises or falls throughout, and its values `y` there.
     QuarticExtrema,
     /// The roots of the quartic, and the crossings that they are.
     QuarticRoots,
     /// The textbook's quartic in doubles, `c₄·t²·t² + c₃·t²·t + c₂·t² + c₁·t + c₀ = 0`, and its real roots `τ`, each without a further
     /// rounding error to speak of: what the rounded coefficients leave of the crossings.
     TextbookQuartic,
-    /// The shear that makes the ray the third axis: `e₁`, `e₂`, `e₃` are the coordinate axes, the one that the direction is longest
+    /// The shear that makes the ray the third axis: `i₁`, `i₂`, `i₃` are the coordinate axes, the one that the direction is longest
     /// along last. Each corner gets the place `x`, `y` as seen along the ray, and `z` along the third axis.
     Shear,
     /// On which side of each edge the ray passes: twice the areas of the triangles between the ray and the edges, with signs.
@@ -70,10 +70,10 @@ pub enum Topic {
     /// is positive, and −1 where it is negative).
     Winding,
     /// The rulings of a bilinear patch, or of the surface that continues it, that meet the ray's line: the roots `u₁ ≤ u₂` of
-    /// `a + 2·h·u + c·u² = 0`.
+    /// `a·u² + 2·h·u + c = 0`.
     Rulings,
     /// The intervals of the line within each operand of a CSG tree (`I₁` the first leaf's) and within the result, `I`.
     Intervals,
-    /// The surface at the nearest hit: the point `p`, the normal `n` and the parameters `u` and `v`.
+    /// The surface at the nearest hit: the point `P`, the normal `N` and the parameters `u` and `v`.
     Surface,
 }

@@ -1,9 +1,10 @@
 //! Triangles, by the watertight test of the search and, beside it, by two others.
 
-use lumbre_math::DVec3;
+use lumbre_math::quadratic::dop;
+use lumbre_math::{DVec3, exact};
 
 use super::notes::{Notes, out_of_range};
-use super::{Fate, Remark, Topic};
+use super::{Fate, Remark, Step, Topic};
 use crate::{Ray, Triangle, TriangleHit, WatertightRay, moller_trumbore, plane_and_sides};
 
 /// The names of the components of sheared corners.
@@ -18,16 +19,29 @@ pub(super) fn tell_shear(
     corners: &[DVec3],
 ) {
     let step = notes.step(Topic::Shear);
-    for (name, axis) in ["e₁", "e₂", "e₃"].into_iter().zip(sheared.axes()) {
+    for (name, axis) in ["i₁", "i₂", "i₃"].into_iter().zip(sheared.axes()) {
         step.vector(name, "", axis);
     }
     let shear = sheared.shear();
-    step.number("σ₁", "(D·e₁)/(D·e₃)", shear.x).number("σ₂", "(D·e₂)/(D·e₃)", shear.y);
-    step.number("σ₃", "1/(D·e₃)", shear.z);
+    step.number("σ₁", "(D·i₁)/(D·i₃)", shear.x).number("σ₂", "(D·i₂)/(D·i₃)", shear.y);
+    step.number("σ₃", "1/(D·i₃)", shear.z);
     for (((name, _), corner), [x, y, z]) in points.iter().zip(corners).zip(CORNER) {
-        step.number(z, format!("({name} − O)·e₃"), corner.z);
-        step.number(x, format!("({name} − O)·e₁ − σ₁·{z}"), corner.x);
-        step.number(y, format!("({name} − O)·e₂ − σ₂·{z}"), corner.y);
+        step.number(z, format!("({name} − O)·i₃"), corner.z);
+        step.number(x, format!("({name} − O)·i₁ − σ₁·{z}"), corner.x);
+        step.number(y, format!("({name} − O)·i₂ − σ₂·{z}"), corner.y);
+    }
+}
+
+/// Says of edges between sheared points where two products are the same number: the rounding errors of both decide, or the line
+/// meets the edge.
+pub(super) fn tell_edges<const N: usize>(step: &mut Step, edges: [[DVec3; 2]; N]) {
+    let mut equal = edges.iter().filter(|[p, q]| p.x * q.y == p.y * q.x);
+    let is_on = |[p, q]: &&[DVec3; 2]| dop(p.x, q.y, p.y, q.x) == 0.0;
+    if equal.clone().any(|edge| !is_on(&edge)) {
+        step.remark(Remark::EdgeByRoundingErrors);
+    }
+    if equal.any(|edge| is_on(&edge)) {
+        step.remark(Remark::OnEdge);
     }
 }
 
@@ -48,19 +62,19 @@ impl Triangle {
         tell_shear(notes, &sheared, &named, &edges.corners);
 
         let step = notes.step(Topic::EdgeFunctions);
-        step.number("u", "x₂·y₁ − y₂·x₁", edges.u);
-        step.number("v", "x₀·y₂ − y₀·x₂", edges.v);
-        step.number("w", "x₁·y₀ − y₁·x₀", edges.w);
-        if edges.by_errors {
-            step.remark(Remark::EdgeByRoundingErrors);
-        }
+        step.number("U", "x₂·y₁ − y₂·x₁", edges.u);
+        step.number("V", "x₀·y₂ − y₀·x₂", edges.v);
+        step.number("W", "x₁·y₀ − y₁·x₀", edges.w);
+        let [a, b, c] = edges.corners;
+        tell_edges(step, [[c, b], [a, c], [b, a]]);
         let is_inside = edges.are_passed_inside();
+        let is_in_plane = exact::is_singular(&[p0, p1, p2, ray.origin].map(|p| [p.x, p.y, p.z, 1.0]));
         let crossing = edges.crossing(sheared.shear().z);
         match crossing {
             Some(hit) => {
-                step.number("det", "u + v + w", hit.determinant);
-                step.number("t", "σ₃·(u·z₀ + v·z₁ + w·z₂)/det", hit.t);
-                step.number("b₁", "v/det", hit.b1).number("b₂", "w/det", hit.b2);
+                step.number("det", "U + V + W", hit.determinant);
+                step.number("t", "σ₃·(U·z₀ + V·z₁ + W·z₂)/det", hit.t);
+                step.number("b₁", "V/det", hit.b1).number("b₂", "W/det", hit.b2);
                 let weights = [1.0 - hit.b1 - hit.b2, hit.b1, hit.b2];
                 let fate = if !is_inside {
                     Fate::OutsideEdges { weights: [edges.u / hit.determinant, hit.b1, hit.b2] }
@@ -73,10 +87,10 @@ impl Triangle {
                 notes.candidate(hit.t, 0, fate);
             }
             None => {
-                step.remark(Remark::Parallel);
+                step.remark(if is_in_plane { Remark::InPlane } else { Remark::Parallel });
             }
         }
-        if !is_inside {
+        if !is_inside && (crossing.is_some() || !is_in_plane) {
             notes.remark_last(Remark::Misses);
         }
         let is_met = is_inside && crossing.is_some() && !self.is_flat;
@@ -99,14 +113,14 @@ fn tell_moller_trumbore(notes: &mut Notes, ray: &Ray, [p0, p1, p2]: [DVec3; 3], 
     let determinant = s1.dot(edge1);
     let inverse = determinant.recip();
     let step = notes.step(Topic::MollerTrumbore);
-    step.vector("E₁", "P₁ − P₀", edge1).vector("E₂", "P₂ − P₀", edge2).vector("S", "O − P₀", s);
-    step.vector("S₁", "D×E₂", s1).vector("S₂", "S×E₁", s2);
+    step.vector("E₁", "P₁ − P₀", edge1).vector("E₂", "P₂ − P₀", edge2).vector("S₀", "O − P₀", s);
+    step.vector("S₁", "D×E₂", s1).vector("S₂", "S₀×E₁", s2);
     step.number("det", "S₁·E₁", determinant);
     if determinant == 0.0 {
         step.remark(Remark::Parallel);
     } else {
         step.number("t", "S₂·E₂/det", s2.dot(edge2) * inverse);
-        step.number("b₁", "S₁·S/det", s1.dot(s) * inverse);
+        step.number("b₁", "S₁·S₀/det", s1.dot(s) * inverse);
         step.number("b₂", "S₂·D/det", s2.dot(direction) * inverse);
     }
     compare(notes, moller_trumbore(origin, direction, p0, p1, p2), is_met);
