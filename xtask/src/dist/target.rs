@@ -62,7 +62,16 @@ pub(super) const TARGETS: &[Target] = &[
 impl Target {
     /// Windows.
     pub(crate) fn windows() -> &'static Self {
-        TARGETS.iter().find(|target| target.is_windows()).expect("it is in the table")
+        Self::named("windows-x86_64")
+    }
+
+    /// Linux on ARM.
+    pub(crate) fn aarch64() -> &'static Self {
+        Self::named("linux-aarch64")
+    }
+
+    fn named(name: &str) -> &'static Self {
+        TARGETS.iter().find(|target| target.name == name).expect("it is in the table")
     }
 
     /// Whether it is Windows.
@@ -89,13 +98,14 @@ impl Target {
     /// What is to be installed.
     pub(crate) fn cargo(&self, subcommand: &str, tools: Option<&Tools>) -> Result<Command, String> {
         let toolchain = self.toolchain()?;
-        let mut command = match tools {
-            Some(tools) if self.linker == Linker::Zig => {
+        let zig = tools.filter(|_| self.linker == Linker::Zig);
+        let mut command = match zig {
+            Some(tools) => {
                 let mut command = tools.command("cargo-zigbuild");
                 command.arg("zigbuild");
                 command
             }
-            _ => {
+            None => {
                 let mut command = Command::new(&toolchain.cargo);
                 command.arg(subcommand);
                 command
@@ -103,7 +113,7 @@ impl Target {
         };
         toolchain.prepare(&mut command, tools);
         let versioned = format!("{}.{GLIBC}", self.triple);
-        let has_glibc = self.linker == Linker::Zig && self.triple.ends_with("gnu");
+        let has_glibc = zig.is_some() && self.triple.ends_with("gnu");
         command.args(["--target", if has_glibc { &versioned } else { self.triple }]);
         if toolchain.builds_std {
             command.arg("-Zbuild-std");
