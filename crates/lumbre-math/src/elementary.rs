@@ -149,8 +149,14 @@ mod tests {
         assert_eq!((0.5_f64.powi(53)).multiply_add(1.0 + 0.5_f64.powi(27), 1.0), 1.0 + f64::EPSILON);
         assert_eq!((0.5_f32.powi(24)).multiply_add(1.0 + 0.5_f32.powi(20), 1.0), 1.0 + f32::EPSILON);
         // Sums of halves and these are not what they seem.
-        assert_eq!([0.5_f64.next_down().rounded(), 0.5_f64.rounded(), (-2.5_f64).rounded()], [0.0, 1.0, -3.0]);
-        assert_eq!([0.5_f32.next_down().rounded(), 0.5_f32.rounded(), (-2.5_f32).rounded()], [0.0, 1.0, -3.0]);
+        assert_eq!(
+            [0.5_f64.next_down().rounded(), 0.5_f64.rounded(), (-2.5_f64).rounded()],
+            [0.0, 1.0, -3.0]
+        );
+        assert_eq!(
+            [0.5_f32.next_down().rounded(), 0.5_f32.rounded(), (-2.5_f32).rounded()],
+            [0.0, 1.0, -3.0]
+        );
         assert_eq!((f64::EPSILON.recip() + 1.0).rounded(), f64::EPSILON.recip() + 1.0);
     }
 
