@@ -31,7 +31,7 @@ pub(crate) struct Dist {
     /// Only these, such as program-linux-x86_64,deb; by default all.
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = PossibleValuesParser::new(names()))]
     only: Vec<String>,
-    /// How programs and wheels are compiled: dist, or release for a trial in half the time.
+    /// How programs and wheels are compiled: dist, or trial, which is quick to compile and slow to run.
     #[arg(long, default_value = "dist")]
     profile: String,
     /// Take what is not committed, too.

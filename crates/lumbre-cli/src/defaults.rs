@@ -91,7 +91,7 @@ impl Defaults {
         // In tenths, if white is more than one stop too bright or three too dark.
         Ok(match scene.white_level(options)? {
             Some(level) if !(0.125..=2.0).contains(&level) => {
-                (-10.0 * level.logarithm_2()).round().clamp(-1000.0, 1000.0) / 10.0
+                (-10.0 * level.logarithm_2()).rounded().clamp(-1000.0, 1000.0) / 10.0
             }
             _ => 0.0,
         })

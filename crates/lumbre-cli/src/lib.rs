@@ -1,3 +1,4 @@
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 //! The `lumbre` program: render, view, cast, info, diff, merge, explain, math. It is a library so that other front
 //! ends, such as the Python package, bring the same program.
 //!

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use lumbre::SaveOptions;
 use lumbre::formats::image::{ImageFormat, encode_image};
 use lumbre::image::{Image, ToneMap};
+use lumbre::math::Elementary;
 use lumbre_viewer::base64;
 
 use crate::console::understands_ansi;
@@ -129,7 +130,7 @@ fn fitted((width, height): (u32, u32), (across, down): (u32, u32)) -> (u32, u32)
     let scale = (f64::from(across) / f64::from(width.max(1)))
         .min(f64::from(down) / f64::from(height.max(1)))
         .min(1.0);
-    let side = |pixels: u32| ((f64::from(pixels) * scale).round() as u32).max(1);
+    let side = |pixels: u32| ((f64::from(pixels) * scale).rounded() as u32).max(1);
     (side(width), side(height))
 }
 

@@ -97,19 +97,19 @@ mod windows {
     fn paths_have_drives_and_either_separator() {
         let folder = Folder::new();
         write(&folder, "a.pbrt", "images", "meshes");
-        let expected = picture(&folder, "a.pbrt", "a.png");
+        let expected = picture(&folder, "a.pbrt", "a.pfm");
         folder.write("b.pbrt", &scene_of("images", "meshes", '\\'));
-        assert!(picture(&folder, ".\\b.pbrt", "images\\b.png") == expected);
+        assert!(picture(&folder, ".\\b.pbrt", "images\\b.pfm") == expected);
         // With its drive: the file, what it names, and the picture.
         let whole = |name: &str| folder.path(name).canonicalize().unwrap().to_string_lossy().into_owned();
         let plain = |name: &str| whole(name).trim_start_matches(r"\\?\").to_owned();
         assert_eq!(&plain("images")[1..3], ":\\", "{}", plain("images"));
         let scene = SCENE.replace("IMAGE", &(plain("images").replace('\\', "/") + "/skin.png"));
         folder.write("c.pbrt", &scene.replace("MESH", &(plain("meshes") + "\\m.ply").replace('\\', "\\\\")));
-        let output = plain("images") + "\\c.png";
+        let output = plain("images") + "\\c.pfm";
         assert!(picture(&folder, &plain("c.pbrt"), &output) == expected);
         // With the prefix that lifts limits.
-        assert!(picture(&folder, &whole("a.pbrt"), &(whole("images") + "\\d.png")) == expected);
+        assert!(picture(&folder, &whole("a.pbrt"), &(whole("images") + "\\d.pfm")) == expected);
     }
 
     #[test]
@@ -118,11 +118,11 @@ mod windows {
         let deep = ["a folder whose name is long, as names of exported projects are"; 6].join("\\");
         assert!(folder.path(&deep).as_os_str().len() > 300);
         write(&folder, "a.pbrt", "images", &deep);
-        let expected = picture(&folder, "a.pbrt", "a.png");
+        let expected = picture(&folder, "a.pbrt", "a.pfm");
         let scene = format!("{deep}\\scene.pbrt");
         let up = "../".repeat(6) + "images";
         fs::write(folder.path(&scene), scene_of(&up, ".", '/')).unwrap();
-        let output = format!("{deep}\\picture.png");
+        let output = format!("{deep}\\picture.pfm");
         assert!(picture(&folder, &scene, &output) == expected);
         let whole = folder.path(&scene).to_string_lossy().into_owned();
         let (code, said) = folder.lumbre(&["info", &whole]);
@@ -159,20 +159,20 @@ mod windows {
     fn a_picture_is_replaced_while_a_program_that_allows_it_has_it_open() {
         let folder = Folder::new();
         write(&folder, "a.pbrt", "images", "meshes");
-        let expected = picture(&folder, "a.pbrt", "a.png");
+        let expected = picture(&folder, "a.pbrt", "a.pfm");
         fs::write(folder.path("b.pfm"), "the old picture").unwrap();
         let held = fs::File::open(folder.path("b.pfm")).unwrap();
-        fs::write(folder.path("c.png"), "another").unwrap();
-        if fs::rename(folder.path("c.png"), folder.path("b.pfm")).is_err() {
+        fs::write(folder.path("c.pfm"), "another").unwrap();
+        if fs::rename(folder.path("c.pfm"), folder.path("b.pfm")).is_err() {
             return eprintln!("left out: this system replaces no open file");
         }
         assert!(picture_over(&folder) == expected);
         assert_eq!(std::io::read_to_string(&held).unwrap(), "the old picture");
     }
 
-    /// Renders over `b.png`.
+    /// Renders over `b.pfm`.
     fn picture_over(folder: &Folder) -> Vec<u8> {
-        let (code, said) = folder.lumbre(&["render", "a.pbrt", "-o", "b.png"]);
+        let (code, said) = folder.lumbre(&["render", "a.pbrt", "-o", "b.pfm"]);
         assert_eq!(code, 0, "{said}");
         fs::read(folder.path("b.pfm")).unwrap()
     }
@@ -182,21 +182,21 @@ mod windows {
         const FILE_SHARE_READ: u32 = 1;
         let folder = Folder::new();
         write(&folder, "a.pbrt", "images", "meshes");
-        let expected = picture(&folder, "a.pbrt", "a.png");
+        let expected = picture(&folder, "a.pbrt", "a.pfm");
         fs::write(folder.path("b.pfm"), "the old picture").unwrap();
         let hold =
             || fs::File::options().read(true).share_mode(FILE_SHARE_READ).open(folder.path("b.pfm")).unwrap();
         let held = hold();
-        let (code, said) = folder.lumbre(&["render", "a.pbrt", "-o", "b.png"]);
+        let (code, said) = folder.lumbre(&["render", "a.pbrt", "-o", "b.pfm"]);
         assert_eq!((code, said.contains("Another program has it open")), (4, true), "{said}");
         // What was rendered is not lost.
-        assert!(folder.names().iter().any(|name| name.starts_with("b.png.rescued.")), "{said}");
+        assert!(folder.names().iter().any(|name| name.starts_with("b.pfm.rescued.")), "{said}");
         assert!(!folder.names().iter().any(|name| name.ends_with(".lumbre.part")), "{:?}", folder.names());
         drop(held);
         assert_eq!(fs::read(folder.path("b.pfm")).unwrap(), b"the old picture");
         // A scanner is done in a moment.
         let held = hold();
-        let child = folder.command(&["render", "a.pbrt", "-o", "b.png", "-q"]).spawn().unwrap();
+        let child = folder.command(&["render", "a.pbrt", "-o", "b.pfm", "-q"]).spawn().unwrap();
         std::thread::sleep(Duration::from_millis(300));
         drop(held);
         let output = child.wait_with_output().unwrap();

@@ -236,7 +236,7 @@ impl Side {
             return Self { is_positive: first > second, is_exact: false };
         }
         // Both products round to the same number: their errors decide.
-        let residue = p.x.mul_add(q.y, -first) - p.y.mul_add(q.x, -first);
+        let residue = p.x.multiply_add(q.y, -first) - p.y.multiply_add(q.x, -first);
         let moved = [residue, p.y - q.y, q.x - p.x].into_iter().find(|&term| term != 0.0);
         Self { is_positive: moved.is_some_and(|term| term > 0.0), is_exact: residue == 0.0 }
     }

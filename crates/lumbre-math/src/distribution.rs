@@ -17,6 +17,8 @@
 
 use glam::DVec2;
 
+use crate::Elementary;
+
 /// The largest number below 1.
 const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
 
@@ -51,7 +53,7 @@ fn accumulate(starts: &mut [u32], weight_at: impl Fn(usize) -> f64) -> (f64, f64
         before += relative(i);
         let positive = u32::from(weight_at(i) > 0.0);
         ahead -= positive;
-        let share = (before / sum * f64::from(TOTAL)).round() as u32;
+        let share = (before / sum * f64::from(TOTAL)).rounded() as u32;
         // Leaves room for this weight and the ones after it; the last positive one ends at the total itself.
         start = if ahead == 0 { TOTAL } else { share.clamp(start + positive, TOTAL - ahead) };
         if positive == 0 {

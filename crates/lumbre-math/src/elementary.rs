@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-/// Sines, exponentials and their like, computed by the same operations everywhere.
+/// Sines, exponentials and their like, computed by the same operations everywhere; and what only some libraries round correctly.
 ///
 /// The methods of the standard library with the shorter names call the system's own, whose last digits differ from one library to the
 /// next, and with the instruction set of the processor. Pictures are to have the same bytes on every machine, so nothing that
@@ -46,6 +46,10 @@ pub trait Elementary: Copy {
     fn hyperbolic_tangent(self) -> Self;
     /// The number with this hyperbolic sine.
     fn inverse_hyperbolic_sine(self) -> Self;
+    /// `self * factor + summand`, rounded once. MinGW's library rounds it twice.
+    fn multiply_add(self, factor: Self, summand: Self) -> Self;
+    /// The nearest whole number; halves go away from 0. MinGW's library takes the number below 1/2 to 1.
+    fn rounded(self) -> Self;
 }
 
 /// The unit vector at an angle in radians from the x axis towards the y axis.
@@ -56,12 +60,12 @@ pub fn direction_at(angle: f64) -> DVec2 {
 }
 
 macro_rules! elementary {
-    ($scalar:ident: $($method:ident = $function:ident($($argument:ident)?)),+; $both:ident) => {
+    ($scalar:ident: $($method:ident = $function:ident($($argument:ident),*)),+; $both:ident) => {
         impl Elementary for $scalar {
             $(
                 #[inline]
-                fn $method(self $(, $argument: Self)?) -> Self {
-                    libm::$function(self $(, $argument)?)
+                fn $method(self $(, $argument: Self)*) -> Self {
+                    libm::$function(self $(, $argument)*)
                 }
             )*
             #[inline]
@@ -77,7 +81,7 @@ elementary! { f32:
     angle_from = atan2f(x), exponential = expf(), exponential_minus_1 = expm1f(), exponential_2 = exp2f(),
     logarithm = logf(), logarithm_2 = log2f(), logarithm_10 = log10f(), power = powf(exponent), cube_root = cbrtf(),
     hypotenuse = hypotf(other), hyperbolic_tangent = tanhf(),
-    inverse_hyperbolic_sine = asinhf(); sincosf
+    inverse_hyperbolic_sine = asinhf(), multiply_add = fmaf(factor, summand), rounded = roundf(); sincosf
 }
 
 elementary! { f64:
@@ -85,7 +89,7 @@ elementary! { f64:
     angle_from = atan2(x), exponential = exp(), exponential_minus_1 = expm1(), exponential_2 = exp2(),
     logarithm = log(), logarithm_2 = log2(), logarithm_10 = log10(), power = pow(exponent), cube_root = cbrt(),
     hypotenuse = hypot(other), hyperbolic_tangent = tanh(),
-    inverse_hyperbolic_sine = asinh(); sincos
+    inverse_hyperbolic_sine = asinh(), multiply_add = fma(factor, summand), rounded = round(); sincos
 }
 
 #[cfg(test)]
@@ -137,6 +141,23 @@ mod tests {
             hash = crate::random::combine(hash, crate::random::hash_f32s(&singles));
         }
         assert_eq!(hash, 16_064_976_216_142_360_282);
+    }
+
+    #[test]
+    fn products_and_sums_are_rounded_once() {
+        // 1 + 2⁻⁵³ + 2⁻⁸⁰: the bits of a long double end in between, and the rest is a tie.
+        assert_eq!((0.5_f64.powi(53)).multiply_add(1.0 + 0.5_f64.powi(27), 1.0), 1.0 + f64::EPSILON);
+        assert_eq!((0.5_f32.powi(24)).multiply_add(1.0 + 0.5_f32.powi(20), 1.0), 1.0 + f32::EPSILON);
+        // Sums of halves and these are not what they seem.
+        assert_eq!(
+            [0.5_f64.next_down().rounded(), 0.5_f64.rounded(), (-2.5_f64).rounded()],
+            [0.0, 1.0, -3.0]
+        );
+        assert_eq!(
+            [0.5_f32.next_down().rounded(), 0.5_f32.rounded(), (-2.5_f32).rounded()],
+            [0.0, 1.0, -3.0]
+        );
+        assert_eq!((f64::EPSILON.recip() + 1.0).rounded(), f64::EPSILON.recip() + 1.0);
     }
 
     #[test]

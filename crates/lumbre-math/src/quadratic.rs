@@ -20,6 +20,7 @@ pub fn dop(a: f64, b: f64, c: f64, d: f64) -> f64 {
 ///
 /// T. J. Dekker, "A floating-point technique for extending the available precision", Numerische Mathematik, 1971.
 #[inline]
+#[allow(clippy::disallowed_methods, reason = "only where it is an instruction")]
 pub fn two_product(a: f64, b: f64) -> (f64, f64) {
     let product = a * b;
     #[cfg(target_feature = "fma")]

@@ -337,7 +337,7 @@ fn error_bound(map: &DAffine3, p: DVec3, error: DVec3) -> DVec3 {
 /// and 45.
 pub fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
     let reduced = degrees % 360.0;
-    let quarter = (reduced / 90.0).round();
+    let quarter = (reduced / 90.0).rounded();
     let rest = reduced - 90.0 * quarter;
     let (sin, cos) = if rest.abs() == 45.0 {
         // Equal, so that the tangent is 1.

@@ -53,7 +53,7 @@ macro_rules! warps {
         /// The sine and cosine of this many turns, which are exact at quarters.
         #[inline]
         pub fn circle(turns: $scalar) -> ($scalar, $scalar) {
-            let quarter = (4.0 * turns).round();
+            let quarter = (4.0 * turns).rounded();
             let (sin, cos) = sin_cos_octant((4.0 * turns - quarter) * FRAC_PI_2);
             match quarter.rem_euclid(4.0) as u8 {
                 0 => (sin, cos),

@@ -901,7 +901,7 @@ pub(crate) fn near(bounds: &Aabb) -> DVec3 {
         return if bounds.is_empty() { DVec3::ZERO } else { finite_or_zero(bounds.center()) };
     }
     let grid = f64::powi(2.0, size.logarithm_2().ceil().clamp(-1000.0, 1000.0) as i32);
-    finite_or_zero((bounds.center() / grid).round() * grid)
+    finite_or_zero((bounds.center() / grid).map(f64::rounded) * grid)
 }
 
 fn finite_or_zero(p: DVec3) -> DVec3 {

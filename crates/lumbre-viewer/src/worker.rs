@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use lumbre::description::{Camera, ClipPlane, FilmKind, IntegratorKind};
 use lumbre::image::{Image, Rgb};
+use lumbre::math::Elementary;
 use lumbre::{
     CancelToken, DVec3, ErrorKind, NoProgress, Picture, Progress, RenderOptions, RenderState, SceneDesc,
     Setting, State, Stats, Stop,
@@ -194,7 +195,7 @@ impl Worker {
             return self.fail(&error);
         }
         if wanted.scale != 1.0 {
-            let side = |pixels: u32| ((f64::from(pixels) * wanted.scale).round() as u32).max(1);
+            let side = |pixels: u32| ((f64::from(pixels) * wanted.scale).rounded() as u32).max(1);
             let (width, height) = (side(options.width), side(options.height));
             options.resize(stage.scene().resolved().film(), width, height);
         }
@@ -456,7 +457,7 @@ impl Worker {
         self.session.tell_progress(&json!({
             "type": "progress",
             "doing": if is_done { "done" } else { "rendering" },
-            "spp": if stats.noise_target.is_some() { spp.round() as u32 } else { stats.spp },
+            "spp": if stats.noise_target.is_some() { spp.rounded() as u32 } else { stats.spp },
             "target": self.options.stop.spp,
             "share": share,
             "noise": stats.noise,

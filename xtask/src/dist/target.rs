@@ -62,7 +62,16 @@ pub(super) const TARGETS: &[Target] = &[
 impl Target {
     /// Windows.
     pub(crate) fn windows() -> &'static Self {
-        TARGETS.iter().find(|target| target.is_windows()).expect("it is in the table")
+        Self::named("windows-x86_64")
+    }
+
+    /// Linux on ARM.
+    pub(crate) fn aarch64() -> &'static Self {
+        Self::named("linux-aarch64")
+    }
+
+    fn named(name: &str) -> &'static Self {
+        TARGETS.iter().find(|target| target.name == name).expect("it is in the table")
     }
 
     /// Whether it is Windows.
@@ -89,26 +98,31 @@ impl Target {
     /// What is to be installed.
     pub(crate) fn cargo(&self, subcommand: &str, tools: Option<&Tools>) -> Result<Command, String> {
         let toolchain = self.toolchain()?;
-        let mut command = match tools {
-            Some(tools) if self.linker == Linker::Zig => {
+        let zig = tools.filter(|_| self.linker == Linker::Zig);
+        let mut command = match zig {
+            Some(tools) => {
                 let mut command = tools.command("cargo-zigbuild");
                 command.arg("zigbuild");
                 command
             }
-            _ => {
+            None => {
                 let mut command = Command::new(&toolchain.cargo);
                 command.arg(subcommand);
                 command
             }
         };
         toolchain.prepare(&mut command, tools);
-        let versioned = format!("{}.{GLIBC}", self.triple);
-        let has_glibc = self.linker == Linker::Zig && self.triple.ends_with("gnu");
-        command.args(["--target", if has_glibc { &versioned } else { self.triple }]);
+        command.args(["--target", &self.named_for(zig.is_some())]);
         if toolchain.builds_std {
             command.arg("-Zbuild-std");
         }
         Ok(command)
+    }
+
+    /// What cargo is told to build for; cargo-zigbuild is told of the glibc as well.
+    fn named_for(&self, is_zig: bool) -> String {
+        let has_glibc = is_zig && self.triple.ends_with("linux-gnu");
+        if has_glibc { format!("{}.{GLIBC}", self.triple) } else { self.triple.to_owned() }
     }
 
     /// Builds the program and says where it lies, or what that needs.
@@ -217,4 +231,18 @@ fn has_library(rustc: &str, triple: &str) -> bool {
 fn has_sources(rustc: &str) -> bool {
     let root = command::output(rustc, &["--print", "sysroot"]);
     root.is_ok_and(|root| Path::new(root.trim()).join("lib/rustlib/src/rust/library/std").is_dir())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_zig_is_told_of_the_glibc() {
+        let arm = Target::aarch64();
+        assert_eq!(arm.named_for(true), "aarch64-unknown-linux-gnu.2.28");
+        assert_eq!(arm.named_for(false), "aarch64-unknown-linux-gnu");
+        assert_eq!(Target::named("linux-x86_64-musl").named_for(true), "x86_64-unknown-linux-musl");
+        assert_eq!(Target::windows().named_for(false), "x86_64-pc-windows-gnu");
+    }
 }

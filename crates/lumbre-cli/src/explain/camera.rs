@@ -1,6 +1,7 @@
 //! The camera, and the ray that it sends through a point of the film.
 
 use lumbre::description::{Camera, CameraKind, CameraView};
+use lumbre::math::Elementary;
 use lumbre::math::glam::{DMat4, DVec2, DVec4};
 use lumbre::math::matrix::rows4;
 use lumbre::{DVec3, ExplainedSample, Ray, Transform};
@@ -127,7 +128,7 @@ fn kind(kind: &CameraKind, texts: &Texts) -> String {
         CameraKind::Spherical { .. } => texts.spherical.to_owned(),
         CameraKind::Realistic(lens) => {
             let mm = [lens.focal_length(), lens.film_distance(), lens.diagonal()];
-            let mm = mm.map(|metres| super::numbers::exact((1e6 * metres).round() / 1e3));
+            let mm = mm.map(|metres| super::numbers::exact((1e6 * metres).rounded() / 1e3));
             filled(texts.realistic, &[&mm[0], &mm[1], &mm[2]])
         }
     }

@@ -1,6 +1,7 @@
 //! Where the labels of a drawing stand: beside what they name, clear of its lines and of each other.
 
 use lumbre::DVec2;
+use lumbre::math::direction_at;
 
 /// The size of the letters, and the width that one of them takes at most.
 pub(super) const FONT_SIZE: f64 = 15.0;
@@ -107,7 +108,7 @@ impl Labels {
         for distance in DISTANCES {
             for i in 0..DIRECTIONS {
                 let angle = std::f64::consts::TAU * (f64::from(i) + 0.5) / f64::from(DIRECTIONS);
-                let towards = DVec2::new(angle.cos(), angle.sin());
+                let towards = direction_at(angle);
                 // From the point to the middle of the label, whose near side is at the distance.
                 let reach = (0.5 * size / towards.abs()).min_element() + distance;
                 let middle = anchor + reach * towards;

@@ -448,7 +448,7 @@ fn turns(rotation: &DMat3) -> (DVec3, bool) {
     let tidy = |radians: f64| {
         let degrees = radians.to_degrees();
         // Hides rounding errors of whole degrees.
-        if (degrees - degrees.round()).abs() < 1e-9 { degrees.round() } else { degrees }
+        if (degrees - degrees.rounded()).abs() < 1e-9 { degrees.rounded() } else { degrees }
     };
     (DVec3::new(tidy(x), tidy(y), tidy(z)), is_at_pole)
 }

@@ -739,7 +739,7 @@ fn aspect(camera: Value<'_>) -> Read<Option<f64>> {
 fn size_of_picture(aspect: f64) -> (Option<u32>, Option<u32>) {
     let aspect = aspect.clamp(0.05, 20.0);
     let height = (1280.0 * 720.0 / aspect).sqrt();
-    (Some((height * aspect).round() as u32), Some(height.round() as u32))
+    (Some((height * aspect).rounded() as u32), Some(height.rounded() as u32))
 }
 
 /// A light (`KHR_lights_punctual`), aimed along -z: candelas for radiant intensity and lux for irradiance agree

@@ -67,7 +67,7 @@ fn shared_exponent(c: Rgb) -> [u8; 4] {
     // The exponent for which the rounded peak is in [128, 256).
     let mut exponent = peak.logarithm_2().floor() as i32 + 1;
     let scaled =
-        |exponent: i32| c.map(|c| (f64::from(c) * f64::from(8 - exponent).exponential_2()).round() as f32);
+        |exponent: i32| c.map(|c| (f64::from(c) * f64::from(8 - exponent).exponential_2()).rounded() as f32);
     while scaled(exponent).max_component() > 255.0 {
         exponent += 1;
     }

@@ -98,7 +98,7 @@ impl Parser<'_, '_> {
         let aspect = camera.aspect();
         scene.film.width = Some(width);
         let is_usual = (aspect - 4.0 / 3.0).abs() < 0.01;
-        let fitting = (f64::from(width) / aspect).round().clamp(1.0, 65_536.0) as u32;
+        let fitting = (f64::from(width) / aspect).rounded().clamp(1.0, 65_536.0) as u32;
         scene.film.height = Some(if is_usual { height } else { fitting });
         scene.filter = FilterDesc::Box { radius: Vec2::splat(0.5) };
         scene.integrator = IntegratorDesc { kind: IntegratorKind::Pov, ..IntegratorDesc::default() };

@@ -2,6 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use lumbre_geometry::Aabb;
+use lumbre_math::Elementary;
 
 use crate::intersect::Simd;
 use crate::tree::node::{Node, TreeSpace, round_up};
@@ -167,7 +168,7 @@ impl Bounds {
     /// The coordinate that becomes this plane.
     fn inward(plane: f32) -> i32 {
         let near = f64::from(plane.next_down()) * ONE;
-        let mut x = (near - near.abs() * f64::from(f32::EPSILON) - 2.0).round() as i32;
+        let mut x = (near - near.abs() * f64::from(f32::EPSILON) - 2.0).rounded() as i32;
         while Self::outward(x) > plane {
             x -= 1;
         }

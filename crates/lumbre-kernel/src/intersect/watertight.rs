@@ -9,7 +9,7 @@
 //! crossing has exactly one owner.
 
 use lumbre_geometry::{Ray, Root};
-use lumbre_math::{DVec2, DVec3};
+use lumbre_math::{DVec2, DVec3, Elementary};
 
 use super::axes::Axes;
 use crate::simd::{Row, WIDE};
@@ -522,7 +522,7 @@ fn settled_edge(p: Corner, q: Corner) -> f64 {
 
 /// px qy - py qx if both products round to `product`.
 fn residue(p: Corner, q: Corner, product: f64) -> f64 {
-    p.x.mul_add(q.y, -product) - p.y.mul_add(q.x, -product)
+    p.x.multiply_add(q.y, -product) - p.y.multiply_add(q.x, -product)
 }
 
 /// A triangle whose nonzero edge functions have one sign.
@@ -567,6 +567,6 @@ fn side(p: Corner, q: Corner) -> Option<bool> {
 /// px qy - py qx within 1.5 ulp (W. Kahan; C.-P. Jeannerod, N. Louvet, J.-M. Muller, Mathematics of Computation 82, 2013).
 fn difference_of_products(p: Corner, q: Corner) -> f64 {
     let second = p.y * q.x;
-    let error = (-p.y).mul_add(q.x, second);
-    p.x.mul_add(q.y, -second) + error
+    let error = (-p.y).multiply_add(q.x, second);
+    p.x.multiply_add(q.y, -second) + error
 }

@@ -2,7 +2,8 @@
 
 use super::scenes::Random;
 use crate::intersect::{Dispatch, Isa, Simd};
-use crate::simd::{F32x8, F32x16, Row, Vector, WIDE};
+use crate::simd::vector::stack_entry;
+use crate::simd::{F32x8, F32x16, LastEight, Row, Vector, WIDE};
 
 /// What is looked at of sixteen rows, and of numbers in double precision.
 struct Together<'a> {
@@ -167,6 +168,116 @@ fn arithmetic_gives_in_every_lane_what_it_gives_alone() {
                 }
                 assert_eq!((masks[0] | masks[1]) >> count, 0, "{isa:?}");
             }
+        }
+    }
+}
+
+/// Numbers that are moved, chosen and counted, and a mask and places to do it by.
+struct Moved<'a> {
+    rows: &'a [Row<f32>; 2],
+    exact: &'a Row<f64>,
+    words: &'a [u32; WIDE],
+    mask: u32,
+    places: u32,
+}
+
+#[derive(Debug, PartialEq)]
+struct Movement {
+    selected: [u32; WIDE],
+    above: u32,
+    keys: [i32; WIDE],
+    bits: [i32; WIDE],
+    at_places: [f32; 8],
+    first_four: [i64; 4],
+    least: [f32; 2],
+    lane: f32,
+    joined: [f32; WIDE],
+    two: [f32; WIDE],
+    are_equal: [bool; 2],
+    rounded: [f32; WIDE],
+    less: [f32; WIDE],
+    larger: [f32; WIDE],
+    smaller: [f32; WIDE],
+    is_no_larger: u32,
+}
+
+/// A lane of which more than its own number is asked.
+const LANE: usize = 6;
+const AWAY: f64 = 0.1;
+
+impl Dispatch for Moved<'_> {
+    type Output = Movement;
+
+    #[inline(always)]
+    fn run<L: Simd>(self) -> Movement {
+        let Self { rows, exact, words, mask, places } = self;
+        let (a, b) = (L::F32x16::load(&rows[0].0), L::F32x16::load(&rows[1].0));
+        let (first, last) = (a.half(0), a.half(1));
+        Movement {
+            selected: stored(L::F32x16::select(mask, a, b)).0.map(f32::to_bits),
+            above: a.bits_above(rows[1].0[LANE].to_bits().cast_signed()),
+            keys: a.lanes_in_bits().bits(),
+            bits: a.bits(),
+            at_places: a.at_places(places).to_array(),
+            first_four: a.first_four(mask, words),
+            least: [first.reduce_min(mask & 0xff), last.reduce_min(0)],
+            lane: last.lane(LANE),
+            joined: stored(L::F32x16::of_two(last, first)).0,
+            two: stored(L::F32x16::splat_two(first.lane(1), last.lane(2), LastEight::new())).0,
+            are_equal: [a.are_equal(), L::F32x16::splat(rows[0].0[LANE]).are_equal()],
+            rounded: stored(L::F32x16::rounded(exact)).0,
+            less: stored(a.rounded_less(AWAY)).0,
+            larger: stored(a.abs().max_nonneg(b)).0,
+            smaller: stored(a.abs().min_nonneg(b.abs())).0,
+            is_no_larger: a.abs().le_nonneg(b.abs()),
+        }
+    }
+}
+
+#[test]
+fn lanes_are_moved_and_chosen_as_one_by_one() {
+    let mut random = Random(174);
+    for round in 0..300 {
+        let mut rows = [Row::of(0.0); 2];
+        for row in &mut rows {
+            row.0 = std::array::from_fn(|_| (random.unit() - 0.5) as f32);
+        }
+        let exact = Row(std::array::from_fn(|_| random.unit() - 0.5));
+        let words: [u32; WIDE] = std::array::from_fn(|_| random.below(1 << 20) as u32);
+        // Four bits or more.
+        let mask = random.below(1 << 16) as u32 | 0b1001_0000_0001_0010;
+        let places = random.below(1 << 16) as u32 | (random.below(1 << 16) as u32) << 16;
+        if round % 4 == 0 {
+            rows[1].0[round % WIDE] = rows[0].0[round % WIDE];
+        }
+        let [a, b] = rows.map(|row| row.0);
+        let bits = a.map(|x| x.to_bits().cast_signed());
+        let lanes_of = |holds: &dyn Fn(usize) -> bool| (0..WIDE).filter(|&i| holds(i)).map(|i| 1 << i).sum();
+        let chosen: Vec<usize> = (0..WIDE).filter(|&i| mask >> i & 1 == 1).collect();
+        let expected = Movement {
+            selected: std::array::from_fn(|i| if mask >> i & 1 == 1 { a[i] } else { b[i] }.to_bits()),
+            above: lanes_of(&|i| bits[i] > b[LANE].to_bits().cast_signed()),
+            keys: std::array::from_fn(|i| bits[i] & !15 | i as i32),
+            bits,
+            at_places: std::array::from_fn(|i| a[(places >> (4 * i) & 15) as usize]),
+            first_four: std::array::from_fn(|i| stack_entry(bits[chosen[i]], words[chosen[i]])),
+            least: [
+                chosen.iter().filter(|&&i| i < 8).map(|&i| a[i]).fold(f32::INFINITY, f32::min),
+                f32::INFINITY,
+            ],
+            lane: a[8 + LANE],
+            joined: std::array::from_fn(|i| a[(i + 8) % WIDE]),
+            two: std::array::from_fn(|i| if i < 8 { a[1] } else { a[10] }),
+            are_equal: [false, true],
+            rounded: exact.0.map(|x| x as f32),
+            less: a.map(|x| (f64::from(x) - AWAY) as f32),
+            larger: std::array::from_fn(|i| a[i].abs().max(b[i])),
+            smaller: std::array::from_fn(|i| a[i].abs().min(b[i].abs())),
+            is_no_larger: lanes_of(&|i| a[i].abs() <= b[i].abs()),
+        };
+        for isa in Isa::all() {
+            let moved = Moved { rows: &rows, exact: &exact, words: &words, mask, places };
+            assert_eq!(isa.run(moved), expected, "{isa:?}");
         }
     }
 }
