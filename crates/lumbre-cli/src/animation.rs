@@ -70,6 +70,11 @@ impl Animation {
         Ok(Some(Self { path: path.to_owned(), kind, frames_per_second, writer: None }))
     }
 
+    /// Whether a picture was added.
+    pub(crate) fn has_frames(&self) -> bool {
+        self.writer.is_some()
+    }
+
     /// Adds a picture as it is displayed.
     ///
     /// # Errors

@@ -784,7 +784,13 @@ fn picture(
         // The picture may still be saved.
         Err(why) => say!("warning: the checkpoint cannot be written: {why}"),
     }
-    check_whole(arguments, &picture, signals.received())?;
+    match check_whole(arguments, &picture, signals.received()) {
+        // An interrupted animation has the frames that are done.
+        Err(Failure::Interrupted(_)) if first.animation.as_ref().is_some_and(Animation::has_frames) => {
+            return Ok(());
+        }
+        whole => whole?,
+    }
     let denoised = match denoiser {
         Some(denoiser) if denoiser.takes(picture.stats().stride) => {
             Some((denoiser.name(), denoiser.apply(&mut picture, options.threads)?))
