@@ -176,8 +176,6 @@ fn many_shapes_take_32_bytes_for_each_of_their_file_and_64_mib() {
     folder.write("spheres.pbrt", &(start.to_owned() + &"Shape \"sphere\"\n".repeat(300_000)));
     let faces: String = (0..50_000).map(|i| format!("usemtl m{i}\nf 1 2 3\n")).collect();
     folder.write("materials.obj", &format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{faces}"));
-    let groups: String = (0..100_000).map(|i| format!("g g{i}\nf 1 2 3\n")).collect();
-    folder.write("groups.obj", &format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{groups}"));
     // A file that is included again is read again.
     let some = "Shape \"sphere\"\n".repeat(1000);
     folder.write("some.pbrt", &some);
@@ -187,7 +185,6 @@ fn many_shapes_take_32_bytes_for_each_of_their_file_and_64_mib() {
         ("spheres.pbrt", size("spheres.pbrt")),
         ("includes.pbrt", size("includes.pbrt") + 300 * size("some.pbrt")),
         ("materials.obj", size("materials.obj")),
-        ("groups.obj", size("groups.obj")),
     ] {
         let allowed = (64 << 10) + 32 * read / 1024;
         let Some(peak) = peak(&folder, &["info", name]) else { return };
