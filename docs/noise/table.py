@@ -1,7 +1,8 @@
 """The true error of pictures to a noise target, as docs/noise.md shows it: python3 docs/noise/table.py [--program FILE] [SCENE ...]
 
 Each scene is rendered to the target, with and without the denoiser, and with as many samples everywhere. The reference is two pictures of many
-samples with seeds of their own: what they differ by is their own error, which is taken out of that of the others.
+samples with seeds of their own: what they differ by is their own error, which is taken out of that of the others. Errors are relative to the
+luminance of a pixel; where the two differ too much to know that, as rare light makes them, to the mean of its neighbourhood.
 """
 
 import argparse
@@ -91,6 +92,21 @@ def mean(values):
     return sum(values) / len(values)
 
 
+def known(one, two, width, floor, agree=0.1, radius=3):
+    """The luminance of each pixel by two pictures; the mean of its neighbourhood where they differ too much there to know it."""
+    height = len(one) // width
+    result = []
+    for i, (a, b) in enumerate(zip(one, two)):
+        x, y = i % width, i // width
+        columns = range(max(x - radius, 0), min(x + radius + 1, width))
+        rows = range(max(y - radius, 0), min(y + radius + 1, height))
+        near = [v * width + u for v in rows for u in columns]
+        luminance = mean((one[j] + two[j]) / 2 for j in near)
+        error = math.sqrt(mean((one[j] - two[j]) ** 2 for j in near)) / 2
+        result.append((a + b) / 2 if error <= agree * (luminance + floor) else luminance)
+    return result
+
+
 def write_sky(path):
     """A dim sky with one texel that is the sun."""
     width, height = 64, 64
@@ -128,7 +144,8 @@ def main():
             (folder / "scene.pbrt").write_text(HEAD.format(width, height) + world)
             one, two = (run(arguments.program, folder, "reference", "--spp", spp, "--seed", seed)[0] for seed in (11, 12))
             reference = [(a + b) / 2 for a, b in zip(one, two)]
-            scale = [luminance + 0.1 * mean(reference) for luminance in reference]
+            floor = 0.1 * mean(reference)
+            scale = [luminance + floor for luminance in known(one, two, width, floor)]
             own = mean(((a - b) / s) ** 2 for a, b, s in zip(one, two, scale)) / 4
 
             def error(picture):

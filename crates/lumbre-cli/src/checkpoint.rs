@@ -13,6 +13,7 @@ use clap::Args;
 use lumbre::formats::is_device_name;
 use lumbre::{Job, Part, PartError, RenderState};
 
+use crate::animation::is_animation;
 use crate::failure::Failure;
 use crate::memory::Memory;
 use crate::output::is_standard_stream;
@@ -112,7 +113,7 @@ impl PartArguments {
     }
 
     /// Whether the state of the render is looked at.
-    fn is_asked(&self) -> bool {
+    pub(crate) fn is_asked(&self) -> bool {
         self.keeps_sums() || self.checkpoint.is_some() || self.resume
     }
 }
@@ -350,7 +351,8 @@ impl Checkpoint {
         is_one_of_several: bool,
         job: impl FnOnce() -> Result<Job, lumbre::Error> + Send + 'static,
     ) -> Result<(Self, Option<RenderState>), Failure> {
-        let is_file = !is_standard_stream(output) && (output.is_file() || !output.exists());
+        let is_picture = !is_standard_stream(output) && !is_animation(output);
+        let is_file = is_picture && (output.is_file() || !output.exists());
         let kept = match &arguments.checkpoint {
             Some(path) => Some(path.clone()),
             None if arguments.no_checkpoint || !is_file => None,

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use lumbre::CancelToken;
 use lumbre::formats::Limits;
-use lumbre::image::{Metric, Rgb, compare};
+use lumbre::image::{Image, Metric, Rgb, Window, compare};
 
 use crate::failure::{Failure, print};
 use crate::memory::Memory;
@@ -20,21 +20,31 @@ use crate::units;
 #[command(after_help = "Examples:
   lumbre diff out.exr reference.exr
   lumbre diff out.png golden.png --metric flip --fail-above 0.02 -o heat.png
+  lumbre diff out.png golden.png --metric ssim --fail-below 0.98
+  lumbre diff out.png golden.png --region 100,50,64,64
   lumbre render scene.pbrt -o - | lumbre diff - golden.png
 
-Prints the difference alone, so that scripts can read it. Exit status 1 when it is above --fail-above.")]
+Prints the difference alone, so that scripts can read it. Exit status 1 when it is above --fail-above, or below
+--fail-below.")]
 pub(crate) struct Arguments {
     /// A picture: .exr, .png, .hdr, .pfm, .jpg and others; - is standard input.
     a: PathBuf,
     /// The picture to compare it with; relmse and flip take it as the reference.
     b: PathBuf,
     /// How to measure: rmse (root mean square), relmse (squares relative to the reference's), mae (mean of absolute
-    /// values), max (the largest), or flip (what a person notices when the two alternate, 0 to 1).
+    /// values), max (the largest), flip (what a person notices when the two alternate, 0 to 1), or ssim (structural similarity,
+    /// 1 for equal pictures).
     #[arg(long, value_name = "NAME", default_value = "rmse", value_parser = one_of(&METRICS, Metric::from_name))]
     metric: Metric,
+    /// Compare this part only: its left and top edge, its width and its height in pixels.
+    #[arg(long, value_name = "X,Y,W,H", value_parser = units::region)]
+    region: Option<Window>,
     /// Fail when the difference is above this.
     #[arg(long, value_name = "X", value_parser = limit)]
     fail_above: Option<f64>,
+    /// Fail when the similarity (ssim) is below this.
+    #[arg(long, value_name = "X", value_parser = limit, conflicts_with = "fail_above")]
+    fail_below: Option<f64>,
     /// Where to write a picture of the differences.
     #[arg(short, long, value_name = "HEAT.png")]
     output: Option<PathBuf>,
@@ -44,7 +54,7 @@ pub(crate) struct Arguments {
 }
 
 /// The names of metrics.
-pub(crate) const METRICS: [&str; 5] = ["rmse", "relmse", "mae", "max", "flip"];
+pub(crate) const METRICS: [&str; 6] = ["rmse", "relmse", "mae", "max", "flip", "ssim"];
 
 fn limit(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|x: &f64| *x >= 0.0).ok_or_else(|| "expected a number from 0 up".to_owned())
@@ -52,13 +62,22 @@ fn limit(text: &str) -> Result<f64, String> {
 
 /// Bytes a pixel of the differences and their picture.
 const BYTES: u64 = 32;
-/// Bytes a pixel of what the metric flip needs besides.
+/// Bytes a pixel of what the metrics flip and ssim need in all.
 const FLIP_BYTES: u64 = 160;
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if is_standard_stream(&arguments.a) && is_standard_stream(&arguments.b) {
         return Err(Failure::Usage("the two pictures cannot both be standard input".to_owned()));
+    }
+    let is_similarity = arguments.metric.is_similarity();
+    if is_similarity && arguments.fail_above.is_some() {
+        return Err(Failure::Usage("--fail-above: ssim is a similarity (expected --fail-below)".to_owned()));
+    }
+    if !is_similarity && arguments.fail_below.is_some() {
+        return Err(Failure::Usage(
+            "--fail-below: this metric is a difference (expected --fail-above, or --metric ssim)".to_owned(),
+        ));
     }
     let signals = Signals::listen(&CancelToken::new())?;
     if let Some(output) = &arguments.output {
@@ -77,13 +96,27 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let (a, b) = (read(&arguments.a)?, read(&arguments.b)?);
     let pixels = u64::from(a.width()) * u64::from(a.height());
-    let each = if arguments.metric == Metric::Flip { FLIP_BYTES } else { BYTES };
+    let each = if matches!(arguments.metric, Metric::Flip | Metric::Ssim) { FLIP_BYTES } else { BYTES };
     let needed = pixels.saturating_mul(each);
     Memory::new(arguments.max_memory).check(
         "the comparison",
         needed,
         2 * pixels * size_of::<Rgb>() as u64,
     )?;
+    let same_size = (a.width(), a.height()) == (b.width(), b.height());
+    let (a, b) = match arguments.region {
+        Some(region) if same_size => {
+            let is_whole = |part: &Image| (part.width(), part.height()) == (region.width, region.height);
+            let part = |image: &Image| image.crop(region).filter(is_whole);
+            part(&a).zip(part(&b)).ok_or_else(|| {
+                let (width, height) = (a.width(), a.height());
+                Failure::Usage(format!(
+                    "--region: it reaches beyond the pictures (expected a part of {width}x{height})"
+                ))
+            })?
+        }
+        _ => (a, b),
+    };
     let Some(comparison) = compare(&a, &b, arguments.metric) else {
         return Err(Failure::input(format!(
             "{} is {}x{} and {} is {}x{} (expected pictures of the same size)",
@@ -105,10 +138,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         drop(stream);
         replaced.say();
     }
-    match arguments.fail_above {
-        // A NaN is above every limit.
-        Some(limit) if difference.is_nan() || difference > limit => {
+    // A NaN is beyond every limit.
+    match (arguments.fail_above, arguments.fail_below) {
+        (Some(limit), _) if difference.is_nan() || difference > limit => {
             say!("{difference} is above {limit}");
+            Err(Failure::Different)
+        }
+        (_, Some(limit)) if difference.is_nan() || difference < limit => {
+            say!("{difference} is below {limit}");
             Err(Failure::Different)
         }
         _ => Ok(()),

@@ -105,8 +105,9 @@ fn slurm(arguments: &SlurmArguments) -> Result<(), Failure> {
     let is_writable = ImageFormat::from_path(&output).is_some_and(|format| format.is_writable());
     if !is_writable || (arguments.frames.is_some() && !output.to_string_lossy().contains('#')) {
         return Err(Failure::Usage(format!(
-            "{}: expected the name of a picture (.exr, .png, .hdr, .pfm or .jpg){}",
+            "{}: expected the name of a picture ({}){}",
             output.display(),
+            ImageFormat::WRITABLE,
             if arguments.frames.is_some() { " with # for the number of the frame" } else { "" }
         )));
     }

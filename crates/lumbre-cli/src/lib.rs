@@ -43,6 +43,8 @@ macro_rules! say {
     ($($what:tt)*) => { $crate::console::tell(&format!($($what)*)) };
 }
 
+#[cfg(not(target_family = "wasm"))]
+mod animation;
 mod cast;
 #[cfg(not(target_family = "wasm"))]
 mod checkpoint;

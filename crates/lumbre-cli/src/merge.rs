@@ -33,7 +33,7 @@ pub(crate) struct Arguments {
     /// The parts: .part files, and .exr files of --samples or --keep-sums.
     #[arg(required = true, value_name = "PART")]
     parts: Vec<PathBuf>,
-    /// The picture (.exr, .png, .hdr, .pfm or .jpg), or a .part. With # for its number, one for each frame that there are parts of.
+    /// The picture (.exr, .png, .jpg, .webp, .qoi, .hdr or .pfm), or a .part. With # for its number, one for each frame that there are parts of.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Join what there is even if samples are missing, and say which.
@@ -68,8 +68,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let format = ImageFormat::from_path(output).filter(|format| format.is_writable());
     if format.is_none() && !is_bare_part(output) {
         return Err(Failure::Usage(format!(
-            "{}: unknown kind of file (expected a name that ends in .exr, .png, .hdr, .pfm, .jpg or .part)",
-            output.display()
+            "{}: unknown kind of file (expected a name that ends in {}, or .part)",
+            output.display(),
+            ImageFormat::WRITABLE
         )));
     }
     if arguments.keep_sums && format != Some(ImageFormat::Exr) {

@@ -33,7 +33,7 @@ pub(crate) struct ReadingArguments {
     /// the default, is an instant; 0.5 is usual in film. Animated objects get motion blur.
     #[arg(long, value_name = "S", value_parser = shutter, help_heading = "Animation")]
     shutter: Option<f64>,
-    /// Frames per second, for --frames and --shutter.
+    /// Frames per second, for --frames, --shutter, and a .gif or a video.
     #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = rate, help_heading = "Animation")]
     fps: f64,
     /// The animation of a glTF to play, by its name or its index from 0. By default all play at once, except those that
@@ -319,6 +319,11 @@ impl ReadingArguments {
             setting.apply(&mut desc).map_err(|wrong| Failure::Usage(format!("-D: {wrong}")))?;
         }
         Ok((desc, diagnostics))
+    }
+
+    /// Frames per second.
+    pub(crate) fn fps(&self) -> f64 {
+        self.fps
     }
 
     /// What the scene depends on besides its files, by name.

@@ -21,6 +21,7 @@ use lumbre::{
 };
 use serde_json::json;
 
+use crate::animation::{Animation, ENDINGS, is_animation};
 use crate::checkpoint::{Checkpoint, PartArguments, is_bare_part};
 use crate::defaults::Defaults;
 use crate::denoiser::{Choice, Denoiser};
@@ -54,6 +55,7 @@ A model without camera and light is framed, lit as in a studio, and stands on it
   lumbre render chair.glb --env garden.hdr --ground none
   lumbre render chair.glb -o chair.png --background transparent
   lumbre render chair.glb --turntable 72 -o frame.####.png
+  lumbre render chair.glb --turntable 36 --size 400x300 -o turn.gif
   lumbre render street.gltf --camera \"Bird's eye\"
   lumbre render street.gltf --fit --variant winter
 
@@ -76,7 +78,8 @@ pub(crate) struct Arguments {
     /// after another; files of other kinds are put into the same world.
     #[arg(required = true, value_name = "SCENE")]
     scene: Vec<PathBuf>,
-    /// The picture: .exr, .png, .hdr, .pfm or .jpg; - is standard output. By default the scene's own film name, else the scene's
+    /// The picture: .exr, .png, .jpg, .webp, .qoi, .hdr or .pfm; - is standard output. Several are one file that ends in .gif, .mp4, .webm,
+    /// .mkv or .mov. By default the scene's own film name, else the scene's
     /// name with .png, but never a file that was read or that Lumbre did not write: then STEM.render.png.
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
@@ -106,7 +109,8 @@ pub(crate) struct Arguments {
     /// Width and height in pixels.
     #[arg(long, value_name = "WxH", value_parser = units::size)]
     size: Option<(u32, u32)>,
-    /// Frames of an animation from A to B, both included, as -o frame.####.png: frame n is that of the time n / --fps.
+    /// Frames of an animation from A to B, both included, as -o frame.####.png, or in one file, as -o walk.gif or walk.mp4 (by ffmpeg):
+    /// frame n is that of the time n / --fps.
     #[arg(long, value_name = "A..B", conflicts_with_all = ["frame", "turntable"], help_heading = "Animation")]
     frames: Option<Frames>,
     /// Render this part only: pixels, or fractions of the picture.
@@ -210,7 +214,7 @@ pub(crate) fn tone_map_name(map: ToneMap) -> &'static str {
 /// The treatments of shading normals.
 pub(crate) const SHADING_NORMALS: [&str; 2] = ["lumbre", "pbrt"];
 /// The names of formats that are written.
-const WRITTEN: [&str; 5] = ["png", "exr", "hdr", "pfm", "jpg"];
+const WRITTEN: [&str; 7] = ["png", "exr", "hdr", "pfm", "jpg", "webp", "qoi"];
 
 fn written_format(name: &str) -> Option<ImageFormat> {
     ImageFormat::from_path(Path::new(&format!("picture.{name}")))
@@ -226,7 +230,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     arguments.staging.check(named.as_deref())?;
     arguments.check_frames(named.as_deref())?;
     if let Some(output) = &named {
-        check_format(output, !arguments.aov.is_empty())?;
+        arguments.check_format(output)?;
     }
     arguments.check_standard_output()?;
     let denoiser = Denoiser::find(arguments.denoise.unwrap_or(Choice::None))?;
@@ -249,7 +253,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     arguments.view.set(&mut stage)?;
     let began = start;
     // The first picture's name and exposure are used for all.
-    let mut from_first = First { pattern: None, exposure: arguments.exposure };
+    let animation = arguments.animation()?;
+    let mut from_first = First { pattern: None, exposure: arguments.exposure, animation };
     if let Some(Frames(frames)) = &arguments.frames {
         let (first, last) = (*frames.start(), *frames.end());
         let mut held = FirstStage::default();
@@ -306,6 +311,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             }
         }
     }
+    if let Some(animation) = from_first.animation {
+        animation.finish()?;
+    }
     match signals.received() {
         Some(status) => Err(Failure::Interrupted(status)),
         None => Ok(()),
@@ -351,7 +359,11 @@ impl Arguments {
         let Some(output) = &self.output else { return Ok(()) };
         self.staging.check(Some(output))?;
         self.check_frames(Some(output))?;
-        check_format(output, !self.aov.is_empty())?;
+        if is_animation(output) {
+            let why = format!("{}: a task renders one picture (expected a name with #)", output.display());
+            return Err(Failure::Usage(why));
+        }
+        self.check_format(output)?;
         self.check_standard_output()?;
         self.parts.check(&self.scene, output, self.spp)?;
         let alone = [
@@ -479,6 +491,38 @@ impl Arguments {
         Ok(())
     }
 
+    /// The file of all frames, if they are in one.
+    fn animation(&self) -> Result<Option<Animation>, Failure> {
+        let Some(output) = self.output.as_deref().filter(|_| self.pictures() != Pictures::One) else {
+            return Ok(None);
+        };
+        let animation = Animation::of(output, self.reading.fps())?;
+        if animation.is_some() && self.parts.is_asked() {
+            return Err(Failure::Usage(format!(
+                "{}: all frames are in one file, which cannot be resumed (expected a name with # for the number of each)",
+                output.display()
+            )));
+        }
+        Ok(animation)
+    }
+
+    /// Checks that the program can write the format of the path's extension.
+    fn check_format(&self, path: &Path) -> Result<(), Failure> {
+        if is_animation(path) {
+            return match self.pictures() {
+                Pictures::One => Err(Failure::Usage(format!(
+                    "{}: it is of several pictures (expected --frames or --turntable, or another ending)",
+                    path.display()
+                ))),
+                _ if !self.aov.is_empty() => {
+                    Err(Failure::Usage(format!("{}: --aov needs an .exr file", path.display())))
+                }
+                _ => Ok(()),
+            };
+        }
+        check_format(path, !self.aov.is_empty())
+    }
+
     /// Rejects frames without an animation, and an output name that is the same for all frames.
     fn check_frames(&self, output: Option<&Path>) -> Result<(), Failure> {
         let is_gltf = |path: &PathBuf| {
@@ -493,9 +537,13 @@ impl Arguments {
         }
         let name = output.and_then(Path::file_name).map(|name| name.to_string_lossy());
         match name {
-            Some(name) if self.frames.is_some() && !name.contains('#') => Err(Failure::Usage(format!(
-                "{name}: --frames makes many pictures (expected a name with # for their number, as frame.####.png)"
-            ))),
+            Some(name)
+                if self.frames.is_some() && !name.contains('#') && !output.is_some_and(is_animation) =>
+            {
+                Err(Failure::Usage(format!(
+                    "{name}: --frames makes many pictures (expected a name with # for their number, as frame.####.png, or one that ends in {ENDINGS})"
+                )))
+            }
             _ => Ok(()),
         }
     }
@@ -532,6 +580,8 @@ struct First {
     /// The name, with `#` for the number of each picture.
     pattern: Option<PathBuf>,
     exposure: Option<f32>,
+    /// The file of all frames, if they are in one.
+    animation: Option<Animation>,
 }
 
 /// The inputs of a picture.
@@ -588,7 +638,7 @@ fn picture(
         None => first.pattern.insert(arguments.pattern(&scene, &inputs)?).clone(),
     };
     let named = arguments.named(&output);
-    check_format(&named, !arguments.aov.is_empty())?;
+    arguments.check_format(&named)?;
     let film = if kind.is_feature() { FilmKind::Rgb } else { scene.resolved().film().kind };
     check_film(&named, film)?;
     arguments.staging.check(Some(&named))?;
@@ -734,7 +784,13 @@ fn picture(
         // The picture may still be saved.
         Err(why) => say!("warning: the checkpoint cannot be written: {why}"),
     }
-    check_whole(arguments, &picture, signals.received())?;
+    match check_whole(arguments, &picture, signals.received()) {
+        // An interrupted animation has the frames that are done.
+        Err(Failure::Interrupted(_)) if first.animation.as_ref().is_some_and(Animation::has_frames) => {
+            return Ok(());
+        }
+        whole => whole?,
+    }
     let denoised = match denoiser {
         Some(denoiser) if denoiser.takes(picture.stats().stride) => {
             Some((denoiser.name(), denoiser.apply(&mut picture, options.threads)?))
@@ -742,8 +798,9 @@ fn picture(
         _ => None,
     };
 
+    let pictures = std::iter::once(&output).filter(|_| first.animation.is_none());
     let replaced: Vec<Replaced<'_>> =
-        std::iter::once(&output).chain(&arguments.stats).map(|path| Replaced::by(path)).collect();
+        pictures.chain(&arguments.stats).map(|path| Replaced::by(path)).collect();
     let stream = signals.enter_writing(&output)?;
     let save_start = Instant::now();
     let mut save = SaveOptions::default();
@@ -761,7 +818,9 @@ fn picture(
         Backdrop::Background(background) => picture.over(background),
         Backdrop::Lights | Backdrop::Nothing => picture,
     };
-    let saved = if is_bare_part(&output) {
+    let saved = if let Some(animation) = &mut first.animation {
+        animation.add(&picture, &save)
+    } else if is_bare_part(&output) {
         checkpoint.part(&state)?.save(&output).map_err(Failure::from)
     } else if arguments.parts.keeps_sums() {
         picture
@@ -876,7 +935,7 @@ fn is_nearly_black(image: &Image, exposure: f32) -> bool {
 
 /// Whether exposure applies to this file's format.
 fn is_for_displays(path: &Path) -> bool {
-    matches!(ImageFormat::from_path(path), Some(ImageFormat::Png | ImageFormat::Jpeg))
+    ImageFormat::from_path(path).is_none_or(|format| !format.is_high_range())
 }
 
 /// Checks that the program can write the format of the path's extension.
@@ -885,8 +944,9 @@ fn check_format(path: &Path, layers: bool) -> Result<(), Failure> {
     match format {
         None if is_bare_part(path) => Ok(()),
         None => Err(Failure::Usage(format!(
-            "{}: unknown kind of picture (expected a name that ends in .exr, .png, .hdr, .pfm or .jpg)",
-            path.display()
+            "{}: unknown kind of picture (expected a name that ends in {})",
+            path.display(),
+            ImageFormat::WRITABLE
         ))),
         Some(format) if layers && format != ImageFormat::Exr => {
             Err(Failure::Usage(format!("{}: --aov needs an .exr file", path.display())))

@@ -7,9 +7,11 @@ use clap::Args;
 use lumbre::description::GroundPlane;
 use lumbre::formats::Limits;
 use lumbre::formats::diagnostic::nearest_name;
+use lumbre::formats::image::ImageFormat;
 use lumbre::image::{Image, Rgb};
 use lumbre::{Background, EnvironmentDesc, Ground, Stage, Surroundings};
 
+use crate::animation::{ENDINGS, is_animation};
 use crate::defaults::Defaults;
 use crate::failure::Failure;
 use crate::names::one_of;
@@ -33,7 +35,7 @@ pub(crate) struct StagingArguments {
     /// Frame the whole model even if the file has a camera.
     #[arg(long, conflicts_with = "camera", help_heading = "View")]
     fit: bool,
-    /// Render N pictures from all around the model, as -o frame.####.png.
+    /// Render N pictures from all around the model, as -o frame.####.png, or into one file, as -o turn.gif or turn.mp4 (by ffmpeg).
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000),
           conflicts_with = "camera", help_heading = "View")]
     turntable: Option<u32>,
@@ -101,16 +103,19 @@ impl StagingArguments {
         let Some(output) = output else { return Ok(()) };
         let name = output.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
         let has_number = name.contains('#');
-        if self.turntable.is_some() && !has_number {
+        if self.turntable.is_some() && !has_number && !is_animation(output) {
             return Err(Failure::Usage(format!(
-                "{}: --turntable makes many pictures (expected a name with # for their number, as frame.####.png)",
+                "{}: --turntable makes many pictures (expected a name with # for their number, as frame.####.png, or one that ends in {ENDINGS})",
                 output.display()
             )));
         }
-        let ending = output.extension().map(|e| e.to_ascii_lowercase()).unwrap_or_default();
-        if self.background == Some(BackgroundArgument::Transparent) && ending != "png" && ending != "exr" {
+        let has_alpha = matches!(
+            ImageFormat::from_path(output),
+            Some(ImageFormat::Png | ImageFormat::Exr | ImageFormat::WebP | ImageFormat::Qoi)
+        );
+        if self.background == Some(BackgroundArgument::Transparent) && !has_alpha {
             return Err(Failure::Usage(format!(
-                "{}: --background transparent needs a picture that holds coverage (expected .png or .exr)",
+                "{}: --background transparent needs a picture that holds coverage (expected .png, .webp, .qoi or .exr)",
                 output.display()
             )));
         }

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use lumbre::image::Window;
+
 /// `640x480`.
 ///
 /// # Errors
@@ -49,6 +51,22 @@ pub(crate) fn crop(text: &str) -> Result<Crop, String> {
         *value = part.parse().map_err(|_| wrong())?;
     }
     if p[0] < p[2] && p[1] < p[3] { Ok(Crop::Pixels(p)) } else { Err(wrong()) }
+}
+
+/// `x,y,width,height` in pixels.
+///
+/// # Errors
+/// What was expected.
+pub(crate) fn region(text: &str) -> Result<Window, String> {
+    let wrong = || format!("found \"{text}\"; expected X,Y,WIDTH,HEIGHT in pixels, as 100,50,64,64");
+    let number = |part: &str| part.trim().parse::<i32>().ok().filter(|&n| n >= 0).ok_or_else(wrong);
+    let parts: Vec<i32> = text.split(',').map(number).collect::<Result<_, _>>()?;
+    match parts[..] {
+        [x, y, width, height] if width > 0 && height > 0 => {
+            Ok(Window { x, y, width: width.unsigned_abs(), height: height.unsigned_abs() })
+        }
+        _ => Err(wrong()),
+    }
 }
 
 /// `90s`, `2m`, `1h30m`, `500ms`; a bare number is seconds.
@@ -134,6 +152,7 @@ mod tests {
         assert_eq!(size("640x480"), Ok((640, 480)));
         assert_eq!(crop("10,20,110,95"), Ok(Crop::Pixels([10, 20, 110, 95])));
         assert_eq!(crop("0.25,0,0.5,1"), Ok(Crop::Fractions([0.25, 0.0, 0.5, 1.0])));
+        assert_eq!(region("10,20, 110,95"), Ok(Window { x: 10, y: 20, width: 110, height: 95 }));
         assert_eq!(duration("1h30m"), Ok(Duration::from_secs(5400)));
         assert_eq!(duration("500ms"), Ok(Duration::from_millis(500)));
         assert_eq!(duration("2.5"), Ok(Duration::from_millis(2500)));
@@ -153,6 +172,9 @@ mod tests {
         }
         for text in ["", "1,2,3", "5,5,5,9", "0.5,0.5,0.25,1", "a,b,c,d", "0.1,0.1,0.2,1.5"] {
             assert!(crop(text).is_err(), "{text}");
+        }
+        for text in ["", "1,2,3", "1,2,3,0", "-1,2,3,4", "1,2,3,4,5", "0.5,0,1,1"] {
+            assert!(region(text).is_err(), "{text}");
         }
         for text in ["", "soon", "3x", "m"] {
             assert!(duration(text).is_err(), "{text}");

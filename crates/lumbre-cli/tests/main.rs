@@ -1,5 +1,6 @@
 //! The program as its users run it, in one binary, which links once.
 
+mod animations;
 mod broken_inputs;
 mod cast_streams;
 mod cast_vectors;

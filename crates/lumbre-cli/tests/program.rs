@@ -84,7 +84,7 @@ fn a_scene_renders_under_its_own_film_name() {
 fn each_extension_makes_its_format_and_all_hold_the_same_picture() {
     let desk = Desk::new();
     desk.write("scene.pbrt", SPHERE);
-    for name in ["a.exr", "a.png", "a.hdr", "a.pfm", "a.jpg"] {
+    for name in ["a.exr", "a.png", "a.hdr", "a.pfm", "a.jpg", "a.webp", "a.qoi"] {
         let out = desk.lumbre(&["render", "scene.pbrt", "-o", name, "-q"]);
         assert_eq!(code(&out), 0, "{name}: {}", stderr(&out));
         let difference = desk.lumbre(&["diff", name, "a.exr", "--metric", "mae"]);
@@ -92,7 +92,9 @@ fn each_extension_makes_its_format_and_all_hold_the_same_picture() {
         let value: f64 = stdout(&difference).trim().parse().unwrap();
         assert!(value < 0.02, "{name}: {value}");
     }
-    let out = desk.lumbre(&["render", "scene.pbrt", "-o", "a.gif"]);
+    let same = desk.lumbre(&["diff", "a.webp", "a.png", "--metric", "max"]);
+    assert_eq!(stdout(&same), "0\n", "{}", stderr(&same));
+    let out = desk.lumbre(&["render", "scene.pbrt", "-o", "a.tiff"]);
     assert_eq!(code(&out), 2, "{}", stderr(&out));
     assert!(stderr(&out).contains(".exr"), "{}", stderr(&out));
 }
@@ -343,6 +345,58 @@ fn a_difference_above_its_limit_ends_with_one() {
         assert_eq!(code(&other), 1, "{metric}: {}", stdout(&other));
         assert!(stdout(&other).trim().parse::<f64>().unwrap() > 0.0);
         assert!(desk.path("heat.png").exists());
+    }
+}
+
+#[test]
+fn a_similarity_below_its_limit_ends_with_one() {
+    let desk = Desk::new();
+    desk.write("scene.pbrt", SPHERE);
+    for (name, seed) in [("a.exr", "1"), ("b.exr", "2")] {
+        assert_eq!(code(&desk.lumbre(&["render", "scene.pbrt", "-o", name, "--seed", seed, "-q"])), 0);
+    }
+    let ssim = |b: &str, more: &[&str]| {
+        desk.lumbre(&[&["diff", "a.exr", b, "--metric", "ssim", "-o", "heat.png"], more].concat())
+    };
+    let same = ssim("a.exr", &["--fail-below", "1"]);
+    assert_eq!((code(&same), &*stdout(&same)), (0, "1\n"));
+    let other = ssim("b.exr", &[]);
+    let value: f64 = stdout(&other).trim().parse().unwrap();
+    assert!(code(&other) == 0 && (0.1..0.9999).contains(&value), "{value}");
+    assert_eq!(code(&ssim("b.exr", &["--fail-below", "0.99999"])), 1);
+    for (arguments, expected) in [
+        (&["--metric", "ssim", "--fail-above", "0.1"][..], "--fail-below"),
+        (&["--metric", "mae", "--fail-below", "0.1"], "--fail-above"),
+    ] {
+        let out = desk.lumbre(&[&["diff", "a.exr", "b.exr"], arguments].concat());
+        assert!(code(&out) == 2 && stderr(&out).contains(expected), "{}", stderr(&out));
+    }
+}
+
+#[test]
+fn a_part_of_two_pictures_can_be_compared() {
+    let desk = Desk::new();
+    // They differ in one pixel of 5 by 4, the second of the third row.
+    let picture = |value: f32| {
+        let mut bytes = b"PF\n5 4\n-1.0\n".to_vec();
+        // Rows from below.
+        for row in (0..4).rev() {
+            for column in 0..5 {
+                let colour = if (column, row) == (1, 2) { value } else { 0.25 };
+                bytes.extend([colour; 3].iter().flat_map(|c| c.to_le_bytes()));
+            }
+        }
+        bytes
+    };
+    fs::write(desk.path("a.pfm"), picture(0.25)).unwrap();
+    fs::write(desk.path("b.pfm"), picture(0.75)).unwrap();
+    for (region, expected) in [("1,2,1,1", "0.5\n"), ("1,2,4,2", "0.0625\n"), ("2,0,3,4", "0\n")] {
+        let out = desk.lumbre(&["diff", "a.pfm", "b.pfm", "--metric", "mae", "--region", region]);
+        assert_eq!((code(&out), &*stdout(&out)), (0, expected), "{region}: {}", stderr(&out));
+    }
+    for region in ["2,0,4,4", "0,0,5,5", "9,9,1,1", "0,0,0,1", "0,0,1", "-1,0,2,2"] {
+        let out = desk.lumbre(&["diff", "a.pfm", "b.pfm", &format!("--region={region}")]);
+        assert_eq!(code(&out), 2, "{region}: {}", stdout(&out));
     }
 }
 

@@ -44,11 +44,11 @@ impl Thin {
         let at = move |i: u32| self.positions[i as usize].as_dvec3();
         let shapes = points(at, &self.points, size).chain(segments(at, &self.segments, size));
         let colour = move |i: u32| self.colours.as_ref().map_or(Rgb::WHITE, |colours| colours[i as usize]);
-        let each = if self.colours.is_some() { size_of::<ColouredShape>() } else { 0 };
+        let each = if self.colours.is_some() { size_of::<ColouredShape>() } else { size_of::<Shape>() };
         shapes.map(move |(shape, ends)| {
             budget.bytes(each as u64, "points and lines")?;
             Ok(match &self.colours {
-                None => GeometryDesc::Exact(shape),
+                None => GeometryDesc::exact(shape),
                 Some(_) => GeometryDesc::Coloured(Box::new(ColouredShape {
                     shape,
                     ends: ends.map(at),

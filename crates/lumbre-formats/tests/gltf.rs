@@ -168,7 +168,7 @@ fn every_mode_makes_the_triangles_that_the_specification_says() {
 #[test]
 fn points_and_lines_are_spheres_and_cylinders() {
     let spheres = |scene: &SceneDesc| {
-        let is = |s: &&ShapeDesc| matches!(s.geometry, GeometryDesc::Exact(Shape::Sphere(_)));
+        let is = |s: &&ShapeDesc| matches!(&s.geometry, GeometryDesc::Exact(exact) if matches!(**exact, Shape::Sphere(_)));
         scene.shapes.iter().filter(is).count()
     };
     // Spheres stand where a line goes on.
@@ -1196,7 +1196,7 @@ fn four_sets_of_texture_coordinates_serve_one_material() {
     let (scene, warnings) = with_sets(4, [0, 1, 2, 3, 3]);
     assert_eq!(warnings, [""; 0]);
     let mesh = mesh(&scene.shapes[0]);
-    for (set, uvs) in std::iter::once(&mesh.uvs).chain(&mesh.further_uvs).enumerate() {
+    for (set, uvs) in std::iter::once(&mesh.uvs).chain(mesh.further_uvs.as_deref().unwrap()).enumerate() {
         let found = of_third_vertex(mesh, uvs.as_ref().unwrap());
         assert!((found - in_the_file(set)).length() < 1e-6, "{set}");
     }
@@ -1215,7 +1215,9 @@ fn of_many_sets_of_texture_coordinates_those_are_kept_that_the_material_names() 
     let (scene, warnings) = with_sets(8, [7, 3, 7, 3, 7]);
     assert_eq!(warnings, [""; 0]);
     let mesh = mesh(&scene.shapes[0]);
-    let [Some(second), None, None] = &mesh.further_uvs else { panic!("{:?}", mesh.further_uvs) };
+    let Some([Some(second), None, None]) = mesh.further_uvs.as_deref() else {
+        panic!("{:?}", mesh.further_uvs)
+    };
     for (uvs, set) in [(mesh.uvs.as_ref().unwrap(), 7), (second, 3)] {
         assert!((of_third_vertex(mesh, uvs) - in_the_file(set)).length() < 1e-6, "{set}");
     }

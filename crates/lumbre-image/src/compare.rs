@@ -1,6 +1,7 @@
 //! Metrics of the difference of two images.
 
 use crate::flip::flip;
+use crate::ssim::ssim;
 use crate::{Image, Rgb};
 use lumbre_math::Elementary;
 
@@ -21,11 +22,13 @@ pub enum Metric {
     /// The mean of FLIP, from 0 to 1: the difference that a viewer perceives who alternates between the two.
     /// See [`crate::flip()`].
     Flip,
+    /// The mean structural similarity: 1 for equal images, and less the more they differ. See [`crate::ssim()`].
+    Ssim,
 }
 
 impl Metric {
     /// The names, in the order of the enum.
-    pub const NAMES: [&'static str; 5] = ["rmse", "relmse", "mae", "max", "flip"];
+    pub const NAMES: [&'static str; 6] = ["rmse", "relmse", "mae", "max", "flip", "ssim"];
 
     /// The metric of a name.
     pub fn from_name(name: &str) -> Option<Self> {
@@ -35,8 +38,14 @@ impl Metric {
             "mae" => Some(Self::Mae),
             "max" => Some(Self::Max),
             "flip" => Some(Self::Flip),
+            "ssim" => Some(Self::Ssim),
             _ => None,
         }
+    }
+
+    /// Whether a larger value means that two images are more alike.
+    pub fn is_similarity(self) -> bool {
+        self == Self::Ssim
     }
 }
 
@@ -45,7 +54,7 @@ impl Metric {
 pub struct Comparison {
     /// The value of the metric; infinite where a number is not finite and the other image's is different.
     pub value: f64,
-    /// Each pixel's contribution, 0 where they are equal, row by row from the top left: the error of FLIP;
+    /// Each pixel's error, 0 where they are equal, row by row from the top left: that of FLIP; 1 - SSIM;
     /// otherwise the largest error of the channels, relative and squared for [`Metric::RelMse`].
     pub map: Vec<f32>,
     width: u32,
@@ -61,10 +70,10 @@ impl Comparison {
         Image::from_pixels(self.width, self.height, colours).expect("one error a pixel")
     }
 
-    /// The map in false colours from 0 to its largest error; to 1 for FLIP, as is usual.
+    /// The map in false colours from 0 to its largest error; to 1 for FLIP and SSIM, as is usual.
     pub fn heat_map(&self, metric: Metric) -> Image {
         let largest = self.map.iter().copied().filter(|e| e.is_finite()).fold(0.0, f32::max);
-        self.heat(if metric == Metric::Flip { 1.0 } else { largest })
+        self.heat(if matches!(metric, Metric::Flip | Metric::Ssim) { 1.0 } else { largest })
     }
 }
 
@@ -80,6 +89,11 @@ pub fn compare(image: &Image, reference: &Image, metric: Metric) -> Option<Compa
         let map = flip(image, reference)?;
         let mean = map.iter().map(|&e| f64::from(e)).sum::<f64>() / map.len() as f64;
         return done(mean, map);
+    }
+    if metric == Metric::Ssim {
+        let map = ssim(image, reference)?;
+        let mean = map.iter().map(|&s| f64::from(s)).sum::<f64>() / map.len() as f64;
+        return done(mean, map.into_iter().map(|s| 1.0 - s).collect());
     }
     let mut sum = 0.0f64;
     let mut largest = 0.0f64;
@@ -168,8 +182,9 @@ mod tests {
         let fine = image(&[[0.5, 0.5, -1.0], [0.5, 0.5, 2.0]]);
         for name in Metric::NAMES {
             let metric = Metric::from_name(name).unwrap();
-            assert_eq!(compare(&odd, &odd, metric).unwrap().value, 0.0, "{name}");
-            if metric != Metric::Flip {
+            let equal = if metric.is_similarity() { 1.0 } else { 0.0 };
+            assert_eq!(compare(&odd, &odd, metric).unwrap().value, equal, "{name}");
+            if !matches!(metric, Metric::Flip | Metric::Ssim) {
                 assert_eq!(compare(&odd, &fine, metric).unwrap().value, f64::INFINITY, "{name}");
                 assert_eq!(compare(&fine, &odd, metric).unwrap().value, f64::INFINITY, "{name}");
             }

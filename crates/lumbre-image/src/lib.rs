@@ -10,6 +10,7 @@ mod half;
 mod image;
 mod layers;
 mod rgb;
+mod ssim;
 mod tonemap;
 
 pub use crate::half::{f32_to_half, half_to_f32};
@@ -21,4 +22,5 @@ pub use encoding::{Encoded, Encoding, linear_to_srgb, srgb_to_linear, unit_to_u8
 pub use flip::flip;
 pub use layers::{Layer, Layers};
 pub use rgb::Rgb;
+pub use ssim::ssim;
 pub use tonemap::ToneMap;

@@ -124,7 +124,7 @@ fn differing(a: &Image, b: &Image) -> usize {
 
 #[test]
 fn flat_meshes_and_exact_shapes_are_the_same_both_ways_and_smooth_ones_are_not() {
-    let sphere = || GeometryDesc::Exact(Sphere::new(CENTER, RADIUS).unwrap().into());
+    let sphere = || GeometryDesc::exact(Sphere::new(CENTER, RADIUS).unwrap());
     for (name, ball, same) in
         [("flat", globe(6, false), true), ("exact", sphere(), true), ("smooth", globe(6, true), false)]
     {
@@ -148,7 +148,7 @@ fn flat_meshes_and_exact_shapes_are_the_same_both_ways_and_smooth_ones_are_not()
 
 #[test]
 fn a_coarse_smooth_sphere_keeps_its_polygonal_terminator_in_pbrt_s_way() {
-    let exact = GeometryDesc::Exact(Sphere::new(CENTER, RADIUS).unwrap().into());
+    let exact = GeometryDesc::exact(Sphere::new(CENTER, RADIUS).unwrap());
     let expected = shown(lit(exact), KINDS[0], ShadingNormals::Pbrt, 16);
     let [ours, pbrt] = WAYS.map(|way| {
         let found = shown(lit(globe(6, true)), KINDS[0], way, 16);

@@ -139,8 +139,8 @@ pub struct Boundary {
 /// The geometry of a shape.
 #[derive(Clone, Debug)]
 pub enum GeometryDesc {
-    /// One exact shape.
-    Exact(Shape),
+    /// One exact shape; boxed, since meshes are smaller and most shapes of a large scene.
+    Exact(Box<Shape>),
     /// An exact shape with colours.
     Coloured(Box<ColouredShape>),
     /// Triangles and quads.
@@ -156,6 +156,11 @@ pub enum GeometryDesc {
 }
 
 impl GeometryDesc {
+    /// One exact shape.
+    pub fn exact(shape: impl Into<Shape>) -> Self {
+        Self::Exact(Box::new(shape.into()))
+    }
+
     /// The name of its kind, in the scene language if that has one; `mesh` for the several ways to write a mesh.
     pub fn name(&self) -> &'static str {
         match self {
@@ -224,8 +229,8 @@ pub struct MeshDesc {
     /// Tangents, with the side of the bitangent of normal maps: 1 for normal × tangent, -1 for its opposite, in
     /// the mesh's own space (a mirror flips it); 0 for normal × tangent even under a mirror.
     pub tangents: Option<Vec<Vec4>>,
-    /// The second, third and fourth uv set.
-    pub further_uvs: [Option<Vec<Vec2>>; FURTHER_SETS],
+    /// The second, third and fourth uv set, if there are any.
+    pub further_uvs: Option<Box<FurtherUvs>>,
     /// Linear colours.
     pub colours: Option<Vec<Rgb>>,
     /// Alphas.
@@ -234,8 +239,11 @@ pub struct MeshDesc {
     pub face_indices: Option<Vec<u32>>,
     /// Its deformation, if any; the vertices above are then those at some time. Its quads are split into
     /// triangles, flat or not, and its tangents do not change.
-    pub motion: Option<MeshMotion>,
+    pub motion: Option<Box<MeshMotion>>,
 }
+
+/// The second, third and fourth uv set of a mesh.
+pub type FurtherUvs = [Option<Vec<Vec2>>; FURTHER_SETS];
 
 /// The vertices of a deforming mesh, interpolated linearly between keys.
 #[derive(Clone, Debug, PartialEq)]

@@ -112,7 +112,7 @@ pub(crate) fn bake(
     let mesh = Arc::new(TriangleMesh { origin, positions, indices: triangles });
     let precise = precise.map(|positions| Arc::new(PreciseMesh { positions, indices: mesh.indices.clone() }));
     let moving =
-        motion.map(|motion| deforming(shape, motion, tree_from_object, &mesh).map(Box::new)).transpose()?;
+        motion.map(|motion| deforming(shape, *motion, tree_from_object, &mesh).map(Box::new)).transpose()?;
     let turned = (turned.normals.is_some() || turned.tangents.is_some()).then(|| Box::new(turned));
     let is_bare = Arc::get_mut(&mut shared).is_some_and(|own| *own == MeshDesc::default());
     let rest = if is_bare { BARE.clone() } else { shared };
@@ -159,14 +159,15 @@ fn deforming(
 
 fn check(shape: u32, desc: &MeshDesc) -> Result<(), BuildError> {
     let expected = desc.positions.len();
+    let further = |set: usize| desc.further_uvs.as_ref().and_then(|sets| sets[set].as_ref()).map(Vec::len);
     let lists = [
         ("precise positions", desc.precise_positions.as_ref().map(Vec::len)),
         ("normals", desc.normals.as_ref().map(Vec::len)),
         ("texture coordinates", desc.uvs.as_ref().map(Vec::len)),
         ("tangents", desc.tangents.as_ref().map(Vec::len)),
-        ("second texture coordinates", desc.further_uvs[0].as_ref().map(Vec::len)),
-        ("third texture coordinates", desc.further_uvs[1].as_ref().map(Vec::len)),
-        ("fourth texture coordinates", desc.further_uvs[2].as_ref().map(Vec::len)),
+        ("second texture coordinates", further(0)),
+        ("third texture coordinates", further(1)),
+        ("fourth texture coordinates", further(2)),
         ("colours", desc.colours.as_ref().map(Vec::len)),
         ("coverages", desc.coverages.as_ref().map(Vec::len)),
     ];

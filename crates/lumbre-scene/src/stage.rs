@@ -286,7 +286,7 @@ mod tests {
         SceneDesc {
             shapes: vec![ShapeDesc {
                 index: 0,
-                geometry: GeometryDesc::Exact(ball.into()),
+                geometry: GeometryDesc::exact(ball),
                 world_from_object: Transform::IDENTITY,
                 reverse_orientation: false,
                 material: Some(MaterialId(0)),

@@ -139,7 +139,7 @@ impl Picture {
         &self.rendered.stats
     }
 
-    /// Saves the picture in the format of the path's extension: .exr, .png, .hdr, .pfm or .jpg.
+    /// Saves the picture in the format of the path's extension: .exr, .png, .jpg, .webp, .qoi, .hdr or .pfm.
     ///
     /// # Errors
     /// [`Error::Format`].
@@ -198,7 +198,7 @@ impl Picture {
         let part = (self.image().width(), self.image().height()) != self.whole;
         let mut options = options.clone();
         options.exr_window = part.then_some((x0 as i32, y0 as i32, self.whole.0, self.whole.1));
-        let is_for_displays = matches!(format, Some(ImageFormat::Png | ImageFormat::Jpeg));
+        let is_for_displays = format.is_some_and(|format| !format.is_high_range());
         options.exr_attributes.clone_from(&self.rendered.film.attributes);
         options.denoiser = self.noisy.as_ref().map(|noisy| noisy.denoiser);
         let coverage = self.rendered.coverage.as_ref();

@@ -1,8 +1,9 @@
-//! Image files: PNG, JPEG, EXR, HDR, PFM, TGA, BMP, QOI and WebP in; PNG, JPEG, QOI, EXR, HDR and PFM out.
+//! Image files: PNG, JPEG, EXR, HDR, PFM, TGA, BMP, QOI and WebP in; PNG, JPEG, QOI, WebP, EXR, HDR and PFM out, and animated GIF.
 
 mod damage;
 mod decode;
 mod exr_file;
+mod gif;
 mod hdr;
 mod origin;
 mod pfm;
@@ -18,10 +19,11 @@ use crate::budget::Budget;
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted};
 use crate::input::Input;
 
+pub use gif::GifWriter;
 pub use origin::is_own_image;
 pub(crate) use scene::open_scene_image;
 pub use write::{
-    ExrCompression, ExrPrecision, PngDepth, WriteOptions, encode_image, encode_layers, write_image,
+    ExrCompression, ExrPrecision, PngDepth, WriteOptions, encode_image, encode_layers, rgb8, write_image,
     write_layers,
 };
 
@@ -45,7 +47,7 @@ pub enum ImageFormat {
     Bmp,
     /// Quite OK Image.
     Qoi,
-    /// WebP, with losses or without; read only.
+    /// WebP; read with losses or without, written without.
     WebP,
 }
 
@@ -104,8 +106,11 @@ impl ImageFormat {
 
     /// Whether it can be written.
     pub const fn is_writable(self) -> bool {
-        matches!(self, Self::Png | Self::Jpeg | Self::Exr | Self::Hdr | Self::Pfm | Self::Qoi)
+        matches!(self, Self::Png | Self::Jpeg | Self::Exr | Self::Hdr | Self::Pfm | Self::Qoi | Self::WebP)
     }
+
+    /// The names of the endings of files that can be written.
+    pub const WRITABLE: &'static str = ".png, .jpg, .webp, .qoi, .exr, .hdr or .pfm";
 
     /// Whether it stores unbounded light rather than display values.
     pub const fn is_high_range(self) -> bool {

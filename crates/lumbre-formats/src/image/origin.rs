@@ -1,6 +1,6 @@
 //! The mark in image files that Lumbre writes, by which it knows them again.
 
-use std::io::Read;
+use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
 use super::ImageFormat;
@@ -16,12 +16,27 @@ const NEAR: u64 = 64 << 10;
 pub(super) const EXIF: &[u8] = b"II*\0\x08\0\0\0\x01\0\x31\x01\x02\0\x07\0\0\0\x1A\0\0\0\0\0\0\0Lumbre\0";
 
 /// Whether the file `path` is an image that Lumbre wrote, by its metadata: the text `Software` of a PNG, the attribute
-/// `software` of an EXR, the line `SOFTWARE` of an HDR, the tag Software of a JPEG. A PFM has no place for such, so that none is
+/// `software` of an EXR, the line `SOFTWARE` of an HDR, the tag Software of a JPEG or a WebP. A PFM has no place for such, so that none is
 /// known to be ours; and so for what cannot be read.
 pub fn is_own_image(path: &Path) -> bool {
-    let Ok((file, _)) = open_regular(path) else { return false };
+    let Ok((mut file, length)) = open_regular(path) else { return false };
     let mut start = Vec::new();
-    file.take(NEAR).read_to_end(&mut start).is_ok() && has_mark(&start)
+    if Read::by_ref(&mut file).take(NEAR).read_to_end(&mut start).is_err() {
+        return false;
+    }
+    if ImageFormat::from_bytes(&start) != Some(ImageFormat::WebP) {
+        return has_mark(&start);
+    }
+    // Its metadata come last.
+    let mark = webp_mark();
+    let mut end = Vec::new();
+    let from = length.saturating_sub(mark.len() as u64);
+    file.seek(SeekFrom::Start(from)).and_then(|_| file.read_to_end(&mut end)).is_ok() && end == mark
+}
+
+/// The chunk EXIF of a WebP, whose length is odd.
+fn webp_mark() -> Vec<u8> {
+    [b"EXIF", &(EXIF.len() as u32).to_le_bytes()[..], EXIF, b"\0"].concat()
 }
 
 fn has_mark(start: &[u8]) -> bool {
@@ -77,9 +92,14 @@ mod tests {
     fn own_images_are_known_by_their_metadata_and_no_others_are() {
         let folder = tempfile::tempdir().unwrap();
         let image = Image::filled(5, 3, Rgb::new(0.1, 0.2, 0.3));
-        for (name, known) in
-            [("a.png", true), ("a.exr", true), ("a.hdr", true), ("a.jpg", true), ("a.pfm", false)]
-        {
+        for (name, known) in [
+            ("a.png", true),
+            ("a.exr", true),
+            ("a.hdr", true),
+            ("a.jpg", true),
+            ("a.webp", true),
+            ("a.pfm", false),
+        ] {
             let path = folder.path().join(name);
             write_image(&path, &image, &WriteOptions::default()).unwrap();
             assert_eq!(is_own_image(&path), known, "{name}");

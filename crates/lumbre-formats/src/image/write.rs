@@ -1,9 +1,10 @@
-//! Writing images: tone-mapped into PNG, JPEG and QOI, linear light into EXR, HDR and PFM.
+//! Writing images: tone-mapped into PNG, JPEG, QOI and WebP, linear light into EXR, HDR and PFM.
 
 use std::io::{self, Write};
 use std::path::Path;
 
 use image::codecs::qoi::QoiEncoder;
+use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use lumbre_image::{Image, Layers, Rgb, ToneMap, unit_to_u8, unit_to_u16};
 
@@ -15,7 +16,7 @@ use crate::diagnostic::{Diagnostic, FormatError, Place, quoted};
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct WriteOptions {
-    /// The tone mapping operator, for PNG and JPEG.
+    /// The tone mapping operator, for the formats that store display values.
     pub tone_map: ToneMap,
     /// The exposure in stops before tone mapping.
     pub exposure: f32,
@@ -131,7 +132,8 @@ pub fn encode_image(image: &Image, format: ImageFormat, options: &WriteOptions) 
         ImageFormat::Hdr => Ok(hdr::encode(image)),
         ImageFormat::Pfm => Ok(pfm::encode(image)),
         ImageFormat::Qoi => encode_qoi(image, options),
-        ImageFormat::Tga | ImageFormat::Bmp | ImageFormat::WebP => {
+        ImageFormat::WebP => encode_webp(image, options),
+        ImageFormat::Tga | ImageFormat::Bmp => {
             Err(io::Error::new(io::ErrorKind::Unsupported, format!("{} is not written", format.name())))
         }
     }
@@ -154,7 +156,7 @@ fn writable_format(path: &Path) -> Result<ImageFormat, FormatError> {
         let ending =
             path.extension().map_or_else(|| "no ending".to_owned(), |e| quoted(&e.to_string_lossy()));
         let wrong = Diagnostic::error("unknown format to write").at(Place::whole(path.display().to_string()));
-        wrong.found(ending).expected(".png, .jpg, .qoi, .exr, .hdr or .pfm").into()
+        wrong.found(ending).expected(ImageFormat::WRITABLE).into()
     })
 }
 
@@ -163,7 +165,7 @@ fn write_bytes(path: &Path, encoded: io::Result<Vec<u8>>) -> Result<(), FormatEr
     atomic_write(path, |out: &mut dyn Write| out.write_all(&bytes))
 }
 
-/// The displayed colour and alpha of every pixel. PNG is not premultiplied.
+/// The displayed colour and alpha of every pixel, not premultiplied.
 fn shown<'a>(image: &'a Image, options: &'a WriteOptions) -> impl Iterator<Item = ([f32; 3], f32)> + 'a {
     image.pixels().iter().enumerate().map(|(i, &light)| {
         let alpha = image.alpha().map_or(1.0, |alpha| alpha[i]);
@@ -209,17 +211,45 @@ fn encode_png(image: &Image, options: &WriteOptions) -> io::Result<Vec<u8>> {
 
 /// Like PNG, with 8 bits.
 fn encode_qoi(image: &Image, options: &WriteOptions) -> io::Result<Vec<u8>> {
-    let has_alpha = image.alpha().is_some();
-    let data: Vec<u8> = shown(image, options)
-        .flat_map(|([r, g, b], a)| [Some(r), Some(g), Some(b), has_alpha.then_some(a)])
-        .flatten()
-        .map(unit_to_u8)
-        .collect();
-    let kind = if has_alpha { ExtendedColorType::Rgba8 } else { ExtendedColorType::Rgb8 };
+    let (data, kind) = eight_bits(image, options);
     let mut out = Vec::new();
     let encoder = QoiEncoder::new(&mut out);
     encoder.write_image(&data, image.width(), image.height(), kind).map_err(io::Error::other)?;
     Ok(out)
+}
+
+/// Like PNG, with 8 bits and without losses.
+fn encode_webp(image: &Image, options: &WriteOptions) -> io::Result<Vec<u8>> {
+    const MAX_SIDE: u32 = 16_384;
+    if image.width().max(image.height()) > MAX_SIDE {
+        return Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "WebP images have at most 16384 pixels a side",
+        ));
+    }
+    let (data, kind) = eight_bits(image, options);
+    let mut out = Vec::new();
+    let mut encoder = WebPEncoder::new_lossless(&mut out);
+    encoder.set_exif_metadata(origin::EXIF.to_vec()).map_err(io::Error::other)?;
+    encoder.write_image(&data, image.width(), image.height(), kind).map_err(io::Error::other)?;
+    Ok(out)
+}
+
+/// Displayed values with 8 bits, with alpha if the image has it, and what they are.
+fn eight_bits(image: &Image, options: &WriteOptions) -> (Vec<u8>, ExtendedColorType) {
+    let has_alpha = image.alpha().is_some();
+    let data = shown(image, options)
+        .flat_map(|([r, g, b], a)| [Some(r), Some(g), Some(b), has_alpha.then_some(a)])
+        .flatten()
+        .map(unit_to_u8)
+        .collect();
+    (data, if has_alpha { ExtendedColorType::Rgba8 } else { ExtendedColorType::Rgb8 })
+}
+
+/// Displayed values with 8 bits, three a pixel, row by row from the top left. An image with alpha is shown over black.
+pub fn rgb8(image: &Image, options: &WriteOptions) -> Vec<u8> {
+    let encode = |&light: &Rgb| options.tone_map.encode(light, options.exposure).to_u8();
+    image.pixels().iter().flat_map(encode).collect()
 }
 
 fn encode_jpeg(image: &Image, options: &WriteOptions) -> io::Result<Vec<u8>> {
@@ -229,9 +259,7 @@ fn encode_jpeg(image: &Image, options: &WriteOptions) -> io::Result<Vec<u8>> {
             "JPEG images have at most 65535 pixels a side",
         ));
     };
-    // Without alpha, premultiplied light is the image over black.
-    let encode = |&light: &Rgb| options.tone_map.encode(light, options.exposure).to_u8();
-    let data: Vec<u8> = image.pixels().iter().flat_map(encode).collect();
+    let data = rgb8(image, options);
     let mut out = Vec::new();
     let quality = options.jpeg_quality.clamp(1, 100);
     let mut encoder = jpeg_encoder::Encoder::new(&mut out, quality);

@@ -111,7 +111,10 @@ impl Converter<'_, '_> {
         }
         let area_light = self.area_light_of(&form.geometry, spot, state)?;
         let boxed = match &form.geometry {
-            GeometryDesc::Exact(Shape::Quadric(_)) => size_of::<Quadric>(),
+            GeometryDesc::Exact(shape) => {
+                size_of::<Shape>()
+                    + if matches!(**shape, Shape::Quadric(_)) { size_of::<Quadric>() } else { 0 }
+            }
             GeometryDesc::Mesh(_) | GeometryDesc::BilinearMesh(_) => size_of::<MeshDesc>(),
             _ => 0,
         };
@@ -192,7 +195,7 @@ impl Converter<'_, '_> {
     fn form(&mut self, ty: &str, params: &Params, state: &State) -> Result<Option<Form>> {
         if let Some(made) = exact_shape(ty, params)? {
             return match made {
-                Ok(shape) => Ok(Some(GeometryDesc::Exact(shape).into())),
+                Ok(shape) => Ok(Some(GeometryDesc::exact(shape).into())),
                 Err(ShapeError::OutOfRange { parameter, found, expected }) => {
                     params.out_of_range(parameter, found, expected)
                 }

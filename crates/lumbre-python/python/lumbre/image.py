@@ -87,7 +87,7 @@ class Image:
         quality: int = 95,
         precision: str | None = None,
     ) -> None:
-        """Writes a file by its extension: .exr, .png, .hdr, .pfm or .jpg. The path holds the old file or the whole new one.
+        """Writes a file by its extension: .exr, .png, .jpg, .webp, .qoi, .hdr or .pfm. The path holds the old file or the whole new one.
 
         Parameters
         ----------
@@ -161,7 +161,7 @@ def read_image(path: str | os.PathLike[str]) -> npt.NDArray[np.float32]:
 
 
 def write_image(path: str | os.PathLike[str], pixels: npt.ArrayLike, *, tonemap: str = "none", exposure: float = 0.0) -> None:
-    """Writes linear light, (h, w, 3) or (h, w) for grey, as an image file: .exr, .png, .hdr, .pfm or .jpg.
+    """Writes linear light, (h, w, 3) or (h, w) for grey, as an image file: .exr, .png, .jpg, .webp, .qoi, .hdr or .pfm.
 
     `tonemap` and `exposure` are as of `Image.save`.
 
