@@ -4,9 +4,12 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
+use lumbre::description::{ClearSky, SkyDesc, SunPosition};
 use lumbre::formats::image::{ExrPrecision, ImageFormat, PngDepth};
 use lumbre::image::{Image, Layer, Rgb, ToneMap};
-use lumbre::{Background, Feature, FilmLayers, Part as PartDesc, PixelBounds, RenderOptions, SaveOptions};
+use lumbre::{
+    Background, DVec3, Feature, FilmLayers, Part as PartDesc, PixelBounds, RenderOptions, SaveOptions,
+};
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
 };

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use lumbre::description::{
-    Camera as CameraDesc, CameraKind, CameraView, ClearSky, CsgOperation, LightDesc, MeshDesc, SkyDesc, SunPosition,
+    Camera as CameraDesc, CameraKind, CameraView, ClearSky, CsgOperation, LightDesc, MeshDesc, SkyDesc,
+    SunPosition,
 };
 use lumbre::geometry::{
     BilinearPatch, Capsule, Cone, Csg, Cuboid, CurveKind, Curves, Cylinder, Disk, Hyperboloid, Paraboloid,
@@ -383,7 +384,9 @@ impl Light {
     fn disc(towards: Triple, angle: f64, irradiance: [f32; 3]) -> PyResult<Self> {
         let towards = DVec3::from(towards);
         if !(0.0 < angle && angle <= 180.0) {
-            return Err(invalid(format!("angle is out of range (found {angle}; expected degrees, from 0 to 180)")));
+            return Err(invalid(format!(
+                "angle is out of range (found {angle}; expected degrees, from 0 to 180)"
+            )));
         }
         Ok(Self::of(LightDesc::Disc { towards, angle, irradiance: colour("irradiance", irradiance)? }))
     }

@@ -33,7 +33,9 @@ pub enum RenderError {
     #[error("the pixel filter needs a positive radius, and more than zero inside it")]
     Filter,
     /// The integrator follows colours only.
-    #[error("this integrator does not carry wavelengths: a spectral render needs the integrator path or caustics")]
+    #[error(
+        "this integrator does not carry wavelengths: a spectral render needs the integrator path or caustics"
+    )]
     NoWavelengths,
     /// The film keeps wavelengths, and the paths carry none.
     #[error(

@@ -99,10 +99,9 @@ impl<'a> PixelSampler<'a> {
             is_centred: options.integrator.kind == lumbre_scene::IntegratorKind::Pov && options.stop.spp == 1,
             lights_are_seen: !options.transparent,
             catcher: Catcher::of(scene),
-            wavelengths: options.wavelengths().map(|density| WavelengthChoice {
-                density,
-                is_shared: integrator.shares_wavelengths(scene),
-            }),
+            wavelengths: options
+                .wavelengths()
+                .map(|density| WavelengthChoice { density, is_shared: integrator.shares_wavelengths(scene) }),
             film: options.film,
             sensor_curves: options.sensor_curves.clone(),
         })

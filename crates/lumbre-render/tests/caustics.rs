@@ -284,7 +284,7 @@ fn wavelengths_shared_by_all_pixels_have_the_mean_of_those_of_each() {
 fn photons_of_wavelengths_find_what_paths_find_through_glass_that_disperses() {
     let mut desc = lit_by_a_large_lamp();
     // The ball; the floor gets a colour.
-    let ball = desc.shapes[2].material;
+    let ball = desc.shapes[2].material.unwrap();
     desc.materials[ball.0 as usize].material = Arc::new(dispersive());
     desc.materials[0].material = Arc::new(Material::new(MaterialKind::Diffuse {
         reflectance: Arc::new(SpectrumTexture::Constant(Rgb::new(0.7, 0.5, 0.3))),
@@ -330,7 +330,7 @@ fn a_caustic_seen_through_the_glass_that_made_it_counts_its_wavelength_once() {
 #[test]
 fn photons_of_wavelengths_depend_on_no_thread_and_no_part() {
     let mut desc = lit_by_a_large_lamp();
-    let ball = desc.shapes[2].material;
+    let ball = desc.shapes[2].material.unwrap();
     desc.materials[ball.0 as usize].material = Arc::new(dispersive());
     desc.integrator.kind = IntegratorKind::Caustics;
     let scene = Scene::build(desc).unwrap();

@@ -13,9 +13,9 @@ use crate::light::choice::LightChoice;
 use crate::light::environment::first_not_finite;
 use crate::light::lanes::LaneLights;
 use crate::light::{
-    DiscLight, DistantLight, Environment, GoniometricLight, Light, LightId, MeshLight, MovingLight, PlacedLight,
-    PointLight, PortalLight, ProjectionLight, ShapeLight, SpotLight, UniformLight, portal::PortalError,
-    power,
+    DiscLight, DistantLight, Environment, GoniometricLight, Light, LightId, MeshLight, MovingLight,
+    PlacedLight, PointLight, PortalLight, ProjectionLight, ShapeLight, SpotLight, UniformLight,
+    portal::PortalError, power,
 };
 use crate::light_colour::LightColour;
 use crate::media::{self, Boundaries, Media};

@@ -53,7 +53,9 @@ impl SunPosition {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SunPositionError {
     /// It has not three parts.
-    #[error("no time and place (found \"{0}\"; expected a date with a time and its zone, a latitude and a longitude, as 2026-06-21T12:00+02:00,40.4,-3.7)")]
+    #[error(
+        "no time and place (found \"{0}\"; expected a date with a time and its zone, a latitude and a longitude, as 2026-06-21T12:00+02:00,40.4,-3.7)"
+    )]
     Parts(String),
     /// The first part is no time.
     #[error("no date with a time and its zone (found \"{0}\"; expected one as 2026-06-21T12:00+02:00)")]
@@ -171,7 +173,9 @@ impl Default for SkyDesc {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SkyError {
     /// There is no model of the night.
-    #[error("the sun is below the horizon, and the night has no model (found an elevation of {0:.1} degrees; expected 0 to 90)")]
+    #[error(
+        "the sun is below the horizon, and the night has no model (found an elevation of {0:.1} degrees; expected 0 to 90)"
+    )]
     Elevation(f64),
     /// Air that is clearer or hazier than any that was modelled.
     #[error("the turbidity is out of range (found {0}; expected 1, clear, to 10, hazy)")]
@@ -250,18 +254,22 @@ impl ClearSky {
     /// The sky without its sun by longitude and latitude, with x in the centre. What is below the horizon is as bright as level
     /// ground under both.
     pub fn map(&self) -> Image {
-        let of_sun = self.sunlight().map_or(Rgb::BLACK, |sun| sun.irradiance * self.sky.towards_sun().z as f32);
+        let of_sun =
+            self.sunlight().map_or(Rgb::BLACK, |sun| sun.irradiance * self.sky.towards_sun().z as f32);
         let on_ground = self.sky.irradiance() * self.desc.sky_scale + of_sun;
         let ground = on_ground * (self.desc.albedo / PI) as f32;
         let (width, height) = (2 * HEIGHT, HEIGHT);
         let size = DVec2::new(width.into(), height.into());
-        let at = |x: u32, y: u32| {
-            let uv = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) / size;
+        let mut image = Image::filled(width, height, ground);
+        for (i, pixel) in image.pixels_mut().iter_mut().enumerate() {
+            let (x, y) = (i % width as usize, i / width as usize);
+            let uv = DVec2::new(x as f64 + 0.5, y as f64 + 0.5) / size;
             let direction = warp64::latlong_to_sphere(uv + DVec2::new(0.5, 0.0));
-            if direction.z > 0.0 { self.radiance(direction) } else { ground }
-        };
-        let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| at(x, y));
-        Image::from_pixels(width, height, pixels.collect()).unwrap_or_else(|| Image::new(width, height))
+            if direction.z > 0.0 {
+                *pixel = self.radiance(direction);
+            }
+        }
+        image
     }
 }
 
@@ -304,9 +312,22 @@ mod tests {
         assert_eq!(time_of("2026-11-30T23:30-01:30"), Some(1_796_086_800.0));
         assert_eq!(time_of("1969-12-31 23:59:59z"), Some(-1.0));
         for wrong in [
-            "", "2026-06-21", "2026-06-21T12:00", "2026-6-21T12:00Z", "2026-13-01T00:00Z", "2025-02-29T00:00Z",
-            "2026-06-21T24:00Z", "2026-06-21T12:60Z", "2026-06-21T12:00+2", "2026-06-21T12:00+15:00", "2026-06-21T12Z",
-            "2026-06-21T12:00:00.5Z", "+026-06-21T12:00Z", "2026-06-21T12:00ZZ", "T+", "2026-06-21T\u{fc}2:00Z",
+            "",
+            "2026-06-21",
+            "2026-06-21T12:00",
+            "2026-6-21T12:00Z",
+            "2026-13-01T00:00Z",
+            "2025-02-29T00:00Z",
+            "2026-06-21T24:00Z",
+            "2026-06-21T12:60Z",
+            "2026-06-21T12:00+2",
+            "2026-06-21T12:00+15:00",
+            "2026-06-21T12Z",
+            "2026-06-21T12:00:00.5Z",
+            "+026-06-21T12:00Z",
+            "2026-06-21T12:00ZZ",
+            "T+",
+            "2026-06-21T\u{fc}2:00Z",
         ] {
             assert_eq!(time_of(wrong), None, "{wrong}");
         }
@@ -327,13 +348,15 @@ mod tests {
     fn the_lights_are_a_sun_and_what_is_around() {
         let desc = SkyDesc { sun: SunPosition { azimuth: 90.0, elevation: 30.0 }, ..SkyDesc::default() };
         let lights = ClearSky::new(desc).unwrap().lights(&Transform::IDENTITY);
-        let [LightDesc::Spectral { light, .. }, LightDesc::Infinite { image: Some(map), .. }] = &lights[..] else {
+        let [LightDesc::Spectral { light, .. }, LightDesc::Infinite { image: Some(map), .. }] = &lights[..]
+        else {
             panic!()
         };
         let LightDesc::Disc { towards, angle, irradiance } = **light else { panic!() };
         assert!(towards.distance(DVec3::new(0.75_f64.sqrt(), 0.0, 0.5)) < 1e-12 && angle == 0.533);
         // The sun gives more than the sky, and is redder.
-        let scene = crate::Scene::build(crate::SceneDesc { lights: lights.clone(), ..Default::default() }).unwrap();
+        let scene =
+            crate::Scene::build(crate::SceneDesc { lights: lights.clone(), ..Default::default() }).unwrap();
         let [_, Light::Environment(sky)] = scene.lights() else { panic!() };
         let of_sky = sky.irradiance(DVec3::Z);
         assert!(irradiance.luminance() * 0.5 > of_sky.luminance());

@@ -236,10 +236,7 @@ impl Stage {
 
 /// Whether a light is not one of those that stand for what is around.
 fn is_finite(light: &LightDesc) -> bool {
-    !matches!(
-        light.bare(),
-        LightDesc::Infinite { .. } | LightDesc::Portal { .. } | LightDesc::Disc { .. }
-    )
+    !matches!(light.bare(), LightDesc::Infinite { .. } | LightDesc::Portal { .. } | LightDesc::Disc { .. })
 }
 
 /// The placement of a sky: east is to the right of the automatic camera, and north away from it.

@@ -221,6 +221,7 @@ impl Setting {
                 | LightDesc::Projection { intensity, .. },
                 "intensity",
             ) => Slot::Light(intensity),
+            (LightDesc::Disc { angle, .. }, "angle") => Slot::Double(angle, ANGLE),
             (LightDesc::Spot { cone_angle, .. }, "coneangle") => Slot::Plain(cone_angle, ANGLE),
             (LightDesc::Projection { fov, .. }, "fov") => Slot::Plain(fov, ANGLE),
             (LightDesc::Spot { cone_delta_angle, .. }, "conedeltaangle") => {

@@ -384,7 +384,15 @@ impl Converter<'_, '_> {
         // Ours: pbrt-v4 is always so.
         let carries_wavelengths = matches!(
             ty,
-            "path" | "volpath" | "simplepath" | "simplevolpath" | "randomwalk" | "caustics" | "bdpt" | "mlt" | "sppm"
+            "path"
+                | "volpath"
+                | "simplepath"
+                | "simplevolpath"
+                | "randomwalk"
+                | "caustics"
+                | "bdpt"
+                | "mlt"
+                | "sppm"
                 | "lightpath"
         );
         if carries_wavelengths && params.boolean("spectral", false)? {

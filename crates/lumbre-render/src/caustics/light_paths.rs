@@ -12,7 +12,8 @@ use lumbre_geometry::Ray;
 use lumbre_kernel::Hit;
 use lumbre_math::rounding::offset_point;
 use lumbre_math::{DVec3, Vec3, orthonormal_basis, warp64};
-use lumbre_scene::{BoundingSphere, Footprint, Interaction, LightSample, MediumId, Sampling, Scene, View};
+use lumbre_scene::light::Sampling;
+use lumbre_scene::{BoundingSphere, Footprint, Interaction, LightSample, MediumId, Scene, View};
 use lumbre_shading::spectrum::{SpectralLookup, WavelengthDensity, Wavelengths};
 use lumbre_shading::{Scatter, ShadingNormals, Spectrum};
 use smallvec::SmallVec;
@@ -265,7 +266,12 @@ impl<'s> LightTracer<'s> {
                 Some(end) => Ray::new(start, end.point - start).with_range(0.0, 1.0),
                 None => Ray::new(start, sample.towards),
             };
-            path.flux *= self.scene.transmittance(path.medium, &back, line.draw.along(&back), line.wavelengths.as_ref());
+            path.flux *= self.scene.transmittance(
+                path.medium,
+                &back,
+                line.draw.along(&back),
+                line.wavelengths.as_ref(),
+            );
         }
     }
 

@@ -47,7 +47,9 @@ impl Merges {
         for (column, x) in self.towards.iter_mut().zip(photon.towards.to_array()) {
             column[at] = x;
         }
-        for (column, x) in self.light.iter_mut().zip((photon.flux_for(is_alone) * (spread / cosine)).to_array()) {
+        for (column, x) in
+            self.light.iter_mut().zip((photon.flux_for(is_alone) * (spread / cosine)).to_array())
+        {
             column[at] = x;
         }
         self.share[at] = spread / photon.density;

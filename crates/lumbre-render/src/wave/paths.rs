@@ -108,7 +108,11 @@ impl Slots<'_> {
     }
 
     /// Chooses the wavelengths of all samples by a number each.
-    pub(crate) fn choose_wavelengths(&mut self, density: WavelengthDensity, numbers: impl Iterator<Item = f32>) {
+    pub(crate) fn choose_wavelengths(
+        &mut self,
+        density: WavelengthDensity,
+        numbers: impl Iterator<Item = f32>,
+    ) {
         self.wavelengths.extend(numbers.take(self.len).map(|u| density.sample(u)));
         self.is_alone.resize(self.len, false);
     }

@@ -16,14 +16,58 @@ const TEMPERATURE: f64 = 5772.0;
 const OZONE: f64 = 0.35;
 /// The absorption of ozone per cm, by wavelength in nm: M. Iqbal, "An Introduction to Solar Radiation", 1983.
 const OZONE_ABSORPTION: [(f64, f64); 52] = [
-    (445.0, 0.003), (450.0, 0.003), (455.0, 0.004), (460.0, 0.006), (465.0, 0.008), (470.0, 0.009), (475.0, 0.012),
-    (480.0, 0.014), (485.0, 0.017), (490.0, 0.021), (495.0, 0.025), (500.0, 0.03), (505.0, 0.035), (510.0, 0.04),
-    (515.0, 0.045), (520.0, 0.048), (525.0, 0.057), (530.0, 0.063), (535.0, 0.07), (540.0, 0.075), (545.0, 0.08),
-    (550.0, 0.085), (555.0, 0.095), (560.0, 0.103), (565.0, 0.11), (570.0, 0.12), (575.0, 0.122), (580.0, 0.12),
-    (585.0, 0.118), (590.0, 0.115), (595.0, 0.12), (600.0, 0.125), (605.0, 0.13), (610.0, 0.12), (620.0, 0.105),
-    (630.0, 0.09), (640.0, 0.079), (650.0, 0.067), (660.0, 0.057), (670.0, 0.048), (680.0, 0.036), (690.0, 0.028),
-    (700.0, 0.023), (710.0, 0.018), (720.0, 0.014), (730.0, 0.011), (740.0, 0.01), (750.0, 0.009), (760.0, 0.007),
-    (770.0, 0.004), (780.0, 0.0), (790.0, 0.0),
+    (445.0, 0.003),
+    (450.0, 0.003),
+    (455.0, 0.004),
+    (460.0, 0.006),
+    (465.0, 0.008),
+    (470.0, 0.009),
+    (475.0, 0.012),
+    (480.0, 0.014),
+    (485.0, 0.017),
+    (490.0, 0.021),
+    (495.0, 0.025),
+    (500.0, 0.03),
+    (505.0, 0.035),
+    (510.0, 0.04),
+    (515.0, 0.045),
+    (520.0, 0.048),
+    (525.0, 0.057),
+    (530.0, 0.063),
+    (535.0, 0.07),
+    (540.0, 0.075),
+    (545.0, 0.08),
+    (550.0, 0.085),
+    (555.0, 0.095),
+    (560.0, 0.103),
+    (565.0, 0.11),
+    (570.0, 0.12),
+    (575.0, 0.122),
+    (580.0, 0.12),
+    (585.0, 0.118),
+    (590.0, 0.115),
+    (595.0, 0.12),
+    (600.0, 0.125),
+    (605.0, 0.13),
+    (610.0, 0.12),
+    (620.0, 0.105),
+    (630.0, 0.09),
+    (640.0, 0.079),
+    (650.0, 0.067),
+    (660.0, 0.057),
+    (670.0, 0.048),
+    (680.0, 0.036),
+    (690.0, 0.028),
+    (700.0, 0.023),
+    (710.0, 0.018),
+    (720.0, 0.014),
+    (730.0, 0.011),
+    (740.0, 0.01),
+    (750.0, 0.009),
+    (760.0, 0.007),
+    (770.0, 0.004),
+    (780.0, 0.0),
+    (790.0, 0.0),
 ];
 /// The wavelengths of the spectrum, in nm.
 const FIRST: u32 = 360;
@@ -51,7 +95,8 @@ impl Sunlight {
     pub fn new(elevation: f64, turbidity: f64) -> Option<Self> {
         let depth = |nm: f64| optical_depth(nm, elevation, turbidity);
         let radiance = |nm: f64| black_body(nm) * (-depth(nm)).exponential();
-        let samples = (FIRST..=LAST).step_by(STEP as usize).map(|nm| (f64::from(nm), radiance(f64::from(nm))));
+        let samples =
+            (FIRST..=LAST).step_by(STEP as usize).map(|nm| (f64::from(nm), radiance(f64::from(nm))));
         let spectrum = SpectrumValue::Sampled(samples.collect());
         let luminance = EFFICACY * luminance_of(&spectrum)?;
         let half = (0.5 * Self::ANGLE).to_radians().sine();
@@ -115,8 +160,11 @@ mod tests {
     #[test]
     fn sunlight_is_weaker_and_redder_the_lower_the_sun_and_the_hazier_the_air() {
         assert!((80_000.0..110_000.0).contains(&lux(60.0, 2.0)), "{}", lux(60.0, 2.0));
-        for (bright, dark) in [((60.0, 3.0), (30.0, 3.0)), ((30.0, 3.0), (5.0, 3.0)), ((30.0, 2.0), (30.0, 6.0))] {
-            let [high, low] = [bright, dark].map(|(elevation, turbidity)| Sunlight::new(elevation, turbidity).unwrap());
+        for (bright, dark) in
+            [((60.0, 3.0), (30.0, 3.0)), ((30.0, 3.0), (5.0, 3.0)), ((30.0, 2.0), (30.0, 6.0))]
+        {
+            let [high, low] =
+                [bright, dark].map(|(elevation, turbidity)| Sunlight::new(elevation, turbidity).unwrap());
             assert!(high.irradiance.luminance() > low.irradiance.luminance());
             assert!(high.irradiance.b / high.irradiance.r > low.irradiance.b / low.irradiance.r);
         }
@@ -125,7 +173,11 @@ mod tests {
     #[test]
     fn the_air_below_the_zenith_is_one_mass() {
         let single = optical_depth(550.0, 90.0, 1.0);
-        assert!((single / (0.008735 * 0.55_f64.powf(-4.08) + 0.00022 * 0.55_f64.powf(-1.3) + 0.35 * 0.085) - 1.0).abs() < 2e-3);
+        assert!(
+            (single / (0.008735 * 0.55_f64.powf(-4.08) + 0.00022 * 0.55_f64.powf(-1.3) + 0.35 * 0.085) - 1.0)
+                .abs()
+                < 2e-3
+        );
         // Near the horizon it is some 38: F. Kasten, A. T. Young, 1989.
         let ratio = optical_depth(550.0, 0.0, 1.0) / single;
         assert!((30.0..42.0).contains(&ratio), "{ratio}");
