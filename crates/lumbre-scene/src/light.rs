@@ -138,7 +138,11 @@ impl Light {
             Self::Goniometric(light) => light.sample(from),
             Self::Projection(light) => light.sample(from),
             Self::Distant(light) => Some(light.sample()),
-            Self::Disc(light) => Some(light.sample(u)),
+            Self::Disc(light) => {
+                let (towards, pdf) = light.sample(u);
+                let radiance = light.radiance(towards);
+                Some(LightSample { towards, end: None, radiance, scatter: Scatter::Density(pdf as f32) })
+            }
             Self::Uniform(light) => Some(light.sample(u)),
             Self::Environment(light) => light.sample(u),
             Self::Portal(light) => light.sample(from, u),

@@ -3,9 +3,7 @@
 use std::f64::consts::PI;
 
 use lumbre_math::{DVec2, DVec3, Elementary, Frame, warp64};
-use lumbre_shading::{Scatter, Spectrum};
-
-use super::LightSample;
+use lumbre_shading::Spectrum;
 
 /// Uniform radiance from a disc at infinity.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,13 +54,10 @@ impl DiscLight {
         if self.holds(direction) { self.radiance } else { Spectrum::BLACK }
     }
 
-    pub(super) fn sample(&self, u: DVec2) -> LightSample {
-        LightSample {
-            towards: self.frame.to_world(warp64::square_to_cone(u, self.one_minus_cos)),
-            end: None,
-            radiance: self.radiance,
-            scatter: Scatter::Density(warp64::cone_pdf(self.one_minus_cos) as f32),
-        }
+    /// A direction in it, by its density per unit solid angle.
+    pub(super) fn sample(&self, u: DVec2) -> (DVec3, f64) {
+        let towards = self.frame.to_world(warp64::square_to_cone(u, self.one_minus_cos));
+        (towards, warp64::cone_pdf(self.one_minus_cos))
     }
 
     pub(super) fn pdf(&self, direction: DVec3) -> f64 {
@@ -109,11 +104,9 @@ mod tests {
             for normal in [light.towards(), DVec3::new(0.6, 0.0, 0.8)] {
                 let (mut sum, count) = (0.0, 20_000);
                 for _ in 0..count {
-                    let sample = light.sample(DVec2::new(random.next_f64(), random.next_f64()));
-                    let Scatter::Density(pdf) = sample.scatter else { panic!() };
-                    assert!((f64::from(pdf) / light.pdf(sample.towards) - 1.0).abs() < 1e-6);
-                    assert_eq!(light.radiance(sample.towards), sample.radiance);
-                    sum += f64::from(sample.radiance.r / pdf) * sample.towards.dot(normal).max(0.0);
+                    let (towards, pdf) = light.sample(DVec2::new(random.next_f64(), random.next_f64()));
+                    assert_eq!(pdf, light.pdf(towards));
+                    sum += f64::from(light.radiance(towards).r) / pdf * towards.dot(normal).max(0.0);
                 }
                 let (found, expected) = (sum / f64::from(count), f64::from(light.irradiance(normal).r));
                 // Of a wide disc, the horizon is not straight.
@@ -143,8 +136,8 @@ mod tests {
             let normal = (light.towards() * height + across * (1.0_f64 - height * height).sqrt()).normalize();
             let (mut sum, count) = (0.0, 40_000);
             for _ in 0..count {
-                let sample = light.sample(DVec2::new(random.next_f64(), random.next_f64()));
-                sum += sample.towards.dot(normal).max(0.0) / f64::from(count);
+                let (towards, _) = light.sample(DVec2::new(random.next_f64(), random.next_f64()));
+                sum += towards.dot(normal).max(0.0) / f64::from(count);
             }
             let expected = f64::from(light.irradiance(normal).g) / 2.0;
             assert!((sum - expected).abs() < 2e-4, "{height}: {sum} {expected}");

@@ -17,11 +17,7 @@ use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Elementary};
 
 pub use sun::Sunlight;
-
-/// The unit of luminance in cd/m².
-const UNIT: f64 = 100_000.0 / PI;
-/// Luminous efficacy, in lm/W.
-const EFFICACY: f64 = 683.0;
+use sun::{EFFICACY, UNIT};
 
 /// Coefficients of the formula.
 const COEFFICIENTS: usize = 9;

@@ -5,10 +5,13 @@ use std::sync::Arc;
 use lumbre_image::Rgb;
 use lumbre_math::Elementary;
 
-use super::{EFFICACY, UNIT};
 use crate::SpectrumValue;
 use crate::spectrum::{LightCurve, luminance_of};
 
+/// The unit of luminance in cd/m².
+pub(super) const UNIT: f64 = 100_000.0 / std::f64::consts::PI;
+/// Luminous efficacy, in lm/W.
+pub(super) const EFFICACY: f64 = 683.0;
 /// The temperature of the sun in kelvin, of which its disc is a black body: A. Prša and others, "Nominal Values for Selected
 /// Solar and Planetary Quantities: IAU 2015 Resolution B3", 2016.
 const TEMPERATURE: f64 = 5772.0;
@@ -80,7 +83,7 @@ const STEP: u32 = 5;
 /// Smits, "A Practical Analytic Model for Daylight", SIGGRAPH 1999, appendix 1.
 #[derive(Clone, Debug)]
 pub struct Sunlight {
-    /// The irradiance, in the unit of [`super::Sky`] times steradians: π is 100,000 lux.
+    /// The irradiance, in the unit of [`crate::sky`] times steradians: π is 100,000 lux.
     pub irradiance: Rgb,
     /// Its spectrum with luminance 1.
     pub spectrum: Arc<LightCurve>,
