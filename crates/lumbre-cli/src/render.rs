@@ -652,7 +652,7 @@ fn picture(
     let mut options = options(arguments, &scene)?;
     options.film = film;
     options.transparent = behind.is_transparent();
-    options.spectral &= matches!(kind, IntegratorKind::Path { .. });
+    options.spectral &= kind.carries_wavelengths();
     options.spectral |= arguments.spectral;
     let samples_are_asked = arguments.spp.is_some()
         || arguments.time.is_some()

@@ -64,7 +64,7 @@ pub(crate) fn shown(mut desc: SceneDesc, wish: &SceneRequest<'_>) -> Result<Prep
     options.integrator.kind = kind;
     // What is looked at has no channels besides its colours.
     options.film = FilmKind::Rgb;
-    options.spectral &= matches!(kind, IntegratorKind::Path { .. });
+    options.spectral &= kind.carries_wavelengths();
     if let Some((width, height)) = size {
         options.resize(scene.resolved().film(), width, height);
     }

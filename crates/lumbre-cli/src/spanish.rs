@@ -100,8 +100,8 @@ const ARGUMENTS: &[(&str, &str, &str)] = &[
     ),
     (
         "env",
-        "Luz de todas partes: una imagen el doble de ancha que alta, o cuadrada con áreas iguales (.hdr, .exr, …); studio; o none, solo la del archivo. Por defecto studio si no hay luz, y para un glTF sin cámara",
-        "ARCHIVO|studio|none",
+        "Luz de todas partes: una imagen el doble de ancha que alta, o cuadrada con áreas iguales (.hdr, .exr, …); studio; sky:HORA,LATITUD,LONGITUD, el sol y un cielo despejado allí y entonces (sky:2026-06-21T12:00+02:00,40.4,-3.7), con el norte detrás del modelo; o none, solo la del archivo. Por defecto studio si no hay luz, y para un glTF sin cámara",
+        "ARCHIVO|studio|sky:HORA,LATITUD,LONGITUD|none",
     ),
     (
         "background",

@@ -1,10 +1,12 @@
 //! Staging options: ground, light, background, and turntable.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
-use lumbre::description::GroundPlane;
+use clap::builder::{OsStringValueParser, TypedValueParser};
+use lumbre::description::{ClearSky, GroundPlane, SkyDesc, SunPositionError};
 use lumbre::formats::Limits;
 use lumbre::formats::diagnostic::nearest_name;
 use lumbre::formats::image::ImageFormat;
@@ -24,10 +26,12 @@ pub(crate) struct StagingArguments {
     /// shadow where both camera and light are automatic.
     #[arg(long, value_name = "WHAT", value_parser = one_of(&Ground::NAMES, Ground::from_name))]
     ground: Option<Ground>,
-    /// Light from all around: a picture (.hdr, .exr, …), studio, or none. A picture is twice as wide as high, or square in pbrt's equal-area
-    /// mapping; with none the file's own lights are all. By default studio for what brings no light, and for a glTF without a camera.
-    #[arg(long, value_name = "FILE|studio|none")]
-    env: Option<PathBuf>,
+    /// Light from all around: a picture (.hdr, .exr, …), studio, sky:TIME,LATITUDE,LONGITUDE or none. A picture is twice as wide as high, or
+    /// square in pbrt's equal-area mapping; a sky is the sun and a clear sky there and then (sky:2026-06-21T12:00+02:00,40.4,-3.7), with
+    /// north behind the model; with none the file's own lights are all. By default studio for what brings no light, and for a glTF without
+    /// a camera.
+    #[arg(long, value_name = "FILE|studio|sky:TIME,LATITUDE,LONGITUDE|none", value_parser = OsStringValueParser::new().try_map(|text| around(&text)))]
+    env: Option<AroundArgument>,
     /// What is behind everything: env (the light from there), studio (grey paper), transparent, a colour (white, "#e8e0d8") or
     /// an image file. By default studio where the light is automatic, else env.
     #[arg(long, value_name = "WHAT", value_parser = background)]
@@ -39,6 +43,29 @@ pub(crate) struct StagingArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000),
           conflicts_with = "camera", help_heading = "View")]
     turntable: Option<u32>,
+}
+
+/// The values of `--env`.
+#[derive(Clone, Debug, PartialEq)]
+enum AroundArgument {
+    None,
+    Studio,
+    Sky(Box<ClearSky>),
+    File(PathBuf),
+}
+
+fn around(text: &OsStr) -> Result<AroundArgument, String> {
+    match text.to_str() {
+        Some("none") => return Ok(AroundArgument::None),
+        Some("studio") => return Ok(AroundArgument::Studio),
+        _ => {}
+    }
+    let Some(at) = text.to_str().and_then(|text| text.strip_prefix("sky:")) else {
+        return Ok(AroundArgument::File(text.into()));
+    };
+    let sun = at.parse().map_err(|error: SunPositionError| error.to_string())?;
+    let sky = ClearSky::new(SkyDesc { sun, ..SkyDesc::default() }).map_err(|error| error.to_string())?;
+    Ok(AroundArgument::Sky(Box::new(sky)))
 }
 
 /// The values of `--background`.
@@ -134,9 +161,10 @@ impl StagingArguments {
     pub(crate) fn stage(&self, size: Option<(u32, u32)>, limits: Limits) -> Result<Stage, Failure> {
         let surroundings = match &self.env {
             None => Surroundings::Automatic,
-            Some(path) if path.as_os_str() == "none" => Surroundings::Own,
-            Some(path) if path.as_os_str() == "studio" => Surroundings::Studio,
-            Some(path) => Surroundings::Map(environment(path, limits)?),
+            Some(AroundArgument::None) => Surroundings::Own,
+            Some(AroundArgument::Studio) => Surroundings::Studio,
+            Some(AroundArgument::Sky(sky)) => Surroundings::Sky(sky.clone()),
+            Some(AroundArgument::File(path)) => Surroundings::Map(environment(path, limits)?),
         };
         let ground = self.ground.unwrap_or_default();
         let mut stage = Stage::default();
@@ -185,12 +213,16 @@ impl StagingArguments {
 
     /// The same in the light of a picture from all around.
     pub(crate) fn in_light_of(&self, picture: &Path) -> Self {
-        Self { env: Some(picture.to_owned()), ..self.clone() }
+        Self { env: Some(AroundArgument::File(picture.to_owned())), ..self.clone() }
     }
 
     /// The files that the stage is made of.
     pub(crate) fn inputs(&self) -> impl Iterator<Item = &Path> {
-        self.env.as_deref().into_iter().chain(self.background_file())
+        let map = match &self.env {
+            Some(AroundArgument::File(path)) => Some(path.as_path()),
+            _ => None,
+        };
+        map.into_iter().chain(self.background_file())
     }
 }
 
@@ -241,6 +273,25 @@ mod tests {
         assert_eq!(background("sky.png"), Ok(BackgroundArgument::File("sky.png".into())));
         for text in ["", "#", "#ff", "#12345", "#+12345", "#ggg", "wite"] {
             assert!(background(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_around_is_understood() {
+        let around = |text: &str| around(OsStr::new(text));
+        assert_eq!(around("none"), Ok(AroundArgument::None));
+        assert_eq!(around("studio"), Ok(AroundArgument::Studio));
+        assert_eq!(around("sky.hdr"), Ok(AroundArgument::File("sky.hdr".into())));
+        let sun = "2026-06-21T12:00+02:00,40.4,-3.7".parse().unwrap();
+        let sky = ClearSky::new(SkyDesc { sun, ..SkyDesc::default() }).unwrap();
+        assert_eq!(around("sky:2026-06-21T12:00+02:00,40.4,-3.7"), Ok(AroundArgument::Sky(Box::new(sky))));
+        for (text, said) in [
+            ("sky:", "expected a date"),
+            ("sky:2026-06-21T12:00,40.4,-3.7", "its zone"),
+            ("sky:2026-06-21T12:00Z,140.4,-3.7", "latitude"),
+            ("sky:2026-06-21T00:00+02:00,40.4,-3.7", "below the horizon"),
+        ] {
+            assert!(around(text).unwrap_err().contains(said), "{text}");
         }
     }
 

@@ -825,6 +825,33 @@ fn photometric_units_replace_the_normalisation() {
 }
 
 #[test]
+fn a_sky_is_a_sun_and_what_is_around() {
+    let scene = world(
+        r#"LightSource "sky" "float azimuth" 90 "float elevation" 30 "float scale" 2
+           Rotate -90 1 0 0
+           LightSource "sky" "string at" "2026-06-21T12:00Z,90,0" "float skyscale" 0 "float sunangle" 2
+           LightSource "sky" "float sunscale" 0 "float turbidity" 5 "float albedo" 0
+           LightSource "distant" "point3 from" [0 0 5] "point3 to" [0 0 0] "float angle" 3"#,
+    );
+    let disc = |light: &LightDesc| match *light.bare() {
+        LightDesc::Disc { towards, angle, irradiance } => (towards, angle, irradiance),
+        _ => panic!(),
+    };
+    let sky = |light: &LightDesc| matches!(light, LightDesc::Infinite { image: Some(_), .. });
+    assert_eq!(scene.lights.len(), 5);
+    let (towards, angle, twice) = disc(&scene.lights[0]);
+    assert!(towards.distance(DVec3::new(0.75_f64.sqrt(), 0.0, 0.5)) < 1e-9 && angle == 0.533);
+    assert!(sky(&scene.lights[1]) && sky(&scene.lights[3]));
+    // At the pole, in y: the elevation is the declination, 23.44 degrees.
+    let (towards, angle, once) = disc(&scene.lights[2]);
+    assert!((towards.y - 23.44_f64.to_radians().sin()).abs() < 1e-3 && angle == 2.0, "{towards}");
+    assert!(twice.luminance() > 2.0 * once.luminance());
+    let (towards, angle, irradiance) = disc(&scene.lights[4]);
+    assert_eq!((towards, angle), (DVec3::Y, 3.0));
+    near_rgb(irradiance, [1.0; 3]);
+}
+
+#[test]
 fn a_spot_opens_along_z_of_its_space() {
     let scene = world(
         r#"Translate 10 0 0 LightSource "spot" "point3 from" [1 2 3] "point3 to" [4 2 3] "rgb I" [2 2 2]

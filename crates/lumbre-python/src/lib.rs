@@ -29,7 +29,7 @@ mod _lumbre {
     #[pymodule_export]
     use crate::meshes::PlacedMesh;
     #[pymodule_export]
-    use crate::picture::{Part, Picture, read_image, write_image};
+    use crate::picture::{Part, Picture, clear_sky, read_image, write_image};
     #[pymodule_export]
     use crate::program::main;
     #[pymodule_export]

@@ -4,9 +4,12 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
+use lumbre::description::{ClearSky, SkyDesc, SunPosition};
 use lumbre::formats::image::{ExrPrecision, ImageFormat, PngDepth};
 use lumbre::image::{Image, Layer, Rgb, ToneMap};
-use lumbre::{Background, Feature, FilmLayers, Part as PartDesc, PixelBounds, RenderOptions, SaveOptions};
+use lumbre::{
+    Background, DVec3, Feature, FilmLayers, Part as PartDesc, PixelBounds, RenderOptions, SaveOptions,
+};
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
 };
@@ -204,6 +207,17 @@ impl Picture {
         let feature = features(&[name.to_owned()])?[0];
         let Some(image) = self.picture.feature(feature) else { return Ok(None) };
         Ok(Some((array(py, image)?, feature.channels().len())))
+    }
+
+    /// The channels of the film besides colours, by name, (h, w) each.
+    fn film<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let image = self.picture.image();
+        let shape = [image.height() as usize, image.width() as usize];
+        let channels = PyDict::new(py);
+        for layer in &self.picture.film().layers {
+            channels.set_item(&layer.name, PyArray1::from_slice(py, &layer.samples).reshape(shape)?)?;
+        }
+        Ok(channels)
     }
 
     /// All that it is made of, by name, for pickles: arrays, numbers and texts.
@@ -416,6 +430,23 @@ impl Part {
 ///
 /// # Errors
 /// What is wrong with the file.
+/// A clear sky by longitude and latitude, (h, 2h, 3), without its sun at this azimuth and elevation; and the luminance of its
+/// zenith.
+#[pyfunction]
+pub(crate) fn clear_sky(
+    py: Python<'_>,
+    azimuth: f64,
+    elevation: f64,
+    turbidity: f64,
+    albedo: f64,
+) -> PyResult<(Py<PyArray3<f32>>, f32)> {
+    let sun = SunPosition { azimuth, elevation };
+    let desc = SkyDesc { sun, turbidity, albedo, sun_scale: 0.0, ..SkyDesc::default() };
+    let sky = ClearSky::new(desc).map_err(invalid)?;
+    let zenith = sky.radiance(DVec3::Z).luminance();
+    Ok((array(py, &py.detach(|| sky.map()))?, zenith))
+}
+
 #[pyfunction]
 pub(crate) fn read_image(py: Python<'_>, path: PathBuf) -> PyResult<Pixels> {
     let image = py.detach(|| lumbre::read_image(&path)).map_err(raised)?;

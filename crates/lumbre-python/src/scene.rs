@@ -6,7 +6,7 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
-use lumbre::description::{FilmKind, IntegratorKind, LightDesc};
+use lumbre::description::{ClearSky, FilmKind, IntegratorKind, LightDesc, SkyDesc, SunPositionError};
 use lumbre::formats::{Diagnostics, Strictness};
 use lumbre::{
     Background, CancelToken, DVec3, Ground, Job, Part as PartDesc, PixelBounds, Progress, Ray, ReadOptions,
@@ -572,7 +572,7 @@ impl Scene {
         if options.integrator.kind.is_feature() {
             options.film = FilmKind::Rgb;
         }
-        options.spectral &= matches!(options.integrator.kind, IntegratorKind::Path { .. });
+        options.spectral &= options.integrator.kind.carries_wavelengths();
         if let Some((width, height)) = size {
             options.resize(shown.scene.resolved().film(), width, height);
         }
@@ -698,16 +698,22 @@ fn around(env: &Bound<'_, PyAny>) -> PyResult<Around> {
         let light = &light.get().0;
         return match **light {
             LightDesc::Infinite { .. } => Ok(Around::Light(Arc::clone(light))),
-            _ => Err(invalid("env is no light from all around (expected an EnvironmentLight)")),
+            _ => Err(invalid("env is no light from all around (expected an EnvironmentLight or a SkyLight)")),
         };
     }
     if let Ok(map) = env.cast::<Environment>() {
         return Ok(Around::Map(map.get().0.clone()));
     }
-    match &*env.extract::<String>()? {
+    let name = env.extract::<String>()?;
+    if let Some(at) = name.strip_prefix("sky:") {
+        let sun = at.parse().map_err(|error: SunPositionError| invalid(format!("env says {error}")))?;
+        let sky = ClearSky::new(SkyDesc { sun, ..SkyDesc::default() }).map_err(invalid)?;
+        return Ok(Around::Sky(Box::new(sky)));
+    }
+    match &*name {
         "studio" => Ok(Around::Studio),
         "none" => Ok(Around::Own),
-        other => Err(unknown("env", other, &["studio", "none"])),
+        other => Err(unknown("env", other, &["studio", "none", "sky:TIME,LATITUDE,LONGITUDE"])),
     }
 }
 

@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
-use lumbre::description::{Camera as CameraDesc, CameraKind, CameraView, CsgOperation, LightDesc, MeshDesc};
+use lumbre::description::{
+    Camera as CameraDesc, CameraKind, CameraView, ClearSky, CsgOperation, LightDesc, MeshDesc, SkyDesc,
+    SunPosition,
+};
 use lumbre::geometry::{
     BilinearPatch, Capsule, Cone, Csg, Cuboid, CurveKind, Curves, Cylinder, Disk, Hyperboloid, Paraboloid,
     Plane, Quadric, Shape, ShapeError, Sphere, Strand, Torus, Triangle,
@@ -374,6 +377,33 @@ impl Light {
         let towards =
             towards.ok_or_else(|| invalid("towards is no direction (expected a vector of some length)"))?;
         Ok(Self::of(LightDesc::Distant { towards, irradiance: colour("irradiance", irradiance)? }))
+    }
+
+    /// A disc at infinity of this diameter in degrees.
+    #[staticmethod]
+    fn disc(towards: Triple, angle: f64, irradiance: [f32; 3]) -> PyResult<Self> {
+        let towards = DVec3::from(towards);
+        if !(0.0 < angle && angle <= 180.0) {
+            return Err(invalid(format!(
+                "angle is out of range (found {angle}; expected degrees, from 0 to 180)"
+            )));
+        }
+        Ok(Self::of(LightDesc::Disc { towards, angle, irradiance: colour("irradiance", irradiance)? }))
+    }
+
+    /// The sun at this azimuth and elevation in degrees, as bright as the air of this turbidity leaves it.
+    #[staticmethod]
+    fn sun(azimuth: f64, elevation: f64, turbidity: f64, angle: f64) -> PyResult<Self> {
+        let desc = SkyDesc {
+            sun: SunPosition { azimuth, elevation },
+            turbidity,
+            sun_angle: angle,
+            sky_scale: 0.0,
+            ..SkyDesc::default()
+        };
+        let lights = ClearSky::new(desc).map_err(invalid)?.lights(&Transform::IDENTITY);
+        let dark = LightDesc::Distant { towards: DVec3::Z, irradiance: Rgb::BLACK };
+        Ok(Self::of(lights.into_iter().next().unwrap_or(dark)))
     }
 
     /// Light from all around: `image` is (h, 2h, 3), by longitude and latitude, with this axis up.

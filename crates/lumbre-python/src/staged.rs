@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use lumbre::description::{GroundPlane, IntegratorKind, LightDesc};
+use lumbre::description::{ClearSky, GroundPlane, IntegratorKind, LightDesc};
 use lumbre::{DVec3, EnvironmentDesc, Ground, SceneDesc, Setting, Stage, Surroundings, Viewpoint};
 use lumbre_cli::Defaults;
 
@@ -36,6 +36,8 @@ pub(crate) enum Around {
     Map(EnvironmentDesc),
     /// A light as it stands.
     Light(Arc<LightDesc>),
+    /// The sun and a clear sky.
+    Sky(Box<ClearSky>),
 }
 
 impl Around {
@@ -44,6 +46,7 @@ impl Around {
         match (self, other) {
             (Self::Map(a), Self::Map(b)) => Arc::ptr_eq(&a.image, &b.image),
             (Self::Light(a), Self::Light(b)) => Arc::ptr_eq(a, b),
+            (Self::Sky(a), Self::Sky(b)) => a == b,
             _ => std::mem::discriminant(self) == std::mem::discriminant(other),
         }
     }
@@ -137,6 +140,7 @@ impl Stages {
             Around::Studio => Surroundings::Studio,
             Around::Map(map) => Surroundings::Map(map.clone()),
             Around::Light(light) => Surroundings::Light(Box::new(LightDesc::clone(light))),
+            Around::Sky(sky) => Surroundings::Sky(sky.clone()),
         };
         let defaults = Defaults::on(&stage, &mut desc, wish.integrator);
         if defaults.is_bare() && !wish.view.changes_lens() {
@@ -216,6 +220,7 @@ impl SceneRequest {
             Around::Own => add("env", "none".to_owned()),
             Around::Studio => add("env", "studio".to_owned()),
             Around::Map(map) => add("env", format!("map {}", hash(&map.image))),
+            Around::Sky(sky) => add("env", format!("sky {:?}", sky.desc())),
             Around::Light(light) => match light.bare() {
                 LightDesc::Infinite { world_from_light, radiance, image } => {
                     let image = image.as_ref().map_or_else(String::new, |map| hash(&map.image));

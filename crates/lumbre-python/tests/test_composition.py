@@ -280,6 +280,7 @@ def test_a_saved_scene_is_the_same_scene(camera: lumbre.Camera, tmp_path) -> Non
         lumbre.PointLight((3, -5, 8), (20, 30, 40)),
         lumbre.SpotLight((-4, -6, 9), target=(0, 0, 1), intensity=90),
         lumbre.SunLight(azimuth=120, elevation=35, irradiance=1.5),
+        lumbre.SunLight(azimuth=20, elevation=25, turbidity=5),
         lumbre.EnvironmentLight((0.2, 0.3, 0.4)),
         lumbre.SkyLight(azimuth=120, elevation=35, radiance=0.25),
     ]

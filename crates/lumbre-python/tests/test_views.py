@@ -226,8 +226,19 @@ def test_pictures_are_pickled_with_all_that_they_show(tmp_path) -> None:
 def test_sun_and_sky_stand_where_they_are_said_to() -> None:
     floor = lumbre.Plane(material=1.0)
     camera = lumbre.Perspective((0, 0, 9), target=(0, 0, 0), up=(0, 1, 0), fov=1)
-    noon = lumbre.Scene(floor, camera=camera, lights=lumbre.SunLight(azimuth=200, elevation=30, irradiance=3.0))
+    noon = lumbre.Scene(floor, camera=camera, lights=lumbre.SunLight(azimuth=200, elevation=30, irradiance=3.0, angle=0))
     np.testing.assert_allclose(noon.render(spp=1, size=(3, 3)).array, 1.5 / np.pi, rtol=1e-4)
+    # A disc, whose points are a little higher and lower.
+    disc = lumbre.Scene(floor, camera=camera, lights=lumbre.SunLight(azimuth=200, elevation=30, irradiance=3.0))
+    np.testing.assert_allclose(disc.render(spp=64, size=(3, 3)).array, 1.5 / np.pi, rtol=2e-3)
+    # What the air leaves of the sun: 50,000 to 80,000 lux on what faces it, redder than white.
+    model = lumbre.Scene(floor, camera=camera, lights=lumbre.SunLight(elevation=30)).render(spp=64, size=(3, 3)).array.mean(axis=(0, 1))
+    assert 0.25 < model[1] < 0.4 and model[0] > 1.1 * model[2]
+    for wrong in (lumbre.SunLight, lumbre.SkyLight):
+        with pytest.raises(lumbre.LumbreError, match="turbidity"):
+            wrong(turbidity=0.5)
+    with pytest.raises(lumbre.LumbreError, match="below the horizon"):
+        lumbre.SkyLight(elevation=-1)
     night = lumbre.Scene(floor, camera=camera, lights=[lumbre.SunLight(elevation=-5)])
     assert night.render(spp=1, size=(3, 3)).array.max() == 0
     for azimuth in (0, 90, 180, 270):

@@ -33,11 +33,13 @@ pub enum RenderError {
     #[error("the pixel filter needs a positive radius, and more than zero inside it")]
     Filter,
     /// The integrator follows colours only.
-    #[error("this integrator does not carry wavelengths: a spectral render needs the path integrator")]
+    #[error(
+        "this integrator does not carry wavelengths: a spectral render needs the integrator path or caustics"
+    )]
     NoWavelengths,
     /// The film keeps wavelengths, and the paths carry none.
     #[error(
-        "film \"spectral\" keeps wavelengths, which these paths do not carry: it needs a spectral render by the path integrator"
+        "film \"spectral\" keeps wavelengths, which these paths do not carry: it needs a spectral render by the integrator path or caustics"
     )]
     NoBuckets,
     /// Nobody wants the picture any longer: [`crate::Progress::is_wanted`].

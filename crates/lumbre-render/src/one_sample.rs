@@ -6,13 +6,13 @@ use lumbre_geometry::Ray;
 use lumbre_math::DVec2;
 use lumbre_scene::{CameraRay, FilmKind, Footprint, Interaction, Pinhole, Scene, View};
 use lumbre_shading::Spectrum;
-use lumbre_shading::spectrum::{SensorCurves, WavelengthDensity, Wavelengths};
+use lumbre_shading::spectrum::{SensorCurves, Wavelengths};
 
 use crate::film::{FeatureSample, Filter, Sample, SpectralSample, SurfacePoint, SurfaceSample};
 use crate::integrators::{Integrator, integrator};
 use crate::transport::{Event, Features, PrimaryHit, Record, SampleNumbers, Sampler, Seen, caught};
 use crate::wave::catcher::{Catcher, Places};
-use crate::wave::{Precision, PrimaryHits, SampleId, Wave, cone};
+use crate::wave::{Precision, PrimaryHits, SampleId, Wave, WavelengthChoice, cone};
 use crate::{RenderError, RenderOptions};
 
 /// Between the rays that textures are looked up for, in pixels: samples average what is finer. The same for any number of samples, so
@@ -40,7 +40,7 @@ pub(crate) struct PixelSampler<'a> {
     catcher: Option<Catcher<'a>>,
     precision: Precision,
     /// The wavelengths that samples carry, if they do.
-    wavelengths: Option<WavelengthDensity>,
+    wavelengths: Option<WavelengthChoice>,
     film: FilmKind,
     /// The camera that records them, if it is not the eye.
     sensor_curves: Option<Arc<SensorCurves>>,
@@ -99,7 +99,9 @@ impl<'a> PixelSampler<'a> {
             is_centred: options.integrator.kind == lumbre_scene::IntegratorKind::Pov && options.stop.spp == 1,
             lights_are_seen: !options.transparent,
             catcher: Catcher::of(scene),
-            wavelengths: options.wavelengths(),
+            wavelengths: options
+                .wavelengths()
+                .map(|density| WavelengthChoice { density, is_shared: integrator.shares_wavelengths(scene) }),
             film: options.film,
             sensor_curves: options.sensor_curves.clone(),
         })

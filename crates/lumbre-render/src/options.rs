@@ -145,7 +145,7 @@ impl RenderOptions {
             filter: scene.filter(),
             film: film.kind,
             exposure: exposure_of(film),
-            spectral: film.spectral && matches!(scene.integrator().kind, IntegratorKind::Path { .. }),
+            spectral: film.spectral && scene.integrator().kind.carries_wavelengths(),
             sensor_curves: film.camera.clone(),
             stop: Stop::at(scene.sampler().spp.unwrap_or(DEFAULT_SPP)),
             ..Self::default()

@@ -13,8 +13,10 @@ use lumbre_scene::{
     SceneDesc,
 };
 use lumbre_shading::medium::{HomogeneousMedium, Medium};
+use lumbre_shading::spectrum::Wavelengths;
 use lumbre_shading::{
-    FloatTexture, Material, MaterialKind, PrincipledParams, Roughness, SpectrumTexture, VolumeParams,
+    FloatTexture, Material, MaterialKind, PrincipledParams, Roughness, SpectrumTexture, SpectrumValue,
+    VolumeParams,
 };
 
 /// Of the floor: so dark that what it lights lights it back by less than a thousandth.
@@ -225,6 +227,122 @@ fn photons_depend_on_no_thread_and_no_interruption() {
     assert_eq!(whole, of(3, None));
     let crop = lumbre_render::PixelBounds { x0: 10, y0: 5, x1: 30, y1: 20 };
     let part = of(2, Some(crop));
+    for (y, x) in (5..20).flat_map(|y| (10..30).map(move |x| (y, x))) {
+        assert_eq!(part.pixel(x - 10, y - 5), whole.pixel(x, y), "({x}, {y})");
+    }
+}
+
+/// The mean of a picture of 32 by 32 pixels, by wavelengths.
+fn by_wavelengths(mut desc: SceneDesc, kind: IntegratorKind, spp: u32) -> [f64; 3] {
+    desc.integrator.kind = kind;
+    let scene = Scene::build(desc).unwrap();
+    mean(&picture(&scene, &changed(options(&scene, 32, 32, spp), |it| it.spectral = true)).image)
+}
+
+fn assert_same_colour(found: [f64; 3], expected: [f64; 3], share: f64, what: &str) {
+    for c in 0..3 {
+        assert_close(found[c], expected[c], share, what);
+    }
+}
+
+/// Glass whose index falls from 1.7 to 1.5.
+fn dispersive() -> Material {
+    let mut material = glass(1.6);
+    material.dispersion = Some(Arc::new(SpectrumValue::Sampled(vec![(360.0, 1.7), (830.0, 1.5)])));
+    material
+}
+
+/// A floor, a wall and a ball of these colours under a lamp, without anything specular.
+fn coloured() -> SceneDesc {
+    let mut desc = floor(vec![lamp(DVec3::new(0.3, 0.1, 3.0))]);
+    let of = |colour| {
+        Material::new(MaterialKind::Diffuse { reflectance: Arc::new(SpectrumTexture::Constant(colour)) })
+    };
+    desc.materials[0].material = Arc::new(of(Rgb::new(0.7, 0.3, 0.2)));
+    let desc = with(desc, of(Rgb::new(0.2, 0.4, 0.7)), Sphere::new(DVec3::new(0.1, 0.4, 0.2), 0.2).unwrap());
+    with(desc, of(Rgb::splat(0.5)), Disk::new(DVec3::new(-0.6, 0.0, 0.0), DVec3::X, 0.8, 0.0).unwrap())
+}
+
+#[test]
+fn without_anything_specular_wavelengths_are_those_of_paths() {
+    let desc = coloured();
+    let of = |kind| by_wavelengths(desc.clone(), kind, 4);
+    assert_eq!(of(IntegratorKind::Caustics), of(IntegratorKind::Path { regularize: false }));
+}
+
+#[test]
+fn wavelengths_shared_by_all_pixels_have_the_mean_of_those_of_each() {
+    // A small mirror has the photons look for light, of which there is hardly any.
+    let small = Disk::new(DVec3::new(9.0, 9.0, 0.1), DVec3::Z, 0.01, 0.0).unwrap();
+    let desc = with(coloured(), mirror(0.9), small);
+    let of = |kind| by_wavelengths(desc.clone(), kind, 512);
+    let [photons, paths] = [of(IntegratorKind::Caustics), of(IntegratorKind::Path { regularize: false })];
+    assert_same_colour(photons, paths, 0.003, "shared wavelengths");
+}
+
+#[test]
+fn photons_of_wavelengths_find_what_paths_find_through_glass_that_disperses() {
+    let mut desc = lit_by_a_large_lamp();
+    // The ball; the floor gets a colour.
+    let ball = desc.shapes[2].material.unwrap();
+    desc.materials[ball.0 as usize].material = Arc::new(dispersive());
+    desc.materials[0].material = Arc::new(Material::new(MaterialKind::Diffuse {
+        reflectance: Arc::new(SpectrumTexture::Constant(Rgb::new(0.7, 0.5, 0.3))),
+    }));
+    let photons = by_wavelengths(desc.clone(), IntegratorKind::Caustics, 1024);
+    let paths = by_wavelengths(desc, IntegratorKind::Path { regularize: false }, 4096);
+    assert_same_colour(photons, paths, 0.008, "dispersion");
+}
+
+#[test]
+fn a_lamp_in_the_middle_of_a_ball_that_disperses_shines_as_it_does_without() {
+    let at = DVec3::new(0.3, 0.1, 3.0);
+    let desc = floor(vec![lamp(at)]);
+    let ball = with(desc.clone(), dispersive(), Sphere::new(at, 0.5).unwrap());
+    let bare = by_wavelengths(desc, IntegratorKind::Path { regularize: false }, 64);
+    assert_same_colour(by_wavelengths(ball, IntegratorKind::Caustics, 256), bare, 0.01, "a lamp in a ball");
+}
+
+#[test]
+fn a_caustic_seen_through_the_glass_that_made_it_counts_its_wavelength_once() {
+    // A lamp in a ball that disperses, seen from the middle of a second such ball: the photons and the camera's paths are
+    // both of the hero wavelength alone. Light crosses both balls straight, so that the floor is lit as without.
+    let at = DVec3::new(0.3, 0.1, 3.0);
+    let desc = floor(vec![lamp(at)]);
+    let [_, bare, _] = by_wavelengths(desc.clone(), IntegratorKind::Path { regularize: false }, 64);
+    let desc = with(desc, dispersive(), Sphere::new(at, 0.5).unwrap());
+    let desc = with(desc, dispersive(), Sphere::new(DVec3::new(0.1, 0.2, 0.9), 0.05).unwrap());
+    let found = by_wavelengths(desc, IntegratorKind::Caustics, 512);
+    // Radiance is n² times that outside. What the eye's ball reflects inside comes back through the eye: of that, only every
+    // second reflection sees the floor. So (1 - R) / (1 - R²) is let through.
+    let seen = |index: f32| index * index / (1.0 + ((index - 1.0) / (index + 1.0)).powi(2));
+    const COUNT: u32 = 1000;
+    let mut expected = [0.0; 3];
+    for i in 0..COUNT {
+        let wavelengths = Wavelengths::visible((i as f32 + 0.5) / COUNT as f32);
+        let [r, g, b] = wavelengths.nm().map(|nm| seen(1.7 - 0.2 * (nm - 360.0) / 470.0));
+        let light = wavelengths.rec709(wavelengths.light(Rgb::WHITE) * Rgb::new(r, g, b)).to_array();
+        (0..3).for_each(|c| expected[c] += bare * f64::from(light[c]) / f64::from(COUNT));
+    }
+    assert_same_colour(found, expected, 0.01, "seen through glass");
+}
+
+#[test]
+fn photons_of_wavelengths_depend_on_no_thread_and_no_part() {
+    let mut desc = lit_by_a_large_lamp();
+    let ball = desc.shapes[2].material.unwrap();
+    desc.materials[ball.0 as usize].material = Arc::new(dispersive());
+    desc.integrator.kind = IntegratorKind::Caustics;
+    let scene = Scene::build(desc).unwrap();
+    let of = |threads, crop| {
+        let options = changed(options(&scene, 40, 30, 20), |it| {
+            (it.threads, it.crop, it.spectral) = (threads, crop, true);
+        });
+        picture(&scene, &options).image
+    };
+    let whole = of(1, None);
+    assert_eq!(whole, of(3, None));
+    let part = of(2, Some(lumbre_render::PixelBounds { x0: 10, y0: 5, x1: 30, y1: 20 }));
     for (y, x) in (5..20).flat_map(|y| (10..30).map(move |x| (y, x))) {
         assert_eq!(part.pixel(x - 10, y - 5), whole.pixel(x, y), "({x}, {y})");
     }

@@ -13,9 +13,9 @@ use crate::light::choice::LightChoice;
 use crate::light::environment::first_not_finite;
 use crate::light::lanes::LaneLights;
 use crate::light::{
-    DistantLight, Environment, GoniometricLight, Light, LightId, MeshLight, MovingLight, PlacedLight,
-    PointLight, PortalLight, ProjectionLight, ShapeLight, SpotLight, UniformLight, portal::PortalError,
-    power,
+    DiscLight, DistantLight, Environment, GoniometricLight, Light, LightId, MeshLight, MovingLight,
+    PlacedLight, PointLight, PortalLight, ProjectionLight, ShapeLight, SpotLight, UniformLight,
+    portal::PortalError, power,
 };
 use crate::light_colour::LightColour;
 use crate::media::{self, Boundaries, Media};
@@ -730,6 +730,12 @@ impl Builder {
                 }
                 Light::Distant(DistantLight { towards, irradiance })
             }
+            LightDesc::Disc { towards, angle, irradiance } => {
+                let light = DiscLight::new(towards, angle, irradiance);
+                Light::Disc(light.ok_or(wrong(
+                    "its direction is zero, its irradiance not finite, or its diameter not between 0 and 180 degrees",
+                ))?)
+            }
             LightDesc::Pov(light) => {
                 if !(light.from.is_finite() && light.point_at.is_finite() && light.colour.is_finite()) {
                     return Err(wrong("its place or its colour is not finite"));
@@ -772,7 +778,7 @@ fn colour_of(desc: &LightDesc) -> LightColour {
     let one = |colour: &Spectrum| LightColour::Constant { colour: *colour, spectrum: None };
     match desc {
         LightDesc::Point { intensity, .. } | LightDesc::Spot { intensity, .. } => one(intensity),
-        LightDesc::Distant { irradiance, .. } => one(irradiance),
+        LightDesc::Distant { irradiance, .. } | LightDesc::Disc { irradiance, .. } => one(irradiance),
         LightDesc::Infinite { radiance, image: None, .. }
         | LightDesc::Portal { radiance, image: None, .. } => one(radiance),
         LightDesc::Infinite { .. }

@@ -350,6 +350,15 @@ pub enum LightDesc {
         /// Irradiance on a perpendicular surface.
         irradiance: Rgb,
     },
+    /// A disc at infinity, such as the sun.
+    Disc {
+        /// Unit vector towards its centre.
+        towards: DVec3,
+        /// Its diameter in degrees: more than 0, and at most 180.
+        angle: f64,
+        /// Irradiance on a perpendicular surface.
+        irradiance: Rgb,
+    },
     /// An environment light.
     Infinite {
         /// The placement: z is up.
@@ -661,6 +670,11 @@ impl IntegratorKind {
             Self::AmbientOcclusion { .. } => false,
             Self::Normals | Self::Depth | Self::Albedo | Self::Uv => true,
         }
+    }
+
+    /// Whether its paths can carry wavelengths in place of linear Rec. 709.
+    pub fn carries_wavelengths(&self) -> bool {
+        matches!(self, Self::Path { .. } | Self::Caustics)
     }
 
     /// The names of all integrators.

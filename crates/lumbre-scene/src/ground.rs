@@ -50,7 +50,7 @@ impl GroundPlane {
                     local.push(light.clone());
                 }
                 // These are constant over time.
-                Light::Distant(_) | Light::Uniform(_) | Light::Environment(_) => {
+                Light::Distant(_) | Light::Disc(_) | Light::Uniform(_) | Light::Environment(_) => {
                     open += light.irradiance(desc.point, 0.0, normal).unwrap_or(Spectrum::BLACK);
                 }
                 Light::Shape(_) | Light::Mesh(_) | Light::Placed(_) => {}

@@ -5,6 +5,7 @@ mod brightness;
 pub(crate) mod choice;
 mod colour;
 mod delta;
+mod disc;
 pub(crate) mod environment;
 pub mod lanes;
 mod mesh;
@@ -24,6 +25,7 @@ pub use area::ShapeLight;
 pub(crate) use area::power;
 pub use choice::Sampling;
 pub use delta::{DistantLight, GoniometricLight, PointLight, SpotLight};
+pub use disc::DiscLight;
 pub use environment::{Environment, UniformLight};
 pub use mesh::MeshLight;
 pub use moving::MovingLight;
@@ -53,6 +55,8 @@ pub enum Light {
     Projection(ProjectionLight),
     /// Parallel light.
     Distant(DistantLight),
+    /// A disc at infinity.
+    Disc(DiscLight),
     /// Uniform radiance from all directions.
     Uniform(UniformLight),
     /// An image over all directions.
@@ -134,6 +138,11 @@ impl Light {
             Self::Goniometric(light) => light.sample(from),
             Self::Projection(light) => light.sample(from),
             Self::Distant(light) => Some(light.sample()),
+            Self::Disc(light) => {
+                let (towards, pdf) = light.sample(u);
+                let radiance = light.radiance(towards);
+                Some(LightSample { towards, end: None, radiance, scatter: Scatter::Density(pdf as f32) })
+            }
             Self::Uniform(light) => Some(light.sample(u)),
             Self::Environment(light) => light.sample(u),
             Self::Portal(light) => light.sample(from, u),
@@ -165,16 +174,20 @@ impl Light {
             Self::Mesh(light) => light.emitters(&entries[light.entry as usize]),
             Self::Placed(light) => light.emitter(entries).into_iter().collect(),
             Self::Moving(light) => light.emitter(entries).into_iter().collect(),
-            Self::Distant(_) | Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) | Self::Pov(_) => {
-                Vec::new()
-            }
+            Self::Distant(_)
+            | Self::Disc(_)
+            | Self::Uniform(_)
+            | Self::Environment(_)
+            | Self::Portal(_)
+            | Self::Pov(_) => Vec::new(),
         }
     }
 
-    /// The direction of parallel light at a time; `None` for other lights.
+    /// The direction of parallel light at a time, and of the centre of a disc; `None` for other lights.
     fn towards(&self, time: f64) -> Option<DVec3> {
         match self {
             Self::Distant(light) => Some(light.towards),
+            Self::Disc(light) => Some(light.towards()),
             Self::Moving(light) => light.towards(time),
             Self::Point(_)
             | Self::Spot(_)
@@ -188,17 +201,23 @@ impl Light {
         }
     }
 
+    /// The sine of the angle between [`Light::towards`] and the edge of a disc; 0 for other lights.
+    fn half_width(&self) -> f64 {
+        if let Self::Disc(light) = self { light.sine() } else { 0.0 }
+    }
+
     /// The density per unit solid angle with which the light samples what `ray` hit. `surface` is the surface in the
     /// space of its tree, for lights that have one. 0 for lights that no ray can hit.
     pub(crate) fn pdf(&self, ray: &Ray, surface: Option<(&Surface, u32)>) -> f64 {
         match (self, surface) {
             (Self::Uniform(_), None) => UniformLight::pdf(),
+            (Self::Disc(light), None) => light.pdf(ray.direction),
             (Self::Environment(light), None) => light.pdf(ray.direction),
             (Self::Portal(light), None) => light.pdf(ray.origin, ray.direction),
             (Self::Shape(light), Some((surface, _))) => light.pdf(ray, surface),
             (Self::Mesh(light), Some((surface, triangle))) => light.pdf(ray, surface, triangle),
             (Self::Placed(light), Some(surface)) => light.pdf(ray, surface),
-            (Self::Uniform(_) | Self::Environment(_) | Self::Portal(_), Some(_))
+            (Self::Disc(_) | Self::Uniform(_) | Self::Environment(_) | Self::Portal(_), Some(_))
             | (Self::Shape(_) | Self::Mesh(_) | Self::Placed(_), None)
             | (Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Projection(_), _)
             | (Self::Distant(_) | Self::Moving(_) | Self::Pov(_), _) => 0.0,
@@ -220,13 +239,14 @@ impl Light {
             | Self::Distant(_)
             | Self::Pov(_)
             | Self::Moving(_) => None,
-            Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => None,
+            Self::Disc(_) | Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => None,
         }
     }
 
     /// The radiance that arrives at `from` along the unit `direction` from infinity.
     pub fn escaped(&self, from: DVec3, direction: DVec3) -> Spectrum {
         match self {
+            Self::Disc(light) => light.radiance(direction),
             Self::Uniform(light) => light.radiance,
             Self::Environment(light) => light.radiance(direction),
             Self::Portal(light) => light.radiance(from, direction),
@@ -254,6 +274,7 @@ impl Light {
             Self::Projection(light) => Some(of(light.sample(at))),
             Self::Distant(light) => Some(of(Some(light.sample()))),
             Self::Pov(light) => Some(of(light.sample(at, DVec2::splat(0.5)))),
+            Self::Disc(light) => Some(light.irradiance(normal)),
             Self::Uniform(light) => Some(light.radiance * std::f32::consts::PI),
             Self::Environment(light) => Some(light.irradiance(normal)),
             Self::Portal(light) => Some(light.irradiance(at, normal)),
@@ -265,7 +286,7 @@ impl Light {
     /// Whether rays that leave the scene hit it.
     pub fn is_infinite(&self) -> bool {
         match self {
-            Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => true,
+            Self::Disc(_) | Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => true,
             Self::Point(_)
             | Self::Spot(_)
             | Self::Goniometric(_)
@@ -287,7 +308,7 @@ impl Light {
             | Self::Distant(_)
             | Self::Pov(_)
             | Self::Moving(_) => true,
-            Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => false,
+            Self::Disc(_) | Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => false,
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => false,
         }
     }
@@ -303,7 +324,7 @@ impl Light {
             | Self::Distant(_)
             | Self::Pov(_)
             | Self::Moving(_) => false,
-            Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => false,
+            Self::Disc(_) | Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => false,
         }
     }
 
@@ -318,6 +339,7 @@ impl Light {
             Self::Projection(light) => light.flux(),
             Self::Spot(light) => light.solid_angle() * mean(light.intensity),
             Self::Distant(light) => disk * mean(light.irradiance),
+            Self::Disc(light) => disk * mean(light.facing()),
             Self::Pov(light) => disk * mean(light.irradiance()),
             Self::Uniform(light) => PI * disk * mean(light.radiance),
             Self::Environment(light) => PI * disk * light.mean(),
@@ -336,7 +358,7 @@ impl Light {
             Self::Spot(_) => "spot",
             Self::Goniometric(_) => "goniometric",
             Self::Projection(_) => "projection",
-            Self::Distant(_) => "distant",
+            Self::Distant(_) | Self::Disc(_) => "distant",
             Self::Pov(_) => "pov",
             Self::Uniform(_) | Self::Environment(_) | Self::Portal(_) => "infinite",
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => "diffuse",

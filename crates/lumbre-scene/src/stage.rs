@@ -9,8 +9,8 @@ use lumbre_math::{DAffine3, DMat3, DVec3, Transform};
 use crate::extent::Extent;
 use crate::framing::{self, axes};
 use crate::{
-    EnvironmentDesc, EnvironmentMapping, GeometryDesc, GroundDesc, LightDesc, SceneDesc, ShapeDesc, UpAxis,
-    Viewpoint, WithoutLight, studio,
+    ClearSky, EnvironmentDesc, EnvironmentMapping, GeometryDesc, GroundDesc, LightDesc, SceneDesc, ShapeDesc,
+    UpAxis, Viewpoint, WithoutLight, studio,
 };
 
 /// How a description is staged. Its own parts are kept, unless stated otherwise here.
@@ -53,6 +53,9 @@ pub enum Surroundings {
     Map(EnvironmentDesc),
     /// A light at infinity, unrotated, instead of the description's infinite lights.
     Light(Box<LightDesc>),
+    /// The sun and a clear sky instead of the description's infinite lights. North is behind the model as seen from the
+    /// unrotated automatic camera.
+    Sky(Box<ClearSky>),
 }
 
 /// The ground under a model.
@@ -149,17 +152,22 @@ impl Stage {
 
         let light = match &self.surroundings {
             Surroundings::Map(map) => {
-                desc.lights.retain(|light| !matches!(light.bare(), LightDesc::Infinite { .. }));
+                desc.lights.retain(is_finite);
                 desc.lights.push(around(desc.up, map));
                 StageLight::Map
             }
             Surroundings::Light(light) => {
-                desc.lights.retain(|light| !matches!(light, LightDesc::Infinite { .. }));
+                desc.lights.retain(is_finite);
                 desc.lights.push(LightDesc::clone(light));
                 StageLight::Map
             }
+            Surroundings::Sky(sky) => {
+                desc.lights.retain(is_finite);
+                desc.lights.extend(sky.lights(&world_from_sky(desc.up)));
+                StageLight::Map
+            }
             Surroundings::Studio => {
-                desc.lights.retain(|light| !matches!(light.bare(), LightDesc::Infinite { .. }));
+                desc.lights.retain(is_finite);
                 StageLight::Studio
             }
             Surroundings::Automatic if wants_studio(desc) => StageLight::Studio,
@@ -224,6 +232,17 @@ impl Stage {
         let (width, height) = self.size.or(desc.film.width.zip(desc.film.height)).unwrap_or(SIZE);
         f64::from(width) / f64::from(height.max(1))
     }
+}
+
+/// Whether a light is not one of those that stand for what is around.
+fn is_finite(light: &LightDesc) -> bool {
+    !matches!(light.bare(), LightDesc::Infinite { .. } | LightDesc::Portal { .. } | LightDesc::Disc { .. })
+}
+
+/// The placement of a sky: east is to the right of the automatic camera, and north away from it.
+fn world_from_sky(up: UpAxis) -> Transform {
+    let [right, upward, front] = axes(up, 0.0);
+    Transform::from_affine(DAffine3::from_mat3(DMat3::from_cols(right, -front, upward))).unwrap_or_default()
 }
 
 /// An environment map, with the centre of a latitude-longitude image at the back.

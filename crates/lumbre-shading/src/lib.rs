@@ -25,6 +25,7 @@ pub mod principled;
 mod principled_lanes;
 mod principled_params;
 pub mod sheen;
+pub mod sky;
 pub mod spectrum;
 mod specular;
 mod stretched;

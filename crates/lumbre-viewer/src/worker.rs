@@ -208,7 +208,7 @@ impl Worker {
             Channel::Variance | Channel::Ids => options.integrator.kind,
         };
         options.film = FilmKind::Rgb;
-        options.spectral &= matches!(options.integrator.kind, IntegratorKind::Path { .. });
+        options.spectral &= options.integrator.kind.carries_wavelengths();
         if !matches!(wanted.channel, Channel::Beauty | Channel::Variance) {
             options.transparent = false;
             options.exposure = RenderOptions::default().exposure;

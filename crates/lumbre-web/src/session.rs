@@ -125,7 +125,7 @@ impl Session {
         let scene = Scene::of_file(desc, &name, &mut diagnostics)?;
         let mut options = scene.options();
         options.integrator.kind = kind.unwrap_or(options.integrator.kind);
-        options.spectral &= matches!(options.integrator.kind, IntegratorKind::Path { .. });
+        options.spectral &= options.integrator.kind.carries_wavelengths();
         if let Some((width, height)) = wanted.size {
             options.resize(scene.resolved().film(), width, height);
         }

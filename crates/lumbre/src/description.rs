@@ -6,10 +6,11 @@
 pub use lumbre_scene::light;
 pub use lumbre_scene::{
     AreaLightDesc, Boundary, Buckets, BuildError as DescriptionError, BuildWarning, Camera, CameraKind,
-    CameraRay, ClipPlane, ColouredShape, CsgDesc, CsgOperation, Emission, EnvironmentDesc,
+    CameraRay, ClearSky, ClipPlane, ColouredShape, CsgDesc, CsgOperation, Emission, EnvironmentDesc,
     EnvironmentMapping, FilmDesc, FilmKind, FilmSpace, FilterDesc, Footprint, FurtherUvs, GeometryDesc,
     Ground, GroundDesc, GroundPlane, InstanceDesc, IntegratorDesc, IntegratorKind, Interaction, Light,
     LightDesc, LightId, LightSample, MaterialId, MediumId, MeshDesc, MeshMoment, MeshMotion, NamedMaterial,
     ObjectDesc, ObjectId, Placement, SamplerDesc, SamplerKind, Scene as ResolvedScene, SceneDesc, ShapeDesc,
-    SphericalMapping, Stage, StageLight, Staged, Surroundings, UpAxis, View as CameraView, WithoutLight,
+    SkyDesc, SkyError, SphericalMapping, Stage, StageLight, Staged, SunPosition, SunPositionError,
+    Surroundings, UpAxis, View as CameraView, WithoutLight,
 };

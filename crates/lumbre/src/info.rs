@@ -158,7 +158,7 @@ fn light_name(light: &LightDesc) -> &'static str {
         LightDesc::Spot { .. } => "spot",
         LightDesc::Goniometric { .. } => "goniometric",
         LightDesc::Projection { .. } => "projection",
-        LightDesc::Distant { .. } => "distant",
+        LightDesc::Distant { .. } | LightDesc::Disc { .. } => "distant",
         LightDesc::Infinite { .. } | LightDesc::Portal { .. } => "infinite",
         LightDesc::Pov(_) => "pov",
         LightDesc::Moving { light, .. } | LightDesc::Spectral { light, .. } => light_name(light),

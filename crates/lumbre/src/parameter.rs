@@ -88,7 +88,7 @@ pub fn parameters(desc: &SceneDesc) -> Vec<Parameter> {
             LightDesc::Projection { intensity, .. } => {
                 add("projection", "intensity", ParameterKind::Light, numbers(*intensity));
             }
-            LightDesc::Distant { irradiance, .. } => {
+            LightDesc::Distant { irradiance, .. } | LightDesc::Disc { irradiance, .. } => {
                 add("distant", "irradiance", ParameterKind::Light, numbers(*irradiance));
             }
             LightDesc::Infinite { radiance, .. } | LightDesc::Portal { radiance, .. } => {

@@ -190,6 +190,7 @@ impl Setting {
             LightDesc::Goniometric { .. } => &["intensity", "scale"],
             LightDesc::Projection { .. } => &["intensity", "fov", "scale"],
             LightDesc::Distant { .. } => &["irradiance", "scale"],
+            LightDesc::Disc { .. } => &["irradiance", "angle", "scale"],
             LightDesc::Infinite { .. } | LightDesc::Portal { .. } => &["radiance", "scale"],
             LightDesc::Pov(_) => &["scale"],
             LightDesc::Moving { .. } | LightDesc::Spectral { .. } => &[],
@@ -203,6 +204,7 @@ impl Setting {
                 | LightDesc::Goniometric { intensity: light, .. }
                 | LightDesc::Projection { intensity: light, .. }
                 | LightDesc::Distant { irradiance: light, .. }
+                | LightDesc::Disc { irradiance: light, .. }
                 | LightDesc::Infinite { radiance: light, .. }
                 | LightDesc::Portal { radiance: light, .. } => *light *= factor,
                 LightDesc::Pov(light) => Arc::make_mut(light).colour *= factor,
@@ -219,12 +221,15 @@ impl Setting {
                 | LightDesc::Projection { intensity, .. },
                 "intensity",
             ) => Slot::Light(intensity),
+            (LightDesc::Disc { angle, .. }, "angle") => Slot::Double(angle, ANGLE),
             (LightDesc::Spot { cone_angle, .. }, "coneangle") => Slot::Plain(cone_angle, ANGLE),
             (LightDesc::Projection { fov, .. }, "fov") => Slot::Plain(fov, ANGLE),
             (LightDesc::Spot { cone_delta_angle, .. }, "conedeltaangle") => {
                 Slot::Plain(cone_delta_angle, ANGLE)
             }
-            (LightDesc::Distant { irradiance, .. }, "irradiance") => Slot::Light(irradiance),
+            (LightDesc::Distant { irradiance, .. } | LightDesc::Disc { irradiance, .. }, "irradiance") => {
+                Slot::Light(irradiance)
+            }
             (LightDesc::Infinite { radiance, .. } | LightDesc::Portal { radiance, .. }, "radiance") => {
                 Slot::Light(radiance)
             }

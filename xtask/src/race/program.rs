@@ -74,8 +74,8 @@ impl Kind {
         let is_principled = |material: &Material| matches!(material, Material::Principled { .. });
         match self {
             Self::Lumbre | Self::MitsubaLlvm | Self::MitsubaScalar => true,
-            // Media are written for those alone, and for pbrt-v4.
-            Self::Cycles | Self::Luxcore if scene.volume.is_some() => false,
+            // Media and hair are written for those alone, and for pbrt-v4.
+            Self::Cycles | Self::Luxcore if scene.volume.is_some() || scene.hair.is_some() => false,
             // What glTF describes is written for those alone.
             _ if scene.materials.iter().any(is_principled) => false,
             // pbrt-v4 maps skies to a square, and LuxCore turns them in a way that the race does not know yet.

@@ -77,6 +77,21 @@ def describe():
             "bsdf": {"type": "null"},
             "interior": medium(volume),
         }
+    hair = SCENE["hair"]
+    if hair:
+        scene["hair"] = {
+            "type": "bsplinecurve",
+            "filename": path(hair["strands"]),
+            "bsdf": {
+                "type": "hair",
+                "sigma_a": rgb(hair["sigma_a"]),
+                "longitudinal_roughness": hair["beta"][0],
+                "azimuthal_roughness": hair["beta"][1],
+                "scale_tilt": hair["alpha"],
+                "int_ior": hair["eta"],
+                "ext_ior": 1.0,
+            },
+        }
     for i, m in enumerate(SCENE["materials"]):
         scene[f"material{i}"] = material(m)
     for i, o in enumerate(SCENE["objects"]):

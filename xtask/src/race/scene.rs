@@ -20,6 +20,7 @@ pub(crate) struct Scene {
     pub(crate) objects: Vec<Object>,
     pub(crate) sky: Option<Sky>,
     pub(crate) volume: Option<Volume>,
+    pub(crate) hair: Option<Hair>,
     /// Whether most of what is interesting is light that comes through glass from a small lamp: programs that have an integrator for it use it.
     pub(crate) has_caustics: bool,
 }
@@ -92,6 +93,36 @@ pub(crate) struct Volume {
     pub(crate) albedo: Rgb,
     /// The mean cosine of Henyey's and Greenstein's phase function.
     pub(crate) g: f64,
+}
+
+/// Uniform cubic B-splines with circular cross sections, and the hair of M. Chiang and others, "A Practical and Controllable Hair and Fur
+/// Model for Production Path Tracing", 2016.
+#[derive(Debug)]
+pub(crate) struct Hair {
+    /// The control points of each strand, four or more, as many for all.
+    pub(crate) strands: Vec<Vec<Point>>,
+    /// The radius at the first control point and at the last; linear between them.
+    pub(crate) radii: [f64; 2],
+    /// Absorption per diameter of a hair.
+    pub(crate) sigma_a: Rgb,
+    /// Roughness along and around.
+    pub(crate) beta: [f64; 2],
+    /// The angle of the scales in degrees.
+    pub(crate) alpha: f64,
+    pub(crate) eta: f64,
+}
+
+impl Hair {
+    /// The radius at a place from the first control point to the last, 0 to 1.
+    pub(crate) fn radius(&self, share: f64) -> f64 {
+        self.radii[0] + (self.radii[1] - self.radii[0]) * share
+    }
+
+    /// The widths at both ends of the curve of a strand, which begins at its second control point and ends at the last but one.
+    pub(crate) fn widths(&self) -> [f64; 2] {
+        let steps = (self.strands[0].len() - 1) as f64;
+        [2.0 * self.radius(1.0 / steps), 2.0 * self.radius(1.0 - 1.0 / steps)]
+    }
 }
 
 impl Volume {

@@ -1,6 +1,8 @@
 //! The scenes of the race, each drawn by a few lines.
 
-use super::scene::{Camera, Material, Mesh, Object, Point, Random, Rgb, Scene, Sky, Volume, dot, normalized};
+use super::scene::{
+    Camera, Hair, Material, Mesh, Object, Point, Random, Rgb, Scene, Sky, Volume, dot, normalized,
+};
 
 /// All of them.
 pub(crate) fn all() -> Vec<Scene> {
@@ -16,6 +18,7 @@ pub(crate) fn all() -> Vec<Scene> {
         pool(),
         cloud(),
         smoke(),
+        hair(),
     ]
 }
 
@@ -63,6 +66,7 @@ impl Parts {
             objects: self.objects,
             sky: None,
             volume: None,
+            hair: None,
             has_caustics: false,
         }
     }
@@ -422,4 +426,42 @@ fn smoke() -> Scene {
     let camera = Camera { eye: [0.0, 2.0, 6.5], target: [0.0, 1.6, 0.0], fov: 40.0 };
     let about = "A column of grey smoke between two lamps.";
     Scene { volume: Some(volume), ..parts.scene("smoke", about, 32, camera) }
+}
+
+fn hair() -> Scene {
+    let mut parts = Parts::default();
+    parts.add(floor([-8.0, 8.0], -1.2, [-8.0, 8.0]), diffuse([0.4, 0.38, 0.35]));
+    parts.add(Mesh::ball([0.0, 0.0, 0.0], 0.98, 5), diffuse([0.35, 0.2, 0.15]));
+    let mut random = Random(5);
+    let mut strands = Vec::new();
+    while strands.len() < 16_000 {
+        let towards = [0, 1, 2].map(|_| 2.0 * random.next() - 1.0);
+        // The face is free.
+        if !(0.1..1.0).contains(&dot(towards, towards)) || towards[1] < 0.6 * towards[2] - 0.35 {
+            continue;
+        }
+        let out = normalized(towards);
+        let length = 0.8 + 0.5 * random.next();
+        let wave = [random.next(), random.next(), random.next()].map(|u| std::f64::consts::TAU * u);
+        let (mut at, mut way) = (out.map(|c| 0.97 * c), out);
+        let mut strand = vec![];
+        for step in 0..7 {
+            strand.push(at);
+            let curl = wave.map(|phase| 0.25 * (1.7 * f64::from(step) + phase).sin());
+            way = normalized([0, 1, 2].map(|k| way[k] + curl[k] - if k == 1 { 0.33 } else { 0.0 }));
+            at = [0, 1, 2].map(|k| at[k] + length / 6.0 * way[k]);
+        }
+        strands.push(strand);
+    }
+    let hair = Hair {
+        strands,
+        radii: [0.006, 0.003],
+        sigma_a: [0.25, 0.45, 0.95],
+        beta: [0.3, 0.3],
+        alpha: 2.0,
+        eta: 1.55,
+    };
+    let camera = Camera { eye: [1.4, 0.9, 4.6], target: [0.0, -0.1, 0.0], fov: 36.0 };
+    let about = "A head of 16,000 blond hairs under a sky with a low, soft sun.";
+    Scene { sky: Some(evening()), hair: Some(hair), ..parts.scene("hair", about, 40, camera) }
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use anyhow::Result;
 use serde_json::{Value, json};
 
-use super::scene::{Material, Mesh, Scene, Sky};
+use super::scene::{Hair, Material, Mesh, Scene, Sky};
 
 /// Writes `scene.pbrt`, `scene.json` and what they name into a folder.
 pub(crate) fn write_scene(scene: &Scene, size: u32, folder: &Path) -> Result<()> {
@@ -23,6 +23,9 @@ pub(crate) fn write_scene(scene: &Scene, size: u32, folder: &Path) -> Result<()>
         let bytes: Vec<u8> = volume.density.iter().flat_map(|density| density.to_le_bytes()).collect();
         fs::write(folder.join(DENSITY_NAME), bytes)?;
     }
+    if let Some(hair) = &scene.hair {
+        fs::write(folder.join(HAIR_NAME), strands(hair))?;
+    }
     fs::write(folder.join("scene.pbrt"), pbrt(scene, size))?;
     fs::write(folder.join("scene.json"), serde_json::to_string_pretty(&description(scene, size))?)?;
     Ok(())
@@ -31,6 +34,7 @@ pub(crate) fn write_scene(scene: &Scene, size: u32, folder: &Path) -> Result<()>
 const SKY_NAME: &str = "sky.hdr";
 const HULL_NAME: &str = "volume.ply";
 const DENSITY_NAME: &str = "volume.f32";
+const HAIR_NAME: &str = "hair.txt";
 
 fn mesh_name(object: usize) -> String {
     format!("mesh-{object}.ply")
@@ -85,6 +89,27 @@ pub(crate) fn pbrt(scene: &Scene, size: u32) -> String {
             volume.g,
             density.join(" ")
         );
+    }
+    if let Some(hair) = &scene.hair {
+        let [width0, width1] = hair.widths();
+        let _ = writeln!(
+            out,
+            "AttributeBegin\n  Material \"hair\" \"rgb sigma_a\" [{}] \"float beta_m\" {} \"float beta_n\" {} \"float alpha\" {} \"float eta\" {}",
+            numbers(&hair.sigma_a),
+            hair.beta[0],
+            hair.beta[1],
+            hair.alpha,
+            hair.eta
+        );
+        for strand in &hair.strands {
+            let points: Vec<String> = strand.iter().map(|point| numbers(point)).collect();
+            let _ = writeln!(
+                out,
+                "  Shape \"curve\" \"string type\" \"cylinder\" \"string basis\" \"bspline\" \"float width0\" {width0} \"float width1\" {width1} \"point3 P\" [{}]",
+                points.join("  ")
+            );
+        }
+        out.push_str("AttributeEnd\n");
     }
     for (i, material) in scene.materials.iter().enumerate() {
         let parameters = match material {
@@ -145,6 +170,15 @@ fn description(scene: &Scene, size: u32) -> Value {
                 json!({"ply": mesh_name(i), "material": o.material, "emission": o.emission, "smooth": is_smooth})
             })
             .collect::<Vec<_>>(),
+        "hair": scene.hair.as_ref().map(|hair| {
+            json!({
+                "strands": HAIR_NAME,
+                "sigma_a": hair.sigma_a,
+                "beta": hair.beta,
+                "alpha": hair.alpha,
+                "eta": hair.eta,
+            })
+        }),
         "sky": scene.sky.as_ref().map(|_| SKY_NAME),
         "volume": scene.volume.as_ref().map(|volume| {
             json!({
@@ -159,6 +193,19 @@ fn description(scene: &Scene, size: u32) -> Value {
             })
         }),
     })
+}
+
+/// Strands as Mitsuba reads them: a control point with its radius a line, and an empty line between strands.
+fn strands(hair: &Hair) -> String {
+    let mut out = String::new();
+    for strand in &hair.strands {
+        let steps = (strand.len() - 1) as f64;
+        for (i, point) in strand.iter().enumerate() {
+            let _ = writeln!(out, "{} {}", numbers(point), hair.radius(i as f64 / steps));
+        }
+        out.push('\n');
+    }
+    out
 }
 
 /// The mesh as a binary, little-endian .ply.

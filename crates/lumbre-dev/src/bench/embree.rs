@@ -25,6 +25,7 @@ use crate::scene::Scene;
 const INVALID: c_uint = c_uint::MAX;
 
 const GEOMETRY_TRIANGLE: c_int = 0;
+const GEOMETRY_FLAT_BEZIER_CURVE: c_int = 25;
 const GEOMETRY_SPHERE_POINT: c_int = 50;
 const GEOMETRY_USER: c_int = 120;
 const GEOMETRY_INSTANCE: c_int = 121;
@@ -32,6 +33,7 @@ const GEOMETRY_INSTANCE: c_int = 121;
 const BUFFER_INDEX: c_int = 0;
 const BUFFER_VERTEX: c_int = 1;
 
+const FORMAT_UINT: c_int = 0x5001;
 const FORMAT_UINT3: c_int = 0x5003;
 const FORMAT_FLOAT3: c_int = 0x9003;
 const FORMAT_FLOAT4: c_int = 0x9004;
@@ -326,6 +328,9 @@ impl Program for Embree {
         if !scene.spheres.spheres.is_empty() {
             group.add_spheres(&scene.spheres.spheres);
         }
+        if !scene.curves.points.is_empty() {
+            group.add_curves(&scene.curves.points);
+        }
         if !scene.shapes.is_empty() {
             group.add_shapes(Arc::clone(&scene.shapes));
         }
@@ -419,6 +424,7 @@ struct Group {
     setting: Setting,
     meshes: Vec<SharedMesh>,
     spheres: Vec<Vec<f32>>,
+    curves: Vec<(Vec<f32>, Vec<u32>)>,
     // The callbacks have the address of the list inside.
     shapes: Vec<Arc<Vec<PlacedShape>>>,
     inner: Vec<Self>,
@@ -447,6 +453,7 @@ impl Group {
             setting,
             meshes: Vec::new(),
             spheres: Vec::new(),
+            curves: Vec::new(),
             shapes: Vec::new(),
             inner: Vec::new(),
             device: Arc::clone(device),
@@ -492,6 +499,22 @@ impl Group {
             };
         });
         self.spheres.push(floats);
+    }
+
+    fn add_curves(&mut self, curves: &[[[f32; 4]; 4]]) {
+        let floats: Vec<f32> = curves.as_flattened().as_flattened().to_vec();
+        let firsts: Vec<u32> = (0..curves.len() as u32).map(|i| 4 * i).collect();
+        self.add(GEOMETRY_FLAT_BEZIER_CURVE, |api, geometry| {
+            let set = api.set_shared_buffer;
+            // SAFETY: `self.curves` holds both arrays as long as the scene: four numbers a control point, and the first of
+            // four control points of each curve.
+            unsafe {
+                let (points, count) = (floats.as_ptr().cast(), 4 * curves.len());
+                set(geometry, BUFFER_VERTEX, 0, FORMAT_FLOAT4, points, 0, 16, count);
+                set(geometry, BUFFER_INDEX, 0, FORMAT_UINT, firsts.as_ptr().cast(), 0, 4, firsts.len());
+            }
+        });
+        self.curves.push((floats, firsts));
     }
 
     fn add_shapes(&mut self, shapes: Arc<Vec<PlacedShape>>) {

@@ -1,6 +1,6 @@
 //! The answer in double precision from a loop over everything, and who differs from it.
 
-use lumbre_geometry::Ray;
+use lumbre_geometry::{Curves, Ray};
 use lumbre_kernel::TriangleMesh;
 use lumbre_math::DVec3;
 use rayon::prelude::*;
@@ -23,8 +23,8 @@ const EDGE: f64 = 1e-12;
 /// How far two answers may lie apart: a hundred-thousandth of the way, and of the scene.
 const APART: f64 = 1e-5;
 
-/// The truth about a ray. The exact shapes answer for themselves.
-pub(crate) fn truth(scene: &Scene, ray: &Ray) -> Truth {
+/// The truth about a ray; `curves` are those of the scene. The exact shapes and curves answer for themselves.
+pub(crate) fn truth(scene: &Scene, curves: &Curves, ray: &Ray) -> Truth {
     let mut truth = Truth { certain: None, possible: None };
     for mesh in &scene.meshes {
         truth.of_mesh(mesh, ray);
@@ -34,6 +34,9 @@ pub(crate) fn truth(scene: &Scene, ray: &Ray) -> Truth {
     }
     for sphere in &scene.spheres.spheres {
         truth.take(sphere_root(sphere, ray), true);
+    }
+    for curve in 0..curves.primitive_count() {
+        truth.take(curves.closest(curve, ray).map(|root| root.t), true);
     }
     for shape in scene.shapes.iter() {
         truth.take(shape.closest(ray).map(|root| root.t), true);
@@ -112,12 +115,13 @@ pub(crate) struct Sample {
 pub(crate) fn sample(scene: &Scene, rays: &[Ray], tests: usize) -> Vec<Sample> {
     let placed: usize = scene.placements.iter().map(|p| scene.placed_meshes[p.mesh].indices.len()).sum();
     let primitives = scene.primitive_count() + placed;
+    let curves = scene.curves.curves();
     let count = (tests / primitives.max(1)).clamp(2, 1_000).min(rays.len());
     (0..count)
         .into_par_iter()
         .map(|i| {
             let index = (i * rays.len() + rays.len() / 2) / count;
-            Sample { index, truth: truth(scene, &rays[index]) }
+            Sample { index, truth: truth(scene, &curves, &rays[index]) }
         })
         .collect()
 }
@@ -226,7 +230,7 @@ mod tests {
         let recipe = &RECIPES[0];
         let scene = recipe.make();
         let ray = Ray::new(DVec3::new(0.02, 0.03, 5.0), DVec3::new(0.01, 0.0, -2.0));
-        let truth = truth(&scene, &ray);
+        let truth = truth(&scene, &scene.curves.curves(), &ray);
         let t = truth.certain.expect("the middle of the ball");
         let says = |answer| truth.agrees(Query::Closest, answer, 2.0, 2.0);
         assert!(says(Some(t)) && says(Some(t * (1.0 + 1e-6))));
@@ -234,7 +238,7 @@ mod tests {
         assert!(!truth.agrees(Query::Any, None, 2.0, 2.0));
         let mut moved = Scene::empty("moved", scene.camera, scene.lamp);
         moved.meshes = vec![Arc::new(TriangleMesh::default())];
-        assert!(!super::truth(&moved, &ray).agrees(Query::Any, Some(t), 2.0, 2.0));
+        assert!(!super::truth(&moved, &moved.curves.curves(), &ray).agrees(Query::Any, Some(t), 2.0, 2.0));
         assert_eq!(
             differences(Query::Closest, &[ray; 3], &[Some(t); 3], &[Some(t), None, Some(2.0 * t)], 2.0),
             2

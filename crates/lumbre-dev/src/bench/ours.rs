@@ -162,7 +162,9 @@ fn list(scene: &Scene, places_spheres: bool, is_precise: bool) -> Vec<Geometry> 
         let world_from_object = placement.transform();
         GeometryKind::Instance(nothing.instance(world_from_object))
     });
-    let kinds = meshes.chain(spheres).chain(shapes).chain(instances);
+    let hair =
+        (!scene.curves.points.is_empty()).then(|| GeometryKind::Custom(Arc::new(scene.curves.curves()) as _));
+    let kinds = meshes.chain(spheres).chain(hair).chain(shapes).chain(instances);
     kinds.enumerate().map(|(i, kind)| Geometry { id: i as u32, kind }).collect()
 }
 

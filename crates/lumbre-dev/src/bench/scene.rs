@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lumbre_geometry::PlacedShape;
+use lumbre_geometry::{CurveBasis, CurveKind, Curves, PlacedShape, Strand};
 use lumbre_kernel::{SphereCloud, TriangleMesh};
 use lumbre_math::{DAffine3, DMat3, DVec3, Transform};
 
@@ -14,6 +14,8 @@ pub(crate) struct Scene {
     pub meshes: Vec<Arc<TriangleMesh>>,
     /// Centre and radius of spheres. Their origin is zero.
     pub spheres: Arc<SphereCloud>,
+    /// Flat cubic curves of one segment each, as Embree takes them; empty for most scenes.
+    pub curves: Arc<Hair>,
     /// Exact shapes of every kind.
     pub shapes: Arc<Vec<PlacedShape>>,
     /// Meshes that stand in the world only where `placements` say. Their origins are zero.
@@ -58,6 +60,27 @@ pub(crate) struct Camera {
     pub field_of_view: f64,
 }
 
+/// Cubic Bézier curves, which face the ray.
+#[derive(Debug, Default)]
+pub(crate) struct Hair {
+    /// Four control points of each, with their radii.
+    pub points: Vec<[[f32; 4]; 4]>,
+}
+
+impl Hair {
+    /// The curves as Lumbre has them.
+    pub(crate) fn curves(&self) -> Curves {
+        let mut curves = Curves::new(CurveKind::Flat);
+        for points in &self.points {
+            let place = points.map(|[x, y, z, _]| DVec3::new(x.into(), y.into(), z.into()));
+            let widths = [points[0], points[3]].map(|[.., radius]| 2.0 * f64::from(radius));
+            let strand = Strand::new(CurveBasis::Bezier, 3, &place, widths).expect("four points");
+            curves.push(&strand).expect("points near one another");
+        }
+        curves
+    }
+}
+
 impl Scene {
     /// A scene without anything in it.
     pub(crate) fn empty(name: impl Into<String>, camera: Camera, lamp: (DVec3, f64)) -> Self {
@@ -65,6 +88,7 @@ impl Scene {
             name: name.into(),
             meshes: Vec::new(),
             spheres: Arc::default(),
+            curves: Arc::default(),
             shapes: Arc::default(),
             placed_meshes: Vec::new(),
             placements: Vec::new(),
@@ -95,6 +119,7 @@ impl Scene {
             + triangles(&self.placed_meshes)
             + self.placements.len()
             + self.sphere_count()
+            + self.curves.points.len()
             + self.shapes.len()
     }
 
@@ -105,6 +130,7 @@ impl Scene {
         let parts = [
             (triangles, "triangles"),
             (self.sphere_count(), "spheres"),
+            (self.curves.points.len(), "curves"),
             (self.shapes.len(), "exact shapes"),
             (self.placements.len(), "instances"),
             (placed, "triangles in what is placed"),
@@ -116,12 +142,17 @@ impl Scene {
 
     /// Whether it consists of triangles alone.
     pub(crate) fn is_triangles_only(&self) -> bool {
-        self.spheres.spheres.is_empty() && self.shapes.is_empty() && self.placements.is_empty()
+        self.spheres.spheres.is_empty() && self.has_neither()
+    }
+
+    /// Whether it has no shapes, curves and instances.
+    fn has_neither(&self) -> bool {
+        self.shapes.is_empty() && self.curves.points.is_empty() && self.placements.is_empty()
     }
 
     /// Whether it consists of spheres alone.
     pub(crate) fn is_spheres_only(&self) -> bool {
-        self.meshes.is_empty() && self.shapes.is_empty() && self.placements.is_empty()
+        self.meshes.is_empty() && self.has_neither()
     }
 }
 

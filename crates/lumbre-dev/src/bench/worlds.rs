@@ -7,7 +7,7 @@ use lumbre_kernel::{SphereCloud, TriangleMesh};
 use lumbre_math::random::RandomStream;
 use lumbre_math::{DAffine3, DVec3, Transform};
 
-use crate::scene::{Camera, Placement, Scene};
+use crate::scene::{Camera, Hair, Placement, Scene};
 use crate::shaping::{Shaper, between, direction};
 
 /// A scene yet to be made.
@@ -43,6 +43,8 @@ pub(crate) const RECIPES: &[Recipe] = &[
     Recipe { name: "boulders", is_quick: false, make: boulders },
     Recipe { name: "spheres-20k", is_quick: true, make: |name| spheres(name, 20_000) },
     Recipe { name: "spheres-1m", is_quick: false, make: |name| spheres(name, 1_000_000) },
+    Recipe { name: "hair-20k", is_quick: true, make: |name| hair(name, 20_000) },
+    Recipe { name: "hair-1m", is_quick: false, make: |name| hair(name, 1_000_000) },
     Recipe { name: "mixed", is_quick: true, make: mixed },
     Recipe { name: "park", is_quick: false, make: park },
 ];
@@ -425,6 +427,32 @@ fn spheres(name: &str, count: usize) -> Scene {
     let lamp = (half * DVec3::new(0.8, 2.5, 0.9), 0.5 * half);
     let cloud = SphereCloud { spheres: list, ..SphereCloud::default() };
     Scene { spheres: Arc::new(cloud), ..Scene::empty(name, camera, lamp) }
+}
+
+/// Hair on a ball of radius 1: each hair is one cubic curve that leaves the ball and falls.
+fn hair(name: &str, count: usize) -> Scene {
+    let mut random = RandomStream::new(21);
+    let thickness = 0.4 / (count as f64).sqrt();
+    let points = (0..count)
+        .map(|_| {
+            let out = direction(&mut random);
+            let length = between(&mut random, 0.25, 0.4);
+            let mut at = out;
+            let mut way = out;
+            // Thinner and thinner, evenly from end to end.
+            [1.0, 0.7, 0.4, 0.1].map(|share| {
+                let here = at;
+                // It falls more and more, and curls a little.
+                way = (way + 0.35 * direction(&mut random) - 0.45 * DVec3::Y).normalize();
+                at += length / 3.0 * way;
+                let [x, y, z] = here.as_vec3().to_array();
+                [x, y, z, (share * thickness) as f32]
+            })
+        })
+        .collect();
+    let camera = Camera { eye: DVec3::new(1.2, 0.9, 3.2), target: DVec3::ZERO, field_of_view: 45.0 };
+    let lamp = (DVec3::new(1.5, 4.0, 1.5), 1.0);
+    Scene { curves: Arc::new(Hair { points }), ..Scene::empty(name, camera, lamp) }
 }
 
 /// 1,600 exact shapes of six kinds about a scanned ball, on a floor of triangles.

@@ -6,7 +6,10 @@ use std::sync::Arc;
 
 use lumbre_image::Image;
 use lumbre_math::{DAffine3, DMat3, DVec3, Elementary, Transform};
-use lumbre_scene::{AreaLightDesc, EnvironmentDesc, EnvironmentMapping, LightDesc};
+use lumbre_scene::{
+    AreaLightDesc, ClearSky, EnvironmentDesc, EnvironmentMapping, LightDesc, SkyDesc, SkyError, SunPosition,
+    SunPositionError,
+};
 use lumbre_shading::spectrum::LightCurve;
 use lumbre_shading::{ImageFilter, Spectrum, SpectrumValue, Wrap};
 
@@ -19,7 +22,8 @@ use super::textures::{LightSpectrum, SpectrumUse, single};
 use crate::Diagnostic;
 use crate::diagnostic::quoted;
 
-pub(super) const KNOWN: [&str; 6] = ["point", "spot", "distant", "infinite", "goniometric", "projection"];
+pub(super) const KNOWN: [&str; 7] =
+    ["point", "spot", "distant", "infinite", "sky", "goniometric", "projection"];
 
 impl Converter<'_, '_> {
     pub fn light(&mut self, ty: &str, params: Params, state: &State) -> Result<()> {
@@ -83,10 +87,21 @@ impl Converter<'_, '_> {
                     let message = "a distant light shines from a point to itself: from and to are equal";
                     return Err(params.spot_of("to").error(message));
                 }
-                let light = LightDesc::Distant { towards, irradiance: colour * scale * lux as f32 };
+                let irradiance = colour * scale * lux as f32;
+                let angle = params.float("angle", 0.0)?;
+                let light = match angle {
+                    0.0 => LightDesc::Distant { towards, irradiance },
+                    _ if 0.0 < angle && angle <= 180.0 => LightDesc::Disc { towards, angle, irradiance },
+                    _ => return params.out_of_range("angle", angle, "0 to 180 degrees"),
+                };
                 spectral(light, curve, scale)
             }
             "infinite" => self.infinite(&params, state)?,
+            "sky" => {
+                let lights = self.sky(&params, state)?;
+                self.done(&params);
+                return self.keep_lights(lights, spot);
+            }
             "goniometric" => self.goniometric(&params, state)?,
             "projection" => self.projection(&params, state)?,
             _ => {
@@ -96,10 +111,51 @@ impl Converter<'_, '_> {
             }
         };
         self.done(&params);
-        self.budget.elements(1, "lights").at(spot)?;
-        self.keep(size_of::<LightDesc>(), "lights", spot)?;
-        self.scene.lights.push(light);
+        self.keep_lights(vec![light], spot)
+    }
+
+    fn keep_lights(&mut self, lights: Vec<LightDesc>, spot: SourcePosition) -> Result<()> {
+        self.budget.elements(lights.len() as u64, "lights").at(spot)?;
+        self.keep(size_of_val(&*lights), "lights", spot)?;
+        self.scene.lights.extend(lights);
         Ok(())
+    }
+
+    /// The sun and a clear sky: two lights.
+    fn sky(&mut self, params: &Params, state: &State) -> Result<Vec<LightDesc>> {
+        let base = SkyDesc::default();
+        let sun = sun_position(params, base.sun)?;
+        let factor = |name| -> Result<f32> {
+            let factor = single(params, name, 1.0)?;
+            if factor < 0.0 {
+                return params.out_of_range(name, f64::from(factor), "0 or more");
+            }
+            Ok(factor)
+        };
+        let scale = factor("scale")?;
+        let sun_angle = params.float("sunangle", base.sun_angle)?;
+        if !(0.0 < sun_angle && sun_angle <= 180.0) {
+            return params.out_of_range("sunangle", sun_angle, "more than 0, to 180 degrees");
+        }
+        let desc = SkyDesc {
+            sun,
+            turbidity: params.float("turbidity", base.turbidity)?,
+            albedo: params.float("albedo", base.albedo)?,
+            sun_scale: scale * factor("sunscale")?,
+            sky_scale: scale * factor("skyscale")?,
+            sun_angle,
+        };
+        let sky = ClearSky::new(desc).map_err(|error| {
+            let name = match error {
+                SkyError::Turbidity(_) => "turbidity",
+                SkyError::Albedo(_) => "albedo",
+                SkyError::Elevation(_) if params.has("at") => "at",
+                SkyError::Elevation(_) => "elevation",
+            };
+            params.spot_of(name).error(error.to_string())
+        })?;
+        self.keep(ClearSky::MAP_BYTES, "sky", params.spot)?;
+        Ok(sky.lights(&state.ctm[0]))
     }
 
     /// The colour of a light: the parameter of this name, else the white of the colour space.
@@ -314,6 +370,23 @@ fn spectral(light: LightDesc, curve: Option<Arc<LightCurve>>, scale: Spectrum) -
         Some(spectrum) => LightDesc::Spectral { light: Box::new(light), spectrum },
         None => light,
     }
+}
+
+/// Where the sun stands: at a time and a place, or by angles.
+fn sun_position(params: &Params, default: SunPosition) -> Result<SunPosition> {
+    let Some(text) = params.string("at")? else {
+        let azimuth = params.float("azimuth", default.azimuth)?;
+        return Ok(SunPosition { azimuth, elevation: params.float("elevation", default.elevation)? });
+    };
+    for name in ["azimuth", "elevation"] {
+        if params.has(name) {
+            let message = format!("a sky has both \"at\" and {}: give one of them", quoted(name));
+            return Err(params.spot_of(name).error(message));
+        }
+    }
+    text.parse().map_err(|error: SunPositionError| {
+        params.spot_of("at").error(format!("wrong value for parameter \"at\": {error}"))
+    })
 }
 
 fn is_grey(colour: Spectrum) -> bool {

@@ -69,6 +69,7 @@ pub(super) fn special(page: &str, name: &str) -> Option<&'static str> {
         ("infinite", "filename") => r#""images/sky.pfm""#,
         ("goniometric", "filename") => r#""images/lobes.png""#,
         ("projection", "filename") => r#""images/letter.png""#,
+        ("sky", "at") => r#""2026-06-21T12:00+02:00,40.4,-3.7""#,
         ("infinite", "portal") => "0 0 0 0 1 0 2 1 0 2 0 0",
         ("curve", "P") => "0 0 0 1 0 0 1 1 0 2 2 0",
         (_, "P") => "0 0 0 1 0 0 0 1 0",

@@ -382,8 +382,20 @@ impl Converter<'_, '_> {
             Ok(IntegratorKind::Path { regularize: params.boolean("regularize", false)? })
         };
         // Ours: pbrt-v4 is always so.
-        let is_path = matches!(ty, "path" | "volpath" | "simplepath" | "simplevolpath");
-        if is_path && params.boolean("spectral", false)? {
+        let carries_wavelengths = matches!(
+            ty,
+            "path"
+                | "volpath"
+                | "simplepath"
+                | "simplevolpath"
+                | "randomwalk"
+                | "caustics"
+                | "bdpt"
+                | "mlt"
+                | "sppm"
+                | "lightpath"
+        );
+        if carries_wavelengths && params.boolean("spectral", false)? {
             self.scene.film.spectral = true;
         }
         let kind = match ty {

@@ -17,7 +17,7 @@ from . import _lumbre
 from ._arrays import Triple, array_of, positive, real, triple, wholes
 from ._lumbre import LumbreError
 from ._words import Described
-from .sky import clear_sky, sun_direction
+from .sky import sun_direction
 
 Colour = tuple[float, float, float]
 
@@ -553,13 +553,15 @@ class DistantLight(Light):
 
 @dataclass(frozen=True)
 class SunLight(Light):
-    """The sun: parallel light from where it stands.
+    """The sun, a disc as wide as it is seen from the earth.
 
     Parameters
     ----------
     azimuth : degrees clockwise from north, which is y; x is east
     elevation : degrees above the horizon; below it the sun gives no light
-    irradiance : that of a surface that faces it; by default as of a high sun whose sky is `SkyLight()`
+    irradiance : that of a surface that faces it; by default what the air leaves of it, in the units of `SkyLight`
+    turbidity : how hazy the air is, from 1 to 10
+    angle : its diameter in degrees; 0 for parallel light, whose shadows are hard
 
     `solar_position` says where the sun stands at a time and a place.
 
@@ -569,7 +571,9 @@ class SunLight(Light):
 
     azimuth: float = 180.0
     elevation: float = 45.0
-    irradiance: float | str | Iterable[float] = (3.0, 2.8, 2.5)
+    irradiance: float | str | Iterable[float] | None = None
+    turbidity: float = 3.0
+    angle: float = 0.533
 
     @property
     def towards(self) -> Triple:
@@ -577,8 +581,14 @@ class SunLight(Light):
         return sun_direction(self.azimuth, self.elevation)
 
     def _new(self) -> _lumbre.Light:
-        irradiance = colour("irradiance", self.irradiance)
-        return _lumbre.Light.distant(self.towards, irradiance if self.elevation > 0 else (0.0, 0.0, 0.0))
+        if self.elevation <= 0:
+            return _lumbre.Light.distant(self.towards, (0.0, 0.0, 0.0))
+        if self.irradiance is not None:
+            irradiance = colour("irradiance", self.irradiance)
+            if self.angle == 0:
+                return _lumbre.Light.distant(self.towards, irradiance)
+            return _lumbre.Light.disc(self.towards, self.angle, irradiance)
+        return _lumbre.Light.sun(self.azimuth, self.elevation, self.turbidity, self.angle)
 
 
 @dataclass(frozen=True, eq=False)
@@ -611,22 +621,31 @@ class EnvironmentLight(Light):
 
 @dataclass(frozen=True)
 class SkyLight(Light):
-    """A clear sky without its sun, whose place is as of `SunLight`: brightest near the sun, brighter at the horizon, blue. `radiance` is
-    that of the zenith.
+    """A clear sky without its sun, whose place is as of `SunLight`: L. Hosek, A. Wilkie, "An Analytic Model for Full Spectral Sky-Dome
+    Radiance", 2012. Its units are such that a white surface shows 1 where 100,000 lux light it.
 
-    Its distribution is the CIE standard clear sky of low turbidity (CIE S 011/E:2003, type 12); its colour goes from blue in the zenith to
-    white at the horizon and near the sun. Below the horizon it is as bright as the ground that it lights would be.
+    Parameters
+    ----------
+    azimuth, elevation : of the sun, in degrees; the elevation is from 0 to 90
+    radiance : that of the zenith, in place of the model's; a colour tints the sky
+    turbidity : how hazy the air is, from 1 to 10; a clear day has 2 to 4
+    albedo : the reflectance of the ground, which lights the sky and is what is seen below the horizon
 
-    >>> SkyLight(elevation=30).radiance
-    0.5
+    >>> SkyLight(elevation=30).turbidity
+    3.0
     """
 
     azimuth: float = 180.0
     elevation: float = 45.0
-    radiance: float | str | Iterable[float] = 0.5
+    radiance: float | str | Iterable[float] | None = None
+    turbidity: float = 3.0
+    albedo: float = 0.3
 
     def _map(self) -> npt.NDArray[np.float32]:
-        return clear_sky(sun_direction(self.azimuth, self.elevation), np.array(colour("radiance", self.radiance)))
+        pixels, zenith = _lumbre.clear_sky(self.azimuth, self.elevation, self.turbidity, self.albedo)
+        if self.radiance is not None:
+            pixels = pixels * (np.array(colour("radiance", self.radiance), dtype=np.float32) / np.float32(zenith))
+        return pixels
 
     def _new(self) -> _lumbre.Light:
         return _lumbre.Light.environment((1.0, 1.0, 1.0), self._map(), (0.0, 0.0, 1.0))
@@ -642,7 +661,7 @@ def environment(value: Any) -> str | _lumbre.Light | _lumbre.Environment:
     """Light from all around, as `Scene.render` takes it."""
     if isinstance(value, EnvironmentLight | SkyLight):
         return value._native()
-    if isinstance(value, str) and value in ("studio", "none"):
+    if isinstance(value, str) and (value in ("studio", "none") or value.startswith("sky:")):
         return value
     if isinstance(value, (str, os.PathLike)):
         path = os.path.abspath(os.fspath(value))
@@ -654,7 +673,7 @@ def environment(value: Any) -> str | _lumbre.Light | _lumbre.Environment:
         return EnvironmentLight(value)._native()
     raise LumbreError(
         f"env is no light from all around (found {value!r}; expected a file, an (h, 2h, 3) array, an EnvironmentLight, a SkyLight, "
-        'a radiance, "studio" or "none")'
+        'a radiance, "studio", "sky:TIME,LATITUDE,LONGITUDE" or "none")'
     )
 
 

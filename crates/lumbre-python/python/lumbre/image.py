@@ -71,6 +71,17 @@ class Image:
             array = np.where(array == 0, np.float32(np.inf), array)
         return array[..., 0] if channels == 1 else array[..., :channels]
 
+    @cached_property
+    def channels(self) -> dict[str, npt.NDArray[np.float32]]:
+        """The channels of the scene's film besides colours, (h, w) each, by pbrt's names: of `gbuffer`, such as "P.X", and of `spectral`,
+        such as "S0.400,000000nm". An .exr file holds them, too. Empty for other films.
+
+        >>> import lumbre
+        >>> lumbre.Scene([lumbre.Sphere()]).render(spp=1, size=(8, 6)).channels
+        {}
+        """
+        return self._native.film()
+
     @property
     def stats(self) -> dict[str, Any]:
         """spp, most_spp, samples, rays, dropped, clamped, noise, noise_target, noise_target_met, noisy_pixels, threads, seconds."""

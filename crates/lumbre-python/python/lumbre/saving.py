@@ -193,7 +193,15 @@ class _Writer:
         elif isinstance(light, (DistantLight, SunLight)):
             if isinstance(light, SunLight) and light.elevation <= 0:
                 return
+            if isinstance(light, SunLight) and light.irradiance is None:
+                place = f"{_param('float', 'azimuth', light.azimuth)} {_param('float', 'elevation', light.elevation)}"
+                air = f"{_param('float', 'turbidity', light.turbidity)} {_param('float', 'sunangle', light.angle)}"
+                self.lights.append(f'LightSource "sky" {place} {air} "float skyscale" 0')
+                return
+            assert light.irradiance is not None
             values = _param("rgb", "L", colour("irradiance", light.irradiance))
+            if isinstance(light, SunLight) and light.angle > 0:
+                values += f" {_param('float', 'angle', light.angle)}"
             self.lights.append(f'LightSource "distant" {_param("point3", "from", tuple(light.towards))} "point3 to" [0 0 0] {values}')
         elif isinstance(light, (EnvironmentLight, SkyLight)):
             self.environment(light)

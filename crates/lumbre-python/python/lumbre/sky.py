@@ -1,4 +1,4 @@
-"""The sun and the sky: where the sun stands, and how bright a clear sky is."""
+"""Where the sun stands."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ._arrays import Triple
 from ._lumbre import LumbreError
@@ -78,34 +77,3 @@ def solar_position(when: Any, latitude: float, longitude: float) -> tuple[Any, A
     south = np.arctan2(np.sin(hour), np.cos(hour) * np.sin(phi) - np.tan(declination) * np.cos(phi))
     azimuth, height = (np.degrees(south) + 180) % 360, np.degrees(elevation)
     return (float(azimuth), float(height)) if times.ndim == 0 else (azimuth, height)
-
-
-def clear_sky(sun: Triple, zenith: npt.NDArray[np.float64], height: int = 128) -> npt.NDArray[np.float32]:
-    """A clear sky as a map by longitude and latitude, (height, 2 height, 3)."""
-    latitude = np.pi * (0.5 - (np.arange(height) + 0.5) / height)[:, None]
-    # The centre is towards x, and three quarters of the width towards y.
-    longitude = 2 * np.pi * ((np.arange(2 * height) + 0.5) / (2 * height) - 0.5)[None, :]
-    x, y = np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude)
-    z = np.broadcast_to(np.sin(latitude), x.shape)
-    away = np.arccos(np.clip(x * sun[0] + y * sun[1] + z * sun[2], -1, 1))
-    # CIE S 011/E:2003, type 12: gradation by the zenith angle, and indicatrix by the angle from the sun.
-    a, b, c, d, e = -1.0, -0.32, 10.0, -3.0, 0.45
-
-    def gradation(cosine: npt.ArrayLike) -> Any:
-        return 1 + a * np.exp(b / np.maximum(cosine, 0.01))
-
-    def indicatrix(angle: npt.ArrayLike) -> Any:
-        return 1 + c * (np.exp(d * np.asarray(angle)) - math.exp(d * math.pi / 2)) + e * np.cos(angle) ** 2
-
-    to_zenith = math.acos(max(-1.0, min(1.0, sun[2])))
-    level = gradation(z) * indicatrix(away) / (gradation(1.0) * indicatrix(to_zenith))
-    # Blue of Rayleigh's law, less of it where light comes a long way or by large angles forwards.
-    white = np.clip(np.exp(-6 * np.maximum(z, 0)) + 0.6 * np.exp(-3 * away), 0, 1)[..., None]
-    blue = np.array([0.45, 0.85, 1.7])
-    sky = level[..., None] * (white + (1 - white) * blue) * zenith
-    is_up = (z > 0)[..., None]
-    # Light from below: the mean of the sky, weighed by the cosine, off ground of reflectance 0.2.
-    weight = np.where(z > 0, z, 0) * np.cos(latitude)
-    below = 0.2 * (sky * weight[..., None]).sum(axis=(0, 1)) / weight.sum()
-    whole: npt.NDArray[np.float32] = np.where(is_up, sky, below).astype(np.float32)
-    return whole

@@ -9,15 +9,19 @@ use std::f64::consts::TAU;
 use std::ops::{ControlFlow, Range};
 
 use lumbre_geometry::Ray;
+use lumbre_kernel::Hit;
 use lumbre_math::rounding::offset_point;
 use lumbre_math::{DVec3, Vec3, orthonormal_basis, warp64};
+use lumbre_scene::light::Sampling;
 use lumbre_scene::{BoundingSphere, Footprint, Interaction, LightSample, MediumId, Scene, View};
+use lumbre_shading::spectrum::{SpectralLookup, WavelengthDensity, Wavelengths};
 use lumbre_shading::{Scatter, ShadingNormals, Spectrum};
 use smallvec::SmallVec;
 
 use super::photons::Photon;
 use crate::transport::direct::{Bounce, Vertex};
 use crate::transport::interior::MediumStack;
+use crate::transport::through::hero_alone;
 use crate::transport::{SampleNumbers, Sampler};
 use crate::wave::paths::{of_column, sides, to_column};
 
@@ -87,6 +91,16 @@ pub(crate) struct LightTracer<'s> {
     /// Whether light straight through panes is found by other strategies too: that of point lights and of lights in one
     /// direction.
     pub(crate) goes_straight_on: bool,
+    /// How the wavelengths of a pass are chosen, by [`Sampler::shared_wavelengths`]; `None` in RGB.
+    pub(crate) density: Option<WavelengthDensity>,
+}
+
+/// What the light paths of a line share.
+struct Line<'a> {
+    draw: &'a SampleNumbers,
+    time: f64,
+    /// `None` in RGB.
+    wavelengths: Option<Wavelengths>,
 }
 
 /// Light that arrives at a surface directly from a lamp.
@@ -118,15 +132,15 @@ struct LightPath<'s> {
     bounces: u32,
     /// Whether other strategies can find it so far.
     is_straight: bool,
+    /// Whether only the hero wavelength continues.
+    is_alone: bool,
 }
 
 impl<'s> LightTracer<'s> {
     /// The photons of some lines of a pass.
     pub(crate) fn trace(&self, pass: u32, lines: Range<u32>, photons: &mut Vec<Photon>) {
         for line in lines {
-            self.each_point(pass, line, true, |point, draw, vertex, time| {
-                self.begin(point, time, draw, vertex, photons);
-            });
+            self.each_point(pass, line, true, |point, line, vertex| self.begin(point, line, vertex, photons));
         }
     }
 
@@ -135,8 +149,8 @@ impl<'s> LightTracer<'s> {
         let count = f64::from(lines.end - lines.start);
         let mut sum = 0.0;
         for line in lines {
-            self.each_point(pass, line, false, |point, draw, vertex, time| {
-                let lit = self.light(point, time, draw, vertex);
+            self.each_point(pass, line, false, |point, line, vertex| {
+                let lit = self.light(point, line, vertex);
                 sum += lit.map_or(0.0, |lit| f64::from(lit.flux.average()));
             });
         }
@@ -144,36 +158,36 @@ impl<'s> LightTracer<'s> {
     }
 
     /// Visits the points in which a line meets surfaces that may be specular, or those that certainly are not. Each has
-    /// its random numbers, the first vertex of these, and the time.
+    /// the first vertex of its random numbers.
     fn each_point(
         &self,
         pass: u32,
         line: u32,
         are_specular: bool,
-        mut visit: impl FnMut(DVec3, &SampleNumbers, u32, f64),
+        mut visit: impl FnMut(DVec3, &Line<'_>, u32),
     ) {
         // Not a pixel of any picture.
         let draw = self.sampler.draw(u32::MAX, pass, line);
         let time = self.view.time(draw.time());
+        let wavelengths = self.density.map(|density| density.sample(self.sampler.shared_wavelengths(pass)));
+        let line = Line { draw: &draw, time, wavelengths };
         let chord = self.chords.line(&draw).at_time(time);
         let mut points = 0;
         self.scene.accel().all(&chord, |hit| {
             if self.scene.may_be_specular(hit) == are_specular {
                 points += 1;
-                visit(chord.at(hit.root.t), &draw, points * VERTICES_A_PATH, time);
+                visit(chord.at(hit.root.t), &line, points * VERTICES_A_PATH);
             }
             if points < MAX_POINTS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
     }
 
     /// Follows light that arrives at a point of a surface.
-    fn begin(&self, point: DVec3, time: f64, draw: &SampleNumbers, vertex: u32, photons: &mut Vec<Photon>) {
-        let Some(Lit { sample, ray, here, pdf, flux }) = self.light(point, time, draw, vertex) else {
-            return;
-        };
+    fn begin(&self, point: DVec3, line: &Line<'_>, vertex: u32, photons: &mut Vec<Photon>) {
+        let Some(Lit { sample, ray, here, pdf, flux }) = self.light(point, line, vertex) else { return };
         let length = point.distance(ray.origin);
         let mut path = LightPath {
-            interiors: MediumStack::default(),
+            interiors: MediumStack::of(line.wavelengths),
             medium: None,
             flux,
             flux_at_start: flux.max_component(),
@@ -183,18 +197,23 @@ impl<'s> LightTracer<'s> {
             length,
             bounces: 0,
             is_straight: pdf == f64::INFINITY && self.goes_straight_on,
+            is_alone: false,
         };
-        self.arrive(&mut path, &sample, &here, draw);
-        self.follow(path, ray, here, draw, vertex, photons);
+        self.arrive(&mut path, &sample, &here, line);
+        self.follow(path, ray, here, line, vertex, photons);
     }
 
     /// The light of one sample that arrives at a point of a surface on a line.
-    fn light(&self, point: DVec3, time: f64, draw: &SampleNumbers, vertex: u32) -> Option<Lit<'s>> {
-        let (choose, u) = (draw.light_choice(vertex), draw.light_point(vertex));
-        let sample = self.scene.sample_light(point, DVec3::ZERO, time, choose, u)?;
-        let ray = self.ray_to(point, &sample).at_time(time);
+    fn light(&self, point: DVec3, line: &Line<'_>, vertex: u32) -> Option<Lit<'s>> {
+        let (choose, u) = (line.draw.light_choice(vertex), line.draw.light_point(vertex));
+        let (id, mut sample) =
+            self.scene.sample_light_for(Sampling::Mis, point, DVec3::ZERO, line.time, choose, u)?;
+        if let Some(wavelengths) = &line.wavelengths {
+            sample.radiance = self.scene.light_at_wavelengths(id, sample.radiance, wavelengths);
+        }
+        let ray = self.ray_to(point, &sample).at_time(line.time);
         let hit = self.scene.closest(&ray)?;
-        let here = self.scene.interaction(&ray, &hit, &Footprint::Point);
+        let here = self.interaction(&ray, &hit, line);
         let size = point.abs().max_element() + (point - ray.origin).length();
         if here.surface.point.distance(point) > NEARLY_THERE * size {
             // Occluded.
@@ -232,7 +251,7 @@ impl<'s> LightTracer<'s> {
         path: &mut LightPath<'s>,
         sample: &LightSample,
         here: &Interaction<'s>,
-        draw: &SampleNumbers,
+        line: &Line<'_>,
     ) {
         path.interiors.arrive(here, here.resolved());
         // Light from infinity was not inside any solid.
@@ -247,7 +266,12 @@ impl<'s> LightTracer<'s> {
                 Some(end) => Ray::new(start, end.point - start).with_range(0.0, 1.0),
                 None => Ray::new(start, sample.towards),
             };
-            path.flux *= self.scene.transmittance(path.medium, &back, draw.along(&back), None);
+            path.flux *= self.scene.transmittance(
+                path.medium,
+                &back,
+                line.draw.along(&back),
+                line.wavelengths.as_ref(),
+            );
         }
     }
 
@@ -257,7 +281,7 @@ impl<'s> LightTracer<'s> {
         mut path: LightPath<'s>,
         mut ray: Ray,
         mut here: Interaction<'s>,
-        draw: &SampleNumbers,
+        line: &Line<'_>,
         first: u32,
         photons: &mut Vec<Photon>,
     ) {
@@ -269,10 +293,14 @@ impl<'s> LightTracer<'s> {
             if path.bounces == self.max_bounces {
                 return;
             }
+            if line.wavelengths.is_some() && vertex.material.disperses() && !path.is_alone {
+                // Each wavelength would refract differently.
+                path.is_alone = true;
+                path.flux = hero_alone(path.flux);
+            }
             let number = first + path.bounces;
-            let Some(part) = self.bounce(&mut path, &vertex, draw.lobe(number), draw.survival(number)) else {
-                return;
-            };
+            let (lobe, survival) = (line.draw.lobe(number), line.draw.survival(number));
+            let Some(part) = self.bounce(&mut path, &vertex, lobe, survival) else { return };
             if part.crosses {
                 match vertex.material.interior_medium(&here.at) {
                     Some(medium) if here.front => path.interiors.enter(vertex.material, medium),
@@ -286,16 +314,16 @@ impl<'s> LightTracer<'s> {
             let hit = self.scene.closest(&ray);
             if self.scene.has_media() && !path.is_straight {
                 let end = hit.as_ref().map_or(f64::INFINITY, |hit| hit.root.t);
-                photons.extend(self.photon_in_medium(&path, &ray.with_range(0.0, end), draw, number));
+                photons.extend(self.photon_in_medium(&path, &ray.with_range(0.0, end), line, number));
             }
             let Some(hit) = hit else { return };
-            let next = self.scene.interaction(&ray, &hit, &Footprint::Point);
+            let next = self.interaction(&ray, &hit, line);
             path.interiors.arrive(&next, next.resolved());
             let way = next.surface.point.distance(ray.origin);
             path.flux *= path.interiors.transmittance(way);
             path.length += way;
             if self.scene.has_media() {
-                self.cross_media(&mut path, &ray.with_range(0.0, way), draw);
+                self.cross_media(&mut path, &ray.with_range(0.0, way), line);
             }
             if path.flux.is_black() || !path.flux.is_finite() {
                 return;
@@ -342,14 +370,14 @@ impl<'s> LightTracer<'s> {
         &self,
         path: &LightPath<'s>,
         segment: &Ray,
-        draw: &SampleNumbers,
+        line: &Line<'_>,
         vertex: u32,
     ) -> Option<Photon> {
         if path.interiors.attenuates() {
             return None;
         }
         let typical = typical_way(self.scene);
-        let u = f64::from(draw.direction(vertex).x);
+        let u = f64::from(line.draw.direction(vertex).x);
         let at = typical * u / (1.0 - u);
         if at >= segment.t_max {
             return None;
@@ -359,7 +387,7 @@ impl<'s> LightTracer<'s> {
         let mut crossings = Vec::new();
         self.scene.crossings(&before, &mut crossings);
         let medium = crossings.last().map_or(path.medium, |crossing| crossing.beyond)?;
-        let transmittance = self.scene.transmittance(path.medium, &before, draw.along(&before), None);
+        let transmittance = self.transmittance(path, &before, line);
         let photon = Photon {
             point: segment.at(at),
             towards: -segment.direction.as_vec3(),
@@ -369,18 +397,32 @@ impl<'s> LightTracer<'s> {
             density: path.density as f32,
             lamp: path.lamp_seen(path.length + at),
             bounces: path.bounces,
+            is_alone: path.is_alone,
         };
         (!photon.flux.is_black() && photon.flux.is_finite()).then_some(photon)
     }
 
     /// Traces a light path through media along its next segment.
-    fn cross_media(&self, path: &mut LightPath<'s>, segment: &Ray, draw: &SampleNumbers) {
-        path.flux *= self.scene.transmittance(path.medium, segment, draw.along(segment), None);
+    fn cross_media(&self, path: &mut LightPath<'s>, segment: &Ray, line: &Line<'_>) {
+        path.flux *= self.transmittance(path, segment, line);
         let mut crossings = Vec::new();
         self.scene.crossings(segment, &mut crossings);
         if let Some(last) = crossings.last() {
             path.medium = last.beyond;
         }
+    }
+
+    fn transmittance(&self, path: &LightPath<'s>, segment: &Ray, line: &Line<'_>) -> Spectrum {
+        let seed = line.draw.along(segment);
+        self.scene.transmittance(path.medium, segment, seed, line.wavelengths.as_ref())
+    }
+
+    /// A hit that looks up materials at the wavelengths of the line.
+    fn interaction(&self, ray: &Ray, hit: &Hit, line: &Line<'_>) -> Interaction<'s> {
+        let mut here = self.scene.interaction(ray, hit, &Footprint::Point);
+        here.at.spectral =
+            line.wavelengths.map(|wavelengths| SpectralLookup { wavelengths, is_unbounded: false });
+        here
     }
 }
 
@@ -410,5 +452,6 @@ fn photon(path: &LightPath<'_>, ray: &Ray, here: &Interaction<'_>) -> Photon {
         density: path.density as f32,
         lamp: path.lamp_seen(path.length),
         bounces: path.bounces,
+        is_alone: path.is_alone,
     }
 }

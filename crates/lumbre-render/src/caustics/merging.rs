@@ -12,7 +12,7 @@ use std::sync::Arc;
 use lumbre_math::{DVec3, Elementary};
 use lumbre_simd::Real;
 
-use super::{ChordSampler, Photons, SAMPLES_A_PASS};
+use super::{ChordSampler, PassPlan, Photons, SAMPLES_A_PASS};
 
 /// The photon radius of the first pass at a directly visible vertex, in widths of a sample's footprint, which is a
 /// quarter of a pixel wide.
@@ -28,6 +28,7 @@ pub(crate) struct Merging<'s> {
     pub(crate) chords: ChordSampler<'s>,
     /// The passes of all samples of the wave, each with its number.
     pub(crate) passes: Vec<(u32, Arc<Photons>)>,
+    pub(crate) plan: PassPlan,
     /// Lines of a pass.
     pub(crate) lines: f64,
     /// [`super::typical_way`]: the inverse of it stands for the density of a photon along its segment in the weights.
@@ -35,22 +36,17 @@ pub(crate) struct Merging<'s> {
 }
 
 impl Merging<'_> {
-    /// The pass of a sample.
-    pub(crate) fn pass_of(sample: u32) -> u32 {
-        sample / SAMPLES_A_PASS
-    }
-
     /// The photons for a sample.
     pub(crate) fn photons(&self, sample: u32) -> Option<&Photons> {
-        let pass = Self::pass_of(sample);
+        let pass = self.plan.pass_of(sample);
         self.passes.iter().find(|(number, _)| *number == pass).map(|(_, photons)| &**photons)
     }
 
-    /// The radius of a sample per width of a footprint: it shrinks from pass to pass, so that the mean of all passes
+    /// The radius of a sample per width of a footprint: it shrinks every [`SAMPLES_A_PASS`] samples, so that the mean of all passes
     /// converges to the right value (C. Knaus, M. Zwicker, "Progressive Photon Mapping: A Probabilistic Approach",
     /// 2011, with α = 2/3).
     pub(crate) fn widths(sample: u32) -> f32 {
-        let pass = f64::from(Self::pass_of(sample)) + 1.0;
+        let pass = f64::from(sample / SAMPLES_A_PASS) + 1.0;
         (WIDTHS * pass.power(-1.0 / 6.0)) as f32
     }
 

@@ -12,39 +12,73 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
+use lumbre_shading::spectrum::WavelengthDensity;
+
 pub(crate) use light_paths::{ChordSampler, LightTracer, typical_way};
 pub(crate) use merging::{Merging, radius};
 pub(crate) use photons::{Photon, Photons};
 pub use share::caustic_share;
 
-/// Samples per pixel that share a pass of light paths.
-pub(crate) const SAMPLES_A_PASS: u32 = 4;
-/// Lines of a pass: one for each pixel, within these limits.
+/// Samples per pixel that share a pass of light paths, in RGB.
+const SAMPLES_A_PASS: u32 = 4;
+/// Lines of a pass: one for each pixel, within these limits; in a spectral render, a quarter of it.
 const MIN_LINES: u32 = 1 << 12;
 const MAX_LINES: u32 = 1 << 18;
 /// Pieces of a pass, each traced by one thread.
 const PIECES: u32 = 32;
-/// Passes that are kept: those of the samples between two noise checks.
-const KEPT: usize = 8;
+/// Samples per pixel whose passes are kept: those between two noise checks.
+const KEPT_SAMPLES: u32 = 32;
 
-/// The lines of a pass for a picture of a size.
-pub(crate) fn lines_of(width: u32, height: u32) -> u32 {
-    width.saturating_mul(height).clamp(MIN_LINES, MAX_LINES)
+/// How the light paths of a picture are divided into passes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PassPlan {
+    /// The number of pixels across and down.
+    size: [u32; 2],
+    /// How paths choose wavelengths; `None` in RGB. The paths of a pass have the same wavelengths, those of the camera and
+    /// those of light. So there is a pass for each sample of a pixel, of fewer lines.
+    density: Option<WavelengthDensity>,
+}
+
+impl PassPlan {
+    /// The plan for a picture of a size, in RGB or by wavelengths.
+    pub(crate) fn new(size: [u32; 2], density: Option<WavelengthDensity>) -> Self {
+        Self { size, density }
+    }
+
+    /// The samples of a pixel that share a pass.
+    fn samples(&self) -> u32 {
+        if self.density.is_some() { 1 } else { SAMPLES_A_PASS }
+    }
+
+    /// The pass of a sample.
+    pub(crate) fn pass_of(&self, sample: u32) -> u32 {
+        sample / self.samples()
+    }
+
+    /// The lines of a pass.
+    pub(crate) fn lines(&self) -> u32 {
+        let [width, height] = self.size;
+        width.saturating_mul(height).clamp(MIN_LINES, MAX_LINES) / (SAMPLES_A_PASS / self.samples())
+    }
+
+    /// How many passes are kept.
+    fn kept(&self) -> usize {
+        (KEPT_SAMPLES / self.samples()) as usize
+    }
 }
 
 /// Memory bound of the passes for a picture of a size. A line may start several light paths, but most start none.
 pub(crate) fn memory_bytes(width: u32, height: u32) -> u64 {
-    KEPT as u64 * u64::from(lines_of(width, height)) * 2 * size_of::<Photon>() as u64
+    let plan = PassPlan::new([width, height], None);
+    plan.kept() as u64 * u64::from(plan.lines()) * 2 * size_of::<Photon>() as u64
 }
 
 /// The cached passes of a render.
 #[derive(Debug, Default)]
 pub(crate) struct Passes {
-    kept: Mutex<Vec<(Key, Arc<Pass>)>>,
+    /// Each with its plan and its number.
+    kept: Mutex<Vec<(PassPlan, u32, Arc<Pass>)>>,
 }
-
-/// The key of a pass: the size of the picture, and its number.
-type Key = ([u32; 2], u32);
 
 /// A pass while threads trace it.
 #[derive(Debug, Default)]
@@ -62,21 +96,21 @@ struct State {
 }
 
 impl Passes {
-    /// The photons of a pass for a picture of a size; traced if they are not cached.
-    pub(crate) fn get(&self, tracer: &LightTracer<'_>, size: [u32; 2], number: u32) -> Arc<Photons> {
-        let pass = self.find((size, number));
-        pass.help(tracer, lines_of(size[0], size[1]), number);
+    /// The photons of a pass; traced if they are not cached.
+    pub(crate) fn get(&self, tracer: &LightTracer<'_>, plan: &PassPlan, number: u32) -> Arc<Photons> {
+        let pass = self.find(plan, number);
+        pass.help(tracer, plan.lines(), number);
         pass.wait()
     }
 
-    fn find(&self, key: Key) -> Arc<Pass> {
+    fn find(&self, plan: &PassPlan, number: u32) -> Arc<Pass> {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        let pass = match kept.iter().position(|(other, _)| *other == key) {
-            Some(position) => kept.remove(position).1,
+        let pass = match kept.iter().position(|(of, at, _)| of == plan && *at == number) {
+            Some(position) => kept.remove(position).2,
             None => Arc::default(),
         };
-        kept.push((key, Arc::clone(&pass)));
-        if kept.len() > KEPT {
+        kept.push((*plan, number, Arc::clone(&pass)));
+        if kept.len() > plan.kept() {
             kept.remove(0);
         }
         pass

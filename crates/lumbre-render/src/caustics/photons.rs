@@ -2,6 +2,7 @@
 
 use lumbre_math::{DVec3, Vec3};
 use lumbre_shading::Spectrum;
+use lumbre_shading::spectrum::Wavelengths;
 
 /// Light that falls on a surface, or passes a point of a medium.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,6 +25,16 @@ pub(crate) struct Photon {
     pub(crate) lamp: f32,
     /// Specular bounces on its way.
     pub(crate) bounces: u32,
+    /// Whether its flux is that of the hero wavelength, which stands for all.
+    pub(crate) is_alone: bool,
+}
+
+impl Photon {
+    /// Its flux for a path; `is_alone` says whether the hero wavelength stands for all of the path's, too.
+    pub(crate) fn flux_for(&self, is_alone: bool) -> Spectrum {
+        // Both have the factor for the missing wavelengths, which counts once.
+        if is_alone && self.is_alone { self.flux / Wavelengths::COUNT as f32 } else { self.flux }
+    }
 }
 
 /// The photons of a pass.
@@ -140,6 +151,7 @@ mod tests {
                 density: 1.0,
                 lamp: 0.0,
                 bounces: 1,
+                is_alone: false,
             })
             .collect()
     }

@@ -36,6 +36,7 @@ pub fn caustic_share(scene: &Scene, options: &RenderOptions) -> Result<f64, Rend
         normals: options.integrator.shading_normals,
         max_bounces: options.integrator.max_depth.saturating_sub(1),
         goes_straight_on: scene.has_delta_transmission(),
+        density: None,
     };
     let mut photons = Vec::new();
     tracer(&chords).trace(PASS, 0..LINES, &mut photons);

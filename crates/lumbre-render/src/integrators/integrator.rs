@@ -18,6 +18,11 @@ pub trait Integrator: Debug + Send + Sync {
         false
     }
 
+    /// Whether all pixels choose the same wavelengths for samples of the same index, in a spectral render of this scene.
+    fn shares_wavelengths(&self, _scene: &Scene) -> bool {
+        false
+    }
+
     /// Whether rays from the camera are to have footprints, also in scenes without textures.
     fn needs_footprints(&self) -> bool {
         false

@@ -47,6 +47,17 @@ impl Sampler {
         [key as u32, (key >> 32) as u32]
     }
 
+    /// The number in [0, 1) by which all pixels choose the wavelengths of the samples with this index: a randomly
+    /// shifted van der Corput sequence, so that the wavelengths of the first 2ᵏ samples are equally spaced.
+    pub(crate) fn shared_wavelengths(&self, index: u32) -> f32 {
+        // Not a pixel of any picture.
+        let number = |index| self.draw(u32::MAX, u32::MAX, index).aim()[3];
+        match self.kind {
+            SamplerKind::Independent => number(index),
+            SamplerKind::Sobol => (number(0) + uniform::<f32>(UInt::splat(index.reverse_bits()))).fract(),
+        }
+    }
+
     /// The kind of all numbers.
     pub(crate) fn kind(&self) -> SamplerKind {
         self.kind
@@ -301,6 +312,23 @@ mod tests {
                 assert!((0.0..1.0).contains(&draw.lobe(1)) && (0.0..1.0).contains(&draw.survival(1)));
                 assert!(draw.light_point(1).max_element() < 1.0);
             }
+        }
+    }
+
+    #[test]
+    fn shared_wavelengths_of_a_power_of_two_of_samples_are_equally_spaced() {
+        let sampler = |seed, kind| Sampler::new(&SamplerDesc { kind, spp: None, seed });
+        let numbers = |seed, kind, count| {
+            let mut all: Vec<f32> = (0..count).map(|i| sampler(seed, kind).shared_wavelengths(i)).collect();
+            all.sort_unstable_by(f32::total_cmp);
+            all
+        };
+        for pair in numbers(9, SamplerKind::Sobol, 64).windows(2) {
+            assert!((pair[1] - pair[0] - 1.0 / 64.0).abs() < 1e-6, "{pair:?}");
+        }
+        assert_ne!(numbers(9, SamplerKind::Sobol, 4), numbers(8, SamplerKind::Sobol, 4));
+        for u in numbers(9, SamplerKind::Independent, 1000) {
+            assert!((0.0..1.0).contains(&u));
         }
     }
 

@@ -65,13 +65,14 @@ impl<'s> Wave<'s> {
         let bounces_left = setting.max_depth.saturating_sub((self.paths.depth[path] & !SCATTERED) + 1);
         let direction = self.paths.direction(path);
         let asymmetry = setting.scene.medium(medium).asymmetry();
+        let is_alone = self.is_alone(slot);
         let mut sum = Spectrum::BLACK;
         let mut seen = Vec::new();
         photons.media.within(point, radius.into(), |photon| {
             if photon.medium == to_column(Some(medium)) && photon.bounces <= bounces_left {
                 let phase = henyey_greenstein(direction.dot(photon.towards), asymmetry);
                 let weight = 1.0 / (1.0 + phase * share / photon.density);
-                let irradiance = photon.flux * spread;
+                let irradiance = photon.flux_for(is_alone) * spread;
                 let scattered = irradiance * (phase * weight);
                 sum += scattered;
                 if record.journal.is_some() {
@@ -83,6 +84,11 @@ impl<'s> Wave<'s> {
             record.note(|| Event::Photons(seen));
         }
         self.slots.radiance[slot] += record.added(Source::Caustics, self.paths.throughput(path), sum, 1.0);
+    }
+
+    /// Whether the hero wavelength stands for all of a sample.
+    fn is_alone(&self, slot: usize) -> bool {
+        self.slots.is_alone.get(slot).copied().unwrap_or(false)
     }
 
     /// Finds the photons near a vertex.
@@ -101,11 +107,12 @@ impl<'s> Wave<'s> {
         if !spread.is_finite() {
             return;
         }
+        let is_alone = self.is_alone(slot);
         photons.surfaces.within(self.vertices.point(at), radius.into(), |photon| {
             // A photon around a corner is on another surface.
             let is_level = photon.normal.dot(normal).abs() >= FRAC_1_SQRT_2;
             if is_level && photon.bounces <= bounces_left {
-                merges.push(vertex, photon, spread);
+                merges.push(vertex, is_alone, photon, spread);
             }
         });
     }

@@ -41,7 +41,7 @@ use lumbre_simd::{InstructionSet, Real};
 pub(crate) use paths::SampleId;
 pub(crate) use search::Precision;
 pub use sights::PrimaryHits;
-pub(crate) use sights::cone;
+pub(crate) use sights::{WavelengthChoice, cone};
 
 use crate::transport::Record;
 use crate::transport::journal::{End, Event, Source};

@@ -33,7 +33,7 @@ pub(crate) struct Merges {
 }
 
 impl Merges {
-    pub(super) fn push(&mut self, vertex: u32, photon: &Photon, spread: f32) {
+    pub(super) fn push(&mut self, vertex: u32, is_alone: bool, photon: &Photon, spread: f32) {
         if self.vertex.len() < self.len + 1 + PAD {
             let len = 2 * (self.len + PAD);
             let columns = self.towards.iter_mut().chain(&mut self.light).chain(&mut self.scattered);
@@ -47,7 +47,9 @@ impl Merges {
         for (column, x) in self.towards.iter_mut().zip(photon.towards.to_array()) {
             column[at] = x;
         }
-        for (column, x) in self.light.iter_mut().zip((photon.flux * (spread / cosine)).to_array()) {
+        for (column, x) in
+            self.light.iter_mut().zip((photon.flux_for(is_alone) * (spread / cosine)).to_array())
+        {
             column[at] = x;
         }
         self.share[at] = spread / photon.density;

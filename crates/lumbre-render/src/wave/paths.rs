@@ -108,8 +108,12 @@ impl Slots<'_> {
     }
 
     /// Chooses the wavelengths of all samples by a number each.
-    pub(crate) fn choose_wavelengths(&mut self, density: WavelengthDensity, numbers: &[f32]) {
-        self.wavelengths.extend(numbers[..self.len].iter().map(|&u| density.sample(u)));
+    pub(crate) fn choose_wavelengths(
+        &mut self,
+        density: WavelengthDensity,
+        numbers: impl Iterator<Item = f32>,
+    ) {
+        self.wavelengths.extend(numbers.take(self.len).map(|u| density.sample(u)));
         self.is_alone.resize(self.len, false);
     }
 

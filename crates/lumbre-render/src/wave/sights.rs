@@ -16,6 +16,14 @@ use crate::wave::setting::Setting;
 use crate::wave::trees::TreeIntegrator;
 use crate::wave::{Precision, Wave};
 
+/// How a render chooses the wavelengths of its samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct WavelengthChoice {
+    pub(crate) density: WavelengthDensity,
+    /// Whether samples of the same index have the same: [`Sampler::shared_wavelengths`].
+    pub(crate) is_shared: bool,
+}
+
 /// Samples whose camera rays have found their first hits. An integrator gives each its radiance.
 #[derive(Debug)]
 pub struct PrimaryHits<'a, 's> {
@@ -23,6 +31,7 @@ pub struct PrimaryHits<'a, 's> {
     view: &'a View,
     wave: &'a mut Wave<'s>,
     precision: Precision,
+    choice: Option<WavelengthChoice>,
     /// The slots that the integrator has to compute.
     wanted: Vec<u32>,
 }
@@ -36,14 +45,20 @@ impl<'a, 's> PrimaryHits<'a, 's> {
         precision: Precision,
         sampler: &Sampler,
         ids: &[SampleId],
-        density: Option<WavelengthDensity>,
+        choice: Option<WavelengthChoice>,
     ) -> Self {
         let Wave { aims, slots, paths, .. } = wave;
         slots.start(sampler, ids);
         paths.start(ids.len());
         InstructionSet::detect().run(AimNumbers { kind: sampler.kind(), slots, aims });
-        if let Some(density) = density {
-            slots.choose_wavelengths(density, aims.wavelengths());
+        match choice {
+            Some(WavelengthChoice { density, is_shared: true }) => {
+                slots.choose_wavelengths(density, ids.iter().map(|id| sampler.shared_wavelengths(id.index)));
+            }
+            Some(WavelengthChoice { density, is_shared: false }) => {
+                slots.choose_wavelengths(density, aims.wavelengths().iter().copied());
+            }
+            None => {}
         }
         if scene.has_solids() {
             slots.start_outside();
@@ -52,7 +67,7 @@ impl<'a, 's> PrimaryHits<'a, 's> {
             slots.start_in(view.medium());
         }
         wave.is_first = true;
-        Self { scene, view, wave, precision, wanted: (0..ids.len() as u32).collect() }
+        Self { scene, view, wave, precision, choice, wanted: (0..ids.len() as u32).collect() }
     }
 
     /// The numbers that aim a sample: see [`SampleNumbers::aim`].
@@ -173,6 +188,11 @@ impl<'a, 's> PrimaryHits<'a, 's> {
     /// The radiance of every sample; black if the integrator set none.
     pub(crate) fn radiance(&self) -> &[Spectrum] {
         &self.wave.slots.radiance
+    }
+
+    /// How samples choose their wavelengths; `None` in RGB.
+    pub(crate) fn wavelength_choice(&self) -> Option<WavelengthChoice> {
+        self.choice
     }
 
     /// Whether samples carry wavelengths.

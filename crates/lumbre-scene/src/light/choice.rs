@@ -208,8 +208,10 @@ impl Elsewhere {
         if normal == DVec3::ZERO {
             return self.power;
         }
-        let cosine = lights[self.light as usize].towards(time).map_or(1.0, |towards| normal.dot(towards));
-        // As for lights in the tree: rounding may light a surface in the light's own plane.
-        if cosine < -HORIZON_SLACK { 0.0 } else { self.power * cosine.max(HORIZON_SLACK) }
+        let light = &lights[self.light as usize];
+        let cosine = light.towards(time).map_or(1.0, |towards| normal.dot(towards));
+        // As for lights in the tree: rounding may light a surface in the light's own plane. A disc may be above it in part.
+        let slack = HORIZON_SLACK + light.half_width();
+        if cosine < -slack { 0.0 } else { self.power * cosine.max(slack) }
     }
 }

@@ -59,6 +59,7 @@ impl Light {
             | Self::Goniometric(_)
             | Self::Projection(_)
             | Self::Distant(_)
+            | Self::Disc(_)
             | Self::Uniform(_)
             | Self::Environment(_)
             | Self::Portal(_)

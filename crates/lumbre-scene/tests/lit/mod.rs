@@ -85,6 +85,7 @@ pub(crate) fn lights_of_all_kinds(sky: Option<EnvironmentMapping>) -> Scene {
         LightDesc::Point { from: v(1.0, -2.0, 2.0), intensity: Rgb::splat(3.0) },
         spot,
         LightDesc::Distant { towards: v(0.2, 1.0, 0.4), irradiance: Rgb::splat(0.7) },
+        LightDesc::Disc { towards: v(-0.3, 0.4, 0.8), angle: 30.0, irradiance: Rgb::splat(0.5) },
         match sky {
             None => LightDesc::Infinite {
                 world_from_light: Transform::IDENTITY,

@@ -200,6 +200,14 @@ fn observe(mut value: impl FnMut(f64) -> f64) -> [f64; 3] {
     xyz
 }
 
+/// The luminance of a spectrum of radiance per nm, without luminous efficacy: its integral over ȳ; `None` for a colour, and for
+/// what is dark.
+pub(crate) fn luminance_of(spectrum: &SpectrumValue) -> Option<f64> {
+    spectrum.at(FIRST_NM)?;
+    let [_, luminance, _] = observe(|nm| spectrum.at(nm).unwrap_or(0.0));
+    (luminance > 0.0 && luminance.is_finite()).then_some(luminance)
+}
+
 /// Each channel's response to D65.
 static WHITE: LazyLock<[f64; 3]> = LazyLock::new(|| rec709_from_xyz(observe(named::d65)));
 

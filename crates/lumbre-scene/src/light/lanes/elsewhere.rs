@@ -32,6 +32,12 @@ enum Kind {
         towards: [f32; 3],
         irradiance: [f32; 3],
     },
+    /// A disc at infinity: by scalar code.
+    Disc {
+        towards: [f32; 3],
+        /// [`SLACK`] for all of it.
+        slack: f32,
+    },
     /// Parallel light that moves: by scalar code.
     Moving,
     /// From all around, by scalar code.
@@ -46,6 +52,10 @@ impl LaneElsewhere {
             Light::Distant(light) => Kind::Distant {
                 towards: light.towards.as_vec3().to_array(),
                 irradiance: light.irradiance.to_array(),
+            },
+            Light::Disc(light) => Kind::Disc {
+                towards: light.towards().as_vec3().to_array(),
+                slack: SLACK + light.sine() as f32,
             },
             Light::Moving(_) => Kind::Moving,
             _ => Kind::Scalar,
@@ -73,16 +83,17 @@ impl LaneElsewhere {
         let power = R::splat(self.power);
         let towards = match self.kind {
             Kind::Uniform { .. } | Kind::Environment | Kind::Scalar => return power,
-            Kind::Distant { towards, .. } => V3::constant(towards),
+            Kind::Distant { towards, .. } | Kind::Disc { towards, .. } => V3::constant(towards),
             Kind::Moving => {
                 let mut towards = [[0.0; MAX_LANES]; 3];
                 directions(scene, self.light, active.to_bitmask(), &Receivers::new(receiver), &mut towards);
                 scalar::from_singles(&towards)
             }
         };
+        let slack = R::splat(if let Kind::Disc { slack, .. } = self.kind { slack } else { SLACK });
         let cosine = place.normal.dot(towards);
-        let is_above = cosine.simd_ge(R::splat(-SLACK));
-        let given = (power * cosine.simd_max(R::splat(SLACK))).or_zero(is_above);
+        let is_above = cosine.simd_ge(-slack);
+        let given = (power * cosine.simd_max(slack)).or_zero(is_above);
         R::select(place.is_oriented, given, power)
     }
 
@@ -220,6 +231,7 @@ fn escaped_scalar(
         pdf[lane] = match light {
             Light::Environment(light) => light.pdf_beside_others(direction) as f32,
             Light::Portal(light) => light.pdf(from, direction) as f32,
+            Light::Disc(light) => light.pdf(direction) as f32,
             _ => 0.0,
         };
         for (column, number) in radiance.iter_mut().zip(light.escaped(from, direction).to_array()) {
