@@ -1,17 +1,14 @@
-//! Surfaces of functions, and fields of heights.
+//! Surfaces of functions.
 
 use std::sync::Arc;
 
 use lumbre_geometry::{Aabb, Ray, Root, Roots};
-use lumbre_math::{DVec2, DVec3, Vec2, Vec3};
-use lumbre_scene::MeshDesc;
+use lumbre_math::DVec3;
 use lumbre_shading::pov::Function;
 
 use super::lexer::Kind;
 use super::objects::Form;
 use super::{Parser, Result};
-use crate::Diagnostic;
-use crate::diagnostic::quoted;
 
 /// Where a function of x, y and z is below a threshold, within a box or a sphere.
 #[derive(Clone, Debug)]
@@ -244,106 +241,5 @@ impl Parser<'_, '_> {
         self.expect(b'}')?;
         self.expect(b'}')?;
         Ok(container)
-    }
-
-    /// A field of heights as a mesh over the unit square, up to what modifies it.
-    pub(super) fn height_field(&mut self) -> Result<Form> {
-        let (width, height, heights) = self.heights()?;
-        let (mut is_smooth, mut water) = (false, 0.0);
-        loop {
-            if self.take_word("smooth")? {
-                is_smooth = self.optional_bool()?;
-            } else if self.take_word("water_level")? {
-                water = self.finite()?;
-            } else if self.take_word("hierarchy")? {
-                self.optional_bool()?;
-            } else {
-                break;
-            }
-        }
-        let at = |x: u32, y: u32| f64::from(heights[(y * width + x) as usize]);
-        let place = |x: u32, y: u32| {
-            let (u, v) = (f64::from(x) / f64::from(width - 1), f64::from(y) / f64::from(height - 1));
-            // The first row is at the far side.
-            DVec3::new(u, at(x, y), 1.0 - v)
-        };
-        let count = u64::from(width) * u64::from(height);
-        self.budget.elements(2 * count, "triangles of a height field")?;
-        self.budget.bytes(56 * count, "triangles of a height field")?;
-        let mut mesh = MeshDesc::default();
-        let mut normals = Vec::new();
-        let mut uvs = Vec::new();
-        for y in 0..height {
-            for x in 0..width {
-                let p = place(x, y);
-                mesh.positions.push(Vec3::new(p.x as f32, p.y as f32, p.z as f32));
-                uvs.push(Vec2::new(p.x as f32, p.z as f32));
-                let (left, right) = (place(x.saturating_sub(1), y), place((x + 1).min(width - 1), y));
-                let (up, down) = (place(x, y.saturating_sub(1)), place(x, (y + 1).min(height - 1)));
-                let n = (up - down).cross(right - left).normalize_or(DVec3::Y);
-                normals.push(Vec3::new(n.x as f32, n.y as f32, n.z as f32));
-            }
-        }
-        for y in 0..height - 1 {
-            for x in 0..width - 1 {
-                let i = y * width + x;
-                let [a, b, c, d] = [i, i + 1, i + width, i + width + 1];
-                for face in [[a, d, c], [a, b, d]] {
-                    if face.iter().any(|&i| f64::from(mesh.positions[i as usize].y) >= water) {
-                        mesh.triangles.push(face);
-                    }
-                }
-            }
-        }
-        mesh.uvs = Some(uvs);
-        mesh.normals = is_smooth.then_some(normals);
-        Ok(Form::Mesh(Arc::new(mesh)))
-    }
-
-    /// Columns, rows, and heights row by row.
-    fn heights(&mut self) -> Result<(u32, u32, Vec<f32>)> {
-        if self.take_word("function")? {
-            let width = self.whole(2.0, 65_536.0)?;
-            self.comma()?;
-            let height = self.whole(2.0, 65_536.0)?;
-            let function = self.function_block(&["x", "y", "z"])?;
-            let mut heights = self.budget.vec(u64::from(width) * u64::from(height), "heights")?;
-            let step = |i: u32, n: u32| f64::from(i) / f64::from(n - 1);
-            for y in 0..height {
-                for x in 0..width {
-                    let p = DVec2::new(step(x, width), step(y, height));
-                    heights.push(function.value(&[p.x, p.y, 0.0]).clamp(0.0, 1.0) as f32);
-                }
-            }
-            return Ok((width, height, heights));
-        }
-        if matches!(self.peek()?, Some(Kind::Word(word)) if !matches!(&**word, "concat")) {
-            self.peeked = None;
-        }
-        let name = self.file_name()?;
-        let Some(path) = self.find(&name) else {
-            let wrong = Diagnostic::error("an image that is not there").found(quoted(&name));
-            return Err(self.diagnostic(wrong).into());
-        };
-        let file = crate::image::open_image(&path, self.budget, self.diagnostics)?;
-        let bitmap = &file.bitmap;
-        let (width, height) = (bitmap.width(), bitmap.height());
-        if width < 2 || height < 2 {
-            return Err(self.error("the image of a height field has two columns and rows or more"));
-        }
-        let mut heights = self.budget.vec(u64::from(width) * u64::from(height), "heights")?;
-        let is_gray = matches!(bitmap.channels(), lumbre_image::Channels::Y | lumbre_image::Channels::Ya);
-        for y in 0..height {
-            for x in 0..width {
-                // Numbers as they are stored; of colours red is the high byte and green the low one.
-                let value = if is_gray {
-                    bitmap.stored(x, y, 0)
-                } else {
-                    (bitmap.stored(x, y, 0) * 256.0 + bitmap.stored(x, y, 1)) / 257.0
-                };
-                heights.push(value);
-            }
-        }
-        Ok((width, height, heights))
     }
 }

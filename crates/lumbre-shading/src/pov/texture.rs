@@ -239,13 +239,13 @@ impl UvForm {
                 let across = p.x.hypotenuse(p.z) - radius;
                 DVec2::new(1.0 - (p.z.angle_from(p.x) + PI) / TAU, (p.y.angle_from(across) + PI) / TAU)
             }
-            Self::Cuboid(low, high) => cross((p - *low) / (*high - *low)),
+            Self::Cuboid(low, high) => unfolded((p - *low) / (*high - *low)),
         }
     }
 }
 
 /// The unfolded faces of the unit cube.
-fn cross(p: DVec3) -> DVec2 {
+pub(super) fn unfolded(p: DVec3) -> DVec2 {
     let DVec3 { x, y, z } = p;
     let faces = [x.abs(), (1.0 - x).abs(), y.abs(), (1.0 - y).abs(), z.abs(), (1.0 - z).abs()];
     let nearest = (0..6).min_by(|&a, &b| faces[a].total_cmp(&faces[b])).unwrap_or(0);
