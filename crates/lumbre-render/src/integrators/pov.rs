@@ -259,7 +259,7 @@ impl<'s> Tracer<'s> {
                     sum += shaded * self.shadow(here, light, from, record);
                 }
             }
-            return sum / (n * m) as f32;
+            return sum * ((n * m) as f32).recip();
         }
         let arriving = light.arriving(p, light.from);
         let shaded = self.shaded(traced, here, material, layer, light, light.from, arriving, opacity);

@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
-use lumbre_math::{DVec3, Elementary, Transform};
+use lumbre_math::{DVec2, DVec3, Elementary, Transform};
 
 use super::noise::{Octaves, hash3, random};
-use super::texture::unfolded;
 
 /// The way of a point from the surface to the pattern, the last written first.
 #[derive(Clone, Debug, Default)]
@@ -213,4 +212,20 @@ fn cubic(p: DVec3) -> DVec3 {
         return DVec3::ZERO;
     }
     unfolded(0.5 + 0.5 * p / depth).extend(depth)
+}
+
+/// The unfolded faces of the unit cube.
+pub(super) fn unfolded(p: DVec3) -> DVec2 {
+    let DVec3 { x, y, z } = p;
+    let faces = [x.abs(), (1.0 - x).abs(), y.abs(), (1.0 - y).abs(), z.abs(), (1.0 - z).abs()];
+    let nearest = (0..6).min_by(|&a, &b| faces[a].total_cmp(&faces[b])).unwrap_or(0);
+    let [u, v] = match nearest {
+        0 => [z / 4.0, (1.0 + y) / 3.0],
+        1 => [0.75 - z / 4.0, (1.0 + y) / 3.0],
+        2 => [(1.0 + x) / 4.0, z / 3.0],
+        3 => [(1.0 + x) / 4.0, 1.0 - z / 3.0],
+        4 => [1.0 - x / 4.0, (1.0 + y) / 3.0],
+        _ => [(1.0 + x) / 4.0, (1.0 + y) / 3.0],
+    };
+    DVec2::new(u, v)
 }
