@@ -117,7 +117,11 @@ impl Corpus {
         warnings.retain(|warning| !HARMLESS.iter().any(|words| warning.contains(words)));
         let error = of_kind("error: ").into_iter().next().filter(|_| !run.is_good);
         if run.is_late {
-            return Ok(Outcome { error, warnings, agreement: Agreement::Unknown("takes longer than it may") });
+            return Ok(Outcome {
+                error,
+                warnings,
+                agreement: Agreement::Unknown("takes longer than it may"),
+            });
         }
         let picture = produced(&ours).and_then(|path| Picture::read(&path).ok());
         let Some(picture) = picture.filter(|_| run.is_good) else {
@@ -146,11 +150,8 @@ impl Corpus {
 
 impl Outcome {
     fn line(&self) -> String {
-        let said = if self.warnings.is_empty() {
-            String::new()
-        } else {
-            format!(" ({})", self.warnings.join("; "))
-        };
+        let said =
+            if self.warnings.is_empty() { String::new() } else { format!(" ({})", self.warnings.join("; ")) };
         match (&self.error, &self.agreement) {
             (Some(error), _) => format!("is not read: {error}{said}"),
             (None, Agreement::Unknown(why)) => format!("{why}{said}"),
@@ -163,7 +164,9 @@ impl Outcome {
 }
 
 fn print_tables(folders: &BTreeMap<String, Vec<Outcome>>) {
-    println!("\n| folder | scenes | read | without a warning | compared | agree |\n|---|---|---|---|---|---|");
+    println!(
+        "\n| folder | scenes | read | without a warning | compared | agree |\n|---|---|---|---|---|---|"
+    );
     let row = |name: &str, outcomes: &[&Outcome]| {
         let count = |test: &dyn Fn(&Outcome) -> bool| outcomes.iter().filter(|o| test(o)).count();
         println!(
@@ -208,13 +211,7 @@ struct Run {
     seconds: f64,
 }
 
-fn run_lumbre(
-    program: &Path,
-    scene: &Path,
-    out: &Path,
-    switches: &[String],
-    limit: Duration,
-) -> Result<Run> {
+fn run_lumbre(program: &Path, scene: &Path, out: &Path, switches: &[String], limit: Duration) -> Result<Run> {
     forget(out);
     let mut command = Command::new(program);
     command.arg("render").arg(scene).args(switches).arg(format!("+O{}", out.display()));

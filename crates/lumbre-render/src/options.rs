@@ -106,9 +106,7 @@ impl Stop {
     pub fn usual(kind: IntegratorKind, spp: Option<u32>) -> Self {
         match (spp, kind) {
             (Some(spp), _) => Self::at(spp),
-            (None, IntegratorKind::Pov) => {
-                Self { noise: Some(EDGE_NOISE), min_spp: Some(4), ..Self::at(16) }
-            }
+            (None, IntegratorKind::Pov) => Self { noise: Some(EDGE_NOISE), min_spp: Some(4), ..Self::at(16) },
             (None, _) => Self::at(DEFAULT_SPP),
         }
     }

@@ -1,19 +1,10 @@
 //! Fields of heights over the unit square, as POV-Ray divides and smooths them.
 
-use std::sync::Arc;
-
 use lumbre_geometry::{Aabb, Ray, Root, Roots};
-use lumbre_image::{Bitmap, Channels, PixelData};
 use lumbre_math::{DVec2, DVec3};
 
-use super::lexer::Kind;
-use super::objects::Form;
-use super::{Parser, Result};
-use crate::Diagnostic;
-use crate::diagnostic::quoted;
-
 /// Heights are whole numbers below this, and 1 is this.
-const LEVELS: f64 = 65_536.0;
+pub(super) const LEVELS: f64 = 65_536.0;
 /// Normals of nodes are kept in whole parts of this.
 const NORMAL_PARTS: f64 = 32_767.0;
 /// By how much the boxes of flat cells are thicker than these.
@@ -41,7 +32,7 @@ struct Blocks {
 
 impl Heights {
     /// At least two nodes along each side; row by row, the first at z = 0.
-    fn new(size: [u32; 2], heights: Vec<f32>, water: f64, is_smooth: bool) -> Self {
+    pub(super) fn new(size: [u32; 2], heights: Vec<f32>, water: f64, is_smooth: bool) -> Self {
         let cells = [size[0] - 1, size[1] - 1];
         let mut ranges = Vec::with_capacity((cells[0] * cells[1]) as usize);
         for z in 0..cells[1] {
@@ -172,13 +163,7 @@ impl Heights {
     }
 
     /// Where a ray is within the box around a block.
-    fn range_in(
-        &self,
-        ray: &Ray,
-        level: usize,
-        block: [u32; 2],
-        [low, high]: [f32; 2],
-    ) -> Option<[f64; 2]> {
+    fn range_in(&self, ray: &Ray, level: usize, block: [u32; 2], [low, high]: [f32; 2]) -> Option<[f64; 2]> {
         if f64::from(high) < self.water {
             return None;
         }
@@ -269,92 +254,6 @@ impl Blocks {
     }
 }
 
-impl Parser<'_, '_> {
-    /// A field of heights over the unit square, up to what modifies it.
-    pub(super) fn height_field(&mut self) -> Result<Form> {
-        let (size, mut heights) = self.heights()?;
-        let (mut is_smooth, mut water) = (false, 0.0);
-        loop {
-            if self.take_word("smooth")? {
-                is_smooth = self.optional_bool()?;
-            } else if self.take_word("water_level")? {
-                water = self.finite()?;
-            } else if self.take_word("hierarchy")? {
-                self.optional_bool()?;
-            } else {
-                break;
-            }
-        }
-        let count = u64::from(size[0]) * u64::from(size[1]);
-        self.budget.elements(2 * count, "triangles of a height field")?;
-        self.budget.bytes(16 * count, "ranges of a height field")?;
-        // The first row of an image is at the far side.
-        let width = size[0] as usize;
-        let rows = heights.chunks(width).rev().flatten().copied();
-        heights = rows.map(|level| level / LEVELS as f32).collect();
-        Ok(Form::Heights(Arc::new(Heights::new(size, heights, water, is_smooth))))
-    }
-
-    /// Columns and rows, and heights in levels, row by row.
-    fn heights(&mut self) -> Result<([u32; 2], Vec<f32>)> {
-        if self.take_word("function")? {
-            let width = self.whole(2.0, 65_536.0)?;
-            self.comma()?;
-            let height = self.whole(2.0, 65_536.0)?;
-            let function = self.function_block(&["x", "y", "z"])?;
-            let mut heights = self.budget.vec(u64::from(width) * u64::from(height), "heights")?;
-            let step = |i: u32, n: u32| f64::from(i) / f64::from(n - 1);
-            for y in 0..height {
-                for x in 0..width {
-                    let value = function.value(&[step(x, width), step(y, height), 0.0]);
-                    heights.push((value.clamp(0.0, 1.0) * (LEVELS - 1.0)).floor() as f32);
-                }
-            }
-            return Ok(([width, height], heights));
-        }
-        let mut kind = None;
-        if let Some(Kind::Word(word)) = self.peek()?
-            && &**word != "concat"
-        {
-            kind = Some(word.to_string());
-            self.peeked = None;
-        }
-        let name = self.file_name()?;
-        let Some(path) = self.find(&name) else {
-            let wrong = Diagnostic::error("an image that is not there").found(quoted(&name));
-            return Err(self.diagnostic(wrong).into());
-        };
-        let file = crate::image::open_image(&path, self.budget, self.diagnostics)?;
-        let bitmap = &file.bitmap;
-        let (width, height) = (bitmap.width(), bitmap.height());
-        if width < 2 || height < 2 {
-            return Err(self.error("the image of a height field has two columns and rows or more"));
-        }
-        let mut heights = self.budget.vec(u64::from(width) * u64::from(height), "heights")?;
-        let is_png = kind.as_deref() == Some("png");
-        for y in 0..height {
-            for x in 0..width {
-                heights.push(level(bitmap, x, y, is_png));
-            }
-        }
-        Ok(([width, height], heights))
-    }
-}
-
-/// The level of a pixel: numbers as they are stored, where red is the high byte and green the low one of what has colours.
-fn level(bitmap: &Bitmap, x: u32, y: u32, is_png: bool) -> f32 {
-    let stored = bitmap.stored(x, y, 0);
-    if !matches!(bitmap.channels(), Channels::Y | Channels::Ya) {
-        return (stored * 255.0).round() * 256.0 + (bitmap.stored(x, y, 1) * 255.0).round();
-    }
-    if is_png && matches!(bitmap.data(), PixelData::U8(_)) {
-        // POV-Ray weighs the three equal channels of such a pixel in single precision, and drops what is behind the point.
-        let gray = 255.0 * (0.297_f32 * stored + 0.589_f32 * stored + 0.114_f32 * stored);
-        return gray.floor() * 257.0;
-    }
-    (stored * (LEVELS as f32 - 1.0)).round()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -388,8 +287,7 @@ mod tests {
                 crossings += 1;
             }
             for pair in roots.windows(2) {
-                let side =
-                    |share: f64| field.contains(ray.at(pair[0].t + share * (pair[1].t - pair[0].t)));
+                let side = |share: f64| field.contains(ray.at(pair[0].t + share * (pair[1].t - pair[0].t)));
                 assert!([0.2, 0.4, 0.6, 0.8].iter().all(|share| side(*share) == side(0.1)), "{i}");
             }
         }
@@ -425,9 +323,8 @@ mod tests {
         for j in 0..5 {
             for i in 0..5 {
                 let (x, y) = (f64::from(i) / 4.0, 1.0 - f64::from(j) / 4.0);
-                let value = 0.5
-                    + 0.4 * (7.0 * x + 1.3).sin() * (5.0 * y + 0.4).cos()
-                    + 0.05 * (31.0 * x * y).sin();
+                let value =
+                    0.5 + 0.4 * (7.0 * x + 1.3).sin() * (5.0 * y + 0.4).cos() + 0.05 * (31.0 * x * y).sin();
                 heights.push(((value * 65_535.0).floor() / 65_536.0) as f32);
             }
         }

@@ -1,14 +1,18 @@
-//! Surfaces of functions.
+//! Surfaces of functions, and fields of heights.
 
 use std::sync::Arc;
 
 use lumbre_geometry::{Aabb, Ray, Root, Roots};
+use lumbre_image::{Bitmap, Channels, PixelData};
 use lumbre_math::DVec3;
 use lumbre_shading::pov::Function;
 
+use super::heights::{Heights, LEVELS};
 use super::lexer::Kind;
 use super::objects::Form;
 use super::{Parser, Result};
+use crate::Diagnostic;
+use crate::diagnostic::quoted;
 
 /// Where a function of x, y and z is below a threshold, within a box or a sphere.
 #[derive(Clone, Debug)]
@@ -242,4 +246,90 @@ impl Parser<'_, '_> {
         self.expect(b'}')?;
         Ok(container)
     }
+}
+
+impl Parser<'_, '_> {
+    /// A field of heights over the unit square, up to what modifies it.
+    pub(super) fn height_field(&mut self) -> Result<Form> {
+        let (size, mut heights) = self.heights()?;
+        let (mut is_smooth, mut water) = (false, 0.0);
+        loop {
+            if self.take_word("smooth")? {
+                is_smooth = self.optional_bool()?;
+            } else if self.take_word("water_level")? {
+                water = self.finite()?;
+            } else if self.take_word("hierarchy")? {
+                self.optional_bool()?;
+            } else {
+                break;
+            }
+        }
+        let count = u64::from(size[0]) * u64::from(size[1]);
+        self.budget.elements(2 * count, "triangles of a height field")?;
+        self.budget.bytes(16 * count, "ranges of a height field")?;
+        // The first row of an image is at the far side.
+        let width = size[0] as usize;
+        let rows = heights.chunks(width).rev().flatten().copied();
+        heights = rows.map(|level| level / LEVELS as f32).collect();
+        Ok(Form::Heights(Arc::new(Heights::new(size, heights, water, is_smooth))))
+    }
+
+    /// Columns and rows, and heights in levels, row by row.
+    fn heights(&mut self) -> Result<([u32; 2], Vec<f32>)> {
+        if self.take_word("function")? {
+            let width = self.whole(2.0, 65_536.0)?;
+            self.comma()?;
+            let height = self.whole(2.0, 65_536.0)?;
+            let function = self.function_block(&["x", "y", "z"])?;
+            let mut heights = self.budget.vec(u64::from(width) * u64::from(height), "heights")?;
+            let step = |i: u32, n: u32| f64::from(i) / f64::from(n - 1);
+            for y in 0..height {
+                for x in 0..width {
+                    let value = function.value(&[step(x, width), step(y, height), 0.0]);
+                    heights.push((value.clamp(0.0, 1.0) * (LEVELS - 1.0)).floor() as f32);
+                }
+            }
+            return Ok(([width, height], heights));
+        }
+        let mut kind = None;
+        if let Some(Kind::Word(word)) = self.peek()?
+            && &**word != "concat"
+        {
+            kind = Some(word.to_string());
+            self.peeked = None;
+        }
+        let name = self.file_name()?;
+        let Some(path) = self.find(&name) else {
+            let wrong = Diagnostic::error("an image that is not there").found(quoted(&name));
+            return Err(self.diagnostic(wrong).into());
+        };
+        let file = crate::image::open_image(&path, self.budget, self.diagnostics)?;
+        let bitmap = &file.bitmap;
+        let (width, height) = (bitmap.width(), bitmap.height());
+        if width < 2 || height < 2 {
+            return Err(self.error("the image of a height field has two columns and rows or more"));
+        }
+        let mut heights = self.budget.vec(u64::from(width) * u64::from(height), "heights")?;
+        let is_png = kind.as_deref() == Some("png");
+        for y in 0..height {
+            for x in 0..width {
+                heights.push(level(bitmap, x, y, is_png));
+            }
+        }
+        Ok(([width, height], heights))
+    }
+}
+
+/// The level of a pixel: numbers as they are stored, where red is the high byte and green the low one of what has colours.
+fn level(bitmap: &Bitmap, x: u32, y: u32, is_png: bool) -> f32 {
+    let stored = bitmap.stored(x, y, 0);
+    if !matches!(bitmap.channels(), Channels::Y | Channels::Ya) {
+        return (stored * 255.0).round() * 256.0 + (bitmap.stored(x, y, 1) * 255.0).round();
+    }
+    if is_png && matches!(bitmap.data(), PixelData::U8(_)) {
+        // POV-Ray weighs the three equal channels of such a pixel in single precision, and drops what is behind the point.
+        let gray = 255.0 * (0.297_f32 * stored + 0.589_f32 * stored + 0.114_f32 * stored);
+        return gray.floor() * 257.0;
+    }
+    (stored * (LEVELS as f32 - 1.0)).round()
 }

@@ -51,7 +51,11 @@ impl Enclosure {
     pub(super) fn new(positions: Vec<lumbre_math::Vec3>, direction: DVec3) -> Self {
         let count = positions.len() as u32 / 3;
         let triangles = (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-        Self { mesh: MeshDesc { positions, triangles, ..MeshDesc::default() }, tree: OnceLock::new(), direction }
+        Self {
+            mesh: MeshDesc { positions, triangles, ..MeshDesc::default() },
+            tree: OnceLock::new(),
+            direction,
+        }
     }
 
     pub(super) fn contains(&self, p: DVec3) -> bool {
@@ -188,8 +192,7 @@ impl MeshTree {
                 continue;
             }
             for &face in &self.order[node.first..node.first + node.count] {
-                let [a, b, c] =
-                    mesh.triangles[face as usize].map(|i| mesh.positions[i as usize].as_dvec3());
+                let [a, b, c] = mesh.triangles[face as usize].map(|i| mesh.positions[i as usize].as_dvec3());
                 let Ok(triangle) = Triangle::new(a, b, c) else { continue };
                 if let Some(root) = triangle.closest(ray) {
                     last = last.min(visit(face, &root));
