@@ -188,11 +188,12 @@ impl<'s> Tracer<'s> {
         here: &Interaction<'s>,
         material: &'s PovMaterial,
         layers: &[LayerAt<'_>],
-        mut left: Spectrum,
+        fade: Spectrum,
         is_inside: bool,
         record: &mut Record,
     ) -> Spectrum {
         let mut sum = Spectrum::BLACK;
+        let mut left = fade;
         // What the lights give is the same for layers of the same normal.
         let mut shadows: Vec<Option<Spectrum>> = vec![None; self.lights.len()];
         for layer in layers.iter().rev() {
@@ -213,7 +214,7 @@ impl<'s> Tracer<'s> {
         if let Some(top) = layers.last()
             && gray(left) >= self.world.adc_bailout
         {
-            sum += self.passing(traced, here, material, top, left, is_inside, record);
+            sum += self.passing(traced, here, material, top, [left, fade], is_inside, record);
         }
         sum
     }
@@ -417,7 +418,7 @@ impl<'s> Tracer<'s> {
         here: &Interaction<'s>,
         material: &'s PovMaterial,
         layer: &LayerAt<'_>,
-        left: Spectrum,
+        [left, fade]: [Spectrum; 2],
         is_inside: bool,
         record: &mut Record,
     ) -> Spectrum {
@@ -440,7 +441,7 @@ impl<'s> Tracer<'s> {
         let (direction, inside) = if is_straight {
             (d, inside)
         } else if is_total {
-            // All light is mirrored, and nothing is filtered.
+            // All light is mirrored, and layers filter nothing.
             (d + n * (2.0 * cosine), traced.inside.clone())
         } else {
             (d * eta + n * (eta * cosine - under.sqrt()), inside)
@@ -455,7 +456,7 @@ impl<'s> Tracer<'s> {
         };
         record.counts.bounce += 1;
         let seen = self.trace_straight(next, is_straight, record);
-        if is_total { seen } else { left * seen }
+        if is_total { fade * seen } else { left * seen }
     }
 
     /// A ray that goes straight on counts as the same ray, but not without end.
