@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail};
 use clap::Subcommand;
 use xtask::command::{Profile, release_program, root, run_ours, succeeds};
 
+use crate::povray::Times;
 use crate::race::Race;
 use crate::race::scaling::Scaling;
 use crate::{PassedOn, field};
@@ -40,6 +41,8 @@ pub(crate) enum Bench {
         #[arg(long, default_value_t = 2)]
         threads: usize,
     },
+    /// Ten example scenes of POV-Ray, against povray where both are installed.
+    Povray(Times),
 }
 
 impl Bench {
@@ -50,6 +53,7 @@ impl Bench {
             Self::Growth(passed) => run_ours("lumbre-growth", Profile::Release, &passed.arguments),
             Self::Render(race) => race.run(),
             Self::Scaling(scaling) => scaling.run(),
+            Self::Povray(times) => times.run(),
             Self::Field { pov, runs, threads } => run_field(pov.as_deref(), runs, threads),
         }
     }

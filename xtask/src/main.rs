@@ -17,6 +17,7 @@ mod files;
 mod fuzz;
 mod page;
 mod pictures;
+mod povray;
 mod proof;
 mod python;
 mod race;
@@ -75,6 +76,9 @@ enum Task {
     /// Compares a picture with a reference of the same scene, means, and each pixel by its noise: `agree --help`.
     #[command(disable_help_flag = true)]
     Agree(PassedOn),
+    /// Walks the example scenes of POV-Ray, where they and povray are installed: which are read, without a warning, and which agree with
+    /// POV-Ray's picture. The program is the one that `LUMBRE_PROGRAM` names, if any.
+    Povray(povray::Corpus),
     /// Proves the kernel by numbers, more of them than the tests have: `leaks` sends rays at edges and vertices of closed
     /// meshes, `loop` compares trees with a loop over everything.
     Proof {
@@ -134,6 +138,7 @@ fn main() -> Result<()> {
             written => Ok(written?),
         },
         Task::Agree(passed) => passed.hand_to_pictures("agree"),
+        Task::Povray(corpus) => corpus.run(),
         Task::Proof { what, rays, seed } => proof::run_proof(what, rays, seed),
         Task::Miri => proof::miri(),
         Task::Asan => proof::asan(),

@@ -16,7 +16,7 @@ use report::{Agreement, Curve, Heat};
 use scene::Scene;
 
 mod curve;
-mod picture;
+pub(crate) mod picture;
 mod plot;
 mod program;
 mod report;

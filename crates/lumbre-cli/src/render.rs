@@ -86,7 +86,7 @@ pub(crate) struct Arguments {
     /// The format of a picture on standard output: png by default.
     #[arg(long, value_name = "FORMAT", value_parser = one_of(&WRITTEN, written_format))]
     output_format: Option<ImageFormat>,
-    /// Samples per pixel. By default as many as the scene says, else 64; 16 for a model whose noise is taken out.
+    /// Samples per pixel. By default as many as the scene says, else 64; 16 for a model whose noise is taken out; for a scene of POV-Ray 4, and 16 at edges.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
     /// Stop after this time, counted from the start (of each frame), as 90s, 2m or 1h30m.
@@ -1010,15 +1010,21 @@ fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failur
         arguments.shading_normals.unwrap_or(options.integrator.shading_normals);
     options.integrator.max_depth = arguments.max_depth.unwrap_or(options.integrator.max_depth);
     options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
-    options.stop.time = arguments.time;
-    options.stop.noise = arguments.noise;
-    options.stop.min_spp = arguments.min_spp;
-    options.stop.spp = match arguments.spp {
+    let usual = Stop::usual(options.integrator.kind, scene.resolved().sampler().spp);
+    let spp = match arguments.spp {
         Some(spp) => spp,
         None if arguments.noise.is_some() => Stop::MAX_FOR_NOISE,
         // A time limit alone leaves samples unlimited.
         None if arguments.time.is_some() => u32::MAX,
-        None => options.stop.spp,
+        None => usual.spp,
+    };
+    let is_told = arguments.spp.is_some() || arguments.time.is_some() || arguments.noise.is_some();
+    options.stop = if is_told || arguments.min_spp.is_some() || arguments.parts.keeps_sums() {
+        let mut told = Stop::at(spp);
+        (told.time, told.noise, told.min_spp) = (arguments.time, arguments.noise, arguments.min_spp);
+        told
+    } else {
+        usual
     };
     if let Some(samples) = arguments.parts.samples() {
         options.first_sample = samples.start;

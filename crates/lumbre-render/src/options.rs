@@ -85,6 +85,8 @@ pub struct Stop {
 
 /// Samples a pixel, where nobody says how many.
 const DEFAULT_SPP: u32 = 64;
+/// Four samples whose mean is less certain than this, as a share, see an edge.
+const EDGE_NOISE: f64 = 0.05;
 /// Pixels across and down, where nobody says how many.
 const DEFAULT_SIZE: (u32, u32) = (1280, 720);
 const MAX_SIDE: u32 = 65_536;
@@ -97,6 +99,16 @@ impl Stop {
     /// At this many samples a pixel.
     pub fn at(spp: u32) -> Self {
         Self { spp, time: None, noise: None, min_spp: None }
+    }
+
+    /// Where a scene may say how many samples a pixel has, and nobody else says when to stop: at 64. Light of [`IntegratorKind::Pov`] is
+    /// free of noise but at edges: four samples there, and 16 where they differ.
+    pub fn usual(kind: IntegratorKind, spp: Option<u32>) -> Self {
+        match (spp, kind) {
+            (Some(spp), _) => Self::at(spp),
+            (None, IntegratorKind::Pov) => Self { noise: Some(EDGE_NOISE), min_spp: Some(4), ..Self::at(16) },
+            (None, _) => Self::at(DEFAULT_SPP),
+        }
     }
 }
 
@@ -147,7 +159,7 @@ impl RenderOptions {
             exposure: exposure_of(film),
             spectral: film.spectral && scene.integrator().kind.carries_wavelengths(),
             sensor_curves: film.camera.clone(),
-            stop: Stop::at(scene.sampler().spp.unwrap_or(DEFAULT_SPP)),
+            stop: Stop::usual(scene.integrator().kind, scene.sampler().spp),
             ..Self::default()
         };
         let window = film.crop_window.map(|window| options.pixels_of(window));

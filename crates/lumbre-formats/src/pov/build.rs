@@ -257,14 +257,15 @@ impl Builder {
 
     /// The surface of a leaf with its place, and whether the camera is inside of it.
     fn geometry(&mut self, leaf: &Leaf<'_>) -> Option<(GeometryDesc, Transform, bool)> {
-        if let Form::Mesh(mesh) = &leaf.object.form {
+        if let Form::Mesh(mesh, enclosure) = &leaf.object.form {
             if mesh.triangles.is_empty() {
                 return None;
             }
-            if !leaf.regions.is_empty() {
-                self.problems.push("a mesh in CSG, or clipped, is shown whole".to_owned());
+            if leaf.regions.is_empty() && !leaf.is_flipped {
+                let eye = leaf.map.inverse_point(self.eye);
+                let is_around_eye = enclosure.as_ref().is_some_and(|enclosure| enclosure.contains(eye));
+                return Some((GeometryDesc::Mesh(Arc::clone(mesh)), leaf.map, is_around_eye));
             }
-            return Some((GeometryDesc::Mesh(Arc::clone(mesh)), leaf.map, false));
         }
         let solid = match Solid::new(&leaf.object.form, &leaf.map) {
             Ok(Some(solid)) => solid,
@@ -321,7 +322,7 @@ impl Builder {
                 (UvForm::Cuboid(low.min(*high), low.max(*high)), Some(Arc::new(leaf.map)))
             }
             Form::Torus(major, _) => (UvForm::Torus(*major), Some(Arc::new(leaf.map))),
-            Form::Mesh(_) => (UvForm::Surface, None),
+            Form::Mesh(..) | Form::Heights(_) => (UvForm::Surface, None),
             Form::Swept(swept) if swept.is_turned() => (UvForm::Surface, None),
             _ => (UvForm::Plane, None),
         };

@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use lumbre_geometry::{Aabb, Ray, Root, Roots};
-use lumbre_math::{DVec2, DVec3, Vec2, Vec3};
-use lumbre_scene::MeshDesc;
+use lumbre_image::{Bitmap, Channels, PixelData};
+use lumbre_math::DVec3;
 use lumbre_shading::pov::Function;
 
+use super::heights::{Heights, LEVELS};
 use super::lexer::Kind;
 use super::objects::Form;
 use super::{Parser, Result};
@@ -245,10 +246,12 @@ impl Parser<'_, '_> {
         self.expect(b'}')?;
         Ok(container)
     }
+}
 
-    /// A field of heights as a mesh over the unit square, up to what modifies it.
+impl Parser<'_, '_> {
+    /// A field of heights over the unit square, up to what modifies it.
     pub(super) fn height_field(&mut self) -> Result<Form> {
-        let (width, height, heights) = self.heights()?;
+        let (size, mut heights) = self.heights()?;
         let (mut is_smooth, mut water) = (false, 0.0);
         loop {
             if self.take_word("smooth")? {
@@ -261,47 +264,18 @@ impl Parser<'_, '_> {
                 break;
             }
         }
-        let at = |x: u32, y: u32| f64::from(heights[(y * width + x) as usize]);
-        let place = |x: u32, y: u32| {
-            let (u, v) = (f64::from(x) / f64::from(width - 1), f64::from(y) / f64::from(height - 1));
-            // The first row is at the far side.
-            DVec3::new(u, at(x, y), 1.0 - v)
-        };
-        let count = u64::from(width) * u64::from(height);
+        let count = u64::from(size[0]) * u64::from(size[1]);
         self.budget.elements(2 * count, "triangles of a height field")?;
-        self.budget.bytes(56 * count, "triangles of a height field")?;
-        let mut mesh = MeshDesc::default();
-        let mut normals = Vec::new();
-        let mut uvs = Vec::new();
-        for y in 0..height {
-            for x in 0..width {
-                let p = place(x, y);
-                mesh.positions.push(Vec3::new(p.x as f32, p.y as f32, p.z as f32));
-                uvs.push(Vec2::new(p.x as f32, p.z as f32));
-                let (left, right) = (place(x.saturating_sub(1), y), place((x + 1).min(width - 1), y));
-                let (up, down) = (place(x, y.saturating_sub(1)), place(x, (y + 1).min(height - 1)));
-                let n = (up - down).cross(right - left).normalize_or(DVec3::Y);
-                normals.push(Vec3::new(n.x as f32, n.y as f32, n.z as f32));
-            }
-        }
-        for y in 0..height - 1 {
-            for x in 0..width - 1 {
-                let i = y * width + x;
-                let [a, b, c, d] = [i, i + 1, i + width, i + width + 1];
-                for face in [[a, d, c], [a, b, d]] {
-                    if face.iter().any(|&i| f64::from(mesh.positions[i as usize].y) >= water) {
-                        mesh.triangles.push(face);
-                    }
-                }
-            }
-        }
-        mesh.uvs = Some(uvs);
-        mesh.normals = is_smooth.then_some(normals);
-        Ok(Form::Mesh(Arc::new(mesh)))
+        self.budget.bytes(16 * count, "ranges of a height field")?;
+        // The first row of an image is at the far side.
+        let width = size[0] as usize;
+        let rows = heights.chunks(width).rev().flatten().copied();
+        heights = rows.map(|level| level / LEVELS as f32).collect();
+        Ok(Form::Heights(Arc::new(Heights::new(size, heights, water, is_smooth))))
     }
 
-    /// Columns, rows, and heights row by row.
-    fn heights(&mut self) -> Result<(u32, u32, Vec<f32>)> {
+    /// Columns and rows, and heights in levels, row by row.
+    fn heights(&mut self) -> Result<([u32; 2], Vec<f32>)> {
         if self.take_word("function")? {
             let width = self.whole(2.0, 65_536.0)?;
             self.comma()?;
@@ -311,13 +285,17 @@ impl Parser<'_, '_> {
             let step = |i: u32, n: u32| f64::from(i) / f64::from(n - 1);
             for y in 0..height {
                 for x in 0..width {
-                    let p = DVec2::new(step(x, width), step(y, height));
-                    heights.push(function.value(&[p.x, p.y, 0.0]).clamp(0.0, 1.0) as f32);
+                    let value = function.value(&[step(x, width), step(y, height), 0.0]);
+                    heights.push((value.clamp(0.0, 1.0) * (LEVELS - 1.0)).floor() as f32);
                 }
             }
-            return Ok((width, height, heights));
+            return Ok(([width, height], heights));
         }
-        if matches!(self.peek()?, Some(Kind::Word(word)) if !matches!(&**word, "concat")) {
+        let mut kind = None;
+        if let Some(Kind::Word(word)) = self.peek()?
+            && &**word != "concat"
+        {
+            kind = Some(word.to_string());
             self.peeked = None;
         }
         let name = self.file_name()?;
@@ -332,18 +310,26 @@ impl Parser<'_, '_> {
             return Err(self.error("the image of a height field has two columns and rows or more"));
         }
         let mut heights = self.budget.vec(u64::from(width) * u64::from(height), "heights")?;
-        let is_gray = matches!(bitmap.channels(), lumbre_image::Channels::Y | lumbre_image::Channels::Ya);
+        let is_png = kind.as_deref() == Some("png");
         for y in 0..height {
             for x in 0..width {
-                // Numbers as they are stored; of colours red is the high byte and green the low one.
-                let value = if is_gray {
-                    bitmap.stored(x, y, 0)
-                } else {
-                    (bitmap.stored(x, y, 0) * 256.0 + bitmap.stored(x, y, 1)) / 257.0
-                };
-                heights.push(value);
+                heights.push(level(bitmap, x, y, is_png));
             }
         }
-        Ok((width, height, heights))
+        Ok(([width, height], heights))
     }
+}
+
+/// The level of a pixel: numbers as they are stored, where red is the high byte and green the low one of what has colours.
+fn level(bitmap: &Bitmap, x: u32, y: u32, is_png: bool) -> f32 {
+    let stored = bitmap.stored(x, y, 0);
+    if !matches!(bitmap.channels(), Channels::Y | Channels::Ya) {
+        return (stored * 255.0).round() * 256.0 + (bitmap.stored(x, y, 1) * 255.0).round();
+    }
+    if is_png && matches!(bitmap.data(), PixelData::U8(_)) {
+        // POV-Ray weighs the three equal channels of such a pixel in single precision, and drops what is behind the point.
+        let gray = 255.0 * (0.297_f32 * stored + 0.589_f32 * stored + 0.114_f32 * stored);
+        return gray.floor() * 257.0;
+    }
+    (stored * (LEVELS as f32 - 1.0)).round()
 }

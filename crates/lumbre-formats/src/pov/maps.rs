@@ -180,32 +180,50 @@ pub(super) fn default_blocks(count: usize, is_brick: bool) -> Vec<Colour> {
     if is_brick {
         return vec![colour(0.5, 0.5, 0.5), colour(0.6, 0.15, 0.15)];
     }
-    let all = [
-        colour(0.0, 0.0, 1.0),
-        colour(0.0, 1.0, 0.0),
-        colour(1.0, 0.0, 0.0),
-        colour(0.0, 1.0, 1.0),
-        colour(1.0, 0.0, 1.0),
-        colour(1.0, 1.0, 0.0),
-    ];
+    let (red, green, blue) = (colour(1.0, 0.0, 0.0), colour(0.0, 1.0, 0.0), colour(0.0, 0.0, 1.0));
+    if count <= 3 {
+        return [blue, green, red].into_iter().take(count.max(1)).collect();
+    }
+    let all = [red, green, blue, colour(1.0, 1.0, 0.0), colour(0.0, 1.0, 1.0), colour(1.0, 0.0, 1.0)];
     all.into_iter().cycle().take(count.max(1)).collect()
 }
 
 /// The colours that a continuous pattern has unless a scene gives some.
-pub(super) fn default_colours(kind: &lumbre_shading::pov::PatternKind) -> Vec<(f64, Colour)> {
-    use lumbre_shading::pov::PatternKind;
+pub(super) fn default_colours(word: &str) -> Vec<(f64, Colour)> {
     let entry = |v: f64, r: f32, g: f32, b: f32| (v, Colour::opaque(Spectrum::new(r, g, b)));
-    match kind {
-        PatternKind::Marble => {
+    match word {
+        "agate" => vec![
+            entry(0.0, 1.0, 1.0, 1.0),
+            entry(0.5, 0.95, 0.75, 0.5),
+            entry(0.5, 0.9, 0.7, 0.5),
+            entry(0.6, 0.9, 0.7, 0.4),
+            entry(0.6, 1.0, 0.7, 0.4),
+            entry(1.0, 0.6, 0.3, 0.0),
+        ],
+        "bozo" => vec![
+            entry(0.4, 1.0, 1.0, 1.0),
+            entry(0.4, 0.0, 1.0, 0.0),
+            entry(0.6, 0.0, 1.0, 0.0),
+            entry(0.6, 0.0, 0.0, 1.0),
+            entry(0.8, 0.0, 0.0, 1.0),
+            entry(0.8, 1.0, 0.0, 0.0),
+        ],
+        "mandel" => vec![
+            entry(0.001, 0.0, 0.0, 0.0),
+            entry(0.001, 1.0, 0.0, 1.0),
+            entry(0.015, 1.0, 0.0, 1.0),
+            entry(0.1, 0.0, 1.0, 1.0),
+        ],
+        "marble" => {
             vec![entry(0.0, 0.9, 0.8, 0.8), entry(0.9, 0.9, 0.08, 0.08), entry(0.9, 0.0, 0.0, 0.0)]
         }
-        PatternKind::Wood => vec![
+        "wood" => vec![
             entry(0.0, 0.666, 0.312, 0.2),
             entry(0.6, 0.666, 0.312, 0.2),
             entry(0.6, 0.4, 0.1333, 0.066),
             entry(1.0, 0.4, 0.1333, 0.066),
         ],
-        PatternKind::Radial => vec![
+        "radial" => vec![
             entry(0.0, 0.0, 1.0, 1.0),
             entry(0.333, 1.0, 1.0, 0.0),
             entry(0.666, 1.0, 0.0, 1.0),

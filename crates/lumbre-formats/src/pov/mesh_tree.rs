@@ -1,9 +1,9 @@
 //! Trees over the triangles of meshes, for scenes that ask where a ray meets one.
 
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-use lumbre_geometry::{Aabb, Ray, Triangle};
+use lumbre_geometry::{Aabb, Ray, Root, Roots, Triangle};
 use lumbre_math::{DVec2, DVec3, Transform};
 use lumbre_scene::MeshDesc;
 
@@ -28,6 +28,90 @@ struct Node {
     count: usize,
     /// The second of its children, the first follows it; 0 for a leaf.
     second: usize,
+}
+
+/// A mesh as a surface of which parts are seen, and what it encloses.
+#[derive(Debug)]
+pub(super) struct MeshBody {
+    mesh: Arc<MeshDesc>,
+    tree: OnceLock<MeshTree>,
+    enclosure: Option<Arc<Enclosure>>,
+}
+
+/// The inside of a mesh: from where a ray in a direction crosses its triangles an odd number of times.
+#[derive(Debug)]
+pub(super) struct Enclosure {
+    mesh: MeshDesc,
+    tree: OnceLock<MeshTree>,
+    direction: DVec3,
+}
+
+impl Enclosure {
+    /// That of triangles, each of three positions.
+    pub(super) fn new(positions: Vec<lumbre_math::Vec3>, direction: DVec3) -> Self {
+        let count = positions.len() as u32 / 3;
+        let triangles = (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        Self {
+            mesh: MeshDesc { positions, triangles, ..MeshDesc::default() },
+            tree: OnceLock::new(),
+            direction,
+        }
+    }
+
+    pub(super) fn contains(&self, p: DVec3) -> bool {
+        let tree = self.tree.get_or_init(|| MeshTree::new(&self.mesh));
+        let mut is_inside = false;
+        tree.each(&self.mesh, &Ray::new(p, self.direction), &mut |_, _| {
+            is_inside = !is_inside;
+            f64::INFINITY
+        });
+        is_inside
+    }
+}
+
+impl MeshBody {
+    pub(super) fn new(mesh: &Arc<MeshDesc>, enclosure: Option<&Arc<Enclosure>>) -> Self {
+        Self { mesh: Arc::clone(mesh), tree: OnceLock::new(), enclosure: enclosure.cloned() }
+    }
+
+    pub(super) fn contains(&self, p: DVec3) -> bool {
+        self.enclosure.as_ref().is_some_and(|enclosure| enclosure.contains(p))
+    }
+
+    pub(super) fn bounds(&self) -> Aabb {
+        Aabb::around(self.mesh.positions.iter().map(|p| p.as_dvec3()))
+    }
+
+    /// Its crossings, each with the number of its triangle as its part.
+    pub(super) fn roots(&self, ray: &Ray, out: &mut Roots) {
+        let tree = self.tree.get_or_init(|| MeshTree::new(&self.mesh));
+        tree.each(&self.mesh, ray, &mut |face, root| {
+            out.push(Root { part: face, ..*root });
+            f64::INFINITY
+        });
+        out.sort_by(|a, b| a.t.total_cmp(&b.t));
+    }
+
+    pub(super) fn normal(&self, root: &Root) -> DVec3 {
+        normal(&self.mesh, root.part, root.local)
+    }
+
+    pub(super) fn uv(&self, root: &Root) -> DVec2 {
+        let Some(uvs) = &self.mesh.uvs else { return root.local };
+        let [a, b, c] = self.mesh.triangles[root.part as usize].map(|i| uvs[i as usize].as_dvec2());
+        a * (1.0 - root.local.x - root.local.y) + b * root.local.x + c * root.local.y
+    }
+}
+
+/// A normal of any length at a place of a triangle: interpolated, where the mesh has normals.
+fn normal(mesh: &MeshDesc, face: u32, DVec2 { x, y }: DVec2) -> DVec3 {
+    let face = mesh.triangles[face as usize];
+    if let Some(normals) = &mesh.normals {
+        let [a, b, c] = face.map(|i| normals[i as usize].as_dvec3());
+        return a * (1.0 - x - y) + b * x + c * y;
+    }
+    let [a, b, c] = face.map(|i| mesh.positions[i as usize].as_dvec3());
+    (b - a).cross(c - a)
 }
 
 /// The first triangle of a mesh along a ray, with its unit normal: interpolated, where the mesh has normals.
@@ -82,10 +166,25 @@ impl MeshTree {
     /// The first hit, with a normal of any length.
     fn closest(&self, mesh: &MeshDesc, ray: &Ray) -> Option<(f64, DVec3)> {
         let mut best: Option<(f64, DVec3)> = None;
+        self.each(mesh, ray, &mut |face, root| {
+            if best.is_none_or(|(t, _)| root.t < t) {
+                best = Some((root.t, normal(mesh, face, root.local)));
+            }
+            best.map_or(f64::INFINITY, |(t, _)| t)
+        });
+        best
+    }
+
+    /// Visits the triangles that a ray meets, in no order. A visit says beyond where hits are of no use any more.
+    fn each(&self, mesh: &MeshDesc, ray: &Ray, visit: &mut dyn FnMut(u32, &Root) -> f64) {
+        if mesh.triangles.is_empty() {
+            return;
+        }
+        let mut last = ray.t_max;
         let mut open = vec![0];
         while let Some(index) = open.pop() {
             let node = &self.nodes[index];
-            if !is_met(&node.bounds, ray, best.map_or(ray.t_max, |(t, _)| t)) {
+            if !is_met(&node.bounds, ray, last) {
                 continue;
             }
             if node.second != 0 {
@@ -93,23 +192,13 @@ impl MeshTree {
                 continue;
             }
             for &face in &self.order[node.first..node.first + node.count] {
-                let face = &mesh.triangles[face as usize];
-                let corner = |i: usize| mesh.positions[face[i] as usize].as_dvec3();
-                let Ok(triangle) = Triangle::new(corner(0), corner(1), corner(2)) else { continue };
-                let Some(root) = triangle.closest(ray) else { continue };
-                if best.is_some_and(|(t, _)| t <= root.t) {
-                    continue;
+                let [a, b, c] = mesh.triangles[face as usize].map(|i| mesh.positions[i as usize].as_dvec3());
+                let Ok(triangle) = Triangle::new(a, b, c) else { continue };
+                if let Some(root) = triangle.closest(ray) {
+                    last = last.min(visit(face, &root));
                 }
-                let flat = (corner(1) - corner(0)).cross(corner(2) - corner(0));
-                let normal = mesh.normals.as_ref().map_or(flat, |normals| {
-                    let at = |i: usize| normals[face[i] as usize].as_dvec3();
-                    let DVec2 { x, y } = root.local;
-                    at(0) * (1.0 - x - y) + at(1) * x + at(2) * y
-                });
-                best = Some((root.t, normal));
             }
         }
-        best
     }
 }
 

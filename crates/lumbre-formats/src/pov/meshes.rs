@@ -9,6 +9,7 @@ use lumbre_scene::MeshDesc;
 use lumbre_shading::pov::Texture;
 
 use super::blob::{Ball, Blob};
+use super::mesh_tree::Enclosure;
 use super::objects::{Form, Object, Operation};
 use super::value::Value;
 use super::{Parser, Result};
@@ -56,12 +57,13 @@ impl Parser<'_, '_> {
         let (corners, normals) = self.smooth_corners()?;
         let mut all = Triangles { has_normals: true, ..Triangles::default() };
         push(&mut all, corners, Some(normals), None);
-        Ok(Form::Mesh(Arc::new(all.mesh())))
+        Ok(Form::Mesh(Arc::new(all.mesh()), None))
     }
 
     /// A mesh, up to what modifies it: its triangles by their textures.
     pub(super) fn mesh(&mut self) -> Result<Object> {
         let mut by_texture: HashMap<usize, (Option<Arc<Texture>>, Triangles)> = HashMap::new();
+        let mut inside = None;
         loop {
             let word = self.word()?;
             let Some(word @ ("triangle" | "smooth_triangle" | "inside_vector")) = word.as_deref() else {
@@ -69,8 +71,7 @@ impl Parser<'_, '_> {
             };
             self.peeked = None;
             if word == "inside_vector" {
-                self.vector()?;
-                self.warn("the inside of a mesh is not cut out");
+                inside = self.vector()?.try_normalize();
                 continue;
             }
             let is_smooth = word == "smooth_triangle";
@@ -108,10 +109,11 @@ impl Parser<'_, '_> {
             let entry = by_texture.entry(key).or_insert_with(|| (texture, Triangles::default()));
             push(&mut entry.1, corners, normals, uvs);
         }
+        let enclosure = enclosure(inside, by_texture.values().map(|(_, triangles)| triangles));
         let mut parts: Vec<(usize, Object)> = Vec::new();
         for (_, (texture, triangles)) in by_texture {
             let first = triangles.positions.first().map_or(0, |p| p.x.to_bits() as usize);
-            let mut part = Object::new(Form::Mesh(Arc::new(triangles.mesh())));
+            let mut part = Object::new(Form::Mesh(Arc::new(triangles.mesh()), enclosure.clone()));
             part.texture = texture;
             parts.push((first, part));
         }
@@ -143,6 +145,7 @@ impl Parser<'_, '_> {
         let (mut vertices, mut normals, mut uvs) = (Vec::new(), Vec::new(), Vec::new());
         let (mut faces, mut normal_faces, mut uv_faces) = (Vec::new(), Vec::new(), Vec::new());
         let mut textures: Vec<Arc<Texture>> = Vec::new();
+        let mut inside = None;
         let mut faces_of: Vec<Option<usize>> = Vec::new();
         loop {
             let word = self.word()?;
@@ -155,10 +158,7 @@ impl Parser<'_, '_> {
             };
             self.peeked = None;
             match word {
-                "inside_vector" => {
-                    self.vector()?;
-                    self.warn("the inside of a mesh is not cut out");
-                }
+                "inside_vector" => inside = self.vector()?.try_normalize(),
                 "vertex_vectors" => vertices = self.vectors()?,
                 "normal_vectors" => normals = self.vectors()?,
                 "uv_vectors" => uvs = self.vectors()?,
@@ -188,11 +188,12 @@ impl Parser<'_, '_> {
             };
             push(triangles, corners, smooth, uv.map(|uv| uv.map(|uv| uv.truncate())));
         }
+        let enclosure = enclosure(inside, &all);
         let textures = std::iter::once(None).chain(textures.into_iter().map(Some));
         let mut parts: Vec<Object> = Vec::new();
         for (texture, triangles) in textures.zip(all) {
             if !triangles.positions.is_empty() {
-                let mut part = Object::new(Form::Mesh(Arc::new(triangles.mesh())));
+                let mut part = Object::new(Form::Mesh(Arc::new(triangles.mesh()), enclosure.clone()));
                 part.texture = texture;
                 parts.push(part);
             }
@@ -288,7 +289,7 @@ impl Parser<'_, '_> {
         for triangle in triangles {
             push(&mut all, triangle.map(|p| origin + s * p.x + t * p.y), None, None);
         }
-        Ok(Form::Mesh(Arc::new(all.mesh())))
+        Ok(Form::Mesh(Arc::new(all.mesh()), None))
     }
 
     /// A blob, up to what modifies it.
@@ -355,6 +356,15 @@ fn push(all: &mut Triangles, corners: [DVec3; 3], normals: Option<[DVec3; 3]>, u
         all.uvs.push(Vec2::new(uv.x as f32, uv.y as f32));
     }
     all.has_uvs |= uvs.is_some();
+}
+
+/// What triangles enclose, by a direction to look for them.
+fn enclosure<'t>(
+    inside: Option<DVec3>,
+    all: impl IntoIterator<Item = &'t Triangles>,
+) -> Option<Arc<Enclosure>> {
+    let positions = all.into_iter().flat_map(|triangles| triangles.positions.iter().copied());
+    inside.map(|direction| Arc::new(Enclosure::new(positions.collect(), direction)))
 }
 
 /// The parts of a mesh as one object.

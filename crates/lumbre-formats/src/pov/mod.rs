@@ -13,6 +13,7 @@ mod expression;
 mod files;
 mod fractals;
 mod functions;
+mod heights;
 mod images;
 mod iso;
 mod job;

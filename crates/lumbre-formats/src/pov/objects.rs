@@ -54,11 +54,13 @@ pub(super) enum Form {
         hole: f64,
     },
     Triangle([DVec3; 3]),
-    Mesh(Arc<MeshDesc>),
+    /// Triangles, and what they enclose.
+    Mesh(Arc<MeshDesc>, Option<Arc<super::mesh_tree::Enclosure>>),
     /// The exponents of a superellipsoid.
     Superellipsoid(f64, f64),
     Poly(Arc<Algebraic>),
     Blob(Arc<super::blob::Blob>),
+    Heights(Arc<super::heights::Heights>),
     Swept(Arc<super::swept::Swept>),
     Iso(Arc<super::iso::Iso>),
     Sweep(Arc<super::sweep::Sweep>),
@@ -441,9 +443,6 @@ impl Parser<'_, '_> {
                 "photons" | "radiosity" => {
                     self.expect(b'{')?;
                     self.skip_to(b'}')?;
-                    if &*word == "photons" {
-                        self.warn("photons are not rendered");
-                    }
                 }
                 "open" => {}
                 "uv_vectors" => {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lumbre_math::{DVec3, Vec2, Vec3};
+use lumbre_math::{DVec2, DVec3, Vec2, Vec3};
 use lumbre_scene::MeshDesc;
 
 use super::objects::Form;
@@ -15,6 +15,8 @@ impl Parser<'_, '_> {
     /// A Bézier patch, divided as often as it says, with its own normals; up to what modifies it.
     pub(super) fn bicubic_patch(&mut self) -> Result<Form> {
         let (mut u_steps, mut v_steps) = (0, 0);
+        // Around the patch: u first grows with v at 0.
+        let mut corners = [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y];
         loop {
             if self.take_word("type")? || self.take_word("flatness")? || self.take_word("accuracy")? {
                 self.float()?;
@@ -23,8 +25,8 @@ impl Parser<'_, '_> {
             } else if self.take_word("v_steps")? {
                 v_steps = self.whole(0.0, MAX_STEPS)?;
             } else if self.take_word("uv_vectors")? {
-                for _ in 0..4 {
-                    self.vector()?;
+                for corner in &mut corners {
+                    *corner = self.vector()?.truncate();
                     self.comma()?;
                 }
             } else if !self.take(b',')? {
@@ -47,7 +49,9 @@ impl Parser<'_, '_> {
                 let single = |p: DVec3| Vec3::new(p.x as f32, p.y as f32, p.z as f32);
                 mesh.positions.push(single(p));
                 normals.push(single(n));
-                uvs.push(Vec2::new(u as f32, v as f32));
+                let [a, b, c, d] = corners;
+                let uv = (a * (1.0 - u) + b * u) * (1.0 - v) + (d * (1.0 - u) + c * u) * v;
+                uvs.push(Vec2::new(uv.x as f32, uv.y as f32));
             }
         }
         for j in 0..up {
@@ -58,7 +62,7 @@ impl Parser<'_, '_> {
             }
         }
         (mesh.normals, mesh.uvs) = (Some(normals), Some(uvs));
-        Ok(Form::Mesh(Arc::new(mesh)))
+        Ok(Form::Mesh(Arc::new(mesh), None))
     }
 }
 

@@ -1,5 +1,7 @@
 //! The words of patterns, with what modifies them.
 
+use std::rc::Rc;
+
 use lumbre_math::{DVec2, DVec3};
 use lumbre_shading::pov::{
     BlackHole, Crackle, Fractal, Magnet, NoiseGenerator, Octaves, Pattern, PatternKind, Slope, Unrolling,
@@ -15,12 +17,14 @@ pub(super) struct Draft {
     pub uv: bool,
     /// The octaves that stand before the pattern.
     pub octaves: Octaves,
+    /// The word that the pattern began with.
+    pub word: Rc<str>,
 }
 
 impl Draft {
     pub(super) fn new(pattern: Option<Pattern>, warps: Warps, uv: bool) -> Self {
         let octaves = pattern.as_ref().map_or_else(Octaves::default, |pattern| pattern.octaves);
-        Self { pattern, warps, uv, octaves }
+        Self { pattern, warps, uv, octaves, word: Rc::from("") }
     }
 
     /// Begins a pattern, with the octaves that stood before it.
@@ -339,7 +343,7 @@ impl Parser<'_, '_> {
                 let (mut orientation, mut exponent, mut major) = (DVec3::Z, 0.0, 1.0);
                 loop {
                     if self.take_word("orientation")? {
-                        orientation = self.vector()?;
+                        orientation = self.vector()?.normalize_or(DVec3::Z);
                     } else if self.take_word("dist_exp")? {
                         exponent = self.finite()?;
                     } else if self.take_word("major_radius")? {
@@ -406,9 +410,19 @@ impl Parser<'_, '_> {
             } else if self.take_word("inverse")? {
                 hole.inverse = true;
             } else {
-                return Ok(hole);
+                break;
             }
         }
+        hole.repeat = hole.repeat.max(DVec3::ZERO);
+        for axis in 0..3 {
+            // Copies lie in their blocks as a whole.
+            if hole.repeat[axis] > 0.0 {
+                hole.center[axis] = hole.center[axis].max(radius);
+                let needed = hole.center[axis] + radius + hole.turbulence[axis];
+                hole.repeat[axis] = hole.repeat[axis].max(needed);
+            }
+        }
+        Ok(hole)
     }
 
     /// A pattern with its modifiers, as `function { pattern { … } }` has it.

@@ -126,7 +126,12 @@ impl Parser<'_, '_> {
                         self.expect(b'{')?;
                         self.skip_to(b'}')?;
                     }
-                    self.warn(&format!("{word} is not rendered by the integrator pov"));
+                    let instead = match &*word {
+                        "radiosity" => ": --integrator path has the light that surfaces give each other",
+                        "photons" => ": --integrator caustics has light that glass and mirrors gather",
+                        _ => "",
+                    };
+                    self.warn(&format!("{word} is not rendered by the integrator pov{instead}"));
                 }
                 _ => return Err(self.error(format!("{word} is no setting"))),
             }

@@ -12,9 +12,10 @@ use lumbre_math::{DVec2, DVec3, Transform};
 
 use super::algebraic::Algebraic;
 use super::blob::Blob;
+use super::heights::Heights;
 use super::iso::Iso;
 use super::julia::Julia;
-use super::mesh_tree::{MeshTrees, mesh_hit};
+use super::mesh_tree::{MeshBody, MeshTrees, mesh_hit};
 use super::objects::{Form, Object, Operation};
 use super::sweep::Sweep;
 use super::swept::Swept;
@@ -46,6 +47,8 @@ pub(super) enum Body {
     Julia(Arc<Julia>),
     Algebraic(Arc<Algebraic>),
     Blob(Arc<Blob>),
+    Heights(Arc<Heights>),
+    Mesh(Arc<MeshBody>),
 }
 
 impl Body {
@@ -57,6 +60,8 @@ impl Body {
             Self::Julia(julia) => julia.roots(ray, out),
             Self::Algebraic(poly) => poly.roots(ray, out),
             Self::Blob(blob) => blob.roots(ray, out),
+            Self::Heights(heights) => heights.roots(ray, out),
+            Self::Mesh(mesh) => mesh.roots(ray, out),
         }
     }
 
@@ -68,6 +73,8 @@ impl Body {
             Self::Julia(julia) => julia.normal(p),
             Self::Algebraic(poly) => poly.normal(p),
             Self::Blob(blob) => blob.normal(p),
+            Self::Heights(heights) => heights.normal(p),
+            Self::Mesh(mesh) => mesh.normal(root),
         }
     }
 
@@ -75,6 +82,8 @@ impl Body {
     fn uv(&self, p: DVec3, root: &Root) -> DVec2 {
         match self {
             Self::Swept(swept) => swept.uv(p, root),
+            Self::Heights(_) => DVec2::new(p.x, p.z),
+            Self::Mesh(mesh) => mesh.uv(root),
             _ => root.local,
         }
     }
@@ -87,6 +96,8 @@ impl Body {
             Self::Julia(julia) => julia.contains(p),
             Self::Algebraic(poly) => poly.contains(p),
             Self::Blob(blob) => blob.contains(p),
+            Self::Heights(heights) => heights.contains(p),
+            Self::Mesh(mesh) => mesh.contains(p),
         }
     }
 
@@ -98,6 +109,8 @@ impl Body {
             Self::Julia(julia) => julia.bounds(),
             Self::Algebraic(_) => return None,
             Self::Blob(blob) => blob.bounds(),
+            Self::Heights(heights) => heights.bounds(),
+            Self::Mesh(mesh) => mesh.bounds(),
         })
     }
 }
@@ -145,6 +158,9 @@ impl Solid {
                 Self::Body { body: Body::Algebraic(Arc::clone(poly)), world_from_object: *map }
             }
             Form::Blob(blob) => Self::Body { body: Body::Blob(Arc::clone(blob)), world_from_object: *map },
+            Form::Heights(heights) => {
+                Self::Body { body: Body::Heights(Arc::clone(heights)), world_from_object: *map }
+            }
             Form::Swept(swept) => {
                 Self::Body { body: Body::Swept(Arc::clone(swept)), world_from_object: *map }
             }
@@ -155,7 +171,11 @@ impl Solid {
             Form::Julia(julia) => {
                 Self::Body { body: Body::Julia(Arc::clone(julia)), world_from_object: *map }
             }
-            Form::Mesh(..) | Form::Group(..) | Form::Light(_) | Form::LightGroup(..) | Form::Nothing => {
+            Form::Mesh(mesh, enclosure) => {
+                let body = Body::Mesh(Arc::new(MeshBody::new(mesh, enclosure.as_ref())));
+                Self::Body { body, world_from_object: *map }
+            }
+            Form::Group(..) | Form::Light(_) | Form::LightGroup(..) | Form::Nothing => {
                 return Ok(None);
             }
         }))
@@ -493,11 +513,15 @@ pub(super) fn trace(
     let ray = Ray::new(from, direction).with_range(1e-9, f64::INFINITY);
     let mut best: Option<(f64, DVec3, DVec3)> = None;
     leaves(object, &Transform::IDENTITY, &[], false, &mut Vec::new(), &mut |leaf, _| {
-        if let Form::Mesh(mesh) = &leaf.object.form
-            && let Some((t, normal)) = mesh_hit(trees, mesh, &leaf.map, &ray)
-            && best.is_none_or(|(best, ..)| t < best)
+        if let Form::Mesh(mesh, _) = &leaf.object.form
+            && leaf.regions.is_empty()
         {
-            best = Some((t, ray.at(t), normal));
+            if let Some((t, normal)) = mesh_hit(trees, mesh, &leaf.map, &ray)
+                && best.is_none_or(|(best, ..)| t < best)
+            {
+                best = Some((t, ray.at(t), normal));
+            }
+            return;
         }
         let Ok(Some(solid)) = Solid::new(&leaf.object.form, &leaf.map) else { return };
         let clipped = Clipped::new(Arc::new(solid), leaf.regions, leaf.is_flipped);
@@ -517,7 +541,7 @@ pub(super) fn bounds(object: &Object) -> Option<Aabb> {
     let mut is_bounded = true;
     leaves(object, &Transform::IDENTITY, &[], false, &mut Vec::new(), &mut |leaf, _| {
         let bounds = match (&leaf.object.form, Solid::new(&leaf.object.form, &leaf.map)) {
-            (Form::Mesh(mesh), _) => {
+            (Form::Mesh(mesh, _), _) => {
                 Some(Aabb::around(mesh.positions.iter().map(|p| leaf.map.point(p.as_dvec3()))))
             }
             (_, Ok(Some(solid))) => Clipped::new(Arc::new(solid), leaf.regions, false).bounds,

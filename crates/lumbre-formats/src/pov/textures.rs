@@ -131,6 +131,7 @@ impl Parser<'_, '_> {
             }
             if let Some(found) = self.pattern_kind(&word)? {
                 draft.begin(found, self.settings.generator);
+                draft.word = Rc::clone(&word);
                 continue;
             }
             if self.pattern_modifier(&word, &mut draft)? {
@@ -248,8 +249,8 @@ impl Parser<'_, '_> {
                     Ok(PigmentKind::Blocks(pattern, blocks.into()))
                 }
                 None => {
-                    let kind = if self.is_density { &PatternKind::Noise } else { &pattern.kind };
-                    let map = ColourMap::new(default_colours(kind));
+                    let word = if self.is_density { "" } else { &*draft.word };
+                    let map = ColourMap::new(default_colours(word));
                     Ok(PigmentKind::Map(pattern, Arc::new(map)))
                 }
             },

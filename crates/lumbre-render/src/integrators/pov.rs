@@ -119,12 +119,12 @@ impl<'s> Tracer<'s> {
         let direction = traced.ray.direction.normalize();
         let (colour, length) = match self.closest(traced) {
             Some((here, material, distance)) => {
-                let mut colour = self.shade(traced, &here, material, record);
                 // Inside of solids light fades, by the way to where it leaves them.
-                for solid in &traced.inside {
-                    colour *= solid.interior.transmittance(distance as f32);
-                }
-                (colour, distance)
+                let fade = |left: Spectrum, solid: &&PovMaterial| {
+                    left * solid.interior.transmittance(distance as f32)
+                };
+                let left = traced.inside.iter().fold(Spectrum::WHITE, fade);
+                (self.shade(traced, &here, material, left, record), distance)
             }
             None => (self.sky(direction), f64::INFINITY),
         };
@@ -160,6 +160,7 @@ impl<'s> Tracer<'s> {
         traced: &Traced<'s>,
         here: &Interaction<'s>,
         material: &'s PovMaterial,
+        left: Spectrum,
         record: &mut Record,
     ) -> Spectrum {
         let direction = traced.ray.direction.normalize();
@@ -174,23 +175,25 @@ impl<'s> Tracer<'s> {
         let is_inside = traced.inside.iter().any(|solid| solid.is_of_solid(material));
         let mut sum = Spectrum::BLACK;
         for (share, layers) in &material.stacks(here.surface.point, &eye, here.front) {
-            sum += self.stack(traced, here, material, layers, is_inside, record) * *share;
+            sum += self.stack(traced, here, material, layers, left, is_inside, record) * *share;
         }
         sum
     }
 
-    /// The light of layers, the bottom first.
+    /// The light of layers, the bottom first, with what is left of it on the way from there. Mirrors are not dimmed by that.
+    #[allow(clippy::too_many_arguments, reason = "layers are seen by a ray, from inside or outside")]
     fn stack(
         &self,
         traced: &Traced<'s>,
         here: &Interaction<'s>,
         material: &'s PovMaterial,
         layers: &[LayerAt<'_>],
+        fade: Spectrum,
         is_inside: bool,
         record: &mut Record,
     ) -> Spectrum {
         let mut sum = Spectrum::BLACK;
-        let mut left = Spectrum::WHITE;
+        let mut left = fade;
         // What the lights give is the same for layers of the same normal.
         let mut shadows: Vec<Option<Spectrum>> = vec![None; self.lights.len()];
         for layer in layers.iter().rev() {
@@ -211,7 +214,7 @@ impl<'s> Tracer<'s> {
         if let Some(top) = layers.last()
             && gray(left) >= self.world.adc_bailout
         {
-            sum += self.passing(traced, here, material, top, left, is_inside, record);
+            sum += self.passing(traced, here, material, top, [left, fade], is_inside, record);
         }
         sum
     }
@@ -247,12 +250,17 @@ impl<'s> Tracer<'s> {
         if let Some(area) = &light.area
             && area.illumination
         {
-            return self.mean_of_area(area, record, &mut |u, record| {
-                let from = light.place(u, p);
+            let [n, m] = area.counts;
+            let mut sum = Spectrum::BLACK;
+            for i in 0..n * m {
+                let from = light.place(DVec2::new(step(i / m, n), step(i % m, m)), p);
                 let arriving = light.arriving(p, from);
                 let shaded = self.shaded(traced, here, material, layer, light, from, arriving, opacity);
-                if shaded.is_black() { shaded } else { shaded * self.shadow(here, light, from, record) }
-            });
+                if !shaded.is_black() {
+                    sum += shaded * self.shadow(here, light, from, record);
+                }
+            }
+            return sum * ((n * m) as f32).recip();
         }
         let arriving = light.arriving(p, light.from);
         let shaded = self.shaded(traced, here, material, layer, light, light.from, arriving, opacity);
@@ -410,7 +418,7 @@ impl<'s> Tracer<'s> {
         here: &Interaction<'s>,
         material: &'s PovMaterial,
         layer: &LayerAt<'_>,
-        left: Spectrum,
+        [left, fade]: [Spectrum; 2],
         is_inside: bool,
         record: &mut Record,
     ) -> Spectrum {
@@ -433,7 +441,7 @@ impl<'s> Tracer<'s> {
         let (direction, inside) = if is_straight {
             (d, inside)
         } else if is_total {
-            // All light is mirrored, and nothing is filtered.
+            // All light is mirrored, and layers filter nothing.
             (d + n * (2.0 * cosine), traced.inside.clone())
         } else {
             (d * eta + n * (eta * cosine - under.sqrt()), inside)
@@ -448,7 +456,7 @@ impl<'s> Tracer<'s> {
         };
         record.counts.bounce += 1;
         let seen = self.trace_straight(next, is_straight, record);
-        if is_total { seen } else { left * seen }
+        if is_total { fade * seen } else { left * seen }
     }
 
     /// A ray that goes straight on counts as the same ray, but not without end.

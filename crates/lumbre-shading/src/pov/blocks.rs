@@ -80,17 +80,22 @@ pub(super) fn square(p: DVec3) -> f64 {
     }
 }
 
-/// 0 to 5 by triangles of side 1 in x and z.
+/// 0 to 5 by triangles of side 1 in x and z: those that point up and those that point down, by threes along a row.
 pub(super) fn triangular(p: DVec3) -> f64 {
     const HEIGHT: f64 = 0.866_025_403_784_438_6;
     let row = (p.z / HEIGHT).floor();
-    let b = p.z / HEIGHT - row;
-    let x = p.x - 0.5 * row;
+    let up = p.z / HEIGHT - row;
+    let is_odd = row.rem_euclid(2.0) == 1.0;
+    let x = p.x - 0.5 * up - if is_odd { 0.5 } else { 0.0 };
     let column = x.floor();
-    let a = x - column;
-    let is_upper = a + b > 1.0;
-    let third = (column - row).rem_euclid(3.0);
-    2.0 * third + if is_upper { 1.0 } else { 0.0 }
+    let is_down = x - column + up > 1.0;
+    let values = match (is_odd, is_down) {
+        (false, false) => [0.0, 4.0, 2.0],
+        (false, true) => [3.0, 5.0, 1.0],
+        (true, false) => [2.0, 0.0, 4.0],
+        (true, true) => [1.0, 3.0, 5.0],
+    };
+    values[column.rem_euclid(3.0) as usize % 3]
 }
 
 /// The distances to the nearest of random points, one in each cube.

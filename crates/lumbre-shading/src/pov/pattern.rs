@@ -227,15 +227,9 @@ impl Pattern {
         p + self.turbulence * self.octaves.vector_turbulence(p)
     }
 
+    /// Whether turbulence is in its formula alone. Spirals have it there, too, at points that it has moved.
     fn has_own_turbulence(&self) -> bool {
-        matches!(
-            self.kind,
-            PatternKind::Marble
-                | PatternKind::Wood
-                | PatternKind::Spiral1(_)
-                | PatternKind::Spiral2(_)
-                | PatternKind::Agate(_)
-        )
+        matches!(self.kind, PatternKind::Marble | PatternKind::Wood | PatternKind::Agate(_))
     }
 
     /// Whether its values are whole numbers that name one of several.
@@ -262,9 +256,9 @@ impl Pattern {
         }
         if self.frequency != 0.0 {
             v = (v * self.frequency + self.phase) % 1.000_01;
-            if v < 0.0 {
-                v -= v.floor();
-            }
+        }
+        if v < 0.0 {
+            v -= v.floor();
         }
         self.wave.of(v)
     }
@@ -292,11 +286,8 @@ impl Pattern {
             PatternKind::Square => blocks::square(p),
             PatternKind::Triangular => blocks::triangular(p),
             PatternKind::Dents => noise(p).powi(3),
-            PatternKind::Function(function) => function.value(&p.to_array()),
-            PatternKind::Gradient(along) => {
-                let v = p.dot(*along);
-                if v > 1.0 { v % 1.0 } else { v }
-            }
+            PatternKind::Function(function) => within_one(function.value(&p.to_array())),
+            PatternKind::Gradient(along) => within_one(p.dot(*along)),
             PatternKind::Granite => {
                 let octave = |i: i32| {
                     let n = noise(p * (4.0 * f64::from(1 << i)));
@@ -362,6 +353,11 @@ impl Pattern {
         }
         self.turbulence.x * self.octaves.turbulence(p, self.generator)
     }
+}
+
+/// What is above 1 begins again at 0.
+fn within_one(v: f64) -> f64 {
+    if v > 1.0 { v % 1.0 } else { v }
 }
 
 /// The wave of ripples.

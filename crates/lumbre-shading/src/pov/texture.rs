@@ -9,7 +9,7 @@ use super::media::Media;
 use super::normal::Normal;
 use super::pattern::Pattern;
 use super::pigment::{Colour, Pigment, between};
-use super::warp::Warps;
+use super::warp::{Warps, unfolded};
 use super::{Eye, Finish};
 use crate::Spectrum;
 
@@ -239,25 +239,9 @@ impl UvForm {
                 let across = p.x.hypotenuse(p.z) - radius;
                 DVec2::new(1.0 - (p.z.angle_from(p.x) + PI) / TAU, (p.y.angle_from(across) + PI) / TAU)
             }
-            Self::Cuboid(low, high) => cross((p - *low) / (*high - *low)),
+            Self::Cuboid(low, high) => unfolded((p - *low) / (*high - *low)),
         }
     }
-}
-
-/// The unfolded faces of the unit cube.
-fn cross(p: DVec3) -> DVec2 {
-    let DVec3 { x, y, z } = p;
-    let faces = [x.abs(), (1.0 - x).abs(), y.abs(), (1.0 - y).abs(), z.abs(), (1.0 - z).abs()];
-    let nearest = (0..6).min_by(|&a, &b| faces[a].total_cmp(&faces[b])).unwrap_or(0);
-    let [u, v] = match nearest {
-        0 => [z / 4.0, (1.0 + y) / 3.0],
-        1 => [0.75 - z / 4.0, (1.0 + y) / 3.0],
-        2 => [(1.0 + x) / 4.0, z / 3.0],
-        3 => [(1.0 + x) / 4.0, 1.0 - z / 3.0],
-        4 => [1.0 - x / 4.0, (1.0 + y) / 3.0],
-        _ => [(1.0 + x) / 4.0, (1.0 + y) / 3.0],
-    };
-    DVec2::new(u, v)
 }
 
 /// From what an object is hidden.

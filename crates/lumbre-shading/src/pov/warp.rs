@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use lumbre_math::{DVec3, Elementary, Transform};
+use lumbre_math::{DVec2, DVec3, Elementary, Transform};
 
-use super::noise::Octaves;
+use super::noise::{Octaves, hash3, random};
 
 /// The way of a point from the surface to the pattern, the last written first.
 #[derive(Clone, Debug, Default)]
@@ -39,16 +39,16 @@ pub enum Warp {
     Unrolled {
         /// What it was around.
         shape: Unrolling,
-        /// The axis to which the depth goes, with its sign.
+        /// The unit vector to which the depth goes.
         orientation: DVec3,
         /// The exponent of the distance, by which the unrolled space grows outwards.
         exponent: f64,
     },
-    /// The nearest point of a plane.
+    /// x and y at a distance.
     Planar {
-        /// The unit normal.
+        /// The unit vector to which the distance goes.
         normal: DVec3,
-        /// The distance of the plane.
+        /// The distance.
         distance: f64,
     },
     /// The faces of a cube.
@@ -79,7 +79,7 @@ pub struct BlackHole {
     pub strength: f64,
     /// The distances of its copies; zero along an axis for none.
     pub repeat: DVec3,
-    /// By how much copies are moved at random.
+    /// By how much copies are moved at most, at random.
     pub turbulence: DVec3,
     /// Whether it pushes.
     pub inverse: bool,
@@ -121,7 +121,7 @@ impl Warp {
             Self::Repeat { axis, width, offset, flip } => repeated(p, *axis, *width, *offset, flip),
             Self::BlackHole(hole) => hole.apply(p),
             Self::Unrolled { shape, orientation, exponent } => unrolled(p, *shape, *orientation, *exponent),
-            Self::Planar { normal, distance } => planar(p, *normal, *distance),
+            Self::Planar { normal, distance } => oriented(DVec3::new(p.x, p.y, *distance), *normal),
             Self::Cubic => cubic(p),
         }
     }
@@ -156,7 +156,8 @@ impl BlackHole {
                 }
             }
             if self.turbulence != DVec3::ZERO {
-                center += self.turbulence * super::noise::vector_noise(cell);
+                let seed = hash3(cell.x as i64, cell.y as i64, cell.z as i64);
+                center += self.turbulence * DVec3::new(random(seed), random(seed + 1), random(seed + 2));
             }
         }
         let away = local - center;
@@ -196,44 +197,35 @@ fn unrolled(p: DVec3, shape: Unrolling, orientation: DVec3, exponent: f64) -> DV
             (turn(p.x, p.z) * grow(length), v * grow(length), length)
         }
     };
-    if orientation.x != 0.0 {
-        DVec3::new(depth, v, -u)
-    } else if orientation.y != 0.0 {
-        DVec3::new(u, -depth, v)
-    } else {
-        DVec3::new(u, v, depth)
-    }
+    oriented(DVec3::new(u, v, depth), orientation)
 }
 
-fn planar(p: DVec3, normal: DVec3, distance: f64) -> DVec3 {
-    // Planes across an axis only set that coordinate; others are turned so that their normal is z.
-    if normal == DVec3::X {
-        return DVec3::new(distance, p.y, p.z);
-    }
-    if normal == DVec3::Y {
-        return DVec3::new(p.x, -distance, p.z);
-    }
-    if normal == DVec3::Z {
-        return DVec3::new(p.x, p.y, distance);
-    }
-    let (s, t) = normal.any_orthonormal_pair();
-    DVec3::new(p.dot(s), p.dot(t), distance)
+/// A point whose z is along the z axis, for a z along another one. Axes that are askew are mixed of the three.
+fn oriented(DVec3 { x: u, y: v, z: depth }: DVec3, axis: DVec3) -> DVec3 {
+    axis.x * DVec3::new(depth, v, -u) + axis.y * DVec3::new(u, -depth, v) + axis.z * DVec3::new(u, v, depth)
 }
 
 fn cubic(p: DVec3) -> DVec3 {
     let size = p.abs();
-    let (u, v, depth) = if size.x >= size.y && size.x >= size.z {
-        let side = if p.x >= 0.0 { -p.z } else { p.z };
-        (side, p.y, size.x)
-    } else if size.y >= size.z {
-        let side = if p.y >= 0.0 { -p.z } else { p.z };
-        (p.x, side, size.y)
-    } else {
-        let side = if p.z >= 0.0 { p.x } else { -p.x };
-        (side, p.y, size.z)
-    };
+    let depth = size.max_element();
     if depth == 0.0 {
         return DVec3::ZERO;
     }
-    DVec3::new(0.5 + 0.5 * u / depth, 0.5 + 0.5 * v / depth, depth)
+    unfolded(0.5 + 0.5 * p / depth).extend(depth)
+}
+
+/// The unfolded faces of the unit cube.
+pub(super) fn unfolded(p: DVec3) -> DVec2 {
+    let DVec3 { x, y, z } = p;
+    let faces = [x.abs(), (1.0 - x).abs(), y.abs(), (1.0 - y).abs(), z.abs(), (1.0 - z).abs()];
+    let nearest = (0..6).min_by(|&a, &b| faces[a].total_cmp(&faces[b])).unwrap_or(0);
+    let [u, v] = match nearest {
+        0 => [z / 4.0, (1.0 + y) / 3.0],
+        1 => [0.75 - z / 4.0, (1.0 + y) / 3.0],
+        2 => [(1.0 + x) / 4.0, z / 3.0],
+        3 => [(1.0 + x) / 4.0, 1.0 - z / 3.0],
+        4 => [1.0 - x / 4.0, (1.0 + y) / 3.0],
+        _ => [(1.0 + x) / 4.0, (1.0 + y) / 3.0],
+    };
+    DVec2::new(u, v)
 }
