@@ -12,6 +12,7 @@ use crate::failure::{Failure, print};
 use crate::memory::Memory;
 use crate::names::one_of;
 use crate::output::{Inputs, Replaced, is_standard_stream};
+use crate::render::check_image_format;
 use crate::signals::Signals;
 use crate::units;
 
@@ -22,7 +23,7 @@ use crate::units;
   lumbre diff out.png golden.png --metric flip --fail-above 0.02 -o heat.png
   lumbre render scene.pbrt -o - | lumbre diff - golden.png
 
-Prints the difference alone, so that scripts can read it. Exit status 1 when it is above --fail-above.")]
+Prints only the difference, so that scripts can read it. Exit status 1 when it is above --fail-above.")]
 pub(crate) struct Arguments {
     /// A picture: .exr, .png, .hdr, .pfm, .jpg and others; - is standard input.
     a: PathBuf,
@@ -38,7 +39,7 @@ pub(crate) struct Arguments {
     /// Where to write a picture of the differences.
     #[arg(short, long, value_name = "HEAT.png")]
     output: Option<PathBuf>,
-    /// Bytes that the program may hold at a time.
+    /// Memory limit.
     #[arg(long, value_name = "SIZE", value_parser = units::bytes)]
     max_memory: Option<u64>,
 }
@@ -46,8 +47,21 @@ pub(crate) struct Arguments {
 /// The names of metrics.
 pub(crate) const METRICS: [&str; 5] = ["rmse", "relmse", "mae", "max", "flip"];
 
+fn metric_name(metric: Metric) -> &'static str {
+    METRICS.into_iter().find(|name| Metric::from_name(name) == Some(metric)).unwrap_or("the difference")
+}
+
+/// A difference with four decimals, or as many more as it takes to see that it is above the limit.
+fn shown_above(difference: f64, limit: f64) -> String {
+    let is_above = |text: &String| text.parse().is_ok_and(|shown: f64| shown > limit);
+    (4..18)
+        .map(|decimals| format!("{difference:.decimals$}"))
+        .find(is_above)
+        .unwrap_or_else(|| difference.to_string())
+}
+
 fn limit(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|x: &f64| *x >= 0.0).ok_or_else(|| "expected a number from 0 up".to_owned())
+    text.parse().ok().filter(|x: &f64| *x >= 0.0).ok_or_else(|| "expected a number, 0 or more".to_owned())
 }
 
 /// Bytes a pixel of the differences and their picture.
@@ -62,6 +76,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let signals = Signals::listen(&CancelToken::new())?;
     if let Some(output) = &arguments.output {
+        check_image_format(output)?;
         Inputs::of([arguments.a.as_path(), &arguments.b]).refuse(output)?;
     }
     let memory = Memory::new(arguments.max_memory);
@@ -108,9 +123,24 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     match arguments.fail_above {
         // A NaN is above every limit.
         Some(limit) if difference.is_nan() || difference > limit => {
-            say!("{difference} is above {limit}");
+            let name = metric_name(arguments.metric);
+            say!("{name} {} is above --fail-above {limit}", shown_above(difference, limit));
             Err(Failure::Different)
         }
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shown_above;
+
+    #[test]
+    fn a_difference_is_shown_with_enough_digits_to_be_above_its_limit() {
+        assert_eq!(shown_above(0.079_123, 0.001), "0.0791");
+        assert_eq!(shown_above(0.079_123, 0.0791), "0.07912");
+        assert_eq!(shown_above(2.5e-7, 0.0), "0.0000003");
+        assert_eq!(shown_above(f64::NAN, 1.0), "NaN");
+        assert_eq!(shown_above(f64::INFINITY, 1.0), "inf");
     }
 }

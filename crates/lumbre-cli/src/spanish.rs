@@ -272,10 +272,15 @@ const EXPECTATIONS: &[(&str, &str)] = &[
         "expected x, y, z, -x, -y, -z or a direction such as 0,1,1",
         "se esperaba x, y, z, -x, -y, -z o una dirección como 0,1,1",
     ),
-    ("invalid digit found in string", "se esperaba un número entero"),
-    ("cannot parse integer from empty string", "se esperaba un número entero"),
-    ("number too large to fit in target type", "el número es demasiado grande"),
+    ("expected a whole number from {} to {}", "se esperaba un número entero de {} a {}"),
 ];
+
+/// What was expected in Spanish, where the English of it fits; `{}` stands for a number, the same in both.
+fn filled_in(english: &str, spanish: &str, source: &str) -> Option<String> {
+    let numbers = source.split(' ').filter(|word| word.bytes().all(|byte| byte.is_ascii_digit()));
+    let fill = |text: &str| numbers.clone().fold(text.to_owned(), |text, number| text.replacen("{}", number, 1));
+    (fill(english) == source).then(|| fill(spanish))
+}
 
 /// What is wrong with the words, in Spanish.
 pub(crate) fn said(error: &Error) -> String {
@@ -293,8 +298,8 @@ pub(crate) fn said(error: &Error) -> String {
         }
         ErrorKind::ValueValidation => {
             let source = error.source().map(ToString::to_string).unwrap_or_default();
-            let expected = EXPECTATIONS.iter().find(|(english, _)| *english == source);
-            let expected = expected.map_or(String::new(), |(_, spanish)| format!(": {spanish}"));
+            let expected = EXPECTATIONS.iter().find_map(|(english, spanish)| filled_in(english, spanish, &source));
+            let expected = expected.map_or(String::new(), |spanish| format!(": {spanish}"));
             format!("valor no válido '{value}' para '{argument}'{expected}")
         }
         ErrorKind::UnknownArgument => format!("argumento desconocido '{argument}'"),

@@ -13,6 +13,7 @@ use lumbre::{Background, EnvironmentDesc, Ground, Stage, Surroundings};
 use crate::defaults::Defaults;
 use crate::failure::Failure;
 use crate::names::one_of;
+use crate::units;
 
 /// How a model is shown.
 #[derive(Args, Clone, Debug)]
@@ -34,7 +35,7 @@ pub(crate) struct StagingArguments {
     #[arg(long, conflicts_with = "camera", help_heading = "View")]
     fit: bool,
     /// Render N pictures from all around the model, as -o frame.####.png.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000),
+    #[arg(long, value_name = "N", value_parser = units::whole(2_u32..=100_000),
           conflicts_with = "camera", help_heading = "View")]
     turntable: Option<u32>,
 }
@@ -194,7 +195,7 @@ fn environment(path: &Path, limits: Limits) -> Result<EnvironmentDesc, Failure> 
     let found = (image.width(), image.height());
     EnvironmentDesc::of_image(image).ok_or_else(|| {
         Failure::Input(format!(
-            "{}: no environment map (found {} by {} pixels; expected twice as wide as high, or square in pbrt's equal-area mapping)",
+            "{}: not an environment map (found {} by {} pixels; expected twice as wide as high, or square in pbrt's equal-area mapping)",
             path.display(),
             found.0,
             found.1

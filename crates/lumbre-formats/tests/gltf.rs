@@ -793,9 +793,9 @@ fn animations_by_pointers_change_what_they_name() {
     }
     // What cannot be animated, or is not there, is said and left out.
     for (pointer, said) in [
-        ("/buffers/0/byteLength", "/pointer: animation of what cannot be animated was left out"),
-        ("/materials/1/alphaCutoff", "/pointer: animation of what is not there was left out"),
-        ("/nodes/2/scale/0", "/pointer: animation of what is not there was left out"),
+        ("/buffers/0/byteLength", "/pointer: animation is left out: this cannot be animated"),
+        ("/materials/1/alphaCutoff", "/pointer: animation is left out: there is no such value"),
+        ("/nodes/2/scale/0", "/pointer: animation is left out: there is no such value"),
     ] {
         let options = changed(GltfOptions::default(), |it| it.frame = Some(1.5));
         let mut diagnostics = Diagnostics::new();
@@ -969,7 +969,7 @@ fn single_weights_and_those_of_meshes_are_animated_by_pointers() {
     assert_eq!(found, [[-1.0, 0.0, 4.0]]);
     assert!(warnings[0].contains("/animations/0/channels/1: animation of what another one"), "{warnings:?}");
     let wrong = error(&parts.json(&rest(&[(0, "/nodes/0/weights/2")])), &parts.binary);
-    assert!(wrong.contains("morph targets that are not there"), "{wrong}");
+    assert!(wrong.contains("morph targets that do not exist"), "{wrong}");
 }
 
 #[test]
@@ -1618,7 +1618,7 @@ fn broken_files_are_refused_with_a_pointer_and_a_reason() {
         (r#""version":"2.0""#, r#""version":2.0"#, "/asset/version: wrong type (found 2.0; expected a string)"),
         (r#""version":"2.0""#, r#""version":"2.0","minVersion":"2.1""#, "/asset/minVersion: unsupported version"),
         (r#""asset":{"version":"2.0"},"#, "", r#""asset" is missing"#),
-        (r#""buffer":0,"byteOffset":0"#, r#""buffer":7,"byteOffset":0"#, "/bufferViews/0/buffer: index of something that is not there (found 7; expected a buffer from 0 to 0)"),
+        (r#""buffer":0,"byteOffset":0"#, r#""buffer":7,"byteOffset":0"#, "/bufferViews/0/buffer: there is no buffer 7 (expected 0)"),
         (r#""buffer":0,"byteOffset":0"#, r#""buffer":-1,"byteOffset":0"#, "/bufferViews/0/buffer: wrong number (found -1; expected a whole number, 0 or more)"),
         (r#""buffer":0,"byteOffset":0"#, r#""buffer":0,"byteOffset":18446744073709551615"#, "/bufferViews/0/byteOffset: wrong number"),
         (r#""buffer":0,"byteOffset":0"#, r#""buffer":0,"byteOffset":9007199254740991"#, "/bufferViews/0/byteOffset: buffer view past the end of its buffer"),
@@ -1660,13 +1660,13 @@ fn broken_files_are_refused_with_a_pointer_and_a_reason() {
         (r#""translation":[0,0,0]"#, r#""matrix":[1,0,0,0,1,1,0,0,0,0,1,0,0,0,0,1]"#, "/nodes/2/matrix: matrix that shears"),
         (r#""nodes":[0,1,3,4]"#, r#""nodes":[0,1,2]"#, "/scenes/0/nodes/2: scene with a node that hangs on another (found 2)"),
         (r#""nodes":[0,1,3,4]"#, r#""nodes":[0,1,0]"#, "/scenes/0/nodes/2: scene with the same node twice (found 0)"),
-        (r#""scene":0"#, r#""scene":3"#, "/scene: index of something that is not there (found 3; expected a scene from 0 to 0)"),
+        (r#""scene":0"#, r#""scene":3"#, "/scene: there is no scene 3 (expected 0)"),
         (r#""yfov":0.7"#, r#""yfov":4"#, "/cameras/0/perspective/yfov: number out of range (found 4; expected a number from"),
         (r#""type":"perspective""#, r#""type":"perspektive""#, r#"/cameras/0/type: unknown kind of camera (found "perspektive"; did you mean "perspective"?)"#),
         (r#""path":"weights""#, r#""path":"wieghts""#, r#"/animations/0/channels/1/target/path: unknown target of an animation (found "wieghts"; did you mean "weights"?)"#),
         (r#""interpolation":"STEP""#, r#""interpolation":"STEPS""#, r#"/animations/0/samplers/1/interpolation: unknown interpolation (found "STEPS"; did you mean "STEP"?)"#),
         (r#""interpolation":"CUBICSPLINE""#, r#""interpolation":"LINEAR""#, "/animations/0/samplers/3/output: animation of a wrong length (found 6 elements; expected 2 times 1 times 1)"),
-        (r#""sampler":1,"target""#, r#""sampler":8,"target""#, "/animations/0/channels/1/sampler: index of something that is not there (found 8; expected a sampler of this animation from 0 to 3)"),
+        (r#""sampler":1,"target""#, r#""sampler":8,"target""#, "/animations/0/channels/1/sampler: there is no sampler 8 (expected 0 to 3)"),
         (r#""alphaMode":"MASK""#, r#""alphaMode":"MASKS""#, r#"/materials/0/alphaMode: unknown alpha mode (found "MASKS"; did you mean "MASK"?)"#),
         (r#""baseColorFactor":[1,1,1,1]"#, r#""baseColorFactor":[1,1,2,1]"#, "/materials/0/pbrMetallicRoughness/baseColorFactor: number out of range"),
         (r#""roughnessFactor":0.5"#, r#""roughnessFactor":"0.5""#, r#"/materials/0/pbrMetallicRoughness/roughnessFactor: wrong type (found "0.5"; expected a number)"#),

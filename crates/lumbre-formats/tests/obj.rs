@@ -114,7 +114,7 @@ fn faces_may_stand_before_what_they_name() {
     let wrong = early.unwrap_err().to_string();
     assert_eq!(
         wrong,
-        "m.obj:3:11: face with a normal that is not there (found -1; expected 1 to 1, or backwards from -1)"
+        "m.obj:3:11: face with a normal that does not exist (found -1; expected 1 or -1)"
     );
     let file = read(
         "v 9 9 9\no a\nf 2//1 3//1 -1//1\nf 2//1 3//1 4//1 5//1\nvn 0 0 1\no b\nv 1 1 5\nv 4 1 5\nv 4 3 5\nv 1 3 5\n",
@@ -176,9 +176,9 @@ fn what_is_dropped_is_said() {
     assert_eq!(
         lines,
         [
-            "warning: m.obj:7:1: face with fewer than three corners, dropped",
-            "warning: m.obj:8:1: unknown keyword, line passed over (found \"faces\")",
-            "warning: m.obj:9:1: free-form curves and surfaces are not supported, passed over",
+            "warning: m.obj:7:1: face with fewer than three vertices is left out",
+            "warning: m.obj:8:1: line with an unknown keyword is left out (found \"faces\")",
+            "warning: m.obj:9:1: free-form curves and surfaces are not supported, and left out",
         ]
     );
 }

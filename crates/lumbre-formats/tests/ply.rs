@@ -225,8 +225,8 @@ fn lenient_drops_what_cannot_be_used_and_counts_it() {
     assert_eq!(
         said.lines(),
         [
-            "warning: m.ply:27:1: face with a vertex that is not finite, dropped (found face 1)",
-            "warning: m.ply:28:1: face with a vertex that is not there, dropped (found face 2)",
+            "warning: m.ply:27:1: face with a vertex that is not finite is left out (found face 1)",
+            "warning: m.ply:28:1: face with a vertex that does not exist is left out (found face 2)",
         ]
     );
     assert!(mesh.positions.iter().all(|p| p.is_finite()));
@@ -444,7 +444,7 @@ fn texture_coordinates_of_corners_are_those_of_the_faces() {
     );
     let text = file("3 0 1 2 6 0 0 0.5 0 0.5 0.75\n3 0 2 3 6 9 9 0.5 0.75 0 1\n3 4 1 2 0\n");
     let error = read(text.as_bytes()).unwrap_err().to_string();
-    assert!(error.contains("face 2 has a vertex that is not there") && error.contains("0 to 3"), "{error}");
+    assert!(error.contains("face 2 has a vertex that does not exist") && error.contains("0 to 3"), "{error}");
 }
 
 #[test]

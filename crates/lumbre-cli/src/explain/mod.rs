@@ -28,7 +28,6 @@ use crate::reading::{ReadingArguments, print_warnings};
 use crate::shown::{PreparedScene, SceneRequest, shown};
 #[cfg(not(target_family = "wasm"))]
 use crate::staging::StagingArguments;
-#[cfg(not(target_family = "wasm"))]
 use crate::units;
 #[cfg(not(target_family = "wasm"))]
 use crate::view::ViewArguments;
@@ -66,8 +65,10 @@ use surfaces::Chosen;
 use texts::Texts;
 pub use things::SceneNames;
 
-/// Tells how the colour of a pixel, or the light along a ray, comes about: the camera and its ray, every surface on the way with the
-/// equation of its crossings, normals, lights and shadows, and the path of one sample, with all numbers as the render computes them.
+/// Explains how a pixel gets its colour.
+///
+/// Or how much light comes along a ray: the camera and its ray, every surface on the way with the equation of its crossings, normals,
+/// lights and shadows, and the path of one sample, with all numbers as the render computes them.
 #[cfg(not(target_family = "wasm"))]
 #[derive(Args)]
 #[command(after_help = "Examples:
@@ -80,7 +81,7 @@ pub use things::SceneNames;
   lumbre explain scene.pbrt --pixel 320,240 --format markdown --lang es
   lumbre explain model.glb --pixel 100,80 --size 200x160 --format json | jq .")]
 pub(crate) struct Arguments {
-    /// The scene: .pbrt, .gltf, .glb, .obj, .ply or .stl, also packed by gzip. Several are put into the same world.
+    /// The scene: .pbrt, .gltf, .glb, .obj, .ply, .stl or .pov, also compressed with gzip. Several are put into the same world.
     #[arg(required = true, value_name = "SCENE")]
     scene: Vec<PathBuf>,
     #[command(flatten)]
@@ -91,14 +92,14 @@ pub(crate) struct Arguments {
     /// Width and height of the picture in pixels.
     #[arg(long, value_name = "WxH", value_parser = units::size)]
     size: Option<(u32, u32)>,
-    /// A camera by name or 0-based position.
+    /// A camera of the scene, by its name or its index from 0.
     #[arg(long, value_name = "NAME|INDEX", help_heading = "View")]
     camera: Option<String>,
-    /// What is computed for each pixel.
+    /// What each pixel shows: light, or a property of the visible surface.
     #[arg(long, value_name = "NAME", value_parser = one_of(&IntegratorKind::NAMES, IntegratorKind::from_name))]
     integrator: Option<IntegratorKind>,
     /// Seed of the random numbers.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = units::whole(0..=u64::MAX))]
     seed: Option<u64>,
     /// Print errors only.
     #[arg(short, long)]
@@ -117,31 +118,31 @@ pub struct Request {
     /// The pixel, from 0,0 in the upper left corner.
     #[arg(long, value_name = "X,Y", value_parser = pixel)]
     pub pixel: Option<(u32, u32)>,
-    /// A ray instead: its origin and its direction, of any length but 0; then, where it is not 0 to infinity, its range of t.
+    /// A ray instead of a pixel: its origin and direction (of any length but 0), then optionally its range of t (by default 0 to infinity).
     #[arg(long, value_name = "OX,OY,OZ,DX,DY,DZ[,TMIN,TMAX]", allow_hyphen_values = true, value_parser = ray, conflicts_with = "pixel")]
     pub ray: Option<Ray>,
-    /// What it is written as.
+    /// The format of the explanation.
     #[arg(long, value_enum, value_name = "FORMAT", default_value_t = Format::Text)]
     pub format: Format,
     /// The language: English or Spanish.
     #[arg(long, value_enum, value_name = "LANGUAGE", default_value_t = Language::En)]
     pub lang: Language,
-    /// Tell the crossings of this many of the rays that follow, too.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    /// Also list the crossings of the next N bounce rays.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = units::whole(0..=u32::MAX))]
     pub depth: u32,
-    /// The number of the sample: the radiance is that which a render adds to the pixel for it.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    /// Which sample of the pixel to explain.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = units::whole(0..=u32::MAX))]
     pub sample: u32,
-    /// Tell only the surface that is seen, not those behind it.
+    /// Explain only the visible surface, not those behind it.
     #[arg(long)]
     pub nearest: bool,
-    /// Tell of this shape, whether the ray meets it or not: its number, its kind, or the name of its material.
+    /// Explain this shape, whether the ray hits it or not: its number, its kind, or the name of its material.
     #[arg(long, value_name = "NAME|N", conflicts_with = "nearest")]
     pub shape: Option<String>,
-    /// Tell of all shapes, those that the ray misses too.
+    /// Explain all shapes, also those that the ray misses.
     #[arg(long, conflicts_with_all = ["nearest", "shape"])]
     pub all_shapes: bool,
-    /// Tell only the sections with these keys, as JSON names them: camera, equation, Quadratic, hit, transform, light, radiance, …
+    /// Print only the sections with these keys, the keys of JSON: camera, equation, Quadratic, hit, transform, light, radiance, …
     #[arg(long, value_name = "KEY,…", value_delimiter = ',')]
     pub only: Vec<String>,
 }
@@ -234,7 +235,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let PreparedScene { scene, mut options, .. } = shown;
     if options.spectral && !arguments.quiet {
-        say!("warning: its picture carries wavelengths; what is explained is a path of red, green and blue");
+        say!("warning: the picture of this scene is spectral; the explanation follows a path of red, green and blue");
     }
     options.spectral = false;
     options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);

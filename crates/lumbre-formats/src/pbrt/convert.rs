@@ -683,7 +683,7 @@ fn shared<K: Hash + Eq, T: TextureValue>(
 pub(super) fn file_fault(at: SourcePosition, error: FormatError) -> Fault {
     match error {
         FormatError::Io { path, action, source } => {
-            at.error(format!("{action} {}: {source}", quoted(&path.display().to_string())))
+            at.error(format!("{}: {action}: {source}", path.display()))
         }
         FormatError::Limit { place: None, source } => Fault::Limit(at, Box::new(source)),
         other => Fault::Named(at, Box::new(other)),

@@ -138,11 +138,11 @@ impl<'b, 'd> Parser<'b, 'd> {
         let input = match Input::open(&path, self.converter.budget) {
             Ok(input) => input,
             Err(FormatError::Io { action, source, path }) => {
-                let message = format!("{action} {}: {source}", quoted(&path.display().to_string()));
+                let message = format!("{}: {action}: {source}", path.display());
                 if !self.converter.diagnostics.is_lenient() {
                     return Err(at.error(message));
                 }
-                self.converter.note(at, format!("{message}; the scene goes on without it"));
+                self.converter.note(at, format!("{message}; the scene is read without it"));
                 return Ok(());
             }
             Err(FormatError::Limit { source, .. }) => return Err(Fault::Limit(at, Box::new(source))),
