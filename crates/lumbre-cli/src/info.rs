@@ -204,10 +204,18 @@ fn about_part(part: &Part, as_json: bool) -> String {
         );
     }
     text += &format!("taken      {} of {}\n", state.taken(), state.wanted());
-    for (name, value) in &part.job.identity {
-        text += &format!("{}: {}\n", escaped_line(name), escaped_line(value));
+    // The options that tell renders apart at a glance; `--json` has all.
+    let options =
+        [("picture", "frame"), ("camera", "camera"), ("integrator", "integrator"), ("seed", "seed"), ("version", "version")];
+    for (name, title) in options {
+        let Some(value) = part.job.identity.get(name).filter(|value| *value != "none") else { continue };
+        let value = value.strip_prefix("kind ").unwrap_or(value);
+        let value = value.split([' ', ',']).next().unwrap_or_default();
+        text += &format!("{title:<11}{}\n", escaped_line(value));
     }
-    text
+    let files = part.job.identity.keys().filter_map(|name| name.strip_prefix("file "));
+    let files: Vec<String> = files.map(|name| escaped_line(name).into_owned()).collect();
+    text + &format!("files      {}\n", shortened(files.into_iter()))
 }
 
 /// How many names of a kind are printed: `--json` has all.

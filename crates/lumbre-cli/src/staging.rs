@@ -195,7 +195,7 @@ fn environment(path: &Path, limits: Limits) -> Result<EnvironmentDesc, Failure> 
     let found = (image.width(), image.height());
     EnvironmentDesc::of_image(image).ok_or_else(|| {
         Failure::Input(format!(
-            "{}: not an environment map (found {} by {} pixels; expected twice as wide as high, or square in pbrt's equal-area mapping)",
+            "{}: no environment map (found {} by {} pixels; expected twice as wide as high, or square in pbrt's equal-area mapping)",
             path.display(),
             found.0,
             found.1

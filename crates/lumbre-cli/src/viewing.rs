@@ -324,7 +324,7 @@ impl Files {
         reading.memory().check_picture(&options, held)?;
         if scene.is_dark() && is_of_light {
             warnings
-                .push(format!("warning: {}: the scene has no light, its picture is black", name.display()));
+                .push(format!("warning: {}: the scene has no light: its picture is black", name.display()));
         }
         let mut save = SaveOptions::default();
         save.exposure = match self.arguments.exposure {

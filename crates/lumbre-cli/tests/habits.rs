@@ -273,7 +273,7 @@ fn colours_are_the_same_for_all_messages() {
 fn wrong_words_are_answered_with_the_right_ones() {
     let desk = Desk::new();
     for (arguments, expected) in [
-        (&["render", "a.obj", "--samples", "4"][..], "how many a pixel has is --spp"),
+        (&["render", "a.obj", "--samples", "4"][..], "the number of samples per pixel is --spp"),
         (&["render", "a.obj", "--pixel-samples", "4"], "'--spp'"),
         (&["render", "a.obj", "--output-file", "x"], "'--output'"),
         (&["render", "a.obj", "--resolution", "4"], "'--size'"),

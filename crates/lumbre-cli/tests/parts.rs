@@ -140,7 +140,7 @@ fn parts_of_several_frames_are_merged_at_once() {
         3,
         "g.1.exr: 600 samples missing: samples 1..3",
     );
-    refused(&folder, "merge a.0.part b.1.part -o g.exr", 3, "they differ in");
+    refused(&folder, "merge a.0.part b.1.part -o g.exr", 3, "of another render than a.0.part: ");
     done(&folder, "render slide.gltf --size 20x15 --samples 0..1 -q -o one.part");
     refused(&folder, "merge one.part -o g.#.exr", 3, "one.part: it is not of a frame");
 }
@@ -169,13 +169,13 @@ fn what_is_missing_doubled_foreign_or_damaged_is_refused_by_name() {
         &folder,
         "merge a.part seed.part -o x.exr",
         3,
-        "another render than a.part: they differ in seed: 0, 4",
+        "of another render than a.part: seed 0 there, 4 here",
     );
     refused(&folder, "merge a.part scene.pbrt -o x.exr", 3, "scene.pbrt: it is no part of a render");
-    refused(&folder, "merge a.part nothing.part -o x.exr", 4, "nothing.part: cannot read");
+    refused(&folder, "merge a.part nothing.part -o x.exr", 4, "nothing.part: cannot open");
     fs::create_dir(folder.path("parts")).unwrap();
-    refused(&folder, "merge parts -o x.exr", 4, "parts: cannot read: it is a folder");
-    refused(&folder, "merge a.part b.part -o a.part", 2, "a.part: it is an input");
+    refused(&folder, "merge parts -o x.exr", 4, "parts: cannot open: it is a folder");
+    refused(&folder, "merge a.part b.part -o a.part", 2, "a.part: this is an input");
     refused(
         &folder,
         "render scene.pbrt -o a.png --samples 0..3",
@@ -203,7 +203,7 @@ fn what_is_missing_doubled_foreign_or_damaged_is_refused_by_name() {
     // An asset that has changed makes it another render.
     wood(&folder, [0.8, 0.5, 0.3]);
     done(&folder, "render scene.pbrt -o d.part --samples 3..5");
-    refused(&folder, "merge a.part d.part -o x.exr", 3, "they differ in file wood.png: changed");
+    refused(&folder, "merge a.part d.part -o x.exr", 3, "of another render than a.part: file wood.png changed");
     let (_, about) = answer(folder.command(&["info", "d.part"]).output().unwrap());
     let about = if about.is_empty() {
         String::from_utf8(folder.command(&["info", "d.part"]).output().unwrap().stdout).unwrap()
@@ -332,7 +332,7 @@ fn a_finished_picture_takes_more_samples() {
         &folder,
         "render scene.pbrt -o few.exr --spp 9 --resume --max-depth 2",
         2,
-        "they differ in integrator",
+        "of another render than this one: integrator ",
     );
     done(&folder, "render scene.pbrt -o new.exr --spp 9 --resume --checkpoint new.ck --keep-sums");
     assert_eq!(bytes(&folder, "new.exr"), bytes(&folder, "whole.exr"));
@@ -419,7 +419,7 @@ mod interrupted {
         signal(child.id(), "INT");
         let (status, said) = answer(child.wait_with_output().unwrap());
         assert!(
-            status == 4 && said.contains("what was rendered is kept in ./a.exr.rescued.0.part"),
+            status == 4 && said.contains("the samples are saved in ./a.exr.rescued.0.part"),
             "{status} {said}"
         );
         let part = lumbre::Part::open(&folder.path("a.exr.rescued.0.part"), |_| u64::MAX).unwrap();
@@ -441,7 +441,7 @@ mod interrupted {
         signal(child.id(), "INT");
         let (status, said) = answer(child.wait_with_output().unwrap());
         assert!(
-            status == 130 && said.contains("warning: the checkpoint cannot be written"),
+            status == 130 && said.contains("warning: cannot write the checkpoint"),
             "{status} {said}"
         );
         assert!(folder.path("a.exr").exists(), "{said}");
@@ -458,7 +458,7 @@ mod interrupted {
             ("render pipe.pbrt -o a.png", "it is not a regular file"),
             (
                 "render names.pbrt -o a.png",
-                "names.pbrt:1:28: cannot read \"pipe.ply\": it is not a regular file",
+                "names.pbrt:1:28: pipe.ply: cannot read: it is not a regular file",
             ),
             ("info pipe.pbrt", "it is not a regular file"),
             ("merge pipe.part -o a.png", "it is not a regular file"),
@@ -469,13 +469,13 @@ mod interrupted {
             ("render /proc/self/environ --input-format pbrt -o a.png", "of the system's own"),
             (
                 "render scene.pbrt -o a.png --checkpoint pipe.part",
-                "it is not a regular file, as a checkpoint is",
+                "not a regular file (expected one for a checkpoint)",
             ),
             (
                 "render scene.pbrt -o a.png --checkpoint /dev/null --resume",
-                "it is not a regular file, as a checkpoint is",
+                "not a regular file (expected one for a checkpoint)",
             ),
-            ("render scene.pbrt -o a.png --checkpoint .", "it is not a regular file, as a checkpoint is"),
+            ("render scene.pbrt -o a.png --checkpoint .", "not a regular file (expected one for a checkpoint)"),
             ("render scene.pbrt -o a.png --stats pipe.ply", "nobody reads from this pipe"),
         ] {
             // What a scene names is an error of the scene.

@@ -716,18 +716,18 @@ fn files_that_are_not_there_are_errors_where_they_are_asked_for() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("s.pbrt");
     let cases = [
-        ("WorldBegin\n Include \"gone.pbrt\"", "2:10: cannot open \"gone.pbrt\""),
-        ("WorldBegin\n Include \".\"", "2:10: cannot read"),
-        ("WorldBegin Shape \"plymesh\" \"string filename\" \"gone.ply\"", "1:28: cannot open \"gone.ply\""),
+        ("WorldBegin\n Include \"gone.pbrt\"", "2:10: gone.pbrt: cannot open"),
+        ("WorldBegin\n Include \".\"", "2:10: .: cannot read"),
+        ("WorldBegin Shape \"plymesh\" \"string filename\" \"gone.ply\"", "1:28: gone.ply: cannot open"),
         (
             "WorldBegin Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"gone.png\" Shape \"sphere\" \"texture alpha\" \"t\"",
-            "1:43: cannot open \"gone.png\"",
+            "1:43: gone.png: cannot open",
         ),
         (
             "WorldBegin LightSource \"infinite\" \"string filename\" \"/dev/zero\"",
-            "1:35: cannot read \"/dev/zero\"",
+            "1:35: /dev/zero: cannot read",
         ),
-        ("WorldBegin Include \"$HOME/x\"", "1:20: cannot open \"$HOME/x\""),
+        ("WorldBegin Include \"$HOME/x\"", "1:20: $HOME/x: cannot open"),
         (
             "WorldBegin Material \"diffuse\" \"spectrum reflectance\" \"../x.spd\"",
             "1:31: unknown spectrum \"../x.spd\"",

@@ -1641,13 +1641,13 @@ fn broken_files_are_refused_with_a_pointer_and_a_reason() {
         (r#""sparse":{"count":1"#, r#""sparse":{"count":5"#, "/sparse/count: too many sparse elements (found 5; expected at most 4"),
         (r#""indices":{"bufferView":1,"componentType":5121}"#, r#""indices":{"bufferView":1,"byteOffset":16,"componentType":5121}"#, "/sparse/indices: accessor past the end"),
         (r#""indices":{"bufferView":1,"componentType":5121}"#, r#""indices":{"bufferView":1,"componentType":5126}"#, "/sparse/indices/componentType: wrong type of sparse indices"),
-        (r#""POSITION":0"#, r#""POSITION":99"#, "/meshes/0/primitives/0/attributes/POSITION: index of something that is not there"),
+        (r#""POSITION":0"#, r#""POSITION":99"#, "/meshes/0/primitives/0/attributes/POSITION: there is no accessor 99"),
         (r#""POSITION":0"#, r#""POSITON":0"#, r#"/meshes/0/primitives/0/attributes/POSITON: unknown attribute (found "POSITON"; expected one of glTF's, or a name that starts with an underscore; did you mean "POSITION"?)"#),
         (r#""mode":6"#, r#""mode":7"#, "/meshes/0/primitives/0/mode: unknown mode of a primitive (found 7"),
         (r#""mode":6"#, r#""indices":0,"mode":6"#, "/meshes/0/primitives/0/indices: accessor of a wrong type"),
         (r#""weights":[0.5]"#, r#""weights":[0.5,1]"#, "/meshes/0/weights: as many weights as morph targets are needed (found 2; expected 1)"),
         (r#""WEIGHTS_0":2"#, r#""WEIGHTS_1":2"#, "/meshes/0/primitives/0/attributes: WEIGHTS_0 is missing"),
-        (r#""joints":[1,2]"#, r#""joints":[1,9]"#, "/skins/0/joints/1: index of something that is not there (found 9"),
+        (r#""joints":[1,2]"#, r#""joints":[1,9]"#, "/skins/0/joints/1: there is no node 9"),
         (r#""joints":[1,2]"#, r#""joints":[1]"#, "/accessors/1: joint that the skin does not have (found 1 at vertex 1; expected 0 to 0)"),
         (r#""joints":[1,2]"#, r#""joints":[1,2],"inverseBindMatrices":0"#, "/skins/0/inverseBindMatrices: accessor of a wrong type"),
         (r#""children":[2]"#, r#""children":[1]"#, "/nodes/1: node inside itself (found nodes 1 > 1)"),
@@ -1671,7 +1671,7 @@ fn broken_files_are_refused_with_a_pointer_and_a_reason() {
         (r#""baseColorFactor":[1,1,1,1]"#, r#""baseColorFactor":[1,1,2,1]"#, "/materials/0/pbrMetallicRoughness/baseColorFactor: number out of range"),
         (r#""roughnessFactor":0.5"#, r#""roughnessFactor":"0.5""#, r#"/materials/0/pbrMetallicRoughness/roughnessFactor: wrong type (found "0.5"; expected a number)"#),
         (r#""roughnessFactor":0.5"#, r#""baseColorTexture":{"index":0}"#, "/meshes/0/primitives/0: texture coordinates that the material needs are missing (found 0 sets; expected 1 sets)"),
-        (r#""roughnessFactor":0.5"#, r#""baseColorTexture":{"index":5}"#, "/materials/0/pbrMetallicRoughness/baseColorTexture/index: index of something that is not there"),
+        (r#""roughnessFactor":0.5"#, r#""baseColorTexture":{"index":5}"#, "/materials/0/pbrMetallicRoughness/baseColorTexture/index: there is no texture 5"),
         (r#""wrapS":10497"#, r#""wrapS":10498"#, "/samplers/0/wrapS: unknown way to wrap (found 10498"),
         (r#""extensionsUsed":["KHR_lights_punctual"]"#, r#""extensionsUsed":["KHR_x"],"extensionsRequired":["KHR_x"]"#, r#"/extensionsRequired/0: the file requires an extension that is not supported (found "KHR_x")"#),
         (r#""extensionsUsed":["KHR_lights_punctual"]"#, r#""extensionsRequired":["KHR_materials_ior"]"#, r#"required extension that "extensionsUsed" does not list"#),
@@ -1721,7 +1721,7 @@ fn indices_beyond_the_vertices_and_numbers_that_are_none_are_found_and_forgiven(
     let found = error(&json, &parts.binary);
     assert!(
         found.contains(
-            "/accessors/1: index of a vertex that is not there (found 65535 as index 4; expected 0 to 3)"
+            "/accessors/1: index of a vertex that does not exist (found 65535 as index 4; expected 0 to 3)"
         ),
         "{found}"
     );

@@ -192,7 +192,7 @@ fn lenient_drops_what_cannot_be_used_and_counts_it() {
     assert_eq!(file.meshes.len(), 1);
     assert_eq!(file.meshes[0].mesh.triangles.len(), 1);
     assert_eq!(lines.len(), 5, "{lines:#?}");
-    assert!(lines.iter().filter(|l| l.contains("with a corner that is not there, dropped")).count() == 3);
+    assert!(lines.iter().filter(|l| l.contains("with a vertex that does not exist is left out")).count() == 3);
 }
 
 #[test]
@@ -264,8 +264,8 @@ fn a_scene_has_its_materials_and_says_what_is_missing() {
     assert!(matches!(scene.shapes[3].alpha.as_deref(), Some(Texture::Constant(0.5))));
     let lines = said.lines();
     assert_eq!(lines.len(), 3, "{lines:#?}");
-    assert!(lines[0].contains("my scene.mtl:13:8: cannot use a texture"), "{}", lines[0]);
-    assert!(lines[1].contains("a.obj:2:8: cannot read a material file"), "{}", lines[1]);
+    assert!(lines[0].contains("my scene.mtl:13:8: texture is left out"), "{}", lines[0]);
+    assert!(lines[1].contains("a.obj:2:8: material file is left out"), "{}", lines[1]);
     assert!(
         lines[2].contains(
             "a.obj:17:8: unknown material, taken for grey (found \"mate\"; did you mean \"matte\"?)"

@@ -130,8 +130,7 @@ impl Cast<'_> {
     fn to_standard_output(&self, rays: RayReader) -> Result<(), Failure> {
         let mut failure = None;
         let mut out = io::stdout().lock();
-        let written = Output::csv(&mut out, self.query.table())
-            .and_then(|output| self.write(rays, output, &mut failure));
+        let written = self.write(rays, Output::csv(&mut out, self.query.table()), &mut failure);
         match (failure, written) {
             (Some(failure), _) => Err(failure),
             // The reader may stop early: `lumbre cast … | head`.
@@ -148,7 +147,7 @@ impl Cast<'_> {
         let mut failure = None;
         let written = match self.form {
             Form::Csv => atomic_write(path, |out: &mut dyn Write| {
-                self.write(rays, Output::csv(out, table)?, &mut failure)
+                self.write(rays, Output::csv(out, table), &mut failure)
             }),
             form => atomic_write_seek(path, |file| {
                 self.write(rays, Output::in_file(file, form, table, folder)?, &mut failure)

@@ -388,11 +388,11 @@ impl<'a> Mesh<'a> {
             let last = u64::from(self.encoding == Encoding::Text);
             let most = (source.left() as u64 + last) / least;
             if element.count > most {
-                let elements = match &*element.name {
-                    "vertex" => "vertices".to_owned(),
-                    "face" => "faces".to_owned(),
-                    "edge" => "edges".to_owned(),
-                    name => format!("elements {}", quoted(name)),
+                let elements = match (&*element.name, element.count) {
+                    (name @ ("vertex" | "face" | "edge"), 1) => name.to_owned(),
+                    ("vertex", _) => "vertices".to_owned(),
+                    (name @ ("face" | "edge"), _) => format!("{name}s"),
+                    (name, _) => format!("of {}", quoted(name)),
                 };
                 let counts = format!("{} {elements} announced, room for {most}", element.count);
                 let wrong = Diagnostic::error("file is truncated").at(element.place.clone());
