@@ -49,7 +49,8 @@ pub(crate) struct PartArguments {
 /// `A..B`, without B.
 fn samples(text: &str) -> Result<Range<u32>, String> {
     let wrong = || {
-        let count = if text.parse::<u32>().is_ok() { "; the number of samples per pixel is --spp" } else { "" };
+        let count =
+            if text.parse::<u32>().is_ok() { "; the number of samples per pixel is --spp" } else { "" };
         format!(
             "expected the first sample and the one after the last, such as 0..16 for the first sixteen{count}"
         )
@@ -453,7 +454,10 @@ impl Checkpoint {
         }
         self.is_own.store(!is_output, Ordering::Relaxed);
         if !is_quiet {
-            say!("resumed from {name}: {} per pixel", counted(u64::from(part.state.least_samples()), "sample"));
+            say!(
+                "resumed from {name}: {} per pixel",
+                counted(u64::from(part.state.least_samples()), "sample")
+            );
         }
         Ok(Some(part.state))
     }

@@ -220,7 +220,8 @@ fn refuse_others(output: &Path, frames: Option<&Frames>) -> Result<(), Failure> 
 /// [`Failure::Usage`] for a name with a backslash.
 fn in_pattern(folder: &str) -> Result<String, Failure> {
     if folder.contains('\\') {
-        let why = "Slurm cannot write logs into a folder of this name (expected --folder without backslashes)";
+        let why =
+            "Slurm cannot write logs into a folder of this name (expected --folder without backslashes)";
         return Err(Failure::Usage(format!("{folder}: {why}")));
     }
     Ok(folder.replace('%', "%%"))

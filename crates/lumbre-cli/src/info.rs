@@ -205,8 +205,13 @@ fn about_part(part: &Part, as_json: bool) -> String {
     }
     text += &format!("taken      {} of {}\n", state.taken(), state.wanted());
     // The options that tell renders apart at a glance; `--json` has all.
-    let options =
-        [("picture", "frame"), ("camera", "camera"), ("integrator", "integrator"), ("seed", "seed"), ("version", "version")];
+    let options = [
+        ("picture", "frame"),
+        ("camera", "camera"),
+        ("integrator", "integrator"),
+        ("seed", "seed"),
+        ("version", "version"),
+    ];
     for (name, title) in options {
         let Some(value) = part.job.identity.get(name).filter(|value| *value != "none") else { continue };
         let value = value.strip_prefix("kind ").unwrap_or(value);

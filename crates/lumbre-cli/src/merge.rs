@@ -89,7 +89,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let part = open(path, arguments)?;
         spp = spp.max(part.state.samples().end);
         let frame = frame_of(&part).ok_or_else(|| {
-            let why = "not a part of a frame (expected an output without #, or parts of a render with --frames)";
+            let why =
+                "not a part of a frame (expected an output without #, or parts of a render with --frames)";
             Failure::Input(format!("{}: {why}", path.display()))
         })?;
         frames.entry(frame).or_default().push(path.clone());
@@ -192,7 +193,11 @@ fn joined(arguments: &Arguments, parts: &[PathBuf]) -> Result<Part, Failure> {
             let has_it = |pieces: &[Piece]| pieces.iter().any(|piece| piece.intersection(overlap).is_some());
             let other =
                 origins.iter().find(|(_, pieces)| has_it(pieces)).map_or(first.as_path(), |(path, _)| *path);
-            Failure::Input(format!("{}: overlaps {}: both have {overlap}; leave one out", path.display(), other.display()))
+            Failure::Input(format!(
+                "{}: overlaps {}: both have {overlap}; leave one out",
+                path.display(),
+                other.display()
+            ))
         })?;
         origins.push((path, pieces));
     }

@@ -308,7 +308,8 @@ mod tests {
 
     #[test]
     fn lines_come_less_often_as_time_passes() {
-        let interval = |seconds, is_json| super::interval(Duration::from_secs(seconds), is_json).as_secs_f64();
+        let interval =
+            |seconds, is_json| super::interval(Duration::from_secs(seconds), is_json).as_secs_f64();
         assert_eq!([0, 20, 50, 600].map(|seconds| interval(seconds, false)), [2.0, 2.0, 5.0, 60.0]);
         assert_eq!(interval(600, true), 2.0);
     }

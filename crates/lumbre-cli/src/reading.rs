@@ -350,7 +350,8 @@ impl ReadingArguments {
             ("--pov-declare", !self.pov_declare.is_empty()),
         ];
         let unused = of_gltf.iter().filter(|_| !has_gltf).map(|option| (option, "a glTF file"));
-        let unused = unused.chain(of_pov.iter().filter(|_| !has_pov).map(|option| (option, "a POV-Ray scene")));
+        let unused =
+            unused.chain(of_pov.iter().filter(|_| !has_pov).map(|option| (option, "a POV-Ray scene")));
         for ((option, _), kind) in unused.filter(|((_, is_given), _)| *is_given) {
             let what = format!("{option} has no effect: {} is not {kind}", first.display());
             diagnostics.push(Diagnostic::warning(what));
@@ -417,9 +418,7 @@ impl ReadingArguments {
 
     fn options(&self, frame: Option<f64>) -> Result<lumbre::ReadOptions, Failure> {
         if self.shutter.is_some() && frame.is_none() {
-            return Err(Failure::Usage(
-                "--shutter needs --frame or --frames".to_owned(),
-            ));
+            return Err(Failure::Usage("--shutter needs --frame or --frames".to_owned()));
         }
         let frame = match (frame, &self.animation) {
             (None, Some(_)) => Some(0.0),

@@ -560,7 +560,8 @@ fn picture(
     let series = frame.as_ref().map(|(frame, _)| frame.series);
     let kind = arguments.integrator.unwrap_or(desc.integrator.kind);
     if denoiser.is_some() && kind.is_feature() {
-        let why = "--denoise cannot be used with --integrator normals, depth, albedo or uv: they have no noise";
+        let why =
+            "--denoise cannot be used with --integrator normals, depth, albedo or uv: they have no noise";
         return Err(Failure::Usage(why.to_owned()));
     }
     let is_of_light = kind.needs_light();
@@ -637,7 +638,8 @@ fn picture(
         say!("{}: z is up, since the model stands on a plane of z (--up y makes y up)", name.display());
     }
     if !options.spectral && is_first && is_of_light && scene.resolved().disperses() {
-        let what = "glass does not disperse light without --spectral: its index at 587.6 nm is used for all colours";
+        let what =
+            "glass does not disperse light without --spectral: its index at 587.6 nm is used for all colours";
         warn(format!("{}: {what}", name.display()))?;
     }
     if scene.is_dark() && is_of_light {
@@ -647,7 +649,10 @@ fn picture(
     if let (Some(ground), Some(camera)) = (scene.resolved().ground(), camera)
         && staging::is_below(ground, camera.world_from_camera.point(DVec3::ZERO))
     {
-        warn(format!("{}: the camera is below the ground, which hides everything (--ground none)", name.display()))?;
+        warn(format!(
+            "{}: the camera is below the ground, which hides everything (--ground none)",
+            name.display()
+        ))?;
     }
 
     let exposure = match first.exposure {
@@ -1003,6 +1008,9 @@ pub(crate) fn camera(scene: &Scene, wanted: &str) -> Result<usize, Failure> {
                 (None, CameraKind::Realistic(_)) => format!("{i} (realistic)"),
             })
             .collect();
-        Failure::Usage(format!("--camera: there is no camera \"{wanted}\" (expected one of: {})", known.join(", ")))
+        Failure::Usage(format!(
+            "--camera: there is no camera \"{wanted}\" (expected one of: {})",
+            known.join(", ")
+        ))
     })
 }

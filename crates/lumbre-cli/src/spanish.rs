@@ -31,28 +31,24 @@ static HEADINGS: [(&str, &str); 7] = [
 const ARGUMENTS: &[(&str, &str, &str)] = &[
     (
         "scene",
-        "La escena: .pbrt, .gltf, .glb, .obj, .ply o .stl, también comprimida con gzip. Varias se reúnen en el mismo mundo",
+        "La escena: .pbrt, .gltf, .glb, .obj, .ply, .stl o .pov, también comprimida con gzip. Varias se reúnen en el mismo mundo",
         "ESCENA",
     ),
     ("pixel", "El píxel, desde 0,0 en la esquina superior izquierda", ""),
     (
         "ray",
-        "En su lugar, un rayo: su origen y su dirección, de cualquier longitud menos 0; después, si no es de 0 a infinito, su rango de t",
+        "Un rayo en lugar de un píxel: su origen y su dirección (de cualquier longitud menos 0) y, si se quiere, su rango de t (por defecto, de 0 a infinito)",
         "",
     ),
     (
         "format",
-        "Cómo se escribe: text (texto), markdown (con fórmulas en LaTeX), html (una página con fórmulas y un dibujo) o json (para programas) [por defecto: text]",
+        "El formato de la explicación: text (texto), markdown (con fórmulas en LaTeX), html (una página con fórmulas y un dibujo) o json (para programas) [por defecto: text]",
         "FORMATO",
     ),
     ("lang", "El idioma: en (inglés) o es (español) [por defecto: en]", "IDIOMA"),
-    ("depth", "Explica también las intersecciones de tantos rayos siguientes [por defecto: 0]", ""),
-    (
-        "sample",
-        "El número de la muestra: la radiancia es la que un render suma al píxel por ella [por defecto: 0]",
-        "",
-    ),
-    ("nearest", "Explica solo la superficie que se ve, no las que hay detrás", ""),
+    ("depth", "Muestra también las intersecciones de los N rayos siguientes del camino [por defecto: 0]", ""),
+    ("sample", "Qué muestra del píxel se explica [por defecto: 0]", ""),
+    ("nearest", "Explica solo la superficie visible, no las que hay detrás", ""),
     (
         "shape",
         "Explica esta forma, la corte el rayo o no: su número, su tipo o el nombre de su material",
@@ -66,28 +62,28 @@ const ARGUMENTS: &[(&str, &str, &str)] = &[
     ),
     ("output", "Escribe en este archivo", "ARCHIVO"),
     ("size", "Ancho y alto de la imagen en píxeles", "ANCHOxALTO"),
-    ("camera", "Una cámara por su nombre o su posición, desde 0", "NOMBRE|ÍNDICE"),
+    ("camera", "Una cámara de la escena, por su nombre o su índice desde 0", "NOMBRE|ÍNDICE"),
     (
         "integrator",
-        "Lo que se calcula en cada píxel: path, caustics, whitted, pov, ambientocclusion, normals, depth, albedo o uv",
+        "Lo que muestra cada píxel, luz o una propiedad de la superficie visible: path, caustics, whitted, pov, ambientocclusion, normals, depth, albedo o uv",
         "NOMBRE",
     ),
     ("seed", "Semilla de los números aleatorios", ""),
     ("quiet", "Muestra solo los errores", ""),
     (
         "azimuth",
-        "Rodea el modelo hacia la derecha tantos grados, desde la vista que se elegiría o desde --eye",
+        "Rodea el modelo hacia la derecha tantos grados, desde la vista automática o desde --eye",
         "GRADOS",
     ),
-    ("elevation", "Sube tantos grados, como mucho hasta la vertical", "GRADOS"),
+    ("elevation", "Sube tantos grados, como mucho 90° (en vertical hacia abajo)", "GRADOS"),
     ("zoom", "Muestra todo tantas veces más grande", "FACTOR"),
     ("fov", "Campo de visión en grados en el lado más corto de la imagen", "GRADOS"),
     ("ortho", "Proyección ortográfica", ""),
     ("eye", "Dónde está la cámara", ""),
-    ("target", "El punto en el centro de la imagen; por defecto, el del modelo", ""),
+    ("target", "El punto en el centro de la imagen. Por defecto, el centro del modelo", ""),
     (
         "up",
-        "Qué es arriba: x, y, z, -x, -y, -z o una dirección X,Y,Z. Por defecto z para .stl, y para un .obj o .ply que claramente se apoya en un plano de z; y para los demás",
+        "Qué dirección es arriba: x, y, z, -x, -y, -z o una dirección X,Y,Z. Por defecto z para .stl, y para un .obj o .ply que claramente se apoya en un plano de z; y para los demás",
         "EJE|X,Y,Z",
     ),
     ("fit", "Encuadra todo el modelo aunque el archivo tenga una cámara", ""),
@@ -109,7 +105,7 @@ const ARGUMENTS: &[(&str, &str, &str)] = &[
     ),
     (
         "input_format",
-        "El formato de una escena en la entrada estándar, o de un archivo sin extensión conocida; si no, se deduce de sus bytes: pbrt, pov, gltf, glb, obj, ply o stl",
+        "El formato de la entrada estándar o de un archivo sin extensión conocida. Por defecto se deduce del contenido: pbrt, pov, gltf, glb, obj, ply o stl",
         "FORMATO",
     ),
     ("strict", "Los avisos son errores", ""),
@@ -121,20 +117,24 @@ const ARGUMENTS: &[(&str, &str, &str)] = &[
     ("variant", "La variante de materiales de un glTF", "NOMBRE"),
     (
         "pov_include",
-        "Una carpeta de archivos que incluye una escena de POV-Ray, además de la suya y de la que POV-Ray tiene en Debian; varias veces para varias, la primera primero",
+        "Una carpeta de archivos que incluye una escena de POV-Ray, además de la suya y de la que POV-Ray tiene en Debian. Se puede repetir; primero se busca en la primera",
         "CARPETA",
     ),
     (
         "pov_clock",
-        "El reloj de una escena de POV-Ray; dos, como 0..2, son los de la primera y la última imagen de --frames",
+        "El valor del reloj de una escena de POV-Ray, o A..B para la primera y la última imagen de --frames",
         "K|A..B",
     ),
     (
         "pov_frames",
-        "Las imágenes que recorre el reloj de una escena de POV-Ray, si --frames son solo algunas de ellas",
+        "Todas las imágenes de una animación de POV-Ray, que recorre su reloj, si --frames son solo algunas de ellas",
         "A..B",
     ),
-    ("pov_cyclic", "La imagen que sigue a la última de una escena de POV-Ray es otra vez la primera", ""),
+    (
+        "pov_cyclic",
+        "La animación de una escena de POV-Ray es un bucle: tras la última imagen viene otra vez la primera",
+        "",
+    ),
     ("pov_declare", "Declara un número o un texto antes de leer una escena de POV-Ray", "NOMBRE=VALOR"),
     ("frame", "El tiempo en segundos en que se evalúan las animaciones de un glTF", ""),
     (
@@ -150,26 +150,26 @@ const ARGUMENTS: &[(&str, &str, &str)] = &[
     ),
     (
         "settings",
-        "Cambia un parámetro de la escena: material.NOMBRE.PARÁM, light.ÍNDICE.PARÁM, light.area.scale, camera.PARÁM o film.PARÁM. A un nombre que no existe se responde con los que hay",
+        "Cambia un parámetro de la escena: material.NOMBRE.PARÁM, light.ÍNDICE.PARÁM, light.area.scale, camera.PARÁM o film.PARÁM. Para un nombre incorrecto, el error enumera los válidos",
         "RUTA=VALOR",
     ),
     ("overlay", "Un archivo de tales cambios, uno por línea; # empieza un comentario", "ARCHIVO"),
     (
         "max_memory",
-        "Bytes que el programa puede ocupar a la vez: lo que ocupa la lectura (8G por defecto), y escenas e imágenes según lo previsto (por defecto lo que está libre)",
+        "Límite de memoria: para leer archivos (8G por defecto), y para la escena y la imagen (por defecto, la memoria libre)",
         "TAMAÑO",
     ),
-    ("max_elements", "Vértices, caras, formas y parámetros que se pueden leer", ""),
-    ("max_nesting", "Niveles de inclusiones y de bloques", ""),
-    ("max_files", "Archivos que se pueden abrir", ""),
+    ("max_elements", "Límite del número de vértices, caras, formas y parámetros que se leen", ""),
+    ("max_nesting", "Límite de la profundidad de inclusiones y bloques anidados", ""),
+    ("max_files", "Límite del número de archivos que se abren", ""),
     (
         "max_expansion",
-        "Bytes a los que puede crecer uno comprimido, y cuántas veces en promedio se puede incluir un archivo",
+        "Límite de cuántas veces pueden crecer los datos comprimidos o los archivos incluidos",
         "",
     ),
     (
         "expression",
-        "Lo que se evalúa, con ; entre expresiones; entre comillas, porque el intérprete de órdenes también usa paréntesis. Sin nada, una consola",
+        "Lo que se evalúa, con ; entre expresiones. Póngalo entre comillas: el intérprete de órdenes trata los paréntesis de otro modo. Sin expresión se abre una consola",
         "EXPRESIÓN",
     ),
     ("file", "Evalúa las sentencias de este archivo; - es la entrada estándar", "ARCHIVO"),
@@ -278,7 +278,8 @@ const EXPECTATIONS: &[(&str, &str)] = &[
 /// What was expected in Spanish, where the English of it fits; `{}` stands for a number, the same in both.
 fn filled_in(english: &str, spanish: &str, source: &str) -> Option<String> {
     let numbers = source.split(' ').filter(|word| word.bytes().all(|byte| byte.is_ascii_digit()));
-    let fill = |text: &str| numbers.clone().fold(text.to_owned(), |text, number| text.replacen("{}", number, 1));
+    let fill =
+        |text: &str| numbers.clone().fold(text.to_owned(), |text, number| text.replacen("{}", number, 1));
     (fill(english) == source).then(|| fill(spanish))
 }
 
@@ -298,7 +299,8 @@ pub(crate) fn said(error: &Error) -> String {
         }
         ErrorKind::ValueValidation => {
             let source = error.source().map(ToString::to_string).unwrap_or_default();
-            let expected = EXPECTATIONS.iter().find_map(|(english, spanish)| filled_in(english, spanish, &source));
+            let expected =
+                EXPECTATIONS.iter().find_map(|(english, spanish)| filled_in(english, spanish, &source));
             let expected = expected.map_or(String::new(), |spanish| format!(": {spanish}"));
             format!("valor no válido '{value}' para '{argument}'{expected}")
         }

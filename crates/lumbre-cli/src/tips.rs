@@ -79,7 +79,10 @@ const HINTS: &[(&[&str], &str)] = &[
         &["--optix"],
         "the denoisers are --denoise (Lumbre's own filter) and --denoise oidn (Open Image Denoise)",
     ),
-    (&["--gpu", "--device", "--cuda", "--wavefront"], "pictures are rendered on the processor's cores (--threads N)"),
+    (
+        &["--gpu", "--device", "--cuda", "--wavefront"],
+        "pictures are rendered on the processor's cores (--threads N)",
+    ),
     (&["--interactive", "--gui", "--display"], "lumbre view SCENE shows the picture in the browser"),
     (
         &["--pixel", "--pixelmaterial"],
@@ -274,7 +277,10 @@ mod tests {
             ("--mse-reference-image", "lumbre diff"),
             ("--wavefront", "--threads"),
         ] {
-            assert!(matches!(tip("render", wrong), Some(Tip::Hint(hint)) if hint.contains(expected)), "{wrong}");
+            assert!(
+                matches!(tip("render", wrong), Some(Tip::Hint(hint)) if hint.contains(expected)),
+                "{wrong}"
+            );
         }
     }
 

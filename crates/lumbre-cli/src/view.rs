@@ -87,7 +87,9 @@ impl ViewArguments {
     /// [`Failure::Usage`] when the camera stands in what it is to look at.
     pub(crate) fn set(&self, stage: &mut Stage) -> Result<(), Failure> {
         if self.eye.is_some() && self.eye == self.target {
-            return Err(Failure::Usage("--eye and --target are the same point (expected two points)".to_owned()));
+            return Err(Failure::Usage(
+                "--eye and --target are the same point (expected two points)".to_owned(),
+            ));
         }
         let mut view = Viewpoint::default();
         view.azimuth = self.azimuth.unwrap_or(view.azimuth);

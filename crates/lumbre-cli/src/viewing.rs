@@ -342,3 +342,18 @@ impl Files {
         Ok(Built { scene, options, save, background, denoise: defaults.denoises(), warnings, explain })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::name_and_port;
+
+    #[test]
+    fn other_hosts_have_a_name_and_a_port() {
+        for text in ["localhost:9000", "[::1]:80", "far.example.org:65535"] {
+            assert_eq!(name_and_port(text), Ok(text.to_owned()));
+        }
+        for text in ["", "far", "far:", "far:0", ":80", "far:65536", "far:x", "a:b:80"] {
+            assert!(name_and_port(text).is_err(), "{text}");
+        }
+    }
+}

@@ -47,7 +47,10 @@ fn an_array_of_tasks_and_its_merge_make_the_file_of_one_run() {
     let farm =
         "farm slurm scene.pbrt --tasks 4 --submit --sbatch=--partition=render -- --max-depth 3 --threads 1";
     let (status, said) = with_sbatch(&folder, farm);
-    assert!(status == 0 && said.contains("4 tasks submitted; scene.exr is written when all are done"), "{said}");
+    assert!(
+        status == 0 && said.contains("4 tasks submitted; scene.exr is written when all are done"),
+        "{said}"
+    );
     assert_eq!(bytes(&folder, "scene.exr"), bytes(&folder, "whole.exr"));
     let log = fs::read_to_string(folder.path("sbatch.log")).unwrap();
     assert!(log.contains("--dependency=afterok:17 scene.farm/merge.sh"), "{log}");
@@ -222,12 +225,7 @@ fn only_scripts_and_pictures_of_lumbre_are_replaced() {
     done(&folder, "farm slurm scene.pbrt --tasks 2");
     done(&folder, "farm slurm scene.pbrt --tasks 3");
     folder.write("scene.exr", "mine");
-    refused(
-        &folder,
-        "farm slurm scene.pbrt --tasks 2",
-        2,
-        "scene.exr exists and was not written by Lumbre",
-    );
+    refused(&folder, "farm slurm scene.pbrt --tasks 2", 2, "scene.exr exists and was not written by Lumbre");
     done(&folder, "farm slurm scene.pbrt --tasks 2 -o other.exr");
 }
 

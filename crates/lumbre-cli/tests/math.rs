@@ -347,11 +347,7 @@ fn mistakes_have_their_place_and_the_exit_status_of_their_source() {
 
     let out = piped(&["math"], "1\n2 +\n");
     assert_eq!(code(&out), 3);
-    assert!(
-        stderr(&out).starts_with("error: standard input:2:4: unexpected here"),
-        "{}",
-        stderr(&out)
-    );
+    assert!(stderr(&out).starts_with("error: standard input:2:4: unexpected here"), "{}", stderr(&out));
 
     // Minutes, if each line were read again with those before it.
     let out = piped(&["math"], &format!("[{}", "1,\n".repeat(400_000)));

@@ -203,7 +203,12 @@ fn what_is_missing_doubled_foreign_or_damaged_is_refused_by_name() {
     // An asset that has changed makes it another render.
     wood(&folder, [0.8, 0.5, 0.3]);
     done(&folder, "render scene.pbrt -o d.part --samples 3..5");
-    refused(&folder, "merge a.part d.part -o x.exr", 3, "of another render than a.part: file wood.png changed");
+    refused(
+        &folder,
+        "merge a.part d.part -o x.exr",
+        3,
+        "of another render than a.part: file wood.png changed",
+    );
     let (_, about) = answer(folder.command(&["info", "d.part"]).output().unwrap());
     let about = if about.is_empty() {
         String::from_utf8(folder.command(&["info", "d.part"]).output().unwrap().stdout).unwrap()
@@ -440,10 +445,7 @@ mod interrupted {
         }
         signal(child.id(), "INT");
         let (status, said) = answer(child.wait_with_output().unwrap());
-        assert!(
-            status == 130 && said.contains("warning: cannot write the checkpoint"),
-            "{status} {said}"
-        );
+        assert!(status == 130 && said.contains("warning: cannot write the checkpoint"), "{status} {said}");
         assert!(folder.path("a.exr").exists(), "{said}");
     }
 
@@ -475,7 +477,10 @@ mod interrupted {
                 "render scene.pbrt -o a.png --checkpoint /dev/null --resume",
                 "not a regular file (expected one for a checkpoint)",
             ),
-            ("render scene.pbrt -o a.png --checkpoint .", "not a regular file (expected one for a checkpoint)"),
+            (
+                "render scene.pbrt -o a.png --checkpoint .",
+                "not a regular file (expected one for a checkpoint)",
+            ),
             ("render scene.pbrt -o a.png --stats pipe.ply", "nobody reads from this pipe"),
         ] {
             // What a scene names is an error of the scene.

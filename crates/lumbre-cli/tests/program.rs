@@ -756,7 +756,12 @@ fn a_picture_of_nothing_is_said_to_be_one() {
     desk.write("n.gltf", r#"{"asset":{"version":"2.0"},"scenes":[{"name":"nothing"}]}"#);
     let out = desk.lumbre(&["render", "n.gltf", "-o", "n.png", "--spp", "1", "--size", "8x8"]);
     assert_eq!(code(&out), 0, "{}", stderr(&out));
-    assert!(stderr(&out).contains("warning: n.gltf: the scene has no shapes: the picture shows only the background"), "{}", stderr(&out));
+    assert!(
+        stderr(&out)
+            .contains("warning: n.gltf: the scene has no shapes: the picture shows only the background"),
+        "{}",
+        stderr(&out)
+    );
 }
 
 #[test]

@@ -147,7 +147,7 @@ fn time_that_is_over_in_the_first_pass_leaves_a_coarse_whole_picture() {
         assert_eq!(code, 0, "{said}");
         assert!(said.contains("the picture has one for"), "{said}");
         assert!(
-            said.contains("a.png: 3000x2000, a coarse picture of ") && !said.contains("0 samples a pixel"),
+            said.contains("a.png: 3000x2000, a coarse picture of ") && !said.contains("0 samples per pixel"),
             "{said}"
         );
         let picture = lumbre::read_image(&folder.path("a.png")).unwrap();

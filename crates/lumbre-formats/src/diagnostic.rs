@@ -702,7 +702,8 @@ mod tests {
         let b = Diagnostic::error("not finite").at(Place::binary("m.ply", 812, "/vertex/3/x")).found("NaN");
         assert_eq!(b.to_string(), "error: m.ply:byte 812 /vertex/3/x: not finite (found NaN)");
         assert_eq!(Diagnostic::error("nothing to render").to_string(), "error: nothing to render");
-        let r = Diagnostic::warning("image is left out").because("a.png: cannot open: gone").found("\"a.png\"");
+        let r =
+            Diagnostic::warning("image is left out").because("a.png: cannot open: gone").found("\"a.png\"");
         assert_eq!(r.to_string(), "warning: image is left out: a.png: cannot open: gone (found \"a.png\")");
     }
 

@@ -103,7 +103,8 @@ fn binary(
     let held = (bytes.len() - 84) / 50;
     if !size_is_right {
         let wrong = if held < count as usize {
-            Diagnostic::error("file is truncated").because(format!("{count} facets announced, {held} present"))
+            Diagnostic::error("file is truncated")
+                .because(format!("{count} facets announced, {held} present"))
         } else {
             Diagnostic::error("count of facets does not fit the size of the STL file")
                 .found(format!("{count} facets in {} bytes", bytes.len()))

@@ -112,10 +112,7 @@ fn faces_may_stand_before_what_they_name() {
         "v 9 9 9\no a\nf 2//1 3//-1 -1//1\nf 2//1 3//1 4//1 5//1\nvn 0 0 1\no b\nv 1 1 5\nv 4 1 5\nv 4 3 5\nv 1 3 5\n",
     );
     let wrong = early.unwrap_err().to_string();
-    assert_eq!(
-        wrong,
-        "m.obj:3:11: face with a normal that does not exist (found -1; expected 1 or -1)"
-    );
+    assert_eq!(wrong, "m.obj:3:11: face with a normal that does not exist (found -1; expected 1 or -1)");
     let file = read(
         "v 9 9 9\no a\nf 2//1 3//1 -1//1\nf 2//1 3//1 4//1 5//1\nvn 0 0 1\no b\nv 1 1 5\nv 4 1 5\nv 4 3 5\nv 1 3 5\n",
     );
@@ -192,7 +189,9 @@ fn lenient_drops_what_cannot_be_used_and_counts_it() {
     assert_eq!(file.meshes.len(), 1);
     assert_eq!(file.meshes[0].mesh.triangles.len(), 1);
     assert_eq!(lines.len(), 5, "{lines:#?}");
-    assert!(lines.iter().filter(|l| l.contains("with a vertex that does not exist is left out")).count() == 3);
+    assert!(
+        lines.iter().filter(|l| l.contains("with a vertex that does not exist is left out")).count() == 3
+    );
 }
 
 #[test]

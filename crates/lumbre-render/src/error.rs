@@ -45,9 +45,7 @@ pub enum RenderError {
     #[error("a spectral render works only with the integrator path")]
     NoWavelengths,
     /// The film keeps wavelengths, and the paths carry none.
-    #[error(
-        "film \"spectral\" works only with a spectral render by the integrator path"
-    )]
+    #[error("film \"spectral\" works only with a spectral render by the integrator path")]
     NoBuckets,
     /// Nobody wants the picture any longer: [`crate::Progress::is_wanted`].
     #[error("the picture is not wanted any longer")]

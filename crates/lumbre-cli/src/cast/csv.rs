@@ -176,8 +176,9 @@ impl Header {
                 return Err((column(), format!("more than the {} values of the header", self.width)));
             }
             let field = unquoted(field.trim());
-            values[count] = number(field)
-                .map_err(|expected| (column(), format!("invalid value (found {}; expected {expected})", quoted(field))))?;
+            values[count] = number(field).map_err(|expected| {
+                (column(), format!("invalid value (found {}; expected {expected})", quoted(field)))
+            })?;
             count += 1;
         }
         if count < self.width {

@@ -252,7 +252,10 @@ mod tests {
                 "ox,oy,oz,dx,dy,dz\n1, 2e-400,3,4,5,6\n",
                 "rays.csv:2:4: invalid value (found \"2e-400\"; expected a number of double precision, which",
             ),
-            ("ox,oy,oz,dx,dy,dz\n0.0000001e-320,2,3,4,5,6\n", "rays.csv:2:1: invalid value (found \"0.0000001e-320\"; expected a number of double"),
+            (
+                "ox,oy,oz,dx,dy,dz\n0.0000001e-320,2,3,4,5,6\n",
+                "rays.csv:2:1: invalid value (found \"0.0000001e-320\"; expected a number of double",
+            ),
             ("ox,oy,oz,dx,dy,dz\n1,2,3\n", "rays.csv:2:6: 3 values (expected 6)"),
             ("ox,oy,oz,dx,dy,dz\n1,2,3,4,5,6,7\n", "rays.csv:2:13: more than the 6 values"),
             (&long, "rays.csv:2:65537: a line of more than 65536 bytes"),

@@ -325,9 +325,7 @@ fn remark(remark: &Remark, name: &OperandName<'_>) -> String {
             "The tube is so thin that the quartic has no digits for it: the crossings come from the torus' own equation."
         }
         Remark::Descent => "The first crossing is found by descent along the quartic.",
-        Remark::Pieces => {
-            "The crossings are found piece by piece, between the extrema of the quartic."
-        }
+        Remark::Pieces => "The crossings are found piece by piece, between the extrema of the quartic.",
         Remark::StartsInside { operand } => {
             return format!("The line begins inside operand {operand} ({}).", name(*operand));
         }

@@ -235,7 +235,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let PreparedScene { scene, mut options, .. } = shown;
     if options.spectral && !arguments.quiet {
-        say!("warning: the picture of this scene is spectral; the explanation follows a path of red, green and blue");
+        say!(
+            "warning: the picture of this scene is spectral; the explanation follows a path of red, green and blue"
+        );
     }
     options.spectral = false;
     options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);

@@ -264,8 +264,7 @@ fn channels<'a>(file: &'a File<'_>, animation: Value<'a>) -> Read<Vec<Channel<'a
     let samplers: Vec<Value<'a>> = animation.need("samplers")?.array()?.collect();
     let mut channels = vec![];
     for value in animation.need("channels")?.array()? {
-        let sampler =
-            samplers[value.need("sampler")?.index(samplers.len(), "a sampler")?];
+        let sampler = samplers[value.need("sampler")?.index(samplers.len(), "a sampler")?];
         let target = value.need("target")?;
         let path_value = target.need("path")?;
         let extension = target.extension("KHR_animation_pointer")?;

@@ -33,17 +33,24 @@ pub(super) fn read<'a>(bytes: &'a [u8], name: &Arc<str>, diagnostics: &mut Diagn
     };
     let (Some(version), Some(length)) = (word(4), word(8)) else {
         let found = format!("{} bytes", bytes.len());
-        return Err(wrong(0, "file is truncated in its header").found(found).expected("12 bytes or more").into());
+        return Err(wrong(0, "file is truncated in its header")
+            .found(found)
+            .expected("12 bytes or more")
+            .into());
     };
     if version != 2 {
         return Err(wrong(4, "unknown version of GLB").found(version).expected("2").into());
     }
     let length = length as usize;
     if length < 12 {
-        return Err(wrong(8, "wrong length in the header of the GLB file").found(length).expected("12 or more").into());
+        return Err(wrong(8, "wrong length in the header of the GLB file")
+            .found(length)
+            .expected("12 or more")
+            .into());
     }
     if length > bytes.len() {
-        let sizes = format!("its header says {length} bytes, the file has {}; copy or export it again", bytes.len());
+        let sizes =
+            format!("its header says {length} bytes, the file has {}; copy or export it again", bytes.len());
         return Err(wrong(8, "file is truncated").because(sizes).into());
     }
     if length < bytes.len() {

@@ -319,9 +319,8 @@ impl<'a> Primitive<'a> {
         };
         let count = indices.as_ref().map(|i| i.count).or(attributes.count());
         if let Some(count) = count.filter(|&count| mode.whole(count) != count) {
-            let warning = value
-                .wrong("left-over vertices are left out")
-                .found(format!("{count} of {}", mode.name()));
+            let warning =
+                value.wrong("left-over vertices are left out").found(format!("{count} of {}", mode.name()));
             file.push(crate::Diagnostic { severity: crate::Severity::Warning, ..warning });
         }
         let mut targets = vec![];

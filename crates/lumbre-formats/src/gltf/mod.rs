@@ -42,9 +42,7 @@ use self::animation::Playing;
 use self::file::File;
 use self::json::{Inside, Json, Read, Value};
 use crate::budget::{Budget, Limits};
-use crate::diagnostic::{
-    Diagnostic, Diagnostics, FormatError, Place, nearest_name, quoted, quoted_bytes,
-};
+use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, nearest_name, quoted, quoted_bytes};
 use crate::input::{Input, text};
 
 /// Options of reading a glTF.

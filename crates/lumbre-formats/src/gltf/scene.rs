@@ -440,7 +440,10 @@ impl Builder<'_> {
             Err(_) => {
                 // A flattened mesh may still be visible; one collapsed to a line or a point is not.
                 let node = self.file.list(List::Nodes)[place.node];
-                self.file.warn(node, "the transform of a node cannot be inverted: its shapes are flattened, or left out");
+                self.file.warn(
+                    node,
+                    "the transform of a node cannot be inverted: its shapes are flattened, or left out",
+                );
                 scene.shapes.extend(shapes.into_iter().filter_map(|shape| flattened(shape, world)));
             }
         }

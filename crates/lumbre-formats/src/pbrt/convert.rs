@@ -690,9 +690,7 @@ pub(super) fn io_message(path: &std::path::Path, action: &str, source: &std::io:
 /// An error about a file that the scene names, at the place that names it.
 pub(super) fn file_fault(at: SourcePosition, error: FormatError) -> Fault {
     match error {
-        FormatError::Io { path, action, source } => {
-            at.error(io_message(&path, action, &source))
-        }
+        FormatError::Io { path, action, source } => at.error(io_message(&path, action, &source)),
         FormatError::Limit { place: None, source } => Fault::Limit(at, Box::new(source)),
         other => Fault::Named(at, Box::new(other)),
     }

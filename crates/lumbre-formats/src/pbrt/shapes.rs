@@ -166,7 +166,9 @@ impl Converter<'_, '_> {
         };
         if !lightless.is_empty() {
             let from = self.files.place(light.spot);
-            return Err(spot.error(format!("{lightless} cannot be an area light (that of {from}); is an AttributeEnd missing?")));
+            return Err(spot.error(format!(
+                "{lightless} cannot be an area light (that of {from}); is an AttributeEnd missing?"
+            )));
         }
         match state.material {
             None => {

@@ -41,7 +41,11 @@ impl<'a> Text<'a> {
         let length = rest.iter().position(blank).unwrap_or(rest.len());
         self.at += start;
         if length == 0 {
-            return Err(Box::new(Fault { at: self.at, message: "file is truncated", found: "the end of the file".into() }));
+            return Err(Box::new(Fault {
+                at: self.at,
+                message: "file is truncated",
+                found: "the end of the file".into(),
+            }));
         }
         self.at += length;
         Ok(&rest[..length])
