@@ -118,6 +118,16 @@ impl PartArguments {
     }
 }
 
+/// In what a render here differs from the one there, in words.
+pub(crate) fn differences(there: &Job, here: &Job) -> Option<String> {
+    let mut differences = there.differences(here);
+    if differences.iter().any(|difference| difference.starts_with("size ")) {
+        // It names the size once more.
+        differences.retain(|difference| !difference.starts_with("stage "));
+    }
+    (!differences.is_empty()).then(|| differences.join("; "))
+}
+
 /// Whether a name is that of a part without a picture.
 pub(crate) fn is_bare_part(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("part"))
@@ -440,9 +450,7 @@ impl Checkpoint {
             }
             return Ok(None);
         }
-        let differences = self.identified.get()?.differences(&part.job);
-        if !differences.is_empty() {
-            let differences = differences.join("; ");
+        if let Some(differences) = differences(&part.job, &self.identified.get()?) {
             return Err(Failure::Usage(format!("{name}: of another render than this one: {differences}")));
         }
         let most = part.state.most_samples();

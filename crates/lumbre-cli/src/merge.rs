@@ -9,7 +9,7 @@ use lumbre::formats::probe_writable;
 use lumbre::image::{Rgb, ToneMap};
 use lumbre::{Background, CancelToken, Feature, MergeError, Part, Piece, SaveOptions};
 
-use crate::checkpoint::{is_bare_part, open_part};
+use crate::checkpoint::{differences, is_bare_part, open_part};
 use crate::failure::Failure;
 use crate::memory::Memory;
 use crate::names::one_of;
@@ -168,13 +168,12 @@ fn joined(arguments: &Arguments, parts: &[PathBuf]) -> Result<Part, Failure> {
     let mut origins: Vec<(&Path, Vec<Piece>)> = vec![(first, whole.state.pieces().to_vec())];
     for path in others {
         let part = open(path, arguments)?;
-        let differences = whole.job.differences(&part.job);
-        if !differences.is_empty() {
+        if let Some(differences) = differences(&whole.job, &part.job) {
             return Err(Failure::Input(format!(
                 "{}: of another render than {}: {}",
                 path.display(),
                 first.display(),
-                differences.join("; ")
+                differences
             )));
         }
         // Which of them is first would say how the picture is shown.

@@ -212,7 +212,7 @@ fn only_scripts_and_pictures_of_lumbre_are_replaced() {
             &folder,
             "farm slurm scene.pbrt --tasks 2",
             2,
-            &format!("scene.farm/{name}: lumbre farm did not write"),
+            &format!("scene.farm/{name}: not written by lumbre farm"),
         );
         assert_eq!(bytes(&folder, &format!("scene.farm/{name}")), b"#!/bin/sh\necho mine\n");
         assert_eq!(fs::read_dir(folder.path("scene.farm")).unwrap().count(), 1);
@@ -220,7 +220,7 @@ fn only_scripts_and_pictures_of_lumbre_are_replaced() {
     }
     // A link is not followed to what is not there.
     std::os::unix::fs::symlink(folder.path("elsewhere"), folder.path("scene.farm/merge.sh")).unwrap();
-    refused(&folder, "farm slurm scene.pbrt --tasks 2", 2, "lumbre farm did not write");
+    refused(&folder, "farm slurm scene.pbrt --tasks 2", 2, "not written by lumbre farm");
     fs::remove_file(folder.path("scene.farm/merge.sh")).unwrap();
     done(&folder, "farm slurm scene.pbrt --tasks 2");
     done(&folder, "farm slurm scene.pbrt --tasks 3");
@@ -249,6 +249,6 @@ fn logs_are_in_no_folder_whose_name_slurm_would_read_otherwise() {
         &folder,
         r"farm slurm scene.pbrt --tasks 2 --folder a\b",
         2,
-        "expected --folder with one without backslashes",
+        "expected --folder without backslashes",
     );
 }

@@ -612,7 +612,7 @@ fn a_picture_in_which_next_to_nothing_is_lit_comes_with_a_hint() {
         let out = desk.lumbre(&[&["render", "room.pbrt", "-o", "a.png"], more].concat());
         assert_eq!(code(&out), 0, "{name}: {}", stderr(&out));
         let said = stderr(&out);
-        let words = ["hint: ", "--env", "--exposure", "--fit", "a camera inside"];
+        let words = ["hint: ", "--env", "--exposure", "--fit", "--eye and --target"];
         assert_eq!(words.map(|word| said.contains(word)), [is_hinted; 5], "{name}: {said}");
     }
 }
@@ -658,7 +658,7 @@ fn a_model_that_plainly_stands_on_a_plane_of_z_has_z_up_unless_told() {
         let out =
             desk.lumbre(&[&["pole.obj", "-o", picture, "--size", "24x24", "--spp", "1"], more].concat());
         assert_eq!(code(&out), 0, "{}", stderr(&out));
-        stderr(&out).contains("z is taken for up")
+        stderr(&out).contains("z is up")
     };
     assert!(render(&[], "guessed.pfm"));
     assert!(!render(&["--up", "z"], "z.pfm") && !render(&["--up", "y"], "y.pfm"));

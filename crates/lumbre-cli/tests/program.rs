@@ -664,7 +664,7 @@ fn frames_that_make_no_sense_are_refused() {
         (&["--shutter", "-1"], "unexpected argument"),
         (&["--shutter", "half"], "a share of a frame"),
         (&["--fps", "0"], "frames a second"),
-        (&["--shutter", "0.5"], "--shutter needs the time of a picture"),
+        (&["--shutter", "0.5"], "--shutter needs --frame or --frames"),
     ] {
         let mut whole = vec!["render", "missing.gltf"];
         whole.extend(arguments);

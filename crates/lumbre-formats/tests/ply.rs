@@ -438,7 +438,7 @@ fn texture_coordinates_of_corners_are_those_of_the_faces() {
     let mesh = read_ply(text.as_bytes(), &name(), &Budget::default(), &mut said).unwrap().mesh;
     assert_eq!((mesh.positions.len(), mesh.triangles.len()), (4, 3));
     assert!(
-        said.lines().len() == 1 && said.lines()[0].contains("not two numbers a corner"),
+        said.lines().len() == 1 && said.lines()[0].contains("expected two numbers per vertex"),
         "{:?}",
         said.lines()
     );
