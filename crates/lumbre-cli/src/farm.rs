@@ -5,6 +5,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand};
 use lumbre::formats::image::{ImageFormat, is_own_image};
 use lumbre::formats::{atomic_write, open_regular};
@@ -275,6 +276,9 @@ fn task(arguments: &SlurmArguments, names: &Names) -> Result<crate::render::Argu
         ))
     };
     let task = Task::try_parse_from(words).map_err(|error| {
+        if let Some(option) = conflicting(&error) {
+            return Failure::Usage(format!("after --: {option} cannot be used in a farm render"));
+        }
         let said = error.to_string();
         let first = said.lines().next().unwrap_or_default();
         wrong(first.strip_prefix("error: ").unwrap_or("not an option of lumbre render"))
@@ -285,6 +289,24 @@ fn task(arguments: &SlurmArguments, names: &Names) -> Result<crate::render::Argu
         (Some(a), Some(b)) if a != b => Err(wrong(&format!("--spp {b} and --spp {a} before it"))),
         _ => Ok(task),
     }
+}
+
+/// The option that conflicts with one that the tasks set themselves.
+fn conflicting(error: &clap::Error) -> Option<String> {
+    const OWN: [&str; 4] = ["--samples", "--frames", "--checkpoint", "--resume"];
+    if error.kind() != ErrorKind::ArgumentConflict {
+        return None;
+    }
+    let named = [ContextKind::InvalidArg, ContextKind::PriorArg].into_iter().filter_map(|kind| {
+        match error.get(kind) {
+            Some(ContextValue::String(name)) => Some(name.clone()),
+            Some(ContextValue::Strings(names)) => names.first().cloned(),
+            _ => None,
+        }
+    });
+    // As `--noise <R>`.
+    let mut options = named.map(|name| name.split(' ').next().unwrap_or_default().to_owned());
+    options.find(|name| !OWN.contains(&&**name))
 }
 
 /// The number of a task.

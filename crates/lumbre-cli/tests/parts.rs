@@ -551,9 +551,19 @@ fn merge_opens_no_image_that_only_a_part_names() {
     let mut part = lumbre::Part::open(&folder.path("a.part"), |_| u64::MAX).unwrap();
     part.job.shown.insert("background".to_owned(), "file /dev/zero".to_owned());
     part.save(&folder.path("foreign.part")).unwrap();
-    refused(&folder, "merge foreign.part -o x.png", 2, "the background image /dev/zero: give it with --background");
+    refused(
+        &folder,
+        "merge foreign.part -o x.png",
+        2,
+        "the background image /dev/zero: give it with --background",
+    );
     done(&folder, "render scene.pbrt -q -o plain.part --samples 0..1 --background #fa0");
-    refused(&folder, "merge plain.part -o x.png --background wood.png", 2, "the parts have no background image");
+    refused(
+        &folder,
+        "merge plain.part -o x.png --background wood.png",
+        2,
+        "the parts have no background image",
+    );
 }
 
 #[test]

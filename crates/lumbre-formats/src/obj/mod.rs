@@ -550,7 +550,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// `v`, `v/vt`, `v//vn` or `v/vt/vn`, each counted from 1, or -N to -1.
+    /// `v`, `v/vt`, `v//vn` or `v/vt/vn`, each counted from 1, or backwards from -1.
     #[inline]
     fn corner(&self, word: Word<'a>) -> Result<Corner, Unusable> {
         let mut corner = [NONE; 3];
