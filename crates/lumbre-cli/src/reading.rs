@@ -24,7 +24,7 @@ pub(crate) struct ReadingArguments {
     /// Warnings are errors.
     #[arg(long, conflicts_with = "lenient")]
     strict: bool,
-    /// Drop broken parts (such as faces with missing vertices) with a warning instead of an error.
+    /// Leave out broken parts (such as faces with missing vertices) with a warning instead of an error.
     #[arg(long)]
     lenient: bool,
     /// The time in seconds at which the animations of a glTF are evaluated.
