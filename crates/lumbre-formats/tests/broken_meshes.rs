@@ -334,7 +334,7 @@ fn every_broken_file_gets_its_message() {
         (
             "a.png",
             b"RIFF\x10\0\0\0WEBPVP8 ".to_vec(),
-            "a.png:byte 12: damaged WebP image (found \"failed to fill whole buffer\")",
+            "a.png:byte 12: damaged WebP image: failed to fill whole buffer",
         ),
         (
             "a.png",
@@ -390,7 +390,8 @@ fn every_broken_file_gets_its_message() {
             Err(error) => error.to_diagnostic().to_string(),
         };
         let expected = format!("error: {expected}");
-        let fits = if expected.ends_with("(found ") { said.starts_with(&expected) } else { said == expected };
+        let is_start = expected.ends_with("(found ") || expected.ends_with(" image: ");
+        let fits = if is_start { said.starts_with(&expected) } else { said == expected };
         if !fits {
             wrong.push(format!("\n    said {said}\nexpected {expected}"));
         }

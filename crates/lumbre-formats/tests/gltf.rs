@@ -784,8 +784,7 @@ fn animations_by_pointers_change_what_they_name() {
         assert_eq!(lines.len(), still, "{lines:?}");
         assert_eq!(still > 0, matches!(scene.lights[0], LightDesc::Moving { .. }));
         let is_said = |(i, pointer): (usize, &str)| {
-            let start =
-                format!("/animations/0/channels/{i}: what an animation changes while the shutter is open");
+            let start = format!("/animations/0/channels/{i}: animation without motion blur");
             lines[i].contains(&start) && lines[i].contains(pointer)
         };
         let places = ["/baseColorFactor\"", "/lights/0/intensity\"", "/KHR_materials_emissive_strength/"];
@@ -967,7 +966,7 @@ fn single_weights_and_those_of_meshes_are_animated_by_pointers() {
     // One and all of them at once: the first counts.
     let (found, warnings) = seen(&[(0, "/nodes/1/weights/1"), (1, "/nodes/1/weights")], 1, 0.0);
     assert_eq!(found, [[-1.0, 0.0, 4.0]]);
-    assert!(warnings[0].contains("/animations/0/channels/1: animation of what another one"), "{warnings:?}");
+    assert!(warnings[0].contains("/animations/0/channels/1: animation is left out: another one"), "{warnings:?}");
     let wrong = error(&parts.json(&rest(&[(0, "/nodes/0/weights/2")])), &parts.binary);
     assert!(wrong.contains("morph targets that do not exist"), "{wrong}");
 }
