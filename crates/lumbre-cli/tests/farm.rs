@@ -86,8 +86,18 @@ fn a_task_that_is_killed_and_runs_again_changes_nothing() {
 #[test]
 fn what_cannot_be_shared_out_is_refused() {
     let folder = folder();
-    refused(&folder, "farm slurm scene.pbrt --tasks 10", 2, "found 10 for 9 samples; expected 9 or fewer");
-    refused(&folder, "farm slurm a.glb --tasks 3 --frames 0..1 -o f.#.png", 2, "found 3 for 2 frames");
+    refused(
+        &folder,
+        "farm slurm scene.pbrt --tasks 10",
+        2,
+        "--tasks 10 is more than the 9 samples per pixel (expected 9 or fewer)",
+    );
+    refused(
+        &folder,
+        "farm slurm a.glb --tasks 3 --frames 0..1 -o f.#.png",
+        2,
+        "--tasks 3 is more than the 2 frames (expected 2 or fewer)",
+    );
     refused(
         &folder,
         "farm slurm scene.pbrt --tasks 2 --frames 0..1 -o f.#.png",

@@ -383,7 +383,7 @@ fn a_view_is_chosen_by_angles_or_by_places() {
         (&["--up", "w"], "-x, -y, -z"),
         (&["--fov", "180"], "degrees from"),
         (&["--zoom", "0"], "a factor"),
-        (&["--eye", "1,2,3", "--target", "1,2,3"], "one point"),
+        (&["--eye", "1,2,3", "--target", "1,2,3"], "the same point"),
         (&["--camera", "0", "--azimuth", "3"], "cannot be used with"),
     ] {
         let out = desk.lumbre(&[&["render", "p.stl"], more].concat());

@@ -342,7 +342,11 @@ fn mistakes_have_their_place_and_the_exit_status_of_their_source() {
     desk.write("script.txt", "\u{feff}a = 2 # fine\r\n\r\na * x * y\r\n");
     let out = desk.lumbre(&["math", "--file", "script.txt"]);
     assert_eq!(code(&out), 3);
-    assert!(stderr(&out).starts_with("error: script.txt:3:7: these have no *"), "{}", stderr(&out));
+    assert!(
+        stderr(&out).starts_with("error: script.txt:3:7: cannot multiply two vectors with *"),
+        "{}",
+        stderr(&out)
+    );
     assert!(stdout(&out).starts_with("a = 2\n"), "what comes before is done: {}", stdout(&out));
 
     let out = piped(&["math"], "1\n2 +\n");

@@ -576,7 +576,7 @@ fn pictures_of_a_series_that_are_done_are_not_rendered_again() {
     fs::remove_file(folder.path("f.2.png")).unwrap();
     let (status, said) = run(&folder, series);
     assert_eq!((status, said.matches(" is done").count()), (0, 2), "{said}");
-    assert!(said.contains("f.1.png is done") && said.contains("f.3.png is done"), "{said}");
+    assert!(said.contains("f.1.png: already") && said.contains("f.3.png: already"), "{said}");
     assert_eq!(bytes(&folder, "f.2.png"), before);
     // Others are not taken for them: more samples, another seed, and what is of no render.
     for (more, count) in [("--spp 3", 0), ("--seed 5", 0), ("", 2)] {

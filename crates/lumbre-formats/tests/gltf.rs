@@ -966,7 +966,10 @@ fn single_weights_and_those_of_meshes_are_animated_by_pointers() {
     // One and all of them at once: the first counts.
     let (found, warnings) = seen(&[(0, "/nodes/1/weights/1"), (1, "/nodes/1/weights")], 1, 0.0);
     assert_eq!(found, [[-1.0, 0.0, 4.0]]);
-    assert!(warnings[0].contains("/animations/0/channels/1: animation is left out: another one"), "{warnings:?}");
+    assert!(
+        warnings[0].contains("/animations/0/channels/1: animation is left out: another one"),
+        "{warnings:?}"
+    );
     let wrong = error(&parts.json(&rest(&[(0, "/nodes/0/weights/2")])), &parts.binary);
     assert!(wrong.contains("morph targets that do not exist"), "{wrong}");
 }
