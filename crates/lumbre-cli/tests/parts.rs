@@ -571,11 +571,11 @@ fn pictures_of_a_series_that_are_done_are_not_rendered_again() {
     let folder = folder();
     let series = "render scene.pbrt --turntable 3 -o f.#.png --spp 2 --progress none --resume";
     let (status, said) = run(&folder, series);
-    assert!(status == 0 && !said.contains("is done"), "{said}");
+    assert!(status == 0 && !said.contains("already rendered"), "{said}");
     let before = bytes(&folder, "f.2.png");
     fs::remove_file(folder.path("f.2.png")).unwrap();
     let (status, said) = run(&folder, series);
-    assert_eq!((status, said.matches(" is done").count()), (0, 2), "{said}");
+    assert_eq!((status, said.matches(": already rendered").count()), (0, 2), "{said}");
     assert!(said.contains("f.1.png: already") && said.contains("f.3.png: already"), "{said}");
     assert_eq!(bytes(&folder, "f.2.png"), before);
     // Others are not taken for them: more samples, another seed, and what is of no render.
@@ -588,7 +588,7 @@ fn pictures_of_a_series_that_are_done_are_not_rendered_again() {
                 series.replace("--spp 2", if more.contains("spp") { "" } else { "--spp 2" })
             ),
         );
-        assert_eq!((status, said.matches(" is done").count()), (0, count), "{more}: {said}");
+        assert_eq!((status, said.matches(": already rendered").count()), (0, count), "{more}: {said}");
         done(&folder, &format!("{series} -q"));
     }
 }
