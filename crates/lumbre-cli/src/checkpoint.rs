@@ -23,26 +23,26 @@ use crate::units::{self, counted};
 #[derive(Args)]
 #[command(next_help_heading = "Parts and checkpoints")]
 pub(crate) struct PartArguments {
-    /// Take these samples of every pixel alone, from A to before B, into a part: an .exr, whose picture other programs show, or a
-    /// .part. lumbre merge makes of parts, in any order, what one run would have made.
+    /// Render only samples A to B-1 of every pixel. lumbre merge joins such parts into exactly the picture of one run. A part is an .exr,
+    /// whose picture other programs show, or a .part.
     #[arg(long, value_name = "A..B", value_parser = samples, conflicts_with_all = ["time", "noise", "min_spp", "denoise", "turntable"])]
     samples: Option<Range<u32>>,
-    /// Keep the samples in this file while they are taken, to go on from with --resume. Without, a render that takes more than two
-    /// minutes keeps them beside its picture, in OUT.checkpoint, until it is done.
+    /// Save the samples in this file during the render, so that --resume can continue. By default a render of more than two minutes saves
+    /// them in OUT.checkpoint until it is done.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["frames", "turntable"])]
     checkpoint: Option<PathBuf>,
     /// The time between two checkpoints.
     #[arg(long, value_name = "DUR", value_parser = units::duration, default_value = "30s")]
     checkpoint_every: Duration,
-    /// Go on from a checkpoint, to the very picture of a run without a break. Or go on from the picture if it was saved with --keep-sums.
-    /// With more samples than before, the picture is that of as many. Where there is neither, begin. Of --frames and --turntable, pictures that
-    /// are done (.png, .exr) are not rendered again.
+    /// Continue from a checkpoint, with the same result as an uninterrupted run. Or continue from the picture, if it was saved with
+    /// --keep-sums. A higher --spp adds samples. If neither exists, start from the beginning. Pictures of --frames and --turntable that are
+    /// finished (.png, .exr) are not rendered again.
     #[arg(long)]
     resume: bool,
-    /// Keep no checkpoint, however long it takes.
+    /// Save no checkpoint, however long the render takes.
     #[arg(long, conflicts_with_all = ["checkpoint", "resume"])]
     no_checkpoint: bool,
-    /// Keep the sums of all samples in the .exr, beside its picture, so that it can be resumed and merged.
+    /// Store the sums of all samples in the .exr, too, so that it can be resumed and merged.
     #[arg(long)]
     keep_sums: bool,
 }
@@ -50,7 +50,8 @@ pub(crate) struct PartArguments {
 /// `A..B`, without B.
 fn samples(text: &str) -> Result<Range<u32>, String> {
     let wrong = || {
-        let count = if text.parse::<u32>().is_ok() { "; how many a pixel has is --spp" } else { "" };
+        let count =
+            if text.parse::<u32>().is_ok() { "; the number of samples per pixel is --spp" } else { "" };
         format!(
             "expected the first sample and the one after the last, such as 0..16 for the first sixteen{count}"
         )
@@ -86,14 +87,14 @@ impl PartArguments {
     pub(crate) fn check(&self, scene: &[PathBuf], output: &Path, spp: Option<u32>) -> Result<(), Failure> {
         let name = output.display();
         if self.is_asked() && scene.iter().any(|path| is_standard_stream(path)) {
-            let why = "-: a part or a checkpoint is of a scene that can be read again (expected a file)";
+            let why = "-: a part or a checkpoint needs a scene that can be read again (expected a file)";
             return Err(Failure::Usage(why.to_owned()));
         }
         if let (Some(samples), Some(spp)) = (&self.samples, spp)
             && samples.end > spp
         {
             return Err(Failure::Usage(format!(
-                "--samples: {} is beyond the {spp} of --spp (expected a range within 0..{spp})",
+                "--samples: {} is above --spp {spp} (expected a range within 0..{spp})",
                 samples.end
             )));
         }
@@ -104,7 +105,7 @@ impl PartArguments {
             )));
         }
         if self.samples.is_none() && is_bare_part(output) {
-            return Err(Failure::Usage(format!("{name}: a part has some samples (expected --samples, too)")));
+            return Err(Failure::Usage(format!("{name}: a .part needs --samples A..B")));
         }
         if self.keep_sums && !is("exr") {
             return Err(Failure::Usage(format!("{name}: --keep-sums needs an .exr file")));
@@ -116,6 +117,16 @@ impl PartArguments {
     pub(crate) fn is_asked(&self) -> bool {
         self.keeps_sums() || self.checkpoint.is_some() || self.resume
     }
+}
+
+/// In what a render here differs from the one there, in words.
+pub(crate) fn differences(there: &Job, here: &Job) -> Option<String> {
+    let mut differences = there.differences(here);
+    if differences.iter().any(|difference| difference.starts_with("size ")) {
+        // It names the size once more.
+        differences.retain(|difference| !difference.starts_with("stage "));
+    }
+    (!differences.is_empty()).then(|| differences.join("; "))
 }
 
 /// Whether a name is that of a part without a picture.
@@ -308,7 +319,7 @@ fn real_path(path: &Path) -> PathBuf {
 /// Refuses what is there and is no regular file: a folder, a pipe, a device.
 fn refuse_special(path: &Path, what: &str) -> Result<(), Failure> {
     if is_device_name(path) || fs::metadata(path).is_ok_and(|meta| !meta.is_file()) {
-        return Err(Failure::Io(format!("{}: it is not a regular file, as {what} is", path.display())));
+        return Err(Failure::Io(format!("{}: not a regular file (expected one for {what})", path.display())));
     }
     Ok(())
 }
@@ -403,7 +414,7 @@ impl Checkpoint {
         };
         let begins = || {
             if arguments.resume && !is_quiet && !is_one_of_several {
-                say!("nothing to resume: the render begins");
+                say!("no checkpoint found: starting from the beginning");
             }
             Ok(None)
         };
@@ -416,7 +427,7 @@ impl Checkpoint {
             Err(PartError::NoPart) if is_output && (self.is_asked || is_one_of_several) => return begins(),
             Err(PartError::NoPart) if is_output => {
                 return Err(Failure::Usage(format!(
-                    "{name}: the picture cannot be resumed (expected one that was saved with --keep-sums, or a checkpoint)"
+                    "{name}: this picture cannot be resumed (expected a checkpoint, or a picture saved with --keep-sums)"
                 )));
             }
             Err(_) if !arguments.resume && !self.is_asked => return Ok(None),
@@ -426,7 +437,7 @@ impl Checkpoint {
         if !arguments.resume {
             if self.is_asked && taken < wanted {
                 return Err(Failure::Usage(format!(
-                    "{name}: it holds {} of an unfinished render (--resume goes on from it; remove it to begin anew)",
+                    "{name}: holds {} of an unfinished render (--resume continues from it; remove the file to start again)",
                     counted(taken, "sample")
                 )));
             }
@@ -436,28 +447,27 @@ impl Checkpoint {
                 self.is_own.store(is_same, Ordering::Relaxed);
                 if is_same && !is_quiet {
                     let share = 100.0 * taken as f64 / wanted.max(1) as f64;
-                    say!("{name} holds {share:.0} % of this render: --resume goes on from there");
+                    say!("{name} holds {share:.0} % of this render (--resume continues from it)");
                 }
             }
             return Ok(None);
         }
-        let differences = self.identified.get()?.differences(&part.job);
-        if !differences.is_empty() {
-            let differences = differences.join("; ");
-            return Err(Failure::Usage(format!(
-                "{name}: it is of another render: they differ in {differences}"
-            )));
+        if let Some(differences) = differences(&part.job, &self.identified.get()?) {
+            return Err(Failure::Usage(format!("{name}: of another render than this one: {differences}")));
         }
         let most = part.state.most_samples();
         if most > spp {
             return Err(Failure::Usage(format!(
-                "{name}: it has up to {} a pixel, more than are asked for (expected --spp {most} or more)",
+                "{name}: has up to {} per pixel already (expected --spp {most} or more)",
                 counted(u64::from(most), "sample")
             )));
         }
         self.is_own.store(!is_output, Ordering::Relaxed);
         if !is_quiet {
-            say!("resumed from {name}: {} a pixel", counted(u64::from(part.state.least_samples()), "sample"));
+            say!(
+                "resumed from {name}: {} per pixel",
+                counted(u64::from(part.state.least_samples()), "sample")
+            );
         }
         Ok(Some(part.state))
     }
@@ -480,7 +490,7 @@ impl Checkpoint {
             // Said once for a disk that stays full.
             let was_said = self.has_failed.swap(written.is_err(), Ordering::Relaxed);
             if let (Err(error), false) = (written, was_said) {
-                say!("warning: the checkpoint cannot be written, which is tried again: {error}");
+                say!("warning: cannot write the checkpoint, will try again: {error}");
             }
         }
         let Ok(job) = self.identified.get() else { return };

@@ -7,7 +7,7 @@ use clap_complete::Shell;
 
 use crate::failure::{Failure, print};
 
-/// Prints what a shell needs to complete commands, options and their values.
+/// Prints a shell's completions of commands, options and their values.
 #[derive(Args)]
 #[command(after_help = "Examples:
   lumbre completions bash > ~/.local/share/bash-completion/completions/lumbre
@@ -26,7 +26,7 @@ pub(crate) struct CompletionsArguments {
   lumbre man render > ~/.local/share/man/man1/lumbre-render.1
   lumbre man --into ~/.local/share/man/man1")]
 pub(crate) struct ManArguments {
-    /// The command; by default the page of the whole program.
+    /// The command. By default the page of the whole program.
     #[arg(value_name = "COMMAND")]
     command: Option<String>,
     /// Write the pages of the program and of all its commands into this folder.

@@ -12,6 +12,7 @@ use crate::failure::{Failure, print};
 use crate::memory::Memory;
 use crate::names::one_of;
 use crate::output::{Inputs, Replaced, is_standard_stream};
+use crate::render::check_image_format;
 use crate::signals::Signals;
 use crate::units;
 
@@ -24,7 +25,7 @@ use crate::units;
   lumbre diff out.png golden.png --region 100,50,64,64
   lumbre render scene.pbrt -o - | lumbre diff - golden.png
 
-Prints the difference alone, so that scripts can read it. Exit status 1 when it is above --fail-above, or below
+Prints only the difference, so that scripts can read it. Exit status 1 when it is above --fail-above, or below
 --fail-below.")]
 pub(crate) struct Arguments {
     /// A picture: .exr, .png, .hdr, .pfm, .jpg and others; - is standard input.
@@ -48,7 +49,7 @@ pub(crate) struct Arguments {
     /// Where to write a picture of the differences.
     #[arg(short, long, value_name = "HEAT.png")]
     output: Option<PathBuf>,
-    /// Bytes that the program may hold at a time.
+    /// Memory limit.
     #[arg(long, value_name = "SIZE", value_parser = units::bytes)]
     max_memory: Option<u64>,
 }
@@ -56,8 +57,20 @@ pub(crate) struct Arguments {
 /// The names of metrics.
 pub(crate) const METRICS: [&str; 6] = ["rmse", "relmse", "mae", "max", "flip", "ssim"];
 
+fn metric_name(metric: Metric) -> &'static str {
+    METRICS.into_iter().find(|name| Metric::from_name(name) == Some(metric)).unwrap_or("the difference")
+}
+
+/// A difference with four decimals, or as many more as it takes to see that it is beyond the limit.
+fn shown_beyond(difference: f64, is_beyond: impl Fn(f64) -> bool) -> String {
+    (4..18)
+        .map(|decimals| format!("{difference:.decimals$}"))
+        .find(|text| text.parse().is_ok_and(&is_beyond))
+        .unwrap_or_else(|| difference.to_string())
+}
+
 fn limit(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|x: &f64| *x >= 0.0).ok_or_else(|| "expected a number from 0 up".to_owned())
+    text.parse().ok().filter(|x: &f64| *x >= 0.0).ok_or_else(|| "expected a number, 0 or more".to_owned())
 }
 
 /// Bytes a pixel of the differences and their picture.
@@ -81,6 +94,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let signals = Signals::listen(&CancelToken::new())?;
     if let Some(output) = &arguments.output {
+        check_image_format(output)?;
         Inputs::of([arguments.a.as_path(), &arguments.b]).refuse(output)?;
     }
     let memory = Memory::new(arguments.max_memory);
@@ -139,15 +153,31 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         replaced.say();
     }
     // A NaN is beyond every limit.
+    let name = metric_name(arguments.metric);
     match (arguments.fail_above, arguments.fail_below) {
         (Some(limit), _) if difference.is_nan() || difference > limit => {
-            say!("{difference} is above {limit}");
+            say!("{name} {} is above --fail-above {limit}", shown_beyond(difference, |shown| shown > limit));
             Err(Failure::Different)
         }
         (_, Some(limit)) if difference.is_nan() || difference < limit => {
-            say!("{difference} is below {limit}");
+            say!("{name} {} is below --fail-below {limit}", shown_beyond(difference, |shown| shown < limit));
             Err(Failure::Different)
         }
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shown_beyond;
+
+    #[test]
+    fn a_difference_is_shown_with_enough_digits_to_be_beyond_its_limit() {
+        assert_eq!(shown_beyond(0.079_123, |x| x > 0.001), "0.0791");
+        assert_eq!(shown_beyond(0.079_123, |x| x > 0.0791), "0.07912");
+        assert_eq!(shown_beyond(0.979_996, |x| x < 0.98), "0.979996");
+        assert_eq!(shown_beyond(2.5e-7, |x| x > 0.0), "0.0000003");
+        assert_eq!(shown_beyond(f64::NAN, |x| x > 1.0), "NaN");
+        assert_eq!(shown_beyond(f64::INFINITY, |x| x > 1.0), "inf");
     }
 }

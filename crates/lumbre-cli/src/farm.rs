@@ -5,6 +5,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand};
 use lumbre::formats::image::{ImageFormat, is_own_image};
 use lumbre::formats::{atomic_write, open_regular};
@@ -14,9 +15,9 @@ use crate::failure::Failure;
 use crate::output::{Inputs, Pictures};
 use crate::reading::Frames;
 use crate::signals::Signals;
-use crate::units::counted;
+use crate::units::{self, counted};
 
-/// Shares out a render among machines.
+/// Distributes a render over many machines.
 #[derive(Args)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
@@ -37,35 +38,35 @@ enum Scheduler {
   lumbre farm slurm dancer.glb --frames 0..239 --tasks 24 -o frame.####.png
   lumbre farm slurm scene.pbrt --tasks 16 --sbatch=--partition=render --sbatch=--cpus-per-task=32
 
-The picture is byte for byte that of one machine. A task that is killed and runs again goes on from its checkpoint, and changes nothing. The
-scripts take their number from Kubernetes' JOB_COMPLETION_INDEX as well.")]
+The picture is byte for byte that of one machine. A task that is killed and runs again continues from its checkpoint, with the same result.
+The scripts also run under Kubernetes, whose JOB_COMPLETION_INDEX is then the number of the task.")]
 struct SlurmArguments {
     /// The scene.
     #[arg(required = true, value_name = "SCENE")]
     scene: PathBuf,
-    /// The picture; with --frames, the pattern of the names of pictures. By default SCENE's stem with .exr.
+    /// The picture; with --frames, a name with # for the frame number. By default NAME.exr for NAME.pbrt.
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
-    /// Samples per pixel, here or after --; by default as many as the scene says.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    /// Samples per pixel. By default as many as the scene says.
+    #[arg(long, value_name = "N", value_parser = units::whole(1..=u32::MAX))]
     spp: Option<u32>,
-    /// Frames of an animation, which are shared out instead of samples.
+    /// Frames of an animation. Each task renders some frames instead of some samples.
     #[arg(long, value_name = "A..B")]
     frames: Option<Frames>,
-    /// How many tasks.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    /// The number of tasks.
+    #[arg(long, value_name = "N", value_parser = units::whole(1_u32..=100_000))]
     tasks: u32,
     /// Submit the jobs, by sbatch.
     #[arg(long)]
     submit: bool,
-    /// An option for sbatch, as --sbatch=--partition=render; as often as needed.
+    /// An option for sbatch, such as --sbatch=--partition=render. May be repeated.
     #[arg(long, value_name = "OPTION", allow_hyphen_values = true)]
     sbatch: Vec<String>,
-    /// The folder of scripts and parts; by default SCENE's stem with .farm.
+    /// The folder of scripts and parts. By default NAME.farm for NAME.pbrt.
     #[arg(long, value_name = "DIR")]
     folder: Option<PathBuf>,
-    /// Options of lumbre render, after --. Those that a task has itself, as --samples and -o, are refused, and those that parts cannot
-    /// have, as --time, --noise and --denoise.
+    /// Options of lumbre render, after --. Those that the tasks set themselves (--samples, -o), and those that parts cannot have (--time,
+    /// --noise, --denoise), are refused.
     #[arg(last = true, value_name = "RENDER OPTIONS")]
     render: Vec<String>,
 }
@@ -168,14 +169,14 @@ fn slurm(arguments: &SlurmArguments) -> Result<(), Failure> {
     }
     let tasks = counted(u64::from(arguments.tasks), "task");
     if !arguments.submit {
-        say!("{}: {tasks}; run it, or give --submit", submit_path.display());
+        say!("{}: {tasks}; run this script, or give --submit", submit_path.display());
         return Ok(());
     }
     // A name that begins with a dash is none of an option.
     let submitted = Command::new("sh").arg(format!("{}/submit.sh", names.folder)).status();
     match submitted {
         Ok(status) if status.success() => {
-            say!("{tasks} submitted; {} comes when all are done", output.display());
+            say!("{tasks} submitted; {} is written when all are done", output.display());
             Ok(())
         }
         Ok(status) => Err(Failure::Io(format!("{}: sbatch failed ({status})", submit_path.display()))),
@@ -197,7 +198,7 @@ fn refuse_foreign(path: &Path) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::Usage(format!(
-        "{}: lumbre farm did not write what is there (expected another --folder, or that it is removed)",
+        "{}: not written by lumbre farm, and not replaced (expected another --folder)",
         path.display()
     )))
 }
@@ -207,7 +208,7 @@ fn refuse_others(output: &Path, frames: Option<&Frames>) -> Result<(), Failure> 
     let pictures = frames.map_or(Pictures::One, |Frames(numbers)| Pictures::Frames(numbers.clone()));
     match pictures.names(output).find(|name| name.exists() && !is_own_image(name)) {
         Some(name) => Err(Failure::Usage(format!(
-            "{} is there, and not known to be Lumbre's (expected -o with another name)",
+            "{} exists and was not written by Lumbre (expected -o with another name)",
             name.display()
         ))),
         None => Ok(()),
@@ -221,7 +222,8 @@ fn refuse_others(output: &Path, frames: Option<&Frames>) -> Result<(), Failure> 
 /// [`Failure::Usage`] for a name with a backslash.
 fn in_pattern(folder: &str) -> Result<String, Failure> {
     if folder.contains('\\') {
-        let why = "Slurm cannot have logs in a folder of this name (expected --folder with one without backslashes)";
+        let why =
+            "Slurm cannot write logs into a folder of this name (expected --folder without backslashes)";
         return Err(Failure::Usage(format!("{folder}: {why}")));
     }
     Ok(folder.replace('%', "%%"))
@@ -235,7 +237,7 @@ fn in_script(path: &Path) -> Result<String, Failure> {
     let name = path.to_str().filter(|name| !name.chars().any(char::is_control));
     match name {
         None => Err(Failure::Usage(format!(
-            "{}: a job script cannot hold this name (expected one of UTF-8 without line feeds and other control characters)",
+            "{}: a job script cannot hold this name (expected UTF-8 without line feeds and other control characters)",
             path.display()
         ))),
         Some("-") => Err(Failure::Usage("-: every task reads the scene (expected a file)".to_owned())),
@@ -271,13 +273,16 @@ fn task(arguments: &SlurmArguments, names: &Names) -> Result<crate::render::Argu
             "--samples, -o, --checkpoint, --resume and --progress"
         };
         Failure::Usage(format!(
-            "after --: {why} (expected options of lumbre render beside {own}, which a task has already)"
+            "after --: {why} (expected options of lumbre render other than {own}, which the tasks set themselves)"
         ))
     };
     let task = Task::try_parse_from(words).map_err(|error| {
+        if let Some(option) = conflicting(&error) {
+            return Failure::Usage(format!("after --: {option} cannot be used in a farm render"));
+        }
         let said = error.to_string();
         let first = said.lines().next().unwrap_or_default();
-        wrong(first.strip_prefix("error: ").unwrap_or("that is no option of a picture"))
+        wrong(first.strip_prefix("error: ").unwrap_or("not an option of lumbre render"))
     })?;
     let task = task.arguments;
     task.check_task().map_err(|why| wrong(&why.to_string()))?;
@@ -285,6 +290,24 @@ fn task(arguments: &SlurmArguments, names: &Names) -> Result<crate::render::Argu
         (Some(a), Some(b)) if a != b => Err(wrong(&format!("--spp {b} and --spp {a} before it"))),
         _ => Ok(task),
     }
+}
+
+/// The option that conflicts with one that the tasks set themselves.
+fn conflicting(error: &clap::Error) -> Option<String> {
+    const OWN: [&str; 4] = ["--samples", "--frames", "--checkpoint", "--resume"];
+    if error.kind() != ErrorKind::ArgumentConflict {
+        return None;
+    }
+    let named = [ContextKind::InvalidArg, ContextKind::PriorArg].into_iter().filter_map(|kind| {
+        match error.get(kind) {
+            Some(ContextValue::String(name)) => Some(name.clone()),
+            Some(ContextValue::Strings(names)) => names.first().cloned(),
+            _ => None,
+        }
+    });
+    // As `--noise <R>`.
+    let mut options = named.map(|name| name.split(' ').next().unwrap_or_default().to_owned());
+    options.find(|name| !OWN.contains(&&**name))
 }
 
 /// The number of a task.
@@ -304,7 +327,7 @@ fn sample_scripts(
     let tasks = arguments.tasks;
     if tasks > spp {
         return Err(Failure::Usage(format!(
-            "--tasks: each takes a sample of every pixel at least (found {tasks} for {}; expected {spp} or fewer)",
+            "--tasks {tasks} is more than the {} per pixel (expected {spp} or fewer)",
             counted(u64::from(spp), "sample")
         )));
     }
@@ -337,7 +360,7 @@ fn frame_scripts(
     let (count, tasks) = (last - first + 1, arguments.tasks);
     if tasks > count {
         return Err(Failure::Usage(format!(
-            "--tasks: each renders a frame at least (found {tasks} for {}; expected {count} or fewer)",
+            "--tasks {tasks} is more than the {} (expected {count} or fewer)",
             counted(u64::from(count), "frame")
         )));
     }

@@ -18,7 +18,7 @@ use crate::report::{caustics_line, caustics_not_found};
 use crate::signals::Signals;
 use crate::units::counted;
 
-/// Prints what is in a scene, and what of it would not be rendered.
+/// Prints what is in a scene, and which parts are not rendered.
 #[derive(Args)]
 #[command(after_help = "Examples:
   lumbre info scene.pbrt
@@ -26,7 +26,7 @@ use crate::units::counted;
   lumbre info model.ply --json | python3 -m json.tool
   lumbre info picture.exr.checkpoint            which samples a part or a checkpoint has, of which render
 
-Exit status 3 when the scene would not load.")]
+Exit status 3 when the scene cannot be loaded.")]
 pub(crate) struct Arguments {
     /// The scene.
     #[arg(required = true)]
@@ -194,7 +194,7 @@ fn about_part(part: &Part, as_json: bool) -> String {
         });
         return escaped_json(&report);
     }
-    let done = if state.is_finished() { "finished" } else { "unfinished: --resume goes on from it" };
+    let done = if state.is_finished() { "finished" } else { "unfinished: --resume continues it" };
     let mut text = format!("part       of a picture of {width}x{height}, {done}\n");
     for piece in state.pieces() {
         let (b, samples) = (piece.bounds, &piece.samples);
@@ -204,10 +204,23 @@ fn about_part(part: &Part, as_json: bool) -> String {
         );
     }
     text += &format!("taken      {} of {}\n", state.taken(), state.wanted());
-    for (name, value) in &part.job.identity {
-        text += &format!("{}: {}\n", escaped_line(name), escaped_line(value));
+    // The options that tell renders apart at a glance; `--json` has all.
+    let options = [
+        ("picture", "frame"),
+        ("camera", "camera"),
+        ("integrator", "integrator"),
+        ("seed", "seed"),
+        ("version", "version"),
+    ];
+    for (name, title) in options {
+        let Some(value) = part.job.identity.get(name).filter(|value| *value != "none") else { continue };
+        let value = value.strip_prefix("kind ").unwrap_or(value);
+        let value = value.split([' ', ',']).next().unwrap_or_default();
+        text += &format!("{title:<11}{}\n", escaped_line(value));
     }
-    text
+    let files = part.job.identity.keys().filter_map(|name| name.strip_prefix("file "));
+    let files: Vec<String> = files.map(|name| escaped_line(name).into_owned()).collect();
+    text + &format!("files      {}\n", shortened(files.into_iter()))
 }
 
 /// How many names of a kind are printed: `--json` has all.

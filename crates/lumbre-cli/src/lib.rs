@@ -130,15 +130,16 @@ pub use memory::{check_picture, memory_left};
 #[command(
     override_usage = "lumbre SCENE… [OPTIONS]      a picture of it, as lumbre render\n       lumbre <COMMAND> …"
 )]
+#[command(mut_subcommand("view", without_turntable), mut_subcommand("explain", without_turntable))]
 #[command(after_help = "Examples:
   lumbre model.glb                              a picture of a model: without a command, files are rendered
   lumbre render scene.pbrt                      a picture under the scene's own film name
   lumbre render model.obj --size 800x600        a model, framed and lit
-  lumbre view scene.pbrt                        the picture in the browser while it is made
+  lumbre view scene.pbrt                        the picture in the browser, live
   lumbre cast scene.pbrt --rays rays.csv        what each ray hits first
   lumbre info scene.pbrt --json                 what is in a scene
   lumbre diff a.exr b.exr --metric relmse       how different two pictures are
-  lumbre merge a.part b.part -o picture.exr     one picture of what two machines rendered
+  lumbre merge a.part b.part -o picture.exr     one picture from parts that two machines rendered
   lumbre explain scene.pbrt --pixel 320,240     every number between a pixel and its colour
   lumbre math 'rotate(z, 90) * [1, 0, 0]'       vectors, transforms and quaternions, step by step
 
@@ -163,6 +164,12 @@ enum Command {
     Farm(farm::Arguments),
     Completions(completions::CompletionsArguments),
     Man(completions::ManArguments),
+}
+
+/// Hides an option that these commands refuse: they show one picture.
+#[cfg(not(target_family = "wasm"))]
+fn without_turntable(command: clap::Command) -> clap::Command {
+    command.mut_arg("turntable", |option| option.hide(true))
 }
 
 /// Runs the program with these words, the first of which is its own name, and returns its exit status. Signals end the process.

@@ -9,7 +9,7 @@ use lumbre::formats::probe_writable;
 use lumbre::image::{Rgb, ToneMap};
 use lumbre::{Background, CancelToken, Feature, MergeError, Part, Piece, SaveOptions};
 
-use crate::checkpoint::{is_bare_part, open_part};
+use crate::checkpoint::{differences, is_bare_part, open_part};
 use crate::failure::Failure;
 use crate::memory::Memory;
 use crate::names::one_of;
@@ -19,13 +19,15 @@ use crate::signals::Signals;
 use crate::staging::frame_name;
 use crate::units::{self, counted};
 
-/// Joins parts of a render (of --samples, with or without --crop) to the picture of one run, byte for byte, in any order.
+/// Joins parts of a render to the picture of one run, byte for byte.
+///
+/// Parts are made with lumbre render --samples, with or without --crop. Their order does not matter.
 #[derive(Args)]
 #[command(after_help = "Examples:
   lumbre render scene.pbrt --samples 0..32 -o a.part     on one machine
   lumbre render scene.pbrt --samples 32..64 -o b.part    on another
-  lumbre merge a.part b.part -o picture.exr              what lumbre render scene.pbrt --spp 64 -o picture.exr makes
-  lumbre merge *.part -o more.part --allow-gaps          a part of parts, to be merged again
+  lumbre merge a.part b.part -o picture.exr              the picture of lumbre render scene.pbrt --spp 64
+  lumbre merge *.part -o more.part --allow-gaps          one part of several, to be merged again
   lumbre merge *.part -o frame.####.png                  parts of several frames: a picture of each frame
 
 Exit status 3 when parts overlap, are of different renders, are unfinished, or leave gaps.")]
@@ -33,25 +35,26 @@ pub(crate) struct Arguments {
     /// The parts: .part files, and .exr files of --samples or --keep-sums.
     #[arg(required = true, value_name = "PART")]
     parts: Vec<PathBuf>,
-    /// The picture (.exr, .png, .jpg, .webp, .qoi, .hdr or .pfm), or a .part. With # for its number, one for each frame that there are parts of.
+    /// The picture (.exr, .png, .jpg, .webp, .qoi, .hdr or .pfm), or a .part. A # in the name is replaced by the frame number: one picture
+    /// per frame.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// Join what there is even if samples are missing, and say which.
+    /// Join the parts even if samples are missing, and print which.
     #[arg(long)]
     allow_gaps: bool,
-    /// Keep the sums of all samples in the .exr, so that it can be merged and resumed again.
+    /// Store the sums of all samples in the .exr, too, so that it can be resumed and merged.
     #[arg(long)]
     keep_sums: bool,
-    /// Exposure in stops, for .png and .jpg, in place of the parts' own, which have to be the same without it.
+    /// Exposure in stops, for .png and .jpg. Overrides the exposure stored in the parts. Required if they differ.
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure)]
     exposure: Option<f32>,
-    /// Tone mapping, for .png and .jpg, in place of the parts' own, which has to be the same without it.
+    /// Tone mapping, for .png and .jpg. Overrides the one stored in the parts. Required if they differ.
     #[arg(long, value_name = "NAME", value_parser = one_of(&ToneMap::NAMES, ToneMap::from_name))]
     tonemap: Option<ToneMap>,
-    /// The image behind the picture, of parts that were rendered with --background FILE. No file that only a part names is opened.
+    /// The background image of parts that were rendered with --background FILE. Give it here: merge never opens a file named only inside a part.
     #[arg(long, value_name = "FILE")]
     background: Option<PathBuf>,
-    /// Bytes of memory that a part may take. By default 64 MiB and 32 for each byte of its file.
+    /// Memory limit for a part. By default 64 MiB plus 32 bytes per byte of the file.
     #[arg(long, value_name = "SIZE", value_parser = units::bytes)]
     max_memory: Option<u64>,
     /// Print errors only.
@@ -68,7 +71,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let format = ImageFormat::from_path(output).filter(|format| format.is_writable());
     if format.is_none() && !is_bare_part(output) {
         return Err(Failure::Usage(format!(
-            "{}: unknown kind of file (expected a name that ends in {}, or .part)",
+            "{}: unknown format (expected a name that ends in {}, or .part)",
             output.display(),
             ImageFormat::WRITABLE
         )));
@@ -88,7 +91,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let part = open(path, arguments)?;
         spp = spp.max(part.state.samples().end);
         let frame = frame_of(&part).ok_or_else(|| {
-            let why = "it is not of a frame (expected a name without #, or parts that --frames made)";
+            let why =
+                "not a part of a frame (expected an output without #, or parts of a render with --frames)";
             Failure::Input(format!("{}: {why}", path.display()))
         })?;
         frames.entry(frame).or_default().push(path.clone());
@@ -121,7 +125,7 @@ fn merge(arguments: &Arguments, parts: &[PathBuf], output: &Path, spp: u32) -> R
         let what =
             if parts.len() < arguments.parts.len() { format!("{}: {what}", output.display()) } else { what };
         if !arguments.allow_gaps {
-            return Err(Failure::Input(format!("{what} (--allow-gaps joins what there is)")));
+            return Err(Failure::Input(format!("{what} (--allow-gaps joins the parts without them)")));
         }
         if !arguments.quiet {
             say!("warning: {what}");
@@ -134,7 +138,7 @@ fn merge(arguments: &Arguments, parts: &[PathBuf], output: &Path, spp: u32) -> R
         let (width, height) = (bounds.width(), bounds.height());
         let spp = counted(u64::from(whole.state.least_samples()), "sample");
         let parts = counted(parts.len() as u64, "part");
-        say!("{}: {width}x{height}, {spp} a pixel, of {parts}", output.display());
+        say!("{}: {width}x{height}, {spp} per pixel, from {parts}", output.display());
     }
     Ok(())
 }
@@ -152,7 +156,7 @@ fn open(path: &Path, arguments: &Arguments) -> Result<Part, Failure> {
         return Ok(part);
     }
     Err(Failure::Input(format!(
-        "{}: it is unfinished, with {} of {} samples (expected the part that lumbre render --resume makes of it)",
+        "{}: unfinished, with {} of {} samples (lumbre render --resume finishes it)",
         path.display(),
         part.state.taken(),
         part.state.wanted()
@@ -166,19 +170,18 @@ fn joined(arguments: &Arguments, parts: &[PathBuf]) -> Result<Part, Failure> {
     let mut origins: Vec<(&Path, Vec<Piece>)> = vec![(first, whole.state.pieces().to_vec())];
     for path in others {
         let part = open(path, arguments)?;
-        let differences = whole.job.differences(&part.job);
-        if !differences.is_empty() {
+        if let Some(differences) = differences(&whole.job, &part.job) {
             return Err(Failure::Input(format!(
-                "{}: it is of another render than {}: they differ in {}",
+                "{}: of another render than {}: {}",
                 path.display(),
                 first.display(),
-                differences.join("; ")
+                differences
             )));
         }
         // Which of them is first would say how the picture is shown.
         if let Some(differences) = shown_differences(&whole.job.shown, &part.job.shown) {
             return Err(Failure::Usage(format!(
-                "{}: its picture is shown in another way than that of {}: {differences}",
+                "{}: other picture settings than in {}: {differences}",
                 path.display(),
                 first.display()
             )));
@@ -191,7 +194,11 @@ fn joined(arguments: &Arguments, parts: &[PathBuf]) -> Result<Part, Failure> {
             let has_it = |pieces: &[Piece]| pieces.iter().any(|piece| piece.intersection(overlap).is_some());
             let other =
                 origins.iter().find(|(_, pieces)| has_it(pieces)).map_or(first.as_path(), |(path, _)| *path);
-            Failure::Input(format!("{}: it has {overlap} as {} has", path.display(), other.display()))
+            Failure::Input(format!(
+                "{}: overlaps {}: both have {overlap}; leave one out",
+                path.display(),
+                other.display()
+            ))
         })?;
         origins.push((path, pieces));
     }
@@ -206,11 +213,11 @@ fn shown_differences(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>)
     };
     let differences = names.into_iter().filter(|name| a.get(*name) != b.get(*name)).map(|name| {
         let option = match name.as_str() {
-            "exposure" => " (expected --exposure EV, or parts of the same)",
-            "tone map" => " (expected --tonemap NAME, or parts of the same)",
-            _ => " (expected parts of the same)",
+            "exposure" => " (--exposure EV sets one for all)",
+            "tone map" => " (--tonemap NAME sets one for all)",
+            _ => " (expected the same)",
         };
-        format!("{name} {} and {}{option}", of(a, name), of(b, name))
+        format!("{name} {} there, {} here{option}", of(a, name), of(b, name))
     });
     let differences: Vec<String> = differences.collect();
     (!differences.is_empty()).then(|| differences.join("; "))
@@ -253,12 +260,12 @@ fn background(name: &str, given: Option<&Path>) -> Result<Option<Background>, Fa
         }
         (Some(named), None) => {
             return Err(Failure::Usage(format!(
-                "the picture of the parts stands before the image {named}, which is not opened unasked (expected --background with its name)"
+                "the parts use the background image {named}: give it with --background"
             )));
         }
         (None, Some(path)) => {
             return Err(Failure::Usage(format!(
-                "--background {}: the picture of the parts stands before no image",
+                "--background {}: the parts have no background image",
                 path.display()
             )));
         }

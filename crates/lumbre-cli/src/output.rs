@@ -86,7 +86,7 @@ impl Inputs {
         match self.find(output) {
             None => Ok(()),
             Some(input) => Err(Failure::Usage(format!(
-                "{}: it is an input ({}), which would be overwritten (expected another name)",
+                "{}: this is an input ({}), which would be overwritten (expected another name)",
                 output.display(),
                 input.display()
             ))),
@@ -143,7 +143,7 @@ pub(crate) fn refuse_inputs(
         inputs.refuse(&name)?;
         if statistics.is_some_and(|statistics| is_same_file(statistics, &name)) {
             return Err(Failure::Usage(format!(
-                "{}: it is both the picture and its statistics (expected two names)",
+                "{}: the name of both the picture and its statistics (expected two names)",
                 name.display()
             )));
         }
@@ -184,9 +184,9 @@ pub(crate) fn default_name(
                 };
                 Some(format!("{} is an input{by_another_name}", name.display()))
             } else if statistics.is_some_and(|statistics| is_same_file(statistics, &name)) {
-                Some(format!("{} is that of the statistics", name.display()))
+                Some(format!("{} is the name of the statistics", name.display()))
             } else if name.is_file() && !is_own_image(&name) {
-                Some(format!("{} is there, and not known to be Lumbre's", name.display()))
+                Some(format!("{} exists and was not written by Lumbre", name.display()))
             } else {
                 None
             }
@@ -202,7 +202,7 @@ pub(crate) fn default_name(
         return Err(Failure::Usage(format!("{why}, {why_too} (expected -o with another name)")));
     }
     if !quiet {
-        say!("{why}: the picture is {}", other.display());
+        say!("{why}: the picture is saved as {}", other.display());
     }
     Ok(other)
 }
@@ -219,7 +219,7 @@ impl<'a> Replaced<'a> {
     /// Says so after it was written.
     pub(crate) fn say(&self) {
         if let Some(path) = self.0 {
-            say!("{}: replaced the file that was there", path.display());
+            say!("{}: replaced", path.display());
         }
     }
 }

@@ -55,7 +55,7 @@ pub(crate) fn translated(words: Vec<OsString>) -> Result<Vec<OsString>, Failure>
     }
     out.extend(options(&job, is_render, folder, &out));
     for ignored in &job.ignored {
-        say!("note: a setting of POV-Ray that has no meaning here: {ignored}");
+        say!("note: this setting of POV-Ray is left out: {ignored}");
     }
     if !scenes.is_empty() {
         out.push("--".into());

@@ -17,15 +17,15 @@ use crate::progress::PictureViewer;
 /// How a terminal shows pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum Protocol {
-    /// The best that this terminal is known to have.
+    /// The best protocol that this terminal is known to have.
     Auto,
-    /// That of Kitty, Ghostty and WezTerm.
+    /// The protocol of Kitty, Ghostty and WezTerm.
     Kitty,
-    /// That of iTerm2.
+    /// The protocol of iTerm2.
     Iterm,
-    /// Sixel, of foot, mlterm, xterm and others.
+    /// Sixel, for foot, mlterm, xterm and others.
     Sixel,
-    /// Half blocks in 24 bits of colour, which nearly every terminal has.
+    /// Half blocks in 24-bit colour, for nearly every terminal.
     Blocks,
 }
 
@@ -51,11 +51,11 @@ impl Preview {
     /// [`Failure::Usage`] where the protocol is to be found out and standard error is no terminal.
     pub(crate) fn new(protocol: Protocol, tone_map: ToneMap, exposure: f32) -> Result<Self, Failure> {
         if protocol == Protocol::Auto && !std::io::stderr().is_terminal() {
-            let why = "--preview: standard error is no terminal (expected one, or kitty, iterm, sixel or blocks after it)";
+            let why = "--preview: standard error is not a terminal (expected a terminal, or --preview=kitty, iterm, sixel or blocks)";
             return Err(Failure::Usage(why.to_owned()));
         }
         if protocol == Protocol::Auto && !understands_ansi() {
-            let why = "--preview: this terminal shows no pictures (expected one that takes escape sequences, or kitty, iterm, sixel or blocks after it)";
+            let why = "--preview: this terminal shows no pictures (expected one that takes escape sequences, or --preview=kitty, iterm, sixel or blocks)";
             return Err(Failure::Usage(why.to_owned()));
         }
         let variable = |name: &str| std::env::var(name).unwrap_or_default();

@@ -20,9 +20,9 @@ pub(crate) enum Style {
     Auto,
     /// A bar.
     Bar,
-    /// A line now and then.
+    /// A line every 2 seconds, less often in long renders.
     Plain,
-    /// A JSON object a line.
+    /// A JSON object per line, every 2 seconds.
     Json,
     /// Nothing.
     None,
@@ -71,7 +71,7 @@ pub(crate) struct Series {
 
 impl fmt::Display for Series {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let left = time_left(self.left(self.share(0.0)));
+        let left = time_left(self.left(0.0));
         write!(f, "frame {} ({} of {}{left})", self.number, self.done + 1, self.count)
     }
 }
@@ -82,10 +82,11 @@ impl Series {
         (f64::from(self.done) + of_picture) / f64::from(self.count)
     }
 
-    /// The time until all are done, if they take as long in the mean.
-    fn left(&self, share: f64) -> Option<Duration> {
-        let elapsed = self.start.elapsed().as_secs_f64();
-        Duration::try_from_secs_f64(elapsed / share - elapsed).ok().filter(|_| share > 0.0)
+    /// The time until all are done, if they take as long in the mean, when this is done of the picture.
+    fn left(&self, of_picture: f64) -> Option<Duration> {
+        let (share, elapsed) = (self.share(of_picture), self.start.elapsed().as_secs_f64());
+        let is_known = self.done > 0 || of_picture >= MIN_SHARE;
+        Duration::try_from_secs_f64(elapsed / share - elapsed).ok().filter(|_| is_known)
     }
 }
 
@@ -123,12 +124,12 @@ impl Progress for Watched<'_> {
 pub(crate) enum Display {
     /// A bar, or a line of words where it is not known how much there is to do.
     Bar(ProgressBar),
-    /// Lines, with the time of the last one.
+    /// Lines.
     Lines {
         /// Whether they are JSON.
         json: bool,
-        /// The time of the last one.
-        last: Mutex<Option<Instant>>,
+        /// The times of the first and the last one.
+        shown: Mutex<Option<(Instant, Instant)>>,
     },
     /// Nothing.
     None,
@@ -136,8 +137,12 @@ pub(crate) enum Display {
 
 /// The length of a bar.
 const STEPS: u64 = 1000;
-/// The interval between lines.
+/// The least interval between lines.
 const INTERVAL: Duration = Duration::from_secs(2);
+/// The interval between lines of words, as a share of the time since the first: 240 lines in 8 minutes would hide all others.
+const INTERVAL_SHARE: f64 = 0.1;
+/// The share that has to be done before the time left is told: less says little about the rest.
+const MIN_SHARE: f64 = 0.01;
 
 impl Display {
     /// A display that shows nothing yet.
@@ -146,8 +151,8 @@ impl Display {
             Style::None => Self::None,
             Style::Auto if std::io::stderr().is_terminal() => Self::bar(),
             Style::Bar => Self::bar(),
-            Style::Auto | Style::Plain => Self::Lines { json: false, last: Mutex::new(None) },
-            Style::Json => Self::Lines { json: true, last: Mutex::new(None) },
+            Style::Auto | Style::Plain => Self::Lines { json: false, shown: Mutex::new(None) },
+            Style::Json => Self::Lines { json: true, shown: Mutex::new(None) },
         }
     }
 
@@ -177,13 +182,17 @@ impl Display {
                 }
                 bar.set_message(words);
             }
-            Self::Lines { json: is_json, last } => {
-                let Ok(mut last) = last.lock() else { return };
+            Self::Lines { json: is_json, shown } => {
+                let Ok(mut shown) = shown.lock() else { return };
                 let is_done = share.is_some_and(|share| share >= 1.0);
-                if !is_done && last.is_some_and(|at| at.elapsed() < INTERVAL) {
+                let is_due = |(first, last): (Instant, Instant)| {
+                    last.elapsed() >= interval(last.duration_since(first), *is_json)
+                };
+                if !is_done && !shown.is_none_or(is_due) {
                     return;
                 }
-                *last = Some(Instant::now());
+                let now = Instant::now();
+                *shown = Some((shown.map_or(now, |(first, _)| first), now));
                 match share {
                     _ if *is_json => say!("{}", json()),
                     Some(share) => say!("{:5.1} %  {words}", 100.0 * share),
@@ -194,26 +203,27 @@ impl Display {
     }
 
     fn state(&self, state: &State, pass: &Pass, series: Option<&Series>) {
-        let all = series.map(|series| (series, series.share(state.share)));
+        let all = series.map(|series| (series, series.share(state.share), series.left(state.share)));
+        let left = state.left.filter(|_| state.share >= MIN_SHARE);
         let seconds = state.elapsed.as_secs_f64();
         let rays_per_second = if seconds > 0.0 { state.rays as f64 / seconds } else { 0.0 };
-        let mut words = all.map_or_else(String::new, |(series, share)| {
+        let mut words = all.map_or_else(String::new, |(series, _, left)| {
             let Series { number, done, count, .. } = series;
-            format!("frame {number}, {} of {count}{}; ", done + 1, time_left(series.left(share)))
+            format!("frame {number}, {} of {count}{}; ", done + 1, time_left(left))
         });
         if pass.spp > 0 {
-            words += &format!("{} a pixel, ", counted(u64::from(pass.spp), "sample"));
+            words += &format!("{} per pixel, ", counted(u64::from(pass.spp), "sample"));
         }
         if let Some(noise) = pass.noise {
             words += &format!("noise {noise:.3}, ");
         }
         words += &format!("{:.1} M rays/s, ", rays_per_second / 1e6);
-        words += &format!("{}{}", spoken(state.elapsed), time_left(state.left));
+        words += &format!("{}{}", spoken(state.elapsed), time_left(left));
         self.show(Some(state.share), words, || {
             serde_json::json!({
-                "frame": all.map(|(series, _)| series.number),
-                "share_of_all": all.map(|(_, share)| share),
-                "seconds_left_of_all": all.and_then(|(series, share)| series.left(share)).map(|left| left.as_secs_f64()),
+                "frame": all.map(|(series, ..)| series.number),
+                "share_of_all": all.map(|(_, share, _)| share),
+                "seconds_left_of_all": all.and_then(|(.., left)| left).map(|left| left.as_secs_f64()),
                 "samples_per_pixel": pass.spp,
                 "noise": pass.noise,
                 "rays_per_second": rays_per_second,
@@ -221,10 +231,16 @@ impl Display {
                 "total": state.total,
                 "share": state.share,
                 "seconds": state.elapsed.as_secs_f64(),
-                "seconds_left": state.left.map(|left| left.as_secs_f64()),
+                "seconds_left": left.map(|left| left.as_secs_f64()),
             })
         });
     }
+}
+
+/// The time from one line to the next, when this time has passed since the first.
+fn interval(elapsed: Duration, is_json: bool) -> Duration {
+    // Programs get a steady stream.
+    if is_json { INTERVAL } else { INTERVAL.max(elapsed.mul_f64(INTERVAL_SHARE)) }
 }
 
 fn styled(bar: ProgressBar, template: &str) -> ProgressBar {
@@ -266,7 +282,7 @@ impl RayProgress {
 fn ray_words(rays: u64, share: Option<f64>, elapsed: Duration) -> String {
     let seconds = elapsed.as_secs_f64();
     let rate = rays as f64 / seconds.max(1e-3);
-    let share = share.filter(|share| 0.0 < *share && *share <= 1.0);
+    let share = share.filter(|share| (MIN_SHARE..=1.0).contains(share));
     let left = share.and_then(|share| Duration::try_from_secs_f64(seconds / share - seconds).ok());
     format!("{:.1} million rays, {:.2} million/s{}", rays as f64 / 1e6, rate / 1e6, time_left(left))
 }
@@ -281,10 +297,21 @@ mod tests {
         let series = Series { number: 12, done: 2, count: 5, start };
         // Half of the third of five pictures: half of all.
         assert_eq!(series.share(0.5), 0.5);
+        // Half of the third is left, and two more.
         assert!((series.left(0.5).unwrap().as_secs_f64() - 30.0).abs() < 1.0);
         assert_eq!(series.to_string(), "frame 12 (3 of 5, 45 s left)");
         let first = Series { done: 0, ..series };
         assert_eq!(first.to_string(), "frame 12 (1 of 5)");
+        assert_eq!(first.left(0.009), None);
+        assert!(first.left(0.02).is_some());
+    }
+
+    #[test]
+    fn lines_come_less_often_as_time_passes() {
+        let seconds_between =
+            |seconds, is_json| interval(Duration::from_secs(seconds), is_json).as_secs_f64();
+        assert_eq!([0, 20, 50, 600].map(|seconds| seconds_between(seconds, false)), [2.0, 2.0, 5.0, 60.0]);
+        assert_eq!(seconds_between(600, true), 2.0);
     }
 
     #[test]
@@ -293,5 +320,6 @@ mod tests {
         let words = |share| ray_words(30_000_000, share, elapsed);
         assert_eq!(words(Some(0.25)), "30.0 million rays, 1.50 million/s, 60 s left");
         assert_eq!(words(None), "30.0 million rays, 1.50 million/s");
+        assert_eq!(words(Some(0.009)), "30.0 million rays, 1.50 million/s");
     }
 }

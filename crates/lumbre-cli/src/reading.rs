@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
+use lumbre::formats::diagnostic::Diagnostic;
 use lumbre::formats::pov::PovOptions;
 use lumbre::formats::{Budget, Diagnostics, Input, Limits, SceneFormat, Strictness};
 use lumbre::{Error, Scene, SceneDesc, Setting, in_words};
@@ -17,13 +18,13 @@ use crate::units;
 #[derive(Args)]
 #[command(next_help_heading = "Reading")]
 pub(crate) struct ReadingArguments {
-    /// The format of a scene on standard input, or in a file without a known ending, which else is told by its bytes.
+    /// The format of standard input or of a file with an unknown extension. By default it is detected from the content.
     #[arg(long, value_name = "FORMAT", value_parser = one_of(&SceneFormat::NAMES, SceneFormat::from_name))]
     input_format: Option<SceneFormat>,
     /// Warnings are errors.
     #[arg(long, conflicts_with = "lenient")]
     strict: bool,
-    /// Drop broken parts (such as faces with missing vertices) with a warning instead of an error.
+    /// Leave out broken parts (such as faces with missing vertices) with a warning instead of an error.
     #[arg(long)]
     lenient: bool,
     /// The time in seconds at which the animations of a glTF are evaluated.
@@ -43,18 +44,18 @@ pub(crate) struct ReadingArguments {
     /// The material variant of a glTF.
     #[arg(long, value_name = "NAME")]
     variant: Option<String>,
-    /// A folder of files that a POV-Ray scene includes, besides its own folder and where Debian has POV-Ray's own; several times for
-    /// several, the first first.
+    /// A folder of files that a POV-Ray scene includes, besides its own folder and where Debian has POV-Ray's own. May be repeated; the
+    /// first folder is searched first.
     #[arg(long, value_name = "DIR")]
     pov_include: Vec<PathBuf>,
-    /// The clock of a POV-Ray scene; two, as 0..2, are those of the first and of the last frame of --frames.
+    /// The clock value of a POV-Ray scene, or A..B for the first and the last frame of --frames.
     #[arg(long, value_name = "K|A..B", value_parser = Clock::from_str, allow_hyphen_values = true, hide_short_help = true,
           help_heading = "Animation")]
     pov_clock: Option<Clock>,
-    /// The frames that the clock of a POV-Ray scene runs over, where --frames are some of them only.
+    /// All frames of a POV-Ray animation, which its clock runs over, if --frames renders only some of them.
     #[arg(long, value_name = "A..B", hide_short_help = true, help_heading = "Animation")]
     pov_frames: Option<Frames>,
-    /// The frame after the last one of a POV-Ray scene is the first one again.
+    /// The animation of a POV-Ray scene is a loop: the frame after the last one is the first one again.
     #[arg(long, hide_short_help = true, help_heading = "Animation")]
     pov_cyclic: bool,
     /// Declare a number or a text before a POV-Ray scene is read.
@@ -63,28 +64,27 @@ pub(crate) struct ReadingArguments {
     /// The size of the picture, which POV-Ray scenes ask for.
     #[arg(skip)]
     picture_size: Option<(u32, u32)>,
-    /// Set a parameter of the scene: material.NAME.PARAM, light.INDEX.PARAM, light.area.scale, camera.PARAM or film.PARAM. A name
-    /// that is not there is answered with those that are.
+    /// Set a parameter of the scene: material.NAME.PARAM, light.INDEX.PARAM, light.area.scale, camera.PARAM or film.PARAM. For a
+    /// wrong name, the error lists the valid ones.
     #[arg(short = 'D', long = "define", value_name = "PATH=VALUE", help_heading = "Parameters", value_parser = Setting::from_str)]
     settings: Vec<Setting>,
-    /// A file of such settings, one a line; # begins a comment line.
+    /// A file of such settings, one per line; # begins a comment line.
     #[arg(long, value_name = "FILE", help_heading = "Parameters")]
     overlay: Vec<PathBuf>,
-    /// Bytes that the program may hold at a time: what reading holds (8G by default), and scenes and pictures as predicted (by
-    /// default what is free).
+    /// Memory limit: for reading files (default 8G), and for the scene and picture (default: the free memory).
     #[arg(long, value_name = "SIZE", value_parser = units::bytes, help_heading = "Limits")]
     max_memory: Option<u64>,
-    /// Vertices, faces, shapes and parameters that may be read.
-    #[arg(long, value_name = "N", hide_short_help = true, help_heading = "Limits")]
+    /// Limit on the number of vertices, faces, shapes and parameters that are read.
+    #[arg(long, value_name = "N", value_parser = units::whole(0..=u64::MAX), hide_short_help = true, help_heading = "Limits")]
     max_elements: Option<u64>,
-    /// Levels of includes and blocks.
-    #[arg(long, value_name = "N", hide_short_help = true, help_heading = "Limits")]
+    /// Limit on the depth of nested includes and blocks.
+    #[arg(long, value_name = "N", value_parser = units::whole(0..=u32::MAX), hide_short_help = true, help_heading = "Limits")]
     max_nesting: Option<u32>,
-    /// Files that may be opened.
-    #[arg(long, value_name = "N", hide_short_help = true, help_heading = "Limits")]
+    /// Limit on the number of files that are opened.
+    #[arg(long, value_name = "N", value_parser = units::whole(0..=u64::MAX), hide_short_help = true, help_heading = "Limits")]
     max_files: Option<u64>,
-    /// Bytes that a compressed byte may expand to, and how often on average a file may be included.
-    #[arg(long, value_name = "N", hide_short_help = true, help_heading = "Limits")]
+    /// Limit on how many times compressed data, or included files, may grow.
+    #[arg(long, value_name = "N", value_parser = units::whole(0..=u64::MAX), hide_short_help = true, help_heading = "Limits")]
     max_expansion: Option<u64>,
 }
 
@@ -311,7 +311,11 @@ impl ReadingArguments {
         options.variant = variant.map(str::to_owned);
         (options.is_alone, options.folder) = (folder.is_some(), folder.map(Path::to_owned));
         let read = lumbre::describe(&paths, &options);
-        let (mut desc, diagnostics) = read.map_err(|error| memory.explain(error))?;
+        let (mut desc, mut diagnostics) = read.map_err(|error| memory.explain(error))?;
+        if let (None, Some(animation)) = (time, &self.animation) {
+            say!("the animation {animation} is shown at 0 s (--frame gives another time)");
+        }
+        self.warn_of_unused(&paths, &mut diagnostics)?;
         for path in &self.overlay {
             self.overlay(path, &mut desc)?;
         }
@@ -324,6 +328,40 @@ impl ReadingArguments {
     /// Frames per second.
     pub(crate) fn fps(&self) -> f64 {
         self.fps
+    }
+
+    /// Warns of options that apply to another format than the files have.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] with the first, under `--strict`.
+    fn warn_of_unused(&self, paths: &[&Path], diagnostics: &mut Diagnostics) -> Result<(), Failure> {
+        // What is detected by its content is not known here.
+        let formats: Option<Vec<SceneFormat>> =
+            paths.iter().map(|path| self.input_format.or(SceneFormat::from_path(path))).collect();
+        let (Some(formats), Some(first)) = (formats, paths.first()) else { return Ok(()) };
+        let has_gltf = formats.contains(&SceneFormat::Gltf);
+        let has_pov = formats.contains(&SceneFormat::Pov);
+        let of_gltf = [
+            ("--frame", self.frame.is_some()),
+            ("--shutter", self.shutter.is_some()),
+            ("--animation", self.animation.is_some()),
+            ("--variant", self.variant.is_some()),
+        ];
+        let of_pov = [
+            ("--pov-include", !self.pov_include.is_empty()),
+            ("--pov-clock", self.pov_clock.is_some()),
+            ("--pov-frames", self.pov_frames.is_some()),
+            ("--pov-cyclic", self.pov_cyclic),
+            ("--pov-declare", !self.pov_declare.is_empty()),
+        ];
+        let unused = of_gltf.iter().filter(|_| !has_gltf).map(|option| (option, "a glTF file"));
+        let unused =
+            unused.chain(of_pov.iter().filter(|_| !has_pov).map(|option| (option, "a POV-Ray scene")));
+        for ((option, _), kind) in unused.filter(|((_, is_given), _)| *is_given) {
+            let what = format!("{option} has no effect: {} is not {kind}", first.display());
+            diagnostics.push(Diagnostic::warning(what));
+        }
+        Ok(diagnostics.check().map_err(Error::from)?)
     }
 
     /// What the scene depends on besides its files, by name.
@@ -385,15 +423,10 @@ impl ReadingArguments {
 
     fn options(&self, frame: Option<f64>) -> Result<lumbre::ReadOptions, Failure> {
         if self.shutter.is_some() && frame.is_none() {
-            return Err(Failure::Usage(
-                "--shutter needs the time of a picture (expected --frame or --frames, too)".to_owned(),
-            ));
+            return Err(Failure::Usage("--shutter needs --frame or --frames".to_owned()));
         }
         let frame = match (frame, &self.animation) {
-            (None, Some(animation)) => {
-                say!("the animation {animation} is shown at 0 s (--frame takes another time)");
-                Some(0.0)
-            }
+            (None, Some(_)) => Some(0.0),
             (frame, _) => frame,
         };
         let mut options = lumbre::ReadOptions::default();

@@ -74,70 +74,70 @@ Animations of a glTF, at a time in seconds, or frame by frame with motion blur:
 
 Ctrl-C stops and saves what is there, if every pixel has a sample; a second one stops at once and saves nothing.")]
 pub(crate) struct Arguments {
-    /// The scene: .pbrt, .gltf, .glb, .obj, .ply or .stl, also packed by gzip; - is standard input. Several .pbrt files are read one
-    /// after another; files of other kinds are put into the same world.
+    /// The scene: .pbrt, .gltf, .glb, .obj, .ply, .stl or .pov, also compressed with gzip; - is standard input. Several .pbrt files are read
+    /// one after another; files of other formats are put into the same world.
     #[arg(required = true, value_name = "SCENE")]
     scene: Vec<PathBuf>,
     /// The picture: .exr, .png, .jpg, .webp, .qoi, .hdr or .pfm; - is standard output. Several are one file that ends in .gif, .mp4, .webm,
-    /// .mkv or .mov. By default the scene's own film name, else the scene's
-    /// name with .png, but never a file that was read or that Lumbre did not write: then STEM.render.png.
+    /// .mkv or .mov. By default the film's name in the scene, else NAME.png. If that file is an input, or not written by Lumbre:
+    /// NAME.render.png.
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
     /// The format of a picture on standard output: png by default.
     #[arg(long, value_name = "FORMAT", value_parser = one_of(&WRITTEN, written_format))]
     output_format: Option<ImageFormat>,
-    /// Samples per pixel. By default as many as the scene says, else 64; 16 for a model whose noise is taken out; for a scene of POV-Ray 4, and 16 at edges.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    /// Samples per pixel. By default as many as the scene says, else 64; 16 for a model that is denoised; 4 for a scene of POV-Ray, and
+    /// 16 at edges.
+    #[arg(long, value_name = "N", value_parser = units::whole(1..=u32::MAX))]
     spp: Option<u32>,
     /// Stop after this time, counted from the start (of each frame), as 90s, 2m or 1h30m.
     #[arg(long, value_name = "DUR", value_parser = units::duration)]
     time: Option<Duration>,
-    /// Stop sampling a pixel when its noise is below this share of its luminance, such as 0.02. It ends at --spp or --time at the latest.
-    /// Without these it takes as long as it takes: the progress says how long, and Ctrl-C saves what is there.
+    /// Stop sampling a pixel when its noise is below this share of its luminance, such as 0.02. The render ends at --spp or --time at the
+    /// latest. Without either it runs until every pixel reaches the target. The progress shows the time left, and Ctrl-C saves the picture.
     #[arg(long, value_name = "R", value_parser = noise)]
     noise: Option<f64>,
-    /// With --noise, the samples that every pixel has before its noise may end it. By default 16, or up to 256 where most of the light
-    /// comes by rare samples.
-    #[arg(long, value_name = "N", requires = "noise", value_parser = clap::value_parser!(u32).range(1..))]
+    /// With --noise: at least this many samples per pixel. By default 16, or up to 256 where most of the light comes from rare samples.
+    #[arg(long, value_name = "N", requires = "noise", value_parser = units::whole(1..=u32::MAX))]
     min_spp: Option<u32>,
-    /// Take the noise out of the picture. By Lumbre's own filter (own or auto, the same), or by Open Image Denoise where it is installed
-    /// (oidn; its folder can be named by the variable OIDN_DIR). An .exr keeps the noisy picture too, in noisy.R, noisy.G and noisy.B.
-    /// By default own in the light of the studio, else none.
+    /// Denoise the picture. With Lumbre's own filter (own, or auto, which is the same), or with Open Image Denoise if it is installed (oidn;
+    /// the variable OIDN_DIR names its folder). An .exr keeps the noisy picture too, in noisy.R, noisy.G and noisy.B. By default own in
+    /// the light of the studio, else none.
     #[arg(long, value_name = "WITH", num_args = 0..=1, default_missing_value = "auto",
           value_parser = one_of(&Choice::NAMES, Choice::from_name))]
     denoise: Option<Choice>,
     /// Width and height in pixels.
     #[arg(long, value_name = "WxH", value_parser = units::size)]
     size: Option<(u32, u32)>,
-    /// Frames of an animation from A to B, both included, as -o frame.####.png, or in one file, as -o walk.gif or walk.mp4 (by ffmpeg):
-    /// frame n is that of the time n / --fps.
+    /// Frames of an animation from A to B, both included, as -o frame.####.png, or in one file, as -o walk.gif or walk.mp4 (by ffmpeg).
+    /// Frame n shows the time n / --fps.
     #[arg(long, value_name = "A..B", conflicts_with_all = ["frame", "turntable"], help_heading = "Animation")]
     frames: Option<Frames>,
-    /// Render this part only: pixels, or fractions of the picture.
+    /// Render only this rectangle, in pixels or in fractions of the picture.
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = units::crop)]
     crop: Option<Crop>,
-    /// A camera by name or 0-based position.
+    /// A camera of the scene, by its name or its index from 0.
     #[arg(long, value_name = "NAME|INDEX", help_heading = "View")]
     camera: Option<String>,
-    /// What is computed for each pixel. It is light along paths, or a quantity of what is seen.
+    /// What each pixel shows: light, or a property of the visible surface.
     #[arg(long, value_name = "NAME", value_parser = one_of(&IntegratorKind::NAMES, IntegratorKind::from_name))]
     integrator: Option<IntegratorKind>,
-    /// The maximal number of bounces.
-    #[arg(long, value_name = "N")]
+    /// The maximum number of bounces.
+    #[arg(long, value_name = "N", value_parser = units::whole(0..=u32::MAX))]
     max_depth: Option<u32>,
-    /// What is made of normals of vertices and maps that are not those of the surface: lumbre keeps coarse meshes free of black
-    /// edges and leaks, pbrt takes them as pbrt-v4 does. By default what the scene says, else lumbre.
+    /// How shading normals are treated: lumbre keeps coarse meshes free of black edges and leaks, pbrt does as pbrt-v4. By default what
+    /// the scene says, else lumbre.
     #[arg(long, value_name = "HOW", value_parser = one_of(&SHADING_NORMALS, ShadingNormals::from_name))]
     shading_normals: Option<ShadingNormals>,
-    /// Carry three wavelengths along each path in place of red, green and blue: colours that multiply many times, light by its spectrum
-    /// and glass that disperses are right. For the integrator path. By default where the scene's film is spectral.
+    /// Carry three wavelengths along each path in place of red, green and blue. Colours that multiply many times, spectra of lights and
+    /// glass that disperses are then right. Only with the integrator path. By default if the scene's film is spectral.
     #[arg(long)]
     spectral: bool,
     /// Seed of the random numbers.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = units::whole(0..=u64::MAX))]
     seed: Option<u64>,
     /// Threads; all cores by default. The picture does not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", value_parser = units::whole(1_u16..=1024))]
     threads: Option<u16>,
     /// Exposure in stops, for .png and .jpg. By default 0, unless a glTF's own lights would make its picture white or
     /// black: then it is measured.
@@ -149,8 +149,8 @@ pub(crate) struct Arguments {
     /// AOVs as layers of an .exr, separated by commas.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = one_of(&FEATURES, Feature::from_name))]
     aov: Vec<Feature>,
-    /// What .exr and .png say of themselves: what their pixels depend on (version, a hash of the scene and the options, seed, samples,
-    /// camera), the same for every run; or, in full, the command and its time as well.
+    /// Which metadata .exr and .png contain. Plain: what the pixels depend on (version, a hash of the scene and the options, seed, samples,
+    /// camera), the same for every run. Full: also the command and its time.
     #[arg(long, value_enum, value_name = "WHICH", default_value_t = Metadata::Plain)]
     metadata: Metadata,
     /// Write statistics of the render, as JSON.
@@ -162,7 +162,7 @@ pub(crate) struct Arguments {
     /// Show the picture in the terminal while it is rendered, in place of the progress.
     #[arg(long, value_enum, value_name = "HOW", num_args = 0..=1, require_equals = true, default_missing_value = "auto")]
     preview: Option<Protocol>,
-    /// Show the picture in a tev that is open, by default at its port 14158.
+    /// Show the picture in a running tev, by default at port 14158.
     #[arg(long, value_name = "HOST:PORT")]
     tev: Option<String>,
     /// Print more.
@@ -367,9 +367,9 @@ impl Arguments {
         self.check_standard_output()?;
         self.parts.check(&self.scene, output, self.spp)?;
         let alone = [
-            (self.stats.is_some(), "--stats is one file for all tasks"),
-            (self.preview.is_some(), "--preview needs a terminal"),
-            (self.tev.is_some(), "--tev needs a screen"),
+            (self.stats.is_some(), "--stats cannot be used in a farm render: all tasks would write one file"),
+            (self.preview.is_some(), "--preview cannot be used in a farm render: it needs a terminal"),
+            (self.tev.is_some(), "--tev cannot be used in a farm render: it needs a screen"),
         ];
         alone
             .iter()
@@ -485,7 +485,7 @@ impl Arguments {
             return Err(Failure::Usage(message.to_owned()));
         }
         if self.output_format.is_some() && !is_asked {
-            let message = "--output-format is for standard output (expected -o -; files have the format of their ending)";
+            let message = "--output-format works only with -o - (the format of a file follows from its name)";
             return Err(Failure::Usage(message.to_owned()));
         }
         Ok(())
@@ -611,7 +611,8 @@ fn picture(
     let series = frame.as_ref().map(|(frame, _)| frame.series);
     let kind = arguments.integrator.unwrap_or(desc.integrator.kind);
     if denoiser.is_some() && kind.is_feature() {
-        let why = "--denoise is for pictures of light: normals, depth, albedo and uv have no such noise";
+        let why =
+            "--denoise cannot be used with --integrator normals, depth, albedo or uv: they have no noise";
         return Err(Failure::Usage(why.to_owned()));
     }
     let is_of_light = kind.needs_light();
@@ -653,6 +654,9 @@ fn picture(
     options.film = film;
     options.transparent = behind.is_transparent();
     options.spectral &= kind.carries_wavelengths();
+    if arguments.spectral && !kind.carries_wavelengths() {
+        return Err(Failure::Usage("--spectral works only with --integrator path or caustics".to_owned()));
+    }
     options.spectral |= arguments.spectral;
     let samples_are_asked = arguments.spp.is_some()
         || arguments.time.is_some()
@@ -679,23 +683,27 @@ fn picture(
         }
     };
     if staged.framed && scene.resolved().accel().primitive_count() == 0 {
-        warn(format!("{}: there is nothing to see", name.display()))?;
+        warn(format!("{}: the scene has no shapes: the picture shows only the background", name.display()))?;
     }
     if staged.guessed_up && is_first && !arguments.quiet {
-        say!("{}: z is taken for up, by the plane that it stands on (--up y takes y)", name.display());
+        say!("{}: z is up, since the model stands on a plane of z (--up y makes y up)", name.display());
     }
     if !options.spectral && is_first && is_of_light && scene.resolved().disperses() {
-        let what = "glass does not disperse light without --spectral: each has its index at 587.6 nm";
+        let what =
+            "glass does not disperse light without --spectral: its index at 587.6 nm is used for all colours";
         warn(format!("{}: {what}", name.display()))?;
     }
     if scene.is_dark() && is_of_light {
-        warn(format!("{}: the scene has no light, its picture is black", name.display()))?;
+        warn(format!("{}: the scene has no light: its picture is black", name.display()))?;
     }
     let camera = scene.resolved().cameras().get(options.camera);
     if let (Some(ground), Some(camera)) = (scene.resolved().ground(), camera)
         && staging::is_below(ground, camera.world_from_camera.point(DVec3::ZERO))
     {
-        warn(format!("{}: the camera is below the ground, which hides everything", name.display()))?;
+        warn(format!(
+            "{}: the camera is below the ground, which hides everything (--ground none)",
+            name.display()
+        ))?;
     }
 
     let exposure = match first.exposure {
@@ -704,7 +712,7 @@ fn picture(
             let stops = defaults.exposure(&scene, &options)?;
             if stops != 0.0 && !arguments.quiet {
                 say!(
-                    "exposed by {stops:.1} stops for the file's own lights (--exposure 0 takes them as they are)"
+                    "exposed by {stops:.1} stops, for the brightness of the file's lights (--exposure 0 turns this off)"
                 );
             }
             *first.exposure.insert(stops)
@@ -746,7 +754,7 @@ fn picture(
             let found = job().map_err(Failure::from)?;
             if is_done_before(&output, &found, &options) {
                 if !arguments.quiet {
-                    say!("{} is done", output.display());
+                    say!("{}: already rendered", output.display());
                 }
                 return Ok(());
             }
@@ -773,16 +781,16 @@ fn picture(
     let is_done = !cancel.is_cancelled();
     match checkpoint.end(&state, is_done) {
         Ok(Some(path)) if !is_done && !arguments.quiet => {
-            say!("{} keeps what was rendered: --resume goes on from there", path.display());
+            say!("{}: checkpoint saved (--resume continues from it)", path.display());
         }
         Ok(None) if !is_done && !arguments.quiet && checkpoint.is_possible() => {
             say!(
-                "hint: --checkpoint FILE keeps what was rendered, for --resume (as renders of two minutes do by themselves)"
+                "hint: --checkpoint FILE saves the samples, for --resume (renders of more than two minutes do so by themselves)"
             );
         }
         Ok(_) => {}
         // The picture may still be saved.
-        Err(why) => say!("warning: the checkpoint cannot be written: {why}"),
+        Err(why) => say!("warning: cannot write the checkpoint: {why}"),
     }
     match check_whole(arguments, &picture, signals.received()) {
         // An interrupted animation has the frames that are done.
@@ -836,7 +844,7 @@ fn picture(
     if let Err(Failure::Io(why)) = saved {
         return Err(Failure::Io(match checkpoint.rescue(&state, &output) {
             Some(kept) => format!(
-                "{why}; what was rendered is kept in {} (lumbre merge {} -o PICTURE makes the picture of it)",
+                "{why}; the samples are saved in {} (lumbre merge {} -o PICTURE makes a picture of them)",
                 kept.display(),
                 kept.display()
             ),
@@ -911,9 +919,8 @@ fn text_of(file: &[u8], at: usize, length: usize) -> Option<&[u8]> {
 }
 
 /// A hint for nearly black pictures.
-const DARK_HINT: &str = "hint: next to nothing in the picture is lit: --fit shows what is closed from outside, where its light does not come in
-  (--eye and --target put a camera inside, where its lights may be), --env FILE lights it from all around, --exposure EV
-  brightens what light there is";
+const DARK_HINT: &str = "hint: almost nothing in the picture is lit. --fit views a closed room from outside; --eye and --target put the camera
+  inside. --env FILE lights the scene from all around; --exposure EV brightens the picture";
 
 /// Whether almost all covered pixels would be shown black.
 fn is_nearly_black(image: &Image, exposure: f32) -> bool {
@@ -938,20 +945,31 @@ fn is_for_displays(path: &Path) -> bool {
     ImageFormat::from_path(path).is_none_or(|format| !format.is_high_range())
 }
 
-/// Checks that the program can write the format of the path's extension.
-fn check_format(path: &Path, layers: bool) -> Result<(), Failure> {
+/// The format of the path's extension, which the program can write.
+///
+/// # Errors
+/// [`Failure::Usage`] for any other.
+pub(crate) fn check_image_format(path: &Path) -> Result<ImageFormat, Failure> {
     let format = ImageFormat::from_path(path).filter(|format| format.is_writable());
-    match format {
-        None if is_bare_part(path) => Ok(()),
-        None => Err(Failure::Usage(format!(
-            "{}: unknown kind of picture (expected a name that ends in {})",
+    format.ok_or_else(|| {
+        Failure::Usage(format!(
+            "{}: unknown image format (expected a name that ends in {})",
             path.display(),
             ImageFormat::WRITABLE
-        ))),
-        Some(format) if layers && format != ImageFormat::Exr => {
+        ))
+    })
+}
+
+/// Checks that the program can write the format of the path's extension, with layers.
+fn check_format(path: &Path, layers: bool) -> Result<(), Failure> {
+    if is_bare_part(path) {
+        return Ok(());
+    }
+    match check_image_format(path)? {
+        format if layers && format != ImageFormat::Exr => {
             Err(Failure::Usage(format!("{}: --aov needs an .exr file", path.display())))
         }
-        Some(_) => Ok(()),
+        _ => Ok(()),
     }
 }
 
@@ -978,11 +996,11 @@ fn check_whole(arguments: &Arguments, picture: &Picture, signal: Option<u8>) -> 
         return Ok(());
     }
     if let Some(status) = signal {
-        say!("not every pixel had a sample: nothing was saved");
+        say!("not every pixel has a sample yet: nothing was saved");
         return Err(Failure::Interrupted(status));
     }
     let time = arguments.time.map(spoken).unwrap_or_default();
-    let over = format!("--time: {time} were over before every pixel had a sample");
+    let over = format!("--time: {time} passed before every pixel had a sample");
     match picture.stats().stride {
         Some(stride) => {
             say!("warning: {over}; the picture has one for {stride} by {stride} pixels");
@@ -999,6 +1017,12 @@ fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failur
     }
     options.crop = match arguments.crop {
         None => options.crop,
+        Some(Crop::Pixels([x0, y0, x1, y1])) if x0 >= options.width || y0 >= options.height => {
+            return Err(Failure::Usage(format!(
+                "--crop {x0},{y0},{x1},{y1} is outside the picture ({}x{})",
+                options.width, options.height
+            )));
+        }
         Some(Crop::Pixels([x0, y0, x1, y1])) => Some(PixelBounds { x0, y0, x1, y1 }),
         Some(Crop::Fractions([x0, y0, x1, y1])) => Some(options.pixels_of([x0, x1, y0, y1])),
     };
@@ -1051,6 +1075,9 @@ pub(crate) fn camera(scene: &Scene, wanted: &str) -> Result<usize, Failure> {
                 (None, CameraKind::Realistic(_)) => format!("{i} (realistic)"),
             })
             .collect();
-        Failure::Usage(format!("--camera: there is no \"{wanted}\" (expected one of: {})", known.join(", ")))
+        Failure::Usage(format!(
+            "--camera: there is no camera \"{wanted}\" (expected one of: {})",
+            known.join(", ")
+        ))
     })
 }

@@ -19,16 +19,16 @@ pub(crate) fn warn_of_losses(threads_are_asked: bool, picture: &Picture) {
         say!("warning: the system grants {} of {} threads", stats.threads, stats.threads + refused);
     }
     for sample in &stats.first_dropped {
-        say!("warning: pixel ({}, {}), sample {}: not finite, dropped", sample.x, sample.y, sample.sample);
+        say!("warning: pixel ({}, {}), sample {}: not finite, left out", sample.x, sample.y, sample.sample);
     }
     let unsaid = stats.dropped.saturating_sub(stats.first_dropped.len() as u64);
     if unsaid > 0 {
-        say!("warning: {} more not finite and dropped", counted(unsaid, "sample"));
+        say!("warning: {} more not finite and left out", counted(unsaid, "sample"));
     }
     if stats.clamped > 0 {
         let count = counted(stats.clamped, "sample");
         let most = Stats::MAX_SAMPLE;
-        say!("warning: {count} brighter than {most:.1e}, which is the most that a sample counts for");
+        say!("warning: {count} brighter than {most:.1e}, the most that a sample counts for");
     }
 }
 
@@ -81,8 +81,8 @@ fn missed(stats: &Stats, stop: &Stop) -> Option<String> {
     // Where a signal ended it, everyone knows what goes on.
     let more = match stop.time {
         _ if stats.cancelled => "",
-        Some(_) if stats.spp < stop.spp => " (more --time goes on)",
-        _ => " (more --spp goes on)",
+        Some(_) if stats.spp < stop.spp => " (give more --time)",
+        _ => " (give more --spp)",
     };
     if stats.misses_noise_target() {
         return Some(format!("the target of {target} was not met{more}"));
@@ -125,9 +125,9 @@ pub(crate) fn summary(
     let samples = if stats.spp > 0 {
         match stats.noise {
             Some(noise) if stop.noise.is_some() => {
-                format!("{} to {} samples a pixel, noise {noise:.4}", stats.spp, stats.most_spp)
+                format!("{} to {} samples per pixel, noise {noise:.4}", stats.spp, stats.most_spp)
             }
-            _ => format!("{} a pixel", counted(u64::from(stats.spp), "sample")),
+            _ => format!("{} per pixel", counted(u64::from(stats.spp), "sample")),
         }
     } else {
         format!("a coarse picture of {}", counted(stats.samples, "sample"))

@@ -121,7 +121,7 @@ mod tests {
             let command = program.find_subcommand_mut(name).expect(name);
             let (short, long) = (command.render_help().to_string(), command.render_long_help().to_string());
             assert!(short.lines().count() <= 60, "{name}: {} lines", short.lines().count());
-            for arg in command.get_arguments().filter_map(Arg::get_long) {
+            for arg in command.get_arguments().filter(|arg| !arg.is_hide_set()).filter_map(Arg::get_long) {
                 assert!(long.contains(&format!("--{arg}")), "{name} --{arg}");
             }
         }

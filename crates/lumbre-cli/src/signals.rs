@@ -260,7 +260,7 @@ impl Watcher {
                 (Phase::Saving, Some(elapsed)) if elapsed > SAVING_GRACE => end(status),
                 (Phase::Saving, Some(elapsed)) if elapsed > GRACE && !has_said => {
                     has_said = true;
-                    say!("saving the picture; another signal ends it at once, without");
+                    say!("saving the picture; another signal stops at once, without saving");
                 }
                 (_, Some(_)) => {}
                 (phase, None) => {
@@ -298,13 +298,13 @@ fn check(phase: Phase, deadline: Deadline) {
     let time = crate::units::spoken(deadline.time);
     match phase {
         Phase::Preparing(what) if over > PREPARING_GRACE => {
-            say!("error: --time: {time} were over while {what}; nothing was rendered");
+            say!("error: --time: {time} passed while {what}; nothing was rendered");
         }
         Phase::Rendering if over > COARSE_GRACE => {
-            say!("error: --time: {time} are over, and the render takes too long to stop; nothing was saved");
+            say!("error: --time: {time} passed, and the render takes too long to stop; nothing was saved");
         }
         Phase::Opening(since) if over.min(since.elapsed()) > GRACE => {
-            say!("error: --time: {time} are over, and no one takes the picture; nothing was saved");
+            say!("error: --time: {time} passed, and nobody reads the picture; nothing was saved");
         }
         _ => return,
     }

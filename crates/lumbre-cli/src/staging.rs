@@ -17,6 +17,7 @@ use crate::animation::{ENDINGS, is_animation};
 use crate::defaults::Defaults;
 use crate::failure::Failure;
 use crate::names::one_of;
+use crate::units;
 
 /// How a model is shown.
 #[derive(Args, Clone, Debug)]
@@ -40,7 +41,7 @@ pub(crate) struct StagingArguments {
     #[arg(long, conflicts_with = "camera", help_heading = "View")]
     fit: bool,
     /// Render N pictures from all around the model, as -o frame.####.png, or into one file, as -o turn.gif or turn.mp4 (by ffmpeg).
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000),
+    #[arg(long, value_name = "N", value_parser = units::whole(2_u32..=100_000),
           conflicts_with = "camera", help_heading = "View")]
     turntable: Option<u32>,
 }

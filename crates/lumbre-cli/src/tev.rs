@@ -44,7 +44,7 @@ impl Tev {
         const PORT: u16 = 14158;
         let with_port = if address.contains(':') { address.to_owned() } else { format!("{address}:{PORT}") };
         let wrong = |why: String| {
-            Failure::Io(format!("--tev: {with_port}: {why} (expected the HOST:PORT of a tev that is open)"))
+            Failure::Io(format!("--tev: {with_port}: {why} (expected the HOST:PORT of a running tev)"))
         };
         let found = with_port.to_socket_addrs().map_err(|e| wrong(e.to_string()))?.next();
         let found = found.ok_or_else(|| wrong("there is no such host".to_owned()))?;
@@ -73,7 +73,7 @@ impl PictureViewer for Tev {
         if let Some(stream) = &mut state.stream
             && let Err(error) = packets.iter().try_for_each(|packet| stream.write_all(packet))
         {
-            say!("warning: tev does not take the picture any longer: {error}");
+            say!("warning: tev no longer accepts the picture: {error}");
             state.stream = None;
         }
         state.last = Some(Instant::now());

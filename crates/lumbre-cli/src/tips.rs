@@ -55,13 +55,14 @@ const OPTIONS: &[(&str, &[&str])] = &[
     ("--env", &["--environment", "--envmap", "--environment-map", "--hdri", "--ibl", "--skybox", "--world"]),
     ("--background", &["--bg", "--backdrop", "--background-color", "--transparent", "--alpha"]),
     ("--ground", &["--floor", "--shadow-catcher", "--ground-plane"]),
+    ("--tev", &["--display-server"]),
     ("--aov", &["--aovs", "--passes", "--layers", "--render-passes"]),
-    ("--stats", &["--statistics", "--report"]),
+    ("--stats", &["--statistics", "--report", "--pixelstats"]),
     ("--integrator", &["--renderer", "--mode", "--algorithm"]),
     ("--seed", &["--random-seed", "--rng-seed"]),
     ("--max-memory", &["--memory", "--mem", "--memory-limit"]),
     ("--quiet", &["--silent"]),
-    ("--verbose", &["--debug"]),
+    ("--verbose", &["--debug", "--log-level"]),
     ("--rays", &["--input", "--rays-file"]),
     ("--query", &["--mode", "--type"]),
     ("--fail-above", &["--threshold", "--tolerance", "--max-error", "--fail"]),
@@ -78,13 +79,27 @@ const HINTS: &[(&[&str], &str)] = &[
         &["--optix"],
         "the denoisers are --denoise (Lumbre's own filter) and --denoise oidn (Open Image Denoise)",
     ),
-    (&["--gpu", "--device", "--cuda"], "pictures are rendered on the processor's cores (--threads N)"),
-    (&["--interactive", "--gui", "--display"], "pictures are written to files (-o OUT)"),
+    (
+        &["--gpu", "--device", "--cuda", "--wavefront"],
+        "pictures are rendered on the processor's cores (--threads N)",
+    ),
+    (&["--interactive", "--gui", "--display"], "lumbre view SCENE shows the picture in the browser"),
+    (
+        &["--pixel", "--pixelmaterial"],
+        "lumbre explain SCENE --pixel X,Y explains the colour of a pixel, with its materials; lumbre render --crop renders a part of the picture",
+    ),
+    (
+        &["--mse-reference-image", "--mse-reference-out"],
+        "lumbre diff OUT REFERENCE measures the difference of two pictures",
+    ),
+    (&["--write-partial-images"], "a long render saves its samples in OUT.checkpoint, for --resume"),
+    (&["--quick"], "a fast picture has few samples, such as --spp 16 --denoise, or a small --size"),
 ];
 
 /// Words of other programs for a command.
 const COMMANDS: &[(&str, &[&str])] = &[
-    ("render", &["view", "show", "draw", "image"]),
+    ("render", &["draw", "image"]),
+    ("view", &["show", "display", "preview", "gui"]),
     ("cast", &["trace", "intersect", "raycast", "shoot", "query"]),
     ("info", &["inspect", "describe", "stat", "stats", "list", "validate"]),
     ("diff", &["compare", "cmp", "difference", "flip"]),
@@ -247,13 +262,26 @@ mod tests {
             ("diff", "--threshold", meaning("--fail-above")),
             ("render", "--sizes", spelling("--size")),
             ("cast", "--querry", spelling("--query")),
+            ("render", "--display-server", meaning("--tev")),
             ("cast", "--samples", None),
             ("render", "--frobnicate", None),
             ("render", "-x", None),
         ] {
             assert_eq!(tip(command, wrong), expected, "{command} {wrong}");
         }
-        assert!(matches!(tip("render", "--oidn"), Some(Tip::Hint(hint)) if hint.contains("--denoise oidn")));
+        for (wrong, expected) in [
+            ("--oidn", "--denoise oidn"),
+            ("--gui", "lumbre view SCENE"),
+            ("--pixel", "lumbre explain SCENE --pixel X,Y"),
+            ("--pixelmaterial", "lumbre explain"),
+            ("--mse-reference-image", "lumbre diff"),
+            ("--wavefront", "--threads"),
+        ] {
+            assert!(
+                matches!(tip("render", wrong), Some(Tip::Hint(hint)) if hint.contains(expected)),
+                "{wrong}"
+            );
+        }
     }
 
     #[test]
@@ -268,7 +296,10 @@ mod tests {
             for (_, words) in OPTIONS.iter().filter(|(option, _)| known(option)) {
                 assert!(!words.iter().any(|word| known(word)), "{words:?}");
             }
-            assert!(!HINTS.iter().flat_map(|(words, _)| *words).any(|word| known(word)));
+            // A hint may name the command that has the option.
+            let here = format!("lumbre {}", command.get_name());
+            let others = HINTS.iter().filter(|(_, hint)| !hint.contains(&here));
+            assert!(!others.flat_map(|(words, _)| *words).any(|word| known(word)), "{here}");
         }
     }
 

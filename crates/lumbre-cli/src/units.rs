@@ -1,5 +1,8 @@
 //! Arguments with units: sizes, durations, bytes and rectangles.
 
+use std::fmt::Display;
+use std::ops::RangeInclusive;
+use std::str::FromStr;
 use std::time::Duration;
 
 use lumbre::image::Window;
@@ -115,6 +118,17 @@ pub(crate) fn bytes(text: &str) -> Result<u64, String> {
     if value > 0.0 && value.is_finite() { Ok((value * factor as f64) as u64) } else { Err(wrong()) }
 }
 
+/// A parser of whole numbers in this range.
+pub(crate) fn whole<T>(range: RangeInclusive<T>) -> impl Fn(&str) -> Result<T, String> + Clone
+where
+    T: FromStr + PartialOrd + Display + Clone + Send + Sync + 'static,
+{
+    move |text| {
+        let number = text.trim().parse().ok().filter(|number| range.contains(number));
+        number.ok_or_else(|| format!("expected a whole number from {} to {}", range.start(), range.end()))
+    }
+}
+
 /// A number of things: `1 sample`, `16 samples`.
 pub(crate) fn counted(count: u64, thing: &str) -> String {
     format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
@@ -158,6 +172,15 @@ mod tests {
         assert_eq!(duration("2.5"), Ok(Duration::from_millis(2500)));
         assert_eq!(bytes("1.5k"), Ok(1536));
         assert_eq!(bytes("8GiB"), Ok(8 << 30));
+    }
+
+    #[test]
+    fn whole_numbers_are_kept_to_their_range() {
+        let spp = whole(1..=u32::MAX);
+        assert_eq!((spp("1"), spp("4294967295")), (Ok(1), Ok(u32::MAX)));
+        for text in ["zero", "", "0", "-1", "1.5", "4294967296"] {
+            assert_eq!(spp(text), Err("expected a whole number from 1 to 4294967295".to_owned()), "{text}");
+        }
     }
 
     #[test]

@@ -12,10 +12,10 @@ use crate::failure::Failure;
 #[derive(Args, Debug)]
 #[command(next_help_heading = "View")]
 pub(crate) struct ViewArguments {
-    /// Go around the model to the right by this angle in degrees, from the view that would be chosen or from --eye.
+    /// Go around the model to the right by this angle in degrees, from the automatic view, or from --eye.
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, value_parser = angle, conflicts_with = "camera")]
     azimuth: Option<f64>,
-    /// Go up by this angle in degrees, at most to straight above.
+    /// Go up by this angle in degrees, at most 90° (straight down).
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, value_parser = angle, conflicts_with = "camera")]
     elevation: Option<f64>,
     /// Enlarge everything by this factor.
@@ -30,10 +30,10 @@ pub(crate) struct ViewArguments {
     /// Where the camera stands.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = point, conflicts_with = "camera")]
     eye: Option<DVec3>,
-    /// The point in the middle of the picture; by default that of the model.
+    /// The point in the middle of the picture. By default the middle of the model.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = point, conflicts_with = "camera")]
     target: Option<DVec3>,
-    /// What is up: x, y, z, -x, -y, -z or a direction X,Y,Z. By default z for .stl, and for an .obj or .ply that plainly
+    /// Which direction is up: x, y, z, -x, -y, -z or X,Y,Z. By default z for .stl, and for an .obj or .ply that plainly
     /// stands on a plane of z; y for all others.
     #[arg(long, value_name = "AXIS|X,Y,Z", allow_hyphen_values = true, value_parser = up_axis)]
     up: Option<UpAxis>,
@@ -87,7 +87,9 @@ impl ViewArguments {
     /// [`Failure::Usage`] when the camera stands in what it is to look at.
     pub(crate) fn set(&self, stage: &mut Stage) -> Result<(), Failure> {
         if self.eye.is_some() && self.eye == self.target {
-            return Err(Failure::Usage("--eye and --target are one point (expected two)".to_owned()));
+            return Err(Failure::Usage(
+                "--eye and --target are the same point (expected two points)".to_owned(),
+            ));
         }
         let mut view = Viewpoint::default();
         view.azimuth = self.azimuth.unwrap_or(view.azimuth);
@@ -121,7 +123,7 @@ impl ViewArguments {
             }
             CameraKind::Realistic(_) => {
                 let option = self.fov.map(|_| "--fov").or(self.zoom.map(|_| "--zoom"));
-                option.map(|option| (option, "has a lens of its file"))
+                option.map(|option| (option, "has the lens of the scene"))
             }
         };
         match refused {

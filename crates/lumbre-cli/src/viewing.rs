@@ -23,8 +23,9 @@ use crate::staging::{Backdrop, StagingArguments};
 use crate::units;
 use crate::view::ViewArguments;
 
-/// Shows a scene in the browser while it is rendered: one moves the camera, looks into the pixels, and sees every edit of the
-/// file when it is saved.
+/// Shows a scene in the browser, live.
+///
+/// Move the camera, inspect pixels, and see every edit of the file when it is saved.
 #[derive(Args)]
 #[command(after_help = "Examples:
   lumbre view scene.pbrt                        opens a page that shows the picture
@@ -37,43 +38,42 @@ use crate::view::ViewArguments;
 On another machine: with the same port at both ends, then open the address that is printed.
   ssh -L 8765:127.0.0.1:8765 HOST lumbre view --no-open --port 8765 scene.pbrt")]
 pub(crate) struct Arguments {
-    /// The scene: .pbrt, .gltf, .glb, .obj, .ply or .stl, also packed by gzip. Several are put into the same world.
+    /// The scene: .pbrt, .gltf, .glb, .obj, .ply, .stl or .pov, also compressed with gzip. Several are put into the same world.
     #[arg(value_name = "SCENE")]
     scene: Vec<PathBuf>,
-    /// The port; by default one that is free.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    /// The port. By default a free one.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = units::whole(0..=u16::MAX))]
     port: u16,
-    /// The address to listen at. Others than this machine's own let anyone who reaches them ask for the page, and what is sent is not
-    /// encrypted: a tunnel by ssh is better.
+    /// The address to listen at. Any other address than 127.0.0.1 exposes the page, unencrypted, to the network: prefer an ssh tunnel.
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     host: IpAddr,
-    /// Another name under which browsers reach it, as localhost:9000 for a tunnel that begins at another port.
-    #[arg(long, value_name = "NAME:PORT")]
+    /// Another name under which browsers reach the page, such as localhost:9000 for a tunnel that begins at another port.
+    #[arg(long, value_name = "NAME:PORT", value_parser = name_and_port)]
     allow_host: Vec<String>,
-    /// Print N more addresses (1 without a number), each of which opens one more browser: it shows what the first one does, and edits nothing.
+    /// Print N more addresses (1 without a number), each for one more browser, which shows what the first one does but cannot edit.
     #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "1", require_equals = true,
-          value_parser = clap::value_parser!(u8).range(1..=32))]
+          value_parser = units::whole(1_u8..=32))]
     share: Option<u8>,
     /// Only print the address.
     #[arg(long)]
     no_open: bool,
-    /// Write a page of the finished picture into this folder instead: with its channels, the values of its pixels and the facts of the
-    /// scene. It opens from a file, and can be sent or put on a web server.
+    /// Write a page of the finished picture into this folder instead, with its channels, pixel values and facts of the scene. The page
+    /// opens from a file, and can be sent or put on a web server.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["port", "host", "allow_host", "no_open", "share"])]
     export: Option<PathBuf>,
-    /// Samples per pixel. By default as many as the scene says, else 64; 16 for a model whose noise is taken out.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    /// Samples per pixel. By default as many as the scene says, else 64; 16 for a model that is denoised.
+    #[arg(long, value_name = "N", value_parser = units::whole(1..=u32::MAX))]
     spp: Option<u32>,
     /// Stop sampling a pixel when its noise is below this share of its luminance, such as 0.02, as render does. The page can change it.
     #[arg(long, value_name = "R", value_parser = noise)]
     noise: Option<f64>,
-    /// With --noise, the samples that every pixel has before its noise may end it.
-    #[arg(long, value_name = "N", requires = "noise", value_parser = clap::value_parser!(u32).range(1..))]
+    /// With --noise: at least this many samples per pixel.
+    #[arg(long, value_name = "N", requires = "noise", value_parser = units::whole(1..=u32::MAX))]
     min_spp: Option<u32>,
     /// Width and height in pixels.
     #[arg(long, value_name = "WxH", value_parser = units::size)]
     size: Option<(u32, u32)>,
-    /// A camera by name or 0-based position.
+    /// A camera of the scene, by its name or its index from 0.
     #[arg(long, value_name = "NAME|INDEX", help_heading = "View")]
     camera: Option<String>,
     /// Exposure in stops. The page can change it.
@@ -90,14 +90,23 @@ pub(crate) struct Arguments {
     reading: ReadingArguments,
 }
 
+/// The name and the port of a host, as browsers send them.
+fn name_and_port(text: &str) -> Result<String, String> {
+    let parts = text.rsplit_once(':').filter(|(name, port)| {
+        let is_whole = !name.contains(':') || (name.starts_with('[') && name.ends_with(']'));
+        !name.is_empty() && is_whole && port.parse::<u16>().is_ok_and(|port| port > 0)
+    });
+    parts.map(|_| text.to_owned()).ok_or_else(|| "expected NAME:PORT, such as localhost:9000".to_owned())
+}
+
 /// Runs the command.
 pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
     if arguments.staging.turntable().is_some() {
-        let why = "--turntable makes many pictures (expected lumbre render, or no --turntable)";
+        let why = "--turntable makes many pictures (expected lumbre render)";
         return Err(Failure::Usage(why.to_owned()));
     }
     if arguments.host.is_unspecified() && arguments.allow_host.is_empty() {
-        let why = "is no address that a browser can open (expected one of this machine's, or --allow-host NAME:PORT too)";
+        let why = "is not an address that a browser can open (expected one of this machine's, or --allow-host NAME:PORT too)";
         return Err(Failure::Usage(format!("--host {} {why}", arguments.host)));
     }
     // What is no scene is said here; what an edit mends is shown in the page.
@@ -112,6 +121,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         }
         signals.enter(Phase::Rendering);
         let files = Files::new(arguments);
+        if folder.exists() && !folder.is_dir() {
+            return Err(Failure::Usage(format!("{} is a file (expected a folder)", folder.display())));
+        }
         export(&files, &folder, &cancel).map_err(Failure::from)?;
         say!("{}: open it in a browser", folder.join("index.html").display());
         return signals.received().map_or(Ok(()), |status| Err(Failure::Interrupted(status)));
@@ -140,7 +152,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
     let lines: String = std::iter::once(url.clone()).chain(watchers).map(|url| url + "\n").collect();
     print(&lines)?;
     if options.watchers > 0 {
-        say!("the first address is yours; each of the others lets one browser look on, which edits nothing");
+        say!("the first address is yours; each of the others is for one browser that only watches");
     }
     if opens && !open(&url) {
         say!("open this address in a browser; Ctrl-C ends the viewer");
@@ -312,7 +324,7 @@ impl Files {
         reading.memory().check_picture(&options, held)?;
         if scene.is_dark() && is_of_light {
             warnings
-                .push(format!("warning: {}: the scene has no light, its picture is black", name.display()));
+                .push(format!("warning: {}: the scene has no light: its picture is black", name.display()));
         }
         let mut save = SaveOptions::default();
         save.exposure = match self.arguments.exposure {
@@ -328,5 +340,20 @@ impl Files {
             Backdrop::Lights | Backdrop::Nothing => None,
         };
         Ok(Built { scene, options, save, background, denoise: defaults.denoises(), warnings, explain })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::name_and_port;
+
+    #[test]
+    fn other_hosts_have_a_name_and_a_port() {
+        for text in ["localhost:9000", "[::1]:80", "far.example.org:65535"] {
+            assert_eq!(name_and_port(text), Ok(text.to_owned()));
+        }
+        for text in ["", "far", "far:", "far:0", ":80", "far:65536", "far:x", "a:b:80"] {
+            assert!(name_and_port(text).is_err(), "{text}");
+        }
     }
 }

@@ -75,13 +75,13 @@ fn cases() -> Vec<Case> {
             "texture.pbrt",
             "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"no.png\"\n\
              Material \"diffuse\" \"texture reflectance\" \"t\"\nShape \"sphere\"\n",
-            ":7:35: cannot open \"no.png\"",
+            ":7:35: no.png: cannot open",
             3,
         ),
         after_head(
             "include.pbrt",
             "Include \"/dev/zero\"\n",
-            ":7:9: cannot read \"/dev/zero\": it is not a regular file",
+            ":7:9: /dev/zero: cannot read: it is not a regular file",
             3,
         ),
         after_head("cycle.pbrt", "Include \"cycle.pbrt\"\n", ":7:9: a file includes itself", 3),

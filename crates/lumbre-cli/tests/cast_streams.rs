@@ -167,7 +167,7 @@ fn what_is_wrong_late_is_said_and_leaves_what_was_there() {
     let long = [&npy[..], b"more"].concat();
     let (cut_at, long_at) = (cut.len(), npy.len());
     let cases = [
-        (bad_number.into_bytes(), "9003:9: expected a number, found \"five\"".to_owned()),
+        (bad_number.into_bytes(), "9003:9: invalid value (found \"five\"; expected a number)".to_owned()),
         (short.into_bytes(), "9003:6: 3 values (expected 8)".to_owned()),
         (
             [csv.as_bytes(), b"1,2,\xFF\n"].concat(),

@@ -132,6 +132,6 @@ fn pictures_of_features_are_not_filtered() {
     desk.write("sphere.pbrt", SPHERE);
     let out = desk.lumbre(&["sphere.pbrt", "--integrator", "normals", "--denoise", "own", "-o", "out.png"]);
     assert_eq!(code(&out), 2, "{}", stderr(&out));
-    assert!(stderr(&out).contains("--denoise is for pictures of light"), "{}", stderr(&out));
+    assert!(stderr(&out).contains("--denoise cannot be used with --integrator normals"), "{}", stderr(&out));
     assert!(!desk.path("out.png").exists());
 }

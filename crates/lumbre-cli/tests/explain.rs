@@ -537,7 +537,7 @@ fn the_matrices_of_the_camera_lead_back_to_the_pixel() {
             + (u[2] * v[0] - u[0] * v[2]) * w[1]
             + (u[0] * v[1] - u[1] * v[0]) * w[2];
         let said = all_texts(camera);
-        let expected = if turn > 0.0 { "has the same hand" } else { "has the other hand" };
+        let expected = if turn > 0.0 { "has the same hand" } else { "camera space is left-handed" };
         assert!(said.iter().any(|text| text.contains(expected)), "{hand}: {said:?}");
     }
 }

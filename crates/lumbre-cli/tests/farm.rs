@@ -47,7 +47,10 @@ fn an_array_of_tasks_and_its_merge_make_the_file_of_one_run() {
     let farm =
         "farm slurm scene.pbrt --tasks 4 --submit --sbatch=--partition=render -- --max-depth 3 --threads 1";
     let (status, said) = with_sbatch(&folder, farm);
-    assert!(status == 0 && said.contains("4 tasks submitted; scene.exr comes when all are done"), "{said}");
+    assert!(
+        status == 0 && said.contains("4 tasks submitted; scene.exr is written when all are done"),
+        "{said}"
+    );
     assert_eq!(bytes(&folder, "scene.exr"), bytes(&folder, "whole.exr"));
     let log = fs::read_to_string(folder.path("sbatch.log")).unwrap();
     assert!(log.contains("--dependency=afterok:17 scene.farm/merge.sh"), "{log}");
@@ -83,8 +86,18 @@ fn a_task_that_is_killed_and_runs_again_changes_nothing() {
 #[test]
 fn what_cannot_be_shared_out_is_refused() {
     let folder = folder();
-    refused(&folder, "farm slurm scene.pbrt --tasks 10", 2, "found 10 for 9 samples; expected 9 or fewer");
-    refused(&folder, "farm slurm a.glb --tasks 3 --frames 0..1 -o f.#.png", 2, "found 3 for 2 frames");
+    refused(
+        &folder,
+        "farm slurm scene.pbrt --tasks 10",
+        2,
+        "--tasks 10 is more than the 9 samples per pixel (expected 9 or fewer)",
+    );
+    refused(
+        &folder,
+        "farm slurm a.glb --tasks 3 --frames 0..1 -o f.#.png",
+        2,
+        "--tasks 3 is more than the 2 frames (expected 2 or fewer)",
+    );
     refused(
         &folder,
         "farm slurm scene.pbrt --tasks 2 --frames 0..1 -o f.#.png",
@@ -209,7 +222,7 @@ fn only_scripts_and_pictures_of_lumbre_are_replaced() {
             &folder,
             "farm slurm scene.pbrt --tasks 2",
             2,
-            &format!("scene.farm/{name}: lumbre farm did not write"),
+            &format!("scene.farm/{name}: not written by lumbre farm"),
         );
         assert_eq!(bytes(&folder, &format!("scene.farm/{name}")), b"#!/bin/sh\necho mine\n");
         assert_eq!(fs::read_dir(folder.path("scene.farm")).unwrap().count(), 1);
@@ -217,17 +230,12 @@ fn only_scripts_and_pictures_of_lumbre_are_replaced() {
     }
     // A link is not followed to what is not there.
     std::os::unix::fs::symlink(folder.path("elsewhere"), folder.path("scene.farm/merge.sh")).unwrap();
-    refused(&folder, "farm slurm scene.pbrt --tasks 2", 2, "lumbre farm did not write");
+    refused(&folder, "farm slurm scene.pbrt --tasks 2", 2, "not written by lumbre farm");
     fs::remove_file(folder.path("scene.farm/merge.sh")).unwrap();
     done(&folder, "farm slurm scene.pbrt --tasks 2");
     done(&folder, "farm slurm scene.pbrt --tasks 3");
     folder.write("scene.exr", "mine");
-    refused(
-        &folder,
-        "farm slurm scene.pbrt --tasks 2",
-        2,
-        "scene.exr is there, and not known to be Lumbre's",
-    );
+    refused(&folder, "farm slurm scene.pbrt --tasks 2", 2, "scene.exr exists and was not written by Lumbre");
     done(&folder, "farm slurm scene.pbrt --tasks 2 -o other.exr");
 }
 
@@ -251,6 +259,6 @@ fn logs_are_in_no_folder_whose_name_slurm_would_read_otherwise() {
         &folder,
         r"farm slurm scene.pbrt --tasks 2 --folder a\b",
         2,
-        "expected --folder with one without backslashes",
+        "expected --folder without backslashes",
     );
 }

@@ -148,7 +148,7 @@ fn a_full_disk_leaves_the_old_picture_and_keeps_the_pixels_elsewhere() {
     assert!(status == 4 && said.contains("full/a.pfm") && said.contains("No space left"), "{status} {said}");
     assert_eq!(bytes(&folder, "full/a.pfm"), old);
     assert_eq!(fs::read_dir(folder.path("full")).unwrap().count(), 1, "nothing else is left there");
-    if said.contains("is kept in") {
+    if said.contains("are saved in") {
         done(&folder, "merge a.pfm.rescued.0.part -o b.pfm");
         done(&folder, "render scene.pbrt --size 64x48 --spp 2 -q -o c.pfm");
         assert_eq!(bytes(&folder, "b.pfm"), bytes(&folder, "c.pfm"));

@@ -170,7 +170,7 @@ fn a_picture_goes_to_standard_output_as_the_file_would_be() {
     }
     let png = with_input(&desk, &["-", "-o", "-", "--spp", "1"], SPHERE.as_bytes());
     assert!(png.stdout.starts_with(b"\x89PNG"), "{}", stderr(&png));
-    assert!(stderr(&png).contains("standard output: 48x32, 1 sample a pixel"), "{}", stderr(&png));
+    assert!(stderr(&png).contains("standard output: 48x32, 1 sample per pixel"), "{}", stderr(&png));
     assert!(!desk.path("-").exists());
     let layers = desk.lumbre(&["scene.pbrt", "-o", "-", "--output-format", "exr", "--aov", "albedo", "-q"]);
     assert!(layers.stdout.windows(8).any(|w| w == b"albedo.R"), "{}", stderr(&layers));
@@ -273,7 +273,7 @@ fn colours_are_the_same_for_all_messages() {
 fn wrong_words_are_answered_with_the_right_ones() {
     let desk = Desk::new();
     for (arguments, expected) in [
-        (&["render", "a.obj", "--samples", "4"][..], "how many a pixel has is --spp"),
+        (&["render", "a.obj", "--samples", "4"][..], "the number of samples per pixel is --spp"),
         (&["render", "a.obj", "--pixel-samples", "4"], "'--spp'"),
         (&["render", "a.obj", "--output-file", "x"], "'--output'"),
         (&["render", "a.obj", "--resolution", "4"], "'--size'"),
@@ -285,12 +285,66 @@ fn wrong_words_are_answered_with_the_right_ones() {
         (&["cast", "a.obj", "--input", "r.csv"], "'--rays'"),
         (&["diff", "a", "b", "--metric", "rsme"], "'rmse'"),
         (&["compare", "a", "b"], "'diff'"),
+        (&["show", "a.obj"], "'view'"),
+        (&["view", "a.obj", "--gui"], "lumbre view SCENE"),
+        (&["a.obj", "--pixel", "3,4"], "lumbre explain SCENE --pixel X,Y"),
+        (&["a.obj", "--display-server", "x:1"], "'--tev'"),
+        (&["view", "a.obj", "--allow-host", "far"], "expected NAME:PORT, such as localhost:9000"),
+        (&["a.obj", "--spp", "zero"], "expected a whole number from 1 to 4294967295"),
+        (&["a.obj", "--spp", "0"], "expected a whole number from 1 to 4294967295"),
+        (&["a.obj", "--threads", "-"], "expected a whole number from 1 to 1024"),
+        (&["diff", "a", "b", "-o", "heat.gif"], "heat.gif: unknown image format"),
     ] {
         let out = desk.lumbre(arguments);
         assert_eq!(code(&out), 2, "{arguments:?}: {}", stderr(&out));
         assert!(stderr(&out).contains(expected), "{arguments:?}: {}", stderr(&out));
         assert!(!stderr(&out).contains("--frames"), "{arguments:?}: {}", stderr(&out));
     }
+}
+
+#[test]
+fn options_of_other_formats_are_named() {
+    let desk = Desk::new();
+    desk.write("p.stl", PYRAMID);
+    for (option, value, of) in [
+        ("--variant", "x", "a glTF file"),
+        ("--frame", "1", "a glTF file"),
+        ("--pov-clock", "1", "a POV-Ray scene"),
+    ] {
+        let expected = format!("warning: {option} has no effect: p.stl is not {of}");
+        let out = desk.lumbre(&["info", "p.stl", option, value]);
+        assert_eq!((code(&out), stderr(&out).contains(&expected)), (0, true), "{}", stderr(&out));
+        let out = desk.lumbre(&["info", "p.stl", option, value, "--strict"]);
+        assert_eq!((code(&out), stderr(&out).contains("has no effect")), (3, true), "{}", stderr(&out));
+    }
+    // Commands that show one picture do not offer many.
+    for (command, is_offered) in [("render", true), ("view", false), ("explain", false)] {
+        let out = desk.lumbre(&[command, "--help"]);
+        assert_eq!(stdout(&out).contains("--turntable"), is_offered, "{command}");
+    }
+}
+
+#[test]
+fn a_crop_outside_the_picture_is_named_with_its_size() {
+    let desk = Desk::new();
+    desk.write("p.stl", PYRAMID);
+    let out = desk.lumbre(&["p.stl", "--size", "32x24", "--crop", "90,90,95,95"]);
+    let expected = "error: --crop 90,90,95,95 is outside the picture (32x24)";
+    assert_eq!((code(&out), stderr(&out).contains(expected)), (2, true), "{}", stderr(&out));
+}
+
+#[test]
+fn a_list_without_answers_prints_no_header() {
+    let desk = Desk::new();
+    desk.write("p.stl", PYRAMID);
+    desk.write("r.csv", "ox,oy,oz,dx,dy,dz\n1,2,x,0,0,1\n");
+    let out = desk.lumbre(&["cast", "p.stl", "--rays", "r.csv"]);
+    assert_eq!((code(&out), stdout(&out)), (3, String::new()));
+    let expected = "error: r.csv:2:5: invalid value (found \"x\"; expected a number)";
+    assert!(stderr(&out).contains(expected), "{}", stderr(&out));
+    desk.write("none.csv", "ox,oy,oz,dx,dy,dz\n");
+    let out = desk.lumbre(&["cast", "p.stl", "--rays", "none.csv"]);
+    assert_eq!((code(&out), stdout(&out).lines().count()), (0, 1), "{}", stderr(&out));
 }
 
 #[test]
@@ -329,7 +383,7 @@ fn a_view_is_chosen_by_angles_or_by_places() {
         (&["--up", "w"], "-x, -y, -z"),
         (&["--fov", "180"], "degrees from"),
         (&["--zoom", "0"], "a factor"),
-        (&["--eye", "1,2,3", "--target", "1,2,3"], "one point"),
+        (&["--eye", "1,2,3", "--target", "1,2,3"], "the same point"),
         (&["--camera", "0", "--azimuth", "3"], "cannot be used with"),
     ] {
         let out = desk.lumbre(&[&["render", "p.stl"], more].concat());
@@ -558,7 +612,7 @@ fn a_picture_in_which_next_to_nothing_is_lit_comes_with_a_hint() {
         let out = desk.lumbre(&[&["render", "room.pbrt", "-o", "a.png"], more].concat());
         assert_eq!(code(&out), 0, "{name}: {}", stderr(&out));
         let said = stderr(&out);
-        let words = ["hint: ", "--env", "--exposure", "--fit", "a camera inside"];
+        let words = ["hint: ", "--env", "--exposure", "--fit", "--eye and --target"];
         assert_eq!(words.map(|word| said.contains(word)), [is_hinted; 5], "{name}: {said}");
     }
 }
@@ -604,7 +658,7 @@ fn a_model_that_plainly_stands_on_a_plane_of_z_has_z_up_unless_told() {
         let out =
             desk.lumbre(&[&["pole.obj", "-o", picture, "--size", "24x24", "--spp", "1"], more].concat());
         assert_eq!(code(&out), 0, "{}", stderr(&out));
-        stderr(&out).contains("z is taken for up")
+        stderr(&out).contains("z is up")
     };
     assert!(render(&[], "guessed.pfm"));
     assert!(!render(&["--up", "z"], "z.pfm") && !render(&["--up", "y"], "y.pfm"));

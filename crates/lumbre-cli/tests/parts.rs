@@ -140,9 +140,9 @@ fn parts_of_several_frames_are_merged_at_once() {
         3,
         "g.1.exr: 600 samples missing: samples 1..3",
     );
-    refused(&folder, "merge a.0.part b.1.part -o g.exr", 3, "they differ in");
+    refused(&folder, "merge a.0.part b.1.part -o g.exr", 3, "of another render than a.0.part: ");
     done(&folder, "render slide.gltf --size 20x15 --samples 0..1 -q -o one.part");
-    refused(&folder, "merge one.part -o g.#.exr", 3, "one.part: it is not of a frame");
+    refused(&folder, "merge one.part -o g.#.exr", 3, "one.part: not a part of a frame");
 }
 
 #[test]
@@ -156,7 +156,7 @@ fn what_is_missing_doubled_foreign_or_damaged_is_refused_by_name() {
         &folder,
         "merge a.part b.part -o x.exr",
         3,
-        "b.part: it has samples 2..3 of pixels 0,0,33,21 as a.part has",
+        "b.part: overlaps a.part: both have samples 2..3 of pixels 0,0,33,21; leave one out",
     );
     refused(
         &folder,
@@ -169,24 +169,24 @@ fn what_is_missing_doubled_foreign_or_damaged_is_refused_by_name() {
         &folder,
         "merge a.part seed.part -o x.exr",
         3,
-        "another render than a.part: they differ in seed: 0, 4",
+        "of another render than a.part: seed 0 there, 4 here",
     );
-    refused(&folder, "merge a.part scene.pbrt -o x.exr", 3, "scene.pbrt: it is no part of a render");
-    refused(&folder, "merge a.part nothing.part -o x.exr", 4, "nothing.part: cannot read");
+    refused(&folder, "merge a.part scene.pbrt -o x.exr", 3, "scene.pbrt: not a part of a render");
+    refused(&folder, "merge a.part nothing.part -o x.exr", 4, "nothing.part: cannot open");
     fs::create_dir(folder.path("parts")).unwrap();
-    refused(&folder, "merge parts -o x.exr", 4, "parts: cannot read: it is a folder");
-    refused(&folder, "merge a.part b.part -o a.part", 2, "a.part: it is an input");
+    refused(&folder, "merge parts -o x.exr", 4, "parts: cannot open: it is a folder");
+    refused(&folder, "merge a.part b.part -o a.part", 2, "a.part: this is an input");
     refused(
         &folder,
         "render scene.pbrt -o a.png --samples 0..3",
         2,
         "expected a name that ends in .exr or .part",
     );
-    refused(&folder, "render scene.pbrt -o a.part", 2, "expected --samples, too");
+    refused(&folder, "render scene.pbrt -o a.part", 2, "a .part needs --samples A..B");
     let piped = fs::File::open(folder.path("scene.pbrt")).unwrap();
     let mut command = folder.command(&["render", "-", "-o", "a.part", "--samples", "0..3"]);
     let (status, said) = answer(command.stdin(piped).output().unwrap());
-    assert!(status == 2 && said.contains("of a scene that can be read again"), "{said}");
+    assert!(status == 2 && said.contains("needs a scene that can be read again"), "{said}");
     refused(&folder, "render scene.pbrt -o a.part --samples 3..3", 2, "the one after the last");
     refused(&folder, "render scene.pbrt -o a.part --samples 0..3 --noise 0.1", 2, "cannot be used with");
     let part = bytes(&folder, "a.part");
@@ -194,7 +194,7 @@ fn what_is_missing_doubled_foreign_or_damaged_is_refused_by_name() {
         let mut damaged = part.clone();
         damaged[place] ^= 4;
         fs::write(folder.path("damaged.part"), damaged).unwrap();
-        let why = if place == 0 { "no part of a render" } else { "checksum" };
+        let why = if place == 0 { "not a part of a render" } else { "checksum" };
         refused(&folder, "merge damaged.part c.part -o x.exr", 3, why);
     }
     fs::write(folder.path("damaged.part"), &part[..part.len() / 2]).unwrap();
@@ -203,7 +203,12 @@ fn what_is_missing_doubled_foreign_or_damaged_is_refused_by_name() {
     // An asset that has changed makes it another render.
     wood(&folder, [0.8, 0.5, 0.3]);
     done(&folder, "render scene.pbrt -o d.part --samples 3..5");
-    refused(&folder, "merge a.part d.part -o x.exr", 3, "they differ in file wood.png: changed");
+    refused(
+        &folder,
+        "merge a.part d.part -o x.exr",
+        3,
+        "of another render than a.part: file wood.png changed",
+    );
     let (_, about) = answer(folder.command(&["info", "d.part"]).output().unwrap());
     let about = if about.is_empty() {
         String::from_utf8(folder.command(&["info", "d.part"]).output().unwrap().stdout).unwrap()
@@ -221,8 +226,8 @@ fn parts_that_are_shown_in_two_ways_are_merged_in_the_one_that_is_asked_for() {
     let asked = "--exposure 1.5 --tonemap agx";
     done(&folder, &format!("render scene.pbrt -q -o whole.png --spp 4 {asked}"));
     for parts in ["a.part b.part", "b.part a.part"] {
-        refused(&folder, &format!("merge {parts} -o x.png"), 2, "expected --exposure EV");
-        refused(&folder, &format!("merge {parts} -o x.part"), 2, "expected --tonemap NAME");
+        refused(&folder, &format!("merge {parts} -o x.png"), 2, "--exposure EV sets one for all");
+        refused(&folder, &format!("merge {parts} -o x.part"), 2, "--tonemap NAME sets one for all");
         refused(&folder, &format!("merge {parts} -o x.png --exposure 1.5"), 2, "tone map");
         done(&folder, &format!("merge {parts} -o x.png {asked}"));
         assert_eq!(bytes(&folder, "x.png"), bytes(&folder, "whole.png"), "{parts}");
@@ -300,11 +305,12 @@ fn what_a_part_says_of_itself_is_told_in_words_and_drives_no_terminal() {
     for debug in ["Some(", "None", " {", "Path", "DVec3", "_"] {
         assert!(!about.contains(debug), "{debug}: {about}");
     }
-    assert!(about.contains("integrator: kind path regularize false, max depth 5"), "{about}");
-    assert!(about.contains("eye dvec3 1.0, -6.0, 2.5"), "{about}");
+    assert!(about.contains("integrator path\n") && about.contains("files      scene.pbrt"), "{about}");
+    let all = told(&["info", "a.part", "--json"]);
+    assert!(all.contains("eye dvec3 1.0, -6.0, 2.5"), "{all}");
     part.job
         .identity
-        .insert("a\x1b[2J\n  taken 7 of 7".to_owned(), "\x1b]0;x\x07\u{9b}31m\u{202e}\n  b".to_owned());
+        .insert("file a\x1b[2J\n  taken 7 of 7".to_owned(), "\x1b]0;x\x07\u{9b}31m\u{202e}\n  b".to_owned());
     part.save(&folder.path("a.part")).unwrap();
     for arguments in [&["info", "a.part"][..], &["info", "a.part", "--json"]] {
         let about = told(arguments);
@@ -326,13 +332,13 @@ fn a_finished_picture_takes_more_samples() {
         &folder,
         "render scene.pbrt -o plain.exr --spp 9 --resume",
         2,
-        "expected one that was saved with --keep-sums",
+        "or a picture saved with --keep-sums",
     );
     refused(
         &folder,
         "render scene.pbrt -o few.exr --spp 9 --resume --max-depth 2",
         2,
-        "they differ in integrator",
+        "of another render than this one: integrator max depth 5 there, max depth 2 here",
     );
     done(&folder, "render scene.pbrt -o new.exr --spp 9 --resume --checkpoint new.ck --keep-sums");
     assert_eq!(bytes(&folder, "new.exr"), bytes(&folder, "whole.exr"));
@@ -399,7 +405,7 @@ mod interrupted {
             &folder,
             &format!("{} -o a.exr --checkpoint ck --resume", RENDER.replace("4000", "1")),
             2,
-            "more than are asked for",
+            "per pixel already",
         );
         let enough = RENDER.replace("4000", &(most + 1).to_string());
         done(&folder, &format!("{enough} -o a.exr --checkpoint ck --resume"));
@@ -419,7 +425,7 @@ mod interrupted {
         signal(child.id(), "INT");
         let (status, said) = answer(child.wait_with_output().unwrap());
         assert!(
-            status == 4 && said.contains("what was rendered is kept in ./a.exr.rescued.0.part"),
+            status == 4 && said.contains("the samples are saved in ./a.exr.rescued.0.part"),
             "{status} {said}"
         );
         let part = lumbre::Part::open(&folder.path("a.exr.rescued.0.part"), |_| u64::MAX).unwrap();
@@ -440,10 +446,7 @@ mod interrupted {
         }
         signal(child.id(), "INT");
         let (status, said) = answer(child.wait_with_output().unwrap());
-        assert!(
-            status == 130 && said.contains("warning: the checkpoint cannot be written"),
-            "{status} {said}"
-        );
+        assert!(status == 130 && said.contains("warning: cannot write the checkpoint"), "{status} {said}");
         assert!(folder.path("a.exr").exists(), "{said}");
     }
 
@@ -458,7 +461,7 @@ mod interrupted {
             ("render pipe.pbrt -o a.png", "it is not a regular file"),
             (
                 "render names.pbrt -o a.png",
-                "names.pbrt:1:28: cannot read \"pipe.ply\": it is not a regular file",
+                "names.pbrt:1:28: pipe.ply: cannot read: it is not a regular file",
             ),
             ("info pipe.pbrt", "it is not a regular file"),
             ("merge pipe.part -o a.png", "it is not a regular file"),
@@ -469,13 +472,16 @@ mod interrupted {
             ("render /proc/self/environ --input-format pbrt -o a.png", "of the system's own"),
             (
                 "render scene.pbrt -o a.png --checkpoint pipe.part",
-                "it is not a regular file, as a checkpoint is",
+                "not a regular file (expected one for a checkpoint)",
             ),
             (
                 "render scene.pbrt -o a.png --checkpoint /dev/null --resume",
-                "it is not a regular file, as a checkpoint is",
+                "not a regular file (expected one for a checkpoint)",
             ),
-            ("render scene.pbrt -o a.png --checkpoint .", "it is not a regular file, as a checkpoint is"),
+            (
+                "render scene.pbrt -o a.png --checkpoint .",
+                "not a regular file (expected one for a checkpoint)",
+            ),
             ("render scene.pbrt -o a.png --stats pipe.ply", "nobody reads from this pipe"),
         ] {
             // What a scene names is an error of the scene.
@@ -521,7 +527,7 @@ mod interrupted {
             &folder,
             &format!("{RENDER} -o b.exr --checkpoint ck"),
             2,
-            "of an unfinished render (--resume goes on from it",
+            "of an unfinished render (--resume continues from it",
         );
     }
 }
@@ -533,8 +539,7 @@ fn merge_opens_no_image_that_only_a_part_names() {
         done(&folder, &format!("render scene.pbrt -q -o {name} --samples {samples} --background wood.png"));
     }
     let merge = "merge a.part b.part -o joined.png";
-    refused(&folder, merge, 2, "stands before the image wood.png, which is not opened unasked");
-    refused(&folder, merge, 2, "expected --background with its name");
+    refused(&folder, merge, 2, "the parts use the background image wood.png: give it with --background");
     assert!(!folder.path("joined.png").exists());
     done(&folder, &format!("{merge} --background wood.png"));
     done(&folder, "render scene.pbrt -q -o whole.png --spp 3 --background wood.png");
@@ -546,9 +551,19 @@ fn merge_opens_no_image_that_only_a_part_names() {
     let mut part = lumbre::Part::open(&folder.path("a.part"), |_| u64::MAX).unwrap();
     part.job.shown.insert("background".to_owned(), "file /dev/zero".to_owned());
     part.save(&folder.path("foreign.part")).unwrap();
-    refused(&folder, "merge foreign.part -o x.png", 2, "the image /dev/zero, which is not opened unasked");
+    refused(
+        &folder,
+        "merge foreign.part -o x.png",
+        2,
+        "the background image /dev/zero: give it with --background",
+    );
     done(&folder, "render scene.pbrt -q -o plain.part --samples 0..1 --background #fa0");
-    refused(&folder, "merge plain.part -o x.png --background wood.png", 2, "stands before no image");
+    refused(
+        &folder,
+        "merge plain.part -o x.png --background wood.png",
+        2,
+        "the parts have no background image",
+    );
 }
 
 #[test]
@@ -556,12 +571,12 @@ fn pictures_of_a_series_that_are_done_are_not_rendered_again() {
     let folder = folder();
     let series = "render scene.pbrt --turntable 3 -o f.#.png --spp 2 --progress none --resume";
     let (status, said) = run(&folder, series);
-    assert!(status == 0 && !said.contains("is done"), "{said}");
+    assert!(status == 0 && !said.contains("already rendered"), "{said}");
     let before = bytes(&folder, "f.2.png");
     fs::remove_file(folder.path("f.2.png")).unwrap();
     let (status, said) = run(&folder, series);
-    assert_eq!((status, said.matches(" is done").count()), (0, 2), "{said}");
-    assert!(said.contains("f.1.png is done") && said.contains("f.3.png is done"), "{said}");
+    assert_eq!((status, said.matches(": already rendered").count()), (0, 2), "{said}");
+    assert!(said.contains("f.1.png: already") && said.contains("f.3.png: already"), "{said}");
     assert_eq!(bytes(&folder, "f.2.png"), before);
     // Others are not taken for them: more samples, another seed, and what is of no render.
     for (more, count) in [("--spp 3", 0), ("--seed 5", 0), ("", 2)] {
@@ -573,7 +588,7 @@ fn pictures_of_a_series_that_are_done_are_not_rendered_again() {
                 series.replace("--spp 2", if more.contains("spp") { "" } else { "--spp 2" })
             ),
         );
-        assert_eq!((status, said.matches(" is done").count()), (0, count), "{more}: {said}");
+        assert_eq!((status, said.matches(": already rendered").count()), (0, count), "{more}: {said}");
         done(&folder, &format!("{series} -q"));
     }
 }

@@ -212,7 +212,7 @@ mod windows {
         let before = fs::read(folder.path("images\\skin.png")).unwrap();
         for output in ["images\\skin.png", "IMAGES/Skin.PNG", "hard.png", ".\\images\\..\\hard.png"] {
             let (code, said) = folder.lumbre(&["render", "a.pbrt", "-o", output]);
-            assert_eq!((code, said.contains("it is an input")), (2, true), "{output}: {said}");
+            assert_eq!((code, said.contains("this is an input")), (2, true), "{output}: {said}");
         }
         assert_eq!(fs::read(folder.path("images\\skin.png")).unwrap(), before);
         // Nor are two outputs one file by their case.

@@ -182,7 +182,7 @@ fn a_scene_file_without_light_is_black_and_that_is_said() {
     let out = desk.lumbre(&["render", "dark.pbrt", "-o", "dark.pfm", "--spp", "2", "--progress", "none"]);
     assert_eq!(code(&out), 0, "{}", stderr(&out));
     assert!(
-        stderr(&out).contains("warning: dark.pbrt: the scene has no light, its picture is black"),
+        stderr(&out).contains("warning: dark.pbrt: the scene has no light: its picture is black"),
         "{}",
         stderr(&out)
     );
@@ -718,7 +718,7 @@ fn frames_that_make_no_sense_are_refused() {
         (&["--shutter", "-1"], "unexpected argument"),
         (&["--shutter", "half"], "a share of a frame"),
         (&["--fps", "0"], "frames a second"),
-        (&["--shutter", "0.5"], "--shutter needs the time of a picture"),
+        (&["--shutter", "0.5"], "--shutter needs --frame or --frames"),
     ] {
         let mut whole = vec!["render", "missing.gltf"];
         whole.extend(arguments);
@@ -810,7 +810,12 @@ fn a_picture_of_nothing_is_said_to_be_one() {
     desk.write("n.gltf", r#"{"asset":{"version":"2.0"},"scenes":[{"name":"nothing"}]}"#);
     let out = desk.lumbre(&["render", "n.gltf", "-o", "n.png", "--spp", "1", "--size", "8x8"]);
     assert_eq!(code(&out), 0, "{}", stderr(&out));
-    assert!(stderr(&out).contains("warning: n.gltf: there is nothing to see"), "{}", stderr(&out));
+    assert!(
+        stderr(&out)
+            .contains("warning: n.gltf: the scene has no shapes: the picture shows only the background"),
+        "{}",
+        stderr(&out)
+    );
 }
 
 #[test]

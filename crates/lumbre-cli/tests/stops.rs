@@ -124,7 +124,7 @@ fn a_signal_ends_reading_and_waiting_for_pipes() {
     // A deadline ends it, too.
     let time = ["render", "room.pbrt", "-o", "out.png", "--time", "500ms", "--progress", "none"];
     let (code, said) = end_of(start(&folder, &time));
-    assert_eq!((code, said.contains("no one takes the picture")), (5, true), "{said}");
+    assert_eq!((code, said.contains("nobody reads the picture")), (5, true), "{said}");
     let mut command = folder.command(&["render", "-", "-o", "x.png", "--time", "200ms"]);
     let mut child = command.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     // To wait for a child closes what it has.
@@ -147,7 +147,7 @@ fn time_that_is_over_in_the_first_pass_leaves_a_coarse_whole_picture() {
         assert_eq!(code, 0, "{said}");
         assert!(said.contains("the picture has one for"), "{said}");
         assert!(
-            said.contains("a.png: 3000x2000, a coarse picture of ") && !said.contains("0 samples a pixel"),
+            said.contains("a.png: 3000x2000, a coarse picture of ") && !said.contains("0 samples per pixel"),
             "{said}"
         );
         let picture = lumbre::read_image(&folder.path("a.png")).unwrap();

@@ -54,7 +54,7 @@ fn a_noise_that_is_not_reached_is_said_with_the_option_that_goes_on() {
     };
     let (status, said, stats) = run("--noise 0.02 --spp 32");
     assert_eq!(status, 0, "{said}");
-    assert!(said.contains("the target of 0.02 was not met (more --spp goes on)"), "{said}");
+    assert!(said.contains("the target of 0.02 was not met (give more --spp)"), "{said}");
     assert_eq!(
         (&stats["noise_target"], &stats["noise_target_met"]),
         (&0.02.into(), &false.into()),
@@ -65,7 +65,7 @@ fn a_noise_that_is_not_reached_is_said_with_the_option_that_goes_on() {
         "{stats}"
     );
     let (_, said, _) = run("--noise 0.001 --time 3s");
-    assert!(said.contains("the target of 0.001 was not met (more --time goes on)"), "{said}");
+    assert!(said.contains("the target of 0.001 was not met (give more --time)"), "{said}");
     // Without an end by number or time it is reached, also by more samples than 1024.
     let (_, said, stats) = run("--noise 0.1");
     assert!(!said.contains("target") && stats["noise_target_met"] == true, "{said} {stats}");

@@ -108,7 +108,7 @@ fn a_viewer_that_cannot_be_says_why() {
         (&["view", "none.pbrt", "--export", "page"], 4, "none.pbrt"),
         (&["view", "scene.pbrt", "--turntable", "8"], 2, "--turntable makes many pictures"),
         (&["view", "scene.pbrt", "--port", "70000"], 2, "70000"),
-        (&["view", "scene.pbrt", "--host", "0.0.0.0"], 2, "is no address that a browser can open"),
+        (&["view", "scene.pbrt", "--host", "0.0.0.0"], 2, "is not an address that a browser can open"),
     ] {
         let out = desk.lumbre(words);
         assert_eq!(code(&out), status, "{words:?}: {}", stderr(&out));

@@ -163,7 +163,7 @@ impl Display for Severity {
 
 /// A problem of an input.
 ///
-/// Displayed as `error: FILE:LINE:COL: what (found X; expected Y)`, followed by a line for each file that
+/// Displayed as `error: FILE:LINE:COL: what: why (found X; expected Y)`, followed by a line for each file that
 /// included this one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
@@ -171,8 +171,10 @@ pub struct Diagnostic {
     pub severity: Severity,
     /// The place, if known.
     pub place: Option<Place>,
-    /// What is wrong.
+    /// What is wrong: the same for all diagnostics of one kind.
     pub message: String,
+    /// Why, where that differs from one to the next.
+    pub reason: Option<String>,
     /// What was found.
     pub found: Option<String>,
     /// What would have been accepted.
@@ -204,6 +206,7 @@ impl Diagnostic {
             severity,
             place: None,
             message,
+            reason: None,
             found: None,
             expected: None,
             suggestion: None,
@@ -215,6 +218,12 @@ impl Diagnostic {
     #[must_use]
     pub fn at(self, place: Place) -> Self {
         Self { place: Some(place), ..self }
+    }
+
+    /// Adds why.
+    #[must_use]
+    pub fn because(self, reason: impl Display) -> Self {
+        Self { reason: Some(reason.to_string()), ..self }
     }
 
     /// Adds what was found. Text from the input should have gone through [`quoted`].
@@ -249,6 +258,9 @@ impl Diagnostic {
             let _ = write!(text, "{place}: ");
         }
         text.push_str(&self.message);
+        if let Some(reason) = &self.reason {
+            let _ = write!(text, ": {reason}");
+        }
         let details: Vec<String> = [
             self.found.as_ref().map(|found| format!("found {found}")),
             self.expected.as_ref().map(|expected| format!("expected {expected}")),
@@ -577,6 +589,12 @@ pub fn is_printable(c: char) -> bool {
         && !matches!(c, '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}')
 }
 
+/// The words of a decoder, made safe for a message: one line without control characters, truncated after 120.
+pub fn in_one_line(text: &str) -> String {
+    let safe = text.chars().map(|c| if is_printable(c) { c } else { ' ' });
+    safe.take(120).collect()
+}
+
 /// A number from an input for a message; very large and very small ones in scientific notation.
 pub fn number(value: f64) -> String {
     let size = value.abs();
@@ -684,6 +702,9 @@ mod tests {
         let b = Diagnostic::error("not finite").at(Place::binary("m.ply", 812, "/vertex/3/x")).found("NaN");
         assert_eq!(b.to_string(), "error: m.ply:byte 812 /vertex/3/x: not finite (found NaN)");
         assert_eq!(Diagnostic::error("nothing to render").to_string(), "error: nothing to render");
+        let r =
+            Diagnostic::warning("image is left out").because("a.png: cannot open: gone").found("\"a.png\"");
+        assert_eq!(r.to_string(), "warning: image is left out: a.png: cannot open: gone (found \"a.png\")");
     }
 
     #[test]

@@ -102,10 +102,15 @@ fn binary(
     };
     let held = (bytes.len() - 84) / 50;
     if !size_is_right {
-        let wrong = Diagnostic::error("count of facets does not fit the size of the STL file")
-            .at(place(80, "/count".into()));
-        let wrong = wrong.found(format!("{count} facets in {} bytes", bytes.len()));
-        let wrong = wrong.expected(format!("{} bytes, or {held} facets", 84 + 50 * u64::from(count)));
+        let wrong = if held < count as usize {
+            Diagnostic::error("file is truncated")
+                .because(format!("{count} facets announced, {held} present"))
+        } else {
+            Diagnostic::error("count of facets does not fit the size of the STL file")
+                .found(format!("{count} facets in {} bytes", bytes.len()))
+                .expected(format!("{} bytes, or {held} facets", 84 + 50 * u64::from(count)))
+        };
+        let wrong = wrong.at(place(80, "/count".into()));
         // A partial facet at the end is ignored: editors append a line break.
         if held != count as usize && !diagnostics.is_lenient() {
             return Err(wrong.into());
@@ -173,7 +178,7 @@ fn not_finite(
 ) -> Result<(), FormatError> {
     if diagnostics.is_lenient() {
         diagnostics
-            .warn("facet with a vertex that is not finite, dropped", |said| said.at(place()).found(facet));
+            .warn("facet with a vertex that is not finite is left out", |said| said.at(place()).found(facet));
         return Ok(());
     }
     let wrong = Diagnostic::error(format!("{facet} has a vertex that is not finite")).at(place());
@@ -287,7 +292,7 @@ impl<'a> Text<'a> {
     fn expect(&mut self, words: &[&str]) -> Result<usize, FormatError> {
         let expected = words.join(" or ");
         let Some((at, word)) = self.word() else {
-            let wrong = Diagnostic::error("file ends early").at(self.place(self.bytes.len()));
+            let wrong = Diagnostic::error("file is truncated").at(self.place(self.bytes.len()));
             return Err(wrong.expected(expected).into());
         };
         words.iter().position(|w| word.eq_ignore_ascii_case(w.as_bytes())).ok_or_else(|| {
@@ -301,7 +306,7 @@ impl<'a> Text<'a> {
         let mut first = self.at;
         for (i, number) in numbers.iter_mut().enumerate() {
             let Some((at, word)) = self.word() else {
-                let wrong = Diagnostic::error("file ends early").at(self.place(self.bytes.len()));
+                let wrong = Diagnostic::error("file is truncated").at(self.place(self.bytes.len()));
                 return Err(wrong.expected("a number").into());
             };
             first = if i == 0 { at } else { first };

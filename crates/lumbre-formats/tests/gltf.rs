@@ -784,8 +784,7 @@ fn animations_by_pointers_change_what_they_name() {
         assert_eq!(lines.len(), still, "{lines:?}");
         assert_eq!(still > 0, matches!(scene.lights[0], LightDesc::Moving { .. }));
         let is_said = |(i, pointer): (usize, &str)| {
-            let start =
-                format!("/animations/0/channels/{i}: what an animation changes while the shutter is open");
+            let start = format!("/animations/0/channels/{i}: animation without motion blur");
             lines[i].contains(&start) && lines[i].contains(pointer)
         };
         let places = ["/baseColorFactor\"", "/lights/0/intensity\"", "/KHR_materials_emissive_strength/"];
@@ -793,9 +792,9 @@ fn animations_by_pointers_change_what_they_name() {
     }
     // What cannot be animated, or is not there, is said and left out.
     for (pointer, said) in [
-        ("/buffers/0/byteLength", "/pointer: animation of what cannot be animated was left out"),
-        ("/materials/1/alphaCutoff", "/pointer: animation of what is not there was left out"),
-        ("/nodes/2/scale/0", "/pointer: animation of what is not there was left out"),
+        ("/buffers/0/byteLength", "/pointer: animation is left out: this cannot be animated"),
+        ("/materials/1/alphaCutoff", "/pointer: animation is left out: there is no such value"),
+        ("/nodes/2/scale/0", "/pointer: animation is left out: there is no such value"),
     ] {
         let options = changed(GltfOptions::default(), |it| it.frame = Some(1.5));
         let mut diagnostics = Diagnostics::new();
@@ -967,9 +966,12 @@ fn single_weights_and_those_of_meshes_are_animated_by_pointers() {
     // One and all of them at once: the first counts.
     let (found, warnings) = seen(&[(0, "/nodes/1/weights/1"), (1, "/nodes/1/weights")], 1, 0.0);
     assert_eq!(found, [[-1.0, 0.0, 4.0]]);
-    assert!(warnings[0].contains("/animations/0/channels/1: animation of what another one"), "{warnings:?}");
+    assert!(
+        warnings[0].contains("/animations/0/channels/1: animation is left out: another one"),
+        "{warnings:?}"
+    );
     let wrong = error(&parts.json(&rest(&[(0, "/nodes/0/weights/2")])), &parts.binary);
-    assert!(wrong.contains("morph targets that are not there"), "{wrong}");
+    assert!(wrong.contains("morph targets that do not exist"), "{wrong}");
 }
 
 #[test]
@@ -1620,7 +1622,7 @@ fn broken_files_are_refused_with_a_pointer_and_a_reason() {
         (r#""version":"2.0""#, r#""version":2.0"#, "/asset/version: wrong type (found 2.0; expected a string)"),
         (r#""version":"2.0""#, r#""version":"2.0","minVersion":"2.1""#, "/asset/minVersion: unsupported version"),
         (r#""asset":{"version":"2.0"},"#, "", r#""asset" is missing"#),
-        (r#""buffer":0,"byteOffset":0"#, r#""buffer":7,"byteOffset":0"#, "/bufferViews/0/buffer: index of something that is not there (found 7; expected a buffer from 0 to 0)"),
+        (r#""buffer":0,"byteOffset":0"#, r#""buffer":7,"byteOffset":0"#, "/bufferViews/0/buffer: there is no buffer 7 (expected 0)"),
         (r#""buffer":0,"byteOffset":0"#, r#""buffer":-1,"byteOffset":0"#, "/bufferViews/0/buffer: wrong number (found -1; expected a whole number, 0 or more)"),
         (r#""buffer":0,"byteOffset":0"#, r#""buffer":0,"byteOffset":18446744073709551615"#, "/bufferViews/0/byteOffset: wrong number"),
         (r#""buffer":0,"byteOffset":0"#, r#""buffer":0,"byteOffset":9007199254740991"#, "/bufferViews/0/byteOffset: buffer view past the end of its buffer"),
@@ -1643,13 +1645,13 @@ fn broken_files_are_refused_with_a_pointer_and_a_reason() {
         (r#""sparse":{"count":1"#, r#""sparse":{"count":5"#, "/sparse/count: too many sparse elements (found 5; expected at most 4"),
         (r#""indices":{"bufferView":1,"componentType":5121}"#, r#""indices":{"bufferView":1,"byteOffset":16,"componentType":5121}"#, "/sparse/indices: accessor past the end"),
         (r#""indices":{"bufferView":1,"componentType":5121}"#, r#""indices":{"bufferView":1,"componentType":5126}"#, "/sparse/indices/componentType: wrong type of sparse indices"),
-        (r#""POSITION":0"#, r#""POSITION":99"#, "/meshes/0/primitives/0/attributes/POSITION: index of something that is not there"),
+        (r#""POSITION":0"#, r#""POSITION":99"#, "/meshes/0/primitives/0/attributes/POSITION: there is no accessor 99"),
         (r#""POSITION":0"#, r#""POSITON":0"#, r#"/meshes/0/primitives/0/attributes/POSITON: unknown attribute (found "POSITON"; expected one of glTF's, or a name that starts with an underscore; did you mean "POSITION"?)"#),
         (r#""mode":6"#, r#""mode":7"#, "/meshes/0/primitives/0/mode: unknown mode of a primitive (found 7"),
         (r#""mode":6"#, r#""indices":0,"mode":6"#, "/meshes/0/primitives/0/indices: accessor of a wrong type"),
         (r#""weights":[0.5]"#, r#""weights":[0.5,1]"#, "/meshes/0/weights: as many weights as morph targets are needed (found 2; expected 1)"),
         (r#""WEIGHTS_0":2"#, r#""WEIGHTS_1":2"#, "/meshes/0/primitives/0/attributes: WEIGHTS_0 is missing"),
-        (r#""joints":[1,2]"#, r#""joints":[1,9]"#, "/skins/0/joints/1: index of something that is not there (found 9"),
+        (r#""joints":[1,2]"#, r#""joints":[1,9]"#, "/skins/0/joints/1: there is no node 9"),
         (r#""joints":[1,2]"#, r#""joints":[1]"#, "/accessors/1: joint that the skin does not have (found 1 at vertex 1; expected 0 to 0)"),
         (r#""joints":[1,2]"#, r#""joints":[1,2],"inverseBindMatrices":0"#, "/skins/0/inverseBindMatrices: accessor of a wrong type"),
         (r#""children":[2]"#, r#""children":[1]"#, "/nodes/1: node inside itself (found nodes 1 > 1)"),
@@ -1662,18 +1664,18 @@ fn broken_files_are_refused_with_a_pointer_and_a_reason() {
         (r#""translation":[0,0,0]"#, r#""matrix":[1,0,0,0,1,1,0,0,0,0,1,0,0,0,0,1]"#, "/nodes/2/matrix: matrix that shears"),
         (r#""nodes":[0,1,3,4]"#, r#""nodes":[0,1,2]"#, "/scenes/0/nodes/2: scene with a node that hangs on another (found 2)"),
         (r#""nodes":[0,1,3,4]"#, r#""nodes":[0,1,0]"#, "/scenes/0/nodes/2: scene with the same node twice (found 0)"),
-        (r#""scene":0"#, r#""scene":3"#, "/scene: index of something that is not there (found 3; expected a scene from 0 to 0)"),
+        (r#""scene":0"#, r#""scene":3"#, "/scene: there is no scene 3 (expected 0)"),
         (r#""yfov":0.7"#, r#""yfov":4"#, "/cameras/0/perspective/yfov: number out of range (found 4; expected a number from"),
         (r#""type":"perspective""#, r#""type":"perspektive""#, r#"/cameras/0/type: unknown kind of camera (found "perspektive"; did you mean "perspective"?)"#),
         (r#""path":"weights""#, r#""path":"wieghts""#, r#"/animations/0/channels/1/target/path: unknown target of an animation (found "wieghts"; did you mean "weights"?)"#),
         (r#""interpolation":"STEP""#, r#""interpolation":"STEPS""#, r#"/animations/0/samplers/1/interpolation: unknown interpolation (found "STEPS"; did you mean "STEP"?)"#),
         (r#""interpolation":"CUBICSPLINE""#, r#""interpolation":"LINEAR""#, "/animations/0/samplers/3/output: animation of a wrong length (found 6 elements; expected 2 times 1 times 1)"),
-        (r#""sampler":1,"target""#, r#""sampler":8,"target""#, "/animations/0/channels/1/sampler: index of something that is not there (found 8; expected a sampler of this animation from 0 to 3)"),
+        (r#""sampler":1,"target""#, r#""sampler":8,"target""#, "/animations/0/channels/1/sampler: there is no sampler 8 (expected 0 to 3)"),
         (r#""alphaMode":"MASK""#, r#""alphaMode":"MASKS""#, r#"/materials/0/alphaMode: unknown alpha mode (found "MASKS"; did you mean "MASK"?)"#),
         (r#""baseColorFactor":[1,1,1,1]"#, r#""baseColorFactor":[1,1,2,1]"#, "/materials/0/pbrMetallicRoughness/baseColorFactor: number out of range"),
         (r#""roughnessFactor":0.5"#, r#""roughnessFactor":"0.5""#, r#"/materials/0/pbrMetallicRoughness/roughnessFactor: wrong type (found "0.5"; expected a number)"#),
         (r#""roughnessFactor":0.5"#, r#""baseColorTexture":{"index":0}"#, "/meshes/0/primitives/0: texture coordinates that the material needs are missing (found 0 sets; expected 1 sets)"),
-        (r#""roughnessFactor":0.5"#, r#""baseColorTexture":{"index":5}"#, "/materials/0/pbrMetallicRoughness/baseColorTexture/index: index of something that is not there"),
+        (r#""roughnessFactor":0.5"#, r#""baseColorTexture":{"index":5}"#, "/materials/0/pbrMetallicRoughness/baseColorTexture/index: there is no texture 5"),
         (r#""wrapS":10497"#, r#""wrapS":10498"#, "/samplers/0/wrapS: unknown way to wrap (found 10498"),
         (r#""extensionsUsed":["KHR_lights_punctual"]"#, r#""extensionsUsed":["KHR_x"],"extensionsRequired":["KHR_x"]"#, r#"/extensionsRequired/0: the file requires an extension that is not supported (found "KHR_x")"#),
         (r#""extensionsUsed":["KHR_lights_punctual"]"#, r#""extensionsRequired":["KHR_materials_ior"]"#, r#"required extension that "extensionsUsed" does not list"#),
@@ -1723,7 +1725,7 @@ fn indices_beyond_the_vertices_and_numbers_that_are_none_are_found_and_forgiven(
     let found = error(&json, &parts.binary);
     assert!(
         found.contains(
-            "/accessors/1: index of a vertex that is not there (found 65535 as index 4; expected 0 to 3)"
+            "/accessors/1: index of a vertex that does not exist (found 65535 as index 4; expected 0 to 3)"
         ),
         "{found}"
     );

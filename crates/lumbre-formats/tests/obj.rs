@@ -112,10 +112,7 @@ fn faces_may_stand_before_what_they_name() {
         "v 9 9 9\no a\nf 2//1 3//-1 -1//1\nf 2//1 3//1 4//1 5//1\nvn 0 0 1\no b\nv 1 1 5\nv 4 1 5\nv 4 3 5\nv 1 3 5\n",
     );
     let wrong = early.unwrap_err().to_string();
-    assert_eq!(
-        wrong,
-        "m.obj:3:11: face with a normal that is not there (found -1; expected 1 to 1, or backwards from -1)"
-    );
+    assert_eq!(wrong, "m.obj:3:11: face with a normal that does not exist (found -1; expected 1 or -1)");
     let file = read(
         "v 9 9 9\no a\nf 2//1 3//1 -1//1\nf 2//1 3//1 4//1 5//1\nvn 0 0 1\no b\nv 1 1 5\nv 4 1 5\nv 4 3 5\nv 1 3 5\n",
     );
@@ -176,9 +173,9 @@ fn what_is_dropped_is_said() {
     assert_eq!(
         lines,
         [
-            "warning: m.obj:7:1: face with fewer than three corners, dropped",
-            "warning: m.obj:8:1: unknown keyword, line passed over (found \"faces\")",
-            "warning: m.obj:9:1: free-form curves and surfaces are not supported, passed over",
+            "warning: m.obj:7:1: face with fewer than three vertices is left out",
+            "warning: m.obj:8:1: line with an unknown keyword is left out (found \"faces\")",
+            "warning: m.obj:9:1: free-form curves and surfaces are not supported, and left out",
         ]
     );
 }
@@ -192,7 +189,9 @@ fn lenient_drops_what_cannot_be_used_and_counts_it() {
     assert_eq!(file.meshes.len(), 1);
     assert_eq!(file.meshes[0].mesh.triangles.len(), 1);
     assert_eq!(lines.len(), 5, "{lines:#?}");
-    assert!(lines.iter().filter(|l| l.contains("with a corner that is not there, dropped")).count() == 3);
+    assert!(
+        lines.iter().filter(|l| l.contains("with a vertex that does not exist is left out")).count() == 3
+    );
 }
 
 #[test]
@@ -264,8 +263,8 @@ fn a_scene_has_its_materials_and_says_what_is_missing() {
     assert!(matches!(scene.shapes[3].alpha.as_deref(), Some(Texture::Constant(0.5))));
     let lines = said.lines();
     assert_eq!(lines.len(), 3, "{lines:#?}");
-    assert!(lines[0].contains("my scene.mtl:13:8: cannot use a texture"), "{}", lines[0]);
-    assert!(lines[1].contains("a.obj:2:8: cannot read a material file"), "{}", lines[1]);
+    assert!(lines[0].contains("my scene.mtl:13:8: texture is left out"), "{}", lines[0]);
+    assert!(lines[1].contains("a.obj:2:8: material file is left out"), "{}", lines[1]);
     assert!(
         lines[2].contains(
             "a.obj:17:8: unknown material, taken for grey (found \"mate\"; did you mean \"matte\"?)"

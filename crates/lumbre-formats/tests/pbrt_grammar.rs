@@ -1320,10 +1320,10 @@ fn a_missing_image_matters_where_it_is_used() {
     };
     let unused = r#"Texture "u" "spectrum" "imagemap" "string filename" "gone.png" Shape "sphere""#;
     let (scene, said) = read(unused, Strictness::Normal);
-    assert!(scene.is_ok() && said.len() == 1 && said[0].contains("2:35: cannot open"), "{said:?}");
+    assert!(scene.is_ok() && said.len() == 1 && said[0].contains("2:35: gone.png: cannot open"), "{said:?}");
     let used = format!("{unused} Material \"diffuse\" \"texture reflectance\" \"u\" Shape \"disk\"");
     let error = read(&used, Strictness::Normal).0.unwrap_err().to_string();
-    assert!(error.starts_with("s.pbrt:2:35: cannot open"), "{error}");
+    assert!(error.starts_with("s.pbrt:2:35: gone.png: cannot open"), "{error}");
     // Lenient reading goes on and names all that is missing.
     let many = format!(
         r#"{used} Include "gone.pbrt" Shape "plymesh" "string filename" "gone.ply"

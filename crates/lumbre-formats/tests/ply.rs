@@ -225,8 +225,8 @@ fn lenient_drops_what_cannot_be_used_and_counts_it() {
     assert_eq!(
         said.lines(),
         [
-            "warning: m.ply:27:1: face with a vertex that is not finite, dropped (found face 1)",
-            "warning: m.ply:28:1: face with a vertex that is not there, dropped (found face 2)",
+            "warning: m.ply:27:1: face with a vertex that is not finite is left out (found face 1)",
+            "warning: m.ply:28:1: face with a vertex that does not exist is left out (found face 2)",
         ]
     );
     assert!(mesh.positions.iter().all(|p| p.is_finite()));
@@ -253,7 +253,7 @@ fn a_count_bomb_costs_nothing() {
                 bytes.extend(b"1 2 3 4 5 6 7 8 9 ");
                 let error = read_ply(&bytes, &name(), &budget, &mut Diagnostics::new()).unwrap_err();
                 let text = error.to_string();
-                assert!(text.contains("than the file holds") && text.contains(count), "{text}");
+                assert!(text.contains("file is truncated: ") && text.contains(count), "{text}");
                 assert!(budget.memory_peak() < 1024, "{}", budget.memory_peak());
             }
         }
@@ -441,13 +441,13 @@ fn texture_coordinates_of_corners_are_those_of_the_faces() {
     let mesh = read_ply(text.as_bytes(), &name(), &Budget::default(), &mut said).unwrap().mesh;
     assert_eq!((mesh.positions.len(), mesh.triangles.len()), (4, 3));
     assert!(
-        said.lines().len() == 1 && said.lines()[0].contains("not two numbers a corner"),
+        said.lines().len() == 1 && said.lines()[0].contains("expected two numbers per vertex"),
         "{:?}",
         said.lines()
     );
     let text = file("3 0 1 2 6 0 0 0.5 0 0.5 0.75\n3 0 2 3 6 9 9 0.5 0.75 0 1\n3 4 1 2 0\n");
     let error = read(text.as_bytes()).unwrap_err().to_string();
-    assert!(error.contains("face 2 has a vertex that is not there") && error.contains("0 to 3"), "{error}");
+    assert!(error.contains("face 2 has a vertex that does not exist") && error.contains("0 to 3"), "{error}");
 }
 
 #[test]

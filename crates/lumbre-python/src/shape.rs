@@ -273,7 +273,7 @@ impl Geometry {
             .find(|(_, vertex)| usize::try_from(**vertex).map_or(true, |v| v >= places.len()));
         if let Some(((face, _), vertex)) = wrong {
             return Err(invalid(format!(
-                "face {face} names a vertex that is not there (found {vertex}; expected 0 to {})",
+                "face {face} has a vertex that does not exist (found {vertex}; expected 0 to {})",
                 places.len().saturating_sub(1)
             )));
         }

@@ -242,7 +242,10 @@ impl RenderOptions {
             return Err(RenderError::Size { width, height });
         }
         let bounds = self.crop.map_or(whole, |crop| crop.intersection(&whole));
-        if bounds.is_empty() { Err(RenderError::EmptyCrop) } else { Ok(bounds) }
+        match self.crop {
+            Some(crop) if bounds.is_empty() => Err(RenderError::EmptyCrop { crop, width, height }),
+            _ => Ok(bounds),
+        }
     }
 
     /// Bytes that a render with these options holds besides the scene: the sums of every pixel, and the pictures made of them. Not

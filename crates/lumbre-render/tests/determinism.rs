@@ -346,8 +346,10 @@ fn options_that_make_no_picture_are_refused() {
         |options: RenderOptions| render(&scene, &options, &NoProgress, &CancelToken::new()).unwrap_err();
     let base = options(&scene, 40, 30, 1);
     assert_eq!(refused(changed(base.clone(), |it| it.width = 0)), RenderError::Size { width: 0, height: 30 });
-    let crop = Some(PixelBounds { x0: 40, y0: 0, x1: 50, y1: 9 });
-    assert_eq!(refused(changed(base.clone(), |it| it.crop = crop)), RenderError::EmptyCrop);
+    let crop = PixelBounds { x0: 40, y0: 0, x1: 50, y1: 9 };
+    let empty = refused(changed(base.clone(), |it| it.crop = Some(crop)));
+    assert_eq!(empty, RenderError::EmptyCrop { crop, width: 40, height: 30 });
+    assert_eq!(empty.to_string(), "the crop 40,0,50,9 is outside the picture (40x30)");
     assert_eq!(
         refused(changed(base.clone(), |it| it.camera = 3)),
         RenderError::NoSuchCamera { index: 3, count: 1 }

@@ -89,7 +89,6 @@ impl Guard {
     ///
     /// # Errors
     /// If the system gives no random bytes.
-    /// Where the system gives no random bytes.
     pub(crate) fn new(
         address: SocketAddr,
         more_hosts: &[String],

@@ -148,7 +148,7 @@ impl Session {
         save.exposure = defaults.exposure(&scene, &options)?;
         let mut warnings = diagnostics.lines();
         if scene.is_dark() && options.integrator.kind.needs_light() {
-            let dark = "the scene has no light, its picture is black";
+            let dark = "the scene has no light: its picture is black";
             warnings.push(format!("warning: {}: {dark}", name.display()));
         }
         Ok(Self { scene, things, name, options, defaults, save, warnings, state: None, picture: None })

@@ -108,22 +108,33 @@ impl Job {
         .into()
     }
 
-    /// In what another render differs, a line each, as `seed: 3, 5`; nothing for the same render.
+    /// In what another render differs, as `seed 3 there, 5 here`, where the other one is here; nothing for the same render.
     pub fn differences(&self, other: &Self) -> Vec<String> {
         let names = self.identity.keys().chain(other.identity.keys());
         let names: std::collections::BTreeSet<&String> = names.collect();
         let of = |job: &Self, name: &String| job.identity.get(name).cloned();
-        let difference = |name: &String| match (of(self, name), of(other, name)) {
+        let of_name = |name: &String| match (of(self, name), of(other, name)) {
             (a, b) if a == b => None,
-            (Some(_), Some(_)) if name.starts_with("file ") => Some(format!("{name}: changed")),
-            (a, b) => Some(format!("{name}: {}, {}", shown(a), shown(b))),
+            (Some(_), Some(_)) if name.starts_with("file ") => Some(format!("{name} changed")),
+            (a, b) => Some(difference(name, &a.unwrap_or_default(), &b.unwrap_or_default())),
         };
-        names.into_iter().filter_map(difference).collect()
+        names.into_iter().filter_map(of_name).collect()
     }
 }
 
-fn shown(value: Option<String>) -> String {
-    value.unwrap_or_else(|| "none".to_owned())
+/// A difference of two renders: of options in words, only those that differ.
+fn difference(name: &str, there: &str, here: &str) -> String {
+    let parts = || there.split(", ").zip(here.split(", "));
+    let is_aligned = there.split(", ").count() == here.split(", ").count();
+    let (there, here) = match is_aligned && parts().count() > 1 {
+        true => parts().filter(|(a, b)| a != b).unzip(),
+        false => (vec![there], vec![here]),
+    };
+    let shown = |values: Vec<&str>| match values.join(", ") {
+        text if text.is_empty() => "none".to_owned(),
+        text => text,
+    };
+    format!("{name} {} there, {} here", shown(there), shown(here))
 }
 
 /// The hash of a file (BLAKE3) in hexadecimal digits.
@@ -147,13 +158,13 @@ fn hash_of_file(path: &Path) -> Result<String, Error> {
 #[non_exhaustive]
 pub enum PartError {
     /// It cannot be read.
-    #[error("cannot read: {0}")]
+    #[error("cannot open: {0}")]
     Io(#[from] io::Error),
     /// It is something else.
-    #[error("it is no part of a render (expected a file of --samples, --checkpoint or --keep-sums)")]
+    #[error("not a part of a render (expected a file of --samples, --checkpoint or --keep-sums)")]
     NoPart,
     /// It would take more memory than it may.
-    #[error("it takes {needed} bytes of memory, limit {limit}; raise it with --max-memory")]
+    #[error("needs {needed} bytes of memory, limit {limit}; raise it with --max-memory")]
     TooLarge {
         /// The bytes that it takes.
         needed: u64,
@@ -161,13 +172,13 @@ pub enum PartError {
         limit: u64,
     },
     /// It is damaged.
-    #[error("it is damaged: its checksum is not that of its bytes")]
+    #[error("damaged or incomplete (wrong checksum): render this part again")]
     Damaged,
     /// It is of another version of Lumbre.
-    #[error("it is of another version of Lumbre")]
+    #[error("written by another version of Lumbre: render this part again")]
     Version,
     /// Its head or its numbers make no sense.
-    #[error("it is damaged: {0}")]
+    #[error("damaged ({0}): render this part again")]
     Invalid(String),
 }
 

@@ -240,8 +240,7 @@ impl Setting {
 
     fn set_camera(&self, desc: &mut SceneDesc) -> Result<(), String> {
         if desc.cameras.is_empty() {
-            return Err("the scene has no camera of its own (expected --fov and other options of the view)"
-                .to_owned());
+            return Err("the scene has no camera: use --fov and the other options of the view".to_owned());
         }
         let by_name = |camera: &Camera| camera.name.as_deref() == Some(&*self.name);
         let has_name = desc.cameras.iter().any(by_name);

@@ -18,12 +18,13 @@ use crate::output::{Inputs, Replaced};
 use crate::progress::RayProgress;
 use crate::reading::{ReadingArguments, print_warnings};
 use crate::signals::Signals;
+use crate::units;
 
 #[cfg(test)]
 #[path = "command_tests.rs"]
 mod tests;
 
-/// Casts rays into a scene, or asks what is at points, in double precision.
+/// Casts rays into a scene, or queries it at points, in double precision.
 #[derive(Args)]
 #[command(after_help = "Examples:
   lumbre cast scene.pbrt --rays rays.csv
@@ -33,7 +34,7 @@ mod tests;
 0,0,-5,0,0,1' | lumbre cast scene.pbrt --rays -
 
 Rays: CSV with a header among ox,oy,oz,dx,dy,dz,tmin,tmax (tmin and tmax may be left out: 0 and inf), or a .npy array (N,6) or (N,8) of f4 or f8.
-t is in units of the given direction, which need not have length 1.
+t is in units of the given direction, which need not have length 1. A ray with direction 0,0,0 misses.
 Points, for closest-point, distance, inside and winding: CSV with a header x,y,z, or a .npy array (N,3).
 Answers: ray,hit,t,px,py,pz,nx,ny,nz,u,v,front,shape,prim,instance (closest, all); ray,hit (any); ray,count (count);
 point,found,distance,px,py,pz,shape,prim,instance (closest-point); point,distance; point,inside; point,winding.")]
@@ -43,14 +44,14 @@ pub(crate) struct Arguments {
     /// The rays, or the points, CSV or .npy; - is standard input.
     #[arg(long, visible_alias = "points", value_name = "FILE")]
     rays: PathBuf,
-    /// What to ask of each ray or point.
+    /// What to compute for each ray or point.
     #[arg(long, value_enum, default_value_t = Query::Closest)]
     query: Query,
     /// Where to write the answers, by extension .csv, .npy or .npz; standard output as CSV by default.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Threads; all cores by default.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", value_parser = units::whole(1_u16..=1024))]
     threads: Option<u16>,
     /// No warnings.
     #[arg(short, long)]
@@ -129,8 +130,7 @@ impl Cast<'_> {
     fn to_standard_output(&self, rays: RayReader) -> Result<(), Failure> {
         let mut failure = None;
         let mut out = io::stdout().lock();
-        let written = Output::csv(&mut out, self.query.table())
-            .and_then(|output| self.write(rays, output, &mut failure));
+        let written = self.write(rays, Output::csv(&mut out, self.query.table()), &mut failure);
         match (failure, written) {
             (Some(failure), _) => Err(failure),
             // The reader may stop early: `lumbre cast … | head`.
@@ -147,7 +147,7 @@ impl Cast<'_> {
         let mut failure = None;
         let written = match self.form {
             Form::Csv => atomic_write(path, |out: &mut dyn Write| {
-                self.write(rays, Output::csv(out, table)?, &mut failure)
+                self.write(rays, Output::csv(out, table), &mut failure)
             }),
             form => atomic_write_seek(path, |file| {
                 self.write(rays, Output::in_file(file, form, table, folder)?, &mut failure)

@@ -153,7 +153,7 @@ impl Header {
                 return Err((column, format!("unknown column {} (expected {expected})", quoted(name))));
             };
             if place[known].replace(i).is_some() {
-                return Err((column, format!("column {} stands twice", quoted(name))));
+                return Err((column, format!("column {} appears twice", quoted(name))));
             }
         }
         if let Some(missing) = (0..rows.needed()).find(|i| place[*i].is_none()) {
@@ -176,8 +176,9 @@ impl Header {
                 return Err((column(), format!("more than the {} values of the header", self.width)));
             }
             let field = unquoted(field.trim());
-            values[count] = number(field)
-                .map_err(|expected| (column(), format!("expected {expected}, found {}", quoted(field))))?;
+            values[count] = number(field).map_err(|expected| {
+                (column(), format!("invalid value (found {}; expected {expected})", quoted(field)))
+            })?;
             count += 1;
         }
         if count < self.width {

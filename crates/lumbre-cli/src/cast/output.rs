@@ -12,8 +12,8 @@ use super::npy;
 
 /// Writes answers in one of their forms.
 pub(super) enum Output<'f> {
-    /// Comma-separated text.
-    Csv(&'f mut dyn Write),
+    /// Comma-separated text; with the header as long as that is not written.
+    Csv(&'f mut dyn Write, Option<String>),
     /// One array, whose header is written last.
     Npy(&'f mut File, Rows),
     /// Arrays that are gathered in a file each, as an archive holds one behind the other.
@@ -27,13 +27,9 @@ pub(super) struct Rows {
 }
 
 impl<'f> Output<'f> {
-    /// CSV, beginning with its header.
-    ///
-    /// # Errors
-    /// Those of the writer.
-    pub(super) fn csv(out: &'f mut dyn Write, table: Table) -> io::Result<Self> {
-        writeln!(out, "{}", table.header())?;
-        Ok(Self::Csv(out))
+    /// CSV. Its header comes with the first answers, so that a list without any is answered with its error alone.
+    pub(super) fn csv(out: &'f mut dyn Write, table: Table) -> Self {
+        Self::Csv(out, Some(table.header()))
     }
 
     /// Any form in a file; what does not fit there yet goes to temporary files in `folder`.
@@ -43,7 +39,7 @@ impl<'f> Output<'f> {
     pub(super) fn in_file(file: &'f mut File, form: Form, table: Table, folder: &Path) -> io::Result<Self> {
         let rows = Rows { table, count: 0 };
         match form {
-            Form::Csv => Self::csv(file, table),
+            Form::Csv => Ok(Self::csv(file, table)),
             Form::Npy => {
                 file.write_all(&npy::header(&table.descr(), 0))?;
                 Ok(Self::Npy(file, rows))
@@ -62,7 +58,10 @@ impl<'f> Output<'f> {
     /// Those of the writer.
     pub(super) fn append(&mut self, block: &Block) -> io::Result<()> {
         match self {
-            Self::Csv(out) => out.write_all(&block.parts[0]),
+            Self::Csv(out, header) => {
+                write_header(out, header)?;
+                out.write_all(&block.parts[0])
+            }
             Self::Npy(file, rows) => {
                 rows.count += block.answers;
                 file.write_all(&block.parts[0])
@@ -80,7 +79,10 @@ impl<'f> Output<'f> {
     /// Those of the writer.
     pub(super) fn finish(self) -> io::Result<()> {
         match self {
-            Self::Csv(out) => out.flush(),
+            Self::Csv(out, mut header) => {
+                write_header(out, &mut header)?;
+                out.flush()
+            }
             Self::Npy(file, rows) => {
                 file.seek(SeekFrom::Start(0))?;
                 file.write_all(&npy::header(&rows.table.descr(), rows.count))
@@ -104,4 +106,8 @@ impl<'f> Output<'f> {
             }
         }
     }
+}
+
+fn write_header(out: &mut dyn Write, header: &mut Option<String>) -> io::Result<()> {
+    header.take().map_or(Ok(()), |header| writeln!(out, "{header}"))
 }

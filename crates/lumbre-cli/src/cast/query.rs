@@ -24,11 +24,11 @@ pub enum Query {
     Count,
     /// Of a point: the nearest point of all surfaces.
     ClosestPoint,
-    /// Of a point: how far away that is.
+    /// Of a point: the distance to the nearest point of all surfaces.
     Distance,
-    /// Of a point: whether it is inside of what stands there.
+    /// Of a point: whether it is inside a closed shape.
     Inside,
-    /// Of a point: how often surfaces wind around it, 1 within a closed body.
+    /// Of a point: its winding number: 1 inside a closed body.
     Winding,
 }
 

@@ -239,20 +239,23 @@ mod tests {
             ("", "rays.csv:1:1: no rays"),
             ("ox,oy,oz,dx,dy\n", "rays.csv:1:1: no column \"dz\""),
             ("ox,oy,oz,dx,dy,dz,time\n", "rays.csv:1:19: unknown column \"time\""),
-            ("\n\nox,oy,oz,dx,dy,dz,ox\n", "rays.csv:3:19: column \"ox\" stands twice"),
+            ("\n\nox,oy,oz,dx,dy,dz,ox\n", "rays.csv:3:19: column \"ox\" appears twice"),
             (
                 "ox,oy,oz,dx,dy,dz\n1,2,3,4,5,6\n\n1,2,3, four,5,6\n",
-                "rays.csv:4:8: expected a number, found \"four\"",
+                "rays.csv:4:8: invalid value (found \"four\"; expected a number)",
             ),
             (
                 "ox,oy,oz,dx,dy,dz\n1,2,3,4,5,-1e999\n",
-                "rays.csv:2:11: expected a number of double precision, at most",
+                "rays.csv:2:11: invalid value (found \"-1e999\"; expected a number of double precision, at most",
             ),
             (
                 "ox,oy,oz,dx,dy,dz\n1, 2e-400,3,4,5,6\n",
-                "rays.csv:2:4: expected a number of double precision, which",
+                "rays.csv:2:4: invalid value (found \"2e-400\"; expected a number of double precision, which",
             ),
-            ("ox,oy,oz,dx,dy,dz\n0.0000001e-320,2,3,4,5,6\n", "rays.csv:2:1: expected a number of double"),
+            (
+                "ox,oy,oz,dx,dy,dz\n0.0000001e-320,2,3,4,5,6\n",
+                "rays.csv:2:1: invalid value (found \"0.0000001e-320\"; expected a number of double",
+            ),
             ("ox,oy,oz,dx,dy,dz\n1,2,3\n", "rays.csv:2:6: 3 values (expected 6)"),
             ("ox,oy,oz,dx,dy,dz\n1,2,3,4,5,6,7\n", "rays.csv:2:13: more than the 6 values"),
             (&long, "rays.csv:2:65537: a line of more than 65536 bytes"),

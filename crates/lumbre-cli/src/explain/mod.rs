@@ -10,6 +10,7 @@ use serde_json::json;
 use crate::console::{escaped_json, escaped_lines};
 use crate::failure::Failure;
 use crate::language::{Language, filled};
+use crate::units;
 
 mod along;
 mod camera;
@@ -50,31 +51,31 @@ pub struct Request {
     /// The pixel, from 0,0 in the upper left corner.
     #[arg(long, value_name = "X,Y", value_parser = pixel)]
     pub pixel: Option<(u32, u32)>,
-    /// A ray instead: its origin and its direction, of any length but 0; then, where it is not 0 to infinity, its range of t.
+    /// A ray instead of a pixel: its origin and direction (of any length but 0), then optionally its range of t (by default 0 to infinity).
     #[arg(long, value_name = "OX,OY,OZ,DX,DY,DZ[,TMIN,TMAX]", allow_hyphen_values = true, value_parser = ray, conflicts_with = "pixel")]
     pub ray: Option<Ray>,
-    /// What it is written as.
+    /// The format of the explanation.
     #[arg(long, value_enum, value_name = "FORMAT", default_value_t = Format::Text)]
     pub format: Format,
     /// The language: English or Spanish.
     #[arg(long, value_enum, value_name = "LANGUAGE", default_value_t = Language::En)]
     pub lang: Language,
-    /// Tell the crossings of this many of the rays that follow, too.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    /// Also list the crossings of the next N bounce rays.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = units::whole(0..=u32::MAX))]
     pub depth: u32,
-    /// The number of the sample: the radiance is that which a render adds to the pixel for it.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    /// Which sample of the pixel to explain.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = units::whole(0..=u32::MAX))]
     pub sample: u32,
-    /// Tell only the surface that is seen, not those behind it.
+    /// Explain only the visible surface, not those behind it.
     #[arg(long)]
     pub nearest: bool,
-    /// Tell of this shape, whether the ray meets it or not: its number, its kind, or the name of its material.
+    /// Explain this shape, whether the ray hits it or not: its number, its kind, or the name of its material.
     #[arg(long, value_name = "NAME|N", conflicts_with = "nearest")]
     pub shape: Option<String>,
-    /// Tell of all shapes, those that the ray misses too.
+    /// Explain all shapes, also those that the ray misses.
     #[arg(long, conflicts_with_all = ["nearest", "shape"])]
     pub all_shapes: bool,
-    /// Tell only the sections with these keys, as JSON names them: camera, equation, Quadratic, hit, transform, light, radiance, …
+    /// Print only the sections with these keys, the keys of JSON: camera, equation, Quadratic, hit, transform, light, radiance, …
     #[arg(long, value_name = "KEY,…", value_delimiter = ',')]
     pub only: Vec<String>,
 }

@@ -22,8 +22,10 @@ use crate::staging::StagingArguments;
 use crate::units;
 use crate::view::ViewArguments;
 
-/// Tells how the colour of a pixel, or the light along a ray, comes about: the camera and its ray, every surface on the way with the
-/// equation of its crossings, normals, lights and shadows, and the path of one sample, with all numbers as the render computes them.
+/// Explains how a pixel gets its colour.
+///
+/// Or how much light comes along a ray: the camera and its ray, every surface on the way with the equation of its crossings, normals,
+/// lights and shadows, and the path of one sample, with all numbers as the render computes them.
 #[derive(Args)]
 #[command(after_help = "Examples:
   lumbre explain scene.pbrt --pixel 320,240
@@ -35,7 +37,7 @@ use crate::view::ViewArguments;
   lumbre explain scene.pbrt --pixel 320,240 --format markdown --lang es
   lumbre explain model.glb --pixel 100,80 --size 200x160 --format json | jq .")]
 pub(crate) struct Arguments {
-    /// The scene: .pbrt, .gltf, .glb, .obj, .ply or .stl, also packed by gzip. Several are put into the same world.
+    /// The scene: .pbrt, .gltf, .glb, .obj, .ply, .stl or .pov, also compressed with gzip. Several are put into the same world.
     #[arg(required = true, value_name = "SCENE")]
     scene: Vec<PathBuf>,
     #[command(flatten)]
@@ -46,14 +48,14 @@ pub(crate) struct Arguments {
     /// Width and height of the picture in pixels.
     #[arg(long, value_name = "WxH", value_parser = units::size)]
     size: Option<(u32, u32)>,
-    /// A camera by name or 0-based position.
+    /// A camera of the scene, by its name or its index from 0.
     #[arg(long, value_name = "NAME|INDEX", help_heading = "View")]
     camera: Option<String>,
-    /// What is computed for each pixel.
+    /// What each pixel shows: light, or a property of the visible surface.
     #[arg(long, value_name = "NAME", value_parser = one_of(&IntegratorKind::NAMES, IntegratorKind::from_name))]
     integrator: Option<IntegratorKind>,
     /// Seed of the random numbers.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = units::whole(0..=u64::MAX))]
     seed: Option<u64>,
     /// Print errors only.
     #[arg(short, long)]

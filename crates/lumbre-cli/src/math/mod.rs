@@ -58,7 +58,7 @@ use texts::Texts;
 
 Exit status 2 for a wrong expression, 3 for one in a file or on standard input.")]
 pub(crate) struct Arguments {
-    /// What to evaluate, with ; between expressions; in quotes, as the shell knows brackets too. A prompt without.
+    /// What to evaluate, with ; between expressions. Quote it: the shell treats brackets specially. Without an expression, a prompt opens.
     expression: Vec<String>,
     /// Evaluate the statements of this file; - is standard input.
     #[arg(long, value_name = "FILE", conflicts_with = "expression")]
@@ -145,7 +145,7 @@ enum Form {
 fn read(path: &Path, texts: &Texts) -> Result<String, Failure> {
     let failed = |e: std::io::Error| match e.kind() {
         std::io::ErrorKind::InvalidData => Failure::Input(format!("{}: {}", path.display(), texts.not_utf8)),
-        _ => Failure::Io(format!("{}: {e}", path.display())),
+        _ => Failure::Io(format!("{}: {}", path.display(), filled(texts.cannot_open, &[&e.to_string()]))),
     };
     if path == Path::new("-") {
         return std::io::read_to_string(std::io::stdin().lock()).map_err(failed);

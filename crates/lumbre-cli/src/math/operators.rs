@@ -91,7 +91,9 @@ pub(super) fn multiply(a: &Value, b: &Value, work: &mut Work) -> Result<Value, B
             work.line(format!("{} · {} = {}", number(*factor), value.line(), result.line()));
             Ok(result)
         }
-        (Value::Vector(_), Value::Vector(_)) => Err(mismatch("*", a, b, work.texts.two_products, work)),
+        (Value::Vector(_), Value::Vector(_)) => {
+            Err(Diagnostic::error(work.texts.no_vector_product).expected(work.texts.two_products).into())
+        }
         (Value::Quaternion(p), Value::Quaternion(q)) => {
             Ok(Value::Quaternion(quaternions::product(*p, *q, work)))
         }

@@ -33,6 +33,22 @@ const MOST: usize = 16;
 /// The names that always have a value.
 const CONSTANTS: [&str; 7] = ["pi", "x", "y", "z", "i", "j", "k"];
 
+/// Names of other programs for a function.
+pub(super) const SYNONYMS: [(&str, &[&str]); 12] = [
+    ("unit", &["normalize", "normalise", "normalized", "normalised"]),
+    ("length", &["norm", "magnitude", "mag", "abs"]),
+    ("inverse", &["inv", "invert"]),
+    ("transpose", &["transposed"]),
+    ("det", &["determinant"]),
+    ("look_at", &["lookat"]),
+    ("ortho", &["orthographic"]),
+    ("project", &["projection", "proj"]),
+    ("rotate", &["rotation", "rot", "axis_angle"]),
+    ("translate", &["translation"]),
+    ("quat", &["quaternion"]),
+    ("camera_ray", &["ray"]),
+];
+
 /// What a statement gave.
 #[derive(Debug)]
 pub(super) enum Outcome {
@@ -360,7 +376,11 @@ impl<'a> Reader<'a> {
         let own = self.session.names.keys().map(String::as_str);
         let texts = self.session.texts;
         let what = Diagnostic::error(message).found(quoted(name)).expected(texts.known_names);
-        Wrong::new(offset, what.suggest(name, own.chain(functions).chain(CONSTANTS)))
+        let by_meaning = SYNONYMS.iter().find(|(_, words)| words.contains(&name));
+        match by_meaning {
+            Some((function, _)) => Wrong::new(offset, what.suggest(function, [*function])),
+            None => Wrong::new(offset, what.suggest(name, own.chain(functions).chain(CONSTANTS))),
+        }
     }
 
     /// The result of an operation at this byte.

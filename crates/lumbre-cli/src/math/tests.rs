@@ -7,7 +7,7 @@ use super::functions;
 use super::session::{Outcome, Session};
 use super::spanish::SPANISH;
 use super::value::Value;
-use super::{Form, message, shown};
+use super::{Form, message, session, shown};
 
 /// The value of the last statement.
 fn value(text: &str) -> Result<Value, String> {
@@ -133,7 +133,7 @@ fn mistakes_say_where_what_and_what_would_do() {
     for (text, expected) in [
         (
             "1 + crosss(x, y)",
-            "expression:1:5: unknown function (found \"crosss\"; expected a name of the list that `help` prints; did you mean \"cross\"?)\n  1 + crosss(x, y)\n      ^",
+            "expression:1:5: unknown function (found \"crosss\"; expected a name that `help` lists; did you mean \"cross\"?)\n  1 + crosss(x, y)\n      ^",
         ),
         (
             "dot(x, 3)",
@@ -145,7 +145,19 @@ fn mistakes_say_where_what_and_what_would_do() {
         ),
         (
             "x * y",
-            "expression:1:3: these have no * (found a vector of 3 * a vector of 3; expected dot(a, b) or cross(a, b))\n  x * y\n    ^",
+            "expression:1:3: cannot multiply two vectors with * (expected dot(a, b) or cross(a, b))\n  x * y\n    ^",
+        ),
+        (
+            "x + 2",
+            "expression:1:3: + is not defined for these (found a vector of 3 + a number; expected two numbers, vectors, matrices or quaternions of the same size)\n  x + 2\n    ^",
+        ),
+        (
+            "normalize(z)",
+            "expression:1:1: unknown function (found \"normalize\"; expected a name that `help` lists; did you mean \"unit\"?)\n  normalize(z)\n  ^",
+        ),
+        (
+            "1 + norm(z)",
+            "expression:1:5: unknown function (found \"norm\"; expected a name that `help` lists; did you mean \"length\"?)\n  1 + norm(z)\n      ^",
         ),
         (
             "1 / 0",
@@ -177,7 +189,7 @@ fn mistakes_say_where_what_and_what_would_do() {
         ),
         (
             "[1, 2",
-            "expression:1:6: this does not belong here (found the end; expected , or ])\n  [1, 2\n       ^",
+            "expression:1:6: unexpected here (found the end; expected \",\" or \"]\")\n  [1, 2\n       ^",
         ),
         (
             "look_at(x, x, y)",
@@ -185,7 +197,7 @@ fn mistakes_say_where_what_and_what_would_do() {
         ),
         (
             "dot = 3",
-            "expression:1:1: this name means something already (found \"dot\"; expected another name)\n  dot = 3\n  ^",
+            "expression:1:1: this name is already used (found \"dot\"; expected another name)\n  dot = 3\n  ^",
         ),
         (
             "2x",
@@ -193,6 +205,14 @@ fn mistakes_say_where_what_and_what_would_do() {
         ),
     ] {
         assert_eq!(value(text).expect_err(text), expected);
+    }
+}
+
+#[test]
+fn every_synonym_names_a_function_and_is_none_itself() {
+    for (function, words) in session::SYNONYMS {
+        assert!(functions::find(function).is_some(), "{function}");
+        assert!(words.iter().all(|word| functions::find(word).is_none()), "{words:?}");
     }
 }
 

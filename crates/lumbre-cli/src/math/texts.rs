@@ -48,6 +48,7 @@ pub(super) struct Texts {
     // What is wrong with the values.
     pub(super) wrong_argument: &'static str,
     pub(super) no_operation: &'static str,
+    pub(super) no_vector_product: &'static str,
     pub(super) same_kind: &'static str,
     pub(super) two_products: &'static str,
     pub(super) rotate_by_quaternion: &'static str,
@@ -135,6 +136,7 @@ pub(super) struct Texts {
     pub(super) expression: &'static str,
     pub(super) standard_input: &'static str,
     pub(super) welcome: &'static str,
+    pub(super) cannot_open: &'static str,
     pub(super) not_utf8: &'static str,
     pub(super) not_regular: &'static str,
     pub(super) too_long: &'static str,

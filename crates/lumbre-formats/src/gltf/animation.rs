@@ -140,7 +140,7 @@ impl<'a> Playing<'a> {
             let key = |channel: &Channel<'_>| (channel.target.clone(), channel.path);
             if channels.iter().any(|channel| moved.contains(&key(channel))) {
                 let warning = Diagnostic::warning(
-                    "animation that moves what one before it moves was left out: choose one by its name or number",
+                    "animation is left out: an earlier one moves the same (choose one with --animation)",
                 );
                 let name = animation.string_at("name")?.map_or_else(|| position.to_string(), Into::into);
                 file.push(warning.at(animation.place()).found(quoted(&name)));
@@ -156,7 +156,7 @@ impl<'a> Playing<'a> {
                 if is_free {
                     playing.channels.push(channel);
                 } else {
-                    file.warn(channel.value, "animation of what another one animates was left out");
+                    file.warn(channel.value, "animation is left out: another one animates the same");
                 }
             }
         }
@@ -193,7 +193,7 @@ impl<'a> Playing<'a> {
                 times.iter().map(|&time| channel.sample(self.file, time)).collect::<Read<_>>()?;
             if values.iter().any(|value| *value != values[0]) {
                 let warning = Diagnostic::warning(
-                    "what an animation changes while the shutter is open was left as it is halfway",
+                    "animation without motion blur: its value halfway through the shutter is used",
                 );
                 self.file.push(warning.at(channel.value.place()).found(quoted(pointer)));
             }
@@ -243,11 +243,13 @@ fn position(file: &File<'_>, wanted: &str) -> Read<usize> {
     if let Some(position) = names.iter().position(|name| name == wanted).or_else(by_number) {
         return Ok(position);
     }
+    if names.is_empty() {
+        let wrong = format!("--animation {}: the file has no animations", quoted(wanted));
+        return Err(Diagnostic::error(wrong).at(file.whole()).into());
+    }
     let wrong = Diagnostic::error("no such animation").at(file.whole()).found(quoted(wanted));
     let known: Vec<String> = names.iter().take(20).map(|name| quoted(name)).collect();
-    let expected =
-        if known.is_empty() { "no choice: the file has none".to_owned() } else { known.join(", ") };
-    Err(wrong.expected(expected).suggest(wanted, names.iter().map(String::as_str)).into())
+    Err(wrong.expected(known.join(", ")).suggest(wanted, names.iter().map(String::as_str)).into())
 }
 
 /// Checks all animations without playing them.
@@ -262,8 +264,7 @@ fn channels<'a>(file: &'a File<'_>, animation: Value<'a>) -> Read<Vec<Channel<'a
     let samplers: Vec<Value<'a>> = animation.need("samplers")?.array()?.collect();
     let mut channels = vec![];
     for value in animation.need("channels")?.array()? {
-        let sampler =
-            samplers[value.need("sampler")?.index(samplers.len(), "a sampler of this animation")?];
+        let sampler = samplers[value.need("sampler")?.index(samplers.len(), "a sampler")?];
         let target = value.need("target")?;
         let path_value = target.need("path")?;
         let extension = target.extension("KHR_animation_pointer")?;
@@ -323,7 +324,7 @@ fn channels<'a>(file: &'a File<'_>, animation: Value<'a>) -> Read<Vec<Channel<'a
             _ => (1, true),
         };
         if !is_there {
-            return Err(target.wrong("animation of morph targets that are not there").into());
+            return Err(target.wrong("animation of morph targets that do not exist").into());
         }
         let each = if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
         let expected = input.count.checked_mul(width).and_then(|n| n.checked_mul(each));
@@ -398,11 +399,11 @@ fn by_pointer<'a>(
     let is_matrix = matches!(output.element, Element::Mat2 | Element::Mat3 | Element::Mat4);
     let is_list = output.element == Element::Scalar && (width > 1 || pointer.ends_with("/weights"));
     if !pointer::is_played(&pointer) || is_matrix || (width > 1 && !is_list) {
-        file.warn(pointer_value, "animation of what cannot be animated was left out");
+        file.warn(pointer_value, "animation is left out: this cannot be animated");
         return Ok(None);
     }
     if !pointer::has_place(file.root, &pointer)? {
-        file.warn(pointer_value, "animation of what is not there was left out");
+        file.warn(pointer_value, "animation is left out: there is no such value");
         return Ok(None);
     }
     let path = Path::Numbers { width: width * output.element.numbers(), is_list };

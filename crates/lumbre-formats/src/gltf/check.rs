@@ -26,7 +26,7 @@ pub(super) fn check(file: &File<'_>, graph: &Graph<'_>) -> Read<()> {
         file.unless_used(match accessor::is_known(value) {
             Ok(true) => Accessor::at(file, index).map(drop),
             Ok(false) => {
-                file.warn(value, "accessor of an unknown kind was left out");
+                file.warn(value, "accessor of an unknown kind is left out");
                 Ok(())
             }
             Err(wrong) => Err(wrong),

@@ -33,15 +33,25 @@ pub(super) fn read<'a>(bytes: &'a [u8], name: &Arc<str>, diagnostics: &mut Diagn
     };
     let (Some(version), Some(length)) = (word(4), word(8)) else {
         let found = format!("{} bytes", bytes.len());
-        return Err(wrong(0, "GLB file without a header").found(found).expected("12 bytes or more").into());
+        return Err(wrong(0, "file is truncated in its header")
+            .found(found)
+            .expected("12 bytes or more")
+            .into());
     };
     if version != 2 {
         return Err(wrong(4, "unknown version of GLB").found(version).expected("2").into());
     }
     let length = length as usize;
-    if length > bytes.len() || length < 12 {
-        let found = format!("a length of {length} in a file of {} bytes", bytes.len());
-        return Err(wrong(8, "GLB file of another length than it says").found(found).into());
+    if length < 12 {
+        return Err(wrong(8, "wrong length in the header of the GLB file")
+            .found(length)
+            .expected("12 or more")
+            .into());
+    }
+    if length > bytes.len() {
+        let sizes =
+            format!("its header says {length} bytes, the file has {}; copy or export it again", bytes.len());
+        return Err(wrong(8, "file is truncated").because(sizes).into());
     }
     if length < bytes.len() {
         let found = format!("{} bytes", bytes.len() - length);
@@ -91,7 +101,7 @@ pub(super) fn read<'a>(bytes: &'a [u8], name: &Arc<str>, diagnostics: &mut Diagn
             }
             binary = Some(data);
         } else {
-            let warning = Diagnostic::warning("unknown GLB chunk was left out").at(place(at + 4));
+            let warning = Diagnostic::warning("unknown GLB chunk is left out").at(place(at + 4));
             diagnostics.push(warning.found(quoted_bytes(kind)));
         }
         // A length that was not rounded up may leave out the padding, or only its bytes.

@@ -124,7 +124,7 @@ impl<'f> Exposure<'f> {
             Ok(motion) => Ok(Some(Arc::new(motion))),
             Err(error) => {
                 let value = self.file.list(List::Nodes)[node];
-                self.file.warn(value, &format!("the motion of a node was left out: {error}"));
+                self.file.warn(value, &format!("the motion of a node is left out: {error}"));
                 Ok(None)
             }
         }

@@ -359,8 +359,7 @@ impl<'a> File<'a> {
                 let path = self.folder.join(path);
                 let input = Input::open(&path, self.budget).map_err(|error| match error {
                     FormatError::Io { source, action, .. } => {
-                        let wrong = uri.wrong(format!("{action}: {source}"));
-                        FormatError::from(wrong.found(quoted(&path.display().to_string())))
+                        uri.wrong(format!("{}: {action}: {source}", path.display())).into()
                     }
                     other => other,
                 })?;

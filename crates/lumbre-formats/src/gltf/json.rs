@@ -563,11 +563,14 @@ impl<'a> Value<'a> {
         match usize::try_from(index) {
             Ok(index) if index < count => Ok(index),
             _ => {
-                let expected = match count {
-                    0 => format!("{what}, but the file has none"),
-                    _ => format!("{what} from 0 to {}", count - 1),
-                };
-                Err(self.unexpected("index of something that is not there", &expected))
+                let noun = what.trim_start_matches("an ").trim_start_matches("a ");
+                let wrong = self.wrong(format!("there is no {noun} {index}"));
+                Err(match count {
+                    0 => wrong.expected("no index: there are none"),
+                    1 => wrong.expected("0"),
+                    _ => wrong.expected(format!("0 to {}", count - 1)),
+                }
+                .into())
             }
         }
     }

@@ -83,7 +83,7 @@ fn wrong(name: &Arc<str>, at: u64, message: &str) -> Diagnostic {
 /// Checks what the decoder relies on.
 fn header(bytes: &[u8], name: &Arc<str>) -> Read<Header> {
     if bytes.len() < HEADER {
-        let wrong = wrong(name, bytes.len() as u64, "KTX 2.0 texture that ends in its header");
+        let wrong = wrong(name, bytes.len() as u64, "KTX 2.0 texture is truncated in its header");
         return Err(wrong.found(format!("{} bytes", bytes.len())).into());
     }
     let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
@@ -147,7 +147,7 @@ fn zstandard_size(data: &[u8]) -> Option<[u64; 2]> {
 fn in_words(error: &basisu::Error) -> String {
     match error {
         basisu::Error::InvalidData => "data that is not of Basis Universal".to_owned(),
-        basisu::Error::Truncated => "data that ends too early".to_owned(),
+        basisu::Error::Truncated => "truncated data".to_owned(),
         basisu::Error::Unsupported { .. } => "a kind of texture that is not decoded to colours".to_owned(),
         basisu::Error::UnsupportedFeature(what) => format!("what is not supported: {what}"),
         basisu::Error::VideoRequiresState => "a video".to_owned(),

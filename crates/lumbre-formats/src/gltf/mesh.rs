@@ -228,7 +228,7 @@ impl<'a> Attributes<'a> {
             }
             let put = |list: &mut Vec<Option<Accessor<'a>>>, set: usize| {
                 if set >= MAX_SETS {
-                    file.warn(index, "attribute beyond the sixteenth set was left out");
+                    file.warn(index, "attribute is left out: beyond the sixteenth set");
                     return;
                 }
                 if list.len() <= set {
@@ -249,7 +249,7 @@ impl<'a> Attributes<'a> {
                 Attribute::Tangent => attributes.tangent = Some(accessor),
                 Attribute::TexCoord(set) => put(&mut attributes.uvs, set),
                 Attribute::Colour(0) => attributes.colour = Some(accessor),
-                Attribute::Colour(_) => file.warn(index, "colours beyond the first set were left out"),
+                Attribute::Colour(_) => file.warn(index, "colours beyond the first set are left out"),
                 Attribute::Joints(_) | Attribute::Weights(_) if is_target => {
                     file.breach(
                         index.wrong("attribute that a morph target cannot have").found(quoted(&name)),
@@ -319,9 +319,8 @@ impl<'a> Primitive<'a> {
         };
         let count = indices.as_ref().map(|i| i.count).or(attributes.count());
         if let Some(count) = count.filter(|&count| mode.whole(count) != count) {
-            let warning = value
-                .wrong("vertices that make no whole shape were left out")
-                .found(format!("{count} of {}", mode.name()));
+            let warning =
+                value.wrong("left-over vertices are left out").found(format!("{count} of {}", mode.name()));
             file.push(crate::Diagnostic { severity: crate::Severity::Warning, ..warning });
         }
         let mut targets = vec![];
@@ -343,7 +342,7 @@ impl<'a> Primitive<'a> {
                     let Some(added) = added else { continue };
                     let Some(base) = base else {
                         return Err(target
-                            .wrong("morph target of an attribute that is not there")
+                            .wrong("morph target of an attribute that does not exist")
                             .found(name)
                             .into());
                     };
@@ -618,7 +617,7 @@ pub(super) fn assemble(file: &File<'_>, primitive: &Primitive<'_>, positions: &[
                     0 => "vertices".to_owned(),
                     n => format!("0 to {}", n - 1),
                 };
-                ("index of a vertex that is not there", culprit, format!("{v} as index {i}"), expected)
+                ("index of a vertex that does not exist", culprit, format!("{v} as index {i}"), expected)
             }
         };
         let wrong = culprit.wrong(message).found(found).expected(expected);

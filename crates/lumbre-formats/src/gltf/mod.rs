@@ -42,7 +42,7 @@ use self::animation::Playing;
 use self::file::File;
 use self::json::{Inside, Json, Read, Value};
 use crate::budget::{Budget, Limits};
-use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, nearest_name, quoted};
+use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, nearest_name, quoted, quoted_bytes};
 use crate::input::{Input, text};
 
 /// Options of reading a glTF.
@@ -125,6 +125,18 @@ pub fn read_gltf(
         .map_err(|e| e.or_at(|| Place::whole(name.clone())))
 }
 
+/// Whether a file is named as a GLB file, packed or not.
+fn has_name_of_glb(name: &str) -> bool {
+    let name = name.to_ascii_lowercase();
+    name.strip_suffix(".gz").unwrap_or(&name).ends_with(".glb")
+}
+
+/// Whether a text may be JSON: an object, or a text that says its encoding.
+fn is_like_json(bytes: &[u8]) -> bool {
+    let marks: [&[u8]; 3] = [b"\xEF\xBB\xBF", b"\xFE\xFF", b"\xFF\xFE"];
+    bytes.trim_ascii_start().starts_with(b"{") || marks.iter().any(|mark| bytes.starts_with(mark))
+}
+
 fn read(
     bytes: &[u8],
     name: &Arc<str>,
@@ -152,6 +164,11 @@ fn read(
                 .at(Place::whole(name.clone()))
                 .expected("a glTF")
                 .into());
+        }
+        if has_name_of_glb(name) && !is_like_json(bytes) {
+            let wrong = Diagnostic::error("not a GLB file").at(Place::binary(name.clone(), 0, ""));
+            let start = quoted_bytes(&bytes[..bytes.len().min(4)]);
+            return Err(wrong.found(start).expected("it to begin with \"glTF\"").into());
         }
         (text(bytes, name)?, None, None)
     };
@@ -241,7 +258,7 @@ fn extensions(file: &File<'_>, root: Value<'_>) -> Read<()> {
             let extension = value.string()?;
             if !SUPPORTED.contains(&&*extension) {
                 let warning =
-                    Diagnostic::warning("extension that is not supported was left out").at(value.place());
+                    Diagnostic::warning("extension is not supported, and left out").at(value.place());
                 file.push(warning.found(quoted(&extension)));
             }
             used.insert(extension);

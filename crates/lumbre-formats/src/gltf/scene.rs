@@ -224,11 +224,13 @@ fn variant(file: &File<'_>, options: &GltfOptions) -> Read<Option<usize>> {
     if let Some(index) = names.iter().position(|name| name == wanted) {
         return Ok(Some(index));
     }
+    if names.is_empty() {
+        let wrong = format!("--variant {}: the file has no material variants", quoted(wanted));
+        return Err(Diagnostic::error(wrong).at(file.whole()).into());
+    }
     let wrong = Diagnostic::error("no such material variant").at(file.whole()).found(quoted(wanted));
     let known: Vec<String> = names.iter().take(20).map(|name| quoted(name)).collect();
-    let expected =
-        if known.is_empty() { "no variant: the file has none".to_owned() } else { known.join(", ") };
-    Err(wrong.expected(expected).suggest(wanted, names.iter().map(String::as_str)).into())
+    Err(wrong.expected(known.join(", ")).suggest(wanted, names.iter().map(String::as_str)).into())
 }
 
 /// The root nodes of the scene to show.
@@ -438,7 +440,10 @@ impl Builder<'_> {
             Err(_) => {
                 // A flattened mesh may still be visible; one collapsed to a line or a point is not.
                 let node = self.file.list(List::Nodes)[place.node];
-                self.file.warn(node, "what a node without an inverse holds is flattened or left out");
+                self.file.warn(
+                    node,
+                    "the transform of a node cannot be inverted: its shapes are flattened, or left out",
+                );
                 scene.shapes.extend(shapes.into_iter().filter_map(|shape| flattened(shape, world)));
             }
         }
@@ -457,7 +462,7 @@ impl Builder<'_> {
         for value in mesh.need("primitives")?.array()? {
             let primitive = Primitive::read(file, value, self.variant)?;
             if primitive.attributes.position.is_none() {
-                file.warn(value, "primitive without positions was left out");
+                file.warn(value, "primitive without positions is left out");
                 continue;
             }
             let has_colours = primitive.attributes.colour.is_some();
@@ -484,7 +489,7 @@ impl Builder<'_> {
             } else if !poses.is_empty() {
                 file.warn(
                     value,
-                    "the motion of points and lines was left out: they stand as they are halfway",
+                    "the motion of points and lines is left out: their positions halfway through the shutter are used",
                 );
             }
             let shape = |geometry, index| ShapeDesc {
@@ -773,7 +778,7 @@ pub(super) fn light(file: &File<'_>, light: Value<'_>, world: &DAffine3) -> Read
             }
         }
         other => {
-            let warning = Diagnostic::warning("light of an unknown kind was left out").at(kind.place());
+            let warning = Diagnostic::warning("light of an unknown kind is left out").at(kind.place());
             file.push(warning.found(quoted(other)));
             return Ok(None);
         }

@@ -109,7 +109,7 @@ impl<'f> Materials<'f> {
         if others.len() > FURTHER_SETS
             && let Some(index) = index
         {
-            let message = "textures on a fifth set of texture coordinates were left out";
+            let message = "textures on a fifth set of texture coordinates are left out";
             self.file.warn(self.file.list(List::Materials)[index], message);
         }
         let further = std::array::from_fn(|i| others.get(i).copied());

@@ -166,7 +166,7 @@ impl<'f> Textures<'f> {
         let value = file.list(List::Textures)[texture];
         let map = match source(file, value)? {
             None => {
-                file.warn(value, "texture without an image was left out");
+                file.warn(value, "texture without an image is left out");
                 None
             }
             Some(image) => match self.image(image)? {
@@ -206,8 +206,8 @@ impl<'f> Textures<'f> {
             Ok(image) => Some(Arc::new(image)),
             // As in other programs, the rest is shown without an image that is missing.
             Err(error @ crate::FormatError::Input(_)) if file.is_lenient() || is_absent(file, value)? => {
-                let warning = Diagnostic::warning("image that cannot be read was left out").at(value.place());
-                file.push(warning.found(error));
+                let warning = Diagnostic::warning("image is left out").at(value.place());
+                file.push(warning.because(within(&value.place(), &error)));
                 None
             }
             Err(error) => return Err(error.included_from(value.place())),
@@ -231,7 +231,17 @@ fn image_name(value: Value<'_>, index: usize) -> Read<String> {
     Ok(value.string_at("name")?.map_or_else(|| format!("image {index}"), |name| name.into_owned()))
 }
 
-/// Whether an image is in a file that is not there, or elsewhere.
+/// An error about an image, without a place in the file that names it.
+fn within(place: &Place, error: &crate::FormatError) -> String {
+    match error {
+        crate::FormatError::Input(wrong) if wrong.place.as_ref().is_some_and(|at| at.file == place.file) => {
+            Diagnostic { place: None, ..(**wrong).clone() }.body()
+        }
+        _ => error.to_string(),
+    }
+}
+
+/// Whether an image is in a file that does not exist, or elsewhere.
 fn is_absent(file: &File<'_>, value: Value<'_>) -> Read<bool> {
     let Some(uri) = value.get("uri")? else { return Ok(false) };
     Ok(match target(&uri.string()?) {

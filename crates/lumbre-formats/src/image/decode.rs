@@ -13,7 +13,7 @@ use super::damage::{Tracked, first_damage, place_of_size};
 use super::{ImageFile, ImageFormat, check_expansion};
 use crate::budget::{Budget, LimitError, LimitKind};
 use crate::contained::contained;
-use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted};
+use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, in_one_line};
 
 pub(super) fn read(
     format: ImageFormat,
@@ -123,7 +123,7 @@ impl Encoded<'_> {
             _ => place.clone(),
         };
         let wrong = Diagnostic::error(format!("{kind} {} image", format.name())).at(at);
-        wrong.found(quoted(&error.to_string())).into()
+        wrong.because(in_one_line(&error.to_string())).into()
     }
 }
 

@@ -19,7 +19,7 @@ use super::write::{ExrCompression, ExrPrecision, WriteOptions};
 use super::{ImageFile, ImageFormat, check_expansion, origin};
 use crate::budget::{Budget, Hold};
 use crate::contained::contained;
-use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted};
+use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, in_one_line, quoted};
 
 pub(super) fn read(
     bytes: &[u8],
@@ -239,7 +239,7 @@ fn fault(place: &Place, at: &Cell<u64>, error: exr::error::Error) -> FormatError
     };
     let place = Place::binary(place.file.clone(), at.get(), "");
     let wrong = Diagnostic::error(format!("{kind} EXR image")).at(place);
-    wrong.found(quoted(&error.to_string())).into()
+    wrong.because(in_one_line(&error.to_string())).into()
 }
 
 pub(super) fn encode(layers: &Layers, options: &WriteOptions) -> std::io::Result<Vec<u8>> {

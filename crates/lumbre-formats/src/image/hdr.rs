@@ -216,7 +216,7 @@ impl<'a> Reader<'a> {
                 self.at += count;
                 Ok(taken)
             }
-            None => Err(Diagnostic::error("HDR image ends early")
+            None => Err(Diagnostic::error("HDR image is truncated")
                 .at(Place::binary(self.name.clone(), self.bytes.len() as u64, format!("/row/{row}")))
                 .into()),
         }

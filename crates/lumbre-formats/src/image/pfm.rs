@@ -42,7 +42,7 @@ pub(super) fn read(bytes: &[u8], name: &Arc<str>, budget: &Budget) -> Result<Ima
     let found = bytes.len().saturating_sub(start) as u64;
     let expected = samples.saturating_mul(4);
     if found < expected {
-        let wrong = fault(start, "PFM image ends early").found(format!("{found} bytes of pixels"));
+        let wrong = fault(start, "PFM image is truncated").found(format!("{found} bytes of pixels"));
         return Err(wrong.expected(format!("{expected} for {width} by {height}")).into());
     }
     let mut data: Vec<f32> = budget.vec(samples, "image")?;

@@ -269,7 +269,7 @@ impl<'a> Reader<'a> {
             b"l" | b"p" => self.thin(keyword, words),
             b"vp" | b"cstype" | b"deg" | b"bmat" | b"step" | b"curv" | b"curv2" | b"surf" | b"parm"
             | b"trim" | b"hole" | b"scrv" | b"sp" | b"end" | b"con" | b"ctech" | b"stech" => {
-                self.pass_over(keyword, "free-form curves and surfaces are not supported, passed over");
+                self.pass_over(keyword, "free-form curves and surfaces are not supported, and left out");
                 Ok(())
             }
             // Display hints for other programs.
@@ -279,7 +279,7 @@ impl<'a> Reader<'a> {
                 let known = ["v", "vt", "vn", "f", "usemtl", "mtllib"];
                 let text = String::from_utf8_lossy(&keyword.bytes[..keyword.bytes.len().min(64)]);
                 let source = self.source;
-                self.diagnostics.warn("unknown keyword, line passed over", |said| {
+                self.diagnostics.warn("line with an unknown keyword is left out", |said| {
                     Diagnostic { severity: said.severity, ..source.wrong(keyword, said.message) }
                         .suggest(&text, known)
                 });
@@ -424,12 +424,12 @@ impl<'a> Reader<'a> {
             return Ok(());
         }
         if self.face.len() < 3 {
-            self.pass_over(keyword, "face with fewer than three corners, dropped");
+            self.pass_over(keyword, "face with fewer than three vertices is left out");
             return Ok(());
         }
         let is_unusable = |c: &Corner| self.unusable.binary_search(&c[0]).is_ok();
         if !self.unusable.is_empty() && self.face.iter().any(is_unusable) {
-            self.pass_over(keyword, "face with a vertex that is not finite, dropped");
+            self.pass_over(keyword, "face with a vertex that is not finite is left out");
             return Ok(());
         }
         let has = |slot: usize| self.face.iter().all(|c| c[slot] != NONE);
@@ -489,13 +489,13 @@ impl<'a> Reader<'a> {
 
     /// `p v …`, a point for each vertex, or `l v …`, a line through all of them.
     fn thin(&mut self, keyword: Word<'a>, words: Words<'a>) -> Result<(), FormatError> {
-        let dropped = |_| "point or line with a vertex that is not there, dropped";
+        let dropped = |_| "point or line with a vertex that does not exist is left out";
         if !self.read_face(keyword, words, dropped)? {
             return Ok(());
         }
         let is_unusable = |c: &Corner| self.unusable.binary_search(&c[0]).is_ok();
         if !self.unusable.is_empty() && self.face.iter().any(is_unusable) {
-            self.pass_over(keyword, "point or line with a vertex that is not finite, dropped");
+            self.pass_over(keyword, "point or line with a vertex that is not finite is left out");
             return Ok(());
         }
         // Names of objects and groups do not matter to them.
@@ -619,14 +619,15 @@ impl<'a> Reader<'a> {
     #[cold]
     fn absent(&self, digits: Word<'a>, what: &str, count: usize) -> Result<u32, Unusable> {
         if self.diagnostics.is_lenient() {
-            return Err(Unusable::Drop("face with a corner that is not there, dropped"));
+            return Err(Unusable::Drop("face with a vertex that does not exist is left out"));
         }
-        let wrong = Diagnostic::error(format!("face with a {what} that is not there"))
+        let wrong = Diagnostic::error(format!("face with a {what} that does not exist"))
             .at(self.source.place(digits.start));
         let wrong = wrong.found(String::from_utf8_lossy(&digits.bytes[..digits.bytes.len().min(24)]));
         Err(match count {
             0 => wrong.expected(format!("none, as there is no {what}")),
-            _ => wrong.expected(format!("1 to {count}, or backwards from -1")),
+            1 => wrong.expected("1 or -1"),
+            _ => wrong.expected(format!("1 to {count}, or -{count} to -1")),
         }
         .into())
     }

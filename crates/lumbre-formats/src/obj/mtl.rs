@@ -235,7 +235,7 @@ impl<'a> Reader<'a, '_> {
                     "bump", "norm",
                 ];
                 let text = String::from_utf8_lossy(&keyword.bytes[..keyword.bytes.len().min(64)]);
-                self.diagnostics.warn("unknown key of a material, passed over", |said| {
+                self.diagnostics.warn("unknown key of a material is left out", |said| {
                     Diagnostic { severity: said.severity, ..source.wrong(keyword, said.message) }
                         .suggest(&text, known)
                 });

@@ -194,10 +194,9 @@ impl Builder<'_> {
             }
             let input = match Input::open(&path, self.budget) {
                 Ok(input) => input,
-                Err(FormatError::Io { source, .. }) => {
-                    let said = Diagnostic::warning("cannot read a material file").at(place.clone());
-                    self.diagnostics
-                        .push(said.found(format!("{}: {source}", quoted(&path.to_string_lossy()))));
+                Err(error @ FormatError::Io { .. }) => {
+                    let said = Diagnostic::warning("material file is left out").at(place.clone());
+                    self.diagnostics.push(said.because(error));
                     continue;
                 }
                 Err(e) => return Err(e.included_from(place.clone())),
@@ -388,8 +387,8 @@ impl Builder<'_> {
             Ok(file) => file,
             Err(e @ FormatError::Limit { .. }) => return Err(e.included_from(map.place.clone())),
             Err(e) => {
-                let said = Diagnostic::warning("cannot use a texture").at(map.place.clone());
-                self.diagnostics.push(said.found(e.to_string()));
+                let said = Diagnostic::warning("texture is left out").at(map.place.clone());
+                self.diagnostics.push(said.because(e));
                 return Ok(None);
             }
         };

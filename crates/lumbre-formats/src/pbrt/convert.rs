@@ -679,12 +679,18 @@ fn shared<K: Hash + Eq, T: TextureValue>(
     made
 }
 
+/// What the system says of a file that the scene names.
+pub(super) fn io_message(path: &std::path::Path, action: &str, source: &std::io::Error) -> String {
+    match path.as_os_str().is_empty() {
+        true => format!("\"\": {action}: {source}"),
+        false => format!("{}: {action}: {source}", path.display()),
+    }
+}
+
 /// An error about a file that the scene names, at the place that names it.
 pub(super) fn file_fault(at: SourcePosition, error: FormatError) -> Fault {
     match error {
-        FormatError::Io { path, action, source } => {
-            at.error(format!("{action} {}: {source}", quoted(&path.display().to_string())))
-        }
+        FormatError::Io { path, action, source } => at.error(io_message(&path, action, &source)),
         FormatError::Limit { place: None, source } => Fault::Limit(at, Box::new(source)),
         other => Fault::Named(at, Box::new(other)),
     }

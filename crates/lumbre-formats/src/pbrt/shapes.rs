@@ -169,7 +169,9 @@ impl Converter<'_, '_> {
         };
         if !lightless.is_empty() {
             let from = self.files.place(light.spot);
-            return Err(spot.error(format!("{lightless} cannot be an area light (that of {from})")));
+            return Err(spot.error(format!(
+                "{lightless} cannot be an area light (that of {from}); is an AttributeEnd missing?"
+            )));
         }
         match state.material {
             None => {
@@ -346,7 +348,7 @@ impl Converter<'_, '_> {
         let indices = if indices.len().is_multiple_of(N) {
             indices
         } else if N == 3 && self.diagnostics.is_lenient() {
-            self.note(spot, "indices that make no whole triangle are dropped");
+            self.note(spot, "indices that make no whole triangle are left out");
             &indices[..indices.len() - indices.len() % N]
         } else {
             let wrong = Diagnostic::error("wrong number of indices").found(indices.len());
@@ -376,7 +378,7 @@ impl Converter<'_, '_> {
             }
         }
         if dropped > 0 {
-            let message = "faces with an index out of range are dropped";
+            let message = "faces with an index out of range are left out";
             self.warn(spot, Diagnostic::warning(message).found(format!("{dropped} of them")));
         }
         Ok((faces, kept))

@@ -603,7 +603,10 @@ impl Converter<'_, '_> {
 
 /// An image that is not what it should be, for a message at the place that names it.
 pub(super) fn unreadable(name: &str, error: &FormatError) -> Diagnostic {
-    Diagnostic::error(format!("cannot read {}: {error}", quoted(name)))
+    match error {
+        FormatError::Io { .. } => Diagnostic::error(error.to_string()),
+        _ => Diagnostic::error(format!("cannot read {}: {error}", quoted(name))),
+    }
 }
 
 /// The encoding of a texture's image.

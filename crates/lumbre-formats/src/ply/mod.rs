@@ -388,10 +388,15 @@ impl<'a> Mesh<'a> {
             let last = u64::from(self.encoding == Encoding::Text);
             let most = (source.left() as u64 + last) / least;
             if element.count > most {
-                let wrong =
-                    Diagnostic::error(format!("more elements {} than the file holds", quoted(&element.name)));
-                let wrong = wrong.at(element.place.clone()).found(element.count);
-                return Err(wrong.expected(format!("at most {most}")).into());
+                let elements = match (&*element.name, element.count) {
+                    (name @ ("vertex" | "face" | "edge"), 1) => name.to_owned(),
+                    ("vertex", _) => "vertices".to_owned(),
+                    (name @ ("face" | "edge"), _) => format!("{name}s"),
+                    (name, _) => format!("of {}", quoted(name)),
+                };
+                let counts = format!("{} {elements} announced, room for {most}", element.count);
+                let wrong = Diagnostic::error("file is truncated").at(element.place.clone());
+                return Err(wrong.because(counts).into());
             }
             self.budget
                 .elements(element.count, "PLY elements")
@@ -420,9 +425,13 @@ impl<'a> Mesh<'a> {
         }
         let rest = &self.bytes[source.at()..];
         if rest.iter().any(|b| !b.is_ascii_whitespace() && *b != 0) {
-            let said = Diagnostic::warning("PLY file goes on after its last element");
-            self.diagnostics
-                .push(said.at(self.place(source.at(), "", 0, "")).found(format!("{} bytes", rest.len())));
+            let start = source.at();
+            let place = match self.encoding {
+                Encoding::Text => self.place(start, "", 0, ""),
+                _ => Place::binary(self.name.clone(), start as u64, ""),
+            };
+            let said = Diagnostic::warning("bytes after the last element are left out").at(place);
+            self.diagnostics.push(said.found(format!("{} bytes", rest.len())));
         }
         Ok(())
     }
@@ -480,7 +489,7 @@ impl<'a> Mesh<'a> {
             if found.iter().all(is_there) {
                 self.edges.push(found.map(|v| v as u32))?;
             } else {
-                self.drop_face("edge with a vertex that is not there, dropped", element, index, start);
+                self.drop_face("edge with a vertex that does not exist is left out", element, index, start);
             }
         }
         Ok(())
@@ -810,7 +819,7 @@ impl<'a> Mesh<'a> {
         }
         let has_uvs = uvs.len() == 2 * corners.len() && uvs.iter().all(|uv| uv.is_finite());
         if !uvs.is_empty() && !has_uvs {
-            let what = "texture coordinates of a face that are not two numbers a corner, left out";
+            let what = "texture coordinates of a face are left out: expected two numbers per vertex";
             self.drop_face(what, element, index, at);
         }
         if !has_uvs && colour.is_none() {
@@ -872,13 +881,13 @@ impl<'a> Mesh<'a> {
         if !self.unusable.is_empty()
             && corners.iter().any(|&c| self.unusable.binary_search(&(c as u32)).is_ok())
         {
-            self.drop_face("face with a vertex that is not finite, dropped", element, index, at);
+            self.drop_face("face with a vertex that is not finite is left out", element, index, at);
             return Ok(());
         }
         match *corners {
             [a, b, c] => self.triangle([a as u32, b as u32, c as u32], number)?,
             [] | [_] | [_, _] => {
-                self.drop_face("face with fewer than three corners, dropped", element, index, at);
+                self.drop_face("face with fewer than three vertices is left out", element, index, at);
             }
             [a, b, c, d] if polygon::is_convex(&[a, b, c, d].map(|i| self.positions[i as usize])) => {
                 self.quads.push([a, b, c, d].map(|i| i as u32))?;
@@ -949,7 +958,7 @@ impl<'a> Mesh<'a> {
         at: usize,
     ) -> Result<(), FormatError> {
         if self.diagnostics.is_lenient() {
-            self.drop_face("face with a vertex that is not there, dropped", element, index, at);
+            self.drop_face("face with a vertex that does not exist is left out", element, index, at);
             return Ok(());
         }
         let place = self.place(self.encoding.start(self.bytes, at), &element.name, index, "vertex_indices");
@@ -959,7 +968,7 @@ impl<'a> Mesh<'a> {
         } else {
             format!("0 to {}", count - 1)
         };
-        let wrong = Diagnostic::error(format!("face {index} has a vertex that is not there")).at(place);
+        let wrong = Diagnostic::error(format!("face {index} has a vertex that does not exist")).at(place);
         let found =
             if corner == i64::MIN { "a number that is not whole".to_owned() } else { corner.to_string() };
         Err(wrong.found(found).expected(expected).into())

@@ -41,7 +41,11 @@ impl<'a> Text<'a> {
         let length = rest.iter().position(blank).unwrap_or(rest.len());
         self.at += start;
         if length == 0 {
-            return Err(Box::new(Fault { at: self.at, message: "file ends early", found: "its end".into() }));
+            return Err(Box::new(Fault {
+                at: self.at,
+                message: "file is truncated",
+                found: "the end of the file".into(),
+            }));
         }
         self.at += length;
         Ok(&rest[..length])
@@ -101,7 +105,7 @@ impl<const BIG: bool> Binary<'_, BIG> {
     pub(super) fn take<const N: usize>(&mut self) -> Read<[u8; N]> {
         let Some(&taken) = self.bytes[self.at..].first_chunk::<N>() else {
             let (at, found) = (self.bytes.len(), format!("{} bytes", self.left()));
-            return Err(Box::new(Fault { at, message: "file ends early", found }));
+            return Err(Box::new(Fault { at, message: "file is truncated", found }));
         };
         self.at += N;
         Ok(taken)
@@ -141,7 +145,7 @@ impl<const BIG: bool> Source for Binary<'_, BIG> {
         let bytes = count.saturating_mul(number.bytes() as u64);
         if bytes > self.left() as u64 {
             let (at, found) = (self.bytes.len(), format!("{} bytes", self.left()));
-            return Err(Box::new(Fault { at, message: "file ends early", found }));
+            return Err(Box::new(Fault { at, message: "file is truncated", found }));
         }
         self.at += bytes as usize;
         Ok(())

@@ -136,7 +136,7 @@ def render(
         for task, part in parts:
             take(task, part)
     if any(whole is None for whole in wholes):
-        raise LumbreError(f"time: {time} s were over before every pixel had a sample")
+        raise LumbreError(f"time: {time} s passed before every pixel had a sample")
     images = [Image(whole.picture()) for whole in wholes if whole is not None]
     return images if frames is not None else images[0]
 

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use lumbre_math::Transform;
 
-use super::convert::Converter;
+use super::convert::{Converter, io_message};
 use super::lexer::{Lexer, Token, TokenKind};
 use super::source::{AtSpot, Fault, Result, SourcePosition};
 use super::state::{Scope, State};
@@ -138,11 +138,11 @@ impl<'b, 'd> Parser<'b, 'd> {
         let input = match Input::open(&path, self.converter.budget) {
             Ok(input) => input,
             Err(FormatError::Io { action, source, path }) => {
-                let message = format!("{action} {}: {source}", quoted(&path.display().to_string()));
+                let message = io_message(&path, action, &source);
                 if !self.converter.diagnostics.is_lenient() {
                     return Err(at.error(message));
                 }
-                self.converter.note(at, format!("{message}; the scene goes on without it"));
+                self.converter.note(at, format!("{message}; the scene is read without it"));
                 return Ok(());
             }
             Err(FormatError::Limit { source, .. }) => return Err(Fault::Limit(at, Box::new(source))),

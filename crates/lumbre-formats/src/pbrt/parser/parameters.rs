@@ -79,15 +79,15 @@ impl Parser<'_, '_> {
     fn values(&mut self, ty: Type, name: &str) -> Result<Values> {
         let expected = match ty.wants() {
             Wants::Bools => "true or false",
-            Wants::Integers => "integer",
-            Wants::Strings => "string",
-            Wants::Numbers => ty.name(),
+            Wants::Integers => "a whole number",
+            Wants::Strings => "a string in quotes",
+            Wants::Numbers => "a number",
             Wants::NumbersOrStrings => "numbers or a string",
         };
         let mut token = self.expect(&format!("a value for parameter {}", quoted(name)))?;
         let bracketed = token.kind == TokenKind::Open;
         if bracketed {
-            token = self.expect("]")?;
+            token = self.expect("\"]\"")?;
         }
         let mut values = match ty.wants() {
             Wants::Bools => Values::Bools(vec![]),
@@ -108,7 +108,7 @@ impl Parser<'_, '_> {
                 return Ok(values);
             }
             self.more_numbers(&mut values, token)?;
-            token = self.expect("]")?;
+            token = self.expect("\"]\"")?;
         }
     }
 
