@@ -3,11 +3,11 @@
 use super::scenes::Random;
 use crate::intersect::{Dispatch, Isa, Simd};
 use crate::simd::vector::stack_entry;
-use crate::simd::{F32x8, F32x16, LastEight, Row, Vector, WIDE};
+use crate::simd::{F32x8, F32x16, LANES, LastEight, Row, Vector};
 
 /// What is looked at of sixteen rows, and of numbers in double precision.
 struct Together<'a> {
-    rows: &'a [Row<f32>; WIDE],
+    rows: &'a [Row<f32>; LANES],
     exact: &'a Row<f64>,
     place: f64,
     scale: f64,
@@ -58,7 +58,7 @@ impl Dispatch for Together<'_> {
 fn sixteen_numbers_give_together_what_each_gives_alone() {
     let mut random = Random(172);
     for round in 0..200 {
-        let mut rows = [Row::of(0.0); WIDE];
+        let mut rows = [Row::of(0.0); LANES];
         for row in &mut rows {
             row.0 = std::array::from_fn(|_| (random.unit() - 0.5) as f32);
         }
@@ -72,7 +72,7 @@ fn sixteen_numbers_give_together_what_each_gives_alone() {
         if is_one {
             exact = Row::of(exact.0[0]);
         }
-        let differs = if round % 5 == 0 { Some(round % WIDE) } else { None };
+        let differs = if round % 5 == 0 { Some(round % LANES) } else { None };
         if let Some(lane) = differs {
             exact.0[lane] = [f64::NAN, exact.0[lane] + 1e-15][round % 2];
         }
@@ -81,7 +81,7 @@ fn sixteen_numbers_give_together_what_each_gives_alone() {
         let rounded = exact.0.map(|x| (x - place) as f32);
         let rest = std::array::from_fn(|i| (exact.0[i] - place - f64::from(rounded[i])) as f32);
         let with_bits =
-            (0..WIDE).filter(|&i| rows[0].0[i].to_bits() == rows[0].0[3].to_bits()).map(|i| 1 << i).sum();
+            (0..LANES).filter(|&i| rows[0].0[i].to_bits() == rows[0].0[3].to_bits()).map(|i| 1 << i).sum();
         let most = rows.each_ref().map(|row| row.0.iter().copied().fold(f32::NEG_INFINITY, f32::max));
         for isa in Isa::all() {
             let given = isa.run(Together { rows: &rows, exact: &exact, place, scale });
@@ -90,9 +90,9 @@ fn sixteen_numbers_give_together_what_each_gives_alone() {
             assert_eq!(given.most[from..], most[from..8], "{isa:?}");
             assert_eq!(given.with_bits, with_bits, "{isa:?}");
             assert_eq!(given.first.to_bits(), rows[0].0[0].to_bits(), "{isa:?}");
-            assert_eq!(given.middle.0.map(f32::to_bits), [middle.to_bits(); WIDE], "{isa:?}");
+            assert_eq!(given.middle.0.map(f32::to_bits), [middle.to_bits(); LANES], "{isa:?}");
             assert_eq!(given.are_same, is_one && differs.is_none(), "{isa:?}");
-            let bits = |row: [f32; WIDE]| row.map(|x| if x.is_nan() { None } else { Some(x.to_bits()) });
+            let bits = |row: [f32; LANES]| row.map(|x| if x.is_nan() { None } else { Some(x.to_bits()) });
             let scaled = exact.0.map(|x| ((x - place) * scale) as f32);
             assert_eq!(bits(given.rounded.0), bits(scaled), "{isa:?}");
             assert_eq!(bits(given.parted[0].0), bits(rounded), "{isa:?}");
@@ -128,7 +128,7 @@ fn arithmetic<V: Vector>(a: V, b: V, c: V) -> Results {
 }
 
 /// The same of eight and of sixteen.
-struct Arithmetic([[f32; WIDE]; 3]);
+struct Arithmetic([[f32; LANES]; 3]);
 
 impl Dispatch for Arithmetic {
     type Output = [Results; 2];
@@ -136,8 +136,8 @@ impl Dispatch for Arithmetic {
     #[inline(always)]
     fn run<L: Simd>(self) -> [Results; 2] {
         let [a, b, c] = &self.0;
-        let eight = |row: &[f32; WIDE]| L::F32x8::load(row.first_chunk().expect("sixteen"));
-        let wide = |row: &[f32; WIDE]| L::F32x16::load(row);
+        let eight = |row: &[f32; LANES]| L::F32x8::load(row.first_chunk().expect("sixteen"));
+        let wide = |row: &[f32; LANES]| L::F32x16::load(row);
         [arithmetic(eight(a), eight(b), eight(c)), arithmetic(wide(a), wide(b), wide(c))]
     }
 }
@@ -148,7 +148,7 @@ fn arithmetic_gives_in_every_lane_what_it_gives_alone() {
     for _ in 0..100 {
         // Whole numbers, of which nothing is rounded.
         let mut row = || std::array::from_fn(|_| random.below(9) as f32 - 4.0);
-        let [a, b, c]: [[f32; WIDE]; 3] = [row(), row(), row()];
+        let [a, b, c]: [[f32; LANES]; 3] = [row(), row(), row()];
         let alone = |i: usize| {
             let (a, b, c) = (a[i], b[i], c[i]);
             let turned = if b.is_sign_negative() { -a } else { a };
@@ -159,7 +159,7 @@ fn arithmetic_gives_in_every_lane_what_it_gives_alone() {
         for isa in Isa::all() {
             for (results, masks) in isa.run(Arithmetic([a, b, c])) {
                 let count = results[0].len();
-                assert!(count == 8 || count == WIDE);
+                assert!(count == 8 || count == LANES);
                 for i in 0..count {
                     let given: Vec<f32> = results.iter().map(|result| result[i]).collect();
                     assert_eq!(given, alone(i), "{isa:?}");
@@ -176,28 +176,28 @@ fn arithmetic_gives_in_every_lane_what_it_gives_alone() {
 struct Moved<'a> {
     rows: &'a [Row<f32>; 2],
     exact: &'a Row<f64>,
-    words: &'a [u32; WIDE],
+    words: &'a [u32; LANES],
     mask: u32,
     places: u32,
 }
 
 #[derive(Debug, PartialEq)]
 struct Movement {
-    selected: [u32; WIDE],
+    selected: [u32; LANES],
     above: u32,
-    keys: [i32; WIDE],
-    bits: [i32; WIDE],
-    at_places: [f32; 8],
+    keys: [i32; LANES],
+    bits: [i32; LANES],
+    swizzle: [f32; 8],
     first_four: [i64; 4],
     least: [f32; 2],
     lane: f32,
-    joined: [f32; WIDE],
-    two: [f32; WIDE],
+    joined: [f32; LANES],
+    two: [f32; LANES],
     are_equal: [bool; 2],
-    rounded: [f32; WIDE],
-    less: [f32; WIDE],
-    larger: [f32; WIDE],
-    smaller: [f32; WIDE],
+    rounded: [f32; LANES],
+    less: [f32; LANES],
+    larger: [f32; LANES],
+    smaller: [f32; LANES],
     is_no_larger: u32,
 }
 
@@ -218,7 +218,7 @@ impl Dispatch for Moved<'_> {
             above: a.bits_above(rows[1].0[LANE].to_bits().cast_signed()),
             keys: a.lanes_in_bits().bits(),
             bits: a.bits(),
-            at_places: a.at_places(places).to_array(),
+            swizzle: a.swizzle(places).to_array(),
             first_four: a.first_four(mask, words),
             least: [first.reduce_min(mask & 0xff), last.reduce_min(0)],
             lane: last.lane(LANE),
@@ -243,30 +243,30 @@ fn lanes_are_moved_and_chosen_as_one_by_one() {
             row.0 = std::array::from_fn(|_| (random.unit() - 0.5) as f32);
         }
         let exact = Row(std::array::from_fn(|_| random.unit() - 0.5));
-        let words: [u32; WIDE] = std::array::from_fn(|_| random.below(1 << 20) as u32);
+        let words: [u32; LANES] = std::array::from_fn(|_| random.below(1 << 20) as u32);
         // Four bits or more.
         let mask = random.below(1 << 16) as u32 | 0b1001_0000_0001_0010;
         let places = random.below(1 << 16) as u32 | (random.below(1 << 16) as u32) << 16;
         if round % 4 == 0 {
-            rows[1].0[round % WIDE] = rows[0].0[round % WIDE];
+            rows[1].0[round % LANES] = rows[0].0[round % LANES];
         }
         let [a, b] = rows.map(|row| row.0);
         let bits = a.map(|x| x.to_bits().cast_signed());
-        let lanes_of = |holds: &dyn Fn(usize) -> bool| (0..WIDE).filter(|&i| holds(i)).map(|i| 1 << i).sum();
-        let chosen: Vec<usize> = (0..WIDE).filter(|&i| mask >> i & 1 == 1).collect();
+        let lanes_of = |holds: &dyn Fn(usize) -> bool| (0..LANES).filter(|&i| holds(i)).map(|i| 1 << i).sum();
+        let chosen: Vec<usize> = (0..LANES).filter(|&i| mask >> i & 1 == 1).collect();
         let expected = Movement {
             selected: std::array::from_fn(|i| if mask >> i & 1 == 1 { a[i] } else { b[i] }.to_bits()),
             above: lanes_of(&|i| bits[i] > b[LANE].to_bits().cast_signed()),
             keys: std::array::from_fn(|i| bits[i] & !15 | i as i32),
             bits,
-            at_places: std::array::from_fn(|i| a[(places >> (4 * i) & 15) as usize]),
+            swizzle: std::array::from_fn(|i| a[(places >> (4 * i) & 15) as usize]),
             first_four: std::array::from_fn(|i| stack_entry(bits[chosen[i]], words[chosen[i]])),
             least: [
                 chosen.iter().filter(|&&i| i < 8).map(|&i| a[i]).fold(f32::INFINITY, f32::min),
                 f32::INFINITY,
             ],
             lane: a[8 + LANE],
-            joined: std::array::from_fn(|i| a[(i + 8) % WIDE]),
+            joined: std::array::from_fn(|i| a[(i + 8) % LANES]),
             two: std::array::from_fn(|i| if i < 8 { a[1] } else { a[10] }),
             are_equal: [false, true],
             rounded: exact.0.map(|x| x as f32),

@@ -62,16 +62,16 @@ impl<'s> ChordSampler<'s> {
     }
 
     /// The line of a sample: the chord of a sphere, chosen by its share of [`ChordSampler::whole`].
-    fn line(&self, draw: &SampleNumbers) -> Ray {
-        let mut left = f64::from(draw.survival(0)) * self.whole / TAU;
+    fn line(&self, numbers: &SampleNumbers) -> Ray {
+        let mut left = f64::from(numbers.survival(0)) * self.whole / TAU;
         let is_chosen = |sphere: &&BoundingSphere| {
             left -= sphere.radius * sphere.radius;
             left < 0.0
         };
         let sphere = self.spheres.iter().find(is_chosen).unwrap_or(&self.spheres[self.spheres.len() - 1]);
-        let direction = warp64::square_to_sphere(draw.lens());
+        let direction = warp64::square_to_sphere(numbers.lens());
         let (across, up) = orthonormal_basis(direction);
-        let offset = sphere.radius * warp64::square_to_disk(draw.filter());
+        let offset = sphere.radius * warp64::square_to_disk(numbers.filter());
         let half = (sphere.radius * sphere.radius - offset.length_squared()).max(0.0).sqrt();
         let middle = sphere.center + offset.x * across + offset.y * up;
         // Clipped to the sphere: points outside would be counted more often than their density.
@@ -97,7 +97,7 @@ pub(crate) struct LightTracer<'s> {
 
 /// What the light paths of a line share.
 struct Line<'a> {
-    draw: &'a SampleNumbers,
+    numbers: &'a SampleNumbers,
     time: f64,
     /// `None` in RGB.
     wavelengths: Option<Wavelengths>,
@@ -167,11 +167,11 @@ impl<'s> LightTracer<'s> {
         mut visit: impl FnMut(DVec3, &Line<'_>, u32),
     ) {
         // Not a pixel of any picture.
-        let draw = self.sampler.draw(u32::MAX, pass, line);
-        let time = self.view.time(draw.time());
+        let numbers = self.sampler.numbers(u32::MAX, pass, line);
+        let time = self.view.time(numbers.time());
         let wavelengths = self.density.map(|density| density.sample(self.sampler.shared_wavelengths(pass)));
-        let line = Line { draw: &draw, time, wavelengths };
-        let chord = self.chords.line(&draw).at_time(time);
+        let line = Line { numbers: &numbers, time, wavelengths };
+        let chord = self.chords.line(&numbers).at_time(time);
         let mut points = 0;
         self.scene.accel().all(&chord, |hit| {
             if self.scene.may_be_specular(hit) == are_specular {
@@ -205,7 +205,7 @@ impl<'s> LightTracer<'s> {
 
     /// The light of one sample that arrives at a point of a surface on a line.
     fn light(&self, point: DVec3, line: &Line<'_>, vertex: u32) -> Option<Lit<'s>> {
-        let (choose, u) = (line.draw.light_choice(vertex), line.draw.light_point(vertex));
+        let (choose, u) = (line.numbers.light_choice(vertex), line.numbers.light_point(vertex));
         let (id, mut sample) =
             self.scene.sample_light_for(Sampling::Mis, point, DVec3::ZERO, line.time, choose, u)?;
         if let Some(wavelengths) = &line.wavelengths {
@@ -269,7 +269,7 @@ impl<'s> LightTracer<'s> {
             path.flux *= self.scene.transmittance(
                 path.medium,
                 &back,
-                line.draw.along(&back),
+                line.numbers.along(&back),
                 line.wavelengths.as_ref(),
             );
         }
@@ -299,7 +299,7 @@ impl<'s> LightTracer<'s> {
                 path.flux = hero_alone(path.flux);
             }
             let number = first + path.bounces;
-            let (lobe, survival) = (line.draw.lobe(number), line.draw.survival(number));
+            let (lobe, survival) = (line.numbers.lobe(number), line.numbers.survival(number));
             let Some(part) = self.bounce(&mut path, &vertex, lobe, survival) else { return };
             if part.crosses {
                 match vertex.material.interior_medium(&here.at) {
@@ -377,7 +377,7 @@ impl<'s> LightTracer<'s> {
             return None;
         }
         let typical = typical_way(self.scene);
-        let u = f64::from(line.draw.direction(vertex).x);
+        let u = f64::from(line.numbers.direction(vertex).x);
         let at = typical * u / (1.0 - u);
         if at >= segment.t_max {
             return None;
@@ -413,7 +413,7 @@ impl<'s> LightTracer<'s> {
     }
 
     fn transmittance(&self, path: &LightPath<'s>, segment: &Ray, line: &Line<'_>) -> Spectrum {
-        let seed = line.draw.along(segment);
+        let seed = line.numbers.along(segment);
         self.scene.transmittance(path.medium, segment, seed, line.wavelengths.as_ref())
     }
 

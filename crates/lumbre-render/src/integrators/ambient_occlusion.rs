@@ -22,8 +22,8 @@ pub struct AmbientOcclusion {
 }
 
 impl Integrator for AmbientOcclusion {
-    fn estimate(&self, sights: &mut PrimaryHits<'_, '_>, _: &Sampler, record: &mut Record) {
-        sights.follow_trees(self, record);
+    fn estimate(&self, primary_hits: &mut PrimaryHits<'_, '_>, _: &Sampler, record: &mut Record) {
+        primary_hits.follow_trees(self, record);
     }
 }
 

@@ -29,9 +29,9 @@ impl Caustics {
 }
 
 impl Integrator for Caustics {
-    fn estimate(&self, sights: &mut PrimaryHits<'_, '_>, sampler: &Sampler, record: &mut Record) {
-        let (scene, view) = (sights.scene(), sights.view());
-        let density = sights.wavelength_choice().map(|choice| choice.density);
+    fn estimate(&self, primary_hits: &mut PrimaryHits<'_, '_>, sampler: &Sampler, record: &mut Record) {
+        let (scene, view) = (primary_hits.scene(), primary_hits.view());
+        let density = primary_hits.wavelength_choice().map(|choice| choice.density);
         let mut setting = Setting { is_spectral: density.is_some(), ..self.path.setting(scene, sampler) };
         if let Some(chords) = ChordSampler::new(scene).filter(|_| !scene.lights().is_empty()) {
             let tracer = LightTracer {
@@ -45,7 +45,7 @@ impl Integrator for Caustics {
                 density,
             };
             let plan = PassPlan::new(view.size(), density);
-            let mut numbers: Vec<u32> = sights.indices().map(|index| plan.pass_of(index)).collect();
+            let mut numbers: Vec<u32> = primary_hits.indices().map(|index| plan.pass_of(index)).collect();
             numbers.sort_unstable();
             numbers.dedup();
             let passes = numbers.into_iter().map(|number| (number, self.passes.get(&tracer, &plan, number)));
@@ -53,7 +53,7 @@ impl Integrator for Caustics {
             let lines = plan.lines().into();
             setting.merging = Some(Merging { chords, passes, plan, lines, typical_way: typical_way(scene) });
         }
-        sights.follow(&setting, record);
+        primary_hits.follow(&setting, record);
     }
 
     fn carries_wavelengths(&self) -> bool {

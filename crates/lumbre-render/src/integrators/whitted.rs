@@ -123,8 +123,8 @@ impl Whitted {
 }
 
 impl Integrator for Whitted {
-    fn estimate(&self, sights: &mut PrimaryHits<'_, '_>, _: &Sampler, record: &mut Record) {
-        sights.follow_trees(self, record);
+    fn estimate(&self, primary_hits: &mut PrimaryHits<'_, '_>, _: &Sampler, record: &mut Record) {
+        primary_hits.follow_trees(self, record);
     }
 }
 

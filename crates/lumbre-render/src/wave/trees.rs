@@ -225,7 +225,7 @@ impl<'s> Wave<'s> {
             radiance: Spectrum::BLACK,
             direct: Direct { slot, factor: None, unoccluded: Spectrum::BLACK, end: 0 },
         };
-        let numbers = self.slots.draw(slot as usize);
+        let numbers = self.slots.numbers(slot as usize);
         integrator.shade(scene, branch, met.as_ref(), &numbers, &mut vertex, record);
         let TreeVertex { radiance, direct, .. } = vertex;
         self.slots.radiance[slot as usize] += radiance;
